@@ -9,10 +9,10 @@ use divan::Bencher;
 use nalgebra::{Rotation3, Vector3};
 use truebead::calibration::Camera;
 use truebead::calibration::board::Board;
-use truebead::calibration::covariance::Covariance;
+use truebead::calibration::covariance::CalibrationCovariance;
 use truebead::calibration::plane::OnBed;
 use truebead::calibration::sighting;
-use truebead::calibration::sighting::Sighting;
+use truebead::calibration::sighting::BoardObservation;
 use truebead::calibration::solve;
 use truebead::calibration::solve::Solution;
 use truebead::calibration::{map, next_view};
@@ -46,8 +46,8 @@ fn frames() -> Vec<Frame> {
         .collect()
 }
 
-fn sightings() -> Vec<Sighting> {
-    frames().iter().map(|frame| sighting::look(&board(), "", frame).expect("a board")).collect()
+fn sightings() -> Vec<BoardObservation> {
+    frames().iter().map(|frame| sighting::observe(&board(), "", frame).expect("a board")).collect()
 }
 
 fn solution() -> Solution {
@@ -60,7 +60,7 @@ fn find_and_refine(bencher: Bencher<'_, '_>) {
     let mut next = 0;
     bencher.bench_local(|| {
         next = (next + 1) % frames.len();
-        sighting::look(&board, "", black_box(&frames[next])).expect("a board")
+        sighting::observe(&board, "", black_box(&frames[next])).expect("a board")
     });
 }
 
@@ -70,9 +70,9 @@ fn solve_thirteen_views(bencher: Bencher<'_, '_>) {
     bencher.bench_local(|| solve::solve(&board, black_box(&sightings)).expect("a camera"));
 }
 
-fn covariance(solution: &Solution) -> Covariance {
+fn covariance(solution: &Solution) -> CalibrationCovariance {
     let on_bed = OnBed::fit(&solution.model, vec![solution.corners(&board(), 0)]).expect("a bed");
-    Covariance::of(&board(), solution, &on_bed, Mm::ZERO).expect("a settled camera")
+    CalibrationCovariance::of(&board(), solution, &on_bed, Mm::ZERO).expect("a settled camera")
 }
 
 #[divan::bench]

@@ -7,19 +7,19 @@
 use divan::Bencher;
 use truebead::core::time::{Span, Stamp};
 use truebead::core::units::{Mm, MmPerS};
-use truebead::width_control::distance::{ByDistance, DistanceSettings, MeasuredWidth};
+use truebead::width_control::distance::{DistanceController, DistanceSettings, MeasuredWidth};
 
 const FRAME_S: f64 = 0.02;
 
 /// A law that is under way on a bead whose flow pulsates.
 struct Under {
-    law: ByDistance,
+    law: DistanceController,
     count: u32,
 }
 
 impl Under {
     fn new() -> Self {
-        let law = ByDistance::new(DistanceSettings {
+        let law = DistanceController::new(DistanceSettings {
             offset: Mm::constant(88.4),
             offset_sigma: Mm::constant(8.8),
             gauge: Mm::constant(12.7),

@@ -6,24 +6,24 @@
 use divan::Bencher;
 use truebead::core::time::{Span, Stamp};
 use truebead::core::units::{MPa, Rpm};
-use truebead::extruder::pressure::{PressureLaw, Running};
-use truebead::studies::ma2026::Tried;
+use truebead::extruder::pressure::{InitialState, PressureController};
+use truebead::studies::ma2026::TestedController;
 
 const READING: Span = Span::from_millis(20);
 const COMMAND: Span = Span::from_millis(50);
 
 /// A law that is under way, with a target that never rests.
 struct Cycle {
-    law: Box<dyn PressureLaw>,
+    law: Box<dyn PressureController>,
     now: Stamp,
     count: u64,
 }
 
 impl Cycle {
-    fn new(tried: Tried) -> Self {
+    fn new(tried: TestedController) -> Self {
         let at = MPa::constant(0.6);
-        let running = Running { pressure: at, target: at, speed: Rpm::constant(0.6) };
-        let law = tried.law(running).expect("sound settings");
+        let running = InitialState { pressure: at, target: at, speed: Rpm::constant(0.6) };
+        let law = tried.controller(running).expect("sound settings");
         let mut cycle = Self { law, now: Stamp::START, count: 0 };
         for _ in 0..200 {
             cycle.run();
@@ -46,8 +46,8 @@ impl Cycle {
 }
 
 // One cycle is too short for the clock alone: a sample is the mean of many.
-#[divan::bench(sample_size = 400, args = [Tried::Pi, Tried::Vsfc, Tried::SmithPi, Tried::Predictive])]
-fn cycle(bencher: Bencher<'_, '_>, tried: Tried) {
+#[divan::bench(sample_size = 400, args = [TestedController::Pi, TestedController::Vsfc, TestedController::SmithPi, TestedController::Predictive])]
+fn cycle(bencher: Bencher<'_, '_>, tried: TestedController) {
     let mut cycle = Cycle::new(tried);
     bencher.bench_local(|| cycle.run());
 }

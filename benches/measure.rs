@@ -19,9 +19,9 @@ use truebead::core::geometry::Roi;
 use truebead::core::time::Stamp;
 use truebead::core::units::Mm;
 use truebead::core::units::WidthRange;
-use truebead::scenario::image::Picture;
+use truebead::scenario::image::ImageModel;
 use truebead::sim::render::Renderer;
-use truebead::vision::{Axis, Gauge, Measurer, Method, Polarity};
+use truebead::vision::{BeadAxis, Gauge, MeasureMethod, Measurer, Polarity};
 
 const MM_PER_PX: f64 = 0.126_582;
 /// Frames of the ring, 25 MB.
@@ -43,7 +43,7 @@ const LINES: EdgeSettings = EdgeSettings {
 };
 const FULL: &str = include_str!("../calib/example.toml");
 
-fn gauge(axis: Axis, method: Method) -> Gauge {
+fn gauge(axis: BeadAxis, method: MeasureMethod) -> Gauge {
     Gauge {
         method,
         ..Gauge::new(
@@ -60,10 +60,10 @@ fn scale() -> Calibration {
 }
 
 /// Different frames, the bead of each a little wider and further to the right.
-fn frames(axis: Axis, count: u8) -> Vec<Frame> {
-    let gauge = gauge(axis, Method::Caliper);
+fn frames(axis: BeadAxis, count: u8) -> Vec<Frame> {
+    let gauge = gauge(axis, MeasureMethod::Caliper);
     let renderer =
-        Renderer::new(scale(), Mm::ZERO, gauge, Picture::USUAL, 1).expect("a sound cell");
+        Renderer::new(scale(), Mm::ZERO, gauge, ImageModel::DEFAULT, 1).expect("a sound cell");
     let frame = |number: u8| {
         let aside = 0.003 * f64::from(number);
         let bead = |_: f64| Some((-21.0 + aside, 21.0 + 2.0 * aside));
@@ -72,7 +72,7 @@ fn frames(axis: Axis, count: u8) -> Vec<Frame> {
     (0..count).map(frame).collect()
 }
 
-fn frame(axis: Axis) -> Frame {
+fn frame(axis: BeadAxis) -> Frame {
     frames(axis, 1).swap_remove(0)
 }
 
@@ -82,38 +82,38 @@ fn time(bencher: Bencher<'_, '_>, gauge: Gauge, frame: &Frame, surface: &Surface
     bencher.bench_local(|| black_box(measurer.measure(black_box(frame), surface)));
 }
 
-#[divan::bench(args = [Method::Caliper, Method::EdgeLines])]
-fn vertical(bencher: Bencher<'_, '_>, method: Method) {
-    let gauge = gauge(Axis::Vertical, method);
-    time(bencher, gauge, &frame(Axis::Vertical), &scale().surface(Mm::ZERO, None));
+#[divan::bench(args = [MeasureMethod::Caliper, MeasureMethod::EdgeLines])]
+fn vertical(bencher: Bencher<'_, '_>, method: MeasureMethod) {
+    let gauge = gauge(BeadAxis::Vertical, method);
+    time(bencher, gauge, &frame(BeadAxis::Vertical), &scale().surface(Mm::ZERO, None));
 }
 
 #[divan::bench]
 fn horizontal(bencher: Bencher<'_, '_>) {
-    let gauge = gauge(Axis::Horizontal, Method::Caliper);
-    time(bencher, gauge, &frame(Axis::Horizontal), &scale().surface(Mm::ZERO, None));
+    let gauge = gauge(BeadAxis::Horizontal, MeasureMethod::Caliper);
+    time(bencher, gauge, &frame(BeadAxis::Horizontal), &scale().surface(Mm::ZERO, None));
 }
 
 #[divan::bench]
 fn sixteen_bits(bencher: Bencher<'_, '_>) {
-    let eight = frame(Axis::Vertical);
+    let eight = frame(BeadAxis::Vertical);
     let values = eight.to_grey8().iter().map(|&grey| u16::from(grey) * 257).collect();
     let frame = Frame::new(0, Stamp::START, eight.size(), Pixels::Grey16(values)).expect("pixels");
-    let gauge = gauge(Axis::Vertical, Method::Caliper);
+    let gauge = gauge(BeadAxis::Vertical, MeasureMethod::Caliper);
     time(bencher, gauge, &frame, &scale().surface(Mm::ZERO, None));
 }
 
 #[divan::bench]
 fn full_calibration(bencher: Bencher<'_, '_>) {
     let calibration = file::parse("example.toml", FULL).expect("a sound calibration");
-    let gauge = gauge(Axis::Vertical, Method::Caliper);
+    let gauge = gauge(BeadAxis::Vertical, MeasureMethod::Caliper);
     let surface = calibration.surface(Mm::constant(20.0), None);
-    time(bencher, gauge, &frame(Axis::Vertical), &surface);
+    time(bencher, gauge, &frame(BeadAxis::Vertical), &surface);
 }
 
 #[divan::bench]
 fn copy_of_the_frame(bencher: Bencher<'_, '_>) {
-    let frame = frame(Axis::Vertical);
+    let frame = frame(BeadAxis::Vertical);
     let mut copy = frame.to_grey8().into_owned();
     bencher.bench_local(|| copy.copy_from_slice(&black_box(&frame).to_grey8()));
 }
@@ -134,7 +134,7 @@ impl<'a> Contest<'a> {
             frames,
             next: 0,
             surface: scale().surface(Mm::ZERO, None),
-            measurer: Measurer::new(gauge(Axis::Vertical, Method::Caliper), None),
+            measurer: Measurer::new(gauge(BeadAxis::Vertical, MeasureMethod::Caliper), None),
             copy: frames[0].to_grey8().into_owned(),
             finder: LineFinder::new(LINES),
         }
@@ -251,7 +251,7 @@ fn report(times: &Times) {
 
 fn main() {
     divan::main();
-    let ring = frames(Axis::Vertical, RING);
+    let ring = frames(BeadAxis::Vertical, RING);
     let times = Contest::new(&ring).run(ROUNDS, ROUNDS_OF_LINES);
     let hot = Contest::new(&ring[..1]).run(HOT_ROUNDS, 10);
     println!("\n{RING} frames of 720x540 px in turn, one thread, rounds interleaved");

@@ -8,25 +8,25 @@ use truebead::core::geometry::Roi;
 use truebead::core::time::Stamp;
 use truebead::core::units::Mm;
 use truebead::core::units::WidthRange;
-use truebead::scenario::image::{Motion, Picture};
+use truebead::scenario::image::{ImageModel, MotionBlur};
 use truebead::sim::render::Renderer;
-use truebead::vision::{Axis, Gauge, Polarity};
+use truebead::vision::{BeadAxis, Gauge, Polarity};
 
-const USUAL: Picture = Picture { size_px: [720, 100], ..Picture::USUAL };
+const USUAL: ImageModel = ImageModel { size_px: [720, 100], ..ImageModel::DEFAULT };
 
 const NAMES: [&str; 9] =
     ["nothing", "shading", "shadow", "older bead", "spots", "grains", "motion", "texture", "curve"];
 
-fn disturbed(name: &str) -> Picture {
+fn disturbed(name: &str) -> ImageModel {
     let mut picture = USUAL;
     match name {
         "shading" => picture.shading.bead_grey_per_px = 1.0,
         "shadow" => picture.shadow.distance_px = 6.0,
         "older bead" => picture.neighbour.gap_px = 20.0,
-        "spots" => picture.spots.share = 0.05,
-        "grains" => picture.grains.rows_share = 0.3,
-        "motion" => picture.motion = Motion { length_px: 6.0, direction_deg: 15.0 },
-        "texture" => picture.texture.size_grey = 2.0,
+        "spots" => picture.spots.covered_fraction = 0.05,
+        "grains" => picture.grains.rows_fraction = 0.3,
+        "motion" => picture.motion = MotionBlur { length_px: 6.0, direction_deg: 15.0 },
+        "texture" => picture.texture.sigma_grey = 2.0,
         "curve" => picture.bend.radius_mm = 120.0,
         _ => {}
     }
@@ -37,7 +37,7 @@ fn disturbed(name: &str) -> Picture {
 fn picture(bencher: Bencher<'_, '_>, name: &str) {
     let gauge = Gauge::new(
         Roi { x: 40, y: 10, width: 640, height: 80 },
-        Axis::Vertical,
+        BeadAxis::Vertical,
         Polarity::Bright,
         WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
     );

@@ -8,21 +8,22 @@ use divan::{Bencher, black_box};
 use truebead::core::time::{Span, Stamp};
 use truebead::core::units::Mm;
 use truebead::extruder::screw::control::{Scheme, ScrewSettings};
-use truebead::extruder::screw::feedback::Setpoint;
+use truebead::extruder::screw::feedback::PlugSetpoint;
 use truebead::extruder::screw::{
-    FillLaw, PiecewiseExponential, Pulsation, Screw, ScrewControl, ScrewDesign,
+    FillFeedback, PiecewiseExponential, Screw, ScrewControl, ScrewDesign, SpeedPulsation,
 };
 
-const A: Pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+const A: SpeedPulsation =
+    SpeedPulsation { relative_amplitude: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
 /// Share that is fed for as long as the delay lasts.
 const SHARES: [f64; 2] = [0.3, 0.5];
 
-fn control(pulsation: Pulsation, scheme: Scheme, period: Span) -> ScrewControl {
+fn control(pulsation: SpeedPulsation, scheme: Scheme, period: Span) -> ScrewControl {
     let screw: Screw = ScrewDesign::DIAGNE_2015.screw(pulsation).expect("sound");
-    let setpoint = Setpoint { plug: Mm::constant(160.0), most: 0.9 };
+    let setpoint = PlugSetpoint { plug: Mm::constant(160.0), max_fill: 0.9 };
     let law = PiecewiseExponential::new(&screw, setpoint, 36.0).expect("sound");
-    let law = FillLaw::Exponential(law);
-    let settings = ScrewSettings { screw, law, scheme, period, before: 0.2 };
+    let law = FillFeedback::Exponential(law);
+    let settings = ScrewSettings { screw, feedback: law, scheme, period, initial_fill: 0.2 };
     ScrewControl::new(&settings).expect("sound")
 }
 
@@ -59,7 +60,7 @@ fn exact_at_1_khz(bencher: Bencher<'_, '_>) {
 #[divan::bench]
 fn exact_and_steady_at_200_hz(bencher: Bencher<'_, '_>) {
     let period = Span::from_millis(5);
-    step(bencher, control(Pulsation::default(), Scheme::Exact, period), period);
+    step(bencher, control(SpeedPulsation::default(), Scheme::Exact, period), period);
 }
 
 #[divan::bench]

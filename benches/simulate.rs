@@ -11,7 +11,7 @@ use truebead::cell::Cell;
 use truebead::cell::file::Purpose;
 use truebead::core::units::Mm;
 use truebead::run::runner::NoRecorder;
-use truebead::sim::cell::{Deaf, SimCell};
+use truebead::sim::cell::{NoObserver, SimCell};
 
 const CELL: &str = include_str!("../cells/barjuei2022.toml");
 
@@ -20,7 +20,7 @@ fn layer() -> f64 {
     let run = cell.run.clone().expect("read for a run");
     let scale = Calibration::Scale { mm_per_px: 0.126_582, sigma: None };
     let mut sim = SimCell::new(&cell, &run, scale, NoRecorder).expect("a sound cell");
-    sim.layer(Mm::ZERO, &mut Deaf).took.secs()
+    sim.layer(Mm::ZERO, &mut NoObserver).duration.secs()
 }
 
 #[divan::bench]

@@ -6,7 +6,7 @@ mod range;
 mod side;
 
 pub use error::AssemblyError;
-pub use range::{beyond, steady};
+pub use range::{range_warning, steady_state};
 pub use side::{ExtruderSide, SimulatedSide};
 
 use extruder::ExtruderFiles;
@@ -19,7 +19,7 @@ use crate::cell::Cell;
 use crate::cell::file::{CalibrationSource, ExtruderPart, Purpose};
 use crate::core::units::Mm;
 use crate::io::calibration_file;
-use crate::sim::cell::Rig;
+use crate::sim::cell::CommandedExtruder;
 use crate::sim::extruder::SimExtruder;
 
 /// A cell, its calibration, and their texts for the recording.
@@ -65,12 +65,12 @@ impl LoadedCell {
             }
         };
         let loaded = Self { path: path.to_owned(), text, cell, calibration, calibration_text };
-        loaded.check_sight()?;
+        loaded.check_camera_offset()?;
         Ok(loaded)
     }
 
     /// Refuses a law by distance whose camera looks at bead that is not laid yet.
-    pub fn check_sight(&self) -> Result<(), AssemblyError> {
+    pub fn check_camera_offset(&self) -> Result<(), AssemblyError> {
         let Some(run) = &self.cell.run else { return Ok(()) };
         let half = self.cell.gauge_length(&self.calibration) * 0.5;
         let offset = run.camera.offset;
@@ -116,11 +116,11 @@ impl LoadedCell {
         let Some(part) = part else { return Ok(None) };
         let plant = self.plant(part)?;
         let Some(side) = self.extruder()? else { return Ok(None) };
-        let beyond = beyond(part, &side)?;
-        let warnings = side.warnings.into_iter().chain(beyond).collect();
+        let range_warning = range_warning(part, &side)?;
+        let warnings = side.warnings.into_iter().chain(range_warning).collect();
         let (demand, nominal_flow) = (part.demand, part.plant_nominal);
-        let rig = Rig { setup: side.setup, demand, plant, nominal_flow };
-        Ok(Some(SimulatedSide { rig, warnings }))
+        let extruder = CommandedExtruder { setup: side.setup, demand, plant, nominal_flow };
+        Ok(Some(SimulatedSide { extruder, warnings }))
     }
 
     /// The map of the measured surface, for a camera that rides as the cell

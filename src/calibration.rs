@@ -40,5 +40,5 @@ pub mod uncertainty;
 pub mod verify;
 
 pub use camera::Camera;
-pub use model::{Calibration, Quality, SurfaceMap};
-pub use uncertainty::Uncertainty;
+pub use model::{Calibration, CalibrationQuality, SurfaceMap};
+pub use uncertainty::CalibrationUncertainty;

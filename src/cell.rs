@@ -6,4 +6,4 @@ mod controller;
 pub mod extruder;
 pub mod file;
 
-pub use file::{Camera, Cell, Mount, Recording, Robot, Source};
+pub use file::{CameraSettings, Cell, ImageSource, Mount, RecordingSettings, RobotSettings};

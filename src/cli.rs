@@ -43,7 +43,7 @@ use std::process::ExitCode;
 use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-use print::Voice;
+use print::Verbosity;
 use status::status_of;
 
 /// Keeps an extruded bead at the width that was asked for.
@@ -121,7 +121,7 @@ pub fn main() -> ExitCode {
         },
     };
     listen(&cli);
-    let voice = Voice { quiet: cli.quiet };
+    let voice = Verbosity { quiet: cli.quiet };
     let done = match &cli.command {
         Command::Demo(args) => demo::run(args, voice),
         Command::Check(args) => check::run(args),

@@ -18,7 +18,7 @@ pub use self::problem::{Problem, Problems};
 pub use self::table::Table;
 
 /// Slips of syntax that are told: one makes many.
-const SLIPS: usize = 3;
+const MAX_SYNTAX_ERRORS: usize = 3;
 
 /// A parsed file and what was found wrong with it so far.
 pub struct Document<'a> {
@@ -32,8 +32,8 @@ impl<'a> Document<'a> {
     pub fn parse(file: &'a str, text: &'a str, for_run: bool) -> Self {
         let (root, errors) = DeTable::parse_recoverable(text);
         let text = FileText::new(file, text, for_run);
-        let more = errors.len().saturating_sub(SLIPS);
-        for error in errors.into_iter().take(SLIPS) {
+        let more = errors.len().saturating_sub(MAX_SYNTAX_ERRORS);
+        for error in errors.into_iter().take(MAX_SYNTAX_ERRORS) {
             let line = error.span().map(|span| text.line_of(span.start));
             text.report(line, "", format!("not TOML: {}", error.message()), "");
         }

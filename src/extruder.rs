@@ -25,11 +25,11 @@ pub mod strategy;
 pub mod supervisor;
 pub mod trajectory;
 
-pub use demand::{FlowDemand, Follows, RobotFollows, RobotSpeed};
-pub use drive::Drive;
+pub use demand::{FlowDemand, FlowFollows, RobotFollows, RobotSpeed};
+pub use drive::CommandQuantity;
 pub use limits::{CommandLimit, CommandLimits};
 pub use readings::ReadingFilters;
 pub use report::{ExtruderCommand, ExtruderReport, PumpMode};
 pub use state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
-pub use strategy::Law;
+pub use strategy::ExtruderStrategy;
 pub use supervisor::{ExtruderSetup, Laying, Supervisor};

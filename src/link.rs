@@ -20,4 +20,6 @@ pub use frame::{
     BadLines, ErrCode, LineError, LineFault, LineSplitter, MAX_BAD_LINES, MAX_LINE, MAX_VALID_MS,
     MIN_VALID_MS, VERSION,
 };
-pub use robot::{Faults, Job, ParamError, PcLine, RobotCell, RobotLine, RobotParams, on_wire};
+pub use robot::{
+    ParamError, PcLine, PrintJob, RobotFaults, RobotLine, RobotParams, VirtualRobot, on_wire,
+};

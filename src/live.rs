@@ -29,7 +29,7 @@ use crossbeam_channel::{Receiver, bounded, never, unbounded};
 use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::cell::extruder::ExtruderLink;
-use crate::cell::file::{RunPart, Source};
+use crate::cell::file::{ImageSource, RunPart};
 use crate::control::Controller;
 use crate::core::time::Span;
 use crate::drivers::camera::open;
@@ -43,15 +43,15 @@ use crate::io::clock::RunClock;
 use crate::io::record::{self, Incomplete, RecordConfig, RecordReport};
 use crate::rows::log::RunLog;
 use crate::rows::output::LogError;
-use crate::rows::summary::{Note, Summary};
+use crate::rows::summary::{RunNote, Summary};
 use crate::run::ports::{FrameSource, RecordError, SourceError};
 use crate::run::runner::Runner;
 use crate::sim::render::{RenderError, Renderer};
 
 pub use control::Ending;
-use control::{ExtruderWatch, LinkPort, Loop, Sources, StepsWatch};
-use eye::Eye;
-use scribe::Scribe;
+use control::{ControlThread, ExtruderWatch, LinkPort, Sources, StepsWatch};
+use eye::CapturePipeline;
+use scribe::RunLogger;
 
 /// What a live run needs.
 pub struct LiveRun {
@@ -97,7 +97,7 @@ impl LiveExtruder {
         let (min, max) = self.setup.limits.range();
         ExtruderConfig {
             address: self.link.address.clone(),
-            drive: self.setup.drive,
+            drive: self.setup.quantity,
             min,
             max,
             valid_ms: self.link.valid_ms,
@@ -153,7 +153,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     let link = LinkClient::start(link_config(&live.run), live.clock, robot_events)?;
     let (extruder, from_extruder) = open_extruder(&live)?;
     let robot_z = Arc::new(AtomicU64::new(f64::NAN.to_bits()));
-    let eye = Eye::start(
+    let eye = CapturePipeline::start(
         source,
         eye::Optics {
             cell: live.cell.clone(),
@@ -163,16 +163,16 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         recorder.frames(),
         live.clock,
     )?;
-    let scribe = Scribe::start(live.log)?;
+    let scribe = RunLogger::start(live.log)?;
     let watch = live
         .extruder
         .as_ref()
         .map(|side| ExtruderWatch::new(side.config(), side.setup.feedforward_period));
-    let mut controller = Controller::new(live.cell.controller(&live.run, &live.calibration));
+    let mut controller = Controller::new(live.cell.controller_setup(&live.run, &live.calibration));
     if let Some(side) = live.extruder {
         controller = controller.with_extruder(side.setup, side.demand);
     }
-    let mut control = Loop {
+    let mut control = ControlThread {
         runner: Runner::with_extruder(controller, LinkPort::new(link), extruder, recorder),
         extruder: watch,
         clock: live.clock,
@@ -181,7 +181,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         robot_z,
         robot_view,
         latencies: latency::Latencies::default(),
-        scribe: &scribe,
+        logger: &scribe,
         notice: live.notice,
         limits: live.run.limits,
         unfit: None,
@@ -209,19 +209,21 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     port.close();
     let dropped = recorder.frames_dropped();
     let recording = recorder.finish();
-    scribe.note(Note::FramesSuperseded(superseded));
-    scribe.note(Note::FramesDroppedByRecorder(dropped));
+    scribe.note(RunNote::FramesSuperseded(superseded));
+    scribe.note(RunNote::FramesDroppedByRecorder(dropped));
     if let Ending::RobotLimits(why) | Ending::ExtruderUnfit(why) = &ending {
-        scribe.note(Note::Remark(format!("The run was refused: {why}.")));
+        scribe.note(RunNote::Remark(format!("The run was refused: {why}.")));
     }
     if pump_runs {
-        scribe.note(Note::Remark(
+        scribe.note(RunNote::Remark(
             "The pump was told to stop and did not say that it stops.".to_owned(),
         ));
     }
     if let Err(incomplete) = &recording {
-        scribe.note(Note::RecordsLost(1));
-        scribe.note(Note::Remark(format!("the recording misses the end of the run: {incomplete}")));
+        scribe.note(RunNote::RecordsLost(1));
+        scribe.note(RunNote::Remark(format!(
+            "the recording misses the end of the run: {incomplete}"
+        )));
     }
     Ok(LiveReport { summary: scribe.finish()?, ending, pump_runs, recording })
 }
@@ -242,7 +244,7 @@ fn open_camera(
     ending: Receiver<()>,
 ) -> Result<(Box<dyn FrameSource>, Option<RobotView>), LiveError> {
     let camera = &live.run.camera;
-    if camera.source != Source::Rendered {
+    if camera.source != ImageSource::Rendered {
         let options = open::LiveOptions::of(camera, live.cell.channel);
         return Ok((open::live(options, live.clock, ending)?, None));
     }
@@ -251,7 +253,7 @@ fn open_camera(
         live.calibration.clone(),
         live.cell.surface_height,
         live.cell.gauge,
-        simulation.picture,
+        simulation.image,
         simulation.seed,
     )?;
     let (source, view) = RenderedCamera::new(renderer, simulation, camera, live.clock, ending);

@@ -48,7 +48,7 @@ mod tests;
 mod time_gradient;
 
 pub use limits::{PathLimits, attainable, time_optimal};
-pub use prediction::{Foretold, Unplanned};
-pub use profile::{ProfileError, SpeedPoint, SpeedProfile};
+pub use prediction::{UnplannedCommand, WidthPrediction};
+pub use profile::{SpeedPoint, SpeedProfile, SpeedProfileError};
 pub use solve::{Plan, solve};
-pub use task::{Bead, Limits, PlanError, RobotLimits, Task, Unmodelled};
+pub use task::{BeadGeometry, FlowUncertainty, PlanError, PlanLimits, PlanTask, RobotMotionLimits};

@@ -22,11 +22,11 @@ pub mod timing;
 mod tests;
 
 pub use log::Log;
-pub use plant::{Facts, Plant};
+pub use plant::{IdentifiedCell, TuneFacts};
 
 /// A number and its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Known {
+pub struct Estimated {
     /// The number.
     pub value: f64,
     /// Its standard deviation.
@@ -38,7 +38,7 @@ pub struct Known {
 pub enum TuneError {
     /// The bead does not tell its model.
     #[error(transparent)]
-    Bead(#[from] crate::identify::camera_offset::OffsetError),
+    Bead(#[from] crate::identify::camera_offset::CameraOffsetError),
     /// The widths hardly tell how the bead answers the speed.
     #[error(
         "the exponent is {exponent:.2} ± {sigma:.2}, known no better than to a third of itself: \

@@ -83,8 +83,8 @@ mod waviness;
 mod whiten;
 pub mod width;
 
-pub use gauge::{Axis, EdgeKind, Gauge, Method, Polarity};
+pub use gauge::{BeadAxis, EdgeKind, Gauge, MeasureMethod, Polarity};
 pub use measure::Measurer;
 pub use reject::Reject;
 pub use roughness::{LocalWidths, Roughness, RoughnessEstimator};
-pub use width::{Caliper, EdgePlace, Edges, Hints, Skew, WidthMeasurement};
+pub use width::{Caliper, CaliperPoint, Edges, Hints, WidthMeasurement, WidthSkew};

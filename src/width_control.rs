@@ -12,5 +12,5 @@ pub mod strategy;
 pub mod target;
 pub mod transport;
 
-pub use distance::{DistanceTrace, Distrust};
-pub use limiter::Limit;
+pub use distance::{DistanceTrace, FallbackReason};
+pub use limiter::SpeedLimit;

@@ -51,7 +51,7 @@ fn the_camera_of_the_real_pictures_is_found() {
     let calibration = calibration_file::read(&out).unwrap();
     let Calibration::Full { camera, quality, .. } = &calibration else { unreachable!() };
     assert!(quality.unwrap().reprojection_rms_px <= 0.20);
-    let share = quality.unwrap().width_sigma_share.unwrap();
+    let share = quality.unwrap().width_relative_sigma.unwrap();
     // The largest where boards were seen, with the design effect of a board that is bent.
     assert!((1e-4..2e-2).contains(&share), "{share}");
     assert!(said.contains("a width is known to"), "{said}");
@@ -80,7 +80,7 @@ fn the_squares_have_their_size_at_any_height_of_the_board() {
     let picture =
         image_file::read(&folder.join("left04.jpg"), Channel::Grey, 0, Stamp::START).unwrap();
     let board = Board::new(9, 6, Mm::constant(25.0)).unwrap();
-    let corners = sighting::look(&board, "left04.jpg", &picture).unwrap().corners;
+    let corners = sighting::observe(&board, "left04.jpg", &picture).unwrap().corners;
     let corners: Vec<_> = corners.iter().map(|corner| corner.px).collect();
     for row in corners.chunks(9) {
         for pair in row.windows(2) {
@@ -188,7 +188,7 @@ fn pictures_that_are_no_good_are_left_out_and_say_why() {
     };
     let nine = board(9, 6);
     let blurred = Exposure { blur_px: 6.0, ..Exposure::SHARP };
-    let moved = Exposure { way_px: Vector2::new(10.0, 0.0), ..Exposure::SHARP };
+    let moved = Exposure { motion_px: Vector2::new(10.0, 0.0), ..Exposure::SHARP };
     save(&take(&nine, blurred, 1), &folder.join("wrong-blurred.png"));
     save(&take(&nine, moved, 2), &folder.join("wrong-moved.png"));
     save(&take(&nine, Exposure::SHARP, 3), &folder.join("wrong-twin.png"));
@@ -230,7 +230,7 @@ fn pictures_that_are_no_good_are_left_out_and_say_why() {
     };
     assert!((found.focal_px[0] - 900.0).abs() < 0.6, "{found:?}");
     let quality = quality.unwrap();
-    assert!(quality.reprojection_rms_px < 0.03 && quality.width_sigma_share.unwrap() < 5e-4);
+    assert!(quality.reprojection_rms_px < 0.03 && quality.width_relative_sigma.unwrap() < 5e-4);
     assert!(quality.seen_px.is_some() && quality.heights_mm.is_some());
 }
 

@@ -11,12 +11,12 @@ use rand::seq::SliceRandom;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use truebead::calibration::board::Board;
-use truebead::calibration::covariance::Covariance;
-use truebead::calibration::equations::Corner;
+use truebead::calibration::covariance::CalibrationCovariance;
+use truebead::calibration::equations::Correspondence;
 use truebead::calibration::plane::OnBed;
 use truebead::calibration::sighting;
-use truebead::calibration::sighting::Sighting;
-use truebead::calibration::{Calibration, Quality, SurfaceMap, solve};
+use truebead::calibration::sighting::BoardObservation;
+use truebead::calibration::{Calibration, CalibrationQuality, SurfaceMap, solve};
 use truebead::core::frame::Channel;
 use truebead::core::time::Stamp;
 use truebead::core::units::Mm;
@@ -38,7 +38,7 @@ fn board() -> Board {
 }
 
 /// The boards of a set, if it is there.
-fn sightings(set: &str) -> Option<Vec<Sighting>> {
+fn sightings(set: &str) -> Option<Vec<BoardObservation>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(set);
     let Ok(files) = folder.read_dir() else {
         eprintln!("skipped: the pictures of the board are not at {}", folder.display());
@@ -48,7 +48,7 @@ fn sightings(set: &str) -> Option<Vec<Sighting>> {
     paths.sort();
     let look = |path: &std::path::PathBuf| {
         let frame = image_file::read(path, Channel::Grey, 0, Stamp::START).unwrap();
-        sighting::look(&board(), &path.display().to_string(), &frame).unwrap()
+        sighting::observe(&board(), &path.display().to_string(), &frame).unwrap()
     };
     Some(paths.par_iter().map(look).collect())
 }
@@ -60,13 +60,13 @@ struct Face {
     inflation: f64,
 }
 
-fn face(half: &[Sighting], corners: &[Corner]) -> Face {
+fn face(half: &[BoardObservation], corners: &[Correspondence]) -> Face {
     let solution = solve::solve(&board(), half).unwrap();
     let on_bed = OnBed::fit(&solution.model, vec![corners.to_vec()]).unwrap();
-    let covariance = Covariance::of(&board(), &solution, &on_bed, Mm::ZERO).unwrap();
-    let quality = Quality {
+    let covariance = CalibrationCovariance::of(&board(), &solution, &on_bed, Mm::ZERO).unwrap();
+    let quality = CalibrationQuality {
         reprojection_rms_px: solution.rms_px,
-        width_sigma_share: None,
+        width_relative_sigma: None,
         seen_px: None,
         heights_mm: None,
         // Both halves see the same corners of this picture: their noise is no difference.
@@ -83,7 +83,7 @@ fn face(half: &[Sighting], corners: &[Corner]) -> Face {
 }
 
 /// Ends of 100 px along x about the middle of each cell of the board.
-fn lengths(sighting: &Sighting) -> Vec<[Point2<f64>; 2]> {
+fn lengths(sighting: &BoardObservation) -> Vec<[Point2<f64>; 2]> {
     let corner = |column: usize, row: usize| sighting.corners[row * 9 + column].px;
     let part = |i: u32| (f64::from(i) + 0.5) / f64::from(GRID);
     let middle = |i: u32| {
@@ -117,18 +117,18 @@ struct Compared {
     sigma: f64,
 }
 
-fn split(all: &[Sighting], left_out: usize, seed: u64) -> Vec<Compared> {
-    let mut others: Vec<Sighting> = all.to_vec();
+fn split(all: &[BoardObservation], left_out: usize, seed: u64) -> Vec<Compared> {
+    let mut others: Vec<BoardObservation> = all.to_vec();
     let one = others.remove(left_out);
     others.shuffle(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
-    let corners = board().place(&one.corners);
+    let corners = board().correspondences(&one.corners);
     let (first, second) = others.split_at(others.len() / 2);
     let faces = [first, second].map(|half| face(half, &corners));
     let compare = |ends: [Point2<f64>; 2]| {
         let [a, b] = [&faces[0], &faces[1]].map(|face| {
             let place = ends.map(|px| face.surface.to_mm(px).unwrap());
             let length = (place[1] - place[0]).norm();
-            let sigma = face.surface.width_sigma_share_of(ends).unwrap() * length;
+            let sigma = face.surface.width_relative_sigma_of(ends).unwrap() * length;
             Length { mm: length, sigma, independent: sigma / face.inflation }
         });
         let (difference, sigma) = (a.mm - b.mm, a.sigma.hypot(b.sigma));
@@ -150,7 +150,7 @@ fn rms(compared: &[Compared], value: fn(&Compared) -> f64) -> f64 {
 
 #[test]
 fn halves_of_real_pictures_differ_as_much_as_they_predict() {
-    let sets: Option<Vec<Vec<Sighting>>> = SETS.iter().map(|set| sightings(set)).collect();
+    let sets: Option<Vec<Vec<BoardObservation>>> = SETS.iter().map(|set| sightings(set)).collect();
     let Some(sets) = sets else { return };
     let compared: Vec<(usize, Vec<Compared>)> = (0..SPLITS)
         .into_par_iter()

@@ -10,7 +10,7 @@ use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use nalgebra::{Rotation3, Vector3};
 use truebead::calibration::board::Board;
-use truebead::calibration::{Calibration, Camera, Quality, file};
+use truebead::calibration::{Calibration, CalibrationQuality, Camera, file};
 use truebead::core::geometry::Pose;
 use truebead::core::units::Mm;
 use truebead::io::calibration_file;
@@ -44,9 +44,9 @@ fn take(pose: &Pose, size: [u32; 2], path: &Path) {
 
 /// A calibration with everything in it.
 fn calibration(path: &Path) {
-    let quality = Quality {
+    let quality = CalibrationQuality {
         reprojection_rms_px: 0.1 + 0.2,
-        width_sigma_share: Some(4e-4),
+        width_relative_sigma: Some(4e-4),
         seen_px: Some([3.0, 4.0, 630.0, 470.0]),
         heights_mm: Some([0.0, 50.0]),
         uncertainty: None,
@@ -101,7 +101,7 @@ fn there_and_back_every_digit_stays_and_what_does_not_is_said() {
     assert_eq!((image_size_px, found, robot_z.get()), (SIZE, camera(), -7.0));
     let quality = quality.unwrap();
     assert!(quality.reprojection_rms_px < 0.05, "{quality:?}");
-    assert_eq!((quality.width_sigma_share, quality.seen_px), (None, None));
+    assert_eq!((quality.width_relative_sigma, quality.seen_px), (None, None));
 }
 
 #[test]

@@ -14,7 +14,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use truebead::io::recording::{Entry, Recording};
+use truebead::io::recording::{RecordedEntry, Recording};
 use wait_timeout::ChildExt;
 
 fn truebead() -> Command {
@@ -103,7 +103,7 @@ fn a_killed_run_leaves_all_but_the_last_second() {
     let last = Recording::open(&partial)
         .unwrap()
         .filter_map(|entry| match entry.unwrap() {
-            Entry::Event { now, .. } => Some(now.secs()),
+            RecordedEntry::Event { now, .. } => Some(now.secs()),
             _ => None,
         })
         .last()

@@ -7,13 +7,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use truebead::calibration::{Calibration, Quality};
+use truebead::calibration::{Calibration, CalibrationQuality};
 use truebead::cell::Cell;
 use truebead::cell::file::{CalibrationSource, Purpose};
 use truebead::io::calibration_file;
-use truebead::scenario::image::{Motion, Side, Spots};
-use truebead::sim::frame_series::Series;
-use truebead::vision::{Measurer, Method, WidthMeasurement};
+use truebead::scenario::image::{BeadSide, MotionBlur, Spots};
+use truebead::sim::frame_series::FrameSeries;
+use truebead::vision::{MeasureMethod, Measurer, WidthMeasurement};
 
 const FOLDERS: [&str; 3] = ["straight", "tilted", "dark"];
 
@@ -38,7 +38,7 @@ fn scenario(name: &str) -> (Cell, Calibration) {
 fn the_test_images_are_made_again_pixel_by_pixel() {
     for name in FOLDERS {
         let (cell, calibration) = scenario(name);
-        let series = Series::new(&cell, calibration).unwrap();
+        let series = FrameSeries::new(&cell, calibration).unwrap();
         let mut table = csv::Reader::from_path(folder(name).join("truth.csv")).unwrap();
         let rows: Vec<Vec<f64>> = table
             .records()
@@ -68,7 +68,7 @@ fn errors(name: &str, seeds: u64) -> Vec<(f64, f64)> {
     let mut errors = Vec::new();
     for seed in 0..seeds {
         cell.simulation.seed = seed;
-        let series = Series::new(&cell, calibration.clone()).unwrap();
+        let series = FrameSeries::new(&cell, calibration.clone()).unwrap();
         for frame in 0..series.frames() {
             let rendered = series.render(frame).unwrap();
             let found = measurer.measure(&rendered.frame, &surface).unwrap();
@@ -99,15 +99,15 @@ fn the_calibrations_share_is_in_the_sigma_of_each_width_and_in_nothing_else() {
     let (mut cell, calibration) = scenario("tilted");
     let mut told = calibration.clone();
     let Calibration::Full { quality, .. } = &mut told else { unreachable!() };
-    *quality = Some(Quality {
+    *quality = Some(CalibrationQuality {
         reprojection_rms_px: 0.2,
-        width_sigma_share: Some(SHARE),
+        width_relative_sigma: Some(SHARE),
         seen_px: None,
         heights_mm: None,
         uncertainty: None,
     });
-    let frame = Series::new(&cell, calibration.clone()).unwrap().render(0).unwrap().frame;
-    for method in [Method::Caliper, Method::EdgeLines] {
+    let frame = FrameSeries::new(&cell, calibration.clone()).unwrap().render(0).unwrap().frame;
+    for method in [MeasureMethod::Caliper, MeasureMethod::EdgeLines] {
         cell.gauge.method = method;
         let [without, with] = [&calibration, &told].map(|calibration| {
             let surface = calibration.surface(cell.surface_height, None);
@@ -186,14 +186,14 @@ fn disturbances_are_read_from_the_cell() {
                 shading_side = \"both\"\nmotion_px = 6.0\nmotion_deg = 15.0\ncurve_radius_mm = -80.0\n\
                 grain_rows_share = 0.3\nshadow_px = 6.0\nneighbour_gap_px = 20.0\n\
                 texture_grey = 2.0\nbead_shading_grey_per_px = -1.0";
-    let picture = with_render(keys).unwrap().simulation.picture;
+    let picture = with_render(keys).unwrap().simulation.image;
     assert_eq!((picture.bead_grey, picture.light_deg), (300.0, Some(90.0)));
-    assert_eq!(picture.spots, Spots { share: 0.05, size_px: 5.0 });
-    assert_eq!(picture.motion, Motion { length_px: 6.0, direction_deg: 15.0 });
-    assert_eq!((picture.shading.side, picture.shading.bead_grey_per_px), (Side::Both, -1.0));
-    assert_eq!((picture.bend.radius_mm, picture.grains.rows_share), (-80.0, 0.3));
+    assert_eq!(picture.spots, Spots { covered_fraction: 0.05, size_px: 5.0 });
+    assert_eq!(picture.motion, MotionBlur { length_px: 6.0, direction_deg: 15.0 });
+    assert_eq!((picture.shading.side, picture.shading.bead_grey_per_px), (BeadSide::Both, -1.0));
+    assert_eq!((picture.bend.radius_mm, picture.grains.rows_fraction), (-80.0, 0.3));
     assert_eq!((picture.shadow.distance_px, picture.neighbour.gap_px), (6.0, 20.0));
-    assert_eq!(picture.texture.size_grey, 2.0);
+    assert_eq!(picture.texture.sigma_grey, 2.0);
     let both = with_render("curve_radius_mm = 80.0\ncorner_deg = 20.0").unwrap_err();
     assert!(both.contains("corner_deg"), "{both}");
     assert!(with_render("bead_grey = 1001.0").is_err());

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use nalgebra::{Rotation3, Vector3};
-use truebead::calibration::board::{Board, Marks};
+use truebead::calibration::board::{Board, Markers};
 use truebead::calibration::dictionary::Dictionary;
 use truebead::calibration::plane::bed_from_board;
 use truebead::calibration::{Camera, file};
@@ -26,7 +26,7 @@ fn camera() -> Camera {
 }
 
 fn board() -> Board {
-    let marks = Marks { side: Mm::constant(10.5), dictionary: Dictionary::Four };
+    let marks = Markers { side: Mm::constant(10.5), dictionary: Dictionary::Four };
     Board::new(9, 6, Mm::constant(15.0)).unwrap().with_marks(marks).unwrap()
 }
 

@@ -9,9 +9,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use truebead::identify::start_stop::file::{self, START, STOP};
-use truebead::sim::melt::Machine;
-use truebead::sim::melt_log::{Recording, example, record, to_csv};
+use truebead::identify::start_stop::file::{self, START_PARAMETERS, STOP_PARAMETERS};
+use truebead::sim::melt::MeltParameters;
+use truebead::sim::melt_log::{RecordingPlan, example, record, to_csv};
 
 use common::{said, truebead};
 
@@ -23,15 +23,15 @@ fn starts(log: &Path, more: &[&str]) -> Command {
 }
 
 /// A log of the simulated extruder, with its text changed.
-fn log(folder: &Path, plan: &Recording, change: impl FnOnce(String) -> String) -> PathBuf {
+fn log(folder: &Path, plan: &RecordingPlan, change: impl FnOnce(String) -> String) -> PathBuf {
     let path = folder.join("log.csv");
-    fs::write(&path, change(to_csv(&record(Machine::USUAL, 3, plan)))).unwrap();
+    fs::write(&path, change(to_csv(&record(MeltParameters::TYPICAL, 3, plan)))).unwrap();
     path
 }
 
 /// The answer to a log whose flow is in a column of this name.
 fn answer(
-    plan: &Recording,
+    plan: &RecordingPlan,
     change: impl FnOnce(String) -> String,
     flow: &str,
     code: i32,
@@ -63,9 +63,9 @@ fn the_example_becomes_a_file_that_is_read_again() {
     }
     let text = fs::read_to_string(at("found/starts.toml")).unwrap();
     let found = file::parse("starts.toml", &text).unwrap();
-    assert_eq!(found.setting.material.as_deref(), Some("PLA"));
-    assert_eq!((found.seen.starts, found.seen.stops), (11, 11));
-    for one in START.iter().chain(&STOP) {
+    assert_eq!(found.conditions.material.as_deref(), Some("PLA"));
+    assert_eq!((found.data.starts, found.data.stops), (11, 11));
+    for one in START_PARAMETERS.iter().chain(&STOP_PARAMETERS) {
         let sigma = (one.of)(&found.sigma);
         assert!(answer.contains(one.key) && sigma > 0.0 && sigma.is_finite(), "{}", one.key);
     }
@@ -85,10 +85,10 @@ fn the_example_becomes_a_file_that_is_read_again() {
 
 #[test]
 fn logs_that_do_not_tell_starts_and_stops_are_refused_with_the_reason() {
-    let few = Recording { idle_s: vec![2.0, 30.0, 8.0], ..example() };
+    let few = RecordingPlan { idle_s: vec![2.0, 30.0, 8.0], ..example() };
     let said = answer(&few, |text| text, "flow_mm3_per_s", 1);
     assert!(said.contains("log.csv: 3 starts after a pause that is known"), "{said}");
-    let alike = Recording { idle_s: vec![20.0, 22.0, 24.0, 26.0, 28.0, 30.0], ..example() };
+    let alike = RecordingPlan { idle_s: vec![20.0, 22.0, 24.0, 26.0, 28.0, 30.0], ..example() };
     let said = answer(&alike, |text| text, "flow_mm3_per_s", 1);
     assert!(said.contains("all pauses are alike: from 20 to 30 s"), "{said}");
     let twice = |text: String| {
@@ -102,7 +102,7 @@ fn logs_that_do_not_tell_starts_and_stops_are_refused_with_the_reason() {
 
 #[test]
 fn a_flow_in_another_unit_is_converted_or_refused() {
-    let few = Recording { idle_s: vec![2.0], ..example() };
+    let few = RecordingPlan { idle_s: vec![2.0], ..example() };
     let named = |name: &'static str| move |text: String| text.replace("flow_mm3_per_s", name);
     for (name, expected) in [
         ("flow_g_per_min", "found g/min, expected a flow in mm³/s or l/min; divide the mass"),
@@ -126,7 +126,7 @@ fn a_flow_in_another_unit_is_converted_or_refused() {
 #[test]
 fn arguments_that_are_wrong() {
     let folder = tempfile::tempdir().unwrap();
-    let few = Recording { idle_s: vec![2.0], ..example() };
+    let few = RecordingPlan { idle_s: vec![2.0], ..example() };
     let log = log(folder.path(), &few, |text| text);
     let flow = ["--output", "flow_mm3_per_s"];
     for (more, expected) in [

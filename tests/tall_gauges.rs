@@ -3,10 +3,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
 
-use truebead::scenario::bead::Roughness;
+use truebead::scenario::bead::EdgeRoughness;
 use truebead::studies::accuracy::sets;
 use truebead::studies::accuracy::sets::Set;
-use truebead::studies::accuracy::studio::Studio;
+use truebead::studies::accuracy::studio::SetStudio;
 use truebead::vision::Measurer;
 
 const FRAMES: u64 = 20;
@@ -18,7 +18,7 @@ fn set(name: &str, rows: u32) -> Set {
 
 /// Errors of the measured frames and their standard deviations \[px\].
 fn measure(set: &Set) -> Vec<(f64, f64)> {
-    let studio = Studio::new(set).unwrap();
+    let studio = SetStudio::new(set).unwrap();
     let mut measurer = Measurer::new(studio.gauge(), None);
     let px = 1.0 / studio.mm_per_px();
     (0..FRAMES)
@@ -34,7 +34,7 @@ fn measure(set: &Set) -> Vec<(f64, f64)> {
 #[test]
 fn rough_beads_are_measured_in_every_row() {
     for rows in [120, 150, 160, 161, 170, 250, 400, 500] {
-        let rough = Roughness { size_mm: 0.3, length_mm: 2.0 };
+        let rough = EdgeRoughness { sigma_mm: 0.3, length_mm: 2.0 };
         let found = measure(&Set { roughness: rough, ..set("blur-1.5", rows) });
         assert!(found.len() >= 18, "{rows} rows: {} measured", found.len());
         let (mut square, mut of_sigma) = (0.0, 0.0);

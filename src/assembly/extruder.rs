@@ -8,19 +8,19 @@ mod starts;
 use std::fs;
 
 pub use behaviour::{Behaviour, behaviour};
-use behaviour::{WITHOUT_FILE, wrong, wrong_file};
+use behaviour::{WITHOUT_FILE, extruder_error, wrong_file};
 
 use super::error::AssemblyError;
-use crate::cell::extruder::{Extruder, FeedforwardKeys, ModelSource, Strategy};
+use crate::cell::extruder::{ExtruderSettings, FeedforwardKeys, ModelSource, Strategy};
 use crate::cell::file::{ExtruderPart, RunPart};
 use crate::core::time::Span;
 use crate::extruder::feedforward::{
     ExtruderModel, FeedforwardError, FlowForecast, InverseSettings, ScrewSpeed, Tracker,
 };
 use crate::extruder::strategy::{
-    AdaptiveNozzle, Constant, Foreseen, Played, PressureLoop, ScrewFill,
+    AdaptiveNozzle, ConstantCommand, InverseFeedforward, Playback, PressureLoop, ScrewFill,
 };
-use crate::extruder::{ExtruderSetup, Law};
+use crate::extruder::{ExtruderSetup, ExtruderStrategy};
 use crate::identify::profile;
 use crate::io::model_file;
 use crate::io::record::ExtruderFile;
@@ -30,7 +30,7 @@ use crate::io::record::format::{
 use crate::numeric::lti::TransferFunction;
 
 /// What the files that an extruder side is made from are called in a recording.
-pub fn attachments(extruder: &Extruder) -> Vec<&'static str> {
+pub fn attachments(extruder: &ExtruderSettings) -> Vec<&'static str> {
     let starts = extruder.starts.as_ref().map(|_| STARTS_ATTACHMENT);
     let plan = extruder.plan.as_ref().map(|_| PLAN_ATTACHMENT);
     [attachment(&extruder.strategy), starts, plan].into_iter().flatten().collect()
@@ -47,7 +47,7 @@ fn attachment(strategy: &Strategy) -> Option<&'static str> {
 }
 
 /// The file of the strategy among those of an extruder side.
-pub fn of_strategy(files: &[ExtruderFile]) -> Option<&ExtruderFile> {
+pub fn file_of_strategy(files: &[ExtruderFile]) -> Option<&ExtruderFile> {
     files.iter().find(|file| [MODEL_ATTACHMENT, PROFILE_ATTACHMENT].contains(&file.name))
 }
 
@@ -104,9 +104,15 @@ pub fn strategy_file(
             let read = model_file::read_library(folder)?;
             let broken = read.broken.iter();
             warnings.extend(broken.map(|broken| format!("this model is not looked at: {broken}")));
-            let found =
-                read.library.find(wanted).map_err(|error| wrong(cell, &error.to_string()))?;
-            tracing::info!(model = found.entry.name, off_c = found.off_c, "model of the cell");
+            let found = read
+                .library
+                .find(wanted)
+                .map_err(|error| extruder_error(cell, &error.to_string()))?;
+            tracing::info!(
+                model = found.entry.name,
+                off_c = found.temperature_difference_c,
+                "model of the cell"
+            );
             (folder.join(&found.entry.name), "model")
         }
         _ => return Ok(None),
@@ -125,19 +131,23 @@ pub fn setup(
     cell: &str,
     files: &[ExtruderFile],
 ) -> Result<ExtruderSetup, AssemblyError> {
-    let file = of_strategy(files);
-    let needed = || file.ok_or_else(|| wrong(cell, WITHOUT_FILE));
-    let law = match &part.extruder.strategy {
-        Strategy::Constant { value } => Law::Constant(Constant(*value)),
-        Strategy::Profile { .. } => Law::Profile(played(needed()?, part)?),
+    let file = file_of_strategy(files);
+    let needed = || file.ok_or_else(|| extruder_error(cell, WITHOUT_FILE));
+    let strategy = match &part.extruder.strategy {
+        Strategy::Constant { value } => ExtruderStrategy::Constant(ConstantCommand(*value)),
+        Strategy::Profile { .. } => ExtruderStrategy::Profile(playback(needed()?, part)?),
         Strategy::Feedforward(keys) => {
             let behaviour = behaviour(keys, part, cell, file)?;
-            Law::Feedforward(Box::new(foreseen(keys, run, part, cell, behaviour)?))
+            ExtruderStrategy::Feedforward(Box::new(inverse_feedforward(
+                keys, run, part, cell, behaviour,
+            )?))
         }
-        Strategy::Pressure(settings) => Law::Pressure(Box::new(PressureLoop::new(**settings))),
-        Strategy::Screw(settings) => Law::Screw(ScrewFill::new(settings)?),
+        Strategy::Pressure(settings) => {
+            ExtruderStrategy::Pressure(Box::new(PressureLoop::new(**settings)))
+        }
+        Strategy::Screw(settings) => ExtruderStrategy::Screw(ScrewFill::new(settings)?),
         Strategy::Adaptive(settings) => {
-            Law::Adaptive(AdaptiveNozzle::new(settings.controller, settings.nozzle))
+            ExtruderStrategy::Adaptive(AdaptiveNozzle::new(settings.controller, settings.nozzle))
         }
     };
     let named = |name| files.iter().find(|file| file.name == name);
@@ -145,35 +155,35 @@ pub fn setup(
     let starts = named(STARTS_ATTACHMENT);
     let timing = starts.map(|file| starts::timing(run, part, file)).transpose()?;
     if let Some(timing) = &timing {
-        starts::has_room(run, plan.as_deref(), timing, cell)?;
+        starts::check_bead_length(run, plan.as_deref(), timing, cell)?;
     }
-    Ok(ExtruderSetup { timing, plan, ..part.extruder.setup(law) })
+    Ok(ExtruderSetup { timing, plan, ..part.extruder.setup(strategy) })
 }
 
 /// The inverse of how the extruder behaves about its operating point.
-fn foreseen(
+fn inverse_feedforward(
     keys: &FeedforwardKeys,
     run: &RunPart,
     part: &ExtruderPart,
     cell: &str,
     behaviour: Behaviour,
-) -> Result<Foreseen, AssemblyError> {
-    let Behaviour { transfer, about } = behaviour;
+) -> Result<InverseFeedforward, AssemblyError> {
+    let Behaviour { transfer, operating_point: about } = behaviour;
     let extruder = &part.extruder;
     let settings = InverseSettings {
         time_constant_s: keys.time_constant_s,
         right_zeros: keys.right_zeros,
-        known_ahead: Span::ZERO,
-        late: keys.late,
+        preview: Span::ZERO,
+        max_delay: keys.max_delay,
         limits: extruder.limits.about(about.command),
         period: Span::from_secs(1.0 / extruder.rates.feedforward_hz),
     };
-    let tracker =
-        Tracker::new(&transfer, &settings).map_err(|error| wrong(cell, &error.to_string()))?;
-    let law = Foreseen::new(tracker, about);
-    let forecast = forecast(transfer, keys.foretold_from, run.robot.rate_hz, settings.period)
-        .map_err(|error| wrong(cell, &error.to_string()))?;
-    Ok(law.foretelling(forecast))
+    let tracker = Tracker::new(&transfer, &settings)
+        .map_err(|error| extruder_error(cell, &error.to_string()))?;
+    let controller = InverseFeedforward::new(tracker, about);
+    let forecast = forecast(transfer, keys.predicted_from, run.robot.rate_hz, settings.period)
+        .map_err(|error| extruder_error(cell, &error.to_string()))?;
+    Ok(controller.with_forecast(forecast))
 }
 
 /// What will flow when a setpoint of the robot that is given now has stood for
@@ -191,7 +201,7 @@ fn forecast(
 
 /// A profile of commands; one of another quantity, or beyond the limits, is
 /// refused before anything moves.
-fn played(file: &ExtruderFile, part: &ExtruderPart) -> Result<Played, AssemblyError> {
+fn playback(file: &ExtruderFile, part: &ExtruderPart) -> Result<Playback, AssemblyError> {
     let wrong = |what: String| wrong_file(file, &what);
     let (profile, quantity) =
         profile::file::parse(&file.text).map_err(|error| wrong(error.to_string()))?;
@@ -208,5 +218,5 @@ fn played(file: &ExtruderFile, part: &ExtruderPart) -> Result<Played, AssemblyEr
              of [extruder]"
         )));
     }
-    Ok(Played::new(profile))
+    Ok(Playback::new(profile))
 }

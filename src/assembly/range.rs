@@ -6,14 +6,14 @@ use super::side::ExtruderSide;
 use crate::cell::extruder::{ModelSource, Strategy};
 use crate::cell::file::ExtruderPart;
 use crate::core::units::MPa;
-use crate::extruder::Law;
-use crate::extruder::strategy::Played;
+use crate::extruder::ExtruderStrategy;
+use crate::extruder::strategy::Playback;
 use crate::identify::file as model;
-use crate::identify::profile::Point;
+use crate::identify::profile::ProfilePoint;
 
 /// What a strategy comes to where it gives the wanted flow for long.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Steady {
+pub struct SteadyState {
     /// In the unit of the command.
     pub command: f64,
     /// Pressure at the nozzle, for a strategy that holds it.
@@ -21,7 +21,10 @@ pub struct Steady {
 }
 
 /// The steady command of a strategy; none where it has none of its own.
-pub fn steady(part: &ExtruderPart, side: &ExtruderSide) -> Result<Option<Steady>, AssemblyError> {
+pub fn steady_state(
+    part: &ExtruderPart,
+    side: &ExtruderSide,
+) -> Result<Option<SteadyState>, AssemblyError> {
     let flow = part.demand.nominal();
     match &part.extruder.strategy {
         Strategy::Feedforward(keys) => {
@@ -34,12 +37,12 @@ pub fn steady(part: &ExtruderPart, side: &ExtruderSide) -> Result<Option<Steady>
                 }
                 (_, None) => return Ok(None),
             };
-            Ok(Some(Steady { command, pressure: None }))
+            Ok(Some(SteadyState { command, pressure: None }))
         }
         Strategy::Pressure(settings) => {
             let pressure = settings.nozzle.pressure(flow)?;
             let command = pressure.get() / settings.model.gain();
-            Ok(Some(Steady { command, pressure: Some(pressure) }))
+            Ok(Some(SteadyState { command, pressure: Some(pressure) }))
         }
         _ => Ok(None),
     }
@@ -47,11 +50,14 @@ pub fn steady(part: &ExtruderPart, side: &ExtruderSide) -> Result<Option<Steady>
 
 /// What to say where the strategy asks for what the extruder or its model does
 /// not give; none where all is well.
-pub fn beyond(part: &ExtruderPart, side: &ExtruderSide) -> Result<Option<String>, AssemblyError> {
-    match &side.setup.law {
-        Law::Profile(played) => Ok(too_fast(part, side, played)),
-        _ => match steady(part, side)? {
-            Some(Steady { pressure: Some(pressure), .. })
+pub fn range_warning(
+    part: &ExtruderPart,
+    side: &ExtruderSide,
+) -> Result<Option<String>, AssemblyError> {
+    match &side.setup.strategy {
+        ExtruderStrategy::Profile(played) => Ok(profile_warning(part, side, played)),
+        _ => match steady_state(part, side)? {
+            Some(SteadyState { pressure: Some(pressure), .. })
                 if part.extruder.max_pressure.is_some_and(|most| pressure > most) =>
             {
                 Ok(Some(format!(
@@ -61,7 +67,7 @@ pub fn beyond(part: &ExtruderPart, side: &ExtruderSide) -> Result<Option<String>
                     pressure.get()
                 )))
             }
-            Some(steady) => beyond_limits_or_model(part, side, steady.command),
+            Some(steady) => steady_warning(part, side, steady.command),
             None => Ok(None),
         },
     }
@@ -69,7 +75,7 @@ pub fn beyond(part: &ExtruderPart, side: &ExtruderSide) -> Result<Option<String>
 
 /// Where a steady command lies outside the limits, or outside the inputs that
 /// its model was identified with.
-fn beyond_limits_or_model(
+fn steady_warning(
     part: &ExtruderPart,
     side: &ExtruderSide,
     command: f64,
@@ -94,20 +100,20 @@ fn beyond_limits_or_model(
 }
 
 /// Two times that differ by less are the same \[s\].
-const SAME_S: f64 = 1e-9;
+const TIME_TOLERANCE_S: f64 = 1e-9;
 
 /// Where a profile goes on before the fastest change has brought the command
 /// to its value. Its first value is no change.
-fn too_fast(part: &ExtruderPart, side: &ExtruderSide, played: &Played) -> Option<String> {
+fn profile_warning(part: &ExtruderPart, side: &ExtruderSide, played: &Playback) -> Option<String> {
     let profile = played.profile();
     let rate = part.extruder.limits.rate_per_s();
     let ends = profile.points().iter().skip(2).map(|point| point.from_s);
     let steps = profile.points().windows(2).zip(ends.chain([profile.end_s()]));
     let (mut missed, mut first) = (0_usize, None);
     for (pair, until_s) in steps {
-        let [before, Point { from_s, value }] = pair else { continue };
+        let [before, ProfilePoint { from_s, value }] = pair else { continue };
         let takes_s = (value - before.value).abs() / rate;
-        if takes_s > until_s - from_s + SAME_S {
+        if takes_s > until_s - from_s + TIME_TOLERANCE_S {
             missed += 1;
             first.get_or_insert((*from_s, (value - before.value).abs(), takes_s, until_s - from_s));
         }

@@ -1,9 +1,9 @@
 //! The extruder side of a cell, for a live run and for a simulated one.
 
-use super::extruder::of_strategy;
+use super::extruder::file_of_strategy;
 use crate::extruder::ExtruderSetup;
 use crate::io::record::ExtruderFile;
-use crate::sim::cell::Rig;
+use crate::sim::cell::CommandedExtruder;
 
 /// The extruder side of a cell that is commanded.
 #[derive(Debug, Clone)]
@@ -21,7 +21,7 @@ pub struct ExtruderSide {
 #[derive(Debug)]
 pub struct SimulatedSide {
     /// What the simulation needs.
-    pub rig: Rig,
+    pub extruder: CommandedExtruder,
     /// As those of [`ExtruderSide`].
     pub warnings: Vec<String>,
 }
@@ -29,6 +29,6 @@ pub struct SimulatedSide {
 impl ExtruderSide {
     /// The file that its strategy is made from, where there is one.
     pub fn file(&self) -> Option<&ExtruderFile> {
-        of_strategy(&self.files)
+        file_of_strategy(&self.files)
     }
 }

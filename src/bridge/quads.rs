@@ -15,13 +15,13 @@ use crate::core::geometry::ImagePoint;
 /// border must be dark in one of them at least.
 const NEIGHBOURHOODS_PX: [i32; 4] = [11, 23, 47, 95];
 /// Grey levels that dark is darker than the mean.
-const DARKER: f64 = 7.0;
+const MIN_DARKNESS: f64 = 7.0;
 /// Least circumference of a quadrilateral \[px\].
-const LEAST_ROUND_PX: f64 = 36.0;
+const MIN_PERIMETER_PX: f64 = 36.0;
 /// Least area over that of a square with the same circumference.
-const LEAST_FULL: f64 = 0.25;
+const MIN_FULLNESS: f64 = 0.25;
 /// How far an outline may be off straight sides, as a share of its length.
-const STRAIGHT: f64 = 0.04;
+const STRAIGHT_TOLERANCE: f64 = 0.04;
 
 /// Corners of dark convex quadrilaterals \[px\], to about a pixel, in the order in which
 /// they are passed clockwise in the picture. The same one may be found several times.
@@ -38,22 +38,22 @@ pub fn find_quads(frame: &Frame) -> Result<Vec<[ImagePoint; 4]>, BridgeError> {
 fn dark(image: &Mat, neighbourhood: i32) -> opencv::Result<Vec<[ImagePoint; 4]>> {
     let mut mask = Mat::default();
     let (mean, inverse) = (ADAPTIVE_THRESH_MEAN_C, THRESH_BINARY_INV);
-    adaptive_threshold(image, &mut mask, 255.0, mean, inverse, neighbourhood, DARKER)?;
+    adaptive_threshold(image, &mut mask, 255.0, mean, inverse, neighbourhood, MIN_DARKNESS)?;
     let mut outlines = Vector::<Vector<Point>>::new();
     find_contours_def(&mask, &mut outlines, RETR_LIST, CHAIN_APPROX_SIMPLE)?;
     let mut quads = Vec::new();
     for outline in outlines {
         let round = arc_length(&outline, true)?;
-        if round < LEAST_ROUND_PX {
+        if round < MIN_PERIMETER_PX {
             continue;
         }
         let mut corners = Vector::<Point>::new();
-        approx_poly_dp(&outline, &mut corners, STRAIGHT * round, true)?;
+        approx_poly_dp(&outline, &mut corners, STRAIGHT_TOLERANCE * round, true)?;
         if corners.len() != 4 || !is_contour_convex(&corners)? {
             continue;
         }
         let area = contour_area(&corners, true)?;
-        if area.abs() < LEAST_FULL * (round / 4.0).powi(2) {
+        if area.abs() < MIN_FULLNESS * (round / 4.0).powi(2) {
             continue;
         }
         let at = |i: usize| corners.get(i).map(|p| Point2::new(f64::from(p.x), f64::from(p.y)));

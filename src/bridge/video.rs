@@ -10,7 +10,7 @@ use opencv::videoio::{
 };
 
 use super::{BridgeError, during, prepare};
-use crate::core::frame::{Channel, Frame, Layout, Pixels};
+use crate::core::frame::{Channel, Frame, Pixels, SampleLayout};
 use crate::core::geometry::Size;
 use crate::core::time::Stamp;
 
@@ -137,9 +137,9 @@ fn frame_of(
 ) -> Result<Frame, BridgeError> {
     let fault = |what: String| BridgeError { task: READ, what };
     let layout = match image.channels() {
-        1 => Layout::Grey,
-        3 => Layout::Bgr,
-        4 => Layout::Bgra,
+        1 => SampleLayout::Grey,
+        3 => SampleLayout::Bgr,
+        4 => SampleLayout::Bgra,
         other => return Err(fault(format!("a picture with {other} channels is not known"))),
     };
     let flat = image.reshape(1, 0).map_err(during(READ))?;

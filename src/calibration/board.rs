@@ -4,7 +4,7 @@
 use nalgebra::{Point2, Point3};
 
 use super::dictionary::Dictionary;
-use super::equations::Corner;
+use super::equations::Correspondence;
 use crate::core::geometry::{GridSize, ImagePoint};
 use crate::core::units::Mm;
 
@@ -14,13 +14,13 @@ pub struct Board {
     columns: usize,
     rows: usize,
     square: Mm,
-    marks: Option<Marks>,
+    markers: Option<Markers>,
 }
 
 /// What makes a checkerboard one of `ChArUco`: a marker in every white square, which
 /// tells which square it is. They are numbered row by row from the upper left.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Marks {
+pub struct Markers {
     /// Side of a marker, with its black border.
     pub side: Mm,
     /// Where the markers are from.
@@ -29,7 +29,7 @@ pub struct Marks {
 
 /// A corner of the board in a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Seen {
+pub struct CornerObservation {
     /// Which one, counted row by row from 0.
     pub index: usize,
     /// Where it is seen \[px\].
@@ -37,8 +37,8 @@ pub struct Seen {
 }
 
 /// All corners of a board, in its order.
-pub fn all_seen(corners_px: &[ImagePoint]) -> Vec<Seen> {
-    corners_px.iter().enumerate().map(|(index, &px)| Seen { index, px }).collect()
+pub fn observe_all(corners_px: &[ImagePoint]) -> Vec<CornerObservation> {
+    corners_px.iter().enumerate().map(|(index, &px)| CornerObservation { index, px }).collect()
 }
 
 /// A board that cannot be used.
@@ -118,12 +118,12 @@ impl Board {
         if square <= Mm::ZERO {
             return Err(BoardError::Square(square));
         }
-        Ok(Self { columns, rows, square, marks: None })
+        Ok(Self { columns, rows, square, markers: None })
     }
 
     /// The same with a marker in each white square. Fails where they do not fit, or
     /// there are not as many.
-    pub fn with_marks(self, marks: Marks) -> Result<Self, BoardError> {
+    pub fn with_marks(self, marks: Markers) -> Result<Self, BoardError> {
         if !MARKER.contains(&(marks.side.get() / self.square.get())) {
             return Err(BoardError::Marker { side: marks.side, square: self.square });
         }
@@ -131,17 +131,17 @@ impl Board {
         if needed > Dictionary::MARKERS {
             return Err(BoardError::Markers { needed });
         }
-        Ok(Self { marks: Some(marks), ..self })
+        Ok(Self { markers: Some(marks), ..self })
     }
 
     /// Its markers; `None` for a plain checkerboard.
-    pub fn marks(&self) -> Option<Marks> {
-        self.marks
+    pub fn markers(&self) -> Option<Markers> {
+        self.markers
     }
 
     /// Whether it has no markers.
     pub fn is_plain(&self) -> bool {
-        self.marks.is_none()
+        self.markers.is_none()
     }
 
     /// Whether it looks the same after half a turn: without markers, and with the same
@@ -154,7 +154,7 @@ impl Board {
     /// its border: column and row of each cell among the marker's, `side + 2` along each
     /// side. Empty where there is none.
     pub fn black_cells(&self, column: usize, row: usize) -> Vec<(usize, usize)> {
-        let Some(marks) = self.marks.filter(|_| (column + row) % 2 == 1) else {
+        let Some(marks) = self.markers.filter(|_| (column + row) % 2 == 1) else {
             return Vec::new();
         };
         let squares = self.columns + 1;
@@ -174,8 +174,8 @@ impl Board {
 
     /// Width of the plain border between a marker and its square's sides, over the side
     /// of a square; half a square without markers.
-    pub fn clear(&self) -> f64 {
-        self.marks.map_or(0.5, |marks| 0.5 * (1.0 - marks.side.get() / self.square.get()))
+    pub fn marker_margin(&self) -> f64 {
+        self.markers.map_or(0.5, |marks| 0.5 * (1.0 - marks.side.get() / self.square.get()))
     }
 
     /// Inner corners along a row and along a column.
@@ -204,7 +204,7 @@ impl Board {
     /// parabola whose mean over all corners is 0, so that the board's plane stays
     /// where it is.
     #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
-    pub fn place(&self, seen: &[Seen]) -> Vec<Corner> {
+    pub fn correspondences(&self, seen: &[CornerObservation]) -> Vec<Correspondence> {
         let side = self.square.get();
         let rise = |at: usize, count: usize| {
             let half = 0.5 * (count - 1) as f64;
@@ -214,12 +214,12 @@ impl Board {
             mean - out * out
         };
         seen.iter()
-            .map(|&Seen { index, px }| {
+            .map(|&CornerObservation { index, px }| {
                 let (column, row) = (index % self.columns, index / self.columns);
-                Corner {
+                Correspondence {
                     on_board: Point2::new(column as f64 * side, row as f64 * side),
                     bend: [rise(column, self.columns), rise(row, self.rows)],
-                    seen: px,
+                    observed: px,
                 }
             })
             .collect()
@@ -281,7 +281,7 @@ mod tests {
     #[test]
     fn a_bend_is_a_parabola_that_leaves_the_plane_where_it_is() {
         let board = board();
-        let corners = board.place(&all_seen(&seen(&board)));
+        let corners = board.correspondences(&observe_all(&seen(&board)));
         assert_eq!(corners[6].on_board, Point2::new(40.0, 20.0));
         for side in 0..2 {
             let mean = corners.iter().map(|corner| corner.bend[side]).sum::<f64>() / 12.0;
@@ -317,9 +317,9 @@ mod tests {
 
     #[test]
     fn markers_must_fit_into_their_squares_and_be_as_many() {
-        let marks = |side| Marks { side: Mm::constant(side), dictionary: Dictionary::Four };
+        let marks = |side| Markers { side: Mm::constant(side), dictionary: Dictionary::Four };
         let with = board().with_marks(marks(14.0)).unwrap();
-        assert!((with.clear() - 0.15).abs() < 1e-12 && !with.is_plain());
+        assert!((with.marker_margin() - 0.15).abs() < 1e-12 && !with.is_plain());
         let too_large = board().with_marks(marks(20.0)).unwrap_err().to_string();
         assert!(too_large.contains("40 to 90 % of that of a square, found 20 mm"), "{too_large}");
         let many = Board::new(60, 40, Mm::constant(20.0)).unwrap().with_marks(marks(14.0));

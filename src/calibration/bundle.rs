@@ -4,37 +4,39 @@
 
 use nalgebra::{DVector, SMatrix, SVector};
 
-use super::equations::{Corner, Equations, Free, Model, Place, SHARED};
+use super::equations::{
+    BoardPlacement, CameraModel, Correspondence, Equations, FreeParameters, SHARED,
+};
 use super::factor::{Elimination, Factor};
 
-const MOST_STEPS: usize = 100;
+const MAX_STEPS: usize = 100;
 /// Damping at first, as a share of each equation's own weight.
-const DAMPING: f64 = 1e-3;
-const LEAST_DAMPING: f64 = 1e-12;
+const INITIAL_DAMPING: f64 = 1e-3;
+const MIN_DAMPING: f64 = 1e-12;
 /// Damping beyond which no step leads down any more.
-const MOST_DAMPING: f64 = 1e12;
+const MAX_DAMPING: f64 = 1e12;
 /// Share of the squares by which a step must lessen them for another one to be
 /// worth while.
-const WORTH: f64 = 1e-13;
+const MIN_RELATIVE_GAIN: f64 = 1e-13;
 
 /// What is roughly known before a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Guess {
     /// The camera and the board's bend.
-    pub model: Model,
+    pub model: CameraModel,
     /// Where the boards lie, in the order of the pictures.
-    pub places: Vec<Place>,
+    pub placements: Vec<BoardPlacement>,
 }
 
 /// What fits best.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fit {
+pub struct BundleFit {
     /// The camera and the board's bend.
-    pub model: Model,
+    pub model: CameraModel,
     /// Where the boards lie, in the order of the pictures.
-    pub places: Vec<Place>,
+    pub placements: Vec<BoardPlacement>,
     /// Sum of the squares of what is left \[px²\].
-    pub squares_px2: f64,
+    pub sum_of_squares_px2: f64,
 }
 
 /// A step of everything together.
@@ -46,12 +48,16 @@ struct Step {
 /// Fits what is free to the boards that lie at each place, beginning with what is
 /// roughly known. `None` where a board is behind the camera from the start, or a
 /// number never becomes finite.
-pub fn fit(start: Guess, free: Free, boards: &[Vec<Vec<Corner>>]) -> Option<Fit> {
-    let Guess { model, places } = start;
-    let squares_px2 = squares_px2(&model, &places, boards)?;
-    let mut best = Fit { model, places, squares_px2 };
-    let mut damping = DAMPING;
-    for _ in 0..MOST_STEPS {
+pub fn fit(
+    start: Guess,
+    free: FreeParameters,
+    boards: &[Vec<Vec<Correspondence>>],
+) -> Option<BundleFit> {
+    let Guess { model, placements: places } = start;
+    let squares_px2 = sum_of_squares_px2(&model, &places, boards)?;
+    let mut best = BundleFit { model, placements: places, sum_of_squares_px2: squares_px2 };
+    let mut damping = INITIAL_DAMPING;
+    for _ in 0..MAX_STEPS {
         let equations = equations(&best, free, boards)?;
         let (next, is_last) = descend(&best, free, &equations, boards, &mut damping);
         let Some(next) = next else { break };
@@ -66,23 +72,32 @@ pub fn fit(start: Guess, free: Free, boards: &[Vec<Vec<Corner>>]) -> Option<Fit>
 /// The next better fit, and whether it is as good as the last; `None` where no step
 /// leads down.
 fn descend(
-    from: &Fit,
-    free: Free,
+    from: &BundleFit,
+    free: FreeParameters,
     equations: &[Equations],
-    boards: &[Vec<Vec<Corner>>],
+    boards: &[Vec<Vec<Correspondence>>],
     damping: &mut f64,
-) -> (Option<Fit>, bool) {
-    while *damping < MOST_DAMPING {
+) -> (Option<BundleFit>, bool) {
+    while *damping < MAX_DAMPING {
         let tried = step(equations, free, *damping).and_then(|step| {
-            let model = from.model.stepped(&step.shared);
-            let places: Vec<Place> =
-                from.places.iter().zip(&step.places).map(|(place, by)| place.stepped(by)).collect();
-            let squares_px2 = squares_px2(&model, &places, boards)?;
-            (squares_px2 <= from.squares_px2).then_some(Fit { model, places, squares_px2 })
+            let model = from.model.moved(&step.shared);
+            let places: Vec<BoardPlacement> = from
+                .placements
+                .iter()
+                .zip(&step.places)
+                .map(|(place, by)| place.moved(by))
+                .collect();
+            let squares_px2 = sum_of_squares_px2(&model, &places, boards)?;
+            (squares_px2 <= from.sum_of_squares_px2).then_some(BundleFit {
+                model,
+                placements: places,
+                sum_of_squares_px2: squares_px2,
+            })
         });
         if let Some(found) = tried {
-            let is_last = from.squares_px2 - found.squares_px2 <= WORTH * from.squares_px2;
-            *damping = (*damping * 0.1).max(LEAST_DAMPING);
+            let is_last = from.sum_of_squares_px2 - found.sum_of_squares_px2
+                <= MIN_RELATIVE_GAIN * from.sum_of_squares_px2;
+            *damping = (*damping * 0.1).max(MIN_DAMPING);
             return (Some(found), is_last);
         }
         *damping *= 10.0;
@@ -90,29 +105,38 @@ fn descend(
     (None, true)
 }
 
-fn squares_px2(model: &Model, places: &[Place], boards: &[Vec<Vec<Corner>>]) -> Option<f64> {
-    let each = places.iter().zip(boards).map(|(place, boards)| model.squares_px2(place, boards));
+fn sum_of_squares_px2(
+    model: &CameraModel,
+    places: &[BoardPlacement],
+    boards: &[Vec<Vec<Correspondence>>],
+) -> Option<f64> {
+    let each =
+        places.iter().zip(boards).map(|(place, boards)| model.sum_of_squares_px2(place, boards));
     each.sum::<Option<f64>>().filter(|squares| squares.is_finite())
 }
 
-fn equations(at: &Fit, free: Free, boards: &[Vec<Vec<Corner>>]) -> Option<Vec<Equations>> {
-    let each = at.places.iter().zip(boards);
+fn equations(
+    at: &BundleFit,
+    free: FreeParameters,
+    boards: &[Vec<Vec<Correspondence>>],
+) -> Option<Vec<Equations>> {
+    let each = at.placements.iter().zip(boards);
     each.map(|(place, boards)| Equations::of(&at.model, free, place, boards)).collect()
 }
 
 /// Solves the damped equations, the places eliminated first.
-fn step(equations: &[Equations], free: Free, damping: f64) -> Option<Step> {
+fn step(equations: &[Equations], free: FreeParameters, damping: f64) -> Option<Step> {
     let mut left = SMatrix::<f64, SHARED, SHARED>::zeros();
     let mut side = SVector::<f64, SHARED>::zeros();
     let mut eliminated = Vec::with_capacity(equations.len());
     for one in equations {
         let mut damped = one.clone();
-        for i in 0..damped.place.nrows() {
-            damped.place[(i, i)] *= 1.0 + damping;
+        for i in 0..damped.placement.nrows() {
+            damped.placement[(i, i)] *= 1.0 + damping;
         }
         let elimination = Elimination::of(&damped)?;
-        left += elimination.left;
-        let known = elimination.place.solve(&damped.place_side);
+        left += elimination.reduced;
+        let known = elimination.placement.solve(&damped.placement_side);
         side += damped.shared_side - as_shared(&(damped.both.transpose() * &known));
         eliminated.push((elimination, damped));
     }
@@ -134,7 +158,7 @@ fn step(equations: &[Equations], free: Free, damping: f64) -> Option<Step> {
     let places = eliminated
         .iter()
         .map(|(elimination, damped)| {
-            elimination.place.solve(&(&damped.place_side - &damped.both * &along))
+            elimination.placement.solve(&(&damped.placement_side - &damped.both * &along))
         })
         .collect();
     Some(Step { shared, places })

@@ -9,8 +9,8 @@ const UNDISTORT_STEPS: usize = 20;
 const UNDISTORT_TOLERANCE: f64 = 1e-13;
 /// Cells of the grid of pixels at which a lens is asked whether it turns over, and
 /// steps on the way to each.
-const FOLD_GRID: (u32, u32) = (32, 24);
-const FOLD_STEPS: u32 = 16;
+const MONOTONIC_GRID: (u32, u32) = (32, 24);
+const MONOTONIC_STEPS: u32 = 16;
 
 /// Coefficients of the distortion.
 pub const COEFFICIENTS: usize = 8;
@@ -181,9 +181,9 @@ impl Camera {
     /// The first of many pixels all over a picture, its border included, whose ray the
     /// distortion does not reach because it turns over on the way: there the lens is not
     /// monotonic, and nothing can be measured. `None` for a sound lens.
-    pub fn fold(&self, image_size_px: [u32; 2]) -> Option<ImagePoint> {
+    pub fn non_monotonic_at(&self, image_size_px: [u32; 2]) -> Option<ImagePoint> {
         let [right, bottom] = image_size_px.map(|side| f64::from(side) - 1.0);
-        let (columns, rows) = FOLD_GRID;
+        let (columns, rows) = MONOTONIC_GRID;
         let along = |i: u32, count: u32, end: f64| f64::from(i) / f64::from(count) * end;
         (0..(columns + 1) * (rows + 1))
             .map(|i| (i % (columns + 1), i / (columns + 1)))
@@ -193,8 +193,8 @@ impl Camera {
 
     /// Whether the lens does not turn over between the axis and a ray.
     fn is_monotonic_to(&self, ray: Point2<f64>) -> bool {
-        (1..=FOLD_STEPS).all(|step| {
-            let part = f64::from(step) / f64::from(FOLD_STEPS);
+        (1..=MONOTONIC_STEPS).all(|step| {
+            let part = f64::from(step) / f64::from(MONOTONIC_STEPS);
             self.distort(ray * part).1.determinant() > 0.0
         })
     }
@@ -283,22 +283,22 @@ mod tests {
 
     #[test]
     fn a_lens_that_turns_over_within_the_picture_is_told_wherever_it_does() {
-        assert_eq!(LENS.fold([640, 480]), None);
-        assert_eq!(Camera::pinhole([500.0; 2], [320.0, 240.0]).fold([640, 480]), None);
+        assert_eq!(LENS.non_monotonic_at([640, 480]), None);
+        assert_eq!(Camera::pinhole([500.0; 2], [320.0, 240.0]).non_monotonic_at([640, 480]), None);
         // r(1 + k1 r²) turns over at r = 1/√(-3 k1), where it reaches two thirds of that:
         // at 0.6 that is 0.4, 200 px from the centre of this camera.
         let k1 = -1.0 / (3.0 * 0.36);
         let fish = Camera::pinhole([500.0; 2], [320.0, 240.0]).with_five([k1, 0.0, 0.0, 0.0, 0.0]);
-        assert_eq!(fish.fold([640, 480]), Some(Point2::new(0.0, 0.0)));
+        assert_eq!(fish.non_monotonic_at([640, 480]), Some(Point2::new(0.0, 0.0)));
         // A picture that is cut out of its middle is sound.
         let centred = Camera { centre_px: [120.0, 120.0], ..fish };
-        assert_eq!(centred.fold([241, 241]), None);
+        assert_eq!(centred.non_monotonic_at([241, 241]), None);
         let wider = Camera { centre_px: [150.0, 150.0], ..fish };
-        assert!(wider.fold([301, 301]).is_some());
+        assert!(wider.non_monotonic_at([301, 301]).is_some());
         // Turns back further out: there are rays at the border, but not without a fold
         // on the way.
         let ring = fish.with_five([-1.5, 0.0, 0.0, 0.0, 1.5]);
-        assert!(ring.fold([640, 480]).is_some());
+        assert!(ring.non_monotonic_at([640, 480]).is_some());
     }
 
     #[test]

@@ -4,13 +4,13 @@
 mod error;
 mod layout;
 
-pub use error::NoMarkers;
+pub use error::MarkerError;
 
 use nalgebra::{Matrix3, Point2};
 
-use super::board::{Board, Marks};
+use super::board::{Board, Markers};
 use super::dictionary::Dictionary;
-use super::grey::Grey;
+use super::grey::GreyImage;
 use super::homography::homography;
 use super::marker;
 use super::marker::Marker;
@@ -18,41 +18,41 @@ use crate::bridge::{self, BridgeError};
 use crate::core::frame::Frame;
 use crate::core::geometry::{GridSize, ImagePoint};
 use crate::numeric::rank;
-use layout::Layout;
+use layout::MarkerGrid;
 
 /// How far a marker's corner may be off its place, over the side of a square.
-const OFF: f64 = 0.3;
+const MAX_CORNER_ERROR: f64 = 0.3;
 /// Pairs of markers from which the board's plane is guessed.
-const MOST_PAIRS: usize = 400;
+const MAX_PAIRS: usize = 400;
 /// The same where many counts of columns are tried.
-const FEW_PAIRS: usize = 60;
+const MAX_PAIRS_PER_COUNT: usize = 60;
 /// Markers beside a place from which the picture of the place is foretold: few, so that
 /// the lens does not bend what lies between them.
 const NEIGHBOURS: usize = 4;
 /// A corner that is this far from the middle of a marker, over the side of a square, or
 /// nearer lies beside its square.
-const BESIDE: f64 = 0.75;
+const MAX_BESIDE_DISTANCE: f64 = 0.75;
 /// How far beyond the markers that were seen corners are foretold.
-const BEYOND: f64 = 2.3;
+const MAX_EXTRAPOLATION: f64 = 2.3;
 /// Markers that must fit for a board to be one.
-const FEWEST: usize = 3;
+const MIN_MARKERS: usize = 3;
 /// Share of the markers that must fit; the others are taken for something else.
-const MOST_FIT: f64 = 0.7;
+const MIN_FIT_FRACTION: f64 = 0.7;
 /// How far the size of the markers may be off what was told.
-const SIZE: f64 = 0.12;
+const SIZE_TOLERANCE: f64 = 0.12;
 /// The same \[px\]: a threshold takes up to a pixel off either side.
-const SIZE_PX: f64 = 3.0;
+const SIZE_TOLERANCE_PX: f64 = 3.0;
 /// Markers that tell their size.
-const SIZED: usize = 8;
+const MIN_SIZE_MARKERS: usize = 8;
 /// Markers of other dictionaries are looked for among so many of each: the more there
 /// are, the more often something else passes for one.
-const COMMON: usize = 250;
+const MARKERS_PER_DICTIONARY: usize = 250;
 /// Columns of inner corners that are tried where the markers do not fit.
-const COLUMNS: std::ops::RangeInclusive<usize> = 3..=40;
+const COLUMN_COUNTS: std::ops::RangeInclusive<usize> = 3..=40;
 
 /// The inner corners of a board with markers \[px\], to about a pixel.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct ExpectedCorners {
     /// Where they should be, row by row; `None` far from every marker that was read.
     pub expected: Vec<Option<ImagePoint>>,
     /// Which of them lie beside a square whose marker was read.
@@ -63,12 +63,12 @@ pub struct Found {
 
 /// A marker and where it is on the board, in squares.
 #[derive(Debug, Clone, Copy)]
-struct Placed {
+struct PlacedMarker {
     on_board: [Point2<f64>; 4],
     marker: Marker,
 }
 
-impl Placed {
+impl PlacedMarker {
     fn middle(&self) -> Point2<f64> {
         nalgebra::center(&self.on_board[0], &self.on_board[2])
     }
@@ -82,64 +82,64 @@ impl Placed {
     fn off(&self, map: &Matrix3<f64>, clear: f64) -> f64 {
         let square_px = self.marker.side_px() / (1.0 - 2.0 * clear);
         self.pairs()
-            .map(|(at, px)| seen(map, at).map_or(f64::INFINITY, |there| (there - px).norm()))
+            .map(|(at, px)| project(map, at).map_or(f64::INFINITY, |there| (there - px).norm()))
             .fold(0.0, f64::max)
             / square_px
     }
 }
 
-fn seen(map: &Matrix3<f64>, at: Point2<f64>) -> Option<ImagePoint> {
+fn project(map: &Matrix3<f64>, at: Point2<f64>) -> Option<ImagePoint> {
     Point2::from_homogeneous(map * at.to_homogeneous())
 }
 
-fn map_of<'a>(placed: impl Iterator<Item = &'a Placed>) -> Option<Matrix3<f64>> {
-    homography(&placed.flat_map(Placed::pairs).collect::<Vec<_>>())
+fn map_of<'a>(placed: impl Iterator<Item = &'a PlacedMarker>) -> Option<Matrix3<f64>> {
+    homography(&placed.flat_map(PlacedMarker::pairs).collect::<Vec<_>>())
 }
 
 /// Finds the board, and says what is wrong where it is not found.
 pub fn find(
     board: &Board,
-    marks: Marks,
+    marks: Markers,
     frame: &Frame,
-) -> Result<Result<Found, NoMarkers>, BridgeError> {
+) -> Result<Result<ExpectedCorners, MarkerError>, BridgeError> {
     let quads = bridge::find_quads(frame)?;
-    let grey = Grey::of(frame);
+    let grey = GreyImage::of(frame);
     Ok(among(board, marks, &grey, &quads))
 }
 
 /// Whether a board with markers of some kind shows.
 pub fn shows(frame: &Frame) -> Result<bool, BridgeError> {
     let quads = bridge::find_quads(frame)?;
-    let grey = Grey::of(frame);
+    let grey = GreyImage::of(frame);
     Ok(Dictionary::ALL.into_iter().any(|dictionary| is_board(&grey, &quads, dictionary)))
 }
 
 fn among(
     board: &Board,
-    marks: Marks,
-    grey: &Grey<'_>,
+    marks: Markers,
+    grey: &GreyImage<'_>,
     quads: &[[ImagePoint; 4]],
-) -> Result<Found, NoMarkers> {
-    let (dictionary, clear) = (marks.dictionary, board.clear());
-    let count = Layout::count(board);
+) -> Result<ExpectedCorners, MarkerError> {
+    let (dictionary, clear) = (marks.dictionary, board.marker_margin());
+    let count = MarkerGrid::count(board);
     let markers = marker::read_all(grey, quads, dictionary, count);
     let (fitting, layout) = [false, true]
         .map(|first| {
-            let layout = Layout::of(board, first);
-            (fitting(&layout, &markers, clear, MOST_PAIRS), layout)
+            let layout = MarkerGrid::of(board, first);
+            (fitting(&layout, &markers, clear, MAX_PAIRS), layout)
         })
         .into_iter()
         .reduce(|a, b| if b.0.len() > a.0.len() { b } else { a })
-        .unwrap_or_else(|| (Vec::new(), Layout::of(board, false)));
-    if fitting.len() < FEWEST || share(fitting.len(), markers.len()) < MOST_FIT {
+        .unwrap_or_else(|| (Vec::new(), MarkerGrid::of(board, false)));
+    if fitting.len() < MIN_MARKERS || fraction(fitting.len(), markers.len()) < MIN_FIT_FRACTION {
         return Err(reason(board, dictionary, grey, quads, fitting.len(), markers.len()));
     }
     check_size(&fitting, clear)?;
-    Ok(foretold(board, &fitting, layout.first_has_marker))
+    Ok(predict_corners(board, &fitting, layout.first_has_marker))
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a count of markers")]
-fn share(part: usize, of: usize) -> f64 {
+fn fraction(part: usize, of: usize) -> f64 {
     part as f64 / of.max(1) as f64
 }
 
@@ -150,26 +150,32 @@ fn percent(share: f64) -> u32 {
 
 /// The markers that lie on one board: the most that two of them agree on, of so many
 /// pairs, and those that fit their neighbours.
-fn fitting(layout: &Layout, markers: &[Marker], clear: f64, most_pairs: usize) -> Vec<Placed> {
-    let placed: Vec<Placed> = markers
+fn fitting(
+    layout: &MarkerGrid,
+    markers: &[Marker],
+    clear: f64,
+    max_pairs: usize,
+) -> Vec<PlacedMarker> {
+    let placed: Vec<PlacedMarker> = markers
         .iter()
         .filter_map(|&marker| {
-            Some(Placed { on_board: layout.corners(marker.number, clear)?, marker })
+            Some(PlacedMarker { on_board: layout.corners(marker.number, clear)?, marker })
         })
         .collect();
     // By their distance in the list, so that none is in most of the pairs.
     let count = placed.len();
     let pairs = (1..count).flat_map(|apart| (0..count - apart).map(move |i| (i, i + apart)));
-    let fits = |map: &Matrix3<f64>, placed: &Placed| placed.off(map, clear) < OFF;
+    let fits =
+        |map: &Matrix3<f64>, placed: &PlacedMarker| placed.off(map, clear) < MAX_CORNER_ERROR;
     let best = pairs
-        .take(most_pairs)
+        .take(max_pairs)
         .filter_map(|(i, j)| map_of([&placed[i], &placed[j]].into_iter()))
         .map(|map| placed.iter().map(|marker| fits(&map, marker)).collect::<Vec<bool>>())
         .max_by_key(|fits| fits.iter().filter(|&&fit| fit).count());
     let mut is_in = best.unwrap_or_else(|| vec![false; placed.len()]);
     // What the lens bends away is reached from one marker to the next.
     loop {
-        let inside: Vec<Placed> = chosen(&placed, &is_in);
+        let inside: Vec<PlacedMarker> = chosen(&placed, &is_in);
         let more: Vec<usize> = (0..placed.len())
             .filter(|&i| !is_in[i])
             .filter(|&i| {
@@ -186,45 +192,45 @@ fn fitting(layout: &Layout, markers: &[Marker], clear: f64, most_pairs: usize) -
     }
 }
 
-fn chosen(placed: &[Placed], is_in: &[bool]) -> Vec<Placed> {
+fn chosen(placed: &[PlacedMarker], is_in: &[bool]) -> Vec<PlacedMarker> {
     placed.iter().zip(is_in).filter(|(_, is_in)| **is_in).map(|(placed, _)| *placed).collect()
 }
 
 /// The markers that are nearest to a place on the board, nearest first.
-fn nearest(placed: &[Placed], at: Point2<f64>, count: usize) -> Vec<Placed> {
+fn nearest(placed: &[PlacedMarker], at: Point2<f64>, count: usize) -> Vec<PlacedMarker> {
     let mut sorted = placed.to_vec();
-    let distance = |placed: &Placed| (placed.middle() - at).norm_squared();
+    let distance = |placed: &PlacedMarker| (placed.middle() - at).norm_squared();
     sorted.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
     sorted.truncate(count);
     sorted
 }
 
 /// Refuses markers of another size than was told, where there are enough of them to tell.
-fn check_size(placed: &[Placed], clear: f64) -> Result<(), NoMarkers> {
-    let told = 1.0 - 2.0 * clear;
-    let Some(found) = size(placed, clear).filter(|_| placed.len() >= SIZED) else {
+fn check_size(placed: &[PlacedMarker], clear: f64) -> Result<(), MarkerError> {
+    let expected = 1.0 - 2.0 * clear;
+    let Some(found) = size(placed, clear).filter(|_| placed.len() >= MIN_SIZE_MARKERS) else {
         return Ok(());
     };
     let mut sides: Vec<f64> = placed.iter().map(|one| one.marker.side_px()).collect();
     let side_px = rank::median(&mut sides).unwrap_or(0.0);
-    let off = (found / told - 1.0).abs();
-    if off > SIZE && off * side_px > SIZE_PX {
-        let (found_percent, expected_percent) = (percent(found), percent(told));
-        return Err(NoMarkers::Size { found_percent, expected_percent });
+    let off = (found / expected - 1.0).abs();
+    if off > SIZE_TOLERANCE && off * side_px > SIZE_TOLERANCE_PX {
+        let (found_percent, expected_percent) = (percent(found), percent(expected));
+        return Err(MarkerError::Size { found_percent, expected_percent });
     }
     Ok(())
 }
 
 /// Side of the markers over that of a square, where the markers' middles tell the
 /// squares.
-fn size(placed: &[Placed], clear: f64) -> Option<f64> {
-    let ratio = |one: &Placed| {
+fn size(placed: &[PlacedMarker], clear: f64) -> Option<f64> {
+    let ratio = |one: &PlacedMarker| {
         let near = nearest(placed, one.middle(), NEIGHBOURS + 1);
         let middles = near.iter().map(|p| (p.middle(), p.marker.middle()));
         let map = homography(&middles.collect::<Vec<_>>())?;
         let sides = (0..4).map(|i| {
             let ends = [one.on_board[i], one.on_board[(i + 1) % 4]];
-            Some((seen(&map, ends[1])? - seen(&map, ends[0])?).norm())
+            Some((project(&map, ends[1])? - project(&map, ends[0])?).norm())
         });
         let expected = sides.sum::<Option<f64>>()? / 4.0;
         Some(one.marker.side_px() / expected)
@@ -235,50 +241,59 @@ fn size(placed: &[Placed], clear: f64) -> Option<f64> {
 
 /// Where the board's corners should be by the markers about them.
 #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
-fn foretold(board: &Board, placed: &[Placed], first_has_marker: bool) -> Found {
+fn predict_corners(
+    board: &Board,
+    placed: &[PlacedMarker],
+    first_has_marker: bool,
+) -> ExpectedCorners {
     let GridSize { columns, rows } = board.corners();
     let (mut expected, mut is_beside) = (Vec::new(), Vec::new());
     for i in 0..columns * rows {
         let at = Point2::new((i % columns) as f64 + 1.0, (i / columns) as f64 + 1.0);
         let near = nearest(placed, at, NEIGHBOURS);
         let distance = near.first().map_or(f64::INFINITY, |first| (first.middle() - at).norm());
-        let px = (distance < BEYOND).then(|| map_of(near.iter())).flatten();
-        expected.push(px.and_then(|map| seen(&map, at)));
-        is_beside.push(distance < BESIDE);
+        let px = (distance < MAX_EXTRAPOLATION).then(|| map_of(near.iter())).flatten();
+        expected.push(px.and_then(|map| project(&map, at)));
+        is_beside.push(distance < MAX_BESIDE_DISTANCE);
     }
-    Found { expected, is_beside, first_has_marker }
+    ExpectedCorners { expected, is_beside, first_has_marker }
 }
 
 /// What is wrong where the markers that were told do not make a board.
 fn reason(
     board: &Board,
     dictionary: Dictionary,
-    grey: &Grey<'_>,
+    grey: &GreyImage<'_>,
     quads: &[[ImagePoint; 4]],
     fit: usize,
     of: usize,
-) -> NoMarkers {
+) -> MarkerError {
     let is_board = |quads: &[[ImagePoint; 4]], dictionary| is_board(grey, quads, dictionary);
     if is_board(&marker::mirrored(quads), dictionary) {
-        return NoMarkers::Mirrored;
+        return MarkerError::Mirrored;
     }
-    let markers = marker::read_all(grey, quads, dictionary, COMMON.max(Layout::count(board)));
-    let meant = columns_of(&markers, board.clear());
+    let markers = marker::read_all(
+        grey,
+        quads,
+        dictionary,
+        MARKERS_PER_DICTIONARY.max(MarkerGrid::count(board)),
+    );
+    let meant = columns_of(&markers, board.marker_margin());
     let expected = board.corners();
-    if meant.is_some() || fit >= FEWEST {
+    if meant.is_some() || fit >= MIN_MARKERS {
         let meant = meant.filter(|&columns| columns != expected.columns);
-        return NoMarkers::Order { fit, of: of.max(markers.len()), expected, meant };
+        return MarkerError::Order { fit, of: of.max(markers.len()), expected, meant };
     }
     let others = Dictionary::ALL.into_iter().filter(|&other| other != dictionary);
     match others.into_iter().find(|&other| is_board(quads, other)) {
-        Some(found) => NoMarkers::Other { found, expected: dictionary },
-        None => NoMarkers::None { found: of, dictionary },
+        Some(found) => MarkerError::Other { found, expected: dictionary },
+        None => MarkerError::None { found: of, dictionary },
     }
 }
 
 /// Whether markers of a dictionary show in the order of any board.
-fn is_board(grey: &Grey<'_>, quads: &[[ImagePoint; 4]], dictionary: Dictionary) -> bool {
-    let markers = marker::read_all(grey, quads, dictionary, COMMON);
+fn is_board(grey: &GreyImage<'_>, quads: &[[ImagePoint; 4]], dictionary: Dictionary) -> bool {
+    let markers = marker::read_all(grey, quads, dictionary, MARKERS_PER_DICTIONARY);
     columns_of(&markers, 0.15).is_some()
 }
 
@@ -286,16 +301,17 @@ fn is_board(grey: &Grey<'_>, quads: &[[ImagePoint; 4]], dictionary: Dictionary) 
 fn columns_of(markers: &[Marker], clear: f64) -> Option<usize> {
     let fits = |columns: usize| {
         let both = [false, true].map(|first_has_marker| {
-            let layout = Layout { columns: columns + 1, rows: usize::MAX, first_has_marker };
-            fitting(&layout, markers, clear, FEW_PAIRS).len()
+            let layout = MarkerGrid { columns: columns + 1, rows: usize::MAX, first_has_marker };
+            fitting(&layout, markers, clear, MAX_PAIRS_PER_COUNT).len()
         });
         both[0].max(both[1])
     };
     // More than a row of them, which fits boards of any length.
     let is_enough = |columns: usize, fit: usize| {
-        fit > FEWEST.max(columns.div_ceil(2)) && share(fit, markers.len()) >= MOST_FIT
+        fit > MIN_MARKERS.max(columns.div_ceil(2))
+            && fraction(fit, markers.len()) >= MIN_FIT_FRACTION
     };
-    COLUMNS
+    COLUMN_COUNTS
         .map(|columns| (columns, fits(columns)))
         .filter(|&(columns, fit)| is_enough(columns, fit))
         .max_by_key(|&(_, fit)| fit)

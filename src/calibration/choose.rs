@@ -5,43 +5,43 @@
 use nalgebra::{DVector, SMatrix, SVector};
 
 use super::bundle;
-use super::bundle::{Fit, Guess};
-use super::equations::{Free, SHARED, only};
+use super::bundle::{BundleFit, Guess};
+use super::equations::{FreeParameters, SHARED, restrict_to_free};
 use super::factor::Factor;
 use super::lens::Lens;
-use super::pull::Pull;
-use super::solve::views::Views;
+use super::pull::ViewInformation;
+use super::solve::views::CalibrationData;
 
 /// Share of the smallest held-out error by which a lens may foretell worse and be
 /// taken for as good. Of those that are as good the one with the most coefficients is
 /// chosen, because a coefficient that is left out counts as known. The rational one
 /// must foretell better by as much: where its numerator and its denominator nearly
 /// cancel, its numbers are anywhere.
-const AS_GOOD: f64 = 0.005;
+const AS_GOOD_TOLERANCE: f64 = 0.005;
 /// Standard deviations from which on a bend of the board is believed.
-const BELIEVED_BEND: f64 = 4.0;
+const MIN_BEND_SIGMAS: f64 = 4.0;
 
 /// What one choice gives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Trial {
+pub struct LensTrial {
     /// What was fitted.
-    pub free: Free,
+    pub free: FreeParameters,
     /// Root mean square of all reprojection errors \[px\].
     pub rms_px: f64,
     /// The same of pictures that took no part in fitting the camera, each left out
     /// once \[px\]; `None` where the others do not settle the camera.
-    pub held_out_px: Option<f64>,
+    pub cross_validation_px: Option<f64>,
     /// Whether the lens turns over within the picture: then it is taken only if all do.
-    pub folds: bool,
+    pub is_non_monotonic: bool,
 }
 
 /// Fits on a flat board with one lens after the other, each begun where the one before
 /// it ended, up to one with the most coefficients; those that lead nowhere left out.
-fn fits(views: &Views, most: Lens) -> Vec<(Fit, Trial)> {
-    let mut fits: Vec<(Fit, Trial)> = Vec::new();
+fn fits(views: &CalibrationData, most: Lens) -> Vec<(BundleFit, LensTrial)> {
+    let mut fits: Vec<(BundleFit, LensTrial)> = Vec::new();
     for lens in Lens::ALL.into_iter().filter(|lens| *lens <= most) {
         let start = fits.last().map_or_else(|| views.start.clone(), |(fit, _)| guess(fit));
-        let free = Free { lens: Some(lens), bend: false };
+        let free = FreeParameters { lens: Some(lens), bend: false };
         if let Some(fit) = bundle::fit(start, free, &views.boards) {
             let trial = trial(views, &fit, free);
             fits.push((fit, trial));
@@ -51,24 +51,25 @@ fn fits(views: &Views, most: Lens) -> Vec<(Fit, Trial)> {
 }
 
 /// Where another fit begins.
-fn guess(fit: &Fit) -> Guess {
-    Guess { model: fit.model, places: fit.places.clone() }
+fn guess(fit: &BundleFit) -> Guess {
+    Guess { model: fit.model, placements: fit.placements.clone() }
 }
 
 /// The best choice and all that was tried. `None` where no lens leads to a camera.
-pub(super) fn best(views: &Views) -> Option<(Fit, Free, Vec<Trial>)> {
+pub(super) fn best(views: &CalibrationData) -> Option<(BundleFit, FreeParameters, Vec<LensTrial>)> {
     let mut fits = fits(views, Lens::Rational);
     let chosen = chosen(&fits)?;
-    let mut trials: Vec<Trial> = fits.iter().map(|(_, trial)| *trial).collect();
+    let mut trials: Vec<LensTrial> = fits.iter().map(|(_, trial)| *trial).collect();
     let (fit, chosen) = fits.swap_remove(chosen);
-    let free = Free { bend: true, ..chosen.free };
+    let free = FreeParameters { bend: true, ..chosen.free };
     let bent =
         bundle::fit(guess(&fit), free, &views.boards).map(|fit| (trial(views, &fit, free), fit));
     if let Some((trial, bent)) = bent {
         trials.push(trial);
-        let foretells = trial.held_out_px.zip(chosen.held_out_px).is_some_and(|(b, f)| b < f);
-        let is_sound = chosen.folds || !trial.folds;
-        if foretells && is_sound && is_bent(views, &bent, free) {
+        let predicts_better =
+            trial.cross_validation_px.zip(chosen.cross_validation_px).is_some_and(|(b, f)| b < f);
+        let is_sound = chosen.is_non_monotonic || !trial.is_non_monotonic;
+        if predicts_better && is_sound && is_bent(views, &bent, free) {
             return Some((bent, free, trials));
         }
     }
@@ -77,37 +78,44 @@ pub(super) fn best(views: &Views) -> Option<(Fit, Free, Vec<Trial>)> {
 
 /// Which of the fits on a flat board is taken; where nothing can be held out the one
 /// with the fewest coefficients. `None` without a fit.
-fn chosen(fits: &[(Fit, Trial)]) -> Option<usize> {
-    let is_rational = |trial: &Trial| trial.free.lens == Some(Lens::Rational);
-    let all_fold = fits.iter().all(|(_, trial)| trial.folds);
-    let held_out =
-        |(_, trial): &(Fit, Trial)| trial.held_out_px.filter(|_| all_fold || !trial.folds);
+fn chosen(fits: &[(BundleFit, LensTrial)]) -> Option<usize> {
+    let is_rational = |trial: &LensTrial| trial.free.lens == Some(Lens::Rational);
+    let all_fold = fits.iter().all(|(_, trial)| trial.is_non_monotonic);
+    let held_out = |(_, trial): &(BundleFit, LensTrial)| {
+        trial.cross_validation_px.filter(|_| all_fold || !trial.is_non_monotonic)
+    };
     let simpler = fits.iter().filter(|(_, trial)| !is_rational(trial));
     let least = simpler.filter_map(held_out).fold(f64::INFINITY, f64::min);
-    let is_as_good = |fit: &(Fit, Trial)| {
-        let most = if is_rational(&fit.1) { 1.0 - AS_GOOD } else { 1.0 + AS_GOOD };
+    let is_as_good = |fit: &(BundleFit, LensTrial)| {
+        let most =
+            if is_rational(&fit.1) { 1.0 - AS_GOOD_TOLERANCE } else { 1.0 + AS_GOOD_TOLERANCE };
         held_out(fit).is_some_and(|px| px <= most * least)
     };
-    let simplest = || fits.iter().position(|(_, trial)| all_fold || !trial.folds);
+    let simplest = || fits.iter().position(|(_, trial)| all_fold || !trial.is_non_monotonic);
     fits.iter().rposition(is_as_good).or_else(simplest)
 }
 
 /// A fit with a lens that is given, by way of the simpler ones.
-pub(super) fn up_to(views: &Views, lens: Lens) -> Option<(Fit, Trial)> {
+pub(super) fn up_to(views: &CalibrationData, lens: Lens) -> Option<(BundleFit, LensTrial)> {
     fits(views, lens).pop().filter(|(_, trial)| trial.free.lens == Some(lens))
 }
 
-fn is_bent(views: &Views, fit: &Fit, free: Free) -> bool {
+fn is_bent(views: &CalibrationData, fit: &BundleFit, free: FreeParameters) -> bool {
     let variance = views.noise_variance_px2(fit, free);
-    let Some(spreads) = views.spreads(fit, free) else { return false };
+    let Some(spreads) = views.unit_sigmas(fit, free) else { return false };
     let sigma = |side: usize| spreads[SHARED - 2 + side] * variance.sqrt();
-    (0..2).any(|side| fit.model.bend_mm[side].abs() > BELIEVED_BEND * sigma(side))
+    (0..2).any(|side| fit.model.bend_mm[side].abs() > MIN_BEND_SIGMAS * sigma(side))
 }
 
-fn trial(views: &Views, fit: &Fit, free: Free) -> Trial {
-    let rms_px = views.rms_px(fit.squares_px2);
-    let folds = fit.model.camera.fold(views.size).is_some();
-    Trial { free, rms_px, held_out_px: held_out_px(views, fit, free), folds }
+fn trial(views: &CalibrationData, fit: &BundleFit, free: FreeParameters) -> LensTrial {
+    let rms_px = views.rms_px(fit.sum_of_squares_px2);
+    let folds = fit.model.camera.non_monotonic_at(views.size).is_some();
+    LensTrial {
+        free,
+        rms_px,
+        cross_validation_px: cross_validation_px(views, fit, free),
+        is_non_monotonic: folds,
+    }
 }
 
 /// Root mean square error of each picture with the camera that the others give and
@@ -117,12 +125,16 @@ fn trial(views: &Views, fit: &Fit, free: Free) -> Trial {
 /// together pull as one picture pulls against them, so that without it the camera
 /// goes by ds = −(S − Sᵥ)⁻¹gᵥ, with S all pictures' equations, poses eliminated, and
 /// Sᵥ and gᵥ its own; of its errors that leaves |r|² + 2 gᵥᵀ(S − Sᵥ)⁻¹gᵥ + dsᵀSᵥds.
-fn held_out_px(views: &Views, fit: &Fit, free: Free) -> Option<f64> {
-    let each = Pull::all(views, fit, free)?;
-    let all: SMatrix<f64, SHARED, SHARED> = each.iter().map(|one| one.left).sum();
+fn cross_validation_px(
+    views: &CalibrationData,
+    fit: &BundleFit,
+    free: FreeParameters,
+) -> Option<f64> {
+    let each = ViewInformation::all(views, fit, free)?;
+    let all: SMatrix<f64, SHARED, SHARED> = each.iter().map(|one| one.information).sum();
     let mut squares = 0.0;
-    for Pull { left, score, squares_px2 } in each {
-        let rest = Factor::of_shared(&only(all - left, free))?;
+    for ViewInformation { information: left, score, sum_of_squares_px2: squares_px2 } in each {
+        let rest = Factor::of_shared(&restrict_to_free(all - left, free))?;
         let moved = rest.solve(&DVector::from_column_slice(score.as_slice()));
         let moved = SVector::<f64, SHARED>::from_fn(|row, _| moved[row]);
         squares += squares_px2 + 2.0 * score.dot(&moved) + (moved.transpose() * left * moved)[0];

@@ -2,32 +2,32 @@
 //! with the board lying still on the bed, then one of every place in which it is held.
 
 use super::board::Board;
-use super::refusal::Refusal;
-use super::sighting::{Sighting, shift_px};
+use super::refusal::BoardRejection;
+use super::sighting::{BoardObservation, shift_px};
 
 /// Looks in a row in which the board must lie still for the bed, and how far it may seem
 /// to move from one to the next \[px\].
-const LYING_LOOKS: usize = 5;
-const LYING_PX: f64 = 0.5;
+const BED_FRAMES: usize = 5;
+const BED_STILL_PX: f64 = 0.5;
 /// The same of a board that is held by hand.
-const HELD_LOOKS: usize = 2;
-const HELD_PX: f64 = 2.0;
+const HELD_FRAMES: usize = 2;
+const HELD_STILL_PX: f64 = 2.0;
 /// Mean shift of the corners against every picture that was kept from which on a place
 /// is a new one, as a share of the picture's width.
-const NEW: f64 = 0.04;
+const NEW_POSITION_SHIFT: f64 = 0.04;
 
 /// Takes what a camera sees, look by look.
 #[derive(Debug, Clone)]
 pub struct Collector {
     board: Board,
-    kept: Vec<Sighting>,
-    last: Option<Sighting>,
+    kept: Vec<BoardObservation>,
+    last: Option<BoardObservation>,
     still: usize,
 }
 
 /// What is done with a look.
 #[derive(Debug, Clone, PartialEq)]
-pub enum News {
+pub enum Decision {
     /// It is kept, as the picture with this number, counted from 1.
     Kept(usize),
     /// The board has moved since the last look.
@@ -39,7 +39,7 @@ pub enum News {
     /// The size of the picture is another one.
     OtherSize,
     /// No board is seen, or it cannot be used.
-    Refused(Refusal),
+    Refused(BoardRejection),
 }
 
 impl Collector {
@@ -49,39 +49,42 @@ impl Collector {
     }
 
     /// The pictures that were kept; the first shows the board on the bed.
-    pub fn kept(&self) -> &[Sighting] {
+    pub fn kept(&self) -> &[BoardObservation] {
         &self.kept
     }
 
     /// Decides on the next look.
-    pub fn see(&mut self, look: Result<Sighting, Refusal>) -> News {
+    pub fn add(&mut self, look: Result<BoardObservation, BoardRejection>) -> Decision {
         let now = match look {
             Ok(now) => now,
             Err(refusal) => {
                 (self.last, self.still) = (None, 0);
-                return News::Refused(refusal);
+                return Decision::Refused(refusal);
             }
         };
-        let (most_px, looks) =
-            if self.kept.is_empty() { (LYING_PX, LYING_LOOKS) } else { (HELD_PX, HELD_LOOKS) };
+        let (most_px, looks) = if self.kept.is_empty() {
+            (BED_STILL_PX, BED_FRAMES)
+        } else {
+            (HELD_STILL_PX, HELD_FRAMES)
+        };
         let shift = self.last.as_ref().and_then(|last| self.shift_px(last, &now));
         self.last = Some(now.clone());
         self.still = if shift.is_some_and(|px| px <= most_px) { self.still + 1 } else { 1 };
         if self.kept.first().is_some_and(|first| first.image_size_px != now.image_size_px) {
-            return News::OtherSize;
+            return Decision::OtherSize;
         }
-        if let Some(known) = self.place_of(&now) {
-            return News::Known(known);
+        if let Some(known) = self.position_of(&now) {
+            return Decision::Known(known);
         }
         if self.still < looks {
             return if shift.is_some_and(|px| px <= most_px) {
-                News::Waiting
+                Decision::Waiting
             } else {
-                News::Moving
+                Decision::Moving
             };
         }
         self.kept.push(now);
-        News::Kept(self.kept.len())
+        Decision::Kept(self.kept.len())
     }
 
     /// Gives the picture that was kept last its name.
@@ -91,13 +94,14 @@ impl Collector {
         }
     }
 
-    fn place_of(&self, now: &Sighting) -> Option<usize> {
-        let least_px = NEW * f64::from(now.image_size_px[0]);
-        let is_there = |kept: &Sighting| self.shift_px(kept, now).is_some_and(|px| px < least_px);
+    fn position_of(&self, now: &BoardObservation) -> Option<usize> {
+        let least_px = NEW_POSITION_SHIFT * f64::from(now.image_size_px[0]);
+        let is_there =
+            |kept: &BoardObservation| self.shift_px(kept, now).is_some_and(|px| px < least_px);
         self.kept.iter().position(is_there).map(|index| index + 1)
     }
 
-    fn shift_px(&self, a: &Sighting, b: &Sighting) -> Option<f64> {
+    fn shift_px(&self, a: &BoardObservation, b: &BoardObservation) -> Option<f64> {
         shift_px(&self.board, &a.corners, &b.corners)
     }
 }
@@ -110,8 +114,8 @@ mod tests {
     use crate::core::geometry::Pose;
     use nalgebra::Vector3;
 
-    fn seen(collector: &mut Collector, pose: &Pose) -> News {
-        collector.see(Ok(synthetic::sighting("", pose, || 0.0)))
+    fn seen(collector: &mut Collector, pose: &Pose) -> Decision {
+        collector.add(Ok(synthetic::sighting("", pose, || 0.0)))
     }
 
     fn moved(pose: &Pose, by_mm: f64) -> Pose {
@@ -122,14 +126,14 @@ mod tests {
     fn the_bed_must_lie_still_for_longer_than_a_board_in_the_hand() {
         let (bed, other) = (poses()[0], poses()[1]);
         let mut collector = Collector::new(board());
-        let said: Vec<News> = (0..5).map(|_| seen(&mut collector, &bed)).collect();
-        assert_eq!(said[0], News::Moving);
-        assert!(said[1..4].iter().all(|news| *news == News::Waiting), "{said:?}");
-        assert_eq!(said[4], News::Kept(1));
-        assert_eq!(seen(&mut collector, &bed), News::Known(1));
-        assert_eq!(seen(&mut collector, &other), News::Moving);
-        assert_eq!(seen(&mut collector, &moved(&other, 0.1)), News::Kept(2));
-        assert_eq!(seen(&mut collector, &moved(&other, 0.2)), News::Known(2));
+        let said: Vec<Decision> = (0..5).map(|_| seen(&mut collector, &bed)).collect();
+        assert_eq!(said[0], Decision::Moving);
+        assert!(said[1..4].iter().all(|news| *news == Decision::Waiting), "{said:?}");
+        assert_eq!(said[4], Decision::Kept(1));
+        assert_eq!(seen(&mut collector, &bed), Decision::Known(1));
+        assert_eq!(seen(&mut collector, &other), Decision::Moving);
+        assert_eq!(seen(&mut collector, &moved(&other, 0.1)), Decision::Kept(2));
+        assert_eq!(seen(&mut collector, &moved(&other, 0.2)), Decision::Known(2));
         assert_eq!(collector.kept().len(), 2);
     }
 
@@ -138,17 +142,17 @@ mod tests {
         let mut collector = Collector::new(board());
         for step in 0..20 {
             let pose = moved(&poses()[0], f64::from(step));
-            assert_eq!(seen(&mut collector, &pose), News::Moving);
+            assert_eq!(seen(&mut collector, &pose), Decision::Moving);
         }
-        let refusal = Refusal::NoBoard { columns: 9, rows: 6 };
+        let refusal = BoardRejection::NoBoard { columns: 9, rows: 6 };
         for _ in 0..4 {
-            assert!(!matches!(seen(&mut collector, &poses()[0]), News::Kept(_)));
+            assert!(!matches!(seen(&mut collector, &poses()[0]), Decision::Kept(_)));
         }
-        assert_eq!(collector.see(Err(refusal.clone())), News::Refused(refusal));
+        assert_eq!(collector.add(Err(refusal.clone())), Decision::Refused(refusal));
         for _ in 0..4 {
-            assert!(!matches!(seen(&mut collector, &poses()[0]), News::Kept(_)));
+            assert!(!matches!(seen(&mut collector, &poses()[0]), Decision::Kept(_)));
         }
-        assert_eq!(seen(&mut collector, &poses()[0]), News::Kept(1));
+        assert_eq!(seen(&mut collector, &poses()[0]), Decision::Kept(1));
         assert_eq!(collector.kept().len(), 1);
     }
 }

@@ -8,33 +8,33 @@ mod window;
 use nalgebra::Vector2;
 
 use super::board::Board;
-use super::grey::Grey;
+use super::grey::GreyImage;
 use crate::core::geometry::{GridSize, ImagePoint, Size};
 use crate::numeric::blurred_step::StepTable;
-use shape::{Corner, NUMBERS, Sample, Sums};
-use window::{Line, Marked, Window};
+use shape::{CornerPixel, CornerShape, CornerSums, PARAMETERS};
+use window::{BoardLine, CornerWindow, Marked};
 
-const MOST_STEPS: usize = 25;
+const MAX_STEPS: usize = 25;
 /// Damping at first, as a share of each equation's own weight.
-const DAMPING: f64 = 1e-3;
+const INITIAL_DAMPING: f64 = 1e-3;
 /// Damping beyond which no step leads down any more.
-const MOST_DAMPING: f64 = 1e3;
+const MAX_DAMPING: f64 = 1e3;
 /// Step of the place at which it is found \[px\].
-const FOUND_PX: f64 = 3e-4;
+const CONVERGED_PX: f64 = 3e-4;
 /// How far the fit may go from where the corner was roughly seen, over the window.
-const FARTHEST: f64 = 0.7;
+const MAX_SHIFT: f64 = 0.7;
 const FIRST_BLUR_PX: f64 = 1.0;
 /// Half the contrast of a corner that is there \[grey levels\], and what it may leave of
 /// the pixels over it (RMS).
-const LEAST_HALF: f64 = 10.0;
-const MOST_LEFT: f64 = 0.3;
+const MIN_HALF_CONTRAST: f64 = 10.0;
+const MAX_RESIDUAL: f64 = 0.3;
 
 /// Refines the corners of a board, given row by row as far as they were seen. `None` is
 /// one whose surroundings do not fit, or leave the picture. Where white squares have
 /// markers, `first_has_marker` tells which are white, and their markers are left out.
 pub fn refine(
     board: &Board,
-    grey: &Grey<'_>,
+    grey: &GreyImage<'_>,
     rough: &[Option<ImagePoint>],
     first_has_marker: bool,
 ) -> Vec<Option<ImagePoint>> {
@@ -52,7 +52,7 @@ pub fn refine(
 /// Once over all corners.
 struct Pass<'a> {
     board: &'a Board,
-    grey: &'a Grey<'a>,
+    grey: &'a GreyImage<'a>,
     table: &'a StepTable,
     first_has_marker: bool,
 }
@@ -70,16 +70,20 @@ impl Pass<'_> {
         let refined = |index: usize| {
             let (column, row) = (index % columns, index / columns);
             let lines = [
-                Line::along(column, columns, |i| place(row * columns + i))?,
-                Line::along(row, rows, |i| place(i * columns + column))?,
+                BoardLine::along(column, columns, |i| place(row * columns + i))?,
+                BoardLine::along(row, rows, |i| place(i * columns + column))?,
             ];
-            let lines = if is_bent { lines } else { lines.map(|line| Line { bend: 0.0, ..line }) };
-            let marked = self.board.marks().map(|_| {
+            let lines =
+                if is_bent { lines } else { lines.map(|line| BoardLine { bend: 0.0, ..line }) };
+            let marked = self.board.markers().map(|_| {
                 let even = (column + row) % 2 == 0;
                 if even == self.first_has_marker { Marked::Along } else { Marked::Across }
             });
-            let window =
-                Window { sides: lines.map(|line| line.side), clear: self.board.clear(), marked };
+            let window = CornerWindow {
+                sides: lines.map(|line| line.side),
+                clear: self.board.marker_margin(),
+                marked,
+            };
             refined(self.grey, self.table, place(index)?, lines, &window)
         };
         (0..known.len()).map(refined).collect()
@@ -88,26 +92,26 @@ impl Pass<'_> {
 
 /// A corner whose lines run like these.
 fn refined(
-    grey: &Grey<'_>,
+    grey: &GreyImage<'_>,
     table: &StepTable,
     rough: ImagePoint,
-    lines: [Line; 2],
-    window: &Window,
+    lines: [BoardLine; 2],
+    window: &CornerWindow,
 ) -> Option<ImagePoint> {
     let samples = samples(grey, rough, window)?;
     let mut corner = start(&samples, lines)?;
     let mut sums = corner.sums(table, &samples);
-    let mut damping = DAMPING;
-    for _ in 0..MOST_STEPS {
+    let mut damping = INITIAL_DAMPING;
+    for _ in 0..MAX_STEPS {
         let mut damped = sums.matrix;
-        for i in 0..NUMBERS {
+        for i in 0..PARAMETERS {
             damped[(i, i)] *= 1.0 + damping;
         }
         let step = damped.cholesky()?.solve(&sums.side);
         let next = corner.stepped(&step);
         let found = next.sums(table, &samples);
-        if found.squares <= sums.squares {
-            let is_found = step[0].hypot(step[1]) < FOUND_PX;
+        if found.sum_of_squares <= sums.sum_of_squares {
+            let is_found = step[0].hypot(step[1]) < CONVERGED_PX;
             (corner, sums) = (next, found);
             damping *= 0.1;
             if is_found {
@@ -115,26 +119,26 @@ fn refined(
             }
         } else {
             damping *= 10.0;
-            if damping > MOST_DAMPING {
+            if damping > MAX_DAMPING {
                 break;
             }
         }
     }
     let is_sound =
-        corner.at.norm() < FARTHEST * window.radius() && corner.at.iter().all(|at| at.is_finite());
+        corner.at.norm() < MAX_SHIFT * window.radius() && corner.at.iter().all(|at| at.is_finite());
     (is_sound && shows(window, &corner, &sums, samples.len())).then(|| rough + corner.at)
 }
 
 /// Whether a corner that was not seen, but foretold by markers, is there: bright and
 /// dark are where they should be, and nothing lies over it.
 #[expect(clippy::cast_precision_loss, reason = "a count of pixels")]
-fn shows(window: &Window, corner: &Corner, sums: &Sums, count: usize) -> bool {
+fn shows(window: &CornerWindow, corner: &CornerShape, sums: &CornerSums, count: usize) -> bool {
     let Some(marked) = window.marked else { return true };
     let half = corner.levels[1];
     // White squares have the markers; the contrast is that of the squares across over
     // those along.
     let white = if marked == Marked::Across { half } else { -half };
-    white > LEAST_HALF && (sums.squares / count as f64).sqrt() < MOST_LEFT * white
+    white > MIN_HALF_CONTRAST && (sums.sum_of_squares / count as f64).sqrt() < MAX_RESIDUAL * white
 }
 
 /// The pixels within a circle about a corner, without those that a marker disturbs;
@@ -145,7 +149,11 @@ fn shows(window: &Window, corner: &Corner, sums: &Sums, count: usize) -> bool {
     clippy::cast_precision_loss,
     reason = "checked to lie in the picture"
 )]
-fn samples(grey: &Grey<'_>, rough: ImagePoint, window: &Window) -> Option<Vec<Sample>> {
+fn samples(
+    grey: &GreyImage<'_>,
+    rough: ImagePoint,
+    window: &CornerWindow,
+) -> Option<Vec<CornerPixel>> {
     let Size { width, height } = grey.size();
     let radius = window.radius();
     let inside = |at: f64, side: usize| at - radius >= 0.0 && at + radius <= side as f64 - 1.0;
@@ -159,7 +167,7 @@ fn samples(grey: &Grey<'_>, rough: ImagePoint, window: &Window) -> Option<Vec<Sa
         for x in from_x..=to_x {
             let at = Vector2::new(x as f64 - rough.x, y as f64 - rough.y);
             if at.norm() <= radius && window.is_clear(at) {
-                samples.push(Sample { at, value: grey.pixel(x, y) });
+                samples.push(CornerPixel { at, value: grey.pixel(x, y) });
             }
         }
     }
@@ -167,7 +175,7 @@ fn samples(grey: &Grey<'_>, rough: ImagePoint, window: &Window) -> Option<Vec<Sa
 }
 
 /// Lines along the board's sides; levels from the pixels on either side of them.
-fn start(samples: &[Sample], lines: [Line; 2]) -> Option<Corner> {
+fn start(samples: &[CornerPixel], lines: [BoardLine; 2]) -> Option<CornerShape> {
     let sides = lines.map(|line| line.side);
     let bends = lines.map(|line| line.bend);
     let turns = sides.map(|side| side.y.atan2(side.x));
@@ -183,6 +191,6 @@ fn start(samples: &[Sample], lines: [Line; 2]) -> Option<Corner> {
     };
     let (same, other) = (mean(true), mean(false));
     let levels = [f64::midpoint(same, other), 0.5 * (same - other), 0.0, 0.0];
-    let corner = Corner { at: Vector2::zeros(), turns, bends, blur: FIRST_BLUR_PX, levels };
+    let corner = CornerShape { at: Vector2::zeros(), turns, bends, blur: FIRST_BLUR_PX, levels };
     (same - other).is_finite().then_some(corner)
 }

@@ -11,12 +11,15 @@ use nalgebra::{DMatrix, DVector, Point3, SMatrix, SVector};
 
 use super::board::Board;
 use super::camera::NUMBERS;
-use super::equations::{Corner, Equations, Free, Model, POSE, Place, SHARED, only};
+use super::equations::{
+    BoardPlacement, CameraModel, Correspondence, Equations, FreeParameters, POSE, SHARED,
+    restrict_to_free,
+};
 use super::factor::{Elimination, Factor};
 use super::plane::{OnBed, bed_from_board};
 use super::scale;
 use super::solve::Solution;
-use super::uncertainty::{Joint, UNCERTAIN, Uncertainty};
+use super::uncertainty::{CalibrationUncertainty, JointCovariance, UNCERTAIN_PARAMETERS};
 use super::{Calibration, SurfaceMap};
 use crate::core::geometry::{ImagePoint, Pose};
 use crate::core::units::Mm;
@@ -24,17 +27,17 @@ use crate::core::units::Mm;
 /// Step of the central differences, as a share of a focal length, as an angle
 /// \[rad\] or as a share of the board's distance: small against the bend of the model
 /// and large against rounding.
-const STEP: f64 = 1e-4;
+const RELATIVE_STEP: f64 = 1e-4;
 
 /// What the noise of the corners leaves open in a calibration.
 #[derive(Debug, Clone)]
-pub struct Covariance {
-    model: Model,
-    free: Free,
+pub struct CalibrationCovariance {
+    model: CameraModel,
+    free: FreeParameters,
     image_size_px: [u32; 2],
     seen_px: [ImagePoint; 2],
-    bed: Place,
-    on_bed: Vec<Vec<Corner>>,
+    bed: BoardPlacement,
+    on_bed: Vec<Vec<Correspondence>>,
     thickness: Mm,
     noise_variance_px2: f64,
     /// What all pictures say of the shared numbers, their boards' poses being free.
@@ -45,7 +48,7 @@ pub struct Covariance {
 
 /// A number that is read off a surface, and how it answers to the calibration.
 #[derive(Debug, Clone)]
-pub struct Reading {
+pub struct DerivedValue {
     /// The number itself.
     pub value: f64,
     /// With the shared numbers, the bed going where they take it.
@@ -55,7 +58,7 @@ pub struct Reading {
     of_bed: f64,
 }
 
-impl Covariance {
+impl CalibrationCovariance {
     /// Of a solution and the boards that fixed the bed plane, and the height of their
     /// faces above the bed. Their pictures may be among the solution's or taken
     /// later; in both cases their poses were fitted to their own corners with the
@@ -65,10 +68,11 @@ impl Covariance {
         let mut left = SMatrix::<f64, SHARED, SHARED>::zeros();
         for (number, view) in solution.views.iter().enumerate() {
             let corners = solution.corners(board, number);
-            left += eliminate(&model, free, &Place::of_one(view.pose), &[corners])?.left;
+            left +=
+                eliminate(&model, free, &BoardPlacement::of_one(view.pose), &[corners])?.reduced;
         }
         let noise_variance_px2 = solution.noise_px.powi(2) * solution.design_effect;
-        let left = only(left, free);
+        let left = restrict_to_free(left, free);
         Some(Self {
             model,
             free,
@@ -86,17 +90,17 @@ impl Covariance {
 
     /// The same if there were another picture of a board, with as much noise.
     /// `None` where the board would not be in front of the camera.
-    pub fn with_another(&self, pose: &Pose, corners: &[Corner]) -> Option<Self> {
-        let place = Place::of_one(*pose);
+    pub fn with_another(&self, pose: &Pose, corners: &[Correspondence]) -> Option<Self> {
+        let place = BoardPlacement::of_one(*pose);
         let more = eliminate(&self.model, self.free, &place, &[corners.to_vec()])?;
-        let left = self.left + only(more.left, self.free);
+        let left = self.left + restrict_to_free(more.reduced, self.free);
         Some(Self { of_shared: Factor::of_shared(&left)?, left, ..self.clone() })
     }
 
     /// The same if there were another board on the bed, whose picture takes part in
     /// both fits: where it lies on the plane of the first. `None` where it would not be
     /// in front of the camera.
-    pub fn with_another_on_bed(&self, lies: [f64; 3], corners: &[Corner]) -> Option<Self> {
+    pub fn with_another_on_bed(&self, lies: [f64; 3], corners: &[Correspondence]) -> Option<Self> {
         let mut bed = self.bed.clone();
         bed.others.push(lies);
         let mut on_bed = self.on_bed.clone();
@@ -109,7 +113,7 @@ impl Covariance {
     /// Where a further board would lie that is on the bed.
     pub fn on_bed(&self, lies: [f64; 3]) -> Pose {
         let others = vec![lies];
-        Place { pose: self.bed.pose, others }.of_board(1)
+        BoardPlacement { pose: self.bed.pose, others }.of_board(1)
     }
 
     /// Size of the pictures \[px\].
@@ -133,7 +137,7 @@ impl Covariance {
     }
 
     /// The camera and the bend of the board.
-    pub fn model(&self) -> &Model {
+    pub fn model(&self) -> &CameraModel {
         &self.model
     }
 
@@ -145,7 +149,7 @@ impl Covariance {
     }
 
     /// The same before the noise is known.
-    pub fn width(&self, ends: [ImagePoint; 2], surface_height: Mm) -> Option<Reading> {
+    pub fn width(&self, ends: [ImagePoint; 2], surface_height: Mm) -> Option<DerivedValue> {
         let width = |map: &SurfaceMap| Some((map.to_mm(ends[1])? - map.to_mm(ends[0])?).norm());
         self.read(surface_height, width)
     }
@@ -160,19 +164,19 @@ impl Covariance {
     }
 
     /// Standard deviation of a number that was read.
-    pub fn sigma(&self, reading: &Reading) -> f64 {
+    pub fn sigma(&self, reading: &DerivedValue) -> f64 {
         let whitened = self.of_shared.whiten(&as_matrix(&reading.slope));
         (self.noise_variance_px2 * (whitened.norm_squared() + reading.of_bed)).sqrt()
     }
 
     /// What is left open in camera and bed plane together.
-    pub fn uncertainty(&self) -> Uncertainty {
+    pub fn uncertainty(&self) -> CalibrationUncertainty {
         self.joint(1.0)
     }
 
     /// The same without what the noise of the bed's own corners adds: two cameras that see
     /// the same board share that.
-    pub fn uncertainty_of_camera(&self) -> Uncertainty {
+    pub fn uncertainty_of_camera(&self) -> CalibrationUncertainty {
         self.joint(0.0)
     }
 
@@ -180,11 +184,11 @@ impl Covariance {
     ///
     /// The bed's pose answers to the shared numbers s as b = −V⁻¹W·s, with V its own
     /// equations and W those of both; its own corners add V⁻¹.
-    fn joint(&self, own: f64) -> Uncertainty {
+    fn joint(&self, own: f64) -> CalibrationUncertainty {
         let numbers = self.bed.numbers();
-        let own_root = self.of_bed.place.whiten(&DMatrix::identity(numbers, numbers));
+        let own_root = self.of_bed.placement.whiten(&DMatrix::identity(numbers, numbers));
         let follows = (own_root.transpose() * &self.of_bed.follows).rows(0, POSE).into_owned();
-        let mut answers = DMatrix::zeros(UNCERTAIN, SHARED);
+        let mut answers = DMatrix::zeros(UNCERTAIN_PARAMETERS, SHARED);
         answers.view_mut((0, 0), (NUMBERS, NUMBERS)).fill_with_identity();
         answers.rows_mut(NUMBERS, POSE).copy_from(&-follows);
         let of_shared = self.of_shared.whiten(&answers.transpose());
@@ -197,10 +201,10 @@ impl Covariance {
         let face = &self.bed.pose;
         let bed = bed_from_board(face, self.thickness);
         let arm = bed.translation_mm() - face.translation_mm();
-        let mut moved = DMatrix::identity(UNCERTAIN, UNCERTAIN);
+        let mut moved = DMatrix::identity(UNCERTAIN_PARAMETERS, UNCERTAIN_PARAMETERS);
         moved.view_mut((NUMBERS + 3, NUMBERS), (3, 3)).copy_from(&-arm.cross_matrix());
         let joint = &moved * joint * moved.transpose();
-        Uncertainty::of(&Joint::from_fn(|row, column| joint[(row, column)]))
+        CalibrationUncertainty::of(&JointCovariance::from_fn(|row, column| joint[(row, column)]))
     }
 
     /// The map of a surface.
@@ -217,36 +221,40 @@ impl Covariance {
         &self,
         surface_height: Mm,
         read: impl Fn(&SurfaceMap) -> Option<f64>,
-    ) -> Option<Reading> {
-        let with = |model: &Model, bed: &Place| read(&self.map(model, bed, surface_height));
+    ) -> Option<DerivedValue> {
+        let with =
+            |model: &CameraModel, bed: &BoardPlacement| read(&self.map(model, bed, surface_height));
         let mut of_shared = DVector::zeros(SHARED);
         for number in (0..SHARED).filter(|&number| self.free.has(number)) {
             // Focal lengths and centre in pixels, all else in units of about one.
-            let step =
-                if number < 4 { STEP * self.model.camera.focal_px[number % 2] } else { STEP };
+            let step = if number < 4 {
+                RELATIVE_STEP * self.model.camera.focal_px[number % 2]
+            } else {
+                RELATIVE_STEP
+            };
             let mut by = SVector::<f64, SHARED>::zeros();
             by[number] = step;
-            let up = with(&self.model.stepped(&by), &self.bed)?;
-            let down = with(&self.model.stepped(&-by), &self.bed)?;
+            let up = with(&self.model.moved(&by), &self.bed)?;
+            let down = with(&self.model.moved(&-by), &self.bed)?;
             of_shared[number] = (up - down) / (2.0 * step);
         }
         let mut of_bed = DVector::zeros(self.bed.numbers());
         let distance = self.bed.pose.translation_mm().norm();
         for number in 0..POSE {
-            let step = if number < 3 { STEP } else { STEP * distance };
+            let step = if number < 3 { RELATIVE_STEP } else { RELATIVE_STEP * distance };
             let mut by = DVector::zeros(self.bed.numbers());
             by[number] = step;
-            let up = with(&self.model, &self.bed.stepped(&by))?;
-            let down = with(&self.model, &self.bed.stepped(&-by))?;
+            let up = with(&self.model, &self.bed.moved(&by))?;
+            let down = with(&self.model, &self.bed.moved(&-by))?;
             of_bed[number] = (up - down) / (2.0 * step);
         }
-        let alone = self.of_bed.place.whiten(&as_matrix(&of_bed));
+        let alone = self.of_bed.placement.whiten(&as_matrix(&of_bed));
         let slope = of_shared - self.of_bed.follows.transpose() * alone.column(0);
         let value = with(&self.model, &self.bed)?;
-        Some(Reading { value, slope, of_bed: alone.norm_squared() })
+        Some(DerivedValue { value, slope, of_bed: alone.norm_squared() })
     }
 
-    fn map(&self, model: &Model, bed: &Place, surface_height: Mm) -> SurfaceMap {
+    fn map(&self, model: &CameraModel, bed: &BoardPlacement, surface_height: Mm) -> SurfaceMap {
         let calibration = Calibration::Full {
             image_size_px: self.image_size_px,
             camera: model.camera,
@@ -263,10 +271,10 @@ fn as_matrix(vector: &DVector<f64>) -> DMatrix<f64> {
 }
 
 fn eliminate(
-    model: &Model,
-    free: Free,
-    place: &Place,
-    boards: &[Vec<Corner>],
+    model: &CameraModel,
+    free: FreeParameters,
+    place: &BoardPlacement,
+    boards: &[Vec<Correspondence>],
 ) -> Option<Elimination> {
     Elimination::of(&Equations::of(model, free, place, boards)?)
 }

@@ -3,20 +3,20 @@
 
 use nalgebra::Vector3;
 
-use super::solve::{Solution, View};
+use super::solve::{BoardView, Solution};
 
 /// The picture is cut into this many parts along each side.
-pub const GRID: usize = 4;
+pub const GRID_SIDE: usize = 4;
 /// All of its parts.
-pub const PARTS: usize = GRID * GRID;
+pub const PARTS: usize = GRID_SIDE * GRID_SIDE;
 /// Tilt about an axis of the picture from which on it counts \[degrees\].
-const TILTED_DEG: f64 = 10.0;
+const MIN_TILT_DEG: f64 = 10.0;
 
 /// What pictures of boards show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Coverage {
     /// Whether a corner was seen in a part of the picture, row by row.
-    pub cells: [[bool; GRID]; GRID],
+    pub cells: [[bool; GRID_SIDE]; GRID_SIDE],
     /// Boards of which one side was nearer to the camera, in the order of [`SIDES`].
     pub tilts: [usize; 4],
 }
@@ -50,11 +50,11 @@ impl Coverage {
 
 /// Which sides of a board are nearer to the camera than its middle, in the order of
 /// [`SIDES`].
-fn nearer(view: &View) -> [bool; 4] {
+fn nearer(view: &BoardView) -> [bool; 4] {
     let normal = view.pose.rotation() * Vector3::z();
     // Seen along the view; where it points to the right, the right side is nearer.
     let normal = if normal.z < 0.0 { -normal } else { normal };
-    let tilted = |across: f64| across.atan2(normal.z).to_degrees() > TILTED_DEG;
+    let tilted = |across: f64| across.atan2(normal.z).to_degrees() > MIN_TILT_DEG;
     [tilted(-normal.x), tilted(normal.x), tilted(-normal.y), tilted(normal.y)]
 }
 
@@ -64,11 +64,12 @@ fn nearer(view: &View) -> [bool; 4] {
     clippy::cast_precision_loss,
     reason = "an index into a handful of cells, clamped to them"
 )]
-fn cells(solution: &Solution) -> [[bool; GRID]; GRID] {
+fn cells(solution: &Solution) -> [[bool; GRID_SIDE]; GRID_SIDE] {
     let [width, height] = solution.image_size_px.map(f64::from);
-    let index =
-        |at: f64, size: f64| (at / size * GRID as f64).clamp(0.0, (GRID - 1) as f64) as usize;
-    let mut seen = [[false; GRID]; GRID];
+    let index = |at: f64, size: f64| {
+        (at / size * GRID_SIDE as f64).clamp(0.0, (GRID_SIDE - 1) as f64) as usize
+    };
+    let mut seen = [[false; GRID_SIDE]; GRID_SIDE];
     for corner in solution.views.iter().flat_map(|view| &view.corners) {
         seen[index(corner.px.y, height)][index(corner.px.x, width)] = true;
     }
@@ -81,8 +82,8 @@ mod tests {
     use crate::core::geometry::Pose;
     use nalgebra::Point3;
 
-    fn view(tilt: Vector3<f64>) -> View {
-        View {
+    fn view(tilt: Vector3<f64>) -> BoardView {
+        BoardView {
             name: String::new(),
             pose: Pose::new(tilt, Vector3::new(0.0, 0.0, 400.0)),
             rms_px: 0.1,
@@ -103,8 +104,8 @@ mod tests {
             let told = nearer(&view);
             for (is_so, deg) in told.into_iter().zip([-right, right, -lower, lower]) {
                 // The axes of the board are turned by 6 degrees against the picture's.
-                if (deg - TILTED_DEG).abs() > 3.0 {
-                    assert_eq!(is_so, deg > TILTED_DEG, "{x} {y}: {told:?}");
+                if (deg - MIN_TILT_DEG).abs() > 3.0 {
+                    assert_eq!(is_so, deg > MIN_TILT_DEG, "{x} {y}: {told:?}");
                 }
             }
         }

@@ -67,7 +67,7 @@ impl Dictionary {
 
     /// Cells that may be misread: so few that what is no marker hardly ever passes for
     /// one.
-    pub fn forgiven(self) -> u32 {
+    pub fn max_errors(self) -> u32 {
         match self {
             Self::Four => 0,
             Self::Five => 1,

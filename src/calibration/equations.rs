@@ -6,14 +6,17 @@
 
 mod unknowns;
 
-pub use unknowns::{Corner, Free, Model, ON_PLANE, POSE, Place, SHARED, only};
+pub use unknowns::{
+    BoardPlacement, CameraModel, Correspondence, FreeParameters, ON_PLANE, POSE, SHARED,
+    restrict_to_free,
+};
 
 use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix3, Point3, SMatrix, SVector, Vector3};
 
 use super::camera::{NUMBERS, Projection};
 use crate::core::geometry::Pose;
 
-const BOTH: usize = POSE + ON_PLANE;
+const PLACEMENT_PARAMETERS: usize = POSE + ON_PLANE;
 /// The equations of one place; the right-hand sides are those of what is left
 /// between seen and expected.
 #[derive(Debug, Clone)]
@@ -23,26 +26,31 @@ pub struct Equations {
     /// Right-hand side for it.
     pub shared_side: SVector<f64, SHARED>,
     /// Of the place alone.
-    pub place: DMatrix<f64>,
+    pub placement: DMatrix<f64>,
     /// Right-hand side for it.
-    pub place_side: DVector<f64>,
+    pub placement_side: DVector<f64>,
     /// Of place and shared numbers together.
     pub both: DMatrix<f64>,
     /// Sum of the squares of what is left \[px²\].
-    pub squares_px2: f64,
+    pub sum_of_squares_px2: f64,
 }
 
 impl Equations {
     /// Of the boards at a place, a list of corners each. `None` where one is behind
     /// the camera.
-    pub fn of(model: &Model, free: Free, place: &Place, boards: &[Vec<Corner>]) -> Option<Self> {
+    pub fn of(
+        model: &CameraModel,
+        free: FreeParameters,
+        place: &BoardPlacement,
+        boards: &[Vec<Correspondence>],
+    ) -> Option<Self> {
         let mut sums = Self {
             shared: SMatrix::zeros(),
             shared_side: SVector::zeros(),
-            place: DMatrix::zeros(place.numbers(), place.numbers()),
-            place_side: DVector::zeros(place.numbers()),
+            placement: DMatrix::zeros(place.numbers(), place.numbers()),
+            placement_side: DVector::zeros(place.numbers()),
             both: DMatrix::zeros(place.numbers(), SHARED),
-            squares_px2: 0.0,
+            sum_of_squares_px2: 0.0,
         };
         for (board, corners) in boards.iter().enumerate() {
             sums.add_board(model, free, place, board, corners)?;
@@ -52,23 +60,23 @@ impl Equations {
 
     fn add_board(
         &mut self,
-        model: &Model,
-        free: Free,
-        place: &Place,
+        model: &CameraModel,
+        free: FreeParameters,
+        place: &BoardPlacement,
         board: usize,
-        corners: &[Corner],
+        corners: &[Correspondence],
     ) -> Option<()> {
         let pose = place.of_board(board);
-        let mut own = SMatrix::<f64, BOTH, BOTH>::zeros();
-        let mut own_side = SVector::<f64, BOTH>::zeros();
-        let mut both = SMatrix::<f64, BOTH, SHARED>::zeros();
+        let mut own = SMatrix::<f64, PLACEMENT_PARAMETERS, PLACEMENT_PARAMETERS>::zeros();
+        let mut own_side = SVector::<f64, PLACEMENT_PARAMETERS>::zeros();
+        let mut both = SMatrix::<f64, PLACEMENT_PARAMETERS, SHARED>::zeros();
         for corner in corners {
             let on_board = model.on_board(corner);
             let projection = model.camera.project_with_slopes(pose.apply(on_board))?;
-            let left = corner.seen - projection.at;
+            let left = corner.observed - projection.at;
             let of_shared = of_shared(&projection, &pose, corner, free);
             let of_place = of_place(&projection, place, &pose, on_board, board > 0);
-            self.squares_px2 += left.norm_squared();
+            self.sum_of_squares_px2 += left.norm_squared();
             self.shared += of_shared.transpose() * of_shared;
             self.shared_side += of_shared.transpose() * left;
             own += of_place.transpose() * of_place;
@@ -78,11 +86,11 @@ impl Equations {
         // The pose of the first board is that of all; each further one has its own
         // numbers besides.
         let index = |i: usize| if i < POSE { i } else { i + ON_PLANE * board - ON_PLANE };
-        let numbers = if board == 0 { POSE } else { BOTH };
+        let numbers = if board == 0 { POSE } else { PLACEMENT_PARAMETERS };
         for i in 0..numbers {
-            self.place_side[index(i)] += own_side[i];
+            self.placement_side[index(i)] += own_side[i];
             for j in 0..numbers {
-                self.place[(index(i), index(j))] += own[(i, j)];
+                self.placement[(index(i), index(j))] += own[(i, j)];
             }
             for j in 0..SHARED {
                 self.both[(index(i), j)] += both[(i, j)];
@@ -96,8 +104,8 @@ impl Equations {
 fn of_shared(
     projection: &Projection,
     pose: &Pose,
-    corner: &Corner,
-    free: Free,
+    corner: &Correspondence,
+    free: FreeParameters,
 ) -> SMatrix<f64, 2, SHARED> {
     let mut slopes = SMatrix::<f64, 2, SHARED>::zeros();
     slopes.fixed_columns_mut::<NUMBERS>(0).copy_from(&projection.of_camera);
@@ -115,13 +123,13 @@ fn of_shared(
 /// How it answers to the pose and, on a further board, to that board's own numbers.
 fn of_place(
     projection: &Projection,
-    place: &Place,
+    place: &BoardPlacement,
     pose: &Pose,
     on_board: Point3<f64>,
     is_further: bool,
-) -> SMatrix<f64, 2, BOTH> {
+) -> SMatrix<f64, 2, PLACEMENT_PARAMETERS> {
     let of_point: Matrix2x3<f64> = projection.of_point;
-    let mut slopes = SMatrix::<f64, 2, BOTH>::zeros();
+    let mut slopes = SMatrix::<f64, 2, PLACEMENT_PARAMETERS>::zeros();
     // The pose turns about the first board's origin.
     let from_origin = pose.apply(on_board) - Point3::from(place.pose.translation_mm());
     let turned: Matrix3<f64> = -from_origin.cross_matrix();
@@ -146,23 +154,23 @@ mod tests {
     use crate::calibration::synthetic::TRUTH;
     use nalgebra::Point2;
 
-    fn corners() -> Vec<Corner> {
+    fn corners() -> Vec<Correspondence> {
         let at = |i: u32, j: u32| Point2::new(f64::from(i) * 20.0, f64::from(j) * 20.0);
         (0..12)
             .map(|k| {
                 let bend = [0.3 - 0.1 * f64::from(k % 4), 0.2 - 0.1 * f64::from(k / 4)];
                 let seen = Point2::new(300.0 + f64::from(k), 200.0 - f64::from(k));
-                Corner { on_board: at(k % 4, k / 4), bend, seen }
+                Correspondence { on_board: at(k % 4, k / 4), bend, observed: seen }
             })
             .collect()
     }
 
-    fn scene() -> (Model, Place) {
+    fn scene() -> (CameraModel, BoardPlacement) {
         let mut camera = TRUTH;
         camera.distortion[5..].copy_from_slice(&[0.03, -0.02, 0.05]);
         let pose = Pose::new(Vector3::new(0.3, -0.2, 0.1), Vector3::new(-60.0, -40.0, 400.0));
-        let place = Place { pose, others: vec![[30.0, -20.0, 0.4], [-50.0, 10.0, -1.0]] };
-        (Model { camera, bend_mm: [1.5, -0.7] }, place)
+        let place = BoardPlacement { pose, others: vec![[30.0, -20.0, 0.4], [-50.0, 10.0, -1.0]] };
+        (CameraModel { camera, bend_mm: [1.5, -0.7] }, place)
     }
 
     /// Right-hand sides are half the gradient of the squares, downwards.
@@ -170,16 +178,18 @@ mod tests {
     fn right_hand_sides_are_the_gradient_of_the_squares() {
         let (model, place) = scene();
         let boards = [corners(), corners(), corners()];
-        let free = Free { lens: Some(Lens::Rational), bend: true };
+        let free = FreeParameters { lens: Some(Lens::Rational), bend: true };
         let equations = Equations::of(&model, free, &place, &boards).unwrap();
-        let squares = |model: &Model, place: &Place| model.squares_px2(place, &boards).unwrap();
-        assert!((equations.squares_px2 / squares(&model, &place) - 1.0).abs() < 1e-12);
+        let squares = |model: &CameraModel, place: &BoardPlacement| {
+            model.sum_of_squares_px2(place, &boards).unwrap()
+        };
+        assert!((equations.sum_of_squares_px2 / squares(&model, &place) - 1.0).abs() < 1e-12);
         let step = 1e-5;
         for number in 0..SHARED {
             let mut by = SVector::zeros();
             by[number] = step;
-            let up = squares(&model.stepped(&by), &place);
-            let down = squares(&model.stepped(&-by), &place);
+            let up = squares(&model.moved(&by), &place);
+            let down = squares(&model.moved(&-by), &place);
             let slope = -(up - down) / (4.0 * step);
             let found = equations.shared_side[number];
             assert!(
@@ -190,10 +200,10 @@ mod tests {
         for number in 0..place.numbers() {
             let mut by = DVector::zeros(place.numbers());
             by[number] = step;
-            let up = squares(&model, &place.stepped(&by));
-            let down = squares(&model, &place.stepped(&-by));
+            let up = squares(&model, &place.moved(&by));
+            let down = squares(&model, &place.moved(&-by));
             let slope = -(up - down) / (4.0 * step);
-            let found = equations.place_side[number];
+            let found = equations.placement_side[number];
             assert!(
                 (slope - found).abs() < 1e-4 * found.abs().max(1.0),
                 "{number}: {slope} {found}"
@@ -204,7 +214,7 @@ mod tests {
     #[test]
     fn what_is_not_free_is_known() {
         let (model, place) = scene();
-        let free = Free { lens: Some(Lens::Two), bend: false };
+        let free = FreeParameters { lens: Some(Lens::Two), bend: false };
         let boards = [corners(), corners(), corners()];
         let equations = Equations::of(&model, free, &place, &boards).unwrap();
         assert_eq!(free.count(), 6);

@@ -14,7 +14,7 @@ mod yaml;
 pub use intrinsics::{Format, Import, Intrinsics};
 
 use crate::document::Problems;
-use fields::Fields;
+use fields::YamlFields;
 
 /// Reads the text of a YAML file; `file` is its name in what is said about it.
 /// Everything that is wrong is reported at once.
@@ -23,8 +23,8 @@ pub fn parse(file: &str, text: &str) -> Result<Import, Problems> {
         Ok(document) => document,
         Err(problem) => return Err(Problems { file: file.to_owned(), list: vec![problem] }),
     };
-    let fields = Fields::of(&document.root);
-    let format = if ros::is_meant(&fields) { Format::Ros } else { Format::OpenCv };
+    let fields = YamlFields::of(&document.root);
+    let format = if ros::is_ros(&fields) { Format::Ros } else { Format::OpenCv };
     let mut notes = Vec::new();
     if document.more {
         notes.push("only the first document of the file is read".to_owned());

@@ -7,15 +7,15 @@ use super::equations::{Equations, SHARED};
 
 /// Share of a number's standard deviation, the others being known, below which the
 /// pictures do not tell it from the others.
-const LEAST_APART: f64 = 1e-5;
+const MIN_PIVOT: f64 = 1e-5;
 
 /// The equations of one place with its own numbers eliminated.
 #[derive(Debug, Clone)]
 pub struct Elimination {
     /// What the picture says of the shared numbers, the place being free.
-    pub left: SMatrix<f64, SHARED, SHARED>,
+    pub reduced: SMatrix<f64, SHARED, SHARED>,
     /// What it says of the place, the shared numbers being known.
-    pub place: Factor,
+    pub placement: Factor,
     /// How the place answers to the shared numbers, whitened.
     pub follows: DMatrix<f64>,
 }
@@ -23,10 +23,10 @@ pub struct Elimination {
 impl Elimination {
     /// `None` where the corners do not fix the place.
     pub fn of(equations: &Equations) -> Option<Self> {
-        let place = Factor::of(&equations.place)?;
+        let place = Factor::of(&equations.placement)?;
         let follows = place.whiten(&equations.both);
         let left = equations.shared - as_shared(&(follows.transpose() * &follows));
-        Some(Self { left, place, follows })
+        Some(Self { reduced: left, placement: place, follows })
     }
 }
 
@@ -53,7 +53,7 @@ impl Factor {
             if row == column { 1.0 } else { matrix[(row, column)] * unit[row] * unit[column] }
         });
         let lower = Cholesky::new(scaled)?;
-        let apart = lower.l_dirty().diagonal().iter().all(|&on| on > LEAST_APART);
+        let apart = lower.l_dirty().diagonal().iter().all(|&on| on > MIN_PIVOT);
         apart.then_some(Self { unit, lower })
     }
 

@@ -8,8 +8,8 @@ use nalgebra::{Point3, Vector3};
 use super::camera::COEFFICIENTS;
 use super::lens::Lens;
 use super::uncertainty;
-use super::uncertainty::Uncertainty;
-use super::{Calibration, Camera, Quality};
+use super::uncertainty::CalibrationUncertainty;
+use super::{Calibration, CalibrationQuality, Camera};
 use crate::core::geometry::Pose;
 use crate::core::units::Mm;
 use crate::document::Problems;
@@ -26,9 +26,9 @@ const TURN_RAD: std::ops::RangeInclusive<f64> = -6.3..=6.3;
 const LENGTH_MM: std::ops::RangeInclusive<f64> = -1e6..=1e6;
 pub(super) const RMS_PX: std::ops::RangeInclusive<f64> = 0.0..=1e3;
 /// Standard deviations, in the units of their numbers, and parts of them.
-const FACTOR: std::ops::RangeInclusive<f64> = -1e9..=1e9;
+const FACTOR_RANGE: std::ops::RangeInclusive<f64> = -1e9..=1e9;
 /// A calibration that leaves more than the width itself open is none.
-const SHARE: std::ops::RangeInclusive<f64> = 0.0..=1.0;
+const RELATIVE_SIGMA_RANGE: std::ops::RangeInclusive<f64> = 0.0..=1.0;
 
 /// Reads the text of a calibration file; `file` is its name in what is said
 /// about it. Everything that is wrong is reported at once.
@@ -59,7 +59,7 @@ fn read_root(root: &Table<'_>) -> Option<Calibration> {
         bed,
         robot_z,
         quality: match quality {
-            Some(quality) => Some(Quality {
+            Some(quality) => Some(CalibrationQuality {
                 uncertainty: match uncertainty {
                     Some(uncertainty) => Some(uncertainty?),
                     None => None,
@@ -72,28 +72,28 @@ fn read_root(root: &Table<'_>) -> Option<Calibration> {
 }
 
 /// Each row is as long as its number counted from 1; one that is missing is known.
-fn read_uncertainty(table: &Table<'_>) -> Option<Uncertainty> {
+fn read_uncertainty(table: &Table<'_>) -> Option<CalibrationUncertainty> {
     let mut is_sound = true;
     let rows = std::array::from_fn(|row| {
         let name = uncertainty::ROWS[row];
         if !table.has(name) {
             return Vec::new();
         }
-        let values = table.row(name, &[row + 1], FACTOR);
+        let values = table.row(name, &[row + 1], FACTOR_RANGE);
         is_sound &= values.is_some();
         values.unwrap_or_default()
     });
-    is_sound.then(|| Uncertainty::from_rows(&rows)).flatten()
+    is_sound.then(|| CalibrationUncertainty::from_rows(&rows)).flatten()
 }
 
-fn read_quality(table: &Table<'_>) -> Option<Quality> {
+fn read_quality(table: &Table<'_>) -> Option<CalibrationQuality> {
     let rms = table.number("reprojection_rms_px", RMS_PX);
-    let width_sigma_share = table.optional_number("width_sigma_share", SHARE);
+    let width_sigma_share = table.optional_number("width_sigma_share", RELATIVE_SIGMA_RANGE);
     let seen_px = table.optional_numbers::<4>("seen_px", CENTRE_PX);
     let heights_mm = table.optional_numbers::<2>("heights_mm", LENGTH_MM);
-    Some(Quality {
+    Some(CalibrationQuality {
         reprojection_rms_px: rms?,
-        width_sigma_share,
+        width_relative_sigma: width_sigma_share,
         seen_px,
         heights_mm,
         uncertainty: None,
@@ -153,7 +153,7 @@ pub fn to_toml(
     bed: &Pose,
     image_size_px: [u32; 2],
     robot_z: Mm,
-    quality: Option<Quality>,
+    quality: Option<CalibrationQuality>,
     notes: &[String],
 ) -> String {
     let mut text = String::new();
@@ -188,7 +188,7 @@ pub fn to_toml(
     if let Some(quality) = quality {
         let rms = quality.reprojection_rms_px;
         let _ = write!(text, "\n[quality]\nreprojection_rms_px = {rms:?}\n");
-        if let Some(share) = quality.width_sigma_share {
+        if let Some(share) = quality.width_relative_sigma {
             let _ = writeln!(
                 text,
                 "width_sigma_share = {share:?} # standard deviation that it leaves in a width, of the width"
@@ -214,7 +214,7 @@ pub fn to_toml(
 }
 
 /// What is left open, as a table.
-fn uncertainty_text(uncertainty: &Uncertainty) -> String {
+fn uncertainty_text(uncertainty: &CalibrationUncertainty) -> String {
     let mut text =
         "\n[uncertainty] # rows of the triangular L; camera and bed have the covariance \
                     L * transpose(L)\n"
@@ -243,8 +243,8 @@ mod tests {
     }
 
     /// Of all numbers but k4 k5 k6.
-    fn some_covariance() -> uncertainty::Joint {
-        uncertainty::Joint::from_fn(|row, column| {
+    fn some_covariance() -> uncertainty::JointCovariance {
+        uncertainty::JointCovariance::from_fn(|row, column| {
             let is_known = |number: usize| (9..12).contains(&number);
             let unit = |number: usize| if is_known(number) { 0.0 } else { 1.0 / 3.0 };
             let (row_unit, column_unit) = (unit(row), unit(column));
@@ -258,7 +258,7 @@ mod tests {
         let share = |text: &str| {
             let map = parse("x", text).unwrap().surface(Mm::ZERO, None);
             let ends = [Point2::new(300.0, 269.5), Point2::new(400.0, 269.5)];
-            map.width_sigma_share_of(ends).unwrap()
+            map.width_relative_sigma_of(ends).unwrap()
         };
         // A focal length along x that is 0.1 % off, and a bed that is 0.1 % further away.
         assert!((share(&with("")) - 1e-3).abs() < 1e-9, "{}", share(&with("")));
@@ -288,12 +288,12 @@ mod tests {
             distortion: [-0.28, 0.03, 1.2e-3, -1e-5, 0.1, 0.0, 0.0, 0.0],
         };
         let bed = Pose::new(Vector3::new(3.0, 0.1, -0.2), Vector3::new(1.5, -2.25, 400.125));
-        let quality = Some(Quality {
+        let quality = Some(CalibrationQuality {
             reprojection_rms_px: 0.1234,
-            width_sigma_share: Some(0.000_567),
+            width_relative_sigma: Some(0.000_567),
             seen_px: Some([3.25, 4.0, 630.5, 470.125]),
             heights_mm: Some([-1.5, 120.0]),
-            uncertainty: Some(Uncertainty::of(&some_covariance())),
+            uncertainty: Some(CalibrationUncertainty::of(&some_covariance())),
         });
         let notes = ["made by hand\nfor a test".to_string()];
         let text = to_toml(&camera, &bed, [640, 480], Mm::constant(12.5), quality, &notes);
@@ -329,7 +329,7 @@ mod tests {
     fn what_the_calibration_leaves_in_a_width_may_be_absent_but_not_more_than_all() {
         let with = |line: &str| EXAMPLE.replace("[quality]", &format!("[quality]\n{line}"));
         let share = |text: &str| {
-            parse("x", text).unwrap().surface(Mm::constant(20.0), None).width_sigma_share()
+            parse("x", text).unwrap().surface(Mm::constant(20.0), None).width_relative_sigma()
         };
         assert_eq!(share(EXAMPLE), None);
         assert_eq!(share(&with("width_sigma_share = 0.0004")), Some(0.0004));

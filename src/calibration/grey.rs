@@ -6,13 +6,13 @@ use crate::core::geometry::{ImagePoint, Size};
 /// The grey values of a picture. Those of 16 bits are scaled so that the brightest is
 /// 255, because 10 or 12 bits are often all that is used of 16.
 #[derive(Debug)]
-pub struct Grey<'a> {
+pub struct GreyImage<'a> {
     pixels: &'a Pixels,
     size: Size,
     scale: f64,
 }
 
-impl<'a> Grey<'a> {
+impl<'a> GreyImage<'a> {
     /// Of a frame.
     pub fn of(frame: &'a Frame) -> Self {
         let scale = match frame.pixels() {

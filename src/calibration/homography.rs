@@ -4,13 +4,13 @@
 use nalgebra::{DMatrix, Matrix3, Point2, Rotation3, Vector3};
 
 use super::Camera;
-use super::equations::Corner;
+use super::equations::Correspondence;
 use crate::core::geometry::Pose;
 
 /// Focal length over the longer side of the picture where the boards do not tell.
-const USUAL_FOCAL: f64 = 1.2;
+const DEFAULT_FOCAL: f64 = 1.2;
 /// Focal lengths that are believed, over the longer side.
-const BELIEVED_FOCAL: std::ops::RangeInclusive<f64> = 0.2..=50.0;
+const PLAUSIBLE_FOCAL: std::ops::RangeInclusive<f64> = 0.2..=50.0;
 
 /// How the plane of a board \[mm\] is mapped into a picture, as homogeneous
 /// coordinates; by the direct linear transform. `None` for corners that lie on a
@@ -57,8 +57,8 @@ fn normaliser(points: impl Iterator<Item = Point2<f64>> + Clone) -> Option<Matri
 }
 
 /// Corners of a board as pairs of where they are and where they are seen.
-pub fn pairs(corners: &[Corner]) -> Vec<(Point2<f64>, Point2<f64>)> {
-    corners.iter().map(|corner| (corner.on_board, corner.seen)).collect()
+pub fn pairs(corners: &[Correspondence]) -> Vec<(Point2<f64>, Point2<f64>)> {
+    corners.iter().map(|corner| (corner.on_board, corner.observed)).collect()
 }
 
 /// A pinhole camera with square pixels and its axis through the middle of the
@@ -88,13 +88,13 @@ pub fn pinhole(homographies: &[Matrix3<f64>], image_size_px: [u32; 2]) -> Camera
         }
     }
     let focal = (weights / sum).max(0.0).sqrt() / longer;
-    let focal = if BELIEVED_FOCAL.contains(&focal) { focal } else { USUAL_FOCAL };
+    let focal = if PLAUSIBLE_FOCAL.contains(&focal) { focal } else { DEFAULT_FOCAL };
     Camera::pinhole([focal * longer; 2], middle)
 }
 
 /// Where a board lies before a camera, from how its plane is mapped into the picture
 /// of a pinhole camera that is 1 away from it. `None` where it is not in front.
-pub fn pose(on_unit_plane: &Matrix3<f64>) -> Option<Pose> {
+pub fn pose_from_homography(on_unit_plane: &Matrix3<f64>) -> Option<Pose> {
     let (first, second) = (on_unit_plane.column(0), on_unit_plane.column(1));
     let scale = 2.0 / (first.norm() + second.norm());
     let (x, y) = (first * scale, second * scale);
@@ -109,12 +109,12 @@ pub fn pose(on_unit_plane: &Matrix3<f64>) -> Option<Pose> {
 
 /// The pose of a board that a camera sees, by undoing its lens first. `None` where
 /// the lens cannot be undone at too many corners, or the board is not in front.
-pub fn pose_before(camera: &Camera, corners: &[Corner]) -> Option<Pose> {
+pub fn board_pose(camera: &Camera, corners: &[Correspondence]) -> Option<Pose> {
     let pairs: Vec<_> = corners
         .iter()
-        .filter_map(|corner| Some((corner.on_board, camera.ray(corner.seen)?)))
+        .filter_map(|corner| Some((corner.on_board, camera.ray(corner.observed)?)))
         .collect();
-    pose(&homography(&pairs)?)
+    pose_from_homography(&homography(&pairs)?)
 }
 
 #[cfg(test)]
@@ -132,13 +132,13 @@ mod tests {
                 Pose::new(tilt, Vector3::new(-60.0, -40.0, 500.0 + 20.0 * turn))
             })
             .collect();
-        let seen = |pose: &Pose| -> Vec<Corner> {
+        let seen = |pose: &Pose| -> Vec<Correspondence> {
             (0..20)
                 .map(|k| {
                     let on_board = Point2::new(f64::from(k % 5) * 30.0, f64::from(k / 5) * 30.0);
                     let at = Point3::new(on_board.x, on_board.y, 0.0);
                     let seen = camera.project(pose.apply(at)).unwrap();
-                    Corner { on_board, bend: [0.0; 2], seen }
+                    Correspondence { on_board, bend: [0.0; 2], observed: seen }
                 })
                 .collect()
         };
@@ -147,7 +147,7 @@ mod tests {
         let found = pinhole(&maps, [640, 480]);
         assert!((found.focal_px[0] - 900.0).abs() < 1e-6, "{found:?}");
         for (view, truth) in views.iter().zip(&poses) {
-            let pose = pose_before(&camera, view).unwrap();
+            let pose = board_pose(&camera, view).unwrap();
             assert!((pose.translation_mm() - truth.translation_mm()).norm() < 1e-6);
             assert!((pose.rotation_rad() - truth.rotation_rad()).norm() < 1e-8);
         }
@@ -157,7 +157,7 @@ mod tests {
     fn boards_seen_straight_on_leave_a_usual_focal_length() {
         let scaled = Matrix3::from_diagonal(&Vector3::new(2.0, 2.0, 1.0));
         let found = pinhole(&[scaled, scaled], [640, 480]);
-        assert_eq!(found.focal_px, [USUAL_FOCAL * 640.0; 2]);
+        assert_eq!(found.focal_px, [DEFAULT_FOCAL * 640.0; 2]);
     }
 
     #[test]

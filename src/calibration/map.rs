@@ -4,7 +4,7 @@
 use nalgebra::Vector2;
 
 use super::SurfaceMap;
-use super::covariance::Covariance;
+use super::covariance::CalibrationCovariance;
 use crate::core::geometry::ImagePoint;
 use crate::core::units::Mm;
 
@@ -18,7 +18,7 @@ pub struct Cells {
 }
 
 /// Cells of a map of widths.
-pub const CELLS: Cells = Cells { columns: 16, rows: 12 };
+pub const MAP_CELLS: Cells = Cells { columns: 16, rows: 12 };
 
 /// What a calibration leaves in the width of a bead on one surface.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,12 +34,12 @@ pub struct WidthMap {
     /// The largest, of beads that lie where boards were seen; `None` without one.
     pub worst_where_seen_mm: Option<f64>,
     /// How much the width of this bead changes if its height is wrong by 1 mm \[mm\].
-    pub by_a_millimetre_of_height_mm: f64,
+    pub mm_per_mm_height: f64,
 }
 
 impl WidthMap {
     /// For beads of a width on a surface.
-    pub fn of(covariance: &Covariance, bead_mm: f64, surface_height: Mm) -> Self {
+    pub fn of(covariance: &CalibrationCovariance, bead_mm: f64, surface_height: Mm) -> Self {
         let mut worst: Option<f64> = None;
         let cells = beads(covariance, bead_mm, surface_height)
             .map(|beads| {
@@ -59,7 +59,7 @@ impl WidthMap {
             surface_height,
             cells,
             worst_where_seen_mm: worst,
-            by_a_millimetre_of_height_mm: bead_mm / above,
+            mm_per_mm_height: bead_mm / above,
         }
     }
 
@@ -80,7 +80,7 @@ pub fn worst_mm(maps: &[WidthMap]) -> Option<f64> {
 /// Ends of beads of a width that lie where boards were seen: those by which
 /// [`WidthMap::worst_where_seen_mm`] is told.
 pub fn where_seen(
-    covariance: &Covariance,
+    covariance: &CalibrationCovariance,
     bead_mm: f64,
     surface_height: Mm,
 ) -> Vec<[ImagePoint; 2]> {
@@ -88,19 +88,19 @@ pub fn where_seen(
     all.filter(|ends| is_where_seen(covariance, ends)).collect()
 }
 
-fn is_where_seen(covariance: &Covariance, ends: &[ImagePoint; 2]) -> bool {
+fn is_where_seen(covariance: &CalibrationCovariance, ends: &[ImagePoint; 2]) -> bool {
     let [from, to] = covariance.seen_px();
     ends.iter().all(|px| (from.x..=to.x).contains(&px.x) && (from.y..=to.y).contains(&px.y))
 }
 
 /// Ends of a bead along the picture and of one across it, about the middle of each cell.
 fn beads(
-    covariance: &Covariance,
+    covariance: &CalibrationCovariance,
     bead_mm: f64,
     surface_height: Mm,
 ) -> impl Iterator<Item = [Option<[ImagePoint; 2]>; 2]> {
     let map = covariance.surface(surface_height);
-    middles(covariance.image_size_px().map(f64::from), CELLS).map(move |middle| {
+    middles(covariance.image_size_px().map(f64::from), MAP_CELLS).map(move |middle| {
         [Vector2::x(), Vector2::y()].map(|along| ends(&map, middle, along, bead_mm))
     })
 }
@@ -132,7 +132,7 @@ pub(super) fn ends(
 }
 
 /// A bead that fills a third of the picture's width on the bed, to two digits \[mm\]. `None` where the middle of the picture does not see the bed.
-pub fn usual_bead_mm(covariance: &Covariance) -> Option<f64> {
+pub fn typical_bead_mm(covariance: &CalibrationCovariance) -> Option<f64> {
     let [width, height] = covariance.image_size_px().map(f64::from);
     let map = covariance.surface(Mm::ZERO);
     let end = |part: f64| map.to_mm(ImagePoint::new(part * width, height / 2.0));
@@ -151,7 +151,7 @@ mod tests {
     use crate::calibration::synthetic;
     use crate::calibration::synthetic::{board, poses};
 
-    fn covariance() -> (solve::Solution, Covariance) {
+    fn covariance() -> (solve::Solution, CalibrationCovariance) {
         let mut turn = 0.0_f64;
         // No noise of a kind, but something that the fit leaves.
         let mut off = || {
@@ -162,8 +162,9 @@ mod tests {
             poses().iter().map(|pose| synthetic::sighting("", pose, &mut off)).collect();
         let solution = solve::solve(&board(), &sightings).unwrap();
         let on_bed =
-            OnBed::fit(&solution.model, vec![board().place(&sightings[0].corners)]).unwrap();
-        let covariance = Covariance::of(&board(), &solution, &on_bed, Mm::ZERO).unwrap();
+            OnBed::fit(&solution.model, vec![board().correspondences(&sightings[0].corners)])
+                .unwrap();
+        let covariance = CalibrationCovariance::of(&board(), &solution, &on_bed, Mm::ZERO).unwrap();
         (solution, covariance)
     }
 
@@ -178,7 +179,7 @@ mod tests {
         // A corner of the picture has no room for a bead about its middle.
         assert_eq!(map.cells[0], None);
         let height = covariance.camera_height_mm();
-        assert!((map.by_a_millimetre_of_height_mm - 40.0 / height).abs() < 1e-9);
+        assert!((map.mm_per_mm_height - 40.0 / height).abs() < 1e-9);
         let wide = WidthMap::of(&covariance, 4000.0, Mm::ZERO);
         assert_eq!((wide.range_mm(), wide.worst_where_seen_mm), (None, None));
     }
@@ -188,7 +189,7 @@ mod tests {
         let (solution, covariance) = covariance();
         let heights = [Mm::ZERO, Mm::constant(20.0)];
         let next = next_view::best(&board(), &solution, &covariance, 40.0, &heights).unwrap();
-        let (before, after) = next.share;
+        let (before, after) = next.relative_sigma;
         // What it begins with is what the maps tell.
         let worst = heights
             .map(|height| WidthMap::of(&covariance, 40.0, height).worst_where_seen_mm.unwrap())

@@ -3,19 +3,19 @@
 use nalgebra::{Matrix3, Point2};
 
 use super::dictionary::Dictionary;
-use super::grey::Grey;
+use super::grey::GreyImage;
 use super::homography;
 use crate::core::geometry::ImagePoint;
 
 /// Difference between white and black cells below which there is no marker \[grey
 /// levels\].
-const LEAST_CONTRAST: f64 = 15.0;
+const MIN_CONTRAST: f64 = 15.0;
 /// Share of the border's cells that may be misread.
-const BORDER_FORGIVEN: f64 = 0.1;
+const MAX_BORDER_ERRORS: f64 = 0.1;
 /// A cell's colour is the mean of so many places along each of its sides, and this part
 /// of it about its middle.
-const PLACES: u32 = 3;
-const PART: f64 = 0.5;
+const SAMPLES_PER_SIDE: u32 = 3;
+const SAMPLED_FRACTION: f64 = 0.5;
 
 /// A marker in a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +36,7 @@ struct Cells {
 /// Reads markers among quadrilaterals whose corners run clockwise: those whose number
 /// is below `count`. Of one that was found several times the largest is kept.
 pub fn read_all(
-    grey: &Grey<'_>,
+    grey: &GreyImage<'_>,
     quads: &[[ImagePoint; 4]],
     dictionary: Dictionary,
     count: usize,
@@ -81,7 +81,7 @@ fn is_same(a: &Marker, b: &Marker) -> bool {
 }
 
 fn read(
-    grey: &Grey<'_>,
+    grey: &GreyImage<'_>,
     quad: &[ImagePoint; 4],
     dictionary: Dictionary,
     count: usize,
@@ -94,7 +94,7 @@ fn read(
         let seen = cells.code();
         for (number, code) in codes.iter().enumerate() {
             let wrong = (seen ^ code).count_ones();
-            if wrong <= dictionary.forgiven() && best.is_none_or(|(least, _)| wrong < least) {
+            if wrong <= dictionary.max_errors() && best.is_none_or(|(least, _)| wrong < least) {
                 let corners = std::array::from_fn(|i| quad[(turn + i) % 4]);
                 best = Some((wrong, Marker { number, corners }));
             }
@@ -108,26 +108,26 @@ impl Cells {
     /// `None` where the quadrilateral leaves the picture, shows no contrast, or has no
     /// dark border.
     #[expect(clippy::cast_precision_loss, reason = "a handful of cells")]
-    fn of(grey: &Grey<'_>, quad: &[ImagePoint; 4], side: usize) -> Option<Self> {
+    fn of(grey: &GreyImage<'_>, quad: &[ImagePoint; 4], side: usize) -> Option<Self> {
         let all = side + 2;
         let end = all as f64;
         let square = [[0.0, 0.0], [end, 0.0], [end, end], [0.0, end]].map(Point2::from);
         let pairs: Vec<_> = square.into_iter().zip(*quad).collect();
         let map = homography::homography(&pairs)?;
         let values: Vec<f64> = (0..all * all)
-            .map(|i| colour(grey, &map, (i % all) as f64, (i / all) as f64))
+            .map(|i| cell_brightness(grey, &map, (i % all) as f64, (i / all) as f64))
             .collect::<Option<_>>()?;
         let (dark, bright) = values
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)));
-        if bright - dark < LEAST_CONTRAST {
+        if bright - dark < MIN_CONTRAST {
             return None;
         }
         let is_white =
             |column: usize, row: usize| values[row * all + column] > f64::midpoint(dark, bright);
         let on_border = |i: &usize| [i % all, i / all].iter().any(|&at| at == 0 || at + 1 == all);
         let wrong = (0..all * all).filter(on_border).filter(|i| is_white(i % all, i / all)).count();
-        if wrong as f64 > BORDER_FORGIVEN * 4.0 * (end - 1.0) {
+        if wrong as f64 > MAX_BORDER_ERRORS * 4.0 * (end - 1.0) {
             return None;
         }
         let white = (0..side * side).map(|i| is_white(1 + i % side, 1 + i / side)).collect();
@@ -148,12 +148,13 @@ impl Cells {
 }
 
 /// Mean grey value about the middle of a cell; `None` where it leaves the picture.
-fn colour(grey: &Grey<'_>, map: &Matrix3<f64>, column: f64, row: f64) -> Option<f64> {
-    let part = |k: u32| 0.5 + PART * (f64::from(k) / f64::from(PLACES - 1) - 0.5);
+fn cell_brightness(grey: &GreyImage<'_>, map: &Matrix3<f64>, column: f64, row: f64) -> Option<f64> {
+    let part =
+        |k: u32| 0.5 + SAMPLED_FRACTION * (f64::from(k) / f64::from(SAMPLES_PER_SIDE - 1) - 0.5);
     let mut sum = 0.0;
-    for i in 0..PLACES * PLACES {
-        let at = Point2::new(column + part(i % PLACES), row + part(i / PLACES));
+    for i in 0..SAMPLES_PER_SIDE * SAMPLES_PER_SIDE {
+        let at = Point2::new(column + part(i % SAMPLES_PER_SIDE), row + part(i / SAMPLES_PER_SIDE));
         sum += grey.at(Point2::from_homogeneous(map * at.to_homogeneous())?)?;
     }
-    Some(sum / f64::from(PLACES * PLACES))
+    Some(sum / f64::from(SAMPLES_PER_SIDE * SAMPLES_PER_SIDE))
 }

@@ -4,18 +4,18 @@
 use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
 
 use super::Camera;
-use super::uncertainty::{PositionSlopes, Uncertainty};
+use super::uncertainty::{CalibrationUncertainty, PositionSlopes};
 use crate::core::geometry::{ImagePoint, Pose, SurfacePoint};
 use crate::core::units::Mm;
 
 /// How good the images said that a calibration is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quality {
+pub struct CalibrationQuality {
     /// Root mean square of the reprojection errors \[px\].
     pub reprojection_rms_px: f64,
     /// Relative standard deviation that the calibration leaves in a width; see
     /// [`super::share::where_seen`]. Files may lack it.
-    pub width_sigma_share: Option<f64>,
+    pub width_relative_sigma: Option<f64>,
     /// First column and row, last column and row between which boards were seen, and
     /// for which the share holds \[px\]. Files may lack it.
     pub seen_px: Option<[f64; 4]>,
@@ -24,7 +24,7 @@ pub struct Quality {
     /// What is left open in camera and bed plane: from it comes the standard deviation of
     /// a width wherever it is seen. Files may lack it; then `width_sigma_share` holds
     /// everywhere.
-    pub uncertainty: Option<Uncertainty>,
+    pub uncertainty: Option<CalibrationUncertainty>,
 }
 
 /// What a pixel means in millimetres.
@@ -51,7 +51,7 @@ pub enum Calibration {
         /// The robot's z when the image that fixed the plane was taken.
         robot_z: Mm,
         /// What the images said about it.
-        quality: Option<Quality>,
+        quality: Option<CalibrationQuality>,
     },
 }
 
@@ -73,25 +73,25 @@ impl Calibration {
         };
         SurfaceMap {
             kind,
-            width_sigma_share: self.width_sigma_share(),
+            width_relative_sigma: self.width_relative_sigma(),
             uncertainty: self.uncertainty(),
-            height_share: None,
+            height_relative_sigma: None,
             image_size_px: self.image_size_px(),
         }
     }
 
     /// What is left open in camera and bed plane, if somebody has told it.
-    pub fn uncertainty(&self) -> Option<Uncertainty> {
+    pub fn uncertainty(&self) -> Option<CalibrationUncertainty> {
         match self {
             Self::Scale { .. } => None,
             Self::Full { quality, .. } => quality.and_then(|quality| quality.uncertainty),
         }
     }
 
-    fn width_sigma_share(&self) -> Option<f64> {
+    fn width_relative_sigma(&self) -> Option<f64> {
         match self {
             Self::Scale { mm_per_px, sigma } => sigma.map(|sigma| sigma / mm_per_px),
-            Self::Full { quality, .. } => quality.and_then(|quality| quality.width_sigma_share),
+            Self::Full { quality, .. } => quality.and_then(|quality| quality.width_relative_sigma),
         }
     }
 
@@ -108,10 +108,10 @@ impl Calibration {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceMap {
     kind: Kind,
-    width_sigma_share: Option<f64>,
-    uncertainty: Option<Uncertainty>,
+    width_relative_sigma: Option<f64>,
+    uncertainty: Option<CalibrationUncertainty>,
     /// What the surface's height leaves open in a width, as a share of it.
-    height_share: Option<f64>,
+    height_relative_sigma: Option<f64>,
     image_size_px: Option<[u32; 2]>,
 }
 
@@ -126,9 +126,9 @@ impl SurfaceMap {
     pub fn from_scale(mm_per_px: f64) -> Self {
         Self {
             kind: Kind::Scale(mm_per_px),
-            width_sigma_share: None,
+            width_relative_sigma: None,
             uncertainty: None,
-            height_share: None,
+            height_relative_sigma: None,
             image_size_px: None,
         }
     }
@@ -149,42 +149,45 @@ impl SurfaceMap {
         if of_height <= 0.0 || !of_height.is_finite() {
             return self;
         }
-        Self { height_share: Some(self.height_share.unwrap_or(0.0).hypot(of_height)), ..self }
+        Self {
+            height_relative_sigma: Some(self.height_relative_sigma.unwrap_or(0.0).hypot(of_height)),
+            ..self
+        }
     }
 
     /// Relative standard deviation that the calibration behind the map leaves
     /// in a width, the same error in every width; `None` where it is not known. The
     /// largest that a usual bead has where boards were seen:
     /// [`Self::width_sigma_share_of`] is that of one width.
-    pub fn width_sigma_share(&self) -> Option<f64> {
-        self.with_height(self.width_sigma_share)
+    pub fn width_relative_sigma(&self) -> Option<f64> {
+        self.with_height(self.width_relative_sigma)
     }
 
     /// The same of the distance between two places that are seen at these pixels, in which
     /// direction and wherever they are, and beyond where boards were seen, too. That of
     /// every width where the calibration has no more than one number. `None` also off the
     /// surface.
-    pub fn width_sigma_share_of(&self, ends: [ImagePoint; 2]) -> Option<f64> {
+    pub fn width_relative_sigma_of(&self, ends: [ImagePoint; 2]) -> Option<f64> {
         let (Some(uncertainty), Kind::Plane { camera, bed, height_mm }) =
             (&self.uncertainty, &self.kind)
         else {
-            return self.width_sigma_share();
+            return self.width_relative_sigma();
         };
         let at = |px: ImagePoint| {
             let mm = self.to_mm(px)?;
             PositionSlopes::at(camera, bed, Point3::new(mm.x, mm.y, *height_mm))
         };
         let [first, last] = ends.map(at);
-        self.with_height(Some(uncertainty.share([&first?, &last?])?))
+        self.with_height(Some(uncertainty.relative_sigma([&first?, &last?])?))
     }
 
     /// What is left open in camera and bed plane behind the map, if it is known.
-    pub fn uncertainty(&self) -> Option<&Uncertainty> {
+    pub fn uncertainty(&self) -> Option<&CalibrationUncertainty> {
         self.uncertainty.as_ref()
     }
 
     fn with_height(&self, share: Option<f64>) -> Option<f64> {
-        match (share, self.height_share) {
+        match (share, self.height_relative_sigma) {
             (Some(share), Some(of_height)) => Some(share.hypot(of_height)),
             (share, of_height) => share.or(of_height),
         }
@@ -198,13 +201,13 @@ impl SurfaceMap {
             Kind::Scale(mm_per_px) => Some(px * *mm_per_px),
             Kind::Plane { camera, bed, height_mm } => {
                 let ray = camera.ray(px)?;
-                let eye = bed.apply_inverse(Point3::origin());
+                let camera_position = bed.apply_inverse(Point3::origin());
                 let direction = bed.turn_inverse(Vector3::new(ray.x, ray.y, 1.0));
-                let along = (height_mm - eye.z) / direction.z;
+                let along = (height_mm - camera_position.z) / direction.z;
                 if !along.is_finite() || along <= 0.0 {
                     return None;
                 }
-                let hit = eye + direction * along;
+                let hit = camera_position + direction * along;
                 Some(Point2::new(hit.x, hit.y))
             }
         }
@@ -277,7 +280,7 @@ mod tests {
     fn a_height_that_is_not_known_well_covers_the_error_that_it_makes() {
         let calibration = straight_down();
         let believed = calibration.surface(Mm::constant(20.0), None);
-        let sigma = believed.with_height_sigma(Mm::constant(1.0)).width_sigma_share().unwrap();
+        let sigma = believed.with_height_sigma(Mm::constant(1.0)).width_relative_sigma().unwrap();
         let width = width_of_100_px(&believed);
         for wrong in [19.0, 21.0] {
             let truth = width_of_100_px(&calibration.surface(Mm::constant(wrong), None));

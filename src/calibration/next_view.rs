@@ -4,9 +4,9 @@
 use nalgebra::{Point3, Rotation3, Vector3};
 use rayon::prelude::*;
 
-use super::board::{Board, all_seen};
-use super::covariance::{Covariance, Reading};
-use super::equations::Corner;
+use super::board::{Board, observe_all};
+use super::covariance::{CalibrationCovariance, DerivedValue};
+use super::equations::Correspondence;
 use super::map;
 use super::share;
 use super::solve::Solution;
@@ -18,9 +18,9 @@ const TILTS_DEG: [f64; 2] = [20.0, 40.0];
 /// Distances that are tried, over the usual one.
 const DISTANCES: [f64; 3] = [0.6, 0.8, 1.0];
 /// Places that are tried along each side of the picture.
-const PLACES: u32 = 3;
+const POSITIONS_PER_SIDE: u32 = 3;
 /// Part of what is open that a picture must take away to be worth while.
-const WORTH: f64 = 0.03;
+const MIN_GAIN: f64 = 0.03;
 
 /// A point of the picture, as fractions of its width and height.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,17 +35,17 @@ pub struct RelativePoint {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NextView {
     /// How the board is held.
-    pub hold: Hold,
+    pub posture: BoardPosture,
     /// Middle of the board in the picture.
     pub at: RelativePoint,
     /// What a width is known to where boards were seen, before and after it: share of
     /// the width.
-    pub share: (f64, f64),
+    pub relative_sigma: (f64, f64),
 }
 
 /// How a board is held before the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Hold {
+pub enum BoardPosture {
     /// It lies on the bed.
     OnBed,
     /// It is held freely.
@@ -67,14 +67,14 @@ pub enum Hold {
 pub fn best(
     board: &Board,
     solution: &Solution,
-    covariance: &Covariance,
+    covariance: &CalibrationCovariance,
     bead_mm: f64,
     heights: &[Mm],
 ) -> Option<NextView> {
-    let told = heights.iter().flat_map(|&height| {
+    let requested = heights.iter().flat_map(|&height| {
         map::where_seen(covariance, bead_mm, height).into_iter().map(move |ends| (ends, height))
     });
-    let mut beads: Vec<Bead> = told.collect();
+    let mut beads: Vec<Bead> = requested.collect();
     if beads.is_empty() {
         beads = share::beads_where_seen(covariance);
     }
@@ -85,43 +85,47 @@ pub fn best(
         .into_par_iter()
         .filter_map(|(at, hold)| {
             let after = match hold {
-                Hold::OnBed => {
+                BoardPosture::OnBed => {
                     let lies = on_bed(board, covariance, at)?;
                     let corners = seen_whole(board, covariance, &covariance.on_bed(lies))?;
                     let with = covariance.with_another_on_bed(lies, &corners)?;
                     share::largest(&with, &self::readings(&with, &beads))?
                 }
-                Hold::Free { .. } => {
+                BoardPosture::Free { .. } => {
                     let pose = pose(board, covariance, at, hold, distance_mm)?;
                     let corners = seen_whole(board, covariance, &pose)?;
                     share::largest(&covariance.with_another(&pose, &corners)?, &readings)?
                 }
             };
-            Some(NextView { hold, at, share: (before, after) })
+            Some(NextView { posture: hold, at, relative_sigma: (before, after) })
         })
         .collect();
-    let best = tried.into_iter().min_by(|a, b| a.share.1.total_cmp(&b.share.1))?;
-    (best.share.1 < (1.0 - WORTH) * before).then_some(best)
+    let best =
+        tried.into_iter().min_by(|a, b| a.relative_sigma.1.total_cmp(&b.relative_sigma.1))?;
+    (best.relative_sigma.1 < (1.0 - MIN_GAIN) * before).then_some(best)
 }
 
 /// Ends of a bead in the picture, and the height of its surface.
 type Bead = ([ImagePoint; 2], Mm);
 
-fn readings(covariance: &Covariance, beads: &[Bead]) -> Vec<Reading> {
+fn readings(covariance: &CalibrationCovariance, beads: &[Bead]) -> Vec<DerivedValue> {
     beads.iter().filter_map(|&(ends, height)| covariance.width(ends, height)).collect()
 }
 
-fn candidates() -> Vec<(RelativePoint, Hold)> {
-    let part = |i: u32| (f64::from(i) + 0.5) / f64::from(PLACES);
+fn candidates() -> Vec<(RelativePoint, BoardPosture)> {
+    let part = |i: u32| (f64::from(i) + 0.5) / f64::from(POSITIONS_PER_SIDE);
     let mut all = Vec::new();
-    for place in 0..PLACES * PLACES {
-        let at = RelativePoint { x: part(place % PLACES), y: part(place / PLACES) };
-        all.push((at, Hold::OnBed));
+    for place in 0..POSITIONS_PER_SIDE * POSITIONS_PER_SIDE {
+        let at = RelativePoint {
+            x: part(place % POSITIONS_PER_SIDE),
+            y: part(place / POSITIONS_PER_SIDE),
+        };
+        all.push((at, BoardPosture::OnBed));
         for distance in DISTANCES {
-            all.push((at, Hold::Free { nearer: (0, 0), tilt_deg: 0.0, distance }));
+            all.push((at, BoardPosture::Free { nearer: (0, 0), tilt_deg: 0.0, distance }));
             for tilt_deg in TILTS_DEG {
                 for nearer in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-                    all.push((at, Hold::Free { nearer, tilt_deg, distance }));
+                    all.push((at, BoardPosture::Free { nearer, tilt_deg, distance }));
                 }
             }
         }
@@ -129,7 +133,7 @@ fn candidates() -> Vec<(RelativePoint, Hold)> {
     all
 }
 
-fn place_px(covariance: &Covariance, at: RelativePoint) -> ImagePoint {
+fn position_px(covariance: &CalibrationCovariance, at: RelativePoint) -> ImagePoint {
     let [width, height] = covariance.image_size_px().map(f64::from);
     ImagePoint::new(at.x * width, at.y * height)
 }
@@ -140,9 +144,13 @@ fn middle_mm(board: &Board) -> Vector3<f64> {
 
 /// Where a board would lie on the bed, turned like the first one, with its middle at a
 /// place of the picture.
-fn on_bed(board: &Board, covariance: &Covariance, at: RelativePoint) -> Option<[f64; 3]> {
+fn on_bed(
+    board: &Board,
+    covariance: &CalibrationCovariance,
+    at: RelativePoint,
+) -> Option<[f64; 3]> {
     let map = covariance.surface(covariance.thickness());
-    let on_face = map.to_mm(place_px(covariance, at))?;
+    let on_face = map.to_mm(position_px(covariance, at))?;
     // The bed's axes are the board's, with y turned over if z is.
     let first = covariance.on_bed([0.0; 3]);
     let sign = if (first.rotation() * Vector3::z()).dot(&first.translation_mm()) > 0.0 {
@@ -157,13 +165,13 @@ fn on_bed(board: &Board, covariance: &Covariance, at: RelativePoint) -> Option<[
 /// Where the board would be, its middle in the middle of the candidate's place.
 fn pose(
     board: &Board,
-    covariance: &Covariance,
+    covariance: &CalibrationCovariance,
     at: RelativePoint,
-    hold: Hold,
+    hold: BoardPosture,
     distance_mm: f64,
 ) -> Option<Pose> {
-    let Hold::Free { nearer, tilt_deg, distance } = hold else { return None };
-    let ray = covariance.model().camera.ray(place_px(covariance, at))?;
+    let BoardPosture::Free { nearer, tilt_deg, distance } = hold else { return None };
+    let ray = covariance.model().camera.ray(position_px(covariance, at))?;
     let (x, y) = (f64::from(nearer.0), f64::from(nearer.1));
     // Turned about an axis of the picture so that the named side comes nearer.
     let rotation = Rotation3::new(Vector3::new(-y, x, 0.0) * tilt_deg.to_radians());
@@ -172,13 +180,17 @@ fn pose(
 }
 
 /// The corners as they would be seen; `None` if not all of them are.
-fn seen_whole(board: &Board, covariance: &Covariance, pose: &Pose) -> Option<Vec<Corner>> {
+fn seen_whole(
+    board: &Board,
+    covariance: &CalibrationCovariance,
+    pose: &Pose,
+) -> Option<Vec<Correspondence>> {
     let [right, bottom] = covariance.image_size_px().map(|px| f64::from(px) - 1.0);
     let camera = &covariance.model().camera;
     let inside = |px: &ImagePoint| (0.0..=right).contains(&px.x) && (0.0..=bottom).contains(&px.y);
     let seen = |corner: Point3<f64>| camera.project(pose.apply(corner)).filter(inside);
     let corners: Option<Vec<ImagePoint>> = board.corners_mm().into_iter().map(seen).collect();
-    Some(board.place(&all_seen(&corners?)))
+    Some(board.correspondences(&observe_all(&corners?)))
 }
 
 fn mean_distance_mm(solution: &Solution) -> f64 {
@@ -189,12 +201,12 @@ fn mean_distance_mm(solution: &Solution) -> f64 {
 
 impl std::fmt::Display for NextView {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let place = place_words(self.at);
-        match self.hold {
-            Hold::OnBed => {
+        let place = position_words(self.at);
+        match self.posture {
+            BoardPosture::OnBed => {
                 write!(f, "the board flat on the bed once more, in the {place} (--plane again)")
             }
-            Hold::Free { nearer, tilt_deg, distance } => {
+            BoardPosture::Free { nearer, tilt_deg, distance } => {
                 let distance = match distance {
                     d if d < 0.7 => ", nearer to the camera by 40 %",
                     d if d < 0.9 => ", nearer to the camera by 20 %",
@@ -217,7 +229,7 @@ impl std::fmt::Display for NextView {
     }
 }
 
-fn place_words(at: RelativePoint) -> String {
+fn position_words(at: RelativePoint) -> String {
     let third = |part: f64, words: [&'static str; 3]| {
         words[usize::from(part > 0.34) + usize::from(part > 0.66)]
     };

@@ -9,7 +9,7 @@
 
 use nalgebra::{Point2, Vector2};
 
-use super::board::{Board, Seen};
+use super::board::{Board, CornerObservation};
 use super::{Calibration, SurfaceMap};
 use crate::core::geometry::{GridSize, ImagePoint};
 use crate::core::units::Mm;
@@ -19,7 +19,7 @@ const STEP_MM: f64 = 0.1;
 
 /// What is known of the cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gauge {
+pub struct OffsetGauge {
     /// Middle of the gauge \[px\].
     pub middle: ImagePoint,
     /// Along the gauge's axis in the picture, towards the nozzle.
@@ -37,7 +37,7 @@ pub struct Gauge {
 pub struct Touch {
     /// Where the nozzle touches the board, in squares from the first inner corner: along
     /// a row, along a column.
-    pub at: [f64; 2],
+    pub position: [f64; 2],
     /// Standard deviation of that place in any direction.
     pub sigma: Mm,
     /// Height of the board's face above the bed.
@@ -49,7 +49,7 @@ pub struct Touch {
 
 /// Parts of an offset's standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Parts {
+pub struct OffsetSigmas {
     /// How well the place that the nozzle touches is known.
     pub touch: Mm,
     /// The corners' noise, carried to that place.
@@ -62,7 +62,7 @@ pub struct Parts {
     pub height: Mm,
 }
 
-impl Parts {
+impl OffsetSigmas {
     /// All together.
     pub fn sigma(&self) -> Mm {
         let calibration = self.calibration.unwrap_or(Mm::ZERO);
@@ -73,13 +73,13 @@ impl Parts {
 
 /// Where the nozzle is, seen from the middle of the gauge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
+pub struct NozzleOffset {
     /// Along the gauge's axis: the offset, on a straight path \[mm\].
     pub along_mm: f64,
     /// Across it, positive to the right in the direction of travel \[mm\].
     pub across_mm: f64,
     /// What its standard deviation is made of.
-    pub parts: Parts,
+    pub parts: OffsetSigmas,
     /// The corner that was taken for the first \[px\].
     pub first_corner: ImagePoint,
     /// Root mean square distance of the corners from a true board \[mm\].
@@ -90,7 +90,7 @@ pub struct Found {
 
 /// Why a board does not tell the offset.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum OffsetError {
+pub enum NozzleOffsetError {
     /// A single number.
     #[error(
         "the cell has mm_per_px, a single number, which does not say where the bed is: give it a \
@@ -158,24 +158,25 @@ fn side_text(ahead: &Vector2<f64>) -> &'static str {
 /// Finds where the nozzle is. The picture must have the calibration's size.
 pub fn find(
     calibration: &Calibration,
-    gauge: &Gauge,
+    gauge: &OffsetGauge,
     board: &Board,
-    corners: &[Seen],
+    corners: &[CornerObservation],
     touch: &Touch,
-) -> Result<Found, OffsetError> {
+) -> Result<NozzleOffset, NozzleOffsetError> {
     if calibration.image_size_px().is_none() {
-        return Err(OffsetError::NoCamera);
+        return Err(NozzleOffsetError::NoCamera);
     }
     let GridSize { columns, rows } = board.corners();
     if board.is_symmetric() && columns == rows {
-        return Err(OffsetError::Square(columns));
+        return Err(NozzleOffsetError::Square(columns));
     }
     let face = calibration.surface(touch.thickness, touch.robot_z);
-    let lies = Lies::on(&face, board, corners).ok_or(OffsetError::OffBed("all of the board"))?;
+    let lies =
+        BoardFit::on(&face, board, corners).ok_or(NozzleOffsetError::OffBed("all of the board"))?;
     let axes =
-        Axes::of(calibration, gauge).ok_or(OffsetError::OffBed("the middle of the gauge"))?;
+        Axes::of(calibration, gauge).ok_or(NozzleOffsetError::OffBed("the middle of the gauge"))?;
     let read = |turned| {
-        let nozzle = lies.place(board, touch.at, turned);
+        let nozzle = lies.position(board, touch.position, turned);
         (turned, axes.to(nozzle), nozzle)
     };
     let readings = [read(false), read(board.is_symmetric())];
@@ -185,17 +186,23 @@ pub fn find(
         readings.into_iter().take(count).filter(|(_, place, _)| place.x > 0.0).collect();
     let (turned, place, nozzle) = match ahead[..] {
         [one] => one,
-        [] => return Err(OffsetError::Behind { at: touch.at, along_mm, ahead: gauge.ahead }),
-        _ => return Err(OffsetError::Ambiguous { at: touch.at, along_mm }),
+        [] => {
+            return Err(NozzleOffsetError::Behind {
+                at: touch.position,
+                along_mm,
+                ahead: gauge.ahead,
+            });
+        }
+        _ => return Err(NozzleOffsetError::Ambiguous { at: touch.position, along_mm }),
     };
-    let share = face.width_sigma_share();
-    let parts = Parts {
+    let share = face.width_relative_sigma();
+    let parts = OffsetSigmas {
         touch: touch.sigma,
         corners: mm(lies.sigma_mm(nozzle)),
         calibration: share.map(|share| mm(share * place.norm())),
         height: gauge.surface_height_sigma * axes.slope,
     };
-    Ok(Found {
+    Ok(NozzleOffset {
         along_mm: place.x,
         across_mm: place.y,
         parts,
@@ -213,20 +220,20 @@ fn mm(value: f64) -> Mm {
 /// it, where it would be.
 fn first_corner(
     board: &Board,
-    corners: &[Seen],
-    lies: &Lies,
+    corners: &[CornerObservation],
+    lies: &BoardFit,
     face: &SurfaceMap,
     turned: bool,
 ) -> ImagePoint {
     let GridSize { columns, rows } = board.corners();
     let index = if turned { columns * rows - 1 } else { 0 };
     let seen = corners.iter().find(|corner| corner.index == index).map(|corner| corner.px);
-    let there = || face.to_px(lies.place(board, [0.0; 2], turned));
+    let there = || face.to_px(lies.position(board, [0.0; 2], turned));
     seen.or_else(there).unwrap_or_else(ImagePoint::origin)
 }
 
 /// Where the board lies on its plane: a turn and a shift that take it there.
-struct Lies {
+struct BoardFit {
     /// Middle of the corners on the board and on the plane \[mm\].
     middles: (Vector2<f64>, Vector2<f64>),
     cos_sin: Vector2<f64>,
@@ -236,18 +243,18 @@ struct Lies {
     /// Number of the corners, and sum of the squares of their distances from their
     /// middle \[mm²\].
     count: f64,
-    squares_mm2: f64,
+    sum_of_squares_mm2: f64,
 }
 
-impl Lies {
+impl BoardFit {
     #[expect(clippy::cast_precision_loss, reason = "a count of corners")]
-    fn on(face: &SurfaceMap, board: &Board, corners: &[Seen]) -> Option<Self> {
+    fn on(face: &SurfaceMap, board: &Board, corners: &[CornerObservation]) -> Option<Self> {
         let seen: Vec<Vector2<f64>> = corners
             .iter()
             .map(|corner| face.to_mm(corner.px).map(|mm| mm.coords))
             .collect::<Option<_>>()?;
         let flat: Vec<Vector2<f64>> =
-            board.place(corners).iter().map(|corner| mirrored(corner.on_board)).collect();
+            board.correspondences(corners).iter().map(|corner| mirrored(corner.on_board)).collect();
         let count = seen.len() as f64;
         let middles =
             (flat.iter().sum::<Vector2<f64>>() / count, seen.iter().sum::<Vector2<f64>>() / count);
@@ -262,14 +269,14 @@ impl Lies {
             scale: turn.norm() / squares_mm2,
             rms_mm: (left / count).sqrt(),
             count,
-            squares_mm2,
+            sum_of_squares_mm2: squares_mm2,
         })
     }
 
     /// A place of the board, in squares from its first or, turned, its last corner
     /// \[mm\].
     #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
-    fn place(&self, board: &Board, [x, y]: [f64; 2], is_turned: bool) -> Point2<f64> {
+    fn position(&self, board: &Board, [x, y]: [f64; 2], is_turned: bool) -> Point2<f64> {
         let GridSize { columns, rows } = board.corners();
         let last = [(columns - 1) as f64, (rows - 1) as f64];
         let [x, y] = if is_turned { [last[0] - x, last[1] - y] } else { [x, y] };
@@ -283,7 +290,7 @@ impl Lies {
     fn sigma_mm(&self, place: Point2<f64>) -> f64 {
         let variance = self.rms_mm.powi(2) * self.count / (2.0 * self.count - 3.0);
         let away = (place.coords - self.middles.1).norm_squared();
-        (variance * (1.0 / self.count + away / self.squares_mm2)).sqrt()
+        (variance * (1.0 / self.count + away / self.sum_of_squares_mm2)).sqrt()
     }
 }
 
@@ -308,7 +315,7 @@ struct Axes {
 
 impl Axes {
     /// At the z of the calibration, as the cell's surface height is meant.
-    fn of(calibration: &Calibration, gauge: &Gauge) -> Option<Self> {
+    fn of(calibration: &Calibration, gauge: &OffsetGauge) -> Option<Self> {
         let map = calibration.surface(gauge.surface_height, None);
         let mm_per_px = map.mm_per_px(gauge.middle)?;
         let along = (mm_per_px * gauge.ahead).try_normalize(0.0)?;

@@ -3,31 +3,31 @@
 //! counts are wrong.
 
 use super::board::Board;
-use super::grey::Grey;
+use super::grey::GreyImage;
 use crate::core::geometry::{GridSize, ImagePoint};
 use crate::numeric::rank;
 
 /// Difference between squares of both colours from which on a row of squares belongs
 /// to a board, as a share of that between the squares within.
-const GOES_ON: f64 = 0.3;
+const MIN_CONTRAST_RATIO: f64 = 0.3;
 /// The same over the standard deviation of squares of one colour.
-const CLEARLY: f64 = 2.0;
+const MIN_SIGMAS: f64 = 2.0;
 /// Scatter of squares of one colour, as a share of the same, from which on they are not
 /// plain.
-const UNEVEN: f64 = 0.15;
+const MAX_UNEVENNESS: f64 = 0.15;
 /// Standard deviation within a square, as a share of that difference, up to which it is
 /// one colour: less than that of a square of whose places a third lie on the border to
 /// the next square.
-const PLAIN: f64 = 0.25;
+const MAX_WITHIN_SQUARE: f64 = 0.25;
 /// Squares of a row that must lie in the picture for it to tell, if it has as many.
-const FEWEST: usize = 3;
+const MIN_SQUARES: usize = 3;
 /// A square's colour is the mean of so many places along each of its sides, well
 /// within it.
-const PLACES: u32 = 3;
+const SAMPLES_PER_SIDE: u32 = 3;
 
 /// A side of the board in the order of its corners.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+pub enum BoardSide {
     /// Before the first column.
     FirstColumn,
     /// After the last column.
@@ -38,18 +38,18 @@ pub enum Side {
     LastRow,
 }
 
-impl Side {
+impl BoardSide {
     const ALL: [Self; 4] = [Self::FirstColumn, Self::LastColumn, Self::FirstRow, Self::LastRow];
 }
 
 /// Where a board does not end as it should.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Outline {
+pub struct BoardOutline {
     /// Beyond these sides it goes on for a further row of squares.
-    pub goes_on: Vec<Side>,
+    pub goes_on: Vec<BoardSide>,
     /// Beyond these there is no row of squares at all: what was taken for corners there
     /// are the ends of the board's squares, or none.
-    pub ends_early: Vec<Side>,
+    pub ends_early: Vec<BoardSide>,
     /// Squares of one colour differ so much from each other that there may be something in
     /// them.
     pub is_uneven: bool,
@@ -60,8 +60,8 @@ pub struct Outline {
 
 /// Looks at the two rows of squares beyond each side; says nothing of a side where they
 /// leave the picture.
-pub fn look(board: &Board, grey: &Grey<'_>, corners: &[ImagePoint]) -> Outline {
-    let mut outline = Outline::default();
+pub fn look(board: &Board, grey: &GreyImage<'_>, corners: &[ImagePoint]) -> BoardOutline {
+    let mut outline = BoardOutline::default();
     let GridSize { columns, rows } = board.corners();
     if corners.len() != columns * rows {
         return outline;
@@ -76,17 +76,20 @@ pub fn look(board: &Board, grey: &Grey<'_>, corners: &[ImagePoint]) -> Outline {
     let Some(Difference { even_less_odd: contrast, scatter }) = Difference::of(inner) else {
         return outline;
     };
-    outline.is_uneven = scatter > UNEVEN * contrast.abs();
+    outline.is_uneven = scatter > MAX_UNEVENNESS * contrast.abs();
     outline.is_first_bright = contrast > 0.0;
-    for side in Side::ALL {
+    for side in BoardSide::ALL {
         let line = |depth: usize, along: usize| match side {
-            Side::FirstColumn => at(depth, along),
-            Side::LastColumn => at(columns - 1 - depth, along),
-            Side::FirstRow => at(along, depth),
-            Side::LastRow => at(along, rows - 1 - depth),
+            BoardSide::FirstColumn => at(depth, along),
+            BoardSide::LastColumn => at(columns - 1 - depth, along),
+            BoardSide::FirstRow => at(along, depth),
+            BoardSide::LastRow => at(along, rows - 1 - depth),
         };
-        let count =
-            if matches!(side, Side::FirstColumn | Side::LastColumn) { rows } else { columns };
+        let count = if matches!(side, BoardSide::FirstColumn | BoardSide::LastColumn) {
+            rows
+        } else {
+            columns
+        };
         // The outermost corner and the next two outwards.
         let beyond: Vec<[ImagePoint; 3]> = (0..count)
             .map(|along| {
@@ -97,9 +100,9 @@ pub fn look(board: &Board, grey: &Grey<'_>, corners: &[ImagePoint]) -> Outline {
         let row = |depth: usize| Row::of(grey, &beyond, depth);
         // Columns and rows of the squares beyond, counted on from those within.
         let first = match side {
-            Side::FirstColumn | Side::FirstRow => 2,
-            Side::LastColumn => columns,
-            Side::LastRow => rows,
+            BoardSide::FirstColumn | BoardSide::FirstRow => 2,
+            BoardSide::LastColumn => columns,
+            BoardSide::LastRow => rows,
         };
         if row(0).and_then(|row| row.alternates(contrast)) == Some(false) {
             outline.ends_early.push(side);
@@ -119,7 +122,7 @@ struct Row {
 impl Row {
     /// The next row to the board, or the one after it. `None` where too few of its squares
     /// lie in the picture.
-    fn of(grey: &Grey<'_>, beyond: &[[ImagePoint; 3]], depth: usize) -> Option<Self> {
+    fn of(grey: &GreyImage<'_>, beyond: &[[ImagePoint; 3]], depth: usize) -> Option<Self> {
         let shades: Vec<(usize, Shade)> = beyond
             .windows(2)
             .enumerate()
@@ -129,7 +132,7 @@ impl Row {
                 Some((along, Shade::of(grey, square)?))
             })
             .collect();
-        (shades.len() >= FEWEST.min(beyond.len() - 1)).then_some(Self { shades })
+        (shades.len() >= MIN_SQUARES.min(beyond.len() - 1)).then_some(Self { shades })
     }
 
     /// Whether its squares alternate at all. `None` where all that are seen have one
@@ -144,8 +147,8 @@ impl Row {
     fn continues(&self, first: usize, contrast: f64) -> bool {
         let Some(found) = self.difference(first) else { return false };
         let mut spreads: Vec<f64> = self.shades.iter().map(|(_, shade)| shade.spread).collect();
-        let is_plain =
-            rank::median(&mut spreads).is_some_and(|spread| spread <= PLAIN * contrast.abs());
+        let is_plain = rank::median(&mut spreads)
+            .is_some_and(|spread| spread <= MAX_WITHIN_SQUARE * contrast.abs());
         found.is_clear(contrast) && found.even_less_odd * contrast > 0.0 && is_plain
     }
 
@@ -181,7 +184,8 @@ impl Difference {
     }
 
     fn is_clear(&self, contrast: f64) -> bool {
-        self.even_less_odd.abs() > (GOES_ON * contrast.abs()).max(CLEARLY * self.scatter)
+        self.even_less_odd.abs()
+            > (MIN_CONTRAST_RATIO * contrast.abs()).max(MIN_SIGMAS * self.scatter)
     }
 }
 
@@ -204,18 +208,18 @@ struct Shade {
 
 impl Shade {
     /// Of a square given row by row; `None` where it leaves the picture.
-    fn of(grey: &Grey<'_>, square: [ImagePoint; 4]) -> Option<Self> {
+    fn of(grey: &GreyImage<'_>, square: [ImagePoint; 4]) -> Option<Self> {
         let [above, below] = [[square[0], square[1]], [square[2], square[3]]];
         let between = |ends: [ImagePoint; 2], part: f64| ends[0] + (ends[1] - ends[0]) * part;
-        let part = |k: u32| 0.3 + 0.4 * f64::from(k) / f64::from(PLACES - 1);
+        let part = |k: u32| 0.3 + 0.4 * f64::from(k) / f64::from(SAMPLES_PER_SIDE - 1);
         let (mut sum, mut squares) = (0.0, 0.0);
-        for i in 0..PLACES * PLACES {
-            let (right, down) = (part(i % PLACES), part(i / PLACES));
+        for i in 0..SAMPLES_PER_SIDE * SAMPLES_PER_SIDE {
+            let (right, down) = (part(i % SAMPLES_PER_SIDE), part(i / SAMPLES_PER_SIDE));
             let value = grey.at(between([between(above, right), between(below, right)], down))?;
             sum += value;
             squares += value * value;
         }
-        let count = f64::from(PLACES * PLACES);
+        let count = f64::from(SAMPLES_PER_SIDE * SAMPLES_PER_SIDE);
         let mean = sum / count;
         Some(Self { mean, spread: (squares / count - mean * mean).max(0.0).sqrt() })
     }

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Rotation3, Vector3};
 
 use super::bundle;
 use super::bundle::Guess;
-use super::equations::{Corner, Free, Model, Place};
+use super::equations::{BoardPlacement, CameraModel, Correspondence, FreeParameters};
 use super::solve;
 use crate::core::geometry::Pose;
 use crate::core::units::Mm;
@@ -13,9 +13,9 @@ use crate::core::units::Mm;
 #[derive(Debug, Clone, PartialEq)]
 pub struct OnBed {
     /// Where they lay; the axes are those of the first.
-    pub place: Place,
+    pub place: BoardPlacement,
     /// Their corners.
-    pub boards: Vec<Vec<Corner>>,
+    pub boards: Vec<Vec<Correspondence>>,
     /// Root mean square of what the corners are off \[px\].
     pub rms_px: f64,
     /// How far the board that is furthest off lies above or below the plane, where
@@ -26,16 +26,17 @@ pub struct OnBed {
 impl OnBed {
     /// Fits one plane to boards that a known camera sees. `None` without a board, or
     /// where the corners of one fit no pose.
-    pub fn fit(model: &Model, boards: Vec<Vec<Corner>>) -> Option<Self> {
+    pub fn fit(model: &CameraModel, boards: Vec<Vec<Correspondence>>) -> Option<Self> {
         let poses: Vec<Pose> =
             boards.iter().map(|corners| solve::pose(model, corners)).collect::<Option<_>>()?;
         let (first, rest) = poses.split_first()?;
         let others = rest.iter().map(|pose| in_plane_of(first, pose)).collect();
-        let start = Guess { model: *model, places: vec![Place { pose: *first, others }] };
+        let start =
+            Guess { model: *model, placements: vec![BoardPlacement { pose: *first, others }] };
         let all = [boards];
-        let fit = bundle::fit(start, Free::PLACES, &all)?;
+        let fit = bundle::fit(start, FreeParameters::PLACEMENTS, &all)?;
         let [boards] = all;
-        let place = fit.places.into_iter().next()?;
+        let place = fit.placements.into_iter().next()?;
         #[expect(clippy::cast_precision_loss, reason = "a count of corners")]
         let corners = boards.iter().map(Vec::len).sum::<usize>().max(1) as f64;
         let off = poses.iter().zip(&boards).map(|(pose, corners)| {
@@ -43,7 +44,7 @@ impl OnBed {
             place.pose.apply_inverse(middle).z.abs()
         });
         let off_mm = if poses.len() > 1 { off.fold(0.0, f64::max) } else { 0.0 };
-        Some(Self { place, boards, rms_px: (fit.squares_px2 / corners).sqrt(), off_mm })
+        Some(Self { place, boards, rms_px: (fit.sum_of_squares_px2 / corners).sqrt(), off_mm })
     }
 
     /// The bed's axes in the camera's, with the printed faces of the boards
@@ -60,7 +61,7 @@ fn in_plane_of(first: &Pose, other: &Pose) -> [f64; 3] {
     [origin.x, origin.y, along.y.atan2(along.x)]
 }
 
-fn middle_of(corners: &[Corner]) -> Point3<f64> {
+fn middle_of(corners: &[Correspondence]) -> Point3<f64> {
     #[expect(clippy::cast_precision_loss, reason = "a count of corners")]
     let count = corners.len().max(1) as f64;
     let sum = corners.iter().map(|corner| corner.on_board.coords).sum::<nalgebra::Vector2<f64>>();
@@ -119,10 +120,10 @@ mod tests {
 
     #[test]
     fn boards_on_one_plane_are_fitted_together() {
-        let model = Model { camera: TRUTH, bend_mm: [0.0; 2] };
+        let model = CameraModel { camera: TRUTH, bend_mm: [0.0; 2] };
         let pose = Pose::new(Vector3::from(TILT), Vector3::new(-70.0, -60.0, 420.0));
-        let truth = Place { pose, others: vec![[25.0, -14.0, 0.7], [-30.0, 22.0, -0.4]] };
-        let seen = |i| board().place(&synthetic::seen(&truth.of_board(i), || 0.0));
+        let truth = BoardPlacement { pose, others: vec![[25.0, -14.0, 0.7], [-30.0, 22.0, -0.4]] };
+        let seen = |i| board().correspondences(&synthetic::seen(&truth.of_board(i), || 0.0));
         let found = OnBed::fit(&model, (0..3).map(seen).collect()).unwrap();
         assert!(found.rms_px < 1e-9 && found.off_mm < 1e-6);
         let moved = found.place.pose.translation_mm() - pose.translation_mm();
@@ -137,7 +138,7 @@ mod tests {
             pose.rotation(),
             pose.translation_mm() - pose.rotation() * Vector3::z() * 3.0,
         );
-        let high = board().place(&synthetic::seen(&up, || 0.0));
+        let high = board().correspondences(&synthetic::seen(&up, || 0.0));
         let found = OnBed::fit(&model, vec![seen(1), seen(2), high]).unwrap();
         assert!(found.off_mm > 0.5, "{}", found.off_mm);
         assert!(OnBed::fit(&model, vec![]).is_none());

@@ -5,14 +5,14 @@
 use nalgebra::Vector3;
 
 use super::coverage::{Coverage, PARTS};
-use super::solve::{Solution, View};
+use super::solve::{BoardView, Solution};
 use crate::numeric::rank;
 
 /// A reason for doubt, and what to do about it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Doubt {
+pub enum Warning {
     /// Few pictures.
-    #[error("only {found} pictures show the board; {ENOUGH_VIEWS} or more average errors better")]
+    #[error("only {found} pictures show the board; {MIN_VIEWS} or more average errors better")]
     FewViews {
         /// Pictures that show it.
         found: usize,
@@ -38,7 +38,7 @@ pub enum Doubt {
     /// The model does not fit.
     #[error(
         "the reprojection error is {rms_px:.2} px, a sharp picture of a flat board gives less \
-         than {GOOD_RMS_PX}: look for blur, a bent board, or a wrong corner count"
+         than {MAX_RMS_PX}: look for blur, a bent board, or a wrong corner count"
     )]
     HighError {
         /// Root mean square over all corners \[px\].
@@ -57,7 +57,7 @@ pub enum Doubt {
         "the lens model turns over before pixel ({x:.0}, {y:.0}), and nothing can be measured \
          there; bring the board into the corners of the picture"
     )]
-    Folds {
+    NonMonotonic {
         /// Column \[px\].
         x: f64,
         /// Row \[px\].
@@ -65,65 +65,67 @@ pub enum Doubt {
     },
     /// The focal length is loose.
     #[error("the focal length is known to {percent:.1} % only; more tilted pictures help")]
-    LooseFocal {
+    UncertainFocal {
         /// Standard deviation over value.
         percent: f64,
     },
 }
 
-const ENOUGH_VIEWS: usize = 8;
-const ENOUGH_CELLS: usize = 12;
-const ENOUGH_TILT_DEG: f64 = 15.0;
-const GOOD_RMS_PX: f64 = 0.5;
-const OUTLIER: f64 = 3.0;
-const GOOD_FOCAL_PERCENT: f64 = 1.0;
+const MIN_VIEWS: usize = 8;
+const MIN_CELLS: usize = 12;
+const MIN_TILT_DEG: f64 = 15.0;
+const MAX_RMS_PX: f64 = 0.5;
+const OUTLIER_RATIO: f64 = 3.0;
+const MAX_FOCAL_PERCENT: f64 = 1.0;
 
 /// Everything that should make one doubt this solution.
-pub fn doubts(solution: &Solution) -> Vec<Doubt> {
-    let mut doubts = Vec::new();
+pub fn warnings(solution: &Solution) -> Vec<Warning> {
+    let mut warnings = Vec::new();
     let found = solution.views.len();
-    if found < ENOUGH_VIEWS {
-        doubts.push(Doubt::FewViews { found });
+    if found < MIN_VIEWS {
+        warnings.push(Warning::FewViews { found });
     }
     let covered = Coverage::of(solution).count();
-    if covered < ENOUGH_CELLS {
-        doubts.push(Doubt::Coverage { covered });
+    if covered < MIN_CELLS {
+        warnings.push(Warning::Coverage { covered });
     }
     let tilt_deg = solution.views.iter().map(tilt_deg).fold(0.0, f64::max);
-    if tilt_deg < ENOUGH_TILT_DEG {
-        doubts.push(Doubt::NoTilt { tilt_deg });
+    if tilt_deg < MIN_TILT_DEG {
+        warnings.push(Warning::NoTilt { tilt_deg });
     }
-    if solution.rms_px > GOOD_RMS_PX {
-        doubts.push(Doubt::HighError { rms_px: solution.rms_px });
+    if solution.rms_px > MAX_RMS_PX {
+        warnings.push(Warning::HighError { rms_px: solution.rms_px });
     }
     let focal_sigma = solution.sigma.map_or(f64::INFINITY, |sigma| sigma[0]);
     let percent = 100.0 * focal_sigma / solution.camera().focal_px[0];
-    if percent > GOOD_FOCAL_PERCENT {
-        doubts.push(Doubt::LooseFocal { percent });
+    if percent > MAX_FOCAL_PERCENT {
+        warnings.push(Warning::UncertainFocal { percent });
     }
-    if let Some(px) = solution.camera().fold(solution.image_size_px) {
-        doubts.push(Doubt::Folds { x: px.x, y: px.y });
+    if let Some(px) = solution.camera().non_monotonic_at(solution.image_size_px) {
+        warnings.push(Warning::NonMonotonic { x: px.x, y: px.y });
     }
-    doubts.extend(outliers(&solution.views));
-    doubts
+    warnings.extend(outliers(&solution.views));
+    warnings
 }
 
 /// Whether the pictures tell the camera's numbers apart at all.
 pub fn settles_camera(solution: &Solution) -> bool {
-    let loose = |doubt: &Doubt| matches!(doubt, Doubt::LooseFocal { .. } | Doubt::NoTilt { .. });
-    !doubts(solution).iter().any(loose)
+    let loose = |warning: &Warning| {
+        matches!(warning, Warning::UncertainFocal { .. } | Warning::NoTilt { .. })
+    };
+    !warnings(solution).iter().any(loose)
 }
 
-fn outliers(views: &[View]) -> impl Iterator<Item = Doubt> {
+fn outliers(views: &[BoardView]) -> impl Iterator<Item = Warning> {
     let mut errors: Vec<f64> = views.iter().map(|view| view.rms_px).collect();
     let typical = rank::median(&mut errors).unwrap_or(f64::INFINITY);
-    let times = move |view: &View| view.rms_px / typical;
-    let worse = views.iter().filter(move |view| times(view) > OUTLIER);
-    worse.map(move |view| Doubt::Outlier { name: view.name.clone(), times: times(view) })
+    let times = move |view: &BoardView| view.rms_px / typical;
+    let worse = views.iter().filter(move |view| times(view) > OUTLIER_RATIO);
+    worse.map(move |view| Warning::Outlier { name: view.name.clone(), times: times(view) })
 }
 
 /// Angle between the board's normal and the camera's view \[degrees\].
-pub fn tilt_deg(view: &View) -> f64 {
+pub fn tilt_deg(view: &BoardView) -> f64 {
     let normal = view.pose.rotation() * Vector3::z();
     normal.z.abs().min(1.0).acos().to_degrees()
 }
@@ -132,33 +134,33 @@ pub fn tilt_deg(view: &View) -> f64 {
 mod tests {
     use super::*;
     use crate::calibration::Camera;
-    use crate::calibration::board::all_seen;
-    use crate::calibration::equations::{Free, Model, SHARED};
+    use crate::calibration::board::observe_all;
+    use crate::calibration::equations::{CameraModel, FreeParameters, SHARED};
     use crate::calibration::lens::Lens;
     use crate::core::geometry::{ImagePoint, Pose};
     use nalgebra::Vector2;
 
-    fn view(name: &str, corner: ImagePoint, tilt_rad: f64, rms_px: f64) -> View {
+    fn view(name: &str, corner: ImagePoint, tilt_rad: f64, rms_px: f64) -> BoardView {
         let pose = Pose::new(Vector3::new(tilt_rad, 0.0, 0.0), Vector3::new(0.0, 0.0, 400.0));
-        View {
+        BoardView {
             name: name.into(),
             pose,
             rms_px,
             max_px: rms_px,
-            corners: all_seen(&[corner]),
+            corners: observe_all(&[corner]),
             errors_px: vec![Vector2::new(rms_px, 0.0)],
         }
     }
 
-    fn solution(views: Vec<View>) -> Solution {
+    fn solution(views: Vec<BoardView>) -> Solution {
         let camera = Camera::pinhole([1000.0; 2], [50.0; 2]);
         Solution {
-            model: Model { camera, bend_mm: [0.0; 2] },
-            free: Free { lens: Some(Lens::Five), bend: false },
+            model: CameraModel { camera, bend_mm: [0.0; 2] },
+            free: FreeParameters { lens: Some(Lens::Five), bend: false },
             sigma: Some([1.0; SHARED]),
             image_size_px: [100, 100],
             rms_px: 0.2,
-            held_out_px: None,
+            cross_validation_px: None,
             noise_px: 0.15,
             design_effect: 1.0,
             trials: vec![],
@@ -167,33 +169,37 @@ mod tests {
     }
 
     /// Sixteen views that see a part of the picture each.
-    fn good() -> Vec<View> {
+    fn good() -> Vec<BoardView> {
         let at = |i: u32| ImagePoint::new(f64::from(i % 4) * 25.0 + 5.0, f64::from(i / 4) * 25.0);
         (0..16).map(|i| view(&i.to_string(), at(i), 0.03 * f64::from(i), 0.2)).collect()
     }
 
     #[test]
     fn many_tilted_views_all_over_the_picture_raise_no_doubt() {
-        assert_eq!(doubts(&solution(good())), vec![]);
+        assert_eq!(warnings(&solution(good())), vec![]);
     }
 
     #[test]
     fn each_weakness_is_told() {
         let mut odd = good();
         odd[4].rms_px = 0.9;
-        let outlier = Doubt::Outlier { name: "4".into(), times: 0.9 / 0.2 };
-        assert_eq!(doubts(&solution(odd)), vec![outlier]);
+        let outlier = Warning::Outlier { name: "4".into(), times: 0.9 / 0.2 };
+        assert_eq!(warnings(&solution(odd)), vec![outlier]);
         let same = |_| view("a", ImagePoint::new(50.0, 50.0), 0.1, 0.2);
-        let told = doubts(&solution((0..5).map(same).collect()));
+        let told = warnings(&solution((0..5).map(same).collect()));
         assert!(matches!(
             told[..],
-            [Doubt::FewViews { found: 5 }, Doubt::Coverage { covered: 1 }, Doubt::NoTilt { .. }]
+            [
+                Warning::FewViews { found: 5 },
+                Warning::Coverage { covered: 1 },
+                Warning::NoTilt { .. }
+            ]
         ));
         let mut folded = solution(good());
         folded.model.camera.distortion[0] = -200.0;
-        assert_eq!(doubts(&folded), vec![Doubt::Folds { x: 0.0, y: 0.0 }]);
+        assert_eq!(warnings(&folded), vec![Warning::NonMonotonic { x: 0.0, y: 0.0 }]);
         let loose = Solution { sigma: Some([20.0; SHARED]), rms_px: 0.8, ..solution(good()) };
-        let told = doubts(&loose);
-        assert!(matches!(told[..], [Doubt::HighError { .. }, Doubt::LooseFocal { .. }]));
+        let told = warnings(&loose);
+        assert!(matches!(told[..], [Warning::HighError { .. }, Warning::UncertainFocal { .. }]));
     }
 }

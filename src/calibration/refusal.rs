@@ -1,20 +1,20 @@
 //! Why a picture of a board is not used, with what to do about it.
 
 use super::board::NotABoard;
-use super::charuco::NoMarkers;
-use super::outline::Side;
+use super::charuco::MarkerError;
+use super::outline::BoardSide;
 use crate::bridge::BridgeError;
 use crate::core::geometry::GridSize;
 
 /// Corners of a board with markers that must show, in [`LEAST_LINES`] of its rows and as
 /// many columns.
-pub const LEAST_CORNERS: usize = 8;
+pub const MIN_CORNERS: usize = 8;
 /// The rows and the columns.
-pub const LEAST_LINES: usize = 3;
+pub const MIN_LINES: usize = 3;
 
 /// Why a picture is not used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Refusal {
+pub enum BoardRejection {
     /// It cannot be read.
     #[error("unreadable: {0}")]
     Unreadable(String),
@@ -49,7 +49,7 @@ pub enum Refusal {
         /// Inner corners along a column.
         rows: usize,
         /// Where it goes on.
-        sides: Vec<Side>,
+        sides: Vec<BoardSide>,
     },
     /// A smaller board, or something that looks like a corner of it.
     #[error(
@@ -62,7 +62,7 @@ pub enum Refusal {
         /// Inner corners along a column.
         rows: usize,
         /// Where it ends.
-        sides: Vec<Side>,
+        sides: Vec<BoardSide>,
     },
     /// Something like a board, but not one.
     #[error("no sound board: {0}")]
@@ -77,11 +77,11 @@ pub enum Refusal {
     },
     /// Taken in motion.
     #[error(
-        "the board moved by {way_px:.1} px during the exposure: hold it still, or expose shorter"
+        "the board moved by {motion_px:.1} px during the exposure: hold it still, or expose shorter"
     )]
     Moved {
         /// How far \[px\].
-        way_px: f64,
+        motion_px: f64,
     },
     /// The board is where it was in another picture.
     #[error("the board is where it is in {of} (within {shift_px:.1} px), which says nothing new")]
@@ -113,13 +113,13 @@ pub enum Refusal {
     Plain,
     /// The markers do not make the board.
     #[error(transparent)]
-    NoMarkers(#[from] NoMarkers),
+    NoMarkers(#[from] MarkerError),
     /// Too little of a board with markers.
     #[error(
-        "only {count} corners of the board show, in {columns} columns and {rows} rows: {LEAST_CORNERS} \
-         in {LEAST_LINES} columns and {LEAST_LINES} rows are needed"
+        "only {count} corners of the board show, in {columns} columns and {rows} rows: {MIN_CORNERS} \
+         in {MIN_LINES} columns and {MIN_LINES} rows are needed"
     )]
-    Little {
+    TooFewCorners {
         /// Corners that show.
         count: usize,
         /// Columns that they are in.
@@ -136,12 +136,12 @@ fn size_text([width, height]: [u32; 2]) -> String {
     format!("{width}x{height} px")
 }
 
-fn sides_text(sides: &[Side]) -> String {
+fn sides_text(sides: &[BoardSide]) -> String {
     let words = sides.iter().map(|side| match side {
-        Side::FirstColumn => "before the first column",
-        Side::LastColumn => "after the last column",
-        Side::FirstRow => "before the first row",
-        Side::LastRow => "after the last row",
+        BoardSide::FirstColumn => "before the first column",
+        BoardSide::LastColumn => "after the last column",
+        BoardSide::FirstRow => "before the first row",
+        BoardSide::LastRow => "after the last row",
     });
     words.collect::<Vec<_>>().join(" and ")
 }

@@ -24,7 +24,7 @@ pub struct SingleScale {
 }
 
 /// Points along each side at which the size of a pixel is taken.
-const GRID: u32 = 9;
+const GRID_POINTS: u32 = 9;
 
 /// The single number of Shojaei Barjuei et al. 2022, section 4.3.1, at a
 /// surface of this height. `None` where the middle of the picture does not see
@@ -35,9 +35,9 @@ pub fn single_scale(calibration: &Calibration, surface_height: Mm) -> Option<Sin
     let map = calibration.surface(surface_height, None);
     let sizes = |px: ImagePoint| Some(map.mm_per_px(px)?.singular_values());
     let mm_per_px = in_the_middle(&map, image_size_px)?;
-    let steps = f64::from(GRID - 1);
-    let (smallest, largest) = (0..GRID * GRID)
-        .map(|i| (f64::from(i % GRID) / steps, f64::from(i / GRID) / steps))
+    let steps = f64::from(GRID_POINTS - 1);
+    let (smallest, largest) = (0..GRID_POINTS * GRID_POINTS)
+        .map(|i| (f64::from(i % GRID_POINTS) / steps, f64::from(i / GRID_POINTS) / steps))
         .filter_map(|(x, y)| sizes(Point2::new(x * width, y * height)))
         .fold((mm_per_px, mm_per_px), |(low, high), s| (low.min(s.min()), high.max(s.max())));
     let middle = sizes(Point2::new(width / 2.0, height / 2.0))?;

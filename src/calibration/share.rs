@@ -3,17 +3,17 @@
 
 use nalgebra::Vector2;
 
-use super::covariance::{Covariance, Reading};
+use super::covariance::{CalibrationCovariance, DerivedValue};
 use crate::core::geometry::ImagePoint;
 use crate::core::units::Mm;
 
 /// A bead for which the share is told fills this much of a side.
-const BEAD: f64 = 1.0 / 3.0;
+const BEAD_FRACTION: f64 = 1.0 / 3.0;
 /// Middles of such beads along each side.
-const PLACES: u32 = 5;
+const POSITIONS_PER_SIDE: u32 = 5;
 /// The highest surface for which the share is told, as a part of the camera's
 /// height above the bed.
-const SURFACE: f64 = 0.05;
+const MAX_SURFACE_FRACTION: f64 = 0.05;
 
 /// Relative standard deviation of a width where boards were seen: the
 /// largest that a bead has which fills a third of that part of the picture,
@@ -21,25 +21,25 @@ const SURFACE: f64 = 0.05;
 /// twentieth of the camera's height above it. The largest and not a mean,
 /// because a gauge stays in its place, and with it the error. `None` where
 /// no such bead is seen on the surface.
-pub fn where_seen(covariance: &Covariance) -> Option<f64> {
+pub fn where_seen(covariance: &CalibrationCovariance) -> Option<f64> {
     largest(covariance, &readings(covariance))
 }
 
 /// Largest share of beads that were read.
-pub fn largest(covariance: &Covariance, readings: &[Reading]) -> Option<f64> {
-    let share = |reading: &Reading| covariance.sigma(reading) / reading.value;
+pub fn largest(covariance: &CalibrationCovariance, readings: &[DerivedValue]) -> Option<f64> {
+    let share = |reading: &DerivedValue| covariance.sigma(reading) / reading.value;
     readings.iter().map(share).filter(|share| share.is_finite()).reduce(f64::max)
 }
 
-fn readings(covariance: &Covariance) -> Vec<Reading> {
+fn readings(covariance: &CalibrationCovariance) -> Vec<DerivedValue> {
     let beads = beads_where_seen(covariance).into_iter();
     beads.filter_map(|(ends, height)| covariance.width(ends, height)).collect()
 }
 
 /// Ends of beads all over the part of the picture where boards were seen, on the bed and
 /// on the highest surface.
-pub fn beads_where_seen(covariance: &Covariance) -> Vec<([ImagePoint; 2], Mm)> {
-    let above = Mm::new(SURFACE * covariance.camera_height_mm()).unwrap_or(Mm::ZERO);
+pub fn beads_where_seen(covariance: &CalibrationCovariance) -> Vec<([ImagePoint; 2], Mm)> {
+    let above = Mm::new(MAX_SURFACE_FRACTION * covariance.camera_height_mm()).unwrap_or(Mm::ZERO);
     let on = |height| beads(covariance.seen_px()).map(move |ends| (ends, height));
     [Mm::ZERO, above].into_iter().flat_map(on).collect()
 }
@@ -48,10 +48,17 @@ pub fn beads_where_seen(covariance: &Covariance) -> Vec<([ImagePoint; 2], Mm)> {
 /// the picture, and as far from its border along the bead as across it.
 fn beads([from, to]: [ImagePoint; 2]) -> impl Iterator<Item = [ImagePoint; 2]> {
     let size = to - from;
-    let place = |i: u32| BEAD / 2.0 + (1.0 - BEAD) * f64::from(i) / f64::from(PLACES - 1);
-    let middles = (0..PLACES * PLACES).map(move |i| {
-        from + size.component_mul(&Vector2::new(place(i % PLACES), place(i / PLACES)))
+    let place = |i: u32| {
+        BEAD_FRACTION / 2.0
+            + (1.0 - BEAD_FRACTION) * f64::from(i) / f64::from(POSITIONS_PER_SIDE - 1)
+    };
+    let middles = (0..POSITIONS_PER_SIDE * POSITIONS_PER_SIDE).map(move |i| {
+        from + size.component_mul(&Vector2::new(
+            place(i % POSITIONS_PER_SIDE),
+            place(i / POSITIONS_PER_SIDE),
+        ))
     });
-    let halves = [Vector2::new(size.x, 0.0), Vector2::new(0.0, size.y)].map(|s| s * (BEAD / 2.0));
+    let halves =
+        [Vector2::new(size.x, 0.0), Vector2::new(0.0, size.y)].map(|s| s * (BEAD_FRACTION / 2.0));
     middles.flat_map(move |middle| halves.map(|half| [middle - half, middle + half]))
 }

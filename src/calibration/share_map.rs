@@ -9,7 +9,7 @@ use crate::core::geometry::{ImagePoint, Roi};
 
 /// Relative standard deviations of the width of one bead that runs one way.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ShareMap {
+pub struct RelativeSigmaMap {
     /// Width of the bead \[mm\].
     pub bead_mm: f64,
     /// Size of the image \[px\].
@@ -23,21 +23,21 @@ pub struct ShareMap {
 
 /// A bead of which the standard deviation is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bead {
+pub struct MapBead {
     /// Its width \[mm\].
     pub width_mm: f64,
     /// Across it, in the image.
     pub across: Vector2<f64>,
 }
 
-impl ShareMap {
+impl RelativeSigmaMap {
     /// On a surface. `None` for a calibration that knows no image, or no more of widths than
     /// one number.
-    pub fn of(surface: &SurfaceMap, bead: &Bead, counts: Cells) -> Option<Self> {
+    pub fn of(surface: &SurfaceMap, bead: &MapBead, counts: Cells) -> Option<Self> {
         let image_size_px = surface.image_size_px()?;
         surface.uncertainty()?;
         let cells = map::middles(image_size_px.map(f64::from), counts)
-            .map(|middle| share_at(surface, bead, middle))
+            .map(|middle| relative_sigma_at(surface, bead, middle))
             .collect();
         Some(Self { bead_mm: bead.width_mm, image_size_px, counts, cells })
     }
@@ -75,19 +75,19 @@ impl ShareMap {
 }
 
 /// Of a bead with its middle at a pixel. `None` where it is not seen whole.
-pub fn share_at(surface: &SurfaceMap, bead: &Bead, middle: ImagePoint) -> Option<f64> {
+pub fn relative_sigma_at(surface: &SurfaceMap, bead: &MapBead, middle: ImagePoint) -> Option<f64> {
     let ends = map::ends(surface, middle, bead.across, bead.width_mm)?;
-    surface.width_sigma_share_of(ends)
+    surface.width_relative_sigma_of(ends)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::covariance::Covariance;
+    use crate::calibration::covariance::CalibrationCovariance;
     use crate::calibration::plane::OnBed;
     use crate::calibration::synthetic;
     use crate::calibration::synthetic::{SIZE, board, poses};
-    use crate::calibration::{Calibration, Quality, solve};
+    use crate::calibration::{Calibration, CalibrationQuality, solve};
     use crate::core::units::Mm;
 
     /// A calibration from corners with an error of a kind.
@@ -101,11 +101,12 @@ mod tests {
             poses().iter().map(|pose| synthetic::sighting("", pose, &mut off)).collect();
         let solution = solve::solve(&board(), &sightings).unwrap();
         let on_bed =
-            OnBed::fit(&solution.model, vec![board().place(&sightings[0].corners)]).unwrap();
-        let covariance = Covariance::of(&board(), &solution, &on_bed, Mm::ZERO).unwrap();
-        let quality = Quality {
+            OnBed::fit(&solution.model, vec![board().correspondences(&sightings[0].corners)])
+                .unwrap();
+        let covariance = CalibrationCovariance::of(&board(), &solution, &on_bed, Mm::ZERO).unwrap();
+        let quality = CalibrationQuality {
             reprojection_rms_px: solution.rms_px,
-            width_sigma_share: Some(1e-3),
+            width_relative_sigma: Some(1e-3),
             seen_px: None,
             heights_mm: None,
             uncertainty: Some(covariance.uncertainty()),
@@ -122,24 +123,25 @@ mod tests {
 
     #[test]
     fn a_width_is_known_less_well_beyond_where_boards_were_seen() {
-        let bead = Bead { width_mm: 40.0, across: Vector2::x() };
-        let map = ShareMap::of(&surface(), &bead, Cells { columns: 8, rows: 6 }).unwrap();
+        let bead = MapBead { width_mm: 40.0, across: Vector2::x() };
+        let map = RelativeSigmaMap::of(&surface(), &bead, Cells { columns: 8, rows: 6 }).unwrap();
         let at = |column: usize, row: usize| map.cells[row * 8 + column];
         let (middle, corner) = (at(3, 3).unwrap(), at(1, 0).unwrap());
         assert!(corner > 2.0 * middle, "{corner} {middle}");
         // The bead does not fit beside the left side of the image.
         assert_eq!(at(0, 3), None);
         let higher = surface().with_height_sigma(Mm::constant(1.0));
-        let with_height =
-            ShareMap::of(&higher, &bead, Cells { columns: 8, rows: 6 }).unwrap().cells[3 * 8 + 3]
-                .unwrap();
+        let with_height = RelativeSigmaMap::of(&higher, &bead, Cells { columns: 8, rows: 6 })
+            .unwrap()
+            .cells[3 * 8 + 3]
+            .unwrap();
         assert!(with_height > middle && with_height > 1e-3, "{with_height}");
     }
 
     #[test]
     fn a_gauge_is_in_the_cells_that_it_covers() {
-        let bead = Bead { width_mm: 40.0, across: Vector2::x() };
-        let map = ShareMap::of(&surface(), &bead, Cells { columns: 8, rows: 6 }).unwrap();
+        let bead = MapBead { width_mm: 40.0, across: Vector2::x() };
+        let map = RelativeSigmaMap::of(&surface(), &bead, Cells { columns: 8, rows: 6 }).unwrap();
         let cells = |gauge: Roi| (0..48).filter(|&cell| map.is_in(gauge, cell)).collect::<Vec<_>>();
         // Cells are 90 px wide and high.
         let gauge = Roi { x: 180, y: 190, width: 270, height: 60 };
@@ -149,9 +151,13 @@ mod tests {
 
     #[test]
     fn a_single_number_has_no_map() {
-        let bead = Bead { width_mm: 40.0, across: Vector2::x() };
+        let bead = MapBead { width_mm: 40.0, across: Vector2::x() };
         assert_eq!(
-            ShareMap::of(&SurfaceMap::from_scale(0.1), &bead, Cells { columns: 8, rows: 6 }),
+            RelativeSigmaMap::of(
+                &SurfaceMap::from_scale(0.1),
+                &bead,
+                Cells { columns: 8, rows: 6 }
+            ),
             None
         );
     }

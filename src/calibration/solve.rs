@@ -4,29 +4,29 @@ mod error;
 mod solution;
 pub(super) mod views;
 
-pub use error::{FEWEST_VIEWS, SolveError};
-pub use solution::{Solution, View};
+pub use error::{MIN_VIEWS, SolveError};
+pub use solution::{BoardView, Solution};
 
 use super::board::Board;
 use super::bundle;
-use super::bundle::{Fit, Guess};
+use super::bundle::{BundleFit, Guess};
 use super::camera::NUMBERS;
 use super::choose;
-use super::choose::Trial;
-use super::equations::{Corner, Free, Model, Place, SHARED};
+use super::choose::LensTrial;
+use super::equations::{BoardPlacement, CameraModel, Correspondence, FreeParameters, SHARED};
 use super::homography;
 use super::lens::Lens;
 use super::pull;
-use super::pull::Pull;
-use super::sighting::Sighting;
+use super::pull::ViewInformation;
+use super::sighting::BoardObservation;
 use crate::core::geometry::{ImagePoint, Pose};
-use error::MOST_RMS_PX;
-use views::{Views, root_mean_square};
+use error::MAX_RMS_PX;
+use views::{CalibrationData, root_mean_square};
 
 /// Fits the camera to sightings that are all of one size, with the lens and the bend
 /// of the board that foretell pictures best which took no part in the fit.
-pub fn solve(board: &Board, sightings: &[Sighting]) -> Result<Solution, SolveError> {
-    let views = Views::of(board, sightings)?;
+pub fn solve(board: &Board, sightings: &[BoardObservation]) -> Result<Solution, SolveError> {
+    let views = CalibrationData::of(board, sightings)?;
     let (fit, free, trials) = choose::best(&views)
         .ok_or(SolveError::NoCamera { focal_px: views.start.model.camera.focal_px })?;
     solution(&views, sightings, &fit, free, trials)
@@ -35,40 +35,40 @@ pub fn solve(board: &Board, sightings: &[Sighting]) -> Result<Solution, SolveErr
 /// The same with a lens that is given, on a flat board.
 pub fn solve_with(
     board: &Board,
-    sightings: &[Sighting],
+    sightings: &[BoardObservation],
     lens: Lens,
 ) -> Result<Solution, SolveError> {
-    let views = Views::of(board, sightings)?;
+    let views = CalibrationData::of(board, sightings)?;
     let trial = choose::up_to(&views, lens)
         .ok_or(SolveError::NoCamera { focal_px: views.start.model.camera.focal_px })?;
-    let free = Free { lens: Some(lens), bend: false };
+    let free = FreeParameters { lens: Some(lens), bend: false };
     solution(&views, sightings, &trial.0, free, vec![trial.1])
 }
 
 fn solution(
-    views: &Views,
-    sightings: &[Sighting],
-    fit: &Fit,
-    free: Free,
-    trials: Vec<Trial>,
+    views: &CalibrationData,
+    sightings: &[BoardObservation],
+    fit: &BundleFit,
+    free: FreeParameters,
+    trials: Vec<LensTrial>,
 ) -> Result<Solution, SolveError> {
     let focal_px = fit.model.camera.focal_px;
     if focal_px.iter().any(|&f| f <= 0.0) {
         return Err(SolveError::NoCamera { focal_px });
     }
-    let rms_px = root_mean_square(fit.squares_px2, views.corners());
-    if rms_px > MOST_RMS_PX {
+    let rms_px = root_mean_square(fit.sum_of_squares_px2, views.corners());
+    if rms_px > MAX_RMS_PX {
         return Err(SolveError::NoFit { rms_px });
     }
     let noise_px = views.noise_variance_px2(fit, free).sqrt();
-    let design_effect = Pull::all(views, fit, free)
+    let design_effect = ViewInformation::all(views, fit, free)
         .and_then(|pulls| pull::design_effect(&pulls, free, noise_px * noise_px))
         .unwrap_or(1.0);
     let of_numbers_px = noise_px * design_effect.sqrt();
-    let spreads = views.spreads(fit, free).filter(|_| of_numbers_px.is_finite());
-    let each: Vec<View> = sightings
+    let spreads = views.unit_sigmas(fit, free).filter(|_| of_numbers_px.is_finite());
+    let each: Vec<BoardView> = sightings
         .iter()
-        .zip(fit.places.iter().zip(&views.boards))
+        .zip(fit.placements.iter().zip(&views.boards))
         .map(|(sighting, (place, boards))| view(&fit.model, sighting, place.pose, &boards[0]))
         .collect();
     Ok(Solution {
@@ -77,7 +77,10 @@ fn solution(
         sigma: spreads.map(|spreads| spreads.map(|spread| spread * of_numbers_px)),
         image_size_px: views.size,
         rms_px,
-        held_out_px: trials.iter().find(|t| t.free == free).and_then(|t| t.held_out_px),
+        cross_validation_px: trials
+            .iter()
+            .find(|t| t.free == free)
+            .and_then(|t| t.cross_validation_px),
         noise_px,
         design_effect,
         trials,
@@ -87,30 +90,35 @@ fn solution(
 
 /// The pose of a board before a camera that is known. `None` where the corners fit
 /// none.
-pub fn pose(model: &Model, corners: &[Corner]) -> Option<Pose> {
-    let start = homography::pose_before(&model.camera, corners)?;
+pub fn pose(model: &CameraModel, corners: &[Correspondence]) -> Option<Pose> {
+    let start = homography::board_pose(&model.camera, corners)?;
     let fit = bundle::fit(
-        Guess { model: *model, places: vec![Place::of_one(start)] },
-        Free::PLACES,
+        Guess { model: *model, placements: vec![BoardPlacement::of_one(start)] },
+        FreeParameters::PLACEMENTS,
         &[vec![corners.to_vec()]],
     )?;
-    fit.places.first().map(|place| place.pose)
+    fit.placements.first().map(|place| place.pose)
 }
 
 /// Errors of one picture by this crate's own camera model, the one that
 /// measures later; a corner that it cannot project counts as infinitely far.
-fn view(model: &Model, sighting: &Sighting, pose: Pose, corners: &[Corner]) -> View {
+fn view(
+    model: &CameraModel,
+    sighting: &BoardObservation,
+    pose: Pose,
+    corners: &[Correspondence],
+) -> BoardView {
     let far = nalgebra::Vector2::repeat(f64::INFINITY);
     let errors_px: Vec<_> = corners
         .iter()
         .map(|corner| {
             let expected: Option<ImagePoint> =
                 model.camera.project(pose.apply(model.on_board(corner)));
-            expected.map_or(far, |px| corner.seen - px)
+            expected.map_or(far, |px| corner.observed - px)
         })
         .collect();
     let squares = errors_px.iter().map(nalgebra::Vector2::norm_squared).sum();
-    View {
+    BoardView {
         name: sighting.name.clone(),
         pose,
         rms_px: root_mean_square(squares, errors_px.len()),

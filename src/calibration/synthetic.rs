@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 
 use super::Camera;
-use super::board::{Board, Seen, all_seen};
-use super::sighting::Sighting;
+use super::board::{Board, CornerObservation, observe_all};
+use super::sighting::BoardObservation;
 use crate::core::geometry::{ImagePoint, Pose};
 use crate::core::units::Mm;
 
@@ -41,11 +41,16 @@ pub fn corners(pose: &Pose, mut off: impl FnMut() -> f64) -> Vec<ImagePoint> {
 }
 
 /// The same as the corners that a picture shows.
-pub fn seen(pose: &Pose, off: impl FnMut() -> f64) -> Vec<Seen> {
-    all_seen(&corners(pose, off))
+pub fn seen(pose: &Pose, off: impl FnMut() -> f64) -> Vec<CornerObservation> {
+    observe_all(&corners(pose, off))
 }
 
 /// The same as a picture.
-pub fn sighting(name: &str, pose: &Pose, off: impl FnMut() -> f64) -> Sighting {
-    Sighting { name: name.to_owned(), image_size_px: SIZE, corners: seen(pose, off), focus: None }
+pub fn sighting(name: &str, pose: &Pose, off: impl FnMut() -> f64) -> BoardObservation {
+    BoardObservation {
+        name: name.to_owned(),
+        image_size_px: SIZE,
+        corners: seen(pose, off),
+        focus: None,
+    }
 }

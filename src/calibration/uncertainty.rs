@@ -9,11 +9,11 @@ use crate::core::geometry::{Pose, SurfacePoint};
 
 /// The camera's numbers, then a turn of the bed about the camera's axes at the bed's
 /// origin \[rad\] and a shift of it along them \[mm\].
-pub const UNCERTAIN: usize = NUMBERS + 6;
+pub const UNCERTAIN_PARAMETERS: usize = NUMBERS + 6;
 
 /// Names of the rows in a calibration file, in order.
-pub const ROWS: [&str; UNCERTAIN] = {
-    let mut names = [""; UNCERTAIN];
+pub const ROWS: [&str; UNCERTAIN_PARAMETERS] = {
+    let mut names = [""; UNCERTAIN_PARAMETERS];
     let mut i = 0;
     while i < NUMBERS {
         names[i] = NAMES[i];
@@ -30,31 +30,31 @@ pub const ROWS: [&str; UNCERTAIN] = {
 
 /// Part of a number's variance that the ones before it must leave for it to add anything:
 /// less is rounding.
-const LEAST_LEFT: f64 = 1e-14;
+const MIN_PIVOT: f64 = 1e-14;
 
 /// Between the numbers of camera and bed.
-pub type Joint = SMatrix<f64, UNCERTAIN, UNCERTAIN>;
+pub type JointCovariance = SMatrix<f64, UNCERTAIN_PARAMETERS, UNCERTAIN_PARAMETERS>;
 
 /// How a place on a surface answers to the numbers of camera and bed \[mm per unit\].
-pub type Slopes = SMatrix<f64, 2, UNCERTAIN>;
+pub type SurfaceSlopes = SMatrix<f64, 2, UNCERTAIN_PARAMETERS>;
 
 /// The covariance of camera and bed plane, as its lower triangular factor L: the
 /// covariance is L·Lᵀ. A number that is known has a row of zeros.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Uncertainty {
-    factor: Joint,
+pub struct CalibrationUncertainty {
+    factor: JointCovariance,
 }
 
-impl Uncertainty {
+impl CalibrationUncertainty {
     /// Of a covariance. Rows and columns of known numbers are 0.
-    pub fn of(covariance: &Joint) -> Self {
-        let mut factor = Joint::zeros();
-        for row in 0..UNCERTAIN {
+    pub fn of(covariance: &JointCovariance) -> Self {
+        let mut factor = JointCovariance::zeros();
+        for row in 0..UNCERTAIN_PARAMETERS {
             for column in 0..=row {
                 let known: f64 = (0..column).map(|k| factor[(row, k)] * factor[(column, k)]).sum();
                 let rest = covariance[(row, column)] - known;
                 if row == column {
-                    let is_rounding = rest <= LEAST_LEFT * covariance[(row, row)];
+                    let is_rounding = rest <= MIN_PIVOT * covariance[(row, row)];
                     factor[(row, row)] = if is_rounding { 0.0 } else { rest.sqrt() };
                 } else if factor[(column, column)] > 0.0 {
                     factor[(row, column)] = rest / factor[(column, column)];
@@ -66,8 +66,8 @@ impl Uncertainty {
 
     /// From the factor's rows, each as long as its number counted from 1; an empty one is
     /// of a number that is known. `None` for rows of another length.
-    pub fn from_rows(rows: &[Vec<f64>; UNCERTAIN]) -> Option<Self> {
-        let mut factor = Joint::zeros();
+    pub fn from_rows(rows: &[Vec<f64>; UNCERTAIN_PARAMETERS]) -> Option<Self> {
+        let mut factor = JointCovariance::zeros();
         for (row, values) in rows.iter().enumerate() {
             if !values.is_empty() && values.len() != row + 1 {
                 return None;
@@ -89,13 +89,13 @@ impl Uncertainty {
     }
 
     /// Standard deviation of a number with these slopes.
-    pub fn sigma(&self, slopes: &SMatrix<f64, 1, UNCERTAIN>) -> f64 {
+    pub fn sigma(&self, slopes: &SMatrix<f64, 1, UNCERTAIN_PARAMETERS>) -> f64 {
         (slopes * self.factor).norm()
     }
 
     /// Standard deviation of the distance between two places of a surface that are seen at
     /// fixed pixels, over that distance. `None` where both are one place.
-    pub fn share(&self, ends: [&PositionSlopes; 2]) -> Option<f64> {
+    pub fn relative_sigma(&self, ends: [&PositionSlopes; 2]) -> Option<f64> {
         let way = ends[1].mm - ends[0].mm;
         let length = way.norm();
         let slopes = way.transpose() / length * (ends[1].slopes - ends[0].slopes);
@@ -111,7 +111,7 @@ pub struct PositionSlopes {
     pub mm: SurfacePoint,
     /// With the numbers of camera and bed, the pixel and the surface's height above the
     /// bed staying what they are.
-    pub slopes: Slopes,
+    pub slopes: SurfaceSlopes,
 }
 
 impl PositionSlopes {
@@ -127,7 +127,7 @@ impl PositionSlopes {
         let back = in_image.try_inverse()?;
         let arm: Vector3<f64> = in_camera.coords - bed.translation_mm();
         let turned: Matrix3<f64> = -arm.cross_matrix();
-        let mut by_number = Slopes::zeros();
+        let mut by_number = SurfaceSlopes::zeros();
         by_number.fixed_columns_mut::<NUMBERS>(0).copy_from(&projection.of_camera);
         by_number.fixed_columns_mut::<3>(NUMBERS).copy_from(&(of_point * turned));
         by_number.fixed_columns_mut::<3>(NUMBERS + 3).copy_from(&of_point);

@@ -4,8 +4,8 @@
 use nalgebra::{Point2, Vector2, Vector3};
 
 use super::Camera;
-use super::board::{Board, Seen};
-use super::equations::Model;
+use super::board::{Board, CornerObservation};
+use super::equations::CameraModel;
 use super::plane::bed_from_board;
 use super::solve;
 use super::{Calibration, SurfaceMap};
@@ -13,10 +13,10 @@ use crate::core::geometry::Pose;
 use crate::core::units::Mm;
 
 /// Widths are compared over this part of the board at least.
-const LEAST_PART: f64 = 0.3;
+const MIN_PART: f64 = 0.3;
 /// Standard deviations that the noise of two corners may make of the error of their
 /// distance; there are hundreds of distances.
-const NOISE: f64 = 4.0;
+const NOISE_SIGMAS: f64 = 4.0;
 
 /// What a board on the bed says of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,8 +50,8 @@ pub struct Findings {
 impl Findings {
     /// Whether no width is further off than this share of it, as far as the corners'
     /// noise lets it be seen.
-    pub fn holds(&self, borne: f64) -> bool {
-        self.scale_error.abs() <= borne && self.worst_error.abs() - self.noise <= borne
+    pub fn holds(&self, tolerance: f64) -> bool {
+        self.scale_error.abs() <= tolerance && self.worst_error.abs() - self.noise <= tolerance
     }
 }
 
@@ -65,7 +65,7 @@ pub enum VerifyError {
     #[error("not all of the board is seen on the bed, as the calibration has it")]
     OffBed,
     /// Too small a part of a board with markers.
-    #[error("too little of the board shows: {:.0} % of a row or a column are needed", 100.0 * LEAST_PART)]
+    #[error("too little of the board shows: {:.0} % of a row or a column are needed", 100.0 * MIN_PART)]
     TooLittle,
     /// No pose.
     #[error("the corners fit no board before the calibration's camera")]
@@ -76,7 +76,7 @@ pub enum VerifyError {
 pub fn verify(
     calibration: &Calibration,
     board: &Board,
-    corners: &[Seen],
+    corners: &[CornerObservation],
     thickness: Mm,
 ) -> Result<Findings, VerifyError> {
     let Calibration::Full { camera, bed, .. } = calibration else {
@@ -86,7 +86,7 @@ pub fn verify(
     let on_bed = places(&map, corners).ok_or(VerifyError::OffBed)?;
     let (scale, rms_mm) = similarity(board, corners, &on_bed).ok_or(VerifyError::OffBed)?;
     let (height_mm, tilt_deg, reprojection_rms_px) =
-        lies(camera, bed, board, corners, thickness).ok_or(VerifyError::NoPose)?;
+        board_pose(camera, bed, board, corners, thickness).ok_or(VerifyError::NoPose)?;
     let (worst_error, noise, worst_at) =
         worst(board, corners, &on_bed, reprojection_rms_px).ok_or(VerifyError::TooLittle)?;
     Ok(Findings {
@@ -102,7 +102,7 @@ pub fn verify(
     })
 }
 
-fn places(map: &SurfaceMap, corners: &[Seen]) -> Option<Vec<Point2<f64>>> {
+fn places(map: &SurfaceMap, corners: &[CornerObservation]) -> Option<Vec<Point2<f64>>> {
     corners.iter().map(|corner| map.to_mm(corner.px)).collect()
 }
 
@@ -110,9 +110,16 @@ fn places(map: &SurfaceMap, corners: &[Seen]) -> Option<Vec<Point2<f64>>> {
 /// measured, by least squares; mirrored, because the bed's y and the board's run
 /// against each other.
 #[expect(clippy::cast_precision_loss, reason = "a count of corners")]
-fn similarity(board: &Board, corners: &[Seen], on_bed: &[Point2<f64>]) -> Option<(f64, f64)> {
-    let flat: Vec<Vector2<f64>> =
-        board.place(corners).iter().map(|c| Vector2::new(c.on_board.x, -c.on_board.y)).collect();
+fn similarity(
+    board: &Board,
+    corners: &[CornerObservation],
+    on_bed: &[Point2<f64>],
+) -> Option<(f64, f64)> {
+    let flat: Vec<Vector2<f64>> = board
+        .correspondences(corners)
+        .iter()
+        .map(|c| Vector2::new(c.on_board.x, -c.on_board.y))
+        .collect();
     let count = flat.len() as f64;
     let middle =
         |points: &mut dyn Iterator<Item = Vector2<f64>>| points.sum::<Vector2<f64>>() / count;
@@ -146,7 +153,7 @@ fn similarity(board: &Board, corners: &[Seen], on_bed: &[Point2<f64>]) -> Option
 #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
 fn worst(
     board: &Board,
-    corners: &[Seen],
+    corners: &[CornerObservation],
     on_bed: &[Point2<f64>],
     rms_px: f64,
 ) -> Option<(f64, f64, (f64, f64, f64))> {
@@ -163,13 +170,13 @@ fn worst(
             } else {
                 continue;
             };
-            if (along as f64) < LEAST_PART * (total - 1) as f64 {
+            if (along as f64) < MIN_PART * (total - 1) as f64 {
                 continue;
             }
             let true_mm = along as f64 * board.square().get();
             let error = (on_bed[j] - on_bed[i]).norm() / true_mm - 1.0;
             // Two ends, each off by 1/√2 of the RMS along the way between them.
-            let noise = NOISE * rms_px / (b.px - a.px).norm();
+            let noise = NOISE_SIGMAS * rms_px / (b.px - a.px).norm();
             if worst.is_none_or(|(most, of_it, _)| error.abs() - noise > most.abs() - of_it) {
                 let middle = |a: usize, b: usize| 0.5 * (a + b) as f64;
                 let place = (middle(column, other_column), middle(row, other_row), true_mm);
@@ -182,17 +189,18 @@ fn worst(
 
 /// Height of the board above its place \[mm\], its tilt \[degrees\], and what the best
 /// pose leaves \[px\].
-fn lies(
+fn board_pose(
     camera: &Camera,
     bed: &Pose,
     board: &Board,
-    corners: &[Seen],
+    corners: &[CornerObservation],
     thickness: Mm,
 ) -> Option<(f64, f64, f64)> {
-    let model = Model { camera: *camera, bend_mm: [0.0; 2] };
-    let placed = board.place(corners);
+    let model = CameraModel { camera: *camera, bend_mm: [0.0; 2] };
+    let placed = board.correspondences(corners);
     let pose = solve::pose(&model, &placed)?;
-    let squares = model.squares_px2(&super::equations::Place::of_one(pose), &[placed])?;
+    let squares =
+        model.sum_of_squares_px2(&super::equations::BoardPlacement::of_one(pose), &[placed])?;
     let seen = bed_from_board(&pose, Mm::ZERO);
     let middle = board.corners_mm().last()?.coords / 2.0;
     let at = bed.apply_inverse(pose.apply(middle.into()));
@@ -226,7 +234,7 @@ mod tests {
     }
 
     /// The board on the bed, turned and shifted in its plane and so much higher.
-    fn seen(higher_mm: f64) -> Vec<Seen> {
+    fn seen(higher_mm: f64) -> Vec<CornerObservation> {
         let up = bed_from_board(&pose(), Mm::ZERO).rotation() * Vector3::z();
         let turn = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 0.2);
         let moved = Pose::from_parts(

@@ -4,18 +4,18 @@ use crate::core::time::Span;
 use crate::core::units::{Mm, MmPerS, MmPerS2, WidthRange};
 use crate::document::Table;
 use crate::vision::Gauge;
-use crate::width_control::limiter::Limits;
+use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::pi::PiGains;
-use crate::width_control::settings::Control;
+use crate::width_control::settings::WidthControlSettings;
 use crate::width_control::strategy::STRATEGIES;
-use crate::width_control::target::{Knot, Layers, Target};
+use crate::width_control::target::{Knot, Layers, WidthTarget};
 
 /// Fastest that any robot of this kind moves, as a bound on typing errors.
-const ANY_SPEED: std::ops::RangeInclusive<f64> = 0.0..=10_000.0;
+const SPEED_RANGE: std::ops::RangeInclusive<f64> = 0.0..=10_000.0;
 
 /// Keys of the PI law's gains, and what they may be.
-const GAINS: [&str; 2] = ["kp_per_s", "ki_per_s2"];
-const ANY_GAIN: std::ops::RangeInclusive<f64> = 0.0..=1e4;
+const GAIN_KEYS: [&str; 2] = ["kp_per_s", "ki_per_s2"];
+const GAIN_RANGE: std::ops::RangeInclusive<f64> = 0.0..=1e4;
 
 /// `target_width_mm`, which stands alone in a cell that only measures.
 pub fn read_target(control: &Table<'_>) -> Option<Mm> {
@@ -24,30 +24,33 @@ pub fn read_target(control: &Table<'_>) -> Option<Mm> {
 
 /// The rest of `[control]`. There are no defaults for gains, nor for the
 /// exponent.
-pub fn read_control(control: &Table<'_>, target: Option<Target>) -> Option<Control> {
+pub fn read_control(
+    control: &Table<'_>,
+    target: Option<WidthTarget>,
+) -> Option<WidthControlSettings> {
     let names = STRATEGIES.map(|strategy| (strategy.name, strategy));
     let strategy = control.required_choice("law", &names);
     let gains = read_gains(control);
     // PI control that is but fallen back to, or not used, may be without gains.
-    let spared = strategy.is_some_and(|strategy| !strategy.needs_gains)
-        && !GAINS.iter().any(|key| control.has(key));
-    if !spared {
-        for key in GAINS.iter().filter(|key| !control.has(key)) {
-            control.absent(key, "a number; there are no defaults for gains");
+    let gains_optional = strategy.is_some_and(|strategy| !strategy.needs_gains)
+        && !GAIN_KEYS.iter().any(|key| control.has(key));
+    if !gains_optional {
+        for key in GAIN_KEYS.iter().filter(|key| !control.has(key)) {
+            control.report_absent(key, "a number; there are no defaults for gains");
         }
     }
     let strategy = if let Some(strategy) = strategy {
         (strategy.read)(control)
     } else {
-        control.pass_over();
+        control.allow_unknown_keys();
         None
     };
     let max_gap = control.number("max_gap_s", 0.01..=60.0);
     let max_hold = control.number("max_hold_s", 0.1..=3600.0);
-    Some(Control {
+    Some(WidthControlSettings {
         target: target?,
         strategy: strategy?,
-        gains: if spared { None } else { Some(gains?) },
+        gains: if gains_optional { None } else { Some(gains?) },
         max_gap: Span::from_secs(max_gap?),
         max_hold: Span::from_secs(max_hold?),
     })
@@ -57,7 +60,7 @@ pub fn read_control(control: &Table<'_>, target: Option<Target>) -> Option<Contr
 fn read_gains(control: &Table<'_>) -> Option<PiGains> {
     // The 2022 paper counts the error in pixels; its gains are of that unit.
     let unit = control.number_or("error_unit_mm", 1e-4..=1e3, 1.0)?;
-    let [kp, ki] = GAINS.map(|key| control.optional_number(key, ANY_GAIN));
+    let [kp, ki] = GAIN_KEYS.map(|key| control.optional_number(key, GAIN_RANGE));
     Some(PiGains { kp_per_s: kp? / unit, ki_per_s2: ki? / unit })
 }
 
@@ -66,7 +69,7 @@ fn read_gains(control: &Table<'_>) -> Option<PiGains> {
 pub fn check_target(
     control: &Table<'_>,
     layers: Option<&Table<'_>>,
-    target: &Target,
+    target: &WidthTarget,
     gauge: &Gauge,
 ) {
     let WidthRange { min: low, max: high } = gauge.width_range;
@@ -88,14 +91,14 @@ pub fn check_target(
 }
 
 /// The width that is asked for, with its course along the path and by layer.
-pub fn read_course(
+pub fn read_target_profile(
     control: &Table<'_>,
     layers: Option<&Table<'_>>,
     width: Option<Mm>,
-) -> Option<Target> {
-    let along = read_along(control);
+) -> Option<WidthTarget> {
+    let along = read_path_profile(control);
     let layers = layers.map(read_layers);
-    let mut target = Target::constant(width?).along(along?);
+    let mut target = WidthTarget::constant(width?).along(along?);
     if let Some(layers) = layers {
         target = target.by_layer(layers?);
     }
@@ -103,19 +106,24 @@ pub fn read_course(
 }
 
 /// `path_mm` and `path_width_mm`, which belong together.
-fn read_along(control: &Table<'_>) -> Option<Vec<Knot>> {
+fn read_path_profile(control: &Table<'_>) -> Option<Vec<Knot>> {
     if !control.has("path_mm") && !control.has("path_width_mm") {
         return Some(Vec::new());
     }
-    let places = control.list("path_mm", 0.0..=1e7);
+    let positions = control.list("path_mm", 0.0..=1e7);
     let widths = control.list("path_width_mm", 0.1..=1000.0);
-    let (places, widths) = (places?, widths?);
-    if places.len() != widths.len() {
+    let (positions, widths) = (positions?, widths?);
+    if positions.len() != widths.len() {
         let found = format!("{} numbers", widths.len());
-        control.report("path_width_mm", found, format!("{}, one for each path_mm", places.len()));
+        control.report(
+            "path_width_mm",
+            found,
+            format!("{}, one for each path_mm", positions.len()),
+        );
         return None;
     }
-    let falls = places.iter().zip(places.iter().skip(1)).find(|(before, after)| after < before);
+    let falls =
+        positions.iter().zip(positions.iter().skip(1)).find(|(before, after)| after < before);
     if let Some((before, after)) = falls {
         let found = format!("{after} after {before}");
         control.report("path_mm", found, "places in the order of the path; twice one is a step");
@@ -124,7 +132,7 @@ fn read_along(control: &Table<'_>) -> Option<Vec<Knot>> {
     let knot = |(path, width): (f64, f64)| {
         Some(Knot { path: Mm::new(path).ok()?, width: Mm::new(width).ok()? })
     };
-    places.into_iter().zip(widths).map(knot).collect()
+    positions.into_iter().zip(widths).map(knot).collect()
 }
 
 /// `[layers]`.
@@ -138,9 +146,9 @@ fn read_layers(table: &Table<'_>) -> Option<Layers> {
 }
 
 /// `[limits]`. There are no defaults for safety.
-pub fn read_limits(limits: &Table<'_>) -> Option<Limits> {
-    let min = limits.number("min_speed_mm_per_s", ANY_SPEED);
-    let max = limits.number("max_speed_mm_per_s", ANY_SPEED);
+pub fn read_limits(limits: &Table<'_>) -> Option<SpeedLimits> {
+    let min = limits.number("min_speed_mm_per_s", SPEED_RANGE);
+    let max = limits.number("max_speed_mm_per_s", SPEED_RANGE);
     let accel = limits.number("max_accel_mm_per_s2", 1e-3..=1e6);
     let (min, max) = (min?, max?);
     if min >= max {
@@ -151,7 +159,7 @@ pub fn read_limits(limits: &Table<'_>) -> Option<Limits> {
         );
         return None;
     }
-    Some(Limits {
+    Some(SpeedLimits {
         min_speed: MmPerS::new(min).ok()?,
         max_speed: MmPerS::new(max).ok()?,
         max_accel: MmPerS2::new(accel?).ok()?,

@@ -13,7 +13,7 @@ const HOLD_TIME: Span = Span::from_millis(1000);
 impl Cell {
     /// What the controller has to know, with the calibration that says how long
     /// the gauge is.
-    pub fn controller(&self, run: &RunPart, calibration: &Calibration) -> Setup {
+    pub fn controller_setup(&self, run: &RunPart, calibration: &Calibration) -> Setup {
         Setup {
             control: run.control.clone(),
             limits: run.limits,
@@ -32,6 +32,6 @@ impl Cell {
     /// The course of steps that the cell asks for.
     pub fn steps(&self, run: &RunPart, calibration: &Calibration) -> Option<StepSettings> {
         let strategy = run.control.strategy.as_kind::<StepsStrategy>()?;
-        Some(strategy.settings(&self.controller(run, calibration).facts()))
+        Some(strategy.settings(&self.controller_setup(run, calibration).facts()))
     }
 }

@@ -16,31 +16,32 @@ mod strategy;
 use std::path::{Path, PathBuf};
 
 pub use adaptive::AdaptiveSettings;
-pub use context::Rates;
+pub use context::ExtruderRates;
 pub use link::ExtruderLink;
-pub use part::{BeadStart, Beside, ExtruderPart};
+pub use part::{BeadStart, CellContext, ExtruderPart};
 pub use plant::{
-    ExtruderPlant, GainWave, InputLoad, LinearPlant, MeltPlant, PlantKind, PressurePlant,
+    ExtruderPlant, GainRipple, InputLoad, LinearPlant, MeltPlant, PlantKind, PressurePlant,
     ScrewPlant,
 };
 pub use strategy::{FeedforwardKeys, ModelSource, Strategy};
 
 use command::read_limits;
-use context::{About, read_rates};
+use context::{ReadContext, read_rates};
 
 use crate::core::time::Span;
 use crate::core::units::{MPa, Mm, MmPerS};
 use crate::document::Table;
 use crate::extruder::demand::section;
 use crate::extruder::{
-    CommandLimits, Drive, ExtruderSetup, FlowDemand, Follows, Law, ReadingFilters, RobotFollows,
+    CommandLimits, CommandQuantity, ExtruderSetup, ExtruderStrategy, FlowDemand, FlowFollows,
+    ReadingFilters, RobotFollows,
 };
 
 /// The extruder side of a cell.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Extruder {
+pub struct ExtruderSettings {
     /// What is commanded.
-    pub drive: Drive,
+    pub drive: CommandQuantity,
     /// What commands may be.
     pub limits: CommandLimits,
     /// How commands are found.
@@ -48,11 +49,11 @@ pub struct Extruder {
     /// Height of a layer.
     pub layer_height: Mm,
     /// What the flow goes by.
-    pub follows: Follows,
+    pub follows: FlowFollows,
     /// What the robot's speed goes by besides the width.
     pub robot_follows: RobotFollows,
     /// How often what is done.
-    pub rates: Rates,
+    pub rates: ExtruderRates,
     /// Longest time without a report over which the strategy goes on.
     pub max_gap: Span,
     /// Longest hold, and longest start, before the pump is stopped.
@@ -69,18 +70,18 @@ pub struct Extruder {
     pub link: Option<ExtruderLink>,
 }
 
-impl Extruder {
+impl ExtruderSettings {
     /// Reads `[extruder]`.
     pub fn read(table: &Table<'_>, folder: &Path) -> Option<Self> {
-        let drive = table.required_choice("command", &Drive::WORDS);
+        let drive = table.required_choice("command", &CommandQuantity::WORDS);
         let rates = read_rates(table);
         if drive.is_none() || rates.is_none() {
-            table.pass_over();
+            table.allow_unknown_keys();
         }
         let limits = drive.and_then(|drive| read_limits(table, drive));
         let strategy = drive.zip(rates).and_then(|(drive, rates)| {
-            let about = About { folder, drive, limits, rates };
-            Strategy::read(table, &about)
+            let context = ReadContext { folder, drive, limits, rates };
+            Strategy::read(table, &context)
         });
         let height = table.number("layer_height_mm", 1e-3..=1e4);
         let robot_follows = table.choice(
@@ -98,9 +99,9 @@ impl Extruder {
         if let Some((gap, rates)) = max_gap.zip(rates)
             && gap * rates.io_hz < 1.5
         {
-            let least =
+            let min_gap =
                 format!("at least {:.3}, one and a half periods of io_rate_hz", 1.5 / rates.io_hz);
-            table.report("max_gap_s", gap.to_string(), least);
+            table.report("max_gap_s", gap.to_string(), min_gap);
         }
         let max_hold = table.number("max_hold_s", 0.1..=3600.0);
         if let Some((gap, hold)) = max_gap.zip(max_hold)
@@ -118,9 +119,7 @@ impl Extruder {
             let expected = "strategy = \"feedforward\", with the model that was planned with";
             table.report("plan", "the plan of a job", expected);
         }
-        if starts.is_some()
-            && strategy.as_ref().is_some_and(|known| !known.stands_while_the_flow_comes())
-        {
+        if starts.is_some() && strategy.as_ref().is_some_and(|known| !known.holds_during_start()) {
             let expected = "strategy = \"constant\" or \"feedforward\": while the flow of a start \
                             comes the strategy stands at its first command";
             table.report("starts", "how the extruder starts and stops", expected);
@@ -158,11 +157,11 @@ impl Extruder {
 
     /// What the extruder side of a controller has to know, with the law that
     /// the strategy came to; without what other files tell of starts and of a job.
-    pub fn setup(&self, law: Law) -> ExtruderSetup {
+    pub fn setup(&self, strategy: ExtruderStrategy) -> ExtruderSetup {
         let period = |hz: f64| Span::from_secs(1.0 / hz);
         ExtruderSetup {
-            drive: self.drive,
-            law,
+            quantity: self.drive,
+            strategy,
             limits: self.limits,
             feedforward_period: period(self.rates.feedforward_hz),
             control_period: period(self.rates.control_hz),
@@ -180,16 +179,16 @@ impl Extruder {
 
 /// A flow that follows the robot, and a robot that follows the flow, would lead
 /// each other to a stand.
-fn read_follows(table: &Table<'_>, robot_follows: Option<RobotFollows>) -> Option<Follows> {
-    let words = [("robot", Follows::Robot), ("start_speed", Follows::StartSpeed)];
+fn read_follows(table: &Table<'_>, robot_follows: Option<RobotFollows>) -> Option<FlowFollows> {
+    let words = [("robot", FlowFollows::Robot), ("start_speed", FlowFollows::StartSpeed)];
     if robot_follows != Some(RobotFollows::Flow) {
         return table.choice("follows", &words);
     }
     if !table.has("follows") {
-        return Some(Follows::StartSpeed);
+        return Some(FlowFollows::StartSpeed);
     }
     let follows = table.choice("follows", &words);
-    if follows == Some(Follows::Robot) {
+    if follows == Some(FlowFollows::Robot) {
         let expected = "\"start_speed\": with robot_follows = \"flow\" the robot goes by the flow";
         table.report("follows", "\"robot\"", expected);
     }

@@ -10,24 +10,24 @@ mod robot;
 use std::path::Path;
 
 use super::control;
-use super::extruder::{BeadStart, Beside};
+use super::extruder::{BeadStart, CellContext};
 use crate::calibration::{Calibration, SurfaceMap};
 use crate::core::frame::Channel;
 use crate::core::units::Mm;
 use crate::document::Problems;
 use crate::document::{Document, Table};
 use crate::scenario::table;
-use crate::scenario::table::{Level, Simulation};
+use crate::scenario::table::{Simulation, WidthSource};
 use crate::vision::Gauge;
-use crate::width_control::limiter::Limits;
-use crate::width_control::settings::Control;
-use crate::width_control::target::Target;
+use crate::width_control::limiter::SpeedLimits;
+use crate::width_control::settings::WidthControlSettings;
+use crate::width_control::target::WidthTarget;
 
 pub use super::extruder::ExtruderPart;
 
 pub use calibration::CalibrationSource;
-pub use camera::{Camera, Mount, Source};
-pub use robot::Robot;
+pub use camera::{CameraSettings, ImageSource, Mount};
+pub use robot::RobotSettings;
 
 use calibration::read_calibration;
 use camera::{read_camera, read_mount};
@@ -60,13 +60,13 @@ pub struct Cell {
     /// Upper end of the camera's scale where it is not that of the pixels.
     pub white: Option<u16>,
     /// Width that is asked for, if the file says so.
-    pub target: Option<Target>,
+    pub target: Option<WidthTarget>,
     /// How often frames are wanted \[Hz\], if the file says so.
     pub frame_rate_hz: Option<f64>,
     /// How the camera rides, if the file says so.
     pub mount: Option<Mount>,
     /// What is kept, and how many refused frames are bearable.
-    pub recording: Recording,
+    pub recording: RecordingSettings,
     /// What a run needs beyond measuring; complete when read for a run.
     pub run: Option<RunPart>,
     /// The simulated bead, its rendering and its world.
@@ -77,13 +77,13 @@ pub struct Cell {
 #[derive(Debug, Clone)]
 pub struct RunPart {
     /// The width controller.
-    pub control: Control,
+    pub control: WidthControlSettings,
     /// What setpoints may be.
-    pub limits: Limits,
+    pub limits: SpeedLimits,
     /// The camera.
-    pub camera: Camera,
+    pub camera: CameraSettings,
     /// The robot.
-    pub robot: Robot,
+    pub robot: RobotSettings,
     /// The extruder, where it is commanded.
     pub extruder: Option<ExtruderPart>,
 }
@@ -99,7 +99,7 @@ pub enum KeepFrames {
 
 /// `[recording]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Recording {
+pub struct RecordingSettings {
     /// Which frames are kept.
     pub frames: KeepFrames,
     /// Share of refused and unreadable frames above which a command ends with
@@ -133,14 +133,14 @@ impl Cell {
     /// How much higher than that of the first layer the surface is at a robot's
     /// z, where the cell has layers: as much as the nozzle.
     pub fn rise(&self, robot_z: Option<Mm>) -> Mm {
-        let layers = self.target.as_ref().and_then(Target::layers);
+        let layers = self.target.as_ref().and_then(WidthTarget::layers);
         layers.zip(robot_z).map_or(Mm::ZERO, |(layers, z)| z - layers.first_z)
     }
 
     /// Whether widths are simulated without pictures.
     pub fn simulates_widths(&self) -> bool {
-        self.run.as_ref().is_some_and(|run| run.camera.source == Source::Rendered)
-            && self.simulation.level == Level::Widths
+        self.run.as_ref().is_some_and(|run| run.camera.source == ImageSource::Rendered)
+            && self.simulation.width_source == WidthSource::Widths
     }
 
     /// Length of bead that one width is the mean of.
@@ -167,8 +167,9 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let control_table = root.run_table("control");
     let width = control_table.as_ref().and_then(control::read_target);
     let layers = root.table("layers");
-    let target =
-        control_table.as_ref().and_then(|t| control::read_course(t, layers.as_ref(), width));
+    let target = control_table
+        .as_ref()
+        .and_then(|t| control::read_target_profile(t, layers.as_ref(), width));
     if let (Some(table), Some(target), Some(gauge)) = (&control_table, &target, &gauge) {
         control::check_target(table, layers.as_ref(), target, gauge);
     }
@@ -187,12 +188,12 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let simulation = table::read(root);
     let speed = robot.as_ref().map(|robot| robot.start_speed);
     let bead = width.zip(speed).map(|(width, speed)| BeadStart { width, speed });
-    let beside = Beside {
+    let context = CellContext {
         bead,
         robot_address: robot.as_ref().map(|robot| robot.address.as_str()),
         simulation: simulation.as_ref(),
     };
-    let extruder = ExtruderPart::read(root, folder, &beside);
+    let extruder = ExtruderPart::read(root, folder, &context);
     let run = match (control, limits, camera, robot) {
         (Some(control), Some(limits), Some(camera), Some(robot)) => {
             Some(RunPart { control, limits, camera, robot, extruder })
@@ -215,15 +216,15 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     })
 }
 
-fn read_recording(table: Option<&Table<'_>>) -> Option<Recording> {
+fn read_recording(table: Option<&Table<'_>>) -> Option<RecordingSettings> {
     let Some(table) = table else {
-        return Some(Recording { frames: KeepFrames::Every(1), max_rejected_share: 0.05 });
+        return Some(RecordingSettings { frames: KeepFrames::Every(1), max_rejected_share: 0.05 });
     };
     let every = table.integer_or("every_nth_frame", 0..=1_000_000, 1);
-    let share = table.number_or("max_rejected_share", 0.0..=1.0, 0.05);
+    let rejected_share = table.number_or("max_rejected_share", 0.0..=1.0, 0.05);
     let frames = match every? {
         0 => KeepFrames::None,
         n => KeepFrames::Every(n),
     };
-    Some(Recording { frames, max_rejected_share: share? })
+    Some(RecordingSettings { frames, max_rejected_share: rejected_share? })
 }

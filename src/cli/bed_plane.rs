@@ -6,15 +6,15 @@ use std::path::Path;
 use anyhow::{Context, bail};
 use nalgebra::{Point3, Vector3};
 
-use super::board_image::{check_size, look_at};
-use crate::calibration::board::{Board, Seen};
-use crate::calibration::equations::{Corner, Model};
+use super::board_image::{check_size, find_board};
+use crate::calibration::board::{Board, CornerObservation};
+use crate::calibration::equations::{CameraModel, Correspondence};
 use crate::calibration::plane::OnBed;
-use crate::calibration::sighting::is_same_place;
+use crate::calibration::sighting::is_same_position;
 use crate::core::units::Mm;
 
 /// The bed plane and where it comes from.
-pub struct Plane {
+pub struct BedPlane {
     /// The images whose boards lay on the bed.
     pub images: Vec<String>,
     /// Whether nobody has named them.
@@ -29,7 +29,7 @@ pub struct Plane {
     pub robot_z: Mm,
 }
 
-impl Plane {
+impl BedPlane {
     /// Where the bed is, and what was assumed about it.
     pub fn text(&self) -> String {
         let mut out = String::new();
@@ -76,28 +76,29 @@ impl Plane {
 }
 
 /// Boards of one kind that are said to lie on the bed, each with its image.
-pub struct Boards<'a> {
+pub struct BoardsOnBed<'a> {
     board: &'a Board,
-    seen: Vec<(String, Vec<Seen>)>,
+    corners: Vec<(String, Vec<CornerObservation>)>,
 }
 
-impl<'a> Boards<'a> {
+impl<'a> BoardsOnBed<'a> {
     /// None yet.
     pub fn of(board: &'a Board) -> Self {
-        Self { board, seen: Vec::new() }
+        Self { board, corners: Vec::new() }
     }
 
     /// Fails for one that is where another is.
-    pub fn add(&mut self, image: String, corners: Vec<Seen>) -> anyhow::Result<()> {
-        let is_twin =
-            |(_, other): &&(String, Vec<Seen>)| is_same_place(self.board, other, &corners);
-        if let Some((twin, _)) = self.seen.iter().find(is_twin) {
+    pub fn add(&mut self, image: String, corners: Vec<CornerObservation>) -> anyhow::Result<()> {
+        let is_twin = |(_, other): &&(String, Vec<CornerObservation>)| {
+            is_same_position(self.board, other, &corners)
+        };
+        if let Some((twin, _)) = self.corners.iter().find(is_twin) {
             bail!(
                 "--plane {image}: the board is where it is in {twin}, which says nothing new; leave \
                  one of them out, or move the board on the bed"
             );
         }
-        self.seen.push((image, corners));
+        self.corners.push((image, corners));
         Ok(())
     }
 
@@ -105,12 +106,15 @@ impl<'a> Boards<'a> {
     /// further off it than `most_px` (RMS); `other` says what they are held against.
     pub fn fit(
         self,
-        model: &Model,
+        model: &CameraModel,
         most_px: f64,
         other: &str,
     ) -> anyhow::Result<(Vec<String>, OnBed)> {
-        let placed = self.seen.into_iter().map(|(image, seen)| (image, self.board.place(&seen)));
-        let (images, boards): (Vec<String>, Vec<Vec<Corner>>) = placed.unzip();
+        let placed = self
+            .corners
+            .into_iter()
+            .map(|(image, seen)| (image, self.board.correspondences(&seen)));
+        let (images, boards): (Vec<String>, Vec<Vec<Correspondence>>) = placed.unzip();
         let names = images.join(", ");
         let on_bed = OnBed::fit(model, boards)
             .with_context(|| format!("the corners in {names} fit no plane"))?;
@@ -136,13 +140,13 @@ impl<'a> Boards<'a> {
 
 /// The board's corners in an image that took no part in finding the camera, which must
 /// be of the size \[px\] that the camera is for.
-pub fn looked_for(
+pub fn find_corners(
     path: &Path,
     board: &Board,
     image_size_px: [u32; 2],
-) -> anyhow::Result<(String, Vec<Seen>)> {
+) -> anyhow::Result<(String, Vec<CornerObservation>)> {
     let name = path.display().to_string();
-    let sighting = look_at(board, &name, path)
+    let sighting = find_board(board, &name, path)
         .with_context(|| format!("--plane {name} does not show the bed plane"))?;
     check_size(&sighting, image_size_px)?;
     Ok((name, sighting.corners))

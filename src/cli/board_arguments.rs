@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::arguments::{WrongArguments, parse_length};
-use crate::calibration::board::{Board, Marks};
+use crate::calibration::board::{Board, Markers};
 use crate::calibration::dictionary::Dictionary;
 use crate::core::units::Mm;
 
@@ -41,7 +41,7 @@ pub struct BoardArgs {
 impl BoardArgs {
     /// Fails for a board that cannot be used.
     pub fn board(&self) -> Result<Board, WrongArguments> {
-        let marks = self.marker_mm.map(|side| Marks { side, dictionary: self.dictionary });
+        let marks = self.marker_mm.map(|side| Markers { side, dictionary: self.dictionary });
         board_of(self.board, self.square_mm, marks)
     }
 }
@@ -51,7 +51,7 @@ impl BoardArgs {
 pub fn board_of(
     corners: InnerCorners,
     square: Mm,
-    marks: Option<Marks>,
+    marks: Option<Markers>,
 ) -> Result<Board, WrongArguments> {
     let plain = Board::new(corners.columns, corners.rows, square).map_err(WrongArguments::new)?;
     let Some(marks) = marks else { return Ok(plain) };

@@ -3,22 +3,26 @@
 use std::path::Path;
 
 use crate::calibration::board::Board;
-use crate::calibration::refusal::Refusal;
+use crate::calibration::refusal::BoardRejection;
 use crate::calibration::sighting;
-use crate::calibration::sighting::Sighting;
+use crate::calibration::sighting::BoardObservation;
 use crate::core::frame::Channel;
 use crate::core::time::Stamp;
 use crate::io::image_file;
 
 /// Looks for the board in an image file.
-pub fn look_at(board: &Board, name: &str, path: &Path) -> Result<Sighting, Refusal> {
+pub fn find_board(
+    board: &Board,
+    name: &str,
+    path: &Path,
+) -> Result<BoardObservation, BoardRejection> {
     let frame = image_file::read(path, Channel::Grey, 0, Stamp::START)
-        .map_err(|error| Refusal::Unreadable(error.to_string()))?;
-    sighting::look(board, name, &frame)
+        .map_err(|error| BoardRejection::Unreadable(error.to_string()))?;
+    sighting::observe(board, name, &frame)
 }
 
 /// Fails for a picture that is not of the size that a calibration is for.
-pub fn check_size(sighting: &Sighting, expected: [u32; 2]) -> anyhow::Result<()> {
+pub fn check_size(sighting: &BoardObservation, expected: [u32; 2]) -> anyhow::Result<()> {
     let ([width, height], [right, bottom]) = (sighting.image_size_px, expected);
     anyhow::ensure!(
         sighting.image_size_px == expected,

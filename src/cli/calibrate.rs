@@ -11,22 +11,22 @@ use std::path::Path;
 use std::process::ExitCode;
 
 pub use self::arguments::CalibrateArgs;
-use self::conclusion::Conclusion;
-use self::pictures::{Pictures, look_at_all};
+use self::conclusion::CalibrationResult;
+use self::pictures::{CalibrationImages, find_boards};
 use super::arguments::{WrongArguments, check_writable};
 use super::print::print;
 use crate::calibration::board::Board;
 use crate::calibration::sighting;
 use crate::core::units::Mm;
 use crate::drivers::camera::folder::list_images;
-use crate::io::whole_file::write_whole;
+use crate::io::whole_file::write_atomic;
 
 /// Runs the command; the table and the figures go to standard output. Fails
 /// without writing anything where no calibration can be found.
 pub fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     let board = args.board.board()?;
     check_arguments(args)?;
-    if let (Some(_), Some(folder)) = (&args.input, &args.pictures) {
+    if let (Some(_), Some(folder)) = (&args.input, &args.images) {
         let what = format!("--pictures {}: only with --camera", folder.display());
         return Err(WrongArguments::new(what).into());
     }
@@ -34,27 +34,31 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
         Some(folder) => look_into(args, &board, folder)?,
         None => live::take(args, &board)?,
     };
-    let conclusion = Conclusion::of(args, &board, &pictures)
-        .inspect_err(|_| print(&report::refusals(&pictures.looks)))?;
-    print(&report::images(&pictures.looks, &conclusion.solution));
+    let conclusion = CalibrationResult::of(args, &board, &pictures)
+        .inspect_err(|_| print(&report::refusals(&pictures.found)))?;
+    print(&report::images(&pictures.found, &conclusion.solution));
     let calibration = conclusion.write()?;
     let answer = conclusion.text(&calibration);
     print(&answer);
     print(&format!("\nwrote {}\n", args.out.display()));
     let report = args.report();
-    write_whole(&report, conclusion.page(&answer, None).as_bytes())?;
+    write_atomic(&report, conclusion.page(&answer, None).as_bytes())?;
     print(&format!("wrote {}\n", report.display()));
     Ok(if conclusion.fails() { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-fn look_into(args: &CalibrateArgs, board: &Board, folder: &Path) -> anyhow::Result<Pictures> {
+fn look_into(
+    args: &CalibrateArgs,
+    board: &Board,
+    folder: &Path,
+) -> anyhow::Result<CalibrationImages> {
     let files = list_images(folder)
         .map_err(|error| WrongArguments::new(format!("{}: {}", error.source_name, error.what)))?;
     plane::check(&args.plane, &files)?;
-    let mut looks = look_at_all(board, &files);
-    sighting::agree_on_size(&mut looks);
-    sighting::take_out_duplicates(board, &mut looks);
-    Ok(Pictures { files, looks, on_bed: args.plane.clone() })
+    let mut looks = find_boards(board, &files);
+    sighting::reject_other_sizes(&mut looks);
+    sighting::reject_duplicates(board, &mut looks);
+    Ok(CalibrationImages { files, found: looks, on_bed: args.plane.clone() })
 }
 
 fn check_arguments(args: &CalibrateArgs) -> Result<(), WrongArguments> {

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 
 use clap::Subcommand;
 
-use super::print::Voice;
+use super::print::Verbosity;
 
 /// Boards to print, calibrations, and where the camera looks
 #[derive(Debug, Subcommand)]
@@ -21,7 +21,7 @@ pub enum CameraCommand {
 }
 
 /// Runs one of them.
-pub fn run(command: &CameraCommand, voice: Voice) -> anyhow::Result<ExitCode> {
+pub fn run(command: &CameraCommand, voice: Verbosity) -> anyhow::Result<ExitCode> {
     match command {
         CameraCommand::Board(args) => board::run(args).map(|()| ExitCode::SUCCESS),
         CameraCommand::Verify(args) => verify::run(args),

@@ -9,13 +9,13 @@ use crate::core::units::Mm;
 use crate::numeric::rank;
 
 /// Largest offset that is tried unless another is given.
-const FARTHEST: Mm = Mm::constant(1000.0);
+const MAX_OFFSET: Mm = Mm::constant(1000.0);
 /// Smallest range of offsets that is a range \[mm\].
 const SHORTEST_SEARCH_MM: f64 = 20.0;
 
 /// Largest distance that is tried, from what was asked for.
-pub fn farthest(max: Option<Mm>) -> Result<Mm, WrongArguments> {
-    let farthest = max.unwrap_or(FARTHEST);
+pub fn max_offset(max: Option<Mm>) -> Result<Mm, WrongArguments> {
+    let farthest = max.unwrap_or(MAX_OFFSET);
     if farthest.get() < SHORTEST_SEARCH_MM {
         let what = format!("--max-mm: found {farthest}, expected {SHORTEST_SEARCH_MM} mm or more");
         return Err(WrongArguments::new(what));

@@ -11,10 +11,10 @@ use nalgebra::Point3;
 use super::arguments::WrongArguments;
 use super::arguments::check_writable;
 use super::print::warn;
-use crate::assembly::{ExtruderSide, LoadedCell, beyond, steady};
+use crate::assembly::{ExtruderSide, LoadedCell, range_warning, steady_state};
 use crate::calibration::Calibration;
 use crate::cell::Cell;
-use crate::cell::file::{Purpose, RunPart, Source};
+use crate::cell::file::{ImageSource, Purpose, RunPart};
 use crate::core::geometry::Size;
 use crate::core::time::Span;
 use crate::core::units::Mm;
@@ -22,9 +22,9 @@ use crate::extruder::start_stop::Pause;
 use crate::width_control::strategy::distance::DistanceStrategy;
 
 /// Ratio of speeds in one cell that nobody means.
-const UNLIKELY: f64 = 200.0;
+const MAX_SPEED_RATIO: f64 = 200.0;
 /// Distance of the camera that nobody means.
-const UNLIKELY_NEAR: Mm = Mm::constant(0.5);
+const MIN_CAMERA_OFFSET: Mm = Mm::constant(0.5);
 
 /// Validates a cell file and all it refers to.
 #[derive(Debug, Args)]
@@ -63,7 +63,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     if let Some(side) = &side {
         warn(&side.warnings);
     }
-    run.as_ref().map_or(Ok(()), LoadedCell::check_sight)?;
+    run.as_ref().map_or(Ok(()), LoadedCell::check_camera_offset)?;
     check_gauge(&loaded)?;
     say!("{}: sound", args.cell.display());
     say!("  calibration  {}", loaded.calibration_words());
@@ -78,7 +78,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
             let Some(run) = &loaded.cell.run else { return Ok(ExitCode::SUCCESS) };
             about_purposes(run);
             about_run(run);
-            about_law(&loaded, run);
+            about_controller(&loaded, run);
             about_extruder(&loaded, side.as_ref())?;
         }
         Err(missing) => {
@@ -190,17 +190,17 @@ fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::R
         "  extruder     told {low} to {high} {unit}, {:.1} mm³/s wanted",
         part.demand.nominal().get()
     );
-    if let Some(steady) = side.map_or(Ok(None), |side| steady(part, side))? {
+    if let Some(steady) = side.map_or(Ok(None), |side| steady_state(part, side))? {
         let pressure = steady.pressure.map_or(String::new(), |pressure| {
             format!(" and {:.3} MPa at the nozzle", pressure.get())
         });
         say!("               which take {:.4} {unit}{pressure} for long", steady.command);
     }
     if let Some(side) = side {
-        about_ahead(side);
+        about_starts_and_plan(side);
     }
     if let Some(side) = side
-        && let Some(words) = beyond(part, side)?
+        && let Some(words) = range_warning(part, side)?
     {
         say!("  WARNING      {words}");
     }
@@ -218,16 +218,16 @@ fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::R
 }
 
 /// Tells of what is known ahead: starts, stops and the plan of a job.
-fn about_ahead(side: &ExtruderSide) {
+fn about_starts_and_plan(side: &ExtruderSide) {
     if let Some(timing) = &side.setup.timing {
-        let pause = Pause { idle: Span::from_secs(300.0), before: timing.laid().flow };
+        let pause = Pause { idle: Span::from_secs(300.0), flow_before: timing.conditions().flow };
         say!(
             "  starts       the flow comes {:.2} s after the command where the pump stood for 5 min;",
             timing.start(&pause).first_flow().secs()
         );
         say!(
             "               it stops {:.1} before a bead ends whose length is known",
-            timing.stop().way()
+            timing.stop().distance()
         );
     }
     if let Some(plan) = &side.setup.plan {
@@ -259,7 +259,7 @@ fn check_gauge(loaded: &LoadedCell) -> Result<(), WrongArguments> {
 }
 
 /// Tells what the width is held by, where it is not the PI law.
-fn about_law(loaded: &LoadedCell, run: &RunPart) {
+fn about_controller(loaded: &LoadedCell, run: &RunPart) {
     if let Some(steps) = loaded.cell.steps(run, &loaded.calibration) {
         let (slow, fast) = steps.speeds();
         say!(
@@ -269,9 +269,9 @@ fn about_law(loaded: &LoadedCell, run: &RunPart) {
             steps.length().get() / 1e3
         );
     }
-    let Some(told) = run.control.strategy.as_kind::<DistanceStrategy>() else { return };
-    let learnt = if told.learns_exponent { ", learnt as the bead is laid" } else { "" };
-    say!("  law          by distance, b = {}{learnt}", told.exponent);
+    let Some(given) = run.control.strategy.as_kind::<DistanceStrategy>() else { return };
+    let learnt = if given.learns_exponent { ", learnt as the bead is laid" } else { "" };
+    say!("  law          by distance, b = {}{learnt}", given.exponent);
     let gauge = loaded.cell.gauge_length(&loaded.calibration);
     say!(
         "               gauge {:.1} mm long, {:.1} ± {:.1} mm behind the nozzle",
@@ -286,7 +286,7 @@ fn about_law(loaded: &LoadedCell, run: &RunPart) {
 }
 
 fn about_run(run: &RunPart) {
-    if let Source::Path(path) = &run.camera.source
+    if let ImageSource::Path(path) = &run.camera.source
         && !path.exists()
     {
         say!("  WARNING      camera.source: {} is not there now", path.display());
@@ -298,10 +298,10 @@ fn about_run(run: &RunPart) {
         run.robot.start_speed
     );
     let (slowest, fastest) = (run.limits.min_speed, run.limits.max_speed);
-    if fastest > slowest * UNLIKELY {
+    if fastest > slowest * MAX_SPEED_RATIO {
         say!("  WARNING      [limits] go from {slowest} to {fastest}: are both mm/s?");
     }
-    if run.camera.offset < UNLIKELY_NEAR {
+    if run.camera.offset < MIN_CAMERA_OFFSET {
         say!("  WARNING      camera.offset_mm: {} is hardly a nozzle's width;", run.camera.offset);
         say!("               is it mm?");
     }

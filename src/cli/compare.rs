@@ -7,18 +7,18 @@ use anyhow::Context;
 use clap::Args;
 
 use super::arguments::WrongArguments;
-use super::print::Voice;
+use super::print::Verbosity;
 use crate::assembly::LoadedCell;
 use crate::cell::file::{Purpose, RunPart};
 use crate::core::units::Mm;
 use crate::core::units::WidthRange;
 use crate::io::progress::Progress;
-use crate::report::compare::Comparison;
+use crate::report::compare::ControllerComparison;
 use crate::rows::output;
 use crate::trials::compare::{Contender, Figures};
 
 /// Most controllers: as many as there are colours.
-const MOST: usize = 6;
+const MAX_CONTROLLERS: usize = 6;
 
 /// Lays the same simulated bead with several controllers and compares them.
 #[derive(Debug, Args)]
@@ -55,7 +55,7 @@ pub struct CompareArgs {
 }
 
 /// Runs the command.
-pub fn run(args: &CompareArgs, voice: Voice) -> anyhow::Result<ExitCode> {
+pub fn run(args: &CompareArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     let contenders = contenders(args)?;
     let widths = widths(args, &contenders)?;
     output::make_folder(&args.out)?;
@@ -74,7 +74,7 @@ pub fn run(args: &CompareArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     }
     progress.finish();
     let controllers = contenders.into_iter().map(|who| who.name).collect();
-    let comparison = Comparison { controllers, seeds: args.seeds, widths: compared };
+    let comparison = ControllerComparison { controllers, seeds: args.seeds, widths: compared };
     let json = serde_json::to_vec_pretty(&comparison.numbers()).context("compare.json")?;
     output::write_whole(&args.out, "compare.json", &json)?;
     output::write_whole(&args.out, "report.html", comparison.page().as_bytes())?;
@@ -84,8 +84,8 @@ pub fn run(args: &CompareArgs, voice: Voice) -> anyhow::Result<ExitCode> {
 
 /// The controllers on the plant of the first cell.
 fn contenders(args: &CompareArgs) -> anyhow::Result<Vec<Contender>> {
-    if args.scenarios.len() > MOST {
-        let what = format!("{} cells: {MOST} can be told apart", args.scenarios.len());
+    if args.scenarios.len() > MAX_CONTROLLERS {
+        let what = format!("{} cells: {MAX_CONTROLLERS} can be told apart", args.scenarios.len());
         return Err(WrongArguments::new(what).into());
     }
     let mut contenders: Vec<Contender> = Vec::new();

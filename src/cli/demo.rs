@@ -9,14 +9,14 @@ use clap::Args;
 
 use super::arguments::{free_folder, parse_seconds};
 use super::live_cell::drive;
-use super::print::Voice;
+use super::print::Verbosity;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::core::time::Span;
 use crate::core::units::{Mm, MmPerS};
 use crate::io::clock::RunClock;
-use crate::link::{Job, RobotParams};
-use crate::simulators::robot::{RobotSim, SimOptions};
+use crate::link::{PrintJob, RobotParams};
+use crate::simulators::robot::{RobotOptions, RobotSim};
 
 /// The cell, as it is shipped.
 const CELL: &str = include_str!("../../cells/demo.toml");
@@ -43,7 +43,7 @@ pub struct DemoArgs {
 }
 
 /// Runs the command.
-pub fn run(args: &DemoArgs, voice: Voice) -> anyhow::Result<ExitCode> {
+pub fn run(args: &DemoArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     let out = args.out.clone().unwrap_or_else(|| free_folder("truebead-demo"));
     let clock = RunClock::start();
     let listener = TcpListener::bind("127.0.0.1:0").context("cannot listen on this machine")?;
@@ -62,13 +62,13 @@ pub fn run(args: &DemoArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     status
 }
 
-fn robot_options() -> SimOptions {
+fn robot_options() -> RobotOptions {
     let params = RobotParams {
         min: MmPerS::constant(50.0),
         max: MmPerS::constant(160.0),
         hold: MmPerS::constant(80.0),
         ..RobotParams::default()
     };
-    let job = Job::new(1, Mm::ZERO, params.z, Span::from_millis(300));
-    SimOptions { params, job, state_period: Span::from_millis(20) }
+    let job = PrintJob::new(1, Mm::ZERO, params.z, Span::from_millis(300));
+    RobotOptions { params, job, state_period: Span::from_millis(20) }
 }

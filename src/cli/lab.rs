@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use clap::Subcommand;
 
-use super::print::Voice;
+use super::print::Verbosity;
 
 /// Experiments of papers, accuracy, and frames with their truth
 #[derive(Debug, Subcommand)]
@@ -19,7 +19,7 @@ pub enum LabCommand {
 }
 
 /// Runs one of them.
-pub fn run(command: &LabCommand, voice: Voice) -> anyhow::Result<ExitCode> {
+pub fn run(command: &LabCommand, voice: Verbosity) -> anyhow::Result<ExitCode> {
     match command {
         LabCommand::Reproduce(args) => reproduce::run(args, voice),
         LabCommand::Accuracy(args) => accuracy::run(args, voice),

@@ -7,8 +7,8 @@ use anyhow::Context;
 
 use super::arguments::{WrongArguments, refuse_a_recording_in};
 use super::outcome;
-use super::print::{Voice, warn};
-use crate::assembly::{LoadedCell, beyond};
+use super::print::{Verbosity, warn};
+use crate::assembly::{LoadedCell, range_warning};
 use crate::cell::file::RunPart;
 use crate::core::time::Span;
 use crate::io::clock::RunClock;
@@ -17,7 +17,7 @@ use crate::io::stop::StopSignal;
 use crate::live::{self, LiveExtruder, LiveReport, LiveRun};
 use crate::report::run::RunPage;
 use crate::rows::log::{ControlFacts, LogOptions};
-use crate::width_control::target::Target;
+use crate::width_control::target::WidthTarget;
 
 /// Runs a cell that has been loaded, into a folder, and tells how it went.
 pub fn drive(
@@ -26,7 +26,7 @@ pub fn drive(
     title: String,
     duration_s: Option<f64>,
     clock: RunClock,
-    voice: Voice,
+    voice: Verbosity,
 ) -> anyhow::Result<ExitCode> {
     let max_rejected_share = loaded.cell.recording.max_rejected_share;
     let until = Until { duration_s, ends_with_steps: false };
@@ -60,7 +60,7 @@ pub fn live(
     title: String,
     until: Until,
     clock: RunClock,
-    voice: Voice,
+    voice: Verbosity,
 ) -> anyhow::Result<LiveReport> {
     refuse_a_recording_in(folders.recording)?;
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
@@ -69,11 +69,11 @@ pub fn live(
     let log = RunPage::log(LogOptions {
         folder: folders.log.to_owned(),
         title,
-        about: about(&loaded, &run, extruder.as_ref()),
+        header: about(&loaded, &run, extruder.as_ref()),
         gauge: loaded.cell.gauge,
-        target: loaded.cell.target.as_ref().map(Target::nominal),
-        max_rejected_share: loaded.cell.recording.max_rejected_share,
-        control: Some(ControlFacts::of(&run, extruder.as_ref().map(|side| &side.setup.law))),
+        target: loaded.cell.target.as_ref().map(WidthTarget::nominal),
+        max_rejected_fraction: loaded.cell.recording.max_rejected_share,
+        control: Some(ControlFacts::of(&run, extruder.as_ref().map(|side| &side.setup.strategy))),
     })?;
     let record = RecordConfig {
         frames: loaded.cell.recording.frames,
@@ -94,7 +94,7 @@ pub fn live(
         log,
         duration: until.duration_s.map(Span::from_secs),
         ends_with_steps: until.ends_with_steps,
-        stop: stop.told().clone(),
+        stop: stop.signals().clone(),
         notice: Box::new(move |line| {
             if !quiet {
                 tell!("{line}");
@@ -138,6 +138,6 @@ fn live_extruder(
         .into());
     };
     warn(&side.warnings);
-    warn(beyond(part, &side)?.as_slice());
+    warn(range_warning(part, &side)?.as_slice());
     Ok((Some(LiveExtruder { setup: side.setup, demand: part.demand, link }), side.files))
 }

@@ -10,7 +10,7 @@ use crate::rows::summary::Summary;
 
 /// Prints the figures of a run to standard output, and gives its status.
 pub fn tell(report: &LiveReport, out: &Path, max_rejected_share: f64) -> ExitCode {
-    figures(&report.summary);
+    print_figures(&report.summary);
     say!("report     {}", out.join("report.html").display());
     match &report.recording {
         Ok(recording) => say!("recording  {}", recording.path.display()),
@@ -20,7 +20,7 @@ pub fn tell(report: &LiveReport, out: &Path, max_rejected_share: f64) -> ExitCod
 }
 
 /// The figures, to standard output.
-pub fn figures(summary: &Summary) {
+pub fn print_figures(summary: &Summary) {
     say!("frames     {}, {} measured", summary.frames, summary.measured);
     for (reason, count) in &summary.rejected {
         say!("           {count} {reason}");
@@ -61,14 +61,14 @@ pub fn figures(summary: &Summary) {
     if let Some(profile) = summary.extruder.as_ref().and_then(|extruder| extruder.profile) {
         say!(
             "profile    {:.1} % of {:.1} s played, bead laid for {:.1} s after it",
-            100.0 * profile.played_share,
-            profile.lasts_s,
-            profile.outlasted_s
+            100.0 * profile.played_fraction,
+            profile.duration_s,
+            profile.after_end_s
         );
     }
     say!("faults     {}", control.faults);
     for (reason, count) in &control.fault_reasons {
-        say!("           {count} {}", names::spoken(reason));
+        say!("           {count} {}", names::in_words(reason));
     }
 }
 
@@ -120,7 +120,7 @@ pub fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
     }
     // A run that somebody ends early may have seen little more than the bead's
     // beginning; that is no loss.
-    let share = report.summary.rejected_share();
+    let share = report.summary.rejected_fraction();
     if share > max_rejected_share && report.ending != Ending::Asked {
         tell!(
             "warning: {:.1} % of the frames were refused, the cell bears {:.1} %",

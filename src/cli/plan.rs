@@ -9,24 +9,24 @@ use anyhow::Result;
 use rayon::prelude::*;
 
 pub use arguments::PlanArgs;
-use bead::Bead;
-use cell::{CommandRange, Extruder};
+use bead::JobBead;
+use cell::{CommandRange, PlannedExtruder};
 
-use crate::plan::{Foretold, PlanError, Task, Unplanned, attainable, solve};
+use crate::plan::{PlanError, PlanTask, UnplannedCommand, WidthPrediction, attainable, solve};
 use crate::report::planned::{PlannedBead, page, rms, to_csv};
 use crate::rows::output;
 
 /// Runs the command; a summary goes to standard output.
 pub fn run(args: &PlanArgs) -> Result<()> {
     args.check()?;
-    let extruder = Extruder::read(args)?;
+    let extruder = PlannedExtruder::read(args)?;
     let beads = job::read(args, &extruder)?;
     extruder.check_speeds(&beads, &args.job)?;
     output::make_folder(&args.out)?;
     let task = extruder.task(args);
     let planned: Result<Vec<PlannedBead>, PlanError> =
         beads.into_par_iter().map(|bead| plan(&task, bead)).collect();
-    let planned = planned.map_err(|error| bead::wrong(&args.job, &error))?;
+    let planned = planned.map_err(|error| bead::wrong_job(&args.job, &error))?;
     let summary = summary(&planned, &extruder);
     let table = to_csv(&planned, &extruder.facts)?;
     let table = output::write_whole(&args.out, "plan.csv", &table)?;
@@ -44,13 +44,13 @@ pub fn run(args: &PlanArgs) -> Result<()> {
     Ok(())
 }
 
-fn plan(task: &Task<'_>, bead: Bead) -> Result<PlannedBead, PlanError> {
+fn plan(task: &PlanTask<'_>, bead: JobBead) -> Result<PlannedBead, PlanError> {
     let nominal = attainable(&bead.nominal, task.limits.robot.accel_mm_per_s2)?;
     let plan = solve(task, &nominal)?;
     Ok(PlannedBead {
-        planned: Foretold::new(task, &plan.speed, |time_s| plan.command_at(time_s))?,
-        constant: Foretold::unplanned(task, &nominal, Unplanned::Constant)?,
-        proportional: Foretold::unplanned(task, &nominal, Unplanned::Proportional)?,
+        planned: WidthPrediction::new(task, &plan.speed, |time_s| plan.command_at(time_s))?,
+        constant: WidthPrediction::unplanned(task, &nominal, UnplannedCommand::Constant)?,
+        proportional: WidthPrediction::unplanned(task, &nominal, UnplannedCommand::Proportional)?,
         name: bead.name,
         position: bead.position,
         nominal,
@@ -59,7 +59,7 @@ fn plan(task: &Task<'_>, bead: Bead) -> Result<PlannedBead, PlanError> {
 }
 
 /// Smallest and largest command of all beads.
-fn range(beads: &[PlannedBead], extruder: &Extruder) -> CommandRange {
+fn range(beads: &[PlannedBead], extruder: &PlannedExtruder) -> CommandRange {
     let all = beads.iter().flat_map(|bead| &bead.plan.command);
     let (low, high) =
         all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)));
@@ -78,12 +78,12 @@ fn slowest(beads: &[PlannedBead], nozzle_mm: f64) -> Option<f64> {
     inside.reduce(f64::min)
 }
 
-fn summary(beads: &[PlannedBead], extruder: &Extruder) -> Vec<(String, String)> {
+fn summary(beads: &[PlannedBead], extruder: &PlannedExtruder) -> Vec<(String, String)> {
     let facts = &extruder.facts;
     let sum = |of: fn(&PlannedBead) -> f64| beads.iter().map(of).sum::<f64>();
     let count =
         if beads.len() == 1 { "1 bead".to_owned() } else { format!("{} beads", beads.len()) };
-    let error = |of: fn(&PlannedBead) -> &Foretold| {
+    let error = |of: fn(&PlannedBead) -> &WidthPrediction| {
         let share = rms(beads, of);
         format!("{:.3} mm ({:.1} %)", share * facts.width_mm, 100.0 * share)
     };

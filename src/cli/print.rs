@@ -35,7 +35,7 @@ pub fn print(text: &str) {
 
 /// How much a command says on standard error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Voice {
+pub struct Verbosity {
     /// Nothing but errors.
     pub quiet: bool,
 }

@@ -10,7 +10,7 @@ use clap::Args;
 use crossbeam_channel::{Sender, bounded};
 
 use super::arguments::WrongArguments;
-use super::print::Voice;
+use super::print::Verbosity;
 use super::status::WITH_LOSS;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
@@ -24,15 +24,15 @@ use crate::report::run::RunPage;
 use crate::rows::edges::EdgesWriter;
 use crate::rows::frame_row::FrameRow;
 use crate::rows::log::{LogOptions, RunLog};
-use crate::rows::summary::{Note, Summary};
+use crate::rows::summary::{RunNote, Summary};
 use crate::run::ports::{FrameSource, Grab, SourceError};
 use crate::vision::{Measurer, Reject, RoughnessEstimator};
-use crate::width_control::target::Target;
+use crate::width_control::target::WidthTarget;
 
 /// Frames that may wait between reading and measuring.
-const WAITING: usize = 8;
+const QUEUE_LENGTH: usize = 8;
 /// Unreadable frames that are named one by one.
-const NAMED: u64 = 10;
+const MAX_NAMED_UNREADABLE: u64 = 10;
 
 /// Measures the bead in recorded frames.
 #[derive(Debug, Args)]
@@ -69,7 +69,7 @@ pub struct ProcessArgs {
 }
 
 /// Runs the command; the summary goes to standard output.
-pub fn run(args: &ProcessArgs, voice: Voice) -> anyhow::Result<ExitCode> {
+pub fn run(args: &ProcessArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     let loaded = LoadedCell::read(&args.cell, Purpose::Measure)?;
     let options = OfflineOptions {
         fps: args.fps,
@@ -81,14 +81,14 @@ pub fn run(args: &ProcessArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     let log = RunPage::log(LogOptions {
         folder: args.out.clone(),
         title: format!("Widths of {}", args.input.display()),
-        about: vec![
+        header: vec![
             ("input".into(), args.input.display().to_string()),
             ("cell".into(), args.cell.display().to_string()),
             ("calibration".into(), loaded.calibration_words()),
         ],
         gauge: loaded.cell.gauge,
-        target: loaded.cell.target.as_ref().map(Target::nominal),
-        max_rejected_share: loaded.cell.recording.max_rejected_share,
+        target: loaded.cell.target.as_ref().map(WidthTarget::nominal),
+        max_rejected_fraction: loaded.cell.recording.max_rejected_share,
         control: None,
     })?;
     let total = recorded.source.expected_frames();
@@ -99,22 +99,30 @@ pub fn run(args: &ProcessArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     let robot_z = recorded.robot_z.as_ref();
     let roughness = RoughnessEstimator::default();
     let refusals = BTreeMap::new();
-    let bench =
-        Bench { loaded: &loaded, robot_z, progress, log, roughness, edges, overlays, refusals };
+    let bench = Measuring {
+        loaded: &loaded,
+        robot_z,
+        progress,
+        log,
+        roughness,
+        edges,
+        overlays,
+        first_rejections: refusals,
+    };
     let measured = bench.measure_all(recorded.source, &stop)?;
     Ok(conclude(args, &measured, &loaded))
 }
 
 /// The first frame that was refused with a status, and why.
-struct Refusal {
+struct FirstRejection {
     frame: u64,
     why: Reject,
 }
 
 /// What was measured, and the first refusal of each status.
-struct Measured {
+struct MeasuredFrames {
     summary: Summary,
-    refusals: BTreeMap<&'static str, Refusal>,
+    first_rejections: BTreeMap<&'static str, FirstRejection>,
 }
 
 fn wrong_input(SourceError { source_name, what }: SourceError) -> WrongArguments {
@@ -122,7 +130,7 @@ fn wrong_input(SourceError { source_name, what }: SourceError) -> WrongArguments
 }
 
 /// Where frames are measured one after the other.
-struct Bench<'a> {
+struct Measuring<'a> {
     loaded: &'a LoadedCell,
     robot_z: Option<&'a RobotZ>,
     progress: Progress,
@@ -130,18 +138,18 @@ struct Bench<'a> {
     roughness: RoughnessEstimator,
     edges: Option<EdgesWriter>,
     overlays: Option<OverlayWriter>,
-    refusals: BTreeMap<&'static str, Refusal>,
+    first_rejections: BTreeMap<&'static str, FirstRejection>,
 }
 
-impl Bench<'_> {
+impl Measuring<'_> {
     /// Reads in a thread of its own, measures here. A source that fails in
     /// the middle ends the work with what there is, and says so.
     fn measure_all(
         mut self,
         mut source: Box<dyn FrameSource>,
         stop: &StopSignal,
-    ) -> anyhow::Result<Measured> {
-        let (send, frames) = bounded(WAITING);
+    ) -> anyhow::Result<MeasuredFrames> {
+        let (send, frames) = bounded(QUEUE_LENGTH);
         let ending = AtomicBool::new(false);
         let failed = std::thread::scope(|scope| -> anyhow::Result<Option<SourceError>> {
             let ending = &ending;
@@ -149,7 +157,7 @@ impl Bench<'_> {
             let mut unreadable = 0;
             let mut measurer = Measurer::new(self.loaded.cell.gauge, self.loaded.cell.white);
             for grab in &frames {
-                if stop.asked() {
+                if stop.requested() {
                     break;
                 }
                 if matches!(grab, Grab::Unreadable { .. }) {
@@ -163,19 +171,19 @@ impl Bench<'_> {
             drop(frames);
             Ok(reader.join().unwrap_or_default())
         })?;
-        if stop.asked() {
-            self.log.note(&Note::Remark("ended before the last frame, as was asked".into()));
+        if stop.requested() {
+            self.log.note(&RunNote::Remark("ended before the last frame, as was asked".into()));
         }
         if let Some(error) = failed {
             tell!("warning: {error}; what was measured until then is kept");
-            self.log.note(&Note::Remark(error.to_string()));
+            self.log.note(&RunNote::Remark(error.to_string()));
         }
         self.progress.finish();
         let summary = self.log.finish()?;
         if let Some(edges) = self.edges {
             edges.finish()?;
         }
-        Ok(Measured { summary, refusals: self.refusals })
+        Ok(MeasuredFrames { summary, first_rejections: self.first_rejections })
     }
 
     fn measure(
@@ -192,8 +200,8 @@ impl Bench<'_> {
                     .measure(&frame, &surface)
                     .inspect_err(|why| {
                         tracing::info!("frame {}: {why}", frame.seq);
-                        let first = Refusal { frame: frame.seq, why: *why };
-                        self.refusals.entry(why.status()).or_insert(first);
+                        let first = FirstRejection { frame: frame.seq, why: *why };
+                        self.first_rejections.entry(why.status()).or_insert(first);
                     })
                     .map(|found| measurer.with_skew(found))
                     .map_err(|reject| reject.status());
@@ -209,9 +217,9 @@ impl Bench<'_> {
                 }
             }
             Grab::Unreadable { seq, time_s, reason } => {
-                if unreadable <= NAMED {
+                if unreadable <= MAX_NAMED_UNREADABLE {
                     self.progress.note(&format!("unreadable: {reason}"));
-                    self.log.note(&Note::Remark(format!("frame {seq} is unreadable: {reason}")));
+                    self.log.note(&RunNote::Remark(format!("frame {seq} is unreadable: {reason}")));
                 }
                 let outcome = Err(Reject::Unreadable.status());
                 let row = FrameRow { frame: seq, time_s, outcome, roughness: None, control: None };
@@ -241,13 +249,13 @@ fn read(
 
 fn conclude(
     args: &ProcessArgs,
-    Measured { summary, refusals }: &Measured,
+    MeasuredFrames { summary, first_rejections: refusals }: &MeasuredFrames,
     loaded: &LoadedCell,
 ) -> ExitCode {
     say!("{} frames, {} measured", summary.frames, summary.measured);
     for (status, count) in &summary.rejected {
         say!("  {count} {status}");
-        if let Some(Refusal { frame, why }) = refusals.get(status) {
+        if let Some(FirstRejection { frame, why }) = refusals.get(status) {
             say!("    frame {frame}: {why}");
         }
     }
@@ -261,7 +269,7 @@ fn conclude(
         say!("hint: {sentence}");
     }
     say!("{}", args.out.join("report.html").display());
-    let share = summary.rejected_share();
+    let share = summary.rejected_fraction();
     let most = loaded.cell.recording.max_rejected_share;
     if share > most {
         tell!(

@@ -9,7 +9,10 @@ use crate::cell::file::{CalibrationSource, Purpose};
 use crate::io::recording::Recording;
 
 /// The cell of a recording and its calibration, as they were in the run.
-pub fn attached(recording: &Recording, purpose: Purpose) -> anyhow::Result<(Cell, Calibration)> {
+pub fn attached_cell(
+    recording: &Recording,
+    purpose: Purpose,
+) -> anyhow::Result<(Cell, Calibration)> {
     let file = recording.file();
     let Some(text) = recording.cell() else {
         let what = format!("{file}: the attachment cell.toml is missing");

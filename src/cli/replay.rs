@@ -9,14 +9,14 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::arguments::WrongArguments;
-use super::recorded::attached;
+use super::recorded::attached_cell;
 use super::status::WITH_LOSS;
 use crate::assembly::extruder;
 use crate::cell::file::{ExtruderPart, Purpose};
 use crate::control::Controller;
 use crate::control::step::Step;
 use crate::io::record::ExtruderFile;
-use crate::io::recording::{Entry, Recording};
+use crate::io::recording::{RecordedEntry, Recording};
 use crate::io::replay::{Difference, ReplayReport, replay};
 
 /// Entries between two updates of the progress display.
@@ -70,14 +70,14 @@ fn recorded_controller(recording: &Recording) -> anyhow::Result<Controller> {
             "{file}: not a recording of truebead: it has no metadata record \"run\" at its start"
         )));
     }
-    let (cell, calibration) = attached(recording, Purpose::Run)
+    let (cell, calibration) = attached_cell(recording, Purpose::Run)
         .context("the controller cannot be set up")
         .map_err(WrongArguments::new)?;
     let Some(run) = cell.run.clone() else {
         let what = format!("cell.toml in {file}: it lacks tables that a run needs");
         bail!(WrongArguments::new(what));
     };
-    let controller = Controller::new(cell.controller(&run, &calibration));
+    let controller = Controller::new(cell.controller_setup(&run, &calibration));
     let Some(part) = &run.extruder else { return Ok(controller) };
     let files = recorded_files(recording, part)?;
     let cell = format!("cell.toml in {}", recording.file());
@@ -110,9 +110,9 @@ fn progress_bar() -> ProgressBar {
 }
 
 fn with_progress<'a, E>(
-    entries: impl Iterator<Item = Result<Entry, E>> + 'a,
+    entries: impl Iterator<Item = Result<RecordedEntry, E>> + 'a,
     progress: &'a ProgressBar,
-) -> impl Iterator<Item = Result<Entry, E>> + 'a {
+) -> impl Iterator<Item = Result<RecordedEntry, E>> + 'a {
     (1u64..).zip(entries).map(|(count, entry)| {
         if count.is_multiple_of(PROGRESS_EVERY) {
             progress.set_position(count);
@@ -125,7 +125,7 @@ fn with_progress<'a, E>(
 /// Prints how it went and gives the exit status.
 fn tell(report: &ReplayReport) -> ExitCode {
     if let Some(difference) = &report.difference {
-        tell_difference(report.compared, difference);
+        print_difference(report.compared, difference);
         return ExitCode::FAILURE;
     }
     say!("{} steps replayed, all the same bit for bit", report.compared);
@@ -144,7 +144,7 @@ fn tell(report: &ReplayReport) -> ExitCode {
     ExitCode::SUCCESS
 }
 
-fn tell_difference(compared: u64, difference: &Difference) {
+fn print_difference(compared: u64, difference: &Difference) {
     say!(
         "step {} differs, {:.6} s after the start; the {} before it are the same",
         difference.n,

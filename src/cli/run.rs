@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::arguments::{free_folder, parse_seconds};
 use super::live_cell::drive;
-use super::print::Voice;
+use super::print::Verbosity;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::io::clock::RunClock;
@@ -34,7 +34,7 @@ pub struct RunArgs {
 }
 
 /// Runs the command.
-pub fn run(args: &RunArgs, voice: Voice) -> anyhow::Result<ExitCode> {
+pub fn run(args: &RunArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     let loaded = LoadedCell::read(&args.cell, Purpose::Run)?;
     let out = args.out.clone().unwrap_or_else(|| free_folder("truebead-run"));
     let title = format!("Run of {}", args.cell.display());

@@ -10,7 +10,7 @@ use clap::Args;
 
 use super::arguments::refuse_a_recording_in;
 use super::outcome;
-use super::print::Voice;
+use super::print::Verbosity;
 use super::simulated_cell::{SimRecorder, simulated_extruder};
 use super::status::WITH_LOSS;
 use crate::assembly::LoadedCell;
@@ -25,9 +25,9 @@ use crate::report::run::RunPage;
 use crate::rows::frame_row::{ControlColumns, FrameRow};
 use crate::rows::log::{ControlFacts, LogOptions, RunLog};
 use crate::rows::output::LogError;
-use crate::rows::summary::Note;
-use crate::sim::cell::{LayerEnd, Sight, SimCell, Witness};
-use crate::width_control::target::Target;
+use crate::rows::summary::RunNote;
+use crate::sim::cell::{FrameObservation, LayerEnd, Observer, SimCell};
+use crate::width_control::target::WidthTarget;
 
 /// Runs the closed loop on a simulated cell.
 #[derive(Debug, Args)]
@@ -57,7 +57,7 @@ pub struct SimulateArgs {
 }
 
 /// Runs the command.
-pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
+pub fn run(args: &SimulateArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     refuse_a_recording_in(&args.out)?;
     let mut loaded = LoadedCell::read(&args.scenario, Purpose::Run)?;
     if let Some(seed) = args.seed {
@@ -65,7 +65,7 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     }
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
     let extruder = simulated_extruder(&loaded)?;
-    let law = extruder.as_ref().map(|rig| rig.setup.law.clone());
+    let controller = extruder.as_ref().map(|rig| rig.setup.strategy.clone());
     let calibration = loaded.calibration.clone();
     let recorder = SimRecorder::of(args.record.then_some(&args.out), &loaded)?;
     let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, recorder, extruder)?;
@@ -73,22 +73,22 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     let log = RunPage::log(LogOptions {
         folder: args.out.clone(),
         title: format!("Simulation of {}", args.scenario.display()),
-        about: vec![
+        header: vec![
             ("scenario".into(), args.scenario.display().to_string()),
             ("seed".into(), loaded.cell.simulation.seed.to_string()),
             ("calibration".into(), loaded.calibration_words()),
         ],
         gauge: loaded.cell.gauge,
-        target: loaded.cell.target.as_ref().map(Target::nominal),
-        max_rejected_share: loaded.cell.recording.max_rejected_share,
-        control: Some(ControlFacts::of(&run, law.as_ref())),
+        target: loaded.cell.target.as_ref().map(WidthTarget::nominal),
+        max_rejected_fraction: loaded.cell.recording.max_rejected_share,
+        control: Some(ControlFacts::of(&run, controller.as_ref())),
     })?;
     let progress = Progress::new("simulating", "s", None, voice.quiet);
     let mut logger = Logger { log, stop, failed: None, progress };
     #[expect(clippy::disallowed_methods, reason = "how much faster than the clock")]
     let began = Instant::now();
     let end = sim.layer(Mm::ZERO, &mut logger);
-    let interrupted = logger.stop.asked() && !end.whole;
+    let interrupted = logger.stop.requested() && !end.complete;
     let took_s = began.elapsed().as_secs_f64();
     logger.progress.finish();
     if let Some(error) = logger.failed {
@@ -96,11 +96,11 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     }
     sim.into_recorder().finish()?;
     let summary = logger.log.finish()?;
-    outcome::figures(&summary);
+    outcome::print_figures(&summary);
     say!(
         "time       {:.1} s simulated in {took_s:.3} s, {:.0} times as fast, its files written meanwhile",
-        end.took.secs(),
-        end.took.secs() / took_s.max(1e-9)
+        end.duration.secs(),
+        end.duration.secs() / took_s.max(1e-9)
     );
     say!("report     {}", args.out.join("report.html").display());
     if interrupted {
@@ -111,12 +111,12 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
 }
 
 fn status(loaded: &LoadedCell, summary: &crate::rows::summary::Summary, end: LayerEnd) -> ExitCode {
-    if !end.whole {
+    if !end.complete {
         tell!("error: the robot stopped before the end of the bead; the report says why");
         return ExitCode::FAILURE;
     }
-    if summary.rejected_share() > loaded.cell.recording.max_rejected_share {
-        tell!("warning: {:.1} % of the frames were refused", summary.rejected_share() * 100.0);
+    if summary.rejected_fraction() > loaded.cell.recording.max_rejected_share {
+        tell!("warning: {:.1} % of the frames were refused", summary.rejected_fraction() * 100.0);
         return ExitCode::from(WITH_LOSS);
     }
     ExitCode::SUCCESS
@@ -130,10 +130,10 @@ struct Logger {
     progress: Progress,
 }
 
-impl Witness for Logger {
+impl Observer for Logger {
     fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         if step.command.is_some() {
-            self.log.note(&Note::SetpointSent);
+            self.log.note(&RunNote::SetpointSent);
         }
         self.log.step(now, event, step);
         #[expect(
@@ -144,16 +144,16 @@ impl Witness for Logger {
         self.progress.set(now.secs() as u64);
     }
 
-    fn has_seen_enough(&self) -> bool {
+    fn is_done(&self) -> bool {
         // What cannot be written is not simulated to its end either.
-        self.failed.is_some() || self.stop.asked()
+        self.failed.is_some() || self.stop.requested()
     }
 
     fn flow(&mut self, now: Stamp, wanted: Option<Mm3PerS>, flow: Mm3PerS) {
         self.log.flow(now, wanted, flow);
     }
 
-    fn look(&mut self, sight: &Sight<'_>) {
+    fn frame(&mut self, sight: &FrameObservation<'_>) {
         if self.failed.is_some() {
             return;
         }

@@ -10,15 +10,15 @@ use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::io::record::{self, RecordConfig, RecorderHandle};
 use crate::run::ports::{RecordError, Recorder};
-use crate::sim::cell::Rig;
+use crate::sim::cell::CommandedExtruder;
 
 /// The extruder side of a simulated cell, with what is to be said about it.
-pub fn simulated_extruder(loaded: &LoadedCell) -> anyhow::Result<Option<Rig>> {
+pub fn simulated_extruder(loaded: &LoadedCell) -> anyhow::Result<Option<CommandedExtruder>> {
     let side = loaded.simulated_extruder()?;
     if let Some(side) = &side {
         warn(&side.warnings);
     }
-    Ok(side.map(|side| side.rig))
+    Ok(side.map(|side| side.extruder))
 }
 
 /// Keeps what happened, where that is asked for.

@@ -11,16 +11,16 @@ use anyhow::Context;
 
 pub use self::arguments::TuneArgs;
 use super::arguments::WrongArguments;
-use super::camera_offset::farthest;
-use super::print::Voice;
+use super::camera_offset::max_offset;
+use super::print::Verbosity;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::report::tuned::Tuned;
 use crate::rows::output;
 
 /// Runs the command.
-pub fn run(args: &TuneArgs, voice: Voice) -> anyhow::Result<ExitCode> {
-    let farthest = farthest(args.max_mm)?;
+pub fn run(args: &TuneArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
+    let max_offset = max_offset(args.max_mm)?;
     let loaded = LoadedCell::read(&args.cell, Purpose::Run)?;
     if let Some(path) = &args.write {
         write::refuse(path, &args.cell, &loaded)?;
@@ -40,14 +40,14 @@ pub fn run(args: &TuneArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     if args.recording.is_none() && run.exists() && !voice.quiet {
         tell!("report of the run: {}", run.display());
     }
-    let tuned = analyse::tuned(&recording, &loaded, farthest)?;
+    let tuned = analyse::tuned(&recording, &loaded, max_offset)?;
     output::make_folder(&args.out)?;
     output::write_whole(&args.out, "tune.json", tuned.json().as_bytes())?;
     let page = output::write_whole(&args.out, "report.html", tuned.page().as_bytes())?;
     tell(&tuned);
     say!("report     {}", page.display());
     if let Some(path) = &args.write {
-        write::write(path, &loaded, &tuned, args.law)
+        write::write(path, &loaded, &tuned, args.controller)
             .with_context(|| format!("{} was not written", path.display()))?;
         say!("written    {}", path.display());
     }

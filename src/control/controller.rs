@@ -5,15 +5,15 @@ use super::extruder_side::{ExtruderSide, NO_OVERRIDE};
 use super::phase::{Bead, BeadOnPath, Mode, Phase, Setpoint};
 use super::setup::Setup;
 use super::step::{Command, Fault, Hold, State, Step, Trace};
-use crate::core::readback::{Follow, Verdict};
+use crate::core::readback::{SpeedMatch, SpeedMonitor};
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::extruder::{ExtruderSetup, FlowDemand};
 use crate::width_control::controller::{WidthController, WidthTrace};
-use crate::width_control::limiter::Limit;
+use crate::width_control::limiter::SpeedLimit;
 use crate::width_control::odometer::Odometer;
-use crate::width_control::transport::Transport;
+use crate::width_control::transport::PathHistory;
 
 /// The controller of a cell: the width by the robot's speed and, where the
 /// cell says so, the flow by the extruder.
@@ -41,17 +41,17 @@ pub(super) struct Robot {
     pub(super) is_another_bead: bool,
     /// Since when nobody has heard it, whatever else was the matter before.
     pub(super) silent_since: Option<Stamp>,
-    pub(super) transport: Transport,
+    pub(super) transport: PathHistory,
     pub(super) odometer: Odometer,
-    pub(super) follow: Follow,
-    pub(super) verdict: Verdict,
+    pub(super) follow: SpeedMonitor,
+    pub(super) verdict: SpeedMatch,
 }
 
 impl Robot {
     /// What it follows from now on is new.
     pub(super) fn follow_anew(&mut self) {
         self.follow.reset();
-        self.verdict = Verdict::Follows;
+        self.verdict = SpeedMatch::Follows;
     }
 }
 
@@ -183,8 +183,8 @@ impl Controller {
         let (last_at, last) = bead.setpoint.map_or((now, speed), |last| (last.at, last.speed));
         let limited = self.setup.limits.apply(speed, last, now - last_at);
         bead.limit = match (limited.limit, self.robot.verdict) {
-            (Limit::None, Verdict::Slower) => Limit::RobotSlower,
-            (Limit::None, Verdict::Faster) => Limit::RobotFaster,
+            (SpeedLimit::None, SpeedMatch::Slower) => SpeedLimit::RobotSlower,
+            (SpeedLimit::None, SpeedMatch::Faster) => SpeedLimit::RobotFaster,
             (limit, _) => limit,
         };
         // What a hold is to keep: the very speed that goes out, or where something else has

@@ -63,12 +63,12 @@ impl Controller {
         let requested = bead.setpoint.map_or(self.setup.start_speed, |last| last.speed);
         // No extruder keeps up with a robot that starts; it is ready for
         // the speed that comes. Nor does it follow a robot that goes by its flow.
-        let goes_ahead = bead.segment == Segment::RunUp || supervisor.is_passing();
+        let goes_ahead = bead.segment == Segment::RunUp || supervisor.is_in_transition();
         let robot = self.robot.state.filter(|_| !goes_ahead);
         let robot =
             robot.map(|robot| RobotSpeed { setpoint: requested, actual: robot.speed_mm_per_s });
-        let flow = planned.map_or_else(|| demand.wanted(robot), |planned| planned.flow);
-        let way = supervisor.way_of_stop(requested);
+        let flow = planned.map_or_else(|| demand.flow(robot), |planned| planned.flow);
+        let way = supervisor.stop_distance(requested);
         let stops = bead.segment == Segment::Ending
             || self.left(now).zip(way).is_some_and(|(left, way)| left <= way);
         if stops { Laying::Ending(flow) } else { Laying::Bead(flow) }

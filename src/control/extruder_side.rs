@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::extruder::trajectory::{Planned, PlannedJob};
+use crate::extruder::trajectory::{PlannedJob, PlannedPoint};
 use crate::extruder::{ExtruderFault, ExtruderSetup, ExtruderState, FlowDemand, Supervisor};
 
 /// The speed override of a robot that goes by nothing but the width.
@@ -18,7 +18,7 @@ pub struct ExtruderSide {
     /// The job that was planned, if there is one.
     pub plan: Option<Arc<PlannedJob>>,
     /// What was planned for the last position on this bead that was known.
-    pub planned: Option<Planned>,
+    pub planned: Option<PlannedPoint>,
 }
 
 impl ExtruderSide {

@@ -3,7 +3,7 @@
 use super::step::{Fault, Hold, State};
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS};
-use crate::width_control::limiter::Limit;
+use crate::width_control::limiter::SpeedLimit;
 
 /// What a controller is doing.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,7 +17,7 @@ pub enum Phase {
         /// Why.
         why: Hold,
         /// The last limit that acted.
-        limit: Limit,
+        limit: SpeedLimit,
     },
 }
 
@@ -31,7 +31,7 @@ pub struct Bead {
     /// The last setpoint, once there was one.
     pub setpoint: Option<Setpoint>,
     /// The last limit that acted.
-    pub limit: Limit,
+    pub limit: SpeedLimit,
 }
 
 /// What is being done on a bead.
@@ -95,7 +95,12 @@ pub struct BeadOnPath {
 impl Bead {
     /// A bead that has just begun.
     pub fn new() -> Self {
-        Self { mode: Mode::Priming, segment: Segment::RunUp, setpoint: None, limit: Limit::None }
+        Self {
+            mode: Mode::Priming,
+            segment: Segment::RunUp,
+            setpoint: None,
+            limit: SpeedLimit::None,
+        }
     }
 
     /// Until when the width is known, where it is being tracked.
@@ -141,9 +146,9 @@ impl Phase {
     }
 
     /// The last limit that acted on a setpoint.
-    pub fn limit(&self) -> Limit {
+    pub fn limit(&self) -> SpeedLimit {
         match self {
-            Self::Idle => Limit::None,
+            Self::Idle => SpeedLimit::None,
             Self::Bead(bead) => bead.limit,
             Self::Ended { limit, .. } => *limit,
         }

@@ -5,15 +5,15 @@ use super::extruder_side::{ExtruderSide, NO_OVERRIDE};
 use crate::core::readback::ROBOT_LAG;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
-use crate::extruder::trajectory::{Planned, PlannedCourse};
+use crate::extruder::trajectory::{PlannedPoint, PlannedTrajectory};
 
 /// Share of its plan from which a bead was laid: the robot's last report comes a little
 /// before its end.
-const WHOLE: f64 = 0.9;
+const COMPLETE_FRACTION: f64 = 0.9;
 
 impl Controller {
     /// The plan of the bead that is being laid.
-    fn course(&self) -> Option<&PlannedCourse> {
+    fn course(&self) -> Option<&PlannedTrajectory> {
         let plan = self.extruder.as_ref()?.plan.as_ref()?;
         Some(plan.bead(self.bead.number).as_ref())
     }
@@ -22,7 +22,7 @@ impl Controller {
     /// no robot says which bead of its program it begins.
     pub(super) fn next_bead(&mut self) {
         let laid = self.bead.laid;
-        if self.course().is_some_and(|course| laid >= course.end() * WHOLE) {
+        if self.course().is_some_and(|course| laid >= course.end() * COMPLETE_FRACTION) {
             self.bead.number += 1;
         }
         self.bead.laid = Mm::ZERO;
@@ -32,7 +32,7 @@ impl Controller {
     }
 
     /// What is planned for where the nozzle is now.
-    pub(super) fn planned(&self, now: Stamp) -> Option<Planned> {
+    pub(super) fn planned(&self, now: Stamp) -> Option<PlannedPoint> {
         Some(self.course()?.at(self.laid_at(now)?))
     }
 
@@ -41,7 +41,7 @@ impl Controller {
     /// known how far along its plan the robot is.
     pub(super) fn speed_override(&self, now: Stamp) -> Option<f64> {
         let share =
-            self.extruder.as_ref().map_or(NO_OVERRIDE, |side| side.supervisor.robot_share());
+            self.extruder.as_ref().map_or(NO_OVERRIDE, |side| side.supervisor.robot_speed_ratio());
         let Some(course) = self.course() else { return Some(share) };
         let path = self.laid_at(now)? + self.robot.state?.speed_mm_per_s * ROBOT_LAG;
         let planned = course.speed(path, self.setup.setpoint_period);
@@ -50,15 +50,15 @@ impl Controller {
 
     /// The flow at the nozzle over that of the start speed, by which the bead is wider than
     /// the robot's speed alone tells.
-    pub(super) fn flow_share(&self, now: Stamp) -> f64 {
+    pub(super) fn flow_ratio(&self, now: Stamp) -> f64 {
         let Some(ExtruderSide { supervisor, demand, .. }) = &self.extruder else { return 1.0 };
         let planned = self.planned(now).map_or(1.0, |planned| planned.flow / demand.nominal());
-        supervisor.flow_share() * planned
+        supervisor.flow_ratio() * planned
     }
 
     /// How much of the bead is left, where its length is known.
     pub(super) fn left(&self, now: Stamp) -> Option<Mm> {
-        let end = self.course().map(PlannedCourse::end).or(self.setup.bead_length)?;
+        let end = self.course().map(PlannedTrajectory::end).or(self.setup.bead_length)?;
         Some(end - self.laid_at(now)?)
     }
 }

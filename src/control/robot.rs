@@ -3,18 +3,18 @@
 use super::controller::Controller;
 use super::phase::{Bead, Mode, Phase, Segment};
 use super::step::{Fault, Hold};
-use crate::core::readback::Verdict;
+use crate::core::readback::SpeedMatch;
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::width_control::controller::BeadReport;
 
 /// Share of the setpoint at which a robot that starts has run up.
-const RUN_UP: f64 = 0.95;
+const RUN_UP_FRACTION: f64 = 0.95;
 /// Way that a bead may have by the first report of it.
-const BEGUN: Mm = Mm::constant(50.0);
+const MAX_LAID_BEFORE_FIRST_REPORT: Mm = Mm::constant(50.0);
 /// A path that falls by less is that of the same bead.
-const FALL_BACK: Mm = Mm::constant(1.0);
+const SAME_BEAD_TOLERANCE: Mm = Mm::constant(1.0);
 
 impl Controller {
     pub(super) fn reported(&mut self, now: Stamp, state: &RobotState) {
@@ -25,7 +25,8 @@ impl Controller {
         robot.silent_since = None;
         // Also where the bead before ended while nobody heard the robot.
         let before = robot.last_path.replace(state.path_mm);
-        robot.is_another_bead |= before.is_some_and(|last| state.path_mm < last - FALL_BACK);
+        robot.is_another_bead |=
+            before.is_some_and(|last| state.path_mm < last - SAME_BEAD_TOLERANCE);
         if matches!(self.phase, Phase::Ended { .. }) {
             return;
         }
@@ -71,13 +72,13 @@ impl Controller {
             at: now,
             path: state.path_mm,
             speed: state.speed_mm_per_s,
-            flow_share: self.flow_share(now),
-            is_path_known: !self.robot.odometer.is_blind(),
+            flow_ratio: self.flow_ratio(now),
+            is_path_known: !self.robot.odometer.reports_no_path(),
         };
         self.width.robot_reported(&report);
         let Some(bead) = self.phase.bead_mut() else { return };
         let requested = bead.setpoint.map_or(self.setup.start_speed, |last| last.speed);
-        if bead.segment == Segment::RunUp && state.speed_mm_per_s >= requested * RUN_UP {
+        if bead.segment == Segment::RunUp && state.speed_mm_per_s >= requested * RUN_UP_FRACTION {
             bead.segment = Segment::Even;
         }
         if let Some(last) = bead.setpoint {
@@ -85,10 +86,10 @@ impl Controller {
             robot.verdict = robot.follow.observe(now, last.speed, state.speed_mm_per_s);
         }
         match self.robot.verdict {
-            Verdict::Lost if !bead.is_faulty() => {
+            SpeedMatch::Lost if !bead.is_faulty() => {
                 bead.mode = Mode::Fault { why: Fault::SpeedMismatch };
             }
-            Verdict::Mismatch => self.phase.hold(now, Hold::SpeedMismatch),
+            SpeedMatch::Mismatch => self.phase.hold(now, Hold::SpeedMismatch),
             _ if bead.waits_for_robot() => self.resume(now, state),
             _ => {}
         }
@@ -96,7 +97,9 @@ impl Controller {
 
     fn begin_bead(&mut self, state: &RobotState, before: Option<Mm>) {
         // It began where the robot was last heard standing, a little before this.
-        let stood = before.filter(|path| state.path_mm - *path < BEGUN && state.path_mm >= *path);
+        let stood = before.filter(|path| {
+            state.path_mm - *path < MAX_LAID_BEFORE_FIRST_REPORT && state.path_mm >= *path
+        });
         self.bead.start = stood.unwrap_or(state.path_mm);
         self.phase = Phase::Bead(Bead::new());
         self.next_bead();

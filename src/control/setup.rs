@@ -2,17 +2,17 @@
 
 use crate::core::time::Span;
 use crate::core::units::{Mm, MmPerS, WidthRange};
-use crate::width_control::limiter::Limits;
-use crate::width_control::settings::Control;
+use crate::width_control::limiter::SpeedLimits;
+use crate::width_control::settings::WidthControlSettings;
 use crate::width_control::strategy::CellFacts;
 
 /// Everything that a controller has to know of its cell.
 #[derive(Debug, Clone)]
 pub struct Setup {
     /// Target, width controller and timeouts.
-    pub control: Control,
+    pub control: WidthControlSettings,
     /// What setpoints may be.
-    pub limits: Limits,
+    pub limits: SpeedLimits,
     /// Narrowest and widest width that is accepted.
     pub width_range: WidthRange,
     /// Speed of the first part of a bead.

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS};
 use crate::extruder::{ExtruderCommand, ExtruderFault, ExtruderState, ExtruderTrace};
-use crate::width_control::Limit;
-use crate::width_control::distance::{DistanceTrace, Distrust};
+use crate::width_control::SpeedLimit;
+use crate::width_control::distance::{DistanceTrace, FallbackReason};
 use crate::width_control::steps::StepsTrace;
 
 /// What is to be sent to the robot.
@@ -123,12 +123,12 @@ pub struct Trace {
     pub distance: Option<DistanceTrace>,
     /// Why the width is held by the PI law instead of the one by distance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub fallback: Option<Distrust>,
+    pub fallback: Option<FallbackReason>,
     /// How far the course of steps is, where the cell asks for one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<StepsTrace>,
     /// The last limit that acted.
-    pub limit: Limit,
+    pub limit: SpeedLimit,
 }
 
 /// What the extruder side did.

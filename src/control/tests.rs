@@ -10,25 +10,25 @@ use crate::core::time::Span;
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS2;
 use crate::core::units::{Mm, MmPerS, WidthRange};
-use crate::width_control::limiter::{Limit, Limits};
+use crate::width_control::limiter::{SpeedLimit, SpeedLimits};
 use crate::width_control::pi::PiGains;
-use crate::width_control::settings::Control;
+use crate::width_control::settings::WidthControlSettings;
 use crate::width_control::strategy::constant::ConstantStrategy;
 use crate::width_control::strategy::pi::PiStrategy;
-use crate::width_control::target::Target;
+use crate::width_control::target::WidthTarget;
 use std::sync::Arc;
 
 /// The cell of the 2022 paper.
 pub fn setup() -> Setup {
     Setup {
-        control: Control {
-            target: Target::constant(Mm::constant(42.0)),
+        control: WidthControlSettings {
+            target: WidthTarget::constant(Mm::constant(42.0)),
             strategy: Arc::new(PiStrategy),
             gains: Some(PiGains { kp_per_s: 5.925, ki_per_s2: 4.74 }),
             max_gap: Span::from_secs(0.5),
             max_hold: Span::from_secs(3.0),
         },
-        limits: Limits {
+        limits: SpeedLimits {
             min_speed: MmPerS::constant(60.0),
             max_speed: MmPerS::constant(150.0),
             max_accel: MmPerS2::constant(2000.0),
@@ -205,7 +205,7 @@ fn the_integral_waits_while_the_robot_is_slower_than_told() {
     let step = line.width(44.0);
     assert_eq!(step.trace.integral_mm_per_s.unwrap(), before);
     let _ = line.tick();
-    assert_eq!(line.width(44.0).trace.limit, Limit::RobotSlower);
+    assert_eq!(line.width(44.0).trace.limit, SpeedLimit::RobotSlower);
 }
 
 #[test]

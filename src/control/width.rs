@@ -4,17 +4,17 @@ use super::controller::{Controller, Measured};
 use super::extruder_side::NO_OVERRIDE;
 use super::phase::{Bead, Mode, Phase};
 use super::step::Trace;
-use crate::core::readback::{ROBOT_LAG, Verdict};
+use crate::core::readback::{ROBOT_LAG, SpeedMatch};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::width_control::controller::{Outlook, SpeedRequest, WidthSample, WidthTrace};
-use crate::width_control::limiter::Limit;
+use crate::width_control::limiter::SpeedLimit;
 use crate::width_control::pi::Saturation;
 use crate::width_control::target::BeadSegment;
 
 /// Least share of its speed from which the speed of a robot that goes by the
 /// flow is taken for the width controller's: below, the robot's limits say more of it.
-const LEAST_SHARE: f64 = 0.5;
+const MIN_OVERRIDE: f64 = 0.5;
 
 impl Controller {
     pub(super) fn measured(&mut self, now: Stamp, measured: &Measured, trace: &mut Trace) {
@@ -39,9 +39,9 @@ impl Controller {
             is_own_bead,
             tracked: bead.and_then(Bead::tracked),
             may_begin: primed && is_own_bead && bead.is_some_and(Bead::waits_for_width),
-            driven: driven * (1.0 / factor.max(LEAST_SHARE)),
+            driven: driven * (1.0 / factor.max(MIN_OVERRIDE)),
             saturation: self.saturation(),
-            is_path_known: !self.robot.odometer.is_blind(),
+            is_path_known: !self.robot.odometer.reports_no_path(),
         };
         let mut of_width = WidthTrace::default();
         let tracking = self.width.measured(&sample, &mut of_width);
@@ -102,8 +102,12 @@ impl Controller {
     /// on the last setpoint and from the speed that is read back.
     fn saturation(&self) -> Saturation {
         match (self.phase.limit(), self.robot.verdict) {
-            (Limit::MaxSpeed | Limit::Acceleration, _) | (_, Verdict::Slower) => Saturation::Above,
-            (Limit::MinSpeed | Limit::Deceleration, _) | (_, Verdict::Faster) => Saturation::Below,
+            (SpeedLimit::MaxSpeed | SpeedLimit::Acceleration, _) | (_, SpeedMatch::Slower) => {
+                Saturation::Above
+            }
+            (SpeedLimit::MinSpeed | SpeedLimit::Deceleration, _) | (_, SpeedMatch::Faster) => {
+                Saturation::Below
+            }
             _ => Saturation::None,
         }
     }

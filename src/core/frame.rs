@@ -3,7 +3,7 @@
 
 mod channel;
 
-pub use channel::{Channel, Layout, Sample, UnknownChannel};
+pub use channel::{Channel, Sample, SampleLayout, UnknownChannel};
 
 use super::geometry::Size;
 use super::time::Stamp;

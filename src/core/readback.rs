@@ -7,9 +7,9 @@ use super::units::MmPerS;
 /// angular frequency of a loop of 10 Hz, as the 2022 paper has it.
 pub const ROBOT_LAG: Span = Span::from_millis(16);
 /// Share of the setpoint by which the speed may differ.
-const TOLERANCE: f64 = 0.10;
+const SPEED_TOLERANCE: f64 = 0.10;
 /// Share from which the robot counts as held by limits of its own.
-const LIMITED: f64 = 0.03;
+const LIMITED_FRACTION: f64 = 0.03;
 /// How long a difference may last before it is believed to be a limit.
 const LIMITED_AFTER: Span = Span::from_millis(300);
 /// How long it may last before the controller holds.
@@ -19,7 +19,7 @@ const FAULT_AFTER: Span = Span::from_millis(2000);
 
 /// Watches the speed that is read back.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Follow {
+pub struct SpeedMonitor {
     slower: Option<Stamp>,
     faster: Option<Stamp>,
     outside: Option<Stamp>,
@@ -27,7 +27,7 @@ pub struct Follow {
 
 /// What the speed read back says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Verdict {
+pub enum SpeedMatch {
     /// The robot does as it is told.
     #[default]
     Follows,
@@ -41,30 +41,30 @@ pub enum Verdict {
     Lost,
 }
 
-impl Follow {
+impl SpeedMonitor {
     /// Compares a report with the setpoint that it should follow.
-    pub fn observe(&mut self, now: Stamp, told: MmPerS, driven: MmPerS) -> Verdict {
-        self.observe_share(now, driven.get(), told.get())
+    pub fn observe(&mut self, now: Stamp, setpoint: MmPerS, driven: MmPerS) -> SpeedMatch {
+        self.observe_relative(now, driven.get(), setpoint.get())
     }
 
     /// The same for a speed of any unit; below 1 of it a difference counts as
     /// if it were one of 1.
-    pub fn observe_share(&mut self, now: Stamp, driven: f64, told: f64) -> Verdict {
-        let share = (driven - told) / told.max(1.0);
-        mark(&mut self.slower, now, share < -LIMITED);
-        mark(&mut self.faster, now, share > LIMITED);
-        mark(&mut self.outside, now, share.abs() > TOLERANCE);
+    pub fn observe_relative(&mut self, now: Stamp, driven: f64, setpoint: f64) -> SpeedMatch {
+        let error = (driven - setpoint) / setpoint.max(1.0);
+        mark(&mut self.slower, now, error < -LIMITED_FRACTION);
+        mark(&mut self.faster, now, error > LIMITED_FRACTION);
+        mark(&mut self.outside, now, error.abs() > SPEED_TOLERANCE);
         let lasts = |since: Option<Stamp>, span: Span| since.is_some_and(|at| now - at > span);
         if lasts(self.outside, FAULT_AFTER) {
-            Verdict::Lost
+            SpeedMatch::Lost
         } else if lasts(self.outside, HOLD_AFTER) {
-            Verdict::Mismatch
+            SpeedMatch::Mismatch
         } else if lasts(self.slower, LIMITED_AFTER) {
-            Verdict::Slower
+            SpeedMatch::Slower
         } else if lasts(self.faster, LIMITED_AFTER) {
-            Verdict::Faster
+            SpeedMatch::Faster
         } else {
-            Verdict::Follows
+            SpeedMatch::Follows
         }
     }
 
@@ -82,8 +82,8 @@ fn mark(since: &mut Option<Stamp>, now: Stamp, lasts: bool) {
 mod tests {
     use super::*;
 
-    fn after(secs: f64, driven: f64) -> Verdict {
-        let mut follow = Follow::default();
+    fn after(secs: f64, driven: f64) -> SpeedMatch {
+        let mut follow = SpeedMonitor::default();
         let told = MmPerS::constant(100.0);
         let _ = follow.observe(Stamp::START, told, MmPerS::constant(driven));
         follow.observe(Stamp::from_secs(secs), told, MmPerS::constant(driven))
@@ -91,22 +91,22 @@ mod tests {
 
     #[test]
     fn a_difference_must_last_to_count() {
-        assert_eq!(after(0.2, 80.0), Verdict::Follows);
-        assert_eq!(after(0.4, 80.0), Verdict::Slower);
-        assert_eq!(after(0.4, 120.0), Verdict::Faster);
-        assert_eq!(after(0.6, 80.0), Verdict::Mismatch);
-        assert_eq!(after(2.1, 80.0), Verdict::Lost);
-        assert_eq!(after(9.0, 101.0), Verdict::Follows);
+        assert_eq!(after(0.2, 80.0), SpeedMatch::Follows);
+        assert_eq!(after(0.4, 80.0), SpeedMatch::Slower);
+        assert_eq!(after(0.4, 120.0), SpeedMatch::Faster);
+        assert_eq!(after(0.6, 80.0), SpeedMatch::Mismatch);
+        assert_eq!(after(2.1, 80.0), SpeedMatch::Lost);
+        assert_eq!(after(9.0, 101.0), SpeedMatch::Follows);
     }
 
     #[test]
     fn a_report_in_between_that_agrees_starts_the_count_again() {
-        let mut follow = Follow::default();
+        let mut follow = SpeedMonitor::default();
         let told = MmPerS::constant(100.0);
         for (secs, driven) in [(0.0, 80.0), (0.4, 100.0), (0.45, 80.0)] {
             let _ = follow.observe(Stamp::from_secs(secs), told, MmPerS::constant(driven));
         }
         let verdict = follow.observe(Stamp::from_secs(0.6), told, MmPerS::constant(80.0));
-        assert_eq!(verdict, Verdict::Follows);
+        assert_eq!(verdict, SpeedMatch::Follows);
     }
 }

@@ -10,7 +10,7 @@ pub struct LineProblem {
 }
 
 /// What the parser says, in words.
-pub fn in_words(error: &csv::Error) -> LineProblem {
+pub fn describe(error: &csv::Error) -> LineProblem {
     let line = error.position().map_or(1, csv::Position::line);
     let what = match error.kind() {
         csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {

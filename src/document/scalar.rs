@@ -22,7 +22,7 @@ pub(super) fn as_integer(value: &DeValue<'_>) -> Option<u64> {
 }
 
 /// A value as it stands in the file, short enough for a message.
-pub(super) fn shown(value: &DeValue<'_>) -> String {
+pub(super) fn as_written(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) => format!("\"{text}\""),
         DeValue::Integer(integer) => integer.to_string(),
@@ -30,7 +30,7 @@ pub(super) fn shown(value: &DeValue<'_>) -> String {
         DeValue::Boolean(truth) => truth.to_string(),
         DeValue::Datetime(datetime) => datetime.to_string(),
         DeValue::Array(array) => {
-            let items: Vec<String> = array.iter().map(|item| shown(item.get_ref())).collect();
+            let items: Vec<String> = array.iter().map(|item| as_written(item.get_ref())).collect();
             format!("[{}]", items.join(", "))
         }
         DeValue::Table(_) => "a table".to_string(),

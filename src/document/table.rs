@@ -8,8 +8,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::file_text::FileText;
-use super::keys::{alike, in_common};
-use super::scalar::shown;
+use super::keys::{resembles, shared_ends};
+use super::scalar::as_written;
 
 /// One table of a document. Keys that nobody asked for are violations, which
 /// are reported when the table is dropped.
@@ -20,7 +20,7 @@ pub struct Table<'a> {
     line: Option<usize>,
     strict: bool,
     asked: RefCell<BTreeSet<&'static str>>,
-    passed_over: Cell<bool>,
+    unknown_keys_allowed: Cell<bool>,
 }
 
 impl<'a> Table<'a> {
@@ -33,14 +33,14 @@ impl<'a> Table<'a> {
             line: None,
             strict: true,
             asked: RefCell::default(),
-            passed_over: Cell::new(false),
+            unknown_keys_allowed: Cell::new(false),
         }
     }
 
     /// Lets unknown keys of this table pass: which there may be hangs on one
     /// that is wrong.
-    pub fn pass_over(&self) {
-        self.passed_over.set(true);
+    pub fn allow_unknown_keys(&self) {
+        self.unknown_keys_allowed.set(true);
     }
 
     fn child(&self, key: &'static str, items: Option<&'a DeTable<'a>>, strict: bool) -> Table<'a> {
@@ -52,12 +52,12 @@ impl<'a> Table<'a> {
             line: value.map(|value| self.text.line_of(value.span().start)),
             strict,
             asked: RefCell::default(),
-            passed_over: Cell::new(false),
+            unknown_keys_allowed: Cell::new(false),
         }
     }
 
     /// Reports the absence of a key, unless the table may be incomplete.
-    pub fn absent(&self, key: &'static str, expected: impl Into<String>) {
+    pub fn report_absent(&self, key: &'static str, expected: impl Into<String>) {
         if self.strict {
             self.report(key, "nothing", expected);
         }
@@ -88,7 +88,7 @@ impl<'a> Table<'a> {
         match self.get(key)?.get_ref() {
             DeValue::Table(items) => Some(self.child(key, Some(items), true)),
             other => {
-                self.report(key, shown(other), format!("a table [{}]", self.key_path(key)));
+                self.report(key, as_written(other), format!("a table [{}]", self.key_path(key)));
                 None
             }
         }
@@ -129,7 +129,7 @@ impl<'a> Table<'a> {
 
 impl Drop for Table<'_> {
     fn drop(&mut self) {
-        if self.passed_over.get() {
+        if self.unknown_keys_allowed.get() {
             return;
         }
         let asked = self.asked.borrow();
@@ -139,8 +139,8 @@ impl Drop for Table<'_> {
                 continue;
             }
             let line = self.text.line_of(key.span().start);
-            let likely = asked.iter().filter(|known| alike(known, name));
-            let near = likely.max_by_key(|known| in_common(known, name).iter().sum::<usize>());
+            let likely = asked.iter().filter(|known| resembles(known, name));
+            let near = likely.max_by_key(|known| shared_ends(known, name).iter().sum::<usize>());
             let expected = match near {
                 Some(known) => format!("\"{known}\"?"),
                 None if asked.is_empty() => "nothing here".to_string(),

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use toml::Spanned;
 use toml::de::DeValue;
 
-use super::scalar::{as_integer, as_number, shown};
+use super::scalar::{as_integer, as_number, as_written};
 use super::table::Table;
 
 impl<'a> Table<'a> {
@@ -16,7 +16,7 @@ impl<'a> Table<'a> {
         match number {
             Some(number) if range.contains(&number) => Some(number),
             _ => {
-                self.report(key, shown(value), expected_number(&range));
+                self.report(key, as_written(value), expected_number(&range));
                 None
             }
         }
@@ -25,7 +25,7 @@ impl<'a> Table<'a> {
     /// A number that must be there.
     pub fn number(&self, key: &'static str, range: RangeInclusive<f64>) -> Option<f64> {
         if !self.has(key) {
-            self.absent(key, expected_number(&range));
+            self.report_absent(key, expected_number(&range));
         }
         self.optional_number(key, range)
     }
@@ -47,7 +47,7 @@ impl<'a> Table<'a> {
             Some(number) if range.contains(&number) => Some(number),
             _ => {
                 let expected = format!("a whole number from {} to {}", range.start(), range.end());
-                self.report(key, shown(value), expected);
+                self.report(key, as_written(value), expected);
                 None
             }
         }
@@ -104,7 +104,7 @@ impl<'a> Table<'a> {
         may_be: impl Fn(usize) -> bool,
     ) -> Option<Vec<f64>> {
         let Some(value) = self.get(key) else {
-            self.absent(key, expected);
+            self.report_absent(key, expected);
             return None;
         };
         let numbers: Option<Vec<f64>> = value.get_ref().as_array().and_then(|array| {
@@ -112,7 +112,7 @@ impl<'a> Table<'a> {
         });
         let found = numbers.filter(|numbers| may_be(numbers.len()));
         if found.is_none() {
-            self.report(key, shown(value.get_ref()), expected);
+            self.report(key, as_written(value.get_ref()), expected);
         }
         found
     }
@@ -132,7 +132,7 @@ impl<'a> Table<'a> {
         match value.as_str() {
             Some(text) if !text.is_empty() => Some(text),
             _ => {
-                self.report(key, shown(value), "a text in quotes");
+                self.report(key, as_written(value), "a text in quotes");
                 None
             }
         }
@@ -141,7 +141,7 @@ impl<'a> Table<'a> {
     /// A text that must be there.
     pub fn text(&self, key: &'static str) -> Option<&'a str> {
         if !self.has(key) {
-            self.absent(key, "a text in quotes");
+            self.report_absent(key, "a text in quotes");
         }
         self.optional_text(key)
     }
@@ -150,7 +150,7 @@ impl<'a> Table<'a> {
     pub fn texts(&self, key: &'static str) -> Option<Vec<String>> {
         let expected = "texts in brackets, each in quotes";
         let Some(value) = self.get(key) else {
-            self.absent(key, expected);
+            self.report_absent(key, expected);
             return None;
         };
         let texts = value.get_ref().as_array().and_then(|array| {
@@ -158,7 +158,7 @@ impl<'a> Table<'a> {
             array.iter().map(|item| text(item).filter(|text| !text.is_empty())).collect()
         });
         if texts.is_none() {
-            self.report(key, shown(value.get_ref()), expected);
+            self.report(key, as_written(value.get_ref()), expected);
         }
         texts
     }
@@ -170,7 +170,7 @@ impl<'a> Table<'a> {
             words.iter().find(|word| value.get_ref().as_str() == Some(word.0)).map(|word| word.1);
         if found.is_none() {
             let names: Vec<String> = words.iter().map(|word| format!("\"{}\"", word.0)).collect();
-            self.report(key, shown(value.get_ref()), names.join(" or "));
+            self.report(key, as_written(value.get_ref()), names.join(" or "));
         }
         found
     }
@@ -181,7 +181,7 @@ impl<'a> Table<'a> {
             return self.choice(key, words);
         }
         let names: Vec<String> = words.iter().map(|word| format!("\"{}\"", word.0)).collect();
-        self.absent(key, names.join(" or "));
+        self.report_absent(key, names.join(" or "));
         None
     }
 }

@@ -5,7 +5,7 @@ use crossbeam_channel::Sender;
 
 use super::line::{Client, Dialect, Heard, LinkEvent, LinkTiming, Open, Unsent, Written};
 use crate::core::time::Stamp;
-use crate::extruder::{Drive, ExtruderCommand};
+use crate::extruder::{CommandQuantity, ExtruderCommand};
 use crate::io::clock::RunClock;
 use crate::link::extruder::{DriveLine, ExtruderHello, ExtruderLine, ExtruderStatus, on_wire};
 use crate::link::{LineError, MAX_VALID_MS, MIN_VALID_MS};
@@ -17,7 +17,7 @@ pub struct ExtruderConfig {
     /// `host:port`.
     pub address: String,
     /// What the cell commands.
-    pub drive: Drive,
+    pub drive: CommandQuantity,
     /// Smallest command of the cell, in the unit of `drive`.
     pub min: f64,
     /// Largest command of the cell, in the same unit.

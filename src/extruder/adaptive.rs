@@ -21,8 +21,8 @@ mod mrac;
 #[cfg(test)]
 mod tests;
 
-pub use gains::{Adaptation, GainError, Gains, Safety, ScalarPlant};
-pub use mrac::{Action, AdaptiveLaw, RampErrors};
+pub use gains::{Adaptation, AdaptiveGains, EstimateBounds, GainError, ScalarPlant};
+pub use mrac::{Action, MracController, RampErrors};
 
 use crate::core::time::Span;
 
@@ -45,7 +45,7 @@ pub struct StrandModel {
 
 /// What is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reading {
+pub struct StrandReading {
     /// v̄1 \[m/s\].
     pub nozzle_m_per_s: f64,
     /// ū3 \[m/s\].
@@ -56,7 +56,7 @@ pub struct Reading {
 
 /// What is wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Targets {
+pub struct StrandTargets {
     /// v̄1 \[m/s\].
     pub nozzle_m_per_s: f64,
     /// ū3 \[m/s\].
@@ -65,7 +65,7 @@ pub struct Targets {
 
 /// What is commanded.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Inputs {
+pub struct StrandInputs {
     /// ṁ \[kg/s\].
     pub mass_flow_kg_per_s: f64,
     /// `U_s` \[m/s\].
@@ -87,20 +87,20 @@ pub struct SubSystemError {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Adaptive {
     model: StrandModel,
-    nozzle: AdaptiveLaw,
-    strand: AdaptiveLaw,
+    nozzle: MracController,
+    strand: MracController,
 }
 
 impl Adaptive {
     /// Both laws, with commands that are held for `hold`.
     pub fn new(
         model: StrandModel,
-        nozzle: Gains,
-        strand: Gains,
+        nozzle: AdaptiveGains,
+        strand: AdaptiveGains,
         hold: Span,
     ) -> Result<Self, SubSystemError> {
         let of = |part, plant, gains| {
-            AdaptiveLaw::new(plant, gains, hold).map_err(|why| SubSystemError { part, why })
+            MracController::new(plant, gains, hold).map_err(|why| SubSystemError { part, why })
         };
         let coupling = [model.pressure_gain, model.swell, model.push_per_s];
         if let Some(value) = coupling.into_iter().find(|value| !value.is_finite()) {
@@ -113,50 +113,56 @@ impl Adaptive {
     }
 
     /// Starts bumpless from what is measured and applied in a steady state.
-    pub fn start(&mut self, reading: &Reading, applied: Inputs) {
-        let (pressure, push) = self.known(reading.pressure_gradient, reading.nozzle_m_per_s);
+    pub fn start(&mut self, reading: &StrandReading, applied: StrandInputs) {
+        let (pressure, push) =
+            self.coupling_inputs(reading.pressure_gradient, reading.nozzle_m_per_s);
         self.nozzle.start(reading.nozzle_m_per_s, applied.mass_flow_kg_per_s, pressure);
         self.strand.start(reading.strand_m_per_s, applied.plate_m_per_s, push);
     }
 
     /// Sets both estimates: of the feed \[kg/s\] and of the plate \[m/s\].
-    pub fn know(&mut self, feed_kg_per_s: f64, plate_m_per_s: f64) {
-        self.nozzle.know(feed_kg_per_s);
-        self.strand.know(plate_m_per_s);
+    pub fn set_estimates(&mut self, feed_kg_per_s: f64, plate_m_per_s: f64) {
+        self.nozzle.set_estimate(feed_kg_per_s);
+        self.strand.set_estimate(plate_m_per_s);
     }
 
     /// One step of both, `dt` after the last one. Returns the actions of the
     /// nozzle (kg/s) and of the strand (m/s).
-    pub fn step(&mut self, reading: &Reading, targets: &Targets, dt: Span) -> (Action, Action) {
-        let (pressure, _) = self.known(reading.pressure_gradient, 0.0);
+    pub fn step(
+        &mut self,
+        reading: &StrandReading,
+        targets: &StrandTargets,
+        dt: Span,
+    ) -> (Action, Action) {
+        let (pressure, _) = self.coupling_inputs(reading.pressure_gradient, 0.0);
         let reference = self.nozzle.reference_for(targets.nozzle_m_per_s);
         let nozzle = self.nozzle.step(reading.nozzle_m_per_s, reference, pressure, dt);
         // The nozzle moves while the plate's command is held: its mean counts.
-        let mean = f64::midpoint(nozzle.model + nozzle.error, nozzle.foretold);
-        let (_, push) = self.known(0.0, mean);
+        let mean = f64::midpoint(nozzle.model + nozzle.error, nozzle.predicted);
+        let (_, push) = self.coupling_inputs(0.0, mean);
         let reference = self.strand.reference_for(targets.strand_m_per_s);
         let strand = self.strand.step(reading.strand_m_per_s, reference, push, dt);
         (nozzle, strand)
     }
 
     /// Tells what was applied in place of the commands.
-    pub fn settle(&mut self, applied: Inputs) {
+    pub fn settle(&mut self, applied: StrandInputs) {
         self.nozzle.settle(applied.mass_flow_kg_per_s);
         self.strand.settle(applied.plate_m_per_s);
     }
 
     /// The law of the nozzle.
-    pub fn nozzle(&self) -> &AdaptiveLaw {
+    pub fn nozzle(&self) -> &MracController {
         &self.nozzle
     }
 
     /// The law of the strand.
-    pub fn strand(&self) -> &AdaptiveLaw {
+    pub fn strand(&self) -> &MracController {
         &self.strand
     }
 
     /// What pressure and nozzle do, as inputs: (β1/β3)·p and (β4·β5/β7)·v̄1.
-    fn known(&self, pressure_gradient: f64, nozzle_m_per_s: f64) -> (f64, f64) {
+    fn coupling_inputs(&self, pressure_gradient: f64, nozzle_m_per_s: f64) -> (f64, f64) {
         let model = &self.model;
         let pressure = model.pressure_gain / model.nozzle.input_gain * pressure_gradient;
         let push = model.swell * model.push_per_s / model.strand.input_gain * nozzle_m_per_s;

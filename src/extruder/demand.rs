@@ -3,15 +3,15 @@
 use crate::core::units::{Mm, Mm2, Mm3PerS, MmPerS};
 
 /// Most by which a robot that moves faster than it was told raises the flow.
-const MOST: f64 = 1.5;
+const MAX_FLOW_RATIO: f64 = 1.5;
 /// Share of the setpoint by which the speed may differ before the flow follows:
 /// a robot is always a little behind a setpoint that changes, and a flow that
 /// followed that would undo some of the width controller's work.
-const SLACK: f64 = 0.05;
+const SPEED_DEADBAND: f64 = 0.05;
 
 /// What the flow goes by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Follows {
+pub enum FlowFollows {
     /// The start speed alone: the flow is the same all along the bead.
     StartSpeed,
     /// The robot, as far as it moves slower or faster than it was told, once it
@@ -46,7 +46,7 @@ pub struct RobotSpeed {
 pub struct FlowDemand {
     section: Mm2,
     speed: MmPerS,
-    follows: Follows,
+    follows: FlowFollows,
 }
 
 /// A bead whose section cannot be.
@@ -72,7 +72,7 @@ pub fn section(width: Mm, height: Mm) -> Result<Mm2, SectionError> {
 
 impl FlowDemand {
     /// For a bead of this section at this speed.
-    pub const fn new(section: Mm2, speed: MmPerS, follows: Follows) -> Self {
+    pub const fn new(section: Mm2, speed: MmPerS, follows: FlowFollows) -> Self {
         Self { section, speed, follows }
     }
 
@@ -83,10 +83,11 @@ impl FlowDemand {
 
     /// The flow that is wanted while the robot, told one speed, moves at
     /// another; none where the robot says nothing.
-    pub fn wanted(&self, robot: Option<RobotSpeed>) -> Mm3PerS {
+    pub fn flow(&self, robot: Option<RobotSpeed>) -> Mm3PerS {
         match (self.follows, robot) {
-            (Follows::Robot, Some(robot)) if robot.setpoint > MmPerS::ZERO => {
-                self.nominal() * followed(robot.actual / robot.setpoint).clamp(0.0, MOST)
+            (FlowFollows::Robot, Some(robot)) if robot.setpoint > MmPerS::ZERO => {
+                self.nominal()
+                    * flow_ratio(robot.actual / robot.setpoint).clamp(0.0, MAX_FLOW_RATIO)
             }
             _ => self.nominal(),
         }
@@ -95,11 +96,11 @@ impl FlowDemand {
 
 /// The share that the flow goes by: 1 within the slack, nothing where the
 /// robot stands, without a step between.
-fn followed(share: f64) -> f64 {
-    if share < 1.0 - SLACK {
-        share / (1.0 - SLACK)
-    } else if share > 1.0 + SLACK {
-        share - SLACK
+fn flow_ratio(ratio: f64) -> f64 {
+    if ratio < 1.0 - SPEED_DEADBAND {
+        ratio / (1.0 - SPEED_DEADBAND)
+    } else if ratio > 1.0 + SPEED_DEADBAND {
+        ratio - SPEED_DEADBAND
     } else {
         1.0
     }
@@ -122,21 +123,19 @@ mod tests {
     #[test]
     fn a_flow_that_follows_the_robot_leaves_the_width_controller_its_say() {
         let flow = |follows, robot| {
-            FlowDemand::new(Mm2::constant(4.0), MmPerS::constant(100.0), follows)
-                .wanted(robot)
-                .get()
+            FlowDemand::new(Mm2::constant(4.0), MmPerS::constant(100.0), follows).flow(robot).get()
         };
         let speeds = |setpoint, actual| {
             let [setpoint, actual] = [setpoint, actual].map(MmPerS::constant);
             Some(RobotSpeed { setpoint, actual })
         };
-        assert_eq!(flow(Follows::Robot, speeds(80.0, 80.0)), 400.0);
-        assert_eq!(flow(Follows::Robot, speeds(80.0, 77.0)), 400.0);
-        assert_eq!(flow(Follows::Robot, speeds(80.0, 83.0)), 400.0);
-        assert!((flow(Follows::Robot, speeds(100.0, 47.5)) - 200.0).abs() < 1e-9);
-        assert_eq!(flow(Follows::Robot, speeds(100.0, 0.0)), 0.0);
-        assert_eq!(flow(Follows::Robot, speeds(100.0, 900.0)), 600.0);
-        assert_eq!(flow(Follows::Robot, None), 400.0);
-        assert_eq!(flow(Follows::StartSpeed, speeds(100.0, 50.0)), 400.0);
+        assert_eq!(flow(FlowFollows::Robot, speeds(80.0, 80.0)), 400.0);
+        assert_eq!(flow(FlowFollows::Robot, speeds(80.0, 77.0)), 400.0);
+        assert_eq!(flow(FlowFollows::Robot, speeds(80.0, 83.0)), 400.0);
+        assert!((flow(FlowFollows::Robot, speeds(100.0, 47.5)) - 200.0).abs() < 1e-9);
+        assert_eq!(flow(FlowFollows::Robot, speeds(100.0, 0.0)), 0.0);
+        assert_eq!(flow(FlowFollows::Robot, speeds(100.0, 900.0)), 600.0);
+        assert_eq!(flow(FlowFollows::Robot, None), 400.0);
+        assert_eq!(flow(FlowFollows::StartSpeed, speeds(100.0, 50.0)), 400.0);
     }
 }

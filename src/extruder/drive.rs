@@ -7,7 +7,7 @@ use crate::core::quantity::Unit;
 /// The quantity of an extruder's command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Drive {
+pub enum CommandQuantity {
     /// Speed of a screw or a wheel \[rpm\].
     Rpm,
     /// Voltage of a drive \[V\].
@@ -22,7 +22,7 @@ pub enum Drive {
     Filling,
 }
 
-impl Drive {
+impl CommandQuantity {
     /// All of them with the word that a cell file has for each.
     pub const WORDS: [(&'static str, Self); 6] = [
         ("rpm", Self::Rpm),

@@ -21,10 +21,10 @@ mod observer;
 mod tests;
 mod tracker;
 
-pub use follow::{FlowSeen, Followed, SpeedFeedforward};
+pub use follow::{FlowMeasurement, SpeedFeedforward, SpeedStep};
 pub use forecast::{ExtruderModel, FlowForecast, ScrewSpeed};
-pub use inverse::{Inverse, InverseSettings, RightZeros};
-pub use observer::{FlowObserver, FlowResidual, UnmodelledFlow, share_left};
+pub use inverse::{Inverse, InverseSettings, RightHalfPlaneZeros};
+pub use observer::{FlowObserver, FlowResidual, UnmodelledFlow, unpredictable_fraction};
 pub use tracker::Tracker;
 
 use super::limits::LimitError;
@@ -59,7 +59,7 @@ pub enum FeedforwardError {
          would grow without bound. Mirror it (the output is then late by 2·Re/|z|²), or fit a \
          model with fewer zeros"
     )]
-    RightZero {
+    NonMinimumPhase {
         /// Real part \[1/s\].
         re: f64,
         /// Size of the imaginary part \[1/s\].
@@ -70,7 +70,7 @@ pub enum FeedforwardError {
         "the placed poles' time constant is {time_constant_s} s, which commands every {period_s} s \
          cannot follow: at least {least_s} s, or command more often"
     )]
-    TooQuick {
+    PolesTooFast {
         /// What was asked for \[s\].
         time_constant_s: f64,
         /// Time between two commands \[s\].

@@ -97,11 +97,11 @@ impl CommandLimits {
         } else {
             (demand, CommandLimit::None)
         };
-        let reach = self.rate_per_s * dt.max(Span::ZERO).secs();
-        if ranged > last + reach {
-            (last + reach, CommandLimit::Rise)
-        } else if ranged < last - reach {
-            (last - reach, CommandLimit::Fall)
+        let max_change = self.rate_per_s * dt.max(Span::ZERO).secs();
+        if ranged > last + max_change {
+            (last + max_change, CommandLimit::Rise)
+        } else if ranged < last - max_change {
+            (last - max_change, CommandLimit::Fall)
         } else {
             (ranged, limit)
         }

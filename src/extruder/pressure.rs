@@ -35,10 +35,10 @@ pub mod vsfc;
 #[cfg(test)]
 mod tests;
 
-pub use call_times::Running;
+pub use call_times::InitialState;
 
 /// The longest dead time and lag that are taken \[s\].
-pub const LONGEST_S: f64 = 60.0;
+pub const MAX_TIME_CONSTANT_S: f64 = 60.0;
 
 /// Settings that cannot be.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -78,10 +78,10 @@ pub enum PressureError {
 
 /// A reading that a law does not take.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum Refused {
+pub enum ReadingRefused {
     /// Older than what the law knows already.
     #[error("a reading is {late_s} s older than the last one")]
-    Late {
+    OutOfOrder {
         /// By how much \[s\].
         late_s: f64,
     },
@@ -109,8 +109,8 @@ impl Fopdt {
     /// gain or a lag that is not positive and on times over [`LONGEST_S`].
     pub fn new(gain_mpa_per_rpm: f64, lag_s: f64, dead_time_s: f64) -> Result<Self, PressureError> {
         within("the gain [MPa/rpm]", gain_mpa_per_rpm, 1e-9..=1e9, "between 1e-9 and 1e9")?;
-        within("the lag [s]", lag_s, 1e-3..=LONGEST_S, "between 0.001 and 60")?;
-        within("the dead time [s]", dead_time_s, 0.0..=LONGEST_S, "between 0 and 60")?;
+        within("the lag [s]", lag_s, 1e-3..=MAX_TIME_CONSTANT_S, "between 0.001 and 60")?;
+        within("the dead time [s]", dead_time_s, 0.0..=MAX_TIME_CONSTANT_S, "between 0 and 60")?;
         Ok(Self { gain: gain_mpa_per_rpm, lag_s, dead_time_s })
     }
 
@@ -132,7 +132,7 @@ impl Fopdt {
 
 /// A command to the screw, within the limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Command {
+pub struct ScrewCommand {
     /// Speed to turn at.
     pub speed: Rpm,
     /// The limit that shaped it.
@@ -140,23 +140,23 @@ pub struct Command {
 }
 
 /// A law of the pressure loop.
-pub trait PressureLaw {
+pub trait PressureController {
     /// Takes a reading of the pressure at the nozzle. Refuses one that is
     /// older than the last or beyond anything the machine could have, and is
     /// then as if it had not been.
-    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), Refused>;
+    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), ReadingRefused>;
 
     /// The command from now on. `target` is what is wanted [`Self::lead`]
     /// ahead where that is known, and what is wanted now where it is not. A
     /// call that is not after the last one gives that one's command again.
-    fn step(&mut self, now: Stamp, target: MPa) -> Command;
+    fn step(&mut self, now: Stamp, target: MPa) -> ScrewCommand;
 
     /// Learns that something else than its last command went to the screw from
     /// `now` on, where other limits than its own shaped it.
     fn settle(&mut self, now: Stamp, applied: Rpm);
 
     /// How far ahead the law would like to know the target.
-    fn lead(&self) -> Span {
+    fn preview(&self) -> Span {
         Span::ZERO
     }
 }

@@ -21,29 +21,29 @@ pub struct ReadingFilters {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Readings {
     filters: ReadingFilters,
-    pressure: Passage,
-    flow: Passage,
-    filled: Passage,
+    pressure: ReadingFilter,
+    flow: ReadingFilter,
+    filled: ReadingFilter,
 }
 
 impl Readings {
     /// Before the first report.
     pub fn new(filters: ReadingFilters) -> Self {
-        let passage = Passage::new(filters);
+        let passage = ReadingFilter::new(filters);
         Self { filters, pressure: passage.clone(), flow: passage.clone(), filled: passage }
     }
 
     /// Forgets what was reported: after a gap it is no longer beside what comes.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         *self = Self::new(self.filters);
     }
 
     /// The report as the law is to see it.
-    pub fn pass(&mut self, report: &ExtruderReport) -> ExtruderReport {
+    pub fn filter(&mut self, report: &ExtruderReport) -> ExtruderReport {
         let filters = self.filters;
-        let pressure = self.pressure.pass(report.pressure_mpa.map(f64::from), filters);
-        let flow = self.flow.pass(report.flow_mm3_per_s.map(f64::from), filters);
-        let filled = self.filled.pass(report.filled_mm.map(f64::from), filters);
+        let pressure = self.pressure.filter(report.pressure_mpa.map(f64::from), filters);
+        let flow = self.flow.filter(report.flow_mm3_per_s.map(f64::from), filters);
+        let filled = self.filled.filter(report.filled_mm.map(f64::from), filters);
         ExtruderReport {
             pressure_mpa: pressure.and_then(|mpa| MPa::new(mpa).ok()),
             flow_mm3_per_s: flow.and_then(|flow| Mm3PerS::new(flow).ok()),
@@ -55,14 +55,14 @@ impl Readings {
 
 /// One reading's filters with their windows.
 #[derive(Debug, Clone, PartialEq)]
-struct Passage {
+struct ReadingFilter {
     spikes: Option<LiveHampel>,
     smoothing: Option<LiveSavGol>,
     /// Whether a reading has passed.
     begun: bool,
 }
 
-impl Passage {
+impl ReadingFilter {
     fn new(filters: ReadingFilters) -> Self {
         Self {
             spikes: filters.spikes.map(LiveHampel::new),
@@ -71,7 +71,7 @@ impl Passage {
         }
     }
 
-    fn pass(&mut self, reading: Option<f64>, filters: ReadingFilters) -> Option<f64> {
+    fn filter(&mut self, reading: Option<f64>, filters: ReadingFilters) -> Option<f64> {
         let Some(reading) = reading else {
             // What comes after a reading that was missing is no neighbour of what
             // came before it.
@@ -106,14 +106,14 @@ mod tests {
     }
 
     fn passed(readings: &mut Readings, mpa: f64) -> f64 {
-        readings.pass(&report(mpa)).pressure_mpa.unwrap().get()
+        readings.filter(&report(mpa)).pressure_mpa.unwrap().get()
     }
 
     #[test]
     fn without_filters_a_report_passes_as_it_is() {
         let mut readings = Readings::new(ReadingFilters::default());
         for mpa in [0.6, 7.0, 0.61] {
-            assert_eq!(readings.pass(&report(mpa)), report(mpa));
+            assert_eq!(readings.filter(&report(mpa)), report(mpa));
         }
     }
 
@@ -130,7 +130,7 @@ mod tests {
         let after: Vec<f64> = (200..204).map(|i| passed(&mut readings, noisy(i, 0.9))).collect();
         assert!(after[1] < 0.65 && after[2] > 0.85, "{after:?}");
         // After a report without the reading there is nothing to compare with.
-        assert_eq!(readings.pass(&nothing), nothing);
+        assert_eq!(readings.filter(&nothing), nothing);
         assert!((passed(&mut readings, 0.3) - 0.3).abs() < 1e-12);
     }
 
@@ -140,7 +140,7 @@ mod tests {
         let mut readings = Readings::new(ReadingFilters { spikes: None, smoothing });
         let ramp: Vec<f64> = (0..30).map(|i| passed(&mut readings, 0.01 * f64::from(i))).collect();
         assert!((ramp[29] - 0.29).abs() < 1e-12, "{}", ramp[29]);
-        readings.forget();
+        readings.reset();
         let (mut before, mut after) = (0.0, 0.0);
         for i in 0..40_000 {
             let off = 0.007 * normal_pair(mix(&[5, i]))[0];
@@ -149,7 +149,7 @@ mod tests {
             after += found * found;
         }
         // At the end of eleven samples of a straight line: (2·(2·11 − 1))/(11·12).
-        let share: f64 = after / before;
-        assert!((share - 42.0 / 132.0).abs() < 0.03, "{share}");
+        let fraction: f64 = after / before;
+        assert!((fraction - 42.0 / 132.0).abs() < 0.03, "{fraction}");
     }
 }

@@ -20,5 +20,5 @@ pub mod model;
 pub use control::{ScrewControl, ScrewFault, ScrewStep};
 pub use design::{ScrewDesign, TurnUnit};
 pub use error::ScrewError;
-pub use feedback::{FillLaw, PiecewiseExponential, Saturated};
-pub use model::{Conveying, Pulsation, Screw};
+pub use feedback::{FillFeedback, PiecewiseExponential, SaturatedLinear};
+pub use model::{Conveying, Screw, SpeedPulsation};

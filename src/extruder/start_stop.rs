@@ -23,7 +23,7 @@ mod conditions;
 mod start;
 mod stop;
 
-pub use conditions::Laid;
+pub use conditions::BeadConditions;
 pub use start::{Pause, Start};
 pub use stop::Stop;
 
@@ -31,14 +31,14 @@ use crate::identify::start_stop::parameters::{StartStop, StartStopError};
 
 /// Starts and stops of one kind of bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Timing {
+pub struct StartStopTiming {
     parameters: StartStop,
-    laid: Laid,
+    conditions: BeadConditions,
 }
 
-impl Timing {
+impl StartStopTiming {
     /// Fails where a parameter, the flow, the speed or the share cannot be.
-    pub fn new(parameters: StartStop, laid: Laid) -> Result<Self, StartStopError> {
+    pub fn new(parameters: StartStop, laid: BeadConditions) -> Result<Self, StartStopError> {
         parameters.check()?;
         for (what, value) in [
             ("the flow of a bead [mm³/s]", laid.flow.get()),
@@ -48,8 +48,8 @@ impl Timing {
                 return Err(StartStopError::NotPositive { what, value });
             }
         }
-        if !(laid.least_share > 0.0 && laid.least_share <= 1.0) {
-            return Err(StartStopError::Share { value: laid.least_share });
+        if !(laid.min_speed_ratio > 0.0 && laid.min_speed_ratio <= 1.0) {
+            return Err(StartStopError::StartSpeedFraction { value: laid.min_speed_ratio });
         }
         let robot_lag_s = laid.robot_lag.secs();
         if robot_lag_s < 0.0 {
@@ -58,7 +58,7 @@ impl Timing {
                 value: robot_lag_s,
             });
         }
-        Ok(Self { parameters, laid })
+        Ok(Self { parameters, conditions: laid })
     }
 
     /// What the extruder is like.
@@ -67,18 +67,18 @@ impl Timing {
     }
 
     /// What is laid.
-    pub const fn laid(&self) -> &Laid {
-        &self.laid
+    pub const fn conditions(&self) -> &BeadConditions {
+        &self.conditions
     }
 
     /// The start after a pause of the pump.
     pub fn start(&self, pause: &Pause) -> Start {
-        Start::after(&self.parameters, &self.laid, pause)
+        Start::after(&self.parameters, &self.conditions, pause)
     }
 
     /// The stop of a bead that flows evenly.
     pub fn stop(&self) -> Stop {
-        Stop::of(&self.parameters, &self.laid)
+        Stop::of(&self.parameters, &self.conditions)
     }
 }
 

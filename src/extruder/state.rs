@@ -84,7 +84,7 @@ pub struct ExtruderTrace {
     pub flow_mm3_per_s: Mm3PerS,
     /// Flow that the law foretells there, where it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub foretold_mm3_per_s: Option<Mm3PerS>,
+    pub predicted_mm3_per_s: Option<Mm3PerS>,
     /// Part of the wish that was known beforehand, in the command's unit.
     pub feedforward: f64,
     /// Part that answers what was measured, in the command's unit.

@@ -7,22 +7,22 @@ mod playback;
 mod pressure_loop;
 mod screw_fill;
 
-pub use interface::{Need, Strategy, Unusable, Wish};
-pub use inverse_model::{Foreseen, OperatingPoint};
+pub use interface::{CommandDemand, ExtruderController, RequiredReading, UnusableReading};
+pub use inverse_model::{InverseFeedforward, OperatingPoint};
 pub use nozzle_speed::{AdaptiveNozzle, NozzleModel};
-pub use playback::{Constant, Played};
+pub use playback::{ConstantCommand, Playback};
 pub use pressure_loop::{PressureChoice, PressureLoop, PressureSettings};
 pub use screw_fill::ScrewFill;
 
 /// A strategy with its memory.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Law {
+pub enum ExtruderStrategy {
     /// One command for as long as bead is laid.
-    Constant(Constant),
+    Constant(ConstantCommand),
     /// Commands that were written down beforehand, for an experiment.
-    Profile(Played),
+    Profile(Playback),
     /// The inverse of a model.
-    Feedforward(Box<Foreseen>),
+    Feedforward(Box<InverseFeedforward>),
     /// The pressure at the nozzle.
     Pressure(Box<PressureLoop>),
     /// The filled length of a screw, foretold over its delay.
@@ -31,28 +31,28 @@ pub enum Law {
     Adaptive(AdaptiveNozzle),
 }
 
-impl Law {
+impl ExtruderStrategy {
     /// The law behind the name.
-    pub fn strategy(&self) -> &dyn Strategy {
+    pub fn controller(&self) -> &dyn ExtruderController {
         match self {
-            Self::Constant(law) => law,
-            Self::Profile(law) => law,
-            Self::Feedforward(law) => law.as_ref(),
-            Self::Pressure(law) => law.as_ref(),
-            Self::Screw(law) => law,
-            Self::Adaptive(law) => law,
+            Self::Constant(controller) => controller,
+            Self::Profile(controller) => controller,
+            Self::Feedforward(controller) => controller.as_ref(),
+            Self::Pressure(controller) => controller.as_ref(),
+            Self::Screw(controller) => controller,
+            Self::Adaptive(controller) => controller,
         }
     }
 
     /// The same, to be stepped.
-    pub fn strategy_mut(&mut self) -> &mut dyn Strategy {
+    pub fn controller_mut(&mut self) -> &mut dyn ExtruderController {
         match self {
-            Self::Constant(law) => law,
-            Self::Profile(law) => law,
-            Self::Feedforward(law) => law.as_mut(),
-            Self::Pressure(law) => law.as_mut(),
-            Self::Screw(law) => law,
-            Self::Adaptive(law) => law,
+            Self::Constant(controller) => controller,
+            Self::Profile(controller) => controller,
+            Self::Feedforward(controller) => controller.as_mut(),
+            Self::Pressure(controller) => controller.as_mut(),
+            Self::Screw(controller) => controller,
+            Self::Adaptive(controller) => controller,
         }
     }
 }

@@ -22,26 +22,26 @@ use super::limits::{CommandLimit, CommandLimits};
 use super::rates::Rate;
 use super::readings::{ReadingFilters, Readings};
 use super::report::{ExtruderCommand, ExtruderReport};
-use super::start_stop::Timing;
+use super::start_stop::StartStopTiming;
 use super::state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
-use super::strategy::{Law, Wish};
+use super::strategy::{CommandDemand, ExtruderStrategy};
 use super::trajectory::PlannedJob;
-use super::{Drive, RobotFollows};
-use crate::core::readback::Follow;
+use super::{CommandQuantity, RobotFollows};
+use crate::core::readback::SpeedMonitor;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{MPa, Mm, Mm3PerS, MmPerS};
-use sequencer::{Pauses, Shares};
+use sequencer::{StartStopSequencer, TransitionRatios};
 
 /// Most by which a robot that follows the flow is quickened.
-const MOST_SHARE: f64 = 1.5;
+const MAX_SPEED_RATIO: f64 = 1.5;
 
 /// Everything the extruder side has to know of its cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderSetup {
     /// What is commanded.
-    pub drive: Drive,
+    pub quantity: CommandQuantity,
     /// The strategy.
-    pub law: Law,
+    pub strategy: ExtruderStrategy,
     /// What commands may be.
     pub limits: CommandLimits,
     /// Time from one step of the feedforward to the next; that of the ticks.
@@ -61,7 +61,7 @@ pub struct ExtruderSetup {
     /// What the robot's speed goes by besides the width.
     pub robot_follows: RobotFollows,
     /// How it starts and stops, if that is known.
-    pub timing: Option<Timing>,
+    pub timing: Option<StartStopTiming>,
     /// The job that robot and extruder were planned for together, if there is one.
     pub plan: Option<Arc<PlannedJob>>,
 }
@@ -92,18 +92,18 @@ enum Phase {
 
 /// How a pump answers to being told to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Obedience {
+enum StopCompliance {
     /// It rests, or was not told to.
-    Obeys,
+    Complies,
     /// It says that it runs all the same.
     RunsOn { since: Stamp },
     /// It has said so for longer than the cell is patient.
-    Lost { since: Stamp },
+    TimedOut { since: Stamp },
 }
 
-impl Obedience {
-    const fn is_lost(self) -> bool {
-        matches!(self, Self::Lost { .. })
+impl StopCompliance {
+    const fn has_timed_out(self) -> bool {
+        matches!(self, Self::TimedOut { .. })
     }
 }
 
@@ -116,29 +116,29 @@ pub struct Supervisor {
     /// The last one, as the law sees it.
     report: Option<(Stamp, ExtruderReport)>,
     readings: Readings,
-    follow: Follow,
+    readback: SpeedMonitor,
     io: Rate,
     control: Rate,
-    ticked: Option<Stamp>,
-    controlled: Option<Stamp>,
+    last_tick: Option<Stamp>,
+    last_control: Option<Stamp>,
     applied: f64,
     /// When the bead began.
-    begun: Stamp,
+    bead_start: Stamp,
     /// When the last report came, on whatever connection.
-    heard: Option<Stamp>,
+    last_report_at: Option<Stamp>,
     /// Whether the pump rests when it is told to. Beside the phase, so that what
     /// stopped the pump first is not forgotten.
-    obedience: Obedience,
+    stop_compliance: StopCompliance,
     /// Whether the last report can be true.
-    usable: bool,
+    report_usable: bool,
     /// Whether the valve stays open to let too high a pressure out.
     relieving: bool,
     /// The last command that went out.
-    told: Option<ExtruderCommand>,
+    last_command: Option<ExtruderCommand>,
     /// Starts and stops, where the cell knows them.
-    pauses: Option<Pauses>,
+    start_stop: Option<StartStopSequencer>,
     /// What they make of the last tick.
-    shares: Option<Shares>,
+    ratios: Option<TransitionRatios>,
     trace: ExtruderTrace,
 }
 
@@ -150,21 +150,21 @@ impl Supervisor {
             control: Rate::every(setup.control_period),
             applied: setup.limits.idle(),
             readings: Readings::new(setup.filters),
-            pauses: setup.timing.map(Pauses::new),
-            shares: None,
+            start_stop: setup.timing.map(StartStopSequencer::new),
+            ratios: None,
             setup,
             phase: Phase::Off,
             link_up: false,
             report: None,
-            follow: Follow::default(),
-            ticked: None,
-            controlled: None,
-            begun: Stamp::START,
-            heard: None,
-            obedience: Obedience::Obeys,
-            usable: true,
+            readback: SpeedMonitor::default(),
+            last_tick: None,
+            last_control: None,
+            bead_start: Stamp::START,
+            last_report_at: None,
+            stop_compliance: StopCompliance::Complies,
+            report_usable: true,
             relieving: false,
-            told: None,
+            last_command: None,
             trace: ExtruderTrace::default(),
         }
     }
@@ -172,7 +172,9 @@ impl Supervisor {
     /// The state in words for outside.
     pub const fn state(&self) -> ExtruderState {
         match self.phase {
-            _ if self.obedience.is_lost() => ExtruderState::Fault(ExtruderFault::RunsOn),
+            _ if self.stop_compliance.has_timed_out() => {
+                ExtruderState::Fault(ExtruderFault::RunsOn)
+            }
             Phase::Off => ExtruderState::Off,
             Phase::Starting { .. } => ExtruderState::Starting,
             Phase::Running => ExtruderState::Running,
@@ -191,48 +193,50 @@ impl Supervisor {
     /// that which belongs to it, else for a robot that follows the flow the
     /// flow that is foretold over the one that is wanted; 1 where the robot
     /// does not follow, or nothing is known of the flow.
-    pub fn robot_share(&self) -> f64 {
-        self.shares.map_or_else(|| self.foretold_share(), |shares| shares.robot)
+    pub fn robot_speed_ratio(&self) -> f64 {
+        self.ratios.map_or_else(|| self.predicted_speed_ratio(), |shares| shares.robot)
     }
 
     /// The flow at the nozzle over the one that is wanted, by which the bead that is
     /// laid is wider than the speed alone tells; 1 where nothing is known of it.
-    pub fn flow_share(&self) -> f64 {
-        self.shares.map_or_else(|| self.foretold().unwrap_or(1.0), |shares| shares.flow)
+    pub fn flow_ratio(&self) -> f64 {
+        self.ratios.map_or_else(|| self.predicted_flow_ratio().unwrap_or(1.0), |shares| shares.flow)
     }
 
     /// Whether a start or a stop is on its way, by which the robot goes.
-    pub const fn is_passing(&self) -> bool {
-        self.shares.is_some()
+    pub const fn is_in_transition(&self) -> bool {
+        self.ratios.is_some()
     }
 
     /// How far from the end of a bead that is laid at this speed the pump is to stop;
     /// none where nothing is known of stops.
-    pub fn way_of_stop(&self, speed: MmPerS) -> Option<Mm> {
-        self.pauses.as_ref().map(|pauses| pauses.way(speed))
+    pub fn stop_distance(&self, speed: MmPerS) -> Option<Mm> {
+        self.start_stop.as_ref().map(|pauses| pauses.stop_distance(speed))
     }
 
     /// The command that was planned for where the nozzle is now, which the law gives once
     /// the flow has come; none without a plan.
     pub fn plan(&mut self, command: Option<f64>) {
-        self.setup.law.strategy_mut().plan(command);
+        self.setup.strategy.controller_mut().plan(command);
     }
 
-    fn foretold_share(&self) -> f64 {
+    fn predicted_speed_ratio(&self) -> f64 {
         match self.setup.robot_follows {
-            RobotFollows::Flow => self.foretold().unwrap_or(1.0),
+            RobotFollows::Flow => self.predicted_flow_ratio().unwrap_or(1.0),
             RobotFollows::Nothing => 1.0,
         }
     }
 
     /// The flow that is foretold over the one that is wanted, where one is and no plan has
     /// foreseen how robot and flow go together.
-    fn foretold(&self) -> Option<f64> {
+    fn predicted_flow_ratio(&self) -> Option<f64> {
         let wanted = self.trace.flow_mm3_per_s;
-        if self.setup.law.strategy().is_on_plan() || wanted <= Mm3PerS::ZERO {
+        if self.setup.strategy.controller().is_on_plan() || wanted <= Mm3PerS::ZERO {
             return None;
         }
-        self.trace.foretold_mm3_per_s.map(|foretold| (foretold / wanted).clamp(0.0, MOST_SHARE))
+        self.trace
+            .predicted_mm3_per_s
+            .map(|predicted| (predicted / wanted).clamp(0.0, MAX_SPEED_RATIO))
     }
 
     /// The link to the extruder came up.
@@ -244,35 +248,35 @@ impl Supervisor {
     pub fn link_went_down(&mut self, now: Stamp) {
         self.link_up = false;
         self.report = None;
-        self.readings.forget();
-        self.obedience = Obedience::Obeys;
-        self.follow.reset();
+        self.readings.reset();
+        self.stop_compliance = StopCompliance::Complies;
+        self.readback.reset();
         self.hold(now, ExtruderHold::LinkDown);
     }
 
     /// It is time for a step of the feedforward. Gives a command when one is
     /// due, and at once when the pump is to stop.
     pub fn tick(&mut self, now: Stamp, laying: Laying) -> Option<ExtruderCommand> {
-        let dt = self.ticked.replace(now).map_or(Span::ZERO, |last| now - last);
+        let dt = self.last_tick.replace(now).map_or(Span::ZERO, |last| now - last);
         match laying {
-            Laying::Bead(_) if self.obedience.is_lost() => {}
+            Laying::Bead(_) if self.stop_compliance.has_timed_out() => {}
             Laying::Bead(flow) => self.lay(now, dt, flow),
-            Laying::Ending(flow) => self.run_out(now, flow),
+            Laying::Ending(flow) => self.end_early(now, flow),
             Laying::Stopped if matches!(self.phase, Phase::Fault(_)) => {}
             Laying::Stopped | Laying::Idle => self.rest(),
         }
         let command = self.command();
-        let ran = self.told.is_some_and(|told| told.pump_on);
+        let ran = self.last_command.is_some_and(|last| last.pump_on);
         let stops = ran && !command.pump_on;
         // Nothing is sent on a connection before it is known what the pump does.
         if !(self.io.due(now) || stops) || !self.link_up || self.report.is_none() {
             return None;
         }
-        if let Some(pauses) = self.pauses.as_mut().filter(|_| ran != command.pump_on) {
-            pauses.turned(now, command.pump_on);
+        if let Some(pauses) = self.start_stop.as_mut().filter(|_| ran != command.pump_on) {
+            pauses.pump_switched(now, command.pump_on);
         }
-        self.told = Some(command);
-        self.told
+        self.last_command = Some(command);
+        self.last_command
     }
 
     /// The run is being ended: the pump stops now.
@@ -281,8 +285,8 @@ impl Supervisor {
         if !self.link_up {
             return None;
         }
-        self.told = Some(self.command());
-        self.told
+        self.last_command = Some(self.command());
+        self.last_command
     }
 
     fn command(&self) -> ExtruderCommand {
@@ -295,19 +299,19 @@ impl Supervisor {
     }
 
     fn drive(&mut self, now: Stamp, dt: Span, flow: Mm3PerS) {
-        self.setup.law.strategy_mut().foresee(dt, flow);
+        self.setup.strategy.controller_mut().feedforward(dt, flow);
         if self.answer(now) == Some(false) {
-            self.usable = false;
+            self.report_usable = false;
             self.hold(now, ExtruderHold::BadReading);
             return;
         }
-        let law = self.setup.law.strategy_mut();
-        let wish = law.wish();
-        let (applied, limit) = self.setup.limits.apply(wish.value, self.applied, dt);
-        let limit = if limit == CommandLimit::None { law.limit() } else { limit };
-        law.settle(now, applied);
+        let controller = self.setup.strategy.controller_mut();
+        let demand = controller.demand();
+        let (applied, limit) = self.setup.limits.apply(demand.value, self.applied, dt);
+        let limit = if limit == CommandLimit::None { controller.limit() } else { limit };
+        controller.settle(now, applied);
         self.applied = applied;
-        self.note(wish, limit);
+        self.note(demand, limit);
     }
 
     /// Lets the law answer the last report where that is due, and says whether
@@ -317,13 +321,13 @@ impl Supervisor {
         if !self.control.due(now) {
             return None;
         }
-        let since = self.controlled.replace(now).map_or(Span::ZERO, |last| now - last);
-        Some(self.setup.law.strategy_mut().answer(now, since, &report).is_ok())
+        let since = self.last_control.replace(now).map_or(Span::ZERO, |last| now - last);
+        Some(self.setup.strategy.controller_mut().control(now, since, &report).is_ok())
     }
 
-    fn note(&mut self, wish: Wish, limit: CommandLimit) {
-        self.trace.feedforward = finite(wish.feedforward);
-        self.trace.feedback = finite(wish.feedback);
+    fn note(&mut self, demand: CommandDemand, limit: CommandLimit) {
+        self.trace.feedforward = finite(demand.feedforward);
+        self.trace.feedback = finite(demand.feedback);
         self.trace.limit = limit;
     }
 }

@@ -5,5 +5,5 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub use job::{Planned, PlannedCourse, PlannedJob, Range};
-pub use table::{TableError, read};
+pub use job::{PlannedJob, PlannedPoint, PlannedTrajectory, Range};
+pub use table::{PlanTableError, read};

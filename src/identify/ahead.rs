@@ -5,139 +5,149 @@
 //! which is ahead. It counts where such a model fits much better than every one
 //! that only answers.
 
-use super::fit::{Before, DeadTime, Fit, Note, Samples, Settings, Structure, fit};
-use crate::numeric::number::float;
+use super::fit::{DeadTime, Fit, FitNote, FitSettings, InitialCondition, Samples, Structure, fit};
+use crate::numeric::number::to_f64;
 
 /// The output is looked for ahead by up to this share of the record…
-const LEAD_SHARE: f64 = 0.125;
+const LEAD_FRACTION: f64 = 0.125;
 /// …and up to this \[s\].
-const LEAD_S: f64 = 10.0;
+const MAX_LEAD_S: f64 = 10.0;
 /// Shares of that which are tried: dead times are looked for on a grid that is
 /// coarse where their range is wide.
-const SHARES: [f64; 3] = [1.0, 0.25, 0.0625];
+const LEAD_FRACTIONS: [f64; 3] = [1.0, 0.25, 0.0625];
 /// What a model that runs ahead may leave at the most, of the squares of the best
 /// that does not.
-const BETTER: f64 = 0.8;
+const MAX_RESIDUAL_RATIO: f64 = 0.8;
 /// The same as a likelihood ratio over independent samples.
-const SURE: f64 = 20.0;
+const MIN_LIKELIHOOD_RATIO: f64 = 20.0;
 /// A fit below this tells nothing of clocks \[%\].
-const LEAST_PERCENT: f64 = 30.0;
+const MIN_FIT_PERCENT: f64 = 30.0;
 /// A model that fits less well than this may be of an output that is ahead \[%\].
-const POOR_PERCENT: f64 = 50.0;
+const POOR_FIT_PERCENT: f64 = 50.0;
 /// By how many standard errors the output must be ahead, and a dead time be seen.
-const SIGMAS: f64 = 3.0;
+const MIN_SIGMAS: f64 = 3.0;
 /// A model slower than this share of the record may follow a drift.
-const SLOW_SHARE: f64 = 1.0 / 3.0;
+const SLOW_FRACTION: f64 = 1.0 / 3.0;
 
 /// Forms that are tried ahead.
-const AHEAD: [Structure; 3] = [
+const LEADING_FORMS: [Structure; 3] = [
     Structure::FirstOrder { zero: false },
     Structure::SecondOrderOscillating { zero: false },
     Structure::SecondOrderOscillating { zero: true },
 ];
 /// Further forms that only answer: a lead looks like an output that is ahead.
-const ANSWERING: [Structure; 2] =
+const CAUSAL_FORMS: [Structure; 2] =
     [Structure::FirstOrder { zero: true }, Structure::Transfer { poles: 3, zeros: 2 }];
 
 /// An output that is ahead.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ahead {
+pub struct OutputLead {
     /// By how much about, with the form that fits best \[s\].
-    pub ahead_s: f64,
+    pub lead_s: f64,
     /// Standard error of that \[s\].
     pub sigma_s: f64,
     /// Fit of a model that runs ahead \[%\].
     pub fit_percent: f64,
     /// Fit of the best that only answers \[%\]; 0 where none stands.
-    pub answering_percent: f64,
+    pub causal_fit_percent: f64,
 }
 
 /// Whether the output is ahead; not looked for where the model that was found has
 /// a dead time and fits.
-pub fn ahead(samples: &Samples, settings: &Settings, found: Option<&Fit>) -> Option<Ahead> {
-    if found.is_some_and(|fit| is_late(fit) && fit.quality.fit_percent >= POOR_PERCENT) {
+pub fn output_lead(
+    samples: &Samples,
+    settings: &FitSettings,
+    found: Option<&Fit>,
+) -> Option<OutputLead> {
+    if found.is_some_and(|fit| has_dead_time(fit) && fit.quality.fit_percent >= POOR_FIT_PERCENT) {
         return None;
     }
-    let most_s = (LEAD_SHARE * samples.duration_s()).min(LEAD_S);
+    let most_s = (LEAD_FRACTION * samples.duration_s()).min(MAX_LEAD_S);
     // Once to see about where, and again from near there: what the input did
     // before the record is not known for as long as the dead time.
     let leads =
-        SHARES.iter().filter_map(|share| brought_forward(samples, settings, share * most_s));
+        LEAD_FRACTIONS.iter().filter_map(|share| with_lead(samples, settings, share * most_s));
     let (lead_s, first) =
         leads.max_by(|a, b| a.1.quality.fit_percent.total_cmp(&b.1.quality.fit_percent))?;
     let about_s = lead_s - first.parameter("dead_time_s")?.value;
     let near_s = (1.5 * about_s + 2.0 * samples.dt_s()).min(most_s);
-    let (lead_s, fit) = brought_forward(samples, settings, near_s)?;
+    let (lead_s, fit) = with_lead(samples, settings, near_s)?;
     let dead_time = fit.parameter("dead_time_s")?;
     let (ahead_s, sigma_s) = (lead_s - dead_time.value, dead_time.sigma);
-    let is_ahead = ahead_s > SIGMAS * sigma_s && ahead_s > 1.5 * samples.dt_s();
-    let slow = fit.model.poles().iter().any(|p| -p.re * SLOW_SHARE * samples.duration_s() < 1.0);
-    if !is_ahead || slow || fit.quality.fit_percent < LEAST_PERCENT {
+    let is_ahead = ahead_s > MIN_SIGMAS * sigma_s && ahead_s > 1.5 * samples.dt_s();
+    let slow = fit.model.poles().iter().any(|p| -p.re * SLOW_FRACTION * samples.duration_s() < 1.0);
+    if !is_ahead || slow || fit.quality.fit_percent < MIN_FIT_PERCENT {
         return None;
     }
-    let usual = answering(&cut(samples, 0, fit.residuals.len())?, settings);
+    let usual = causal_fit_percent(&shifted(samples, 0, fit.residuals.len())?, settings);
     let answering_percent = found.map_or(usual, |found| usual.max(found.quality.fit_percent));
-    let ratio = share_left(fit.quality.fit_percent) / share_left(answering_percent);
-    let is_better = ratio < BETTER && -fit.independent_samples * libm::log(ratio) > SURE;
-    is_better.then_some(Ahead {
-        ahead_s,
+    let ratio = residual_fraction(fit.quality.fit_percent) / residual_fraction(answering_percent);
+    let is_better = ratio < MAX_RESIDUAL_RATIO
+        && -fit.independent_samples * libm::log(ratio) > MIN_LIKELIHOOD_RATIO;
+    is_better.then_some(OutputLead {
+        lead_s: ahead_s,
         sigma_s,
         fit_percent: fit.quality.fit_percent,
-        answering_percent,
+        causal_fit_percent: answering_percent,
     })
 }
 
-fn is_late(fit: &Fit) -> bool {
-    let to_a_step = |note: &Note| matches!(note, Note::DeadTimeToAStep { .. });
+fn has_dead_time(fit: &Fit) -> bool {
+    let to_a_step = |note: &FitNote| matches!(note, FitNote::DeadTimeToAStep { .. });
     match fit.parameter("dead_time_s") {
-        Some(dead_time) => dead_time.value > SIGMAS * dead_time.sigma,
+        Some(dead_time) => dead_time.value > MIN_SIGMAS * dead_time.sigma,
         None if fit.notes.iter().any(to_a_step) => fit.model.dead_time_s() > 0.0,
-        None => fit.model.dead_time_s() > 0.0 && !fit.notes.contains(&Note::NoDeadTime),
+        None => fit.model.dead_time_s() > 0.0 && !fit.notes.contains(&FitNote::NoDeadTime),
     }
 }
 
 /// Share of the output's squares that a fit leaves.
-fn share_left(fit_percent: f64) -> f64 {
+fn residual_fraction(fit_percent: f64) -> f64 {
     let left = (1.0 - 0.01 * fit_percent).max(1e-9);
     left * left
 }
 
 /// The best model of the output by an input that comes so much earlier, in whole
 /// steps.
-fn brought_forward(samples: &Samples, settings: &Settings, lead_s: f64) -> Option<(f64, Fit)> {
+fn with_lead(samples: &Samples, settings: &FitSettings, lead_s: f64) -> Option<(f64, Fit)> {
     let dt_s = samples.dt_s();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
     let steps = (lead_s / dt_s).floor().max(0.0) as usize;
-    let lead_s = float(steps) * dt_s;
-    let forward = cut(samples, steps, samples.len().checked_sub(steps)?)?;
-    let range = DeadTime::Estimated { least_s: 0.0, most_s: 2.0 * lead_s.max(dt_s) };
-    let fits = AHEAD.iter().filter_map(|form| tried(&forward, settings, *form, range));
+    let lead_s = to_f64(steps) * dt_s;
+    let forward = shifted(samples, steps, samples.len().checked_sub(steps)?)?;
+    let range = DeadTime::Estimated { min_s: 0.0, max_s: 2.0 * lead_s.max(dt_s) };
+    let fits = LEADING_FORMS.iter().filter_map(|form| tried(&forward, settings, *form, range));
     Some((lead_s, fits.min_by(|a, b| a.quality.rmse.total_cmp(&b.quality.rmse))?))
 }
 
 /// Fit of the best model that only answers \[%\].
-fn answering(samples: &Samples, settings: &Settings) -> f64 {
-    let most_s = (LEAD_SHARE * samples.duration_s()).min(LEAD_S);
-    let range = DeadTime::Estimated { least_s: 0.0, most_s };
-    let forms = AHEAD.iter().chain(&ANSWERING);
+fn causal_fit_percent(samples: &Samples, settings: &FitSettings) -> f64 {
+    let most_s = (LEAD_FRACTION * samples.duration_s()).min(MAX_LEAD_S);
+    let range = DeadTime::Estimated { min_s: 0.0, max_s: most_s };
+    let forms = LEADING_FORMS.iter().chain(&CAUSAL_FORMS);
     let fits = forms.filter_map(|form| tried(samples, settings, *form, range));
     fits.map(|fit| fit.quality.fit_percent).fold(0.0, f64::max)
 }
 
 fn tried(
     samples: &Samples,
-    settings: &Settings,
+    settings: &FitSettings,
     structure: Structure,
     dead_time: DeadTime,
 ) -> Option<Fit> {
-    let before = Before::Unknown;
-    let settings =
-        Settings { structure, dead_time, before, accept_undetermined: true, ..*settings };
+    let before = InitialCondition::Unknown;
+    let settings = FitSettings {
+        structure,
+        dead_time,
+        initial_state: before,
+        accept_undetermined: true,
+        ..*settings
+    };
     fit(samples, &settings).ok()
 }
 
 /// The first samples of the output, with those of the input from a later one on.
-fn cut(samples: &Samples, from: usize, count: usize) -> Option<Samples> {
+fn shifted(samples: &Samples, from: usize, count: usize) -> Option<Samples> {
     let input = samples.input().get(from..from + count)?.to_vec();
     Samples::new(input, samples.output().get(..count)?.to_vec(), samples.dt_s()).ok()
 }

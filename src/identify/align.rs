@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_aligned_is_told() {
+    fn what_cannot_be_aligned_is_refused() {
         let fell = to_extruded(&[0.0, 2.0, 1.0], &[0.0; 3], 1.0).unwrap_err();
         assert!(fell.to_string().contains("falls from 2 to 1 at sample 3"), "{fell}");
         assert!(matches!(to_extruded(&[0.0], &[], 1.0), Err(AlignError::Length { .. })));

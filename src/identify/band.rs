@@ -7,7 +7,7 @@ use crate::numeric::lti::{FirstOrder, ModelError, SecondOrder, TransferFunction,
 use super::fit::{DeadTime, Fit, Structure};
 
 /// A parameter is moved by this share of its standard error for a derivative.
-const NUDGE: f64 = 1e-3;
+const RELATIVE_STEP: f64 = 1e-3;
 
 /// A curve with its standard deviation, a value each for every place.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -25,16 +25,16 @@ pub struct Band {
 pub fn step_response(fit: &Fit, step_s: f64, count: u32) -> Result<Band, ModelError> {
     let ones = vec![1.0; count as usize];
     let at = (0..count).map(|k| f64::from(k) * step_s).collect();
-    spread(fit, at, |model| simulate(model, &ones, step_s))
+    with_sigma(fit, at, |model| simulate(model, &ones, step_s))
 }
 
 /// Gain \[dB\] and phase \[°\] at frequencies \[Hz\]; the phase is without jumps
 /// when the frequencies only grow.
 pub fn frequency_response(fit: &Fit, hz: &[f64]) -> Result<[Band; 2], ModelError> {
-    let gain = spread(fit, hz.to_vec(), |model| {
+    let gain = with_sigma(fit, hz.to_vec(), |model| {
         Ok(hz.iter().map(|f| 20.0 * libm::log10(model.at_frequency(radians(*f)).norm())).collect())
     })?;
-    let phase = spread(fit, hz.to_vec(), |model| phase(model, hz))?;
+    let phase = with_sigma(fit, hz.to_vec(), |model| phase(model, hz))?;
     Ok([gain, phase])
 }
 
@@ -54,14 +54,14 @@ fn phase(model: &TransferFunction, hz: &[f64]) -> Result<Vec<f64>, ModelError> {
     Ok(hz.iter().map(&mut next).collect())
 }
 
-fn spread(
+fn with_sigma(
     fit: &Fit,
     at: Vec<f64>,
     answer: impl Fn(&TransferFunction) -> Result<Vec<f64>, ModelError>,
 ) -> Result<Band, ModelError> {
     let value = answer(&fit.model)?;
     let slopes = (0..fit.parameters.len()).map(|number| {
-        let nudge = NUDGE * fit.parameters.get(number).map_or(0.0, |one| one.sigma);
+        let nudge = RELATIVE_STEP * fit.parameters.get(number).map_or(0.0, |one| one.sigma);
         if !(nudge > 0.0 && nudge.is_finite()) {
             return Ok(vec![0.0; value.len()]);
         }
@@ -87,7 +87,7 @@ fn moved(fit: &Fit, number: usize, by: f64) -> Result<TransferFunction, ModelErr
     let of = |name: &str| value(name).unwrap_or(0.0);
     let (gain, zero_s) = (of("gain"), of("zero_s"));
     let given = match fit.settings.dead_time {
-        DeadTime::Given(given) => given,
+        DeadTime::Known(given) => given,
         DeadTime::Estimated { .. } => 0.0,
     };
     let dead_time_s = value("dead_time_s").unwrap_or(given).max(0.0);
@@ -122,7 +122,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
     use super::*;
-    use crate::identify::fit::{Samples, Settings, fit};
+    use crate::identify::fit::{FitSettings, Samples, fit};
     use crate::identify::prbs::Prbs;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
@@ -144,9 +144,9 @@ mod tests {
         let answer = simulate(&truth(), &input, DT_S).unwrap();
         let output = answer.iter().map(|y| y + 0.1 * noise()).collect();
         let samples = Samples::new(input, output, DT_S).unwrap();
-        let dead_time = DeadTime::Estimated { least_s: 0.0, most_s: 2.0 };
-        let settings = Settings::new(structure, dead_time);
-        fit(&samples, &Settings { accept_undetermined: true, ..settings }).unwrap()
+        let dead_time = DeadTime::Estimated { min_s: 0.0, max_s: 2.0 };
+        let settings = FitSettings::new(structure, dead_time);
+        fit(&samples, &FitSettings { accept_undetermined: true, ..settings }).unwrap()
     }
 
     #[test]

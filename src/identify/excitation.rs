@@ -7,14 +7,14 @@ use rand_distr::{Distribution, Normal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::prbs::{NoSuchLength, Prbs};
-use super::profile::{Point, Profile, ProfileError};
+use super::profile::{CommandProfile, CommandProfileError, ProfilePoint};
 
 /// Draws of a Gaussian level after which one outside the limits is cut to them.
-const DRAWS: u32 = 64;
+const MAX_DRAWS: u32 = 64;
 /// Values that a profile may have: a day of ten a second.
 const MAX_POINTS: f64 = 1e6;
 /// A level that is held for T has half its power below this share of 1/T.
-const HALF_POWER: f64 = 0.443;
+const HALF_POWER_FREQUENCY: f64 = 0.443;
 
 /// What cannot be played.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -67,19 +67,19 @@ pub enum ExcitationError {
         "{value} from the beginning to the end: a model can be told only from an input that changes; \
          give levels that differ, and time for more than one of them"
     )]
-    Still {
+    Constant {
         /// The level.
         value: f64,
     },
     /// Something else that is no profile.
     #[error(transparent)]
-    Profile(#[from] ProfileError),
+    Profile(#[from] CommandProfileError),
 }
 
 /// A shape of excitation. Levels are in the unit of the quantity that is
 /// commanded.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Shape {
+pub enum Waveform {
     /// A sequence of maximal length between two levels.
     Prbs {
         /// Length of the register, 3 to 16.
@@ -110,7 +110,7 @@ pub enum Shape {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excitation {
     /// Its shape.
-    pub shape: Shape,
+    pub shape: Waveform,
     /// How long each level is held \[s\]; the bit time of a sequence.
     pub hold_s: f64,
     /// How long it lasts \[s\]; none for one period of a sequence, and for each
@@ -120,7 +120,7 @@ pub struct Excitation {
 
 impl Excitation {
     /// The profile; fails where the numbers make none.
-    pub fn profile(&self) -> Result<Profile, ExcitationError> {
+    pub fn profile(&self) -> Result<CommandProfile, ExcitationError> {
         let (hold_s, duration_s) = (self.hold_s, self.duration_s()?);
         let count = (duration_s / hold_s - 1e-9).ceil();
         if !(hold_s > 0.0 && (1.0..=MAX_POINTS).contains(&count)) {
@@ -135,12 +135,13 @@ impl Excitation {
         if let Some(value) =
             values.first().copied().filter(|first| values.iter().all(|v| v == first))
         {
-            return Err(ExcitationError::Still { value });
+            return Err(ExcitationError::Constant { value });
         }
         let points = (0_u32..).zip(values);
-        let points =
-            points.map(|(k, value)| Point { from_s: f64::from(k) * hold_s, value }).collect();
-        Ok(Profile::new(points, duration_s)?)
+        let points = points
+            .map(|(k, value)| ProfilePoint { from_s: f64::from(k) * hold_s, value })
+            .collect();
+        Ok(CommandProfile::new(points, duration_s)?)
     }
 
     /// Lowest and highest frequency that it excites with at least half of its
@@ -150,18 +151,18 @@ impl Excitation {
     pub fn band_hz(&self) -> Result<(f64, f64), ExcitationError> {
         let duration_s = self.duration_s()?;
         let period_s = match self.shape {
-            Shape::Prbs { bits, .. } => f64::from(Prbs::new(bits)?.period()) * self.hold_s,
+            Waveform::Prbs { bits, .. } => f64::from(Prbs::new(bits)?.period()) * self.hold_s,
             _ => duration_s,
         };
-        Ok((1.0 / period_s.min(duration_s), HALF_POWER / self.hold_s))
+        Ok((1.0 / period_s.min(duration_s), HALF_POWER_FREQUENCY / self.hold_s))
     }
 
     fn duration_s(&self) -> Result<f64, ExcitationError> {
         let levels = match &self.shape {
-            Shape::Prbs { bits, .. } => f64::from(Prbs::new(*bits)?.period()),
+            Waveform::Prbs { bits, .. } => f64::from(Prbs::new(*bits)?.period()),
             #[expect(clippy::cast_precision_loss, reason = "nobody writes so many")]
-            Shape::Stairs(levels) => levels.len() as f64,
-            Shape::Gaussian { .. } => 0.0,
+            Waveform::Stairs(levels) => levels.len() as f64,
+            Waveform::Gaussian { .. } => 0.0,
         };
         let duration_s = self.duration_s.unwrap_or(levels * self.hold_s);
         if duration_s > 0.0 && duration_s.is_finite() {
@@ -172,7 +173,7 @@ impl Excitation {
     }
 }
 
-impl Shape {
+impl Waveform {
     fn levels(&self, count: u32) -> Result<Vec<f64>, ExcitationError> {
         match *self {
             Self::Prbs { bits, low, high } => {
@@ -189,7 +190,7 @@ impl Shape {
                 }
                 let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
                 let mut level = || {
-                    let mut draws = (0..DRAWS).map(|_| normal.sample(&mut random));
+                    let mut draws = (0..MAX_DRAWS).map(|_| normal.sample(&mut random));
                     let within = draws.find(|drawn| (low..=high).contains(drawn));
                     within.unwrap_or_else(|| normal.sample(&mut random).clamp(low, high))
                 };
@@ -216,12 +217,12 @@ mod tests {
     use super::*;
 
     fn prbs(hold_s: f64, duration_s: Option<f64>) -> Excitation {
-        let shape = Shape::Prbs { bits: 7, low: 20.0, high: 40.0 };
+        let shape = Waveform::Prbs { bits: 7, low: 20.0, high: 40.0 };
         Excitation { shape, hold_s, duration_s }
     }
 
     fn gaussian(sigma: f64) -> Excitation {
-        let shape = Shape::Gaussian { mean: 3.0, sigma, low: 2.0, high: 4.0, seed: 7 };
+        let shape = Waveform::Gaussian { mean: 3.0, sigma, low: 2.0, high: 4.0, seed: 7 };
         Excitation { shape, hold_s: 1.5, duration_s: Some(3000.0) }
     }
 
@@ -265,7 +266,7 @@ mod tests {
 
     #[test]
     fn stairs_come_in_their_order() {
-        let shape = Shape::Stairs(vec![10.0, 30.0, 20.0]);
+        let shape = Waveform::Stairs(vec![10.0, 30.0, 20.0]);
         let stairs = Excitation { shape, hold_s: 5.0, duration_s: None };
         let profile = stairs.profile().unwrap();
         assert_eq!(profile.end_s(), 15.0);
@@ -289,14 +290,15 @@ mod tests {
         assert!(said(prbs(f64::NAN, None)).contains("NaN"));
         assert!(said(gaussian(0.0)).contains("standard deviation 0"));
         assert!(said(gaussian(f64::NAN)).contains("standard deviation NaN"));
-        let level = Excitation { shape: Shape::Stairs(vec![1.0]), hold_s: 1.0, duration_s: None };
+        let level =
+            Excitation { shape: Waveform::Stairs(vec![1.0]), hold_s: 1.0, duration_s: None };
         assert_eq!(said(level), "1 level: a step takes two");
         for (levels, duration_s) in [(vec![3.0, 3.0], None), (vec![3.0, 4.0], Some(0.5))] {
-            let shape = Shape::Stairs(levels);
+            let shape = Waveform::Stairs(levels);
             let still = said(Excitation { shape, hold_s: 1.0, duration_s });
             assert!(still.starts_with("3 from the beginning to the end"), "{still}");
         }
-        let shape = Shape::Prbs { bits: 7, low: 4.0, high: 4.0 };
+        let shape = Waveform::Prbs { bits: 7, low: 4.0, high: 4.0 };
         let flat = Excitation { shape, hold_s: 1.0, duration_s: None };
         assert!(said(flat).contains("levels from 4 to 4"));
     }

@@ -7,26 +7,26 @@ mod suspicion;
 
 use std::fmt;
 
-pub use self::error::{ExperimentError, FEWEST_SAMPLES, Side};
-pub use self::suspicion::doubt_unit;
-use super::grid::{Gap, Grid, usual_step};
-use crate::numeric::number::float;
+pub use self::error::{DataColumn, ExperimentError, MIN_SAMPLES};
+pub use self::suspicion::implausible_unit;
+use super::grid::{SampleGap, TimeGrid, usual_step};
+use crate::numeric::number::to_f64;
 
 /// Usual steps between these can be of an extruder's log \[s\]; beyond them the
 /// unit of time is another.
-const STEPS_S: std::ops::RangeInclusive<f64> = 2e-5..=2.0;
+const PLAUSIBLE_STEPS_S: std::ops::RangeInclusive<f64> = 2e-5..=2.0;
 /// A column that moves by less than this share of its size is constant.
-const STILL: f64 = 1e-9;
+const MIN_RELATIVE_RANGE: f64 = 1e-9;
 
 /// What was done to the data, or is odd about them, in words.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Note {
+pub enum DataNote {
     /// Gaps that were bridged.
     Bridged {
         /// How many.
         count: usize,
         /// The longest one.
-        longest: Gap,
+        longest: SampleGap,
         /// The longest that would be \[s\].
         limit_s: f64,
     },
@@ -37,7 +37,7 @@ pub enum Note {
     },
 }
 
-impl fmt::Display for Note {
+impl fmt::Display for DataNote {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Bridged { count, longest, limit_s } => write!(
@@ -64,7 +64,7 @@ pub struct Rules {
     /// Gaps up to this are bridged \[s\]; none for five steps.
     pub max_gap_s: Option<f64>,
     /// Whether the unit of time was told, and is not doubted.
-    pub time_is_told: bool,
+    pub is_time_unit_known: bool,
 }
 
 /// An input and an output on one even grid.
@@ -82,7 +82,7 @@ pub struct Experiment {
     /// and does not run straight to it.
     pub input_is_held: bool,
     /// What was done to the data.
-    pub notes: Vec<Note>,
+    pub notes: Vec<DataNote>,
 }
 
 impl Experiment {
@@ -94,18 +94,18 @@ impl Experiment {
         rules: &Rules,
     ) -> Result<Self, ExperimentError> {
         let got = time_s.len().min(input.len()).min(output.len());
-        if got < FEWEST_SAMPLES {
+        if got < MIN_SAMPLES {
             return Err(ExperimentError::TooFew { got });
         }
         check_time(time_s, rules)?;
-        let grid = Grid::of(time_s).ok_or(ExperimentError::TooFew { got })?;
-        let notes = bridge(&grid, rules)?;
-        for (side, values) in [(Side::Input, input), (Side::Output, output)] {
+        let grid = TimeGrid::of(time_s).ok_or(ExperimentError::TooFew { got })?;
+        let notes = bridge_gaps(&grid, rules)?;
+        for (side, values) in [(DataColumn::Input, input), (DataColumn::Output, output)] {
             check_moves(side, values)?;
             outlier::check(side, values)?;
         }
         if input == output {
-            return Err(ExperimentError::Same);
+            return Err(ExperimentError::Identical);
         }
         let input_is_held = is_held(input);
         let (input, output) = if grid.is_uneven {
@@ -115,7 +115,7 @@ impl Experiment {
         } else {
             (input.to_vec(), output.to_vec())
         };
-        let Grid { start_s, step_s, .. } = grid;
+        let TimeGrid { start_s, step_s, .. } = grid;
         Ok(Self { start_s, step_s, input, output, input_is_held, notes })
     }
 
@@ -144,29 +144,29 @@ impl Experiment {
     /// The beginning to fit to, and this share of it at the end to validate
     /// with. The notes stay with the first. Fails where either is too short, or
     /// the input or the output of either does not move.
-    pub fn split(mut self, share: f64) -> Result<(Self, Self), ExperimentError> {
+    pub fn split(mut self, fraction: f64) -> Result<(Self, Self), ExperimentError> {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             clippy::cast_precision_loss,
             reason = "a share of a count"
         )]
-        let kept = (self.len() as f64 * (1.0 - share.clamp(0.0, 1.0))).round() as usize;
+        let kept = (self.len() as f64 * (1.0 - fraction.clamp(0.0, 1.0))).round() as usize;
         let left = self.len().saturating_sub(kept);
-        if left < FEWEST_SAMPLES {
+        if left < MIN_SAMPLES {
             return Err(ExperimentError::ShortValidation { got: left });
         }
-        if kept < FEWEST_SAMPLES {
+        if kept < MIN_SAMPLES {
             return Err(ExperimentError::TooFew { got: kept });
         }
         let (input, output) = (self.input.split_off(kept), self.output.split_off(kept));
         let [start_s, end_s] =
-            [kept, kept + left].map(|count| self.start_s + float(count) * self.step_s);
+            [kept, kept + left].map(|count| self.start_s + to_f64(count) * self.step_s);
         for (side, values, validates) in [
-            (Side::Input, &self.input, false),
-            (Side::Output, &self.output, false),
-            (Side::Input, &input, true),
-            (Side::Output, &output, true),
+            (DataColumn::Input, &self.input, false),
+            (DataColumn::Output, &self.output, false),
+            (DataColumn::Input, &input, true),
+            (DataColumn::Output, &output, true),
         ] {
             check_moves(side, values).map_err(|error| {
                 let ExperimentError::Constant { side, value } = error else { return error };
@@ -187,33 +187,33 @@ pub fn check_time(time_s: &[f64], rules: &Rules) -> Result<(), ExperimentError> 
         return Err(ExperimentError::Order { at, before_s: pair[0], time_s: pair[1] });
     }
     let step_s = usual_step(time_s).unwrap_or(0.0);
-    if !rules.time_is_told && !STEPS_S.contains(&step_s) {
+    if !rules.is_time_unit_known && !PLAUSIBLE_STEPS_S.contains(&step_s) {
         return Err(ExperimentError::TimeUnit { step_s });
     }
     Ok(())
 }
 
-fn bridge(grid: &Grid, rules: &Rules) -> Result<Vec<Note>, ExperimentError> {
+fn bridge_gaps(grid: &TimeGrid, rules: &Rules) -> Result<Vec<DataNote>, ExperimentError> {
     let limit_s = rules.max_gap_s.unwrap_or(grid.usual_limit_s());
     let mut notes = Vec::new();
     if let Some(longest) = grid.longest().copied() {
         // A limit of so many steps includes a gap of as many.
-        let is_long = |gap: &&Gap| gap.length_s > limit_s * (1.0 + 1e-6);
+        let is_long = |gap: &&SampleGap| gap.length_s > limit_s * (1.0 + 1e-6);
         let count = grid.gaps.iter().filter(is_long).count();
         if count > 0 {
             return Err(ExperimentError::Gap { gap: longest, count, limit_s });
         }
-        notes.push(Note::Bridged { count: grid.gaps.len(), longest, limit_s });
+        notes.push(DataNote::Bridged { count: grid.gaps.len(), longest, limit_s });
     } else if grid.is_uneven {
-        notes.push(Note::Resampled { step_s: grid.step_s });
+        notes.push(DataNote::Resampled { step_s: grid.step_s });
     }
     Ok(notes)
 }
 
-fn check_moves(side: Side, values: &[f64]) -> Result<(), ExperimentError> {
+fn check_moves(side: DataColumn, values: &[f64]) -> Result<(), ExperimentError> {
     let start = (f64::INFINITY, f64::NEG_INFINITY);
     let (low, high) = values.iter().fold(start, |(low, high), v| (low.min(*v), high.max(*v)));
-    if high - low > STILL * high.abs().max(low.abs()) {
+    if high - low > MIN_RELATIVE_RANGE * high.abs().max(low.abs()) {
         return Ok(());
     }
     Err(ExperimentError::Constant { side, value: low })

@@ -8,23 +8,23 @@ use crate::document::{Document, Table};
 use crate::numeric::lti::TransferFunction;
 
 pub use self::write::to_toml;
-pub(super) use self::write::{number, put, put_setting, row};
+pub(super) use self::write::{number, put, put_conditions, row};
 
 /// Most coefficients of a numerator or a denominator.
-pub const MOST_COEFFICIENTS: usize = 8;
+pub const MAX_COEFFICIENTS: usize = 8;
 /// The same as counts that a row may have.
-const COUNTS: [usize; MOST_COEFFICIENTS] = [1, 2, 3, 4, 5, 6, 7, 8];
+const COUNTS: [usize; MAX_COEFFICIENTS] = [1, 2, 3, 4, 5, 6, 7, 8];
 /// Whatever is beyond is no coefficient of an extruder.
-const ANY: std::ops::RangeInclusive<f64> = -1e15..=1e15;
+const COEFFICIENT_RANGE: std::ops::RangeInclusive<f64> = -1e15..=1e15;
 const DEAD_TIME_S: std::ops::RangeInclusive<f64> = 0.0..=1e4;
 const STEP_S: std::ops::RangeInclusive<f64> = 1e-6..=1e4;
-const FIT: std::ops::RangeInclusive<f64> = -1e6..=100.0;
+const FIT_PERCENT: std::ops::RangeInclusive<f64> = -1e6..=100.0;
 const NOZZLE_MM: std::ops::RangeInclusive<f64> = 0.01..=1e3;
 const TEMPERATURE_C: std::ops::RangeInclusive<f64> = -100.0..=2000.0;
 
 /// What a model holds for; what is not told is `None`.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Setting {
+pub struct Conditions {
     /// Material by its name.
     pub material: Option<String>,
     /// Diameter of the nozzle \[mm\].
@@ -35,7 +35,7 @@ pub struct Setting {
 
 /// A parameter as it was found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Parameter {
+pub struct SavedParameter {
     /// Its name with its unit.
     pub name: String,
     /// Its value.
@@ -46,16 +46,16 @@ pub struct Parameter {
 
 /// What the noise of the data leaves open.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Uncertainty {
+pub struct ParameterUncertainty {
     /// The parameters that were fitted.
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<SavedParameter>,
     /// Their covariance, row by row.
     pub covariance: Vec<f64>,
 }
 
 /// What it was fitted to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Fit {
+pub struct FitSummary {
     /// From sample to sample \[s\].
     pub step_s: f64,
     /// NRMSE fit to the data that it was fitted to \[%\].
@@ -69,7 +69,7 @@ pub struct Fit {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelFile {
     /// What it holds for.
-    pub setting: Setting,
+    pub conditions: Conditions,
     /// Its form, such as `fopdt` or `2,1`.
     pub kind: String,
     /// What goes in.
@@ -83,9 +83,9 @@ pub struct ModelFile {
     /// G(s), stable.
     pub transfer: TransferFunction,
     /// What the noise leaves open.
-    pub uncertainty: Option<Uncertainty>,
+    pub uncertainty: Option<ParameterUncertainty>,
     /// What it was fitted to.
-    pub fit: Option<Fit>,
+    pub fit: Option<FitSummary>,
 }
 
 /// Reads the text of a model's file; `file` is its name in what is said about
@@ -102,7 +102,7 @@ fn read_root(root: &Table<'_>) -> Option<ModelFile> {
     }
     let version = root.optional_integer("version", 1..=1);
     let kind = root.text("kind").map(str::to_owned);
-    let setting = read_setting(root);
+    let setting = read_conditions(root);
     let input = root.required_table("input").and_then(|table| read_input(&table));
     let output = root.required_table("output").and_then(|table| read_side(&table));
     let transfer = root.required_table("transfer").and_then(|table| read_transfer(&table));
@@ -112,7 +112,7 @@ fn read_root(root: &Table<'_>) -> Option<ModelFile> {
     let ((input, input_at), input_range) = input?;
     let (output, output_at) = output?;
     Some(ModelFile {
-        setting,
+        conditions: setting,
         kind: kind?,
         input,
         output,
@@ -131,8 +131,8 @@ fn read_root(root: &Table<'_>) -> Option<ModelFile> {
 }
 
 /// What a file holds for, as far as it tells.
-pub(super) fn read_setting(root: &Table<'_>) -> Setting {
-    Setting {
+pub(super) fn read_conditions(root: &Table<'_>) -> Conditions {
+    Conditions {
         material: root.optional_text("material").map(str::to_owned),
         nozzle_mm: root.optional_number("nozzle_mm", NOZZLE_MM),
         temperature_c: root.optional_number("temperature_c", TEMPERATURE_C),
@@ -144,7 +144,7 @@ fn read_side(table: &Table<'_>) -> Option<(Quantity, f64)> {
     let name = table.text("quantity").map(str::to_owned);
     let words: Vec<(&str, Unit)> = Unit::all().map(|unit| (unit.word(), unit)).collect();
     let unit = table.required_choice("unit", &words);
-    let at = table.number("operating_point", ANY);
+    let at = table.number("operating_point", COEFFICIENT_RANGE);
     Some((Quantity { name: name?, unit: unit? }, at?))
 }
 
@@ -152,7 +152,7 @@ type Input = ((Quantity, f64), (f64, f64));
 
 fn read_input(table: &Table<'_>) -> Option<Input> {
     let side = read_side(table);
-    let [low, high] = table.numbers::<2>("range", ANY)?;
+    let [low, high] = table.numbers::<2>("range", COEFFICIENT_RANGE)?;
     if low >= high {
         table.report(
             "range",
@@ -165,8 +165,8 @@ fn read_input(table: &Table<'_>) -> Option<Input> {
 }
 
 fn read_transfer(table: &Table<'_>) -> Option<TransferFunction> {
-    let numerator = table.row("numerator", &COUNTS, ANY);
-    let denominator = table.row("denominator", &COUNTS, ANY);
+    let numerator = table.row("numerator", &COUNTS, COEFFICIENT_RANGE);
+    let denominator = table.row("denominator", &COUNTS, COEFFICIENT_RANGE);
     let dead_time_s = table.number("dead_time_s", DEAD_TIME_S);
     let denominator = denominator?;
     let found = TransferFunction::new(&numerator?, &denominator, dead_time_s?);
@@ -181,24 +181,28 @@ fn read_transfer(table: &Table<'_>) -> Option<TransferFunction> {
     None
 }
 
-fn read_uncertainty(table: &Table<'_>) -> Option<Uncertainty> {
+fn read_uncertainty(table: &Table<'_>) -> Option<ParameterUncertainty> {
     let names = table.texts("parameters");
     let counts: Vec<usize> = names.iter().map(Vec::len).collect();
     let squares: Vec<usize> = counts.iter().map(|count| count * count).collect();
-    let values = table.row("values", &counts, ANY);
+    let values = table.row("values", &counts, COEFFICIENT_RANGE);
     let errors = table.row("standard_errors", &counts, 0.0..=1e15);
     let covariance = table.row("covariance", &squares, -1e30..=1e30);
     let rows = names?.into_iter().zip(values?).zip(errors?);
     let parameters =
-        rows.map(|((name, value), standard_error)| Parameter { name, value, standard_error });
-    Some(Uncertainty { parameters: parameters.collect(), covariance: covariance? })
+        rows.map(|((name, value), standard_error)| SavedParameter { name, value, standard_error });
+    Some(ParameterUncertainty { parameters: parameters.collect(), covariance: covariance? })
 }
 
-fn read_fit(table: &Table<'_>) -> Option<Fit> {
+fn read_fit(table: &Table<'_>) -> Option<FitSummary> {
     let step_s = table.number("step_s", STEP_S);
-    let estimation_percent = table.number("estimation_percent", FIT);
-    let validation_percent = table.optional_number("validation_percent", FIT);
-    Some(Fit { step_s: step_s?, estimation_percent: estimation_percent?, validation_percent })
+    let estimation_percent = table.number("estimation_percent", FIT_PERCENT);
+    let validation_percent = table.optional_number("validation_percent", FIT_PERCENT);
+    Some(FitSummary {
+        step_s: step_s?,
+        estimation_percent: estimation_percent?,
+        validation_percent,
+    })
 }
 
 #[cfg(test)]

@@ -48,67 +48,72 @@ mod spread;
 mod start;
 mod trend;
 
-pub use clipped::{Clipped, Column, End};
-pub use compare::{Comparison, Row, compare};
-pub use detrended::SteadyGain;
+pub use clipped::{Clipped, Column, Extreme};
+pub use compare::{ComparedModel, ModelComparison, compare};
+pub use detrended::DetrendedGain;
 pub use error::FitError;
-pub use estimate::{Fit, Note, Parameter};
-pub use loose::Loose;
-pub use quality::Quality;
+pub use estimate::{Fit, FitNote, Parameter};
+pub use loose::Undetermined;
+pub use quality::FitQuality;
 pub use samples::{Samples, SamplesError};
-pub use settings::{Before, DeadTime, Level, MOST_POLES, Settings, Structure};
-pub use trend::{DOMINATES, Trend};
+pub use settings::{DeadTime, FitSettings, InitialCondition, MAX_POLES, OutputLevel, Structure};
+pub use trend::{DOMINANT_FRACTION, Trend};
 
 use crate::numeric::lti::Between;
-use problem::Problem;
+use problem::FitProblem;
 
 /// Fits one model. Fails where the data cannot tell one ([`SamplesError`]) and where
 /// the outcome is none ([`FitError`]); every message says what was found.
-pub fn fit(samples: &Samples, settings: &Settings) -> Result<Fit, FitError> {
+pub fn fit(samples: &Samples, settings: &FitSettings) -> Result<Fit, FitError> {
     check::check(settings, samples)?;
-    samples.check_input(settings.before)?;
+    samples.check_input(settings.initial_state)?;
     samples.check_clipped().map_err(SamplesError::from)?;
-    let problem = Problem::new(samples, settings);
+    let problem = FitProblem::new(samples, settings);
     let best = start::best(&problem)?;
     let straight_through = settings.structure.zeros() == settings.structure.poles();
     match settings.dead_time {
-        DeadTime::Estimated { least_s, most_s }
+        DeadTime::Estimated { min_s: least_s, max_s: most_s }
             if straight_through && settings.between == Between::Held =>
         {
-            to_a_step(samples, settings, [least_s, most_s], problem.dead_time_s(&best.theta))
+            with_dead_time_to_a_step(
+                samples,
+                settings,
+                [least_s, most_s],
+                problem.dead_time_s(&best.theta),
+            )
         }
         _ => report::report(&problem, settings, &best),
     }
 }
 
 /// Whole steps on either side of the first estimate that are tried.
-const STEPS_BESIDE: u32 = 2;
+const NEIGHBOUR_STEPS: u32 = 2;
 
 /// With as many zeros as poles and a held input, a dead time within a step is
 /// another numerator: only the whole step can be told.
-fn to_a_step(
+fn with_dead_time_to_a_step(
     samples: &Samples,
-    settings: &Settings,
+    settings: &FitSettings,
     [least_s, most_s]: [f64; 2],
     near_s: f64,
 ) -> Result<Fit, FitError> {
     let dt_s = samples.dt_s();
-    let first = (near_s / dt_s).floor() - f64::from(STEPS_BESIDE);
-    let whole = (0..=2 * STEPS_BESIDE + 1).map(|k| (first + f64::from(k)) * dt_s);
+    let first = (near_s / dt_s).floor() - f64::from(NEIGHBOUR_STEPS);
+    let whole = (0..=2 * NEIGHBOUR_STEPS + 1).map(|k| (first + f64::from(k)) * dt_s);
     let mut found = Vec::new();
     for dead_time_s in whole.filter(|dead_time_s| (least_s..=most_s).contains(dead_time_s)) {
-        let settings = Settings { dead_time: DeadTime::Given(dead_time_s), ..*settings };
-        let problem = Problem::new(samples, &settings);
+        let settings = FitSettings { dead_time: DeadTime::Known(dead_time_s), ..*settings };
+        let problem = FitProblem::new(samples, &settings);
         found.extend(start::best(&problem).ok().map(|best| (settings, problem, best)));
     }
-    let least = found.iter().min_by(|a, b| a.2.squares.total_cmp(&b.2.squares));
+    let least = found.iter().min_by(|a, b| a.2.sum_of_squares.total_cmp(&b.2.sum_of_squares));
     let (settings, problem, best) = least.ok_or(FitError::NoStart)?;
     let dead_time_s = problem.dead_time_s(&[]);
     if dead_time_s + dt_s > most_s {
         return Err(FitError::DeadTimeAtBound { end: "upper", bound_s: most_s });
     }
     let mut fit = report::report(problem, settings, best)?;
-    fit.notes.push(Note::DeadTimeToAStep { dead_time_s });
+    fit.notes.push(FitNote::DeadTimeToAStep { dead_time_s });
     Ok(fit)
 }
 

@@ -5,7 +5,7 @@ use super::align::{AlignError, to_extruded};
 
 /// What was logged of a bead, a value each a sample.
 #[derive(Debug, Clone, Copy)]
-pub struct Logged<'a> {
+pub struct LoggedBead<'a> {
     /// Way of the surface below the nozzle \[mm\]; only grows.
     pub position_mm: &'a [f64],
     /// Its speed \[mm/s\].
@@ -18,7 +18,7 @@ pub struct Logged<'a> {
 
 /// Flow \[mm³/s\] at the moments of the samples. Shorter than the log by those
 /// whose material has not been measured when it ends.
-pub fn extruded(logged: &Logged<'_>) -> Result<Vec<f64>, AlignError> {
+pub fn extruded(logged: &LoggedBead<'_>) -> Result<Vec<f64>, AlignError> {
     let areas = to_extruded(logged.position_mm, logged.area_mm2, logged.offset_mm)?;
     let areas: Vec<f64> = areas.into_iter().map_while(|area| area).collect();
     Ok(at_moments(logged.speed_mm_per_s, &areas))
@@ -54,7 +54,7 @@ mod tests {
         let speed_mm_per_s: Vec<f64> = times.iter().map(|t| speed(*t)).collect();
         let area_at = |position: f64| flow(left(position - 40.0)) / speed(left(position - 40.0));
         let area_mm2: Vec<f64> = position_mm.iter().map(|p| area_at(*p)).collect();
-        let logged = Logged {
+        let logged = LoggedBead {
             position_mm: &position_mm,
             speed_mm_per_s: &speed_mm_per_s,
             area_mm2: &area_mm2,

@@ -15,7 +15,7 @@ pub const TOLERANCE_C: f64 = 5.0;
 
 /// A model and where it is kept.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
+pub struct ModelEntry {
     /// The file's name.
     pub name: String,
     /// What stands in it.
@@ -25,12 +25,12 @@ pub struct Entry {
 /// The models that are at hand, in the order of their files' names.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Library {
-    entries: Vec<Entry>,
+    entries: Vec<ModelEntry>,
 }
 
 /// What is looked for.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Wanted {
+pub struct ModelQuery {
     /// Material; capital letters do not count.
     pub material: String,
     /// Diameter of the nozzle \[mm\].
@@ -47,11 +47,11 @@ pub struct Wanted {
 
 /// The model that was meant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found<'a> {
+pub struct ModelMatch<'a> {
     /// The model and its file.
-    pub entry: &'a Entry,
+    pub entry: &'a ModelEntry,
     /// Its temperature less the one that was asked for \[°C\].
-    pub off_c: f64,
+    pub temperature_difference_c: f64,
 }
 
 /// No model, or more than one.
@@ -85,7 +85,7 @@ fn list(known: &[String]) -> String {
     }
 }
 
-impl fmt::Display for Wanted {
+impl fmt::Display for ModelQuery {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { material, nozzle_mm, temperature_c, tolerance_c, .. } = self;
         write!(f, "{material}, nozzle {nozzle_mm} mm, {temperature_c} ± {tolerance_c} °C")?;
@@ -98,9 +98,9 @@ impl fmt::Display for Wanted {
     }
 }
 
-impl fmt::Display for Entry {
+impl fmt::Display for ModelEntry {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ModelFile { setting, input, output, .. } = &self.model;
+        let ModelFile { conditions: setting, input, output, .. } = &self.model;
         write!(f, "{} ({}", self.name, setting.material.as_deref().unwrap_or("no material"))?;
         if let Some(nozzle_mm) = setting.nozzle_mm {
             write!(f, ", {nozzle_mm} mm")?;
@@ -114,24 +114,24 @@ impl fmt::Display for Entry {
 
 impl Library {
     /// Of these models.
-    pub fn new(mut entries: Vec<Entry>) -> Self {
+    pub fn new(mut entries: Vec<ModelEntry>) -> Self {
         entries.sort_by(|a, b| a.name.cmp(&b.name));
         Self { entries }
     }
 
     /// All of them.
-    pub fn entries(&self) -> &[Entry] {
+    pub fn entries(&self) -> &[ModelEntry] {
         &self.entries
     }
 
     /// The model that holds for the same as this one, so that [`Library::find`]
     /// could not tell the two apart.
-    pub fn same(&self, model: &ModelFile) -> Option<&Entry> {
-        let (setting, mut entries) = (&model.setting, self.entries.iter());
+    pub fn same(&self, model: &ModelFile) -> Option<&ModelEntry> {
+        let (setting, mut entries) = (&model.conditions, self.entries.iter());
         let material = setting.material.as_ref()?;
         let (nozzle_mm, temperature_c) = (setting.nozzle_mm?, setting.temperature_c?);
         entries.find(|entry| {
-            let other = &entry.model.setting;
+            let other = &entry.model.conditions;
             let near = |value: Option<f64>, of: f64, by| value.is_some_and(|v| (v - of).abs() < by);
             other.material.as_ref().is_some_and(|name| same_name(name, material))
                 && near(other.nozzle_mm, nozzle_mm, SAME_NOZZLE_MM)
@@ -144,35 +144,41 @@ impl Library {
     /// The model of this material and nozzle whose temperature is the nearest
     /// within the tolerance. Models that do not tell all three are not looked
     /// at.
-    pub fn find(&self, wanted: &Wanted) -> Result<Found<'_>, LibraryError> {
-        let off = |entry: &Entry| {
-            let setting = &entry.model.setting;
-            let same = setting.material.as_ref().is_some_and(|m| same_name(m, &wanted.material))
-                && setting.nozzle_mm.is_some_and(|d| (d - wanted.nozzle_mm).abs() < SAME_NOZZLE_MM)
-                && wanted.input.is_none_or(|unit| unit == entry.model.input.unit)
-                && wanted.output.is_none_or(|unit| unit == entry.model.output.unit);
-            let off_c = setting.temperature_c? - wanted.temperature_c;
-            (same && off_c.abs() <= wanted.tolerance_c).then_some(off_c)
+    pub fn find(&self, query: &ModelQuery) -> Result<ModelMatch<'_>, LibraryError> {
+        let off = |entry: &ModelEntry| {
+            let setting = &entry.model.conditions;
+            let same = setting.material.as_ref().is_some_and(|m| same_name(m, &query.material))
+                && setting.nozzle_mm.is_some_and(|d| (d - query.nozzle_mm).abs() < SAME_NOZZLE_MM)
+                && query.input.is_none_or(|unit| unit == entry.model.input.unit)
+                && query.output.is_none_or(|unit| unit == entry.model.output.unit);
+            let off_c = setting.temperature_c? - query.temperature_c;
+            (same && off_c.abs() <= query.tolerance_c).then_some(off_c)
         };
-        let near: Vec<Found<'_>> = self
+        let near: Vec<ModelMatch<'_>> = self
             .entries
             .iter()
-            .filter_map(|entry| Some(Found { entry, off_c: off(entry)? }))
+            .filter_map(|entry| Some(ModelMatch { entry, temperature_difference_c: off(entry)? }))
             .collect();
-        let least = near.iter().map(|found| found.off_c.abs()).fold(f64::INFINITY, f64::min);
-        let is_nearest = |found: &&Found<'_>| found.off_c.abs() < least + SAME_TEMPERATURE_C;
-        let nearest: Vec<&Found<'_>> = near.iter().filter(is_nearest).collect();
-        let names =
-            |entries: &mut dyn Iterator<Item = &Entry>| entries.map(Entry::to_string).collect();
+        let least = near
+            .iter()
+            .map(|found| found.temperature_difference_c.abs())
+            .fold(f64::INFINITY, f64::min);
+        let is_nearest = |found: &&ModelMatch<'_>| {
+            found.temperature_difference_c.abs() < least + SAME_TEMPERATURE_C
+        };
+        let nearest: Vec<&ModelMatch<'_>> = near.iter().filter(is_nearest).collect();
+        let names = |entries: &mut dyn Iterator<Item = &ModelEntry>| {
+            entries.map(ModelEntry::to_string).collect()
+        };
         match nearest[..] {
             [only] => Ok(*only),
             [] => {
                 let known = names(&mut self.entries.iter());
-                Err(LibraryError::Absent { wanted: wanted.to_string(), known })
+                Err(LibraryError::Absent { wanted: query.to_string(), known })
             }
             _ => {
                 let fit = names(&mut nearest.iter().map(|found| found.entry));
-                Err(LibraryError::Ambiguous { wanted: wanted.to_string(), fit })
+                Err(LibraryError::Ambiguous { wanted: query.to_string(), fit })
             }
         }
     }
@@ -182,7 +188,7 @@ impl Library {
 /// `pla-0.4mm-210c-rpm-to-mm3_per_s.toml`; none where its material, nozzle or
 /// temperature is not told.
 pub fn file_name(model: &ModelFile) -> Option<String> {
-    let setting = &model.setting;
+    let setting = &model.conditions;
     let material = setting.material.as_ref()?.trim().to_lowercase();
     let plain = |c: char| if c.is_alphanumeric() { c } else { '-' };
     let material: String = material.chars().map(plain).collect();
@@ -201,7 +207,7 @@ mod tests {
 
     use super::*;
     use crate::core::quantity::Quantity;
-    use crate::identify::file::Setting;
+    use crate::identify::file::Conditions;
     use crate::numeric::lti::TransferFunction;
 
     fn entry(
@@ -210,14 +216,14 @@ mod tests {
         nozzle_mm: f64,
         temperature_c: f64,
         output: Unit,
-    ) -> Entry {
-        let setting = Setting {
+    ) -> ModelEntry {
+        let setting = Conditions {
             material: Some(material.to_owned()),
             nozzle_mm: Some(nozzle_mm),
             temperature_c: Some(temperature_c),
         };
         let model = ModelFile {
-            setting,
+            conditions: setting,
             kind: "fopdt".to_owned(),
             input: Quantity { name: "screw".to_owned(), unit: Unit::Rpm },
             output: Quantity { name: "out".to_owned(), unit: output },
@@ -227,7 +233,7 @@ mod tests {
             uncertainty: None,
             fit: None,
         };
-        Entry { name: name.to_owned(), model }
+        ModelEntry { name: name.to_owned(), model }
     }
 
     fn library() -> Library {
@@ -240,8 +246,8 @@ mod tests {
         ])
     }
 
-    fn wanted(material: &str, temperature_c: f64) -> Wanted {
-        Wanted {
+    fn wanted(material: &str, temperature_c: f64) -> ModelQuery {
+        ModelQuery {
             material: material.to_owned(),
             nozzle_mm: 0.4,
             temperature_c,
@@ -255,9 +261,12 @@ mod tests {
     fn the_nearest_temperature_of_the_same_material_and_nozzle_is_meant() {
         let library = library();
         let found = library.find(&wanted("pla", 204.0)).unwrap();
-        assert_eq!((found.entry.name.as_str(), found.off_c), ("pla-200.toml", -4.0));
+        assert_eq!(
+            (found.entry.name.as_str(), found.temperature_difference_c),
+            ("pla-200.toml", -4.0)
+        );
         assert_eq!(library.find(&wanted("PLA ", 214.0)).unwrap().entry.name, "pla-210.toml");
-        let any = Wanted { output: None, ..wanted("PLA", 204.0) };
+        let any = ModelQuery { output: None, ..wanted("PLA", 204.0) };
         assert_eq!(library.find(&any).unwrap().entry.name, "pla-pressure.toml");
     }
 
@@ -280,7 +289,7 @@ mod tests {
         assert_eq!(name, "pla--grey-0.4mm-210c-rpm-to-mm3_per_s.toml");
         assert_eq!(library().same(&model("pla", 0.4)).unwrap().name, "pla-210.toml");
         assert_eq!(library().same(&model("PLA", 0.8)), None);
-        let nothing = ModelFile { setting: Setting::default(), ..model("PLA", 0.4) };
+        let nothing = ModelFile { conditions: Conditions::default(), ..model("PLA", 0.4) };
         assert!(file_name(&nothing).is_none() && library().same(&nothing).is_none());
     }
 

@@ -1,12 +1,12 @@
 //! Numbers as sentences give them.
 
 /// A value to six digits, without the tail that arithmetic leaves.
-pub fn short(value: f64) -> String {
+pub fn six_digits(value: f64) -> String {
     rounded(value, 5)
 }
 
 /// The same to three digits, for what is known about.
-pub fn brief(value: f64) -> String {
+pub fn three_digits(value: f64) -> String {
     rounded(value, 2)
 }
 
@@ -26,7 +26,7 @@ mod tests {
 
     #[test]
     fn what_arithmetic_leaves_is_not_read() {
-        for (value, told) in [
+        for (value, expected) in [
             (59.999_999_999_999_99, "60"),
             (0.1 + 0.2, "0.3"),
             (-35.25, "-35.25"),
@@ -36,8 +36,8 @@ mod tests {
             (0.0, "0"),
             (f64::NAN, "NaN"),
         ] {
-            assert_eq!(short(value), told);
+            assert_eq!(six_digits(value), expected);
         }
-        assert_eq!(brief(138.464), "138");
+        assert_eq!(three_digits(138.464), "138");
     }
 }

@@ -4,7 +4,7 @@ pub mod file;
 
 /// A value that holds from a moment on.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
+pub struct ProfilePoint {
     /// When it begins \[s\].
     pub from_s: f64,
     /// The value, in the unit of the quantity that is commanded.
@@ -12,17 +12,17 @@ pub struct Point {
 }
 
 /// Two times of a sum of steps that differ by less are the same \[s\].
-const SAME_S: f64 = 1e-9;
+const TIME_TOLERANCE_S: f64 = 1e-9;
 
 /// Points that make no profile. Counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum ProfileError {
+pub enum CommandProfileError {
     /// There is none.
     #[error("a profile without a single value")]
     Empty,
     /// The first one comes late.
     #[error("value 1 of a profile begins at {from_s} s: a profile begins at 0 s")]
-    Late {
+    LateStart {
         /// When it begins \[s\].
         from_s: f64,
     },
@@ -56,31 +56,31 @@ pub enum ProfileError {
 
 /// A command from 0 s to its end.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Profile {
-    points: Vec<Point>,
+pub struct CommandProfile {
+    points: Vec<ProfilePoint>,
     end_s: f64,
 }
 
-impl Profile {
+impl CommandProfile {
     /// From points in the order of time, the first at 0 s, and its end.
-    pub fn new(points: Vec<Point>, end_s: f64) -> Result<Self, ProfileError> {
-        let first = points.first().ok_or(ProfileError::Empty)?;
+    pub fn new(points: Vec<ProfilePoint>, end_s: f64) -> Result<Self, CommandProfileError> {
+        let first = points.first().ok_or(CommandProfileError::Empty)?;
         if first.from_s != 0.0 {
-            return Err(ProfileError::Late { from_s: first.from_s });
+            return Err(CommandProfileError::LateStart { from_s: first.from_s });
         }
         let mut before_s = f64::NEG_INFINITY;
         for (at, point) in (1..).zip(&points) {
-            let Point { from_s, value } = *point;
+            let ProfilePoint { from_s, value } = *point;
             if !value.is_finite() {
-                return Err(ProfileError::NotFinite { at, value });
+                return Err(CommandProfileError::NotFinite { at, value });
             }
             if !(from_s > before_s && from_s.is_finite()) {
-                return Err(ProfileError::Order { at, from_s, before_s });
+                return Err(CommandProfileError::Order { at, from_s, before_s });
             }
             before_s = from_s;
         }
         if !(end_s > before_s && end_s.is_finite()) {
-            return Err(ProfileError::End { end_s, last_s: before_s });
+            return Err(CommandProfileError::End { end_s, last_s: before_s });
         }
         Ok(Self { points, end_s })
     }
@@ -88,7 +88,7 @@ impl Profile {
     /// The value at a moment \[s\]: the first before the beginning, the last
     /// after the end.
     pub fn at(&self, time_s: f64) -> f64 {
-        let begun = self.points.partition_point(|point| point.from_s <= time_s + SAME_S);
+        let begun = self.points.partition_point(|point| point.from_s <= time_s + TIME_TOLERANCE_S);
         let now = self.points.get(begun.saturating_sub(1)).or(self.points.last());
         now.map_or(0.0, |point| point.value)
     }
@@ -99,7 +99,7 @@ impl Profile {
     }
 
     /// The values in the order of time.
-    pub fn points(&self) -> &[Point] {
+    pub fn points(&self) -> &[ProfilePoint] {
         &self.points
     }
 
@@ -122,16 +122,17 @@ impl Profile {
         level: f64,
         lead_in_s: f64,
         lead_out_s: f64,
-    ) -> Result<Self, ProfileError> {
+    ) -> Result<Self, CommandProfileError> {
         let mut points = Vec::with_capacity(self.points.len() + 2);
         if lead_in_s > 0.0 {
-            points.push(Point { from_s: 0.0, value: level });
+            points.push(ProfilePoint { from_s: 0.0, value: level });
         }
-        let later = |point: &Point| Point { from_s: point.from_s + lead_in_s, ..*point };
+        let later =
+            |point: &ProfilePoint| ProfilePoint { from_s: point.from_s + lead_in_s, ..*point };
         points.extend(self.points.iter().map(later));
         let mut end_s = self.end_s + lead_in_s;
         if lead_out_s > 0.0 {
-            points.push(Point { from_s: end_s, value: level });
+            points.push(ProfilePoint { from_s: end_s, value: level });
             end_s += lead_out_s;
         }
         Self::new(points, end_s)
@@ -144,8 +145,11 @@ mod tests {
 
     use super::*;
 
-    fn stairs(points: &[(f64, f64)], end_s: f64) -> Result<Profile, ProfileError> {
-        Profile::new(points.iter().map(|&(from_s, value)| Point { from_s, value }).collect(), end_s)
+    fn stairs(points: &[(f64, f64)], end_s: f64) -> Result<CommandProfile, CommandProfileError> {
+        CommandProfile::new(
+            points.iter().map(|&(from_s, value)| ProfilePoint { from_s, value }).collect(),
+            end_s,
+        )
     }
 
     #[test]
@@ -177,15 +181,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_profile_is_told() {
-        assert_eq!(stairs(&[], 1.0).unwrap_err(), ProfileError::Empty);
-        assert_eq!(stairs(&[(1.0, 0.0)], 2.0).unwrap_err(), ProfileError::Late { from_s: 1.0 });
+    fn what_is_no_profile_is_refused() {
+        assert_eq!(stairs(&[], 1.0).unwrap_err(), CommandProfileError::Empty);
+        assert_eq!(
+            stairs(&[(1.0, 0.0)], 2.0).unwrap_err(),
+            CommandProfileError::LateStart { from_s: 1.0 }
+        );
         let fell = stairs(&[(0.0, 0.0), (2.0, 0.0), (2.0, 1.0)], 3.0).unwrap_err();
-        assert_eq!(fell, ProfileError::Order { at: 3, from_s: 2.0, before_s: 2.0 });
+        assert_eq!(fell, CommandProfileError::Order { at: 3, from_s: 2.0, before_s: 2.0 });
         let nan = stairs(&[(0.0, f64::NAN)], 3.0).unwrap_err();
-        assert!(matches!(nan, ProfileError::NotFinite { at: 1, .. }));
+        assert!(matches!(nan, CommandProfileError::NotFinite { at: 1, .. }));
         assert!(stairs(&[(0.0, 0.0), (f64::NAN, 1.0)], 3.0).is_err());
         let short = stairs(&[(0.0, 0.0), (2.0, 1.0)], 2.0).unwrap_err();
-        assert_eq!(short, ProfileError::End { end_s: 2.0, last_s: 2.0 });
+        assert_eq!(short, CommandProfileError::End { end_s: 2.0, last_s: 2.0 });
     }
 }

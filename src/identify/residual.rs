@@ -1,6 +1,6 @@
 //! What a model leaves: whether it still hangs together.
 
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 /// Of a normal variable 99 % lie within so many standard deviations.
 const NORMAL_99: f64 = 2.5758;
@@ -17,7 +17,7 @@ pub struct Autocorrelation {
 impl Autocorrelation {
     /// Up to a lag; of a row about its mean.
     pub fn of(row: &[f64], longest: usize) -> Self {
-        let n = float(row.len().max(1));
+        let n = to_f64(row.len().max(1));
         let mean = row.iter().sum::<f64>() / n;
         let off: Vec<f64> = row.iter().map(|value| value - mean).collect();
         let at = |lag: usize| -> f64 {
@@ -25,17 +25,17 @@ impl Autocorrelation {
             off.iter().zip(later).map(|(a, b)| a * b).sum()
         };
         let whole = at(0);
-        let share = |lag| if whole > 0.0 { at(lag) / whole } else { 0.0 };
+        let correlation = |lag| if whole > 0.0 { at(lag) / whole } else { 0.0 };
         let longest = longest.min(row.len().saturating_sub(1));
-        Self { lags: (0..=longest).map(share).collect(), bound: NORMAL_99 / n.sqrt() }
+        Self { lags: (0..=longest).map(correlation).collect(), bound: NORMAL_99 / n.sqrt() }
     }
 
     /// Share of the lags from 1 on that white noise would hardly have: some 1 %
     /// of them for white noise.
-    pub fn share_outside(&self) -> f64 {
+    pub fn fraction_outside(&self) -> f64 {
         let lags = self.lags.get(1..).unwrap_or_default();
         let outside = lags.iter().filter(|lag| lag.abs() > self.bound).count();
-        float(outside) / float(lags.len().max(1))
+        to_f64(outside) / to_f64(lags.len().max(1))
     }
 }
 
@@ -61,10 +61,10 @@ mod tests {
     fn white_noise_stays_within_its_bounds_and_coloured_noise_does_not() {
         let white = Autocorrelation::of(&noise(0.0), 200);
         assert_eq!((white.lags[0], white.lags.len()), (1.0, 201));
-        assert!(white.share_outside() < 0.04, "{}", white.share_outside());
+        assert!(white.fraction_outside() < 0.04, "{}", white.fraction_outside());
         let coloured = Autocorrelation::of(&noise(0.9), 10);
         assert!((coloured.lags[5] - 0.9_f64.powi(5)).abs() < 0.05, "{:?}", coloured.lags);
-        assert!(coloured.share_outside() > 0.9);
+        assert!(coloured.fraction_outside() > 0.9);
     }
 
     #[test]

@@ -1,12 +1,12 @@
 //! Columns with moments of their own, as a recording has them: each is sampled
 //! when its source spoke. Two of them are brought to the moments of the output.
 
-use super::experiment::{Experiment, ExperimentError, FEWEST_SAMPLES, Rules};
-use super::grid::{Gap, Grid, usual_step};
+use super::experiment::{Experiment, ExperimentError, MIN_SAMPLES, Rules};
+use super::grid::{SampleGap, TimeGrid, usual_step};
 
 /// One column.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Series {
+pub struct TimeSeries {
     /// Its name, which ends with its unit.
     pub name: String,
     /// Moments, which only grow \[s\].
@@ -17,7 +17,7 @@ pub struct Series {
     pub is_held: bool,
 }
 
-impl Series {
+impl TimeSeries {
     /// An empty one.
     pub fn new(name: impl Into<String>, is_held: bool) -> Self {
         Self { name: name.into(), time_s: Vec::new(), values: Vec::new(), is_held }
@@ -44,7 +44,7 @@ impl Series {
     /// What lies between two moments \[s\], these included.
     #[must_use]
     pub fn within(&self, from_s: f64, to_s: f64) -> Self {
-        let (low, high) = self.places(from_s, to_s);
+        let (low, high) = self.index_range(from_s, to_s);
         Self {
             name: self.name.clone(),
             time_s: self.time_s.get(low..high).unwrap_or_default().to_vec(),
@@ -55,7 +55,7 @@ impl Series {
 
     /// The first sample at or after a moment, and that behind the last one at
     /// or before another.
-    fn places(&self, from_s: f64, to_s: f64) -> (usize, usize) {
+    fn index_range(&self, from_s: f64, to_s: f64) -> (usize, usize) {
         let low = self.time_s.partition_point(|time| *time < from_s);
         (low, self.time_s.partition_point(|time| *time <= to_s).max(low))
     }
@@ -92,7 +92,7 @@ impl Series {
     /// At the moments of another column. What is held is the mean until the
     /// next moment, so that a step between two moments comes neither too early
     /// nor too late; what is measured is interpolated.
-    fn on(&self, moments: &[f64]) -> Vec<f64> {
+    fn resampled_at(&self, moments: &[f64]) -> Vec<f64> {
         let usual = usual_step(moments).unwrap_or(0.0);
         let value = |(k, moment): (usize, &f64)| {
             if self.is_held {
@@ -108,8 +108,8 @@ impl Series {
 /// An input and an output as far as there are both, on the output's grid.
 /// Fails as [`Experiment::new`] does, and on a gap of a measured input.
 pub fn paired(
-    input: &Series,
-    output: &Series,
+    input: &TimeSeries,
+    output: &TimeSeries,
     rules: &Rules,
 ) -> Result<Experiment, ExperimentError> {
     let (Some(&first), Some(&last)) = (input.time_s.first(), input.time_s.last()) else {
@@ -117,23 +117,28 @@ pub fn paired(
     };
     let last = if input.is_held { last + usual_step(&input.time_s).unwrap_or(0.0) } else { last };
     let output = output.within(first, last);
-    if output.len() < FEWEST_SAMPLES {
+    if output.len() < MIN_SAMPLES {
         return Err(ExperimentError::TooFew { got: output.len() });
     }
     if !input.is_held {
         check_gaps(input, rules)?;
     }
     // The gaps of the output and its grid first, then what went in at each of its moments.
-    let taken = Experiment::new(&output.time_s, &input.on(&output.time_s), &output.values, rules)?;
+    let taken = Experiment::new(
+        &output.time_s,
+        &input.resampled_at(&output.time_s),
+        &output.values,
+        rules,
+    )?;
     let moments = taken.moments();
     let input_is_held = input.is_held;
-    Ok(Experiment { input: input.on(&moments), input_is_held, ..taken })
+    Ok(Experiment { input: input.resampled_at(&moments), input_is_held, ..taken })
 }
 
-fn check_gaps(input: &Series, rules: &Rules) -> Result<(), ExperimentError> {
-    let Some(grid) = Grid::of(&input.time_s) else { return Ok(()) };
+fn check_gaps(input: &TimeSeries, rules: &Rules) -> Result<(), ExperimentError> {
+    let Some(grid) = TimeGrid::of(&input.time_s) else { return Ok(()) };
     let limit_s = rules.max_gap_s.unwrap_or(grid.usual_limit_s());
-    let too_long = |gap: &&Gap| gap.length_s > limit_s * (1.0 + 1e-6);
+    let too_long = |gap: &&SampleGap| gap.length_s > limit_s * (1.0 + 1e-6);
     let count = grid.gaps.iter().filter(too_long).count();
     match grid.longest() {
         Some(gap) if count > 0 => Err(ExperimentError::Gap { gap: *gap, count, limit_s }),
@@ -147,8 +152,8 @@ mod tests {
 
     use super::*;
 
-    fn series(step_s: f64, count: u32, held: bool, value: impl Fn(f64) -> f64) -> Series {
-        let mut made = Series::new("x_rpm", held);
+    fn series(step_s: f64, count: u32, held: bool, value: impl Fn(f64) -> f64) -> TimeSeries {
+        let mut made = TimeSeries::new("x_rpm", held);
         for k in 0..count {
             let time_s = f64::from(k) * step_s;
             made.push(time_s, value(time_s));
@@ -158,11 +163,11 @@ mod tests {
 
     #[test]
     fn a_command_that_changes_between_two_samples_counts_in_part() {
-        let mut command = Series::new("command_rpm", true);
+        let mut command = TimeSeries::new("command_rpm", true);
         for (time, value) in [(0.0, 10.0), (0.13, 20.0), (0.17, 40.0), (0.5, 0.0)] {
             command.push(time, value);
         }
-        let on = command.on(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5]);
+        let on = command.resampled_at(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5]);
         let middle = 0.3 * 10.0 + 0.4 * 20.0 + 0.3 * 40.0;
         for (found, wanted) in on.iter().zip([10.0, middle, 40.0, 40.0, 40.0, 0.0]) {
             assert!((found - wanted).abs() < 1e-9, "{on:?}");
@@ -192,7 +197,7 @@ mod tests {
             let refused = paired(input, output, &Rules::default()).unwrap_err().to_string();
             assert!(refused.contains("a gap of 1.220 s after 3.980 s"), "{refused}");
         }
-        let apart = Series { time_s: vec![100.0, 101.0], ..series(0.02, 2, false, f64::sin) };
+        let apart = TimeSeries { time_s: vec![100.0, 101.0], ..series(0.02, 2, false, f64::sin) };
         let refused = paired(&apart, &whole, &Rules::default()).unwrap_err();
         assert_eq!(refused, ExperimentError::TooFew { got: 0 });
     }

@@ -23,21 +23,21 @@ mod rise;
 mod void;
 
 pub use error::StartStopFitError;
-pub use estimate::{SeenStart, SeenStop, StartStopFit};
+pub use estimate::{ObservedStart, ObservedStop, StartStopFit};
 
-use crate::identify::series::Series;
+use crate::identify::series::TimeSeries;
 use parameters::StartStop;
 
 /// Parameters of starts and stops from a command, in any unit, and a flow
 /// \[mm³/s\]. Fails where the recording does not tell them.
-pub fn fit(command: &Series, flow: &Series) -> Result<StartStopFit, StartStopFitError> {
+pub fn fit(command: &TimeSeries, flow: &TimeSeries) -> Result<StartStopFit, StartStopFitError> {
     let episodes = episodes::find(command, flow)?;
     let fall = fall::fit(&episodes.stops)?;
     let rise = rise::fit(&episodes.starts, &fall.model)?;
     let void = void::fit(&rise.starts)?;
     let parameters = assemble(&fall.model, rise.time_constant_s, &void.value);
     let sigma = assemble(&fall.sigma, rise.sigma_s, &void.sigma);
-    let starts = rise.starts.iter().map(|start| SeenStart {
+    let starts = rise.starts.iter().map(|start| ObservedStart {
         modelled_s: parameters.delay_s(start.idle_s, start.flow_mm3_per_s),
         ..*start
     });
@@ -47,11 +47,11 @@ pub fn fit(command: &Series, flow: &Series) -> Result<StartStopFit, StartStopFit
         runs: episodes.runs,
         starts: starts.collect(),
         stops: fall.stops,
-        delay_scatter_s: void.scatter_s,
+        delay_sigma_s: void.residual_sigma_s,
     })
 }
 
-fn assemble(fall: &fall::Falling, rise_s: f64, void: &void::Saturating) -> StartStop {
+fn assemble(fall: &fall::StopResponse, rise_s: f64, void: &void::IdleDelay) -> StartStop {
     StartStop {
         first_flow_s: void.first_flow_s,
         rise_s,

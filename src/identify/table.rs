@@ -1,11 +1,11 @@
 //! Logged data as a table with named columns. Lines are counted as an editor
 //! counts them, the names being line 1.
 
-use crate::document::csv::{LineProblem, in_words};
+use crate::document::csv::{LineProblem, describe};
 
 /// What is wrong with a table.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum TableError {
+pub enum DataTableError {
     /// Nothing in it.
     #[error("there is no line with the names of columns")]
     Empty,
@@ -19,7 +19,7 @@ pub enum TableError {
     },
     /// A name that is there twice.
     #[error("two columns are called {name}")]
-    Twice {
+    DuplicateColumn {
         /// The name.
         name: String,
     },
@@ -33,7 +33,7 @@ pub enum TableError {
     },
     /// A cell that is no finite number.
     #[error(
-        "line {line}, column {column}: found {}, expected a number{}{}", shown(.found), point(.found),
+        "line {line}, column {column}: found {}, expected a number{}{}", shown(.found), decimal_hint(.found),
         and_more(*.others)
     )]
     Cell {
@@ -53,7 +53,7 @@ fn shown(found: &str) -> String {
 }
 
 /// A comma that was meant as a point.
-fn point(found: &str) -> &'static str {
+fn decimal_hint(found: &str) -> &'static str {
     if number(&found.replace(',', ".")).is_some() { " with a decimal point" } else { "" }
 }
 
@@ -67,7 +67,7 @@ fn and_more(count: usize) -> String {
 
 /// A table as it stands in a file.
 #[derive(Debug, Clone)]
-pub struct Table {
+pub struct DataTable {
     names: Vec<String>,
     rows: Vec<csv::StringRecord>,
     lines: Vec<u64>,
@@ -76,14 +76,14 @@ pub struct Table {
 /// Shortest way to write a byte order mark.
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
-impl Table {
+impl DataTable {
     /// Reads a file's text: separated by commas, or by semicolons or tabs where
     /// the first line has those instead. Empty lines and lines that begin with
     /// `#` are left out.
-    pub fn parse(text: &str) -> Result<Self, TableError> {
+    pub fn parse(text: &str) -> Result<Self, DataTableError> {
         let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
         let names = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#'));
-        let names = names.ok_or(TableError::Empty)?;
+        let names = names.ok_or(DataTableError::Empty)?;
         let separators = [b',', b';', b'\t'];
         let separator = separators.into_iter().find(|byte| names.as_bytes().contains(byte));
         let mut reader = csv::ReaderBuilder::new()
@@ -96,7 +96,7 @@ impl Table {
         let twice =
             names.iter().enumerate().find(|(at, name)| names.iter().take(*at).any(|n| n == *name));
         if let Some((_, name)) = twice {
-            return Err(TableError::Twice { name: name.clone() });
+            return Err(DataTableError::DuplicateColumn { name: name.clone() });
         }
         let (mut rows, mut lines) = (Vec::new(), Vec::new());
         for row in reader.records() {
@@ -128,16 +128,16 @@ impl Table {
     }
 
     /// The numbers of a column; fails on the first cell that is none.
-    pub fn column(&self, name: &str) -> Result<Vec<f64>, TableError> {
+    pub fn column(&self, name: &str) -> Result<Vec<f64>, DataTableError> {
         let at = self.names.iter().position(|known| known == name).ok_or_else(|| {
-            TableError::NoColumn { name: name.to_owned(), known: self.names.clone() }
+            DataTableError::NoColumn { name: name.to_owned(), known: self.names.clone() }
         })?;
         let cells = || self.rows.iter().map(|row| row.get(at).unwrap_or_default());
         let numbers: Option<Vec<f64>> = cells().map(number).collect();
         numbers.ok_or_else(|| {
             let mut wrong = cells().zip(&self.lines).filter(|(cell, _)| number(cell).is_none());
             let (found, line) = wrong.next().map_or(("", 0), |(cell, line)| (cell, *line));
-            TableError::Cell {
+            DataTableError::Cell {
                 line,
                 column: name.to_owned(),
                 found: found.to_owned(),
@@ -160,9 +160,9 @@ fn number(cell: &str) -> Option<f64> {
     cell.parse::<f64>().ok().filter(|number| number.is_finite())
 }
 
-fn of_line(error: &csv::Error) -> TableError {
-    let LineProblem { line, what } = in_words(error);
-    TableError::Line { line, what }
+fn of_line(error: &csv::Error) -> DataTableError {
+    let LineProblem { line, what } = describe(error);
+    DataTableError::Line { line, what }
 }
 
 #[cfg(test)]
@@ -175,7 +175,7 @@ mod tests {
     fn columns_are_found_by_name_whatever_separates_them() {
         for separator in [",", ";", "\t"] {
             let text = "# a log\ntime_s,screw_rpm,remark\n\n0,20.5,start\n0.1,-3e1,\n";
-            let table = Table::parse(&text.replace(',', separator)).unwrap();
+            let table = DataTable::parse(&text.replace(',', separator)).unwrap();
             assert_eq!(table.column("screw_rpm").unwrap(), [20.5, -30.0]);
             assert_eq!((table.len(), table.line(0), table.line(1)), (2, 4, 5));
         }
@@ -183,30 +183,30 @@ mod tests {
 
     #[test]
     fn a_cell_that_is_no_number_is_named() {
-        let table = Table::parse("time_s,rpm\n0,1\n0.1,NaN\n0.2,off\n0.3,\n0.4,inf\n").unwrap();
+        let table = DataTable::parse("time_s,rpm\n0,1\n0.1,NaN\n0.2,off\n0.3,\n0.4,inf\n").unwrap();
         let error = table.column("rpm").unwrap_err().to_string();
         assert_eq!(
             error,
             "line 3, column rpm: found \"NaN\", expected a number (and 3 more such cells)"
         );
-        let table = Table::parse("time_s;rpm\n0;1,5\n").unwrap();
+        let table = DataTable::parse("time_s;rpm\n0;1,5\n").unwrap();
         let error = table.column("rpm").unwrap_err().to_string();
         assert_eq!(
             error,
             "line 2, column rpm: found \"1,5\", expected a number with a decimal point"
         );
-        let table = Table::parse("time_s,rpm\n0,\n").unwrap();
+        let table = DataTable::parse("time_s,rpm\n0,\n").unwrap();
         let error = table.column("rpm").unwrap_err().to_string();
         assert_eq!(error, "line 2, column rpm: found nothing, expected a number");
     }
 
     #[test]
     fn what_is_no_table_is_told() {
-        let said = |text: &str| Table::parse(text).unwrap_err().to_string();
+        let said = |text: &str| DataTable::parse(text).unwrap_err().to_string();
         assert_eq!(said("\n\n"), "there is no line with the names of columns");
         assert_eq!(said("a,a\n1,2\n"), "two columns are called a");
         assert_eq!(said("a,b\n1,2\n3\n"), "line 3: found 1 field, expected 2 as in the heading");
-        let table = Table::parse("a,b\n1,2\n").unwrap();
+        let table = DataTable::parse("a,b\n1,2\n").unwrap();
         let error = table.column("c").unwrap_err().to_string();
         assert_eq!(error, "there is no column c; the columns are a, b");
     }

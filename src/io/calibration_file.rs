@@ -9,7 +9,7 @@ use crate::calibration::{Calibration, file};
 use crate::document::Problems;
 
 /// Bytes of a camera in the YAML of others, at most.
-const LONGEST_YAML: u64 = 1_000_000;
+const MAX_YAML_BYTES: u64 = 1_000_000;
 
 /// A calibration file that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -45,7 +45,7 @@ pub fn read(path: &Path) -> Result<Calibration, CalibrationFileError> {
 
 /// Reads a camera from the YAML of ROS or OpenCV; everything that is wrong with it is
 /// reported at once.
-pub fn read_exchanged(path: &Path) -> Result<Import, CalibrationFileError> {
+pub fn read_yaml(path: &Path) -> Result<Import, CalibrationFileError> {
     let text = read_text(path)
         .map_err(|source| CalibrationFileError::ReadYaml { path: path.to_owned(), source })?;
     Ok(exchange::parse(&path.display().to_string(), &text)?)
@@ -54,7 +54,7 @@ pub fn read_exchanged(path: &Path) -> Result<Import, CalibrationFileError> {
 /// A camera is a page of text; whatever is much longer is something else.
 fn read_text(path: &Path) -> io::Result<String> {
     let length = fs::metadata(path)?.len();
-    if length > LONGEST_YAML {
+    if length > MAX_YAML_BYTES {
         let what = format!("{length} bytes are no camera's calibration");
         return Err(io::Error::new(io::ErrorKind::InvalidData, what));
     }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat, ImageReader};
 
-use crate::core::frame::{Channel, Frame, Layout, Pixels, WrongSize};
+use crate::core::frame::{Channel, Frame, Pixels, SampleLayout, WrongSize};
 use crate::core::geometry::Size;
 use crate::core::time::Stamp;
 
@@ -31,7 +31,7 @@ pub enum DecodeError {
     UnknownFormat,
     /// A JPEG without its end, whose missing part would be decoded as grey.
     #[error("it is cut off before its end")]
-    CutOff,
+    Truncated,
     /// The format is known, the content is broken or not supported.
     #[error("it cannot be decoded: {0}")]
     Broken(#[source] ImageError),
@@ -115,7 +115,7 @@ pub fn decode(
         .map_err(|error| DecodeError::Broken(ImageError::IoError(error)))?;
     match reader.format() {
         None => return Err(DecodeError::UnknownFormat),
-        Some(ImageFormat::Jpeg) if is_cut_off(bytes) => return Err(DecodeError::CutOff),
+        Some(ImageFormat::Jpeg) if is_truncated(bytes) => return Err(DecodeError::Truncated),
         Some(_) => {}
     }
     let image = reader.decode().map_err(DecodeError::Broken)?;
@@ -125,7 +125,7 @@ pub fn decode(
 
 /// Whether a JPEG has no end after the beginning of its last scan. Its decoder
 /// fills what is missing and says nothing; the others fail.
-fn is_cut_off(jpeg: &[u8]) -> bool {
+fn is_truncated(jpeg: &[u8]) -> bool {
     let last = |marker: [u8; 2]| jpeg.windows(2).rposition(|pair| pair == marker);
     last(END_OF_IMAGE) < last(START_OF_SCAN)
 }
@@ -135,12 +135,14 @@ fn grey_values(image: DynamicImage, channel: Channel) -> Result<Pixels, DecodeEr
     Ok(match image {
         Image::ImageLuma8(grey) => Pixels::Grey8(grey.into_raw()),
         Image::ImageLuma16(grey) => Pixels::Grey16(grey.into_raw()),
-        Image::ImageLumaA8(data) => Pixels::Grey8(channel.extract(&data, Layout::GreyAlpha)),
-        Image::ImageLumaA16(data) => Pixels::Grey16(channel.extract(&data, Layout::GreyAlpha)),
-        Image::ImageRgb8(data) => Pixels::Grey8(channel.extract(&data, Layout::Rgb)),
-        Image::ImageRgb16(data) => Pixels::Grey16(channel.extract(&data, Layout::Rgb)),
-        Image::ImageRgba8(data) => Pixels::Grey8(channel.extract(&data, Layout::Rgba)),
-        Image::ImageRgba16(data) => Pixels::Grey16(channel.extract(&data, Layout::Rgba)),
+        Image::ImageLumaA8(data) => Pixels::Grey8(channel.extract(&data, SampleLayout::GreyAlpha)),
+        Image::ImageLumaA16(data) => {
+            Pixels::Grey16(channel.extract(&data, SampleLayout::GreyAlpha))
+        }
+        Image::ImageRgb8(data) => Pixels::Grey8(channel.extract(&data, SampleLayout::Rgb)),
+        Image::ImageRgb16(data) => Pixels::Grey16(channel.extract(&data, SampleLayout::Rgb)),
+        Image::ImageRgba8(data) => Pixels::Grey8(channel.extract(&data, SampleLayout::Rgba)),
+        Image::ImageRgba16(data) => Pixels::Grey16(channel.extract(&data, SampleLayout::Rgba)),
         other => {
             return Err(DecodeError::SampleKind { found: format!("{:?}", other.color()) });
         }
@@ -247,7 +249,7 @@ mod tests {
             let whole = bytes_of(&DynamicImage::new_rgb8(64, 48), format);
             assert!(decode(&whole, Channel::Grey, 0, Stamp::START).is_ok(), "{format:?}");
             let cut = fault(&whole[..whole.len() * 3 / 4]);
-            assert!(matches!(cut, DecodeError::Broken(_) | DecodeError::CutOff), "{format:?}");
+            assert!(matches!(cut, DecodeError::Broken(_) | DecodeError::Truncated), "{format:?}");
         }
         let float = bytes_of(&DynamicImage::new_rgb32f(2, 2), ImageFormat::Tiff);
         assert!(fault(&float).to_string().contains("Rgb32F"));

@@ -5,7 +5,7 @@ use std::{fs, io};
 
 use crate::document::Problems;
 use crate::identify::file::{self, ModelFile};
-use crate::identify::library::{Entry, Library};
+use crate::identify::library::{Library, ModelEntry};
 
 /// A model that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -41,7 +41,7 @@ pub fn read(path: &Path) -> Result<ModelFile, ModelFileError> {
 
 /// The models of a folder, and why others cannot be used.
 #[derive(Debug)]
-pub struct Folder {
+pub struct ModelFolder {
     /// Those that are sound.
     pub library: Library,
     /// What is wrong with each of the others, in the order of their names.
@@ -51,7 +51,7 @@ pub struct Folder {
 /// Reads every `.toml` of a folder, not of those within it. A file that is wrong
 /// does not hide the others: the caller tells of it, as a model that was meant to
 /// be found may be missed.
-pub fn read_library(folder: &Path) -> Result<Folder, ModelFileError> {
+pub fn read_library(folder: &Path) -> Result<ModelFolder, ModelFileError> {
     let failed = |what| ModelFileError::Folder { path: folder.to_owned(), what };
     let mut paths = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
@@ -65,11 +65,11 @@ pub fn read_library(folder: &Path) -> Result<Folder, ModelFileError> {
     for path in paths {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         match read(&path) {
-            Ok(model) => entries.push(Entry { name, model }),
+            Ok(model) => entries.push(ModelEntry { name, model }),
             Err(error) => broken.push(error),
         }
     }
-    Ok(Folder { library: Library::new(entries), broken })
+    Ok(ModelFolder { library: Library::new(entries), broken })
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ pub struct Progress {
     unit: &'static str,
     plain: bool,
     next_line: Duration,
-    said: bool,
+    printed: bool,
 }
 
 impl Progress {
@@ -42,7 +42,7 @@ impl Progress {
         }
         bar.set_message(what);
         bar.set_prefix(unit);
-        Self { bar, what, unit, plain: !terminal && !quiet, next_line: FIRST_LINE, said: false }
+        Self { bar, what, unit, plain: !terminal && !quiet, next_line: FIRST_LINE, printed: false }
     }
 
     /// So many are done.
@@ -71,13 +71,13 @@ impl Progress {
     pub fn finish(mut self) {
         let done = self.bar.position();
         self.bar.finish_and_clear();
-        if self.said {
+        if self.printed {
             self.say(done, ", done");
         }
     }
 
     fn say(&mut self, done: u64, end: &str) {
-        self.said = true;
+        self.printed = true;
         let line = line(self.what, self.unit, done, self.bar.length(), self.bar.elapsed());
         let _ = writeln!(std::io::stderr(), "{line}{end}");
     }
@@ -115,7 +115,7 @@ mod tests {
         progress.advance();
         progress.advance();
         assert_eq!(progress.bar.position(), 2);
-        assert!(progress.bar.is_hidden() && !progress.said);
+        assert!(progress.bar.is_hidden() && !progress.printed);
         progress.finish();
     }
 }

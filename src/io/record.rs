@@ -39,17 +39,17 @@ use crate::control::step::Step;
 use crate::core::frame::Frame;
 use crate::core::time::Stamp;
 use crate::run::ports::{RecordError, Recorder};
-use config::Tuning;
+use config::RecorderLimits;
 pub use config::{ExtruderFile, RecordConfig};
 use encode::FrameJob;
 use format::{CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, FORMAT_VERSION, RunInfo};
 use mux::Mux;
 use report::Counts;
 pub use report::{Incomplete, RecordReport};
-use shared::{Answered, Shared};
-use sink::{FileSink, Outlet, Sink};
+use shared::{AnsweredEvent, RecorderState};
+use sink::{FileSink, RetryingWriter, Sink};
 pub use tap::FrameTap;
-use writer::{Inputs, WriterThread};
+use writer::{WriterInputs, WriterThread};
 
 /// The recorder as the control thread holds it. Dropping it finishes the
 /// recording as [`Self::finish`] does, but tells nobody how that went.
@@ -57,7 +57,7 @@ pub struct RecorderHandle {
     next: u64,
     /// Whether a full queue is waited for.
     waits: bool,
-    answered: Option<Sender<Answered>>,
+    answered: Option<Sender<AnsweredEvent>>,
     tap: FrameTap,
     path: PathBuf,
     writer: Option<JoinHandle<RecordReport>>,
@@ -71,13 +71,13 @@ pub fn start(
     config: &RecordConfig,
     folder: &Path,
 ) -> Result<(RecorderHandle, Receiver<RecordError>), RecordError> {
-    start_with(config, FileSink::create(folder)?, Tuning::default())
+    start_with(config, FileSink::create(folder)?, RecorderLimits::default())
 }
 
 fn start_with<S: Sink + 'static>(
     config: &RecordConfig,
     sink: S,
-    tuning: Tuning,
+    tuning: RecorderLimits,
 ) -> Result<(RecorderHandle, Receiver<RecordError>), RecordError> {
     let run = RunInfo {
         format_version: FORMAT_VERSION,
@@ -92,14 +92,14 @@ fn start_with<S: Sink + 'static>(
     attachments.extend(extruder_files);
     let mut mux = Mux::new(&run, &attachments).map_err(|error| RecordError(error.to_string()))?;
     let path = sink.path().to_path_buf();
-    let mut outlet = Outlet::new(sink);
+    let mut outlet = RetryingWriter::new(sink);
     mux.take(outlet.waiting());
     outlet
         .push()
         .map_err(|error| RecordError(format!("cannot write {}: {error}", path.display())))?;
 
     let (alarm, alarms) = bounded(1);
-    let shared = Arc::new(Shared::new(alarm));
+    let shared = Arc::new(RecorderState::new(alarm));
     let (answered, answered_out) = bounded(tuning.events);
     let (jobs, jobs_out) = bounded(tuning.frames);
     let (encoded, encoded_out) = bounded(tuning.encoded);
@@ -107,9 +107,14 @@ fn start_with<S: Sink + 'static>(
     spawn("frame encoder", move || {
         encode::run(&jobs_out, &encoded, epoch_ns, &encoder_shared);
     })?;
-    let thread =
-        WriterThread { mux, outlet, shared: Arc::clone(&shared), tuning, safe: Counts::default() };
-    let inputs = Inputs { answered: answered_out, frames: encoded_out };
+    let thread = WriterThread {
+        mux,
+        output: outlet,
+        shared: Arc::clone(&shared),
+        tuning,
+        written: Counts::default(),
+    };
+    let inputs = WriterInputs { answered: answered_out, frames: encoded_out };
     let writer = spawn("recorder", move || thread.run(inputs))?;
     let tap = FrameTap { keep: config.frames, jobs, shared };
     let handle = RecorderHandle {
@@ -139,7 +144,7 @@ impl Recorder for RecorderHandle {
         if let Some(why) = shared.failure() {
             return Err(why.clone());
         }
-        let item = Answered { n: self.next, now, event: event.clone(), step: step.clone() };
+        let item = AnsweredEvent { n: self.next, now, event: event.clone(), step: step.clone() };
         let Some(answered) = &self.answered else {
             return Err(shared.fail(RecordError("the recording is finished".to_string())));
         };

@@ -9,15 +9,15 @@ use crate::core::time::Stamp;
 use crate::core::units::{MPa, Mm, Mm3PerS, MmPerS, Rpm};
 use crate::extruder::demand::section;
 use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
-use crate::identify::series::Series;
-use crate::io::recording::{Entry, RecordingError};
+use crate::identify::series::TimeSeries;
+use crate::io::recording::{RecordedEntry, RecordingError};
 
 /// Name of the command's column, before its unit.
 pub const COMMAND: &str = "command";
 
 /// What has to be known of the cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Facts {
+pub struct CellFacts {
     /// Unit of the extruder's command, where it is commanded.
     pub command: Option<Unit>,
     /// Height of a layer, if it is known.
@@ -28,9 +28,9 @@ pub struct Facts {
 
 /// What a recording holds.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recorded {
+pub struct BeadColumns {
     /// Columns, on the clock of the run; those without a sample are left out.
-    pub columns: Vec<Series>,
+    pub columns: Vec<TimeSeries>,
     /// What the reader should know of them.
     pub notes: Vec<String>,
 }
@@ -39,28 +39,28 @@ pub struct Recorded {
 /// and the pump, where it reports, runs. Fails where the recording cannot be
 /// read on.
 pub fn columns(
-    entries: impl IntoIterator<Item = Result<Entry, RecordingError>>,
-    facts: &Facts,
-) -> Result<Recorded, RecordingError> {
-    let mut found = Found::new(facts);
+    entries: impl IntoIterator<Item = Result<RecordedEntry, RecordingError>>,
+    facts: &CellFacts,
+) -> Result<BeadColumns, RecordingError> {
+    let mut collector = ColumnCollector::new(facts);
     for entry in entries {
         match entry? {
-            Entry::Event { now, event, .. } => found.event(now, &event),
-            Entry::Step { now, step, .. } => found.step(now, &step),
-            Entry::Frame(_) => {}
+            RecordedEntry::Event { now, event, .. } => collector.event(now, &event),
+            RecordedEntry::Step { now, step, .. } => collector.step(now, &step),
+            RecordedEntry::Frame(_) => {}
         }
     }
-    Ok(found.conclude(facts))
+    Ok(collector.finish(facts))
 }
 
 /// A stretch of time \[s\].
 #[derive(Debug, Clone, Copy)]
-struct Stretch {
+struct BeadInterval {
     from_s: f64,
     to_s: f64,
 }
 
-impl Stretch {
+impl BeadInterval {
     fn length_s(&self) -> f64 {
         self.to_s - self.from_s
     }
@@ -68,46 +68,46 @@ impl Stretch {
 
 /// Stretches of time over which something is so.
 #[derive(Debug, Default)]
-struct Stretches {
-    all: Vec<Stretch>,
+struct Intervals {
+    all: Vec<BeadInterval>,
     is_open: bool,
 }
 
-impl Stretches {
+impl Intervals {
     fn observe(&mut self, now_s: f64, is_so: bool, is_new: bool) {
         match self.all.last_mut() {
             Some(last) if is_so && self.is_open && !is_new => last.to_s = now_s,
-            _ if is_so => self.all.push(Stretch { from_s: now_s, to_s: now_s }),
+            _ if is_so => self.all.push(BeadInterval { from_s: now_s, to_s: now_s }),
             _ => {}
         }
         self.is_open = is_so;
     }
 }
 
-struct Found {
-    command: Series,
-    reported: [Series; 4],
-    speed: Series,
-    path: Series,
-    width: Series,
-    laying: Stretches,
-    pumping: Stretches,
+struct ColumnCollector {
+    command: TimeSeries,
+    reported: [TimeSeries; 4],
+    speed: TimeSeries,
+    path: TimeSeries,
+    width: TimeSeries,
+    laying: Intervals,
+    pumping: Intervals,
     /// Whether anything was reported by an extruder.
     has_pump: bool,
 }
 
-impl Found {
-    fn new(facts: &Facts) -> Self {
-        let measured = |name: &str| Series::new(name, false);
+impl ColumnCollector {
+    fn new(facts: &CellFacts) -> Self {
+        let measured = |name: &str| TimeSeries::new(name, false);
         let unit = facts.command.unwrap_or(Unit::One).word();
         Self {
-            command: Series::new(format!("{COMMAND}_{unit}"), true),
+            command: TimeSeries::new(format!("{COMMAND}_{unit}"), true),
             reported: ["screw_rpm", "pressure_mpa", "flow_mm3_per_s", "filled_mm"].map(measured),
             speed: measured("speed_mm_per_s"),
             path: measured("path_mm"),
             width: measured("width_mm"),
-            laying: Stretches::default(),
-            pumping: Stretches::default(),
+            laying: Intervals::default(),
+            pumping: Intervals::default(),
             has_pump: false,
         }
     }
@@ -156,68 +156,71 @@ impl Found {
 
     /// The longest stretch of a bead with a running pump, and how many there
     /// are.
-    fn stretch(&self) -> (Option<Stretch>, usize) {
-        let both = |bead: &Stretch| -> Vec<Stretch> {
+    fn longest_interval(&self) -> (Option<BeadInterval>, usize) {
+        let both = |bead: &BeadInterval| -> Vec<BeadInterval> {
             if !self.has_pump {
                 return vec![*bead];
             }
-            let cut = self.pumping.all.iter().map(|pump| Stretch {
+            let cut = self.pumping.all.iter().map(|pump| BeadInterval {
                 from_s: pump.from_s.max(bead.from_s),
                 to_s: pump.to_s.min(bead.to_s),
             });
             cut.filter(|stretch| stretch.length_s() > 0.0).collect()
         };
-        let all: Vec<Stretch> = self.laying.all.iter().flat_map(both).collect();
+        let all: Vec<BeadInterval> = self.laying.all.iter().flat_map(both).collect();
         let longest = all.iter().max_by(|a, b| a.length_s().total_cmp(&b.length_s()));
         (longest.copied(), all.len())
     }
 
-    fn conclude(self, facts: &Facts) -> Recorded {
+    fn finish(self, facts: &CellFacts) -> BeadColumns {
         let mut notes = Vec::new();
-        let (stretch, count) = self.stretch();
-        let Some(stretch) = stretch else {
+        let (interval, count) = self.longest_interval();
+        let Some(interval) = interval else {
             let what = "no bead was laid with a running pump: there is nothing to find a model in";
-            return Recorded { columns: Vec::new(), notes: vec![what.to_owned()] };
+            return BeadColumns { columns: Vec::new(), notes: vec![what.to_owned()] };
         };
         if count > 1 {
             notes.push(format!(
                 "{count} beads were laid; the longest is taken, {:.2} to {:.2} s",
-                stretch.from_s, stretch.to_s
+                interval.from_s, interval.to_s
             ));
         }
-        let cut = |column: &Series| column.within(stretch.from_s, stretch.to_s);
-        let bead = Bead { path: cut(&self.path), speed: cut(&self.speed), width: cut(&self.width) };
+        let cut = |column: &TimeSeries| column.within(interval.from_s, interval.to_s);
+        let bead =
+            BeadSeries { path: cut(&self.path), speed: cut(&self.speed), width: cut(&self.width) };
         let (laid, more) = bead.laid(facts);
         notes.extend(more);
         let command = facts.command.map(|_| cut(&self.command));
         let columns = command.into_iter().chain(self.reported.iter().map(cut));
-        let Bead { path, speed, width } = bead;
+        let BeadSeries { path, speed, width } = bead;
         let columns = columns.chain([speed, path, width]).chain(laid);
-        Recorded { columns: columns.filter(|column| !column.is_empty()).collect(), notes }
+        BeadColumns { columns: columns.filter(|column| !column.is_empty()).collect(), notes }
     }
 }
 
 /// One bead as robot and camera tell of it.
-struct Bead {
-    path: Series,
-    speed: Series,
-    width: Series,
+struct BeadSeries {
+    path: TimeSeries,
+    speed: TimeSeries,
+    width: TimeSeries,
 }
 
-impl Bead {
+impl BeadSeries {
     /// The width and the flow of the bead at the moments when it was laid: what
     /// the camera sees left the nozzle when that was the offset further back
     /// along the path.
-    fn laid(&self, facts: &Facts) -> ([Series; 2], Option<String>) {
-        let mut width = Series::new("laid_width_mm", false);
-        let mut flow = Series::new("laid_flow_mm3_per_s", false);
+    fn laid(&self, facts: &CellFacts) -> ([TimeSeries; 2], Option<String>) {
+        let mut width = TimeSeries::new("laid_width_mm", false);
+        let mut flow = TimeSeries::new("laid_flow_mm3_per_s", false);
         let mut too_narrow = 0_usize;
-        for (seen_s, seen) in self.width.time_s.iter().zip(&self.width.values) {
-            let place = self.path.at(*seen_s).map(|path| path - facts.offset.get());
-            let Some(laid_s) = place.and_then(|place| self.passed(place)) else { continue };
-            width.push(laid_s, *seen);
+        for (measured_s, measured) in self.width.time_s.iter().zip(&self.width.values) {
+            let position = self.path.at(*measured_s).map(|path| path - facts.offset.get());
+            let Some(laid_s) = position.and_then(|position| self.time_at(position)) else {
+                continue;
+            };
+            width.push(laid_s, *measured);
             let Some(height) = facts.layer_height else { continue };
-            match self.flow(laid_s, *seen, height) {
+            match self.flow(laid_s, *measured, height) {
                 Some(value) => flow.push(laid_s, value),
                 None => too_narrow += 1,
             }
@@ -239,12 +242,12 @@ impl Bead {
     }
 
     /// When the nozzle first was at a place of the path \[s\].
-    fn passed(&self, place: f64) -> Option<f64> {
-        let after = self.path.values.partition_point(|path| *path < place);
+    fn time_at(&self, position: f64) -> Option<f64> {
+        let after = self.path.values.partition_point(|path| *path < position);
         let before = after.checked_sub(1)?;
         let (from, to) = (*self.path.values.get(before)?, *self.path.values.get(after)?);
         let (from_s, to_s) = (*self.path.time_s.get(before)?, *self.path.time_s.get(after)?);
-        Some(from_s + (to_s - from_s) * (place - from) / (to - from))
+        Some(from_s + (to_s - from_s) * (position - from) / (to - from))
     }
 
     fn flow(&self, laid_s: f64, width: f64, height: Mm) -> Option<f64> {

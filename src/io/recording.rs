@@ -88,7 +88,7 @@ pub enum RecordingError {
 
 /// Something that was recorded.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Entry {
+pub enum RecordedEntry {
     /// What the controller was told.
     Event {
         /// Counts the events of the run from 0.
@@ -233,7 +233,7 @@ impl Recording {
 
     /// What a message says in the terms of this program; `None` for a message
     /// of another topic.
-    pub fn entry(&self, message: Message) -> Result<Option<Entry>, RecordingError> {
+    pub fn entry(&self, message: Message) -> Result<Option<RecordedEntry>, RecordingError> {
         let bad = |error: serde_json::Error| RecordingError::BadMessage {
             file: self.file.clone(),
             topic: message.topic.name.clone(),
@@ -243,24 +243,28 @@ impl Recording {
         Ok(match message.topic.name.as_str() {
             EVENT_TOPIC => {
                 let row: EventRow = serde_json::from_slice(&message.data).map_err(bad)?;
-                Some(Entry::Event { n: row.n, now: Stamp::from_ns(row.now_ns), event: row.event })
+                Some(RecordedEntry::Event {
+                    n: row.n,
+                    now: Stamp::from_ns(row.now_ns),
+                    event: row.event,
+                })
             }
             STEP_TOPIC => {
                 let row: StepRow = serde_json::from_slice(&message.data).map_err(bad)?;
-                Some(Entry::Step {
+                Some(RecordedEntry::Step {
                     n: row.n,
                     now: Stamp::from_ns(row.now_ns),
                     step: Box::new(row.step),
                 })
             }
-            IMAGE_TOPIC => Some(Entry::Frame(message)),
+            IMAGE_TOPIC => Some(RecordedEntry::Frame(message)),
             _ => None,
         })
     }
 }
 
 impl Iterator for Recording {
-    type Item = Result<Entry, RecordingError>;
+    type Item = Result<RecordedEntry, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {

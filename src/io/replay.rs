@@ -4,7 +4,7 @@
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::Stamp;
-use crate::io::recording::{Entry, RecordingError};
+use crate::io::recording::{RecordedEntry, RecordingError};
 
 /// The first step that came out differently.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +24,7 @@ pub struct Difference {
 /// Events that are missing from the middle of a recording. What comes after
 /// cannot be compared, because the controller has not seen them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Gap {
+pub struct MissingEvents {
     /// First event that is missing, with its step or without.
     pub expected: u64,
     /// Event or step that stands in its place.
@@ -40,7 +40,7 @@ pub struct ReplayReport {
     /// Where the replay left the recording. It ends there.
     pub difference: Option<Difference>,
     /// Where events are missing. The replay ends there.
-    pub gap: Option<Gap>,
+    pub gap: Option<MissingEvents>,
     /// An event at the end whose step was not recorded any more.
     pub unanswered: Option<u64>,
 }
@@ -56,28 +56,28 @@ struct Pending {
 /// Replays a recording. `step` is the controller, fresh from its
 /// configuration. Fails where the recording cannot be read on.
 pub fn replay(
-    entries: impl IntoIterator<Item = Result<Entry, RecordingError>>,
+    entries: impl IntoIterator<Item = Result<RecordedEntry, RecordingError>>,
     mut step: impl FnMut(Stamp, &Event) -> Step,
 ) -> Result<ReplayReport, RecordingError> {
     let mut report = ReplayReport::default();
     let mut pending: Option<Pending> = None;
     for entry in entries {
         match entry? {
-            Entry::Frame(_) => {}
-            Entry::Event { n, now, event } => {
+            RecordedEntry::Frame(_) => {}
+            RecordedEntry::Event { n, now, event } => {
                 let expected = report.compared;
                 if pending.is_some() || n != expected {
-                    report.gap = Some(Gap { expected, found: n });
+                    report.gap = Some(MissingEvents { expected, found: n });
                     return Ok(report);
                 }
                 let replayed = step(now, &event);
                 pending = Some(Pending { n, now, event, replayed });
             }
-            Entry::Step { n, step: recorded, .. } => {
+            RecordedEntry::Step { n, step: recorded, .. } => {
                 let Some(Pending { now, event, replayed, .. }) =
                     pending.take_if(|open| open.n == n)
                 else {
-                    report.gap = Some(Gap { expected: report.compared, found: n });
+                    report.gap = Some(MissingEvents { expected: report.compared, found: n });
                     return Ok(report);
                 };
                 report.compared += 1;
@@ -120,7 +120,7 @@ mod tests {
         }
     }
 
-    fn recorded(count: u32) -> Vec<Entry> {
+    fn recorded(count: u32) -> Vec<RecordedEntry> {
         let mut controller = controller();
         let mut entries = Vec::new();
         for frame in 0..count {
@@ -133,13 +133,13 @@ mod tests {
                 sigma_mm: Mm::constant(0.05),
             };
             let step = controller(now, &event);
-            entries.push(Entry::Event { n, now, event });
-            entries.push(Entry::Step { n, now, step: Box::new(step) });
+            entries.push(RecordedEntry::Event { n, now, event });
+            entries.push(RecordedEntry::Step { n, now, step: Box::new(step) });
         }
         entries
     }
 
-    fn replayed(entries: Vec<Entry>) -> ReplayReport {
+    fn replayed(entries: Vec<RecordedEntry>) -> ReplayReport {
         replay(entries.into_iter().map(Ok), controller()).unwrap()
     }
 
@@ -152,7 +152,9 @@ mod tests {
     #[test]
     fn one_bit_is_a_difference() {
         let mut entries = recorded(20);
-        let Entry::Step { step, .. } = &mut entries[15] else { panic!("a step was expected") };
+        let RecordedEntry::Step { step, .. } = &mut entries[15] else {
+            panic!("a step was expected")
+        };
         let error = step.trace.error_mm.unwrap().get();
         step.trace.error_mm = Mm::new(f64::from_bits(error.to_bits() + 1)).ok();
         let report = replayed(entries);
@@ -164,7 +166,9 @@ mod tests {
     #[test]
     fn the_sign_of_a_zero_is_a_difference() {
         let mut entries = recorded(1);
-        let Entry::Step { step, .. } = &mut entries[1] else { panic!("a step was expected") };
+        let RecordedEntry::Step { step, .. } = &mut entries[1] else {
+            panic!("a step was expected")
+        };
         step.trace.error_mm = Some(Mm::constant(-0.0));
         assert_eq!(replayed(entries).difference.unwrap().n, 0);
     }
@@ -183,6 +187,6 @@ mod tests {
         entries.drain(6..10);
         let report = replayed(entries);
         assert_eq!((report.compared, report.difference), (3, None));
-        assert_eq!(report.gap, Some(Gap { expected: 3, found: 5 }));
+        assert_eq!(report.gap, Some(MissingEvents { expected: 3, found: 5 }));
     }
 }

@@ -12,43 +12,43 @@ use signal_hook::iterator::Signals;
 /// Tells that the command is to end.
 #[derive(Debug, Clone)]
 pub struct StopSignal {
-    asked: Arc<AtomicBool>,
-    told: Receiver<()>,
+    requested: Arc<AtomicBool>,
+    signals: Receiver<()>,
 }
 
 impl StopSignal {
     /// Begins to listen for signals.
     pub fn install() -> io::Result<Self> {
-        let (tell, told) = unbounded();
-        let asked = Arc::new(AtomicBool::new(false));
+        let (sender, receiver) = unbounded();
+        let requested = Arc::new(AtomicBool::new(false));
         let mut signals = Signals::new([SIGINT, SIGTERM])?;
-        let heard = Arc::clone(&asked);
+        let shared = Arc::clone(&requested);
         std::thread::Builder::new()
             .name("signals".to_owned())
-            .spawn(move || wait(&mut signals, &heard, &tell))?;
-        Ok(Self { asked, told })
+            .spawn(move || wait(&mut signals, &shared, &sender))?;
+        Ok(Self { requested, signals: receiver })
     }
 
     /// Whether a signal has come.
-    pub fn asked(&self) -> bool {
-        self.asked.load(Ordering::Relaxed)
+    pub fn requested(&self) -> bool {
+        self.requested.load(Ordering::Relaxed)
     }
 
     /// Gives a message when a signal comes.
-    pub fn told(&self) -> &Receiver<()> {
-        &self.told
+    pub fn signals(&self) -> &Receiver<()> {
+        &self.signals
     }
 }
 
-fn wait(signals: &mut Signals, heard: &AtomicBool, tell: &Sender<()>) {
+fn wait(signals: &mut Signals, requested: &AtomicBool, sender: &Sender<()>) {
     for signal in signals.forever() {
-        if heard.swap(true, Ordering::Relaxed) {
+        if requested.swap(true, Ordering::Relaxed) {
             // The person insists; 128 + the signal is what a shell would say.
             std::process::exit(128 + signal);
         }
         // Where standard error is gone there is nobody to tell.
         let _ = writeln!(io::stderr(), "ending in order; once more ends at once");
-        if tell.send(()).is_err() {
+        if sender.send(()).is_err() {
             return;
         }
     }

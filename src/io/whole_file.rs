@@ -20,13 +20,13 @@ const MODE: u32 = 0o666;
 
 /// Writes beside the final name and renames when everything is on the disk.
 /// An older file of this name is replaced.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     write_and_rename(path, bytes)
-        .map_err(|error| WriteError { path: path.to_owned(), what: of_the_system(error) })
+        .map_err(|error| WriteError { path: path.to_owned(), what: without_temporary_name(error) })
 }
 
 /// Without the name of the file beside, which the user has not asked for.
-fn of_the_system(error: io::Error) -> io::Error {
+fn without_temporary_name(error: io::Error) -> io::Error {
     let text = error.to_string();
     match text.split_once(" at path ") {
         Some((what, _)) => io::Error::new(error.kind(), what),
@@ -64,8 +64,8 @@ mod tests {
     fn the_file_is_there_and_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("calib.toml");
-        write_whole(&path, b"old").unwrap();
-        write_whole(&path, b"new").unwrap();
+        write_atomic(&path, b"old").unwrap();
+        write_atomic(&path, b"new").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         assert_ne!(fs::metadata(&path).unwrap().permissions().mode() & 0o044, 0, "others may read");
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn a_missing_folder_is_named() {
-        let error = write_whole(Path::new("no/such/folder/x.toml"), b"").unwrap_err();
+        let error = write_atomic(Path::new("no/such/folder/x.toml"), b"").unwrap_err();
         let said = error.to_string();
         assert!(said.starts_with("cannot write no/such/folder/x.toml: No such file"), "{said}");
         assert!(!said.contains(".truebead-") && std::error::Error::source(&error).is_none());

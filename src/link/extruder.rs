@@ -15,5 +15,5 @@ mod numbers;
 
 pub use drive_line::DriveLine;
 pub use extruder_line::{ExtruderHello, ExtruderLine, ExtruderStatus, pump_word};
-pub use gate::{Faults, Gate};
+pub use gate::{ExtruderEndpoint, ExtruderFaults};
 pub use numbers::on_wire;

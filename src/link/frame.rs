@@ -10,7 +10,7 @@ mod sequence;
 mod split;
 
 pub use device_line::{DeviceLine, LineBody};
-pub use fields::{Decimals, Fields, LineError, one_word, printing};
+pub use fields::{Decimals, LineError, LineFields, one_word, printing};
 pub use limits::{MAX_BAD_LINES, MAX_LINE, MAX_VALID_MS, MIN_VALID_MS, VERSION};
 pub use pc_hello::{BYE_LINE, hello_line, read_hello};
 pub use refusal::{ErrCode, LineRefusal};

@@ -10,9 +10,9 @@ pub mod pc_line;
 pub mod robot_line;
 pub mod virtual_robot;
 
-pub use job::Job;
+pub use job::PrintJob;
 pub use numbers::on_wire;
 pub use params::{ParamError, RobotParams};
 pub use pc_line::PcLine;
 pub use robot_line::{RobotLine, mode_word};
-pub use virtual_robot::{Faults, RobotCell};
+pub use virtual_robot::{RobotFaults, VirtualRobot};

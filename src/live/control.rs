@@ -15,9 +15,9 @@ use std::time::Duration;
 
 use crossbeam_channel::{Receiver, never, select};
 
-use super::eye::Seen;
+use super::eye::CameraMessage;
 use super::latency::Latencies;
-use super::scribe::Scribe;
+use super::scribe::RunLogger;
 use crate::control::event::Event;
 use crate::control::step::{Command, State, Step};
 use crate::core::robot::RobotMode;
@@ -29,10 +29,10 @@ use crate::drivers::robot::RobotEvent;
 use crate::io::clock::RunClock;
 use crate::io::record::RecorderHandle;
 use crate::rows::names;
-use crate::rows::summary::Note;
+use crate::rows::summary::RunNote;
 use crate::run::ports::RecordError;
 use crate::run::runner::{Handled, Runner};
-use crate::width_control::limiter::Limits;
+use crate::width_control::limiter::SpeedLimits;
 
 pub use ending::Ending;
 pub use extruder_watch::ExtruderWatch;
@@ -40,11 +40,11 @@ pub use port::LinkPort;
 pub use steps::StepsWatch;
 
 /// Longest wait for the robot to say that it has stopped.
-const FAREWELL: Span = Span::from_millis(600);
+const SHUTDOWN_TIMEOUT: Span = Span::from_millis(600);
 
 /// Where events come from.
 pub struct Sources<'a> {
-    pub seen: &'a Receiver<Seen>,
+    pub seen: &'a Receiver<CameraMessage>,
     pub robot: &'a Receiver<RobotEvent>,
     pub extruder: &'a Receiver<ExtruderEvent>,
     pub alarm: &'a Receiver<RecordError>,
@@ -52,7 +52,7 @@ pub struct Sources<'a> {
 }
 
 /// The control thread's own.
-pub struct Loop<'a> {
+pub struct ControlThread<'a> {
     pub runner: Runner<LinkPort, RecorderHandle, Option<ExtruderClient>>,
     pub extruder: Option<ExtruderWatch>,
     pub clock: RunClock,
@@ -61,9 +61,9 @@ pub struct Loop<'a> {
     pub robot_z: Arc<AtomicU64>,
     pub robot_view: Option<RobotView>,
     pub latencies: Latencies,
-    pub scribe: &'a Scribe,
+    pub logger: &'a RunLogger,
     pub notice: Box<dyn FnMut(&str) + Send>,
-    pub limits: Limits,
+    pub limits: SpeedLimits,
     pub unfit: Option<Ending>,
     pub steps: Option<StepsWatch>,
     pub shown: Option<State>,
@@ -71,18 +71,18 @@ pub struct Loop<'a> {
     pub setpoint: Option<MmPerS>,
 }
 
-impl Loop<'_> {
+impl ControlThread<'_> {
     /// Runs until something ends it, and then ends it in order.
     pub fn run(&mut self, sources: &Sources<'_>) -> Ending {
         let ending = self.until_ended(sources);
         self.give(Event::Stop);
-        self.farewell(sources);
+        self.shut_down(sources);
         ending
     }
 
     /// Waits a little for robot and extruder to say that they rest.
-    fn farewell(&mut self, sources: &Sources<'_>) {
-        let until = self.clock.now() + FAREWELL;
+    fn shut_down(&mut self, sources: &Sources<'_>) {
+        let until = self.clock.now() + SHUTDOWN_TIMEOUT;
         let mut stopped = false;
         while !(stopped && self.extruder.as_ref().is_none_or(ExtruderWatch::rests)) {
             let left = until - self.clock.now();
@@ -93,11 +93,11 @@ impl Loop<'_> {
                 recv(sources.robot) -> message => {
                     let Ok(event) = message else { return };
                     stopped |= has_stopped(&event);
-                    self.hear_robot(event);
+                    self.take_robot_event(event);
                 }
                 recv(sources.extruder) -> message => {
                     let Ok(event) = message else { return };
-                    self.hear_extruder(event);
+                    self.take_extruder_event(event);
                 }
                 default(duration(left)) => return,
             }
@@ -106,12 +106,12 @@ impl Loop<'_> {
 
     /// Takes down what was seen until the camera ended, so that every frame in
     /// the recording has its event.
-    pub fn take_rest(&mut self, seen: &Receiver<Seen>) {
+    pub fn take_rest(&mut self, seen: &Receiver<CameraMessage>) {
         for seen in seen.try_iter() {
             match seen {
-                Seen::Frame(look) => self.look(*look),
-                Seen::Unreadable { seq, at, reason } => self.unreadable(seq, at, &reason),
-                Seen::Ended(_) => {}
+                CameraMessage::Frame(look) => self.look(*look),
+                CameraMessage::Unreadable { seq, at, reason } => self.unreadable(seq, at, &reason),
+                CameraMessage::Ended(_) => {}
             }
         }
     }
@@ -151,10 +151,10 @@ impl Loop<'_> {
             let wait = [over, extruder_due].into_iter().flatten().fold(due, Stamp::min) - now;
             select! {
                 recv(seen) -> message => match message {
-                    Ok(Seen::Frame(look)) => self.look(*look),
-                    Ok(Seen::Unreadable { seq, at, reason }) => self.unreadable(seq, at, &reason),
-                    Ok(Seen::Ended(None)) | Err(_) => return Ending::LastFrame,
-                    Ok(Seen::Ended(Some(reason))) => {
+                    Ok(CameraMessage::Frame(look)) => self.look(*look),
+                    Ok(CameraMessage::Unreadable { seq, at, reason }) => self.unreadable(seq, at, &reason),
+                    Ok(CameraMessage::Ended(None)) | Err(_) => return Ending::LastFrame,
+                    Ok(CameraMessage::Ended(Some(reason))) => {
                         (self.notice)(&format!("camera lost: {reason}"));
                         self.give(Event::CameraLost { reason: reason.clone() });
                         lost = Some(reason);
@@ -162,10 +162,10 @@ impl Loop<'_> {
                     }
                 },
                 recv(sources.robot) -> message => {
-                    if let Ok(event) = message { self.hear_robot(event); }
+                    if let Ok(event) = message { self.take_robot_event(event); }
                 }
                 recv(sources.extruder) -> message => {
-                    if let Ok(event) = message { self.hear_extruder(event); }
+                    if let Ok(event) = message { self.take_extruder_event(event); }
                 }
                 recv(alarm) -> message => {
                     if let Ok(error) = message {
@@ -192,14 +192,14 @@ impl Loop<'_> {
         let handled = self.runner.handle(now, &event);
         if let (Some(_), Some(Command::Speed(speed))) = (handled.sent, handled.step.command) {
             self.setpoint = Some(speed);
-            self.scribe.note(Note::SetpointSent);
+            self.logger.note(RunNote::SetpointSent);
         }
         if let Some(steps) = &mut self.steps {
             steps.see(&handled.step);
         }
         self.show(now, &handled.step);
         self.show_extruder(now, &handled.step);
-        self.scribe.step(now, event, handled.step.clone());
+        self.logger.step(now, event, handled.step.clone());
         handled
     }
 
@@ -209,8 +209,8 @@ impl Loop<'_> {
             return;
         }
         let words = match &step.state {
-            State::Holding(why) => format!("holding: {}", names::spoken(names::hold(why))),
-            State::Fault(why) => format!("fault: {}", names::spoken(&names::fault(why))),
+            State::Holding(why) => format!("holding: {}", names::in_words(names::hold(why))),
+            State::Fault(why) => format!("fault: {}", names::in_words(&names::fault(why))),
             state => state.name().to_owned(),
         };
         (self.notice)(&format!("{:8.2} s  {}", now.secs(), words));
@@ -224,7 +224,7 @@ impl Loop<'_> {
         match (handled.sent, written) {
             (Some(_), Some(written)) if is_speed => {
                 for latency in self.latencies.sent(due, written.at) {
-                    self.scribe.latency(latency);
+                    self.logger.latency(latency);
                 }
             }
             _ => self.latencies.forget(),

@@ -31,9 +31,9 @@ pub struct Optics {
 
 /// What the eye tells control.
 #[derive(Debug)]
-pub enum Seen {
+pub enum CameraMessage {
     /// A frame was looked at.
-    Frame(Box<Look>),
+    Frame(Box<MeasuredFrame>),
     /// There was a frame, but it cannot be read.
     Unreadable {
         /// Its number.
@@ -49,7 +49,7 @@ pub enum Seen {
 
 /// A frame that was looked at.
 #[derive(Debug)]
-pub struct Look {
+pub struct MeasuredFrame {
     /// The frame.
     pub frame: Arc<Frame>,
     /// When the program had it.
@@ -69,14 +69,14 @@ enum Taken {
 }
 
 /// The running threads.
-pub struct Eye {
+pub struct CapturePipeline {
     /// What they see.
-    pub seen: Receiver<Seen>,
+    pub seen: Receiver<CameraMessage>,
     mailbox: Arc<Mailbox<Taken>>,
     threads: Vec<JoinHandle<()>>,
 }
 
-impl Eye {
+impl CapturePipeline {
     /// Starts to look.
     pub fn start(
         source: Box<dyn FrameSource>,
@@ -113,7 +113,7 @@ impl Eye {
 fn take_frames(
     mut source: Box<dyn FrameSource>,
     mailbox: &Mailbox<Taken>,
-    tell: &Sender<Seen>,
+    tell: &Sender<CameraMessage>,
     clock: RunClock,
 ) {
     let why = loop {
@@ -131,10 +131,15 @@ fn take_frames(
     };
     mailbox.close();
     // Nobody listens any more when the run has ended first.
-    let _ = tell.send(Seen::Ended(why));
+    let _ = tell.send(CameraMessage::Ended(why));
 }
 
-fn measure_frames(mailbox: &Mailbox<Taken>, optics: &Optics, tap: &FrameTap, tell: &Sender<Seen>) {
+fn measure_frames(
+    mailbox: &Mailbox<Taken>,
+    optics: &Optics,
+    tap: &FrameTap,
+    tell: &Sender<CameraMessage>,
+) {
     let mut measurer = Measurer::new(optics.cell.gauge, optics.cell.white);
     let mut estimator = RoughnessEstimator::default();
     while let Some(taken) = mailbox.take() {
@@ -148,14 +153,15 @@ fn measure_frames(mailbox: &Mailbox<Taken>, optics: &Optics, tap: &FrameTap, tel
                 let edges = measurer.edges();
                 let frame = Arc::new(frame);
                 let edges = (edges.left.to_vec(), edges.right.to_vec());
-                let look = Look { frame: Arc::clone(&frame), had_at, outcome, roughness, edges };
-                if tell.send(Seen::Frame(Box::new(look))).is_err() {
+                let look =
+                    MeasuredFrame { frame: Arc::clone(&frame), had_at, outcome, roughness, edges };
+                if tell.send(CameraMessage::Frame(Box::new(look))).is_err() {
                     return;
                 }
                 tap.frame(frame);
                 continue;
             }
-            Taken::Unreadable { seq, at, reason } => Seen::Unreadable { seq, at, reason },
+            Taken::Unreadable { seq, at, reason } => CameraMessage::Unreadable { seq, at, reason },
         };
         if tell.send(seen).is_err() {
             return;

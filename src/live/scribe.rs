@@ -16,7 +16,7 @@ use crate::core::time::Stamp;
 use crate::rows::frame_row::FrameRow;
 use crate::rows::log::RunLog;
 use crate::rows::output::LogError;
-use crate::rows::summary::{Note, Summary};
+use crate::rows::summary::{RunNote, Summary};
 use crate::vision::Edges;
 
 /// Pictures that may wait for the log; beyond, rows go without theirs.
@@ -26,18 +26,18 @@ enum Fact {
     Frame { row: FrameRow, picture: Option<(Arc<Frame>, Vec<ImagePoint>, Vec<ImagePoint>)> },
     Step { now: Stamp, event: Event, step: Step },
     Latency(Latency),
-    Note(Note),
+    Note(RunNote),
 }
 
 /// The thread that writes the log.
-pub struct Scribe {
+pub struct RunLogger {
     facts: Sender<Fact>,
     /// Pictures that have been told and not yet written.
     waiting: Arc<AtomicUsize>,
     thread: JoinHandle<Result<Summary, LogError>>,
 }
 
-impl Scribe {
+impl RunLogger {
     /// Starts to write.
     pub fn start(log: RunLog) -> std::io::Result<Self> {
         let (facts, told) = unbounded();
@@ -73,7 +73,7 @@ impl Scribe {
     }
 
     /// Another fact.
-    pub fn note(&self, note: Note) {
+    pub fn note(&self, note: RunNote) {
         self.tell(Fact::Note(note));
     }
 

@@ -2,20 +2,20 @@
 //! Gaussian, as by a lens, and by a box, as by even motion while the shutter is open.
 //! Position is in standard deviations of the whole blur.
 
-use super::number::float;
+use super::number::to_f64;
 
 /// Half the table's reach, in standard deviations of the blur.
-const REACH: f64 = 6.0;
+const TABLE_HALF_RANGE_SD: f64 = 6.0;
 /// Entries for each standard deviation.
-const PER_SD: f64 = 64.0;
+const ENTRIES_PER_SD: f64 = 64.0;
 /// Fraction of the variance up to which a box is none.
-const NO_BOX: f64 = 1e-6;
+const MIN_BOX_FRACTION: f64 = 1e-6;
 
 /// A blurred step at a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Entry {
     /// Fraction of the step that is reached.
-    share: f64,
+    fraction: f64,
     /// Its slope.
     density: f64,
     /// What the integral of the share up to here is beyond z times the share.
@@ -44,8 +44,8 @@ impl StepTable {
         reason = "REACH and PER_SD are small and positive"
     )]
     pub fn new(box_fraction: f64) -> Self {
-        let count = (2.0 * REACH * PER_SD) as u32 + 2;
-        let place = |k: u32| f64::from(k) / PER_SD - REACH;
+        let count = (2.0 * TABLE_HALF_RANGE_SD * ENTRIES_PER_SD) as u32 + 2;
+        let place = |k: u32| f64::from(k) / ENTRIES_PER_SD - TABLE_HALF_RANGE_SD;
         let entries = (0..count).map(|k| Entry::of(place(k), box_fraction)).collect();
         Self { entries, box_fraction }
     }
@@ -59,22 +59,22 @@ impl StepTable {
     #[inline]
     pub fn at(&self, z: f64) -> (f64, f64) {
         let entry = self.entry(z);
-        (entry.share, entry.density)
+        (entry.fraction, entry.density)
     }
 
     /// Share of the step, its slope, and the levels of two slopes that begin at the
     /// step, blurred like it: one that falls towards it and one that rises after it.
     #[inline]
     pub fn with_slopes(&self, z: f64) -> (f64, f64, [f64; 2]) {
-        let Entry { share, density, tail } = self.entry(z);
+        let Entry { fraction: share, density, tail } = self.entry(z);
         (share, density, [tail - z * (1.0 - share), tail + z * share])
     }
 
     #[inline]
     fn entry(&self, z: f64) -> Entry {
-        let place = (z + REACH) * PER_SD;
+        let place = (z + TABLE_HALF_RANGE_SD) * ENTRIES_PER_SD;
         if place <= 0.0 {
-            return Entry { share: 0.0, density: 0.0, tail: 0.0 };
+            return Entry { fraction: 0.0, density: 0.0, tail: 0.0 };
         }
         #[expect(
             clippy::cast_possible_truncation,
@@ -83,12 +83,12 @@ impl StepTable {
         )]
         let index = place as usize;
         let (Some(low), Some(high)) = (self.entries.get(index), self.entries.get(index + 1)) else {
-            return Entry { share: 1.0, density: 0.0, tail: 0.0 };
+            return Entry { fraction: 1.0, density: 0.0, tail: 0.0 };
         };
-        let part = place - float(index);
+        let part = place - to_f64(index);
         let between = |low: f64, high: f64| low + part * (high - low);
         Entry {
-            share: between(low.share, high.share),
+            fraction: between(low.fraction, high.fraction),
             density: between(low.density, high.density),
             tail: between(low.tail, high.tail),
         }
@@ -97,9 +97,9 @@ impl StepTable {
 
 impl Entry {
     fn of(z: f64, box_fraction: f64) -> Self {
-        if box_fraction < NO_BOX {
+        if box_fraction < MIN_BOX_FRACTION {
             let (share, density) = gaussian(z);
-            return Self { share, density, tail: density };
+            return Self { fraction: share, density, tail: density };
         }
         // The integrals of a Gaussian's distribution function, once and twice, between
         // the ends of the box.
@@ -113,7 +113,7 @@ impl Entry {
             [share, sd * once, sd * sd * twice]
         });
         let [density, share, integral] = [0, 1, 2].map(|k| (far[k] - near[k]) / length);
-        Self { share, density, tail: integral - z * share }
+        Self { fraction: share, density, tail: integral - z * share }
     }
 }
 

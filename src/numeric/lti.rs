@@ -18,8 +18,8 @@ mod simulate;
 mod state;
 mod transfer;
 
-pub use discrete::{DiscreteTransfer, Method, Recursion};
-pub use margins::{Margins, margins};
+pub use discrete::{DiscreteTransfer, DiscretisationMethod, Recursion};
+pub use margins::{StabilityMargins, margins};
 pub use process::{FirstOrder, SecondOrder};
 pub use simulate::{Between, Simulator, simulate};
 pub use state::{Advance, StateSpace};

@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 pub const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
 const NODES_PER_UNIT: f64 = 16.0;
 /// The nodes reach from −`END` to `END`; beyond, the tail is less than 10⁻²³.
-const END: f64 = 10.0;
+const MAX_NODE: f64 = 10.0;
 
 /// What a series about one place is made of.
 struct Node {
@@ -23,8 +23,8 @@ struct Node {
 
 static NODES: LazyLock<Vec<Node>> = LazyLock::new(|| {
     let mut nodes = Vec::new();
-    let mut at = -END;
-    while at <= END {
+    let mut at = -MAX_NODE;
+    while at <= MAX_NODE {
         let density = libm::exp(-0.5 * at * at) / TAU.sqrt();
         let cumulative = cumulative(at);
         nodes.push(Node {
@@ -47,8 +47,8 @@ static NODES: LazyLock<Vec<Node>> = LazyLock::new(|| {
 /// The nearest node and the distance from it; `None` outside the nodes.
 fn near(u: f64) -> Option<(&'static Node, f64)> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-    let number = ((u + END) * NODES_PER_UNIT + 0.5) as usize;
-    let node = NODES.get(number).filter(|_| u >= -END)?;
+    let number = ((u + MAX_NODE) * NODES_PER_UNIT + 0.5) as usize;
+    let node = NODES.get(number).filter(|_| u >= -MAX_NODE)?;
     Some((node, u - node.at))
 }
 

@@ -3,19 +3,19 @@
 use nalgebra::{Cholesky, SMatrix, SVector};
 
 /// Normal equations of a small fit.
-pub struct Normal<const N: usize> {
+pub struct NormalEquations<const N: usize> {
     matrix: [[f64; N]; N],
     /// Right-hand side.
     pub vector: SVector<f64, N>,
 }
 
-impl<const N: usize> Default for Normal<N> {
+impl<const N: usize> Default for NormalEquations<N> {
     fn default() -> Self {
         Self { matrix: [[0.0; N]; N], vector: SVector::zeros() }
     }
 }
 
-impl<const N: usize> Normal<N> {
+impl<const N: usize> NormalEquations<N> {
     /// Adds an observation: its derivatives, what it misses, its weight.
     #[inline(always)]
     pub fn add(&mut self, row: [f64; N], miss: f64, weight: f64) {
@@ -30,7 +30,7 @@ impl<const N: usize> Normal<N> {
     }
 
     /// Holds one unknown: `miss` from where it is held.
-    pub fn hold(&mut self, which: usize, weight: f64, miss: f64) {
+    pub fn add_prior(&mut self, which: usize, weight: f64, miss: f64) {
         self.matrix[which][which] += weight;
         self.vector[which] += weight * miss;
     }
@@ -47,7 +47,7 @@ impl<const N: usize> Normal<N> {
 
     /// By how much a step lowers the sum of squared misses.
     #[inline(always)]
-    pub fn lowered_by(&self, step: &SVector<f64, N>) -> f64 {
+    pub fn decrease_after(&self, step: &SVector<f64, N>) -> f64 {
         2.0 * self.vector.dot(step) - (SMatrix::from(self.matrix) * step).dot(step)
     }
 
@@ -60,15 +60,15 @@ impl<const N: usize> Normal<N> {
 
     /// The equations of some unknowns alone.
     #[inline(always)]
-    pub fn part<const M: usize>(&self, of: [usize; M]) -> Part<M> {
-        Part {
+    pub fn of_unknowns<const M: usize>(&self, of: [usize; M]) -> PartialEquations<M> {
+        PartialEquations {
             matrix: SMatrix::from_fn(|row, column| self.matrix[of[row]][of[column]]),
             vector: SVector::from_fn(|row, _| self.vector[of[row]]),
         }
     }
 
     /// Solves them; `None` where they have no solution.
-    pub fn solve(&mut self) -> Option<Solved<N>>
+    pub fn solve(&mut self) -> Option<NormalSolution<N>>
     where
         nalgebra::Const<N>: nalgebra::DimMin<nalgebra::Const<N>>,
     {
@@ -78,34 +78,34 @@ impl<const N: usize> Normal<N> {
         }
         let cholesky = Cholesky::new(SMatrix::from(self.matrix))?;
         let unknowns = cholesky.solve(&self.vector);
-        Some(Solved { unknowns, cholesky })
+        Some(NormalSolution { unknowns, cholesky })
     }
 }
 
 /// Normal equations of some of the unknowns.
-pub struct Part<const M: usize> {
+pub struct PartialEquations<const M: usize> {
     matrix: SMatrix<f64, M, M>,
     vector: SVector<f64, M>,
 }
 
-impl<const M: usize> Part<M> {
+impl<const M: usize> PartialEquations<M> {
     /// By how much the unknowns can lower the sum of squared misses; 0 where the
     /// observations do not tell them.
     #[inline(always)]
-    pub fn lowers(&self) -> f64 {
+    pub fn max_decrease(&self) -> f64 {
         let unknowns = Cholesky::new(self.matrix);
         unknowns.map_or(0.0, |unknowns| self.vector.dot(&unknowns.solve(&self.vector)))
     }
 }
 
 /// Solved equations.
-pub struct Solved<const N: usize> {
+pub struct NormalSolution<const N: usize> {
     /// The unknowns.
     pub unknowns: SVector<f64, N>,
     cholesky: Cholesky<f64, nalgebra::Const<N>>,
 }
 
-impl<const N: usize> Solved<N> {
+impl<const N: usize> NormalSolution<N> {
     /// Variance of an unknown, for observations of variance 1.
     pub fn variance(&self, which: usize) -> f64 {
         let mut one = SVector::<f64, N>::zeros();

@@ -7,7 +7,7 @@ use std::cmp::Ordering;
 pub const SIGMA_PER_MEDIAN: f64 = 1.4826;
 
 /// Median of the square of a standard normal number.
-pub const MEDIAN_SQUARE: f64 = 0.455;
+pub const MEDIAN_OF_SQUARED_NORMAL: f64 = 0.455;
 
 /// Numbers that have an order.
 pub trait Ordered: Copy {

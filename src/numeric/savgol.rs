@@ -3,7 +3,7 @@
 //! Golay 1964). The coefficients are sums over orthonormal polynomials, so no
 //! matrix is solved and none of them suffers from the powers of a long window.
 
-use super::number::float;
+use super::number::to_f64;
 
 /// Highest degree that is of use.
 const MAX_DEGREE: usize = 8;
@@ -95,11 +95,11 @@ impl SavGol {
     /// the value at sample `at` of it, counted from 0.
     pub fn coefficients(&self, at: usize) -> Vec<f64> {
         // The window reaches from −1 to 1.
-        let half = float(self.window / 2).max(1.0);
-        let place = |sample: usize| (float(sample) - float(self.window / 2)) / half;
+        let half = to_f64(self.window / 2).max(1.0);
+        let place = |sample: usize| (to_f64(sample) - to_f64(self.window / 2)) / half;
         let mut coefficients = vec![0.0; self.window];
         let mut basis = Basis::new((0..self.window).map(place).collect());
-        let mut there = Derivatives::new(place(at), 1.0 / float(self.window).sqrt());
+        let mut there = Derivatives::new(place(at), 1.0 / to_f64(self.window).sqrt());
         for degree in 0..=self.degree {
             if degree > 0 {
                 there.advance(basis.advance());
@@ -194,7 +194,7 @@ struct Basis {
 impl Basis {
     fn new(places: Vec<f64>) -> Self {
         let count = places.len();
-        let values = vec![1.0 / float(count).sqrt(); count];
+        let values = vec![1.0 / to_f64(count).sqrt(); count];
         Self { places, values, before: vec![0.0; count], norm: 0.0 }
     }
 
@@ -237,7 +237,7 @@ impl Derivatives {
         let mut lower = 0.0;
         for (order, to) in next.iter_mut().enumerate() {
             let (value, before) = (self.of_order(order), self.before.get(order).unwrap_or(&0.0));
-            *to = (self.place - by.centre) * value + float(order) * lower - by.back * before;
+            *to = (self.place - by.centre) * value + to_f64(order) * lower - by.back * before;
             *to /= by.norm;
             lower = value;
         }

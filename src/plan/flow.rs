@@ -12,13 +12,13 @@ pub const KNOT_S: f64 = 0.08;
 
 /// Flow \[mm³/s\] and volume since the first tick \[mm³\], tick by tick.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course {
+pub struct FlowTrajectory {
     from_s: f64,
     flow: Vec<f64>,
     volume: Vec<f64>,
 }
 
-impl Course {
+impl FlowTrajectory {
     /// That begins at a moment \[s\] with a flow \[mm³/s\].
     fn new(from_s: f64, flow: f64) -> Self {
         Self { from_s, flow: vec![flow], volume: vec![0.0] }
@@ -33,22 +33,22 @@ impl Course {
 
     /// Flow at a moment \[mm³/s\]; beyond the ends that of the end.
     pub fn flow_at(&self, time_s: f64) -> f64 {
-        let (at, share) = self.place(time_s);
-        between(&self.flow, at, share.clamp(0.0, 1.0))
+        let (at, fraction) = self.index_at(time_s);
+        between(&self.flow, at, fraction.clamp(0.0, 1.0))
     }
 
     /// Volume from the first tick to a moment \[mm³\].
     pub fn volume_at(&self, time_s: f64) -> f64 {
-        let (at, share) = self.place(time_s);
+        let (at, fraction) = self.index_at(time_s);
         let base = self.volume.get(at).copied().unwrap_or(0.0);
         let first = self.flow.get(at).copied().unwrap_or(0.0);
-        let here = between(&self.flow, at, share.clamp(0.0, 1.0));
-        let inside = share.clamp(0.0, 1.0);
-        base + TICK_S * (0.5 * (first + here) * inside + here * (share - inside))
+        let here = between(&self.flow, at, fraction.clamp(0.0, 1.0));
+        let inside = fraction.clamp(0.0, 1.0);
+        base + TICK_S * (0.5 * (first + here) * inside + here * (fraction - inside))
     }
 
     /// The tick before a moment and the share of a tick since.
-    fn place(&self, time_s: f64) -> (usize, f64) {
+    fn index_at(&self, time_s: f64) -> (usize, f64) {
         let ticks = (time_s - self.from_s) / TICK_S;
         let last = self.flow.len().saturating_sub(2);
         let at = whole(ticks).min(last);
@@ -58,19 +58,19 @@ impl Course {
 
 /// The extruder at the moment from which on its command is still open.
 #[derive(Debug, Clone)]
-pub struct Extruder {
+pub struct FlowModel {
     flow: Simulator,
     command: f64,
-    past: Course,
+    history: FlowTrajectory,
 }
 
-impl Extruder {
+impl FlowModel {
     /// Settled at a command since long before 0 s.
     pub fn settled(model: &TransferFunction, command: f64) -> Result<Self, ModelError> {
         let mut flow = Simulator::new(model, TICK_S, Between::Linear)?;
         flow.settle(command)?;
         let now = if command == 0.0 { 0.0 } else { command * model.dc_gain() };
-        Ok(Self { flow, command, past: Course::new(0.0, now) })
+        Ok(Self { flow, command, history: FlowTrajectory::new(0.0, now) })
     }
 
     /// The command from which the knots go on.
@@ -80,12 +80,12 @@ impl Extruder {
 
     /// When the command is open \[s\].
     pub fn now_s(&self) -> f64 {
-        self.past.from_s + TICK_S * float(self.past.flow.len() - 1)
+        self.history.from_s + TICK_S * float(self.history.flow.len() - 1)
     }
 
     /// Forgets what was before a moment \[s\], but for the tick before it.
-    pub fn forget(&mut self, before_s: f64) {
-        let past = &mut self.past;
+    pub fn discard_before(&mut self, before_s: f64) {
+        let past = &mut self.history;
         let ticks = whole((before_s - past.from_s) / TICK_S).min(past.flow.len().saturating_sub(2));
         past.flow.drain(..ticks);
         past.volume.drain(..ticks);
@@ -94,13 +94,13 @@ impl Extruder {
 
     /// Takes knots for decided.
     pub fn advance(&mut self, knots: &[f64]) {
-        run(&mut self.flow, self.command, knots, &mut self.past);
+        run(&mut self.flow, self.command, knots, &mut self.history);
         self.command = knots.last().copied().unwrap_or(self.command);
     }
 
     /// What comes of knots, after what has been.
-    pub fn foretell(&self, knots: &[f64]) -> Course {
-        let (mut flow, mut course) = (self.flow.clone(), self.past.clone());
+    pub fn predict(&self, knots: &[f64]) -> FlowTrajectory {
+        let (mut flow, mut course) = (self.flow.clone(), self.history.clone());
         run(&mut flow, self.command, knots, &mut course);
         course
     }
@@ -108,24 +108,24 @@ impl Extruder {
 
 /// What comes of a command over time \[s\], asked for tick by tick, at whose first value
 /// the extruder has settled.
-pub fn follow(
+pub fn simulate(
     model: &TransferFunction,
     mut command: impl FnMut(f64) -> f64,
     until_s: f64,
-) -> Result<Course, ModelError> {
-    let Extruder { mut flow, mut past, .. } = Extruder::settled(model, command(0.0))?;
+) -> Result<FlowTrajectory, ModelError> {
+    let FlowModel { mut flow, history: mut past, .. } = FlowModel::settled(model, command(0.0))?;
     for tick in 1..=whole(until_s / TICK_S) + 1 {
         past.push(flow.step(command(TICK_S * float(tick))));
     }
     Ok(past)
 }
 
-fn run(flow: &mut Simulator, from: f64, knots: &[f64], course: &mut Course) {
+fn run(flow: &mut Simulator, from: f64, knots: &[f64], course: &mut FlowTrajectory) {
     let mut last = from;
     for knot in knots {
         for tick in 1..=KNOT_TICKS {
-            let share = float(tick) / float(KNOT_TICKS);
-            course.push(flow.step(last + share * (knot - last)));
+            let fraction = float(tick) / float(KNOT_TICKS);
+            course.push(flow.step(last + fraction * (knot - last)));
         }
         last = *knot;
     }
@@ -134,18 +134,18 @@ fn run(flow: &mut Simulator, from: f64, knots: &[f64], course: &mut Course) {
 /// What a unit more at one knot does, tick by tick after the knot before it: the command
 /// rises to the knot and falls to the next one, or stays where there is none.
 #[derive(Debug, Clone)]
-pub struct Hats {
-    inner: Course,
-    last: Course,
+pub struct KnotResponses {
+    inner: FlowTrajectory,
+    last: FlowTrajectory,
 }
 
-impl Hats {
+impl KnotResponses {
     /// For a number of knots.
     pub fn new(model: &TransferFunction, knots: usize) -> Result<Self, ModelError> {
         let ticks = (knots + 1) * KNOT_TICKS;
-        let answer = |input: &dyn Fn(f64) -> f64| -> Result<Course, ModelError> {
+        let answer = |input: &dyn Fn(f64) -> f64| -> Result<FlowTrajectory, ModelError> {
             let mut flow = Simulator::new(model, TICK_S, Between::Linear)?;
-            let mut course = Course::new(0.0, flow.step(0.0));
+            let mut course = FlowTrajectory::new(0.0, flow.step(0.0));
             for tick in 1..=ticks {
                 course.push(flow.step(input(float(tick) / float(KNOT_TICKS))));
             }
@@ -161,16 +161,20 @@ impl Hats {
     pub fn at(&self, since_s: f64, knots: usize) -> impl Iterator<Item = (f64, f64)> {
         (0..knots).map(move |knot| {
             let since = since_s - KNOT_S * float(knot);
-            let hat = if knot + 1 == knots { &self.last } else { &self.inner };
-            if since <= 0.0 { (0.0, 0.0) } else { (hat.flow_at(since), hat.volume_at(since)) }
+            let response = if knot + 1 == knots { &self.last } else { &self.inner };
+            if since <= 0.0 {
+                (0.0, 0.0)
+            } else {
+                (response.flow_at(since), response.volume_at(since))
+            }
         })
     }
 }
 
-fn between(row: &[f64], at: usize, share: f64) -> f64 {
+fn between(row: &[f64], at: usize, fraction: f64) -> f64 {
     let first = row.get(at).copied().unwrap_or(0.0);
     let second = row.get(at + 1).copied().unwrap_or(first);
-    first + share * (second - first)
+    first + fraction * (second - first)
 }
 
 #[expect(clippy::cast_precision_loss, reason = "counts of a plan are far below 2⁵²")]
@@ -200,7 +204,7 @@ mod tests {
 
     #[test]
     fn a_command_that_stays_keeps_the_flow() {
-        let course = Extruder::settled(&model(), 3.0).unwrap().foretell(&[3.0; 20]);
+        let course = FlowModel::settled(&model(), 3.0).unwrap().predict(&[3.0; 20]);
         assert!((course.flow_at(0.7) - 60.0).abs() < 1e-9);
         assert!((course.volume_at(1.234) - 60.0 * 1.234).abs() < 1e-9);
     }
@@ -208,13 +212,13 @@ mod tests {
     #[test]
     fn hats_add_up_to_what_knots_do() {
         let knots = [1.0, 4.0, 2.0, 2.5, 7.0];
-        let extruder = Extruder::settled(&model(), 2.0).unwrap();
-        let course = extruder.foretell(&knots);
-        let hats = Hats::new(&model(), knots.len()).unwrap();
+        let extruder = FlowModel::settled(&model(), 2.0).unwrap();
+        let course = extruder.predict(&knots);
+        let responses = KnotResponses::new(&model(), knots.len()).unwrap();
         for k in 0_u32..80 {
             let time = TICK_S * f64::from(k);
             let (mut flow, mut volume) = (40.0, 40.0 * time);
-            for (knot, (by_flow, by_volume)) in knots.iter().zip(hats.at(time, knots.len())) {
+            for (knot, (by_flow, by_volume)) in knots.iter().zip(responses.at(time, knots.len())) {
                 flow += (knot - 2.0) * by_flow;
                 volume += (knot - 2.0) * by_volume;
             }
@@ -226,11 +230,11 @@ mod tests {
     #[test]
     fn what_was_decided_and_forgotten_changes_nothing_later() {
         let knots = [1.0, 4.0, 2.0, 2.5, 7.0];
-        let mut extruder = Extruder::settled(&model(), 2.0).unwrap();
-        let whole = extruder.foretell(&knots);
+        let mut extruder = FlowModel::settled(&model(), 2.0).unwrap();
+        let whole = extruder.predict(&knots);
         extruder.advance(&knots[..2]);
-        extruder.forget(0.1);
-        let rest = extruder.foretell(&knots[2..]);
+        extruder.discard_before(0.1);
+        let rest = extruder.predict(&knots[2..]);
         assert!((extruder.now_s() - 2.0 * KNOT_S).abs() < 1e-12);
         for time in [0.12, 0.2, 0.39] {
             assert!((rest.flow_at(time) - whole.flow_at(time)).abs() < 1e-9);

@@ -14,18 +14,18 @@ mod words;
 pub use error::GcodeError;
 
 use super::limits::{PathLimits, time_optimal};
-use super::profile::{ProfileError, SpeedProfile};
+use super::profile::{SpeedProfile, SpeedProfileError};
 use arc::Move;
-use state::{Motion, State};
+use state::{LineMotion, ModalState};
 
 /// Length of the straight lines that a curve's positions are given by, at most \[mm\].
-const CHORD_MM: f64 = 1.0;
+const MAX_CHORD_MM: f64 = 1.0;
 /// A turn whose cosine differs from 1 by less is none.
-const STRAIGHT: f64 = 1e-6;
+const MIN_TURN: f64 = 1e-6;
 
 /// How beads begin and end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ends {
+pub enum BeadEnds {
     /// At rest.
     Rest,
     /// At the speed of their first and their last move, where something else starts and
@@ -35,7 +35,7 @@ pub enum Ends {
 
 /// What the path's speed limits are made with.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
+pub struct GcodeSettings {
     /// Where the nozzle is before the first line \[mm\].
     pub start_mm: [f64; 3],
     /// Largest speed, whatever a feed says \[mm/s\].
@@ -48,12 +48,12 @@ pub struct Settings {
     /// Speed to which no corner is slowed further \[mm/s\].
     pub apex_mm_per_s: f64,
     /// How beads begin and end.
-    pub ends: Ends,
+    pub ends: BeadEnds,
 }
 
 /// A bead: what is laid from one rapid move, or the start, to the next.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stretch {
+pub struct GcodeBead {
     /// Line of its first move.
     pub line: usize,
     /// How fast its path may be passed; the path begins at 0 mm.
@@ -62,30 +62,30 @@ pub struct Stretch {
     pub position: Vec<(f64, [f64; 3])>,
 }
 
-impl Stretch {
+impl GcodeBead {
     /// The quickest speed within the limits and an acceleration \[mm/s²\].
-    pub fn nominal(&self, accel: f64) -> Result<SpeedProfile, ProfileError> {
+    pub fn nominal(&self, accel: f64) -> Result<SpeedProfile, SpeedProfileError> {
         time_optimal(&self.limits, accel)
     }
 }
 
 /// Reads all beads of a program.
-pub fn read(text: &str, settings: &Settings) -> Result<Vec<Stretch>, GcodeError> {
-    let mut state = State::new(settings.start_mm);
+pub fn read(text: &str, settings: &GcodeSettings) -> Result<Vec<GcodeBead>, GcodeError> {
+    let mut state = ModalState::new(settings.start_mm);
     let mut all = Vec::new();
     let mut laid: Vec<LaidMove> = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
         let words = words::words(line, text)?;
-        match state.take(line, &words)? {
-            Motion::None => {}
-            Motion::Rapid => all.extend(stretch(&std::mem::take(&mut laid), settings)),
-            Motion::Laid(moved, feed) => laid.push(LaidMove { line, moved, feed }),
+        match state.interpret(line, &words)? {
+            LineMotion::None => {}
+            LineMotion::Rapid => all.extend(bead_of(&std::mem::take(&mut laid), settings)),
+            LineMotion::Laid(moved, feed) => laid.push(LaidMove { line, moved, feed }),
         }
         if state.ended() {
             break;
         }
     }
-    all.extend(stretch(&laid, settings));
+    all.extend(bead_of(&laid, settings));
     if all.is_empty() {
         return Err(GcodeError::Empty);
     }
@@ -102,12 +102,12 @@ struct LaidMove {
 }
 
 /// The bead of some moves; `None` of none.
-fn stretch(moves: &[LaidMove], settings: &Settings) -> Option<Stretch> {
+fn bead_of(moves: &[LaidMove], settings: &GcodeSettings) -> Option<GcodeBead> {
     let LaidMove { line, moved: first, .. } = moves.first()?;
     // A node is no faster than the pieces beside it.
     let end = match settings.ends {
-        Ends::Rest => 0.0,
-        Ends::Moving => settings.fastest_mm_per_s,
+        BeadEnds::Rest => 0.0,
+        BeadEnds::Moving => settings.fastest_mm_per_s,
     };
     let mut limits = PathLimits::new(0.0, end);
     let mut position = vec![(0.0, first.at(0.0))];
@@ -116,18 +116,20 @@ fn stretch(moves: &[LaidMove], settings: &Settings) -> Option<Stretch> {
         let from = limits.end_mm();
         let sideways = (settings.accel_mm_per_s2 * moved.radius_mm()).sqrt();
         let speed = feed.min(settings.fastest_mm_per_s).min(sideways);
-        let there = next.map_or(end, |next| junction(moved, next, settings));
-        limits.to(from + moved.length_mm(), speed, there);
-        position
-            .extend(chords(moved).map(|share| (from + share * moved.length_mm(), moved.at(share))));
+        let there = next.map_or(end, |next| junction_speed(moved, next, settings));
+        limits.extend_to(from + moved.length_mm(), speed, there);
+        position.extend(
+            chord_fractions(moved)
+                .map(|fraction| (from + fraction * moved.length_mm(), moved.at(fraction))),
+        );
     }
-    Some(Stretch { line: *line, limits, position })
+    Some(GcodeBead { line: *line, limits, position })
 }
 
 /// Shares of a move at which its positions are given.
-fn chords(moved: &Move) -> impl Iterator<Item = f64> + use<> {
+fn chord_fractions(moved: &Move) -> impl Iterator<Item = f64> + use<> {
     let count =
-        if moved.radius_mm().is_finite() { (moved.length_mm() / CHORD_MM).ceil() } else { 1.0 };
+        if moved.radius_mm().is_finite() { (moved.length_mm() / MAX_CHORD_MM).ceil() } else { 1.0 };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
     let pieces = (count as u32).max(1);
     (1..=pieces).map(move |piece| f64::from(piece) / f64::from(pieces))
@@ -136,10 +138,10 @@ fn chords(moved: &Move) -> impl Iterator<Item = f64> + use<> {
 /// Largest speed at the corner between two moves \[mm/s\]: v² = a·δ·c/(1 − c), with c the
 /// cosine of half the turn. The arc that touches both sides and passes the corner at the
 /// distance δ has that radius, and its speed the acceleration across.
-fn junction(before: &Move, after: &Move, settings: &Settings) -> f64 {
+fn junction_speed(before: &Move, after: &Move, settings: &GcodeSettings) -> f64 {
     let (from, to) = (before.direction(1.0), after.direction(0.0));
     let cosine: f64 = from.iter().zip(to).map(|(a, b)| a * b).sum();
-    if cosine > 1.0 - STRAIGHT {
+    if cosine > 1.0 - MIN_TURN {
         return settings.fastest_mm_per_s;
     }
     let half = (0.5 * (1.0 + cosine)).max(0.0).sqrt();
@@ -156,13 +158,13 @@ mod tests {
     use super::*;
     use crate::plan::position::distance;
 
-    const SETTINGS: Settings = Settings {
+    const SETTINGS: GcodeSettings = GcodeSettings {
         start_mm: [0.0; 3],
         fastest_mm_per_s: 100.0,
         accel_mm_per_s2: 2000.0,
         corner_mm: 0.0,
         apex_mm_per_s: 2.0,
-        ends: Ends::Rest,
+        ends: BeadEnds::Rest,
     };
 
     #[test]
@@ -175,7 +177,7 @@ mod tests {
         assert!((profile.speed_at(100.0) - 100.0).abs() < 1e-9);
         assert_eq!(all[0].position[1], (200.0, [200.0, 0.0, 0.0]));
         // 0.1 mm of rounding: v² = 2000·0.1·c/(1 − c), c = cos 45°.
-        let rounded = read(text, &Settings { corner_mm: 0.1, ..SETTINGS }).unwrap();
+        let rounded = read(text, &GcodeSettings { corner_mm: 0.1, ..SETTINGS }).unwrap();
         let speed = rounded[0].nominal(2000.0).unwrap().speed_at(200.0);
         assert!((speed - 21.974).abs() < 1e-3, "{speed}");
     }
@@ -221,7 +223,7 @@ mod tests {
     #[test]
     fn a_bead_that_something_else_starts_and_stops_begins_and_ends_at_its_feed() {
         let text = "G1 X200 F6000\nY200\nY300 F3000\nG0 X0\nG1 X50\n";
-        let all = read(text, &Settings { ends: Ends::Moving, ..SETTINGS }).unwrap();
+        let all = read(text, &GcodeSettings { ends: BeadEnds::Moving, ..SETTINGS }).unwrap();
         let speeds = |at: usize, path_mm: f64| all[at].nominal(2000.0).unwrap().speed_at(path_mm);
         let found = [speeds(0, 0.0), speeds(0, 200.0), speeds(0, 500.0), speeds(1, 0.0)];
         for (found, expected) in found.iter().zip([100.0, 2.0, 50.0, 50.0]) {

@@ -1,36 +1,37 @@
 //! Where the speed has its nodes and where the width is judged: finely where the nominal
 //! speed changes quickly, coarsely elsewhere.
 
-use super::horizon::Window;
+use super::horizon::WidthWindow;
 use super::profile::SpeedProfile;
 use super::segment::PathSegment;
-use super::task::Bead;
+use super::task::BeadGeometry;
 
 /// A change of the speed of this share of the acceleration is quick.
-const QUICK: f64 = 0.1;
+const QUICK_ACCEL_RATIO: f64 = 0.1;
 /// Nodes of a horizon at most; more are put further apart.
-const MOST_NODES: usize = 220;
+const MAX_NODES: usize = 220;
 /// Distances of the nodes, in lengths of the nozzle: within how far from a quick change,
 /// and how far apart.
-const NODES: [Spacing; 3] =
+const NODE_SPACING: [Spacing; 3] =
     [Spacing::new(0.5, 0.025), Spacing::new(2.4, 0.1), Spacing::new(f64::INFINITY, 0.4)];
 /// The same of the places where the width is judged over a nozzle's length.
-const PLACES: [Spacing; 2] = [Spacing::new(1.5, 0.05), Spacing::new(f64::INFINITY, 0.25)];
+const WINDOW_SPACING: [Spacing; 2] = [Spacing::new(1.5, 0.05), Spacing::new(f64::INFINITY, 0.25)];
 /// The same of those where it is judged more finely; none lies about the quick change
 /// itself, whose unevenness only the nozzle's length can take up.
-const FINE_PLACES: [Spacing; 2] = [Spacing::new(1.5, 0.05), Spacing::new(f64::INFINITY, 0.125)];
-const FINE_FROM: f64 = 0.6;
+const FINE_WINDOW_SPACING: [Spacing; 2] =
+    [Spacing::new(1.5, 0.05), Spacing::new(f64::INFINITY, 0.125)];
+const FINE_MIN_DISTANCE: f64 = 0.6;
 /// The finer length, in lengths of the nozzle, and what it counts: enough that a wave of
 /// the speed which a nozzle's length just hides is not taken for free.
 const FINE_LENGTH: f64 = 0.25;
 const FINE_WEIGHT: f64 = 0.003;
 /// Largest share by which the nozzle's length is thought to be off.
-const MOST_AWAY: f64 = 0.75;
+const MAX_LENGTH_ERROR: f64 = 0.75;
 /// Within how far of a quick change noise is weighed, in lengths of the nozzle.
-const NEAR: f64 = 5.0;
+const NOISE_RANGE: f64 = 5.0;
 /// How far before and after the quick changes the flow's change is taken, in lengths of
 /// the nozzle: narrowly and widely.
-const CHANGED: [(f64, f64); 2] = [(5.0, 5.0), (11.0, 14.0)];
+const CHANGE_MARGINS: [(f64, f64); 2] = [(5.0, 5.0), (11.0, 14.0)];
 
 /// How far places lie from each other near to a quick change, in lengths of the nozzle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,15 +50,15 @@ impl Spacing {
 
 /// Stretches of path in which the nominal speed changes quickly \[mm\].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Quick(Vec<PathSegment>);
+pub struct QuickChanges(Vec<PathSegment>);
 
-impl Quick {
+impl QuickChanges {
     /// Of a profile and the robot's acceleration \[mm/s²\].
     pub fn of(profile: &SpeedProfile, accel: f64) -> Self {
         let nodes = || profile.path().iter().zip(profile.squares());
         let mut all: Vec<PathSegment> = Vec::new();
         for ((s0, b0), (s1, b1)) in nodes().zip(nodes().skip(1)) {
-            if (b1 - b0).abs() < QUICK * 2.0 * accel * (s1 - s0) {
+            if (b1 - b0).abs() < QUICK_ACCEL_RATIO * 2.0 * accel * (s1 - s0) {
                 continue;
             }
             match all.last_mut() {
@@ -69,11 +70,11 @@ impl Quick {
     }
 
     /// Distance of a place from the nearest \[mm\]; infinite where there is none.
-    pub fn distance(&self, place_mm: f64) -> f64 {
-        let after = self.0.partition_point(|quick| quick.to_mm < place_mm);
+    pub fn distance(&self, position_mm: f64) -> f64 {
+        let after = self.0.partition_point(|quick| quick.to_mm < position_mm);
         let before = after.checked_sub(1).and_then(|i| self.0.get(i));
-        let back = before.map_or(f64::INFINITY, |quick| place_mm - quick.to_mm);
-        let ahead = self.0.get(after).map_or(f64::INFINITY, |quick| quick.from_mm - place_mm);
+        let back = before.map_or(f64::INFINITY, |quick| position_mm - quick.to_mm);
+        let ahead = self.0.get(after).map_or(f64::INFINITY, |quick| quick.from_mm - position_mm);
         back.min(ahead).max(0.0)
     }
 
@@ -89,11 +90,11 @@ impl Quick {
     /// The parts of a stretch over which the flow's change is taken: from before the first
     /// to after the last, narrowly and widely \[mm\]. What is changed only outside the
     /// one shows in the other.
-    pub fn about(&self, stretch: PathSegment, nozzle_mm: f64) -> [PathSegment; 2] {
+    pub fn change_segments(&self, stretch: PathSegment, nozzle_mm: f64) -> [PathSegment; 2] {
         let mut inside = self.within(stretch);
         let Some(first) = inside.next() else { return [stretch; 2] };
         let last = inside.last().unwrap_or(first);
-        CHANGED.map(|(before, after)| PathSegment {
+        CHANGE_MARGINS.map(|(before, after)| PathSegment {
             from_mm: stretch.from_mm.max(first.from_mm - before * nozzle_mm),
             to_mm: stretch.to_mm.min(last.to_mm + after * nozzle_mm),
         })
@@ -101,7 +102,7 @@ impl Quick {
 
     /// Places from one to another, both included, as far apart as the distance from here
     /// says.
-    fn places(&self, stretch: PathSegment, unit: f64, spacings: &[Spacing]) -> Vec<f64> {
+    fn positions(&self, stretch: PathSegment, unit: f64, spacings: &[Spacing]) -> Vec<f64> {
         let mut all = Vec::new();
         let PathSegment { from_mm: mut at, to_mm: to } = stretch;
         while at < to {
@@ -124,13 +125,13 @@ impl Quick {
     /// among them, so that a straight line between two nodes lies nowhere above it and the
     /// nominal speed itself can be planned.
     pub fn nodes(&self, nominal: &SpeedProfile, span: PathSegment, nozzle_mm: f64) -> Vec<f64> {
-        let turns = turns(nominal, span);
+        let turns = acceleration_changes(nominal, span);
         let mut unit = nozzle_mm;
         loop {
-            let even = self.places(span, unit, &NODES);
-            let apart = 0.5 * unit * NODES.first().map_or(0.0, |s| s.step);
+            let even = self.positions(span, unit, &NODE_SPACING);
+            let apart = 0.5 * unit * NODE_SPACING.first().map_or(0.0, |s| s.step);
             let merged = merge(&even, &turns, apart);
-            if merged.len() <= MOST_NODES.max(turns.len() + 2) || unit > 8.0 * nozzle_mm {
+            if merged.len() <= MAX_NODES.max(turns.len() + 2) || unit > 8.0 * nozzle_mm {
                 return merged;
             }
             unit *= 1.2;
@@ -138,14 +139,14 @@ impl Quick {
     }
 
     /// Where the width is judged, over pieces that lie within a stretch \[mm\].
-    pub fn windows(&self, stretch: PathSegment, bead: &Bead) -> Vec<Window> {
+    pub fn windows(&self, stretch: PathSegment, bead: &BeadGeometry) -> Vec<WidthWindow> {
         let mut all = Vec::new();
         let nozzle_mm = bead.nozzle_mm;
         let fine = FINE_LENGTH * nozzle_mm;
-        let fine = (fine, FINE_WEIGHT, &FINE_PLACES, FINE_FROM * nozzle_mm);
+        let fine = (fine, FINE_WEIGHT, &FINE_WINDOW_SPACING, FINE_MIN_DISTANCE * nozzle_mm);
         let lengths = lengths(bead).into_iter();
-        let whole =
-            lengths.map(|(length_mm, weight)| (length_mm, weight, &PLACES, f64::NEG_INFINITY));
+        let whole = lengths
+            .map(|(length_mm, weight)| (length_mm, weight, &WINDOW_SPACING, f64::NEG_INFINITY));
         for (length_mm, weight, steps, beyond) in whole.chain([fine]) {
             let inside = PathSegment {
                 from_mm: stretch.from_mm + 0.5 * length_mm,
@@ -154,15 +155,15 @@ impl Quick {
             if inside.to_mm <= inside.from_mm {
                 continue;
             }
-            let places = self.places(inside, nozzle_mm, steps);
-            let next = places.iter().skip(1).chain(places.last());
-            let before = places.first().into_iter().chain(&places);
-            for ((at_mm, next), before) in places.iter().zip(next).zip(before) {
+            let positions = self.positions(inside, nozzle_mm, steps);
+            let next = positions.iter().skip(1).chain(positions.last());
+            let before = positions.first().into_iter().chain(&positions);
+            for ((at_mm, next), before) in positions.iter().zip(next).zip(before) {
                 let distance = self.distance(*at_mm);
                 if distance > beyond {
                     let weight = weight * 0.5 * (next - before);
-                    let near = distance <= NEAR * nozzle_mm;
-                    all.push(Window { at_mm: *at_mm, length_mm, weight, near });
+                    let near = distance <= NOISE_RANGE * nozzle_mm;
+                    all.push(WidthWindow { at_mm: *at_mm, length_mm, weight, near });
                 }
             }
         }
@@ -172,17 +173,17 @@ impl Quick {
 
 /// Lengths over which the nozzle may average \[mm\] and how likely each is: three that have
 /// the mean and the standard deviation of what is known.
-fn lengths(bead: &Bead) -> Vec<(f64, f64)> {
-    let Bead { nozzle_mm, nozzle_doubt, .. } = *bead;
+fn lengths(bead: &BeadGeometry) -> Vec<(f64, f64)> {
+    let BeadGeometry { nozzle_mm, nozzle_sigma: nozzle_doubt, .. } = *bead;
     if nozzle_doubt <= 0.0 {
         return vec![(nozzle_mm, 1.0)];
     }
-    let away = nozzle_mm * (nozzle_doubt * std::f64::consts::SQRT_2).min(MOST_AWAY);
+    let away = nozzle_mm * (nozzle_doubt * std::f64::consts::SQRT_2).min(MAX_LENGTH_ERROR);
     vec![(nozzle_mm - away, 0.25), (nozzle_mm, 0.5), (nozzle_mm + away, 0.25)]
 }
 
 /// Places within a stretch at which a profile's acceleration changes \[mm\].
-fn turns(profile: &SpeedProfile, stretch: PathSegment) -> Vec<f64> {
+fn acceleration_changes(profile: &SpeedProfile, stretch: PathSegment) -> Vec<f64> {
     let nodes = || profile.path().iter().zip(profile.squares());
     let slope = |a: (&f64, &f64), b: (&f64, &f64)| (b.1 - a.1) / (b.0 - a.0);
     nodes()
@@ -223,11 +224,11 @@ mod tests {
     #[test]
     fn a_corner_is_one_quick_stretch_with_its_apex_among_the_nodes() {
         let profile = corner();
-        let quick = Quick::of(&profile, 2000.0);
-        assert_eq!(quick, Quick(vec![PathSegment { from_mm: -2.499, to_mm: 2.499 }]));
+        let quick = QuickChanges::of(&profile, 2000.0);
+        assert_eq!(quick, QuickChanges(vec![PathSegment { from_mm: -2.499, to_mm: 2.499 }]));
         assert_eq!(quick.distance(-12.499), 10.0);
         let nodes = quick.nodes(&profile, STRETCH, 20.0);
-        assert!(nodes.contains(&0.0) && nodes.len() <= MOST_NODES, "{}", nodes.len());
+        assert!(nodes.contains(&0.0) && nodes.len() <= MAX_NODES, "{}", nodes.len());
         assert_eq!((nodes[0], nodes[nodes.len() - 1]), (-200.0, 250.0));
         for pair in nodes.windows(2) {
             let near = quick.distance(pair[0]).min(quick.distance(pair[1]));
@@ -240,8 +241,8 @@ mod tests {
 
     #[test]
     fn the_windows_weigh_what_the_path_is_long() {
-        let quick = Quick::of(&corner(), 2000.0);
-        let bead = Bead { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_doubt: 0.0 };
+        let quick = QuickChanges::of(&corner(), 2000.0);
+        let bead = BeadGeometry { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_sigma: 0.0 };
         let windows = quick.windows(STRETCH, &bead);
         let coarse = windows.iter().filter(|w| w.length_mm == 20.0);
         let sum: f64 = coarse.map(|w| w.weight).sum();

@@ -1,8 +1,8 @@
 //! The planned profile of a job from a table: path length, position and nominal speed.
 
 use super::position::{Position, distance};
-use super::profile::{ProfileError, SpeedPoint, SpeedProfile};
-use crate::document::csv::{LineProblem, in_words};
+use super::profile::{SpeedPoint, SpeedProfile, SpeedProfileError};
+use crate::document::csv::{LineProblem, describe};
 
 /// Columns that are read; others are left alone.
 const PATH: &str = "path_mm";
@@ -11,7 +11,7 @@ const POSITION: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
 
 /// A job's path and its nominal speed.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Job {
+pub struct PathJob {
     /// Nominal speed over path.
     pub speed: SpeedProfile,
     /// Where the nozzle is at each point of the path, in order: path and position \[mm\].
@@ -65,12 +65,12 @@ pub enum JobError {
         /// The line of the point that is wrong, if one is.
         line: Option<u64>,
         /// What is wrong with it.
-        error: ProfileError,
+        error: SpeedProfileError,
     },
 }
 
 /// A way may be longer than its path by rounding: this share of it and this much \[mm\].
-const ROUNDED: (f64, f64) = (1e-3, 0.01);
+const PATH_TOLERANCE: (f64, f64) = (1e-3, 0.01);
 
 /// A column of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,7 +87,7 @@ struct Waypoint {
 }
 
 /// Reads a job from the text of a table with a heading.
-pub fn read(text: &str) -> Result<Job, JobError> {
+pub fn read(text: &str) -> Result<PathJob, JobError> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let heading = reader.headers().map_err(|error| of_row(&error))?.clone();
     let column = |name: &'static str| {
@@ -119,7 +119,7 @@ pub fn read(text: &str) -> Result<Job, JobError> {
         let at = error.point().and_then(|point| point.checked_sub(1));
         JobError::Profile { line: at.and_then(|at| lines.get(at).copied()), error }
     })?;
-    Ok(Job { speed, position })
+    Ok(PathJob { speed, position })
 }
 
 fn number(record: &csv::StringRecord, line: u64, column: Column) -> Result<f64, JobError> {
@@ -133,14 +133,14 @@ fn check_way(line: u64, before: Waypoint, here: Waypoint) -> Result<(), JobError
     let way_mm = distance(before.position, here.position);
     let path_mm = here.path_mm - before.path_mm;
     // A path that does not grow is for the profile to say.
-    if path_mm > 0.0 && way_mm > path_mm * (1.0 + ROUNDED.0) + ROUNDED.1 {
+    if path_mm > 0.0 && way_mm > path_mm * (1.0 + PATH_TOLERANCE.0) + PATH_TOLERANCE.1 {
         return Err(JobError::Way { line, path_mm, way_mm });
     }
     Ok(())
 }
 
 fn of_row(error: &csv::Error) -> JobError {
-    let LineProblem { line, what } = in_words(error);
+    let LineProblem { line, what } = describe(error);
     JobError::Row { line, what }
 }
 

@@ -1,6 +1,6 @@
 //! Limits of the speed along a path, and the quickest way to keep them.
 
-use super::profile::{ProfileError, ProfileNode, SpeedProfile};
+use super::profile::{ProfileNode, SpeedProfile, SpeedProfileError};
 
 /// How fast a path may be passed: a limit for each node and one for each piece between
 /// two of them.
@@ -19,7 +19,7 @@ impl PathLimits {
 
     /// Goes on to a place \[mm\], on the way with at most one speed and there with at most
     /// another \[mm/s\].
-    pub fn to(&mut self, path_mm: f64, on_the_way_mm_per_s: f64, there_mm_per_s: f64) {
+    pub fn extend_to(&mut self, path_mm: f64, on_the_way_mm_per_s: f64, there_mm_per_s: f64) {
         self.path.push(path_mm);
         self.pieces.push(on_the_way_mm_per_s);
         self.nodes.push(there_mm_per_s);
@@ -34,9 +34,9 @@ impl PathLimits {
 /// The quickest profile within the limits and an acceleration \[mm/s²\]: limits are carried
 /// forwards and backwards as far as the acceleration reaches, and between two nodes the
 /// speed rises, stays at the piece's limit and falls.
-pub fn time_optimal(limits: &PathLimits, accel: f64) -> Result<SpeedProfile, ProfileError> {
+pub fn time_optimal(limits: &PathLimits, accel: f64) -> Result<SpeedProfile, SpeedProfileError> {
     if !(accel.is_finite() && accel > 0.0) {
-        return Err(ProfileError::Acceleration { value: accel });
+        return Err(SpeedProfileError::Acceleration { value: accel });
     }
     check(limits)?;
     let square = |speed: &f64| speed * speed;
@@ -47,46 +47,46 @@ pub fn time_optimal(limits: &PathLimits, accel: f64) -> Result<SpeedProfile, Pro
             *node = node.min(*piece);
         }
     }
-    reach(&limits.path, &mut nodes, accel);
+    limit_acceleration(&limits.path, &mut nodes, accel);
     let mut all = Vec::with_capacity(3 * nodes.len());
     let node = |(path_mm, square): (&f64, &f64)| ProfileNode { path_mm: *path_mm, square: *square };
     let ends = limits.path.iter().zip(&nodes).map(node);
     for ((first, second), top) in ends.clone().zip(ends.skip(1)).zip(&pieces) {
         all.push(first);
-        all.extend(between(first, second, *top, accel));
+        all.extend(piece_nodes(first, second, *top, accel));
     }
     all.extend(limits.path.last().zip(nodes.last()).map(node));
     SpeedProfile::of_squares(&all)
 }
 
-fn check(limits: &PathLimits) -> Result<(), ProfileError> {
+fn check(limits: &PathLimits) -> Result<(), SpeedProfileError> {
     if limits.path.len() < 2 {
-        return Err(ProfileError::Short { nodes: limits.path.len() });
+        return Err(SpeedProfileError::Short { nodes: limits.path.len() });
     }
     let numbered = |speeds: &[f64]| (1..).zip(speeds.to_vec()).collect::<Vec<(usize, f64)>>();
     for (at, speed) in numbered(&limits.nodes) {
         if !(speed.is_finite() && speed >= 0.0) {
-            return Err(ProfileError::Speed { at, speed });
+            return Err(SpeedProfileError::Speed { at, speed });
         }
     }
     for (at, speed) in numbered(&limits.pieces) {
         if !(speed.is_finite() && speed > 0.0) {
-            return Err(ProfileError::Speed { at, speed });
+            return Err(SpeedProfileError::Speed { at, speed });
         }
     }
     let neighbours = limits.path.iter().zip(limits.path.iter().skip(1));
     for (at, (before_mm, path_mm)) in (2..).zip(neighbours) {
         if !(path_mm > before_mm && path_mm.is_finite()) {
-            return Err(ProfileError::Order { at, path_mm: *path_mm, before_mm: *before_mm });
+            return Err(SpeedProfileError::Order { at, path_mm: *path_mm, before_mm: *before_mm });
         }
     }
     Ok(())
 }
 
 /// The quickest speed below a profile that an acceleration allows \[mm/s²\].
-pub fn attainable(profile: &SpeedProfile, accel: f64) -> Result<SpeedProfile, ProfileError> {
+pub fn attainable(profile: &SpeedProfile, accel: f64) -> Result<SpeedProfile, SpeedProfileError> {
     let mut squares = profile.squares().to_vec();
-    reach(profile.path(), &mut squares, accel);
+    limit_acceleration(profile.path(), &mut squares, accel);
     let node = |(path_mm, square): (&f64, f64)| ProfileNode { path_mm: *path_mm, square };
     let nodes: Vec<_> = profile.path().iter().zip(squares).map(node).collect();
     SpeedProfile::of_squares(&nodes)
@@ -94,7 +94,7 @@ pub fn attainable(profile: &SpeedProfile, accel: f64) -> Result<SpeedProfile, Pr
 
 /// Lowers squares of the speed until each can be reached from the one before it and be
 /// left for the one after it.
-pub(super) fn reach(path: &[f64], squares: &mut [f64], accel: f64) {
+pub(super) fn limit_acceleration(path: &[f64], squares: &mut [f64], accel: f64) {
     for i in 1..squares.len().min(path.len()) {
         squares[i] = squares[i].min(squares[i - 1] + 2.0 * accel * (path[i] - path[i - 1]));
     }
@@ -105,7 +105,7 @@ pub(super) fn reach(path: &[f64], squares: &mut [f64], accel: f64) {
 
 /// The nodes that a piece needs between its ends: where it reaches the top, and where it
 /// leaves it.
-fn between(
+fn piece_nodes(
     first: ProfileNode,
     second: ProfileNode,
     top: f64,
@@ -133,8 +133,8 @@ mod tests {
     #[test]
     fn a_corner_is_approached_at_the_last_moment() {
         let mut limits = PathLimits::new(-100.0, 100.0);
-        limits.to(0.0, 100.0, 2.0);
-        limits.to(100.0, 100.0, 100.0);
+        limits.extend_to(0.0, 100.0, 2.0);
+        limits.extend_to(100.0, 100.0, 100.0);
         let profile = time_optimal(&limits, 2000.0).unwrap();
         // From 100 mm/s to 2 mm/s at 2 m/s²: 49 ms and (100² − 2²)/4000 mm.
         assert_eq!(profile.path(), [-100.0, -2.499, 0.0, 2.499, 100.0]);
@@ -146,7 +146,7 @@ mod tests {
     #[test]
     fn from_rest_to_rest_is_a_triangle_where_the_way_is_short() {
         let mut limits = PathLimits::new(0.0, 0.0);
-        limits.to(10.0, 1000.0, 0.0);
+        limits.extend_to(10.0, 1000.0, 0.0);
         let profile = time_optimal(&limits, 1000.0).unwrap();
         assert!((profile.duration_s() - 2.0 * (10.0_f64 / 1000.0).sqrt()).abs() < 1e-12);
         assert!((profile.speed_at(5.0) - 100.0).abs() < 1e-9);
@@ -155,13 +155,13 @@ mod tests {
     #[test]
     fn limits_that_are_none_are_refused() {
         let mut limits = PathLimits::new(0.0, 10.0);
-        assert_eq!(time_optimal(&limits, 1.0), Err(ProfileError::Short { nodes: 1 }));
-        limits.to(0.0, 10.0, 10.0);
-        assert!(matches!(time_optimal(&limits, 1.0), Err(ProfileError::Order { at: 2, .. })));
+        assert_eq!(time_optimal(&limits, 1.0), Err(SpeedProfileError::Short { nodes: 1 }));
+        limits.extend_to(0.0, 10.0, 10.0);
+        assert!(matches!(time_optimal(&limits, 1.0), Err(SpeedProfileError::Order { at: 2, .. })));
         let mut limits = PathLimits::new(0.0, 10.0);
-        limits.to(5.0, 0.0, 10.0);
-        assert!(matches!(time_optimal(&limits, 1.0), Err(ProfileError::Speed { at: 1, .. })));
-        assert!(matches!(time_optimal(&limits, 0.0), Err(ProfileError::Acceleration { .. })));
+        limits.extend_to(5.0, 0.0, 10.0);
+        assert!(matches!(time_optimal(&limits, 1.0), Err(SpeedProfileError::Speed { at: 1, .. })));
+        assert!(matches!(time_optimal(&limits, 0.0), Err(SpeedProfileError::Acceleration { .. })));
     }
 
     proptest! {
@@ -172,7 +172,7 @@ mod tests {
             let accel = 500.0;
             let mut limits = PathLimits::new(0.0, 30.0);
             for (length, way, there) in pieces {
-                limits.to(limits.end_mm() + length, way, there);
+                limits.extend_to(limits.end_mm() + length, way, there);
             }
             let profile = time_optimal(&limits, accel).unwrap();
             for ((s, piece), node) in limits.path.iter().zip(&limits.pieces).zip(&limits.nodes) {

@@ -1,17 +1,17 @@
 //! What the model predicts for a speed and a command: flow over time and width over path.
 
-use super::flow::{Course, TICK_S, float, follow, whole};
+use super::flow::{FlowTrajectory, TICK_S, float, simulate, whole};
 use super::profile::SpeedProfile;
-use super::task::{AlongPath, PlanError, Task};
+use super::task::{PathValue, PlanError, PlanTask};
 use crate::core::time::Span;
 use crate::numeric::lti::ModelError;
 
 /// Distance of the places for which the width is foretold, in lengths of the nozzle.
-const EVERY: f64 = 0.05;
+const POSITION_SPACING: f64 = 0.05;
 
 /// An extruder's command without a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unplanned {
+pub enum UnplannedCommand {
     /// It stays at what the fastest speed takes.
     Constant,
     /// In proportion to the robot's speed at that moment, within the drive's limits.
@@ -20,38 +20,38 @@ pub enum Unplanned {
 
 /// What is foretold.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Foretold {
-    course: Course,
+pub struct WidthPrediction {
+    flow: FlowTrajectory,
     /// Places \[mm\] and by which share of the wanted width the mean width over a nozzle's
     /// length about each is off.
-    pub width: Vec<AlongPath>,
+    pub width: Vec<PathValue>,
 }
 
-impl Foretold {
+impl WidthPrediction {
     /// Of a speed and a command over time \[s\], which is asked for in the order of time.
     /// The extruder has settled at the first command.
     pub fn new(
-        task: &Task<'_>,
+        task: &PlanTask<'_>,
         speed: &SpeedProfile,
         command: impl FnMut(f64) -> f64,
     ) -> Result<Self, ModelError> {
-        let course = follow(task.extruder, command, speed.duration_s())?;
+        let course = simulate(task.extruder, command, speed.duration_s())?;
         let width = width(task, speed, &course);
-        Ok(Self { course, width })
+        Ok(Self { flow: course, width })
     }
 
     /// Of a speed and a command that nobody planned.
     pub fn unplanned(
-        task: &Task<'_>,
+        task: &PlanTask<'_>,
         speed: &SpeedProfile,
-        how: Unplanned,
+        how: UnplannedCommand,
     ) -> Result<Self, PlanError> {
         let fastest = speed.squares().iter().copied().fold(0.0, f64::max).sqrt();
         let constant = task.steady(fastest)?;
         let mut last = None;
         let command = |now_s| match how {
-            Unplanned::Constant => constant,
-            Unplanned::Proportional => {
+            UnplannedCommand::Constant => constant,
+            UnplannedCommand::Proportional => {
                 let wanted = constant * speed.speed_at(speed.path_at(now_s)) / fastest;
                 let before = last.unwrap_or(wanted);
                 let (command, _) = task.limits.drive.apply(wanted, before, Span::from_secs(TICK_S));
@@ -64,19 +64,19 @@ impl Foretold {
 
     /// Flow at a moment \[mm³/s\].
     pub fn flow_at(&self, time_s: f64) -> f64 {
-        self.course.flow_at(time_s)
+        self.flow.flow_at(time_s)
     }
 }
 
-fn width(task: &Task<'_>, speed: &SpeedProfile, course: &Course) -> Vec<AlongPath> {
+fn width(task: &PlanTask<'_>, speed: &SpeedProfile, course: &FlowTrajectory) -> Vec<PathValue> {
     let half = 0.5 * task.bead.nozzle_mm;
     let full = task.bead.area_mm2 * task.bead.nozzle_mm;
-    let every = EVERY * task.bead.nozzle_mm;
+    let every = POSITION_SPACING * task.bead.nozzle_mm;
     let volume = |path_mm: f64| course.volume_at(speed.time_at(path_mm));
     let first = speed.start_mm() + half;
     let count = whole((speed.end_mm() - half - first) / every);
-    let places = (0..=count).map(|k| first + every * float(k));
-    let inside = places.filter(|at| at + half <= speed.end_mm());
+    let positions = (0..=count).map(|k| first + every * float(k));
+    let inside = positions.filter(|at| at + half <= speed.end_mm());
     inside.map(|at| (at, (volume(at + half) - volume(at - half)) / full - 1.0)).collect()
 }
 
@@ -88,29 +88,31 @@ mod tests {
     use crate::extruder::limits::CommandLimits;
     use crate::numeric::lti::TransferFunction;
     use crate::plan::profile::profile_of;
-    use crate::plan::{Bead, Limits, RobotLimits, Unmodelled};
+    use crate::plan::{BeadGeometry, FlowUncertainty, PlanLimits, RobotMotionLimits};
 
     #[test]
     fn a_constant_command_lays_too_much_where_the_robot_is_slow() {
         let extruder = TransferFunction::new(&[600.0], &[0.3, 1.0], 0.05).unwrap();
-        let task = Task {
-            limits: Limits {
-                robot: RobotLimits { accel_mm_per_s2: 2000.0, slowest_mm_per_s: 2.0 },
+        let task = PlanTask {
+            limits: PlanLimits {
+                robot: RobotMotionLimits { accel_mm_per_s2: 2000.0, slowest_mm_per_s: 2.0 },
                 drive: CommandLimits::new(0.0, 10.0, 20.0).unwrap(),
                 budget_s: 1.0,
             },
-            bead: Bead { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_doubt: 0.0 },
-            unmodelled: Unmodelled { share: 0.17, correlation_s: 0.15 },
+            bead: BeadGeometry { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_sigma: 0.0 },
+            unmodelled: FlowUncertainty { ratio: 0.17, correlation_s: 0.15 },
             extruder: &extruder,
         };
         let speed = profile_of(&[(0.0, 100.0), (60.0, 100.0), (61.0, 50.0), (200.0, 50.0)]);
         let speed = speed.unwrap();
-        let constant = Foretold::unplanned(&task, &speed, Unplanned::Constant).unwrap();
+        let constant =
+            WidthPrediction::unplanned(&task, &speed, UnplannedCommand::Constant).unwrap();
         let (first, last) = (constant.width[0].1, constant.width.last().unwrap().1);
         assert!(first.abs() < 1e-9 && (last - 1.0).abs() < 1e-9, "{first} {last}");
         assert!((constant.flow_at(1.0) - 4500.0).abs() < 1e-6);
         // In proportion it comes right in the end.
-        let followed = Foretold::unplanned(&task, &speed, Unplanned::Proportional).unwrap();
+        let followed =
+            WidthPrediction::unplanned(&task, &speed, UnplannedCommand::Proportional).unwrap();
         assert!(followed.width.last().unwrap().1.abs() < 0.01);
         assert!((followed.flow_at(speed.duration_s()) - 2250.0).abs() < 10.0);
     }

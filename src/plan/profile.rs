@@ -3,7 +3,7 @@
 
 /// Nodes that make no profile. Counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum ProfileError {
+pub enum SpeedProfileError {
     /// One node is no way.
     #[error("a speed profile of {nodes} points: at least 2 are needed")]
     Short {
@@ -33,7 +33,7 @@ pub enum ProfileError {
     },
     /// It would stand for ever.
     #[error("from {from_mm} mm to {to_mm} mm the speed is 0: the robot would never arrive")]
-    Stands {
+    StandsStill {
         /// Where it would stand \[mm\].
         from_mm: f64,
         /// Where it would never arrive \[mm\].
@@ -47,12 +47,12 @@ pub enum ProfileError {
     },
 }
 
-impl ProfileError {
+impl SpeedProfileError {
     /// The point that is wrong, from 1, if one is.
     pub const fn point(&self) -> Option<usize> {
         match self {
             Self::Order { at, .. } | Self::Speed { at, .. } => Some(*at),
-            Self::Short { .. } | Self::Stands { .. } | Self::Acceleration { .. } => None,
+            Self::Short { .. } | Self::StandsStill { .. } | Self::Acceleration { .. } => None,
         }
     }
 }
@@ -85,7 +85,7 @@ pub struct SpeedProfile {
 
 impl SpeedProfile {
     /// From points in the order of the path.
-    pub fn new(points: &[SpeedPoint]) -> Result<Self, ProfileError> {
+    pub fn new(points: &[SpeedPoint]) -> Result<Self, SpeedProfileError> {
         let node = |point: &SpeedPoint| {
             let speed = point.speed_mm_per_s;
             ProfileNode { path_mm: point.path_mm, square: speed * speed.abs() }
@@ -95,30 +95,33 @@ impl SpeedProfile {
     }
 
     /// From nodes in the order of the path.
-    pub(super) fn of_squares(nodes: &[ProfileNode]) -> Result<Self, ProfileError> {
+    pub(super) fn of_squares(nodes: &[ProfileNode]) -> Result<Self, SpeedProfileError> {
         if nodes.len() < 2 {
-            return Err(ProfileError::Short { nodes: nodes.len() });
+            return Err(SpeedProfileError::Short { nodes: nodes.len() });
         }
         let mut before: Option<ProfileNode> = None;
         let mut time = Vec::with_capacity(nodes.len());
         let mut now = 0.0;
         for (at, &ProfileNode { path_mm, square }) in (1..).zip(nodes) {
             if !(square.is_finite() && square >= 0.0) {
-                return Err(ProfileError::Speed {
+                return Err(SpeedProfileError::Speed {
                     at,
                     speed: square.signum() * square.abs().sqrt(),
                 });
             }
             if let Some(ProfileNode { path_mm: before_mm, square: last }) = before {
                 if !(path_mm > before_mm && path_mm.is_finite()) {
-                    return Err(ProfileError::Order { at, path_mm, before_mm });
+                    return Err(SpeedProfileError::Order { at, path_mm, before_mm });
                 }
                 if last == 0.0 && square == 0.0 {
-                    return Err(ProfileError::Stands { from_mm: before_mm, to_mm: path_mm });
+                    return Err(SpeedProfileError::StandsStill {
+                        from_mm: before_mm,
+                        to_mm: path_mm,
+                    });
                 }
                 now += 2.0 * (path_mm - before_mm) / (last.sqrt() + square.sqrt());
             } else if !path_mm.is_finite() {
-                return Err(ProfileError::Order { at, path_mm, before_mm: f64::NEG_INFINITY });
+                return Err(SpeedProfileError::Order { at, path_mm, before_mm: f64::NEG_INFINITY });
             }
             time.push(now);
             before = Some(ProfileNode { path_mm, square });
@@ -160,8 +163,8 @@ impl SpeedProfile {
     /// Square of the speed at a place \[mm²/s²\]; beyond the ends that of the end.
     pub fn square_at(&self, path_mm: f64) -> f64 {
         let piece = self.piece(&self.path, path_mm);
-        let share = ((path_mm - piece.path.0) / (piece.path.1 - piece.path.0)).clamp(0.0, 1.0);
-        piece.square.0 + share * (piece.square.1 - piece.square.0)
+        let fraction = ((path_mm - piece.path.0) / (piece.path.1 - piece.path.0)).clamp(0.0, 1.0);
+        piece.square.0 + fraction * (piece.square.1 - piece.square.0)
     }
 
     /// Speed at a place \[mm/s\].
@@ -222,7 +225,7 @@ struct Piece {
 
 /// The profile through places \[mm\] with speeds \[mm/s\].
 #[cfg(test)]
-pub(super) fn profile_of(points: &[(f64, f64)]) -> Result<SpeedProfile, ProfileError> {
+pub(super) fn profile_of(points: &[(f64, f64)]) -> Result<SpeedProfile, SpeedProfileError> {
     let point = |&(path_mm, speed_mm_per_s)| SpeedPoint { path_mm, speed_mm_per_s };
     SpeedProfile::new(&points.iter().map(point).collect::<Vec<_>>())
 }
@@ -260,9 +263,18 @@ mod tests {
     #[test]
     fn points_that_make_no_profile_are_refused() {
         let new = profile_of;
-        assert_eq!(new(&[(0.0, 1.0)]), Err(ProfileError::Short { nodes: 1 }));
-        assert!(matches!(new(&[(0.0, 1.0), (0.0, 1.0)]), Err(ProfileError::Order { at: 2, .. })));
-        assert!(matches!(new(&[(0.0, -1.0), (1.0, 1.0)]), Err(ProfileError::Speed { at: 1, .. })));
-        assert!(matches!(new(&[(0.0, 0.0), (1.0, 0.0)]), Err(ProfileError::Stands { .. })));
+        assert_eq!(new(&[(0.0, 1.0)]), Err(SpeedProfileError::Short { nodes: 1 }));
+        assert!(matches!(
+            new(&[(0.0, 1.0), (0.0, 1.0)]),
+            Err(SpeedProfileError::Order { at: 2, .. })
+        ));
+        assert!(matches!(
+            new(&[(0.0, -1.0), (1.0, 1.0)]),
+            Err(SpeedProfileError::Speed { at: 1, .. })
+        ));
+        assert!(matches!(
+            new(&[(0.0, 0.0), (1.0, 0.0)]),
+            Err(SpeedProfileError::StandsStill { .. })
+        ));
     }
 }

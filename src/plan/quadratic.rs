@@ -27,18 +27,18 @@ pub struct Term {
 
 /// Rows A·x ≤ bound, as (row, column, value).
 #[derive(Debug, Clone, Default)]
-pub struct Rows {
-    places: (Vec<usize>, Vec<usize>),
+pub struct ConstraintRows {
+    indices: (Vec<usize>, Vec<usize>),
     values: Vec<f64>,
     bounds: Vec<f64>,
 }
 
-impl Rows {
+impl ConstraintRows {
     /// Adds Σ value·x(column) ≤ bound.
-    pub fn at_most(&mut self, terms: impl IntoIterator<Item = Term>, bound: f64) {
+    pub fn add_upper_bound(&mut self, terms: impl IntoIterator<Item = Term>, bound: f64) {
         for Term { column, value } in terms {
-            self.places.0.push(self.bounds.len());
-            self.places.1.push(column);
+            self.indices.0.push(self.bounds.len());
+            self.indices.1.push(column);
             self.values.push(value);
         }
         self.bounds.push(bound);
@@ -46,13 +46,13 @@ impl Rows {
 }
 
 /// The least of a function under the rows; `None` where the solver finds none.
-pub fn least(function: &Quadratic, rows: Rows) -> Option<DVector<f64>> {
+pub fn minimise(function: &Quadratic, rows: ConstraintRows) -> Option<DVector<f64>> {
     let Quadratic { hessian: p, gradient: q } = function;
     let unknowns = q.len();
     let upper = upper_triangle(p);
     let count = rows.bounds.len();
     let a =
-        CscMatrix::new_from_triplets(count, unknowns, rows.places.0, rows.places.1, rows.values);
+        CscMatrix::new_from_triplets(count, unknowns, rows.indices.0, rows.indices.1, rows.values);
     let settings = DefaultSettingsBuilder::default().verbose(false).max_iter(60).build().ok()?;
     let cones = [SupportedConeT::NonnegativeConeT(count)];
     let mut solver =

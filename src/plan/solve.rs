@@ -2,10 +2,10 @@
 
 use super::flow::{KNOT_S, float, whole};
 use super::limits::attainable;
-use super::prediction::Foretold;
+use super::prediction::WidthPrediction;
 use super::profile::SpeedProfile;
-use super::receding_horizon::Long;
-use super::task::{AlongPath, PlanError, Task};
+use super::receding_horizon::RecedingHorizon;
+use super::task::{PathValue, PlanError, PlanTask};
 
 /// Speed and command that belong together.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,7 +16,7 @@ pub struct Plan {
     pub command: Vec<f64>,
     /// Places \[mm\] and by which share of the wanted width the mean width over a
     /// nozzle's length about each is off, as far as the model tells.
-    pub foretold: Vec<AlongPath>,
+    pub predicted_width: Vec<PathValue>,
     /// Time that the plan takes longer than the nominal speed \[s\].
     pub added_s: f64,
 }
@@ -40,16 +40,17 @@ impl Plan {
 /// Plans speed and command for a nominal speed along a path. What the nominal speed asks
 /// beyond the robot's acceleration is taken off first. The extruder has settled at the
 /// first speed when the plan begins.
-pub fn solve(task: &Task<'_>, nominal: &SpeedProfile) -> Result<Plan, PlanError> {
+pub fn solve(task: &PlanTask<'_>, nominal: &SpeedProfile) -> Result<Plan, PlanError> {
     task.check()?;
     let nominal = attainable(nominal, task.limits.robot.accel_mm_per_s2)?;
     let squares = nominal.squares();
     task.steady(squares.iter().copied().fold(0.0, f64::max).sqrt())?;
     let start = task.steady(squares.first().copied().unwrap_or(0.0).sqrt())?;
-    let (speed, knots) = Long::new(task, &nominal, start)?.plan()?;
+    let (speed, knots) = RecedingHorizon::new(task, &nominal, start)?.plan()?;
     let added_s = speed.duration_s() - nominal.duration_s();
     let command = std::iter::once(start).chain(knots).collect();
-    let mut plan = Plan { speed, command, foretold: Vec::new(), added_s };
-    plan.foretold = Foretold::new(task, &plan.speed, |time_s| plan.command_at(time_s))?.width;
+    let mut plan = Plan { speed, command, predicted_width: Vec::new(), added_s };
+    plan.predicted_width =
+        WidthPrediction::new(task, &plan.speed, |time_s| plan.command_at(time_s))?.width;
     Ok(plan)
 }

@@ -3,9 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::flow::KNOT_S;
-use super::horizon::{Choice, Horizon, Outcome};
-use super::quadratic::{Quadratic, Rows, Term, least};
-use super::time_gradient::Clock;
+use super::horizon::{Evaluation, Horizon, Iterate};
+use super::quadratic::{ConstraintRows, Quadratic, Term, minimise};
+use super::time_gradient::PassingTimes;
 use crate::extruder::limits::CommandLimits;
 
 /// Added to the scaled Hessian's diagonal, for directions that cost nothing.
@@ -28,68 +28,80 @@ pub struct Bounds {
 
 /// The problem of a round, with its unknowns as shares: of the squares of the speed that
 /// are free, and of the drive's range.
-struct Round<'a> {
+struct Subproblem<'a> {
     horizon: &'a Horizon<'a>,
     bounds: &'a Bounds,
-    choice: &'a Choice,
+    choice: &'a Iterate,
     /// Column of each node that is free.
     columns: Vec<Option<usize>>,
     /// Node or, after all nodes, knot of each column.
-    places: Vec<usize>,
+    variables: Vec<usize>,
     /// What a share of one is.
     scale: Vec<f64>,
-    rows: Rows,
+    rows: ConstraintRows,
 }
 
 /// The change that the convex problem about a choice asks for, with squares of the speed
 /// that change by at most a share of themselves.
-pub fn step(
+pub fn solve_subproblem(
     horizon: &Horizon<'_>,
     bounds: &Bounds,
-    choice: &Choice,
-    outcome: &Outcome,
-    reach: f64,
-) -> Option<Choice> {
-    let mut round = Round::new(horizon, bounds, choice);
-    round.keep_speeds(reach);
+    iterate: &Iterate,
+    outcome: &Evaluation,
+    trust_radius: f64,
+) -> Option<Iterate> {
+    let mut round = Subproblem::new(horizon, bounds, iterate);
+    round.keep_speeds(trust_radius);
     round.keep_acceleration();
     round.keep_drive();
     round.keep_time(outcome);
     round.solve(outcome)
 }
 
-impl<'a> Round<'a> {
-    fn new(horizon: &'a Horizon<'a>, bounds: &'a Bounds, choice: &'a Choice) -> Self {
-        let nodes = choice.squares.len();
-        let limits = bounds.floor.iter().zip(&bounds.ceiling).zip(&choice.squares);
-        let mut places = Vec::new();
+impl<'a> Subproblem<'a> {
+    fn new(horizon: &'a Horizon<'a>, bounds: &'a Bounds, iterate: &'a Iterate) -> Self {
+        let nodes = iterate.squares.len();
+        let limits = bounds.floor.iter().zip(&bounds.ceiling).zip(&iterate.squares);
+        let mut variables = Vec::new();
         let columns = limits.enumerate().map(|(node, ((low, high), now))| {
             (low < high && *now > 0.0).then(|| {
-                places.push(node);
-                places.len() - 1
+                variables.push(node);
+                variables.len() - 1
             })
         });
         let columns = columns.collect();
         let mut scale: Vec<f64> =
-            places.iter().filter_map(|node| choice.squares.get(*node).copied()).collect();
-        places.extend(nodes..nodes + choice.knots.len());
-        scale.resize(places.len(), horizon.drive_span);
-        Self { horizon, bounds, choice, columns, places, scale, rows: Rows::default() }
+            variables.iter().filter_map(|node| iterate.squares.get(*node).copied()).collect();
+        variables.extend(nodes..nodes + iterate.knots.len());
+        scale.resize(variables.len(), horizon.drive_span);
+        Self {
+            horizon,
+            bounds,
+            choice: iterate,
+            columns,
+            variables,
+            scale,
+            rows: ConstraintRows::default(),
+        }
     }
 
     /// Columns and nodes that are free.
     fn free(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
         let nodes = self.choice.squares.len();
-        self.places.clone().into_iter().enumerate().filter(move |(_, place)| *place < nodes)
+        self.variables
+            .clone()
+            .into_iter()
+            .enumerate()
+            .filter(move |(_, variable)| *variable < nodes)
     }
 
-    fn keep_speeds(&mut self, reach: f64) {
+    fn keep_speeds(&mut self, trust_radius: f64) {
         for (column, node) in self.free() {
             let now = self.choice.squares[node];
-            let up = (self.bounds.ceiling[node] / now - 1.0).min(reach);
-            let down = (1.0 - self.bounds.floor[node] / now).min(reach);
-            self.rows.at_most([Term { column, value: 1.0 }], up.max(0.0));
-            self.rows.at_most([Term { column, value: -1.0 }], down.max(0.0));
+            let up = (self.bounds.ceiling[node] / now - 1.0).min(trust_radius);
+            let down = (1.0 - self.bounds.floor[node] / now).min(trust_radius);
+            self.rows.add_upper_bound([Term { column, value: 1.0 }], up.max(0.0));
+            self.rows.add_upper_bound([Term { column, value: -1.0 }], down.max(0.0));
         }
     }
 
@@ -108,7 +120,7 @@ impl<'a> Round<'a> {
             }
             for sign in [1.0, -1.0] {
                 let terms = terms.iter().map(|term| Term { value: sign * term.value, ..*term });
-                self.rows.at_most(terms, (1.0 - sign * rise).max(0.0));
+                self.rows.add_upper_bound(terms, (1.0 - sign * rise).max(0.0));
             }
         }
     }
@@ -117,47 +129,48 @@ impl<'a> Round<'a> {
         let (min, max) = self.bounds.drive.range();
         let span = self.horizon.drive_span;
         let most = self.bounds.drive.rate_per_s() * KNOT_S / span;
-        let first = self.places.len() - self.choice.knots.len();
+        let first = self.variables.len() - self.choice.knots.len();
         let mut before = self.horizon.extruder.command();
         for (column, now) in (first..).zip(&self.choice.knots) {
-            self.rows.at_most([Term { column, value: 1.0 }], (max - now) / span);
-            self.rows.at_most([Term { column, value: -1.0 }], (now - min) / span);
+            self.rows.add_upper_bound([Term { column, value: 1.0 }], (max - now) / span);
+            self.rows.add_upper_bound([Term { column, value: -1.0 }], (now - min) / span);
             let rise = (now - before) / span;
             for sign in [1.0, -1.0] {
                 let last = (column > first).then(|| Term { column: column - 1, value: -sign });
                 let terms = [Term { column, value: sign }].into_iter().chain(last);
-                self.rows.at_most(terms, (most - sign * rise).max(0.0));
+                self.rows.add_upper_bound(terms, (most - sign * rise).max(0.0));
             }
             before = *now;
         }
     }
 
-    fn keep_time(&mut self, outcome: &Outcome) {
-        let slope = Clock::new(&outcome.profile).to_end();
+    fn keep_time(&mut self, outcome: &Evaluation) {
+        let slope = PassingTimes::new(&outcome.profile).to_end();
         let left = self.bounds.longest_s - outcome.profile.duration_s();
         let value = |column: usize, node: usize| slope[node] * self.scale[column];
         let terms: Vec<_> =
             self.free().map(|(column, node)| Term { column, value: value(column, node) }).collect();
-        self.rows.at_most(terms, left.max(0.0));
+        self.rows.add_upper_bound(terms, left.max(0.0));
     }
 
-    fn solve(self, outcome: &Outcome) -> Option<Choice> {
+    fn solve(self, outcome: &Evaluation) -> Option<Iterate> {
         let Quadratic { hessian, gradient } = self.horizon.model(self.choice, outcome);
-        let (places, scale) = (&self.places, &self.scale);
+        let (variables, scale) = (&self.variables, &self.scale);
         let size = 1.0 / outcome.cost.max(f64::MIN_POSITIVE);
-        let p = DMatrix::from_fn(places.len(), places.len(), |i, j| {
+        let p = DMatrix::from_fn(variables.len(), variables.len(), |i, j| {
             let ridge = if i == j { RIDGE } else { 0.0 };
-            hessian[(places[i], places[j])] * scale[i] * scale[j] * size + ridge
+            hessian[(variables[i], variables[j])] * scale[i] * scale[j] * size + ridge
         });
-        let scaled = places.iter().zip(scale).map(|(place, scale)| gradient[*place] * scale * size);
-        let q = DVector::from_iterator(places.len(), scaled);
-        let x = least(&Quadratic { hessian: p, gradient: q }, self.rows)?;
+        let scaled =
+            variables.iter().zip(scale).map(|(variable, scale)| gradient[*variable] * scale * size);
+        let q = DVector::from_iterator(variables.len(), scaled);
+        let x = minimise(&Quadratic { hessian: p, gradient: q }, self.rows)?;
         let nodes = self.choice.squares.len();
         let mut all = vec![0.0; nodes + self.choice.knots.len()];
-        for ((place, scale), share) in places.iter().zip(scale).zip(x.iter()) {
-            all[*place] = share * scale;
+        for ((variable, scale), fraction) in variables.iter().zip(scale).zip(x.iter()) {
+            all[*variable] = fraction * scale;
         }
         let knots = all.split_off(nodes);
-        Some(Choice { squares: all, knots })
+        Some(Iterate { squares: all, knots })
     }
 }

@@ -1,12 +1,12 @@
 //! What a plan is asked for with, and why there may be none.
 
-use super::profile::ProfileError;
+use super::profile::SpeedProfileError;
 use crate::extruder::limits::CommandLimits;
 use crate::numeric::lti::{ModelError, TransferFunction};
 
 /// What the robot can do along a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RobotLimits {
+pub struct RobotMotionLimits {
     /// Largest acceleration along the path \[mm/s²\].
     pub accel_mm_per_s2: f64,
     /// Slowest speed that is planned where the nominal one is faster \[mm/s\].
@@ -15,9 +15,9 @@ pub struct RobotLimits {
 
 /// What a plan has to keep, beside the nominal speed, which it never exceeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
+pub struct PlanLimits {
     /// Of the robot.
-    pub robot: RobotLimits,
+    pub robot: RobotMotionLimits,
     /// Of the extruder's command.
     pub drive: CommandLimits,
     /// Time that may be added for each slow-down of the nominal speed \[s\].
@@ -26,61 +26,61 @@ pub struct Limits {
 
 /// The bead that is wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bead {
+pub struct BeadGeometry {
     /// Its section \[mm²\].
     pub area_mm2: f64,
     /// Length over which the nozzle averages what it lays \[mm\].
     pub nozzle_mm: f64,
     /// Standard deviation of that length, as a share of it: the more, the less a plan makes
     /// use of it.
-    pub nozzle_doubt: f64,
+    pub nozzle_sigma: f64,
 }
 
 /// The flow that no model tells.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unmodelled {
+pub struct FlowUncertainty {
     /// Its standard deviation as a share of that of the flow's change.
-    pub share: f64,
+    pub ratio: f64,
     /// How long it hangs together \[s\].
     pub correlation_s: f64,
 }
 
-impl Unmodelled {
+impl FlowUncertainty {
     /// Variance of its volume over a time, for a unit of its own variance:
     /// 2τ²(T/τ − 1 + e^(−T/τ)), with a correlation that falls as e^(−t/τ) \[s²\].
-    pub fn spread(&self, over_s: f64) -> f64 {
+    pub fn volume_variance(&self, over_s: f64) -> f64 {
         let tau = self.correlation_s;
         2.0 * tau * (over_s - tau * (1.0 - libm::exp(-over_s / tau)))
     }
 
     /// How fast that grows with the time \[s\].
-    pub(super) fn spread_slope(&self, over_s: f64) -> f64 {
+    pub(super) fn volume_variance_slope(&self, over_s: f64) -> f64 {
         2.0 * self.correlation_s * (1.0 - libm::exp(-over_s / self.correlation_s))
     }
 }
 
 /// What is planned for.
 #[derive(Debug, Clone, Copy)]
-pub struct Task<'a> {
+pub struct PlanTask<'a> {
     /// What has to be kept.
-    pub limits: Limits,
+    pub limits: PlanLimits,
     /// What is wanted.
-    pub bead: Bead,
+    pub bead: BeadGeometry,
     /// What is not known of the flow.
-    pub unmodelled: Unmodelled,
+    pub unmodelled: FlowUncertainty,
     /// From the command to the flow \[mm³/s\], with its dead time.
     pub extruder: &'a TransferFunction,
 }
 
 /// A place and a value there.
-pub type AlongPath = (f64, f64);
+pub type PathValue = (f64, f64);
 
 /// Why there is no plan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlanError {
     /// The robot's speed.
     #[error("the robot's speed: {0}")]
-    Profile(#[from] ProfileError),
+    Profile(#[from] SpeedProfileError),
     /// The extruder's model.
     #[error("the extruder's model: {0}")]
     Model(#[from] ModelError),
@@ -111,7 +111,7 @@ pub enum PlanError {
     },
 }
 
-impl Task<'_> {
+impl PlanTask<'_> {
     /// The command that holds the section at a speed \[mm/s\]; fails where the drive does
     /// not reach it.
     pub fn steady(&self, speed_mm_per_s: f64) -> Result<f64, PlanError> {
@@ -137,7 +137,7 @@ impl Task<'_> {
         ];
         let others = [
             ("the time that may be added", self.limits.budget_s),
-            ("the share of the unmodelled flow", self.unmodelled.share),
+            ("the share of the unmodelled flow", self.unmodelled.ratio),
         ];
         let others = others.map(|(what, value)| (what, value, "a number of 0 or more is needed"));
         for (what, value, wanted) in numbers {

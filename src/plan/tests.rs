@@ -14,13 +14,13 @@ fn extruder() -> TransferFunction {
     TransferFunction::new(&[600.0], &[0.3, 1.0], 0.05).unwrap()
 }
 
-fn task(extruder: &TransferFunction, budget_s: f64) -> Task<'_> {
-    let robot = RobotLimits { accel_mm_per_s2: ACCEL, slowest_mm_per_s: 2.0 };
+fn task(extruder: &TransferFunction, budget_s: f64) -> PlanTask<'_> {
+    let robot = RobotMotionLimits { accel_mm_per_s2: ACCEL, slowest_mm_per_s: 2.0 };
     let drive = CommandLimits::new(0.0, 10.0, 20.0).unwrap();
-    Task {
-        limits: Limits { robot, drive, budget_s },
-        bead: Bead { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_doubt: 0.0 },
-        unmodelled: Unmodelled { share: 0.17, correlation_s: 0.15 },
+    PlanTask {
+        limits: PlanLimits { robot, drive, budget_s },
+        bead: BeadGeometry { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_sigma: 0.0 },
+        unmodelled: FlowUncertainty { ratio: 0.17, correlation_s: 0.15 },
         extruder,
     }
 }
@@ -30,9 +30,9 @@ fn path(corners: &[f64], end_mm: f64, rest: bool) -> SpeedProfile {
     let ends = if rest { 0.0 } else { 100.0 };
     let mut limits = PathLimits::new(0.0, ends);
     for corner in corners {
-        limits.to(*corner, 100.0, 5.0);
+        limits.extend_to(*corner, 100.0, 5.0);
     }
-    limits.to(end_mm, 100.0, ends);
+    limits.extend_to(end_mm, 100.0, ends);
     time_optimal(&limits, ACCEL).unwrap()
 }
 
@@ -41,8 +41,8 @@ fn keeps_its_limits(plan: &Plan, nominal: &SpeedProfile, most_s: f64) {
     let nodes = plan.speed.path().iter().zip(plan.speed.squares());
     for ((s0, b0), (s1, b1)) in nodes.clone().zip(nodes.clone().skip(1)) {
         assert!((b1 - b0).abs() <= 2.0 * ACCEL * (s1 - s0) * (1.0 + 1e-9) + 1e-6, "{s0} {s1}");
-        for share in [0.0, 0.3, 0.7, 1.0] {
-            let at = s0 + share * (s1 - s0);
+        for fraction in [0.0, 0.3, 0.7, 1.0] {
+            let at = s0 + fraction * (s1 - s0);
             assert!(plan.speed.square_at(at) <= nominal.square_at(at) + 1e-6, "{at}");
         }
     }
@@ -56,7 +56,7 @@ fn keeps_its_limits(plan: &Plan, nominal: &SpeedProfile, most_s: f64) {
 }
 
 fn rms(plan: &Plan, from: f64, to: f64) -> f64 {
-    let inside = plan.foretold.iter().filter(|(at, _)| (from..=to).contains(at));
+    let inside = plan.predicted_width.iter().filter(|(at, _)| (from..=to).contains(at));
     crate::numeric::average::rms(inside.map(|(_, error)| *error))
 }
 

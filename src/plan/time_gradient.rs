@@ -3,13 +3,13 @@
 use super::profile::SpeedProfile;
 
 /// How the moment at which a place is passed changes with each of them \[s³/mm²\].
-pub struct Clock<'a> {
+pub struct PassingTimes<'a> {
     profile: &'a SpeedProfile,
     /// For each piece, with its first and its second node.
     pieces: Vec<[f64; 2]>,
 }
 
-impl<'a> Clock<'a> {
+impl<'a> PassingTimes<'a> {
     /// Of a profile.
     pub fn new(profile: &'a SpeedProfile) -> Self {
         let nodes = || profile.path().iter().zip(profile.squares());
@@ -19,19 +19,19 @@ impl<'a> Clock<'a> {
     }
 
     /// Tells each node before a place and its slope; a node of two pieces twice.
-    pub fn each(&self, place_mm: f64, mut tell: impl FnMut(usize, f64)) {
+    pub fn for_each(&self, position_mm: f64, mut tell: impl FnMut(usize, f64)) {
         let nodes = || self.profile.path().iter().zip(self.profile.squares());
         let ends = nodes().zip(nodes().skip(1));
         for (node, ([first, second], ((s0, b0), (s1, b1)))) in
             self.pieces.iter().zip(ends).enumerate()
         {
-            if place_mm <= *s0 {
+            if position_mm <= *s0 {
                 return;
             }
             let way = s1 - s0;
-            let share = (place_mm - s0) / way;
+            let fraction = (position_mm - s0) / way;
             let [first, second] =
-                if share < 1.0 { slopes(way, *b0, *b1, share) } else { [*first, *second] };
+                if fraction < 1.0 { slopes(way, *b0, *b1, fraction) } else { [*first, *second] };
             tell(node, first);
             tell(node + 1, second);
         }
@@ -40,7 +40,7 @@ impl<'a> Clock<'a> {
     /// The slope of the moment at which the end is passed, for each node.
     pub fn to_end(&self) -> Vec<f64> {
         let mut all = vec![0.0; self.profile.path().len()];
-        self.each(self.profile.end_mm(), |node, slope| {
+        self.for_each(self.profile.end_mm(), |node, slope| {
             if let Some(sum) = all.get_mut(node) {
                 *sum += slope;
             }
@@ -52,11 +52,11 @@ impl<'a> Clock<'a> {
 /// Slopes of the time over the first share of a piece with the squares at its ends: it is
 /// 2·share·way/(v₀ + v), with v² on the straight line between them. A node at rest is
 /// never moved and has none.
-fn slopes(way: f64, first: f64, second: f64, share: f64) -> [f64; 2] {
-    let (v0, v) = (first.sqrt(), (first + share * (second - first)).sqrt());
-    let outer = -2.0 * share * way / (v0 + v).powi(2);
+fn slopes(way: f64, first: f64, second: f64, fraction: f64) -> [f64; 2] {
+    let (v0, v) = (first.sqrt(), (first + fraction * (second - first)).sqrt());
+    let outer = -2.0 * fraction * way / (v0 + v).powi(2);
     let inner = |speed: f64, part: f64| if speed > 0.0 { 0.5 * part / speed } else { 0.0 };
-    [outer * (inner(v0, 1.0) + inner(v, 1.0 - share)), outer * inner(v, share)]
+    [outer * (inner(v0, 1.0) + inner(v, 1.0 - fraction)), outer * inner(v, fraction)]
 }
 
 #[cfg(test)]
@@ -79,17 +79,17 @@ mod tests {
             SpeedProfile::of_squares(&nodes).unwrap()
         };
         let here = profile(&squares);
-        for place in [1.0, 2.0, 3.3, 5.7, 6.0] {
+        for position in [1.0, 2.0, 3.3, 5.7, 6.0] {
             let mut slope = [0.0; 4];
-            Clock::new(&here).each(place, |node, by| slope[node] += by);
+            PassingTimes::new(&here).for_each(position, |node, by| slope[node] += by);
             for node in 0..4 {
                 let time = |by: f64| {
                     let mut moved = squares;
                     moved[node] += by;
-                    profile(&moved).time_at(place)
+                    profile(&moved).time_at(position)
                 };
                 let wanted = (time(0.01) - time(-0.01)) / 0.02;
-                assert!((slope[node] - wanted).abs() < 1e-9, "{place} {node}");
+                assert!((slope[node] - wanted).abs() < 1e-9, "{position} {node}");
             }
         }
     }

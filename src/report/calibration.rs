@@ -12,18 +12,18 @@ use crate::calibration::map;
 use crate::calibration::map::WidthMap;
 use crate::calibration::next_view::NextView;
 use crate::calibration::quality;
-use crate::calibration::sighting::Looks;
+use crate::calibration::sighting::Observations;
 use crate::calibration::solve::Solution;
 use crate::core::geometry::GridSize;
 use drawing::{Drawing, residuals, width_map};
 
 /// Everything that the page is made of.
 #[derive(Debug)]
-pub struct Page<'a> {
+pub struct CalibrationPage<'a> {
     /// The board.
     pub board: &'a Board,
     /// What became of each picture.
-    pub looks: &'a Looks,
+    pub images: &'a Observations,
     /// The camera.
     pub solution: &'a Solution,
     /// What a width is known to, a surface each; empty where that cannot be told.
@@ -40,7 +40,7 @@ pub struct Page<'a> {
     pub reload_s: Option<u32>,
 }
 
-impl Page<'_> {
+impl CalibrationPage<'_> {
     /// The page.
     pub fn page(&self) -> String {
         let title = format!("Calibration {}", self.calibration_file);
@@ -65,11 +65,11 @@ impl Page<'_> {
         html! {
             div.about {
                 span { (kind) " " b { (columns) "x" (rows) " corners, " (self.board.square()) } }
-                span { "pictures " b { (self.solution.views.len()) " of " (self.looks.len()) } }
+                span { "pictures " b { (self.solution.views.len()) " of " (self.images.len()) } }
                 span { "size " b { (width) "x" (height) " px" } }
                 span { "lens " b { (model) } }
                 span { "reprojection error " b { (format!("{:.3} px", self.solution.rms_px)) } }
-                @if let Some(px) = self.solution.held_out_px {
+                @if let Some(px) = self.solution.cross_validation_px {
                     span { "held out " b { (format!("{px:.3} px")) } }
                 }
             }
@@ -77,10 +77,10 @@ impl Page<'_> {
     }
 
     fn verdict(&self) -> Markup {
-        let doubts = quality::doubts(self.solution);
+        let warnings = quality::warnings(self.solution);
         let worst = map::worst_mm(self.maps);
         let fails = self.limit_mm.is_some_and(|limit| worst.is_none_or(|worst| worst > limit));
-        let (class, word) = match (fails, worst, doubts.is_empty()) {
+        let (class, word) = match (fails, worst, warnings.is_empty()) {
             (true, ..) | (_, None, _) => ("bad", "Not good enough."),
             (false, Some(_), false) => ("caution", "Look closer."),
             (false, Some(_), true) => ("good", "Good."),
@@ -102,13 +102,13 @@ impl Page<'_> {
                     _ => "How well a width is known cannot be told from these pictures."
                 }
                 ul {
-                    @for doubt in &doubts { li { (doubt) } }
+                    @for doubt in &warnings { li { (doubt) } }
                     @if let Some(next) = self.next {
                         li {
                             "One more picture would help most with " (next)
                             (format!(
                                 ": {:.3} % of a width instead of {:.3} %.",
-                                100.0 * next.share.1, 100.0 * next.share.0
+                                100.0 * next.relative_sigma.1, 100.0 * next.relative_sigma.0
                             ))
                         }
                     }
@@ -129,7 +129,7 @@ impl Page<'_> {
                              from the corners. Dashed: where boards were seen; beads that lie in it with both ends count for the number above. Empty \
                              cells do not see such a bead whole. A height that is 1 mm wrong changes \
                              it by {:.4} mm.",
-                            map.bead_mm, map.by_a_millimetre_of_height_mm
+                            map.bead_mm, map.mm_per_mm_height
                         ))
                     }
                     (width_map(self.solution, map))
@@ -166,7 +166,7 @@ impl Page<'_> {
                             th.number { "largest [px]" } th.number { "tilt [°]" }
                             th.number { "blur [px]" } th { "" }
                         }
-                        @for (name, look) in self.looks { (self.view(name, look, largest)) }
+                        @for (name, look) in self.images { (self.view(name, look, largest)) }
                     }
                 }
             }
@@ -176,7 +176,10 @@ impl Page<'_> {
     fn view(
         &self,
         name: &str,
-        look: &Result<crate::calibration::sighting::Sighting, crate::calibration::refusal::Refusal>,
+        look: &Result<
+            crate::calibration::sighting::BoardObservation,
+            crate::calibration::refusal::BoardRejection,
+        >,
         largest: f64,
     ) -> Markup {
         let view = self.solution.views.iter().find(|view| view.name == name);

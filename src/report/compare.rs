@@ -9,14 +9,14 @@ use super::chart::area::{Area, XAxis};
 use super::chart::legend::legend;
 use super::chart::palette;
 use super::chart::palette::Ink;
-use super::chart::plot::{Layer, Plot, y_range};
-use super::chart::series::Series;
+use super::chart::plot::{Plot, PlotLayer, y_range};
+use super::chart::series::Curve;
 use super::html::whole_page;
-use crate::trials::compare::{Estimate, Figures, JUDGED_AFTER_MM, SCATTER_AFTER_MM};
+use crate::trials::compare::{Figures, JUDGED_AFTER_MM, SIGMA_AFTER_MM, SeedStatistics};
 
 /// One number of one controller at one width, as `compare.json` has it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Number {
+pub struct ComparedNumber {
     /// The controller.
     pub controller: String,
     /// Width that was asked for \[mm\].
@@ -35,7 +35,7 @@ pub struct Number {
 
 /// All that was compared.
 #[derive(Debug)]
-pub struct Comparison {
+pub struct ControllerComparison {
     /// Names of the controllers.
     pub controllers: Vec<String>,
     /// Seeds of every controller and width.
@@ -45,13 +45,13 @@ pub struct Comparison {
 }
 
 /// What is told of a controller: name, unit, and how it is told.
-const QUANTITIES: [(&str, &str, Told); 6] = [
-    ("mean size of the error", "mm", Told::Mean),
-    ("RMS error", "mm", Told::Mean),
-    ("RMS error over that of the first", "1", Told::Mean),
-    ("settled within 0.5 mm after", "mm", Told::Median),
-    ("integral of the error's size", "mm²", Told::Mean),
-    ("scatter once settled", "mm", Told::Mean),
+const QUANTITIES: [(&str, &str, Average); 6] = [
+    ("mean size of the error", "mm", Average::Mean),
+    ("RMS error", "mm", Average::Mean),
+    ("RMS error over that of the first", "1", Average::Mean),
+    ("settled within 0.5 mm after", "mm", Average::Median),
+    ("integral of the error's size", "mm²", Average::Mean),
+    ("scatter once settled", "mm", Average::Mean),
 ];
 
 /// What is told of controllers that failed.
@@ -59,31 +59,31 @@ const FAILED: &str = "seeds never controlled, or stopped";
 
 /// How a number over seeds is told in a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Told {
+enum Average {
     /// Mean and confidence.
     Mean,
     /// Median: some seeds may have none.
     Median,
 }
 
-fn estimates(figures: &Figures) -> [Estimate; 6] {
+fn estimates(figures: &Figures) -> [SeedStatistics; 6] {
     [
         figures.mean_error_mm,
         figures.rms_error_mm,
         figures.ratio,
         figures.settled_mm,
         figures.integral_mm2,
-        figures.scatter_mm,
+        figures.sigma_mm,
     ]
 }
 
-fn told(estimate: &Estimate, how: Told) -> String {
+fn average(estimate: &SeedStatistics, how: Average) -> String {
     match (how, estimate.mean, estimate.confidence) {
-        (Told::Median, ..) => estimate.median.map_or("never".to_owned(), short),
-        (Told::Mean, Some(mean), Some(confidence)) => {
+        (Average::Median, ..) => estimate.median.map_or("never".to_owned(), short),
+        (Average::Mean, Some(mean), Some(confidence)) => {
             format!("{} ± {}", short(mean), short(confidence))
         }
-        (Told::Mean, mean, _) => mean.map_or("–".to_owned(), short),
+        (Average::Mean, mean, _) => mean.map_or("–".to_owned(), short),
     }
 }
 
@@ -96,15 +96,15 @@ fn short(value: f64) -> String {
     }
 }
 
-impl Comparison {
+impl ControllerComparison {
     /// The numbers, one by one.
-    pub fn numbers(&self) -> Vec<Number> {
+    pub fn numbers(&self) -> Vec<ComparedNumber> {
         let mut numbers = Vec::new();
         for (width_mm, all) in &self.widths {
             for (controller, figures) in self.controllers.iter().zip(all) {
                 #[expect(clippy::cast_precision_loss, reason = "seeds are few")]
-                let failed = Some(figures.failed as f64);
-                numbers.push(Number {
+                let failed = Some(figures.failed_seeds as f64);
+                numbers.push(ComparedNumber {
                     controller: controller.clone(),
                     width_mm: *width_mm,
                     quantity: FAILED,
@@ -114,7 +114,7 @@ impl Comparison {
                     median: failed,
                 });
                 for ((quantity, unit, _), estimate) in QUANTITIES.iter().zip(estimates(figures)) {
-                    numbers.push(Number {
+                    numbers.push(ComparedNumber {
                         controller: controller.clone(),
                         width_mm: *width_mm,
                         quantity,
@@ -142,11 +142,11 @@ impl Comparison {
         for (at, (quantity, unit, how)) in QUANTITIES.iter().enumerate() {
             let unit = if *unit == "1" { String::new() } else { format!(" [{unit}]") };
             let _ = write!(text, "\n{quantity}{unit}\n");
-            self.lines(&mut text, widest, |found| told(&estimates(found)[at], *how));
+            self.lines(&mut text, widest, |found| average(&estimates(found)[at], *how));
         }
         if self.has_failures() {
             let _ = writeln!(text, "\n{FAILED}");
-            self.lines(&mut text, widest, |found| found.failed.to_string());
+            self.lines(&mut text, widest, |found| found.failed_seeds.to_string());
         }
         text
     }
@@ -164,7 +164,7 @@ impl Comparison {
     }
 
     fn has_failures(&self) -> bool {
-        self.widths.iter().flat_map(|(_, all)| all).any(|found| found.failed > 0)
+        self.widths.iter().flat_map(|(_, all)| all).any(|found| found.failed_seeds > 0)
     }
 
     /// The page.
@@ -173,7 +173,7 @@ impl Comparison {
             h1 { "Controllers beside each other" }
             p.hint { "The same bead and the same disturbances for all, " (self.seeds) " seeds each. \
                 Errors are those of the bead itself, from " (JUDGED_AFTER_MM) " mm after control \
-                began, scatter from " (SCATTER_AFTER_MM) " mm after; ± is 95 % confidence of the mean \
+                began, scatter from " (SIGMA_AFTER_MM) " mm after; ± is 95 % confidence of the mean \
                 over seeds. Where it settled is the median." }
             section {
                 h2 { "Numbers" }
@@ -206,7 +206,7 @@ impl Comparison {
                         td { (name) }
                         @for (_, all) in &self.widths { td.number {
                             @if let Some(found) = all.get(who) {
-                                (told(&estimates(found)[at], *how))
+                                (average(&estimates(found)[at], *how))
                             }
                         } }
                     } }
@@ -216,7 +216,7 @@ impl Comparison {
                         td { @if who == 0 { (FAILED) } }
                         td { (name) }
                         @for (_, all) in &self.widths { td.number {
-                            @if let Some(found) = all.get(who) { (found.failed) }
+                            @if let Some(found) = all.get(who) { (found.failed_seeds) }
                         } }
                     } } }
                 }
@@ -225,18 +225,18 @@ impl Comparison {
     }
 
     fn draw(&self, width: f64, all: &[Figures]) -> Markup {
-        let errors: Vec<Series> =
-            all.iter().map(|found| found.course.iter().copied().collect()).collect();
-        let beads: Vec<Series> =
+        let errors: Vec<Curve> =
+            all.iter().map(|found| found.error_profile.iter().copied().collect()).collect();
+        let beads: Vec<Curve> =
             all.iter().map(|found| found.example.iter().copied().collect()).collect();
-        let Some(range) = errors.iter().find_map(Series::extent) else { return html! {} };
+        let Some(range) = errors.iter().find_map(Curve::extent) else { return html! {} };
         let axis = XAxis::path(range);
         let name = format!("{width} mm");
-        let target = Layer::Level(width, palette::TARGET, name.as_str());
+        let target = PlotLayer::Level(width, palette::TARGET, name.as_str());
         let entries: Vec<(&str, Ink, &str)> = self
             .controllers
             .iter()
-            .zip(palette::CONTENDERS)
+            .zip(palette::CONTROLLERS)
             .map(|(name, ink)| (name.as_str(), ink, ""))
             .collect();
         html! {
@@ -250,12 +250,12 @@ impl Comparison {
 fn curves(
     axis: &XAxis,
     y_title: &str,
-    of: &[Series],
+    of: &[Curve],
     shown: &[f64],
-    level: Option<Layer<'_>>,
+    level: Option<PlotLayer<'_>>,
 ) -> Markup {
-    let all: Vec<&Series> = of.iter().collect();
-    let curves = of.iter().zip(palette::CONTENDERS).map(|(one, ink)| Layer::Curve(one, ink));
+    let all: Vec<&Curve> = of.iter().collect();
+    let curves = of.iter().zip(palette::CONTROLLERS).map(|(one, ink)| PlotLayer::Curve(one, ink));
     let plot = Plot {
         area: Area::wide(240.0),
         x: axis,
@@ -272,9 +272,9 @@ mod tests {
 
     #[test]
     fn a_controller_that_mostly_never_settles_says_so() {
-        let never = Estimate { mean: None, confidence: None, median: None };
-        assert_eq!(told(&never, Told::Median), "never");
-        let some = Estimate { mean: Some(0.1), confidence: Some(0.02), median: Some(0.09) };
-        assert_eq!(told(&some, Told::Mean), "0.100 ± 0.020");
+        let never = SeedStatistics { mean: None, confidence: None, median: None };
+        assert_eq!(average(&never, Average::Median), "never");
+        let some = SeedStatistics { mean: Some(0.1), confidence: Some(0.02), median: Some(0.09) };
+        assert_eq!(average(&some, Average::Mean), "0.100 ± 0.020");
     }
 }

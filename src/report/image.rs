@@ -95,7 +95,7 @@ impl Snapshot {
 
     /// From raw image pixels to pixels of the drawing. The borders of the
     /// pixels fall together, not their centres.
-    fn place(&self, point: ImagePoint, enlarge: f64) -> (f64, f64) {
+    fn position(&self, point: ImagePoint, enlarge: f64) -> (f64, f64) {
         let scale = self.scale * enlarge;
         let along = |value: f64, corner: usize| (value + 0.5 - as_f64(corner)) * scale - 0.5;
         (along(point.x, self.corner.0), along(point.y, self.corner.1))
@@ -104,11 +104,11 @@ impl Snapshot {
     fn draw_gauge(&self, canvas: &mut Canvas, enlarge: f64) {
         let (left, top) = (as_f64(self.roi.x) - 0.5, as_f64(self.roi.y) - 0.5);
         let (right, bottom) = (left + as_f64(self.roi.width), top + as_f64(self.roi.height));
-        let colour = if self.outcome.is_ok() { GAUGE.light } else { REJECTED.light };
+        let ink = if self.outcome.is_ok() { GAUGE.light } else { REJECTED.light };
         let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
-            .map(|(x, y)| self.place(ImagePoint::new(x, y), enlarge));
+            .map(|(x, y)| self.position(ImagePoint::new(x, y), enlarge));
         for pair in corners.windows(2) {
-            canvas.dashes(pair[0], pair[1], 1.4, colour);
+            canvas.dashes(pair[0], pair[1], 1.4, ink);
         }
     }
 
@@ -116,12 +116,12 @@ impl Snapshot {
         let radius = (self.scale * enlarge * 0.8).clamp(2.0, 3.2);
         for (points, ink) in [(&self.left, LEFT_EDGE), (&self.right, RIGHT_EDGE)] {
             for point in points {
-                canvas.dot(self.place(*point, enlarge), radius, ink.light);
+                canvas.dot(self.position(*point, enlarge), radius, ink.light);
             }
         }
         let Ok(measured) = &self.outcome else { return };
-        let left = self.place(measured.left, enlarge);
-        let right = self.place(measured.right, enlarge);
+        let left = self.position(measured.left, enlarge);
+        let right = self.position(measured.right, enlarge);
         canvas.line(left, right, 2.6, BLACK);
         canvas.line(left, right, 1.3, WHITE);
         for (end, ink) in [(left, LEFT_EDGE), (right, RIGHT_EDGE)] {
@@ -154,10 +154,10 @@ fn surroundings(roi: Roi, (width, height): (usize, usize)) -> ((usize, usize), (
     if w == 0 || h == 0 { ((0, 0), (width, height)) } else { ((x, y), (w, h)) }
 }
 
-type Cut = ((usize, usize), (usize, usize));
+type CutOut = ((usize, usize), (usize, usize));
 
 /// Cuts out a part and makes it smaller if it is too large; tells the scale.
-fn cut_out(frame: &Frame, ((x, y), (width, height)): Cut) -> (image::GrayImage, f64) {
+fn cut_out(frame: &Frame, ((x, y), (width, height)): CutOut) -> (image::GrayImage, f64) {
     let grey = frame.to_grey8();
     let rows = grey.chunks_exact(frame.width()).skip(y).take(height);
     let pixels: Vec<u8> = rows.flat_map(|row| &row[x..x + width]).copied().collect();

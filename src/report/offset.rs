@@ -4,39 +4,43 @@
 use crate::control::event::Event;
 use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
-use crate::identify::camera_offset::Width;
-use crate::io::recording::{Entry, RecordingError};
+use crate::identify::camera_offset::MeasuredWidth;
+use crate::io::recording::{RecordedEntry, RecordingError};
 
 /// A bead as it was recorded.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Print {
+pub struct RecordedBead {
     /// What the robot reported, when it arrived.
     pub states: Vec<(Stamp, RobotState)>,
     /// Widths that were measured.
-    pub widths: Vec<Width>,
+    pub widths: Vec<MeasuredWidth>,
     /// Frames that gave none.
-    pub refused: u64,
+    pub rejected: u64,
 }
 
 /// Reads a recording to its end. Fails where it cannot be read on.
-pub fn print(
-    entries: impl IntoIterator<Item = Result<Entry, RecordingError>>,
-) -> Result<Print, RecordingError> {
-    let mut print = Print::default();
+pub fn recorded_bead(
+    entries: impl IntoIterator<Item = Result<RecordedEntry, RecordingError>>,
+) -> Result<RecordedBead, RecordingError> {
+    let mut bead = RecordedBead::default();
     for entry in entries {
-        let Entry::Event { now, event, .. } = entry? else { continue };
+        let RecordedEntry::Event { now, event, .. } = entry? else { continue };
         match event {
-            Event::Robot(state) => print.states.push((now, state)),
+            Event::Robot(state) => bead.states.push((now, state)),
             Event::Measured { captured_at, width_mm, sigma_mm, .. } => {
-                print.widths.push(Width { at: captured_at, width: width_mm, sigma: sigma_mm });
+                bead.widths.push(MeasuredWidth {
+                    at: captured_at,
+                    width: width_mm,
+                    sigma: sigma_mm,
+                });
             }
-            Event::Rejected { .. } => print.refused += 1,
+            Event::Rejected { .. } => bead.rejected += 1,
             _ => {}
         }
     }
     // Time goes by capture, whatever came in between.
-    print.widths.sort_by_key(|width| width.at);
-    Ok(print)
+    bead.widths.sort_by_key(|width| width.at);
+    Ok(bead)
 }
 
 #[cfg(test)]
@@ -50,13 +54,13 @@ mod tests {
             let captured_at = Stamp::from_ns(ms * 1_000_000);
             let (width_mm, sigma_mm) = (Mm::constant(40.0), Mm::constant(0.1));
             let event = Event::Measured { frame: n, captured_at, width_mm, sigma_mm };
-            Ok(Entry::Event { n, now: captured_at, event })
+            Ok(RecordedEntry::Event { n, now: captured_at, event })
         };
         let refused =
             Event::Rejected { frame: 2, captured_at: Stamp::START, reason: "no_pair".into() };
-        let refused = Ok(Entry::Event { n: 2, now: Stamp::START, event: refused });
-        let print = print([measured(0, 40), measured(1, 20), refused]).unwrap();
-        let times: Vec<u64> = print.widths.iter().map(|width| width.at.ns() / 1_000_000).collect();
-        assert_eq!((times, print.refused), (vec![20, 40], 1));
+        let refused = Ok(RecordedEntry::Event { n: 2, now: Stamp::START, event: refused });
+        let bead = recorded_bead([measured(0, 40), measured(1, 20), refused]).unwrap();
+        let times: Vec<u64> = bead.widths.iter().map(|width| width.at.ns() / 1_000_000).collect();
+        assert_eq!((times, bead.rejected), (vec![20, 40], 1));
     }
 }

@@ -4,23 +4,23 @@
 use super::image::Snapshot;
 use crate::core::frame::Frame;
 use crate::rows::frame_row::FrameRow;
-use crate::rows::names::spoken;
+use crate::rows::names::in_words;
 use crate::vision::{Edges, Gauge};
 
 /// Most pictures in a report.
-const PICTURES: usize = 12;
+const MAX_FRAMES: usize = 12;
 /// Refused frames among them, each for another reason.
-const REFUSED: usize = 4;
+const MAX_REJECTED_FRAMES: usize = 4;
 /// Snapshots of the spread that are kept before every second is let go.
-const SPREAD: usize = 16;
+const MAX_SPREAD_FRAMES: usize = 16;
 /// A frame replaces the least sure one only if it is clearly less sure, so
 /// that a slow drift does not copy every frame.
-const CLEARLY: f64 = 1.05;
+const MIN_SIGMA_RATIO: f64 = 1.05;
 const JPEG_QUALITY: u8 = 82;
 
 /// A frame of the report.
 #[derive(Debug, Clone)]
-pub struct Chosen {
+pub struct ChosenFrame {
     /// Its number.
     pub frame: u64,
     /// What it shows.
@@ -31,7 +31,7 @@ pub struct Chosen {
 
 /// A snapshot with its time and why it was kept.
 #[derive(Debug, Clone)]
-struct Kept {
+struct KeptSnapshot {
     snapshot: Snapshot,
     time_s: Option<f64>,
     why: &'static str,
@@ -41,10 +41,10 @@ struct Kept {
 #[derive(Debug)]
 pub struct FramePicker {
     gauge: Gauge,
-    first: Option<Kept>,
-    least_sure: Option<(f64, Kept)>,
-    refused: Vec<Kept>,
-    spread: Vec<Kept>,
+    first: Option<KeptSnapshot>,
+    largest_sigma: Option<(f64, KeptSnapshot)>,
+    rejected: Vec<KeptSnapshot>,
+    spread: Vec<KeptSnapshot>,
     stride: u64,
     measured: u64,
 }
@@ -55,8 +55,8 @@ impl FramePicker {
         Self {
             gauge,
             first: None,
-            least_sure: None,
-            refused: Vec::new(),
+            largest_sigma: None,
+            rejected: Vec::new(),
             spread: Vec::new(),
             stride: 1,
             measured: 0,
@@ -66,16 +66,16 @@ impl FramePicker {
     /// A frame that was looked at; most are let go at once.
     pub fn offer(&mut self, row: &FrameRow, frame: &Frame, edges: Option<Edges<'_>>) {
         let gauge = self.gauge;
-        let keep = |why| Kept {
+        let keep = |why| KeptSnapshot {
             snapshot: Snapshot::take(frame, &gauge, edges, row.outcome),
             time_s: row.time_s,
             why,
         };
         let measured = match &row.outcome {
             Err(status) => {
-                let known = self.refused.iter().any(|kept| kept.snapshot.outcome == Err(*status));
-                if self.refused.len() < REFUSED && !known {
-                    self.refused.push(keep("refused"));
+                let known = self.rejected.iter().any(|kept| kept.snapshot.outcome == Err(*status));
+                if self.rejected.len() < MAX_REJECTED_FRAMES && !known {
+                    self.rejected.push(keep("refused"));
                 }
                 return;
             }
@@ -85,14 +85,14 @@ impl FramePicker {
             self.first = Some(keep("first"));
         }
         let sigma = measured.sigma.get();
-        if self.least_sure.as_ref().is_none_or(|(most, _)| sigma > most * CLEARLY) {
-            self.least_sure = Some((sigma, keep("least sure")));
+        if self.largest_sigma.as_ref().is_none_or(|(most, _)| sigma > most * MIN_SIGMA_RATIO) {
+            self.largest_sigma = Some((sigma, keep("least sure")));
         }
         if self.measured.is_multiple_of(self.stride) {
             self.spread.push(keep(""));
         }
         self.measured += 1;
-        if self.spread.len() > SPREAD {
+        if self.spread.len() > MAX_SPREAD_FRAMES {
             let mut index = 0;
             self.spread.retain(|_| {
                 index += 1;
@@ -103,14 +103,14 @@ impl FramePicker {
     }
 
     /// The chosen frames in their order, drawn.
-    pub fn finish(self) -> Vec<Chosen> {
-        let mut chosen: Vec<Kept> = self.refused;
+    pub fn finish(self) -> Vec<ChosenFrame> {
+        let mut chosen: Vec<KeptSnapshot> = self.rejected;
         chosen.extend(self.first);
-        let least_sure = self.least_sure.map(|(_, kept)| kept);
+        let least_sure = self.largest_sigma.map(|(_, kept)| kept);
         if let Some(kept) = least_sure.filter(|kept| is_new(&chosen, kept)) {
             chosen.push(kept);
         }
-        let room = PICTURES.saturating_sub(chosen.len());
+        let room = MAX_FRAMES.saturating_sub(chosen.len());
         let mut spread = self.spread;
         spread.retain(|kept| is_new(&chosen, kept));
         for index in evenly(spread.len(), room) {
@@ -122,7 +122,7 @@ impl FramePicker {
 }
 
 /// A frame is not shown twice.
-fn is_new(chosen: &[Kept], kept: &Kept) -> bool {
+fn is_new(chosen: &[KeptSnapshot], kept: &KeptSnapshot) -> bool {
     chosen.iter().all(|other| other.snapshot.frame != kept.snapshot.frame)
 }
 
@@ -132,7 +132,7 @@ fn evenly(count: usize, wanted: usize) -> Vec<usize> {
     (1..=wanted).map(|part| part * count / wanted - 1).collect()
 }
 
-fn draw(kept: &Kept) -> Option<Chosen> {
+fn draw(kept: &KeptSnapshot) -> Option<ChosenFrame> {
     let mut parts = Vec::new();
     if let Some(time_s) = kept.time_s {
         parts.push(format!("{time_s:.2} s"));
@@ -141,12 +141,12 @@ fn draw(kept: &Kept) -> Option<Chosen> {
         Ok(measured) => {
             parts.push(format!("{:.3} ± {:.3} mm", measured.width.get(), measured.sigma.get()));
         }
-        Err(status) => parts.push(format!("refused: {}", spoken(status))),
+        Err(status) => parts.push(format!("refused: {}", in_words(status))),
     }
     if kept.snapshot.outcome.is_ok() && !kept.why.is_empty() {
         parts.push(kept.why.to_string());
     }
-    Some(Chosen {
+    Some(ChosenFrame {
         frame: kept.snapshot.frame,
         caption: parts.join(" · "),
         jpeg: kept.snapshot.jpeg(JPEG_QUALITY)?,
@@ -162,14 +162,14 @@ mod tests {
     use crate::core::units::Mm;
     use crate::core::units::WidthRange;
     use crate::rows::frame_row::sample;
-    use crate::vision::{Axis, Polarity};
+    use crate::vision::{BeadAxis, Polarity};
 
     fn picker() -> FramePicker {
         FramePicker::new(Gauge {
             calipers: 8,
             ..Gauge::new(
                 Roi { x: 4, y: 4, width: 24, height: 16 },
-                Axis::Vertical,
+                BeadAxis::Vertical,
                 Polarity::Any,
                 WidthRange { min: Mm::constant(1.0), max: Mm::constant(100.0) },
             )
@@ -202,10 +202,10 @@ mod tests {
             };
             offer(&mut picker, seq, outcome);
         }
-        assert!(picker.spread.len() <= SPREAD);
+        assert!(picker.spread.len() <= MAX_SPREAD_FRAMES);
         let chosen = picker.finish();
         let frames: Vec<u64> = chosen.iter().map(|chosen| chosen.frame).collect();
-        assert!(frames.len() <= PICTURES && frames.len() >= 8, "{frames:?}");
+        assert!(frames.len() <= MAX_FRAMES && frames.len() >= 8, "{frames:?}");
         for frame in [0, 700, 1234, 1500] {
             assert!(frames.contains(&frame), "{frames:?}");
         }

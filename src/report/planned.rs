@@ -8,7 +8,7 @@ pub use page::page;
 pub use table::to_csv;
 
 use crate::core::quantity::Unit;
-use crate::plan::{Foretold, Plan, SpeedProfile};
+use crate::plan::{Plan, SpeedProfile, WidthPrediction};
 
 /// A bead of a job, planned.
 #[derive(Debug)]
@@ -22,16 +22,16 @@ pub struct PlannedBead {
     /// The plan, with commands that count from [`Facts::idle`].
     pub plan: Plan,
     /// What comes of it.
-    pub planned: Foretold,
+    pub planned: WidthPrediction,
     /// What comes of the nominal speed with a constant command.
-    pub constant: Foretold,
+    pub constant: WidthPrediction,
     /// What comes of it with a command in proportion to the speed.
-    pub proportional: Foretold,
+    pub proportional: WidthPrediction,
 }
 
 /// What is the same for all beads.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Facts {
+pub struct PlanFacts {
     /// Width that is wanted \[mm\].
     pub width_mm: f64,
     /// Section that is wanted \[mm²\].
@@ -52,7 +52,7 @@ impl PlannedBead {
 /// Root mean square of the width's error over beads, as a share of the width.
 pub fn rms<'a>(
     beads: impl IntoIterator<Item = &'a PlannedBead>,
-    of: fn(&PlannedBead) -> &Foretold,
+    of: fn(&PlannedBead) -> &WidthPrediction,
 ) -> f64 {
     let all = beads.into_iter().flat_map(|bead| of(bead).width.iter());
     let (sum, count) =

@@ -59,7 +59,7 @@ pub struct TooLarge {
 /// What is printed: black rectangles and lines of words, from the paper's upper left
 /// corner \[mm\].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sheet {
+pub struct BoardSheet {
     paper: Paper,
     title: String,
     /// x, y, width, height.
@@ -68,7 +68,7 @@ pub struct Sheet {
     words: Vec<(f64, f64, String)>,
 }
 
-impl Sheet {
+impl BoardSheet {
     /// Lays a board out in the middle of the paper, with a bar to check its size with.
     #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
     pub fn of(board: &Board, paper: Paper) -> Result<Self, TooLarge> {
@@ -193,14 +193,14 @@ impl Sheet {
 /// hair line shows between them.
 #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
 fn markers(board: &Board, (left, top): (f64, f64)) -> Vec<[f64; 4]> {
-    let Some(marks) = board.marks() else { return Vec::new() };
+    let Some(marks) = board.markers() else { return Vec::new() };
     let GridSize { columns, rows } = board.corners();
     let square = board.square().get();
     let cell = marks.side.get() / (marks.dictionary.side() + 2) as f64;
     let mut black: Vec<[f64; 4]> = Vec::new();
     for (column, row) in (0..=rows).flat_map(|row| (0..=columns).map(move |column| (column, row))) {
-        let x = left + (column as f64 + board.clear()) * square;
-        let y = top + (row as f64 + board.clear()) * square;
+        let x = left + (column as f64 + board.marker_margin()) * square;
+        let y = top + (row as f64 + board.marker_margin()) * square;
         let mut last = None;
         for (across, down) in board.black_cells(column, row) {
             let is_next = last.is_some_and(|(before, row)| (before + 1, row) == (across, down));
@@ -216,7 +216,7 @@ fn markers(board: &Board, (left, top): (f64, f64)) -> Vec<[f64; 4]> {
 
 /// The options that tell a board's markers.
 fn options(board: &Board) -> String {
-    board.marks().map_or_else(String::new, |marks| {
+    board.markers().map_or_else(String::new, |marks| {
         format!(" --marker-mm {} --dictionary {}", shown(marks.side.get()), marks.dictionary.name())
     })
 }
@@ -262,7 +262,7 @@ fn shown(mm: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::board::Marks;
+    use crate::calibration::board::Markers;
     use crate::calibration::dictionary::Dictionary;
     use crate::core::units::Mm;
 
@@ -274,7 +274,7 @@ mod tests {
 
     #[test]
     fn squares_and_bar_have_their_size() {
-        let sheet = Sheet::of(&board(20.0), A4).unwrap();
+        let sheet = BoardSheet::of(&board(20.0), A4).unwrap();
         let squares: Vec<_> = sheet.black.iter().filter(|r| r[2] == 20.0 && r[3] == 20.0).collect();
         assert_eq!(squares.len(), 35);
         let bar = sheet.black.iter().find(|r| r[2] == 100.0).unwrap();
@@ -290,7 +290,7 @@ mod tests {
 
     #[test]
     fn both_formats_say_what_the_board_is() {
-        let sheet = Sheet::of(&board(12.5), A4).unwrap();
+        let sheet = BoardSheet::of(&board(12.5), A4).unwrap();
         let svg = sheet.svg();
         assert!(svg.contains("width=\"297mm\"") && svg.contains("h12.5v12.5h-12.5z"), "{svg}");
         assert!(svg.contains("--board 9x6 --square-mm 12.5"));
@@ -304,8 +304,8 @@ mod tests {
 
     #[test]
     fn markers_are_drawn_in_the_white_squares() {
-        let marks = Marks { side: Mm::constant(12.0), dictionary: Dictionary::Four };
-        let sheet = Sheet::of(&board(20.0).with_marks(marks).unwrap(), A4).unwrap();
+        let marks = Markers { side: Mm::constant(12.0), dictionary: Dictionary::Four };
+        let sheet = BoardSheet::of(&board(20.0).with_marks(marks).unwrap(), A4).unwrap();
         // The second square of the first row, 20 mm from the left border of the squares,
         // has the first marker: its second row of cells is black, white, black, white,
         // white, black.
@@ -324,7 +324,7 @@ mod tests {
 
     #[test]
     fn a_board_that_does_not_fit_says_what_it_needs() {
-        let said = Sheet::of(&board(30.0), A4).unwrap_err().to_string();
+        let said = BoardSheet::of(&board(30.0), A4).unwrap_err().to_string();
         assert!(said.contains("needs 316 x 250 mm, the paper has 297 x 210 mm"), "{said}");
     }
 }

@@ -21,10 +21,10 @@ use crate::core::units::{Mm, MmPerS, MmPerS2};
 use crate::report::run::RunPage;
 use crate::rows::frame_row::{ControlColumns, FrameRow, sample};
 use crate::rows::log::{ControlFacts, LogOptions};
-use crate::rows::summary::{Note, Summary};
-use crate::vision::{Axis, Edges, Gauge, Polarity, WidthMeasurement};
-use crate::width_control::limiter::Limit;
-use crate::width_control::limiter::Limits;
+use crate::rows::summary::{RunNote, Summary};
+use crate::vision::{BeadAxis, Edges, Gauge, Polarity, WidthMeasurement};
+use crate::width_control::limiter::SpeedLimit;
+use crate::width_control::limiter::SpeedLimits;
 
 const SIZE: (usize, usize) = (720, 540);
 const MM_PER_PX: f64 = 0.126_582;
@@ -33,7 +33,7 @@ const MM_BEHIND: f64 = 88.4;
 pub fn gauge() -> Gauge {
     Gauge::new(
         Roi { x: 100, y: 60, width: 520, height: 420 },
-        Axis::Vertical,
+        BeadAxis::Vertical,
         Polarity::Bright,
         WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
     )
@@ -43,16 +43,16 @@ pub fn options(folder: &Path, title: &str, with_control: bool) -> LogOptions {
     LogOptions {
         folder: folder.to_path_buf(),
         title: title.to_string(),
-        about: vec![
+        header: vec![
             ("camera".to_string(), "rendered, 50 Hz, 720 × 540 px".to_string()),
             ("robot".to_string(), "127.0.0.1:5653".to_string()),
             ("calibration".to_string(), "0.126582 mm/px".to_string()),
         ],
         gauge: gauge(),
         target: with_control.then_some(Mm::constant(42.0)),
-        max_rejected_share: 0.05,
+        max_rejected_fraction: 0.05,
         control: with_control.then_some(ControlFacts {
-            limits: Limits {
+            limits: SpeedLimits {
                 min_speed: MmPerS::constant(60.0),
                 max_speed: MmPerS::constant(150.0),
                 max_accel: MmPerS2::constant(2000.0),
@@ -139,7 +139,7 @@ fn measured(frame: u64, width: f64) -> WidthMeasurement {
     measured.hints.contrast_grey = 110.0 + 3.0 * chance(frame + 7) - frame as f64 * 0.01;
     measured.hints.blur_px = 1.2 + 0.05 * chance(frame + 8);
     measured.hints.noise_grey = 2.1 + 0.1 * chance(frame + 9);
-    measured.hints.saturated_share = 0.002 * (1.0 + chance(frame + 10));
+    measured.hints.saturated_fraction = 0.002 * (1.0 + chance(frame + 10));
     measured
 }
 
@@ -156,8 +156,8 @@ fn robot(time: f64, path: f64) -> Event {
 
 fn setpoint(time: f64) -> Step {
     let speed = MmPerS::new(speed_at(time)).unwrap();
-    let limit = if speed.get() <= 60.0 { Limit::MinSpeed } else { Limit::None };
-    let wish = MmPerS::new(speed.get() - if limit == Limit::None { 0.3 } else { 9.0 }).ok();
+    let limit = if speed.get() <= 60.0 { SpeedLimit::MinSpeed } else { SpeedLimit::None };
+    let wish = MmPerS::new(speed.get() - if limit == SpeedLimit::None { 0.3 } else { 9.0 }).ok();
     let moving = !matches!(state_at(time), State::Idle | State::Fault(_));
     Step {
         command: moving.then_some(Command::Speed(speed)),
@@ -181,19 +181,19 @@ pub fn run(folder: &Path) -> Summary {
         log.step(now, &robot(time, path), &step);
         if frame.is_multiple_of(10) {
             log.step(now, &Event::Tick, &setpoint(time));
-            log.note(&Note::SetpointSent);
+            log.note(&RunNote::SetpointSent);
             log.latency(1.1 + 0.5 * chance(frame).powi(3) + 0.4 * chance(frame + 1), 80.0);
         }
         let width = width_at(time) + 0.06 * chance(frame + 3);
         let outcome = refused_at(frame, time).map_or(Ok(measured(frame, width)), Err);
         let control = ControlColumns {
             bead_expected: true,
-            bead_path: Mm::new(path - MM_BEHIND).ok().filter(|path| *path >= Mm::ZERO),
+            measured_path: Mm::new(path - MM_BEHIND).ok().filter(|path| *path >= Mm::ZERO),
             nozzle_path: Mm::new(path).ok(),
             speed: MmPerS::new(speed_at(time)).ok(),
             setpoint: None,
             state: state_at(time).name(),
-            limit: Limit::None,
+            limit: SpeedLimit::None,
             target: Some(Mm::constant(42.0)),
         };
         let row = FrameRow {
@@ -249,12 +249,12 @@ pub fn hours(folder: &Path) -> Summary {
         let outcome = if lost { Err("no_pair") } else { Ok(measured(frame, width)) };
         let control = ControlColumns {
             bead_expected: true,
-            bead_path: Mm::new(path - MM_BEHIND).ok(),
+            measured_path: Mm::new(path - MM_BEHIND).ok(),
             nozzle_path: Mm::new(path).ok(),
             speed: MmPerS::new(80.0).ok(),
             setpoint: MmPerS::new(80.0).ok(),
             state: "tracking",
-            limit: Limit::None,
+            limit: SpeedLimit::None,
             target: Some(Mm::constant(42.0)),
         };
         let row = FrameRow {

@@ -7,22 +7,22 @@ mod text;
 use crate::cell::Cell;
 use crate::cell::file::RunPart;
 use crate::identify::camera_offset::SpeedRange;
-use crate::sim::cell::SimError;
-use crate::tune::candidate::Candidate;
+use crate::sim::cell::SimCellError;
+use crate::tune::candidate::ControllerCandidate;
 use crate::tune::noise::Drift;
-use crate::tune::predict::{Prediction, SEEDS, World};
-use crate::tune::propose::{Proposal, propose, worst};
+use crate::tune::predict::{BeadPrediction, SEEDS, TestCell};
+use crate::tune::propose::{Proposal, propose, slowest_loop};
 use crate::tune::stability::{LoopMargins, LoopPlant};
-use crate::tune::{Log, Plant};
-use crate::width_control::limiter::Limits;
+use crate::tune::{IdentifiedCell, Log};
+use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::pi::PiGains;
 
 /// Standard deviations from which a setting of the cell counts as wrong.
-const WRONG: f64 = 3.0;
+const PLAUSIBLE_MISMATCH: f64 = 3.0;
 /// Part of the speeds' range that may be left of the robot's answer.
-const UNLIKE: f64 = 0.1;
+const MAX_GAIN_RATIO: f64 = 0.1;
 /// Part of widths that were refused from which the noise is not to be trusted.
-const MANY_REFUSED: f64 = 0.2;
+const MANY_REJECTED: f64 = 0.2;
 
 /// A recording that was looked at, and what follows.
 #[derive(Debug, Clone)]
@@ -34,25 +34,25 @@ pub struct Tuned {
     /// What was recorded.
     pub log: Log,
     /// What was found.
-    pub plant: Plant,
+    pub plant: IdentifiedCell,
     /// What is proposed.
     pub proposal: Proposal,
     /// Width that is asked for \[mm\].
     pub target_mm: f64,
     /// The cell's limits.
-    pub limits: Limits,
+    pub limits: SpeedLimits,
     /// The cell's distance of the camera and its standard deviation now \[mm\].
-    pub offset_now_mm: (f64, f64),
+    pub present_offset_mm: (f64, f64),
     /// The cell's PI gains now, on the error in mm, with their margins at the worst
     /// speed.
-    pub gains_now: Option<(PiGains, Option<LoopMargins>)>,
+    pub present_gains: Option<(PiGains, Option<LoopMargins>)>,
     /// The loop at the speed at which the target is laid.
     pub usual: LoopPlant,
     /// What the laws would do: as it is now where it holds a width, the proposed PI,
     /// the proposed law by distance.
-    pub predictions: Vec<Prediction>,
+    pub predictions: Vec<BeadPrediction>,
     /// The law by distance as proposed, and told wrong.
-    pub misled: Vec<Prediction>,
+    pub mismatched: Vec<BeadPrediction>,
     /// Band within which a bead counts as settled \[mm\].
     pub band_mm: f64,
     /// Where the flow steps in the simulated beads \[mm\].
@@ -66,20 +66,21 @@ impl Tuned {
         recording: String,
         cell_name: String,
         log: Log,
-        plant: Plant,
+        plant: IdentifiedCell,
         cell: &Cell,
         run: &RunPart,
-    ) -> Result<Self, SimError> {
+    ) -> Result<Self, SimCellError> {
         let target_mm = run.control.target.nominal().get();
         let proposal = propose(&plant, run);
-        let world = World::new(cell, run, &plant);
-        let now = Candidate::now(run);
-        let laws =
-            now.into_iter().chain([Candidate::pi(&proposal), Candidate::distance(&proposal)]);
+        let world = TestCell::new(cell, run, &plant);
+        let now = ControllerCandidate::now(run);
+        let laws = now
+            .into_iter()
+            .chain([ControllerCandidate::pi(&proposal), ControllerCandidate::distance(&proposal)]);
         let predictions = laws.map(|who| world.predict(&who)).collect::<Result<_, _>>()?;
-        let misled = Candidate::misled(&proposal);
+        let misled = ControllerCandidate::mismatched(&proposal);
         let misled = misled.iter().map(|who| world.predict(who)).collect::<Result<_, _>>()?;
-        let at = worst(&plant, target_mm, &run.limits);
+        let at = slowest_loop(&plant, target_mm, &run.limits);
         Ok(Self {
             recording,
             cell: cell_name,
@@ -87,11 +88,11 @@ impl Tuned {
             proposal,
             target_mm,
             limits: run.limits,
-            offset_now_mm: (run.camera.offset.get(), run.camera.offset_sigma.get()),
+            present_offset_mm: (run.camera.offset.get(), run.camera.offset_sigma.get()),
             usual: LoopPlant::at(&plant, target_mm, speed_within(&plant, target_mm, &run.limits)),
-            gains_now: run.control.gains.map(|gains| (gains, at.margins(gains))),
+            present_gains: run.control.gains.map(|gains| (gains, at.margins(gains))),
             predictions,
-            misled,
+            mismatched: misled,
             band_mm: world.band_mm,
             step_at_mm: world.step_at_mm,
             plant,
@@ -136,7 +137,7 @@ impl Tuned {
         let all = self.log.refused + self.log.widths.len() as u64;
         #[expect(clippy::cast_precision_loss, reason = "counts of frames")]
         let share = self.log.refused as f64 / all.max(1) as f64;
-        if share > MANY_REFUSED {
+        if share > MANY_REJECTED {
             warnings.push(format!(
                 "{:.0} % of the frames gave no width; see why with truebead process",
                 100.0 * share
@@ -146,9 +147,9 @@ impl Tuned {
     }
 
     fn gains_warning(&self) -> Option<String> {
-        let (_, margins) = self.gains_now.as_ref()?;
+        let (_, margins) = self.present_gains.as_ref()?;
         let margins = (*margins)?;
-        if margins.are_enough() {
+        if margins.are_sufficient() {
             return None;
         }
         let at = self.proposal.pi.at.speed_mm_per_s;
@@ -165,21 +166,21 @@ impl Tuned {
 
     fn robot_warning(&self) -> Option<String> {
         let robot = self.plant.robot.ok()?;
-        let SpeedRange { min: from, max: to } = self.plant.study.found.speeds;
-        (robot.left_mm_per_s > UNLIKE * (to - from).get()).then(|| {
+        let SpeedRange { min: from, max: to } = self.plant.study.estimate.speeds;
+        (robot.residual_mm_per_s > MAX_GAIN_RATIO * (to - from).get()).then(|| {
             format!(
                 "the robot answers otherwise than by a dead time, a lag and a largest slope: {:.1} \
                  mm/s RMS are left of its reported speed; what is foretold is not to be trusted",
-                robot.left_mm_per_s
+                robot.residual_mm_per_s
             )
         })
     }
 
     fn offset_warning(&self) -> Option<String> {
-        let (now, sigma) = self.offset_now_mm;
+        let (now, sigma) = self.present_offset_mm;
         let found = self.plant.offset_mm;
         let off = (now - found.value).abs();
-        (off > WRONG * found.sigma.hypot(sigma))
+        (off > PLAUSIBLE_MISMATCH * found.sigma.hypot(sigma))
             .then(|| format!("the cell has offset_mm = {now}, {off:.1} mm from what was found"))
     }
 
@@ -207,8 +208,8 @@ impl Tuned {
 
     /// The drift in words.
     fn drift_words(&self) -> String {
-        match self.plant.scatter.drift {
-            Drift::Found { per_root_m, low, high } => format!(
+        match self.plant.width_noise.drift {
+            Drift::Estimated { per_root_m, low, high } => format!(
                 "{:.2} % along a metre ({:.2} to {:.2} %)",
                 100.0 * per_root_m,
                 100.0 * low,
@@ -222,7 +223,7 @@ impl Tuned {
 }
 
 /// Speed at which the target is laid, within limits \[mm/s\].
-fn speed_within(plant: &Plant, target_mm: f64, limits: &Limits) -> f64 {
+fn speed_within(plant: &IdentifiedCell, target_mm: f64, limits: &SpeedLimits) -> f64 {
     let (min, max) = (limits.min_speed.get().max(1.0), limits.max_speed.get());
     plant.speed_for(target_mm).max(min).min(max)
 }

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use super::output::{LogError, Partial};
 use super::widths::decimals;
-use crate::vision::{Caliper, EdgePlace};
+use crate::vision::{Caliper, CaliperPoint};
 
 /// Columns of the file.
-pub const COLUMNS: [&str; 8] = [
+pub const EDGE_COLUMNS: [&str; 8] = [
     "frame",
     "caliper",
     "left_x_px",
@@ -32,7 +32,7 @@ impl EdgesWriter {
         let partial = Partial::create(folder, "edges.csv")?;
         let mut writer =
             Self { csv: csv::Writer::from_writer(partial), path: folder.join("edges.csv.partial") };
-        let written = writer.csv.write_record(COLUMNS);
+        let written = writer.csv.write_record(EDGE_COLUMNS);
         written.map_err(|error| writer.error(error.into()))?;
         Ok(writer)
     }
@@ -44,7 +44,7 @@ impl EdgesWriter {
         calipers: impl Iterator<Item = Caliper>,
     ) -> Result<(), LogError> {
         for caliper in calipers {
-            let [left, right] = [caliper.left, caliper.right].map(place_fields);
+            let [left, right] = [caliper.left, caliper.right].map(position_fields);
             let numbers = [frame.to_string(), caliper.number.to_string()];
             let written = self.csv.write_record(numbers.iter().chain(&left).chain(&right));
             written.map_err(|error| self.error(error.into()))?;
@@ -69,7 +69,7 @@ impl EdgesWriter {
 }
 
 /// Place and standard deviation of an edge; empty where there is none.
-fn place_fields(place: Option<EdgePlace>) -> [String; 3] {
+fn position_fields(place: Option<CaliperPoint>) -> [String; 3] {
     let x = place.map(|place| place.at.x);
     let y = place.map(|place| place.at.y);
     let sigma = place.and_then(|place| place.sigma_px);
@@ -85,8 +85,8 @@ mod tests {
     fn a_line_has_what_was_found_on_it() {
         let folder = tempfile::tempdir().unwrap();
         let mut writer = EdgesWriter::create(folder.path()).unwrap();
-        let left = EdgePlace { at: ImagePoint::new(100.25, 7.5), sigma_px: Some(0.125) };
-        let right = EdgePlace { at: ImagePoint::new(200.5, 7.5), sigma_px: None };
+        let left = CaliperPoint { at: ImagePoint::new(100.25, 7.5), sigma_px: Some(0.125) };
+        let right = CaliperPoint { at: ImagePoint::new(200.5, 7.5), sigma_px: None };
         let calipers = [
             Caliper { number: 3, left: Some(left), right: Some(right) },
             Caliper { number: 5, left: None, right: Some(right) },

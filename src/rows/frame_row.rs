@@ -3,7 +3,7 @@
 use crate::control::step::Step;
 use crate::core::units::{Mm, MmPerS};
 use crate::vision::{Roughness, WidthMeasurement};
-use crate::width_control::limiter::Limit;
+use crate::width_control::limiter::SpeedLimit;
 
 /// One row of `widths.csv`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +27,7 @@ pub struct FrameRow {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlColumns {
     /// Where along the path the bead in the gauge had been laid.
-    pub bead_path: Option<Mm>,
+    pub measured_path: Option<Mm>,
     /// Whether bead of this run was under the camera; a frame without it is no
     /// loss when it is refused.
     pub bead_expected: bool,
@@ -40,7 +40,7 @@ pub struct ControlColumns {
     /// Name of the controller's state.
     pub state: &'static str,
     /// The limit that acted on the last setpoint.
-    pub limit: Limit,
+    pub limit: SpeedLimit,
     /// Width that was asked for where that bead was laid.
     pub target: Option<Mm>,
 }
@@ -56,7 +56,7 @@ impl ControlColumns {
     ) -> Self {
         let trace = &step.trace;
         Self {
-            bead_path: trace.bead_path_mm,
+            measured_path: trace.bead_path_mm,
             bead_expected: trace.bead_expected,
             nozzle_path: trace.nozzle_path_mm,
             speed,
@@ -97,8 +97,8 @@ pub mod sample {
                 contrast_grey: 120.0,
                 blur_px: 1.5,
                 noise_grey: 2.0,
-                saturated_share: 0.01,
-                used_share: 0.98,
+                saturated_fraction: 0.01,
+                used_fraction: 0.98,
                 skew: None,
             },
         }

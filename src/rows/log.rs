@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::frame_row::FrameRow;
 use super::output::{LogError, make_folder};
-use super::summary::{Note, Summary, SummaryBuilder};
+use super::summary::{RunNote, Summary, SummaryBuilder};
 use super::widths::WidthsWriter;
 use crate::cell::file::RunPart;
 use crate::control::event::Event;
@@ -13,10 +13,10 @@ use crate::control::step::Step;
 use crate::core::frame::Frame;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, Mm3PerS};
-use crate::extruder::{Drive, Law};
+use crate::extruder::{CommandQuantity, ExtruderStrategy};
 use crate::numeric::statistics::Distribution;
 use crate::vision::{Edges, Gauge};
-use crate::width_control::limiter::Limits;
+use crate::width_control::limiter::SpeedLimits;
 
 /// Most remarks that a report lists.
 const MAX_REMARKS: usize = 40;
@@ -29,13 +29,13 @@ pub struct LogOptions {
     /// Title of the report.
     pub title: String,
     /// Names and values under the title: input, cell, calibration and so on.
-    pub about: Vec<(String, String)>,
+    pub header: Vec<(String, String)>,
     /// Where the bead is measured.
     pub gauge: Gauge,
     /// Width that is asked for, if known.
     pub target: Option<Mm>,
     /// Share of refused frames that the cell bears.
-    pub max_rejected_share: f64,
+    pub max_rejected_fraction: f64,
     /// What only a run with a controller has.
     pub control: Option<ControlFacts>,
 }
@@ -44,19 +44,19 @@ pub struct LogOptions {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlFacts {
     /// What setpoints may be.
-    pub limits: Limits,
+    pub limits: SpeedLimits,
     /// What the extruder is told, where it is commanded.
-    pub extruder: Option<Drive>,
+    pub extruder: Option<CommandQuantity>,
     /// How long the profile is that it plays, where it plays one.
     pub profile: Option<Span>,
 }
 
 impl ControlFacts {
     /// Of a cell's run, with the law of its extruder.
-    pub fn of(run: &RunPart, law: Option<&Law>) -> Self {
+    pub fn of(run: &RunPart, controller: Option<&ExtruderStrategy>) -> Self {
         let extruder = run.extruder.as_ref().map(|part| part.extruder.drive);
-        let profile = law.and_then(|law| match law {
-            Law::Profile(played) => Some(played.lasts()),
+        let profile = controller.and_then(|controller| match controller {
+            ExtruderStrategy::Profile(played) => Some(played.lasts()),
             _ => None,
         });
         Self { limits: run.limits, extruder, profile }
@@ -64,7 +64,7 @@ impl ControlFacts {
 }
 
 /// What people look at after a run, fed with the same facts as the rows.
-pub trait Page: std::fmt::Debug + Send {
+pub trait RunObserver: std::fmt::Debug + Send {
     /// A frame that was looked at, with its image and edges where they are at hand.
     fn frame(&mut self, row: &FrameRow, image: Option<(&Frame, Option<Edges<'_>>)>);
 
@@ -75,12 +75,12 @@ pub trait Page: std::fmt::Debug + Send {
     fn flow(&mut self, now: Stamp, flow: Mm3PerS);
 
     /// Writes the page of a run that has ended.
-    fn write(self: Box<Self>, run: &EndedRun<'_>) -> Result<(), LogError>;
+    fn write(self: Box<Self>, run: &FinishedRun<'_>) -> Result<(), LogError>;
 }
 
 /// What is known of a run at its end.
 #[derive(Debug, Clone, Copy)]
-pub struct EndedRun<'a> {
+pub struct FinishedRun<'a> {
     /// What was known before its first frame.
     pub options: &'a LogOptions,
     /// What it came to.
@@ -97,7 +97,7 @@ pub struct RunLog {
     options: LogOptions,
     widths: WidthsWriter,
     summary: SummaryBuilder,
-    page: Box<dyn Page>,
+    page: Box<dyn RunObserver>,
     remarks: Vec<String>,
     /// Reasons for which the extruder refused lines.
     refused: Vec<String>,
@@ -105,7 +105,7 @@ pub struct RunLog {
 
 impl RunLog {
     /// Makes the folder and begins `widths.csv`.
-    pub fn create(options: LogOptions, page: Box<dyn Page>) -> Result<Self, LogError> {
+    pub fn create(options: LogOptions, page: Box<dyn RunObserver>) -> Result<Self, LogError> {
         make_folder(&options.folder)?;
         let with_control = options.control.is_some();
         Ok(Self {
@@ -174,9 +174,9 @@ impl RunLog {
     }
 
     /// Another fact.
-    pub fn note(&mut self, note: &Note) {
+    pub fn note(&mut self, note: &RunNote) {
         self.summary.note(note);
-        if let Note::Remark(text) = note {
+        if let RunNote::Remark(text) = note {
             self.add_remark(text.clone());
         }
     }
@@ -187,7 +187,7 @@ impl RunLog {
         self.widths.finish()?;
         let summary = self.summary.finish();
         summary.write(&self.options.folder)?;
-        self.page.write(&EndedRun {
+        self.page.write(&FinishedRun {
             options: &self.options,
             summary: &summary,
             latencies: self.summary.latencies(),
@@ -249,7 +249,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut log = RunPage::log(synthetic::options(folder.path(), "t", true)).unwrap();
         for index in 0..1000 {
-            log.note(&Note::Remark(format!("remark {index}")));
+            log.note(&RunNote::Remark(format!("remark {index}")));
         }
         assert_eq!(log.remarks.len(), MAX_REMARKS + 1);
     }

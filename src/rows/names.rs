@@ -2,18 +2,18 @@
 
 use crate::control::step::{Fault, Hold};
 use crate::extruder::{CommandLimit, ExtruderFault, ExtruderHold};
-use crate::width_control::limiter::Limit;
+use crate::width_control::limiter::SpeedLimit;
 
 /// Name of a limit in `widths.csv` and `summary.json`.
-pub fn limit(limit: Limit) -> &'static str {
+pub fn limit(limit: SpeedLimit) -> &'static str {
     match limit {
-        Limit::None => "none",
-        Limit::MinSpeed => "min_speed",
-        Limit::MaxSpeed => "max_speed",
-        Limit::Acceleration => "acceleration",
-        Limit::Deceleration => "deceleration",
-        Limit::RobotSlower => "robot_slower",
-        Limit::RobotFaster => "robot_faster",
+        SpeedLimit::None => "none",
+        SpeedLimit::MinSpeed => "min_speed",
+        SpeedLimit::MaxSpeed => "max_speed",
+        SpeedLimit::Acceleration => "acceleration",
+        SpeedLimit::Deceleration => "deceleration",
+        SpeedLimit::RobotSlower => "robot_slower",
+        SpeedLimit::RobotFaster => "robot_faster",
     }
 }
 
@@ -78,11 +78,11 @@ pub const fn command_limit(limit: CommandLimit) -> &'static str {
 }
 
 /// A name as it is shown to people.
-pub fn spoken(name: &str) -> String {
+pub fn in_words(name: &str) -> String {
     if let Some(why) = name.strip_prefix("extruder_") {
-        format!("extruder: {}", spoken(why))
+        format!("extruder: {}", in_words(why))
     } else if let Some(why) = name.strip_prefix("held_too_long_") {
-        format!("held too long: {}", spoken(why))
+        format!("held too long: {}", in_words(why))
     } else {
         name.replace('_', " ")
     }

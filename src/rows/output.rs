@@ -103,7 +103,7 @@ impl Write for Partial {
 /// Writes a file whose content is at hand. A failure leaves nothing behind.
 pub fn write_whole(folder: &Path, name: &str, content: &[u8]) -> Result<PathBuf, LogError> {
     let path = folder.join(name);
-    whole_file::write_whole(&path, content)
+    whole_file::write_atomic(&path, content)
         .map_err(|error| LogError::Write { path: error.path, source: error.what })?;
     Ok(path)
 }

@@ -20,9 +20,9 @@ pub use distance::DistanceSummary;
 use distance::DistanceTally;
 pub use extruder::ExtruderSummary;
 use extruder::ExtruderTally;
-pub use follow::Follower;
-pub use image_quality::HintSummary;
-pub use note::Note;
+pub use follow::StateFollower;
+pub use image_quality::ImageQuality;
+pub use note::RunNote;
 pub use profile::ProfileSummary;
 
 use super::frame_row::FrameRow;
@@ -58,7 +58,7 @@ pub struct Summary {
     #[serde(flatten)]
     pub roughness: RoughnessSummary,
     /// How good the pictures were.
-    pub hints: HintSummary,
+    pub image_quality: ImageQuality,
     /// What could be better about light and lens, in words.
     pub advice: Vec<String>,
     /// From the first moment that is known to the last.
@@ -115,7 +115,7 @@ impl RoughnessSummary {
 impl Summary {
     /// Share of the frames that were refused or unreadable, of those that could
     /// show bead; 0 of none.
-    pub fn rejected_share(&self) -> f64 {
+    pub fn rejected_fraction(&self) -> f64 {
         let frames = self.frames_with_bead();
         if frames == 0 { 0.0 } else { as_f64(frames - self.measured.min(frames)) / as_f64(frames) }
     }
@@ -186,14 +186,14 @@ impl SummaryBuilder {
     /// The same for a run whose extruder plays a profile of this length.
     #[must_use]
     pub fn with_profile(mut self, lasts: Option<Span>) -> Self {
-        self.extruder.plays(lasts);
+        self.extruder.set_profile(lasts);
         self
     }
 
     /// A frame that was looked at.
     pub fn frame(&mut self, row: &FrameRow) {
         self.frames += 1;
-        self.moment(row.time_s);
+        self.cover_time(row.time_s);
         match &row.outcome {
             Err(status) => {
                 *self.rejected.entry(status).or_default() += 1;
@@ -205,8 +205,8 @@ impl SummaryBuilder {
                 self.width.add(measured.width.get());
                 self.sigma.add(measured.sigma.get());
                 self.roughness = row.roughness;
-                self.saturated.add(measured.hints.saturated_share);
-                self.used.add(measured.hints.used_share);
+                self.saturated.add(measured.hints.saturated_fraction);
+                self.used.add(measured.hints.used_fraction);
                 self.contrast.add(measured.hints.contrast_grey);
                 self.blur.add(measured.hints.blur_px);
                 self.noise.add(measured.hints.noise_grey);
@@ -222,7 +222,7 @@ impl SummaryBuilder {
 
     /// A step of the controller.
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
-        self.moment(Some(now.secs()));
+        self.cover_time(Some(now.secs()));
         self.extruder.step(now, event, step);
         self.distance.step(step);
         if let Some(control) = &mut self.control {
@@ -244,7 +244,7 @@ impl SummaryBuilder {
     }
 
     /// Another fact.
-    pub fn note(&mut self, note: &Note) {
+    pub fn note(&mut self, note: &RunNote) {
         if let Some(control) = &mut self.control {
             control.note(note);
         }
@@ -258,7 +258,7 @@ impl SummaryBuilder {
     /// The sum of it all.
     pub fn finish(&self) -> Summary {
         let measured = self.frames - self.rejected.values().sum::<u64>();
-        let hints = self.hints();
+        let hints = self.image_quality();
         Summary {
             frames: self.frames,
             measured,
@@ -269,7 +269,7 @@ impl SummaryBuilder {
             sigma_mean_mm: self.sigma.mean(),
             roughness: self.roughness.map_or_else(Default::default, RoughnessSummary::of),
             advice: advice::advice(&hints),
-            hints,
+            image_quality: hints,
             duration_s: self.first_s.zip(self.last_s).map(|(first, last)| last - first),
             target_width_mm: self.target.map(Mm::get),
             control: self.control.as_ref().map(ControlTally::finish),
@@ -278,19 +278,19 @@ impl SummaryBuilder {
         }
     }
 
-    fn hints(&self) -> HintSummary {
-        HintSummary {
+    fn image_quality(&self) -> ImageQuality {
+        ImageQuality {
             contrast_median_grey: self.contrast.quantile(0.5),
             blur_median_px: self.blur.quantile(0.5),
             noise_median_grey: self.noise.quantile(0.5),
-            saturated_share_mean: self.saturated.mean(),
-            used_share_mean: self.used.mean(),
+            saturated_fraction_mean: self.saturated.mean(),
+            used_fraction_mean: self.used.mean(),
             skew_offset_px: self.skew.mean(),
             skew_offset_sigma_px: self.skew.sigma(),
         }
     }
 
-    fn moment(&mut self, time_s: Option<f64>) {
+    fn cover_time(&mut self, time_s: Option<f64>) {
         if let Some(time_s) = time_s.filter(|time_s| time_s.is_finite()) {
             self.first_s = Some(self.first_s.map_or(time_s, |first| first.min(time_s)));
             self.last_s = Some(self.last_s.map_or(time_s, |last| last.max(time_s)));

@@ -8,7 +8,7 @@ use super::output::{LogError, Partial};
 use crate::vision::{Roughness, WidthMeasurement};
 
 /// Columns of every file; the first nine are promised to other programs.
-pub const COLUMNS: [&str; 17] = [
+pub const WIDTH_COLUMNS: [&str; 17] = [
     "frame",
     "time_s",
     "status",
@@ -67,7 +67,7 @@ impl WidthsWriter {
             flushed_at_s: None,
         };
         let control: &[&str] = if with_control { &CONTROL_COLUMNS } else { &[] };
-        let written = writer.csv.write_record(COLUMNS.iter().chain(control));
+        let written = writer.csv.write_record(WIDTH_COLUMNS.iter().chain(control));
         written.map_err(|error| writer.error(error.into()))?;
         writer.flush()?;
         Ok(writer)
@@ -111,7 +111,7 @@ impl WidthsWriter {
             }
             Err(status) => {
                 self.csv.write_field(status)?;
-                for _ in 3..COLUMNS.len() {
+                for _ in 3..WIDTH_COLUMNS.len() {
                     self.csv.write_field("")?;
                 }
             }
@@ -148,8 +148,8 @@ fn measured_fields(measured: &WidthMeasurement, roughness: Option<Roughness>) ->
         Some(measured.hints.contrast_grey),
         Some(measured.hints.blur_px),
         Some(measured.hints.noise_grey),
-        Some(measured.hints.saturated_share),
-        Some(measured.hints.used_share),
+        Some(measured.hints.saturated_fraction),
+        Some(measured.hints.used_fraction),
     ]
     .map(|value| decimals(value, 6))
 }
@@ -157,7 +157,7 @@ fn measured_fields(measured: &WidthMeasurement, roughness: Option<Roughness>) ->
 fn control_fields(control: Option<&ControlColumns>) -> [String; 7] {
     let Some(control) = control else { return Default::default() };
     [
-        decimals(control.bead_path.map(f64::from), 6),
+        decimals(control.measured_path.map(f64::from), 6),
         decimals(control.nozzle_path.map(f64::from), 6),
         decimals(control.speed.map(f64::from), 6),
         decimals(control.setpoint.map(f64::from), 6),

@@ -20,9 +20,9 @@ pub struct BeadModel {
 
 /// Waviness of a bead's edges.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Roughness {
+pub struct EdgeRoughness {
     /// Standard deviation of the width along the bead \[mm\].
-    pub size_mm: f64,
+    pub sigma_mm: f64,
     /// Length over which it is correlated \[mm\].
     pub length_mm: f64,
 }
@@ -30,7 +30,7 @@ pub struct Roughness {
 impl BeadModel {
     /// Slowest speed that the model is asked about \[mm/s\]; a bead laid at
     /// rest would have no bound.
-    const SLOWEST_MM_PER_S: f64 = 1.0;
+    const MIN_SPEED_MM_PER_S: f64 = 1.0;
 
     /// The plant fitted to tables 1 and 2 of the 2022 paper.
     pub fn fitted_2022() -> Self {
@@ -45,7 +45,7 @@ impl BeadModel {
 
     /// Width of a bead laid at a speed \[mm/s\], at the nominal flow \[mm\].
     pub fn width_at(&self, speed_mm_per_s: f64) -> f64 {
-        let speed = speed_mm_per_s.max(Self::SLOWEST_MM_PER_S);
+        let speed = speed_mm_per_s.max(Self::MIN_SPEED_MM_PER_S);
         let knee = self.slow_below_mm_per_s;
         if speed >= knee {
             self.width_mm * (speed / self.at_speed_mm_per_s).powf(-self.exponent)

@@ -10,11 +10,11 @@ pub struct Flow {
     /// Flow from there on, as a share of the nominal flow.
     pub step_ratio: f64,
     /// Amplitude of a sine, as a share of the nominal flow.
-    pub wave_share: f64,
+    pub wave_amplitude: f64,
     /// Its length along the path \[mm\].
     pub wavelength_mm: f64,
     /// Amplitude of a pulsation over time, as a share of the nominal flow.
-    pub pulse_share: f64,
+    pub pulse_amplitude: f64,
     /// Its period \[s\].
     pub pulse_period_s: f64,
     /// How far it wanders along a metre of path, as a share (standard deviation).
@@ -26,9 +26,9 @@ impl Flow {
     pub const STEADY: Self = Self {
         step_at_mm: 0.0,
         step_ratio: 1.0,
-        wave_share: 0.0,
+        wave_amplitude: 0.0,
         wavelength_mm: 1000.0,
-        pulse_share: 0.0,
+        pulse_amplitude: 0.0,
         pulse_period_s: 1.0,
         drift_per_root_m: 0.0,
     };
@@ -36,13 +36,13 @@ impl Flow {
     /// The pulsation at a time \[s\] with a phase in periods, as a share of the
     /// nominal flow.
     pub fn pulse_at(&self, at_s: f64, phase: f64) -> f64 {
-        1.0 + self.pulse_share * (TAU * (at_s / self.pulse_period_s + phase)).sin()
+        1.0 + self.pulse_amplitude * (TAU * (at_s / self.pulse_period_s + phase)).sin()
     }
 
     /// Flow at a path length, as a share of the nominal flow.
     pub fn ratio_at(&self, path_mm: f64) -> f64 {
         let step = if path_mm >= self.step_at_mm { self.step_ratio } else { 1.0 };
-        step * (1.0 + self.wave_share * (TAU * path_mm / self.wavelength_mm).sin())
+        step * (1.0 + self.wave_amplitude * (TAU * path_mm / self.wavelength_mm).sin())
     }
 }
 
@@ -55,9 +55,9 @@ mod tests {
         let flow = Flow {
             step_at_mm: 100.0,
             step_ratio: 0.92,
-            wave_share: 0.1,
+            wave_amplitude: 0.1,
             wavelength_mm: 400.0,
-            pulse_share: 0.2,
+            pulse_amplitude: 0.2,
             pulse_period_s: 2.0,
             ..Flow::STEADY
         };

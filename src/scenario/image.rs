@@ -2,7 +2,7 @@
 
 /// Light, blur, noise and view of rendered frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Picture {
+pub struct ImageModel {
     /// Columns and rows \[px\]; a calibration file's size goes before it.
     pub size_px: [u32; 2],
     /// Grey level of the bead, of 256; what is above 255 is saturated.
@@ -30,7 +30,7 @@ pub struct Picture {
     /// Path of the bead, where it is not straight.
     pub bend: Bend,
     /// Light that falls on one side.
-    pub shading: Shading,
+    pub shading: EdgeShading,
     /// Specular spots on the bead.
     pub spots: Spots,
     /// Grains on the edges.
@@ -40,15 +40,15 @@ pub struct Picture {
     /// An older bead beside it.
     pub neighbour: Neighbour,
     /// Motion while the shutter is open.
-    pub motion: Motion,
+    pub motion: MotionBlur,
     /// Texture of all that is seen.
-    pub texture: Texture,
+    pub texture: TexturePattern,
 }
 
 /// An edge of the bead, in the order of a gauge: of a horizontal bead, left is
 /// the upper one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+pub enum BeadSide {
     /// The left or upper edge.
     Left,
     /// The right or lower edge.
@@ -72,7 +72,7 @@ pub struct Bend {
 
 /// Grey that changes with the distance from an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shading {
+pub struct EdgeShading {
     /// Change of the bead for each pixel of depth inside the edge \[grey
     /// levels/px\].
     pub bead_grey_per_px: f64,
@@ -83,14 +83,14 @@ pub struct Shading {
     /// Distance from which it is constant \[px\].
     pub ground_px: f64,
     /// The edges.
-    pub side: Side,
+    pub side: BeadSide,
 }
 
 /// Saturated discs on the bead, at random places in each frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spots {
     /// Mean share of the bead's area that they cover.
-    pub share: f64,
+    pub covered_fraction: f64,
     /// Diameter \[px\].
     pub size_px: f64,
 }
@@ -100,7 +100,7 @@ pub struct Spots {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grains {
     /// Share of the rows on which a grain covers the edge, on either edge.
-    pub rows_share: f64,
+    pub rows_fraction: f64,
     /// Diameter \[px\].
     pub size_px: f64,
     /// Grey level, of 256.
@@ -116,9 +116,9 @@ pub struct Shadow {
     pub width_px: f64,
     /// How much darker than the ground it is – brighter beside a dark bead –,
     /// as a share of the bead's contrast; negative for the opposite.
-    pub share: f64,
+    pub contrast_fraction: f64,
     /// The edges.
-    pub side: Side,
+    pub side: BeadSide,
 }
 
 /// An older bead that runs parallel to an edge.
@@ -129,14 +129,14 @@ pub struct Neighbour {
     /// Width \[px\].
     pub width_px: f64,
     /// Its contrast as a share of the bead's.
-    pub share: f64,
+    pub contrast_fraction: f64,
     /// The edges.
-    pub side: Side,
+    pub side: BeadSide,
 }
 
 /// Steady motion of all that is seen while the shutter is open.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motion {
+pub struct MotionBlur {
     /// Length \[px\].
     pub length_px: f64,
     /// Direction against the gauge's axis \[degrees\], counted like the slant.
@@ -146,16 +146,16 @@ pub struct Motion {
 /// A random pattern over the whole picture, new in each frame. Its
 /// autocorrelation at the distance r is exp(−(r/L)²).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Texture {
+pub struct TexturePattern {
     /// Standard deviation \[grey levels of 256\].
-    pub size_grey: f64,
+    pub sigma_grey: f64,
     /// Correlation length L \[px\].
     pub length_px: f64,
 }
 
-impl Picture {
+impl ImageModel {
     /// A picture that nothing disturbs.
-    pub const USUAL: Self = Self {
+    pub const DEFAULT: Self = Self {
         size_px: [720, 540],
         bead_grey: 150.0,
         ground_grey: 70.0,
@@ -167,29 +167,39 @@ impl Picture {
         lateral_mm: 0.0,
         true_surface_height_mm: None,
         bend: Bend { radius_mm: 0.0, corner_deg: 0.0 },
-        shading: Shading {
+        shading: EdgeShading {
             bead_grey_per_px: 0.0,
             bead_px: 30.0,
             ground_grey_per_px: 0.0,
             ground_px: 30.0,
-            side: Side::Left,
+            side: BeadSide::Left,
         },
-        spots: Spots { share: 0.0, size_px: 4.0 },
-        grains: Grains { rows_share: 0.0, size_px: 6.0, grey: 230.0 },
-        shadow: Shadow { distance_px: 0.0, width_px: 20.0, share: 0.7, side: Side::Left },
-        neighbour: Neighbour { gap_px: 0.0, width_px: 100.0, share: 0.6, side: Side::Left },
-        motion: Motion { length_px: 0.0, direction_deg: 0.0 },
-        texture: Texture { size_grey: 0.0, length_px: 4.0 },
+        spots: Spots { covered_fraction: 0.0, size_px: 4.0 },
+        grains: Grains { rows_fraction: 0.0, size_px: 6.0, grey: 230.0 },
+        shadow: Shadow {
+            distance_px: 0.0,
+            width_px: 20.0,
+            contrast_fraction: 0.7,
+            side: BeadSide::Left,
+        },
+        neighbour: Neighbour {
+            gap_px: 0.0,
+            width_px: 100.0,
+            contrast_fraction: 0.6,
+            side: BeadSide::Left,
+        },
+        motion: MotionBlur { length_px: 0.0, direction_deg: 0.0 },
+        texture: TexturePattern { sigma_grey: 0.0, length_px: 4.0 },
     };
 }
 
-impl Default for Picture {
+impl Default for ImageModel {
     fn default() -> Self {
-        Self::USUAL
+        Self::DEFAULT
     }
 }
 
-impl Side {
+impl BeadSide {
     /// Whether the left and the right edge are meant.
     pub fn edges(self) -> [bool; 2] {
         [self != Self::Right, self != Self::Left]

@@ -3,10 +3,11 @@
 //! are the plant fitted to Shojaei Barjuei et al. 2022; nothing here moves a
 //! real robot.
 
-use super::bead::{BeadModel, Roughness};
+use super::bead::{BeadModel, EdgeRoughness};
 use super::disturbance::Flow;
 use super::image::{
-    Bend, Grains, Motion, Neighbour, Picture, Shading, Shadow, Side, Spots, Texture,
+    BeadSide, Bend, EdgeShading, Grains, ImageModel, MotionBlur, Neighbour, Shadow, Spots,
+    TexturePattern,
 };
 use crate::core::time::Span;
 use crate::core::units::Mm;
@@ -14,7 +15,7 @@ use crate::document::Table;
 
 /// How a simulated cell measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Level {
+pub enum WidthSource {
     /// The true width over the gauge, with noise.
     Widths,
     /// Rendered frames, measured like any other.
@@ -27,7 +28,7 @@ pub struct Simulation {
     /// Seed of everything random.
     pub seed: u64,
     /// Frames or widths.
-    pub level: Level,
+    pub width_source: WidthSource,
     /// Length of the bead.
     pub path: Mm,
     /// Path length from one picture to the next where no robot sets it, if the
@@ -49,19 +50,19 @@ pub struct Simulation {
     /// Standard deviation of a measured width, where no frame is rendered.
     pub width_noise: Mm,
     /// Share of the widths that are outliers, where no frame is rendered.
-    pub outlier_share: f64,
+    pub outlier_fraction: f64,
     /// Most by which these are off, as a share of the width.
     pub outlier_size: f64,
     /// Share of the frames that give no width, where none is rendered.
-    pub missing_share: f64,
+    pub missing_fraction: f64,
     /// How wide a bead comes out at a speed.
     pub bead: BeadModel,
     /// How rough its edges are.
-    pub roughness: Roughness,
+    pub roughness: EdgeRoughness,
     /// What the pump does to its flow.
     pub flow: Flow,
     /// How it is pictured.
-    pub picture: Picture,
+    pub image: ImageModel,
 }
 
 /// Reads the three tables; absent keys have their defaults.
@@ -72,10 +73,11 @@ pub fn read(root: &Table<'_>) -> Option<Simulation> {
     let model = read_bead(&bead);
     let roughness = read_roughness(&bead);
     let flow = read_flow(&bead);
-    let picture = read_picture(&render);
+    let picture = read_image(&render);
     let spacing = render.optional_number("frame_spacing_mm", 1e-3..=1e5);
     let seed = world.integer_or("seed", 0..=u64::MAX >> 1, 1);
-    let level = world.choice("level", &[("frames", Level::Frames), ("widths", Level::Widths)]);
+    let level =
+        world.choice("level", &[("frames", WidthSource::Frames), ("widths", WidthSource::Widths)]);
     let path = world.number_or("path_mm", 1.0..=1e7, 2000.0);
     let step_ms = world.number_or("step_ms", 0.1..=1000.0, 20.0);
     let report_ms = world.optional_number("report_ms", 1.0..=1000.0);
@@ -89,7 +91,7 @@ pub fn read(root: &Table<'_>) -> Option<Simulation> {
     let missing = world.number_or("missing_share", 0.0..=1.0, 0.0);
     Some(Simulation {
         seed: seed?,
-        level: level?,
+        width_source: level?,
         path: Mm::new(path?).ok()?,
         frame_spacing: spacing.and_then(|spacing| Mm::new(spacing).ok()),
         step: Span::from_secs(step_ms? / 1e3),
@@ -99,13 +101,13 @@ pub fn read(root: &Table<'_>) -> Option<Simulation> {
         random_phase: random_phase?,
         gauge_length: Mm::new(gauge_length?).ok()?,
         width_noise: Mm::new(noise?).ok()?,
-        outlier_share: outliers?,
+        outlier_fraction: outliers?,
         outlier_size: outlier_size?,
-        missing_share: missing?,
+        missing_fraction: missing?,
         bead: model?,
         roughness: roughness?,
         flow: flow?,
-        picture: picture?,
+        image: picture?,
     })
 }
 
@@ -125,10 +127,10 @@ fn read_bead(table: &Table<'_>) -> Option<BeadModel> {
     })
 }
 
-fn read_roughness(table: &Table<'_>) -> Option<Roughness> {
+fn read_roughness(table: &Table<'_>) -> Option<EdgeRoughness> {
     let size = table.number_or("roughness_mm", 0.0..=10.0, 0.1);
     let length = table.number_or("roughness_length_mm", 0.1..=1e3, 5.0);
-    Some(Roughness { size_mm: size?, length_mm: length? })
+    Some(EdgeRoughness { sigma_mm: size?, length_mm: length? })
 }
 
 fn read_flow(table: &Table<'_>) -> Option<Flow> {
@@ -143,15 +145,15 @@ fn read_flow(table: &Table<'_>) -> Option<Flow> {
         drift_per_root_m: drift?,
         step_at_mm: step_at?,
         step_ratio: step_ratio?,
-        wave_share: wave?,
+        wave_amplitude: wave?,
         wavelength_mm: wavelength?,
-        pulse_share: pulse?,
+        pulse_amplitude: pulse?,
         pulse_period_s: period?,
     })
 }
 
-fn read_picture(table: &Table<'_>) -> Option<Picture> {
-    let usual = Picture::USUAL;
+fn read_image(table: &Table<'_>) -> Option<ImageModel> {
+    let usual = ImageModel::DEFAULT;
     let size_px = read_size(table);
     let bead = table.number_or("bead_grey", 0.0..=1000.0, usual.bead_grey);
     let ground = table.number_or("ground_grey", 0.0..=1000.0, usual.ground_grey);
@@ -166,7 +168,7 @@ fn read_picture(table: &Table<'_>) -> Option<Picture> {
     let (spots, grains) = (read_spots(table), read_grains(table));
     let (shadow, neighbour) = (read_shadow(table), read_neighbour(table));
     let (motion, texture) = (read_motion(table), read_texture(table));
-    Some(Picture {
+    Some(ImageModel {
         light_deg: table.optional_number("light_deg", -360.0..=360.0),
         true_surface_height_mm: table.optional_number("true_surface_height_mm", -1e4..=1e4),
         size_px: size_px?,
@@ -190,7 +192,7 @@ fn read_picture(table: &Table<'_>) -> Option<Picture> {
 
 fn read_size(table: &Table<'_>) -> Option<[u32; 2]> {
     if !table.has("image_size_px") {
-        return Some(Picture::USUAL.size_px);
+        return Some(ImageModel::DEFAULT.size_px);
     }
     #[expect(
         clippy::cast_possible_truncation,
@@ -201,11 +203,11 @@ fn read_size(table: &Table<'_>) -> Option<[u32; 2]> {
     Some(table.numbers::<2>("image_size_px", 16.0..=16_384.0)?.map(whole))
 }
 
-const LEFT_FIRST: [(&str, Side); 3] =
-    [("left", Side::Left), ("right", Side::Right), ("both", Side::Both)];
+const SIDES: [(&str, BeadSide); 3] =
+    [("left", BeadSide::Left), ("right", BeadSide::Right), ("both", BeadSide::Both)];
 
 fn read_bend(table: &Table<'_>) -> Option<Bend> {
-    let usual = Picture::USUAL.bend;
+    let usual = ImageModel::DEFAULT.bend;
     let radius = table.number_or("curve_radius_mm", -1e6..=1e6, usual.radius_mm);
     let corner = table.number_or("corner_deg", -90.0..=90.0, usual.corner_deg);
     let bend = Bend { radius_mm: radius?, corner_deg: corner? };
@@ -216,15 +218,15 @@ fn read_bend(table: &Table<'_>) -> Option<Bend> {
     Some(bend)
 }
 
-fn read_shading(table: &Table<'_>) -> Option<Shading> {
-    let usual = Picture::USUAL.shading;
+fn read_shading(table: &Table<'_>) -> Option<EdgeShading> {
+    let usual = ImageModel::DEFAULT.shading;
     let slope = -100.0..=100.0;
     let bead = table.number_or("bead_shading_grey_per_px", slope.clone(), usual.bead_grey_per_px);
     let bead_px = table.number_or("bead_shading_px", 0.0..=1000.0, usual.bead_px);
     let ground = table.number_or("ground_shading_grey_per_px", slope, usual.ground_grey_per_px);
     let ground_px = table.number_or("ground_shading_px", 0.0..=1000.0, usual.ground_px);
-    let side = table.choice("shading_side", &LEFT_FIRST);
-    Some(Shading {
+    let side = table.choice("shading_side", &SIDES);
+    Some(EdgeShading {
         bead_grey_per_px: bead?,
         bead_px: bead_px?,
         ground_grey_per_px: ground?,
@@ -234,48 +236,53 @@ fn read_shading(table: &Table<'_>) -> Option<Shading> {
 }
 
 fn read_spots(table: &Table<'_>) -> Option<Spots> {
-    let usual = Picture::USUAL.spots;
-    let share = table.number_or("spot_share", 0.0..=0.9, usual.share);
+    let usual = ImageModel::DEFAULT.spots;
+    let share = table.number_or("spot_share", 0.0..=0.9, usual.covered_fraction);
     let size = table.number_or("spot_size_px", 1.0..=200.0, usual.size_px);
-    Some(Spots { share: share?, size_px: size? })
+    Some(Spots { covered_fraction: share?, size_px: size? })
 }
 
 fn read_grains(table: &Table<'_>) -> Option<Grains> {
-    let usual = Picture::USUAL.grains;
-    let share = table.number_or("grain_rows_share", 0.0..=0.9, usual.rows_share);
+    let usual = ImageModel::DEFAULT.grains;
+    let share = table.number_or("grain_rows_share", 0.0..=0.9, usual.rows_fraction);
     let size = table.number_or("grain_size_px", 1.0..=200.0, usual.size_px);
     let grey = table.number_or("grain_grey", 0.0..=1000.0, usual.grey);
-    Some(Grains { rows_share: share?, size_px: size?, grey: grey? })
+    Some(Grains { rows_fraction: share?, size_px: size?, grey: grey? })
 }
 
 fn read_shadow(table: &Table<'_>) -> Option<Shadow> {
-    let usual = Picture::USUAL.shadow;
+    let usual = ImageModel::DEFAULT.shadow;
     let distance = table.number_or("shadow_px", 0.0..=1000.0, usual.distance_px);
     let width = table.number_or("shadow_width_px", 0.0..=1000.0, usual.width_px);
-    let share = table.number_or("shadow_share", -2.0..=2.0, usual.share);
-    let side = table.choice("shadow_side", &LEFT_FIRST);
-    Some(Shadow { distance_px: distance?, width_px: width?, share: share?, side: side? })
+    let share = table.number_or("shadow_share", -2.0..=2.0, usual.contrast_fraction);
+    let side = table.choice("shadow_side", &SIDES);
+    Some(Shadow {
+        distance_px: distance?,
+        width_px: width?,
+        contrast_fraction: share?,
+        side: side?,
+    })
 }
 
 fn read_neighbour(table: &Table<'_>) -> Option<Neighbour> {
-    let usual = Picture::USUAL.neighbour;
+    let usual = ImageModel::DEFAULT.neighbour;
     let gap = table.number_or("neighbour_gap_px", 0.0..=1000.0, usual.gap_px);
     let width = table.number_or("neighbour_width_px", 0.0..=10_000.0, usual.width_px);
-    let share = table.number_or("neighbour_share", 0.0..=2.0, usual.share);
-    let side = table.choice("neighbour_side", &LEFT_FIRST);
-    Some(Neighbour { gap_px: gap?, width_px: width?, share: share?, side: side? })
+    let share = table.number_or("neighbour_share", 0.0..=2.0, usual.contrast_fraction);
+    let side = table.choice("neighbour_side", &SIDES);
+    Some(Neighbour { gap_px: gap?, width_px: width?, contrast_fraction: share?, side: side? })
 }
 
-fn read_motion(table: &Table<'_>) -> Option<Motion> {
-    let usual = Picture::USUAL.motion;
+fn read_motion(table: &Table<'_>) -> Option<MotionBlur> {
+    let usual = ImageModel::DEFAULT.motion;
     let length = table.number_or("motion_px", 0.0..=100.0, usual.length_px);
     let direction = table.number_or("motion_deg", -360.0..=360.0, usual.direction_deg);
-    Some(Motion { length_px: length?, direction_deg: direction? })
+    Some(MotionBlur { length_px: length?, direction_deg: direction? })
 }
 
-fn read_texture(table: &Table<'_>) -> Option<Texture> {
-    let usual = Picture::USUAL.texture;
-    let size = table.number_or("texture_grey", 0.0..=100.0, usual.size_grey);
+fn read_texture(table: &Table<'_>) -> Option<TexturePattern> {
+    let usual = ImageModel::DEFAULT.texture;
+    let size = table.number_or("texture_grey", 0.0..=100.0, usual.sigma_grey);
     let length = table.number_or("texture_px", 0.5..=50.0, usual.length_px);
-    Some(Texture { size_grey: size?, length_px: length? })
+    Some(TexturePattern { sigma_grey: size?, length_px: length? })
 }

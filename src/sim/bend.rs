@@ -7,12 +7,12 @@ use crate::scenario::image;
 
 /// Angle from the middle of the gauge beyond which an arc is not followed
 /// \[rad\]: its edges are functions of the place along the gauge's axis.
-const FARTHEST_RAD: f64 = 1.2;
+const MAX_ARC_RAD: f64 = 1.2;
 
 /// From distances along and across the bead to the directions ahead and to the
 /// right at the middle of the gauge, all in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Bend {
+pub enum BeadPath {
     /// No bend.
     Straight,
     /// An arc of a signed radius \[mm\], to the right if positive.
@@ -27,13 +27,13 @@ pub enum Bend {
     },
 }
 
-impl Bend {
+impl BeadPath {
     /// As a picture asks for it.
-    pub fn new(asked: &image::Bend) -> Self {
-        if asked.radius_mm != 0.0 {
-            Self::Arc { radius_mm: asked.radius_mm }
-        } else if asked.corner_deg != 0.0 {
-            Self::Corner { half: libm::sincos(0.5 * asked.corner_deg.to_radians()) }
+    pub fn new(settings: &image::Bend) -> Self {
+        if settings.radius_mm != 0.0 {
+            Self::Arc { radius_mm: settings.radius_mm }
+        } else if settings.corner_deg != 0.0 {
+            Self::Corner { half: libm::sincos(0.5 * settings.corner_deg.to_radians()) }
         } else {
             Self::Straight
         }
@@ -42,13 +42,13 @@ impl Bend {
     /// Where a place along and across the bead lies, ahead and to the right.
     /// `across_mm` is normal to the bead's own axis. `None` too far around a
     /// curve.
-    pub fn place(self, along_mm: f64, across_mm: f64) -> Option<Vector2<f64>> {
+    pub fn position(self, along_mm: f64, across_mm: f64) -> Option<Vector2<f64>> {
         match self {
             Self::Straight => Some(Vector2::new(along_mm, across_mm)),
             Self::Arc { radius_mm } => {
                 let (sin, cos) = libm::sincos(along_mm / radius_mm);
                 let to_centre = radius_mm - across_mm;
-                let near = (along_mm / radius_mm).abs() < FARTHEST_RAD;
+                let near = (along_mm / radius_mm).abs() < MAX_ARC_RAD;
                 near.then(|| Vector2::new(to_centre * sin, radius_mm - to_centre * cos))
             }
             // Edges parallel to the two halves meet on the line across, where
@@ -76,8 +76,8 @@ impl Bend {
 mod tests {
     use super::*;
 
-    fn arc(radius_mm: f64) -> Bend {
-        Bend::new(&image::Bend { radius_mm, corner_deg: 0.0 })
+    fn arc(radius_mm: f64) -> BeadPath {
+        BeadPath::new(&image::Bend { radius_mm, corner_deg: 0.0 })
     }
 
     #[test]
@@ -86,23 +86,23 @@ mod tests {
             let bend = arc(radius_mm);
             let centre = Vector2::new(0.0, radius_mm);
             for (along, across) in [(0.0, 0.0), (5.0, 4.0), (-11.0, 4.0), (20.0, -6.0)] {
-                let place = bend.place(along, across).unwrap();
+                let place = bend.position(along, across).unwrap();
                 let distance = (place - centre).norm();
                 // To the right is towards the centre of a curve to the right.
                 let expected = (radius_mm - across).abs();
                 assert!((distance - expected).abs() < 1e-12);
                 assert!((bend.along_mm(place) - along).abs() < 1e-12, "{along} {across}");
             }
-            assert!(bend.place(10.0, 0.0).unwrap().y * radius_mm > 0.0);
+            assert!(bend.position(10.0, 0.0).unwrap().y * radius_mm > 0.0);
         }
     }
 
     #[test]
     fn both_halves_of_a_corner_have_the_width_normal_to_themselves() {
-        let bend = Bend::new(&image::Bend { radius_mm: 0.0, corner_deg: 40.0 });
+        let bend = BeadPath::new(&image::Bend { radius_mm: 0.0, corner_deg: 40.0 });
         for sign in [1.0, -1.0] {
             let [a, b, c] = [(3.0, 2.0), (9.0, 2.0), (5.0, -2.0)]
-                .map(|(along, across)| bend.place(sign * along, across).unwrap());
+                .map(|(along, across)| bend.position(sign * along, across).unwrap());
             let direction = (b - a).normalize();
             assert!((direction.y / direction.x.abs() - 20_f64.to_radians().tan()).abs() < 1e-12);
             let normal = Vector2::new(-direction.y, direction.x);
@@ -112,6 +112,6 @@ mod tests {
 
     #[test]
     fn a_circle_is_not_gone_around() {
-        assert!(arc(10.0).place(13.0, 0.0).is_none());
+        assert!(arc(10.0).position(13.0, 0.0).is_none());
     }
 }

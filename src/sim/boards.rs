@@ -13,16 +13,16 @@ use crate::numeric::normal_distribution;
 /// Grey values of a board's black and white squares and of what lies around it.
 const BLACK: f64 = 40.0;
 const WHITE: f64 = 210.0;
-const AROUND: f64 = 120.0;
+const BACKGROUND: f64 = 120.0;
 /// White around the outer squares, in squares.
-const MARGIN: f64 = 0.8;
+const MARGIN_SQUARES: f64 = 0.8;
 /// Squares within or beyond the border of the squares from which on it has no part in a
 /// pixel.
-const FAR: f64 = 1.5;
+const EDGE_ZONE_SQUARES: f64 = 1.5;
 /// Standard deviations of the blur from an edge beyond which all is black or white.
-const FLAT: f64 = 8.0;
+const MAX_BLUR_SIGMAS: f64 = 8.0;
 /// Variance of the mean over a pixel, which is even over its width \[px²\].
-const PIXEL: f64 = 1.0 / 12.0;
+const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 
 /// How pictures are taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,12 +32,13 @@ pub struct Exposure {
     /// Standard deviation of a pixel's noise \[grey levels\].
     pub noise_grey: f64,
     /// How far the board moves in the picture while the shutter is open \[px\].
-    pub way_px: Vector2<f64>,
+    pub motion_px: Vector2<f64>,
 }
 
 impl Exposure {
     /// A sharp picture.
-    pub const SHARP: Self = Self { blur_px: 0.7, noise_grey: 2.0, way_px: Vector2::new(0.0, 0.0) };
+    pub const SHARP: Self =
+        Self { blur_px: 0.7, noise_grey: 2.0, motion_px: Vector2::new(0.0, 0.0) };
 }
 
 /// A camera before which boards are held. What a pixel sees is kept from picture to
@@ -67,10 +68,10 @@ impl BoardStudio {
         exposure: Exposure,
         seed: u64,
     ) -> Result<Frame, WrongSize> {
-        let scene = Scene::of(board, pose, exposure);
+        let scene = BoardScene::of(board, pose, exposure);
         let (width, height) = self.size;
         let values = self.rays.iter().enumerate().map(|(i, ray)| {
-            let grey = ray.map_or(AROUND, |at| {
+            let grey = ray.map_or(BACKGROUND, |at| {
                 // To the next pixel, and at the picture's end from the last one.
                 let to_next = |step: usize, is_last: bool| {
                     let other = if is_last { i.checked_sub(step) } else { i.checked_add(step) };
@@ -79,7 +80,7 @@ impl BoardStudio {
                 };
                 let right = to_next(1, i % width + 1 == width);
                 let below = to_next(width, i / width + 1 == height);
-                right.zip(below).map_or(AROUND, |(right, below)| scene.grey(at, right, below))
+                right.zip(below).map_or(BACKGROUND, |(right, below)| scene.grey(at, right, below))
             });
             let pair = hash::normal_pair(hash::mix(&[seed, i as u64 / 2]));
             rounded(grey + exposure.noise_grey * pair[i % 2])
@@ -99,13 +100,13 @@ fn rounded(grey: f64) -> u8 {
 }
 
 /// The board as the camera sees it.
-struct Scene {
+struct BoardScene {
     /// From rays to the board, in squares; homogeneous.
     to_board: Matrix3<f64>,
     /// Squares along its sides.
     squares: Vector2<f64>,
     exposure: Exposure,
-    marks: Option<Marked>,
+    markers: Option<MarkedBoard>,
 }
 
 /// A coordinate on the board and how far it is blurred, both in squares.
@@ -116,39 +117,40 @@ struct Blurred {
 }
 
 /// The markers in the white squares.
-struct Marked {
+struct MarkedBoard {
     /// Cells along a marker's side, and the side of one in squares.
     cells: (usize, f64),
     /// Border about a marker, in squares.
-    clear: f64,
+    clearance: f64,
     /// The black cells of every square, row by row.
     black: Vec<Vec<(usize, usize)>>,
 }
 
-impl Marked {
+impl MarkedBoard {
     #[expect(clippy::cast_precision_loss, reason = "a handful of cells")]
     fn of(board: &Board) -> Option<Self> {
-        let count = board.marks()?.dictionary.side() + 2;
+        let count = board.markers()?.dictionary.side() + 2;
         let GridSize { columns, rows } = board.corners();
         let squares =
             (0..(columns + 1) * (rows + 1)).map(|i| (i % (columns + 1), i / (columns + 1)));
-        let clear = board.clear();
+        let clear = board.marker_margin();
         Some(Self {
             cells: (count, (1.0 - 2.0 * clear) / count as f64),
-            clear,
+            clearance: clear,
             black: squares.map(|(column, row)| board.black_cells(column, row)).collect(),
         })
     }
 
     /// How much of a place in a square is covered by its marker's black.
     #[expect(clippy::cast_precision_loss, reason = "a handful of cells")]
-    fn cover(&self, square: usize, u: Blurred, v: Blurred) -> f64 {
+    fn black_fraction(&self, square: usize, u: Blurred, v: Blurred) -> f64 {
         let Some(black) = self.black.get(square).filter(|black| !black.is_empty()) else {
             return 0.0;
         };
         let (count, side) = self.cells;
         let along = |Blurred { at, blur }: Blurred| -> Vec<f64> {
-            let passed = |line: usize| step(at - self.clear - line as f64 * side, blur);
+            let passed =
+                |line: usize| edge_fraction(at - self.clearance - line as f64 * side, blur);
             (0..count).map(|cell| passed(cell) - passed(cell + 1)).collect()
         };
         let (across, down) = (along(u), along(v));
@@ -156,7 +158,7 @@ impl Marked {
     }
 }
 
-impl Scene {
+impl BoardScene {
     #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
     fn of(board: &Board, pose: &Pose, exposure: Exposure) -> Self {
         let rotation = pose.rotation();
@@ -172,56 +174,57 @@ impl Scene {
             to_board: from_board.try_inverse().unwrap_or_else(Matrix3::zeros),
             squares: Vector2::new(columns as f64 + 1.0, rows as f64 + 1.0),
             exposure,
-            marks: Marked::of(board),
+            markers: MarkedBoard::of(board),
         }
     }
 
     /// Mean grey value of a pixel whose ray is this, and whose neighbours' rays are
     /// so far off.
     fn grey(&self, ray: Point2<f64>, right: Vector2<f64>, below: Vector2<f64>) -> f64 {
-        let Some(at) = self.on_board(ray) else { return AROUND };
+        let Some(at) = self.on_board(ray) else { return BACKGROUND };
         // Squares from the sheet's middle and from its border.
         let beyond = (at + Vector2::repeat(1.0) - self.squares / 2.0).abs() - self.squares / 2.0;
-        if beyond.max() > FAR {
-            return AROUND;
+        if beyond.max() > EDGE_ZONE_SQUARES {
+            return BACKGROUND;
         }
         let (Some(a), Some(b)) = (self.on_board(ray + right), self.on_board(ray + below)) else {
-            return AROUND;
+            return BACKGROUND;
         };
         let (by_x, by_y) = (a - at, b - at);
         // Blur across the lines of one direction, in squares: that of the lens and of
         // the pixel is the same all round, that of the motion has a direction.
         let blur = |axis: usize| {
             let slope = Vector2::new(by_x[axis], by_y[axis]);
-            let still = self.exposure.blur_px.powi(2) + PIXEL;
-            let moved = slope.dot(&self.exposure.way_px).powi(2) / 12.0;
+            let still = self.exposure.blur_px.powi(2) + PIXEL_VARIANCE_PX2;
+            let moved = slope.dot(&self.exposure.motion_px).powi(2) / 12.0;
             (slope.norm_squared() * still + moved).sqrt().max(1e-9)
         };
         let u = Blurred { at: at.x, blur: blur(0) };
         let v = Blurred { at: at.y, blur: blur(1) };
         let white = 0.5 * (WHITE + BLACK);
-        let checker = white - 0.5 * (WHITE - BLACK) * wave(u) * wave(v);
-        let checker = checker - (WHITE - BLACK) * self.marker(u, v);
-        if beyond.max() < -FAR {
+        let checker = white - 0.5 * (WHITE - BLACK) * blurred_stripes(u) * blurred_stripes(v);
+        let checker = checker - (WHITE - BLACK) * self.marker_fraction(u, v);
+        if beyond.max() < -EDGE_ZONE_SQUARES {
             return checker;
         }
         // The origin is the first inner corner, one square within the board.
         let inside = |grow: f64| {
             let along = |Blurred { at, blur }, squares: f64| {
-                step(at + 1.0 + grow, blur) * step(squares - 1.0 + grow - at, blur)
+                edge_fraction(at + 1.0 + grow, blur)
+                    * edge_fraction(squares - 1.0 + grow - at, blur)
             };
             along(u, self.squares.x) * along(v, self.squares.y)
         };
-        let (on_squares, on_sheet) = (inside(0.0), inside(MARGIN));
+        let (on_squares, on_sheet) = (inside(0.0), inside(MARGIN_SQUARES));
         let sheet = WHITE + (checker - WHITE) * on_squares;
-        AROUND + (sheet - AROUND) * on_sheet
+        BACKGROUND + (sheet - BACKGROUND) * on_sheet
     }
 
     /// How much of a place is covered by a marker's black: that of its own square alone,
     /// for no marker's blur reaches the next one.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the board")]
-    fn marker(&self, u: Blurred, v: Blurred) -> f64 {
-        let Some(marks) = &self.marks else { return 0.0 };
+    fn marker_fraction(&self, u: Blurred, v: Blurred) -> f64 {
+        let Some(marks) = &self.markers else { return 0.0 };
         let (column, row) = (u.at.floor() + 1.0, v.at.floor() + 1.0);
         let within = |at: f64, count: f64| (0.0..count).contains(&at);
         if !within(column, self.squares.x) || !within(row, self.squares.y) {
@@ -229,7 +232,7 @@ impl Scene {
         }
         let square = row as usize * self.squares.x as usize + column as usize;
         let within_square = |c: Blurred| Blurred { at: c.at - c.at.floor(), ..c };
-        marks.cover(square, within_square(u), within_square(v))
+        marks.black_fraction(square, within_square(u), within_square(v))
     }
 
     fn on_board(&self, ray: Point2<f64>) -> Option<Vector2<f64>> {
@@ -240,16 +243,16 @@ impl Scene {
 }
 
 /// Share of a blurred half plane.
-fn step(inside: f64, blur: f64) -> f64 {
+fn edge_fraction(inside: f64, blur: f64) -> f64 {
     // The tails beyond are less than a part in 10¹⁵, and slow.
-    normal_distribution::cumulative((inside / blur).clamp(-FLAT, FLAT))
+    normal_distribution::cumulative((inside / blur).clamp(-MAX_BLUR_SIGMAS, MAX_BLUR_SIGMAS))
 }
 
 /// Stripes of width 1 and values 1 and -1, 1 from 0 to 1, blurred.
-fn wave(Blurred { at, blur }: Blurred) -> f64 {
+fn blurred_stripes(Blurred { at, blur }: Blurred) -> f64 {
     let line = at.round();
     let sign = if line.rem_euclid(2.0) < 0.5 { 1.0 } else { -1.0 };
-    sign * (2.0 * step(at - line, blur) - 1.0)
+    sign * (2.0 * edge_fraction(at - line, blur) - 1.0)
 }
 
 #[cfg(test)]
@@ -275,7 +278,7 @@ mod tests {
             let tilt = Vector3::new(0.35 * turn.cos(), 0.35 * turn.sin(), 0.03 * turn);
             let pose = Pose::new(tilt, Vector3::new(-80.0, -50.0, 400.0 + 5.0 * turn));
             let frame = studio.take(&board, &pose, Exposure::SHARP, seed.into()).unwrap();
-            let found = sighting::look(&board, "", &frame).unwrap().corners;
+            let found = sighting::observe(&board, "", &frame).unwrap().corners;
             let found: Vec<_> = found.iter().map(|corner| corner.px).collect();
             let truth: Vec<_> = board
                 .corners_mm()

@@ -18,7 +18,7 @@ use crate::core::robot::RobotMode;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, Mm3PerS, MmPerS, MmPerS2};
 use crate::extruder::{ExtruderSetup, ExtruderState, FlowDemand};
-use crate::link::{ParamError, RobotCell, RobotParams};
+use crate::link::{ParamError, RobotParams, VirtualRobot};
 use crate::run::ports::Recorder;
 use crate::run::runner::{Handled, Runner};
 
@@ -27,30 +27,30 @@ use super::hash;
 use super::laid::{LaidBead, PathSpeed};
 use super::render::RenderError;
 
-pub use camera::Sight;
-pub use witness::{Deaf, Witness};
+pub use camera::FrameObservation;
+pub use witness::{NoObserver, Observer};
 
 use std::collections::VecDeque;
 
-use camera::{SimCamera, Taken};
-use clock::{Ticker, What};
+use camera::{CapturedFrame, SimCamera};
+use clock::{ClockEvent, Ticker};
 use port::SimPort;
 
 /// A robot that stops for this long has finished.
-const LONGEST_LAYER_S: f64 = 86_400.0;
+const MAX_LAYER_S: f64 = 86_400.0;
 /// Slowness of the simulated robot's own acceleration limit where the cell's
 /// setpoints are limited already \[mm/s²\].
 const ROBOT_ACCEL: MmPerS2 = MmPerS2::constant(1e6);
 /// Share of the start speed from which the start counts as over.
-const STARTED: f64 = 0.99;
+const STARTED_FRACTION: f64 = 0.99;
 
 /// Share of the nominal flow below which nothing is laid.
-const LEAST_FLOW: f64 = 1e-3;
+const MIN_FLOW_FRACTION: f64 = 1e-3;
 
 /// An extruder that is commanded: what the controller knows of it, and what
 /// answers.
 #[derive(Debug)]
-pub struct Rig {
+pub struct CommandedExtruder {
     /// What the controller knows.
     pub setup: ExtruderSetup,
     /// The flow that is wanted.
@@ -63,7 +63,7 @@ pub struct Rig {
 
 /// A cell that cannot be simulated.
 #[derive(Debug, thiserror::Error)]
-pub enum SimError {
+pub enum SimCellError {
     /// The robot that the cell describes cannot be.
     #[error("the simulated robot cannot be: {0}")]
     Robot(#[from] ParamError),
@@ -87,7 +87,7 @@ pub struct SimCell<K> {
     /// Where in its period the pump's pulsation begins.
     pulse_phase: f64,
     /// Widths that have not arrived yet, the oldest first.
-    under_way: VecDeque<Arrival>,
+    pending_widths: VecDeque<Arrival>,
     /// Nozzle's path at the start of the layer \[mm\].
     bead_start: f64,
     /// As far as bead is laid, from there.
@@ -101,9 +101,9 @@ pub struct SimCell<K> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LayerEnd {
     /// Simulated time that it took.
-    pub took: Span,
+    pub duration: Span,
     /// Whether the bead was laid to its end.
-    pub whole: bool,
+    pub complete: bool,
 }
 
 impl<K: Recorder> SimCell<K> {
@@ -114,22 +114,22 @@ impl<K: Recorder> SimCell<K> {
         run: &RunPart,
         calibration: Calibration,
         recorder: K,
-    ) -> Result<Self, SimError> {
+    ) -> Result<Self, SimCellError> {
         Self::with_extruder(cell, run, calibration, recorder, None)
     }
 
     /// The same with a controller that is told the camera's distance wrong by a
     /// factor.
-    pub fn told(
+    pub fn mismatched(
         cell: &Cell,
         run: &RunPart,
         factor: f64,
         calibration: Calibration,
         recorder: K,
-    ) -> Result<Self, SimError> {
-        let mut told = run.clone();
-        told.camera.offset = told.camera.offset * factor;
-        let mut sim = Self::new(cell, &told, calibration, recorder)?;
+    ) -> Result<Self, SimCellError> {
+        let mut mismatched = run.clone();
+        mismatched.camera.offset = mismatched.camera.offset * factor;
+        let mut sim = Self::new(cell, &mismatched, calibration, recorder)?;
         sim.run = run.clone();
         Ok(sim)
     }
@@ -140,8 +140,8 @@ impl<K: Recorder> SimCell<K> {
         run: &RunPart,
         calibration: Calibration,
         recorder: K,
-        extruder: Option<Rig>,
-    ) -> Result<Self, SimError> {
+        extruder: Option<CommandedExtruder>,
+    ) -> Result<Self, SimCellError> {
         let simulation = &cell.simulation;
         let params = RobotParams {
             min: run.limits.min_speed,
@@ -153,8 +153,8 @@ impl<K: Recorder> SimCell<K> {
             bead: Some(simulation.path),
             ..RobotParams::default()
         };
-        let port = SimPort::new(RobotCell::new(params, Stamp::START)?, run.robot.valid_ms);
-        let mut controller = Controller::new(cell.controller(run, &calibration));
+        let port = SimPort::new(VirtualRobot::new(params, Stamp::START)?, run.robot.valid_ms);
+        let mut controller = Controller::new(cell.controller_setup(run, &calibration));
         let nominal_flow = extruder.as_ref().map(|rig| rig.nominal_flow);
         let mut plant = None;
         if let Some(rig) = extruder {
@@ -170,8 +170,8 @@ impl<K: Recorder> SimCell<K> {
             bead: Self::fresh_bead(cell, 0),
             now: Stamp::START,
             layers: 0,
-            pulse_phase: hash::unit(hash::mix(&[simulation.seed, PULSE])),
-            under_way: VecDeque::new(),
+            pulse_phase: hash::unit(hash::mix(&[simulation.seed, PULSE_STREAM])),
+            pending_widths: VecDeque::new(),
             bead_start: 0.0,
             laid_to: PathSpeed { path_mm: 0.0, speed_mm_per_s: 0.0 },
             started: false,
@@ -205,7 +205,7 @@ impl<K: Recorder> SimCell<K> {
     /// Lays one bead from start to end with the nozzle at a height, and tells
     /// a witness everything. Ends early when the robot stops, and when the
     /// witness has seen enough.
-    pub fn layer(&mut self, z: Mm, witness: &mut impl Witness) -> LayerEnd {
+    pub fn layer(&mut self, z: Mm, witness: &mut impl Observer) -> LayerEnd {
         self.bead = Self::fresh_bead(&self.cell, self.layers);
         self.camera.raise(self.cell.rise(Some(z)));
         self.bead_start = self.runner.robot_mut().begin(self.now, z).path_mm.get();
@@ -221,23 +221,23 @@ impl<K: Recorder> SimCell<K> {
             self.now = at;
             self.lay();
             match what {
-                What::Report => {
+                ClockEvent::Report => {
                     let state = self.runner.robot_mut().state(at);
                     self.speed = Some(state.speed_mm_per_s);
                     self.tell(&Event::Robot(state), witness);
                     let ended = !matches!(state.mode, RobotMode::Print | RobotMode::Hold);
-                    let too_long = (at - began).secs() > LONGEST_LAYER_S;
-                    if ended || too_long || witness.has_seen_enough() {
+                    let too_long = (at - began).secs() > MAX_LAYER_S;
+                    if ended || too_long || witness.is_done() {
                         let whole = state.mode == RobotMode::Idle;
-                        return LayerEnd { took: at - began, whole };
+                        return LayerEnd { duration: at - began, complete: whole };
                     }
                 }
-                What::Frame => self.look(witness),
-                What::ExtruderReport => self.extruder_reports(witness),
-                What::ExtruderTick => {
+                ClockEvent::Frame => self.take_frame(witness),
+                ClockEvent::ExtruderReport => self.extruder_reports(witness),
+                ClockEvent::ExtruderTick => {
                     let _ = self.tell(&Event::ExtruderTick, witness);
                 }
-                What::Tick => {
+                ClockEvent::Tick => {
                     let handled = self.tell(&Event::Tick, witness);
                     if let (Some(_), Some(Command::Speed(speed))) =
                         (handled.sent, handled.step.command)
@@ -250,7 +250,7 @@ impl<K: Recorder> SimCell<K> {
     }
 
     /// Lets the robot stand, and with it the pump, until the next layer.
-    pub fn rest(&mut self, lasts: Span, witness: &mut impl Witness) {
+    pub fn rest(&mut self, lasts: Span, witness: &mut impl Observer) {
         let mut clock = Ticker::new(&self.cell, &self.run, self.now, self.layers);
         let until = self.now + lasts;
         loop {
@@ -261,26 +261,26 @@ impl<K: Recorder> SimCell<K> {
             }
             self.now = at;
             match what {
-                What::Report => {
+                ClockEvent::Report => {
                     let state = self.runner.robot_mut().state(at);
                     self.tell(&Event::Robot(state), witness);
                 }
-                What::ExtruderReport => self.extruder_reports(witness),
-                What::ExtruderTick => {
+                ClockEvent::ExtruderReport => self.extruder_reports(witness),
+                ClockEvent::ExtruderTick => {
                     let _ = self.tell(&Event::ExtruderTick, witness);
                 }
-                What::Frame | What::Tick => {}
+                ClockEvent::Frame | ClockEvent::Tick => {}
             }
         }
     }
 
-    fn tell(&mut self, event: &Event, witness: &mut impl Witness) -> Handled {
+    fn tell(&mut self, event: &Event, witness: &mut impl Observer) -> Handled {
         let handled = self.runner.handle(self.now, event);
         witness.step(self.now, event, &handled.step);
         handled
     }
 
-    fn extruder_reports(&mut self, witness: &mut impl Witness) {
+    fn extruder_reports(&mut self, witness: &mut impl Observer) {
         let now = self.now;
         let Some(extruder) = self.runner.extruder_mut() else { return };
         extruder.advance(now);
@@ -294,7 +294,7 @@ impl<K: Recorder> SimCell<K> {
     fn lay(&mut self) {
         let state = self.runner.robot_mut().state(self.now);
         let path = state.path_mm.get() - self.bead_start;
-        let speed = self.speed_of_flow(state.speed_mm_per_s.get());
+        let speed = self.equivalent_speed(state.speed_mm_per_s.get());
         let last = self.laid_to;
         let pulse = self.cell.simulation.flow.pulse_at(self.now.secs(), self.pulse_phase);
         self.bead.set_pulse(pulse);
@@ -315,44 +315,45 @@ impl<K: Recorder> SimCell<K> {
     /// Without an extruder that is commanded the flow is gathered with the
     /// speed while the robot starts, so that the bead begins as wide as it is
     /// at the start speed.
-    fn speed_of_flow(&mut self, speed: f64) -> Option<f64> {
+    fn equivalent_speed(&mut self, speed: f64) -> Option<f64> {
         let now = self.now;
         let Some(nominal) = self.nominal_flow else {
             let start_speed = self.run.robot.start_speed.get();
             if self.started {
                 return Some(speed);
             }
-            self.started = speed >= STARTED * start_speed;
+            self.started = speed >= STARTED_FRACTION * start_speed;
             return Some(start_speed);
         };
         let extruder = self.runner.extruder_mut().as_mut()?;
         extruder.advance(now);
         let share = extruder.flow() / nominal;
-        (share > LEAST_FLOW).then(|| speed / share)
+        (share > MIN_FLOW_FRACTION).then(|| speed / share)
     }
 
     /// Takes a picture, whose width arrives after the latency.
-    fn look(&mut self, witness: &mut impl Witness) {
+    fn take_frame(&mut self, witness: &mut impl Observer) {
         let state = self.runner.robot_mut().state(self.now);
         let under = state.path_mm.get() - self.bead_start - self.run.camera.offset.get();
         let taken = self.camera.take(self.now, under, state.z_mm, &self.bead);
         let latency = self.cell.simulation.latency;
-        let arrival = Arrival { at: self.now + latency, captured_at: self.now, under, taken };
-        self.under_way.push_back(arrival);
+        let arrival =
+            Arrival { at: self.now + latency, captured_at: self.now, position_mm: under, taken };
+        self.pending_widths.push_back(arrival);
         self.arrivals(self.now, witness);
     }
 
     /// Lets the widths arrive that are due by a moment.
-    fn arrivals(&mut self, until: Stamp, witness: &mut impl Witness) {
-        while self.under_way.front().is_some_and(|arrival| arrival.at <= until) {
-            let Some(arrival) = self.under_way.pop_front() else { return };
+    fn arrivals(&mut self, until: Stamp, witness: &mut impl Observer) {
+        while self.pending_widths.front().is_some_and(|arrival| arrival.at <= until) {
+            let Some(arrival) = self.pending_widths.pop_front() else { return };
             self.now = arrival.at;
             self.arrive(arrival, witness);
         }
     }
 
-    fn arrive(&mut self, arrival: Arrival, witness: &mut impl Witness) {
-        let Arrival { captured_at, under, taken, .. } = arrival;
+    fn arrive(&mut self, arrival: Arrival, witness: &mut impl Observer) {
+        let Arrival { captured_at, position_mm: under, taken, .. } = arrival;
         let event = match &taken.outcome {
             Ok(measured) => Event::Measured {
                 frame: taken.seq,
@@ -367,15 +368,15 @@ impl<K: Recorder> SimCell<K> {
         let handled = self.tell(&event, witness);
         // The edges are those of the last picture, which is this one unless
         // another has been taken meanwhile.
-        let newest = self.under_way.is_empty();
-        witness.look(&Sight {
+        let newest = self.pending_widths.is_empty();
+        witness.frame(&FrameObservation {
             seq: taken.seq,
             captured_at,
             outcome: taken.outcome,
             frame: taken.frame.as_ref(),
             edges: (newest && taken.frame.is_some()).then(|| self.camera.edges()),
             truth: taken.truth,
-            under_mm: under,
+            position_mm: under,
             step: &handled.step,
             speed: self.speed,
             setpoint: self.setpoint,
@@ -388,12 +389,12 @@ struct Arrival {
     at: Stamp,
     captured_at: Stamp,
     /// Where along the bead the middle of the gauge was \[mm\].
-    under: f64,
-    taken: Taken,
+    position_mm: f64,
+    taken: CapturedFrame,
 }
 
 /// Keeps the phase of the pulsation apart from other random numbers of a seed.
-const PULSE: u64 = 0x0070_756c_7365;
+const PULSE_STREAM: u64 = 0x0070_756c_7365;
 
 #[cfg(test)]
 mod tests;

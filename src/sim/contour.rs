@@ -1,7 +1,7 @@
 //! One edge of a bead as a function of the place along the gauge's axis.
 
-use super::outline::Sample;
-use crate::numeric::number::float;
+use super::outline::OutlineSample;
+use crate::numeric::number::to_f64;
 
 /// An edge, row by row of a vertical bead; all in pixels.
 #[derive(Debug, Clone)]
@@ -29,15 +29,15 @@ impl Contour {
     /// Where the polyline through the samples crosses each whole place along
     /// the axis, from `margin` before the picture to `margin` after it; NaN
     /// where it does not.
-    pub fn new(samples: &[Sample], side: usize, run: usize, margin: usize) -> Self {
-        let first = -float(margin);
+    pub fn new(samples: &[OutlineSample], side: usize, run: usize, margin: usize) -> Self {
+        let first = -to_f64(margin);
         let mut cross = vec![f64::NAN; run + 2 * margin];
         for pair in samples.windows(2) {
-            let (a, b) = (pair[0].seen[side], pair[1].seen[side]);
-            let from = clamp((a.run - first).ceil(), cross.len());
-            let past = clamp((b.run - first).floor() + 1.0, cross.len());
+            let (a, b) = (pair[0].projected[side], pair[1].projected[side]);
+            let from = clamp_index((a.run - first).ceil(), cross.len());
+            let past = clamp_index((b.run - first).floor() + 1.0, cross.len());
             for (number, crossing) in cross.iter_mut().enumerate().take(past).skip(from) {
-                let share = (float(number) + first - a.run) / (b.run - a.run);
+                let share = (to_f64(number) + first - a.run) / (b.run - a.run);
                 if share.is_finite() {
                     *crossing = a.cross + (b.cross - a.cross) * share;
                 }
@@ -46,7 +46,7 @@ impl Contour {
         let slope: Vec<f64> = (0..cross.len())
             .map(|i| {
                 let (a, b) = (i.saturating_sub(1), (i + 1).min(cross.len() - 1));
-                (cross[b] - cross[a]) / float(b - a)
+                (cross[b] - cross[a]) / to_f64(b - a)
             })
             .collect();
         let long = slope.iter().map(|slope| f64::hypot(1.0, *slope)).collect();
@@ -54,13 +54,13 @@ impl Contour {
     }
 
     fn index(&self, at: f64) -> usize {
-        clamp(at - self.first + 0.5, self.cross.len() - 1)
+        clamp_index(at - self.first + 0.5, self.cross.len() - 1)
     }
 
     /// Place across the axis at a place along it; NaN where it is not seen.
     pub fn crossing(&self, at: f64) -> f64 {
         let near = self.index(at);
-        self.cross[near] + self.slope[near] * (at - self.first - float(near))
+        self.cross[near] + self.slope[near] * (at - self.first - to_f64(near))
     }
 
     /// First and last place across the axis within a distance of the edge.
@@ -82,7 +82,7 @@ impl Contour {
         let near = self.index(at + foot);
         let near = if self.slope[near].is_finite() { near } else { here };
         let (cross, slope) = (self.cross[near], self.slope[near]);
-        let past = at - self.first - float(near);
+        let past = at - self.first - to_f64(near);
         let long = self.long[near];
         Tangent {
             beyond: (place - cross - slope * past) / long,
@@ -92,7 +92,7 @@ impl Contour {
 }
 
 /// The whole number at or below a place, from 0 to `count`.
-pub fn clamp(place: f64, count: usize) -> usize {
+pub fn clamp_index(place: f64, count: usize) -> usize {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

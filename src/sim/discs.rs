@@ -1,14 +1,14 @@
 //! Discs that hide what is below them, on a grid of 4 × 4 points a pixel.
 
-use super::contour::clamp;
+use super::contour::clamp_index;
 use super::convolve::{convolve, kernel};
 use super::motion::ShutterPosition;
-use super::shade::Shape;
+use super::shade::BeadShape;
 use super::view::GaugeExtent;
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 /// Points along the side of a pixel.
-const FINE: usize = 4;
+const POINTS_PER_SIDE: usize = 4;
 
 /// A disc in pixels along and across the gauge's axis.
 #[derive(Debug, Clone, Copy)]
@@ -30,9 +30,9 @@ pub struct Mask {
 
 /// What the discs hide, and how bright they are.
 #[derive(Debug)]
-pub struct Scene<'a> {
+pub struct Backdrop<'a> {
     /// The bead.
-    pub shape: &'a Shape,
+    pub shape: &'a BeadShape,
     /// Grey of ground and bead, of 256.
     pub grey: [f64; 2],
     /// What shading adds to it, line after line.
@@ -41,7 +41,7 @@ pub struct Scene<'a> {
 
 /// The discs of one grey level for each pixel, and whether only bead can have
 /// them.
-pub struct Layer<'a> {
+pub struct DiscLayer<'a> {
     /// Where.
     pub mask: &'a Mask,
     /// Grey of a disc in a pixel along and across the axis.
@@ -52,7 +52,7 @@ pub struct Layer<'a> {
 
 /// Where along a pixel a point lies, from the pixel's centre \[px\].
 fn point(number: usize) -> f64 {
-    (float(number) + 0.5) / float(FINE) - 0.5
+    (to_f64(number) + 0.5) / to_f64(POINTS_PER_SIDE) - 0.5
 }
 
 impl Mask {
@@ -62,17 +62,17 @@ impl Mask {
     }
 
     /// Covers a disc.
-    pub fn cover(&mut self, disc: Disc) {
+    pub fn add_disc(&mut self, disc: Disc) {
         let Disc { run, cross, radius } = disc;
         let range = |middle: f64, count: usize| {
-            clamp(middle - radius + 0.5, count)..clamp(middle + radius + 1.5, count)
+            clamp_index(middle - radius + 0.5, count)..clamp_index(middle + radius + 1.5, count)
         };
         for at in range(run, self.extent.run) {
             for number in range(cross, self.extent.cross) {
-                let (dv, du) = (float(at) - run, float(number) - cross);
+                let (dv, du) = (to_f64(at) - run, to_f64(number) - cross);
                 let bits = &mut self.bits[at * self.extent.cross + number];
-                for i in 0..FINE * FINE {
-                    let (v, u) = (dv + point(i / FINE), du + point(i % FINE));
+                for i in 0..POINTS_PER_SIDE * POINTS_PER_SIDE {
+                    let (v, u) = (dv + point(i / POINTS_PER_SIDE), du + point(i % POINTS_PER_SIDE));
                     *bits |= u16::from(v * v + u * u <= radius * radius) << i;
                 }
             }
@@ -80,7 +80,7 @@ impl Mask {
     }
 
     /// Uncovers what the other mask covers.
-    pub fn give_way(&mut self, other: &Self) {
+    pub fn subtract(&mut self, other: &Self) {
         for (bits, taken) in self.bits.iter_mut().zip(&other.bits) {
             *bits &= !taken;
         }
@@ -88,15 +88,15 @@ impl Mask {
 
     /// Share of all points that are covered.
     #[cfg(test)]
-    pub fn share(&self) -> f64 {
+    pub fn fraction(&self) -> f64 {
         let covered: u32 = self.bits.iter().map(|bits| bits.count_ones()).sum();
-        f64::from(covered) / float(FINE * FINE * self.bits.len())
+        f64::from(covered) / to_f64(POINTS_PER_SIDE * POINTS_PER_SIDE * self.bits.len())
     }
 }
 
-impl Scene<'_> {
+impl Backdrop<'_> {
     /// Adds what a layer changes, before the blur, averaged over each pixel.
-    pub fn paint(&self, layer: &Layer<'_>, change: &mut [f32]) {
+    pub fn paint(&self, layer: &DiscLayer<'_>, change: &mut [f32]) {
         let cross = self.shape.extent.cross;
         for (at, line) in layer.mask.bits.chunks_exact(cross).enumerate() {
             for (number, bits) in line.iter().enumerate().filter(|(_, bits)| **bits != 0) {
@@ -115,19 +115,19 @@ impl Scene<'_> {
     fn split(&self, bits: u16, at: usize, number: usize) -> [f64; 2] {
         let (mut outside, mut inside) = (0_u32, 0_u32);
         let corners = [(-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)];
-        let holds = |v: f64, u: f64| self.shape.holds(float(at) + v, float(number) + u);
+        let holds = |v: f64, u: f64| self.shape.holds(to_f64(at) + v, to_f64(number) + u);
         let held = corners.into_iter().filter(|(v, u)| holds(*v, *u)).count();
         match held {
             0 => outside = bits.count_ones(),
             4 => inside = bits.count_ones(),
             _ => {
-                for i in (0..FINE * FINE).filter(|i| bits >> i & 1 == 1) {
-                    let inner = holds(point(i / FINE), point(i % FINE));
+                for i in (0..POINTS_PER_SIDE * POINTS_PER_SIDE).filter(|i| bits >> i & 1 == 1) {
+                    let inner = holds(point(i / POINTS_PER_SIDE), point(i % POINTS_PER_SIDE));
                     *if inner { &mut inside } else { &mut outside } += 1;
                 }
             }
         }
-        [outside, inside].map(|count| f64::from(count) / float(FINE * FINE))
+        [outside, inside].map(|count| f64::from(count) / to_f64(POINTS_PER_SIDE * POINTS_PER_SIDE))
     }
 }
 
@@ -187,13 +187,13 @@ mod tests {
     fn a_disc_covers_its_area_once() {
         let mut mask = Mask::new(GaugeExtent { run: 40, cross: 50 });
         let disc = Disc { run: 20.3, cross: 24.8, radius: 9.0 };
-        mask.cover(disc);
-        mask.cover(disc);
-        let area = mask.share() * 2000.0;
+        mask.add_disc(disc);
+        mask.add_disc(disc);
+        let area = mask.fraction() * 2000.0;
         assert!((area - 81.0 * std::f64::consts::PI).abs() < 1.5, "{area}");
-        mask.cover(Disc { run: -3.0, cross: 60.0, radius: 5.0 });
-        mask.give_way(&mask.clone());
-        assert_eq!(mask.share(), 0.0);
+        mask.add_disc(Disc { run: -3.0, cross: 60.0, radius: 5.0 });
+        mask.subtract(&mask.clone());
+        assert_eq!(mask.fraction(), 0.0);
     }
 
     #[test]
@@ -204,7 +204,7 @@ mod tests {
             [[1.25, -2.5], [2.25, -2.5]].map(|shift_px| ShutterPosition { weight: 0.5, shift_px });
         let moved = blur(values, 30, 0.0, &positions);
         let moment = |of: &dyn Fn(f64, f64) -> f64| {
-            (0..600).map(|i| f64::from(moved[i]) * of(float(i / 30), float(i % 30))).sum::<f64>()
+            (0..600).map(|i| f64::from(moved[i]) * of(to_f64(i / 30), to_f64(i % 30))).sum::<f64>()
         };
         assert!((moment(&|_, _| 1.0) - 6.0).abs() < 1e-5);
         // What a pixel sees through the shifted camera lies the other way.

@@ -12,10 +12,10 @@ use crate::numeric::normal_distribution::{cumulative, density, first_integral, s
 /// Blur below which an edge counts as sharp \[px\].
 const SHARP_PX: f64 = 1e-6;
 /// Distance beyond which a Gaussian has ended, in standard deviations.
-const FAR: f64 = 9.0;
+const GAUSSIAN_END_SIGMAS: f64 = 9.0;
 /// Extent of the pixel along one direction, in units of blur, below which the
 /// fourth-order series is exact to 10⁻¹¹.
-const SMALL: f64 = 0.1;
+const SERIES_BELOW_BLURS: f64 = 0.1;
 
 /// Share of a unit pixel that an edge leaves on the inner side, 0 to 1.
 /// `inside_px` is how far the pixel's centre lies on the inner side of the
@@ -50,10 +50,10 @@ fn sharp(d: f64, long: f64, short: f64) -> f64 {
 
 /// Mean of Φ(d + a·u + b·v) over |u|, |v| ≤ ½ for d ≤ 0 and a ≥ b ≥ 0.
 fn blurred(d: f64, a: f64, b: f64) -> f64 {
-    if d + 0.5 * (a + b) < -FAR {
+    if d + 0.5 * (a + b) < -GAUSSIAN_END_SIGMAS {
         return 0.0;
     }
-    if a < SMALL {
+    if a < SERIES_BELOW_BLURS {
         let slope = density(d);
         let second = -d * slope;
         let fourth = (3.0 * d - d * d * d) * slope;
@@ -62,7 +62,8 @@ fn blurred(d: f64, a: f64, b: f64) -> f64 {
         return cumulative(d) + (a2 + b2) / 24.0 * second + quartic * fourth;
     }
     // The error of the series grows as b⁶/a, that of the difference as a/b.
-    let small = if a > 300.0 { SMALL * libm::cbrt(a / 300.0) } else { SMALL };
+    let small =
+        if a > 300.0 { SERIES_BELOW_BLURS * libm::cbrt(a / 300.0) } else { SERIES_BELOW_BLURS };
     if b < small.min(0.5 * a) {
         return one_way(d, a, b);
     }
@@ -189,7 +190,8 @@ mod tests {
     #[test]
     fn series_and_closed_form_meet_where_one_takes_over() {
         for a in [0.1, 0.5, 2.0, 30.0, 1e3, 1e5] {
-            let border = SMALL.max(SMALL * f64::cbrt(a / 300.0)).min(0.5 * a);
+            let border =
+                SERIES_BELOW_BLURS.max(SERIES_BELOW_BLURS * f64::cbrt(a / 300.0)).min(0.5 * a);
             for d in [-0.5 * a - 2.0, -0.5 * a, -0.3 * a, 0.0] {
                 let below = blurred(d, a, border * (1.0 - 1e-12));
                 let above = blurred(d, a, border * (1.0 + 1e-12));

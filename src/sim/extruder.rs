@@ -15,9 +15,9 @@ mod plant;
 mod pressed;
 
 pub use filled::Filled;
-pub use linear::Linear;
+pub use linear::LinearPlantSim;
 pub use molten::Molten;
-pub use plant::{Plant, STEP};
+pub use plant::{STEP, SimPlant};
 pub use pressed::Pressed;
 
 /// Delays of pump and valve.
@@ -35,24 +35,24 @@ pub struct Delays {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Switch {
     on: bool,
-    told: bool,
-    at: Stamp,
+    commanded: bool,
+    acts_at: Stamp,
 }
 
 impl Switch {
     const fn new() -> Self {
-        Self { on: false, told: false, at: Stamp::START }
+        Self { on: false, commanded: false, acts_at: Stamp::START }
     }
 
     fn tell(&mut self, now: Stamp, on: bool, delay: Span) {
-        if on != self.told {
-            (self.told, self.at) = (on, now + delay);
+        if on != self.commanded {
+            (self.commanded, self.acts_at) = (on, now + delay);
         }
     }
 
     fn advance(&mut self, now: Stamp) {
-        if now >= self.at {
-            self.on = self.told;
+        if now >= self.acts_at {
+            self.on = self.commanded;
         }
     }
 }
@@ -60,7 +60,7 @@ impl Switch {
 /// An extruder in simulated time.
 #[derive(Debug)]
 pub struct SimExtruder {
-    plant: Box<dyn Plant>,
+    plant: Box<dyn SimPlant>,
     delays: Delays,
     pump: Switch,
     valve: Switch,
@@ -70,7 +70,7 @@ pub struct SimExtruder {
 
 impl SimExtruder {
     /// At rest.
-    pub fn new(plant: Box<dyn Plant>, delays: Delays) -> Self {
+    pub fn new(plant: Box<dyn SimPlant>, delays: Delays) -> Self {
         let (pump, valve) = (Switch::new(), Switch::new());
         Self { plant, delays, pump, valve, value: 0.0, now: Stamp::START }
     }
@@ -80,8 +80,8 @@ impl SimExtruder {
     pub fn of(plant: &ExtruderPlant, seed: u64, usual: Mm3PerS) -> Result<Self, ModelError> {
         let delays =
             Delays { start: plant.start_delay, stop: plant.stop_delay, valve: plant.valve_delay };
-        let kind: Box<dyn Plant> = match &plant.kind {
-            PlantKind::Linear(linear) => Box::new(Linear::new(linear, seed)?),
+        let kind: Box<dyn SimPlant> = match &plant.kind {
+            PlantKind::Linear(linear) => Box::new(LinearPlantSim::new(linear, seed)?),
             PlantKind::Pressure(pressure) => Box::new(Pressed::new(pressure, seed)),
             PlantKind::Screw(screw) => Box::new(Filled::new(screw, seed)),
             PlantKind::Melt(melt) => Box::new(Molten::new(melt, seed, usual)),
@@ -106,7 +106,7 @@ impl SimExtruder {
 
     /// What the pump does, and whether the valve is open.
     pub const fn state(&self) -> (PumpMode, bool) {
-        let pump = match (self.pump.told, self.pump.on) {
+        let pump = match (self.pump.commanded, self.pump.on) {
             (true, true) => PumpMode::On,
             (true, false) => PumpMode::Starting,
             (false, true) => PumpMode::Stopping,
@@ -169,7 +169,7 @@ mod tests {
             sensor_noise: None,
             screw_lag_s: None,
         };
-        SimExtruder::new(Box::new(Linear::new(&plant, 1).unwrap()), delays)
+        SimExtruder::new(Box::new(LinearPlantSim::new(&plant, 1).unwrap()), delays)
     }
 
     fn flow_at(extruder: &mut SimExtruder, secs: f64) -> f64 {

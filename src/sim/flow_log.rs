@@ -5,7 +5,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::identify::excitation::{Excitation, ExcitationError, Shape};
+use crate::identify::excitation::{Excitation, ExcitationError, Waveform};
 use crate::numeric::lti::{Between, ModelError, SecondOrder, Simulator, TransferFunction};
 
 /// From sample to sample \[s\].
@@ -19,7 +19,7 @@ const NOISE_MM3_PER_S: f64 = 12.0;
 
 /// What a log was made of that cannot be.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum LoggedError {
+pub enum FlowLogError {
     /// The excitation.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),
@@ -30,7 +30,7 @@ pub enum LoggedError {
 
 /// What was logged.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Logged {
+pub struct FlowLog {
     /// Moments \[s\].
     pub time_s: Vec<f64>,
     /// Speed of the screw that was commanded \[rpm\].
@@ -54,18 +54,18 @@ pub fn truth() -> Result<TransferFunction, ModelError> {
 }
 
 /// A log for the fit: a binary sequence of 7 bits between 25 and 35 rpm.
-pub fn binary() -> Result<Logged, LoggedError> {
-    let shape = Shape::Prbs { bits: 7, low: 25.0, high: 35.0 };
-    logged(&Excitation { shape, hold_s: 0.7, duration_s: None }, 1)
+pub fn binary() -> Result<FlowLog, FlowLogError> {
+    let shape = Waveform::Prbs { bits: 7, low: 25.0, high: 35.0 };
+    record(&Excitation { shape, hold_s: 0.7, duration_s: None }, 1)
 }
 
 /// A log to validate with: levels drawn at random for 60 s.
-pub fn gaussian() -> Result<Logged, LoggedError> {
-    let shape = Shape::Gaussian { mean: MIDDLE_RPM, sigma: 4.0, low: 20.0, high: 40.0, seed: 2 };
-    logged(&Excitation { shape, hold_s: 1.5, duration_s: Some(60.0) }, 3)
+pub fn gaussian() -> Result<FlowLog, FlowLogError> {
+    let shape = Waveform::Gaussian { mean: MIDDLE_RPM, sigma: 4.0, low: 20.0, high: 40.0, seed: 2 };
+    record(&Excitation { shape, hold_s: 1.5, duration_s: Some(60.0) }, 3)
 }
 
-fn logged(excitation: &Excitation, seed: u64) -> Result<Logged, LoggedError> {
+fn record(excitation: &Excitation, seed: u64) -> Result<FlowLog, FlowLogError> {
     let profile = excitation.profile()?.with_lead(MIDDLE_RPM, 5.0, 5.0);
     let profile = profile.map_err(ExcitationError::from)?;
     #[expect(
@@ -83,10 +83,10 @@ fn logged(excitation: &Excitation, seed: u64) -> Result<Logged, LoggedError> {
     });
     let flow_mm3_per_s = flow.collect();
     let time_s = (0..count).map(|k| f64::from(k) * STEP_S).collect();
-    Ok(Logged { time_s, screw_rpm, flow_mm3_per_s })
+    Ok(FlowLog { time_s, screw_rpm, flow_mm3_per_s })
 }
 
-impl Logged {
+impl FlowLog {
     /// As the text of a file.
     pub fn to_csv(&self) -> String {
         let rows = self.time_s.iter().zip(&self.screw_rpm).zip(&self.flow_mm3_per_s);

@@ -5,25 +5,25 @@ use super::laid::{LaidBead, PathSpeed};
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
-use crate::scenario::bead::{BeadModel, Roughness};
+use crate::scenario::bead::{BeadModel, EdgeRoughness};
 use crate::scenario::disturbance::Flow;
 
 /// Longest stretch between two reports that is still taken for one bead
 /// \[mm\]: a robot that was connected in the middle of its bead, or was not
 /// heard for a while.
-const LONGEST_STRETCH_MM: f64 = 5000.0;
+const MAX_SEGMENT_MM: f64 = 5000.0;
 /// Longest time over which a position is carried on from the last report.
-const LONGEST_OUTLOOK: Span = Span::from_millis(500);
+const MAX_EXTRAPOLATION: Span = Span::from_millis(500);
 /// A path that falls back by less is the same bead \[mm\].
-const FALL_BACK_MM: f64 = 0.01;
+const PATH_TOLERANCE_MM: f64 = 0.01;
 
 /// What every bead is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Recipe {
+pub struct BeadRecipe {
     /// How wide a bead comes out at a speed.
     pub model: BeadModel,
     /// How rough its edges are.
-    pub roughness: Roughness,
+    pub roughness: EdgeRoughness,
     /// What the pump does to its flow.
     pub flow: Flow,
     /// Seed of everything random; every bead has its own roughness.
@@ -34,17 +34,17 @@ pub struct Recipe {
 /// to `PRINT`, and when its path falls back or jumps; it grows in `PRINT` and
 /// `HOLD`. Between two reports speed changes evenly along the path.
 #[derive(Debug, Clone)]
-pub struct Follower {
-    recipe: Recipe,
+pub struct BeadFollower {
+    recipe: BeadRecipe,
     beads: u64,
     laid: LaidBead,
     before: Option<(Stamp, RobotState)>,
     last: Option<(Stamp, RobotState)>,
 }
 
-impl Follower {
+impl BeadFollower {
     /// Of a robot that has not been heard yet.
-    pub fn new(recipe: Recipe) -> Self {
+    pub fn new(recipe: BeadRecipe) -> Self {
         Self { recipe, beads: 0, laid: bead_of(&recipe, 0), before: None, last: None }
     }
 
@@ -69,7 +69,7 @@ impl Follower {
         let stood = previous.filter(|last| !lays(last.mode) && follows(last, state));
         let path = state.path_mm.get();
         let from = stood.map_or(0.0, |last| last.path_mm.get());
-        let from = from.clamp(path - LONGEST_STRETCH_MM, path);
+        let from = from.clamp(path - MAX_SEGMENT_MM, path);
         self.laid.lay(from, path, state.speed_mm_per_s.get());
     }
 
@@ -82,7 +82,7 @@ impl Follower {
         let ahead = at - reported;
         if ahead >= Span::ZERO {
             let moves = if lays(state.mode) { state.speed_mm_per_s.get() } else { 0.0 };
-            return Some(path + moves * ahead.min(LONGEST_OUTLOOK).secs());
+            return Some(path + moves * ahead.min(MAX_EXTRAPOLATION).secs());
         }
         let (earlier, old) = self.before.filter(|(_, old)| follows(old, &state))?;
         let share = ((at - earlier).secs() / (reported - earlier).secs()).max(0.0);
@@ -116,10 +116,10 @@ fn path_speed(state: &RobotState) -> PathSpeed {
 /// Whether a report continues the path of another.
 fn follows(last: &RobotState, next: &RobotState) -> bool {
     let stretch = (next.path_mm - last.path_mm).get();
-    (-FALL_BACK_MM..=LONGEST_STRETCH_MM).contains(&stretch)
+    (-PATH_TOLERANCE_MM..=MAX_SEGMENT_MM).contains(&stretch)
 }
 
-fn bead_of(recipe: &Recipe, number: u64) -> LaidBead {
+fn bead_of(recipe: &BeadRecipe, number: u64) -> LaidBead {
     let seed = hash::mix(&[recipe.seed, number]);
     LaidBead::new(recipe.model, recipe.roughness, recipe.flow, seed)
 }
@@ -129,10 +129,10 @@ mod tests {
     use super::*;
     use crate::core::units::MmPerS;
 
-    fn follower() -> Follower {
-        Follower::new(Recipe {
+    fn follower() -> BeadFollower {
+        BeadFollower::new(BeadRecipe {
             model: BeadModel::fitted_2022(),
-            roughness: Roughness { size_mm: 0.0, length_mm: 5.0 },
+            roughness: EdgeRoughness { sigma_mm: 0.0, length_mm: 5.0 },
             flow: Flow::STEADY,
             seed: 1,
         })

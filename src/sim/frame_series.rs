@@ -8,12 +8,12 @@ use crate::core::time::Stamp;
 use crate::core::units::Mm;
 
 /// Frames a second where a cell names no rate.
-const USUAL_RATE_HZ: f64 = 10.0;
+const DEFAULT_RATE_HZ: f64 = 10.0;
 
 /// A bead that reaches beyond both ends of what is pictured, and where along
 /// it the pictures are taken.
 #[derive(Debug, Clone)]
-pub struct Series {
+pub struct FrameSeries {
     renderer: Renderer,
     bead: LaidBead,
     speed_mm_per_s: f64,
@@ -21,7 +21,7 @@ pub struct Series {
     frames: u64,
 }
 
-impl Series {
+impl FrameSeries {
     /// The pictures of a cell: the bead is laid at the robot's start speed, or
     /// at the bead model's reference speed where the cell has no robot; the
     /// middle of the gauge goes from 0 to the length of the simulated path.
@@ -29,11 +29,11 @@ impl Series {
         let simulation = &cell.simulation;
         let seed = simulation.seed;
         let renderer =
-            Renderer::new(calibration, cell.surface_height, cell.gauge, simulation.picture, seed)?;
+            Renderer::new(calibration, cell.surface_height, cell.gauge, simulation.image, seed)?;
         let robot = cell.run.as_ref().map(|run| run.robot.start_speed.get());
         let reference = simulation.bead.at_speed_mm_per_s;
         let speed_mm_per_s = robot.filter(|speed| *speed > 0.0).unwrap_or(reference);
-        let rate_hz = cell.frame_rate_hz.unwrap_or(USUAL_RATE_HZ);
+        let rate_hz = cell.frame_rate_hz.unwrap_or(DEFAULT_RATE_HZ);
         let spacing_mm = simulation.frame_spacing.map_or(speed_mm_per_s / rate_hz, Mm::get);
         let length_mm = simulation.path.get();
         // Twice the reach, because roughness and slant move the edges.

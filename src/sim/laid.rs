@@ -1,17 +1,17 @@
 //! The bead as it has been laid: where its edges lie, along the path.
 
-use super::wander::Wander;
+use super::wander::FlowDrift;
 use super::waviness::Waviness;
-use crate::scenario::bead::{BeadModel, Roughness};
+use crate::scenario::bead::{BeadModel, EdgeRoughness};
 use crate::scenario::disturbance::Flow;
 
 /// Coarsest grid along the path on which a bead is kept \[mm\].
-const COARSEST_MM: f64 = 0.5;
+const MAX_STEP_MM: f64 = 0.5;
 /// Points of the grid within one correlation length of the roughness; between
 /// them a bead loses less than 1 % of its roughness.
 const POINTS_PER_LENGTH: f64 = 10.0;
 /// Pieces that miss each other by less belong together \[mm\].
-const JOINT_MM: f64 = 1e-6;
+const JOINT_TOLERANCE_MM: f64 = 1e-6;
 
 /// A bead along its path. Its width is that of the model at the speed at which
 /// a place was laid, times the flow's ratio there, plus roughness. The edges
@@ -22,7 +22,7 @@ pub struct LaidBead {
     model: BeadModel,
     flow: Flow,
     waviness: Waviness,
-    wander: Wander,
+    drift: FlowDrift,
     /// What the pump does over time.
     pulse: f64,
     step_mm: f64,
@@ -64,15 +64,15 @@ impl Node {
 
 impl LaidBead {
     /// A bead of which nothing has been laid.
-    pub fn new(model: BeadModel, roughness: Roughness, flow: Flow, seed: u64) -> Self {
-        let step_mm = if roughness.size_mm > 0.0 {
-            COARSEST_MM.min(roughness.length_mm.max(0.01) / POINTS_PER_LENGTH)
+    pub fn new(model: BeadModel, roughness: EdgeRoughness, flow: Flow, seed: u64) -> Self {
+        let step_mm = if roughness.sigma_mm > 0.0 {
+            MAX_STEP_MM.min(roughness.length_mm.max(0.01) / POINTS_PER_LENGTH)
         } else {
-            COARSEST_MM
+            MAX_STEP_MM
         };
         let waviness = Waviness::new(roughness, seed);
-        let wander = Wander::new(flow.drift_per_root_m, seed);
-        Self { model, flow, waviness, wander, pulse: 1.0, step_mm, strips: Vec::new() }
+        let wander = FlowDrift::new(flow.drift_per_root_m, seed);
+        Self { model, flow, waviness, drift: wander, pulse: 1.0, step_mm, strips: Vec::new() }
     }
 
     /// Lays a piece at one speed. Pieces come in the order of the path: what
@@ -84,14 +84,14 @@ impl LaidBead {
         if !sound || to_mm <= from_mm {
             return;
         }
-        if self.end_mm().is_none_or(|end| from_mm > end + JOINT_MM) {
+        if self.end_mm().is_none_or(|end| from_mm > end + JOINT_TOLERANCE_MM) {
             let first = number((from_mm / self.step_mm).floor());
             let strip = Strip { start_mm: from_mm, end_mm: from_mm, first, nodes: Vec::new() };
             self.strips.push(strip);
         }
         let last = number((to_mm / self.step_mm).ceil());
         let width = self.model.width_at(speed_mm_per_s) * self.pulse;
-        let Self { flow, waviness, wander, step_mm, strips, .. } = self;
+        let Self { flow, waviness, drift: wander, step_mm, strips, .. } = self;
         let Some(strip) = strips.last_mut() else { return };
         strip.take_back(*step_mm);
         strip.end_mm = to_mm;
@@ -240,10 +240,10 @@ mod tests {
     }
 
     const STEADY: Flow = Flow::STEADY;
-    const SMOOTH: Roughness = Roughness { size_mm: 0.0, length_mm: 5.0 };
-    const ROUGH: Roughness = Roughness { size_mm: 0.1, length_mm: 5.0 };
+    const SMOOTH: EdgeRoughness = EdgeRoughness { sigma_mm: 0.0, length_mm: 5.0 };
+    const ROUGH: EdgeRoughness = EdgeRoughness { sigma_mm: 0.1, length_mm: 5.0 };
 
-    fn laid(roughness: Roughness, seed: u64, length_mm: f64) -> LaidBead {
+    fn laid(roughness: EdgeRoughness, seed: u64, length_mm: f64) -> LaidBead {
         let mut bead = LaidBead::new(BeadModel::fitted_2022(), roughness, STEADY, seed);
         bead.lay(0.0, length_mm, 112.5);
         bead

@@ -1,7 +1,7 @@
 //! Light that grows evenly across the picture.
 
-use crate::numeric::number::float;
-use crate::scenario::image::Picture;
+use crate::numeric::number::to_f64;
+use crate::scenario::image::ImageModel;
 
 /// Light of every pixel; 1 in the middle of the picture.
 #[derive(Debug, Clone, Copy)]
@@ -13,10 +13,10 @@ pub struct Light {
 
 impl Light {
     /// For a picture of so many columns and rows.
-    pub fn new(picture: &Picture, columns: usize, rows: usize) -> Self {
+    pub fn new(picture: &ImageModel, columns: usize, rows: usize) -> Self {
         let ratio = picture.light_ratio.max(1.0);
         let swing = (ratio - 1.0) / (ratio + 1.0);
-        let spans = [float(columns) - 1.0, float(rows) - 1.0];
+        let spans = [to_f64(columns) - 1.0, to_f64(rows) - 1.0];
         let growth = match picture.light_deg {
             None => spans.map(|span| swing / span.max(1.0)),
             Some(direction) => {
@@ -34,12 +34,12 @@ impl Light {
     /// At a pixel.
     pub fn at(&self, column: usize, row: usize) -> f64 {
         let (first, growth) = self.row(row);
-        first + growth * float(column)
+        first + growth * to_f64(column)
     }
 
     /// At the first pixel of a row, and its growth along the row.
     pub fn row(&self, row: usize) -> (f64, f64) {
-        (self.first + self.growth[1] * float(row), self.growth[0])
+        (self.first + self.growth[1] * to_f64(row), self.growth[0])
     }
 }
 
@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     fn at(light_deg: Option<f64>, column: f64, row: usize) -> f64 {
-        let picture = Picture { light_ratio: 4.0, light_deg, ..Picture::USUAL };
+        let picture = ImageModel { light_ratio: 4.0, light_deg, ..ImageModel::DEFAULT };
         let (first, growth) = Light::new(&picture, 101, 51).row(row);
         first + growth * column
     }

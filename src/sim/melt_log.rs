@@ -2,15 +2,15 @@
 
 use std::fmt::Write as _;
 
-use super::melt::{Machine, Melt};
-use crate::identify::series::Series;
+use super::melt::{Melt, MeltParameters};
+use crate::identify::series::TimeSeries;
 use crate::sim::hash::{mix, normal_pair};
 
-const SENSOR: u64 = 0x7365_6e73;
+const SENSOR_STREAM: u64 = 0x7365_6e73;
 
 /// What is recorded.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recording {
+pub struct RecordingPlan {
     /// Pauses of the pump, in their order \[s\].
     pub idle_s: Vec<f64>,
     /// How long the pump runs between them \[s\].
@@ -25,10 +25,10 @@ pub struct Recording {
 
 /// Command \[rpm\] and flow \[mm³/s\] of a machine that runs, pauses and runs
 /// again.
-pub fn record(machine: Machine, seed: u64, plan: &Recording) -> [Series; 2] {
-    let mut melt = Melt::flowing(machine, seed);
-    let mut command = Series::new("command_rpm", true);
-    let mut flow = Series::new("flow_mm3_per_s", false);
+pub fn record(machine: MeltParameters, seed: u64, plan: &RecordingPlan) -> [TimeSeries; 2] {
+    let mut melt = Melt::steady(machine, seed);
+    let mut command = TimeSeries::new("command_rpm", true);
+    let mut flow = TimeSeries::new("flow_mm3_per_s", false);
     let runs_rpm = machine.flow_mm3_per_s / plan.mm3_per_s_per_rpm;
     command.push(0.0, runs_rpm);
     let mut logged = 0_u32;
@@ -36,7 +36,7 @@ pub fn record(machine: Machine, seed: u64, plan: &Recording) -> [Series; 2] {
         while melt.now_s() < until_s {
             let (dt_s, came_mm3) = melt.advance();
             if melt.now_s() >= f64::from(logged) * plan.step_s {
-                let [fresh, _] = normal_pair(mix(&[seed, SENSOR, u64::from(logged)]));
+                let [fresh, _] = normal_pair(mix(&[seed, SENSOR_STREAM, u64::from(logged)]));
                 flow.push(melt.now_s(), came_mm3 / dt_s + plan.sensor_mm3_per_s * fresh);
                 logged += 1;
             }
@@ -55,8 +55,8 @@ pub fn record(machine: Machine, seed: u64, plan: &Recording) -> [Series; 2] {
 }
 
 /// The example of `extruder identify`: 11 starts and stops in nine minutes.
-pub fn example() -> Recording {
-    Recording {
+pub fn example() -> RecordingPlan {
+    RecordingPlan {
         idle_s: vec![2.0, 30.0, 5.0, 120.0, 1.0, 15.0, 8.0, 60.0, 3.0, 0.5, 240.0],
         runs_s: 6.0,
         mm3_per_s_per_rpm: 10.0,
@@ -67,11 +67,11 @@ pub fn example() -> Recording {
 
 /// Command \[rpm\] and flow \[mm³/s\] as the text of a table, a line for each
 /// sample of the flow.
-pub fn to_csv([command, flow]: &[Series; 2]) -> String {
+pub fn to_csv([command, flow]: &[TimeSeries; 2]) -> String {
     let mut text = "time_s,screw_rpm,flow_mm3_per_s\n".to_owned();
     for (time_s, flow) in flow.time_s.iter().zip(&flow.values) {
-        let told = command.time_s.partition_point(|from_s| from_s <= time_s);
-        let rpm = told.checked_sub(1).and_then(|at| command.values.get(at)).unwrap_or(&0.0);
+        let commands = command.time_s.partition_point(|from_s| from_s <= time_s);
+        let rpm = commands.checked_sub(1).and_then(|at| command.values.get(at)).unwrap_or(&0.0);
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{time_s:.3},{rpm},{flow:.2}");
     }

@@ -1,9 +1,9 @@
 //! Motion while the shutter is open: the mean of the picture over its positions.
 
-use crate::scenario::image::Motion;
+use crate::scenario::image::MotionBlur;
 
 /// Most positions that a mean is taken over.
-const MOST: u32 = 64;
+const MAX_POSITIONS: u32 = 64;
 
 /// Where the picture is for a part of the time while the shutter is open.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,7 +16,7 @@ pub struct ShutterPosition {
 
 /// Where the picture is while the shutter is open. The positions are those of
 /// Gauss–Legendre quadrature, close enough for a picture with this blur.
-pub fn positions(motion: &Motion, blur_px: f64) -> Vec<ShutterPosition> {
+pub fn positions(motion: &MotionBlur, blur_px: f64) -> Vec<ShutterPosition> {
     if motion.length_px <= 0.0 {
         return vec![ShutterPosition { weight: 1.0, shift_px: [0.0, 0.0] }];
     }
@@ -25,7 +25,7 @@ pub fn positions(motion: &Motion, blur_px: f64) -> Vec<ShutterPosition> {
     let blur = (blur_px * blur_px + 1.0 / 12.0).sqrt();
     let half = 0.5 * motion.length_px;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-    let count = (3.0 + 1.2 * motion.length_px / blur).ceil().min(f64::from(MOST)) as u32;
+    let count = (3.0 + 1.2 * motion.length_px / blur).ceil().min(f64::from(MAX_POSITIONS)) as u32;
     let nodes = (1..=count).map(|number| node(number, count));
     let position = |(at, weight): (f64, f64)| ShutterPosition {
         weight: 0.5 * weight,
@@ -57,7 +57,7 @@ mod tests {
 
     #[test]
     fn the_mean_over_the_places_is_the_integral() {
-        let motion = Motion { length_px: 6.0, direction_deg: 15.0 };
+        let motion = MotionBlur { length_px: 6.0, direction_deg: 15.0 };
         let positions = positions(&motion, 1.5);
         let mean = |of: &dyn Fn(f64) -> f64| {
             let part = |ShutterPosition { weight, shift_px: [run, cross] }: &ShutterPosition| {
@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn what_stands_still_is_seen_in_its_place() {
-        let still = Motion { length_px: 0.0, direction_deg: 30.0 };
+        let still = MotionBlur { length_px: 0.0, direction_deg: 30.0 };
         assert_eq!(positions(&still, 1.5), [ShutterPosition { weight: 1.0, shift_px: [0.0, 0.0] }]);
     }
 }

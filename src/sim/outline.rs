@@ -1,7 +1,7 @@
 //! The outline of a bead in the picture: both edges, and where it begins and
 //! ends.
 
-use super::view::{Place, View};
+use super::view::{AxisPoint, BeadView};
 
 /// Half the change of an edge's slope that the sampling steps over is of this
 /// length \[px\].
@@ -11,43 +11,43 @@ const HALVINGS: u32 = 30;
 
 /// Signed offsets of the left and the right edge \[mm\] at a distance along
 /// the bead from the middle of the gauge \[mm\]; `None` where there is no bead.
-pub type Bead<'a> = dyn Fn(f64) -> Option<(f64, f64)> + 'a;
+pub type BeadEdges<'a> = dyn Fn(f64) -> Option<(f64, f64)> + 'a;
 
 /// One place along the bead, and where its edges are seen.
 #[derive(Debug, Clone, Copy)]
-pub struct Sample {
+pub struct OutlineSample {
     /// Distance along the bead \[mm\].
     pub along_mm: f64,
     /// Offsets of the left and the right edge \[mm\].
     pub offset_mm: [f64; 2],
     /// Where they are seen.
-    pub seen: [Place; 2],
+    pub projected: [AxisPoint; 2],
 }
 
 /// Everything that is seen of a bead.
 #[derive(Debug, Clone)]
-pub struct Outline {
+pub struct BeadOutline {
     /// In the order in which `run` grows. Beyond the ends of the bead its
     /// edges go on straight.
-    pub samples: Vec<Sample>,
+    pub samples: Vec<OutlineSample>,
     /// Stretches that have been laid \[mm\], within what is seen.
-    pub stretches: Vec<Stretch>,
+    pub segments: Vec<LaidSegment>,
 }
 
 /// A stretch of bead between two ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stretch {
+pub struct LaidSegment {
     /// Where it begins \[mm\]; −∞ if before what is seen.
     pub from_mm: f64,
     /// Where it ends \[mm\]; +∞ if after what is seen.
     pub to_mm: f64,
 }
 
-impl Outline {
+impl BeadOutline {
     /// Follows the bead through a picture that has `run` pixels along the
     /// gauge's axis, and `margin` more on either side. `None` without bead in
     /// sight.
-    pub fn trace(view: &View, bead: &Bead<'_>, run: f64, margin: f64) -> Option<Self> {
+    pub fn trace(view: &BeadView, bead: &BeadEdges<'_>, run: f64, margin: f64) -> Option<Self> {
         let step = view.pixel_mm * SAMPLE_PX;
         let most = (run + 2.0 * margin) * 16.0 / SAMPLE_PX;
         let walk = |sign: f64| {
@@ -70,23 +70,23 @@ impl Outline {
             places.push((count * step, bead(count * step)));
             count += 1.0;
         }
-        let stretches = stretches(&places, bead);
-        let mut samples: Vec<Sample> = filled(&places)?
+        let stretches = segments(&places, bead);
+        let mut samples: Vec<OutlineSample> = filled(&places)?
             .filter_map(|(along_mm, (left, right))| {
                 let seen = [view.px(along_mm, left)?, view.px(along_mm, right)?];
-                Some(Sample { along_mm, offset_mm: [left, right], seen })
+                Some(OutlineSample { along_mm, offset_mm: [left, right], projected: seen })
             })
             .collect();
         if view.run_sign() < 0.0 {
             samples.reverse();
         }
-        Some(Self { samples, stretches })
+        Some(Self { samples, segments: stretches })
     }
 
     /// Where an edge (0 left, 1 right) crosses a line across the gauge \[px\].
     pub fn crossing(&self, edge: usize, run: f64) -> Option<f64> {
         let (before, after, share) = self.around(edge, run)?;
-        let (a, b) = (before.seen[edge].cross, after.seen[edge].cross);
+        let (a, b) = (before.projected[edge].cross, after.projected[edge].cross);
         Some(a + (b - a) * share)
     }
 
@@ -96,23 +96,23 @@ impl Outline {
         Some(before.along_mm + (after.along_mm - before.along_mm) * share)
     }
 
-    fn around(&self, edge: usize, run: f64) -> Option<(&Sample, &Sample, f64)> {
-        let after = self.samples.partition_point(|s| s.seen[edge].run < run);
+    fn around(&self, edge: usize, run: f64) -> Option<(&OutlineSample, &OutlineSample, f64)> {
+        let after = self.samples.partition_point(|s| s.projected[edge].run < run);
         let (before, after) = (self.samples.get(after.checked_sub(1)?)?, self.samples.get(after)?);
-        let (a, b) = (before.seen[edge].run, after.seen[edge].run);
+        let (a, b) = (before.projected[edge].run, after.projected[edge].run);
         Some((before, after, if b > a { (run - a) / (b - a) } else { 0.0 }))
     }
 
     /// Whether all of a stretch has been laid.
     pub fn is_whole(&self, from_mm: f64, to_mm: f64) -> bool {
-        self.stretches.iter().any(|s| s.from_mm <= from_mm && to_mm <= s.to_mm)
+        self.segments.iter().any(|s| s.from_mm <= from_mm && to_mm <= s.to_mm)
     }
 }
 
-type Laid = Option<(f64, f64)>;
+type EdgeOffsets = Option<(f64, f64)>;
 
 /// The samples with the offsets of the nearest bead where there is none.
-fn filled(places: &[(f64, Laid)]) -> Option<impl Iterator<Item = (f64, (f64, f64))>> {
+fn filled(places: &[(f64, EdgeOffsets)]) -> Option<impl Iterator<Item = (f64, (f64, f64))>> {
     let mut last = places.iter().find_map(|(_, laid)| *laid)?;
     Some(places.iter().map(move |(along_mm, laid)| {
         last = laid.unwrap_or(last);
@@ -120,26 +120,26 @@ fn filled(places: &[(f64, Laid)]) -> Option<impl Iterator<Item = (f64, (f64, f64
     }))
 }
 
-fn stretches(places: &[(f64, Laid)], bead: &Bead<'_>) -> Vec<Stretch> {
+fn segments(places: &[(f64, EdgeOffsets)], bead: &BeadEdges<'_>) -> Vec<LaidSegment> {
     let mut found = Vec::new();
     let mut begun = places.first().and_then(|(_, laid)| laid.map(|_| f64::NEG_INFINITY));
     for pair in places.windows(2) {
         let [(before, was), (after, is)] = pair else { continue };
         match (was, is, begun) {
-            (None, Some(_), _) => begun = Some(border(bead, *after, *before)),
+            (None, Some(_), _) => begun = Some(bead_end(bead, *after, *before)),
             (Some(_), None, Some(from_mm)) => {
-                found.push(Stretch { from_mm, to_mm: border(bead, *before, *after) });
+                found.push(LaidSegment { from_mm, to_mm: bead_end(bead, *before, *after) });
                 begun = None;
             }
             _ => {}
         }
     }
-    found.extend(begun.map(|from_mm| Stretch { from_mm, to_mm: f64::INFINITY }));
+    found.extend(begun.map(|from_mm| LaidSegment { from_mm, to_mm: f64::INFINITY }));
     found
 }
 
 /// Where bead turns to no bead between two places.
-fn border(bead: &Bead<'_>, mut with_mm: f64, mut without_mm: f64) -> f64 {
+fn bead_end(bead: &BeadEdges<'_>, mut with_mm: f64, mut without_mm: f64) -> f64 {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (with_mm + without_mm);
         if bead(middle).is_some() {

@@ -7,23 +7,23 @@ use std::f64::consts::TAU;
 
 use super::hash::{mix, normal_pair};
 use crate::core::units::{MPa, Rpm};
-use crate::extruder::pressure::{Fopdt, Running};
+use crate::extruder::pressure::{Fopdt, InitialState};
 
 /// Step of the plant \[s\].
 pub const TICK_S: f64 = 0.005;
 
 /// A wave of the gain.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drift {
+pub struct GainWave {
     /// Amplitude, as a share of the gain.
-    pub share: f64,
+    pub amplitude: f64,
     /// Period \[s\].
     pub period_s: f64,
 }
 
 /// A step of the load.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Load {
+pub struct LoadChange {
     /// When it comes \[s\].
     pub at_s: f64,
     /// How large it is, at the input of the lag \[rpm\].
@@ -32,11 +32,11 @@ pub struct Load {
 
 /// What disturbs the process.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Disturbed {
+pub struct Disturbances {
     /// Waves of the gain.
-    pub drift: Vec<Drift>,
+    pub gain_waves: Vec<GainWave>,
     /// A step of the load.
-    pub load: Option<Load>,
+    pub load: Option<LoadChange>,
     /// Variance of a reading \[MPa²\].
     pub noise_mpa2: f64,
     /// Seed of the noise.
@@ -47,13 +47,13 @@ pub struct Disturbed {
 #[derive(Debug, Clone)]
 pub struct SimPressure {
     process: Fopdt,
-    disturbed: Disturbed,
+    disturbances: Disturbances,
     fastest_rpm: f64,
     /// Speeds of the ticks that are under way, the newest first.
-    under_way: VecDeque<f64>,
+    delayed_speeds: VecDeque<f64>,
     /// Whole ticks of the dead time, and the rest of it as a share of a tick.
     ticks: usize,
-    rest: f64,
+    fractional_tick: f64,
     speed_rpm: f64,
     pressure: f64,
     tick: u64,
@@ -66,7 +66,12 @@ impl SimPressure {
         clippy::cast_sign_loss,
         reason = "at most 60 s of ticks"
     )]
-    pub fn new(process: Fopdt, disturbed: Disturbed, fastest: Rpm, running: Running) -> Self {
+    pub fn new(
+        process: Fopdt,
+        disturbed: Disturbances,
+        fastest: Rpm,
+        running: InitialState,
+    ) -> Self {
         let ticks = process.dead_time_s() / TICK_S;
         // A dead time of whole ticks must not lose one to rounding.
         let whole = (ticks + 1e-9).floor();
@@ -75,11 +80,11 @@ impl SimPressure {
         under_way.resize(whole as usize + 2, speed_rpm);
         Self {
             process,
-            disturbed,
+            disturbances: disturbed,
             fastest_rpm: fastest.get(),
-            under_way,
+            delayed_speeds: under_way,
             ticks: whole as usize,
-            rest: (ticks - whole).max(0.0),
+            fractional_tick: (ticks - whole).max(0.0),
             speed_rpm,
             pressure: running.pressure.get(),
             tick: 0,
@@ -104,8 +109,8 @@ impl SimPressure {
 
     /// What the sensor reads.
     pub fn read(&self) -> MPa {
-        let [normal, _] = normal_pair(mix(&[0x7072_6573, self.disturbed.seed, self.tick]));
-        let noise = self.disturbed.noise_mpa2.sqrt() * normal;
+        let [normal, _] = normal_pair(mix(&[0x7072_6573, self.disturbances.seed, self.tick]));
+        let noise = self.disturbances.noise_mpa2.sqrt() * normal;
         MPa::new(self.pressure + noise).unwrap_or_default()
     }
 
@@ -118,26 +123,28 @@ impl SimPressure {
     /// time after the end of this tick.
     pub fn advance(&mut self) {
         let at_s = self.now_s();
-        let drift: f64 = self.disturbed.drift.iter().map(|wave| wave.at(at_s)).sum();
-        let load = self.disturbed.load.filter(|load| at_s >= load.at_s - 1e-9);
+        let drift: f64 = self.disturbances.gain_waves.iter().map(|wave| wave.at(at_s)).sum();
+        let load = self.disturbances.load.filter(|load| at_s >= load.at_s - 1e-9);
         let load = load.map_or(0.0, |load| load.rpm);
-        let old = |back: usize| self.under_way.get(back).copied().unwrap_or(self.speed_rpm);
+        let old = |back: usize| self.delayed_speeds.get(back).copied().unwrap_or(self.speed_rpm);
         // The rest of the dead time belongs to the speed of one tick earlier.
-        for (speed, share) in [(old(self.ticks + 1), self.rest), (old(self.ticks), 1.0 - self.rest)]
-        {
+        for (speed, share) in [
+            (old(self.ticks + 1), self.fractional_tick),
+            (old(self.ticks), 1.0 - self.fractional_tick),
+        ] {
             let settled = self.process.gain() * (1.0 + drift) * (speed + load);
             let kept = libm::exp(-share * TICK_S / self.process.lag_s());
             self.pressure = settled + (self.pressure - settled) * kept;
         }
-        self.under_way.pop_back();
-        self.under_way.push_front(self.speed_rpm);
+        self.delayed_speeds.pop_back();
+        self.delayed_speeds.push_front(self.speed_rpm);
         self.tick += 1;
     }
 }
 
-impl Drift {
+impl GainWave {
     fn at(&self, at_s: f64) -> f64 {
-        self.share * libm::sin(TAU * at_s / self.period_s)
+        self.amplitude * libm::sin(TAU * at_s / self.period_s)
     }
 }
 
@@ -145,8 +152,8 @@ impl Drift {
 mod tests {
     use super::*;
 
-    fn still() -> Running {
-        Running { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO }
+    fn still() -> InitialState {
+        InitialState { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO }
     }
 
     #[test]
@@ -154,7 +161,7 @@ mod tests {
         for dead in [0.41, 0.4137, 0.0, 0.492] {
             let process = Fopdt::new(2.0, 0.84, dead).unwrap();
             let fastest = Rpm::constant(3.0);
-            let mut plant = SimPressure::new(process, Disturbed::default(), fastest, still());
+            let mut plant = SimPressure::new(process, Disturbances::default(), fastest, still());
             plant.command(Rpm::constant(0.3));
             for _ in 0..400 {
                 plant.advance();
@@ -169,7 +176,7 @@ mod tests {
     fn the_screw_keeps_what_it_can_turn() {
         let process = Fopdt::new(1.0, 0.1, 0.0).unwrap();
         let fastest = Rpm::constant(3.0);
-        let mut plant = SimPressure::new(process, Disturbed::default(), fastest, still());
+        let mut plant = SimPressure::new(process, Disturbances::default(), fastest, still());
         plant.command(Rpm::constant(50.0));
         for _ in 0..2000 {
             plant.advance();
@@ -180,13 +187,16 @@ mod tests {
     #[test]
     fn a_load_and_a_drift_do_what_they_say() {
         let process = Fopdt::new(1.0, 0.05, 0.41).unwrap();
-        let disturbed = Disturbed {
-            drift: vec![Drift { share: 0.1, period_s: 1e4 }],
-            load: Some(Load { at_s: 1.0, rpm: 0.1 }),
-            ..Disturbed::default()
+        let disturbed = Disturbances {
+            gain_waves: vec![GainWave { amplitude: 0.1, period_s: 1e4 }],
+            load: Some(LoadChange { at_s: 1.0, rpm: 0.1 }),
+            ..Disturbances::default()
         };
-        let running =
-            Running { pressure: MPa::constant(0.6), target: MPa::ZERO, speed: Rpm::constant(0.6) };
+        let running = InitialState {
+            pressure: MPa::constant(0.6),
+            target: MPa::ZERO,
+            speed: Rpm::constant(0.6),
+        };
         let mut plant = SimPressure::new(process, disturbed, Rpm::constant(3.0), running);
         for _ in 0..200 {
             plant.advance();

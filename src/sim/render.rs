@@ -4,28 +4,28 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::bend::Bend;
+use super::bend::BeadPath;
 use super::light::Light;
-use super::outline::{Bead, Outline};
-use super::seen::{Masks, Seen};
-use super::shade::{self, Shape};
+use super::outline::{BeadEdges, BeadOutline};
+use super::seen::{BeadCoverage, Masks};
+use super::shade::{self, BeadShape};
 use super::tint::Tint;
 use super::truth::{self, Truth};
-use super::view::{GaugeExtent, View};
+use super::view::{BeadView, GaugeExtent};
 use super::{grains, hash, motion, spots, texture};
 use crate::calibration::Calibration;
 use crate::core::frame::{Frame, Pixels, WrongSize};
 use crate::core::geometry::{ImagePoint, Size};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
-use crate::numeric::number::float;
-use crate::scenario::image::Picture;
-use crate::vision::{Axis, Gauge};
+use crate::numeric::number::to_f64;
+use crate::scenario::image::ImageModel;
+use crate::vision::{BeadAxis, Gauge};
 
 /// What the random numbers of a frame are for; those of the noise have no word.
-const SPOTS: u64 = 1;
-const GRAINS: u64 = 2;
-const TEXTURE: u64 = 3;
+const SPOTS_STREAM: u64 = 1;
+const GRAINS_STREAM: u64 = 2;
+const TEXTURE_STREAM: u64 = 3;
 
 /// Takes pictures of a bead that runs through the gauge of a calibrated
 /// camera.
@@ -44,7 +44,7 @@ pub struct Renderer {
     /// How much higher the bead lies than that of the first layer.
     rise: Mm,
     gauge: Gauge,
-    picture: Picture,
+    image: ImageModel,
     size: (usize, usize),
     seed: u64,
 }
@@ -64,13 +64,13 @@ pub enum RenderError {
     /// The gauge does not lie within the picture.
     #[error(
         "the gauge reaches to ({}, {}) px, the picture has {} x {} px; make one fit the other",
-        reaches.0, reaches.1, picture.0, picture.1
+        end.0, end.1, image.0, image.1
     )]
     GaugeOutside {
         /// Right and lower side of the gauge \[px\].
-        reaches: (usize, usize),
+        end: (usize, usize),
         /// Size of the picture \[px\].
-        picture: (usize, usize),
+        image: (usize, usize),
     },
     /// The middle of the gauge sees no surface.
     #[error(
@@ -94,7 +94,7 @@ impl Renderer {
         calibration: Calibration,
         surface_height: Mm,
         gauge: Gauge,
-        picture: Picture,
+        picture: ImageModel,
         seed: u64,
     ) -> Result<Self, RenderError> {
         let side = |px: u32| usize::try_from(px).unwrap_or(usize::MAX);
@@ -103,12 +103,12 @@ impl Renderer {
         if !gauge.roi.fits(Size::new(size.0, size.1)) {
             let roi = gauge.roi;
             let reaches = (roi.x.saturating_add(roi.width), roi.y.saturating_add(roi.height));
-            return Err(RenderError::GaugeOutside { reaches, picture: size });
+            return Err(RenderError::GaugeOutside { end: reaches, image: size });
         }
         let true_height = picture.true_surface_height_mm.and_then(|height| Mm::new(height).ok());
         let surface_height = true_height.unwrap_or(surface_height);
         let rise = Mm::ZERO;
-        Ok(Self { calibration, surface_height, rise, gauge, picture, size, seed })
+        Ok(Self { calibration, surface_height, rise, gauge, image: picture, size, seed })
     }
 
     /// The bead lies higher than that of the first layer from now on.
@@ -128,15 +128,15 @@ impl Renderer {
         seq: u64,
         captured_at: Stamp,
         robot_z: Option<Mm>,
-        bead: &Bead<'_>,
+        bead: &BeadEdges<'_>,
     ) -> Result<Rendered, RenderError> {
         let view = self.view(robot_z)?;
         let GaugeExtent { run, cross } = self.extent();
         // Half the picture across more, for edges that run at an angle.
-        let margin = float(shade::margin_px(self.picture.blur_px) + cross / 2);
-        let margin = margin + self.picture.motion.length_px;
-        let outline = Outline::trace(&view, bead, float(run), margin);
-        let seen = outline.as_ref().map(|outline| self.see(seq, outline, &view));
+        let margin = to_f64(shade::margin_px(self.image.blur_px) + cross / 2);
+        let margin = margin + self.image.motion.length_px;
+        let outline = BeadOutline::trace(&view, bead, to_f64(run), margin);
+        let seen = outline.as_ref().map(|outline| self.coverage(seq, outline, &view));
         let pixels = self.expose(seq, seen.as_ref());
         let truth = outline.and_then(|outline| truth::of(&outline, &view, &self.gauge));
         let frame = Frame::new(
@@ -151,22 +151,22 @@ impl Renderer {
     /// How far from the middle of the gauge the picture reaches along the bead
     /// \[mm\], at most a metre.
     pub fn reach_mm(&self, robot_z: Option<Mm>) -> Result<f64, RenderError> {
-        const FARTHEST_MM: f64 = 1000.0;
+        const MAX_REACH_MM: f64 = 1000.0;
         let view = self.view(robot_z)?;
-        let (right, below) = (float(self.size.0) - 0.5, float(self.size.1) - 0.5);
+        let (right, below) = (to_f64(self.size.0) - 0.5, to_f64(self.size.1) - 0.5);
         let corners = [(-0.5, -0.5), (right, -0.5), (-0.5, below), (right, below)];
         let reach = corners.into_iter().map(|(x, y)| {
-            view.along_mm(ImagePoint::new(x, y)).map_or(FARTHEST_MM, f64::abs).min(FARTHEST_MM)
+            view.along_mm(ImagePoint::new(x, y)).map_or(MAX_REACH_MM, f64::abs).min(MAX_REACH_MM)
         });
         Ok(reach.fold(0.0, f64::max))
     }
 
-    fn view(&self, robot_z: Option<Mm>) -> Result<View, RenderError> {
+    fn view(&self, robot_z: Option<Mm>) -> Result<BeadView, RenderError> {
         let height = self.surface_height + self.rise;
         let map = self.calibration.surface(height, robot_z);
-        let Picture { slant_deg, lateral_mm, .. } = self.picture;
-        View::new(map, &self.gauge, slant_deg, lateral_mm)
-            .map(|view| view.bent(Bend::new(&self.picture.bend)))
+        let ImageModel { slant_deg, lateral_mm, .. } = self.image;
+        BeadView::new(map, &self.gauge, slant_deg, lateral_mm)
+            .map(|view| view.bent(BeadPath::new(&self.image.bend)))
             .ok_or(RenderError::OffSurface { height_mm: height.get() })
     }
 
@@ -174,40 +174,42 @@ impl Renderer {
     fn extent(&self) -> GaugeExtent {
         let (width, height) = self.size;
         match self.gauge.axis {
-            Axis::Vertical => GaugeExtent { run: height, cross: width },
-            Axis::Horizontal => GaugeExtent { run: width, cross: height },
+            BeadAxis::Vertical => GaugeExtent { run: height, cross: width },
+            BeadAxis::Horizontal => GaugeExtent { run: width, cross: height },
         }
     }
 
     /// What a pixel sees of bead and ground, without light, texture and noise.
-    fn see(&self, seq: u64, outline: &Outline, view: &View) -> Seen {
-        let picture = &self.picture;
-        let shape = Shape::new(outline, view, self.extent(), picture.blur_px);
+    fn coverage(&self, seq: u64, outline: &BeadOutline, view: &BeadView) -> BeadCoverage {
+        let picture = &self.image;
+        let shape = BeadShape::new(outline, view, self.extent(), picture.blur_px);
         let positions = motion::positions(&picture.motion, picture.blur_px);
-        let mut seen = Seen::of(&shape, Tint::new(picture).as_ref(), &positions);
-        let spots = spots::spots(&picture.spots, &shape, hash::mix(&[self.seed, seq, SPOTS]));
-        let grains = grains::grains(&picture.grains, &shape, hash::mix(&[self.seed, seq, GRAINS]));
+        let mut seen = BeadCoverage::of(&shape, Tint::new(picture).as_ref(), &positions);
+        let spots =
+            spots::spots(&picture.spots, &shape, hash::mix(&[self.seed, seq, SPOTS_STREAM]));
+        let grains =
+            grains::grains(&picture.grains, &shape, hash::mix(&[self.seed, seq, GRAINS_STREAM]));
         if spots.is_some() || grains.is_some() {
             let light = Light::new(picture, self.size.0, self.size.1);
             let at = |run: usize, cross: usize| match self.gauge.axis {
-                Axis::Vertical => light.at(cross, run),
-                Axis::Horizontal => light.at(run, cross),
+                BeadAxis::Vertical => light.at(cross, run),
+                BeadAxis::Horizontal => light.at(run, cross),
             };
             seen.cover(&shape, picture, Masks { spots, grains }, &at, &positions);
         }
         match self.gauge.axis {
-            Axis::Vertical => seen,
-            Axis::Horizontal => seen.turned(self.extent().cross),
+            BeadAxis::Vertical => seen,
+            BeadAxis::Horizontal => seen.turned(self.extent().cross),
         }
     }
 
     /// Grey levels from what is seen, light, texture and noise.
-    fn expose(&self, seq: u64, seen: Option<&Seen>) -> Vec<u8> {
-        let Picture { bead_grey, ground_grey, noise_grey, .. } = self.picture;
+    fn expose(&self, seq: u64, seen: Option<&BeadCoverage>) -> Vec<u8> {
+        let ImageModel { bead_grey, ground_grey, noise_grey, .. } = self.image;
         let step = bead_grey - ground_grey;
-        let light = Light::new(&self.picture, self.size.0, self.size.1);
-        let key = hash::mix(&[self.seed, seq, TEXTURE]);
-        let texture = texture::texture(&self.picture.texture, self.size.0, self.size.1, key);
+        let light = Light::new(&self.image, self.size.0, self.size.1);
+        let key = hash::mix(&[self.seed, seq, TEXTURE_STREAM]);
+        let texture = texture::texture(&self.image.texture, self.size.0, self.size.1, key);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(hash::mix(&[self.seed, seq]));
         let (width, height) = self.size;
         let mut pixels = Vec::with_capacity(width * height);
@@ -215,10 +217,10 @@ impl Renderer {
             let line = |values: &'_ [f32], column: usize| f64::from(values[row * width + column]);
             let (first, growth) = light.row(row);
             for column in 0..width {
-                let share = seen.map_or(0.0, |seen| line(&seen.shares, column));
-                let added = seen.and_then(|seen| seen.added.as_deref());
+                let share = seen.map_or(0.0, |seen| line(&seen.fractions, column));
+                let added = seen.and_then(|seen| seen.added_grey.as_deref());
                 let added = added.map_or(0.0, |added| line(added, column));
-                let lit = first + growth * float(column);
+                let lit = first + growth * to_f64(column);
                 let mut grey = lit * (ground_grey + step * share + added);
                 grey += texture.as_deref().map_or(0.0, |texture| line(texture, column));
                 if noise_grey > 0.0 {

@@ -60,7 +60,7 @@ impl SimScrew {
     /// Feeds a share of full over one step.
     pub fn advance(&mut self, fill: f64) {
         let from = self.now_s();
-        self.feed.push(self.fed_at(from), fill);
+        self.feed.push(self.feed_position(from), fill);
         let to = f64::from(self.ticks + 1) * self.step_s;
         match self.integrator {
             Integrator::Euler => self.euler(from),
@@ -74,20 +74,21 @@ impl SimScrew {
         let steps = (self.screw.delay(from, self.plug_m) / self.step_s).ceil();
         // The middle of the step that the feed is of, so that no rounding of
         // its ends matters.
-        let place = self.fed_at(from - (steps - 0.5) * self.step_s);
+        let place = self.feed_position(from - (steps - 0.5) * self.step_s);
         self.plug_m += self.step_s * self.rate(from, self.plug_m, self.feed.at(place));
     }
 
     fn runge_kutta(&mut self, from: f64, to: f64, longest: f64) {
         let mut at = from;
         while at < to {
-            let place = self.reaching(at, self.plug_m);
+            let place = self.arriving_position(at, self.plug_m);
             let (fill, change) = (self.feed.at(place), self.feed.next_change(place));
             let full = longest.min(to - at);
             let mut step = full;
             if let Some(change) = change {
-                let past =
-                    |step: f64| self.reaching(at + step, self.grown(at, step, fill)) - change;
+                let past = |step: f64| {
+                    self.arriving_position(at + step, self.grown(at, step, fill)) - change
+                };
                 if past(full) > 0.0 {
                     step = crossing(past, full);
                 }
@@ -112,18 +113,18 @@ impl SimScrew {
     }
 
     /// Where in the feed's row that is what reaches the plug now.
-    fn reaching(&self, at: f64, plug: f64) -> f64 {
+    fn arriving_position(&self, at: f64, plug: f64) -> f64 {
         match self.screw.conveying {
             Conveying::AtPresentSpeed => at - (self.screw.length_m - plug) / self.screw.speed(at),
-            Conveying::AtSpeedOnTheWay => self.screw.way(at) - (self.screw.length_m - plug),
+            Conveying::AtSpeedOnTheWay => self.screw.conveyed_m(at) - (self.screw.length_m - plug),
         }
     }
 
     /// Where in the feed's row that is what is fed now.
-    fn fed_at(&self, at: f64) -> f64 {
+    fn feed_position(&self, at: f64) -> f64 {
         match self.screw.conveying {
             Conveying::AtPresentSpeed => at,
-            Conveying::AtSpeedOnTheWay => self.screw.way(at),
+            Conveying::AtSpeedOnTheWay => self.screw.conveyed_m(at),
         }
     }
 }
@@ -151,10 +152,10 @@ pub fn delay_free(
     plug_m: f64,
     from_s: f64,
     step_s: f64,
-    law: impl Fn(f64) -> f64,
+    controller: impl Fn(f64) -> f64,
 ) -> impl Iterator<Item = f64> {
     const PARTS: u32 = 10;
-    let rate = move |at: f64, plug: f64| screw.speed(at) * screw.growth(plug, law(plug));
+    let rate = move |at: f64, plug: f64| screw.speed(at) * screw.growth(plug, controller(plug));
     let step = step_s / f64::from(PARTS);
     let half = 0.5 * step;
     let mut plug = plug_m;
@@ -175,13 +176,15 @@ pub fn delay_free(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::extruder::screw::exact::Exact;
-    use crate::extruder::screw::{Pulsation, ScrewDesign};
+    use crate::extruder::screw::exact::ExactPredictor;
+    use crate::extruder::screw::{ScrewDesign, SpeedPulsation};
 
-    const A: Pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
-    const B: Pulsation = Pulsation { share: 0.4, rad_per_s: 0.4, phase_rad: 0.0 };
+    const A: SpeedPulsation =
+        SpeedPulsation { relative_amplitude: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+    const B: SpeedPulsation =
+        SpeedPulsation { relative_amplitude: 0.4, rad_per_s: 0.4, phase_rad: 0.0 };
 
-    fn screw(pulsation: Pulsation) -> Screw {
+    fn screw(pulsation: SpeedPulsation) -> Screw {
         ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap()
     }
 
@@ -194,9 +197,9 @@ mod tests {
     fn a_plug_that_is_held_stays() {
         for integrator in [Integrator::Euler, Integrator::RungeKutta(1e-3)] {
             let screw = screw(A);
-            let mut plant = SimScrew::new(screw, integrator, 1e-3, 0.13, screw.holding(0.13));
+            let mut plant = SimScrew::new(screw, integrator, 1e-3, 0.13, screw.holding_fill(0.13));
             for _ in 0..5_000 {
-                plant.advance(screw.holding(0.13));
+                plant.advance(screw.holding_fill(0.13));
             }
             assert!((plant.plug_m() - 0.13).abs() < 1e-12);
         }
@@ -206,7 +209,7 @@ mod tests {
     fn nothing_happens_before_the_first_effect() {
         for integrator in [Integrator::Euler, Integrator::RungeKutta(1e-3)] {
             let screw = screw(B);
-            let mut plant = SimScrew::new(screw, integrator, 1e-3, 0.1, screw.holding(0.1));
+            let mut plant = SimScrew::new(screw, integrator, 1e-3, 0.1, screw.holding_fill(0.1));
             while (plant.plug_m() - 0.1).abs() < 1e-9 {
                 plant.advance(0.9);
             }
@@ -220,20 +223,20 @@ mod tests {
         // What was fed is in the channel or has left through the nozzle: with
         // q for the way conveyed, d(plug + ∫fill ahead of it) = U − θ2·x/(1 + θ2·x) a metre.
         let screw = Screw { conveying: Conveying::AtSpeedOnTheWay, ..screw(A) };
-        let before = screw.holding(0.1);
+        let before = screw.holding_fill(0.1);
         let mut plant = SimScrew::new(screw, Integrator::RungeKutta(2e-4), 1e-3, 0.1, before);
         let (mut stored, mut passed) = (0.1 + 0.1 * before, 0.0);
         for tick in 0..3_000 {
-            let way = screw.way(plant.now_s() + 1e-3) - screw.way(plant.now_s());
-            let leaves = screw.holding(plant.plug_m());
+            let way = screw.conveyed_m(plant.now_s() + 1e-3) - screw.conveyed_m(plant.now_s());
+            let leaves = screw.holding_fill(plant.plug_m());
             plant.advance(fill(tick));
-            let leaves = f64::midpoint(leaves, screw.holding(plant.plug_m()));
+            let leaves = f64::midpoint(leaves, screw.holding_fill(plant.plug_m()));
             passed += way * (fill(tick) - leaves);
         }
-        let now = screw.way(plant.now_s());
+        let now = screw.conveyed_m(plant.now_s());
         let ahead: f64 = plant
             .feed
-            .pieces(now - (screw.length_m - plant.plug_m()), now)
+            .segments(now - (screw.length_m - plant.plug_m()), now)
             .map(|piece| piece.length * piece.fill)
             .sum();
         stored -= plant.plug_m() + ahead;
@@ -243,9 +246,9 @@ mod tests {
     #[test]
     fn a_prediction_comes_true() {
         for conveying in [Conveying::AtPresentSpeed, Conveying::AtSpeedOnTheWay] {
-            for pulsation in [Pulsation::default(), A, B] {
+            for pulsation in [SpeedPulsation::default(), A, B] {
                 let screw = Screw { conveying, ..screw(pulsation) };
-                let predictor = Exact::new(screw);
+                let predictor = ExactPredictor::new(screw);
                 let mut plant = SimScrew::new(screw, Integrator::RungeKutta(2e-4), 1e-3, 0.1, 0.2);
                 let mut history = FeedHistory::new(4_000, 0.2);
                 let mut due = Vec::new();
@@ -254,7 +257,7 @@ mod tests {
                     if tick % 100 == 7 {
                         due.push(predictor.predict(&history, now, plant.plug_m()).unwrap());
                     }
-                    history.push(predictor.place(now), fill(tick));
+                    history.push(predictor.coordinate(now), fill(tick));
                     let was = plant.plug_m();
                     plant.advance(fill(tick));
                     due.retain(|found| {
@@ -272,7 +275,7 @@ mod tests {
     #[test]
     fn without_delay_the_plug_goes_where_the_share_holds_it() {
         let screw = screw(B);
-        let hold = screw.holding(0.16);
+        let hold = screw.holding_fill(0.16);
         let last = delay_free(&screw, 0.1, 0.0, 0.1, |_| hold).nth(900).unwrap();
         assert!((last - 0.16).abs() < 1e-6);
     }

@@ -1,20 +1,20 @@
 //! What the pixels see before light, texture and noise: shares of bead, and
 //! the grey that disturbances add.
 
-use super::discs::{self, Layer, Mask, Scene};
+use super::discs::{self, Backdrop, DiscLayer, Mask};
 use super::motion::ShutterPosition;
-use super::shade::Shape;
-use super::tint::{Line, Tint};
+use super::shade::BeadShape;
+use super::tint::{BeadLine, Tint};
 use super::view::GaugeExtent;
-use crate::scenario::image::Picture;
+use crate::scenario::image::ImageModel;
 
 /// Pixels line after line across the bead, until they are turned.
 #[derive(Debug, Clone)]
-pub struct Seen {
+pub struct BeadCoverage {
     /// Share of bead.
-    pub shares: Vec<f32>,
+    pub fractions: Vec<f32>,
     /// Grey levels that are added to bead and ground.
-    pub added: Option<Vec<f32>>,
+    pub added_grey: Option<Vec<f32>>,
 }
 
 /// What lies on bead and ground; `None` where there is nothing of the kind.
@@ -26,10 +26,10 @@ pub struct Masks {
     pub grains: Option<Mask>,
 }
 
-impl Seen {
+impl BeadCoverage {
     /// The bead and what follows its edges, as the mean over the places where
     /// the picture is while the shutter is open.
-    pub fn of(shape: &Shape, tint: Option<&Tint>, positions: &[ShutterPosition]) -> Self {
+    pub fn of(shape: &BeadShape, tint: Option<&Tint>, positions: &[ShutterPosition]) -> Self {
         let GaugeExtent { run, cross } = shape.extent;
         let mut shares = vec![0.0; run * cross];
         let mut added = tint.map(|_| vec![0.0; run * cross]);
@@ -45,47 +45,48 @@ impl Seen {
                 }
                 if let Some((tint, added)) = tint.zip(added.as_mut()) {
                     let greys = &mut added[at * cross..][..cross];
-                    let here = Line { at, shift_px: *shift_px, first, shares: &line, weight };
+                    let here =
+                        BeadLine { at, shift_px: *shift_px, first, fractions: &line, weight };
                     tint.add(shape, &here, greys);
                 }
             }
         }
-        Self { shares, added }
+        Self { fractions: shares, added_grey: added }
     }
 
     /// Covers bead and ground with spots and grains. `light` is that of a
     /// pixel along and across the axis.
     pub fn cover(
         &mut self,
-        shape: &Shape,
-        picture: &Picture,
+        shape: &BeadShape,
+        picture: &ImageModel,
         Masks { spots, grains }: Masks,
         light: &dyn Fn(usize, usize) -> f64,
         positions: &[ShutterPosition],
     ) {
-        let count = self.shares.len();
-        let tint = self.added.take().unwrap_or_else(|| vec![0.0; count]);
+        let count = self.fractions.len();
+        let tint = self.added_grey.take().unwrap_or_else(|| vec![0.0; count]);
         let grey = [picture.ground_grey, picture.bead_grey];
-        let scene = Scene { shape, grey, tint: &tint };
+        let scene = Backdrop { shape, grey, tint: &tint };
         let mut change = vec![0.0; count];
         if let Some(mut mask) = spots {
             // Grains lie on top.
             if let Some(grains) = &grains {
-                mask.give_way(grains);
+                mask.subtract(grains);
             }
             // Saturated in any light.
             let grey = |run, cross| picture.bead_grey.max(255.0 / light(run, cross));
-            scene.paint(&Layer { mask: &mask, grey: &grey, bead_only: true }, &mut change);
+            scene.paint(&DiscLayer { mask: &mask, grey: &grey, bead_only: true }, &mut change);
         }
         if let Some(mask) = &grains {
             let grey = |_, _| picture.grains.grey;
-            scene.paint(&Layer { mask, grey: &grey, bead_only: false }, &mut change);
+            scene.paint(&DiscLayer { mask, grey: &grey, bead_only: false }, &mut change);
         }
         let mut added = discs::blur(change, shape.extent.cross, shape.blur_px, positions);
         for (added, tint) in added.iter_mut().zip(tint) {
             *added += tint;
         }
-        self.added = Some(added);
+        self.added_grey = Some(added);
     }
 
     /// Lines of `cross` pixels become columns.
@@ -93,6 +94,6 @@ impl Seen {
         let turn = |values: Vec<f32>| -> Vec<f32> {
             (0..cross).flat_map(|at| values.iter().skip(at).step_by(cross)).copied().collect()
         };
-        Self { shares: turn(self.shares), added: self.added.map(turn) }
+        Self { fractions: turn(self.fractions), added_grey: self.added_grey.map(turn) }
     }
 }

@@ -1,16 +1,16 @@
 //! How much of each pixel is bead: the outline, blurred by the lens and
 //! integrated over the pixels.
 
-use super::contour::{Contour, clamp};
+use super::contour::{Contour, clamp_index};
 use super::edge::coverage;
-use super::outline::{Outline, Stretch};
-use super::view::{GaugeExtent, View};
-use crate::numeric::number::float;
+use super::outline::{BeadOutline, LaidSegment};
+use super::view::{BeadView, GaugeExtent};
+use crate::numeric::number::to_f64;
 
 /// A Gaussian ends here, in standard deviations: 3·10⁻⁷ of a step is left.
-pub const REACH: f64 = 5.0;
+pub const GAUSSIAN_REACH_SIGMAS: f64 = 5.0;
 /// Half the diagonal of a pixel, and a little for the bend of an edge \[px\].
-const AROUND_PX: f64 = 1.5;
+const EDGE_MARGIN_PX: f64 = 1.5;
 
 /// A straight line across the bead, at one of its ends.
 #[derive(Debug, Clone, Copy)]
@@ -24,7 +24,7 @@ struct End {
 /// A bead as it lies in the picture; all in pixels along and across the
 /// gauge's axis.
 #[derive(Debug, Clone)]
-pub struct Shape {
+pub struct BeadShape {
     /// The left and the right edge.
     pub edges: [Contour; 2],
     /// Pixels along and across the axis.
@@ -35,14 +35,14 @@ pub struct Shape {
     ends: Vec<(Option<End>, Option<End>)>,
 }
 
-impl Shape {
+impl BeadShape {
     /// The shape of an outline in a picture with so many pixels along and
     /// across the gauge's axis.
-    pub fn new(outline: &Outline, view: &View, extent: GaugeExtent, blur_px: f64) -> Self {
+    pub fn new(outline: &BeadOutline, view: &BeadView, extent: GaugeExtent, blur_px: f64) -> Self {
         let margin = margin_px(blur_px);
         let edges = [0, 1].map(|side| Contour::new(&outline.samples, side, extent.run, margin));
         let mut ends: Vec<(Option<End>, Option<End>)> =
-            outline.stretches.iter().map(|stretch| ends_of(stretch, outline, view)).collect();
+            outline.segments.iter().map(|stretch| ends_of(stretch, outline, view)).collect();
         if ends.iter().any(|ends| matches!(ends, (None, None))) {
             ends.clear();
         }
@@ -55,22 +55,23 @@ impl Shape {
     /// axis. Near an edge a pixel sees the tangent at the edge's nearest point.
     pub fn line(&self, at: usize, shift: [f64; 2], line: &mut Vec<f32>) -> Option<usize> {
         let [left, right] = &self.edges;
-        let (at, reach) = (float(at) + shift[0], REACH * self.blur_px + AROUND_PX);
+        let (at, reach) =
+            (to_f64(at) + shift[0], GAUSSIAN_REACH_SIGMAS * self.blur_px + EDGE_MARGIN_PX);
         let (from, solid_from) = left.span(at, reach)?;
         let (solid_to, to) = right.span(at, reach)?;
-        let first = clamp(from - shift[1], self.extent.cross);
-        let last = clamp(to - shift[1] + 1.0, self.extent.cross);
+        let first = clamp_index(from - shift[1], self.extent.cross);
+        let last = clamp_index(to - shift[1] + 1.0, self.extent.cross);
         line.clear();
         for number in first..last {
-            let place = float(number) + shift[1];
-            let from_left = if place > solid_from { 1.0 } else { self.share(0, at, place) };
-            let from_right = if place < solid_to { 1.0 } else { self.share(1, at, place) };
+            let place = to_f64(number) + shift[1];
+            let from_left = if place > solid_from { 1.0 } else { self.edge_fraction(0, at, place) };
+            let from_right = if place < solid_to { 1.0 } else { self.edge_fraction(1, at, place) };
             #[expect(clippy::cast_possible_truncation, reason = "a share of one pixel")]
             line.push((from_left + from_right - 1.0).max(0.0) as f32);
         }
         if !self.ends.is_empty() {
             for (share, number) in line.iter_mut().zip(first..) {
-                *share *= self.laid_share(at, float(number) + shift[1]);
+                *share *= self.laid_fraction(at, to_f64(number) + shift[1]);
             }
         }
         (first < last).then_some(first)
@@ -84,7 +85,7 @@ impl Shape {
     }
 
     /// Share of a pixel on the inner side of an edge.
-    fn share(&self, side: usize, at: f64, place: f64) -> f64 {
+    fn edge_fraction(&self, side: usize, at: f64, place: f64) -> f64 {
         let sign = if side == 0 { 1.0 } else { -1.0 };
         let tangent = self.edges[side].tangent(at, place);
         coverage(sign * tangent.beyond, tangent.normal, self.blur_px)
@@ -93,7 +94,7 @@ impl Shape {
     /// Share of a pixel that lies between the ends of any stretch, blurred like
     /// the edges.
     #[expect(clippy::cast_possible_truncation, reason = "a share of one pixel")]
-    pub fn laid_share(&self, at: f64, place: f64) -> f32 {
+    pub fn laid_fraction(&self, at: f64, place: f64) -> f32 {
         self.laid(at, place, self.blur_px) as f32
     }
 
@@ -115,11 +116,15 @@ impl Shape {
 
 /// How far beyond the picture the outline is needed \[px\].
 pub fn margin_px(blur_px: f64) -> usize {
-    clamp((REACH * blur_px).ceil(), 1000) + 8
+    clamp_index((GAUSSIAN_REACH_SIGMAS * blur_px).ceil(), 1000) + 8
 }
 
 /// The ends of a stretch that are in sight.
-fn ends_of(stretch: &Stretch, outline: &Outline, view: &View) -> (Option<End>, Option<End>) {
+fn ends_of(
+    stretch: &LaidSegment,
+    outline: &BeadOutline,
+    view: &BeadView,
+) -> (Option<End>, Option<End>) {
     let end = |along_mm: f64, sign: f64| {
         if !along_mm.is_finite() {
             return None;

@@ -7,21 +7,21 @@ use rand_distr::{Distribution, Poisson, StandardUniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::discs::{Disc, Mask};
-use super::shade::Shape;
-use crate::numeric::number::float;
+use super::shade::BeadShape;
+use crate::numeric::number::to_f64;
 use crate::scenario::image::Spots;
 
 /// Discs at random places over the bead. They may cover each other: of the
 /// area a, N discs leave the share exp(−N·πr²/a).
-pub fn spots(spots: &Spots, shape: &Shape, key: u64) -> Option<Mask> {
+pub fn spots(spots: &Spots, shape: &BeadShape, key: u64) -> Option<Mask> {
     let radius = 0.5 * spots.size_px;
-    if spots.share <= 0.0 || radius <= 0.0 {
+    if spots.covered_fraction <= 0.0 || radius <= 0.0 {
         return None;
     }
     let mut random = Xoshiro256PlusPlus::seed_from_u64(key);
     let (from, to) = across(shape, radius);
-    let run = float(shape.extent.run) + 2.0 * radius;
-    let density = -libm::log1p(-spots.share.min(0.99)) / (PI * radius * radius);
+    let run = to_f64(shape.extent.run) + 2.0 * radius;
+    let density = -libm::log1p(-spots.covered_fraction.min(0.99)) / (PI * radius * radius);
     let count = Poisson::new(density * run * (to - from)).ok()?.sample(&mut random);
     let mut mask = Mask::new(shape.extent);
     let mut uniform = || -> f64 { StandardUniform.sample(&mut random) };
@@ -33,16 +33,16 @@ pub fn spots(spots: &Spots, shape: &Shape, key: u64) -> Option<Mask> {
             cross: from + (to - from) * uniform(),
             radius,
         };
-        mask.cover(disc);
+        mask.add_disc(disc);
     }
     Some(mask)
 }
 
 /// First and last place across the axis that a spot on the bead can have.
-fn across(shape: &Shape, radius: f64) -> (f64, f64) {
+fn across(shape: &BeadShape, radius: f64) -> (f64, f64) {
     let crossings =
-        |edge: usize| (0..shape.extent.run).map(move |at| shape.edges[edge].crossing(float(at)));
+        |edge: usize| (0..shape.extent.run).map(move |at| shape.edges[edge].crossing(to_f64(at)));
     let from = crossings(0).fold(f64::INFINITY, f64::min) - radius;
     let to = crossings(1).fold(f64::NEG_INFINITY, f64::max) + radius;
-    (from.max(-radius), to.min(float(shape.extent.cross) + radius))
+    (from.max(-radius), to.min(to_f64(shape.extent.cross) + radius))
 }

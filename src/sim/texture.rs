@@ -6,13 +6,18 @@ use rand_distr::StandardUniform;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::convolve::{convolve, kernel};
-use crate::scenario::image::Texture;
+use crate::scenario::image::TexturePattern;
 
 /// Grey levels of a pattern over so many columns and rows, `None` where there
 /// is none. White noise, blurred with half the correlation length, has the
 /// autocorrelation exp(−(r/L)²).
-pub fn texture(texture: &Texture, width: usize, height: usize, key: u64) -> Option<Vec<f32>> {
-    if texture.size_grey <= 0.0 {
+pub fn texture(
+    texture: &TexturePattern,
+    width: usize,
+    height: usize,
+    key: u64,
+) -> Option<Vec<f32>> {
+    if texture.sigma_grey <= 0.0 {
         return None;
     }
     let kernel = kernel(0.5 * texture.length_px);
@@ -22,7 +27,7 @@ pub fn texture(texture: &Texture, width: usize, height: usize, key: u64) -> Opti
     let mut random = Xoshiro256PlusPlus::seed_from_u64(key);
     let gain = kernel.iter().skip(1).fold(kernel[0].powi(2), |sum, w| sum + 2.0 * w.powi(2));
     #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
-    let size = texture.size_grey as f32 / gain;
+    let size = texture.sigma_grey as f32 / gain;
     let mut pattern: Vec<f32> =
         (0..wide * high).map(|_| size * nearly_normal(&mut random)).collect();
     convolve(&mut pattern, wide, &kernel);
@@ -47,7 +52,7 @@ mod tests {
 
     #[test]
     fn size_and_autocorrelation_are_those_asked_for() {
-        let asked = Texture { size_grey: 3.0, length_px: 4.0 };
+        let asked = TexturePattern { sigma_grey: 3.0, length_px: 4.0 };
         let (width, height) = (1000, 600);
         let pattern = texture(&asked, width, height, 7).unwrap();
         let product = |x: usize, y: usize| {
@@ -70,6 +75,6 @@ mod tests {
 
     #[test]
     fn no_texture_is_none() {
-        assert!(texture(&Texture { size_grey: 0.0, length_px: 4.0 }, 8, 8, 1).is_none());
+        assert!(texture(&TexturePattern { sigma_grey: 0.0, length_px: 4.0 }, 8, 8, 1).is_none());
     }
 }

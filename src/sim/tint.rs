@@ -1,14 +1,14 @@
 //! Grey that follows an edge of the bead: light from one side, a shadow, an
 //! older bead beside it.
 
-use super::contour::clamp;
-use super::shade::{REACH, Shape};
+use super::contour::clamp_index;
+use super::shade::{BeadShape, GAUSSIAN_REACH_SIGMAS};
 use crate::numeric::normal_distribution::{cumulative, first_integral};
-use crate::numeric::number::float;
-use crate::scenario::image::Picture;
+use crate::numeric::number::to_f64;
+use crate::scenario::image::ImageModel;
 
 /// Places of a profile for each pixel.
-const PER_PX: f64 = 16.0;
+const POINTS_PER_PX: f64 = 16.0;
 
 /// Grey levels that are added at a distance from an edge; 0 on the near side.
 #[derive(Debug, Clone, Default)]
@@ -28,7 +28,7 @@ pub struct Tint {
 
 /// One line across the bead.
 #[derive(Debug, Clone, Copy)]
-pub struct Line<'a> {
+pub struct BeadLine<'a> {
     /// Its number along the gauge's axis.
     pub at: usize,
     /// Shift of the picture along and across the axis \[px\].
@@ -36,7 +36,7 @@ pub struct Line<'a> {
     /// First pixel that holds bead.
     pub first: usize,
     /// Shares of bead from that pixel on.
-    pub shares: &'a [f32],
+    pub fractions: &'a [f32],
     /// Weight of this line in the mean over the shutter's time.
     pub weight: f32,
 }
@@ -51,7 +51,7 @@ struct Knee {
 
 impl Tint {
     /// `None` where a picture has nothing of the kind.
-    pub fn new(picture: &Picture) -> Option<Self> {
+    pub fn new(picture: &ImageModel) -> Option<Self> {
         // A pixel is itself a blur.
         let blur_px = (picture.blur_px * picture.blur_px + 1.0 / 12.0).sqrt();
         let shading = &picture.shading;
@@ -66,11 +66,11 @@ impl Tint {
     }
 
     /// Adds to the grey of one line across the bead.
-    pub fn add(&self, shape: &Shape, line: &Line<'_>, greys: &mut [f32]) {
-        let Line { at, shift_px: shift, first, shares, weight } = *line;
-        let run = float(at) + shift[0];
+    pub fn add(&self, shape: &BeadShape, line: &BeadLine<'_>, greys: &mut [f32]) {
+        let BeadLine { at, shift_px: shift, first, fractions: shares, weight } = *line;
+        let run = to_f64(at) + shift[0];
         let middle = 0.5 * (shape.edges[0].crossing(run) + shape.edges[1].crossing(run)) - shift[1];
-        let middle = clamp(middle, greys.len());
+        let middle = clamp_index(middle, greys.len());
         let both = self.bead.iter().all(|profile| !profile.grey.is_empty());
         for (edge, sign) in [(0, -1.0), (1, 1.0)] {
             // The own half of the bead, and the other one up to its edge.
@@ -80,14 +80,14 @@ impl Tint {
                 (middle..greys.len(), 0..middle)
             };
             let outside = |number: usize| {
-                sign * shape.edges[edge].tangent(run, float(number) + shift[1]).beyond
+                sign * shape.edges[edge].tangent(run, to_f64(number) + shift[1]).beyond
             };
             let (bead, ground) = (&self.bead[edge], &self.ground[edge]);
             if !bead.grey.is_empty() || !ground.grey.is_empty() {
                 for number in own {
                     let distance = outside(number);
                     let grey = bead.at(-distance) + ground.at(distance);
-                    let laid = shape.laid_share(run, float(number) + shift[1]);
+                    let laid = shape.laid_fraction(run, to_f64(number) + shift[1]);
                     greys[number] += weight * laid * grey;
                 }
             }
@@ -101,18 +101,26 @@ impl Tint {
 }
 
 /// What lies beside an edge.
-fn beside(picture: &Picture, edge: usize) -> Vec<Knee> {
-    let Picture { shading, shadow, neighbour, .. } = picture;
+fn beside(picture: &ImageModel, edge: usize) -> Vec<Knee> {
+    let ImageModel { shading, shadow, neighbour, .. } = picture;
     let contrast = picture.bead_grey - picture.ground_grey;
     let mut knees = Vec::new();
     if shading.side.edges()[edge] {
         knees.extend(ramp(shading.ground_grey_per_px, shading.ground_px));
     }
     if shadow.distance_px > 0.0 && shadow.side.edges()[edge] {
-        knees.extend(band(shadow.distance_px, shadow.width_px, -shadow.share * contrast));
+        knees.extend(band(
+            shadow.distance_px,
+            shadow.width_px,
+            -shadow.contrast_fraction * contrast,
+        ));
     }
     if neighbour.gap_px > 0.0 && neighbour.side.edges()[edge] {
-        knees.extend(band(neighbour.gap_px, neighbour.width_px, neighbour.share * contrast));
+        knees.extend(band(
+            neighbour.gap_px,
+            neighbour.width_px,
+            neighbour.contrast_fraction * contrast,
+        ));
     }
     knees
 }
@@ -143,10 +151,13 @@ impl Profile {
         if knees.is_empty() {
             return Self::default();
         }
-        let from_px = first - REACH * blur_px;
-        let count = clamp((last + REACH * blur_px - from_px) * PER_PX + 2.0, 1 << 24);
+        let from_px = first - GAUSSIAN_REACH_SIGMAS * blur_px;
+        let count = clamp_index(
+            (last + GAUSSIAN_REACH_SIGMAS * blur_px - from_px) * POINTS_PER_PX + 2.0,
+            1 << 24,
+        );
         let grey = (0..count).map(|number| {
-            let at = from_px + float(number) / PER_PX;
+            let at = from_px + to_f64(number) / POINTS_PER_PX;
             let of = |knee: &&Knee| {
                 let u = (at - knee.at_px) / blur_px;
                 knee.step_grey * cumulative(u) + knee.grey_per_px * blur_px * first_integral(u)
@@ -160,12 +171,12 @@ impl Profile {
 
     /// Straight between the places, constant beyond the last one.
     fn at(&self, distance_px: f64) -> f32 {
-        let place = (distance_px - self.from_px) * PER_PX;
+        let place = (distance_px - self.from_px) * POINTS_PER_PX;
         let Some(last) = self.grey.last().filter(|_| place > 0.0) else { return 0.0 };
-        let number = clamp(place, self.grey.len());
+        let number = clamp_index(place, self.grey.len());
         let Some([a, b]) = self.grey.get(number..number + 2) else { return *last };
         #[expect(clippy::cast_possible_truncation, reason = "within 0 to 1")]
-        let share = (place - float(number)) as f32;
+        let share = (place - to_f64(number)) as f32;
         a + (b - a) * share
     }
 }

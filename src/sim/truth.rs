@@ -1,9 +1,9 @@
 //! What is true of a rendered frame.
 
-use super::outline::{Outline, Sample};
-use super::view::{Place, View, gauge_middle};
+use super::outline::{BeadOutline, OutlineSample};
+use super::view::{AxisPoint, BeadView, gauge_middle};
 use crate::core::geometry::ImagePoint;
-use crate::vision::{Axis, Gauge};
+use crate::vision::{BeadAxis, Gauge};
 
 /// What a perfect measurement of a rendered frame would find.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,11 +23,11 @@ pub struct Truth {
 }
 
 /// `None` unless the bead runs through the whole gauge.
-pub(super) fn of(outline: &Outline, view: &View, gauge: &Gauge) -> Option<Truth> {
+pub(super) fn of(outline: &BeadOutline, view: &BeadView, gauge: &Gauge) -> Option<Truth> {
     let middle = gauge_middle(&gauge.roi);
     let (run, count) = match gauge.axis {
-        Axis::Vertical => (middle.y, gauge.roi.height),
-        Axis::Horizontal => (middle.x, gauge.roi.width),
+        BeadAxis::Vertical => (middle.y, gauge.roi.height),
+        BeadAxis::Horizontal => (middle.x, gauge.roi.width),
     };
     #[expect(clippy::cast_precision_loss, reason = "pixel numbers stay far below 2^53")]
     let half = count as f64 / 2.0;
@@ -42,12 +42,12 @@ pub(super) fn of(outline: &Outline, view: &View, gauge: &Gauge) -> Option<Truth>
     }
     let offset = |side: usize, stretch| mean(outline, stretch, |s| s.offset_mm[side]);
     let both = (left.0.max(right.0), left.1.min(right.1));
-    let width = |s: &Sample| s.offset_mm[1] - s.offset_mm[0];
+    let width = |s: &OutlineSample| s.offset_mm[1] - s.offset_mm[0];
     let centre = mean(outline, both, width);
     let variance = mean(outline, both, |s| (width(s) - centre).powi(2));
     let point = |side: usize| {
         let cross = outline.crossing(side, run)?;
-        Some(view.image_point(Place { run, cross }))
+        Some(view.image_point(AxisPoint { run, cross }))
     };
     Some(Truth {
         width_mm: offset(1, right) - offset(0, left),
@@ -58,7 +58,11 @@ pub(super) fn of(outline: &Outline, view: &View, gauge: &Gauge) -> Option<Truth>
 }
 
 /// Mean of a quantity, straight between the samples, along a stretch of bead.
-fn mean(outline: &Outline, (from_mm, to_mm): (f64, f64), of: impl Fn(&Sample) -> f64) -> f64 {
+fn mean(
+    outline: &BeadOutline,
+    (from_mm, to_mm): (f64, f64),
+    of: impl Fn(&OutlineSample) -> f64,
+) -> f64 {
     let mut sum = 0.0;
     let mut length = 0.0;
     for pair in outline.samples.windows(2) {

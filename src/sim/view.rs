@@ -7,22 +7,22 @@
 
 use nalgebra::Vector2;
 
-use super::bend::Bend;
+use super::bend::BeadPath;
 use crate::calibration::SurfaceMap;
 use crate::core::geometry::{ImagePoint, Roi, SurfacePoint};
-use crate::vision::{Axis, Gauge};
+use crate::vision::{BeadAxis, Gauge};
 
 /// Places on the surface by their distance along the bead \[mm\], counted from
 /// the middle of the gauge in the direction of travel, and across it, positive
 /// to the right.
 #[derive(Debug, Clone, Copy)]
-pub struct View {
+pub struct BeadView {
     map: SurfaceMap,
     origin: SurfacePoint,
     along: Vector2<f64>,
     across: Vector2<f64>,
-    axis: Axis,
-    bend: Bend,
+    axis: BeadAxis,
+    bend: BeadPath,
     /// Length along the bead of one pixel in the middle of the gauge \[mm\].
     pub pixel_mm: f64,
 }
@@ -34,7 +34,7 @@ pub fn gauge_middle(roi: &Roi) -> ImagePoint {
     ImagePoint::new(middle(roi.x, roi.width), middle(roi.y, roi.height))
 }
 
-impl View {
+impl BeadView {
     /// The bead runs through the middle of the gauge, shifted sideways by
     /// `lateral_mm`, along the gauge's axis as it lies on the surface. A
     /// positive `slant_deg` makes its place across the gauge grow with its
@@ -44,8 +44,8 @@ impl View {
         let middle = gauge_middle(&gauge.roi);
         let mm_per_px = map.mm_per_px(middle)?;
         let (ahead, right, turn) = match gauge.axis {
-            Axis::Vertical => (Vector2::new(0.0, -1.0), Vector2::new(1.0, 0.0), -slant_deg),
-            Axis::Horizontal => (Vector2::new(1.0, 0.0), Vector2::new(0.0, 1.0), slant_deg),
+            BeadAxis::Vertical => (Vector2::new(0.0, -1.0), Vector2::new(1.0, 0.0), -slant_deg),
+            BeadAxis::Horizontal => (Vector2::new(1.0, 0.0), Vector2::new(0.0, 1.0), slant_deg),
         };
         let (ahead_mm, right_mm) = (mm_per_px * ahead, mm_per_px * right);
         let straight = ahead_mm.try_normalize(0.0)?;
@@ -56,20 +56,20 @@ impl View {
         let across = sideways * cos - straight * sin;
         let origin = map.to_mm(middle)? + across * lateral_mm;
         let (axis, pixel_mm) = (gauge.axis, ahead_mm.norm());
-        Some(Self { map, origin, along, across, axis, bend: Bend::Straight, pixel_mm })
+        Some(Self { map, origin, along, across, axis, bend: BeadPath::Straight, pixel_mm })
     }
 
     /// The same where the bead's path bends about the middle of the gauge.
-    pub fn bent(self, bend: Bend) -> Self {
+    pub fn bent(self, bend: BeadPath) -> Self {
         Self { bend, ..self }
     }
 
     /// The pixel of a place; `None` behind the camera, and too far around a
     /// curve.
-    pub fn px(&self, along_mm: f64, across_mm: f64) -> Option<Place> {
-        let place = self.bend.place(along_mm, across_mm)?;
+    pub fn px(&self, along_mm: f64, across_mm: f64) -> Option<AxisPoint> {
+        let place = self.bend.position(along_mm, across_mm)?;
         let px = self.map.to_px(self.origin + self.along * place.x + self.across * place.y)?;
-        (px.x.is_finite() && px.y.is_finite()).then(|| self.place(px))
+        (px.x.is_finite() && px.y.is_finite()).then(|| self.axis_point(px))
     }
 
     /// Distance of a pixel's place along the bead \[mm\].
@@ -78,26 +78,26 @@ impl View {
         Some(self.bend.along_mm(Vector2::new(place.dot(&self.along), place.dot(&self.across))))
     }
 
-    fn place(&self, px: ImagePoint) -> Place {
+    fn axis_point(&self, px: ImagePoint) -> AxisPoint {
         match self.axis {
-            Axis::Vertical => Place { run: px.y, cross: px.x },
-            Axis::Horizontal => Place { run: px.x, cross: px.y },
+            BeadAxis::Vertical => AxisPoint { run: px.y, cross: px.x },
+            BeadAxis::Horizontal => AxisPoint { run: px.x, cross: px.y },
         }
     }
 
     /// The pixel of image coordinates along and across the gauge's axis.
-    pub fn image_point(&self, place: Place) -> ImagePoint {
+    pub fn image_point(&self, place: AxisPoint) -> ImagePoint {
         match self.axis {
-            Axis::Vertical => ImagePoint::new(place.cross, place.run),
-            Axis::Horizontal => ImagePoint::new(place.run, place.cross),
+            BeadAxis::Vertical => ImagePoint::new(place.cross, place.run),
+            BeadAxis::Horizontal => ImagePoint::new(place.run, place.cross),
         }
     }
 
     /// 1 where `run` grows in the direction of travel, else −1.
     pub fn run_sign(&self) -> f64 {
         match self.axis {
-            Axis::Vertical => -1.0,
-            Axis::Horizontal => 1.0,
+            BeadAxis::Vertical => -1.0,
+            BeadAxis::Horizontal => 1.0,
         }
     }
 }
@@ -113,7 +113,7 @@ pub struct GaugeExtent {
 
 /// A point of the image in the gauge's own directions \[px\].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct AxisPoint {
     /// Along the gauge's axis: the row of a vertical bead.
     pub run: f64,
     /// Across it: the column of a vertical bead.
@@ -127,7 +127,7 @@ mod tests {
     use crate::core::units::WidthRange;
     use crate::vision::Polarity;
 
-    fn gauge(axis: Axis) -> Gauge {
+    fn gauge(axis: BeadAxis) -> Gauge {
         Gauge::new(
             Roi { x: 10, y: 20, width: 101, height: 51 },
             axis,
@@ -139,10 +139,10 @@ mod tests {
     #[test]
     fn travel_is_up_or_to_the_right_with_the_left_edge_on_its_left() {
         let map = SurfaceMap::from_scale(0.5);
-        let up = View::new(map, &gauge(Axis::Vertical), 0.0, 0.0).unwrap();
+        let up = BeadView::new(map, &gauge(BeadAxis::Vertical), 0.0, 0.0).unwrap();
         let place = up.px(2.0, -1.0).unwrap();
         assert_eq!(up.image_point(place), ImagePoint::new(60.0 - 2.0, 45.0 - 4.0));
-        let right = View::new(map, &gauge(Axis::Horizontal), 0.0, 0.0).unwrap();
+        let right = BeadView::new(map, &gauge(BeadAxis::Horizontal), 0.0, 0.0).unwrap();
         let place = right.px(2.0, -1.0).unwrap();
         assert_eq!(right.image_point(place), ImagePoint::new(60.0 + 4.0, 45.0 - 2.0));
     }
@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn a_slant_turns_the_bead_and_a_shift_is_normal_to_it() {
         let map = SurfaceMap::from_scale(1.0);
-        let view = View::new(map, &gauge(Axis::Vertical), -10.0, 3.0).unwrap();
+        let view = BeadView::new(map, &gauge(BeadAxis::Vertical), -10.0, 3.0).unwrap();
         let (sin, cos) = 10_f64.to_radians().sin_cos();
         let place = view.px(0.0, 0.0).unwrap();
         assert!((place.cross - (60.0 + 3.0 * cos)).abs() < 1e-12);

@@ -5,19 +5,19 @@ use super::hash;
 /// Distance between the nodes of the walk; straight in between \[mm\].
 const NODE_MM: f64 = 5.0;
 /// Keeps the walk apart from other random numbers of a seed.
-const WANDER: u64 = 0x0077_616e_6465_7200;
+const DRIFT_STREAM: u64 = 0x0077_616e_6465_7200;
 
 /// The walk of one bead: a function of seed and place, whose nodes are kept as far
 /// as they were asked for.
 #[derive(Debug, Clone)]
-pub struct Wander {
+pub struct FlowDrift {
     /// Standard deviation of a step from node to node.
     step: f64,
     seed: u64,
     nodes: Vec<f64>,
 }
 
-impl Wander {
+impl FlowDrift {
     /// A walk that goes this far over a metre, as a share (standard deviation).
     pub fn new(per_root_m: f64, seed: u64) -> Self {
         Self { step: per_root_m * (NODE_MM / 1000.0).sqrt(), seed, nodes: vec![0.0] }
@@ -37,7 +37,7 @@ impl Wander {
         let node = place as usize;
         while self.nodes.len() < node + 2 {
             let number = self.nodes.len() as u64;
-            let [step, _] = hash::normal_pair(hash::mix(&[self.seed, WANDER, number]));
+            let [step, _] = hash::normal_pair(hash::mix(&[self.seed, DRIFT_STREAM, number]));
             let last = self.nodes.last().copied().unwrap_or(0.0);
             self.nodes.push(last + self.step * step);
         }
@@ -52,14 +52,15 @@ mod tests {
 
     #[test]
     fn it_wanders_as_far_as_it_was_told_whoever_asks_first() {
-        let far: Vec<f64> = (0..400).map(|seed| Wander::new(0.01, seed).at(4000.0).ln()).collect();
+        let far: Vec<f64> =
+            (0..400).map(|seed| FlowDrift::new(0.01, seed).at(4000.0).ln()).collect();
         let size = (far.iter().map(|x| x * x).sum::<f64>() / 400.0).sqrt();
         // A standard deviation of 400 numbers is known to 3.5 %.
         assert!((size / 0.02 - 1.0).abs() < 0.14, "{size}");
-        let mut walk = Wander::new(0.01, 3);
+        let mut walk = FlowDrift::new(0.01, 3);
         let first = walk.at(300.0);
         let _ = walk.at(4000.0);
         assert_eq!(walk.at(300.0), first);
-        assert_eq!(Wander::new(0.0, 3).at(4000.0), 1.0);
+        assert_eq!(FlowDrift::new(0.0, 3).at(4000.0), 1.0);
     }
 }

@@ -5,13 +5,13 @@ use std::collections::VecDeque;
 use std::f64::consts::PI;
 
 use super::hash;
-use crate::scenario::bead::Roughness;
+use crate::scenario::bead::EdgeRoughness;
 
 /// Nodes of white noise within one correlation length. Three make the variance
 /// between nodes constant to 1 in 10⁹.
 const NODES_PER_LENGTH: f64 = 3.0;
 /// Nodes on either side that reach a place: the kernel has fallen to 10⁻⁵.
-const REACH: i64 = 7;
+const KERNEL_REACH_NODES: i64 = 7;
 
 /// Deviation of both edges along the path: white noise on a grid, hashed from
 /// the seed and the node's number, and smoothed with a Gaussian. The
@@ -28,10 +28,10 @@ pub struct Waviness {
 
 impl Waviness {
     /// Each edge carries its own half of the variance of the width.
-    pub fn new(roughness: Roughness, seed: u64) -> Self {
+    pub fn new(roughness: EdgeRoughness, seed: u64) -> Self {
         let sum_of_squares = PI.sqrt() / 2.0 * NODES_PER_LENGTH;
         Self {
-            size_mm: roughness.size_mm / (2.0 * sum_of_squares).sqrt(),
+            size_mm: roughness.sigma_mm / (2.0 * sum_of_squares).sqrt(),
             spacing_mm: roughness.length_mm.max(1e-3) / NODES_PER_LENGTH,
             seed,
             nodes: VecDeque::new(),
@@ -61,8 +61,8 @@ impl Waviness {
 
     /// Makes `nodes` the ones around a node.
     fn reach_for(&mut self, middle: i64) {
-        let wanted = middle.saturating_sub(REACH);
-        let count = 2 * REACH + 1;
+        let wanted = middle.saturating_sub(KERNEL_REACH_NODES);
+        let count = 2 * KERNEL_REACH_NODES + 1;
         let shift = wanted.saturating_sub(self.first);
         let kept = i64::try_from(self.nodes.len()).unwrap_or(0).saturating_sub(shift);
         if shift < 0 || kept <= 0 {

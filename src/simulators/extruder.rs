@@ -10,14 +10,14 @@ use super::server::Server;
 use crate::core::time::Span;
 use crate::extruder::{ExtruderCommand, PumpMode};
 use crate::io::clock::RunClock;
-use crate::link::extruder::{ExtruderHello, Faults, Gate};
+use crate::link::extruder::{ExtruderEndpoint, ExtruderFaults, ExtruderHello};
 use crate::sim::extruder::SimExtruder;
 
 mod machine;
 mod shared;
 
 use machine::ExtruderMachine;
-use shared::{Shared, Works};
+use shared::{GatedPlant, SharedExtruder};
 
 /// What is simulated.
 #[derive(Debug)]
@@ -49,7 +49,7 @@ pub enum ExtruderSimError {
 /// A simulated extruder that runs in threads of its own until it is stopped.
 #[derive(Debug)]
 pub struct ExtruderSim {
-    shared: Arc<Shared>,
+    shared: Arc<SharedExtruder>,
     server: Server,
 }
 
@@ -66,9 +66,9 @@ impl ExtruderSim {
         if options.state_period <= Span::ZERO {
             return Err(ExtruderSimError::Period);
         }
-        let gate = Gate::new(options.hello, options.clock_start_ms);
-        let works = Works::new(clock.now(), gate, options.plant, options.fails_after);
-        let shared = Arc::new(Shared::new(clock, works));
+        let gate = ExtruderEndpoint::new(options.hello, options.clock_start_ms);
+        let gated = GatedPlant::new(clock.now(), gate, options.plant, options.fails_after);
+        let shared = Arc::new(SharedExtruder::new(clock, gated));
         let machine = ExtruderMachine::new(Arc::clone(&shared));
         let server = Server::spawn(listener, clock, options.state_period, machine, notice)?;
         Ok(Self { shared, server })
@@ -81,26 +81,26 @@ impl ExtruderSim {
 
     /// What the pump does now.
     pub fn pump(&self) -> PumpMode {
-        let mut works = self.shared.works();
-        works.advance(self.shared.clock.now());
-        works.plant().state().0
+        let mut gated = self.shared.gated();
+        gated.advance(self.shared.clock.now());
+        gated.plant().state().0
     }
 
     /// What pump and valve are told now.
     pub fn command(&self) -> ExtruderCommand {
-        let mut works = self.shared.works();
-        works.advance(self.shared.clock.now());
-        works.command()
+        let mut gated = self.shared.gated();
+        gated.advance(self.shared.clock.now());
+        gated.command()
     }
 
     /// The pump fails.
     pub fn fail(&self) {
-        self.shared.works().gate().fail();
+        self.shared.gated().gate().fail();
     }
 
     /// Misbehaves from now on.
-    pub fn set_faults(&self, faults: Faults) {
-        self.shared.works().gate().set_faults(faults);
+    pub fn set_faults(&self, faults: ExtruderFaults) {
+        self.shared.gated().gate().set_faults(faults);
     }
 
     /// Closes all sockets and ends the threads.

@@ -8,11 +8,11 @@ use crate::link::frame::{DeviceLine, LineBody, LineRefusal};
 pub type Notice = Box<dyn FnMut(Stamp, &str) + Send>;
 
 /// What stands behind a server.
-pub trait Machine: Send + 'static {
+pub trait LinkMachine: Send + 'static {
     /// Name of its threads.
     const NAME: &'static str;
     /// What a PC leaves behind, such as `the last setpoint`.
-    const LEFT: &'static str;
+    const SETPOINT_WORDS: &'static str;
 
     /// Once every period: goes on, and gives the `STATE` to send, if there is
     /// somebody to hear it.
@@ -25,18 +25,18 @@ pub trait Machine: Send + 'static {
     fn disconnected(&mut self, now: Stamp);
 
     /// Takes a line without LF; fails where it makes no sense.
-    fn take(&mut self, now: Stamp, text: &str) -> Result<Taken, LineError>;
+    fn take(&mut self, now: Stamp, text: &str) -> Result<LineOutcome, LineError>;
 
     /// The answer to bytes that make no line.
     fn bad_line(&mut self, why: &str) -> Answer;
 
     /// What has changed since it was last asked, in words, if anything.
-    fn news(&mut self, now: Stamp) -> Option<String>;
+    fn changes(&mut self, now: Stamp) -> Option<String>;
 }
 
 /// What became of a line.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Taken {
+pub struct LineOutcome {
     /// What to answer.
     pub answer: Option<Answer>,
     /// Whether it was the last one.

@@ -10,22 +10,22 @@ use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::Span;
 use crate::core::units::Mm;
 use crate::io::clock::RunClock;
-use crate::link::{Faults, Job, ParamError, RobotCell, RobotParams};
+use crate::link::{ParamError, PrintJob, RobotFaults, RobotParams, VirtualRobot};
 
 mod machine;
 mod shared;
 
 use machine::RobotMachine;
-use shared::Shared;
-pub use shared::Truth;
+use shared::SharedRobot;
+pub use shared::TrueState;
 
 /// What is simulated.
 #[derive(Debug, Clone)]
-pub struct SimOptions {
+pub struct RobotOptions {
     /// The robot.
     pub params: RobotParams,
     /// What it prints by itself while a PC is connected.
-    pub job: Job,
+    pub job: PrintJob,
     /// Time between two `STATE` lines, 20 to 200 ms on a robot that keeps to
     /// the link.
     pub state_period: Span,
@@ -33,7 +33,7 @@ pub struct SimOptions {
 
 /// The robot cannot be started.
 #[derive(Debug, thiserror::Error)]
-pub enum SimError {
+pub enum RobotSimError {
     /// A robot that cannot be.
     #[error(transparent)]
     Params(#[from] ParamError),
@@ -48,7 +48,7 @@ pub enum SimError {
 /// A simulated robot that runs in threads of its own until it is stopped.
 #[derive(Debug)]
 pub struct RobotSim {
-    shared: Arc<Shared>,
+    shared: Arc<SharedRobot>,
     server: Server,
 }
 
@@ -59,14 +59,14 @@ impl RobotSim {
     pub fn spawn(
         listener: TcpListener,
         clock: RunClock,
-        options: SimOptions,
+        options: RobotOptions,
         notice: Notice,
-    ) -> Result<Self, SimError> {
+    ) -> Result<Self, RobotSimError> {
         if options.state_period <= Span::ZERO {
-            return Err(SimError::Period);
+            return Err(RobotSimError::Period);
         }
-        let cell = RobotCell::new(options.params, clock.now())?;
-        let shared = Arc::new(Shared::new(clock, cell));
+        let cell = VirtualRobot::new(options.params, clock.now())?;
+        let shared = Arc::new(SharedRobot::new(clock, cell));
         let machine = RobotMachine::new(Arc::clone(&shared), options.job);
         let server = Server::spawn(listener, clock, options.state_period, machine, notice)?;
         Ok(Self { shared, server })
@@ -83,7 +83,7 @@ impl RobotSim {
     }
 
     /// Its true states so far, one for every `STATE` period, the oldest first.
-    pub fn history(&self) -> Vec<Truth> {
+    pub fn history(&self) -> Vec<TrueState> {
         self.shared.history().iter().copied().collect()
     }
 
@@ -103,7 +103,7 @@ impl RobotSim {
     }
 
     /// Misbehaves from now on.
-    pub fn set_faults(&self, faults: Faults) {
+    pub fn set_faults(&self, faults: RobotFaults) {
         self.shared.cell().set_faults(self.shared.clock.now(), faults);
     }
 

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use crossbeam_channel::{Sender, after, bounded};
 
-use super::machine::{Machine, Notice};
+use super::machine::{LinkMachine, Notice};
 use crate::core::time::Span;
 use crate::io::clock::RunClock;
 
@@ -22,9 +22,9 @@ use host::Host;
 use input::Input;
 
 /// Pieces of input that may wait; senders then wait too.
-const WAITING_INPUTS: usize = 64;
+const MAX_WAITING_INPUTS: usize = 64;
 /// How long a call on the server's own socket may take when it is woken to end.
-const WAKE: Duration = Duration::from_millis(200);
+const WAKE_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// A machine that is served in threads of its own until it is stopped.
 #[derive(Debug)]
@@ -38,7 +38,7 @@ pub struct Server {
 impl Server {
     /// Serves a machine on `listener`, which is told of the time by `clock`
     /// and says its `STATE` once every `period`.
-    pub fn spawn<M: Machine>(
+    pub fn spawn<M: LinkMachine>(
         listener: TcpListener,
         clock: RunClock,
         period: Span,
@@ -46,7 +46,7 @@ impl Server {
         notice: Notice,
     ) -> io::Result<Self> {
         let address = listener.local_addr()?;
-        let (inputs, received) = bounded(WAITING_INPUTS);
+        let (inputs, received) = bounded(MAX_WAITING_INPUTS);
         let quitting = Arc::new(AtomicBool::new(false));
         let host = Host::new(machine, clock, inputs.clone(), period, notice);
         let serve = Builder::new().name(M::NAME.to_owned());
@@ -74,7 +74,7 @@ impl Server {
         self.quitting.store(true, Ordering::Release);
         // Fails only where the thread has ended already.
         let _ = self.inputs.send(Input::Quit);
-        let _ = TcpStream::connect_timeout(&reachable(self.address), WAKE);
+        let _ = TcpStream::connect_timeout(&reachable(self.address), WAKE_TIMEOUT);
         for thread in self.threads.drain(..) {
             if thread.join().is_err() {
                 tracing::error!("a thread of the simulated machine had failed");
@@ -103,7 +103,7 @@ fn accept_all(listener: &TcpListener, quitting: &AtomicBool, inputs: &Sender<Inp
             Err(error) => {
                 tracing::warn!(%error, "a connection could not be accepted");
                 // What is short, such as file handles, needs time to return.
-                let _ = after(WAKE).recv();
+                let _ = after(WAKE_TIMEOUT).recv();
             }
         }
     }

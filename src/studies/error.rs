@@ -7,7 +7,7 @@ use crate::extruder::adaptive::SubSystemError;
 use crate::extruder::feedforward::FeedforwardError;
 use crate::extruder::pressure::PressureError;
 use crate::numeric::lti::ModelError;
-use crate::sim::cell::SimError;
+use crate::sim::cell::SimCellError;
 use crate::sim::render::RenderError;
 
 /// An experiment that could not be run.
@@ -21,7 +21,7 @@ pub enum ReproduceError {
     NoRun,
     /// The simulated cell cannot be.
     #[error(transparent)]
-    Sim(#[from] SimError),
+    Sim(#[from] SimCellError),
     /// A picture cannot be rendered.
     #[error(transparent)]
     Render(#[from] RenderError),
@@ -42,7 +42,7 @@ pub enum ReproduceError {
     FitTable(#[from] FitTableError),
     /// Starts and stops cannot be told or timed.
     #[error(transparent)]
-    StartStop(#[from] super::bcs_thesis::start_stop::experiment::ExperimentError),
+    StartStop(#[from] super::bcs_thesis::start_stop::experiment::StartStopExperimentError),
     /// A corner cannot be planned or run.
     #[error(transparent)]
     Corner(#[from] CornerError),

@@ -11,13 +11,13 @@ pub mod table;
 
 use crate::core::time::Span;
 use crate::extruder::adaptive::{
-    Action, Adaptation, Adaptive, Gains, Inputs, Reading, Safety, ScalarPlant, StrandModel,
-    SubSystemError, Targets,
+    Action, Adaptation, Adaptive, AdaptiveGains, EstimateBounds, ScalarPlant, StrandInputs,
+    StrandModel, StrandReading, StrandTargets, SubSystemError,
 };
 use crate::sim::hash::{mix, normal_pair};
-use strand::{Disturbance, Parameters, Ramp, Strand};
+use strand::{InputDisturbance, Ramp, Strand, StrandParameters};
 
-pub use cases::{Case, Convergence, SubSystem, TABLE};
+pub use cases::{Convergence, SubSystem, TABLE, TableCase};
 
 /// The plant. β2, β3 are fitted, with [`FEEDBACK`] and [`LEARNING_RATE`].
 pub const MODEL: StrandModel = StrandModel {
@@ -47,11 +47,11 @@ pub const TOLERANCES: [f64; 2] = [1.61e-5, 1.01e-7];
 const HOLD: Span = Span::from_millis(1);
 const HOLD_S: f64 = 0.001;
 /// The operating point.
-const TARGETS: Targets = Targets { nozzle_m_per_s: 0.05, strand_m_per_s: 0.05 };
+const TARGETS: StrandTargets = StrandTargets { nozzle_m_per_s: 0.05, strand_m_per_s: 0.05 };
 
 /// Which law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
+pub enum AdaptationMethod {
     /// The paper's with γ = 0.
     NotAdaptive,
     /// The paper's.
@@ -60,9 +60,9 @@ pub enum Method {
     Ours,
 }
 
-impl Method {
+impl AdaptationMethod {
     /// Its gains for either sub-system.
-    pub fn gains(self) -> [Gains; 2] {
+    pub fn gains(self) -> [AdaptiveGains; 2] {
         let of = |part: usize, plant: ScalarPlant| {
             let feedback = FEEDBACK[part];
             let adaptation = match self {
@@ -70,26 +70,31 @@ impl Method {
                 Self::Paper => {
                     Adaptation::Constant { learning_rate: LEARNING_RATE[part], weight: 1.0 }
                 }
-                Self::Ours => return Gains::triple_pole(plant, feedback, OUR_POLE_PER_S),
+                Self::Ours => return AdaptiveGains::triple_pole(plant, feedback, OUR_POLE_PER_S),
             };
-            Gains { feedback, error_feedback: 0.0, adaptation, safety: Safety::default() }
+            AdaptiveGains {
+                feedback,
+                error_feedback: 0.0,
+                adaptation,
+                safety: EstimateBounds::default(),
+            }
         };
         [of(0, MODEL.nozzle), of(1, MODEL.strand)]
     }
 
-    fn law(self, hold: Span) -> Result<Adaptive, SubSystemError> {
+    fn controller(self, hold: Span) -> Result<Adaptive, SubSystemError> {
         let [nozzle, strand] = self.gains();
         Adaptive::new(MODEL, nozzle, strand, hold)
     }
 }
 
 /// Inputs that hold `TARGETS`.
-pub fn operating_point() -> Inputs {
+pub fn operating_point() -> StrandInputs {
     let (nozzle, strand) = (MODEL.nozzle, MODEL.strand);
     let (v, u) = (TARGETS.nozzle_m_per_s, TARGETS.strand_m_per_s);
     let pressure = MODEL.pressure_gain * PRESSURE_GRADIENT;
     let pushed = MODEL.push_per_s * MODEL.swell * v;
-    Inputs {
+    StrandInputs {
         mass_flow_kg_per_s: -(pressure + nozzle.state_gain_per_s * v) / nozzle.input_gain,
         plate_m_per_s: -(pushed + strand.state_gain_per_s * u) / strand.input_gain,
     }
@@ -97,22 +102,22 @@ pub fn operating_point() -> Inputs {
 
 /// An experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Experiment {
+pub struct StrandExperiment {
     /// The law.
-    pub method: Method,
+    pub method: AdaptationMethod,
     /// How the plant's parameters go with its inputs.
-    pub parameters: Parameters,
+    pub parameters: StrandParameters,
     /// Unknown part of ṁ \[kg/s\].
-    pub feed: Disturbance,
+    pub feed: InputDisturbance,
     /// Unknown part of the plate's speed \[m/s\].
-    pub plate: Disturbance,
+    pub plate: InputDisturbance,
     /// How long \[s\].
     pub length_s: f64,
 }
 
 /// A moment of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moment {
+pub struct StrandSample {
     /// Time \[s\].
     pub t_s: f64,
     /// v̄1 and ū3 \[m/s\].
@@ -123,27 +128,28 @@ pub struct Moment {
     pub unknown: [f64; 2],
 }
 
-impl Experiment {
+impl StrandExperiment {
     /// Runs it from the steady state and shows every millisecond.
-    pub fn run(&self, mut see: impl FnMut(&Moment)) -> Result<(), SubSystemError> {
-        let mut law = self.method.law(HOLD)?;
+    pub fn run(&self, mut see: impl FnMut(&StrandSample)) -> Result<(), SubSystemError> {
+        let mut controller = self.method.controller(HOLD)?;
         let start = operating_point();
         let mut plant = Strand::steady(MODEL, self.parameters, PRESSURE_GRADIENT, start);
-        law.start(&reading(&plant), start);
+        controller.start(&reading(&plant), start);
         let (mut step, mut dt) = (0_u32, Span::ZERO);
         loop {
             let t_s = f64::from(step) * HOLD_S;
             if t_s >= self.length_s {
                 return Ok(());
             }
-            let (feed, plate) = law.step(&reading(&plant), &TARGETS, dt);
+            let (feed, plate) = controller.step(&reading(&plant), &TARGETS, dt);
             let unknown = [self.feed.at(t_s), self.plate.at(t_s)];
             let speeds = [plant.nozzle_m_per_s, plant.strand_m_per_s];
-            see(&Moment { t_s, speeds, actions: [feed, plate], unknown });
-            let inputs = Inputs { mass_flow_kg_per_s: feed.command, plate_m_per_s: plate.command };
+            see(&StrandSample { t_s, speeds, actions: [feed, plate], unknown });
+            let inputs =
+                StrandInputs { mass_flow_kg_per_s: feed.command, plate_m_per_s: plate.command };
             // Straight up to just before the next millisecond, where a step
             // may come.
-            let ramp = |of: &Disturbance| Ramp {
+            let ramp = |of: &InputDisturbance| Ramp {
                 first: of.at(t_s),
                 last: of.at(t_s + HOLD_S * (1.0 - 1e-9)),
             };
@@ -153,8 +159,8 @@ impl Experiment {
     }
 }
 
-fn reading(plant: &Strand) -> Reading {
-    Reading {
+fn reading(plant: &Strand) -> StrandReading {
+    StrandReading {
         nozzle_m_per_s: plant.nozzle_m_per_s,
         strand_m_per_s: plant.strand_m_per_s,
         pressure_gradient: plant.pressure_gradient,
@@ -167,52 +173,54 @@ pub const RAMPS_PER_S: [f64; 2] = [-0.0005, -0.0008];
 
 /// The errors e1 and e3 that are left after a minute of a ramp in either input
 /// \[m/s\], and what the formula c/(γ·p·β) of the law says.
-pub fn ramp_errors(method: Method) -> Result<[(f64, f64); 2], SubSystemError> {
-    let ramp = |slope_per_s| Disturbance::Ramp { slope_per_s, from_s: 0.0, to_s: f64::INFINITY };
+pub fn ramp_errors(method: AdaptationMethod) -> Result<[(f64, f64); 2], SubSystemError> {
+    let ramp =
+        |slope_per_s| InputDisturbance::Ramp { slope_per_s, from_s: 0.0, to_s: f64::INFINITY };
     let [feed, plate] = RAMPS_PER_S.map(ramp);
-    let parameters = Parameters::Constant;
-    let experiment = Experiment { method, parameters, feed, plate, length_s: 60.0 };
+    let parameters = StrandParameters::Constant;
+    let experiment = StrandExperiment { method, parameters, feed, plate, length_s: 60.0 };
     let mut last = [0.0; 2];
     experiment.run(|moment| last = moment.actions.map(|action| action.error))?;
-    let law = method.law(HOLD)?;
+    let controller = method.controller(HOLD)?;
     Ok([
-        (last[0], law.nozzle().ramp_errors(RAMPS_PER_S[0]).output),
-        (last[1], law.strand().ramp_errors(RAMPS_PER_S[1]).output),
+        (last[0], controller.nozzle().ramp_errors(RAMPS_PER_S[0]).output),
+        (last[1], controller.strand().ramp_errors(RAMPS_PER_S[1]).output),
     ])
 }
 
 /// The plate's speed drops by 40 % at 30 s and comes back at 60 s (case
 /// study 1).
-pub fn plate_step(method: Method, parameters: Parameters) -> Experiment {
+pub fn plate_step(method: AdaptationMethod, parameters: StrandParameters) -> StrandExperiment {
     let size = -0.4 * operating_point().plate_m_per_s;
-    let plate = Disturbance::Step { size, from_s: 30.0, to_s: 60.0 };
-    Experiment { method, parameters, feed: Disturbance::None, plate, length_s: 90.0 }
+    let plate = InputDisturbance::Step { size, from_s: 30.0, to_s: 60.0 };
+    StrandExperiment { method, parameters, feed: InputDisturbance::None, plate, length_s: 90.0 }
 }
 
 /// The feed falls from 30 s to 60 s (case study 2).
-pub fn feed_ramp(method: Method, parameters: Parameters) -> Experiment {
-    let feed = Disturbance::Ramp { slope_per_s: RAMPS_PER_S[0], from_s: 30.0, to_s: 60.0 };
-    Experiment { method, parameters, feed, plate: Disturbance::None, length_s: 90.0 }
+pub fn feed_ramp(method: AdaptationMethod, parameters: StrandParameters) -> StrandExperiment {
+    let feed = InputDisturbance::Ramp { slope_per_s: RAMPS_PER_S[0], from_s: 30.0, to_s: 60.0 };
+    StrandExperiment { method, parameters, feed, plate: InputDisturbance::None, length_s: 90.0 }
 }
 
 /// Standard deviation of the feed's command for each unit of white noise on
 /// v̄1 at 100 Hz, in a steady state.
-pub fn command_noise(method: Method) -> Result<f64, SubSystemError> {
+pub fn command_noise(method: AdaptationMethod) -> Result<f64, SubSystemError> {
     const SAMPLES: u32 = 40_000;
     const SIGMA_M_PER_S: f64 = 1e-3;
     let hold = Span::from_millis(10);
-    let mut law = method.law(hold)?;
+    let mut controller = method.controller(hold)?;
     let start = operating_point();
-    let mut plant = Strand::steady(MODEL, Parameters::Constant, PRESSURE_GRADIENT, start);
-    law.start(&reading(&plant), start);
+    let mut plant = Strand::steady(MODEL, StrandParameters::Constant, PRESSURE_GRADIENT, start);
+    controller.start(&reading(&plant), start);
     let (mut sum, mut dt) = (0.0, Span::ZERO);
     for sample in 0..SAMPLES {
         let [noise, _] = normal_pair(mix(&[2026, u64::from(sample)]));
         let mut seen = reading(&plant);
         seen.nozzle_m_per_s += SIGMA_M_PER_S * noise;
-        let (feed, plate) = law.step(&seen, &TARGETS, dt);
+        let (feed, plate) = controller.step(&seen, &TARGETS, dt);
         sum += (feed.command - start.mass_flow_kg_per_s).powi(2);
-        let inputs = Inputs { mass_flow_kg_per_s: feed.command, plate_m_per_s: plate.command };
+        let inputs =
+            StrandInputs { mass_flow_kg_per_s: feed.command, plate_m_per_s: plate.command };
         plant.step(inputs, Ramp::default(), Ramp::default(), hold.secs());
         dt = hold;
     }
@@ -227,7 +235,7 @@ mod tests {
     fn cases_1_to_5_converge_as_in_an_independent_simulation() {
         let independent = [(4.80, 8.26), (4.80, 8.26), (5.34, 8.60), (5.64, 8.78), (5.85, 8.90)];
         for (case, (tracking, estimate)) in TABLE.iter().zip(independent) {
-            let found = case.run(Method::Paper).unwrap();
+            let found = case.run(AdaptationMethod::Paper).unwrap();
             assert!((found.tracking_s.unwrap() / tracking - 1.0).abs() < 0.005, "{found:?}");
             assert!((found.estimate_s.unwrap() / estimate - 1.0).abs() < 0.005, "{found:?}");
         }
@@ -236,21 +244,24 @@ mod tests {
     #[test]
     fn ours_converges_sooner_in_both_and_leaves_nothing_of_a_ramp() {
         for case in &TABLE[..5] {
-            let (paper, ours) = (case.run(Method::Paper).unwrap(), case.run(Method::Ours).unwrap());
+            let (paper, ours) = (
+                case.run(AdaptationMethod::Paper).unwrap(),
+                case.run(AdaptationMethod::Ours).unwrap(),
+            );
             assert!(ours.tracking_s < paper.tracking_s, "{case:?} {ours:?}");
             assert!(ours.estimate_s < paper.estimate_s, "{case:?} {ours:?}");
         }
-        for (found, _) in ramp_errors(Method::Ours).unwrap() {
+        for (found, _) in ramp_errors(AdaptationMethod::Ours).unwrap() {
             assert!(found.abs() < 1e-12, "{found}");
         }
     }
 
     #[test]
     fn the_ramps_error_constants_are_those_of_the_formula() {
-        for (found, formula) in ramp_errors(Method::Paper).unwrap() {
+        for (found, formula) in ramp_errors(AdaptationMethod::Paper).unwrap() {
             assert!((found / formula - 1.0).abs() < 1e-6, "{found} {formula}");
         }
-        let [first, _] = ramp_errors(Method::Paper).unwrap();
+        let [first, _] = ramp_errors(AdaptationMethod::Paper).unwrap();
         assert!((first.1 - -0.0005 / 1.786).abs() < 1e-15);
     }
 
@@ -269,12 +280,12 @@ mod tests {
         };
         // β7·Δ/(β7·k3 − β6) with Δ = −40 % of 0.04 m/s.
         let stays = 0.6 * 0.016 / 2.4;
-        let found = error_at_59_s(Method::NotAdaptive, Parameters::Constant);
+        let found = error_at_59_s(AdaptationMethod::NotAdaptive, StrandParameters::Constant);
         assert!((found / stays - 1.0).abs() < 1e-6, "{found}");
-        assert!(error_at_59_s(Method::Paper, Parameters::Constant) < 1e-9);
-        let real = Parameters::WithInputs(operating_point());
-        assert!(error_at_59_s(Method::NotAdaptive, real) > 1e-3);
-        assert!(error_at_59_s(Method::Paper, real) < 1e-6);
-        assert!(error_at_59_s(Method::Ours, real) < 1e-6);
+        assert!(error_at_59_s(AdaptationMethod::Paper, StrandParameters::Constant) < 1e-9);
+        let real = StrandParameters::WithInputs(operating_point());
+        assert!(error_at_59_s(AdaptationMethod::NotAdaptive, real) > 1e-3);
+        assert!(error_at_59_s(AdaptationMethod::Paper, real) < 1e-6);
+        assert!(error_at_59_s(AdaptationMethod::Ours, real) < 1e-6);
     }
 }

@@ -10,9 +10,9 @@ pub mod table;
 #[cfg(test)]
 mod tests;
 
-pub use course::{Course, LoadFigures, StepFigures};
-pub use experiment::{Experiment, STEP_EVERY, Target, Tried};
-pub use margins::{Margins, margins};
+pub use course::{LoadFigures, PressureResponse, StepFigures};
+pub use experiment::{PressureExperiment, PressureTarget, STEP_EVERY, TestedController};
+pub use margins::{MismatchMargins, margins};
 pub use plant::{
-    DEAD_TIME_S, Factors, LAG_S, LOAD_RPM, NOISE_MPA2, OFF, STEP_MPA, WANDER_MPA2, model,
+    DEAD_TIME_S, DRIFT_MPA2, Factors, LAG_S, LOAD_RPM, MODEL_ERROR, NOISE_MPA2, STEP_MPA, model,
 };

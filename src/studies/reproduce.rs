@@ -5,16 +5,16 @@
 use maud::html;
 
 use super::error::ReproduceError;
-use super::source::Source;
+use super::source::Publication;
 use super::study::{Effort, Reproduced};
 use crate::io::progress::Progress;
 use crate::report::html::whole_page;
-use summary::Summary;
+use summary::PaperSummary;
 
 pub mod summary;
 pub mod table;
 
-impl Source {
+impl Publication {
     /// How many experiments [`Self::run`] reports to its progress.
     pub const fn experiments(self) -> u64 {
         match self {
@@ -53,7 +53,7 @@ pub fn page(sources: &[Reproduced]) -> String {
         (summary::markup(sources))
         @for (at, source) in sources.iter().enumerate() {
             h1 id={ "source-" (at) } { (source.title) }
-            p { (Summary::of(&source.rows).text()) }
+            p { (PaperSummary::of(&source.rows).text()) }
             p.hint { (source.about) }
             @for part in &source.sections {
                 section {
@@ -76,11 +76,11 @@ pub fn page(sources: &[Reproduced]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::studies::row::Rows;
+    use crate::studies::row::TableRows;
 
     #[test]
     fn a_row_has_the_keys_that_others_rely_on() {
-        let mut rows = Rows::of(Source::Barjuei2022);
+        let mut rows = TableRows::of(Publication::Barjuei2022);
         rows.push("44 mm", ("mean error", "mm"), [Some(1.3), Some(1.46), None]);
         let rows = rows.into_vec();
         assert_eq!(
@@ -92,7 +92,8 @@ mod tests {
 
     #[test]
     fn every_source_has_a_name_of_its_own() {
-        let names: std::collections::BTreeSet<_> = Source::ALL.iter().map(|s| s.name()).collect();
-        assert_eq!(names.len(), Source::ALL.len());
+        let names: std::collections::BTreeSet<_> =
+            Publication::ALL.iter().map(|s| s.name()).collect();
+        assert_eq!(names.len(), Publication::ALL.len());
     }
 }

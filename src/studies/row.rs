@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::source::Source;
+use super::source::Publication;
 
 /// One quantity of one experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
+pub struct TableRow {
     /// The source.
     pub seed: &'static str,
     /// The experiment.
@@ -27,14 +27,14 @@ pub struct Row {
 
 /// Rows of one source as they come.
 #[derive(Debug)]
-pub struct Rows {
+pub struct TableRows {
     seed: &'static str,
-    rows: Vec<Row>,
+    rows: Vec<TableRow>,
 }
 
-impl Rows {
+impl TableRows {
     /// No rows yet.
-    pub const fn of(source: Source) -> Self {
+    pub const fn of(source: Publication) -> Self {
         Self { seed: source.name(), rows: Vec::new() }
     }
 
@@ -47,11 +47,11 @@ impl Rows {
         [published, simulated, ours]: [Option<f64>; 3],
     ) {
         let (seed, case) = (self.seed, case.into());
-        self.rows.push(Row { seed, case, quantity, unit, published, simulated, ours });
+        self.rows.push(TableRow { seed, case, quantity, unit, published, simulated, ours });
     }
 
     /// The rows.
-    pub fn into_vec(self) -> Vec<Row> {
+    pub fn into_vec(self) -> Vec<TableRow> {
         self.rows
     }
 }

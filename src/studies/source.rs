@@ -2,7 +2,7 @@
 
 /// A paper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Source {
+pub enum Publication {
     /// Shojaei Barjuei et al. 2022: width by robot speed.
     Barjuei2022,
     /// Bead characterisation thesis: models of the extruder, and speed by flow.
@@ -15,7 +15,7 @@ pub enum Source {
     Looey2026,
 }
 
-impl Source {
+impl Publication {
     /// All of them, in the order of the page.
     pub const ALL: [Self; 5] =
         [Self::Barjuei2022, Self::BcsThesis, Self::Diagne2015, Self::Ma2026, Self::Looey2026];

@@ -2,7 +2,7 @@
 
 use maud::Markup;
 
-use super::row::Row;
+use super::row::TableRow;
 
 /// How much is spent on an experiment with noise; none is the source's own
 /// number.
@@ -22,7 +22,7 @@ pub struct Reproduced {
     /// How often and with what.
     pub about: String,
     /// The table.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TableRow>,
     /// The plots, in the order in which they are read.
     pub sections: Vec<Section>,
 }

@@ -3,19 +3,19 @@
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::layer::Trial;
-use super::score::AlongBead;
+use super::layer::LayerTrial;
+use super::score::BeadPoint;
 use crate::calibration::Calibration;
 use crate::cell::file::{Cell, RunPart};
 use crate::core::units::Mm;
 use crate::numeric::average::{mean, median};
-use crate::sim::cell::SimError;
-use crate::width_control::target::Target;
+use crate::sim::cell::SimCellError;
+use crate::width_control::target::WidthTarget;
 
 /// Way after control began from which errors count \[mm\].
 pub const JUDGED_AFTER_MM: f64 = 30.0;
 /// The same from which scatter is that of control alone \[mm\].
-pub const SCATTER_AFTER_MM: f64 = 700.0;
+pub const SIGMA_AFTER_MM: f64 = 700.0;
 /// Length of a piece of the bead over which errors are put together \[mm\].
 const PIECE_MM: f64 = 5.0;
 /// Share of means that a confidence interval holds.
@@ -37,16 +37,16 @@ pub struct Contender {
 
 impl Contender {
     /// The same with another width that is asked for.
-    fn asked(&self, width: Mm) -> RunPart {
+    fn with_width(&self, width: Mm) -> RunPart {
         let mut run = self.run.clone();
-        run.control.target = Target::constant(width);
+        run.control.target = WidthTarget::constant(width);
         run
     }
 }
 
 /// A number over seeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
+pub struct SeedStatistics {
     /// Its mean; none where a seed has none.
     pub mean: Option<f64>,
     /// Half the interval that holds the mean with 95 % confidence, by Student's t.
@@ -55,7 +55,7 @@ pub struct Estimate {
     pub median: Option<f64>,
 }
 
-impl Estimate {
+impl SeedStatistics {
     /// Of a number of each seed.
     pub fn of(mut values: Vec<f64>) -> Self {
         let finite = values.iter().all(|value| value.is_finite());
@@ -67,14 +67,14 @@ impl Estimate {
         let median = median(&mut values);
         Self {
             mean: finite.then_some(middle),
-            confidence: interval(count).filter(|_| finite).map(|times| times * spread),
+            confidence: confidence_factor(count).filter(|_| finite).map(|times| times * spread),
             median: median.is_finite().then_some(median),
         }
     }
 }
 
 /// Half the confidence interval of a mean of so many values, in its standard deviations.
-fn interval(count: f64) -> Option<f64> {
+fn confidence_factor(count: f64) -> Option<f64> {
     let student = StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
     Some(student.inverse_cdf(0.5 * (1.0 + CONFIDENCE)))
 }
@@ -83,24 +83,24 @@ fn interval(count: f64) -> Option<f64> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figures {
     /// Mean size of the bead's error from 30 mm after control began \[mm\].
-    pub mean_error_mm: Estimate,
+    pub mean_error_mm: SeedStatistics,
     /// Its root mean square \[mm\].
-    pub rms_error_mm: Estimate,
+    pub rms_error_mm: SeedStatistics,
     /// Integral of its size over the path from where control began \[mm²\].
-    pub integral_mm2: Estimate,
+    pub integral_mm2: SeedStatistics,
     /// Way after control began to within half a millimetre for good \[mm\].
-    pub settled_mm: Estimate,
+    pub settled_mm: SeedStatistics,
     /// Standard deviation of the width from 700 mm after control began \[mm\].
-    pub scatter_mm: Estimate,
+    pub sigma_mm: SeedStatistics,
     /// Root mean square error over that of the first controller with the same
     /// seed.
-    pub ratio: Estimate,
+    pub ratio: SeedStatistics,
     /// Seeds whose bead it never controlled, or did not lay to its end.
-    pub failed: usize,
+    pub failed_seeds: usize,
     /// Root mean square error over all seeds, along the path.
-    pub course: Vec<AlongBead>,
+    pub error_profile: Vec<BeadPoint>,
     /// Width of the bead of the first seed.
-    pub example: Vec<AlongBead>,
+    pub example: Vec<BeadPoint>,
     /// Root mean square error of each seed \[mm\].
     rms_by_seed: Vec<f64>,
 }
@@ -112,24 +112,35 @@ impl Figures {
         width: Mm,
         seeds: u64,
         first: Option<&Self>,
-    ) -> Result<Self, SimError> {
-        let run = who.asked(width);
-        let lay = |seed| Trial::lay(&who.cell, &run, &who.calibration, seed);
-        let trials: Vec<Trial> = (0..seeds).into_par_iter().map(lay).collect::<Result<_, _>>()?;
-        let of = |value: &dyn Fn(&Trial) -> f64| trials.iter().map(value).collect::<Vec<f64>>();
-        let judged = |trial: &Trial| trial.begun_mm + JUDGED_AFTER_MM;
+    ) -> Result<Self, SimCellError> {
+        let run = who.with_width(width);
+        let lay = |seed| LayerTrial::lay(&who.cell, &run, &who.calibration, seed);
+        let trials: Vec<LayerTrial> =
+            (0..seeds).into_par_iter().map(lay).collect::<Result<_, _>>()?;
+        let of =
+            |value: &dyn Fn(&LayerTrial) -> f64| trials.iter().map(value).collect::<Vec<f64>>();
+        let judged = |trial: &LayerTrial| trial.control_start_mm + JUDGED_AFTER_MM;
         let rms_by_seed = of(&|trial| trial.rms_error(judged(trial)));
         let firsts = first.map_or(&rms_by_seed, |first| &first.rms_by_seed);
         let ratios = rms_by_seed.iter().zip(firsts).map(|(ours, first)| ours / first).collect();
         Ok(Self {
-            mean_error_mm: Estimate::of(of(&|trial| trial.mean_error(judged(trial)))),
-            rms_error_mm: Estimate::of(rms_by_seed.clone()),
-            integral_mm2: Estimate::of(of(&|trial| trial.error_integral(trial.begun_mm))),
-            settled_mm: Estimate::of(of(&|trial| trial.settles_within(trial.begun_mm, 0.5))),
-            scatter_mm: Estimate::of(of(&|trial| trial.scatter(trial.begun_mm + SCATTER_AFTER_MM))),
-            ratio: Estimate::of(ratios),
-            failed: trials.iter().filter(|one| !one.whole || one.begun_mm.is_infinite()).count(),
-            course: course(&trials, width.get()),
+            mean_error_mm: SeedStatistics::of(of(&|trial| trial.mean_error(judged(trial)))),
+            rms_error_mm: SeedStatistics::of(rms_by_seed.clone()),
+            integral_mm2: SeedStatistics::of(of(&|trial| {
+                trial.error_integral(trial.control_start_mm)
+            })),
+            settled_mm: SeedStatistics::of(of(&|trial| {
+                trial.settles_within(trial.control_start_mm, 0.5)
+            })),
+            sigma_mm: SeedStatistics::of(of(&|trial| {
+                trial.standard_deviation(trial.control_start_mm + SIGMA_AFTER_MM)
+            })),
+            ratio: SeedStatistics::of(ratios),
+            failed_seeds: trials
+                .iter()
+                .filter(|one| !one.complete || one.control_start_mm.is_infinite())
+                .count(),
+            error_profile: error_profile(&trials, width.get()),
             example: trials.into_iter().next().map(|trial| trial.bead).unwrap_or_default(),
             rms_by_seed,
         })
@@ -137,7 +148,7 @@ impl Figures {
 }
 
 /// Root mean square error of all seeds, piece by piece of the path.
-fn course(trials: &[Trial], target_mm: f64) -> Vec<AlongBead> {
+fn error_profile(trials: &[LayerTrial], target_mm: f64) -> Vec<BeadPoint> {
     let mut pieces: Vec<(f64, f64)> = Vec::new();
     for (at, width) in trials.iter().flat_map(|trial| &trial.bead) {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a path")]
@@ -173,15 +184,15 @@ mod tests {
 
     #[test]
     fn an_estimate_tells_mean_median_and_confidence() {
-        let estimate = Estimate::of(vec![1.0, 2.0, 3.0, 6.0]);
+        let estimate = SeedStatistics::of(vec![1.0, 2.0, 3.0, 6.0]);
         assert_eq!((estimate.mean, estimate.median), (Some(3.0), Some(2.5)));
         // s² = 14/3, s/√4 = 1.0801; Student's t of 3 degrees of freedom is 3.1824.
         assert!((estimate.confidence.unwrap() - 3.1824 * 1.0801).abs() < 1e-3);
-        assert!((interval(100.0).unwrap() - 1.9842).abs() < 1e-3);
-        assert_eq!(Estimate::of(vec![2.0]).confidence, None);
-        let never = Estimate::of(vec![1.0, f64::INFINITY, 2.0]);
+        assert!((confidence_factor(100.0).unwrap() - 1.9842).abs() < 1e-3);
+        assert_eq!(SeedStatistics::of(vec![2.0]).confidence, None);
+        let never = SeedStatistics::of(vec![1.0, f64::INFINITY, 2.0]);
         assert_eq!((never.mean, never.median), (None, Some(2.0)));
-        assert_eq!(Estimate::of(vec![f64::INFINITY; 3]).median, None);
+        assert_eq!(SeedStatistics::of(vec![f64::INFINITY; 3]).median, None);
     }
 
     #[test]
@@ -191,12 +202,15 @@ mod tests {
         let mut late = ours.clone();
         late.run.robot.start_length = Mm::constant(1e5);
         let late = Figures::lay(&late, width, 2, None).unwrap();
-        assert_eq!((late.failed, late.rms_error_mm.mean, late.settled_mm.median), (2, None, None));
-        assert_eq!((late.integral_mm2.mean, late.scatter_mm.mean), (None, None));
+        assert_eq!(
+            (late.failed_seeds, late.rms_error_mm.mean, late.settled_mm.median),
+            (2, None, None)
+        );
+        assert_eq!((late.integral_mm2.mean, late.sigma_mm.mean), (None, None));
         let mut blind = ours;
         blind.cell.simulation.path = Mm::constant(500.0);
         let blind = Figures::lay(&blind, width, 2, None).unwrap();
-        assert_eq!((blind.failed, blind.scatter_mm.mean), (0, None));
+        assert_eq!((blind.failed_seeds, blind.sigma_mm.mean), (0, None));
         assert!(blind.rms_error_mm.mean.is_some());
     }
 

@@ -9,69 +9,79 @@ use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::run::runner::NoRecorder;
 
-use super::score::{AlongBead, Score};
+use super::score::{BeadPoint, LayerScore};
 use crate::numeric::average::{mean, rms};
-use crate::sim::cell::{Sight, SimCell, SimError, Witness};
+use crate::sim::cell::{FrameObservation, Observer, SimCell, SimCellError};
 
 /// Places along the bead at which it is judged \[mm\].
-const EVERY_MM: f64 = 0.5;
+const BEAD_SPACING_MM: f64 = 0.5;
 
 /// A layer as it was laid.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Trial {
+pub struct LayerTrial {
     /// What was measured.
-    pub score: Score,
+    pub score: LayerScore,
     /// Width of the bead itself, every half millimetre.
-    pub bead: Vec<AlongBead>,
+    pub bead: Vec<BeadPoint>,
     /// Where the nozzle was when the first controlled setpoint was sent
     /// \[mm\]; infinite where there was none.
-    pub begun_mm: f64,
+    pub control_start_mm: f64,
     /// Whether it was laid to its end; the controller stopped it otherwise.
-    pub whole: bool,
+    pub complete: bool,
     target_mm: f64,
 }
 
-impl Trial {
+impl LayerTrial {
     /// Lays one layer of the cell's nominal width with a seed.
     pub fn lay(
         cell: &Cell,
         run: &RunPart,
         calibration: &Calibration,
         seed: u64,
-    ) -> Result<Self, SimError> {
-        Self::lay_told(cell, run, calibration, 1.0, seed)
+    ) -> Result<Self, SimCellError> {
+        Self::lay_mismatched(cell, run, calibration, 1.0, seed)
     }
 
     /// The same by a controller that is told the camera's distance wrong by a
     /// factor.
-    pub fn lay_told(
+    pub fn lay_mismatched(
         cell: &Cell,
         run: &RunPart,
         calibration: &Calibration,
         factor: f64,
         seed: u64,
-    ) -> Result<Self, SimError> {
+    ) -> Result<Self, SimCellError> {
         let mut cell = cell.clone();
         cell.simulation.seed = seed + 1;
         let target_mm = run.control.target.nominal().get();
-        let mut sim = SimCell::told(&cell, run, factor, calibration.clone(), NoRecorder)?;
-        let mut watch = Watch { score: Score::new(target_mm), newest: None, begun: None };
+        let mut sim = SimCell::mismatched(&cell, run, factor, calibration.clone(), NoRecorder)?;
+        let mut watch = StartObserver {
+            score: LayerScore::new(target_mm),
+            newest: None,
+            control_start_mm: None,
+        };
         let end = sim.layer(Mm::ZERO, &mut watch);
         let mut bead = Vec::new();
         let mut at = 0.0;
         while at < cell.simulation.path.get() {
             bead.extend(sim.bead().width_at(at).map(|width| (at, width)));
-            at += EVERY_MM;
+            at += BEAD_SPACING_MM;
         }
-        let begun_mm = watch.begun.unwrap_or(f64::INFINITY);
-        Ok(Self { score: watch.score, bead, begun_mm, whole: end.whole, target_mm })
+        let begun_mm = watch.control_start_mm.unwrap_or(f64::INFINITY);
+        Ok(Self {
+            score: watch.score,
+            bead,
+            control_start_mm: begun_mm,
+            complete: end.complete,
+            target_mm,
+        })
     }
 
     /// Way from a place to where the bead stays within a band of the target for
     /// good \[mm\]; infinite if it never does, or no bead lies there.
     pub fn settles_within(&self, from_mm: f64, band_mm: f64) -> f64 {
         let outside =
-            |(at, width): &AlongBead| *at >= from_mm && (width - self.target_mm).abs() > band_mm;
+            |(at, width): &BeadPoint| *at >= from_mm && (width - self.target_mm).abs() > band_mm;
         match self.bead.iter().rposition(outside) {
             None if self.errors(from_mm).next().is_none() => f64::INFINITY,
             None => 0.0,
@@ -85,7 +95,7 @@ impl Trial {
         if self.errors(from_mm).next().is_none() {
             return f64::NAN;
         }
-        self.errors(from_mm).map(|error| error.abs() * EVERY_MM).sum()
+        self.errors(from_mm).map(|error| error.abs() * BEAD_SPACING_MM).sum()
     }
 
     /// Mean size of the bead's error from a place on \[mm\].
@@ -99,26 +109,26 @@ impl Trial {
     }
 
     /// Standard deviation of the bead's width from a place on \[mm\].
-    pub fn scatter(&self, from_mm: f64) -> f64 {
+    pub fn standard_deviation(&self, from_mm: f64) -> f64 {
         let middle = mean(self.errors(from_mm));
         mean(self.errors(from_mm).map(|error| (error - middle).powi(2))).sqrt()
     }
 
     fn errors(&self, from_mm: f64) -> impl Iterator<Item = f64> {
-        let late = self.bead.iter().filter(move |(at, _)| *at >= from_mm);
-        late.map(|(_, width)| width - self.target_mm)
+        let after = self.bead.iter().filter(move |(at, _)| *at >= from_mm);
+        after.map(|(_, width)| width - self.target_mm)
     }
 }
 
 /// Watches for the first setpoint that is a controller's.
-struct Watch {
-    score: Score,
+struct StartObserver {
+    score: LayerScore,
     /// Path at the bead's start, the newest report, and when it came.
     newest: Option<(f64, RobotState, Stamp)>,
-    begun: Option<f64>,
+    control_start_mm: Option<f64>,
 }
 
-impl Witness for Watch {
+impl Observer for StartObserver {
     fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         self.score.step(now, event, step);
         match event {
@@ -130,13 +140,13 @@ impl Witness for Watch {
                 let path = self.newest.map(|(start, state, at)| {
                     (state.path_mm + state.speed_mm_per_s * (now - at)).get() - start
                 });
-                self.begun = self.begun.or(path);
+                self.control_start_mm = self.control_start_mm.or(path);
             }
             _ => {}
         }
     }
 
-    fn look(&mut self, sight: &Sight<'_>) {
-        self.score.look(sight);
+    fn frame(&mut self, sight: &FrameObservation<'_>) {
+        self.score.frame(sight);
     }
 }

@@ -5,28 +5,28 @@ use crate::control::step::Step;
 use crate::core::robot::RobotMode;
 use crate::core::time::Stamp;
 use crate::numeric::average::{mean, rms};
-use crate::sim::cell::{Sight, Witness};
+use crate::sim::cell::{FrameObservation, Observer};
 
 /// A place along the bead and a value there.
-pub type AlongBead = (f64, f64);
+pub type BeadPoint = (f64, f64);
 
 /// Watches one layer and adds up what the tables of the 2022 paper report.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Score {
+pub struct LayerScore {
     target: f64,
-    begun: Option<(Stamp, f64)>,
+    started: Option<(Stamp, f64)>,
     ended: Option<(Stamp, f64)>,
     refused: u64,
     /// Measured width over path.
-    pub widths: Vec<AlongBead>,
+    pub widths: Vec<BeadPoint>,
     /// The same, as a perfect measurement would have it, where frames are
     /// rendered.
-    pub true_widths: Vec<AlongBead>,
+    pub true_widths: Vec<BeadPoint>,
     /// Robot's speed over path.
-    pub speeds: Vec<AlongBead>,
+    pub speeds: Vec<BeadPoint>,
 }
 
-impl Score {
+impl LayerScore {
     /// For a wanted width \[mm\].
     pub fn new(target_mm: f64) -> Self {
         Self { target: target_mm, ..Self::default() }
@@ -44,7 +44,7 @@ impl Score {
 
     /// Mean of the speed over time, the start included \[mm/s\].
     pub fn mean_speed(&self) -> f64 {
-        match (self.begun, self.ended) {
+        match (self.started, self.ended) {
             (Some((from, first)), Some((to, last))) if to > from => {
                 (last - first) / (to - from).secs()
             }
@@ -62,28 +62,28 @@ impl Score {
     }
 }
 
-impl Witness for Score {
+impl Observer for LayerScore {
     fn step(&mut self, now: Stamp, event: &Event, _: &Step) {
         let Event::Robot(state) = event else { return };
         let path = state.path_mm.get();
         if state.mode == RobotMode::Print {
-            let (_, start) = *self.begun.get_or_insert((now, path));
+            let (_, start) = *self.started.get_or_insert((now, path));
             self.ended = Some((now, path));
             self.speeds.push((path - start, state.speed_mm_per_s.get()));
         }
     }
 
-    fn look(&mut self, sight: &Sight<'_>) {
+    fn frame(&mut self, sight: &FrameObservation<'_>) {
         // The bead's end within the gauge is not a width of the layer.
-        if sight.under_mm < 0.0 {
+        if sight.position_mm < 0.0 {
             return;
         }
         match sight.outcome {
-            Ok(measured) => self.widths.push((sight.under_mm, measured.width.get())),
+            Ok(measured) => self.widths.push((sight.position_mm, measured.width.get())),
             Err(_) => self.refused += 1,
         }
         if let Some(truth) = sight.truth {
-            self.true_widths.push((sight.under_mm, truth.width_mm));
+            self.true_widths.push((sight.position_mm, truth.width_mm));
         }
     }
 }
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn what_was_never_seen_has_no_error() {
-        let mut score = Score::new(42.0);
+        let mut score = LayerScore::new(42.0);
         assert!(score.mean_error().is_nan() && score.rms_error().is_nan());
         score.widths = vec![(100.0, 38.6), (300.0, 41.0), (500.0, 41.6), (700.0, 42.1)];
         assert!((score.mean_error() - (3.4 + 1.0 + 0.4 + 0.1) / 4.0).abs() < 1e-12);

@@ -11,7 +11,7 @@ use crate::width_control::strategy::pi::PiStrategy;
 
 /// A law that is tried.
 #[derive(Debug, Clone)]
-pub struct Candidate {
+pub struct ControllerCandidate {
     /// What it is called.
     pub name: String,
     /// Its width controller.
@@ -24,7 +24,7 @@ pub struct Candidate {
     pub offset_sigma_mm: f64,
 }
 
-impl Candidate {
+impl ControllerCandidate {
     /// As the cell has it now; none where its law holds no width.
     pub fn now(run: &RunPart) -> Option<Self> {
         let strategy = &run.control.strategy;
@@ -60,23 +60,23 @@ impl Candidate {
         Self::of("proposed, by distance", &proposal.distance)
     }
 
-    fn of(name: &str, told: &DistanceProposal) -> Self {
+    fn of(name: &str, settings: &DistanceProposal) -> Self {
         Self {
             name: name.to_owned(),
             strategy: Arc::new(DistanceStrategy {
-                exponent: told.exponent,
-                learns_exponent: told.learns,
-                drift_per_root_m: told.drift_per_root_m,
+                exponent: settings.exponent,
+                learns_exponent: settings.learns,
+                drift_per_root_m: settings.drift_per_root_m,
             }),
             gains: None,
-            offset_mm: told.offset_mm,
-            offset_sigma_mm: told.offset_sigma_mm,
+            offset_mm: settings.offset_mm,
+            offset_sigma_mm: settings.offset_sigma_mm,
         }
     }
 
     /// The law by distance as it is proposed, and with what it is told wrong.
-    pub fn misled(proposal: &Proposal) -> Vec<Self> {
-        let told = proposal.distance;
+    pub fn mismatched(proposal: &Proposal) -> Vec<Self> {
+        let settings = proposal.distance;
         let cases: [(&str, f64, f64); 5] = [
             ("as proposed", 1.0, 1.0),
             ("offset_mm 20 % too small", 0.8, 1.0),
@@ -85,12 +85,12 @@ impl Candidate {
             ("exponent half as large again", 1.0, 1.5),
         ];
         let case = |(name, offset, exponent): (&str, f64, f64)| {
-            let told = DistanceProposal {
-                offset_mm: told.offset_mm * offset,
-                exponent: told.exponent * exponent,
-                ..told
+            let settings = DistanceProposal {
+                offset_mm: settings.offset_mm * offset,
+                exponent: settings.exponent * exponent,
+                ..settings
             };
-            Self::of(name, &told)
+            Self::of(name, &settings)
         };
         cases.map(case).to_vec()
     }

@@ -6,8 +6,8 @@ use crate::control::step::{Command, Step};
 use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
-use crate::identify::camera_offset::Width;
-use crate::width_control::steps::{Progress, StepSettings, StepsTrace};
+use crate::identify::camera_offset::MeasuredWidth;
+use crate::width_control::steps::{StepSettings, StepsProgress, StepsTrace};
 
 /// A run as it was recorded, in order.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -15,7 +15,7 @@ pub struct Log {
     /// What the robot reported, when it arrived.
     pub states: Vec<(Stamp, RobotState)>,
     /// Widths that were measured, by capture.
-    pub widths: Vec<Width>,
+    pub widths: Vec<MeasuredWidth>,
     /// From capture to arrival at the controller of each, in the order of arrival \[s\].
     pub latencies_s: Vec<f64>,
     /// Speeds that were sent, and when.
@@ -33,7 +33,11 @@ impl Log {
             Event::Robot(state) => self.states.push((now, *state)),
             Event::Measured { captured_at, width_mm, sigma_mm, .. } => {
                 self.latencies_s.push((now - *captured_at).secs());
-                self.widths.push(Width { at: *captured_at, width: *width_mm, sigma: *sigma_mm });
+                self.widths.push(MeasuredWidth {
+                    at: *captured_at,
+                    width: *width_mm,
+                    sigma: *sigma_mm,
+                });
             }
             Event::Rejected { .. } => self.refused += 1,
             _ => {}
@@ -60,13 +64,13 @@ impl Log {
             ));
         }
         match steps.progress {
-            Progress::Piece(number) => {
+            StepsProgress::Piece(number) => {
                 Some(format!("the run ended in piece {} of {}", number + 1, StepSettings::count()))
             }
-            Progress::Seeing => {
+            StepsProgress::Seeing => {
                 Some("the run ended before the camera had seen the last piece".to_owned())
             }
-            Progress::Over => None,
+            StepsProgress::Over => None,
         }
     }
 

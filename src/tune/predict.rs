@@ -5,46 +5,46 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::candidate::Candidate;
-use super::plant::Plant;
+use super::candidate::ControllerCandidate;
+use super::plant::IdentifiedCell;
 use crate::calibration::Calibration;
 use crate::cell::Cell;
-use crate::cell::file::{RunPart, Source};
+use crate::cell::file::{ImageSource, RunPart};
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS2};
 use crate::run::runner::NoRecorder;
-use crate::scenario::bead::{BeadModel, Roughness};
+use crate::scenario::bead::{BeadModel, EdgeRoughness};
 use crate::scenario::disturbance::Flow;
-use crate::scenario::table::{Level, Simulation};
-use crate::sim::cell::{Sight, SimCell, SimError, Witness};
-use crate::width_control::target::Target;
+use crate::scenario::table::{Simulation, WidthSource};
+use crate::sim::cell::{FrameObservation, Observer, SimCell, SimCellError};
+use crate::width_control::target::WidthTarget;
 
 /// Step of the flow, as a share.
 pub const FLOW_STEP: f64 = 0.08;
 /// Beads that are laid with each law.
 pub const SEEDS: u64 = 24;
 /// Least band about the target within which a bead counts as settled \[mm\].
-const LEAST_BAND_MM: f64 = 0.5;
+const MIN_BAND_MM: f64 = 0.5;
 /// Path from the first stretch to the flow's step, and from there to the end: at least
 /// this \[mm\], and so many times the camera's distance.
-const LEAST_MM: f64 = 1200.0;
-const TIMES: f64 = 15.0;
+const MIN_SEGMENT_MM: f64 = 1200.0;
+const SEGMENT_OFFSETS: f64 = 15.0;
 /// Part of the way before the flow's step over which a bead counts as steady.
-const STEADY: f64 = 1.0 / 3.0;
+const STEADY_FRACTION: f64 = 1.0 / 3.0;
 /// Length over which a rough bead is taken to be alike, as a part of the gauge.
-const ROUGH_PART: f64 = 0.1;
+const ROUGHNESS_LENGTH_FRACTION: f64 = 0.1;
 /// Places along the bead at which it is judged \[mm\].
-const EVERY_MM: f64 = 1.0;
+const SAMPLE_SPACING_MM: f64 = 1.0;
 /// What is a single scale good for where widths are not rendered.
-const SCALE: Calibration = Calibration::Scale { mm_per_px: 0.1, sigma: None };
+const UNUSED_SCALE: Calibration = Calibration::Scale { mm_per_px: 0.1, sigma: None };
 /// Bandwidths that a simulated robot may have \[Hz\].
 const BANDWIDTHS_HZ: (f64, f64) = (0.01, 1000.0);
 
 /// What is foretold of a law.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Prediction {
+pub struct BeadPrediction {
     /// The law.
     pub name: String,
     /// Way from the beginning of control until the bead is within the band, as the
@@ -70,7 +70,7 @@ pub struct Prediction {
 
 /// The cell as it was found, on which laws are tried.
 #[derive(Debug, Clone)]
-pub struct World {
+pub struct TestCell {
     cell: Cell,
     run: RunPart,
     target_mm: f64,
@@ -81,18 +81,18 @@ pub struct World {
     end_mm: f64,
 }
 
-impl World {
+impl TestCell {
     /// Of a cell and what was found. Its rates, limits and first stretch are the
     /// cell's; bead, noise, wandering, delays and the robot are those found. A dead
     /// time of the robot is added to the camera's, which is the same to a loop; a largest
     /// slope of its speed becomes that of the setpoints.
-    pub fn new(cell: &Cell, run: &RunPart, plant: &Plant) -> Self {
+    pub fn new(cell: &Cell, run: &RunPart, plant: &IdentifiedCell) -> Self {
         let (mut cell, mut run) = (cell.clone(), run.clone());
         let target_mm = run.control.target.nominal().get();
-        let way_mm = (TIMES * plant.offset_mm.value).max(LEAST_MM);
+        let way_mm = (SEGMENT_OFFSETS * plant.offset_mm.value).max(MIN_SEGMENT_MM);
         let step_at_mm = run.robot.start_length.get() + way_mm;
         let end_mm = step_at_mm + way_mm;
-        as_found(&mut cell.simulation, plant);
+        apply_identified(&mut cell.simulation, plant);
         cell.simulation.path = mm(end_mm);
         cell.simulation.flow.step_at_mm = step_at_mm;
         run.extruder = None;
@@ -100,21 +100,23 @@ impl World {
             let slope = MmPerS2::new(slope).unwrap_or(run.limits.max_accel);
             run.limits.max_accel = run.limits.max_accel.min(slope);
         }
-        run.camera.source = Source::Rendered;
+        run.camera.source = ImageSource::Rendered;
         run.camera.offset = mm(plant.offset_mm.value);
-        run.control.target = Target::constant(mm(target_mm));
+        run.control.target = WidthTarget::constant(mm(target_mm));
         cell.target = Some(run.control.target.clone());
         cell.run = Some(run.clone());
-        let rough_mm = plant.scatter.rough * plant.width_mm.value;
-        let band_mm = (2.0 * plant.noise_mm().hypot(rough_mm)).max(LEAST_BAND_MM);
+        let rough_mm = plant.width_noise.roughness * plant.width_mm.value;
+        let band_mm = (2.0 * plant.noise_mm().hypot(rough_mm)).max(MIN_BAND_MM);
         Self { cell, run, target_mm, band_mm, step_at_mm, end_mm }
     }
 
     /// What a law would do.
-    pub fn predict(&self, who: &Candidate) -> Result<Prediction, SimError> {
-        let laid: Vec<Laid> =
-            (0..SEEDS).into_par_iter().map(|seed| self.lay(who, seed)).collect::<Result<_, _>>()?;
-        let square = |from: &dyn Fn(&Laid) -> f64, to_mm: f64| {
+    pub fn predict(&self, candidate: &ControllerCandidate) -> Result<BeadPrediction, SimCellError> {
+        let laid: Vec<LaidRun> = (0..SEEDS)
+            .into_par_iter()
+            .map(|seed| self.lay(candidate, seed))
+            .collect::<Result<_, _>>()?;
+        let square = |from: &dyn Fn(&LaidRun) -> f64, to_mm: f64| {
             let errors = laid.iter().flat_map(|one| {
                 let from_mm = from(one);
                 one.bead.iter().filter(move |(at, _)| (from_mm..to_mm).contains(at))
@@ -124,21 +126,23 @@ impl World {
             });
             if count > 0.0 { f64::sqrt(sum / count) } else { f64::NAN }
         };
-        let median = |way: &dyn Fn(&Laid) -> f64| {
+        let median = |way: &dyn Fn(&LaidRun) -> f64| {
             let mut ways: Vec<f64> = laid.iter().map(way).collect();
             crate::numeric::rank::median(&mut ways).filter(|way| way.is_finite())
         };
         // A mean over the gauge knows of the step half a gauge before it.
-        let calm_mm = self.step_at_mm - 0.5 * self.cell.simulation.gauge_length.get();
-        let steady = |one: &Laid| one.begun_mm + (1.0 - STEADY) * (calm_mm - one.begun_mm);
+        let steady_end_mm = self.step_at_mm - 0.5 * self.cell.simulation.gauge_length.get();
+        let steady = |one: &LaidRun| {
+            one.control_start_mm + (1.0 - STEADY_FRACTION) * (steady_end_mm - one.control_start_mm)
+        };
         let speeds = laid.iter().map(|one| one.setpoints);
         let speeds = speeds.reduce(|a, b| (a.0.max(b.0), a.1.min(b.1))).unwrap_or_default();
-        Ok(Prediction {
-            name: who.name.clone(),
-            start_settles_mm: median(&|one| self.settles(one, one.begun_mm, calm_mm)),
+        Ok(BeadPrediction {
+            name: candidate.name.clone(),
+            start_settles_mm: median(&|one| self.settles(one, one.control_start_mm, steady_end_mm)),
             step_settles_mm: median(&|one| self.settles(one, self.step_at_mm, self.end_mm)),
-            steady_rms_mm: square(&steady, calm_mm),
-            whole_rms_mm: square(&|one| one.begun_mm, self.end_mm),
+            steady_rms_mm: square(&steady, steady_end_mm),
+            whole_rms_mm: square(&|one| one.control_start_mm, self.end_mm),
             stopped: laid.iter().filter(|one| one.stopped).count(),
             speeds_mm_per_s: speeds,
             bead: laid.first().map(|one| one.bead.clone()).unwrap_or_default(),
@@ -148,7 +152,7 @@ impl World {
 
     /// Way from a place to where the bead stays within the band; infinite if it does
     /// not before the end.
-    fn settles(&self, one: &Laid, from_mm: f64, to_mm: f64) -> f64 {
+    fn settles(&self, one: &LaidRun, from_mm: f64, to_mm: f64) -> f64 {
         let within: Vec<_> =
             one.bead.iter().filter(|(at, _)| (from_mm..to_mm).contains(at)).collect();
         let outside = within.iter().rposition(|(_, w)| (w - self.target_mm).abs() > self.band_mm);
@@ -159,16 +163,19 @@ impl World {
         }
     }
 
-    fn lay(&self, who: &Candidate, seed: u64) -> Result<Laid, SimError> {
+    fn lay(&self, candidate: &ControllerCandidate, seed: u64) -> Result<LaidRun, SimCellError> {
         let (mut cell, mut run) = (self.cell.clone(), self.run.clone());
         cell.simulation.seed = seed + 1;
-        run.control.strategy = Arc::clone(&who.strategy);
-        run.control.gains = who.gains;
-        run.camera.offset_sigma = mm(who.offset_sigma_mm);
-        let factor = who.offset_mm / self.run.camera.offset.get().max(1e-9);
-        let mut sim = SimCell::told(&cell, &run, factor, SCALE, NoRecorder)?;
-        let mut laid =
-            Laid { begun_mm: f64::INFINITY, setpoints: (0.0, f64::INFINITY), ..Laid::default() };
+        run.control.strategy = Arc::clone(&candidate.strategy);
+        run.control.gains = candidate.gains;
+        run.camera.offset_sigma = mm(candidate.offset_sigma_mm);
+        let factor = candidate.offset_mm / self.run.camera.offset.get().max(1e-9);
+        let mut sim = SimCell::mismatched(&cell, &run, factor, UNUSED_SCALE, NoRecorder)?;
+        let mut laid = LaidRun {
+            control_start_mm: f64::INFINITY,
+            setpoints: (0.0, f64::INFINITY),
+            ..LaidRun::default()
+        };
         let _ = sim.layer(Mm::ZERO, &mut laid);
         // Of a rough bead no law sees more than the mean over the gauge.
         let half_mm = 0.5 * cell.simulation.gauge_length.get();
@@ -176,7 +183,7 @@ impl World {
         while at < self.end_mm {
             let width = sim.bead().mean_width(at - half_mm, at + half_mm);
             laid.bead.extend(width.map(|width| (at, width)));
-            at += EVERY_MM;
+            at += SAMPLE_SPACING_MM;
         }
         Ok(laid)
     }
@@ -184,16 +191,16 @@ impl World {
 
 /// A bead that was laid.
 #[derive(Debug, Clone, Default)]
-struct Laid {
+struct LaidRun {
     bead: Vec<(f64, f64)>,
     speed: Vec<(f64, f64)>,
-    begun_mm: f64,
+    control_start_mm: f64,
     stopped: bool,
     /// Fastest and slowest setpoint \[mm/s\].
     setpoints: (f64, f64),
 }
 
-impl Witness for Laid {
+impl Observer for LaidRun {
     fn step(&mut self, _: Stamp, event: &Event, step: &Step) {
         if let Event::Robot(state) = event
             && state.mode.lays_bead()
@@ -205,29 +212,29 @@ impl Witness for Laid {
         if step.state.name() != "tracking" {
             return;
         }
-        if self.begun_mm.is_infinite() {
-            self.begun_mm = self.speed.last().map_or(f64::INFINITY, |(path, _)| *path);
+        if self.control_start_mm.is_infinite() {
+            self.control_start_mm = self.speed.last().map_or(f64::INFINITY, |(path, _)| *path);
         }
         let (fastest, slowest) = self.setpoints;
         self.setpoints = (fastest.max(speed.get()), slowest.min(speed.get()));
     }
 
-    fn look(&mut self, _: &Sight<'_>) {}
+    fn frame(&mut self, _: &FrameObservation<'_>) {}
 }
 
 /// Bead, noise, delays and robot as they were found.
-fn as_found(simulation: &mut Simulation, plant: &Plant) {
-    let answers = plant.answers();
-    simulation.level = Level::Widths;
-    simulation.latency = Span::from_secs(plant.timing.latency_s + answers.dead_s);
+fn apply_identified(simulation: &mut Simulation, plant: &IdentifiedCell) {
+    let robot = plant.robot_dynamics();
+    simulation.width_source = WidthSource::Widths;
+    simulation.latency = Span::from_secs(plant.timing.latency_s + robot.dead_time_s);
     simulation.report = Span::from_secs(plant.timing.report_s.clamp(0.001, 1.0));
     simulation.step = Span::from_millis(1);
-    let bandwidth_hz = 1.0 / (std::f64::consts::TAU * answers.lag_s.max(1e-6));
+    let bandwidth_hz = 1.0 / (std::f64::consts::TAU * robot.lag_s.max(1e-6));
     simulation.robot_bandwidth_hz = bandwidth_hz.clamp(BANDWIDTHS_HZ.0, BANDWIDTHS_HZ.1);
     simulation.gauge_length = mm(plant.gauge_mm);
     simulation.width_noise = mm(plant.noise_mm());
-    simulation.outlier_share = 0.0;
-    simulation.missing_share = 0.0;
+    simulation.outlier_fraction = 0.0;
+    simulation.missing_fraction = 0.0;
     simulation.bead = BeadModel {
         width_mm: plant.width_mm.value,
         at_speed_mm_per_s: plant.at_speed_mm_per_s,
@@ -244,19 +251,19 @@ fn as_found(simulation: &mut Simulation, plant: &Plant) {
 }
 
 /// Shortest length over which a roughness hangs together \[mm\].
-const LEAST_ROUGH_MM: f64 = 0.1;
+const MIN_ROUGHNESS_LENGTH_MM: f64 = 0.1;
 
 /// A roughness that is found again in means over the gauge: of one that is alike as
 /// exp(−(distance/l)²), a mean over a long G keeps the share √π·l/G of the variance.
-fn roughness(plant: &Plant) -> Roughness {
-    let seen_mm = plant.scatter.rough * plant.width_mm.value;
-    let length_mm = ROUGH_PART * plant.gauge_mm;
-    if length_mm < LEAST_ROUGH_MM {
+fn roughness(plant: &IdentifiedCell) -> EdgeRoughness {
+    let measured_mm = plant.width_noise.roughness * plant.width_mm.value;
+    let length_mm = ROUGHNESS_LENGTH_FRACTION * plant.gauge_mm;
+    if length_mm < MIN_ROUGHNESS_LENGTH_MM {
         // Widths at points are as rough as the bead.
-        return Roughness { size_mm: seen_mm, length_mm: LEAST_ROUGH_MM };
+        return EdgeRoughness { sigma_mm: measured_mm, length_mm: MIN_ROUGHNESS_LENGTH_MM };
     }
-    let kept = std::f64::consts::PI.sqrt() * ROUGH_PART;
-    Roughness { size_mm: seen_mm / kept.sqrt(), length_mm }
+    let kept_fraction = std::f64::consts::PI.sqrt() * ROUGHNESS_LENGTH_FRACTION;
+    EdgeRoughness { sigma_mm: measured_mm / kept_fraction.sqrt(), length_mm }
 }
 
 fn mm(value: f64) -> Mm {

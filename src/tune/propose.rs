@@ -3,22 +3,22 @@
 use serde::Serialize;
 
 use super::noise::Drift;
-use super::plant::Plant;
+use super::plant::IdentifiedCell;
 use super::stability::{LoopMargins, LoopPlant};
 use crate::cell::file::RunPart;
-use crate::width_control::limiter::Limits;
+use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::pi::PiGains;
 use crate::width_control::strategy::Strategy;
 use crate::width_control::strategy::distance::DistanceStrategy;
 
 /// How far the flow is said to wander along a metre unless less is known; that of the
 /// law by distance.
-const USUAL_DRIFT: f64 = 0.0055;
+const DEFAULT_DRIFT: f64 = 0.0055;
 /// Range of what may be said.
-const DRIFTS: (f64, f64) = (1e-4, 0.2);
+const DRIFT_RANGE: (f64, f64) = (1e-4, 0.2);
 /// Least that is claimed of the camera's distance \[mm\]: nozzles drip and paths round
 /// their corners.
-const LEAST_OFFSET_SIGMA_MM: f64 = 0.5;
+const MIN_OFFSET_SIGMA_MM: f64 = 0.5;
 
 /// Settings of both laws.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,8 +57,8 @@ pub struct PiProposal {
 }
 
 /// What follows from a plant for the width and the limits of a cell.
-pub fn propose(plant: &Plant, run: &RunPart) -> Proposal {
-    let at = worst(plant, run.control.target.nominal().get(), &run.limits);
+pub fn propose(plant: &IdentifiedCell, run: &RunPart) -> Proposal {
+    let at = slowest_loop(plant, run.control.target.nominal().get(), &run.limits);
     let gains = gains(&at);
     Proposal {
         distance: by_distance(plant, &*run.control.strategy),
@@ -67,20 +67,20 @@ pub fn propose(plant: &Plant, run: &RunPart) -> Proposal {
 }
 
 /// The slowest speed: there a change of it makes most of a width, and is seen last.
-pub fn worst(plant: &Plant, target_mm: f64, limits: &Limits) -> LoopPlant {
+pub fn slowest_loop(plant: &IdentifiedCell, target_mm: f64, limits: &SpeedLimits) -> LoopPlant {
     LoopPlant::at(plant, target_mm, limits.min_speed.get().max(1.0))
 }
 
-fn by_distance(plant: &Plant, now: &dyn Strategy) -> DistanceProposal {
-    let drift_per_root_m = match plant.scatter.drift {
-        Drift::Found { per_root_m, .. } => per_root_m,
-        Drift::AtMost(most) => USUAL_DRIFT.min(most),
+fn by_distance(plant: &IdentifiedCell, now: &dyn Strategy) -> DistanceProposal {
+    let drift_per_root_m = match plant.width_noise.drift {
+        Drift::Estimated { per_root_m, .. } => per_root_m,
+        Drift::AtMost(max) => DEFAULT_DRIFT.min(max),
     };
     DistanceProposal {
         exponent: plant.exponent.value,
         offset_mm: plant.offset_mm.value,
-        offset_sigma_mm: plant.offset_mm.sigma.max(LEAST_OFFSET_SIGMA_MM),
-        drift_per_root_m: drift_per_root_m.clamp(DRIFTS.0, DRIFTS.1),
+        offset_sigma_mm: plant.offset_mm.sigma.max(MIN_OFFSET_SIGMA_MM),
+        drift_per_root_m: drift_per_root_m.clamp(DRIFT_RANGE.0, DRIFT_RANGE.1),
         learns: now.as_kind::<DistanceStrategy>().is_none_or(|now| now.learns_exponent),
     }
 }
@@ -88,10 +88,10 @@ fn by_distance(plant: &Plant, now: &dyn Strategy) -> DistanceProposal {
 /// The rule AMIGO for a lag behind a dead time, which leaves Ms = 1.4 (Åström and
 /// Hägglund 2006, *Advanced PID control*, section 7.3).
 pub fn gains(plant: &LoopPlant) -> PiGains {
-    let LoopPlant { gain_s: gain, dead_s: dead, lag_s: lag, .. } = *plant;
+    let LoopPlant { gain_s: gain, dead_time_s: dead, lag_s: lag, .. } = *plant;
     let dead = dead.max(1e-3);
-    let share = lag / (lag + dead);
-    let kp = (0.15 + 0.35 * lag / dead - share * share) / gain;
+    let normalised_lag = lag / (lag + dead);
+    let kp = (0.15 + 0.35 * lag / dead - normalised_lag * normalised_lag) / gain;
     let all = lag * lag + 12.0 * lag * dead + 7.0 * dead * dead;
     let reset_s = 0.35 * dead + 13.0 * dead * lag * lag / all;
     PiGains { kp_per_s: kp, ki_per_s2: kp / reset_s }

@@ -16,15 +16,15 @@ use std::f64::consts::PI;
 
 use serde::Serialize;
 
-use super::plant::Plant;
+use super::plant::IdentifiedCell;
 use crate::numeric::lti::{TransferFunction, margins};
 use crate::width_control::pi::PiGains;
 
 /// Least margins that a loop is to have: a factor, and degrees (Åström and Murray 2008,
 /// section 9.3).
-pub const LEAST_GAIN: f64 = 2.0;
+pub const MIN_GAIN_MARGIN: f64 = 2.0;
 /// See [`LEAST_GAIN`].
-pub const LEAST_PHASE_DEG: f64 = 45.0;
+pub const MIN_PHASE_MARGIN_DEG: f64 = 45.0;
 
 /// The bead, the camera and the robot in the loop, at one speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -34,7 +34,7 @@ pub struct LoopPlant {
     /// Width for speed, K \[mm/(mm/s)\].
     pub gain_s: f64,
     /// All dead time, T \[s\].
-    pub dead_s: f64,
+    pub dead_time_s: f64,
     /// The robot's lag, τ \[s\].
     pub lag_s: f64,
 }
@@ -56,37 +56,37 @@ pub struct LoopMargins {
 
 impl LoopMargins {
     /// Whether these are the margins that a loop is to have.
-    pub fn are_enough(&self) -> bool {
-        self.is_stable && self.gain >= LEAST_GAIN && self.phase_deg >= LEAST_PHASE_DEG
+    pub fn are_sufficient(&self) -> bool {
+        self.is_stable && self.gain >= MIN_GAIN_MARGIN && self.phase_deg >= MIN_PHASE_MARGIN_DEG
     }
 }
 
 impl LoopPlant {
     /// At a speed at which bead of the wanted width is laid.
-    pub fn at(plant: &Plant, target_mm: f64, speed_mm_per_s: f64) -> Self {
+    pub fn at(plant: &IdentifiedCell, target_mm: f64, speed_mm_per_s: f64) -> Self {
         let timing = &plant.timing;
-        let robot = plant.answers();
+        let robot = plant.robot_dynamics();
         Self {
             speed_mm_per_s,
             gain_s: plant.exponent.value * target_mm / speed_mm_per_s,
-            dead_s: plant.offset_mm.value / speed_mm_per_s
+            dead_time_s: plant.offset_mm.value / speed_mm_per_s
                 + timing.latency_s
-                + robot.dead_s
+                + robot.dead_time_s
                 + 0.5 * (timing.frame_s + timing.setpoint_s),
             lag_s: robot.lag_s,
         }
     }
 
     /// Gain of the loop at a frequency \[rad/s\].
-    fn size(&self, gains: PiGains, w: f64) -> f64 {
-        let law = gains.kp_per_s.hypot(gains.ki_per_s2 / w);
-        self.gain_s * law / (self.lag_s * w).hypot(1.0)
+    fn magnitude(&self, gains: PiGains, w: f64) -> f64 {
+        let controller = gains.kp_per_s.hypot(gains.ki_per_s2 / w);
+        self.gain_s * controller / (self.lag_s * w).hypot(1.0)
     }
 
     /// Its phase, without turns left out \[rad\].
     fn phase(&self, gains: PiGains, w: f64) -> f64 {
-        let law = -libm::atan2(gains.ki_per_s2, gains.kp_per_s * w);
-        law - libm::atan(self.lag_s * w) - self.dead_s * w
+        let controller = -libm::atan2(gains.ki_per_s2, gains.kp_per_s * w);
+        controller - libm::atan(self.lag_s * w) - self.dead_time_s * w
     }
 
     /// Margins with gains on the error in mm; none where both are 0.
@@ -95,11 +95,11 @@ impl LoopPlant {
             return None;
         }
         // Behind this the dead time alone has turned the phase by more than that.
-        let far = 2.0 * PI / self.dead_s.max(1e-6);
-        let turned = first(far, |w| self.phase(gains, w) + PI)?;
-        let gain = 1.0 / self.size(gains, turned);
+        let max_frequency = 2.0 * PI / self.dead_time_s.max(1e-6);
+        let turned = first_sign_change(max_frequency, |w| self.phase(gains, w) + PI)?;
+        let gain = 1.0 / self.magnitude(gains, turned);
         let is_stable = gain > 1.0;
-        let crossover = falling(|w| self.size(gains, w) - 1.0);
+        let crossover = falling_root(|w| self.magnitude(gains, w) - 1.0);
         // A gain that is below 1 throughout leaves any phase, one above it none.
         let none = if is_stable { f64::INFINITY } else { f64::NEG_INFINITY };
         let phase = crossover.map_or(none, |w| PI + self.phase(gains, w));
@@ -119,7 +119,7 @@ impl LoopPlant {
     /// The loop as a transfer function.
     pub fn transfer(&self, gains: PiGains) -> Option<TransferFunction> {
         let num = [gains.kp_per_s, gains.ki_per_s2].map(|gain| gain * self.gain_s);
-        TransferFunction::new(&num, &[self.lag_s, 1.0, 0.0], self.dead_s).ok()
+        TransferFunction::new(&num, &[self.lag_s, 1.0, 0.0], self.dead_time_s).ok()
     }
 }
 
@@ -129,14 +129,14 @@ const STEPS: u32 = 4000;
 const HALVINGS: u32 = 200;
 
 /// The first zero of a function that is positive at first.
-fn first(end: f64, of: impl Fn(f64) -> f64) -> Option<f64> {
+fn first_sign_change(end: f64, of: impl Fn(f64) -> f64) -> Option<f64> {
     let at = |k: u32| end * f64::from(k) / f64::from(STEPS);
     let k = (1..=STEPS).find(|&k| of(at(k)) < 0.0)?;
-    Some(halved(at(k - 1), at(k), of))
+    Some(bisect(at(k - 1), at(k), of))
 }
 
 /// The zero of a function that falls; none where it is positive throughout, or nowhere.
-fn falling(of: impl Fn(f64) -> f64) -> Option<f64> {
+fn falling_root(of: impl Fn(f64) -> f64) -> Option<f64> {
     let (mut low, mut high) = (1e-9, 1e-9);
     if of(low) <= 0.0 {
         return None;
@@ -148,10 +148,10 @@ fn falling(of: impl Fn(f64) -> f64) -> Option<f64> {
             return None;
         }
     }
-    Some(halved(low, high, of))
+    Some(bisect(low, high, of))
 }
 
-fn halved(mut low: f64, mut high: f64, of: impl Fn(f64) -> f64) -> f64 {
+fn bisect(mut low: f64, mut high: f64, of: impl Fn(f64) -> f64) -> f64 {
     for _ in 0..HALVINGS {
         let middle = f64::midpoint(low, high);
         if of(middle) > 0.0 {

@@ -8,7 +8,7 @@ use std::path::Path;
 use super::noise::Drift;
 use super::propose::gains;
 use super::stability::LoopPlant;
-use super::{Facts, Log, Plant, TuneError, robot};
+use super::{IdentifiedCell, Log, TuneError, TuneFacts, robot};
 use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::cell::file::Purpose;
@@ -17,12 +17,12 @@ use crate::control::step::Step;
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS};
-use crate::identify::camera_offset::OffsetError;
+use crate::identify::camera_offset::CameraOffsetError;
 use crate::numeric::lti::margins;
 use crate::run::runner::NoRecorder;
-use crate::sim::cell::{Sight, SimCell, Witness};
+use crate::sim::cell::{FrameObservation, Observer, SimCell};
 use crate::width_control::pi::PiGains;
-use crate::width_control::steps::Progress;
+use crate::width_control::steps::StepsProgress;
 
 const SCALE: Calibration = Calibration::Scale { mm_per_px: 0.126_582, sigma: None };
 
@@ -43,14 +43,14 @@ struct Watch {
     states: Vec<&'static str>,
 }
 
-impl Witness for Watch {
+impl Observer for Watch {
     fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         self.log.event(now, event);
         self.log.step(now, step);
         self.states.push(step.state.name());
     }
 
-    fn look(&mut self, _: &Sight<'_>) {}
+    fn frame(&mut self, _: &FrameObservation<'_>) {}
 }
 
 /// Lays the bead of a cell with a seed.
@@ -65,20 +65,20 @@ fn laid(cell: &Cell, seed: u64) -> Watch {
     watch
 }
 
-fn facts(cell: &Cell) -> Facts {
-    Facts {
+fn facts(cell: &Cell) -> TuneFacts {
+    TuneFacts {
         gauge: cell.simulation.gauge_length,
-        farthest: Mm::constant(1000.0),
+        max_offset: Mm::constant(1000.0),
         start_speed: cell.run.as_ref().unwrap().robot.start_speed,
     }
 }
 
-fn plant(cell: &Cell, seed: u64) -> Plant {
-    Plant::of(&laid(cell, seed).log, &facts(cell)).unwrap()
+fn plant(cell: &Cell, seed: u64) -> IdentifiedCell {
+    IdentifiedCell::of(&laid(cell, seed).log, &facts(cell)).unwrap()
 }
 
 /// Whether numbers scatter about the truth as their standard deviations say.
-fn covers(name: &str, truth: f64, found: &[super::Known]) {
+fn covers(name: &str, truth: f64, found: &[super::Estimated]) {
     let deviations: Vec<f64> = found.iter().map(|one| (one.value - truth) / one.sigma).collect();
     let count = f64::from(u32::try_from(deviations.len()).unwrap());
     let size = (deviations.iter().map(|z| z * z).sum::<f64>() / count).sqrt();
@@ -93,12 +93,13 @@ fn covers(name: &str, truth: f64, found: &[super::Known]) {
 #[test]
 fn what_is_found_scatters_about_the_truth_as_it_says() {
     let cell = cell(0.1);
-    let plants: Vec<Plant> = (1..=32).map(|seed| plant(&cell, seed)).collect();
-    let each = |of: fn(&Plant) -> super::Known| plants.iter().map(of).collect::<Vec<_>>();
+    let plants: Vec<IdentifiedCell> = (1..=32).map(|seed| plant(&cell, seed)).collect();
+    let each =
+        |of: fn(&IdentifiedCell) -> super::Estimated| plants.iter().map(of).collect::<Vec<_>>();
     covers("offset", 88.4, &each(|plant| plant.offset_mm));
     covers("exponent", 0.221, &each(|plant| plant.exponent));
     covers("width", 38.61, &each(|plant| plant.width_mm));
-    covers("noise", 0.36 / 38.61, &each(|plant| plant.scatter.each));
+    covers("noise", 0.36 / 38.61, &each(|plant| plant.width_noise.per_width));
     for plant in &plants {
         let robot = plant.robot.unwrap();
         let lag_s = 1.0 / (2.0 * PI * 10.0);
@@ -106,7 +107,7 @@ fn what_is_found_scatters_about_the_truth_as_it_says() {
         assert!((plant.timing.latency_s - 0.02).abs() < 1e-9);
         assert!((plant.timing.setpoint_s - 0.05).abs() < 1e-9);
     }
-    let none = plants.iter().filter(|plant| matches!(plant.scatter.drift, Drift::AtMost(_)));
+    let none = plants.iter().filter(|plant| matches!(plant.width_noise.drift, Drift::AtMost(_)));
     assert!(none.count() >= 28, "a drift that was not there");
 }
 
@@ -115,15 +116,16 @@ fn a_flow_that_wanders_is_told_from_noise_and_widens_what_is_said() {
     let mut cell = cell(0.1);
     cell.simulation.flow.drift_per_root_m = 0.02;
     cell.simulation.path = Mm::constant(2500.0);
-    let plants: Vec<Plant> = (1..=32).map(|seed| plant(&cell, seed)).collect();
-    let each = |of: fn(&Plant) -> super::Known| plants.iter().map(of).collect::<Vec<_>>();
+    let plants: Vec<IdentifiedCell> = (1..=32).map(|seed| plant(&cell, seed)).collect();
+    let each =
+        |of: fn(&IdentifiedCell) -> super::Estimated| plants.iter().map(of).collect::<Vec<_>>();
     covers("offset", 88.4, &each(|plant| plant.offset_mm));
     covers("exponent", 0.221, &each(|plant| plant.exponent));
-    let mut drifts: Vec<f64> = plants.iter().map(Plant::drift_per_root_m).collect();
+    let mut drifts: Vec<f64> = plants.iter().map(IdentifiedCell::drift_per_root_m).collect();
     drifts.sort_by(f64::total_cmp);
     assert!((0.015..0.027).contains(&drifts[16]), "{drifts:?}");
-    let held = plants.iter().filter(|plant| match plant.scatter.drift {
-        Drift::Found { low, high, .. } => (low..=high).contains(&0.02),
+    let held = plants.iter().filter(|plant| match plant.width_noise.drift {
+        Drift::Estimated { low, high, .. } => (low..=high).contains(&0.02),
         Drift::AtMost(_) => false,
     });
     // Two of three within one standard deviation.
@@ -144,7 +146,7 @@ fn every_setpoint_is_one_of_the_three_speeds_and_within_the_limits() {
         let reach = 200.0 * (*at - *before).secs() + 1e-9;
         assert!((*speed - *last).get().abs() <= reach, "{last} to {speed}");
     }
-    assert_eq!(log.steps.unwrap().progress, Progress::Over);
+    assert_eq!(log.steps.unwrap().progress, StepsProgress::Over);
     let last = log.setpoints.last().unwrap().1;
     assert!((last.get() - 112.5).abs() < 1e-9);
 }
@@ -171,10 +173,10 @@ fn a_width_near_an_end_of_the_range_brings_the_start_speed_back() {
 #[test]
 fn widths_that_stay_out_hold_the_speed_and_then_stop_the_robot() {
     let mut cell = cell(0.1);
-    cell.simulation.missing_share = 1.0;
+    cell.simulation.missing_fraction = 1.0;
     let none = laid(&cell, 1);
     assert!(none.log.setpoints.iter().all(|(_, speed)| (speed.get() - 112.5).abs() < 1e-9));
-    cell.simulation.missing_share = 0.0;
+    cell.simulation.missing_fraction = 0.0;
     cell.simulation.flow.step_at_mm = 900.0;
     // Wider than anything that is believed, at once: no width at all.
     cell.simulation.flow.step_ratio = 2.0;
@@ -187,15 +189,18 @@ fn a_recording_that_tells_nothing_is_refused_with_what_to_do() {
     let mut steady = cell(0.1);
     let length = steady.simulation.path;
     steady.run.as_mut().unwrap().robot.start_length = length;
-    let refused = Plant::of(&laid(&steady, 1).log, &facts(&steady)).unwrap_err();
-    assert!(matches!(refused, TuneError::Bead(OffsetError::Steady { .. })), "{refused}");
-    let nothing = Plant::of(&Log::default(), &facts(&steady)).unwrap_err();
-    assert!(matches!(nothing, TuneError::Bead(OffsetError::NoPath)));
+    let refused = IdentifiedCell::of(&laid(&steady, 1).log, &facts(&steady)).unwrap_err();
+    assert!(
+        matches!(refused, TuneError::Bead(CameraOffsetError::ConstantSpeed { .. })),
+        "{refused}"
+    );
+    let nothing = IdentifiedCell::of(&Log::default(), &facts(&steady)).unwrap_err();
+    assert!(matches!(nothing, TuneError::Bead(CameraOffsetError::NoPath)));
     // The bead is as wide as it is, whatever the speed.
     let mut stiff = cell(0.05);
     stiff.simulation.bead.exponent = 0.0;
     stiff.simulation.bead.slow_exponent = 0.0;
-    assert!(Plant::of(&laid(&stiff, 1).log, &facts(&stiff)).is_err());
+    assert!(IdentifiedCell::of(&laid(&stiff, 1).log, &facts(&stiff)).is_err());
 }
 
 /// A robot with a dead time and a lag, reported every 20 ms with noise.
@@ -242,8 +247,8 @@ fn ramped(dead_s: f64, lag_s: f64, slope: f64, noise: f64) -> Log {
 #[test]
 fn a_robot_that_answers_late_and_slowly_is_found() {
     for (dead_s, lag_s) in [(0.0, 0.05), (0.06, 0.03), (0.11, 0.2)] {
-        let found = robot::answer(&answered(dead_s, lag_s, 0.2)).unwrap();
-        let near = |known: super::Known, truth: f64| {
+        let found = robot::fit_response(&answered(dead_s, lag_s, 0.2)).unwrap();
+        let near = |known: super::Estimated, truth: f64| {
             // The world's grid is 0.1 ms.
             let off = (known.value - truth).abs();
             assert!(off < 3.5 * known.sigma + 2e-4, "{known:?} for {truth}");
@@ -252,21 +257,21 @@ fn a_robot_that_answers_late_and_slowly_is_found() {
         assert_eq!(found.slope_mm_per_s2, None);
         near(found.dead_time_s, dead_s);
         near(found.lag_s, lag_s);
-        assert!((found.left_mm_per_s - 0.2).abs() < 0.04);
+        assert!((found.residual_mm_per_s - 0.2).abs() < 0.04);
     }
-    let found = robot::answer(&ramped(0.05, 0.04, 50.0, 0.2)).unwrap();
+    let found = robot::fit_response(&ramped(0.05, 0.04, 50.0, 0.2)).unwrap();
     assert!((found.slope_mm_per_s2.unwrap() - 50.0).abs() < 1.0, "{found:?}");
     assert!((found.dead_time_s.value - 0.05).abs() < 0.01, "{found:?}");
     let mut steady = answered(0.0, 0.05, 0.2);
     for (_, speed) in &mut steady.setpoints {
         *speed = MmPerS::constant(100.0);
     }
-    let refused = robot::answer(&steady).unwrap_err();
-    assert_eq!(refused, robot::RobotError::TooFewSteps { found: 0 });
+    let refused = robot::fit_response(&steady).unwrap_err();
+    assert_eq!(refused, robot::RobotResponseError::TooFewSteps { found: 0 });
 }
 
 fn loop_of(dead_s: f64, lag_s: f64) -> LoopPlant {
-    LoopPlant { speed_mm_per_s: 80.0, gain_s: 0.13, dead_s, lag_s }
+    LoopPlant { speed_mm_per_s: 80.0, gain_s: 0.13, dead_time_s: dead_s, lag_s }
 }
 
 /// L = K·ki·e^(−sT)/s crosses at K·ki with 90° − K·ki·T to lose, and its phase is −180°
@@ -275,7 +280,7 @@ fn loop_of(dead_s: f64, lag_s: f64) -> LoopPlant {
 fn an_integral_behind_a_dead_time_has_the_margins_of_the_closed_form() {
     let plant = loop_of(1.2, 0.0);
     for share in [0.2, 0.5, 0.9, 1.1] {
-        let cross = share * FRAC_PI_2 / plant.dead_s;
+        let cross = share * FRAC_PI_2 / plant.dead_time_s;
         let gains = PiGains { kp_per_s: 0.0, ki_per_s2: cross / plant.gain_s };
         let found = plant.margins(gains).unwrap();
         assert!((found.gain - 1.0 / share).abs() < 1e-9);
@@ -302,7 +307,7 @@ fn margins_are_those_of_the_general_loop_and_the_rule_leaves_what_it_promises() 
         assert!((found.gain - general.gain.unwrap()).abs() < 1e-6 * found.gain);
         assert!((found.phase_deg - general.phase_rad.unwrap().to_degrees()).abs() < 1e-6);
         assert!((found.delay_s - general.delay_s.unwrap()).abs() < 1e-6);
-        assert!(found.are_enough(), "{found:?}");
+        assert!(found.are_sufficient(), "{found:?}");
         // The rule is an approximation to Ms = 1.4.
         assert!((1.2..1.55).contains(&found.sensitivity.unwrap()), "{found:?}");
     }

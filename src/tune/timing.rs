@@ -9,7 +9,7 @@ use crate::numeric::rank;
 /// What a cell's clocks do \[s\]. Each is a median, with the 99th percentile where a
 /// late one matters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Timing {
+pub struct CellTiming {
     /// From a frame's capture to its width's arrival at the controller.
     pub latency_s: f64,
     /// The same, which one of a hundred exceeds.
@@ -25,19 +25,19 @@ pub struct Timing {
 }
 
 /// Of a run; nothing where something never happened twice is 0.
-pub fn timing(log: &Log) -> Timing {
+pub fn timing(log: &Log) -> CellTiming {
     let frames: Vec<Stamp> = log.widths.iter().map(|width| width.at).collect();
     let reports: Vec<Stamp> = log.states.iter().map(|(at, _)| *at).collect();
     let setpoints: Vec<Stamp> = log.setpoints.iter().map(|(at, _)| *at).collect();
     let mut latencies = log.latencies_s.clone();
     let mut between = periods(&reports);
-    Timing {
-        latency_s: share(&mut latencies, 0.5),
-        latency_p99_s: share(&mut latencies, 0.99),
-        frame_s: share(&mut periods(&frames), 0.5),
-        report_s: share(&mut between, 0.5),
-        report_p99_s: share(&mut between, 0.99),
-        setpoint_s: share(&mut periods(&setpoints), 0.5),
+    CellTiming {
+        latency_s: quantile(&mut latencies, 0.5),
+        latency_p99_s: quantile(&mut latencies, 0.99),
+        frame_s: quantile(&mut periods(&frames), 0.5),
+        report_s: quantile(&mut between, 0.5),
+        report_p99_s: quantile(&mut between, 0.99),
+        setpoint_s: quantile(&mut periods(&setpoints), 0.5),
     }
 }
 
@@ -53,7 +53,7 @@ fn periods(times: &[Stamp]) -> Vec<f64> {
     clippy::cast_precision_loss,
     reason = "a share of a count"
 )]
-fn share(values: &mut [f64], part: f64) -> f64 {
-    let rank = (part * values.len().saturating_sub(1) as f64).round() as usize;
+fn quantile(values: &mut [f64], fraction: f64) -> f64 {
+    let rank = (fraction * values.len().saturating_sub(1) as f64).round() as usize;
     rank::at(values, rank).unwrap_or(0.0)
 }

@@ -9,13 +9,13 @@ mod width_input;
 use crate::core::units::Mm;
 
 use super::corner;
-use super::curve::{Curve, NOTABLE_PX};
+use super::curve::{Curve, NOTABLE_SCATTER_PX};
 use super::reject::Reject;
 use super::width::{Hints, WidthMeasurement};
-use crate::numeric::gauss_legendre::NODES;
+use crate::numeric::gauss_legendre::GAUSS_LEGENDRE_5;
 use sections::Sections;
-use spread::Spread;
-pub use width_input::{Memory, Scene, Side};
+use spread::WidthUncertainty;
+pub use width_input::{LocatedEdge, WidthInput, WidthScratch};
 
 /// Largest angle between the bead and the gauge's axis that is measured: the
 /// 20 degrees of the contract and a little for the measurement's own noise.
@@ -25,30 +25,30 @@ const MAX_SLANT_RAD: f64 = 0.38;
 const MAX_END_SLANT_RAD: f64 = 0.44;
 /// Smallest radius of a bead's axis in its widths: what bends more sharply is
 /// a corner.
-const LEAST_RADIUS: f64 = 1.5;
+const MIN_RADIUS_WIDTHS: f64 = 1.5;
 /// Angle over half the gauge below which a bend is a bead's waviness.
-const LEAST_TURN_RAD: f64 = 0.25;
+const MIN_TURN_RAD: f64 = 0.25;
 /// Share of the gauge on either side of its middle from which the edge points
 /// there are taken.
-const MIDDLE_SHARE: f64 = 0.125;
+const MIDDLE_FRACTION: f64 = 0.125;
 /// Width of the bead.
 pub fn width(
-    scene: &Scene<'_>,
+    scene: &WidthInput<'_>,
     hints: Hints,
-    memory: &mut Memory,
+    memory: &mut WidthScratch,
 ) -> Result<WidthMeasurement, Reject> {
     let failed = Reject::NoPair { got: 0.0, need: 0.0 };
-    let curve = |side: usize| Curve::fit(scene.points(side), scene.reach()).ok_or(failed);
+    let curve = |side: usize| Curve::fit(scene.points(side), scene.half_length()).ok_or(failed);
     let curves = [curve(0)?, curve(1)?];
     let slant_rad = scene.slant(&curves)?;
     let sections = Sections::cut(scene, &curves).ok_or(Reject::OffSurface)?;
     scene.check_width(sections.mean)?;
     for (side, (curve, off)) in curves.iter().zip(&mut memory.off).enumerate() {
-        scene.lay_off(side, curve, off);
+        scene.residuals_into(side, curve, off);
     }
-    let spread = Spread::of(scene, &curves, &sections, memory);
+    let spread = WidthUncertainty::of(scene, &curves, &sections, memory);
     let edge = |side: usize| {
-        let at = curves[side].at(0.0) + scene.off_at_middle(&memory.off[side]);
+        let at = curves[side].at(0.0) + scene.residual_at_middle(&memory.off[side]);
         scene.view.to_image(at, scene.centre())
     };
     let finite = |value: f64| Mm::new(value).map_err(|_| Reject::OffSurface);
@@ -62,11 +62,12 @@ pub fn width(
     })
 }
 
-impl Scene<'_> {
+impl WidthInput<'_> {
     /// Angle of the bead in the middle of the gauge \[rad\]; refuses beads that
     /// run too far off the gauge's axis there or at its ends.
     fn slant(&self, [left, right]: &[Curve; 2]) -> Result<f64, Reject> {
-        let at = |t: f64| (f64::midpoint(left.slope(t), right.slope(t)) / self.reach()).atan();
+        let at =
+            |t: f64| (f64::midpoint(left.slope(t), right.slope(t)) / self.half_length()).atan();
         let crooked = |got_rad: f64, limit_rad: f64| Reject::Crooked { got_rad, limit_rad };
         let middle = at(0.0);
         if middle.abs() > MAX_SLANT_RAD {
@@ -85,27 +86,27 @@ impl Scene<'_> {
     fn check_bend(&self, left: &Curve, right: &Curve) -> Result<(), Reject> {
         let turn = |side: usize, curve: &Curve| {
             let off = curve.about_parabola;
-            let notable = off > NOTABLE_PX * NOTABLE_PX;
-            if notable { corner::turn(&self.points(side), off, self.reach()) } else { 0.0 }
+            let notable = off > NOTABLE_SCATTER_PX * NOTABLE_SCATTER_PX;
+            if notable { corner::turn(&self.points(side), off, self.half_length()) } else { 0.0 }
         };
         let of_left = turn(0, left);
         if of_left != 0.0 && corner::is_corner([of_left, turn(1, right)]) {
-            return Err(Reject::Corner { got_widths: 0.0, least_widths: LEAST_RADIUS });
+            return Err(Reject::Corner { got_widths: 0.0, least_widths: MIN_RADIUS_WIDTHS });
         }
-        let square = self.reach() * self.reach();
+        let square = self.half_length() * self.half_length();
         // Towards the ends a short polynomial follows waviness too eagerly.
-        for (t, _) in &NODES[1..4] {
+        for (t, _) in &GAUSS_LEGENDRE_5[1..4] {
             let t = *t;
-            let slope = f64::midpoint(left.slope(t), right.slope(t)) / self.reach();
+            let slope = f64::midpoint(left.slope(t), right.slope(t)) / self.half_length();
             let bend = f64::midpoint(left.bend(t), right.bend(t)).abs() / square;
             let length = 1.0 + slope * slope;
             // Radius and width normal to the axis, of which there are so many.
             let radius = length * length.sqrt() / bend;
             let width = (right.at(t) - left.at(t)) / length.sqrt();
             let got_widths = radius / width;
-            let turn = bend * self.reach() / length;
-            if got_widths < LEAST_RADIUS && turn > LEAST_TURN_RAD {
-                return Err(Reject::Corner { got_widths, least_widths: LEAST_RADIUS });
+            let turn = bend * self.half_length() / length;
+            if got_widths < MIN_RADIUS_WIDTHS && turn > MIN_TURN_RAD {
+                return Err(Reject::Corner { got_widths, least_widths: MIN_RADIUS_WIDTHS });
             }
         }
         Ok(())
@@ -122,17 +123,17 @@ impl Scene<'_> {
     }
 
     /// How far each place lies off the course of its edge \[px\].
-    fn lay_off(&self, side: usize, curve: &Curve, off: &mut Vec<Option<f64>>) {
+    fn residuals_into(&self, side: usize, curve: &Curve, off: &mut Vec<Option<f64>>) {
         off.clear();
-        let places = self.sides[side].places.iter().enumerate();
+        let places = self.sides[side].positions.iter().enumerate();
         off.extend(places.map(|(band, located)| {
-            located.as_ref().map(|located| located.at - curve.at(self.place(band)))
+            located.as_ref().map(|located| located.at - curve.at(self.normalised_position(band)))
         }));
     }
 
     /// Mean distance from the course near the middle of the gauge \[px\].
-    fn off_at_middle(&self, off: &[Option<f64>]) -> f64 {
-        let near = |band: &usize| self.place(*band).abs() <= MIDDLE_SHARE;
+    fn residual_at_middle(&self, off: &[Option<f64>]) -> f64 {
+        let near = |band: &usize| self.normalised_position(*band).abs() <= MIDDLE_FRACTION;
         let (mut sum, mut n) = (0.0, 0.0);
         for value in (0..off.len()).filter(near).filter_map(|band| off[band]) {
             sum += value;

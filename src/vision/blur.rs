@@ -3,33 +3,33 @@
 
 use nalgebra::{Matrix5, Vector5};
 
-use super::fit::Model;
+use super::fit::ShadedStep;
 use crate::numeric::blurred_step::StepTable;
 
 const BINS: usize = 161;
-const CENTRE: usize = BINS / 2;
+const CENTRE_BIN: usize = BINS / 2;
 const MAX_STEPS: usize = 30;
 /// Blur of a perfectly sharp edge that is integrated over pixels and half-pixel
 /// bins.
-const LEAST_PX: f64 = 0.35;
-const MOST_PX: f64 = 15.0;
+const MIN_BLUR_PX: f64 = 0.35;
+const MAX_BLUR_PX: f64 = 15.0;
 /// Farthest that the common edge may lie from the rough ones \[px\].
-const FARTHEST_PX: f64 = 8.0;
+const MAX_OFFSET_PX: f64 = 8.0;
 
 /// Profiles laid over each other about their edges.
 #[derive(Debug, Clone)]
-pub struct Overlay {
+pub struct BinnedProfile {
     sums: [f64; BINS],
     counts: [f64; BINS],
 }
 
-impl Default for Overlay {
+impl Default for BinnedProfile {
     fn default() -> Self {
         Self { sums: [0.0; BINS], counts: [0.0; BINS] }
     }
 }
 
-impl Overlay {
+impl BinnedProfile {
     /// Forgets everything.
     pub fn clear(&mut self) {
         *self = Self::default();
@@ -39,7 +39,7 @@ impl Overlay {
     /// left out.
     pub fn add(&mut self, distance_px: f64, grey: f64) {
         #[expect(clippy::cast_precision_loss, reason = "there are few bins")]
-        let (place, bins) = ((2.0 * distance_px).round() + CENTRE as f64, BINS as f64);
+        let (place, bins) = ((2.0 * distance_px).round() + CENTRE_BIN as f64, BINS as f64);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -60,7 +60,7 @@ impl Overlay {
             let mut matrix = Matrix5::<f64>::zeros();
             let mut slope = Vector5::<f64>::zeros();
             for (distance, grey, weight) in self.samples() {
-                let model = Model::at(table, distance - at, blur, bead_after);
+                let model = ShadedStep::at(table, distance - at, blur, bead_after);
                 let by_position = -height * model.density - shading * model.depth_slope;
                 let by_blur = -height * model.density * (distance - at) / blur
                     + shading * model.density * blur;
@@ -77,19 +77,19 @@ impl Overlay {
             at += step[0].clamp(-1.0, 1.0);
             ground += step[1];
             height += step[2];
-            blur = (blur + step[3].clamp(-0.5 * blur, 0.5 * blur)).clamp(LEAST_PX, MOST_PX);
+            blur = (blur + step[3].clamp(-0.5 * blur, 0.5 * blur)).clamp(MIN_BLUR_PX, MAX_BLUR_PX);
             shading += step[4];
             if step[0].abs() < 1e-4 && step[3].abs() < 1e-4 {
                 break;
             }
         }
-        (at.abs() < FARTHEST_PX).then_some(blur)
+        (at.abs() < MAX_OFFSET_PX).then_some(blur)
     }
 
     fn samples(&self) -> impl Iterator<Item = (f64, f64, f64)> {
         #[expect(clippy::cast_precision_loss, reason = "there are few bins")]
         (0..BINS).filter(|&k| self.counts[k] > 0.0).map(|k| {
-            let distance = (k as f64 - CENTRE as f64) / 2.0;
+            let distance = (k as f64 - CENTRE_BIN as f64) / 2.0;
             (distance, self.sums[k] / self.counts[k], self.counts[k])
         })
     }
@@ -110,7 +110,7 @@ mod tests {
     fn the_blur_comes_back() {
         let table = StepTable::default();
         for blur in [0.8, 1.5, 3.0, 6.0] {
-            let mut overlay = Overlay::default();
+            let mut overlay = BinnedProfile::default();
             let half = if blur > 2.0 { 20 } else { 8 };
             for caliper in 0..40 {
                 let at = 0.37 * f64::from(caliper);
@@ -126,6 +126,6 @@ mod tests {
 
     #[test]
     fn nothing_has_no_blur() {
-        assert_eq!(Overlay::default().fit(&StepTable::default(), true), None);
+        assert_eq!(BinnedProfile::default().fit(&StepTable::default(), true), None);
     }
 }

@@ -5,15 +5,15 @@
 use crate::numeric::blurred_step::StepTable;
 
 /// Rounding to whole levels is noise too \[grey levels²\].
-const ROUNDING: f64 = 1.0 / 12.0;
+const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;
 
 /// A pixel that is cut off at the end of the scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Seen {
+pub struct CensoredPixel {
     /// Its mean \[grey levels\].
     pub level: f64,
     /// Share of a small change of the true level that it shows.
-    pub pass: f64,
+    pub sensitivity: f64,
     /// Its variance \[grey levels²\].
     pub variance: f64,
 }
@@ -21,7 +21,7 @@ pub struct Seen {
 /// A pixel of a true level in Gaussian noise of a standard deviation, cut off
 /// at `white`: mean and variance of min(level + noise, white).
 #[inline]
-pub fn seen(table: &StepTable, level: f64, noise: f64, white: f64) -> Seen {
+pub fn censored_pixel(table: &StepTable, level: f64, noise: f64, white: f64) -> CensoredPixel {
     let above = (level - white) / noise;
     let (hidden, density) = table.at(above);
     let pass = 1.0 - hidden;
@@ -29,7 +29,11 @@ pub fn seen(table: &StepTable, level: f64, noise: f64, white: f64) -> Seen {
     let missing = density - above * pass;
     let square = (1.0 + above * above) * pass - above * density;
     let variance = (square - missing * missing).clamp(0.0, 1.0);
-    Seen { level: white - noise * missing, pass, variance: noise * noise * variance + ROUNDING }
+    CensoredPixel {
+        level: white - noise * missing,
+        sensitivity: pass,
+        variance: noise * noise * variance + ROUNDING_VARIANCE,
+    }
 }
 
 #[cfg(test)]
@@ -39,23 +43,23 @@ mod tests {
     #[test]
     fn far_below_the_end_nothing_is_lost_and_far_above_everything() {
         let table = StepTable::default();
-        let below = seen(&table, 200.0, 4.0, 255.0);
-        assert!((below.level - 200.0).abs() < 1e-9 && below.pass == 1.0);
-        assert!((below.variance - 16.0 - ROUNDING).abs() < 1e-9);
-        let above = seen(&table, 300.0, 4.0, 255.0);
-        assert!((above.level - 255.0).abs() < 1e-9 && above.pass == 0.0);
-        assert!((above.variance - ROUNDING).abs() < 1e-9);
+        let below = censored_pixel(&table, 200.0, 4.0, 255.0);
+        assert!((below.level - 200.0).abs() < 1e-9 && below.sensitivity == 1.0);
+        assert!((below.variance - 16.0 - ROUNDING_VARIANCE).abs() < 1e-9);
+        let above = censored_pixel(&table, 300.0, 4.0, 255.0);
+        assert!((above.level - 255.0).abs() < 1e-9 && above.sensitivity == 0.0);
+        assert!((above.variance - ROUNDING_VARIANCE).abs() < 1e-9);
     }
 
     /// At the end of the scale itself half a Gaussian is left: its mean lies
     /// 1/√(2π) noises below, its variance is 1/2 − 1/(2π).
     #[test]
     fn at_the_end_of_the_scale_half_a_gaussian_is_left() {
-        let at = seen(&StepTable::default(), 255.0, 4.0, 255.0);
+        let at = censored_pixel(&StepTable::default(), 255.0, 4.0, 255.0);
         let tau = 2.0 * std::f64::consts::PI;
         assert!((at.level - (255.0 - 4.0 / tau.sqrt())).abs() < 1e-6);
-        assert!((at.pass - 0.5).abs() < 1e-9);
-        assert!((at.variance - 16.0 * (0.5 - 1.0 / tau) - ROUNDING).abs() < 1e-6);
+        assert!((at.sensitivity - 0.5).abs() < 1e-9);
+        assert!((at.variance - 16.0 * (0.5 - 1.0 / tau) - ROUNDING_VARIANCE).abs() < 1e-6);
     }
 
     #[test]
@@ -63,9 +67,12 @@ mod tests {
         let table = StepTable::default();
         for k in 0..40 {
             let level = 235.0 + f64::from(k);
-            let at = |level| seen(&table, level, 4.0, 255.0).level;
+            let at = |level| censored_pixel(&table, level, 4.0, 255.0).level;
             let slope = (at(level + 0.5) - at(level - 0.5)) / 1.0;
-            assert!((slope - seen(&table, level, 4.0, 255.0).pass).abs() < 2e-3, "{level}");
+            assert!(
+                (slope - censored_pixel(&table, level, 4.0, 255.0).sensitivity).abs() < 2e-3,
+                "{level}"
+            );
         }
     }
 }

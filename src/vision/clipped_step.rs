@@ -5,46 +5,46 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::blur_estimate::BlurEstimate;
-use super::censor::{self, Seen};
-use super::edge_windows::{Sheet, Window};
-use super::overlay::{Overlay, Profile};
+use super::censor::{self, CensoredPixel};
+use super::edge_windows::{EdgeWindow, EdgeWindows};
+use super::overlay::{MeanProfilePart, Overlay};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::normal_equations::Normal;
+use crate::numeric::normal_equations::NormalEquations;
 use crate::numeric::rank;
 
 /// Parts along the bead that are told apart, because light may change.
-const PARTS: usize = 3;
+const PARTS_ALONG: usize = 3;
 const MAX_STEPS: usize = 30;
 /// Steps after which the window stays where it is: a pixel that comes and goes
 /// at its ends keeps a fit from settling.
 const WINDOW_STEPS: usize = 4;
-const LEAST_BLUR_PX: f64 = 0.3;
+const MIN_BLUR_PX: f64 = 0.3;
 /// How far either side is looked at, in blurs and pixels beside.
-const HIDDEN_BLURS: f64 = 3.5;
-const VISIBLE_BLURS: f64 = 3.0;
+const CLIPPED_SIDE_BLURS: f64 = 3.5;
+const VISIBLE_SIDE_BLURS: f64 = 3.0;
 const BESIDE_PX: f64 = 12.0;
 /// The hidden level is not expected farther above the end of the scale than so
 /// many times what can be seen, as a standard deviation.
-const FAR_ABOVE: f64 = 2.0;
+const HIDDEN_LEVEL_SIGMA: f64 = 2.0;
 /// Share by which blur may change from frame to frame, as a standard deviation.
-const DRIFT: f64 = 0.002;
+const BLUR_DRIFT: f64 = 0.002;
 /// A blur that differs from that of the frames before by more standard
 /// deviations is another one.
-const ANOTHER: f64 = 4.0;
+const BLUR_CHANGE_SIGMAS: f64 = 4.0;
 /// Levels below which ground says nothing of the light \[grey levels\].
-const DARK: f64 = 25.0;
+const MIN_LIGHT_GREY: f64 = 25.0;
 /// Rows that fit worse than the median by so many times do not count.
-const UNLIKE: f64 = 2.5;
+const MAX_MISFIT_RATIO: f64 = 2.5;
 /// Standard deviations beyond which a pixel or a row is not noise.
-const MANY_SIGMA: f64 = 4.5;
+const NOISE_SIGMAS: f64 = 4.5;
 /// How far a row may run beside the path \[px\].
 const SLACK_PX: f64 = 0.5;
 /// Wild pixels that a row may have.
-const FEW_WILD: usize = 2;
+const MAX_WILD_PIXELS: usize = 2;
 
 /// A step of which one level is hidden \[px, grey levels\].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
+pub struct ClippedStep {
     /// How far it lies from the path.
     pub at: f64,
     /// Blur, integration over pixels included.
@@ -52,14 +52,14 @@ pub struct Step {
     /// Level on the side that can be seen.
     pub visible: f64,
     /// Level on the other side.
-    pub hidden: f64,
+    pub clipped: f64,
 }
 
 /// What is known of the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scene {
+pub struct ClippedScene {
     /// Whether the hidden level lies after the edge.
-    pub hidden_after: bool,
+    pub clipped_after: bool,
     /// Noise of a pixel \[grey levels\].
     pub noise: f64,
     /// End of the scale \[grey levels\].
@@ -74,36 +74,36 @@ pub struct Scene {
 
 /// What a flank tells.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
+pub struct ClippedStepFit {
     /// The step.
-    pub step: Step,
+    pub step: ClippedStep,
     /// Variance of its place that doubt about blur and hidden level leaves
     /// \[px²\].
     pub variance: f64,
     /// Standard deviation of the blur \[px\].
     pub blur_sd: f64,
     /// Share of the step that is not hidden.
-    pub visible_share: f64,
+    pub visible_fraction: f64,
     /// Mean visible level of the path \[grey levels\].
     mean_visible: f64,
 }
 
 /// What a caliper line tells of the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Line {
+pub struct ClippedLine {
     /// Distance from the path \[px\].
     pub moved: f64,
     /// Variance of it \[px²\].
     pub variance: f64,
     /// Share of its rows that count.
-    pub share: f64,
+    pub row_fraction: f64,
 }
 
 /// Locates edges that are cut off; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
-pub struct CutOff {
-    profiles: Vec<Profile>,
-    rows: Vec<Row>,
+pub struct ClippedEdge {
+    profiles: Vec<MeanProfilePart>,
+    rows: Vec<ClippedRow>,
     sorted: Vec<f64>,
     /// Blur of the frames before.
     blur: Option<BlurEstimate>,
@@ -111,7 +111,7 @@ pub struct CutOff {
 
 /// What a row tells.
 #[derive(Debug, Clone, Copy, Default)]
-struct Row {
+struct ClippedRow {
     line: usize,
     matrix: Matrix2<f64>,
     vector: Vector2<f64>,
@@ -122,30 +122,30 @@ struct Row {
 
 /// Levels in a row or in a mean of rows \[grey levels\].
 #[derive(Debug, Clone, Copy)]
-struct Levels {
+struct ClippedLevels {
     visible: f64,
-    hidden: f64,
+    clipped: f64,
     /// Light, 1 in the mean.
     light: f64,
 }
 
 /// A pixel as it is expected, and its derivatives by place, blur, visible and
 /// hidden level.
-struct Expected {
-    seen: Seen,
+struct ExpectedPixel {
+    seen: CensoredPixel,
     by: [f64; 4],
 }
 
-impl Scene {
+impl ClippedScene {
     fn sign(&self) -> f64 {
-        if self.hidden_after { 1.0 } else { -1.0 }
+        if self.clipped_after { 1.0 } else { -1.0 }
     }
 
     /// Ends of what is looked at, as distances from the path \[px\].
-    fn window(&self, step: &Step) -> (f64, f64) {
-        let visible = (VISIBLE_BLURS * step.blur + BESIDE_PX).min(self.room[0]);
-        let hidden = (HIDDEN_BLURS * step.blur).min(self.room[1]);
-        if self.hidden_after {
+    fn window(&self, step: &ClippedStep) -> (f64, f64) {
+        let visible = (VISIBLE_SIDE_BLURS * step.blur + BESIDE_PX).min(self.room[0]);
+        let hidden = (CLIPPED_SIDE_BLURS * step.blur).min(self.room[1]);
+        if self.clipped_after {
             (step.at - visible, step.at + hidden)
         } else {
             (step.at - hidden, step.at + visible)
@@ -153,11 +153,17 @@ impl Scene {
     }
 
     /// Levels where the path has these before and after the edge.
-    fn levels(&self, step: &Step, mean_visible: f64, [before, after]: [f64; 2]) -> Levels {
-        let here = if self.hidden_after { before } else { after };
-        let light = if mean_visible > DARK { (here / mean_visible).clamp(0.5, 2.0) } else { 1.0 };
+    fn levels(
+        &self,
+        step: &ClippedStep,
+        mean_visible: f64,
+        [before, after]: [f64; 2],
+    ) -> ClippedLevels {
+        let here = if self.clipped_after { before } else { after };
+        let light =
+            if mean_visible > MIN_LIGHT_GREY { (here / mean_visible).clamp(0.5, 2.0) } else { 1.0 };
         let visible = step.visible + here - mean_visible;
-        Levels { visible, hidden: step.hidden * light, light }
+        ClippedLevels { visible, clipped: step.clipped * light, light }
     }
 
     /// The pixel at a distance from the path, seen in rows whose places differ
@@ -166,37 +172,37 @@ impl Scene {
     fn expect(
         &self,
         table: &StepTable,
-        step: &Step,
-        levels: &Levels,
+        step: &ClippedStep,
+        levels: &ClippedLevels,
         (distance, spread): (f64, f64),
-    ) -> Expected {
+    ) -> ExpectedPixel {
         let blur = (step.blur * step.blur + spread).sqrt();
         let z = self.sign() * (distance - step.at) / blur;
         let (share, density) = table.at(z);
-        let height = levels.hidden - levels.visible;
+        let height = levels.clipped - levels.visible;
         let depth = blur * (density - z * (1.0 - share));
         let level = levels.visible + height * share + self.shading * depth;
         let slope = height * density / blur;
         let noise = (self.noise * self.noise + slope * slope * spread).sqrt();
-        let seen = censor::seen(table, level, noise, self.white);
+        let seen = censor::censored_pixel(table, level, noise, self.white);
         let by = [-self.sign() * slope, -slope * z, 1.0 - share, levels.light * share];
-        Expected { seen, by: by.map(|by| by * seen.pass) }
+        ExpectedPixel { seen, by: by.map(|by| by * seen.sensitivity) }
     }
 }
 
-impl CutOff {
+impl ClippedEdge {
     /// Fits the step to the rows of an overlay along a path. `blur` is what is
     /// known of the blur. `None` where no step can be fitted.
     pub fn fit(
         &mut self,
         table: &StepTable,
-        scene: &Scene,
+        scene: &ClippedScene,
         overlay: &Overlay,
-        start: Step,
+        start: ClippedStep,
         blur: Option<BlurEstimate>,
-    ) -> Option<Found> {
-        overlay.profiles(PARTS, &mut self.profiles);
-        let mean_visible = self.mean_visible(scene.hidden_after);
+    ) -> Option<ClippedStepFit> {
+        overlay.profiles(PARTS_ALONG, &mut self.profiles);
+        let mean_visible = self.mean_visible(scene.clipped_after);
         let mut step = start;
         let mut window = scene.window(&step);
         for k in 0..MAX_STEPS {
@@ -205,23 +211,23 @@ impl CutOff {
             }
             let (mut normal, misfit) = self.linearise(table, scene, window, &step, mean_visible);
             let seen = (scene.white - step.visible).max(scene.noise);
-            normal.hold(3, (FAR_ABOVE * seen).powi(-2), scene.white - step.hidden);
+            normal.add_prior(3, (HIDDEN_LEVEL_SIGMA * seen).powi(-2), scene.white - step.clipped);
             if let Some(BlurEstimate { px, sd_px }) = blur {
-                normal.hold(1, sd_px.powi(-2), px - step.blur);
+                normal.add_prior(1, sd_px.powi(-2), px - step.blur);
             }
             let solved = normal.solve()?;
             let moved = solved.unknowns;
-            step = Step {
+            step = ClippedStep {
                 at: step.at + moved[0].clamp(-step.blur, step.blur),
                 blur: (step.blur + moved[1].clamp(-0.3 * step.blur, 0.3 * step.blur))
-                    .max(LEAST_BLUR_PX),
+                    .max(MIN_BLUR_PX),
                 visible: step.visible + moved[2],
-                hidden: (step.hidden + moved[3].clamp(-seen, seen)).max(scene.white - seen / 2.0),
+                clipped: (step.clipped + moved[3].clamp(-seen, seen)).max(scene.white - seen / 2.0),
             };
             let settled = moved[0].abs() < 1e-3 && moved[1].abs() < 1e-3 * step.blur;
             if settled && k >= WINDOW_STEPS {
                 let covariance = solved.covariance() * misfit.max(1.0);
-                return Found::of(scene, step, &covariance, mean_visible);
+                return ClippedStepFit::of(scene, step, &covariance, mean_visible);
             }
         }
         None
@@ -229,15 +235,15 @@ impl CutOff {
 
     /// The blur that is expected where a frame alone says so much: that of the
     /// frames before, as far as the lens is still the same.
-    pub fn expected_blur(&self, alone: &Found) -> Option<BlurEstimate> {
+    pub fn expected_blur(&self, alone: &ClippedStepFit) -> Option<BlurEstimate> {
         let BlurEstimate { px, sd_px } = self.blur?;
-        let (sd, off) = (sd_px.hypot(DRIFT * px), (px - alone.step.blur).abs());
-        let changed = off > ANOTHER * sd.hypot(alone.blur_sd);
+        let (sd, off) = (sd_px.hypot(BLUR_DRIFT * px), (px - alone.step.blur).abs());
+        let changed = off > BLUR_CHANGE_SIGMAS * sd.hypot(alone.blur_sd);
         Some(BlurEstimate { px, sd_px: if changed { off } else { sd } })
     }
 
     /// Keeps a blur for the frames to come.
-    pub fn remember(&mut self, found: &Found) {
+    pub fn keep_blur(&mut self, found: &ClippedStepFit) {
         self.blur = Some(BlurEstimate { px: found.step.blur, sd_px: found.blur_sd });
     }
 
@@ -254,18 +260,18 @@ impl CutOff {
     fn linearise(
         &self,
         table: &StepTable,
-        scene: &Scene,
+        scene: &ClippedScene,
         (from, to): (f64, f64),
-        step: &Step,
+        step: &ClippedStep,
         mean_visible: f64,
-    ) -> (Normal<4>, f64) {
-        let mut normal = Normal::<4>::default();
+    ) -> (NormalEquations<4>, f64) {
+        let mut normal = NormalEquations::<4>::default();
         let (mut square, mut n) = (0.0, -4.0);
         for profile in &self.profiles {
             let levels = scene.levels(step, mean_visible, profile.levels);
             for (distance, value) in profile.samples(from, to) {
                 let place = (distance, profile.spread);
-                let Expected { seen, by } = scene.expect(table, step, &levels, place);
+                let ExpectedPixel { seen, by } = scene.expect(table, step, &levels, place);
                 let (miss, weight) = (value - seen.level, profile.rows / seen.variance);
                 normal.add(by, miss, weight);
                 square += weight * miss * miss;
@@ -281,20 +287,20 @@ impl CutOff {
     pub fn locate(
         &mut self,
         table: &StepTable,
-        scene: &Scene,
-        sheet: &Sheet,
+        scene: &ClippedScene,
+        sheet: &EdgeWindows,
         lines: usize,
-        found: &Found,
-        mut take: impl FnMut(usize, Option<Line>),
+        found: &ClippedStepFit,
+        mut take: impl FnMut(usize, Option<ClippedLine>),
     ) -> f64 {
         self.rows.clear();
         for (number, window) in sheet.windows().iter().enumerate() {
             let [at, before, step] = window.expected;
             let levels = [f64::from(before), f64::from(before + step)];
             let levels = scene.levels(&found.step, found.mean_visible, levels);
-            let step = Step { at: f64::from(at), ..found.step };
+            let step = ClippedStep { at: f64::from(at), ..found.step };
             let pixels = (sheet.pixels(number).as_slice(), window);
-            self.rows.push(Row::read(table, scene, pixels, &step, &levels));
+            self.rows.push(ClippedRow::read(table, scene, pixels, &step, &levels));
         }
         let (limit, misfit) = self.limit();
         let mut first = 0;
@@ -311,19 +317,19 @@ impl CutOff {
     /// noise.
     fn limit(&mut self) -> (f64, f64) {
         self.sorted.clear();
-        self.sorted.extend(self.rows.iter().map(Row::misfit));
+        self.sorted.extend(self.rows.iter().map(ClippedRow::misfit));
         let middle = self.sorted.len() / 2;
         let median = rank::median(&mut self.sorted).unwrap_or(f64::INFINITY);
         let pixels = self.rows.get(middle).map_or(1.0, |row| row.pixels.max(1.0));
-        let noise = 1.0 + MANY_SIGMA * (2.0 / pixels).sqrt();
-        (noise.max(UNLIKE * median), median.sqrt())
+        let noise = 1.0 + NOISE_SIGMAS * (2.0 / pixels).sqrt();
+        (noise.max(MAX_MISFIT_RATIO * median), median.sqrt())
     }
 }
 
-impl Found {
+impl ClippedStepFit {
     fn of(
-        scene: &Scene,
-        step: Step,
+        scene: &ClippedScene,
+        step: ClippedStep,
         covariance: &nalgebra::Matrix4<f64>,
         mean_visible: f64,
     ) -> Option<Self> {
@@ -336,22 +342,22 @@ impl Found {
             covariance[(3, 3)],
         );
         let variance = (of_place.transpose() * of_others.try_inverse()? * of_place)[0];
-        let visible_share = (scene.white - step.visible) / (step.hidden - step.visible);
+        let visible_share = (scene.white - step.visible) / (step.clipped - step.visible);
         let blur_sd = covariance[(1, 1)].sqrt();
-        let found = Self { step, variance, blur_sd, visible_share, mean_visible };
+        let found = Self { step, variance, blur_sd, visible_fraction: visible_share, mean_visible };
         (variance.is_finite() && blur_sd.is_finite() && step.blur > 0.0).then_some(found)
     }
 }
 
-impl Row {
+impl ClippedRow {
     /// Reads a window: what it misses, times its derivatives by place and
     /// visible level.
     fn read(
         table: &StepTable,
-        scene: &Scene,
-        (pixels, window): (&[f32], &Window),
-        step: &Step,
-        levels: &Levels,
+        scene: &ClippedScene,
+        (pixels, window): (&[f32], &EdgeWindow),
+        step: &ClippedStep,
+        levels: &ClippedLevels,
     ) -> Self {
         let (from, to) = scene.window(step);
         let mut row = Self { line: window.line, ..Self::default() };
@@ -363,9 +369,9 @@ impl Row {
             if place < from || place > to {
                 continue;
             }
-            let Expected { seen, by } = scene.expect(table, step, levels, (place, 0.0));
+            let ExpectedPixel { seen, by } = scene.expect(table, step, levels, (place, 0.0));
             let miss = f64::from(pixel) - seen.level;
-            if miss.abs() > MANY_SIGMA * noise + SLACK_PX * by[0].abs() {
+            if miss.abs() > NOISE_SIGMAS * noise + SLACK_PX * by[0].abs() {
                 row.wild += 1;
                 continue;
             }
@@ -382,7 +388,7 @@ impl Row {
     /// Mean square of what the row leaves once it is moved, in units of the
     /// noise.
     fn misfit(&self) -> f64 {
-        if self.wild > FEW_WILD || self.matrix[(0, 0)] <= 0.0 {
+        if self.wild > MAX_WILD_PIXELS || self.matrix[(0, 0)] <= 0.0 {
             return f64::INFINITY;
         }
         (self.squares - self.vector[0] * self.vector[0] / self.matrix[(0, 0)]) / self.pixels
@@ -390,8 +396,8 @@ impl Row {
 }
 
 /// Place of a line from its rows.
-fn solve(rows: &[Row], limit: f64) -> Option<Line> {
-    let counts = |row: &&Row| row.misfit() <= limit;
+fn solve(rows: &[ClippedRow], limit: f64) -> Option<ClippedLine> {
+    let counts = |row: &&ClippedRow| row.misfit() <= limit;
     let (mut matrix, mut vector, mut n) = (Matrix2::zeros(), Vector2::zeros(), 0.0);
     for row in rows.iter().filter(counts) {
         matrix += row.matrix;
@@ -404,7 +410,11 @@ fn solve(rows: &[Row], limit: f64) -> Option<Line> {
         return None;
     }
     let inverse = matrix.try_inverse()?;
-    Some(Line { moved: (inverse * vector)[0], variance: inverse[(0, 0)], share })
+    Some(ClippedLine {
+        moved: (inverse * vector)[0],
+        variance: inverse[(0, 0)],
+        row_fraction: share,
+    })
 }
 
 #[cfg(test)]
@@ -414,10 +424,10 @@ mod tests {
     use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
     use crate::vision::edge_windows::Grouping;
-    use crate::vision::gauge::Axis;
-    use crate::vision::path::Correction;
+    use crate::vision::gauge::BeadAxis;
+    use crate::vision::path::EdgeCorrection;
     use crate::vision::row_range::RowRange;
-    use crate::vision::strip::{Strips, Turner, View};
+    use crate::vision::strip::{GaugeRowsOfDepth, GaugeView, RowLayout};
 
     const SIZE: (usize, usize) = (120, 40);
     const LINES: [RowRange; 4] =
@@ -435,14 +445,20 @@ mod tests {
         }
     }
 
-    fn scene(hidden_after: bool) -> Scene {
-        Scene { hidden_after, noise: 4.0, white: 255.0, room: [30.0; 2], shading: 0.0 }
+    fn scene(hidden_after: bool) -> ClippedScene {
+        ClippedScene {
+            clipped_after: hidden_after,
+            noise: 4.0,
+            white: 255.0,
+            room: [30.0; 2],
+            shading: 0.0,
+        }
     }
 
     /// The mean of what a camera with noise shows of a step, in fine levels.
-    fn sheet(scene: &Scene, step: &Step, path: &Straight) -> Sheet {
+    fn sheet(scene: &ClippedScene, step: &ClippedStep, path: &Straight) -> EdgeWindows {
         let table = StepTable::default();
-        let levels = Levels { visible: step.visible, hidden: step.hidden, light: 1.0 };
+        let levels = ClippedLevels { visible: step.visible, clipped: step.clipped, light: 1.0 };
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -455,10 +471,12 @@ mod tests {
         let values = (0..40).flat_map(|_| (0..120u16).map(shown)).collect();
         let frame =
             Frame::new(0, Stamp::START, Size::new(SIZE.0, SIZE.1), Pixels::Grey16(values)).unwrap();
-        let view = View::new(Roi { x: 0, y: 0, width: 120, height: 40 }, Axis::Vertical);
-        let mut turner = Turner::default();
-        let Strips::Words(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
-        let mut sheet = Sheet::default();
+        let view = GaugeView::new(Roi { x: 0, y: 0, width: 120, height: 40 }, BeadAxis::Vertical);
+        let mut turner = RowLayout::default();
+        let GaugeRowsOfDepth::Words(strip) = turner.strips(&frame, &view, None) else {
+            unreachable!()
+        };
+        let mut sheet = EdgeWindows::default();
         let grouping = Grouping { steepest: 0.0, max_rows: 1 };
         sheet.read(&strip, &LINES, grouping, |_| path.expected());
         sheet
@@ -469,24 +487,24 @@ mod tests {
         let table = StepTable::default();
         for hidden_after in [true, false] {
             let scene = scene(hidden_after);
-            let truth = Step { at: 60.3, blur: 1.6, visible: 175.0, hidden: 300.0 };
+            let truth = ClippedStep { at: 60.3, blur: 1.6, visible: 175.0, clipped: 300.0 };
             let levels = if hidden_after { [175.0, 255.0] } else { [255.0, 175.0] };
             let path = Straight { at: 59.8, levels };
             let mut sheet = sheet(&scene, &truth, &path);
             let mut overlay = Overlay::default();
             overlay.lay(&sheet);
-            let start = Step { at: 0.0, blur: 1.2, visible: 175.0, hidden: 280.0 };
-            let mut cut_off = CutOff::default();
+            let start = ClippedStep { at: 0.0, blur: 1.2, visible: 175.0, clipped: 280.0 };
+            let mut cut_off = ClippedEdge::default();
             let found = cut_off.fit(&table, &scene, &overlay, start, None).unwrap();
             assert!((found.step.at - 0.5).abs() < 0.005, "{found:?}");
             assert!((found.step.blur - 1.6).abs() < 0.005, "{found:?}");
-            assert!((found.step.hidden - 300.0).abs() < 0.5, "{found:?}");
-            assert!((found.visible_share - 80.0 / 125.0).abs() < 0.005);
+            assert!((found.step.clipped - 300.0).abs() < 0.5, "{found:?}");
+            assert!((found.visible_fraction - 80.0 / 125.0).abs() < 0.005);
             // The scatter that 40 rows allow where nothing is known before.
             assert!((0.10..0.25).contains(&found.variance.sqrt()), "{found:?}");
             let mut lines = Vec::new();
-            sheet.adopt(Correction { aside: 60.25 - path.at, before: 0.0, after: 1.0 });
-            let take = |_, line: Option<Line>| lines.push(line.unwrap());
+            sheet.correct(EdgeCorrection { aside: 60.25 - path.at, before: 0.0, after: 1.0 });
+            let take = |_, line: Option<ClippedLine>| lines.push(line.unwrap());
             cut_off.locate(&table, &scene, &sheet, LINES.len(), &found, take);
             assert_eq!(lines.len(), 4);
             assert!(lines.iter().all(|line| (line.moved - 0.05).abs() < 0.006), "{lines:?}");
@@ -495,16 +513,16 @@ mod tests {
 
     #[test]
     fn the_blur_of_frames_before_counts_until_it_is_another() {
-        let found = |blur, blur_sd| Found {
-            step: Step { at: 0.0, blur, visible: 175.0, hidden: 300.0 },
+        let found = |blur, blur_sd| ClippedStepFit {
+            step: ClippedStep { at: 0.0, blur, visible: 175.0, clipped: 300.0 },
             variance: 0.01,
             blur_sd,
-            visible_share: 0.64,
+            visible_fraction: 0.64,
             mean_visible: 175.0,
         };
-        let mut cut_off = CutOff::default();
+        let mut cut_off = ClippedEdge::default();
         assert_eq!(cut_off.expected_blur(&found(1.5, 0.05)), None);
-        cut_off.remember(&found(1.5, 0.01));
+        cut_off.keep_blur(&found(1.5, 0.01));
         let expected = cut_off.expected_blur(&found(1.55, 0.05)).unwrap();
         assert_eq!(expected.px, 1.5);
         assert!((expected.sd_px - 0.01_f64.hypot(0.003)).abs() < 1e-12);

@@ -4,9 +4,9 @@
 //! an edge does not.
 
 use super::gauge::WidthRangePx;
-use super::pair::{RIVAL_SHARE, SEAM_SHARE, is_narrower};
-use super::strip::{Grey, Strip};
-use crate::numeric::number::{single, whole};
+use super::pair::{MAX_SEAM_RATIO, MIN_RIVAL_RATIO, is_narrower};
+use super::strip::{GaugeRows, GreyPixel};
+use crate::numeric::number::{round_to_count, to_f32};
 use crate::numeric::rank;
 
 /// Rows of a band at least, and bands at most.
@@ -26,24 +26,24 @@ const SLOPE_STEP_PX: f32 = 3.0;
 /// spark is no edge.
 const CAP_RANK: f32 = 0.7;
 /// Widest groove beside a bead \[px\]: beyond it begins another thing.
-const GROOVE_PX: f32 = 40.0;
+const MAX_GROOVE_PX: f32 = 40.0;
 /// Distance within a groove in which what its far side adds to an edge falls to
 /// 1/e \[px\]: of two lines before a groove the nearer one is the edge.
-const GROOVE_FALL_PX: f32 = 20.0;
+const GROOVE_DECAY_PX: f32 = 20.0;
 /// Share of a groove's far side that counts for the edge.
-const FAR_SIDE: f32 = 0.5;
+const FAR_SIDE_WEIGHT: f32 = 0.5;
 /// What a groove's far side adds to an edge that certainly lies beside one, as a fraction
 /// of the edge's step: a pattern of the ground adds up to 0.37.
-const CERTAIN_GROOVE: f32 = 0.4;
+const MIN_CERTAIN_GROOVE: f32 = 0.4;
 /// Distance of a seam from an edge \[px\]: nearer lines belong to the edge's flank.
-const SEAM_APART_PX: f32 = 6.0;
+const MIN_SEAM_DISTANCE_PX: f32 = 6.0;
 /// [`SEAM_SHARE`] and [`RIVAL_SHARE`] where the stronger pair lies within the other one:
 /// rough edges are some tenths fainter in the mean along a line than ribs are.
-const INNER_SHARES: (f32, f32) = (0.5, 0.8);
+const INNER_PAIR_RATIOS: (f32, f32) = (0.5, 0.8);
 /// Lines of each sign that are looked at.
 const MAX_LINES: usize = 8;
 /// Difference of slope at which a pair of lines counts for 1/e.
-const SLOPE_DIFFERENCE: f32 = 0.3;
+const SLOPE_DIFFERENCE_SCALE: f32 = 0.3;
 
 /// A line along which the grey steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,7 +66,7 @@ pub struct LinePair {
     /// How strong the pair is \[grey levels\].
     pub score: f32,
     /// The same without what grooves beside it add \[grey levels\].
-    pub bare: f32,
+    pub score_without_grooves: f32,
     /// How strong each edge is, a groove beside it included \[grey levels\].
     pub strengths: [f32; 2],
 }
@@ -80,13 +80,13 @@ impl LinePair {
     /// Whether a groove certainly lies beside one of the two lines.
     pub fn has_groove(&self) -> bool {
         let mut sides = self.sides.iter().zip(self.strengths);
-        sides.any(|(line, strength)| strength > (1.0 + CERTAIN_GROOVE) * line.step)
+        sides.any(|(line, strength)| strength > (1.0 + MIN_CERTAIN_GROOVE) * line.step)
     }
 }
 
 /// The search; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
-pub struct Coarse {
+pub struct LineSearch {
     /// Steps of each band, and its middle row about the gauge's.
     steps: Vec<f32>,
     middles: Vec<f32>,
@@ -105,14 +105,14 @@ pub struct Coarse {
     downs: Vec<StepLine>,
 }
 
-impl Coarse {
+impl LineSearch {
     /// Looks for lines. `width_px` is a usual width of the bead.
     #[inline(always)]
-    pub fn look<T: Grey>(&mut self, strip: &Strip<'_, T>, width_px: f32) {
-        let reach = whole((REACH_FRACTION * width_px).clamp(REACH_PX.0, REACH_PX.1));
+    pub fn look<T: GreyPixel>(&mut self, strip: &GaugeRows<'_, T>, width_px: f32) {
+        let reach = round_to_count((REACH_FRACTION * width_px).clamp(REACH_PX.0, REACH_PX.1));
         self.respond(strip, reach);
-        self.cap();
-        self.project(strip.along);
+        self.clip_steps();
+        self.project_lines(strip.along);
         self.find_strongest(reach);
     }
 
@@ -141,7 +141,7 @@ impl Coarse {
                     if width < range.min || width > range.max {
                         continue;
                     }
-                    let apart = (left.slope - right.slope) / SLOPE_DIFFERENCE;
+                    let apart = (left.slope - right.slope) / SLOPE_DIFFERENCE_SCALE;
                     let strengths = [
                         left.step + groove(&left, far_sides.0, -1.0),
                         right.step + groove(&right, far_sides.1, 1.0),
@@ -149,7 +149,13 @@ impl Coarse {
                     let parallel = (-apart * apart).exp();
                     let score = (strengths[0] * strengths[1]).sqrt() * parallel;
                     let bare = (left.step * right.step).sqrt() * parallel;
-                    out.push(LinePair { sides: [left, right], bright, score, bare, strengths });
+                    out.push(LinePair {
+                        sides: [left, right],
+                        bright,
+                        score,
+                        score_without_grooves: bare,
+                        strengths,
+                    });
                 }
             }
         }
@@ -172,19 +178,21 @@ impl Coarse {
         let (ins, outs) =
             if outer.bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
         // The narrower pair, where it is the stronger one, owes that to its rib.
-        let (seam, rival) = if inner == pair { INNER_SHARES } else { (SEAM_SHARE, RIVAL_SHARE) };
+        let (seam, rival) =
+            if inner == pair { INNER_PAIR_RATIOS } else { (MAX_SEAM_RATIO, MIN_RIVAL_RATIO) };
         let least = seam * left.step.max(right.step);
         let is_of_rib = |end: &StepLine, partners: &[StepLine]| {
             let mut partners = partners.iter().filter(|line| line.step >= least);
             let has_partner = partners.any(|line| {
                 let apart = (line.at - left.at).min(right.at - line.at);
-                apart > SEAM_APART_PX && (line.at - end.at).abs() < GROOVE_PX
+                apart > MIN_SEAM_DISTANCE_PX && (line.at - end.at).abs() < MAX_GROOVE_PX
             });
             end.step >= least && has_partner
         };
         let ends = [(&inner.sides[0], left, outs), (&inner.sides[1], right, ins)];
         let mut ribs = ends.into_iter().filter(|(end, edge, _)| **end != *edge);
-        let fits = other.bare >= rival * pair.bare || outer == pair && gap > SEAM_SHARE;
+        let fits = other.score_without_grooves >= rival * pair.score_without_grooves
+            || outer == pair && gap > MAX_SEAM_RATIO;
         fits && ribs.all(|(end, _, partners)| is_of_rib(end, partners))
     }
 
@@ -206,8 +214,8 @@ impl Coarse {
 
     /// Typical step along a line between two positions where there is no edge: the
     /// root of the mean square over all slopes \[grey levels\].
-    pub fn between(&self, from: f32, to: f32) -> f32 {
-        let range = whole(from).min(self.across)..whole(to).min(self.across);
+    pub fn texture_between(&self, from: f32, to: f32) -> f32 {
+        let range = round_to_count(from).min(self.across)..round_to_count(to).min(self.across);
         let (mut sum, mut count) = (0.0, 0.0);
         for means in self.means.chunks(self.across) {
             for mean in means.get(range.clone()).unwrap_or_default() {
@@ -220,7 +228,7 @@ impl Coarse {
 
     /// Steps of the bands' mean profiles.
     #[inline(always)]
-    fn respond<T: Grey>(&mut self, strip: &Strip<'_, T>, reach: usize) {
+    fn respond<T: GreyPixel>(&mut self, strip: &GaugeRows<'_, T>, reach: usize) {
         let count = (strip.along / BAND_ROWS).clamp(1, MAX_BANDS);
         self.across = strip.across;
         self.steps.clear();
@@ -228,14 +236,14 @@ impl Coarse {
         self.middles.clear();
         for band in 0..count {
             let (from, to) = (band * strip.along / count, (band + 1) * strip.along / count);
-            self.middles.push(0.5 * (single(from + to) - single(strip.along)));
+            self.middles.push(0.5 * (to_f32(from + to) - to_f32(strip.along)));
             let steps = &mut self.steps[band * strip.across..][..strip.across];
             for v in from..to {
                 for (sum, &value) in steps.iter_mut().zip(strip.row(v)) {
-                    *sum += T::float(value.add_to(T::Sum::default()));
+                    *sum += T::sum_to_f32(value.add_to(T::Sum::default()));
                 }
             }
-            let scale = strip.scale / single((to - from) * reach);
+            let scale = strip.scale / to_f32((to - from) * reach);
             self.totals.clear();
             self.totals.push(0.0);
             let mut total = 0.0;
@@ -252,11 +260,11 @@ impl Coarse {
     }
 
     /// Caps steps at what most bands have.
-    fn cap(&mut self) {
+    fn clip_steps(&mut self) {
         let most = |steps: &[f32]| steps.iter().fold(0.0, |most: f32, step| most.max(step.abs()));
         self.strongest.clear();
         self.strongest.extend(self.steps.chunks(self.across).map(most));
-        let rank = whole(CAP_RANK * single(self.strongest.len() - 1));
+        let rank = round_to_count(CAP_RANK * to_f32(self.strongest.len() - 1));
         let cap = rank::at(&mut self.strongest, rank).unwrap_or(f32::INFINITY);
         for step in &mut self.steps {
             *step = step.clamp(-cap, cap);
@@ -281,24 +289,24 @@ impl Coarse {
         for low in lowest.iter_mut() {
             *low = -*low;
         }
-        let lines = Lines { means: &self.means, slopes: &self.slopes, reach };
-        lines.take(highest, 1.0, &mut self.ups);
-        lines.take(lowest, -1.0, &mut self.downs);
+        let lines = ProjectedLines { means: &self.means, slopes: &self.slopes, reach };
+        lines.take_strongest(highest, 1.0, &mut self.ups);
+        lines.take_strongest(lowest, -1.0, &mut self.downs);
     }
 
     /// Means of the steps along lines. Of two neighbouring bands the steps are added for
     /// each shift of one against the other before they are added along all lines.
     #[inline(always)]
-    fn project(&mut self, along: usize) {
+    fn project_lines(&mut self, along: usize) {
         let across = self.across;
-        let most = (MAX_SLOPE * single(along) / SLOPE_STEP_PX).ceil();
-        let count = 2 * whole(most) + 1;
+        let most = (MAX_SLOPE * to_f32(along) / SLOPE_STEP_PX).ceil();
+        let count = 2 * round_to_count(most) + 1;
         self.slopes.clear();
-        self.slopes.extend((0..count).map(|k| (single(k) - most) * SLOPE_STEP_PX / single(along)));
+        self.slopes.extend((0..count).map(|k| (to_f32(k) - most) * SLOPE_STEP_PX / to_f32(along)));
         self.means.clear();
         self.means.resize(count * across, 0.0);
         self.pair.resize(across, 0.0);
-        let scale = 1.0 / single(self.middles.len());
+        let scale = 1.0 / to_f32(self.middles.len());
         for (bands, middles) in self.steps.chunks(2 * across).zip(self.middles.chunks(2)) {
             let (first, second) = bands.split_at(across);
             let mut added = None;
@@ -332,15 +340,15 @@ fn add_shifted(sums: &mut [f32], values: &[f32], aside: isize, scale: f32) {
 }
 
 /// Mean steps of all lines, and the least distance of two that are taken \[px\].
-struct Lines<'a> {
+struct ProjectedLines<'a> {
     means: &'a [f32],
     slopes: &'a [f32],
     reach: usize,
 }
 
-impl Lines<'_> {
+impl ProjectedLines<'_> {
     /// Takes the strongest lines of a sign out of the strongest step of each position.
-    fn take(&self, best: &mut [f32], sign: f32, out: &mut Vec<StepLine>) {
+    fn take_strongest(&self, best: &mut [f32], sign: f32, out: &mut Vec<StepLine>) {
         out.clear();
         let across = best.len();
         while out.len() < MAX_LINES {
@@ -349,7 +357,7 @@ impl Lines<'_> {
             let mut by_slope = self.means.chunks(across).zip(self.slopes);
             let strongest = by_slope.find(|(means, _)| sign * means[at] >= step);
             let Some((_, &slope)) = strongest else { return };
-            out.push(StepLine { at: single(at) - 0.5, slope, step });
+            out.push(StepLine { at: to_f32(at) - 0.5, slope, step });
             let near = at.saturating_sub(self.reach)..(at + self.reach + 1).min(across);
             best[near].fill(0.0);
         }
@@ -361,14 +369,14 @@ impl Lines<'_> {
 fn groove(edge: &StepLine, far_sides: Option<&Vec<StepLine>>, outwards: f32) -> f32 {
     let added = far_sides.into_iter().flatten().map(|far| {
         let gap = outwards * (far.at - edge.at);
-        let within = gap > 0.0 && gap <= GROOVE_PX;
-        if within { FAR_SIDE * far.step * (-gap / GROOVE_FALL_PX).exp() } else { 0.0 }
+        let within = gap > 0.0 && gap <= MAX_GROOVE_PX;
+        if within { FAR_SIDE_WEIGHT * far.step * (-gap / GROOVE_DECAY_PX).exp() } else { 0.0 }
     });
     added.fold(0.0, f32::max)
 }
 
 /// A shift by whole pixels.
 fn shift(aside: f32) -> isize {
-    let size = whole(aside.abs()).cast_signed();
+    let size = round_to_count(aside.abs()).cast_signed();
     if aside < 0.0 { -size } else { size }
 }

@@ -2,15 +2,15 @@
 //! that most of them agree on. What covers an edge pulls to one side, so that
 //! means and medians of all of them go astray.
 
-use crate::numeric::normal_equations::Normal;
-use crate::numeric::number::single;
+use crate::numeric::normal_equations::NormalEquations;
+use crate::numeric::number::to_f32;
 
 /// Lines and parabolas that are tried.
 const TRIALS: usize = 160;
 /// By so many values more a parabola must hold than a line to be believed.
-const BENT: f32 = 3.0;
+const PARABOLA_SCORE_MARGIN: f32 = 3.0;
 /// Fits through the values that agree.
-const FITS: usize = 2;
+const REFITS: usize = 2;
 
 /// A parabola over the numbers of the values.
 #[derive(Debug, Clone, Copy)]
@@ -21,9 +21,9 @@ struct Parabola {
 
 /// Turns values that lie farther than a tolerance from what most agree on into
 /// gaps, which are NaN. Returns how many are left.
-pub fn agree(values: &mut [f32], tolerance: f32) -> usize {
+pub fn keep_consensus(values: &mut [f32], tolerance: f32) -> usize {
     let Some(mut found) = search(values, tolerance) else { return count(values) };
-    for _ in 0..FITS {
+    for _ in 0..REFITS {
         found = found.fitted(values, tolerance).unwrap_or(found);
     }
     for (k, value) in values.iter_mut().enumerate() {
@@ -69,31 +69,31 @@ fn search(values: &[f32], tolerance: f32) -> Option<Parabola> {
     }
     let [line, bent] = best;
     match (line, bent) {
-        (Some((few, _)), Some((many, curve))) if many > few + BENT => Some(curve),
+        (Some((few, _)), Some((many, curve))) if many > few + PARABOLA_SCORE_MARGIN => Some(curve),
         (line, _) => line.map(|(_, curve)| curve),
     }
 }
 
 impl Parabola {
     fn line(values: &[f32], first: usize, third: usize) -> Self {
-        let middle = single(values.len() - 1) / 2.0;
-        let slope = (values[third] - values[first]) / single(third - first);
-        let level = values[first] + slope * (middle - single(first));
+        let middle = to_f32(values.len() - 1) / 2.0;
+        let slope = (values[third] - values[first]) / to_f32(third - first);
+        let level = values[first] + slope * (middle - to_f32(first));
         Self { middle, terms: [level, slope, 0.0] }
     }
 
     /// The parabola that leaves a line's two places where they are and goes
     /// through a third.
     fn bent_to(self, values: &[f32], at: usize, first: usize, third: usize) -> Self {
-        let bend = (values[at] - self.at(at)) / (single(at - first) * -single(third - at));
+        let bend = (values[at] - self.at(at)) / (to_f32(at - first) * -to_f32(third - at));
         // bend · (x − first) · (x − third), about the middle.
-        let (a, b) = (self.middle - single(first), self.middle - single(third));
+        let (a, b) = (self.middle - to_f32(first), self.middle - to_f32(third));
         let [level, slope, _] = self.terms;
         Self { terms: [level + bend * a * b, slope + bend * (a + b), bend], ..self }
     }
 
     fn at(&self, k: usize) -> f32 {
-        let x = single(k) - self.middle;
+        let x = to_f32(k) - self.middle;
         let [level, slope, bend] = self.terms;
         level + x * (slope + x * bend)
     }
@@ -110,16 +110,16 @@ impl Parabola {
 
     /// The best one of the same order through the values that agree.
     fn fitted(&self, values: &[f32], tolerance: f32) -> Option<Self> {
-        let mut normal = Normal::<3>::default();
+        let mut normal = NormalEquations::<3>::default();
         for (k, &value) in values.iter().enumerate() {
             let miss = value - self.at(k);
             if miss.abs() <= tolerance {
-                let x = f64::from(single(k) - self.middle);
+                let x = f64::from(to_f32(k) - self.middle);
                 normal.add([1.0, x, x * x], miss.into(), 1.0);
             }
         }
         if self.terms[2] == 0.0 {
-            normal.hold(2, 1e12, 0.0);
+            normal.add_prior(2, 1e12, 0.0);
         }
         let moved = normal.solve()?.unknowns;
         let mut terms = self.terms;
@@ -140,13 +140,13 @@ mod tests {
     use super::*;
 
     fn check(of: impl Fn(f32) -> f32) {
-        let mut values: Vec<f32> = (0..30).map(|k| of(single(k))).collect();
+        let mut values: Vec<f32> = (0..30).map(|k| of(to_f32(k))).collect();
         let wrong = [1, 2, 3, 9, 10, 14, 15, 16, 17, 22, 25, 26, 28];
         for (n, &k) in wrong.iter().enumerate() {
-            values[k] += 1.5 + 0.3 * single(n);
+            values[k] += 1.5 + 0.3 * to_f32(n);
         }
         values[5] = f32::NAN;
-        assert_eq!(agree(&mut values, 0.8), 30 - wrong.len() - 1);
+        assert_eq!(keep_consensus(&mut values, 0.8), 30 - wrong.len() - 1);
         assert!(wrong.iter().all(|&k| values[k].is_nan()));
     }
 
@@ -159,6 +159,6 @@ mod tests {
     #[test]
     fn few_values_are_left_as_they_are() {
         let mut values = [1.0, f32::NAN, 9.0, 3.0];
-        assert_eq!(agree(&mut values, 0.8), 3);
+        assert_eq!(keep_consensus(&mut values, 0.8), 3);
     }
 }

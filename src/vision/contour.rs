@@ -3,12 +3,12 @@
 //! skipped; sparks and grains are no chains. The strongest chain is found
 //! first, then the strongest of what it leaves.
 
-use super::edge::{Candidate, Candidates, KEPT};
-use crate::numeric::number::single;
+use super::edge::{MAX_STEPS_KEPT, StepCandidate, StepCandidates};
+use crate::numeric::number::to_f32;
 use crate::numeric::rank;
 
 /// Contours of one sign that are looked for.
-const MOST: usize = 6;
+const MAX_CONTOURS: usize = 6;
 /// Bands that a contour may jump over at once.
 const MAX_SKIP: usize = 4;
 /// Cost of a band without a step, in typical steps.
@@ -19,64 +19,70 @@ const ASIDE_COST: f32 = 0.25;
 const BREAK_COST: f32 = 1.0;
 /// Slope against the gauge's axis up to which edges run freely; a bead that
 /// slants 20 degrees and bulges by another 15 stays below.
-const FREE_SLOPE: f32 = 0.7;
+const MAX_FREE_SLOPE: f32 = 0.7;
 /// Height of a band within which no bead's edge runs far \[px\].
-const LOW_BAND_PX: f32 = 4.0;
+const REFERENCE_BAND_PX: f32 = 4.0;
 /// Marks the first step of a contour.
-const NONE: u16 = u16::MAX;
+const NO_PREDECESSOR: u16 = u16::MAX;
 
 /// An edge that runs along the bead.
 #[derive(Debug, Clone, Default)]
-pub struct Contour {
+pub struct EdgeContour {
     /// Its step in every band \[px\], or none where it is hidden.
     pub at: Vec<Option<f32>>,
     /// Mean height of its steps \[grey levels\].
     pub step: f32,
     /// Share of the bands in which it has a step.
-    pub share: f64,
+    pub band_fraction: f64,
     /// How far a step lies off the line between its neighbours, median \[px\], as if
     /// of bands of no more than [`LOW_BAND_PX`]: little for an edge, also for a rough
     /// one, much for sparks that happen to lie in a row.
-    pub wobble: f32,
+    pub waviness_px: f32,
 }
 
 /// Contours of one sign; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
-pub struct Contours {
-    scores: Vec<[f32; KEPT]>,
-    froms: Vec<[u16; KEPT]>,
+pub struct EdgeContours {
+    scores: Vec<[f32; MAX_STEPS_KEPT]>,
+    predecessors: Vec<[u16; MAX_STEPS_KEPT]>,
     used: Vec<u16>,
     steps: Vec<f32>,
-    found: Vec<Contour>,
+    contours: Vec<EdgeContour>,
     count: usize,
 }
 
-impl Contours {
+impl EdgeContours {
     /// What was found, the strongest first.
-    pub fn all(&self) -> &[Contour] {
-        &self.found[..self.count]
+    pub fn all(&self) -> &[EdgeContour] {
+        &self.contours[..self.count]
     }
 
     /// Looks for contours of steps up or down that reach `least_share` of the
     /// bands. `band_px` is the height of a band.
-    pub fn search(&mut self, bands: &[Candidates], up: bool, band_px: f32, least_share: f64) {
+    pub fn search(
+        &mut self,
+        bands: &[StepCandidates],
+        up: bool,
+        band_px: f32,
+        min_band_fraction: f64,
+    ) {
         self.used.clear();
         self.used.resize(bands.len(), 0);
-        self.scores.resize(bands.len(), [0.0; KEPT]);
-        self.froms.resize(bands.len(), [NONE; KEPT]);
-        self.found.resize_with(MOST, Contour::default);
+        self.scores.resize(bands.len(), [0.0; MAX_STEPS_KEPT]);
+        self.predecessors.resize(bands.len(), [NO_PREDECESSOR; MAX_STEPS_KEPT]);
+        self.contours.resize_with(MAX_CONTOURS, EdgeContour::default);
         self.count = 0;
         let steps = |band: usize| if up { bands[band].up() } else { bands[band].down() };
-        while self.count < MOST {
+        while self.count < MAX_CONTOURS {
             let typical = self.typical_step(bands.len(), &steps);
             if typical <= 0.0 {
                 return;
             }
             let Some(last) = self.link(bands.len(), &steps, band_px, typical) else { return };
             self.follow(last, &steps);
-            let found = &mut self.found[self.count];
-            found.wobble *= (LOW_BAND_PX / band_px).min(1.0);
-            if found.share < least_share {
+            let found = &mut self.contours[self.count];
+            found.waviness_px *= (REFERENCE_BAND_PX / band_px).min(1.0);
+            if found.band_fraction < min_band_fraction {
                 return;
             }
             self.count += 1;
@@ -88,7 +94,11 @@ impl Contours {
     }
 
     /// A strong but not extreme step: the 70th percentile of each band's best.
-    fn typical_step<'a>(&mut self, bands: usize, steps: &impl Fn(usize) -> &'a [Candidate]) -> f32 {
+    fn typical_step<'a>(
+        &mut self,
+        bands: usize,
+        steps: &impl Fn(usize) -> &'a [StepCandidate],
+    ) -> f32 {
         self.steps.clear();
         for band in 0..bands {
             let free = steps(band).iter().enumerate();
@@ -108,7 +118,7 @@ impl Contours {
     fn link<'a>(
         &mut self,
         bands: usize,
-        steps: &impl Fn(usize) -> &'a [Candidate],
+        steps: &impl Fn(usize) -> &'a [StepCandidate],
         band_px: f32,
         typical: f32,
     ) -> Option<(usize, usize)> {
@@ -122,8 +132,8 @@ impl Contours {
                 let reward = (step.step / typical).sqrt().min(1.2);
                 let (score, from) = self.best_before(band, step.at, steps, band_px);
                 self.scores[band][index] = score + reward;
-                self.froms[band][index] = from;
-                let total = score + reward - SKIP_COST * single(bands - 1 - band);
+                self.predecessors[band][index] = from;
+                let total = score + reward - SKIP_COST * to_f32(bands - 1 - band);
                 if total > best_total {
                     best_total = total;
                     best = Some((band, index));
@@ -137,14 +147,14 @@ impl Contours {
         &self,
         band: usize,
         at: f32,
-        steps: &impl Fn(usize) -> &'a [Candidate],
+        steps: &impl Fn(usize) -> &'a [StepCandidate],
         band_px: f32,
     ) -> (f32, u16) {
-        let mut best = (-SKIP_COST * single(band), NONE);
+        let mut best = (-SKIP_COST * to_f32(band), NO_PREDECESSOR);
         for gap in 1..=(MAX_SKIP + 1).min(band) {
             let before = band - gap;
-            let skipped = SKIP_COST * single(gap - 1);
-            let free = FREE_SLOPE * band_px * single(gap) + 1.0;
+            let skipped = SKIP_COST * to_f32(gap - 1);
+            let free = MAX_FREE_SLOPE * band_px * to_f32(gap) + 1.0;
             for (index, step) in steps(before).iter().enumerate() {
                 if self.is_used(before, index) {
                     continue;
@@ -162,8 +172,8 @@ impl Contours {
     }
 
     /// Follows a contour back from its last step and takes its steps out.
-    fn follow<'a>(&mut self, last: (usize, usize), steps: &impl Fn(usize) -> &'a [Candidate]) {
-        let contour = &mut self.found[self.count];
+    fn follow<'a>(&mut self, last: (usize, usize), steps: &impl Fn(usize) -> &'a [StepCandidate]) {
+        let contour = &mut self.contours[self.count];
         contour.at.clear();
         contour.at.resize(self.used.len(), None);
         let (mut sum, mut n) = (0.0, 0.0);
@@ -174,20 +184,20 @@ impl Contours {
             self.used[band] |= 1 << index;
             sum += step.step;
             n += 1.0;
-            let from = self.froms[band][index];
-            if from == NONE {
+            let from = self.predecessors[band][index];
+            if from == NO_PREDECESSOR {
                 break;
             }
             band -= usize::from(from >> 8);
             index = usize::from(from & 0xff);
         }
         contour.step = sum / n;
-        contour.share = f64::from(n) / f64::from(single(self.used.len()));
-        contour.wobble = wobble(&contour.at, &mut self.steps);
+        contour.band_fraction = f64::from(n) / f64::from(to_f32(self.used.len()));
+        contour.waviness_px = median_waviness(&contour.at, &mut self.steps);
     }
 }
 
-fn wobble(at: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
+fn median_waviness(at: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
     memory.clear();
     memory.extend(
         at.windows(3).filter_map(|three| Some((three[1]? - 0.5 * (three[0]? + three[2]?)).abs())),
@@ -196,32 +206,32 @@ fn wobble(at: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
 }
 
 fn pack(gap: usize, index: usize) -> u16 {
-    u16::try_from(gap << 8 | index).unwrap_or(NONE)
+    u16::try_from(gap << 8 | index).unwrap_or(NO_PREDECESSOR)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn band(places: &[(f32, f32)]) -> Candidates {
-        Candidates::of(places.iter().map(|&(at, step)| Candidate { at, step }))
+    fn band(places: &[(f32, f32)]) -> StepCandidates {
+        StepCandidates::of(places.iter().map(|&(at, step)| StepCandidate { at, step }))
     }
 
-    fn search(bands: &[Candidates]) -> Contours {
-        let mut contours = Contours::default();
+    fn search(bands: &[StepCandidates]) -> EdgeContours {
+        let mut contours = EdgeContours::default();
         contours.search(bands, true, 4.0, 0.4);
         contours
     }
 
     #[test]
     fn a_rough_edge_in_tall_bands_does_not_wobble_more_than_sparks_in_low_ones() {
-        let edge = |band: u8| Candidate { at: 50.0 + f32::from(band * 7 % 3), step: 20.0 };
-        let bands: Vec<Candidates> =
-            (0..20).map(|band| Candidates::of([edge(band)].into_iter())).collect();
+        let edge = |band: u8| StepCandidate { at: 50.0 + f32::from(band * 7 % 3), step: 20.0 };
+        let bands: Vec<StepCandidates> =
+            (0..20).map(|band| StepCandidates::of([edge(band)].into_iter())).collect();
         let wobble = |band_px: f32| {
-            let mut contours = Contours::default();
+            let mut contours = EdgeContours::default();
             contours.search(&bands, true, band_px, 0.4);
-            contours.all()[0].wobble
+            contours.all()[0].waviness_px
         };
         assert_eq!(wobble(4.0), 1.5);
         assert_eq!(wobble(20.0), 0.3);
@@ -229,7 +239,7 @@ mod tests {
 
     #[test]
     fn a_contour_follows_the_edge_and_skips_what_is_hidden() {
-        let bands: Vec<Candidates> = (0..20u8)
+        let bands: Vec<StepCandidates> = (0..20u8)
             .map(
                 |k| if k == 7 || k == 8 { band(&[]) } else { band(&[(60.0 + f32::from(k), 80.0)]) },
             )
@@ -238,12 +248,12 @@ mod tests {
         assert_eq!(found.all().len(), 1);
         assert_eq!(found.all()[0].at[8], None);
         assert_eq!(found.all()[0].at[19], Some(79.0));
-        assert!((found.all()[0].share - 0.9).abs() < 1e-12);
+        assert!((found.all()[0].band_fraction - 0.9).abs() < 1e-12);
     }
 
     #[test]
     fn sparks_that_are_stronger_do_not_lead_astray() {
-        let bands: Vec<Candidates> = (0..20u8)
+        let bands: Vec<StepCandidates> = (0..20u8)
             .map(|k| {
                 let far = |n: u8| f32::from((k * 37 + n * 91) % 200) + 100.0;
                 band(&[(60.0, 60.0), (far(1), 160.0), (far(2), 160.0), (far(3), 160.0)])
@@ -255,7 +265,7 @@ mod tests {
 
     #[test]
     fn two_edges_are_two_contours_the_stronger_first() {
-        let bands: Vec<Candidates> =
+        let bands: Vec<StepCandidates> =
             (0..20u8).map(|k| band(&[(60.0 + 0.5 * f32::from(k), 50.0), (90.0, 80.0)])).collect();
         let found = search(&bands);
         assert_eq!(found.all().len(), 2);

@@ -2,32 +2,32 @@
 
 use nalgebra::Vector3;
 
-use super::curve::Point;
-use crate::numeric::normal_equations::Normal;
+use super::curve::EdgePoint;
+use crate::numeric::normal_equations::NormalEquations;
 
 /// Places along the gauge at which an edge may turn, −1 to 1: so many, this far
 /// from its middle at most.
-const PLACES: u8 = 18;
-const FARTHEST: f64 = 0.85;
+const CORNER_POSITIONS: u8 = 18;
+const MAX_CORNER_POSITION: f64 = 0.85;
 /// Part of the squared distances from a parabola that two lines may leave.
-const LEFT: f64 = 0.5;
+const MAX_RESIDUAL_RATIO: f64 = 0.5;
 /// Smallest turn \[rad\]; what turns less is a bead's waviness.
-const LEAST_RAD: f64 = 0.14;
+const MIN_TURN_RAD: f64 = 0.14;
 
 /// By how much an edge turns \[rad\], where two lines that meet follow its points
 /// much better than a parabola, which leaves them so far off in the mean square
 /// \[px²\]; 0 where they do not. Half the gauge is so long \[px\].
 #[cold]
 pub fn turn(
-    points: &(impl Iterator<Item = Point> + Clone),
+    points: &(impl Iterator<Item = EdgePoint> + Clone),
     about_parabola: f64,
     reach_px: f64,
 ) -> f64 {
-    let apart = 2.0 * FARTHEST / f64::from(PLACES - 1);
-    let corners = (0..PLACES).map(|k| f64::from(k) * apart - FARTHEST);
-    let lines = corners.filter_map(|at| Lines::fit(points.clone(), at));
-    let best = lines.min_by(|one, other| one.scatter.total_cmp(&other.scatter));
-    let best = best.filter(|lines| lines.scatter < LEFT * about_parabola);
+    let apart = 2.0 * MAX_CORNER_POSITION / f64::from(CORNER_POSITIONS - 1);
+    let corners = (0..CORNER_POSITIONS).map(|k| f64::from(k) * apart - MAX_CORNER_POSITION);
+    let lines = corners.filter_map(|at| BrokenLine::fit(points.clone(), at));
+    let best = lines.min_by(|one, other| one.mean_square.total_cmp(&other.mean_square));
+    let best = best.filter(|lines| lines.mean_square < MAX_RESIDUAL_RATIO * about_parabola);
     best.map_or(0.0, |lines| {
         let [before, after] = lines.slopes().map(|slope| (slope / reach_px).atan());
         after - before
@@ -37,36 +37,36 @@ pub fn turn(
 /// Whether two edges that turn so much \[rad\] are those of a corner: both turn,
 /// and the same way. One alone has a bump or a notch.
 pub fn is_corner([one, other]: [f64; 2]) -> bool {
-    one * other > 0.0 && one.abs().min(other.abs()) > LEAST_RAD
+    one * other > 0.0 && one.abs().min(other.abs()) > MIN_TURN_RAD
 }
 
 /// Two lines that meet at a place along the gauge.
-struct Lines {
+struct BrokenLine {
     at: f64,
     /// Position where they meet \[px\], slope before and its change \[px\].
     terms: Vector3<f64>,
     /// Mean square of the points' distances \[px²\].
-    scatter: f64,
+    mean_square: f64,
 }
 
-impl Lines {
-    fn fit(points: impl Iterator<Item = Point> + Clone, at: f64) -> Option<Self> {
-        let mut normal = Normal::<3>::default();
+impl BrokenLine {
+    fn fit(points: impl Iterator<Item = EdgePoint> + Clone, at: f64) -> Option<Self> {
+        let mut normal = NormalEquations::<3>::default();
         for point in points.clone() {
-            normal.add(Self::shares(point.t - at), point.u, point.weight);
+            normal.add(Self::terms_at(point.t - at), point.u, point.weight);
         }
-        let mut lines = Self { at, terms: normal.solve()?.unknowns, scatter: 0.0 };
+        let mut lines = Self { at, terms: normal.solve()?.unknowns, mean_square: 0.0 };
         let (mut sum, mut n) = (0.0, 0.0);
         for point in points {
-            let off = point.u - lines.terms.dot(&Vector3::from(Self::shares(point.t - lines.at)));
+            let off = point.u - lines.terms.dot(&Vector3::from(Self::terms_at(point.t - lines.at)));
             sum += point.weight * off * off;
             n += point.weight;
         }
-        lines.scatter = sum / f64::max(n, 1e-9);
+        lines.mean_square = sum / f64::max(n, 1e-9);
         Some(lines)
     }
 
-    fn shares(ahead: f64) -> [f64; 3] {
+    fn terms_at(ahead: f64) -> [f64; 3] {
         [1.0, ahead, ahead.max(0.0)]
     }
 
@@ -86,7 +86,8 @@ mod tests {
 
     fn turn_of(of: impl Fn(f64) -> f64) -> f64 {
         let places = (0..25u8).map(|k| (f64::from(k) + 0.5) / 12.5 - 1.0);
-        let points: Vec<Point> = places.map(|t| Point { t, u: of(t), weight: 1.0 }).collect();
+        let points: Vec<EdgePoint> =
+            places.map(|t| EdgePoint { t, u: of(t), weight: 1.0 }).collect();
         let curve = Curve::fit(points.iter().copied(), REACH).unwrap();
         turn(&points.iter().copied(), curve.about_parabola, REACH)
     }
@@ -107,11 +108,11 @@ mod tests {
     #[test]
     fn arcs_and_waves_are_none() {
         let arc = |t: f64| 300.0 - (300.0f64.powi(2) - (REACH * t).powi(2)).sqrt();
-        assert!(turn_of(arc).abs() < LEAST_RAD);
+        assert!(turn_of(arc).abs() < MIN_TURN_RAD);
         for (size, waves) in [(0.8, 1.0), (0.8, 2.0), (2.0, 2.5), (3.0, 4.0)] {
             for phase in [0.0, 0.7, 1.4] {
                 let wave = |t: f64| size * (std::f64::consts::PI * waves * t + phase).sin();
-                assert!(turn_of(wave).abs() < LEAST_RAD, "{size} {waves} {phase}");
+                assert!(turn_of(wave).abs() < MIN_TURN_RAD, "{size} {waves} {phase}");
             }
         }
     }

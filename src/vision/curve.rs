@@ -1,31 +1,31 @@
 //! The course of an edge along the gauge as a short polynomial: where it runs
 //! in the mean, in which direction, and how it bends.
 
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 use nalgebra::{SMatrix, SVector};
 
 /// Terms that a curve has at most: up to t⁴.
-const MOST: usize = 5;
+const MAX_TERMS: usize = 5;
 /// Terms of a straight bead, and of one that is evenly bent.
-const STRAIGHT: usize = 2;
-const FEW: usize = 3;
+const LINE_TERMS: usize = 2;
+const PARABOLA_TERMS: usize = 3;
 /// A bend is believed from so many standard deviations on.
-const SURE: f64 = 4.0;
+const MIN_BEND_SIGMAS: f64 = 4.0;
 /// Scatter about a parabola that is looked at for more \[px\].
-pub const NOTABLE_PX: f64 = 0.25;
+pub const NOTABLE_SCATTER_PX: f64 = 0.25;
 /// Part of the scatter's square that more terms must explain.
-const EXPLAINED: f64 = 0.8;
+const MIN_EXPLAINED: f64 = 0.8;
 /// Part of it that they leave at most where they follow a bead that bends evenly: a
 /// torn edge's waves leave more.
-const ALL_BUT_NOISE: f64 = 0.02;
+const MAX_UNEXPLAINED: f64 = 0.02;
 /// Largest correlation from point to point that is believed.
-const MOST_ALIKE: f64 = 0.95;
+const MAX_CORRELATION: f64 = 0.95;
 /// Rounds in which slope and bend in the middle settle beside the higher orders.
 const ARC_PASSES: usize = 3;
 
 /// A point of an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
+pub struct EdgePoint {
     /// Place along the gauge: −1 at its first row, 1 at its last.
     pub t: f64,
     /// Position across it \[px\].
@@ -38,7 +38,7 @@ pub struct Point {
 /// over the whole gauge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curve {
-    terms: [f64; MOST],
+    terms: [f64; MAX_TERMS],
     /// Number of its terms.
     pub count: usize,
     /// Variance of the mean over the gauge, for points of weight 1 and
@@ -55,34 +55,36 @@ pub struct Curve {
 impl Curve {
     /// Fits points of a gauge of which half is so long \[px\]; `None` where there
     /// are too few or where they lie too close together.
-    pub fn fit(points: impl Iterator<Item = Point> + Clone, reach_px: f64) -> Option<Self> {
-        let sums = Sums::<FEW>::of(points.clone());
-        let (straight, _) = sums.curve::<STRAIGHT>()?;
-        let Some((few, off)) = sums.curve::<FEW>() else { return Some(straight) };
-        let told = |curve: Self| Some(Self { about_parabola: off, ..curve });
+    pub fn fit(points: impl Iterator<Item = EdgePoint> + Clone, reach_px: f64) -> Option<Self> {
+        let sums = CurveSums::<PARABOLA_TERMS>::of(points.clone());
+        let (straight, _) = sums.curve::<LINE_TERMS>()?;
+        let Some((few, off)) = sums.curve::<PARABOLA_TERMS>() else { return Some(straight) };
+        let with_scatter = |curve: Self| Some(Self { about_parabola: off, ..curve });
         // An unsure bend would tell wrong places beyond the gauge's ends,
         // where the normals of a slanted bead may cross it.
-        let notable = off > NOTABLE_PX * NOTABLE_PX;
-        let more = (notable && sums.weight >= 4.0 * float(MOST))
-            .then(|| Sums::<MOST>::of(points.clone()).curve::<MOST>())
+        let notable = off > NOTABLE_SCATTER_PX * NOTABLE_SCATTER_PX;
+        let more = (notable && sums.weight >= 4.0 * to_f64(MAX_TERMS))
+            .then(|| CurveSums::<MAX_TERMS>::of(points.clone()).curve::<MAX_TERMS>())
             .flatten();
         let left = more.map_or(1.0, |(_, rest)| rest / off);
         // What more terms follow is the bead's course; waves of its edge are not.
-        let waves = notable && left > ALL_BUT_NOISE;
+        let waves = notable && left > MAX_UNEXPLAINED;
         let apart = if waves { few.design_effect(points) } else { 1.0 };
-        if few.terms[2] * few.terms[2] < SURE * SURE * off * apart * few.bend_variance {
-            return told(straight);
+        if few.terms[2] * few.terms[2]
+            < MIN_BEND_SIGMAS * MIN_BEND_SIGMAS * off * apart * few.bend_variance
+        {
+            return with_scatter(straight);
         }
-        if let Some((more, _)) = more.filter(|_| left < 1.0 - EXPLAINED) {
-            return told(more);
+        if let Some((more, _)) = more.filter(|_| left < 1.0 - MIN_EXPLAINED) {
+            return with_scatter(more);
         }
-        told(few.as_arc(reach_px))
+        with_scatter(few.as_arc(reach_px))
     }
 
     /// By how much the variance of a mean grows because neighbouring points lie off the
     /// curve together, as along a torn edge: (1 + r)/(1 − r) for a correlation r from
     /// point to point.
-    fn design_effect(&self, points: impl Iterator<Item = Point>) -> f64 {
+    fn design_effect(&self, points: impl Iterator<Item = EdgePoint>) -> f64 {
         let (mut squares, mut products) = (0.0, 0.0);
         let mut last = 0.0;
         for point in points {
@@ -91,7 +93,8 @@ impl Curve {
             products += off * last;
             last = off;
         }
-        let correlation = (products / f64::max(squares, f64::MIN_POSITIVE)).clamp(0.0, MOST_ALIKE);
+        let correlation =
+            (products / f64::max(squares, f64::MIN_POSITIVE)).clamp(0.0, MAX_CORRELATION);
         (1.0 + correlation) / (1.0 - correlation)
     }
 
@@ -124,7 +127,7 @@ impl Curve {
     /// Position at a place \[px\].
     pub fn at(&self, t: f64) -> f64 {
         let values = legendre(t);
-        (0..MOST).map(|k| self.terms[k] * values[k]).sum()
+        (0..MAX_TERMS).map(|k| self.terms[k] * values[k]).sum()
     }
 
     /// Change of the position at a place, for a step of 1 in t \[px\].
@@ -145,7 +148,7 @@ impl Curve {
 }
 
 /// Sums over points for curves of up to so many terms.
-struct Sums<const N: usize> {
+struct CurveSums<const N: usize> {
     matrix: SMatrix<f64, N, N>,
     vector: SVector<f64, N>,
     square: f64,
@@ -154,8 +157,8 @@ struct Sums<const N: usize> {
     from: f64,
 }
 
-impl<const N: usize> Sums<N> {
-    fn of(points: impl Iterator<Item = Point>) -> Self {
+impl<const N: usize> CurveSums<N> {
+    fn of(points: impl Iterator<Item = EdgePoint>) -> Self {
         let mut points = points.peekable();
         let from = points.peek().map_or(0.0, |point| point.u);
         let (matrix, vector) = (SMatrix::zeros(), SVector::zeros());
@@ -183,7 +186,7 @@ impl<const N: usize> Sums<N> {
         let vector = self.vector.fixed_rows::<M>(0).into_owned();
         let inverse = matrix.cholesky()?.inverse();
         let found = inverse * vector;
-        let mut terms = [0.0; MOST];
+        let mut terms = [0.0; MAX_TERMS];
         terms[..M].copy_from_slice(found.as_slice());
         terms[0] += self.from;
         if !terms.iter().all(|term| term.is_finite()) {
@@ -203,7 +206,7 @@ impl<const N: usize> Sums<N> {
     }
 }
 
-fn legendre(t: f64) -> [f64; MOST] {
+fn legendre(t: f64) -> [f64; MAX_TERMS] {
     let s = t * t;
     [1.0, t, 1.5 * s - 0.5, t * (2.5 * s - 1.5), (35.0 * s - 30.0) * s / 8.0 + 0.375]
 }
@@ -212,10 +215,10 @@ fn legendre(t: f64) -> [f64; MOST] {
 mod tests {
     use super::*;
 
-    fn points(of: impl Fn(f64) -> f64) -> Vec<Point> {
+    fn points(of: impl Fn(f64) -> f64) -> Vec<EdgePoint> {
         (0..40u8)
             .map(|k| (f64::from(k) + 0.5) / 20.0 - 1.0)
-            .map(|t| Point { t, u: of(t), weight: 1.0 })
+            .map(|t| EdgePoint { t, u: of(t), weight: 1.0 })
             .collect()
     }
 

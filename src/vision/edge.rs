@@ -2,17 +2,17 @@
 
 /// Pixels on either side of a place that are compared for a step there. Wide
 /// enough to gather a blurred edge, narrow enough to keep two apart.
-pub const REACH: usize = 4;
+pub const STEP_HALF_WIDTH: usize = 4;
 
 /// Places that are passed over together where nothing reaches the floor.
-const BLOCK: usize = 32;
+const BLOCK_PIXELS: usize = 32;
 
 /// Steps of each sign that are kept a profile.
-pub const KEPT: usize = 16;
+pub const MAX_STEPS_KEPT: usize = 16;
 
 /// A place where a profile steps.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Candidate {
+pub struct StepCandidate {
     /// Position in the profile \[px\].
     pub at: f32,
     /// Height of the step \[grey levels\], positive.
@@ -21,27 +21,27 @@ pub struct Candidate {
 
 /// The strongest steps of one profile.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Candidates {
-    up: [Candidate; KEPT],
-    down: [Candidate; KEPT],
+pub struct StepCandidates {
+    up: [StepCandidate; MAX_STEPS_KEPT],
+    down: [StepCandidate; MAX_STEPS_KEPT],
     ups: usize,
     downs: usize,
 }
 
-impl Candidates {
+impl StepCandidates {
     /// Steps from dark to bright, in no order.
-    pub fn up(&self) -> &[Candidate] {
+    pub fn up(&self) -> &[StepCandidate] {
         &self.up[..self.ups]
     }
 
     /// Steps from bright to dark, in no order.
-    pub fn down(&self) -> &[Candidate] {
+    pub fn down(&self) -> &[StepCandidate] {
         &self.down[..self.downs]
     }
 
     /// Of given steps up.
     #[cfg(test)]
-    pub fn of(up: impl Iterator<Item = Candidate>) -> Self {
+    pub fn of(up: impl Iterator<Item = StepCandidate>) -> Self {
         let mut found = Self::default();
         up.for_each(|step| keep(&mut found.up, &mut found.ups, step));
         found
@@ -55,9 +55,9 @@ impl Candidates {
         #[expect(clippy::cast_possible_truncation, reason = "saturates")]
         let floor = (floor / unit).ceil() as i16;
         let last = response.len().saturating_sub(1);
-        for (number, block) in response.chunks(BLOCK).enumerate() {
+        for (number, block) in response.chunks(BLOCK_PIXELS).enumerate() {
             if reaches(block, floor) {
-                let start = number * BLOCK;
+                let start = number * BLOCK_PIXELS;
                 for u in start.max(1)..(start + block.len()).min(last) {
                     self.look_at([response[u - 1], response[u], response[u + 1]], u, floor, unit);
                 }
@@ -93,17 +93,17 @@ fn reaches(block: &[i16], floor: i16) -> bool {
 #[inline(always)]
 pub fn respond(profile: &[u16], response: &mut [i16]) {
     let length = profile.len();
-    if length <= 2 * REACH {
+    if length <= 2 * STEP_HALF_WIDTH {
         response.fill(0);
         return;
     }
-    let span = length - 2 * REACH;
-    response[..REACH].fill(0);
-    response[length - REACH..].fill(0);
+    let span = length - 2 * STEP_HALF_WIDTH;
+    response[..STEP_HALF_WIDTH].fill(0);
+    response[length - STEP_HALF_WIDTH..].fill(0);
     let part = |offset: usize| &profile[offset..][..span];
     let (b4, b3, b2, b1) = (part(0), part(1), part(2), part(3));
     let (a1, a2, a3, a4) = (part(5), part(6), part(7), part(8));
-    let inner = &mut response[REACH..length - REACH];
+    let inner = &mut response[STEP_HALF_WIDTH..length - STEP_HALF_WIDTH];
     for u in 0..span {
         let before = (b1[u] + b2[u]) + (b3[u] + b4[u]);
         let after = (a1[u] + a2[u]) + (a3[u] + a4[u]);
@@ -113,17 +113,17 @@ pub fn respond(profile: &[u16], response: &mut [i16]) {
 }
 
 /// Vertex of the parabola through a peak and its neighbours.
-fn peak(u: usize, [before, here, after]: [i16; 3], unit: f32) -> Candidate {
+fn peak(u: usize, [before, here, after]: [i16; 3], unit: f32) -> StepCandidate {
     let (before, here, after) = (f32::from(before), f32::from(here), f32::from(after));
     let bend = before - 2.0 * here + after;
     let shift = if bend < 0.0 { 0.5 * (before - after) / bend } else { 0.0 };
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     let u = u as f32;
-    Candidate { at: u + shift.clamp(-0.5, 0.5), step: here * unit }
+    StepCandidate { at: u + shift.clamp(-0.5, 0.5), step: here * unit }
 }
 
-fn keep(kept: &mut [Candidate; KEPT], count: &mut usize, new: Candidate) {
-    if *count < KEPT {
+fn keep(kept: &mut [StepCandidate; MAX_STEPS_KEPT], count: &mut usize, new: StepCandidate) {
+    if *count < MAX_STEPS_KEPT {
         kept[*count] = new;
         *count += 1;
         return;
@@ -154,7 +154,7 @@ mod tests {
     fn a_sharp_step_responds_with_its_height_halfway_between_the_pixels() {
         let mut response = vec![0; 80];
         respond(&bar(), &mut response);
-        let mut found = Candidates::default();
+        let mut found = StepCandidates::default();
         found.find(&response, 20.0, UNIT);
         assert_eq!((found.up().len(), found.down().len()), (1, 1));
         assert!((found.up()[0].at - 19.5).abs() <= 0.5);
@@ -168,7 +168,7 @@ mod tests {
         for k in 0..20u8 {
             response[5 + 4 * usize::from(k)] = 16 * i16::from((k * 7) % 20 + 1);
         }
-        let mut found = Candidates::default();
+        let mut found = StepCandidates::default();
         found.find(&response, 1.0, UNIT);
         let mut steps: Vec<f32> = found.up().iter().map(|c| c.step).collect();
         steps.sort_by(f32::total_cmp);

@@ -12,7 +12,7 @@ use crate::core::frame::Frame;
 use crate::core::geometry::ImagePoint;
 use crate::core::units::Mm;
 
-use super::gauge::{Axis, Gauge, Polarity};
+use super::gauge::{BeadAxis, Gauge, Polarity};
 use super::reject::Reject;
 use super::width::{Hints, WidthMeasurement};
 use crate::core::units::WidthRange;
@@ -25,14 +25,14 @@ const MAX_SLOPE: f64 = 0.45;
 /// Lines that this near to each other at the gauge's middle are one edge \[px\].
 const SAME_EDGE_PX: f64 = 4.0;
 /// Share of the gauge that an edge line must cover.
-const NEED_SHARE: f64 = 0.3;
+const MIN_COVERAGE: f64 = 0.3;
 
 /// An edge line across the gauge: its ends on the gauge's first and last row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct EdgeLine {
     first: f64,
     last: f64,
-    covered: f64,
+    coverage: f64,
 }
 
 impl EdgeLine {
@@ -49,7 +49,7 @@ pub fn measure(
     surface: &SurfaceMap,
     (left_px, right_px): (&mut Vec<ImagePoint>, &mut Vec<ImagePoint>),
 ) -> Result<WidthMeasurement, Reject> {
-    let refused = |got| Reject::NoPair { got, need: NEED_SHARE };
+    let refused = |got| Reject::NoPair { got, need: MIN_COVERAGE };
     let settings = EdgeSettings {
         blur_sigma_px: 1.5,
         thresholds: [4.0 * gauge.min_contrast_grey, 10.0 * gauge.min_contrast_grey],
@@ -76,15 +76,15 @@ pub fn measure(
         left: m1,
         right: m2,
         slant_rad: slope.atan(),
-        hints: Hints { used_share: left.covered.min(right.covered), ..Hints::default() },
+        hints: Hints { used_fraction: left.coverage.min(right.coverage), ..Hints::default() },
     })
 }
 
 #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
 fn along(gauge: &Gauge) -> f64 {
     match gauge.axis {
-        Axis::Vertical => gauge.roi.height as f64,
-        Axis::Horizontal => gauge.roi.width as f64,
+        BeadAxis::Vertical => gauge.roi.height as f64,
+        BeadAxis::Horizontal => gauge.roi.width as f64,
     }
 }
 
@@ -93,8 +93,8 @@ fn along(gauge: &Gauge) -> f64 {
 fn gauge_coordinates(gauge: &Gauge, at: ImagePoint) -> (f64, f64) {
     let (x, y) = (at.x - gauge.roi.x as f64, at.y - gauge.roi.y as f64);
     match gauge.axis {
-        Axis::Vertical => (x, y),
-        Axis::Horizontal => (y, x),
+        BeadAxis::Vertical => (x, y),
+        BeadAxis::Horizontal => (y, x),
     }
 }
 
@@ -102,8 +102,8 @@ fn gauge_coordinates(gauge: &Gauge, at: ImagePoint) -> (f64, f64) {
 fn point(gauge: &Gauge, across: f64, along: f64) -> ImagePoint {
     let (x, y) = (gauge.roi.x as f64, gauge.roi.y as f64);
     match gauge.axis {
-        Axis::Vertical => ImagePoint::new(x + across, y + along),
-        Axis::Horizontal => ImagePoint::new(x + along, y + across),
+        BeadAxis::Vertical => ImagePoint::new(x + across, y + along),
+        BeadAxis::Horizontal => ImagePoint::new(x + along, y + across),
     }
 }
 
@@ -121,22 +121,25 @@ fn edge_lines(gauge: &Gauge, segments: &[Segment]) -> Vec<EdgeLine> {
             continue;
         }
         let covered = run.abs() / length;
-        let new =
-            EdgeLine { first: u0 - slope * v0, last: u0 + slope * (length - 1.0 - v0), covered };
+        let new = EdgeLine {
+            first: u0 - slope * v0,
+            last: u0 + slope * (length - 1.0 - v0),
+            coverage: covered,
+        };
         let same =
             lines.iter_mut().find(|line| (line.middle() - new.middle()).abs() < SAME_EDGE_PX);
         match same {
             Some(line) => {
-                let sum = line.covered + covered;
-                line.first = (line.first * line.covered + new.first * covered) / sum;
-                line.last = (line.last * line.covered + new.last * covered) / sum;
-                line.covered = sum;
+                let sum = line.coverage + covered;
+                line.first = (line.first * line.coverage + new.first * covered) / sum;
+                line.last = (line.last * line.coverage + new.last * covered) / sum;
+                line.coverage = sum;
             }
             None => lines.push(new),
         }
     }
     for line in &mut lines {
-        line.covered = line.covered.min(1.0);
+        line.coverage = line.coverage.min(1.0);
     }
     lines
 }
@@ -152,8 +155,8 @@ fn best_pair(
     let middle = (along(gauge) - 1.0) / 2.0;
     let grey = frame.to_grey8();
     let mut best: Option<(f64, EdgeLine, EdgeLine)> = None;
-    for left in lines.iter().filter(|line| line.covered >= NEED_SHARE) {
-        for right in lines.iter().filter(|line| line.covered >= NEED_SHARE) {
+    for left in lines.iter().filter(|line| line.coverage >= MIN_COVERAGE) {
+        for right in lines.iter().filter(|line| line.coverage >= MIN_COVERAGE) {
             if right.middle() <= left.middle() {
                 continue;
             }
@@ -166,7 +169,7 @@ fn best_pair(
             {
                 continue;
             }
-            let covered = left.covered + right.covered;
+            let covered = left.coverage + right.coverage;
             if best.is_none_or(|(most, ..)| covered > most) {
                 best = Some((covered, *left, *right));
             }
@@ -215,7 +218,7 @@ mod tests {
     use crate::core::frame::Pixels;
     use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
-    use crate::vision::Method;
+    use crate::vision::MeasureMethod;
 
     fn bar(from: usize, to: usize) -> Frame {
         let values = (0..100usize)
@@ -228,10 +231,10 @@ mod tests {
 
     fn gauge() -> Gauge {
         Gauge {
-            method: Method::EdgeLines,
+            method: MeasureMethod::EdgeLines,
             ..Gauge::new(
                 Roi { x: 10, y: 5, width: 140, height: 90 },
-                Axis::Vertical,
+                BeadAxis::Vertical,
                 Polarity::Bright,
                 WidthRange { min: Mm::constant(2.0), max: Mm::constant(20.0) },
             )

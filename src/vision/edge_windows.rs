@@ -1,24 +1,24 @@
 //! The gauge straightened along an edge: the pixels around it, one window a few
 //! rows, read once and held against the edge as often as it takes.
 
-use super::path::Correction;
+use super::path::EdgeCorrection;
 use super::row_range::RowRange;
-use super::strip::{Grey, Strip};
-use crate::numeric::number::{floor, single};
+use super::strip::{GaugeRows, GreyPixel};
+use crate::numeric::number::{floor_to_index, to_f32};
 
 /// Pixels of a window.
-pub const SPAN: usize = 112;
+pub const WINDOW_PX: usize = 112;
 /// Pixel of a window at which the edge is expected.
-pub const MIDDLE: usize = SPAN / 2;
+pub const MIDDLE_PX: usize = WINDOW_PX / 2;
 
 /// A gauge of more rows has plenty: those of a caliper line are taken together.
-pub const PLENTY: usize = 160;
+pub const MAX_SINGLE_ROWS: usize = 160;
 /// How far an edge may run aside within rows that are taken together \[px\].
-const STRAIGHT_PX: f32 = 0.6;
+const MAX_ASIDE_PX: f32 = 0.6;
 
 /// A window: the mean of a few neighbouring rows \[grey levels of 256\].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Window {
+pub struct EdgeWindow {
     /// Caliper line that the rows belong to.
     pub line: usize,
     /// Number of rows.
@@ -43,25 +43,25 @@ pub struct Grouping {
 
 /// Windows along an edge; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
-pub struct Sheet {
-    windows: Vec<Window>,
-    pixels: Vec<[f32; SPAN]>,
+pub struct EdgeWindows {
+    windows: Vec<EdgeWindow>,
+    pixels: Vec<[f32; WINDOW_PX]>,
 }
 
-impl Sheet {
+impl EdgeWindows {
     /// What the windows are of.
-    pub fn windows(&self) -> &[Window] {
+    pub fn windows(&self) -> &[EdgeWindow] {
         &self.windows
     }
 
     /// The pixels of a window \[grey levels of 256\].
     #[inline(always)]
-    pub fn pixels(&self, window: usize) -> &[f32; SPAN] {
+    pub fn pixels(&self, window: usize) -> &[f32; WINDOW_PX] {
         &self.pixels[window]
     }
 
     /// Expects the edge a little aside, and other levels.
-    pub fn adopt(&mut self, Correction { aside, before, after }: Correction) {
+    pub fn correct(&mut self, EdgeCorrection { aside, before, after }: EdgeCorrection) {
         for window in &mut self.windows {
             let [at, level, step] = window.expected;
             window.expected = [at + aside, level + before * step, (after - before) * step];
@@ -72,9 +72,9 @@ impl Sheet {
     /// along it. Rows are taken together within caliper lines: one where there are
     /// few, more where a tall gauge has plenty.
     #[inline(always)]
-    pub fn read<T: Grey>(
+    pub fn read<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
+        strip: &GaugeRows<'_, T>,
         lines: &[RowRange],
         grouping: Grouping,
         expected: impl Fn(f32) -> [f32; 3],
@@ -86,14 +86,14 @@ impl Sheet {
             let mut v = bounds.first;
             while v < bounds.end {
                 let rows = together.min(bounds.end - v);
-                let middle = single(2 * v + rows - 1) / 2.0;
+                let middle = to_f32(2 * v + rows - 1) / 2.0;
                 let expected = expected(middle);
-                let first = floor(expected[0].into()) - MIDDLE.cast_signed();
-                self.windows.push(Window { line, rows: single(rows), middle, first, expected });
+                let first = floor_to_index(expected[0].into()) - MIDDLE_PX.cast_signed();
+                self.windows.push(EdgeWindow { line, rows: to_f32(rows), middle, first, expected });
                 v += rows;
             }
         }
-        self.pixels.resize(self.windows.len(), [0.0; SPAN]);
+        self.pixels.resize(self.windows.len(), [0.0; WINDOW_PX]);
         let mut v = 0;
         for (window, pixels) in self.windows.iter().zip(&mut self.pixels) {
             let end = v + count(window.rows);
@@ -105,25 +105,25 @@ impl Sheet {
 
 /// Rows that are taken together.
 fn rows_together(along: usize, lines: usize, steepest: f32) -> usize {
-    if along <= PLENTY {
+    if along <= MAX_SINGLE_ROWS {
         return 1;
     }
-    let straight = count(STRAIGHT_PX / steepest.max(1e-3));
+    let straight = count(MAX_ASIDE_PX / steepest.max(1e-3));
     along.div_ceil(lines.max(1)).min(straight).max(1)
 }
 
 /// Mean of some rows from a place on.
 #[inline(always)]
-fn average<T: Grey>(
-    strip: &Strip<'_, T>,
+fn average<T: GreyPixel>(
+    strip: &GaugeRows<'_, T>,
     rows: std::ops::Range<usize>,
     first: isize,
-    out: &mut [f32; SPAN],
+    out: &mut [f32; WINDOW_PX],
 ) {
-    let scale = strip.scale / single(rows.len());
-    let mut sums = [T::Sum::default(); SPAN];
+    let scale = strip.scale / to_f32(rows.len());
+    let mut sums = [T::Sum::default(); WINDOW_PX];
     let mut v = rows.start;
-    let mut memory = [[T::default(); SPAN]; 2];
+    let mut memory = [[T::default(); WINDOW_PX]; 2];
     while v + 1 < rows.end {
         let [one, two] = &mut memory;
         add([pixels(strip, v, first, one), pixels(strip, v + 1, first, two)], &mut sums);
@@ -133,20 +133,20 @@ fn average<T: Grey>(
         add([pixels(strip, v, first, &mut memory[0])], &mut sums);
     }
     for (out, sum) in out.iter_mut().zip(sums) {
-        *out = scale * T::float(sum);
+        *out = scale * T::sum_to_f32(sum);
     }
 }
 
 /// The pixels of a row from a place on; `memory` is for those beyond its ends.
 #[inline(always)]
-fn pixels<'a, T: Grey>(
-    strip: &Strip<'a, T>,
+fn pixels<'a, T: GreyPixel>(
+    strip: &GaugeRows<'a, T>,
     v: usize,
     first: isize,
-    memory: &'a mut [T; SPAN],
-) -> &'a [T; SPAN] {
+    memory: &'a mut [T; WINDOW_PX],
+) -> &'a [T; WINDOW_PX] {
     let row = strip.row(v);
-    let within = usize::try_from(first).ok().and_then(|from| row.get(from..from + SPAN));
+    let within = usize::try_from(first).ok().and_then(|from| row.get(from..from + WINDOW_PX));
     if let Some(pixels) = within.and_then(<[T]>::first_chunk) {
         return pixels;
     }
@@ -155,8 +155,8 @@ fn pixels<'a, T: Grey>(
 }
 
 #[inline(always)]
-fn add<T: Grey, const N: usize>(rows: [&[T; SPAN]; N], sums: &mut [T::Sum; SPAN]) {
-    for k in 0..SPAN {
+fn add<T: GreyPixel, const N: usize>(rows: [&[T; WINDOW_PX]; N], sums: &mut [T::Sum; WINDOW_PX]) {
+    for k in 0..WINDOW_PX {
         for row in rows {
             sums[k] = row[k].add_to(sums[k]);
         }

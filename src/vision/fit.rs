@@ -11,7 +11,7 @@ const CONVERGED_PX: f64 = 1e-4;
 
 /// Position and levels of an edge.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Edge {
+pub struct FittedEdge {
     /// Position \[px\].
     pub at: f64,
     /// Level before the edge \[grey levels\].
@@ -36,7 +36,7 @@ pub struct Prior {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeFit {
     /// The edge.
-    pub edge: Edge,
+    pub edge: FittedEdge,
     /// Variances of position, ground, height and shading, for noise of this
     /// variance.
     pub variance: [f64; 4],
@@ -46,7 +46,7 @@ pub struct EdgeFit {
 
 /// A profile around an edge: samples a pixel apart.
 #[derive(Debug, Clone, Copy)]
-pub struct Window<'a> {
+pub struct ProfileWindow<'a> {
     /// Position of the first sample \[px\].
     pub first: f64,
     /// The grey levels.
@@ -61,7 +61,7 @@ pub struct Window<'a> {
 
 /// What a blurred step with shading is at a place, and its derivatives.
 #[derive(Debug, Clone, Copy)]
-pub struct Model {
+pub struct ShadedStep {
     /// Φ: share of the step that is reached.
     pub step: f64,
     /// Slope of the share \[1/px\].
@@ -72,7 +72,7 @@ pub struct Model {
     pub depth_slope: f64,
 }
 
-impl Model {
+impl ShadedStep {
     /// At a distance from the edge \[px\], for a blur \[px\].
     #[inline]
     pub fn at(table: &StepTable, distance: f64, blur: f64, bead_after: bool) -> Self {
@@ -84,10 +84,15 @@ impl Model {
     }
 }
 
-impl Window<'_> {
+impl ProfileWindow<'_> {
     /// Fits from a start; `None` where the fit leaves the window or there is
     /// nothing to hold it.
-    pub fn fit(&self, table: &StepTable, start: Edge, prior: Option<&Prior>) -> Option<EdgeFit> {
+    pub fn fit(
+        &self,
+        table: &StepTable,
+        start: FittedEdge,
+        prior: Option<&Prior>,
+    ) -> Option<EdgeFit> {
         let mut edge = start;
         let mut normal = Matrix4::zeros();
         for _ in 0..MAX_STEPS {
@@ -116,10 +121,14 @@ impl Window<'_> {
     }
 
     /// Each sample's model and how far the sample is from it.
-    fn misses(&self, table: &StepTable, edge: Edge) -> impl Iterator<Item = (Model, f64)> {
+    fn residuals(
+        &self,
+        table: &StepTable,
+        edge: FittedEdge,
+    ) -> impl Iterator<Item = (ShadedStep, f64)> {
         (0u32..).zip(self.samples).map(move |(place, &sample)| {
             let distance = self.first + f64::from(place) - edge.at;
-            let model = Model::at(table, distance, self.blur, self.bead_after);
+            let model = ShadedStep::at(table, distance, self.blur, self.bead_after);
             let grey = edge.ground + edge.height * model.step + edge.shading * model.depth;
             (model, f64::from(sample) - grey)
         })
@@ -129,12 +138,12 @@ impl Window<'_> {
     fn linearise(
         &self,
         table: &StepTable,
-        edge: Edge,
+        edge: FittedEdge,
         prior: Option<&Prior>,
     ) -> (Matrix4<f64>, Vector4<f64>) {
         let mut matrix = Matrix4::zeros();
         let mut slope = Vector4::zeros();
-        for (model, miss) in self.misses(table, edge) {
+        for (model, miss) in self.residuals(table, edge) {
             let by_position = -edge.height * model.density - edge.shading * model.depth_slope;
             let row = Vector4::new(by_position, 1.0, model.step, model.depth);
             matrix.ger(1.0, &row, &row, 1.0);
@@ -151,8 +160,8 @@ impl Window<'_> {
         (matrix, slope)
     }
 
-    fn residual(&self, table: &StepTable, edge: Edge) -> f64 {
-        self.misses(table, edge).map(|(_, miss)| miss * miss).sum()
+    fn residual(&self, table: &StepTable, edge: FittedEdge) -> f64 {
+        self.residuals(table, edge).map(|(_, miss)| miss * miss).sum()
     }
 }
 
@@ -160,11 +169,11 @@ impl Window<'_> {
 mod tests {
     use super::*;
 
-    fn profile(edge: Edge, blur: f64, bead_after: bool) -> Vec<f32> {
+    fn profile(edge: FittedEdge, blur: f64, bead_after: bool) -> Vec<f32> {
         let table = StepTable::default();
         #[expect(clippy::cast_possible_truncation, reason = "grey levels")]
         let grey = |u: u32| {
-            let model = Model::at(&table, f64::from(u) - edge.at, blur, bead_after);
+            let model = ShadedStep::at(&table, f64::from(u) - edge.at, blur, bead_after);
             (edge.ground + edge.height * model.step + edge.shading * model.depth) as f32
         };
         (0..25).map(grey).collect()
@@ -174,11 +183,11 @@ mod tests {
     fn a_clean_edge_is_found_where_it_is() {
         let table = StepTable::default();
         for (height, bead_after) in [(80.0, true), (-80.0, false)] {
-            let truth = Edge { at: 12.34, ground: 40.0, height, shading: 1.5 };
+            let truth = FittedEdge { at: 12.34, ground: 40.0, height, shading: 1.5 };
             let samples = profile(truth, 1.7, bead_after);
             let window =
-                Window { first: 0.0, samples: &samples, noise: 1.0, blur: 1.7, bead_after };
-            let start = Edge { at: 11.0, ground: 50.0, height: 0.7 * height, shading: 0.0 };
+                ProfileWindow { first: 0.0, samples: &samples, noise: 1.0, blur: 1.7, bead_after };
+            let start = FittedEdge { at: 11.0, ground: 50.0, height: 0.7 * height, shading: 0.0 };
             let fit = window.fit(&table, start, None).unwrap();
             assert!((fit.edge.at - 12.34).abs() < 1e-3, "{fit:?}");
             assert!((fit.edge.shading - 1.5).abs() < 1e-2);
@@ -188,10 +197,15 @@ mod tests {
     #[test]
     fn known_levels_bring_the_variance_to_the_bound() {
         let table = StepTable::default();
-        let edge = Edge { at: 12.0, ground: 40.0, height: 80.0, shading: 0.0 };
+        let edge = FittedEdge { at: 12.0, ground: 40.0, height: 80.0, shading: 0.0 };
         let samples = profile(edge, 1.5, true);
-        let window =
-            Window { first: 0.0, samples: &samples, noise: 16.0, blur: 1.5, bead_after: true };
+        let window = ProfileWindow {
+            first: 0.0,
+            samples: &samples,
+            noise: 16.0,
+            blur: 1.5,
+            bead_after: true,
+        };
         let prior = Prior { mean: [40.0, 80.0, 0.0], variance: [1e-9; 3] };
         let fit = window.fit(&table, edge, Some(&prior)).unwrap();
         // Cramér–Rao bound of one row: 1.883 (σ/A) √s.
@@ -203,9 +217,14 @@ mod tests {
     fn flat_ground_holds_no_edge() {
         let table = StepTable::default();
         let samples = [50.0; 25];
-        let window =
-            Window { first: 0.0, samples: &samples, noise: 1.0, blur: 1.5, bead_after: true };
-        let start = Edge { at: 12.0, ground: 50.0, height: 0.0, shading: 0.0 };
+        let window = ProfileWindow {
+            first: 0.0,
+            samples: &samples,
+            noise: 1.0,
+            blur: 1.5,
+            bead_after: true,
+        };
+        let start = FittedEdge { at: 12.0, ground: 50.0, height: 0.0, shading: 0.0 };
         assert_eq!(window.fit(&table, start, None), None);
     }
 }

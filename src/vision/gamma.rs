@@ -4,14 +4,14 @@
 
 /// Light from grey levels, by a table over all levels of a camera.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Linear {
+pub struct LightTable {
     gamma: f64,
     white: u16,
     /// Light of each level, in steps of a 65,535th of white.
     table: Vec<u16>,
 }
 
-impl Linear {
+impl LightTable {
     /// For a camera with a gamma. `white` is the upper end of its scale; levels
     /// beyond it are white too.
     pub fn new(gamma: f64, white: u16) -> Self {
@@ -54,7 +54,7 @@ mod tests {
     #[test]
     fn light_comes_back_from_grey() {
         for (gamma, white) in [(0.45, 255u16), (2.2, 255), (0.45, 4095), (1.0, u16::MAX)] {
-            let linear = Linear::new(gamma, white);
+            let linear = LightTable::new(gamma, white);
             for tenth in 1..10u8 {
                 let light = f64::from(tenth) / 10.0;
                 let grey = f64::from(white) * light.powf(gamma);
@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn only_white_is_white() {
         for gamma in [0.2, 1.0, 5.0] {
-            let linear = Linear::new(gamma, 4095);
+            let linear = LightTable::new(gamma, 4095);
             assert!(linear.light(4094) < u16::MAX);
             assert_eq!(linear.light(4095), u16::MAX);
             assert_eq!(linear.light(5000), u16::MAX, "beyond the camera's own scale");

@@ -6,7 +6,7 @@ use crate::core::units::{Mm, WidthRange};
 
 /// How the bead runs in the image, to within 20 degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Axis {
+pub enum BeadAxis {
     /// From top to bottom.
     Vertical,
     /// From left to right.
@@ -26,7 +26,7 @@ pub enum Polarity {
 
 /// How edges are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
+pub enum MeasureMethod {
     /// Sub-pixel edges along caliper lines across the bead.
     Caliper,
     /// The method of Shojaei Barjuei et al. 2022, eq. (1)–(3): an edge
@@ -47,13 +47,13 @@ pub enum EdgeKind {
 }
 
 /// Caliper lines along a gauge whose cell names no number.
-pub const CALIPERS: usize = 64;
+pub const DEFAULT_CALIPERS: usize = 64;
 /// Smallest contrast where the cell names none: about three times the noise of an
 /// industrial camera at full scale \[grey levels of 256\].
-pub const MIN_CONTRAST_GREY: f64 = 6.0;
+pub const DEFAULT_MIN_CONTRAST_GREY: f64 = 6.0;
 /// Largest standard deviation of a width where the cell names none, as a fraction
 /// of the width: tolerances of printed beads are 5 % and more.
-pub const MAX_SIGMA: f64 = 0.02;
+pub const DEFAULT_MAX_SIGMA: f64 = 0.02;
 
 /// Widths of a bead in pixels across the gauge's middle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,13 +70,13 @@ pub struct Gauge {
     /// Region of interest in the image.
     pub roi: Roi,
     /// How the bead runs in the region.
-    pub axis: Axis,
+    pub axis: BeadAxis,
     /// The bead against its surroundings.
     pub polarity: Polarity,
     /// Widths that are plausible.
     pub width_range: WidthRange,
     /// How edges are found.
-    pub method: Method,
+    pub method: MeasureMethod,
     /// Number of caliper lines along the region.
     pub calipers: usize,
     /// Smallest step from ground to bead that is taken for an edge, on a scale
@@ -94,17 +94,17 @@ pub struct Gauge {
 
 impl Gauge {
     /// A gauge with the cell file's defaults for everything else.
-    pub fn new(roi: Roi, axis: Axis, polarity: Polarity, width_range: WidthRange) -> Self {
+    pub fn new(roi: Roi, axis: BeadAxis, polarity: Polarity, width_range: WidthRange) -> Self {
         Self {
             roi,
             axis,
             polarity,
             width_range,
-            method: Method::Caliper,
-            calipers: CALIPERS,
-            min_contrast_grey: MIN_CONTRAST_GREY,
+            method: MeasureMethod::Caliper,
+            calipers: DEFAULT_CALIPERS,
+            min_contrast_grey: DEFAULT_MIN_CONTRAST_GREY,
             edge: EdgeKind::Auto,
-            max_sigma: MAX_SIGMA,
+            max_sigma: DEFAULT_MAX_SIGMA,
             gamma: None,
         }
     }
@@ -118,10 +118,10 @@ impl Gauge {
         let (across, along) = (x + 0.5 * (width - 1.0), y + 0.5 * (height - 1.0));
         // From border to border of its pixels, the first of which has its centre at 0.
         let ends = match self.axis {
-            Axis::Vertical => {
+            BeadAxis::Vertical => {
                 [ImagePoint::new(across, y - 0.5), ImagePoint::new(across, y + height - 0.5)]
             }
-            Axis::Horizontal => {
+            BeadAxis::Horizontal => {
                 [ImagePoint::new(x - 0.5, along), ImagePoint::new(x + width - 0.5, along)]
             }
         };
@@ -140,7 +140,7 @@ mod tests {
         let gauge = |axis| Gauge::new(roi, axis, Polarity::Bright, range);
         let map = SurfaceMap::from_scale(0.1);
         let length = |axis| gauge(axis).length_on(&map).unwrap().get();
-        assert!((length(Axis::Vertical) - 5.0).abs() < 1e-9);
-        assert!((length(Axis::Horizontal) - 10.0).abs() < 1e-9);
+        assert!((length(BeadAxis::Vertical) - 5.0).abs() < 1e-9);
+        assert!((length(BeadAxis::Horizontal) - 10.0).abs() < 1e-9);
     }
 }

@@ -2,29 +2,29 @@
 //! it may move the mean of the edge.
 
 use super::row_range::RowRange;
-use super::strip::{Grey, Strip};
-use crate::numeric::number::{float, narrow, whole};
+use super::strip::{GaugeRows, GreyPixel};
+use crate::numeric::number::{narrow_to_f32, round_to_count, to_f64};
 use crate::numeric::rank;
 
 /// Distances from the edge at which the pattern is looked at \[px\]: the first one
 /// beyond the flank, in blurs and at least, and those after it.
 const FLANK_BLURS: f64 = 3.0;
-const FIRST_PX: f64 = 4.0;
-const STEP_PX: usize = 2;
-const COLUMNS: usize = 10;
+const MIN_FIRST_PX: f64 = 4.0;
+const COLUMN_STEP_PX: usize = 2;
+const MAX_COLUMNS: usize = 10;
 /// Fewest lines that tell a pattern.
-const LEAST_LINES: usize = 8;
+const MIN_LINES: usize = 8;
 /// Part of the noise's variance by which a pattern's must exceed it: less is not told
 /// from noise.
-pub const TOLD: f64 = 0.25;
+pub const MIN_EXCESS_VARIANCE: f64 = 0.25;
 
 /// Variance of all pixels in that of the noise up to which they show nothing but noise:
 /// there is no need of medians.
-const SURELY_NOISE: f64 = 1.1;
+const MAX_NOISE_RATIO: f64 = 1.1;
 
 /// Where an edge lies on some rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct EdgePosition {
     /// The rows.
     pub rows: RowRange,
     /// Position across it \[px\].
@@ -33,9 +33,9 @@ pub struct Place {
 
 /// Where to look for a pattern.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Side<'a> {
+pub struct EdgeSide<'a> {
     /// The edge, row by row.
-    pub places: &'a [Place],
+    pub positions: &'a [EdgePosition],
     /// Direction in which to look, away from the edge: 1 or -1.
     pub outwards: f64,
     /// Blur of the edge \[px\].
@@ -44,7 +44,7 @@ pub struct Side<'a> {
     pub room_px: f64,
 }
 
-impl Side<'_> {
+impl EdgeSide<'_> {
     /// Whether it lies at higher positions than the edge.
     fn is_after(&self) -> bool {
         self.outwards > 0.0
@@ -64,26 +64,26 @@ pub struct Pattern {
 
 /// Looks for patterns; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
-pub struct Ground {
+pub struct PatternSearch {
     /// Grey levels beside the edge, line by line, each column less its straight line.
-    lines: Vec<Line>,
+    lines: Vec<ColumnValues>,
     /// Columns that lie within the gauge.
     columns: usize,
     column: Vec<f32>,
 }
 
 /// Pixels of one line, outwards.
-type Line = [f32; COLUMNS];
+type ColumnValues = [f32; MAX_COLUMNS];
 
-impl Ground {
+impl PatternSearch {
     /// The pattern along an edge. `noise` is the standard deviation of a pixel's
     /// \[grey levels\]. `None` where none is told from noise, or too little is in the
     /// gauge.
     #[inline(always)]
-    pub fn pattern<T: Grey>(
+    pub fn pattern<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
-        side: &Side<'_>,
+        strip: &GaugeRows<'_, T>,
+        side: &EdgeSide<'_>,
         noise: f64,
     ) -> Option<Pattern> {
         let mut variances = self.look(strip, side, noise)?;
@@ -95,10 +95,10 @@ impl Ground {
     /// \[grey levels\], from the median of how far pixels are off their median: sparks or
     /// holes, which move a mean, are none. `None` as for a pattern.
     #[inline(always)]
-    pub fn texture<T: Grey>(
+    pub fn texture<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
-        side: &Side<'_>,
+        strip: &GaugeRows<'_, T>,
+        side: &EdgeSide<'_>,
         noise: f64,
     ) -> Option<f64> {
         let mut variances = self.look(strip, side, noise)?;
@@ -107,7 +107,7 @@ impl Ground {
             self.column.extend(self.lines.iter().map(|line| line[column]));
             let median = rank::median(&mut self.column)?;
             let deviation = f64::from(rank::median_deviation(&mut self.column, median)?);
-            *variance = narrow((rank::SIGMA_PER_MEDIAN * deviation).powi(2));
+            *variance = narrow_to_f32((rank::SIGMA_PER_MEDIAN * deviation).powi(2));
         }
         self.without_noise(&mut variances, noise)
     }
@@ -115,49 +115,51 @@ impl Ground {
     /// Reads what lies beside an edge: the variance of each column; `None` where all
     /// together are surely noise.
     #[inline(always)]
-    fn look<T: Grey>(
+    fn look<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
-        side: &Side<'_>,
+        strip: &GaugeRows<'_, T>,
+        side: &EdgeSide<'_>,
         noise: f64,
-    ) -> Option<[f32; COLUMNS]> {
-        let count = side.places.len();
-        if count < LEAST_LINES {
+    ) -> Option<[f32; MAX_COLUMNS]> {
+        let count = side.positions.len();
+        if count < MIN_LINES {
             return None;
         }
         self.read(strip, side);
-        level(&mut self.lines);
-        let freedom = 1.0 / narrow(float(count - 2));
+        detrend(&mut self.lines);
+        let freedom = 1.0 / narrow_to_f32(to_f64(count - 2));
         let variances = sum(self.lines.iter().map(|line| line.map(|grey| freedom * grey * grey)));
-        let mean = variances[..self.columns].iter().sum::<f32>() / narrow(float(self.columns));
-        (f64::from(mean) > SURELY_NOISE * noise * noise).then_some(variances)
+        let mean =
+            variances[..self.columns].iter().sum::<f32>() / narrow_to_f32(to_f64(self.columns));
+        (f64::from(mean) > MAX_NOISE_RATIO * noise * noise).then_some(variances)
     }
 
     /// Standard deviation without the pixels' noise, from the median of the columns'
     /// variances \[grey levels\]; `None` where it is not told from noise.
-    fn without_noise(&self, variances: &mut [f32; COLUMNS], noise: f64) -> Option<f64> {
+    fn without_noise(&self, variances: &mut [f32; MAX_COLUMNS], noise: f64) -> Option<f64> {
         let variance = f64::from(rank::median(&mut variances[..self.columns])?) - noise * noise;
-        (variance > TOLD * noise * noise).then(|| variance.sqrt())
+        (variance > MIN_EXCESS_VARIANCE * noise * noise).then(|| variance.sqrt())
     }
 
     /// Reads columns of pixels beside an edge, as far as they lie within the gauge.
     #[inline(always)]
-    fn read<T: Grey>(&mut self, strip: &Strip<'_, T>, side: &Side<'_>) {
-        let first = FIRST_PX.max(FLANK_BLURS * side.blur_px);
-        let last = float(strip.across - 1);
-        let border = |place: &Place| if side.is_after() { last - place.at } else { place.at };
-        let room = side.places.iter().map(border).fold(side.room_px - first, f64::min);
-        let fits = |column: &usize| first + float(STEP_PX * column) <= room;
-        self.columns = (0..COLUMNS).take_while(fits).count();
+    fn read<T: GreyPixel>(&mut self, strip: &GaugeRows<'_, T>, side: &EdgeSide<'_>) {
+        let first = MIN_FIRST_PX.max(FLANK_BLURS * side.blur_px);
+        let last = to_f64(strip.across - 1);
+        let border =
+            |place: &EdgePosition| if side.is_after() { last - place.at } else { place.at };
+        let room = side.positions.iter().map(border).fold(side.room_px - first, f64::min);
+        let fits = |column: &usize| first + to_f64(COLUMN_STEP_PX * column) <= room;
+        self.columns = (0..MAX_COLUMNS).take_while(fits).count();
         self.lines.clear();
-        self.lines.extend(side.places.iter().map(|place| {
+        self.lines.extend(side.positions.iter().map(|place| {
             let pixels = strip.row(usize::midpoint(place.rows.first, place.rows.end - 1));
-            let nearest = whole(narrow(place.at + side.outwards * first));
+            let nearest = round_to_count(narrow_to_f32(place.at + side.outwards * first));
             std::array::from_fn(|column| {
-                let off = STEP_PX * column;
+                let off = COLUMN_STEP_PX * column;
                 let at = if side.is_after() { nearest + off } else { nearest.saturating_sub(off) };
                 let pixel = pixels[at.min(pixels.len() - 1)];
-                strip.scale * T::float(pixel.add_to(T::Sum::default()))
+                strip.scale * T::sum_to_f32(pixel.add_to(T::Sum::default()))
             })
         }));
     }
@@ -170,21 +172,21 @@ impl Ground {
             let pairs = self.lines[lag..].iter().zip(&self.lines);
             let products = sum(pairs.map(|(a, b)| std::array::from_fn(|k| a[k] * b[k])));
             let all = products[..self.columns].iter().sum::<f32>();
-            f64::from(all) / float(self.columns * count)
+            f64::from(all) / to_f64(self.columns * count)
         };
         let later = (1..count / 4).map(covariance).take_while(|covariance| *covariance > 0.0);
         let sum = covariance(0) - noise * noise + 2.0 * later.sum::<f64>();
-        sum.max(0.0) / float(count)
+        sum.max(0.0) / to_f64(count)
     }
 }
 
 /// Takes the straight line through each column out of it.
 #[inline(always)]
-fn level(lines: &mut [Line]) {
-    let count = narrow(float(lines.len()));
+fn detrend(lines: &mut [ColumnValues]) {
+    let count = narrow_to_f32(to_f64(lines.len()));
     let middle = (count - 1.0) / 2.0;
     let means = sum(lines.iter().copied()).map(|sum| sum / count);
-    let places = || (0..).map(move |k| narrow(float(k)) - middle);
+    let places = || (0..).map(move |k| narrow_to_f32(to_f64(k)) - middle);
     let across = sum(lines.iter().zip(places()).map(|(line, place)| line.map(|v| place * v)));
     let along = count * (count * count - 1.0) / 12.0;
     let slopes = across.map(|across| across / along);
@@ -197,8 +199,8 @@ fn level(lines: &mut [Line]) {
 
 /// Sum of lines, column by column.
 #[inline(always)]
-fn sum(lines: impl Iterator<Item = Line>) -> Line {
-    let mut sums = [0.0; COLUMNS];
+fn sum(lines: impl Iterator<Item = ColumnValues>) -> ColumnValues {
+    let mut sums = [0.0; MAX_COLUMNS];
     for line in lines {
         for (sum, value) in sums.iter_mut().zip(line) {
             *sum += value;

@@ -2,27 +2,27 @@
 //! levels beside an edge by less than their noise shows there, and tells by how much by its
 //! slopes at both edges.
 
-use super::overlay::{REACH, Shading, Shape};
-use crate::numeric::number::float;
+use super::overlay::{HALF_SPAN, SideShading, StepShape};
+use crate::numeric::number::to_f64;
 
 /// How far the slopes of the light on the two sides of an edge may differ, as a fraction of
 /// their mean: those of a bead or of ground that is shaded itself are its alone.
-const ALIKE: f64 = 0.5;
+const MAX_SLOPE_DIFFERENCE: f64 = 0.5;
 
 /// How much less the light's relative slope grows at the edges than between them where it
 /// falls off on both sides, in squares of that slope: 2/3 for a lamp, 1/(1 + r²)^1.5 of whose
 /// light arrives, 1/2 for a lens, with 1/(1 + r²)².
-const FALLS_OFF: f64 = 0.6;
+const FALLOFF_CURVATURE: f64 = 0.6;
 
 /// Bend of the light at the farthest sample up to which it is left out: it moves an edge by
 /// 0.001 px.
-const HARDLY: f64 = 2e-3;
+const MIN_BEND: f64 = 2e-3;
 
 /// What lies beside an edge.
 #[derive(Debug)]
 pub struct Surroundings<'a> {
     /// The edge, at its place and its levels.
-    pub shape: &'a mut Shape,
+    pub shape: &'a mut StepShape,
     /// Level before it \[grey levels\].
     pub before: f64,
     /// Step to the level after it \[grey levels\].
@@ -43,7 +43,8 @@ impl Surroundings<'_> {
         let [outwards, onwards] = self.shape.shading.map(|shading| shading.slope);
         let (before, after) = (-outwards / before, onwards / after);
         let mean = f64::midpoint(before, after);
-        let is_light = before * after > 0.0 && (after - before).abs() < ALIKE * mean.abs();
+        let is_light =
+            before * after > 0.0 && (after - before).abs() < MAX_SLOPE_DIFFERENCE * mean.abs();
         is_light.then_some(mean)
     }
 
@@ -51,14 +52,14 @@ impl Surroundings<'_> {
     /// second derivative \[1/px²\].
     fn bend(&mut self, relative: f64) {
         let levels = self.levels();
-        let Shape { step, extent, shading, .. } = &mut *self.shape;
+        let StepShape { step, extent, shading, .. } = &mut *self.shape;
         let ends = [extent.before, extent.after];
         for ((shading, level), end) in shading.iter_mut().zip(levels).zip(ends) {
             if shading.bend == 0.0 {
                 let bend = level * relative;
                 // A parabola's straight line runs as it does in the middle of its samples.
                 let middle = 0.5 * (3.0 * step.blur + end);
-                *shading = Shading { slope: shading.slope - 2.0 * bend * middle, bend };
+                *shading = SideShading { slope: shading.slope - 2.0 * bend * middle, bend };
             }
         }
     }
@@ -66,10 +67,10 @@ impl Surroundings<'_> {
 
 /// Bends the levels beside both edges of a bead of such a width as the light does whose
 /// slopes show on all four sides.
-pub fn bend(mut edges: [Surroundings<'_>; 2], width_px: f64) {
+pub fn apply_falloff(mut edges: [Surroundings<'_>; 2], width_px: f64) {
     let [Some(left), Some(right)] = [edges[0].light(), edges[1].light()] else { return };
-    let bends = bends([left, right], width_px);
-    if bends.iter().any(|bend| bend.abs() * float(REACH * REACH) > HARDLY) {
+    let bends = falloff_bends([left, right], width_px);
+    if bends.iter().any(|bend| bend.abs() * to_f64(HALF_SPAN * HALF_SPAN) > MIN_BEND) {
         for (edge, relative) in edges.iter_mut().zip(bends) {
             edge.bend(relative);
         }
@@ -78,8 +79,8 @@ pub fn bend(mut edges: [Surroundings<'_>; 2], width_px: f64) {
 
 /// Half of the light's relative second derivative at either edge \[1/px²\], from its relative
 /// slopes there \[1/px\].
-fn bends([left, right]: [f64; 2], width_px: f64) -> [f64; 2] {
-    let growth = (right - left) / width_px + FALLS_OFF * (-left * right).max(0.0);
+fn falloff_bends([left, right]: [f64; 2], width_px: f64) -> [f64; 2] {
+    let growth = (right - left) / width_px + FALLOFF_CURVATURE * (-left * right).max(0.0);
     [left, right].map(|slope| 0.5 * (growth + slope * slope))
 }
 
@@ -92,7 +93,7 @@ mod tests {
         let slopes = edges.map(|x| (light(x + 0.5) - light(x - 0.5)) / light(x));
         let truth =
             edges.map(|x| 0.5 * (light(x + 1.0) - 2.0 * light(x) + light(x - 1.0)) / light(x));
-        [bends(slopes, edges[1] - edges[0]), truth]
+        [falloff_bends(slopes, edges[1] - edges[0]), truth]
     }
 
     #[test]

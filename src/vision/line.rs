@@ -2,14 +2,14 @@
 
 /// Slopes of the surroundings are believed from so many standard deviations
 /// on.
-const SURE: f64 = 2.5;
+const MIN_SLOPE_SIGMAS: f64 = 2.5;
 /// Mean square distance of places from their middle from which on they show a
 /// slope \[px²\].
-const STRAIGHT: f64 = 3.0;
+const MIN_SPREAD_PX2: f64 = 3.0;
 
 /// Running sums of a straight line.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Line {
+pub struct LineSums {
     /// Sum of the weights.
     pub weight: f64,
     x: f64,
@@ -18,7 +18,7 @@ pub struct Line {
     xy: f64,
 }
 
-impl Line {
+impl LineSums {
     /// Adds a sample.
     #[inline(always)]
     pub fn add(&mut self, x: f64, y: f64, weight: f64) {
@@ -58,7 +58,7 @@ impl Line {
 
     /// Whether the samples reach far enough to show a slope.
     pub fn shows_slope(&self) -> bool {
-        self.weight > 0.0 && self.spread() >= STRAIGHT * self.weight
+        self.weight > 0.0 && self.spread() >= MIN_SPREAD_PX2 * self.weight
     }
 
     /// What the line is at a place, and its variance in units of a sample's;
@@ -78,13 +78,14 @@ impl Line {
     /// The slope less what noise may have made of it – nothing below 2.5
     /// standard deviations, nearly all far above –, and the variance that its
     /// doubt leaves to the line at the edge.
-    pub fn sure_slope(&self, noise: f64) -> (f64, f64) {
+    pub fn shrunk_slope(&self, noise: f64) -> (f64, f64) {
         if !self.shows_slope() {
             return (0.0, 0.0);
         }
         let slope = self.slope();
         let variance = noise * noise / self.spread();
-        let sure = (1.0 - SURE * SURE * variance / (slope * slope)).max(0.0);
+        let sure =
+            (1.0 - MIN_SLOPE_SIGMAS * MIN_SLOPE_SIGMAS * variance / (slope * slope)).max(0.0);
         (slope * sure, sure * variance * self.middle() * self.middle())
     }
 }

@@ -16,20 +16,22 @@ mod mean_edge_input;
 mod weights;
 
 use super::coarse::StepLine;
-use super::edge_windows::PLENTY;
-use super::located::Located;
+use super::edge_windows::MAX_SINGLE_ROWS;
+use super::located::CaliperEdge;
 use super::rough::RoughFit;
 use super::row_range::RowRange;
-use super::strip::Grey;
+use super::strip::GreyPixel;
 use super::vectors;
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::{float, narrow, whole};
+use crate::numeric::number::{narrow_to_f32, round_to_count, to_f64};
 use crate::numeric::rank;
-use column::Column;
-use course::{Bent, bend_at};
-use descent::{Descent, Goal, LONGEST_PX, MAX_STEPS, NEAR, TO_THE_END};
-pub use mean_edge_input::Scene;
-use weights::{HALF_PX, Samples, WINDOW, Weights, product};
+use column::ColumnSums;
+use course::{ParabolicCourse, bend_at};
+use descent::{
+    CONVERGED, DescentResult, MAX_ITERATIONS, MAX_STEP_PX, ROUGHLY_CONVERGED, StopCriterion,
+};
+pub use mean_edge_input::MeanEdgeInput;
+use weights::{EdgeWeights, HALF_PX, ShiftSamples, WINDOW, product};
 
 /// Half of the window about an edge at most, as a fraction of the bead's width.
 const HALF_FRACTION: f32 = 0.4;
@@ -39,17 +41,17 @@ pub const BLURS_PX: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0];
 /// The one of them with which an edge is approached.
 const USUAL_BLUR: usize = 3;
 /// How far from each other edges of different blurs rest in a profile \[px\].
-const NEAR_PX: usize = 4;
+const BLUR_SHIFT_PX: usize = 4;
 /// How far an edge may lie from its line \[px\].
-const FARTHEST_PX: f64 = 10.0;
+const MAX_OFFSET_PX: f64 = 10.0;
 /// How many standard deviations of what the pattern bends an edge by are a bend of the
 /// edge.
-const BENDS: f64 = 4.0;
+const MIN_BEND_SIGMAS: f64 = 4.0;
 /// Ground that is looked at \[px\], and bead: other things lie farther away.
-const GROUND_PX: usize = 100;
-const BEAD_PX: usize = 120;
+const MAX_GROUND_PX: usize = 100;
+const MAX_BEAD_PX: usize = 120;
 /// Distance from the edge at which ground and bead are free of the flank, in blurs.
-const FREE_BLURS: f64 = 4.0;
+const FLANK_BLURS: f64 = 4.0;
 /// Bead beside the flank whose mean is its level \[px\].
 const LEVEL_PX: usize = 24;
 /// Columns of the ground that tell its pattern, and their distance \[px\].
@@ -59,10 +61,10 @@ const COLUMN_PX: usize = 2;
 /// An edge along a course; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct MeanEdge {
-    course: Bent,
+    course: ParabolicCourse,
     half: usize,
-    lines: Vec<Option<Located>>,
-    columns: Vec<Column>,
+    lines: Vec<Option<CaliperEdge>>,
+    columns: Vec<ColumnSums>,
     spreads: Vec<f32>,
 }
 
@@ -70,7 +72,7 @@ pub struct MeanEdge {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeanFit {
     /// What the ground makes of the edge's position, and the bead.
-    pub samples: [Samples; 2],
+    pub samples: [ShiftSamples; 2],
     /// Step from the ground to the bead \[grey levels\]: the smaller of that in the window
     /// and that of all places that are looked at.
     pub contrast: f64,
@@ -91,8 +93,8 @@ impl MeanFit {
             is_groove: false,
             is_narrow_groove: false,
             is_on_ground: true,
-            odd_share: 0.0,
-            odd_within_share: 0.0,
+            odd_fraction: 0.0,
+            odd_fraction_within: 0.0,
             along_px: 0.0,
             lines_fraction: 1.0,
         }
@@ -101,32 +103,37 @@ impl MeanFit {
 
 impl MeanEdge {
     /// Positions of the last frame, one a caliper line.
-    pub fn lines(&self) -> &[Option<Located>] {
+    pub fn lines(&self) -> &[Option<CaliperEdge>] {
         &self.lines
     }
 
     /// Standard deviation of the ground's pattern along a line, with the noise of the
     /// pixels \[grey levels\]: the median of its columns'. `None` where too little
     /// ground lies within the gauge.
-    pub fn pattern<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) -> Option<f64> {
-        self.take(scene, line);
+    pub fn pattern<T: GreyPixel>(
+        &mut self,
+        scene: &MeanEdgeInput<'_, T>,
+        line: &StepLine,
+    ) -> Option<f64> {
+        self.start_from(scene, line);
         let rows = scene.strip.along;
-        let ends = [0, rows - 1].map(|row| self.course.at(scene.place(row)));
+        let ends = [0, rows - 1].map(|row| self.course.at(scene.normalised_position(row)));
         let room = ends.map(|at| if scene.bead_after { at } else { scene.last() - at });
-        let fits = |off: &usize| float(*off) <= room[0].min(room[1]);
-        let count = (HALF_PX..GROUND_PX).step_by(COLUMN_PX).take_while(fits).count();
+        let fits = |off: &usize| to_f64(*off) <= room[0].min(room[1]);
+        let count = (HALF_PX..MAX_GROUND_PX).step_by(COLUMN_PX).take_while(fits).count();
         if count < MIN_COLUMNS {
             return None;
         }
         self.columns.clear();
-        self.columns.resize(count, Column::default());
+        self.columns.resize(count, ColumnSums::default());
         let last = scene.strip.across - 1;
-        let every = if rows > PLENTY { 2 } else { 1 };
+        let every = if rows > MAX_SINGLE_ROWS { 2 } else { 1 };
         let seen = rows.div_ceil(every);
         for (number, row) in (0..rows).step_by(every).enumerate() {
-            let place = float(number) - 0.5 * float(seen - 1);
-            let at = self.course.at(scene.place(row)) - scene.inwards() * float(HALF_PX);
-            let nearest = whole(narrow(at)).min(last);
+            let place = to_f64(number) - 0.5 * to_f64(seen - 1);
+            let at =
+                self.course.at(scene.normalised_position(row)) - scene.inwards() * to_f64(HALF_PX);
+            let nearest = round_to_count(narrow_to_f32(at)).min(last);
             let pixels = scene.strip.row(row);
             for (column, off) in self.columns.iter_mut().zip((0..).step_by(COLUMN_PX)) {
                 let at = if scene.bead_after {
@@ -134,97 +141,101 @@ impl MeanEdge {
                 } else {
                     (nearest + off).min(last)
                 };
-                column.add(place, f64::from(T::float(pixels[at].add_to(T::Sum::default()))));
+                column.add(place, f64::from(T::sum_to_f32(pixels[at].add_to(T::Sum::default()))));
             }
         }
         self.spreads.clear();
-        self.spreads.extend(self.columns.iter().map(|of| narrow(of.variance_about_line(seen))));
+        self.spreads
+            .extend(self.columns.iter().map(|of| narrow_to_f32(of.variance_about_line(seen))));
         let variance = rank::median(&mut self.spreads)?;
         Some(f64::from(scene.strip.scale * variance.sqrt()))
     }
 
-    fn take<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) {
-        let half = 0.5 * float(scene.strip.along);
-        self.course = Bent { at: line.at.into(), tilt: half * f64::from(line.slope), bend: 0.0 };
-        self.half = HALF_PX.min(whole((HALF_FRACTION * scene.width_px).floor()));
+    fn start_from<T: GreyPixel>(&mut self, scene: &MeanEdgeInput<'_, T>, line: &StepLine) {
+        let half = 0.5 * to_f64(scene.strip.along);
+        self.course =
+            ParabolicCourse { at: line.at.into(), tilt: half * f64::from(line.slope), bend: 0.0 };
+        self.half = HALF_PX.min(round_to_count((HALF_FRACTION * scene.width_px).floor()));
     }
 
     /// Descends from a line to the edge beside it. Returns what a step of each of
     /// [`BLURS_PX`] leaves of its profile; infinite where there is no edge.
-    pub fn approach<T: Grey>(
+    pub fn fit_blurs<T: GreyPixel>(
         &mut self,
-        scene: &Scene<'_, T>,
+        scene: &MeanEdgeInput<'_, T>,
         line: &StepLine,
         table: &StepTable,
     ) -> [f64; BLURS_PX.len()] {
-        self.take(scene, line);
-        let weights = BLURS_PX.map(|blur_px| Weights::new(table, blur_px, self.half));
+        self.start_from(scene, line);
+        let weights = BLURS_PX.map(|blur_px| EdgeWeights::new(table, blur_px, self.half));
         let usual = weights.iter().flatten().take(USUAL_BLUR + 1).last();
-        let is_found = usual.is_some_and(|usual| self.descend(scene, usual, NEAR).is_some());
+        let is_found =
+            usual.is_some_and(|usual| self.descend(scene, usual, ROUGHLY_CONVERGED).is_some());
         // What other blurs change is the place within the profile, and hardly its direction.
-        let reach = self.half + NEAR_PX;
-        let [profile, ..] = self.means(scene, -float(reach), 2 * reach + 1);
+        let reach = self.half + BLUR_SHIFT_PX;
+        let [profile, ..] = self.means(scene, -to_f64(reach), 2 * reach + 1);
         weights.map(|weights| {
             let weights = weights.filter(|_| is_found);
-            weights.and_then(|weights| weights.rest(&profile)).unwrap_or(f64::INFINITY)
+            weights.and_then(|weights| weights.residual_at_edge(&profile)).unwrap_or(f64::INFINITY)
         })
     }
 
     /// Locates the edge that was approached, with a blur; `None` where there is none.
-    pub fn locate<T: Grey>(
+    pub fn locate<T: GreyPixel>(
         &mut self,
-        scene: &Scene<'_, T>,
+        scene: &MeanEdgeInput<'_, T>,
         table: &StepTable,
         blur_px: f64,
     ) -> Option<MeanFit> {
-        let weights = Weights::new(table, blur_px, self.half)?;
-        let straight = self.descend(scene, &weights, TO_THE_END)?;
-        let free = whole(narrow((FREE_BLURS * blur_px).ceil()));
-        let mut beside = self.beside(scene, free);
+        let weights = EdgeWeights::new(table, blur_px, self.half)?;
+        let straight = self.descend(scene, &weights, CONVERGED)?;
+        let free = round_to_count(narrow_to_f32((FLANK_BLURS * blur_px).ceil()));
+        let mut beside = self.side_profiles(scene, free);
         let [_, _, ground] = &beside.ground;
         let [_, _, bead] = &beside.bead;
         let bends = weights.on_ground(ground).with(weights.on_bead(bead));
         let bends = bends.variance().sqrt() / straight.step;
         let mut found = straight;
-        if straight.bend.abs() > BENDS * bends {
-            found = self.descend(scene, &weights, Goal { bends: true, ..TO_THE_END })?;
-            beside = self.beside(scene, free);
+        if straight.bend.abs() > MIN_BEND_SIGMAS * bends {
+            found = self.descend(scene, &weights, StopCriterion { bends: true, ..CONVERGED })?;
+            beside = self.side_profiles(scene, free);
         }
         let ([ground, ..], [bead, ..]) = (&beside.ground, &beside.bead);
         let bead_grey = mean(&bead[..bead.len().min(LEVEL_PX)])?;
         let contrast = found.step.min(bead_grey - mean(ground)?);
-        if !weights.is_like(ground, found.ground, found.step) {
+        if !weights.is_ground_level(ground, found.ground, found.step) {
             return None;
         }
         let samples = [weights.on_ground(ground), weights.on_bead(bead)];
         let samples = samples.map(|of| of.over(found.step));
         let shift = samples[0].shift() + samples[1].shift();
-        self.gather(scene, &weights, &found, contrast, shift);
+        self.locate_lines(scene, &weights, &found, contrast, shift);
         (contrast > 0.0).then_some(MeanFit { samples, contrast, bead_grey })
     }
 
     /// Moves the course until the mean profile about it shows the edge in its middle.
-    fn descend<T: Grey>(
+    fn descend<T: GreyPixel>(
         &mut self,
-        scene: &Scene<'_, T>,
-        weights: &Weights,
-        goal: Goal,
-    ) -> Option<Descent> {
+        scene: &MeanEdgeInput<'_, T>,
+        weights: &EdgeWeights,
+        goal: StopCriterion,
+    ) -> Option<DescentResult> {
         let start = self.course.at;
-        for _ in 0..MAX_STEPS {
-            let means = self.means(scene, -float(self.half), 2 * self.half + 1);
+        for _ in 0..MAX_ITERATIONS {
+            let means = self.means(scene, -to_f64(self.half), 2 * self.half + 1);
             let step = weights.step(&means[0]);
-            if step <= 0.0 || (self.course.at - start).abs() > FARTHEST_PX {
+            if step <= 0.0 || (self.course.at - start).abs() > MAX_OFFSET_PX {
                 return None;
             }
-            let moves =
-                means.each_ref().map(|mean| scene.inwards() * product(&weights.place, mean) / step);
+            let moves = means
+                .each_ref()
+                .map(|mean| scene.inwards() * product(&weights.position, mean) / step);
             let unknowns = if goal.bends { &moves[..] } else { &moves[..2] };
             if unknowns.iter().all(|by| by.abs() < goal.last_px) {
                 let ground = product(&weights.levels[0], &means[0]);
-                return Some(Descent { step, ground, bend: moves[2] });
+                return Some(DescentResult { step, ground, bend: moves[2] });
             }
-            let [at, tilt, bend] = moves.map(|by| by.clamp(-LONGEST_PX, LONGEST_PX));
+            let [at, tilt, bend] = moves.map(|by| by.clamp(-MAX_STEP_PX, MAX_STEP_PX));
             self.course.at += at;
             self.course.tilt += tilt;
             self.course.bend += if goal.bends { bend } else { 0.0 };
@@ -234,9 +245,14 @@ impl MeanEdge {
 
     /// Mean over the rows of so many pixels at distances from the course, from one inwards
     /// on, and how it changes with the course's tilt and bend.
-    fn means<T: Grey>(&self, scene: &Scene<'_, T>, first: f64, pixels: usize) -> Profiles {
+    fn means<T: GreyPixel>(
+        &self,
+        scene: &MeanEdgeInput<'_, T>,
+        first: f64,
+        pixels: usize,
+    ) -> Profiles {
         // The lowest position of the profile, which inwards of a right edge is its last.
-        let reach = if scene.bead_after { 0.0 } else { float(pixels.saturating_sub(1)) };
+        let reach = if scene.bead_after { 0.0 } else { to_f64(pixels.saturating_sub(1)) };
         let lowest = scene.inwards() * first - reach;
         let mut sums: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; pixels]);
         let mut squares = [0.0; 3];
@@ -245,13 +261,13 @@ impl MeanEdge {
             #[inline(always)]
             || {
                 for row in 0..scene.strip.along {
-                    let place = scene.place(row);
+                    let place = scene.normalised_position(row);
                     let shares = [1.0, place, bend_at(place)];
                     for (square, share) in squares.iter_mut().zip(shares) {
                         *square += share * share;
                     }
                     let between = scene.fetch(row, self.course.at(place) + lowest, &mut greys);
-                    add_row(&mut sums, &greys, between, shares.map(narrow));
+                    add_row(&mut sums, &greys, between, shares.map(narrow_to_f32));
                 }
             },
         );
@@ -269,25 +285,30 @@ impl MeanEdge {
     }
 
     /// The same of ground and bead, free of the flank, as far as they lie in the gauge.
-    fn beside<T: Grey>(&self, scene: &Scene<'_, T>, free: usize) -> Beside {
+    fn side_profiles<T: GreyPixel>(
+        &self,
+        scene: &MeanEdgeInput<'_, T>,
+        free: usize,
+    ) -> SideProfiles {
         let ends = [-1.0, 0.0, 1.0].map(|place| self.course.at(place));
         let nearest = ends.into_iter().fold(f64::INFINITY, f64::min);
         let farthest = ends.into_iter().fold(f64::NEG_INFINITY, f64::max);
         let room = if scene.bead_after { nearest } else { scene.last() - farthest };
-        let ground_px = GROUND_PX.min(whole(narrow(room.floor()))).saturating_sub(free);
-        let bead_px = BEAD_PX.min(whole(0.5 * scene.width_px)).saturating_sub(free);
-        Beside {
-            ground: self.means(scene, -float(ground_px + free), ground_px),
-            bead: self.means(scene, float(free), bead_px),
+        let ground_px =
+            MAX_GROUND_PX.min(round_to_count(narrow_to_f32(room.floor()))).saturating_sub(free);
+        let bead_px = MAX_BEAD_PX.min(round_to_count(0.5 * scene.width_px)).saturating_sub(free);
+        SideProfiles {
+            ground: self.means(scene, -to_f64(ground_px + free), ground_px),
+            bead: self.means(scene, to_f64(free), bead_px),
         }
     }
 
     /// Positions of the caliper lines, less what all are shifted inwards by.
-    fn gather<T: Grey>(
+    fn locate_lines<T: GreyPixel>(
         &mut self,
-        scene: &Scene<'_, T>,
-        weights: &Weights,
-        found: &Descent,
+        scene: &MeanEdgeInput<'_, T>,
+        weights: &EdgeWeights,
+        found: &DescentResult,
         contrast: f64,
         shift: f64,
     ) {
@@ -296,7 +317,7 @@ impl MeanEdge {
         let mut greys = [0.0; WINDOW + 1];
         let greys = &mut greys[..=weights.pixels];
         // In the order of the pixels of a row.
-        let mut place = weights.place;
+        let mut place = weights.position;
         if !scene.bead_after {
             place[..weights.pixels].reverse();
         }
@@ -304,20 +325,20 @@ impl MeanEdge {
         for &RowRange { first: from, end: to } in scene.lines {
             let (mut aside, mut middle) = (0.0, 0.0);
             for row in from..to {
-                let at = self.course.at(scene.place(row));
-                middle += at / float(to - from);
-                let between = scene.fetch(row, at - float(self.half), greys);
+                let at = self.course.at(scene.normalised_position(row));
+                middle += at / to_f64(to - from);
+                let between = scene.fetch(row, at - to_f64(self.half), greys);
                 for (weight, pixels) in place.iter().zip(greys.windows(2)) {
                     aside += weight * f64::from(pixels[0] + between * (pixels[1] - pixels[0]));
                 }
             }
-            let aside = per_grey * aside / float(to - from) - shift;
+            let aside = per_grey * aside / to_f64(to - from) - shift;
             positions.push((middle, scene.inwards() * aside));
         }
         let squares: f64 = positions.iter().map(|(_, aside)| aside * aside).sum();
-        let variance = squares / float(positions.len().max(1));
+        let variance = squares / to_f64(positions.len().max(1));
         self.lines.extend(positions.into_iter().map(|(middle, aside)| {
-            Some(Located { at: middle + aside, variance, height: contrast, share: 1.0 })
+            Some(CaliperEdge { at: middle + aside, variance, height: contrast, row_fraction: 1.0 })
         }));
     }
 }
@@ -328,7 +349,7 @@ type Profiles = [Vec<f64>; 3];
 
 /// The same of what lies beside an edge.
 #[derive(Debug)]
-struct Beside {
+struct SideProfiles {
     ground: Profiles,
     bead: Profiles,
 }
@@ -347,5 +368,5 @@ fn add_row(sums: &mut [Vec<f32>; 3], pixels: &[f32], between: f32, shares: [f32;
 }
 
 fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / float(values.len()))
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / to_f64(values.len()))
 }

@@ -18,44 +18,44 @@ mod work;
 use crate::calibration::SurfaceMap;
 use crate::core::frame::Frame;
 use crate::core::geometry::ImagePoint;
-use checks::{WIDEST_BLUR_PX, WIDEST_MOTION_PX};
-use pattern_limits::STRONGEST_BESIDE_WHOLE;
+use checks::{MAX_BLUR_PX, MAX_MOTION_BLUR_PX};
+use pattern_limits::MAX_PATTERN_BESIDE_COMPLETE;
 use rough_edges::may_be_rough;
-use work::{Way, Work};
+use work::{EdgeModel, MeasureState};
 
 use super::axis;
 use super::edge_lines;
-use super::gauge::{Gauge, Method, WidthRangePx};
+use super::gauge::{Gauge, MeasureMethod, WidthRangePx};
 use super::pixel_noise::PixelNoise;
 use super::pool;
 use super::reject::Reject;
 use super::roughness::{CaliperFilter, LocalWidths};
-use super::strip::{Grey, Strip, Strips, Turner, View};
-use super::trace::Tracer;
+use super::strip::{GaugeRows, GaugeRowsOfDepth, GaugeView, GreyPixel, RowLayout};
+use super::trace::EdgeTracer;
 use super::vectors;
-use super::width::{Caliper, EdgePlace, Edges, Hints, WidthMeasurement};
-use crate::numeric::number::float;
+use super::width::{Caliper, CaliperPoint, Edges, Hints, WidthMeasurement};
+use crate::numeric::number::to_f64;
 
 /// Standard deviation of a width of [`NARROWEST_BLURS`] blurs from the flanks' overlap, in
 /// blurs, and the blurs by which a width must be larger for 1/e of it.
-const OVERLAP: f64 = 0.045;
-const NARROWEST_BLURS: f64 = 4.0;
-const OVERLAP_BLURS: f64 = 3.0;
+const OVERLAP_SIGMA: f64 = 0.045;
+const OVERLAP_REFERENCE_BLURS: f64 = 4.0;
+const OVERLAP_DECAY_BLURS: f64 = 3.0;
 
 /// Measures frames of one cell; keeps its memory from frame to frame.
 #[derive(Debug, Clone)]
 pub struct Measurer {
     gauge: Gauge,
     white: Option<u16>,
-    turner: Turner,
-    work: Work,
+    turner: RowLayout,
+    work: MeasureState,
 }
 
 impl Measurer {
     /// For a gauge. `white` is the upper end of the camera's scale where it is
     /// not that of the pixels, as with 12 bits in 16.
     pub fn new(gauge: Gauge, white: Option<u16>) -> Self {
-        Self { gauge, white, turner: Turner::new(gauge.gamma), work: Work::new(gauge) }
+        Self { gauge, white, turner: RowLayout::new(gauge.gamma), work: MeasureState::new(gauge) }
     }
 
     /// The edges behind the last width, for pictures of them.
@@ -69,12 +69,12 @@ impl Measurer {
         let Edges { left, right } = self.edges();
         let (mut left, mut right) = (left.iter().copied(), right.iter().copied());
         let lines = match self.gauge.method {
-            Method::Caliper => self.work.lines.len(),
-            Method::EdgeLines => left.len(),
+            MeasureMethod::Caliper => self.work.lines.len(),
+            MeasureMethod::EdgeLines => left.len(),
         };
         (0..lines).filter_map(move |number| {
-            let left = self.place(&self.work.left, number, &mut left);
-            let right = self.place(&self.work.right, number, &mut right);
+            let left = self.next_edge_point(&self.work.left, number, &mut left);
+            let right = self.next_edge_point(&self.work.right, number, &mut right);
             let found = left.is_some() || right.is_some();
             found.then_some(Caliper { number, left, right })
         })
@@ -88,7 +88,7 @@ impl Measurer {
         surface: &SurfaceMap,
     ) -> Option<LocalWidths> {
         let lines = self.work.lines.len();
-        let along = View::new(self.gauge.roi, self.gauge.axis).along;
+        let along = GaugeView::new(self.gauge.roi, self.gauge.axis).along;
         let filter = CaliperFilter {
             filter_px: self
                 .work
@@ -99,7 +99,7 @@ impl Measurer {
             blur_px: measured.hints.blur_px,
             noise_fractions: [&self.work.left, &self.work.right]
                 .map(|edge| edge.uncertainty.lines_fraction),
-            line_px: float(along) / float(lines.max(1)),
+            line_px: to_f64(along) / to_f64(lines.max(1)),
         };
         LocalWidths::read(self.calipers(), lines, filter, surface)
     }
@@ -112,17 +112,17 @@ impl Measurer {
     }
 
     /// The next point of an edge, if it belongs to this line.
-    fn place(
+    fn next_edge_point(
         &self,
-        tracer: &Tracer,
+        tracer: &EdgeTracer,
         number: usize,
         points: &mut impl Iterator<Item = ImagePoint>,
-    ) -> Option<EdgePlace> {
-        if self.gauge.method == Method::EdgeLines {
-            return Some(EdgePlace { at: points.next()?, sigma_px: None });
+    ) -> Option<CaliperPoint> {
+        if self.gauge.method == MeasureMethod::EdgeLines {
+            return Some(CaliperPoint { at: points.next()?, sigma_px: None });
         }
         let located = tracer.edges().get(number).copied().flatten()?;
-        Some(EdgePlace { at: points.next()?, sigma_px: Some(located.variance.sqrt()) })
+        Some(CaliperPoint { at: points.next()?, sigma_px: Some(located.variance.sqrt()) })
     }
 
     /// Measures the bead in a frame on a surface. Refuses a width whose standard
@@ -132,14 +132,14 @@ impl Measurer {
         frame: &Frame,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
-        let edges_only = self.measure_picture(frame, surface)?;
+        let edges_only = self.measure_image(frame, surface)?;
         let found = edges_only.with_calibration(surface)?;
         found.check_sigma(edges_only.sigma, self.gauge.max_sigma)?;
         Ok(found)
     }
 
     /// The same with no more in sigma than the picture itself leaves open.
-    fn measure_picture(
+    fn measure_image(
         &mut self,
         frame: &Frame,
         surface: &SurfaceMap,
@@ -151,17 +151,17 @@ impl Measurer {
             return Err(Reject::WrongSize { image: (frame.width(), frame.height()) });
         }
         check_size((frame.width(), frame.height()), surface)?;
-        if self.gauge.method == Method::EdgeLines {
+        if self.gauge.method == MeasureMethod::EdgeLines {
             let points = (&mut work.left_px, &mut work.right_px);
             return edge_lines::measure(&self.gauge, frame, surface, points);
         }
-        let view = View::new(self.gauge.roi, self.gauge.axis);
+        let view = GaugeView::new(self.gauge.roi, self.gauge.axis);
         let strips = self.turner.strips(frame, &view, self.white);
         vectors::widest(
             #[inline(always)]
             || match strips {
-                Strips::Bytes(strip) => work.measure(&strip, &view, surface),
-                Strips::Words(strip) => work.measure(&strip, &view, surface),
+                GaugeRowsOfDepth::Bytes(strip) => work.measure(&strip, &view, surface),
+                GaugeRowsOfDepth::Words(strip) => work.measure(&strip, &view, surface),
             },
         )
     }
@@ -172,7 +172,10 @@ impl Measurer {
 /// 600 px with a blur of 1.5 px.
 fn overlap_variance(width_px: f64, blur_px: f64) -> f64 {
     let blurs = width_px / blur_px;
-    0.5 * (OVERLAP * blur_px * libm::exp((NARROWEST_BLURS - blurs) / OVERLAP_BLURS)).powi(2)
+    0.5 * (OVERLAP_SIGMA
+        * blur_px
+        * libm::exp((OVERLAP_REFERENCE_BLURS - blurs) / OVERLAP_DECAY_BLURS))
+    .powi(2)
 }
 
 /// Refuses images of another size than those that the calibration was made with.
@@ -182,18 +185,18 @@ fn check_size(image: (usize, usize), surface: &SurfaceMap) -> Result<(), Reject>
     if same { Ok(()) } else { Err(Reject::OtherSize { image, calibrated }) }
 }
 
-impl Work {
+impl MeasureState {
     #[inline(always)]
-    fn measure<T: Grey>(
+    fn measure<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
-        view: &View,
+        strip: &GaugeRows<'_, T>,
+        view: &GaugeView,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         let range = self.search_range(view, surface)?;
         self.noise = PixelNoise::read(strip, 0..strip.across);
         self.bands.pool(strip, self.gauge.calipers);
-        pool::cut(strip.along, self.gauge.calipers, &mut self.lines);
+        pool::cut_into_ranges(strip.along, self.gauge.calipers, &mut self.lines);
         self.find_candidates();
         if self.is_busy()
             && let Some(textured) = self.measure_busy(strip, range, view, surface)
@@ -201,7 +204,7 @@ impl Work {
             return textured;
         }
         match self.measure_steps(strip, range, view, surface) {
-            Ok(found) => self.measure_again(found, strip, range, view, surface),
+            Ok(found) => self.refine_measurement(found, strip, range, view, surface),
             Err(reject) if may_be_rough(&reject) => self
                 .measure_rough(&reject, strip, range, view, surface)
                 .map_err(|rough| rough.or(reject)),
@@ -211,29 +214,30 @@ impl Work {
 
     /// Measures edges that were measured as blurred steps in another way, where that tells
     /// more; otherwise gives what was found.
-    fn measure_again<T: Grey>(
+    fn refine_measurement<T: GreyPixel>(
         &mut self,
         found: WidthMeasurement,
-        strip: &Strip<'_, T>,
+        strip: &GaugeRows<'_, T>,
         range: WidthRangePx,
-        view: &View,
+        view: &GaugeView,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
-        let knows_texture = self.left.knows_texture() && self.right.knows_texture();
-        let is_bearable = self.pattern_share > 0.0 && self.pattern_share < STRONGEST_BESIDE_WHOLE;
+        let knows_texture = self.left.is_textured() && self.right.is_textured();
+        let is_bearable =
+            self.pattern_ratio > 0.0 && self.pattern_ratio < MAX_PATTERN_BESIDE_COMPLETE;
         let is_on_texture = knows_texture && is_bearable;
         if !is_on_texture && let Some(textured) = self.measure_textured(strip, range, view, surface)
         {
             return textured;
         }
-        let found = if self.may_be_more_than_steps()
+        let found = if self.may_not_be_steps()
             && let Ok(fits) = self.find_rough(strip, range)
         {
             if self.explains_more(&fits, &found) {
-                return self.take_rough(&fits, strip, view, surface);
+                return self.width_of_rough(&fits, strip, view, surface);
             }
             self.check_flanks(&fits)?;
-            self.at_least_as_unsure(&fits, found)
+            self.with_row_uncertainty(&fits, found)
         } else {
             found
         };
@@ -243,32 +247,36 @@ impl Work {
 
     /// Measures edges that are blurred steps.
     #[inline(always)]
-    fn measure_steps<T: Grey>(
+    fn measure_steps<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
+        strip: &GaugeRows<'_, T>,
         range: WidthRangePx,
-        view: &View,
+        view: &GaugeView,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         self.find_contours();
         let pair = self.find_pair(range)?;
         self.trace(strip, pair)?;
-        self.sort_out(pair.bright)?;
+        self.reject_outliers(pair.bright)?;
         self.check_contrast()?;
-        let is_motion = self.blur_shapes.is_motion() && self.way != Way::Lines;
-        self.check_blur(if is_motion { WIDEST_MOTION_PX } else { WIDEST_BLUR_PX })?;
+        let is_motion = self.blur_shapes.is_motion() && self.edge_model != EdgeModel::LineByLine;
+        self.check_blur(if is_motion { MAX_MOTION_BLUR_PX } else { MAX_BLUR_PX })?;
         self.check_ground(strip, f64::max)?;
-        self.check_border(strip.across)?;
-        self.width_on(view, surface)
+        self.check_boundary(strip.across)?;
+        self.width_on_surface(view, surface)
     }
 
-    fn width_on(&mut self, view: &View, surface: &SurfaceMap) -> Result<WidthMeasurement, Reject> {
+    fn width_on_surface(
+        &mut self,
+        view: &GaugeView,
+        surface: &SurfaceMap,
+    ) -> Result<WidthMeasurement, Reject> {
         let hints = Hints {
             contrast_grey: f64::midpoint(self.contrasts[0], self.contrasts[1]),
             blur_px: f64::midpoint(self.left.blur_px, self.right.blur_px),
             noise_grey: self.noise.grey.into(),
-            saturated_share: self.bands.saturated_share(),
-            used_share: f64::midpoint(self.left.used_share(), self.right.used_share()),
+            saturated_fraction: self.bands.saturated_fraction(),
+            used_fraction: f64::midpoint(self.left.used_fraction(), self.right.used_fraction()),
             skew: None,
         };
         self.middles.clear();
@@ -287,8 +295,8 @@ impl Work {
             let mean_variance =
                 tracer.uncertainty.mean_variance.map(|known| known.max(of_compression));
             let of_steps = if mean_variance.is_none() { of_compression } else { 0.0 };
-            axis::Side {
-                places: tracer.edges(),
+            axis::LocatedEdge {
+                positions: tracer.edges(),
                 common_variance: tracer.uncertainty.common_variance
                     + tracer.uncertainty.ground_variance
                     + 0.5 * skew_variance
@@ -299,9 +307,9 @@ impl Work {
             }
         });
         let (gauge, middles) = (&self.gauge, self.middles.as_slice());
-        let scene = axis::Scene { view, surface, gauge, middles, sides };
+        let scene = axis::WidthInput { view, surface, gauge, middles, sides };
         let found = axis::width(&scene, hints, &mut self.axis)?;
-        self.check_covered(&found)?;
+        self.check_occlusion(&found)?;
         Ok(found)
     }
 }

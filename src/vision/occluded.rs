@@ -2,69 +2,70 @@
 //! of its rows are clear.
 
 use super::blur_estimate::BlurEstimate;
-use super::edge::{Candidate, Candidates};
-use super::parallel::Parallel;
-use super::strip::Grey;
-use super::trace::{Scene, Tracer};
+use super::edge::{StepCandidate, StepCandidates};
+use super::parallel::ParallelEdges;
+use super::strip::GreyPixel;
+use super::trace::{EdgeTracer, TraceInput};
 use crate::numeric::blurred_step::StepTable;
 
 /// By how much the distance of two steps may differ from that of the rough
 /// edges \[px\].
-const ABOUT_PX: f32 = 40.0;
+const WIDTH_TOLERANCE_PX: f32 = 40.0;
 
 /// Least distance of two steps, as a share of that of the rough edges.
-const LEAST_SHARE: f32 = 0.3;
+const MIN_WIDTH_RATIO: f32 = 0.3;
 
 /// A bead that was looked at.
 #[derive(Debug, Clone, Copy)]
-pub struct Bead<'a, T> {
+pub struct OccludedBead<'a, T> {
     /// What is looked at, left and right.
-    pub scenes: [Scene<'a, T>; 2],
+    pub scenes: [TraceInput<'a, T>; 2],
     /// All steps of the bands.
-    pub candidates: &'a [Candidates],
+    pub candidates: &'a [StepCandidates],
     /// Whether the bead is brighter than what lies beside it.
     pub bright: bool,
 }
 
-impl<T: Grey> Bead<'_, T> {
+impl<T: GreyPixel> OccludedBead<'_, T> {
     /// Locates the hidden one of two edges, or both, along steps that run beside
     /// each other, where there are any.
     #[cold]
-    pub fn uncover(
+    pub fn locate_from_clear_rows(
         &self,
-        [left, right]: [&mut Tracer; 2],
+        [left, right]: [&mut EdgeTracer; 2],
         table: &StepTable,
         blur: BlurEstimate,
-        parallel: &mut Parallel,
+        parallel: &mut ParallelEdges,
     ) {
         let [left_scene, right_scene] = &self.scenes;
         let width = left_scene.width_px;
-        let range = f32::max(width - ABOUT_PX, LEAST_SHARE * width)..width + ABOUT_PX;
+        let range = f32::max(width - WIDTH_TOLERANCE_PX, MIN_WIDTH_RATIO * width)
+            ..width + WIDTH_TOLERANCE_PX;
         let bands = self.candidates.len();
-        let lefts = |band| self.places(band, left, left_scene, self.bright);
-        let rights = |band| self.places(band, right, right_scene, !self.bright);
+        let lefts = |band| self.candidate_positions(band, left, left_scene, self.bright);
+        let rights = |band| self.candidate_positions(band, right, right_scene, !self.bright);
         if !parallel.find(bands, lefts, rights, range) {
             return;
         }
-        if left.is_hidden() {
-            left.uncover_along(table, left_scene, blur, parallel.lefts());
+        if left.is_lost() {
+            left.locate_occluded_along(table, left_scene, blur, parallel.lefts());
         }
-        if right.is_hidden() {
-            right.uncover_along(table, right_scene, blur, parallel.rights());
+        if right.is_lost() {
+            right.locate_occluded_along(table, right_scene, blur, parallel.rights());
         }
     }
 
     /// Where an edge may be in a band: where it was located, or at any step of
     /// its kind.
-    fn places(
+    fn candidate_positions(
         &self,
         band: usize,
-        tracer: &Tracer,
-        scene: &Scene<'_, T>,
+        tracer: &EdgeTracer,
+        scene: &TraceInput<'_, T>,
         up: bool,
     ) -> impl Iterator<Item = f32> {
         let candidates = &self.candidates[band];
-        let steps: &[Candidate] = match (tracer.is_clear(), up) {
+        let steps: &[StepCandidate] = match (tracer.is_clear(), up) {
             (true, _) => &[],
             (false, true) => candidates.up(),
             (false, false) => candidates.down(),

@@ -1,17 +1,21 @@
 //! Calipers that disagree with their neighbours: grains, sparks, wrong picks.
 
-use super::located::Located;
+use super::located::CaliperEdge;
 use crate::numeric::rank;
 
 /// Distances at which neighbours are asked.
-const SPANS: [usize; 3] = [1, 2, 3];
+const NEIGHBOUR_DISTANCES: [usize; 3] = [1, 2, 3];
 /// Deviation that makes an outlier, in robust standard deviations.
-const MANY_SIGMA: f64 = 5.0;
+const OUTLIER_SIGMAS: f64 = 5.0;
 
 /// Removes edges that lie far from the line between their neighbours, and
 /// returns the robust standard deviation of the deviations \[px\]. `memory` is
 /// scratch; `least_px` is the least deviation that makes an outlier.
-pub fn sort_out(edges: &mut [Option<Located>], least_px: f64, memory: &mut Vec<f64>) -> f64 {
+pub fn remove_outliers(
+    edges: &mut [Option<CaliperEdge>],
+    least_px: f64,
+    memory: &mut Vec<f64>,
+) -> f64 {
     let count = edges.len();
     memory.clear();
     memory.extend(edges.iter().map(|edge| edge.map_or(f64::NAN, |edge| edge.at)));
@@ -29,7 +33,7 @@ pub fn sort_out(edges: &mut [Option<Located>], least_px: f64, memory: &mut Vec<f
     let sizes = &mut places[..sizes];
     let Some(median) = rank::median(sizes) else { return 0.0 };
     let sigma = rank::SIGMA_PER_MEDIAN * median;
-    let limit = least_px.max(MANY_SIGMA * sigma);
+    let limit = least_px.max(OUTLIER_SIGMAS * sigma);
     for (edge, deviation) in edges.iter_mut().zip(deviations) {
         if deviation.abs() > limit {
             *edge = None;
@@ -43,9 +47,9 @@ pub fn sort_out(edges: &mut [Option<Located>], least_px: f64, memory: &mut Vec<f
 /// such neighbours; places that are none are not a number.
 fn deviation(places: &[f64], at: usize) -> Option<f64> {
     let here = places[at];
-    let mut found = [0.0; SPANS.len()];
+    let mut found = [0.0; NEIGHBOUR_DISTANCES.len()];
     let mut n = 0;
-    for span in SPANS {
+    for span in NEIGHBOUR_DISTANCES {
         let before = at.checked_sub(span).map_or(f64::NAN, |k| places[k]);
         let after = places.get(at + span).copied().unwrap_or(f64::NAN);
         let off = here - f64::midpoint(before, after);
@@ -66,11 +70,11 @@ fn deviation(places: &[f64], at: usize) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn edges() -> Vec<Option<Located>> {
+    fn edges() -> Vec<Option<CaliperEdge>> {
         (0..30u32)
             .map(|k| {
                 let at = 50.0 + 0.3 * f64::from(k) + 0.02 * f64::from(k % 3);
-                Some(Located { at, variance: 0.01, height: 80.0, share: 1.0 })
+                Some(CaliperEdge { at, variance: 0.01, height: 80.0, row_fraction: 1.0 })
             })
             .collect()
     }
@@ -78,7 +82,7 @@ mod tests {
     #[test]
     fn a_straight_slanted_edge_keeps_all_its_calipers() {
         let mut edges = edges();
-        let sigma = sort_out(&mut edges, 0.3, &mut Vec::new());
+        let sigma = remove_outliers(&mut edges, 0.3, &mut Vec::new());
         assert!(sigma < 0.1);
         assert!(edges.iter().all(Option::is_some));
     }
@@ -89,7 +93,7 @@ mod tests {
         if let Some(edge) = &mut edges[12] {
             edge.at += 4.0;
         }
-        sort_out(&mut edges, 0.3, &mut Vec::new());
+        remove_outliers(&mut edges, 0.3, &mut Vec::new());
         assert!(edges[12].is_none());
         assert_eq!(edges.iter().flatten().count(), 29);
     }

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::edge_windows::Sheet;
+use super::edge_windows::EdgeWindows;
 use super::phase::split;
 use crate::numeric::rank;
 
@@ -21,38 +21,38 @@ mod step;
 mod step_fit;
 
 pub use flank_skew::EdgeSkew;
-pub use look::{Distances, Look};
-pub use shape::{Shading, Shape};
-pub use step::{Extent, Step};
+pub use look::{SideRange, StepFit};
+pub use shape::{SideShading, StepShape};
+pub use step::{BlurredStep, Extent};
 
 /// Rows that are laid over each other at most.
-const ROWS: usize = 100;
+const MAX_ROWS: usize = 100;
 /// Farthest sample from the edge on either side \[px\].
-pub const REACH: usize = 48;
-const SPAN: usize = 2 * REACH;
+pub const HALF_SPAN: usize = 48;
+const SPAN: usize = 2 * HALF_SPAN;
 /// Rows are laid down at the nearest of so many places between pixels.
 const PHASES: usize = 2;
 /// Samples this near the edge tell whether a row is like the others \[px\].
-const CORE: usize = 12;
-const JUDGED: Range<usize> = REACH - CORE..REACH + CORE;
+const CORE_HALF: usize = 12;
+const JUDGED_SAMPLES: Range<usize> = HALF_SPAN - CORE_HALF..HALF_SPAN + CORE_HALF;
 /// A row that differs from the mean by so many times what rows do in the
 /// median is left out; the second time, when the mean is a better one.
-const UNLIKE: [f32; 2] = [2.0, 1.7];
+const MAX_ROW_MISFIT: [f32; 2] = [2.0, 1.7];
 /// Share of the rows that are most alike, from which a mean is made where many
 /// may be covered, and how often anew.
-const ALIKE: f32 = 0.3;
-const SETTLES: usize = 5;
+const BEST_FRACTION: f32 = 0.3;
+const MAX_SETTLE_ROUNDS: usize = 5;
 /// What makes a row that is cut off at the end of the scale unlike the others, in
 /// such medians.
-const VERY_UNLIKE: f32 = 3.5;
+const MAX_CLIPPED_MISFIT: f32 = 3.5;
 /// Blur that the place's rounding to half a pixel adds \[px²\].
-const ROUNDING: f64 = 1.0 / 48.0;
+const ROUNDING_VARIANCE_PX2: f64 = 1.0 / 48.0;
 
 /// How a window was laid down: at which phase, how far the path lies ahead of
 /// its pixel \[px\], of how many rows it is, and the level before the edge and
 /// the step that were expected \[grey levels\].
 #[derive(Debug, Clone, Copy)]
-struct Laid {
+struct LaidRow {
     number: usize,
     phase: usize,
     ahead: f32,
@@ -65,21 +65,21 @@ struct Laid {
 #[derive(Debug, Clone)]
 pub struct Overlay {
     rows: Vec<[f32; SPAN]>,
-    phases: Vec<Laid>,
-    unlike: Vec<f32>,
+    laid: Vec<LaidRow>,
+    row_misfits: Vec<f32>,
     sorted: Vec<f32>,
     mean: [[f32; SPAN]; PHASES],
     counts: [f32; PHASES],
     /// Mean distance of the path from the pixels' places in each phase \[px\].
     shifts: [f32; PHASES],
     /// How unlike the mean a row is in the median.
-    typical: f32,
+    median_misfit: f32,
 }
 
 /// Mean of rows of one part along the bead, all at nearly the same place
 /// between pixels.
 #[derive(Debug, Clone)]
-pub struct Profile {
+pub struct MeanProfilePart {
     /// Samples \[grey levels\].
     pub mean: [f32; SPAN],
     /// Number of rows.
@@ -93,12 +93,12 @@ pub struct Profile {
     pub levels: [f64; 2],
 }
 
-impl Profile {
+impl MeanProfilePart {
     const EMPTY: Self =
         Self { mean: [0.0; SPAN], rows: 0.0, shift: 0.0, spread: 0.0, levels: [0.0; 2] };
 
-    fn add(&mut self, row: &[f32; SPAN], laid: &Laid) {
-        let Laid { ahead, rows, before, step, .. } = *laid;
+    fn add(&mut self, row: &[f32; SPAN], laid: &LaidRow) {
+        let LaidRow { ahead, rows, before, step, .. } = *laid;
         for (sum, sample) in self.mean.iter_mut().zip(row) {
             *sum += rows * (before + step * sample);
         }
@@ -131,13 +131,13 @@ impl Default for Overlay {
     fn default() -> Self {
         Self {
             rows: Vec::new(),
-            phases: Vec::new(),
-            unlike: Vec::new(),
+            laid: Vec::new(),
+            row_misfits: Vec::new(),
             sorted: Vec::new(),
             mean: [[0.0; SPAN]; PHASES],
             counts: [0.0; PHASES],
             shifts: [0.0; PHASES],
-            typical: f32::INFINITY,
+            median_misfit: f32::INFINITY,
         }
     }
 }
@@ -145,53 +145,53 @@ impl Default for Overlay {
 impl Overlay {
     /// Lays down windows where the edge is expected.
     #[inline(always)]
-    pub fn lay(&mut self, sheet: &Sheet) {
+    pub fn lay(&mut self, sheet: &EdgeWindows) {
         self.lay_down(sheet);
-        self.average(f32::INFINITY, JUDGED);
-        let [first, last] = UNLIKE;
-        self.typical = self.judge(0.5);
-        let limit = first * self.typical;
-        if self.unlike.iter().any(|&unlike| unlike > limit) {
-            self.average(limit, JUDGED);
-            self.typical = self.judge(0.5);
+        self.average(f32::INFINITY, JUDGED_SAMPLES);
+        let [first, last] = MAX_ROW_MISFIT;
+        self.median_misfit = self.compute_row_misfits(0.5);
+        let limit = first * self.median_misfit;
+        if self.row_misfits.iter().any(|&unlike| unlike > limit) {
+            self.average(limit, JUDGED_SAMPLES);
+            self.median_misfit = self.compute_row_misfits(0.5);
         }
-        self.average(last * self.typical, 0..SPAN);
+        self.average(last * self.median_misfit, 0..SPAN);
     }
 
     /// Lays down windows of which many may be covered: starts from
     /// those that are said to be clear and goes on with those that are most
     /// like the mean, over and over.
     #[inline(always)]
-    pub fn settle(&mut self, sheet: &Sheet, clear: impl Fn(usize) -> bool) {
+    pub fn lay_robustly(&mut self, sheet: &EdgeWindows, clear: impl Fn(usize) -> bool) {
         self.lay_clear(sheet, clear);
-        for _ in 0..SETTLES {
-            let limit = self.judge(ALIKE);
+        for _ in 0..MAX_SETTLE_ROUNDS {
+            let limit = self.compute_row_misfits(BEST_FRACTION);
             self.average(limit, 0..SPAN);
         }
     }
 
     /// Lays down the windows that are clear, and no others.
     #[inline(always)]
-    pub fn lay_clear(&mut self, sheet: &Sheet, clear: impl Fn(usize) -> bool) {
+    pub fn lay_clear(&mut self, sheet: &EdgeWindows, clear: impl Fn(usize) -> bool) {
         self.lay_down(sheet);
-        for (laid, unlike) in self.phases.iter().zip(&mut self.unlike) {
+        for (laid, unlike) in self.laid.iter().zip(&mut self.row_misfits) {
             *unlike = if clear(laid.number) { 0.0 } else { f32::INFINITY };
         }
         self.average(f32::MAX, 0..SPAN);
     }
 
     #[inline(always)]
-    fn lay_down(&mut self, sheet: &Sheet) {
+    fn lay_down(&mut self, sheet: &EdgeWindows) {
         let windows = sheet.windows();
-        let count = windows.len().min(ROWS);
+        let count = windows.len().min(MAX_ROWS);
         self.rows.clear();
-        self.phases.clear();
+        self.laid.clear();
         for k in 0..count {
             let number = (2 * k + 1) * windows.len() / (2 * count);
             let window = &windows[number];
             let [at, before, step] = window.expected;
             let (place, phase) = split(at, PHASES);
-            let start = place - window.first - REACH.cast_signed();
+            let start = place - window.first - HALF_SPAN.cast_signed();
             let pixels = usize::try_from(start).ok().and_then(|start| {
                 sheet.pixels(number).get(start..start + SPAN)?.first_chunk::<SPAN>()
             });
@@ -204,10 +204,10 @@ impl Overlay {
                 *sample = pixel * scale - shift;
             }
             self.rows.push(row);
-            self.phases.push(Laid { number, phase, ahead, rows: window.rows, before, step });
+            self.laid.push(LaidRow { number, phase, ahead, rows: window.rows, before, step });
         }
-        self.unlike.clear();
-        self.unlike.resize(self.rows.len(), 0.0);
+        self.row_misfits.clear();
+        self.row_misfits.resize(self.rows.len(), 0.0);
     }
 
     /// Means of the rows that are not unlike the others, in some columns.
@@ -216,11 +216,11 @@ impl Overlay {
         self.mean = [[0.0; SPAN]; PHASES];
         self.counts = [0.0; PHASES];
         self.shifts = [0.0; PHASES];
-        for ((row, laid), &unlike) in self.rows.iter().zip(&self.phases).zip(&self.unlike) {
+        for ((row, laid), &unlike) in self.rows.iter().zip(&self.laid).zip(&self.row_misfits) {
             if unlike > limit {
                 continue;
             }
-            let Laid { phase, ahead, rows, .. } = *laid;
+            let LaidRow { phase, ahead, rows, .. } = *laid;
             self.counts[phase] += rows;
             self.shifts[phase] += rows * ahead;
             let sums = self.mean[phase][columns.clone()].iter_mut();
@@ -240,11 +240,13 @@ impl Overlay {
     /// How far each row lies from the mean about the edge; returns how far a
     /// share of them does at most.
     #[inline(always)]
-    fn judge(&mut self, share: f32) -> f32 {
-        for ((row, laid), unlike) in self.rows.iter().zip(&self.phases).zip(&mut self.unlike) {
+    fn compute_row_misfits(&mut self, share: f32) -> f32 {
+        for ((row, laid), unlike) in self.rows.iter().zip(&self.laid).zip(&mut self.row_misfits) {
             let mean = &self.mean[laid.phase];
             let mut lanes = [0.0f32; 8];
-            for (a, b) in row[JUDGED].chunks_exact(8).zip(mean[JUDGED].chunks_exact(8)) {
+            for (a, b) in
+                row[JUDGED_SAMPLES].chunks_exact(8).zip(mean[JUDGED_SAMPLES].chunks_exact(8))
+            {
                 for k in 0..8 {
                     let miss = a[k] - b[k];
                     lanes[k] += miss * miss;
@@ -253,7 +255,7 @@ impl Overlay {
             *unlike = lanes.iter().sum();
         }
         self.sorted.clear();
-        self.sorted.extend_from_slice(&self.unlike);
+        self.sorted.extend_from_slice(&self.row_misfits);
         let rank = rank_of(self.sorted.len(), share);
         rank::at(&mut self.sorted, rank).unwrap_or(f32::INFINITY)
     }
@@ -262,12 +264,12 @@ impl Overlay {
     /// rows that are very unlike the others are left out: of pixels that are cut
     /// off above, more lie far below their mean than above it, and leaving them
     /// out would lift it.
-    pub fn profiles(&self, parts: usize, profiles: &mut Vec<Profile>) {
+    pub fn profiles(&self, parts: usize, profiles: &mut Vec<MeanProfilePart>) {
         profiles.clear();
-        profiles.resize(parts * PHASES, Profile::EMPTY);
+        profiles.resize(parts * PHASES, MeanProfilePart::EMPTY);
         let count = self.rows.len();
-        for (k, (row, laid)) in self.rows.iter().zip(&self.phases).enumerate() {
-            if self.unlike[k] <= VERY_UNLIKE * self.typical {
+        for (k, (row, laid)) in self.rows.iter().zip(&self.laid).enumerate() {
+            if self.row_misfits[k] <= MAX_CLIPPED_MISFIT * self.median_misfit {
                 profiles[k * parts / count * PHASES + laid.phase].add(row, laid);
             }
         }
@@ -286,30 +288,30 @@ impl Overlay {
     pub fn laid(&self) -> (f64, f64) {
         #[expect(clippy::cast_precision_loss, reason = "there are few windows")]
         let windows = self.rows.len() as f64;
-        (self.phases.iter().map(|laid| f64::from(laid.rows)).sum(), windows)
+        (self.laid.iter().map(|laid| f64::from(laid.rows)).sum(), windows)
     }
 
     /// Variance of a window's samples about the mean near the edge, of the window
     /// in the median, in squared shares of the step.
-    pub fn unlikeness(&self) -> f64 {
+    pub fn row_variance(&self) -> f64 {
         #[expect(clippy::cast_precision_loss, reason = "a small number")]
-        let samples = (2 * CORE) as f64;
-        f64::from(self.typical) / samples
+        let samples = (2 * CORE_HALF) as f64;
+        f64::from(self.median_misfit) / samples
     }
 
     /// The windows that differ by no more than so many medians of what rows do,
     /// each with the mean that it is compared with.
-    pub fn rows_like_others(&self, many: f32) -> impl Iterator<Item = (&[f32], &[f32])> {
-        let rows = self.rows.iter().zip(&self.phases).zip(&self.unlike);
-        rows.filter(move |(_, unlike)| **unlike <= many * self.typical)
+    pub fn typical_rows(&self, many: f32) -> impl Iterator<Item = (&[f32], &[f32])> {
+        let rows = self.rows.iter().zip(&self.laid).zip(&self.row_misfits);
+        rows.filter(move |(_, unlike)| **unlike <= many * self.median_misfit)
             .map(|((row, laid), _)| (row.as_slice(), self.mean[laid.phase].as_slice()))
     }
 
     /// The means of the phases that have rows.
     #[inline(always)]
-    fn means(&self) -> impl Iterator<Item = Mean<'_>> {
+    fn means(&self) -> impl Iterator<Item = PhaseMean<'_>> {
         let means = self.mean.iter().zip(self.shifts).zip(self.counts);
-        means.filter(|(_, count)| *count > 0.0).map(|((samples, shift), count)| Mean {
+        means.filter(|(_, count)| *count > 0.0).map(|((samples, shift), count)| PhaseMean {
             samples,
             shift: shift.into(),
             weight: count.into(),
@@ -318,7 +320,7 @@ impl Overlay {
 }
 
 /// Mean of the rows of a phase.
-struct Mean<'a> {
+struct PhaseMean<'a> {
     samples: &'a [f32; SPAN],
     /// Mean distance of the path from the middle sample \[px\].
     shift: f64,
@@ -326,7 +328,7 @@ struct Mean<'a> {
     weight: f64,
 }
 
-impl Mean<'_> {
+impl PhaseMean<'_> {
     /// Each sample's distance from the path and its value, from a distance to
     /// another \[px\].
     #[inline(always)]
@@ -362,7 +364,7 @@ fn rank_of(count: usize, share: f32) -> usize {
 
 #[expect(clippy::cast_precision_loss, reason = "the window is short")]
 fn place(index: usize) -> f64 {
-    index as f64 - REACH as f64
+    index as f64 - HALF_SPAN as f64
 }
 
 /// Number of the sample at a whole distance, within the window.
@@ -373,7 +375,7 @@ fn place(index: usize) -> f64 {
     reason = "clamped to the window"
 )]
 fn index(distance: f64) -> usize {
-    (distance + REACH as f64).clamp(0.0, SPAN as f64) as usize
+    (distance + HALF_SPAN as f64).clamp(0.0, SPAN as f64) as usize
 }
 
 #[cfg(test)]

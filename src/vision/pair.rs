@@ -3,28 +3,28 @@
 //! lies between them. A seam or a rib within the bead is no edge while it is clearly
 //! weaker than the edges; where it is not, two pairs fit.
 
-use super::contour::{Contour, Contours};
+use super::contour::{EdgeContour, EdgeContours};
 use super::gauge::WidthRangePx;
 use crate::numeric::rank;
 
 /// Depth of a gap between two edges, as a share of the weaker one, that shows them
 /// to belong to two beads: it is deeper than the bead is high over the ground.
-const GAP_SHARE: f32 = 1.1;
+const MIN_GAP_RATIO: f32 = 1.1;
 /// The same up to which it is a seam within one bead. A seam of 60 % is no edge, and
 /// a little is left to noise.
-pub const SEAM_SHARE: f32 = 0.64;
+pub const MAX_SEAM_RATIO: f32 = 0.64;
 /// Strength of a pair within another one, as a share of the other's, from which on it
 /// fits as well: a rib of 81 % of the edges.
-pub const RIVAL_SHARE: f32 = 0.9;
+pub const MIN_RIVAL_RATIO: f32 = 0.9;
 /// Share of the width by which two pairs differ at least, and how many pixels are enough.
-const SAME_WIDTH: f32 = 0.03;
-const SAME_PX: f32 = 5.0;
+const SAME_WIDTH_FRACTION: f32 = 0.03;
+const SAME_WIDTH_PX: f32 = 5.0;
 /// Share of the bands in which a gap is seen, in that of the bead's edges.
-const WHOLE: f64 = 0.85;
+const MIN_GAP_BAND_RATIO: f64 = 0.85;
 
 /// The two edges of the bead among the contours, by their numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pair {
+pub struct EdgePair {
     /// Number of the left contour.
     pub left: usize,
     /// Number of the right one.
@@ -32,7 +32,7 @@ pub struct Pair {
     /// Geometric mean of the two steps \[grey levels\].
     pub step: f32,
     /// Smaller of the shares of bands in which they are seen.
-    pub share: f64,
+    pub band_fraction: f64,
     /// Step of the weaker edge, less where it is not seen all along \[grey levels\].
     pub strength: f32,
     /// How good the pair is, comparable between searches on the same frame.
@@ -47,56 +47,60 @@ pub struct Pair {
 
 /// The best pair of contours, or none.
 pub fn find(
-    lefts: &Contours,
-    rights: &Contours,
+    lefts: &EdgeContours,
+    rights: &EdgeContours,
     range: WidthRangePx,
     memory: &mut Vec<f32>,
-) -> Option<Pair> {
-    let mut best: Option<Pair> = None;
+) -> Option<EdgePair> {
+    let mut best: Option<EdgePair> = None;
     each(lefts, rights, range, memory, |pair| {
         if best.is_none_or(|best| best.score < pair.score) {
             let sides = (&lefts.all()[pair.left], &rights.all()[pair.right]);
             let gap = gap(lefts, rights, sides) / weaker(sides);
-            if gap < GAP_SHARE {
-                best = Some(Pair { gap, ..pair });
+            if gap < MIN_GAP_RATIO {
+                best = Some(EdgePair { gap, ..pair });
             }
         }
     });
     let best = best?;
-    let mut rival: Option<Pair> = None;
+    let mut rival: Option<EdgePair> = None;
     each(lefts, rights, range, memory, |pair| {
         let (inner, outer) =
             if pair.width_px < best.width_px { (pair, best) } else { (best, pair) };
-        let fits =
-            pair.strength >= RIVAL_SHARE * best.strength || outer == best && best.gap > SEAM_SHARE;
+        let fits = pair.strength >= MIN_RIVAL_RATIO * best.strength
+            || outer == best && best.gap > MAX_SEAM_RATIO;
         let better = rival.is_none_or(|rival| rival.score < pair.score);
         if fits && better && is_within(&inner, &outer, (lefts, rights)) {
             let sides = (&lefts.all()[outer.left], &rights.all()[outer.right]);
-            if outer == best || gap(lefts, rights, sides) < GAP_SHARE * weaker(sides) {
+            if outer == best || gap(lefts, rights, sides) < MIN_GAP_RATIO * weaker(sides) {
                 rival = Some(pair);
             }
         }
     });
-    Some(Pair { rival_px: rival.map(|rival| rival.width_px), ..best })
+    Some(EdgePair { rival_px: rival.map(|rival| rival.width_px), ..best })
 }
 
 /// Whether a pair is so much narrower than another that it is not the same.
 pub fn is_narrower(inner_px: f32, outer_px: f32) -> bool {
-    inner_px < outer_px - (SAME_WIDTH * outer_px).min(SAME_PX)
+    inner_px < outer_px - (SAME_WIDTH_FRACTION * outer_px).min(SAME_WIDTH_PX)
 }
 
 /// Step of the weaker one of two edges \[grey levels\].
-fn weaker((left, right): (&Contour, &Contour)) -> f32 {
+fn weaker((left, right): (&EdgeContour, &EdgeContour)) -> f32 {
     left.step.min(right.step)
 }
 
 /// Whether a pair has one edge in common with another pair, and ends within it at a
 /// seam or a rib, which has two lines of its own.
-fn is_within(inner: &Pair, outer: &Pair, (lefts, rights): (&Contours, &Contours)) -> bool {
+fn is_within(
+    inner: &EdgePair,
+    outer: &EdgePair,
+    (lefts, rights): (&EdgeContours, &EdgeContours),
+) -> bool {
     let (left, right) = (&lefts.all()[outer.left], &rights.all()[outer.right]);
-    let least = SEAM_SHARE * outer.step;
+    let least = MAX_SEAM_RATIO * outer.step;
     let within =
-        |line: &&Contour| line.step >= least && in_order(left, line) && in_order(line, right);
+        |line: &&EdgeContour| line.step >= least && in_order(left, line) && in_order(line, right);
     let narrower = is_narrower(inner.width_px, outer.width_px);
     let ends_within = inner.left == outer.left
         && within(&&rights.all()[inner.right])
@@ -109,11 +113,11 @@ fn is_within(inner: &Pair, outer: &Pair, (lefts, rights): (&Contours, &Contours)
 
 /// All pairs whose width is within the range.
 fn each(
-    lefts: &Contours,
-    rights: &Contours,
+    lefts: &EdgeContours,
+    rights: &EdgeContours,
     range: WidthRangePx,
     memory: &mut Vec<f32>,
-    mut visit: impl FnMut(Pair),
+    mut visit: impl FnMut(EdgePair),
 ) {
     for (left, edge) in lefts.all().iter().enumerate() {
         for (right, other) in rights.all().iter().enumerate() {
@@ -122,20 +126,30 @@ fn each(
                 continue;
             }
             let step = (edge.step * other.step).sqrt();
-            let share = edge.share.min(other.share);
+            let share = edge.band_fraction.min(other.band_fraction);
             #[expect(clippy::cast_possible_truncation, reason = "a share")]
-            let shares = (edge.share * other.share) as f32;
+            let shares = (edge.band_fraction * other.band_fraction) as f32;
             let strength = edge.step.min(other.step) * shares;
-            let score = strength / ((1.0 + edge.wobble) * (1.0 + other.wobble)).sqrt();
+            let score = strength / ((1.0 + edge.waviness_px) * (1.0 + other.waviness_px)).sqrt();
             let (gap, rival_px) = (0.0, None);
-            visit(Pair { left, right, step, share, strength, score, width_px, gap, rival_px });
+            visit(EdgePair {
+                left,
+                right,
+                step,
+                band_fraction: share,
+                strength,
+                score,
+                width_px,
+                gap,
+                rival_px,
+            });
         }
     }
 }
 
 /// Median distance from one contour to another to its right \[px\]; `None`
 /// where they do not run side by side or cross.
-fn distance(left: &Contour, right: &Contour, memory: &mut Vec<f32>) -> Option<f32> {
+fn distance(left: &EdgeContour, right: &EdgeContour, memory: &mut Vec<f32>) -> Option<f32> {
     memory.clear();
     let both = left.at.iter().zip(&right.at);
     memory.extend(both.filter_map(|(left, right)| Some((*right)? - (*left)?)));
@@ -147,14 +161,18 @@ fn distance(left: &Contour, right: &Contour, memory: &mut Vec<f32>) -> Option<f3
 
 /// Depth of the deepest gap between two edges: a contour out of the bead,
 /// followed by one back in, both about as whole as the edges are.
-fn gap(lefts: &Contours, rights: &Contours, (left, right): (&Contour, &Contour)) -> f32 {
-    let whole = WHOLE * left.share.min(right.share);
+fn gap(
+    lefts: &EdgeContours,
+    rights: &EdgeContours,
+    (left, right): (&EdgeContour, &EdgeContour),
+) -> f32 {
+    let whole = MIN_GAP_BAND_RATIO * left.band_fraction.min(right.band_fraction);
     let mut deepest: f32 = 0.0;
-    for out in rights.all().iter().filter(|out| out.share >= whole) {
+    for out in rights.all().iter().filter(|out| out.band_fraction >= whole) {
         if !in_order(left, out) || !in_order(out, right) {
             continue;
         }
-        for back in lefts.all().iter().filter(|back| back.share >= whole) {
+        for back in lefts.all().iter().filter(|back| back.band_fraction >= whole) {
             if in_order(out, back) && in_order(back, right) {
                 deepest = deepest.max(out.step.min(back.step));
             }
@@ -165,7 +183,7 @@ fn gap(lefts: &Contours, rights: &Contours, (left, right): (&Contour, &Contour))
 
 /// Whether one contour runs to the left of another wherever both are seen,
 /// which must be in most bands.
-fn in_order(left: &Contour, right: &Contour) -> bool {
+fn in_order(left: &EdgeContour, right: &EdgeContour) -> bool {
     let (mut both, mut ordered) = (0, 0);
     for (left, right) in left.at.iter().zip(&right.at) {
         if let (Some(left), Some(right)) = (left, right) {
@@ -179,10 +197,10 @@ fn in_order(left: &Contour, right: &Contour) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vision::edge::{Candidates, respond};
+    use crate::vision::edge::{StepCandidates, respond};
 
     /// Contours up and down of bright bars on dark ground.
-    fn bars(bars: &[(usize, usize, u16)]) -> (Contours, Contours) {
+    fn bars(bars: &[(usize, usize, u16)]) -> (EdgeContours, EdgeContours) {
         let mut profile = vec![160; 200];
         for &(from, to, height) in bars {
             for value in &mut profile[from..to] {
@@ -192,19 +210,19 @@ mod tests {
         contours(&profile)
     }
 
-    fn contours(profile: &[u16]) -> (Contours, Contours) {
+    fn contours(profile: &[u16]) -> (EdgeContours, EdgeContours) {
         let mut response = vec![0; 200];
         respond(profile, &mut response);
-        let mut steps = Candidates::default();
+        let mut steps = StepCandidates::default();
         steps.find(&response, 5.0, 0.0625);
         let bands = vec![steps; 20];
-        let (mut up, mut down) = (Contours::default(), Contours::default());
+        let (mut up, mut down) = (EdgeContours::default(), EdgeContours::default());
         up.search(&bands, true, 4.0, 0.4);
         down.search(&bands, false, 4.0, 0.4);
         (up, down)
     }
 
-    fn width(bars: &(Contours, Contours), range: WidthRangePx) -> Option<f32> {
+    fn width(bars: &(EdgeContours, EdgeContours), range: WidthRangePx) -> Option<f32> {
         let mut memory = Vec::new();
         let pair = find(&bars.0, &bars.1, range, &mut memory)?;
         distance(&bars.0.all()[pair.left], &bars.1.all()[pair.right], &mut memory)

@@ -3,19 +3,19 @@
 //! the bead runs, and what covers an edge here and there does not.
 
 /// Difference of the distances within which edges run side by side \[px\].
-const ALIKE_PX: f32 = 1.2;
+const SAME_DISTANCE_PX: f32 = 1.2;
 /// Bands that must agree.
-const LEAST: usize = 4;
+const MIN_BANDS: usize = 4;
 
 /// A step up and a step down in one band.
 #[derive(Debug, Clone, Copy)]
-struct Span {
+struct StepPair {
     band: usize,
     left: f32,
     right: f32,
 }
 
-impl Span {
+impl StepPair {
     fn width(&self) -> f32 {
         self.right - self.left
     }
@@ -23,15 +23,15 @@ impl Span {
 
 /// Places of two edges side by side; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
-pub struct Parallel {
-    spans: Vec<Span>,
+pub struct ParallelEdges {
+    spans: Vec<StepPair>,
     /// Spans of each band within the distances that are being looked at.
     within: Vec<u16>,
     lefts: Vec<f32>,
     rights: Vec<f32>,
 }
 
-impl Parallel {
+impl ParallelEdges {
     /// Finds the distance at which steps on the left and on the right lie in
     /// most bands, within a range \[px\], and the steps that do. Returns whether
     /// there are enough.
@@ -49,14 +49,14 @@ impl Parallel {
         self.spans.clear();
         for band in 0..bands {
             for left in lefts(band) {
-                let spans = rights(band).map(|right| Span { band, left, right });
+                let spans = rights(band).map(|right| StepPair { band, left, right });
                 self.spans.extend(spans.filter(|span| range.contains(&span.width())));
             }
         }
         self.spans.sort_unstable_by(|a, b| a.width().total_cmp(&b.width()));
         let (most, width) = self.most_alike(bands);
         self.pick(bands, width);
-        most >= LEAST
+        most >= MIN_BANDS
     }
 
     /// Places of the left edge, one a band \[px\]; NaN in bands that do not show
@@ -78,11 +78,11 @@ impl Parallel {
         let (mut first, mut count) = (0, 0);
         let mut best = (0, f32::NAN);
         for last in 0..self.spans.len() {
-            let Span { band, .. } = self.spans[last];
+            let StepPair { band, .. } = self.spans[last];
             count += usize::from(self.within[band] == 0);
             self.within[band] += 1;
-            while self.spans[last].width() - self.spans[first].width() > ALIKE_PX {
-                let Span { band, .. } = self.spans[first];
+            while self.spans[last].width() - self.spans[first].width() > SAME_DISTANCE_PX {
+                let StepPair { band, .. } = self.spans[first];
                 self.within[band] -= 1;
                 count -= usize::from(self.within[band] == 0);
                 first += 1;
@@ -106,7 +106,7 @@ impl Parallel {
         self.spans.sort_unstable_by_key(|span| span.band);
         for span in &self.spans {
             if span.band != band {
-                (band, nearest) = (span.band, ALIKE_PX);
+                (band, nearest) = (span.band, SAME_DISTANCE_PX);
             }
             let miss = (span.width() - width).abs();
             if miss < nearest {
@@ -140,7 +140,7 @@ mod tests {
             let true_one = (band % 4 != 3).then_some(140.5 + bend(band));
             std::iter::once(covered).chain(true_one)
         };
-        let mut parallel = Parallel::default();
+        let mut parallel = ParallelEdges::default();
         assert!(parallel.find(24, left, right, 80.0..140.0));
         for band in 0..24 {
             let (left, right) = (parallel.lefts()[band], parallel.rights()[band]);
@@ -155,7 +155,7 @@ mod tests {
     fn a_few_steps_at_any_distance_are_no_bead() {
         let left = |band: usize| (band < 3).then_some(10.0).into_iter();
         let right = |_| std::iter::once(60.0);
-        assert!(!Parallel::default().find(24, left, right, 40.0..60.0));
-        assert!(!Parallel::default().find(3, left, right, 70.0..80.0));
+        assert!(!ParallelEdges::default().find(24, left, right, 40.0..60.0));
+        assert!(!ParallelEdges::default().find(3, left, right, 70.0..80.0));
     }
 }

@@ -3,21 +3,21 @@
 
 use super::pool::Bands;
 use super::row_range::RowRange;
-use crate::numeric::number::{narrow, single};
+use crate::numeric::number::{narrow_to_f32, to_f32};
 use crate::numeric::rank;
 
 /// Bands on either side that a smoothed value is taken from.
 const NEIGHBOURS: usize = 3;
 
 /// By how much a bend must move the line through the neighbours to be one \[px\].
-const BENT_PX: f32 = 0.1;
+const MIN_BEND_PX: f32 = 0.1;
 
 /// Neighbours by whose median wild values are told.
-const WILD_WINDOW: usize = 9;
+const OUTLIER_WINDOW: usize = 9;
 /// Distance from it that makes a value wild \[px\], and in typical distances
 /// beside.
-const WILD_PX: f32 = 1.2;
-const WILD_TIMES: f32 = 4.0;
+const MIN_OUTLIER_PX: f32 = 1.2;
+const OUTLIER_RATIO: f32 = 4.0;
 
 /// Fills gaps from their neighbours, in a straight line; `false` where there
 /// is nothing at all.
@@ -29,9 +29,9 @@ pub fn fill(rough: impl Iterator<Item = Option<f32>>, out: &mut Vec<f32>) -> boo
         let Some(value) = value else { continue };
         let from = last.map_or(value, |last| out[last]);
         let first = last.map_or(0, |last| last + 1);
-        let gap = single((band - last.unwrap_or(0)).max(1));
+        let gap = to_f32((band - last.unwrap_or(0)).max(1));
         for (between, place) in (first..band).enumerate() {
-            let share = if last.is_some() { single(between + 1) / gap } else { 0.0 };
+            let share = if last.is_some() { to_f32(between + 1) / gap } else { 0.0 };
             out[place] = from + share * (value - from);
         }
         last = Some(band);
@@ -45,25 +45,25 @@ pub fn fill(rough: impl Iterator<Item = Option<f32>>, out: &mut Vec<f32>) -> boo
 /// Takes out values that lie far off the median of their neighbours: where a
 /// grain covers the edge for a few bands, its contour is not the edge's.
 /// `memory` is scratch.
-pub fn take_out_wild(values: &mut [f32], memory: &mut Vec<f32>) {
+pub fn remove_outliers(values: &mut [f32], memory: &mut Vec<f32>) {
     let count = values.len();
-    if count < WILD_WINDOW || runs_smoothly(values) {
+    if count < OUTLIER_WINDOW || runs_smoothly(values) {
         return;
     }
     memory.clear();
     for band in 0..count {
-        let from = band.saturating_sub(WILD_WINDOW / 2).min(count - WILD_WINDOW);
-        let mut window = [0.0; WILD_WINDOW];
-        window.copy_from_slice(&values[from..from + WILD_WINDOW]);
+        let from = band.saturating_sub(OUTLIER_WINDOW / 2).min(count - OUTLIER_WINDOW);
+        let mut window = [0.0; OUTLIER_WINDOW];
+        window.copy_from_slice(&values[from..from + OUTLIER_WINDOW]);
         // Off the line through the window: along a slanted edge the median itself is
         // the value in the middle, however far that is off.
         let slope = (middle_of(&window[6..]) - middle_of(&window[..3])) / 6.0;
         for (k, value) in window.iter_mut().enumerate() {
-            *value -= slope * single(k);
+            *value -= slope * to_f32(k);
         }
         let here = window[band - from];
         window.sort_unstable_by(f32::total_cmp);
-        memory.push(here - window[WILD_WINDOW / 2]);
+        memory.push(here - window[OUTLIER_WINDOW / 2]);
     }
     let offs = memory.len();
     memory.extend_from_within(..);
@@ -72,7 +72,7 @@ pub fn take_out_wild(values: &mut [f32], memory: &mut Vec<f32>) {
     }
     let Some(typical) = rank::median(&mut memory[offs..]) else { return };
     for (value, off) in values.iter_mut().zip(&memory[..offs]) {
-        if off.abs() > WILD_PX + WILD_TIMES * typical {
+        if off.abs() > MIN_OUTLIER_PX + OUTLIER_RATIO * typical {
             *value = f32::NAN;
         }
     }
@@ -81,7 +81,7 @@ pub fn take_out_wild(values: &mut [f32], memory: &mut Vec<f32>) {
 /// Whether no value lies off the line between its neighbours far enough for a
 /// wild one.
 fn runs_smoothly(values: &[f32]) -> bool {
-    values.windows(3).all(|near| (near[1] - 0.5 * (near[0] + near[2])).abs() < 0.5 * WILD_PX)
+    values.windows(3).all(|near| (near[1] - 0.5 * (near[0] + near[2])).abs() < 0.5 * MIN_OUTLIER_PX)
 }
 
 /// The middle one of the first three values.
@@ -109,15 +109,15 @@ pub fn smooth(values: &[f32], out: &mut Vec<f32>) {
     for band in 0..count {
         let from = band.saturating_sub(NEIGHBOURS).min(count - window);
         let (mut mean, mut slope) = (0.0, 0.0);
-        let middle = single(window - 1) / 2.0;
+        let middle = to_f32(window - 1) / 2.0;
         let mut spread = 0.0;
         for (k, value) in values[from..from + window].iter().enumerate() {
-            let away = single(k) - middle;
+            let away = to_f32(k) - middle;
             mean += value;
             slope += away * value;
             spread += away * away;
         }
-        let (count, away) = (single(window), single(band - from) - middle);
+        let (count, away) = (to_f32(window), to_f32(band - from) - middle);
         out.push(mean / count + if spread > 0.0 { slope / spread * away } else { 0.0 });
     }
 }
@@ -126,9 +126,9 @@ pub fn smooth(values: &[f32], out: &mut Vec<f32>) {
 /// notable: the line through the neighbours of a bent edge runs inside it. The values
 /// are scratch afterwards.
 pub fn smooth_bent(values: &mut [f32], out: &mut Vec<f32>) {
-    let middle = 0.5 * (single(values.len()) - 1.0);
-    let square = |band: usize| (single(band) - middle) * (single(band) - middle);
-    let mean = (0..values.len()).map(square).sum::<f32>() / single(values.len()).max(1.0);
+    let middle = 0.5 * (to_f32(values.len()) - 1.0);
+    let square = |band: usize| (to_f32(band) - middle) * (to_f32(band) - middle);
+    let mean = (0..values.len()).map(square).sum::<f32>() / to_f32(values.len()).max(1.0);
     let (mut sum, mut norm) = (0.0, 0.0);
     for (band, value) in values.iter().enumerate() {
         let bent = square(band) - mean;
@@ -137,8 +137,8 @@ pub fn smooth_bent(values: &mut [f32], out: &mut Vec<f32>) {
     }
     let bend = if norm > 0.0 { sum / norm } else { 0.0 };
     // The bend times the mean square of the distances is what the line is off.
-    let off = bend * single(NEIGHBOURS * (NEIGHBOURS + 1)) / 3.0;
-    if off.abs() < BENT_PX {
+    let off = bend * to_f32(NEIGHBOURS * (NEIGHBOURS + 1)) / 3.0;
+    if off.abs() < MIN_BEND_PX {
         return smooth(values, out);
     }
     for (band, value) in values.iter_mut().enumerate() {
@@ -153,17 +153,17 @@ pub fn smooth_bent(values: &mut [f32], out: &mut Vec<f32>) {
 /// What is expected of an edge along the gauge: place, level before it and
 /// step, on lines between the middles of the bands.
 #[derive(Debug, Clone, Default)]
-pub struct Course {
+pub struct EdgeTrajectory {
     middles: Vec<f32>,
     values: Vec<[f32; 3]>,
-    segments: Vec<Segment>,
+    segments: Vec<TrajectorySegment>,
     /// Bands for each pixel along the bead.
     per_px: f32,
 }
 
 /// By how much an edge is other than it was expected.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Correction {
+pub struct EdgeCorrection {
     /// How far it lies aside \[px\].
     pub aside: f32,
     /// Its level before the step, beyond the one that was expected, as a fraction of the
@@ -175,7 +175,7 @@ pub struct Correction {
 
 /// The course from the middle of a band to that of the next.
 #[derive(Debug, Clone, Copy)]
-struct Segment {
+struct TrajectorySegment {
     /// Where it begins and how long it is \[px\].
     middle: f32,
     length: f32,
@@ -185,7 +185,7 @@ struct Segment {
     slopes: [f32; 3],
 }
 
-impl Segment {
+impl TrajectorySegment {
     fn between(middles: [f32; 2], values: [[f32; 3]; 2]) -> Self {
         let length = middles[1] - middles[0];
         let slope = |k: usize| (values[1][k] - values[0][k]) / length;
@@ -198,18 +198,18 @@ impl Segment {
     }
 }
 
-impl Course {
+impl EdgeTrajectory {
     /// Draws the lines between the bands.
     pub fn draw(&mut self, bands: &Bands, at: &[f32], before: &[f32], step: &[f32]) {
         self.middles.clear();
-        self.middles.extend((0..bands.count()).map(|band| narrow(bands.middle(band))));
+        self.middles.extend((0..bands.count()).map(|band| narrow_to_f32(bands.middle(band))));
         self.values.clear();
         self.values.extend((0..at.len()).map(|band| [at[band], before[band], step[band]]));
         self.link();
     }
 
     /// Moves all of it aside and takes other levels.
-    pub fn adopt(&mut self, Correction { aside, before, after }: Correction) {
+    pub fn correct(&mut self, EdgeCorrection { aside, before, after }: EdgeCorrection) {
         for [at, level, step] in &mut self.values {
             *at += aside;
             *level += before * *step;
@@ -223,12 +223,12 @@ impl Course {
     pub fn redraw(&mut self, lines: &[RowRange], at: &[f32], memory: &mut Vec<[f32; 3]>) {
         memory.clear();
         memory.extend(lines.iter().zip(at).map(|(&line, &at)| {
-            let [_, before, step] = self.at(narrow(line.middle()));
+            let [_, before, step] = self.at(narrow_to_f32(line.middle()));
             [at, before, step]
         }));
         std::mem::swap(&mut self.values, memory);
         self.middles.clear();
-        self.middles.extend(lines.iter().map(|&line| narrow(line.middle())));
+        self.middles.extend(lines.iter().map(|&line| narrow_to_f32(line.middle())));
         self.link();
     }
 
@@ -244,11 +244,11 @@ impl Course {
     /// Draws the lines between the middles.
     fn link(&mut self) {
         let last = self.middles.len() - 1;
-        self.per_px = single(last) / (self.middles[last] - self.middles[0]).max(1.0);
+        self.per_px = to_f32(last) / (self.middles[last] - self.middles[0]).max(1.0);
         let neighbours = self.middles.windows(2).zip(self.values.windows(2));
         self.segments.clear();
         self.segments.extend(neighbours.map(|(middles, values)| {
-            Segment::between([middles[0], middles[1]], [values[0], values[1]])
+            TrajectorySegment::between([middles[0], middles[1]], [values[0], values[1]])
         }));
     }
 
@@ -264,7 +264,7 @@ impl Course {
         } else if v >= self.middles[band + 1] && band < last {
             band += 1;
         }
-        let Segment { middle, length, values, slopes } = self.segments[band];
+        let TrajectorySegment { middle, length, values, slopes } = self.segments[band];
         let ahead = v - middle;
         let within = ahead.clamp(0.0, length);
         [
@@ -312,15 +312,19 @@ mod tests {
         );
         let frame = frame.unwrap();
         let roi = crate::core::geometry::Roi { x: 0, y: 0, width: 20, height: 43 };
-        let view = crate::vision::strip::View::new(roi, crate::vision::gauge::Axis::Vertical);
-        let mut turner = crate::vision::strip::Turner::default();
-        let crate::vision::strip::Strips::Bytes(strip) = turner.strips(&frame, &view, None) else {
+        let view =
+            crate::vision::strip::GaugeView::new(roi, crate::vision::gauge::BeadAxis::Vertical);
+        let mut turner = crate::vision::strip::RowLayout::default();
+        let crate::vision::strip::GaugeRowsOfDepth::Bytes(strip) =
+            turner.strips(&frame, &view, None)
+        else {
             unreachable!()
         };
         let mut bands = Bands::default();
         bands.pool(&strip, 8);
-        let at: Vec<f32> = (0..8).map(|band| 3.0 + 0.5 * narrow(bands.middle(band))).collect();
-        let mut course = Course::default();
+        let at: Vec<f32> =
+            (0..8).map(|band| 3.0 + 0.5 * narrow_to_f32(bands.middle(band))).collect();
+        let mut course = EdgeTrajectory::default();
         course.draw(&bands, &at, &[40.0; 8], &[80.0; 8]);
         for v in 0..43u8 {
             let [place, before, step] = course.at(f32::from(v));
@@ -335,17 +339,17 @@ mod tests {
         let rough =
             |k: u8| 5.4 * f32::from(k) + [0.0, 1.4, 2.3, 0.9, -1.2, -2.0][usize::from(k % 6)];
         let mut values: Vec<f32> = (0..25).map(rough).collect();
-        take_out_wild(&mut values, &mut Vec::new());
+        remove_outliers(&mut values, &mut Vec::new());
         assert!(values.iter().all(|value| value.is_finite()), "{values:?}");
         values[3] += 25.0;
-        take_out_wild(&mut values, &mut Vec::new());
+        remove_outliers(&mut values, &mut Vec::new());
         let gone: Vec<usize> = (0..25).filter(|&k| values[k].is_nan()).collect();
         assert_eq!(gone, [3]);
     }
 
     #[test]
     fn a_bent_edge_is_smoothed_where_it_is() {
-        let at = |k: usize| 200.0 + 3.0 * single(k) - 0.2 * single(k) * single(k);
+        let at = |k: usize| 200.0 + 3.0 * to_f32(k) - 0.2 * to_f32(k) * to_f32(k);
         let mut bent: Vec<f32> = (0..25).map(at).collect();
         let mut out = Vec::new();
         smooth_bent(&mut bent, &mut out);

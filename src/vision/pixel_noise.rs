@@ -3,23 +3,23 @@
 
 use std::ops::Range;
 
-use super::strip::{Grey, Strip};
+use super::strip::{GaugeRows, GreyPixel};
 
 /// Rows that are looked at, and neighbouring pixels in each.
-const ROWS: usize = 32;
-const RUN: usize = 32;
+const SAMPLED_ROWS: usize = 32;
+const SAMPLED_COLUMNS: usize = 32;
 /// Distance of the neighbours along the bead \[px\].
-const APART: usize = 1;
+const ROW_DISTANCE: usize = 1;
 /// Differences beyond so many medians are edges and grains.
-const FEW_MEDIANS: f32 = 4.5;
+const MAX_MEDIANS: f32 = 4.5;
 /// Share of the variance of a normal number that lies within as many medians
 /// of its size (4.5 · 0.6745 standard deviations).
-const KEPT_VARIANCE: f32 = 0.976;
+const KEPT_VARIANCE_FRACTION: f32 = 0.976;
 /// Rounding to whole levels is noise too.
-const LEAST: f32 = 0.2887;
+const MIN_NOISE_STEPS: f32 = 0.2887;
 
 /// Noise up to which it is not told from rounding, as a multiple of that.
-const HARDLY: f32 = 1.2;
+const MAX_ROUNDING_RATIO: f32 = 1.2;
 
 /// Noise of pixels.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -28,36 +28,37 @@ pub struct PixelNoise {
     pub grey: f32,
     /// Whether it is hardly more than rounding: a compression or the camera took it away,
     /// and what it left in its place is not that of neighbours.
-    pub is_taken_away: bool,
+    pub is_suppressed: bool,
 }
 
 impl PixelNoise {
     /// That of the pixels in some columns.
     #[inline(always)]
-    pub fn read<T: Grey>(strip: &Strip<'_, T>, columns: Range<usize>) -> Self {
+    pub fn read<T: GreyPixel>(strip: &GaugeRows<'_, T>, columns: Range<usize>) -> Self {
         let grey = of(strip, columns);
-        Self { grey, is_taken_away: grey < HARDLY * LEAST * strip.level_step }
+        Self { grey, is_suppressed: grey < MAX_ROUNDING_RATIO * MIN_NOISE_STEPS * strip.level_step }
     }
 }
 
 /// Standard deviation of a pixel in some columns \[grey levels of 256\].
 #[inline(always)]
-pub fn of<T: Grey>(strip: &Strip<'_, T>, columns: Range<usize>) -> f32 {
-    let room = strip.along.saturating_sub(APART);
-    let (rows, run) = (room.min(ROWS), columns.len().min(RUN));
+pub fn of<T: GreyPixel>(strip: &GaugeRows<'_, T>, columns: Range<usize>) -> f32 {
+    let room = strip.along.saturating_sub(ROW_DISTANCE);
+    let (rows, run) = (room.min(SAMPLED_ROWS), columns.len().min(SAMPLED_COLUMNS));
     let slots = columns.len() - run;
-    let mut differences = [u16::MAX; ROWS * RUN];
+    let mut differences = [u16::MAX; SAMPLED_ROWS * SAMPLED_COLUMNS];
     for k in 0..rows {
         let v = (2 * k + 1) * room / (2 * rows);
         // Another place in each row: 13 has no divisor in common with ROWS.
-        let first = columns.start + 13 * k % ROWS * slots / ROWS;
-        let (row, other) = (strip.row(v), strip.row(v + APART));
+        let first = columns.start + 13 * k % SAMPLED_ROWS * slots / SAMPLED_ROWS;
+        let (row, other) = (strip.row(v), strip.row(v + ROW_DISTANCE));
         let pixels = row[first..first + run].iter().zip(&other[first..first + run]);
-        for (difference, (here, there)) in differences[k * RUN..].iter_mut().zip(pixels) {
+        for (difference, (here, there)) in differences[k * SAMPLED_COLUMNS..].iter_mut().zip(pixels)
+        {
             *difference = here.away_from(*there);
         }
     }
-    let least = LEAST * strip.level_step;
+    let least = MIN_NOISE_STEPS * strip.level_step;
     if rows * run == 0 {
         least
     } else {
@@ -69,7 +70,7 @@ pub fn of<T: Grey>(strip: &Strip<'_, T>, columns: Range<usize>) -> f32 {
 /// noise's count; the rest of the list is larger than any. The scale ends at
 /// `white`.
 #[inline(always)]
-fn spread(differences: &[u16; ROWS * RUN], total: usize, white: u32) -> f32 {
+fn spread(differences: &[u16; SAMPLED_ROWS * SAMPLED_COLUMNS], total: usize, white: u32) -> f32 {
     let mut median = 0;
     for bit in (0..(u32::BITS - white.leading_zeros()).min(16)).rev() {
         let below = (1 << bit) + median;
@@ -78,7 +79,7 @@ fn spread(differences: &[u16; ROWS * RUN], total: usize, white: u32) -> f32 {
         }
     }
     // The median of rounded differences is coarse; the mean square is not.
-    let limit = FEW_MEDIANS * (f32::from(median) + 0.25);
+    let limit = MAX_MEDIANS * (f32::from(median) + 0.25);
     let (mut sums, mut counts) = ([0.0f32; 16], [0.0f32; 16]);
     for few in differences.chunks_exact(16) {
         for k in 0..16 {
@@ -89,14 +90,14 @@ fn spread(differences: &[u16; ROWS * RUN], total: usize, white: u32) -> f32 {
         }
     }
     let (sum, n) = (sums.iter().sum::<f32>(), counts.iter().sum::<f32>());
-    (sum / n.max(1.0) / (2.0 * KEPT_VARIANCE)).sqrt()
+    (sum / n.max(1.0) / (2.0 * KEPT_VARIANCE_FRACTION)).sqrt()
 }
 
 #[inline(always)]
-fn count_below(differences: &[u16; ROWS * RUN], limit: u16) -> usize {
-    let mut counts = [0u16; RUN];
-    for few in differences.chunks_exact(RUN) {
-        for k in 0..RUN {
+fn count_below(differences: &[u16; SAMPLED_ROWS * SAMPLED_COLUMNS], limit: u16) -> usize {
+    let mut counts = [0u16; SAMPLED_COLUMNS];
+    for few in differences.chunks_exact(SAMPLED_COLUMNS) {
+        for k in 0..SAMPLED_COLUMNS {
             counts[k] += u16::from(few[k] < limit);
         }
     }
@@ -109,8 +110,8 @@ mod tests {
     use crate::core::frame::{Frame, Pixels};
     use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
-    use crate::vision::gauge::Axis;
-    use crate::vision::strip::{Strips, Turner, View};
+    use crate::vision::gauge::BeadAxis;
+    use crate::vision::strip::{GaugeRowsOfDepth, GaugeView, RowLayout};
     use rand::SeedableRng;
     use rand_distr::{Distribution, Normal};
 
@@ -134,9 +135,12 @@ mod tests {
                 .collect();
             let frame =
                 Frame::new(0, Stamp::START, Size::new(300, 200), Pixels::Grey8(values)).unwrap();
-            let view = View::new(Roi { x: 0, y: 0, width: 300, height: 200 }, Axis::Vertical);
-            let mut turner = Turner::default();
-            let Strips::Bytes(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
+            let view =
+                GaugeView::new(Roi { x: 0, y: 0, width: 300, height: 200 }, BeadAxis::Vertical);
+            let mut turner = RowLayout::default();
+            let GaugeRowsOfDepth::Bytes(strip) = turner.strips(&frame, &view, None) else {
+                unreachable!()
+            };
             let found = f64::from(of(&strip, 0..300));
             let expected = (sigma * sigma + 1.0 / 12.0).sqrt();
             assert!((found / expected - 1.0).abs() < 0.08, "{sigma}: {found}");

@@ -4,22 +4,22 @@
 //! lines likewise.
 
 use super::row_range::RowRange;
-use super::strip::{Grey, Strip};
+use super::strip::{GaugeRows, GreyPixel};
 
 /// Rows that a profile is the mean of: fewer are too noisy to tell a step
 /// from its surroundings when the contrast is low, more would smear slanted
 /// edges.
-const ROWS: usize = 4;
+const ROWS_PER_PROFILE: usize = 4;
 
 /// Distance of such rows at most \[px\].
-const MOST_APART: usize = 2;
+const MAX_ROW_DISTANCE: usize = 2;
 
 /// Profiles at most: the pick needs no more, and reading whole rows is what
 /// takes its time.
-const MOST: usize = 25;
+const MAX_PROFILES: usize = 25;
 
 /// Bits that a profile's sums are cut to, so that four of them fit 15.
-const BITS: u32 = 12;
+const PROFILE_BITS: u32 = 12;
 
 /// Pooled profiles, one a band, in whole numbers of a unit that is fine enough
 /// for the first pick.
@@ -69,20 +69,20 @@ impl Bands {
 
     /// Share of the pixels at the upper end of the scale, from one row a band.
     #[expect(clippy::cast_precision_loss, reason = "a share needs no more")]
-    pub fn saturated_share(&self) -> f64 {
+    pub fn saturated_fraction(&self) -> f64 {
         self.full as f64 / self.pixels.max(1) as f64
     }
 
     /// Cuts the strip into bands, of which there are at most as many as caliper
     /// lines, and pools each.
     #[inline(always)]
-    pub fn pool<T: Grey>(&mut self, strip: &Strip<'_, T>, calipers: usize) {
+    pub fn pool<T: GreyPixel>(&mut self, strip: &GaugeRows<'_, T>, calipers: usize) {
         self.across = strip.across;
-        cut(strip.along, calipers.min(MOST), &mut self.bounds);
+        cut_into_ranges(strip.along, calipers.min(MAX_PROFILES), &mut self.bounds);
         let count = self.bounds.len();
         self.profiles.resize(count * strip.across, 0);
         let most = 4 * strip.white.level().max(1);
-        self.shift = (most.ilog2() + 1).saturating_sub(BITS);
+        self.shift = (most.ilog2() + 1).saturating_sub(PROFILE_BITS);
         #[expect(clippy::cast_precision_loss, reason = "a power of two")]
         let coarse = (1u32 << self.shift) as f32;
         self.unit = 0.25 * strip.scale * coarse;
@@ -90,7 +90,7 @@ impl Bands {
         self.pixels = 0;
         for (profile, rows) in self.profiles.chunks_exact_mut(strip.across).zip(&self.bounds) {
             // Where there are fewer, some are taken twice.
-            let row = |k| strip.row(spread(k, rows.first, rows.end));
+            let row = |k| strip.row(sampled_row(k, rows.first, rows.end));
             let rows = [row(0), row(1), row(2), row(3)];
             add_up(rows, self.shift, profile);
             self.full += count_full(rows[1], strip.white);
@@ -101,8 +101,8 @@ impl Bands {
 
 /// Cuts rows into as many pieces as asked for, but none of fewer than a band
 /// needs.
-pub fn cut(along: usize, pieces: usize, bounds: &mut Vec<RowRange>) {
-    let count = pieces.min(along / ROWS).max(1);
+pub fn cut_into_ranges(along: usize, pieces: usize, bounds: &mut Vec<RowRange>) {
+    let count = pieces.min(along / ROWS_PER_PROFILE).max(1);
     bounds.clear();
     bounds.extend((0..count).map(|k| RowRange::new(k * along / count, (k + 1) * along / count)));
 }
@@ -110,14 +110,15 @@ pub fn cut(along: usize, pieces: usize, bounds: &mut Vec<RowRange>) {
 /// The `k`-th of the rows that stand for a band, evenly spread and symmetric
 /// about its middle, and in a tall band no farther apart than slanted edges
 /// allow.
-fn spread(k: usize, from: usize, to: usize) -> usize {
+fn sampled_row(k: usize, from: usize, to: usize) -> usize {
     let last = to - from - 1;
-    let beside = last.saturating_sub(MOST_APART * (ROWS - 1)) / 2;
-    from + beside + (2 * k * (last - 2 * beside) + ROWS - 1) / (2 * (ROWS - 1))
+    let beside = last.saturating_sub(MAX_ROW_DISTANCE * (ROWS_PER_PROFILE - 1)) / 2;
+    from + beside
+        + (2 * k * (last - 2 * beside) + ROWS_PER_PROFILE - 1) / (2 * (ROWS_PER_PROFILE - 1))
 }
 
 #[inline(always)]
-fn add_up<T: Grey>([a, b, c, d]: [&[T]; ROWS], shift: u32, out: &mut [u16]) {
+fn add_up<T: GreyPixel>([a, b, c, d]: [&[T]; ROWS_PER_PROFILE], shift: u32, out: &mut [u16]) {
     let across = out.len();
     let (a, b, c, d) = (&a[..across], &b[..across], &c[..across], &d[..across]);
     for u in 0..across {
@@ -126,7 +127,7 @@ fn add_up<T: Grey>([a, b, c, d]: [&[T]; ROWS], shift: u32, out: &mut [u16]) {
 }
 
 #[inline(always)]
-fn count_full<T: Grey>(row: &[T], white: T) -> usize {
+fn count_full<T: GreyPixel>(row: &[T], white: T) -> usize {
     let mut count = 0;
     // Sums of a byte are added up fastest.
     for part in row.chunks(192) {
@@ -142,8 +143,8 @@ mod tests {
     use crate::core::frame::{Frame, Pixels};
     use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
-    use crate::vision::gauge::Axis;
-    use crate::vision::strip::{Strips, Turner, View};
+    use crate::vision::gauge::BeadAxis;
+    use crate::vision::strip::{GaugeRowsOfDepth, GaugeView, RowLayout};
 
     const ROI: Roi = Roi { x: 5, y: 4, width: 12, height: 10 };
 
@@ -151,9 +152,11 @@ mod tests {
     fn a_band_is_the_mean_of_rows_spread_about_its_middle() {
         let values = (0..20u8).flat_map(|y| (0..30u8).map(move |x| x * 4 + y)).collect();
         let frame = Frame::new(0, Stamp::START, Size::new(30, 20), Pixels::Grey8(values)).unwrap();
-        let mut turner = Turner::default();
-        let view = View::new(ROI, Axis::Vertical);
-        let Strips::Bytes(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
+        let mut turner = RowLayout::default();
+        let view = GaugeView::new(ROI, BeadAxis::Vertical);
+        let GaugeRowsOfDepth::Bytes(strip) = turner.strips(&frame, &view, None) else {
+            unreachable!()
+        };
         let mut bands = Bands::default();
         bands.pool(&strip, 64);
         assert_eq!(bands.count(), 2);
@@ -169,12 +172,14 @@ mod tests {
     fn sixteen_bits_pool_to_the_same_scale_and_full_pixels_are_counted() {
         let values = (0..600u16).map(|k| if k < 360 { 4095 } else { 0 }).collect();
         let frame = Frame::new(0, Stamp::START, Size::new(30, 20), Pixels::Grey16(values)).unwrap();
-        let mut turner = Turner::default();
-        let view = View::new(Roi { x: 0, y: 0, width: 30, height: 20 }, Axis::Vertical);
-        let Strips::Words(strip) = turner.strips(&frame, &view, Some(4095)) else { unreachable!() };
+        let mut turner = RowLayout::default();
+        let view = GaugeView::new(Roi { x: 0, y: 0, width: 30, height: 20 }, BeadAxis::Vertical);
+        let GaugeRowsOfDepth::Words(strip) = turner.strips(&frame, &view, Some(4095)) else {
+            unreachable!()
+        };
         let mut bands = Bands::default();
         bands.pool(&strip, 5);
         assert!((f32::from(bands.profile(0)[0]) * bands.unit() - 255.0).abs() < 0.1);
-        assert!((bands.saturated_share() - 0.6).abs() < 1e-12);
+        assert!((bands.saturated_fraction() - 0.6).abs() < 1e-12);
     }
 }

@@ -3,11 +3,11 @@
 //! caliper line is fitted for itself in a short window, with the shading of the
 //! bead free and the levels of its neighbours as prior.
 
-use super::blur::Overlay;
-use super::fit::{Edge, EdgeFit, Prior, Window};
-use super::located::Located;
+use super::blur::BinnedProfile;
+use super::fit::{EdgeFit, FittedEdge, Prior, ProfileWindow};
+use super::located::CaliperEdge;
 use super::row_range::RowRange;
-use super::strip::{Grey, Strip};
+use super::strip::{GaugeRows, GreyPixel};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::rank;
 
@@ -19,9 +19,9 @@ const MIN_HALF: usize = 4;
 
 /// Where to look and how.
 #[derive(Debug, Clone, Copy)]
-pub struct Task<'a, T> {
+pub struct RefinerInput<'a, T> {
     /// The gauge's pixels.
-    pub strip: &'a Strip<'a, T>,
+    pub strip: &'a GaugeRows<'a, T>,
     /// Rows of its caliper lines.
     pub lines: &'a [RowRange],
     /// Room between the two edges of the bead \[px\], typical.
@@ -36,30 +36,30 @@ fn levels(fit: &EdgeFit) -> [f64; 3] {
 
 /// Refines one edge of the bead; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
-pub struct Refiner {
+pub struct LineRefiner {
     rough: Vec<Option<f64>>,
     samples: Vec<f32>,
     firsts: Vec<f64>,
     half: usize,
     bead_after: bool,
-    overlay: Overlay,
+    profile: BinnedProfile,
     first_fits: Vec<Option<EdgeFit>>,
-    scatter: Vec<f64>,
+    scratch: Vec<f64>,
     /// Blur of the edge \[px\].
     pub blur_px: f64,
     /// Noise of a pixel \[grey levels\].
     pub noise_grey: f64,
 }
 
-impl Refiner {
+impl LineRefiner {
     /// Locates the edge from rough positions, one a band; `bead_after` is the
     /// bead's side. Returns whether any edge could be located.
-    pub fn refine<T: Grey>(
+    pub fn refine<T: GreyPixel>(
         &mut self,
         table: &StepTable,
-        task: &Task<'_, T>,
+        task: &RefinerInput<'_, T>,
         bead_after: bool,
-        edges: &mut [Option<Located>],
+        edges: &mut [Option<CaliperEdge>],
         rough: impl Iterator<Item = f64>,
     ) -> bool {
         self.bead_after = bead_after;
@@ -84,7 +84,7 @@ impl Refiner {
     }
 
     /// Reads the window of every band, along the local slope of the edge.
-    fn read<T: Grey>(&mut self, task: &Task<'_, T>) {
+    fn read<T: GreyPixel>(&mut self, task: &RefinerInput<'_, T>) {
         let length = 2 * self.half + 1;
         self.samples.clear();
         self.samples.resize(length * self.rough.len(), 0.0);
@@ -120,26 +120,32 @@ impl Refiner {
         if under > 0.0 { (over / under).clamp(-2.0, 2.0) } else { 0.0 }
     }
 
-    fn window(&self, band: usize, noise: f64) -> Option<Window<'_>> {
+    fn window(&self, band: usize, noise: f64) -> Option<ProfileWindow<'_>> {
         let first = self.firsts[band];
         if first.is_nan() {
             return None;
         }
         let length = 2 * self.half + 1;
         let samples = &self.samples[band * length..(band + 1) * length];
-        Some(Window { first, samples, noise, blur: self.blur_px, bead_after: self.bead_after })
+        Some(ProfileWindow {
+            first,
+            samples,
+            noise,
+            blur: self.blur_px,
+            bead_after: self.bead_after,
+        })
     }
 
     fn fit_blur(&mut self, table: &StepTable) -> Option<f64> {
-        self.overlay.clear();
+        self.profile.clear();
         for band in 0..self.rough.len() {
             let Some(at) = self.rough[band] else { continue };
-            self.lay_over(band, at);
+            self.add_to_profile(band, at);
         }
-        self.overlay.fit(table, self.bead_after)
+        self.profile.fit(table, self.bead_after)
     }
 
-    fn lay_over(&mut self, band: usize, at: f64) {
+    fn add_to_profile(&mut self, band: usize, at: f64) {
         let first = self.firsts[band];
         if first.is_nan() {
             return;
@@ -147,12 +153,12 @@ impl Refiner {
         let length = 2 * self.half + 1;
         let window = &self.samples[band * length..(band + 1) * length];
         for (place, &sample) in (0u32..).zip(window) {
-            self.overlay.add(first + f64::from(place) - at, f64::from(sample));
+            self.profile.add(first + f64::from(place) - at, f64::from(sample));
         }
     }
 
     /// First pass: every caliper for itself, which also tells the noise.
-    fn locate_alone<T: Grey>(&mut self, table: &StepTable, task: &Task<'_, T>) {
+    fn locate_alone<T: GreyPixel>(&mut self, table: &StepTable, task: &RefinerInput<'_, T>) {
         self.first_fits.clear();
         let (mut residual, mut freedom) = (0.0, 0.0);
         for band in 0..self.rough.len() {
@@ -175,23 +181,23 @@ impl Refiner {
 
     /// The rough positions smear the overlay; the located ones do not.
     fn sharpen_blur(&mut self, table: &StepTable) {
-        self.overlay.clear();
+        self.profile.clear();
         for band in 0..self.rough.len() {
             if let Some(fit) = self.first_fits[band] {
-                self.lay_over(band, fit.edge.at);
+                self.add_to_profile(band, fit.edge.at);
             }
         }
-        if let Some(blur) = self.overlay.fit(table, self.bead_after) {
+        if let Some(blur) = self.profile.fit(table, self.bead_after) {
             self.blur_px = blur;
         }
     }
 
     /// Second pass: with the levels of the neighbours as prior.
-    fn locate_with_neighbours<T: Grey>(
+    fn locate_with_neighbours<T: GreyPixel>(
         &mut self,
         table: &StepTable,
-        task: &Task<'_, T>,
-        edges: &mut [Option<Located>],
+        task: &RefinerInput<'_, T>,
+        edges: &mut [Option<CaliperEdge>],
     ) {
         let excess = [0, 1, 2].map(|which| self.excess_variance(which));
         for (band, edge) in edges.iter_mut().enumerate() {
@@ -206,15 +212,15 @@ impl Refiner {
             };
             let Some(window) = self.window(band, noise) else { continue };
             let [ground, height, shading] = prior.mean;
-            let start = Edge { at: alone.edge.at, ground, height, shading };
-            *edge = window.fit(table, start, Some(&prior)).map(|fit| Located {
+            let start = FittedEdge { at: alone.edge.at, ground, height, shading };
+            *edge = window.fit(table, start, Some(&prior)).map(|fit| CaliperEdge {
                 at: fit.edge.at,
                 // Levels that neighbours share are wrong for all of them
                 // together, so that the mean of many edges is no surer than
                 // if each had found its own.
                 variance: alone.variance[0] * noise,
                 height: fit.edge.height,
-                share: 1.0,
+                row_fraction: 1.0,
             });
         }
     }
@@ -234,7 +240,7 @@ impl Refiner {
     /// explains: the variance that the prior must allow it. Robust, from the
     /// median of the squares.
     fn excess_variance(&mut self, which: usize) -> f64 {
-        let mut scatter = std::mem::take(&mut self.scatter);
+        let mut scatter = std::mem::take(&mut self.scratch);
         scatter.clear();
         let (mut explained, mut n) = (0.0, 0.0);
         for band in 0..self.first_fits.len() {
@@ -245,8 +251,8 @@ impl Refiner {
                 n += 1.0;
             }
         }
-        let total = rank::median(&mut scatter).unwrap_or(0.0) / rank::MEDIAN_SQUARE;
-        self.scatter = scatter;
+        let total = rank::median(&mut scatter).unwrap_or(0.0) / rank::MEDIAN_OF_SQUARED_NORMAL;
+        self.scratch = scatter;
         (total - explained / f64::max(n, 1.0)).max(0.0)
     }
 }
@@ -260,8 +266,8 @@ impl Refiner {
     clippy::cast_precision_loss,
     reason = "positions lie within the gauge, which is checked"
 )]
-fn read_window<T: Grey>(
-    task: &Task<'_, T>,
+fn read_window<T: GreyPixel>(
+    task: &RefinerInput<'_, T>,
     band: usize,
     (at, slope): (f64, f64),
     window: &mut [f32],
@@ -291,14 +297,14 @@ fn read_window<T: Grey>(
 }
 
 /// Levels to start from: the window's two ends.
-fn start_levels(window: &Window<'_>, at: f64) -> Edge {
+fn start_levels(window: &ProfileWindow<'_>, at: f64) -> FittedEdge {
     let samples = window.samples;
     let end = samples.len().min(3);
     #[expect(clippy::cast_precision_loss, reason = "three at most")]
     let mean = |part: &[f32]| f64::from(part.iter().sum::<f32>()) / part.len() as f64;
     let ground = mean(&samples[..end]);
     let height = mean(&samples[samples.len() - end..]) - ground;
-    Edge { at, ground, height, shading: 0.0 }
+    FittedEdge { at, ground, height, shading: 0.0 }
 }
 
 /// Half window for a blur \[px\]: to where the step is over, but not across

@@ -152,7 +152,7 @@ impl Reject {
             (Self::NoPair { .. }, smooth) => smooth,
             // Two pairs of smooth edges are more than texture that an edge hardly exceeds.
             (Self::Vague { .. }, Self::Ambiguous { .. }) => smooth,
-            (told, _) => told,
+            (rough, _) => rough,
         }
     }
 

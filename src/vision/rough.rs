@@ -23,16 +23,16 @@ mod route;
 mod window;
 
 use super::coarse::StepLine;
-use super::located::{self, Located};
-use super::strip::Grey;
-use crate::numeric::number::{float, narrow};
-use crossing::INSIDE_PX;
-pub use groove::Blur;
-use groove::EdgeShape;
-use levels::{Crossings, Levels, OUTSIDE};
-pub use rough_input::Scene;
-use route::Route;
-use window::{ALONG_PX, STRAIGHT_ROWS, Windows};
+use super::located::{self, CaliperEdge};
+use super::strip::GreyPixel;
+use crate::numeric::number::{narrow_to_f32, to_f64};
+use crossing::SUMMED_INSIDE_PX;
+use groove::GrooveShape;
+pub use groove::MeanBlur;
+use levels::{Crossings, EdgeLevels, OUTSIDE_PX};
+pub use rough_input::RoughInput;
+use route::EdgeRoute;
+use window::{ALONG_PX, RowWindows, STRAIGHT_ROWS};
 
 /// Rounds in which levels are read along the edge that was found with the levels
 /// before.
@@ -42,59 +42,59 @@ const MIN_ROWS_FRACTION: f64 = 0.5;
 
 /// Blur of an edge of which nothing is known: lenses that are nearly in focus, and what is
 /// too fine to be followed.
-const UNKNOWN_BLUR: Blur = Blur { px: 1.8, variance: 1.0 };
+const PRIOR_BLUR: MeanBlur = MeanBlur { px: 1.8, variance: 1.0 };
 /// Standard deviation of the blurs of two edges about each other, as a fraction, and the
 /// same of what is too fine to be followed.
-const SAME_BLUR: f64 = 0.02;
-const FINE_FRACTION: f64 = 0.2;
+const BLUR_DIFFERENCE: f64 = 0.02;
+const FINE_ROUGHNESS_FRACTION: f64 = 0.2;
 
 /// How likely a groove that does not show its depth must be to be looked at, for it to be
 /// doubted that there is none, and for the shape of the whole flank to be doubted as well where
 /// it lies so far from where rows pass half height \[px\]: of drawn edges beside weak narrow
 /// grooves, some that were taken for sloping ground lay 0.7 px off.
-const LIKELY_GROOVE: f64 = 0.18;
-const POSSIBLE_GROOVE: f64 = 0.085;
-const CONCEIVABLE_GROOVE: f64 = 0.03;
-const FAR_OFF_PX: f64 = 0.5;
+const MIN_LIKELY_GROOVE: f64 = 0.18;
+const MIN_POSSIBLE_GROOVE: f64 = 0.085;
+const MIN_CONCEIVABLE_GROOVE: f64 = 0.03;
+const MAX_SHAPE_OFFSET_PX: f64 = 0.5;
 
 /// Standard deviation of the place of an edge beside a groove that hides its depth that its
 /// waves leave open, as a fraction of theirs and at most \[px\]: the mean over them is no Gaussian
 /// flank. Measured on 12,000 rendered beads.
-const GROOVE_WAVES: f64 = 0.15;
-const MOST_GROOVE_WAVES_PX: f64 = 0.15;
+const GROOVE_WAVINESS_FRACTION: f64 = 0.15;
+const MAX_GROOVE_WAVINESS_PX: f64 = 0.15;
 /// The same beside one that shows it and is not wider than that \[px\]: without it, 3.5 of 30,000
 /// drawn widths were more than 5 sigma off, with it 2.5.
-const NARROW_GROOVE_WAVES: f64 = 0.06;
-const NARROW_GROOVE_PX: f64 = 7.5;
+const NARROW_GROOVE_WAVINESS_FRACTION: f64 = 0.06;
+const MAX_NARROW_GROOVE_PX: f64 = 7.5;
 
 /// Standard deviation, beside that of noise, of where rows pass half height as the edge beside
 /// a groove \[px\]: its floor may be hidden, and torn edges have no Gaussian flank. Averaged
 /// with the groove's shape by their variances, the same piece of real concrete differs from
 /// frame to frame by 0.33 px in the median, with the shape alone by 0.36; beside rendered
 /// grooves the shape weighs nearly all.
-const GROOVE_CROSSING_PX: f64 = 0.5;
+const GROOVE_CROSSING_SIGMA_PX: f64 = 0.5;
 
 /// Difference of the bead's level beside the edge from that farther inside, in standard
 /// deviations of what light does, from which on the former is taken, and the standard
 /// deviation of the shift that this makes, as a fraction of it.
-const LEVEL_OFF: f64 = 0.5;
+const MIN_LEVEL_SIGMAS: f64 = 0.5;
 const SHIFT_FRACTION: f64 = 0.2;
 /// How far off the shape may lie then, in what such a difference makes of the pixels that are
 /// summed within the edge: a flank that is no blurred step lies farther.
-const MOST_OFF: f64 = 2.0;
+const MAX_LEVEL_SHIFT: f64 = 2.0;
 
 /// Finds one edge; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct RoughEdge {
-    windows: Windows,
-    route: Route,
-    levels: Levels,
+    windows: RowWindows,
+    route: EdgeRoute,
+    levels: EdgeLevels,
     crossings: Crossings,
-    lines: Vec<Option<Located>>,
+    lines: Vec<Option<CaliperEdge>>,
     /// Variance of the mean profile \[grey levels²\].
     variance: f64,
     /// Shape of the mean profile.
-    shape: Option<EdgeShape>,
+    shape: Option<GrooveShape>,
 }
 
 /// What was found of an edge.
@@ -118,9 +118,9 @@ pub struct RoughFit {
     pub is_on_ground: bool,
     /// Share of the pixels about the edge that show neither the bead nor what lies
     /// outside.
-    pub odd_share: f64,
+    pub odd_fraction: f64,
     /// The same of the bead farther inside: its texture's.
-    pub odd_within_share: f64,
+    pub odd_fraction_within: f64,
     /// Standard deviation of the smoothing along the bead \[px\].
     pub along_px: f64,
     /// Fraction of the lines' variance that differs from line to line.
@@ -131,24 +131,24 @@ impl RoughFit {
     /// Whether the odd pixels about the edge exceed those of the bead's texture by such a
     /// share.
     pub fn exceeds_texture(&self, by: f64) -> bool {
-        self.odd_share > self.odd_within_share + by
+        self.odd_fraction > self.odd_fraction_within + by
     }
 }
 
 impl RoughEdge {
     /// Positions of the last frame, one a caliper line.
-    pub fn lines(&self) -> &[Option<Located>] {
+    pub fn lines(&self) -> &[Option<CaliperEdge>] {
         &self.lines
     }
 
     /// Mean of the positions across the bead \[px\].
     pub fn middle(&self) -> f64 {
-        located::middle(&self.lines)
+        located::mean_position(&self.lines)
     }
 
     /// Finds the edge near a line; `None` where no edge runs there.
     #[inline(always)]
-    pub fn find<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) -> Option<()> {
+    pub fn find<T: GreyPixel>(&mut self, scene: &RoughInput<'_, T>, line: &StepLine) -> Option<()> {
         self.windows.read(scene, line);
         self.route.find(&self.windows, scene.width_px)?;
         for round in 1..=ROUNDS {
@@ -161,63 +161,65 @@ impl RoughEdge {
             self.route.follow(&self.crossings.at)?;
         }
         self.variance = position_noise::of_profile(&self.levels)?;
-        self.shape = self.fit_shape(UNKNOWN_BLUR, scene, None);
+        self.shape = self.fit_shape(PRIOR_BLUR, scene, None);
         Some(())
     }
 
     /// Blur of the edge that was found.
-    pub fn blur(&self) -> Option<Blur> {
-        let fine =
-            FINE_FRACTION * position_noise::fine_roughness(&self.crossings, self.windows.fine());
+    pub fn blur(&self) -> Option<MeanBlur> {
+        let fine = FINE_ROUGHNESS_FRACTION
+            * position_noise::fine_roughness(&self.crossings, self.windows.fine());
         self.shape.map(|shape| {
-            let Blur { px, variance } = shape.blur;
-            let other = (SAME_BLUR * px).powi(2) + (0.5 * fine / px).powi(2);
-            Blur { px, variance: variance + other }
+            let MeanBlur { px, variance } = shape.blur;
+            let other = (BLUR_DIFFERENCE * px).powi(2) + (0.5 * fine / px).powi(2);
+            MeanBlur { px, variance: variance + other }
         })
     }
 
     /// Where the edge that was found lies. `other` is the blur of the other edge, which is
     /// seen through the same lens.
     #[inline(always)]
-    pub fn locate<T: Grey>(
+    pub fn locate<T: GreyPixel>(
         &mut self,
-        scene: &Scene<'_, T>,
-        other: Option<Blur>,
+        scene: &RoughInput<'_, T>,
+        other: Option<MeanBlur>,
     ) -> Option<RoughFit> {
         let mean = self.levels.mean()?;
         let (is_groove, on_ground) = (mean.is_groove(), mean.on_ground);
         let (bead_grey, hides_depth) = (mean.bead(), mean.filled > 0.0);
-        let known = other.filter(|blur| blur.variance < UNKNOWN_BLUR.variance);
+        let known = other.filter(|blur| blur.variance < PRIOR_BLUR.variance);
         let shape = known.and_then(|blur| self.fit_shape(blur, scene, self.shape)).or(self.shape);
-        let is_groove_likely = shape.is_some_and(|shape| shape.groove_share > LIKELY_GROOVE);
+        let is_groove_likely =
+            shape.is_some_and(|shape| shape.groove_probability > MIN_LIKELY_GROOVE);
         let noise = position_noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
         // Where a rib or a shade lies within, only the level beside the edge is the bead's.
-        let off = |shape: &EdgeShape| shape.at - float(OUTSIDE) - self.crossings.off_course;
+        let off = |shape: &GrooveShape| shape.at - to_f64(OUTSIDE_PX) - self.crossings.off_course;
         let contrast = self.levels.contrast();
-        let of_level = |shape: &EdgeShape| {
+        let of_level = |shape: &GrooveShape| {
             let level = shape.level_off * groove::BEAD_SIGMA * bead_grey / contrast;
-            shape.level_off > LEVEL_OFF
-                && off(shape).abs() < MOST_OFF * level * f64::from(INSIDE_PX)
+            shape.level_off > MIN_LEVEL_SIGMAS
+                && off(shape).abs() < MAX_LEVEL_SHIFT * level * f64::from(SUMMED_INSIDE_PX)
         };
         let shaped = shape.filter(|shape| is_groove_likely || of_level(shape));
-        let is_narrow = !on_ground && shape.is_some_and(|shape| shape.width() < NARROW_GROOVE_PX);
+        let is_narrow =
+            !on_ground && shape.is_some_and(|shape| shape.width() < MAX_NARROW_GROOVE_PX);
         let waves = || position_noise::roughness(&self.crossings).sqrt();
         let of_waves = if hides_depth {
-            (GROOVE_WAVES * waves()).min(MOST_GROOVE_WAVES_PX).powi(2)
+            (GROOVE_WAVINESS_FRACTION * waves()).min(MAX_GROOVE_WAVINESS_PX).powi(2)
         } else if is_narrow {
-            (NARROW_GROOVE_WAVES * waves()).powi(2)
+            (NARROW_GROOVE_WAVINESS_FRACTION * waves()).powi(2)
         } else {
             0.0
         };
-        let of_crossing = noise.of_mean + GROOVE_CROSSING_PX.powi(2);
-        let weight_of = |shape: EdgeShape| {
+        let of_crossing = noise.of_mean + GROOVE_CROSSING_SIGMA_PX.powi(2);
+        let weight_of = |shape: GrooveShape| {
             if on_ground { 1.0 } else { of_crossing / (of_crossing + shape.variance + of_waves) }
         };
         let shift = shaped.map_or(0.0, |shape| weight_of(shape) * off(&shape));
         for at in &mut self.crossings.at {
-            *at += narrow(shift);
+            *at += narrow_to_f32(shift);
         }
-        let of_shape = |shape: EdgeShape| {
+        let of_shape = |shape: GrooveShape| {
             if is_groove_likely {
                 let (weight, of_groove) = (weight_of(shape), shape.variance + of_waves);
                 let rest = 1.0 - weight;
@@ -227,26 +229,27 @@ impl RoughEdge {
             }
             shape.variance.max(noise.of_mean) + (SHIFT_FRACTION * shift).powi(2)
         };
-        let of_doubt = |shape: EdgeShape| {
-            let is_possible = shape.groove_share > POSSIBLE_GROOVE;
-            let is_far = shape.groove_share > CONCEIVABLE_GROOVE && off(&shape).abs() > FAR_OFF_PX;
+        let variance_of_alternatives = |shape: GrooveShape| {
+            let is_possible = shape.groove_probability > MIN_POSSIBLE_GROOVE;
+            let is_far = shape.groove_probability > MIN_CONCEIVABLE_GROOVE
+                && off(&shape).abs() > MAX_SHAPE_OFFSET_PX;
             let of_place = if is_possible { shape.variance } else { 0.0 };
             of_place + if is_far { off(&shape).powi(2) } else { 0.0 }
         };
-        let doubted = shape.map_or(0.0, of_doubt).max(noise.of_mean);
-        self.gather(scene, noise.of_row);
+        let variance_without_shape = shape.map_or(0.0, variance_of_alternatives).max(noise.of_mean);
+        self.locate_lines(scene, noise.of_row);
         let seen = self.crossings.at.iter().filter(|at| at.is_finite()).count();
         Some(RoughFit {
-            variance: shaped.map_or(doubted, of_shape),
-            rows_fraction: float(seen) / float(self.crossings.at.len()),
+            variance: shaped.map_or(variance_without_shape, of_shape),
+            rows_fraction: to_f64(seen) / to_f64(self.crossings.at.len()),
             contrast,
             blur_px: noise.blur_px,
             bead_grey,
             is_groove,
             is_narrow_groove: is_groove_likely,
             is_on_ground: on_ground,
-            odd_share: position_noise::mean_of(&self.crossings.odd),
-            odd_within_share: position_noise::mean_of(&self.crossings.odd_within),
+            odd_fraction: position_noise::mean_of(&self.crossings.odd),
+            odd_fraction_within: position_noise::mean_of(&self.crossings.odd_within),
             along_px: ALONG_PX,
             lines_fraction: noise.lines_fraction,
         })
@@ -255,11 +258,11 @@ impl RoughEdge {
     /// Fits a groove or a step to the mean profile.
     fn fit_shape<T>(
         &self,
-        blur: Blur,
-        scene: &Scene<'_, T>,
-        before: Option<EdgeShape>,
-    ) -> Option<EdgeShape> {
-        let known = groove::Known {
+        blur: MeanBlur,
+        scene: &RoughInput<'_, T>,
+        before: Option<GrooveShape>,
+    ) -> Option<GrooveShape> {
+        let known = groove::GroovePrior {
             table: scene.table,
             variance: self.variance,
             blur,
@@ -271,7 +274,7 @@ impl RoughEdge {
     }
 
     /// Positions of the caliper lines from those of their rows.
-    fn gather<T: Grey>(&mut self, scene: &Scene<'_, T>, variance_of_row: f64) {
+    fn locate_lines<T: GreyPixel>(&mut self, scene: &RoughInput<'_, T>, variance_of_row: f64) {
         let (windows, crossings) = (&self.windows, &self.crossings.at);
         let height = self.levels.contrast();
         self.lines.clear();
@@ -289,11 +292,11 @@ impl RoughEdge {
                 }
                 next += 1;
             }
-            let located = (seen >= MIN_ROWS_FRACTION * rows && seen > 0.0).then(|| Located {
+            let located = (seen >= MIN_ROWS_FRACTION * rows && seen > 0.0).then(|| CaliperEdge {
                 at: sum / seen,
                 variance: variance_of_row / seen,
                 height,
-                share: seen / rows,
+                row_fraction: seen / rows,
             });
             self.lines.push(located);
         }

@@ -24,7 +24,7 @@ use super::width::WidthMeasurement;
 use crate::calibration::SurfaceMap;
 use crate::core::units::Mm;
 use overlap::Overlap;
-use spectrum::{BLURS, Kind, Spectrum, lengths_mm};
+use spectrum::{BLUR_FACTORS, FrameKind, Spectrum, lengths_mm};
 
 /// Largest standard deviation of the logarithm of roughness, and of length, with which
 /// they are reported: what twenty to thirty correlation lengths of bead leave.
@@ -32,13 +32,13 @@ const MAX_LOG_SIGMA: f64 = 0.3;
 const MAX_LENGTH_LOG_SIGMA: f64 = 0.65;
 /// By how much roughness must be more likely than noise alone, in the logarithm: three
 /// standard deviations.
-const EVIDENCE: f64 = 4.5;
+const MIN_LOG_EVIDENCE: f64 = 4.5;
 /// Kinds of frames that are told apart at most; a run has one or two.
 const MAX_KINDS: usize = 8;
 /// Part by which a smaller blur must be smaller to be taken over.
-const SMALLER: f64 = 0.95;
+const MIN_BLUR_DECREASE: f64 = 0.95;
 /// Steps in which the most likely roughness is looked for.
-const STEPS: usize = 12;
+const SCORING_STEPS: usize = 12;
 
 /// Roughness of a bead. Signal, not error: the standard deviation of a width does not
 /// contain it.
@@ -99,14 +99,14 @@ impl RoughnessEstimator {
             self.lengths_mm = lengths_mm(widths);
             self.blur_mm = widths.blur_mm;
         }
-        if widths.blur_mm < SMALLER * self.blur_mm {
+        if widths.blur_mm < MIN_BLUR_DECREASE * self.blur_mm {
             self.blur_mm = widths.blur_mm;
             for spectrum in &mut self.spectra {
                 spectrum.expect(&self.lengths_mm, self.blur_mm);
             }
         }
         let fresh = self.overlap.fresh(widths, moved);
-        let kind = Kind::of(widths);
+        let kind = FrameKind::of(widths);
         let known = self.spectra.iter().position(|spectrum| spectrum.is_of(kind));
         let number = known.unwrap_or_else(|| {
             if self.spectra.len() == MAX_KINDS {
@@ -128,11 +128,12 @@ impl RoughnessEstimator {
             .iter()
             .map(|spectrum| log_likelihood(spectrum, &spectrum.expected[0][0], 0.0))
             .sum();
-        let cases = (0..BLURS.len())
-            .flat_map(|blur| (0..self.lengths_mm.len()).map(move |length| Case { blur, length }));
-        let fits: Vec<Fit> = cases.map(|case| self.fit(case)).collect::<Option<_>>()?;
+        let cases = (0..BLUR_FACTORS.len()).flat_map(|blur| {
+            (0..self.lengths_mm.len()).map(move |length| GridPoint { blur, length })
+        });
+        let fits: Vec<GridFit> = cases.map(|case| self.fit(case)).collect::<Option<_>>()?;
         let best = fits.iter().map(|fit| fit.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
-        if !best.is_finite() || best < smooth + EVIDENCE {
+        if !best.is_finite() || best < smooth + MIN_LOG_EVIDENCE {
             return None;
         }
         let (mut sum, mut roughness, mut length) = (0.0, LogMean::default(), LogMean::default());
@@ -160,10 +161,10 @@ impl RoughnessEstimator {
 
     /// The most likely square of the roughness for one blur and correlation length, by
     /// Fisher's scoring.
-    fn fit(&self, case: Case) -> Option<Fit> {
+    fn fit(&self, case: GridPoint) -> Option<GridFit> {
         let mut square = self.first_square(case)?;
         let mut information = 0.0_f64;
-        for _ in 0..STEPS {
+        for _ in 0..SCORING_STEPS {
             let mut slope = 0.0_f64;
             information = 0.0_f64;
             for spectrum in &self.spectra {
@@ -189,11 +190,11 @@ impl RoughnessEstimator {
             .iter()
             .map(|spectrum| log_likelihood(spectrum, case.of(spectrum), square))
             .sum();
-        Some(Fit { square_mm2: square, log_variance: 1.0 / information, log_likelihood })
+        Some(GridFit { square_mm2: square, log_variance: 1.0 / information, log_likelihood })
     }
 
     /// A square to begin with: all that was seen.
-    fn first_square(&self, case: Case) -> Option<f64> {
+    fn first_square(&self, case: GridPoint) -> Option<f64> {
         let seen = |spectrum: &Spectrum| -> f64 {
             spectrum.squares.iter().take(case.of(spectrum).len()).sum()
         };
@@ -207,12 +208,12 @@ impl RoughnessEstimator {
 
 /// A blur along the bead and a correlation length, by their numbers.
 #[derive(Debug, Clone, Copy)]
-struct Case {
+struct GridPoint {
     blur: usize,
     length: usize,
 }
 
-impl Case {
+impl GridPoint {
     /// Expected squares of a spectrum for a roughness of 1.
     fn of(self, spectrum: &Spectrum) -> &[f64] {
         &spectrum.expected[self.blur][self.length]
@@ -221,7 +222,7 @@ impl Case {
 
 /// The most likely roughness for one case.
 #[derive(Debug, Clone, Copy)]
-struct Fit {
+struct GridFit {
     square_mm2: f64,
     /// Variance of the logarithm of the square.
     log_variance: f64,
@@ -248,7 +249,7 @@ struct LogMean {
 
 /// See [`LogMean`].
 #[derive(Debug, Clone, Copy)]
-struct Log {
+struct LogEstimate {
     mean: f64,
     sigma: f64,
 }
@@ -259,9 +260,9 @@ impl LogMean {
         self.squares += weight * (mean * mean + variance);
     }
 
-    fn over(self, weights: f64) -> Log {
+    fn over(self, weights: f64) -> LogEstimate {
         let mean = self.sum / weights;
-        Log { mean, sigma: (self.squares / weights - mean * mean).max(0.0).sqrt() }
+        LogEstimate { mean, sigma: (self.squares / weights - mean * mean).max(0.0).sqrt() }
     }
 }
 

@@ -3,48 +3,48 @@
 
 use super::pixel_noise;
 use super::reject::Reject;
-use super::strip::{Grey, Strip};
-use super::trace::{Scene, Tracer};
+use super::strip::{GaugeRows, GreyPixel};
+use super::trace::{EdgeTracer, TraceInput};
 use crate::numeric::blurred_step::StepTable;
 
 /// Share of a step that must lie below the end of the scale.
-const NEED_VISIBLE: f64 = 0.4;
+const MIN_VISIBLE_FRACTION: f64 = 0.4;
 /// Largest doubt about an edge's place that a hidden level may leave \[px\].
-const MAX_DOUBT_PX: f64 = 0.2;
+const MAX_CLIPPED_SIGMA_PX: f64 = 0.2;
 /// Ground on either side of the bead that its noise is taken from, and its
 /// distance from the edges \[px\].
-const BESIDE_PX: f32 = 24.0;
-const OFF_EDGE_PX: f32 = 6.0;
+const NOISE_COLUMNS_PX: f32 = 24.0;
+const NOISE_MARGIN_PX: f32 = 6.0;
 
 /// A bead that was looked at.
 #[derive(Debug, Clone, Copy)]
-pub struct Bead<'a, T> {
+pub struct SaturatedBead<'a, T> {
     /// What is looked at, left and right.
-    pub scenes: [Scene<'a, T>; 2],
+    pub scenes: [TraceInput<'a, T>; 2],
     /// Rough places of the left edge, band by band \[px\].
     pub lefts: &'a [Option<f32>],
     /// Those of the right edge.
     pub rights: &'a [Option<f32>],
 }
 
-impl<T: Grey> Bead<'_, T> {
+impl<T: GreyPixel> SaturatedBead<'_, T> {
     /// Traces edges that were looked at, of which these are cut off before or
     /// after them. Returns the noise of a pixel \[grey levels\].
     #[cold]
     pub fn trace(
         &self,
-        tracers: [&mut Tracer; 2],
+        tracers: [&mut EdgeTracer; 2],
         table: &StepTable,
         cut_off: [[bool; 2]; 2],
     ) -> Result<f32, Reject> {
         let [[_, left_inside], [right_inside, _]] = cut_off;
         let noise = self.visible_noise(left_inside || right_inside);
         for ((tracer, scene), cut_off) in tracers.into_iter().zip(self.scenes).zip(cut_off) {
-            let scene = Scene { noise, ..scene };
+            let scene = TraceInput { noise, ..scene };
             match cut_off {
-                [true, true] => return Err(blinded(0.0)),
+                [true, true] => return Err(too_much_clipped(0.0)),
                 [false, false] => trace_plainly(tracer, table, &scene)?,
-                [_, hidden_after] => trace_hidden(tracer, table, &scene, hidden_after)?,
+                [_, hidden_after] => trace_clipped(tracer, table, &scene, hidden_after)?,
             }
         }
         Ok(noise)
@@ -55,11 +55,14 @@ impl<T: Grey> Bead<'_, T> {
     fn visible_noise(&self, bead_is_hidden: bool) -> f32 {
         let strip = self.scenes[0].strip;
         let ((left, left_end), (right, right_end)) = (span(self.lefts), span(self.rights));
-        let beside = OFF_EDGE_PX + BESIDE_PX;
+        let beside = NOISE_MARGIN_PX + NOISE_COLUMNS_PX;
         let ranges = if bead_is_hidden {
-            [(left - beside, left - OFF_EDGE_PX), (right_end + OFF_EDGE_PX, right_end + beside)]
+            [
+                (left - beside, left - NOISE_MARGIN_PX),
+                (right_end + NOISE_MARGIN_PX, right_end + beside),
+            ]
         } else {
-            [(left_end + OFF_EDGE_PX, right - OFF_EDGE_PX); 2]
+            [(left_end + NOISE_MARGIN_PX, right - NOISE_MARGIN_PX); 2]
         };
         let (mut square, mut n) = (0.0, 0.0);
         for columns in ranges.map(|range| columns(strip, range)) {
@@ -72,24 +75,25 @@ impl<T: Grey> Bead<'_, T> {
     }
 }
 
-fn trace_hidden<T: Grey>(
-    tracer: &mut Tracer,
+fn trace_clipped<T: GreyPixel>(
+    tracer: &mut EdgeTracer,
     table: &StepTable,
-    scene: &Scene<'_, T>,
+    scene: &TraceInput<'_, T>,
     hidden_after: bool,
 ) -> Result<(), Reject> {
-    let found = tracer.trace_cut_off(table, scene, hidden_after).ok_or(blinded(0.0))?;
-    if found.visible_share < NEED_VISIBLE || found.variance.sqrt() > MAX_DOUBT_PX {
-        return Err(blinded(found.visible_share));
+    let found = tracer.trace_clipped(table, scene, hidden_after).ok_or(too_much_clipped(0.0))?;
+    if found.visible_fraction < MIN_VISIBLE_FRACTION || found.variance.sqrt() > MAX_CLIPPED_SIGMA_PX
+    {
+        return Err(too_much_clipped(found.visible_fraction));
     }
     Ok(())
 }
 
 /// An edge both sides of which can be seen.
-fn trace_plainly<T: Grey>(
-    tracer: &mut Tracer,
+fn trace_plainly<T: GreyPixel>(
+    tracer: &mut EdgeTracer,
     table: &StepTable,
-    scene: &Scene<'_, T>,
+    scene: &TraceInput<'_, T>,
 ) -> Result<(), Reject> {
     if let Some(blur) = tracer.blur() {
         tracer.trace(table, scene, blur);
@@ -97,8 +101,8 @@ fn trace_plainly<T: Grey>(
     if tracer.is_located() { Ok(()) } else { Err(Reject::NoPair { got: 0.0, need: 1.0 }) }
 }
 
-fn blinded(visible: f64) -> Reject {
-    Reject::Blinded { visible, need: NEED_VISIBLE }
+fn too_much_clipped(visible: f64) -> Reject {
+    Reject::Blinded { visible, need: MIN_VISIBLE_FRACTION }
 }
 
 /// Lowest and highest of an edge's places.
@@ -112,6 +116,9 @@ fn span(places: &[Option<f32>]) -> (f32, f32) {
     clippy::cast_sign_loss,
     reason = "saturates at 0 and is cut to the gauge"
 )]
-fn columns<T: Grey>(strip: &Strip<'_, T>, (from, to): (f32, f32)) -> std::ops::Range<usize> {
+fn columns<T: GreyPixel>(
+    strip: &GaugeRows<'_, T>,
+    (from, to): (f32, f32),
+) -> std::ops::Range<usize> {
     from as usize..(to as usize).min(strip.across)
 }

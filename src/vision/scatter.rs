@@ -1,23 +1,23 @@
 //! How far the places of an edge scatter about its course, and over how many
 //! bands that hangs together.
 
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 /// Weights of a parabola through nine neighbours at the middle one, over 231.
 const SMOOTHER: [f64; 9] = [-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0];
-const HALF: usize = 4;
+const SMOOTHER_HALF: usize = 4;
 /// Excess that is believed, in standard deviations of its own doubt.
-const BELIEVED: f64 = 2.5;
+const MIN_EXCESS_SIGMAS: f64 = 2.5;
 /// Places beyond the terms of their course that tell their scatter.
-const FEWEST_FREE: f64 = 3.0;
+const MIN_FREEDOM: f64 = 3.0;
 
 /// A place off the course of its edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Offset {
+pub struct EdgeResidual {
     /// Distance from the course \[px\].
     pub px: f64,
     /// Fraction of a band's rows that the place comes from.
-    pub share: f64,
+    pub row_fraction: f64,
 }
 
 /// By how much the variance of the mean of an edge's places is larger than
@@ -27,11 +27,15 @@ pub struct Offset {
 /// at least 1.
 ///
 /// `None` where gaps leave too few neighbours; see [`inflation_with_gaps`].
-pub fn inflation(places: &[Option<f64>], variance: f64, memory: &mut Vec<f64>) -> Option<f64> {
+pub fn variance_inflation(
+    places: &[Option<f64>],
+    variance: f64,
+    memory: &mut Vec<f64>,
+) -> Option<f64> {
     memory.clear();
-    memory.extend(places.windows(2 * HALF + 1).filter_map(left_over));
-    let n = float(memory.len());
-    if memory.len() < 2 * HALF {
+    memory.extend(places.windows(2 * SMOOTHER_HALF + 1).filter_map(residual));
+    let n = to_f64(memory.len());
+    if memory.len() < 2 * SMOOTHER_HALF {
         return None;
     }
     if variance <= 0.0 {
@@ -39,15 +43,15 @@ pub fn inflation(places: &[Option<f64>], variance: f64, memory: &mut Vec<f64>) -
     }
     let product = |lag: usize| -> f64 {
         let pairs = memory.iter().zip(&memory[lag..]);
-        pairs.map(|(a, b)| a * b).sum::<f64>() / (n - float(lag))
+        pairs.map(|(a, b)| a * b).sum::<f64>() / (n - to_f64(lag))
     };
-    let passed = [passes(0), passes(1), passes(2)];
+    let passed = [residual_covariance(0), residual_covariance(1), residual_covariance(2)];
     let (same, next) = (product(0), product(1));
     let ratio = same / (passed[0] * variance);
     // The products of what is left hang together over a few neighbours, so
     // that there are fewer of them than it seems.
-    let doubt = (2.0 * 1.43 / n).sqrt();
-    if ratio < 1.0 + BELIEVED * doubt {
+    let ratio_sigma = (2.0 * 1.43 / n).sqrt();
+    if ratio < 1.0 + MIN_EXCESS_SIGMAS * ratio_sigma {
         return Some(1.0);
     }
     // Covariance of a place with itself and with the next, before the
@@ -63,21 +67,21 @@ pub fn inflation(places: &[Option<f64>], variance: f64, memory: &mut Vec<f64>) -
 /// course that was fitted to them with so many terms. What the bead's own shape leaves counts as an error too:
 /// the gaps hide as much of it.
 pub fn inflation_with_gaps(
-    places: impl Iterator<Item = Offset>,
+    places: impl Iterator<Item = EdgeResidual>,
     variance: f64,
     terms: usize,
 ) -> f64 {
     let (mut square, mut n) = (0.0, 0.0);
-    for Offset { px, share } in places {
+    for EdgeResidual { px, row_fraction: share } in places {
         square += share * px * px;
         n += 1.0;
     }
-    let free = n - float(terms);
-    if free < FEWEST_FREE || variance <= 0.0 {
+    let free = n - to_f64(terms);
+    if free < MIN_FREEDOM || variance <= 0.0 {
         return 1.0;
     }
     let ratio = square / (free * variance);
-    if ratio < 1.0 + BELIEVED * (2.0 / free).sqrt() {
+    if ratio < 1.0 + MIN_EXCESS_SIGMAS * (2.0 / free).sqrt() {
         return 1.0;
     }
     // So few do not tell their own scatter well: mean of its inverse.
@@ -85,18 +89,18 @@ pub fn inflation_with_gaps(
 }
 
 /// What the parabola leaves of the middle place; `None` where one is missing.
-fn left_over(places: &[Option<f64>]) -> Option<f64> {
+fn residual(places: &[Option<f64>]) -> Option<f64> {
     let mut smooth = 0.0;
     for (place, weight) in places.iter().zip(SMOOTHER) {
         smooth += weight / 231.0 * (*place)?;
     }
-    Some(places[HALF]? - smooth)
+    Some(places[SMOOTHER_HALF]? - smooth)
 }
 
 /// What is left of independent places of variance 1, times itself or what is
 /// left so many places on.
-fn passes(lag: usize) -> f64 {
-    let left = |k: usize| f64::from(u8::from(k == HALF)) - SMOOTHER[k] / 231.0;
+fn residual_covariance(lag: usize) -> f64 {
+    let left = |k: usize| f64::from(u8::from(k == SMOOTHER_HALF)) - SMOOTHER[k] / 231.0;
     (0..SMOOTHER.len() - lag).map(|k| left(k) * left(k + lag)).sum()
 }
 
@@ -116,7 +120,7 @@ pub fn correlated_variance(values: &[f64]) -> f64 {
         }
         time += 2.0 * product / square;
     }
-    square / (float(values.len()) - 3.0).max(1.0) * time
+    square / (to_f64(values.len()) - 3.0).max(1.0) * time
 }
 
 #[cfg(test)]
@@ -132,7 +136,7 @@ mod tests {
 
     fn found(values: &[f64]) -> f64 {
         let places: Vec<Option<f64>> = values.iter().copied().map(Some).collect();
-        inflation(&places, 1.0, &mut Vec::new()).unwrap()
+        variance_inflation(&places, 1.0, &mut Vec::new()).unwrap()
     }
 
     #[test]
@@ -143,7 +147,7 @@ mod tests {
         }
         let mut wavy = white(7, 64);
         for (k, value) in wavy.iter_mut().enumerate() {
-            *value += 8.0 * (float(k) / 8.0).sin();
+            *value += 8.0 * (to_f64(k) / 8.0).sin();
         }
         assert_eq!(found(&wavy), 1.0);
     }
@@ -154,11 +158,11 @@ mod tests {
             let all = white(seed, 64).into_iter().enumerate();
             all.map(|(k, at)| (k % 5 < 2).then_some(at)).collect()
         };
-        assert_eq!(inflation(&places(0), 1.0, &mut Vec::new()), None);
+        assert_eq!(variance_inflation(&places(0), 1.0, &mut Vec::new()), None);
         let of = |seed, variance| {
             let places = places(seed);
             inflation_with_gaps(
-                places.iter().flatten().map(|&px| Offset { px, share: 1.0 }),
+                places.iter().flatten().map(|&px| EdgeResidual { px, row_fraction: 1.0 }),
                 variance,
                 2,
             )

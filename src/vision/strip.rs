@@ -7,8 +7,8 @@
 use crate::core::frame::{Frame, Pixels};
 use crate::core::geometry::{ImagePoint, Roi};
 
-use super::gamma::Linear;
-use super::gauge::Axis;
+use super::gamma::LightTable;
+use super::gauge::BeadAxis;
 
 /// Side of the squares in which a region is turned: a row of one fits a register,
 /// and reading and writing stay in the cache.
@@ -16,21 +16,21 @@ const TILE: usize = 16;
 
 /// The gauge laid over an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct View {
+pub struct GaugeView {
     roi: Roi,
-    axis: Axis,
+    axis: BeadAxis,
     /// Number of pixels across the bead.
     pub across: usize,
     /// Number of pixels along the bead.
     pub along: usize,
 }
 
-impl View {
+impl GaugeView {
     /// Lays a region over an image.
-    pub fn new(roi: Roi, axis: Axis) -> Self {
+    pub fn new(roi: Roi, axis: BeadAxis) -> Self {
         let (across, along) = match axis {
-            Axis::Vertical => (roi.width, roi.height),
-            Axis::Horizontal => (roi.height, roi.width),
+            BeadAxis::Vertical => (roi.width, roi.height),
+            BeadAxis::Horizontal => (roi.height, roi.width),
         };
         Self { roi, axis, across, along }
     }
@@ -40,14 +40,14 @@ impl View {
     pub fn to_image(self, u: f64, v: f64) -> ImagePoint {
         let (x, y) = (self.roi.x as f64, self.roi.y as f64);
         match self.axis {
-            Axis::Vertical => ImagePoint::new(x + u, y + v),
-            Axis::Horizontal => ImagePoint::new(x + v, y + u),
+            BeadAxis::Vertical => ImagePoint::new(x + u, y + v),
+            BeadAxis::Horizontal => ImagePoint::new(x + v, y + u),
         }
     }
 }
 
 /// Grey values as the measurement takes them.
-pub trait Grey: Copy + Default + PartialOrd {
+pub trait GreyPixel: Copy + Default + PartialOrd {
     /// What the sum of up to 128 values fits.
     type Sum: Copy + Default;
     /// The value as a whole number.
@@ -59,10 +59,10 @@ pub trait Grey: Copy + Default + PartialOrd {
     /// A sum with this value.
     fn add_to(self, sum: Self::Sum) -> Self::Sum;
     /// A sum as a float.
-    fn float(sum: Self::Sum) -> f32;
+    fn sum_to_f32(sum: Self::Sum) -> f32;
 }
 
-impl Grey for u8 {
+impl GreyPixel for u8 {
     type Sum = u16;
 
     #[inline(always)]
@@ -86,12 +86,12 @@ impl Grey for u8 {
     }
 
     #[inline(always)]
-    fn float(sum: u16) -> f32 {
+    fn sum_to_f32(sum: u16) -> f32 {
         f32::from(sum)
     }
 }
 
-impl Grey for u16 {
+impl GreyPixel for u16 {
     type Sum = u32;
 
     #[inline(always)]
@@ -117,14 +117,14 @@ impl Grey for u16 {
 
     #[inline(always)]
     #[expect(clippy::cast_precision_loss, reason = "23 bits fit a float")]
-    fn float(sum: u32) -> f32 {
+    fn sum_to_f32(sum: u32) -> f32 {
         sum as f32
     }
 }
 
 /// The gauge's pixels, one row across the bead after the other.
 #[derive(Debug, Clone, Copy)]
-pub struct Strip<'a, T> {
+pub struct GaugeRows<'a, T> {
     values: &'a [T],
     stride: usize,
     /// Number of pixels across the bead.
@@ -139,7 +139,7 @@ pub struct Strip<'a, T> {
     pub level_step: f32,
 }
 
-impl<'a, T: Grey> Strip<'a, T> {
+impl<'a, T: GreyPixel> GaugeRows<'a, T> {
     /// One row across the bead.
     #[inline(always)]
     pub fn row(&self, v: usize) -> &'a [T] {
@@ -170,24 +170,24 @@ impl<'a, T: Grey> Strip<'a, T> {
 /// horizontal beads, which have to be turned, and for light where the camera has
 /// a gamma.
 #[derive(Debug, Clone, Default)]
-pub struct Turner {
+pub struct RowLayout {
     bytes: Vec<u8>,
     words: Vec<u16>,
     gamma: Option<f64>,
-    linear: Option<Linear>,
+    linear: Option<LightTable>,
     light: Vec<u16>,
 }
 
 /// A strip of either depth.
 #[derive(Debug, Clone, Copy)]
-pub enum Strips<'a> {
+pub enum GaugeRowsOfDepth<'a> {
     /// Of 8 bits.
-    Bytes(Strip<'a, u8>),
+    Bytes(GaugeRows<'a, u8>),
     /// Of 16 bits.
-    Words(Strip<'a, u16>),
+    Words(GaugeRows<'a, u16>),
 }
 
-impl Turner {
+impl RowLayout {
     /// For a camera with a gamma, or without one.
     pub fn new(gamma: Option<f64>) -> Self {
         Self { gamma, ..Self::default() }
@@ -199,21 +199,21 @@ impl Turner {
     pub fn strips<'a>(
         &'a mut self,
         frame: &'a Frame,
-        view: &View,
+        view: &GaugeView,
         white: Option<u16>,
-    ) -> Strips<'a> {
+    ) -> GaugeRowsOfDepth<'a> {
         match frame.pixels() {
             Pixels::Grey8(values) => {
                 let white = white.map_or(u8::MAX, |white| u8::try_from(white).unwrap_or(u8::MAX));
                 let strip = lay(values, frame.width(), view, white, &mut self.bytes);
-                let Some(gamma) = self.gamma else { return Strips::Bytes(strip) };
-                Strips::Words(to_light(&strip, gamma, &mut self.linear, &mut self.light))
+                let Some(gamma) = self.gamma else { return GaugeRowsOfDepth::Bytes(strip) };
+                GaugeRowsOfDepth::Words(to_light(&strip, gamma, &mut self.linear, &mut self.light))
             }
             Pixels::Grey16(values) => {
                 let white = white.unwrap_or(u16::MAX);
                 let strip = lay(values, frame.width(), view, white, &mut self.words);
-                let Some(gamma) = self.gamma else { return Strips::Words(strip) };
-                Strips::Words(to_light(&strip, gamma, &mut self.linear, &mut self.light))
+                let Some(gamma) = self.gamma else { return GaugeRowsOfDepth::Words(strip) };
+                GaugeRowsOfDepth::Words(to_light(&strip, gamma, &mut self.linear, &mut self.light))
             }
         }
     }
@@ -221,20 +221,20 @@ impl Turner {
 
 /// The light behind a strip's grey levels. The table is made for the first frame
 /// and kept.
-fn to_light<'a, T: Grey + Into<u16>>(
-    strip: &Strip<'_, T>,
+fn to_light<'a, T: GreyPixel + Into<u16>>(
+    strip: &GaugeRows<'_, T>,
     gamma: f64,
-    linear: &mut Option<Linear>,
+    linear: &mut Option<LightTable>,
     memory: &'a mut Vec<u16>,
-) -> Strip<'a, u16> {
+) -> GaugeRows<'a, u16> {
     let white = strip.white.into();
     let known = linear.take().filter(|linear| linear.is_for(gamma, white));
-    let linear = linear.insert(known.unwrap_or_else(|| Linear::new(gamma, white)));
+    let linear = linear.insert(known.unwrap_or_else(|| LightTable::new(gamma, white)));
     memory.clear();
     for v in 0..strip.along {
         memory.extend(strip.row(v).iter().map(|&level| linear.light(level.into())));
     }
-    Strip {
+    GaugeRows {
         values: memory,
         stride: strip.across,
         across: strip.across,
@@ -245,17 +245,17 @@ fn to_light<'a, T: Grey + Into<u16>>(
     }
 }
 
-fn lay<'a, T: Grey>(
+fn lay<'a, T: GreyPixel>(
     values: &'a [T],
     image_width: usize,
-    view: &View,
+    view: &GaugeView,
     white: T,
     memory: &'a mut Vec<T>,
-) -> Strip<'a, T> {
+) -> GaugeRows<'a, T> {
     let first = view.roi.y * image_width + view.roi.x;
     let (values, stride) = match view.axis {
-        Axis::Vertical => (&values[first..], image_width),
-        Axis::Horizontal => {
+        BeadAxis::Vertical => (&values[first..], image_width),
+        BeadAxis::Horizontal => {
             turn(&values[first..], image_width, view, memory);
             (memory.as_slice(), view.across)
         }
@@ -263,12 +263,12 @@ fn lay<'a, T: Grey>(
     #[expect(clippy::cast_precision_loss, reason = "16 bits fit a float")]
     let scale = 255.0 / white.level().max(1) as f32;
     let (across, along) = (view.across, view.along);
-    Strip { values, stride, across, along, white, scale, level_step: scale }
+    GaugeRows { values, stride, across, along, white, scale, level_step: scale }
 }
 
 /// Writes columns of the region as rows, tile by tile; what is left at the ends
 /// pixel by pixel.
-fn turn<T: Grey>(values: &[T], image_width: usize, view: &View, memory: &mut Vec<T>) {
+fn turn<T: GreyPixel>(values: &[T], image_width: usize, view: &GaugeView, memory: &mut Vec<T>) {
     memory.resize(view.across * view.along, T::default());
     let whole = |side: usize| side - side % TILE;
     for u in (0..whole(view.across)).step_by(TILE) {
@@ -294,7 +294,7 @@ fn turn<T: Grey>(values: &[T], image_width: usize, view: &View, memory: &mut Vec
 /// Rows become columns: each round interleaves the rows of the two halves, which
 /// processors do for whole rows at once.
 #[inline(always)]
-fn transposed<T: Grey>(mut tile: [[T; TILE]; TILE]) -> [[T; TILE]; TILE] {
+fn transposed<T: GreyPixel>(mut tile: [[T; TILE]; TILE]) -> [[T; TILE]; TILE] {
     const HALF: usize = TILE / 2;
     for _ in 0..TILE.ilog2() {
         let mut next = [[T::default(); TILE]; TILE];
@@ -328,10 +328,12 @@ mod tests {
     #[test]
     fn a_horizontal_bead_is_a_vertical_one_on_its_side() {
         let frame = ramp();
-        let mut turner = Turner::default();
-        for axis in [Axis::Vertical, Axis::Horizontal] {
-            let view = View::new(ROI, axis);
-            let Strips::Bytes(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
+        let mut turner = RowLayout::default();
+        for axis in [BeadAxis::Vertical, BeadAxis::Horizontal] {
+            let view = GaugeView::new(ROI, axis);
+            let GaugeRowsOfDepth::Bytes(strip) = turner.strips(&frame, &view, None) else {
+                unreachable!()
+            };
             for (v, u) in (0..view.along).flat_map(|v| (0..view.across).map(move |u| (v, u))) {
                 #[expect(clippy::cast_precision_loss, reason = "a few pixels")]
                 let at = view.to_image(u as f64, v as f64);
@@ -343,9 +345,11 @@ mod tests {
     #[test]
     fn beyond_a_row_its_last_pixel_goes_on() {
         let frame = ramp();
-        let mut turner = Turner::default();
-        let view = View::new(ROI, Axis::Vertical);
-        let Strips::Bytes(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
+        let mut turner = RowLayout::default();
+        let view = GaugeView::new(ROI, BeadAxis::Vertical);
+        let GaugeRowsOfDepth::Bytes(strip) = turner.strips(&frame, &view, None) else {
+            unreachable!()
+        };
         let mut out = [0; 4];
         strip.fetch(0, -2, &mut out);
         assert_eq!(out, [24, 24, 24, 28]);

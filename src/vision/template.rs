@@ -3,34 +3,34 @@
 
 use nalgebra::Matrix3;
 
-use super::overlay::Shape;
+use super::overlay::StepShape;
 use super::phase::{offset, split};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 pub mod textured;
 
 /// Pixels that are taken together.
 const LANES: usize = 16;
 /// Places between two pixels for which the edge is tabulated.
-const PHASES: usize = 8;
+const SUBPIXEL_PHASES: usize = 8;
 /// Chunks of the core at most: a blur of 12 px and more is cut short.
-const MAX_CORE: usize = 6;
+const MAX_CORE_CHUNKS: usize = 6;
 /// Chunks of the surroundings on either side at most.
-const MAX_PLAIN: usize = 2;
+const MAX_PLAIN_CHUNKS: usize = 2;
 /// Chunks at most: what the overlay reaches, rounded up.
 const MAX_CHUNKS: usize = 6;
 /// Half the core, in blurs and pixels beside.
 const CORE_BLURS: f64 = 3.5;
-const CORE_BESIDE_PX: f64 = 1.0;
+const CORE_MARGIN_PX: f64 = 1.0;
 /// Chunks of the core in textured surroundings, of which nothing is plain.
-const TEXTURED_CORE: usize = 4;
+const TEXTURED_CORE_CHUNKS: usize = 4;
 
 type Chunk = [f32; LANES];
 
 /// One chunk of pixels of the template.
 #[derive(Debug, Clone, Copy, Default)]
-struct Part {
+struct TemplateChunk {
     /// Share of the step that is reached, with shading.
     step: Chunk,
     /// 1 where the pixel counts.
@@ -62,8 +62,8 @@ pub struct Products {
 
 /// An edge of known blur and surroundings.
 #[derive(Debug, Clone)]
-pub struct Template {
-    parts: Vec<Part>,
+pub struct StepTemplate {
+    parts: Vec<TemplateChunk>,
     chunks: usize,
     core: std::ops::Range<usize>,
     /// Sums over the core.
@@ -77,7 +77,7 @@ pub struct RowSums {
     /// Residual times the slope of the step.
     pub slope: f32,
     /// Sum of the squared residuals.
-    pub squares: f32,
+    pub sum_of_squares: f32,
     /// Residual times the share before the edge.
     pub before: f32,
     /// Residual times the share after it.
@@ -89,7 +89,7 @@ pub struct RowSums {
 impl RowSums {
     /// Of a row whose edge lies beyond what was read of it.
     pub const OUT_OF_SIGHT: Self =
-        Self { slope: 0.0, squares: 0.0, before: 0.0, after: 0.0, wild: f32::INFINITY };
+        Self { slope: 0.0, sum_of_squares: 0.0, before: 0.0, after: 0.0, wild: f32::INFINITY };
 }
 
 /// Plain pixels that count and their residuals, over several rows, lane by
@@ -114,7 +114,7 @@ impl PlainSums {
 
 /// Place and levels that a row is held against.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Expected {
+pub struct ExpectedStep {
     /// Position of the edge \[px\], within a sixteenth of a pixel of the one that
     /// was asked for: a pixel and a phase.
     pub at: f32,
@@ -132,23 +132,23 @@ pub struct Expected {
     pub tolerance_at_step: f32,
 }
 
-impl Expected {
+impl ExpectedStep {
     /// A place, the level before it and the step to the level after it, and how
     /// far pixels may be off beside the step and on it.
     #[inline(always)]
     pub fn new([at, before, step]: [f32; 3], tolerances: [f32; 2]) -> Self {
-        let (place, phase) = split(at, PHASES);
+        let (place, phase) = split(at, SUBPIXEL_PHASES);
         #[expect(clippy::cast_precision_loss, reason = "a place near the gauge, few phases")]
-        let at = place as f32 + phase as f32 / PHASES as f32;
+        let at = place as f32 + phase as f32 / SUBPIXEL_PHASES as f32;
         let [tolerance, tolerance_at_step] = tolerances;
         Self { at, place, phase, before, step, tolerance, tolerance_at_step }
     }
 }
 
-impl Default for Template {
+impl Default for StepTemplate {
     fn default() -> Self {
         Self {
-            parts: vec![Part::default(); PHASES * MAX_CHUNKS],
+            parts: vec![TemplateChunk::default(); SUBPIXEL_PHASES * MAX_CHUNKS],
             chunks: 0,
             core: 0..0,
             products: Products::default(),
@@ -156,33 +156,34 @@ impl Default for Template {
     }
 }
 
-impl Template {
+impl StepTemplate {
     /// How far the core reaches to either side for a blur \[px\].
     pub fn core_half(blur: f64) -> f64 {
-        let half = CORE_BLURS * blur + CORE_BESIDE_PX;
-        float(chunks(2.0 * half).clamp(1, MAX_CORE) * LANES / 2)
+        let half = CORE_BLURS * blur + CORE_MARGIN_PX;
+        to_f64(chunks(2.0 * half).clamp(1, MAX_CORE_CHUNKS) * LANES / 2)
     }
 
     /// Tabulates an edge.
     #[inline(always)]
-    pub fn tabulate(&mut self, table: &StepTable, shape: &Shape, textured: bool) {
-        let half = CORE_BLURS * shape.step.blur + CORE_BESIDE_PX;
-        let core = chunks(2.0 * half).clamp(if textured { TEXTURED_CORE } else { 1 }, MAX_CORE);
+    pub fn tabulate(&mut self, table: &StepTable, shape: &StepShape, textured: bool) {
+        let half = CORE_BLURS * shape.step.blur + CORE_MARGIN_PX;
+        let core = chunks(2.0 * half)
+            .clamp(if textured { TEXTURED_CORE_CHUNKS } else { 1 }, MAX_CORE_CHUNKS);
         // A step that goes on beyond the core leaves nothing plain.
-        let too_long = 2.0 * half > float(MAX_CORE * LANES);
+        let too_long = 2.0 * half > to_f64(MAX_CORE_CHUNKS * LANES);
         let room = MAX_CHUNKS.saturating_sub(core) / 2;
-        let plain = if textured || too_long { 0 } else { room.min(MAX_PLAIN) };
-        let half = float(core * LANES / 2);
+        let plain = if textured || too_long { 0 } else { room.min(MAX_PLAIN_CHUNKS) };
+        let half = to_f64(core * LANES / 2);
         let before = chunks(shape.extent.before - half).min(plain);
         let after = chunks(shape.extent.after - half).min(plain);
         self.chunks = before + core + after;
         self.core = before..before + core;
         let mut products = Products::default();
-        for phase in 0..PHASES {
+        for phase in 0..SUBPIXEL_PHASES {
             for chunk in 0..self.chunks {
                 let part = &mut self.parts[phase * MAX_CHUNKS + chunk];
-                let first = float(chunk * LANES) - float(before * LANES) - half;
-                let first = first - offset(phase, PHASES);
+                let first = to_f64(chunk * LANES) - to_f64(before * LANES) - half;
+                let first = first - offset(phase, SUBPIXEL_PHASES);
                 if self.core.contains(&chunk) {
                     fill_core(part, table, shape, first);
                     products.add(part);
@@ -201,7 +202,7 @@ impl Template {
     /// there are none.
     pub fn plain_pixels(&self) -> [f64; 2] {
         let parts = &self.parts[..self.chunks];
-        let count = |parts: &[Part]| -> f64 {
+        let count = |parts: &[TemplateChunk]| -> f64 {
             parts.iter().flat_map(|part| part.mask).map(f64::from).sum::<f64>().max(0.5)
         };
         [count(&parts[..self.core.start]), count(&parts[self.core.end..])]
@@ -210,13 +211,13 @@ impl Template {
     /// Holds a window against the edge; `None` where the edge lies too near its
     /// end.
     #[inline(always)]
-    pub fn hold(
+    pub fn compare(
         &self,
         (pixels, first): (&[f32], isize),
-        expected: &Expected,
+        expected: &ExpectedStep,
         plain: &mut PlainSums,
     ) -> Option<RowSums> {
-        let Expected { place, phase, .. } = *expected;
+        let ExpectedStep { place, phase, .. } = *expected;
         let reach = (self.core.start * LANES + self.core.len() * LANES / 2).cast_signed();
         let start = usize::try_from(place - reach - first).ok()?;
         let pixels = pixels.get(start..start + self.chunks * LANES)?;
@@ -227,9 +228,9 @@ impl Template {
     #[inline(always)]
     fn sum(
         &self,
-        parts: &[Part],
+        parts: &[TemplateChunk],
         pixels: &[f32],
-        expected: &Expected,
+        expected: &ExpectedStep,
         plain: &mut PlainSums,
     ) -> RowSums {
         let (before, rest) = parts.split_at(self.core.start);
@@ -252,12 +253,17 @@ impl Template {
         add_plain(before, pixels_before, expected, &mut plain.before);
         add_plain(after, pixels_after, expected, &mut plain.after);
         let [slope, squares, all, after, wild] = lanes.map(|lanes| total(&lanes));
-        RowSums { slope, squares, before: all - after, after, wild }
+        RowSums { slope, sum_of_squares: squares, before: all - after, after, wild }
     }
 }
 
 #[inline(always)]
-fn add_plain(parts: &[Part], pixels: &[f32], expected: &Expected, [count, sum]: &mut [Chunk; 2]) {
+fn add_plain(
+    parts: &[TemplateChunk],
+    pixels: &[f32],
+    expected: &ExpectedStep,
+    [count, sum]: &mut [Chunk; 2],
+) {
     for (part, pixels) in parts.iter().zip(pixels.chunks_exact(LANES)) {
         for k in 0..LANES {
             let miss = residual(part, k, pixels[k], expected);
@@ -269,7 +275,7 @@ fn add_plain(parts: &[Part], pixels: &[f32], expected: &Expected, [count, sum]: 
 }
 
 #[inline(always)]
-fn residual(part: &Part, k: usize, pixel: f32, expected: &Expected) -> f32 {
+fn residual(part: &TemplateChunk, k: usize, pixel: f32, expected: &ExpectedStep) -> f32 {
     pixel - expected.before - expected.step * part.step[k]
 }
 
@@ -289,10 +295,10 @@ fn total(lanes: &Chunk) -> f32 {
 /// Fills a chunk of the core whose first pixel lies at a distance from the edge.
 #[expect(clippy::cast_possible_truncation, reason = "shares and slopes of a step")]
 #[inline(always)]
-fn fill_core(part: &mut Part, table: &StepTable, shape: &Shape, first: f64) {
+fn fill_core(part: &mut TemplateChunk, table: &StepTable, shape: &StepShape, first: f64) {
     let (blur, per_blur) = (shape.step.blur, 1.0 / shape.step.blur);
     for k in 0..LANES {
-        let distance = first + float(k);
+        let distance = first + to_f64(k);
         let z = distance * per_blur;
         let (step, density, [falling, rising]) = table.with_slopes(z);
         let shading = blur * (shape.shading[0].slope * falling + shape.shading[1].slope * rising);
@@ -308,7 +314,7 @@ fn fill_core(part: &mut Part, table: &StepTable, shape: &Shape, first: f64) {
 /// The same of the surroundings, on one side of the edge.
 #[expect(clippy::cast_possible_truncation, reason = "distances and slopes")]
 #[inline(always)]
-fn fill_plain(part: &mut Part, shape: &Shape, first: f64) {
+fn fill_plain(part: &mut TemplateChunk, shape: &StepShape, first: f64) {
     let (first, after) = (first as f32, first > 0.0);
     let (step, extent, shading) = if after {
         (1.0, shape.extent.after as f32, shape.shading[1].slope as f32)
@@ -328,11 +334,11 @@ fn fill_plain(part: &mut Part, shape: &Shape, first: f64) {
 /// Adds bent shading and the tails of steps beside the edge.
 #[cold]
 #[expect(clippy::cast_possible_truncation, reason = "shares of a step")]
-fn add_bends(part: &mut Part, table: &StepTable, shape: &Shape, first: f64) {
+fn add_bends(part: &mut TemplateChunk, table: &StepTable, shape: &StepShape, first: f64) {
     let blur = shape.step.blur;
     let [bend_before, bend_after] = shape.shading.map(|shading| shading.bend * blur * blur);
     for (k, level) in part.step.iter_mut().enumerate() {
-        let away = first + float(k);
+        let away = first + to_f64(k);
         let z = away / blur;
         let (step, density) = table.at(z);
         // Squares of the distances on one side, blurred.
@@ -346,7 +352,7 @@ fn add_bends(part: &mut Part, table: &StepTable, shape: &Shape, first: f64) {
 
 impl Products {
     #[inline(always)]
-    fn add(&mut self, part: &Part) {
+    fn add(&mut self, part: &TemplateChunk) {
         let mut lanes = [[0.0f32; LANES]; 7];
         for k in 0..LANES {
             let (mask, after, slope) = (part.mask[k], part.after[k], part.slope[k]);
@@ -391,7 +397,7 @@ impl Products {
     }
 
     fn mean(self) -> Self {
-        let share = 1.0 / float(PHASES);
+        let share = 1.0 / to_f64(SUBPIXEL_PHASES);
         Self {
             slope_slope: share * self.slope_slope,
             slope_before: share * self.slope_before,
@@ -411,5 +417,5 @@ impl Products {
     reason = "not negative, and a window is short"
 )]
 fn chunks(pixels: f64) -> usize {
-    (pixels.max(0.0) / float(LANES)).ceil() as usize
+    (pixels.max(0.0) / to_f64(LANES)).ceil() as usize
 }

@@ -4,34 +4,34 @@
 
 use std::sync::LazyLock;
 
-use super::overlay::{Distances, Overlay};
-use crate::numeric::number::float;
+use super::overlay::{Overlay, SideRange};
+use crate::numeric::number::to_f64;
 
 /// Variance of the rows about an edge, in that of their noise, from which on
 /// they are looked at for texture: noise alone, in 100 rows, has less in all but one of
 /// a hundred.
-const NOTABLE: f64 = 1.12;
+const MIN_VARIANCE_RATIO: f64 = 1.12;
 /// Rows differ more about the edge than beside it where the edge is no blurred
 /// step or does not lie where it is thought; by more than so many times, and it
 /// is not texture that makes them differ.
-const AT_EDGE: f64 = 1.6;
+const MAX_EDGE_RATIO: f64 = 1.6;
 /// Least variance of a texture, in that of the noise.
-const LEAST: f64 = 0.1;
+const MIN_TEXTURE_RATIO: f64 = 0.1;
 /// Longest texture \[px\]: what changes more slowly is light, or the bead's
 /// shape, which the levels of the caliper lines follow.
-const LONGEST_PX: f64 = 11.0;
+const MAX_LENGTH_PX: f64 = 11.0;
 /// Variance of the texture on one side over that on the other below which they differ.
-const ONE_SIDE: f64 = 0.25;
+const MAX_SIDE_RATIO: f64 = 0.25;
 /// Samples beyond so many standard deviations are grains and sparks.
-const MANY_SIGMA: f64 = 4.0;
+const OUTLIER_SIGMAS: f64 = 4.0;
 /// Rows that differ by so many medians of what rows do have one on them.
-const UNLIKE: f32 = 4.0;
+const MAX_ROW_MISFIT: f32 = 4.0;
 /// Distances at which samples are compared \[px\], up to.
 const LAGS: usize = 8;
 /// Samples of a side that are needed for that.
-const LEAST_ROOM: usize = 2 * LAGS;
+const MIN_SIDE_PX: usize = 2 * LAGS;
 /// Longest stretch of a row on one side of the edge \[px\].
-const MOST_ROOM: usize = 40;
+const MAX_SIDE_PX: usize = 40;
 
 /// Autocorrelations exp(−(r/length)^power) that are tried, up to 19 px.
 const POWERS: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
@@ -39,14 +39,14 @@ const LENGTHS: usize = 30;
 const FIRST_LENGTH_PX: f64 = 0.7;
 const LENGTH_RATIO: f64 = 1.12;
 /// Rows of a window at most; more are taken for so many.
-const MOST_ROWS: usize = 8;
+const MAX_ROWS: usize = 8;
 /// Table of their integrals along the edge: places for a length, lengths.
 const PER_LENGTH: usize = 8;
-const REACH: usize = 12;
+const TABLE_LENGTHS: usize = 12;
 
 /// Texture and noise about an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Texture {
+pub struct SurfaceTexture {
     /// Variance of the noise, which every pixel has for itself.
     pub noise: f64,
     /// Variance of the texture.
@@ -58,22 +58,22 @@ pub struct Texture {
     /// Rows of a window, and the share of the texture that is left of it in
     /// their mean.
     rows: f64,
-    kept: f64,
+    kept_fraction: f64,
     /// Standard deviations before and after the edge, over the root of their mean square.
     sides: [f64; 2],
 }
 
-impl Texture {
+impl SurfaceTexture {
     /// Reads it from windows laid over each other, `None` where there is no
     /// texture to speak of. `noise` is the variance of a pixel, all variances
     /// are in squared shares of the step; `beside` are the pixels that are free of
     /// the edge, before it and after it.
     #[inline(always)]
-    pub fn read(overlay: &Overlay, noise: f64, beside: [Distances; 2]) -> Option<Self> {
+    pub fn read(overlay: &Overlay, noise: f64, beside: [SideRange; 2]) -> Option<Self> {
         let (rows, windows) = overlay.laid();
         let rows = rows / windows.max(1.0);
-        let about_edge = rows * overlay.unlikeness();
-        if about_edge < NOTABLE * noise {
+        let about_edge = rows * overlay.row_variance();
+        if about_edge < MIN_VARIANCE_RATIO * noise {
             return None;
         }
         Self::find(overlay, rows, about_edge, noise, beside)
@@ -84,23 +84,33 @@ impl Texture {
         rows: f64,
         about_edge: f64,
         noise: f64,
-        beside: [Distances; 2],
+        beside: [SideRange; 2],
     ) -> Option<Self> {
         let Covariances { all, sides } =
-            covariances(overlay, beside, MANY_SIGMA * (about_edge / rows).sqrt())?;
-        if rows * all[0] < (1.0 + LEAST) * noise || about_edge > AT_EDGE * rows * all[0] {
+            covariances(overlay, beside, OUTLIER_SIGMAS * (about_edge / rows).sqrt())?;
+        if rows * all[0] < (1.0 + MIN_TEXTURE_RATIO) * noise
+            || about_edge > MAX_EDGE_RATIO * rows * all[0]
+        {
             return None;
         }
-        let Fit { power, length, variance, kept } = TABLES.fit(&all, rows);
-        if length > LONGEST_PX {
+        let AutocorrelationFit { power, length, variance, kept } = TABLES.fit(&all, rows);
+        if length > MAX_LENGTH_PX {
             return None;
         }
         // What neighbouring rows differ by, as noise is found, has a little of
         // the texture in it.
         let noise = (rows * (all[0] - kept * variance)).clamp(0.25 * noise, 1.1 * noise);
         let sides = sides.map(|side| side.map(|all| (rows * all - noise).max(0.0)));
-        let texture = Self { noise, variance, length, power, rows, kept, sides: shares(sides) };
-        (rows * kept * variance > LEAST * noise).then_some(texture)
+        let texture = Self {
+            noise,
+            variance,
+            length,
+            power,
+            rows,
+            kept_fraction: kept,
+            sides: side_levels(sides),
+        };
+        (rows * kept * variance > MIN_TEXTURE_RATIO * noise).then_some(texture)
     }
 
     /// With grey levels instead of shares of a step.
@@ -111,7 +121,7 @@ impl Texture {
 
     /// Variance of the mean of a window's rows, without noise.
     pub fn of_window(&self) -> f64 {
-        self.kept * self.variance
+        self.kept_fraction * self.variance
     }
 
     /// Variance of the noise in it.
@@ -121,7 +131,7 @@ impl Texture {
 
     /// Standard deviation where a share of the edge's step is reached, over the root of its
     /// mean square before and after the edge.
-    pub fn beside(&self, step: f64) -> f64 {
+    pub fn level_at(&self, step: f64) -> f64 {
         let [before, after] = self.sides;
         before * (1.0 - step) + after * step
     }
@@ -148,9 +158,9 @@ impl Texture {
 
     /// Squared correlation of pixels, summed up over a window: so many of them
     /// say of its strength what one alone does.
-    pub fn pixels_alike(&self) -> f64 {
+    pub fn effective_pixels(&self) -> f64 {
         let all = self.of_window() + self.noise_of_window();
-        let shared = |lag: usize| (self.within_window(float(lag)) / all).powi(2);
+        let shared = |lag: usize| (self.within_window(to_f64(lag)) / all).powi(2);
         (1..=LAGS).fold(1.0, |sum, lag| sum + 2.0 * shared(lag))
     }
 }
@@ -166,9 +176,9 @@ struct Covariances {
 /// Standard deviations before and after the edge, over the root of their mean square, from
 /// variances: weights for the same texture on both sides believe that what they see on the one
 /// tells them of the other.
-fn shares(sides: [Option<f64>; 2]) -> [f64; 2] {
+fn side_levels(sides: [Option<f64>; 2]) -> [f64; 2] {
     match sides {
-        [Some(before), Some(after)] if before.min(after) < ONE_SIDE * before.max(after) => {
+        [Some(before), Some(after)] if before.min(after) < MAX_SIDE_RATIO * before.max(after) => {
             let mean = f64::midpoint(before, after);
             [before, after].map(|side| (side / mean).sqrt())
         }
@@ -177,20 +187,20 @@ fn shares(sides: [Option<f64>; 2]) -> [f64; 2] {
 }
 
 /// Covariances over all rows but those with a grain; `None` where there is too little room.
-fn covariances(overlay: &Overlay, beside: [Distances; 2], limit: f64) -> Option<Covariances> {
+fn covariances(overlay: &Overlay, beside: [SideRange; 2], limit: f64) -> Option<Covariances> {
     let mut sums = [0.0; LAGS + 1];
     let mut counts = [0.0; LAGS + 1];
     let mut sides = [None; 2];
     #[expect(clippy::cast_possible_truncation, reason = "a share of a step")]
     let limit = limit as f32;
-    for (side, Distances { near, far }) in beside.into_iter().enumerate() {
+    for (side, SideRange { near, far }) in beside.into_iter().enumerate() {
         let (sum_before, count_before) = (sums[0], counts[0]);
-        let length = far.saturating_sub(near).min(MOST_ROOM);
-        if length < LEAST_ROOM {
+        let length = far.saturating_sub(near).min(MAX_SIDE_PX);
+        if length < MIN_SIDE_PX {
             continue;
         }
-        let mut off = [0.0f32; MOST_ROOM];
-        for (row, mean) in overlay.rows_like_others(UNLIKE) {
+        let mut off = [0.0f32; MAX_SIDE_PX];
+        for (row, mean) in overlay.typical_rows(MAX_ROW_MISFIT) {
             let centre = row.len() / 2;
             let first = if side == 0 { centre - near - length } else { centre + near };
             let both = row[first..first + length].iter().zip(&mean[first..first + length]);
@@ -199,7 +209,7 @@ fn covariances(overlay: &Overlay, beside: [Distances; 2], limit: f64) -> Option<
             }
             for (lag, (sum, count)) in sums.iter_mut().zip(&mut counts).enumerate() {
                 *sum += f64::from(product(&off[..length - lag], &off[lag..length]));
-                *count += float(length - lag);
+                *count += to_f64(length - lag);
             }
         }
         sides[side] = Some((sums[0] - sum_before) / (counts[0] - count_before).max(1.0));
@@ -236,7 +246,7 @@ fn correlation(distance: f64, power: f64) -> f64 {
 }
 
 /// What a texture is like.
-struct Fit {
+struct AutocorrelationFit {
     power: usize,
     length: f64,
     variance: f64,
@@ -249,44 +259,45 @@ type OfWindows = [[[f64; LAGS + 1]; LENGTHS]; POWERS.len()];
 
 /// Covariances of windows of each number of rows, and for each power sums along
 /// the edge.
-struct Tables {
+struct TextureTables {
     windows: Vec<OfWindows>,
-    integrals: [[f64; REACH * PER_LENGTH + 1]; POWERS.len()],
+    integrals: [[f64; TABLE_LENGTHS * PER_LENGTH + 1]; POWERS.len()],
 }
 
-static TABLES: LazyLock<Tables> = LazyLock::new(Tables::new);
+static TABLES: LazyLock<TextureTables> = LazyLock::new(TextureTables::new);
 
-impl Tables {
+impl TextureTables {
     fn new() -> Self {
         Self {
-            windows: (1..=MOST_ROWS).map(of_windows).collect(),
+            windows: (1..=MAX_ROWS).map(of_windows).collect(),
             integrals: POWERS.map(sums_along),
         }
     }
 
     /// What texture explains the covariances of windows of so many rows best.
     /// Those of pixels with themselves have noise in them and are passed over.
-    fn fit(&self, covariances: &[f64; LAGS + 1], rows: f64) -> Fit {
-        let rows = rows.clamp(1.0, float(MOST_ROWS));
-        let fewer = (1..MOST_ROWS).rfind(|&few| float(few) <= rows).unwrap_or(1);
-        let share = rows - float(fewer);
-        let (fewer, more) = (&self.windows[fewer - 1], &self.windows[fewer.min(MOST_ROWS - 1)]);
+    fn fit(&self, covariances: &[f64; LAGS + 1], rows: f64) -> AutocorrelationFit {
+        let rows = rows.clamp(1.0, to_f64(MAX_ROWS));
+        let fewer = (1..MAX_ROWS).rfind(|&few| to_f64(few) <= rows).unwrap_or(1);
+        let share = rows - to_f64(fewer);
+        let (fewer, more) = (&self.windows[fewer - 1], &self.windows[fewer.min(MAX_ROWS - 1)]);
         let mut best = 0.0;
-        let mut fit = Fit { power: 0, length: FIRST_LENGTH_PX, variance: 0.0, kept: 1.0 };
+        let mut fit =
+            AutocorrelationFit { power: 0, length: FIRST_LENGTH_PX, variance: 0.0, kept: 1.0 };
         for (power, (fewer, more)) in fewer.iter().zip(more).enumerate() {
             for (number, (fewer, more)) in fewer.iter().zip(more).enumerate() {
                 let model = |lag: usize| fewer[lag] + share * (more[lag] - fewer[lag]);
                 let (mut product, mut square) = (0.0, 0.0);
                 for (lag, found) in covariances.iter().enumerate().skip(1) {
                     let model = model(lag);
-                    product += model * found / float(lag);
-                    square += model * model / float(lag);
+                    product += model * found / to_f64(lag);
+                    square += model * model / to_f64(lag);
                 }
                 let explained = product * product.max(0.0) / square;
                 if explained > best {
                     best = explained;
                     let (length, variance) = (length(number), product / square);
-                    fit = Fit { power, length, variance, kept: model(0) };
+                    fit = AutocorrelationFit { power, length, variance, kept: model(0) };
                 }
             }
         }
@@ -296,7 +307,7 @@ impl Tables {
     /// Autocorrelation of a texture of length 1 at a distance across, summed up
     /// along the edge.
     fn along(&self, power: usize, distance: f64) -> f64 {
-        let place = distance * float(PER_LENGTH);
+        let place = distance * to_f64(PER_LENGTH);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -307,7 +318,7 @@ impl Tables {
         let (Some(here), Some(next)) = (values.get(below), values.get(below + 1)) else {
             return 0.0;
         };
-        here + (place - float(below)) * (next - here)
+        here + (place - to_f64(below)) * (next - here)
     }
 }
 
@@ -315,8 +326,8 @@ fn of_windows(rows: usize) -> OfWindows {
     POWERS.map(|power| {
         std::array::from_fn(|number| {
             std::array::from_fn(|lag| {
-                let distance = |apart: usize| float(lag).hypot(float(apart)) / length(number);
-                let along: [f64; MOST_ROWS] =
+                let distance = |apart: usize| to_f64(lag).hypot(to_f64(apart)) / length(number);
+                let along: [f64; MAX_ROWS] =
                     std::array::from_fn(|apart| correlation(distance(apart), power));
                 mean_of_pairs(&along[..rows])
             })
@@ -326,12 +337,12 @@ fn of_windows(rows: usize) -> OfWindows {
 
 /// Autocorrelation of a texture of length 1 summed up along the edge, at
 /// distances across.
-fn sums_along(power: f64) -> [f64; REACH * PER_LENGTH + 1] {
-    let step = 1.0 / float(PER_LENGTH);
+fn sums_along(power: f64) -> [f64; TABLE_LENGTHS * PER_LENGTH + 1] {
+    let step = 1.0 / to_f64(PER_LENGTH);
     std::array::from_fn(|place| {
-        let across = step * float(place);
-        let at = |k: usize| correlation(across.hypot(step * float(k)), power);
-        step * (1..REACH * PER_LENGTH).fold(at(0), |sum, k| sum + 2.0 * at(k))
+        let across = step * to_f64(place);
+        let at = |k: usize| correlation(across.hypot(step * to_f64(k)), power);
+        step * (1..TABLE_LENGTHS * PER_LENGTH).fold(at(0), |sum, k| sum + 2.0 * at(k))
     })
 }
 
@@ -340,14 +351,14 @@ fn mean_of_pairs(by_distance: &[f64]) -> f64 {
     let rows = by_distance.len();
     let pairs = by_distance.iter().enumerate().map(|(apart, value)| {
         let pairs = if apart == 0 { rows } else { 2 * (rows - apart) };
-        float(pairs) * value
+        to_f64(pairs) * value
     });
-    pairs.sum::<f64>() / float(rows * rows)
+    pairs.sum::<f64>() / to_f64(rows * rows)
 }
 
 /// The lengths that are tried \[px\].
 fn length(number: usize) -> f64 {
-    FIRST_LENGTH_PX * LENGTH_RATIO.powf(float(number))
+    FIRST_LENGTH_PX * LENGTH_RATIO.powf(to_f64(number))
 }
 
 #[cfg(test)]
@@ -359,12 +370,12 @@ mod tests {
         for (power, wanted, rows) in [(0, 4.0, 1), (2, 3.0, 3), (4, 5.5, 6)] {
             let mut covariances = [0.0; LAGS + 1];
             for (lag, value) in covariances.iter_mut().enumerate() {
-                let at = |apart: usize| float(lag).hypot(float(apart)) / wanted;
+                let at = |apart: usize| to_f64(lag).hypot(to_f64(apart)) / wanted;
                 let along: Vec<f64> =
                     (0..rows).map(|apart| 3.0 * correlation(at(apart), POWERS[power])).collect();
                 *value = mean_of_pairs(&along);
             }
-            let fit = TABLES.fit(&covariances, float(rows));
+            let fit = TABLES.fit(&covariances, to_f64(rows));
             assert_eq!(fit.power, power);
             assert!((fit.length / wanted - 1.0).abs() < 0.07, "{}", fit.length);
             assert!((fit.variance / 3.0 - 1.0).abs() < 0.1, "{}", fit.variance);
@@ -373,22 +384,22 @@ mod tests {
 
     #[test]
     fn a_texture_is_one_sides_where_the_other_has_hardly_any() {
-        assert_eq!(shares([Some(3.0), Some(5.0)]), [1.0; 2]);
-        assert_eq!(shares([None, Some(5.0)]), [1.0; 2]);
-        let [before, after] = shares([Some(0.0), Some(5.0)]);
+        assert_eq!(side_levels([Some(3.0), Some(5.0)]), [1.0; 2]);
+        assert_eq!(side_levels([None, Some(5.0)]), [1.0; 2]);
+        let [before, after] = side_levels([Some(0.0), Some(5.0)]);
         assert_eq!(before, 0.0);
         assert!((after * after - 2.0).abs() < 1e-12, "{after}");
     }
 
     #[test]
     fn sums_along_the_edge_are_those_of_a_gaussian() {
-        let texture = Texture {
+        let texture = SurfaceTexture {
             noise: 1.0,
             variance: 4.0,
             length: 4.0,
             power: 4,
             rows: 1.0,
-            kept: 1.0,
+            kept_fraction: 1.0,
             sides: [1.0; 2],
         };
         for distance in [0.0, 1.3, 5.0, 60.0] {

@@ -14,46 +14,49 @@ mod rows;
 mod winding;
 
 use super::blur_estimate::BlurEstimate;
-use super::clipped_step::CutOff;
-use super::edge_windows::{Grouping, Sheet};
+use super::clipped_step::ClippedEdge;
+use super::edge_windows::{EdgeWindows, Grouping};
 use super::light::Surroundings;
-use super::located::{self, Located};
-use super::overlay::{EdgeSkew, Extent, Look, Overlay, REACH, Shape, Step};
-use super::path::{self, Correction, Course};
+use super::located::{self, CaliperEdge};
+use super::overlay::{BlurredStep, EdgeSkew, Extent, HALF_SPAN, Overlay, StepFit, StepShape};
+use super::path::{self, EdgeCorrection, EdgeTrajectory};
 use super::pool::Bands;
-use super::refine::{Refiner, Task};
+use super::refine::{LineRefiner, RefinerInput};
 use super::rough::RoughFit;
 use super::row_range::RowRange;
-use super::strip::{Grey, Strip};
-use super::texture::Texture;
+use super::strip::{GaugeRows, GreyPixel};
+use super::texture::SurfaceTexture;
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::{float, narrow};
-use parts::{BandValues, Occlusion, RowFit, Scratch, State, Textured, Uncertainty, Winding};
+use crate::numeric::number::{narrow_to_f32, to_f64};
+use parts::{
+    BandValues, EdgeState, EdgeUncertainty, Occlusion, RowFit, TexturedFit, TraceScratch,
+    WindingState,
+};
 
 /// Passes over the rows at most; a second one is made only where the first
 /// path was off by a good part of the blur.
 const MAX_PASSES: usize = 3;
 /// Distance of the path from the edge from which on pixels are read anew \[px\].
-const FAR_ASIDE_PX: f64 = 4.0;
+const MAX_PATH_OFFSET_PX: f64 = 4.0;
 /// Share of the blur by which a path may be off.
-const NEAR_ENOUGH: f64 = 0.2;
+const MAX_PATH_ERROR_BLURS: f64 = 0.2;
 /// Standard deviations beyond which a pixel or a row is not noise.
-const MANY_SIGMA: f32 = 4.5;
+const NOISE_SIGMAS: f32 = 4.5;
 /// Rows that are taken together at most.
-const MOST_TOGETHER: usize = 8;
+const MAX_GROUP_ROWS: usize = 8;
 /// Misfit up to which an edge is a blurred step for certain.
-const GOOD_FIT: f64 = 1.5;
+const MAX_STEP_MISFIT: f64 = 1.5;
 /// Share of the rows from which on an edge is taken to be covered in part.
-const COVERED_SHARE: f64 = 0.03;
+const MAX_UNFIT_FRACTION: f64 = 0.03;
 /// Misfit of the clear rows from which on the edge is not covered, but no blurred
 /// step at all.
-const CLEAR_FIT: f64 = 1.25;
+const MAX_CLEAR_MISFIT: f64 = 1.25;
 
 /// What is looked at.
 #[derive(Debug, Clone, Copy)]
-pub struct Scene<'a, T> {
+pub struct TraceInput<'a, T> {
     /// The gauge's pixels.
-    pub strip: &'a Strip<'a, T>,
+    pub strip: &'a GaugeRows<'a, T>,
     /// Its bands.
     pub bands: &'a Bands,
     /// Rows of its caliper lines.
@@ -68,44 +71,44 @@ pub struct Scene<'a, T> {
 
 /// Traces one edge of the bead; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
-pub struct Tracer {
+pub struct EdgeTracer {
     values: BandValues,
-    course: Course,
+    course: EdgeTrajectory,
     /// A course along bands with levels that were picked anew.
-    levels: Course,
-    winding: Winding,
-    sheet: Sheet,
+    levels: EdgeTrajectory,
+    winding: WindingState,
+    sheet: EdgeWindows,
     overlay: Overlay,
-    seen: Option<Look>,
+    step_fit: Option<StepFit>,
     /// What was read of the edge, and how far aside of the course it was \[px\].
-    shape: Option<Shape>,
+    shape: Option<StepShape>,
     aside_px: f64,
-    textured: Textured,
+    textured: TexturedFit,
     row_fit: RowFit,
     occlusion: Occlusion,
-    refiner: Refiner,
-    cut_off: CutOff,
-    scratch: Scratch,
-    edges: Vec<Option<Located>>,
-    state: State,
+    refiner: LineRefiner,
+    cut_off: ClippedEdge,
+    scratch: TraceScratch,
+    edges: Vec<Option<CaliperEdge>>,
+    state: EdgeState,
     /// Share of the rows that did not fit.
-    unfit: f64,
+    unfit_fraction: f64,
     /// What a row in the median leaves of the step that it is held against, in
     /// standard deviations of its noise; about 1 where the edge is one.
     pub misfit: f64,
     /// Rows that were held together at most.
-    together: f64,
+    max_group_rows: f64,
     /// Blur of the edge \[px\].
     pub blur_px: f64,
     /// Whether ground lies beside it, no groove.
     pub is_on_ground: bool,
     /// How sure its places are, beside what each says.
-    pub uncertainty: Uncertainty,
+    pub uncertainty: EdgeUncertainty,
 }
 
-impl Tracer {
+impl EdgeTracer {
     /// Takes over places that were found without a model of the flank.
-    pub fn take_rough(&mut self, places: &[Option<Located>], fit: &RoughFit) {
+    pub fn take_rough(&mut self, places: &[Option<CaliperEdge>], fit: &RoughFit) {
         self.edges.clear();
         self.edges.extend_from_slice(places);
         self.blur_px = fit.blur_px;
@@ -114,76 +117,77 @@ impl Tracer {
         (self.uncertainty.along_px, self.uncertainty.lines_fraction) =
             (fit.along_px, fit.lines_fraction);
         self.misfit = f64::INFINITY;
-        self.state = State::Open;
+        self.state = EdgeState::Clear;
         self.is_on_ground = fit.is_on_ground && !fit.is_groove;
     }
 
     /// The edges of the last frame, band by band.
-    pub fn edges(&self) -> &[Option<Located>] {
+    pub fn edges(&self) -> &[Option<CaliperEdge>] {
         &self.edges
     }
 
     /// Share of all rows that the edges come from.
-    pub fn used_share(&self) -> f64 {
-        let used: f64 = self.edges.iter().flatten().map(|edge| edge.share).sum();
-        used / float(self.edges.len().max(1))
+    pub fn used_fraction(&self) -> f64 {
+        let used: f64 = self.edges.iter().flatten().map(|edge| edge.row_fraction).sum();
+        used / to_f64(self.edges.len().max(1))
     }
 
     /// Share of the rows that surely show something else than the edge.
-    pub fn unfit(&self) -> f64 {
-        self.unfit
+    pub fn unfit_fraction(&self) -> f64 {
+        self.unfit_fraction
     }
 
     /// Mean of the edges' places across the bead \[px\].
     pub fn middle(&self) -> f64 {
-        located::middle(&self.edges)
+        located::mean_position(&self.edges)
     }
 
     /// The edges, for those who sort out outliers.
-    pub fn edges_mut(&mut self) -> &mut [Option<Located>] {
+    pub fn edges_mut(&mut self) -> &mut [Option<CaliperEdge>] {
         &mut self.edges
     }
 
     /// Whether the edge's places are known.
     pub fn is_located(&self) -> bool {
-        self.state != State::Unseen
+        self.state != EdgeState::NotFound
     }
 
     /// Whether the edge was found to be covered in part, and is located from
     /// its clear rows alone.
-    pub fn is_covered(&self) -> bool {
-        self.state == State::Covered
+    pub fn is_occluded(&self) -> bool {
+        self.state == EdgeState::Occluded
     }
 
     /// Whether the edge was not found, or seems to be covered and no clear rows
     /// were found.
-    pub fn is_hidden(&self) -> bool {
-        matches!(self.state, State::Unseen | State::Hidden)
+    pub fn is_lost(&self) -> bool {
+        matches!(self.state, EdgeState::NotFound | EdgeState::Unresolved)
     }
 
     /// The misfit as if rows had been held one by one: what is no blurred step shows
     /// the more, the more rows are taken together.
     pub fn misfit_of_a_row(&self) -> f64 {
-        let beyond = (self.misfit * self.misfit - 1.0) / self.together.max(1.0);
+        let beyond = (self.misfit * self.misfit - 1.0) / self.max_group_rows.max(1.0);
         (1.0 + beyond.max(0.0)).sqrt()
     }
 
     /// Whether nothing covers the edge, or its clear rows are known.
     pub fn is_clear(&self) -> bool {
-        matches!(self.state, State::Open | State::Covered) && self.misfit < GOOD_FIT
+        matches!(self.state, EdgeState::Clear | EdgeState::Occluded)
+            && self.misfit < MAX_STEP_MISFIT
     }
 
     /// Where the edge is expected at a place along it \[px\].
     pub fn expected_at(&self, v: f64) -> f32 {
-        self.course.at(narrow(v))[0]
+        self.course.at(narrow_to_f32(v))[0]
     }
 
     /// Looks at the edge along rough places, one a band: its blur. `None` where there is no edge.
     #[inline(always)]
-    pub fn look<T: Grey>(
+    pub fn fit_first<T: GreyPixel>(
         &mut self,
         table: &StepTable,
-        scene: &Scene<'_, T>,
+        scene: &TraceInput<'_, T>,
         rough: impl Iterator<Item = Option<f32>>,
     ) -> Option<BlurEstimate> {
         self.edges.clear();
@@ -193,11 +197,11 @@ impl Tracer {
             self.uncertainty.lines_fraction,
         ) = (None, 0.0, 1.0);
         self.is_on_ground = true;
-        self.seen = None;
+        self.step_fit = None;
         self.values.path.clear();
-        self.state = State::Unseen;
+        self.state = EdgeState::NotFound;
         self.misfit = f64::INFINITY;
-        (self.occlusion.sort_rows, self.unfit) = (false, 0.0);
+        (self.occlusion.sort_rows, self.unfit_fraction) = (false, 0.0);
         (self.winding.is_followed, self.winding.excess) = (false, 0.0);
         self.occlusion.clear.clear();
         self.values.picked.clear();
@@ -211,27 +215,27 @@ impl Tracer {
 
     /// Lays the rows over each other along the course and looks at what they show.
     #[inline(always)]
-    fn lay_over<T: Grey>(
+    fn lay_over<T: GreyPixel>(
         &mut self,
         table: &StepTable,
-        scene: &Scene<'_, T>,
+        scene: &TraceInput<'_, T>,
     ) -> Option<BlurEstimate> {
         self.read(scene);
         self.overlay.lay(&self.sheet);
         let noise = f64::from(scene.noise) / f64::from(typical(&self.values.step).abs());
-        self.seen = self.overlay.look(table, noise, self.room(scene));
+        self.step_fit = self.overlay.first_fit(table, noise, self.room(scene));
         self.look_for_texture(scene, noise);
-        self.seen.as_ref().map(Look::blur)
+        self.step_fit.as_ref().map(StepFit::blur)
     }
 
     /// Whether the edge was located with weights that know the texture beside it.
-    pub fn knows_texture(&self) -> bool {
+    pub fn is_textured(&self) -> bool {
         self.textured.texture.is_some()
     }
 
     /// What was seen of the edge.
-    pub fn seen(&self) -> Option<&Look> {
-        self.seen.as_ref()
+    pub fn step_fit(&self) -> Option<&StepFit> {
+        self.step_fit.as_ref()
     }
 
     /// Whether a narrow groove may lie beside the edge, after it or before it. `noise` is the
@@ -243,40 +247,40 @@ impl Tracer {
     /// How skewed the edge's flank is; `None` where it is not located as a blurred step
     /// that nothing covers.
     pub fn skew(&self, table: &StepTable) -> Option<EdgeSkew> {
-        let is_step = self.state == State::Open && self.misfit.is_finite();
-        self.overlay.skew(table, self.seen.as_ref().filter(|_| is_step)?)
+        let is_step = self.state == EdgeState::Clear && self.misfit.is_finite();
+        self.overlay.skew(table, self.step_fit.as_ref().filter(|_| is_step)?)
     }
 
     /// Looks at the same rows once more, with another shape of the blur, from a look at
     /// them on or from nothing. What is known of a texture stays.
     #[inline(always)]
-    pub fn look_again<T: Grey>(
+    pub fn refit<T: GreyPixel>(
         &self,
         table: &StepTable,
-        scene: &Scene<'_, T>,
-        before: Option<&Look>,
-    ) -> Option<Look> {
+        scene: &TraceInput<'_, T>,
+        before: Option<&StepFit>,
+    ) -> Option<StepFit> {
         if let Some(before) = before {
-            return self.overlay.fit_again(table, before);
+            return self.overlay.refit(table, before);
         }
-        let seen = self.seen?;
-        self.overlay.look(table, seen.pixel_noise(), self.room(scene))
+        let seen = self.step_fit?;
+        self.overlay.first_fit(table, seen.pixel_noise(), self.room(scene))
     }
 
     /// Takes a look with another shape of the blur for what was seen.
-    pub fn take_look(&mut self, look: Look) {
-        self.seen = Some(look);
+    pub fn take_fit(&mut self, look: StepFit) {
+        self.step_fit = Some(look);
     }
 
     /// Draws the path through the picked places, as far as they are not wild, with
     /// the levels beside it. Returns whether there is any.
     #[inline(always)]
-    fn take_picked<T: Grey>(&mut self, scene: &Scene<'_, T>) -> bool {
+    fn take_picked<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         let rough = self.values.picked.iter().map(|at| at.is_finite().then_some(*at));
         if !path::fill(rough, &mut self.scratch.rough) {
             return false;
         }
-        path::take_out_wild(&mut self.scratch.rough, &mut self.scratch.sorted);
+        path::remove_outliers(&mut self.scratch.rough, &mut self.scratch.sorted);
         let rest = self.scratch.rough.iter().map(|at| at.is_finite().then_some(*at));
         if !path::fill(rest, &mut self.values.path) {
             return false;
@@ -293,10 +297,10 @@ impl Tracer {
     #[inline(always)]
     pub fn take_shape(&mut self, table: &StepTable, blur: BlurEstimate) {
         self.shape = None;
-        let Some(seen) = &self.seen else { return };
+        let Some(seen) = &self.step_fit else { return };
         let Some(shape) = self.overlay.shape(table, seen, blur) else { return };
         self.aside_px = shape.step.at;
-        self.shape = Some(self.adopt(shape));
+        self.shape = Some(self.apply_shape(shape));
     }
 
     /// The levels that were picked before and after the edge: means over the bands
@@ -315,13 +319,18 @@ impl Tracer {
 
     /// Locates the edge whose shape was read; `blur` as there.
     #[inline(always)]
-    pub fn trace<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>, blur: BlurEstimate) {
+    pub fn trace<T: GreyPixel>(
+        &mut self,
+        table: &StepTable,
+        scene: &TraceInput<'_, T>,
+        blur: BlurEstimate,
+    ) {
         let found = self.trace_open(table, scene);
-        let is_open = found && self.unfit <= COVERED_SHARE && !self.lost_rows(scene);
+        let is_open = found && self.unfit_fraction <= MAX_UNFIT_FRACTION && !self.lost_rows(scene);
         if is_open || self.trace_winding(table, scene) {
-            self.state = State::Open;
-        } else if self.uncover(table, scene) {
-            self.state = State::Covered;
+            self.state = EdgeState::Clear;
+        } else if self.locate_occluded(table, scene) {
+            self.state = EdgeState::Occluded;
         } else {
             self.trace_again(table, scene, blur);
         }
@@ -329,17 +338,17 @@ impl Tracer {
 
     /// Locates the edge as if nothing covered it.
     #[inline(always)]
-    fn trace_open<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
+    fn trace_open<T: GreyPixel>(&mut self, table: &StepTable, scene: &TraceInput<'_, T>) -> bool {
         let Some(shape) = self.shape else { return false };
-        if self.aside_px.abs() > FAR_ASIDE_PX {
+        if self.aside_px.abs() > MAX_PATH_OFFSET_PX {
             self.read(scene);
         }
         self.blur_px = shape.step.blur;
         self.uncertainty.common_variance = shape.variance;
         self.tabulate(table, &shape);
         for _ in 0..MAX_PASSES {
-            self.hold(scene);
-            self.gather(scene);
+            self.compare_rows(scene);
+            self.sum_bands(scene);
             if self.locate(scene, shape.step.blur) {
                 break;
             }
@@ -350,35 +359,36 @@ impl Tracer {
     /// Traces once more as if nothing covered the edge.
     #[cold]
     #[inline(never)]
-    fn trace_again<T: Grey>(
+    fn trace_again<T: GreyPixel>(
         &mut self,
         table: &StepTable,
-        scene: &Scene<'_, T>,
+        scene: &TraceInput<'_, T>,
         blur: BlurEstimate,
     ) {
         self.occlusion.clear.clear();
         let picked = std::mem::take(&mut self.values.picked);
         let rough = picked.iter().map(|at| at.is_finite().then_some(*at));
-        let seen = self.look(table, scene, rough);
+        let seen = self.fit_first(table, scene, rough);
         self.values.picked = picked;
         self.take_shape(table, blur);
         let found = seen.is_some() && self.trace_open(table, scene);
-        self.state = if found { State::Hidden } else { State::Unseen };
+        self.state = if found { EdgeState::Unresolved } else { EdgeState::NotFound };
     }
 
-    fn look_for_texture<T: Grey>(&mut self, scene: &Scene<'_, T>, noise: f64) {
+    fn look_for_texture<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, noise: f64) {
         self.textured.texture = None;
-        let Some(seen) = self.seen else { return };
-        let Some(texture) = Texture::read(&self.overlay, noise * noise, seen.beside()) else {
+        let Some(seen) = self.step_fit else { return };
+        let Some(texture) = SurfaceTexture::read(&self.overlay, noise * noise, seen.beside())
+        else {
             return;
         };
-        let pitch = float(scene.strip.along) / self.overlay.laid().0;
-        self.seen = Some(seen.in_texture(texture.over_area(pitch).sqrt()));
+        let pitch = to_f64(scene.strip.along) / self.overlay.laid().0;
+        self.step_fit = Some(seen.with_texture(texture.over_area(pitch).sqrt()));
         self.textured.texture = Some(texture.in_grey(typical(&self.values.step).into()));
     }
 
     /// Makes the template; one that knows the texture where there is some.
-    fn tabulate(&mut self, table: &StepTable, shape: &Shape) {
+    fn tabulate(&mut self, table: &StepTable, shape: &StepShape) {
         self.textured.scatter = None;
         if let Some(texture) = &self.textured.texture {
             self.row_fit.template.tabulate(table, shape, true);
@@ -392,17 +402,18 @@ impl Tracer {
     }
 
     /// Variance of a pixel of the mean of so many rows \[grey levels²\].
-    fn pixel_variance<T: Grey>(&self, scene: &Scene<'_, T>, rows: f32) -> f32 {
-        let texture = self.textured.texture.map_or(0.0, |texture| narrow(texture.of_window()));
+    fn pixel_variance<T: GreyPixel>(&self, scene: &TraceInput<'_, T>, rows: f32) -> f32 {
+        let texture =
+            self.textured.texture.map_or(0.0, |texture| narrow_to_f32(texture.of_window()));
         scene.noise * scene.noise / rows + texture
     }
 
     /// Locates the edge anew, line by line, where it is not a blurred step.
     /// Returns whether there is one.
     #[cold]
-    pub fn refine<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
+    pub fn refine<T: GreyPixel>(&mut self, table: &StepTable, scene: &TraceInput<'_, T>) -> bool {
         let width_px = f64::from(scene.width_px);
-        let task = Task { strip: scene.strip, lines: scene.lines, width_px };
+        let task = RefinerInput { strip: scene.strip, lines: scene.lines, width_px };
         // A blurred step that does not fit says nothing of the place either.
         if !self.take_picked(scene) {
             return false;
@@ -410,24 +421,25 @@ impl Tracer {
         self.edges.clear();
         self.edges.resize(scene.lines.len(), None);
         let course = &self.course;
-        let rough = scene.lines.iter().map(|&line| f64::from(course.at(narrow(line.middle()))[0]));
+        let rough =
+            scene.lines.iter().map(|&line| f64::from(course.at(narrow_to_f32(line.middle()))[0]));
         let found = self.refiner.refine(table, &task, scene.bead_after, &mut self.edges, rough);
         self.blur_px = self.refiner.blur_px;
         self.uncertainty.common_variance = 0.0;
         self.misfit = f64::INFINITY;
-        self.state = if found { State::Open } else { State::Unseen };
+        self.state = if found { EdgeState::Clear } else { EdgeState::NotFound };
         found
     }
 
     /// How far there is nothing but this edge for certain: up to the gauge's
     /// border and to the middle of the bead.
-    fn room<T: Grey>(&self, scene: &Scene<'_, T>) -> Extent {
+    fn room<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> Extent {
         let (low, high) =
             self.values.path.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &at| {
                 (low.min(at), high.max(at))
             });
         #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-        let (across, reach) = (scene.strip.across as f32, REACH as f32 - 1.0);
+        let (across, reach) = (scene.strip.across as f32, HALF_SPAN as f32 - 1.0);
         let inside = 0.5 * scene.width_px;
         let mut before = low.clamp(2.0, reach);
         let mut after = (across - 1.0 - high).clamp(2.0, reach);
@@ -441,13 +453,13 @@ impl Tracer {
 
     /// Takes over what the overlay shows: the path is moved, and levels and
     /// shading are those at the edge.
-    fn adopt(&mut self, shape: Shape) -> Shape {
-        let Step { at, before, after, .. } = shape.step;
+    fn apply_shape(&mut self, shape: StepShape) -> StepShape {
+        let BlurredStep { at, before, after, .. } = shape.step;
         let height = after - before;
         let flanks = shape.flanks.about(at, height);
         self.shift_course(at, before, after);
-        Shape {
-            step: Step { at: 0.0, before: 0.0, after: 1.0, ..shape.step },
+        StepShape {
+            step: BlurredStep { at: 0.0, before: 0.0, after: 1.0, ..shape.step },
             shading: shape.shading.map(|shading| shading.of(height)),
             flanks,
             variance: shape.variance / (height * height),
@@ -458,23 +470,23 @@ impl Tracer {
     /// Moves what is expected aside and takes other levels: those before and after
     /// the edge as shares of the step.
     fn shift_course(&mut self, aside: f64, before: f64, after: f64) {
-        let [aside, before, after] = [aside, before, after].map(narrow);
-        self.course.adopt(Correction { aside, before, after });
-        self.sheet.adopt(Correction { aside, before, after });
+        let [aside, before, after] = [aside, before, after].map(narrow_to_f32);
+        self.course.correct(EdgeCorrection { aside, before, after });
+        self.sheet.correct(EdgeCorrection { aside, before, after });
     }
 
     /// Reads the pixels along the path.
     #[inline(always)]
-    fn read<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+    fn read<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let course = &self.course;
-        let most = if self.occlusion.sort_rows { 1 } else { MOST_TOGETHER };
+        let most = if self.occlusion.sort_rows { 1 } else { MAX_GROUP_ROWS };
         let grouping = Grouping { steepest: course.steepest(), max_rows: most };
         self.sheet.read(scene.strip, scene.lines, grouping, |v| course.at(v));
     }
 
     /// Draws the path anew through the edges that were found.
     #[inline(always)]
-    fn redraw<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+    fn redraw<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         self.fill_from_edges(scene);
         path::median_of_three(&mut self.scratch.rough);
         if self.textured.texture.is_some() && !self.winding.is_followed {

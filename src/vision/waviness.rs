@@ -9,31 +9,31 @@
 use std::sync::LazyLock;
 
 use super::curve::Curve;
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 /// Legendre coefficients that are looked at: of the orders 1 to 8.
 pub const ORDERS: usize = 8;
 /// Orders that a curve has.
-pub const CURVED: usize = 4;
+pub const CURVE_ORDERS: usize = 4;
 /// Distances over which waves hang together, in halves of the gauge.
-const LENGTHS: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4];
+const CORRELATION_LENGTHS: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4];
 /// Variances of a midline's waves: the first, the ratio of one to the next and
 /// their number \[px²\].
-const FIRST_PX2: f64 = 2e-4;
-const RATIO: f64 = 2.0;
-const VARIANCES: usize = 18;
+const MIN_VARIANCE_PX2: f64 = 2e-4;
+const VARIANCE_RATIO: f64 = 2.0;
+const VARIANCE_COUNT: usize = 18;
 /// Points of the gauge for the integrals over it.
-const POINTS: usize = 40;
+const INTEGRAL_POINTS: usize = 40;
 /// Evidence that is believed, in standard deviations of what noise makes.
-const BELIEVED: f64 = 4.0;
+const MIN_EVIDENCE_SIGMAS: f64 = 4.0;
 /// Degrees of freedom of the waves' variance.
-const FREEDOM: f64 = 10.0;
+const DEGREES_OF_FREEDOM: f64 = 10.0;
 /// How likely a bent bead is to show a coefficient, in the density of waves at none.
-const BENT: f64 = 0.02;
+const BENT_DENSITY: f64 = 0.02;
 
 /// What kind of waves an edge has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Waves {
+pub enum WaveKind {
     /// Those of a smooth edge. Their autocorrelation is that of a Matérn process of order
     /// 3/2, which has a slope everywhere but is rougher than a Gaussian one.
     Smooth,
@@ -41,11 +41,11 @@ pub enum Waves {
     Torn,
 }
 
-impl Waves {
+impl WaveKind {
     /// Small waves are likelier than large ones beforehand, by this power of their
     /// variance: with 1, the mean variance of waves whose length is known is without bias.
     /// Waves as long as the gauge leave a slope unsure, and less scatter with less.
-    fn small_first(self) -> f64 {
+    fn variance_prior_power(self) -> f64 {
         match self {
             Self::Smooth => 0.7,
             Self::Torn => 0.9,
@@ -55,7 +55,7 @@ impl Waves {
     /// Part of the waves' first order that an axis along the edges is off by, in the mean of
     /// squares: widths of drawn rough beads are without bias up to a third with it. That of
     /// torn ones, with grooves and texture beside them, is larger.
-    pub fn slope_share(self) -> f64 {
+    pub fn slope_fraction(self) -> f64 {
         match self {
             Self::Smooth => 0.6,
             Self::Torn => 0.9,
@@ -69,7 +69,7 @@ impl Waves {
         }
     }
 
-    fn shares(self) -> &'static Shares {
+    fn order_variances(self) -> &'static OrderVariances {
         match self {
             Self::Smooth => &SMOOTH,
             Self::Torn => &TORN,
@@ -96,23 +96,23 @@ impl Evidence {
 
     /// Variances that waves give to the midline's coefficients of the orders 1
     /// to 4 \[px²\]; `None` where noise explains all.
-    pub fn waves(&self, kind: Waves) -> Option<[f64; CURVED]> {
+    pub fn waves(&self, kind: WaveKind) -> Option<[f64; CURVE_ORDERS]> {
         let (mut ratio, mut n) = (0.0, 0.0);
         for order in 0..ORDERS {
             ratio += self.squares[order] / self.noise[order].max(f64::MIN_POSITIVE);
             n += self.counts[order];
         }
-        if ratio < n + BELIEVED * f64::sqrt(2.0 * n) {
+        if ratio < n + MIN_EVIDENCE_SIGMAS * f64::sqrt(2.0 * n) {
             return None;
         }
         let mut sum = 0.0;
-        let mut waves = [0.0; CURVED];
+        let mut waves = [0.0; CURVE_ORDERS];
         let mut best = f64::NEG_INFINITY;
-        for shares in kind.shares() {
-            let mut variance = FIRST_PX2;
-            for _ in 0..VARIANCES {
-                let likelihood =
-                    self.log_likelihood(shares, variance) - kind.small_first() * variance.ln();
+        for shares in kind.order_variances() {
+            let mut variance = MIN_VARIANCE_PX2;
+            for _ in 0..VARIANCE_COUNT {
+                let likelihood = self.log_likelihood(shares, variance)
+                    - kind.variance_prior_power() * variance.ln();
                 if likelihood > best {
                     let fade = (best - likelihood).exp();
                     sum *= fade;
@@ -124,7 +124,7 @@ impl Evidence {
                 for (wave, share) in waves.iter_mut().zip(shares) {
                     *wave += weight * variance * share;
                 }
-                variance *= RATIO;
+                variance *= VARIANCE_RATIO;
             }
         }
         (sum > 0.0).then(|| waves.map(|value| value / sum))
@@ -145,7 +145,7 @@ impl Evidence {
 /// Legendre coefficients of the line midway between two edges, of the orders
 /// 1 to 4 \[px\].
 #[derive(Debug, Clone, Copy)]
-pub struct Midline([f64; CURVED]);
+pub struct Midline([f64; CURVE_ORDERS]);
 
 /// What of a midline's bends is waves.
 #[derive(Debug, Clone, Copy)]
@@ -153,9 +153,9 @@ pub struct Bends {
     /// Mean square of the slope that waves make \[px²\].
     pub of_waves: f64,
     /// Standard deviation of that \[px²\].
-    pub doubt: f64,
+    pub of_waves_sigma: f64,
     /// How likely the bead itself is evenly bent.
-    pub chance_bent: f64,
+    pub bent_probability: f64,
 }
 
 impl Midline {
@@ -175,43 +175,43 @@ impl Midline {
     /// Mean square of the slope that comes from bends, as far as waves of these
     /// variances explain them, and the doubt that leaves where a bead that is
     /// bent could explain them as well.
-    pub fn bends_of(&self, waves: &[f64; CURVED]) -> Bends {
+    pub fn bends_of(&self, waves: &[f64; CURVE_ORDERS]) -> Bends {
         let mut axis = *self;
-        let (mut believed, mut doubt) = (0.0, 0.0);
-        let mut chance_bent = [0.0; CURVED];
+        let (mut explained_by_waves, mut variance) = (0.0, 0.0);
+        let mut chance_bent = [0.0; CURVE_ORDERS];
         for (k, in_square) in [(1, 3.0), (2, 6.0), (3, 10.0)] {
             let square = self.0[k] * self.0[k];
-            let waves_alone = likelihood_of_waves(square / waves[k].max(f64::MIN_POSITIVE));
+            let waves_alone = posterior_of_waves(square / waves[k].max(f64::MIN_POSITIVE));
             let bent = 1.0 - waves_alone;
             axis.0[k] *= bent.sqrt();
             chance_bent[k] = bent;
-            believed += in_square * bent * waves[k];
-            doubt += waves_alone * bent * (in_square * square).powi(2);
+            explained_by_waves += in_square * bent * waves[k];
+            variance += waves_alone * bent * (in_square * square).powi(2);
         }
-        let of_waves = self.square() - axis.square() + believed;
-        Bends { of_waves, doubt: doubt.sqrt(), chance_bent: chance_bent[1] }
+        let of_waves = self.square() - axis.square() + explained_by_waves;
+        Bends { of_waves, of_waves_sigma: variance.sqrt(), bent_probability: chance_bent[1] }
     }
 }
 
 /// How likely it is that waves alone make a coefficient, by its square in their
 /// variance, which is estimated from a dozen coefficients: Student's density, beside
 /// that of a bead that is bent by any amount.
-fn likelihood_of_waves(square: f64) -> f64 {
-    let waves = (1.0 + square / FREEDOM).powf(-0.5 * (FREEDOM + 1.0));
-    waves / (waves + BENT)
+fn posterior_of_waves(square: f64) -> f64 {
+    let waves = (1.0 + square / DEGREES_OF_FREEDOM).powf(-0.5 * (DEGREES_OF_FREEDOM + 1.0));
+    waves / (waves + BENT_DENSITY)
 }
 
 /// Variance of each coefficient for waves of variance 1, for each length.
-type Shares = [[f64; ORDERS]; LENGTHS.len()];
+type OrderVariances = [[f64; ORDERS]; CORRELATION_LENGTHS.len()];
 
-static SMOOTH: LazyLock<Shares> = LazyLock::new(|| shares_of(Waves::Smooth));
-static TORN: LazyLock<Shares> = LazyLock::new(|| shares_of(Waves::Torn));
+static SMOOTH: LazyLock<OrderVariances> = LazyLock::new(|| order_variances(WaveKind::Smooth));
+static TORN: LazyLock<OrderVariances> = LazyLock::new(|| order_variances(WaveKind::Torn));
 
-fn shares_of(kind: Waves) -> Shares {
-    LENGTHS.map(|length| {
+fn order_variances(kind: WaveKind) -> OrderVariances {
+    CORRELATION_LENGTHS.map(|length| {
         let mut shares = [0.0; ORDERS];
-        for i in 0..POINTS {
-            for j in 0..POINTS {
+        for i in 0..INTEGRAL_POINTS {
+            for j in 0..INTEGRAL_POINTS {
                 let alike = kind.correlation((place(i) - place(j)).abs() / length);
                 let (a, b) = (legendre(place(i)), legendre(place(j)));
                 for (order, share) in shares.iter_mut().enumerate() {
@@ -220,7 +220,7 @@ fn shares_of(kind: Waves) -> Shares {
             }
         }
         for (order, share) in shares.iter_mut().enumerate() {
-            *share *= (norm(order + 1) / float(POINTS)).powi(2);
+            *share *= (norm(order + 1) / to_f64(INTEGRAL_POINTS)).powi(2);
         }
         shares
     })
@@ -228,13 +228,13 @@ fn shares_of(kind: Waves) -> Shares {
 
 /// Middle of a piece of the gauge, −1 to 1.
 fn place(piece: usize) -> f64 {
-    (float(2 * piece) + 1.0) / float(POINTS) - 1.0
+    (to_f64(2 * piece) + 1.0) / to_f64(INTEGRAL_POINTS) - 1.0
 }
 
 /// Factor from the mean of values times a Legendre polynomial to its
 /// coefficient.
 pub fn norm(order: usize) -> f64 {
-    float(2 * order + 1)
+    to_f64(2 * order + 1)
 }
 
 /// Legendre polynomials of the orders 1 to 8.
@@ -242,7 +242,7 @@ pub fn legendre(t: f64) -> [f64; ORDERS] {
     let mut values = [t; ORDERS];
     let (mut before, mut here) = (1.0, t);
     for (k, value) in values.iter_mut().enumerate().skip(1) {
-        let (n, next) = (float(k), 1.0 / float(k + 1));
+        let (n, next) = (to_f64(k), 1.0 / to_f64(k + 1));
         (before, here) = (here, ((2.0 * n + 1.0) * t * here - n * before) * next);
         *value = here;
     }
@@ -264,11 +264,14 @@ mod tests {
 
     #[test]
     fn a_bend_is_waves_the_less_the_more_it_exceeds_them() {
-        let of = |bend: f64| Midline([0.0, bend, 0.0, 0.0]).bends_of(&[1.0; CURVED]);
+        let of = |bend: f64| Midline([0.0, bend, 0.0, 0.0]).bends_of(&[1.0; CURVE_ORDERS]);
         let (small, unsure, large) = (of(1.0), of(4.0), of(12.0));
-        assert!(small.chance_bent < 0.06 && (small.of_waves / 3.0 - 1.0).abs() < 0.15, "{small:?}");
-        assert!(unsure.doubt > 0.3 * 3.0 * 16.0, "{unsure:?}");
-        assert!(large.chance_bent > 0.98 && large.of_waves < 0.05 * 3.0 * 144.0, "{large:?}");
+        assert!(
+            small.bent_probability < 0.06 && (small.of_waves / 3.0 - 1.0).abs() < 0.15,
+            "{small:?}"
+        );
+        assert!(unsure.of_waves_sigma > 0.3 * 3.0 * 16.0, "{unsure:?}");
+        assert!(large.bent_probability > 0.98 && large.of_waves < 0.05 * 3.0 * 144.0, "{large:?}");
     }
 
     #[test]
@@ -288,8 +291,8 @@ mod tests {
                     without.add(k + 1, normal(noise), noise);
                 }
             }
-            wrong += usize::from(without.waves(Waves::Smooth).is_some());
-            found += with.waves(Waves::Smooth).unwrap()[0] / (0.25 * SMOOTH[5][0]) / 400.0;
+            wrong += usize::from(without.waves(WaveKind::Smooth).is_some());
+            found += with.waves(WaveKind::Smooth).unwrap()[0] / (0.25 * SMOOTH[5][0]) / 400.0;
         }
         assert!(wrong <= 4, "{wrong}");
         assert!((found - 1.0).abs() < 0.3, "{found}");

@@ -3,30 +3,30 @@
 //! levels on either side.
 
 /// Pixels at most.
-pub const MOST: usize = 64;
+pub const MAX_PIXELS: usize = 64;
 
 /// Finds weights; keeps its memory from frame to frame.
 #[derive(Debug, Clone)]
-pub struct Whitener {
+pub struct NoiseWhitener {
     /// Lower triangle L of the covariances' Cholesky factors, row by row, with
     /// the reciprocal of the diagonal.
-    rows: Vec<[f64; MOST]>,
+    rows: Vec<[f64; MAX_PIXELS]>,
     count: usize,
-    level: [f64; MOST],
+    level: [f64; MAX_PIXELS],
 }
 
-impl Default for Whitener {
+impl Default for NoiseWhitener {
     fn default() -> Self {
-        Self { rows: vec![[0.0; MOST]; MOST], count: 0, level: [1.0; MOST] }
+        Self { rows: vec![[0.0; MAX_PIXELS]; MAX_PIXELS], count: 0, level: [1.0; MAX_PIXELS] }
     }
 }
 
-impl Whitener {
+impl NoiseWhitener {
     /// Takes the covariances of pixels at distances of 0, 1, … Returns whether
     /// they can be ones.
     pub fn prepare(&mut self, count: usize, covariance: impl Fn(usize) -> f64) -> bool {
-        self.count = count.min(MOST);
-        let mut by_distance = [0.0; MOST];
+        self.count = count.min(MAX_PIXELS);
+        let mut by_distance = [0.0; MAX_PIXELS];
         for (distance, value) in by_distance[..self.count].iter_mut().enumerate() {
             *value = covariance(distance);
         }
@@ -42,7 +42,7 @@ impl Whitener {
             }
             row[i] = 1.0 / square.sqrt();
         }
-        self.level = [1.0; MOST];
+        self.level = [1.0; MAX_PIXELS];
         let mut level = self.level;
         self.whiten(&mut level);
         self.level = level;
@@ -52,7 +52,7 @@ impl Whitener {
     /// Replaces the slope of a step by the weights of its place, so that their
     /// product with the slope is 1 and those with the shares after and before
     /// the step are 0; returns the variance that they leave to the place.
-    pub fn weights(&self, slope: &mut [f64; MOST], after: &[f64; MOST]) -> Option<f64> {
+    pub fn weights(&self, slope: &mut [f64; MAX_PIXELS], after: &[f64; MAX_PIXELS]) -> Option<f64> {
         let n = self.count;
         let mut after = *after;
         self.whiten(slope);
@@ -73,14 +73,14 @@ impl Whitener {
     }
 
     /// L⁻¹ times a vector.
-    fn whiten(&self, values: &mut [f64; MOST]) {
+    fn whiten(&self, values: &mut [f64; MAX_PIXELS]) {
         for (i, row) in self.rows[..self.count].iter().enumerate() {
             values[i] = (values[i] - product(&row[..i], &values[..i])) * row[i];
         }
     }
 
     /// L⁻ᵀ times a vector.
-    fn whiten_back(&self, values: &mut [f64; MOST]) {
+    fn whiten_back(&self, values: &mut [f64; MAX_PIXELS]) {
         for i in (0..self.count).rev() {
             let row = &self.rows[i];
             let value = values[i] * row[i];
@@ -126,7 +126,7 @@ mod tests {
             7.0 * libm::exp(-d * d / 16.0) + if d == 0.0 { 1.0 } else { 0.0 }
         };
         let table = crate::numeric::blurred_step::StepTable::default();
-        let (mut slope, mut after) = ([0.0; MOST], [0.0; MOST]);
+        let (mut slope, mut after) = ([0.0; MAX_PIXELS], [0.0; MAX_PIXELS]);
         for k in 0..n {
             let z = (f64::from(u32::try_from(k).unwrap()) - 11.3) / 1.5;
             let (step, density) = table.at(z);
@@ -138,7 +138,7 @@ mod tests {
         let inverse = (design.transpose() * &whitened).try_inverse().unwrap();
         let expected: DVector<f64> = whitened * inverse.column(0);
 
-        let mut whitener = Whitener::default();
+        let mut whitener = NoiseWhitener::default();
         assert!(whitener.prepare(n, covariance));
         let variance = whitener.weights(&mut slope, &after).unwrap();
         assert!((variance / inverse[(0, 0)] - 1.0).abs() < 1e-9);
@@ -149,6 +149,6 @@ mod tests {
 
     #[test]
     fn what_cannot_be_covariances_is_told() {
-        assert!(!Whitener::default().prepare(8, |d| if d < 4 { 1.0 } else { 0.0 }));
+        assert!(!NoiseWhitener::default().prepare(8, |d| if d < 4 { 1.0 } else { 0.0 }));
     }
 }

@@ -29,7 +29,7 @@ pub struct WidthMeasurement {
 impl WidthMeasurement {
     /// Adds what the calibration leaves open to the picture's own sigma.
     pub(super) fn with_calibration(self, surface: &SurfaceMap) -> Result<Self, Reject> {
-        let Some(share) = surface.width_sigma_share_of([self.left, self.right]) else {
+        let Some(share) = surface.width_relative_sigma_of([self.left, self.right]) else {
             return Ok(self);
         };
         let variance = self.sigma.get().powi(2) + (share * self.width.get()).powi(2);
@@ -59,18 +59,18 @@ pub struct Hints {
     /// Noise of a pixel \[grey levels of 256\].
     pub noise_grey: f64,
     /// Share of the gauge's pixels that are at the end of the scale.
-    pub saturated_share: f64,
+    pub saturated_fraction: f64,
     /// Share of the caliper lines that the width comes from.
-    pub used_share: f64,
+    pub used_fraction: f64,
     /// How far the skew of the flanks moves the width; none where it was not asked for, or
     /// the edges are no blurred steps.
-    pub skew: Option<Skew>,
+    pub skew: Option<WidthSkew>,
 }
 
 /// How far the skew of the edges' flanks moves a width in the picture: by a camera's gamma
 /// that is not given, rounded shoulders of a bead, or a penumbra.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Skew {
+pub struct WidthSkew {
     /// Measured less true width \[px\].
     pub offset_px: f64,
     /// Variance of that \[px²\].
@@ -92,14 +92,14 @@ pub struct Caliper {
     /// Number of the line along the gauge, from 0.
     pub number: usize,
     /// The left (of a horizontal bead the upper) edge.
-    pub left: Option<EdgePlace>,
+    pub left: Option<CaliperPoint>,
     /// The right (of a horizontal bead the lower) edge.
-    pub right: Option<EdgePlace>,
+    pub right: Option<CaliperPoint>,
 }
 
 /// Where an edge was found on one caliper line.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EdgePlace {
+pub struct CaliperPoint {
     /// In raw image pixels.
     pub at: ImagePoint,
     /// Standard deviation across the bead \[px\], as the pixels' noise explains

@@ -7,7 +7,7 @@
 
 use std::fmt::Debug;
 
-use super::distance::{DistanceTrace, Distrust};
+use super::distance::{DistanceTrace, FallbackReason};
 use super::pi::Saturation;
 use super::steps::StepsTrace;
 use crate::core::time::{Span, Stamp};
@@ -36,7 +36,7 @@ pub trait WidthController: Debug + Send {
     fn speed(&mut self, request: &SpeedRequest, trace: &mut WidthTrace) -> Option<MmPerS>;
 
     /// Why it has fallen back to another way of control on this bead, if it has.
-    fn fallback(&self) -> Option<Distrust> {
+    fn fallback(&self) -> Option<FallbackReason> {
         None
     }
 }
@@ -51,7 +51,7 @@ pub struct BeadReport {
     /// Speed along the path.
     pub speed: MmPerS,
     /// Flow at the nozzle over that of the start speed, without a unit.
-    pub flow_share: f64,
+    pub flow_ratio: f64,
     /// Whether the path is really known, and not made up.
     pub is_path_known: bool,
 }

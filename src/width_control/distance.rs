@@ -32,14 +32,14 @@ use serde::{Deserialize, Serialize};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
 
-use autocorrelation::Colour;
-use flow_change::Changes;
-use offset_estimate::OffsetBelief;
-use pulsation::Pulsation;
-use sample::{GaugeInterval, Measured, Pairing, Unrest};
-use speed_history::Trail;
-use validation::Trust;
-use width_model::{Level, Surprise};
+use autocorrelation::NoiseAutocorrelation;
+use flow_change::ChangeDetector;
+use offset_estimate::OffsetEstimator;
+use pulsation::FlowPulsation;
+use sample::{ConsistencyMonitor, GaugeInterval, Measured, WidthSample};
+use speed_history::SpeedHistory;
+use validation::ModelValidation;
+use width_model::{WidthInnovation, WidthModel};
 
 /// What the law has to know of its cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,7 +74,7 @@ pub struct MeasuredWidth {
 /// What became of a width.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Use {
+pub enum WidthUse {
     /// It was taken.
     #[default]
     Taken,
@@ -83,14 +83,14 @@ pub enum Use {
     /// With those before it, it shows that the flow has changed.
     Change,
     /// No speed is known for the bead that it shows.
-    NotPaired,
+    NotMatched,
 }
 
 /// What the law believes, for the record.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DistanceTrace {
     /// What became of this width.
-    pub use_of_width: Use,
+    pub use_of_width: WidthUse,
     /// Width at the reference speed, A.
     pub level_mm: Mm,
     /// Its standard deviation if the exponent is the one that is believed.
@@ -107,71 +107,74 @@ pub struct DistanceTrace {
 /// Why the law is not to be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Distrust {
+pub enum FallbackReason {
     /// The robot moves, and reports no path.
     NoPath,
     /// The width does not answer the speed as the model says.
     ModelContradicted,
     /// The bead that is seen is none whose speed is known.
-    Unpaired,
+    Unmatched,
 }
 
 /// The law with what it has seen.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ByDistance {
+pub struct DistanceController {
     settings: DistanceSettings,
-    trail: Trail,
-    level: Level,
-    changes: Changes,
-    pulsation: Pulsation,
-    offset: OffsetBelief,
-    unrest: Unrest,
-    colour: Colour,
-    trust: Trust,
+    speed_history: SpeedHistory,
+    model: WidthModel,
+    change_detector: ChangeDetector,
+    pulsation: FlowPulsation,
+    offset: OffsetEstimator,
+    consistency: ConsistencyMonitor,
+    autocorrelation: NoiseAutocorrelation,
+    validation: ModelValidation,
     /// The nozzle's path when the first of the last widths came that show bead of which no
     /// speed is known \[mm\].
-    unpaired: Option<f64>,
+    unmatched_since_mm: Option<f64>,
     /// Whether there were too many of them on this bead.
-    is_unpaired: bool,
+    is_unmatched: bool,
 }
 
-impl ByDistance {
+impl DistanceController {
     /// A law that has seen nothing yet.
     pub fn new(settings: DistanceSettings) -> Self {
         let exponent = settings.exponent;
         Self {
             settings,
-            trail: Trail::new(settings.reference_speed.get(), reach_mm(&settings)),
-            level: Level::new(exponent, settings.learns_exponent),
-            changes: Changes::new(settings.gauge.get()),
-            pulsation: Pulsation::new(),
-            offset: OffsetBelief::new(
+            speed_history: SpeedHistory::new(
+                settings.reference_speed.get(),
+                history_length_mm(&settings),
+            ),
+            model: WidthModel::new(exponent, settings.learns_exponent),
+            change_detector: ChangeDetector::new(settings.gauge.get()),
+            pulsation: FlowPulsation::new(),
+            offset: OffsetEstimator::new(
                 settings.offset_sigma / settings.offset.max(Mm::constant(1.0)),
             ),
-            unrest: Unrest::default(),
-            colour: Colour::new(settings.gauge.get()),
-            trust: Trust::default(),
-            unpaired: None,
-            is_unpaired: false,
+            consistency: ConsistencyMonitor::default(),
+            autocorrelation: NoiseAutocorrelation::new(settings.gauge.get()),
+            validation: ModelValidation::default(),
+            unmatched_since_mm: None,
+            is_unmatched: false,
         }
     }
 
     /// A new bead: where the old one was laid is forgotten, what was learnt of
     /// the flow is kept, and doubted a little.
     pub fn begin_bead(&mut self) {
-        self.trail.clear();
-        self.changes.clear();
-        self.level.begin_bead();
+        self.speed_history.clear();
+        self.change_detector.clear();
+        self.model.begin_bead();
         self.offset.begin_bead();
-        self.colour.begin_anew();
-        self.trust = Trust::default();
-        (self.unpaired, self.is_unpaired) = (None, false);
+        self.autocorrelation.reset();
+        self.validation = ModelValidation::default();
+        (self.unmatched_since_mm, self.is_unmatched) = (None, false);
     }
 
     /// What the robot reported: where the nozzle is, and how fast it moves. The
     /// bead is as wide as one laid at the speed over the share of the flow.
     pub fn reported(&mut self, at: Stamp, path: Mm, speed: MmPerS, flow_share: f64) {
-        self.trail.report(at.secs(), path.get(), speed.get(), flow_share);
+        self.speed_history.report(at.secs(), path.get(), speed.get(), flow_share);
     }
 
     /// A width of a frame that was captured with the nozzle at `nozzle_path`, and the width
@@ -182,31 +185,31 @@ impl ByDistance {
         measured: MeasuredWidth,
         wanted: Mm,
     ) -> DistanceTrace {
-        self.watch_the_trail(nozzle_path.get());
+        self.check_history(nozzle_path.get());
         let MeasuredWidth { width, sigma } = measured;
-        let taken = match self.pair(nozzle_path.get(), width.get(), sigma.get()) {
-            Some(pairing) => self.take(&pairing, nozzle_path.get(), wanted.get()),
-            None => Use::NotPaired,
+        let taken = match self.match_speed(nozzle_path.get(), width.get(), sigma.get()) {
+            Some(pairing) => self.take_sample(&pairing, nozzle_path.get(), wanted.get()),
+            None => WidthUse::NotMatched,
         };
         self.trace(taken)
     }
 
     /// The law's speed is driven from here on: what is laid now, it answers for.
-    pub fn steers(&mut self, nozzle_path: Mm) {
-        self.trust.steer(nozzle_path.get());
+    pub fn engaged(&mut self, nozzle_path: Mm) {
+        self.validation.engage(nozzle_path.get());
     }
 
     /// Whether enough has been seen to set a speed.
     pub fn is_ready(&self) -> bool {
-        self.level.is_known()
+        self.model.is_known()
     }
 
     /// Why the law is not to be trusted any more, if so.
-    pub fn distrust(&self) -> Option<Distrust> {
-        if self.is_unpaired {
-            return Some(Distrust::Unpaired);
+    pub fn fallback_reason(&self) -> Option<FallbackReason> {
+        if self.is_unmatched {
+            return Some(FallbackReason::Unmatched);
         }
-        self.trust.is_lost().then_some(Distrust::ModelContradicted)
+        self.validation.is_contradicted().then_some(FallbackReason::ModelContradicted)
     }
 
     /// The speed at which the bead comes out `width` wide in the mean over a
@@ -215,115 +218,140 @@ impl ByDistance {
         if !self.is_ready() || width <= Mm::ZERO {
             return None;
         }
-        let swing = self.pulsation.mean(from.secs(), (from + lasts).secs());
-        let ln_speed = (self.level.ln_width() + swing - width.get().ln()) / self.level.exponent();
-        let speed = self.settings.reference_speed.get() * ln_speed.clamp(-MOST_LN, MOST_LN).exp();
+        let pulsation = self.pulsation.mean(from.secs(), (from + lasts).secs());
+        let ln_speed =
+            (self.model.ln_width() + pulsation - width.get().ln()) / self.model.exponent();
+        let speed = self.settings.reference_speed.get()
+            * ln_speed.clamp(-MAX_LN_SPEED_RATIO, MAX_LN_SPEED_RATIO).exp();
         MmPerS::new(speed).ok()
     }
 
     /// Notices when no speed is known of the bead that is seen for longer than a bead's
     /// beginning takes to come under the camera.
-    fn watch_the_trail(&mut self, nozzle_path: f64) {
-        let (place, half) = (self.place(nozzle_path), 0.5 * self.settings.gauge.get());
-        if self.trail.over(place - half, place + half).is_some() {
-            self.unpaired = None;
+    fn check_history(&mut self, nozzle_path: f64) {
+        let (position, half) = (self.gauge_centre(nozzle_path), 0.5 * self.settings.gauge.get());
+        if self.speed_history.mean_over(position - half, position + half).is_some() {
+            self.unmatched_since_mm = None;
             return;
         }
-        let since = *self.unpaired.get_or_insert(nozzle_path);
-        let longest = (self.settings.offset + self.settings.gauge).get() + LOST_MM;
-        self.is_unpaired |= nozzle_path - since > longest;
+        let since = *self.unmatched_since_mm.get_or_insert(nozzle_path);
+        let longest = (self.settings.offset + self.settings.gauge).get() + MAX_UNMATCHED_MM;
+        self.is_unmatched |= nozzle_path - since > longest;
     }
 
     /// Middle of the gauge along the path \[mm\].
-    fn place(&self, nozzle_path: f64) -> f64 {
+    fn gauge_centre(&self, nozzle_path: f64) -> f64 {
         nozzle_path - self.settings.offset.get() * self.offset.factor()
     }
 
-    fn pair(&self, nozzle_path: f64, width: f64, sigma: f64) -> Option<Pairing> {
-        if width <= 0.0 || self.trail.stands() {
+    fn match_speed(&self, nozzle_path: f64, width: f64, sigma: f64) -> Option<WidthSample> {
+        if width <= 0.0 || self.speed_history.is_empty() {
             return None;
         }
         let offset = self.settings.offset.get();
         let gauge = GaugeInterval {
-            centre_mm: self.place(nozzle_path),
+            centre_mm: self.gauge_centre(nozzle_path),
             length_mm: self.settings.gauge.get(),
-            centre_tolerance_mm: DOUBTS * self.offset.sigma() * offset,
+            centre_tolerance_mm: OFFSET_SIGMAS * self.offset.sigma() * offset,
         };
         let measured = Measured { width_mm: width, sigma_mm: sigma };
-        Pairing::of(&self.trail, gauge, measured, self.level.exponent())
+        WidthSample::new(&self.speed_history, gauge, measured, self.model.exponent())
     }
 
-    fn take(&mut self, seen: &Pairing, nozzle_path: f64, wanted: f64) -> Use {
+    fn take_sample(&mut self, seen: &WidthSample, nozzle_path: f64, wanted: f64) -> WidthUse {
         // As much less as widths that hang together say.
-        let pairing = &Pairing { noise: seen.noise * self.colour.inflation(), ..*seen };
-        let drift = self.drift_per_mm() * self.level.way_to(pairing.place_mm);
-        let swing = self.pulsation.at(pairing.laid_s);
+        let pairing =
+            &WidthSample { noise: seen.noise * self.autocorrelation.inflation(), ..*seen };
+        let drift = self.drift_per_mm() * self.model.distance_to(pairing.position_mm);
+        let pulsation = self.pulsation.at(pairing.laid_s);
         let (gauge, offset) = (self.settings.gauge.get(), self.settings.offset.get());
-        let look = offset_estimate::Sight {
+        let observation = offset_estimate::OffsetObservation {
             nozzle_path,
             offset,
             gauge,
-            ln_width: pairing.ln_width - swing,
-            exponent: self.level.exponent(),
+            ln_width: pairing.ln_width - pulsation,
+            exponent: self.model.exponent(),
             variance: pairing.noise,
             drift,
         };
-        self.offset.take(&self.trail, &look);
-        self.level.move_to(pairing.place_mm, drift);
-        let spread = self.level.spread(pairing.ln_speed);
-        let plain = pairing.ln_width + self.level.exponent() * pairing.ln_speed;
-        let hanging = seen.noise * self.colour.hanging() + seen.doubt * seen.doubt;
-        self.pulsation.take(pairing.laid_s, plain, hanging + UNSURE * spread, drift);
-        self.weigh(pairing, pairing.ln_width - swing, libm::log(wanted.max(1e-3)), drift)
+        self.offset.update(&self.speed_history, &observation);
+        self.model.advance_to(pairing.position_mm, drift);
+        let spread = self.model.predicted_variance(pairing.ln_speed);
+        let plain = pairing.ln_width + self.model.exponent() * pairing.ln_speed;
+        let correlated = seen.noise * self.autocorrelation.correlated_inflation()
+            + seen.offset_sigma * seen.offset_sigma;
+        self.pulsation.update(
+            pairing.laid_s,
+            plain,
+            correlated + LEVEL_VARIANCE_FACTOR * spread,
+            drift,
+        );
+        self.update(pairing, pairing.ln_width - pulsation, libm::log(wanted.max(1e-3)), drift)
     }
 
     /// Takes a width that has been freed of the pulsation, or leaves it.
-    fn weigh(&mut self, pairing: &Pairing, ln_width: f64, ln_wanted: f64, drift: f64) -> Use {
-        let before = self.level;
-        let sight = self.changes.sight(pairing, ln_width);
-        let surprise = self.level.surprise(&sight);
-        let calm = self.unrest.is_calm();
-        if !(calm && surprise.is_far()) {
-            let hangs = pairing.variance() * (1.0 - 1.0 / self.colour.inflation());
-            let alone = Surprise { variance: surprise.variance - hangs, ..surprise };
-            self.colour.note(pairing.place_mm, alone);
+    fn update(
+        &mut self,
+        pairing: &WidthSample,
+        ln_width: f64,
+        ln_wanted: f64,
+        drift: f64,
+    ) -> WidthUse {
+        let before = self.model;
+        let sight = self.change_detector.observation(pairing, ln_width);
+        let innovation = self.model.innovation(&sight);
+        let calm = self.consistency.is_consistent();
+        if !(calm && innovation.is_outlier()) {
+            let correlated_variance =
+                pairing.variance() * (1.0 - 1.0 / self.autocorrelation.inflation());
+            let alone = WidthInnovation {
+                variance: innovation.variance - correlated_variance,
+                ..innovation
+            };
+            self.autocorrelation.update(pairing.position_mm, alone);
         }
-        self.changes.push(pairing, ln_width, before, calm);
-        self.unrest.note(pairing.laid_s, surprise, pairing.variance() / surprise.variance);
-        self.trust.note(pairing, surprise, ln_wanted, drift);
-        if let Some(before) = self.changes.undone(pairing, ln_width, surprise, drift) {
-            self.pulsation.shift(before.ln_width() - self.level.ln_width(), 0.0);
-            self.level = before;
-            return Use::Taken;
+        self.change_detector.push(pairing, ln_width, before, calm);
+        self.consistency.update(
+            pairing.laid_s,
+            innovation,
+            pairing.variance() / innovation.variance,
+        );
+        self.validation.update(pairing, innovation, ln_wanted, drift);
+        if let Some(before) = self.change_detector.revert(pairing, ln_width, innovation, drift) {
+            self.pulsation.shift(before.ln_width() - self.model.ln_width(), 0.0);
+            self.model = before;
+            return WidthUse::Taken;
         }
-        let outlier = self.level.is_known() && surprise.is_far() && !self.unrest.is_great();
+        let outlier =
+            self.model.is_known() && innovation.is_outlier() && !self.consistency.is_inconsistent();
         if !outlier {
-            let learns = self.unrest.is_calm() || self.level.hardly_knows_exponent();
-            let tells = self.level.tells_exponent(pairing.ln_speed) && !pairing.is_doubtful();
-            self.level.update(&sight, learns && tells);
+            let learns = self.consistency.is_consistent() || self.model.exponent_is_uncertain();
+            let tells =
+                self.model.informs_exponent(pairing.ln_speed) && !pairing.is_offset_sensitive();
+            self.model.update(&sight, learns && tells);
         }
-        let Some(found) = self.changes.find() else {
-            return if outlier { Use::Outlier } else { Use::Taken };
+        let Some(found) = self.change_detector.find() else {
+            return if outlier { WidthUse::Outlier } else { WidthUse::Taken };
         };
-        self.trust.begin_anew();
-        self.colour.begin_anew();
+        self.validation.reset_steady();
+        self.autocorrelation.reset();
         self.pulsation.shift(found.size, found.variance);
-        self.level = found.level_after(pairing.place_mm, self.drift_per_mm());
-        Use::Change
+        self.model = found.level_after(pairing.position_mm, self.drift_per_mm());
+        WidthUse::Change
     }
 
     fn drift_per_mm(&self) -> f64 {
         self.settings.drift_per_root_m.powi(2) / 1e3
     }
 
-    fn trace(&self, use_of_width: Use) -> DistanceTrace {
+    fn trace(&self, use_of_width: WidthUse) -> DistanceTrace {
         let mm = |value: f64| Mm::new(value).unwrap_or_default();
-        let level = self.level.ln_width().exp();
+        let level = self.model.ln_width().exp();
         DistanceTrace {
             use_of_width,
             level_mm: mm(level),
-            level_sigma_mm: mm(level * self.level.sigma()),
-            exponent: self.level.exponent(),
+            level_sigma_mm: mm(level * self.model.sigma()),
+            exponent: self.model.exponent(),
             offset_mm: self.settings.offset * self.offset.factor(),
             pulsation_s: self.pulsation.period_s(),
         }
@@ -332,18 +360,18 @@ impl ByDistance {
 
 /// Bead behind the nozzle of which the law has to know the speed \[mm\]: to where the camera
 /// looks, and what it may look further.
-fn reach_mm(settings: &DistanceSettings) -> f64 {
-    FURTHER * (settings.offset + settings.gauge).get() + LOST_MM
+fn history_length_mm(settings: &DistanceSettings) -> f64 {
+    HISTORY_FACTOR * (settings.offset + settings.gauge).get() + MAX_UNMATCHED_MM
 }
 
 /// Times the way to the end of the gauge for which speeds are kept.
-const FURTHER: f64 = 2.0;
+const HISTORY_FACTOR: f64 = 2.0;
 /// Way over which widths without a speed are nothing to worry about, beside that to the
 /// camera \[mm\].
-const LOST_MM: f64 = 50.0;
+const MAX_UNMATCHED_MM: f64 = 50.0;
 /// Largest logarithm of a speed over the reference speed; beyond it limits act.
-const MOST_LN: f64 = 5.0;
+const MAX_LN_SPEED_RATIO: f64 = 5.0;
 /// Standard deviations of the offset by which a pairing may be wrong.
-const DOUBTS: f64 = 2.0;
+const OFFSET_SIGMAS: f64 = 2.0;
 /// How many times over a level that is hardly known counts against a pulsation.
-const UNSURE: f64 = 4.0;
+const LEVEL_VARIANCE_FACTOR: f64 = 4.0;

@@ -9,7 +9,7 @@ use crate::core::units::{MmPerS, MmPerS2};
 /// Which limit acted on a setpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Limit {
+pub enum SpeedLimit {
     /// None.
     #[default]
     None,
@@ -29,7 +29,7 @@ pub enum Limit {
 
 /// What a setpoint may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
+pub struct SpeedLimits {
     /// Slowest setpoint.
     pub min_speed: MmPerS,
     /// Fastest setpoint.
@@ -40,33 +40,33 @@ pub struct Limits {
 
 /// A setpoint that keeps the limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limited {
+pub struct LimitedSpeed {
     /// The setpoint.
     pub speed: MmPerS,
     /// The limit that shaped it.
-    pub limit: Limit,
+    pub limit: SpeedLimit,
 }
 
-impl Limits {
+impl SpeedLimits {
     /// The setpoint nearest to a demand that keeps the limits, `dt` after the
     /// last one. Range goes before slew: a last setpoint outside the range is
     /// left at once.
-    pub fn apply(&self, demand: MmPerS, last: MmPerS, dt: Span) -> Limited {
+    pub fn apply(&self, demand: MmPerS, last: MmPerS, dt: Span) -> LimitedSpeed {
         let (ranged, range_limit) = if demand < self.min_speed {
-            (self.min_speed, Limit::MinSpeed)
+            (self.min_speed, SpeedLimit::MinSpeed)
         } else if demand > self.max_speed {
-            (self.max_speed, Limit::MaxSpeed)
+            (self.max_speed, SpeedLimit::MaxSpeed)
         } else {
-            (demand, Limit::None)
+            (demand, SpeedLimit::None)
         };
         let last = last.max(self.min_speed).min(self.max_speed);
-        let reach = self.max_accel * dt.max(Span::ZERO);
-        if ranged > last + reach {
-            Limited { speed: last + reach, limit: Limit::Acceleration }
-        } else if ranged < last - reach {
-            Limited { speed: last - reach, limit: Limit::Deceleration }
+        let max_change = self.max_accel * dt.max(Span::ZERO);
+        if ranged > last + max_change {
+            LimitedSpeed { speed: last + max_change, limit: SpeedLimit::Acceleration }
+        } else if ranged < last - max_change {
+            LimitedSpeed { speed: last - max_change, limit: SpeedLimit::Deceleration }
         } else {
-            Limited { speed: ranged, limit: range_limit }
+            LimitedSpeed { speed: ranged, limit: range_limit }
         }
     }
 }
@@ -76,13 +76,13 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const LIMITS: Limits = Limits {
+    const LIMITS: SpeedLimits = SpeedLimits {
         min_speed: MmPerS::constant(60.0),
         max_speed: MmPerS::constant(150.0),
         max_accel: MmPerS2::constant(100.0),
     };
 
-    fn apply(demand: f64, last: f64, dt_s: f64) -> (f64, Limit) {
+    fn apply(demand: f64, last: f64, dt_s: f64) -> (f64, SpeedLimit) {
         let limited =
             LIMITS.apply(MmPerS::constant(demand), MmPerS::constant(last), Span::from_secs(dt_s));
         (limited.speed.get(), limited.limit)
@@ -90,11 +90,11 @@ mod tests {
 
     #[test]
     fn the_limit_that_acted_is_named() {
-        assert_eq!(apply(100.0, 100.0, 0.2), (100.0, Limit::None));
-        assert_eq!(apply(20.0, 61.0, 0.2), (60.0, Limit::MinSpeed));
-        assert_eq!(apply(500.0, 149.0, 0.2), (150.0, Limit::MaxSpeed));
-        assert_eq!(apply(140.0, 100.0, 0.2), (120.0, Limit::Acceleration));
-        assert_eq!(apply(70.0, 100.0, 0.2), (80.0, Limit::Deceleration));
+        assert_eq!(apply(100.0, 100.0, 0.2), (100.0, SpeedLimit::None));
+        assert_eq!(apply(20.0, 61.0, 0.2), (60.0, SpeedLimit::MinSpeed));
+        assert_eq!(apply(500.0, 149.0, 0.2), (150.0, SpeedLimit::MaxSpeed));
+        assert_eq!(apply(140.0, 100.0, 0.2), (120.0, SpeedLimit::Acceleration));
+        assert_eq!(apply(70.0, 100.0, 0.2), (80.0, SpeedLimit::Deceleration));
     }
 
     proptest! {

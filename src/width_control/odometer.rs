@@ -5,16 +5,16 @@ use crate::core::time::Stamp;
 use crate::core::units::Mm;
 
 /// Way by the speed over which a path that stands is believed.
-const BELIEVED: Mm = Mm::constant(20.0);
+const MAX_UNREPORTED: Mm = Mm::constant(20.0);
 
 /// Watches whether the path that a robot reports goes on with its speed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Odometer {
     last: Option<(Stamp, RobotState)>,
     /// Way by the speed since the reported path last changed.
-    unseen: Mm,
+    unreported: Mm,
     /// Whether the robot reports no path.
-    blind: bool,
+    reports_no_path: bool,
     /// What is added to the reported path.
     added: Mm,
 }
@@ -33,16 +33,16 @@ impl Odometer {
         if let Some((at, last)) = self.last {
             let way = last.speed_mm_per_s * (now - at);
             if state.path_mm == last.path_mm {
-                self.unseen = self.unseen + way.max(Mm::ZERO);
-            } else if !self.blind {
-                self.unseen = Mm::ZERO;
+                self.unreported = self.unreported + way.max(Mm::ZERO);
+            } else if !self.reports_no_path {
+                self.unreported = Mm::ZERO;
             }
-            if self.blind {
+            if self.reports_no_path {
                 // A path that begins to grow late grows beside the speed's.
                 self.added = self.added + way - (state.path_mm - last.path_mm);
-            } else if self.unseen > BELIEVED {
-                self.blind = true;
-                self.added = self.unseen;
+            } else if self.unreported > MAX_UNREPORTED {
+                self.reports_no_path = true;
+                self.added = self.unreported;
             }
         }
         self.last = Some((now, *state));
@@ -50,8 +50,8 @@ impl Odometer {
     }
 
     /// Whether the robot moves without reporting a path.
-    pub const fn is_blind(&self) -> bool {
-        self.blind
+    pub const fn reports_no_path(&self) -> bool {
+        self.reports_no_path
     }
 }
 
@@ -80,7 +80,7 @@ mod tests {
             let state = report(100.0 * at, RobotMode::Print);
             assert_eq!(odometer.correct(Stamp::from_secs(at), &state), state);
         }
-        assert!(!odometer.is_blind());
+        assert!(!odometer.reports_no_path());
     }
 
     #[test]
@@ -91,7 +91,7 @@ mod tests {
             let now = Stamp::from_secs(0.1 * f64::from(k));
             path = odometer.correct(now, &report(7.0, RobotMode::Print)).path_mm.get();
         }
-        assert!(odometer.is_blind());
+        assert!(odometer.reports_no_path());
         assert!((path - (7.0 + 490.0)).abs() < 1e-6, "{path}");
         // One that begins to count late, or anew, counts once.
         let late = odometer.correct(Stamp::from_secs(5.0), &report(17.0, RobotMode::Print));
@@ -100,6 +100,6 @@ mod tests {
         assert_eq!(anew.path_mm.get(), 1.0);
         let idle = odometer.correct(Stamp::from_secs(6.0), &report(7.0, RobotMode::Idle));
         assert_eq!(idle.path_mm.get(), 7.0);
-        assert!(!odometer.is_blind());
+        assert!(!odometer.reports_no_path());
     }
 }

@@ -57,14 +57,14 @@ impl Pi {
     /// further into a direction in which what was applied cannot follow
     /// (anti-windup by conditional integration).
     pub fn step(&mut self, error: Mm, dt: Span, saturation: Saturation) -> Demand {
-        let gathered = MmPerS::ZERO + gather(self.gains, error, dt);
+        let increment = MmPerS::ZERO + integral_increment(self.gains, error, dt);
         let against = match saturation {
             Saturation::None => false,
-            Saturation::Above => gathered > MmPerS::ZERO,
-            Saturation::Below => gathered < MmPerS::ZERO,
+            Saturation::Above => increment > MmPerS::ZERO,
+            Saturation::Below => increment < MmPerS::ZERO,
         };
         if !against && dt > Span::ZERO {
-            self.integral = self.integral + gathered;
+            self.integral = self.integral + increment;
         }
         let proportional = proportional(self.gains, error);
         Demand { speed: proportional + self.integral, proportional, integral: self.integral }
@@ -75,7 +75,7 @@ fn proportional(gains: PiGains, error: Mm) -> MmPerS {
     MmPerS::new(gains.kp_per_s * error.get()).unwrap_or_default()
 }
 
-fn gather(gains: PiGains, error: Mm, dt: Span) -> MmPerS {
+fn integral_increment(gains: PiGains, error: Mm, dt: Span) -> MmPerS {
     MmPerS::new(gains.ki_per_s2 * error.get() * dt.secs()).unwrap_or_default()
 }
 

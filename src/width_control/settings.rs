@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use super::pi::PiGains;
 use super::strategy::Strategy;
-use super::target::Target;
+use super::target::WidthTarget;
 use crate::core::time::Span;
 
 /// What the width controller is to do.
 #[derive(Debug, Clone)]
-pub struct Control {
+pub struct WidthControlSettings {
     /// Width that is asked for.
-    pub target: Target,
+    pub target: WidthTarget,
     /// How it is held.
     pub strategy: Arc<dyn Strategy>,
     /// Gains of the PI law, on the error in millimetres; none where it is only

@@ -28,10 +28,10 @@ const PIECES: [(f64, f64); 11] = [
 /// Shortest reach that pieces are made for: that of a camera on the nozzle.
 const SHORTEST_REACH: Mm = Mm::constant(20.0);
 /// Part of the range of widths at either of its ends that ends the experiment.
-const MARGIN: f64 = 0.05;
+const RANGE_MARGIN: f64 = 0.05;
 /// Way after the last piece until the camera has seen it, over the reach: the
 /// camera's distance is not known well before the experiment.
-const SEEN_AFTER: f64 = 1.5;
+const CAMERA_REACHES: f64 = 1.5;
 
 /// What the course is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,9 +39,9 @@ pub struct StepSettings {
     /// Speed about which it steps.
     pub start_speed: MmPerS,
     /// Change of the speed, as a share of it.
-    pub share: f64,
+    pub step_ratio: f64,
     /// Distance from the nozzle to the far end of the gauge.
-    pub reach: Mm,
+    pub camera_reach: Mm,
     /// Narrowest and widest width that is believed.
     pub width_range: WidthRange,
 }
@@ -49,7 +49,7 @@ pub struct StepSettings {
 impl StepSettings {
     /// Slowest and fastest speed that is asked for.
     pub fn speeds(&self) -> (MmPerS, MmPerS) {
-        (self.start_speed * (1.0 - self.share), self.start_speed * (1.0 + self.share))
+        (self.start_speed * (1.0 - self.step_ratio), self.start_speed * (1.0 + self.step_ratio))
     }
 
     /// Number of pieces.
@@ -58,7 +58,7 @@ impl StepSettings {
     }
 
     fn unit(&self) -> Mm {
-        self.reach.max(SHORTEST_REACH)
+        self.camera_reach.max(SHORTEST_REACH)
     }
 
     /// Path length of all pieces.
@@ -67,8 +67,8 @@ impl StepSettings {
     }
 
     /// Path length from the first piece on until the camera has seen the last.
-    pub fn seen_length(&self) -> Mm {
-        self.length() + self.unit() * SEEN_AFTER
+    pub fn length_until_seen(&self) -> Mm {
+        self.length() + self.unit() * CAMERA_REACHES
     }
 
     /// Number of the piece at a way into the course, and its speed; none behind its
@@ -77,14 +77,14 @@ impl StepSettings {
         let mut end = Mm::ZERO;
         (0_u32..).zip(PIECES).find_map(|(number, (length, shares))| {
             end = end + self.unit() * length;
-            (way < end).then(|| (number, self.start_speed * (1.0 + self.share * shares)))
+            (way < end).then(|| (number, self.start_speed * (1.0 + self.step_ratio * shares)))
         })
     }
 
     /// Whether a width is so near an end of the range that steps are not to go on.
-    fn is_near_an_end(&self, width: Mm) -> bool {
+    fn is_near_range_end(&self, width: Mm) -> bool {
         let WidthRange { min, max } = self.width_range;
-        let margin = (max - min) * MARGIN;
+        let margin = (max - min) * RANGE_MARGIN;
         width < min + margin || width > max - margin
     }
 }
@@ -92,7 +92,7 @@ impl StepSettings {
 /// How far the experiment is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Progress {
+pub enum StepsProgress {
     /// A piece is being laid; they count from 0.
     Piece(u32),
     /// All pieces are laid, or none will be any more; the camera has yet to see the
@@ -106,7 +106,7 @@ pub enum Progress {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StepsTrace {
     /// How far it is.
-    pub progress: Progress,
+    pub progress: StepsProgress,
     /// The width that ended it before its time, because it came near an end of the
     /// range of widths.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -142,7 +142,7 @@ impl Steps {
     /// Looks at a width, with the nozzle at a place: one near an end of the range
     /// ends the steps for the rest of the bead.
     pub fn measured(&mut self, path: Mm, width: Mm) {
-        if self.begun.is_some() && self.settings.is_near_an_end(width) {
+        if self.begun.is_some() && self.settings.is_near_range_end(width) {
             self.ended = self.ended.or(Some((path, width)));
         }
     }
@@ -156,11 +156,11 @@ impl Steps {
     pub fn trace(&self, path: Mm) -> StepsTrace {
         let all = self.begun.map_or(path, |begun| begun + self.settings.length());
         let last = self.ended.map_or(all, |(at, _)| at.min(all));
-        let seen = last + self.settings.unit() * SEEN_AFTER;
+        let seen = last + self.settings.unit() * CAMERA_REACHES;
         let progress = match self.piece(path) {
-            Some((number, _)) => Progress::Piece(number),
-            None if path < seen => Progress::Seeing,
-            None => Progress::Over,
+            Some((number, _)) => StepsProgress::Piece(number),
+            None if path < seen => StepsProgress::Seeing,
+            None => StepsProgress::Over,
         };
         StepsTrace { progress, near_end_mm: self.ended.map(|(_, width)| width) }
     }
@@ -180,8 +180,8 @@ mod tests {
     fn settings() -> StepSettings {
         StepSettings {
             start_speed: MmPerS::constant(100.0),
-            share: 0.1,
-            reach: Mm::constant(100.0),
+            step_ratio: 0.1,
+            camera_reach: Mm::constant(100.0),
             width_range: WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
         }
     }
@@ -201,25 +201,25 @@ mod tests {
         close(at(251.0).0, 110.0);
         close(at(381.0).0, 90.0);
         close(at(470.0).0, 100.0);
-        assert_eq!(at(381.0).1.progress, Progress::Piece(1));
+        assert_eq!(at(381.0).1.progress, StepsProgress::Piece(1));
         let end = 250.0 + settings().length().get();
         close(at(end + 1.0).0, 100.0);
-        assert_eq!(at(end + 1.0).1.progress, Progress::Seeing);
-        assert_eq!(at(end + 151.0).1.progress, Progress::Over);
+        assert_eq!(at(end + 1.0).1.progress, StepsProgress::Seeing);
+        assert_eq!(at(end + 151.0).1.progress, StepsProgress::Over);
     }
 
     #[test]
     fn a_width_near_an_end_of_the_range_ends_it_for_the_bead() {
         let mut steps = begun();
         steps.measured(Mm::constant(300.0), Mm::constant(40.0));
-        assert_eq!(steps.trace(Mm::constant(300.0)).progress, Progress::Piece(0));
+        assert_eq!(steps.trace(Mm::constant(300.0)).progress, StepsProgress::Piece(0));
         steps.measured(Mm::constant(310.0), Mm::constant(58.5));
         assert_eq!(steps.speed(Mm::constant(310.0)).get(), 100.0);
         let trace = steps.trace(Mm::constant(320.0));
-        assert_eq!(trace.progress, Progress::Seeing);
+        assert_eq!(trace.progress, StepsProgress::Seeing);
         assert_eq!(trace.near_end_mm, Some(Mm::constant(58.5)));
         steps.measured(Mm::constant(330.0), Mm::constant(40.0));
-        assert_eq!(steps.trace(Mm::constant(470.0)).progress, Progress::Over);
+        assert_eq!(steps.trace(Mm::constant(470.0)).progress, StepsProgress::Over);
         steps.begin_bead();
         assert_eq!(steps.trace(Mm::ZERO).near_end_mm, None);
     }

@@ -5,7 +5,7 @@ use crate::core::units::Mm;
 /// Widths that are asked for. One number, one for each layer, or a course along
 /// the path of every bead.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Target {
+pub struct WidthTarget {
     width: Mm,
     along: Vec<Knot>,
     layers: Option<Layers>,
@@ -59,7 +59,7 @@ impl Layers {
     }
 }
 
-impl Target {
+impl WidthTarget {
     /// One width everywhere.
     pub const fn constant(width: Mm) -> Self {
         Self { width, along: Vec::new(), layers: None }
@@ -101,7 +101,7 @@ impl Target {
     /// Width at a path length from where the bead begins, at the robot's z.
     pub fn at(&self, z: Mm, path: Mm) -> Mm {
         let of_layer = || self.layers.as_ref().and_then(|layers| layers.width(z));
-        self.course(path).or_else(of_layer).unwrap_or(self.width)
+        self.width_along(path).or_else(of_layer).unwrap_or(self.width)
     }
 
     /// Mean width over a stretch of the bead.
@@ -113,9 +113,10 @@ impl Target {
         }
         let mut area = 0.0;
         let mut last = from;
-        for place in self.along.iter().map(|knot| knot.path).filter(|at| from < *at && *at < to) {
-            area += self.area(last, place);
-            last = place;
+        for position in self.along.iter().map(|knot| knot.path).filter(|at| from < *at && *at < to)
+        {
+            area += self.area(last, position);
+            last = position;
         }
         area += self.area(last, to);
         Mm::new(area / length.get()).unwrap_or(self.width)
@@ -124,10 +125,10 @@ impl Target {
     /// Area of a piece without a knot within it \[mm²\].
     fn area(&self, from: Mm, to: Mm) -> f64 {
         let middle = from + (to - from) * 0.5;
-        self.course(middle).unwrap_or(self.width).get() * (to - from).get()
+        self.width_along(middle).unwrap_or(self.width).get() * (to - from).get()
     }
 
-    fn course(&self, path: Mm) -> Option<Mm> {
+    fn width_along(&self, path: Mm) -> Option<Mm> {
         let after = self.along.partition_point(|knot| knot.path <= path);
         let Some(next) = self.along.get(after) else {
             return self.along.last().map(|knot| knot.width);
@@ -135,8 +136,8 @@ impl Target {
         let Some(before) = after.checked_sub(1).and_then(|at| self.along.get(at)) else {
             return Some(next.width);
         };
-        let share = (path - before.path) / (next.path - before.path);
-        Some(before.width + (next.width - before.width) * share)
+        let fraction = (path - before.path) / (next.path - before.path);
+        Some(before.width + (next.width - before.width) * fraction)
     }
 }
 
@@ -152,9 +153,9 @@ mod tests {
         Knot { path: mm(path), width: mm(width) }
     }
 
-    fn stepped() -> Target {
+    fn stepped() -> WidthTarget {
         let knots = vec![knot(100.0, 42.0), knot(100.0, 40.0), knot(300.0, 44.0)];
-        Target::constant(mm(42.0)).along(knots)
+        WidthTarget::constant(mm(42.0)).along(knots)
     }
 
     #[test]
@@ -179,7 +180,7 @@ mod tests {
     fn layers_are_told_by_z_and_the_last_width_holds_above() {
         let layers =
             Layers { first_z: mm(5.0), height: mm(20.0), widths: vec![mm(42.0), mm(40.0)] };
-        let target = Target::constant(mm(44.0)).by_layer(layers);
+        let target = WidthTarget::constant(mm(44.0)).by_layer(layers);
         let at = |z| target.at(mm(z), Mm::ZERO).get();
         assert_eq!((at(0.0), at(6.0), at(24.0), at(400.0)), (42.0, 42.0, 40.0, 40.0));
         assert!(!target.is_constant());

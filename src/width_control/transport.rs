@@ -9,14 +9,14 @@ use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
 
 /// Reports that are kept: more than three seconds at the fastest rate.
-const KEPT: usize = 160;
+const MAX_REPORTS: usize = 160;
 /// Longest extrapolation beyond the newest report; the link counts as lost
 /// after this time.
-const FARTHEST: Span = Span::from_millis(500);
+const MAX_EXTRAPOLATION: Span = Span::from_millis(500);
 
 /// The nozzle's path over time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Transport {
+pub struct PathHistory {
     reports: VecDeque<Report>,
 }
 
@@ -27,20 +27,20 @@ struct Report {
     speed: MmPerS,
 }
 
-impl Default for Transport {
+impl Default for PathHistory {
     fn default() -> Self {
-        Self { reports: VecDeque::with_capacity(KEPT) }
+        Self { reports: VecDeque::with_capacity(MAX_REPORTS) }
     }
 }
 
-impl Transport {
+impl PathHistory {
     /// Takes a report that arrived at a moment. A path that falls belongs to
     /// a new bead, and the old one is forgotten.
     pub fn observe(&mut self, at: Stamp, state: &RobotState) {
         if self.reports.back().is_some_and(|last| state.path_mm < last.path || at <= last.at) {
             self.reports.clear();
         }
-        if self.reports.len() == KEPT {
+        if self.reports.len() == MAX_REPORTS {
             self.reports.pop_front();
         }
         self.reports.push_back(Report { at, path: state.path_mm, speed: state.speed_mm_per_s });
@@ -53,13 +53,13 @@ impl Transport {
         let newest = self.reports.back()?;
         if at >= newest.at {
             let beyond = at - newest.at;
-            return (beyond <= FARTHEST).then(|| newest.path + newest.speed * beyond);
+            return (beyond <= MAX_EXTRAPOLATION).then(|| newest.path + newest.speed * beyond);
         }
         let after = self.reports.partition_point(|report| report.at <= at);
         let before = self.reports.get(after.checked_sub(1)?)?;
         let after = self.reports.get(after)?;
-        let share = (at - before.at).secs() / (after.at - before.at).secs();
-        Some(before.path + (after.path - before.path) * share)
+        let fraction = (at - before.at).secs() / (after.at - before.at).secs();
+        Some(before.path + (after.path - before.path) * fraction)
     }
 }
 
@@ -81,7 +81,7 @@ mod tests {
 
     #[test]
     fn between_reports_the_path_is_a_line_and_after_them_it_goes_on() {
-        let mut transport = Transport::default();
+        let mut transport = PathHistory::default();
         transport.observe(Stamp::from_secs(1.0), &report(100.0, 50.0));
         transport.observe(Stamp::from_secs(1.2), &report(120.0, 60.0));
         let path = |secs| transport.path_at(Stamp::from_secs(secs)).map(Mm::get);
@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn a_new_bead_forgets_the_old() {
-        let mut transport = Transport::default();
+        let mut transport = PathHistory::default();
         transport.observe(Stamp::from_secs(1.0), &report(1900.0, 50.0));
         transport.observe(Stamp::from_secs(1.1), &report(0.0, 50.0));
         assert_eq!(transport.path_at(Stamp::from_secs(1.05)), None);

@@ -8,12 +8,12 @@ use truebead::cell::extruder::LinearPlant;
 use truebead::core::time::Span;
 use truebead::drivers::extruder::{ExtruderClient, ExtruderConfig, ExtruderEvent, ExtruderNotSent};
 use truebead::drivers::line::LinkTiming;
-use truebead::extruder::{Drive, ExtruderCommand, PumpMode};
+use truebead::extruder::{CommandQuantity, ExtruderCommand, PumpMode};
 use truebead::io::clock::RunClock;
 use truebead::link::ErrCode;
-use truebead::link::extruder::{ExtruderHello, ExtruderStatus, Faults};
+use truebead::link::extruder::{ExtruderFaults, ExtruderHello, ExtruderStatus};
 use truebead::numeric::lti::TransferFunction;
-use truebead::sim::extruder::{Delays, Linear, SimExtruder};
+use truebead::sim::extruder::{Delays, LinearPlantSim, SimExtruder};
 use truebead::simulators::extruder::{ExtruderOptions, ExtruderSim};
 
 /// What should happen does so long before; only a failure waits for it.
@@ -31,9 +31,14 @@ fn sim_on(listener: TcpListener) -> ExtruderSim {
         sensor_noise: Some(0.0),
         screw_lag_s: None,
     };
-    let plant = Linear::new(&plant, 1).unwrap();
+    let plant = LinearPlantSim::new(&plant, 1).unwrap();
     let options = ExtruderOptions {
-        hello: ExtruderHello { name: "sim".into(), drive: Drive::Rpm, min: 0.0, max: 90.0 },
+        hello: ExtruderHello {
+            name: "sim".into(),
+            drive: CommandQuantity::Rpm,
+            min: 0.0,
+            max: 90.0,
+        },
         plant: SimExtruder::new(Box::new(plant), Delays::default()),
         state_period: Span::from_millis(20),
         clock_start_ms: 7_000_000,
@@ -49,7 +54,7 @@ fn sim() -> ExtruderSim {
 fn config(address: SocketAddr) -> ExtruderConfig {
     ExtruderConfig {
         address: address.to_string(),
-        drive: Drive::Rpm,
+        drive: CommandQuantity::Rpm,
         min: 0.0,
         max: 90.0,
         valid_ms: 1000,
@@ -109,7 +114,7 @@ fn commands_turn_the_pump_and_run_out_with_pump_and_valve_at_rest() {
     let sim = sim();
     let pc = Pc::start(ExtruderConfig { valid_ms: 200, ..config(sim.local_addr()) });
     let hello = pc.until_up();
-    assert_eq!((hello.drive, hello.min, hello.max), (Drive::Rpm, 0.0, 90.0));
+    assert_eq!((hello.drive, hello.min, hello.max), (CommandQuantity::Rpm, 0.0, 90.0));
     let mut seq = 0;
     // A machine that is busy may need more than one before one is in time.
     let flowing = loop {
@@ -155,9 +160,9 @@ fn silence_ends_a_connection_and_the_pump_goes_to_rest() {
     pc.until_state(|_| true);
     pc.link.send(RUN).unwrap();
     pc.until_state(|state| state.report.pump == PumpMode::On);
-    sim.set_faults(Faults { mute: true, ..Faults::default() });
+    sim.set_faults(ExtruderFaults { mute: true, ..ExtruderFaults::default() });
     assert_eq!(pc.until_down(), "no STATE from the extruder for 200 ms");
-    sim.set_faults(Faults::default());
+    sim.set_faults(ExtruderFaults::default());
     pc.until_up();
     pc.until_state(|state| state.report.pump == PumpMode::Off);
 }
@@ -185,7 +190,7 @@ fn nothing_leaves_for_an_extruder_that_does_not_fit_the_cell() {
     let sim = sim();
     for (config, told) in [
         (ExtruderConfig { max: 120.0, ..config(sim.local_addr()) }, "takes 0 to 90 rpm"),
-        (ExtruderConfig { drive: Drive::Flow, ..config(sim.local_addr()) }, "mm3_per_s"),
+        (ExtruderConfig { drive: CommandQuantity::Flow, ..config(sim.local_addr()) }, "mm3_per_s"),
     ] {
         let pc = Pc::start(config.clone());
         let hello = pc.until_up();

@@ -199,7 +199,7 @@ fn a_robot_that_begins_where_no_extruder_answers_is_stopped_with_the_reason() {
         .unwrap();
     let output = wait(run);
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    assert!(said(&output).contains("fault: extruder: no answer"), "{}", said(&output));
+    assert!(said(&output).contains("fault: no answer"), "{}", said(&output));
     let summary = fs::read_to_string(folder.path().join("out/summary.json")).unwrap();
     let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
     assert_eq!(summary["fault_reasons"]["extruder_no_answer"], 1, "{summary}");

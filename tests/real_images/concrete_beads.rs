@@ -11,7 +11,7 @@ use truebead::core::frame::Frame;
 use truebead::core::geometry::Roi;
 use truebead::core::units::Mm;
 use truebead::core::units::WidthRange;
-use truebead::vision::{Axis, Gauge, Measurer, Polarity};
+use truebead::vision::{BeadAxis, Gauge, Measurer, Polarity};
 
 use super::concrete_labels::{COLUMNS, Sequence};
 use super::statistics::{median, quantile, sizes};
@@ -49,7 +49,7 @@ impl Beads {
     fn gauge(&self, roi: Roi) -> Gauge {
         let [min, max] =
             [0.6, 1.3].map(|times| Mm::constant((times * self.sequence.width).round()));
-        Gauge::new(roi, Axis::Horizontal, Polarity::Bright, WidthRange { min, max })
+        Gauge::new(roi, BeadAxis::Horizontal, Polarity::Bright, WidthRange { min, max })
     }
 
     /// Measures frames in shuffled order, each in its own region.

@@ -6,7 +6,7 @@
 use truebead::core::geometry::Roi;
 use truebead::core::units::Mm;
 use truebead::core::units::WidthRange;
-use truebead::vision::{Axis, Gauge, Polarity};
+use truebead::vision::{BeadAxis, Gauge, Polarity};
 
 use super::{data, image, measure};
 
@@ -58,7 +58,7 @@ fn no_layer_is_falsely_measured_in_90_settings() {
                 settings += 1;
                 let [min, max] = range.map(Mm::constant);
                 let gauge =
-                    Gauge::new(listed.roi, Axis::Horizontal, polarity, WidthRange { min, max });
+                    Gauge::new(listed.roi, BeadAxis::Horizontal, polarity, WidthRange { min, max });
                 let Ok(found) = measure(gauge, &frame) else { continue };
                 measured += 1;
                 let (width, sigma) = (found.width.get(), found.sigma.get());

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use truebead::core::geometry::Roi;
 use truebead::core::units::Mm;
 use truebead::core::units::WidthRange;
-use truebead::vision::{Axis, Gauge, Polarity, WidthMeasurement};
+use truebead::vision::{BeadAxis, Gauge, Polarity, WidthMeasurement};
 
 use super::statistics::{median, sizes};
 use super::{data, image, measure};
@@ -79,7 +79,7 @@ fn gauge(listed: &Listed, pitch_px: f64) -> Gauge {
         height: 2 * half_height,
     };
     let range = WidthRange { min: Mm::constant(8.0), max: Mm::constant(45.0) };
-    Gauge::new(roi, Axis::Horizontal, Polarity::Bright, range)
+    Gauge::new(roi, BeadAxis::Horizontal, Polarity::Bright, range)
 }
 
 /// Measures all spots; prints each that is refused.

@@ -8,7 +8,7 @@ use truebead::core::frame::Frame;
 use truebead::core::units::Mm;
 use truebead::core::units::WidthRange;
 use truebead::io::image_file::has_image_extension;
-use truebead::vision::{Axis, Gauge, Polarity};
+use truebead::vision::{BeadAxis, Gauge, Polarity};
 
 use super::statistics::median;
 use super::{clip, data, image, measure};
@@ -34,7 +34,7 @@ fn frames(name: &str) -> Option<Vec<Frame>> {
     Some(files.iter().step_by(every).map(|file| image(file)).collect())
 }
 
-fn gauge(frame: &Frame, axis: Axis, polarity: Polarity) -> Gauge {
+fn gauge(frame: &Frame, axis: BeadAxis, polarity: Polarity) -> Gauge {
     let Size { width, height } = frame.size();
     let range = WidthRange { min: Mm::constant(2.0), max: Mm::constant(600.0) };
     Gauge::new(Roi { x: 0, y: 0, width, height }, axis, polarity, range)
@@ -56,7 +56,7 @@ fn no_width_of_a_whole_image_has_a_useless_sigma() {
         let Some(frames) = frames(name) else { continue };
         let (mut asked, mut fractions) = (0, Vec::new());
         for frame in &frames {
-            for axis in [Axis::Vertical, Axis::Horizontal] {
+            for axis in [BeadAxis::Vertical, BeadAxis::Horizontal] {
                 for polarity in [Polarity::Bright, Polarity::Dark, Polarity::Any] {
                     asked += 1;
                     let gauge = gauge(frame, axis, polarity);

@@ -9,7 +9,7 @@ use truebead::drivers::robot::{
     LinkClient, LinkConfig, LinkConfigError, LinkTiming, NotSent, RobotEvent,
 };
 use truebead::io::clock::RunClock;
-use truebead::link::{ErrCode, Faults};
+use truebead::link::{ErrCode, RobotFaults};
 use truebead::run::ports::RobotPort;
 
 use crate::support::{Pc, Talk, config, listener, sim, sim_on, speed};
@@ -115,9 +115,9 @@ fn a_robot_that_falls_silent_is_given_up_and_called_again() {
     let timing = LinkTiming { silence: Duration::from_millis(200), ..LinkTiming::default() };
     let pc = Pc::start(LinkConfig { timing, ..config(sim.local_addr()) });
     pc.until_mode(RobotMode::Print);
-    sim.set_faults(Faults { mute: true, ..Faults::default() });
+    sim.set_faults(RobotFaults { mute: true, ..RobotFaults::default() });
     assert_eq!(pc.until_down(), "no STATE from the robot for 200 ms");
-    sim.set_faults(Faults::default());
+    sim.set_faults(RobotFaults::default());
     pc.until_up();
     pc.until_state(|_| true);
 }
@@ -176,7 +176,7 @@ fn a_refusal_is_reported() {
     let sim = sim();
     let pc = Pc::start(config(sim.local_addr()));
     pc.until_mode(RobotMode::Print);
-    sim.set_faults(Faults { refuse: Some(ErrCode::Range), ..Faults::default() });
+    sim.set_faults(RobotFaults { refuse: Some(ErrCode::Range), ..RobotFaults::default() });
     pc.link.send(Command::Speed(speed(100.0))).unwrap();
     let refused = pc.until(|event| match event {
         RobotEvent::Refused { seq, code, .. } => Some((*seq, *code)),

@@ -10,8 +10,8 @@ use truebead::core::time::Span;
 use truebead::core::units::{Mm, MmPerS};
 use truebead::drivers::robot::{LinkClient, LinkConfig, LinkTiming, RobotEvent};
 use truebead::io::clock::RunClock;
-use truebead::link::{Job, RobotParams};
-use truebead::simulators::robot::{RobotSim, SimOptions};
+use truebead::link::{PrintJob, RobotParams};
+use truebead::simulators::robot::{RobotOptions, RobotSim};
 
 /// What should happen does so long before; only a failure waits for it.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -27,9 +27,9 @@ pub fn listener() -> TcpListener {
 /// A robot that begins an endless bead as soon as a PC is there, `layers`
 /// times.
 pub fn sim_on(listener: TcpListener, layers: u32) -> RobotSim {
-    let options = SimOptions {
+    let options = RobotOptions {
         params: RobotParams { clock_start_ms: 7_000_000, ..RobotParams::default() },
-        job: Job::new(layers, Mm::ZERO, Mm::ZERO, Span::ZERO),
+        job: PrintJob::new(layers, Mm::ZERO, Mm::ZERO, Span::ZERO),
         state_period: Span::from_millis(20),
     };
     RobotSim::spawn(listener, RunClock::start(), options, Box::new(|_, _| {})).unwrap()

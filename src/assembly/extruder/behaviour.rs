@@ -23,7 +23,7 @@ pub struct Behaviour {
     /// From the cell's command to mm³/s.
     pub transfer: TransferFunction,
     /// Command and flow about which that holds.
-    pub about: OperatingPoint,
+    pub operating_point: OperatingPoint,
 }
 
 /// How the extruder of a cell behaves about its operating point, from the command to
@@ -35,14 +35,14 @@ pub fn behaviour(
     file: Option<&ExtruderFile>,
 ) -> Result<Behaviour, AssemblyError> {
     match (&keys.model, file) {
-        (ModelSource::Screw(screw), _) => carried(*screw),
-        (_, Some(file)) => identified(keys, part, cell, file),
-        (_, None) => Err(wrong(cell, WITHOUT_FILE)),
+        (ModelSource::Screw(screw), _) => drag_flow_behaviour(*screw),
+        (_, Some(file)) => model_behaviour(keys, part, cell, file),
+        (_, None) => Err(extruder_error(cell, WITHOUT_FILE)),
     }
 }
 
 /// An error about `[extruder]` of a cell.
-pub(super) fn wrong(cell: &str, what: &str) -> AssemblyError {
+pub(super) fn extruder_error(cell: &str, what: &str) -> AssemblyError {
     AssemblyError::unfit(format!("{cell}: [extruder]: {what}"))
 }
 
@@ -53,13 +53,16 @@ pub(super) fn wrong_file(file: &ExtruderFile, what: &str) -> AssemblyError {
 
 /// A screw that carries the same volume with every turn, as a model from rpm to
 /// mm³/s.
-fn carried(screw: DragFlow) -> Result<Behaviour, AssemblyError> {
+fn drag_flow_behaviour(screw: DragFlow) -> Result<Behaviour, AssemblyError> {
     let one = screw.flow(Rpm::constant(1.0))?;
-    Ok(Behaviour { transfer: TransferFunction::gain(one.get())?, about: OperatingPoint::default() })
+    Ok(Behaviour {
+        transfer: TransferFunction::gain(one.get())?,
+        operating_point: OperatingPoint::default(),
+    })
 }
 
 /// The model of a file, from the cell's command to mm³/s.
-fn identified(
+fn model_behaviour(
     keys: &FeedforwardKeys,
     part: &ExtruderPart,
     cell: &str,
@@ -72,7 +75,7 @@ fn identified(
             "found a model from {} to {}, expected one from {unit} to {flow}",
             model.input, model.output
         );
-        return Err(wrong(cell, &what));
+        return Err(extruder_error(cell, &what));
     }
     let gain = model.transfer.dc_gain();
     if gain < 0.0 {
@@ -80,14 +83,14 @@ fn identified(
             "found a model with a gain of {gain:.4}, less flow from more {unit}; expected one \
              above 0: look at the sign of a column"
         );
-        return Err(wrong(cell, &what));
+        return Err(extruder_error(cell, &what));
     }
-    if keys.foretold_from == ScrewSpeed::Measured && model.input.name == COMMAND {
+    if keys.predicted_from == ScrewSpeed::Measured && model.input.name == COMMAND {
         let what = "found a model whose input was the command, expected one of the screw as it \
                     was measured (identify --input screw_rpm) for foretold_from = \"encoder\"";
-        return Err(wrong(cell, what));
+        return Err(extruder_error(cell, what));
     }
     let (command, flow_mm3_per_s) = model.operating_point;
     let about = OperatingPoint { command, flow_mm3_per_s };
-    Ok(Behaviour { transfer: model.transfer, about })
+    Ok(Behaviour { transfer: model.transfer, operating_point: about })
 }

@@ -10,11 +10,11 @@ use crate::extruder::trajectory::{self, PlannedJob};
 use crate::io::record::ExtruderFile;
 
 /// How far the section of a plan may lie from the cell's, as a share.
-const SAME_SECTION: f64 = 0.02;
+const SECTION_TOLERANCE: f64 = 0.02;
 /// Rates may be passed by as much as a table rounds.
-const STEEPER: f64 = 1.02;
+const RATE_TOLERANCE: f64 = 1.02;
 /// Limits may be passed by as much as a table rounds \[mm/s, or the command's unit\].
-const ROUNDED: f64 = 1e-3;
+const LIMIT_TOLERANCE: f64 = 1e-3;
 
 /// Reads the plan and holds it against the cell.
 pub fn plan(
@@ -41,7 +41,7 @@ pub fn plan(
     let limits = run.limits;
     let (low, high) = job.speeds();
     let (min, max) = (limits.min_speed.get(), limits.max_speed.get());
-    if low < min - ROUNDED || high > max + ROUNDED {
+    if low < min - LIMIT_TOLERANCE || high > max + LIMIT_TOLERANCE {
         return Err(wrong(format!(
             "found speeds from {low:.2} to {high:.2} mm/s, expected {min} to {max}, the \
              [limits]: set those, or plan again with --apex-mm-per-s {min}"
@@ -49,30 +49,30 @@ pub fn plan(
     }
     let (low, high) = job.commands();
     let (min, max) = part.extruder.limits.range();
-    if low < min - ROUNDED || high > max + ROUNDED {
+    if low < min - LIMIT_TOLERANCE || high > max + LIMIT_TOLERANCE {
         return Err(wrong(format!(
             "found commands from {low:.4} to {high:.4} {unit}, expected {min} to {max}, the limits \
              of [extruder]: plan again with this cell"
         )));
     }
-    let (accel, most) = (job.steepest_speed(), limits.max_accel.get());
-    if accel > most * STEEPER {
+    let (accel, max) = (job.steepest_speed(), limits.max_accel.get());
+    if accel > max * RATE_TOLERANCE {
         return Err(wrong(format!(
-            "found an acceleration of {accel:.0} mm/s², expected {most} at most, the [limits]: plan \
+            "found an acceleration of {accel:.0} mm/s², expected {max} at most, the [limits]: plan \
              again with this cell"
         )));
     }
-    let (rate, most) = (job.steepest_command(), part.extruder.limits.rate_per_s());
-    if rate > most * STEEPER {
+    let (rate, max) = (job.steepest_command(), part.extruder.limits.rate_per_s());
+    if rate > max * RATE_TOLERANCE {
         return Err(wrong(format!(
-            "found a command that changes by {rate:.1} {unit} a second, expected {most} at most, \
+            "found a command that changes by {rate:.1} {unit} a second, expected {max} at most, \
              the limit of [extruder]: plan again with this cell"
         )));
     }
     let wanted = part.demand.nominal().get() / run.robot.start_speed.get();
     for (number, bead) in (1_u32..).zip(job.beads()) {
         let found = bead.section_mm2();
-        if (found / wanted - 1.0).abs() > SAME_SECTION {
+        if (found / wanted - 1.0).abs() > SECTION_TOLERANCE {
             return Err(wrong(format!(
                 "found a section of {found:.2} mm² for bead {number}, expected the cell's \
                  {wanted:.2} mm²: plan again with this cell"

@@ -5,7 +5,7 @@ use crate::cell::file::{ExtruderPart, RunPart};
 use crate::core::readback::ROBOT_LAG;
 use crate::core::time::Span;
 use crate::core::units::Mm;
-use crate::extruder::start_stop::{Laid, Timing};
+use crate::extruder::start_stop::{BeadConditions, StartStopTiming};
 use crate::extruder::trajectory::PlannedJob;
 use crate::identify::start_stop::file;
 use crate::io::record::ExtruderFile;
@@ -15,36 +15,36 @@ pub fn timing(
     run: &RunPart,
     part: &ExtruderPart,
     found: &ExtruderFile,
-) -> Result<Timing, AssemblyError> {
+) -> Result<StartStopTiming, AssemblyError> {
     let read = file::parse(&found.source, &found.text)?;
     let speed = run.robot.start_speed;
-    let laid = Laid {
+    let conditions = BeadConditions {
         flow: part.demand.nominal(),
         speed,
         // A robot that is told to lay bead cannot be told to stand.
-        least_share: run.limits.min_speed / speed,
+        min_speed_ratio: run.limits.min_speed / speed,
         robot_lag: Span::from_secs(0.5 / run.robot.rate_hz) + ROBOT_LAG,
     };
-    Timing::new(read.parameters, laid)
+    StartStopTiming::new(read.parameters, conditions)
         .map_err(|error| AssemblyError::unfit(format!("{}: {error}", found.source)))
 }
 
 /// Refuses beads that would end before their extruder has come to flow and been stopped.
-pub fn has_room(
+pub fn check_bead_length(
     run: &RunPart,
     plan: Option<&PlannedJob>,
-    timing: &Timing,
+    timing: &StartStopTiming,
     cell: &str,
 ) -> Result<(), AssemblyError> {
     let planned = plan.into_iter().flat_map(|plan| plan.beads().iter().map(|bead| bead.end()));
     let Some(shortest) = planned.chain(run.robot.bead_length).reduce(Mm::min) else {
         return Ok(());
     };
-    let way = timing.stop().way();
-    if shortest <= way {
+    let stop_length = timing.stop().distance();
+    if shortest <= stop_length {
         return Err(AssemblyError::unfit(format!(
             "{cell}: robot.bead_length_mm or a planned bead: found {shortest}, expected more than \
-             {way}, which is laid after the pump was told to stop: leave extruder.starts out"
+             {stop_length}, which is laid after the pump was told to stop: leave extruder.starts out"
         )));
     }
     Ok(())

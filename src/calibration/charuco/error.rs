@@ -5,7 +5,7 @@ use crate::core::geometry::GridSize;
 
 /// Why no board with markers is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum NoMarkers {
+pub enum MarkerError {
     /// There are none, or too few.
     #[error("no board with markers of {} cells: {found} of them show", dictionary.name())]
     None {

@@ -7,7 +7,7 @@ use crate::core::geometry::GridSize;
 
 /// Where markers are on a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Layout {
+pub struct MarkerGrid {
     /// Squares along a row.
     pub columns: usize,
     /// Squares along a column; a number beyond them has no place.
@@ -17,7 +17,7 @@ pub struct Layout {
     pub first_has_marker: bool,
 }
 
-impl Layout {
+impl MarkerGrid {
     /// Of a board.
     pub fn of(board: &Board, first_has_marker: bool) -> Self {
         let GridSize { columns, rows } = board.corners();
@@ -61,7 +61,7 @@ mod tests {
     fn markers_are_numbered_row_by_row_over_the_white_squares() {
         for columns in [6, 7] {
             for first_has_marker in [false, true] {
-                let layout = Layout { columns, rows: 5, first_has_marker };
+                let layout = MarkerGrid { columns, rows: 5, first_has_marker };
                 let white = (0..5)
                     .flat_map(|row| (0..columns).map(move |column| (column, row)))
                     .filter(|(column, row)| ((column + row) % 2 == 0) == first_has_marker);

@@ -7,18 +7,18 @@ use crate::numeric::blurred_step::StepTable;
 
 /// Place, directions of the two lines, blur; then mean, contrast and the slopes of the
 /// light.
-pub const NUMBERS: usize = 9;
+pub const PARAMETERS: usize = 9;
 const BLUR_PX: std::ops::RangeInclusive<f64> = 0.2..=8.0;
 
 /// A pixel of the window: where it is from the rough corner, and its value.
-pub struct Sample {
+pub struct CornerPixel {
     pub at: Vector2<f64>,
     pub value: f64,
 }
 
 /// The numbers of the model.
 #[derive(Debug, Clone, Copy)]
-pub struct Corner {
+pub struct CornerShape {
     /// From the rough corner \[px\].
     pub at: Vector2<f64>,
     /// Directions of the lines \[rad\].
@@ -32,14 +32,14 @@ pub struct Corner {
 
 /// The corner with the directions of its lines worked out.
 #[derive(Debug, Clone, Copy)]
-pub struct Model {
-    pub corner: Corner,
+pub struct CornerModel {
+    pub corner: CornerShape,
     pub along: [Vector2<f64>; 2],
     pub normals: [Vector2<f64>; 2],
 }
 
-impl Model {
-    pub fn of(corner: Corner) -> Self {
+impl CornerModel {
+    pub fn of(corner: CornerShape) -> Self {
         let along = corner.turns.map(|turn| {
             let (sin, cos) = turn.sin_cos();
             Vector2::new(cos, sin)
@@ -49,8 +49,8 @@ impl Model {
 
     /// The value that is expected at a place, and how it answers to the numbers.
     #[inline]
-    pub fn at(&self, table: &StepTable, place: Vector2<f64>) -> (f64, SVector<f64, NUMBERS>) {
-        let Corner { at, bends, blur, levels: [mean, half, by_x, by_y], .. } = self.corner;
+    pub fn at(&self, table: &StepTable, place: Vector2<f64>) -> (f64, SVector<f64, PARAMETERS>) {
+        let CornerShape { at, bends, blur, levels: [mean, half, by_x, by_y], .. } = self.corner;
         let from = place - at;
         let along = self.along.map(|direction| direction.dot(&from));
         let aside: [f64; 2] = std::array::from_fn(|line| {
@@ -82,31 +82,32 @@ impl Model {
 
 /// What the pixels of a window say of a corner: the normal equations, of which only
 /// the lower triangle is filled, and the squares of what is left.
-pub struct Sums {
-    pub matrix: SMatrix<f64, NUMBERS, NUMBERS>,
-    pub side: SVector<f64, NUMBERS>,
-    pub squares: f64,
+pub struct CornerSums {
+    pub matrix: SMatrix<f64, PARAMETERS, PARAMETERS>,
+    pub side: SVector<f64, PARAMETERS>,
+    pub sum_of_squares: f64,
 }
 
-impl Corner {
-    pub fn sums(&self, table: &StepTable, samples: &[Sample]) -> Sums {
-        let model = Model::of(*self);
-        let mut sums = Sums { matrix: SMatrix::zeros(), side: SVector::zeros(), squares: 0.0 };
+impl CornerShape {
+    pub fn sums(&self, table: &StepTable, samples: &[CornerPixel]) -> CornerSums {
+        let model = CornerModel::of(*self);
+        let mut sums =
+            CornerSums { matrix: SMatrix::zeros(), side: SVector::zeros(), sum_of_squares: 0.0 };
         for sample in samples {
             let (value, slopes) = model.at(table, sample.at);
             let left = sample.value - value;
-            for column in 0..NUMBERS {
-                for row in column..NUMBERS {
+            for column in 0..PARAMETERS {
+                for row in column..PARAMETERS {
                     sums.matrix[(row, column)] += slopes[row] * slopes[column];
                 }
             }
             sums.side += slopes * left;
-            sums.squares += left * left;
+            sums.sum_of_squares += left * left;
         }
         sums
     }
 
-    pub fn stepped(&self, step: &SVector<f64, NUMBERS>) -> Self {
+    pub fn stepped(&self, step: &SVector<f64, PARAMETERS>) -> Self {
         let mut levels = self.levels;
         levels.iter_mut().zip(step.iter().skip(5)).for_each(|(level, by)| *level += by);
         Self {
@@ -126,7 +127,7 @@ mod tests {
     #[test]
     fn the_slopes_are_the_derivatives() {
         let table = StepTable::default();
-        let corner = Corner {
+        let corner = CornerShape {
             at: Vector2::new(0.2, -0.1),
             turns: [0.1, 1.4],
             bends: [0.0, 0.0],
@@ -134,12 +135,12 @@ mod tests {
             levels: [120.0, -80.0, 0.5, -0.3],
         };
         for place in [Vector2::new(1.0, 0.4), Vector2::new(-0.7, 1.1), Vector2::new(0.1, -2.0)] {
-            let (_, slopes) = Model::of(corner).at(&table, place);
-            for number in 0..NUMBERS {
-                let mut step = SVector::<f64, NUMBERS>::zeros();
+            let (_, slopes) = CornerModel::of(corner).at(&table, place);
+            for number in 0..PARAMETERS {
+                let mut step = SVector::<f64, PARAMETERS>::zeros();
                 step[number] = 0.02;
-                let up = Model::of(corner.stepped(&step)).at(&table, place).0;
-                let down = Model::of(corner.stepped(&-step)).at(&table, place).0;
+                let up = CornerModel::of(corner.stepped(&step)).at(&table, place).0;
+                let down = CornerModel::of(corner.stepped(&-step)).at(&table, place).0;
                 let by = (up - down) / 0.04;
                 // The table is good to some 1e-5 of the step.
                 assert!((by - slopes[number]).abs() < 0.3, "{number}: {by} {}", slopes[number]);

@@ -7,12 +7,12 @@ use crate::core::geometry::ImagePoint;
 /// Half side of the window over the distance to the nearest line of the board that
 /// does not run through the corner: less than one, for that line's blur.
 const WINDOW_OVER_DISTANCE: f64 = 0.6;
-const SMALLEST_WINDOW_PX: f64 = 2.5;
-const LARGEST_WINDOW_PX: f64 = 9.0;
+const MIN_WINDOW_PX: f64 = 2.5;
+const MAX_WINDOW_PX: f64 = 9.0;
 /// How far a marker's blur reaches \[px\], and the part of the plain border beside it that
 /// is used in any case.
 const MARKER_BLUR_PX: f64 = 2.5;
-const LEAST_CLEAR: f64 = 0.5;
+const MIN_MARGIN: f64 = 0.5;
 
 /// The white squares that have a marker, by the corner that they meet at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,7 +25,7 @@ pub enum Marked {
 
 /// A line of the board at one of its corners.
 #[derive(Debug, Clone, Copy)]
-pub struct Line {
+pub struct BoardLine {
     /// From corner to corner \[px\].
     pub side: Vector2<f64>,
     /// How much it bends \[1/px\], towards the left of its direction as the picture's
@@ -33,7 +33,7 @@ pub struct Line {
     pub bend: f64,
 }
 
-impl Line {
+impl BoardLine {
     /// Through the corners on either side, as far as there are; straight where there
     /// are not three in a row. `None` without another corner.
     pub fn along(
@@ -58,7 +58,7 @@ impl Line {
 }
 
 /// The part of a corner's surroundings that shows two lines and nothing else.
-pub struct Window {
+pub struct CornerWindow {
     /// To the next corners along a row and along a column \[px\].
     pub sides: [Vector2<f64>; 2],
     /// Plain border about a marker, over the side of a square.
@@ -66,14 +66,14 @@ pub struct Window {
     pub marked: Option<Marked>,
 }
 
-impl Window {
+impl CornerWindow {
     /// Radius \[px\].
     pub fn radius(&self) -> f64 {
         // The nearest line that does not run through the corner is a side's end, or the
         // one that runs through it beside the other side.
         let area = self.sides[0].perp(&self.sides[1]).abs();
         let distance = (area / self.sides[0].norm()).min(area / self.sides[1].norm());
-        (distance * WINDOW_OVER_DISTANCE).clamp(SMALLEST_WINDOW_PX, LARGEST_WINDOW_PX)
+        (distance * WINDOW_OVER_DISTANCE).clamp(MIN_WINDOW_PX, MAX_WINDOW_PX)
     }
 
     /// Whether a place, as seen from the corner, is no part of a marker, nor blurred by
@@ -86,7 +86,7 @@ impl Window {
         let (along, across) = (at.perp(&column) / area, row.perp(&at) / area);
         let is_marked = (along * across > 0.0) == (marked == Marked::Along);
         let reach = |side: &Vector2<f64>| {
-            (self.clear - MARKER_BLUR_PX / side.norm()).max(LEAST_CLEAR * self.clear)
+            (self.clear - MARKER_BLUR_PX / side.norm()).max(MIN_MARGIN * self.clear)
         };
         !is_marked || along.abs() < reach(&row) || across.abs() < reach(&column)
     }

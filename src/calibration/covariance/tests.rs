@@ -1,7 +1,7 @@
 use super::*;
 use nalgebra::Vector3;
 
-use crate::calibration::Quality;
+use crate::calibration::CalibrationQuality;
 use crate::calibration::lens::Lens;
 use crate::calibration::share;
 use crate::calibration::solve;
@@ -29,17 +29,18 @@ fn solved(seed: u64) -> (Solution, [OnBed; 3]) {
     let sightings: Vec<_> =
         poses().iter().map(|pose| synthetic::sighting("", pose, &mut off)).collect();
     let solution = solve::solve_with(&board(), &sightings, Lens::Five).unwrap();
-    let several = Place { pose: later(), others: vec![[10.0, 14.0, 0.3], [-20.0, 5.0, -0.4]] };
-    let mut seen = |i| board().place(&synthetic::seen(&several.of_board(i), &mut off));
+    let several =
+        BoardPlacement { pose: later(), others: vec![[10.0, 14.0, 0.3], [-20.0, 5.0, -0.4]] };
+    let mut seen = |i| board().correspondences(&synthetic::seen(&several.of_board(i), &mut off));
     let (first, second, third) = (seen(0), seen(1), seen(2));
-    let own = board().place(&sightings[3].corners);
+    let own = board().correspondences(&sightings[3].corners);
     let beds = [vec![own], vec![first.clone()], vec![first, second, third]]
         .map(|boards| OnBed::fit(&solution.model, boards).unwrap());
     (solution, beds)
 }
 
-fn covariance(solution: &Solution, on_bed: &OnBed) -> Covariance {
-    Covariance::of(&board(), solution, on_bed, THICKNESS).unwrap()
+fn covariance(solution: &Solution, on_bed: &OnBed) -> CalibrationCovariance {
+    CalibrationCovariance::of(&board(), solution, on_bed, THICKNESS).unwrap()
 }
 
 /// Beads here and there, and the height of their surface.
@@ -55,7 +56,7 @@ fn beads() -> [([ImagePoint; 2], Mm); 3] {
 #[test]
 #[expect(clippy::cast_precision_loss, reason = "some seeds")]
 fn widths_scatter_over_many_calibrations_as_each_of_them_foretells() {
-    let runs: Vec<[Covariance; 3]> = (0..SEEDS)
+    let runs: Vec<[CalibrationCovariance; 3]> = (0..SEEDS)
         .into_par_iter()
         .map(|seed| {
             let (solution, beds) = solved(seed);
@@ -81,9 +82,9 @@ fn the_joint_covariance_says_what_each_width_does() {
     let (solution, beds) = solved(6);
     for bed in &beds {
         let covariance = covariance(&solution, bed);
-        let quality = Quality {
+        let quality = CalibrationQuality {
             reprojection_rms_px: solution.rms_px,
-            width_sigma_share: None,
+            width_relative_sigma: None,
             seen_px: None,
             heights_mm: None,
             uncertainty: Some(covariance.uncertainty()),
@@ -97,7 +98,7 @@ fn the_joint_covariance_says_what_each_width_does() {
         };
         for (ends, height) in beads() {
             let (width, sigma) = covariance.width_mm(ends, height).unwrap();
-            let share = calibration.surface(height, None).width_sigma_share_of(ends).unwrap();
+            let share = calibration.surface(height, None).width_relative_sigma_of(ends).unwrap();
             assert!((share * width / sigma - 1.0).abs() < 1e-4, "{share} {sigma} {width}");
         }
     }
@@ -146,7 +147,7 @@ fn more_noise_leaves_more_and_boards_all_alike_do_not_settle_the_camera() {
     for view in &mut alike.views {
         view.pose = straight;
     }
-    assert!(Covariance::of(&board(), &alike, &later, THICKNESS).is_none());
+    assert!(CalibrationCovariance::of(&board(), &alike, &later, THICKNESS).is_none());
 }
 
 #[test]
@@ -154,7 +155,7 @@ fn another_picture_leaves_less_open() {
     let (solution, [_, later, _]) = solved(4);
     let covariance = covariance(&solution, &later);
     let pose = poses()[7];
-    let corners = board().place(&synthetic::seen(&pose, || 0.0));
+    let corners = board().correspondences(&synthetic::seen(&pose, || 0.0));
     let more = covariance.with_another(&pose, &corners).unwrap();
     for (ends, height) in beads() {
         let [with, without] = [&more, &covariance].map(|c| c.width_mm(ends, height).unwrap().1);

@@ -17,19 +17,19 @@ pub const ON_PLANE: usize = 3;
 
 /// One corner of a board and where it is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Corner {
+pub struct Correspondence {
     /// Where it is on a flat board \[mm\].
     pub on_board: Point2<f64>,
     /// How far it rises out of the board's plane for each millimetre of bend along
     /// its rows and along its columns.
     pub bend: [f64; 2],
     /// Where it is seen \[px\].
-    pub seen: ImagePoint,
+    pub observed: ImagePoint,
 }
 
 /// A camera, and the bend of the board that it saw.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Model {
+pub struct CameraModel {
     /// The camera.
     pub camera: Camera,
     /// How far the middle of a board stands out of the plane through it, against the
@@ -39,7 +39,7 @@ pub struct Model {
 
 /// Which of the shared numbers are fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Free {
+pub struct FreeParameters {
     /// The lens, with focal lengths and principal point; `None` where the camera is
     /// known.
     pub lens: Option<Lens>,
@@ -49,7 +49,7 @@ pub struct Free {
 
 /// Where boards lie: one, or several on one plane.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Place {
+pub struct BoardPlacement {
     /// Axes of the first board in the camera's.
     pub pose: Pose,
     /// Where the others lie on its plane: a shift along its axes \[mm\] and a turn
@@ -57,9 +57,9 @@ pub struct Place {
     pub others: Vec<[f64; ON_PLANE]>,
 }
 
-impl Free {
+impl FreeParameters {
     /// Nothing but the places.
-    pub const PLACES: Self = Self { lens: None, bend: false };
+    pub const PLACEMENTS: Self = Self { lens: None, bend: false };
 
     /// Whether one of the shared numbers is fitted.
     pub fn has(self, number: usize) -> bool {
@@ -76,9 +76,9 @@ impl Free {
     }
 }
 
-impl Model {
+impl CameraModel {
     /// With its shared numbers changed by these.
-    pub fn stepped(&self, step: &SVector<f64, SHARED>) -> Self {
+    pub fn moved(&self, step: &SVector<f64, SHARED>) -> Self {
         let mut numbers = self.camera.numbers();
         for (number, by) in numbers.iter_mut().zip(step) {
             *number += by;
@@ -88,27 +88,31 @@ impl Model {
     }
 
     /// Where a corner is, in the board's axes \[mm\].
-    pub fn on_board(&self, corner: &Corner) -> Point3<f64> {
+    pub fn on_board(&self, corner: &Correspondence) -> Point3<f64> {
         let z = self.bend_mm[0] * corner.bend[0] + self.bend_mm[1] * corner.bend[1];
         Point3::new(corner.on_board.x, corner.on_board.y, z)
     }
 
     /// Sum of the squares of what is left between seen and expected \[px²\]; `None`
     /// behind the camera.
-    pub fn squares_px2(&self, place: &Place, boards: &[Vec<Corner>]) -> Option<f64> {
+    pub fn sum_of_squares_px2(
+        &self,
+        place: &BoardPlacement,
+        boards: &[Vec<Correspondence>],
+    ) -> Option<f64> {
         let mut sum = 0.0;
         for (board, corners) in boards.iter().enumerate() {
             let pose = place.of_board(board);
             for corner in corners {
                 let at = self.camera.project(pose.apply(self.on_board(corner)))?;
-                sum += (corner.seen - at).norm_squared();
+                sum += (corner.observed - at).norm_squared();
             }
         }
         Some(sum)
     }
 }
 
-impl Place {
+impl BoardPlacement {
     /// Of a single board.
     pub fn of_one(pose: Pose) -> Self {
         Self { pose, others: Vec::new() }
@@ -128,7 +132,7 @@ impl Place {
     }
 
     /// With its numbers changed by these.
-    pub fn stepped(&self, step: &DVector<f64>) -> Self {
+    pub fn moved(&self, step: &DVector<f64>) -> Self {
         let turn = Rotation3::new(step.fixed_rows::<3>(0));
         let shift = step.fixed_rows::<3>(3);
         let others = self.others.iter().enumerate().map(|(i, other)| {
@@ -149,7 +153,10 @@ impl Place {
 
 /// Equations between shared numbers, without what rounding leaves of those that are
 /// not free.
-pub fn only(mut matrix: SMatrix<f64, SHARED, SHARED>, free: Free) -> SMatrix<f64, SHARED, SHARED> {
+pub fn restrict_to_free(
+    mut matrix: SMatrix<f64, SHARED, SHARED>,
+    free: FreeParameters,
+) -> SMatrix<f64, SHARED, SHARED> {
     for number in (0..SHARED).filter(|&number| !free.has(number)) {
         matrix.row_mut(number).fill(0.0);
         matrix.column_mut(number).fill(0.0);

@@ -23,12 +23,12 @@ pub struct Matrix {
 }
 
 /// The outermost keys of a file.
-pub struct Fields<'a> {
+pub struct YamlFields<'a> {
     items: &'a [(String, Node)],
     problems: RefCell<Vec<Problem>>,
 }
 
-impl<'a> Fields<'a> {
+impl<'a> YamlFields<'a> {
     /// What is no mapping has no keys, which is reported.
     pub fn of(root: &'a Node) -> Self {
         let items = mapping(root);

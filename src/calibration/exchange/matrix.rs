@@ -1,14 +1,14 @@
 //! From a matrix and a row of coefficients to a camera that can measure.
 
-use super::fields::{Fields, Matrix};
+use super::fields::{Matrix, YamlFields};
 use crate::calibration::Camera;
 use crate::calibration::camera::COEFFICIENTS;
 use crate::calibration::file::{CENTRE_PX, DISTORTION, FOCAL_PX};
 
 /// What OpenCV puts after the eight coefficients: thin prism and tilt.
-const BEYOND: [&str; 6] = ["s1", "s2", "s3", "s4", "tau_x", "tau_y"];
+const PRISM_AND_TILT: [&str; 6] = ["s1", "s2", "s3", "s4", "tau_x", "tau_y"];
 
-impl Fields<'_> {
+impl YamlFields<'_> {
     /// The camera of its matrix and its coefficients, of which there may be so many.
     pub fn camera(
         &self,
@@ -71,7 +71,7 @@ impl Fields<'_> {
             return None;
         }
         let mut is_sound = true;
-        for (&value, name) in row.data.iter().skip(COEFFICIENTS).zip(BEYOND) {
+        for (&value, name) in row.data.iter().skip(COEFFICIENTS).zip(PRISM_AND_TILT) {
             if value != 0.0 {
                 let found = format!("{name} = {value}");
                 let expected = "0; thin prisms and tilted sensors are not known here";

@@ -2,7 +2,7 @@
 //! `camera_info_manager` reads, and `sensor_msgs/CameraInfo` as `ros2 topic echo`
 //! prints it.
 
-use super::fields::{Fields, Matrix, Names};
+use super::fields::{Matrix, Names, YamlFields};
 use super::intrinsics::Intrinsics;
 use super::write::row;
 use crate::calibration::camera::COEFFICIENTS;
@@ -19,14 +19,14 @@ const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
 /// Whether the keys are ROS's: some that only it has, or a picture's size as in a
 /// message.
-pub(super) fn is_meant(fields: &Fields<'_>) -> bool {
+pub(super) fn is_ros(fields: &YamlFields<'_>) -> bool {
     let only_here: [Names; 6] =
         [NAME, MODEL, &["rectificationmatrix"], &["projectionmatrix"], &["binningx"], &["roi"]];
     let message = fields.has(&["width"]) && fields.has(&["height"]);
     !fields.has_within(CAMERA, "dt") && (message || only_here.iter().any(|names| fields.has(names)))
 }
 
-pub(super) fn read(fields: &Fields<'_>, notes: &mut Vec<String>) -> Option<Intrinsics> {
+pub(super) fn read(fields: &YamlFields<'_>, notes: &mut Vec<String>) -> Option<Intrinsics> {
     let width = fields.side(WIDTH, "image_width");
     let height = fields.side(HEIGHT, "image_height");
     let counts = read_model(fields, notes);
@@ -46,7 +46,7 @@ pub(super) fn read(fields: &Fields<'_>, notes: &mut Vec<String>) -> Option<Intri
 }
 
 /// How many coefficients the lens has.
-fn read_model(fields: &Fields<'_>, notes: &mut Vec<String>) -> Option<&'static [usize]> {
+fn read_model(fields: &YamlFields<'_>, notes: &mut Vec<String>) -> Option<&'static [usize]> {
     const PLUMB_BOB: &[usize] = &[4, 5];
     if !fields.has(MODEL) {
         notes.push("no distortion_model: taken for plumb_bob, as ROS does".to_owned());
@@ -69,7 +69,7 @@ fn read_model(fields: &Fields<'_>, notes: &mut Vec<String>) -> Option<&'static [
 
 /// Numbers of a part of the picture, or of one with fewer pixels, hold for others
 /// than those that are measured.
-fn check_whole_picture(fields: &Fields<'_>, [width, height]: [Option<u32>; 2]) {
+fn check_whole_picture(fields: &YamlFields<'_>, [width, height]: [Option<u32>; 2]) {
     for key in ["binning_x", "binning_y"] {
         fields.check_whole(&[key], &[0, 1], "0 or 1, pictures with all their pixels");
     }
@@ -83,7 +83,7 @@ fn check_whole_picture(fields: &Fields<'_>, [width, height]: [Option<u32>; 2]) {
 
 /// Pictures are measured as they come, and the two matrices say how others would be
 /// made of them.
-fn note_rectification(fields: &Fields<'_>, camera: Option<&Matrix>, notes: &mut Vec<String>) {
+fn note_rectification(fields: &YamlFields<'_>, camera: Option<&Matrix>, notes: &mut Vec<String>) {
     let turned = fields
         .optional_matrix(RECTIFICATION, "rectification_matrix", [3, 3])
         .is_some_and(|matrix| matrix.data != IDENTITY);
@@ -242,7 +242,7 @@ roi:
     #[test]
     fn a_part_of_the_picture_and_pixels_put_together_are_refused() {
         for (from, to, words) in [
-            ("binning_x: 0", "binning_x: 2", "line 30: binning_x: found 2, expected 0 or 1"),
+            ("binning_x: 0", "binning_x: 2", "line 30: found 2, expected 0 or 1"),
             ("x_offset: 0", "x_offset: 8", "roi.x_offset: found 8, expected 0 or the whole"),
             ("  width: 0", "  width: 320", "roi.width: found 320, expected 0 or the whole"),
         ] {
@@ -257,7 +257,7 @@ roi:
     #[test]
     fn lenses_that_are_not_known_are_refused() {
         let fish = said(&FILE.replace("plumb_bob", "equidistant"));
-        let words = "line 10: distortion_model: found equidistant, expected plumb_bob or rational";
+        let words = "line 10: found equidistant, expected plumb_bob or rational";
         assert!(fish.contains(words), "{fish}");
         let eight = said(&FILE.replace("plumb_bob", "rational_polynomial"));
         assert!(eight.contains("distortion_coefficients: found 5 numbers, expected 8"), "{eight}");
@@ -276,7 +276,7 @@ roi:
         let said = said(&text);
         for words in [
             "image_width: found nothing, expected a whole number from 1 to 65536",
-            "line 1: image_height: found -480, expected a whole number",
+            "line 1: found -480, expected a whole number",
             "camera_matrix: found a focal length fx of -3, expected 1 to 10000000",
             "camera_matrix: found a skew of 0.5, expected 0",
             "line 13: distortion_coefficients.data[1]: found .Nan, expected a finite number",

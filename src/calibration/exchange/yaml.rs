@@ -6,7 +6,7 @@ use saphyr_parser::{Event, Parser, ScalarStyle, ScanError};
 use crate::document::Problem;
 
 /// Calibrations are nested three deep.
-const DEEPEST: usize = 32;
+const MAX_DEPTH: usize = 32;
 
 /// One node of the tree.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,7 +32,7 @@ pub enum Value {
 
 /// The first document of a file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Document {
+pub struct YamlDocument {
     /// Its outermost node.
     pub root: Node,
     /// Whether another one follows.
@@ -71,7 +71,7 @@ enum Open {
 
 /// Reads the first document that is not empty. Keys that stand twice, and what
 /// refers to other places of the file, are refused.
-pub fn parse(text: &str) -> Result<Document, Problem> {
+pub fn parse(text: &str) -> Result<YamlDocument, Problem> {
     // OpenCV before its fifth version begins with `%YAML:1.0`, which is no directive
     // of YAML's; as a comment it does no harm, and the lines stay where they are.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -101,7 +101,7 @@ pub fn parse(text: &str) -> Result<Document, Problem> {
                 let Some(closed) = open.pop() else { continue };
                 let node = closed.into_node();
                 match put(&mut open, node)? {
-                    Some(root) => return Ok(Document { root, more: follows(parser) }),
+                    Some(root) => return Ok(YamlDocument { root, more: follows(parser) }),
                     None => continue,
                 }
             }
@@ -109,11 +109,11 @@ pub fn parse(text: &str) -> Result<Document, Problem> {
         };
         let is_empty = open.is_empty() && value == Value::Plain(String::new());
         match put(&mut open, Node { line, value })? {
-            Some(root) if !is_empty => return Ok(Document { root, more: follows(parser) }),
+            Some(root) if !is_empty => return Ok(YamlDocument { root, more: follows(parser) }),
             _ => {}
         }
     }
-    Ok(Document { root: Node { line: 1, value: Value::Plain(String::new()) }, more: false })
+    Ok(YamlDocument { root: Node { line: 1, value: Value::Plain(String::new()) }, more: false })
 }
 
 impl Open {
@@ -163,10 +163,10 @@ fn follows(mut parser: Parser<'_, saphyr_parser::StrInput<'_>>) -> bool {
 }
 
 fn check_depth(open: &[Open], line: usize) -> Result<(), Problem> {
-    if open.len() <= DEEPEST {
+    if open.len() <= MAX_DEPTH {
         return Ok(());
     }
-    Err(wrong(line, format!("rows nested more than {DEEPEST} deep"), "a calibration"))
+    Err(wrong(line, format!("rows nested more than {MAX_DEPTH} deep"), "a calibration"))
 }
 
 fn not_yaml(error: &ScanError) -> Problem {

@@ -1,11 +1,11 @@
 use nalgebra::{Point3, Rotation3, Vector3};
 
 use super::*;
-use crate::calibration::board::Marks;
+use crate::calibration::board::Markers;
 use crate::calibration::dictionary::Dictionary;
 use crate::calibration::sighting;
-use crate::calibration::sighting::Sighting;
-use crate::calibration::{Camera, Quality};
+use crate::calibration::sighting::BoardObservation;
+use crate::calibration::{CalibrationQuality, Camera};
 use crate::core::frame::{Frame, Pixels};
 use crate::core::geometry::{Pose, Size};
 use crate::core::time::Stamp;
@@ -35,9 +35,9 @@ fn bed() -> Pose {
 }
 
 fn calibration() -> Calibration {
-    let quality = Quality {
+    let quality = CalibrationQuality {
         reprojection_rms_px: 0.1,
-        width_sigma_share: Some(1e-3),
+        width_relative_sigma: Some(1e-3),
         seen_px: None,
         uncertainty: None,
         heights_mm: None,
@@ -51,9 +51,9 @@ fn calibration() -> Calibration {
     }
 }
 
-fn gauge() -> Gauge {
+fn gauge() -> OffsetGauge {
     let middle = bed().apply(Point3::new(MIDDLE[0], MIDDLE[1], SURFACE));
-    Gauge {
+    OffsetGauge {
         middle: camera().project(middle).unwrap(),
         ahead: Vector2::new(0.0, -1.0),
         right: Vector2::new(1.0, 0.0),
@@ -68,7 +68,7 @@ fn board() -> Board {
 
 fn touch(sigma_mm: f64) -> Touch {
     let (sigma, thickness) = (Mm::new(sigma_mm).unwrap(), Mm::constant(THICKNESS));
-    Touch { at: AT, sigma, thickness, robot_z: None }
+    Touch { position: AT, sigma, thickness, robot_z: None }
 }
 
 /// The board so that a place of it, in squares, lies at a place of the bed; a little
@@ -82,14 +82,14 @@ fn lies(at: [f64; 2], on_bed: [f64; 2], height: f64) -> Pose {
 }
 
 /// The picture of a board whose place `AT` is so far off where it is told to be.
-fn seen(off: [f64; 2], height: f64, seed: u64) -> Sighting {
+fn seen(off: [f64; 2], height: f64, seed: u64) -> BoardObservation {
     let place = [MIDDLE[0] + RIGHT + off[0], MIDDLE[1] + AHEAD + off[1]];
     let studio = BoardStudio::new(&camera(), SIZE);
     let frame = studio.take(&board(), &lies(AT, place, height), Exposure::SHARP, seed).unwrap();
-    sighting::look(&board(), "", &frame).unwrap()
+    sighting::observe(&board(), "", &frame).unwrap()
 }
 
-fn found(sighting: &Sighting, touch: &Touch) -> Found {
+fn found(sighting: &BoardObservation, touch: &Touch) -> NozzleOffset {
     find(&calibration(), &gauge(), &board(), &sighting.corners, touch).unwrap()
 }
 
@@ -126,7 +126,7 @@ fn a_touch_that_is_certain_leaves_the_noise_of_the_corners() {
 /// tell.
 #[test]
 fn a_board_with_markers_has_one_reading_and_may_be_covered_in_part() {
-    let marks = Marks { side: Mm::constant(14.0), dictionary: Dictionary::Four };
+    let marks = Markers { side: Mm::constant(14.0), dictionary: Dictionary::Four };
     let marked = board().with_marks(marks).unwrap();
     let at = [4.0, 2.0];
     let place = [MIDDLE[0] + RIGHT, MIDDLE[1] + 20.0];
@@ -142,13 +142,13 @@ fn a_board_with_markers_has_one_reading_and_may_be_covered_in_part() {
     });
     let covered =
         Frame::new(0, Stamp::START, Size::new(640, 480), Pixels::Grey8(values.collect())).unwrap();
-    let corners = sighting::look(&marked, "", &covered).unwrap().corners;
+    let corners = sighting::observe(&marked, "", &covered).unwrap().corners;
     assert!((30..54).contains(&corners.len()), "{}", corners.len());
-    let touch = Touch { at, ..touch(0.0) };
+    let touch = Touch { position: at, ..touch(0.0) };
     let found = find(&calibration(), &gauge(), &marked, &corners, &touch).unwrap();
     assert!((found.along_mm - 20.0).hypot(found.across_mm - RIGHT) < 0.05, "{found:?}");
     // Behind the gauge is behind it, and not the other way round.
-    let behind = Gauge { ahead: Vector2::new(0.0, 1.0), ..gauge() };
+    let behind = OffsetGauge { ahead: Vector2::new(0.0, 1.0), ..gauge() };
     let none = find(&calibration(), &behind, &marked, &corners, &touch).unwrap_err();
     assert!(none.to_string().contains("of the gauge (20.0 mm behind its middle)"), "{none}");
 }
@@ -163,7 +163,7 @@ fn a_camera_that_has_risen_with_the_robot_sees_the_same() {
 #[test]
 fn a_height_that_is_not_known_moves_the_middle_of_a_gauge_seen_aslant() {
     let sighting = seen([0.0; 2], THICKNESS, 2);
-    let gauge = Gauge { surface_height_sigma: Mm::constant(2.0), ..gauge() };
+    let gauge = OffsetGauge { surface_height_sigma: Mm::constant(2.0), ..gauge() };
     let found = find(&calibration(), &gauge, &board(), &sighting.corners, &touch(0.0)).unwrap();
     let eye = bed().apply_inverse(Point3::origin());
     let expected = 2.0 * ((MIDDLE[1] - eye.y) / (eye.z - SURFACE)).abs();
@@ -182,7 +182,7 @@ fn the_nozzle_is_beyond_the_right_end_of_a_horizontal_gauge() {
         robot_z: Mm::ZERO,
         quality: None,
     };
-    let gauge = Gauge {
+    let gauge = OffsetGauge {
         middle: camera().project(bed.apply(Point3::new(-30.0, 0.0, SURFACE))).unwrap(),
         ahead: Vector2::new(1.0, 0.0),
         right: Vector2::new(0.0, 1.0),
@@ -194,8 +194,8 @@ fn the_nozzle_is_beyond_the_right_end_of_a_horizontal_gauge() {
     let pose = Pose::from_parts(bed.rotation() * axes, place(65.0 - 180.0, -1.2 + 50.0));
     let studio = BoardStudio::new(&camera(), SIZE);
     let frame = studio.take(&board(), &pose, Exposure::SHARP, 3).unwrap();
-    let corners = sighting::look(&board(), "", &frame).unwrap().corners;
-    let touch = Touch { at: [9.0, 2.5], ..touch(0.0) };
+    let corners = sighting::observe(&board(), "", &frame).unwrap().corners;
+    let touch = Touch { position: [9.0, 2.5], ..touch(0.0) };
     let found = find(&calibration, &gauge, &board(), &corners, &touch).unwrap();
     let off = (found.along_mm - 95.0).hypot(found.across_mm - 1.2);
     assert!(off < 0.05 && found.parts.calibration.is_none(), "{found:?}");
@@ -209,22 +209,22 @@ fn what_has_no_one_answer_is_refused() {
     let studio = BoardStudio::new(&camera(), SIZE);
     let pose = lies(AT, place, THICKNESS);
     let frame = studio.take(&even, &pose, Exposure::SHARP, 4).unwrap();
-    let corners = sighting::look(&even, "", &frame).unwrap().corners;
-    let asked = |gauge: &Gauge, at| {
-        let touch = Touch { at, ..touch(0.5) };
+    let corners = sighting::observe(&even, "", &frame).unwrap().corners;
+    let asked = |gauge: &OffsetGauge, at| {
+        let touch = Touch { position: at, ..touch(0.5) };
         find(&calibration(), gauge, &even, &corners, &touch).map(|found| found.along_mm)
     };
     // The board's middle, and a little beside it, is ahead of the gauge's either way.
     let both = asked(&gauge(), [3.5, 2.0]);
-    assert!(matches!(both, Err(OffsetError::Ambiguous { .. })), "{both:?}");
-    let behind = Gauge { ahead: Vector2::new(0.0, 1.0), ..gauge() };
+    assert!(matches!(both, Err(NozzleOffsetError::Ambiguous { .. })), "{both:?}");
+    let behind = OffsetGauge { ahead: Vector2::new(0.0, 1.0), ..gauge() };
     let none = asked(&behind, [3.5, 2.0]);
-    assert!(matches!(none, Err(OffsetError::Behind { .. })), "{none:?}");
+    assert!(matches!(none, Err(NozzleOffsetError::Behind { .. })), "{none:?}");
     let square = Board::new(6, 6, Mm::constant(20.0)).unwrap();
     let few = &corners[..36];
     let refused = find(&calibration(), &gauge(), &square, few, &touch(0.5));
-    assert_eq!(refused.unwrap_err(), OffsetError::Square(6));
+    assert_eq!(refused.unwrap_err(), NozzleOffsetError::Square(6));
     let single = Calibration::Scale { mm_per_px: 0.1, sigma: None };
     let refused = find(&single, &gauge(), &board(), &corners, &touch(0.5));
-    assert_eq!(refused.unwrap_err(), OffsetError::NoCamera);
+    assert_eq!(refused.unwrap_err(), NozzleOffsetError::NoCamera);
 }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::calibration::Camera;
-use crate::calibration::board::all_seen;
+use crate::calibration::board::observe_all;
 use crate::calibration::dictionary::Dictionary;
 use crate::calibration::synthetic;
 use crate::calibration::synthetic::poses;
@@ -16,7 +16,7 @@ fn board(columns: usize, rows: usize) -> Board {
 }
 
 /// What is said of a picture of a board, where one of 9x6 is looked for.
-fn seen(shown: &Board, exposure: Exposure) -> Result<Sighting, Refusal> {
+fn seen(shown: &Board, exposure: Exposure) -> Result<BoardObservation, BoardRejection> {
     let camera =
         Camera::pinhole([620.0, 622.0], [263.0, 198.0]).with_five([-0.2, 0.05, 0.0, 0.0, 0.0]);
     let GridSize { columns, rows } = shown.corners();
@@ -24,7 +24,7 @@ fn seen(shown: &Board, exposure: Exposure) -> Result<Sighting, Refusal> {
     let middle = Vector3::new(columns as f64 - 1.0, rows as f64 - 1.0, 0.0) * 10.0;
     let pose = Pose::new(Vector3::new(0.2, -0.15, 0.05), Vector3::new(0.0, 0.0, 420.0) - middle);
     let frame = BoardStudio::new(&camera, [520, 400]).take(shown, &pose, exposure, 3).unwrap();
-    look(&board(9, 6), "a.png", &frame)
+    observe(&board(9, 6), "a.png", &frame)
 }
 
 #[test]
@@ -48,18 +48,21 @@ fn other_boards_are_told_from_none() {
     assert!(
         matches!(
             larger,
-            Refusal::Larger { .. }
-                | Refusal::OtherBoard { found: GridSize { columns: 11, rows: 8 }, .. }
+            BoardRejection::Larger { .. }
+                | BoardRejection::OtherBoard { found: GridSize { columns: 11, rows: 8 }, .. }
         ),
         "{larger}"
     );
     let longer = seen(&board(10, 6), Exposure::SHARP).unwrap_err();
-    assert!(matches!(longer, Refusal::Larger { .. } | Refusal::OtherBoard { .. }), "{longer}");
+    assert!(
+        matches!(longer, BoardRejection::Larger { .. } | BoardRejection::OtherBoard { .. }),
+        "{longer}"
+    );
     let empty =
         Frame::new(0, Stamp::START, Size::new(400, 300), Pixels::Grey8(vec![90; 400 * 300]))
             .unwrap();
-    let none = look(&board(9, 6), "a.png", &empty).unwrap_err();
-    assert_eq!(none, Refusal::NoBoard { columns: 9, rows: 6 });
+    let none = observe(&board(9, 6), "a.png", &empty).unwrap_err();
+    assert_eq!(none, BoardRejection::NoBoard { columns: 9, rows: 6 });
 }
 
 /// A board that fills the upper left of a picture to its very edge, what is around it
@@ -87,13 +90,14 @@ fn at_the_edge(shown: &Board, behind: impl Fn(f64, f64) -> Option<u8>) -> Frame 
 
 #[test]
 fn a_board_close_to_the_edge_is_found_and_a_larger_one_is_not_taken_for_it() {
-    let found = look(&board(9, 6), "a", &at_the_edge(&board(9, 6), |_, _| None)).unwrap();
+    let found = observe(&board(9, 6), "a", &at_the_edge(&board(9, 6), |_, _| None)).unwrap();
     assert_eq!(found.corners.len(), 54);
     assert!(found.corners.iter().any(|corner| corner.px.y < 40.0), "{:?}", found.corners);
     for (columns, rows) in [(10, 6), (9, 7), (10, 7)] {
         let larger = at_the_edge(&board(columns, rows), |_, _| None);
-        let said = look(&board(9, 6), "a", &larger).unwrap_err();
-        let is_told = matches!(said, Refusal::Larger { .. } | Refusal::OtherBoard { .. });
+        let said = observe(&board(9, 6), "a", &larger).unwrap_err();
+        let is_told =
+            matches!(said, BoardRejection::Larger { .. } | BoardRejection::OtherBoard { .. });
         assert!(is_told, "{columns}x{rows}: {said}");
     }
 }
@@ -111,15 +115,16 @@ fn what_lies_behind_a_board_is_not_taken_for_more_of_it() {
         let part = if is_odd(x, y) { 0.25 } else { 0.75 };
         beyond(x, y).then(|| shade((8.0 * y).rem_euclid(2.0) < 2.0 * part)).flatten()
     };
-    let said = look(&board(9, 6), "a", &at_the_edge(&board(9, 6), in_step));
-    let is_larger = matches!(said, Err(Refusal::Larger { .. } | Refusal::OtherBoard { .. }));
+    let said = observe(&board(9, 6), "a", &at_the_edge(&board(9, 6), in_step));
+    let is_larger =
+        matches!(said, Err(BoardRejection::Larger { .. } | BoardRejection::OtherBoard { .. }));
     assert!(is_larger, "{said:?}");
-    assert!(look(&board(9, 6), "a", &at_the_edge(&board(9, 6), out_of_step)).is_ok());
-    assert!(look(&board(9, 6), "a", &at_the_edge(&board(9, 6), patterned)).is_ok());
+    assert!(observe(&board(9, 6), "a", &at_the_edge(&board(9, 6), out_of_step)).is_ok());
+    assert!(observe(&board(9, 6), "a", &at_the_edge(&board(9, 6), patterned)).is_ok());
 }
 
 fn marked(columns: usize, rows: usize, dictionary: Dictionary) -> Board {
-    let marks = Marks { side: Mm::constant(14.0), dictionary };
+    let marks = Markers { side: Mm::constant(14.0), dictionary };
     board(columns, rows).with_marks(marks).unwrap()
 }
 
@@ -138,7 +143,7 @@ fn picture(shown: &Board, at: Vector3<f64>, seed: u64) -> (Frame, Vec<Option<Ima
     (frame, truth)
 }
 
-fn off_px(sighting: &Sighting, truth: &[Option<ImagePoint>]) -> f64 {
+fn off_px(sighting: &BoardObservation, truth: &[Option<ImagePoint>]) -> f64 {
     let squares = sighting.corners.iter().map(|c| (c.px - truth[c.index].unwrap()).norm_squared());
     #[expect(clippy::cast_precision_loss, reason = "a count of corners")]
     let count = sighting.corners.len() as f64;
@@ -150,7 +155,7 @@ fn corners_between_markers_are_found_as_well_as_those_of_a_plain_board() {
     for dictionary in Dictionary::ALL {
         let shown = marked(9, 6, dictionary);
         let (frame, truth) = picture(&shown, Vector3::new(0.0, 0.0, 420.0), 5);
-        let sighting = look(&shown, "a", &frame).unwrap();
+        let sighting = observe(&shown, "a", &frame).unwrap();
         assert_eq!(sighting.corners.len(), 54);
         let off = off_px(&sighting, &truth);
         assert!(off < 0.04, "{}: {off}", dictionary.name());
@@ -161,7 +166,7 @@ fn corners_between_markers_are_found_as_well_as_those_of_a_plain_board() {
 fn a_board_that_is_partly_in_the_picture_is_seen_as_far_as_it_is() {
     let shown = marked(9, 6, Dictionary::Four);
     let (frame, truth) = picture(&shown, Vector3::new(110.0, 50.0, 420.0), 6);
-    let sighting = look(&shown, "a", &frame).unwrap();
+    let sighting = observe(&shown, "a", &frame).unwrap();
     let inside = |px: &ImagePoint| (12.0..627.0).contains(&px.x) && (12.0..467.0).contains(&px.y);
     let whole = truth.iter().flatten().filter(|px| inside(px)).count();
     let found = sighting.corners.len();
@@ -170,9 +175,13 @@ fn a_board_that_is_partly_in_the_picture_is_seen_as_far_as_it_is() {
     assert!(off < 0.05, "{off}");
     // Too little of it.
     let (frame, _) = picture(&shown, Vector3::new(215.0, 50.0, 420.0), 6);
-    let little = look(&shown, "a", &frame).unwrap_err();
+    let little = observe(&shown, "a", &frame).unwrap_err();
     assert!(
-        matches!(little, Refusal::Little { .. } | Refusal::NoMarkers(NoMarkers::None { .. })),
+        matches!(
+            little,
+            BoardRejection::TooFewCorners { .. }
+                | BoardRejection::NoMarkers(MarkerError::None { .. })
+        ),
         "{little}"
     );
 }
@@ -190,7 +199,7 @@ fn what_is_wrong_with_a_board_with_markers_is_told() {
     let shown = marked(9, 6, Dictionary::Four);
     let (frame, _) = picture(&shown, at, 7);
     let said =
-        |expected: &Board, frame: &Frame| look(expected, "a", frame).unwrap_err().to_string();
+        |expected: &Board, frame: &Frame| observe(expected, "a", frame).unwrap_err().to_string();
     let mirror = said(&shown, &mirrored(&frame));
     assert!(mirror.contains("the board is mirrored"), "{mirror}");
     let other = said(&marked(9, 6, Dictionary::Five), &frame);
@@ -198,7 +207,7 @@ fn what_is_wrong_with_a_board_with_markers_is_told() {
     let counts = said(&marked(7, 6, Dictionary::Four), &frame);
     assert!(counts.contains("not in the order of a board with 7x6 inner corners"), "{counts}");
     assert!(counts.contains("they fit one of 9 columns"), "{counts}");
-    let marks = Marks { side: Mm::constant(9.0), dictionary: Dictionary::Four };
+    let marks = Markers { side: Mm::constant(9.0), dictionary: Dictionary::Four };
     let size = said(&board(9, 6).with_marks(marks).unwrap(), &frame);
     assert!(size.starts_with("the markers measure 6"), "{size}");
     assert!(size.contains("% of a square's side, not 45 %"), "{size}");
@@ -217,7 +226,7 @@ fn a_board_with_markers_tells_half_a_turn() {
     let (frame, truth) = picture(&shown, Vector3::new(0.0, 0.0, 420.0), 8);
     let turned: Vec<u8> = frame.to_grey8().iter().rev().copied().collect();
     let turned = Frame::new(0, Stamp::START, frame.size(), Pixels::Grey8(turned)).unwrap();
-    let sighting = look(&shown, "a", &turned).unwrap();
+    let sighting = observe(&shown, "a", &turned).unwrap();
     let truth: Vec<_> =
         truth.iter().map(|px| px.map(|px| ImagePoint::new(639.0 - px.x, 479.0 - px.y))).collect();
     assert!(off_px(&sighting, &truth) < 0.05);
@@ -226,16 +235,16 @@ fn a_board_with_markers_tells_half_a_turn() {
 #[test]
 fn blur_is_told_from_motion() {
     let blurred = Exposure { blur_px: 5.0, ..Exposure::SHARP };
-    let Err(Refusal::Blurred { blur_px }) = seen(&board(9, 6), blurred) else {
+    let Err(BoardRejection::Blurred { blur_px }) = seen(&board(9, 6), blurred) else {
         panic!("a blurred board is seen");
     };
     assert!((4.0..6.0).contains(&blur_px), "{blur_px}");
-    let moved = Exposure { way_px: Vector2::new(9.0, 0.0), ..Exposure::SHARP };
-    let Err(Refusal::Moved { way_px }) = seen(&board(9, 6), moved) else {
+    let moved = Exposure { motion_px: Vector2::new(9.0, 0.0), ..Exposure::SHARP };
+    let Err(BoardRejection::Moved { motion_px: way_px }) = seen(&board(9, 6), moved) else {
         panic!("a moving board is seen");
     };
     assert!((7.0..11.0).contains(&way_px), "{way_px}");
-    let little = Exposure { way_px: Vector2::new(1.5, 1.0), ..Exposure::SHARP };
+    let little = Exposure { motion_px: Vector2::new(1.5, 1.0), ..Exposure::SHARP };
     assert!(seen(&board(9, 6), little).is_ok());
 }
 
@@ -247,7 +256,7 @@ fn a_board_that_was_seen_in_its_place_already_counts_once() {
     let by =
         |mm: f64| Pose::from_parts(first.rotation(), first.translation_mm() + Vector3::x() * mm);
     let mut looks = vec![at("a", &first), at("b", &by(0.1)), at("c", &by(2.0))];
-    take_out_duplicates(&board(9, 6), &mut looks);
+    reject_duplicates(&board(9, 6), &mut looks);
     let said: Vec<bool> = looks.iter().map(|look| look.1.is_ok()).collect();
     assert_eq!(said, [true, false, true]);
     let words = looks[1].1.as_ref().unwrap_err().to_string();
@@ -259,7 +268,7 @@ fn a_symmetric_board_may_be_counted_from_either_end() {
     let places: Vec<_> =
         (0..24).map(|i| ImagePoint::new(f64::from(i % 6), f64::from(i / 6))).collect();
     let turned: Vec<_> = places.iter().rev().copied().collect();
-    let [one, other] = [all_seen(&places), all_seen(&turned)];
+    let [one, other] = [observe_all(&places), observe_all(&turned)];
     assert_eq!(shift_px(&board(6, 4), &one, &other), Some(0.0));
     let told = shift_px(&board(8, 3), &one, &other).unwrap();
     assert!(told > 1.0, "{told}");
@@ -270,24 +279,24 @@ fn a_symmetric_board_may_be_counted_from_either_end() {
 fn a_board_with_two_colours_in_opposite_corners_is_counted_from_the_black_one() {
     let shown = board(9, 6);
     let (frame, truth) = picture(&shown, Vector3::new(0.0, 0.0, 420.0), 9);
-    assert!(off_px(&look(&shown, "a", &frame).unwrap(), &truth) < 0.04);
+    assert!(off_px(&observe(&shown, "a", &frame).unwrap(), &truth) < 0.04);
     let turned: Vec<u8> = frame.to_grey8().iter().rev().copied().collect();
     let turned = Frame::new(0, Stamp::START, frame.size(), Pixels::Grey8(turned)).unwrap();
     let back = |px: ImagePoint| ImagePoint::new(639.0 - px.x, 479.0 - px.y);
     let truth: Vec<_> = truth.into_iter().map(|px| px.map(back)).collect();
-    assert!(off_px(&look(&shown, "a", &turned).unwrap(), &truth) < 0.04);
+    assert!(off_px(&observe(&shown, "a", &turned).unwrap(), &truth) < 0.04);
 }
 
 #[test]
 fn pictures_of_another_size_are_refused() {
-    let mut looks: Looks = poses()
+    let mut looks: Observations = poses()
         .iter()
         .map(|pose| ("x".to_owned(), Ok(synthetic::sighting("x", pose, || 0.0))))
         .collect();
     if let Ok(odd) = &mut looks[1].1 {
         odd.image_size_px = [540, 720];
     }
-    agree_on_size(&mut looks);
+    reject_other_sizes(&mut looks);
     let said = looks[1].1.as_ref().unwrap_err().to_string();
     assert_eq!(said, "size 540x720 px, while most are 720x540 px");
     assert_eq!(looks.iter().filter(|look| look.1.is_ok()).count(), 11);

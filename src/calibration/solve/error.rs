@@ -2,17 +2,17 @@
 
 /// Pictures with a board below which the model cannot be told from the data:
 /// two poses fix the focal length only if nothing is wrong.
-pub const FEWEST_VIEWS: usize = 3;
+pub const MIN_VIEWS: usize = 3;
 
 /// Reprojection error beyond which a fit is none \[px\].
-pub(super) const MOST_RMS_PX: f64 = 3.0;
+pub(super) const MAX_RMS_PX: f64 = 3.0;
 
 /// No camera model can be found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SolveError {
     /// Too few pictures show the board.
     #[error(
-        "{found} picture(s) show the board, at least {FEWEST_VIEWS} must: take 10 to 20, \
+        "{found} picture(s) show the board, at least {MIN_VIEWS} must: take 10 to 20, \
          tilted to several sides, that fill the picture between them"
     )]
     TooFew {
@@ -28,7 +28,7 @@ pub enum SolveError {
     /// The corners are nowhere near where any camera would see them.
     #[error(
         "the corners are {rms_px:.1} px off where the best camera would see them, more than \
-         {MOST_RMS_PX} px: look for a wrong count of corners (--board), or pictures with another \
+         {MAX_RMS_PX} px: look for a wrong count of corners (--board), or pictures with another \
          zoom or focus among them"
     )]
     NoFit {

@@ -1,14 +1,14 @@
 //! A camera that was found, and how well each picture agrees with it.
 
 use crate::calibration::Camera;
-use crate::calibration::board::{Board, Seen};
-use crate::calibration::choose::Trial;
-use crate::calibration::equations::{Corner, Free, Model, SHARED};
+use crate::calibration::board::{Board, CornerObservation};
+use crate::calibration::choose::LensTrial;
+use crate::calibration::equations::{CameraModel, Correspondence, FreeParameters, SHARED};
 use crate::core::geometry::{ImagePoint, Pose};
 
 /// One picture in the solution.
 #[derive(Debug, Clone, PartialEq)]
-pub struct View {
+pub struct BoardView {
     /// The picture's name.
     pub name: String,
     /// The board's axes in the camera's.
@@ -18,7 +18,7 @@ pub struct View {
     /// The largest of them \[px\].
     pub max_px: f64,
     /// The corners that were found.
-    pub corners: Vec<Seen>,
+    pub corners: Vec<CornerObservation>,
     /// What each of them is off the place at which the model expects it \[px\].
     pub errors_px: Vec<nalgebra::Vector2<f64>>,
 }
@@ -27,9 +27,9 @@ pub struct View {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
     /// Intrinsics, distortion, and the bend of the board.
-    pub model: Model,
+    pub model: CameraModel,
     /// What was fitted.
-    pub free: Free,
+    pub free: FreeParameters,
     /// Standard deviations of the camera's numbers, then of the bend \[mm\]; `None`
     /// where the pictures do not tell the numbers apart.
     pub sigma: Option<[f64; SHARED]>,
@@ -39,7 +39,7 @@ pub struct Solution {
     pub rms_px: f64,
     /// The same of pictures that took no part in fitting the camera, each left out
     /// once \[px\]; `None` where the others do not settle it.
-    pub held_out_px: Option<f64>,
+    pub cross_validation_px: Option<f64>,
     /// Standard deviation of a corner's place in one direction \[px\], from what the
     /// fit leaves.
     pub noise_px: f64,
@@ -47,9 +47,9 @@ pub struct Solution {
     /// itself.
     pub design_effect: f64,
     /// All that was tried.
-    pub trials: Vec<Trial>,
+    pub trials: Vec<LensTrial>,
     /// The pictures, in the order in which they were given.
-    pub views: Vec<View>,
+    pub views: Vec<BoardView>,
 }
 
 impl Solution {
@@ -84,7 +84,7 @@ impl Solution {
     }
 
     /// The corners of a picture on the board.
-    pub fn corners(&self, board: &Board, view: usize) -> Vec<Corner> {
-        self.views.get(view).map_or_else(Vec::new, |view| board.place(&view.corners))
+    pub fn corners(&self, board: &Board, view: usize) -> Vec<Correspondence> {
+        self.views.get(view).map_or_else(Vec::new, |view| board.correspondences(&view.corners))
     }
 }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::calibration::Calibration;
-use crate::calibration::board::all_seen;
+use crate::calibration::board::observe_all;
 use crate::calibration::plane::bed_from_board;
 use crate::calibration::synthetic;
 use crate::calibration::synthetic::{SIZE, TRUTH, board, poses};
@@ -11,7 +11,7 @@ use rand_distr::{Distribution, Normal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// What the true camera sees, with noise.
-fn sightings(noise_px: f64) -> Vec<Sighting> {
+fn sightings(noise_px: f64) -> Vec<BoardObservation> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
     let noise = Normal::new(0.0, noise_px).unwrap();
     let mut off = || noise.sample(&mut random);
@@ -53,12 +53,12 @@ fn a_lens_and_a_bend_that_are_there_are_found_and_none_is_made_up() {
     assert!(!flat.free.bend);
     assert!(flat.free.lens >= Some(Lens::Four), "{:?}", flat.free);
     let bend_mm = [0.0, 0.4];
-    let model = Model { camera: TRUTH, bend_mm };
+    let model = CameraModel { camera: TRUTH, bend_mm };
     let mut bent = sightings(0.0);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(8);
     let noise = Normal::new(0.0, 0.1).unwrap();
     for (sighting, pose) in bent.iter_mut().zip(poses()) {
-        let corners = board().place(&sighting.corners);
+        let corners = board().correspondences(&sighting.corners);
         let places: Vec<_> = corners
             .iter()
             .map(|corner| {
@@ -66,7 +66,7 @@ fn a_lens_and_a_bend_that_are_there_are_found_and_none_is_made_up() {
                 px + nalgebra::Vector2::new(noise.sample(&mut random), noise.sample(&mut random))
             })
             .collect();
-        sighting.corners = all_seen(&places);
+        sighting.corners = observe_all(&places);
     }
     let found = solve(&board(), &bent).unwrap();
     assert!(found.free.bend, "{:?}", found.trials);
@@ -85,13 +85,13 @@ fn the_held_out_error_is_that_of_really_leaving_pictures_out() {
         let mut others = all.clone();
         let one = others.remove(left_out);
         let model = solve_with(&board(), &others, Lens::Five).unwrap().model;
-        let seen = board().place(&one.corners);
+        let seen = board().correspondences(&one.corners);
         let pose = pose(&model, &seen).unwrap();
-        squares += model.squares_px2(&Place::of_one(pose), &[seen]).unwrap();
+        squares += model.sum_of_squares_px2(&BoardPlacement::of_one(pose), &[seen]).unwrap();
         corners += 54.0;
     }
     let left_out = f64::sqrt(squares / corners);
-    let told = solution.held_out_px.unwrap();
+    let told = solution.cross_validation_px.unwrap();
     assert!((told / left_out - 1.0).abs() < 0.002, "{told} {left_out}");
     assert!(told > solution.rms_px);
 }
@@ -123,8 +123,8 @@ fn a_width_is_right_at_any_height_with_the_full_calibration() {
 
 #[test]
 fn a_pose_alone_is_found_with_a_known_camera() {
-    let model = Model { camera: TRUTH, bend_mm: [0.0; 2] };
-    let found = pose(&model, &board().place(&sightings(0.0)[3].corners)).unwrap();
+    let model = CameraModel { camera: TRUTH, bend_mm: [0.0; 2] };
+    let found = pose(&model, &board().correspondences(&sightings(0.0)[3].corners)).unwrap();
     assert!((found.translation_mm() - poses()[3].translation_mm()).norm() < 1e-6);
     assert!((found.rotation_rad() - poses()[3].rotation_rad()).norm() < 1e-8);
 }

@@ -1,34 +1,37 @@
 //! What a camera is fitted to: the corners of each picture, and a guess to begin with.
 
-use super::error::{FEWEST_VIEWS, SolveError};
+use super::error::{MIN_VIEWS, SolveError};
 use crate::calibration::board::Board;
-use crate::calibration::bundle::{Fit, Guess};
+use crate::calibration::bundle::{BundleFit, Guess};
 use crate::calibration::equations::Equations;
-use crate::calibration::equations::{Corner, Free, Model, Place, SHARED, only};
+use crate::calibration::equations::{
+    BoardPlacement, CameraModel, Correspondence, FreeParameters, SHARED, restrict_to_free,
+};
 use crate::calibration::factor::{Elimination, Factor};
 use crate::calibration::homography;
-use crate::calibration::sighting::Sighting;
-use crate::numeric::number::float;
+use crate::calibration::sighting::BoardObservation;
+use crate::numeric::number::to_f64;
 
 /// What is fitted to, and where it begins.
 #[derive(Debug)]
-pub struct Views {
+pub struct CalibrationData {
     /// The corners of the one board of each picture.
-    pub boards: Vec<Vec<Vec<Corner>>>,
+    pub boards: Vec<Vec<Vec<Correspondence>>>,
     /// A camera and places that are roughly right.
     pub start: Guess,
     /// Size of the pictures \[px\].
     pub size: [u32; 2],
 }
 
-impl Views {
+impl CalibrationData {
     /// Of sightings that are all of one size.
-    pub fn of(board: &Board, sightings: &[Sighting]) -> Result<Self, SolveError> {
-        let Some(first) = sightings.first().filter(|_| sightings.len() >= FEWEST_VIEWS) else {
+    pub fn of(board: &Board, sightings: &[BoardObservation]) -> Result<Self, SolveError> {
+        let Some(first) = sightings.first().filter(|_| sightings.len() >= MIN_VIEWS) else {
             return Err(SolveError::TooFew { found: sightings.len() });
         };
         let size = first.image_size_px;
-        let boards: Vec<_> = sightings.iter().map(|s| vec![board.place(&s.corners)]).collect();
+        let boards: Vec<_> =
+            sightings.iter().map(|s| vec![board.correspondences(&s.corners)]).collect();
         let maps: Vec<_> = boards
             .iter()
             .filter_map(|b| homography::homography(&homography::pairs(&b[0])))
@@ -38,14 +41,14 @@ impl Views {
             .iter()
             .zip(&boards)
             .map(|(sighting, corners)| {
-                homography::pose_before(&camera, &corners[0])
-                    .map(Place::of_one)
+                homography::board_pose(&camera, &corners[0])
+                    .map(BoardPlacement::of_one)
                     .ok_or_else(|| SolveError::NoPose { name: sighting.name.clone() })
             })
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
             boards,
-            start: Guess { model: Model { camera, bend_mm: [0.0; 2] }, places },
+            start: Guess { model: CameraModel { camera, bend_mm: [0.0; 2] }, placements: places },
             size,
         })
     }
@@ -58,19 +61,20 @@ impl Views {
     /// Variance of a corner's place in one direction \[px²\], from what the fit
     /// leaves; not a number where there are too few corners to tell.
     #[expect(clippy::cast_precision_loss, reason = "counts of corners and pictures")]
-    pub fn noise_variance_px2(&self, fit: &Fit, free: Free) -> f64 {
-        let numbers = free.count() + fit.places.iter().map(Place::numbers).sum::<usize>();
+    pub fn noise_variance_px2(&self, fit: &BundleFit, free: FreeParameters) -> f64 {
+        let numbers =
+            free.count() + fit.placements.iter().map(BoardPlacement::numbers).sum::<usize>();
         let left = (2 * self.corners()) as f64 - numbers as f64;
-        if left > 0.0 { fit.squares_px2 / left } else { f64::NAN }
+        if left > 0.0 { fit.sum_of_squares_px2 / left } else { f64::NAN }
     }
 
     /// Standard deviations of the shared numbers for a noise of 1 px.
-    pub fn spreads(&self, fit: &Fit, free: Free) -> Option<[f64; SHARED]> {
+    pub fn unit_sigmas(&self, fit: &BundleFit, free: FreeParameters) -> Option<[f64; SHARED]> {
         let mut left = nalgebra::SMatrix::<f64, SHARED, SHARED>::zeros();
-        for (place, boards) in fit.places.iter().zip(&self.boards) {
-            left += Elimination::of(&Equations::of(&fit.model, free, place, boards)?)?.left;
+        for (place, boards) in fit.placements.iter().zip(&self.boards) {
+            left += Elimination::of(&Equations::of(&fit.model, free, place, boards)?)?.reduced;
         }
-        let variances = Factor::of_shared(&only(left, free))?.variances();
+        let variances = Factor::of_shared(&restrict_to_free(left, free))?.variances();
         Some(std::array::from_fn(|number| variances[number].sqrt()))
     }
 
@@ -82,5 +86,5 @@ impl Views {
 
 /// Root of the mean of so many squares.
 pub fn root_mean_square(squares: f64, count: usize) -> f64 {
-    (squares / float(count.max(1))).sqrt()
+    (squares / to_f64(count.max(1))).sqrt()
 }

@@ -1,13 +1,13 @@
 //! The keys of an extruder's command and of its limits, which carry its unit.
 
 use crate::document::Table;
-use crate::extruder::{CommandLimits, Drive};
+use crate::extruder::{CommandLimits, CommandQuantity};
 
 /// Any number that a command of an extruder can be, as a bound on slips.
-pub(super) const ANY: std::ops::RangeInclusive<f64> = -1e9..=1e9;
+pub(super) const ANY_COMMAND: std::ops::RangeInclusive<f64> = -1e9..=1e9;
 
 /// The keys of a command's limits, which carry its unit.
-pub(super) struct Keys {
+pub(super) struct CommandKeys {
     pub(super) value: &'static str,
     pub(super) min: &'static str,
     pub(super) max: &'static str,
@@ -15,10 +15,10 @@ pub(super) struct Keys {
 }
 
 /// The keys of a command of this quantity.
-pub(super) const fn keys(drive: Drive) -> Keys {
+pub(super) const fn command_keys(drive: CommandQuantity) -> CommandKeys {
     macro_rules! keys {
         ($unit:literal) => {
-            Keys {
+            CommandKeys {
                 value: concat!("constant_", $unit),
                 min: concat!("min_", $unit),
                 max: concat!("max_", $unit),
@@ -27,20 +27,20 @@ pub(super) const fn keys(drive: Drive) -> Keys {
         };
     }
     match drive {
-        Drive::Rpm => keys!("rpm"),
-        Drive::Volts => keys!("v"),
-        Drive::Pressure => keys!("mpa"),
-        Drive::Flow => keys!("mm3_per_s"),
-        Drive::MassFlow => keys!("kg_per_s"),
-        Drive::Filling => keys!("filling"),
+        CommandQuantity::Rpm => keys!("rpm"),
+        CommandQuantity::Volts => keys!("v"),
+        CommandQuantity::Pressure => keys!("mpa"),
+        CommandQuantity::Flow => keys!("mm3_per_s"),
+        CommandQuantity::MassFlow => keys!("kg_per_s"),
+        CommandQuantity::Filling => keys!("filling"),
     }
 }
 
 /// The limits of a command. There are no defaults.
-pub(super) fn read_limits(table: &Table<'_>, drive: Drive) -> Option<CommandLimits> {
-    let keys = keys(drive);
-    let min = table.number(keys.min, ANY);
-    let max = table.number(keys.max, ANY);
+pub(super) fn read_limits(table: &Table<'_>, drive: CommandQuantity) -> Option<CommandLimits> {
+    let keys = command_keys(drive);
+    let min = table.number(keys.min, ANY_COMMAND);
+    let max = table.number(keys.max, ANY_COMMAND);
     let rate = table.number(keys.rate, 1e-9..=1e12);
     let (min, max) = (min?, max?);
     if min >= max {

@@ -4,11 +4,11 @@
 use std::path::Path;
 
 use crate::document::Table;
-use crate::extruder::{CommandLimits, Drive};
+use crate::extruder::{CommandLimits, CommandQuantity};
 
 /// How often what is done \[Hz\].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rates {
+pub struct ExtruderRates {
     /// Steps of the feedforward.
     pub feedforward_hz: f64,
     /// Steps of the control.
@@ -18,24 +18,24 @@ pub struct Rates {
 }
 
 /// What the reading of a strategy hangs on.
-pub(super) struct About<'a> {
+pub(super) struct ReadContext<'a> {
     pub(super) folder: &'a Path,
-    pub(super) drive: Drive,
+    pub(super) drive: CommandQuantity,
     pub(super) limits: Option<CommandLimits>,
-    pub(super) rates: Rates,
+    pub(super) rates: ExtruderRates,
 }
 
 /// How often what is done; nothing is done more often than the feedforward.
-pub(super) fn read_rates(table: &Table<'_>) -> Option<Rates> {
+pub(super) fn read_rates(table: &Table<'_>) -> Option<ExtruderRates> {
     let hz = 0.5..=5000.0;
     let feedforward = table.number_or("feedforward_rate_hz", hz.clone(), 200.0);
     let control = table.number_or("control_rate_hz", hz.clone(), 20.0);
     let io = table.number_or("io_rate_hz", hz, 50.0);
-    let rates = Rates { feedforward_hz: feedforward?, control_hz: control?, io_hz: io? };
+    let rates = ExtruderRates { feedforward_hz: feedforward?, control_hz: control?, io_hz: io? };
     for (key, rate) in [("control_rate_hz", rates.control_hz), ("io_rate_hz", rates.io_hz)] {
         if rate > rates.feedforward_hz {
-            let most = format!("at most feedforward_rate_hz = {}", rates.feedforward_hz);
-            table.report(key, rate.to_string(), most);
+            let max = format!("at most feedforward_rate_hz = {}", rates.feedforward_hz);
+            table.report(key, rate.to_string(), max);
         }
     }
     Some(rates)

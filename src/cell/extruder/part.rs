@@ -3,18 +3,18 @@
 
 use std::path::Path;
 
-use super::{Extruder, ExtruderPlant, PlantKind, Strategy};
+use super::{ExtruderPlant, ExtruderSettings, PlantKind, Strategy};
 use crate::core::units::{Mm, Mm3PerS, MmPerS};
 use crate::document::Table;
-use crate::extruder::strategy::Need;
-use crate::extruder::{Drive, FlowDemand};
+use crate::extruder::strategy::RequiredReading;
+use crate::extruder::{CommandQuantity, FlowDemand};
 use crate::scenario::table::Simulation;
 
 /// The extruder side of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderPart {
     /// What it is told.
-    pub extruder: Extruder,
+    pub extruder: ExtruderSettings,
     /// The flow that is wanted.
     pub demand: FlowDemand,
     /// What answers in a simulated cell, if the file says so.
@@ -34,7 +34,7 @@ pub struct BeadStart {
 
 /// What stands beside the extruder in its cell; none of what could not be read.
 #[derive(Debug, Clone, Copy)]
-pub struct Beside<'a> {
+pub struct CellContext<'a> {
     /// The bead.
     pub bead: Option<BeadStart>,
     /// Host and port of the robot.
@@ -46,7 +46,7 @@ pub struct Beside<'a> {
 impl ExtruderPart {
     /// Reads both tables for what stands beside them; none where the extruder
     /// goes its own way, and where a violation was reported.
-    pub fn read(root: &Table<'_>, folder: &Path, beside: &Beside<'_>) -> Option<Self> {
+    pub fn read(root: &Table<'_>, folder: &Path, context: &CellContext<'_>) -> Option<Self> {
         let plant_table = root.optional_run_table("extruder_plant");
         let plant = plant_table.as_ref().and_then(ExtruderPlant::read);
         let Some(table) = root.optional_run_table("extruder") else {
@@ -59,19 +59,19 @@ impl ExtruderPart {
             }
             return None;
         };
-        let extruder = Extruder::read(&table, folder)?;
+        let extruder = ExtruderSettings::read(&table, folder)?;
         if let (Some(plant), Some(plant_table)) = (&plant, &plant_table) {
-            compare(&extruder, &table, &plant.kind, plant_table);
+            check_plant(&extruder, &table, &plant.kind, plant_table);
         }
         if let Some(link) = &extruder.link
-            && beside.robot_address == Some(&link.address)
+            && context.robot_address == Some(&link.address)
         {
             let expected = "another than robot.address: each has a controller of its own";
             table.report("address", format!("\"{}\"", link.address), expected);
         }
-        let BeadStart { width, speed } = beside.bead?;
+        let BeadStart { width, speed } = context.bead?;
         let demand = extruder.demand(&table, width, speed)?;
-        let model = beside.simulation?.bead;
+        let model = context.simulation?.bead;
         let (width, at) =
             (Mm::new(model.width_mm).ok()?, MmPerS::new(model.at_speed_mm_per_s).ok()?);
         let plant_nominal = extruder.demand(&table, width, at)?.nominal();
@@ -81,11 +81,16 @@ impl ExtruderPart {
 
 /// Reports a plant that takes another command than is given, or that never
 /// reports what is needed: nothing of such a cell could be simulated.
-fn compare(extruder: &Extruder, table: &Table<'_>, kind: &PlantKind, plant_table: &Table<'_>) {
+fn check_plant(
+    extruder: &ExtruderSettings,
+    table: &Table<'_>,
+    kind: &PlantKind,
+    plant_table: &Table<'_>,
+) {
     let taken = match kind {
-        PlantKind::Linear(plant) => plant.screw_lag_s.map(|_| Drive::Rpm),
-        PlantKind::Pressure(_) => Some(Drive::Rpm),
-        PlantKind::Screw(_) => Some(Drive::Filling),
+        PlantKind::Linear(plant) => plant.screw_lag_s.map(|_| CommandQuantity::Rpm),
+        PlantKind::Pressure(_) => Some(CommandQuantity::Rpm),
+        PlantKind::Screw(_) => Some(CommandQuantity::Filling),
         PlantKind::Melt(_) => None,
     };
     if let Some(taken) = taken.filter(|taken| *taken != extruder.drive) {
@@ -99,22 +104,22 @@ fn compare(extruder: &Extruder, table: &Table<'_>, kind: &PlantKind, plant_table
         return;
     }
     let needed = match extruder.strategy {
-        Strategy::Pressure(_) => Some(Need::Pressure),
-        Strategy::Screw(_) => Some(Need::Filled),
-        Strategy::Adaptive(_) => Some(Need::Flow),
-        Strategy::Feedforward(ref keys) => keys.foretold_from.need(),
+        Strategy::Pressure(_) => Some(RequiredReading::Pressure),
+        Strategy::Screw(_) => Some(RequiredReading::Filled),
+        Strategy::Adaptive(_) => Some(RequiredReading::Flow),
+        Strategy::Feedforward(ref keys) => keys.predicted_from.required_reading(),
         Strategy::Constant { .. } | Strategy::Profile { .. } => None,
     };
-    let limited = extruder.max_pressure.map(|_| Need::Pressure);
+    let limited = extruder.max_pressure.map(|_| RequiredReading::Pressure);
     let key =
         if let Strategy::Feedforward(_) = extruder.strategy { "foretold_from" } else { "strategy" };
     for (key, need) in [(key, needed), ("max_pressure_mpa", limited)] {
         if let Some(need) = need.filter(|need| !kind.reports(*need)) {
             let (reading, plant) = match need {
-                Need::Pressure => ("a pressure", "kind = \"pressure\""),
-                Need::Filled => ("a filled length", "kind = \"screw\""),
-                Need::Flow => ("a flow", "flow_sensor_noise_mm3_per_s"),
-                Need::Screw => ("the screw's speed", "screw_lag_s"),
+                RequiredReading::Pressure => ("a pressure", "kind = \"pressure\""),
+                RequiredReading::Filled => ("a filled length", "kind = \"screw\""),
+                RequiredReading::Flow => ("a flow", "flow_sensor_noise_mm3_per_s"),
+                RequiredReading::Screw => ("the screw's speed", "screw_lag_s"),
             };
             let found = format!("{reading} to go by, which [extruder_plant] never reports");
             table.report(key, found, format!("one with {plant}, or none at all"));

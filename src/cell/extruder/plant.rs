@@ -9,12 +9,12 @@ use crate::document::Table;
 use crate::extruder::pressure::Fopdt;
 use crate::extruder::rheology::PowerLaw;
 use crate::extruder::screw::{Screw, ScrewDesign};
-use crate::extruder::strategy::Need;
+use crate::extruder::strategy::RequiredReading;
 use crate::numeric::lti::TransferFunction;
 
-const ANY: std::ops::RangeInclusive<f64> = -1e12..=1e12;
+const ANY_COEFFICIENT: std::ops::RangeInclusive<f64> = -1e12..=1e12;
 /// Coefficients that a numerator or a denominator may have.
-const COUNTS: [usize; 6] = [1, 2, 3, 4, 5, 6];
+const COEFFICIENT_COUNTS: [usize; 6] = [1, 2, 3, 4, 5, 6];
 
 /// The simulated extruder of a cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,15 +44,17 @@ pub enum PlantKind {
 
 impl PlantKind {
     /// Whether it has a sensor of that.
-    pub const fn reports(&self, reading: Need) -> bool {
+    pub const fn reports(&self, reading: RequiredReading) -> bool {
         match self {
             Self::Linear(plant) => match reading {
-                Need::Flow => plant.sensor_noise.is_some(),
-                Need::Screw => plant.screw_lag_s.is_some(),
-                Need::Pressure | Need::Filled => false,
+                RequiredReading::Flow => plant.sensor_noise.is_some(),
+                RequiredReading::Screw => plant.screw_lag_s.is_some(),
+                RequiredReading::Pressure | RequiredReading::Filled => false,
             },
-            Self::Pressure(_) => matches!(reading, Need::Pressure | Need::Screw),
-            Self::Screw(_) => matches!(reading, Need::Filled),
+            Self::Pressure(_) => {
+                matches!(reading, RequiredReading::Pressure | RequiredReading::Screw)
+            }
+            Self::Screw(_) => matches!(reading, RequiredReading::Filled),
             Self::Melt(_) => false,
         }
     }
@@ -66,18 +68,18 @@ pub struct PressurePlant {
     /// From the pressure to flow.
     pub nozzle: PowerLaw,
     /// Fastest that the screw turns.
-    pub fastest: Rpm,
+    pub max_speed: Rpm,
     /// Noise of the sensor \[MPa\].
     pub sensor_noise_mpa: f64,
     /// A wave of the gain.
-    pub gain_wave: GainWave,
+    pub gain_wave: GainRipple,
     /// A load at the input of the process.
     pub load: InputLoad,
 }
 
 /// A sine by which a gain swells and falls.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GainWave {
+pub struct GainRipple {
     /// Amplitude as a fraction of the gain.
     pub fraction: f64,
     /// Period \[s\].
@@ -101,15 +103,15 @@ pub struct MeltPlant {
     /// From a command until the drive acts \[s\].
     pub dead_time_s: f64,
     /// Time constant of the screw \[s\].
-    pub screw_s: f64,
+    pub screw_lag_s: f64,
     /// Melt that is stored under pressure at the usual flow, over that flow \[s\].
     pub stored_s: f64,
     /// What is empty before the nozzle after a long pause \[mm³\].
     pub void_mm3: f64,
     /// Standard deviation of that from pause to pause, as a share.
-    pub void_scatter: f64,
+    pub void_sigma: f64,
     /// Standard deviation of the flow, as a share.
-    pub flow_scatter: f64,
+    pub flow_sigma: f64,
 }
 
 /// A linear plant from command to flow.
@@ -143,13 +145,13 @@ pub struct ScrewPlant {
     /// Filled length at the start of the run \[m\].
     pub start_m: f64,
     /// Share of full that was fed until then.
-    pub before: f64,
+    pub initial_fill: f64,
     /// Noise of the sensor of the filled length \[mm\].
     pub sensor_noise_mm: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Word {
+enum PlantWord {
     Direct,
     Linear,
     Pressure,
@@ -157,34 +159,34 @@ enum Word {
     Melt,
 }
 
-const WORDS: [(&str, Word); 5] = [
-    ("direct", Word::Direct),
-    ("linear", Word::Linear),
-    ("pressure", Word::Pressure),
-    ("screw", Word::Screw),
-    ("melt", Word::Melt),
+const PLANT_WORDS: [(&str, PlantWord); 5] = [
+    ("direct", PlantWord::Direct),
+    ("linear", PlantWord::Linear),
+    ("pressure", PlantWord::Pressure),
+    ("screw", PlantWord::Screw),
+    ("melt", PlantWord::Melt),
 ];
 
 impl ExtruderPlant {
     /// Reads `[extruder_plant]`.
     pub fn read(table: &Table<'_>) -> Option<Self> {
-        let word = table.required_choice("kind", &WORDS);
+        let word = table.required_choice("kind", &PLANT_WORDS);
         let kind = word.and_then(|word| match word {
-            Word::Direct => {
+            PlantWord::Direct => {
                 let gain = table.number("gain_mm3_per_s", 1e-9..=1e12)?;
                 let transfer = TransferFunction::gain(gain).ok()?;
                 read_linear(table, transfer).map(PlantKind::Linear)
             }
-            Word::Linear => {
+            PlantWord::Linear => {
                 let transfer = read_transfer(table)?;
                 read_linear(table, transfer).map(PlantKind::Linear)
             }
-            Word::Pressure => read_pressure_plant(table).map(PlantKind::Pressure),
-            Word::Screw => read_screw_plant(table).map(PlantKind::Screw),
-            Word::Melt => read_melt(table).map(PlantKind::Melt),
+            PlantWord::Pressure => read_pressure_plant(table).map(PlantKind::Pressure),
+            PlantWord::Screw => read_screw_plant(table).map(PlantKind::Screw),
+            PlantWord::Melt => read_melt(table).map(PlantKind::Melt),
         });
         if kind.is_none() {
-            table.pass_over();
+            table.allow_unknown_keys();
         }
         let delay = |key| table.number_or(key, 0.0..=60.0, 0.0).map(Span::from_secs);
         let (start, stop) = (delay("start_delay_s"), delay("stop_delay_s"));
@@ -203,14 +205,14 @@ fn read_transfer(table: &Table<'_>) -> Option<TransferFunction> {
         ("denominator", "those of its denominator, such as [0.656, 0.975, 1.0]"),
     ] {
         if !table.has(key) {
-            table.absent(key, what);
+            table.report_absent(key, what);
         }
     }
     if !(table.has("numerator") && table.has("denominator")) {
         return None;
     }
-    let num = table.row("numerator", &COUNTS, ANY);
-    let den = table.row("denominator", &COUNTS, ANY);
+    let num = table.row("numerator", &COEFFICIENT_COUNTS, ANY_COEFFICIENT);
+    let den = table.row("denominator", &COEFFICIENT_COUNTS, ANY_COEFFICIENT);
     let dead_time = table.number_or("dead_time_s", 0.0..=1e3, 0.0);
     let (num, den) = (num?, den?);
     let transfer = match TransferFunction::new(&num, &den, dead_time?) {
@@ -228,8 +230,8 @@ fn read_transfer(table: &Table<'_>) -> Option<TransferFunction> {
 }
 
 fn read_linear(table: &Table<'_>, transfer: TransferFunction) -> Option<LinearPlant> {
-    let unknown = table.number_or("unknown_input", ANY, 0.0);
-    let unknown_per_s = table.number_or("unknown_input_per_s", ANY, 0.0);
+    let unknown = table.number_or("unknown_input", ANY_COEFFICIENT, 0.0);
+    let unknown_per_s = table.number_or("unknown_input_per_s", ANY_COEFFICIENT, 0.0);
     let noise = table.number_or("flow_noise_mm3_per_s", 0.0..=1e12, 0.0);
     let lag = table.number_or("flow_noise_lag_s", 1e-3..=1e3, 0.15);
     let sensor = table.optional_number("flow_sensor_noise_mm3_per_s", 0.0..=1e12);
@@ -251,23 +253,23 @@ fn read_melt(table: &Table<'_>) -> Option<MeltPlant> {
     let screw = table.number_or("screw_s", 1e-3..=60.0, 0.07);
     let stored = table.number_or("stored_s", 1e-3..=60.0, 0.3);
     let void = table.number_or("void_mm3", 0.0..=1e9, 650.0);
-    let void_scatter = table.number_or("void_scatter", 0.0..=1.0, 0.03);
-    let flow_scatter = table.number_or("flow_scatter", 0.0..=1.0, 0.01);
+    let void_sigma = table.number_or("void_scatter", 0.0..=1.0, 0.03);
+    let flow_sigma = table.number_or("flow_scatter", 0.0..=1.0, 0.01);
     Some(MeltPlant {
         gain_mm3_per_s: gain?,
         dead_time_s: dead_time?,
-        screw_s: screw?,
+        screw_lag_s: screw?,
         stored_s: stored?,
         void_mm3: void?,
-        void_scatter: void_scatter?,
-        flow_scatter: flow_scatter?,
+        void_sigma: void_sigma?,
+        flow_sigma: flow_sigma?,
     })
 }
 
 fn read_pressure_plant(table: &Table<'_>) -> Option<PressurePlant> {
     let process = read_process(table);
     let nozzle = read_nozzle(table);
-    let fastest = table.number("fastest_rpm", 1e-6..=1e6);
+    let max_speed = table.number("fastest_rpm", 1e-6..=1e6);
     let noise = table.number_or("sensor_noise_mpa", 0.0..=1e3, 0.0);
     let wave = table.number_or("gain_wave_share", 0.0..=0.9, 0.0);
     let period = table.number_or("gain_wave_period_s", 0.1..=1e6, 60.0);
@@ -276,9 +278,9 @@ fn read_pressure_plant(table: &Table<'_>) -> Option<PressurePlant> {
     Some(PressurePlant {
         process: process?,
         nozzle: nozzle?,
-        fastest: Rpm::new(fastest?).ok()?,
+        max_speed: Rpm::new(max_speed?).ok()?,
         sensor_noise_mpa: noise?,
-        gain_wave: GainWave { fraction: wave?, period_s: period? },
+        gain_wave: GainRipple { fraction: wave?, period_s: period? },
         load: InputLoad { rpm: load?, at_s: load_at? },
     })
 }
@@ -298,7 +300,7 @@ fn read_screw_plant(table: &Table<'_>) -> Option<ScrewPlant> {
         screw,
         full_flow_mm3_per_s: full?,
         start_m,
-        before: screw.holding(start_m),
+        initial_fill: screw.holding_fill(start_m),
         sensor_noise_mm: noise?,
     })
 }

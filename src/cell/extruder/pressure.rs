@@ -1,35 +1,38 @@
 //! `[extruder.pressure]`: the process from the screw's speed to the pressure at
 //! the nozzle, the nozzle's power law, and which law holds the pressure.
 
-use super::context::About;
+use super::context::ReadContext;
 use crate::document::Table;
 use crate::extruder::pressure::Fopdt;
-use crate::extruder::pressure::kalman::Noise;
-use crate::extruder::pressure::pi::PiGains;
+use crate::extruder::pressure::kalman::PressureNoise;
+use crate::extruder::pressure::pi::PressurePiGains;
 use crate::extruder::pressure::tuning::Tuning;
 use crate::extruder::pressure::vsfc::VsfcGains;
 use crate::extruder::rheology::PowerLaw;
 use crate::extruder::strategy::{PressureChoice, PressureSettings};
 
 /// The laws remember as many commands a second.
-const MOST_HZ: f64 = 250.0;
+const MAX_LOOP_HZ: f64 = 250.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Word {
+enum ControllerWord {
     Predictive,
     Vsfc,
     Pi,
 }
 
-const WORDS: [(&str, Word); 3] =
-    [("predictive", Word::Predictive), ("vsfc", Word::Vsfc), ("pi", Word::Pi)];
+const CONTROLLER_WORDS: [(&str, ControllerWord); 3] = [
+    ("predictive", ControllerWord::Predictive),
+    ("vsfc", ControllerWord::Vsfc),
+    ("pi", ControllerWord::Pi),
+];
 
 /// The process; the same keys stand in the plant of a simulated cell.
 pub fn read_process(table: &Table<'_>) -> Option<Fopdt> {
     let gain = table.number("gain_mpa_per_rpm", 1e-9..=1e9);
     let lag = table.number("lag_s", 1e-3..=60.0);
     let dead = table.number("dead_time_s", 0.0..=60.0);
-    told(table, "gain_mpa_per_rpm", Fopdt::new(gain?, lag?, dead?))
+    or_report(table, "gain_mpa_per_rpm", Fopdt::new(gain?, lag?, dead?))
 }
 
 /// The nozzle; the same keys stand in the plant of a simulated cell.
@@ -37,59 +40,59 @@ pub fn read_nozzle(table: &Table<'_>) -> Option<PowerLaw> {
     let flow = table.number("flow_at_1_mpa_g_per_min", 1e-9..=1e12);
     let exponent = table.number("flow_exponent", 0.1..=10.0);
     let density = table.number("density_g_per_cm3", 1e-3..=50.0);
-    told(table, "flow_exponent", PowerLaw::new(flow?, exponent?, density?))
+    or_report(table, "flow_exponent", PowerLaw::new(flow?, exponent?, density?))
 }
 
 /// The loop with its law. Gains have no defaults; the predictive law has none,
 /// its settings come from process and noise.
-pub(super) fn read(table: &Table<'_>, about: &About<'_>) -> Option<PressureSettings> {
+pub(super) fn read(table: &Table<'_>, context: &ReadContext<'_>) -> Option<PressureSettings> {
     let model = read_process(table);
     let nozzle = read_nozzle(table);
     let sigma = table.number("sensor_noise_mpa", 1e-9..=1e3);
-    let wander = table.number_or("wander_mpa2", 0.0..=1e3, 2e-5);
-    let word = table.choice("law", &WORDS);
+    let drift = table.number_or("wander_mpa2", 0.0..=1e3, 2e-5);
+    let word = table.choice("law", &CONTROLLER_WORDS);
     if word.is_none() {
-        table.pass_over();
+        table.allow_unknown_keys();
     }
-    if about.rates.feedforward_hz > MOST_HZ {
-        let found = format!("a pressure loop at {} Hz", about.rates.feedforward_hz);
-        table.report("law", found, format!("feedforward_rate_hz of at most {MOST_HZ}"));
+    if context.rates.feedforward_hz > MAX_LOOP_HZ {
+        let found = format!("a pressure loop at {} Hz", context.rates.feedforward_hz);
+        table.report("law", found, format!("feedforward_rate_hz of at most {MAX_LOOP_HZ}"));
     }
-    let noise = told(table, "sensor_noise_mpa", Noise::new(wander?, sigma?.powi(2)));
+    let noise = or_report(table, "sensor_noise_mpa", PressureNoise::new(drift?, sigma?.powi(2)));
     let choice = match word? {
-        Word::Predictive => {
-            let doubt = table.number_or("model_doubt", 0.01..=0.2, 0.1)?;
-            let tuning = Tuning::of(&model?, &noise?, doubt);
-            told(table, "model_doubt", tuning).map(PressureChoice::Predictive)
+        ControllerWord::Predictive => {
+            let uncertainty = table.number_or("model_doubt", 0.01..=0.2, 0.1)?;
+            let tuning = Tuning::of(&model?, &noise?, uncertainty);
+            or_report(table, "model_doubt", tuning).map(PressureChoice::Predictive)
         }
-        Word::Vsfc => read_vsfc(table, noise?).map(PressureChoice::Vsfc),
-        Word::Pi => read_pi(table).map(PressureChoice::Pi),
+        ControllerWord::Vsfc => read_vsfc(table, noise?).map(PressureChoice::Vsfc),
+        ControllerWord::Pi => read_pi(table).map(PressureChoice::Pi),
     };
     Some(PressureSettings {
         choice: choice?,
         model: model?,
         noise: noise?,
         nozzle: nozzle?,
-        limits: about.limits?,
+        limits: context.limits?,
     })
 }
 
-fn read_vsfc(table: &Table<'_>, noise: Noise) -> Option<VsfcGains> {
+fn read_vsfc(table: &Table<'_>, noise: PressureNoise) -> Option<VsfcGains> {
     let kp = table.number("kp_rpm_per_mpa", 0.0..=1e9);
     let ki = table.number("ki_rpm_per_mpa_s", 0.0..=1e9);
-    let creep = table.number_or("weak_zone_share", 0.0..=1.0, 0.3);
-    told(table, "kp_rpm_per_mpa", VsfcGains::new(kp?, ki?, creep?, noise.sigma()))
+    let zone_fraction = table.number_or("weak_zone_share", 0.0..=1.0, 0.3);
+    or_report(table, "kp_rpm_per_mpa", VsfcGains::new(kp?, ki?, zone_fraction?, noise.sigma()))
 }
 
-fn read_pi(table: &Table<'_>) -> Option<PiGains> {
+fn read_pi(table: &Table<'_>) -> Option<PressurePiGains> {
     let kp = table.number("kp_rpm_per_mpa", 0.0..=1e9);
     let integral = table.number("integral_time_s", 1e-3..=1e4);
     let integral = integral?;
     let tracking = table.number_or("tracking_time_s", 1e-3..=1e4, integral);
-    told(table, "kp_rpm_per_mpa", PiGains::new(kp?, integral, tracking?))
+    or_report(table, "kp_rpm_per_mpa", PressurePiGains::new(kp?, integral, tracking?))
 }
 
-fn told<T, E: std::fmt::Display>(
+fn or_report<T, E: std::fmt::Display>(
     table: &Table<'_>,
     key: &'static str,
     found: Result<T, E>,

@@ -3,18 +3,18 @@
 use std::path::PathBuf;
 
 use super::adaptive::AdaptiveSettings;
-use super::command::{ANY, keys};
-use super::context::About;
+use super::command::{ANY_COMMAND, command_keys};
+use super::context::ReadContext;
 use super::{adaptive, pressure, screw};
 use crate::core::quantity::Unit;
 use crate::core::time::Span;
 use crate::document::Table;
-use crate::extruder::Drive;
-use crate::extruder::feedforward::{RightZeros, ScrewSpeed};
+use crate::extruder::CommandQuantity;
+use crate::extruder::feedforward::{RightHalfPlaneZeros, ScrewSpeed};
 use crate::extruder::rheology::DragFlow;
 use crate::extruder::screw::control::ScrewSettings;
 use crate::extruder::strategy::PressureSettings;
-use crate::identify::library::{TOLERANCE_C, Wanted};
+use crate::identify::library::{ModelQuery, TOLERANCE_C};
 
 /// How commands are found.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +42,7 @@ pub enum Strategy {
 impl Strategy {
     /// Whether its first command is that of a steady flow, at which it can stand while the
     /// flow of a start comes up.
-    pub const fn stands_while_the_flow_comes(&self) -> bool {
+    pub const fn holds_during_start(&self) -> bool {
         matches!(self, Self::Constant { .. } | Self::Feedforward(_))
     }
 }
@@ -55,11 +55,11 @@ pub struct FeedforwardKeys {
     /// Time constant of the poles that are placed \[s\].
     pub time_constant_s: f64,
     /// How late the flow may be beyond what is known ahead.
-    pub late: Span,
+    pub max_delay: Span,
     /// What becomes of zeros in the right half plane.
-    pub right_zeros: RightZeros,
+    pub right_zeros: RightHalfPlaneZeros,
     /// What the flow is foretold from.
-    pub foretold_from: ScrewSpeed,
+    pub predicted_from: ScrewSpeed,
 }
 
 /// Where a model comes from.
@@ -72,14 +72,14 @@ pub enum ModelSource {
         /// The folder.
         folder: PathBuf,
         /// What is looked for.
-        wanted: Wanted,
+        wanted: ModelQuery,
     },
     /// None: a screw that carries the same volume with every turn, at once.
     Screw(DragFlow),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Word {
+enum StrategyWord {
     Constant,
     Profile,
     Feedforward,
@@ -88,46 +88,47 @@ enum Word {
     Adaptive,
 }
 
-const WORDS: [(&str, Word); 6] = [
-    ("constant", Word::Constant),
-    ("profile", Word::Profile),
-    ("feedforward", Word::Feedforward),
-    ("pressure", Word::Pressure),
-    ("screw-predictor", Word::Screw),
-    ("adaptive", Word::Adaptive),
+const STRATEGY_WORDS: [(&str, StrategyWord); 6] = [
+    ("constant", StrategyWord::Constant),
+    ("profile", StrategyWord::Profile),
+    ("feedforward", StrategyWord::Feedforward),
+    ("pressure", StrategyWord::Pressure),
+    ("screw-predictor", StrategyWord::Screw),
+    ("adaptive", StrategyWord::Adaptive),
 ];
 
 impl Strategy {
     /// Reads the strategy and its keys or its table.
-    pub(super) fn read(table: &Table<'_>, about: &About<'_>) -> Option<Self> {
-        let word = table.required_choice("strategy", &WORDS);
+    pub(super) fn read(table: &Table<'_>, context: &ReadContext<'_>) -> Option<Self> {
+        let word = table.required_choice("strategy", &STRATEGY_WORDS);
         if word.is_none() {
-            table.pass_over();
+            table.allow_unknown_keys();
         }
         match word? {
-            Word::Constant => {
-                let key = keys(about.drive).value;
-                let range =
-                    about.limits.map_or((*ANY.start(), *ANY.end()), |limits| limits.range());
+            StrategyWord::Constant => {
+                let key = command_keys(context.drive).value;
+                let range = context
+                    .limits
+                    .map_or((*ANY_COMMAND.start(), *ANY_COMMAND.end()), |limits| limits.range());
                 table.number(key, range.0..=range.1).map(|value| Self::Constant { value })
             }
-            Word::Profile => {
-                table.text("profile").map(|file| Self::Profile { file: about.folder.join(file) })
+            StrategyWord::Profile => {
+                table.text("profile").map(|file| Self::Profile { file: context.folder.join(file) })
             }
-            Word::Feedforward => read_feedforward(table, about).map(Self::Feedforward),
-            Word::Pressure => {
-                needs(table, about, Drive::Rpm);
-                pressure::read(&table.required_table("pressure")?, about)
+            StrategyWord::Feedforward => read_feedforward(table, context).map(Self::Feedforward),
+            StrategyWord::Pressure => {
+                require_command(table, context, CommandQuantity::Rpm);
+                pressure::read(&table.required_table("pressure")?, context)
                     .map(|settings| Self::Pressure(Box::new(settings)))
             }
-            Word::Screw => {
-                needs(table, about, Drive::Filling);
-                screw::read_law(&table.required_table("screw")?, about)
+            StrategyWord::Screw => {
+                require_command(table, context, CommandQuantity::Filling);
+                screw::read_predictor(&table.required_table("screw")?, context)
                     .map(|settings| Self::Screw(Box::new(settings)))
             }
-            Word::Adaptive => {
-                needs(table, about, Drive::MassFlow);
-                adaptive::read(&table.required_table("adaptive")?, about)
+            StrategyWord::Adaptive => {
+                require_command(table, context, CommandQuantity::MassFlow);
+                adaptive::read(&table.required_table("adaptive")?, context)
                     .map(|law| Self::Adaptive(Box::new(law)))
             }
         }
@@ -135,106 +136,109 @@ impl Strategy {
 }
 
 /// Reports a command of another quantity than the strategy gives.
-fn needs(table: &Table<'_>, about: &About<'_>, drive: Drive) {
-    if about.drive != drive {
-        let (found, given) = (about.drive.word(), drive.word());
+fn require_command(table: &Table<'_>, context: &ReadContext<'_>, drive: CommandQuantity) {
+    if context.drive != drive {
+        let (found, given) = (context.drive.word(), drive.word());
         let expected = format!("\"{given}\", which this strategy gives");
         table.report("command", format!("\"{found}\""), expected);
     }
 }
 
-fn read_feedforward(table: &Table<'_>, about: &About<'_>) -> Option<FeedforwardKeys> {
-    let model = read_model(table, about);
+fn read_feedforward(table: &Table<'_>, context: &ReadContext<'_>) -> Option<FeedforwardKeys> {
+    let model = read_model(table, context);
     // A screw that follows at once leaves no pole to be placed.
     let time_constant = if table.has("mm3_per_turn") {
         table.number_or("time_constant_s", 1e-3..=60.0, 1.0)
     } else {
         table.number("time_constant_s", 1e-3..=60.0)
     };
-    let late = table.number_or("late_s", 0.0..=60.0, 0.0);
-    let right_zeros = table
-        .choice("right_zeros", &[("refuse", RightZeros::Refuse), ("mirror", RightZeros::Mirror)]);
-    let foretold_from = table.choice(
+    let max_delay = table.number_or("late_s", 0.0..=60.0, 0.0);
+    let right_zeros = table.choice(
+        "right_zeros",
+        &[("refuse", RightHalfPlaneZeros::Refuse), ("mirror", RightHalfPlaneZeros::Mirror)],
+    );
+    let predicted_from = table.choice(
         "foretold_from",
         &[("command", ScrewSpeed::Modelled), ("encoder", ScrewSpeed::Measured)],
     );
-    if foretold_from == Some(ScrewSpeed::Measured) && about.drive != Drive::Rpm {
+    if predicted_from == Some(ScrewSpeed::Measured) && context.drive != CommandQuantity::Rpm {
         let expected = "\"command\", or command = \"rpm\", which is what an encoder reports";
         table.report("foretold_from", "\"encoder\"", expected);
     }
     Some(FeedforwardKeys {
         model: model?,
         time_constant_s: time_constant?,
-        late: Span::from_secs(late?),
+        max_delay: Span::from_secs(max_delay?),
         right_zeros: right_zeros?,
-        foretold_from: foretold_from?,
+        predicted_from: predicted_from?,
     })
 }
 
 /// What a model is looked up by in a library.
-const LOOKED_UP_BY: [&str; 4] =
+const LIBRARY_KEYS: [&str; 4] =
     ["material", "nozzle_mm", "temperature_c", "temperature_tolerance_c"];
 
 const MODEL_OR_LIBRARY: &str = "the file of a model, library with material, nozzle_mm and \
                                 temperature_c, or mm3_per_turn";
 
 /// A screw or a wheel in place of a model.
-fn read_turn(table: &Table<'_>, about: &About<'_>) -> Option<DragFlow> {
+fn read_drag_flow(table: &Table<'_>, context: &ReadContext<'_>) -> Option<DragFlow> {
     let volume = table.number("mm3_per_turn", 1e-6..=1e12);
     if table.has("model") || table.has("library") {
         let expected = "one of model, library and mm3_per_turn";
         table.report("mm3_per_turn", "a volume beside a model", expected);
-        table.pass_over();
+        table.allow_unknown_keys();
     }
-    for key in LOOKED_UP_BY.into_iter().filter(|key| table.has(key)) {
+    for key in LIBRARY_KEYS.into_iter().filter(|key| table.has(key)) {
         let expected = "nothing here: mm3_per_turn stands in for a model; leave one of them out";
         table.report(key, "a key of a library beside mm3_per_turn", expected);
     }
-    if about.drive != Drive::Rpm {
+    if context.drive != CommandQuantity::Rpm {
         let expected = "a model, or command = \"rpm\", which turns a screw";
         table.report("mm3_per_turn", "a volume for each turn", expected);
     }
     DragFlow::new(volume?).ok()
 }
 
-fn read_model(table: &Table<'_>, about: &About<'_>) -> Option<ModelSource> {
+fn read_model(table: &Table<'_>, context: &ReadContext<'_>) -> Option<ModelSource> {
     if table.has("mm3_per_turn") {
-        return read_turn(table, about).map(ModelSource::Screw);
+        return read_drag_flow(table, context).map(ModelSource::Screw);
     }
     match (table.has("model"), table.has("library")) {
         (true, with_library) => {
             if with_library {
                 table.report("library", "a library beside a model", "one of model and library");
             }
-            for key in LOOKED_UP_BY.into_iter().filter(|key| table.has(key)) {
+            for key in LIBRARY_KEYS.into_iter().filter(|key| table.has(key)) {
                 let expected = "nothing here: model names one file, and this looks one up in a \
                                 library; give library in place of model, or leave this out";
                 table.report(key, "a key of a library beside a model", expected);
             }
-            table.text("model").map(|file| ModelSource::File(about.folder.join(file)))
+            table.text("model").map(|file| ModelSource::File(context.folder.join(file)))
         }
         (false, true) => {
-            let folder = about.folder.join(table.text("library")?);
+            let folder = context.folder.join(table.text("library")?);
             let material = table.text("material");
             let nozzle = table.number("nozzle_mm", 0.01..=1e3);
             let temperature = table.number("temperature_c", -100.0..=2000.0);
             let tolerance = table.number_or("temperature_tolerance_c", 0.0..=1e3, TOLERANCE_C);
-            let wanted = Wanted {
+            let wanted = ModelQuery {
                 material: material?.to_owned(),
                 nozzle_mm: nozzle?,
                 temperature_c: temperature?,
                 tolerance_c: tolerance?,
-                input: Some(about.drive.unit()),
+                input: Some(context.drive.unit()),
                 output: Some(Unit::Mm3PerS),
             };
             Some(ModelSource::Library { folder, wanted })
         }
         (false, false) => {
-            let named = LOOKED_UP_BY.into_iter().filter(|key| table.has(key)).count();
+            let named = LIBRARY_KEYS.into_iter().filter(|key| table.has(key)).count();
             if named > 0 {
-                table.absent("library", "the folder in which a model for these is looked up");
+                table
+                    .report_absent("library", "the folder in which a model for these is looked up");
             } else {
-                table.absent("model", MODEL_OR_LIBRARY);
+                table.report_absent("model", MODEL_OR_LIBRARY);
             }
             None
         }

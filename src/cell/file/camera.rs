@@ -8,7 +8,7 @@ use crate::document::Table;
 
 /// Where frames come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Source {
+pub enum ImageSource {
     /// A folder of images, a video file or an MCAP.
     Path(PathBuf),
     /// A live camera by its index.
@@ -21,7 +21,7 @@ pub enum Source {
     Rendered,
 }
 
-impl Source {
+impl ImageSource {
     /// The source that a name means; paths are relative to a folder. `None` for a camera
     /// without a whole number.
     pub fn parse(name: &str, folder: &Path) -> Option<Self> {
@@ -50,9 +50,9 @@ pub enum Mount {
 
 /// The camera of a cell.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Camera {
+pub struct CameraSettings {
     /// Where frames come from.
-    pub source: Source,
+    pub source: ImageSource,
     /// The source as the file names it.
     pub source_name: String,
     /// Frames a second.
@@ -68,7 +68,7 @@ pub struct Camera {
 }
 
 /// Standard deviation of an offset of which the file says none, as a share.
-const OFFSET_SIGMA: f64 = 0.1;
+const OFFSET_SIGMA_FRACTION: f64 = 0.1;
 
 pub(super) fn read_mount(table: &Table<'_>) -> Option<Mount> {
     table.required_choice("mount", &[("flange", Mount::Flange), ("fixed", Mount::Fixed)])
@@ -79,10 +79,10 @@ pub(super) fn read_camera(
     folder: &Path,
     mount: Option<Mount>,
     rate_hz: Option<f64>,
-) -> Option<Camera> {
+) -> Option<CameraSettings> {
     let name = table.text("source");
     let source = name.and_then(|name| {
-        let source = Source::parse(name, folder);
+        let source = ImageSource::parse(name, folder);
         if source.is_none() {
             table.report("source", format!("\"{name}\""), "camera: and a whole number");
         }
@@ -91,13 +91,13 @@ pub(super) fn read_camera(
     let offset = table.number("offset_mm", 0.0..=1e5);
     let sigma = table.optional_number("offset_sigma_mm", 0.0..=1e4);
     let deadline = table.number_or("deadline_s", 0.05..=600.0, 2.0);
-    Some(Camera {
+    Some(CameraSettings {
         source: source?,
         source_name: name?.to_string(),
         rate_hz: rate_hz?,
         mount: mount?,
         offset: Mm::new(offset?).ok()?,
-        offset_sigma: Mm::new(sigma.unwrap_or(OFFSET_SIGMA * offset?)).ok()?,
+        offset_sigma: Mm::new(sigma.unwrap_or(OFFSET_SIGMA_FRACTION * offset?)).ok()?,
         deadline: Span::from_secs(deadline?),
     })
 }

@@ -5,31 +5,33 @@ use crate::core::geometry::Roi;
 use crate::core::units::Mm;
 use crate::core::units::WidthRange;
 use crate::document::Table;
-use crate::vision::gauge::{self, Axis, EdgeKind, Gauge, Method, Polarity};
+use crate::vision::gauge::{self, BeadAxis, EdgeKind, Gauge, MeasureMethod, Polarity};
 
 /// Largest image side that is taken \[px\].
 const MAX_SIDE_PX: f64 = 65_536.0;
 /// Largest fraction of a width that its standard deviation may be asked to be.
-const MAX_SIGMA: f64 = 0.5;
+const LARGEST_MAX_SIGMA: f64 = 0.5;
 /// Gammas of cameras: 0.45 for television, 2.2 for its inverse, with room beyond.
-const GAMMA: std::ops::RangeInclusive<f64> = 0.2..=5.0;
+const GAMMA_RANGE: std::ops::RangeInclusive<f64> = 0.2..=5.0;
 
 pub(super) fn read_gauge(table: &Table<'_>) -> Option<Gauge> {
     let roi = read_roi(table);
     let axis = table.required_choice(
         "bead_axis",
-        &[("vertical", Axis::Vertical), ("horizontal", Axis::Horizontal)],
+        &[("vertical", BeadAxis::Vertical), ("horizontal", BeadAxis::Horizontal)],
     );
     let polarity = table.required_choice(
         "polarity",
         &[("bright", Polarity::Bright), ("dark", Polarity::Dark), ("any", Polarity::Any)],
     );
     let range = table.numbers::<2>("width_range_mm", 1e-6..=1e5);
-    let method =
-        table.choice("method", &[("caliper", Method::Caliper), ("edge_lines", Method::EdgeLines)]);
-    let calipers = table.integer_or("calipers", 4..=4096, gauge::CALIPERS as u64);
+    let method = table.choice(
+        "method",
+        &[("caliper", MeasureMethod::Caliper), ("edge_lines", MeasureMethod::EdgeLines)],
+    );
+    let calipers = table.integer_or("calipers", 4..=4096, gauge::DEFAULT_CALIPERS as u64);
     let min_contrast_grey =
-        table.number_or("min_contrast_grey", 0.1..=255.0, gauge::MIN_CONTRAST_GREY);
+        table.number_or("min_contrast_grey", 0.1..=255.0, gauge::DEFAULT_MIN_CONTRAST_GREY);
     let edge = table.choice(
         "edge",
         &[("auto", EdgeKind::Auto), ("step", EdgeKind::Step), ("groove", EdgeKind::Groove)],
@@ -56,7 +58,7 @@ pub(super) fn read_gauge(table: &Table<'_>) -> Option<Gauge> {
 }
 
 fn read_max_sigma(table: &Table<'_>) -> Option<f64> {
-    let found = table.number_or("max_sigma", 0.0..=MAX_SIGMA, gauge::MAX_SIGMA)?;
+    let found = table.number_or("max_sigma", 0.0..=LARGEST_MAX_SIGMA, gauge::DEFAULT_MAX_SIGMA)?;
     if found <= 0.0 {
         table.report("max_sigma", "0", "a fraction of the width above 0, such as 0.02");
         return None;
@@ -65,9 +67,9 @@ fn read_max_sigma(table: &Table<'_>) -> Option<f64> {
 }
 
 /// The camera's gamma, none where the cell names none.
-fn read_gamma(table: &Table<'_>, method: Option<Method>) -> Option<f64> {
-    let gamma = table.optional_number("gamma", GAMMA)?;
-    if method == Some(Method::EdgeLines) {
+fn read_gamma(table: &Table<'_>, method: Option<MeasureMethod>) -> Option<f64> {
+    let gamma = table.optional_number("gamma", GAMMA_RANGE)?;
+    if method == Some(MeasureMethod::EdgeLines) {
         table.report("gamma", gamma.to_string(), "no gamma beside method = \"edge_lines\"");
     }
     Some(gamma)

@@ -2,11 +2,11 @@
 
 use crate::core::units::{Mm, MmPerS};
 use crate::document::Table;
-use crate::width_control::limiter::Limits;
+use crate::width_control::limiter::SpeedLimits;
 
 /// The robot of a cell.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Robot {
+pub struct RobotSettings {
     /// Host and port of the robot controller.
     pub address: String,
     /// Setpoints a second.
@@ -21,7 +21,7 @@ pub struct Robot {
     pub valid_ms: u32,
 }
 
-pub(super) fn read_robot(table: &Table<'_>, limits: Option<Limits>) -> Option<Robot> {
+pub(super) fn read_robot(table: &Table<'_>, limits: Option<SpeedLimits>) -> Option<RobotSettings> {
     let driver = table.required_choice("driver", &[("line", ())]);
     let address = table.text("address");
     let rate_hz = table.number("rate_hz", 0.5..=1000.0);
@@ -47,7 +47,7 @@ pub(super) fn read_robot(table: &Table<'_>, limits: Option<Limits>) -> Option<Ro
         table.report("start_speed_mm_per_s", speed.to_string(), expected);
     }
     driver?;
-    Some(Robot {
+    Some(RobotSettings {
         address: address?.to_string(),
         rate_hz: rate_hz?,
         start_speed: MmPerS::new(start_speed?).ok()?,

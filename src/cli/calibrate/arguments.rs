@@ -38,7 +38,7 @@ pub struct CalibrateArgs {
     /// Folder for the pictures that are taken
     /// [default: beside the calibration file, with its name and -pictures]
     #[arg(long, value_name = "DIR", requires = "camera")]
-    pub pictures: Option<PathBuf>,
+    pub images: Option<PathBuf>,
     /// Pictures a second from an http address or from recorded frames
     #[arg(long, value_name = "HZ", requires = "camera", default_value_t = 10.0)]
     pub rate_hz: f64,

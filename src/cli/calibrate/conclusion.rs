@@ -3,55 +3,55 @@
 use anyhow::Context;
 
 use super::arguments::CalibrateArgs;
-use super::pictures::Pictures;
+use super::pictures::CalibrationImages;
 use super::{plane, report};
 use crate::calibration::board::Board;
-use crate::calibration::covariance::Covariance;
+use crate::calibration::covariance::CalibrationCovariance;
 use crate::calibration::map;
 use crate::calibration::map::WidthMap;
 use crate::calibration::next_view;
 use crate::calibration::next_view::NextView;
 use crate::calibration::quality;
 use crate::calibration::share;
-use crate::calibration::sighting::Sighting;
+use crate::calibration::sighting::BoardObservation;
 use crate::calibration::solve;
 use crate::calibration::solve::Solution;
-use crate::calibration::{Calibration, Quality, file};
-use crate::cli::bed_plane::Plane;
+use crate::calibration::{Calibration, CalibrationQuality, file};
+use crate::cli::bed_plane::BedPlane;
 use crate::core::geometry::GridSize;
 use crate::core::units::Mm;
-use crate::io::whole_file::write_whole;
-use crate::report::calibration::Page;
+use crate::io::whole_file::write_atomic;
+use crate::report::calibration::CalibrationPage;
 
 /// A camera that was found, and how well.
-pub struct Conclusion<'a> {
+pub struct CalibrationResult<'a> {
     args: &'a CalibrateArgs,
     board: &'a Board,
-    pictures: &'a Pictures,
+    pictures: &'a CalibrationImages,
     /// The camera.
     pub solution: Solution,
-    plane: Plane,
-    covariance: Option<Covariance>,
+    plane: BedPlane,
+    covariance: Option<CalibrationCovariance>,
     maps: Vec<WidthMap>,
     /// What one more picture would bring.
     pub next: Option<NextView>,
 }
 
-impl<'a> Conclusion<'a> {
+impl<'a> CalibrationResult<'a> {
     /// Fails where no camera or no bed is found, and for a surface that the camera does
     /// not look down on.
     pub fn of(
         args: &'a CalibrateArgs,
         board: &'a Board,
-        pictures: &'a Pictures,
+        pictures: &'a CalibrationImages,
     ) -> anyhow::Result<Self> {
-        let looks = pictures.looks.iter();
-        let seen: Vec<Sighting> = looks.filter_map(|(_, look)| look.clone().ok()).collect();
+        let looks = pictures.found.iter();
+        let seen: Vec<BoardObservation> = looks.filter_map(|(_, look)| look.clone().ok()).collect();
         let solution = solve::solve(board, &seen)?;
         let plane = plane::find(args, board, &solution, pictures)?;
         // Corners' noise is the least of the errors where the focal length is loose.
         let covariance = quality::settles_camera(&solution)
-            .then(|| Covariance::of(board, &solution, &plane.on_bed, plane.thickness))
+            .then(|| CalibrationCovariance::of(board, &solution, &plane.on_bed, plane.thickness))
             .flatten();
         let mut conclusion = Self {
             args,
@@ -63,24 +63,24 @@ impl<'a> Conclusion<'a> {
             maps: Vec::new(),
             next: None,
         };
-        conclusion.tell_widths()?;
+        conclusion.find_width_sigma()?;
         Ok(conclusion)
     }
 
     /// Works out what is left open in the width of the bead.
-    fn tell_widths(&mut self) -> anyhow::Result<()> {
+    fn find_width_sigma(&mut self) -> anyhow::Result<()> {
         let Some(known) = &self.covariance else { return Ok(()) };
         let camera_mm = known.camera_height_mm();
-        let told = self.args.surface_height_mm.as_slice();
-        if let Some(height) = told.iter().find(|height| height.get() >= camera_mm) {
+        let given = self.args.surface_height_mm.as_slice();
+        if let Some(height) = given.iter().find(|height| height.get() >= camera_mm) {
             anyhow::bail!(
                 "--surface-height-mm: found {height}, but the camera is only {camera_mm:.1} mm above \
                  the bed"
             );
         }
         let usual = [Mm::ZERO, Mm::new((camera_mm / 20.0).round()).unwrap_or(Mm::ZERO)];
-        let heights = if told.is_empty() { &usual[..] } else { told };
-        let Some(bead) = self.args.bead_mm.map(Mm::get).or_else(|| map::usual_bead_mm(known))
+        let heights = if given.is_empty() { &usual[..] } else { given };
+        let Some(bead) = self.args.bead_mm.map(Mm::get).or_else(|| map::typical_bead_mm(known))
         else {
             return Ok(());
         };
@@ -103,10 +103,10 @@ impl<'a> Conclusion<'a> {
 
     /// Share of a width that the calibration leaves open where boards were seen: of the
     /// bead that was told or is usual, at the worst of the heights.
-    fn share(&self) -> Option<f64> {
+    fn width_sigma_fraction(&self) -> Option<f64> {
         let bead = self.maps.first().map(|map| map.bead_mm);
-        let told = self.worst_mm().zip(bead).map(|(worst, bead)| worst / bead);
-        told.or_else(|| share::where_seen(self.covariance.as_ref()?))
+        let given = self.worst_mm().zip(bead).map(|(worst, bead)| worst / bead);
+        given.or_else(|| share::where_seen(self.covariance.as_ref()?))
     }
 
     /// The answer, but for the list of pictures.
@@ -120,16 +120,16 @@ impl<'a> Conclusion<'a> {
             report::maps(&self.maps, self.args.max_width_sigma_mm),
             report::next_view(covariance, self.next.as_ref()),
             report::scale(calibration, covariance, self.plane.thickness),
-            report::doubts(&self.solution),
+            report::warnings(&self.solution),
         ]
         .concat()
     }
 
     /// The report; with a number of seconds after which it loads itself anew.
     pub fn page(&self, text: &str, reload_s: Option<u32>) -> String {
-        Page {
+        CalibrationPage {
             board: self.board,
-            looks: &self.pictures.looks,
+            images: &self.pictures.found,
             solution: &self.solution,
             maps: &self.maps,
             limit_mm: self.args.max_width_sigma_mm.map(Mm::get),
@@ -145,7 +145,7 @@ impl<'a> Conclusion<'a> {
     pub fn write(&self) -> anyhow::Result<Calibration> {
         let text = self.file();
         let calibration = self.read_back(&text)?;
-        write_whole(&self.args.out, text.as_bytes())?;
+        write_atomic(&self.args.out, text.as_bytes())?;
         Ok(calibration)
     }
 
@@ -174,15 +174,15 @@ impl<'a> Conclusion<'a> {
         );
         let bed = plane.on_bed.bed(plane.thickness);
         let covariance = self.covariance.as_ref();
-        let quality = Quality {
+        let quality = CalibrationQuality {
             reprojection_rms_px: solution.rms_px,
-            width_sigma_share: self.share(),
+            width_relative_sigma: self.width_sigma_fraction(),
             seen_px: covariance.map(|covariance| {
                 let [from, to] = covariance.seen_px();
                 [from.x, from.y, to.x, to.y].map(|px| (px * 10.0).round() / 10.0)
             }),
             heights_mm: covariance.and_then(|_| solution.heights_mm(self.board, &bed)),
-            uncertainty: covariance.map(Covariance::uncertainty),
+            uncertainty: covariance.map(CalibrationCovariance::uncertainty),
         };
         let camera = solution.camera();
         file::to_toml(camera, &bed, solution.image_size_px, plane.robot_z, Some(quality), &[note])

@@ -9,15 +9,15 @@ use anyhow::{Context, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::arguments::CalibrateArgs;
-use super::conclusion::Conclusion;
-use super::pictures::{Pictures, taken};
+use super::conclusion::CalibrationResult;
+use super::pictures::{CalibrationImages, taken_so_far};
 use crate::calibration::board::Board;
-use crate::calibration::collect::{Collector, News};
+use crate::calibration::collect::{Collector, Decision};
 use crate::calibration::coverage::{Coverage, PARTS, SIDES};
 use crate::calibration::quality;
 use crate::calibration::sighting;
-use crate::calibration::solve::FEWEST_VIEWS;
-use crate::cell::file::Source;
+use crate::calibration::solve::MIN_VIEWS;
+use crate::cell::file::ImageSource;
 use crate::cli::arguments::WrongArguments;
 use crate::core::frame::{Channel, Frame};
 use crate::core::time::Span;
@@ -26,20 +26,20 @@ use crate::drivers::camera::open::LiveOptions;
 use crate::io::clock::RunClock;
 use crate::io::image_file;
 use crate::io::stop::StopSignal;
-use crate::io::whole_file::write_whole;
+use crate::io::whole_file::write_atomic;
 use crate::run::ports::{FrameSource, Grab};
 
 /// Longest wait for a picture \[s\].
-const DEADLINE_S: f64 = 5.0;
+const FRAME_TIMEOUT_S: f64 = 5.0;
 /// More pictures than this say nothing more that is worth the while.
-const MOST_VIEWS: usize = 60;
+const MAX_VIEWS: usize = 60;
 /// Seconds after which the report loads itself anew.
 const RELOAD_S: u32 = 3;
 
 /// Takes pictures until the width of the bead is known as well as was asked for, a
 /// further picture brings nothing, there are [`MOST_VIEWS`], the camera ends, or the user
 /// ends it.
-pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<Pictures> {
+pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<CalibrationImages> {
     let name = args.camera.as_deref().unwrap_or_default();
     let source = source(name)?;
     let folder = folder(args)?;
@@ -48,10 +48,10 @@ pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<Pictures> {
         source: &source,
         name,
         rate_hz: args.rate_hz,
-        deadline: Span::from_secs(DEADLINE_S),
+        deadline: Span::from_secs(FRAME_TIMEOUT_S),
         channel: Channel::Grey,
     };
-    let mut camera = open::live(options, RunClock::start(), stop.told().clone())?;
+    let mut camera = open::live(options, RunClock::start(), stop.signals().clone())?;
     let is_folder_new = !folder.exists();
     std::fs::create_dir_all(&folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
@@ -64,12 +64,12 @@ pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<Pictures> {
     taking.finish()
 }
 
-fn source(name: &str) -> Result<Source, WrongArguments> {
-    match Source::parse(name, Path::new("")) {
+fn source(name: &str) -> Result<ImageSource, WrongArguments> {
+    match ImageSource::parse(name, Path::new("")) {
         None => Err(WrongArguments::new(format!(
             "--camera {name}: expected camera: and a whole number, such as camera:0"
         ))),
-        Some(Source::Rendered) => Err(WrongArguments::new(
+        Some(ImageSource::Rendered) => Err(WrongArguments::new(
             "--camera rendered: the rendered camera shows a bead, not a board; name a real one",
         )),
         Some(source) => Ok(source),
@@ -82,7 +82,7 @@ fn folder(args: &CalibrateArgs) -> Result<PathBuf, WrongArguments> {
         let stem = args.out.file_stem().unwrap_or(args.out.as_os_str()).to_string_lossy();
         args.out.with_file_name(format!("{stem}-pictures"))
     };
-    let folder = args.pictures.clone().unwrap_or_else(beside);
+    let folder = args.images.clone().unwrap_or_else(beside);
     let is_empty = match std::fs::read_dir(&folder) {
         Ok(mut entries) => entries.next().is_none(),
         Err(_) => !folder.exists(),
@@ -130,9 +130,9 @@ impl<'a> Taking<'a> {
     fn run(&mut self, camera: &mut dyn FrameSource, stop: &StopSignal) -> anyhow::Result<()> {
         self.screen
             .say("lay the board flat on the bed, in the middle of the picture, and let it lie");
-        while !stop.asked() {
+        while !stop.requested() {
             let is_enough = match camera.next_frame() {
-                Ok(Some(Grab::Frame { frame, .. })) => self.look(&frame)?,
+                Ok(Some(Grab::Frame { frame, .. })) => self.examine(&frame)?,
                 Ok(Some(Grab::Unreadable { reason, .. })) => {
                     self.screen.state(&format!("unreadable: {reason}"));
                     false
@@ -156,9 +156,9 @@ impl<'a> Taking<'a> {
     }
 
     /// Whether the pictures are enough.
-    fn look(&mut self, frame: &Frame) -> anyhow::Result<bool> {
-        match self.collector.see(sighting::look(self.board, "", frame)) {
-            News::Kept(number) => self.keep(number, frame),
+    fn examine(&mut self, frame: &Frame) -> anyhow::Result<bool> {
+        match self.collector.add(sighting::observe(self.board, "", frame)) {
+            Decision::Kept(number) => self.keep(number, frame),
             news => {
                 self.screen.state(&words(&news));
                 Ok(false)
@@ -170,7 +170,7 @@ impl<'a> Taking<'a> {
         let name = format!("view-{number:03}.png");
         let path = self.folder.join(&name);
         let png = image_file::encode_png(frame)?;
-        write_whole(&path, &png).with_context(|| {
+        write_atomic(&path, &png).with_context(|| {
             format!("the {} pictures before it are in {}", number - 1, self.folder.display())
         })?;
         self.collector.name_last(&name);
@@ -185,17 +185,17 @@ impl<'a> Taking<'a> {
                  by 20 to 45 degrees to all sides",
             );
         }
-        if number < FEWEST_VIEWS {
+        if number < MIN_VIEWS {
             return Ok(false);
         }
-        Ok(self.judge(number) || number >= MOST_VIEWS)
+        Ok(self.assess(number) || number >= MAX_VIEWS)
     }
 
     /// Says how far the pictures have come, and writes the report; whether they are
     /// enough. While there are few they may make no camera; then more are taken.
-    fn judge(&mut self, number: usize) -> bool {
-        let pictures = taken(&self.files, self.collector.kept());
-        let conclusion = match Conclusion::of(self.args, self.board, &pictures) {
+    fn assess(&mut self, number: usize) -> bool {
+        let pictures = taken_so_far(&self.files, self.collector.kept());
+        let conclusion = match CalibrationResult::of(self.args, self.board, &pictures) {
             Ok(conclusion) => conclusion,
             Err(error) => {
                 self.screen.say(&format!("  not yet a calibration: {error:#}"));
@@ -206,8 +206,8 @@ impl<'a> Taking<'a> {
         let page =
             conclusion.calibration().map(|c| conclusion.page(&conclusion.text(&c), Some(RELOAD_S)));
         let report = self.args.report();
-        match page.map(|page| write_whole(&report, page.as_bytes())) {
-            Ok(Ok(())) if number == FEWEST_VIEWS => {
+        match page.map(|page| write_atomic(&report, page.as_bytes())) {
+            Ok(Ok(())) if number == MIN_VIEWS => {
                 self.screen.say(&format!("  open {} to follow it", report.display()));
             }
             Ok(Ok(())) | Err(_) => {}
@@ -224,12 +224,12 @@ impl<'a> Taking<'a> {
         }
     }
 
-    fn finish(self) -> anyhow::Result<Pictures> {
+    fn finish(self) -> anyhow::Result<CalibrationImages> {
         self.screen.end();
         if self.files.is_empty() {
             bail!("the camera has not shown the board lying still on the bed; nothing was written");
         }
-        let pictures = taken(&self.files, self.collector.kept());
+        let pictures = taken_so_far(&self.files, self.collector.kept());
         say!("{} pictures in {}\n", self.files.len(), self.folder.display());
         Ok(pictures)
     }
@@ -237,16 +237,16 @@ impl<'a> Taking<'a> {
 
 /// Whether nothing speaks against the calibration, and widths are known as well as was
 /// asked for, or as well as one more picture would let them be known.
-fn is_enough(args: &CalibrateArgs, conclusion: &Conclusion<'_>) -> bool {
+fn is_enough(args: &CalibrateArgs, conclusion: &CalibrationResult<'_>) -> bool {
     let known = match args.max_width_sigma_mm {
         Some(_) => !conclusion.fails(),
         None => conclusion.worst_mm().is_some() && conclusion.next.is_none(),
     };
-    known && quality::doubts(&conclusion.solution).is_empty()
+    known && quality::warnings(&conclusion.solution).is_empty()
 }
 
 /// How far the pictures have come.
-fn progress(args: &CalibrateArgs, conclusion: &Conclusion<'_>) -> String {
+fn progress(args: &CalibrateArgs, conclusion: &CalibrationResult<'_>) -> String {
     let coverage = Coverage::of(&conclusion.solution);
     let mut text = String::new();
     let width = conclusion.worst_mm().map_or_else(
@@ -270,7 +270,9 @@ fn progress(args: &CalibrateArgs, conclusion: &Conclusion<'_>) -> String {
             .next
             .as_ref()
             .map_or_else(String::new, |next| format!("would help most: {next}")),
-        quality::doubts(&conclusion.solution).first().map_or_else(String::new, ToString::to_string),
+        quality::warnings(&conclusion.solution)
+            .first()
+            .map_or_else(String::new, ToString::to_string),
     ];
     for (row, beside) in coverage.cells.iter().zip(beside) {
         let row: String = row.iter().map(|&seen| if seen { '#' } else { '.' }).collect();
@@ -279,14 +281,14 @@ fn progress(args: &CalibrateArgs, conclusion: &Conclusion<'_>) -> String {
     text.trim_end().to_owned()
 }
 
-fn words(news: &News) -> String {
+fn words(news: &Decision) -> String {
     match news {
-        News::Kept(number) => format!("view {number}"),
-        News::Moving => "the board moves: hold it still".to_owned(),
-        News::Waiting => "still: a moment".to_owned(),
-        News::Known(number) => format!("the board is where it was in view {number}: move it"),
-        News::OtherSize => "the camera's pictures have changed their size".to_owned(),
-        News::Refused(refusal) => refusal.to_string(),
+        Decision::Kept(number) => format!("view {number}"),
+        Decision::Moving => "the board moves: hold it still".to_owned(),
+        Decision::Waiting => "still: a moment".to_owned(),
+        Decision::Known(number) => format!("the board is where it was in view {number}: move it"),
+        Decision::OtherSize => "the camera's pictures have changed their size".to_owned(),
+        Decision::Refused(refusal) => refusal.to_string(),
     }
 }
 

@@ -7,27 +7,27 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use crate::calibration::board::Board;
-use crate::calibration::sighting::{Looks, Sighting};
-use crate::cli::board_image::look_at;
+use crate::calibration::sighting::{BoardObservation, Observations};
+use crate::cli::board_image::find_board;
 
 /// Pictures that were looked at.
-pub struct Pictures {
+pub struct CalibrationImages {
     /// Their files, in their order.
     pub files: Vec<PathBuf>,
     /// What they show.
-    pub looks: Looks,
+    pub found: Observations,
     /// Those whose boards lay on the bed; none where the last one is to be taken.
     pub on_bed: Vec<PathBuf>,
 }
 
 /// Looks for the board in all of these.
-pub fn look_at_all(board: &Board, files: &[PathBuf]) -> Looks {
+pub fn find_boards(board: &Board, files: &[PathBuf]) -> Observations {
     let bar = progress(files.len());
     let looks = files
         .par_iter()
         .map(|path| {
             let name = name_of(path);
-            let look = look_at(board, &name, path);
+            let look = find_board(board, &name, path);
             bar.inc(1);
             (name, look)
         })
@@ -42,10 +42,10 @@ fn name_of(path: &std::path::Path) -> String {
 }
 
 /// Pictures that a camera has taken so far, the first with the board on the bed.
-pub fn taken(files: &[PathBuf], kept: &[Sighting]) -> Pictures {
+pub fn taken_so_far(files: &[PathBuf], kept: &[BoardObservation]) -> CalibrationImages {
     let looks = kept.iter().map(|sighting| (sighting.name.clone(), Ok(sighting.clone())));
     let on_bed = files.first().cloned().into_iter().collect();
-    Pictures { files: files.to_vec(), looks: looks.collect(), on_bed }
+    CalibrationImages { files: files.to_vec(), found: looks.collect(), on_bed }
 }
 
 fn progress(count: usize) -> ProgressBar {

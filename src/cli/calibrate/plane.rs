@@ -5,20 +5,20 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 
 use super::arguments::CalibrateArgs;
-use super::pictures::Pictures;
-use crate::calibration::board::{Board, Seen};
-use crate::calibration::charuco::NoMarkers;
-use crate::calibration::refusal::Refusal;
-use crate::calibration::sighting::Looks;
+use super::pictures::CalibrationImages;
+use crate::calibration::board::{Board, CornerObservation};
+use crate::calibration::charuco::MarkerError;
+use crate::calibration::refusal::BoardRejection;
+use crate::calibration::sighting::Observations;
 use crate::calibration::solve::Solution;
 use crate::cli::arguments::WrongArguments;
-use crate::cli::bed_plane::{Boards, Plane, looked_for};
+use crate::cli::bed_plane::{BedPlane, BoardsOnBed, find_corners};
 
 /// Corners on the bed may be so many times further off than those of the other
 /// pictures, and so far in any case \[px\]; beyond that the pictures do not belong to
 /// this camera, or the boards lay on no plane.
-const OFF: f64 = 4.0;
-const OFF_PX: f64 = 0.3;
+const MAX_RMS_RATIO: f64 = 4.0;
+const MIN_ACCEPTED_RMS_PX: f64 = 0.3;
 
 /// Finds a mistyped image before the long work.
 pub fn check(planes: &[PathBuf], files: &[PathBuf]) -> Result<(), WrongArguments> {
@@ -51,13 +51,14 @@ pub fn find(
     args: &CalibrateArgs,
     board: &Board,
     solution: &Solution,
-    pictures: &Pictures,
-) -> anyhow::Result<Plane> {
-    let Pictures { files, looks, on_bed: named } = pictures;
-    let mut boards = Boards::of(board);
+    pictures: &CalibrationImages,
+) -> anyhow::Result<BedPlane> {
+    let CalibrationImages { files, found: looks, on_bed: named } = pictures;
+    let mut boards = BoardsOnBed::of(board);
     let mut passed_over = Vec::new();
     if named.is_empty() {
-        let (last, later) = last_seen(solution, looks).context("no picture shows the board")?;
+        let (last, later) =
+            last_with_board(solution, looks).context("no picture shows the board")?;
         boards.add(last.to_owned(), corners_of(solution, last).unwrap_or_default())?;
         passed_over = later;
     }
@@ -65,10 +66,10 @@ pub fn find(
         let (image, corners) = on_bed(path, board, solution, (files, looks))?;
         boards.add(image, corners)?;
     }
-    let most_px = (OFF * solution.rms_px).max(OFF_PX);
+    let most_px = (MAX_RMS_RATIO * solution.rms_px).max(MIN_ACCEPTED_RMS_PX);
     let other = format!("the other pictures have {:.2} px", solution.rms_px);
     let (images, on_bed) = boards.fit(&solution.model, most_px, &other)?;
-    Ok(Plane {
+    Ok(BedPlane {
         images,
         assumed: named.is_empty(),
         passed_over,
@@ -80,19 +81,22 @@ pub fn find(
 
 /// The last picture that shows a board, or its twin where the board was in its place
 /// before; and those after it that show a board, but were refused.
-fn last_seen<'a>(solution: &'a Solution, looks: &'a Looks) -> Option<(&'a str, Vec<String>)> {
+fn last_with_board<'a>(
+    solution: &'a Solution,
+    looks: &'a Observations,
+) -> Option<(&'a str, Vec<String>)> {
     let mut later = Vec::new();
     for (name, look) in looks.iter().rev() {
         match look {
             Ok(_) if solution.views.iter().any(|view| view.name == *name) => {
                 return Some((name, later));
             }
-            Err(Refusal::Duplicate { of, .. }) => return Some((of, later)),
+            Err(BoardRejection::Duplicate { of, .. }) => return Some((of, later)),
             Ok(_)
             | Err(
-                Refusal::Unreadable(_)
-                | Refusal::NoBoard { .. }
-                | Refusal::NoMarkers(NoMarkers::None { .. }),
+                BoardRejection::Unreadable(_)
+                | BoardRejection::NoBoard { .. }
+                | BoardRejection::NoMarkers(MarkerError::None { .. }),
             ) => {}
             Err(_) => later.push(name.clone()),
         }
@@ -100,7 +104,7 @@ fn last_seen<'a>(solution: &'a Solution, looks: &'a Looks) -> Option<(&'a str, V
     None
 }
 
-fn corners_of(solution: &Solution, name: &str) -> Option<Vec<Seen>> {
+fn corners_of(solution: &Solution, name: &str) -> Option<Vec<CornerObservation>> {
     solution.views.iter().find(|view| view.name == name).map(|view| view.corners.clone())
 }
 
@@ -110,8 +114,8 @@ fn on_bed(
     path: &Path,
     board: &Board,
     solution: &Solution,
-    (files, looks): (&[PathBuf], &Looks),
-) -> anyhow::Result<(String, Vec<Seen>)> {
+    (files, looks): (&[PathBuf], &Observations),
+) -> anyhow::Result<(String, Vec<CornerObservation>)> {
     if let Some((file, (name, look))) =
         index_of(path, files).and_then(|index| Some((files.get(index)?, looks.get(index)?)))
     {
@@ -120,11 +124,13 @@ fn on_bed(
                 .map(|corners| (name.clone(), corners))
                 .with_context(|| format!("--plane {name}: not used")),
             // A board that is in one place twice still lies on the bed.
-            Err(Refusal::Duplicate { .. }) => looked_for(file, board, solution.image_size_px),
+            Err(BoardRejection::Duplicate { .. }) => {
+                find_corners(file, board, solution.image_size_px)
+            }
             Err(refusal) => {
                 bail!("--plane {name}: {refusal}; name an image that shows the board")
             }
         };
     }
-    looked_for(path, board, solution.image_size_px)
+    find_corners(path, board, solution.image_size_px)
 }

@@ -4,18 +4,18 @@ use std::fmt::Write;
 
 use crate::calibration::Calibration;
 use crate::calibration::camera::NUMBERS;
-use crate::calibration::covariance::Covariance;
+use crate::calibration::covariance::CalibrationCovariance;
 use crate::calibration::map;
 use crate::calibration::map::WidthMap;
 use crate::calibration::next_view::NextView;
 use crate::calibration::quality;
 use crate::calibration::scale::single_scale;
-use crate::calibration::sighting::Looks;
+use crate::calibration::sighting::Observations;
 use crate::calibration::solve::{SHARED_NAMES, Solution};
 use crate::core::units::Mm;
 
 /// One line an image: corners and errors, or why it is not used.
-pub fn images(looks: &Looks, solution: &Solution) -> String {
+pub fn images(looks: &Observations, solution: &Solution) -> String {
     let mut out = String::new();
     let column = name_column(looks);
     line!(out, "{:column$}  corners  rms px  max px", "image");
@@ -45,7 +45,7 @@ pub fn images(looks: &Looks, solution: &Solution) -> String {
 
 /// One line an image that is not used, for the case that nothing else can be
 /// said.
-pub fn refusals(looks: &Looks) -> String {
+pub fn refusals(looks: &Observations) -> String {
     let mut out = String::new();
     let column = name_column(looks);
     for (name, look) in looks {
@@ -57,7 +57,7 @@ pub fn refusals(looks: &Looks) -> String {
     out
 }
 
-fn name_column(looks: &Looks) -> usize {
+fn name_column(looks: &Observations) -> usize {
     looks.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max("image".len())
 }
 
@@ -69,9 +69,10 @@ pub fn lens(solution: &Solution) -> String {
     for trial in &solution.trials {
         let name = trial.free.lens.map_or("", |lens| lens.name());
         let bend = if trial.free.bend { ", bent board" } else { "" };
-        let held_out =
-            trial.held_out_px.map_or_else(|| "not told".to_owned(), |px| format!("{px:.4}"));
-        let folds = if trial.folds { "  turns over within the picture" } else { "" };
+        let held_out = trial
+            .cross_validation_px
+            .map_or_else(|| "not told".to_owned(), |px| format!("{px:.4}"));
+        let folds = if trial.is_non_monotonic { "  turns over within the picture" } else { "" };
         let mark = if trial.free == solution.free { "  <- taken" } else { "" };
         line!(
             out,
@@ -85,7 +86,7 @@ pub fn lens(solution: &Solution) -> String {
 
 /// Design effect from which on it is no chance: its own standard error is some 0.16 with a
 /// dozen pictures.
-const TOLD_EFFECT: f64 = 1.5;
+const REPORTED_EFFECT: f64 = 1.5;
 /// Letters of the longest name of a number.
 const NAME: usize = 18;
 
@@ -109,7 +110,7 @@ pub fn camera(solution: &Solution) -> String {
         line!(out, "  {name:NAME$}  {value:10.digits$} ± {sigma}{unit}");
     }
     line!(out, "  noise of a corner: {:.3} px", solution.noise_px);
-    if solution.design_effect > TOLD_EFFECT {
+    if solution.design_effect > REPORTED_EFFECT {
         line!(
             out,
             "  the pictures contradict each other more than such noise explains (a board that is"
@@ -127,12 +128,12 @@ pub fn camera(solution: &Solution) -> String {
 /// How far a width can be trusted.
 pub fn width(
     calibration: &Calibration,
-    covariance: Option<&Covariance>,
+    covariance: Option<&CalibrationCovariance>,
     maps: &[WidthMap],
 ) -> String {
     let mut out = String::new();
     let quality = match calibration {
-        Calibration::Full { quality: Some(quality), .. } => quality.width_sigma_share,
+        Calibration::Full { quality: Some(quality), .. } => quality.width_relative_sigma,
         _ => None,
     };
     let (Some(covariance), Some(share)) = (covariance, quality) else {
@@ -144,8 +145,8 @@ pub fn width(
         line!(out, "  degrees to several sides");
         return out;
     };
-    let told = maps.first().filter(|_| map::worst_mm(maps).is_some());
-    let bead = told.map_or_else(
+    let given = maps.first().filter(|_| map::worst_mm(maps).is_some());
+    let bead = given.map_or_else(
         || " of a bead that fills a third of where boards were seen,".to_owned(),
         |map| format!(" ({:.4} mm in {} mm)", share * map.bead_mm, map.bead_mm),
     );
@@ -185,7 +186,7 @@ pub fn maps(maps: &[WidthMap], limit: Option<Mm>) -> String {
             out,
             "  {:>7.1} mm  {worst:>16}  {range:>22}  {:>10.4} mm",
             map.surface_height.get(),
-            map.by_a_millimetre_of_height_mm
+            map.mm_per_mm_height
         );
     }
     if let Some(limit) = limit {
@@ -203,14 +204,14 @@ pub fn maps(maps: &[WidthMap], limit: Option<Mm>) -> String {
 }
 
 /// What one more picture would bring.
-pub fn next_view(covariance: Option<&Covariance>, next: Option<&NextView>) -> String {
+pub fn next_view(covariance: Option<&CalibrationCovariance>, next: Option<&NextView>) -> String {
     let mut out = String::new();
     match (covariance, next) {
         (None, _) => {}
         (Some(_), Some(next)) => {
             line!(out, "\none more picture would help most with");
             line!(out, "  {next}:");
-            let (before, after) = next.share;
+            let (before, after) = next.relative_sigma;
             line!(out, "  {:.3} % of a width instead of {:.3} %", 100.0 * after, 100.0 * before);
         }
         (Some(_), None) => line!(out, "\none more picture would bring less than 3 %"),
@@ -219,7 +220,11 @@ pub fn next_view(covariance: Option<&Covariance>, next: Option<&NextView>) -> St
 }
 
 /// The single number of the 2022 paper, and what it is worth.
-pub fn scale(calibration: &Calibration, covariance: Option<&Covariance>, face: Mm) -> String {
+pub fn scale(
+    calibration: &Calibration,
+    covariance: Option<&CalibrationCovariance>,
+    face: Mm,
+) -> String {
     let mut out = String::new();
     let Some(scale) = single_scale(calibration, face) else {
         line!(
@@ -262,14 +267,14 @@ pub fn scale(calibration: &Calibration, covariance: Option<&Covariance>, face: M
 }
 
 /// Reasons for doubt.
-pub fn doubts(solution: &Solution) -> String {
+pub fn warnings(solution: &Solution) -> String {
     let mut out = String::new();
-    let doubts = quality::doubts(solution);
-    if !doubts.is_empty() {
+    let warnings = quality::warnings(solution);
+    if !warnings.is_empty() {
         line!(out);
     }
-    for doubt in doubts {
-        line!(out, "warning: {doubt}");
+    for warning in warnings {
+        line!(out, "warning: {warning}");
     }
     out
 }

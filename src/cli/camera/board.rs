@@ -6,8 +6,8 @@ use clap::Args;
 
 use crate::cli::arguments::WrongArguments;
 use crate::cli::board_arguments::BoardArgs;
-use crate::io::whole_file::write_whole;
-use crate::report::sheet::{Paper, Sheet};
+use crate::io::whole_file::write_atomic;
+use crate::report::sheet::{BoardSheet, Paper};
 
 /// Makes a checkerboard to print, at its true size.
 #[derive(Debug, Args)]
@@ -47,7 +47,7 @@ fn parse_paper(text: &str) -> Result<Paper, String> {
 /// Runs the command.
 pub fn run(args: &SheetArgs) -> anyhow::Result<()> {
     let board = args.board.board()?;
-    let sheet = Sheet::of(&board, args.paper).map_err(WrongArguments::new)?;
+    let sheet = BoardSheet::of(&board, args.paper).map_err(WrongArguments::new)?;
     let ending = args.out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
     let bytes = match ending.as_deref() {
         Some("pdf") => sheet.pdf(),
@@ -58,7 +58,7 @@ pub fn run(args: &SheetArgs) -> anyhow::Result<()> {
             return Err(WrongArguments::new(what).into());
         }
     };
-    write_whole(&args.out, &bytes)?;
+    write_atomic(&args.out, &bytes)?;
     say!("{}", args.out.display());
     Ok(())
 }

@@ -8,24 +8,24 @@ use std::path::Path;
 pub use self::arguments::ConvertArgs;
 use self::arguments::To;
 use crate::calibration::exchange::{Import, Intrinsics, opencv, ros};
-use crate::calibration::{Calibration, Quality};
+use crate::calibration::{Calibration, CalibrationQuality};
 use crate::cli::arguments::{WrongArguments, check_writable};
-use crate::cli::print::Voice;
+use crate::cli::print::Verbosity;
 use crate::core::units::Mm;
 use crate::io::calibration_file;
-use crate::io::whole_file::write_whole;
+use crate::io::whole_file::write_atomic;
 
 /// Runs the command. What the other format cannot hold goes to standard error.
-pub fn run(args: &ConvertArgs, voice: Voice) -> anyhow::Result<()> {
+pub fn run(args: &ConvertArgs, voice: Verbosity) -> anyhow::Result<()> {
     let to = target(args)?;
     check(args, to)?;
     let (source, mut notes) = read(args)?;
     let text = match (&source, to) {
-        (Source::Truebead(..), To::Truebead) => {
+        (ConvertSource::Truebead(..), To::Truebead) => {
             let what = format!("{}: it is truebead's already", args.input.display());
             return Err(WrongArguments::new(what).into());
         }
-        (Source::Other(import), To::Truebead) => import::text(args, import, &mut notes)?,
+        (ConvertSource::Other(import), To::Truebead) => import::text(args, import, &mut notes)?,
         (source, To::Ros) => {
             let intrinsics = source.intrinsics();
             let own = intrinsics.camera_name.as_deref().unwrap_or("camera");
@@ -37,7 +37,7 @@ pub fn run(args: &ConvertArgs, voice: Voice) -> anyhow::Result<()> {
             opencv::to_yaml(source.intrinsics())
         }
     };
-    write_whole(&args.out, text.as_bytes())?;
+    write_atomic(&args.out, text.as_bytes())?;
     say!("wrote {}", args.out.display());
     if !voice.quiet {
         for note in &notes {
@@ -112,18 +112,18 @@ fn check(args: &ConvertArgs, to: To) -> Result<(), WrongArguments> {
 
 /// What is converted.
 #[expect(clippy::large_enum_variant, reason = "there is one, read once")]
-enum Source {
+enum ConvertSource {
     /// A calibration of ours: what others can hold of it, and what the pictures said.
-    Truebead(Intrinsics, Option<Quality>),
+    Truebead(Intrinsics, Option<CalibrationQuality>),
     /// A file of others.
     Other(Import),
 }
 
-fn read(args: &ConvertArgs) -> anyhow::Result<(Source, Vec<String>)> {
+fn read(args: &ConvertArgs) -> anyhow::Result<(ConvertSource, Vec<String>)> {
     if ends_in(&args.input, YAML) {
-        let import = calibration_file::read_exchanged(&args.input)?;
+        let import = calibration_file::read_yaml(&args.input)?;
         let notes = import.notes.clone();
-        return Ok((Source::Other(import), notes));
+        return Ok((ConvertSource::Other(import), notes));
     }
     let calibration = calibration_file::read(&args.input)?;
     let Calibration::Full { image_size_px, camera, quality, .. } = calibration else {
@@ -131,10 +131,10 @@ fn read(args: &ConvertArgs) -> anyhow::Result<(Source, Vec<String>)> {
     };
     let rms_px = quality.map(|quality| quality.reprojection_rms_px);
     let intrinsics = Intrinsics { image_size_px, camera, rms_px, camera_name: None };
-    Ok((Source::Truebead(intrinsics, quality), Vec::new()))
+    Ok((ConvertSource::Truebead(intrinsics, quality), Vec::new()))
 }
 
-impl Source {
+impl ConvertSource {
     fn intrinsics(&self) -> &Intrinsics {
         match self {
             Self::Truebead(intrinsics, _) => intrinsics,
@@ -144,10 +144,10 @@ impl Source {
 
     /// What a file of this format does not hold, in words; `None` where nothing is lost.
     fn left_out(&self, to: To) -> Option<String> {
-        let is_told = |quality: &Quality| {
-            let Quality {
+        let is_given = |quality: &CalibrationQuality| {
+            let CalibrationQuality {
                 reprojection_rms_px: _,
-                width_sigma_share,
+                width_relative_sigma: width_sigma_share,
                 seen_px,
                 heights_mm,
                 uncertainty,
@@ -161,7 +161,7 @@ impl Source {
         let mut way_back = "";
         if let Self::Truebead(_, quality) = self {
             lost.push("the bed plane and the robot's z");
-            if quality.as_ref().is_some_and(is_told) {
+            if quality.as_ref().is_some_and(is_given) {
                 lost.push("how well a width is known and where boards were seen");
             }
             way_back = "; keep the .toml: on the way back the bed plane needs pictures of a board \

@@ -11,16 +11,16 @@ use crate::calibration::verify::{Findings, verify};
 use crate::cli::arguments::WrongArguments;
 use crate::cli::arguments::parse_length;
 use crate::cli::board_arguments::BoardArgs;
-use crate::cli::board_image::{check_size, look_at};
+use crate::cli::board_image::{check_size, find_board};
 use crate::core::units::Mm;
 use crate::io::calibration_file;
 
 /// Largest error of a width that is borne unless another is given \[%\].
-const MOST_PERCENT: f64 = 0.2;
+const MAX_ERROR_PERCENT: f64 = 0.2;
 /// Standard deviations of what the calibration itself leaves that are borne, too.
-const STANDARD_DEVIATIONS: f64 = 3.0;
+const ACCEPTED_SIGMAS: f64 = 3.0;
 /// A lens leaves so many times what it left when it was calibrated.
-const LENS_CHANGED: f64 = 2.0;
+const MAX_LENS_RATIO: f64 = 2.0;
 /// A lens that leaves less is sound in any case \[px\].
 const LENS_CHANGED_PX: f64 = 0.15;
 /// A board that is further off its place than this is higher, and not the noise
@@ -50,7 +50,7 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "MM", default_value = "0", value_parser = parse_length)]
     board_thickness_mm: Mm,
     /// Largest error of a width that is borne [% of the width]
-    #[arg(long, value_name = "PERCENT", default_value_t = MOST_PERCENT)]
+    #[arg(long, value_name = "PERCENT", default_value_t = MAX_ERROR_PERCENT)]
     max_error_percent: f64,
 }
 
@@ -71,7 +71,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     }
     let calibration = calibration_file::read(&args.calibration)?;
     let name = args.image.display().to_string();
-    let sighting = look_at(&board, &name, &args.image).with_context(|| name.clone())?;
+    let sighting = find_board(&board, &name, &args.image).with_context(|| name.clone())?;
     if let Some(expected) = calibration.image_size_px() {
         check_size(&sighting, expected)?;
     }
@@ -80,11 +80,11 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         .with_context(|| name.clone())?;
     let (rms_px, share) = match &calibration {
         Calibration::Full { quality: Some(quality), .. } => {
-            (Some(quality.reprojection_rms_px), quality.width_sigma_share)
+            (Some(quality.reprojection_rms_px), quality.width_relative_sigma)
         }
         _ => (None, None),
     };
-    let borne = (args.max_error_percent / 100.0).hypot(STANDARD_DEVIATIONS * share.unwrap_or(0.0));
+    let borne = (args.max_error_percent / 100.0).hypot(ACCEPTED_SIGMAS * share.unwrap_or(0.0));
     tell(&found, args, borne, rms_px);
     Ok(if found.holds(borne) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
@@ -108,7 +108,7 @@ fn tell(found: &Findings, args: &VerifyArgs, borne: f64, rms_px: Option<f64>) {
     let before = rms_px.map_or_else(String::new, |px| format!(" ({px:.3} px when calibrated)"));
     say!("reprojection error of the lens alone {:.3} px{before}", found.reprojection_rms_px);
     let how = format!(
-        "{} % are borne, and {STANDARD_DEVIATIONS} standard deviations of what the calibration leaves",
+        "{} % are borne, and {ACCEPTED_SIGMAS} standard deviations of what the calibration leaves",
         args.max_error_percent
     );
     if found.holds(borne) {
@@ -120,7 +120,7 @@ fn tell(found: &Findings, args: &VerifyArgs, borne: f64, rms_px: Option<f64>) {
     }
     say!("DOES NOT HOLD: a width is more than {:.3} % wrong ({how})", 100.0 * borne);
     let has_changed =
-        |px: f64| found.reprojection_rms_px > (LENS_CHANGED * px).max(LENS_CHANGED_PX);
+        |px: f64| found.reprojection_rms_px > (MAX_LENS_RATIO * px).max(LENS_CHANGED_PX);
     if rms_px.is_some_and(has_changed) {
         say!("  the lens is not as it was: focus, zoom or the board's flatness; calibrate anew");
     } else if found.tilt_deg > FLAT_DEG {

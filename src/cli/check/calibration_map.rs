@@ -7,12 +7,12 @@ use nalgebra::Vector2;
 
 use crate::assembly::LoadedCell;
 use crate::calibration::Calibration;
-use crate::calibration::map::{CELLS, Cells};
-use crate::calibration::share_map::{Bead, ShareMap, share_at};
+use crate::calibration::map::{Cells, MAP_CELLS};
+use crate::calibration::share_map::{MapBead, RelativeSigmaMap, relative_sigma_at};
 use crate::core::geometry::{ImagePoint, Roi};
-use crate::io::whole_file::write_whole;
-use crate::report::calibration::cell::CellPage;
-use crate::vision::gauge::Axis;
+use crate::io::whole_file::write_atomic;
+use crate::report::calibration::cell::CellCalibrationPage;
+use crate::vision::gauge::BeadAxis;
 
 /// Cells of the map in text, along the image and across it.
 const TEXT_CELLS: Cells = Cells { columns: 8, rows: 6 };
@@ -26,8 +26,8 @@ pub fn tell(loaded: &LoadedCell, page: Option<&Path>) -> anyhow::Result<()> {
     };
     let surface = loaded.surface(None);
     let bead = bead(loaded);
-    let Some(text) = ShareMap::of(&surface, &bead, TEXT_CELLS) else {
-        if let Some(share) = surface.width_sigma_share() {
+    let Some(text) = RelativeSigmaMap::of(&surface, &bead, TEXT_CELLS) else {
+        if let Some(share) = surface.width_relative_sigma() {
             let percent = 100.0 * share;
             say!("  sigma        the calibration leaves {percent:.3} % of every width open: one");
             say!("               number for the whole image; `calibrate` anew makes a map");
@@ -38,7 +38,7 @@ pub fn tell(loaded: &LoadedCell, page: Option<&Path>) -> anyhow::Result<()> {
         return Ok(());
     };
     let roi = loaded.cell.gauge.roi;
-    let in_gauge = share_at(&surface, &bead, middle(roi));
+    let in_gauge = relative_sigma_at(&surface, &bead, middle(roi));
     say!(
         "  sigma        what the calibration leaves in a width of {:.1} mm [% of it], where its",
         { bead.width_mm }
@@ -55,30 +55,30 @@ pub fn tell(loaded: &LoadedCell, page: Option<&Path>) -> anyhow::Result<()> {
         );
     }
     let Some(path) = page else { return Ok(()) };
-    let Some(map) = ShareMap::of(&surface, &bead, CELLS) else { return Ok(()) };
-    let page = CellPage {
+    let Some(map) = RelativeSigmaMap::of(&surface, &bead, MAP_CELLS) else { return Ok(()) };
+    let page = CellCalibrationPage {
         cell: &loaded.path.display().to_string(),
         calibration: &loaded.calibration_words(),
         map: &map,
         gauge: roi,
         in_gauge,
-        seen_px: quality.and_then(|quality| quality.seen_px),
+        covered_px: quality.and_then(|quality| quality.seen_px),
     };
-    write_whole(path, page.page().as_bytes())?;
+    write_atomic(path, page.page().as_bytes())?;
     say!("  wrote        {}", path.display());
     Ok(())
 }
 
 /// One of a plausible width that runs as the gauge says: the geometric mean of the
 /// narrowest and the widest.
-fn bead(loaded: &LoadedCell) -> Bead {
+fn bead(loaded: &LoadedCell) -> MapBead {
     let gauge = &loaded.cell.gauge;
     let range = gauge.width_range;
     let across = match gauge.axis {
-        Axis::Vertical => Vector2::x(),
-        Axis::Horizontal => Vector2::y(),
+        BeadAxis::Vertical => Vector2::x(),
+        BeadAxis::Horizontal => Vector2::y(),
     };
-    Bead { width_mm: (range.min.get() * range.max.get()).sqrt(), across }
+    MapBead { width_mm: (range.min.get() * range.max.get()).sqrt(), across }
 }
 
 #[expect(clippy::cast_precision_loss, reason = "pixels of an image")]
@@ -88,7 +88,7 @@ fn middle(roi: Roi) -> ImagePoint {
 }
 
 /// The map with the columns and rows of the cells' middles \[px\].
-fn lines(map: &ShareMap, gauge: Roi) -> Vec<String> {
+fn lines(map: &RelativeSigmaMap, gauge: Roi) -> Vec<String> {
     let Cells { columns, rows } = map.counts;
     let middle = |cell: u32| {
         let [left, top, right, bottom] = map.cell_px(cell);

@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 
-use super::log::columns::Columns;
-use super::log::layer::Layer;
-use super::log::source::Source;
+use super::log::columns::ColumnArgs;
+use super::log::layer::LayerArgs;
+use super::log::source::LogSource;
 use crate::identify::grid::usual_step;
-use crate::identify::table::Table;
+use crate::identify::table::DataTable;
 
 /// One line of the list.
-struct Line {
+struct ColumnLine {
     name: String,
     unit: String,
     samples: String,
@@ -31,20 +31,20 @@ pub struct ColumnsArgs {
     #[arg(value_name = "DATA.csv|RECORDING.mcap")]
     data: PathBuf,
     #[command(flatten)]
-    columns: Columns,
+    columns: ColumnArgs,
     #[command(flatten)]
-    layer: Layer,
+    layer: LayerArgs,
 }
 
 /// Runs the command; the list goes to standard output.
 pub fn run(args: &ColumnsArgs) -> Result<()> {
     let ColumnsArgs { data, columns, layer } = args;
-    let (lines, notes) = match Source::read(data, layer)? {
-        Source::Table(table) => (of_table(&table, columns), Vec::new()),
-        Source::Recording(found) => {
+    let (lines, notes) = match LogSource::read(data, layer)? {
+        LogSource::Table(table) => (of_table(&table, columns), Vec::new()),
+        LogSource::Recording(found) => {
             let lines = found.columns.iter().map(|column| {
                 let column = columns.cut_series(column);
-                Line::of(&column.name, columns, &column.values, usual_step(&column.time_s))
+                ColumnLine::of(&column.name, columns, &column.values, usual_step(&column.time_s))
             });
             (lines.collect(), found.notes.clone())
         }
@@ -58,7 +58,7 @@ pub fn run(args: &ColumnsArgs) -> Result<()> {
         "rate",
         "from least to most"
     );
-    for Line { name, unit, samples, rate, range } in lines {
+    for ColumnLine { name, unit, samples, rate, range } in lines {
         say!("{name:<width$}  {unit:<8}{samples:>9}{rate:>12}  {range}");
     }
     for note in notes {
@@ -68,15 +68,15 @@ pub fn run(args: &ColumnsArgs) -> Result<()> {
     Ok(())
 }
 
-fn of_table(table: &Table, columns: &Columns) -> Vec<Line> {
+fn of_table(table: &DataTable, columns: &ColumnArgs) -> Vec<ColumnLine> {
     let time = columns.time(table.names()).ok();
     let step_s = time.as_ref().and_then(|(time, unit_s)| {
         let time = table.column(time).ok()?;
         usual_step(&time).map(|step| step * unit_s)
     });
     let line = |name: &String| match table.column(name) {
-        Ok(values) => Line::of(name, columns, &values, step_s),
-        Err(error) => Line {
+        Ok(values) => ColumnLine::of(name, columns, &values, step_s),
+        Err(error) => ColumnLine {
             name: name.clone(),
             unit: unit(name, columns),
             samples: "–".to_owned(),
@@ -88,12 +88,12 @@ fn of_table(table: &Table, columns: &Columns) -> Vec<Line> {
     table.names().iter().filter(|name| !is_time(name)).map(line).collect()
 }
 
-fn unit(name: &str, columns: &Columns) -> String {
+fn unit(name: &str, columns: &ColumnArgs) -> String {
     columns.quantity(name).map_or_else(|_| "not told".to_owned(), |found| found.unit.to_string())
 }
 
-impl Line {
-    fn of(name: &str, columns: &Columns, values: &[f64], step_s: Option<f64>) -> Self {
+impl ColumnLine {
+    fn of(name: &str, columns: &ColumnArgs, values: &[f64], step_s: Option<f64>) -> Self {
         let start = (f64::INFINITY, f64::NEG_INFINITY);
         let (low, high) = values.iter().fold(start, |(low, high), v| (low.min(*v), high.max(*v)));
         let rate = step_s.filter(|step| *step > 0.0);

@@ -8,15 +8,15 @@ use clap::{Args, Subcommand};
 use crate::cli::arguments::WrongArguments;
 use crate::cli::arguments::refuse_replacing;
 use crate::core::quantity::{Quantity, Unit};
-use crate::identify::excitation::{Excitation, Shape};
-use crate::identify::number::short;
-use crate::identify::profile::{Profile, file};
-use crate::io::whole_file::write_whole;
+use crate::identify::excitation::{Excitation, Waveform};
+use crate::identify::number::six_digits;
+use crate::identify::profile::{CommandProfile, file};
+use crate::io::whole_file::write_atomic;
 
 /// Levels held for less are a slip of the unit \[s\].
 const SHORTEST_S: f64 = 1e-3;
 /// How often a cell tells its extruder something, unless it says otherwise \[s\].
-const USUAL_PERIOD_S: f64 = 0.02;
+const DEFAULT_PERIOD_S: f64 = 0.02;
 
 /// Writes a profile that excites an extruder, so that its model can be found.
 ///
@@ -63,7 +63,7 @@ struct PrbsArgs {
     #[arg(long, value_name = "N")]
     bits: Option<u32>,
     #[command(flatten)]
-    all: All,
+    all: CommonArgs,
 }
 
 /// Levels that are drawn at random, normally distributed
@@ -91,7 +91,7 @@ struct GaussianArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
-    all: All,
+    all: CommonArgs,
 }
 
 fn parse_level(text: &str) -> Result<f64, String> {
@@ -115,11 +115,11 @@ struct StepsArgs {
     )]
     levels: Vec<f64>,
     #[command(flatten)]
-    all: All,
+    all: CommonArgs,
 }
 
 #[derive(Debug, Args)]
-struct All {
+struct CommonArgs {
     /// How long each level is held; the bit time of a sequence [s]
     #[arg(long, alias = "bit-s", value_name = "S", allow_hyphen_values = true)]
     hold_s: f64,
@@ -146,7 +146,7 @@ pub fn run(args: &ExciteArgs) -> Result<()> {
     let (shape, level, all) = match &args.kind {
         Kind::Prbs(prbs) => {
             let bits = prbs.bits.unwrap_or_else(|| bits_for(&prbs.all));
-            let shape = Shape::Prbs { bits, low: prbs.low, high: prbs.high };
+            let shape = Waveform::Prbs { bits, low: prbs.low, high: prbs.high };
             (shape, f64::midpoint(prbs.low, prbs.high), &prbs.all)
         }
         Kind::Gaussian(gaussian) if gaussian.all.duration_s.is_none() => {
@@ -157,11 +157,11 @@ pub fn run(args: &ExciteArgs) -> Result<()> {
             let &GaussianArgs { low, high, seed, .. } = gaussian;
             let mean = gaussian.mean.unwrap_or(f64::midpoint(low, high));
             let sigma = gaussian.sigma.unwrap_or((high - low) / 6.0);
-            (Shape::Gaussian { mean, sigma, low, high, seed }, mean, &gaussian.all)
+            (Waveform::Gaussian { mean, sigma, low, high, seed }, mean, &gaussian.all)
         }
         Kind::Steps(steps) => {
             let first = steps.levels.first().copied().unwrap_or(0.0);
-            (Shape::Stairs(steps.levels.clone()), first, &steps.all)
+            (Waveform::Stairs(steps.levels.clone()), first, &steps.all)
         }
     };
     all.check()?;
@@ -172,13 +172,13 @@ pub fn run(args: &ExciteArgs) -> Result<()> {
         .and_then(|profile| Ok(profile.with_lead(level, all.lead_in_s, all.lead_out_s)?))
         .map_err(WrongArguments::new)?;
     let band = excitation.band_hz().map_err(WrongArguments::new)?;
-    write_whole(&all.out, file::to_csv(&profile, &all.quantity).as_bytes())?;
+    write_atomic(&all.out, file::to_csv(&profile, &all.quantity).as_bytes())?;
     tell(&profile, &all.quantity, &all.out);
-    tell_band(&excitation, band);
+    print_band(&excitation, band);
     Ok(())
 }
 
-impl All {
+impl CommonArgs {
     fn check(&self) -> Result<(), WrongArguments> {
         if Quantity::of_column(&self.quantity, None).is_none() || self.quantity.contains(',') {
             let units: Vec<&str> = Unit::all().map(Unit::word).collect();
@@ -206,7 +206,7 @@ impl All {
     }
 }
 
-impl All {
+impl CommonArgs {
     /// What an extruder lays is not what it is told.
     fn check_commanded(&self) -> Result<(), WrongArguments> {
         match Unit::of_column(&self.quantity) {
@@ -222,24 +222,24 @@ impl All {
 }
 
 /// The shortest sequence that does not repeat itself, from 7 bits on.
-fn bits_for(all: &All) -> u32 {
+fn bits_for(all: &CommonArgs) -> u32 {
     let bits = all.duration_s.unwrap_or(0.0) / all.hold_s;
     (7..16).find(|n| f64::from((1_u32 << n) - 1) >= bits).unwrap_or(16)
 }
 
-fn tell(profile: &Profile, column: &str, out: &Path) {
+fn tell(profile: &CommandProfile, column: &str, out: &Path) {
     let unit = Unit::of_column(column).map_or("", Unit::symbol);
     let (low, high) = profile.range();
     let (count, end_s) = (profile.points().len(), profile.end_s());
     say!("profile    {}: {count} values of {column}, {end_s:.1} s", out.display());
-    say!("values     {} to {} {unit}", short(low), short(high));
+    say!("values     {} to {} {unit}", six_digits(low), six_digits(high));
 }
 
 /// Which frequencies it excites. Stairs excite most what is slowest, and what is
 /// held a few times only has no band of its own.
-fn tell_band(excitation: &Excitation, (low_hz, high_hz): (f64, f64)) {
-    let hold_s = short(excitation.hold_s);
-    if matches!(excitation.shape, Shape::Stairs(_)) || low_hz >= high_hz {
+fn print_band(excitation: &Excitation, (low_hz, high_hz): (f64, f64)) {
+    let hold_s = six_digits(excitation.hold_s);
+    if matches!(excitation.shape, Waveform::Stairs(_)) || low_hz >= high_hz {
         say!(
             "excites    up to {high_hz:.4} Hz, what is slow the most: for an extruder that has come \
              to rest {hold_s} s after a step"
@@ -247,7 +247,7 @@ fn tell_band(excitation: &Excitation, (low_hz, high_hz): (f64, f64)) {
     } else {
         say!("excites    {low_hz:.4} to {high_hz:.4} Hz with half of its power density or more");
     }
-    if excitation.hold_s < USUAL_PERIOD_S {
+    if excitation.hold_s < DEFAULT_PERIOD_S {
         say!(
             "hint       each level holds for {hold_s} s: set io_rate_hz of the cell to {:.0} or more, \
              so that none is left out",

@@ -12,8 +12,8 @@ use anyhow::{Context, Result};
 pub use self::arguments::IdentifyArgs;
 use super::keep;
 use crate::cli::arguments::free_folder;
-use crate::identify::file::{Setting, to_toml};
-use crate::report::identify::{Study, page, study, text, to_json};
+use crate::identify::file::{Conditions, to_toml};
+use crate::report::identify::{ModelStudy, page, study, text, to_json};
 use crate::rows::output::{make_folder, write_whole};
 
 /// Runs the command; the answer goes to standard output.
@@ -24,11 +24,11 @@ pub fn run(args: &IdentifyArgs) -> Result<()> {
     let setting = args.setting.setting()?;
     let folder = args.out.clone().unwrap_or_else(|| free_folder("model"));
     keep::refuse_taken(&folder, keep::MODEL)?;
-    let (logs, doubts) = args.logs()?;
+    let (logs, warnings) = args.logs()?;
     let source = logs.source.clone();
     let forms = args.forms(&logs.estimation);
     let mut found = study(logs, &forms).with_context(|| source)?;
-    found.warnings.splice(0..0, doubts);
+    found.warnings.splice(0..0, warnings);
     say!("{}", text(&found).trim_end());
     let model = write(&found, setting, &folder)?;
     let path = folder.join(keep::MODEL);
@@ -41,7 +41,7 @@ pub fn run(args: &IdentifyArgs) -> Result<()> {
 }
 
 /// Writes all that is told of a model, and returns the text of its own file.
-fn write(found: &Study, setting: Setting, folder: &Path) -> Result<String> {
+fn write(found: &ModelStudy, setting: Conditions, folder: &Path) -> Result<String> {
     make_folder(folder)?;
     let notes = [
         format!("Fitted by truebead {} to {}.", env!("CARGO_PKG_VERSION"), found.logs.source),

@@ -9,8 +9,8 @@ use clap::Args;
 use crate::cli::arguments::WrongArguments;
 use crate::core::quantity::Unit;
 use crate::identify::file::ModelFile;
-use crate::identify::library::{Entry, Library, TOLERANCE_C, Wanted};
-use crate::io::model_file::{Folder, read, read_library};
+use crate::identify::library::{Library, ModelEntry, ModelQuery, TOLERANCE_C};
+use crate::io::model_file::{ModelFolder, read, read_library};
 
 /// Lists a folder of models, or tells which of them a cell would use.
 #[derive(Debug, Args)]
@@ -64,12 +64,12 @@ pub fn parse_unit(word: &str) -> Result<Unit, String> {
 /// Runs the command; the answer goes to standard output.
 pub fn run(args: &ModelsArgs) -> Result<ExitCode> {
     let wanted = args.wanted()?;
-    let Folder { library, broken } = if args.path.is_dir() {
+    let ModelFolder { library, broken } = if args.path.is_dir() {
         read_library(&args.path)?
     } else {
         let name = args.path.display().to_string();
-        let library = Library::new(vec![Entry { name, model: read(&args.path)? }]);
-        Folder { library, broken: Vec::new() }
+        let library = Library::new(vec![ModelEntry { name, model: read(&args.path)? }]);
+        ModelFolder { library, broken: Vec::new() }
     };
     for broken in &broken {
         tell!("{}: {broken}", if wanted.is_some() { "warning: not looked at" } else { "error" });
@@ -82,14 +82,14 @@ pub fn run(args: &ModelsArgs) -> Result<ExitCode> {
     };
     let found = library.find(&wanted)?;
     table(std::slice::from_ref(found.entry));
-    if found.off_c != 0.0 {
-        say!("its temperature is {:+} °C off", found.off_c);
+    if found.temperature_difference_c != 0.0 {
+        say!("its temperature is {:+} °C off", found.temperature_difference_c);
     }
     Ok(ExitCode::SUCCESS)
 }
 
 impl ModelsArgs {
-    fn wanted(&self) -> Result<Option<Wanted>, WrongArguments> {
+    fn wanted(&self) -> Result<Option<ModelQuery>, WrongArguments> {
         let (Some(material), Some(nozzle_mm), Some(temperature_c)) =
             (&self.material, self.nozzle_mm, self.temperature_c)
         else {
@@ -100,7 +100,7 @@ impl ModelsArgs {
                 "expected finite numbers, and a tolerance of 0 or more",
             ));
         }
-        Ok(Some(Wanted {
+        Ok(Some(ModelQuery {
             material: material.clone(),
             nozzle_mm,
             temperature_c,
@@ -111,7 +111,7 @@ impl ModelsArgs {
     }
 }
 
-fn table(entries: &[Entry]) {
+fn table(entries: &[ModelEntry]) {
     if entries.is_empty() {
         say!("no models here; `truebead extruder identify` makes them");
         return;
@@ -143,16 +143,16 @@ fn table(entries: &[Entry]) {
 }
 
 fn row(name: &str, model: &ModelFile) -> [String; 10] {
-    let setting = &model.setting;
-    let told = |value: Option<f64>, unit: &str| {
+    let setting = &model.conditions;
+    let given = |value: Option<f64>, unit: &str| {
         value.map_or_else(|| "-".to_owned(), |value| format!("{value} {unit}"))
     };
     let fit = model.fit.map(|fit| fit.validation_percent.unwrap_or(fit.estimation_percent));
     [
         name.to_owned(),
         setting.material.clone().unwrap_or_else(|| "-".to_owned()),
-        told(setting.nozzle_mm, "mm"),
-        told(setting.temperature_c, "°C"),
+        given(setting.nozzle_mm, "mm"),
+        given(setting.temperature_c, "°C"),
         format!("{} [{}]", model.input.name, model.input.unit),
         format!("{} [{}]", model.output.name, model.output.unit),
         model.kind.clone(),

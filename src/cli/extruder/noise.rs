@@ -6,19 +6,19 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use super::log::columns::Columns;
-use super::log::layer::Layer;
-use super::log::rows::Rows;
-use super::log::source::Source;
+use super::log::columns::ColumnArgs;
+use super::log::layer::LayerArgs;
+use super::log::rows::TableColumns;
+use super::log::source::LogSource;
 use crate::cli::arguments::WrongArguments;
 use crate::core::quantity::Unit;
 use crate::core::units::MPa;
-use crate::extruder::pressure::kalman::Noise;
+use crate::extruder::pressure::kalman::PressureNoise;
 use crate::identify::grid::usual_step;
 
 /// A pressure's own steps from reading to reading over the scatter of the
 /// readings: beyond it, it was hardly at rest.
-const RESTLESS: f64 = 1.0;
+const MAX_DRIFT_RATIO: f64 = 1.0;
 
 /// Finds the noise of a pressure, as keys of [extruder.pressure].
 #[derive(Debug, Args)]
@@ -36,24 +36,24 @@ pub struct NoiseArgs {
     #[arg(long, value_name = "COLUMN")]
     column: String,
     #[command(flatten)]
-    columns: Columns,
+    columns: ColumnArgs,
 }
 
 /// Runs the command; the keys go to standard output.
 pub fn run(args: &NoiseArgs) -> Result<()> {
     let NoiseArgs { data, column, columns } = args;
     let name = data.display().to_string();
-    let (time_s, values) = match Source::read(data, &Layer::default())? {
-        Source::Table(table) => {
+    let (time_s, values) = match LogSource::read(data, &LayerArgs::default())? {
+        LogSource::Table(table) => {
             let (time, unit_s) = columns.time(table.names())?;
-            let rows = Rows { table: &table, name: &name, columns };
+            let rows = TableColumns { table: &table, name: &name, columns };
             let mut time_s: Vec<f64> =
                 rows.column(&time)?.iter().map(|time| time * unit_s).collect();
             let mut values = rows.column(column)?;
             columns.cut(&mut time_s, &mut values.clone(), &mut values);
             (time_s, values)
         }
-        Source::Recording(found) => {
+        LogSource::Recording(found) => {
             let series = found.columns.iter().find(|series| series.name == *column);
             let series = series.ok_or_else(|| {
                 let known: Vec<_> = found.columns.iter().map(|c| c.name.as_str()).collect();
@@ -69,13 +69,13 @@ pub fn run(args: &NoiseArgs) -> Result<()> {
     let to_mpa = in_mpa(column, columns)?;
     let pressures: Vec<MPa> =
         values.iter().filter_map(|value| MPa::new(value * to_mpa).ok()).collect();
-    let noise = Noise::identify(&pressures).with_context(|| format!("{name}: {column}"))?;
+    let noise = PressureNoise::identify(&pressures).with_context(|| format!("{name}: {column}"))?;
     tell(column, &noise, values.len(), usual_step(&time_s));
     Ok(())
 }
 
 /// What a column is multiplied by to be in MPa.
-fn in_mpa(column: &str, columns: &Columns) -> Result<f64, WrongArguments> {
+fn in_mpa(column: &str, columns: &ColumnArgs) -> Result<f64, WrongArguments> {
     match columns.quantity(column)?.unit {
         Unit::MPa => Ok(1.0),
         Unit::KPa => Ok(1e-3),
@@ -86,16 +86,16 @@ fn in_mpa(column: &str, columns: &Columns) -> Result<f64, WrongArguments> {
     }
 }
 
-fn tell(column: &str, noise: &Noise, count: usize, step_s: Option<f64>) {
+fn tell(column: &str, noise: &PressureNoise, count: usize, step_s: Option<f64>) {
     let every = step_s.map_or(String::new(), |step_s| format!(", one every {step_s:.3} s"));
     say!("# {column}: {count} readings{every}");
     say!("sensor_noise_mpa = {:.3e}   # standard deviation of a reading", noise.sigma().get());
     say!(
         "wander_mpa2 = {:.3e}        # variance that the pressure itself gains between two readings; \
          a cell that reads at another io_rate_hz takes it times the ratio of the intervals",
-        noise.wander_mpa2()
+        noise.drift_mpa2()
     );
-    if noise.wander_mpa2() > RESTLESS * noise.reading_mpa2() {
+    if noise.drift_mpa2() > MAX_DRIFT_RATIO * noise.reading_mpa2() {
         tell!(
             "warning: the pressure moves by more than its readings scatter; a noise is told from \
              a command that stands: cut the rest off with --from-s and --to-s"

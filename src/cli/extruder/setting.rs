@@ -3,7 +3,7 @@
 use clap::Args;
 
 use crate::cli::arguments::WrongArguments;
-use crate::identify::file::Setting;
+use crate::identify::file::Conditions;
 
 /// Material, nozzle and temperature.
 #[derive(Debug, Args)]
@@ -21,12 +21,12 @@ pub struct SettingArgs {
 
 impl SettingArgs {
     /// What the model holds for.
-    pub fn setting(&self) -> Result<Setting, WrongArguments> {
-        let told = [
+    pub fn setting(&self) -> Result<Conditions, WrongArguments> {
+        let given = [
             ("--nozzle-mm", self.nozzle_mm, 0.01..=1e3, "0.01 to 1000 mm"),
             ("--temperature-c", self.temperature_c, -100.0..=2000.0, "-100 to 2000 °C"),
         ];
-        for (name, value, range, expected) in told {
+        for (name, value, range, expected) in given {
             if let Some(value) = value.filter(|value| !range.contains(value)) {
                 return Err(WrongArguments::new(format!("{name} {value}: expected {expected}")));
             }
@@ -34,7 +34,7 @@ impl SettingArgs {
         if self.material.as_ref().is_some_and(|name| name.trim().is_empty()) {
             return Err(WrongArguments::new("--material: expected a name"));
         }
-        Ok(Setting {
+        Ok(Conditions {
             material: self.material.clone(),
             nozzle_mm: self.nozzle_mm,
             temperature_c: self.temperature_c,

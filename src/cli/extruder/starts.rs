@@ -6,18 +6,18 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use super::keep;
-use super::log::columns::{Columns, refuse_same};
-use super::log::layer::Layer;
-use super::log::rows::{Rows, at_line, check_told};
-use super::log::source::Source;
+use super::log::columns::{ColumnArgs, refuse_same};
+use super::log::layer::LayerArgs;
+use super::log::rows::{TableColumns, at_line, check_unit_overrides};
+use super::log::source::LogSource;
 use super::setting::SettingArgs;
 use crate::cli::arguments::WrongArguments;
 use crate::cli::arguments::free_folder;
 use crate::core::quantity::{Quantity, Unit};
 use crate::identify::experiment::{Rules, check_time};
-use crate::identify::series::Series;
+use crate::identify::series::TimeSeries;
 use crate::identify::start_stop::file::to_toml;
-use crate::identify::table::Table;
+use crate::identify::table::DataTable;
 use crate::report::identify::starts::{StartLogs, StartStudy, page, study, text};
 use crate::rows::output::{make_folder, write_whole};
 
@@ -44,7 +44,7 @@ pub struct StartsArgs {
     #[arg(long, value_name = "COLUMN")]
     output: String,
     #[command(flatten)]
-    columns: Columns,
+    columns: ColumnArgs,
     #[command(flatten)]
     setting: SettingArgs,
     /// Folder for starts.toml and report.html; one that holds such a file already is
@@ -82,9 +82,9 @@ fn read(args: &StartsArgs) -> Result<StartLogs> {
     let StartsArgs { data, input, output, columns, .. } = args;
     refuse_same(input, output)?;
     let name = data.display().to_string();
-    let table = match Source::read(data, &Layer::default())? {
-        Source::Table(table) => table,
-        Source::Recording(_) => {
+    let table = match LogSource::read(data, &LayerArgs::default())? {
+        LogSource::Table(table) => table,
+        LogSource::Recording(_) => {
             let what = format!(
                 "{name}: expected a table: of a recording only the longest bead with a \
                  running pump is looked at, and there is no stop in it"
@@ -92,13 +92,14 @@ fn read(args: &StartsArgs) -> Result<StartLogs> {
             return Err(WrongArguments::new(what).into());
         }
     };
-    check_told(columns, table.names(), &name)?;
-    let (told, came) = (columns.quantity(input)?, columns.quantity(output)?);
-    let to_mm3_per_s = in_mm3_per_s(output, &came)?;
-    let rows = Rows { table: &table, name: &name, columns };
+    check_unit_overrides(columns, table.names(), &name)?;
+    let input_units = columns.quantity(input)?;
+    let output_units = columns.quantity(output)?;
+    let to_mm3_per_s = in_mm3_per_s(output, &output_units)?;
+    let rows = TableColumns { table: &table, name: &name, columns };
     let [command, mut flow] = series(args, &rows, [input, output])?;
     flow.values.iter_mut().for_each(|value| *value *= to_mm3_per_s);
-    Ok(StartLogs { source: name.clone(), input: told, output: came, command, flow })
+    Ok(StartLogs { source: name.clone(), input: input_units, output: output_units, command, flow })
 }
 
 /// What a flow is multiplied by to be in mm³/s.
@@ -119,16 +120,17 @@ fn in_mm3_per_s(column: &str, quantity: &Quantity) -> Result<f64, WrongArguments
 }
 
 /// Two columns of a table at their moments.
-fn series(args: &StartsArgs, rows: &Rows<'_>, names: [&str; 2]) -> Result<[Series; 2]> {
-    let (columns, table): (_, &Table) = (&args.columns, rows.table);
+fn series(args: &StartsArgs, rows: &TableColumns<'_>, names: [&str; 2]) -> Result<[TimeSeries; 2]> {
+    let (columns, table): (_, &DataTable) = (&args.columns, rows.table);
     let (time, unit_s) = columns.time(table.names())?;
     let mut time_s: Vec<f64> = rows.column(&time)?.iter().map(|at| at * unit_s).collect();
     let [input, output] = names;
     let (mut command, mut flow) = (rows.column(input)?, rows.column(output)?);
     let first = columns.cut(&mut time_s, &mut command, &mut flow);
-    let rules = Rules { max_gap_s: None, time_is_told: columns.told(&time).is_some() };
+    let rules =
+        Rules { max_gap_s: None, is_time_unit_known: columns.unit_override(&time).is_some() };
     check_time(&time_s, &rules).map_err(|error| at_line(table, first, rows.name, error))?;
-    let made = |name: &str, is_held, values| Series {
+    let made = |name: &str, is_held, values| TimeSeries {
         name: name.to_owned(),
         time_s: time_s.clone(),
         values,

@@ -13,26 +13,26 @@ use rayon::prelude::*;
 
 pub use self::arguments::AccuracyArgs;
 use crate::cli::arguments::WrongArguments;
-use crate::cli::print::Voice;
+use crate::cli::print::Verbosity;
 use crate::io::progress::Progress;
 use crate::rows::output;
 use crate::studies::accuracy::calibration_table;
-use crate::studies::accuracy::calibration_table::RigFigures;
+use crate::studies::accuracy::calibration_table::CalibrationFigures;
 use crate::studies::accuracy::calibrations;
-use crate::studies::accuracy::calibrations::{Bench, Rig, Source};
+use crate::studies::accuracy::calibrations::{CalibrationBench, CalibrationCase, CornerSource};
 use crate::studies::accuracy::sets;
 use crate::studies::accuracy::sets::Set;
-use crate::studies::accuracy::studio::Studio;
-use crate::studies::accuracy::{Outcome, SetFigures, markdown, table};
+use crate::studies::accuracy::studio::SetStudio;
+use crate::studies::accuracy::{SetFigures, WidthError, markdown, table};
 use crate::vision::Measurer;
 
 /// Frames of a set where nothing else is said.
 const FRAMES: u64 = 3_000;
 /// Frames that one measurer measures after each other, as in a cell.
-const RUN: u64 = 250;
+const FRAMES_PER_MEASURER: u64 = 250;
 
 /// Runs the command.
-pub fn run(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
+pub fn run(args: &AccuracyArgs, voice: Verbosity) -> Result<ExitCode> {
     if args.calibration {
         return judge_calibrations(args, voice);
     }
@@ -64,19 +64,19 @@ pub fn run(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
     Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-fn judge_calibrations(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
+fn judge_calibrations(args: &AccuracyArgs, voice: Verbosity) -> Result<ExitCode> {
     let rigs =
-        chosen(&args.sets, calibrations::rigs().context("the rigs' boards")?, |rig| rig.name)?;
+        chosen(&args.sets, calibrations::cases().context("the rigs' boards")?, |rig| rig.name)?;
     if let Some(out) = &args.out {
         output::make_folder(out)?;
     }
-    let corners = rigs.iter().map(|rig| (rig, Source::Corners, args.trials));
+    let corners = rigs.iter().map(|rig| (rig, CornerSource::Corners, args.trials));
     let rendered = rigs.iter().filter(|rig| rig.rendered);
-    let pictures = rendered.map(|rig| (rig, Source::Pictures, args.rendered_trials));
+    let pictures = rendered.map(|rig| (rig, CornerSource::Images, args.rendered_trials));
     let all: Vec<_> = corners.chain(pictures).filter(|(.., trials)| *trials > 0).collect();
     let total = all.iter().map(|(.., trials)| trials).sum();
     let progress = Mutex::new(Progress::new("calibrating", "trials", Some(total), voice.quiet));
-    let figures: Vec<RigFigures> = all
+    let figures: Vec<CalibrationFigures> = all
         .into_iter()
         .map(|(rig, source, trials)| judge_rig(rig, source, trials, &progress))
         .collect();
@@ -95,8 +95,13 @@ fn judge_calibrations(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
     Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-fn judge_rig(rig: &Rig, source: Source, trials: u64, progress: &Mutex<Progress>) -> RigFigures {
-    let bench = Bench::new(rig.clone(), source);
+fn judge_rig(
+    rig: &CalibrationCase,
+    source: CornerSource,
+    trials: u64,
+    progress: &Mutex<Progress>,
+) -> CalibrationFigures {
+    let bench = CalibrationBench::new(rig.clone(), source);
     let outcomes: Vec<_> = (0..trials)
         .into_par_iter()
         .map(|trial| {
@@ -105,7 +110,7 @@ fn judge_rig(rig: &Rig, source: Source, trials: u64, progress: &Mutex<Progress>)
             outcomes
         })
         .collect();
-    RigFigures::of(rig, source, &outcomes)
+    CalibrationFigures::of(rig, source, &outcomes)
 }
 
 /// Those that were named, or all.
@@ -122,12 +127,12 @@ fn chosen<T>(names: &[String], all: Vec<T>, name_of: impl Fn(&T) -> &str) -> Res
 /// Renders and measures the frames of a set. Which measurer measures which
 /// frames does not depend on the machine.
 fn judge(set: &Set, frames: u64, progress: &Mutex<Progress>) -> Result<SetFigures> {
-    let studio = Studio::new(set)?;
-    let runs: Result<Vec<Vec<Option<Outcome>>>> = (0..frames.div_ceil(RUN))
+    let studio = SetStudio::new(set)?;
+    let runs: Result<Vec<Vec<Option<WidthError>>>> = (0..frames.div_ceil(FRAMES_PER_MEASURER))
         .into_par_iter()
         .map(|run| {
             let mut measurer = Measurer::new(studio.gauge(), None);
-            (run * RUN..frames.min((run + 1) * RUN))
+            (run * FRAMES_PER_MEASURER..frames.min((run + 1) * FRAMES_PER_MEASURER))
                 .map(|frame| {
                     let outcome = measure(&studio, &mut measurer, frame);
                     progress.lock().unwrap_or_else(PoisonError::into_inner).advance();
@@ -140,11 +145,11 @@ fn judge(set: &Set, frames: u64, progress: &Mutex<Progress>) -> Result<SetFigure
 }
 
 /// `None` for a frame that is refused.
-fn measure(studio: &Studio, measurer: &mut Measurer, frame: u64) -> Result<Option<Outcome>> {
+fn measure(studio: &SetStudio, measurer: &mut Measurer, frame: u64) -> Result<Option<WidthError>> {
     let rendered = studio.take(frame)?;
     let truth = rendered.truth.context("a bead that runs through its gauge has a truth")?;
     let found = measurer.measure(&rendered.frame, studio.surface()).ok();
-    Ok(found.map(|found| Outcome {
+    Ok(found.map(|found| WidthError {
         error_mm: found.width.get() - truth.width_mm,
         sigma_mm: found.sigma.get(),
     }))

@@ -14,10 +14,10 @@ use crate::assembly::LoadedCell;
 use crate::cell::Cell;
 use crate::cell::file::{CalibrationSource, Purpose};
 use crate::cli::arguments::WrongArguments;
-use crate::cli::print::Voice;
+use crate::cli::print::Verbosity;
 use crate::core::frame::Frame;
 use crate::io::progress::Progress;
-use crate::sim::frame_series::Series;
+use crate::sim::frame_series::FrameSeries;
 use crate::sim::truth::Truth;
 
 /// Renders frames of a simulated bead, with the truth of each.
@@ -42,10 +42,10 @@ pub struct RenderArgs {
 }
 
 /// Renders a scenario into a folder, which appears when it is whole.
-pub fn run(args: &RenderArgs, voice: Voice) -> Result<()> {
+pub fn run(args: &RenderArgs, voice: Verbosity) -> Result<()> {
     let LoadedCell { cell, calibration, text, .. } =
         LoadedCell::read(&args.scenario, Purpose::Measure)?;
-    let series = Series::new(&cell, calibration)
+    let series = FrameSeries::new(&cell, calibration)
         .map_err(|error| WrongArguments::new(format!("{}: {error}", args.scenario.display())))?;
     refuse_files_in(&args.out)?;
     let frames = args.frames.map_or(series.frames(), |most| most.min(series.frames()));
@@ -94,10 +94,10 @@ fn refuse_files_in(out: &Path) -> Result<()> {
 
 /// Renders and writes all frames, and returns what is true of each.
 fn write_frames(
-    series: &Series,
+    series: &FrameSeries,
     frames: u64,
     folder: &Path,
-    voice: Voice,
+    voice: Verbosity,
 ) -> Result<Vec<Option<Truth>>> {
     let progress = Mutex::new(Progress::new("rendering", "frames", Some(frames), voice.quiet));
     let truths = (0..frames)
@@ -128,7 +128,7 @@ fn write_png(frame: &Frame, path: &Path) -> Result<()> {
     Ok(())
 }
 
-fn write_tables(series: &Series, truths: &[Option<Truth>], folder: &Path) -> Result<()> {
+fn write_tables(series: &FrameSeries, truths: &[Option<Truth>], folder: &Path) -> Result<()> {
     let mut times = csv::Writer::from_path(folder.join("times.csv"))?;
     let mut table = csv::Writer::from_path(folder.join("truth.csv"))?;
     times.write_record(["frame", "time_s"])?;

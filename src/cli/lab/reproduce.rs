@@ -7,13 +7,13 @@ use anyhow::Context;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
-use crate::cli::print::Voice;
+use crate::cli::print::Verbosity;
 use crate::io::progress::Progress;
 use crate::rows::output;
-use crate::studies::reproduce::summary::Summary;
+use crate::studies::reproduce::summary::PaperSummary;
 use crate::studies::reproduce::{page, table};
-use crate::studies::row::Row;
-use crate::studies::source::Source;
+use crate::studies::row::TableRow;
+use crate::studies::source::Publication;
 use crate::studies::study::{Effort, Reproduced};
 
 /// Runs the experiments of a source paper beside its published numbers.
@@ -28,7 +28,7 @@ Ours: what this program's best method gives on the same plant.")]
 pub struct ReproduceArgs {
     /// The paper; all of them where none is named
     #[arg(value_enum)]
-    source: Option<Source>,
+    source: Option<Publication>,
     /// Folder for the results
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -40,7 +40,7 @@ pub struct ReproduceArgs {
     frame_seeds: Option<u64>,
 }
 
-impl ValueEnum for Source {
+impl ValueEnum for Publication {
     fn value_variants<'a>() -> &'a [Self] {
         &Self::ALL
     }
@@ -51,9 +51,10 @@ impl ValueEnum for Source {
 }
 
 /// Runs the command.
-pub fn run(args: &ReproduceArgs, voice: Voice) -> anyhow::Result<ExitCode> {
+pub fn run(args: &ReproduceArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     output::make_folder(&args.out)?;
-    let sources: &[Source] = args.source.as_ref().map_or(&Source::ALL, std::slice::from_ref);
+    let sources: &[Publication] =
+        args.source.as_ref().map_or(&Publication::ALL, std::slice::from_ref);
     let effort = Effort { seeds: args.seeds, frame_seeds: args.frame_seeds };
     let total = sources.iter().map(|source| source.experiments()).sum();
     let mut progress = Progress::new("reproducing", "experiments", Some(total), voice.quiet);
@@ -61,12 +62,12 @@ pub fn run(args: &ReproduceArgs, voice: Voice) -> anyhow::Result<ExitCode> {
         sources.iter().map(|source| source.run(effort, &mut progress)).collect();
     let done = done?;
     progress.finish();
-    let rows: Vec<&Row> = done.iter().flat_map(|source| &source.rows).collect();
+    let rows: Vec<&TableRow> = done.iter().flat_map(|source| &source.rows).collect();
     let json = serde_json::to_vec_pretty(&rows).context("reproduce.json")?;
     output::write_whole(&args.out, "reproduce.json", &json)?;
     output::write_whole(&args.out, "report.html", page(&done).as_bytes())?;
     for source in &done {
-        let (rows, met) = (table::plain(&source.rows), Summary::of(&source.rows).text());
+        let (rows, met) = (table::plain(&source.rows), PaperSummary::of(&source.rows).text());
         say!("{}\n\n{rows}\n{met}\n{}\n", source.title, source.about);
     }
     say!("{}", args.out.join("report.html").display());

@@ -43,7 +43,7 @@ pub struct PlanArgs {
     /// How well that length is known: its standard deviation as a share of it; the more, the
     /// less the plan makes use of it
     #[arg(long, value_name = "SHARE", default_value_t = 0.3, allow_negative_numbers = true)]
-    pub nozzle_doubt: f64,
+    pub nozzle_sigma: f64,
     /// Slowest speed that is planned, and to which a corner of G-code is slowed [mm/s]
     #[arg(long, value_name = "V", default_value_t = 2.0, allow_negative_numbers = true)]
     pub apex_mm_per_s: f64,
@@ -54,27 +54,27 @@ pub struct PlanArgs {
     /// How beads of G-code begin and end: at rest, or moving, for a cell that starts and
     /// stops them itself [default: rest]
     #[arg(long, value_name = "rest|moving", hide_possible_values = true)]
-    pub ends: Option<Ends>,
+    pub ends: Option<BeadEndsArgument>,
     /// Flow that no model tells: its standard deviation as a share of that of the flow's
     /// change; the more, the less the flow is changed
     #[arg(long, value_name = "SHARE", default_value_t = 0.17, allow_negative_numbers = true)]
-    pub unmodelled_share: f64,
+    pub unmodelled_fraction: f64,
 }
 
 /// How beads begin and end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Ends {
+pub enum BeadEndsArgument {
     /// At rest, robot and extruder
     Rest,
     /// At the feed; for a cell, which starts and stops its beads itself
     Moving,
 }
 
-impl From<Ends> for gcode::Ends {
-    fn from(ends: Ends) -> Self {
+impl From<BeadEndsArgument> for gcode::BeadEnds {
+    fn from(ends: BeadEndsArgument) -> Self {
         match ends {
-            Ends::Rest => Self::Rest,
-            Ends::Moving => Self::Moving,
+            BeadEndsArgument::Rest => Self::Rest,
+            BeadEndsArgument::Moving => Self::Moving,
         }
     }
 }
@@ -88,9 +88,9 @@ impl PlanArgs {
             ("--budget-s", Some(self.budget_s), least as fn(f64) -> bool, "0 or more seconds"),
             ("--nozzle-mm", self.nozzle_mm, above, "a length above 0"),
             ("--apex-mm-per-s", Some(self.apex_mm_per_s), above, "a speed above 0"),
-            ("--nozzle-doubt", Some(self.nozzle_doubt), least, "a share of 0 or more"),
+            ("--nozzle-doubt", Some(self.nozzle_sigma), least, "a share of 0 or more"),
             ("--corner-mm", self.corner_mm, least, "a length of 0 or more"),
-            ("--unmodelled-share", Some(self.unmodelled_share), least, "a share of 0 or more"),
+            ("--unmodelled-share", Some(self.unmodelled_fraction), least, "a share of 0 or more"),
         ];
         for (name, value, sound, expected) in numbers {
             if let Some(value) = value.filter(|value| !sound(*value)) {

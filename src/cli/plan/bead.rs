@@ -7,7 +7,7 @@ use crate::plan::SpeedProfile;
 
 /// A bead before it is planned.
 #[derive(Debug)]
-pub struct Bead {
+pub struct JobBead {
     /// What it is called.
     pub name: String,
     /// Its nominal speed.
@@ -17,6 +17,6 @@ pub struct Bead {
 }
 
 /// What is wrong with a job, with its file's name.
-pub fn wrong(job: &Path, what: &impl ToString) -> WrongArguments {
+pub fn wrong_job(job: &Path, what: &impl ToString) -> WrongArguments {
     WrongArguments::new(format!("job {}: {}", job.display(), what.to_string()))
 }

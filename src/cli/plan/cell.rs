@@ -1,7 +1,7 @@
 //! What a plan takes from its cell.
 
 use super::arguments::PlanArgs;
-use super::bead::{Bead, wrong};
+use super::bead::{JobBead, wrong_job};
 use crate::assembly::extruder::Behaviour;
 use crate::assembly::{LoadedCell, extruder};
 use crate::cell::extruder::Strategy;
@@ -14,7 +14,7 @@ use crate::identify::file as model;
 use crate::io::record::ExtruderFile;
 use crate::numeric::lti::TransferFunction;
 use crate::plan;
-use crate::report::planned::Facts;
+use crate::report::planned::PlanFacts;
 
 /// How long the flow that no model tells hangs together \[s\], as in the bead
 /// characterisation thesis.
@@ -40,7 +40,7 @@ struct Identified {
 
 /// The cell as a plan sees it.
 #[derive(Debug)]
-pub struct Extruder {
+pub struct PlannedExtruder {
     /// What messages call the cell.
     name: String,
     /// From the command, counted from [`Facts::idle`], to mm³/s.
@@ -48,7 +48,7 @@ pub struct Extruder {
     /// Limits of such a command, of which none lets the flow run backwards.
     drive: CommandLimits,
     /// Limits of the command itself.
-    told: CommandLimits,
+    command_limits: CommandLimits,
     /// What the model was identified with, where it was.
     identified: Option<Identified>,
     /// Largest speed \[mm/s\].
@@ -58,10 +58,10 @@ pub struct Extruder {
     /// Length over which the nozzle averages what it lays \[mm\].
     pub nozzle_mm: f64,
     /// The bead and the command's unit.
-    pub facts: Facts,
+    pub facts: PlanFacts,
 }
 
-impl Extruder {
+impl PlannedExtruder {
     /// Reads the cell, its model and its limits.
     pub fn read(args: &PlanArgs) -> anyhow::Result<Self> {
         let loaded = LoadedCell::read(&args.cell, Purpose::Run)?;
@@ -94,28 +94,28 @@ impl Extruder {
         (name, identified): (String, Option<Identified>),
         behaviour: Behaviour,
     ) -> anyhow::Result<Self> {
-        let Behaviour { transfer, about } = behaviour;
+        let Behaviour { transfer, operating_point: about } = behaviour;
         if !run.control.target.is_constant() {
             let what = format!("{name}: found a target that changes, expected one target_width_mm");
             return Err(WrongArguments::new(what).into());
         }
         let target = run.control.target.nominal();
         let area = section(target, part.extruder.layer_height).map_err(WrongArguments::new)?;
-        let told = part.extruder.limits;
+        let limits = part.extruder.limits;
         let idle = about.command - about.flow_mm3_per_s / transfer.dc_gain();
-        let (min, max) = told.about(idle).range();
-        let drive = CommandLimits::new(min.max(0.0), max, told.rate_per_s())
+        let (min, max) = limits.about(idle).range();
+        let drive = CommandLimits::new(min.max(0.0), max, limits.rate_per_s())
             .map_err(|error| WrongArguments::new(format!("{name}: [extruder]: {error}")))?;
         Ok(Self {
             name,
             transfer,
             drive,
-            told,
+            command_limits: limits,
             identified,
             fastest_mm_per_s: run.limits.max_speed.get(),
             accel_mm_per_s2: run.limits.max_accel.get(),
             nozzle_mm: args.nozzle_mm.unwrap_or(target.get()),
-            facts: Facts {
+            facts: PlanFacts {
                 width_mm: target.get(),
                 area_mm2: area.get(),
                 idle,
@@ -125,20 +125,20 @@ impl Extruder {
     }
 
     /// What is planned for.
-    pub fn task(&self, args: &PlanArgs) -> plan::Task<'_> {
-        let robot = plan::RobotLimits {
+    pub fn task(&self, args: &PlanArgs) -> plan::PlanTask<'_> {
+        let robot = plan::RobotMotionLimits {
             accel_mm_per_s2: self.accel_mm_per_s2,
             slowest_mm_per_s: args.apex_mm_per_s,
         };
-        plan::Task {
-            limits: plan::Limits { robot, drive: self.drive, budget_s: args.budget_s },
-            bead: plan::Bead {
+        plan::PlanTask {
+            limits: plan::PlanLimits { robot, drive: self.drive, budget_s: args.budget_s },
+            bead: plan::BeadGeometry {
                 area_mm2: self.facts.area_mm2,
                 nozzle_mm: self.nozzle_mm,
-                nozzle_doubt: args.nozzle_doubt,
+                nozzle_sigma: args.nozzle_sigma,
             },
-            unmodelled: plan::Unmodelled {
-                share: args.unmodelled_share,
+            unmodelled: plan::FlowUncertainty {
+                ratio: args.unmodelled_fraction,
                 correlation_s: CORRELATION_S,
             },
             extruder: &self.transfer,
@@ -148,7 +148,7 @@ impl Extruder {
     /// Refuses speeds that robot or extruder cannot have.
     pub fn check_speeds(
         &self,
-        beads: &[Bead],
+        beads: &[JobBead],
         job: &std::path::Path,
     ) -> Result<(), WrongArguments> {
         let squares = || beads.iter().flat_map(|bead| bead.nominal.squares().iter().copied());
@@ -158,14 +158,14 @@ impl Extruder {
                 "found {fastest:.3} mm/s, expected at most {} mm/s, max_speed_mm_per_s of {}",
                 self.fastest_mm_per_s, self.name
             );
-            return Err(wrong(job, &what));
+            return Err(wrong_job(job, &what));
         }
         let first = beads.iter().filter_map(|bead| bead.nominal.squares().first().copied());
         let slowest = first.fold(f64::INFINITY, f64::min).sqrt();
         for speed in [fastest, slowest] {
             let flow = speed * self.facts.area_mm2;
             let command = flow / self.transfer.dc_gain() + self.facts.idle;
-            let (min, max) = self.told.range();
+            let (min, max) = self.command_limits.range();
             if command < min || command > max {
                 let unit = self.facts.unit;
                 let what = format!(
@@ -173,7 +173,7 @@ impl Extruder {
                      [extruder] of {} allows {min} to {max} {unit}; change the job's speed there",
                     self.name
                 );
-                return Err(wrong(job, &what));
+                return Err(wrong_job(job, &what));
             }
         }
         Ok(())

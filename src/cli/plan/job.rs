@@ -2,9 +2,9 @@
 
 use std::fs;
 
-use super::arguments::{Ends, PlanArgs};
-use super::bead::{Bead, wrong};
-use super::cell::Extruder;
+use super::arguments::{BeadEndsArgument, PlanArgs};
+use super::bead::{JobBead, wrong_job};
+use super::cell::PlannedExtruder;
 use crate::cli::arguments::WrongArguments;
 use crate::plan::{gcode, job};
 
@@ -12,15 +12,15 @@ use crate::plan::{gcode, job};
 const GCODE: [&str; 3] = ["gcode", "nc", "g"];
 
 /// Reads a job by its ending.
-pub fn read(args: &PlanArgs, extruder: &Extruder) -> Result<Vec<Bead>, WrongArguments> {
+pub fn read(args: &PlanArgs, extruder: &PlannedExtruder) -> Result<Vec<JobBead>, WrongArguments> {
     let path = &args.job;
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let is_gcode = GCODE.contains(&ending.as_str());
     if !is_gcode && ending != "csv" {
         let expected = format!("expected one that ends with .csv, .{}", GCODE.join(", ."));
-        return Err(wrong(path, &expected));
+        return Err(wrong_job(path, &expected));
     }
-    let text = fs::read_to_string(path).map_err(|error| wrong(path, &error))?;
+    let text = fs::read_to_string(path).map_err(|error| wrong_job(path, &error))?;
     if is_gcode {
         return of_gcode(args, extruder, &text);
     }
@@ -29,29 +29,37 @@ pub fn read(args: &PlanArgs, extruder: &Extruder) -> Result<Vec<Bead>, WrongArgu
     {
         if is_given {
             let what = format!("{name} is for G-code; a table tells its speed at every place");
-            return Err(wrong(path, &what));
+            return Err(wrong_job(path, &what));
         }
     }
-    let job = job::read(&text).map_err(|error| wrong(path, &error))?;
-    Ok(vec![Bead { name: "Along the bead".to_owned(), nominal: job.speed, position: job.position }])
+    let job = job::read(&text).map_err(|error| wrong_job(path, &error))?;
+    Ok(vec![JobBead {
+        name: "Along the bead".to_owned(),
+        nominal: job.speed,
+        position: job.position,
+    }])
 }
 
-fn of_gcode(args: &PlanArgs, extruder: &Extruder, text: &str) -> Result<Vec<Bead>, WrongArguments> {
-    let settings = gcode::Settings {
+fn of_gcode(
+    args: &PlanArgs,
+    extruder: &PlannedExtruder,
+    text: &str,
+) -> Result<Vec<JobBead>, WrongArguments> {
+    let settings = gcode::GcodeSettings {
         start_mm: [0.0; 3],
         fastest_mm_per_s: extruder.fastest_mm_per_s,
         accel_mm_per_s2: extruder.accel_mm_per_s2,
         corner_mm: args.corner_mm.unwrap_or(0.0),
         apex_mm_per_s: args.apex_mm_per_s,
-        ends: args.ends.unwrap_or(Ends::Rest).into(),
+        ends: args.ends.unwrap_or(BeadEndsArgument::Rest).into(),
     };
-    let stretches = gcode::read(text, &settings).map_err(|error| wrong(&args.job, &error))?;
-    let bead = |stretch: gcode::Stretch| {
+    let stretches = gcode::read(text, &settings).map_err(|error| wrong_job(&args.job, &error))?;
+    let bead = |stretch: gcode::GcodeBead| {
         let name = format!("Along the bead from line {} on", stretch.line);
         let nominal = stretch
             .nominal(extruder.accel_mm_per_s2)
-            .map_err(|error| wrong(&args.job, &format!("line {}: {error}", stretch.line)))?;
-        Ok(Bead { name, nominal, position: stretch.position })
+            .map_err(|error| wrong_job(&args.job, &format!("line {}: {error}", stretch.line)))?;
+        Ok(JobBead { name, nominal, position: stretch.position })
     };
     stretches.into_iter().map(bead).collect()
 }

@@ -11,8 +11,8 @@ use crate::cli::arguments::WrongArguments;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS, MmPerS2, NotFinite};
 use crate::io::clock::RunClock;
-use crate::link::{Job, RobotParams};
-use crate::simulators::robot::{RobotSim, SimError, SimOptions};
+use crate::link::{PrintJob, RobotParams};
+use crate::simulators::robot::{RobotOptions, RobotSim, RobotSimError};
 
 /// A robot that answers the robot link.
 #[derive(Debug, Args)]
@@ -92,7 +92,7 @@ pub fn run(args: &RobotSimArgs) -> anyhow::Result<()> {
     let mut signals = Signals::new([SIGINT, SIGTERM]).context("cannot wait for signals")?;
     let sim = match RobotSim::spawn(listener, RunClock::start(), options(args), Box::new(print)) {
         Ok(sim) => sim,
-        Err(SimError::Params(error)) => return Err(WrongArguments::new(error).into()),
+        Err(RobotSimError::Params(error)) => return Err(WrongArguments::new(error).into()),
         Err(error) => return Err(error.into()),
     };
     tell!("robot `{}` listens on {}; Ctrl-C ends it", args.name, sim.local_addr());
@@ -102,7 +102,7 @@ pub fn run(args: &RobotSimArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn options(args: &RobotSimArgs) -> SimOptions {
+fn options(args: &RobotSimArgs) -> RobotOptions {
     let params = RobotParams {
         name: args.name.clone(),
         min: args.min,
@@ -115,8 +115,8 @@ fn options(args: &RobotSimArgs) -> SimOptions {
         ..RobotParams::default()
     };
     let layers = if args.endless { 1 } else { args.layers };
-    let job = Job::new(layers, args.layer_height_mm, params.z, args.pause_s);
-    SimOptions { params, job, state_period: Span::from_millis(i64::from(args.state_ms)) }
+    let job = PrintJob::new(layers, args.layer_height_mm, params.z, args.pause_s);
+    RobotOptions { params, job, state_period: Span::from_millis(i64::from(args.state_ms)) }
 }
 
 fn print(at: Stamp, text: &str) {

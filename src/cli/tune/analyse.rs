@@ -8,15 +8,15 @@ use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::cli::arguments::WrongArguments;
 use crate::cli::camera_offset::gauge;
-use crate::cli::recorded::attached;
+use crate::cli::recorded::attached_cell;
 use crate::core::units::Mm;
-use crate::io::recording::{Entry, Recording};
+use crate::io::recording::{RecordedEntry, Recording};
 use crate::report::tuned::Tuned;
-use crate::tune::{Facts, Log, Plant};
+use crate::tune::{IdentifiedCell, Log, TuneFacts};
 
 /// How far beyond the limits, as a factor, the target's speed may lie for anything to be
 /// foretold.
-const FAR: f64 = 3.0;
+const MAX_SPEED_BEYOND_LIMITS: f64 = 3.0;
 
 /// Reads a recording and looks at it with the eyes of a cell.
 pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<Tuned> {
@@ -27,12 +27,12 @@ pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<T
         tell!("warning: {name}: {what}");
     }
     // The gauge is that of the run, whatever the cell has become since.
-    let (cell, calibration) = attached(&recording, Purpose::Run)
+    let (cell, calibration) = attached_cell(&recording, Purpose::Run)
         .unwrap_or_else(|_| (loaded.cell.clone(), loaded.calibration.clone()));
     let gauge = gauge(&cell, &calibration, &log.states)?;
     let run = loaded.cell.run.as_ref().context("the cell was not read for a run")?;
-    let facts = Facts { gauge, farthest, start_speed: run.robot.start_speed };
-    let plant = Plant::of(&log, &facts).with_context(|| {
+    let facts = TuneFacts { gauge, max_offset: farthest, start_speed: run.robot.start_speed };
+    let plant = IdentifiedCell::of(&log, &facts).with_context(|| {
         if log.states.is_empty() {
             return format!("{name}: no robot was heard, and no bead was laid");
         }
@@ -50,7 +50,7 @@ pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<T
     let target = run.control.target.nominal();
     let speed = plant.speed_for(target.get());
     let (min, max) = (run.limits.min_speed.get(), run.limits.max_speed.get());
-    if !(min / FAR..=max * FAR).contains(&speed) {
+    if !(min / MAX_SPEED_BEYOND_LIMITS..=max * MAX_SPEED_BEYOND_LIMITS).contains(&speed) {
         anyhow::bail!(
             "{name}: its bead would be {target} wide at {speed:.1} mm/s, far from the {min} to {max} \
              mm/s of [limits] in {}: give the cell that was recorded, or a target near its bead",
@@ -64,9 +64,9 @@ fn log(recording: &mut Recording) -> anyhow::Result<Log> {
     let mut log = Log::default();
     for entry in recording {
         match entry? {
-            Entry::Event { now, event, .. } => log.event(now, &event),
-            Entry::Step { now, step, .. } => log.step(now, &step),
-            Entry::Frame(_) => {}
+            RecordedEntry::Event { now, event, .. } => log.event(now, &event),
+            RecordedEntry::Step { now, step, .. } => log.step(now, &step),
+            RecordedEntry::Frame(_) => {}
         }
     }
     log.finish();

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use crate::cli::arguments::parse_length;
 use crate::core::units::Mm;
-use crate::width_control::strategy::steps::STEP_SHARES;
+use crate::width_control::strategy::steps::STEP_FRACTIONS;
 
 /// Finds what a cell is like from steps of its speed, and proposes settings.
 #[derive(Debug, Args)]
@@ -41,8 +41,8 @@ pub struct TuneArgs {
     pub out: PathBuf,
     /// Change of the speed, as a share of the start speed
     /// [default: 0.1, or that of a cell whose law is steps]
-    #[arg(long, value_name = "S", value_parser = parse_share, conflicts_with = "recording")]
-    pub step_share: Option<f64>,
+    #[arg(long, value_name = "S", value_parser = parse_fraction, conflicts_with = "recording")]
+    pub step_fraction: Option<f64>,
     /// Lay the cell's simulated bead; nothing real moves
     #[arg(long, conflicts_with = "recording")]
     pub simulated: bool,
@@ -64,21 +64,21 @@ pub struct TuneArgs {
         requires = "write",
         hide_possible_values = true
     )]
-    pub law: Law,
+    pub controller: ControllerArg,
 }
 
 /// A law that is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Law {
+pub enum ControllerArg {
     /// By distance
     Distance,
     /// Proportional-integral
     Pi,
 }
 
-fn parse_share(text: &str) -> Result<f64, String> {
-    let share = text.trim().parse().ok().filter(|share| STEP_SHARES.contains(share));
+fn parse_fraction(text: &str) -> Result<f64, String> {
+    let share = text.trim().parse().ok().filter(|share| STEP_FRACTIONS.contains(share));
     share.ok_or_else(|| {
-        format!("expected a share from {} to {}", STEP_SHARES.start(), STEP_SHARES.end())
+        format!("expected a share from {} to {}", STEP_FRACTIONS.start(), STEP_FRACTIONS.end())
     })
 }

@@ -12,7 +12,7 @@ use crate::cell::file::Purpose;
 use crate::cli::arguments::refuse_a_recording_in;
 use crate::cli::live_cell::{Folders, Until, live};
 use crate::cli::outcome;
-use crate::cli::print::Voice;
+use crate::cli::print::Verbosity;
 use crate::cli::simulated_cell::{SimRecorder, simulated_extruder};
 use crate::control::event::Event;
 use crate::control::step::Step;
@@ -21,20 +21,20 @@ use crate::core::units::Mm;
 use crate::io::clock::RunClock;
 use crate::io::stop::StopSignal;
 use crate::rows::output;
-use crate::sim::cell::{Sight, SimCell, Witness};
-use crate::width_control::steps::{Progress, StepSettings};
+use crate::sim::cell::{FrameObservation, Observer, SimCell};
+use crate::width_control::steps::{StepSettings, StepsProgress};
 
 /// Keys of `[control]` that only other laws know.
-pub const OF_DISTANCE: [&str; 3] = ["exponent", "exponent_learns", "drift_per_root_m"];
+pub const DISTANCE_KEYS: [&str; 3] = ["exponent", "exponent_learns", "drift_per_root_m"];
 /// Bead beyond the camera's sight of the last piece, for the run-up and the way out
 /// \[mm\].
-const SPARE_MM: f64 = 50.0;
+const EXTRA_LENGTH_MM: f64 = 50.0;
 
 /// Runs it into the folder, and gives the recording with the status of the run.
 pub fn run(
     args: &TuneArgs,
     loaded: &LoadedCell,
-    voice: Voice,
+    voice: Verbosity,
 ) -> anyhow::Result<(PathBuf, ExitCode)> {
     let loaded = derived(args, loaded)?;
     let steps = steps(&loaded)?;
@@ -68,11 +68,11 @@ fn derived(args: &TuneArgs, loaded: &LoadedCell) -> anyhow::Result<LoadedCell> {
     let mut document: DocumentMut = loaded.text.parse().context("the cell file")?;
     document["control"]["law"] = value("steps");
     if let Some(control) = document["control"].as_table_like_mut() {
-        for key in OF_DISTANCE {
+        for key in DISTANCE_KEYS {
             control.remove(key);
         }
     }
-    if let Some(share) = args.step_share {
+    if let Some(share) = args.step_fraction {
         document["control"]["step_share"] = value(share);
     }
     let read = |document: &DocumentMut| {
@@ -100,8 +100,8 @@ fn steps(loaded: &LoadedCell) -> anyhow::Result<StepSettings> {
 /// Bead that it takes from the robot's start on.
 fn whole_length(loaded: &LoadedCell, steps: &StepSettings) -> anyhow::Result<Mm> {
     let run = loaded.cell.run.as_ref().context("the cell was not read for a run")?;
-    let begins = run.robot.start_length.max(steps.reach * 1.5);
-    Ok(begins + steps.seen_length() + Mm::constant(SPARE_MM))
+    let begins = run.robot.start_length.max(steps.camera_reach * 1.5);
+    Ok(begins + steps.length_until_seen() + Mm::constant(EXTRA_LENGTH_MM))
 }
 
 /// Says what is about to happen.
@@ -109,7 +109,7 @@ fn announce(
     args: &TuneArgs,
     loaded: &LoadedCell,
     steps: &StepSettings,
-    voice: Voice,
+    voice: Verbosity,
 ) -> anyhow::Result<()> {
     if voice.quiet {
         return Ok(());
@@ -143,25 +143,26 @@ fn simulate(out: &Path, loaded: &LoadedCell) -> anyhow::Result<()> {
     let calibration = loaded.calibration.clone();
     let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, recorder, extruder)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
-    let mut watch = Watch { is_over: false, stop };
+    let mut watch = Watch { steps_ended: false, stop };
     let _ = sim.layer(Mm::ZERO, &mut watch);
     sim.into_recorder().finish()
 }
 
 /// Waits for the end of the steps.
 struct Watch {
-    is_over: bool,
+    steps_ended: bool,
     stop: StopSignal,
 }
 
-impl Witness for Watch {
+impl Observer for Watch {
     fn step(&mut self, _: Stamp, _: &Event, step: &Step) {
-        self.is_over |= step.trace.steps.is_some_and(|steps| steps.progress == Progress::Over);
+        self.steps_ended |=
+            step.trace.steps.is_some_and(|steps| steps.progress == StepsProgress::Over);
     }
 
-    fn look(&mut self, _: &Sight<'_>) {}
+    fn frame(&mut self, _: &FrameObservation<'_>) {}
 
-    fn has_seen_enough(&self) -> bool {
-        self.is_over || self.stop.asked()
+    fn is_done(&self) -> bool {
+        self.steps_ended || self.stop.requested()
     }
 }

@@ -5,12 +5,12 @@ use std::path::Path;
 use anyhow::Context;
 use toml_edit::{DocumentMut, Item, Value, value};
 
-use super::arguments::Law;
-use super::experiment::OF_DISTANCE;
+use super::arguments::ControllerArg;
+use super::experiment::DISTANCE_KEYS;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::cli::arguments::{WrongArguments, refuse_replacing};
-use crate::io::whole_file::write_whole;
+use crate::io::whole_file::write_atomic;
 use crate::report::tuned::Tuned;
 
 /// Keys of the file that name another file.
@@ -71,26 +71,31 @@ fn is_relative(document: &DocumentMut, table: &str, key: &str) -> bool {
 }
 
 /// Writes the copy. It is read back as any cell is before it gets its name.
-pub fn write(path: &Path, loaded: &LoadedCell, tuned: &Tuned, law: Law) -> anyhow::Result<()> {
-    let text = text(loaded, tuned, law)?;
+pub fn write(
+    path: &Path,
+    loaded: &LoadedCell,
+    tuned: &Tuned,
+    controller: ControllerArg,
+) -> anyhow::Result<()> {
+    let text = text(loaded, tuned, controller)?;
     LoadedCell::from_text(path, text.clone(), Purpose::Run)?;
     refuse_replacing_written(path)?;
-    write_whole(path, text.as_bytes())?;
+    write_atomic(path, text.as_bytes())?;
     Ok(())
 }
 
-fn text(loaded: &LoadedCell, tuned: &Tuned, law: Law) -> anyhow::Result<String> {
+fn text(loaded: &LoadedCell, tuned: &Tuned, controller: ControllerArg) -> anyhow::Result<String> {
     let mut document: DocumentMut = loaded.text.parse().context("the cell file")?;
     let unit = document["control"].get("error_unit_mm").and_then(number).unwrap_or(1.0);
-    for (table, key, number) in tuned.settings(law == Law::Distance, unit) {
+    for (table, key, number) in tuned.settings(controller == ControllerArg::Distance, unit) {
         set(&mut document, table, key, value(number));
     }
-    let name = if law == Law::Distance { "distance" } else { "pi" };
+    let name = if controller == ControllerArg::Distance { "distance" } else { "pi" };
     set(&mut document, "control", "law", value(name));
     let control = document["control"].as_table_like_mut().context("[control] is no table")?;
     control.remove("step_share");
-    if law == Law::Pi {
-        for key in OF_DISTANCE {
+    if controller == ControllerArg::Pi {
+        for key in DISTANCE_KEYS {
             control.remove(key);
         }
     }

@@ -1,7 +1,7 @@
 //! The width held by distance, event by event.
 
 use super::*;
-use crate::width_control::distance::Distrust;
+use crate::width_control::distance::FallbackReason;
 use crate::width_control::strategy::distance::DistanceStrategy;
 use crate::width_control::target::Knot;
 
@@ -80,7 +80,7 @@ fn a_step_of_the_target_is_driven_where_it_is_wanted() {
     let mut setup = by_distance();
     let knot = |path, width| Knot { path: Mm::constant(path), width: Mm::constant(width) };
     let knots = vec![knot(400.0, 42.0), knot(400.0, 40.0)];
-    setup.control.target = Target::constant(Mm::constant(42.0)).along(knots);
+    setup.control.target = WidthTarget::constant(Mm::constant(42.0)).along(knots);
     let mut cell = Cell::new(setup);
     let _ = cell.until(390.0);
     assert!((Cell::width_at(cell.speed) - 42.0).abs() < 0.2);
@@ -95,7 +95,7 @@ fn a_robot_that_tells_no_path_is_held_by_the_pi_law_and_the_record_says_why() {
     let mut cell = Cell::new(by_distance());
     cell.tells_path = false;
     let step = cell.until(600.0);
-    assert_eq!(step.trace.fallback, Some(Distrust::NoPath));
+    assert_eq!(step.trace.fallback, Some(FallbackReason::NoPath));
     assert!(step.trace.integral_mm_per_s.is_some(), "{step:?}");
     assert_eq!(cell.line.controller.state(), State::Tracking);
 }

@@ -3,21 +3,21 @@
 
 use super::*;
 use crate::core::units::{Mm2, Rpm};
-use crate::extruder::strategy::{Constant, Played};
+use crate::extruder::strategy::{ConstantCommand, Playback};
 use crate::extruder::{
-    CommandLimits, Drive, ExtruderCommand, ExtruderFault, ExtruderHold, ExtruderReport,
-    ExtruderState, Follows, Law, PumpMode, RobotFollows,
+    CommandLimits, CommandQuantity, ExtruderCommand, ExtruderFault, ExtruderHold, ExtruderReport,
+    ExtruderState, ExtruderStrategy, FlowFollows, PumpMode, RobotFollows,
 };
 use crate::extruder::{ExtruderSetup, FlowDemand};
-use crate::identify::profile::{Point, Profile};
+use crate::identify::profile::{CommandProfile, ProfilePoint};
 
 const TICK_S: f64 = 0.005;
 const SPEED: f64 = 112.5;
 
-fn rig(law: Law) -> (ExtruderSetup, FlowDemand) {
+fn rig(law: ExtruderStrategy) -> (ExtruderSetup, FlowDemand) {
     let setup = ExtruderSetup {
-        drive: Drive::Rpm,
-        law,
+        quantity: CommandQuantity::Rpm,
+        strategy: law,
         limits: CommandLimits::new(0.0, 60.0, 400.0).unwrap(),
         feedforward_period: Span::from_secs(TICK_S),
         control_period: Span::from_millis(50),
@@ -30,7 +30,7 @@ fn rig(law: Law) -> (ExtruderSetup, FlowDemand) {
         timing: None,
         plan: None,
     };
-    let demand = FlowDemand::new(Mm2::constant(10.0), MmPerS::constant(SPEED), Follows::Robot);
+    let demand = FlowDemand::new(Mm2::constant(10.0), MmPerS::constant(SPEED), FlowFollows::Robot);
     (setup, demand)
 }
 
@@ -46,7 +46,7 @@ struct Cell {
 }
 
 impl Cell {
-    fn new(law: Law) -> Self {
+    fn new(law: ExtruderStrategy) -> Self {
         let mut line = Line::new();
         let (setup, demand) = rig(law);
         line.controller = line.controller.with_extruder(setup, demand);
@@ -118,7 +118,7 @@ impl Cell {
 
 #[test]
 fn a_lost_extruder_is_held_while_the_robot_goes_on() {
-    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    let mut cell = Cell::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     cell.mode = RobotMode::Print;
     assert_eq!(cell.go(1.0), ExtruderState::Running);
     cell.link(false);
@@ -131,7 +131,7 @@ fn a_lost_extruder_is_held_while_the_robot_goes_on() {
 
 #[test]
 fn a_pump_does_not_outlast_a_robot_that_nobody_hears() {
-    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    let mut cell = Cell::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     cell.mode = RobotMode::Print;
     assert_eq!(cell.go(1.0), ExtruderState::Running);
     let _ = cell.line.give(&Event::LinkDown { reason: "no STATE for 500 ms".into() });
@@ -151,7 +151,7 @@ fn a_pump_does_not_outlast_a_robot_that_nobody_hears() {
 
 #[test]
 fn an_extruder_that_stays_away_stops_the_robot_and_is_stopped_when_it_comes_back() {
-    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    let mut cell = Cell::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     cell.mode = RobotMode::Print;
     let _ = cell.go(1.0);
     cell.link(false);
@@ -171,9 +171,9 @@ fn an_extruder_that_stays_away_stops_the_robot_and_is_stopped_when_it_comes_back
 
 #[test]
 fn every_bead_begins_anew() {
-    let at = |from_s, value| Point { from_s, value };
-    let profile = Profile::new(vec![at(0.0, 20.0), at(0.5, 50.0)], 2.0).unwrap();
-    let mut cell = Cell::new(Law::Profile(Played::new(profile)));
+    let at = |from_s, value| ProfilePoint { from_s, value };
+    let profile = CommandProfile::new(vec![at(0.0, 20.0), at(0.5, 50.0)], 2.0).unwrap();
+    let mut cell = Cell::new(ExtruderStrategy::Profile(Playback::new(profile)));
     for _ in 0..3 {
         (cell.mode, cell.path) = (RobotMode::Print, 0.0);
         let sent = cell.sent.len();
@@ -188,7 +188,7 @@ fn every_bead_begins_anew() {
 
 #[test]
 fn a_bead_right_behind_another_keeps_the_pump_running() {
-    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    let mut cell = Cell::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     cell.mode = RobotMode::Print;
     let _ = cell.go(1.0);
     let sent = cell.sent.len();
@@ -209,11 +209,11 @@ bead,time_s,path_mm,speed_mm_per_s,command_rpm,flow_mm3_per_s
 ";
 
 fn planned() -> Cell {
-    let (setup, demand) = rig(Law::Constant(Constant(30.0)));
+    let (setup, demand) = rig(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     let plan = Some(std::sync::Arc::new(crate::extruder::trajectory::read(PLAN).unwrap()));
-    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    let mut cell = Cell::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     // The test puts the robot elsewhere, which no real one does: its speed jumps, too.
-    let limits = Limits {
+    let limits = SpeedLimits {
         min_speed: MmPerS::constant(10.0),
         max_accel: MmPerS2::constant(1e5),
         ..super::setup().limits
@@ -309,7 +309,7 @@ fn a_bead_that_begins_while_the_link_is_down_is_the_next_of_the_plan() {
 fn a_pump_goes_by_when_the_robot_was_last_heard_whatever_was_held_before() {
     // Held for a lost camera when the link goes, and for want of widths long before it.
     for lost_before in [Some(Event::CameraLost { reason: "unplugged".into() }), None] {
-        let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+        let mut cell = Cell::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
         cell.mode = RobotMode::Print;
         assert_eq!(cell.go(2.0), ExtruderState::Running);
         let _ = cell.line.width(42.0);

@@ -24,7 +24,7 @@ pub enum Channel {
 /// The samples of one pixel, in the order in which they are stored. Alpha is
 /// ignored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Layout {
+pub enum SampleLayout {
     /// One grey value.
     Grey,
     /// Grey, alpha.
@@ -39,7 +39,7 @@ pub enum Layout {
     Bgra,
 }
 
-impl Layout {
+impl SampleLayout {
     /// Samples a pixel.
     pub const fn samples(self) -> usize {
         match self {
@@ -88,9 +88,9 @@ fn luma<T: Sample>([red, green, blue]: [T; 3]) -> T {
 impl Channel {
     /// One value a pixel from rows of interleaved samples; the depth stays.
     /// Samples that do not fill a last pixel are dropped.
-    pub fn extract<T: Sample>(self, samples: &[T], layout: Layout) -> Vec<T> {
+    pub fn extract<T: Sample>(self, samples: &[T], layout: SampleLayout) -> Vec<T> {
         let pixels = samples.chunks_exact(layout.samples());
-        if matches!(layout, Layout::Grey | Layout::GreyAlpha) {
+        if matches!(layout, SampleLayout::Grey | SampleLayout::GreyAlpha) {
             return pixels.map(|pixel| pixel[0]).collect();
         }
         let (red, blue) = if layout.is_blue_first() { (2, 0) } else { (0, 2) };
@@ -161,10 +161,10 @@ mod tests {
             (Channel::Blue, 30000),
             (Channel::Grey, 4596),
         ] {
-            assert_eq!(channel.extract(&rgba, Layout::Rgba), vec![value]);
-            assert_eq!(channel.extract(&bgr, Layout::Bgr), vec![value]);
+            assert_eq!(channel.extract(&rgba, SampleLayout::Rgba), vec![value]);
+            assert_eq!(channel.extract(&bgr, SampleLayout::Bgr), vec![value]);
         }
-        assert_eq!(Channel::Blue.extract(&[5_u8, 255], Layout::GreyAlpha), vec![5]);
+        assert_eq!(Channel::Blue.extract(&[5_u8, 255], SampleLayout::GreyAlpha), vec![5]);
     }
 
     #[test]

@@ -21,7 +21,7 @@ use crate::io::foxglove::{COMPRESSED_IMAGE, CompressedImage, RAW_IMAGE, RawImage
 use crate::io::image_file;
 use crate::io::record::format::EVENT_TOPIC;
 use crate::io::recording::messages::{Message, Topic};
-use crate::io::recording::{Entry, Recording, RecordingError, summary};
+use crate::io::recording::{RecordedEntry, Recording, RecordingError, summary};
 use crate::run::ports::{FrameSource, Grab, SourceError};
 
 /// Frames of one topic of an MCAP.
@@ -187,7 +187,7 @@ fn note_robot(recording: &Recording, robot_z: &RobotZ, message: &Message) {
     if recording.run().is_none() || message.topic.name != EVENT_TOPIC {
         return;
     }
-    if let Ok(Some(Entry::Event { now, event, .. })) = recording.entry(message.clone()) {
+    if let Ok(Some(RecordedEntry::Event { now, event, .. })) = recording.entry(message.clone()) {
         robot_z.note(now, &event);
     }
 }

@@ -11,7 +11,7 @@ use super::mcap::{McapSource, RobotZ};
 use super::snapshot::{Snapshot, SnapshotSettings};
 use super::video::VideoFile;
 use crate::bridge::VideoInput;
-use crate::cell::file::{Camera, Source};
+use crate::cell::file::{CameraSettings, ImageSource};
 use crate::core::frame::Channel;
 use crate::core::time::Span;
 use crate::io::clock::RunClock;
@@ -72,7 +72,7 @@ pub fn is_mcap(path: &Path) -> bool {
 #[derive(Debug, Clone, Copy)]
 pub struct LiveOptions<'a> {
     /// Where frames come from.
-    pub source: &'a Source,
+    pub source: &'a ImageSource,
     /// The source as the user names it.
     pub name: &'a str,
     /// Frames a second of sources that do not set their own pace.
@@ -85,7 +85,7 @@ pub struct LiveOptions<'a> {
 
 impl<'a> LiveOptions<'a> {
     /// Of a cell's camera.
-    pub fn of(camera: &'a Camera, channel: Channel) -> Self {
+    pub fn of(camera: &'a CameraSettings, channel: Channel) -> Self {
         Self {
             source: &camera.source,
             name: &camera.source_name,
@@ -109,9 +109,9 @@ pub fn live(
         Ok(Box::new(Live::open(input, camera.name, channel, patience, clock)?))
     };
     match camera.source {
-        Source::Index(index) => device(VideoInput::Camera(*index)),
-        Source::Pipeline(pipeline) => device(VideoInput::Pipeline(pipeline.clone())),
-        Source::Url(url) => {
+        ImageSource::Index(index) => device(VideoInput::Camera(*index)),
+        ImageSource::Pipeline(pipeline) => device(VideoInput::Pipeline(pipeline.clone())),
+        ImageSource::Url(url) => {
             let settings = SnapshotSettings {
                 rate_hz: camera.rate_hz,
                 timeout: camera.deadline,
@@ -119,13 +119,15 @@ pub fn live(
             };
             Ok(Box::new(Snapshot::open(url, channel, settings, clock)?))
         }
-        Source::Path(path) => {
+        ImageSource::Path(path) => {
             let options = OfflineOptions { channel, ..OfflineOptions::default() };
             let inner = recorded(path, options)?.source;
             let period = Span::from_secs(1.0 / camera.rate_hz);
             Ok(Box::new(Paced { inner, clock, period, due: None, stop }))
         }
-        Source::Rendered => Err(fault(camera.name, "the rendered camera is opened with its bead")),
+        ImageSource::Rendered => {
+            Err(fault(camera.name, "the rendered camera is opened with its bead"))
+        }
     }
 }
 

@@ -6,13 +6,13 @@ use std::time::Duration;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
 use super::fault;
-use crate::cell::{Camera, Mount};
+use crate::cell::{CameraSettings, Mount};
 use crate::core::robot::RobotState;
 use crate::core::time::{Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::run::ports::{FrameSource, Grab, SourceError};
 use crate::scenario::table::Simulation;
-use crate::sim::follow::{Follower, Recipe};
+use crate::sim::follow::{BeadFollower, BeadRecipe};
 use crate::sim::render::Renderer;
 
 /// Reports that wait for the camera: some 20 s of a robot that reports every
@@ -35,7 +35,7 @@ impl RobotView {
 /// Takes pictures at a fixed rate of what lies under the camera.
 pub struct RenderedCamera {
     renderer: Renderer,
-    follower: Follower,
+    follower: BeadFollower,
     reports: Receiver<(Stamp, RobotState)>,
     stop: Receiver<()>,
     clock: RunClock,
@@ -53,11 +53,11 @@ impl RenderedCamera {
     pub fn new(
         renderer: Renderer,
         simulation: &Simulation,
-        camera: &Camera,
+        camera: &CameraSettings,
         clock: RunClock,
         stop: Receiver<()>,
     ) -> (Self, RobotView) {
-        let recipe = Recipe {
+        let recipe = BeadRecipe {
             model: simulation.bead,
             roughness: simulation.roughness,
             flow: simulation.flow,
@@ -66,7 +66,7 @@ impl RenderedCamera {
         let (told, reports) = bounded(WAITING_REPORTS);
         let source = Self {
             renderer,
-            follower: Follower::new(recipe),
+            follower: BeadFollower::new(recipe),
             reports,
             stop,
             clock,

@@ -1,33 +1,39 @@
 //! The estimate of the unknown part, from one sample to the next.
 
-use super::gains::{Adaptation, Gains, ScalarPlant, mean_exp};
+use super::gains::{Adaptation, AdaptiveGains, ScalarPlant, mean_exp};
 
 /// Δ̂ and its slope. Over a sample the error is taken for straight, and what
 /// acts on the plant is Δ̂ in the middle of the time for which it is held; so
 /// the sampled law is the continuous one up to the square of the sample's
 /// length, and a constant error moves Δ̂ exactly as it does there.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Estimate {
+pub(super) struct UncertaintyEstimate {
     pub value: f64,
     pub slope_per_s: f64,
     /// The error at the last sample; none before the first.
     pub last_error: Option<f64>,
 }
 
-impl Estimate {
+impl UncertaintyEstimate {
     /// Learns from an error, `dt_s` after the last one.
-    pub(super) fn learn(&mut self, plant: ScalarPlant, gains: &Gains, error: f64, dt_s: f64) {
+    pub(super) fn learn(
+        &mut self,
+        plant: ScalarPlant,
+        gains: &AdaptiveGains,
+        error: f64,
+        dt_s: f64,
+    ) {
         let mean = f64::midpoint(error, self.last_error.unwrap_or(error));
         self.last_error = Some(error);
         if gains.adaptation == Adaptation::Off {
             return;
         }
         let leak = gains.safety.leakage_per_s * dt_s;
-        let (kept, gathered) = (libm::exp(-leak), dt_s * mean_exp(-leak));
+        let (kept, integral) = (libm::exp(-leak), dt_s * mean_exp(-leak));
         let drive = gains.adaptation.rate(plant.input_gain) * mean;
         let slope =
-            kept * self.slope_per_s + gathered * gains.adaptation.slope_rate_per_s() * drive;
-        let value = kept * self.value + gathered * (drive + f64::midpoint(self.slope_per_s, slope));
+            kept * self.slope_per_s + integral * gains.adaptation.slope_rate_per_s() * drive;
+        let value = kept * self.value + integral * (drive + f64::midpoint(self.slope_per_s, slope));
         let bound = gains.safety.bound.unwrap_or(f64::MAX);
         self.value = value.clamp(-bound, bound);
         // At the bound a slope that leads outward is not the uncertainty's.
@@ -36,7 +42,13 @@ impl Estimate {
     }
 
     /// What is taken off the command that is held for `hold_s` from now.
-    pub(super) fn acting(&self, plant: ScalarPlant, gains: &Gains, error: f64, hold_s: f64) -> f64 {
+    pub(super) fn acting(
+        &self,
+        plant: ScalarPlant,
+        gains: &AdaptiveGains,
+        error: f64,
+        hold_s: f64,
+    ) -> f64 {
         if gains.adaptation == Adaptation::Off {
             return self.value;
         }

@@ -17,7 +17,7 @@ pub struct ScalarPlant {
 /// Gains of the law u = −k·y + r − w − Δ̂ (Mohammadi Looey et al. 2026, eq. (8)
 /// with its indices mended).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gains {
+pub struct AdaptiveGains {
     /// k: feedback of the output \[unit of u per unit of y\].
     pub feedback: f64,
     /// What is fed back beyond k from the error against the reference model
@@ -27,10 +27,10 @@ pub struct Gains {
     /// How the unknown part is learnt.
     pub adaptation: Adaptation,
     /// What the estimate may be.
-    pub safety: Safety,
+    pub safety: EstimateBounds,
 }
 
-impl Gains {
+impl AdaptiveGains {
     /// Gains that learn the slope as well, with all three poles of the error
     /// at the same place \[1/s\]: a triple pole swings least for its speed.
     /// The reference is answered as with the feedback alone. Fast poles are
@@ -47,7 +47,7 @@ impl Gains {
                 weight: 1.0,
                 slope_rate_per_s: pole_per_s / 3.0,
             },
-            safety: Safety::default(),
+            safety: EstimateBounds::default(),
         }
     }
 }
@@ -81,7 +81,7 @@ pub enum Adaptation {
 
 /// What keeps the estimate from going where no uncertainty can be.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Safety {
+pub struct EstimateBounds {
     /// The largest size of Δ̂ (projection); the slope is not learnt further
     /// there \[unit of u\].
     pub bound: Option<f64>,
@@ -149,7 +149,7 @@ pub enum GainError {
         "at a command every {hold_s} s the error grows by {radius:.3} from one to the next: \
          command more often, or take smaller gains"
     )]
-    TooSeldom {
+    SamplingTooSlow {
         /// Time that a command is held \[s\].
         hold_s: f64,
         /// Largest eigenvalue of the sampled error.
@@ -181,7 +181,7 @@ impl Adaptation {
 impl ScalarPlant {
     /// What the output becomes of itself, and of an input that is held, in a
     /// time \[s\]: e^(a·t) and b·∫e^(a·s)ds.
-    pub fn held(&self, t_s: f64) -> (f64, f64) {
+    pub fn zero_order_hold(&self, t_s: f64) -> (f64, f64) {
         let x = self.state_gain_per_s * t_s;
         (libm::exp(x), self.input_gain * t_s * mean_exp(x))
     }
@@ -199,7 +199,11 @@ pub(super) fn mean_exp(x: f64) -> f64 {
 
 /// Checks a law in continuous time: eq. (11), γ and p above zero, and the
 /// Routh–Hurwitz condition of the error where the slope is learnt as well.
-pub(super) fn check(plant: ScalarPlant, gains: &Gains, hold: Span) -> Result<(), GainError> {
+pub(super) fn check(
+    plant: ScalarPlant,
+    gains: &AdaptiveGains,
+    hold: Span,
+) -> Result<(), GainError> {
     all_finite(plant, gains)?;
     positive("the time that a command is held", hold.secs())?;
     if plant.input_gain == 0.0 {
@@ -250,7 +254,7 @@ fn positive(what: &'static str, value: f64) -> Result<(), GainError> {
     if value > 0.0 { Ok(()) } else { Err(GainError::NotPositive { what, value }) }
 }
 
-fn all_finite(plant: ScalarPlant, gains: &Gains) -> Result<(), GainError> {
+fn all_finite(plant: ScalarPlant, gains: &AdaptiveGains) -> Result<(), GainError> {
     let (learning_rate, weight, slope) = match gains.adaptation {
         Adaptation::Off => (0.0, 0.0, 0.0),
         Adaptation::Constant { learning_rate, weight } => (learning_rate, weight, 0.0),

@@ -2,12 +2,12 @@
 
 use nalgebra::Matrix4;
 
-use super::estimate::Estimate;
-use super::gains::{Adaptation, GainError, Gains, Safety, ScalarPlant, check};
+use super::estimate::UncertaintyEstimate;
+use super::gains::{Adaptation, AdaptiveGains, EstimateBounds, GainError, ScalarPlant, check};
 use crate::core::time::Span;
 
 /// Samples that may be missed before the time between two is a gap.
-const GAP: f64 = 4.0;
+const MAX_GAP_HOLDS: f64 = 4.0;
 
 /// Model-reference adaptive law of a first-order plant (Mohammadi Looey et al.
 /// 2026, eqs. (8)–(10)), sampled.
@@ -17,21 +17,21 @@ const GAP: f64 = 4.0;
 /// long a command is held. The error's part is the continuous law, with the
 /// estimate led by half a sample ([`Self::step`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AdaptiveLaw {
+pub struct MracController {
     plant: ScalarPlant,
-    gains: Gains,
+    gains: AdaptiveGains,
     hold: Span,
     /// The plant and the reference model over one held command.
     state_step: f64,
     input_step: f64,
-    estimate: Estimate,
+    estimate: UncertaintyEstimate,
     model: f64,
-    last: Option<Held>,
+    last: Option<HeldInput>,
 }
 
 /// What has been held since the last step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Held {
+struct HeldInput {
     reference: f64,
     demanded: f64,
     applied: f64,
@@ -49,23 +49,23 @@ pub struct Action {
     /// Δ̂ now.
     pub estimate: f64,
     /// Where the output will be at the end of the hold if Δ̂ is right.
-    pub foretold: f64,
+    pub predicted: f64,
 }
 
-impl AdaptiveLaw {
+impl MracController {
     /// A law whose commands are held for `hold`. Fails where reference model
     /// or error are not stable, in continuous time or at that rate of
     /// commands, and where a gain has the wrong sign.
-    pub fn new(plant: ScalarPlant, gains: Gains, hold: Span) -> Result<Self, GainError> {
+    pub fn new(plant: ScalarPlant, gains: AdaptiveGains, hold: Span) -> Result<Self, GainError> {
         check(plant, &gains, hold)?;
-        let (state_step, input_step) = plant.held(hold.secs());
-        let (estimate, model, last) = (Estimate::default(), 0.0, None);
-        let law = Self { plant, gains, hold, state_step, input_step, estimate, model, last };
-        let radius = law.error_radius();
+        let (state_step, input_step) = plant.zero_order_hold(hold.secs());
+        let (estimate, model, last) = (UncertaintyEstimate::default(), 0.0, None);
+        let controller = Self { plant, gains, hold, state_step, input_step, estimate, model, last };
+        let radius = controller.error_radius();
         if radius < 1.0 {
-            Ok(law)
+            Ok(controller)
         } else {
-            Err(GainError::TooSeldom { hold_s: hold.secs(), radius })
+            Err(GainError::SamplingTooSlow { hold_s: hold.secs(), radius })
         }
     }
 
@@ -77,14 +77,14 @@ impl AdaptiveLaw {
         let bound = self.gains.safety.bound.unwrap_or(f64::MAX);
         let needed = -self.plant.state_gain_per_s / self.plant.input_gain * measured;
         let value = (needed - known - applied).clamp(-bound, bound);
-        self.estimate = Estimate { value, slope_per_s: 0.0, last_error: None };
+        self.estimate = UncertaintyEstimate { value, slope_per_s: 0.0, last_error: None };
         self.model = measured;
         self.last = None;
     }
 
     /// Sets the estimate, as the paper's law that does not adapt is given what
     /// it knows beforehand.
-    pub fn know(&mut self, uncertainty: f64) {
+    pub fn set_estimate(&mut self, uncertainty: f64) {
         self.estimate.value = uncertainty;
         self.estimate.slope_per_s = 0.0;
     }
@@ -102,7 +102,7 @@ impl AdaptiveLaw {
     /// [`Self::settle`].
     pub fn step(&mut self, measured: f64, reference: f64, known: f64, dt: Span) -> Action {
         self.advance_model(dt);
-        let gap = dt.secs() > GAP * self.hold.secs();
+        let gap = dt.secs() > MAX_GAP_HOLDS * self.hold.secs();
         let seen = measured.is_finite();
         if gap && seen {
             self.model = measured;
@@ -117,12 +117,12 @@ impl AdaptiveLaw {
         let hold_s = self.hold.secs();
         let acting = self.estimate.acting(self.plant, &self.gains, error, hold_s);
         let fed_back = (self.gains.feedback + self.gains.error_feedback) * error;
-        let follow = self.follow(reference);
+        let follow = self.reference_input(reference);
         let command = follow - fed_back - known - acting;
-        self.last = Some(Held { reference, demanded: command, applied: command });
+        self.last = Some(HeldInput { reference, demanded: command, applied: command });
         let output = self.model + error;
-        let foretold = self.state_step * output + self.input_step * (command + known + acting);
-        Action { command, model: self.model, error, estimate: self.estimate.value, foretold }
+        let predicted = self.state_step * output + self.input_step * (command + known + acting);
+        Action { command, model: self.model, error, estimate: self.estimate.value, predicted }
     }
 
     /// Tells what was applied in place of the command. The reference model is
@@ -171,23 +171,23 @@ impl AdaptiveLaw {
 
     /// The input that takes the plant from the model's output to where the
     /// model will be after the hold.
-    fn follow(&self, reference: f64) -> f64 {
-        let (kept, driven) = self.model_held(self.hold.secs());
+    fn reference_input(&self, reference: f64) -> f64 {
+        let (kept, driven) = self.model_zero_order_hold(self.hold.secs());
         let next = kept * self.model + driven * reference;
         (next - self.state_step * self.model) / self.input_step
     }
 
-    fn model_held(&self, t_s: f64) -> (f64, f64) {
+    fn model_zero_order_hold(&self, t_s: f64) -> (f64, f64) {
         let model = ScalarPlant { state_gain_per_s: self.model_pole(), ..self.plant };
-        model.held(t_s)
+        model.zero_order_hold(t_s)
     }
 
     fn advance_model(&mut self, dt: Span) {
         if let Some(held) = self.last
             && dt > Span::ZERO
         {
-            let (kept, driven) = self.model_held(dt.secs());
-            let missed = self.plant.held(dt.secs()).1 * (held.applied - held.demanded);
+            let (kept, driven) = self.model_zero_order_hold(dt.secs());
+            let missed = self.plant.zero_order_hold(dt.secs()).1 * (held.applied - held.demanded);
             self.model = kept * self.model + driven * held.reference + missed;
         }
     }
@@ -197,8 +197,11 @@ impl AdaptiveLaw {
         let hold_s = self.hold.secs();
         let column = |state: [f64; 4]| {
             let [error, last, value, slope_per_s] = state;
-            let mut estimate = Estimate { value, slope_per_s, last_error: Some(last) };
-            let free = Gains { safety: Safety { bound: None, ..self.gains.safety }, ..self.gains };
+            let mut estimate = UncertaintyEstimate { value, slope_per_s, last_error: Some(last) };
+            let free = AdaptiveGains {
+                safety: EstimateBounds { bound: None, ..self.gains.safety },
+                ..self.gains
+            };
             estimate.learn(self.plant, &free, error, hold_s);
             let acting = estimate.acting(self.plant, &free, error, hold_s);
             let fed_back = (free.feedback + free.error_feedback) * error;

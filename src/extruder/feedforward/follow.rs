@@ -12,17 +12,17 @@ pub struct SpeedFeedforward {
     observer: Option<FlowObserver>,
     axis: Inverse,
     /// Flows of the model in the past, to compare with late measurements.
-    past: Past,
+    history: FlowHistory,
     period: Span,
 }
 
 /// What is commanded in a period.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Followed {
+pub struct SpeedStep {
     /// Flow that the model foretells, [`FlowForecast::ahead_s`] from now.
     pub modelled: Mm3PerS,
     /// What the measurements add to it.
-    pub added: Mm3PerS,
+    pub correction: Mm3PerS,
     /// Speed that goes with both.
     pub speed: MmPerS,
     /// Command of the axis, in its own unit.
@@ -31,7 +31,7 @@ pub struct Followed {
 
 /// A measurement of the whole flow.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FlowSeen {
+pub struct FlowMeasurement {
     /// When that flow left the nozzle: for a section seen behind the nozzle,
     /// when it was laid.
     pub at: Stamp,
@@ -43,7 +43,7 @@ pub struct FlowSeen {
 
 /// The model's flows on the grid, newest last.
 #[derive(Debug, Clone, PartialEq)]
-struct Past {
+struct FlowHistory {
     flows: Vec<f64>,
     newest: usize,
     at: Option<Stamp>,
@@ -65,8 +65,8 @@ impl SpeedFeedforward {
         let memory_s = positive("the memory", memory.secs())?;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "above zero")]
         let length = (memory_s / period_s).ceil().min(1e6) as usize + 2;
-        let past = Past { flows: vec![0.0; length], newest: 0, at: None, period_s };
-        Ok(Self { forecast, observer, axis, past, period })
+        let past = FlowHistory { flows: vec![0.0; length], newest: 0, at: None, period_s };
+        Ok(Self { forecast, observer, axis, history: past, period })
     }
 
     /// Takes up the steady state of a command of the extruder; the axis goes
@@ -80,15 +80,15 @@ impl SpeedFeedforward {
         positive("the wanted section", area.get())?;
         self.forecast.start(command)?;
         let flow = self.forecast.step(command, None);
-        self.past.flows.fill(flow.get());
-        self.past.at = None;
+        self.history.flows.fill(flow.get());
+        self.history.at = None;
         self.axis.start(flow.get() / area.get(), axis_command)
     }
 
     /// Compares a measurement with what the model said then. One that is older
     /// than the memory, or lies in the future, is left out: `false`.
-    pub fn measure(&mut self, seen: &FlowSeen) -> bool {
-        let (Some(observer), Some(then)) = (&mut self.observer, self.past.at(seen.at)) else {
+    pub fn measure(&mut self, seen: &FlowMeasurement) -> bool {
+        let (Some(observer), Some(then)) = (&mut self.observer, self.history.at(seen.at)) else {
             return false;
         };
         let residual = Mm3PerS::new(seen.flow.get() - then).unwrap_or_default();
@@ -98,14 +98,14 @@ impl SpeedFeedforward {
 
     /// One period from now on: the extruder's command that is applied, the
     /// screw's measured speed if there is an encoder, the wanted section.
-    pub fn step(&mut self, now: Stamp, command: f64, rpm: Option<Rpm>, area: Mm2) -> Followed {
+    pub fn step(&mut self, now: Stamp, command: f64, rpm: Option<Rpm>, area: Mm2) -> SpeedStep {
         let modelled = self.forecast.step(command, rpm);
         let then = now + Span::from_secs(self.forecast.ahead_s());
-        self.past.push(then, modelled.get());
+        self.history.push(then, modelled.get());
         let added = self.observer.map_or(Mm3PerS::ZERO, |observer| observer.estimate(then));
         let flow = modelled + added;
         let speed = MmPerS::new(flow.get() / area.get()).unwrap_or_default();
-        Followed { modelled, added, speed, command: self.axis.step(speed.get()) }
+        SpeedStep { modelled, correction: added, speed, command: self.axis.step(speed.get()) }
     }
 
     /// Tells what was applied to the axis in place of the command.
@@ -119,7 +119,7 @@ impl SpeedFeedforward {
     }
 }
 
-impl Past {
+impl FlowHistory {
     fn push(&mut self, at: Stamp, flow: f64) {
         self.newest = (self.newest + 1) % self.flows.len();
         self.flows[self.newest] = flow;

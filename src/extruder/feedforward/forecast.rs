@@ -19,7 +19,7 @@ pub struct ExtruderModel {
 impl ExtruderModel {
     /// From command to flow, for [`Inverse`](super::Inverse). Fails where the
     /// numbers are too large to be multiplied.
-    pub fn whole(&self) -> Result<TransferFunction, ModelError> {
+    pub fn command_to_flow(&self) -> Result<TransferFunction, ModelError> {
         self.drive.series(&self.flow)
     }
 }

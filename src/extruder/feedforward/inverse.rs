@@ -16,11 +16,11 @@ pub struct InverseSettings {
     /// of its own \[s\]: as many as the model has poles more than zeros.
     pub time_constant_s: f64,
     /// What becomes of a zero in the right half plane.
-    pub right_zeros: RightZeros,
+    pub right_zeros: RightHalfPlaneZeros,
     /// How far ahead the demand is known.
-    pub known_ahead: Span,
+    pub preview: Span,
     /// How late the output may be beyond that.
-    pub late: Span,
+    pub max_delay: Span,
     /// Range and slew of the command.
     pub limits: CommandLimits,
     /// Time between two commands.
@@ -30,7 +30,7 @@ pub struct InverseSettings {
 /// What becomes of a zero in the right half plane, whose exact inverse would
 /// grow without bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RightZeros {
+pub enum RightHalfPlaneZeros {
     /// The model is refused.
     Refuse,
     /// Its mirror image is inverted: the size at every frequency is right, and
@@ -72,7 +72,7 @@ impl Inverse {
             0.0
         };
         let dead_time_s = model.dead_time_s() + mirrored_s;
-        let (known_s, late_s) = (settings.known_ahead.secs(), settings.late.secs());
+        let (known_s, late_s) = (settings.preview.secs(), settings.max_delay.secs());
         if dead_time_s > known_s + late_s + 1e-9 {
             return Err(FeedforwardError::DeadTime { dead_time_s, known_s, late_s });
         }
@@ -107,7 +107,7 @@ impl Inverse {
 
     /// How late the output is at low frequencies when the demand is read
     /// [`Self::preview_s`] ahead \[s\].
-    pub fn late_s(&self) -> f64 {
+    pub fn delay_s(&self) -> f64 {
         self.dead_time_s + self.lag_s + 0.5 * self.period.secs() - self.preview_s
     }
 
@@ -153,7 +153,7 @@ impl Inverse {
 /// by how much mirroring makes it late \[s\].
 pub(super) fn minimum_phase(
     model: &TransferFunction,
-    rule: RightZeros,
+    rule: RightHalfPlaneZeros,
 ) -> Result<(TransferFunction, f64), FeedforwardError> {
     let zeros = model.zeros();
     let right: Vec<Complex<f64>> = zeros.iter().copied().filter(|zero| zero.re >= 0.0).collect();
@@ -162,8 +162,8 @@ pub(super) fn minimum_phase(
     };
     // On the imaginary axis there is no mirror image that is stable.
     let on_the_axis = right.iter().any(|zero| zero.re <= 1e-9 * zero.norm());
-    if rule == RightZeros::Refuse || on_the_axis {
-        return Err(FeedforwardError::RightZero { re: first.re, im: first.im.abs() });
+    if rule == RightHalfPlaneZeros::Refuse || on_the_axis {
+        return Err(FeedforwardError::NonMinimumPhase { re: first.re, im: first.im.abs() });
     }
     let late_s = right.iter().map(|zero| 2.0 * zero.re / zero.norm_sqr()).sum();
     let mirrored: Vec<Complex<f64>> =

@@ -21,7 +21,7 @@ pub struct UnmodelledFlow {
     /// τ: after which a share of e^(−1) of it is left \[s\].
     pub correlation_s: f64,
     /// How far the offset wanders in a second, as a standard deviation.
-    pub wander: Mm3PerS,
+    pub drift: Mm3PerS,
 }
 
 /// A measurement of the flow, as a difference from the model's.
@@ -38,7 +38,7 @@ pub struct FlowResidual {
 /// Kalman filter for the unmodelled flow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlowObserver {
-    part: UnmodelledFlow,
+    model: UnmodelledFlow,
     /// Noise and offset \[mm³/s\], as they were at `at`.
     state: Vector2<f64>,
     covariance: Matrix2<f64>,
@@ -51,14 +51,14 @@ impl FlowObserver {
     pub fn new(part: UnmodelledFlow) -> Result<Self, FeedforwardError> {
         let sigma = positive("the standard deviation of the flow", part.sigma.get())?;
         positive("the correlation time", part.correlation_s)?;
-        if part.wander.get() < 0.0 {
-            let (what, value) = ("the wander of the offset", part.wander.get());
+        if part.drift.get() < 0.0 {
+            let (what, value) = ("the wander of the offset", part.drift.get());
             return Err(FeedforwardError::NotPositive { what, value });
         }
         // Beforehand the offset may be as large as the noise is in ten times
         // its size; the first measurements settle it.
         let covariance = Matrix2::new(sigma * sigma, 0.0, 0.0, 100.0 * sigma * sigma);
-        Ok(Self { part, state: Vector2::zeros(), covariance, at: None })
+        Ok(Self { model: part, state: Vector2::zeros(), covariance, at: None })
     }
 
     /// Takes a measurement. One that is older than the last is weighed as if
@@ -66,19 +66,19 @@ impl FlowObserver {
     pub fn measure(&mut self, seen: &FlowResidual) {
         let age_s = self.at.map_or(0.0, |at| (at - seen.at).secs());
         if age_s < 0.0 {
-            self.state = self.ahead(-age_s);
-            self.covariance = self.spread(-age_s);
+            self.state = self.predicted(-age_s);
+            self.covariance = self.predicted_covariance(-age_s);
         }
-        let shared = self.kept(age_s.max(0.0));
+        let shared = self.decay(age_s.max(0.0));
         let row = RowVector2::new(shared, 1.0);
-        let own = self.part.sigma.get().powi(2) * (1.0 - shared * shared);
+        let own = self.model.sigma.get().powi(2) * (1.0 - shared * shared);
         let variance = seen.sigma.get().powi(2) + own;
-        let gathered = self.covariance * row.transpose();
-        let total = (row * gathered).x + variance;
+        let cross_covariance = self.covariance * row.transpose();
+        let total = (row * cross_covariance).x + variance;
         let innovation = seen.residual.get() - (row * self.state).x;
         if total > 0.0 {
-            self.state += gathered * (innovation / total);
-            self.covariance -= gathered * gathered.transpose() / total;
+            self.state += cross_covariance * (innovation / total);
+            self.covariance -= cross_covariance * cross_covariance.transpose() / total;
         }
         self.at = Some(self.at.map_or(seen.at, |at| at.max(seen.at)));
     }
@@ -86,31 +86,31 @@ impl FlowObserver {
     /// The part at a moment after the last measurement.
     pub fn estimate(&self, at: Stamp) -> Mm3PerS {
         let after_s = self.at.map_or(0.0, |last| (at - last).secs().max(0.0));
-        Mm3PerS::new(self.ahead(after_s).sum()).unwrap_or_default()
+        Mm3PerS::new(self.predicted(after_s).sum()).unwrap_or_default()
     }
 
     /// Its standard deviation then.
     pub fn sigma(&self, at: Stamp) -> Mm3PerS {
         let after_s = self.at.map_or(0.0, |last| (at - last).secs().max(0.0));
-        Mm3PerS::new(self.spread(after_s).sum().max(0.0).sqrt()).unwrap_or_default()
+        Mm3PerS::new(self.predicted_covariance(after_s).sum().max(0.0).sqrt()).unwrap_or_default()
     }
 
-    fn kept(&self, after_s: f64) -> f64 {
-        libm::exp(-after_s / self.part.correlation_s)
+    fn decay(&self, after_s: f64) -> f64 {
+        libm::exp(-after_s / self.model.correlation_s)
     }
 
-    fn ahead(&self, after_s: f64) -> Vector2<f64> {
-        Vector2::new(self.kept(after_s) * self.state.x, self.state.y)
+    fn predicted(&self, after_s: f64) -> Vector2<f64> {
+        Vector2::new(self.decay(after_s) * self.state.x, self.state.y)
     }
 
-    fn spread(&self, after_s: f64) -> Matrix2<f64> {
-        let kept = self.kept(after_s);
+    fn predicted_covariance(&self, after_s: f64) -> Matrix2<f64> {
+        let kept = self.decay(after_s);
         let mut next = self.covariance;
         next[(0, 0)] *= kept * kept;
         next[(0, 1)] *= kept;
         next[(1, 0)] *= kept;
-        next[(0, 0)] += self.part.sigma.get().powi(2) * (1.0 - kept * kept);
-        next[(1, 1)] += self.part.wander.get().powi(2) * after_s;
+        next[(0, 0)] += self.model.sigma.get().powi(2) * (1.0 - kept * kept);
+        next[(1, 1)] += self.model.drift.get().powi(2) * after_s;
         next
     }
 }
@@ -118,6 +118,6 @@ impl FlowObserver {
 /// What share of the standard deviation of a noise that is forgotten within
 /// `correlation_s` is left after the best use of measurements without noise
 /// of an age: the bound for every controller that acts `age_s` after it saw.
-pub fn share_left(age_s: f64, correlation_s: f64) -> f64 {
+pub fn unpredictable_fraction(age_s: f64, correlation_s: f64) -> f64 {
     (-libm::expm1(-2.0 * age_s / correlation_s)).max(0.0).sqrt()
 }

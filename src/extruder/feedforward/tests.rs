@@ -8,9 +8,9 @@ const PERIOD: Span = Span::from_millis(5);
 fn settings() -> InverseSettings {
     InverseSettings {
         time_constant_s: 0.05,
-        right_zeros: RightZeros::Refuse,
-        known_ahead: Span::from_secs(1.0),
-        late: Span::ZERO,
+        right_zeros: RightHalfPlaneZeros::Refuse,
+        preview: Span::from_secs(1.0),
+        max_delay: Span::ZERO,
         limits: CommandLimits::new(-1e6, 1e6, 1e9).unwrap(),
         period: PERIOD,
     }
@@ -18,7 +18,7 @@ fn settings() -> InverseSettings {
 
 /// Voltage to flow of bcs-thesis: relative degree 1, dead time 54 ms.
 fn extruder() -> TransferFunction {
-    ExtruderModel { drive: drive(), flow: flow() }.whole().unwrap()
+    ExtruderModel { drive: drive(), flow: flow() }.command_to_flow().unwrap()
 }
 
 fn drive() -> TransferFunction {
@@ -58,7 +58,7 @@ fn follow(model: &TransferFunction, inverse: &mut Inverse, late_s: f64) -> f64 {
 fn a_demand_that_is_known_ahead_is_met_when_it_is_due() {
     let mut inverse = Inverse::new(&extruder(), &settings()).unwrap();
     assert!((inverse.preview_s() - (0.054 + 0.05 + 0.0025)).abs() < 1e-12);
-    assert!(inverse.late_s().abs() < 1e-12);
+    assert!(inverse.delay_s().abs() < 1e-12);
     // What the placed pole's second order leaves: (ωτ)²/2 of the swing.
     let left = 200.0 * 0.5 * (1.3_f64 * 0.05).powi(2) + 80.0 * 0.5 * (3.1_f64 * 0.05).powi(2);
     let largest = follow(&extruder(), &mut inverse, 0.0);
@@ -68,13 +68,13 @@ fn a_demand_that_is_known_ahead_is_met_when_it_is_due() {
 #[test]
 fn without_a_preview_it_is_late_by_what_is_told() {
     let late =
-        InverseSettings { known_ahead: Span::ZERO, late: Span::from_secs(0.06), ..settings() };
+        InverseSettings { preview: Span::ZERO, max_delay: Span::from_secs(0.06), ..settings() };
     let mut inverse = Inverse::new(&extruder(), &late).unwrap();
     assert_eq!(inverse.preview_s(), 0.0);
-    let late_s = inverse.late_s();
+    let late_s = inverse.delay_s();
     assert!((late_s - 0.1065).abs() < 1e-12);
     assert!(follow(&extruder(), &mut inverse, late_s) < 1.6);
-    let refused = Inverse::new(&extruder(), &InverseSettings { late: Span::ZERO, ..late });
+    let refused = Inverse::new(&extruder(), &InverseSettings { max_delay: Span::ZERO, ..late });
     let refused = refused.unwrap_err();
     assert!(matches!(refused, FeedforwardError::DeadTime { known_s: 0.0, late_s: 0.0, .. }));
     assert!(refused.to_string().contains("dead time of 0.0540 s is longer"), "{refused}");
@@ -93,13 +93,13 @@ fn as_many_zeros_as_poles_need_no_placed_pole() {
 fn a_zero_in_the_right_half_plane_is_refused_or_mirrored_with_its_lateness() {
     let model = TransferFunction::new(&[-0.1, 1.0], &[0.5, 1.0], 0.02).unwrap();
     let refused = Inverse::new(&model, &settings()).unwrap_err();
-    assert_eq!(refused, FeedforwardError::RightZero { re: 10.0, im: 0.0 });
-    let mirror = InverseSettings { right_zeros: RightZeros::Mirror, ..settings() };
+    assert_eq!(refused, FeedforwardError::NonMinimumPhase { re: 10.0, im: 0.0 });
+    let mirror = InverseSettings { right_zeros: RightHalfPlaneZeros::Mirror, ..settings() };
     let mut inverse = Inverse::new(&model, &mirror).unwrap();
     assert!((inverse.preview_s() - (0.02 + 0.2 + 0.0025)).abs() < 1e-12);
     // An all-pass (10 − s)/(10 + s) led by 0.2 s: off by 2(ω/10)³/3 in phase.
     assert!(follow(&model, &mut inverse, 0.0) < 5.0);
-    let short = InverseSettings { known_ahead: Span::from_secs(0.1), ..mirror };
+    let short = InverseSettings { preview: Span::from_secs(0.1), ..mirror };
     assert!(matches!(Inverse::new(&model, &short), Err(FeedforwardError::DeadTime { .. })));
     let pair = TransferFunction::new(&[1.0, -2.0, 10.0], &[1.0, 3.0, 5.0], 0.0).unwrap();
     let inverse = Inverse::new(&pair, &mirror).unwrap();
@@ -152,13 +152,13 @@ fn the_forecast_is_the_plants_flow_as_far_ahead_as_the_dead_time() {
     forecast.start(3.0).unwrap();
     screw.settle(3.0).unwrap();
     nozzle.settle(3.0 * drive().dc_gain()).unwrap();
-    let mut foretold = Vec::new();
+    let mut predicted = Vec::new();
     for step in 0..2000_u32 {
         let command = if step % 200 < 100 { 3.4 } else { 2.5 };
         let flow = nozzle.step(screw.step(command));
-        foretold.push(forecast.step(command, None).get());
+        predicted.push(forecast.step(command, None).get());
         if let Some(then) = (step as usize).checked_sub(10) {
-            assert!((foretold[then] - flow).abs() < 1e-6 * flow, "{step}");
+            assert!((predicted[then] - flow).abs() < 1e-6 * flow, "{step}");
         }
     }
     let refused = new(0.06).unwrap_err();
@@ -176,17 +176,17 @@ fn the_encoder_makes_good_for_a_drive_that_is_not_as_modelled() {
         let mut forecast = FlowForecast::new(&model, screw, ahead, PERIOD).unwrap();
         let mut real = Simulator::new(&slow, 0.005, Between::Held).unwrap();
         let mut nozzle = Simulator::new(&flow(), 0.005, Between::Linear).unwrap();
-        let (mut foretold, mut sum) = (std::collections::VecDeque::from(vec![0.0; 4]), 0.0);
+        let (mut predicted, mut sum) = (std::collections::VecDeque::from(vec![0.0; 4]), 0.0);
         forecast.start(0.0).unwrap();
         for step in 0..4000_u32 {
             let command = if step % 800 < 400 { 3.4 } else { 2.5 };
             let rpm = real.step(command);
             let flow = nozzle.step(rpm);
-            foretold.push_back(forecast.step(command, Rpm::new(rpm).ok()).get());
+            predicted.push_back(forecast.step(command, Rpm::new(rpm).ok()).get());
             if step > 1000 {
-                sum += (foretold[0] - flow).powi(2);
+                sum += (predicted[0] - flow).powi(2);
             }
-            foretold.pop_front();
+            predicted.pop_front();
         }
         (sum / 3000.0_f64).sqrt()
     };
@@ -215,12 +215,12 @@ fn the_observer_reaches_the_bound_that_age_sets() {
     let part = UnmodelledFlow {
         sigma: Mm3PerS::constant(30.0),
         correlation_s: 0.15,
-        wander: Mm3PerS::constant(0.01),
+        drift: Mm3PerS::constant(0.01),
     };
     let noise = coloured(60_000, 0.01, 0.15);
     for age in [2_usize, 10, 25] {
         let mut observer = FlowObserver::new(part).unwrap();
-        let (mut sum, mut count, mut told, offset) = (0.0, 0.0, 0.0, 90.0);
+        let (mut sum, mut count, mut last, offset) = (0.0, 0.0, 0.0, 90.0);
         for now in 2000..noise.len() {
             let stamp = |step: usize| Stamp::from_ns(step as u64 * 10_000_000);
             let residual = Mm3PerS::new(30.0 * noise[now - age] + offset).unwrap();
@@ -230,13 +230,13 @@ fn the_observer_reaches_the_bound_that_age_sets() {
                 let left = 30.0 * noise[now] + offset - observer.estimate(stamp(now)).get();
                 sum += left * left;
                 count += 1.0;
-                told = observer.sigma(stamp(now)).get();
+                last = observer.sigma(stamp(now)).get();
             }
         }
-        let share = f64::sqrt(sum / count) / 30.0;
-        let bound = share_left(0.01 * f64::from(u32::try_from(age).unwrap()), 0.15);
-        assert!((share / bound - 1.0).abs() < 0.03, "{age}: {share} {bound}");
-        assert!((told / 30.0 / bound - 1.0).abs() < 0.03, "{age}: {told}");
+        let fraction = f64::sqrt(sum / count) / 30.0;
+        let bound = unpredictable_fraction(0.01 * f64::from(u32::try_from(age).unwrap()), 0.15);
+        assert!((fraction / bound - 1.0).abs() < 0.03, "{age}: {fraction} {bound}");
+        assert!((last / 30.0 / bound - 1.0).abs() < 0.03, "{age}: {last}");
     }
 }
 
@@ -245,7 +245,7 @@ fn an_old_measurement_adds_to_a_fresh_one_and_spoils_nothing() {
     let part = UnmodelledFlow {
         sigma: Mm3PerS::constant(30.0),
         correlation_s: 0.15,
-        wander: Mm3PerS::constant(0.1),
+        drift: Mm3PerS::constant(0.1),
     };
     let mut observer = FlowObserver::new(part).unwrap();
     let at = Stamp::from_secs(1.0);
@@ -267,26 +267,28 @@ fn measurements_from_before_the_memory_or_the_future_are_left_out() {
     let part = UnmodelledFlow {
         sigma: Mm3PerS::constant(30.0),
         correlation_s: 0.15,
-        wander: Mm3PerS::ZERO,
+        drift: Mm3PerS::ZERO,
     };
     let observer = FlowObserver::new(part).unwrap();
     let robot = FirstOrder { gain: 1.0, time_constant_s: 0.016, zero_s: 0.0, dead_time_s: 0.0 };
     let axis = Inverse::new(&robot.transfer().unwrap(), &settings()).unwrap();
     let memory = Span::from_secs(1.0);
-    let mut law = SpeedFeedforward::new(forecast, Some(observer), axis, PERIOD, memory).unwrap();
+    let mut controller =
+        SpeedFeedforward::new(forecast, Some(observer), axis, PERIOD, memory).unwrap();
     let area = Mm2::constant(45.0);
-    law.start(3.0, area, 44.0).unwrap();
+    controller.start(3.0, area, 44.0).unwrap();
     let mut now = Stamp::START;
-    let mut done = law.step(now, 3.0, None, area);
+    let mut done = controller.step(now, 3.0, None, area);
     for _ in 0..400 {
         now = now + PERIOD;
-        done = law.step(now, 3.0, None, area);
+        done = controller.step(now, 3.0, None, area);
     }
     assert!((done.speed.get() - done.modelled.get() / 45.0).abs() < 1e-9);
-    let seen = |at| FlowSeen { at, flow: Mm3PerS::constant(2050.0), sigma: Mm3PerS::constant(1.0) };
-    assert!(!law.measure(&seen(now + PERIOD)));
-    assert!(!law.measure(&seen(now - Span::from_secs(1.1))));
-    assert!(law.measure(&seen(now - Span::from_secs(0.5))));
-    let after = law.step(now + PERIOD, 3.0, None, area);
-    assert!(after.added.get() > 20.0 && after.speed > done.speed, "{after:?}");
+    let seen =
+        |at| FlowMeasurement { at, flow: Mm3PerS::constant(2050.0), sigma: Mm3PerS::constant(1.0) };
+    assert!(!controller.measure(&seen(now + PERIOD)));
+    assert!(!controller.measure(&seen(now - Span::from_secs(1.1))));
+    assert!(controller.measure(&seen(now - Span::from_secs(0.5))));
+    let after = controller.step(now + PERIOD, 3.0, None, area);
+    assert!(after.correction.get() > 20.0 && after.speed > done.speed, "{after:?}");
 }

@@ -12,17 +12,17 @@ use crate::numeric::lti::{StateSpace, TransferFunction};
 
 /// Periods of the command in one time constant of the placed poles: with fewer,
 /// the feedback, which is held over a period, swings.
-const LEAST_PERIODS: f64 = 4.0;
+const MIN_PERIODS: f64 = 4.0;
 
 /// The model's state with the feedback on it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracker {
     /// State over one period of a command that is held.
-    moves: DMatrix<f64>,
-    driven: DVector<f64>,
+    transition: DMatrix<f64>,
+    input_vector: DVector<f64>,
     /// The command for each unit of the state and of the demand.
-    by_state: DVector<f64>,
-    by_demand: f64,
+    state_gain: DVector<f64>,
+    demand_gain: f64,
     /// State for each unit of a command that stands.
     steady: DVector<f64>,
     gain: f64,
@@ -53,9 +53,9 @@ impl Tracker {
         } else {
             feedback(&space, excess, settings.time_constant_s)
         };
-        let least_s = LEAST_PERIODS * settings.period.secs();
+        let least_s = MIN_PERIODS * settings.period.secs();
         if excess > 0 && settings.time_constant_s < least_s {
-            return Err(FeedforwardError::TooQuick {
+            return Err(FeedforwardError::PolesTooFast {
                 time_constant_s: settings.time_constant_s,
                 period_s: settings.period.secs(),
                 least_s,
@@ -63,10 +63,10 @@ impl Tracker {
         }
         let order = space.b.len();
         Ok(Self {
-            moves: over.state,
-            driven: over.constant,
-            by_state,
-            by_demand,
+            transition: over.state,
+            input_vector: over.constant,
+            state_gain: by_state,
+            demand_gain: by_demand,
             steady: space.steady()?,
             gain,
             period: settings.period,
@@ -92,16 +92,16 @@ impl Tracker {
     }
 
     /// One period passes with what was applied over it.
-    pub fn pass(&mut self, applied: f64) {
-        self.next.copy_from(&self.driven);
+    pub fn advance(&mut self, applied: f64) {
+        self.next.copy_from(&self.input_vector);
         self.next *= applied;
-        self.next.gemv(1.0, &self.moves, &self.state, 1.0);
+        self.next.gemv(1.0, &self.transition, &self.state, 1.0);
         std::mem::swap(&mut self.state, &mut self.next);
     }
 
     /// The command for a demand now.
     pub fn command(&self, demand: f64) -> f64 {
-        self.by_state.dot(&self.state) + self.by_demand * demand
+        self.state_gain.dot(&self.state) + self.demand_gain * demand
     }
 }
 
@@ -110,16 +110,16 @@ fn feedback(space: &StateSpace, excess: usize, time_constant_s: f64) -> (DVector
     let mut row = space.c.clone();
     let mut wanted = DVector::zeros(space.b.len());
     let (mut binomial, mut power) = (1.0, 1.0);
-    let mut reach = 0.0;
+    let mut lead_gain = 0.0;
     for derivative in 0..excess {
         wanted += &row * (binomial * power);
-        reach = row.dot(&space.b);
+        lead_gain = row.dot(&space.b);
         row = space.a.tr_mul(&row);
         #[expect(clippy::cast_precision_loss, reason = "an order is small")]
         let step = (excess - derivative) as f64 / (derivative + 1) as f64;
         binomial *= step;
         power *= time_constant_s;
     }
-    let by_state = -(wanted / power + row) / reach;
-    (by_state, 1.0 / (power * reach))
+    let by_state = -(wanted / power + row) / lead_gain;
+    (by_state, 1.0 / (power * lead_gain))
 }

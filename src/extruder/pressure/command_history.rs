@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use super::Fopdt;
 
 /// Commands a second that are kept over the longest delay that is asked for.
-const HZ: f64 = 250.0;
+const MAX_COMMANDS_PER_S: f64 = 250.0;
 
 /// A command from a moment on, and the lags at that moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,19 +15,19 @@ struct Entry {
     at_s: f64,
     /// Gain times command \[MPa\].
     drive: f64,
-    lags: Lags,
+    lags: LagStates,
 }
 
 /// One lag of the commands, and a second one of the first, both \[MPa\].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lags {
+pub struct LagStates {
     /// The pressure of a process with lag and gain and no dead time.
     pub first: f64,
     /// The same once more through the lag.
     pub second: f64,
 }
 
-impl Lags {
+impl LagStates {
     /// After `dt_s` under a steady drive (zero-order hold, closed form).
     fn after(self, drive: f64, dt_s: f64, lag_s: f64) -> Self {
         let x = dt_s.max(0.0) / lag_s;
@@ -39,11 +39,11 @@ impl Lags {
 
 /// What holds at a moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moment {
+pub struct ModelMoment {
     /// Gain times the command that was in force just before \[MPa\].
     pub drive: f64,
     /// The lags.
-    pub lags: Lags,
+    pub lags: LagStates,
 }
 
 /// The commands of the last while.
@@ -54,7 +54,7 @@ pub struct CommandHistory {
     /// The oldest first; never empty.
     entries: VecDeque<Entry>,
     /// How many are kept.
-    most: usize,
+    capacity: usize,
 }
 
 impl CommandHistory {
@@ -67,11 +67,11 @@ impl CommandHistory {
     )]
     pub fn new(model: &Fopdt, back_s: f64, speed_rpm: f64) -> Self {
         let drive = model.gain() * speed_rpm;
-        let lags = Lags { first: drive, second: drive };
-        let most = (back_s.clamp(0.0, 1e3) * HZ).ceil() as usize + 2;
+        let lags = LagStates { first: drive, second: drive };
+        let most = (back_s.clamp(0.0, 1e3) * MAX_COMMANDS_PER_S).ceil() as usize + 2;
         let mut entries = VecDeque::with_capacity(most);
         entries.push_back(Entry { at_s: f64::NEG_INFINITY, drive, lags });
-        Self { gain: model.gain(), lag_s: model.lag_s(), entries, most }
+        Self { gain: model.gain(), lag_s: model.lag_s(), entries, capacity: most }
     }
 
     /// A command from `at_s` on; not before the last one.
@@ -85,7 +85,7 @@ impl CommandHistory {
         match self.entries.back_mut() {
             Some(last) if last.at_s == at_s => *last = entry,
             _ => {
-                if self.entries.len() >= self.most {
+                if self.entries.len() >= self.capacity {
                     self.entries.pop_front();
                 }
                 self.entries.push_back(entry);
@@ -94,10 +94,10 @@ impl CommandHistory {
     }
 
     /// What holds at a moment. Before all that is kept, the earliest.
-    pub fn at(&self, at_s: f64) -> Moment {
+    pub fn at(&self, at_s: f64) -> ModelMoment {
         let entry = self.in_force(at_s);
         let dt_s = if entry.at_s.is_finite() { at_s - entry.at_s } else { 0.0 };
-        Moment { drive: entry.drive, lags: entry.lags.after(entry.drive, dt_s, self.lag_s) }
+        ModelMoment { drive: entry.drive, lags: entry.lags.after(entry.drive, dt_s, self.lag_s) }
     }
 
     /// Gain times the command that was in force just before a moment \[MPa\].
@@ -108,7 +108,7 @@ impl CommandHistory {
     /// The command in force just before: one that begins now does not count.
     fn in_force(&self, at_s: f64) -> Entry {
         let later = self.entries.partition_point(|entry| entry.at_s < at_s);
-        let nothing = Lags { first: 0.0, second: 0.0 };
+        let nothing = LagStates { first: 0.0, second: 0.0 };
         self.entries.get(later.saturating_sub(1)).copied().unwrap_or(Entry {
             at_s: f64::NEG_INFINITY,
             drive: 0.0,

@@ -5,24 +5,24 @@
 
 /// The zones of corrections \[MPa\], and the share that is made within.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Zone {
+pub struct DeadZone {
     /// Share of a correction that is made within the dead zone, 0 to 1.
-    pub share: f64,
+    pub inner_gain: f64,
     /// Size of correction up to which the share holds \[MPa\].
-    pub dead: f64,
+    pub inner: f64,
     /// Size from which on all of it is made \[MPa\].
-    pub weak: f64,
+    pub outer: f64,
 }
 
-impl Zone {
+impl DeadZone {
     /// What is made of a correction \[MPa\]: odd, continuous, never falling.
-    pub fn made(&self, correction: f64) -> f64 {
+    pub fn applied(&self, correction: f64) -> f64 {
         let size = correction.abs();
-        let made = if size <= self.dead {
-            self.share * size
-        } else if size < self.weak {
-            let at_rim = self.share * self.dead;
-            at_rim + (self.weak - at_rim) * (size - self.dead) / (self.weak - self.dead)
+        let made = if size <= self.inner {
+            self.inner_gain * size
+        } else if size < self.outer {
+            let at_rim = self.inner_gain * self.inner;
+            at_rim + (self.outer - at_rim) * (size - self.inner) / (self.outer - self.inner)
         } else {
             size
         };
@@ -35,19 +35,19 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const ZONE: Zone = Zone { share: 0.3, dead: 0.03, weak: 0.07 };
+    const ZONE: DeadZone = DeadZone { inner_gain: 0.3, inner: 0.03, outer: 0.07 };
 
     #[test]
     fn a_share_within_and_all_beyond() {
-        assert!((ZONE.made(0.02) - 0.006).abs() < 1e-15);
-        assert_eq!(ZONE.made(-0.07), -0.07);
-        assert_eq!(ZONE.made(5.0), 5.0);
+        assert!((ZONE.applied(0.02) - 0.006).abs() < 1e-15);
+        assert_eq!(ZONE.applied(-0.07), -0.07);
+        assert_eq!(ZONE.applied(5.0), 5.0);
     }
 
     proptest! {
         #[test]
         fn it_is_continuous_and_never_falls(at in -0.2..0.2_f64, more in 0.0..1e-3_f64) {
-            let (low, high) = (ZONE.made(at), ZONE.made(at + more));
+            let (low, high) = (ZONE.applied(at), ZONE.applied(at + more));
             prop_assert!(high >= low);
             prop_assert!(high - low <= 2.0 * more);
         }

@@ -5,14 +5,14 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::command_history::{Lags, Moment};
+use super::command_history::{LagStates, ModelMoment};
 use super::tuning::Tuning;
 
 /// Load's part of the pressure now and once settled \[MPa\]; errors of gain,
 /// lag and dead time as shares.
-pub type State = SVector<f64, 5>;
+pub type ModelState = SVector<f64, 5>;
 /// Covariances of the state.
-pub type Covariance = SMatrix<f64, 5, 5>;
+pub type StateCovariance = SMatrix<f64, 5, 5>;
 
 /// Place of the load's part of the pressure now.
 pub const LOAD_NOW: usize = 0;
@@ -23,32 +23,32 @@ pub const GAIN: usize = 2;
 /// Place of the lag's error.
 pub const LAG: usize = 3;
 /// Place of the dead time's error.
-pub const DEAD: usize = 4;
+pub const DEAD_TIME: usize = 4;
 
 /// How much of the change of slope within the dead time's doubt counts as
 /// noise: what the straight line of the sensitivity misses.
-const BEND: f64 = 0.27;
+const CURVATURE_NOISE: f64 = 0.27;
 /// Errors of gain and lag are taken to lie within these shares.
-const LEAST: f64 = -0.4;
-const MOST: f64 = 0.5;
+const MIN_RELATIVE_ERROR: f64 = -0.4;
+const MAX_RELATIVE_ERROR: f64 = 0.5;
 
 /// Constants of the filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Filter {
+pub struct FilterSettings {
     /// The model's lag \[s\].
     pub lag_s: f64,
     /// The model's dead time \[s\].
     pub dead_time_s: f64,
     /// Standard deviation of the dead time about this belief's own, as a share.
-    pub dead_doubt: f64,
+    pub dead_time_sigma: f64,
     /// The law's settings.
     pub tuning: Tuning,
 }
 
-impl Filter {
-    fn prior(&self, place: usize) -> f64 {
-        let doubt = if place == DEAD { self.dead_doubt } else { self.tuning.doubt };
-        doubt * doubt
+impl FilterSettings {
+    fn prior(&self, index: usize) -> f64 {
+        let sigma = if index == DEAD_TIME { self.dead_time_sigma } else { self.tuning.model_sigma };
+        sigma * sigma
     }
 }
 
@@ -56,21 +56,25 @@ impl Filter {
 /// while the pressure moves: at rest there would be nothing to learn it anew
 /// from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Left {
+pub struct Transition {
     /// Share of the load's way that is still to go.
-    load: f64,
+    load_decay: f64,
     /// Share of what is known of the model's errors.
-    known: f64,
+    model_decay: f64,
     /// Variance that the load has gained \[MPa²\].
-    wandered: f64,
+    load_drift: f64,
 }
 
-impl Left {
+impl Transition {
     /// After `dt_s` at rest, and after the same while the pressure moves.
-    pub fn after(filter: &Filter, dt_s: f64) -> [Self; 2] {
+    pub fn after(filter: &FilterSettings, dt_s: f64) -> [Self; 2] {
         let load = libm::exp(-dt_s / filter.lag_s);
-        let wandered = filter.tuning.wander * dt_s;
-        [1.0, libm::exp(-dt_s / filter.tuning.forget_s)].map(|known| Self { load, known, wandered })
+        let wandered = filter.tuning.load_drift * dt_s;
+        [1.0, libm::exp(-dt_s / filter.tuning.forgetting_s)].map(|known| Self {
+            load_decay: load,
+            model_decay: known,
+            load_drift: wandered,
+        })
     }
 }
 
@@ -85,39 +89,40 @@ pub struct Innovation {
 
 /// The belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Belief {
+pub struct Hypothesis {
     /// The dead time that is believed in \[s\].
     pub dead_time_s: f64,
     /// Its probability.
     pub weight: f64,
-    state: State,
-    covariance: Covariance,
+    state: ModelState,
+    covariance: StateCovariance,
 }
 
-impl Belief {
+impl Hypothesis {
     /// Before the first reading, under a load that is known \[MPa\].
-    pub fn new(filter: &Filter, dead_time_s: f64, weight: f64, load: f64) -> Self {
-        let sure = 2e-4 * filter.tuning.reading;
-        let mut covariance = Covariance::zeros();
-        for place in [LOAD_NOW, LOAD] {
-            covariance[(place, place)] = sure;
+    pub fn new(filter: &FilterSettings, dead_time_s: f64, weight: f64, load: f64) -> Self {
+        let sure = 2e-4 * filter.tuning.reading_variance;
+        let mut covariance = StateCovariance::zeros();
+        for index in [LOAD_NOW, LOAD] {
+            covariance[(index, index)] = sure;
         }
-        for place in [GAIN, LAG, DEAD] {
-            covariance[(place, place)] = filter.prior(place);
+        for index in [GAIN, LAG, DEAD_TIME] {
+            covariance[(index, index)] = filter.prior(index);
         }
-        let mut state = State::zeros();
+        let mut state = ModelState::zeros();
         state[LOAD_NOW] = load;
         state[LOAD] = load;
         Self { dead_time_s, weight, state, covariance }
     }
 
     /// Lets time pass, by what it leaves.
-    pub fn pass(&mut self, filter: &Filter, left: &Left) {
-        let toward = |now: f64, settled: f64| left.load * now + (1.0 - left.load) * settled;
+    pub fn advance(&mut self, filter: &FilterSettings, left: &Transition) {
+        let toward =
+            |now: f64, settled: f64| left.load_decay * now + (1.0 - left.load_decay) * settled;
         let (state, covariance) = (&mut self.state, &mut self.covariance);
         state[LOAD_NOW] = toward(state[LOAD_NOW], state[LOAD]);
-        for place in [GAIN, LAG, DEAD] {
-            state[place] *= left.known;
+        for index in [GAIN, LAG, DEAD_TIME] {
+            state[index] *= left.model_decay;
         }
         // The step's matrix from the left and its transpose from the right: it
         // mixes the two loads and shrinks the rest.
@@ -127,33 +132,35 @@ impl Belief {
         for i in 0..5 {
             covariance[(i, LOAD_NOW)] = toward(covariance[(i, LOAD_NOW)], covariance[(i, LOAD)]);
         }
-        for place in [GAIN, LAG, DEAD] {
+        for index in [GAIN, LAG, DEAD_TIME] {
             for i in 0..5 {
-                covariance[(place, i)] *= left.known;
-                covariance[(i, place)] *= left.known;
+                covariance[(index, i)] *= left.model_decay;
+                covariance[(i, index)] *= left.model_decay;
             }
         }
-        covariance[(LOAD, LOAD)] += left.wandered;
-        for place in [GAIN, LAG, DEAD] {
-            covariance[(place, place)] += (1.0 - left.known * left.known) * filter.prior(place);
+        covariance[(LOAD, LOAD)] += left.load_drift;
+        for index in [GAIN, LAG, DEAD_TIME] {
+            covariance[(index, index)] +=
+                (1.0 - left.model_decay * left.model_decay) * filter.prior(index);
         }
     }
 
     /// Takes a reading \[MPa\]. `then` is the model a dead time ago; `around`
     /// its drives at either end of the dead time's doubt.
-    pub fn read(
+    pub fn update(
         &mut self,
-        filter: &Filter,
+        filter: &FilterSettings,
         reading: f64,
-        then: &Moment,
+        then: &ModelMoment,
         around: [f64; 2],
     ) -> Innovation {
-        let Lags { first, second } = then.lags;
+        let LagStates { first, second } = then.lags;
         let slope = (then.drive - first) / filter.lag_s;
-        let row = State::from([1.0, 0.0, first, second - first, -filter.dead_time_s * slope]);
+        let row = ModelState::from([1.0, 0.0, first, second - first, -filter.dead_time_s * slope]);
         let turn = around.map(|drive| (drive - then.drive).abs());
-        let bend = BEND * self.dead_sigma_s(filter) / filter.lag_s * turn[0].max(turn[1]);
-        let noise = filter.tuning.reading + bend * bend;
+        let bend =
+            CURVATURE_NOISE * self.dead_time_sigma_s(filter) / filter.lag_s * turn[0].max(turn[1]);
+        let noise = filter.tuning.reading_variance + bend * bend;
         let along = self.covariance * row;
         let variance = noise + row.dot(&along).max(0.0);
         let difference = reading - first - row.dot(&self.state);
@@ -167,8 +174,8 @@ impl Belief {
 
     /// Adds a step of the load that began a while ago: `settled` \[MPa\] of
     /// which the share `grown` shows, known with a variance.
-    pub fn jump(&mut self, settled: f64, grown: f64, variance: f64) {
-        let mut way = State::zeros();
+    pub fn add_load_step(&mut self, settled: f64, grown: f64, variance: f64) {
+        let mut way = ModelState::zeros();
         way[LOAD_NOW] = grown;
         way[LOAD] = 1.0;
         self.state += way * settled;
@@ -176,27 +183,27 @@ impl Belief {
     }
 
     /// Whether rounding or wild readings have left nothing to go on from.
-    pub fn is_lost(&self) -> bool {
-        let sound = |place| {
-            let variance: f64 = self.covariance[(place, place)];
+    pub fn has_diverged(&self) -> bool {
+        let sound = |index| {
+            let variance: f64 = self.covariance[(index, index)];
             variance.is_finite() && variance >= 0.0
         };
         !(self.state.iter().all(|value| value.is_finite()) && (0..5).all(sound))
     }
 
     /// Standard deviation of the dead time about this belief's own \[s\].
-    pub fn dead_sigma_s(&self, filter: &Filter) -> f64 {
-        self.covariance[(DEAD, DEAD)].max(0.0).sqrt() * filter.dead_time_s
+    pub fn dead_time_sigma_s(&self, filter: &FilterSettings) -> f64 {
+        self.covariance[(DEAD_TIME, DEAD_TIME)].max(0.0).sqrt() * filter.dead_time_s
     }
 
     /// Gain's error.
-    pub fn gain(&self) -> f64 {
-        self.state[GAIN].clamp(LEAST, MOST)
+    pub fn gain_error(&self) -> f64 {
+        self.state[GAIN].clamp(MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR)
     }
 
     /// Lag's error.
-    pub fn lag(&self) -> f64 {
-        self.state[LAG].clamp(LEAST, MOST)
+    pub fn lag_error(&self) -> f64 {
+        self.state[LAG].clamp(MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR)
     }
 
     /// The load's part of the pressure once settled \[MPa\].
@@ -205,25 +212,25 @@ impl Belief {
     }
 
     /// Dead time with its error \[s\].
-    pub fn dead_s(&self, filter: &Filter) -> f64 {
-        let share = self.state[DEAD].clamp(LEAST, MOST);
-        (self.dead_time_s + share * filter.dead_time_s).max(0.0)
+    pub fn corrected_dead_time_s(&self, filter: &FilterSettings) -> f64 {
+        let fraction = self.state[DEAD_TIME].clamp(MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR);
+        (self.dead_time_s + fraction * filter.dead_time_s).max(0.0)
     }
 
     /// The pressure a dead time from now \[MPa\], where the commands until now
     /// will have brought it, and the row that it is of the state.
-    pub fn foretell(&self, filter: &Filter, now: &Lags) -> (f64, State) {
+    pub fn predict(&self, filter: &FilterSettings, now: &LagStates) -> (f64, ModelState) {
         let kept = libm::exp(-self.dead_time_s / filter.lag_s);
         let bent = now.second - now.first;
-        let pressure = now.first * (1.0 + self.gain())
-            + bent * self.lag()
+        let pressure = now.first * (1.0 + self.gain_error())
+            + bent * self.lag_error()
             + kept * self.state[LOAD_NOW]
             + (1.0 - kept) * self.state[LOAD];
-        (pressure, State::from([kept, 1.0 - kept, now.first, bent, 0.0]))
+        (pressure, ModelState::from([kept, 1.0 - kept, now.first, bent, 0.0]))
     }
 
     /// Covariances of the state with a row of it.
-    pub fn along(&self, row: &State) -> State {
+    pub fn covariance_with(&self, row: &ModelState) -> ModelState {
         self.covariance * row
     }
 }

@@ -9,52 +9,59 @@ const WINDOW: usize = 16;
 
 /// Nothing is told apart from a step that has grown to all but this; powers of
 /// it over the window stay within the numbers.
-const LEAST: f64 = 1e-6;
+const MIN_DECAY: f64 = 1e-6;
 
 /// A step of the load.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Jump {
+pub struct LoadStep {
     /// Its size once settled \[MPa\].
     pub settled: f64,
     /// Share of it that shows by now.
-    pub grown: f64,
+    pub shown_fraction: f64,
     /// Variance of its size \[MPa²\].
     pub variance: f64,
 }
 
 /// The last innovations.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Watch {
+pub struct LoadStepDetector {
     lag_s: f64,
-    load: f64,
-    evidence: f64,
+    step_sigma: f64,
+    threshold: f64,
     /// The newest first.
-    seen: [Seen; WINDOW],
+    innovations: [TimedInnovation; WINDOW],
     count: usize,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Seen {
+struct TimedInnovation {
     innovation: Innovation,
     /// Share that is left of the time since the one before, in lags.
-    kept: f64,
+    decay: f64,
 }
 
-const NOTHING: Seen = Seen { innovation: Innovation { difference: 0.0, variance: 1.0 }, kept: 1.0 };
+const NO_INNOVATION: TimedInnovation =
+    TimedInnovation { innovation: Innovation { difference: 0.0, variance: 1.0 }, decay: 1.0 };
 
-impl Watch {
+impl LoadStepDetector {
     /// For a lag \[s\], steps of this standard deviation \[MPa\], and the
     /// logarithm of the ratio from which on one is taken for real.
     pub fn new(lag_s: f64, load: f64, evidence: f64) -> Self {
-        Self { lag_s, load, evidence, seen: [NOTHING; WINDOW], count: 0 }
+        Self {
+            lag_s,
+            step_sigma: load,
+            threshold: evidence,
+            innovations: [NO_INNOVATION; WINDOW],
+            count: 0,
+        }
     }
 
     /// Takes an innovation, `dt_s` after the last, and tells of a step. After
     /// one it begins anew.
-    pub fn see(&mut self, innovation: Innovation, dt_s: f64) -> Option<Jump> {
-        self.seen.rotate_right(1);
-        let kept = libm::exp(-dt_s / self.lag_s).max(LEAST);
-        self.seen[0] = Seen { innovation, kept };
+    pub fn update(&mut self, innovation: Innovation, dt_s: f64) -> Option<LoadStep> {
+        self.innovations.rotate_right(1);
+        let kept = libm::exp(-dt_s / self.lag_s).max(MIN_DECAY);
+        self.innovations[0] = TimedInnovation { innovation, decay: kept };
         self.count = (self.count + 1).min(WINDOW);
         let jump = self.likeliest();
         if jump.is_some() {
@@ -66,36 +73,36 @@ impl Watch {
     /// Goes back through the innovations. What a step had grown to at each of
     /// them is 1 − left/passed, `passed` being what the time between it and
     /// the newest leaves, so that sums over `passed` serve every beginning.
-    fn likeliest(&self) -> Option<Jump> {
-        let mut best = (self.evidence, None);
+    fn likeliest(&self) -> Option<LoadStep> {
+        let mut best = (self.threshold, None);
         let (mut passed, mut sums) = (1.0, Sums::default());
-        for (back, seen) in self.seen.iter().take(self.count).enumerate() {
+        for (back, seen) in self.innovations.iter().take(self.count).enumerate() {
             sums.add(seen.innovation, passed);
             if back > 0 {
-                let (ratio, jump) = self.of_step(&sums, passed * seen.kept.sqrt());
+                let (ratio, jump) = self.fit_step(&sums, passed * seen.decay.sqrt());
                 if ratio > best.0 {
                     best = (ratio, Some(jump));
                 }
             }
-            passed *= seen.kept;
+            passed *= seen.decay;
         }
         best.1
     }
 
     /// A step that began half an interval before the last innovation of the
     /// sums and of which the share `left` is still to come.
-    fn of_step(&self, sums: &Sums, left: f64) -> (f64, Jump) {
+    fn fit_step(&self, sums: &Sums, left: f64) -> (f64, LoadStep) {
         let with = sums.difference[0] - left * sums.difference[1];
         let power = sums.weight[0] - 2.0 * left * sums.weight[1] + left * left * sums.weight[2];
         if power <= 0.0 {
             let settled = 0.0;
-            return (f64::NEG_INFINITY, Jump { settled, grown: 0.0, variance: 0.0 });
+            return (f64::NEG_INFINITY, LoadStep { settled, shown_fraction: 0.0, variance: 0.0 });
         }
-        let prior = self.load * self.load;
-        let share = prior / (prior + 1.0 / power);
-        let ratio = 0.5 * with * with / power * share - 0.5 * libm::log(1.0 + prior * power);
-        let settled = share * with / power;
-        (ratio, Jump { settled, grown: 1.0 - left, variance: share / power })
+        let prior = self.step_sigma * self.step_sigma;
+        let shrinkage = prior / (prior + 1.0 / power);
+        let ratio = 0.5 * with * with / power * shrinkage - 0.5 * libm::log(1.0 + prior * power);
+        let settled = shrinkage * with / power;
+        (ratio, LoadStep { settled, shown_fraction: 1.0 - left, variance: shrinkage / power })
     }
 }
 
@@ -126,15 +133,15 @@ mod tests {
 
     const SIGMA: f64 = 0.007;
 
-    fn watch(load: f64, seed: u64, count: u64) -> (u32, Option<(u64, Jump)>) {
-        let mut watch = Watch::new(0.84, 0.06, 3.65);
+    fn watch(load: f64, seed: u64, count: u64) -> (u32, Option<(u64, LoadStep)>) {
+        let mut watch = LoadStepDetector::new(0.84, 0.06, 3.65);
         let (mut found, mut first) = (0, None);
         for i in 0..count {
             let [a, _] = normal_pair(mix(&[seed, i]));
             let t = (0.02 * (f64::from(u32::try_from(i).unwrap()) - 99.5)).max(0.0);
             let difference = SIGMA * a + load * (1.0 - f64::exp(-t / 0.84));
             let variance = SIGMA * SIGMA;
-            if let Some(jump) = watch.see(Innovation { difference, variance }, 0.02) {
+            if let Some(jump) = watch.update(Innovation { difference, variance }, 0.02) {
                 found += 1;
                 if i >= 100 && first.is_none() {
                     first = Some((i, jump));
@@ -164,15 +171,15 @@ mod tests {
 
     /// The ratio written out: a step that began half an interval before the
     /// innovation at `first` would show as `grown` at each one since.
-    fn written_out(watch: &Watch, first: usize) -> f64 {
+    fn written_out(watch: &LoadStepDetector, first: usize) -> f64 {
         let (mut with, mut power, mut left) = (0.0, 0.0, 1.0);
-        for (index, seen) in watch.seen.iter().take(first + 1).rev().enumerate() {
-            left *= if index == 0 { seen.kept.sqrt() } else { seen.kept };
+        for (index, seen) in watch.innovations.iter().take(first + 1).rev().enumerate() {
+            left *= if index == 0 { seen.decay.sqrt() } else { seen.decay };
             let grown = 1.0 - left;
             with += grown * seen.innovation.difference / seen.innovation.variance;
             power += grown * grown / seen.innovation.variance;
         }
-        let prior = watch.load * watch.load;
+        let prior = watch.step_sigma * watch.step_sigma;
         0.5 * with * with / power * prior / (prior + 1.0 / power)
             - 0.5 * f64::ln(1.0 + prior * power)
     }
@@ -181,18 +188,18 @@ mod tests {
     fn the_sums_come_to_the_ratio_written_out() {
         for gap in [1e-3, 0.02, 0.3, 40.0, 1e4] {
             // Never taken for real, so that nothing begins anew.
-            let mut watch = Watch::new(0.84, 0.06, f64::INFINITY);
+            let mut watch = LoadStepDetector::new(0.84, 0.06, f64::INFINITY);
             for i in 0..40 {
                 let [a, b] = normal_pair(mix(&[7, i]));
                 let variance = SIGMA * SIGMA * (1.0 + b.abs());
                 let dt = if i == 30 { gap } else { 0.02 };
-                watch.see(Innovation { difference: SIGMA * a, variance }, dt);
+                watch.update(Innovation { difference: SIGMA * a, variance }, dt);
             }
             let expected = (1..WINDOW).map(|first| written_out(&watch, first));
             let best = expected.fold(f64::NEG_INFINITY, f64::max);
-            watch.evidence = best - 1e-9;
+            watch.threshold = best - 1e-9;
             assert!(watch.likeliest().is_some(), "{gap}");
-            watch.evidence = best + 1e-9;
+            watch.threshold = best + 1e-9;
             assert!(watch.likeliest().is_none(), "{gap}");
         }
     }

@@ -3,33 +3,33 @@
 //! would follow it (multiple-model estimation, Magill 1965).
 
 use super::Fopdt;
-use super::command_history::{CommandHistory, Lags};
-use super::hypothesis::{Belief, Filter, GAIN, LAG, LOAD, Left, State};
-use super::load_step::Watch;
+use super::command_history::{CommandHistory, LagStates};
+use super::hypothesis::{FilterSettings, GAIN, Hypothesis, LAG, LOAD, ModelState, Transition};
+use super::load_step::LoadStepDetector;
 use super::tuning::Tuning;
 
 /// Dead times beside each other, out to two standard deviations.
-const BELIEFS: usize = 5;
+const HYPOTHESES: usize = 5;
 /// Share of probability that is spread over all with every reading, so that
 /// none is lost for good.
-const SPREAD: f64 = 1e-4;
+const PROBABILITY_FLOOR: f64 = 1e-4;
 /// Squares of innovations beyond this are told no further apart.
-const FAR: f64 = 50.0;
+const MAX_SQUARED_INNOVATION: f64 = 50.0;
 /// Standard deviations of a reading by which the pressure has yet to go where
 /// it counts as moving.
-const MOVING: f64 = 6.0;
+const MOVING_SIGMAS: f64 = 6.0;
 
 /// The beliefs and their common watch for steps of the load.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bank {
-    filter: Filter,
-    beliefs: [Belief; BELIEFS],
-    watch: Watch,
+pub struct MultipleModelFilter {
+    filter: FilterSettings,
+    hypotheses: [Hypothesis; HYPOTHESES],
+    detector: LoadStepDetector,
 }
 
 /// What the beliefs come to, a dead time ahead.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Foretold {
+pub struct PressurePrediction {
     /// Pressure \[MPa\].
     pub pressure: f64,
     /// Its standard deviation \[MPa\].
@@ -45,7 +45,7 @@ pub struct Foretold {
     slopes: [f64; 3],
 }
 
-impl Foretold {
+impl PressurePrediction {
     /// The same with the pressure some standard deviations higher, and all
     /// else as is then likeliest.
     pub fn higher(&self, deviations: f64) -> Self {
@@ -60,78 +60,89 @@ impl Foretold {
     }
 }
 
-impl Bank {
+impl MultipleModelFilter {
     /// Before the first reading, under a load that is known \[MPa\].
     pub fn new(model: &Fopdt, tuning: Tuning, load: f64) -> Self {
         let dead_time_s = model.dead_time_s();
-        let step = tuning.doubt;
-        let filter = Filter { lag_s: model.lag_s(), dead_time_s, dead_doubt: 0.5 * step, tuning };
+        let step = tuning.model_sigma;
+        let filter = FilterSettings {
+            lag_s: model.lag_s(),
+            dead_time_s,
+            dead_time_sigma: 0.5 * step,
+            tuning,
+        };
         // Normal about the model's, at −2 … 2 standard deviations.
         let weights = [0.054_49, 0.244_20, 0.402_62, 0.244_20, 0.054_49];
         let mut deviations = -2.0;
         let beliefs = weights.map(|weight| {
-            let belief =
-                Belief::new(&filter, dead_time_s * (1.0 + deviations * step), weight, load);
+            let hypothesis =
+                Hypothesis::new(&filter, dead_time_s * (1.0 + deviations * step), weight, load);
             deviations += 1.0;
-            belief
+            hypothesis
         });
-        let watch = Watch::new(filter.lag_s, tuning.load, tuning.evidence);
-        Self { filter, beliefs, watch }
+        let watch =
+            LoadStepDetector::new(filter.lag_s, tuning.load_step_sigma, tuning.load_step_threshold);
+        Self { filter, hypotheses: beliefs, detector: watch }
     }
 
     /// The longest time that is looked back by \[s\].
-    pub fn back_s(model: &Fopdt, tuning: &Tuning) -> f64 {
-        model.dead_time_s() * (1.0 + 3.0 * tuning.doubt)
+    pub fn lookback_s(model: &Fopdt, tuning: &Tuning) -> f64 {
+        model.dead_time_s() * (1.0 + 3.0 * tuning.model_sigma)
     }
 
     /// Takes a reading \[MPa\], `dt_s` after the last.
-    pub fn read(&mut self, history: &CommandHistory, at_s: f64, dt_s: f64, reading: f64) {
+    pub fn update(&mut self, history: &CommandHistory, at_s: f64, dt_s: f64, reading: f64) {
         let filter = self.filter;
-        let moving = MOVING * filter.tuning.sigma();
-        let [resting, going] = Left::after(&filter, dt_s);
-        let mut seen = self.beliefs.map(|belief| (belief.weight, None));
-        for (belief, seen) in self.beliefs.iter_mut().zip(&mut seen) {
-            let then_s = at_s - belief.dead_time_s;
+        let moving = MOVING_SIGMAS * filter.tuning.sigma();
+        let [resting, going] = Transition::after(&filter, dt_s);
+        let mut seen = self.hypotheses.map(|hypothesis| (hypothesis.weight, None));
+        for (hypothesis, seen) in self.hypotheses.iter_mut().zip(&mut seen) {
+            let then_s = at_s - hypothesis.dead_time_s;
             let then = history.at(then_s);
             let moves = (then.drive - then.lags.first).abs() > moving;
-            belief.pass(&filter, if moves { &going } else { &resting });
-            let aside = belief.dead_sigma_s(&filter);
+            hypothesis.advance(&filter, if moves { &going } else { &resting });
+            let aside = hypothesis.dead_time_sigma_s(&filter);
             let around = [then_s - aside, then_s + aside].map(|at_s| history.drive_at(at_s));
-            let innovation = belief.read(&filter, reading, &then, around);
-            if belief.is_lost() {
+            let innovation = hypothesis.update(&filter, reading, &then, around);
+            if hypothesis.has_diverged() {
                 let load = reading - then.lags.first;
-                *belief = Belief::new(&filter, belief.dead_time_s, belief.weight, load);
+                *hypothesis =
+                    Hypothesis::new(&filter, hypothesis.dead_time_s, hypothesis.weight, load);
             }
             let square = innovation.difference * innovation.difference / innovation.variance;
-            let likelihood = libm::exp(-0.5 * square.min(FAR)) / innovation.variance.sqrt();
-            *seen = (belief.weight * likelihood, Some(innovation));
+            let likelihood =
+                libm::exp(-0.5 * square.min(MAX_SQUARED_INNOVATION)) / innovation.variance.sqrt();
+            *seen = (hypothesis.weight * likelihood, Some(innovation));
         }
         let total: f64 = seen.iter().map(|(weight, _)| weight).sum();
-        let spread = SPREAD / 5.0;
-        for (belief, (weight, _)) in self.beliefs.iter_mut().zip(&seen) {
-            let share = if total > 0.0 && total.is_finite() { weight / total } else { 0.2 };
-            belief.weight = (1.0 - SPREAD) * share + spread;
+        let spread = PROBABILITY_FLOOR / 5.0;
+        for (hypothesis, (weight, _)) in self.hypotheses.iter_mut().zip(&seen) {
+            let posterior = if total > 0.0 && total.is_finite() { weight / total } else { 0.2 };
+            hypothesis.weight = (1.0 - PROBABILITY_FLOOR) * posterior + spread;
         }
         let likeliest = seen.iter().max_by(|a, b| a.0.total_cmp(&b.0));
         let jump = likeliest
             .and_then(|(_, innovation)| *innovation)
-            .and_then(|innovation| self.watch.see(innovation, dt_s));
+            .and_then(|innovation| self.detector.update(innovation, dt_s));
         if let Some(jump) = jump {
-            for belief in &mut self.beliefs {
-                belief.jump(jump.settled, jump.grown, jump.variance);
+            for hypothesis in &mut self.hypotheses {
+                hypothesis.add_load_step(jump.settled, jump.shown_fraction, jump.variance);
             }
         }
     }
 
     /// The dead time \[s\].
-    pub fn dead_s(&self) -> f64 {
-        self.beliefs.iter().map(|belief| belief.weight * belief.dead_s(&self.filter)).sum()
+    pub fn dead_time_s(&self) -> f64 {
+        self.hypotheses
+            .iter()
+            .map(|hypothesis| hypothesis.weight * hypothesis.corrected_dead_time_s(&self.filter))
+            .sum()
     }
 
     /// Where the commands until now will have brought the pressure a dead time
     /// from now.
-    pub fn foretell(&self, now: &Lags) -> Foretold {
-        let mut mean = Foretold {
+    pub fn predict(&self, now: &LagStates) -> PressurePrediction {
+        let mut mean = PressurePrediction {
             pressure: 0.0,
             sigma: 0.0,
             gain: 1.0,
@@ -139,20 +150,20 @@ impl Bank {
             load: 0.0,
             slopes: [0.0; 3],
         };
-        for belief in &self.beliefs {
-            let (pressure, _) = belief.foretell(&self.filter, now);
-            mean.pressure += belief.weight * pressure;
-            mean.gain += belief.weight * belief.gain();
-            mean.lag += belief.weight * belief.lag();
-            mean.load += belief.weight * belief.load();
+        for hypothesis in &self.hypotheses {
+            let (pressure, _) = hypothesis.predict(&self.filter, now);
+            mean.pressure += hypothesis.weight * pressure;
+            mean.gain += hypothesis.weight * hypothesis.gain_error();
+            mean.lag += hypothesis.weight * hypothesis.lag_error();
+            mean.load += hypothesis.weight * hypothesis.load();
         }
-        let (mut variance, mut along) = (0.0, State::zeros());
-        for belief in &self.beliefs {
-            let (pressure, row) = belief.foretell(&self.filter, now);
-            let covariances = belief.along(&row);
+        let (mut variance, mut along) = (0.0, ModelState::zeros());
+        for hypothesis in &self.hypotheses {
+            let (pressure, row) = hypothesis.predict(&self.filter, now);
+            let covariances = hypothesis.covariance_with(&row);
             let apart = pressure - mean.pressure;
-            variance += belief.weight * (row.dot(&covariances).max(0.0) + apart * apart);
-            along += covariances * belief.weight;
+            variance += hypothesis.weight * (row.dot(&covariances).max(0.0) + apart * apart);
+            along += covariances * hypothesis.weight;
         }
         mean.sigma = variance.sqrt();
         let over = mean.sigma.max(1e-12);

@@ -2,22 +2,22 @@
 //! command is led back into the integral (Åström and Hägglund 2006, 3.5). What
 //! Ma et al. 2026 compare their law with.
 
-use super::call_times::{Calls, Running, sane};
-use super::kalman::{Kalman, Noise};
-use super::{Command, PressureError, PressureLaw, Refused, within};
+use super::call_times::{CallTimes, InitialState, bounded};
+use super::kalman::{Kalman, PressureNoise};
+use super::{PressureController, PressureError, ReadingRefused, ScrewCommand, within};
 use crate::core::time::Stamp;
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
 
 /// Gains of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PiGains {
+pub struct PressurePiGains {
     kp: f64,
     ki: f64,
     tracking_s: f64,
 }
 
-impl PiGains {
+impl PressurePiGains {
     /// The setting that gives the published overshoot and rise (fitted; the
     /// paper names none), for a gain of the process of 1 MPa/rpm.
     pub const MA2026: Self = Self { kp: 1.5, ki: 1.5, tracking_s: 1.0 };
@@ -35,17 +35,17 @@ impl PiGains {
 
 /// What a proportional-integral law remembers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PiMemory {
-    gains: PiGains,
+pub struct PiState {
+    gains: PressurePiGains,
     integral: f64,
     /// The last error \[MPa\] and what the law would have liked for it \[rpm\].
     error: f64,
     demand: f64,
 }
 
-impl PiMemory {
+impl PiState {
     /// With an integral \[rpm\], where a speed runs.
-    pub const fn new(gains: PiGains, integral: f64, running: Rpm) -> Self {
+    pub const fn new(gains: PressurePiGains, integral: f64, running: Rpm) -> Self {
         Self { gains, integral, error: 0.0, demand: running.get() }
     }
 
@@ -54,46 +54,51 @@ impl PiMemory {
     /// known beforehand \[rpm\].
     pub fn step(&mut self, error: f64, feedforward: f64, applied: Rpm, dt_s: f64) -> f64 {
         let lost = applied.get() - self.demand;
-        let gathers = self.gains.ki * self.error + lost / self.gains.tracking_s;
-        self.integral = sane(self.integral + gathers * dt_s);
+        let increment = self.gains.ki * self.error + lost / self.gains.tracking_s;
+        self.integral = bounded(self.integral + increment * dt_s);
         self.error = error;
-        self.demand = sane(feedforward + self.gains.kp * error + self.integral);
+        self.demand = bounded(feedforward + self.gains.kp * error + self.integral);
         self.demand
     }
 }
 
 /// The law with its memory.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Pi {
+pub struct PressurePi {
     limits: CommandLimits,
     kalman: Kalman,
-    memory: PiMemory,
-    calls: Calls,
+    state: PiState,
+    calls: CallTimes,
 }
 
-impl Pi {
+impl PressurePi {
     /// Takes over from what runs, without a bump.
-    pub fn new(gains: PiGains, noise: Noise, limits: CommandLimits, running: Running) -> Self {
+    pub fn new(
+        gains: PressurePiGains,
+        noise: PressureNoise,
+        limits: CommandLimits,
+        running: InitialState,
+    ) -> Self {
         let error = running.target.get() - running.pressure.get();
         let integral = running.speed.get() - gains.kp * error;
         Self {
             limits,
             kalman: Kalman::new(noise, running.pressure),
-            memory: PiMemory::new(gains, integral, running.speed),
-            calls: Calls::new(running.speed),
+            state: PiState::new(gains, integral, running.speed),
+            calls: CallTimes::new(running.speed),
         }
     }
 }
 
-impl PressureLaw for Pi {
-    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), Refused> {
-        self.calls.hear(now, pressure, &mut self.kalman)
+impl PressureController for PressurePi {
+    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), ReadingRefused> {
+        self.calls.filter(now, pressure, &mut self.kalman)
     }
 
-    fn step(&mut self, now: Stamp, target: MPa) -> Command {
-        let Some(dt_s) = self.calls.begin(now) else { return self.calls.last() };
+    fn step(&mut self, now: Stamp, target: MPa) -> ScrewCommand {
+        let Some(dt_s) = self.calls.begin(now) else { return self.calls.last_command() };
         let error = target.get() - self.kalman.pressure();
-        let demand = self.memory.step(error, 0.0, self.calls.last().speed, dt_s);
+        let demand = self.state.step(error, 0.0, self.calls.last_command().speed, dt_s);
         self.calls.command(&self.limits, demand, dt_s)
     }
 

@@ -7,102 +7,106 @@
 //! from passing it. Nothing is integrated in the law, so nothing winds up: the
 //! observer is told what was commanded, limits and all.
 
-use super::call_times::{Calls, Running};
+use super::call_times::{CallTimes, InitialState};
 use super::command_history::CommandHistory;
-use super::multiple_model::{Bank, Foretold};
-use super::reference::{Reference, Way};
+use super::multiple_model::{MultipleModelFilter, PressurePrediction};
+use super::reference::{Reference, ReferenceSegment};
 use super::tuning::Tuning;
-use super::{Command, Fopdt, PressureLaw, Refused};
+use super::{Fopdt, PressureController, ReadingRefused, ScrewCommand};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
 
 /// The law with its memory.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Predictive {
+pub struct PredictiveController {
     model: Fopdt,
     tuning: Tuning,
     limits: CommandLimits,
     history: CommandHistory,
-    bank: Bank,
+    filter: MultipleModelFilter,
     reference: Reference,
-    calls: Calls,
+    calls: CallTimes,
     /// How much of what ran before is still kept in place of the tunnel.
-    kept: f64,
+    takeover_decay: f64,
 }
 
-impl Predictive {
+impl PredictiveController {
     /// Takes over from what runs, without a bump: what the pressure differs
     /// from the model is taken for a load.
-    pub fn new(model: Fopdt, tuning: Tuning, limits: CommandLimits, running: Running) -> Self {
+    pub fn new(model: Fopdt, tuning: Tuning, limits: CommandLimits, running: InitialState) -> Self {
         let speed = running.speed.get();
         let load = running.pressure.get() - model.gain() * speed;
         Self {
             model,
             tuning,
             limits,
-            history: CommandHistory::new(&model, Bank::back_s(&model, &tuning), speed),
-            bank: Bank::new(&model, tuning, load),
+            history: CommandHistory::new(
+                &model,
+                MultipleModelFilter::lookback_s(&model, &tuning),
+                speed,
+            ),
+            filter: MultipleModelFilter::new(&model, tuning, load),
             reference: Reference::new(tuning.reference_s, model.lag_s(), running),
-            calls: Calls::new(running.speed),
-            kept: 1.0,
+            calls: CallTimes::new(running.speed),
+            takeover_decay: 1.0,
         }
     }
 
     /// What is known of the process and where it is going, as of `now`.
-    pub fn foretold(&self, now: Stamp) -> Foretold {
-        self.bank.foretell(&self.history.at(now.secs()).lags)
+    pub fn prediction(&self, now: Stamp) -> PressurePrediction {
+        self.filter.predict(&self.history.at(now.secs()).lags)
     }
 
     /// The dead time as far as it is known \[s\].
     pub fn dead_time_s(&self) -> f64 {
-        self.bank.dead_s()
+        self.filter.dead_time_s()
     }
 
     /// The drive \[MPa\] that brings a foretold pressure to another in the time
     /// until the next command.
-    fn drive(&self, foretold: &Foretold, wanted: f64, period_s: f64) -> f64 {
-        let kept = libm::exp(-period_s / (self.model.lag_s() * foretold.lag));
-        ((wanted - kept * foretold.pressure) / (1.0 - kept) - foretold.load) / foretold.gain
+    fn drive(&self, prediction: &PressurePrediction, wanted: f64, period_s: f64) -> f64 {
+        let kept = libm::exp(-period_s / (self.model.lag_s() * prediction.lag));
+        ((wanted - kept * prediction.pressure) / (1.0 - kept) - prediction.load) / prediction.gain
     }
 
     /// What is left uncorrected of the load and of the gain's error \[MPa\].
-    fn tolerated(&self, foretold: &Foretold, target: f64) -> f64 {
-        let needed = (target - foretold.load) / foretold.gain - target;
-        (self.tuning.zone.made(needed) - needed) * foretold.gain * (1.0 - self.kept)
+    fn uncorrected(&self, prediction: &PressurePrediction, target: f64) -> f64 {
+        let needed = (target - prediction.load) / prediction.gain - target;
+        (self.tuning.zone.applied(needed) - needed) * prediction.gain * (1.0 - self.takeover_decay)
     }
 
     /// The drive that keeps what the pressure may be from passing the target;
     /// none where the reference has arrived.
-    fn bound(&self, foretold: &Foretold, way: &Way) -> Option<(f64, f64)> {
+    fn bound(&self, prediction: &PressurePrediction, way: &ReferenceSegment) -> Option<(f64, f64)> {
         let to_go = way.target - way.from;
         if to_go.abs() <= self.tuning.sigma() {
             return None;
         }
         let sign = to_go.signum();
-        let may_be = foretold.higher(sign * self.tuning.caution);
+        let may_be = prediction.higher(sign * self.tuning.caution_sigmas);
         let top = way.target + sign * self.tuning.margin;
         Some((sign, self.drive(&may_be, top, way.period_s)))
     }
 }
 
-impl PressureLaw for Predictive {
-    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), Refused> {
+impl PressureController for PredictiveController {
+    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), ReadingRefused> {
         let dt_s = self.calls.read(now, pressure)?;
-        self.bank.read(&self.history, now.secs(), dt_s, pressure.get());
+        self.filter.update(&self.history, now.secs(), dt_s, pressure.get());
         Ok(())
     }
 
-    fn step(&mut self, now: Stamp, target: MPa) -> Command {
-        let Some(dt_s) = self.calls.begin(now) else { return self.calls.last() };
-        self.kept *= libm::exp(-dt_s / self.tuning.return_s);
+    fn step(&mut self, now: Stamp, target: MPa) -> ScrewCommand {
+        let Some(dt_s) = self.calls.begin(now) else { return self.calls.last_command() };
+        self.takeover_decay *= libm::exp(-dt_s / self.tuning.return_s);
         let way = self.reference.step(target.get(), dt_s);
-        let foretold = self.foretold(now);
-        let left = self.tolerated(&foretold, way.target);
+        let prediction = self.prediction(now);
+        let left = self.uncorrected(&prediction, way.target);
         let closing = libm::exp(-way.period_s / self.tuning.feedback_s);
-        let wanted = way.to + left + closing * (foretold.pressure - way.from - left);
-        let mut drive = self.drive(&foretold, wanted, way.period_s);
-        if let Some((sign, bound)) = self.bound(&foretold, &way) {
+        let wanted = way.to + left + closing * (prediction.pressure - way.from - left);
+        let mut drive = self.drive(&prediction, wanted, way.period_s);
+        if let Some((sign, bound)) = self.bound(&prediction, &way) {
             drive = sign * (sign * drive).min(sign * bound);
         }
         let command = self.calls.command(&self.limits, drive / self.model.gain(), dt_s);
@@ -115,7 +119,7 @@ impl PressureLaw for Predictive {
         self.history.push(now.secs(), applied.get());
     }
 
-    fn lead(&self) -> Span {
-        Span::from_secs(self.bank.dead_s() + self.reference.lead_s())
+    fn preview(&self) -> Span {
+        Span::from_secs(self.filter.dead_time_s() + self.reference.lead_s())
     }
 }

@@ -2,24 +2,24 @@
 //! foretells: the pressure that is read, less what the commands under way have
 //! not yet done to it. Ma et al. 2026, eq. (8).
 
-use super::call_times::{Calls, Running};
+use super::call_times::{CallTimes, InitialState};
 use super::command_history::CommandHistory;
-use super::kalman::{Kalman, Noise};
-use super::pi::{PiGains, PiMemory};
+use super::kalman::{Kalman, PressureNoise};
+use super::pi::{PiState, PressurePiGains};
 use super::reference::Reference;
-use super::{Command, Fopdt, PressureLaw, Refused};
+use super::{Fopdt, PressureController, ReadingRefused, ScrewCommand};
 use crate::core::time::Stamp;
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
 
 /// What the commands under way are about to do, from the model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Smith {
+pub struct SmithPredictor {
     history: CommandHistory,
     dead_time_s: f64,
 }
 
-impl Smith {
+impl SmithPredictor {
     /// As if the speed had been commanded for ever.
     pub fn new(model: &Fopdt, speed_rpm: f64) -> Self {
         let dead_time_s = model.dead_time_s();
@@ -28,7 +28,7 @@ impl Smith {
 
     /// By how much the pressure will have changed a dead time from now
     /// \[MPa\].
-    pub fn under_way(&self, now: Stamp) -> f64 {
+    pub fn pending_change(&self, now: Stamp) -> f64 {
         let at_s = now.secs();
         let then = self.history.at(at_s - self.dead_time_s).lags.first;
         self.history.at(at_s).lags.first - then
@@ -48,10 +48,10 @@ pub struct SmithPi {
     model: Fopdt,
     limits: CommandLimits,
     kalman: Kalman,
-    smith: Smith,
+    smith: SmithPredictor,
     reference: Reference,
-    memory: PiMemory,
-    calls: Calls,
+    state: PiState,
+    calls: CallTimes,
 }
 
 impl SmithPi {
@@ -59,36 +59,36 @@ impl SmithPi {
     /// the target by `reference_s`.
     pub fn new(
         model: Fopdt,
-        gains: PiGains,
+        gains: PressurePiGains,
         reference_s: f64,
-        noise: Noise,
+        noise: PressureNoise,
         limits: CommandLimits,
-        running: Running,
+        running: InitialState,
     ) -> Self {
         let steady = running.pressure.get() / model.gain();
         Self {
             model,
             limits,
             kalman: Kalman::new(noise, running.pressure),
-            smith: Smith::new(&model, running.speed.get()),
+            smith: SmithPredictor::new(&model, running.speed.get()),
             reference: Reference::new(reference_s, model.lag_s(), running),
-            memory: PiMemory::new(gains, running.speed.get() - steady, running.speed),
-            calls: Calls::new(running.speed),
+            state: PiState::new(gains, running.speed.get() - steady, running.speed),
+            calls: CallTimes::new(running.speed),
         }
     }
 }
 
-impl PressureLaw for SmithPi {
-    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), Refused> {
-        self.calls.hear(now, pressure, &mut self.kalman)
+impl PressureController for SmithPi {
+    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), ReadingRefused> {
+        self.calls.filter(now, pressure, &mut self.kalman)
     }
 
-    fn step(&mut self, now: Stamp, target: MPa) -> Command {
-        let Some(dt_s) = self.calls.begin(now) else { return self.calls.last() };
+    fn step(&mut self, now: Stamp, target: MPa) -> ScrewCommand {
+        let Some(dt_s) = self.calls.begin(now) else { return self.calls.last_command() };
         let way = self.reference.step(target.get(), dt_s);
-        let error = way.from - (self.kalman.pressure() + self.smith.under_way(now));
+        let error = way.from - (self.kalman.pressure() + self.smith.pending_change(now));
         let feedforward = way.drive(self.model.lag_s()) / self.model.gain();
-        let demand = self.memory.step(error, feedforward, self.calls.last().speed, dt_s);
+        let demand = self.state.step(error, feedforward, self.calls.last_command().speed, dt_s);
         let command = self.calls.command(&self.limits, demand, dt_s);
         self.smith.commanded(now, command.speed);
         command

@@ -2,16 +2,16 @@
 
 use proptest::prelude::*;
 
-use super::kalman::Noise;
-use super::pi::{Pi, PiGains};
-use super::predictive::Predictive;
+use super::kalman::PressureNoise;
+use super::pi::{PressurePi, PressurePiGains};
+use super::predictive::PredictiveController;
 use super::smith::SmithPi;
 use super::tuning::Tuning;
 use super::vsfc::{Vsfc, VsfcGains};
 use super::*;
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
-use crate::sim::pressure::{Disturbed, SimPressure};
+use crate::sim::pressure::{Disturbances, SimPressure};
 
 const FASTEST: Rpm = Rpm::constant(3.0);
 const PERIOD: Span = Span::from_millis(50);
@@ -20,20 +20,23 @@ fn model() -> Fopdt {
     Fopdt::new(1.0, 0.84, 0.41).unwrap()
 }
 
-fn noise() -> Noise {
-    Noise::new(2e-5, 4.98e-5).unwrap()
+fn noise() -> PressureNoise {
+    PressureNoise::new(2e-5, 4.98e-5).unwrap()
 }
 
-fn ours(limits: CommandLimits, running: Running) -> Predictive {
+fn ours(limits: CommandLimits, running: InitialState) -> PredictiveController {
     let tuning = Tuning::of(&model(), &noise(), 0.1).unwrap();
-    Predictive::new(model(), tuning, limits, running)
+    PredictiveController::new(model(), tuning, limits, running)
 }
 
-fn laws(limits: CommandLimits, running: Running) -> [(&'static str, Box<dyn PressureLaw>); 4] {
+fn laws(
+    limits: CommandLimits,
+    running: InitialState,
+) -> [(&'static str, Box<dyn PressureController>); 4] {
     let vsfc = VsfcGains::ma2026(noise()).unwrap();
-    let smith = PiGains::new(1.0, 0.84, 1.0).unwrap();
+    let smith = PressurePiGains::new(1.0, 0.84, 1.0).unwrap();
     [
-        ("pi", Box::new(Pi::new(PiGains::MA2026, noise(), limits, running))),
+        ("pi", Box::new(PressurePi::new(PressurePiGains::MA2026, noise(), limits, running))),
         ("vsfc", Box::new(Vsfc::new(model(), vsfc, noise(), limits, running))),
         ("smith", Box::new(SmithPi::new(model(), smith, 0.23, noise(), limits, running))),
         ("ours", Box::new(ours(limits, running))),
@@ -44,15 +47,15 @@ fn free() -> CommandLimits {
     CommandLimits::new(0.0, FASTEST.get(), 1e6).unwrap()
 }
 
-fn running(pressure: f64, target: f64, speed: f64) -> Running {
+fn running(pressure: f64, target: f64, speed: f64) -> InitialState {
     let [pressure, target] = [pressure, target].map(MPa::constant);
-    Running { pressure, target, speed: Rpm::constant(speed) }
+    InitialState { pressure, target, speed: Rpm::constant(speed) }
 }
 
 /// Runs a law on a plant from `from_s` on, with readings at 50 Hz and commands
 /// at 20 Hz, and gives pressure and speed of every tick.
 fn drive(
-    law: &mut dyn PressureLaw,
+    controller: &mut dyn PressureController,
     plant: &mut SimPressure,
     until_s: f64,
     target: impl Fn(f64) -> f64,
@@ -62,10 +65,10 @@ fn drive(
     while plant.now_s() < until_s {
         let now = Stamp::from_secs(plant.now_s());
         if tick.is_multiple_of(4) {
-            law.measured(now, plant.read()).unwrap();
+            controller.measured(now, plant.read()).unwrap();
         }
         if tick.is_multiple_of(10) {
-            plant.command(law.step(now, MPa::constant(target(plant.now_s()))).speed);
+            plant.command(controller.step(now, MPa::constant(target(plant.now_s()))).speed);
         }
         course.push((plant.pressure(), plant.speed_rpm()));
         plant.advance();
@@ -78,10 +81,10 @@ fn drive(
 fn a_law_that_takes_over_begins_with_the_speed_that_runs() {
     // At rest, off the model by a load, and far from the target.
     for running in [running(0.6, 0.6, 0.6), running(0.58, 0.6, 0.65), running(0.2, 0.9, 0.4)] {
-        for (name, mut law) in laws(free(), running) {
+        for (name, mut controller) in laws(free(), running) {
             let now = Stamp::from_secs(7.3);
-            law.measured(now, running.pressure).unwrap();
-            let first = law.step(now, running.target).speed.get();
+            controller.measured(now, running.pressure).unwrap();
+            let first = controller.step(now, running.target).speed.get();
             assert!((first - running.speed.get()).abs() < 1e-9, "{name} {running:?}: {first}");
         }
     }
@@ -91,12 +94,12 @@ fn a_law_that_takes_over_begins_with_the_speed_that_runs() {
 fn switching_to_any_law_in_the_middle_of_a_step_is_no_jump() {
     for which in 0..4 {
         let start = running(0.0, 0.0, 0.0);
-        let mut plant = SimPressure::new(model(), Disturbed::default(), FASTEST, start);
+        let mut plant = SimPressure::new(model(), Disturbances::default(), FASTEST, start);
         let mut before = ours(free(), start);
         drive(&mut before, &mut plant, 1.0, |_| 0.6);
         let now = running(plant.pressure(), 0.6, plant.speed_rpm());
-        let (name, mut law) = laws(free(), now).into_iter().nth(which).unwrap();
-        let course = drive(law.as_mut(), &mut plant, 30.0, |_| 0.6);
+        let (name, mut controller) = laws(free(), now).into_iter().nth(which).unwrap();
+        let course = drive(controller.as_mut(), &mut plant, 30.0, |_| 0.6);
         let (_, first) = course[0];
         assert!((first - now.speed.get()).abs() < 1e-9, "{name}: {first} after {now:?}");
         let (last, _) = course[course.len() - 1];
@@ -108,11 +111,11 @@ fn switching_to_any_law_in_the_middle_of_a_step_is_no_jump() {
 fn nothing_winds_up_while_the_target_is_out_of_reach() {
     for which in 0..4 {
         let start = running(0.6, 0.6, 0.6);
-        let (name, mut law) = laws(free(), start).into_iter().nth(which).unwrap();
-        let mut plant = SimPressure::new(model(), Disturbed::default(), FASTEST, start);
-        drive(law.as_mut(), &mut plant, 60.0, |_| 5.0);
+        let (name, mut controller) = laws(free(), start).into_iter().nth(which).unwrap();
+        let mut plant = SimPressure::new(model(), Disturbances::default(), FASTEST, start);
+        drive(controller.as_mut(), &mut plant, 60.0, |_| 5.0);
         assert!(plant.speed_rpm() > 2.99, "{name}");
-        let course = drive(law.as_mut(), &mut plant, 90.0, |_| 0.6);
+        let course = drive(controller.as_mut(), &mut plant, 90.0, |_| 0.6);
         let slows = course.iter().position(|(_, speed)| *speed < 1.0).unwrap();
         assert!(slows <= 200, "{name}: only after {slows} ticks");
         let (last, _) = course[course.len() - 1];
@@ -125,19 +128,19 @@ fn a_limit_beyond_its_own_that_a_law_is_told_of_winds_nothing_up() {
     const CAP: f64 = 0.9;
     for which in 0..4 {
         let start = running(0.6, 0.6, 0.6);
-        let (name, mut law) = laws(free(), start).into_iter().nth(which).unwrap();
-        let mut plant = SimPressure::new(model(), Disturbed::default(), FASTEST, start);
+        let (name, mut controller) = laws(free(), start).into_iter().nth(which).unwrap();
+        let mut plant = SimPressure::new(model(), Disturbances::default(), FASTEST, start);
         let mut falls_s = None;
         for tick in 0..12_000_u64 {
             let now = Stamp::from_secs(plant.now_s());
             if tick.is_multiple_of(4) {
-                law.measured(now, plant.read()).unwrap();
+                controller.measured(now, plant.read()).unwrap();
             }
             if tick.is_multiple_of(10) {
                 let target = if plant.now_s() < 30.0 { 1.5 } else { 0.6 };
-                let speed = law.step(now, MPa::constant(target)).speed;
+                let speed = controller.step(now, MPa::constant(target)).speed;
                 let applied = speed.min(Rpm::constant(CAP));
-                law.settle(now, applied);
+                controller.settle(now, applied);
                 plant.command(applied);
                 if target < 1.0 && falls_s.is_none() && applied.get() < CAP {
                     falls_s = Some(plant.now_s());
@@ -154,9 +157,9 @@ fn a_limit_beyond_its_own_that_a_law_is_told_of_winds_nothing_up() {
 fn commands_keep_the_rate_and_ours_keeps_its_foresight_under_it() {
     let limits = CommandLimits::new(0.1, 2.0, 1.5).unwrap();
     let start = running(0.1, 0.1, 0.1);
-    for (name, mut law) in laws(limits, start) {
-        let mut plant = SimPressure::new(model(), Disturbed::default(), FASTEST, start);
-        let course = drive(law.as_mut(), &mut plant, 10.0, |_| 1.2);
+    for (name, mut controller) in laws(limits, start) {
+        let mut plant = SimPressure::new(model(), Disturbances::default(), FASTEST, start);
+        let course = drive(controller.as_mut(), &mut plant, 10.0, |_| 1.2);
         for pair in course.windows(2) {
             let step = (pair[1].1 - pair[0].1).abs();
             assert!(step <= 1.5 * PERIOD.secs() + 1e-12, "{name}: {step}");
@@ -171,14 +174,14 @@ fn commands_keep_the_rate_and_ours_keeps_its_foresight_under_it() {
 
 #[test]
 fn readings_that_cannot_be_are_refused_and_change_nothing() {
-    for (name, mut law) in laws(free(), running(0.6, 0.6, 0.6)) {
+    for (name, mut controller) in laws(free(), running(0.6, 0.6, 0.6)) {
         let at = Stamp::from_secs;
-        law.measured(at(1.0), MPa::constant(0.6)).unwrap();
-        let late = law.measured(at(0.5), MPa::constant(9.0)).unwrap_err();
-        assert_eq!(late, Refused::Late { late_s: 0.5 }, "{name}");
-        let wild = law.measured(at(1.1), MPa::constant(2e6)).unwrap_err();
+        controller.measured(at(1.0), MPa::constant(0.6)).unwrap();
+        let late = controller.measured(at(0.5), MPa::constant(9.0)).unwrap_err();
+        assert_eq!(late, ReadingRefused::OutOfOrder { late_s: 0.5 }, "{name}");
+        let wild = controller.measured(at(1.1), MPa::constant(2e6)).unwrap_err();
         assert!(wild.to_string().contains("check the sensor"), "{name}: {wild}");
-        let speed = law.step(at(1.2), MPa::constant(0.6)).speed.get();
+        let speed = controller.step(at(1.2), MPa::constant(0.6)).speed.get();
         assert!((speed - 0.6).abs() < 1e-9, "{name}: {speed}");
     }
     // What is no number cannot even be asked.
@@ -187,11 +190,11 @@ fn readings_that_cannot_be_are_refused_and_change_nothing() {
 
 #[test]
 fn a_second_call_at_the_same_moment_gives_the_same_command() {
-    for (name, mut law) in laws(free(), running(0.0, 0.0, 0.0)) {
+    for (name, mut controller) in laws(free(), running(0.0, 0.0, 0.0)) {
         let now = Stamp::from_secs(1.0);
-        let once = law.step(now, MPa::constant(0.6));
-        assert_eq!(law.step(now, MPa::constant(0.1)), once, "{name}");
-        assert_eq!(law.step(Stamp::START, MPa::constant(0.1)), once, "{name}");
+        let once = controller.step(now, MPa::constant(0.6));
+        assert_eq!(controller.step(now, MPa::constant(0.1)), once, "{name}");
+        assert_eq!(controller.step(Stamp::START, MPa::constant(0.1)), once, "{name}");
     }
 }
 
@@ -203,7 +206,7 @@ fn a_model_that_cannot_be_is_refused_with_what_was_found() {
     assert_eq!(error, "the dead time [s] is -0.1: it must be between 0 and 60");
     assert!(Tuning::of(&model(), &noise(), 0.5).is_err());
     assert!(VsfcGains::new(1.0, 1.0, 1.5, MPa::ZERO).is_err());
-    assert!(PiGains::new(1.0, 0.0, 1.0).is_err());
+    assert!(PressurePiGains::new(1.0, 0.0, 1.0).is_err());
 }
 
 #[test]
@@ -212,14 +215,14 @@ fn a_step_tells_ours_by_how_much_its_model_is_off() {
     for (gain, lag, dead) in cases {
         let start = running(0.0, 0.0, 0.0);
         let process = Fopdt::new(gain, lag, dead).unwrap();
-        let disturbed = Disturbed { noise_mpa2: 4.98e-5, seed: 3, ..Disturbed::default() };
+        let disturbed = Disturbances { noise_mpa2: 4.98e-5, seed: 3, ..Disturbances::default() };
         let mut plant = SimPressure::new(process, disturbed, FASTEST, start);
-        let mut law = ours(free(), start);
-        drive(&mut law, &mut plant, 4.0, |_| 0.6);
+        let mut controller = ours(free(), start);
+        drive(&mut controller, &mut plant, 4.0, |_| 0.6);
         // The plant takes a command over a tick late.
-        let dead_found = law.dead_time_s();
+        let dead_found = controller.dead_time_s();
         assert!((dead_found - dead - 0.005).abs() < 0.025, "{gain} {dead}: {dead_found}");
-        let found = law.foretold(Stamp::from_secs(4.0));
+        let found = controller.prediction(Stamp::from_secs(4.0));
         // Gain and load share what a single level can tell.
         let settled = found.gain * plant.speed_rpm() + found.load;
         assert!((settled - gain * plant.speed_rpm()).abs() < 0.01, "{gain} {dead}: {found:?}");
@@ -230,13 +233,13 @@ fn a_step_tells_ours_by_how_much_its_model_is_off() {
 #[test]
 fn a_process_without_dead_time_is_held_as_well() {
     let process = Fopdt::new(0.02, 2.0, 0.0).unwrap();
-    let noise = Noise::new(1e-6, 1e-4).unwrap();
+    let noise = PressureNoise::new(1e-6, 1e-4).unwrap();
     let tuning = Tuning::of(&process, &noise, 0.1).unwrap();
     let limits = CommandLimits::new(0.0, 300.0, 1e6).unwrap();
     let start = running(1.0, 1.0, 50.0);
-    let mut law = Predictive::new(process, tuning, limits, start);
-    let mut plant = SimPressure::new(process, Disturbed::default(), Rpm::constant(300.0), start);
-    let course = drive(&mut law, &mut plant, 20.0, |_| 2.0);
+    let mut controller = PredictiveController::new(process, tuning, limits, start);
+    let mut plant = SimPressure::new(process, Disturbances::default(), Rpm::constant(300.0), start);
+    let course = drive(&mut controller, &mut plant, 20.0, |_| 2.0);
     let highest = course.iter().map(|(pressure, _)| *pressure).fold(0.0, f64::max);
     assert!(highest < 2.01, "{highest}");
     assert!((plant.pressure() - 2.0).abs() < 1e-3, "{}", plant.pressure());
@@ -263,7 +266,7 @@ proptest! {
                     let speed = law.step(now, target).speed.get();
                     prop_assert!((-1.0..=3.0).contains(&speed), "{}: {}", name, speed);
                 }
-                prop_assert!(law.lead().secs().is_finite());
+                prop_assert!(law.preview().secs().is_finite());
             }
         }
     }

@@ -13,8 +13,8 @@
 //! | tunnel | 0.3 within 5·σ, all from 10·σ | a drift within the noise moves the screw little; at most 3.5·σ of it stay in the pressure |
 //! | caution | 1.45 standard deviations, 2·σ beyond the target | on its way to a target the pressure that may be there, not only the likeliest, is kept from passing it |
 
-use super::dead_zone::Zone;
-use super::kalman::Noise;
+use super::dead_zone::DeadZone;
+use super::kalman::PressureNoise;
 use super::{Fopdt, PressureError, within};
 
 /// Settings of the predictive law.
@@ -26,26 +26,26 @@ pub struct Tuning {
     pub feedback_s: f64,
     /// Standard deviation of gain, lag and dead time about the model, as
     /// shares of them.
-    pub doubt: f64,
+    pub model_sigma: f64,
     /// Time in which what was learnt about the model is forgotten while the
     /// pressure moves \[s\].
-    pub forget_s: f64,
+    pub forgetting_s: f64,
     /// Variance of a reading \[MPa²\].
-    pub reading: f64,
+    pub reading_variance: f64,
     /// Growth of the load's variance \[MPa²/s\].
-    pub wander: f64,
+    pub load_drift: f64,
     /// Standard deviation of a step of the load \[MPa\].
-    pub load: f64,
+    pub load_step_sigma: f64,
     /// Logarithm of the likelihood ratio from which on a step of the load is
     /// taken for real.
-    pub evidence: f64,
+    pub load_step_threshold: f64,
     /// The tunnel around the feedforward.
-    pub zone: Zone,
+    pub zone: DeadZone,
     /// Time in which a law that took over goes back to the tunnel \[s\].
     pub return_s: f64,
     /// Standard deviations of the foretold pressure that are kept from passing
     /// the target.
-    pub caution: f64,
+    pub caution_sigmas: f64,
     /// How far beyond the target that pressure may be \[MPa\].
     pub margin: f64,
 }
@@ -53,28 +53,32 @@ pub struct Tuning {
 impl Tuning {
     /// By the rules. `doubt` is the standard deviation of the model's gain,
     /// lag and dead time, as shares of them: 0.1 where they may be off by 20 %.
-    pub fn of(model: &Fopdt, noise: &Noise, doubt: f64) -> Result<Self, PressureError> {
-        within("the model's doubt", doubt, 0.01..=0.2, "between 0.01 and 0.2")?;
+    pub fn of(
+        model: &Fopdt,
+        noise: &PressureNoise,
+        model_sigma: f64,
+    ) -> Result<Self, PressureError> {
+        within("the model's doubt", model_sigma, 0.01..=0.2, "between 0.01 and 0.2")?;
         let (lag, dead) = (model.lag_s(), model.dead_time_s());
         let sigma = noise.sigma().get();
         Ok(Self {
             reference_s: (0.56 * dead).max(0.25 * lag),
             feedback_s: (dead * 2.0 / 3.0).max(0.25 * lag),
-            doubt,
-            forget_s: 12.0 * lag,
-            reading: noise.reading_mpa2(),
-            wander: 0.25 * noise.reading_mpa2() / lag,
-            load: 8.5 * sigma,
-            evidence: 3.65,
-            zone: Zone { share: 0.3, dead: 5.0 * sigma, weak: 10.0 * sigma },
+            model_sigma,
+            forgetting_s: 12.0 * lag,
+            reading_variance: noise.reading_mpa2(),
+            load_drift: 0.25 * noise.reading_mpa2() / lag,
+            load_step_sigma: 8.5 * sigma,
+            load_step_threshold: 3.65,
+            zone: DeadZone { inner_gain: 0.3, inner: 5.0 * sigma, outer: 10.0 * sigma },
             return_s: 6.0 * lag,
-            caution: 1.45,
+            caution_sigmas: 1.45,
             margin: 2.0 * sigma,
         })
     }
 
     /// Standard deviation of a reading \[MPa\].
     pub fn sigma(&self) -> f64 {
-        self.reading.sqrt()
+        self.reading_variance.sqrt()
     }
 }

@@ -2,11 +2,11 @@
 //! feedforward, as Ma et al. 2026, eqs. (6) to (10): the integral rests while
 //! the error is within the noise, creeps in a zone around it, and works beyond.
 
-use super::call_times::{Calls, Running, sane};
-use super::kalman::{Kalman, Noise};
-use super::reference::FIRST_S;
-use super::smith::Smith;
-use super::{Command, Fopdt, PressureError, PressureLaw, Refused, within};
+use super::call_times::{CallTimes, InitialState, bounded};
+use super::kalman::{Kalman, PressureNoise};
+use super::reference::FIRST_PERIOD_S;
+use super::smith::SmithPredictor;
+use super::{Fopdt, PressureController, PressureError, ReadingRefused, ScrewCommand, within};
 use crate::core::time::Stamp;
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
@@ -39,7 +39,7 @@ impl VsfcGains {
 
     /// The setting that gives the published overshoot and rise (fitted; the
     /// paper names none), for a process of 1 MPa/rpm with this noise.
-    pub fn ma2026(noise: Noise) -> Result<Self, PressureError> {
+    pub fn ma2026(noise: PressureNoise) -> Result<Self, PressureError> {
         Self::new(0.816, 1.19, 0.3, noise.sigma())
     }
 
@@ -63,9 +63,9 @@ pub struct Vsfc {
     gain: f64,
     limits: CommandLimits,
     kalman: Kalman,
-    smith: Smith,
+    smith: SmithPredictor,
     integral: f64,
-    calls: Calls,
+    calls: CallTimes,
     demand: f64,
 }
 
@@ -74,52 +74,52 @@ impl Vsfc {
     pub fn new(
         model: Fopdt,
         gains: VsfcGains,
-        noise: Noise,
+        noise: PressureNoise,
         limits: CommandLimits,
-        running: Running,
+        running: InitialState,
     ) -> Self {
         let error = running.target.get() - running.pressure.get();
         let feedforward = running.target.get() / model.gain();
         // The first command gathers over its own period at once.
-        let proportional = gains.kp * error + gains.ki_at(error) * error * FIRST_S;
+        let proportional = gains.kp * error + gains.ki_at(error) * error * FIRST_PERIOD_S;
         Self {
             gains,
             gain: model.gain(),
             limits,
             kalman: Kalman::new(noise, running.pressure),
-            smith: Smith::new(&model, running.speed.get()),
+            smith: SmithPredictor::new(&model, running.speed.get()),
             integral: running.speed.get() - feedforward - proportional,
-            calls: Calls::new(running.speed),
+            calls: CallTimes::new(running.speed),
             demand: running.speed.get(),
         }
     }
 
     /// The integral over the time since the last command; the first command
     /// gathers over its own period.
-    fn gather(&mut self, error: f64, dt_s: f64) {
+    fn integrate(&mut self, error: f64, dt_s: f64) {
         if error.abs() < self.gains.dead_zone {
             self.integral *= libm::exp(-dt_s / self.gains.return_s);
         }
-        let dt_s = if dt_s > 0.0 { dt_s } else { FIRST_S };
-        let gathered = self.gains.ki_at(error) * error * dt_s;
+        let dt_s = if dt_s > 0.0 { dt_s } else { FIRST_PERIOD_S };
+        let increment = self.gains.ki_at(error) * error * dt_s;
         // Nothing is gathered into a limit.
-        let against = self.demand - self.calls.last().speed.get();
-        if gathered * against <= 0.0 {
-            self.integral = sane(self.integral + gathered);
+        let against = self.demand - self.calls.last_command().speed.get();
+        if increment * against <= 0.0 {
+            self.integral = bounded(self.integral + increment);
         }
     }
 }
 
-impl PressureLaw for Vsfc {
-    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), Refused> {
-        self.calls.hear(now, pressure, &mut self.kalman)
+impl PressureController for Vsfc {
+    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), ReadingRefused> {
+        self.calls.filter(now, pressure, &mut self.kalman)
     }
 
-    fn step(&mut self, now: Stamp, target: MPa) -> Command {
-        let Some(dt_s) = self.calls.begin(now) else { return self.calls.last() };
-        let error = target.get() - (self.kalman.pressure() + self.smith.under_way(now));
-        self.gather(error, dt_s);
-        self.demand = sane(target.get() / self.gain + self.gains.kp * error + self.integral);
+    fn step(&mut self, now: Stamp, target: MPa) -> ScrewCommand {
+        let Some(dt_s) = self.calls.begin(now) else { return self.calls.last_command() };
+        let error = target.get() - (self.kalman.pressure() + self.smith.pending_change(now));
+        self.integrate(error, dt_s);
+        self.demand = bounded(target.get() / self.gain + self.gains.kp * error + self.integral);
         let command = self.calls.command(&self.limits, self.demand, dt_s);
         self.smith.commanded(now, command.speed);
         command

@@ -2,16 +2,16 @@
 //! and the law is asked there, eq. (74) of Diagne et al. 2015.
 
 use super::error::{ScrewError, positive};
-use super::euler::{Euler, whole};
-use super::exact::{Exact, Overtaken, Prediction};
+use super::euler::{EulerPredictor, whole};
+use super::exact::{ExactPredictor, FeedOvertaken, PlugPrediction};
 use super::feed_history::FeedHistory;
-use super::feedback::FillLaw;
+use super::feedback::FillFeedback;
 use super::model::{Conveying, MM_PER_M, Screw};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
 
 /// Most changes of the feed that are remembered.
-const MOST_STEPS: usize = 1 << 16;
+const MAX_STEPS: usize = 1 << 16;
 
 /// How the prediction is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,20 +29,20 @@ pub struct ScrewSettings {
     /// that knows of no pulsation, eqs. (105) to (112).
     pub screw: Screw,
     /// The law.
-    pub law: FillLaw,
+    pub feedback: FillFeedback,
     /// How the prediction is computed.
     pub scheme: Scheme,
     /// Time between steps. The exact scheme takes steps at half that distance
     /// and more, the paper's only whole multiples of it.
     pub period: Span,
     /// Share of full that has been fed up to the first step, from 0 to below 1.
-    pub before: f64,
+    pub initial_fill: f64,
 }
 
 /// The control with its memory of the feed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScrewControl {
-    law: FillLaw,
+    feedback: FillFeedback,
     predictor: Predictor,
     length: Mm,
     period: Span,
@@ -51,8 +51,8 @@ pub struct ScrewControl {
 
 #[derive(Debug, Clone, PartialEq)]
 enum Predictor {
-    Exact { exact: Exact, history: FeedHistory },
-    Paper(Euler),
+    Exact { exact: ExactPredictor, history: FeedHistory },
+    Paper(EulerPredictor),
 }
 
 /// A decision.
@@ -78,7 +78,7 @@ pub enum ScrewFault {
         plug,
         length
     )]
-    Outside {
+    PlugOutsideScrew {
         /// What was measured.
         plug: Mm,
         /// The screw's length.
@@ -86,7 +86,7 @@ pub enum ScrewFault {
     },
     /// The feed would not arrive.
     #[error(transparent)]
-    Overtaken(#[from] Overtaken),
+    Overtaken(#[from] FeedOvertaken),
     /// A step that is not after the last one, or too soon after it.
     #[error("{} s after the last step is too soon: steps are {} s apart", since.secs(), period.secs())]
     TooSoon {
@@ -105,7 +105,7 @@ pub enum ScrewFault {
     },
     /// A share that cannot have been fed.
     #[error("a share of {fill} cannot have been fed; it must be from 0 to below 1")]
-    Share {
+    FillOutOfRange {
         /// What was told.
         fill: f64,
     },
@@ -117,28 +117,30 @@ impl ScrewControl {
     pub fn new(settings: &ScrewSettings) -> Result<Self, ScrewError> {
         let screw = Screw::new(settings.screw)?;
         let period_s = positive("period", settings.period.secs())?;
-        if !(0.0..1.0).contains(&settings.before) {
-            return Err(ScrewError::Before { fill: settings.before });
+        if !(0.0..1.0).contains(&settings.initial_fill) {
+            return Err(ScrewError::InitialFill { fill: settings.initial_fill });
         }
         let delay_s = screw.longest_delay();
         // Steps may come at half the period.
         let steps = (2.0 * delay_s / period_s).ceil() + 2.0;
         let room = whole(steps);
-        if room > MOST_STEPS {
-            return Err(ScrewError::Memory { period_s, delay_s, steps, most: MOST_STEPS });
+        if room > MAX_STEPS {
+            return Err(ScrewError::TooManySteps { period_s, delay_s, steps, most: MAX_STEPS });
         }
         let predictor = match settings.scheme {
             Scheme::Exact => Predictor::Exact {
-                exact: Exact::new(screw),
-                history: FeedHistory::new(room, settings.before),
+                exact: ExactPredictor::new(screw),
+                history: FeedHistory::new(room, settings.initial_fill),
             },
             Scheme::Paper if screw.conveying == Conveying::AtSpeedOnTheWay => {
                 return Err(ScrewError::SchemeOnTheWay);
             }
-            Scheme::Paper => Predictor::Paper(Euler::new(screw, period_s, room, settings.before)),
+            Scheme::Paper => {
+                Predictor::Paper(EulerPredictor::new(screw, period_s, room, settings.initial_fill))
+            }
         };
         Ok(Self {
-            law: settings.law,
+            feedback: settings.feedback,
             predictor,
             length: Mm::new(screw.length_m * MM_PER_M).unwrap_or_default(),
             period: settings.period,
@@ -148,7 +150,7 @@ impl ScrewControl {
 
     /// Decides what to feed from now on, from the plug measured now.
     pub fn step(&mut self, now: Stamp, plug: Mm) -> Result<ScrewStep, ScrewFault> {
-        self.pass(now)?;
+        self.advance(now)?;
         self.last = Some(now);
         let decided = self.decide(now, plug);
         let fill = decided.as_ref().map_or(self.fed(), |step| step.fill);
@@ -160,10 +162,12 @@ impl ScrewControl {
     /// decided: a limit acted, or an operator.
     pub fn applied(&mut self, from: Stamp, fill: f64) -> Result<(), ScrewFault> {
         if !(0.0..1.0).contains(&fill) {
-            return Err(ScrewFault::Share { fill });
+            return Err(ScrewFault::FillOutOfRange { fill });
         }
         match &mut self.predictor {
-            Predictor::Exact { exact, history } => history.push(exact.place(from.secs()), fill),
+            Predictor::Exact { exact, history } => {
+                history.push(exact.coordinate(from.secs()), fill)
+            }
             Predictor::Paper(euler) => euler.amend(fill),
         }
         Ok(())
@@ -179,19 +183,19 @@ impl ScrewControl {
 
     fn decide(&self, now: Stamp, plug: Mm) -> Result<ScrewStep, ScrewFault> {
         if !(plug >= Mm::ZERO && plug < self.length) {
-            return Err(ScrewFault::Outside { plug, length: self.length });
+            return Err(ScrewFault::PlugOutsideScrew { plug, length: self.length });
         }
-        let foretold = self.predictor.predict(now, plug.get() / MM_PER_M)?;
+        let prediction = self.predictor.predict(now, plug.get() / MM_PER_M)?;
         Ok(ScrewStep {
-            fill: self.law.fill(foretold.plug_m),
-            plug: Mm::new(foretold.plug_m * MM_PER_M).unwrap_or_default(),
-            arrival: Stamp::from_secs(foretold.arrival_s),
-            delay: Span::from_secs(foretold.delay_s),
+            fill: self.feedback.fill(prediction.plug_m),
+            plug: Mm::new(prediction.plug_m * MM_PER_M).unwrap_or_default(),
+            arrival: Stamp::from_secs(prediction.arrival_s),
+            delay: Span::from_secs(prediction.delay_s),
         })
     }
 
     /// Lets the time pass since the last step, if a step may be made now.
-    fn pass(&mut self, now: Stamp) -> Result<(), ScrewFault> {
+    fn advance(&mut self, now: Stamp) -> Result<(), ScrewFault> {
         let Some(last) = self.last else { return Ok(()) };
         let (since, period) = (now - last, self.period);
         let steps = since.secs() / period.secs();
@@ -202,7 +206,7 @@ impl ScrewControl {
             if (steps - steps.round()).abs() > 0.01 {
                 return Err(ScrewFault::OffGrid { since, period });
             }
-            for _ in 1..whole(steps.round()).min(MOST_STEPS) {
+            for _ in 1..whole(steps.round()).min(MAX_STEPS) {
                 euler.push(euler.last());
             }
         }
@@ -211,7 +215,7 @@ impl ScrewControl {
 }
 
 impl Predictor {
-    fn predict(&self, now: Stamp, plug_m: f64) -> Result<Prediction, Overtaken> {
+    fn predict(&self, now: Stamp, plug_m: f64) -> Result<PlugPrediction, FeedOvertaken> {
         match self {
             Self::Exact { exact, history } => exact.predict(history, now.secs(), plug_m),
             Self::Paper(euler) => euler.predict(now.secs(), plug_m),
@@ -220,7 +224,7 @@ impl Predictor {
 
     fn push(&mut self, now: Stamp, fill: f64) {
         match self {
-            Self::Exact { exact, history } => history.push(exact.place(now.secs()), fill),
+            Self::Exact { exact, history } => history.push(exact.coordinate(now.secs()), fill),
             Self::Paper(euler) => euler.push(fill),
         }
     }

@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use super::error::{ScrewError, positive};
-use super::model::{Conveying, MM_PER_M, Pulsation, Screw};
+use super::model::{Conveying, MM_PER_M, Screw, SpeedPulsation};
 use crate::core::units::{Mm, Rpm};
 
 /// What the screw's speed is multiplied with the pitch in.
@@ -54,7 +54,7 @@ impl ScrewDesign {
 
     /// θ1 and θ2 of the design, eqs. (14) and (15), with the conveying speed
     /// as it pulsates.
-    pub fn screw(&self, pulsation: Pulsation) -> Result<Screw, ScrewError> {
+    pub fn screw(&self, pulsation: SpeedPulsation) -> Result<Screw, ScrewError> {
         let turns = match self.unit {
             TurnUnit::RadPerS => self.speed.get() * TAU / 60.0,
             TurnUnit::RevPerS => self.speed.get() / 60.0,

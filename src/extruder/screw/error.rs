@@ -15,7 +15,7 @@ pub enum ScrewError {
     #[error(
         "the conveying speed's pulsation is {share} of its mean, which must be from 0 to below 1"
     )]
-    Share {
+    PulsationAmplitude {
         /// What was given.
         share: f64,
     },
@@ -43,7 +43,7 @@ pub enum ScrewError {
     #[error(
         "the feed is limited to {most} of full, which must be below 1 and above the {needed:.4} that holds the setpoint"
     )]
-    Most {
+    MaxFill {
         /// What was given.
         most: f64,
         /// What the setpoint needs.
@@ -63,7 +63,7 @@ pub enum ScrewError {
     #[error(
         "a share of {fill} before the start cannot have been fed; it must be from 0 to below 1"
     )]
-    Before {
+    InitialFill {
         /// What was given.
         fill: f64,
     },
@@ -71,7 +71,7 @@ pub enum ScrewError {
     #[error(
         "at one step every {period_s} s a delay of up to {delay_s:.3} s is {steps:.0} steps, of which at most {most} are kept; step less often"
     )]
-    Memory {
+    TooManySteps {
         /// Time between steps.
         period_s: f64,
         /// Longest delay.

@@ -3,12 +3,12 @@
 //! reproduce the paper and to show what it leaves out; [`super::exact`] is the
 //! one to use.
 
-use super::exact::{MOST_GROWTH, Overtaken, Prediction};
+use super::exact::{FeedOvertaken, MAX_DELAY_GROWTH, PlugPrediction};
 use super::model::Screw;
 
 /// The predictor with the feed of the last steps.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Euler {
+pub struct EulerPredictor {
     screw: Screw,
     step_s: f64,
     /// Shares fed, a ring; `newest` is the place of the last.
@@ -16,7 +16,7 @@ pub struct Euler {
     newest: usize,
 }
 
-impl Euler {
+impl EulerPredictor {
     /// Steps of a fixed length, after a feed that has been held for longer than
     /// the delay. `steps` is how many the longest delay may have.
     pub fn new(screw: Screw, step_s: f64, steps: usize, before: f64) -> Self {
@@ -43,43 +43,43 @@ impl Euler {
 
     /// The share that is fed now.
     pub fn last(&self) -> f64 {
-        self.back(0)
+        self.fill_before(0)
     }
 
     /// What was fed a number of steps before the last.
-    fn back(&self, steps: usize) -> f64 {
-        let place = (self.newest + self.fed.len() - steps) % self.fed.len();
-        self.fed.get(place).copied().unwrap_or_default()
+    fn fill_before(&self, steps: usize) -> f64 {
+        let index = (self.newest + self.fed.len() - steps) % self.fed.len();
+        self.fed.get(index).copied().unwrap_or_default()
     }
 
     /// Foretells from a plug that was measured now, before anything is pushed
     /// for the step that begins.
-    pub fn predict(&self, now_s: f64, plug_m: f64) -> Result<Prediction, Overtaken> {
+    pub fn predict(&self, now_s: f64, plug_m: f64) -> Result<PlugPrediction, FeedOvertaken> {
         let screw = &self.screw;
         let delay_s = screw.delay(now_s, plug_m);
         let (mut plug, mut arrival) = (plug_m, now_s);
         for steps in (0..whole(delay_s / self.step_s).min(self.fed.len())).rev() {
-            let fill = self.back(steps);
-            let (speed, slowing) = moving(screw, arrival);
+            let fill = self.fill_before(steps);
+            let (speed, slowing) = speed_and_delay_rate(screw, arrival);
             let growth = slowing * (screw.length_m - plug) - screw.growth(plug, fill);
-            if growth.is_nan() || growth >= MOST_GROWTH {
-                return Err(Overtaken { growth, plug_m: plug });
+            if growth.is_nan() || growth >= MAX_DELAY_GROWTH {
+                return Err(FeedOvertaken { growth, plug_m: plug });
             }
             let stretch = self.step_s / (1.0 - growth);
             plug = (plug + stretch * speed * screw.growth(plug, fill)).clamp(0.0, screw.length_m);
             arrival += stretch;
         }
-        Ok(Prediction { plug_m: plug, arrival_s: arrival, delay_s })
+        Ok(PlugPrediction { plug_m: plug, arrival_s: arrival, delay_s })
     }
 }
 
 /// Conveying speed \[m/s\], and ∂D/∂t for each metre of way, θ1·ε·ω·sin(ωt)/c²,
 /// eq. (82).
-fn moving(screw: &Screw, at_s: f64) -> (f64, f64) {
+fn speed_and_delay_rate(screw: &Screw, at_s: f64) -> (f64, f64) {
     let pulsation = screw.pulsation;
     let (sin, cos) = libm::sincos(pulsation.rad_per_s * at_s + pulsation.phase_rad);
-    let speed = screw.theta1_m_per_s * (1.0 + pulsation.share * cos);
-    let turns = screw.theta1_m_per_s * pulsation.share * pulsation.rad_per_s * sin;
+    let speed = screw.theta1_m_per_s * (1.0 + pulsation.relative_amplitude * cos);
+    let turns = screw.theta1_m_per_s * pulsation.relative_amplitude * pulsation.rad_per_s * sin;
     (speed, turns / (speed * speed))
 }
 
@@ -92,20 +92,20 @@ pub(super) fn whole(steps: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::extruder::screw::exact::Exact;
+    use crate::extruder::screw::exact::ExactPredictor;
     use crate::extruder::screw::feed_history::FeedHistory;
-    use crate::extruder::screw::{Pulsation, ScrewDesign};
+    use crate::extruder::screw::{ScrewDesign, SpeedPulsation};
 
     #[test]
     fn finer_steps_lead_to_the_exact_prediction() {
-        let pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+        let pulsation = SpeedPulsation { relative_amplitude: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
         let screw = ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap();
         let feed = |at_s: f64| if at_s < 0.7 { 0.2 } else { 0.6 };
         let mut history = FeedHistory::new(8, 0.2);
         history.push(0.7, 0.6);
-        let truth = Exact::new(screw).predict(&history, 1.2, 0.12).unwrap();
+        let truth = ExactPredictor::new(screw).predict(&history, 1.2, 0.12).unwrap();
         let missed = |step_s: f64| {
-            let mut euler = Euler::new(screw, step_s, 1 << 15, 0.2);
+            let mut euler = EulerPredictor::new(screw, step_s, 1 << 15, 0.2);
             for step in 0..whole(1.2 / step_s + 0.5) {
                 euler.push(feed(step_s * (f64::from(u32::try_from(step).unwrap()) + 0.5)));
             }

@@ -9,12 +9,12 @@
 //! changes: of fourth order, or of second where the feed changes so often that
 //! the steps are shorter than that needs.
 
-use super::feed_history::{FeedHistory, Piece};
+use super::feed_history::{FeedHistory, FeedSegment};
 use super::model::{Conveying, Screw};
 
 /// What is foretold.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Prediction {
+pub struct PlugPrediction {
     /// Length of the plug when what is fed now arrives, P \[m\].
     pub plug_m: f64,
     /// When it arrives, σ \[s\].
@@ -30,7 +30,7 @@ pub struct Prediction {
      second, which must be below 1; the pulsation is too strong or too fast for this screw",
     plug_m * 1000.0
 )]
-pub struct Overtaken {
+pub struct FeedOvertaken {
     /// Growth of the delay F, eq. (77).
     pub growth: f64,
     /// Foretold length of the plug where it grows so \[m\].
@@ -39,23 +39,23 @@ pub struct Overtaken {
 
 /// Largest growth of the delay that a prediction goes through: beyond, a second
 /// of feed is stretched a hundredfold.
-pub(super) const MOST_GROWTH: f64 = 0.99;
+pub(super) const MAX_DELAY_GROWTH: f64 = 0.99;
 /// Largest turn of the pulsation in one Runge–Kutta step \[rad\].
-const STEP_RAD: f64 = 0.2;
+const MAX_STEP_RAD: f64 = 0.2;
 /// Longest Runge–Kutta step \[s\].
-const STEP_S: f64 = 0.1;
+const MAX_STEP_S: f64 = 0.1;
 /// Up to this turn and length second order leaves less than a micrometre over
 /// the delay.
-const SHORT_RAD: f64 = 0.05;
-const SHORT_S: f64 = 0.006;
+const SECOND_ORDER_RAD: f64 = 0.05;
+const SECOND_ORDER_S: f64 = 0.006;
 
 /// The predictor with the model that it knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Exact {
+pub struct ExactPredictor {
     screw: Screw,
 }
 
-impl Exact {
+impl ExactPredictor {
     /// A predictor that knows this screw.
     pub fn new(screw: Screw) -> Self {
         Self { screw }
@@ -68,8 +68,8 @@ impl Exact {
 
     /// Where a moment lies in the history's coordinate: seconds, or metres
     /// conveyed where the closed form holds.
-    pub fn place(&self, now_s: f64) -> f64 {
-        if self.is_linear() { self.screw.way(now_s) } else { now_s }
+    pub fn coordinate(&self, now_s: f64) -> f64 {
+        if self.is_linear() { self.screw.conveyed_m(now_s) } else { now_s }
     }
 
     fn is_linear(&self) -> bool {
@@ -82,26 +82,26 @@ impl Exact {
         history: &FeedHistory,
         now_s: f64,
         plug_m: f64,
-    ) -> Result<Prediction, Overtaken> {
+    ) -> Result<PlugPrediction, FeedOvertaken> {
         let delay_s = self.screw.delay(now_s, plug_m);
         if self.is_linear() {
-            let now = self.screw.way(now_s);
+            let now = self.screw.conveyed_m(now_s);
             let from = now - (self.screw.length_m - plug_m);
             let grown =
-                history.pieces(from, now).fold(plug_m, |plug, piece| self.grow(plug, piece));
+                history.segments(from, now).fold(plug_m, |plug, piece| self.grow(plug, piece));
             let way = now + self.screw.length_m - grown;
-            let arrival_s = self.screw.moment(way, now_s);
-            return Ok(Prediction { plug_m: grown, arrival_s, delay_s });
+            let arrival_s = self.screw.moment_of(way, now_s);
+            return Ok(PlugPrediction { plug_m: grown, arrival_s, delay_s });
         }
-        let mut ahead = Ahead::new(&self.screw, now_s, plug_m);
-        for piece in history.pieces(now_s - delay_s, now_s) {
+        let mut ahead = PredictionState::new(&self.screw, now_s, plug_m);
+        for piece in history.segments(now_s - delay_s, now_s) {
             ahead.follow(piece)?;
         }
-        Ok(Prediction { plug_m: ahead.plug, arrival_s: now_s + ahead.past_s, delay_s })
+        Ok(PlugPrediction { plug_m: ahead.plug, arrival_s: now_s + ahead.elapsed_s, delay_s })
     }
 
     /// The plug after a stretch of feed has joined it.
-    fn grow(&self, plug: f64, piece: Piece) -> f64 {
+    fn grow(&self, plug: f64, piece: FeedSegment) -> f64 {
         let fade = self.screw.theta2_per_m * (1.0 - piece.fill);
         let joined = -libm::expm1(-fade * piece.length);
         (plug + joined * (piece.fill / fade - plug)).min(self.screw.length_m)
@@ -110,10 +110,10 @@ impl Exact {
 
 /// A prediction under way: the plug, the time since now and the pulsation's
 /// phase then.
-struct Ahead<'a> {
+struct PredictionState<'a> {
     screw: &'a Screw,
     plug: f64,
-    past_s: f64,
+    elapsed_s: f64,
     phase: Phase,
 }
 
@@ -131,38 +131,38 @@ struct Rates {
     time: f64,
 }
 
-impl<'a> Ahead<'a> {
+impl<'a> PredictionState<'a> {
     fn new(screw: &'a Screw, now_s: f64, plug: f64) -> Self {
         let pulsation = screw.pulsation;
         let (sin, cos) = libm::sincos(pulsation.rad_per_s * now_s + pulsation.phase_rad);
-        Self { screw, plug, past_s: 0.0, phase: Phase { sin, cos } }
+        Self { screw, plug, elapsed_s: 0.0, phase: Phase { sin, cos } }
     }
 
     /// Over a stretch of held feed.
-    fn follow(&mut self, piece: Piece) -> Result<(), Overtaken> {
+    fn follow(&mut self, piece: FeedSegment) -> Result<(), FeedOvertaken> {
         let mut left = piece.length;
         while left > 0.0 {
             let first = self.rates(piece.fill, self.phase, self.plug)?;
             let turn = self.screw.pulsation.rad_per_s * first.time;
-            let step = left.min(STEP_S).min(STEP_RAD / turn);
+            let step = left.min(MAX_STEP_S).min(MAX_STEP_RAD / turn);
             // What would be left by rounding is taken along.
             let step = if left - step < 1e-12 { left } else { step };
-            let mean = if step <= SHORT_S && step * turn <= SHORT_RAD {
+            let mean = if step <= SECOND_ORDER_S && step * turn <= SECOND_ORDER_RAD {
                 self.after(piece.fill, first, 0.5 * step)?
             } else {
                 self.fourth_order(piece.fill, first, step)?
             };
             let past_s = step * mean.time;
             self.plug = (self.plug + step * mean.plug).min(self.screw.length_m);
-            self.past_s += past_s;
-            self.phase = self.turned(past_s);
+            self.elapsed_s += past_s;
+            self.phase = self.rotated(past_s);
             left -= step;
         }
         Ok(())
     }
 
     /// Mean rates of a step, to fourth order.
-    fn fourth_order(&self, fill: f64, first: Rates, step: f64) -> Result<Rates, Overtaken> {
+    fn fourth_order(&self, fill: f64, first: Rates, step: f64) -> Result<Rates, FeedOvertaken> {
         let second = self.after(fill, first, 0.5 * step)?;
         let third = self.after(fill, second, 0.5 * step)?;
         let fourth = self.after(fill, third, step)?;
@@ -174,8 +174,8 @@ impl<'a> Ahead<'a> {
 
     /// Rates where others lead within a part of a step.
     #[inline]
-    fn after(&self, fill: f64, rates: Rates, part: f64) -> Result<Rates, Overtaken> {
-        self.rates(fill, self.turned(rates.time * part), self.plug + rates.plug * part)
+    fn after(&self, fill: f64, rates: Rates, part: f64) -> Result<Rates, FeedOvertaken> {
+        self.rates(fill, self.rotated(rates.time * part), self.plug + rates.plug * part)
     }
 
     /// f/(1 − F) and 1/(1 − F) of (47), (48), with F at the time of arrival
@@ -183,20 +183,20 @@ impl<'a> Ahead<'a> {
     /// are multiplied with (1 + θ2·P)(1 − U), which is 1/(1 − Γ), and with
     /// θ1·(1 + ε·cos)².
     #[inline]
-    fn rates(&self, fill: f64, phase: Phase, plug: f64) -> Result<Rates, Overtaken> {
+    fn rates(&self, fill: f64, phase: Phase, plug: f64) -> Result<Rates, FeedOvertaken> {
         let Phase { sin, cos } = phase;
         let screw = self.screw;
-        let share = screw.pulsation.share;
-        let scale = 1.0 + share * cos;
+        let amplitude = screw.pulsation.relative_amplitude;
+        let scale = 1.0 + amplitude * cos;
         let lead = screw.theta2_per_m * plug;
         let stretch = (1.0 + lead) * (1.0 - fill);
         let square = screw.theta1_m_per_s * scale * scale;
-        let slows = share * screw.pulsation.rad_per_s * sin * (screw.length_m - plug);
+        let slows = amplitude * screw.pulsation.rad_per_s * sin * (screw.length_m - plug);
         let over = square / (square - stretch * slows);
         let time = stretch * over;
-        if !(time > 0.0 && time * (1.0 - MOST_GROWTH) < 1.0) {
+        if !(time > 0.0 && time * (1.0 - MAX_DELAY_GROWTH) < 1.0) {
             let growth = slows / square + 1.0 - 1.0 / stretch;
-            return Err(Overtaken { growth, plug_m: plug });
+            return Err(FeedOvertaken { growth, plug_m: plug });
         }
         let joins = fill - lead * (1.0 - fill);
         Ok(Rates { plug: screw.theta1_m_per_s * scale * joins * over, time })
@@ -205,9 +205,9 @@ impl<'a> Ahead<'a> {
     /// Sine and cosine of the pulsation's phase a while later, turned on from
     /// those that are known: by a series, exact to 10⁻¹³, where it is short.
     #[inline]
-    fn turned(&self, past_s: f64) -> Phase {
+    fn rotated(&self, past_s: f64) -> Phase {
         let a = self.screw.pulsation.rad_per_s * past_s;
-        let (sin, cos) = if a.abs() <= SHORT_RAD {
+        let (sin, cos) = if a.abs() <= SECOND_ORDER_RAD {
             let q = a * a;
             let sin = a * (1.0 + q * (-1.0 / 6.0 + q * (1.0 / 120.0)));
             (sin, 1.0 + q * (-0.5 + q * (1.0 / 24.0 - q * (1.0 / 720.0))))
@@ -222,28 +222,29 @@ impl<'a> Ahead<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::extruder::screw::{Pulsation, ScrewDesign};
+    use crate::extruder::screw::{ScrewDesign, SpeedPulsation};
 
-    const A: Pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+    const A: SpeedPulsation =
+        SpeedPulsation { relative_amplitude: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
 
-    fn screw(pulsation: Pulsation) -> Screw {
+    fn screw(pulsation: SpeedPulsation) -> Screw {
         ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap()
     }
 
     /// A feed that changes every 20 ms from `from_s` on for a second and a half.
-    fn fed(predictor: &Exact, from_s: f64) -> FeedHistory {
+    fn fed(predictor: &ExactPredictor, from_s: f64) -> FeedHistory {
         let mut history = FeedHistory::new(100, 0.2);
         for k in 0..75 {
             let at = f64::from(k);
-            history.push(predictor.place(from_s + 0.02 * at), 0.45 + 0.4 * (0.3 * at).sin());
+            history.push(predictor.coordinate(from_s + 0.02 * at), 0.45 + 0.4 * (0.3 * at).sin());
         }
         history
     }
 
     #[test]
     fn the_closed_form_is_where_the_steps_lead_as_the_pulsation_fades() {
-        let steady = Exact::new(screw(Pulsation::default()));
-        let faint = Exact::new(screw(Pulsation { share: 1e-11, ..A }));
+        let steady = ExactPredictor::new(screw(SpeedPulsation::default()));
+        let faint = ExactPredictor::new(screw(SpeedPulsation { relative_amplitude: 1e-11, ..A }));
         let closed = steady.predict(&fed(&steady, 0.0), 1.5, 0.12).unwrap();
         let stepped = faint.predict(&fed(&faint, 0.0), 1.5, 0.12).unwrap();
         assert!((closed.plug_m - stepped.plug_m).abs() < 1e-9);
@@ -256,7 +257,7 @@ mod tests {
         // Eq. (53): σ = t + D(σ, P), with either kind of conveying.
         for conveying in [Conveying::AtPresentSpeed, Conveying::AtSpeedOnTheWay] {
             let screw = Screw { conveying, ..screw(A) };
-            let predictor = Exact::new(screw);
+            let predictor = ExactPredictor::new(screw);
             let found = predictor.predict(&fed(&predictor, 3.0), 4.5, 0.12).unwrap();
             let due = 4.5 + screw.delay(found.arrival_s, found.plug_m);
             assert!((found.arrival_s - due).abs() < 2e-6, "{conveying:?}");
@@ -265,8 +266,8 @@ mod tests {
 
     #[test]
     fn a_phase_that_is_turned_on_is_that_of_the_moment() {
-        for turn in [SHORT_RAD, 0.4] {
-            let ahead = Ahead::new(&screw(A), 7.0, 0.1).turned(turn / 3.5);
+        for turn in [SECOND_ORDER_RAD, 0.4] {
+            let ahead = PredictionState::new(&screw(A), 7.0, 0.1).rotated(turn / 3.5);
             let (sin, cos) = libm::sincos(3.5 * 7.0 + turn);
             assert!((ahead.sin - sin).abs() < 1e-12 && (ahead.cos - cos).abs() < 1e-12);
         }
@@ -274,8 +275,10 @@ mod tests {
 
     #[test]
     fn a_feed_that_changes_often_costs_less_than_a_micrometre() {
-        for pulsation in [A, Pulsation { share: 0.4, rad_per_s: 0.4, phase_rad: 2.0 }] {
-            let predictor = Exact::new(screw(pulsation));
+        for pulsation in
+            [A, SpeedPulsation { relative_amplitude: 0.4, rad_per_s: 0.4, phase_rad: 2.0 }]
+        {
+            let predictor = ExactPredictor::new(screw(pulsation));
             let fill = |k: i32| 0.45 + 0.4 * (1.7 * f64::from(k)).sin();
             let (mut coarse, mut fine) =
                 (FeedHistory::new(500, 0.2), FeedHistory::new(40_000, 0.2));
@@ -296,7 +299,11 @@ mod tests {
 
     #[test]
     fn a_feed_that_does_not_arrive_is_said_to_be_overtaken() {
-        let fast = Exact::new(screw(Pulsation { share: 0.5, rad_per_s: 6.0, phase_rad: 0.0 }));
+        let fast = ExactPredictor::new(screw(SpeedPulsation {
+            relative_amplitude: 0.5,
+            rad_per_s: 6.0,
+            phase_rad: 0.0,
+        }));
         let history = FeedHistory::new(4, 0.0);
         let mut found = (0..20).map(|k| fast.predict(&history, 0.1 * f64::from(k), 0.02));
         let fault = found.find_map(Result::err).unwrap();

@@ -7,7 +7,7 @@ use super::model::{Conveying, Screw};
 
 /// What the delay's growth was bounded with.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bound {
+pub struct GrowthBound {
     /// Largest sin/(1 + ε·cos)² over a turn, or 1/(1 − ε)² in its place.
     pub factor: f64,
     /// ε·ω times that factor \[rad/s\].
@@ -49,9 +49,9 @@ pub struct Thresholds {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Feasibility {
     /// With the exact bound of the speed's part of the growth.
-    pub sharp: Bound,
+    pub exact: GrowthBound,
     /// With the paper's looser one, eq. (84).
-    pub printed: Bound,
+    pub paper: GrowthBound,
     /// What the paper's conditions compare with.
     pub thresholds: Thresholds,
     /// Where the delay adds up on the way nothing overtakes: always feasible.
@@ -65,10 +65,10 @@ impl Feasibility {
         let spread = screw.theta1_m_per_s * screw.theta2_per_m / (1.0 + lead).powi(2);
         let reach = if lead < 1.0 { screw.theta1_m_per_s / screw.length_m } else { 4.0 * spread };
         let thresholds = Thresholds { increasing: spread, reach, lead };
-        let share = screw.pulsation.share;
+        let amplitude = screw.pulsation.relative_amplitude;
         Self {
-            sharp: Bound::over(screw, &thresholds, sharpest(share)),
-            printed: Bound::over(screw, &thresholds, 1.0 / (1.0 - share).powi(2)),
+            exact: GrowthBound::over(screw, &thresholds, max_pulsation_factor(amplitude)),
+            paper: GrowthBound::over(screw, &thresholds, 1.0 / (1.0 - amplitude).powi(2)),
             thresholds,
             conveying: screw.conveying,
         }
@@ -76,24 +76,24 @@ impl Feasibility {
 
     /// Whether every feed reaches the plug.
     pub fn is_feasible(&self) -> bool {
-        self.conveying == Conveying::AtSpeedOnTheWay || self.sharp.growth < 1.0
+        self.conveying == Conveying::AtSpeedOnTheWay || self.exact.growth < 1.0
     }
 }
 
 /// The largest sin φ/(1 + ε·cos φ)² over a turn: its derivative is zero where
 /// ε·cos² φ − cos φ − 2ε = 0.
-fn sharpest(share: f64) -> f64 {
-    if share == 0.0 {
+fn max_pulsation_factor(amplitude: f64) -> f64 {
+    if amplitude == 0.0 {
         return 1.0;
     }
     // The smaller root, written so that a small share loses no digits.
-    let cos = -4.0 * share / (1.0 + (1.0 + 8.0 * share * share).sqrt());
-    (1.0 - cos * cos).max(0.0).sqrt() / (1.0 + share * cos).powi(2)
+    let cos = -4.0 * amplitude / (1.0 + (1.0 + 8.0 * amplitude * amplitude).sqrt());
+    (1.0 - cos * cos).max(0.0).sqrt() / (1.0 + amplitude * cos).powi(2)
 }
 
-impl Bound {
+impl GrowthBound {
     fn over(screw: &Screw, thresholds: &Thresholds, factor: f64) -> Self {
-        let pulsation = screw.pulsation.share * screw.pulsation.rad_per_s * factor;
+        let pulsation = screw.pulsation.relative_amplitude * screw.pulsation.rad_per_s * factor;
         let (theta2, length) = (screw.theta2_per_m, screw.length_m);
         let fall = pulsation / screw.theta1_m_per_s;
         // Between a growing and a falling course lies one highest point (95).
@@ -102,7 +102,7 @@ impl Bound {
         Self {
             factor,
             pulsation_rad_per_s: pulsation,
-            growth: fall * (length - worst_plug_m) + screw.holding(worst_plug_m),
+            growth: fall * (length - worst_plug_m) + screw.holding_fill(worst_plug_m),
             worst_plug_m,
             condition: thresholds.met(pulsation),
         }
@@ -142,7 +142,8 @@ impl fmt::Display for Feasibility {
                 "feasible: the material keeps its order on the way, so every feed reaches the plug",
             );
         }
-        let Bound { growth, worst_plug_m, factor, pulsation_rad_per_s, condition } = &self.sharp;
+        let GrowthBound { growth, worst_plug_m, factor, pulsation_rad_per_s, condition } =
+            &self.exact;
         let worst_mm = worst_plug_m * 1000.0;
         if self.is_feasible() {
             write!(
@@ -172,28 +173,30 @@ impl fmt::Display for Feasibility {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::extruder::screw::{Pulsation, ScrewDesign, TurnUnit};
+    use crate::extruder::screw::{ScrewDesign, SpeedPulsation, TurnUnit};
     use proptest::prelude::*;
 
-    const A: Pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
-    const B: Pulsation = Pulsation { share: 0.4, rad_per_s: 0.4, phase_rad: 0.0 };
+    const A: SpeedPulsation =
+        SpeedPulsation { relative_amplitude: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+    const B: SpeedPulsation =
+        SpeedPulsation { relative_amplitude: 0.4, rad_per_s: 0.4, phase_rad: 0.0 };
 
-    fn judge(unit: TurnUnit, pulsation: Pulsation) -> Feasibility {
+    fn judge(unit: TurnUnit, pulsation: SpeedPulsation) -> Feasibility {
         let design = ScrewDesign { unit, ..ScrewDesign::DIAGNE_2015 };
         Feasibility::judge(&design.screw(pulsation).unwrap())
     }
 
     #[test]
     fn the_exact_factor_is_the_largest_of_a_turn() {
-        for (share, known) in [(0.1, 1.0202), (0.4, 1.3881)] {
-            assert!((sharpest(share) - known).abs() < 5e-5);
+        for (amplitude, known) in [(0.1, 1.0202), (0.4, 1.3881)] {
+            assert!((max_pulsation_factor(amplitude) - known).abs() < 5e-5);
             let seen = (0..100_000)
                 .map(|k| f64::from(k) * std::f64::consts::TAU / 100_000.0)
-                .map(|turn| turn.sin() / (1.0 + share * turn.cos()).powi(2))
+                .map(|turn| turn.sin() / (1.0 + amplitude * turn.cos()).powi(2))
                 .fold(0.0, f64::max);
-            assert!((sharpest(share) - seen).abs() < 1e-8);
+            assert!((max_pulsation_factor(amplitude) - seen).abs() < 1e-8);
         }
-        assert!((sharpest(1e-9) - 1.0).abs() < 1e-12);
+        assert!((max_pulsation_factor(1e-9) - 1.0).abs() < 1e-12);
     }
 
     #[test]
@@ -201,22 +204,22 @@ mod tests {
         for pulsation in [A, B] {
             let radians = judge(TurnUnit::RadPerS, pulsation);
             assert!(radians.is_feasible());
-            assert_eq!(radians.sharp.condition, Some(Condition::Short));
-            assert_eq!(radians.printed.condition, Some(Condition::Short));
+            assert_eq!(radians.exact.condition, Some(Condition::Short));
+            assert_eq!(radians.paper.condition, Some(Condition::Short));
             let turns = judge(TurnUnit::RevPerS, pulsation);
             assert!(!turns.is_feasible());
-            assert_eq!(turns.sharp.condition, None);
-            assert_eq!(turns.printed.condition, None);
+            assert_eq!(turns.exact.condition, None);
+            assert_eq!(turns.paper.condition, None);
         }
     }
 
     #[test]
     fn the_exact_bound_allows_what_the_printed_one_refuses() {
         // 0.55·0.4/(1 − 0.55)² is 1.09 rad/s, beyond θ1/L = 0.471.
-        let strong = judge(TurnUnit::RadPerS, Pulsation { share: 0.55, ..B });
+        let strong = judge(TurnUnit::RadPerS, SpeedPulsation { relative_amplitude: 0.55, ..B });
         assert!(strong.is_feasible());
-        assert_eq!(strong.printed.condition, None);
-        assert!(strong.printed.growth > 1.0);
+        assert_eq!(strong.paper.condition, None);
+        assert!(strong.paper.growth > 1.0);
     }
 
     #[test]
@@ -235,7 +238,7 @@ mod tests {
     #[test]
     fn a_belt_that_keeps_its_order_is_always_feasible() {
         let screw = ScrewDesign::DIAGNE_2015.screw(A).unwrap();
-        let fast = Pulsation { share: 0.9, rad_per_s: 50.0, phase_rad: 0.0 };
+        let fast = SpeedPulsation { relative_amplitude: 0.9, rad_per_s: 50.0, phase_rad: 0.0 };
         let fast = Screw { pulsation: fast, ..screw };
         assert!(!Feasibility::judge(&fast).is_feasible());
         let belt = Screw { conveying: Conveying::AtSpeedOnTheWay, ..fast };
@@ -245,23 +248,23 @@ mod tests {
     proptest! {
         #[test]
         fn the_largest_growth_is_that_of_a_search_and_the_conditions_agree_with_it(
-            share in 0.0..0.8_f64,
+            relative_amplitude in 0.0..0.8_f64,
             rad_per_s in 0.0..6.0_f64,
             theta2_per_m in 0.2..40.0_f64,
         ) {
-            let pulsation = Pulsation { share, rad_per_s, phase_rad: 0.0 };
+            let pulsation = SpeedPulsation { relative_amplitude, rad_per_s, phase_rad: 0.0 };
             let screw = ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap();
             let screw = Screw { theta2_per_m, ..screw };
             let verdict = Feasibility::judge(&screw);
             let mut most = 0.0_f64;
             for k in 0..=200 {
                 let plug = 0.001 * f64::from(k);
-                let at = share * rad_per_s * verdict.sharp.factor / screw.theta1_m_per_s;
-                most = most.max(at * (0.2 - plug) + screw.holding(plug));
+                let at = relative_amplitude * rad_per_s * verdict.exact.factor / screw.theta1_m_per_s;
+                most = most.max(at * (0.2 - plug) + screw.holding_fill(plug));
             }
-            prop_assert!((verdict.sharp.growth - most).abs() < 1e-3);
-            prop_assert!(verdict.sharp.growth >= most - 1e-12);
-            for bound in [verdict.sharp, verdict.printed] {
+            prop_assert!((verdict.exact.growth - most).abs() < 1e-3);
+            prop_assert!(verdict.exact.growth >= most - 1e-12);
+            for bound in [verdict.exact, verdict.paper] {
                 prop_assert_eq!(bound.condition.is_some(), bound.growth < 1.0);
             }
         }

@@ -10,7 +10,7 @@ pub struct FeedHistory {
     first: usize,
     count: usize,
     /// What was fed before the oldest change.
-    before: f64,
+    initial_fill: f64,
 }
 
 /// From here on this share is fed.
@@ -22,7 +22,7 @@ struct Change {
 
 /// A stretch over which the feed was held.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Piece {
+pub struct FeedSegment {
     /// Its length, in the coordinate's unit.
     pub length: f64,
     /// Share that was fed.
@@ -34,7 +34,7 @@ impl FeedHistory {
     /// held for as long as matters.
     pub fn new(capacity: usize, before: f64) -> Self {
         let changes = vec![Change::default(); capacity.max(1)].into_boxed_slice();
-        Self { changes, first: 0, count: 0, before }
+        Self { changes, first: 0, count: 0, initial_fill: before }
     }
 
     /// From `from` on `fill` is fed. A second share at the same place takes the
@@ -43,11 +43,11 @@ impl FeedHistory {
         let last = self.count.checked_sub(1).map(|last| self.get(last));
         if last.is_some_and(|last| last.from >= from) {
             self.count -= 1;
-        } else if last.map_or(self.before, |last| last.fill) == fill {
+        } else if last.map_or(self.initial_fill, |last| last.fill) == fill {
             return;
         }
         if self.count == self.changes.len() {
-            self.before = self.get(0).fill;
+            self.initial_fill = self.get(0).fill;
             self.first = self.slot(1);
             self.count -= 1;
         }
@@ -60,32 +60,34 @@ impl FeedHistory {
 
     /// The share that is fed now.
     pub fn last(&self) -> f64 {
-        self.count.checked_sub(1).map_or(self.before, |last| self.get(last).fill)
+        self.count.checked_sub(1).map_or(self.initial_fill, |last| self.get(last).fill)
     }
 
     /// The share that was fed at a place.
-    pub fn at(&self, place: f64) -> f64 {
-        self.after(place).checked_sub(1).map_or(self.before, |found| self.get(found).fill)
+    pub fn at(&self, coordinate: f64) -> f64 {
+        self.first_after(coordinate)
+            .checked_sub(1)
+            .map_or(self.initial_fill, |found| self.get(found).fill)
     }
 
     /// Where the feed changes next after a place.
-    pub fn next_change(&self, place: f64) -> Option<f64> {
-        let found = self.after(place);
+    pub fn next_change(&self, coordinate: f64) -> Option<f64> {
+        let found = self.first_after(coordinate);
         (found < self.count).then(|| self.get(found).from)
     }
 
     /// The held stretches between two places, in order.
-    pub fn pieces(&self, from: f64, to: f64) -> impl Iterator<Item = Piece> + '_ {
+    pub fn segments(&self, from: f64, to: f64) -> impl Iterator<Item = FeedSegment> + '_ {
         let mut at = from;
-        let mut next = self.after(from);
-        let mut fill = next.checked_sub(1).map_or(self.before, |found| self.get(found).fill);
+        let mut next = self.first_after(from);
+        let mut fill = next.checked_sub(1).map_or(self.initial_fill, |found| self.get(found).fill);
         std::iter::from_fn(move || {
             if at >= to {
                 return None;
             }
             let change = (next < self.count).then(|| self.get(next));
             let end = change.map_or(to, |change| change.from.min(to));
-            let piece = Piece { length: end - at, fill };
+            let piece = FeedSegment { length: end - at, fill };
             at = end;
             next += 1;
             fill = change.map_or(fill, |change| change.fill);
@@ -94,11 +96,11 @@ impl FeedHistory {
     }
 
     /// Number of the first change that lies beyond a place.
-    fn after(&self, place: f64) -> usize {
+    fn first_after(&self, coordinate: f64) -> usize {
         let (mut low, mut high) = (0, self.count);
         while low < high {
             let middle = low.midpoint(high);
-            if self.get(middle).from <= place {
+            if self.get(middle).from <= coordinate {
                 low = middle + 1;
             } else {
                 high = middle;
@@ -123,7 +125,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn pieces(history: &FeedHistory, from: f64, to: f64) -> Vec<(f64, f64)> {
-        history.pieces(from, to).map(|piece| (piece.length, piece.fill)).collect()
+        history.segments(from, to).map(|piece| (piece.length, piece.fill)).collect()
     }
 
     #[test]
@@ -165,7 +167,7 @@ mod tests {
             let end = f64::from(u32::try_from(fills.len()).unwrap());
             let from = (end - 7.0 + from).min(end).max(0.0);
             let mut at = from;
-            for piece in history.pieces(from, end) {
+            for piece in history.segments(from, end) {
                 let middle = at + 0.5 * piece.length;
                 let held = (0_u32..40).zip(&fills).rfind(|(second, _)| f64::from(*second) <= middle);
                 prop_assert_eq!(Some(&piece.fill), held.map(|(_, fill)| fill));

@@ -7,48 +7,48 @@ use crate::core::units::Mm;
 
 /// What is asked of a law.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Setpoint {
+pub struct PlugSetpoint {
     /// Wanted length of the plug x*.
     pub plug: Mm,
     /// Largest share that can be fed, `v_max`, below 1.
-    pub most: f64,
+    pub max_fill: f64,
 }
 
 /// A setpoint that has been checked against a screw, in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Held {
+struct CheckedSetpoint {
     plug_m: f64,
     length_m: f64,
-    most: f64,
+    max_fill: f64,
     /// Share that holds the setpoint.
-    hold: f64,
+    holding_fill: f64,
 }
 
-impl Setpoint {
-    fn check(&self, screw: &Screw) -> Result<Held, ScrewError> {
+impl PlugSetpoint {
+    fn check(&self, screw: &Screw) -> Result<CheckedSetpoint, ScrewError> {
         let (plug_m, length_m) = (self.plug.get() / MM_PER_M, screw.length_m);
         if !(plug_m > 0.0 && plug_m < length_m) {
             let (setpoint_mm, length_mm) = (self.plug.get(), length_m * MM_PER_M);
             return Err(ScrewError::Setpoint { setpoint_mm, length_mm });
         }
-        let hold = screw.holding(plug_m);
-        if !(self.most > hold && self.most < 1.0) {
-            return Err(ScrewError::Most { most: self.most, needed: hold });
+        let hold = screw.holding_fill(plug_m);
+        if !(self.max_fill > hold && self.max_fill < 1.0) {
+            return Err(ScrewError::MaxFill { most: self.max_fill, needed: hold });
         }
-        Ok(Held { plug_m, length_m, most: self.most, hold })
+        Ok(CheckedSetpoint { plug_m, length_m, max_fill: self.max_fill, holding_fill: hold })
     }
 
     /// Flattest slope at the setpoint for which the exponentials bend towards
     /// it from both sides, `S_min` \[1/m\]: eq. (31) without its leading x*.
-    pub fn least_slope(&self, screw: &Screw) -> Result<f64, ScrewError> {
-        self.check(screw).map(|held| held.least_slope())
+    pub fn min_slope(&self, screw: &Screw) -> Result<f64, ScrewError> {
+        self.check(screw).map(|held| held.min_slope())
     }
 }
 
-impl Held {
-    fn least_slope(&self) -> f64 {
-        let left = (self.most - self.hold) / self.plug_m;
-        left.max(self.hold / (self.length_m - self.plug_m))
+impl CheckedSetpoint {
+    fn min_slope(&self) -> f64 {
+        let left = (self.max_fill - self.holding_fill) / self.plug_m;
+        left.max(self.holding_fill / (self.length_m - self.plug_m))
     }
 }
 
@@ -74,7 +74,7 @@ fn gain(slope: f64, height: f64, width: f64) -> f64 {
 /// eqs. (20) to (22).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PiecewiseExponential {
-    held: Held,
+    setpoint: CheckedSetpoint,
     slope_per_m: f64,
     left_per_m: f64,
     right_per_m: f64,
@@ -85,23 +85,27 @@ pub struct PiecewiseExponential {
 impl PiecewiseExponential {
     /// Solves the gains for a slope at the setpoint S \[1/m\], which must be
     /// above [`Setpoint::least_slope`].
-    pub fn new(screw: &Screw, setpoint: Setpoint, slope_per_m: f64) -> Result<Self, ScrewError> {
+    pub fn new(
+        screw: &Screw,
+        setpoint: PlugSetpoint,
+        slope_per_m: f64,
+    ) -> Result<Self, ScrewError> {
         let held = setpoint.check(screw)?;
-        let least_per_m = held.least_slope();
+        let least_per_m = held.min_slope();
         if !(slope_per_m > least_per_m && slope_per_m.is_finite()) {
             return Err(ScrewError::Slope { slope_per_m, least_per_m });
         }
-        let rise = held.most - held.hold;
+        let rise = held.max_fill - held.holding_fill;
         let beyond = held.length_m - held.plug_m;
         let left_per_m = gain(slope_per_m, rise, held.plug_m);
-        let right_per_m = gain(slope_per_m, held.hold, beyond);
+        let right_per_m = gain(slope_per_m, held.holding_fill, beyond);
         Ok(Self {
-            held,
+            setpoint: held,
             slope_per_m,
             left_per_m,
             right_per_m,
             left_scale: rise / (1.0 - libm::exp(-left_per_m * held.plug_m)),
-            right_scale: held.hold / (1.0 - libm::exp(-right_per_m * beyond)),
+            right_scale: held.holding_fill / (1.0 - libm::exp(-right_per_m * beyond)),
         })
     }
 
@@ -117,11 +121,12 @@ impl PiecewiseExponential {
     }
 
     fn fill(&self, plug_m: f64) -> f64 {
-        let off = plug_m - self.held.plug_m;
+        let off = plug_m - self.setpoint.plug_m;
         if off <= 0.0 {
-            self.held.hold + self.left_scale * (1.0 - libm::exp(self.left_per_m * off))
+            self.setpoint.holding_fill + self.left_scale * (1.0 - libm::exp(self.left_per_m * off))
         } else {
-            self.held.hold - self.right_scale * (1.0 - libm::exp(-self.right_per_m * off))
+            self.setpoint.holding_fill
+                - self.right_scale * (1.0 - libm::exp(-self.right_per_m * off))
         }
     }
 }
@@ -130,52 +135,58 @@ impl PiecewiseExponential {
 /// through the share that holds it. It brings the plug there as soon as the
 /// limit allows; how steep it may be is a matter of how well the model is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Saturated {
-    held: Held,
+pub struct SaturatedLinear {
+    setpoint: CheckedSetpoint,
     slope_per_m: f64,
 }
 
-impl Saturated {
+impl SaturatedLinear {
     /// A law with a slope at the setpoint \[1/m\].
-    pub fn new(screw: &Screw, setpoint: Setpoint, slope_per_m: f64) -> Result<Self, ScrewError> {
+    pub fn new(
+        screw: &Screw,
+        setpoint: PlugSetpoint,
+        slope_per_m: f64,
+    ) -> Result<Self, ScrewError> {
         let held = setpoint.check(screw)?;
         positive("slope_per_m", slope_per_m)?;
-        Ok(Self { held, slope_per_m })
+        Ok(Self { setpoint: held, slope_per_m })
     }
 }
 
 /// A law.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum FillLaw {
+pub enum FillFeedback {
     /// The paper's.
     Exponential(PiecewiseExponential),
     /// The straight one between limits.
-    Saturated(Saturated),
+    Saturated(SaturatedLinear),
 }
 
-impl FillLaw {
+impl FillFeedback {
     /// Share of full to feed at a length of the plug \[m\], from 0 to the
     /// largest that can be fed. A length outside the screw counts as its nearer
     /// end.
     pub fn fill(&self, plug_m: f64) -> f64 {
-        let held = self.held();
+        let held = self.setpoint();
         let plug_m = plug_m.clamp(0.0, held.length_m);
         let fill = match self {
-            Self::Exponential(law) => law.fill(plug_m),
-            Self::Saturated(law) => held.hold - law.slope_per_m * (plug_m - held.plug_m),
+            Self::Exponential(feedback) => feedback.fill(plug_m),
+            Self::Saturated(feedback) => {
+                held.holding_fill - feedback.slope_per_m * (plug_m - held.plug_m)
+            }
         };
-        fill.clamp(0.0, held.most)
+        fill.clamp(0.0, held.max_fill)
     }
 
     /// Share that holds the setpoint.
-    pub fn hold(&self) -> f64 {
-        self.held().hold
+    pub fn holding_fill(&self) -> f64 {
+        self.setpoint().holding_fill
     }
 
-    fn held(&self) -> &Held {
+    fn setpoint(&self) -> &CheckedSetpoint {
         match self {
-            Self::Exponential(law) => &law.held,
-            Self::Saturated(law) => &law.held,
+            Self::Exponential(feedback) => &feedback.setpoint,
+            Self::Saturated(feedback) => &feedback.setpoint,
         }
     }
 }
@@ -183,25 +194,25 @@ impl FillLaw {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::extruder::screw::{Pulsation, ScrewDesign};
+    use crate::extruder::screw::{ScrewDesign, SpeedPulsation};
     use proptest::prelude::*;
 
-    const SETPOINT: Setpoint = Setpoint { plug: Mm::constant(160.0), most: 0.9 };
+    const SETPOINT: PlugSetpoint = PlugSetpoint { plug: Mm::constant(160.0), max_fill: 0.9 };
 
     fn screw() -> Screw {
-        ScrewDesign::DIAGNE_2015.screw(Pulsation::default()).unwrap()
+        ScrewDesign::DIAGNE_2015.screw(SpeedPulsation::default()).unwrap()
     }
 
     #[test]
     fn the_paper_s_gains_solve_their_equations() {
         let screw = screw();
-        let least = SETPOINT.least_slope(&screw).unwrap();
+        let least = SETPOINT.min_slope(&screw).unwrap();
         assert!((least - 6.319_40).abs() < 1e-5, "{least}");
-        let law = PiecewiseExponential::new(&screw, SETPOINT, least + 30.0).unwrap();
-        let (left, right) = law.gains_per_m();
+        let feedback = PiecewiseExponential::new(&screw, SETPOINT, least + 30.0).unwrap();
+        let (left, right) = feedback.gains_per_m();
         assert!((right - 143.214_9).abs() < 1e-4, "{right}");
         assert!((left - 56.108_6).abs() < 1e-4, "{left}");
-        let (slope, hold) = (law.slope_per_m(), screw.holding(0.16));
+        let (slope, hold) = (feedback.slope_per_m(), screw.holding_fill(0.16));
         assert!((left * (0.9 - hold) - slope * (1.0 - (-left * 0.16).exp())).abs() < 1e-12);
         assert!((right * hold - slope * (1.0 - (-right * 0.04).exp())).abs() < 1e-12);
     }
@@ -209,14 +220,14 @@ mod tests {
     #[test]
     fn the_law_feeds_all_when_empty_nothing_when_full_and_has_one_slope_between() {
         let screw = screw();
-        let law = PiecewiseExponential::new(&screw, SETPOINT, 36.3194).unwrap();
-        let law = FillLaw::Exponential(law);
-        assert!((law.fill(0.0) - 0.9).abs() < 1e-15);
-        assert!(law.fill(0.2).abs() < 1e-15);
-        assert!((law.fill(0.16) - law.hold()).abs() < 1e-15);
+        let feedback = PiecewiseExponential::new(&screw, SETPOINT, 36.3194).unwrap();
+        let feedback = FillFeedback::Exponential(feedback);
+        assert!((feedback.fill(0.0) - 0.9).abs() < 1e-15);
+        assert!(feedback.fill(0.2).abs() < 1e-15);
+        assert!((feedback.fill(0.16) - feedback.holding_fill()).abs() < 1e-15);
         let h = 1e-7;
         for side in [-h, h] {
-            let slope = (law.fill(0.16) - law.fill(0.16 + side)) / side;
+            let slope = (feedback.fill(0.16) - feedback.fill(0.16 + side)) / side;
             assert!((slope - 36.3194).abs() < 1e-3, "{slope}");
         }
     }
@@ -228,13 +239,13 @@ mod tests {
         let said = flat.to_string();
         assert_eq!(said, "a slope of 6.3/m at the setpoint is too flat: it must be above 6.3194/m");
         assert!(PiecewiseExponential::new(&screw, SETPOINT, f64::NAN).is_err());
-        let weak = Setpoint { most: 0.2, ..SETPOINT };
-        assert!(matches!(weak.least_slope(&screw), Err(ScrewError::Most { .. })));
-        let full = Setpoint { most: 1.0, ..SETPOINT };
-        assert!(matches!(full.least_slope(&screw), Err(ScrewError::Most { .. })));
+        let weak = PlugSetpoint { max_fill: 0.2, ..SETPOINT };
+        assert!(matches!(weak.min_slope(&screw), Err(ScrewError::MaxFill { .. })));
+        let full = PlugSetpoint { max_fill: 1.0, ..SETPOINT };
+        assert!(matches!(full.min_slope(&screw), Err(ScrewError::MaxFill { .. })));
         for plug in [0.0, 200.0, -3.0] {
-            let outside = Setpoint { plug: Mm::constant(plug), ..SETPOINT };
-            let found = Saturated::new(&screw, outside, 100.0);
+            let outside = PlugSetpoint { plug: Mm::constant(plug), ..SETPOINT };
+            let found = SaturatedLinear::new(&screw, outside, 100.0);
             assert!(matches!(found, Err(ScrewError::Setpoint { .. })), "{plug}");
         }
     }
@@ -249,16 +260,16 @@ mod tests {
             more in 0.0..0.2_f64,
         ) {
             let screw = screw();
-            let hold = screw.holding(setpoint / 1000.0);
-            let setpoint = Setpoint { plug: Mm::constant(setpoint), most: hold + spare * (0.999 - hold) };
-            let slope = steeper * setpoint.least_slope(&screw).unwrap();
+            let hold = screw.holding_fill(setpoint / 1000.0);
+            let setpoint = PlugSetpoint { plug: Mm::constant(setpoint), max_fill: hold + spare * (0.999 - hold) };
+            let slope = steeper * setpoint.min_slope(&screw).unwrap();
             let exponential = PiecewiseExponential::new(&screw, setpoint, slope).unwrap();
             let (left, right) = exponential.gains_per_m();
             prop_assert!(left > 0.0 && right > 0.0);
-            let saturated = Saturated::new(&screw, setpoint, slope).unwrap();
-            for law in [FillLaw::Exponential(exponential), FillLaw::Saturated(saturated)] {
+            let saturated = SaturatedLinear::new(&screw, setpoint, slope).unwrap();
+            for law in [FillFeedback::Exponential(exponential), FillFeedback::Saturated(saturated)] {
                 let (before, after) = (law.fill(one), law.fill(one + more));
-                prop_assert!((0.0..=setpoint.most).contains(&before));
+                prop_assert!((0.0..=setpoint.max_fill).contains(&before));
                 prop_assert!(after <= before);
             }
         }

@@ -10,9 +10,9 @@ pub(super) const MM_PER_M: f64 = 1000.0;
 /// How the conveying speed pulsates about its mean: c = θ1·(1 + ε·cos(ωt + φ)),
 /// eq. (17).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Pulsation {
+pub struct SpeedPulsation {
     /// Share of the mean ε, from 0 up to but not 1.
-    pub share: f64,
+    pub relative_amplitude: f64,
     /// Angular frequency ω \[rad/s\].
     pub rad_per_s: f64,
     /// Phase at the start of the run φ \[rad\]; 0 in the paper.
@@ -41,7 +41,7 @@ pub struct Screw {
     /// From the nozzle to the feed, L \[m\].
     pub length_m: f64,
     /// How the conveying speed changes.
-    pub pulsation: Pulsation,
+    pub pulsation: SpeedPulsation,
     /// What the delay is made of.
     pub conveying: Conveying,
 }
@@ -52,9 +52,10 @@ impl Screw {
         positive("theta1_m_per_s", screw.theta1_m_per_s)?;
         positive("theta2_per_m", screw.theta2_per_m)?;
         positive("length_m", screw.length_m)?;
-        let Pulsation { share, rad_per_s, phase_rad } = screw.pulsation;
-        if !(0.0..1.0).contains(&share) {
-            return Err(ScrewError::Share { share });
+        let SpeedPulsation { relative_amplitude: amplitude, rad_per_s, phase_rad } =
+            screw.pulsation;
+        if !(0.0..1.0).contains(&amplitude) {
+            return Err(ScrewError::PulsationAmplitude { share: amplitude });
         }
         if !(rad_per_s.is_finite() && rad_per_s >= 0.0 && phase_rad.is_finite()) {
             return Err(ScrewError::Frequency { rad_per_s, phase_rad });
@@ -65,45 +66,45 @@ impl Screw {
     /// The same screw as one who does not know of the pulsation sees it,
     /// eqs. (102) to (104).
     pub fn steady(self) -> Self {
-        Self { pulsation: Pulsation::default(), ..self }
+        Self { pulsation: SpeedPulsation::default(), ..self }
     }
 
     /// Whether the conveying speed changes at all.
     pub fn pulsates(&self) -> bool {
-        self.pulsation.share > 0.0 && self.pulsation.rad_per_s > 0.0
+        self.pulsation.relative_amplitude > 0.0 && self.pulsation.rad_per_s > 0.0
     }
 
     /// Conveying speed at a moment, c(t) \[m/s\], eq. (17).
     pub fn speed(&self, at_s: f64) -> f64 {
-        let Pulsation { share, rad_per_s, phase_rad } = self.pulsation;
-        self.theta1_m_per_s * (1.0 + share * libm::cos(rad_per_s * at_s + phase_rad))
+        let SpeedPulsation { relative_amplitude: amplitude, rad_per_s, phase_rad } = self.pulsation;
+        self.theta1_m_per_s * (1.0 + amplitude * libm::cos(rad_per_s * at_s + phase_rad))
     }
 
     /// Slowest conveying speed \[m/s\].
     pub fn slowest(&self) -> f64 {
-        self.theta1_m_per_s * (1.0 - self.pulsation.share)
+        self.theta1_m_per_s * (1.0 - self.pulsation.relative_amplitude)
     }
 
     /// Way that is conveyed from the start of the run to a moment, ∫c \[m\].
-    pub fn way(&self, at_s: f64) -> f64 {
-        let Pulsation { share, rad_per_s, phase_rad } = self.pulsation;
-        let swing = if rad_per_s > 0.0 {
+    pub fn conveyed_m(&self, at_s: f64) -> f64 {
+        let SpeedPulsation { relative_amplitude: amplitude, rad_per_s, phase_rad } = self.pulsation;
+        let oscillation = if rad_per_s > 0.0 {
             (libm::sin(rad_per_s * at_s + phase_rad) - libm::sin(phase_rad)) / rad_per_s
         } else {
             at_s * libm::cos(phase_rad)
         };
-        self.theta1_m_per_s * (at_s + share * swing)
+        self.theta1_m_per_s * (at_s + amplitude * oscillation)
     }
 
     /// Share of full that holds the plug at a length \[m\], v(x), eq. (19).
-    pub fn holding(&self, plug_m: f64) -> f64 {
+    pub fn holding_fill(&self, plug_m: f64) -> f64 {
         let lead = self.theta2_per_m * plug_m;
         lead / (1.0 + lead)
     }
 
     /// Growth of the plug for each metre that is conveyed, −Γ(x, U), eq. (73).
     pub fn growth(&self, plug_m: f64, fill: f64) -> f64 {
-        (fill - self.holding(plug_m)) / (1.0 - fill)
+        (fill - self.holding_fill(plug_m)) / (1.0 - fill)
     }
 
     /// Delay of what arrives at a moment (16) \[s\].
@@ -111,7 +112,7 @@ impl Screw {
         let way = self.length_m - plug_m;
         match self.conveying {
             Conveying::AtPresentSpeed => way / self.speed(at_s),
-            Conveying::AtSpeedOnTheWay => at_s - self.moment(self.way(at_s) - way, at_s),
+            Conveying::AtSpeedOnTheWay => at_s - self.moment_of(self.conveyed_m(at_s) - way, at_s),
         }
     }
 
@@ -123,14 +124,15 @@ impl Screw {
     /// When the way conveyed since the start came to `way_m` \[s\], by Newton's
     /// method within the two moments between which it must lie. `near_s` is a
     /// moment to start from.
-    pub fn moment(&self, way_m: f64, near_s: f64) -> f64 {
-        let reach = (way_m - self.way(near_s)) / self.theta1_m_per_s;
-        let Pulsation { share, .. } = self.pulsation;
-        let (slow, fast) = (near_s + reach / (1.0 - share), near_s + reach / (1.0 + share));
+    pub fn moment_of(&self, way_m: f64, near_s: f64) -> f64 {
+        let time_s = (way_m - self.conveyed_m(near_s)) / self.theta1_m_per_s;
+        let SpeedPulsation { relative_amplitude: amplitude, .. } = self.pulsation;
+        let (slow, fast) =
+            (near_s + time_s / (1.0 - amplitude), near_s + time_s / (1.0 + amplitude));
         let (mut low, mut high) = (slow.min(fast), slow.max(fast));
-        let mut at = near_s + reach;
+        let mut at = near_s + time_s;
         for _ in 0..60 {
-            let miss = self.way(at) - way_m;
+            let miss = self.conveyed_m(at) - way_m;
             if miss > 0.0 {
                 high = high.min(at);
             } else {
@@ -152,7 +154,7 @@ impl Screw {
     pub fn arrival(&self, fed_s: f64, plug_m: f64) -> f64 {
         let way = self.length_m - plug_m;
         if self.conveying == Conveying::AtSpeedOnTheWay || !self.pulsates() {
-            return self.moment(self.way(fed_s) + way, fed_s);
+            return self.moment_of(self.conveyed_m(fed_s) + way, fed_s);
         }
         let late = |at: f64| at - self.delay(at, plug_m) - fed_s;
         let (from, to) = (way / (2.0 * self.theta1_m_per_s), way / self.slowest());
@@ -182,15 +184,16 @@ mod tests {
     use crate::core::units::{Mm, Rpm};
     use crate::extruder::screw::{ScrewDesign, TurnUnit};
 
-    const B: Pulsation = Pulsation { share: 0.4, rad_per_s: 0.4, phase_rad: 0.0 };
+    const B: SpeedPulsation =
+        SpeedPulsation { relative_amplitude: 0.4, rad_per_s: 0.4, phase_rad: 0.0 };
 
-    fn screw(pulsation: Pulsation) -> Screw {
+    fn screw(pulsation: SpeedPulsation) -> Screw {
         ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap()
     }
 
     #[test]
     fn both_readings_of_the_screw_speed_and_the_nozzles_ratio_come_out() {
-        let screw = screw(Pulsation::default());
+        let screw = screw(SpeedPulsation::default());
         assert!((screw.theta1_m_per_s - 0.094_247_779_6).abs() < 1e-10);
         assert!((screw.theta2_per_m - 2.114_292_6).abs() < 1e-7);
         let turns = ScrewDesign { unit: TurnUnit::RevPerS, ..ScrewDesign::DIAGNE_2015 };
@@ -206,7 +209,7 @@ mod tests {
     #[test]
     fn the_holding_share_holds_and_more_makes_the_plug_grow() {
         let screw = screw(B);
-        let hold = screw.holding(0.16);
+        let hold = screw.holding_fill(0.16);
         assert!((hold - 0.252_78).abs() < 1e-5);
         assert!(screw.growth(0.16, hold).abs() < 1e-15);
         assert!(screw.growth(0.16, 0.9) > 0.0);
@@ -219,22 +222,22 @@ mod tests {
 
     #[test]
     fn the_way_is_the_integral_of_the_speed_and_its_moment_leads_back() {
-        let screw = screw(Pulsation { phase_rad: 0.7, ..B });
+        let screw = screw(SpeedPulsation { phase_rad: 0.7, ..B });
         let mut sum = 0.0;
         for k in 0..40_000 {
             sum += screw.speed((f64::from(k) + 0.5) * 1e-4) * 1e-4;
         }
-        assert!((screw.way(4.0) - sum).abs() < 1e-9);
+        assert!((screw.conveyed_m(4.0) - sum).abs() < 1e-9);
         for near in [0.0, 3.9, 20.0] {
-            assert!((screw.moment(screw.way(4.0), near) - 4.0).abs() < 1e-12, "{near}");
+            assert!((screw.moment_of(screw.conveyed_m(4.0), near) - 4.0).abs() < 1e-12, "{near}");
         }
     }
 
     #[test]
     fn the_first_effect_of_a_control_comes_when_published_numbers_say() {
-        let none = screw(Pulsation::default()).arrival(0.0, 0.1);
+        let none = screw(SpeedPulsation::default()).arrival(0.0, 0.1);
         assert!((none - 0.1 / 0.094_247_779_6).abs() < 1e-9);
-        let a = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+        let a = SpeedPulsation { relative_amplitude: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
         assert!((screw(a).arrival(0.0, 0.1) - 1.137).abs() < 5e-4);
         assert!((screw(B).arrival(0.0, 0.1) - 0.768).abs() < 5e-4);
     }
@@ -242,11 +245,11 @@ mod tests {
     #[test]
     fn a_delay_that_adds_up_on_the_way_is_the_paper_s_where_the_speed_is_steady() {
         let belt = Conveying::AtSpeedOnTheWay;
-        let steady = Screw { conveying: belt, ..screw(Pulsation::default()) };
+        let steady = Screw { conveying: belt, ..screw(SpeedPulsation::default()) };
         assert!((steady.delay(5.0, 0.1) - 0.1 / 0.094_247_779_6).abs() < 1e-9);
         let waving = Screw { conveying: belt, ..screw(B) };
         let delay = waving.delay(5.0, 0.1);
-        assert!((waving.way(5.0) - waving.way(5.0 - delay) - 0.1).abs() < 1e-12);
+        assert!((waving.conveyed_m(5.0) - waving.conveyed_m(5.0 - delay) - 0.1).abs() < 1e-12);
         let arrival = waving.arrival(5.0 - delay, 0.1);
         assert!((arrival - 5.0).abs() < 1e-9);
     }
@@ -264,12 +267,15 @@ mod tests {
         ));
         let nan = ScrewDesign { nozzle_m3: f64::NAN, ..design };
         assert!(matches!(nan.screw(B), Err(ScrewError::NotPositive { name: "nozzle_m3", .. })));
-        for share in [1.0, -0.1, f64::NAN] {
-            let pulsation = Pulsation { share, ..B };
-            assert!(matches!(design.screw(pulsation), Err(ScrewError::Share { .. })), "{share}");
+        for amplitude in [1.0, -0.1, f64::NAN] {
+            let pulsation = SpeedPulsation { relative_amplitude: amplitude, ..B };
+            assert!(
+                matches!(design.screw(pulsation), Err(ScrewError::PulsationAmplitude { .. })),
+                "{amplitude}"
+            );
         }
         for rad_per_s in [f64::INFINITY, -1.0] {
-            let pulsation = Pulsation { rad_per_s, ..B };
+            let pulsation = SpeedPulsation { rad_per_s, ..B };
             assert!(matches!(design.screw(pulsation), Err(ScrewError::Frequency { .. })));
         }
     }

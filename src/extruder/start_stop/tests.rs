@@ -15,13 +15,17 @@ const MACHINE: StartStop = StartStop {
     drool_time_constant_s: 0.8,
 };
 
-fn timing(least_share: f64) -> Timing {
+fn timing(min_speed_ratio: f64) -> StartStopTiming {
     let (flow, speed) = (Mm3PerS::constant(400.0), MmPerS::constant(40.0));
-    Timing::new(MACHINE, Laid { flow, speed, least_share, robot_lag: Span::ZERO }).unwrap()
+    StartStopTiming::new(
+        MACHINE,
+        BeadConditions { flow, speed, min_speed_ratio, robot_lag: Span::ZERO },
+    )
+    .unwrap()
 }
 
 fn pause(idle_s: f64) -> Pause {
-    Pause { idle: Span::from_secs(idle_s), before: Mm3PerS::constant(400.0) }
+    Pause { idle: Span::from_secs(idle_s), flow_before: Mm3PerS::constant(400.0) }
 }
 
 /// Sum of a function over equal steps of a second [s].
@@ -44,20 +48,20 @@ fn the_first_flow_comes_later_the_longer_the_pump_stood_and_no_later_than_for_al
 #[test]
 fn the_closed_form_of_what_comes_after_a_stop_is_its_integral() {
     for t in [0.1, 0.4, 2.0, 9.0] {
-        let summed = integral(t, |at| MACHINE.falling(at));
-        assert!((MACHINE.fallen_s(t) - summed).abs() < 1e-7, "{t}");
+        let summed = integral(t, |at| MACHINE.remaining_flow(at));
+        assert!((MACHINE.delivered_s(t) - summed).abs() < 1e-7, "{t}");
     }
-    assert!((MACHINE.after_stop_s() - MACHINE.fallen_s(60.0)).abs() < 1e-12);
-    for share in [0.9, 0.5, 0.05, 1e-3] {
-        assert!((MACHINE.falling(MACHINE.falls_to_s(share)) - share).abs() < 1e-9);
+    assert!((MACHINE.total_after_stop_s() - MACHINE.delivered_s(60.0)).abs() < 1e-12);
+    for fraction in [0.9, 0.5, 0.05, 1e-3] {
+        assert!((MACHINE.remaining_flow(MACHINE.falls_to_s(fraction)) - fraction).abs() < 1e-9);
     }
 }
 
 /// Void and surplus of a start at which the robot goes at a moment [s of flow].
-fn lost_at_start(start: &Start, goes_s: f64, share: impl Fn(f64) -> f64) -> f64 {
+fn lost_at_start(start: &Start, goes_s: f64, fraction: impl Fn(f64) -> f64) -> f64 {
     integral(6.0, |t| {
-        let wanted = if t < goes_s { 0.0 } else { share(t) };
-        (wanted - start.flow_share(Span::from_secs(t))).abs()
+        let wanted = if t < goes_s { 0.0 } else { fraction(t) };
+        (wanted - start.flow_ratio(Span::from_secs(t))).abs()
     })
 }
 
@@ -65,9 +69,9 @@ fn lost_at_start(start: &Start, goes_s: f64, share: impl Fn(f64) -> f64) -> f64 
 fn no_other_moment_to_go_leaves_less_void_and_surplus() {
     for idle in [0.0, 2.0, 40.0, 300.0] {
         let start = timing(1.0).start(&pause(idle));
-        let best = lost_at_start(&start, start.robot().secs(), |_| 1.0);
+        let best = lost_at_start(&start, start.robot_start().secs(), |_| 1.0);
         for other in [-0.3, -0.05, 0.05, 0.3] {
-            let goes_s = (start.robot().secs() + other).max(0.0);
+            let goes_s = (start.robot_start().secs() + other).max(0.0);
             assert!(lost_at_start(&start, goes_s, |_| 1.0) >= best - 1e-3, "{idle} {other}");
         }
     }
@@ -76,30 +80,30 @@ fn no_other_moment_to_go_leaves_less_void_and_surplus() {
 #[test]
 fn a_robot_that_follows_the_flow_leaves_a_tenth() {
     let start = timing(0.1).start(&pause(300.0));
-    let share = |t: f64| start.robot_share(Span::from_secs(t));
-    let following = lost_at_start(&start, start.robot().secs(), share);
+    let fraction = |t: f64| start.speed_ratio(Span::from_secs(t));
+    let following = lost_at_start(&start, start.robot_start().secs(), fraction);
     let steady = timing(1.0).start(&pause(300.0));
-    let keeping = lost_at_start(&steady, steady.robot().secs(), |_| 1.0);
+    let keeping = lost_at_start(&steady, steady.robot_start().secs(), |_| 1.0);
     assert!(following < 0.11 * keeping, "{following} {keeping}");
 }
 
 #[test]
 fn what_still_comes_after_a_stop_is_what_the_rest_of_the_bead_needs() {
-    for least_share in [1.0, 0.3, 0.05] {
-        let stop = timing(least_share).stop();
-        let lasts = stop.lasts().secs();
-        let way = integral(lasts, |t| 40.0 * stop.robot_share(Span::from_secs(t)));
-        assert!((way - stop.way().get()).abs() < 1e-3, "{way} {}", stop.way());
-        let end = stop.flow_share(stop.lasts());
-        assert!((end - 0.5 * least_share).abs() < 1e-6);
+    for min_speed_ratio in [1.0, 0.3, 0.05] {
+        let stop = timing(min_speed_ratio).stop();
+        let lasts = stop.duration().secs();
+        let way = integral(lasts, |t| 40.0 * stop.speed_ratio(Span::from_secs(t)));
+        assert!((way - stop.distance().get()).abs() < 1e-3, "{way} {}", stop.distance());
+        let end = stop.flow_ratio(stop.duration());
+        assert!((end - 0.5 * min_speed_ratio).abs() < 1e-6);
         // The way's volume, less the void before its end, and what is left come to all.
         let void = integral(lasts, |t| {
             let since = Span::from_secs(t);
-            400.0 * (stop.robot_share(since) - stop.flow_share(since))
+            400.0 * (stop.speed_ratio(since) - stop.flow_ratio(since))
         });
-        let laid = 10.0 * stop.way().get() - void;
-        let all = 400.0 * MACHINE.after_stop_s();
-        assert!((laid + stop.left_mm3() - all).abs() < 0.05, "{laid} {all}");
+        let laid = 10.0 * stop.distance().get() - void;
+        let all = 400.0 * MACHINE.total_after_stop_s();
+        assert!((laid + stop.drool_mm3() - all).abs() < 0.05, "{laid} {all}");
     }
 }
 
@@ -107,30 +111,34 @@ fn what_still_comes_after_a_stop_is_what_the_rest_of_the_bead_needs() {
 fn a_robot_that_lags_is_told_earlier_by_its_lag() {
     let lag = Span::from_millis(80);
     let prompt = timing(0.2);
-    let late = Timing::new(MACHINE, Laid { robot_lag: lag, ..*prompt.laid() }).unwrap();
+    let late =
+        StartStopTiming::new(MACHINE, BeadConditions { robot_lag: lag, ..*prompt.conditions() })
+            .unwrap();
     let [prompt_start, late_start] = [prompt, late].map(|timing| timing.start(&pause(30.0)));
-    assert_eq!(late_start.robot() + lag, prompt_start.robot());
+    assert_eq!(late_start.robot_start() + lag, prompt_start.robot_start());
     for ms in [700, 1500, 2500] {
-        let at = prompt_start.robot() + Span::from_millis(ms);
-        assert_eq!(late_start.robot_share(at - lag), prompt_start.robot_share(at));
+        let at = prompt_start.robot_start() + Span::from_millis(ms);
+        assert_eq!(late_start.speed_ratio(at - lag), prompt_start.speed_ratio(at));
         let at = Span::from_millis(ms);
-        assert_eq!(late.stop().robot_share(at - lag), prompt.stop().robot_share(at));
+        assert_eq!(late.stop().speed_ratio(at - lag), prompt.stop().speed_ratio(at));
     }
-    assert_eq!(late.stop().way(), prompt.stop().way());
+    assert_eq!(late.stop().distance(), prompt.stop().distance());
 }
 
 #[test]
 fn a_pump_that_hardly_stood_needs_no_waiting() {
     let start = timing(0.1).start(&pause(0.0));
-    assert_eq!(start.robot(), Span::ZERO);
-    assert_eq!(start.flow_share(Span::ZERO), 1.0);
-    assert!(start.flow_share(Span::from_secs(0.3)) > 0.7);
+    assert_eq!(start.robot_start(), Span::ZERO);
+    assert_eq!(start.flow_ratio(Span::ZERO), 1.0);
+    assert!(start.flow_ratio(Span::from_secs(0.3)) > 0.7);
 }
 
 #[test]
 fn what_cannot_be_is_refused() {
-    let laid = *timing(1.0).laid();
-    let said = |parameters: StartStop, laid: Laid| Timing::new(parameters, laid).unwrap_err();
+    let laid = *timing(1.0).conditions();
+    let said = |parameters: StartStop, laid: BeadConditions| {
+        StartStopTiming::new(parameters, laid).unwrap_err()
+    };
     let error = said(StartStop { rise_s: 0.0, ..MACHINE }, laid);
     assert_eq!(
         error.to_string(),
@@ -140,8 +148,8 @@ fn what_cannot_be_is_refused() {
     assert!(matches!(error, StartStopError::Negative { what: "the void [mm³]", .. }));
     let error = said(StartStop { drool_s: 0.9, ..MACHINE }, laid);
     assert_eq!(error, StartStopError::TooMuchDrool { drool_s: 0.9, time_constant_s: 0.8 });
-    let error = said(MACHINE, Laid { least_share: 1.5, ..laid });
-    assert_eq!(error, StartStopError::Share { value: 1.5 });
-    let error = said(MACHINE, Laid { flow: Mm3PerS::ZERO, ..laid });
+    let error = said(MACHINE, BeadConditions { min_speed_ratio: 1.5, ..laid });
+    assert_eq!(error, StartStopError::StartSpeedFraction { value: 1.5 });
+    let error = said(MACHINE, BeadConditions { flow: Mm3PerS::ZERO, ..laid });
     assert!(matches!(error, StartStopError::NotPositive { .. }));
 }

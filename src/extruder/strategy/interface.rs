@@ -8,7 +8,7 @@ use crate::extruder::report::ExtruderReport;
 
 /// A reading that a law cannot do without.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Need {
+pub enum RequiredReading {
     /// The pressure at the nozzle.
     Pressure,
     /// The filled length of the screw.
@@ -19,7 +19,7 @@ pub enum Need {
     Screw,
 }
 
-impl Need {
+impl RequiredReading {
     /// Whether a report has it.
     pub const fn met_by(self, report: &ExtruderReport) -> bool {
         match self {
@@ -33,7 +33,7 @@ impl Need {
 
 /// A command with the parts that it is made of, in the unit of the command.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Wish {
+pub struct CommandDemand {
     /// What the law would like.
     pub value: f64,
     /// Part that is known beforehand from what is wanted.
@@ -42,45 +42,50 @@ pub struct Wish {
     pub feedback: f64,
 }
 
-impl Wish {
+impl CommandDemand {
     /// A command that answers nothing.
-    pub const fn known(value: f64) -> Self {
+    pub const fn feedforward_only(value: f64) -> Self {
         Self { value, feedforward: value, feedback: 0.0 }
     }
 }
 
 /// A reading that cannot be true, such as a screw filled beyond its length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Unusable;
+pub struct UnusableReading;
 
 /// What every law can do. None of it allocates, but where a bead begins or a hold
 /// ends.
-pub trait Strategy {
+pub trait ExtruderController {
     /// The readings that it needs.
-    fn needs(&self) -> &'static [Need] {
+    fn required_readings(&self) -> &'static [RequiredReading] {
         &[]
     }
 
     /// Begins a bead at a wanted flow, in the steady state that belongs to it.
-    fn begin(&mut self, now: Stamp, flow: Mm3PerS) -> Wish;
+    fn begin(&mut self, now: Stamp, flow: Mm3PerS) -> CommandDemand;
 
     /// Hears a report as it comes. Fails where it cannot be true.
-    fn hear(&mut self, _now: Stamp, _report: &ExtruderReport) -> Result<(), Unusable> {
+    fn reported(&mut self, _now: Stamp, _report: &ExtruderReport) -> Result<(), UnusableReading> {
         Ok(())
     }
 
     /// The part that runs at the rate of the feedforward, `dt` after the last
     /// time.
-    fn foresee(&mut self, dt: Span, flow: Mm3PerS);
+    fn feedforward(&mut self, dt: Span, flow: Mm3PerS);
 
     /// The part that runs at the rate of the control, `dt` after the last time
     /// (zero at the first). The report is not older than the supervisor allows
     /// and has what [`Self::needs`] names. Fails where it cannot be true; then
     /// the wish stays as it is.
-    fn answer(&mut self, now: Stamp, dt: Span, report: &ExtruderReport) -> Result<(), Unusable>;
+    fn control(
+        &mut self,
+        now: Stamp,
+        dt: Span,
+        report: &ExtruderReport,
+    ) -> Result<(), UnusableReading>;
 
     /// Time passes while the last command is kept.
-    fn wait(&mut self, _dt: Span) {}
+    fn hold(&mut self, _dt: Span) {}
 
     /// Goes on from a command that was kept for a while. Nothing is gathered of
     /// that time.
@@ -88,7 +93,7 @@ pub trait Strategy {
 
     /// A start is over, through which one command was kept: the flow that belongs to it
     /// has come.
-    fn flows(&mut self, now: Stamp, applied: f64) {
+    fn flow_established(&mut self, now: Stamp, applied: f64) {
         self.settle(now, applied);
     }
 
@@ -103,7 +108,7 @@ pub trait Strategy {
 
     /// The flow that will leave the nozzle, for a robot that goes by it; none
     /// where the law knows none.
-    fn foretold(&self) -> Option<Mm3PerS> {
+    fn predicted_flow(&self) -> Option<Mm3PerS> {
         None
     }
 
@@ -113,7 +118,7 @@ pub trait Strategy {
     }
 
     /// What it would like now.
-    fn wish(&self) -> Wish;
+    fn demand(&self) -> CommandDemand;
 
     /// Learns what became of its wish, so that nothing winds up against a
     /// limit.

@@ -3,10 +3,10 @@
 //! Mohammadi Looey et al. 2026, eq. (8); the strand's sub-system commands the
 //! plate, which is the robot's side.
 
-use super::interface::{Need, Strategy, Unusable, Wish};
+use super::interface::{CommandDemand, ExtruderController, RequiredReading, UnusableReading};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm2, Mm3PerS};
-use crate::extruder::adaptive::{AdaptiveLaw, ScalarPlant};
+use crate::extruder::adaptive::{MracController, ScalarPlant};
 use crate::extruder::report::ExtruderReport;
 
 /// Metres in a millimetre.
@@ -25,25 +25,25 @@ pub struct NozzleModel {
 /// The law with its nozzle. The flow at the nozzle must be reported.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdaptiveNozzle {
-    law: AdaptiveLaw,
+    controller: MracController,
     nozzle: NozzleModel,
     reference: f64,
-    wish: Wish,
+    demand: CommandDemand,
     begun: bool,
     /// What was applied since the last answer.
-    applied: Applied,
+    applied: AppliedMean,
 }
 
 /// The mean of what was applied, which is all that the law's model of a held
 /// command can be told of.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Applied {
+struct AppliedMean {
     last: Option<(Stamp, f64)>,
     secs: f64,
     sum: f64,
 }
 
-impl Applied {
+impl AppliedMean {
     /// The last one held until now.
     fn hold(&mut self, now: Stamp) {
         if let Some((since, value)) = &mut self.last {
@@ -71,14 +71,14 @@ impl Applied {
 
 impl AdaptiveNozzle {
     /// Before its first bead.
-    pub fn new(law: AdaptiveLaw, nozzle: NozzleModel) -> Self {
+    pub fn new(controller: MracController, nozzle: NozzleModel) -> Self {
         Self {
-            law,
+            controller,
             nozzle,
             reference: 0.0,
-            wish: Wish::default(),
+            demand: CommandDemand::default(),
             begun: false,
-            applied: Applied::default(),
+            applied: AppliedMean::default(),
         }
     }
 
@@ -90,57 +90,66 @@ impl AdaptiveNozzle {
     /// The feed that holds a speed in the nozzle if nothing is unknown
     /// \[kg/s\].
     fn holding(&self, speed: f64) -> f64 {
-        let ScalarPlant { state_gain_per_s, input_gain } = self.law.plant();
+        let ScalarPlant { state_gain_per_s, input_gain } = self.controller.plant();
         -state_gain_per_s / input_gain * speed - self.nozzle.pressure_kg_per_s
     }
 }
 
-impl Strategy for AdaptiveNozzle {
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Flow]
+impl ExtruderController for AdaptiveNozzle {
+    fn required_readings(&self) -> &'static [RequiredReading] {
+        &[RequiredReading::Flow]
     }
 
-    fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> Wish {
+    fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> CommandDemand {
         let speed = self.speed(flow);
-        self.reference = self.law.reference_for(speed);
+        self.reference = self.controller.reference_for(speed);
         // What was learnt on the last bead still holds.
-        self.wish = Wish::known(self.holding(speed) - self.law.estimate());
+        self.demand =
+            CommandDemand::feedforward_only(self.holding(speed) - self.controller.estimate());
         self.begun = false;
-        self.applied = Applied::default();
-        self.wish
+        self.applied = AppliedMean::default();
+        self.demand
     }
 
-    fn foresee(&mut self, _dt: Span, flow: Mm3PerS) {
-        self.reference = self.law.reference_for(self.speed(flow));
+    fn feedforward(&mut self, _dt: Span, flow: Mm3PerS) {
+        self.reference = self.controller.reference_for(self.speed(flow));
     }
 
-    fn answer(&mut self, now: Stamp, dt: Span, report: &ExtruderReport) -> Result<(), Unusable> {
-        let flow = report.flow_mm3_per_s.ok_or(Unusable)?;
+    fn control(
+        &mut self,
+        now: Stamp,
+        dt: Span,
+        report: &ExtruderReport,
+    ) -> Result<(), UnusableReading> {
+        let flow = report.flow_mm3_per_s.ok_or(UnusableReading)?;
         let (measured, known) = (self.speed(flow), self.nozzle.pressure_kg_per_s);
         if let Some(mean) = self.applied.take(now) {
-            self.law.settle(mean);
+            self.controller.settle(mean);
         }
         if !self.begun {
             self.begun = true;
             // The flow is no steady one yet; what was learnt before still holds.
-            let learnt = self.law.estimate();
-            self.law.start(measured, self.wish.value, known);
-            self.law.know(learnt);
+            let learnt = self.controller.estimate();
+            self.controller.start(measured, self.demand.value, known);
+            self.controller.set_estimate(learnt);
         }
-        let action = self.law.step(measured, self.reference, known, dt);
+        let action = self.controller.step(measured, self.reference, known, dt);
         let feedforward = self.holding(action.model);
-        self.wish =
-            Wish { value: action.command, feedforward, feedback: action.command - feedforward };
+        self.demand = CommandDemand {
+            value: action.command,
+            feedforward,
+            feedback: action.command - feedforward,
+        };
         Ok(())
     }
 
-    fn wish(&self) -> Wish {
-        self.wish
+    fn demand(&self) -> CommandDemand {
+        self.demand
     }
 
     fn resume(&mut self, now: Stamp, applied: f64) {
         self.begun = false;
-        self.applied = Applied::default();
+        self.applied = AppliedMean::default();
         self.settle(now, applied);
     }
 
@@ -153,16 +162,20 @@ impl Strategy for AdaptiveNozzle {
 mod tests {
     use super::*;
     use crate::core::units::Mm2;
-    use crate::extruder::adaptive::{Adaptation, Gains, Safety};
+    use crate::extruder::adaptive::{Adaptation, AdaptiveGains, EstimateBounds};
 
     fn law() -> AdaptiveNozzle {
         let plant = ScalarPlant { state_gain_per_s: -1.0, input_gain: 1.0 };
         let adaptation = Adaptation::Constant { learning_rate: 4.0, weight: 1.0 };
-        let gains =
-            Gains { feedback: 1.604, error_feedback: 0.0, adaptation, safety: Safety::default() };
-        let law = AdaptiveLaw::new(plant, gains, Span::from_millis(50)).unwrap();
+        let gains = AdaptiveGains {
+            feedback: 1.604,
+            error_feedback: 0.0,
+            adaptation,
+            safety: EstimateBounds::default(),
+        };
+        let controller = MracController::new(plant, gains, Span::from_millis(50)).unwrap();
         let nozzle = NozzleModel { section: Mm2::constant(100.0), pressure_kg_per_s: 0.0 };
-        AdaptiveNozzle::new(law, nozzle)
+        AdaptiveNozzle::new(controller, nozzle)
     }
 
     fn report(flow: f64) -> ExtruderReport {
@@ -179,22 +192,22 @@ mod tests {
     /// Runs the law against its plant with a part that it does not know; gives
     /// the law and the flow at the end.
     fn run(secs: f64, unknown: f64) -> (AdaptiveNozzle, f64) {
-        let (mut law, wanted) = (law(), Mm3PerS::constant(1000.0));
+        let (mut controller, wanted) = (law(), Mm3PerS::constant(1000.0));
         let (mut speed, mut now) = (0.01, Stamp::START);
-        let mut command = law.begin(now, wanted).value;
+        let mut command = controller.begin(now, wanted).value;
         let mut dt = Span::ZERO;
         while now.secs() < secs {
-            law.foresee(dt, wanted);
-            law.answer(now, dt, &report(speed * 100.0 / M_PER_MM)).unwrap();
-            command = law.wish().value;
-            law.settle(now, command);
+            controller.feedforward(dt, wanted);
+            controller.control(now, dt, &report(speed * 100.0 / M_PER_MM)).unwrap();
+            command = controller.demand().value;
+            controller.settle(now, command);
             dt = Span::from_millis(50);
             let kept = (-dt.secs()).exp();
             speed = kept * speed + (1.0 - kept) * (command + unknown);
             now = now + dt;
         }
         assert!(command.is_finite());
-        (law, speed * 100.0 / M_PER_MM)
+        (controller, speed * 100.0 / M_PER_MM)
     }
 
     fn after(secs: f64, unknown: f64) -> f64 {
@@ -206,8 +219,8 @@ mod tests {
         let wanted = Mm3PerS::constant(1000.0);
         let first = law().begin(Stamp::START, wanted).value;
         assert!((first - 0.010).abs() < 1e-9, "{first}");
-        let (mut law, _) = run(40.0, -0.004);
-        let next = law.begin(Stamp::from_secs(60.0), wanted).value;
+        let (mut controller, _) = run(40.0, -0.004);
+        let next = controller.begin(Stamp::from_secs(60.0), wanted).value;
         assert!((next - 0.014).abs() < 2e-5, "{next}");
     }
 
@@ -216,20 +229,20 @@ mod tests {
         let (mut stepwise, mut at_once) = (law(), law());
         let wanted = Mm3PerS::constant(1000.0);
         let ms = Span::from_millis;
-        for law in [&mut stepwise, &mut at_once] {
-            let _ = law.begin(Stamp::START, wanted);
-            law.settle(Stamp::START, 0.004);
-            law.answer(Stamp::START, Span::ZERO, &report(500.0)).unwrap();
+        for controller in [&mut stepwise, &mut at_once] {
+            let _ = controller.begin(Stamp::START, wanted);
+            controller.settle(Stamp::START, 0.004);
+            controller.control(Stamp::START, Span::ZERO, &report(500.0)).unwrap();
         }
         for i in 0_u32..10 {
             let now = Stamp::START + ms(5 * i64::from(i));
             stepwise.settle(now, 0.004 + 0.0004 * f64::from(i));
             at_once.settle(now, 0.0058);
         }
-        for law in [&mut stepwise, &mut at_once] {
-            law.answer(Stamp::START + ms(50), ms(50), &report(500.0)).unwrap();
+        for controller in [&mut stepwise, &mut at_once] {
+            controller.control(Stamp::START + ms(50), ms(50), &report(500.0)).unwrap();
         }
-        let [a, b] = [stepwise, at_once].map(|law| law.wish().value);
+        let [a, b] = [stepwise, at_once].map(|controller| controller.demand().value);
         assert!((a - b).abs() < 1e-12 && a.is_finite(), "{a} {b}");
     }
 

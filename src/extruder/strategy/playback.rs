@@ -1,29 +1,34 @@
 //! Commands that answer nothing: one for all of a bead, or a profile that was
 //! written down beforehand.
 
-use super::interface::{Strategy, Unusable, Wish};
+use super::interface::{CommandDemand, ExtruderController, UnusableReading};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm3PerS;
 use crate::extruder::report::ExtruderReport;
-use crate::identify::profile::Profile;
+use crate::identify::profile::CommandProfile;
 
 /// One command for as long as bead is laid, in the unit of the command.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Constant(pub f64);
+pub struct ConstantCommand(pub f64);
 
-impl Strategy for Constant {
-    fn begin(&mut self, _now: Stamp, _flow: Mm3PerS) -> Wish {
-        self.wish()
+impl ExtruderController for ConstantCommand {
+    fn begin(&mut self, _now: Stamp, _flow: Mm3PerS) -> CommandDemand {
+        self.demand()
     }
 
-    fn foresee(&mut self, _dt: Span, _flow: Mm3PerS) {}
+    fn feedforward(&mut self, _dt: Span, _flow: Mm3PerS) {}
 
-    fn answer(&mut self, _now: Stamp, _dt: Span, _report: &ExtruderReport) -> Result<(), Unusable> {
+    fn control(
+        &mut self,
+        _now: Stamp,
+        _dt: Span,
+        _report: &ExtruderReport,
+    ) -> Result<(), UnusableReading> {
         Ok(())
     }
 
-    fn wish(&self) -> Wish {
-        Wish::known(self.0)
+    fn demand(&self) -> CommandDemand {
+        CommandDemand::feedforward_only(self.0)
     }
 
     fn resume(&mut self, _now: Stamp, _applied: f64) {}
@@ -33,19 +38,19 @@ impl Strategy for Constant {
 
 /// A profile that is played from the moment on which the pump runs; it stands in a hold.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Played {
-    profile: Profile,
+pub struct Playback {
+    profile: CommandProfile,
     at_s: f64,
 }
 
-impl Played {
+impl Playback {
     /// From its beginning.
-    pub const fn new(profile: Profile) -> Self {
+    pub const fn new(profile: CommandProfile) -> Self {
         Self { profile, at_s: 0.0 }
     }
 
     /// What is played.
-    pub const fn profile(&self) -> &Profile {
+    pub const fn profile(&self) -> &CommandProfile {
         &self.profile
     }
 
@@ -55,22 +60,27 @@ impl Played {
     }
 }
 
-impl Strategy for Played {
-    fn begin(&mut self, _now: Stamp, _flow: Mm3PerS) -> Wish {
+impl ExtruderController for Playback {
+    fn begin(&mut self, _now: Stamp, _flow: Mm3PerS) -> CommandDemand {
         self.at_s = 0.0;
-        self.wish()
+        self.demand()
     }
 
-    fn foresee(&mut self, dt: Span, _flow: Mm3PerS) {
+    fn feedforward(&mut self, dt: Span, _flow: Mm3PerS) {
         self.at_s += dt.max(Span::ZERO).secs();
     }
 
-    fn answer(&mut self, _now: Stamp, _dt: Span, _report: &ExtruderReport) -> Result<(), Unusable> {
+    fn control(
+        &mut self,
+        _now: Stamp,
+        _dt: Span,
+        _report: &ExtruderReport,
+    ) -> Result<(), UnusableReading> {
         Ok(())
     }
 
-    fn wish(&self) -> Wish {
-        Wish::known(self.profile.at(self.at_s))
+    fn demand(&self) -> CommandDemand {
+        CommandDemand::feedforward_only(self.profile.at(self.at_s))
     }
 
     fn resume(&mut self, _now: Stamp, _applied: f64) {}

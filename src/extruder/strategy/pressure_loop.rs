@@ -2,16 +2,16 @@
 //! pressure by the nozzle's power law, and the screw is told the speed that
 //! holds it. Ma et al. 2026.
 
-use super::interface::{Need, Strategy, Unusable, Wish};
+use super::interface::{CommandDemand, ExtruderController, RequiredReading, UnusableReading};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{MPa, Mm3PerS, Rpm};
 use crate::extruder::limits::{CommandLimit, CommandLimits};
-use crate::extruder::pressure::kalman::Noise;
-use crate::extruder::pressure::pi::{Pi, PiGains};
-use crate::extruder::pressure::predictive::Predictive;
+use crate::extruder::pressure::kalman::PressureNoise;
+use crate::extruder::pressure::pi::{PressurePi, PressurePiGains};
+use crate::extruder::pressure::predictive::PredictiveController;
 use crate::extruder::pressure::tuning::Tuning;
 use crate::extruder::pressure::vsfc::{Vsfc, VsfcGains};
-use crate::extruder::pressure::{Fopdt, PressureLaw, Running};
+use crate::extruder::pressure::{Fopdt, InitialState, PressureController};
 use crate::extruder::report::ExtruderReport;
 use crate::extruder::rheology::PowerLaw;
 
@@ -24,7 +24,7 @@ pub enum PressureChoice {
     /// noise.
     Vsfc(VsfcGains),
     /// The paper's baseline.
-    Pi(PiGains),
+    Pi(PressurePiGains),
 }
 
 /// What the loop has to know.
@@ -35,7 +35,7 @@ pub struct PressureSettings {
     /// From the screw's speed to the pressure.
     pub model: Fopdt,
     /// The sensor's noise and the pressure's own wandering.
-    pub noise: Noise,
+    pub noise: PressureNoise,
     /// From pressure to flow.
     pub nozzle: PowerLaw,
     /// What the screw may be told.
@@ -46,41 +46,41 @@ pub struct PressureSettings {
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressureLoop {
     settings: PressureSettings,
-    running: Option<Holder>,
+    active: Option<ActiveController>,
     target: MPa,
     /// Speed of the screw that a hold has kept \[rpm\].
-    kept: Option<f64>,
-    told: f64,
+    held_rpm: Option<f64>,
+    command_rpm: f64,
     limit: CommandLimit,
 }
 
 /// The law that holds the pressure of a bead.
 #[derive(Debug, Clone, PartialEq)]
-enum Holder {
-    Predictive(Box<Predictive>),
+enum ActiveController {
+    Predictive(Box<PredictiveController>),
     Vsfc(Vsfc),
-    Pi(Pi),
+    Pi(PressurePi),
 }
 
-impl Holder {
-    fn new(settings: &PressureSettings, running: Running) -> Self {
+impl ActiveController {
+    fn new(settings: &PressureSettings, running: InitialState) -> Self {
         let PressureSettings { choice, model, noise, limits, .. } = *settings;
         match choice {
-            PressureChoice::Predictive(tuning) => {
-                Self::Predictive(Box::new(Predictive::new(model, tuning, limits, running)))
-            }
+            PressureChoice::Predictive(tuning) => Self::Predictive(Box::new(
+                PredictiveController::new(model, tuning, limits, running),
+            )),
             PressureChoice::Vsfc(gains) => {
                 Self::Vsfc(Vsfc::new(model, gains, noise, limits, running))
             }
-            PressureChoice::Pi(gains) => Self::Pi(Pi::new(gains, noise, limits, running)),
+            PressureChoice::Pi(gains) => Self::Pi(PressurePi::new(gains, noise, limits, running)),
         }
     }
 
-    fn law(&mut self) -> &mut dyn PressureLaw {
+    fn controller(&mut self) -> &mut dyn PressureController {
         match self {
-            Self::Predictive(law) => law.as_mut(),
-            Self::Vsfc(law) => law,
-            Self::Pi(law) => law,
+            Self::Predictive(controller) => controller.as_mut(),
+            Self::Vsfc(controller) => controller,
+            Self::Pi(controller) => controller,
         }
     }
 }
@@ -90,10 +90,10 @@ impl PressureLoop {
     pub const fn new(settings: PressureSettings) -> Self {
         Self {
             settings,
-            running: None,
+            active: None,
             target: MPa::ZERO,
-            kept: None,
-            told: 0.0,
+            held_rpm: None,
+            command_rpm: 0.0,
             limit: CommandLimit::None,
         }
     }
@@ -106,54 +106,63 @@ impl PressureLoop {
     }
 }
 
-impl Strategy for PressureLoop {
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Pressure]
+impl ExtruderController for PressureLoop {
+    fn required_readings(&self) -> &'static [RequiredReading] {
+        &[RequiredReading::Pressure]
     }
 
-    fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> Wish {
+    fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> CommandDemand {
         self.aim(flow);
         // The screw stands until the pump runs; the law takes over from there,
         // for it knows how a pressure rises.
-        (self.running, self.kept, self.told) = (None, None, 0.0);
-        self.wish()
+        (self.active, self.held_rpm, self.command_rpm) = (None, None, 0.0);
+        self.demand()
     }
 
-    fn hear(&mut self, now: Stamp, report: &ExtruderReport) -> Result<(), Unusable> {
-        let pressure = report.pressure_mpa.ok_or(Unusable)?;
+    fn reported(&mut self, now: Stamp, report: &ExtruderReport) -> Result<(), UnusableReading> {
+        let pressure = report.pressure_mpa.ok_or(UnusableReading)?;
         let settings = &self.settings;
         // What presses while the screw stood was left by the last bead: as if the
         // screw had turned for it until now, for it falls as that would.
-        let before = self.kept.unwrap_or(pressure.get().max(0.0) / settings.model.gain());
-        let speed = Rpm::new(before).map_err(|_| Unusable)?;
-        let holder = self.running.get_or_insert_with(|| {
-            Holder::new(settings, Running { pressure, target: pressure, speed })
+        let before = self.held_rpm.unwrap_or(pressure.get().max(0.0) / settings.model.gain());
+        let speed = Rpm::new(before).map_err(|_| UnusableReading)?;
+        let holder = self.active.get_or_insert_with(|| {
+            ActiveController::new(settings, InitialState { pressure, target: pressure, speed })
         });
-        holder.law().measured(now, pressure).map_err(|_| Unusable)
+        holder.controller().measured(now, pressure).map_err(|_| UnusableReading)
     }
 
-    fn foresee(&mut self, _dt: Span, flow: Mm3PerS) {
+    fn feedforward(&mut self, _dt: Span, flow: Mm3PerS) {
         self.aim(flow);
     }
 
-    fn answer(&mut self, now: Stamp, _dt: Span, _report: &ExtruderReport) -> Result<(), Unusable> {
+    fn control(
+        &mut self,
+        now: Stamp,
+        _dt: Span,
+        _report: &ExtruderReport,
+    ) -> Result<(), UnusableReading> {
         // Before the first report there is nothing to answer.
-        if let Some(holder) = &mut self.running {
-            let command = holder.law().step(now, self.target);
-            (self.told, self.limit) = (command.speed.get(), command.limit);
+        if let Some(holder) = &mut self.active {
+            let command = holder.controller().step(now, self.target);
+            (self.command_rpm, self.limit) = (command.speed.get(), command.limit);
         }
         Ok(())
     }
 
-    fn wish(&self) -> Wish {
+    fn demand(&self) -> CommandDemand {
         let feedforward = self.target.get() / self.settings.model.gain();
-        Wish { value: self.told, feedforward, feedback: self.told - feedforward }
+        CommandDemand {
+            value: self.command_rpm,
+            feedforward,
+            feedback: self.command_rpm - feedforward,
+        }
     }
 
     fn resume(&mut self, _now: Stamp, applied: f64) {
         // The laws keep the time of their calls; one that is made anew gathers
         // nothing of the time between.
-        (self.running, self.kept, self.told) = (None, Some(applied), applied);
+        (self.active, self.held_rpm, self.command_rpm) = (None, Some(applied), applied);
     }
 
     fn limit(&self) -> CommandLimit {
@@ -161,8 +170,8 @@ impl Strategy for PressureLoop {
     }
 
     fn settle(&mut self, now: Stamp, applied: f64) {
-        if let (Some(holder), Ok(applied)) = (&mut self.running, Rpm::new(applied)) {
-            holder.law().settle(now, applied);
+        if let (Some(holder), Ok(applied)) = (&mut self.active, Rpm::new(applied)) {
+            holder.controller().settle(now, applied);
         }
     }
 }

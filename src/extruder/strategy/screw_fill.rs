@@ -2,7 +2,7 @@
 //! is brought to its setpoint and held there by what is fed. Diagne et al.
 //! 2015, eq. (74).
 
-use super::interface::{Need, Strategy, Unusable, Wish};
+use super::interface::{CommandDemand, ExtruderController, RequiredReading, UnusableReading};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm3PerS;
 use crate::extruder::report::ExtruderReport;
@@ -16,8 +16,8 @@ pub struct ScrewFill {
     control: ScrewControl,
     /// How long the screw has turned: its own clock, for what is on its way
     /// stands while it stands.
-    turned: Stamp,
-    hold: f64,
+    screw_time: Stamp,
+    holding_fill: f64,
     fill: f64,
 }
 
@@ -25,42 +25,51 @@ impl ScrewFill {
     /// Before its first bead. Fails for parameters that no screw has.
     pub fn new(settings: &ScrewSettings) -> Result<Self, ScrewError> {
         let control = ScrewControl::new(settings)?;
-        let hold = settings.law.hold();
-        Ok(Self { control, turned: Stamp::START, hold, fill: hold })
+        let hold = settings.feedback.holding_fill();
+        Ok(Self { control, screw_time: Stamp::START, holding_fill: hold, fill: hold })
     }
 }
 
-impl Strategy for ScrewFill {
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Filled]
+impl ExtruderController for ScrewFill {
+    fn required_readings(&self) -> &'static [RequiredReading] {
+        &[RequiredReading::Filled]
     }
 
-    fn begin(&mut self, _now: Stamp, _flow: Mm3PerS) -> Wish {
-        self.fill = self.hold;
-        self.wish()
+    fn begin(&mut self, _now: Stamp, _flow: Mm3PerS) -> CommandDemand {
+        self.fill = self.holding_fill;
+        self.demand()
     }
 
-    fn foresee(&mut self, dt: Span, _flow: Mm3PerS) {
-        self.wait(dt);
+    fn feedforward(&mut self, dt: Span, _flow: Mm3PerS) {
+        self.hold(dt);
     }
 
-    fn wait(&mut self, dt: Span) {
-        self.turned = self.turned + dt.max(Span::ZERO);
+    fn hold(&mut self, dt: Span) {
+        self.screw_time = self.screw_time + dt.max(Span::ZERO);
     }
 
-    fn answer(&mut self, _now: Stamp, _dt: Span, report: &ExtruderReport) -> Result<(), Unusable> {
-        let plug = report.filled_mm.ok_or(Unusable)?;
-        match self.control.step(self.turned, plug) {
+    fn control(
+        &mut self,
+        _now: Stamp,
+        _dt: Span,
+        report: &ExtruderReport,
+    ) -> Result<(), UnusableReading> {
+        let plug = report.filled_mm.ok_or(UnusableReading)?;
+        match self.control.step(self.screw_time, plug) {
             Ok(step) => self.fill = step.fill,
             // The screw has hardly turned since the last step.
             Err(ScrewFault::TooSoon { .. }) => {}
-            Err(_) => return Err(Unusable),
+            Err(_) => return Err(UnusableReading),
         }
         Ok(())
     }
 
-    fn wish(&self) -> Wish {
-        Wish { value: self.fill, feedforward: self.hold, feedback: self.fill - self.hold }
+    fn demand(&self) -> CommandDemand {
+        CommandDemand {
+            value: self.fill,
+            feedforward: self.holding_fill,
+            feedback: self.fill - self.holding_fill,
+        }
     }
 
     fn resume(&mut self, now: Stamp, applied: f64) {
@@ -70,7 +79,7 @@ impl Strategy for ScrewFill {
     fn settle(&mut self, _now: Stamp, applied: f64) {
         // What is on its way is what was fed, not what was wished for.
         if (applied - self.control.fed()).abs() > f64::EPSILON {
-            let _ = self.control.applied(self.turned, applied);
+            let _ = self.control.applied(self.screw_time, applied);
         }
     }
 }

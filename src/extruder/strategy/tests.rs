@@ -3,24 +3,26 @@
 use super::*;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{MPa, Mm, Mm2, Mm3PerS, Rpm};
-use crate::extruder::adaptive::{Adaptation, AdaptiveLaw, Gains, Safety, ScalarPlant};
-use crate::extruder::feedforward::{InverseSettings, RightZeros, Tracker};
+use crate::extruder::adaptive::{
+    Adaptation, AdaptiveGains, EstimateBounds, MracController, ScalarPlant,
+};
+use crate::extruder::feedforward::{InverseSettings, RightHalfPlaneZeros, Tracker};
 use crate::extruder::limits::CommandLimits;
-use crate::extruder::pressure::kalman::Noise;
-use crate::extruder::pressure::pi::PiGains;
+use crate::extruder::pressure::kalman::PressureNoise;
+use crate::extruder::pressure::pi::PressurePiGains;
 use crate::extruder::pressure::tuning::Tuning;
 use crate::extruder::pressure::vsfc::VsfcGains;
-use crate::extruder::pressure::{Fopdt, Running};
+use crate::extruder::pressure::{Fopdt, InitialState};
 use crate::extruder::report::ExtruderReport;
 use crate::extruder::rheology::PowerLaw;
 use crate::extruder::screw::control::{Scheme, ScrewSettings};
-use crate::extruder::screw::feedback::Setpoint;
-use crate::extruder::screw::{FillLaw, PiecewiseExponential, Pulsation, ScrewDesign};
+use crate::extruder::screw::feedback::PlugSetpoint;
+use crate::extruder::screw::{FillFeedback, PiecewiseExponential, ScrewDesign, SpeedPulsation};
 use crate::extruder::{
-    Drive, ExtruderHold, ExtruderSetup, ExtruderState, Laying, PumpMode, Supervisor,
+    CommandQuantity, ExtruderHold, ExtruderSetup, ExtruderState, Laying, PumpMode, Supervisor,
 };
 use crate::numeric::lti::{Between, Simulator, TransferFunction};
-use crate::sim::pressure::{Disturbed, SimPressure};
+use crate::sim::pressure::{Disturbances, SimPressure};
 use crate::sim::screw::{Integrator, SimScrew};
 
 const TICK: Span = Span::from_millis(5);
@@ -36,10 +38,14 @@ pub(super) fn report() -> ExtruderReport {
     }
 }
 
-fn supervisor(drive: Drive, law: Law, limits: CommandLimits) -> Supervisor {
+fn supervisor(
+    drive: CommandQuantity,
+    controller: ExtruderStrategy,
+    limits: CommandLimits,
+) -> Supervisor {
     Supervisor::new(ExtruderSetup {
-        drive,
-        law,
+        quantity: drive,
+        strategy: controller,
         limits,
         feedforward_period: TICK,
         control_period: Span::from_millis(50),
@@ -99,7 +105,7 @@ fn commanded(
     reports: bool,
 ) -> Vec<f64> {
     let mut all = Vec::new();
-    let mut told = None;
+    let mut last = None;
     for tick in from..to {
         let now = Stamp::from_secs(f64::from(tick) * TICK.secs());
         if reports && tick.is_multiple_of(4) {
@@ -108,10 +114,10 @@ fn commanded(
             side.reported(now, &ExtruderReport { pump, ..machine.report() });
         }
         if let Some(command) = side.tick(now, laying) {
-            told = command.pump_on.then_some(command.value);
-            all.extend(told);
+            last = command.pump_on.then_some(command.value);
+            all.extend(last);
         }
-        machine.advance(told);
+        machine.advance(last);
     }
     all
 }
@@ -129,24 +135,28 @@ impl Machine for Pressed {
     }
 }
 
-fn pressed(choice: fn(&Fopdt, Noise) -> PressureChoice) -> (Supervisor, Pressed) {
+fn pressed(iterate: fn(&Fopdt, PressureNoise) -> PressureChoice) -> (Supervisor, Pressed) {
     let process = Fopdt::new(0.02, 0.84, 0.41).unwrap();
-    let noise = Noise::new(2e-5, 4.98e-5).unwrap();
+    let noise = PressureNoise::new(2e-5, 4.98e-5).unwrap();
     let limits = CommandLimits::new(0.0, 90.0, 1e4).unwrap();
     let settings = PressureSettings {
-        choice: choice(&process, noise),
+        choice: iterate(&process, noise),
         model: process,
         noise,
         nozzle: PowerLaw::PP_GF28,
         limits,
     };
-    let side = supervisor(Drive::Rpm, Law::Pressure(Box::new(PressureLoop::new(settings))), limits);
-    let rest = Running { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
-    let disturbed = Disturbed { noise_mpa2: 1e-6, seed: 7, ..Disturbed::default() };
+    let side = supervisor(
+        CommandQuantity::Rpm,
+        ExtruderStrategy::Pressure(Box::new(PressureLoop::new(settings))),
+        limits,
+    );
+    let rest = InitialState { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
+    let disturbed = Disturbances { noise_mpa2: 1e-6, seed: 7, ..Disturbances::default() };
     (side, Pressed(SimPressure::new(process, disturbed, Rpm::constant(90.0), rest)))
 }
 
-fn predictive(process: &Fopdt, noise: Noise) -> PressureChoice {
+fn predictive(process: &Fopdt, noise: PressureNoise) -> PressureChoice {
     PressureChoice::Predictive(Tuning::of(process, &noise, 0.1).unwrap())
 }
 
@@ -207,18 +217,18 @@ impl Machine for Boxed<'_> {
 #[test]
 fn no_law_jumps_after_a_hold_and_every_law_finds_its_command_on_the_next_bead() {
     let flow = PowerLaw::PP_GF28.flow(MPa::constant(0.6)).unwrap().get();
-    let of = |choice: fn(&Fopdt, Noise) -> PressureChoice| {
+    let of = |iterate: fn(&Fopdt, PressureNoise) -> PressureChoice| {
         move || {
-            let (side, machine) = pressed(choice);
+            let (side, machine) = pressed(iterate);
             (side, Box::new(machine) as Box<dyn Machine>)
         }
     };
     goes_on("predictive", &of(predictive), flow);
-    let vsfc = |_: &Fopdt, noise: Noise| {
+    let vsfc = |_: &Fopdt, noise: PressureNoise| {
         PressureChoice::Vsfc(VsfcGains::new(40.0, 60.0, 0.3, noise.sigma()).unwrap())
     };
     goes_on("vsfc", &of(vsfc), flow);
-    let pi = |_: &Fopdt, _| PressureChoice::Pi(PiGains::new(50.0, 1.0, 1.0).unwrap());
+    let pi = |_: &Fopdt, _| PressureChoice::Pi(PressurePiGains::new(50.0, 1.0, 1.0).unwrap());
     goes_on("pi", &of(pi), flow);
     let filled = || {
         let (side, machine) = screw();
@@ -234,28 +244,35 @@ fn foreseen() -> (Supervisor, Box<dyn Machine>) {
     let limits = CommandLimits::new(0.0, 90.0, 200.0).unwrap();
     let settings = InverseSettings {
         time_constant_s: 0.1,
-        right_zeros: RightZeros::Refuse,
-        known_ahead: Span::ZERO,
-        late: Span::ZERO,
+        right_zeros: RightHalfPlaneZeros::Refuse,
+        preview: Span::ZERO,
+        max_delay: Span::ZERO,
         limits,
         period: TICK,
     };
-    let law = Foreseen::new(Tracker::new(&model, &settings).unwrap(), OperatingPoint::default());
-    let side = supervisor(Drive::Rpm, Law::Feedforward(Box::new(law)), limits);
+    let controller = InverseFeedforward::new(
+        Tracker::new(&model, &settings).unwrap(),
+        OperatingPoint::default(),
+    );
+    let side = supervisor(
+        CommandQuantity::Rpm,
+        ExtruderStrategy::Feedforward(Box::new(controller)),
+        limits,
+    );
     (side, Box::new(Lagging::new(12.0, 0.84)))
 }
 
 fn adaptive() -> (Supervisor, Box<dyn Machine>) {
     let plant = ScalarPlant { state_gain_per_s: -2.0, input_gain: 4.0 };
     let adaptation = Adaptation::Ramp { learning_rate: 0.5, weight: 1.0, slope_rate_per_s: 0.3 };
-    let safety = Safety { bound: Some(0.001), leakage_per_s: 0.0 };
-    let gains = Gains { feedback: 0.2, error_feedback: 0.0, adaptation, safety };
-    let law = AdaptiveLaw::new(plant, gains, Span::from_millis(50)).unwrap();
+    let safety = EstimateBounds { bound: Some(0.001), leakage_per_s: 0.0 };
+    let gains = AdaptiveGains { feedback: 0.2, error_feedback: 0.0, adaptation, safety };
+    let controller = MracController::new(plant, gains, Span::from_millis(50)).unwrap();
     // 100 mm²: 2 kg/s for each m/s, 1e5 mm³/s for each m/s; less 10 %.
     let nozzle = NozzleModel { section: Mm2::constant(100.0), pressure_kg_per_s: 0.0 };
     let limits = CommandLimits::new(0.0, 0.1, 1.0).unwrap();
-    let law = Law::Adaptive(AdaptiveNozzle::new(law, nozzle));
-    let side = supervisor(Drive::MassFlow, law, limits);
+    let controller = ExtruderStrategy::Adaptive(AdaptiveNozzle::new(controller, nozzle));
+    let side = supervisor(CommandQuantity::MassFlow, controller, limits);
     (side, Box::new(Lagging::new(0.9 * 2e5, 0.5)))
 }
 
@@ -274,22 +291,26 @@ impl Machine for Filled {
 }
 
 fn screw() -> (Supervisor, Filled) {
-    let pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+    let pulsation = SpeedPulsation { relative_amplitude: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
     let screw = ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap();
-    let setpoint = Setpoint { plug: Mm::constant(160.0), most: 0.9 };
-    let law = PiecewiseExponential::new(&screw, setpoint, 36.3194).unwrap();
-    let law = FillLaw::Exponential(law);
+    let setpoint = PlugSetpoint { plug: Mm::constant(160.0), max_fill: 0.9 };
+    let controller = PiecewiseExponential::new(&screw, setpoint, 36.3194).unwrap();
+    let controller = FillFeedback::Exponential(controller);
     let settings = ScrewSettings {
         screw,
-        law,
+        feedback: controller,
         scheme: Scheme::Exact,
         period: Span::from_millis(50),
-        before: screw.holding(0.1),
+        initial_fill: screw.holding_fill(0.1),
     };
-    let law = Law::Screw(ScrewFill::new(&settings).unwrap());
-    let side = supervisor(Drive::Filling, law, CommandLimits::new(0.0, 0.9, 1e3).unwrap());
+    let controller = ExtruderStrategy::Screw(ScrewFill::new(&settings).unwrap());
+    let side = supervisor(
+        CommandQuantity::Filling,
+        controller,
+        CommandLimits::new(0.0, 0.9, 1e3).unwrap(),
+    );
     let scheme = Integrator::RungeKutta(TICK.secs());
-    (side, Filled(SimScrew::new(screw, scheme, TICK.secs(), 0.1, screw.holding(0.1))))
+    (side, Filled(SimScrew::new(screw, scheme, TICK.secs(), 0.1, screw.holding_fill(0.1))))
 }
 
 #[test]

@@ -1,16 +1,16 @@
 use super::*;
 use crate::core::units::Rpm;
-use crate::extruder::strategy::{Constant, Played};
+use crate::extruder::strategy::{ConstantCommand, Playback};
 use crate::extruder::{ExtruderFault, ExtruderHold, PumpMode};
-use crate::identify::profile::{Point, Profile};
+use crate::identify::profile::{CommandProfile, ProfilePoint};
 
 const TICK: Span = Span::from_millis(5);
 const FLOW: Mm3PerS = Mm3PerS::constant(500.0);
 
-fn setup(law: Law) -> ExtruderSetup {
+fn setup(controller: ExtruderStrategy) -> ExtruderSetup {
     ExtruderSetup {
-        drive: Drive::Rpm,
-        law,
+        quantity: CommandQuantity::Rpm,
+        strategy: controller,
         limits: CommandLimits::new(0.0, 60.0, 40.0).unwrap(),
         feedforward_period: TICK,
         control_period: Span::from_millis(50),
@@ -46,8 +46,8 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(law: Law) -> Self {
-        let mut side = Supervisor::new(setup(law));
+    fn new(controller: ExtruderStrategy) -> Self {
+        let mut side = Supervisor::new(setup(controller));
         side.link_came_up();
         let report = Some(report(PumpMode::On, 30.0));
         Self { side, ticks: 0, laying: Laying::Bead(FLOW), report, sent: Vec::new() }
@@ -78,7 +78,7 @@ impl Bench {
 
 #[test]
 fn commands_go_out_at_the_rate_of_the_link_while_bead_is_laid() {
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     assert_eq!(bench.go(1.0), ExtruderState::Running);
     assert_eq!(bench.sent.len(), 50);
     let on = ExtruderCommand { pump_on: true, valve_open: true, value: 30.0 };
@@ -90,12 +90,12 @@ fn commands_go_out_at_the_rate_of_the_link_while_bead_is_laid() {
 
 #[test]
 fn a_pump_that_does_not_start_is_a_fault_and_one_that_does_is_waited_for() {
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.report = Some(report(PumpMode::Starting, 0.0));
     assert_eq!(bench.go(0.6), ExtruderState::Starting);
     bench.report = Some(report(PumpMode::On, 30.0));
     assert_eq!(bench.go(0.1), ExtruderState::Running);
-    let mut stuck = Bench::new(Law::Constant(Constant(30.0)));
+    let mut stuck = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     stuck.report = Some(report(PumpMode::Starting, 0.0));
     assert_eq!(stuck.go(1.1), ExtruderState::Fault(ExtruderFault::DidNotStart));
     assert!(!stuck.last().pump_on);
@@ -103,7 +103,7 @@ fn a_pump_that_does_not_start_is_a_fault_and_one_that_does_is_waited_for() {
 
 #[test]
 fn reports_that_stay_out_are_a_hold_then_a_fault() {
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.report = None;
     assert_eq!(bench.go(0.15), ExtruderState::Running);
@@ -120,7 +120,7 @@ fn reports_that_stay_out_are_a_hold_then_a_fault() {
 
 #[test]
 fn a_fault_stays_until_the_robot_is_idle() {
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.report = Some(report(PumpMode::Fault, 0.0));
     assert_eq!(bench.go(0.1), ExtruderState::Fault(ExtruderFault::Pump));
@@ -137,12 +137,12 @@ fn a_fault_stays_until_the_robot_is_idle() {
 
 #[test]
 fn a_bead_that_no_extruder_answers_to_is_a_fault_within_the_longest_gap() {
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.report = None;
     assert_eq!(bench.go(0.15), ExtruderState::Starting);
     assert_eq!(bench.go(0.1), ExtruderState::Fault(ExtruderFault::NoAnswer));
     // One that answered before the bead and no more.
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.laying = Laying::Idle;
     bench.report = Some(report(PumpMode::Off, 0.0));
     bench.go(0.5);
@@ -157,7 +157,7 @@ fn a_pump_that_runs_on_does_not_hide_why_it_was_stopped() {
     let high = |pump, mpa| {
         Some(ExtruderReport { pressure_mpa: Some(MPa::constant(mpa)), ..report(pump, 30.0) })
     };
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.report = high(PumpMode::On, 2.1);
     let stopped = ExtruderState::Fault(ExtruderFault::Overpressure);
@@ -180,7 +180,7 @@ fn a_pump_that_runs_on_does_not_hide_why_it_was_stopped() {
 #[test]
 fn a_pump_that_runs_on_is_a_fault_until_it_rests() {
     let runs_on = ExtruderState::Fault(ExtruderFault::RunsOn);
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.laying = Laying::Idle;
     assert_eq!(bench.go(0.9), ExtruderState::Off);
@@ -199,7 +199,7 @@ fn a_pump_that_runs_on_is_a_fault_until_it_rests() {
 
 #[test]
 fn too_high_a_pressure_stops_the_pump_and_leaves_the_valve_open() {
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     let mut high = report(PumpMode::On, 30.0);
     high.pressure_mpa = Some(MPa::constant(2.1));
@@ -210,7 +210,7 @@ fn too_high_a_pressure_stops_the_pump_and_leaves_the_valve_open() {
 
 #[test]
 fn a_screw_that_does_not_turn_as_it_was_told_is_a_hold_then_a_fault() {
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.report = Some(report(PumpMode::On, 25.0));
     assert_eq!(bench.go(0.4), ExtruderState::Running);
@@ -226,7 +226,7 @@ fn a_screw_that_does_not_turn_as_it_was_told_is_a_hold_then_a_fault() {
 
 #[test]
 fn a_link_that_is_down_takes_no_command_and_is_given_up_in_time() {
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.side.link_went_down(Stamp::from_secs(0.5));
     bench.report = None;
@@ -240,9 +240,9 @@ fn a_link_that_is_down_takes_no_command_and_is_given_up_in_time() {
 
 #[test]
 fn a_profile_is_played_from_the_moment_the_pump_runs_within_the_fastest_change() {
-    let at = |from_s, value| Point { from_s, value };
-    let profile = Profile::new(vec![at(0.0, 10.0), at(0.5, 50.0)], 9.0).unwrap();
-    let mut bench = Bench::new(Law::Profile(Played::new(profile)));
+    let at = |from_s, value| ProfilePoint { from_s, value };
+    let profile = CommandProfile::new(vec![at(0.0, 10.0), at(0.5, 50.0)], 9.0).unwrap();
+    let mut bench = Bench::new(ExtruderStrategy::Profile(Playback::new(profile)));
     bench.report = Some(ExtruderReport { screw_rpm: None, ..report(PumpMode::On, 0.0) });
     bench.go(0.4);
     assert_eq!(bench.last().value, 10.0);
@@ -255,7 +255,7 @@ fn a_profile_is_played_from_the_moment_the_pump_runs_within_the_fastest_change()
 
 #[test]
 fn ending_a_run_stops_the_pump_at_once() {
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     assert!(!bench.side.stop().unwrap().pump_on);
     assert_eq!(bench.side.state(), ExtruderState::Off);
@@ -263,7 +263,7 @@ fn ending_a_run_stops_the_pump_at_once() {
 
 #[test]
 fn a_valve_that_stays_shut_is_a_hold_then_a_fault() {
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.report = Some(ExtruderReport { valve_open: false, ..report(PumpMode::On, 30.0) });
     assert_eq!(bench.go(0.1), ExtruderState::Holding(ExtruderHold::ValveShut));
@@ -276,7 +276,7 @@ fn a_valve_that_stays_shut_is_a_hold_then_a_fault() {
 
 #[test]
 fn reports_of_the_time_before_the_pump_was_told_to_run_are_no_fault() {
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.03);
     assert_eq!(bench.side.state(), ExtruderState::Running);
     bench.report = Some(report(PumpMode::Stopping, 30.0));
@@ -291,7 +291,7 @@ fn reports_of_the_time_before_the_pump_was_told_to_run_are_no_fault() {
 
 #[test]
 fn a_limit_on_the_pressure_needs_its_reading_and_lets_it_out_until_it_has_fallen() {
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.report = Some(ExtruderReport { pressure_mpa: None, ..report(PumpMode::On, 30.0) });
     assert_eq!(bench.go(0.1), ExtruderState::Holding(ExtruderHold::NoReading));
@@ -310,9 +310,9 @@ fn a_limit_on_the_pressure_needs_its_reading_and_lets_it_out_until_it_has_fallen
 
 #[test]
 fn a_pump_that_starts_anew_finds_a_law_that_begins_anew() {
-    let at = |from_s, value| Point { from_s, value };
-    let profile = Profile::new(vec![at(0.0, 20.0), at(0.5, 50.0)], 2.0).unwrap();
-    let mut bench = Bench::new(Law::Profile(Played::new(profile)));
+    let at = |from_s, value| ProfilePoint { from_s, value };
+    let profile = CommandProfile::new(vec![at(0.0, 20.0), at(0.5, 50.0)], 2.0).unwrap();
+    let mut bench = Bench::new(ExtruderStrategy::Profile(Playback::new(profile)));
     bench.report = Some(report(PumpMode::On, 20.0));
     assert_eq!(bench.go(0.3), ExtruderState::Running);
     bench.report = Some(report(PumpMode::Starting, 0.0));
@@ -325,7 +325,7 @@ fn a_pump_that_starts_anew_finds_a_law_that_begins_anew() {
 
 #[test]
 fn a_valve_that_lets_pressure_out_waits_for_a_report_that_it_has_fallen() {
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     let with = |mpa: Option<f64>| {
         let pressure_mpa = mpa.map(|mpa| MPa::new(mpa).unwrap());
         Some(ExtruderReport { pressure_mpa, ..report(PumpMode::On, 30.0) })

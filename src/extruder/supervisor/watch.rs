@@ -1,27 +1,27 @@
 //! What reports mean for the state: starts, holds, faults, and going on.
 
-use super::{Obedience, Phase, Supervisor};
-use crate::core::readback::Verdict;
+use super::{Phase, StopCompliance, Supervisor};
+use crate::core::readback::SpeedMatch;
 use crate::core::time::{Span, Stamp};
-use crate::extruder::Drive;
+use crate::extruder::CommandQuantity;
 use crate::extruder::report::{ExtruderReport, PumpMode};
 use crate::extruder::state::{ExtruderFault, ExtruderHold};
-use crate::extruder::strategy::Need;
+use crate::extruder::strategy::RequiredReading;
 
 /// Share of the highest pressure below which it has fallen.
-const FALLEN: f64 = 0.95;
+const RELIEF_RESET_RATIO: f64 = 0.95;
 
 impl Supervisor {
     /// The extruder reported.
     pub fn reported(&mut self, now: Stamp, report: &ExtruderReport) {
         self.link_up = true;
-        if self.heard.is_some_and(|at| now - at > self.setup.max_gap) {
-            self.readings.forget();
+        if self.last_report_at.is_some_and(|at| now - at > self.setup.max_gap) {
+            self.readings.reset();
         }
-        let seen = self.readings.pass(report);
+        let seen = self.readings.filter(report);
         self.report = Some((now, seen));
-        self.heard = Some(now);
-        self.see_whether_it_rests(now, report.pump);
+        self.last_report_at = Some(now);
+        self.check_stop_compliance(now, report.pump);
         let too_high = self.relieve(report);
         if self.phase == Phase::Off || matches!(self.phase, Phase::Fault(_)) {
             return;
@@ -35,11 +35,11 @@ impl Supervisor {
         }
         match report.pump {
             PumpMode::Fault => self.phase = Phase::Fault(ExtruderFault::Pump),
-            PumpMode::On => self.runs(now, &seen),
-            PumpMode::Starting => self.starts_anew(now, now),
+            PumpMode::On => self.pump_runs(now, &seen),
+            PumpMode::Starting => self.restart(now, now),
             // A report may still tell of the time before the pump was told to run.
-            PumpMode::Off | PumpMode::Stopping if now - self.begun <= self.setup.max_gap => {
-                self.starts_anew(now, self.begun);
+            PumpMode::Off | PumpMode::Stopping if now - self.bead_start <= self.setup.max_gap => {
+                self.restart(now, self.bead_start);
             }
             PumpMode::Off | PumpMode::Stopping => {
                 if !matches!(self.phase, Phase::Starting { .. }) {
@@ -51,21 +51,21 @@ impl Supervisor {
 
     /// A pump that is told to stop may take its time, but no longer than the
     /// cell is patient.
-    fn see_whether_it_rests(&mut self, now: Stamp, pump: PumpMode) {
+    fn check_stop_compliance(&mut self, now: Stamp, pump: PumpMode) {
         let runs = matches!(pump, PumpMode::On | PumpMode::Starting);
-        let told_to_rest = self.told.is_some_and(|told| !told.pump_on);
-        if !(runs && told_to_rest) {
-            self.obedience = Obedience::Obeys;
+        let commanded_off = self.last_command.is_some_and(|last| !last.pump_on);
+        if !(runs && commanded_off) {
+            self.stop_compliance = StopCompliance::Complies;
             return;
         }
-        let since = match self.obedience {
-            Obedience::Obeys => now,
-            Obedience::RunsOn { since } | Obedience::Lost { since } => since,
+        let since = match self.stop_compliance {
+            StopCompliance::Complies => now,
+            StopCompliance::RunsOn { since } | StopCompliance::TimedOut { since } => since,
         };
-        self.obedience = if now - since > self.setup.max_hold {
-            Obedience::Lost { since }
+        self.stop_compliance = if now - since > self.setup.max_hold {
+            StopCompliance::TimedOut { since }
         } else {
-            Obedience::RunsOn { since }
+            StopCompliance::RunsOn { since }
         };
     }
 
@@ -77,9 +77,11 @@ impl Supervisor {
             return false;
         };
         let too_high = found > limit;
-        if too_high && (self.phase != Phase::Off || self.obedience != Obedience::Obeys) {
+        if too_high
+            && (self.phase != Phase::Off || self.stop_compliance != StopCompliance::Complies)
+        {
             self.relieving = true;
-        } else if found.get() < FALLEN * limit.get() {
+        } else if found.get() < RELIEF_RESET_RATIO * limit.get() {
             self.relieving = false;
         }
         too_high
@@ -87,66 +89,66 @@ impl Supervisor {
 
     /// The pump says that it is starting: a law that runs would wind up against
     /// a flow that does not come, and so it begins once more.
-    fn starts_anew(&mut self, now: Stamp, since: Stamp) {
+    fn restart(&mut self, now: Stamp, since: Stamp) {
         if matches!(self.phase, Phase::Running | Phase::Holding { .. }) {
             self.phase = Phase::Starting { since };
-            self.follow.reset();
+            self.readback.reset();
             // Its flow comes up once more, unless it was still on its way.
-            if let Some(pauses) = self.pauses.as_mut().filter(|_| self.shares.is_none()) {
+            if let Some(pauses) = self.start_stop.as_mut().filter(|_| self.ratios.is_none()) {
                 pauses.begin(now);
             }
-            self.stand(now, self.trace.flow_mm3_per_s);
+            self.hold_initial_command(now, self.trace.flow_mm3_per_s);
         }
     }
 
     /// The pump runs: a start is over, or the screw turns as it was told.
-    fn runs(&mut self, now: Stamp, report: &ExtruderReport) {
+    fn pump_runs(&mut self, now: Stamp, report: &ExtruderReport) {
         if !report.valve_open {
             self.hold(now, ExtruderHold::ValveShut);
             return;
         }
         if matches!(self.phase, Phase::Starting { .. }) {
             self.phase = Phase::Running;
-            self.controlled = None;
-            self.setup.law.strategy_mut().settle(now, self.applied);
+            self.last_control = None;
+            self.setup.strategy.controller_mut().settle(now, self.applied);
         }
         self.resume_from(now, ExtruderHold::ValveShut);
-        if self.setup.drive == Drive::Rpm
+        if self.setup.quantity == CommandQuantity::Rpm
             && let Some(turning) = report.screw_rpm
         {
-            match self.follow.observe_share(now, turning.get(), self.applied) {
-                Verdict::Lost => self.phase = Phase::Fault(ExtruderFault::SpeedMismatch),
-                Verdict::Mismatch => self.hold(now, ExtruderHold::SpeedMismatch),
+            match self.readback.observe_relative(now, turning.get(), self.applied) {
+                SpeedMatch::Lost => self.phase = Phase::Fault(ExtruderFault::SpeedMismatch),
+                SpeedMatch::Mismatch => self.hold(now, ExtruderHold::SpeedMismatch),
                 _ => self.resume_from(now, ExtruderHold::SpeedMismatch),
             }
         }
         self.resume_from(now, ExtruderHold::LinkDown);
-        if self.has_what_is_needed(report) {
+        if self.has_required_readings(report) {
             self.resume_from(now, ExtruderHold::NoReading);
-            self.hear(now, report);
+            self.pass_to_controller(now, report);
         }
     }
 
     /// Lets the law hear a report; one that cannot be true is a hold until one
     /// comes that can.
-    fn hear(&mut self, now: Stamp, report: &ExtruderReport) {
-        self.usable = self.setup.law.strategy_mut().hear(now, report).is_ok();
-        if !self.usable {
+    fn pass_to_controller(&mut self, now: Stamp, report: &ExtruderReport) {
+        self.report_usable = self.setup.strategy.controller_mut().reported(now, report).is_ok();
+        if !self.report_usable {
             self.hold(now, ExtruderHold::BadReading);
         }
     }
 
     /// A limit on the pressure is no limit where the pressure is not reported.
-    fn has_what_is_needed(&self, report: &ExtruderReport) -> bool {
-        self.setup.law.strategy().needs().iter().all(|need| need.met_by(report))
-            && (self.setup.max_pressure.is_none() || Need::Pressure.met_by(report))
+    fn has_required_readings(&self, report: &ExtruderReport) -> bool {
+        self.setup.strategy.controller().required_readings().iter().all(|need| need.met_by(report))
+            && (self.setup.max_pressure.is_none() || RequiredReading::Pressure.met_by(report))
     }
 
     /// Holds when reports stay out, and gives up when a hold or a start lasts
     /// too long.
-    pub(super) fn lose_patience(&mut self, now: Stamp) {
+    pub(super) fn check_timeouts(&mut self, now: Stamp) {
         let heard = self.report.is_some_and(|(at, report)| {
-            now - at <= self.setup.max_gap && self.has_what_is_needed(&report)
+            now - at <= self.setup.max_gap && self.has_required_readings(&report)
         });
         match self.phase {
             Phase::Running if !heard => self.hold(now, ExtruderHold::NoReading),
@@ -165,7 +167,7 @@ impl Supervisor {
 
     /// How long nothing has been heard on this bead.
     fn silent_for(&self, now: Stamp) -> Span {
-        now - self.heard.map_or(self.begun, |at| at.max(self.begun))
+        now - self.last_report_at.map_or(self.bead_start, |at| at.max(self.bead_start))
     }
 
     /// Keeps the last command; a first reason stays.
@@ -185,7 +187,7 @@ impl Supervisor {
     /// was kept, and gathers nothing of the time between.
     pub(super) fn resume(&mut self, now: Stamp) {
         self.phase = Phase::Running;
-        self.controlled = None;
-        self.setup.law.strategy_mut().resume(now, self.applied);
+        self.last_control = None;
+        self.setup.strategy.controller_mut().resume(now, self.applied);
     }
 }

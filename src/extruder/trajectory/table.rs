@@ -1,8 +1,8 @@
 //! The table of a plan, `plan.csv`.
 
-use super::job::{PlannedJob, Row};
+use super::job::{PlanRow, PlannedJob};
 use crate::core::quantity::Unit;
-use crate::document::csv::{LineProblem, in_words};
+use crate::document::csv::{LineProblem, describe};
 
 /// How the column of the command begins; its end is the unit.
 const COMMAND: &str = "command_";
@@ -11,7 +11,7 @@ const NUMBERS: [&str; 4] = ["time_s", "path_mm", "speed_mm_per_s", "flow_mm3_per
 
 /// A table that is no plan. Lines are counted from 1, the heading included.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TableError {
+pub enum PlanTableError {
     /// A column is missing.
     #[error("the heading has no column {column}; a plan comes from truebead plan")]
     Column {
@@ -58,23 +58,23 @@ struct Columns {
 }
 
 impl Columns {
-    fn of(heading: &csv::StringRecord) -> Result<(Self, Unit), TableError> {
-        let place = |column: &str| {
+    fn of(heading: &csv::StringRecord) -> Result<(Self, Unit), PlanTableError> {
+        let index = |column: &str| {
             let at = heading.iter().position(|name| name == column);
-            at.ok_or_else(|| TableError::Column { column: column.to_owned() })
+            at.ok_or_else(|| PlanTableError::Column { column: column.to_owned() })
         };
-        let [time, path, speed, flow] = NUMBERS.map(place);
+        let [time, path, speed, flow] = NUMBERS.map(index);
         let commands: Vec<(usize, &str)> =
             heading.iter().enumerate().filter(|(_, name)| name.starts_with(COMMAND)).collect();
         let &[(command, name)] = commands.as_slice() else {
             let names: Vec<&str> = commands.iter().map(|(_, name)| *name).collect();
             let found = if names.is_empty() { "nothing".into() } else { names.join(", ") };
-            return Err(TableError::Command { found });
+            return Err(PlanTableError::Command { found });
         };
         let unit = Unit::of_word(name.trim_start_matches(COMMAND));
-        let unit = unit.ok_or_else(|| TableError::Command { found: name.to_owned() })?;
+        let unit = unit.ok_or_else(|| PlanTableError::Command { found: name.to_owned() })?;
         let columns = Self {
-            bead: place(BEAD)?,
+            bead: index(BEAD)?,
             numbers: [time?, path?, speed?, flow?],
             command,
             command_name: name.to_owned(),
@@ -82,12 +82,12 @@ impl Columns {
         Ok((columns, unit))
     }
 
-    fn row(&self, record: &csv::StringRecord, line: u64) -> Result<Row, TableError> {
+    fn row(&self, record: &csv::StringRecord, line: u64) -> Result<PlanRow, PlanTableError> {
         let number = |at: usize, column: &str, least: f64, expected: &'static str| {
             let found = record.get(at).unwrap_or_default();
             let value = found.parse().ok();
             value.filter(|value: &f64| value.is_finite() && *value >= least).ok_or_else(|| {
-                TableError::Number {
+                PlanTableError::Number {
                     line,
                     column: column.to_owned(),
                     found: found.to_owned(),
@@ -96,7 +96,7 @@ impl Columns {
             })
         };
         let known = |k: usize| number(self.numbers[k], NUMBERS[k], 0.0, "a number of 0 or more");
-        Ok(Row {
+        Ok(PlanRow {
             time_s: known(0)?,
             path_mm: known(1)?,
             speed_mm_per_s: known(2)?,
@@ -108,14 +108,14 @@ impl Columns {
 
 /// Reads a job's plan from the text of a `plan.csv`. Fails where a column, a number or the
 /// order of the rows is not as `truebead plan` writes it.
-pub fn read(text: &str) -> Result<PlannedJob, TableError> {
+pub fn read(text: &str) -> Result<PlannedJob, PlanTableError> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let of_row = |error: csv::Error| {
-        let LineProblem { line, what } = in_words(&error);
-        TableError::Row { line, what }
+        let LineProblem { line, what } = describe(&error);
+        PlanTableError::Row { line, what }
     };
     let (columns, unit) = Columns::of(reader.headers().map_err(of_row)?)?;
-    let mut beads: Vec<(String, Vec<Row>)> = Vec::new();
+    let mut beads: Vec<(String, Vec<PlanRow>)> = Vec::new();
     for record in reader.records() {
         let record = record.map_err(of_row)?;
         let line = record.position().map_or(0, csv::Position::line);
@@ -123,42 +123,42 @@ pub fn read(text: &str) -> Result<PlannedJob, TableError> {
         let bead = record.get(columns.bead).unwrap_or_default();
         match beads.last_mut().filter(|(name, _)| name == bead) {
             None => {
-                begins(&row, line)?;
+                check_first(&row, line)?;
                 beads.push((bead.to_owned(), vec![row]));
             }
             Some((_, rows)) => {
-                follows(rows.last(), &row, line)?;
+                check_order(rows.last(), &row, line)?;
                 rows.push(row);
             }
         }
     }
     if beads.is_empty() || beads.iter().any(|(_, rows)| rows.len() < 2) {
-        return Err(TableError::Short);
+        return Err(PlanTableError::Short);
     }
     Ok(PlannedJob::new(unit, beads.into_iter().map(|(_, rows)| rows).collect()))
 }
 
-fn wrong(line: u64, column: &str, found: f64, expected: &'static str) -> TableError {
-    TableError::Number { line, column: column.to_owned(), found: found.to_string(), expected }
+fn wrong(line: u64, column: &str, found: f64, expected: &'static str) -> PlanTableError {
+    PlanTableError::Number { line, column: column.to_owned(), found: found.to_string(), expected }
 }
 
 /// What a bead in a cell begins with.
-const EXPECTED: &str = "a bead that begins at a speed above 0, for the cell starts it itself: plan \
+const EXPECTED_START: &str = "a bead that begins at a speed above 0, for the cell starts it itself: plan \
                         G-code with --ends moving";
 
-fn begins(row: &Row, line: u64) -> Result<(), TableError> {
+fn check_first(row: &PlanRow, line: u64) -> Result<(), PlanTableError> {
     for (column, found) in [("time_s", row.time_s), ("path_mm", row.path_mm)] {
         if found > 0.0 {
             return Err(wrong(line, column, found, "0 where a bead begins"));
         }
     }
     if row.speed_mm_per_s <= 0.0 {
-        return Err(wrong(line, "speed_mm_per_s", 0.0, EXPECTED));
+        return Err(wrong(line, "speed_mm_per_s", 0.0, EXPECTED_START));
     }
     Ok(())
 }
 
-fn follows(before: Option<&Row>, row: &Row, line: u64) -> Result<(), TableError> {
+fn check_order(before: Option<&PlanRow>, row: &PlanRow, line: u64) -> Result<(), PlanTableError> {
     let Some(before) = before else { return Ok(()) };
     if row.time_s <= before.time_s {
         return Err(wrong(line, "time_s", row.time_s, "more than in the row before"));

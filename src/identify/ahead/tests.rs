@@ -5,15 +5,15 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
-use crate::identify::excitation::{Excitation, Shape};
-use crate::identify::fit::Before;
+use crate::identify::excitation::{Excitation, Waveform};
+use crate::identify::fit::InitialCondition;
 use crate::numeric::lti::{Between, TransferFunction, simulate};
 
 const DT_S: f64 = 0.05;
 
 /// An input of random levels and the answer to it, with a fifth of it as noise.
 fn logged(model: &TransferFunction, seed: u64) -> (Vec<f64>, Vec<f64>) {
-    let shape = Shape::Gaussian { mean: 0.0, sigma: 2.0, low: -6.0, high: 6.0, seed };
+    let shape = Waveform::Gaussian { mean: 0.0, sigma: 2.0, low: -6.0, high: 6.0, seed };
     let levels = Excitation { shape, hold_s: 0.8, duration_s: Some(60.0) };
     let input = levels.profile().unwrap().sampled(DT_S, 1200);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -26,10 +26,10 @@ fn logged(model: &TransferFunction, seed: u64) -> (Vec<f64>, Vec<f64>) {
     (input, output)
 }
 
-fn settings() -> Settings {
-    let range = DeadTime::Estimated { least_s: 0.0, most_s: 5.0 };
-    let settings = Settings::new(Structure::SecondOrderOscillating { zero: true }, range);
-    Settings { before: Before::Unknown, accept_undetermined: true, ..settings }
+fn settings() -> FitSettings {
+    let range = DeadTime::Estimated { min_s: 0.0, max_s: 5.0 };
+    let settings = FitSettings::new(Structure::SecondOrderOscillating { zero: true }, range);
+    FitSettings { initial_state: InitialCondition::Unknown, accept_undetermined: true, ..settings }
 }
 
 fn model(num: &[f64], den: &[f64], dead_time_s: f64) -> TransferFunction {
@@ -49,10 +49,10 @@ fn a_clock_that_is_behind_is_told_with_how_much() {
         let (input, output) = logged(&machine, seed);
         let samples = ahead_by(&input, &output, steps);
         let found = fit(&samples, &settings()).ok();
-        let told = ahead(&samples, &settings(), found.as_ref()).unwrap();
+        let told = output_lead(&samples, &settings(), found.as_ref()).unwrap();
         let truth_s = f64::from(u32::try_from(steps).unwrap()) * DT_S - 0.3;
-        assert!((told.ahead_s - truth_s).abs() < 0.3, "{told:?}");
-        assert!(told.fit_percent > told.answering_percent + 5.0, "{told:?}");
+        assert!((told.lead_s - truth_s).abs() < 0.3, "{told:?}");
+        assert!(told.fit_percent > told.causal_fit_percent + 5.0, "{told:?}");
     }
 }
 
@@ -74,8 +74,8 @@ fn a_machine_that_only_answers_is_never_ahead() {
         let samples = Samples::new(input, output, DT_S).unwrap();
         // Also where no model was found, and where the input was measured.
         for between in [Between::Held, Between::Linear] {
-            let settings = Settings { between, ..settings() };
-            assert_eq!(ahead(&samples, &settings, None), None, "seed {seed}");
+            let settings = FitSettings { between, ..settings() };
+            assert_eq!(output_lead(&samples, &settings, None), None, "seed {seed}");
         }
     }
 }
@@ -86,6 +86,6 @@ fn noise_is_not_ahead() {
         let (input, _) = logged(&model(&[2.0], &[0.8, 1.0], 0.0), seed);
         let (_, output) = logged(&model(&[2.0], &[0.8, 1.0], 0.0), seed + 100);
         let samples = Samples::new(input, output, DT_S).unwrap();
-        assert_eq!(ahead(&samples, &settings(), None), None, "seed {seed}");
+        assert_eq!(output_lead(&samples, &settings(), None), None, "seed {seed}");
     }
 }

@@ -1,33 +1,33 @@
 //! The speed at which bead was laid, along the path.
 
 use super::estimate::SpeedRange;
-use super::observation::Look;
+use super::observation::BeadObservation;
 use crate::core::robot::RobotState;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 /// Longest time between two reports over which the speed is taken to have changed
 /// evenly; the link counts as lost after it.
-const LONGEST_GAP: Span = Span::from_millis(500);
+const MAX_GAP: Span = Span::from_millis(500);
 /// A path that falls back by less is the same bead \[mm\].
-const FALL_BACK_MM: f64 = 0.01;
+const MAX_BACKSTEP_MM: f64 = 0.01;
 /// Grid along the path on which speeds are summed up \[mm\].
-const STEP_MM: f64 = 0.5;
+const GRID_MM: f64 = 0.5;
 /// Longest bead \[mm\]; a longer one is a path that jumped.
-const LONGEST_MM: f64 = 1e7;
+const MAX_LENGTH_MM: f64 = 1e7;
 /// Share of the usual speed below which a bead is at its beginning or its end, where its
 /// width is no power of the speed.
-const SLOWEST: f64 = 0.2;
+const MIN_SPEED_FRACTION: f64 = 0.2;
 /// Growth of the speed over a millimetre, as a share, beyond which a bead that begins is
 /// still run up, or one that ends run out: there, too, its width is something else.
 const RUN_UP_PER_MM: f64 = 0.01;
 
 /// All beads of a recording.
 #[derive(Debug, Clone)]
-pub struct Course {
+pub struct SpeedProfile {
     beads: Vec<Bead>,
-    slowest: f64,
+    min_speed: f64,
 }
 
 /// Reports of one bead without a gap.
@@ -45,7 +45,7 @@ struct Bead {
 
 /// Sums along one bead from which means over stretches of it are read.
 #[derive(Debug, Clone)]
-pub struct Sums {
+pub struct PowerIntegral {
     start_mm: f64,
     exponent: f64,
     /// Integral of v^−b from the start to each node \[mm·(mm/s)^−b\].
@@ -54,7 +54,7 @@ pub struct Sums {
     ends: (f64, f64),
 }
 
-impl Course {
+impl SpeedProfile {
     /// Of what the robot reported, in order; `None` where it laid nothing.
     pub fn of(states: &[(Stamp, RobotState)]) -> Option<Self> {
         let mut beads: Vec<Bead> = Vec::new();
@@ -73,17 +73,17 @@ impl Course {
                 bead.push(*at, state);
             }
         }
-        beads.retain(|bead| bead.length_mm() > 0.0 && bead.length_mm() < LONGEST_MM);
+        beads.retain(|bead| bead.length_mm() > 0.0 && bead.length_mm() < MAX_LENGTH_MM);
         let mut speeds: Vec<f64> = beads.iter().flat_map(Bead::on_grid).collect();
         if speeds.is_empty() {
             return None;
         }
         speeds.sort_by(f64::total_cmp);
-        let slowest = (SLOWEST * speeds[speeds.len() / 2]).max(f64::MIN_POSITIVE);
+        let slowest = (MIN_SPEED_FRACTION * speeds[speeds.len() / 2]).max(f64::MIN_POSITIVE);
         for bead in &mut beads {
             bead.mark_slow(slowest);
         }
-        Some(Self { beads, slowest })
+        Some(Self { beads, min_speed: slowest })
     }
 
     /// Bead and path of the nozzle at a moment \[mm\], on the line between two reports.
@@ -102,7 +102,7 @@ impl Course {
     )]
     pub fn range(&self, tail: f64) -> SpeedRange {
         let speeds = self.beads.iter().flat_map(Bead::on_grid);
-        let mut speeds: Vec<f64> = speeds.filter(|&speed| speed >= self.slowest).collect();
+        let mut speeds: Vec<f64> = speeds.filter(|&speed| speed >= self.min_speed).collect();
         speeds.sort_by(f64::total_cmp);
         let last = speeds.len().saturating_sub(1);
         let skip = (tail * last as f64) as usize;
@@ -113,7 +113,7 @@ impl Course {
 
     /// Whether the speed is known, and large enough, all over the gauge of a width at an
     /// offset \[mm\].
-    pub fn knows(&self, look: &Look, offset_mm: f64, gauge: Mm) -> bool {
+    pub fn covers(&self, look: &BeadObservation, offset_mm: f64, gauge: Mm) -> bool {
         let middle = look.path_mm - offset_mm;
         let half = 0.5 * gauge.get();
         self.beads.get(look.bead).is_some_and(|bead| bead.knows(middle - half, middle + half))
@@ -123,7 +123,7 @@ impl Course {
     /// \[mm\]: between two reports the robot came further than it would at an even
     /// change if it slowed down later than that, or sped up sooner. The mean, weighted as
     /// the changes tell the offset, by their squares.
-    pub fn lag_mm(&self) -> f64 {
+    pub fn position_sigma_mm(&self) -> f64 {
         let (mut ways, mut changes) = (0.0, 0.0);
         for (way, change) in self.beads.iter().flat_map(Bead::changes) {
             ways += way * change;
@@ -133,8 +133,8 @@ impl Course {
     }
 
     /// Sums of every bead for an exponent.
-    pub fn sums(&self, exponent: f64) -> Vec<Sums> {
-        self.beads.iter().map(|bead| bead.sums(exponent, self.slowest)).collect()
+    pub fn sums(&self, exponent: f64) -> Vec<PowerIntegral> {
+        self.beads.iter().map(|bead| bead.sums(exponent, self.min_speed)).collect()
     }
 }
 
@@ -143,7 +143,7 @@ impl Bead {
         let (Some(&last_at), Some(&last)) = (self.times.last(), self.paths.last()) else {
             return true;
         };
-        at > last_at && at - last_at <= LONGEST_GAP && state.path_mm.get() >= last - FALL_BACK_MM
+        at > last_at && at - last_at <= MAX_GAP && state.path_mm.get() >= last - MAX_BACKSTEP_MM
     }
 
     fn push(&mut self, at: Stamp, state: &RobotState) {
@@ -178,8 +178,8 @@ impl Bead {
     fn on_grid(&self) -> impl Iterator<Item = f64> {
         let start = self.start_mm();
         let mut next = 1;
-        (0..=number(self.length_mm() / STEP_MM)).map(move |node| {
-            let path = start + float(node) * STEP_MM;
+        (0..=number(self.length_mm() / GRID_MM)).map(move |node| {
+            let path = start + to_f64(node) * GRID_MM;
             while next + 1 < self.paths.len() && self.paths[next] < path {
                 next += 1;
             }
@@ -218,56 +218,56 @@ impl Bead {
             return false;
         }
         // Both nodes about either end count: a gauge may be as short as a point.
-        let before = number(from / STEP_MM).checked_sub(1).and_then(|node| self.slow.get(node));
-        let after = self.slow.get(number(to / STEP_MM) + 1).or(self.slow.last());
+        let before = number(from / GRID_MM).checked_sub(1).and_then(|node| self.slow.get(node));
+        let after = self.slow.get(number(to / GRID_MM) + 1).or(self.slow.last());
         before.copied().unwrap_or(0) == after.copied().unwrap_or(0)
     }
 
-    fn sums(&self, exponent: f64, slowest: f64) -> Sums {
+    fn sums(&self, exponent: f64, slowest: f64) -> PowerIntegral {
         let powers: Vec<f64> =
             self.on_grid().map(|speed| speed.max(slowest).powf(-exponent)).collect();
         let mut sum = 0.0;
         let mut to_nodes = vec![0.0];
         to_nodes.extend(powers.windows(2).map(|pair| {
-            sum += STEP_MM * 0.5 * (pair[0] + pair[1]);
+            sum += GRID_MM * 0.5 * (pair[0] + pair[1]);
             sum
         }));
         let end = |power: Option<&f64>| power.copied().unwrap_or(1.0);
         let ends = (end(powers.first()), end(powers.last()));
-        Sums { start_mm: self.start_mm(), exponent, to_nodes, ends }
+        PowerIntegral { start_mm: self.start_mm(), exponent, to_nodes, ends }
     }
 }
 
 /// Nodes from a bead's end inwards over which the speed still grows fast.
 fn run_up<'a>(speeds: impl Iterator<Item = &'a f64> + Clone, slowest: f64) -> usize {
-    let grows = |here: f64, next: f64| next > here * (1.0 + RUN_UP_PER_MM * STEP_MM);
+    let grows = |here: f64, next: f64| next > here * (1.0 + RUN_UP_PER_MM * GRID_MM);
     let pairs = speeds.clone().zip(speeds.skip(1));
     pairs.take_while(|(here, next)| **here < slowest || grows(**here, **next)).count()
 }
 
-impl Sums {
+impl PowerIntegral {
     /// Logarithm of the speed that lays a bead as wide as the mean over a stretch about a
     /// place. Beyond the ends of what is known the speed is taken to have been as at
     /// them.
     pub fn ln_speed(&self, middle_mm: f64, length: Mm) -> f64 {
-        let length = length.get().max(STEP_MM);
+        let length = length.get().max(GRID_MM);
         let from = middle_mm - 0.5 * length;
-        let mean = (self.up_to(from + length) - self.up_to(from)) / length;
+        let mean = (self.integral_to(from + length) - self.integral_to(from)) / length;
         -mean.ln() / self.exponent
     }
 
-    fn up_to(&self, path_mm: f64) -> f64 {
-        let place = (path_mm - self.start_mm) / STEP_MM;
+    fn integral_to(&self, path_mm: f64) -> f64 {
+        let index = (path_mm - self.start_mm) / GRID_MM;
         let last = self.to_nodes.len() - 1;
-        if place <= 0.0 {
-            return place * STEP_MM * self.ends.0;
+        if index <= 0.0 {
+            return index * GRID_MM * self.ends.0;
         }
-        let node = number(place);
+        let node = number(index);
         if node >= last {
-            return self.to_nodes[last] + (place - float(last)) * STEP_MM * self.ends.1;
+            return self.to_nodes[last] + (index - to_f64(last)) * GRID_MM * self.ends.1;
         }
         self.to_nodes[node]
-            + (self.to_nodes[node + 1] - self.to_nodes[node]) * (place - float(node))
+            + (self.to_nodes[node + 1] - self.to_nodes[node]) * (index - to_f64(node))
     }
 }
 

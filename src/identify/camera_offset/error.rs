@@ -3,13 +3,13 @@
 use crate::core::units::{Mm, MmPerS};
 
 /// Widths below which nothing is told.
-pub const FEWEST: usize = 50;
+pub const MIN_WIDTHS: usize = 50;
 /// Gauges of path, side by side, below which the noise is not told from the bead.
-pub const FEWEST_PIECES: usize = 10;
+pub const MIN_PIECES: usize = 10;
 
 /// Why a bead does not tell the offset.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum OffsetError {
+pub enum CameraOffsetError {
     /// Nothing says where the nozzle was.
     #[error(
         "no robot state with a path that grew in PRINT or HOLD: the offset shows only while bead \
@@ -18,7 +18,7 @@ pub enum OffsetError {
     NoPath,
     /// Too few widths.
     #[error(
-        "{found} widths are of bead that was laid while the speed is known, and {FEWEST} are needed: \
+        "{found} widths are of bead that was laid while the speed is known, and {MIN_WIDTHS} are needed: \
          record longer, or see why frames were refused (`truebead process`)"
     )]
     TooFew {
@@ -27,7 +27,7 @@ pub enum OffsetError {
     },
     /// Too little path.
     #[error(
-        "the widths cover only {pieces} gauges side by side, of {:.1} mm each, and {FEWEST_PIECES} are \
+        "the widths cover only {pieces} gauges side by side, of {:.1} mm each, and {MIN_PIECES} are \
          needed: record a longer bead", gauge.get()
     )]
     TooShort {
@@ -42,7 +42,7 @@ pub enum OffsetError {
          with steps of the target width, or of the speed, by 20 % or more",
         100.0 * (to.get() / from.get() - 1.0), from.get(), to.get()
     )]
-    Steady {
+    ConstantSpeed {
         /// Slowest speed.
         from: MmPerS,
         /// Fastest speed.
@@ -51,21 +51,21 @@ pub enum OffsetError {
     /// The widths do not show it.
     #[error(
         "the speed changed by {:.1} % ({:.1} to {:.1} mm/s), but the widths do not follow it \
-         clearly, at no offset up to {farthest}: run once with larger or more abrupt steps of the \
+         clearly, at no offset up to {max_offset}: run once with larger or more abrupt steps of the \
          target width or of the speed",
         100.0 * (to.get() / from.get() - 1.0), from.get(), to.get()
     )]
-    NotFollowing {
+    NoResponse {
         /// Slowest speed.
         from: MmPerS,
         /// Fastest speed.
         to: MmPerS,
         /// Largest offset that was tried.
-        farthest: Mm,
+        max_offset: Mm,
     },
     /// The best is at an end of what was tried.
     #[error(
-        "the widths fit best at the end of what was tried, {at:.1} of 0 to {farthest}: give more with \
+        "the widths fit best at the end of what was tried, {at:.1} of 0 to {max_offset}: give more with \
          --max-mm if the camera is further away; otherwise the widths follow something else than \
          the speed",
         at = .at.get()
@@ -74,7 +74,7 @@ pub enum OffsetError {
         /// The best that was tried.
         at: Mm,
         /// Largest offset that was tried.
-        farthest: Mm,
+        max_offset: Mm,
     },
     /// Two offsets are as good.
     #[error(
@@ -94,7 +94,7 @@ pub enum OffsetError {
          width or of the speed",
         offset.get(), sigma.get()
     )]
-    Loose {
+    Uncertain {
         /// The best.
         offset: Mm,
         /// Its standard deviation.

@@ -4,7 +4,7 @@ use crate::core::units::{Mm, MmPerS};
 
 /// Exponents b that a bead may have. The bead of Shojaei Barjuei et al. 2022 has 0.22 to
 /// 0.27, one whose mass alone counts has 1.
-pub const EXPONENTS: (f64, f64) = (0.1, 2.0);
+pub const EXPONENT_RANGE: (f64, f64) = (0.1, 2.0);
 
 /// Slowest and fastest speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,7 +17,7 @@ pub struct SpeedRange {
 
 /// An offset that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
+pub struct OffsetEstimate {
     /// Path length from the nozzle back to the middle of the gauge.
     pub offset: Mm,
     /// Its standard deviation.
@@ -34,14 +34,14 @@ pub struct Found {
     /// known or nearly none, or far off their neighbours.
     pub left_out: usize,
     /// What is left of the widths, as a share (root mean square).
-    pub scatter: f64,
+    pub residual_rms: f64,
 }
 
 /// The bead's model that was fitted, and the widths beside it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Study {
+pub struct OffsetStudy {
     /// Offset and exponent.
-    pub found: Found,
+    pub estimate: OffsetEstimate,
     /// Standard deviation of the exponent, with what is open in the offset.
     pub exponent_sigma: f64,
     /// The width where the speed is as the mean \[mm\].
@@ -51,14 +51,14 @@ pub struct Study {
     /// Variances of the level, as a share, and of the exponent, and their covariance.
     pub(super) covariance: [f64; 3],
     /// The widths that told it, one by one.
-    pub seen: Vec<Seen>,
+    pub widths: Vec<WidthAtSpeed>,
     /// The same in means over a gauge's length of path.
-    pub pieces: Vec<Seen>,
+    pub pieces: Vec<WidthAtSpeed>,
 }
 
 /// Widths beside the speed that laid them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Seen {
+pub struct WidthAtSpeed {
     /// Number of the bead.
     pub bead: usize,
     /// Path of the nozzle when they were measured \[mm\].
@@ -71,19 +71,19 @@ pub struct Seen {
     pub ln_speed: f64,
 }
 
-impl Study {
+impl OffsetStudy {
     /// Width at a speed, and its standard deviation \[mm\].
     pub fn width_at(&self, speed: MmPerS) -> (f64, f64) {
         let faster = (speed.get() / self.mean_speed_mm_per_s).ln();
-        let width = self.level_mm * (-self.found.exponent * faster).exp();
+        let width = self.level_mm * (-self.estimate.exponent * faster).exp();
         let [level, exponent, both] = self.covariance;
         let variance = level - 2.0 * faster * both + faster * faster * exponent;
         (width, width * variance.max(0.0).sqrt())
     }
 
     /// What is left of a width, as a share.
-    pub fn left(&self, seen: &Seen) -> f64 {
+    pub fn residual(&self, seen: &WidthAtSpeed) -> f64 {
         let faster = seen.ln_speed - self.mean_speed_mm_per_s.ln();
-        seen.ln_width - self.level_mm.ln() + self.found.exponent * faster
+        seen.ln_width - self.level_mm.ln() + self.estimate.exponent * faster
     }
 }

@@ -2,7 +2,7 @@
 
 /// A width, and where the nozzle was.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
+pub struct BeadObservation {
     /// Number of the bead.
     pub bead: usize,
     /// Path of the nozzle \[mm\].
@@ -10,5 +10,5 @@ pub struct Look {
     /// Logarithm of the width in mm.
     pub ln_width: f64,
     /// Standard deviation of the width, as a share of it.
-    pub share: f64,
+    pub relative_sigma: f64,
 }

@@ -10,13 +10,14 @@ use rand_distr::{Distribution, Normal, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 
-use super::whiten::{Place, Whitener};
+use super::whiten::{PathPosition, PathWhitener};
 use super::*;
 use crate::core::robot::RobotMode;
 use crate::core::units::MmPerS;
 
 const GAUGE_MM: f64 = 60.0;
-const SEARCH: Search = Search { gauge: Mm::constant(GAUGE_MM), farthest: Mm::constant(1000.0) };
+const SEARCH: OffsetSearch =
+    OffsetSearch { gauge: Mm::constant(GAUGE_MM), max_offset: Mm::constant(1000.0) };
 /// The truth steps through time in these \[s\].
 const TICK_S: f64 = 0.002;
 /// Ticks between two states of the robot, and between two frames.
@@ -41,7 +42,7 @@ const PLANT: Plant =
 /// What was recorded.
 struct Record {
     states: Vec<(Stamp, RobotState)>,
-    widths: Vec<Width>,
+    widths: Vec<MeasuredWidth>,
 }
 
 /// Path and speed over time, with steps of the demand.
@@ -117,7 +118,7 @@ impl Way {
                 let Some(width) = self.width(plant.exponent, from, to) else { continue };
                 let noise = plant.wander.0 * wander + plant.picture * normal.sample(&mut random);
                 let width = 40.0 * width * noise.exp();
-                record.widths.push(Width {
+                record.widths.push(MeasuredWidth {
                     at,
                     width: Mm::new(width).unwrap(),
                     sigma: Mm::constant(0.04),
@@ -139,7 +140,7 @@ fn state(tick: usize, path: f64, speed: f64) -> RobotState {
     }
 }
 
-fn found(record: &Record) -> Result<Found, OffsetError> {
+fn found(record: &Record) -> Result<OffsetEstimate, CameraOffsetError> {
     find(&record.states, &record.widths, SEARCH)
 }
 
@@ -152,7 +153,7 @@ fn coverage(seeds: u64, wander: (f64, f64), picture: f64) -> (f64, f64) {
             let offset_mm = Uniform::new(50.0, 250.0).unwrap().sample(&mut random);
             let plant = Plant { offset_mm, picture, wander, ..PLANT };
             let record = steps(plant.seconds, seed).record(plant, seed);
-            let near = Search { farthest: Mm::constant(400.0), ..SEARCH };
+            let near = OffsetSearch { max_offset: Mm::constant(400.0), ..SEARCH };
             let found = find(&record.states, &record.widths, near).unwrap();
             (found.offset.get() - plant.offset_mm) / found.sigma.get()
         })
@@ -178,7 +179,7 @@ fn a_bead_of_constant_flow_tells_its_exponent_too() {
     let found = found(&steps(15, 1).record(plant, 1)).unwrap();
     assert!((found.offset.get() - 180.0).abs() < 3.0 * found.sigma.get(), "{found:?}");
     assert!((found.exponent - 1.0).abs() < 0.05 && !found.at_bound, "{found:?}");
-    assert!(found.used > 500 && found.scatter < 0.01, "{found:?}");
+    assert!(found.used > 500 && found.residual_rms < 0.01, "{found:?}");
 }
 
 #[test]
@@ -245,13 +246,13 @@ fn a_new_bead_does_not_mix_with_the_old_one_and_a_wrong_width_counts_for_nothing
     let later = Stamp::from_secs(9.0) - Stamp::START;
     // What lies under the camera before the new bead comes is the old one.
     let old = record.widths[100];
-    record
-        .widths
-        .extend((0..30).map(|i| Width { at: Stamp::from_secs(9.0 + 0.02 * f64::from(i)), ..old }));
+    record.widths.extend(
+        (0..30).map(|i| MeasuredWidth { at: Stamp::from_secs(9.0 + 0.02 * f64::from(i)), ..old }),
+    );
     record.states.extend(second.states.iter().map(|(at, state)| (*at + later, *state)));
     record
         .widths
-        .extend(second.widths.iter().map(|width| Width { at: width.at + later, ..*width }));
+        .extend(second.widths.iter().map(|width| MeasuredWidth { at: width.at + later, ..*width }));
     let clean = found(&record).unwrap();
     assert!((clean.offset.get() - 90.0).abs() < 3.0 * clean.sigma.get(), "{clean:?}");
     assert!(clean.left_out >= 30, "{clean:?}");
@@ -264,21 +265,25 @@ fn a_new_bead_does_not_mix_with_the_old_one_and_a_wrong_width_counts_for_nothing
 #[test]
 fn what_does_not_tell_is_refused_with_its_reason() {
     let steady = demands(15, |tick, _| if tick < 3000 { 100.0 } else { 100.5 }).record(PLANT, 1);
-    assert!(matches!(found(&steady), Err(OffsetError::Steady { .. })), "{:?}", found(&steady));
+    assert!(
+        matches!(found(&steady), Err(CameraOffsetError::ConstantSpeed { .. })),
+        "{:?}",
+        found(&steady)
+    );
     let plant = Plant { exponent: 0.0, ..PLANT };
     let deaf = found(&steps(15, 2).record(plant, 2));
-    assert!(matches!(deaf, Err(OffsetError::NotFollowing { .. })), "{deaf:?}");
+    assert!(matches!(deaf, Err(CameraOffsetError::NoResponse { .. })), "{deaf:?}");
     let mut short = steps(15, 2).record(PLANT, 2);
     short.widths.truncate(40);
-    assert_eq!(found(&short), Err(OffsetError::TooFew { found: 40 }));
+    assert_eq!(found(&short), Err(CameraOffsetError::TooFew { found: 40 }));
     for (_, state) in &mut short.states {
         state.mode = RobotMode::Idle;
     }
-    assert_eq!(found(&short), Err(OffsetError::NoPath));
+    assert_eq!(found(&short), Err(CameraOffsetError::NoPath));
     let far = steps(15, 2).record(Plant { offset_mm: 400.0, ..PLANT }, 2);
-    let search = Search { farthest: Mm::constant(390.0), ..SEARCH };
+    let search = OffsetSearch { max_offset: Mm::constant(390.0), ..SEARCH };
     let at_end = find(&far.states, &far.widths, search);
-    assert!(matches!(at_end, Err(OffsetError::AtEnd { .. })), "{at_end:?}");
+    assert!(matches!(at_end, Err(CameraOffsetError::AtEnd { .. })), "{at_end:?}");
 }
 
 #[test]
@@ -287,8 +292,8 @@ fn a_speed_that_repeats_itself_is_ambiguous_until_the_range_is_told() {
     let way = demands(20, |tick, _| 95.0 + 20.0 * (tick as f64 * TICK_S * 2.1).sin());
     let record = way.record(PLANT, 6);
     let twice = found(&record);
-    assert!(matches!(twice, Err(OffsetError::Ambiguous { .. })), "{twice:?}");
-    let search = Search { farthest: Mm::constant(250.0), ..SEARCH };
+    assert!(matches!(twice, Err(CameraOffsetError::Ambiguous { .. })), "{twice:?}");
+    let search = OffsetSearch { max_offset: Mm::constant(250.0), ..SEARCH };
     let once = find(&record.states, &record.widths, search).unwrap();
     assert!((once.offset.get() - 90.0).abs() < 3.0 * once.sigma.get(), "{once:?}");
 }
@@ -297,7 +302,7 @@ fn a_speed_that_repeats_itself_is_ambiguous_until_the_range_is_told() {
 fn differences_of_a_wandering_series_are_independent_and_of_one_size() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
     let normal = Normal::new(0.0, 1.0).unwrap();
-    let noise = Noise::all().find(|noise| *noise == Noise::FIRST).unwrap();
+    let noise = WidthNoise::all().find(|noise| *noise == WidthNoise::INITIAL).unwrap();
     let count = 40_000;
     let (mut path, mut wander) = (0.0, 3f64.sqrt() * normal.sample(&mut random));
     let mut places = Vec::new();
@@ -309,10 +314,10 @@ fn differences_of_a_wandering_series_are_independent_and_of_one_size() {
         let kept = (-way / 80.0).exp();
         wander = kept * wander + (3.0 * (1.0 - kept * kept)).sqrt() * normal.sample(&mut random);
         let variance = if i % 3 == 0 { 4.0 } else { 1.0 };
-        places.push(Place { bead: 0, path_mm: path, variance });
+        places.push(PathPosition { bead: 0, path_mm: path, variance });
         values.push(wander + variance.sqrt() * normal.sample(&mut random));
     }
-    let left: Vec<f64> = Whitener::new(&places, noise).apply(values.into_iter()).collect();
+    let left: Vec<f64> = PathWhitener::new(&places, noise).apply(values.into_iter()).collect();
     let mean = |lag: usize| {
         left.iter().zip(&left[lag..]).map(|(a, b)| a * b).sum::<f64>() / f64::from(count)
     };

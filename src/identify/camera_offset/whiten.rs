@@ -13,27 +13,30 @@ const LENGTHS_MM: [f64; 9] = [3.0, 10.0, 20.0, 40.0, 80.0, 200.0, 600.0, 2000.0,
 
 /// How widths scatter about the bead's model.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
+pub struct WidthNoise {
     variance: f64,
-    length_mm: f64,
+    correlation_length_mm: f64,
 }
 
-impl Noise {
+impl WidthNoise {
     /// Taken as long as nothing is known.
-    pub const FIRST: Self = Self { variance: 3.0, length_mm: 80.0 };
+    pub const INITIAL: Self = Self { variance: 3.0, correlation_length_mm: 80.0 };
 
     /// All that are tried.
     pub fn all() -> impl Iterator<Item = Self> {
         let wandering = VARIANCES.into_iter().skip(1).flat_map(|variance| {
-            LENGTHS_MM.into_iter().map(move |length_mm| Self { variance, length_mm })
+            LENGTHS_MM
+                .into_iter()
+                .map(move |length_mm| Self { variance, correlation_length_mm: length_mm })
         });
-        std::iter::once(Self { variance: VARIANCES[0], length_mm: LENGTHS_MM[0] }).chain(wandering)
+        std::iter::once(Self { variance: VARIANCES[0], correlation_length_mm: LENGTHS_MM[0] })
+            .chain(wandering)
     }
 }
 
 /// A place at which something was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct PathPosition {
     /// Number of the bead; what wanders begins anew with each.
     pub bead: usize,
     /// Where along its path \[mm\].
@@ -44,7 +47,7 @@ pub struct Place {
 
 /// The filter of some places.
 #[derive(Debug, Clone)]
-pub struct Whitener {
+pub struct PathWhitener {
     steps: Vec<Step>,
     /// Sum of the logarithms of the variances of the differences.
     pub ln_variances: f64,
@@ -53,24 +56,25 @@ pub struct Whitener {
 #[derive(Debug, Clone, Copy)]
 struct Step {
     /// How much of what was known holds here.
-    kept: f64,
+    correlation: f64,
     gain: f64,
     /// One over the standard deviation of the difference.
     weight: f64,
 }
 
-impl Whitener {
+impl PathWhitener {
     /// For these places, in order.
-    pub fn new(places: &[Place], noise: Noise) -> Self {
+    pub fn new(places: &[PathPosition], noise: WidthNoise) -> Self {
         let mut variance = noise.variance;
-        let mut before: Option<Place> = None;
+        let mut before: Option<PathPosition> = None;
         let mut ln_variances = 0.0;
         let steps = places
             .iter()
             .map(|place| {
                 let kept =
                     before.filter(|before| before.bead == place.bead).map_or(0.0, |before| {
-                        (-(place.path_mm - before.path_mm).abs() / noise.length_mm).exp()
+                        (-(place.path_mm - before.path_mm).abs() / noise.correlation_length_mm)
+                            .exp()
                     });
                 variance = kept * kept * variance + noise.variance * (1.0 - kept * kept);
                 let total = variance + place.variance;
@@ -78,7 +82,7 @@ impl Whitener {
                 variance *= 1.0 - gain;
                 before = Some(*place);
                 ln_variances += total.ln();
-                Step { kept, gain, weight: 1.0 / total.sqrt() }
+                Step { correlation: kept, gain, weight: 1.0 / total.sqrt() }
             })
             .collect();
         Self { steps, ln_variances }
@@ -88,10 +92,10 @@ impl Whitener {
     pub fn apply(&self, values: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
         let mut known = 0.0;
         self.steps.iter().zip(values).map(move |(step, value)| {
-            let foretold = step.kept * known;
-            let left = value - foretold;
-            known = foretold + step.gain * left;
-            step.weight * left
+            let predicted = step.correlation * known;
+            let innovation = value - predicted;
+            known = predicted + step.gain * innovation;
+            step.weight * innovation
         })
     }
 }

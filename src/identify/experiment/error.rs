@@ -2,22 +2,22 @@
 
 use std::fmt;
 
-use crate::identify::grid::Gap;
-use crate::identify::number::short;
+use crate::identify::grid::SampleGap;
+use crate::identify::number::six_digits;
 
 /// Samples that a model takes at least.
-pub const FEWEST_SAMPLES: usize = 50;
+pub const MIN_SAMPLES: usize = 50;
 
 /// Which of the two columns is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+pub enum DataColumn {
     /// What the extruder was told, or what drives it.
     Input,
     /// What came of it.
     Output,
 }
 
-impl fmt::Display for Side {
+impl fmt::Display for DataColumn {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Input => "input",
@@ -30,7 +30,7 @@ impl fmt::Display for Side {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ExperimentError {
     /// Hardly anything there.
-    #[error("{got} samples: a model takes {FEWEST_SAMPLES} or more")]
+    #[error("{got} samples: a model takes {MIN_SAMPLES} or more")]
     TooFew {
         /// Samples that there are.
         got: usize,
@@ -52,7 +52,7 @@ pub enum ExperimentError {
     /// A unit of time that cannot be.
     #[error(
         "from sample to sample {} s, if the unit of time is right: no log of an extruder has \
-         such steps. {}", short(*.step_s), if *.step_s > 1.0 {
+         such steps. {}", six_digits(*.step_s), if *.step_s > 1.0 {
             "Is the column in ms? Say so with --unit COLUMN=ms; if it is right, with --unit COLUMN=s"
         } else {
             "Is the column in s? Say so with --unit COLUMN=s"
@@ -70,7 +70,7 @@ pub enum ExperimentError {
     )]
     Gap {
         /// The longest one.
-        gap: Gap,
+        gap: SampleGap,
         /// Gaps that are too long.
         count: usize,
         /// The longest that is bridged \[s\].
@@ -79,13 +79,13 @@ pub enum ExperimentError {
     /// A column that does not move.
     #[error(
         "the {side} is {} all the time: nothing can be told from it{}",
-        short(*.value), if *.side == Side::Input { "; excite it (truebead extruder excite writes profiles)" } else {
+        six_digits(*.value), if *.side == DataColumn::Input { "; excite it (truebead extruder excite writes profiles)" } else {
             "; see that its sensor is connected"
         }
     )]
     Constant {
         /// Which one.
-        side: Side,
+        side: DataColumn,
         /// Its value.
         value: f64,
     },
@@ -93,12 +93,12 @@ pub enum ExperimentError {
     #[error(
         "the {side} is {} all the time from {from_s:.1} s to {to_s:.1} s, the part that is {}: \
          cut the log elsewhere (--validate-share, --to-s), or name another one to validate with \
-         (--validate)", short(*.value),
+         (--validate)", six_digits(*.value),
         if *.validates { "kept to validate with" } else { "fitted to" }
     )]
     ConstantPart {
         /// Which one.
-        side: Side,
+        side: DataColumn,
         /// Its value.
         value: f64,
         /// Beginning of the part \[s\].
@@ -111,15 +111,15 @@ pub enum ExperimentError {
     /// A few samples far beyond all others.
     #[error(
         "the {side} is {} at sample {}{}, and all others lie between {} and {}: that is no reading. \
-         Mend it in the log, or use a part without it (--from-s, --to-s){}", short(*.value), .at + 1,
+         Mend it in the log, or use a part without it (--from-s, --to-s){}", six_digits(*.value), .at + 1,
         if *.count > 1 { format!(" (the farthest of {count})") } else { String::new() },
-        short(.others[0]), short(.others[1]), if *.side == Side::Output {
+        six_digits(.others[0]), six_digits(.others[1]), if *.side == DataColumn::Output {
             "; --hampel 5,5 replaces such samples"
         } else { "" }
     )]
     Outlier {
         /// Which column.
-        side: Side,
+        side: DataColumn,
         /// The farthest sample.
         at: usize,
         /// Its value.
@@ -134,9 +134,9 @@ pub enum ExperimentError {
         "input and output are the same from sample to sample: a model tells the one from the other. \
          Was a command logged in place of what came of it?"
     )]
-    Same,
+    Identical,
     /// A part that tells nothing.
-    #[error("{got} samples are left to validate with: {FEWEST_SAMPLES} or more are needed")]
+    #[error("{got} samples are left to validate with: {MIN_SAMPLES} or more are needed")]
     ShortValidation {
         /// Samples that there are.
         got: usize,

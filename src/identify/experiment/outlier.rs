@@ -1,21 +1,21 @@
 //! Samples so far beyond all others that nothing measured them.
 
-use super::error::{ExperimentError, Side};
+use super::error::{DataColumn, ExperimentError};
 
 /// A sample that lies this many times the others' range beyond them is no
 /// reading: one that a sensor can give, if a wrong one, is left to --hampel.
-const BEYOND: f64 = 20.0;
+const OUTLIER_RANGES: f64 = 20.0;
 /// One sample in so many may be such a one; more of them are the column itself.
-const ONE_IN: usize = 1000;
+const SAMPLES_PER_OUTLIER: usize = 1000;
 
 /// Refuses a column of which a few samples lie far beyond all others. Says
 /// nothing where the others do not move: pulses from rest are an excitation.
-pub(super) fn check(side: Side, values: &[f64]) -> Result<(), ExperimentError> {
+pub(super) fn check(side: DataColumn, values: &[f64]) -> Result<(), ExperimentError> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let most = (values.len() / ONE_IN).max(1);
-    let found =
-        (1..=most).find_map(|count| (0..=count).find_map(|low| beyond(&sorted, low, count)));
+    let most = (values.len() / SAMPLES_PER_OUTLIER).max(1);
+    let found = (1..=most)
+        .find_map(|count| (0..=count).find_map(|low| farthest_outlier(&sorted, low, count)));
     let Some((count, value, others)) = found else { return Ok(()) };
     let at = values.iter().position(|v| *v == value).unwrap_or(0);
     Err(ExperimentError::Outlier { side, at, value, count, others })
@@ -23,10 +23,10 @@ pub(super) fn check(side: Side, values: &[f64]) -> Result<(), ExperimentError> {
 
 /// The farthest of `count` samples, `low` of them at the lower end, and the range
 /// of the others; none where these reach nearly as far.
-fn beyond(sorted: &[f64], low: usize, count: usize) -> Option<(usize, f64, [f64; 2])> {
+fn farthest_outlier(sorted: &[f64], low: usize, count: usize) -> Option<(usize, f64, [f64; 2])> {
     let others = sorted.get(low..sorted.len().checked_sub(count - low)?)?;
     let (least, most) = (*others.first()?, *others.last()?);
-    let limit = BEYOND * (most - least);
+    let limit = OUTLIER_RANGES * (most - least);
     let below = || sorted.iter().take(low).map(|v| (*v, least - v));
     let above = || sorted.iter().skip(low + others.len()).map(|v| (*v, v - most));
     let are_beyond = limit > 0.0 && below().chain(above()).all(|(_, by)| by > limit);
@@ -49,7 +49,7 @@ mod tests {
         for (at, value) in places {
             values[*at] = *value;
         }
-        check(Side::Output, &values)
+        check(DataColumn::Output, &values)
     }
 
     #[test]
@@ -71,12 +71,12 @@ mod tests {
         assert_eq!(with(&[(700, 100.0)]), Ok(()));
         let mut pulse = vec![0.0; 3000];
         pulse[40] = 10.0;
-        assert_eq!(check(Side::Input, &pulse), Ok(()));
+        assert_eq!(check(DataColumn::Input, &pulse), Ok(()));
         // An answer to pulses, which begins and ends with noise.
         let mut answer: Vec<f64> = swinging(3000).iter().map(|v| 1e-3 * v).collect();
         for (k, value) in answer.iter_mut().skip(900).take(60).enumerate() {
             *value += 100.0 * 0.9_f64.powi(i32::try_from(k).unwrap());
         }
-        assert_eq!(check(Side::Output, &answer), Ok(()));
+        assert_eq!(check(DataColumn::Output, &answer), Ok(()));
     }
 }

@@ -3,15 +3,15 @@
 use crate::core::quantity::Unit;
 
 /// No extruder works beyond this, in megapascal.
-const MOST_MPA: f64 = 150.0;
+const MAX_PRESSURE_MPA: f64 = 150.0;
 
 /// A doubt about a column's unit, in words.
-pub fn doubt_unit(column: &str, unit: Unit, values: &[f64]) -> Option<String> {
+pub fn implausible_unit(column: &str, unit: Unit, values: &[f64]) -> Option<String> {
     let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-    let is_beyond = unit == Unit::MPa && largest > MOST_MPA;
+    let is_beyond = unit == Unit::MPa && largest > MAX_PRESSURE_MPA;
     is_beyond.then(|| {
         format!(
-            "{column} goes up to {largest:.0} MPa, and no extruder works beyond {MOST_MPA:.0} MPa: \
+            "{column} goes up to {largest:.0} MPa, and no extruder works beyond {MAX_PRESSURE_MPA:.0} MPa: \
              if it is in bar, say --unit {column}=bar"
         )
     })

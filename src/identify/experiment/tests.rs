@@ -78,7 +78,7 @@ fn milliseconds_that_are_called_seconds_and_the_reverse() {
     assert!(refusal(&scaled(1000.0)).contains("Is the column in ms?"));
     assert!(refusal(&scaled(0.001)).contains("Is the column in s?"));
     let [time_s, input, output] = scaled(1000.0);
-    let told = Rules { time_is_told: true, ..Rules::default() };
+    let told = Rules { is_time_unit_known: true, ..Rules::default() };
     assert!(Experiment::new(&time_s, &input, &output, &told).is_ok());
 }
 
@@ -113,7 +113,9 @@ fn uneven_sampling_is_taken_to_a_grid() {
         *time += 0.003 * (f64::from(k) * 1.7).sin();
     }
     let even = taken(&[times, input, output]).unwrap();
-    assert!(matches!(even.notes[..], [Note::Resampled { step_s }] if (step_s - 0.01).abs() < 1e-4));
+    assert!(
+        matches!(even.notes[..], [DataNote::Resampled { step_s }] if (step_s - 0.01).abs() < 1e-4)
+    );
     assert!(even.input.iter().all(|rpm| *rpm == 20.0 || *rpm == 40.0));
 }
 
@@ -138,8 +140,8 @@ fn one_column_twice() {
 
 #[test]
 fn bar_that_is_called_megapascal() {
-    let said = doubt_unit("nozzle_mpa", Unit::MPa, &[12.0, -230.0]).unwrap();
+    let said = implausible_unit("nozzle_mpa", Unit::MPa, &[12.0, -230.0]).unwrap();
     assert!(said.contains("up to 230 MPa") && said.contains("--unit nozzle_mpa=bar"), "{said}");
-    assert_eq!(doubt_unit("nozzle_mpa", Unit::MPa, &[70.0]), None);
-    assert_eq!(doubt_unit("nozzle_bar", Unit::Bar, &[700.0]), None);
+    assert_eq!(implausible_unit("nozzle_mpa", Unit::MPa, &[70.0]), None);
+    assert_eq!(implausible_unit("nozzle_bar", Unit::Bar, &[700.0]), None);
 }

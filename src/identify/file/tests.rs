@@ -5,13 +5,13 @@
 use super::*;
 
 fn model() -> ModelFile {
-    let parameter = |name: &str, value, standard_error| Parameter {
+    let parameter = |name: &str, value, standard_error| SavedParameter {
         name: name.to_owned(),
         value,
         standard_error,
     };
     ModelFile {
-        setting: Setting {
+        conditions: Conditions {
             material: Some("PLA \"silk\" é".to_owned()),
             nozzle_mm: Some(0.4),
             temperature_c: Some(210.0),
@@ -22,11 +22,15 @@ fn model() -> ModelFile {
         input_range: (20.0, 40.0),
         operating_point: (30.123_456_789_012_345, 512.0),
         transfer: TransferFunction::new(&[25.0], &[0.84, 1.0], 1.0 / 3.0).unwrap(),
-        uncertainty: Some(Uncertainty {
+        uncertainty: Some(ParameterUncertainty {
             parameters: vec![parameter("gain", 25.0, 0.1), parameter("dead time [s]", 0.4, 1e-7)],
             covariance: vec![0.01, -1e-9, -1e-9, 1e-14],
         }),
-        fit: Some(Fit { step_s: 0.02, estimation_percent: 91.25, validation_percent: Some(90.0) }),
+        fit: Some(FitSummary {
+            step_s: 0.02,
+            estimation_percent: 91.25,
+            validation_percent: Some(90.0),
+        }),
     }
 }
 
@@ -36,8 +40,8 @@ fn what_is_written_is_read_again() {
     let text = to_toml(&all, &["Fitted to a log.\nOf two lines.".to_owned()]);
     assert!(text.starts_with("# Fitted to a log.\n# Of two lines.\nversion = 1\n"), "{text}");
     assert_eq!(parse("model.toml", &text).unwrap(), all);
-    let setting = Setting::default();
-    let bare = ModelFile { setting, uncertainty: None, fit: None, ..all };
+    let setting = Conditions::default();
+    let bare = ModelFile { conditions: setting, uncertainty: None, fit: None, ..all };
     assert_eq!(parse("model.toml", &to_toml(&bare, &[])).unwrap(), bare);
 }
 
@@ -53,8 +57,8 @@ fn everything_that_is_wrong_is_told_at_once() {
     let said = parse("model.toml", &text).unwrap_err().to_string();
     for part in [
         "model.toml: 7 problems",
-        "line 1: version: found 2",
-        "line 2: matrial: found an unknown key, expected \"material\"?",
+        "line 1: found 2",
+        "line 2: found an unknown key, expected \"material\"?",
         "input.unit: found \"turns\", expected \"rpm\" or \"mpa\"",
         "input.range: found [40, 20]",
         "transfer.denominator: found [-0.84, 1.0], which is unstable, expected poles",

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Fit, ModelFile, Setting, Uncertainty};
+use super::{Conditions, FitSummary, ModelFile, ParameterUncertainty};
 use crate::core::quantity::Quantity;
 
 /// The text of a model's file; each note becomes a comment at its head. Numbers
@@ -14,7 +14,7 @@ pub fn to_toml(model: &ModelFile, notes: &[String]) -> String {
     }
     put(&mut text, "version = 1");
     put(&mut text, &format!("kind = {}", quoted(&model.kind)));
-    put_setting(&mut text, &model.setting);
+    put_conditions(&mut text, &model.conditions);
     let (input_at, output_at) = model.operating_point;
     put(&mut text, "\n# output - operating point = G(s) * (input - operating point)\n[input]");
     side(&mut text, &model.input, input_at);
@@ -35,7 +35,7 @@ pub fn to_toml(model: &ModelFile, notes: &[String]) -> String {
 }
 
 /// What a file holds for, as far as it is known.
-pub(in crate::identify) fn put_setting(text: &mut String, setting: &Setting) {
+pub(in crate::identify) fn put_conditions(text: &mut String, setting: &Conditions) {
     if let Some(material) = &setting.material {
         put(text, &format!("material = {}", quoted(material)));
     }
@@ -47,7 +47,7 @@ pub(in crate::identify) fn put_setting(text: &mut String, setting: &Setting) {
     }
 }
 
-fn put_fit(text: &mut String, fit: &Fit) {
+fn put_fit(text: &mut String, fit: &FitSummary) {
     put(text, "\n[fit]");
     put(text, &format!("step_s = {}", number(fit.step_s)));
     put(text, &format!("estimation_percent = {}", number(fit.estimation_percent)));
@@ -56,7 +56,7 @@ fn put_fit(text: &mut String, fit: &Fit) {
     }
 }
 
-fn put_uncertainty(text: &mut String, uncertainty: &Uncertainty) {
+fn put_uncertainty(text: &mut String, uncertainty: &ParameterUncertainty) {
     let parameters = &uncertainty.parameters;
     let names: Vec<String> = parameters.iter().map(|one| quoted(&one.name)).collect();
     let values: Vec<f64> = parameters.iter().map(|one| one.value).collect();

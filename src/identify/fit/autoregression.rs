@@ -1,31 +1,31 @@
 //! The residuals as coloured noise: an autoregressive model of them.
 
 use super::row::dot;
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 /// Longest memory of the model of the residuals, and its share of the samples.
-const LONGEST: usize = 30;
-const SAMPLES_A_LAG: usize = 20;
+const MAX_ORDER: usize = 30;
+const SAMPLES_PER_LAG: usize = 20;
 
 /// The residuals as an autoregressive process: e(t) = −Σ a(k)·e(t−k) + white noise.
 #[derive(Debug, Clone)]
-pub(super) struct Colour {
+pub(super) struct ArModel {
     coefficients: Vec<f64>,
     /// Standard deviation of the white noise.
-    sigma: f64,
+    innovation_sigma: f64,
     /// Variance of the residuals themselves.
     pub variance: f64,
 }
 
-impl Colour {
+impl ArModel {
     /// By Yule's and Walker's equations, the order by BIC: stable at any rate.
     pub fn of(residuals: &[f64]) -> Self {
-        let n = float(residuals.len());
-        let longest = LONGEST.min(residuals.len() / SAMPLES_A_LAG);
+        let n = to_f64(residuals.len());
+        let longest = MAX_ORDER.min(residuals.len() / SAMPLES_PER_LAG);
         let lagged = |lag: usize| dot(&residuals[lag..], residuals) / n;
         let correlation: Vec<f64> = (0..=longest).map(lagged).collect();
         let variance = correlation[0];
-        let white = Self { coefficients: Vec::new(), sigma: variance.sqrt(), variance };
+        let white = Self { coefficients: Vec::new(), innovation_sigma: variance.sqrt(), variance };
         let (mut best, mut least) = (white, n * libm::log(variance.max(f64::MIN_POSITIVE)));
         let mut row: Vec<f64> = Vec::new();
         let mut power = variance;
@@ -40,10 +40,14 @@ impl Colour {
             row.iter_mut().zip(turned).for_each(|(a, by)| *a += by);
             row.push(reflection);
             power *= 1.0 - reflection * reflection;
-            let cost = n * libm::log(power.max(f64::MIN_POSITIVE)) + float(order) * libm::log(n);
+            let cost = n * libm::log(power.max(f64::MIN_POSITIVE)) + to_f64(order) * libm::log(n);
             if cost < least {
                 least = cost;
-                best = Self { coefficients: row.clone(), sigma: power.max(0.0).sqrt(), variance };
+                best = Self {
+                    coefficients: row.clone(),
+                    innovation_sigma: power.max(0.0).sqrt(),
+                    variance,
+                };
             }
         }
         best
@@ -52,20 +56,20 @@ impl Colour {
     /// How many independent samples have a mean as well known: fewer than there
     /// are where neighbours resemble each other.
     #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
-    pub fn independent(&self, samples: usize) -> f64 {
+    pub fn effective_samples(&self, samples: usize) -> f64 {
         let n = samples as f64;
         let sum = 1.0 + self.coefficients.iter().sum::<f64>();
-        let at_rest = self.sigma * self.sigma / (sum * sum);
+        let at_rest = self.innovation_sigma * self.innovation_sigma / (sum * sum);
         if at_rest > 0.0 { (n * self.variance / at_rest).clamp(1.0, n) } else { n }
     }
 
     /// A column as the noise sees it: Hᵀ·column, H·Hᵀ being the covariance of the
     /// residuals.
-    pub fn weigh(&self, column: &[f64]) -> Vec<f64> {
+    pub fn weight(&self, column: &[f64]) -> Vec<f64> {
         let mut weighed = vec![0.0; column.len()];
         for t in (0..column.len()).rev() {
             let later = self.coefficients.iter().zip(weighed.get(t + 1..).unwrap_or_default());
-            weighed[t] = self.sigma * column[t] - later.map(|(a, w)| a * w).sum::<f64>();
+            weighed[t] = self.innovation_sigma * column[t] - later.map(|(a, w)| a * w).sum::<f64>();
         }
         weighed
     }
@@ -93,12 +97,12 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn the_colour_of_a_lag_is_found_and_white_noise_has_none() {
-        let colour = Colour::of(&lagged(1, 20_000, 0.7));
-        assert!((colour.coefficients[0] + 0.7).abs() < 0.02, "{colour:?}");
-        assert!((colour.sigma - 1.0).abs() < 0.02, "{colour:?}");
-        let share = colour.independent(20_000) / 20_000.0;
+    fn the_order_of_a_lag_is_found_and_white_noise_has_none() {
+        let model = ArModel::of(&lagged(1, 20_000, 0.7));
+        assert!((model.coefficients[0] + 0.7).abs() < 0.02, "{model:?}");
+        assert!((model.innovation_sigma - 1.0).abs() < 0.02, "{model:?}");
+        let share = model.effective_samples(20_000) / 20_000.0;
         assert!((share - 0.3 / 1.7).abs() < 0.03, "{share}");
-        assert!(Colour::of(&lagged(2, 20_000, 0.0)).independent(20_000) > 19_000.0);
+        assert!(ArModel::of(&lagged(2, 20_000, 0.0)).effective_samples(20_000) > 19_000.0);
     }
 }

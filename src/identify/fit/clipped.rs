@@ -3,32 +3,32 @@
 
 use std::fmt;
 
-use super::row::ends;
-use crate::identify::number::short;
-use crate::numeric::number::float;
+use super::row::min_max;
+use crate::identify::number::six_digits;
+use crate::numeric::number::to_f64;
 
 /// Levels, each about once, from which on a signal goes through many.
-const FEWEST_LEVELS: usize = 10;
+const MIN_LEVELS: usize = 10;
 /// Shortest run of equal samples that looks cut off.
-const RUN: usize = 3;
+const MIN_RUN: usize = 3;
 /// Share of samples in such runs from which on a signal is refused.
-const CUT_SHARE: f64 = 0.02;
+const MAX_CLIPPED_FRACTION: f64 = 0.02;
 /// Times that a command comes to an end of its range before that is a cut.
-const ARRIVALS: usize = 3;
+const MIN_ARRIVALS: usize = 3;
 /// A command that goes back and forth by more than this share of its range has
 /// turned between its ends.
-const TURN: f64 = 0.05;
+const MIN_REVERSAL: f64 = 0.05;
 /// Steps that differ by less than this share are of one rate.
-const RATE: f64 = 0.02;
+const RATE_TOLERANCE: f64 = 0.02;
 /// A stretch that loses more than this share of its pace is no ramp.
-const BEND: f64 = 0.003;
+const RAMP_TOLERANCE: f64 = 0.003;
 /// A command that slows down to less than this share of its mean step before it
 /// stands has settled there, and was not cut off.
-const ABRUPT: f64 = 0.5;
+const ABRUPT_RATE: f64 = 0.5;
 /// The same for any signal.
-const SETTLED: f64 = 0.1;
+const SETTLED_RATE: f64 = 0.1;
 /// A change by less than this share of the range is no step.
-const SMALL: f64 = 0.01;
+const MIN_STEP: f64 = 0.01;
 
 /// One of the two columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub enum Column {
 
 /// An end of a signal's range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum End {
+pub enum Extreme {
     /// Its smallest value.
     Smallest,
     /// Its largest value.
@@ -51,19 +51,19 @@ pub enum End {
 /// A signal that was cut off, and where.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "the {column} is cut off: {share_percent:.1} % of its samples stand at its {end}, {}, in \
+    "the {column} is cut off: {clipped_percent:.1} % of its samples stand at its {end}, {}, in \
      {runs} runs, the longest of {longest} samples from {from_s:.3} s after the beginning on; {}",
-    short(*.value), advice(*.column)
+    six_digits(*.value), advice(*.column)
 )]
 pub struct Clipped {
     /// Which column.
     pub column: Column,
     /// At which end of its range.
-    pub end: End,
+    pub end: Extreme,
     /// The value there.
     pub value: f64,
     /// Share of the samples that stand there \[%\].
-    pub share_percent: f64,
+    pub clipped_percent: f64,
     /// Runs of equal samples there.
     pub runs: usize,
     /// Samples of the longest of them.
@@ -95,7 +95,7 @@ impl fmt::Display for Column {
     }
 }
 
-impl fmt::Display for End {
+impl fmt::Display for Extreme {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Smallest => "smallest value",
@@ -112,7 +112,8 @@ pub(super) fn check(input: &[f64], output: &[f64], dt_s: f64) -> Result<(), Clip
         let signal = Signal::new(row);
         let is_command = column == Column::Input && (signal.is_held() || signal.is_at_one_rate());
         for (end, value) in signal.ends() {
-            let is_cut = if is_command { signal.is_cut_command(value) } else { signal.varies() };
+            let is_cut =
+                if is_command { signal.is_clipped_command(value) } else { signal.varies() };
             if is_cut {
                 signal.check(column, end, value, dt_s)?;
             }
@@ -130,12 +131,12 @@ struct Signal<'a> {
 
 impl<'a> Signal<'a> {
     fn new(row: &'a [f64]) -> Self {
-        Self { row, runs: row.chunk_by(|a, b| a == b).collect(), range: ends(row) }
+        Self { row, runs: row.chunk_by(|a, b| a == b).collect(), range: min_max(row) }
     }
 
-    const fn ends(&self) -> [(End, f64); 2] {
+    const fn ends(&self) -> [(Extreme, f64); 2] {
         let [least, most] = self.range;
-        [(End::Smallest, least), (End::Largest, most)]
+        [(Extreme::Smallest, least), (Extreme::Largest, most)]
     }
 
     fn is_end(&self, value: f64) -> bool {
@@ -144,25 +145,25 @@ impl<'a> Signal<'a> {
 
     /// Whether most samples stand in runs.
     fn is_held(&self) -> bool {
-        let held = self.runs.iter().map(|run| run.len()).filter(|len| *len >= RUN);
+        let held = self.runs.iter().map(|run| run.len()).filter(|len| *len >= MIN_RUN);
         2 * held.sum::<usize>() > self.row.len()
     }
 
     /// Whether it changes at one rate, and stands in between.
     fn is_at_one_rate(&self) -> bool {
-        is_at_one_rate(self.row, self.grain())
+        is_at_one_rate(self.row, self.resolution())
     }
 
     /// Whether it seldom repeats a sample between its ends.
     fn varies(&self) -> bool {
         let between = || self.runs.iter().filter(|run| !self.is_end(run[0]));
         let single = between().filter(|run| run.len() == 1).count();
-        single >= FEWEST_LEVELS && 2 * single >= between().map(|run| run.len()).sum()
+        single >= MIN_LEVELS && 2 * single >= between().map(|run| run.len()).sum()
     }
 
     /// Whether a command that mostly stands was cut off at this end: it runs
     /// into it, or it has many levels of which only this one comes back.
-    fn is_cut_command(&self, end: f64) -> bool {
+    fn is_clipped_command(&self, end: f64) -> bool {
         self.runs_into(end) || self.piles_up(end)
     }
 
@@ -171,19 +172,22 @@ impl<'a> Signal<'a> {
     /// a bend. A drive that takes steps no faster comes on a straight ramp, one
     /// that settles slows down.
     fn runs_into(&self, end: f64) -> bool {
-        let at_end = || self.stands().filter(|stand| stand.value == end && stand.is_inside);
-        let abrupt = || at_end().filter(|stand| stand.pace >= ABRUPT).map(|stand| stand.before);
-        let (grain, total) = (self.grain(), at_end().count());
+        let at_end = || self.plateaus().filter(|stand| stand.value == end && stand.is_inside);
+        let abrupt =
+            || at_end().filter(|stand| stand.final_rate >= ABRUPT_RATE).map(|stand| stand.before);
+        let (grain, total) = (self.resolution(), at_end().count());
         let range = self.range[1] - self.range[0];
-        let has_turned =
-            |stretch: &&[f64]| turns(stretch) > TURN * range && !is_at_one_rate(stretch, grain);
+        let has_turned = |stretch: &&[f64]| {
+            reversal(stretch) > MIN_REVERSAL * range && !is_at_one_rate(stretch, grain)
+        };
         let turned = abrupt().filter(has_turned).count();
-        let bent = abrupt().filter(|stretch| is_bent(stretch, grain)).count();
-        (turned >= ARRIVALS && 5 * turned >= total) || (bent > ARRIVALS && 5 * bent >= 4 * total)
+        let bent = abrupt().filter(|stretch| slows_down(stretch, grain)).count();
+        (turned >= MIN_ARRIVALS && 5 * turned >= total)
+            || (bent > MIN_ARRIVALS && 5 * bent >= 4 * total)
     }
 
     /// The smallest difference between two samples, as a log rounds them.
-    fn grain(&self) -> f64 {
+    fn resolution(&self) -> f64 {
         let mut sorted = self.row.to_vec();
         sorted.sort_by(f64::total_cmp);
         let steps = sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0);
@@ -194,7 +198,7 @@ impl<'a> Signal<'a> {
     /// this one again and again.
     #[expect(clippy::cast_precision_loss, reason = "counts of levels")]
     fn piles_up(&self, end: f64) -> bool {
-        let held: Vec<f64> = self.stands().map(|stand| stand.value).collect();
+        let held: Vec<f64> = self.plateaus().map(|stand| stand.value).collect();
         let mut inner: Vec<f64> = held.iter().copied().filter(|v| !self.is_end(*v)).collect();
         // Pulses from one level to others come back to it after each of them.
         let follow = held.windows(2).filter(|pair| !pair.iter().any(|v| self.is_end(*v))).count();
@@ -203,24 +207,24 @@ impl<'a> Signal<'a> {
         inner.sort_by(f64::total_cmp);
         inner.dedup();
         let mean = inner_visits / inner.len().max(1) as f64;
-        inner.len() >= FEWEST_LEVELS
-            && 2 * follow >= FEWEST_LEVELS
-            && visits >= ARRIVALS
-            && visits as f64 >= ARRIVALS as f64 * mean
+        inner.len() >= MIN_LEVELS
+            && 2 * follow >= MIN_LEVELS
+            && visits >= MIN_ARRIVALS
+            && visits as f64 >= MIN_ARRIVALS as f64 * mean
     }
 
     /// Runs of equal samples.
-    fn stands(&self) -> impl Iterator<Item = Stand<'_>> {
+    fn plateaus(&self) -> impl Iterator<Item = Plateau<'_>> {
         let (mut begin, mut free) = (0, 0);
         self.runs.iter().filter_map(move |run| {
             let from = begin;
             begin += run.len();
             let before = self.row.get(free..from).unwrap_or_default();
-            (run.len() >= RUN).then(|| {
+            (run.len() >= MIN_RUN).then(|| {
                 free = begin;
                 let is_inside = from > 0 && begin < self.row.len();
-                let pace = self.pace(before, from);
-                Stand { value: run[0], from, len: run.len(), is_inside, before, pace }
+                let pace = self.final_rate(before, from);
+                Plateau { value: run[0], from, len: run.len(), is_inside, before, final_rate: pace }
             })
         })
     }
@@ -228,11 +232,11 @@ impl<'a> Signal<'a> {
     /// Size of the last step of a stretch before a run as a share of its mean
     /// one; of a stretch too short for that, whether the run is a step away.
     #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
-    fn pace(&self, stretch: &[f64], from: usize) -> f64 {
+    fn final_rate(&self, stretch: &[f64], from: usize) -> f64 {
         let [_, .., before, last] = *stretch else {
             let pair = self.row.get(from.saturating_sub(1)..=from).unwrap_or_default();
-            let [least, most] = ends(pair);
-            let is_step = most - least > SMALL * (self.range[1] - self.range[0]);
+            let [least, most] = min_max(pair);
+            let is_step = most - least > MIN_STEP * (self.range[1] - self.range[0]);
             return if is_step { 1.0 } else { 0.0 };
         };
         let way: f64 = stretch.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
@@ -241,39 +245,49 @@ impl<'a> Signal<'a> {
 
     /// Refuses a signal that stands at this value for long, between others, and
     /// has not settled there.
-    fn check(&self, column: Column, end: End, value: f64, dt_s: f64) -> Result<(), Clipped> {
-        let is_cut =
-            |stand: &Stand<'_>| stand.value == value && stand.is_inside && stand.pace > SETTLED;
-        let cut: Vec<Stand<'_>> = self.stands().filter(is_cut).collect();
+    fn check(&self, column: Column, end: Extreme, value: f64, dt_s: f64) -> Result<(), Clipped> {
+        let is_cut = |stand: &Plateau<'_>| {
+            stand.value == value && stand.is_inside && stand.final_rate > SETTLED_RATE
+        };
+        let cut: Vec<Plateau<'_>> = self.plateaus().filter(is_cut).collect();
         let samples: usize = cut.iter().map(|stand| stand.len).sum();
         let Some(longest) = cut.iter().max_by_key(|stand| stand.len) else { return Ok(()) };
-        let (share, from_s) = (float(samples) / float(self.row.len()), float(longest.from) * dt_s);
-        if share <= CUT_SHARE {
+        let (share, from_s) =
+            (to_f64(samples) / to_f64(self.row.len()), to_f64(longest.from) * dt_s);
+        if share <= MAX_CLIPPED_FRACTION {
             return Ok(());
         }
         let (share_percent, longest) = (100.0 * share, longest.len);
-        Err(Clipped { column, end, value, share_percent, runs: cut.len(), longest, from_s })
+        Err(Clipped {
+            column,
+            end,
+            value,
+            clipped_percent: share_percent,
+            runs: cut.len(),
+            longest,
+            from_s,
+        })
     }
 }
 
 /// A run of equal samples, and those since the last one before it.
-struct Stand<'a> {
+struct Plateau<'a> {
     value: f64,
     from: usize,
     len: usize,
     is_inside: bool,
     before: &'a [f64],
-    pace: f64,
+    final_rate: f64,
 }
 
 /// How far a stretch goes back and forth.
-fn turns(stretch: &[f64]) -> f64 {
+fn reversal(stretch: &[f64]) -> f64 {
     let way: f64 = stretch.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
-    way - ends_apart(stretch)
+    way - net_change(stretch)
 }
 
 /// From its first sample to its last.
-fn ends_apart(stretch: &[f64]) -> f64 {
+fn net_change(stretch: &[f64]) -> f64 {
     let ends = stretch.first().zip(stretch.last());
     ends.map_or(0.0, |(first, last)| (last - first).abs())
 }
@@ -285,18 +299,19 @@ fn is_at_one_rate(stretch: &[f64], grain: f64) -> bool {
     let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
     steps.sort_by(f64::total_cmp);
     let median = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-    let near = |step: &&f64| (**step - median).abs() <= RATE.mul_add(median, 1.01 * grain);
+    let near =
+        |step: &&f64| (**step - median).abs() <= RATE_TOLERANCE.mul_add(median, 1.01 * grain);
     5 * steps.iter().filter(near).count() >= 4 * steps.len()
 }
 
 /// Whether the last third of a stretch is less steep than the middle one, by
 /// more than the rounding of its samples.
-fn is_bent(stretch: &[f64], grain: f64) -> bool {
+fn slows_down(stretch: &[f64], grain: f64) -> bool {
     let third = stretch.len().saturating_sub(1) / 3;
     let last = stretch.get(stretch.len().saturating_sub(third + 1)..).unwrap_or_default();
     let middle = stretch.get(third..=2 * third).unwrap_or_default();
-    let (last, middle) = (ends_apart(last), ends_apart(middle));
-    third > 0 && middle - last > BEND.mul_add(middle, 2.0 * grain)
+    let (last, middle) = (net_change(last), net_change(middle));
+    third > 0 && middle - last > RAMP_TOLERANCE.mul_add(middle, 2.0 * grain)
 }
 
 #[cfg(test)]

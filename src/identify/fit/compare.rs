@@ -1,22 +1,22 @@
 //! Several models of the same data, and which of them to take.
 
-use super::autoregression::Colour;
+use super::autoregression::ArModel;
 use super::error::FitError;
 use super::estimate::Fit;
-use super::quality::Quality;
+use super::quality::FitQuality;
 use super::samples::Samples;
-use super::settings::{Before, Settings};
-use crate::numeric::number::float;
+use super::settings::{FitSettings, InitialCondition};
+use crate::numeric::number::to_f64;
 
 /// One of the models that were compared.
 #[derive(Debug, Clone)]
-pub struct Row {
+pub struct ComparedModel {
     /// What was fitted.
-    pub settings: Settings,
+    pub settings: FitSettings,
     /// The fit, or why there is none.
     pub fit: Result<Fit, FitError>,
     /// On the data of the validation, where there are such.
-    pub validation: Option<Quality>,
+    pub validation: Option<FitQuality>,
     /// Schwarz's criterion with as many samples as are independent in the
     /// residuals of the best model; less is better. `None` without a fit.
     pub bic: Option<f64>,
@@ -24,9 +24,9 @@ pub struct Row {
 
 /// All of them, and which to take.
 #[derive(Debug, Clone)]
-pub struct Comparison {
+pub struct ModelComparison {
     /// In the order in which they were given.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ComparedModel>,
     /// The row to take; `None` where no fit stands.
     pub chosen: Option<usize>,
     /// Why this one, in words.
@@ -40,18 +40,18 @@ pub struct Comparison {
 /// the data do not determine are shown and not chosen.
 pub fn compare(
     estimation: &Samples,
-    validation: Option<(&Samples, Before)>,
-    candidates: &[Settings],
-) -> Comparison {
+    validation: Option<(&Samples, InitialCondition)>,
+    candidates: &[FitSettings],
+) -> ModelComparison {
     let mut rows = Vec::new();
     let mut errors: Vec<Option<Vec<f64>>> = Vec::new();
     for settings in candidates {
-        let fit = super::fit(estimation, &Settings { accept_undetermined: true, ..*settings });
+        let fit = super::fit(estimation, &FitSettings { accept_undetermined: true, ..*settings });
         let (quality, squares) = match (&fit, validation) {
-            (Ok(fit), Some((samples, before))) => on(fit, samples, before),
+            (Ok(fit), Some((samples, before))) => validate_on(fit, samples, before),
             _ => (None, None),
         };
-        rows.push(Row { settings: *settings, fit, validation: quality, bic: None });
+        rows.push(ComparedModel { settings: *settings, fit, validation: quality, bic: None });
         errors.push(squares);
     }
     fill_bic(&mut rows);
@@ -59,60 +59,64 @@ pub fn compare(
         Some(_) => by_validation(&rows, &errors),
         None => by_bic(&rows),
     };
-    Comparison { rows, chosen, reason }
+    ModelComparison { rows, chosen, reason }
 }
 
 /// Quality and squared errors on other data.
-fn on(fit: &Fit, samples: &Samples, before: Before) -> (Option<Quality>, Option<Vec<f64>>) {
+fn validate_on(
+    fit: &Fit,
+    samples: &Samples,
+    before: InitialCondition,
+) -> (Option<FitQuality>, Option<Vec<f64>>) {
     let Ok(predicted) = fit.predict(samples, before) else { return (None, None) };
     let squares = samples.output().iter().zip(&predicted).map(|(y, p)| (y - p) * (y - p));
-    (Quality::of(samples.output(), &predicted), Some(squares.collect()))
+    (FitQuality::of(samples.output(), &predicted), Some(squares.collect()))
 }
 
-fn fill_bic(rows: &mut [Row]) {
+fn fill_bic(rows: &mut [ComparedModel]) {
     let fits = || rows.iter().filter_map(|row| row.fit.as_ref().ok());
     let best = fits().min_by(|a, b| a.residual_sigma.total_cmp(&b.residual_sigma));
     let Some(independent) = best.map(|fit| fit.independent_samples) else { return };
     for row in rows {
         row.bic = row.fit.as_ref().ok().map(|fit| {
             let variance = (fit.quality.rmse * fit.quality.rmse).max(f64::MIN_POSITIVE);
-            let k = float(fit.estimated);
+            let k = to_f64(fit.estimated);
             independent * libm::log(variance) + k * libm::log(independent.max(2.0))
         });
     }
 }
 
-fn stands(row: &Row) -> bool {
+fn stands(row: &ComparedModel) -> bool {
     row.fit.as_ref().is_ok_and(Fit::is_determined)
 }
 
-fn named(row: &Row) -> String {
+fn describe(row: &ComparedModel) -> String {
     let structure = row.settings.structure;
     format!("{} poles and {} zeros", structure.poles(), structure.zeros())
 }
 
-const NONE: &str = "no model stands; see why beside each";
+const NO_MODEL: &str = "no model stands; see why beside each";
 
-fn by_bic(rows: &[Row]) -> (Option<usize>, String) {
+fn by_bic(rows: &[ComparedModel]) -> (Option<usize>, String) {
     let standing = (0..rows.len()).filter(|&i| stands(&rows[i]));
     let of = |i: usize| rows[i].bic.unwrap_or(f64::MAX);
     let Some(chosen) = standing.min_by(|a, b| of(*a).total_cmp(&of(*b))) else {
-        return (None, NONE.to_owned());
+        return (None, NO_MODEL.to_owned());
     };
     let reason = format!(
         "{}: the least BIC, {:.1}, over independent samples; there are no validation data",
-        named(&rows[chosen]),
+        describe(&rows[chosen]),
         of(chosen)
     );
     (Some(chosen), reason)
 }
 
-fn by_validation(rows: &[Row], errors: &[Option<Vec<f64>>]) -> (Option<usize>, String) {
+fn by_validation(rows: &[ComparedModel], errors: &[Option<Vec<f64>>]) -> (Option<usize>, String) {
     let fit = |i: usize| rows[i].validation.map_or(f64::MIN, |quality| quality.fit_percent);
     let standing: Vec<usize> =
         (0..rows.len()).filter(|&i| stands(&rows[i]) && errors[i].is_some()).collect();
     let Some(&best) = standing.iter().max_by(|a, b| fit(**a).total_cmp(&fit(**b))) else {
-        return (None, NONE.to_owned());
+        return (None, NO_MODEL.to_owned());
     };
     let size = |i: usize| rows[i].fit.as_ref().map_or(usize::MAX, |fit| fit.estimated);
     let as_good = |i: usize| match (&errors[i], &errors[best]) {
@@ -126,14 +130,18 @@ fn by_validation(rows: &[Row], errors: &[Option<Vec<f64>>]) -> (Option<usize>, S
         .min_by(|a, b| size(*a).cmp(&size(*b)).then(fit(*b).total_cmp(&fit(*a))))
         .unwrap_or(best);
     let reason = if chosen == best {
-        format!("{}: the best fit on the validation data, {:.1} %", named(&rows[best]), fit(best))
+        format!(
+            "{}: the best fit on the validation data, {:.1} %",
+            describe(&rows[best]),
+            fit(best)
+        )
     } else {
         format!(
             "{}: {:.1} % on the validation data, with fewer parameters than {} of {:.1} %, which \
              is better by less than the standard error of the difference",
-            named(&rows[chosen]),
+            describe(&rows[chosen]),
             fit(chosen),
-            named(&rows[best]),
+            describe(&rows[best]),
             fit(best)
         )
     };
@@ -148,5 +156,5 @@ fn no_worse(a: &[f64], b: &[f64]) -> bool {
     let mean = a.iter().zip(b).map(|(a, b)| a - b).sum::<f64>() / n.max(1) as f64;
     let about: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b - mean).collect();
     let variance = about.iter().map(|d| d * d).sum::<f64>() / n.max(1) as f64;
-    mean <= (variance / Colour::of(&about).independent(n)).sqrt()
+    mean <= (variance / ArModel::of(&about).effective_samples(n)).sqrt()
 }

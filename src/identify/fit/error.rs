@@ -1,8 +1,8 @@
 //! Why there is no fit.
 
-use super::loose::Loose;
+use super::loose::Undetermined;
 use super::samples::SamplesError;
-use crate::identify::number::{brief, short};
+use crate::identify::number::{six_digits, three_digits};
 use crate::numeric::lti::ModelError;
 
 /// Why there is no fit, with what was found.
@@ -22,16 +22,16 @@ pub enum FitError {
     /// A range of dead times that is none.
     #[error(
         "a dead time of {} to {} s; give a range that begins at 0 or above and ends \
-         above that, by half the record ({most_allowed_s:.3} s) at the latest",
-        short(*.least_s), short(*.most_s)
+         above that, by half the record ({max_allowed_s:.3} s) at the latest",
+        six_digits(*.min_s), six_digits(*.max_s)
     )]
     DeadTimeRange {
         /// Lower end \[s\].
-        least_s: f64,
+        min_s: f64,
         /// Upper end \[s\].
-        most_s: f64,
+        max_s: f64,
         /// Latest upper end \[s\].
-        most_allowed_s: f64,
+        max_allowed_s: f64,
     },
     /// Fewer samples than the parameters need.
     #[error("{found} samples for {parameters} parameters; it needs at least {needed}")]
@@ -69,16 +69,16 @@ pub enum FitError {
     },
     /// An output that drifts, and a model that follows the drift.
     #[error(
-        "the output drifts: a straight line in time explains {share_percent:.1} % of it ({} by {} \
+        "the output drifts: a straight line in time explains {explained_percent:.1} % of it ({} by {} \
          over {record_s:.1} s) and not the input, and the model follows that line. Hold temperature \
          and feed steady, use a part without the drift (--from-s, --to-s), or take the line out of \
          the log; an extruder that is so slow takes a longer log", if *.rise > 0.0 { "up" } else {
             "down"
-        }, brief(.rise.abs())
+        }, three_digits(.rise.abs())
     )]
     Drift {
         /// Share of the output's variance that the line explains \[%\].
-        share_percent: f64,
+        explained_percent: f64,
         /// By how much it rises over the record, in units of the output.
         rise: f64,
         /// Length of the record \[s\].
@@ -87,7 +87,7 @@ pub enum FitError {
     /// The dead time ran into the end of its range.
     #[error(
         "the dead time runs against the {end} end of its range, {} s; widen the range, or \
-         look whether input and output are on one clock", short(*.bound_s)
+         look whether input and output are on one clock", six_digits(*.bound_s)
     )]
     DeadTimeAtBound {
         /// `lower` or `upper`.
@@ -106,7 +106,7 @@ pub enum FitError {
     },
     /// More parameters than the data can tell apart.
     #[error("{0}; take fewer poles or zeros, or excite the input more")]
-    Undetermined(Loose),
+    Undetermined(Undetermined),
     /// Nothing that could be started from.
     #[error(
         "no model of this form could be started: the output does not follow the input with any \

@@ -3,12 +3,12 @@
 use nalgebra::DMatrix;
 
 use super::error::FitError;
-use super::linear::nearest;
-use super::loose::Loose;
+use super::linear::least_squares;
+use super::loose::Undetermined;
 use super::problem::free_responses;
-use super::quality::Quality;
+use super::quality::FitQuality;
 use super::samples::{Samples, SamplesError};
-use super::settings::{Before, Settings};
+use super::settings::{FitSettings, InitialCondition};
 use crate::numeric::lti::{Simulator, TransferFunction};
 
 /// A parameter that was estimated.
@@ -28,7 +28,7 @@ pub struct Parameter {
 
 /// What a user should know of a fit that stands.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Note {
+pub enum FitNote {
     /// The estimate of the dead time was its lower end of 0: it was taken out.
     /// Where the fit is poor beside, the output may run ahead of the input.
     NoDeadTime,
@@ -40,7 +40,7 @@ pub enum Note {
     },
     /// The data do not determine all parameters
     /// ([`Settings::accept_undetermined`]).
-    Undetermined(Loose),
+    Undetermined(Undetermined),
     /// The oscillating form came out with a damping above 1: its poles are real.
     PolesAreReal,
 }
@@ -49,7 +49,7 @@ pub enum Note {
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// What was asked for; without dead time where [`Note::NoDeadTime`] says so.
-    pub settings: Settings,
+    pub settings: FitSettings,
     /// Output less output level over input less input level.
     pub model: TransferFunction,
     /// Where the input stood before, in units of the input.
@@ -69,7 +69,7 @@ pub struct Fit {
     /// Standard deviation of the residuals, in units of the output.
     pub residual_sigma: f64,
     /// On the data of the estimation.
-    pub quality: Quality,
+    pub quality: FitQuality,
     /// Akaike's criterion for white residuals; less is better.
     pub aic: f64,
     /// Schwarz's criterion for white residuals; less is better.
@@ -77,7 +77,7 @@ pub struct Fit {
     /// Number of samples that would say as much if they were independent.
     pub independent_samples: f64,
     /// What a user should know.
-    pub notes: Vec<Note>,
+    pub notes: Vec<FitNote>,
     /// Number of estimated parameters, those of the free response included.
     pub estimated: usize,
 }
@@ -90,23 +90,27 @@ impl Fit {
 
     /// Whether all parameters are determined.
     pub fn is_determined(&self) -> bool {
-        !self.notes.iter().any(|note| matches!(note, Note::Undetermined(_)))
+        !self.notes.iter().any(|note| matches!(note, FitNote::Undetermined(_)))
     }
 
     /// What the model says of other data, with the fit's levels. With
     /// [`Before::Unknown`] the free response, and nothing else, is estimated from
     /// them.
-    pub fn predict(&self, samples: &Samples, before: Before) -> Result<Vec<f64>, FitError> {
+    pub fn predict(
+        &self,
+        samples: &Samples,
+        before: InitialCondition,
+    ) -> Result<Vec<f64>, FitError> {
         let first = samples.input().first().copied().unwrap_or(self.input_level);
         let stood = match before {
-            Before::Settled { input } => input,
-            Before::SettledAtFirst | Before::Unknown => first,
+            InitialCondition::Settled { input } => input,
+            InitialCondition::SettledAtFirst | InitialCondition::Unknown => first,
         };
         let mut model = Simulator::new(&self.model, samples.dt_s(), self.settings.between)?;
         model.settle(stood - self.input_level)?;
         let answer = |u: &f64| self.output_level + model.step(u - self.input_level);
         let mut predicted: Vec<f64> = samples.input().iter().map(answer).collect();
-        if before == Before::Unknown {
+        if before == InitialCondition::Unknown {
             self.add_free_response(samples, &mut predicted)?;
         }
         Ok(predicted)
@@ -115,7 +119,7 @@ impl Fit {
     fn add_free_response(&self, samples: &Samples, predicted: &mut [f64]) -> Result<(), FitError> {
         let columns = free_responses(self.model.den(), samples.dt_s(), samples.len())?;
         let left: Vec<f64> = samples.output().iter().zip(&*predicted).map(|(y, p)| y - p).collect();
-        let found = nearest(&columns, &left).ok_or(FitError::NoStart)?;
+        let found = least_squares(&columns, &left).ok_or(FitError::NoStart)?;
         for (value, column) in found.iter().zip(&columns) {
             predicted.iter_mut().zip(column).for_each(|(y, c)| *y += value * c);
         }
@@ -123,9 +127,13 @@ impl Fit {
     }
 
     /// How well the model predicts other data.
-    pub fn validate(&self, samples: &Samples, before: Before) -> Result<Quality, FitError> {
+    pub fn validate(
+        &self,
+        samples: &Samples,
+        before: InitialCondition,
+    ) -> Result<FitQuality, FitError> {
         let predicted = self.predict(samples, before)?;
-        let found = Quality::of(samples.output(), &predicted);
+        let found = FitQuality::of(samples.output(), &predicted);
         found.ok_or(FitError::Data(SamplesError::TooFew { found: 0, needed: 1 }))
     }
 }

@@ -3,29 +3,29 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::linear::{nearest, normal_matrix};
-use super::problem::Problem;
+use super::linear::{least_squares, normal_matrix};
+use super::problem::FitProblem;
 use super::row::dot;
-use super::settings::Level;
-use crate::numeric::number::float;
+use super::settings::OutputLevel;
+use crate::numeric::number::to_f64;
 
 /// Where the steps ended.
 #[derive(Debug, Clone)]
-pub(super) struct Outcome {
+pub(super) struct Minimum {
     pub theta: Vec<f64>,
     /// Sum of the squared residuals.
-    pub squares: f64,
+    pub sum_of_squares: f64,
 }
 
 /// Puts the parameters that act in proportion where they fit best.
-pub(super) fn fill_linear(problem: &Problem, theta: &mut [f64]) -> Option<f64> {
+pub(super) fn solve_linear(problem: &FitProblem, theta: &mut [f64]) -> Option<f64> {
     let (numbers, columns) = problem.linear_columns(theta)?;
     let known = match problem.level {
-        Level::Known(level) => level,
-        Level::Estimated => 0.0,
+        OutputLevel::Known(level) => level,
+        OutputLevel::Estimated => 0.0,
     };
     let target: Vec<f64> = problem.output.iter().map(|y| y - known).collect();
-    let found = nearest(&columns, &target)?;
+    let found = least_squares(&columns, &target)?;
     let mut left = target;
     for ((number, value), column) in numbers.into_iter().zip(&found).zip(&columns) {
         theta[number] = *value;
@@ -36,23 +36,23 @@ pub(super) fn fill_linear(problem: &Problem, theta: &mut [f64]) -> Option<f64> {
     Some(dot(&left, &left))
 }
 
-fn residuals(problem: &Problem, theta: &[f64]) -> Option<Vec<f64>> {
+fn residuals(problem: &FitProblem, theta: &[f64]) -> Option<Vec<f64>> {
     let predicted = problem.predict(theta)?;
     Some(problem.output.iter().zip(&predicted).map(|(y, p)| y - p).collect())
 }
 
 /// Steps downhill from a start until nothing is gained. `None` where the start
 /// is no stable model.
-pub(super) fn descend(problem: &Problem, start: &[f64], most_steps: usize) -> Option<Outcome> {
+pub(super) fn minimise(problem: &FitProblem, start: &[f64], max_steps: usize) -> Option<Minimum> {
     let mut theta = start.to_vec();
     problem.project(&mut theta);
     let mut left = residuals(problem, &theta)?;
     let mut squares = dot(&left, &left);
     let mut damping = 1e-3;
     // Less than this of the residuals' variance tells nothing about a parameter.
-    let nothing = 1e-5 / float(left.len());
+    let nothing = 1e-5 / to_f64(left.len());
     let mut idle = 0;
-    for _ in 0..most_steps {
+    for _ in 0..max_steps {
         let scales = problem.scales(&theta);
         let Some(columns) = problem.jacobian(&theta, &scales) else { break };
         let slope: Vec<f64> = columns.iter().map(|c| dot(c, &left)).collect();
@@ -83,7 +83,7 @@ pub(super) fn descend(problem: &Problem, start: &[f64], most_steps: usize) -> Op
             break;
         }
     }
-    Some(Outcome { theta, squares })
+    Some(Minimum { theta, sum_of_squares: squares })
 }
 
 /// Normal equations of the parameters that may move.
@@ -94,7 +94,7 @@ struct Normal {
 }
 
 /// A parameter at an end of its range that would go beyond is held.
-fn held_normal(problem: &Problem, theta: &[f64], columns: &[Vec<f64>], slope: &[f64]) -> Normal {
+fn held_normal(problem: &FitProblem, theta: &[f64], columns: &[Vec<f64>], slope: &[f64]) -> Normal {
     let sizes: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt().max(f64::MIN_POSITIVE)).collect();
     let mut matrix = normal_matrix(columns, &sizes);
     let mut right = DVector::from_fn(columns.len(), |i, _| slope[i] / sizes[i]);

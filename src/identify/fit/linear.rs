@@ -6,7 +6,7 @@ use super::row::dot;
 
 /// Coefficients of the columns that together come nearest to a row, the smallest
 /// such where columns repeat each other.
-pub(super) fn nearest(columns: &[Vec<f64>], target: &[f64]) -> Option<Vec<f64>> {
+pub(super) fn least_squares(columns: &[Vec<f64>], target: &[f64]) -> Option<Vec<f64>> {
     let sizes: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt().max(f64::MIN_POSITIVE)).collect();
     let n = columns.len();
     let normal = normal_matrix(columns, &sizes);

@@ -4,7 +4,7 @@ use std::fmt;
 
 /// What is not determined.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Loose {
+pub enum Undetermined {
     /// The highest coefficient of the denominator does not differ from zero, so
     /// that the data show a pole fewer. Each parameter of a form that is told
     /// over that coefficient may look well determined beside the others.
@@ -34,7 +34,7 @@ pub enum Loose {
         sigma_s: f64,
     },
     /// Parameters of which one makes up for a change of the others.
-    Together {
+    Combination {
         /// Their names.
         names: Vec<String>,
         /// A pole and a zero that all but cancel \[1/s\]: the data do not tell
@@ -43,7 +43,7 @@ pub enum Loose {
     },
 }
 
-impl fmt::Display for Loose {
+impl fmt::Display for Undetermined {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Pole { poles, coefficient, sigma, pair } => {
@@ -55,7 +55,7 @@ impl fmt::Display for Loose {
                     if *poles == 1 { "" } else { "s" },
                     poles.saturating_sub(1)
                 )?;
-                cancelling(f, *pair)
+                write_cancelling_pair(f, *pair)
             }
             Self::Gain { gain, sigma } => write!(
                 f,
@@ -68,7 +68,7 @@ impl fmt::Display for Loose {
                 "the data do not tell the dead time: {dead_time_s:.3} s with a standard error of \
                  {sigma_s:.3} s, longer than itself and than the slowest time constant"
             ),
-            Self::Together { names, pair } => {
+            Self::Combination { names, pair } => {
                 match names.split_last() {
                     Some((last, others)) if !others.is_empty() => write!(
                         f,
@@ -79,13 +79,13 @@ impl fmt::Display for Loose {
                     Some((only, _)) => write!(f, "the data do not determine {only}"),
                     None => f.write_str("the data do not determine the parameters"),
                 }?;
-                cancelling(f, *pair)
+                write_cancelling_pair(f, *pair)
             }
         }
     }
 }
 
-fn cancelling(f: &mut fmt::Formatter<'_>, pair: Option<(f64, f64)>) -> fmt::Result {
+fn write_cancelling_pair(f: &mut fmt::Formatter<'_>, pair: Option<(f64, f64)>) -> fmt::Result {
     match pair {
         Some((pole, zero)) => {
             write!(f, " (a pole at {pole:.3} 1/s and a zero at {zero:.3} 1/s all but cancel)")

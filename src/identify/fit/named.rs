@@ -3,19 +3,19 @@
 use nalgebra::DMatrix;
 
 use super::error::FitError;
-use super::problem::Problem;
+use super::problem::FitProblem;
 use super::settings::Structure;
 
 /// Names and values.
-pub(super) struct Named {
+pub(super) struct NamedParameters {
     pub names: Vec<String>,
     pub values: Vec<f64>,
     pub poles_are_real: bool,
 }
 
-impl Named {
+impl NamedParameters {
     /// Fails where real poles were asked for and the poles are not.
-    pub fn of(problem: &Problem, structure: Structure, theta: &[f64]) -> Result<Self, FitError> {
+    pub fn of(problem: &FitProblem, structure: Structure, theta: &[f64]) -> Result<Self, FitError> {
         let mut named = Self { names: Vec::new(), values: Vec::new(), poles_are_real: false };
         let alpha = |i: usize| theta[problem.zeros + i];
         match structure {
@@ -74,9 +74,9 @@ impl Named {
     }
 
     /// How the named parameters answer to those of the fit, by differences.
-    pub fn slopes(
+    pub fn jacobian(
         &self,
-        problem: &Problem,
+        problem: &FitProblem,
         structure: Structure,
         theta: &[f64],
         scales: &[f64],
@@ -85,7 +85,8 @@ impl Named {
         for (number, scale) in scales.iter().enumerate() {
             let mut moved = theta.to_vec();
             // Small against the parameter itself, which may be far below its scale.
-            let step = STEP * if theta[number] == 0.0 { *scale } else { theta[number].abs() };
+            let step =
+                RELATIVE_STEP * if theta[number] == 0.0 { *scale } else { theta[number].abs() };
             let mut at = |by: f64| {
                 moved[number] = theta[number] + by;
                 Self::of(problem, structure, &moved).ok().map(|named| named.values)
@@ -105,4 +106,4 @@ impl Named {
 }
 
 /// Step of the differences as a part of the parameter.
-const STEP: f64 = 1e-6;
+const RELATIVE_STEP: f64 = 1e-6;

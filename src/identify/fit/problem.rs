@@ -8,18 +8,18 @@
 
 use super::row::standard_deviation;
 use super::samples::Samples;
-use super::settings::{Before, DeadTime, Level, Settings};
+use super::settings::{DeadTime, FitSettings, InitialCondition, OutputLevel};
 use crate::numeric::lti::{Between, ModelError, Simulator, TransferFunction, polynomial};
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 /// A pole faster than this many in a step is not seen.
-const FASTEST_PER_STEP: f64 = 50.0;
+const MAX_POLE_RATE_PER_STEP: f64 = 50.0;
 /// A time constant longer than this many records is an integrator.
-const SLOWEST_RECORDS: f64 = 100.0;
+const MAX_TIME_CONSTANT_RECORDS: f64 = 100.0;
 
 /// What is fitted to what.
 #[derive(Debug, Clone)]
-pub(super) struct Problem {
+pub(super) struct FitProblem {
     /// Less the input level.
     pub input: Vec<f64>,
     pub input_level: f64,
@@ -28,13 +28,13 @@ pub(super) struct Problem {
     pub poles: usize,
     pub zeros: usize,
     pub dead_time: DeadTime,
-    pub level: Level,
-    pub free: bool,
+    pub level: OutputLevel,
+    pub has_free_response: bool,
     pub between: Between,
 }
 
 /// Numbers of the parameters.
-pub(super) struct Layout {
+pub(super) struct ParameterLayout {
     pub poles_from: usize,
     pub dead_time: Option<usize>,
     pub level: Option<usize>,
@@ -42,12 +42,12 @@ pub(super) struct Layout {
     pub total: usize,
 }
 
-impl Problem {
-    pub fn new(samples: &Samples, settings: &Settings) -> Self {
+impl FitProblem {
+    pub fn new(samples: &Samples, settings: &FitSettings) -> Self {
         let first = samples.input().first().copied().unwrap_or(0.0);
-        let input_level = match settings.before {
-            Before::Settled { input } => input,
-            Before::SettledAtFirst | Before::Unknown => first,
+        let input_level = match settings.initial_state {
+            InitialCondition::Settled { input } => input,
+            InitialCondition::SettledAtFirst | InitialCondition::Unknown => first,
         };
         Self {
             input: samples.input().iter().map(|u| u - input_level).collect(),
@@ -58,15 +58,15 @@ impl Problem {
             zeros: settings.structure.zeros(),
             dead_time: settings.dead_time,
             level: settings.level,
-            free: settings.before == Before::Unknown,
+            has_free_response: settings.initial_state == InitialCondition::Unknown,
             between: settings.between,
         }
     }
 
     /// The same with the means of so many samples each: input and output that are
     /// averaged alike still belong together.
-    pub fn thinned(&self, factor: usize) -> Self {
-        let n = float(factor);
+    pub fn decimated(&self, factor: usize) -> Self {
+        let n = to_f64(factor);
         let means = |row: &[f64]| -> Vec<f64> {
             row.chunks_exact(factor).map(|part| part.iter().sum::<f64>() / n).collect()
         };
@@ -74,7 +74,7 @@ impl Problem {
         Self { input, output, dt_s: n * self.dt_s, ..self.clone() }
     }
 
-    pub fn layout(&self) -> Layout {
+    pub fn layout(&self) -> ParameterLayout {
         let poles_from = self.zeros + 1;
         let mut total = poles_from + self.poles;
         let mut next = |is: bool| {
@@ -82,10 +82,10 @@ impl Problem {
             is.then(|| total - 1)
         };
         let dead_time = next(matches!(self.dead_time, DeadTime::Estimated { .. }));
-        let level = next(self.level == Level::Estimated);
+        let level = next(self.level == OutputLevel::Estimated);
         let free_from = total;
-        total += if self.free { self.poles } else { 0 };
-        Layout { poles_from, dead_time, level, free_from, total }
+        total += if self.has_free_response { self.poles } else { 0 };
+        ParameterLayout { poles_from, dead_time, level, free_from, total }
     }
 
     #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
@@ -101,7 +101,7 @@ impl Problem {
 
     pub fn dead_time_s(&self, theta: &[f64]) -> f64 {
         match self.dead_time {
-            DeadTime::Given(given) => given,
+            DeadTime::Known(given) => given,
             DeadTime::Estimated { .. } => theta[self.zeros + 1 + self.poles],
         }
     }
@@ -113,26 +113,26 @@ impl Problem {
 
     pub fn output_level(&self, theta: &[f64]) -> f64 {
         match self.level {
-            Level::Known(level) => level,
-            Level::Estimated => self.layout().level.map_or(0.0, |place| theta[place]),
+            OutputLevel::Known(level) => level,
+            OutputLevel::Estimated => self.layout().level.map_or(0.0, |place| theta[place]),
         }
     }
 
     /// Whether these are parameters of a stable model at all.
-    fn possible(&self, theta: &[f64]) -> bool {
-        let slow = theta[self.zeros + 1] > SLOWEST_RECORDS * self.duration_s();
+    fn is_admissible(&self, theta: &[f64]) -> bool {
+        let slow = theta[self.zeros + 1] > MAX_TIME_CONSTANT_RECORDS * self.duration_s();
         !slow && theta.iter().all(|p| p.is_finite()) && polynomial::is_hurwitz(&self.den(theta))
     }
 
     /// The output that they predict; `None` of what is no stable model.
     pub fn predict(&self, theta: &[f64]) -> Option<Vec<f64>> {
-        if !self.possible(theta) {
+        if !self.is_admissible(theta) {
             return None;
         }
         let level = self.output_level(theta);
         let mut model = Simulator::new(&self.transfer(theta)?, self.dt_s, self.between).ok()?;
         let mut predicted: Vec<f64> = self.input.iter().map(|u| level + model.step(*u)).collect();
-        if self.free {
+        if self.has_free_response {
             let layout = self.layout();
             let own: Vec<f64> = theta[layout.free_from..].iter().rev().copied().collect();
             let own = free_response(&own, &self.den(theta), self.dt_s, predicted.len()).ok()?;
@@ -145,7 +145,7 @@ impl Problem {
     /// response – for a denominator and dead time, and the numbers of these
     /// parameters.
     pub fn linear_columns(&self, theta: &[f64]) -> Option<(Vec<usize>, Vec<Vec<f64>>)> {
-        if !self.possible(theta) {
+        if !self.is_admissible(theta) {
             return None;
         }
         let layout = self.layout();
@@ -162,7 +162,7 @@ impl Problem {
             numbers.push(place);
             columns.push(vec![1.0; self.output.len()]);
         }
-        if self.free {
+        if self.has_free_response {
             numbers.extend(layout.free_from..layout.total);
             columns.extend(free_responses(&den, self.dt_s, self.output.len()).ok()?);
         }
@@ -177,21 +177,21 @@ impl Problem {
         let mut time = 0.0_f64;
         for i in 1..=self.poles {
             let alpha = theta[layout.poles_from + i - 1].abs();
-            time = time.max(libm::pow(alpha, 1.0 / float(i)));
+            time = time.max(libm::pow(alpha, 1.0 / to_f64(i)));
         }
         let time = time.max(self.dt_s);
-        let unit = |i: usize| libm::pow(time, float(i));
+        let unit = |i: usize| libm::pow(time, to_f64(i));
         let gain = (0..=self.zeros).map(|i| theta[i].abs() / unit(i)).fold(tiny, f64::max);
         let mut scales: Vec<f64> = (0..=self.zeros).map(|i| gain * unit(i)).collect();
         scales.extend((1..=self.poles).map(unit));
         if layout.dead_time.is_some() {
             scales.push(time);
         }
-        let swing = standard_deviation(&self.output).max(tiny);
+        let amplitude = standard_deviation(&self.output).max(tiny);
         if layout.level.is_some() {
-            scales.push(swing);
+            scales.push(amplitude);
         }
-        scales.extend((0..layout.total - layout.free_from).map(|i| swing * unit(i)));
+        scales.extend((0..layout.total - layout.free_from).map(|i| amplitude * unit(i)));
         scales
     }
 
@@ -199,14 +199,14 @@ impl Problem {
     pub fn range(&self, theta: &[f64], number: usize) -> [f64; 2] {
         let layout = self.layout();
         if Some(number) == layout.dead_time
-            && let DeadTime::Estimated { least_s, most_s } = self.dead_time
+            && let DeadTime::Estimated { min_s: least_s, max_s: most_s } = self.dead_time
         {
             return [least_s, most_s];
         }
         let last_pole = layout.poles_from + self.poles - 1;
         if number == last_pole {
             let before = if self.poles == 1 { 1.0 } else { theta[last_pole - 1].abs() };
-            return [before * self.dt_s / FASTEST_PER_STEP, f64::MAX];
+            return [before * self.dt_s / MAX_POLE_RATE_PER_STEP, f64::MAX];
         }
         [f64::MIN, f64::MAX]
     }
@@ -229,14 +229,15 @@ impl Problem {
         }
         for number in 0..theta.len() {
             if columns[number].is_empty() {
-                columns[number] = self.slope(theta, number, STEP * scales[number])?;
+                columns[number] =
+                    self.finite_difference(theta, number, RELATIVE_STEP * scales[number])?;
             }
         }
         Some(columns)
     }
 
     /// By central differences, one-sided at an end of the range.
-    fn slope(&self, theta: &[f64], number: usize, step: f64) -> Option<Vec<f64>> {
+    fn finite_difference(&self, theta: &[f64], number: usize, step: f64) -> Option<Vec<f64>> {
         let [least, most] = self.range(theta, number);
         let moved = |by: f64| {
             let mut moved = theta.to_vec();
@@ -281,4 +282,4 @@ pub(super) fn free_responses(
 }
 
 /// Step of the differences as a part of a parameter's size.
-const STEP: f64 = 1e-5;
+const RELATIVE_STEP: f64 = 1e-5;

@@ -1,10 +1,10 @@
 //! How well a prediction meets what was measured.
 
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 /// How well a prediction meets what was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quality {
+pub struct FitQuality {
     /// 100·(1 − ‖y − ŷ‖/‖y − mean y‖) \[%\]: 100 for a perfect model, 0 for one
     /// no better than the mean, below for worse. The bead characterisation
     /// thesis, eq. (16).
@@ -15,13 +15,13 @@ pub struct Quality {
     pub mae: f64,
 }
 
-impl Quality {
+impl FitQuality {
     /// Of a prediction as long as what was measured; of the shorter part where
     /// it is not. `None` where nothing was measured. An output that never
     /// changes has a fit of minus infinity.
     pub fn of(measured: &[f64], predicted: &[f64]) -> Option<Self> {
         let count = measured.len().min(predicted.len());
-        let n = float(count);
+        let n = to_f64(count);
         if count == 0 {
             return None;
         }
@@ -48,11 +48,11 @@ mod tests {
 
     #[test]
     fn the_measures_are_those_of_the_formulas() {
-        let found = Quality::of(&[1.0, 2.0, 3.0, 6.0], &[1.0, 3.0, 3.0, 4.0]).unwrap();
+        let found = FitQuality::of(&[1.0, 2.0, 3.0, 6.0], &[1.0, 3.0, 3.0, 4.0]).unwrap();
         assert!((found.fit_percent - 100.0 * (1.0 - (5.0_f64 / 14.0).sqrt())).abs() < 1e-12);
         assert!((found.rmse - 1.25_f64.sqrt()).abs() < 1e-12);
         assert!((found.mae - 0.75).abs() < 1e-12);
-        assert_eq!(Quality::of(&[], &[]), None);
-        assert_eq!(Quality::of(&[1.0, 3.0], &[2.0, 2.0]).unwrap().fit_percent, 0.0);
+        assert_eq!(FitQuality::of(&[], &[]), None);
+        assert_eq!(FitQuality::of(&[1.0, 3.0], &[2.0, 2.0]).unwrap().fit_percent, 0.0);
     }
 }

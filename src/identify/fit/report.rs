@@ -2,29 +2,29 @@
 
 use nalgebra::DMatrix;
 
-use super::autoregression::Colour;
+use super::autoregression::ArModel;
 use super::drift::check_drift;
 use super::error::FitError;
-use super::estimate::{Fit, Note, Parameter};
-use super::identifiability::loose;
-use super::levenberg::Outcome;
-use super::named::Named;
-use super::problem::Problem;
-use super::quality::Quality;
+use super::estimate::{Fit, FitNote, Parameter};
+use super::identifiability::undetermined;
+use super::levenberg::Minimum;
+use super::named::NamedParameters;
+use super::problem::FitProblem;
+use super::quality::FitQuality;
 use super::row::{dot, standard_deviation};
-use super::settings::{DeadTime, Settings};
-use super::spread::{Spread, spread};
+use super::settings::{DeadTime, FitSettings};
+use super::spread::{Covariances, covariances};
 use super::start;
 use crate::numeric::lti::polynomial;
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 /// Turns the least squares into a fit, or says why it is none.
 pub(super) fn report(
-    problem: &Problem,
-    settings: &Settings,
-    best: &Outcome,
+    problem: &FitProblem,
+    settings: &FitSettings,
+    best: &Minimum,
 ) -> Result<Fit, FitError> {
-    if let DeadTime::Estimated { least_s, most_s } = settings.dead_time {
+    if let DeadTime::Estimated { min_s: least_s, max_s: most_s } = settings.dead_time {
         let found = problem.dead_time_s(&best.theta);
         if found <= least_s && least_s == 0.0 {
             return without_dead_time(problem, settings);
@@ -42,7 +42,7 @@ pub(super) fn report(
         return Ok(fit);
     }
     let loose = fit.notes.iter().find_map(|note| match note {
-        Note::Undetermined(loose) => Some(loose.clone()),
+        FitNote::Undetermined(loose) => Some(loose.clone()),
         _ => None,
     });
     match loose {
@@ -51,23 +51,23 @@ pub(super) fn report(
     }
 }
 
-fn without_dead_time(problem: &Problem, settings: &Settings) -> Result<Fit, FitError> {
-    let settings = Settings { dead_time: DeadTime::Given(0.0), ..*settings };
-    let problem = Problem { dead_time: settings.dead_time, ..problem.clone() };
+fn without_dead_time(problem: &FitProblem, settings: &FitSettings) -> Result<Fit, FitError> {
+    let settings = FitSettings { dead_time: DeadTime::Known(0.0), ..*settings };
+    let problem = FitProblem { dead_time: settings.dead_time, ..problem.clone() };
     let best = start::best(&problem)?;
     let mut fit = report(&problem, &settings, &best)?;
-    fit.notes.push(Note::NoDeadTime);
+    fit.notes.push(FitNote::NoDeadTime);
     Ok(fit)
 }
 
 /// A time constant beyond this many records was not seen.
-const LONGEST_RECORDS: f64 = 10.0;
+const MAX_TIME_CONSTANT_RECORDS: f64 = 10.0;
 
-fn check_stable(problem: &Problem, best: &Outcome) -> Result<(), FitError> {
+fn check_stable(problem: &FitProblem, best: &Minimum) -> Result<(), FitError> {
     let record_s = problem.duration_s();
     let poles = polynomial::roots(&problem.den(&best.theta));
     let slowest = poles.iter().map(|pole| pole.re).fold(f64::MIN, f64::max);
-    if slowest > -1.0 / (LONGEST_RECORDS * record_s) {
+    if slowest > -1.0 / (MAX_TIME_CONSTANT_RECORDS * record_s) {
         return Err(FitError::UnstableFit { re: slowest, record_s });
     }
     Ok(())
@@ -75,13 +75,13 @@ fn check_stable(problem: &Problem, best: &Outcome) -> Result<(), FitError> {
 
 /// What a model explains of the output must be more than chance: five times
 /// what as many parameters explain of noise of the residuals' colour on average.
-const BEYOND_CHANCE: f64 = 5.0;
+const CHANCE_FACTOR: f64 = 5.0;
 
-fn check_dependence(problem: &Problem, fit: &Fit) -> Result<(), FitError> {
+fn check_dependence(problem: &FitProblem, fit: &Fit) -> Result<(), FitError> {
     let whole = standard_deviation(&problem.output);
-    let squares = dot(&fit.residuals, &fit.residuals) / float(fit.residuals.len());
+    let squares = dot(&fit.residuals, &fit.residuals) / to_f64(fit.residuals.len());
     let explained = 1.0 - squares / (whole * whole);
-    let chance = (BEYOND_CHANCE * float(fit.estimated) / fit.independent_samples).min(1.0);
+    let chance = (CHANCE_FACTOR * to_f64(fit.estimated) / fit.independent_samples).min(1.0);
     // As a share of what is left: an F ratio.
     if explained < chance * (1.0 - explained) {
         let explained_percent = 100.0 * explained.max(0.0);
@@ -91,19 +91,19 @@ fn check_dependence(problem: &Problem, fit: &Fit) -> Result<(), FitError> {
     Ok(())
 }
 
-fn assemble(problem: &Problem, settings: &Settings, best: &Outcome) -> Result<Fit, FitError> {
+fn assemble(problem: &FitProblem, settings: &FitSettings, best: &Minimum) -> Result<Fit, FitError> {
     let theta = &best.theta;
     let model = problem.transfer(theta).ok_or(FitError::NoStart)?;
     let predicted = problem.predict(theta).ok_or(FitError::NoStart)?;
     let scales = problem.scales(theta);
     let columns = problem.jacobian(theta, &scales).ok_or(FitError::NoStart)?;
     let residuals: Vec<f64> = problem.output.iter().zip(&predicted).map(|(y, p)| y - p).collect();
-    let colour = Colour::of(&residuals);
-    let spread = spread(&columns, &colour, residuals.len());
-    let named = Named::of(problem, settings.structure, theta)?;
-    let predicted_quality = Quality::of(&problem.output, &predicted).ok_or(FitError::NoStart)?;
-    let turn = named.slopes(problem, settings.structure, theta, &scales);
-    let covariance = &turn * &spread.coloured * turn.transpose();
+    let noise = ArModel::of(&residuals);
+    let spread = covariances(&columns, &noise, residuals.len());
+    let named = NamedParameters::of(problem, settings.structure, theta)?;
+    let predicted_quality = FitQuality::of(&problem.output, &predicted).ok_or(FitError::NoStart)?;
+    let turn = named.jacobian(problem, settings.structure, theta, &scales);
+    let covariance = &turn * &spread.correlated * turn.transpose();
     let covariance_if_white = &turn * &spread.white * turn.transpose();
     // Nothing holds a parameter whose variance is lost in rounding.
     let sigma = |of: &DMatrix<f64>, i: usize| {
@@ -118,7 +118,7 @@ fn assemble(problem: &Problem, settings: &Settings, best: &Outcome) -> Result<Fi
         })
         .collect();
     let notes = notes(problem, theta, &spread, &named, &turn);
-    let (n, k) = (float(residuals.len()), float(theta.len()));
+    let (n, k) = (to_f64(residuals.len()), to_f64(theta.len()));
     let squares = dot(&residuals, &residuals);
     let misfit = n * libm::log((squares / n).max(f64::MIN_POSITIVE));
     Ok(Fit {
@@ -133,7 +133,7 @@ fn assemble(problem: &Problem, settings: &Settings, best: &Outcome) -> Result<Fi
         quality: predicted_quality,
         aic: misfit + 2.0 * k,
         bic: misfit + k * libm::log(n),
-        independent_samples: colour.independent(residuals.len()),
+        independent_samples: noise.effective_samples(residuals.len()),
         predicted,
         residuals,
         notes,
@@ -142,16 +142,18 @@ fn assemble(problem: &Problem, settings: &Settings, best: &Outcome) -> Result<Fi
 }
 
 fn notes(
-    problem: &Problem,
+    problem: &FitProblem,
     theta: &[f64],
-    spread: &Spread,
-    named: &Named,
+    spread: &Covariances,
+    named: &NamedParameters,
     turn: &DMatrix<f64>,
-) -> Vec<Note> {
-    let mut notes: Vec<Note> =
-        loose(problem, theta, spread, named, turn).map(Note::Undetermined).into_iter().collect();
+) -> Vec<FitNote> {
+    let mut notes: Vec<FitNote> = undetermined(problem, theta, spread, named, turn)
+        .map(FitNote::Undetermined)
+        .into_iter()
+        .collect();
     if named.poles_are_real {
-        notes.push(Note::PolesAreReal);
+        notes.push(FitNote::PolesAreReal);
     }
     notes
 }

@@ -3,13 +3,13 @@
 
 use super::clipped;
 use super::clipped::Clipped;
-use super::row::ends;
-use super::settings::Before;
-use crate::identify::number::short;
+use super::row::min_max;
+use super::settings::InitialCondition;
+use crate::identify::number::six_digits;
 
 /// Size that no sample reaches; larger ones would overflow where they are
 /// squared and multiplied.
-const LARGEST: f64 = 1e12;
+const MAX_VALUE: f64 = 1e12;
 
 /// What is wrong with the data.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -33,7 +33,7 @@ pub enum SamplesError {
     /// A sample that is no number.
     #[error(
         "the {what} is {} at sample {at}, which nothing that is measured can be; cut the data \
-         there or mend it first", short(*.value)
+         there or mend it first", six_digits(*.value)
     )]
     NotFinite {
         /// `input` or `output`.
@@ -52,7 +52,7 @@ pub enum SamplesError {
     /// An input that never changes.
     #[error(
         "the input is {} throughout; a model can be told only from an input that changes",
-        short(*.value)
+        six_digits(*.value)
     )]
     ConstantInput {
         /// Its value.
@@ -70,7 +70,7 @@ pub enum SamplesError {
         level: f64,
     },
     /// An output that never changes.
-    #[error("the output is {} throughout; look whether the sensor was on", short(*.value))]
+    #[error("the output is {} throughout; look whether the sensor was on", six_digits(*.value))]
     ConstantOutput {
         /// Its value.
         value: f64,
@@ -89,9 +89,9 @@ pub struct Samples {
 }
 
 /// A record shorter than this is none.
-const FEWEST: usize = 10;
+const MIN_SAMPLES: usize = 10;
 /// Change of an input as a part of its level that is noise of the arithmetic.
-const HARDLY: f64 = 1e-4;
+const MIN_RELATIVE_RANGE: f64 = 1e-4;
 
 impl Samples {
     /// Of equally long rows, `dt_s` \[s\] apart. Fails where a number is not
@@ -100,13 +100,13 @@ impl Samples {
         if input.len() != output.len() {
             return Err(SamplesError::Lengths { input: input.len(), output: output.len() });
         }
-        finite("input", &input)?;
-        finite("output", &output)?;
+        check_finite("input", &input)?;
+        check_finite("output", &output)?;
         if !dt_s.is_finite() || dt_s <= 0.0 {
             return Err(SamplesError::Step { dt_s });
         }
-        if input.len() < FEWEST {
-            return Err(SamplesError::TooFew { found: input.len(), needed: FEWEST });
+        if input.len() < MIN_SAMPLES {
+            return Err(SamplesError::TooFew { found: input.len(), needed: MIN_SAMPLES });
         }
         Ok(Self { input, output, dt_s })
     }
@@ -145,25 +145,25 @@ impl Samples {
 
     /// Whether the input changes, if only from what came before, and so does the
     /// output.
-    pub fn check_input(&self, before: Before) -> Result<(), SamplesError> {
-        let [mut least, mut most] = ends(&self.input);
-        if let Before::Settled { input } = before {
+    pub fn check_input(&self, before: InitialCondition) -> Result<(), SamplesError> {
+        let [mut least, mut most] = min_max(&self.input);
+        if let InitialCondition::Settled { input } = before {
             (least, most) = (least.min(input), most.max(input));
         }
         if least == most {
             return Err(SamplesError::ConstantInput { value: least });
         }
         let (range, level) = (most - least, most.abs().max(least.abs()));
-        if range < HARDLY * level {
+        if range < MIN_RELATIVE_RANGE * level {
             return Err(SamplesError::InputHardlyChanges { range, level });
         }
-        let [least, most] = ends(&self.output);
+        let [least, most] = min_max(&self.output);
         if least == most { Err(SamplesError::ConstantOutput { value: least }) } else { Ok(()) }
     }
 }
 
-fn finite(what: &'static str, row: &[f64]) -> Result<(), SamplesError> {
-    match row.iter().enumerate().find(|(_, value)| !value.is_finite() || value.abs() >= LARGEST) {
+fn check_finite(what: &'static str, row: &[f64]) -> Result<(), SamplesError> {
+    match row.iter().enumerate().find(|(_, value)| !value.is_finite() || value.abs() >= MAX_VALUE) {
         Some((at, value)) => Err(SamplesError::NotFinite { what, value: *value, at }),
         None => Ok(()),
     }

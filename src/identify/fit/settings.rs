@@ -3,7 +3,7 @@
 use crate::numeric::lti::Between;
 
 /// Most poles of a fit.
-pub const MOST_POLES: usize = 4;
+pub const MAX_POLES: usize = 4;
 
 /// Form of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,20 +60,20 @@ impl Structure {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DeadTime {
     /// Known \[s\]; 0 for none.
-    Given(f64),
+    Known(f64),
     /// Estimated within a range, to a part of a step; to a whole step where the input
     /// is held and there are as many zeros as poles.
     Estimated {
         /// Lower end \[s\].
-        least_s: f64,
+        min_s: f64,
         /// Upper end \[s\].
-        most_s: f64,
+        max_s: f64,
     },
 }
 
 /// The output for an input that stands at the input level.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Level {
+pub enum OutputLevel {
     /// Known, in units of the output. A level that is truly known sharpens the
     /// gain a lot where the input is a single step.
     Known(f64),
@@ -83,7 +83,7 @@ pub enum Level {
 
 /// What came before the first sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Before {
+pub enum InitialCondition {
     /// The input had stood at this level for long and the output was at rest.
     Settled {
         /// Input level, in units of the input.
@@ -99,7 +99,7 @@ pub enum Before {
 
 /// What is fitted, and how the data are to be read.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
+pub struct FitSettings {
     /// Form of the model.
     pub structure: Structure,
     /// Its dead time.
@@ -108,15 +108,15 @@ pub struct Settings {
     /// measured quantities.
     pub between: Between,
     /// The output at the operating point.
-    pub level: Level,
+    pub level: OutputLevel,
     /// What came before the first sample.
-    pub before: Before,
+    pub initial_state: InitialCondition,
     /// Whether a model with parameters that the data do not determine is given
     /// all the same, with [`super::Note::Undetermined`].
     pub accept_undetermined: bool,
 }
 
-impl Settings {
+impl FitSettings {
     /// A structure with a dead time, a held input, an estimated output level,
     /// settled at the first sample.
     pub fn new(structure: Structure, dead_time: DeadTime) -> Self {
@@ -124,8 +124,8 @@ impl Settings {
             structure,
             dead_time,
             between: Between::Held,
-            level: Level::Estimated,
-            before: Before::SettledAtFirst,
+            level: OutputLevel::Estimated,
+            initial_state: InitialCondition::SettledAtFirst,
             accept_undetermined: false,
         }
     }
@@ -134,8 +134,8 @@ impl Settings {
     pub fn parameters(&self) -> usize {
         let poles = self.structure.poles();
         let dead_time = usize::from(matches!(self.dead_time, DeadTime::Estimated { .. }));
-        let level = usize::from(self.level == Level::Estimated);
-        let free = if self.before == Before::Unknown { poles } else { 0 };
+        let level = usize::from(self.level == OutputLevel::Estimated);
+        let free = if self.initial_state == InitialCondition::Unknown { poles } else { 0 };
         self.structure.zeros() + 1 + poles + dead_time + level + free
     }
 }

@@ -3,32 +3,32 @@
 
 use nalgebra::DMatrix;
 
-use super::autoregression::Colour;
+use super::autoregression::ArModel;
 use super::linear::normal_matrix;
 use super::row::dot;
 
 /// Covariances of the parameters.
-pub(super) struct Spread {
+pub(super) struct Covariances {
     /// For white residuals.
     pub white: DMatrix<f64>,
     /// For residuals of their colour.
-    pub coloured: DMatrix<f64>,
+    pub correlated: DMatrix<f64>,
     /// How the parameters move along the direction in which the data hold least,
     /// where they hold next to nothing.
-    pub loose: Option<Vec<f64>>,
+    pub weak_direction: Option<Vec<f64>>,
 }
 
 /// Least eigenvalue of the normalized equations that still tells something.
-const SINGULAR: f64 = 1e-11;
+const MIN_EIGENVALUE: f64 = 1e-11;
 
 /// Of the slopes of the prediction and the residuals' colour.
-pub(super) fn spread(columns: &[Vec<f64>], colour: &Colour, samples: usize) -> Spread {
+pub(super) fn covariances(columns: &[Vec<f64>], noise: &ArModel, samples: usize) -> Covariances {
     let sizes: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt().max(f64::MIN_POSITIVE)).collect();
     let p = columns.len();
     let normal = normal_matrix(columns, &sizes);
     let eigen = normal.clone().symmetric_eigen();
     let least = eigen.eigenvalues.imin();
-    let is_loose = eigen.eigenvalues[least] < SINGULAR;
+    let is_loose = eigen.eigenvalues[least] < MIN_EIGENVALUE;
     let along = || {
         let direction = eigen.eigenvectors.column(least);
         direction.iter().zip(&sizes).map(|(part, size)| part / size).collect()
@@ -36,23 +36,23 @@ pub(super) fn spread(columns: &[Vec<f64>], colour: &Colour, samples: usize) -> S
     let loose: Option<Vec<f64>> = is_loose.then(along);
     let endless = || DMatrix::from_diagonal_element(p, p, f64::INFINITY);
     let Some(inverse) = normal.try_inverse() else {
-        return Spread {
+        return Covariances {
             white: endless(),
-            coloured: endless(),
-            loose: loose.or_else(|| Some(along())),
+            correlated: endless(),
+            weak_direction: loose.or_else(|| Some(along())),
         };
     };
     #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
     let freedom = samples as f64 / (samples.saturating_sub(p).max(1)) as f64;
-    let weighed: Vec<Vec<f64>> = columns.iter().map(|c| colour.weigh(c)).collect();
+    let weighed: Vec<Vec<f64>> = columns.iter().map(|c| noise.weight(c)).collect();
     let middle = normal_matrix(&weighed, &sizes);
     let scaled = |m: DMatrix<f64>| {
         DMatrix::from_fn(p, p, |i, j| m[(i, j)] * freedom / (sizes[i] * sizes[j]))
     };
-    Spread {
-        white: scaled(&inverse * colour.variance),
-        coloured: scaled(&inverse * middle * &inverse),
-        loose,
+    Covariances {
+        white: scaled(&inverse * noise.variance),
+        correlated: scaled(&inverse * middle * &inverse),
+        weak_direction: loose,
     }
 }
 
@@ -62,22 +62,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_mean_of_coloured_noise_scatters_as_the_coloured_error_says() {
+    fn the_mean_of_correlated_noise_varies_as_its_standard_error_predicts() {
         let (n, pole) = (400, 0.8);
         let ones = vec![vec![1.0; n]];
         let trials = 300_u32;
-        let (mut squares, mut told, mut white) = (0.0, 0.0, 0.0);
+        let (mut squares, mut predicted, mut white) = (0.0, 0.0, 0.0);
         for seed in 0..trials {
             let noise = lagged(u64::from(seed), n + 100, pole)[100..].to_vec();
             let mean = noise.iter().sum::<f64>() / 400.0;
             let left: Vec<f64> = noise.iter().map(|e| e - mean).collect();
-            let spread = spread(&ones, &Colour::of(&left), n);
+            let spread = covariances(&ones, &ArModel::of(&left), n);
             squares += mean * mean;
-            told += spread.coloured[(0, 0)];
+            predicted += spread.correlated[(0, 0)];
             white += spread.white[(0, 0)];
         }
-        let (told, white) = (told / squares, white / squares);
-        assert!((0.7..1.2).contains(&told), "{told}");
+        let (predicted, white) = (predicted / squares, white / squares);
+        assert!((0.7..1.2).contains(&predicted), "{predicted}");
         assert!(white < 0.2, "{white}");
     }
 }

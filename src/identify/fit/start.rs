@@ -4,68 +4,68 @@
 use nalgebra::Complex;
 
 use super::error::FitError;
-use super::levenberg::{Outcome, descend, fill_linear};
-use super::linear::nearest;
-use super::problem::Problem;
-use super::settings::{DeadTime, Level};
+use super::levenberg::{Minimum, minimise, solve_linear};
+use super::linear::least_squares;
+use super::problem::FitProblem;
+use super::settings::{DeadTime, OutputLevel};
 use crate::numeric::lti::{Between, Simulator, TransferFunction, polynomial};
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 /// Bandwidths of the filter, evenly spread in their logarithm.
 const BANDWIDTHS: u32 = 5;
 /// Dead times that are tried at the most.
-const MOST_DEAD_TIMES: usize = 25;
+const MAX_DEAD_TIMES: usize = 25;
 /// Starts that are followed a few steps, and to the end.
-const FOLLOWED: usize = 5;
-const TO_THE_END: usize = 2;
-const FEW_STEPS: usize = 8;
-const MANY_STEPS: usize = 200;
+const FOLLOWED_STARTS: usize = 5;
+const FINAL_STARTS: usize = 2;
+const FIRST_STEPS: usize = 8;
+const MAX_STEPS: usize = 200;
 
 /// A longer record is thinned out to at least this many samples for the search;
 /// the last descent is on all of them.
-const ENOUGH: usize = 2000;
+const MIN_SEARCH_SAMPLES: usize = 2000;
 
 /// The best model that any of the starts leads to.
-pub(super) fn best(problem: &Problem) -> Result<Outcome, FitError> {
-    let factor = problem.output.len() / ENOUGH;
-    let followed = if factor < 2 { search(problem) } else { search(&problem.thinned(factor)) };
-    let ends = followed.iter().filter_map(|start| descend(problem, &start.theta, MANY_STEPS));
-    ends.min_by(|a, b| a.squares.total_cmp(&b.squares)).ok_or(FitError::NoStart)
+pub(super) fn best(problem: &FitProblem) -> Result<Minimum, FitError> {
+    let factor = problem.output.len() / MIN_SEARCH_SAMPLES;
+    let followed = if factor < 2 { search(problem) } else { search(&problem.decimated(factor)) };
+    let ends = followed.iter().filter_map(|start| minimise(problem, &start.theta, MAX_STEPS));
+    ends.min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares)).ok_or(FitError::NoStart)
 }
 
 /// The few models from which it is worth while to go on.
-fn search(problem: &Problem) -> Vec<Outcome> {
+fn search(problem: &FitProblem) -> Vec<Minimum> {
     let mut starts = candidates(problem);
-    starts.sort_by(|a, b| a.squares.total_cmp(&b.squares));
-    starts.dedup_by(|b, a| (b.squares - a.squares).abs() < 1e-6 * a.squares);
-    starts.truncate(FOLLOWED);
+    starts.sort_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
+    starts.dedup_by(|b, a| (b.sum_of_squares - a.sum_of_squares).abs() < 1e-6 * a.sum_of_squares);
+    starts.truncate(FOLLOWED_STARTS);
     if problem.poles > 2 {
         starts.extend(from_fewer_poles(problem));
     }
-    let mut followed: Vec<Outcome> =
-        starts.iter().filter_map(|start| descend(problem, &start.theta, FEW_STEPS)).collect();
-    followed.sort_by(|a, b| a.squares.total_cmp(&b.squares));
-    followed.truncate(TO_THE_END);
+    let mut followed: Vec<Minimum> =
+        starts.iter().filter_map(|start| minimise(problem, &start.theta, FIRST_STEPS)).collect();
+    followed.sort_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
+    followed.truncate(FINAL_STARTS);
     followed
 }
 
 /// The best model with a pole fewer and another that is hardly seen: a model
 /// with more poles is then never worse.
-fn from_fewer_poles(problem: &Problem) -> Vec<Outcome> {
+fn from_fewer_poles(problem: &FitProblem) -> Vec<Minimum> {
     let poles = problem.poles - 1;
-    let fewer = Problem { poles, zeros: problem.zeros.min(poles), ..problem.clone() };
+    let fewer = FitProblem { poles, zeros: problem.zeros.min(poles), ..problem.clone() };
     let Ok(best) = best(&fewer) else { return Vec::new() };
     let slow: f64 = best.theta[fewer.zeros + 1];
     let with_pole = |time_s: f64| {
         let den = polynomial::multiply(&fewer.den(&best.theta), &[time_s, 1.0]);
-        started(problem, &den, fewer.dead_time_s(&best.theta))
+        with_linear_part(problem, &den, fewer.dead_time_s(&best.theta))
     };
     [0.1 * problem.dt_s, problem.dt_s, 0.2 * slow].into_iter().filter_map(with_pole).collect()
 }
 
 /// A start of a denominator (highest power first, of any scale) and a dead
 /// time, with the numerator that fits best.
-fn started(problem: &Problem, den: &[f64], dead_time_s: f64) -> Option<Outcome> {
+fn with_linear_part(problem: &FitProblem, den: &[f64], dead_time_s: f64) -> Option<Minimum> {
     let layout = problem.layout();
     let mut theta = vec![0.0; layout.total];
     let last = den.last().copied()?;
@@ -76,11 +76,11 @@ fn started(problem: &Problem, den: &[f64], dead_time_s: f64) -> Option<Outcome> 
         theta[place] = dead_time_s;
     }
     problem.project(&mut theta);
-    let squares = fill_linear(problem, &mut theta)?;
-    Some(Outcome { theta, squares })
+    let squares = solve_linear(problem, &mut theta)?;
+    Some(Minimum { theta, sum_of_squares: squares })
 }
 
-fn candidates(problem: &Problem) -> Vec<Outcome> {
+fn candidates(problem: &FitProblem) -> Vec<Minimum> {
     let dead_times = dead_times(problem);
     let slowest = 4.0 / problem.duration_s();
     let ratio = libm::log(0.5 / problem.dt_s / slowest) / f64::from(BANDWIDTHS - 1);
@@ -90,21 +90,21 @@ fn candidates(problem: &Problem) -> Vec<Outcome> {
         let Some(filtered) = Filtered::of(problem, bandwidth) else { continue };
         for &dead_time_s in &dead_times {
             let den = filtered.denominator(problem, dead_time_s);
-            found.extend(den.and_then(|den| started(problem, &den, dead_time_s)));
+            found.extend(den.and_then(|den| with_linear_part(problem, &den, dead_time_s)));
         }
     }
     found
 }
 
 /// Whole steps where the range is narrow, spread over it where it is wide.
-fn dead_times(problem: &Problem) -> Vec<f64> {
-    let DeadTime::Estimated { least_s, most_s } = problem.dead_time else {
+fn dead_times(problem: &FitProblem) -> Vec<f64> {
+    let DeadTime::Estimated { min_s: least_s, max_s: most_s } = problem.dead_time else {
         return vec![problem.dead_time_s(&[])];
     };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
     let steps = ((most_s - least_s) / problem.dt_s).ceil() as usize;
-    let count = steps.clamp(1, MOST_DEAD_TIMES - 1);
-    let at = |k: usize| least_s + (most_s - least_s) * float(k) / float(count);
+    let count = steps.clamp(1, MAX_DEAD_TIMES - 1);
+    let at = |k: usize| least_s + (most_s - least_s) * to_f64(k) / to_f64(count);
     (0..=count).map(at).collect()
 }
 
@@ -120,7 +120,7 @@ struct Filtered {
 }
 
 impl Filtered {
-    fn of(problem: &Problem, bandwidth: f64) -> Option<Self> {
+    fn of(problem: &FitProblem, bandwidth: f64) -> Option<Self> {
         let n = problem.poles;
         let den = (0..n).fold(vec![1.0], |p, _| polynomial::multiply(&p, &[1.0, bandwidth]));
         let through = |row: &[f64], j: usize, between: Between| -> Option<Vec<f64>> {
@@ -131,11 +131,11 @@ impl Filtered {
             Some(row.iter().map(|u| model.step(*u)).collect())
         };
         let level = match problem.level {
-            Level::Known(level) => level,
-            Level::Estimated => problem.output.first().copied()?,
+            OutputLevel::Known(level) => level,
+            OutputLevel::Estimated => problem.output.first().copied()?,
         };
         let output: Vec<f64> = problem.output.iter().map(|y| y - level).collect();
-        let unsettled = problem.free || problem.level == Level::Estimated;
+        let unsettled = problem.has_free_response || problem.level == OutputLevel::Estimated;
         let ones = vec![1.0; output.len()];
         let constants = if unsettled { n } else { 0 };
         Some(
@@ -169,27 +169,27 @@ impl Filtered {
     }
 
     /// A stable denominator: s^n·y = −Σ a(j)·s^j·y + Σ b(j)·s^j·u(t − L), solved for a.
-    fn denominator(&self, problem: &Problem, dead_time_s: f64) -> Option<Vec<f64>> {
+    fn denominator(&self, problem: &FitProblem, dead_time_s: f64) -> Option<Vec<f64>> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
         let delay = (dead_time_s / problem.dt_s).round() as usize;
-        let late = |row: &Vec<f64>| -> Vec<f64> {
+        let delayed = |row: &Vec<f64>| -> Vec<f64> {
             let zeros = std::iter::repeat_n(0.0, delay.min(row.len()));
             zeros.chain(row.iter().copied()).take(row.len()).collect()
         };
         let n = problem.poles;
         let mut columns: Vec<Vec<f64>> = self.output[..n].to_vec();
-        columns.extend(self.input.iter().map(late));
+        columns.extend(self.input.iter().map(delayed));
         columns.extend(self.constant.iter().cloned());
-        let found = nearest(&columns, &self.output[n])?;
+        let found = least_squares(&columns, &self.output[n])?;
         let monic: Vec<f64> =
             [1.0].into_iter().chain(found[..n].iter().rev().map(|a| -a)).collect();
-        Some(stable(&monic, problem))
+        Some(stabilised(&monic, problem))
     }
 }
 
 /// The same with poles that lie on the right mirrored, and none slower than the
 /// record or faster than a tenth of a step.
-fn stable(monic: &[f64], problem: &Problem) -> Vec<f64> {
+fn stabilised(monic: &[f64], problem: &FitProblem) -> Vec<f64> {
     let (least, most) = (1.0 / problem.duration_s(), 10.0 / problem.dt_s);
     let mend = |pole: &Complex<f64>| {
         Complex::new(-pole.re.abs().clamp(least, most), pole.im.clamp(-most, most))

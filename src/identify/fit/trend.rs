@@ -1,33 +1,33 @@
 //! A straight line in time through a row: how much of it is drift.
 
-use super::autoregression::Colour;
-use crate::numeric::number::float;
+use super::autoregression::ArModel;
+use crate::numeric::number::to_f64;
 
 /// Least F ratio at which a line is more than chance.
-const SEEN: f64 = 15.0;
+const MIN_F_RATIO: f64 = 15.0;
 /// A smaller share of a row is of no account.
-const SMALL: f64 = 0.1;
+const MIN_EXPLAINED: f64 = 0.1;
 /// A line that explains more than this share of a row dominates it.
-pub const DOMINATES: f64 = 0.5;
+pub const DOMINANT_FRACTION: f64 = 0.5;
 
 /// The line that is nearest to a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trend {
     /// Share of the row's variance that it explains, 0 to 1.
-    pub share: f64,
+    pub explained_fraction: f64,
     /// By how much it rises from the first sample to the last.
     pub rise: f64,
     /// Sum of squares about the line.
-    pub squares: f64,
+    pub residual_sum_of_squares: f64,
 }
 
 impl Trend {
     /// Of a row at even times; of fewer than two samples there is none.
     pub fn of(row: &[f64]) -> Self {
-        let n = float(row.len().max(1));
+        let n = to_f64(row.len().max(1));
         let mean = row.iter().sum::<f64>() / n;
         let middle = 0.5 * (n - 1.0);
-        let from_middle = |k: usize| float(k) - middle;
+        let from_middle = |k: usize| to_f64(k) - middle;
         let (mut along, mut across, mut whole) = (0.0, 0.0, 0.0);
         for (k, value) in row.iter().enumerate() {
             along += from_middle(k) * from_middle(k);
@@ -35,33 +35,38 @@ impl Trend {
             whole += (value - mean) * (value - mean);
         }
         if !(along > 0.0 && whole > 0.0) {
-            return Self { share: 0.0, rise: 0.0, squares: whole };
+            return Self { explained_fraction: 0.0, rise: 0.0, residual_sum_of_squares: whole };
         }
         let slope = across / along;
         let explained = (slope * across).min(whole);
-        Self { share: explained / whole, rise: slope * (n - 1.0), squares: whole - explained }
+        Self {
+            explained_fraction: explained / whole,
+            rise: slope * (n - 1.0),
+            residual_sum_of_squares: whole - explained,
+        }
     }
 
     /// A row without its line; the row's mean stays.
-    pub fn taken_off(&self, row: &[f64]) -> Vec<f64> {
-        let last = float(row.len().max(2)) - 1.0;
+    pub fn detrend(&self, row: &[f64]) -> Vec<f64> {
+        let last = to_f64(row.len().max(2)) - 1.0;
         let slope = self.rise / last;
-        row.iter().enumerate().map(|(k, value)| value - slope * (float(k) - 0.5 * last)).collect()
+        row.iter().enumerate().map(|(k, value)| value - slope * (to_f64(k) - 0.5 * last)).collect()
     }
 
     /// The line through a row where it is more than chance: more than a tenth of
     /// the row, and more than as few samples would show as what it leaves says as
     /// much as.
-    pub fn seen_in(row: &[f64]) -> Option<Self> {
+    pub fn significant_in(row: &[f64]) -> Option<Self> {
         let trend = Self::of(row);
-        if trend.share < SMALL {
+        if trend.explained_fraction < MIN_EXPLAINED {
             return None;
         }
-        let mean = row.iter().sum::<f64>() / float(row.len().max(1));
-        let left: Vec<f64> = trend.taken_off(row).iter().map(|value| value - mean).collect();
-        let ratio = trend.share / (1.0 - trend.share).max(f64::MIN_POSITIVE)
-            * Colour::of(&left).independent(left.len());
-        (ratio > SEEN).then_some(trend)
+        let mean = row.iter().sum::<f64>() / to_f64(row.len().max(1));
+        let left: Vec<f64> = trend.detrend(row).iter().map(|value| value - mean).collect();
+        let ratio = trend.explained_fraction
+            / (1.0 - trend.explained_fraction).max(f64::MIN_POSITIVE)
+            * ArModel::of(&left).effective_samples(left.len());
+        (ratio > MIN_F_RATIO).then_some(trend)
     }
 }
 
@@ -89,22 +94,25 @@ mod tests {
     fn a_line_is_found_with_its_rise() {
         let line: Vec<f64> = (0..101).map(|k| 3.0 - 0.2 * f64::from(k)).collect();
         let found = Trend::of(&line);
-        assert!((found.share - 1.0).abs() < 1e-12 && (found.rise + 20.0).abs() < 1e-9);
-        assert!(found.squares < 1e-9);
-        assert!(found.taken_off(&line).iter().all(|value| (value + 7.0).abs() < 1e-9));
-        assert_eq!(Trend::of(&[4.0; 9]), Trend { share: 0.0, rise: 0.0, squares: 0.0 });
-        assert_eq!(Trend::of(&[]).share, 0.0);
+        assert!((found.explained_fraction - 1.0).abs() < 1e-12 && (found.rise + 20.0).abs() < 1e-9);
+        assert!(found.residual_sum_of_squares < 1e-9);
+        assert!(found.detrend(&line).iter().all(|value| (value + 7.0).abs() < 1e-9));
+        assert_eq!(
+            Trend::of(&[4.0; 9]),
+            Trend { explained_fraction: 0.0, rise: 0.0, residual_sum_of_squares: 0.0 }
+        );
+        assert_eq!(Trend::of(&[]).explained_fraction, 0.0);
     }
 
     #[test]
     fn drift_is_seen_below_noise_and_noise_is_none() {
         for seed in 0..30 {
-            assert_eq!(Trend::seen_in(&noise(seed, 0.0)), None, "{seed}");
-            assert_eq!(Trend::seen_in(&noise(seed, 0.98)), None, "{seed}");
+            assert_eq!(Trend::significant_in(&noise(seed, 0.0)), None, "{seed}");
+            assert_eq!(Trend::significant_in(&noise(seed, 0.98)), None, "{seed}");
             let drifts = noise(seed, 0.5);
             let drifts: Vec<f64> =
                 (0..2000).zip(drifts).map(|(k, e)| e + 1e-3 * f64::from(k)).collect();
-            let seen = Trend::seen_in(&drifts).unwrap();
+            let seen = Trend::significant_in(&drifts).unwrap();
             assert!((seen.rise - 2.0).abs() < 0.8, "{seen:?}");
         }
     }

@@ -3,9 +3,9 @@
 
 use std::fmt::Write;
 
-use super::{Point, Profile, ProfileError};
+use super::{CommandProfile, CommandProfileError, ProfilePoint};
 use crate::core::quantity::Quantity;
-use crate::identify::table::{Table, TableError};
+use crate::identify::table::{DataTable, DataTableError};
 
 /// The column of time.
 const TIME: &str = "time_s";
@@ -15,7 +15,7 @@ const TIME: &str = "time_s";
 pub enum ProfileFileError {
     /// It is no table.
     #[error(transparent)]
-    Table(#[from] TableError),
+    Table(#[from] DataTableError),
     /// Its columns are others.
     #[error("the columns are {}; expected time_s and one quantity whose name ends with its unit, such as screw_rpm", .found.join(", "))]
     Columns {
@@ -37,12 +37,12 @@ pub enum ProfileFileError {
     Short,
     /// Its values make none.
     #[error(transparent)]
-    Profile(#[from] ProfileError),
+    Profile(#[from] CommandProfileError),
 }
 
 /// Reads a profile, and what it commands.
-pub fn parse(text: &str) -> Result<(Profile, Quantity), ProfileFileError> {
-    let table = Table::parse(text)?;
+pub fn parse(text: &str) -> Result<(CommandProfile, Quantity), ProfileFileError> {
+    let table = DataTable::parse(text)?;
     let other = || ProfileFileError::Columns { found: table.names().to_vec() };
     let [time, column] = table.names() else { return Err(other()) };
     let quantity = Quantity::of_column(column, None).filter(|_| time == TIME).ok_or_else(other)?;
@@ -55,12 +55,12 @@ pub fn parse(text: &str) -> Result<(Profile, Quantity), ProfileFileError> {
     let (Some((end_s, begins)), true) = (times.split_last(), times.len() > 1) else {
         return Err(ProfileFileError::Short);
     };
-    let points = begins.iter().zip(values).map(|(&from_s, value)| Point { from_s, value });
-    Ok((Profile::new(points.collect(), *end_s)?, quantity))
+    let points = begins.iter().zip(values).map(|(&from_s, value)| ProfilePoint { from_s, value });
+    Ok((CommandProfile::new(points.collect(), *end_s)?, quantity))
 }
 
 /// The text of a profile's file; `column` ends with the unit.
-pub fn to_csv(profile: &Profile, column: &str) -> String {
+pub fn to_csv(profile: &CommandProfile, column: &str) -> String {
     let mut text = format!("{TIME},{column}\n");
     let end = profile.points().last().map(|last| (profile.end_s(), last.value));
     let points = profile.points().iter().map(|point| (point.from_s, point.value));
@@ -82,8 +82,8 @@ mod tests {
     #[test]
     fn what_is_written_is_read_again() {
         let value = |k: u32| 20.0 + f64::from(k * k % 7) / 3.0;
-        let points = (0..50).map(|k| Point { from_s: f64::from(k) * 0.5, value: value(k) });
-        let profile = Profile::new(points.collect(), 24.9).unwrap();
+        let points = (0..50).map(|k| ProfilePoint { from_s: f64::from(k) * 0.5, value: value(k) });
+        let profile = CommandProfile::new(points.collect(), 24.9).unwrap();
         let text = to_csv(&profile, "screw_rpm");
         assert!(text.starts_with("time_s,screw_rpm\n0,20\n0.5,20.333333333333332\n"), "{text}");
         let (read, quantity) = parse(&text).unwrap();
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_profile_is_told() {
+    fn what_is_no_profile_is_refused() {
         let said = |text: &str| parse(text).unwrap_err().to_string();
         assert!(said("time_s,speed\n0,1\n1,1\n").contains("the columns are time_s, speed"));
         assert!(said("time_ms,rpm\n0,1\n1,1\n").contains("expected time_s"));

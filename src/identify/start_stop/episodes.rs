@@ -3,34 +3,34 @@
 
 use super::error::StartStopFitError;
 use crate::identify::grid::usual_step;
-use crate::identify::series::Series;
-use crate::numeric::number::float;
+use crate::identify::series::TimeSeries;
+use crate::numeric::number::to_f64;
 use crate::numeric::rank;
 
 /// A command above this share of its largest value runs the pump.
-const RUNS_SHARE: f64 = 0.05;
+const RUN_FRACTION: f64 = 0.05;
 /// A start is looked at until then at the latest \[s\].
-const LONGEST_START_S: f64 = 30.0;
+const MAX_START_S: f64 = 30.0;
 /// A stop is looked at for so long \[s\].
-const LONGEST_STOP_S: f64 = 6.0;
+const MAX_STOP_S: f64 = 6.0;
 /// A stop that was looked at for less tells nothing of the drool \[s\].
-const SHORTEST_STOP_S: f64 = 0.5;
+const MIN_STOP_S: f64 = 0.5;
 /// Less than this share of the samples tells neither.
-const SEEN_SHARE: f64 = 0.8;
+const MIN_COVERAGE: f64 = 0.8;
 /// A run tells its flow in this share at its end.
-const EVEN_SHARE: f64 = 0.4;
+const STEADY_FRACTION: f64 = 0.4;
 /// A flow, or a command, that changes by more than this share is not even.
-const UNEVEN_SHARE: f64 = 0.05;
+const STEADY_TOLERANCE: f64 = 0.05;
 /// Three standard deviations of the difference of the medians of two halves, over
 /// the median step from a sample to the next and √n: 3·1.2533·2/(0.6745·√2).
 const NOISE_FACTOR: f64 = 7.88;
 /// A run whose flow is below this share of the largest has none…
-const NO_FLOW_SHARE: f64 = 0.1;
+const NO_FLOW_FRACTION: f64 = 0.1;
 /// …unless it is shorter than this share of the usual one.
-const SHORT_SHARE: f64 = 0.5;
-const FEWEST_SAMPLES: usize = 50;
+const SHORT_FRACTION: f64 = 0.5;
+const MIN_SAMPLES: usize = 50;
 /// Fewer samples of an even flow do not tell it.
-const FEWEST_EVEN: usize = 10;
+const MIN_STEADY_SAMPLES: usize = 10;
 
 /// Flow after a change of the command.
 #[derive(Debug, Clone)]
@@ -64,16 +64,15 @@ struct Run {
     from_s: f64,
     to_s: f64,
     /// Whether it was told to stop at its end; otherwise the record ends.
-    is_told_to_stop: bool,
+    is_stop_commanded: bool,
     flow: f64,
     /// Whether the command was the same all along and the flow even at its end.
-    is_even: bool,
+    is_steady: bool,
 }
 
 /// Finds starts after a pause that is known, and stops of an even flow.
-pub(super) fn find(command: &Series, flow: &Series) -> Result<Episodes, StartStopFitError> {
-    for (what, series, needed) in [("the command", command, 2), ("the flow", flow, FEWEST_SAMPLES)]
-    {
+pub(super) fn find(command: &TimeSeries, flow: &TimeSeries) -> Result<Episodes, StartStopFitError> {
+    for (what, series, needed) in [("the command", command, 2), ("the flow", flow, MIN_SAMPLES)] {
         if series.len() < needed {
             return Err(StartStopFitError::TooFewSamples { what, found: series.len(), needed });
         }
@@ -82,7 +81,7 @@ pub(super) fn find(command: &Series, flow: &Series) -> Result<Episodes, StartSto
     let most = runs.iter().map(|run| run.flow).fold(0.0, f64::max);
     check_flow(&runs, most)?;
     for run in &mut runs {
-        run.is_even &= run.flow > NO_FLOW_SHARE * most;
+        run.is_steady &= run.flow > NO_FLOW_FRACTION * most;
     }
     let starts: Vec<Episode> = runs
         .windows(2)
@@ -96,22 +95,22 @@ pub(super) fn find(command: &Series, flow: &Series) -> Result<Episodes, StartSto
     Ok(Episodes { runs: runs.len(), starts, stops })
 }
 
-fn start(flow: &Series, last: &Run, run: &Run) -> Option<Episode> {
-    let to_s = run.to_s.min(run.from_s + LONGEST_START_S);
+fn start(flow: &TimeSeries, last: &Run, run: &Run) -> Option<Episode> {
+    let to_s = run.to_s.min(run.from_s + MAX_START_S);
     let (idle_s, before) = (run.from_s - last.to_s, last.flow);
-    run.is_even.then(|| episode(flow, [run.from_s, to_s], idle_s, [run.flow, before]))?
+    run.is_steady.then(|| episode(flow, [run.from_s, to_s], idle_s, [run.flow, before]))?
 }
 
-fn stop(flow: &Series, run: &Run, next_s: f64) -> Option<Episode> {
+fn stop(flow: &TimeSeries, run: &Run, next_s: f64) -> Option<Episode> {
     let idle_s = next_s - run.to_s;
-    let to_s = run.to_s + idle_s.min(LONGEST_STOP_S);
-    let told = run.is_told_to_stop && run.is_even && idle_s >= SHORTEST_STOP_S;
-    told.then(|| episode(flow, [run.to_s, to_s], idle_s, [run.flow, run.flow]))?
+    let to_s = run.to_s + idle_s.min(MAX_STOP_S);
+    let is_usable = run.is_stop_commanded && run.is_steady && idle_s >= MIN_STOP_S;
+    is_usable.then(|| episode(flow, [run.to_s, to_s], idle_s, [run.flow, run.flow]))?
 }
 
 /// The flow between two moments; none where much of it was lost.
 fn episode(
-    flow: &Series,
+    flow: &TimeSeries,
     [from_s, to_s]: [f64; 2],
     idle_s: f64,
     [even, before]: [f64; 2],
@@ -120,8 +119,8 @@ fn episode(
     let part = flow.within(from_s, to_s);
     let pairs = part.time_s.iter().zip(&part.values);
     let samples: Vec<(f64, f64)> = pairs.map(|(t, q)| (t - from_s, q / even)).collect();
-    let seen_s = float(samples.len()) * step_s;
-    let is_whole = seen_s >= SEEN_SHARE * (to_s - from_s);
+    let seen_s = to_f64(samples.len()) * step_s;
+    let is_whole = seen_s >= MIN_COVERAGE * (to_s - from_s);
     is_whole.then_some(Episode { at_s: from_s, idle_s, flow: even, before, samples, step_s })
 }
 
@@ -130,83 +129,89 @@ fn check_count(
     stops: &[Episode],
     runs: &[Run],
 ) -> Result<(), StartStopFitError> {
-    const STARTS: usize = 5;
-    const STOPS: usize = 3;
-    const FACTOR: f64 = 5.0;
-    if starts.len() < STARTS {
+    const MIN_STARTS: usize = 5;
+    const MIN_STOPS: usize = 3;
+    const MIN_PAUSE_RATIO: f64 = 5.0;
+    if starts.len() < MIN_STARTS {
         let (found, left_out) = (starts.len(), runs.len() - starts.len());
-        return Err(StartStopFitError::TooFewStarts { found, needed: STARTS, left_out });
+        return Err(StartStopFitError::TooFewStarts { found, needed: MIN_STARTS, left_out });
     }
-    if stops.len() < STOPS {
-        return Err(StartStopFitError::TooFewStops { found: stops.len(), needed: STOPS });
+    if stops.len() < MIN_STOPS {
+        return Err(StartStopFitError::TooFewStops { found: stops.len(), needed: MIN_STOPS });
     }
     let idle = || starts.iter().map(|start| start.idle_s);
     let (shortest_s, longest_s) = (idle().fold(f64::MAX, f64::min), idle().fold(0.0, f64::max));
-    if longest_s < FACTOR * shortest_s {
-        return Err(StartStopFitError::IdleTimesAlike { shortest_s, longest_s, factor: FACTOR });
+    if longest_s < MIN_PAUSE_RATIO * shortest_s {
+        return Err(StartStopFitError::PausesTooSimilar {
+            shortest_s,
+            longest_s,
+            factor: MIN_PAUSE_RATIO,
+        });
     }
     Ok(())
 }
 
 /// Times in which the command runs the pump.
-fn runs(command: &Series, flow: &Series) -> Result<Vec<Run>, StartStopFitError> {
+fn runs(command: &TimeSeries, flow: &TimeSeries) -> Result<Vec<Run>, StartStopFitError> {
     let most = command.values.iter().copied().fold(0.0, f64::max);
     if most <= 0.0 {
-        return Err(StartStopFitError::NeverCommanded { most });
+        return Err(StartStopFitError::NeverCommanded { max: most });
     }
-    let (mut found, mut open) = (Vec::new(), None::<Told>);
+    let (mut found, mut open) = (Vec::new(), None::<CommandedRun>);
     for (time_s, value) in command.time_s.iter().zip(&command.values) {
-        match (&mut open, *value > RUNS_SHARE * most) {
-            (None, true) => open = Some(Told { from_s: *time_s, low: *value, high: *value }),
-            (Some(told), true) => {
-                (told.low, told.high) = (told.low.min(*value), told.high.max(*value));
+        match (&mut open, *value > RUN_FRACTION * most) {
+            (None, true) => {
+                open = Some(CommandedRun { from_s: *time_s, low: *value, high: *value })
             }
-            (Some(told), false) => {
-                found.push(run(flow, told, *time_s, true));
+            (Some(command), true) => {
+                (command.low, command.high) = (command.low.min(*value), command.high.max(*value));
+            }
+            (Some(command), false) => {
+                found.push(run(flow, command, *time_s, true));
                 open = None;
             }
             (None, false) => {}
         }
     }
-    if let (Some(told), Some(to_s)) = (open, flow.time_s.last()) {
-        found.push(run(flow, &told, *to_s, false));
+    if let (Some(command), Some(to_s)) = (open, flow.time_s.last()) {
+        found.push(run(flow, &command, *to_s, false));
     }
     Ok(found)
 }
 
 /// What the pump is told in a run.
 #[derive(Debug, Clone, Copy)]
-struct Told {
+struct CommandedRun {
     from_s: f64,
     low: f64,
     high: f64,
 }
 
-fn run(flow: &Series, told: &Told, to_s: f64, is_told_to_stop: bool) -> Run {
-    let from_s = told.from_s;
-    let half_s = 0.5 * EVEN_SHARE * (to_s - from_s);
+fn run(flow: &TimeSeries, command: &CommandedRun, to_s: f64, is_stop_commanded: bool) -> Run {
+    let from_s = command.from_s;
+    let half_s = 0.5 * STEADY_FRACTION * (to_s - from_s);
     let end = flow.within(to_s - 2.0 * half_s, to_s).values;
     let part = |from_s: f64, to_s: f64| rank::median(&mut flow.within(from_s, to_s).values);
     let [early, late] = [part(to_s - 2.0 * half_s, to_s - half_s), part(to_s - half_s, to_s)];
     let even = rank::median(&mut end.clone()).unwrap_or(0.0);
     let mut off: Vec<f64> =
         end.windows(2).filter_map(|pair| Some((pair.get(1)? - pair.first()?).abs())).collect();
-    let chance = NOISE_FACTOR * rank::median(&mut off).unwrap_or(0.0) / float(end.len()).sqrt();
+    let chance = NOISE_FACTOR * rank::median(&mut off).unwrap_or(0.0) / to_f64(end.len()).sqrt();
     // A flow that still comes up grows from one half to the other.
     let grows = late.zip(early).map_or(f64::INFINITY, |(late, early)| (late - early).abs());
-    let is_level = told.high - told.low <= UNEVEN_SHARE * told.high;
+    let is_level = command.high - command.low <= STEADY_TOLERANCE * command.high;
     let is_even = is_level
-        && end.len() >= FEWEST_EVEN
+        && end.len() >= MIN_STEADY_SAMPLES
         && chance < even.abs()
-        && grows < UNEVEN_SHARE * even.abs() + chance;
-    Run { from_s, to_s, is_told_to_stop, flow: even, is_even }
+        && grows < STEADY_TOLERANCE * even.abs() + chance;
+    Run { from_s, to_s, is_stop_commanded, flow: even, is_steady: is_even }
 }
 
 fn check_flow(runs: &[Run], most: f64) -> Result<(), StartStopFitError> {
     let mut lasted: Vec<f64> = runs.iter().map(|run| run.to_s - run.from_s).collect();
     let usual_s = rank::median(&mut lasted).unwrap_or(0.0);
     let dry = runs.iter().find(|run| {
-        run.flow <= NO_FLOW_SHARE * most && run.to_s - run.from_s >= SHORT_SHARE * usual_s
+        run.flow <= NO_FLOW_FRACTION * most && run.to_s - run.from_s >= SHORT_FRACTION * usual_s
     });
     match dry {
         None => Ok(()),
@@ -214,7 +219,7 @@ fn check_flow(runs: &[Run], most: f64) -> Result<(), StartStopFitError> {
             at_s: run.from_s,
             lasted_s: run.to_s - run.from_s,
             flow_mm3_per_s: run.flow,
-            most_mm3_per_s: most,
+            max_mm3_per_s: most,
         }),
     }
 }

@@ -1,6 +1,6 @@
 //! Why a recording does not tell how an extruder starts and stops.
 
-use crate::identify::number::brief;
+use crate::identify::number::three_digits;
 
 /// What is wrong with a recording, with what was found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -16,10 +16,10 @@ pub enum StartStopFitError {
         needed: usize,
     },
     /// The pump was never told to run.
-    #[error("the command never exceeds zero (its largest value is {}); is it the right column?", brief(*.most))]
+    #[error("the command never exceeds zero (its largest value is {}); is it the right column?", three_digits(*.max))]
     NeverCommanded {
         /// Largest value of the command.
-        most: f64,
+        max: f64,
     },
     /// Samples so far apart that a start is over before the next one.
     #[error(
@@ -57,9 +57,9 @@ pub enum StartStopFitError {
     /// Pauses that do not tell how the delay grows.
     #[error(
         "all pauses are alike: from {} to {} s. How the delay grows with the pause shows only in \
-         pauses that differ by a factor of {factor} or more", brief(*.shortest_s), brief(*.longest_s)
+         pauses that differ by a factor of {factor} or more", three_digits(*.shortest_s), three_digits(*.longest_s)
     )]
-    IdleTimesAlike {
+    PausesTooSimilar {
         /// Shortest pause \[s\].
         shortest_s: f64,
         /// Longest pause \[s\].
@@ -71,7 +71,7 @@ pub enum StartStopFitError {
     #[error(
         "the pump was told to run at {at_s:.2} s for {lasted_s:.1} s and no flow came: \
          {} mm³/s, in other runs up to {} mm³/s. Look for a blocked nozzle or a log of another bead",
-        brief(*.flow_mm3_per_s), brief(*.most_mm3_per_s)
+        three_digits(*.flow_mm3_per_s), three_digits(*.max_mm3_per_s)
     )]
     NoFlow {
         /// When it was told \[s\].
@@ -81,29 +81,29 @@ pub enum StartStopFitError {
         /// Flow at the end of that.
         flow_mm3_per_s: f64,
         /// Largest flow at the end of a run.
-        most_mm3_per_s: f64,
+        max_mm3_per_s: f64,
     },
     /// Flow that does not cease.
     #[error(
-        "{seen_s:.1} s after the stop at {at_s:.2} s, which was looked at longest, the flow is still \
-         {percent:.0} % of that before; expected below {most_percent:.0} %. Does the command tell the \
+        "{observed_s:.1} s after the stop at {at_s:.2} s, which was looked at longest, the flow is still \
+         {percent:.0} % of that before; expected below {max_percent:.0} %. Does the command tell the \
          pump to stop, is the zero of the flow right?"
     )]
-    FlowGoesOn {
+    FlowContinues {
         /// When the pump was told to stop \[s\].
         at_s: f64,
         /// How long after that it was looked at \[s\].
-        seen_s: f64,
+        observed_s: f64,
         /// What is left of the flow \[%\].
         percent: f64,
         /// What may be left \[%\].
-        most_percent: f64,
+        max_percent: f64,
     },
     /// The delay has nothing to do with the pause.
     #[error(
         "the delay of the first flow does not grow with the pause: by {grows_s:.3} ± {sigma_s:.3} s \
          from a pause of {} to one of {} s. A fixed delay is enough, or shorter pauses are missing",
-        brief(*.shortest_s), brief(*.longest_s)
+        three_digits(*.shortest_s), three_digits(*.longest_s)
     )]
     DelayDoesNotGrow {
         /// By how much it grows \[s\].
@@ -118,8 +118,8 @@ pub enum StartStopFitError {
     /// A time constant that the pauses do not bracket.
     #[error(
         "the pauses do not tell how fast the void opens: a time constant of {} ± {} s from pauses \
-         of {} to {} s. Add pauses {}", brief(*.found_s), brief(*.sigma_s), brief(*.shortest_s),
-        brief(*.longest_s), if *.found_s > 0.5 * *.longest_s { "of several times that" } else {
+         of {} to {} s. Add pauses {}", three_digits(*.found_s), three_digits(*.sigma_s), three_digits(*.shortest_s),
+        three_digits(*.longest_s), if *.found_s > 0.5 * *.longest_s { "of several times that" } else {
             "about that long, and shorter ones" }
     )]
     TimeConstantUndetermined {

@@ -4,7 +4,7 @@ use super::parameters::StartStop;
 
 /// A start as it was seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SeenStart {
+pub struct ObservedStart {
     /// When the command began \[s\].
     pub at_s: f64,
     /// How long the pump had stood \[s\].
@@ -19,15 +19,15 @@ pub struct SeenStart {
 
 /// A stop as it was seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SeenStop {
+pub struct ObservedStop {
     /// When the command ended \[s\].
     pub at_s: f64,
     /// Flow before it \[mm³/s\].
     pub flow_mm3_per_s: f64,
     /// How long the flow was looked at after it \[s\].
-    pub seen_s: f64,
+    pub observed_s: f64,
     /// What came in that time, with what was on its way \[mm³\].
-    pub came_mm3: f64,
+    pub volume_mm3: f64,
 }
 
 /// What was found.
@@ -40,9 +40,9 @@ pub struct StartStopFit {
     /// Runs of the pump, with those that tell nothing.
     pub runs: usize,
     /// Starts after a pause that is known.
-    pub starts: Vec<SeenStart>,
+    pub starts: Vec<ObservedStart>,
     /// Stops.
-    pub stops: Vec<SeenStop>,
+    pub stops: Vec<ObservedStop>,
     /// Standard deviation of the delays about the model \[s\].
-    pub delay_scatter_s: f64,
+    pub delay_sigma_s: f64,
 }

@@ -3,11 +3,11 @@
 use super::estimate::StartStopFit;
 use super::parameters::StartStop;
 use crate::document::{Document, Problems, Table};
-use crate::identify::file::{Setting, number, put, put_setting, read_setting, row};
+use crate::identify::file::{Conditions, number, put, put_conditions, read_conditions, row};
 
 /// A parameter as files and tables name it.
 #[derive(Debug, Clone, Copy)]
-pub struct Named {
+pub struct ParameterKey {
     /// Its key, which ends with its unit.
     pub key: &'static str,
     /// The key of its standard error.
@@ -26,12 +26,12 @@ const fn named(
     [key, sigma_key, unit, about]: [&'static str; 4],
     is_positive: bool,
     of: fn(&StartStop) -> f64,
-) -> Named {
-    Named { key, sigma_key, unit, about, is_positive, of }
+) -> ParameterKey {
+    ParameterKey { key, sigma_key, unit, about, is_positive, of }
 }
 
 /// Parameters of a start.
-pub const START: [Named; 4] = [
+pub const START_PARAMETERS: [ParameterKey; 4] = [
     named(
         ["first_flow_s", "first_flow_sigma_s", "s", "from the command to the first flow"],
         false,
@@ -56,7 +56,7 @@ pub const START: [Named; 4] = [
 ];
 
 /// Parameters of a stop.
-pub const STOP: [Named; 4] = [
+pub const STOP_PARAMETERS: [ParameterKey; 4] = [
     named(["stop_s", "stop_sigma_s", "s", "from the command until the flow falls"], false, |of| {
         of.stop_s
     }),
@@ -78,14 +78,14 @@ pub const STOP: [Named; 4] = [
 ];
 
 /// Beyond it lies no time \[s\] and no volume \[mm³\] of an extruder.
-const MOST: f64 = 1e7;
+const MAX_VALUE: f64 = 1e7;
 /// The shortest time constant that is one \[s\].
-const LEAST: f64 = 1e-6;
-const COUNT: std::ops::RangeInclusive<u64> = 0..=1_000_000;
+const MIN_TIME_CONSTANT_S: f64 = 1e-6;
+const COUNT_RANGE: std::ops::RangeInclusive<u64> = 0..=1_000_000;
 
 /// What the parameters were found from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Seen {
+pub struct FitData {
     /// Starts.
     pub starts: u64,
     /// Stops.
@@ -95,35 +95,35 @@ pub struct Seen {
     /// Smallest and largest flow \[mm³/s\].
     pub flow_range_mm3_per_s: [f64; 2],
     /// Standard deviation of the delays about the model \[s\].
-    pub delay_scatter_s: f64,
+    pub delay_sigma_s: f64,
 }
 
 /// How an extruder starts and stops, and what is known of that.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StartStopFile {
     /// What it holds for.
-    pub setting: Setting,
+    pub conditions: Conditions,
     /// The parameters.
     pub parameters: StartStop,
     /// Their standard errors, each in its own unit.
     pub sigma: StartStop,
     /// What they were found from.
-    pub seen: Seen,
+    pub data: FitData,
 }
 
 impl StartStopFile {
     /// Of what was found.
-    pub fn of(fit: &StartStopFit, setting: Setting) -> Self {
+    pub fn of(fit: &StartStopFit, setting: Conditions) -> Self {
         let idle = fit.starts.iter().map(|start| start.idle_s);
         let flows = fit.starts.iter().map(|start| start.flow_mm3_per_s);
-        let seen = Seen {
+        let seen = FitData {
             starts: fit.starts.len() as u64,
             stops: fit.stops.len() as u64,
             idle_range_s: ends(idle),
             flow_range_mm3_per_s: ends(flows),
-            delay_scatter_s: fit.delay_scatter_s,
+            delay_sigma_s: fit.delay_sigma_s,
         };
-        Self { setting, parameters: fit.parameters, sigma: fit.sigma, seen }
+        Self { conditions: setting, parameters: fit.parameters, sigma: fit.sigma, data: seen }
     }
 }
 
@@ -139,8 +139,8 @@ pub fn to_toml(file: &StartStopFile, notes: &[String]) -> String {
         put(&mut text, format!("# {line}").trim_end());
     }
     put(&mut text, "version = 1");
-    put_setting(&mut text, &file.setting);
-    for (head, list) in [("[start]", &START), ("[stop]", &STOP)] {
+    put_conditions(&mut text, &file.conditions);
+    for (head, list) in [("[start]", &START_PARAMETERS), ("[stop]", &STOP_PARAMETERS)] {
         put(&mut text, &format!("\n{head}"));
         for one in list {
             put(&mut text, &format!("# {}", one.about));
@@ -148,13 +148,13 @@ pub fn to_toml(file: &StartStopFile, notes: &[String]) -> String {
             put(&mut text, &format!("{} = {}", one.sigma_key, number((one.of)(&file.sigma))));
         }
     }
-    let seen = &file.seen;
+    let seen = &file.data;
     put(&mut text, "\n[seen]");
     put(&mut text, &format!("starts = {}", seen.starts));
     put(&mut text, &format!("stops = {}", seen.stops));
     put(&mut text, &format!("idle_range_s = {}", row(&seen.idle_range_s)));
     put(&mut text, &format!("flow_range_mm3_per_s = {}", row(&seen.flow_range_mm3_per_s)));
-    put(&mut text, &format!("delay_scatter_s = {}", number(seen.delay_scatter_s)));
+    put(&mut text, &format!("delay_scatter_s = {}", number(seen.delay_sigma_s)));
     text
 }
 
@@ -171,10 +171,10 @@ fn read_root(root: &Table<'_>) -> Option<StartStopFile> {
         root.report("version", "nothing", "version = 1");
     }
     let version = root.optional_integer("version", 1..=1);
-    let setting = read_setting(root);
-    let start = root.required_table("start").and_then(|table| read_part(&table, &START));
+    let setting = read_conditions(root);
+    let start = root.required_table("start").and_then(|table| read_part(&table, &START_PARAMETERS));
     let stop_table = root.required_table("stop");
-    let stop = stop_table.as_ref().and_then(|table| read_part(table, &STOP));
+    let stop = stop_table.as_ref().and_then(|table| read_part(table, &STOP_PARAMETERS));
     let seen = root.required_table("seen").and_then(|table| read_seen(&table));
     version?;
     let ([first, first_sigma], [last, last_sigma]) = (start?, stop?);
@@ -184,39 +184,39 @@ fn read_root(root: &Table<'_>) -> Option<StartStopFile> {
         return None;
     }
     Some(StartStopFile {
-        setting,
+        conditions: setting,
         parameters,
         sigma: assemble(first_sigma, last_sigma),
-        seen: seen?,
+        data: seen?,
     })
 }
 
 /// Values and standard errors of a table, in the order of its names.
-fn read_part(table: &Table<'_>, list: &[Named; 4]) -> Option<[[f64; 4]; 2]> {
-    let least = |one: &Named| if one.is_positive { LEAST } else { 0.0 };
-    let values = list.map(|one| table.number(one.key, least(&one)..=MOST));
-    let sigma = list.map(|one| table.number(one.sigma_key, 0.0..=MOST));
+fn read_part(table: &Table<'_>, list: &[ParameterKey; 4]) -> Option<[[f64; 4]; 2]> {
+    let least = |one: &ParameterKey| if one.is_positive { MIN_TIME_CONSTANT_S } else { 0.0 };
+    let values = list.map(|one| table.number(one.key, least(&one)..=MAX_VALUE));
+    let sigma = list.map(|one| table.number(one.sigma_key, 0.0..=MAX_VALUE));
     let whole = |[a, b, c, d]: [Option<f64>; 4]| Some([a?, b?, c?, d?]);
     Some([whole(values)?, whole(sigma)?])
 }
 
-fn read_seen(table: &Table<'_>) -> Option<Seen> {
+fn read_seen(table: &Table<'_>) -> Option<FitData> {
     let count = |key: &'static str| {
         if !table.has(key) {
-            table.absent(key, "a whole number");
+            table.report_absent(key, "a whole number");
         }
-        table.optional_integer(key, COUNT)
+        table.optional_integer(key, COUNT_RANGE)
     };
     let (starts, stops) = (count("starts"), count("stops"));
-    let idle_range_s = table.numbers("idle_range_s", 0.0..=MOST);
-    let flow_range_mm3_per_s = table.numbers("flow_range_mm3_per_s", 0.0..=MOST);
-    let delay_scatter_s = table.number("delay_scatter_s", 0.0..=MOST);
-    Some(Seen {
+    let idle_range_s = table.numbers("idle_range_s", 0.0..=MAX_VALUE);
+    let flow_range_mm3_per_s = table.numbers("flow_range_mm3_per_s", 0.0..=MAX_VALUE);
+    let delay_scatter_s = table.number("delay_scatter_s", 0.0..=MAX_VALUE);
+    Some(FitData {
         starts: starts?,
         stops: stops?,
         idle_range_s: idle_range_s?,
         flow_range_mm3_per_s: flow_range_mm3_per_s?,
-        delay_scatter_s: delay_scatter_s?,
+        delay_sigma_s: delay_scatter_s?,
     })
 }
 

@@ -5,27 +5,27 @@ use nalgebra::{DMatrix, DVector};
 
 /// Where the steps ended.
 #[derive(Debug, Clone)]
-pub(super) struct Solved {
+pub(super) struct LeastSquares {
     pub at: Vec<f64>,
     /// Sum of the squared residuals.
-    pub squares: f64,
+    pub sum_of_squares: f64,
     /// Standard errors, for residuals that have nothing to do with each other.
     pub sigma: Vec<f64>,
 }
 
-const MOST_STEPS: usize = 60;
+const MAX_STEPS: usize = 60;
 /// A parameter is moved by this share of its range for a derivative.
-const NUDGE: f64 = 1e-6;
+const RELATIVE_STEP: f64 = 1e-6;
 /// A step that gains less than this share of the squares gains nothing.
-const NOTHING: f64 = 1e-9;
+const MIN_RELATIVE_GAIN: f64 = 1e-9;
 
 /// Steps downhill from a start, every parameter within its range. `None` where
 /// the residuals are not finite or are fewer than the parameters.
-pub(super) fn descend(
+pub(super) fn minimise(
     residuals: &dyn Fn(&[f64]) -> Vec<f64>,
     start: &[f64],
     ranges: &[[f64; 2]],
-) -> Option<Solved> {
+) -> Option<LeastSquares> {
     let mut at: Vec<f64> = start.iter().zip(ranges).map(|(x, [a, b])| x.clamp(*a, *b)).collect();
     let mut left = DVector::from_vec(residuals(&at));
     let mut squares = left.norm_squared();
@@ -33,7 +33,7 @@ pub(super) fn descend(
         return None;
     }
     let mut damping = 1e-3;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let slopes = jacobian(residuals, &at, ranges);
         let before = squares;
         for _ in 0..10 {
@@ -48,12 +48,12 @@ pub(super) fn descend(
                 None => damping *= 10.0,
             }
         }
-        if before - squares <= NOTHING * before {
+        if before - squares <= MIN_RELATIVE_GAIN * before {
             break;
         }
     }
     let sigma = spread(&jacobian(residuals, &at, ranges), squares);
-    Some(Solved { at, squares, sigma })
+    Some(LeastSquares { at, sum_of_squares: squares, sigma })
 }
 
 fn jacobian(
@@ -65,7 +65,7 @@ fn jacobian(
         .iter()
         .enumerate()
         .map(|(number, [low, high])| {
-            let nudge = NUDGE * (high - low);
+            let nudge = RELATIVE_STEP * (high - low);
             let moved = |by: f64| {
                 let mut at = at.to_vec();
                 if let Some(value) = at.get_mut(number) {
@@ -131,9 +131,9 @@ mod tests {
         let residuals = |p: &[f64]| -> Vec<f64> {
             seen.iter().map(|(t, y)| p[0] * (-t / p[1]).exp() - y).collect()
         };
-        let solved = descend(&residuals, &[1.0, 2.0], &[[0.0, 10.0], [0.01, 10.0]]).unwrap();
+        let solved = minimise(&residuals, &[1.0, 2.0], &[[0.0, 10.0], [0.01, 10.0]]).unwrap();
         assert!((solved.at[0] - 3.0).abs() < 1e-6 && (solved.at[1] - 0.7).abs() < 1e-6);
-        assert!(solved.squares < 1e-9);
+        assert!(solved.sum_of_squares < 1e-9);
     }
 
     #[test]
@@ -141,16 +141,16 @@ mod tests {
         let seen = [(0.0, 1.1), (1.0, 2.9), (2.0, 5.2), (3.0, 6.8)];
         let residuals =
             |p: &[f64]| -> Vec<f64> { seen.iter().map(|(x, y)| p[0] + p[1] * x - y).collect() };
-        let solved = descend(&residuals, &[0.0, 0.0], &[[-9.0, 9.0], [-9.0, 9.0]]).unwrap();
+        let solved = minimise(&residuals, &[0.0, 0.0], &[[-9.0, 9.0], [-9.0, 9.0]]).unwrap();
         assert!((solved.at[0] - 1.09).abs() < 1e-6 && (solved.at[1] - 1.94).abs() < 1e-6);
         // s² = Σr²/2, var(slope) = s²/Σ(x − x̄)² = s²/5.
-        assert!((solved.sigma[1] - (solved.squares / 2.0 / 5.0).sqrt()).abs() < 1e-6);
+        assert!((solved.sigma[1] - (solved.sum_of_squares / 2.0 / 5.0).sqrt()).abs() < 1e-6);
     }
 
     #[test]
     fn a_parameter_stays_in_its_range() {
         let residuals = |p: &[f64]| vec![p[0] - 5.0, 0.1 * (p[0] - 5.0)];
-        assert_eq!(descend(&residuals, &[1.0], &[[0.0, 2.0]]).unwrap().at, [2.0]);
-        assert!(descend(&residuals, &[1.0, 1.0, 1.0], &[[0.0, 2.0]; 3]).is_none());
+        assert_eq!(minimise(&residuals, &[1.0], &[[0.0, 2.0]]).unwrap().at, [2.0]);
+        assert!(minimise(&residuals, &[1.0, 1.0, 1.0], &[[0.0, 2.0]; 3]).is_none());
     }
 }

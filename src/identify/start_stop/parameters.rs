@@ -32,7 +32,7 @@ pub enum StartStopError {
     },
     /// A share of the start speed that is none.
     #[error("the least share of the start speed is {value}; it must be above 0 and at most 1")]
-    Share {
+    StartSpeedFraction {
         /// What was found.
         value: f64,
     },
@@ -106,24 +106,24 @@ impl StartStop {
 
     /// f: the flow so long after the command to stop, as a share of the flow
     /// before.
-    pub fn falling(&self, since_s: f64) -> f64 {
+    pub fn remaining_flow(&self, since_s: f64) -> f64 {
         let since_s = since_s - self.stop_s;
         if since_s <= 0.0 {
             return 1.0;
         }
-        let slow = self.slow_share();
+        let slow = self.slow_fraction();
         (1.0 - slow) * libm::exp(-since_s / self.fall_s)
             + slow * libm::exp(-since_s / self.drool_time_constant_s)
     }
 
     /// ∫f: what has come so long after the command to stop, for each unit of the
     /// flow before \[s\].
-    pub fn fallen_s(&self, since_s: f64) -> f64 {
+    pub fn delivered_s(&self, since_s: f64) -> f64 {
         let past_s = since_s - self.stop_s;
         if past_s <= 0.0 {
             return since_s;
         }
-        let slow = self.slow_share();
+        let slow = self.slow_fraction();
         let [fast_s, drool_s] = [self.fall_s, self.drool_time_constant_s];
         self.stop_s
             - (1.0 - slow) * fast_s * libm::expm1(-past_s / fast_s)
@@ -131,8 +131,8 @@ impl StartStop {
     }
 
     /// The same after all has come \[s\].
-    pub fn after_stop_s(&self) -> f64 {
-        self.stop_s + (1.0 - self.slow_share()) * self.fall_s + self.drool_s
+    pub fn total_after_stop_s(&self) -> f64 {
+        self.stop_s + (1.0 - self.slow_fraction()) * self.fall_s + self.drool_s
     }
 
     /// When the flow has fallen to a share, from the command to stop \[s\].
@@ -143,13 +143,13 @@ impl StartStop {
         let (mut low, mut high) = (self.stop_s, self.stop_s - slowest_s * libm::log(share));
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);
-            if self.falling(middle) > share { low = middle } else { high = middle }
+            if self.remaining_flow(middle) > share { low = middle } else { high = middle }
         }
         high
     }
 
     /// a: the share of the flow that falls slowly.
-    fn slow_share(&self) -> f64 {
+    fn slow_fraction(&self) -> f64 {
         self.drool_s / self.drool_time_constant_s
     }
 }

@@ -3,52 +3,53 @@
 
 use super::episodes::Episode;
 use super::error::StartStopFitError;
-use super::estimate::SeenStart;
-use super::fall::Falling;
-use super::least_squares::descend;
+use super::estimate::ObservedStart;
+use super::fall::StopResponse;
+use super::least_squares::minimise;
 use super::parameters::StartStop;
 use crate::numeric::rank;
 
 /// What was found of the starts.
 #[derive(Debug, Clone)]
-pub(super) struct Rise {
+pub(super) struct StartFit {
     /// T \[s\].
     pub time_constant_s: f64,
     /// Its standard error \[s\].
     pub sigma_s: f64,
-    pub starts: Vec<SeenStart>,
+    pub starts: Vec<ObservedStart>,
 }
 
 /// Range of T \[s\].
-const RISE_S: [f64; 2] = [0.005, 10.0];
+const TIME_CONSTANT_RANGE_S: [f64; 2] = [0.005, 10.0];
 /// So many samples in a row above half the flow are no noise.
-const IN_A_ROW: usize = 3;
+const CONSECUTIVE_SAMPLES: usize = 3;
 /// Starts that must each tell T: of fewer there is no spread to speak of.
-const FEWEST_RISES: usize = 3;
+const MIN_RISES: usize = 3;
 
 /// The median of the time constants of all starts, and the delay of each with
 /// that.
-pub(super) fn fit(starts: &[Episode], fall: &Falling) -> Result<Rise, StartStopFitError> {
+pub(super) fn fit(starts: &[Episode], fall: &StopResponse) -> Result<StartFit, StartStopFitError> {
     let fall = fall.model();
-    let rises: Vec<f64> = starts.iter().filter_map(|start| alone(start, &fall)).collect();
-    let told = middle(&rises).filter(|_| rises.len() >= FEWEST_RISES);
-    let (rise_s, sigma_s) = told.ok_or(StartStopFitError::NoFit { what: "rise" })?;
+    let rises: Vec<f64> =
+        starts.iter().filter_map(|start| time_constant_of(start, &fall)).collect();
+    let typical = median_and_sigma(&rises).filter(|_| rises.len() >= MIN_RISES);
+    let (rise_s, sigma_s) = typical.ok_or(StartStopFitError::NoFit { what: "rise" })?;
     if let Some(start) = starts.first().filter(|start| rise_s < start.step_s) {
         return Err(StartStopFitError::TooSparse { step_s: start.step_s, rise_s });
     }
     let seen = |start: &Episode| {
-        let delay_s = delayed(start, &fall, rise_s)?;
+        let delay_s = delay_of(start, &fall, rise_s)?;
         let (at_s, idle_s, flow_mm3_per_s) = (start.at_s, start.idle_s, start.flow);
-        Some(SeenStart { at_s, idle_s, flow_mm3_per_s, delay_s, modelled_s: delay_s })
+        Some(ObservedStart { at_s, idle_s, flow_mm3_per_s, delay_s, modelled_s: delay_s })
     };
-    let seen: Option<Vec<SeenStart>> = starts.iter().map(seen).collect();
+    let seen: Option<Vec<ObservedStart>> = starts.iter().map(seen).collect();
     let starts = seen.ok_or(StartStopFitError::NoFit { what: "rise" })?;
-    Ok(Rise { time_constant_s: rise_s, sigma_s, starts })
+    Ok(StartFit { time_constant_s: rise_s, sigma_s, starts })
 }
 
 /// Median, and its standard error from the spread about it.
 #[expect(clippy::cast_precision_loss, reason = "a recording has few starts")]
-fn middle(values: &[f64]) -> Option<(f64, f64)> {
+fn median_and_sigma(values: &[f64]) -> Option<(f64, f64)> {
     let median = rank::median(&mut values.to_vec())?;
     let mut off: Vec<f64> = values.iter().map(|value| (value - median).abs()).collect();
     // Of normal deviations: the median of their sizes is 0.6745 σ, the standard
@@ -60,7 +61,8 @@ fn middle(values: &[f64]) -> Option<(f64, f64)> {
 /// The share of the flow after a start with this delay and time constant: what
 /// comes anew, and what still comes of the run before.
 fn modelled(start: &Episode, fall: &StartStop, since_s: f64, [delay_s, rise_s]: [f64; 2]) -> f64 {
-    let left = |since_s: f64| start.before / start.flow * fall.falling(start.idle_s + since_s);
+    let left =
+        |since_s: f64| start.before / start.flow * fall.remaining_flow(start.idle_s + since_s);
     if since_s < delay_s {
         return left(since_s);
     }
@@ -74,33 +76,33 @@ fn solve(start: &Episode, fall: &StartStop, first: [f64; 2], rise: [f64; 2]) -> 
         start.samples.iter().map(of).collect()
     };
     let longest_s = start.samples.last()?.0;
-    let solved = descend(&residuals, &first, &[[0.0, longest_s], rise])?;
+    let solved = minimise(&residuals, &first, &[[0.0, longest_s], rise])?;
     let &[delay_s, rise_s] = solved.at.as_slice() else { return None };
     Some([delay_s, rise_s])
 }
 
 /// T of one start; none where the flow had not ceased before it.
-fn alone(start: &Episode, fall: &StartStop) -> Option<f64> {
-    const CEASED: f64 = 0.1;
-    if start.before / start.flow * fall.falling(start.idle_s) > CEASED {
+fn time_constant_of(start: &Episode, fall: &StartStop) -> Option<f64> {
+    const MAX_REMAINING: f64 = 0.1;
+    if start.before / start.flow * fall.remaining_flow(start.idle_s) > MAX_REMAINING {
         return None;
     }
-    let half_s = half(start)?;
+    let half_s = half_rise_s(start)?;
     let first = [(half_s - 0.7 * fall.fall_s).max(0.0), fall.fall_s];
-    solve(start, fall, first, RISE_S).map(|[_, rise_s]| rise_s)
+    solve(start, fall, first, TIME_CONSTANT_RANGE_S).map(|[_, rise_s]| rise_s)
 }
 
-fn delayed(start: &Episode, fall: &StartStop, rise_s: f64) -> Option<f64> {
-    let half_s = half(start)?;
+fn delay_of(start: &Episode, fall: &StartStop, rise_s: f64) -> Option<f64> {
+    let half_s = half_rise_s(start)?;
     let first = [(half_s - 0.7 * rise_s).max(0.0), rise_s];
     let almost = [rise_s * (1.0 - 1e-6), rise_s * (1.0 + 1e-6)];
     solve(start, fall, first, almost).map(|[delay_s, _]| delay_s)
 }
 
 /// When the flow comes to half of what it will be, for good \[s\].
-fn half(start: &Episode) -> Option<f64> {
+fn half_rise_s(start: &Episode) -> Option<f64> {
     let above = |window: &[(f64, f64)]| window.iter().all(|(_, share)| *share > 0.5);
-    let windows = || start.samples.windows(IN_A_ROW);
+    let windows = || start.samples.windows(CONSECUTIVE_SAMPLES);
     // What still comes of the run before is no first flow.
     let from = windows().position(|window| !above(window)).unwrap_or(0);
     let at = from + windows().skip(from).position(above)?;

@@ -3,7 +3,7 @@
 use super::*;
 use crate::core::time::Span;
 use crate::core::units::{Mm3PerS, MmPerS};
-use crate::extruder::start_stop::{Laid, Pause, Timing};
+use crate::extruder::start_stop::{BeadConditions, Pause, StartStopTiming};
 
 const MACHINE: StartStop = StartStop {
     first_flow_s: 0.2,
@@ -20,12 +20,12 @@ const RUNS_S: f64 = 5.0;
 const STEP_S: f64 = 0.02;
 
 /// The share of the flow that runs of 5 s with pauses between them give, by the model itself.
-fn recording(machine: StartStop, pauses_s: &[f64]) -> [Series; 2] {
+fn recording(machine: StartStop, pauses_s: &[f64]) -> [TimeSeries; 2] {
     let (flow, speed) = (Mm3PerS::constant(400.0), MmPerS::constant(40.0));
-    let laid = Laid { flow, speed, least_share: 1.0, robot_lag: Span::ZERO };
-    let timing = Timing::new(machine, laid).unwrap();
-    let mut command = Series::new("command_rpm", true);
-    let mut seen = Series::new("flow_mm3_per_s", false);
+    let laid = BeadConditions { flow, speed, min_speed_ratio: 1.0, robot_lag: Span::ZERO };
+    let timing = StartStopTiming::new(machine, laid).unwrap();
+    let mut command = TimeSeries::new("command_rpm", true);
+    let mut seen = TimeSeries::new("flow_mm3_per_s", false);
     command.push(0.0, 40.0);
     let mut from_s = 0.0;
     let mut log = |from_s: f64, lasts_s: f64, share: &dyn Fn(Span) -> f64| {
@@ -39,11 +39,11 @@ fn recording(machine: StartStop, pauses_s: &[f64]) -> [Series; 2] {
     from_s += RUNS_S;
     for idle_s in pauses_s {
         command.push(from_s, 0.0);
-        log(from_s, *idle_s, &|since| timing.stop().flow_share(since));
+        log(from_s, *idle_s, &|since| timing.stop().flow_ratio(since));
         from_s += idle_s;
         command.push(from_s, 40.0);
-        let start = timing.start(&Pause { idle: Span::from_secs(*idle_s), before: flow });
-        log(from_s, RUNS_S, &|since| start.flow_share(since));
+        let start = timing.start(&Pause { idle: Span::from_secs(*idle_s), flow_before: flow });
+        log(from_s, RUNS_S, &|since| start.flow_ratio(since));
         from_s += RUNS_S;
     }
     [command, seen]
@@ -73,9 +73,9 @@ fn the_parameters_of_a_recording_without_noise_are_found_again() {
     }
     assert_eq!((fit.starts.len(), fit.stops.len()), (8, 8));
     assert!(fit.starts.iter().all(|start| (start.delay_s - start.modelled_s).abs() < 0.01));
-    let came = 400.0 * MACHINE.after_stop_s();
-    let longest = fit.stops.iter().find(|stop| stop.seen_s > 5.9).unwrap();
-    assert!((longest.came_mm3 - came).abs() < 8.0, "{} {came}", longest.came_mm3);
+    let came = 400.0 * MACHINE.total_after_stop_s();
+    let longest = fit.stops.iter().find(|stop| stop.observed_s > 5.9).unwrap();
+    assert!((longest.volume_mm3 - came).abs() < 8.0, "{} {came}", longest.volume_mm3);
 }
 
 #[test]
@@ -85,7 +85,10 @@ fn a_flow_that_does_not_drool_is_found_as_well() {
     let found = fit(&command, &flow).unwrap().parameters;
     assert_eq!(found.check(), Ok(()));
     for at_s in [0.1, 0.2, 0.3, 0.5, 1.0, 3.0] {
-        assert!((found.falling(at_s) - machine.falling(at_s)).abs() < 0.01, "{at_s} {found:?}");
+        assert!(
+            (found.remaining_flow(at_s) - machine.remaining_flow(at_s)).abs() < 0.01,
+            "{at_s} {found:?}"
+        );
     }
 }
 
@@ -105,7 +108,7 @@ fn pauses_that_tell_nothing_of_the_void_are_refused() {
         Error::TooFewStarts { found: 2, needed: 5, left_out: 1 }
     );
     let error = refused(MACHINE, &[10.0, 12.0, 11.0, 15.0, 10.0, 9.0]);
-    assert!(matches!(error, Error::IdleTimesAlike { .. }), "{error}");
+    assert!(matches!(error, Error::PausesTooSimilar { .. }), "{error}");
     assert!(error.to_string().contains("from 9 to 15 s"), "{error}");
     // The void opens far more slowly than the longest pause.
     let slow = StartStop { idle_time_constant_s: 2000.0, void_mm3: 6000.0, ..MACHINE };
@@ -139,11 +142,11 @@ fn a_flow_that_does_not_go_with_the_command_is_refused() {
     let mut standing = flow.clone();
     standing.values.iter_mut().for_each(|value| *value += 100.0);
     let error = fit(&command, &standing).unwrap_err();
-    assert!(matches!(error, Error::FlowGoesOn { .. }), "{error}");
+    assert!(matches!(error, Error::FlowContinues { .. }), "{error}");
     assert!(error.to_string().contains("still 20 % of that before"), "{error}");
     let mut off = command.clone();
     off.values.fill(0.0);
-    assert_eq!(fit(&off, &flow), Err(Error::NeverCommanded { most: 0.0 }));
+    assert_eq!(fit(&off, &flow), Err(Error::NeverCommanded { max: 0.0 }));
     let short = flow.within(0.0, 0.3);
     let error = fit(&command, &short).unwrap_err();
     assert_eq!(error, Error::TooFewSamples { what: "the flow", found: 16, needed: 50 });

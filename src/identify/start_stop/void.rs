@@ -2,13 +2,13 @@
 //! must be filled.
 
 use super::error::StartStopFitError;
-use super::estimate::SeenStart;
-use super::least_squares::descend;
-use crate::numeric::number::float;
+use super::estimate::ObservedStart;
+use super::least_squares::minimise;
+use crate::numeric::number::to_f64;
 
 /// Parameters of the delay; see [`crate::identify::start_stop::parameters::StartStop`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Saturating {
+pub(super) struct IdleDelay {
     pub first_flow_s: f64,
     pub void_mm3: f64,
     pub idle_time_constant_s: f64,
@@ -16,22 +16,22 @@ pub(super) struct Saturating {
 
 /// What was found of the delays.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Void {
-    pub value: Saturating,
-    pub sigma: Saturating,
+pub(super) struct DelayFit {
+    pub value: IdleDelay,
+    pub sigma: IdleDelay,
     /// Standard deviation about the curve \[s\].
-    pub scatter_s: f64,
+    pub residual_sigma_s: f64,
 }
 
 /// A growth of fewer standard deviations of a delay is none…
-const BEYOND_CHANCE: f64 = 4.0;
+const MIN_SIGMAS: f64 = 4.0;
 /// …nor is one that no robot notices \[s\].
-const LEAST_GROWTH_S: f64 = 0.01;
+const MIN_GROWTH_S: f64 = 0.01;
 /// A standard error above this share of a time constant leaves it open.
-const LOOSE_SHARE: f64 = 0.5;
+const MAX_RELATIVE_SIGMA: f64 = 0.5;
 
 /// Least squares of L + V∞·(1 − e^(−idle/τ))/Q.
-pub(super) fn fit(starts: &[SeenStart]) -> Result<Void, StartStopFitError> {
+pub(super) fn fit(starts: &[ObservedStart]) -> Result<DelayFit, StartStopFitError> {
     let nothing = StartStopFitError::NoFit { what: "delay" };
     let idle = || starts.iter().map(|start| start.idle_s);
     let (shortest_s, longest_s) = (idle().fold(f64::MAX, f64::min), idle().fold(0.0, f64::max));
@@ -39,7 +39,7 @@ pub(super) fn fit(starts: &[SeenStart]) -> Result<Void, StartStopFitError> {
     let latest_s = starts.iter().map(|start| start.delay_s).fold(0.0, f64::max);
     let residuals = |row: &[f64]| -> Vec<f64> {
         let &[first_s, void, tau] = row else { return Vec::new() };
-        let of = |start: &SeenStart| {
+        let of = |start: &ObservedStart| {
             let opened = -void * libm::expm1(-start.idle_s / tau);
             first_s + opened / start.flow_mm3_per_s - start.delay_s
         };
@@ -49,35 +49,37 @@ pub(super) fn fit(starts: &[SeenStart]) -> Result<Void, StartStopFitError> {
     let ranges = [[0.0, latest_s + 1e-3], [0.0, 10.0 * latest_s * flow], [1e-2, slowest_s]];
     let ladder = (0..8).map(|k| shortest_s.max(0.1) * libm::exp2(f64::from(k)));
     let solved = ladder.filter_map(|tau| {
-        descend(&residuals, &[0.0, latest_s * flow, tau.min(longest_s)], &ranges)
+        minimise(&residuals, &[0.0, latest_s * flow, tau.min(longest_s)], &ranges)
     });
-    let best = solved.min_by(|a, b| a.squares.total_cmp(&b.squares)).ok_or(nothing.clone())?;
+    let best = solved
+        .min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares))
+        .ok_or(nothing.clone())?;
     let of = |row: &[f64]| match *row {
         [first_flow_s, void_mm3, idle_time_constant_s] => {
-            Some(Saturating { first_flow_s, void_mm3, idle_time_constant_s })
+            Some(IdleDelay { first_flow_s, void_mm3, idle_time_constant_s })
         }
         _ => None,
     };
     let (value, sigma) = of(&best.at).zip(of(&best.sigma)).ok_or(nothing)?;
-    let scatter_s = (best.squares / (float(starts.len()) - 3.0).max(1.0)).sqrt();
-    let found = Void { value, sigma, scatter_s };
+    let scatter_s = (best.sum_of_squares / (to_f64(starts.len()) - 3.0).max(1.0)).sqrt();
+    let found = DelayFit { value, sigma, residual_sigma_s: scatter_s };
     check(&found, [shortest_s, longest_s], flow)?;
     Ok(found)
 }
 
-fn check(found: &Void, pauses_s: [f64; 2], flow: f64) -> Result<(), StartStopFitError> {
+fn check(found: &DelayFit, pauses_s: [f64; 2], flow: f64) -> Result<(), StartStopFitError> {
     let [shortest_s, longest_s] = pauses_s;
-    let Saturating { void_mm3, idle_time_constant_s: found_s, .. } = found.value;
+    let IdleDelay { void_mm3, idle_time_constant_s: found_s, .. } = found.value;
     let left = |idle_s: f64| void_mm3 * libm::exp(-idle_s / found_s);
     let grows_s = (left(shortest_s) - left(longest_s)) / flow;
-    let sigma_s = found.scatter_s;
-    if grows_s < LEAST_GROWTH_S.max(BEYOND_CHANCE * sigma_s) {
+    let sigma_s = found.residual_sigma_s;
+    if grows_s < MIN_GROWTH_S.max(MIN_SIGMAS * sigma_s) {
         let grown = StartStopFitError::DelayDoesNotGrow { grows_s, sigma_s, shortest_s, longest_s };
         return Err(grown);
     }
     let sigma_s = found.sigma.idle_time_constant_s;
     let bracketed = found_s < longest_s && found_s > 0.5 * shortest_s;
-    if bracketed && sigma_s < LOOSE_SHARE * found_s {
+    if bracketed && sigma_s < MAX_RELATIVE_SIGMA * found_s {
         return Ok(());
     }
     Err(StartStopFitError::TimeConstantUndetermined { found_s, sigma_s, shortest_s, longest_s })

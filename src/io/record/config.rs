@@ -34,14 +34,14 @@ pub struct ExtruderFile {
 
 /// Sizes and times, which tests make small.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Tuning {
+pub(super) struct RecorderLimits {
     pub(super) flush_every: Duration,
     pub(super) events: usize,
     pub(super) frames: usize,
     pub(super) encoded: usize,
 }
 
-impl Default for Tuning {
+impl Default for RecorderLimits {
     fn default() -> Self {
         Self { flush_every: Duration::from_millis(400), events: 4096, frames: 8, encoded: 4 }
     }

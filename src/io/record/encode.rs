@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 use crossbeam_channel::{Receiver, Sender};
 use prost::Message as _;
 
-use super::shared::Shared;
+use super::shared::RecorderState;
 use crate::core::frame::Frame;
 use crate::core::time::Stamp;
 use crate::io::foxglove::{CompressedImage, timestamp};
@@ -32,7 +32,12 @@ pub struct EncodedFrame {
 }
 
 /// Encodes until told to close or until nobody takes the result.
-pub fn run(jobs: &Receiver<FrameJob>, out: &Sender<EncodedFrame>, epoch_ns: u64, shared: &Shared) {
+pub fn run(
+    jobs: &Receiver<FrameJob>,
+    out: &Sender<EncodedFrame>,
+    epoch_ns: u64,
+    shared: &RecorderState,
+) {
     while let Ok(FrameJob::Encode(frame)) = jobs.recv() {
         match encode(&frame, epoch_ns) {
             Ok(encoded) => {

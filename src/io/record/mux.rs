@@ -16,7 +16,7 @@ use super::format::{
     RunInfo, STEP_SCHEMA, STEP_TOPIC, StepMessage,
 };
 use super::report::Counts;
-use super::shared::Answered;
+use super::shared::AnsweredEvent;
 use crate::core::time::Stamp;
 use crate::io::foxglove;
 
@@ -38,9 +38,9 @@ pub enum MuxError {
 
 /// Bytes that the MCAP writer has given out.
 #[derive(Debug, Clone, Default)]
-struct Shelf(Arc<Mutex<Vec<u8>>>);
+struct SharedBuffer(Arc<Mutex<Vec<u8>>>);
 
-impl Shelf {
+impl SharedBuffer {
     fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -50,7 +50,7 @@ impl Shelf {
     }
 }
 
-impl Write for Shelf {
+impl Write for SharedBuffer {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.bytes().extend_from_slice(bytes);
         Ok(bytes.len())
@@ -70,8 +70,8 @@ struct Channels {
 
 /// The MCAP writer and its channels.
 pub struct Mux {
-    writer: Writer<NoSeek<Shelf>>,
-    shelf: Shelf,
+    writer: Writer<NoSeek<SharedBuffer>>,
+    buffer: SharedBuffer,
     channels: Channels,
     epoch_ns: u64,
     counts: Counts,
@@ -84,7 +84,7 @@ impl Mux {
     /// channels are in a small chunk of their own, so that damage further on
     /// does not make later messages unreadable.
     pub fn new(run: &RunInfo, attachments: &[(&str, &str)]) -> Result<Self, MuxError> {
-        let shelf = Shelf::default();
+        let buffer = SharedBuffer::default();
         let mut writer = WriteOptions::new()
             .library(concat!("truebead ", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Zstd))
@@ -92,7 +92,7 @@ impl Mux {
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES))
             .disable_seeking(true)
-            .create(NoSeek::new(shelf.clone()))?;
+            .create(NoSeek::new(buffer.clone()))?;
         writer.write_metadata(&Metadata {
             name: RUN_METADATA.to_string(),
             metadata: run.to_metadata(),
@@ -111,7 +111,7 @@ impl Mux {
         writer.flush()?;
         Ok(Self {
             writer,
-            shelf,
+            buffer,
             channels,
             epoch_ns: run.epoch_ns,
             counts: Counts::default(),
@@ -120,7 +120,7 @@ impl Mux {
     }
 
     /// Adds an event and the step that answered it.
-    pub fn answered(&mut self, item: &Answered) -> Result<(), MuxError> {
+    pub fn answered(&mut self, item: &AnsweredEvent) -> Result<(), MuxError> {
         let (n, now_ns) = (item.n, item.now.ns());
         let event = serde_json::to_vec(&EventMessage { n, now_ns, event: &item.event })?;
         let state = item.step.state.name();
@@ -156,7 +156,7 @@ impl Mux {
     /// Moves what has been written to the end of `bytes`; it ends with a whole
     /// record.
     pub fn take(&mut self, bytes: &mut Vec<u8>) {
-        bytes.append(&mut self.shelf.bytes());
+        bytes.append(&mut self.buffer.bytes());
     }
 
     /// What is in the chunks that are complete.
@@ -179,9 +179,9 @@ impl Mux {
             log_time: wall_ns,
             publish_time: wall_ns,
         };
-        let before = self.shelf.len();
+        let before = self.buffer.len();
         self.writer.write_to_known_channel(&header, data)?;
-        if self.shelf.len() > before {
+        if self.buffer.len() > before {
             // The chunk was full and ended just before this message.
             self.complete = self.counts;
         }
@@ -189,7 +189,7 @@ impl Mux {
     }
 }
 
-fn add_channels(writer: &mut Writer<NoSeek<Shelf>>) -> Result<Channels, McapError> {
+fn add_channels(writer: &mut Writer<NoSeek<SharedBuffer>>) -> Result<Channels, McapError> {
     let none = BTreeMap::new();
     let event = writer.add_schema("truebead.Event", "jsonschema", EVENT_SCHEMA.as_bytes())?;
     let step = writer.add_schema("truebead.Step", "jsonschema", STEP_SCHEMA.as_bytes())?;

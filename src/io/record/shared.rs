@@ -11,7 +11,7 @@ use crate::core::time::Stamp;
 use crate::run::ports::RecordError;
 
 /// An event and its answer, on the way to the writer.
-pub(super) struct Answered {
+pub(super) struct AnsweredEvent {
     pub(super) n: u64,
     pub(super) now: Stamp,
     pub(super) event: Event,
@@ -19,13 +19,13 @@ pub(super) struct Answered {
 }
 
 /// What the threads know in common.
-pub(super) struct Shared {
+pub(super) struct RecorderState {
     failure: OnceLock<RecordError>,
     alarm: Sender<RecordError>,
     pub(super) frames_dropped: AtomicU64,
 }
 
-impl Shared {
+impl RecorderState {
     /// Nothing has failed yet; the first failure goes to `alarm`.
     pub(super) fn new(alarm: Sender<RecordError>) -> Self {
         Self { failure: OnceLock::new(), alarm, frames_dropped: AtomicU64::new(0) }

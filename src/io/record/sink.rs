@@ -101,17 +101,17 @@ impl Sink for FileSink {
 
 /// Hands bytes to a sink so that after a failure the sink still ends with a
 /// whole record, and the same bytes can be tried again.
-pub struct Outlet<S> {
+pub struct RetryingWriter<S> {
     sink: S,
     waiting: Vec<u8>,
     written: u64,
-    torn: bool,
+    cut_pending: bool,
 }
 
-impl<S: Sink> Outlet<S> {
+impl<S: Sink> RetryingWriter<S> {
     /// Over an empty sink.
     pub fn new(sink: S) -> Self {
-        Self { sink, waiting: Vec::new(), written: 0, torn: false }
+        Self { sink, waiting: Vec::new(), written: 0, cut_pending: false }
     }
 
     /// Bytes that are still to be written. Whoever adds to them ends with a
@@ -125,11 +125,11 @@ impl<S: Sink> Outlet<S> {
         if self.waiting.is_empty() {
             return Ok(());
         }
-        self.mend()?;
+        self.cut_partial()?;
         if let Err(error) = self.sink.write_all(&self.waiting).and_then(|()| self.sink.flush()) {
-            self.torn = true;
+            self.cut_pending = true;
             // A cut that fails too is tried again at the next push.
-            self.mend().unwrap_or_default();
+            self.cut_partial().unwrap_or_default();
             return Err(error);
         }
         self.written += self.waiting.len() as u64;
@@ -137,10 +137,10 @@ impl<S: Sink> Outlet<S> {
         Ok(())
     }
 
-    fn mend(&mut self) -> io::Result<()> {
-        if self.torn {
+    fn cut_partial(&mut self) -> io::Result<()> {
+        if self.cut_pending {
             self.sink.cut(self.written)?;
-            self.torn = false;
+            self.cut_pending = false;
         }
         Ok(())
     }

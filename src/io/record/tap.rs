@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use crossbeam_channel::Sender;
 
 use super::encode::FrameJob;
-use super::shared::Shared;
+use super::shared::RecorderState;
 use crate::cell::file::KeepFrames;
 use crate::core::frame::Frame;
 
@@ -15,7 +15,7 @@ use crate::core::frame::Frame;
 pub struct FrameTap {
     pub(super) keep: KeepFrames,
     pub(super) jobs: Sender<FrameJob>,
-    pub(super) shared: Arc<Shared>,
+    pub(super) shared: Arc<RecorderState>,
 }
 
 impl FrameTap {

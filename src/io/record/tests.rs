@@ -9,7 +9,7 @@ use crate::core::geometry::Size;
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::units::{Mm, MmPerS};
 use crate::io::image_file;
-use crate::io::recording::{Entry, Recording};
+use crate::io::recording::{RecordedEntry, Recording};
 
 mod disk;
 mod disk_faults;
@@ -29,8 +29,8 @@ fn config() -> RecordConfig {
     }
 }
 
-fn quick() -> Tuning {
-    Tuning { flush_every: Duration::from_millis(5), ..Tuning::default() }
+fn quick() -> RecorderLimits {
+    RecorderLimits { flush_every: Duration::from_millis(5), ..RecorderLimits::default() }
 }
 
 fn event(n: u64) -> Event {
@@ -52,7 +52,7 @@ fn read(bytes: Vec<u8>) -> Recording {
 fn event_numbers(recording: &mut Recording) -> Vec<u64> {
     let entries = recording.map(Result::unwrap);
     entries
-        .filter_map(|entry| if let Entry::Event { n, .. } = entry { Some(n) } else { None })
+        .filter_map(|entry| if let RecordedEntry::Event { n, .. } = entry { Some(n) } else { None })
         .collect()
 }
 
@@ -98,11 +98,11 @@ fn every_number_comes_back_bit_for_bit() {
     let mut demands = Vec::new();
     for entry in Recording::open(&path).unwrap() {
         match entry.unwrap() {
-            Entry::Event { event: Event::Measured { frame, width_mm, .. }, n, .. } => {
+            RecordedEntry::Event { event: Event::Measured { frame, width_mm, .. }, n, .. } => {
                 assert_eq!(frame, u64::MAX - n);
                 widths.push(width_mm.get().to_bits());
             }
-            Entry::Step { step, .. } => {
+            RecordedEntry::Step { step, .. } => {
                 demands.push(step.trace.demand_mm_per_s.unwrap().get().to_bits());
             }
             other => panic!("{other:?}"),
@@ -159,7 +159,7 @@ fn every_kind_of_event_comes_back_and_is_described_by_the_schema() {
     }
     recorder.finish().unwrap();
     let back = read(disk.bytes()).map(Result::unwrap).filter_map(|entry| match entry {
-        Entry::Event { event, .. } => Some(event),
+        RecordedEntry::Event { event, .. } => Some(event),
         _ => None,
     });
     assert_eq!(back.collect::<Vec<_>>(), events);
@@ -232,7 +232,9 @@ fn frames_of_both_depths_are_kept_without_loss() {
     assert_eq!((report.frames_kept, report.frames_dropped), (2, 0));
     let mut back = Vec::new();
     for entry in read(disk.bytes()) {
-        let Entry::Frame(message) = entry.unwrap() else { panic!("only frames were given") };
+        let RecordedEntry::Frame(message) = entry.unwrap() else {
+            panic!("only frames were given")
+        };
         let image: crate::io::foxglove::CompressedImage =
             prost::Message::decode(message.data.as_slice()).unwrap();
         assert_eq!(image.format, "png");

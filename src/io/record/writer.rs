@@ -7,18 +7,18 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, never, select_biased};
 
-use super::config::Tuning;
+use super::config::RecorderLimits;
 use super::encode::EncodedFrame;
 use super::mux::{Mux, MuxError};
 use super::report::{Counts, RecordReport};
-use super::shared::{Answered, Shared};
-use super::sink::{Outlet, Sink};
+use super::shared::{AnsweredEvent, RecorderState};
+use super::sink::{RetryingWriter, Sink};
 use crate::run::ports::RecordError;
 
 /// What the writer listens to.
-pub struct Inputs {
+pub struct WriterInputs {
     /// Events with their steps; the end of them is the end of the recording.
-    pub answered: Receiver<Answered>,
+    pub answered: Receiver<AnsweredEvent>,
     /// Frames that have been encoded.
     pub frames: Receiver<EncodedFrame>,
 }
@@ -26,15 +26,15 @@ pub struct Inputs {
 /// Everything that the writing thread owns.
 pub struct WriterThread<S> {
     pub mux: Mux,
-    pub outlet: Outlet<S>,
-    pub shared: Arc<Shared>,
-    pub tuning: Tuning,
+    pub output: RetryingWriter<S>,
+    pub shared: Arc<RecorderState>,
+    pub tuning: RecorderLimits,
     /// What is in the sink for certain.
-    pub safe: Counts,
+    pub written: Counts,
 }
 
-enum Turn {
-    Answered(Box<Answered>),
+enum NextInput {
+    Answered(Box<AnsweredEvent>),
     Frame(EncodedFrame),
     FramesEnded,
     Ended,
@@ -43,8 +43,8 @@ enum Turn {
 
 impl<S: Sink> WriterThread<S> {
     /// Writes until the events end, then ends the recording.
-    pub fn run(mut self, inputs: Inputs) -> RecordReport {
-        let Inputs { answered, mut frames } = inputs;
+    pub fn run(mut self, inputs: WriterInputs) -> RecordReport {
+        let WriterInputs { answered, mut frames } = inputs;
         let mut frames_ended = false;
         let mut due = now() + self.tuning.flush_every;
         loop {
@@ -54,15 +54,15 @@ impl<S: Sink> WriterThread<S> {
                 due = now() + self.tuning.flush_every;
                 continue;
             }
-            match next_turn(&answered, &frames, left) {
-                Turn::Answered(item) => self.answered(&item),
-                Turn::Frame(frame) => self.frame(&frame),
-                Turn::FramesEnded => {
+            match next_input(&answered, &frames, left) {
+                NextInput::Answered(item) => self.answered(&item),
+                NextInput::Frame(frame) => self.frame(&frame),
+                NextInput::FramesEnded => {
                     frames_ended = true;
                     frames = never();
                 }
-                Turn::Ended => break,
-                Turn::Nothing => {}
+                NextInput::Ended => break,
+                NextInput::Nothing => {}
             }
         }
         if !frames_ended {
@@ -71,7 +71,7 @@ impl<S: Sink> WriterThread<S> {
         self.finish()
     }
 
-    fn answered(&mut self, item: &Answered) {
+    fn answered(&mut self, item: &AnsweredEvent) {
         let made = self.mux.answered(item);
         self.check(made);
         self.push_ready();
@@ -110,22 +110,22 @@ impl<S: Sink> WriterThread<S> {
     /// Writes the chunks that are complete. After a failure the flush period
     /// sets the pace of further tries.
     fn push_ready(&mut self) {
-        self.mux.take(self.outlet.waiting());
-        if self.shared.failure().is_none() && !self.outlet.waiting().is_empty() {
+        self.mux.take(self.output.waiting());
+        if self.shared.failure().is_none() && !self.output.waiting().is_empty() {
             self.push();
         }
     }
 
     fn push(&mut self) {
-        self.mux.take(self.outlet.waiting());
-        match self.outlet.push() {
-            Ok(()) => self.safe = self.mux.complete(),
+        self.mux.take(self.output.waiting());
+        match self.output.push() {
+            Ok(()) => self.written = self.mux.complete(),
             Err(error) => self.fail("write", &error),
         }
     }
 
     fn fail(&mut self, what: &str, error: &io::Error) {
-        let path = self.outlet.sink().path().display().to_string();
+        let path = self.output.sink().path().display().to_string();
         self.shared.fail(RecordError(format!("cannot {what} {path}: {error}")));
     }
 
@@ -143,33 +143,33 @@ impl<S: Sink> WriterThread<S> {
         self.check(finished);
         self.push();
         if self.shared.failure().is_none()
-            && let Err(error) = self.outlet.sink().publish()
+            && let Err(error) = self.output.sink().publish()
         {
             self.fail("give its final name to", &error);
         }
         RecordReport {
-            events: self.safe.events,
-            steps: self.safe.steps,
-            frames_kept: self.safe.frames,
+            events: self.written.events,
+            steps: self.written.steps,
+            frames_kept: self.written.frames,
             frames_dropped: self.shared.frames_dropped.load(Ordering::Relaxed),
-            bytes: self.outlet.written(),
-            path: self.outlet.sink().path().to_path_buf(),
+            bytes: self.output.written(),
+            path: self.output.sink().path().to_path_buf(),
         }
     }
 }
 
 /// Events go first, so that frames cannot hold them up.
-fn next_turn(
-    answered: &Receiver<Answered>,
+fn next_input(
+    answered: &Receiver<AnsweredEvent>,
     frames: &Receiver<EncodedFrame>,
     wait: Duration,
-) -> Turn {
+) -> NextInput {
     select_biased! {
         recv(answered) -> item => {
-            item.map_or(Turn::Ended, |item| Turn::Answered(Box::new(item)))
+            item.map_or(NextInput::Ended, |item| NextInput::Answered(Box::new(item)))
         },
-        recv(frames) -> frame => frame.map_or(Turn::FramesEnded, Turn::Frame),
-        default(wait) => Turn::Nothing,
+        recv(frames) -> frame => frame.map_or(NextInput::FramesEnded, NextInput::Frame),
+        default(wait) => NextInput::Nothing,
     }
 }
 

@@ -55,7 +55,7 @@ fn reported(pump: PumpMode, t: f64) -> Event {
 
 /// A bead that begins at a moment and lasts so long; the pump runs from 0.3 s
 /// on.
-fn bead(begins_s: f64, lasts_s: f64) -> Vec<Entry> {
+fn bead(begins_s: f64, lasts_s: f64) -> Vec<RecordedEntry> {
     let mut told: Vec<(f64, Event)> = Vec::new();
     let each = |period_s: f64| {
         let mut t = 0.0;
@@ -89,24 +89,27 @@ fn bead(begins_s: f64, lasts_s: f64) -> Vec<Entry> {
         let side = ExtruderStep { command: Some(command), ..ExtruderStep::default() };
         let is_tick = event == Event::ExtruderTick;
         let step = Step { extruder: is_tick.then_some(side), ..Step::default() };
-        [Entry::Event { n: 0, now, event }, Entry::Step { n: 0, now, step: Box::new(step) }]
+        [
+            RecordedEntry::Event { n: 0, now, event },
+            RecordedEntry::Step { n: 0, now, step: Box::new(step) },
+        ]
     };
     told.into_iter().flat_map(entry).collect()
 }
 
-fn facts() -> Facts {
-    Facts {
+fn facts() -> CellFacts {
+    CellFacts {
         command: Some(Unit::Rpm),
         layer_height: Some(Mm::constant(HEIGHT)),
         offset: Mm::constant(OFFSET),
     }
 }
 
-fn found(entries: Vec<Entry>, facts: &Facts) -> Recorded {
+fn found(entries: Vec<RecordedEntry>, facts: &CellFacts) -> BeadColumns {
     columns(entries.into_iter().map(Ok), facts).unwrap()
 }
 
-fn names(found: &Recorded) -> Vec<&str> {
+fn names(found: &BeadColumns) -> Vec<&str> {
     found.columns.iter().map(|column| column.name.as_str()).collect()
 }
 
@@ -147,14 +150,15 @@ fn the_longest_of_several_beads_is_taken() {
 
 #[test]
 fn what_cannot_be_made_is_told() {
-    let without = Facts { layer_height: None, ..facts() };
+    let without = CellFacts { layer_height: None, ..facts() };
     let told = found(bead(0.0, 5.0), &without);
     assert_eq!(*names(&told).last().unwrap(), "laid_width_mm");
     assert!(told.notes[0].contains("--layer-height-mm"), "{:?}", told.notes);
-    let high = Facts { layer_height: Some(Mm::constant(9.0)), ..facts() };
+    let high = CellFacts { layer_height: Some(Mm::constant(9.0)), ..facts() };
     let told = found(bead(0.0, 5.0), &high);
     assert!(told.notes[0].contains("are less than the layer's height of 9"), "{:?}", told.notes);
-    let idle = vec![Entry::Event { n: 0, now: Stamp::START, event: robot(RobotMode::Idle, 0.0) }];
+    let idle =
+        vec![RecordedEntry::Event { n: 0, now: Stamp::START, event: robot(RobotMode::Idle, 0.0) }];
     let told = found(idle, &facts());
     assert!(told.columns.is_empty() && told.notes[0].contains("no bead was laid"));
 }

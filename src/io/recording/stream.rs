@@ -22,7 +22,7 @@ pub struct Integrity {
     /// The file has its proper end.
     pub finished: bool,
     /// Where a file without it breaks off \[bytes\].
-    pub breaks_off_at: Option<u64>,
+    pub truncated_at: Option<u64>,
     /// Bytes beyond that point that belong to no whole record.
     pub lost_bytes: u64,
     /// Records and chunks in the middle that could not be read and were
@@ -41,7 +41,7 @@ impl Integrity {
     /// What is wrong, in a sentence; `None` where nothing is.
     pub fn summary(&self) -> Option<String> {
         let mut parts = Vec::new();
-        if let Some(at) = self.breaks_off_at {
+        if let Some(at) = self.truncated_at {
             parts.push(match self.lost_bytes {
                 0 => format!("it was not finished and ends at byte {at}"),
                 lost => format!(
@@ -124,15 +124,15 @@ impl<R: Read + Seek> RecordStream<R> {
         let mut head = Vec::new();
         self.source.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
         let Some((&opcode, length)) = head.split_first() else {
-            self.break_off(left);
+            self.truncate(left);
             return Ok(());
         };
         let Ok(length) = <[u8; 8]>::try_from(length).map(u64::from_le_bytes) else {
-            self.break_off(left);
+            self.truncate(left);
             return Ok(());
         };
         if opcode == 0 || length > left.saturating_sub(HEAD_BYTES) {
-            self.break_off(left);
+            self.truncate(left);
             return Ok(());
         }
         let start = self.at;
@@ -147,7 +147,7 @@ impl<R: Read + Seek> RecordStream<R> {
                 self.ended = true;
                 self.integrity.finished = self.ends_with_magic()?;
                 if !self.integrity.finished {
-                    self.integrity.breaks_off_at = Some(self.len);
+                    self.integrity.truncated_at = Some(self.len);
                 }
             }
             op::MESSAGE_INDEX => {
@@ -187,9 +187,9 @@ impl<R: Read + Seek> RecordStream<R> {
         Ok(tail == MAGIC)
     }
 
-    fn break_off(&mut self, lost: u64) {
+    fn truncate(&mut self, lost: u64) {
         self.ended = true;
-        self.integrity.breaks_off_at = Some(self.at);
+        self.integrity.truncated_at = Some(self.at);
         self.integrity.lost_bytes = lost;
     }
 }

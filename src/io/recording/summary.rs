@@ -7,14 +7,14 @@ use std::path::Path;
 use ::mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 
 /// Longest record of an index that is taken \[bytes\].
-const MAX_RECORD_BYTES: usize = 1 << 26;
+const MAX_INDEX_RECORD_BYTES: usize = 1 << 26;
 
 /// How many messages a topic has, where the file says so.
 pub fn messages_of(path: &Path, topic: &str) -> Option<u64> {
     let mut file = File::open(path).ok()?;
     let options = SummaryReaderOptions::default()
         .with_file_size(file.metadata().ok()?.len())
-        .with_record_length_limit(MAX_RECORD_BYTES);
+        .with_record_length_limit(MAX_INDEX_RECORD_BYTES);
     let mut reader = SummaryReader::new_with_options(options);
     while let Some(event) = reader.next_event() {
         match event.ok()? {

@@ -54,9 +54,9 @@ fn read(bytes: &[u8]) -> Read {
     let (mut events, mut steps) = (Vec::new(), 0);
     for entry in recording.by_ref() {
         match entry.unwrap() {
-            Entry::Event { n, .. } => events.push(n),
-            Entry::Step { .. } => steps += 1,
-            Entry::Frame(_) => {}
+            RecordedEntry::Event { n, .. } => events.push(n),
+            RecordedEntry::Step { .. } => steps += 1,
+            RecordedEntry::Frame(_) => {}
         }
     }
     Read { events, steps, integrity: recording.integrity().clone() }

@@ -2,7 +2,7 @@
 
 use super::numbers::{NUMBERS, switch};
 use crate::extruder::ExtruderCommand;
-use crate::link::frame::{BYE_LINE, Fields, LineError, hello_line, read_hello};
+use crate::link::frame::{BYE_LINE, LineError, LineFields, hello_line, read_hello};
 
 const KEYWORDS: [&str; 3] = ["HELLO", "DRIVE", "BYE"];
 
@@ -29,7 +29,7 @@ pub enum DriveLine {
 impl DriveLine {
     /// Reads a line without its LF. The name after `HELLO 1` may be any word.
     pub fn parse(text: &str) -> Result<Self, LineError> {
-        let fields = Fields::open(text, &KEYWORDS, "HELLO, DRIVE or BYE")?;
+        let fields = LineFields::open(text, &KEYWORDS, "HELLO, DRIVE or BYE")?;
         match fields.keyword() {
             "HELLO" => read_hello(fields, Self::Hello),
             "DRIVE" => parse_drive(fields),
@@ -52,7 +52,7 @@ impl DriveLine {
     }
 }
 
-fn parse_drive(mut fields: Fields<'_>) -> Result<DriveLine, LineError> {
+fn parse_drive(mut fields: LineFields<'_>) -> Result<DriveLine, LineError> {
     let seq = fields.whole("seq")?;
     let value = fields.number("value")?;
     let pump_on = fields.switch("pump")?;

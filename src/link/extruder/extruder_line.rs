@@ -2,8 +2,8 @@
 
 use super::numbers::{NUMBERS, switch};
 use crate::core::units::{MPa, Mm, Mm3PerS, Rpm};
-use crate::extruder::{Drive, ExtruderReport, PumpMode};
-use crate::link::frame::{DeviceLine, Fields, LineBody, LineError, one_word};
+use crate::extruder::{CommandQuantity, ExtruderReport, PumpMode};
+use crate::link::frame::{DeviceLine, LineBody, LineError, LineFields, one_word};
 
 /// A line from the extruder to the PC; a `STATE` comes every 5 to 200 ms.
 pub type ExtruderLine = DeviceLine<ExtruderHello, ExtruderStatus>;
@@ -14,7 +14,7 @@ pub struct ExtruderHello {
     /// Its name, one word.
     pub name: String,
     /// What it is commanded in.
-    pub drive: Drive,
+    pub drive: CommandQuantity,
     /// Smallest command that it takes while the pump is to run, in the unit of
     /// `drive`.
     pub min: f64,
@@ -34,12 +34,12 @@ pub struct ExtruderStatus {
 }
 
 impl LineBody for ExtruderHello {
-    fn read(fields: &mut Fields<'_>) -> Result<Self, LineError> {
+    fn read(fields: &mut LineFields<'_>) -> Result<Self, LineError> {
         let name = fields.word("name")?.to_owned();
         let word = fields.word("unit")?;
         let expected = "rpm, v, mpa, mm3_per_s, kg_per_s or filling";
-        let drive =
-            Drive::of_unit_word(word).ok_or_else(|| fields.wrong("unit", expected, word))?;
+        let drive = CommandQuantity::of_unit_word(word)
+            .ok_or_else(|| fields.field_error("unit", expected, word))?;
         let min = fields.number("min")?;
         let max = fields.number("max")?;
         if min > max {
@@ -56,12 +56,12 @@ impl LineBody for ExtruderHello {
 }
 
 impl LineBody for ExtruderStatus {
-    fn read(fields: &mut Fields<'_>) -> Result<Self, LineError> {
+    fn read(fields: &mut LineFields<'_>) -> Result<Self, LineError> {
         let t_ms = fields.whole("t_ms")?;
         let seq = fields.whole("seq")?;
         let word = fields.word("pump")?;
         let expected = "OFF, STARTING, ON, STOPPING or FAULT";
-        let pump = pump_of(word).ok_or_else(|| fields.wrong("pump", expected, word))?;
+        let pump = pump_of(word).ok_or_else(|| fields.field_error("pump", expected, word))?;
         let report = ExtruderReport {
             pump,
             valve_open: fields.switch("valve")?,

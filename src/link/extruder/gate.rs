@@ -9,11 +9,11 @@ use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
 use crate::link::frame::{DeviceClock, ErrCode, LineRefusal, Sequence, Validity};
 
 /// What stands without a command.
-const REST: ExtruderCommand = ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 };
+const AT_REST: ExtruderCommand = ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 };
 
 /// Ways in which an extruder can misbehave, for tests and rehearsals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Faults {
+pub struct ExtruderFaults {
     /// Refuses every command with this.
     pub refuse: Option<ErrCode>,
     /// Sends no `STATE`.
@@ -22,27 +22,27 @@ pub struct Faults {
 
 /// An extruder's end of the link.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gate {
+pub struct ExtruderEndpoint {
     hello: ExtruderHello,
     clock: DeviceClock,
     sequence: Sequence,
     /// The running command and when it is void.
     command: Option<(ExtruderCommand, Stamp)>,
     failed: bool,
-    faults: Faults,
+    faults: ExtruderFaults,
 }
 
-impl Gate {
+impl ExtruderEndpoint {
     /// Of an extruder whose pump stands and whose clock shows `clock_start_ms`
     /// at stamp 0.
     pub const fn new(hello: ExtruderHello, clock_start_ms: u64) -> Self {
         Self {
             hello,
-            clock: DeviceClock { of: "extruder", start_ms: clock_start_ms },
+            clock: DeviceClock { device: "extruder", start_ms: clock_start_ms },
             sequence: Sequence::new(),
             command: None,
             failed: false,
-            faults: Faults { refuse: None, mute: false },
+            faults: ExtruderFaults { refuse: None, mute: false },
         }
     }
 
@@ -54,7 +54,7 @@ impl Gate {
 
     /// The connection is gone. The last command runs out.
     pub const fn disconnect(&mut self) {
-        self.sequence.leave();
+        self.sequence.disconnect();
     }
 
     /// The pump fails: it stops, and no command makes it run.
@@ -74,7 +74,7 @@ impl Gate {
     }
 
     /// Misbehaves from now on.
-    pub const fn set_faults(&mut self, faults: Faults) {
+    pub const fn set_faults(&mut self, faults: ExtruderFaults) {
         self.faults = faults;
     }
 
@@ -87,7 +87,7 @@ impl Gate {
     /// and nothing otherwise.
     pub fn command(&mut self, now: Stamp) -> ExtruderCommand {
         self.command = self.command.filter(|&(_, until)| now < until);
-        self.command.map_or(REST, |(command, _)| command)
+        self.command.map_or(AT_REST, |(command, _)| command)
     }
 
     /// The `STATE` to send, with what pump, valve and sensors say; none before
@@ -146,7 +146,7 @@ impl Gate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::extruder::Drive;
+    use crate::extruder::CommandQuantity;
 
     const RUN: ExtruderCommand = ExtruderCommand { pump_on: true, valve_open: true, value: 60.0 };
 
@@ -154,12 +154,13 @@ mod tests {
         Stamp::from_ns(ms * 1_000_000)
     }
 
-    fn gate() -> Gate {
-        let hello = ExtruderHello { name: "test".into(), drive: Drive::Rpm, min: 5.0, max: 90.0 };
-        Gate::new(hello, 7000)
+    fn gate() -> ExtruderEndpoint {
+        let hello =
+            ExtruderHello { name: "test".into(), drive: CommandQuantity::Rpm, min: 5.0, max: 90.0 };
+        ExtruderEndpoint::new(hello, 7000)
     }
 
-    fn greeted() -> Gate {
+    fn greeted() -> ExtruderEndpoint {
         let mut gate = gate();
         assert!(matches!(gate.take(at(0), DriveLine::Hello), Some(ExtruderLine::Hello(_))));
         gate
@@ -181,7 +182,7 @@ mod tests {
         let mut gate = greeted();
         assert_eq!(gate.take(at(20), drive(1, RUN, 300, 7010)), None);
         assert_eq!(gate.command(at(309)), RUN);
-        assert_eq!(gate.command(at(310)), REST);
+        assert_eq!(gate.command(at(310)), AT_REST);
         assert_eq!(
             code(gate.take(at(320), drive(2, RUN, 300, 7010)).as_ref()),
             Some(ErrCode::Stale)
@@ -205,7 +206,7 @@ mod tests {
         }
         assert_eq!(gate.command(at(999)), RUN);
         // At rest no command is too small.
-        assert_eq!(gate.take(at(40), drive(8, REST, 300, 7010)), None);
+        assert_eq!(gate.take(at(40), drive(8, AT_REST, 300, 7010)), None);
     }
 
     #[test]
@@ -225,9 +226,9 @@ mod tests {
         let mut gate = greeted();
         assert_eq!(gate.take(at(20), drive(1, RUN, 1000, 7000)), None);
         gate.fail();
-        assert_eq!(gate.command(at(30)), REST);
+        assert_eq!(gate.command(at(30)), AT_REST);
         assert_eq!(code(gate.take(at(30), drive(2, RUN, 300, 7010)).as_ref()), Some(ErrCode::Mode));
-        assert_eq!(gate.take(at(30), drive(3, REST, 300, 7010)), None);
+        assert_eq!(gate.take(at(30), drive(3, AT_REST, 300, 7010)), None);
         gate.acknowledge();
         assert_eq!(gate.take(at(30), drive(4, RUN, 300, 7010)), None);
         assert_eq!(gate.command(at(40)), RUN);

@@ -3,7 +3,7 @@
 use crate::link::frame::Decimals;
 
 /// Eight digits before the point; four such numbers still fit a line.
-pub(super) const NUMBERS: Decimals = Decimals { largest: 99_999_999.0 };
+pub(super) const NUMBERS: Decimals = Decimals { max_magnitude: 99_999_999.0 };
 
 /// The command as it arrives at the other side: six decimals, at most eight
 /// digits before the point.

@@ -1,7 +1,7 @@
 //! Lines from a device, a robot or an extruder, to the PC. Every device says what
 //! it is, what it does and what it refuses; only the bodies differ.
 
-use super::fields::{Fields, LineError, printing};
+use super::fields::{LineError, LineFields, printing};
 use super::limits::{MAX_LINE, VERSION};
 use super::refusal::{ErrCode, LineRefusal};
 
@@ -11,7 +11,7 @@ const KEYWORDS: [&str; 3] = ["HELLO", "STATE", "ERR"];
 /// the version.
 pub trait LineBody: Sized {
     /// Reads its fields.
-    fn read(fields: &mut Fields<'_>) -> Result<Self, LineError>;
+    fn read(fields: &mut LineFields<'_>) -> Result<Self, LineError>;
 
     /// Its fields, separated by one space.
     fn write(&self) -> String;
@@ -38,7 +38,7 @@ pub enum DeviceLine<H, S> {
 impl<H: LineBody, S: LineBody> DeviceLine<H, S> {
     /// Reads a line without its LF.
     pub fn parse(text: &str) -> Result<Self, LineError> {
-        let mut fields = Fields::open(text, &KEYWORDS, "HELLO, STATE or ERR")?;
+        let mut fields = LineFields::open(text, &KEYWORDS, "HELLO, STATE or ERR")?;
         match fields.keyword() {
             "HELLO" => {
                 fields.version()?;
@@ -76,12 +76,12 @@ impl<H: LineBody, S: LineBody> DeviceLine<H, S> {
 }
 
 /// Reads the fields of an `ERR` line.
-fn parse_err(mut fields: Fields<'_>) -> Result<(u64, LineRefusal), LineError> {
+fn parse_err(mut fields: LineFields<'_>) -> Result<(u64, LineRefusal), LineError> {
     let seq = fields.whole("seq")?;
     let word = fields.word("code")?;
     let code = ErrCode::ALL.into_iter().find(|code| code.word() == word);
     let expected = "STALE, RANGE, SEQUENCE, MODE or FORM";
-    let code = code.ok_or_else(|| fields.wrong("code", expected, word))?;
+    let code = code.ok_or_else(|| fields.field_error("code", expected, word))?;
     Ok((seq, LineRefusal { code, text: fields.text() }))
 }
 

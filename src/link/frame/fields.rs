@@ -7,7 +7,7 @@ use super::limits::VERSION;
 use crate::core::units::{MmPerS, NotFinite};
 
 /// Longest name that still fits a line beside three numbers.
-const LONGEST_NAME: usize = 48;
+const MAX_NAME_LEN: usize = 48;
 /// Decimals that are written: a nanometre, or a nanometre a second.
 const DECIMALS: usize = 6;
 
@@ -79,12 +79,12 @@ pub enum LineError {
 
 /// Reads the fields of one line from left to right.
 #[derive(Debug)]
-pub struct Fields<'a> {
+pub struct LineFields<'a> {
     keyword: &'static str,
     rest: Split<'a, char>,
 }
 
-impl<'a> Fields<'a> {
+impl<'a> LineFields<'a> {
     /// Begins a line, which must start with one of `keywords`; `expected` are
     /// these in words.
     pub fn open(
@@ -122,7 +122,7 @@ impl<'a> Fields<'a> {
         let digits = word.bytes().all(|byte| byte.is_ascii_digit());
         match word.parse() {
             Ok(value) if digits => Ok(value),
-            _ => Err(self.wrong(field, "a whole number of at most 64 bits", word)),
+            _ => Err(self.field_error(field, "a whole number of at most 64 bits", word)),
         }
     }
 
@@ -136,7 +136,9 @@ impl<'a> Fields<'a> {
         let plain = word.bytes().all(|byte| byte.is_ascii_digit() || matches!(byte, b'.' | b'-'));
         match word.parse::<f64>().map(&unit) {
             Ok(Ok(value)) if plain => Ok(value),
-            _ => Err(self.wrong(field, "a number with a decimal point and no exponent", word)),
+            _ => {
+                Err(self.field_error(field, "a number with a decimal point and no exponent", word))
+            }
         }
     }
 
@@ -165,7 +167,7 @@ impl<'a> Fields<'a> {
         match self.word(field)? {
             "0" => Ok(false),
             "1" => Ok(true),
-            found => Err(self.wrong(field, "0 or 1", found)),
+            found => Err(self.field_error(field, "0 or 1", found)),
         }
     }
 
@@ -193,7 +195,12 @@ impl<'a> Fields<'a> {
     }
 
     /// A field that is not of its form.
-    pub fn wrong(&self, field: &'static str, expected: &'static str, found: &str) -> LineError {
+    pub fn field_error(
+        &self,
+        field: &'static str,
+        expected: &'static str,
+        found: &str,
+    ) -> LineError {
         LineError::Field { keyword: self.keyword, field, expected, found: found.to_owned() }
     }
 }
@@ -203,13 +210,13 @@ impl<'a> Fields<'a> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decimals {
     /// Largest magnitude that is written.
-    pub largest: f64,
+    pub max_magnitude: f64,
 }
 
 impl Decimals {
     /// A number as it stands on a line.
     pub fn write(self, value: f64) -> String {
-        let text = format!("{:.DECIMALS$}", value.clamp(-self.largest, self.largest));
+        let text = format!("{:.DECIMALS$}", value.clamp(-self.max_magnitude, self.max_magnitude));
         let text = text.trim_end_matches('0').trim_end_matches('.');
         if text == "-0" { "0".to_owned() } else { text.to_owned() }
     }
@@ -228,6 +235,6 @@ pub fn printing(text: &str, longest: usize) -> String {
 
 /// A name as one word of at most `LONGEST_NAME` characters.
 pub fn one_word(name: &str, instead: &str) -> String {
-    let word = printing(name, LONGEST_NAME).replace(' ', "-");
+    let word = printing(name, MAX_NAME_LEN).replace(' ', "-");
     if word.is_empty() { instead.to_owned() } else { word }
 }

@@ -1,6 +1,6 @@
 //! How a PC greets a device and takes its leave, over either link.
 
-use super::fields::{Fields, LineError};
+use super::fields::{LineError, LineFields};
 use super::limits::VERSION;
 
 /// The last line of a connection that is ended in order.
@@ -12,7 +12,7 @@ pub fn hello_line() -> String {
 }
 
 /// Reads the fields of that line and gives `line`; the name in it may be any word.
-pub fn read_hello<T>(mut fields: Fields<'_>, line: T) -> Result<T, LineError> {
+pub fn read_hello<T>(mut fields: LineFields<'_>, line: T) -> Result<T, LineError> {
     fields.version()?;
     fields.word("name")?;
     fields.end(line)

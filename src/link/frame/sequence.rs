@@ -34,7 +34,7 @@ impl Sequence {
     }
 
     /// The connection is gone.
-    pub const fn leave(&mut self) {
+    pub const fn disconnect(&mut self) {
         self.greeted = false;
     }
 
@@ -81,7 +81,7 @@ pub struct Validity {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DeviceClock {
     /// What messages call the device: `robot` or `extruder`.
-    pub of: &'static str,
+    pub device: &'static str,
     /// What it shows at stamp 0 \[ms\].
     pub start_ms: u64,
 }
@@ -94,7 +94,7 @@ impl DeviceClock {
 
     /// When a line is void that arrives now, if it is not already.
     pub fn void_at(self, now: Stamp, validity: Validity) -> Result<Stamp, LineRefusal> {
-        let Self { of, start_ms } = self;
+        let Self { device: of, start_ms } = self;
         let Validity { valid_ms, ref_t_ms } = validity;
         let t_ms = self.ms(now);
         if !(MIN_VALID_MS..=MAX_VALID_MS).contains(&valid_ms) {

@@ -1,7 +1,7 @@
 //! What a robot without an operator prints: layer upon layer, while a PC is
 //! connected.
 
-use super::virtual_robot::RobotCell;
+use super::virtual_robot::VirtualRobot;
 use crate::core::robot::RobotMode;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
@@ -10,7 +10,7 @@ use crate::core::units::Mm;
 /// operator's key: it begins the job again when it was finished, and
 /// acknowledges a `STOP` or `FAULT` that it finds, after the pause.
 #[derive(Debug, Clone)]
-pub struct Job {
+pub struct PrintJob {
     layers: u32,
     layer_height: Mm,
     first_z: Mm,
@@ -20,7 +20,7 @@ pub struct Job {
     waiting_since: Option<Stamp>,
 }
 
-impl Job {
+impl PrintJob {
     /// `layers` beads, each `layer_height` above the one before, with a pause
     /// before each.
     pub fn new(layers: u32, layer_height: Mm, first_z: Mm, pause: Span) -> Self {
@@ -43,7 +43,7 @@ impl Job {
     }
 
     /// Moves the cell on to `now` and begins a bead when it is time for one.
-    pub fn advance(&mut self, now: Stamp, cell: &mut RobotCell) {
+    pub fn advance(&mut self, now: Stamp, cell: &mut VirtualRobot) {
         cell.advance(now);
         let waits = match cell.mode() {
             RobotMode::Idle => self.begun < self.layers,
@@ -79,12 +79,12 @@ mod tests {
         Stamp::from_secs(t)
     }
 
-    fn cell() -> RobotCell {
+    fn cell() -> VirtualRobot {
         let bead = Some(Mm::constant(10.0));
-        RobotCell::new(RobotParams { bead, ..RobotParams::default() }, Stamp::START).unwrap()
+        VirtualRobot::new(RobotParams { bead, ..RobotParams::default() }, Stamp::START).unwrap()
     }
 
-    fn run(job: &mut Job, cell: &mut RobotCell, from_s: f64, to_s: f64) {
+    fn run(job: &mut PrintJob, cell: &mut VirtualRobot, from_s: f64, to_s: f64) {
         let mut t = from_s;
         while t < to_s {
             job.advance(secs(t), cell);
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn nothing_is_printed_before_a_pc_is_there() {
-        let (mut job, mut cell) = (Job::new(2, Mm::ZERO, Mm::ZERO, Span::ZERO), cell());
+        let (mut job, mut cell) = (PrintJob::new(2, Mm::ZERO, Mm::ZERO, Span::ZERO), cell());
         run(&mut job, &mut cell, 0.0, 5.0);
         assert_eq!((job.begun(), cell.mode()), (0, RobotMode::Idle));
     }
@@ -102,7 +102,7 @@ mod tests {
     #[test]
     fn layers_rise_and_end() {
         let height = Mm::constant(5.0);
-        let mut job = Job::new(2, height, Mm::constant(1.0), Span::from_millis(100));
+        let mut job = PrintJob::new(2, height, Mm::constant(1.0), Span::from_millis(100));
         let mut cell = cell();
         cell.connect(secs(0.0));
         job.connected(cell.mode());
@@ -116,8 +116,8 @@ mod tests {
 
     #[test]
     fn a_connection_after_a_stop_begins_the_finished_job_anew() {
-        let mut job = Job::new(1, Mm::ZERO, Mm::ZERO, Span::from_millis(100));
-        let mut cell = RobotCell::new(RobotParams::default(), Stamp::START).unwrap();
+        let mut job = PrintJob::new(1, Mm::ZERO, Mm::ZERO, Span::from_millis(100));
+        let mut cell = VirtualRobot::new(RobotParams::default(), Stamp::START).unwrap();
         for connection in 0..3 {
             let from_s = 5.0 * f64::from(connection);
             cell.connect(secs(from_s));
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_stop_is_acknowledged_by_the_next_connection_only() {
-        let mut job = Job::new(9, Mm::ZERO, Mm::ZERO, Span::from_millis(100));
+        let mut job = PrintJob::new(9, Mm::ZERO, Mm::ZERO, Span::from_millis(100));
         let mut cell = cell();
         cell.connect(secs(0.0));
         cell.take(secs(0.0), PcLine::Hello);

@@ -4,7 +4,7 @@
 
 /// What drives the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drive {
+pub struct SpeedLoop {
     /// Speed to go to \[mm/s\].
     pub target: f64,
     /// Time constant of the velocity loop, 1/(2π·bandwidth) \[s\].
@@ -15,39 +15,39 @@ pub struct Drive {
 
 /// Speed and path at one moment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Motion {
+pub struct PathMotion {
     /// Speed along the path \[mm/s\].
     pub speed: f64,
     /// Distance along the path \[mm\].
     pub path: f64,
 }
 
-impl Motion {
+impl PathMotion {
     /// The motion `dt_s` seconds later under a constant drive: with
     /// e = target − v, dv/dt = clamp(e/τ, ±a). A ramp while |e| > a·τ, then
     /// v = target − e·exp(−t/τ).
     #[must_use]
-    pub fn after(self, drive: Drive, dt_s: f64) -> Self {
-        let Drive { target, lag_s, accel } = drive;
+    pub fn after(self, drive: SpeedLoop, dt_s: f64) -> Self {
+        let SpeedLoop { target, lag_s, accel } = drive;
         let missing = target - self.speed;
         let ramp_s = ((missing.abs() - accel * lag_s) / accel).clamp(0.0, dt_s);
         let slope = accel.copysign(missing);
         let ramped = Self {
             speed: self.speed + slope * ramp_s,
-            path: self.path + forward(self.speed * ramp_s + 0.5 * slope * ramp_s * ramp_s),
+            path: self.path + non_negative(self.speed * ramp_s + 0.5 * slope * ramp_s * ramp_s),
         };
         let rest_s = dt_s - ramp_s;
         let missing = target - ramped.speed;
         let settled = -(-rest_s / lag_s).exp_m1();
         Self {
             speed: ramped.speed + missing * settled,
-            path: ramped.path + forward(target * rest_s - missing * lag_s * settled),
+            path: ramped.path + non_negative(target * rest_s - missing * lag_s * settled),
         }
     }
 
     /// How many nanoseconds of `within_ns` pass until the path has reached
     /// `path_mm`, rounded up; none if it is not reached by then.
-    pub fn reaches(self, drive: Drive, path_mm: f64, within_ns: u64) -> Option<u64> {
+    pub fn ns_until(self, drive: SpeedLoop, path_mm: f64, within_ns: u64) -> Option<u64> {
         let there = |ns: u64| self.after(drive, seconds(ns)).path >= path_mm;
         if !there(within_ns) {
             return None;
@@ -66,7 +66,7 @@ impl Motion {
 }
 
 /// Rounding must not let a path fall.
-fn forward(step_mm: f64) -> f64 {
+fn non_negative(step_mm: f64) -> f64 {
     step_mm.max(0.0)
 }
 
@@ -86,8 +86,8 @@ mod tests {
 
     #[test]
     fn one_time_constant_covers_63_percent() {
-        let drive = Drive { target: 100.0, lag_s: LAG_S, accel: 1e9 };
-        let motion = Motion::default().after(drive, LAG_S);
+        let drive = SpeedLoop { target: 100.0, lag_s: LAG_S, accel: 1e9 };
+        let motion = PathMotion::default().after(drive, LAG_S);
         assert!((motion.speed - 100.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-9);
         // ∫ u(1 − e^(−t/τ)) dt over one τ is u·τ/e.
         assert!((motion.path - 100.0 * LAG_S * (-1.0_f64).exp()).abs() < 1e-9);
@@ -95,20 +95,20 @@ mod tests {
 
     #[test]
     fn the_slope_is_limited_until_the_lag_takes_over() {
-        let drive = Drive { target: 100.0, lag_s: LAG_S, accel: 500.0 };
-        let early = Motion::default().after(drive, 0.1);
+        let drive = SpeedLoop { target: 100.0, lag_s: LAG_S, accel: 500.0 };
+        let early = PathMotion::default().after(drive, 0.1);
         assert!((early.speed - 50.0).abs() < 1e-9);
         assert!((early.path - 2.5).abs() < 1e-9);
-        assert!((Motion::default().after(drive, 2.0).speed - 100.0).abs() < 1e-9);
+        assert!((PathMotion::default().after(drive, 2.0).speed - 100.0).abs() < 1e-9);
     }
 
     #[test]
     fn a_place_on_the_path_is_found_to_the_nanosecond() {
-        let drive = Drive { target: 100.0, lag_s: LAG_S, accel: 2000.0 };
-        let steady = Motion { speed: 100.0, path: 0.0 };
-        assert_eq!(steady.reaches(drive, 10.0, 200_000_000), Some(100_000_000));
-        assert_eq!(steady.reaches(drive, 10.0, 99_000_000), None);
-        assert_eq!(steady.reaches(drive, 0.0, 5), Some(0));
+        let drive = SpeedLoop { target: 100.0, lag_s: LAG_S, accel: 2000.0 };
+        let steady = PathMotion { speed: 100.0, path: 0.0 };
+        assert_eq!(steady.ns_until(drive, 10.0, 200_000_000), Some(100_000_000));
+        assert_eq!(steady.ns_until(drive, 10.0, 99_000_000), None);
+        assert_eq!(steady.ns_until(drive, 0.0, 5), Some(0));
     }
 
     proptest! {
@@ -120,8 +120,8 @@ mod tests {
             total_s in 0.0..1.0_f64,
             cuts in prop::collection::vec(0.0..1.0_f64, 0..20),
         ) {
-            let drive = Drive { target, lag_s: LAG_S, accel };
-            let start = Motion { speed, path: 7.0 };
+            let drive = SpeedLoop { target, lag_s: LAG_S, accel };
+            let start = PathMotion { speed, path: 7.0 };
             let whole = start.after(drive, total_s);
             let mut cuts = cuts;
             cuts.push(1.0);

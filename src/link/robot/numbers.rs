@@ -4,7 +4,7 @@ use crate::core::units::MmPerS;
 use crate::link::frame::Decimals;
 
 /// Twelve digits before the point; three such numbers still fit a line.
-pub(super) const NUMBERS: Decimals = Decimals { largest: 999_999_999_999.0 };
+pub(super) const NUMBERS: Decimals = Decimals { max_magnitude: 999_999_999_999.0 };
 
 /// The speed as it arrives at the other side: six decimals, at most twelve
 /// digits before the point.

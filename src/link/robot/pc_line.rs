@@ -2,7 +2,7 @@
 
 use super::numbers::NUMBERS;
 use crate::core::units::MmPerS;
-use crate::link::frame::{BYE_LINE, Fields, LineError, hello_line, read_hello};
+use crate::link::frame::{BYE_LINE, LineError, LineFields, hello_line, read_hello};
 
 const KEYWORDS: [&str; 4] = ["HELLO", "SPEED", "STOP", "BYE"];
 
@@ -34,7 +34,7 @@ pub enum PcLine {
 impl PcLine {
     /// Reads a line without its LF. The name after `HELLO 1` may be any word.
     pub fn parse(text: &str) -> Result<Self, LineError> {
-        let mut fields = Fields::open(text, &KEYWORDS, "HELLO, SPEED, STOP or BYE")?;
+        let mut fields = LineFields::open(text, &KEYWORDS, "HELLO, SPEED, STOP or BYE")?;
         match fields.keyword() {
             "HELLO" => read_hello(fields, Self::Hello),
             "SPEED" => {

@@ -3,13 +3,13 @@
 use super::numbers::NUMBERS;
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::units::{Mm, MmPerS};
-use crate::link::frame::{DeviceLine, Fields, LineBody, LineError, one_word};
+use crate::link::frame::{DeviceLine, LineBody, LineError, LineFields, one_word};
 
 /// A line from the robot to the PC; a `STATE` comes every 20 to 200 ms.
 pub type RobotLine = DeviceLine<RobotLimits, RobotState>;
 
 impl LineBody for RobotLimits {
-    fn read(fields: &mut Fields<'_>) -> Result<Self, LineError> {
+    fn read(fields: &mut LineFields<'_>) -> Result<Self, LineError> {
         let name = fields.word("name")?.to_owned();
         let min_mm_per_s = fields.quantity("min_mm_per_s", MmPerS::new)?;
         let max_mm_per_s = fields.quantity("max_mm_per_s", MmPerS::new)?;
@@ -28,12 +28,12 @@ impl LineBody for RobotLimits {
 }
 
 impl LineBody for RobotState {
-    fn read(fields: &mut Fields<'_>) -> Result<Self, LineError> {
+    fn read(fields: &mut LineFields<'_>) -> Result<Self, LineError> {
         let t_ms = fields.whole("t_ms")?;
         let seq = fields.whole("seq")?;
         let word = fields.word("mode")?;
         let expected = "IDLE, PRINT, HOLD, STOP or FAULT";
-        let mode = mode_of(word).ok_or_else(|| fields.wrong("mode", expected, word))?;
+        let mode = mode_of(word).ok_or_else(|| fields.field_error("mode", expected, word))?;
         let speed_mm_per_s = fields.quantity("speed_mm_per_s", MmPerS::new)?;
         let path_mm = fields.quantity("path_mm", Mm::new)?;
         let z_mm = fields.quantity("z_mm", Mm::new)?;

@@ -16,7 +16,7 @@
 //! setpoint may be ([`MAX_VALID_MS`]): a PC that is dead, or connected and
 //! mute, then leads to `HOLD` and `STOP` like one that falls silent later.
 
-use super::motion::{Drive, Motion, seconds};
+use super::motion::{PathMotion, SpeedLoop, seconds};
 use super::params::{ParamError, RobotParams};
 use super::robot_line::RobotLine;
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
@@ -35,7 +35,7 @@ const START_VALID: Span = Span::from_millis(MAX_VALID_MS.cast_signed());
 
 /// What the robot does, with what belongs to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Doing {
+enum Phase {
     Idle,
     Print { target: MmPerS, until: Stamp },
     Hold { until: Stamp },
@@ -45,46 +45,46 @@ enum Doing {
 
 /// Ways in which a robot can misbehave, for tests and rehearsals.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Faults {
+pub struct RobotFaults {
     /// Refuses every setpoint with this.
     pub refuse: Option<ErrCode>,
     /// Sends no `STATE`.
     pub mute: bool,
     /// Moves at this share of the speed that it was told; 1 is none the worse.
-    pub follows: f64,
+    pub speed_ratio: f64,
 }
 
-impl Default for Faults {
+impl Default for RobotFaults {
     fn default() -> Self {
-        Self { refuse: None, mute: false, follows: 1.0 }
+        Self { refuse: None, mute: false, speed_ratio: 1.0 }
     }
 }
 
 /// A robot that speaks the link.
 #[derive(Debug, Clone)]
-pub struct RobotCell {
+pub struct VirtualRobot {
     params: RobotParams,
     at: Stamp,
-    doing: Doing,
-    motion: Motion,
+    phase: Phase,
+    motion: PathMotion,
     bead_end: Option<f64>,
     z: Mm,
     sequence: Sequence,
-    faults: Faults,
+    faults: RobotFaults,
 }
 
-impl RobotCell {
+impl VirtualRobot {
     /// A robot that stands idle at `now`; fails on parameters that cannot be.
     pub fn new(params: RobotParams, now: Stamp) -> Result<Self, ParamError> {
         let params = params.checked()?;
         Ok(Self {
             at: now,
-            doing: Doing::Idle,
-            motion: Motion::default(),
+            phase: Phase::Idle,
+            motion: PathMotion::default(),
             bead_end: None,
             z: params.z,
             sequence: Sequence::new(),
-            faults: Faults::default(),
+            faults: RobotFaults::default(),
             params,
         })
     }
@@ -99,7 +99,7 @@ impl RobotCell {
     /// The connection is gone. The last setpoint runs out.
     pub fn disconnect(&mut self, now: Stamp) {
         self.advance(now);
-        self.sequence.leave();
+        self.sequence.disconnect();
     }
 
     /// Whether a PC is connected and has said `HELLO`.
@@ -109,12 +109,12 @@ impl RobotCell {
 
     /// What it does.
     pub fn mode(&self) -> RobotMode {
-        match self.doing {
-            Doing::Idle => RobotMode::Idle,
-            Doing::Print { .. } => RobotMode::Print,
-            Doing::Hold { .. } => RobotMode::Hold,
-            Doing::Stop => RobotMode::Stop,
-            Doing::Fault => RobotMode::Fault,
+        match self.phase {
+            Phase::Idle => RobotMode::Idle,
+            Phase::Print { .. } => RobotMode::Print,
+            Phase::Hold { .. } => RobotMode::Hold,
+            Phase::Stop => RobotMode::Stop,
+            Phase::Fault => RobotMode::Fault,
         }
     }
 
@@ -126,31 +126,31 @@ impl RobotCell {
     /// Begins a bead at a height, out of `IDLE` only; says whether it did.
     pub fn begin_bead(&mut self, now: Stamp, z: Mm) -> bool {
         self.advance(now);
-        if self.doing != Doing::Idle {
+        if self.phase != Phase::Idle {
             return false;
         }
         self.z = z;
         self.bead_end = self.params.bead.map(|length| self.motion.path + length.get());
-        self.doing = Doing::Print { target: self.params.start, until: self.at + START_VALID };
+        self.phase = Phase::Print { target: self.params.start, until: self.at + START_VALID };
         true
     }
 
     /// What an operator does at the robot: leaves `STOP` or `FAULT` for `IDLE`.
     pub fn acknowledge(&mut self, now: Stamp) {
         self.advance(now);
-        if matches!(self.doing, Doing::Stop | Doing::Fault) {
-            self.doing = Doing::Idle;
+        if matches!(self.phase, Phase::Stop | Phase::Fault) {
+            self.phase = Phase::Idle;
         }
     }
 
     /// Makes it stop with a fault of its own.
     pub fn fail(&mut self, now: Stamp) {
         self.advance(now);
-        self.doing = Doing::Fault;
+        self.phase = Phase::Fault;
     }
 
     /// Makes it misbehave from now on.
-    pub fn set_faults(&mut self, now: Stamp, faults: Faults) {
+    pub fn set_faults(&mut self, now: Stamp, faults: RobotFaults) {
         self.advance(now);
         self.faults = faults;
     }
@@ -160,11 +160,11 @@ impl RobotCell {
         while self.at < now || self.due() {
             let to = self.deadline().map_or(now, |deadline| deadline.min(now)).max(self.at);
             if self.move_until(to) {
-                self.doing = Doing::Idle;
+                self.phase = Phase::Idle;
             } else if self.due() {
-                self.doing = match self.doing {
-                    Doing::Print { until, .. } => Doing::Hold { until: until + HOLD_TO_STOP },
-                    _ => Doing::Stop,
+                self.phase = match self.phase {
+                    Phase::Print { until, .. } => Phase::Hold { until: until + HOLD_TO_STOP },
+                    _ => Phase::Stop,
                 };
             }
         }
@@ -193,31 +193,35 @@ impl RobotCell {
     /// Runs the motion to `to`, or to the end of the bead if that comes first;
     /// says whether it did.
     fn move_until(&mut self, to: Stamp) -> bool {
-        let drive = self.drive();
+        let speed_loop = self.speed_loop();
         let within_ns = to.ns().saturating_sub(self.at.ns());
-        let printing = matches!(self.doing, Doing::Print { .. } | Doing::Hold { .. });
+        let printing = matches!(self.phase, Phase::Print { .. } | Phase::Hold { .. });
         let end = self.bead_end.filter(|_| printing);
-        let end_ns = end.and_then(|end| self.motion.reaches(drive, end, within_ns));
+        let end_ns = end.and_then(|end| self.motion.ns_until(speed_loop, end, within_ns));
         let ns = end_ns.unwrap_or(within_ns);
-        self.motion = self.motion.after(drive, seconds(ns));
+        self.motion = self.motion.after(speed_loop, seconds(ns));
         self.at = Stamp::from_ns(self.at.ns().saturating_add(ns));
         end_ns.is_some()
     }
 
-    fn drive(&self) -> Drive {
-        let target = match self.doing {
-            Doing::Print { target, .. } => target.get(),
-            Doing::Hold { .. } => self.params.hold.get(),
-            Doing::Idle | Doing::Stop | Doing::Fault => 0.0,
+    fn speed_loop(&self) -> SpeedLoop {
+        let target = match self.phase {
+            Phase::Print { target, .. } => target.get(),
+            Phase::Hold { .. } => self.params.hold.get(),
+            Phase::Idle | Phase::Stop | Phase::Fault => 0.0,
         };
         let lag_s = 1.0 / (2.0 * std::f64::consts::PI * self.params.bandwidth_hz);
-        Drive { target: target * self.faults.follows, lag_s, accel: self.params.accel.get() }
+        SpeedLoop {
+            target: target * self.faults.speed_ratio,
+            lag_s,
+            accel: self.params.accel.get(),
+        }
     }
 
     fn deadline(&self) -> Option<Stamp> {
-        match self.doing {
-            Doing::Print { until, .. } | Doing::Hold { until } => Some(until),
-            Doing::Idle | Doing::Stop | Doing::Fault => None,
+        match self.phase {
+            Phase::Print { until, .. } | Phase::Hold { until } => Some(until),
+            Phase::Idle | Phase::Stop | Phase::Fault => None,
         }
     }
 
@@ -226,6 +230,6 @@ impl RobotCell {
     }
 
     fn clock(&self) -> DeviceClock {
-        DeviceClock { of: "robot", start_ms: self.params.clock_start_ms }
+        DeviceClock { device: "robot", start_ms: self.params.clock_start_ms }
     }
 }

@@ -1,7 +1,7 @@
 //! The extruder's part of the control thread: what its link reports, and what
 //! the operator is told of it.
 
-use super::Loop;
+use super::ControlThread;
 use super::ending::Ending;
 use crate::control::event::Event;
 use crate::control::step::Step;
@@ -10,10 +10,10 @@ use crate::drivers::extruder::ExtruderEvent;
 use crate::extruder::ExtruderState;
 use crate::rows::names;
 
-impl Loop<'_> {
+impl ControlThread<'_> {
     /// Hands the controller what the extruder reports. An extruder that does
     /// not fit the cell is never told of, so that nothing is sent to it.
-    pub(super) fn hear_extruder(&mut self, event: ExtruderEvent) {
+    pub(super) fn take_extruder_event(&mut self, event: ExtruderEvent) {
         let Some(watch) = &mut self.extruder else { return };
         if let Some(words) = watch.note(&event) {
             (self.notice)(&words);
@@ -44,10 +44,10 @@ impl Loop<'_> {
         watch.shown = side.state;
         let words = match side.state {
             ExtruderState::Holding(why) => {
-                format!("holding: {}", names::spoken(names::extruder_hold(why)))
+                format!("holding: {}", names::in_words(names::extruder_hold(why)))
             }
             ExtruderState::Fault(why) => {
-                format!("fault: {}", names::spoken(&names::extruder_fault(why)))
+                format!("fault: {}", names::in_words(&names::extruder_fault(why)))
             }
             state => state.name().to_owned(),
         };

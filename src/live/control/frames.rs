@@ -1,7 +1,7 @@
 //! The frames' part of the control thread.
 
-use super::super::eye::Look;
-use super::Loop;
+use super::super::eye::MeasuredFrame;
+use super::ControlThread;
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::Stamp;
@@ -9,10 +9,10 @@ use crate::core::units::Mm;
 use crate::rows::frame_row::{ControlColumns, FrameRow};
 use crate::vision::Reject;
 
-impl Loop<'_> {
+impl ControlThread<'_> {
     /// A frame that was looked at: the event, its answer and the log's row.
-    pub(super) fn look(&mut self, look: Look) {
-        let Look { frame, had_at, outcome, roughness, edges } = look;
+    pub(super) fn look(&mut self, look: MeasuredFrame) {
+        let MeasuredFrame { frame, had_at, outcome, roughness, edges } = look;
         let (seq, captured_at) = (frame.seq, frame.captured_at);
         let event = match &outcome {
             Ok(measured) => Event::Measured {
@@ -36,7 +36,7 @@ impl Loop<'_> {
             outcome: outcome.map_err(|reject| reject.status()),
             roughness,
         };
-        self.scribe.frame(&row, Some((frame, edges.0, edges.1)));
+        self.logger.frame(&row, Some((frame, edges.0, edges.1)));
     }
 
     /// A frame that cannot be read.
@@ -53,7 +53,7 @@ impl Loop<'_> {
             roughness: None,
             control,
         };
-        self.scribe.frame(&row, None);
+        self.logger.frame(&row, None);
     }
 
     fn columns(&self, step: &Step, width: Option<Mm>) -> ControlColumns {

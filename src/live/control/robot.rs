@@ -2,15 +2,15 @@
 
 use std::sync::atomic::Ordering;
 
-use super::Loop;
+use super::ControlThread;
 use super::ending::Ending;
 use crate::core::robot::RobotLimits;
 use crate::drivers::robot::RobotEvent;
-use crate::width_control::limiter::Limits;
+use crate::width_control::limiter::SpeedLimits;
 
-impl Loop<'_> {
+impl ControlThread<'_> {
     /// Hands the controller what the robot reports.
-    pub(super) fn hear_robot(&mut self, event: RobotEvent) {
+    pub(super) fn take_robot_event(&mut self, event: RobotEvent) {
         match &event {
             RobotEvent::State { at, state } => {
                 self.robot_z.store(state.z_mm.get().to_bits(), Ordering::Relaxed);
@@ -34,7 +34,7 @@ impl Loop<'_> {
 }
 
 /// Why a robot cannot be driven with a cell's limits, if it cannot.
-fn unfit(limits: &Limits, robot: &RobotLimits) -> Option<String> {
+fn unfit(limits: &SpeedLimits, robot: &RobotLimits) -> Option<String> {
     let fits = robot.min_mm_per_s <= limits.min_speed && limits.max_speed <= robot.max_mm_per_s;
     (!fits).then(|| {
         format!(

@@ -1,7 +1,7 @@
 //! When a run ends that is there for a course of steps.
 
 use crate::control::step::{State, Step};
-use crate::width_control::steps::Progress;
+use crate::width_control::steps::StepsProgress;
 
 /// Watches a course of steps.
 #[derive(Debug, Clone, Copy, Default)]
@@ -17,7 +17,7 @@ impl StepsWatch {
         let progress = step.trace.steps.map(|steps| steps.progress);
         self.has_begun |= progress.is_some();
         let ends = matches!(step.state, State::Idle | State::Fault(_));
-        self.is_over |= progress == Some(Progress::Over) || self.has_begun && ends;
+        self.is_over |= progress == Some(StepsProgress::Over) || self.has_begun && ends;
     }
 
     /// Whether it is over.

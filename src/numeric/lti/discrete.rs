@@ -9,7 +9,7 @@ use super::transfer::{ModelError, TransferFunction};
 
 /// How it gets there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
+pub enum DiscretisationMethod {
     /// Exact for an input that holds its sample (zero-order hold); a dead time
     /// that ends within a step is kept exactly.
     ZeroOrderHold,
@@ -46,9 +46,16 @@ impl TransferFunction {
     /// On a grid of `dt_s` \[s\]. Fails where the step is not above zero, where
     /// the dead time is not whole steps and the method is not a hold, and for
     /// the impulse-invariant method with as many zeros as poles.
-    pub fn discretise(&self, dt_s: f64, method: Method) -> Result<DiscreteTransfer, ModelError> {
+    pub fn discretise(
+        &self,
+        dt_s: f64,
+        method: DiscretisationMethod,
+    ) -> Result<DiscreteTransfer, ModelError> {
         let (delay, rest_s) = split(self.dead_time_s(), dt_s)?;
-        let held = matches!(method, Method::ZeroOrderHold | Method::FirstOrderHold);
+        let held = matches!(
+            method,
+            DiscretisationMethod::ZeroOrderHold | DiscretisationMethod::FirstOrderHold
+        );
         if rest_s > 0.0 && !held {
             return Err(ModelError::PartOfAStep {
                 dead_time_s: self.dead_time_s(),
@@ -57,15 +64,17 @@ impl TransferFunction {
             });
         }
         let (num, den) = match method {
-            Method::ZeroOrderHold => hold(self, dt_s, Between::Held)?,
-            Method::FirstOrderHold => hold(self, dt_s, Between::Linear)?,
-            Method::Bilinear => {
+            DiscretisationMethod::ZeroOrderHold => hold(self, dt_s, Between::Held)?,
+            DiscretisationMethod::FirstOrderHold => hold(self, dt_s, Between::Linear)?,
+            DiscretisationMethod::Bilinear => {
                 let per_s = 2.0 / dt_s;
                 substitute(self, &[per_s, -per_s], &[1.0, 1.0])
             }
-            Method::BackwardDifference => substitute(self, &[1.0 / dt_s, -1.0 / dt_s], &[1.0, 0.0]),
-            Method::ImpulseInvariant => impulse(self, dt_s)?,
-            Method::MatchedPoleZero => matched(self, dt_s),
+            DiscretisationMethod::BackwardDifference => {
+                substitute(self, &[1.0 / dt_s, -1.0 / dt_s], &[1.0, 0.0])
+            }
+            DiscretisationMethod::ImpulseInvariant => impulse(self, dt_s)?,
+            DiscretisationMethod::MatchedPoleZero => matched(self, dt_s),
         };
         let length = num.len().max(den.len());
         let padded = |mut row: Vec<f64>| {
@@ -108,7 +117,7 @@ impl Resolvent {
 
 /// Polynomials in 1/z: `add` and `multiply` serve rows with the highest power
 /// first, so sums are taken on rows that were padded to one length.
-fn later(row: &[f64], steps: usize, length: usize) -> Vec<f64> {
+fn delayed_row(row: &[f64], steps: usize, length: usize) -> Vec<f64> {
     let mut padded = vec![0.0; steps];
     padded.extend_from_slice(row);
     padded.resize(length, 0.0);
@@ -126,11 +135,11 @@ fn hold(
     let length = order + 2;
     let mut num = vec![0.0; length];
     for (steps, tap) in sampled.taps.iter().enumerate().filter(|(_, tap)| tap.amax() > 0.0) {
-        num = add(&num, &later(&resolvent.num(&sampled.c, tap), steps, length));
+        num = add(&num, &delayed_row(&resolvent.num(&sampled.c, tap), steps, length));
     }
     for (steps, through) in sampled.through.iter().enumerate() {
         let straight = multiply(&resolvent.den, &[*through]);
-        num = add(&num, &later(&straight, steps, length));
+        num = add(&num, &delayed_row(&straight, steps, length));
     }
     if num[order + 1] == 0.0 {
         num.pop();
@@ -187,7 +196,7 @@ fn matched(tf: &TransferFunction, dt_s: f64) -> (Vec<f64>, Vec<f64>) {
     };
     let num: Vec<f64> = num.iter().map(|c| c * gain).collect();
     let first = den.len() - num.len();
-    (later(&num, first, den.len()), den)
+    (delayed_row(&num, first, den.len()), den)
 }
 
 fn exp(s: Complex<f64>) -> Complex<f64> {

@@ -10,7 +10,7 @@ use super::transfer::TransferFunction;
 /// far it is from the edge, not on which side: an unstable loop may show large
 /// ones. `None` where there is no such crossing, and with it no such limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Margins {
+pub struct StabilityMargins {
     /// Frequency at which the loop's gain passes one \[rad/s\]; of several, that
     /// with the smallest phase margin.
     pub crossover_rad_per_s: Option<f64>,
@@ -27,10 +27,10 @@ pub struct Margins {
 }
 
 /// Points of the first look, over all frequencies that matter.
-const POINTS: u32 = 6000;
+const GRID_POINTS: u32 = 6000;
 
 /// Margins of a loop, controller and plant in series.
-pub fn margins(of_loop: &TransferFunction) -> Margins {
+pub fn margins(of_loop: &TransferFunction) -> StabilityMargins {
     let grid = frequencies(of_loop);
     let at = |w: f64| of_loop.at_frequency(w);
     let size = |w: f64| libm::log(at(w).norm());
@@ -61,7 +61,7 @@ pub fn margins(of_loop: &TransferFunction) -> Margins {
     let signed = |w: f64| if phase(w) > PI { phase(w) - TAU } else { phase(w) };
     let tightest = crossovers.iter().copied().min_by(|a, b| signed(*a).total_cmp(&signed(*b)));
     let neighbours = [worst.1.saturating_sub(1), (worst.1 + 1).min(grid.len() - 1)];
-    Margins {
+    StabilityMargins {
         crossover_rad_per_s: tightest,
         phase_rad: tightest.map(signed),
         gain,
@@ -81,8 +81,8 @@ fn frequencies(of_loop: &TransferFunction) -> Vec<f64> {
     sizes.push(of_loop.num()[0].abs().max(1e-9) / of_loop.den()[0].abs());
     let low = 1e-3 * sizes.iter().copied().fold(f64::MAX, f64::min);
     let high = 1e3 * sizes.iter().copied().fold(0.0, f64::max);
-    let ratio = libm::log(high / low) / f64::from(POINTS - 1);
-    (0..POINTS).map(|k| low * libm::exp(ratio * f64::from(k))).collect()
+    let ratio = libm::log(high / low) / f64::from(GRID_POINTS - 1);
+    (0..GRID_POINTS).map(|k| low * libm::exp(ratio * f64::from(k))).collect()
 }
 
 /// Where a function changes sign.

@@ -16,7 +16,7 @@ pub enum Between {
 
 /// Dead times that miss a whole number of steps by less than this share of one
 /// are whole.
-const WHOLE: f64 = 1e-9;
+const WHOLE_STEP_TOLERANCE: f64 = 1e-9;
 
 /// How a model moves from one sample to the next:
 /// x(k) = Φ·x(k−1) + Σ taps(j)·u(k−delay−j), y(k) = c·x(k) + Σ through(j)·u(k−delay−j).
@@ -66,10 +66,10 @@ pub(super) fn split(dead_time_s: f64, dt_s: f64) -> Result<(usize, f64), ModelEr
         return Err(ModelError::NotPositive { what: "the time step", value: dt_s });
     }
     let steps = dead_time_s / dt_s;
-    let whole = (steps + WHOLE).floor();
+    let whole = (steps + WHOLE_STEP_TOLERANCE).floor();
     let rest = (steps - whole) * dt_s;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
-    Ok((whole as usize, if rest < WHOLE * dt_s { 0.0 } else { rest }))
+    Ok((whole as usize, if rest < WHOLE_STEP_TOLERANCE * dt_s { 0.0 } else { rest }))
 }
 
 /// A model that is given one sample after the other. A step allocates nothing

@@ -49,14 +49,14 @@ fn noise_gains_are_those_of_others_and_of_noise() {
     let noise: Vec<f64> = (0..200_000).map(|_| StandardNormal.sample(&mut random)).collect();
     let filter = SavGol::new(11, 3).unwrap();
     let smooth = filter.filter(&noise).unwrap();
-    let variance = dot(&smooth, &smooth) / float(smooth.len());
+    let variance = dot(&smooth, &smooth) / to_f64(smooth.len());
     assert!((variance / filter.noise_gain(5) - 1.0).abs() < 0.03, "{variance}");
 }
 
 #[test]
 fn a_polynomial_stays_what_it_is_to_both_ends_and_live() {
     let cubic = |k: usize| {
-        let t = float(k) * 0.005;
+        let t = to_f64(k) * 0.005;
         [1.0 + 2.0 * t - 30.0 * t * t + 90.0 * t.powi(3), 2.0 - 60.0 * t + 270.0 * t * t]
     };
     let samples: Vec<f64> = (0..50).map(|k| cubic(k)[0]).collect();

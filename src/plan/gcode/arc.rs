@@ -7,7 +7,7 @@ use crate::plan::position::{Position, distance};
 
 /// Ends of an arc may differ by this much in their distance from the centre, as rounded
 /// numbers do \[mm\], and by this share of it.
-const ROUND: (f64, f64) = (0.02, 1e-3);
+const ARC_TOLERANCE: (f64, f64) = (0.02, 1e-3);
 
 /// A move from one place to another.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,7 +45,7 @@ pub struct ArcEnds {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Centre {
     /// Beside its start \[mm\].
-    Beside([f64; 2]),
+    Offset([f64; 2]),
     /// By the radius \[mm\]; below zero for the longer of both arcs.
     Radius(f64),
 }
@@ -59,13 +59,13 @@ impl Move {
         left: bool,
     ) -> Result<Self, GcodeError> {
         let centre = match given {
-            Centre::Beside([i, j]) => [from[0] + i, from[1] + j],
-            Centre::Radius(radius) => by_radius(line, ArcEnds { from, to }, radius, left)?,
+            Centre::Offset([i, j]) => [from[0] + i, from[1] + j],
+            Centre::Radius(radius) => centre_by_radius(line, ArcEnds { from, to }, radius, left)?,
         };
         let arm = |p: [f64; 3]| (p[0] - centre[0], p[1] - centre[1]);
         let ((x0, y0), (x1, y1)) = (arm(from), arm(to));
         let (from_mm, to_mm) = (x0.hypot(y0), x1.hypot(y1));
-        if from_mm <= 0.0 || (from_mm - to_mm).abs() > ROUND.0 + ROUND.1 * from_mm {
+        if from_mm <= 0.0 || (from_mm - to_mm).abs() > ARC_TOLERANCE.0 + ARC_TOLERANCE.1 * from_mm {
             return Err(GcodeError::Centre { line, from_mm, to_mm });
         }
         let angle = libm::atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1);
@@ -97,30 +97,30 @@ impl Move {
     }
 
     /// The place after a share of it \[mm\].
-    pub fn at(&self, share: f64) -> [f64; 3] {
+    pub fn at(&self, fraction: f64) -> [f64; 3] {
         match *self {
             Self::Line { from, to } => {
-                let between = |a: f64, b: f64| a + share * (b - a);
+                let between = |a: f64, b: f64| a + fraction * (b - a);
                 [between(from[0], to[0]), between(from[1], to[1]), between(from[2], to[2])]
             }
             Self::Arc { from, centre, turn, climb } => {
-                let (sin, cos) = libm::sincos(share * turn);
+                let (sin, cos) = libm::sincos(fraction * turn);
                 let (x, y) = (from[0] - centre[0], from[1] - centre[1]);
-                let z = from[2] + share * climb;
+                let z = from[2] + fraction * climb;
                 [centre[0] + cos * x - sin * y, centre[1] + sin * x + cos * y, z]
             }
         }
     }
 
     /// Its direction after a share of it, of length one.
-    pub fn direction(&self, share: f64) -> [f64; 3] {
+    pub fn direction(&self, fraction: f64) -> [f64; 3] {
         let length = self.length_mm();
         match *self {
             Self::Line { from, to } => {
                 [0, 1, 2].map(|axis: usize| (to[axis] - from[axis]) / length)
             }
             Self::Arc { centre, turn, climb, .. } => {
-                let here = self.at(share);
+                let here = self.at(fraction);
                 let (x, y) = (here[0] - centre[0], here[1] - centre[1]);
                 [-y * turn / length, x * turn / length, climb / length]
             }
@@ -128,7 +128,7 @@ impl Move {
     }
 }
 
-fn by_radius(
+fn centre_by_radius(
     line: usize,
     ArcEnds { from, to }: ArcEnds,
     radius: f64,
@@ -138,7 +138,7 @@ fn by_radius(
     let way_mm = dx.hypot(dy);
     let radius_mm = radius.abs();
     // Beyond rounding, the ends are too far apart.
-    if way_mm <= 0.0 || 0.5 * way_mm > radius_mm + ROUND.0 + ROUND.1 * radius_mm {
+    if way_mm <= 0.0 || 0.5 * way_mm > radius_mm + ARC_TOLERANCE.0 + ARC_TOLERANCE.1 * radius_mm {
         return Err(GcodeError::Radius { line, radius_mm, way_mm });
     }
     let aside = (radius_mm * radius_mm - 0.25 * way_mm * way_mm).max(0.0).sqrt() / way_mm;

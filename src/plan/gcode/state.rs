@@ -7,14 +7,14 @@ use crate::plan::position::distance;
 
 /// Codes that change nothing about the path: the plane XY, no compensation, a work
 /// offset, exact and continuous paths, no cycle, feeds a minute.
-const IDLE: [f64; 9] = [17.0, 40.0, 49.0, 54.0, 61.0, 64.0, 80.0, 90.1, 94.0];
+const IGNORED_CODES: [f64; 9] = [17.0, 40.0, 49.0, 54.0, 61.0, 64.0, 80.0, 90.1, 94.0];
 const MM_PER_INCH: f64 = 25.4;
-const KNOWN: &str = "G0 to G3, G20, G21, G90 and G91 are, and what moves nothing is passed over \
+const KNOWN_CODES: &str = "G0 to G3, G20, G21, G90 and G91 are, and what moves nothing is passed over \
                      (jobs/README.md has all words); write the move with these";
 
 /// What a line moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Motion {
+pub enum LineMotion {
     /// Nothing.
     None,
     /// A rapid move.
@@ -33,7 +33,7 @@ enum Mode {
 
 /// What holds from one line to the next.
 #[derive(Debug, Clone, PartialEq)]
-pub struct State {
+pub struct ModalState {
     here: [f64; 3],
     mode: Option<Mode>,
     relative: bool,
@@ -44,13 +44,13 @@ pub struct State {
 
 /// A line's places and centre, in the program's units.
 #[derive(Debug, Clone, Copy, Default)]
-struct Asked {
+struct LineWords {
     axes: [Option<f64>; 3],
-    beside: [Option<f64>; 2],
+    centre_offset: [Option<f64>; 2],
     radius: Option<f64>,
 }
 
-impl State {
+impl ModalState {
     /// At a place \[mm\], absolute and in millimetres.
     pub fn new(here: [f64; 3]) -> Self {
         Self { here, mode: None, relative: false, unit_mm: 1.0, feed: None, ended: false }
@@ -62,20 +62,20 @@ impl State {
     }
 
     /// Takes a line's words.
-    pub fn take(&mut self, line: usize, words: &[Word]) -> Result<Motion, GcodeError> {
+    pub fn interpret(&mut self, line: usize, words: &[Word]) -> Result<LineMotion, GcodeError> {
         // Units go before the numbers that are in them.
         for word in words.iter().filter(|word| word.letter == 'G') {
-            self.code(line, word.number, words)?;
+            self.apply_code(line, word.number, words)?;
         }
-        let mut asked = Asked::default();
+        let mut line_words = LineWords::default();
         for Word { letter, number } in words.iter().copied() {
             match letter {
-                'X' => asked.axes[0] = Some(number),
-                'Y' => asked.axes[1] = Some(number),
-                'Z' => asked.axes[2] = Some(number),
-                'I' => asked.beside[0] = Some(number),
-                'J' => asked.beside[1] = Some(number),
-                'R' => asked.radius = Some(number),
+                'X' => line_words.axes[0] = Some(number),
+                'Y' => line_words.axes[1] = Some(number),
+                'Z' => line_words.axes[2] = Some(number),
+                'I' => line_words.centre_offset[0] = Some(number),
+                'J' => line_words.centre_offset[1] = Some(number),
+                'R' => line_words.radius = Some(number),
                 'F' if number > 0.0 => self.feed = Some(number * self.unit_mm / 60.0),
                 'F' => return Err(GcodeError::Feed { line, found: number }),
                 'M' => self.ended |= number == 2.0 || number == 30.0,
@@ -83,10 +83,10 @@ impl State {
                 _ => return Err(unknown(line, letter, number)),
             }
         }
-        self.go(line, &asked)
+        self.motion(line, &line_words)
     }
 
-    fn code(&mut self, line: usize, number: f64, words: &[Word]) -> Result<(), GcodeError> {
+    fn apply_code(&mut self, line: usize, number: f64, words: &[Word]) -> Result<(), GcodeError> {
         match number {
             0.0 => self.mode = Some(Mode::Rapid),
             1.0 => self.mode = Some(Mode::Line),
@@ -99,49 +99,50 @@ impl State {
             // Setting the feeder's own count moves nothing.
             92.0 if words.iter().all(|word| matches!(word.letter, 'G' | 'E'))
                 && words.iter().any(|word| word.letter == 'E') => {}
-            _ if IDLE.contains(&number) => {}
+            _ if IGNORED_CODES.contains(&number) => {}
             _ => return Err(unknown(line, 'G', number)),
         }
         Ok(())
     }
 
-    fn go(&mut self, line: usize, asked: &Asked) -> Result<Motion, GcodeError> {
-        let circle = asked.beside.iter().any(Option::is_some) || asked.radius.is_some();
-        if asked.axes.iter().all(Option::is_none) && !circle {
-            return Ok(Motion::None);
+    fn motion(&mut self, line: usize, line_words: &LineWords) -> Result<LineMotion, GcodeError> {
+        let circle =
+            line_words.centre_offset.iter().any(Option::is_some) || line_words.radius.is_some();
+        if line_words.axes.iter().all(Option::is_none) && !circle {
+            return Ok(LineMotion::None);
         }
         let found = || "a place without a move".to_owned();
         let wanted = "write G0, G1, G2 or G3 on it or before";
         let mode = self.mode.ok_or_else(|| GcodeError::Code { line, found: found(), wanted })?;
         let from = self.here;
         let mut to = from;
-        for (to, asked) in to.iter_mut().zip(asked.axes) {
-            let Some(asked) = asked else { continue };
-            *to = asked * self.unit_mm + if self.relative { *to } else { 0.0 };
+        for (to, line_words) in to.iter_mut().zip(line_words.axes) {
+            let Some(line_words) = line_words else { continue };
+            *to = line_words * self.unit_mm + if self.relative { *to } else { 0.0 };
         }
         self.here = to;
         let moved = match mode {
-            Mode::Rapid => return Ok(Motion::Rapid),
+            Mode::Rapid => return Ok(LineMotion::Rapid),
             // A line to where the nozzle is lays nothing.
-            Mode::Line if distance(from, to) <= 0.0 => return Ok(Motion::None),
+            Mode::Line if distance(from, to) <= 0.0 => return Ok(LineMotion::None),
             Mode::Line => Move::Line { from, to },
             Mode::Left | Mode::Right => {
-                let centre = self.centre(line, asked)?;
+                let centre = self.centre(line, line_words)?;
                 Move::arc(line, ArcEnds { from, to }, centre, mode == Mode::Left)?
             }
         };
-        Ok(Motion::Laid(moved, self.feed.ok_or(GcodeError::NoFeed { line })?))
+        Ok(LineMotion::Laid(moved, self.feed.ok_or(GcodeError::NoFeed { line })?))
     }
 
-    fn centre(&self, line: usize, asked: &Asked) -> Result<Centre, GcodeError> {
-        match (asked.beside, asked.radius) {
+    fn centre(&self, line: usize, line_words: &LineWords) -> Result<Centre, GcodeError> {
+        match (line_words.centre_offset, line_words.radius) {
             ([None, None], Some(radius)) => Ok(Centre::Radius(radius * self.unit_mm)),
             ([None, None], None) => Err(GcodeError::NoCentre { line }),
-            (beside, _) => Ok(Centre::Beside(beside.map(|c| c.unwrap_or(0.0) * self.unit_mm))),
+            (beside, _) => Ok(Centre::Offset(beside.map(|c| c.unwrap_or(0.0) * self.unit_mm))),
         }
     }
 }
 
 fn unknown(line: usize, letter: char, number: f64) -> GcodeError {
-    GcodeError::Code { line, found: format!("{letter}{number}"), wanted: KNOWN }
+    GcodeError::Code { line, found: format!("{letter}{number}"), wanted: KNOWN_CODES }
 }

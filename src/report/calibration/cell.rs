@@ -2,29 +2,29 @@
 
 use maud::html;
 
-use super::drawing::share_map;
-use crate::calibration::share_map::ShareMap;
+use super::drawing::sigma_map;
+use crate::calibration::share_map::RelativeSigmaMap;
 use crate::core::geometry::Roi;
 use crate::report::html::whole_page;
 
 /// What the page is made of.
 #[derive(Debug)]
-pub struct CellPage<'a> {
+pub struct CellCalibrationPage<'a> {
     /// The cell file.
     pub cell: &'a str,
     /// Calibration and surface in words.
     pub calibration: &'a str,
     /// What is left open, over the image.
-    pub map: &'a ShareMap,
+    pub map: &'a RelativeSigmaMap,
     /// The gauge.
     pub gauge: Roi,
     /// What is left open in the middle of the gauge, as a share of the width.
     pub in_gauge: Option<f64>,
     /// First column and row, last column and row between which boards were seen \[px\].
-    pub seen_px: Option<[f64; 4]>,
+    pub covered_px: Option<[f64; 4]>,
 }
 
-impl CellPage<'_> {
+impl CellCalibrationPage<'_> {
     /// The page.
     pub fn page(&self) -> String {
         let title = format!("Calibration of {}", self.cell);
@@ -52,7 +52,7 @@ impl CellPage<'_> {
                         ))
                     }
                 }
-                (share_map(self.map, corners_px(self.gauge), self.seen_px))
+                (sigma_map(self.map, corners_px(self.gauge), self.covered_px))
             }
             footer { "Written by truebead " (env!("CARGO_PKG_VERSION")) "." }
         };

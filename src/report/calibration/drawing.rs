@@ -2,16 +2,16 @@
 
 use maud::{Markup, html};
 
-use crate::calibration::map::{CELLS, Cells, WidthMap};
-use crate::calibration::share_map::ShareMap;
-use crate::calibration::solve::{Solution, View};
+use crate::calibration::map::{Cells, MAP_CELLS, WidthMap};
+use crate::calibration::share_map::RelativeSigmaMap;
+use crate::calibration::solve::{BoardView, Solution};
 use crate::numeric::rank;
 use crate::report::chart::palette::{GAUGE, Ink, LEFT_EDGE, LIMIT, REJECTED, WIDTH};
 
 /// Width of a drawing on the page [units of its own].
 const WIDE: f64 = 960.0;
 /// Room at the left and at the lower side for the axes.
-const ROOM: (f64, f64) = (52.0, 44.0);
+const MARGIN: (f64, f64) = (52.0, 44.0);
 /// Part of a square's side that the median way between seen and expected is drawn as.
 const DRAWN: f64 = 0.15;
 const BAR: (f64, f64) = (160.0, 12.0);
@@ -26,11 +26,11 @@ pub struct Drawing {
 impl Drawing {
     fn of(image_size_px: [u32; 2]) -> Self {
         let size_px = image_size_px.map(f64::from);
-        Self { size_px, scale: (WIDE - ROOM.0 - 8.0) / size_px[0] }
+        Self { size_px, scale: (WIDE - MARGIN.0 - 8.0) / size_px[0] }
     }
 
     fn x(self, px: f64) -> f64 {
-        round(ROOM.0 + (px + 0.5) * self.scale)
+        round(MARGIN.0 + (px + 0.5) * self.scale)
     }
 
     fn y(self, px: f64) -> f64 {
@@ -42,7 +42,7 @@ impl Drawing {
         let [width, height] = self.size_px;
         let (right, bottom) = (self.x(width - 0.5), self.y(height - 0.5));
         let (left, top) = (self.x(-0.5), self.y(-0.5));
-        let view = format!("0 0 {WIDE} {}", round(bottom + ROOM.1));
+        let view = format!("0 0 {WIDE} {}", round(bottom + MARGIN.1));
         html! {
             svg role="img" aria-label=(label) viewBox=(view) {
                 rect.lane x=(left) y=(top) width=(round(right - left)) height=(round(bottom - top)) {}
@@ -100,7 +100,7 @@ pub fn magnification(solution: &Solution) -> f64 {
 
 /// Distance of neighbouring corners of a row, in the median of all \[px\].
 fn typical_side(solution: &Solution) -> f64 {
-    let neighbours = |view: &View| -> Vec<f64> {
+    let neighbours = |view: &BoardView| -> Vec<f64> {
         let pairs = view.corners.windows(2).filter(|pair| pair[0].index + 1 == pair[1].index);
         pairs.map(|pair| (pair[1].px - pair[0].px).norm()).collect()
     };
@@ -132,7 +132,7 @@ pub fn residuals(solution: &Solution, times: f64) -> Markup {
 pub fn width_map(solution: &Solution, map: &WidthMap) -> Markup {
     let drawing = Drawing::of(solution.image_size_px);
     let [width, height] = drawing.size_px;
-    let Cells { columns, rows } = CELLS;
+    let Cells { columns, rows } = MAP_CELLS;
     let edge = |at: u32, count: u32, side: f64| f64::from(at) / f64::from(count) * side - 0.5;
     let area = |i: u32| {
         let (column, row) = (i % columns, i / columns);
@@ -152,7 +152,7 @@ pub fn width_map(solution: &Solution, map: &WidthMap) -> Markup {
 }
 
 /// What a width is known to, cell by cell, with the gauge and where boards were seen.
-pub fn share_map(map: &ShareMap, gauge_px: [f64; 4], seen_px: Option<[f64; 4]>) -> Markup {
+pub fn sigma_map(map: &RelativeSigmaMap, gauge_px: [f64; 4], seen_px: Option<[f64; 4]>) -> Markup {
     let drawing = Drawing::of(map.image_size_px);
     drawing.svg(
         "relative standard deviation of a width over the image, with the gauge",

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::axis::{Extent, Scale};
+use super::axis::{AxisScale, Extent};
 use super::range::Range;
 
 /// An x axis that several plots share.
@@ -38,9 +38,9 @@ impl XAxis {
         Self { title: format!("distance along the path [{unit}]"), range, divisor }
     }
 
-    fn scale(&self, page: Extent) -> Scale {
+    fn scale(&self, page: Extent) -> AxisScale {
         let Range { min, max } = self.range;
-        Scale::linear(Range::new(min / self.divisor, max / self.divisor), page)
+        AxisScale::linear(Range::new(min / self.divisor, max / self.divisor), page)
     }
 }
 
@@ -86,7 +86,7 @@ impl Area {
     pub fn x(&self, axis: &XAxis) -> impl Fn(f64) -> f64 + use<> {
         let scale = axis.scale(self.across());
         let divisor = axis.divisor;
-        move |value| scale.place(value / divisor)
+        move |value| scale.position(value / divisor)
     }
 
     /// Vertical grid lines and their labels.
@@ -100,12 +100,12 @@ impl Area {
     }
 
     /// The same for ticks of another scale.
-    pub fn vertical_grid(&self, ticks: &[(f64, String)], scale: &Scale, title: &str) -> Markup {
+    pub fn vertical_grid(&self, ticks: &[(f64, String)], scale: &AxisScale, title: &str) -> Markup {
         let Extent { from: bottom, to: top } = self.upwards();
         let Extent { from: left, to: right } = self.across();
         html! {
             @for (value, label) in ticks {
-                @let x = round(scale.place(*value));
+                @let x = round(scale.position(*value));
                 line.grid x1=(x) x2=(x) y1=(top) y2=(bottom) {}
                 text.tick x=(x) y=(bottom + 17.0) text-anchor="middle" { (label) }
             }
@@ -115,13 +115,13 @@ impl Area {
     }
 
     /// Horizontal grid lines, their labels and the axis title above them.
-    pub fn y_grid(&self, scale: &Scale, title: &str) -> Markup {
+    pub fn y_grid(&self, scale: &AxisScale, title: &str) -> Markup {
         let Extent { from: left, to: right } = self.across();
         let Extent { from: bottom, to: top } = self.upwards();
         let wanted = if bottom - top > 150.0 { 6 } else { 4 };
         html! {
             @for (value, label) in scale.ticks(wanted) {
-                @let y = round(scale.place(value));
+                @let y = round(scale.position(value));
                 line.grid x1=(left) x2=(right) y1=(y) y2=(y) {}
                 text.tick x=(left - 8.0) y=(y + 4.5) text-anchor="end" { (label) }
             }

@@ -14,7 +14,7 @@ pub struct Extent {
 
 /// A linear or logarithmic map from values to a stretch of the page.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scale {
+pub struct AxisScale {
     low: f64,
     high: f64,
     from: f64,
@@ -22,7 +22,7 @@ pub struct Scale {
     log: bool,
 }
 
-impl Scale {
+impl AxisScale {
     /// Values onto a part of the page. A range without extent is widened.
     pub fn linear(values: Range, page: Extent) -> Self {
         let (low, high) = widened(values.min, values.max);
@@ -39,7 +39,7 @@ impl Scale {
     }
 
     /// The place of a value on the page.
-    pub fn place(&self, value: f64) -> f64 {
+    pub fn position(&self, value: f64) -> f64 {
         let share = if self.log {
             (value.max(1e-9) / self.low).ln() / (self.high / self.low).ln()
         } else {
@@ -61,7 +61,7 @@ impl Scale {
 
     fn linear_ticks(&self, wanted: u32) -> Vec<(f64, String)> {
         let step = round_step((self.high - self.low) / f64::from(wanted.max(1)));
-        let places = places(step);
+        let places = decimals(step);
         let mut ticks = Vec::new();
         let mut index = (self.low / step - 1e-9).ceil();
         while index * step <= self.high + step * 1e-9 && ticks.len() < 100 {
@@ -86,7 +86,7 @@ impl Scale {
                 let value = decade * factor;
                 if (self.low..=self.high).contains(&value) {
                     let halves = usize::from(factor.fract() > 0.0);
-                    ticks.push((value, format!("{value:.*}", places(value) + halves)));
+                    ticks.push((value, format!("{value:.*}", decimals(value) + halves)));
                 }
             }
             decade *= 10.0;
@@ -116,7 +116,7 @@ fn round_step(rough: f64) -> f64 {
 
 /// Decimals that a step of this size needs.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=9")]
-fn places(step: f64) -> usize {
+fn decimals(step: f64) -> usize {
     (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize
 }
 
@@ -124,7 +124,7 @@ fn places(step: f64) -> usize {
 mod tests {
     use super::*;
 
-    fn labels(scale: Scale, wanted: u32) -> Vec<String> {
+    fn labels(scale: AxisScale, wanted: u32) -> Vec<String> {
         scale.ticks(wanted).into_iter().map(|tick| tick.1).collect()
     }
 
@@ -132,33 +132,38 @@ mod tests {
     fn ticks_are_round() {
         let page = Extent { from: 0.0, to: 100.0 };
         assert_eq!(
-            labels(Scale::linear(Range::new(0.0, 20.0), page), 5),
+            labels(AxisScale::linear(Range::new(0.0, 20.0), page), 5),
             ["0", "5", "10", "15", "20"]
         );
         assert_eq!(
-            labels(Scale::linear(Range::new(41.83, 42.21), page), 4),
+            labels(AxisScale::linear(Range::new(41.83, 42.21), page), 4),
             ["41.9", "42.0", "42.1", "42.2"]
         );
-        assert_eq!(labels(Scale::linear(Range::new(-0.5, 0.5), page), 2), ["-0.5", "0.0", "0.5"]);
-        assert_eq!(labels(Scale::log(Range::new(0.3, 6.0), page), 5), ["0.5", "1", "2", "5"]);
-        assert_eq!(labels(Scale::log(Range::new(0.9, 3.1), page), 5), ["1", "1.5", "2", "3"]);
+        assert_eq!(
+            labels(AxisScale::linear(Range::new(-0.5, 0.5), page), 2),
+            ["-0.5", "0.0", "0.5"]
+        );
+        assert_eq!(labels(AxisScale::log(Range::new(0.3, 6.0), page), 5), ["0.5", "1", "2", "5"]);
+        assert_eq!(labels(AxisScale::log(Range::new(0.9, 3.1), page), 5), ["1", "1.5", "2", "3"]);
     }
 
     #[test]
     fn a_range_without_extent_still_has_an_axis() {
-        let scale = Scale::linear(Range::new(42.0, 42.0), Extent { from: 0.0, to: 100.0 });
-        assert!((scale.place(42.0) - 50.0).abs() < 1e-9);
+        let scale = AxisScale::linear(Range::new(42.0, 42.0), Extent { from: 0.0, to: 100.0 });
+        assert!((scale.position(42.0) - 50.0).abs() < 1e-9);
         assert!(!scale.ticks(5).is_empty());
         assert!(
-            !Scale::log(Range::new(0.0, 0.0), Extent { from: 0.0, to: 1.0 }).place(0.0).is_nan()
+            !AxisScale::log(Range::new(0.0, 0.0), Extent { from: 0.0, to: 1.0 })
+                .position(0.0)
+                .is_nan()
         );
     }
 
     #[test]
     fn values_have_their_place() {
-        let scale = Scale::linear(Range::new(0.0, 10.0), Extent { from: 200.0, to: 100.0 });
-        assert!((scale.place(2.5) - 175.0).abs() < 1e-9);
-        let log = Scale::log(Range::new(1.0, 100.0), Extent { from: 0.0, to: 100.0 });
-        assert!((log.place(10.0) - 50.0).abs() < 1e-9);
+        let scale = AxisScale::linear(Range::new(0.0, 10.0), Extent { from: 200.0, to: 100.0 });
+        assert!((scale.position(2.5) - 175.0).abs() < 1e-9);
+        let log = AxisScale::log(Range::new(1.0, 100.0), Extent { from: 0.0, to: 100.0 });
+        assert!((log.position(10.0) - 50.0).abs() < 1e-9);
     }
 }

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::area::{Area, round};
-use super::axis::{Extent, Scale};
+use super::axis::{AxisScale, Extent};
 use super::palette;
 use super::range::Range;
 use crate::numeric::statistics::{Distribution, as_f64};
@@ -15,16 +15,16 @@ pub fn draw(latencies: &Distribution) -> Markup {
     let bars = latencies.bars(BARS_PER_OCTAVE);
     let (Some(first), Some(last)) = (bars.first(), bars.last()) else { return html! {} };
     let area = Area::wide(230.0);
-    let x = Scale::log(Range::new(first.0.min(last.1 / 4.0), last.1), area.across());
+    let x = AxisScale::log(Range::new(first.0.min(last.1 / 4.0), last.1), area.across());
     let most = bars.iter().map(|bar| bar.2).max().unwrap_or(1);
-    let y = Scale::linear(Range::new(0.0, as_f64(most) * 1.12), area.upwards());
+    let y = AxisScale::linear(Range::new(0.0, as_f64(most) * 1.12), area.upwards());
     let Extent { from: bottom, to: top } = area.upwards();
     let inner = html! {
         (area.y_grid(&y, "setpoints"))
         (area.vertical_grid(&x.ticks(0), &x, "latency [ms]"))
         @for (low, high, count) in &bars {
-            @let (from, to) = (x.place(*low), x.place(*high));
-            @let upper = y.place(as_f64(*count));
+            @let (from, to) = (x.position(*low), x.position(*high));
+            @let upper = y.position(as_f64(*count));
             @if *count > 0 {
                 rect x=(round(from + 0.5)) y=(round(upper)) width=(round((to - from - 1.0).max(0.5)))
                     height=(round((bottom - upper).max(1.0))) fill=(palette::SETPOINT.css()) {
@@ -34,7 +34,7 @@ pub fn draw(latencies: &Distribution) -> Markup {
         }
         @for (name, q, row) in [("median", 0.5, 12.0), ("99 %", 0.99, 30.0)] {
             @if let Some(value) = latencies.quantile(q) {
-                @let at = round(x.place(value));
+                @let at = round(x.position(value));
                 line.level x1=(at) x2=(at) y1=(top) y2=(bottom) stroke=(palette::TARGET.css()) {}
                 text.label x=(at - 5.0) y=(top + row) text-anchor="end" {
                     (name) " " (format!("{value:.2} ms"))

@@ -4,14 +4,14 @@ use maud::{Markup, html};
 
 use super::palette;
 use super::palette::Ink;
-use super::series::Series;
+use super::series::Curve;
 use super::strip::Strip;
 
 /// Name, colour and kind of line ("", "dash", "area", "block" or "dot").
-pub type Entry<'a> = (&'a str, Ink, &'a str);
+pub type LegendEntry<'a> = (&'a str, Ink, &'a str);
 
 /// All of the entries.
-pub fn legend(entries: &[Entry<'_>]) -> Markup {
+pub fn legend(entries: &[LegendEntry<'_>]) -> Markup {
     html! {
         div.legend { @for (name, ink, kind) in entries {
             @let property = if matches!(*kind, "" | "dash") { "border-color" } else { "background" };
@@ -21,16 +21,16 @@ pub fn legend(entries: &[Entry<'_>]) -> Markup {
 }
 
 /// The entries whose series has something to draw.
-pub fn drawn<'a>(entries: &[(&Series, Entry<'a>)]) -> Vec<Entry<'a>> {
+pub fn drawn<'a>(entries: &[(&Curve, LegendEntry<'a>)]) -> Vec<LegendEntry<'a>> {
     let drawn = entries.iter().filter(|(series, _)| !series.is_empty());
     drawn.map(|(_, entry)| *entry).collect()
 }
 
 /// The states that a strip shows, and whether a limit acted.
 pub fn of_strips(names: &[&'static str], states: &Strip, limits: &Strip) -> Markup {
-    let shown = |name: &str| states.spells().iter().any(|spell| spell.mark.name == name);
+    let shown = |name: &str| states.segments().iter().any(|spell| spell.mark.name == name);
     let drawn = names.iter().filter(|name| shown(name));
-    let mut entries: Vec<Entry<'_>> =
+    let mut entries: Vec<LegendEntry<'_>> =
         drawn.filter_map(|name| Some((*name, palette::state(name)?, "block"))).collect();
     if has_marks(limits) {
         entries.push(("a limit acts", palette::LIMIT, "block"));
@@ -40,7 +40,7 @@ pub fn of_strips(names: &[&'static str], states: &Strip, limits: &Strip) -> Mark
 
 /// Whether a strip shows anything worth drawing.
 pub fn has_marks(strip: &Strip) -> bool {
-    strip.spells().iter().any(|spell| spell.mark.severity > 0)
+    strip.segments().iter().any(|spell| spell.mark.severity > 0)
 }
 
 #[cfg(test)]
@@ -50,7 +50,7 @@ mod tests {
 
     #[test]
     fn what_is_not_drawn_is_not_named() {
-        let (mut some, none) = (Series::default(), Series::default());
+        let (mut some, none) = (Curve::default(), Curve::default());
         some.push(0.0, 1.0);
         let entry = |name| (name, palette::SPEED, "");
         let named = drawn(&[(&some, entry("robot")), (&none, entry("demand"))]);

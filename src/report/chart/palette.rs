@@ -71,7 +71,7 @@ pub const RIGHT_EDGE: Ink = ink("right-edge", [240, 228, 66], [240, 228, 66]);
 pub const GAUGE: Ink = ink("gauge", [0, 158, 115], [0, 158, 115]);
 
 /// Controllers beside each other, in order.
-pub const CONTENDERS: [Ink; 6] = [PAPER, OURS, TRACKING, SETPOINT, LIMIT, FILLED];
+pub const CONTROLLERS: [Ink; 6] = [PAPER, OURS, TRACKING, SETPOINT, LIMIT, FILLED];
 
 const ALL: [Ink; 23] = [
     WIDTH, TARGET, SPEED, SETPOINT, DEMAND, LIMIT, REJECTED, FLOW, PRESSURE, SCREW, FILLED, MODEL,

@@ -6,27 +6,27 @@ use std::fmt::Write as _;
 use maud::{Markup, html};
 
 use super::area::{Area, round};
-use super::axis::Scale;
+use super::axis::AxisScale;
 use super::palette::Ink;
 use super::range::Range;
-use super::series::Point;
+use super::series::CurvePoint;
 
 /// Pauses that the axis names \[s\].
 const TICKS_S: [f64; 9] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0];
 
 /// What is drawn over pauses \[s\], in the order of their length.
 #[derive(Debug)]
-pub enum Drawn<'a> {
+pub enum PauseLayer<'a> {
     /// A curve from point to point.
-    Curve(&'a [Point], Ink),
+    Curve(&'a [CurvePoint], Ink),
     /// The same, and each point.
-    Marked(&'a [Point], Ink),
+    Marked(&'a [CurvePoint], Ink),
     /// Points alone.
-    Points(&'a [Point], Ink),
+    Points(&'a [CurvePoint], Ink),
 }
 
-impl Drawn<'_> {
-    const fn points(&self) -> &[Point] {
+impl PauseLayer<'_> {
+    const fn points(&self) -> &[CurvePoint] {
         match self {
             Self::Curve(points, _) | Self::Marked(points, _) | Self::Points(points, _) => points,
         }
@@ -34,16 +34,17 @@ impl Drawn<'_> {
 }
 
 /// The drawing; values begin at zero.
-pub fn over_pauses(area: Area, y_title: &str, layers: &[Drawn<'_>]) -> Markup {
-    let all = || layers.iter().flat_map(Drawn::points);
+pub fn over_pauses(area: Area, y_title: &str, layers: &[PauseLayer<'_>]) -> Markup {
+    let all = || layers.iter().flat_map(PauseLayer::points);
     let longest_s = all().map(|(idle_s, _)| *idle_s).fold(1.0, f64::max);
     let most = all().map(|(_, value)| *value).fold(0.0, f64::max);
     let low = all().map(|(_, value)| *value).fold(0.0, f64::min);
     let high = Range::new(low, most).with_margin(0.06).max;
-    let x = Scale::linear(Range::new(0.0, place(1.05 * longest_s)), area.across());
-    let y = Scale::linear(Range::new(low, high), area.upwards());
+    let x = AxisScale::linear(Range::new(0.0, axis_position(1.05 * longest_s)), area.across());
+    let y = AxisScale::linear(Range::new(low, high), area.upwards());
     let shown = TICKS_S.iter().filter(|tick| **tick <= 1.05 * longest_s);
-    let ticks: Vec<(f64, String)> = shown.map(|tick| (place(*tick), tick.to_string())).collect();
+    let ticks: Vec<(f64, String)> =
+        shown.map(|tick| (axis_position(*tick), tick.to_string())).collect();
     area.svg(
         &format!("{y_title} over the pause"),
         &html! {
@@ -55,16 +56,18 @@ pub fn over_pauses(area: Area, y_title: &str, layers: &[Drawn<'_>]) -> Markup {
 }
 
 /// Long pauses are drawn together, short ones apart.
-fn place(idle_s: f64) -> f64 {
+fn axis_position(idle_s: f64) -> f64 {
     idle_s.max(0.0).ln_1p()
 }
 
-fn draw(layer: &Drawn<'_>, x: &Scale, y: &Scale) -> Markup {
-    let at = |point: &Point| (round(x.place(place(point.0))), round(y.place(point.1)));
+fn draw(layer: &PauseLayer<'_>, x: &AxisScale, y: &AxisScale) -> Markup {
+    let at = |point: &CurvePoint| {
+        (round(x.position(axis_position(point.0))), round(y.position(point.1)))
+    };
     let (line, dots, ink) = match layer {
-        Drawn::Curve(_, ink) => (true, false, ink),
-        Drawn::Marked(_, ink) => (true, true, ink),
-        Drawn::Points(_, ink) => (false, true, ink),
+        PauseLayer::Curve(_, ink) => (true, false, ink),
+        PauseLayer::Marked(_, ink) => (true, true, ink),
+        PauseLayer::Points(_, ink) => (false, true, ink),
     };
     let mut path = String::new();
     for (number, point) in layer.points().iter().enumerate() {
@@ -88,7 +91,8 @@ mod tests {
     #[test]
     fn every_pause_has_its_place() {
         let points = [(0.0, 1.0), (1.0, 2.0), (300.0, 4.0)];
-        let layers = [Drawn::Marked(&points, palette::OURS), Drawn::Points(&[], palette::FLOW)];
+        let layers =
+            [PauseLayer::Marked(&points, palette::OURS), PauseLayer::Points(&[], palette::FLOW)];
         let drawn = over_pauses(Area::wide(200.0), "void [mm³]", &layers).into_string();
         assert_eq!(drawn.matches("<circle").count(), 3);
         assert!(drawn.contains(">300<") && !drawn.contains(">1000<"), "{drawn}");

@@ -5,24 +5,24 @@ use std::fmt::Write as _;
 use maud::{Markup, html};
 
 use super::area::{Area, XAxis, round};
-use super::axis::{Extent, Scale};
+use super::axis::{AxisScale, Extent};
 use super::palette::Ink;
 use super::range::Range;
-use super::series::{Point, Series, unbroken};
+use super::series::{Curve, CurvePoint, unbroken};
 
 /// What is drawn into a plot.
 #[derive(Debug)]
-pub enum Layer<'a> {
+pub enum PlotLayer<'a> {
     /// A curve from sample to sample.
-    Curve(&'a Series, Ink),
+    Curve(&'a Curve, Ink),
     /// A pale curve of noisy data, for another to be seen over it.
-    Data(&'a Series, Ink),
+    Data(&'a Curve, Ink),
     /// A thin dashed curve, for what is wished rather than done.
-    Wish(&'a Series, Ink),
+    Demand(&'a Curve, Ink),
     /// A value that holds until the next one.
-    Stairs(&'a Series, Ink),
+    Stairs(&'a Curve, Ink),
     /// The area between the envelopes of two series.
-    Band(&'a Series, &'a Series, Ink),
+    Band(&'a Curve, &'a Curve, Ink),
     /// A dashed line at a value, with a label at its right end.
     Level(f64, Ink, &'a str),
 }
@@ -39,11 +39,11 @@ pub struct Plot<'a> {
     /// Smallest and largest value; see [`y_range`].
     pub y_range: Range,
     /// What is drawn, the lowest first.
-    pub layers: Vec<Layer<'a>>,
+    pub layers: Vec<PlotLayer<'a>>,
 }
 
 /// The range that shows all of these series and values, with a little air.
-pub fn y_range(series: &[&Series], values: &[f64]) -> Range {
+pub fn y_range(series: &[&Curve], values: &[f64]) -> Range {
     let ranges = series.iter().filter_map(|series| series.range());
     let all =
         ranges.chain(values.iter().map(|value| Range::new(*value, *value))).reduce(Range::joined);
@@ -53,7 +53,7 @@ pub fn y_range(series: &[&Series], values: &[f64]) -> Range {
 impl Plot<'_> {
     /// The drawing.
     pub fn draw(&self) -> Markup {
-        let y = Scale::linear(self.y_range, self.area.upwards());
+        let y = AxisScale::linear(self.y_range, self.area.upwards());
         let inner = html! {
             (self.area.y_grid(&y, self.y_title))
             (self.area.x_grid(self.x))
@@ -66,31 +66,31 @@ impl Plot<'_> {
         self.area.svg(&label, &inner)
     }
 
-    fn layer(&self, layer: &Layer<'_>, y: &Scale) -> Markup {
+    fn layer(&self, layer: &PlotLayer<'_>, y: &AxisScale) -> Markup {
         let x = self.area.x(self.x);
-        let place = |point: &Point| (round(x(point.0)), round(y.place(point.1)));
+        let place = |point: &CurvePoint| (round(x(point.0)), round(y.position(point.1)));
         match layer {
-            Layer::Curve(series, ink) => curve(&series.points(), place, "curve", *ink),
-            Layer::Data(series, ink) => curve(&series.points(), place, "data", *ink),
-            Layer::Wish(series, ink) => curve(&series.points(), place, "wish", *ink),
-            Layer::Stairs(series, ink) => {
+            PlotLayer::Curve(series, ink) => curve(&series.points(), place, "curve", *ink),
+            PlotLayer::Data(series, ink) => curve(&series.points(), place, "data", *ink),
+            PlotLayer::Demand(series, ink) => curve(&series.points(), place, "wish", *ink),
+            PlotLayer::Stairs(series, ink) => {
                 html! { path.stairs d=(stairs(&series.points(), place)) stroke=(ink.css()) {} }
             }
-            Layer::Band(lower, upper, ink) => {
+            PlotLayer::Band(lower, upper, ink) => {
                 let (low, high) = (lower.lower_envelope(), upper.upper_envelope());
                 html! { path.band d=(outline(&low, &high, place)) fill=(ink.css()) {} }
             }
-            Layer::Level(value, ink, _) => {
+            PlotLayer::Level(value, ink, _) => {
                 let Extent { from: left, to: right } = self.area.across();
-                let at = round(y.place(*value));
+                let at = round(y.position(*value));
                 html! { line.level x1=(left) x2=(right) y1=(at) y2=(at) stroke=(ink.css()) {} }
             }
         }
     }
 
-    fn label(&self, layer: &Layer<'_>, y: &Scale) -> Markup {
-        let Layer::Level(value, _, text) = layer else { return html! {} };
-        let at = round(y.place(*value)) - 4.0;
+    fn label(&self, layer: &PlotLayer<'_>, y: &AxisScale) -> Markup {
+        let PlotLayer::Level(value, _, text) = layer else { return html! {} };
+        let at = round(y.position(*value)) - 4.0;
         html! {
             text.label x=(self.area.across().to - 4.0) y=(at) text-anchor="end" {
                 (text)
@@ -99,7 +99,12 @@ impl Plot<'_> {
     }
 }
 
-fn curve(points: &[Point], place: impl Fn(&Point) -> Point, class: &str, ink: Ink) -> Markup {
+fn curve(
+    points: &[CurvePoint],
+    place: impl Fn(&CurvePoint) -> CurvePoint,
+    class: &str,
+    ink: Ink,
+) -> Markup {
     let mut path = String::new();
     let mut lone = Vec::new();
     for part in unbroken(points) {
@@ -117,7 +122,7 @@ fn curve(points: &[Point], place: impl Fn(&Point) -> Point, class: &str, ink: In
     }
 }
 
-fn stairs(points: &[Point], place: impl Fn(&Point) -> Point) -> String {
+fn stairs(points: &[CurvePoint], place: impl Fn(&CurvePoint) -> CurvePoint) -> String {
     let mut path = String::new();
     for part in unbroken(points) {
         let mut last_y = None;
@@ -138,7 +143,11 @@ fn stairs(points: &[Point], place: impl Fn(&Point) -> Point) -> String {
 
 /// The two series are fed together, so their envelopes have the same x; the
 /// outline breaks where the lower one does.
-fn outline(low: &[Point], high: &[Point], place: impl Fn(&Point) -> Point) -> String {
+fn outline(
+    low: &[CurvePoint],
+    high: &[CurvePoint],
+    place: impl Fn(&CurvePoint) -> CurvePoint,
+) -> String {
     let mut path = String::new();
     let mut start = 0;
     for part in unbroken(low) {
@@ -155,7 +164,7 @@ fn outline(low: &[Point], high: &[Point], place: impl Fn(&Point) -> Point) -> St
     path
 }
 
-fn append(path: &mut String, command: char, (x, y): Point) {
+fn append(path: &mut String, command: char, (x, y): CurvePoint) {
     // Writing to a string cannot fail.
     let _ = write!(path, "{command}{x} {y}");
 }
@@ -169,13 +178,13 @@ mod tests {
     fn a_curve_runs_through_its_samples() {
         let axis = XAxis::time(Range::new(0.0, 10.0));
         let area = Area::wide(200.0);
-        let samples: Series = [(0.0, 0.0), (10.0, 1.0)].into_iter().collect();
+        let samples: Curve = [(0.0, 0.0), (10.0, 1.0)].into_iter().collect();
         let plot = Plot {
             area,
             x: &axis,
             y_title: "y [mm]",
             y_range: Range::new(0.0, 1.0),
-            layers: vec![Layer::Curve(&samples, palette::WIDTH)],
+            layers: vec![PlotLayer::Curve(&samples, palette::WIDTH)],
         };
         let drawn = plot.draw().into_string();
         let Extent { from: left, to: right } = area.across();
@@ -192,16 +201,16 @@ mod tests {
 
     #[test]
     fn nothing_is_drawn_of_nothing() {
-        let (empty, axis) = (Series::default(), XAxis::path(Range::new(0.0, 0.0)));
+        let (empty, axis) = (Curve::default(), XAxis::path(Range::new(0.0, 0.0)));
         let plot = Plot {
             area: Area::half(150.0),
             x: &axis,
             y_title: "y",
             y_range: y_range(&[&empty], &[]),
             layers: vec![
-                Layer::Curve(&empty, palette::WIDTH),
-                Layer::Band(&empty, &empty, palette::WIDTH),
-                Layer::Stairs(&empty, palette::SETPOINT),
+                PlotLayer::Curve(&empty, palette::WIDTH),
+                PlotLayer::Band(&empty, &empty, palette::WIDTH),
+                PlotLayer::Stairs(&empty, palette::SETPOINT),
             ],
         };
         assert!(!plot.draw().into_string().contains("NaN"));

@@ -5,7 +5,7 @@
 use super::range::Range;
 
 /// A point of a curve, in the units of its axes.
-pub type Point = (f64, f64);
+pub type CurvePoint = (f64, f64);
 
 /// Buckets that are kept; each gives up to two points.
 const MAX_BUCKETS: usize = 1000;
@@ -13,15 +13,15 @@ const MAX_BUCKETS: usize = 1000;
 /// The extremes of some neighbouring samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Bucket {
-    low: Point,
-    high: Point,
+    low: CurvePoint,
+    high: CurvePoint,
     first_x: f64,
     last_x: f64,
     count: u64,
 }
 
 impl Bucket {
-    fn of(point: Point) -> Self {
+    fn of(point: CurvePoint) -> Self {
         Self { low: point, high: point, first_x: point.0, last_x: point.0, count: 1 }
     }
 
@@ -38,18 +38,18 @@ impl Bucket {
 
 /// Samples in the order of their coming, thinned by doubling buckets.
 #[derive(Debug, Clone)]
-pub struct Series {
+pub struct Curve {
     buckets: Vec<Bucket>,
     per_bucket: u64,
 }
 
-impl Default for Series {
+impl Default for Curve {
     fn default() -> Self {
         Self { buckets: Vec::new(), per_bucket: 1 }
     }
 }
 
-impl Series {
+impl Curve {
     /// Takes a sample; one that is not finite is left out. x that falls begins
     /// anew, as a path does with a new bead.
     pub fn push(&mut self, x: f64, y: f64) {
@@ -79,7 +79,7 @@ impl Series {
     }
 
     /// The curve, with both extremes of every bucket; at most 2000 points.
-    pub fn points(&self) -> Vec<Point> {
+    pub fn points(&self) -> Vec<CurvePoint> {
         let mut points = Vec::with_capacity(self.buckets.len() * 2);
         for bucket in &self.buckets {
             if bucket.count == 1 {
@@ -94,12 +94,12 @@ impl Series {
     }
 
     /// The smallest of every bucket, at its middle.
-    pub fn lower_envelope(&self) -> Vec<Point> {
+    pub fn lower_envelope(&self) -> Vec<CurvePoint> {
         self.buckets.iter().map(|b| (f64::midpoint(b.first_x, b.last_x), b.low.1)).collect()
     }
 
     /// The largest of every bucket, at its middle.
-    pub fn upper_envelope(&self) -> Vec<Point> {
+    pub fn upper_envelope(&self) -> Vec<CurvePoint> {
         self.buckets.iter().map(|b| (f64::midpoint(b.first_x, b.last_x), b.high.1)).collect()
     }
 
@@ -122,7 +122,7 @@ impl Series {
 
 /// Where points that belong together end: the curve breaks where x falls or
 /// leaps over five times its usual step.
-pub fn unbroken(points: &[Point]) -> Vec<&[Point]> {
+pub fn unbroken(points: &[CurvePoint]) -> Vec<&[CurvePoint]> {
     let mut steps: Vec<f64> =
         points.windows(2).map(|pair| pair[1].0 - pair[0].0).filter(|step| *step > 0.0).collect();
     steps.sort_by(f64::total_cmp);
@@ -136,8 +136,8 @@ pub fn unbroken(points: &[Point]) -> Vec<&[Point]> {
 }
 
 /// Points as a curve that can be drawn.
-impl FromIterator<Point> for Series {
-    fn from_iter<I: IntoIterator<Item = Point>>(points: I) -> Self {
+impl FromIterator<CurvePoint> for Curve {
+    fn from_iter<I: IntoIterator<Item = CurvePoint>>(points: I) -> Self {
         let mut series = Self::default();
         for (x, y) in points {
             series.push(x, y);
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn a_short_curve_is_kept_as_it_is() {
-        let mut series = Series::default();
+        let mut series = Curve::default();
         for point in [(0.0, 1.0), (1.0, 5.0), (2.0, f64::NAN), (3.0, 2.0)] {
             series.push(point.0, point.1);
         }
@@ -164,7 +164,7 @@ mod tests {
 
     #[test]
     fn a_lone_spike_survives_a_million_samples() {
-        let mut series = Series::default();
+        let mut series = Curve::default();
         for i in 0..1_000_000_u32 {
             let y = if i == 654_321 { 99.0 } else { f64::from(i % 7) };
             series.push(f64::from(i), y);
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn curves_break_at_gaps_and_at_a_new_bead() {
-        let points: Vec<Point> =
+        let points: Vec<CurvePoint> =
             [0.0, 1.0, 2.0, 20.0, 21.0, 3.0, 4.0].iter().map(|x| (*x, 0.0)).collect();
         let lengths: Vec<usize> = unbroken(&points).iter().map(|part| part.len()).collect();
         assert_eq!(lengths, [3, 2, 2]);
@@ -186,7 +186,7 @@ mod tests {
     proptest! {
         #[test]
         fn extremes_are_kept(values in prop::collection::vec(-1e6..1e6, 1..5000)) {
-            let mut series = Series::default();
+            let mut series = Curve::default();
             for (i, y) in (0_u32..).zip(&values) {
                 series.push(f64::from(i), *y);
             }

@@ -2,9 +2,9 @@
 //! frames. Where it changes too fast to be drawn the worse is kept.
 
 /// Spells that are kept before they are gathered.
-const MAX_SPELLS: usize = 2000;
+const MAX_SEGMENTS: usize = 2000;
 /// Spells that a gathered strip is made of, at the most about twice as many.
-const CELLS: f64 = 750.0;
+const MERGED_SEGMENTS: f64 = 750.0;
 
 /// What held; the higher severity wins where there is no room for both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -17,7 +17,7 @@ pub struct Mark {
 
 /// A stretch over which a mark held.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spell {
+pub struct Segment {
     /// Where it began.
     pub from: f64,
     /// Where it ended.
@@ -29,7 +29,7 @@ pub struct Spell {
 /// Spells one after the other.
 #[derive(Debug, Clone, Default)]
 pub struct Strip {
-    spells: Vec<Spell>,
+    segments: Vec<Segment>,
 }
 
 impl Strip {
@@ -40,29 +40,31 @@ impl Strip {
             return;
         }
         let mut from = x;
-        if let Some(last) = self.spells.last_mut() {
+        if let Some(last) = self.segments.last_mut() {
             from = x.max(last.to);
             last.to = from;
             if last.mark == mark {
                 return;
             }
         }
-        self.spells.push(Spell { from, to: from, mark });
-        if self.spells.len() > MAX_SPELLS {
-            self.gather();
+        self.segments.push(Segment { from, to: from, mark });
+        if self.segments.len() > MAX_SEGMENTS {
+            self.merge_short();
         }
     }
 
     /// What has been gathered so far.
-    pub fn spells(&self) -> &[Spell] {
-        &self.spells
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments
     }
 
-    fn gather(&mut self) {
-        let (Some(first), Some(last)) = (self.spells.first(), self.spells.last()) else { return };
-        let cell = (last.to - first.from) / CELLS;
-        let mut gathered: Vec<Spell> = Vec::with_capacity(MAX_SPELLS);
-        for spell in self.spells.drain(..) {
+    fn merge_short(&mut self) {
+        let (Some(first), Some(last)) = (self.segments.first(), self.segments.last()) else {
+            return;
+        };
+        let cell = (last.to - first.from) / MERGED_SEGMENTS;
+        let mut gathered: Vec<Segment> = Vec::with_capacity(MAX_SEGMENTS);
+        for spell in self.segments.drain(..) {
             match gathered.last_mut() {
                 Some(last) if last.mark == spell.mark || spell.to - last.from <= cell => {
                     last.to = spell.to;
@@ -71,7 +73,7 @@ impl Strip {
                 _ => gathered.push(spell),
             }
         }
-        self.spells = gathered;
+        self.segments = gathered;
     }
 }
 
@@ -88,9 +90,9 @@ mod tests {
         for (x, mark) in [(0.0, GOOD), (1.0, GOOD), (2.0, BAD), (3.0, GOOD)] {
             strip.push(x, mark);
         }
-        let bad = strip.spells()[1];
+        let bad = strip.segments()[1];
         assert_eq!((bad.from, bad.to, bad.mark), (2.0, 3.0, BAD));
-        assert_eq!(strip.spells().len(), 3);
+        assert_eq!(strip.segments().len(), 3);
     }
 
     #[test]
@@ -107,8 +109,8 @@ mod tests {
             };
             strip.push(f64::from(i), mark);
         }
-        assert!(strip.spells().len() <= MAX_SPELLS);
-        let bad: Vec<_> = strip.spells().iter().filter(|spell| spell.mark == BAD).collect();
+        assert!(strip.segments().len() <= MAX_SEGMENTS);
+        let bad: Vec<_> = strip.segments().iter().filter(|spell| spell.mark == BAD).collect();
         assert!(bad.iter().any(|spell| (spell.from..=spell.to).contains(&77_777.0)), "{bad:?}");
     }
 }

@@ -2,17 +2,17 @@
 
 use maud::{Markup, html};
 
-use super::model::Study;
+use super::model::ModelStudy;
 use crate::core::quantity::Unit;
 use crate::identify::band::{self, Band};
 use crate::identify::experiment::Experiment;
 use crate::report::chart::area::{Area, XAxis, round};
-use crate::report::chart::axis::Scale;
+use crate::report::chart::axis::AxisScale;
 use crate::report::chart::legend::legend;
 use crate::report::chart::palette::{DEMAND, FLOW, Ink, MODEL, PRESSURE, SCREW, TARGET};
-use crate::report::chart::plot::{Layer, Plot, y_range};
+use crate::report::chart::plot::{Plot, PlotLayer, y_range};
 use crate::report::chart::range::Range;
-use crate::report::chart::series::Series;
+use crate::report::chart::series::Curve;
 
 /// Points of a curve that a model gives.
 const POINTS: u32 = 400;
@@ -30,8 +30,8 @@ fn ink(unit: Unit) -> Ink {
     }
 }
 
-fn series(at: impl Iterator<Item = f64>, values: impl Iterator<Item = f64>) -> Series {
-    let mut series = Series::default();
+fn series(at: impl Iterator<Item = f64>, values: impl Iterator<Item = f64>) -> Curve {
+    let mut series = Curve::default();
     at.zip(values).for_each(|(x, y)| series.push(x, y));
     series
 }
@@ -42,25 +42,28 @@ fn times(data: &Experiment) -> impl Iterator<Item = f64> {
 }
 
 /// Input and output over time, with what the model says of the output.
-pub fn over_time(study: &Study, data: &Experiment, foretold: &[f64]) -> Markup {
+pub fn over_time(study: &ModelStudy, data: &Experiment, predicted: &[f64]) -> Markup {
     let logs = &study.logs;
     let end = data.start_s + data.duration_s();
     let axis = XAxis::time(Range::new(data.start_s, end));
     let input = series(times(data), data.input.iter().copied());
     let output = series(times(data), data.output.iter().copied());
-    let model = series(times(data), foretold.iter().copied());
+    let model = series(times(data), predicted.iter().copied());
     let (above, below) = (logs.output.to_string(), logs.input.to_string());
     let answer = Plot {
         area: Area::wide(270.0),
         x: &axis,
         y_title: &above,
         y_range: y_range(&[&output, &model], &[]),
-        layers: vec![Layer::Data(&output, ink(logs.output.unit)), Layer::Curve(&model, MODEL)],
+        layers: vec![
+            PlotLayer::Data(&output, ink(logs.output.unit)),
+            PlotLayer::Curve(&model, MODEL),
+        ],
     };
     let layer = if data.input_is_held {
-        Layer::Stairs(&input, ink(logs.input.unit))
+        PlotLayer::Stairs(&input, ink(logs.input.unit))
     } else {
-        Layer::Curve(&input, ink(logs.input.unit))
+        PlotLayer::Curve(&input, ink(logs.input.unit))
     };
     let command = Plot {
         area: Area::wide(150.0),
@@ -78,7 +81,7 @@ pub fn over_time(study: &Study, data: &Experiment, foretold: &[f64]) -> Markup {
 }
 
 /// What the model leaves of its own data.
-pub fn residuals(study: &Study) -> Markup {
+pub fn residuals(study: &ModelStudy) -> Markup {
     let data = &study.logs.estimation;
     let left = series(times(data), study.fit.residuals.iter().copied());
     let title = format!("measured − model [{}]", study.logs.output.unit);
@@ -88,14 +91,14 @@ pub fn residuals(study: &Study) -> Markup {
         x: &axis,
         y_title: &title,
         y_range: y_range(&[&left], &[0.0]),
-        layers: vec![Layer::Data(&left, LEFT), Layer::Level(0.0, TARGET, "")],
+        layers: vec![PlotLayer::Data(&left, LEFT), PlotLayer::Level(0.0, TARGET, "")],
     };
     plot.draw()
 }
 
 /// How what the model leaves hangs together, from the first lag on: at none it
 /// is 1 whatever is left, and the rest would be drawn too small beside that.
-pub fn autocorrelation(study: &Study) -> Markup {
+pub fn autocorrelation(study: &ModelStudy) -> Markup {
     let step_s = study.logs.estimation.step_s;
     let lags = &study.residuals.lags;
     let at = |k: usize| crate::numeric::statistics::as_f64(k as u64) * step_s;
@@ -112,16 +115,16 @@ pub fn autocorrelation(study: &Study) -> Markup {
         y_title: "autocorrelation of what is left",
         y_range: y_range(&[&curve], &[-2.0 * bound, 2.0 * bound]),
         layers: vec![
-            Layer::Level(bound, TARGET, "99 % of white noise"),
-            Layer::Level(-bound, TARGET, ""),
-            Layer::Curve(&curve, LEFT),
+            PlotLayer::Level(bound, TARGET, "99 % of white noise"),
+            PlotLayer::Level(-bound, TARGET, ""),
+            PlotLayer::Curve(&curve, LEFT),
         ],
     };
     plot.draw()
 }
 
 /// The answer to a step of one unit, with its band.
-pub fn step(study: &Study) -> Markup {
+pub fn step(study: &ModelStudy) -> Markup {
     let fit = &study.fit;
     let end_s = fit.model.dead_time_s() + 7.0 * study.slowest_s();
     let Ok(band) = band::step_response(fit, end_s / f64::from(POINTS), POINTS) else {
@@ -137,15 +140,15 @@ pub fn step(study: &Study) -> Markup {
         y_title: &title,
         y_range: y_range(&[&low, &high], &[0.0]),
         layers: vec![
-            Layer::Level(gain, TARGET, "gain"),
-            Layer::Band(&low, &high, MODEL),
-            Layer::Curve(&value, MODEL),
+            PlotLayer::Level(gain, TARGET, "gain"),
+            PlotLayer::Band(&low, &high, MODEL),
+            PlotLayer::Curve(&value, MODEL),
         ],
     };
     plot.draw()
 }
 
-fn edges(band: &Band) -> [Series; 3] {
+fn edges(band: &Band) -> [Curve; 3] {
     [-WIDE, 0.0, WIDE].map(|times| {
         let values = band.value.iter().zip(&band.sigma).map(|(value, sigma)| value + times * sigma);
         series(band.at.iter().copied(), values)
@@ -153,7 +156,7 @@ fn edges(band: &Band) -> [Series; 3] {
 }
 
 /// Gain and phase over frequency.
-pub fn bode(study: &Study) -> Markup {
+pub fn bode(study: &ModelStudy) -> Markup {
     let Ok([gain, phase]) = band::frequency_response(&study.fit, &frequencies(study)) else {
         return html! {};
     };
@@ -168,7 +171,7 @@ pub fn bode(study: &Study) -> Markup {
 
 /// From one period in the whole record to well beyond the fastest pole, but no
 /// further than the samples can tell.
-fn frequencies(study: &Study) -> Vec<f64> {
+fn frequencies(study: &ModelStudy) -> Vec<f64> {
     let data = &study.logs.estimation;
     let poles = study.fit.model.poles();
     let fastest = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
@@ -182,14 +185,15 @@ fn over_frequency(band: &Band, title: &str) -> Markup {
     let area = Area::half(230.0);
     let lowest = band.at.first().copied().unwrap_or(0.1);
     let ends = Range::new(lowest, band.at.last().copied().unwrap_or(1.0));
-    let x = Scale::log(ends, area.across());
+    let x = AxisScale::log(ends, area.across());
     let all = edges(band);
-    let range = all.iter().filter_map(Series::range).reduce(Range::joined);
-    let y = Scale::linear(range.unwrap_or(Range::new(0.0, 1.0)).with_margin(0.06), area.upwards());
+    let range = all.iter().filter_map(Curve::range).reduce(Range::joined);
+    let y =
+        AxisScale::linear(range.unwrap_or(Range::new(0.0, 1.0)).with_margin(0.06), area.upwards());
     let path = |times: f64, back: bool| -> String {
         let points = band.at.iter().zip(&band.value).zip(&band.sigma);
         let points = points.map(|((f, value), sigma)| {
-            format!("{} {}", round(x.place(*f)), round(y.place(value + times * sigma)))
+            format!("{} {}", round(x.position(*f)), round(y.position(value + times * sigma)))
         });
         let mut points: Vec<String> = points.collect();
         if back {

@@ -1,9 +1,9 @@
 //! What a reader should know of a model before it is used.
 
-use super::model::{Logs, Study};
+use super::model::{Logs, ModelStudy};
 use crate::identify::experiment::Experiment;
-use crate::identify::fit::{DOMINATES, Fit, Note, Trend};
-use crate::identify::number::brief;
+use crate::identify::fit::{DOMINANT_FRACTION, Fit, FitNote, Trend};
+use crate::identify::number::three_digits;
 
 /// A model that is further off other data than off its own by this factor is
 /// told. Errors are compared and not fits, which grow with the excitation.
@@ -15,48 +15,48 @@ const TIME_CONSTANTS: f64 = 5.0;
 /// A record shorter than so many of the slowest time constants shows no end of it.
 const RECORD_TIME_CONSTANTS: f64 = 3.0;
 
-impl Study {
+impl ModelStudy {
     /// What the reader should know before the model is used.
-    pub(super) fn doubts(&self) -> Vec<String> {
-        let mut doubts: Vec<String> =
+    pub(super) fn all_warnings(&self) -> Vec<String> {
+        let mut warnings: Vec<String> =
             self.logs.estimation.notes.iter().map(|note| format!("data: {note}")).collect();
         if let Some((data, from)) = &self.logs.validation {
-            doubts.extend(data.notes.iter().map(|note| format!("{from}: {note}")));
+            warnings.extend(data.notes.iter().map(|note| format!("{from}: {note}")));
         }
-        doubts.extend(self.fit.notes.iter().map(of_note));
+        warnings.extend(self.fit.notes.iter().map(of_note));
         let own = self.fit.quality.fit_percent;
         if own < POOR_PERCENT {
-            doubts.push(format!(
+            warnings.push(format!(
                 "the model explains little of the data ({own:.1} % fit): look for what else moves \
                  the output, or filter it with --hampel and --smooth"
             ));
         }
         match self.validation {
-            None => doubts.push(
+            None => warnings.push(
                 "nothing was validated with: a fit to its own data says little; give --validate or \
                  --validate-share"
                     .to_owned(),
             ),
-            Some(other) if other.rmse > OVERFIT * self.fit.quality.rmse => doubts.push(format!(
+            Some(other) if other.rmse > OVERFIT * self.fit.quality.rmse => warnings.push(format!(
                 "the model is {:.1} times as far off the data to validate with as off its own: take \
                  fewer poles and zeros, log longer, or look whether the machine has changed",
                 other.rmse / self.fit.quality.rmse
             )),
             Some(_) => {}
         }
-        doubts.extend(self.short_validation());
-        doubts.extend(self.short_record());
-        doubts.extend(of_drift(&self.fit, &self.logs));
+        warnings.extend(self.short_validation());
+        warnings.extend(self.short_record());
+        warnings.extend(of_drift(&self.fit, &self.logs));
         let (gain, input, output) =
             (self.fit.model.dc_gain(), self.logs.input.unit, self.logs.output.unit);
         if gain < 0.0 {
-            doubts.push(format!(
+            warnings.push(format!(
                 "the gain is {gain:.4}, less {output} from more {input}: look at the sign of a column"
             ));
         }
-        let outside = self.residuals.share_outside();
+        let outside = self.residuals.fraction_outside();
         if outside > 0.05 {
-            doubts.push(format!(
+            warnings.push(format!(
                 "what the model leaves hangs together ({:.0} % of the lags outside the 99 % band; the \
                  {} samples say as much as {:.0} independent ones): the noise is coloured, or \
                  something is missing in the model; the standard errors allow for it",
@@ -65,7 +65,7 @@ impl Study {
                 self.fit.independent_samples
             ));
         }
-        doubts
+        warnings
     }
 
     fn short_validation(&self) -> Option<String> {
@@ -96,15 +96,16 @@ impl Study {
 
 /// What is said of a straight line in time in what a model leaves.
 fn of_drift(fit: &Fit, logs: &Logs) -> Option<String> {
-    let line = Trend::seen_in(&fit.residuals)?;
+    let line = Trend::significant_in(&fit.residuals)?;
     Some(drifting(logs, &line, "what the model leaves"))
 }
 
 /// What is said of an output that such a line dominates, and not the input.
-pub(super) fn of_output(logs: &Logs) -> Option<String> {
+pub(super) fn output_drift(logs: &Logs) -> Option<String> {
     let Experiment { input, output, .. } = &logs.estimation;
-    let line = Trend::seen_in(output).filter(|line| line.share > DOMINATES)?;
-    (Trend::of(input).share < DOMINATES).then(|| drifting(logs, &line, "it"))
+    let line =
+        Trend::significant_in(output).filter(|line| line.explained_fraction > DOMINANT_FRACTION)?;
+    (Trend::of(input).explained_fraction < DOMINANT_FRACTION).then(|| drifting(logs, &line, "it"))
 }
 
 fn drifting(logs: &Logs, line: &Trend, whose: &str) -> String {
@@ -113,29 +114,29 @@ fn drifting(logs: &Logs, line: &Trend, whose: &str) -> String {
          explains {:.0} % of {whose}. Hold temperature and feed steady, use a part without the drift \
          (--from-s, --to-s), or take the line out of the log",
         if line.rise > 0.0 { "up" } else { "down" },
-        brief(line.rise.abs()),
+        three_digits(line.rise.abs()),
         logs.output.unit,
         logs.estimation.duration_s(),
-        100.0 * line.share
+        100.0 * line.explained_fraction
     )
 }
 
-fn of_note(note: &Note) -> String {
+fn of_note(note: &FitNote) -> String {
     match note {
-        Note::NoDeadTime => {
+        FitNote::NoDeadTime => {
             "no dead time shows; it was left out (a clock of the output that is behind the input's \
  hides one)"
                 .to_owned()
         }
-        Note::PolesAreReal => {
+        FitNote::PolesAreReal => {
             "the damping is above 1: both poles are real; --model sopdt-real gives \
                                their time constants"
                 .to_owned()
         }
-        Note::DeadTimeToAStep { dead_time_s } => format!(
+        FitNote::DeadTimeToAStep { dead_time_s } => format!(
             "the dead time of {dead_time_s:.4} s is told to a whole step only: the form passes its \
              input straight through"
         ),
-        Note::Undetermined(loose) => loose.to_string(),
+        FitNote::Undetermined(loose) => loose.to_string(),
     }
 }

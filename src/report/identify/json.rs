@@ -2,12 +2,12 @@
 
 use serde_json::{Value, json};
 
-use super::model::{Study, form};
+use super::model::{ModelStudy, form};
 use crate::identify::experiment::Experiment;
-use crate::identify::fit::{Quality, Row};
+use crate::identify::fit::{ComparedModel, FitQuality};
 
 /// Everything but the curves.
-pub fn to_json(study: &Study) -> Value {
+pub fn to_json(study: &ModelStudy) -> Value {
     let logs = &study.logs;
     let fit = &study.fit;
     let parameters = fit.parameters.iter().map(|one| {
@@ -41,7 +41,7 @@ pub fn to_json(study: &Study) -> Value {
         "residuals": {
             "sigma": fit.residual_sigma,
             "independent_samples": fit.independent_samples,
-            "share_of_lags_outside_99_percent": study.residuals.share_outside(),
+            "share_of_lags_outside_99_percent": study.residuals.fraction_outside(),
         },
         "compared": study.comparison.rows.iter().map(row).collect::<Vec<Value>>(),
         "reason": study.comparison.reason,
@@ -59,7 +59,7 @@ fn data(data: &Experiment, source: &str) -> Value {
     })
 }
 
-fn quality(quality: Quality) -> Value {
+fn quality(quality: FitQuality) -> Value {
     json!({
         "nrmse_percent": quality.fit_percent,
         "rmse": quality.rmse,
@@ -67,7 +67,7 @@ fn quality(quality: Quality) -> Value {
     })
 }
 
-fn row(row: &Row) -> Value {
+fn row(row: &ComparedModel) -> Value {
     let fit = row.fit.as_ref();
     json!({
         "form": form(row.settings.structure),

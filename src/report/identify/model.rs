@@ -2,8 +2,8 @@
 
 use crate::core::quantity::Quantity;
 use crate::identify::experiment::Experiment;
-use crate::identify::file::{self, ModelFile, Setting, Uncertainty};
-use crate::identify::fit::{Comparison, Fit, Quality, Structure};
+use crate::identify::file::{self, Conditions, ModelFile, ParameterUncertainty};
+use crate::identify::fit::{Fit, FitQuality, ModelComparison, Structure};
 use crate::identify::residual::Autocorrelation;
 
 /// Data and what they are called.
@@ -25,17 +25,17 @@ pub struct Logs {
 
 /// A model with all that is known of it.
 #[derive(Debug)]
-pub struct Study {
+pub struct ModelStudy {
     /// The data.
     pub logs: Logs,
     /// All that were fitted.
-    pub comparison: Comparison,
+    pub comparison: ModelComparison,
     /// The one that was taken.
     pub fit: Fit,
     /// How well it foretells other data.
-    pub validation: Option<Quality>,
+    pub validation: Option<FitQuality>,
     /// What it foretells there.
-    pub foretold: Option<Vec<f64>>,
+    pub predicted: Option<Vec<f64>>,
     /// Whether what it leaves hangs together.
     pub residuals: Autocorrelation,
     /// What the reader should know before the model is used.
@@ -53,7 +53,7 @@ pub fn form(structure: Structure) -> String {
     }
 }
 
-impl Study {
+impl ModelStudy {
     /// The slowest time constant of the model \[s\].
     pub fn slowest_s(&self) -> f64 {
         let poles = self.fit.model.poles();
@@ -62,30 +62,30 @@ impl Study {
     }
 
     /// The model as a file keeps it.
-    pub fn model(&self, setting: Setting) -> ModelFile {
+    pub fn model(&self, setting: Conditions) -> ModelFile {
         let fit = &self.fit;
         let input = &self.logs.estimation.input;
         let start = (f64::INFINITY, f64::NEG_INFINITY);
         let input_range = input.iter().fold(start, |(low, high), v| (low.min(*v), high.max(*v)));
-        let parameters = fit.parameters.iter().map(|one| file::Parameter {
+        let parameters = fit.parameters.iter().map(|one| file::SavedParameter {
             name: one.name.clone(),
             value: one.value,
             standard_error: one.sigma,
         });
         ModelFile {
-            setting,
+            conditions: setting,
             kind: form(fit.settings.structure),
             input: self.logs.input.clone(),
             output: self.logs.output.clone(),
             input_range,
             operating_point: (fit.input_level, fit.output_level),
             transfer: fit.model.clone(),
-            uncertainty: Some(Uncertainty {
+            uncertainty: Some(ParameterUncertainty {
                 parameters: parameters.collect(),
                 // Symmetric, so that rows are columns.
                 covariance: fit.covariance.iter().copied().collect(),
             }),
-            fit: Some(file::Fit {
+            fit: Some(file::FitSummary {
                 step_s: self.logs.estimation.step_s,
                 estimation_percent: fit.quality.fit_percent,
                 validation_percent: self.validation.map(|quality| quality.fit_percent),

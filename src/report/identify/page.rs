@@ -3,14 +3,14 @@
 use maud::{Markup, html};
 
 use super::curves;
-use super::model::{Study, form};
+use super::model::{ModelStudy, form};
 use super::table::{independent, significant, transfer};
 use crate::report::chart::legend::legend;
 use crate::report::chart::palette::MODEL;
 use crate::report::html::whole_page;
 
 /// The page.
-pub fn page(study: &Study) -> String {
+pub fn page(study: &ModelStudy) -> String {
     let logs = &study.logs;
     let title = format!("Model {} → {}", logs.input, logs.output);
     let body = html! {
@@ -23,7 +23,7 @@ pub fn page(study: &Study) -> String {
             h2 { "What the model was fitted to" }
             (curves::over_time(study, &logs.estimation, &study.fit.predicted))
         }
-        @if let (Some((data, from)), Some(foretold)) = (&logs.validation, &study.foretold) {
+        @if let (Some((data, from)), Some(foretold)) = (&logs.validation, &study.predicted) {
             section {
                 h2 { "What it was validated with" }
                 p.hint { (from) ", from " (format!("{:.2}", data.start_s)) " s on" }
@@ -31,14 +31,14 @@ pub fn page(study: &Study) -> String {
             }
         }
         (answers(study))
-        (left(study))
+        (residuals(study))
         footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
             ". The numbers are in identify.json, the model is in model.toml." }
     };
     whole_page(&title, &body).into_string()
 }
 
-fn about(study: &Study) -> Markup {
+fn about(study: &ModelStudy) -> Markup {
     let data = &study.logs.estimation;
     html! {
         div.about {
@@ -50,7 +50,7 @@ fn about(study: &Study) -> Markup {
     }
 }
 
-fn verdict(study: &Study) -> Markup {
+fn verdict(study: &ModelStudy) -> Markup {
     let (class, word) =
         if study.warnings.is_empty() { ("good", "Good.") } else { ("caution", "Look closer.") };
     html! {
@@ -68,7 +68,7 @@ fn verdict(study: &Study) -> Markup {
     }
 }
 
-fn parameters(study: &Study) -> Markup {
+fn parameters(study: &ModelStudy) -> Markup {
     let fit = &study.fit;
     html! {
         section {
@@ -91,7 +91,7 @@ fn parameters(study: &Study) -> Markup {
     }
 }
 
-fn compared(study: &Study) -> Markup {
+fn compared(study: &ModelStudy) -> Markup {
     let comparison = &study.comparison;
     if comparison.rows.len() < 2 {
         return html! {};
@@ -126,7 +126,7 @@ fn compared(study: &Study) -> Markup {
     }
 }
 
-fn answers(study: &Study) -> Markup {
+fn answers(study: &ModelStudy) -> Markup {
     html! {
         section {
             h2 { "How it answers" }
@@ -139,7 +139,7 @@ fn answers(study: &Study) -> Markup {
     }
 }
 
-fn left(study: &Study) -> Markup {
+fn residuals(study: &ModelStudy) -> Markup {
     html! {
         section {
             h2 { "What it leaves" }

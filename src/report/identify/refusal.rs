@@ -1,16 +1,16 @@
 //! Why no model can be trusted.
 
-use crate::identify::ahead::Ahead;
+use crate::identify::ahead::OutputLead;
 use crate::identify::fit::SamplesError;
 
 /// No model that can be trusted.
 #[derive(Debug, thiserror::Error)]
-pub enum Refusal {
+pub enum NoModel {
     /// The data.
     #[error(transparent)]
     Data(#[from] SamplesError),
     /// None of the forms.
-    #[error("no model can be trusted:{}{}", lines(.forms), beside(.drift.as_ref()))]
+    #[error("no model can be trusted:{}{}", lines(.forms), drift_line(.drift.as_ref()))]
     None {
         /// Each form, and why it is none.
         forms: Vec<(String, String)>,
@@ -21,9 +21,9 @@ pub enum Refusal {
     #[error(
         "the model ({form}, {estimation:.1} % on its own data) does not foretell the data to \
          validate with: {validation:.1} %, no better than their mean. Are both of the same machine \
-         and material, and is the input the one that moves the output?{}", further(.drift.as_ref())
+         and material, and is the input the one that moves the output?{}", drift_sentence(.drift.as_ref())
     )]
-    Foretells {
+    PoorPrediction {
         /// Its form.
         form: String,
         /// Fit to its own data \[%\].
@@ -55,9 +55,9 @@ pub enum Refusal {
         "the output answers the input some {:.2} s before it comes: a model that may do so fits to \
          {:.1} %, the best that does not to {:.1} %. Are both on one clock, each sample with the \
          moment at which it was taken? A closed loop that moves the input after the output looks the \
-         same", .0.ahead_s, .0.fit_percent, .0.answering_percent
+         same", .0.lead_s, .0.fit_percent, .0.causal_fit_percent
     )]
-    Ahead(Ahead),
+    Ahead(OutputLead),
 }
 
 /// A line for each reason, before it the forms that it holds for.
@@ -74,10 +74,10 @@ fn lines(refused: &[(String, String)]) -> String {
     lines.concat()
 }
 
-fn beside(sentence: Option<&String>) -> String {
+fn drift_line(sentence: Option<&String>) -> String {
     sentence.map_or_else(String::new, |sentence| format!("\n  beside: {sentence}"))
 }
 
-fn further(sentence: Option<&String>) -> String {
+fn drift_sentence(sentence: Option<&String>) -> String {
     sentence.map_or_else(String::new, |sentence| format!(" Further, {sentence}"))
 }

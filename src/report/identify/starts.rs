@@ -8,14 +8,16 @@ pub use page::page;
 pub use text::text;
 
 use crate::core::quantity::Quantity;
-use crate::identify::file::Setting;
-use crate::identify::number::brief;
-use crate::identify::series::Series;
-use crate::identify::start_stop::file::{Named, START, STOP, StartStopFile};
+use crate::identify::file::Conditions;
+use crate::identify::number::three_digits;
+use crate::identify::series::TimeSeries;
+use crate::identify::start_stop::file::{
+    ParameterKey, START_PARAMETERS, STOP_PARAMETERS, StartStopFile,
+};
 use crate::identify::start_stop::{StartStopFit, StartStopFitError, fit};
 
 /// A standard error above this share of a parameter is told.
-const LOOSE_SHARE: f64 = 0.3;
+const LOOSE_FRACTION: f64 = 0.3;
 /// With fewer starts a scatter is hardly known.
 const FEW_STARTS: usize = 8;
 
@@ -29,9 +31,9 @@ pub struct StartLogs {
     /// What comes of it, as it was logged.
     pub output: Quantity,
     /// What the extruder is told, in its own unit.
-    pub command: Series,
+    pub command: TimeSeries,
     /// What comes of it \[mm³/s\].
-    pub flow: Series,
+    pub flow: TimeSeries,
 }
 
 /// Starts and stops with all that is known of them.
@@ -48,34 +50,35 @@ pub struct StartStudy {
 }
 
 /// Fits starts and stops, or says why the data do not tell them.
-pub fn study(logs: StartLogs, setting: Setting) -> Result<StartStudy, StartStopFitError> {
+pub fn study(logs: StartLogs, setting: Conditions) -> Result<StartStudy, StartStopFitError> {
     let fit = fit(&logs.command, &logs.flow)?;
     let file = StartStopFile::of(&fit, setting);
-    let warnings = doubts(&fit);
+    let warnings = all_warnings(&fit);
     Ok(StartStudy { logs, fit, file, warnings })
 }
 
-fn doubts(fit: &StartStopFit) -> Vec<String> {
-    let mut doubts = Vec::new();
+fn all_warnings(fit: &StartStopFit) -> Vec<String> {
+    let mut warnings = Vec::new();
     if fit.starts.len() < FEW_STARTS {
-        doubts.push(format!(
+        warnings.push(format!(
             "{} starts leave the standard errors themselves uncertain; {FEW_STARTS} or more tell \
              them",
             fit.starts.len()
         ));
     }
-    let loose = |one: &&Named| (one.of)(&fit.sigma) > LOOSE_SHARE * (one.of)(&fit.parameters);
-    for one in START.iter().chain(&STOP).filter(loose) {
-        doubts.push(format!(
+    let loose =
+        |one: &&ParameterKey| (one.of)(&fit.sigma) > LOOSE_FRACTION * (one.of)(&fit.parameters);
+    for one in START_PARAMETERS.iter().chain(&STOP_PARAMETERS).filter(loose) {
+        warnings.push(format!(
             "{} is {} ± {} {}: hardly known; more {} of the same kind tell it",
             one.key,
-            brief((one.of)(&fit.parameters)),
-            brief((one.of)(&fit.sigma)),
+            three_digits((one.of)(&fit.parameters)),
+            three_digits((one.of)(&fit.sigma)),
             one.unit,
-            if STOP.iter().any(|stop| stop.key == one.key) { "stops" } else { "starts" }
+            if STOP_PARAMETERS.iter().any(|stop| stop.key == one.key) { "stops" } else { "starts" }
         ));
     }
-    doubts
+    warnings
 }
 
 impl StartStudy {
@@ -87,7 +90,7 @@ impl StartStudy {
 
     /// The flow about which the delays are told \[mm³/s\].
     pub fn flow_mm3_per_s(&self) -> f64 {
-        let [low, high] = self.file.seen.flow_range_mm3_per_s;
+        let [low, high] = self.file.data.flow_range_mm3_per_s;
         f64::midpoint(low, high)
     }
 }

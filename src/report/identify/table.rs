@@ -2,14 +2,14 @@
 
 use std::fmt::Write;
 
-use super::model::{Study, form};
-use crate::identify::fit::{Fit, Note, Row};
+use super::model::{ModelStudy, form};
+use crate::identify::fit::{ComparedModel, Fit, FitNote};
 
 /// Least width of the names of forms.
 const NAME: usize = 10;
 
 /// A short table.
-pub fn text(study: &Study) -> String {
+pub fn text(study: &ModelStudy) -> String {
     let mut text = String::new();
     data(&mut text, study);
     compared(&mut text, study);
@@ -27,7 +27,7 @@ pub fn put(text: &mut String, head: &str, line: &str) {
     let _ = writeln!(text, "{}", format!("{head:<11}{line}").trim_end());
 }
 
-fn data(text: &mut String, study: &Study) {
+fn data(text: &mut String, study: &ModelStudy) {
     let logs = &study.logs;
     let described = |data: &crate::identify::experiment::Experiment| {
         format!(
@@ -47,7 +47,7 @@ fn data(text: &mut String, study: &Study) {
     put(text, "output", &logs.output.to_string());
 }
 
-fn compared(text: &mut String, study: &Study) {
+fn compared(text: &mut String, study: &ModelStudy) {
     let rows = &study.comparison.rows;
     if rows.len() > 1 {
         let names = rows.iter().map(|row| form(row.settings.structure).len());
@@ -70,7 +70,7 @@ fn compared(text: &mut String, study: &Study) {
     }
 }
 
-fn one(row: &Row, width: usize) -> String {
+fn one(row: &ComparedModel, width: usize) -> String {
     let name = form(row.settings.structure);
     match &row.fit {
         Err(why) => format!("{name:<width$}{why}"),
@@ -90,7 +90,7 @@ fn one(row: &Row, width: usize) -> String {
     }
 }
 
-fn parameters(text: &mut String, study: &Study) {
+fn parameters(text: &mut String, study: &ModelStudy) {
     let fit = &study.fit;
     let line = format!("{:<18}{:>12}{:>14}  {}", "", "value", "std. error", "unit");
     put(text, "model", &line);
@@ -103,8 +103,8 @@ fn parameters(text: &mut String, study: &Study) {
         );
     }
     if fit.parameter("dead_time_s").is_none() {
-        let to_a_step = |note: &Note| matches!(note, Note::DeadTimeToAStep { .. });
-        let known = if fit.notes.contains(&Note::NoDeadTime) {
+        let to_a_step = |note: &FitNote| matches!(note, FitNote::DeadTimeToAStep { .. });
+        let known = if fit.notes.contains(&FitNote::NoDeadTime) {
             "none shows"
         } else if fit.notes.iter().any(to_a_step) {
             "to a step"
@@ -153,7 +153,7 @@ pub fn significant(value: f64) -> String {
     format!("{value:.places$}")
 }
 
-fn quality(text: &mut String, study: &Study) {
+fn quality(text: &mut String, study: &ModelStudy) {
     let unit = study.logs.output.unit;
     let own = study.fit.quality;
     let line = format!(

@@ -5,13 +5,13 @@
 use super::*;
 use crate::core::quantity::{Quantity, Unit};
 use crate::identify::experiment::Rules;
-use crate::identify::file::{self, Setting};
+use crate::identify::file::{self, Conditions};
 use crate::identify::fit::DeadTime;
 use crate::identify::fit::Structure;
 use crate::sim::flow_log;
-use crate::sim::flow_log::Logged;
+use crate::sim::flow_log::FlowLog;
 
-fn experiment(log: &Logged) -> Experiment {
+fn experiment(log: &FlowLog) -> Experiment {
     let rules = Rules::default();
     Experiment::new(&log.time_s, &log.screw_rpm, &log.flow_mm3_per_s, &rules).unwrap()
 }
@@ -27,8 +27,8 @@ fn logs(estimation: Experiment, validation: Option<Experiment>) -> Logs {
     }
 }
 
-fn settings(structure: Structure) -> Settings {
-    Settings::new(structure, DeadTime::Estimated { least_s: 0.0, most_s: 3.0 })
+fn settings(structure: Structure) -> FitSettings {
+    FitSettings::new(structure, DeadTime::Estimated { min_s: 0.0, max_s: 3.0 })
 }
 
 #[test]
@@ -58,7 +58,7 @@ fn a_known_extruder_is_found_again_and_its_file_is_read_again() {
     assert!(found.warnings.is_empty(), "{:?}", found.warnings);
     // In the file stands what was found.
     let setting =
-        Setting { material: Some("PLA".to_owned()), nozzle_mm: Some(0.4), temperature_c: None };
+        Conditions { material: Some("PLA".to_owned()), nozzle_mm: Some(0.4), temperature_c: None };
     let model = found.model(setting);
     let text = file::to_toml(&model, &[super::text(&found)]);
     assert_eq!(file::parse("model.toml", &text).unwrap(), model);
@@ -108,7 +108,7 @@ fn one_log_alone_is_warned_of() {
     );
     let found = found.unwrap();
     assert!(found.warnings.iter().any(|warning| warning.contains("nothing was validated with")));
-    assert!(found.validation.is_none() && found.foretold.is_none());
+    assert!(found.validation.is_none() && found.predicted.is_none());
     let page = page(&found);
     assert!(!page.contains("What it was validated with"));
 }
@@ -139,7 +139,7 @@ fn a_drift_is_no_answer() {
 }
 
 /// All forms that are compared where nothing is told.
-fn usual_forms() -> Vec<Settings> {
+fn usual_forms() -> Vec<FitSettings> {
     [
         Structure::FirstOrder { zero: false },
         Structure::FirstOrder { zero: true },
@@ -158,7 +158,7 @@ fn a_drift_that_poles_and_zeros_take_up_is_refused_with_the_gain_without_it() {
         let (first, rest) = with(|time_s, flow| flow + slope * time_s).split(0.3).unwrap();
         let answer = study(logs(first, Some(rest)), &usual_forms());
         match answer {
-            Err(Refusal::Drifts { steady, sigma, .. }) => {
+            Err(NoModel::Drifts { steady, sigma, .. }) => {
                 assert!((steady - 19.05).abs() < 4.0 * sigma + 0.2, "{slope}: {steady}");
             }
             // The least of them may be told beside the answer.
@@ -219,6 +219,6 @@ fn an_output_on_a_clock_that_is_behind_is_refused() {
 fn forms_that_are_refused_alike_are_told_once() {
     let one = |form: &str, why: &str| (form.to_owned(), why.to_owned());
     let forms = vec![one("fopdt", "a"), one("3,2", "b"), one("sopdt", "a")];
-    let refusal = Refusal::None { forms, drift: None };
+    let refusal = NoModel::None { forms, drift: None };
     assert_eq!(refusal.to_string(), "no model can be trusted:\n  fopdt, sopdt: a\n  3,2: b");
 }

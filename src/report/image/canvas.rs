@@ -2,7 +2,7 @@
 
 use crate::report::chart::palette::Rgb;
 
-type Place = (f64, f64);
+type CanvasPoint = (f64, f64);
 
 /// An image that is drawn on.
 pub struct Canvas {
@@ -24,13 +24,13 @@ impl Canvas {
     }
 
     /// A filled circle.
-    pub fn dot(&mut self, centre: Place, radius: f64, colour: Rgb) {
-        self.line(centre, centre, radius, colour);
+    pub fn dot(&mut self, centre: CanvasPoint, radius: f64, ink: Rgb) {
+        self.line(centre, centre, radius, ink);
     }
 
     /// A line of half this thickness on either side, with round ends. Every
     /// pixel is covered by how far its centre lies within.
-    pub fn line(&mut self, from: Place, to: Place, radius: f64, colour: Rgb) {
+    pub fn line(&mut self, from: CanvasPoint, to: CanvasPoint, radius: f64, ink: Rgb) {
         let reach = radius + 1.0;
         let columns = span(from.0.min(to.0) - reach, from.0.max(to.0) + reach, self.image.width());
         let rows = span(from.1.min(to.1) - reach, from.1.max(to.1) + reach, self.image.height());
@@ -39,14 +39,14 @@ impl Canvas {
                 let distance = distance((f64::from(x), f64::from(y)), from, to);
                 let cover = (radius + 0.5 - distance).clamp(0.0, 1.0);
                 if cover > 0.0 {
-                    self.blend(x, y, colour, cover);
+                    self.blend(x, y, ink, cover);
                 }
             }
         }
     }
 
     /// A dashed line.
-    pub fn dashes(&mut self, from: Place, to: Place, radius: f64, colour: Rgb) {
+    pub fn dashes(&mut self, from: CanvasPoint, to: CanvasPoint, radius: f64, ink: Rgb) {
         const DASH: f64 = 9.0;
         const PERIOD: f64 = 15.0;
         let (dx, dy) = (to.0 - from.0, to.1 - from.1);
@@ -60,21 +60,21 @@ impl Canvas {
         };
         let mut along = 0.0;
         while along < length {
-            self.line(at(along), at(along + DASH), radius, colour);
+            self.line(at(along), at(along + DASH), radius, ink);
             along += PERIOD;
         }
     }
 
-    fn blend(&mut self, x: u32, y: u32, colour: Rgb, cover: f64) {
+    fn blend(&mut self, x: u32, y: u32, ink: Rgb, cover: f64) {
         let pixel = self.image.get_pixel_mut(x, y);
-        for (under, over) in pixel.0.iter_mut().zip(colour) {
+        for (under, over) in pixel.0.iter_mut().zip(ink) {
             let mixed = f64::from(*under) * (1.0 - cover) + f64::from(over) * cover;
             *under = to_u8(mixed);
         }
     }
 }
 
-fn distance(point: Place, from: Place, to: Place) -> f64 {
+fn distance(point: CanvasPoint, from: CanvasPoint, to: CanvasPoint) -> f64 {
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);
     let length_squared = dx * dx + dy * dy;
     let along = if length_squared > 0.0 {

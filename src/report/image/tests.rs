@@ -5,14 +5,14 @@ use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::core::units::WidthRange;
 use crate::rows::frame_row::sample;
-use crate::vision::{Axis, Polarity};
+use crate::vision::{BeadAxis, Polarity};
 
 fn gauge(roi: Roi) -> Gauge {
     Gauge {
         calipers: 16,
         ..Gauge::new(
             roi,
-            Axis::Vertical,
+            BeadAxis::Vertical,
             Polarity::Bright,
             WidthRange { min: Mm::constant(1.0), max: Mm::constant(100.0) },
         )

@@ -3,15 +3,15 @@
 use maud::{Markup, html};
 
 use super::verdict::verdict;
-use super::{Facts, PlannedBead, rms};
-use crate::plan::{Foretold, SpeedProfile};
+use super::{PlanFacts, PlannedBead, rms};
+use crate::plan::{SpeedProfile, WidthPrediction};
 use crate::report::chart::area::{Area, XAxis};
 use crate::report::chart::legend::legend;
 use crate::report::chart::palette;
 use crate::report::chart::palette::Ink;
-use crate::report::chart::plot::{Layer, Plot, y_range};
+use crate::report::chart::plot::{Plot, PlotLayer, y_range};
 use crate::report::chart::range::Range;
-use crate::report::chart::series::Series;
+use crate::report::chart::series::Curve;
 use crate::report::html::whole_page;
 
 /// Beads that are drawn; of more, those with the largest errors.
@@ -19,13 +19,13 @@ const DRAWN: usize = 12;
 /// Points of a curve over path.
 const POINTS: u32 = 2000;
 
-/// A curve, its name, its colour and whether it is only wished for.
-type Curve = (Series, &'static str, Ink, bool);
+/// A curve, its name, its colour and whether it is only demanded.
+type NamedCurve = (Curve, &'static str, Ink, bool);
 
 /// The page, with names and values under its title, and with warnings.
 pub fn page(
     beads: &[PlannedBead],
-    facts: &Facts,
+    facts: &PlanFacts,
     about: &[(String, String)],
     warnings: &[String],
 ) -> String {
@@ -49,7 +49,7 @@ pub fn page(
     whole_page("A job that is planned ahead", &body).into_string()
 }
 
-fn section(bead: &PlannedBead, facts: &Facts) -> Markup {
+fn section(bead: &PlannedBead, facts: &PlanFacts) -> Markup {
     let path = XAxis::path(Range::new(bead.nominal.start_mm(), bead.nominal.end_mm()));
     let speed = &bead.plan.speed;
     let at_time = |of: &dyn Fn(f64) -> f64| along(speed, |path_mm| of(speed.time_at(path_mm)));
@@ -64,7 +64,7 @@ fn section(bead: &PlannedBead, facts: &Facts) -> Markup {
     ];
     let command = at_time(&|t| bead.plan.command_at(t) + facts.idle);
     let commands = [(command, "command", palette::SCREW, false)];
-    let width = |of: &Foretold| widths_about(facts.width_mm, of, facts);
+    let width = |of: &WidthPrediction| widths_about(facts.width_mm, of, facts);
     let widths = [
         (
             width(&bead.proportional),
@@ -92,8 +92,8 @@ fn section(bead: &PlannedBead, facts: &Facts) -> Markup {
 }
 
 /// The width over path as it strays about a value \[mm\].
-fn widths_about(middle_mm: f64, of: &Foretold, facts: &Facts) -> Series {
-    let mut series = Series::default();
+fn widths_about(middle_mm: f64, of: &WidthPrediction, facts: &PlanFacts) -> Curve {
+    let mut series = Curve::default();
     for (at, share) in &of.width {
         series.push(*at, middle_mm + facts.width_mm * share);
     }
@@ -101,30 +101,30 @@ fn widths_about(middle_mm: f64, of: &Foretold, facts: &Facts) -> Series {
 }
 
 /// A value along the path of a speed.
-fn along(speed: &SpeedProfile, of: impl Fn(f64) -> f64) -> Series {
+fn along(speed: &SpeedProfile, of: impl Fn(f64) -> f64) -> Curve {
     let (start, length) = (speed.start_mm(), speed.end_mm() - speed.start_mm());
     let even = (0..=POINTS).map(|k| start + length * f64::from(k) / f64::from(POINTS));
     // The nodes as well, so that no apex lies between two points.
     let mut places: Vec<f64> = even.chain(speed.path().iter().copied()).collect();
     places.sort_by(f64::total_cmp);
-    let mut series = Series::default();
+    let mut series = Curve::default();
     for place in places {
         series.push(place, of(place));
     }
     series
 }
 
-fn plot(y_title: &str, x: &XAxis, curves: &[Curve], target: Option<f64>) -> Markup {
-    let shown: Vec<&Series> = curves.iter().map(|curve| &curve.0).collect();
+fn plot(y_title: &str, x: &XAxis, curves: &[NamedCurve], target: Option<f64>) -> Markup {
+    let shown: Vec<&Curve> = curves.iter().map(|curve| &curve.0).collect();
     let levels: Vec<f64> = target.into_iter().collect();
-    let mut layers: Vec<Layer<'_>> =
-        levels.iter().map(|level| Layer::Level(*level, palette::TARGET, "")).collect();
-    layers.extend(curves.iter().map(|(series, _, ink, wish)| {
-        if *wish { Layer::Wish(series, *ink) } else { Layer::Curve(series, *ink) }
+    let mut layers: Vec<PlotLayer<'_>> =
+        levels.iter().map(|level| PlotLayer::Level(*level, palette::TARGET, "")).collect();
+    layers.extend(curves.iter().map(|(series, _, ink, demand)| {
+        if *demand { PlotLayer::Demand(series, *ink) } else { PlotLayer::Curve(series, *ink) }
     }));
     let mut names: Vec<(&str, Ink, &str)> = curves
         .iter()
-        .map(|(_, name, ink, wish)| (*name, *ink, if *wish { "dash" } else { "" }))
+        .map(|(_, name, ink, demand)| (*name, *ink, if *demand { "dash" } else { "" }))
         .collect();
     names.extend(levels.iter().map(|_| ("target", palette::TARGET, "dash")));
     html! {

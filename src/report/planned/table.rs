@@ -1,14 +1,14 @@
 //! `plan.csv`: what robot and extruder do at each moment.
 
-use super::{Facts, PlannedBead};
+use super::{PlanFacts, PlannedBead};
 
 /// Time from row to row \[s\]; a point of the job has a row of its own.
-const EVERY_S: f64 = 0.01;
+const STEP_S: f64 = 0.01;
 /// A row on the even grid is left out this near to one of a point \[s\].
-const BESIDE_S: f64 = 1e-3;
+const CORNER_STEP_S: f64 = 1e-3;
 
 /// The table of all beads. Time begins anew with each.
-pub fn to_csv(beads: &[PlannedBead], facts: &Facts) -> Result<Vec<u8>, csv::Error> {
+pub fn to_csv(beads: &[PlannedBead], facts: &PlanFacts) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let command = format!("command_{}", facts.unit.word());
     writer.write_record([
@@ -39,8 +39,8 @@ fn moments(bead: &PlannedBead) -> Vec<f64> {
     let mut fixed: Vec<f64> = points.map(|time_s| time_s.clamp(0.0, end_s)).collect();
     fixed.extend([0.0, end_s]);
     fixed.sort_by(f64::total_cmp);
-    fixed.dedup_by(|later, earlier| *later - *earlier < BESIDE_S);
-    let even = (1_u32..).map(|k| EVERY_S * f64::from(k)).take_while(|time_s| *time_s < end_s);
+    fixed.dedup_by(|later, earlier| *later - *earlier < CORNER_STEP_S);
+    let even = (1_u32..).map(|k| STEP_S * f64::from(k)).take_while(|time_s| *time_s < end_s);
     let mut all: Vec<f64> = even.filter(|time_s| !beside(&fixed, *time_s)).collect();
     all.extend(fixed);
     all.sort_by(f64::total_cmp);
@@ -49,14 +49,15 @@ fn moments(bead: &PlannedBead) -> Vec<f64> {
 
 fn beside(fixed: &[f64], time_s: f64) -> bool {
     let after = fixed.partition_point(|point| *point < time_s);
-    let near = |at: usize| fixed.get(at).is_some_and(|point| (point - time_s).abs() < BESIDE_S);
+    let near =
+        |at: usize| fixed.get(at).is_some_and(|point| (point - time_s).abs() < CORNER_STEP_S);
     near(after) || (after > 0 && near(after - 1))
 }
 
-fn row(number: u32, bead: &PlannedBead, time_s: f64, facts: &Facts) -> [String; 11] {
+fn row(number: u32, bead: &PlannedBead, time_s: f64, facts: &PlanFacts) -> [String; 11] {
     let path_mm = bead.plan.speed.path_at(time_s).min(bead.nominal.end_mm());
     let [x, y, z] = position_at(&bead.position, path_mm);
-    let width = share_at(&bead.planned.width, path_mm)
+    let width = fraction_at(&bead.planned.width, path_mm)
         .map_or_else(String::new, |share| format!("{:.4}", facts.width_mm * (1.0 + share)));
     [
         number.to_string(),
@@ -86,7 +87,7 @@ fn position_at(position: &[(f64, [f64; 3])], path_mm: f64) -> [f64; 3] {
 }
 
 /// None within half a nozzle of the ends, where no full mean is.
-fn share_at(width: &[(f64, f64)], path_mm: f64) -> Option<f64> {
+fn fraction_at(width: &[(f64, f64)], path_mm: f64) -> Option<f64> {
     let after = width.partition_point(|(at, _)| *at < path_mm);
     let (to_mm, to) = width.get(after)?;
     let (from_mm, from) = width.get(after.checked_sub(1)?)?;

@@ -2,14 +2,14 @@
 
 use maud::{Markup, html};
 
-use super::{Facts, PlannedBead, rms};
+use super::{PlanFacts, PlannedBead, rms};
 
 /// Error of the planned width, as a share of it, from which on it is worth a word.
-const FAR_OFF: f64 = 0.05;
+const FAR_OFF_ERROR: f64 = 0.05;
 
 /// The verdict of a page. `warnings` are what the plan's caller has to say.
-pub fn verdict(beads: &[PlannedBead], facts: &Facts, warnings: &[String]) -> Markup {
-    let far_off = rms(beads, |bead| &bead.planned) > FAR_OFF;
+pub fn verdict(beads: &[PlannedBead], facts: &PlanFacts, warnings: &[String]) -> Markup {
+    let far_off = rms(beads, |bead| &bead.planned) > FAR_OFF_ERROR;
     let (class, word) = if far_off || !warnings.is_empty() {
         ("caution", "Look closer.")
     } else {
@@ -26,7 +26,7 @@ pub fn verdict(beads: &[PlannedBead], facts: &Facts, warnings: &[String]) -> Mar
     }
 }
 
-fn sentences(beads: &[PlannedBead], facts: &Facts, far_off: bool) -> String {
+fn sentences(beads: &[PlannedBead], facts: &PlanFacts, far_off: bool) -> String {
     let planned = rms(beads, |bead| &bead.planned);
     let unplanned = rms(beads, |bead| &bead.constant).min(rms(beads, |bead| &bead.proportional));
     let added_s: f64 = beads.iter().map(|bead| bead.plan.added_s).sum::<f64>().max(0.0);

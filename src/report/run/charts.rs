@@ -7,22 +7,22 @@ use crate::control::event::Event;
 use crate::control::step::{State, Step};
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
-use crate::report::chart::series::Series;
+use crate::report::chart::series::Curve;
 use crate::report::chart::strip::{Mark, Strip};
 use crate::rows::frame_row::FrameRow;
 use crate::rows::names;
-use crate::rows::summary::Follower;
+use crate::rows::summary::StateFollower;
 
 /// A quantity over time (or frames) and over path.
 #[derive(Debug, Default)]
-pub struct Twice {
+pub struct TimeAndPath {
     /// Over time, or over frames where no time is known.
-    pub time: Series,
+    pub time: Curve,
     /// Over the distance along the path.
-    pub path: Series,
+    pub path: Curve,
 }
 
-impl Twice {
+impl TimeAndPath {
     fn push(&mut self, time: f64, path: Option<f64>, value: f64) {
         self.time.push(time, value);
         if let Some(path) = path {
@@ -38,33 +38,33 @@ pub struct Charts {
     /// frame.
     pub timed: Option<bool>,
     /// Measured width.
-    pub width: Twice,
+    pub width: TimeAndPath,
     /// Width less two standard deviations.
-    pub width_low: Twice,
+    pub width_low: TimeAndPath,
     /// Width plus two standard deviations.
-    pub width_high: Twice,
+    pub width_high: TimeAndPath,
     /// Width that was asked for there.
-    pub target: Twice,
+    pub target: TimeAndPath,
     /// Speed that the robot reports.
-    pub speed: Twice,
+    pub speed: TimeAndPath,
     /// Setpoints.
-    pub setpoint: Twice,
+    pub setpoint: TimeAndPath,
     /// What the controller would like.
-    pub demand: Twice,
+    pub demand: TimeAndPath,
     /// Contrast hint.
-    pub contrast: Series,
+    pub contrast: Curve,
     /// Blur hint.
-    pub blur: Series,
+    pub blur: Curve,
     /// Noise hint.
-    pub noise: Series,
+    pub noise: Curve,
     /// Share of saturated pixels \[%\].
-    pub saturated: Series,
+    pub saturated: Curve,
     /// Share of the rows that the width comes from \[%\].
-    pub used: Series,
+    pub used: Curve,
     /// Standard deviation of the width \[mm\].
-    pub sigma: Series,
+    pub sigma: Curve,
     /// Refused frames.
-    pub refused: Strip,
+    pub rejected: Strip,
     /// States of the controller.
     pub states: Strip,
     /// Limits that acted.
@@ -73,7 +73,7 @@ pub struct Charts {
     pub distance: DistanceCharts,
     /// The extruder side.
     pub extruder: ExtruderCharts,
-    follower: Follower,
+    follower: StateFollower,
 }
 
 impl Charts {
@@ -84,11 +84,11 @@ impl Charts {
             if timed { row.time_s } else { Some(crate::numeric::statistics::as_f64(row.frame)) };
         let Some(x) = x else { return };
         let measured = match &row.outcome {
-            Err(status) => return self.refused.push(x, Mark { severity: 1, name: status }),
+            Err(status) => return self.rejected.push(x, Mark { severity: 1, name: status }),
             Ok(measured) => measured,
         };
-        self.refused.push(x, Mark { severity: 0, name: "ok" });
-        let path = row.control.and_then(|control| control.bead_path).map(f64::from);
+        self.rejected.push(x, Mark { severity: 0, name: "ok" });
+        let path = row.control.and_then(|control| control.measured_path).map(f64::from);
         let (width, sigma) = (measured.width.get(), measured.sigma.get());
         self.width.push(x, path, width);
         self.width_low.push(x, path, width - 2.0 * sigma);
@@ -99,8 +99,8 @@ impl Charts {
         self.contrast.push(x, measured.hints.contrast_grey);
         self.blur.push(x, measured.hints.blur_px);
         self.noise.push(x, measured.hints.noise_grey);
-        self.saturated.push(x, measured.hints.saturated_share * 100.0);
-        self.used.push(x, measured.hints.used_share * 100.0);
+        self.saturated.push(x, measured.hints.saturated_fraction * 100.0);
+        self.used.push(x, measured.hints.used_fraction * 100.0);
         self.sigma.push(x, sigma);
     }
 

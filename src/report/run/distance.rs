@@ -6,18 +6,18 @@ use crate::control::step::Step;
 use crate::report::chart::area::{Area, XAxis};
 use crate::report::chart::legend;
 use crate::report::chart::palette;
-use crate::report::chart::plot::{Layer, Plot, y_range};
-use crate::report::chart::series::Series;
+use crate::report::chart::plot::{Plot, PlotLayer, y_range};
+use crate::report::chart::series::Curve;
 use crate::rows::summary::DistanceSummary;
 
 /// What the plots are drawn from, over where the bead was laid.
 #[derive(Debug, Default)]
 pub struct DistanceCharts {
-    level: Series,
-    level_low: Series,
-    level_high: Series,
-    exponent: Series,
-    offset: Series,
+    level: Curve,
+    level_low: Curve,
+    level_high: Curve,
+    exponent: Curve,
+    offset: Curve,
 }
 
 impl DistanceCharts {
@@ -62,8 +62,8 @@ impl DistanceCharts {
             y_title: "A [mm]",
             y_range: y_range(&[&self.level], &[]),
             layers: vec![
-                Layer::Band(&self.level_low, &self.level_high, palette::MODEL),
-                Layer::Curve(&self.level, palette::MODEL),
+                PlotLayer::Band(&self.level_low, &self.level_high, palette::MODEL),
+                PlotLayer::Curve(&self.level, palette::MODEL),
             ],
         };
         html! {
@@ -76,13 +76,13 @@ impl DistanceCharts {
     }
 }
 
-fn curve(axis: &XAxis, y_title: &str, of: &Series) -> Markup {
+fn curve(axis: &XAxis, y_title: &str, of: &Curve) -> Markup {
     let plot = Plot {
         area: Area::wide(120.0),
         x: axis,
         y_title,
         y_range: y_range(&[of], &[]),
-        layers: vec![Layer::Curve(of, palette::MODEL)],
+        layers: vec![PlotLayer::Curve(of, palette::MODEL)],
     };
     plot.draw()
 }

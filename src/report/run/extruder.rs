@@ -7,16 +7,16 @@ use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::Mm3PerS;
-use crate::extruder::{Drive, ExtruderReport, ExtruderState};
+use crate::extruder::{CommandQuantity, ExtruderReport, ExtruderState};
 use crate::report::chart::area::{Area, XAxis};
 use crate::report::chart::legend;
 use crate::report::chart::palette;
 use crate::report::chart::palette::Ink;
-use crate::report::chart::plot::{Layer, Plot, y_range};
-use crate::report::chart::series::Series;
+use crate::report::chart::plot::{Plot, PlotLayer, y_range};
+use crate::report::chart::series::Curve;
 use crate::report::chart::strip::{Mark, Strip};
 use crate::report::chart::strips;
-use crate::report::chart::strips::Row;
+use crate::report::chart::strips::StripRow;
 use crate::rows::names;
 use crate::rows::summary::ExtruderSummary;
 
@@ -26,15 +26,15 @@ const STATES: [&str; 6] = ["off", "starting", "running", "ending", "holding", "f
 /// What the plots of the extruder side are drawn from.
 #[derive(Debug, Default)]
 pub struct ExtruderCharts {
-    wanted: Series,
-    foretold: Series,
-    flow: Series,
-    sensed_flow: Series,
-    command: Series,
-    feedforward: Series,
-    screw: Series,
-    pressure: Series,
-    filled: Series,
+    demand: Curve,
+    predicted: Curve,
+    flow: Curve,
+    sensed_flow: Curve,
+    command: Curve,
+    feedforward: Curve,
+    screw: Curve,
+    pressure: Curve,
+    filled: Curve,
     states: Strip,
     limits: Strip,
 }
@@ -44,7 +44,7 @@ impl ExtruderCharts {
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         let time = now.secs();
         if let Event::Extruder(report) = event {
-            self.report(time, report);
+            self.state(time, report);
         }
         let Some(side) = &step.extruder else { return };
         let severity = match side.state {
@@ -59,10 +59,10 @@ impl ExtruderCharts {
         self.limits.push(time, Mark { severity: u8::from(limit != "none"), name: limit });
         if let Some(command) = side.command {
             self.command.push(time, command.value);
-            self.wanted.push(time, side.trace.flow_mm3_per_s.get());
+            self.demand.push(time, side.trace.flow_mm3_per_s.get());
             self.feedforward.push(time, side.trace.feedforward);
-            if let Some(foretold) = side.trace.foretold_mm3_per_s {
-                self.foretold.push(time, foretold.get());
+            if let Some(predicted) = side.trace.predicted_mm3_per_s {
+                self.predicted.push(time, predicted.get());
             }
         }
     }
@@ -72,8 +72,8 @@ impl ExtruderCharts {
         self.flow.push(now.secs(), flow.get());
     }
 
-    fn report(&mut self, time: f64, report: &ExtruderReport) {
-        let push = |series: &mut Series, value: Option<f64>| {
+    fn state(&mut self, time: f64, report: &ExtruderReport) {
+        let push = |series: &mut Curve, value: Option<f64>| {
             if let Some(value) = value {
                 series.push(time, value);
             }
@@ -85,22 +85,22 @@ impl ExtruderCharts {
     }
 
     /// The section of the page, for an extruder that is told this drive.
-    pub fn section(&self, drive: Drive, summary: Option<&ExtruderSummary>) -> Markup {
+    pub fn section(&self, drive: CommandQuantity, summary: Option<&ExtruderSummary>) -> Markup {
         let Some(range) = self.command.extent() else { return html! {} };
         let axis = XAxis::time(range);
-        let told = format!("command [{}]", drive.unit());
+        let given = format!("command [{}]", drive.unit());
         html! {
             section {
                 h2 { "The extruder" }
                 (self.flow_plot(&axis))
                 (strips::draw(&axis, &[
-                    Row { name: "state", strip: &self.states, ink: palette::state },
-                    Row { name: "limit", strip: &self.limits, ink: limit },
+                    StripRow { name: "state", strip: &self.states, ink: palette::state },
+                    StripRow { name: "limit", strip: &self.limits, ink: limit },
                 ]))
                 (legend::of_strips(&STATES, &self.states, &self.limits))
-                (self.command_plot(&axis, &told, drive == Drive::Rpm))
+                (self.command_plot(&axis, &given, drive == CommandQuantity::Rpm))
                 (sensor(&axis, &self.pressure, "pressure [MPa]", palette::PRESSURE))
-                @if drive != Drive::Rpm {
+                @if drive != CommandQuantity::Rpm {
                     (sensor(&axis, &self.screw, "screw [rpm]", palette::SCREW))
                 }
                 (sensor(&axis, &self.filled, "filled length [mm]", palette::FILLED))
@@ -120,25 +120,25 @@ impl ExtruderCharts {
             area: Area::wide(240.0),
             x: axis,
             y_title: "flow [mm³/s]",
-            y_range: y_range(&[&self.wanted, flow, &self.foretold], &[0.0]),
+            y_range: y_range(&[&self.demand, flow, &self.predicted], &[0.0]),
             layers: vec![
-                Layer::Wish(&self.wanted, palette::TARGET),
-                Layer::Curve(flow, palette::FLOW),
-                Layer::Wish(&self.foretold, palette::MODEL),
+                PlotLayer::Demand(&self.demand, palette::TARGET),
+                PlotLayer::Curve(flow, palette::FLOW),
+                PlotLayer::Demand(&self.predicted, palette::MODEL),
             ],
         };
         let entries = [
-            (&self.wanted, ("wanted", palette::TARGET, "dash")),
+            (&self.demand, ("wanted", palette::TARGET, "dash")),
             (flow, (name, palette::FLOW, "")),
-            (&self.foretold, ("foretold by the model", palette::MODEL, "dash")),
+            (&self.predicted, ("foretold by the model", palette::MODEL, "dash")),
         ];
         html! { (legend::legend(&legend::drawn(&entries))) (plot.draw()) }
     }
 
     fn command_plot(&self, axis: &XAxis, title: &str, with_screw: bool) -> Markup {
         let mut layers = vec![
-            Layer::Wish(&self.feedforward, palette::DEMAND),
-            Layer::Stairs(&self.command, palette::SETPOINT),
+            PlotLayer::Demand(&self.feedforward, palette::DEMAND),
+            PlotLayer::Stairs(&self.command, palette::SETPOINT),
         ];
         let mut shown = vec![&self.command];
         let mut entries = vec![
@@ -146,7 +146,7 @@ impl ExtruderCharts {
             (&self.feedforward, ("known beforehand", palette::DEMAND, "dash")),
         ];
         if with_screw {
-            layers.push(Layer::Curve(&self.screw, palette::SCREW));
+            layers.push(PlotLayer::Curve(&self.screw, palette::SCREW));
             shown.push(&self.screw);
             entries.push((&self.screw, ("screw", palette::SCREW, "")));
         }
@@ -166,7 +166,7 @@ fn times(summary: &ExtruderSummary) -> Markup {
     let total: f64 = summary.states_s.values().sum();
     let row = |what: &str, name: &str, seconds: f64| {
         html! { tr {
-            td { (what) } td { (names::spoken(name)) }
+            td { (what) } td { (names::in_words(name)) }
             td.number { (format!("{seconds:.1} s")) }
             td.number { (format!("{:.1} %", 100.0 * seconds / total.max(1e-9))) }
         } }
@@ -181,7 +181,7 @@ fn times(summary: &ExtruderSummary) -> Markup {
                 }
                 @for (name, seconds) in &summary.limited_by_s { (row("limit", name, *seconds)) }
                 @for (name, count) in &summary.fault_reasons { tr {
-                    td { "fault" } td { (names::spoken(name)) }
+                    td { "fault" } td { (names::in_words(name)) }
                     td.number { (count) " ×" } td {}
                 } }
             }
@@ -189,7 +189,7 @@ fn times(summary: &ExtruderSummary) -> Markup {
     }
 }
 
-fn sensor(axis: &XAxis, series: &Series, title: &str, ink: Ink) -> Markup {
+fn sensor(axis: &XAxis, series: &Curve, title: &str, ink: Ink) -> Markup {
     if series.is_empty() {
         return html! {};
     }
@@ -198,7 +198,7 @@ fn sensor(axis: &XAxis, series: &Series, title: &str, ink: Ink) -> Markup {
         x: axis,
         y_title: title,
         y_range: y_range(&[series], &[0.0]),
-        layers: vec![Layer::Curve(series, ink)],
+        layers: vec![PlotLayer::Curve(series, ink)],
     };
     plot.draw()
 }

@@ -3,17 +3,17 @@
 use maud::{Markup, html};
 
 use crate::extruder::ExtruderFault;
-use crate::rows::names::{extruder_fault, spoken};
+use crate::rows::names::{extruder_fault, in_words};
 use crate::rows::summary::{ControlSummary, ExtruderSummary, ProfileSummary, Summary};
 
 /// Share of what was wanted from which on an error is worth a word.
-const FAR_OFF: f64 = 0.05;
+const FAR_OFF_ERROR: f64 = 0.05;
 /// Share of the time from which on a limit is.
-const LONG_LIMITED: f64 = 0.10;
+const LONG_LIMITED_FRACTION: f64 = 0.10;
 
 /// How a run went.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Level {
+pub enum VerdictLevel {
     /// Nothing to worry about.
     Good,
     /// Something to look at.
@@ -26,7 +26,7 @@ pub enum Level {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Verdict {
     /// In one word.
-    pub level: Level,
+    pub level: VerdictLevel,
     /// In a few sentences.
     pub text: String,
 }
@@ -34,20 +34,20 @@ pub struct Verdict {
 /// Judges a run. `max_rejected_share` is the share of refused frames that the
 /// cell bears.
 pub fn verdict(summary: &Summary, max_rejected_share: f64) -> Verdict {
-    let mut level = Level::Good;
+    let mut level = VerdictLevel::Good;
     let mut sentences = vec![width_sentence(summary)];
     if summary.measured == 0 {
-        level = Level::Bad;
-    } else if summary.rejected_share() > max_rejected_share {
-        level = Level::Caution;
+        level = VerdictLevel::Bad;
+    } else if summary.rejected_fraction() > max_rejected_share {
+        level = VerdictLevel::Caution;
     }
-    sentences.push(share_sentence(summary, max_rejected_share));
+    sentences.push(rejected_sentence(summary, max_rejected_share));
     if let Some(control) = &summary.control {
         let (control_level, more) = control_sentences(control);
         level = level.max(control_level);
         sentences.extend(more);
         if let Some(sentence) = far_off(control, summary) {
-            level = level.max(Level::Caution);
+            level = level.max(VerdictLevel::Caution);
             // Right behind the sentence about the width.
             sentences.insert(1, sentence);
         }
@@ -55,7 +55,7 @@ pub fn verdict(summary: &Summary, max_rejected_share: f64) -> Verdict {
     if let Some(extruder) = &summary.extruder {
         let more = extruder_sentences(extruder);
         if !more.is_empty() {
-            level = level.max(Level::Caution);
+            level = level.max(VerdictLevel::Caution);
         }
         sentences.extend(more);
         if let Some(profile) = &extruder.profile {
@@ -116,15 +116,15 @@ fn held_sentence(control: &ControlSummary, target: f64) -> String {
     }
 }
 
-fn share_sentence(summary: &Summary, max_rejected_share: f64) -> String {
-    let share = (1.0 - summary.rejected_share()) * 100.0;
+fn rejected_sentence(summary: &Summary, max_rejected_share: f64) -> String {
+    let share = (1.0 - summary.rejected_fraction()) * 100.0;
     let frames = summary.frames_with_bead();
     let of_bead = if frames == summary.frames { "" } else { " that could show bead" };
     if summary.frames == 0 {
         "There was no frame at all.".to_string()
     } else if frames == 0 {
         "No frame could show bead: none was laid.".to_string()
-    } else if summary.rejected_share() > max_rejected_share {
+    } else if summary.rejected_fraction() > max_rejected_share {
         format!(
             "Only {share:.1} % of {frames} frames{of_bead} were measured; the cell asks for {:.0} %.",
             (1.0 - max_rejected_share) * 100.0
@@ -139,12 +139,12 @@ fn share_sentence(summary: &Summary, max_rejected_share: f64) -> String {
 fn far_off(control: &ControlSummary, summary: &Summary) -> Option<String> {
     let (error, target) = (control.width_error_rms_settled_mm?, summary.target_width_mm?);
     let share = control.limited_s / summary.duration_s.unwrap_or(f64::INFINITY);
-    if error > FAR_OFF * target && !is_excited(summary) {
+    if error > FAR_OFF_ERROR * target && !is_excited(summary) {
         Some(format!("That is {:.0} % of the target.", 100.0 * error / target))
     } else if let Some(sentence) = far_off_before(control, target).filter(|_| !is_excited(summary))
     {
         Some(sentence)
-    } else if share > LONG_LIMITED {
+    } else if share > LONG_LIMITED_FRACTION {
         Some(format!("The robot stood at a limit for {:.0} % of the time.", 100.0 * share))
     } else {
         None
@@ -154,7 +154,7 @@ fn far_off(control: &ControlSummary, summary: &Summary) -> Option<String> {
 /// An error over all bead laid under control, as at a corner within what counts as settling.
 fn far_off_before(control: &ControlSummary, target: f64) -> Option<String> {
     let (rms, worst) = (control.width_error_rms_mm?, control.width_error_worst?);
-    (rms > FAR_OFF * target).then(|| {
+    (rms > FAR_OFF_ERROR * target).then(|| {
         format!(
             "Over all bead laid under control the error is {rms:.2} mm RMS, {:.0} % of the target; \
              at worst {:+.2} mm, at {:.0} mm of the path.",
@@ -176,11 +176,11 @@ fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
     for (why, seconds) in &extruder.held_for_s {
         sentences.push(format!(
             "The extruder kept its last command for {seconds:.1} s ({}).",
-            spoken(why)
+            in_words(why)
         ));
     }
     for (limit, seconds) in &extruder.limited_by_s {
-        if share(*seconds) > LONG_LIMITED {
+        if share(*seconds) > LONG_LIMITED_FRACTION {
             sentences.push(format!(
                 "The extruder's command stood at a limit for {:.0} % of the time ({limit}).",
                 100.0 * share(*seconds)
@@ -189,7 +189,7 @@ fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
     }
     let kept = extruder.flow_controlled;
     if let (Some(error), Some(mean)) = (kept.error_mean_mm3_per_s, kept.mean_mm3_per_s)
-        && error.abs() > FAR_OFF * mean.abs().max(1e-9)
+        && error.abs() > FAR_OFF_ERROR * mean.abs().max(1e-9)
     {
         sentences.push(format!(
             "The flow was {error:+.1} mm³/s off on average after control began, {mean:.1} mm³/s \
@@ -200,49 +200,53 @@ fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
 }
 
 /// Whether a profile was played to its end, and whether the bead went on.
-fn profile_sentence(profile: &ProfileSummary) -> (Level, String) {
-    let ProfileSummary { lasts_s, played_share, outlasted_s } = *profile;
+fn profile_sentence(profile: &ProfileSummary) -> (VerdictLevel, String) {
+    let ProfileSummary {
+        duration_s: lasts_s,
+        played_fraction: played_share,
+        after_end_s: outlasted_s,
+    } = *profile;
     if played_share < 1.0 {
         let sentence = format!(
             "The bead ended before the profile: {:.1} % of its {lasts_s:.1} s were played.",
             100.0 * played_share
         );
-        (Level::Caution, sentence)
+        (VerdictLevel::Caution, sentence)
     } else {
         let sentence = format!(
             "The profile of {lasts_s:.1} s was played to its end; bead was laid for {outlasted_s:.1} s \
              more, with its last command."
         );
-        (Level::Good, sentence)
+        (VerdictLevel::Good, sentence)
     }
 }
 
-fn control_sentences(control: &ControlSummary) -> (Level, Vec<String>) {
-    let mut level = Level::Good;
+fn control_sentences(control: &ControlSummary) -> (VerdictLevel, Vec<String>) {
+    let mut level = VerdictLevel::Good;
     let mut sentences = Vec::new();
     if control.faults > 0 {
-        level = Level::Bad;
-        let why: Vec<String> = control.fault_reasons.keys().map(|name| spoken(name)).collect();
+        level = VerdictLevel::Bad;
+        let why: Vec<String> = control.fault_reasons.keys().map(|name| in_words(name)).collect();
         let times = if control.faults == 1 { "once" } else { "more than once" };
         sentences.push(format!("Control gave up {times} ({}).", why.join(", ")));
     } else {
         sentences.push("There was no fault.".to_string());
     }
     if control.width_error_rms_mm.is_none() {
-        level = level.max(Level::Caution);
+        level = level.max(VerdictLevel::Caution);
     }
     // What holds while a run is being ended is no disturbance.
     let held: f64 =
         control.held_for_s.iter().filter(|(why, _)| **why != "stopping").map(|(_, s)| s).sum();
     if held >= 0.05 {
-        level = level.max(Level::Caution);
+        level = level.max(VerdictLevel::Caution);
         sentences.push(format!("Control held for {held:.1} s."));
     }
     if control.limited_s >= 0.05 {
         sentences.push(format!("A limit shaped the speed for {:.1} s.", control.limited_s));
     }
     if control.records_lost > 0 {
-        level = level.max(Level::Caution);
+        level = level.max(VerdictLevel::Caution);
         sentences.push(format!("{} records were lost.", control.records_lost));
     }
     (level, sentences)
@@ -250,7 +254,7 @@ fn control_sentences(control: &ControlSummary) -> (Level, Vec<String>) {
 
 /// The figures as tiles.
 pub fn tiles(summary: &Summary) -> Markup {
-    let share = (1.0 - summary.rejected_share()) * 100.0;
+    let share = (1.0 - summary.rejected_fraction()) * 100.0;
     let measured = if summary.frames == 0 { None } else { Some(share) };
     html! {
         div.tiles {
@@ -271,8 +275,8 @@ pub fn tiles(summary: &Summary) -> Markup {
                 }
             } @else {
                 (tile("uncertainty", &number(summary.sigma_mean_mm, 3), "mm", "mean standard deviation"))
-                (tile("contrast", &number(summary.hints.contrast_median_grey, 0), "grey levels", "median, of 256"))
-                (tile("blur", &number(summary.hints.blur_median_px, 2), "px", "median"))
+                (tile("contrast", &number(summary.image_quality.contrast_median_grey, 0), "grey levels", "median, of 256"))
+                (tile("blur", &number(summary.image_quality.blur_median_px, 2), "px", "median"))
             }
         }
     }

@@ -2,19 +2,19 @@
 
 use maud::{Markup, html};
 
-use super::contents::Report;
-use super::headline::{self, Level};
+use super::contents::RunReport;
+use super::headline::{self, VerdictLevel};
 use super::sections;
 use crate::report::html::whole_page;
 
-impl Report<'_> {
+impl RunReport<'_> {
     /// The page.
     pub fn page(&self) -> String {
-        let verdict = headline::verdict(self.summary, self.max_rejected_share);
+        let verdict = headline::verdict(self.summary, self.max_rejected_fraction);
         let (class, word) = match verdict.level {
-            Level::Good => ("good", "Good."),
-            Level::Caution => ("caution", "Look closer."),
-            Level::Bad => ("bad", "Failed."),
+            VerdictLevel::Good => ("good", "Good."),
+            VerdictLevel::Caution => ("caution", "Look closer."),
+            VerdictLevel::Bad => ("bad", "Failed."),
         };
         let body = html! {
             h1 { (self.title) }
@@ -28,8 +28,8 @@ impl Report<'_> {
                 (self.charts.extruder.section(drive, self.summary.extruder.as_ref()))
             }
             (sections::rejections(self))
-            (sections::pictures(self))
-            (sections::hints(self))
+            (sections::images(self))
+            (sections::image_quality(self))
             (sections::latency(self))
             footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
                 ". The numbers are in summary.json, every frame is in widths.csv." }
@@ -40,7 +40,7 @@ impl Report<'_> {
     fn about(&self) -> Markup {
         html! {
             div.about {
-                @for (name, value) in self.about { span { (name) " " b { (value) } } }
+                @for (name, value) in self.header { span { (name) " " b { (value) } } }
             }
         }
     }

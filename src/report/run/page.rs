@@ -1,14 +1,14 @@
 //! The page of a run, gathered while it goes on.
 
 use super::charts::Charts;
-use super::contents::Report;
+use super::contents::RunReport;
 use crate::control::{Event, Step};
 use crate::core::frame::Frame;
 use crate::core::time::Stamp;
 use crate::core::units::Mm3PerS;
 use crate::report::picker::FramePicker;
 use crate::rows::frame_row::FrameRow;
-use crate::rows::log::{EndedRun, LogOptions, Page, RunLog};
+use crate::rows::log::{FinishedRun, LogOptions, RunLog, RunObserver};
 use crate::rows::output::{LogError, write_whole};
 use crate::vision::{Edges, Gauge};
 
@@ -32,7 +32,7 @@ impl RunPage {
     }
 }
 
-impl Page for RunPage {
+impl RunObserver for RunPage {
     fn frame(&mut self, row: &FrameRow, image: Option<(&Frame, Option<Edges<'_>>)>) {
         self.charts.frame(row);
         if let Some((frame, edges)) = image {
@@ -48,18 +48,18 @@ impl Page for RunPage {
         self.charts.extruder.flow(now, flow);
     }
 
-    fn write(self: Box<Self>, run: &EndedRun<'_>) -> Result<(), LogError> {
+    fn write(self: Box<Self>, run: &FinishedRun<'_>) -> Result<(), LogError> {
         let options = run.options;
-        let report = Report {
+        let report = RunReport {
             title: &options.title,
-            about: &options.about,
-            max_rejected_share: options.max_rejected_share,
+            header: &options.header,
+            max_rejected_fraction: options.max_rejected_fraction,
             summary: run.summary,
             charts: &self.charts,
             limits: options.control.map(|control| control.limits),
             extruder: options.control.and_then(|control| control.extruder),
             latencies: run.latencies,
-            pictures: &self.images.finish(),
+            images: &self.images.finish(),
             remarks: run.remarks,
         };
         write_whole(&options.folder, "report.html", report.page().as_bytes())?;

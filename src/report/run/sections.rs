@@ -3,8 +3,8 @@
 use base64::Engine as _;
 use maud::{Markup, html};
 
-use super::charts::Twice;
-use super::contents::Report;
+use super::charts::TimeAndPath;
+use super::contents::RunReport;
 use super::remedies;
 use crate::numeric::statistics::as_f64;
 use crate::report::chart::area::{Area, XAxis};
@@ -12,12 +12,12 @@ use crate::report::chart::histogram;
 use crate::report::chart::legend;
 use crate::report::chart::palette;
 use crate::report::chart::palette::Ink;
-use crate::report::chart::plot::{Layer, Plot, y_range};
+use crate::report::chart::plot::{Plot, PlotLayer, y_range};
 use crate::report::chart::range::Range;
-use crate::report::chart::series::Series;
+use crate::report::chart::series::Curve;
 use crate::report::chart::strip::Strip;
 use crate::report::chart::strips;
-use crate::report::chart::strips::Row;
+use crate::report::chart::strips::StripRow;
 use crate::rows::summary::Summary;
 use crate::rows::summary::advice;
 
@@ -27,23 +27,23 @@ use crate::report::chart::legend::legend;
 const STATES: [&str; 5] = ["idle", "priming", "tracking", "holding", "fault"];
 
 /// Width, speed, states and limits over time, or over frames.
-pub fn over_time(report: &Report<'_>) -> Markup {
+pub fn over_time(report: &RunReport<'_>) -> Markup {
     let charts = report.charts;
-    let strips = [&charts.refused, &charts.states, &charts.limits].map(strip_extent);
+    let strips = [&charts.rejected, &charts.states, &charts.limits].map(strip_extent);
     let extents = [charts.width.time.extent(), charts.speed.time.extent()];
-    let Some(range) = spanned(extents.into_iter().chain(strips)) else { return html! {} };
+    let Some(range) = joined(extents.into_iter().chain(strips)) else { return html! {} };
     let timed = charts.timed == Some(true);
     let axis = if timed { XAxis::time(range) } else { XAxis::frames(range) };
     html! {
         section {
             h2 { @if timed { "Over time" } @else { "Frame by frame" } }
             (width_plot(report, &axis, |twice| &twice.time))
-            (strips::draw(&axis, &[Row { name: "refused", strip: &charts.refused, ink: refused }]))
+            (strips::draw(&axis, &[StripRow { name: "refused", strip: &charts.rejected, ink: rejected_ink }]))
             @if report.summary.control.is_some() {
                 (speed_plot(report, &axis, |twice| &twice.time))
                 (strips::draw(&axis, &[
-                    Row { name: "state", strip: &charts.states, ink: palette::state },
-                    Row { name: "limit", strip: &charts.limits, ink: limit },
+                    StripRow { name: "state", strip: &charts.states, ink: palette::state },
+                    StripRow { name: "limit", strip: &charts.limits, ink: limit_ink },
                 ]))
                 (legend::of_strips(&STATES, &charts.states, &charts.limits))
             }
@@ -52,10 +52,10 @@ pub fn over_time(report: &Report<'_>) -> Markup {
 }
 
 /// Width and speed over the path.
-pub fn over_path(report: &Report<'_>) -> Markup {
+pub fn over_path(report: &RunReport<'_>) -> Markup {
     let charts = report.charts;
     let extents = [charts.width.path.extent(), charts.speed.path.extent()];
-    let Some(range) = spanned(extents.into_iter()) else { return html! {} };
+    let Some(range) = joined(extents.into_iter()) else { return html! {} };
     let axis = XAxis::path(range);
     html! {
         section {
@@ -68,27 +68,27 @@ pub fn over_path(report: &Report<'_>) -> Markup {
     }
 }
 
-fn width_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) -> Markup {
+fn width_plot(report: &RunReport<'_>, axis: &XAxis, pick: fn(&TimeAndPath) -> &Curve) -> Markup {
     let charts = report.charts;
     let width = pick(&charts.width);
-    let course = pick(&charts.target);
-    let varies = course.range().is_some_and(|range| range.length() > 1e-6);
+    let profile = pick(&charts.target);
+    let varies = profile.range().is_some_and(|range| range.length() > 1e-6);
     let target = report.summary.target_width_mm.filter(|_| !varies);
     let values: Vec<f64> = target.into_iter().collect();
     let name = target.map(|target| format!("{target} mm")).unwrap_or_default();
     let mut layers = vec![
-        Layer::Band(pick(&charts.width_low), pick(&charts.width_high), palette::WIDTH),
-        Layer::Curve(width, palette::WIDTH),
+        PlotLayer::Band(pick(&charts.width_low), pick(&charts.width_high), palette::WIDTH),
+        PlotLayer::Curve(width, palette::WIDTH),
     ];
-    layers.extend(target.map(|target| Layer::Level(target, palette::TARGET, name.as_str())));
+    layers.extend(target.map(|target| PlotLayer::Level(target, palette::TARGET, name.as_str())));
     if varies {
-        layers.push(Layer::Curve(course, palette::TARGET));
+        layers.push(PlotLayer::Curve(profile, palette::TARGET));
     }
     let plot = Plot {
         area: Area::wide(270.0),
         x: axis,
         y_title: "width [mm]",
-        y_range: y_range(&[width, if varies { course } else { width }], &values),
+        y_range: y_range(&[width, if varies { profile } else { width }], &values),
         layers,
     };
     let mut entries = Vec::new();
@@ -99,26 +99,26 @@ fn width_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) ->
     if target.is_some() || varies {
         entries.push(("target", palette::TARGET, if varies { "" } else { "dash" }));
     }
-    if legend::has_marks(&charts.refused) && !axis.title.starts_with("distance") {
+    if legend::has_marks(&charts.rejected) && !axis.title.starts_with("distance") {
         entries.push(("refused frames, in the strip", palette::REJECTED, "block"));
     }
     html! { (legend(&entries)) (plot.draw()) }
 }
 
-fn speed_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) -> Markup {
+fn speed_plot(report: &RunReport<'_>, axis: &XAxis, pick: fn(&TimeAndPath) -> &Curve) -> Markup {
     let charts = report.charts;
     let (speed, setpoint) = (pick(&charts.speed), pick(&charts.setpoint));
     let demand = pick(&charts.demand);
     let bounds = report.limits.map(|limits| [limits.min_speed.get(), limits.max_speed.get()]);
     let names = bounds.map(|bounds| bounds.map(|bound| format!("{bound} mm/s")));
     let mut layers = vec![
-        Layer::Wish(demand, palette::DEMAND),
-        Layer::Stairs(setpoint, palette::SETPOINT),
-        Layer::Curve(speed, palette::SPEED),
+        PlotLayer::Demand(demand, palette::DEMAND),
+        PlotLayer::Stairs(setpoint, palette::SETPOINT),
+        PlotLayer::Curve(speed, palette::SPEED),
     ];
     if let (Some(bounds), Some(names)) = (bounds, &names) {
         let levels = bounds.iter().zip(names);
-        layers.extend(levels.map(|(bound, name)| Layer::Level(*bound, palette::LIMIT, name)));
+        layers.extend(levels.map(|(bound, name)| PlotLayer::Level(*bound, palette::LIMIT, name)));
     }
     let plot = Plot {
         area: Area::wide(270.0),
@@ -140,7 +140,7 @@ fn speed_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) ->
 }
 
 /// Which frames were refused, why, and what to do.
-pub fn rejections(report: &Report<'_>) -> Markup {
+pub fn rejections(report: &RunReport<'_>) -> Markup {
     let summary = report.summary;
     let mut rejected: Vec<_> = summary.rejected.iter().collect();
     rejected.sort_by(|a, b| b.1.cmp(a.1));
@@ -170,9 +170,9 @@ pub fn rejections(report: &Report<'_>) -> Markup {
 }
 
 /// Some frames with the edges drawn in.
-pub fn pictures(report: &Report<'_>) -> Markup {
+pub fn images(report: &RunReport<'_>) -> Markup {
     html! {
-        @if !report.pictures.is_empty() {
+        @if !report.images.is_empty() {
             section {
                 h2 { "What the camera saw" }
                 (legend(&[
@@ -181,7 +181,7 @@ pub fn pictures(report: &Report<'_>) -> Markup {
                     ("gauge", palette::GAUGE, "dash"), ("gauge of a refused frame", palette::REJECTED, "dash"),
                 ]))
                 p.hint { "A click enlarges a picture; a click beside it puts it back." }
-                div.pictures { @for picture in report.pictures { figure tabindex="0" {
+                div.pictures { @for picture in report.images { figure tabindex="0" {
                     img alt=(format!("frame {}", picture.frame)) src=(data_uri(&picture.jpeg));
                     figcaption { b { "frame " (picture.frame) } " · " (picture.caption) }
                 } } }
@@ -195,7 +195,7 @@ fn data_uri(jpeg: &[u8]) -> String {
 }
 
 /// How good the pictures are.
-pub fn hints(report: &Report<'_>) -> Markup {
+pub fn image_quality(report: &RunReport<'_>) -> Markup {
     let charts = report.charts;
     let Some(range) = charts.contrast.extent() else { return html! {} };
     // Widths that were simulated without a picture have no hints.
@@ -204,21 +204,21 @@ pub fn hints(report: &Report<'_>) -> Markup {
     }
     let axis = if charts.timed == Some(true) { XAxis::time(range) } else { XAxis::frames(range) };
     // A steady hint is drawn as steady, not as its last digits.
-    let small = |series: &Series, least_top: f64, y_title: &str| {
+    let small = |series: &Curve, least_top: f64, y_title: &str| {
         let range = y_range(&[series], &[0.0]);
         Plot {
             area: Area::half(190.0),
             x: &axis,
             y_title,
             y_range: Range::new(range.min.max(0.0), range.max.max(least_top)),
-            layers: vec![Layer::Curve(series, palette::WIDTH)],
+            layers: vec![PlotLayer::Curve(series, palette::WIDTH)],
         }
         .draw()
     };
     html! {
         section {
             h2 { "How good the pictures are" }
-            (improvements(report.summary))
+            (advice(report.summary))
             p.hint { "Much contrast, little blur and noise and no saturation make a sure width. A \
                 slow drift tells of dust on the lens or of changing light." }
             div.pair {
@@ -234,8 +234,8 @@ pub fn hints(report: &Report<'_>) -> Markup {
 }
 
 /// What could be better about light and lens.
-fn improvements(summary: &Summary) -> Markup {
-    let bound = advice::row_bound_px(&summary.hints);
+fn advice(summary: &Summary) -> Markup {
+    let bound = advice::row_bound_px(&summary.image_quality);
     html! {
         @if !summary.advice.is_empty() {
             ul.advice { @for sentence in &summary.advice { li { (sentence) } } }
@@ -251,7 +251,7 @@ fn improvements(summary: &Summary) -> Markup {
 }
 
 /// How long a frame takes to become a setpoint.
-pub fn latency(report: &Report<'_>) -> Markup {
+pub fn latency(report: &RunReport<'_>) -> Markup {
     html! {
         @if let Some(latencies) = report.latencies.filter(|latencies| latencies.total() > 0) {
             section {
@@ -264,18 +264,18 @@ pub fn latency(report: &Report<'_>) -> Markup {
     }
 }
 
-fn refused(name: &str) -> Option<Ink> {
+fn rejected_ink(name: &str) -> Option<Ink> {
     (name != "ok").then_some(palette::REJECTED)
 }
 
-fn limit(name: &str) -> Option<Ink> {
+fn limit_ink(name: &str) -> Option<Ink> {
     (name != "none").then_some(palette::LIMIT)
 }
 
 fn strip_extent(strip: &Strip) -> Option<Range> {
-    Some(Range::new(strip.spells().first()?.from, strip.spells().last()?.to))
+    Some(Range::new(strip.segments().first()?.from, strip.segments().last()?.to))
 }
 
-fn spanned(extents: impl Iterator<Item = Option<Range>>) -> Option<Range> {
+fn joined(extents: impl Iterator<Item = Option<Range>>) -> Option<Range> {
     extents.flatten().reduce(Range::joined)
 }

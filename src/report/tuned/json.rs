@@ -35,13 +35,13 @@ impl Tuned {
                 "exponent": plant.exponent,
                 "offset_mm": plant.offset_mm,
                 "gauge_mm": plant.gauge_mm,
-                "noise_share": plant.scatter.each,
-                "roughness_share": plant.scatter.rough,
-                "drift_per_root_m": plant.scatter.drift,
+                "noise_share": plant.width_noise.per_width,
+                "roughness_share": plant.width_noise.roughness,
+                "drift_per_root_m": plant.width_noise.drift,
                 "robot": robot,
                 "timing": plant.timing,
-                "widths_used": plant.study.found.used,
-                "widths_left_out": plant.study.found.left_out,
+                "widths_used": plant.study.estimate.used,
+                "widths_left_out": plant.study.estimate.left_out,
             },
             "proposed": {
                 "distance": self.proposal.distance,
@@ -50,7 +50,7 @@ impl Tuned {
                 "ki_per_s2": self.proposal.pi.gains.ki_per_s2,
             },
             "loops": loops,
-            "foretold": { "settled_within_mm": self.band_mm, "laws": self.predictions, "told_wrong": self.misled },
+            "foretold": { "settled_within_mm": self.band_mm, "laws": self.predictions, "told_wrong": self.mismatched },
             "warnings": self.warnings(),
         });
         let mut text = format!("{all:#}");

@@ -4,17 +4,17 @@ use maud::{Markup, html};
 
 use super::Tuned;
 use super::text::margin_words;
-use crate::identify::camera_offset::Seen;
+use crate::identify::camera_offset::WidthAtSpeed;
 use crate::report::chart::area::{Area, XAxis};
 use crate::report::chart::legend::legend;
 use crate::report::chart::palette::{
-    CONTENDERS, Ink, LIMIT, MODEL, SETPOINT, SPEED, TARGET, WIDTH,
+    CONTROLLERS, Ink, LIMIT, MODEL, SETPOINT, SPEED, TARGET, WIDTH,
 };
-use crate::report::chart::plot::{Layer, Plot, y_range};
-use crate::report::chart::series::Series;
+use crate::report::chart::plot::{Plot, PlotLayer, y_range};
+use crate::report::chart::series::Curve;
 
 use crate::report::html::whole_page;
-use crate::tune::predict::{FLOW_STEP, Prediction, SEEDS};
+use crate::tune::predict::{BeadPrediction, FLOW_STEP, SEEDS};
 
 /// Time of the robot's answer that is shown about its steps \[s\].
 const SHOWN_S: f64 = 30.0;
@@ -35,7 +35,7 @@ impl Tuned {
             (self.bead())
             (self.robot())
             (self.margins())
-            (self.foretold())
+            (self.predicted())
             section {
                 h2 { "The lines" }
                 p.hint { "Nothing is applied. Copy these into the cell, or let " code { "--write" }
@@ -75,7 +75,7 @@ impl Tuned {
             section {
                 h2 { "What was found" }
                 p.hint { "± is one standard deviation." }
-                div.wide { table { tbody { @for (name, words) in self.found() {
+                div.wide { table { tbody { @for (name, words) in self.findings() {
                     tr { td { (name) } td { (words) } }
                 } } } }
             }
@@ -84,13 +84,13 @@ impl Tuned {
 
     fn bead(&self) -> Markup {
         let study = &self.plant.study;
-        let seen = |of: &dyn Fn(&Seen) -> f64| {
+        let seen = |of: &dyn Fn(&WidthAtSpeed) -> f64| {
             let offset = self.plant.offset_mm.value;
-            study.seen.iter().map(|seen| (seen.path_mm - offset, of(seen))).collect::<Series>()
+            study.widths.iter().map(|seen| (seen.path_mm - offset, of(seen))).collect::<Curve>()
         };
         let widths = seen(&|seen| seen.ln_width.exp());
-        let model = seen(&|seen| (seen.ln_width - study.left(seen)).exp());
-        let left = seen(&|seen| 100.0 * study.left(seen));
+        let model = seen(&|seen| (seen.ln_width - study.residual(seen)).exp());
+        let left = seen(&|seen| 100.0 * study.residual(seen));
         let speeds = seen(&|seen| seen.ln_speed.exp());
         let Some(range) = widths.extent() else { return html! {} };
         let axis = XAxis::path(range);
@@ -101,13 +101,13 @@ impl Tuned {
                     robot's speed there; and what is left of the widths." }
                 (legend(&[("measured width", WIDTH, ""), ("model", MODEL, "")]))
                 (plot(&axis, "width [mm]", 240.0, &[], vec![
-                    Layer::Data(&widths, WIDTH), Layer::Curve(&model, MODEL),
+                    PlotLayer::Data(&widths, WIDTH), PlotLayer::Curve(&model, MODEL),
                 ], &[&widths, &model]))
                 (plot(&axis, "robot's speed [mm/s]", 150.0, &[], vec![
-                    Layer::Curve(&speeds, SPEED),
+                    PlotLayer::Curve(&speeds, SPEED),
                 ], &[&speeds]))
                 (plot(&axis, "left [% of the width]", 150.0, &[0.0], vec![
-                    Layer::Curve(&left, WIDTH), Layer::Level(0.0, TARGET, ""),
+                    PlotLayer::Curve(&left, WIDTH), PlotLayer::Level(0.0, TARGET, ""),
                 ], &[&left]))
             }
         }
@@ -117,20 +117,20 @@ impl Tuned {
         let Some((begin, _)) = self.log.setpoints.first() else { return html! {} };
         let from = begin.secs();
         let within = |at: f64| (from..from + SHOWN_S).contains(&at);
-        let told = self.log.setpoints.iter().map(|(at, speed)| (at.secs(), speed.get()));
-        let told: Series = told.filter(|(at, _)| within(*at)).collect();
+        let setpoints = self.log.setpoints.iter().map(|(at, speed)| (at.secs(), speed.get()));
+        let setpoints: Curve = setpoints.filter(|(at, _)| within(*at)).collect();
         let reported = self.log.states.iter();
         let reported = reported.map(|(at, state)| (at.secs(), state.speed_mm_per_s.get()));
-        let reported: Series = reported.filter(|(at, _)| within(*at)).collect();
-        let Some(range) = told.extent() else { return html! {} };
+        let reported: Curve = reported.filter(|(at, _)| within(*at)).collect();
+        let Some(range) = setpoints.extent() else { return html! {} };
         let axis = XAxis::time(range);
         html! {
             section {
                 h2 { "The robot" }
                 (legend(&[("setpoint", SETPOINT, ""), ("reported speed", SPEED, "")]))
                 (plot(&axis, "speed [mm/s]", 220.0, &[], vec![
-                    Layer::Stairs(&told, SETPOINT), Layer::Curve(&reported, SPEED),
-                ], &[&told]))
+                    PlotLayer::Stairs(&setpoints, SETPOINT), PlotLayer::Curve(&reported, SPEED),
+                ], &[&setpoints]))
             }
         }
     }
@@ -145,7 +145,7 @@ impl Tuned {
                      to the edge: {:.3} mm for each mm/s, behind {:.3} s of dead time. The proposed \
                      gains are those of the rule AMIGO (Åström and Hägglund 2006). A loop is to \
                      have a gain margin of 2 and a phase margin of 45°.",
-                    at.speed_mm_per_s, at.gain_s, at.dead_s
+                    at.speed_mm_per_s, at.gain_s, at.dead_time_s
                 )) }
                 div.wide { table {
                     thead { tr {
@@ -164,23 +164,23 @@ impl Tuned {
         }
     }
 
-    fn foretold(&self) -> Markup {
-        let beads: Vec<Series> =
+    fn predicted(&self) -> Markup {
+        let beads: Vec<Curve> =
             self.predictions.iter().map(|one| one.bead.iter().copied().collect()).collect();
-        let speeds: Vec<Series> =
+        let speeds: Vec<Curve> =
             self.predictions.iter().map(|one| one.speed.iter().copied().collect()).collect();
-        let Some(range) = beads.iter().find_map(Series::extent) else { return html! {} };
+        let Some(range) = beads.iter().find_map(Curve::extent) else { return html! {} };
         let axis = XAxis::path(range);
         let names: Vec<_> = self
             .predictions
             .iter()
-            .zip(CONTENDERS)
+            .zip(CONTROLLERS)
             .map(|(one, ink)| (one.name.as_str(), ink, ""))
             .collect();
         let target = format!("{} mm", self.target_mm);
-        let level = [Layer::Level(self.target_mm, TARGET, &target)];
+        let level = [PlotLayer::Level(self.target_mm, TARGET, &target)];
         let bounds = [self.limits.min_speed.get(), self.limits.max_speed.get()];
-        let limits = bounds.map(|bound| Layer::Level(bound, LIMIT, ""));
+        let limits = bounds.map(|bound| PlotLayer::Level(bound, LIMIT, ""));
         html! {
             section {
                 h2 { "What is foretold" }
@@ -194,21 +194,21 @@ impl Tuned {
                 )) }
                 (legend(&names))
                 (plot(&axis, "width of the bead [mm]", 260.0, &[self.target_mm],
-                    curves(&beads, CONTENDERS).chain(level).collect(),
+                    curves(&beads, CONTROLLERS).chain(level).collect(),
                     &beads.iter().collect::<Vec<_>>()))
                 (plot(&axis, "robot's speed [mm/s]", 200.0, &bounds,
-                    curves(&speeds, CONTENDERS).chain(limits).collect(), &[]))
+                    curves(&speeds, CONTROLLERS).chain(limits).collect(), &[]))
                 (table("law", &self.predictions))
                 p.hint { "The law by distance has no gains that could swing. What stands for a \
                     margin is how far what it is told may be wrong:" }
-                (table("the law by distance", &self.misled))
+                (table("the law by distance", &self.mismatched))
             }
         }
     }
 }
 
-fn curves(of: &[Series], inks: [Ink; 6]) -> impl Iterator<Item = Layer<'_>> {
-    of.iter().zip(inks).map(|(one, ink)| Layer::Curve(one, ink))
+fn curves(of: &[Curve], inks: [Ink; 6]) -> impl Iterator<Item = PlotLayer<'_>> {
+    of.iter().zip(inks).map(|(one, ink)| PlotLayer::Curve(one, ink))
 }
 
 fn plot(
@@ -216,14 +216,14 @@ fn plot(
     title: &str,
     height: f64,
     shown: &[f64],
-    layers: Vec<Layer<'_>>,
-    ranged: &[&Series],
+    layers: Vec<PlotLayer<'_>>,
+    ranged: &[&Curve],
 ) -> Markup {
     let y_range = y_range(ranged, shown);
     Plot { area: Area::wide(height), x: axis, y_title: title, y_range, layers }.draw()
 }
 
-fn table(head: &str, of: &[Prediction]) -> Markup {
+fn table(head: &str, of: &[BeadPrediction]) -> Markup {
     let way = |way: Option<f64>| way.map_or("not".to_owned(), |mm| format!("{mm:.0}"));
     html! {
         div.wide { table {

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::Tuned;
 use crate::identify::camera_offset::SpeedRange;
-use crate::tune::predict::{FLOW_STEP, Prediction, SEEDS};
+use crate::tune::predict::{BeadPrediction, FLOW_STEP, SEEDS};
 use crate::tune::stability::LoopMargins;
 use crate::width_control::pi::PiGains;
 
@@ -12,7 +12,7 @@ impl Tuned {
     /// All that was found, foretold and proposed.
     pub fn plain(&self) -> String {
         let mut text = String::new();
-        for (name, words) in self.found() {
+        for (name, words) in self.findings() {
             // Writing to a string cannot fail.
             let _ = writeln!(text, "{name:<10} {words}");
         }
@@ -26,10 +26,10 @@ impl Tuned {
     }
 
     /// What was found, by name and in words.
-    pub fn found(&self) -> Vec<(&'static str, String)> {
+    pub fn findings(&self) -> Vec<(&'static str, String)> {
         let plant = &self.plant;
         let (width, exponent, offset) = (plant.width_mm, plant.exponent, plant.offset_mm);
-        let SpeedRange { min: from, max: to } = plant.study.found.speeds;
+        let SpeedRange { min: from, max: to } = plant.study.estimate.speeds;
         vec![
             (
                 "bead",
@@ -46,7 +46,7 @@ impl Tuned {
                 "offset",
                 format!(
                     "{:.2} ± {:.2} mm from the nozzle to the middle of the gauge (cell: {})",
-                    offset.value, offset.sigma, self.offset_now_mm.0
+                    offset.value, offset.sigma, self.present_offset_mm.0
                 ),
             ),
             ("speed", format!("{:.1} to {:.1} mm/s while it was laid", from.get(), to.get())),
@@ -58,27 +58,30 @@ impl Tuned {
                 "widths",
                 format!(
                     "{} used, {} left out, {} frames refused; {:.2} % RMS off that bead",
-                    plant.study.found.used,
-                    plant.study.found.left_out,
+                    plant.study.estimate.used,
+                    plant.study.estimate.left_out,
                     self.log.refused,
-                    100.0 * plant.study.found.scatter
+                    100.0 * plant.study.estimate.residual_rms
                 ),
             ),
         ]
     }
 
     fn noise_words(&self) -> String {
-        let (width, scatter) = (self.plant.width_mm.value, &self.plant.scatter);
-        let rough = if scatter.rough > 0.0 {
-            format!("the bead is rough by {:.3} mm in means over the gauge", scatter.rough * width)
+        let (width, scatter) = (self.plant.width_mm.value, &self.plant.width_noise);
+        let rough = if scatter.roughness > 0.0 {
+            format!(
+                "the bead is rough by {:.3} mm in means over the gauge",
+                scatter.roughness * width
+            )
         } else {
             "no roughness seen beyond it".to_owned()
         };
         format!(
             "{:.3} ± {:.3} mm from width to width ({:.2} %); {rough}",
             self.plant.noise_mm(),
-            scatter.each.sigma * width,
-            100.0 * scatter.each.value
+            scatter.per_width.sigma * width,
+            100.0 * scatter.per_width.value
         )
     }
 
@@ -93,7 +96,7 @@ impl Tuned {
                 robot
                     .slope_mm_per_s2
                     .map_or(String::new(), |slope| { format!(", at {slope:.0} mm/s² at most") }),
-                robot.left_mm_per_s
+                robot.residual_mm_per_s
             ),
             Err(error) => error.to_string(),
         }
@@ -116,7 +119,7 @@ impl Tuned {
     /// Names, gains and margins of the PI laws, each at the worst speed and at that of
     /// the target.
     pub fn loops(&self) -> Vec<(String, PiGains, Option<LoopMargins>)> {
-        let now = self.gains_now.iter().map(|(gains, _)| ("now", *gains));
+        let now = self.present_gains.iter().map(|(gains, _)| ("now", *gains));
         let laws = now.chain([("proposed", self.proposal.pi.gains)]);
         let each = laws.flat_map(|(name, gains)| {
             [self.proposal.pi.at, self.usual].map(|at| {
@@ -133,7 +136,7 @@ impl Tuned {
             text,
             "PI loop at {} mm/s, the worst of [limits]: {:.3} mm/(mm/s) behind {:.3} s of dead time; \
              {} mm is laid at {:.0} mm/s",
-            at.speed_mm_per_s, at.gain_s, at.dead_s, self.target_mm, self.usual.speed_mm_per_s
+            at.speed_mm_per_s, at.gain_s, at.dead_time_s, self.target_mm, self.usual.speed_mm_per_s
         );
         let _ = writeln!(
             text,
@@ -167,7 +170,7 @@ impl Tuned {
             row(text, one);
         }
         let _ = writeln!(text, "by distance, told wrong");
-        for one in &self.misled {
+        for one in &self.mismatched {
             row(text, one);
         }
     }
@@ -198,7 +201,7 @@ impl Tuned {
     }
 }
 
-fn row(text: &mut String, one: &Prediction) {
+fn row(text: &mut String, one: &BeadPrediction) {
     let way = |way: Option<f64>| way.map_or("not".to_owned(), |mm| format!("{mm:.0} mm"));
     let (fast, slow) = one.speeds_mm_per_s;
     let _ = writeln!(
@@ -214,7 +217,7 @@ fn row(text: &mut String, one: &Prediction) {
 }
 
 /// A margin that may have no end.
-fn told(margin: f64, words: impl Fn(f64) -> String) -> String {
+fn with_unit(margin: f64, words: impl Fn(f64) -> String) -> String {
     if margin.is_finite() { words(margin) } else { "no end".to_owned() }
 }
 
@@ -227,8 +230,8 @@ pub fn margin_words(margins: Option<LoopMargins>) -> [String; 4] {
     }
     [
         format!("{:.2}", margins.gain),
-        told(margins.phase_deg, |phase| format!("{phase:.0}°")),
-        told(margins.delay_s, |delay| format!("{delay:.2} s")),
+        with_unit(margins.phase_deg, |phase| format!("{phase:.0}°")),
+        with_unit(margins.delay_s, |delay| format!("{delay:.2} s")),
         margins.sensitivity.map_or("–".to_owned(), |most| format!("{most:.2}")),
     ]
 }

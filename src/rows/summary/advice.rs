@@ -6,38 +6,38 @@
 //! held against one with 80 grey levels of contrast, 4 of noise and a blur of
 //! 1.5 px, for which the table of accuracy holds.
 
-use super::image_quality::HintSummary;
+use super::image_quality::ImageQuality;
 
-const CONTRAST_GREY: f64 = 80.0;
-const NOISE_GREY: f64 = 4.0;
-const BLUR_PX: f64 = 1.5;
+const REFERENCE_CONTRAST_GREY: f64 = 80.0;
+const REFERENCE_NOISE_GREY: f64 = 4.0;
+const REFERENCE_BLUR_PX: f64 = 1.5;
 /// Advice is given where it would make widths surer by this factor.
-const WORTH: f64 = 1.5;
+const MIN_GAIN_OF_ADVICE: f64 = 1.5;
 /// Contrast below which shadows, stains and texture of a few grey levels bend
 /// an edge, whatever the noise.
-const FAINT_GREY: f64 = 25.0;
+const MIN_CONTRAST_GREY: f64 = 25.0;
 /// Blur up to which the limits of accuracy are held.
-const SOFT_PX: f64 = 3.2;
+const MAX_BLUR_PX: f64 = 3.2;
 /// Blur, the pixels' own included, below which an edge falls between pixels.
-const SHARP_PX: f64 = 0.55;
+const MIN_BLUR_PX: f64 = 0.55;
 /// Two steps are told apart from so many blurs on.
-const APART: f64 = 4.0;
+const RESOLVED_AT_BLURS: f64 = 4.0;
 /// Saturated share of the gauge from which the bead itself is cut off: noise
 /// alone does that where the bead is two of its standard deviations below the
 /// end of the scale.
-const CUT_OFF_SHARE: f64 = 0.01;
+const CLIPPED_FRACTION: f64 = 0.01;
 /// Share of the rows below which something covers the edges.
-const COVERED_SHARE: f64 = 0.9;
+const MIN_USED_FRACTION: f64 = 0.9;
 /// Offset of widths by skewed flanks that is worth a word \[px\], and the standard
 /// deviations by which it has to be sure: one run in 10,000 without a skew has as much.
-const SKEWED_PX: f64 = 0.05;
+const MIN_SKEW_PX: f64 = 0.05;
 const SKEW_SIGMAS: f64 = 4.0;
 
 /// One sentence for each thing to improve, the worst for the width first; none
 /// where nothing is known.
-pub fn advice(hints: &HintSummary) -> Vec<String> {
+pub fn advice(hints: &ImageQuality) -> Vec<String> {
     let mut advice = Vec::new();
-    advice.extend(hints.saturated_share_mean.and_then(on_saturation));
+    advice.extend(hints.saturated_fraction_mean.and_then(on_saturation));
     let known = |value: Option<f64>| value.filter(|value| *value > 0.0);
     let (contrast, noise) = (known(hints.contrast_median_grey), known(hints.noise_median_grey));
     if let (Some(contrast), Some(noise)) = (contrast, noise) {
@@ -45,14 +45,14 @@ pub fn advice(hints: &HintSummary) -> Vec<String> {
         advice.extend(on_noise(contrast, noise));
     }
     advice.extend(known(hints.blur_median_px).and_then(on_blur));
-    advice.extend(hints.used_share_mean.and_then(on_rows));
+    advice.extend(hints.used_fraction_mean.and_then(on_rows));
     let skew = hints.skew_offset_px.zip(hints.skew_offset_sigma_px);
     advice.extend(skew.and_then(|(offset, sigma)| on_skew(offset, sigma)));
     advice
 }
 
 /// Smallest possible standard deviation of an edge in one row \[px\].
-pub fn row_bound_px(hints: &HintSummary) -> Option<f64> {
+pub fn row_bound_px(hints: &ImageQuality) -> Option<f64> {
     let (contrast, noise) = (hints.contrast_median_grey?, hints.noise_median_grey?);
     let blur = hints.blur_median_px?;
     let root = (2.0 * std::f64::consts::PI.sqrt()).sqrt();
@@ -60,7 +60,7 @@ pub fn row_bound_px(hints: &HintSummary) -> Option<f64> {
 }
 
 fn on_saturation(share: f64) -> Option<String> {
-    (share > CUT_OFF_SHARE).then(|| {
+    (share > CLIPPED_FRACTION).then(|| {
         format!(
             "{:.0} % of the gauge's pixels are saturated: shorten the exposure, or turn the light \
              out of the mirror direction. What is cut off moves the edges, and sigma does not \
@@ -71,13 +71,14 @@ fn on_saturation(share: f64) -> Option<String> {
 }
 
 /// How many times surer widths were with the reference's contrast and noise.
-fn lost(contrast: f64, noise: f64) -> f64 {
-    (noise / contrast) / (NOISE_GREY / CONTRAST_GREY)
+fn precision_lost(contrast: f64, noise: f64) -> f64 {
+    (noise / contrast) / (REFERENCE_NOISE_GREY / REFERENCE_CONTRAST_GREY)
 }
 
 fn on_contrast(contrast: f64, noise: f64) -> Option<String> {
-    let low = contrast < CONTRAST_GREY / WORTH && lost(contrast, noise) > WORTH;
-    (low || contrast < FAINT_GREY).then(|| {
+    let low = contrast < REFERENCE_CONTRAST_GREY / MIN_GAIN_OF_ADVICE
+        && precision_lost(contrast, noise) > MIN_GAIN_OF_ADVICE;
+    (low || contrast < MIN_CONTRAST_GREY).then(|| {
         format!(
             "Contrast {contrast:.0} grey levels of 256: light the bead more from the side, or \
              measure another colour channel. Twice the contrast halves the scatter of the widths, \
@@ -87,8 +88,9 @@ fn on_contrast(contrast: f64, noise: f64) -> Option<String> {
 }
 
 fn on_noise(contrast: f64, noise: f64) -> Option<String> {
-    let by_contrast_alone = contrast < CONTRAST_GREY / WORTH && noise <= NOISE_GREY * WORTH;
-    (lost(contrast, noise) > WORTH && !by_contrast_alone).then(|| {
+    let by_contrast_alone = contrast < REFERENCE_CONTRAST_GREY / MIN_GAIN_OF_ADVICE
+        && noise <= REFERENCE_NOISE_GREY * MIN_GAIN_OF_ADVICE;
+    (precision_lost(contrast, noise) > MIN_GAIN_OF_ADVICE && !by_contrast_alone).then(|| {
         format!(
             "Noise {noise:.1} grey levels: more light or a longer exposure in place of gain. Half \
              the noise halves the scatter of the widths."
@@ -97,28 +99,28 @@ fn on_noise(contrast: f64, noise: f64) -> Option<String> {
 }
 
 fn on_blur(blur: f64) -> Option<String> {
-    if blur < SHARP_PX {
+    if blur < MIN_BLUR_PX {
         return Some(format!(
             "Blur {blur:.1} px: the lens is sharper than the pixels, so that the place of an edge \
              within a pixel is not seen, and sigma is too small. Put it out of focus a little, to \
              0.8 px or more."
         ));
     }
-    (blur > SOFT_PX).then(|| {
+    (blur > MAX_BLUR_PX).then(|| {
         format!(
             "Blur {blur:.1} px: refocus on the top edges of the bead, or shorten the exposure if \
-             it smears (torn edges look blurred in focus as well). At {BLUR_PX} px widths of a \
+             it smears (torn edges look blurred in focus as well). At {REFERENCE_BLUR_PX} px widths of a \
              smooth bead would scatter {:.0} % less, and a shadow be told from an edge {:.0} px \
              away, not only {:.0} px.",
-            (1.0 - (BLUR_PX / blur).sqrt()) * 100.0,
-            APART * BLUR_PX,
-            APART * blur
+            (1.0 - (REFERENCE_BLUR_PX / blur).sqrt()) * 100.0,
+            RESOLVED_AT_BLURS * REFERENCE_BLUR_PX,
+            RESOLVED_AT_BLURS * blur
         )
     })
 }
 
 fn on_rows(share: f64) -> Option<String> {
-    (share < COVERED_SHARE).then(|| {
+    (share < MIN_USED_FRACTION).then(|| {
         format!(
             "Only {:.0} % of the rows show the edges: look at the pictures for grains, glare and \
              shadows on them.",
@@ -128,7 +130,7 @@ fn on_rows(share: f64) -> Option<String> {
 }
 
 fn on_skew(offset: f64, sigma: f64) -> Option<String> {
-    let is_sure = offset.abs() > SKEWED_PX && offset.abs() > SKEW_SIGMAS * sigma;
+    let is_sure = offset.abs() > MIN_SKEW_PX && offset.abs() > SKEW_SIGMAS * sigma;
     is_sure.then(|| {
         let way = if offset > 0.0 { "wide" } else { "narrow" };
         format!(
@@ -145,19 +147,19 @@ fn on_skew(offset: f64, sigma: f64) -> Option<String> {
 mod tests {
     use super::*;
 
-    fn hints(contrast: f64, noise: f64, blur: f64, saturated: f64, used: f64) -> HintSummary {
-        HintSummary {
+    fn hints(contrast: f64, noise: f64, blur: f64, saturated: f64, used: f64) -> ImageQuality {
+        ImageQuality {
             contrast_median_grey: Some(contrast),
             blur_median_px: Some(blur),
             noise_median_grey: Some(noise),
-            saturated_share_mean: Some(saturated),
-            used_share_mean: Some(used),
+            saturated_fraction_mean: Some(saturated),
+            used_fraction_mean: Some(used),
             skew_offset_px: Some(0.01),
             skew_offset_sigma_px: Some(0.001),
         }
     }
 
-    fn begins(hints: &HintSummary, expected: &[&str]) {
+    fn begins(hints: &ImageQuality, expected: &[&str]) {
         let advice = advice(hints);
         assert_eq!(advice.len(), expected.len(), "{advice:?}");
         for (sentence, begin) in advice.iter().zip(expected) {
@@ -189,7 +191,7 @@ mod tests {
 
     #[test]
     fn skewed_flanks_are_told_where_they_are_sure_and_matter() {
-        let skewed = |offset: f64, sigma: f64| HintSummary {
+        let skewed = |offset: f64, sigma: f64| ImageQuality {
             skew_offset_px: Some(offset),
             skew_offset_sigma_px: Some(sigma),
             ..hints(80.0, 4.0, 1.5, 0.0, 1.0)
@@ -207,12 +209,12 @@ mod tests {
 
     #[test]
     fn what_is_not_known_gives_no_advice() {
-        let nothing = HintSummary {
+        let nothing = ImageQuality {
             contrast_median_grey: None,
             blur_median_px: None,
             noise_median_grey: None,
-            saturated_share_mean: None,
-            used_share_mean: None,
+            saturated_fraction_mean: None,
+            used_fraction_mean: None,
             skew_offset_px: None,
             skew_offset_sigma_px: None,
         };

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::follow::{Follower, Lapse};
-use super::note::Note;
+use super::follow::{Interval, StateFollower};
+use super::note::RunNote;
 use crate::control::event::Event;
 use crate::control::step::{State, Step};
 use crate::core::time::{Span, Stamp};
@@ -13,7 +13,7 @@ use crate::core::units::Mm;
 use crate::numeric::statistics::{Distribution, Moments};
 use crate::rows::frame_row::FrameRow;
 use crate::rows::names;
-use crate::width_control::limiter::Limit;
+use crate::width_control::limiter::SpeedLimit;
 
 /// Path length after the start of control from which the bead counts as
 /// settled.
@@ -30,7 +30,7 @@ pub struct ControlSummary {
     pub width_error_rms_settled_mm: Option<f64>,
     /// The largest error of the bead laid after control began, with its sign, and where on
     /// the robot's path that bead lies.
-    pub width_error_worst: Option<Worst>,
+    pub width_error_worst: Option<LargestError>,
     /// Setpoints that were written to the robot.
     pub setpoints_sent: u64,
     /// Time during which a limit shaped the speed.
@@ -67,7 +67,7 @@ pub struct ControlSummary {
 
 /// A width that is further off than all others.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Worst {
+pub struct LargestError {
     /// Measured less wanted \[mm\].
     pub error_mm: f64,
     /// Robot's path of the bead that it shows \[mm\].
@@ -98,12 +98,12 @@ impl Quantiles {
 /// Adds up what control did.
 #[derive(Debug, Default)]
 pub struct ControlTally {
-    follower: Follower,
-    began: Began,
+    follower: StateFollower,
+    began: ControlBegan,
     error: Moments,
     error_size: Moments,
     error_settled: Moments,
-    worst: Option<Worst>,
+    worst: Option<LargestError>,
     limited_by: Times,
     held_for: Times,
     states: Times,
@@ -119,7 +119,7 @@ pub struct ControlTally {
 
 /// Where on the path of the present bead control began.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-enum Began {
+enum ControlBegan {
     #[default]
     NotYet,
     At(Mm),
@@ -132,8 +132,8 @@ impl ControlTally {
     pub fn frame(&mut self, row: &FrameRow) {
         let (Ok(measured), Some(control)) = (&row.outcome, row.control) else { return };
         let Some(target) = control.target else { return };
-        let (Began::At(began) | Began::Over(began)) = self.began else { return };
-        let Some(bead) = control.bead_path.filter(|bead| *bead >= began) else { return };
+        let (ControlBegan::At(began) | ControlBegan::Over(began)) = self.began else { return };
+        let Some(bead) = control.measured_path.filter(|bead| *bead >= began) else { return };
         // A robot that is not printing shows the camera the same bead again
         // and again.
         if control.state == State::Idle.name() {
@@ -143,7 +143,7 @@ impl ControlTally {
         self.error.add(error.get());
         self.error_size.add(error.get().abs());
         if self.worst.is_none_or(|worst| error.get().abs() > worst.error_mm.abs()) {
-            self.worst = Some(Worst { error_mm: error.get(), bead_path_mm: bead.get() });
+            self.worst = Some(LargestError { error_mm: error.get(), bead_path_mm: bead.get() });
         }
         if bead > began + SETTLED_AFTER {
             self.error_settled.add(error.get());
@@ -156,7 +156,7 @@ impl ControlTally {
         }
         let before = self.follower.state().clone();
         if let Some(lapse) = self.follower.step(now, event, step) {
-            self.spend(&lapse);
+            self.add_time(&lapse);
         }
         if let State::Fault(why) = &step.state
             && !matches!(before, State::Fault(_))
@@ -164,11 +164,11 @@ impl ControlTally {
             *self.fault_reasons.entry(names::fault(why)).or_default() += 1;
         }
         self.began = match (&step.state, self.began) {
-            (State::Priming, _) => Began::NotYet,
-            (State::Idle, Began::At(path)) => Began::Over(path),
-            (State::Tracking, Began::NotYet | Began::Over(_)) => {
+            (State::Priming, _) => ControlBegan::NotYet,
+            (State::Idle, ControlBegan::At(path)) => ControlBegan::Over(path),
+            (State::Tracking, ControlBegan::NotYet | ControlBegan::Over(_)) => {
                 let path = self.follower.path().or(step.trace.nozzle_path_mm);
-                path.map_or(Began::NotYet, Began::At)
+                path.map_or(ControlBegan::NotYet, ControlBegan::At)
             }
             (_, began) => began,
         };
@@ -179,13 +179,13 @@ impl ControlTally {
         self.send_wait.add(send_wait_ms);
     }
 
-    pub fn note(&mut self, note: &Note) {
+    pub fn note(&mut self, note: &RunNote) {
         match note {
-            Note::SetpointSent => self.setpoints += 1,
-            Note::FramesSuperseded(more) => self.superseded += more,
-            Note::FramesDroppedByRecorder(more) => self.dropped += more,
-            Note::RecordsLost(more) => self.records_lost += more,
-            Note::Remark(_) => {}
+            RunNote::SetpointSent => self.setpoints += 1,
+            RunNote::FramesSuperseded(more) => self.superseded += more,
+            RunNote::FramesDroppedByRecorder(more) => self.dropped += more,
+            RunNote::RecordsLost(more) => self.records_lost += more,
+            RunNote::Remark(_) => {}
         }
     }
 
@@ -217,13 +217,13 @@ impl ControlTally {
         }
     }
 
-    fn spend(&mut self, lapse: &Lapse) {
-        spend(&mut self.states, lapse.state.name(), lapse.span);
+    fn add_time(&mut self, lapse: &Interval) {
+        add_time(&mut self.states, lapse.state.name(), lapse.span);
         if let State::Holding(why) = &lapse.state {
-            spend(&mut self.held_for, names::hold(why), lapse.span);
+            add_time(&mut self.held_for, names::hold(why), lapse.span);
         }
-        if lapse.limit != Limit::None {
-            spend(&mut self.limited_by, names::limit(lapse.limit), lapse.span);
+        if lapse.limit != SpeedLimit::None {
+            add_time(&mut self.limited_by, names::limit(lapse.limit), lapse.span);
         }
     }
 }
@@ -231,7 +231,7 @@ impl ControlTally {
 /// Time for each reason, summed without rounding.
 type Times = BTreeMap<&'static str, Span>;
 
-fn spend(times: &mut Times, reason: &'static str, span: Span) {
+fn add_time(times: &mut Times, reason: &'static str, span: Span) {
     let sum = times.entry(reason).or_default();
     *sum = *sum + span;
 }

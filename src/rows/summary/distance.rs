@@ -3,20 +3,20 @@
 use serde::Serialize;
 
 use crate::control::step::Step;
-use crate::width_control::distance::Use;
-use crate::width_control::{DistanceTrace, Distrust};
+use crate::width_control::distance::WidthUse;
+use crate::width_control::{DistanceTrace, FallbackReason};
 
 /// Widths by what became of them, and what was believed at last.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DistanceSummary {
     /// Widths that were taken.
-    pub taken: u64,
+    pub samples_used: u64,
     /// Widths that were left as outliers.
     pub outliers: u64,
     /// Changes of the flow that were found.
     pub changes: u64,
     /// Widths of bead whose speed was not known.
-    pub not_paired: u64,
+    pub without_speed_history: u64,
     /// Width at the start speed \[mm\].
     pub level_mm: f64,
     /// Its standard deviation \[mm\].
@@ -28,23 +28,24 @@ pub struct DistanceSummary {
     /// Period of a pulsation, where one was seen \[s\].
     pub pulsation_s: Option<f64>,
     /// Why the PI law took over, if it did.
-    pub fallback: Option<Distrust>,
+    pub fallback_reason: Option<FallbackReason>,
 }
 
 impl DistanceSummary {
     /// In a sentence or two.
     pub fn words(&self) -> String {
-        let Self { taken, outliers, changes, level_mm, exponent, offset_mm, .. } = self;
+        let Self { samples_used: taken, outliers, changes, level_mm, exponent, offset_mm, .. } =
+            self;
         let pulsation = self.pulsation_s.map_or(String::new(), |period| {
             format!(" The flow pulsates with a period of {period:.2} s.")
         });
-        let fallback = self.fallback.map_or("", |why| match why {
-            Distrust::NoPath => " The PI law took over: the robot reports no path.",
-            Distrust::Unpaired => {
+        let fallback = self.fallback_reason.map_or("", |why| match why {
+            FallbackReason::NoPath => " The PI law took over: the robot reports no path.",
+            FallbackReason::Unmatched => {
                 " The PI law took over: the bead under the camera is none whose speed is known; is \
                  offset_mm right?"
             }
-            Distrust::ModelContradicted => {
+            FallbackReason::ModelContradicted => {
                 " The PI law took over: the width did not answer the speed as the model says."
             }
         });
@@ -61,7 +62,7 @@ impl DistanceSummary {
 pub struct DistanceTally {
     counts: [u64; 4],
     last: Option<DistanceTrace>,
-    fallback: Option<Distrust>,
+    fallback: Option<FallbackReason>,
 }
 
 impl DistanceTally {
@@ -70,10 +71,10 @@ impl DistanceTally {
         self.fallback = self.fallback.or(step.trace.fallback);
         let Some(trace) = step.trace.distance else { return };
         let which = match trace.use_of_width {
-            Use::Taken => 0,
-            Use::Outlier => 1,
-            Use::Change => 2,
-            Use::NotPaired => 3,
+            WidthUse::Taken => 0,
+            WidthUse::Outlier => 1,
+            WidthUse::Change => 2,
+            WidthUse::NotMatched => 3,
         };
         self.counts[which] += 1;
         self.last = Some(trace);
@@ -84,16 +85,16 @@ impl DistanceTally {
         let last = self.last?;
         let [taken, outliers, changes, not_paired] = self.counts;
         Some(DistanceSummary {
-            taken,
+            samples_used: taken,
             outliers,
             changes,
-            not_paired,
+            without_speed_history: not_paired,
             level_mm: last.level_mm.get(),
             level_sigma_mm: last.level_sigma_mm.get(),
             exponent: last.exponent,
             offset_mm: last.offset_mm.get(),
             pulsation_s: last.pulsation_s,
-            fallback: self.fallback,
+            fallback_reason: self.fallback,
         })
     }
 }

@@ -94,7 +94,7 @@ pub struct ExtruderTally {
 
 impl ExtruderTally {
     /// A profile of this length is played.
-    pub fn plays(&mut self, lasts: Option<Span>) {
+    pub fn set_profile(&mut self, lasts: Option<Span>) {
         self.profile = lasts.map(ProfileTally::new);
     }
 
@@ -107,7 +107,7 @@ impl ExtruderTally {
         let Some(side) = &step.extruder else { return };
         self.commands += u64::from(side.command.is_some());
         if let Some((since, state, limit)) = self.last {
-            self.spend(now - since, state, limit);
+            self.add_time(now - since, state, limit);
         }
         if let ExtruderState::Fault(why) = side.state
             && self.last.is_none_or(|(_, last, _)| last != side.state)
@@ -152,14 +152,14 @@ impl ExtruderTally {
         })
     }
 
-    fn spend(&mut self, span: Span, state: ExtruderState, limit: CommandLimit) {
+    fn add_time(&mut self, span: Span, state: ExtruderState, limit: CommandLimit) {
         let add = |times: &mut BTreeMap<&'static str, Span>, name| {
             let sum = times.entry(name).or_default();
             *sum = *sum + span;
         };
         add(&mut self.states, state.name());
         if let Some(profile) = &mut self.profile {
-            profile.spend(span, state);
+            profile.add_time(span, state);
         }
         if let ExtruderState::Holding(why) = state {
             add(&mut self.held_for, names::extruder_hold(why));

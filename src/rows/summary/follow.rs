@@ -5,35 +5,35 @@ use crate::control::event::Event;
 use crate::control::step::{Command, State, Step};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
-use crate::width_control::limiter::Limit;
+use crate::width_control::limiter::SpeedLimit;
 
 /// Where a run stands after the steps that it has seen.
 #[derive(Debug, Default)]
-pub struct Follower {
+pub struct StateFollower {
     now: Option<Stamp>,
     state: State,
-    limit: Limit,
+    limit: SpeedLimit,
     path: Option<Mm>,
     setpoint: Option<MmPerS>,
 }
 
 /// The time between two steps, and how it was spent.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Lapse {
+pub struct Interval {
     /// How long it lasted.
     pub span: Span,
     /// The state during it.
     pub state: State,
     /// The limit that acted during it.
-    pub limit: Limit,
+    pub limit: SpeedLimit,
 }
 
-impl Follower {
+impl StateFollower {
     /// Takes the next step and tells of the time before it; nothing is before
     /// the first. A limit acts from the step that names it to the next
     /// setpoint without it.
-    pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) -> Option<Lapse> {
-        let lapse = self.now.map(|then| Lapse {
+    pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) -> Option<Interval> {
+        let lapse = self.now.map(|then| Interval {
             span: (now - then).max(Span::ZERO),
             state: self.state.clone(),
             limit: self.limit,
@@ -48,12 +48,12 @@ impl Follower {
                 self.setpoint = Some(speed);
                 self.limit = step.trace.limit;
             }
-            Some(Command::Stop) => self.limit = Limit::None,
-            None if step.trace.limit != Limit::None => self.limit = step.trace.limit,
+            Some(Command::Stop) => self.limit = SpeedLimit::None,
+            None if step.trace.limit != SpeedLimit::None => self.limit = step.trace.limit,
             None => {}
         }
         if matches!(step.state, State::Idle | State::Fault(_)) {
-            self.limit = Limit::None;
+            self.limit = SpeedLimit::None;
         }
         lapse
     }
@@ -64,7 +64,7 @@ impl Follower {
     }
 
     /// The limit that acts after the last step.
-    pub fn limit(&self) -> Limit {
+    pub fn limit(&self) -> SpeedLimit {
         self.limit
     }
 

@@ -2,7 +2,7 @@
 
 /// A fact that neither a frame nor a step tells.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Note {
+pub enum RunNote {
     /// A setpoint was written to the robot.
     SetpointSent,
     /// Frames that were never looked at, because a newer one was there.

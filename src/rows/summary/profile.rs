@@ -10,31 +10,31 @@ use crate::extruder::ExtruderState;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ProfileSummary {
     /// How long the profile is.
-    pub lasts_s: f64,
+    pub duration_s: f64,
     /// Share of it that was played, on the bead with the least of it.
-    pub played_share: f64,
+    pub played_fraction: f64,
     /// Time for which bead was laid after its end.
-    pub outlasted_s: f64,
+    pub after_end_s: f64,
 }
 
 /// Adds up how long the profile was played on each bead.
 #[derive(Debug, Clone, Copy)]
 pub struct ProfileTally {
-    lasts: Span,
+    duration: Span,
     /// On the present bead.
     played: Option<Span>,
-    least: Option<Span>,
-    outlasted: Span,
+    min_played: Option<Span>,
+    after_end: Span,
 }
 
 impl ProfileTally {
     pub const fn new(lasts: Span) -> Self {
-        Self { lasts, played: None, least: None, outlasted: Span::ZERO }
+        Self { duration: lasts, played: None, min_played: None, after_end: Span::ZERO }
     }
 
     /// The extruder side was in a state for a while. A profile waits while the
     /// last command is kept.
-    pub fn spend(&mut self, span: Span, state: ExtruderState) {
+    pub fn add_time(&mut self, span: Span, state: ExtruderState) {
         match state {
             ExtruderState::Off | ExtruderState::Ending | ExtruderState::Fault(_) => {
                 self.end_bead();
@@ -51,18 +51,22 @@ impl ProfileTally {
 
     fn end_bead(&mut self) {
         let Some(played) = self.played.take() else { return };
-        self.least = Some(self.least.map_or(played, |least| least.min(played)));
-        if played > self.lasts {
-            self.outlasted = self.outlasted + (played - self.lasts);
+        self.min_played = Some(self.min_played.map_or(played, |least| least.min(played)));
+        if played > self.duration {
+            self.after_end = self.after_end + (played - self.duration);
         }
     }
 
     /// None where no bead was laid.
     pub fn finish(mut self) -> Option<ProfileSummary> {
         self.end_bead();
-        let lasts_s = self.lasts.secs();
-        let played_share = (self.least?.secs() / lasts_s).min(1.0);
-        Some(ProfileSummary { lasts_s, played_share, outlasted_s: self.outlasted.secs() })
+        let lasts_s = self.duration.secs();
+        let played_share = (self.min_played?.secs() / lasts_s).min(1.0);
+        Some(ProfileSummary {
+            duration_s: lasts_s,
+            played_fraction: played_share,
+            after_end_s: self.after_end.secs(),
+        })
     }
 }
 
@@ -85,10 +89,10 @@ mod tests {
             (1.0, ExtruderState::Off),
             (4.0, ExtruderState::Running),
         ] {
-            tally.spend(Span::from_secs(secs), state);
+            tally.add_time(Span::from_secs(secs), state);
         }
         let found = tally.finish().unwrap();
-        assert!((found.played_share - 0.4).abs() < 1e-9, "{found:?}");
-        assert!((found.outlasted_s - 2.0).abs() < 1e-9, "{found:?}");
+        assert!((found.played_fraction - 0.4).abs() < 1e-9, "{found:?}");
+        assert!((found.after_end_s - 2.0).abs() < 1e-9, "{found:?}");
     }
 }

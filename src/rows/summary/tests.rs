@@ -3,7 +3,7 @@ use crate::control::step::{Command, Fault, Hold, State, Trace};
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::units::MmPerS;
 use crate::rows::frame_row::{ControlColumns, sample};
-use crate::width_control::limiter::Limit;
+use crate::width_control::limiter::SpeedLimit;
 
 const TARGET: Mm = Mm::constant(42.0);
 
@@ -22,7 +22,7 @@ fn robot(path: f64) -> Event {
     })
 }
 
-fn step(state: State, limit: Limit) -> Step {
+fn step(state: State, limit: SpeedLimit) -> Step {
     Step {
         command: Some(Command::Speed(MmPerS::constant(100.0))),
         state,
@@ -39,12 +39,12 @@ fn row(width: f64, bead_path: f64, state: &'static str) -> FrameRow {
         roughness: None,
         control: Some(ControlColumns {
             bead_expected: true,
-            bead_path: Some(Mm::new(bead_path).unwrap()),
+            measured_path: Some(Mm::new(bead_path).unwrap()),
             nozzle_path: None,
             speed: None,
             setpoint: None,
             state,
-            limit: Limit::None,
+            limit: SpeedLimit::None,
             target: Some(Mm::constant(42.0)),
         }),
     }
@@ -66,7 +66,7 @@ fn widths_and_rejections_add_up() {
     let summary = builder.finish();
     assert_eq!((summary.frames, summary.measured), (6, 3));
     assert_eq!(summary.rejected, BTreeMap::from([("no_pair", 2), ("saturated", 1)]));
-    assert!((summary.rejected_share() - 0.5).abs() < 1e-12);
+    assert!((summary.rejected_fraction() - 0.5).abs() < 1e-12);
     assert!((summary.width_mean_mm.unwrap() - 42.0).abs() < 1e-12);
     assert!((summary.width_std_mm.unwrap() - 2.0).abs() < 1e-12);
     assert_eq!(summary.sigma_mean_mm, Some(0.5));
@@ -77,9 +77,9 @@ fn widths_and_rejections_add_up() {
 #[test]
 fn only_bead_laid_under_control_counts_for_the_error() {
     let mut builder = SummaryBuilder::new(Some(TARGET), true);
-    builder.step(seconds(0.0), &robot(0.0), &step(State::Priming, Limit::None));
+    builder.step(seconds(0.0), &robot(0.0), &step(State::Priming, SpeedLimit::None));
     builder.frame(&row(50.0, 100.0, "priming"));
-    builder.step(seconds(1.0), &robot(200.0), &step(State::Tracking, Limit::None));
+    builder.step(seconds(1.0), &robot(200.0), &step(State::Tracking, SpeedLimit::None));
     // Seen under control, but laid before it.
     builder.frame(&row(50.0, 199.0, "tracking"));
     builder.frame(&row(45.0, 200.0, "tracking"));
@@ -101,11 +101,11 @@ fn only_bead_laid_under_control_counts_for_the_error() {
 #[test]
 fn a_new_bead_begins_anew() {
     let mut builder = SummaryBuilder::new(Some(TARGET), true);
-    builder.step(seconds(0.0), &robot(300.0), &step(State::Tracking, Limit::None));
-    builder.step(seconds(1.0), &robot(400.0), &step(State::Idle, Limit::None));
-    builder.step(seconds(2.0), &robot(0.0), &step(State::Priming, Limit::None));
+    builder.step(seconds(0.0), &robot(300.0), &step(State::Tracking, SpeedLimit::None));
+    builder.step(seconds(1.0), &robot(400.0), &step(State::Idle, SpeedLimit::None));
+    builder.step(seconds(2.0), &robot(0.0), &step(State::Priming, SpeedLimit::None));
     builder.frame(&row(60.0, 350.0, "priming"));
-    builder.step(seconds(3.0), &robot(100.0), &step(State::Tracking, Limit::None));
+    builder.step(seconds(3.0), &robot(100.0), &step(State::Tracking, SpeedLimit::None));
     builder.frame(&row(43.0, 150.0, "tracking"));
     let control = builder.finish().control.unwrap();
     assert_eq!(control.width_error_mean_mm, Some(1.0));
@@ -115,20 +115,24 @@ fn a_new_bead_begins_anew() {
 #[test]
 fn time_is_spent_in_the_state_that_the_step_before_left() {
     let mut builder = SummaryBuilder::new(Some(TARGET), true);
-    builder.step(seconds(0.0), &Event::Tick, &step(State::Idle, Limit::None));
-    builder.step(seconds(1.0), &Event::Tick, &step(State::Tracking, Limit::MaxSpeed));
+    builder.step(seconds(0.0), &Event::Tick, &step(State::Idle, SpeedLimit::None));
+    builder.step(seconds(1.0), &Event::Tick, &step(State::Tracking, SpeedLimit::MaxSpeed));
     // No setpoint, no word of a limit: it still acts.
     builder.step(seconds(1.5), &Event::Tick, &Step { state: State::Tracking, ..Step::default() });
-    builder.step(seconds(3.0), &Event::Tick, &step(State::Holding(Hold::NoWidth), Limit::None));
+    builder.step(
+        seconds(3.0),
+        &Event::Tick,
+        &step(State::Holding(Hold::NoWidth), SpeedLimit::None),
+    );
     builder.step(
         seconds(7.0),
         &Event::Tick,
-        &step(State::Fault(Fault::HeldTooLong(Hold::NoWidth)), Limit::None),
+        &step(State::Fault(Fault::HeldTooLong(Hold::NoWidth)), SpeedLimit::None),
     );
     builder.step(
         seconds(8.0),
         &Event::Tick,
-        &step(State::Fault(Fault::HeldTooLong(Hold::NoWidth)), Limit::None),
+        &step(State::Fault(Fault::HeldTooLong(Hold::NoWidth)), SpeedLimit::None),
     );
     let control = builder.finish().control.unwrap();
     assert!((control.limited_s - 2.0).abs() < 1e-9);
@@ -151,12 +155,12 @@ fn counts_reach_the_file_under_their_promised_keys() {
             hold_mm_per_s: MmPerS::ZERO,
         },
     };
-    builder.step(seconds(0.0), &up, &step(State::Idle, Limit::None));
-    builder.step(seconds(1.0), &up, &step(State::Idle, Limit::None));
+    builder.step(seconds(0.0), &up, &step(State::Idle, SpeedLimit::None));
+    builder.step(seconds(1.0), &up, &step(State::Idle, SpeedLimit::None));
     builder.latency(2.0, 100.0);
     builder.latency(f64::NAN, f64::INFINITY);
-    builder.note(&Note::SetpointSent);
-    builder.note(&Note::FramesSuperseded(3));
+    builder.note(&RunNote::SetpointSent);
+    builder.note(&RunNote::FramesSuperseded(3));
     let folder = tempfile::tempdir().unwrap();
     let path = builder.finish().write(folder.path()).unwrap();
     let json: serde_json::Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
@@ -184,7 +188,7 @@ fn light_that_is_too_strong_is_answered_with_advice() {
         control: None,
     });
     assert!(builder.finish().advice.is_empty());
-    measured.hints.saturated_share = 0.25;
+    measured.hints.saturated_fraction = 0.25;
     for frame in 1..9 {
         builder.frame(&FrameRow {
             frame,

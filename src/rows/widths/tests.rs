@@ -1,7 +1,7 @@
 use super::*;
 use crate::core::units::{Mm, MmPerS};
 use crate::rows::frame_row::sample;
-use crate::width_control::limiter::Limit;
+use crate::width_control::limiter::SpeedLimit;
 
 fn rows_of(with_control: bool, rows: &[FrameRow]) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
@@ -61,12 +61,12 @@ fn a_rejected_row_keeps_frame_time_and_status() {
 fn a_run_says_where_the_robot_was_and_what_the_controller_did() {
     let control = ControlColumns {
         bead_expected: true,
-        bead_path: Some(Mm::constant(10.0)),
+        measured_path: Some(Mm::constant(10.0)),
         nozzle_path: Some(Mm::constant(100.0)),
         speed: Some(MmPerS::constant(80.5)),
         setpoint: None,
         state: "tracking",
-        limit: Limit::MinSpeed,
+        limit: SpeedLimit::MinSpeed,
         target: None,
     };
     let row = FrameRow {

@@ -12,17 +12,17 @@ use crate::core::geometry::ImagePoint;
 use crate::core::time::Stamp;
 use crate::core::units::WidthRange;
 use crate::core::units::{Mm, MmPerS};
-use crate::scenario::table::Level;
+use crate::scenario::table::WidthSource;
 use crate::sim::hash;
 use crate::sim::laid::LaidBead;
 use crate::sim::render::{RenderError, Renderer};
 use crate::sim::truth::Truth;
 use crate::sim::view::gauge_middle;
-use crate::vision::{Axis, Edges, Hints, Measurer, Reject, WidthMeasurement};
+use crate::vision::{BeadAxis, Edges, Hints, Measurer, Reject, WidthMeasurement};
 
 /// What the camera saw, for a witness.
 #[derive(Debug)]
-pub struct Sight<'a> {
+pub struct FrameObservation<'a> {
     /// Number of the frame, through all layers.
     pub seq: u64,
     /// When.
@@ -36,7 +36,7 @@ pub struct Sight<'a> {
     /// What a perfect measurement would have found.
     pub truth: Option<Truth>,
     /// Where along the bead the middle of the gauge was \[mm\].
-    pub under_mm: f64,
+    pub position_mm: f64,
     /// The controller's answer.
     pub step: &'a Step,
     /// Speed that the robot last reported.
@@ -46,7 +46,7 @@ pub struct Sight<'a> {
 }
 
 /// One picture.
-pub struct Taken {
+pub struct CapturedFrame {
     pub seq: u64,
     pub outcome: Result<WidthMeasurement, &'static str>,
     pub frame: Option<Frame>,
@@ -54,17 +54,17 @@ pub struct Taken {
 }
 
 pub struct SimCamera {
-    level: Level,
+    level: WidthSource,
     seed: u64,
     seq: u64,
     gauge_length: f64,
     noise: Mm,
     /// Share of the widths that are outliers, and most by which they are off.
-    outliers: (f64, f64),
-    missing_share: f64,
+    outlier_rate_and_size: (f64, f64),
+    missing_fraction: f64,
     /// Widths that are believed.
     width_range: WidthRange,
-    rides: bool,
+    rides_on_robot: bool,
     calibration: Calibration,
     surface_height: Mm,
     /// How much higher the bead lies than that of the first layer.
@@ -82,26 +82,26 @@ impl SimCamera {
             calibration.clone(),
             cell.surface_height,
             cell.gauge,
-            simulation.picture,
+            simulation.image,
             simulation.seed,
         )?;
         Ok(Self {
-            level: simulation.level,
+            level: simulation.width_source,
             seed: simulation.seed,
             seq: 0,
             gauge_length: simulation.gauge_length.get(),
             noise: simulation.width_noise,
-            outliers: (simulation.outlier_share, simulation.outlier_size),
-            missing_share: simulation.missing_share,
+            outlier_rate_and_size: (simulation.outlier_fraction, simulation.outlier_size),
+            missing_fraction: simulation.missing_fraction,
             width_range: cell.gauge.width_range,
-            rides: cell.mount != Some(Mount::Fixed),
+            rides_on_robot: cell.mount != Some(Mount::Fixed),
             calibration,
             surface_height: cell.surface_height,
             rise: Mm::ZERO,
             middle: gauge_middle(&cell.gauge.roi),
             across: match cell.gauge.axis {
-                Axis::Vertical => Vector2::x(),
-                Axis::Horizontal => Vector2::y(),
+                BeadAxis::Vertical => Vector2::x(),
+                BeadAxis::Horizontal => Vector2::y(),
             },
             renderer,
             measurer: Measurer::new(cell.gauge, cell.white),
@@ -120,28 +120,28 @@ impl SimCamera {
     }
 
     /// Looks at the bead with the middle of the gauge at `under_mm` along it.
-    pub fn take(&mut self, now: Stamp, under_mm: f64, z: Mm, bead: &LaidBead) -> Taken {
+    pub fn take(&mut self, now: Stamp, position_mm: f64, z: Mm, bead: &LaidBead) -> CapturedFrame {
         let seq = self.seq;
         self.seq += 1;
-        let z = self.rides.then_some(z);
+        let z = self.rides_on_robot.then_some(z);
         let surface = self.calibration.surface(self.surface_height + self.rise, z);
         match self.level {
-            Level::Widths => {
-                let outcome = self.width(seq, under_mm, bead, &surface);
-                Taken { seq, outcome, frame: None, truth: None }
+            WidthSource::Widths => {
+                let outcome = self.width(seq, position_mm, bead, &surface);
+                CapturedFrame { seq, outcome, frame: None, truth: None }
             }
-            Level::Frames => {
-                let edges = |along: f64| bead.edges_at(under_mm + along);
+            WidthSource::Frames => {
+                let edges = |along: f64| bead.edges_at(position_mm + along);
                 match self.renderer.render(seq, now, z, &edges) {
                     Err(_) => {
                         let outcome = Err(Reject::OffSurface.status());
-                        Taken { seq, outcome, frame: None, truth: None }
+                        CapturedFrame { seq, outcome, frame: None, truth: None }
                     }
                     Ok(rendered) => {
                         let found = self.measurer.measure(&rendered.frame, &surface);
                         let outcome = found.map_err(|reject| reject.status());
                         let (frame, truth) = (Some(rendered.frame), rendered.truth);
-                        Taken { seq, outcome, frame, truth }
+                        CapturedFrame { seq, outcome, frame, truth }
                     }
                 }
             }
@@ -152,20 +152,20 @@ impl SimCamera {
     fn width(
         &self,
         seq: u64,
-        under_mm: f64,
+        position_mm: f64,
         bead: &LaidBead,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, &'static str> {
         let half = self.gauge_length / 2.0;
         let truth = if half > 0.0 {
-            bead.mean_width(under_mm - half, under_mm + half)
+            bead.mean_width(position_mm - half, position_mm + half)
         } else {
-            bead.width_at(under_mm)
+            bead.width_at(position_mm)
         };
         let refused = Reject::NoPair { got: 0.0, need: 1.0 }.status();
         let truth = truth.ok_or(refused)?;
-        let [noise, _] = hash::normal_pair(hash::mix(&[self.seed, NOISE, seq]));
-        if hash::unit(hash::mix(&[self.seed, MISSING, seq])) < self.missing_share {
+        let [noise, _] = hash::normal_pair(hash::mix(&[self.seed, NOISE_STREAM, seq]));
+        if hash::unit(hash::mix(&[self.seed, MISSING_STREAM, seq])) < self.missing_fraction {
             return Err(refused);
         }
         let seen = (truth + noise * self.noise.get()) * self.outlier(seq);
@@ -182,15 +182,15 @@ impl SimCamera {
             left,
             right,
             slant_rad: 0.0,
-            hints: Hints { used_share: 1.0, ..Hints::default() },
+            hints: Hints { used_fraction: 1.0, ..Hints::default() },
         })
     }
 
     /// The factor by which a width is wrong; mostly 1.
     fn outlier(&self, seq: u64) -> f64 {
-        let (share, size) = self.outliers;
-        if hash::unit(hash::mix(&[self.seed, OUTLIER, seq])) < share {
-            1.0 + size * (2.0 * hash::unit(hash::mix(&[self.seed, OUTLIER, seq, 1])) - 1.0)
+        let (share, size) = self.outlier_rate_and_size;
+        if hash::unit(hash::mix(&[self.seed, OUTLIER_STREAM, seq])) < share {
+            1.0 + size * (2.0 * hash::unit(hash::mix(&[self.seed, OUTLIER_STREAM, seq, 1])) - 1.0)
         } else {
             1.0
         }
@@ -206,7 +206,7 @@ impl SimCamera {
 }
 
 /// Keep outliers and missing widths apart from other random numbers of a seed.
-const OUTLIER: u64 = 0x6f75_746c_6965_7200;
-const MISSING: u64 = 0x006d_6973_7369_6e67;
+const OUTLIER_STREAM: u64 = 0x6f75_746c_6965_7200;
+const MISSING_STREAM: u64 = 0x006d_6973_7369_6e67;
 /// Keeps the noise of widths apart from other random numbers of a seed.
-const NOISE: u64 = 0x006e_6f69_7365;
+const NOISE_STREAM: u64 = 0x006e_6f69_7365;

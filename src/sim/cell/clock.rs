@@ -7,7 +7,7 @@ use crate::sim::hash;
 
 /// What comes next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum What {
+pub enum ClockEvent {
     Report,
     ExtruderReport,
     Frame,
@@ -22,7 +22,7 @@ struct Clock {
     period: f64,
     phase: f64,
     count: u32,
-    what: What,
+    event: ClockEvent,
 }
 
 /// The clocks of a cell; at the same moment the first of them comes first.
@@ -46,29 +46,29 @@ impl Ticker {
             let share = (word >> 11) as f64 / (1_u64 << 53) as f64;
             (share * period / step).floor() * step
         };
-        let clock = |period, phase, what| Clock { period, phase, count: 0, what };
+        let clock = |period, phase, what| Clock { period, phase, count: 0, event: what };
         let mut clocks = vec![
-            clock(simulation.report.secs(), 0.0, What::Report),
-            clock(frame, phase(1, frame), What::Frame),
-            clock(tick, phase(2, tick), What::Tick),
+            clock(simulation.report.secs(), 0.0, ClockEvent::Report),
+            clock(frame, phase(1, frame), ClockEvent::Frame),
+            clock(tick, phase(2, tick), ClockEvent::Tick),
         ];
         if let Some(part) = &run.extruder {
             let rates = part.extruder.rates;
-            clocks.insert(1, clock(1.0 / rates.io_hz, 0.0, What::ExtruderReport));
-            clocks.push(clock(1.0 / rates.feedforward_hz, 0.0, What::ExtruderTick));
+            clocks.insert(1, clock(1.0 / rates.io_hz, 0.0, ClockEvent::ExtruderReport));
+            clocks.push(clock(1.0 / rates.feedforward_hz, 0.0, ClockEvent::ExtruderTick));
         }
         Self { began, clocks }
     }
 
-    pub fn next(&mut self) -> (Stamp, What) {
+    pub fn next(&mut self) -> (Stamp, ClockEvent) {
         let due = |clock: &Clock| {
             self.began + Span::from_secs(clock.phase + clock.period * f64::from(clock.count))
         };
         let first = self.clocks.iter_mut().min_by_key(|clock| due(clock));
-        first.map_or((self.began, What::Report), |clock| {
+        first.map_or((self.began, ClockEvent::Report), |clock| {
             let at = due(clock);
             clock.count += 1;
-            (at, clock.what)
+            (at, clock.event)
         })
     }
 }

@@ -5,20 +5,20 @@ use crate::control::step::Command;
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
-use crate::link::{PcLine, RobotCell, RobotLine};
+use crate::link::{PcLine, RobotLine, VirtualRobot};
 use crate::run::ports::RobotPort;
 
 /// A robot within the process.
 #[derive(Debug)]
 pub struct SimPort {
-    cell: RobotCell,
+    cell: VirtualRobot,
     seq: u64,
     valid_ms: u64,
 }
 
 impl SimPort {
     /// A robot that takes setpoints valid for `valid_ms`.
-    pub fn new(cell: RobotCell, valid_ms: u32) -> Self {
+    pub fn new(cell: VirtualRobot, valid_ms: u32) -> Self {
         Self { cell, seq: 0, valid_ms: u64::from(valid_ms) }
     }
 

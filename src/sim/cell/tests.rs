@@ -6,9 +6,9 @@ use super::*;
 use crate::calibration::Calibration;
 use crate::cell::file::Purpose;
 use crate::control::step::Step;
-use crate::extruder::start_stop::{Laid, Timing};
-use crate::extruder::strategy::Constant;
-use crate::extruder::{ExtruderSetup, Law};
+use crate::extruder::start_stop::{BeadConditions, StartStopTiming};
+use crate::extruder::strategy::ConstantCommand;
+use crate::extruder::{ExtruderSetup, ExtruderStrategy};
 use crate::identify::start_stop::file;
 use crate::run::runner::NoRecorder;
 
@@ -32,7 +32,7 @@ struct Volumes {
     bead_start: f64,
 }
 
-impl Witness for Volumes {
+impl Observer for Volumes {
     fn step(&mut self, _: Stamp, event: &Event, _: &Step) {
         if let Event::Robot(state) = event {
             let lays = state.mode == RobotMode::Print;
@@ -41,7 +41,7 @@ impl Witness for Volumes {
         }
     }
 
-    fn look(&mut self, _: &Sight<'_>) {}
+    fn frame(&mut self, _: &FrameObservation<'_>) {}
 
     fn flow(&mut self, now: Stamp, _: Option<Mm3PerS>, flow: Mm3PerS) {
         let dt = self.last.replace(now).map_or(0.0, |last| (now - last).secs());
@@ -61,16 +61,17 @@ fn lost(seed: u64, knows: bool) -> (f64, f64) {
     let run = cell.run.clone().unwrap();
     let part = run.extruder.clone().unwrap();
     let speed = run.robot.start_speed;
-    let laid = Laid {
+    let laid = BeadConditions {
         flow: part.demand.nominal(),
         speed,
-        least_share: run.limits.min_speed / speed,
+        min_speed_ratio: run.limits.min_speed / speed,
         robot_lag: Span::from_millis(41),
     };
-    let timing = Timing::new(file::parse("starts.toml", STARTS).unwrap().parameters, laid).unwrap();
-    let setup = part.extruder.setup(Law::Constant(Constant(20.0)));
+    let timing =
+        StartStopTiming::new(file::parse("starts.toml", STARTS).unwrap().parameters, laid).unwrap();
+    let setup = part.extruder.setup(ExtruderStrategy::Constant(ConstantCommand(20.0)));
     let plant = SimExtruder::of(part.plant.as_ref().unwrap(), seed, part.plant_nominal).unwrap();
-    let rig = Rig {
+    let rig = CommandedExtruder {
         setup: ExtruderSetup { timing: knows.then_some(timing), ..setup },
         demand: part.demand,
         plant,
@@ -82,7 +83,7 @@ fn lost(seed: u64, knows: bool) -> (f64, f64) {
     for pause_s in PAUSES_S {
         sim.rest(Span::from_secs(pause_s), &mut volumes);
         volumes.began = sim.now;
-        assert!(sim.layer(Mm::ZERO, &mut volumes).whole);
+        assert!(sim.layer(Mm::ZERO, &mut volumes).complete);
     }
     sim.rest(Span::from_secs(4.0), &mut volumes);
     (volumes.void_mm3, volumes.drool_mm3)

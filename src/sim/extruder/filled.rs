@@ -1,16 +1,16 @@
 //! The screw of Diagne et al. 2015 as an extruder: its flow goes by the filled
 //! length. It stands while the pump does, and so does all that is on its way.
 
-use super::plant::{Plant, STEP};
+use super::plant::{STEP, SimPlant};
 use crate::cell::extruder::ScrewPlant as Settings;
 use crate::core::units::{Mm, Mm3PerS};
 use crate::extruder::ExtruderReport;
 use crate::sim::hash::{mix, normal_pair};
 use crate::sim::screw::{Integrator, SimScrew};
 
-const SENSOR: u64 = 0x0073_6372_6577;
+const SENSOR_STREAM: u64 = 0x0073_6372_6577;
 /// Largest share that can be fed: a full screw has no filled length.
-const MOST: f64 = 0.999;
+const MAX_FILL: f64 = 0.999;
 
 /// The plant with its sensor.
 #[derive(Debug)]
@@ -19,41 +19,41 @@ pub struct Filled {
     settings: Settings,
     seed: u64,
     reports: u64,
-    turns: bool,
+    is_turning: bool,
 }
 
 impl Filled {
     /// At the filled length that the cell starts with.
     pub fn new(settings: &Settings, seed: u64) -> Self {
         let scheme = Integrator::RungeKutta(STEP.secs());
-        let Settings { screw, start_m, before, .. } = *settings;
+        let Settings { screw, start_m, initial_fill: before, .. } = *settings;
         let plant = SimScrew::new(screw, scheme, STEP.secs(), start_m, before);
-        Self { plant, settings: *settings, seed, reports: 0, turns: false }
+        Self { plant, settings: *settings, seed, reports: 0, is_turning: false }
     }
 }
 
-impl Plant for Filled {
+impl SimPlant for Filled {
     fn advance(&mut self, command: Option<f64>) {
-        self.turns = command.is_some();
+        self.is_turning = command.is_some();
         if let Some(fill) = command {
-            self.plant.advance(fill.clamp(0.0, MOST));
+            self.plant.advance(fill.clamp(0.0, MAX_FILL));
         }
     }
 
     fn flow(&self) -> Mm3PerS {
-        if !self.turns {
+        if !self.is_turning {
             return Mm3PerS::ZERO;
         }
         let screw = &self.settings.screw;
         let speed = screw.speed(self.plant.now_s()) / screw.theta1_m_per_s;
-        let share = screw.holding(self.plant.plug_m()) * speed;
-        Mm3PerS::new(self.settings.full_flow_mm3_per_s * share).unwrap_or_default()
+        let fraction = screw.holding_fill(self.plant.plug_m()) * speed;
+        Mm3PerS::new(self.settings.full_flow_mm3_per_s * fraction).unwrap_or_default()
     }
 
     fn sense(&mut self, report: &mut ExtruderReport) {
-        let [fresh, _] = normal_pair(mix(&[self.seed, SENSOR, self.reports]));
+        let [fresh, _] = normal_pair(mix(&[self.seed, SENSOR_STREAM, self.reports]));
         self.reports += 1;
-        let seen = self.plant.plug_m() * 1000.0 + self.settings.sensor_noise_mm * fresh;
-        report.filled_mm = Mm::new(seen).ok();
+        let measured_mm = self.plant.plug_m() * 1000.0 + self.settings.sensor_noise_mm * fresh;
+        report.filled_mm = Mm::new(measured_mm).ok();
     }
 }

@@ -1,7 +1,7 @@
 //! A transfer function from command to flow, with what no model tells: an
 //! unknown input, and a flow that wanders.
 
-use super::plant::{Plant, STEP};
+use super::plant::{STEP, SimPlant};
 use crate::cell::extruder::LinearPlant;
 use crate::core::units::{Mm3PerS, Rpm};
 use crate::extruder::ExtruderReport;
@@ -9,12 +9,12 @@ use crate::numeric::lti::{Between, ModelError, Simulator};
 use crate::sim::hash::{mix, normal_pair};
 
 /// Keeps the random numbers of flow and sensor apart from others of a seed.
-const FLOW: u64 = 0x0000_666c_6f77;
-const SENSOR: u64 = 0x7365_6e73;
+const FLOW_STREAM: u64 = 0x0000_666c_6f77;
+const SENSOR_STREAM: u64 = 0x7365_6e73;
 
 /// The plant with its memory.
 #[derive(Debug)]
-pub struct Linear {
+pub struct LinearPlantSim {
     simulator: Simulator,
     plant: LinearPlant,
     seed: u64,
@@ -23,20 +23,29 @@ pub struct Linear {
     /// What the screw does, in the unit of the command.
     turning: f64,
     modelled: f64,
-    wandering: f64,
+    noise: f64,
 }
 
-impl Linear {
+impl LinearPlantSim {
     /// At rest. Fails where the transfer function cannot be put on the grid.
     pub fn new(plant: &LinearPlant, seed: u64) -> Result<Self, ModelError> {
         let simulator = Simulator::new(&plant.transfer, STEP.secs(), Between::Held)?;
         let plant = plant.clone();
         let (turning, modelled, wandering) = (0.0, 0.0, 0.0);
-        Ok(Self { simulator, plant, seed, steps: 0, reports: 0, turning, modelled, wandering })
+        Ok(Self {
+            simulator,
+            plant,
+            seed,
+            steps: 0,
+            reports: 0,
+            turning,
+            modelled,
+            noise: wandering,
+        })
     }
 
     /// The screw after a step with a command.
-    fn turn(&self, command: f64) -> f64 {
+    fn screw_after(&self, command: f64) -> f64 {
         match self.plant.screw_lag_s {
             Some(lag_s) if lag_s > 0.0 => {
                 command + (self.turning - command) * libm::exp(-STEP.secs() / lag_s)
@@ -52,23 +61,23 @@ impl Linear {
     }
 }
 
-impl Plant for Linear {
+impl SimPlant for LinearPlantSim {
     fn advance(&mut self, command: Option<f64>) {
-        self.turning = self.turn(command.unwrap_or(0.0));
+        self.turning = self.screw_after(command.unwrap_or(0.0));
         let unknown = if command.is_some() { self.unknown() } else { 0.0 };
         let input = self.turning + unknown;
         self.modelled = self.simulator.step(input);
         if self.plant.flow_noise > 0.0 {
             let kept = libm::exp(-STEP.secs() / self.plant.flow_noise_lag_s);
-            let [fresh, _] = normal_pair(mix(&[self.seed, FLOW, self.steps]));
+            let [fresh, _] = normal_pair(mix(&[self.seed, FLOW_STREAM, self.steps]));
             let size = self.plant.flow_noise * (1.0 - kept * kept).sqrt();
-            self.wandering = kept * self.wandering + size * fresh;
+            self.noise = kept * self.noise + size * fresh;
         }
         self.steps += 1;
     }
 
     fn flow(&self) -> Mm3PerS {
-        Mm3PerS::new((self.modelled + self.wandering).max(0.0)).unwrap_or_default()
+        Mm3PerS::new((self.modelled + self.noise).max(0.0)).unwrap_or_default()
     }
 
     fn sense(&mut self, report: &mut ExtruderReport) {
@@ -76,7 +85,7 @@ impl Plant for Linear {
             report.screw_rpm = Rpm::new(self.turning).ok();
         }
         if let Some(noise) = self.plant.sensor_noise {
-            let [fresh, _] = normal_pair(mix(&[self.seed, SENSOR, self.reports]));
+            let [fresh, _] = normal_pair(mix(&[self.seed, SENSOR_STREAM, self.reports]));
             self.reports += 1;
             report.flow_mm3_per_s = Mm3PerS::new(self.flow().get() + noise * fresh).ok();
         }

@@ -8,7 +8,7 @@ use crate::extruder::ExtruderReport;
 pub const STEP: Span = Span::from_millis(1);
 
 /// What turns commands into flow.
-pub trait Plant: std::fmt::Debug + Send {
+pub trait SimPlant: std::fmt::Debug + Send {
     /// Goes on by [`STEP`] with a command, in the command's unit, or without
     /// one while the pump stands.
     fn advance(&mut self, command: Option<f64>);

@@ -1,13 +1,13 @@
 //! A pressure at the nozzle that follows the screw, and the flow that it
 //! presses out: the plant of Ma et al. 2026 as an extruder.
 
-use super::plant::{Plant, STEP};
-use crate::cell::extruder::{GainWave, InputLoad, PressurePlant};
+use super::plant::{STEP, SimPlant};
+use crate::cell::extruder::{InputLoad, PressurePlant};
 use crate::core::units::{MPa, Mm3PerS, Rpm};
 use crate::extruder::ExtruderReport;
-use crate::extruder::pressure::Running;
+use crate::extruder::pressure::InitialState;
 use crate::extruder::rheology::PowerLaw;
-use crate::sim::pressure::{Disturbed, Drift, Load, SimPressure, TICK_S};
+use crate::sim::pressure::{Disturbances, GainWave, LoadChange, SimPressure, TICK_S};
 
 /// The plant with its nozzle.
 #[derive(Debug)]
@@ -15,32 +15,32 @@ pub struct Pressed {
     process: SimPressure,
     nozzle: PowerLaw,
     /// Time since the process was advanced last \[s\].
-    waits_s: f64,
+    elapsed_s: f64,
 }
 
 impl Pressed {
     /// At rest.
     pub fn new(plant: &PressurePlant, seed: u64) -> Self {
-        let GainWave { fraction: share, period_s } = plant.gain_wave;
+        let wave = &plant.gain_wave;
         let InputLoad { rpm, at_s } = plant.load;
-        let disturbed = Disturbed {
-            drift: vec![Drift { share, period_s }],
-            load: Some(Load { at_s, rpm }),
+        let disturbed = Disturbances {
+            gain_waves: vec![GainWave { amplitude: wave.fraction, period_s: wave.period_s }],
+            load: Some(LoadChange { at_s, rpm }),
             noise_mpa2: plant.sensor_noise_mpa.powi(2),
             seed,
         };
-        let rest = Running { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
-        let process = SimPressure::new(plant.process, disturbed, plant.fastest, rest);
-        Self { process, nozzle: plant.nozzle, waits_s: 0.0 }
+        let rest = InitialState { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
+        let process = SimPressure::new(plant.process, disturbed, plant.max_speed, rest);
+        Self { process, nozzle: plant.nozzle, elapsed_s: 0.0 }
     }
 }
 
-impl Plant for Pressed {
+impl SimPlant for Pressed {
     fn advance(&mut self, command: Option<f64>) {
         self.process.command(Rpm::new(command.unwrap_or(0.0)).unwrap_or_default());
-        self.waits_s += STEP.secs();
-        if self.waits_s >= TICK_S - 1e-9 {
-            self.waits_s = 0.0;
+        self.elapsed_s += STEP.secs();
+        if self.elapsed_s >= TICK_S - 1e-9 {
+            self.elapsed_s = 0.0;
             self.process.advance();
         }
     }

@@ -10,13 +10,13 @@ mod disturbed;
 
 const PAPER_SCALE: f64 = 0.126_582;
 
-fn gauge(roi: Roi, axis: Axis) -> Gauge {
+fn gauge(roi: Roi, axis: BeadAxis) -> Gauge {
     let range = WidthRange { min: Mm::constant(1.0), max: Mm::constant(90.0) };
     Gauge::new(roi, axis, Polarity::Bright, range)
 }
 
 fn upright() -> Gauge {
-    gauge(Roi { x: 40, y: 20, width: 640, height: 500 }, Axis::Vertical)
+    gauge(Roi { x: 40, y: 20, width: 640, height: 500 }, BeadAxis::Vertical)
 }
 
 fn scale() -> Calibration {
@@ -37,23 +37,23 @@ fn tilted() -> Calibration {
     }
 }
 
-fn quiet() -> Picture {
-    Picture { noise_grey: 0.0, light_ratio: 1.0, ..Picture::default() }
+fn quiet() -> ImageModel {
+    ImageModel { noise_grey: 0.0, light_ratio: 1.0, ..ImageModel::default() }
 }
 
-fn renderer(calibration: Calibration, gauge: Gauge, picture: &Picture) -> Renderer {
+fn renderer(calibration: Calibration, gauge: Gauge, picture: &ImageModel) -> Renderer {
     Renderer::new(calibration, Mm::constant(20.0), gauge, *picture, 5).unwrap()
 }
 
-fn shares(renderer: &Renderer, bead: &Bead<'_>) -> Vec<f32> {
-    seen(renderer, bead).shares
+fn shares(renderer: &Renderer, bead: &BeadEdges<'_>) -> Vec<f32> {
+    seen(renderer, bead).fractions
 }
 
-fn seen(renderer: &Renderer, bead: &Bead<'_>) -> Seen {
+fn seen(renderer: &Renderer, bead: &BeadEdges<'_>) -> BeadCoverage {
     let view = renderer.view(None).unwrap();
     let GaugeExtent { run, cross } = renderer.extent();
-    let outline = Outline::trace(&view, bead, float(run), float(cross)).unwrap();
-    renderer.see(0, &outline, &view)
+    let outline = BeadOutline::trace(&view, bead, to_f64(run), to_f64(cross)).unwrap();
+    renderer.coverage(0, &outline, &view)
 }
 
 fn grey(frame: &Frame) -> Vec<f64> {
@@ -76,13 +76,13 @@ fn half_way(renderer: &Renderer, shares: &[f32], row: usize, rising: bool) -> f6
         }
     };
     let i = (0..width - 1).find(|i| passes(*i)).unwrap();
-    float(i) + f64::from((0.5 - line[i]) / (line[i + 1] - line[i]))
+    to_f64(i) + f64::from((0.5 - line[i]) / (line[i + 1] - line[i]))
 }
 
 #[test]
 fn every_row_holds_the_width_of_the_bead_in_pixels() {
     for (slant_deg, blur_px) in [(0.0, 1.5), (7.3, 1.5), (-19.0, 0.0), (12.0, 4.0), (3.0, 0.3)] {
-        let picture = Picture { slant_deg, blur_px, lateral_mm: 1.234, ..quiet() };
+        let picture = ImageModel { slant_deg, blur_px, lateral_mm: 1.234, ..quiet() };
         let renderer = renderer(scale(), upright(), &picture);
         let shares = shares(&renderer, &straight(30.0));
         let expected = 30.0 / PAPER_SCALE / slant_deg.to_radians().cos();
@@ -95,7 +95,7 @@ fn every_row_holds_the_width_of_the_bead_in_pixels() {
 
 #[test]
 fn pixels_far_from_the_edges_are_bead_or_ground_in_the_light_there() {
-    let picture = Picture { noise_grey: 0.0, light_ratio: 1.5, ..Picture::default() };
+    let picture = ImageModel { noise_grey: 0.0, light_ratio: 1.5, ..ImageModel::default() };
     let renderer = renderer(scale(), upright(), &picture);
     let pixels = grey(&renderer.render(0, Stamp::START, None, &straight(40.0)).unwrap().frame);
     let light = |x: f64, y: f64| 1.0 + 0.2 * ((x - 359.5) / 719.0 + (y - 269.5) / 539.0);
@@ -114,9 +114,9 @@ fn truth_lies_where_the_picture_passes_half_way() {
         Some((-19.0 - wave, 20.0 + 0.1 * (s / 3.0).cos()))
     };
     // An odd number of rows, so that the middle of the gauge is a row.
-    let odd = gauge(Roi { x: 40, y: 20, width: 640, height: 501 }, Axis::Vertical);
+    let odd = gauge(Roi { x: 40, y: 20, width: 640, height: 501 }, BeadAxis::Vertical);
     for (calibration, slant_deg) in [(scale(), 0.0), (tilted(), 0.0), (tilted(), 9.0)] {
-        let picture = Picture { slant_deg, lateral_mm: -0.7, ..quiet() };
+        let picture = ImageModel { slant_deg, lateral_mm: -0.7, ..quiet() };
         let renderer = renderer(calibration, odd, &picture);
         let truth = renderer.render(0, Stamp::START, None, &wavy).unwrap().truth.unwrap();
         let shares = shares(&renderer, &wavy);
@@ -129,7 +129,7 @@ fn truth_lies_where_the_picture_passes_half_way() {
 
 #[test]
 fn a_straight_bead_has_its_width_between_its_edges_on_the_surface() {
-    let picture = Picture { slant_deg: 11.0, lateral_mm: 2.0, ..quiet() };
+    let picture = ImageModel { slant_deg: 11.0, lateral_mm: 2.0, ..quiet() };
     let renderer = renderer(tilted(), upright(), &picture);
     let bead = straight(37.0);
     let truth = renderer.render(0, Stamp::START, None, &bead).unwrap().truth.unwrap();
@@ -157,7 +157,7 @@ fn a_surface_nearer_the_camera_looks_wider() {
         quality: None,
     };
     let seen = |height: Option<f64>, robot_z: Option<f64>| {
-        let picture = Picture { true_surface_height_mm: height, ..quiet() };
+        let picture = ImageModel { true_surface_height_mm: height, ..quiet() };
         let rendered = renderer(down.clone(), upright(), &picture)
             .render(0, Stamp::START, robot_z.map(Mm::constant), &straight(40.0))
             .unwrap();
@@ -175,9 +175,9 @@ fn a_horizontal_bead_is_a_vertical_one_turned() {
     let size_px = [300, 300];
     let roi = Roi { x: 20, y: 20, width: 260, height: 260 };
     // To the right of the direction of travel in both.
-    let leaning = |slant_deg| Picture { size_px, slant_deg, ..quiet() };
-    let up = shares(&renderer(scale(), gauge(roi, Axis::Vertical), &leaning(-5.0)), &bead);
-    let right = shares(&renderer(scale(), gauge(roi, Axis::Horizontal), &leaning(5.0)), &bead);
+    let leaning = |slant_deg| ImageModel { size_px, slant_deg, ..quiet() };
+    let up = shares(&renderer(scale(), gauge(roi, BeadAxis::Vertical), &leaning(-5.0)), &bead);
+    let right = shares(&renderer(scale(), gauge(roi, BeadAxis::Horizontal), &leaning(5.0)), &bead);
     for (row, column) in (0..300).flat_map(|row| (0..300).map(move |column| (row, column))) {
         let turned = up[(299 - column) * 300 + row];
         assert!((right[row * 300 + column] - turned).abs() < 1e-6);
@@ -187,10 +187,11 @@ fn a_horizontal_bead_is_a_vertical_one_turned() {
 #[test]
 fn a_bead_that_begins_in_the_picture_covers_its_own_area() {
     let begun = |s: f64| (s < 3.3).then_some((-12.0, 13.0));
-    let picture = Picture { slant_deg: 6.0, size_px: [400, 300], ..quiet() };
+    let picture = ImageModel { slant_deg: 6.0, size_px: [400, 300], ..quiet() };
     let roi = Roi { x: 20, y: 20, width: 360, height: 260 };
-    let renderer = renderer(scale(), gauge(roi, Axis::Vertical), &picture);
-    let at = |bead: &Bead<'_>| shares(&renderer, bead).iter().map(|s| f64::from(*s)).sum::<f64>();
+    let renderer = renderer(scale(), gauge(roi, BeadAxis::Vertical), &picture);
+    let at =
+        |bead: &BeadEdges<'_>| shares(&renderer, bead).iter().map(|s| f64::from(*s)).sum::<f64>();
     let later = |s: f64| (s < 5.3).then_some((-12.0, 13.0));
     let grown = (at(&later) - at(&begun)) * PAPER_SCALE * PAPER_SCALE;
     assert!((grown - 2.0 * 25.0).abs() < 1e-2, "{grown}");
@@ -208,13 +209,13 @@ fn without_a_bead_there_is_ground() {
 
 #[test]
 fn noise_is_of_the_size_that_was_asked_for_and_of_the_frame_alone() {
-    let picture = Picture { light_ratio: 1.0, noise_grey: 4.0, ..Picture::default() };
+    let picture = ImageModel { light_ratio: 1.0, noise_grey: 4.0, ..ImageModel::default() };
     let renderer = renderer(scale(), upright(), &picture);
     let frame = |seq| renderer.render(seq, Stamp::START, None, &|_| None).unwrap().frame;
     let (first, second) = (frame(0), frame(1));
     assert_eq!(frame(0), first);
     let (a, b) = (grey(&first), grey(&second));
-    let n = float(a.len());
+    let n = to_f64(a.len());
     let variance = a.iter().map(|v| (v - 70.0).powi(2)).sum::<f64>() / n;
     // Rounding adds a twelfth; four standard errors.
     assert!((variance - 16.0 - 1.0 / 12.0).abs() < 4.0 * 16.0 * (2.0 / n).sqrt());
@@ -224,7 +225,7 @@ fn noise_is_of_the_size_that_was_asked_for_and_of_the_frame_alone() {
 
 #[test]
 fn a_gauge_outside_the_picture_is_refused_in_words() {
-    let picture = Picture { size_px: [320, 240], ..quiet() };
+    let picture = ImageModel { size_px: [320, 240], ..quiet() };
     let refused = Renderer::new(scale(), Mm::ZERO, upright(), picture, 1).unwrap_err();
     let message = refused.to_string();
     assert!(message.contains("(680, 520)") && message.contains("320 x 240"), "{message}");

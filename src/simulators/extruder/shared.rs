@@ -5,50 +5,50 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use crate::core::time::{Span, Stamp};
 use crate::extruder::ExtruderCommand;
 use crate::io::clock::RunClock;
-use crate::link::extruder::Gate;
+use crate::link::extruder::ExtruderEndpoint;
 use crate::run::ports::ExtruderPort;
 use crate::sim::extruder::SimExtruder;
 
 /// What the extruder's thread shares with the handle.
 #[derive(Debug)]
-pub(super) struct Shared {
+pub(super) struct SharedExtruder {
     pub(super) clock: RunClock,
-    works: Mutex<Works>,
+    gated: Mutex<GatedPlant>,
 }
 
 /// The link's gate and what stands behind it.
 #[derive(Debug)]
-pub(super) struct Works {
-    gate: Gate,
+pub(super) struct GatedPlant {
+    gate: ExtruderEndpoint,
     plant: SimExtruder,
-    told: ExtruderCommand,
+    applied: ExtruderCommand,
     fails_after: Option<Span>,
     ran_since: Option<Stamp>,
 }
 
-impl Shared {
-    pub(super) fn new(clock: RunClock, works: Works) -> Self {
-        Self { clock, works: Mutex::new(works) }
+impl SharedExtruder {
+    pub(super) fn new(clock: RunClock, works: GatedPlant) -> Self {
+        Self { clock, gated: Mutex::new(works) }
     }
 
-    pub(super) fn works(&self) -> MutexGuard<'_, Works> {
-        self.works.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(super) fn gated(&self) -> MutexGuard<'_, GatedPlant> {
+        self.gated.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Works {
+impl GatedPlant {
     pub(super) fn new(
         now: Stamp,
-        mut gate: Gate,
+        mut gate: ExtruderEndpoint,
         plant: SimExtruder,
         fails_after: Option<Span>,
     ) -> Self {
-        let told = gate.command(now);
-        Self { gate, plant, told, fails_after, ran_since: None }
+        let applied = gate.command(now);
+        Self { gate, plant, applied, fails_after, ran_since: None }
     }
 
     /// The end of the link.
-    pub(super) fn gate(&mut self) -> &mut Gate {
+    pub(super) fn gate(&mut self) -> &mut ExtruderEndpoint {
         &mut self.gate
     }
 
@@ -59,7 +59,7 @@ impl Works {
 
     /// What pump and valve were told last.
     pub(super) fn command(&self) -> ExtruderCommand {
-        self.told
+        self.applied
     }
 
     /// Goes on to a moment: the plant is told what the gate lets through.
@@ -72,20 +72,20 @@ impl Works {
         }
         // A command ends where it runs out, however long nobody looked.
         if let Some(until) = self.gate.runs_out().filter(|&until| until < now) {
-            self.obey(until);
+            self.apply(until);
         }
-        self.obey(now);
-        if self.ran_since.is_none() && self.told.pump_on {
+        self.apply(now);
+        if self.ran_since.is_none() && self.applied.pump_on {
             self.ran_since = Some(now);
         }
     }
 
     /// Goes on to a moment and does what the gate lets through there.
-    fn obey(&mut self, at: Stamp) {
+    fn apply(&mut self, at: Stamp) {
         self.plant.advance(at);
         let command = self.gate.command(at);
-        if command != self.told {
-            self.told = command;
+        if command != self.applied {
+            self.applied = command;
             let _ = self.plant.send(at, command);
         }
     }

@@ -2,28 +2,28 @@
 
 use std::sync::Arc;
 
-use super::shared::Shared;
+use super::shared::SharedRobot;
 use crate::core::robot::RobotMode;
 use crate::core::time::Stamp;
 use crate::link::robot::mode_word;
-use crate::link::{Job, LineError, PcLine, RobotLine};
-use crate::simulators::machine::{Answer, Machine, Taken};
+use crate::link::{LineError, PcLine, PrintJob, RobotLine};
+use crate::simulators::machine::{Answer, LineOutcome, LinkMachine};
 
 pub(super) struct RobotMachine {
-    shared: Arc<Shared>,
-    job: Job,
+    shared: Arc<SharedRobot>,
+    job: PrintJob,
     mode: RobotMode,
 }
 
 impl RobotMachine {
-    pub(super) fn new(shared: Arc<Shared>, job: Job) -> Self {
+    pub(super) fn new(shared: Arc<SharedRobot>, job: PrintJob) -> Self {
         Self { shared, job, mode: RobotMode::Idle }
     }
 }
 
-impl Machine for RobotMachine {
+impl LinkMachine for RobotMachine {
     const NAME: &'static str = "robot-sim";
-    const LEFT: &'static str = "the last setpoint";
+    const SETPOINT_WORDS: &'static str = "the last setpoint";
 
     fn tick(&mut self, now: Stamp) -> Option<String> {
         let (state, report) = {
@@ -45,17 +45,17 @@ impl Machine for RobotMachine {
         self.shared.cell().disconnect(now);
     }
 
-    fn take(&mut self, now: Stamp, text: &str) -> Result<Taken, LineError> {
+    fn take(&mut self, now: Stamp, text: &str) -> Result<LineOutcome, LineError> {
         let line = PcLine::parse(text)?;
         let answer = self.shared.cell().take(now, line).map(Answer::from);
-        Ok(Taken { answer, bye: line == PcLine::Bye })
+        Ok(LineOutcome { answer, bye: line == PcLine::Bye })
     }
 
     fn bad_line(&mut self, why: &str) -> Answer {
         RobotLine::bad_line(why).into()
     }
 
-    fn news(&mut self, now: Stamp) -> Option<String> {
+    fn changes(&mut self, now: Stamp) -> Option<String> {
         let state = self.shared.cell().state(now);
         if state.mode == self.mode {
             return None;

@@ -6,14 +6,14 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::io::clock::RunClock;
-use crate::link::RobotCell;
+use crate::link::VirtualRobot;
 
 /// Samples of the truth that are kept; at 50 a second more than an hour.
-const LONGEST_HISTORY: usize = 200_000;
+const MAX_HISTORY: usize = 200_000;
 
 /// Where the robot really was.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Truth {
+pub struct TrueState {
     /// When.
     pub at: Stamp,
     /// Its state.
@@ -22,30 +22,30 @@ pub struct Truth {
 
 /// What the robot's thread shares with the handle.
 #[derive(Debug)]
-pub(super) struct Shared {
+pub(super) struct SharedRobot {
     pub(super) clock: RunClock,
-    cell: Mutex<RobotCell>,
-    history: Mutex<VecDeque<Truth>>,
+    cell: Mutex<VirtualRobot>,
+    history: Mutex<VecDeque<TrueState>>,
 }
 
-impl Shared {
-    pub(super) fn new(clock: RunClock, cell: RobotCell) -> Self {
+impl SharedRobot {
+    pub(super) fn new(clock: RunClock, cell: VirtualRobot) -> Self {
         Self { clock, cell: Mutex::new(cell), history: Mutex::default() }
     }
 
-    pub(super) fn cell(&self) -> MutexGuard<'_, RobotCell> {
+    pub(super) fn cell(&self) -> MutexGuard<'_, VirtualRobot> {
         self.cell.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn history(&self) -> MutexGuard<'_, VecDeque<Truth>> {
+    pub(super) fn history(&self) -> MutexGuard<'_, VecDeque<TrueState>> {
         self.history.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(super) fn remember(&self, at: Stamp, state: RobotState) {
         let mut history = self.history();
-        if history.len() == LONGEST_HISTORY {
+        if history.len() == MAX_HISTORY {
             history.pop_front();
         }
-        history.push_back(Truth { at, state });
+        history.push_back(TrueState { at, state });
     }
 }

@@ -10,7 +10,7 @@ use super::peer::Peer;
 use crate::core::time::{Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::link::LineFault;
-use crate::simulators::machine::{Answer, Machine, Notice, RefusedLine};
+use crate::simulators::machine::{Answer, LinkMachine, Notice, RefusedLine};
 
 pub(super) struct Host<M> {
     machine: M,
@@ -22,7 +22,7 @@ pub(super) struct Host<M> {
     connections: u64,
 }
 
-impl<M: Machine> Host<M> {
+impl<M: LinkMachine> Host<M> {
     pub(super) fn new(
         machine: M,
         clock: RunClock,
@@ -40,8 +40,8 @@ impl<M: Machine> Host<M> {
             let wait = Duration::from_nanos(u64::try_from(left).unwrap_or(0));
             match received.recv_timeout(wait) {
                 Ok(Input::Connection(stream)) => self.connected(stream),
-                Ok(Input::Bytes(id, bytes)) => self.heard(id, &bytes),
-                Ok(Input::Gone(id)) => self.gone(id),
+                Ok(Input::Bytes(id, bytes)) => self.received(id, &bytes),
+                Ok(Input::Disconnected(id)) => self.disconnected(id),
                 Ok(Input::Quit) | Err(RecvTimeoutError::Disconnected) => return,
                 Err(RecvTimeoutError::Timeout) => {}
             }
@@ -53,7 +53,7 @@ impl<M: Machine> Host<M> {
                 // A machine that was late does not make up for it in a burst.
                 next_state = (next_state + self.period).max(now);
             }
-            self.watch();
+            self.report_changes();
         }
     }
 
@@ -79,19 +79,19 @@ impl<M: Machine> Host<M> {
         self.tell(&text);
     }
 
-    fn gone(&mut self, id: u64) {
+    fn disconnected(&mut self, id: u64) {
         if self.peer.as_ref().is_some_and(|peer| peer.id == id) {
-            self.let_go("connection lost");
+            self.disconnect("connection lost");
         }
     }
 
-    fn let_go(&mut self, why: &str) {
+    fn disconnect(&mut self, why: &str) {
         self.peer = None;
         self.machine.disconnected(self.clock.now());
-        self.tell(&format!("{why}; {} runs out", M::LEFT));
+        self.tell(&format!("{why}; {} runs out", M::SETPOINT_WORDS));
     }
 
-    fn heard(&mut self, id: u64, bytes: &[u8]) {
+    fn received(&mut self, id: u64, bytes: &[u8]) {
         let Some(peer) = self.peer.as_mut().filter(|peer| peer.id == id) else { return };
         for piece in peer.splitter.push(bytes) {
             self.line(piece);
@@ -121,9 +121,9 @@ impl<M: Machine> Host<M> {
         if let Some(answer) = answer {
             self.answer(&answer);
         }
-        self.watch();
+        self.report_changes();
         if let Some(why) = end {
-            self.let_go(why);
+            self.disconnect(why);
         }
     }
 
@@ -138,12 +138,12 @@ impl<M: Machine> Host<M> {
     fn say(&mut self, line: &str) {
         let Some(peer) = self.peer.as_mut() else { return };
         if let Err(error) = peer.say(line) {
-            self.let_go(&format!("the PC takes no bytes: {error}"));
+            self.disconnect(&format!("the PC takes no bytes: {error}"));
         }
     }
 
-    fn watch(&mut self) {
-        if let Some(news) = self.machine.news(self.clock.now()) {
+    fn report_changes(&mut self) {
+        if let Some(news) = self.machine.changes(self.clock.now()) {
             self.tell(&news);
         }
     }

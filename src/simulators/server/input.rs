@@ -10,7 +10,7 @@ pub(super) enum Input {
     /// Bytes of the connection with this number.
     Bytes(u64, Vec<u8>),
     /// The connection with this number is gone.
-    Gone(u64),
+    Disconnected(u64),
     /// The end.
     Quit,
 }

@@ -9,10 +9,10 @@ use crossbeam_channel::Sender;
 
 use super::input::Input;
 use crate::link::{BadLines, LineSplitter};
-use crate::simulators::machine::Machine;
+use crate::simulators::machine::LinkMachine;
 
 /// A PC that takes no bytes for this long is let go.
-const WRITE: Duration = Duration::from_millis(100);
+const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 
 /// The PC at the other end.
 pub(super) struct Peer {
@@ -25,13 +25,13 @@ pub(super) struct Peer {
 
 impl Peer {
     /// Starts to read; bytes and the end arrive among `inputs` under `id`.
-    pub(super) fn new<M: Machine>(
+    pub(super) fn new<M: LinkMachine>(
         stream: TcpStream,
         id: u64,
         inputs: Sender<Input>,
     ) -> std::io::Result<Self> {
         stream.set_nodelay(true)?;
-        stream.set_write_timeout(Some(WRITE))?;
+        stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
         let address = stream.peer_addr()?;
         let reading = stream.try_clone()?;
         let thread = Builder::new().name(format!("{}-read", M::NAME));
@@ -59,9 +59,9 @@ fn read_all(mut stream: TcpStream, id: u64, inputs: &Sender<Input>) {
         let input = match stream.read(&mut bytes) {
             Ok(count) if count > 0 => Input::Bytes(id, bytes[..count].to_vec()),
             Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
-            _ => Input::Gone(id),
+            _ => Input::Disconnected(id),
         };
-        let last = matches!(input, Input::Gone(_));
+        let last = matches!(input, Input::Disconnected(_));
         if inputs.send(input).is_err() || last {
             return;
         }

@@ -2,22 +2,22 @@
 
 use serde::Serialize;
 
-use super::INTERVAL;
-use super::calibrations::{Outcome, Rig, Source};
+use super::INTERVAL_SIGMAS;
+use super::calibrations::{CalibratedWidth, CalibrationCase, CornerSource};
 use super::table::{aligned, marked};
 
 /// How far scatter and forecast may be apart where trials are many.
-const APART: f64 = 0.10;
+const MAX_RATIO_DEVIATION: f64 = 0.10;
 /// Share of the true widths that the 95 % interval must hold.
-const HELD: (f64, f64) = (0.93, 0.97);
+const COVERAGE_RANGE: (f64, f64) = (0.93, 0.97);
 /// Standard errors of a figure that are put down to the count of the trials.
-const STANDARD_ERRORS: f64 = 3.0;
+const ALLOWANCE_SIGMAS: f64 = 3.0;
 
 /// The figures of one rig.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RigFigures {
+pub struct CalibrationFigures {
     /// The rig's name.
-    pub rig: &'static str,
+    pub case: &'static str,
     /// Where the corners came from.
     pub source: &'static str,
     /// Pictures of each calibration.
@@ -30,7 +30,7 @@ pub struct RigFigures {
     pub found: usize,
     /// Root mean square error of a width over the trials, as a share of the width: the
     /// smallest and the largest of the beads.
-    pub scatter_share: [f64; 2],
+    pub rms_error_fraction: [f64; 2],
     /// The same of the error over what its own calibration foretells: the smallest and
     /// the largest of the beads.
     pub ratio: [f64; 2],
@@ -44,38 +44,43 @@ pub struct RigFigures {
     pub missed: Vec<String>,
 }
 
-struct OfBead {
-    scatter_share: f64,
+struct BeadFigures {
+    rms_error_fraction: f64,
     ratio: f64,
     bias_over_sigma: f64,
 }
 
-impl RigFigures {
+impl CalibrationFigures {
     /// Out of the widths of each trial.
     #[expect(clippy::cast_precision_loss, reason = "counts of trials")]
-    pub fn of(rig: &Rig, source: Source, trials: &[Option<Vec<Outcome>>]) -> Self {
-        let found: Vec<&Vec<Outcome>> = trials.iter().flatten().collect();
+    pub fn of(
+        rig: &CalibrationCase,
+        source: CornerSource,
+        trials: &[Option<Vec<CalibratedWidth>>],
+    ) -> Self {
+        let found: Vec<&Vec<CalibratedWidth>> = trials.iter().flatten().collect();
         let beads = found.first().map_or(0, |first| first.len());
-        let each: Vec<OfBead> = (0..beads).map(|bead| of_bead(&found, bead)).collect();
+        let each: Vec<BeadFigures> = (0..beads).map(|bead| of_bead(&found, bead)).collect();
         let all = || found.iter().flat_map(|outcomes| outcomes.iter());
-        let held = all().filter(|o| o.error_mm.abs() <= INTERVAL * o.sigma_mm).count() as f64;
+        let held =
+            all().filter(|o| o.error_mm.abs() <= INTERVAL_SIGMAS * o.sigma_mm).count() as f64;
         let within_interval = held / all().count().max(1) as f64;
-        let ends = |value: fn(&OfBead) -> f64| {
+        let ends = |value: fn(&BeadFigures) -> f64| {
             let values = || each.iter().map(value);
             [values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max)]
         };
         let squares: f64 = each.iter().map(|bead| bead.ratio.powi(2)).sum();
         let mut figures = Self {
-            rig: rig.name,
+            case: rig.name,
             source: match source {
-                Source::Corners => "corners",
-                Source::Pictures => "pictures",
+                CornerSource::Corners => "corners",
+                CornerSource::Images => "pictures",
             },
             views: rig.views,
-            noise_px: (source == Source::Corners).then_some(rig.noise_px),
+            noise_px: (source == CornerSource::Corners).then_some(rig.noise_px),
             trials: trials.len(),
             found: found.len(),
-            scatter_share: ends(|bead| bead.scatter_share),
+            rms_error_fraction: ends(|bead| bead.rms_error_fraction),
             ratio: ends(|bead| bead.ratio),
             ratio_of_all: (squares / each.len().max(1) as f64).sqrt(),
             within_interval,
@@ -90,8 +95,8 @@ impl RigFigures {
     #[expect(clippy::cast_precision_loss, reason = "counts of trials")]
     fn misses(&self) -> Vec<String> {
         let trials = self.found.max(1) as f64;
-        let open = APART.max(STANDARD_ERRORS / (2.0 * trials).sqrt());
-        let open_share = STANDARD_ERRORS * (0.95 * 0.05 / trials).sqrt();
+        let open = MAX_RATIO_DEVIATION.max(ALLOWANCE_SIGMAS / (2.0 * trials).sqrt());
+        let open_share = ALLOWANCE_SIGMAS * (0.95 * 0.05 / trials).sqrt();
         let mut missed = Vec::new();
         if self.found < self.trials {
             missed.push(format!("{} trials without a calibration", self.trials - self.found));
@@ -99,7 +104,8 @@ impl RigFigures {
         if self.ratio[0] < 1.0 - open || self.ratio[1] > 1.0 + open {
             missed.push(format!("scatter/foretold beyond {:.2} to {:.2}", 1.0 - open, 1.0 + open));
         }
-        let (low, high) = (HELD.0.min(0.95 - open_share), HELD.1.max(0.95 + open_share));
+        let (low, high) =
+            (COVERAGE_RANGE.0.min(0.95 - open_share), COVERAGE_RANGE.1.max(0.95 + open_share));
         if !(low..=high).contains(&self.within_interval) {
             missed.push(format!("in 95 % beyond {:.1} to {:.1}", 100.0 * low, 100.0 * high));
         }
@@ -108,12 +114,12 @@ impl RigFigures {
 }
 
 #[expect(clippy::cast_precision_loss, reason = "counts of trials")]
-fn of_bead(found: &[&Vec<Outcome>], bead: usize) -> OfBead {
+fn of_bead(found: &[&Vec<CalibratedWidth>], bead: usize) -> BeadFigures {
     let outcomes = || found.iter().filter_map(|outcomes| outcomes.get(bead));
     let count = outcomes().count().max(1) as f64;
-    let mean = |value: fn(&Outcome) -> f64| outcomes().map(value).sum::<f64>() / count;
-    OfBead {
-        scatter_share: mean(|o| (o.error_mm / o.width_mm).powi(2)).sqrt(),
+    let mean = |value: fn(&CalibratedWidth) -> f64| outcomes().map(value).sum::<f64>() / count;
+    BeadFigures {
+        rms_error_fraction: mean(|o| (o.error_mm / o.width_mm).powi(2)).sqrt(),
         ratio: mean(|o| (o.error_mm / o.sigma_mm).powi(2)).sqrt(),
         bias_over_sigma: mean(|o| o.error_mm / o.sigma_mm),
     }
@@ -133,10 +139,10 @@ const HEADS: [&str; COLUMNS] = [
     "limits",
 ];
 
-fn cells(figures: &RigFigures) -> [String; COLUMNS] {
-    let percent = figures.scatter_share.map(|share| 100.0 * share);
+fn cells(figures: &CalibrationFigures) -> [String; COLUMNS] {
+    let percent = figures.rms_error_fraction.map(|share| 100.0 * share);
     [
-        figures.rig.to_owned(),
+        figures.case.to_owned(),
         figures.source.to_owned(),
         figures.views.to_string(),
         figures.noise_px.map_or_else(|| "–".to_owned(), |px| px.to_string()),
@@ -154,11 +160,11 @@ fn cells(figures: &RigFigures) -> [String; COLUMNS] {
 }
 
 /// The figures as a table for a terminal.
-pub fn table(figures: &[RigFigures]) -> String {
+pub fn table(figures: &[CalibrationFigures]) -> String {
     aligned(&HEADS, figures.iter().map(cells))
 }
 
 /// The figures as a table in Markdown.
-pub fn markdown(figures: &[RigFigures]) -> String {
+pub fn markdown(figures: &[CalibrationFigures]) -> String {
     marked(&HEADS, figures.iter().map(cells))
 }

@@ -3,14 +3,14 @@
 
 use nalgebra::{Point3, Rotation3, Vector3};
 
-use crate::calibration::board::{Board, BoardError, all_seen};
-use crate::calibration::covariance::Covariance;
+use crate::calibration::board::{Board, BoardError, observe_all};
+use crate::calibration::covariance::CalibrationCovariance;
 use crate::calibration::plane::{OnBed, bed_from_board};
 use crate::calibration::sighting;
-use crate::calibration::sighting::Sighting;
+use crate::calibration::sighting::BoardObservation;
 use crate::calibration::solve;
 use crate::calibration::solve::Solution;
-use crate::calibration::{Calibration, Camera, Quality};
+use crate::calibration::{Calibration, CalibrationQuality, Camera};
 use crate::core::geometry::{ImagePoint, Pose};
 use crate::core::units::Mm;
 use crate::sim::boards::{BoardStudio, Exposure};
@@ -21,18 +21,18 @@ const TILT_DEG: std::ops::RangeInclusive<f64> = 15.0..=45.0;
 /// Tilt of the board on the bed, as the camera looks down \[degrees\].
 const BED_TILT_DEG: f64 = 8.0;
 /// Least distance of a corner from the border of the picture \[px\].
-const BORDER_PX: f64 = 8.0;
-const MOST_TRIES: u64 = 2000;
+const IMAGE_MARGIN_PX: f64 = 8.0;
+const MAX_TRIES: u64 = 2000;
 /// Cells along each side of the board on the bed; the middle of a bead is in the middle of
 /// each.
-const GRID: u32 = 5;
+const GRID_CELLS: u32 = 5;
 /// Widths of the beads as parts of the board's length: those of the outer cells end where
 /// the corners do.
-const WIDTH: f64 = 1.0 / 5.0;
+const BEAD_WIDTH_FRACTION: f64 = 1.0 / 5.0;
 
 /// A camera that is calibrated with boards.
 #[derive(Debug, Clone)]
-pub struct Rig {
+pub struct CalibrationCase {
     /// What it is called in tables.
     pub name: &'static str,
     /// The true camera.
@@ -53,7 +53,7 @@ pub struct Rig {
 
 /// One width that was calibrated for, measured at the true places of its edges.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outcome {
+pub struct CalibratedWidth {
     /// Which bead.
     pub bead: usize,
     /// How far the width is off \[mm\].
@@ -66,17 +66,17 @@ pub struct Outcome {
 
 /// Where the corners of a trial come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Source {
+pub enum CornerSource {
     /// The true places with the rig's noise.
     Corners,
     /// Pictures that are rendered and searched.
-    Pictures,
+    Images,
 }
 
 /// A rig, ready for trials.
 #[derive(Debug, Clone)]
-pub struct Bench {
-    rig: Rig,
+pub struct CalibrationBench {
+    case: CalibrationCase,
     studio: Option<BoardStudio>,
     seed: u64,
 }
@@ -84,7 +84,7 @@ pub struct Bench {
 /// The cameras that are tried: a long lens on a cell's usual picture, a short one
 /// with much distortion, and a larger picture; few and many views, little and much
 /// noise.
-pub fn rigs() -> Result<Vec<Rig>, BoardError> {
+pub fn cases() -> Result<Vec<CalibrationCase>, BoardError> {
     let camera = |focal: f64, centre: [f64; 2], k: [f64; 4]| {
         Camera::pinhole([focal, focal * 1.001], centre).with_five([k[0], k[1], k[2], k[3], 0.0])
     };
@@ -92,8 +92,8 @@ pub fn rigs() -> Result<Vec<Rig>, BoardError> {
     let short = camera(533.0, [342.0, 234.0], [-0.28, 0.06, 1e-3, -2e-4]);
     let large = camera(1700.0, [650.0, 498.0], [-0.12, 0.08, -4e-4, 6e-4]);
     let board = |square: f64| Board::new(9, 6, Mm::new(square).unwrap_or(Mm::ZERO));
-    let rig =
-        |name: &'static str, camera, image_size_px, distance_mm, board, views, noise_px| Rig {
+    let rig = |name: &'static str, camera, image_size_px, distance_mm, board, views, noise_px| {
+        CalibrationCase {
             name,
             camera,
             image_size_px,
@@ -102,7 +102,8 @@ pub fn rigs() -> Result<Vec<Rig>, BoardError> {
             views,
             noise_px,
             rendered: ["long-20", "short-13", "large-12"].contains(&name),
-        };
+        }
+    };
     let (small, medium) = ([640, 480], [720, 540]);
     Ok(vec![
         rig("long-20", long, medium, 400.0, board(7.0)?, 20, 0.05),
@@ -115,38 +116,39 @@ pub fn rigs() -> Result<Vec<Rig>, BoardError> {
     ])
 }
 
-impl Bench {
+impl CalibrationBench {
     /// For trials with corners from one source.
-    pub fn new(rig: Rig, source: Source) -> Self {
+    pub fn new(rig: CalibrationCase, source: CornerSource) -> Self {
         let seed = hash::mix(&rig.name.bytes().map(u64::from).collect::<Vec<_>>());
-        let studio =
-            (source == Source::Pictures).then(|| BoardStudio::new(&rig.camera, rig.image_size_px));
-        Self { rig, studio, seed }
+        let studio = (source == CornerSource::Images)
+            .then(|| BoardStudio::new(&rig.camera, rig.image_size_px));
+        Self { case: rig, studio, seed }
     }
 
     /// The rig.
-    pub fn rig(&self) -> &Rig {
-        &self.rig
+    pub fn case(&self) -> &CalibrationCase {
+        &self.case
     }
 
     /// Calibrates once, with boards held at random, and measures beads that lie where
     /// the last board did, on the bed and 5 % of the distance above it. A picture in which
     /// no board is found is left out, as a user's would be. `None` where that is the one of
     /// the bed, or where no calibration was found.
-    pub fn calibrate(&self, trial: u64) -> Option<Vec<Outcome>> {
+    pub fn calibrate(&self, trial: u64) -> Option<Vec<CalibratedWidth>> {
         let key = hash::mix(&[self.seed, trial]);
-        let poses: Vec<Pose> = (0..self.rig.views)
-            .map(|view| self.pose(hash::mix(&[key, view]), view + 1 == self.rig.views))
+        let poses: Vec<Pose> = (0..self.case.views)
+            .map(|view| self.pose(hash::mix(&[key, view]), view + 1 == self.case.views))
             .collect::<Option<_>>()?;
         let (on_bed, held) = poses.split_last()?;
         let look = |(pose, view)| self.sighting(pose, hash::mix(&[key, view, 1]));
-        let mut sightings: Vec<Sighting> = held.iter().zip(0..).filter_map(look).collect();
-        sightings.push(look((on_bed, self.rig.views - 1))?);
-        let board = &self.rig.board;
+        let mut sightings: Vec<BoardObservation> = held.iter().zip(0..).filter_map(look).collect();
+        sightings.push(look((on_bed, self.case.views - 1))?);
+        let board = &self.case.board;
         let solution = solve::solve(board, &sightings).ok()?;
-        let on_bed = OnBed::fit(&solution.model, vec![board.place(&sightings.last()?.corners)])?;
-        let covariance = Covariance::of(board, &solution, &on_bed, Mm::ZERO)?;
-        let heights = [Mm::ZERO, Mm::new(0.05 * self.rig.distance_mm).ok()?];
+        let on_bed =
+            OnBed::fit(&solution.model, vec![board.correspondences(&sightings.last()?.corners)])?;
+        let covariance = CalibrationCovariance::of(board, &solution, &on_bed, Mm::ZERO)?;
+        let heights = [Mm::ZERO, Mm::new(0.05 * self.case.distance_mm).ok()?];
         let calibration = self.calibration(&solution, &on_bed, &covariance);
         let beads = heights.into_iter().flat_map(|height| cells().map(move |at| (height, at)));
         beads
@@ -155,8 +157,8 @@ impl Bench {
                 let (ends, width_mm) = self.bead(poses.last()?, cell, height)?;
                 let map = calibration.surface(height, None);
                 let found_mm = (map.to_mm(ends[1])? - map.to_mm(ends[0])?).norm();
-                let sigma_mm = map.width_sigma_share_of(ends)? * found_mm;
-                Some(Outcome { bead, error_mm: found_mm - width_mm, sigma_mm, width_mm })
+                let sigma_mm = map.width_relative_sigma_of(ends)? * found_mm;
+                Some(CalibratedWidth { bead, error_mm: found_mm - width_mm, sigma_mm, width_mm })
             })
             .collect()
     }
@@ -166,16 +168,16 @@ impl Bench {
         &self,
         solution: &Solution,
         on_bed: &OnBed,
-        covariance: &Covariance,
+        covariance: &CalibrationCovariance,
     ) -> Calibration {
         Calibration::Full {
-            image_size_px: self.rig.image_size_px,
+            image_size_px: self.case.image_size_px,
             camera: *solution.camera(),
             bed: on_bed.bed(Mm::ZERO),
             robot_z: Mm::ZERO,
-            quality: Some(Quality {
+            quality: Some(CalibrationQuality {
                 reprojection_rms_px: solution.rms_px,
-                width_sigma_share: None,
+                width_relative_sigma: None,
                 seen_px: None,
                 heights_mm: None,
                 uncertainty: Some(covariance.uncertainty()),
@@ -185,15 +187,15 @@ impl Bench {
 
     /// One at random that shows the whole board.
     fn pose(&self, key: u64, on_bed: bool) -> Option<Pose> {
-        let draw = |again| drawn(&self.rig, hash::mix(&[key, again]), on_bed);
-        (0..MOST_TRIES).map(draw).find(|pose| is_seen(&self.rig, pose))
+        let draw = |again| random_pose(&self.case, hash::mix(&[key, again]), on_bed);
+        (0..MAX_TRIES).map(draw).find(|pose| is_in_image(&self.case, pose))
     }
 
-    fn sighting(&self, pose: &Pose, seed: u64) -> Option<Sighting> {
-        let rig = &self.rig;
+    fn sighting(&self, pose: &Pose, seed: u64) -> Option<BoardObservation> {
+        let rig = &self.case;
         if let Some(studio) = &self.studio {
             let frame = studio.take(&rig.board, pose, Exposure::SHARP, seed).ok()?;
-            return sighting::look(&rig.board, "", &frame).ok();
+            return sighting::observe(&rig.board, "", &frame).ok();
         }
         let corners = rig.board.corners_mm().into_iter().zip(0..).map(|(corner, i)| {
             let [x, y] = hash::normal_pair(hash::mix(&[seed, i]));
@@ -201,10 +203,10 @@ impl Bench {
             Some(ImagePoint::new(at.x + rig.noise_px * x, at.y + rig.noise_px * y))
         });
         let corners: Vec<ImagePoint> = corners.collect::<Option<_>>()?;
-        Some(Sighting {
+        Some(BoardObservation {
             name: String::new(),
             image_size_px: rig.image_size_px,
-            corners: all_seen(&corners),
+            corners: observe_all(&corners),
             focus: None,
         })
     }
@@ -212,7 +214,7 @@ impl Bench {
     /// Where the true camera sees the ends of a bead on the true bed \[px\], and how
     /// wide it is \[mm\].
     fn bead(&self, on_bed: &Pose, cell: [f64; 2], height: Mm) -> Option<([ImagePoint; 2], f64)> {
-        let rig = &self.rig;
+        let rig = &self.case;
         let calibration = Calibration::Full {
             image_size_px: rig.image_size_px,
             camera: rig.camera,
@@ -224,7 +226,7 @@ impl Bench {
         let sides = rig.board.corners_mm().last()?.coords;
         // Y of the bed is the board's turned over.
         let middle = [cell[0] * sides.x, -cell[1] * sides.y];
-        let half = 0.5 * WIDTH * sides.x;
+        let half = 0.5 * BEAD_WIDTH_FRACTION * sides.x;
         let end = |by: f64| {
             map.to_px(crate::core::geometry::SurfacePoint::new(middle[0] + by, middle[1]))
         };
@@ -235,12 +237,12 @@ impl Bench {
 /// Middles of the cells along the rows and columns of the board on the bed, as parts of its
 /// sides.
 fn cells() -> impl Iterator<Item = [f64; 2]> {
-    let part = |i: u32| (f64::from(i) + 0.5) / f64::from(GRID);
-    (0..GRID * GRID).map(move |i| [part(i % GRID), part(i / GRID)])
+    let part = |i: u32| (f64::from(i) + 0.5) / f64::from(GRID_CELLS);
+    (0..GRID_CELLS * GRID_CELLS).map(move |i| [part(i % GRID_CELLS), part(i / GRID_CELLS)])
 }
 
 /// A pose at random, with the board's middle somewhere in the picture.
-fn drawn(rig: &Rig, key: u64, on_bed: bool) -> Pose {
+fn random_pose(rig: &CalibrationCase, key: u64, on_bed: bool) -> Pose {
     let part = |what: u64| hash::unit(hash::mix(&[key, what]));
     let [width, height] = rig.image_size_px.map(f64::from);
     let (tilt_deg, at) = if on_bed {
@@ -262,7 +264,7 @@ fn drawn(rig: &Rig, key: u64, on_bed: bool) -> Pose {
 }
 
 /// Whether the whole board is in the picture, with its outer squares.
-fn is_seen(rig: &Rig, pose: &Pose) -> bool {
+fn is_in_image(rig: &CalibrationCase, pose: &Pose) -> bool {
     let [right, bottom] = rig.image_size_px.map(|px| f64::from(px) - 1.0);
     let side = rig.board.square().get();
     let far = rig.board.corners_mm().last().map_or_else(Vector3::zeros, |far| far.coords);
@@ -272,8 +274,8 @@ fn is_seen(rig: &Rig, pose: &Pose) -> bool {
         Point3::new(beyond(x, far.x), beyond(y, far.y), 0.0)
     });
     let inside = |px: ImagePoint| {
-        (BORDER_PX..=right - BORDER_PX).contains(&px.x)
-            && (BORDER_PX..=bottom - BORDER_PX).contains(&px.y)
+        (IMAGE_MARGIN_PX..=right - IMAGE_MARGIN_PX).contains(&px.x)
+            && (IMAGE_MARGIN_PX..=bottom - IMAGE_MARGIN_PX).contains(&px.y)
     };
     outer.iter().all(|&corner| rig.camera.project(pose.apply(corner)).is_some_and(inside))
 }

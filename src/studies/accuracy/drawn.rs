@@ -29,11 +29,11 @@ use crate::core::geometry::{Roi, Size};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::core::units::WidthRange;
-use crate::vision::{Axis, Gauge, Polarity};
+use crate::vision::{BeadAxis, Gauge, Polarity};
 use draw::Draw;
-use scene::Scene;
+use scene::DrawnScene;
 
-pub use draw::Parameter;
+pub use draw::DrawnParameter;
 pub use list::{DrawnSet, Requirements, all, named};
 pub use long_bead::LongBead;
 
@@ -51,7 +51,7 @@ pub struct DrawnFrame {
     /// the outside is no bead, a hole within it is.
     pub truth_px: f64,
     /// What was drawn.
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<DrawnParameter>,
 }
 
 impl DrawnSet {
@@ -72,10 +72,10 @@ impl DrawnSet {
     }
 }
 
-fn gauge(scene: &Scene, knows_gamma: bool) -> Gauge {
+fn gauge(scene: &DrawnScene, knows_gamma: bool) -> Gauge {
     let roi = Roi { x: 0, y: 0, width: scene.size.0, height: scene.size.1 };
     let [min, max] = [RANGE.0, RANGE.1].map(|times| Mm::constant(times * scene.width_px));
-    let gauge = Gauge::new(roi, Axis::Vertical, Polarity::Bright, WidthRange { min, max });
+    let gauge = Gauge::new(roi, BeadAxis::Vertical, Polarity::Bright, WidthRange { min, max });
     if knows_gamma { Gauge { gamma: Some(scene.gamma), ..gauge } } else { gauge }
 }
 

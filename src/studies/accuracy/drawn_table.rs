@@ -6,7 +6,7 @@ mod limits;
 mod parts;
 mod tables;
 
-pub use figures::{Deviation, DrawnFigures, DrawnOutcome, Part, Refusal};
+pub use figures::{Deviation, DrawnFigures, DrawnOutcome, FrameRejection, SetPart};
 pub use parts::figures;
 pub use tables::{markdown, table};
 

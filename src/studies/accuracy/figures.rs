@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// Error and standard deviation of one measured width \[mm\].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outcome {
+pub struct WidthError {
     /// Measured less true width.
     pub error_mm: f64,
     /// As the measurement believes it.
@@ -39,9 +39,9 @@ pub struct SetFigures {
     /// Root of the mean square of the error \[mm\].
     pub rmse_mm: Option<f64>,
     /// Share of the frames that gave a width.
-    pub measured_share: f64,
+    pub measured_fraction: f64,
     /// Share of the frames that gave a width more than half a pixel off.
-    pub silent_share: f64,
+    pub silent_fraction: f64,
     /// Root of the mean square of the error over its standard deviation.
     pub rms_over_sigma: Option<f64>,
     /// Share of the widths whose 95 % interval holds the true one.
@@ -86,7 +86,7 @@ fn short(value: f64) -> f64 {
 }
 
 #[expect(clippy::cast_precision_loss, reason = "no set has 2^53 frames")]
-pub(super) fn share(part: usize, of: usize) -> f64 {
+pub(super) fn fraction(part: usize, of: usize) -> f64 {
     part as f64 / of.max(1) as f64
 }
 

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use super::share;
+use super::fraction;
 use super::table::{aligned, marked};
 use crate::numeric::statistics::Moments;
 
@@ -13,9 +13,9 @@ const MAX_ROUGHNESS_ERROR: f64 = 0.20;
 const MAX_LENGTH_ERROR: f64 = 0.30;
 /// Smallest and largest root of the mean square of a width's error against the bead's own
 /// mean, over sigma with roughness.
-const Z: (f64, f64) = (0.85, 1.15);
+const Z_RANGE: (f64, f64) = (0.85, 1.15);
 /// Parts of the range of correlation lengths.
-const PARTS: [&str; 3] = ["short waves", "middle waves", "long waves"];
+const LENGTH_PARTS: [&str; 3] = ["short waves", "middle waves", "long waves"];
 
 /// What came of one bead.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,20 +23,20 @@ pub struct BeadOutcome {
     /// True correlation length \[px\].
     pub length_px: f64,
     /// What frames found; none where they left it open.
-    pub found: Option<Found>,
+    pub estimate: Option<RoughnessEstimate>,
     /// Each measured frame's error against the bead's own mean \[px\].
     pub widths: Vec<OwnMeanError>,
 }
 
 /// What successive frames found, over what is true.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
+pub struct RoughnessEstimate {
     /// Roughness.
     pub roughness: Ratio,
     /// Correlation length.
     pub length: Ratio,
     /// Standard deviation of a gauge's mean about the bead's own mean \[px\].
-    pub of_gauge_mean_px: f64,
+    pub gauge_mean_sigma_px: f64,
 }
 
 /// An estimate over its truth.
@@ -67,7 +67,7 @@ pub struct RoughnessFigures {
     /// Their number.
     pub beads: usize,
     /// Share whose roughness was determined.
-    pub determined_share: f64,
+    pub determined_fraction: f64,
     /// Median of found over true roughness.
     pub roughness_median: Option<f64>,
     /// Median of |found/true − 1|; a bead without an estimate counts as 1.
@@ -103,7 +103,7 @@ pub fn figures(
     let mut all = RoughnessFigures::of(advance_px, "all", &every);
     all.missed = all.misses();
     let mut parts = vec![all];
-    for (number, part) in (0u32..).zip(PARTS) {
+    for (number, part) in (0u32..).zip(LENGTH_PARTS) {
         let end = |number: u32| from * libm::pow(to / from, f64::from(number) / 3.0);
         let within = end(number)..end(number + 1);
         let some: Vec<&BeadOutcome> =
@@ -117,14 +117,14 @@ impl RoughnessFigures {
     fn of(advance_px: usize, part: &'static str, outcomes: &[&BeadOutcome]) -> Self {
         let (mut widths, mut alone) = (Moments::default(), Moments::default());
         for outcome in outcomes {
-            let Some(found) = outcome.found else { continue };
+            let Some(found) = outcome.estimate else { continue };
             for width in &outcome.widths {
-                widths.add(width.error_px / width.sigma_px.hypot(found.of_gauge_mean_px));
+                widths.add(width.error_px / width.sigma_px.hypot(found.gauge_mean_sigma_px));
                 alone.add(width.error_px / width.sigma_px);
             }
         }
-        let of = |ratio: fn(&Found) -> Ratio| {
-            let found = |outcome: &&BeadOutcome| outcome.found.as_ref().map(ratio);
+        let of = |ratio: fn(&RoughnessEstimate) -> Ratio| {
+            let found = |outcome: &&BeadOutcome| outcome.estimate.as_ref().map(ratio);
             let errors = outcomes
                 .iter()
                 .map(|outcome| found(outcome).map_or(1.0, |ratio| (ratio.value - 1.0).abs()));
@@ -137,12 +137,12 @@ impl RoughnessFigures {
         };
         let (roughness_median, roughness_error, roughness_z) = of(|found| found.roughness);
         let (length_median, length_error, length_z) = of(|found| found.length);
-        let determined = outcomes.iter().filter(|outcome| outcome.found.is_some()).count();
+        let determined = outcomes.iter().filter(|outcome| outcome.estimate.is_some()).count();
         Self {
             advance_px,
             part,
             beads: outcomes.len(),
-            determined_share: share(determined, outcomes.len()),
+            determined_fraction: fraction(determined, outcomes.len()),
             roughness_median,
             roughness_error,
             roughness_z,
@@ -165,8 +165,8 @@ impl RoughnessFigures {
             let error = error.filter(|error| *error > most)?;
             Some(format!("median error of {name} {error:.2} > {most}"))
         });
-        let of_width = self.width_z.filter(|z| !(Z.0..=Z.1).contains(z));
-        let of_width = of_width.map(|z| format!("z {z:.2}, not {} to {}", Z.0, Z.1));
+        let of_width = self.width_z.filter(|z| !(Z_RANGE.0..=Z_RANGE.1).contains(z));
+        let of_width = of_width.map(|z| format!("z {z:.2}, not {} to {}", Z_RANGE.0, Z_RANGE.1));
         missed.chain(of_width).collect()
     }
 }
@@ -204,7 +204,7 @@ fn cells(figures: &RoughnessFigures) -> [String; COLUMNS] {
         figures.part.to_owned(),
         figures.advance_px.to_string(),
         figures.beads.to_string(),
-        percent(Some(figures.determined_share)),
+        percent(Some(figures.determined_fraction)),
         number(figures.roughness_median, 2),
         percent(figures.roughness_error),
         number(figures.roughness_z, 2),
@@ -241,10 +241,10 @@ mod tests {
         let ratio = |value: f64| Ratio { value, sigma: 0.1 };
         let bead = |value: f64, error_px: f64| BeadOutcome {
             length_px: 10.0,
-            found: Some(Found {
+            estimate: Some(RoughnessEstimate {
                 roughness: ratio(value),
                 length: ratio(1.0),
-                of_gauge_mean_px: 0.4,
+                gauge_mean_sigma_px: 0.4,
             }),
             widths: vec![OwnMeanError { error_px, sigma_px: 0.3 }; 2],
         };
@@ -255,7 +255,7 @@ mod tests {
         assert_eq!(of(&rough), "median error of roughness 0.30 > 0.2");
         let far = [bead(1.0, 0.6), bead(1.0, -0.6), bead(1.0, 0.6)];
         assert_eq!(of(&far), "z 1.20, not 0.85 to 1.15");
-        let open = BeadOutcome { found: None, ..bead(1.0, 0.5) };
+        let open = BeadOutcome { estimate: None, ..bead(1.0, 0.5) };
         assert!(of(&[open.clone(), open, bead(1.0, 0.5)]).contains("length 1.00 > 0.3"));
     }
 }

@@ -7,17 +7,17 @@ mod list;
 use crate::core::geometry::Roi;
 use crate::core::units::Mm;
 use crate::core::units::WidthRange;
-use crate::scenario::bead::Roughness;
-use crate::scenario::image::Picture;
-use crate::vision::{Axis, Gauge, Polarity};
+use crate::scenario::bead::EdgeRoughness;
+use crate::scenario::image::ImageModel;
+use crate::vision::{BeadAxis, Gauge, Polarity};
 
-pub use limits::Limits;
+pub use limits::SetLimits;
 pub use list::all;
 
 /// Scale of all sets without a camera model, that of the 2022 paper.
 pub const MM_PER_PX: f64 = 0.126_582;
 /// The gauge's extent across the bead, and that of the picture \[px\].
-const ACROSS: (usize, u32) = (640, 720);
+const ACROSS_PX: (usize, u32) = (640, 720);
 
 /// Pictures of one kind.
 #[derive(Debug, Clone)]
@@ -25,21 +25,21 @@ pub struct Set {
     /// What it is called.
     pub name: &'static str,
     /// How the bead is pictured; the size is that of the set.
-    pub picture: Picture,
+    pub picture: ImageModel,
     /// Rows of the gauge; of a horizontal bead columns.
     pub rows: u32,
     /// Width of the bead in the mean \[mm\].
     pub width_mm: f64,
     /// Roughness of its edges.
-    pub roughness: Roughness,
+    pub roughness: EdgeRoughness,
     /// How it runs in the picture.
-    pub axis: Axis,
+    pub axis: BeadAxis,
     /// The bead against its surroundings.
     pub polarity: Polarity,
     /// Seen by a tilted camera through a lens with distortion.
     pub tilted: bool,
     /// What the measurement must reach.
-    pub limits: Limits,
+    pub limits: SetLimits,
 }
 
 impl Set {
@@ -87,7 +87,8 @@ impl Set {
 
     /// Smallest variance of an edge's place along a row e² \[px²\].
     fn row_variance(&self) -> f64 {
-        let Picture { bead_grey, ground_grey, noise_grey, blur_px, slant_deg, .. } = self.picture;
+        let ImageModel { bead_grey, ground_grey, noise_grey, blur_px, slant_deg, .. } =
+            self.picture;
         let share = noise_grey / (bead_grey - ground_grey);
         let along_row = blur_px / libm::cos(slant_deg.to_radians());
         2.0 * std::f64::consts::PI.sqrt() * share * share * along_row
@@ -96,14 +97,14 @@ impl Set {
     /// Whether silently wrong widths are limited, for which many frames are
     /// needed.
     pub fn limits_silent(&self) -> bool {
-        self.limits.silent_share.is_some()
+        self.limits.silent_fraction.is_some()
     }
 
     /// Size of the pictures \[px\], where no camera model sets it.
     pub fn size_px(&self) -> [u32; 2] {
         match self.axis {
-            Axis::Vertical => [ACROSS.1, self.rows + 20],
-            Axis::Horizontal => [self.rows + 20, ACROSS.1],
+            BeadAxis::Vertical => [ACROSS_PX.1, self.rows + 20],
+            BeadAxis::Horizontal => [self.rows + 20, ACROSS_PX.1],
         }
     }
 
@@ -112,8 +113,8 @@ impl Set {
         let rows = usize::try_from(self.rows).unwrap_or(usize::MAX);
         let first = if self.tilted { 20 } else { 10 };
         let roi = match self.axis {
-            Axis::Vertical => Roi { x: 40, y: first, width: ACROSS.0, height: rows },
-            Axis::Horizontal => Roi { x: first, y: 40, width: rows, height: ACROSS.0 },
+            BeadAxis::Vertical => Roi { x: 40, y: first, width: ACROSS_PX.0, height: rows },
+            BeadAxis::Horizontal => Roi { x: first, y: 40, width: rows, height: ACROSS_PX.0 },
         };
         let range = if self.width_mm < 20.0 { [5.0, 25.0] } else { [20.0, 60.0] };
         let [min, max] = range.map(Mm::constant);
@@ -135,7 +136,7 @@ mod tests {
         let sets = all();
         let names: BTreeSet<&str> = sets.iter().map(|set| set.name).collect();
         assert_eq!(names.len(), sets.len());
-        assert!(sets.iter().all(|set| set.limits != Limits::default()));
+        assert!(sets.iter().all(|set| set.limits != SetLimits::default()));
     }
 
     #[test]

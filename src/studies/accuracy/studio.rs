@@ -9,8 +9,8 @@ use crate::calibration::{Calibration, Camera, SurfaceMap};
 use crate::core::geometry::Pose;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
-use crate::scenario::bead::Roughness;
-use crate::scenario::image::Picture;
+use crate::scenario::bead::EdgeRoughness;
+use crate::scenario::image::ImageModel;
 use crate::sim::hash;
 use crate::sim::render::{RenderError, Rendered, Renderer};
 use crate::sim::view::gauge_middle;
@@ -18,22 +18,22 @@ use crate::sim::waviness::Waviness;
 use crate::vision::Gauge;
 
 /// Widths and places are uniform within this distance of the middle ones \[px\].
-const SWAY_PX: f64 = 1.0;
+const JITTER_PX: f64 = 1.0;
 
 /// Makes the pictures of a set.
 #[derive(Debug, Clone)]
-pub struct Studio {
+pub struct SetStudio {
     renderer: Renderer,
     surface: SurfaceMap,
     gauge: Gauge,
     width_mm: f64,
-    roughness: Roughness,
+    roughness: EdgeRoughness,
     seed: u64,
     /// Of the middle of the gauge.
     mm_per_px: f64,
 }
 
-impl Studio {
+impl SetStudio {
     /// For the pictures of a set.
     pub fn new(set: &Set) -> Result<Self, RenderError> {
         let calibration = if set.tilted {
@@ -45,7 +45,7 @@ impl Studio {
         let gauge = set.gauge();
         let surface = calibration.surface(height, None);
         let seed = hash::mix(&set.name.bytes().map(u64::from).collect::<Vec<_>>());
-        let picture = Picture { size_px: set.size_px(), ..set.picture };
+        let picture = ImageModel { size_px: set.size_px(), ..set.picture };
         let mm_per_px =
             surface.mm_per_px(gauge_middle(&gauge.roi)).map_or(MM_PER_PX, |mm| mm.column(0).norm());
         let renderer = Renderer::new(calibration, height, gauge, picture, seed)?;
@@ -57,7 +57,7 @@ impl Studio {
     pub fn take(&self, frame: u64) -> Result<Rendered, RenderError> {
         let sway = |what: u64| {
             let share = hash::unit(hash::mix(&[self.seed, frame, what]));
-            (2.0 * share - 1.0) * SWAY_PX * self.mm_per_px
+            (2.0 * share - 1.0) * JITTER_PX * self.mm_per_px
         };
         let half = 0.5 * (self.width_mm + sway(1));
         let aside = sway(2);
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn pictures_are_of_their_set_and_frame_and_have_a_truth() {
         for set in all() {
-            let studio = Studio::new(&set).unwrap();
+            let studio = SetStudio::new(&set).unwrap();
             let (first, second) = (studio.take(0).unwrap(), studio.take(1).unwrap());
             let size = if set.tilted { [720, 540] } else { set.size_px() };
             let size = size.map(|side| usize::try_from(side).unwrap());

@@ -33,8 +33,8 @@ fn cells(figures: &SetFigures) -> [String; COLUMNS] {
         number(figures.rmse_over_bound, 2),
         number(Some(figures.free_bound_px), 4),
         number(figures.rmse_over_free_bound, 2),
-        number(Some(100.0 * figures.measured_share), 2),
-        number(Some(100.0 * figures.silent_share), 3),
+        number(Some(100.0 * figures.measured_fraction), 2),
+        number(Some(100.0 * figures.silent_fraction), 3),
         number(figures.rms_over_sigma, 2),
         number(figures.within_interval.map(|share| 100.0 * share), 1),
         match figures.kept {

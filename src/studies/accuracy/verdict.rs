@@ -1,7 +1,7 @@
 //! Figures held against the limits of their set.
 
 use super::figures::{Miss, SetFigures};
-use super::sets::Limits;
+use super::sets::SetLimits;
 
 /// A figure and what it must keep to.
 #[derive(Clone, Copy)]
@@ -10,14 +10,14 @@ struct Check {
     /// 100 for shares that are shown in percent.
     scale: f64,
     value: Option<f64>,
-    least: Option<f64>,
-    most: Option<f64>,
+    min: Option<f64>,
+    max: Option<f64>,
 }
 
 impl Check {
     fn miss(self) -> Option<Miss> {
-        let below = self.least.filter(|least| self.value.is_none_or(|value| value < *least));
-        let above = self.most.filter(|most| self.value.is_none_or(|value| value > *most));
+        let below = self.min.filter(|least| self.value.is_none_or(|value| value < *least));
+        let above = self.max.filter(|most| self.value.is_none_or(|value| value > *most));
         below.or(above).map(|limit| Miss {
             figure: self.figure,
             value: self.value.map(|value| self.scale * value),
@@ -26,13 +26,13 @@ impl Check {
     }
 }
 
-fn at_most(figure: &'static str, value: Option<f64>, most: Option<f64>) -> Check {
-    Check { figure, scale: 1.0, value: value.map(f64::abs), least: None, most }
+fn at_most(figure: &'static str, value: Option<f64>, max: Option<f64>) -> Check {
+    Check { figure, scale: 1.0, value: value.map(f64::abs), min: None, max }
 }
 
 fn within(figure: &'static str, value: Option<f64>, range: Option<[f64; 2]>) -> Check {
-    let (least, most) = (range.map(|range| range[0]), range.map(|range| range[1]));
-    Check { figure, scale: 1.0, value, least, most }
+    let (min, max) = (range.map(|range| range[0]), range.map(|range| range[1]));
+    Check { figure, scale: 1.0, value, min, max }
 }
 
 fn percent(check: Check) -> Check {
@@ -40,9 +40,9 @@ fn percent(check: Check) -> Check {
 }
 
 /// What misses its limit; a limit that nothing was measured against is missed.
-pub fn misses(limits: &Limits, figures: &SetFigures) -> Vec<Miss> {
-    let (measured, silent) = (Some(figures.measured_share), Some(figures.silent_share));
-    let enough = limits.measured_share.map(|least| [least, 1.0]);
+pub fn misses(limits: &SetLimits, figures: &SetFigures) -> Vec<Miss> {
+    let (measured, silent) = (Some(figures.measured_fraction), Some(figures.silent_fraction));
+    let enough = limits.measured_fraction.map(|least| [least, 1.0]);
     let checks = [
         at_most("bias px", figures.bias_px, limits.bias_px),
         at_most("bias mm", figures.bias_mm, limits.bias_mm),
@@ -50,7 +50,7 @@ pub fn misses(limits: &Limits, figures: &SetFigures) -> Vec<Miss> {
         at_most("RMSE mm", figures.rmse_mm, limits.rmse_mm),
         at_most("RMSE/free bound", figures.rmse_over_free_bound, limits.rmse_over_free_bound),
         percent(within("measured %", measured, enough)),
-        percent(at_most("silent %", silent, limits.silent_share)),
+        percent(at_most("silent %", silent, limits.silent_fraction)),
         within("RMS e/σ", figures.rms_over_sigma, limits.rms_over_sigma),
         percent(within("in 95 %", figures.within_interval, limits.within_interval)),
     ];
@@ -73,8 +73,8 @@ mod tests {
             rmse_over_free_bound: Some(1.0),
             bias_mm: Some(-0.004),
             rmse_mm: Some(0.005),
-            measured_share: 0.99,
-            silent_share: 1e-4,
+            measured_fraction: 0.99,
+            silent_fraction: 1e-4,
             rms_over_sigma: Some(0.9),
             within_interval: Some(0.97),
             kept: None,
@@ -84,9 +84,9 @@ mod tests {
 
     #[test]
     fn a_figure_at_its_limit_keeps_it() {
-        assert_eq!(misses(&Limits::DISTURBED, &figures()), []);
-        assert_eq!(misses(&Limits::TRUST, &figures()), []);
-        assert_eq!(misses(&Limits::default(), &figures()), []);
+        assert_eq!(misses(&SetLimits::DISTURBED, &figures()), []);
+        assert_eq!(misses(&SetLimits::TRUST, &figures()), []);
+        assert_eq!(misses(&SetLimits::default(), &figures()), []);
     }
 
     #[test]
@@ -95,12 +95,12 @@ mod tests {
             misses(&limits, &figures).iter().map(Miss::to_string).collect()
         };
         let expected = ["bias px 0.04 > 0.005", "measured % 99 < 100"];
-        assert_eq!(said(Limits::CLEAN, figures()), expected);
-        let silent = SetFigures { silent_share: 2e-4, ..figures() };
-        assert_eq!(said(Limits::CORNER, silent), ["silent % 0.02 > 0.01"]);
+        assert_eq!(said(SetLimits::CLEAN, figures()), expected);
+        let silent = SetFigures { silent_fraction: 2e-4, ..figures() };
+        assert_eq!(said(SetLimits::CORNER, silent), ["silent % 0.02 > 0.01"]);
         let wary = SetFigures { rms_over_sigma: Some(0.5), ..figures() };
-        assert_eq!(said(Limits::TRUST, wary), ["RMS e/σ 0.5 < 0.9"]);
+        assert_eq!(said(SetLimits::TRUST, wary), ["RMS e/σ 0.5 < 0.9"]);
         let nothing = SetFigures { bias_px: None, ..figures() };
-        assert_eq!(said(Limits::CURVE, nothing), ["bias px none"]);
+        assert_eq!(said(SetLimits::CURVE, nothing), ["bias px none"]);
     }
 }

@@ -7,7 +7,7 @@ use crate::cell::file::{Cell, RunPart};
 use crate::core::time::Span;
 use crate::core::units::Mm;
 use crate::width_control::strategy::distance::DistanceStrategy;
-use crate::width_control::target::Target;
+use crate::width_control::target::WidthTarget;
 
 /// Length of the gauge \[mm\].
 const GAUGE: Mm = Mm::constant(12.7);
@@ -18,20 +18,20 @@ const LATENCY: Span = Span::from_millis(20);
 /// are random.
 const STEP: Span = Span::from_millis(5);
 /// What the law is told of the bead, whatever its width: b = 0.25.
-const TOLD: f64 = 0.25;
+const ASSUMED_EXPONENT: f64 = 0.25;
 /// How far the flow is said to wander along a metre, as a share.
 const DRIFT: f64 = 0.0055;
 
 /// Rates of camera and robot link \[Hz\].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rates {
+pub struct LoopRates {
     /// Frames a second.
     pub vision_hz: f64,
     /// Setpoints a second.
     pub link_hz: f64,
 }
 
-impl Rates {
+impl LoopRates {
     /// Those of the paper.
     pub const PAPER: Self = Self { vision_hz: 10.0, link_hz: 5.0 };
     /// Those of a camera and a link of today.
@@ -40,17 +40,17 @@ impl Rates {
 
 /// Who sets the speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Contender {
+pub enum ControlSetup {
     /// The paper's PI law at its rates.
     Paper,
     /// The law by distance, told an exponent.
-    Distance(Rates, f64),
+    Distance(LoopRates, f64),
 }
 
-impl Contender {
+impl ControlSetup {
     /// By distance with b = 0.25.
-    pub const fn by_distance(rates: Rates) -> Self {
-        Self::Distance(rates, TOLD)
+    pub const fn by_distance(rates: LoopRates) -> Self {
+        Self::Distance(rates, ASSUMED_EXPONENT)
     }
 
     /// The paper's cell with a gauge of 12.7 mm and this one at its controls.
@@ -58,7 +58,7 @@ impl Contender {
         let (mut cell, mut run) = (cell.clone(), run.clone());
         cell.simulation.gauge_length = GAUGE;
         if let Ok(width) = Mm::new(target_mm) {
-            run.control.target = Target::constant(width);
+            run.control.target = WidthTarget::constant(width);
         }
         if let Self::Distance(rates, exponent) = self {
             cell.simulation.latency = LATENCY;

@@ -2,52 +2,52 @@
 
 use rayon::prelude::*;
 
-use super::{Contender, scale};
+use super::{ControlSetup, scale};
 use crate::cell::file::{Cell, RunPart};
 use crate::core::units::Mm;
 use crate::numeric::average::{mean, median};
-use crate::sim::cell::SimError;
-use crate::trials::layer::Trial;
+use crate::sim::cell::SimCellError;
+use crate::trials::layer::LayerTrial;
 
 /// Width of the disturbed layers \[mm\].
 const TARGET_MM: f64 = 42.0;
 /// Camera to nozzle where a disturbance is to be answered.
-const NEAR: Mm = Mm::constant(60.0);
+const NEAR_OFFSET: Mm = Mm::constant(60.0);
 /// Amplitude of waves and pulsations, as a share of the flow.
-const SHARE: f64 = 0.03;
+const AMPLITUDE: f64 = 0.03;
 /// Speed to reckon with \[mm/s\].
 const SPEED_MM_PER_S: f64 = 80.0;
 /// Where control begins, and some way to settle \[mm\].
-const BEGUN_MM: f64 = 220.0;
+const CONTROL_START_MM: f64 = 220.0;
 
 /// A disturbance of the flow that goes on.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Disturbance {
+pub enum FlowDisturbance {
     /// A sine along the path, of this wavelength \[mm\].
     Wave(f64),
     /// A pulsation of pump or screw, of this period \[s\].
     Pulsation(f64),
 }
 
-impl Disturbance {
+impl FlowDisturbance {
     /// A cell with this disturbance, long enough to judge it, and where to
     /// begin with that \[mm\].
     fn enter(self, cell: &mut Cell, run: &mut RunPart) -> f64 {
         let flow = &mut cell.simulation.flow;
         let (from, length) = match self {
             Self::Wave(wavelength_mm) => {
-                flow.wave_share = SHARE;
+                flow.wave_amplitude = AMPLITUDE;
                 flow.wavelength_mm = wavelength_mm;
                 cell.simulation.random_phase = false;
                 look_near(run);
-                let from = (BEGUN_MM + 2.0 * wavelength_mm).max(700.0);
-                (from, (12.0 * wavelength_mm).max(3000.0) + BEGUN_MM)
+                let from = (CONTROL_START_MM + 2.0 * wavelength_mm).max(700.0);
+                (from, (12.0 * wavelength_mm).max(3000.0) + CONTROL_START_MM)
             }
             Self::Pulsation(period_s) => {
-                flow.pulse_share = SHARE;
+                flow.pulse_amplitude = AMPLITUDE;
                 flow.pulse_period_s = period_s;
                 let seen_s = 5.0 * period_s + 1.0;
-                (BEGUN_MM + SPEED_MM_PER_S * seen_s, SPEED_MM_PER_S * (seen_s + 20.0))
+                (CONTROL_START_MM + SPEED_MM_PER_S * seen_s, SPEED_MM_PER_S * (seen_s + 20.0))
             }
         };
         cell.simulation.path = Mm::new(length).unwrap_or(cell.simulation.path);
@@ -58,24 +58,25 @@ impl Disturbance {
 /// Puts the camera near the nozzle.
 fn look_near(run: &mut RunPart) {
     let share = run.camera.offset_sigma / run.camera.offset;
-    run.camera.offset = NEAR;
-    run.camera.offset_sigma = NEAR * share;
+    run.camera.offset = NEAR_OFFSET;
+    run.camera.offset_sigma = NEAR_OFFSET * share;
 }
 
 /// Root mean square error of the bead over that of one which nobody corrects,
 /// as the mean over seeds.
-pub fn unrest(
+pub fn error_ratio(
     cell: &Cell,
     run: &RunPart,
-    who: Contender,
-    what: Disturbance,
+    who: ControlSetup,
+    what: FlowDisturbance,
     seeds: u64,
-) -> Result<f64, SimError> {
+) -> Result<f64, SimCellError> {
     let (mut cell, mut run) = who.enter(cell, run, TARGET_MM);
     let from = what.enter(&mut cell, &mut run);
-    let open = TARGET_MM * SHARE / std::f64::consts::SQRT_2;
-    let found =
-        each(seeds, |seed| Ok(Trial::lay(&cell, &run, &scale(), seed)?.rms_error(from) / open))?;
+    let open = TARGET_MM * AMPLITUDE / std::f64::consts::SQRT_2;
+    let found = each(seeds, |seed| {
+        Ok(LayerTrial::lay(&cell, &run, &scale(), seed)?.rms_error(from) / open)
+    })?;
     Ok(mean(found.into_iter()))
 }
 
@@ -84,9 +85,9 @@ pub fn unrest(
 pub fn step_settles(
     cell: &Cell,
     run: &RunPart,
-    who: Contender,
+    who: ControlSetup,
     seeds: u64,
-) -> Result<f64, SimError> {
+) -> Result<f64, SimCellError> {
     let (mut cell, mut run) = who.enter(cell, run, TARGET_MM);
     look_near(&mut run);
     cell.simulation.path = Mm::constant(3000.0);
@@ -96,14 +97,14 @@ pub fn step_settles(
         let at = 1000.0 + (3 * seed) as f64;
         cell.simulation.flow.step_at_mm = at;
         cell.simulation.flow.step_ratio = 1.08;
-        Ok(Trial::lay(&cell, &run, &scale(), seed)?.settles_within(at, 0.5))
+        Ok(LayerTrial::lay(&cell, &run, &scale(), seed)?.settles_within(at, 0.5))
     })?;
     Ok(median(&mut found))
 }
 
 /// What the controller is told wrong, and what its camera does.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wrong {
+pub struct Mismatch {
     /// Camera's distance as it is told, over the true one.
     pub offset: f64,
     /// Share of widths that are outliers.
@@ -112,14 +113,14 @@ pub struct Wrong {
     pub missing: f64,
 }
 
-impl Wrong {
+impl Mismatch {
     /// Nothing is wrong.
-    pub const NOTHING: Self = Self { offset: 1.0, outliers: 0.0, missing: 0.0 };
+    pub const NONE: Self = Self { offset: 1.0, outliers: 0.0, missing: 0.0 };
 }
 
 /// Root mean square errors of many beads \[mm\].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Borne {
+pub struct BeadErrors {
     /// Their median.
     pub median_mm: f64,
     /// Their mean, in which one bead that goes astray shows.
@@ -127,29 +128,29 @@ pub struct Borne {
 }
 
 /// Root mean square error of the bead from 500 mm after control began, over seeds.
-pub fn wrong(
+pub fn mismatched(
     cell: &Cell,
     run: &RunPart,
-    who: Contender,
-    what: Wrong,
+    who: ControlSetup,
+    what: Mismatch,
     seeds: u64,
-) -> Result<Borne, SimError> {
+) -> Result<BeadErrors, SimCellError> {
     let (mut cell, run) = who.enter(cell, run, TARGET_MM);
-    cell.simulation.outlier_share = what.outliers;
-    cell.simulation.missing_share = what.missing;
-    let told = what.offset;
+    cell.simulation.outlier_fraction = what.outliers;
+    cell.simulation.missing_fraction = what.missing;
+    let offset_factor = what.offset;
     let mut found = each(seeds, |seed| {
-        let trial = Trial::lay_told(&cell, &run, &scale(), told, seed)?;
-        Ok(trial.rms_error(trial.begun_mm + 500.0))
+        let trial = LayerTrial::lay_mismatched(&cell, &run, &scale(), offset_factor, seed)?;
+        Ok(trial.rms_error(trial.control_start_mm + 500.0))
     })?;
     let mean_mm = mean(found.iter().copied());
-    Ok(Borne { median_mm: median(&mut found), mean_mm })
+    Ok(BeadErrors { median_mm: median(&mut found), mean_mm })
 }
 
 /// A number of every seed, in parallel.
 pub(super) fn each<T: Send>(
     seeds: u64,
-    of: impl Fn(u64) -> Result<T, SimError> + Send + Sync,
-) -> Result<Vec<T>, SimError> {
+    of: impl Fn(u64) -> Result<T, SimCellError> + Send + Sync,
+) -> Result<Vec<T>, SimCellError> {
     (0..seeds).into_par_iter().map(of).collect()
 }

@@ -1,16 +1,16 @@
 //! The four layers.
 
 use super::disturbed::each;
-use super::{Contender, scale};
+use super::{ControlSetup, scale};
 use crate::cell::file::{Cell, RunPart};
 use crate::core::units::Mm;
 use crate::numeric::average::median;
-use crate::scenario::table::Level;
-use crate::sim::cell::SimError;
-use crate::trials::compare::{JUDGED_AFTER_MM, SCATTER_AFTER_MM};
-use crate::trials::layer::Trial;
-use crate::trials::score::Score;
-use crate::vision::Method;
+use crate::scenario::table::WidthSource;
+use crate::sim::cell::SimCellError;
+use crate::trials::compare::{JUDGED_AFTER_MM, SIGMA_AFTER_MM};
+use crate::trials::layer::LayerTrial;
+use crate::trials::score::LayerScore;
+use crate::vision::MeasureMethod;
 
 /// What a layer came to, as the median over seeds.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,23 +36,26 @@ pub struct LayerResult {
     /// Frames that were refused, over all seeds.
     pub refused: u64,
     /// Widths and speeds over path of the first seed.
-    pub example: Score,
+    pub example: LayerScore,
 }
 
 /// Lays a layer with several seeds, in parallel, and takes medians.
-pub fn lay(cell: &Cell, run: &RunPart, seeds: u64) -> Result<LayerResult, SimError> {
-    let trials = each(seeds, |seed| Trial::lay(cell, run, &scale(), seed))?;
-    let of =
-        |value: &dyn Fn(&Trial) -> f64| median(&mut trials.iter().map(value).collect::<Vec<f64>>());
-    let settled = of(&|trial| trial.settles_within(trial.begun_mm, 0.5));
+pub fn lay(cell: &Cell, run: &RunPart, seeds: u64) -> Result<LayerResult, SimCellError> {
+    let trials = each(seeds, |seed| LayerTrial::lay(cell, run, &scale(), seed))?;
+    let of = |value: &dyn Fn(&LayerTrial) -> f64| {
+        median(&mut trials.iter().map(value).collect::<Vec<f64>>())
+    };
+    let settled = of(&|trial| trial.settles_within(trial.control_start_mm, 0.5));
     Ok(LayerResult {
         mean_error_mm: of(&|trial| trial.score.mean_error()),
         rms_error_mm: of(&|trial| trial.score.rms_error()),
         mean_speed_mm_per_s: of(&|trial| trial.score.mean_speed()),
-        bead_mean_error_mm: of(&|trial| trial.mean_error(trial.begun_mm + JUDGED_AFTER_MM)),
-        bead_rms_error_mm: of(&|trial| trial.rms_error(trial.begun_mm + JUDGED_AFTER_MM)),
-        error_integral_mm2: of(&|trial| trial.error_integral(trial.begun_mm)),
-        bead_scatter_mm: of(&|trial| trial.scatter(trial.begun_mm + SCATTER_AFTER_MM)),
+        bead_mean_error_mm: of(&|trial| trial.mean_error(trial.control_start_mm + JUDGED_AFTER_MM)),
+        bead_rms_error_mm: of(&|trial| trial.rms_error(trial.control_start_mm + JUDGED_AFTER_MM)),
+        error_integral_mm2: of(&|trial| trial.error_integral(trial.control_start_mm)),
+        bead_scatter_mm: of(&|trial| {
+            trial.standard_deviation(trial.control_start_mm + SIGMA_AFTER_MM)
+        }),
         settled_mm: settled.is_finite().then_some(settled),
         refused: trials.iter().map(|trial| trial.score.refused()).sum(),
         example: trials.into_iter().next().map(|trial| trial.score).unwrap_or_default(),
@@ -65,22 +68,23 @@ pub fn lay(cell: &Cell, run: &RunPart, seeds: u64) -> Result<LayerResult, SimErr
 pub fn settles_unseen(
     cell: &Cell,
     run: &RunPart,
-    who: Contender,
+    who: ControlSetup,
     target_mm: f64,
     seeds: u64,
-) -> Result<f64, SimError> {
+) -> Result<f64, SimCellError> {
     let (cell, mut run) = who.enter(cell, run, target_mm);
     run.robot.start_length = Mm::ZERO;
-    let mut found =
-        each(seeds, |seed| Ok(Trial::lay(&cell, &run, &scale(), seed)?.settles_within(0.0, 0.5)))?;
+    let mut found = each(seeds, |seed| {
+        Ok(LayerTrial::lay(&cell, &run, &scale(), seed)?.settles_within(0.0, 0.5))
+    })?;
     Ok(median(&mut found))
 }
 
 /// The paper's cell with every frame rendered and measured by a method.
-pub fn with_frames(cell: &Cell, method: Method) -> Cell {
+pub fn with_frames(cell: &Cell, method: MeasureMethod) -> Cell {
     let mut cell = cell.clone();
-    cell.simulation.level = Level::Frames;
-    cell.simulation.roughness.size_mm = 0.1;
+    cell.simulation.width_source = WidthSource::Frames;
+    cell.simulation.roughness.sigma_mm = 0.1;
     cell.gauge.method = method;
     cell
 }

@@ -12,9 +12,9 @@ use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::numeric::average::mean;
 use crate::run::runner::NoRecorder;
-use crate::sim::cell::{Sight, SimCell, SimError, Witness};
-use crate::trials::score::Score;
-use crate::width_control::target::Target;
+use crate::sim::cell::{FrameObservation, Observer, SimCell, SimCellError};
+use crate::trials::score::LayerScore;
+use crate::width_control::target::WidthTarget;
 
 /// Two layers, one upon the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,20 +31,20 @@ pub struct Stack {
 
 /// Lays two layers of 38 mm, the second 20 mm higher and a little aside, under
 /// a camera that rises with the nozzle.
-pub fn stack(cell: &Cell, run: &RunPart, aside_mm: f64) -> Result<Stack, SimError> {
+pub fn stack(cell: &Cell, run: &RunPart, aside_mm: f64) -> Result<Stack, SimCellError> {
     const LAYER_MM: f64 = 20.0;
     let (mut middles, mut widths, mut truths) = ([0.0; 2], [0.0; 2], [0.0; 2]);
     for (layer, raised) in [0.0, LAYER_MM].into_iter().enumerate() {
         let mut cell = cell.clone();
         cell.surface_height = Mm::new(raised + LAYER_MM).unwrap_or_default();
-        cell.simulation.picture.lateral_mm = if layer == 1 { aside_mm } else { 0.0 };
+        cell.simulation.image.lateral_mm = if layer == 1 { aside_mm } else { 0.0 };
         let calibration = raised_camera(LAYER_MM);
         let z = Mm::new(raised).unwrap_or_default();
         let surface = calibration.surface(cell.surface_height, Some(z));
         let mut run = run.clone();
-        run.control.target = Target::constant(Mm::constant(38.0));
+        run.control.target = WidthTarget::constant(Mm::constant(38.0));
         let mut sim = SimCell::new(&cell, &run, calibration, NoRecorder)?;
-        let mut watch = Middles { surface, score: Score::new(38.0), across_mm: Vec::new() };
+        let mut watch = Middles { surface, score: LayerScore::new(38.0), across_mm: Vec::new() };
         let _ = sim.layer(z, &mut watch);
         middles[layer] = mean(watch.across_mm.iter().copied());
         widths[layer] = mean(watch.score.widths.iter().map(|(_, w)| *w));
@@ -72,17 +72,17 @@ pub(super) fn raised_camera(layer_mm: f64) -> Calibration {
 /// Where the middle of the bead lies across the bed \[mm\].
 struct Middles {
     surface: SurfaceMap,
-    score: Score,
+    score: LayerScore,
     across_mm: Vec<f64>,
 }
 
-impl Witness for Middles {
+impl Observer for Middles {
     fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         self.score.step(now, event, step);
     }
 
-    fn look(&mut self, sight: &Sight<'_>) {
-        self.score.look(sight);
+    fn frame(&mut self, sight: &FrameObservation<'_>) {
+        self.score.frame(sight);
         if let (Ok(measured), Some(_)) = (sight.outcome, sight.truth)
             && let (Some(left), Some(right)) =
                 (self.surface.to_mm(measured.left), self.surface.to_mm(measured.right))

@@ -51,7 +51,7 @@ pub fn stand_off(cell: &Cell) -> Result<Vec<StandOff>, RenderError> {
         .map(|step| {
             let nearer_mm = 5.0 * f64::from(step);
             let height = Mm::new(nearer_mm).unwrap_or_default();
-            let picture = cell.simulation.picture;
+            let picture = cell.simulation.image;
             let renderer = Renderer::new(calibration.clone(), height, cell.gauge, picture, 1)?;
             let bead = |_: f64| Some((-WIDTH_MM / 2.0, WIDTH_MM / 2.0));
             let frame = renderer.render(0, Stamp::START, None, &bead)?.frame;

@@ -6,18 +6,18 @@ mod experiments;
 
 use std::path::Path;
 
-use super::{Contender, LAYERS, LayerResult, Rates, StandOff};
+use super::{ControlSetup, LAYERS, LayerResult, LoopRates, StandOff};
 use crate::cell::Cell;
 use crate::cell::file::{Purpose, RunPart};
 use crate::core::units::Mm;
 use crate::io::progress::Progress;
 use crate::studies::barjuei2022 as paper;
 use crate::studies::error::ReproduceError;
-use crate::studies::row::Rows;
-use crate::studies::source::Source;
+use crate::studies::row::TableRows;
+use crate::studies::source::Publication;
 use crate::studies::study::{Effort, Reproduced, Section};
-use crate::vision::Method;
-use crate::width_control::target::Target;
+use crate::vision::MeasureMethod;
+use crate::width_control::target::WidthTarget;
 use experiments::Experiments;
 
 const CELL: &str = include_str!("../../../cells/barjuei2022.toml");
@@ -26,7 +26,7 @@ const ASIDE_MM: f64 = 0.8;
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 11 + ahead::EXPERIMENTS;
 /// Layers one upon the other.
-const STOREYS: u32 = 20;
+const TOWER_LAYERS: u32 = 20;
 const SEEDS: u64 = 40;
 const FRAME_SEEDS: u64 = 3;
 
@@ -37,7 +37,7 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
     let limits = run.limits;
     let seeds = effort.seeds.unwrap_or(SEEDS);
     let frame_seeds = effort.frame_seeds.unwrap_or(FRAME_SEEDS);
-    let rows = Rows::of(Source::Barjuei2022);
+    let rows = TableRows::of(Publication::Barjuei2022);
     let mut work = Experiments { cell, run, seeds, frame_seeds, rows };
     let mut sections = Vec::new();
     for layer in &LAYERS {
@@ -86,7 +86,7 @@ impl Experiments {
     fn tables(
         &mut self,
         case: &str,
-        layer: &paper::Layer,
+        layer: &paper::PaperLayer,
         theirs: &LayerResult,
         ours: Option<&LayerResult>,
     ) {
@@ -106,22 +106,23 @@ impl Experiments {
     /// paper's camera and link.
     fn widths(
         &mut self,
-        layer: &paper::Layer,
+        layer: &paper::PaperLayer,
     ) -> Result<(LayerResult, LayerResult), ReproduceError> {
         let target = layer.target_mm;
-        let theirs = paper::lay(&self.cell, &asked(&self.run, target), self.seeds)?;
-        let (cell, run) = Contender::by_distance(Rates::PAPER).enter(&self.cell, &self.run, target);
+        let theirs = paper::lay(&self.cell, &with_width(&self.run, target), self.seeds)?;
+        let (cell, run) =
+            ControlSetup::by_distance(LoopRates::PAPER).enter(&self.cell, &self.run, target);
         let ours = paper::lay(&cell, &run, self.seeds)?;
         self.tables(&format!("{target} mm"), layer, &theirs, Some(&ours));
         Ok((theirs, ours))
     }
 
-    fn frames(&mut self, layer: &paper::Layer) -> Result<(), ReproduceError> {
+    fn frames(&mut self, layer: &paper::PaperLayer) -> Result<(), ReproduceError> {
         let lay = |method| {
             let cell = paper::with_frames(&self.cell, method);
-            paper::lay(&cell, &asked(&self.run, layer.target_mm), self.frame_seeds)
+            paper::lay(&cell, &with_width(&self.run, layer.target_mm), self.frame_seeds)
         };
-        let (theirs, ours) = (lay(Method::EdgeLines)?, lay(Method::Caliper)?);
+        let (theirs, ours) = (lay(MeasureMethod::EdgeLines)?, lay(MeasureMethod::Caliper)?);
         let case = format!("{} mm, frames rendered", layer.target_mm);
         self.tables(&case, layer, &theirs, Some(&ours));
         #[expect(clippy::cast_precision_loss, reason = "frames are few")]
@@ -147,7 +148,7 @@ impl Experiments {
             let cell = paper::with_frames(&self.cell, method);
             paper::stack(&cell, &self.run, ASIDE_MM)
         };
-        let (theirs, ours) = (lay(Method::EdgeLines)?, lay(Method::Caliper)?);
+        let (theirs, ours) = (lay(MeasureMethod::EdgeLines)?, lay(MeasureMethod::Caliper)?);
         let case = format!("two layers of 38 mm, truly {ASIDE_MM} mm apart");
         let offsets = [None, Some(theirs.offset_mm), Some(ours.offset_mm)];
         self.rows.push(&case, ("lateral offset", "mm"), offsets);
@@ -163,11 +164,12 @@ impl Experiments {
 
     /// The worst of many layers, measured and laid.
     fn tower(&mut self) -> Result<(), ReproduceError> {
-        let storeys = paper::tower(&self.cell, &self.run, STOREYS)?;
-        let worst = |of: fn(&paper::Storey) -> f64| {
-            storeys.iter().map(|storey| of(storey).abs()).fold(0.0, f64::max)
+        let layers = paper::tower(&self.cell, &self.run, TOWER_LAYERS)?;
+        let worst = |of: fn(&paper::TowerLayer) -> f64| {
+            layers.iter().map(|layer| of(layer).abs()).fold(0.0, f64::max)
         };
-        let case = format!("{STOREYS} layers of 20 mm and 42 mm, frames rendered, by distance");
+        let case =
+            format!("{TOWER_LAYERS} layers of 20 mm and 42 mm, frames rendered, by distance");
         let pairs = [
             ("mean error of the measured width, worst layer", worst(|s| s.measured_error_mm)),
             ("mean error of the bead, worst layer", worst(|s| s.laid_error_mm)),
@@ -180,10 +182,10 @@ impl Experiments {
 }
 
 /// The same run with another width asked for.
-fn asked(run: &RunPart, target_mm: f64) -> RunPart {
+fn with_width(run: &RunPart, target_mm: f64) -> RunPart {
     let mut run = run.clone();
     if let Ok(width) = Mm::new(target_mm) {
-        run.control.target = Target::constant(width);
+        run.control.target = WidthTarget::constant(width);
     }
     run
 }

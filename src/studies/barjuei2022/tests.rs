@@ -5,8 +5,8 @@ use std::path::Path;
 use super::*;
 use crate::cell::file::{Cell, Purpose, RunPart};
 use crate::core::units::Mm;
-use crate::trials::layer::Trial;
-use crate::vision::Method;
+use crate::trials::layer::LayerTrial;
+use crate::vision::MeasureMethod;
 
 fn cell() -> (Cell, RunPart) {
     let text = include_str!("../../../cells/barjuei2022.toml");
@@ -18,7 +18,8 @@ fn cell() -> (Cell, RunPart) {
 /// The same run with another width asked for.
 fn asked(run: &RunPart, target_mm: f64) -> RunPart {
     let mut run = run.clone();
-    run.control.target = crate::width_control::target::Target::constant(Mm::constant(target_mm));
+    run.control.target =
+        crate::width_control::target::WidthTarget::constant(Mm::constant(target_mm));
     run
 }
 
@@ -44,9 +45,9 @@ fn the_papers_tables_come_out_as_in_an_independent_simulation() {
 #[test]
 fn the_same_seed_lays_the_same_bead() {
     let (cell, run) = cell();
-    let once = Trial::lay(&cell, &run, &scale(), 7).unwrap();
-    assert_eq!(once, Trial::lay(&cell, &run, &scale(), 7).unwrap());
-    assert_ne!(once.bead, Trial::lay(&cell, &run, &scale(), 8).unwrap().bead);
+    let once = LayerTrial::lay(&cell, &run, &scale(), 7).unwrap();
+    assert_eq!(once, LayerTrial::lay(&cell, &run, &scale(), 7).unwrap());
+    assert_ne!(once.bead, LayerTrial::lay(&cell, &run, &scale(), 8).unwrap().bead);
 }
 
 #[test]
@@ -63,7 +64,7 @@ fn five_millimetres_of_height_cost_the_single_scale_1_2_mm_and_the_full_calibrat
 #[test]
 fn a_second_layer_is_measured_where_it_lies() {
     let (cell, run) = cell();
-    let mut cell = with_frames(&cell, Method::Caliper);
+    let mut cell = with_frames(&cell, MeasureMethod::Caliper);
     cell.simulation.path = Mm::constant(400.0);
     let stack = stack(&cell, &run, 0.8).unwrap();
     assert!((stack.offset_mm - 0.8).abs() < 0.02, "{stack:?}");
@@ -73,7 +74,7 @@ fn a_second_layer_is_measured_where_it_lies() {
 }
 
 /// Both columns of rates by distance.
-const RATES: [Rates; 2] = [Rates::PAPER, Rates::FAST];
+const RATES: [LoopRates; 2] = [LoopRates::PAPER, LoopRates::FAST];
 const SEEDS: u64 = 24;
 
 #[test]
@@ -81,13 +82,13 @@ fn by_distance_a_layer_settles_within_millimetres_where_the_paper_needs_hundreds
     let (mut cell, run) = cell();
     cell.simulation.width_noise = Mm::ZERO;
     for target in [44.0, 42.0, 40.0, 38.0] {
-        let lay_by = |who: Contender| {
+        let lay_by = |who: ControlSetup| {
             let (cell, run) = who.enter(&cell, &run, target);
             lay(&cell, &run, SEEDS).unwrap()
         };
-        let theirs = lay_by(Contender::Paper);
+        let theirs = lay_by(ControlSetup::Paper);
         for (rates, most, share) in [(RATES[0], 20.0, 8.0), (RATES[1], 15.0, 10.0)] {
-            let ours = lay_by(Contender::by_distance(rates));
+            let ours = lay_by(ControlSetup::by_distance(rates));
             let settled = ours.settled_mm.unwrap();
             assert!(settled <= most, "{target} {rates:?}: {settled}");
             let ratio = theirs.error_integral_mm2 / ours.error_integral_mm2;
@@ -102,7 +103,7 @@ fn by_distance_it_settles_soon_after_the_first_bead_is_seen() {
     cell.simulation.width_noise = Mm::ZERO;
     for target in [44.0, 42.0, 40.0, 38.0] {
         for (rates, most) in [(RATES[0], 148.4), (RATES[1], 118.4)] {
-            let who = Contender::by_distance(rates);
+            let who = ControlSetup::by_distance(rates);
             let found = settles_unseen(&cell, &run, who, target, SEEDS).unwrap();
             assert!(found <= most, "{target} {rates:?}: {found}");
         }
@@ -116,7 +117,7 @@ fn by_distance_the_bead_itself_is_true_to_a_tenth_of_a_millimetre() {
         for (rates, mean, rms, scatter) in
             [(RATES[0], 0.10, 0.14, 0.08), (RATES[1], 0.06, 0.105, 0.05)]
         {
-            let (cell, run) = Contender::by_distance(rates).enter(&cell, &run, target);
+            let (cell, run) = ControlSetup::by_distance(rates).enter(&cell, &run, target);
             let found = lay(&cell, &run, SEEDS).unwrap();
             assert!(found.bead_mean_error_mm <= mean, "{target} {rates:?}: {found:?}");
             assert!(found.bead_rms_error_mm <= rms, "{target} {rates:?}: {found:?}");
@@ -130,7 +131,7 @@ fn by_distance_a_step_of_the_flow_is_answered_once_it_is_seen() {
     let (mut cell, run) = cell();
     cell.simulation.width_noise = Mm::ZERO;
     for (rates, most) in [(RATES[0], 140.0), (RATES[1], 75.0)] {
-        let who = Contender::by_distance(rates);
+        let who = ControlSetup::by_distance(rates);
         let found = step_settles(&cell, &run, who, SEEDS).unwrap();
         assert!(found <= most, "{rates:?}: {found}");
     }
@@ -139,16 +140,17 @@ fn by_distance_a_step_of_the_flow_is_answered_once_it_is_seen() {
 #[test]
 fn by_distance_slow_waves_and_pulsations_are_taken_out() {
     let (cell, run) = cell();
-    let ratio = |rates, what| unrest(&cell, &run, Contender::by_distance(rates), what, 6).unwrap();
+    let ratio =
+        |rates, what| error_ratio(&cell, &run, ControlSetup::by_distance(rates), what, 6).unwrap();
     for (wavelength, most) in [(2400.0, [0.43, 0.28]), (1200.0, [0.77, 0.55])] {
         for (rates, most) in RATES.into_iter().zip(most) {
-            let found = ratio(rates, Disturbance::Wave(wavelength));
+            let found = ratio(rates, FlowDisturbance::Wave(wavelength));
             assert!(found <= most, "{wavelength} mm, {rates:?}: {found}");
         }
     }
     for period in [1.0, 2.0, 3.5, 6.0] {
         for (rates, most) in RATES.into_iter().zip([0.5, 0.35]) {
-            let found = ratio(rates, Disturbance::Pulsation(period));
+            let found = ratio(rates, FlowDisturbance::Pulsation(period));
             assert!(found <= most, "{period} s, {rates:?}: {found}");
         }
     }
@@ -158,18 +160,18 @@ fn by_distance_slow_waves_and_pulsations_are_taken_out() {
 fn by_distance_what_is_told_wrong_and_widths_that_are_wrong_are_borne() {
     let (cell, run) = cell();
     let told = |rates, exponent, what| {
-        let who = Contender::Distance(rates, exponent);
-        wrong(&cell, &run, who, what, SEEDS).unwrap()
+        let who = ControlSetup::Distance(rates, exponent);
+        mismatched(&cell, &run, who, what, SEEDS).unwrap()
     };
     for rates in RATES {
-        let nominal = told(rates, 0.25, Wrong::NOTHING);
+        let nominal = told(rates, 0.25, Mismatch::NONE);
         let cases = [
-            (0.25, Wrong { offset: 1.2, ..Wrong::NOTHING }),
-            (0.25, Wrong { offset: 0.8, ..Wrong::NOTHING }),
-            (0.375, Wrong::NOTHING),
-            (0.125, Wrong::NOTHING),
-            (0.25, Wrong { outliers: 0.1, ..Wrong::NOTHING }),
-            (0.25, Wrong { missing: 0.2, ..Wrong::NOTHING }),
+            (0.25, Mismatch { offset: 1.2, ..Mismatch::NONE }),
+            (0.25, Mismatch { offset: 0.8, ..Mismatch::NONE }),
+            (0.375, Mismatch::NONE),
+            (0.125, Mismatch::NONE),
+            (0.25, Mismatch { outliers: 0.1, ..Mismatch::NONE }),
+            (0.25, Mismatch { missing: 0.2, ..Mismatch::NONE }),
         ];
         for (exponent, what) in cases {
             let found = told(rates, exponent, what);
@@ -180,7 +182,7 @@ fn by_distance_what_is_told_wrong_and_widths_that_are_wrong_are_borne() {
         }
         // All of it at once, in any direction.
         for (exponent, offset) in [(0.375, 1.2), (0.125, 1.2), (0.375, 0.8), (0.125, 0.8)] {
-            let found = told(rates, exponent, Wrong { offset, outliers: 0.1, missing: 0.2 });
+            let found = told(rates, exponent, Mismatch { offset, outliers: 0.1, missing: 0.2 });
             let ratio = found.median_mm / nominal.median_mm;
             assert!(ratio <= 1.8, "{rates:?}, b {exponent}, {offset}: {found:?} is {ratio}");
         }
@@ -204,12 +206,14 @@ fn twenty_layers_are_measured_alike_at_every_height() {
 #[test]
 fn by_distance_a_rough_bead_is_not_chased() {
     let (mut cell, run) = cell();
-    cell.simulation.roughness.size_mm = 0.5;
+    cell.simulation.roughness.sigma_mm = 0.5;
     cell.simulation.roughness.length_mm = 8.0;
-    let nobody = Contender::Paper.enter(&cell, &run, 42.0);
-    let (cell, mut run) = Contender::by_distance(RATES[1]).enter(&nobody.0, &run, 42.0);
+    let nobody = ControlSetup::Paper.enter(&cell, &run, 42.0);
+    let (cell, mut run) = ControlSetup::by_distance(RATES[1]).enter(&nobody.0, &run, 42.0);
     let scatter = |run: &RunPart| {
-        let square = |seed| Trial::lay(&cell, run, &scale(), seed).unwrap().scatter(700.0).powi(2);
+        let square = |seed| {
+            LayerTrial::lay(&cell, run, &scale(), seed).unwrap().standard_deviation(700.0).powi(2)
+        };
         ((0..SEEDS).map(square).sum::<f64>() / f64::from(u32::try_from(SEEDS).unwrap())).sqrt()
     };
     let held = scatter(&run);

@@ -7,7 +7,9 @@ use rayon::prelude::*;
 
 use super::fit_table::FitTableError;
 use super::flow;
-use crate::identify::fit::{Before, DeadTime, Level, Samples, Settings, Structure, fit};
+use crate::identify::fit::{
+    DeadTime, FitSettings, InitialCondition, OutputLevel, Samples, Structure, fit,
+};
 use crate::numeric::average::{rms, standard_deviation};
 use crate::numeric::lti::{FirstOrder, ModelError, TransferFunction, simulate};
 use crate::sim::hash::{mix, normal_pair};
@@ -16,7 +18,7 @@ const DT_S: f64 = 0.02;
 
 /// One parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bound {
+pub struct ParameterBound {
     /// Its name.
     pub name: &'static str,
     /// Its true value.
@@ -25,26 +27,26 @@ pub struct Bound {
     /// parameter's own unit.
     pub sigma: f64,
     /// Root mean square error of the fits, in the same.
-    pub scatter: f64,
+    pub spread: f64,
 }
 
 /// An experiment whose parameters are looked for.
-struct Experiment<'a, const N: usize> {
+struct BoundExperiment<'a, const N: usize> {
     truth: [f64; N],
     names: [&'static str; N],
     /// The names that a fit gives them.
     fitted: [&'static str; N],
     input: Vec<f64>,
-    settings: Settings,
+    settings: FitSettings,
     model: &'a (dyn Fn(&[f64; N]) -> Result<TransferFunction, ModelError> + Sync),
 }
 
 /// Gain, time constant \[s\] and dead time \[s\] of K = 1, τ = 0.84 s,
 /// L = 0.41 s from a step of 0.6 over 10 s at 50 Hz with white noise of
 /// variance 4.98·10⁻⁵, and of as many fits.
-pub fn first_order(trials: u64) -> Result<[Bound; 3], FitTableError> {
-    let dead_time = DeadTime::Estimated { least_s: 0.0, most_s: 2.0 };
-    let experiment = Experiment {
+pub fn first_order(trials: u64) -> Result<[ParameterBound; 3], FitTableError> {
+    let dead_time = DeadTime::Estimated { min_s: 0.0, max_s: 2.0 };
+    let experiment = BoundExperiment {
         truth: [1.0, 0.84, 0.41],
         names: ["K", "τ", "L"],
         fitted: ["gain", "time_constant_s", "dead_time_s"],
@@ -60,7 +62,7 @@ pub fn first_order(trials: u64) -> Result<[Bound; 3], FitTableError> {
 /// Denominator a1, a0 and numerator b2, b1, b0 of G2 from 60 s of a nine-bit
 /// PRBS with bits of 1 s, sampled every 20 ms, with white noise of 17 % of the
 /// flow's standard deviation, and of as many fits.
-pub fn flow_model(trials: u64) -> Result<[Bound; 5], FitTableError> {
+pub fn flow_model(trials: u64) -> Result<[ParameterBound; 5], FitTableError> {
     const SAMPLES_A_BIT: usize = 50;
     // Maximal-length sequence with taps at 9 and 5.
     let mut bits = vec![true; 9];
@@ -76,28 +78,28 @@ pub fn flow_model(trials: u64) -> Result<[Bound; 5], FitTableError> {
     let clean = simulate(&model, &input, DT_S)?;
     let (num, den) = (model.num(), model.den());
     let names = ["a1", "a0", "b2", "b1", "b0"];
-    let experiment = Experiment {
+    let experiment = BoundExperiment {
         truth: [den[1], den[2], num[0], num[1], num[2]],
         names,
         fitted: names,
         input,
-        settings: at_rest(Structure::Transfer { poles: 2, zeros: 2 }, DeadTime::Given(0.0)),
+        settings: at_rest(Structure::Transfer { poles: 2, zeros: 2 }, DeadTime::Known(0.0)),
         model: &|p| TransferFunction::new(&[p[2], p[3], p[4]], &[1.0, p[0], p[1]], 0.0),
     };
     experiment.bounds(0.17 * standard_deviation(&clean), trials)
 }
 
 /// From rest, with an output whose level is known.
-fn at_rest(structure: Structure, dead_time: DeadTime) -> Settings {
-    Settings {
-        before: Before::Settled { input: 0.0 },
-        level: Level::Known(0.0),
-        ..Settings::new(structure, dead_time)
+fn at_rest(structure: Structure, dead_time: DeadTime) -> FitSettings {
+    FitSettings {
+        initial_state: InitialCondition::Settled { input: 0.0 },
+        level: OutputLevel::Known(0.0),
+        ..FitSettings::new(structure, dead_time)
     }
 }
 
-impl<const N: usize> Experiment<'_, N> {
-    fn bounds(&self, noise: f64, trials: u64) -> Result<[Bound; N], FitTableError> {
+impl<const N: usize> BoundExperiment<'_, N> {
+    fn bounds(&self, noise: f64, trials: u64) -> Result<[ParameterBound; N], FitTableError> {
         let clean = self.output(&self.truth)?;
         let sigmas = self.sigmas(noise)?;
         let errors: Result<Vec<[f64; N]>, FitTableError> = (0..trials.max(1))
@@ -106,11 +108,11 @@ impl<const N: usize> Experiment<'_, N> {
             .collect();
         let errors = errors?;
         let scatter = |i: usize| rms(errors.iter().map(|error| error[i]));
-        Ok(std::array::from_fn(|i| Bound {
+        Ok(std::array::from_fn(|i| ParameterBound {
             name: self.names[i],
             value: self.truth[i],
             sigma: sigmas[i],
-            scatter: scatter(i),
+            spread: scatter(i),
         }))
     }
 
@@ -157,9 +159,9 @@ mod tests {
     use super::*;
 
     /// Four standard errors of a standard deviation from 40 fits.
-    fn near_the_bound(bound: &Bound) -> bool {
+    fn near_the_bound(bound: &ParameterBound) -> bool {
         let slack = 4.0 / f64::sqrt(80.0);
-        (bound.scatter / bound.sigma - 1.0).abs() < slack
+        (bound.spread / bound.sigma - 1.0).abs() < slack
     }
 
     #[test]

@@ -19,15 +19,15 @@ mod baseline;
 mod plant;
 mod scenario;
 
-pub use baseline::{Baseline, Drive};
-pub use plant::{Errors, Laid, Run};
+pub use baseline::{Baseline, DriveMode};
+pub use plant::{CornerRun, Errors, WidthProfile};
 pub use scenario::{BEAD, CornerError, JUDGED_MM, Scenario, UNMODELLED};
 
-use crate::plan::Unmodelled;
+use crate::plan::FlowUncertainty;
 
 /// What comes of one time that may be added.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct BudgetRow {
     /// Time that may be added \[s\].
     pub budget_s: f64,
     /// Time that the plan adds \[s\].
@@ -43,23 +43,23 @@ pub struct Row {
     pub floor: f64,
 }
 
-impl Row {
+impl BudgetRow {
     /// How many times larger the error of the best baseline of a kind is, with noise.
-    pub fn ratio(&self, drive: Drive) -> f64 {
-        self.best(drive, |errors| errors.noisy)
+    pub fn ratio(&self, drive: DriveMode) -> f64 {
+        self.best_ratio(drive, |errors| errors.noisy)
     }
 
     /// The same without noise.
-    pub fn quiet_ratio(&self, drive: Drive) -> f64 {
-        self.best(drive, |errors| errors.quiet)
+    pub fn quiet_ratio(&self, drive: DriveMode) -> f64 {
+        self.best_ratio(drive, |errors| errors.quiet)
     }
 
     /// The largest ratio that the bound lets be, without noise.
-    pub fn bound_ratio(&self, drive: Drive) -> f64 {
+    pub fn bound_ratio(&self, drive: DriveMode) -> f64 {
         self.quiet_ratio(drive) * self.planned.quiet / self.bound
     }
 
-    fn best(&self, drive: Drive, of: impl Fn(&Errors) -> f64) -> f64 {
+    fn best_ratio(&self, drive: DriveMode, of: impl Fn(&Errors) -> f64) -> f64 {
         let kind = self.baselines.iter().filter(|(baseline, _)| baseline.drive == drive);
         kind.map(|(_, errors)| of(errors)).fold(f64::INFINITY, f64::min) / of(&self.planned)
     }
@@ -68,17 +68,17 @@ impl Row {
 impl Scenario {
     /// The plan and every baseline, for a time that may be added \[s\] and a number of
     /// seeds.
-    pub fn row(&self, budget_s: f64, seeds: u64) -> Result<Row, CornerError> {
+    pub fn row(&self, budget_s: f64, seeds: u64) -> Result<BudgetRow, CornerError> {
         let plan = self.plan(budget_s, UNMODELLED)?;
-        let known = self.plan(budget_s, Unmodelled { share: 0.0, ..UNMODELLED })?;
-        let run = Run::new(self, &plan.speed, |time| plan.command_at(time))?;
-        let bound = Run::new(self, &known.speed, |time| known.command_at(time))?;
+        let known = self.plan(budget_s, FlowUncertainty { ratio: 0.0, ..UNMODELLED })?;
+        let run = CornerRun::new(self, &plan.speed, |time| plan.command_at(time))?;
+        let bound = CornerRun::new(self, &known.speed, |time| known.command_at(time))?;
         let mut baselines = Vec::new();
         for baseline in Baseline::ALL {
             let errors = baseline.run(self, &plan.speed)?.errors(seeds);
             baselines.push((baseline, errors));
         }
-        Ok(Row {
+        Ok(BudgetRow {
             budget_s,
             added_s: plan.added_s,
             planned: run.errors(seeds),
@@ -98,7 +98,7 @@ mod tests {
     #[test]
     fn the_constant_extruder_lays_what_the_closed_form_says() {
         let scenario = Scenario::default();
-        let run = Run::new(&scenario, &scenario.nominal().unwrap(), |_| {
+        let run = CornerRun::new(&scenario, &scenario.nominal().unwrap(), |_| {
             100.0 * BEAD.area_mm2 / Scenario::extruder().unwrap().dc_gain()
         });
         // (v − v₀)²/a over a nozzle's length.
@@ -110,9 +110,9 @@ mod tests {
     fn a_planned_corner_is_five_times_as_even_within_a_second() {
         let row = Scenario::default().row(1.0, 20).unwrap();
         assert!(row.added_s <= 1.0 + 1e-9, "{row:?}");
-        assert!(row.ratio(Drive::Constant) >= 5.0, "{row:?}");
-        assert!(row.ratio(Drive::Proportional) >= 2.5, "{row:?}");
-        assert!(row.quiet_ratio(Drive::Constant) >= 5.0, "{row:?}");
+        assert!(row.ratio(DriveMode::Constant) >= 5.0, "{row:?}");
+        assert!(row.ratio(DriveMode::Proportional) >= 2.5, "{row:?}");
+        assert!(row.quiet_ratio(DriveMode::Constant) >= 5.0, "{row:?}");
     }
 
     #[test]
@@ -120,7 +120,7 @@ mod tests {
         let scenario = Scenario::default();
         let rms = |budget| {
             let plan = scenario.plan(budget, UNMODELLED).unwrap();
-            let run = Run::new(&scenario, &plan.speed, |time| plan.command_at(time)).unwrap();
+            let run = CornerRun::new(&scenario, &plan.speed, |time| plan.command_at(time)).unwrap();
             run.quiet().rms().hypot(run.floor())
         };
         let (none, some, more) = (rms(0.0), rms(0.1), rms(0.5));
@@ -131,8 +131,8 @@ mod tests {
     fn what_was_planned_is_what_comes_of_it() {
         let scenario = Scenario::default();
         let plan = scenario.plan(0.5, UNMODELLED).unwrap();
-        let run = Run::new(&scenario, &plan.speed, |time| plan.command_at(time)).unwrap();
-        for (at, foretold) in plan.foretold.iter().filter(|(at, _)| at.abs() < JUDGED_MM) {
+        let run = CornerRun::new(&scenario, &plan.speed, |time| plan.command_at(time)).unwrap();
+        for (at, foretold) in plan.predicted_width.iter().filter(|(at, _)| at.abs() < JUDGED_MM) {
             assert!((run.quiet().at(*at) - foretold).abs() < 2e-3, "{at}");
         }
     }

@@ -11,7 +11,8 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::identify::fit::{
-    Before, DeadTime, FitError, Level, Samples, SamplesError, Settings, Structure, fit,
+    DeadTime, FitError, FitSettings, InitialCondition, OutputLevel, Samples, SamplesError,
+    Structure, fit,
 };
 use crate::identify::prbs::{NoSuchLength, Prbs};
 use crate::numeric::average::{mean, standard_deviation};
@@ -22,7 +23,7 @@ const SAMPLES: usize = 2400;
 const SAMPLES_A_BIT: usize = 14;
 const VOLTS: f64 = 0.4;
 const NOISE_LAG_S: f64 = 0.15;
-const NOISE_SHARE: f64 = 0.19;
+const NOISE_FRACTION: f64 = 0.19;
 
 /// Poles, zeros and the published fit \[%\].
 pub const PUBLISHED: [(usize, usize, f64); 8] = [
@@ -110,20 +111,20 @@ pub fn fit_table(seeds: u64) -> Result<FitTable, FitTableError> {
     Ok(FitTable { rows, rms_points, example })
 }
 
-const BEFORE: Before = Before::Settled { input: 0.0 };
+const BEFORE: InitialCondition = InitialCondition::Settled { input: 0.0 };
 
 fn empty((poles, zeros, published_percent): (usize, usize, f64)) -> FitRow {
     FitRow { poles, zeros, published_percent, simulated_percent: 0.0, each_percent: Vec::new() }
 }
 
-fn settings(poles: usize, zeros: usize) -> Settings {
-    Settings {
+fn settings(poles: usize, zeros: usize) -> FitSettings {
+    FitSettings {
         between: Between::Linear,
-        level: Level::Estimated,
-        before: BEFORE,
+        level: OutputLevel::Estimated,
+        initial_state: BEFORE,
         // The third pole is not seen; the thesis shows its fits all the same.
         accept_undetermined: true,
-        ..Settings::new(Structure::Transfer { poles, zeros }, DeadTime::Given(0.0))
+        ..FitSettings::new(Structure::Transfer { poles, zeros }, DeadTime::Known(0.0))
     }
 }
 
@@ -134,7 +135,7 @@ fn run(number: u64) -> Result<Samples, FitTableError> {
     let drive = super::drive()?;
     let rpm = simulate(&drive, &volts, DT_S)?;
     let mut flow = simulate(&drive.series(&super::flow()?)?, &volts, DT_S)?;
-    let sigma = NOISE_SHARE * standard_deviation(&flow);
+    let sigma = NOISE_FRACTION * standard_deviation(&flow);
     flow.iter_mut().zip(noise(number, sigma)).for_each(|(flow, noise)| *flow += noise);
     Ok(Samples::new(rpm, flow, DT_S)?)
 }

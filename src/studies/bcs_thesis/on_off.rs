@@ -10,16 +10,16 @@ mod wheel;
 
 pub use compare::{Compared, compare};
 pub use course::{
-    AREA_MM2, CORRELATION_S, Course, JUDGED_FROM_S, MM_PER_S_PER_RPM, UNMODELLED_SHARE,
+    AREA_MM2, CORRELATION_S, ExtruderRun, JUDGED_FROM_S, MM_PER_S_PER_RPM, UNMODELLED_FRACTION,
 };
-pub use wheel::{EXPONENT, Run, Sensors};
+pub use wheel::{EXPONENT, Sensors, WheelRun};
 
 use super::{drive, flow, wheel as motor};
 use crate::core::time::Span;
 use crate::core::units::{Mm2, Mm3PerS};
 use crate::extruder::feedforward::{
     ExtruderModel, FeedforwardError, FlowForecast, FlowObserver, Inverse, InverseSettings,
-    RightZeros, ScrewSpeed, SpeedFeedforward, UnmodelledFlow,
+    RightHalfPlaneZeros, ScrewSpeed, SpeedFeedforward, UnmodelledFlow,
 };
 use crate::extruder::limits::CommandLimits;
 use crate::numeric::lti::TransferFunction;
@@ -33,7 +33,7 @@ const SENSOR_STEPS: u64 = 20;
 
 /// What is done about the wheel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Control {
+pub enum WheelControl {
     /// Constant speed for the mean flow.
     Off,
     /// The thesis' controller: G1, G2, division by the section, GC. The models
@@ -47,68 +47,71 @@ pub enum Control {
     Observed(Sensors),
 }
 
-impl Course {
+impl ExtruderRun {
     /// Runs the wheel.
-    pub fn run(&self, control: Control) -> Result<Run, FeedforwardError> {
+    pub fn run(&self, control: WheelControl) -> Result<WheelRun, FeedforwardError> {
         let mut plant = Wheel::new(self)?;
-        let mut law = self.law(control)?;
+        let mut controller = self.controller(control)?;
         let area = Mm2::constant(AREA_MM2);
         let rest = self.mean_flow / AREA_MM2 / MM_PER_S_PER_RPM / motor()?.dc_gain();
         let mut command = rest;
-        if let Some(law) = &mut law {
-            law.start(self.voltage.first().copied().unwrap_or(0.0), area, rest)?;
+        if let Some(controller) = &mut controller {
+            controller.start(self.voltage.first().copied().unwrap_or(0.0), area, rest)?;
         }
         for (step, voltage) in (0_u64..).zip(&self.voltage) {
             let now = at(step);
-            if let (Some(law), Control::Observed(sensors)) = (&mut law, control)
+            if let (Some(controller), WheelControl::Observed(sensors)) = (&mut controller, control)
                 && step.is_multiple_of(SENSOR_STEPS)
             {
-                for seen in plant.seen(self, step, &sensors).into_iter().flatten() {
-                    law.measure(&seen);
+                for seen in plant.sensor_readings(self, step, &sensors).into_iter().flatten() {
+                    controller.measure(&seen);
                 }
             }
-            if let Some(law) = &mut law
+            if let Some(controller) = &mut controller
                 && step.is_multiple_of(COMMAND_STEPS)
             {
-                command = law.step(now, *voltage, None, area).command;
+                command = controller.step(now, *voltage, None, area).command;
             }
             plant.step(self, command);
         }
         Ok(plant.judge(self))
     }
 
-    fn law(&self, control: Control) -> Result<Option<SpeedFeedforward>, FeedforwardError> {
+    fn controller(
+        &self,
+        control: WheelControl,
+    ) -> Result<Option<SpeedFeedforward>, FeedforwardError> {
         let period = Span::from_millis(5);
         let surface = motor()?;
         let in_mm_per_s: Vec<f64> = surface.num().iter().map(|c| c * MM_PER_S_PER_RPM).collect();
         let surface = TransferFunction::new(&in_mm_per_s, surface.den(), surface.dead_time_s())?;
         let known_ahead = match control {
-            Control::Off => return Ok(None),
-            Control::Thesis => Span::ZERO,
-            Control::Ahead | Control::Observed(_) => Span::from_secs(0.054),
+            WheelControl::Off => return Ok(None),
+            WheelControl::Thesis => Span::ZERO,
+            WheelControl::Ahead | WheelControl::Observed(_) => Span::from_secs(0.054),
         };
         let axis = Inverse::new(
             &surface,
             &InverseSettings {
                 time_constant_s: 0.01,
-                right_zeros: RightZeros::Refuse,
-                known_ahead,
-                late: Span::from_millis(9),
+                right_zeros: RightHalfPlaneZeros::Refuse,
+                preview: known_ahead,
+                max_delay: Span::from_millis(9),
                 limits: CommandLimits::new(0.0, 10.0, 1000.0)?,
                 period,
             },
         )?;
         let model = ExtruderModel { drive: drive()?, flow: flow()? };
         let ahead = match control {
-            Control::Thesis => period,
+            WheelControl::Thesis => period,
             _ => Span::from_secs(axis.preview_s()),
         };
         let forecast = FlowForecast::new(&model, ScrewSpeed::Modelled, ahead, period)?;
         let observer = match control {
-            Control::Observed(_) => Some(FlowObserver::new(UnmodelledFlow {
+            WheelControl::Observed(_) => Some(FlowObserver::new(UnmodelledFlow {
                 sigma: Mm3PerS::new(self.unmodelled).unwrap_or_default(),
                 correlation_s: CORRELATION_S,
-                wander: Mm3PerS::constant(0.1),
+                drift: Mm3PerS::constant(0.1),
             })?),
             _ => None,
         };

@@ -11,15 +11,16 @@ use maud::{Markup, html};
 use super::bounds;
 use super::fit_table::{FitTable, fit_table};
 use super::on_off::{
-    CORRELATION_S, Compared, Control, EXPONENT, Sensors, UNMODELLED_SHARE, camera_age_s, compare,
+    CORRELATION_S, Compared, EXPONENT, Sensors, UNMODELLED_FRACTION, WheelControl, camera_age_s,
+    compare,
 };
-use crate::extruder::feedforward::share_left;
+use crate::extruder::feedforward::unpredictable_fraction;
 use crate::io::progress::Progress;
-use crate::numeric::lti::{Method, TransferFunction};
+use crate::numeric::lti::{DiscretisationMethod, TransferFunction};
 use crate::studies::bcs_thesis as plant;
 use crate::studies::error::ReproduceError;
-use crate::studies::row::Rows;
-use crate::studies::source::Source;
+use crate::studies::row::TableRows;
+use crate::studies::source::Publication;
 use crate::studies::study::{Effort, Reproduced, Section};
 
 /// What progress is told of.
@@ -40,7 +41,7 @@ const PRESSURE: Sensors = Sensors { camera_mm: None, pressure: true, exponent: E
 /// Runs the experiments.
 pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, ReproduceError> {
     let seeds = effort.seeds.unwrap_or(SEEDS);
-    let mut rows = Rows::of(Source::BcsThesis);
+    let mut rows = TableRows::of(Publication::BcsThesis);
     let mut sections = Vec::new();
     let fits = fit_table(effort.seeds.unwrap_or(FIT_SEEDS))?;
     push_fits(&fits, &mut rows);
@@ -115,7 +116,7 @@ fn about(effort: Effort) -> String {
 }
 
 /// Table 3.
-fn push_fits(table: &FitTable, rows: &mut Rows) {
+fn push_fits(table: &FitTable, rows: &mut TableRows) {
     for row in &table.rows {
         let case = format!("fit, {} poles, {} zeros", row.poles, row.zeros);
         let found = [Some(row.published_percent), Some(row.simulated_percent), None];
@@ -126,9 +127,9 @@ fn push_fits(table: &FitTable, rows: &mut Rows) {
 }
 
 /// A control beside the thesis' with an exact model.
-fn exact(seeds: u64, rows: &mut Rows) -> Result<[Compared; 2], ReproduceError> {
-    let thesis = compare(seeds, 0.0, Control::Thesis)?;
-    let ours = compare(seeds, 0.0, Control::Ahead)?;
+fn exact(seeds: u64, rows: &mut TableRows) -> Result<[Compared; 2], ReproduceError> {
+    let thesis = compare(seeds, 0.0, WheelControl::Thesis)?;
+    let ours = compare(seeds, 0.0, WheelControl::Ahead)?;
     let case = "controller, exact model";
     rows.push(case, ("area RMSE, off over on", "1"), [None, Some(thesis.ratio), Some(ours.ratio)]);
     let on = |found: &Compared| Some(found.area_rmse_mm2[1]);
@@ -138,13 +139,13 @@ fn exact(seeds: u64, rows: &mut Rows) -> Result<[Compared; 2], ReproduceError> {
 
 /// The same with 17 % of the flow's standard deviation unmodelled, as the
 /// thesis' own plant has it: table 4.
-fn unmodelled(seeds: u64, rows: &mut Rows) -> Result<(Compared, Compared), ReproduceError> {
-    let thesis = compare(seeds, UNMODELLED_SHARE, Control::Thesis)?;
-    let ours = compare(seeds, UNMODELLED_SHARE, Control::Observed(PRESSURE))?;
+fn unmodelled(seeds: u64, rows: &mut TableRows) -> Result<(Compared, Compared), ReproduceError> {
+    let thesis = compare(seeds, UNMODELLED_FRACTION, WheelControl::Thesis)?;
+    let ours = compare(seeds, UNMODELLED_FRACTION, WheelControl::Observed(PRESSURE))?;
     let case = "controller, 17 % unmodelled";
     let ratio = [Some(3.43 / 0.57), Some(thesis.ratio), Some(ours.ratio)];
     rows.push(case, ("area RMSE, off over on", "1"), ratio);
-    let least = [None, Some(thesis.least_ratio), Some(ours.least_ratio)];
+    let least = [None, Some(thesis.min_ratio), Some(ours.min_ratio)];
     rows.push(case, ("the same, worst seed", "1"), least);
     for quantity in QUANTITIES {
         for (which, name) in quantity.names.into_iter().enumerate() {
@@ -194,7 +195,7 @@ const QUANTITIES: [Quantity; 4] = [
 ];
 
 /// What other sensors would bring, beside the bound that their age sets.
-fn sensing(seeds: u64, rows: &mut Rows) -> Result<Section, ReproduceError> {
+fn sensing(seeds: u64, rows: &mut TableRows) -> Result<Section, ReproduceError> {
     let camera = |mm| Sensors { camera_mm: Some(mm), pressure: false, ..PRESSURE };
     let others = [
         ("pressure, exponent 1.50 for 1.58", Sensors { exponent: 1.5, ..PRESSURE }),
@@ -203,22 +204,22 @@ fn sensing(seeds: u64, rows: &mut Rows) -> Result<Section, ReproduceError> {
         ("camera 4 mm behind", camera(4.0)),
     ];
     for (name, sensors) in others {
-        let found = compare(seeds, UNMODELLED_SHARE, Control::Observed(sensors))?;
+        let found = compare(seeds, UNMODELLED_FRACTION, WheelControl::Observed(sensors))?;
         let case = format!("17 % unmodelled, {name}");
         rows.push(case, ("area RMSE, off over on", "1"), [None, None, Some(found.ratio)]);
     }
     let mut found = Vec::new();
     for mm in CAMERAS_MM {
         let seeds = seeds.min(CAMERA_SEEDS);
-        let compared = compare(seeds, UNMODELLED_SHARE, Control::Observed(camera(mm)))?;
+        let compared = compare(seeds, UNMODELLED_FRACTION, WheelControl::Observed(camera(mm)))?;
         found.push(draw::CameraGain { behind_mm: mm, ratio: compared.ratio });
     }
     let bound: Vec<draw::CameraGain> = (0..=100_u32)
         .map(|step| {
             let mm = 0.2 * f64::from(step);
-            let left = share_left(camera_age_s(mm), CORRELATION_S);
+            let left = unpredictable_fraction(camera_age_s(mm), CORRELATION_S);
             // The flow off varies by the unmodelled part as well.
-            let ratio = (1.0 + UNMODELLED_SHARE.powi(2)).sqrt() / (UNMODELLED_SHARE * left);
+            let ratio = (1.0 + UNMODELLED_FRACTION.powi(2)).sqrt() / (UNMODELLED_FRACTION * left);
             draw::CameraGain { behind_mm: mm, ratio }
         })
         .collect();
@@ -234,19 +235,19 @@ fn sensing(seeds: u64, rows: &mut Rows) -> Result<Section, ReproduceError> {
 }
 
 /// The least errors that parameters can have, and those of our fits.
-fn accuracy_bounds(rows: &mut Rows) -> Result<(), ReproduceError> {
+fn accuracy_bounds(rows: &mut TableRows) -> Result<(), ReproduceError> {
     let case = "step of 0.6, 10 s at 50 Hz, least error and ours";
     let names = ["σ of K", "σ of τ", "σ of L"];
     for (bound, quantity) in bounds::first_order(TRIALS)?.iter().zip(names) {
         let (unit, scale) = if bound.name == "K" { ("1", 1.0) } else { ("ms", 1000.0) };
-        let [least, ours] = [bound.sigma, bound.scatter].map(|sigma| Some(sigma * scale));
+        let [least, ours] = [bound.sigma, bound.spread].map(|sigma| Some(sigma * scale));
         rows.push(case, (quantity, unit), [None, least, ours]);
     }
     let case = "G2, 60 s of PRBS, 17 % white noise, least error and ours";
     let names = ["σ of a1", "σ of a0", "σ of b2", "σ of b1", "σ of b0"];
     for (bound, quantity) in bounds::flow_model(TRIALS)?.iter().zip(names) {
         let percent = |sigma: f64| Some(100.0 * sigma / bound.value.abs());
-        let values = [None, percent(bound.sigma), percent(bound.scatter)];
+        let values = [None, percent(bound.sigma), percent(bound.spread)];
         rows.push(case, (quantity, "%"), values);
     }
     Ok(())
@@ -254,12 +255,12 @@ fn accuracy_bounds(rows: &mut Rows) -> Result<(), ReproduceError> {
 
 /// The thesis' models on its controller's grid.
 fn discretised() -> Result<Markup, ReproduceError> {
-    const METHODS: [(&str, Method); 5] = [
-        ("zero-order hold", Method::ZeroOrderHold),
-        ("first-order hold", Method::FirstOrderHold),
-        ("Tustin", Method::Bilinear),
-        ("matched", Method::MatchedPoleZero),
-        ("backward difference", Method::BackwardDifference),
+    const METHODS: [(&str, DiscretisationMethod); 5] = [
+        ("zero-order hold", DiscretisationMethod::ZeroOrderHold),
+        ("first-order hold", DiscretisationMethod::FirstOrderHold),
+        ("Tustin", DiscretisationMethod::Bilinear),
+        ("matched", DiscretisationMethod::MatchedPoleZero),
+        ("backward difference", DiscretisationMethod::BackwardDifference),
     ];
     let models = [
         ("G1, voltage to rpm", plant::drive()?),
@@ -287,7 +288,10 @@ fn discretised() -> Result<Markup, ReproduceError> {
     })
 }
 
-fn on_the_grid(model: &TransferFunction, method: Method) -> Result<[String; 3], ReproduceError> {
+fn on_the_grid(
+    model: &TransferFunction,
+    method: DiscretisationMethod,
+) -> Result<[String; 3], ReproduceError> {
     const DT_S: f64 = 0.005;
     let found = match model.discretise(DT_S, method) {
         Ok(found) => found,

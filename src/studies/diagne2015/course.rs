@@ -2,7 +2,7 @@
 
 /// One moment of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
+pub struct PlugSample {
     /// Since the start \[s\].
     pub at_s: f64,
     /// Length of the plug \[mm\].
@@ -10,16 +10,16 @@ pub struct Sample {
     /// Share of full that is fed.
     pub fill: f64,
     /// Foretold length of the plug when that arrives \[mm\], and when \[s\].
-    pub foretold: Option<(f64, f64)>,
+    pub predicted: Option<(f64, f64)>,
     /// Delay of what arrives \[s\].
     pub delay_s: f64,
 }
 
 /// A run, sample by sample.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Course {
+pub struct PlugResponse {
     /// In order of time, a step apart.
-    pub samples: Vec<Sample>,
+    pub samples: Vec<PlugSample>,
 }
 
 /// A swing that stays.
@@ -31,10 +31,10 @@ pub struct Cycle {
     pub period_s: f64,
 }
 
-impl Course {
+impl PlugResponse {
     /// When the plug came nearer to a length than `within_mm` for good \[s\].
     pub fn settles(&self, plug_mm: f64, within_mm: f64) -> Option<f64> {
-        let outside = |sample: &Sample| (sample.plug_mm - plug_mm).abs() > within_mm;
+        let outside = |sample: &PlugSample| (sample.plug_mm - plug_mm).abs() > within_mm;
         let inside = self.samples.iter().rposition(outside).map_or(0, |last| last + 1);
         self.samples.get(inside).map(|sample| sample.at_s)
     }
@@ -53,7 +53,7 @@ impl Course {
 
     /// Root mean square change of the feed from step to step, after a moment:
     /// how much the feeder is shaken.
-    pub fn shaking(&self, after_s: f64) -> f64 {
+    pub fn feed_change(&self, after_s: f64) -> f64 {
         let late = self.after(after_s);
         let sum: f64 = late.windows(2).map(|pair| change(pair).powi(2)).sum();
         (sum / count(late)).sqrt()
@@ -80,7 +80,7 @@ impl Course {
 
     /// Largest distance from a row of lengths that are a sample apart \[mm\],
     /// of which the first belongs to the sample number `from`.
-    pub fn misses(&self, from: usize, lengths_mm: impl Iterator<Item = f64>) -> f64 {
+    pub fn max_deviation(&self, from: usize, lengths_mm: impl Iterator<Item = f64>) -> f64 {
         let late = self.samples.get(from..).unwrap_or_default();
         late.iter()
             .zip(lengths_mm)
@@ -88,23 +88,23 @@ impl Course {
             .fold(0.0, f64::max)
     }
 
-    fn after(&self, after_s: f64) -> &[Sample] {
+    fn after(&self, after_s: f64) -> &[PlugSample] {
         let first = self.samples.partition_point(|sample| sample.at_s < after_s);
         self.samples.get(first..).unwrap_or_default()
     }
 }
 
 #[expect(clippy::cast_precision_loss, reason = "far fewer samples than 2⁵³")]
-fn count(samples: &[Sample]) -> f64 {
+fn count(samples: &[PlugSample]) -> f64 {
     samples.len().max(1) as f64
 }
 
-fn change(pair: &[Sample]) -> f64 {
+fn change(pair: &[PlugSample]) -> f64 {
     if let [one, two] = pair { two.fill - one.fill } else { 0.0 }
 }
 
 /// When a pair of samples passes a level in either direction.
-fn pass(pair: &[Sample], level: f64) -> Option<f64> {
+fn pass(pair: &[PlugSample], level: f64) -> Option<f64> {
     let [one, two] = pair else { return None };
     if (one.plug_mm < level) == (two.plug_mm < level) {
         return None;
@@ -117,12 +117,12 @@ fn pass(pair: &[Sample], level: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn course(plug: impl Fn(f64) -> f64) -> Course {
+    fn course(plug: impl Fn(f64) -> f64) -> PlugResponse {
         let sample = |k: u32| {
             let at_s = 0.001 * f64::from(k);
-            Sample { at_s, plug_mm: plug(at_s), fill: 0.0, foretold: None, delay_s: 0.0 }
+            PlugSample { at_s, plug_mm: plug(at_s), fill: 0.0, predicted: None, delay_s: 0.0 }
         };
-        Course { samples: (0..10_000).map(sample).collect() }
+        PlugResponse { samples: (0..10_000).map(sample).collect() }
     }
 
     #[test]

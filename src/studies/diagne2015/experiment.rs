@@ -1,10 +1,12 @@
 //! Everything that is tried on one course of the conveying speed.
 
-use super::course::{Course, Cycle};
-use super::run::{Method, Plan, RunError, follow};
-use super::{BAND_MM, Case, SETPOINT, START, SWING_S, paper_law, saturated};
+use super::course::{Cycle, PlugResponse};
+use super::run::{FeedMethod, RunError, RunPlan, follow};
+use super::{
+    CYCLE_S, PulsationCase, SETPOINT, SETTLING_BAND_MM, START, paper_controller, saturated,
+};
 use crate::extruder::screw::control::Scheme;
-use crate::extruder::screw::{FillLaw, Screw, TurnUnit};
+use crate::extruder::screw::{FillFeedback, Screw, TurnUnit};
 use crate::sim::screw::delay_free;
 
 const MM_PER_M: f64 = 1000.0;
@@ -20,35 +22,35 @@ pub const SLOPES_PER_M: [f64; 3] = [60.0, 100.0, 200.0];
 /// A predictor in the paper's scheme on the paper's plant, and in ours on a
 /// plant that is integrated to high order.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Pair {
+pub struct PredictorPair {
     /// By Euler steps.
-    pub paper: Course,
+    pub paper: PlugResponse,
     /// To high order.
-    pub exact: Course,
+    pub exact: PlugResponse,
 }
 
 /// What a course of the conveying speed came to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Examined {
     /// The course of the speed.
-    pub case: Case,
+    pub case: PulsationCase,
     /// First effect of the control, σ0 \[s\].
     pub first_effect_s: f64,
     /// The share that holds the setpoint, from the start on.
-    pub open: Course,
+    pub open: PlugResponse,
     /// The law without a predictor.
-    pub uncompensated: Course,
+    pub uncompensated: PlugResponse,
     /// The predictor that knows how the speed pulsates.
-    pub informed: Pair,
+    pub informed: PredictorPair,
     /// The predictor that takes the speed for steady.
-    pub uninformed: Pair,
+    pub uninformed: PredictorPair,
     /// The law between limits on the informed prediction, for each of
     /// [`SLOPES_PER_M`].
-    pub straight: Vec<Course>,
+    pub straight: Vec<PlugResponse>,
     /// The delay-free loop from the first effect on: time \[s\] and plug \[mm\].
     pub oracle: Vec<(f64, f64)>,
     /// How far the informed predictors' loops are from it at most \[mm\].
-    pub misses_mm: [f64; 2],
+    pub max_deviation_mm: [f64; 2],
     /// When a feed at its limit from the start on brings the plug within the
     /// band: no law is sooner \[s\].
     pub soonest_s: f64,
@@ -56,16 +58,16 @@ pub struct Examined {
 
 impl Examined {
     /// Runs all of it.
-    pub fn run(case: Case) -> Result<Self, RunError> {
+    pub fn run(case: PulsationCase) -> Result<Self, RunError> {
         let screw = case.screw(TurnUnit::RadPerS)?;
-        let law = FillLaw::Exponential(paper_law(&screw)?);
-        let paper = |until_s: f64, method| follow(&Plan::paper(screw, until_s), &method);
-        let exact = |method| follow(&Plan::exact(screw, SHORT_S), &method);
-        let with = |law, scheme, known| Method::Predictor { law, scheme, known };
-        let pair = |known: Screw| -> Result<Pair, RunError> {
-            Ok(Pair {
-                paper: paper(SHORT_S, with(law, Scheme::Paper, known))?,
-                exact: exact(with(law, Scheme::Exact, known))?,
+        let controller = FillFeedback::Exponential(paper_controller(&screw)?);
+        let paper = |until_s: f64, method| follow(&RunPlan::paper(screw, until_s), &method);
+        let exact = |method| follow(&RunPlan::exact(screw, SHORT_S), &method);
+        let with = |controller, scheme, known| FeedMethod::Predictor { controller, scheme, known };
+        let pair = |known: Screw| -> Result<PredictorPair, RunError> {
+            Ok(PredictorPair {
+                paper: paper(SHORT_S, with(controller, Scheme::Paper, known))?,
+                exact: exact(with(controller, Scheme::Exact, known))?,
             })
         };
         let informed = pair(screw)?;
@@ -74,39 +76,45 @@ impl Examined {
             straight.push(exact(with(saturated(&screw, slope)?, Scheme::Exact, screw))?);
         }
         let first_effect_s = screw.arrival(0.0, START.get() / MM_PER_M);
-        let (first, oracle) = oracle(&screw, first_effect_s, &law);
-        let missed = |course: &Course| course.misses(first, oracle.iter().map(|(_, plug)| *plug));
+        let (first, oracle) = oracle(&screw, first_effect_s, &controller);
+        let missed = |course: &PlugResponse| {
+            course.max_deviation(first, oracle.iter().map(|(_, plug)| *plug))
+        };
         let misses_mm = [missed(&informed.paper), missed(&informed.exact)];
         Ok(Self {
             case,
             first_effect_s,
-            open: paper(LONG_S, Method::OpenLoop)?,
-            uncompensated: paper(LONG_S, Method::Uncompensated(law))?,
+            open: paper(LONG_S, FeedMethod::OpenLoop)?,
+            uncompensated: paper(LONG_S, FeedMethod::Uncompensated(controller))?,
             uninformed: pair(screw.steady())?,
             informed,
             straight,
             oracle,
-            misses_mm,
+            max_deviation_mm: misses_mm,
             soonest_s: soonest(&screw, first_effect_s),
         })
     }
 
     /// The swing of the law without a predictor.
-    pub fn swing(&self) -> Option<Cycle> {
-        self.uncompensated.cycle(SETPOINT.plug.get(), LONG_S - SWING_S)
+    pub fn cycle(&self) -> Option<Cycle> {
+        self.uncompensated.cycle(SETPOINT.plug.get(), LONG_S - CYCLE_S)
     }
 }
 
 /// When a course settled \[s\].
-pub fn settles(course: &Course) -> Option<f64> {
-    course.settles(SETPOINT.plug.get(), BAND_MM)
+pub fn settles(course: &PlugResponse) -> Option<f64> {
+    course.settles(SETPOINT.plug.get(), SETTLING_BAND_MM)
 }
 
 /// Number of the first sample after the first effect, and the delay-free loop
 /// at that one and those after it.
-fn oracle(screw: &Screw, first_effect_s: f64, law: &FillLaw) -> (usize, Vec<(f64, f64)>) {
+fn oracle(
+    screw: &Screw,
+    first_effect_s: f64,
+    controller: &FillFeedback,
+) -> (usize, Vec<(f64, f64)>) {
     let first = (first_effect_s / STEP_S).ceil();
-    let fill = |plug: f64| law.fill(plug);
+    let fill = |plug: f64| controller.fill(plug);
     let start_m = START.get() / MM_PER_M;
     let lead = first * STEP_S - first_effect_s;
     let plug = delay_free(screw, start_m, first_effect_s, lead, fill).nth(1).unwrap_or(start_m);
@@ -120,9 +128,9 @@ fn oracle(screw: &Screw, first_effect_s: f64, law: &FillLaw) -> (usize, Vec<(f64
 }
 
 fn soonest(screw: &Screw, first_effect_s: f64) -> f64 {
-    let band = (SETPOINT.plug.get() - BAND_MM) / MM_PER_M;
+    let band = (SETPOINT.plug.get() - SETTLING_BAND_MM) / MM_PER_M;
     let start_m = START.get() / MM_PER_M;
-    let plugs = delay_free(screw, start_m, first_effect_s, 1e-4, |_| SETPOINT.most);
+    let plugs = delay_free(screw, start_m, first_effect_s, 1e-4, |_| SETPOINT.max_fill);
     let times = (0_u32..).map(|tick| first_effect_s + 1e-4 * f64::from(tick));
     times.zip(plugs).find(|(_, plug)| *plug >= band).map_or(f64::INFINITY, |(at_s, _)| at_s)
 }
@@ -150,14 +158,18 @@ mod tests {
             let [first, open, swing, period, informed, uninformed] = known;
             near(found.first_effect_s, first, 0.001);
             near(settles(&found.open).unwrap(), open, 0.001);
-            let cycle = found.swing().unwrap();
+            let cycle = found.cycle().unwrap();
             near(cycle.peak_to_peak_mm, swing, 0.02);
             near(cycle.period_s, period, 0.02);
             near(settles(&found.informed.paper).unwrap(), informed, 0.001);
             near(settles(&found.uninformed.paper).unwrap(), uninformed, 0.001);
             // Sampled at 1 ms the exact loop is a perfect predictor's.
-            assert!(found.misses_mm[1] < 0.05, "{:?}", found.misses_mm);
-            assert!((0.4..0.7).contains(&found.misses_mm[0]), "{:?}", found.misses_mm);
+            assert!(found.max_deviation_mm[1] < 0.05, "{:?}", found.max_deviation_mm);
+            assert!(
+                (0.4..0.7).contains(&found.max_deviation_mm[0]),
+                "{:?}",
+                found.max_deviation_mm
+            );
             near(settles(&found.informed.exact).unwrap(), informed, 0.01);
             // As soon as the limit allows, the steeper the sooner.
             let mut before = settles(&found.informed.exact).unwrap();
@@ -168,7 +180,7 @@ mod tests {
             }
             near(before, found.soonest_s, 0.02);
             assert!(found.informed.paper.overshoot_mm(160.0) < 1e-3);
-            if case.pulsation.share > 0.3 {
+            if case.pulsation.relative_amplitude > 0.3 {
                 near(found.uninformed.paper.overshoot_mm(160.0), 8.8, 0.02);
             }
         }

@@ -1,20 +1,20 @@
 //! The loops at 200 Hz on a screw that is not quite the one that the predictor
 //! knows, or whose plug is measured with noise.
 
-use super::run::{Method, Plan, RunError, follow};
-use super::{BAND_MM, Case, SETPOINT};
+use super::run::{FeedMethod, RunError, RunPlan, follow};
+use super::{PulsationCase, SETPOINT, SETTLING_BAND_MM};
 use crate::extruder::screw::control::Scheme;
-use crate::extruder::screw::{Conveying, FillLaw, Pulsation, Screw, TurnUnit};
+use crate::extruder::screw::{Conveying, FillFeedback, Screw, SpeedPulsation, TurnUnit};
 
 /// Length of the runs, and when all has settled that settles \[s\].
-const UNTIL_S: f64 = 12.0;
-const LATE_S: f64 = 6.0;
+const RUN_S: f64 = 12.0;
+const STEADY_AFTER_S: f64 = 6.0;
 /// Steps of the plant in one of the control: 200 Hz.
-const HOLD: u32 = 5;
+const HOLD_STEPS: u32 = 5;
 
 /// What is not as the predictor knows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Trouble {
+pub enum ScrewMismatch {
     /// Nothing.
     None,
     /// The known conveying speed θ1 is the true one times this.
@@ -32,79 +32,80 @@ pub enum Trouble {
 }
 
 /// What is tried.
-pub const TROUBLES: [(&str, Trouble); 9] = [
-    ("nothing wrong", Trouble::None),
-    ("θ1 known 10 % too high", Trouble::Speed(1.1)),
-    ("θ1 known 10 % too low", Trouble::Speed(0.9)),
-    ("θ2 known 10 % too high", Trouble::Nozzle(1.1)),
-    ("ε known half as large", Trouble::Share(0.5)),
-    ("phase known 30° ahead", Trouble::Phase(std::f64::consts::FRAC_PI_6)),
-    ("plug measured with 0.5 mm", Trouble::Noise(0.5)),
-    ("plug measured with 2 mm", Trouble::Noise(2.0)),
-    ("delay adds up on the way", Trouble::Belt),
+pub const MISMATCHES: [(&str, ScrewMismatch); 9] = [
+    ("nothing wrong", ScrewMismatch::None),
+    ("θ1 known 10 % too high", ScrewMismatch::Speed(1.1)),
+    ("θ1 known 10 % too low", ScrewMismatch::Speed(0.9)),
+    ("θ2 known 10 % too high", ScrewMismatch::Nozzle(1.1)),
+    ("ε known half as large", ScrewMismatch::Share(0.5)),
+    ("phase known 30° ahead", ScrewMismatch::Phase(std::f64::consts::FRAC_PI_6)),
+    ("plug measured with 0.5 mm", ScrewMismatch::Noise(0.5)),
+    ("plug measured with 2 mm", ScrewMismatch::Noise(2.0)),
+    ("delay adds up on the way", ScrewMismatch::Belt),
 ];
 
 /// What a run came to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outcome {
+pub struct RobustnessOutcome {
     /// Settled after \[s\]; none where it never did.
     pub settles_s: Option<f64>,
     /// Farthest beyond the setpoint \[mm\].
     pub overshoot_mm: f64,
     /// Root mean square error after all that settles has settled \[mm\].
-    pub late_mm: f64,
+    pub steady_error_mm: f64,
     /// Root mean square change of the feed from one plant step to the next then.
-    pub shaking: f64,
+    pub feed_change: f64,
 }
 
 /// Runs a law with a scheme against a trouble.
-pub fn suffer(
-    case: &Case,
-    trouble: Trouble,
-    law: FillLaw,
+pub fn run_mismatched(
+    case: &PulsationCase,
+    mismatch: ScrewMismatch,
+    controller: FillFeedback,
     scheme: Scheme,
-) -> Result<Outcome, RunError> {
+) -> Result<RobustnessOutcome, RunError> {
     let screw = case.screw(TurnUnit::RadPerS)?;
-    let mut plan = Plan { hold: HOLD, ..Plan::exact(screw, UNTIL_S) };
+    let mut plan = RunPlan { hold: HOLD_STEPS, ..RunPlan::exact(screw, RUN_S) };
     let mut known = screw;
-    match trouble {
-        Trouble::None => {}
-        Trouble::Speed(times) => known.theta1_m_per_s *= times,
-        Trouble::Nozzle(times) => known.theta2_per_m *= times,
-        Trouble::Share(times) => known.pulsation.share *= times,
-        Trouble::Phase(ahead) => {
-            known.pulsation = Pulsation { phase_rad: ahead, ..known.pulsation };
+    match mismatch {
+        ScrewMismatch::None => {}
+        ScrewMismatch::Speed(times) => known.theta1_m_per_s *= times,
+        ScrewMismatch::Nozzle(times) => known.theta2_per_m *= times,
+        ScrewMismatch::Share(times) => known.pulsation.relative_amplitude *= times,
+        ScrewMismatch::Phase(ahead) => {
+            known.pulsation = SpeedPulsation { phase_rad: ahead, ..known.pulsation };
         }
-        Trouble::Noise(sigma_mm) => plan.noise_mm = sigma_mm,
-        Trouble::Belt => {
+        ScrewMismatch::Noise(sigma_mm) => plan.noise_mm = sigma_mm,
+        ScrewMismatch::Belt => {
             plan.screw = Screw { conveying: Conveying::AtSpeedOnTheWay, ..screw };
         }
     }
-    let course = follow(&plan, &Method::Predictor { law, scheme, known })?;
+    let course = follow(&plan, &FeedMethod::Predictor { controller, scheme, known })?;
     let target = SETPOINT.plug.get();
-    Ok(Outcome {
-        settles_s: course.settles(target, BAND_MM),
+    Ok(RobustnessOutcome {
+        settles_s: course.settles(target, SETTLING_BAND_MM),
         overshoot_mm: course.overshoot_mm(target),
-        late_mm: course.rms_mm(target, LATE_S),
-        shaking: course.shaking(LATE_S),
+        steady_error_mm: course.rms_mm(target, STEADY_AFTER_S),
+        feed_change: course.feed_change(STEADY_AFTER_S),
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::studies::diagne2015::{CASES, paper_law, saturated};
+    use crate::studies::diagne2015::{CASES, paper_controller, saturated};
 
     #[test]
     fn both_laws_settle_in_spite_of_a_speed_that_is_known_to_a_tenth() {
         let [_, _, case] = CASES;
         let screw = case.screw(TurnUnit::RadPerS).unwrap();
-        let paper = FillLaw::Exponential(paper_law(&screw).unwrap());
+        let paper = FillFeedback::Exponential(paper_controller(&screw).unwrap());
         for law in [paper, saturated(&screw, 60.0).unwrap()] {
             for times in [0.9, 1.1] {
-                let found = suffer(&case, Trouble::Speed(times), law, Scheme::Exact).unwrap();
+                let found =
+                    run_mismatched(&case, ScrewMismatch::Speed(times), law, Scheme::Exact).unwrap();
                 assert!(found.settles_s.unwrap() < 1.4);
-                assert!(found.overshoot_mm < 6.5 && found.late_mm < 1e-3);
+                assert!(found.overshoot_mm < 6.5 && found.steady_error_mm < 1e-3);
             }
         }
     }
@@ -114,8 +115,8 @@ mod tests {
         let [case, ..] = CASES;
         let screw = case.screw(TurnUnit::RadPerS).unwrap();
         let law = saturated(&screw, 60.0).unwrap();
-        let found = suffer(&case, Trouble::Nozzle(1.1), law, Scheme::Exact).unwrap();
-        assert!((0.5..1.5).contains(&found.late_mm), "{}", found.late_mm);
+        let found = run_mismatched(&case, ScrewMismatch::Nozzle(1.1), law, Scheme::Exact).unwrap();
+        assert!((0.5..1.5).contains(&found.steady_error_mm), "{}", found.steady_error_mm);
     }
 
     #[test]
@@ -124,10 +125,10 @@ mod tests {
         let screw = case.screw(TurnUnit::RadPerS).unwrap();
         let shaken = |slope| {
             let law = saturated(&screw, slope).unwrap();
-            suffer(&case, Trouble::Noise(0.5), law, Scheme::Exact).unwrap()
+            run_mismatched(&case, ScrewMismatch::Noise(0.5), law, Scheme::Exact).unwrap()
         };
         let (flat, steep) = (shaken(36.0), shaken(100.0));
-        assert!(steep.shaking > 2.0 * flat.shaking);
-        assert!(steep.late_mm > flat.late_mm && steep.late_mm < 0.2);
+        assert!(steep.feed_change > 2.0 * flat.feed_change);
+        assert!(steep.steady_error_mm > flat.steady_error_mm && steep.steady_error_mm < 0.2);
     }
 }

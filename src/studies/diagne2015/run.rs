@@ -4,27 +4,27 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::course::{Course, Sample};
+use super::course::{PlugResponse, PlugSample};
 use super::{SETPOINT, START};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
 use crate::extruder::screw::control::{Scheme, ScrewSettings};
-use crate::extruder::screw::{FillLaw, Screw, ScrewControl, ScrewError, ScrewFault};
+use crate::extruder::screw::{FillFeedback, Screw, ScrewControl, ScrewError, ScrewFault};
 use crate::sim::screw::{Integrator, SimScrew};
 
 const MM_PER_M: f64 = 1000.0;
 
 /// What feeds the screw.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Method {
+pub enum FeedMethod {
     /// The share that holds the setpoint, from the start on.
     OpenLoop,
     /// The law on the measured plug, as if there were no delay.
-    Uncompensated(FillLaw),
+    Uncompensated(FillFeedback),
     /// The law on the foretold plug.
     Predictor {
         /// The law.
-        law: FillLaw,
+        controller: FillFeedback,
         /// How the prediction is computed.
         scheme: Scheme,
         /// What the predictor knows of the screw.
@@ -34,7 +34,7 @@ pub enum Method {
 
 /// How a run is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plan {
+pub struct RunPlan {
     /// The plant.
     pub screw: Screw,
     /// How the plant is integrated.
@@ -51,7 +51,7 @@ pub struct Plan {
     pub seed: u64,
 }
 
-impl Plan {
+impl RunPlan {
     /// The paper's: plant and control by Euler steps of a millisecond.
     pub fn paper(screw: Screw, until_s: f64) -> Self {
         let integrator = Integrator::Euler;
@@ -86,14 +86,14 @@ pub enum RunError {
 }
 
 /// Runs it, from a plug that has been held at the start.
-pub fn follow(plan: &Plan, method: &Method) -> Result<Course, RunError> {
+pub fn follow(plan: &RunPlan, method: &FeedMethod) -> Result<PlugResponse, RunError> {
     let start_m = START.get() / MM_PER_M;
-    let before = plan.screw.holding(start_m);
+    let before = plan.screw.holding_fill(start_m);
     let step_s = f64::from(plan.step_ms) / 1000.0;
     let mut plant = SimScrew::new(plan.screw, plan.integrator, step_s, start_m, before);
     let mut feeder = Feeder::new(plan, method, before)?;
     let mut noise = Xoshiro256PlusPlus::seed_from_u64(plan.seed);
-    let mut course = Course::default();
+    let mut course = PlugResponse::default();
     let mut fed = (before, None);
     for tick in 0_u32.. {
         let at_s = plant.now_s();
@@ -106,8 +106,14 @@ pub fn follow(plan: &Plan, method: &Method) -> Result<Course, RunError> {
             let measured = Mm::new(plug_mm + plan.noise_mm * draw).unwrap_or_default();
             fed = feeder.feed(tick * plan.step_ms, measured)?;
         }
-        let (fill, foretold) = fed;
-        course.samples.push(Sample { at_s, plug_mm, fill, foretold, delay_s: plant.delay_s() });
+        let (fill, predicted) = fed;
+        course.samples.push(PlugSample {
+            at_s,
+            plug_mm,
+            fill,
+            predicted,
+            delay_s: plant.delay_s(),
+        });
         plant.advance(fill);
     }
     Ok(course)
@@ -116,7 +122,7 @@ pub fn follow(plan: &Plan, method: &Method) -> Result<Course, RunError> {
 /// What feeds, with its memory.
 enum Feeder {
     Constant(f64),
-    Law(FillLaw),
+    StateFeedback(FillFeedback),
     Control(ScrewControl),
 }
 
@@ -124,13 +130,21 @@ enum Feeder {
 type Fed = (f64, Option<(f64, f64)>);
 
 impl Feeder {
-    fn new(plan: &Plan, method: &Method, before: f64) -> Result<Self, ScrewError> {
+    fn new(plan: &RunPlan, method: &FeedMethod, before: f64) -> Result<Self, ScrewError> {
         Ok(match *method {
-            Method::OpenLoop => Self::Constant(plan.screw.holding(SETPOINT.plug.get() / MM_PER_M)),
-            Method::Uncompensated(law) => Self::Law(law),
-            Method::Predictor { law, scheme, known } => {
+            FeedMethod::OpenLoop => {
+                Self::Constant(plan.screw.holding_fill(SETPOINT.plug.get() / MM_PER_M))
+            }
+            FeedMethod::Uncompensated(controller) => Self::StateFeedback(controller),
+            FeedMethod::Predictor { controller, scheme, known } => {
                 let period = plan.period();
-                let settings = ScrewSettings { screw: known, law, scheme, period, before };
+                let settings = ScrewSettings {
+                    screw: known,
+                    feedback: controller,
+                    scheme,
+                    period,
+                    initial_fill: before,
+                };
                 Self::Control(ScrewControl::new(&settings)?)
             }
         })
@@ -140,7 +154,7 @@ impl Feeder {
         let now = Stamp::from_ns(u64::from(at_ms) * 1_000_000);
         match self {
             Self::Constant(fill) => Ok((*fill, None)),
-            Self::Law(law) => Ok((law.fill(plug.get() / MM_PER_M), None)),
+            Self::StateFeedback(controller) => Ok((controller.fill(plug.get() / MM_PER_M), None)),
             Self::Control(control) => match control.step(now, plug) {
                 Ok(step) => Ok((step.fill, Some((step.plug.get(), step.arrival.secs())))),
                 Err(fault) => Err(RunError::Fault { at_s: now.secs(), fault }),

@@ -3,23 +3,25 @@
 use maud::{Markup, html};
 
 use super::experiment::{Examined, SLOPES_PER_M, settles};
-use super::robustness::{Outcome, TROUBLES, suffer};
+use super::robustness::{MISMATCHES, RobustnessOutcome, run_mismatched};
 use super::run::RunError;
-use super::{CASES, Case, Course, SETPOINT, Sample, paper_law, saturated};
+use super::{
+    CASES, PlugResponse, PlugSample, PulsationCase, SETPOINT, paper_controller, saturated,
+};
 use crate::extruder::screw::control::Scheme;
 use crate::extruder::screw::feasible::Feasibility;
-use crate::extruder::screw::{FillLaw, Screw, TurnUnit};
+use crate::extruder::screw::{FillFeedback, Screw, TurnUnit};
 use crate::io::progress::Progress;
 use crate::report::chart::area::{Area, XAxis};
 use crate::report::chart::legend::legend;
 use crate::report::chart::palette;
 use crate::report::chart::palette::Ink;
-use crate::report::chart::plot::{Layer as Drawn, Plot, y_range};
+use crate::report::chart::plot::{Plot, PlotLayer as Drawn, y_range};
 use crate::report::chart::range::Range;
-use crate::report::chart::series::Series;
+use crate::report::chart::series::Curve;
 use crate::studies::error::ReproduceError;
-use crate::studies::row::Rows;
-use crate::studies::source::Source;
+use crate::studies::row::TableRows;
+use crate::studies::source::Publication;
 use crate::studies::study::{Reproduced, Section};
 
 /// What progress is told of.
@@ -35,9 +37,9 @@ const ABOUT: &str = "The paper prints curves and no numbers of them, so that not
 
 /// Runs the experiments.
 pub fn run(progress: &mut Progress) -> Result<Reproduced, ReproduceError> {
-    let mut rows = Rows::of(Source::Diagne2015);
+    let mut rows = TableRows::of(Publication::Diagne2015);
     let mut sections = Vec::new();
-    law_rows(&mut rows)?;
+    controller_rows(&mut rows)?;
     sections.push(feasibility(&mut rows)?);
     for case in CASES {
         let found = Examined::run(case)?;
@@ -51,18 +53,18 @@ pub fn run(progress: &mut Progress) -> Result<Reproduced, ReproduceError> {
     Ok(Reproduced { title, about: ABOUT.to_owned(), rows: rows.into_vec(), sections })
 }
 
-fn law_rows(rows: &mut Rows) -> Result<(), RunError> {
+fn controller_rows(rows: &mut TableRows) -> Result<(), RunError> {
     let [case, ..] = CASES;
     let screw = case.screw(TurnUnit::RadPerS)?;
     let turns = case.screw(TurnUnit::RevPerS)?;
-    let law = paper_law(&screw)?;
-    let (left, right) = law.gains_per_m();
+    let controller = paper_controller(&screw)?;
+    let (left, right) = controller.gains_per_m();
     for (quantity, unit, value) in [
         ("θ1, speed read in rad/s", "m/s", screw.theta1_m_per_s),
         ("θ1, speed read in rev/s", "m/s", turns.theta1_m_per_s),
         ("θ2", "1/m", screw.theta2_per_m),
-        ("flattest slope S_min", "1/m", SETPOINT.least_slope(&screw)?),
-        ("slope S", "1/m", law.slope_per_m()),
+        ("flattest slope S_min", "1/m", SETPOINT.min_slope(&screw)?),
+        ("slope S", "1/m", controller.slope_per_m()),
         ("gain to the left a_l", "1/m", left),
         ("gain to the right a_r", "1/m", right),
     ] {
@@ -71,13 +73,13 @@ fn law_rows(rows: &mut Rows) -> Result<(), RunError> {
     Ok(())
 }
 
-fn feasibility(rows: &mut Rows) -> Result<Section, RunError> {
+fn feasibility(rows: &mut TableRows) -> Result<Section, RunError> {
     let mut judged = Vec::new();
     for (unit, name) in [(TurnUnit::RadPerS, "rad/s"), (TurnUnit::RevPerS, "rev/s")] {
-        for case in CASES.iter().filter(|case| case.pulsation.share > 0.0) {
+        for case in CASES.iter().filter(|case| case.pulsation.relative_amplitude > 0.0) {
             let verdict = Feasibility::judge(&case.screw(unit)?);
             let title = format!("{}, speed read in {name}", case.name);
-            let (printed, sharp) = (verdict.printed, verdict.sharp);
+            let (printed, sharp) = (verdict.paper, verdict.exact);
             for (what, theirs, ours) in [
                 (("bound of sin/(1 + ε·cos)²", ""), printed.factor, sharp.factor),
                 (("largest growth of the delay", "s/s"), printed.growth, sharp.growth),
@@ -103,7 +105,7 @@ fn feasibility(rows: &mut Rows) -> Result<Section, RunError> {
             td { (title) }
             td { (verdict) }
             td {
-                (verdict.printed.condition.map_or("no condition is met".to_owned(), |met| {
+                (verdict.paper.condition.map_or("no condition is met".to_owned(), |met| {
                     format!("{met} is met")
                 }))
             }
@@ -116,7 +118,7 @@ fn feasibility(rows: &mut Rows) -> Result<Section, RunError> {
     Ok(Section { heading, hint, drawing })
 }
 
-fn case_rows(rows: &mut Rows, found: &Examined) {
+fn case_rows(rows: &mut TableRows, found: &Examined) {
     let name = found.case.name;
     let target = SETPOINT.plug.get();
     let mut push = |(quantity, unit), theirs: Option<f64>, ours: Option<f64>| {
@@ -125,7 +127,7 @@ fn case_rows(rows: &mut Rows, found: &Examined) {
     let first = Some(found.first_effect_s);
     push(("first effect of the control", "s"), first, first);
     push(("open loop settles", "s"), settles(&found.open), None);
-    let swing = found.swing();
+    let swing = found.cycle();
     let peaks = swing.map(|swing| swing.peak_to_peak_mm);
     push(("no predictor: swing, peak to peak", "mm"), peaks, None);
     push(("no predictor: period of the swing", "s"), swing.map(|swing| swing.period_s), None);
@@ -140,10 +142,10 @@ fn case_rows(rows: &mut Rows, found: &Examined) {
         ("predictor (time and state) overshoots by", informed),
         ("predictor (state only) overshoots by", uninformed),
     ] {
-        let beyond = |course: &Course| Some(course.overshoot_mm(target));
+        let beyond = |course: &PlugResponse| Some(course.overshoot_mm(target));
         push((quantity, "mm"), beyond(&pair.paper), beyond(&pair.exact));
     }
-    let [theirs, ours] = found.misses_mm.map(Some);
+    let [theirs, ours] = found.max_deviation_mm.map(Some);
     push(("farthest from the delay-free loop", "mm"), theirs, ours);
     let steeper = ["law between limits, 60/m, settles", "… 100/m, settles", "… 200/m, settles"];
     for (quantity, course) in steeper.into_iter().zip(&found.straight) {
@@ -152,25 +154,26 @@ fn case_rows(rows: &mut Rows, found: &Examined) {
     push(("soonest that the largest feed allows", "s"), Some(found.soonest_s), None);
 }
 
-fn robustness_rows(rows: &mut Rows) -> Result<(), RunError> {
+fn robustness_rows(rows: &mut TableRows) -> Result<(), RunError> {
     let [_, _, case] = CASES;
     let screw: Screw = case.screw(TurnUnit::RadPerS)?;
-    let paper = FillLaw::Exponential(paper_law(&screw)?);
+    let paper = FillFeedback::Exponential(paper_controller(&screw)?);
     let ours = saturated(&screw, SLOPES_PER_M[0])?;
-    for (name, trouble) in TROUBLES {
-        let theirs = suffer(&case, trouble, paper, Scheme::Paper)?;
-        let same = suffer(&case, trouble, paper, Scheme::Exact)?;
-        let ours = suffer(&case, trouble, ours, Scheme::Exact)?;
+    for (name, trouble) in MISMATCHES {
+        let theirs = run_mismatched(&case, trouble, paper, Scheme::Paper)?;
+        let same = run_mismatched(&case, trouble, paper, Scheme::Exact)?;
+        let ours = run_mismatched(&case, trouble, ours, Scheme::Exact)?;
         let title = format!("b at 200 Hz: {name}");
-        let mut push = |what, of: fn(&Outcome) -> Option<f64>, ours: &Outcome| {
-            rows.push(&title, what, [None, of(&theirs), of(ours)]);
-        };
+        let mut push =
+            |what, of: fn(&RobustnessOutcome) -> Option<f64>, ours: &RobustnessOutcome| {
+                rows.push(&title, what, [None, of(&theirs), of(ours)]);
+            };
         push(("settles, paper's law", "s"), |found| found.settles_s, &same);
         push(("settles, law between limits", "s"), |found| found.settles_s, &ours);
         push(("overshoots by, paper's law", "mm"), |found| Some(found.overshoot_mm), &same);
         push(("overshoots by, law between limits", "mm"), |f| Some(f.overshoot_mm), &ours);
-        push(("RMS error at the end", "mm"), |found| Some(found.late_mm), &ours);
-        push(("RMS change of the feed at the end", ""), |found| Some(found.shaking), &ours);
+        push(("RMS error at the end", "mm"), |found| Some(found.steady_error_mm), &ours);
+        push(("RMS change of the feed at the end", ""), |found| Some(found.feed_change), &ours);
     }
     Ok(())
 }
@@ -179,7 +182,7 @@ fn robustness_rows(rows: &mut Rows) -> Result<(), RunError> {
 struct Line<'a> {
     name: &'a str,
     ink: Ink,
-    course: &'a Course,
+    course: &'a PlugResponse,
 }
 
 fn case_section(found: &Examined) -> Section {
@@ -196,14 +199,14 @@ fn case_section(found: &Examined) -> Section {
     let drawing = html! {
         (names(&short))
         (draw(&short, BEGINNING, ("filled length x [mm]", plug), Some(SETPOINT.plug.get())))
-        (draw(&short, BEGINNING, ("share fed U", fill), Some(SETPOINT.most)))
+        (draw(&short, BEGINNING, ("share fed U", fill), Some(SETPOINT.max_fill)))
         (draw(&short, BEGINNING, ("delay D [s]", delay), None))
         (names(&[&open, &bare]))
         (draw(&[&open, &bare], ALL, ("filled length x [mm]", plug), Some(SETPOINT.plug.get())))
-        (draw_foretold(found))
+        (draw_prediction(found))
         (draw_misses(found))
     };
-    let hint = match found.case.pulsation.share {
+    let hint = match found.case.pulsation.relative_amplitude {
         0.0 => "The conveying speed is steady: both predictors are the same.",
         _ => "The conveying speed pulsates; the predictor of the state only takes it for steady.",
     };
@@ -211,11 +214,15 @@ fn case_section(found: &Examined) -> Section {
     Section { heading, hint: hint.to_owned(), drawing }
 }
 
-fn heading(case: &Case) -> String {
-    if case.pulsation.share > 0.0 { format!("of case {}", case.name) } else { case.name.to_owned() }
+fn heading(case: &PulsationCase) -> String {
+    if case.pulsation.relative_amplitude > 0.0 {
+        format!("of case {}", case.name)
+    } else {
+        case.name.to_owned()
+    }
 }
 
-type Of = fn(&Sample) -> f64;
+type Of = fn(&PlugSample) -> f64;
 
 fn names(lines: &[&Line<'_>]) -> Markup {
     let entries: Vec<_> = lines.iter().map(|line| (line.name, line.ink, "")).collect();
@@ -228,33 +235,33 @@ fn draw(
     (y_title, of): (&str, Of),
     level: Option<f64>,
 ) -> Markup {
-    let curves: Vec<(Series, Ink)> =
+    let curves: Vec<(Curve, Ink)> =
         lines.iter().map(|line| (during(line.course, range, of), line.ink)).collect();
     let name = level.map(|level| level.to_string()).unwrap_or_default();
     let mut layers: Vec<Drawn<'_>> =
         curves.iter().map(|(curve, ink)| Drawn::Curve(curve, *ink)).collect();
     layers.extend(level.map(|level| Drawn::Level(level, palette::TARGET, &name)));
     let axis = XAxis::time(range);
-    let shown: Vec<&Series> = curves.iter().map(|(curve, _)| curve).collect();
+    let shown: Vec<&Curve> = curves.iter().map(|(curve, _)| curve).collect();
     let levels: Vec<f64> = level.into_iter().collect();
     let y_range = y_range(&shown, &levels);
     Plot { area: Area::wide(200.0), x: &axis, y_title, y_range, layers }.draw()
 }
 
-fn during(course: &Course, range: Range, of: Of) -> Series {
+fn during(course: &PlugResponse, range: Range, of: Of) -> Curve {
     let inside =
         course.samples.iter().filter(|sample| (range.min..=range.max).contains(&sample.at_s));
     inside.map(|sample| (sample.at_s, of(sample))).collect()
 }
 
 /// What was foretold, at the moment for which it was, beside what came.
-fn draw_foretold(found: &Examined) -> Markup {
+fn draw_prediction(found: &Examined) -> Markup {
     let course = &found.informed.exact;
     let until = |points: Vec<(f64, f64)>| {
-        points.into_iter().filter(|(at_s, _)| *at_s <= BEGINNING.max).collect::<Series>()
+        points.into_iter().filter(|(at_s, _)| *at_s <= BEGINNING.max).collect::<Curve>()
     };
-    let foretold = course.samples.iter().filter_map(|s| s.foretold.map(|(mm, at_s)| (at_s, mm)));
-    let foretold = until(foretold.collect());
+    let predicted = course.samples.iter().filter_map(|s| s.predicted.map(|(mm, at_s)| (at_s, mm)));
+    let predicted = until(predicted.collect());
     let oracle = until(found.oracle.clone());
     let came = during(course, BEGINNING, |sample| sample.plug_mm);
     let axis = XAxis::time(BEGINNING);
@@ -262,11 +269,11 @@ fn draw_foretold(found: &Examined) -> Markup {
         area: Area::wide(200.0),
         x: &axis,
         y_title: "filled length x [mm]",
-        y_range: y_range(&[&foretold, &oracle, &came], &[]),
+        y_range: y_range(&[&predicted, &oracle, &came], &[]),
         layers: vec![
             Drawn::Curve(&came, palette::OURS),
-            Drawn::Curve(&foretold, palette::MODEL),
-            Drawn::Wish(&oracle, palette::TARGET),
+            Drawn::Curve(&predicted, palette::MODEL),
+            Drawn::Demand(&oracle, palette::TARGET),
         ],
     };
     html! {
@@ -281,12 +288,12 @@ fn draw_foretold(found: &Examined) -> Markup {
 
 /// How far either scheme's loop is from the delay-free one.
 fn draw_misses(found: &Examined) -> Markup {
-    let miss = |course: &Course| {
+    let miss = |course: &PlugResponse| {
         let first = course.samples.partition_point(|sample| sample.at_s < found.first_effect_s);
         let late = course.samples.get(first..).unwrap_or_default();
         let pairs = late.iter().zip(&found.oracle);
         let points = pairs.map(|(sample, (at_s, plug))| (*at_s, sample.plug_mm - plug));
-        points.filter(|(at_s, _)| *at_s <= BEGINNING.max).collect::<Series>()
+        points.filter(|(at_s, _)| *at_s <= BEGINNING.max).collect::<Curve>()
     };
     let (paper, exact) = (miss(&found.informed.paper), miss(&found.informed.exact));
     let axis = XAxis::time(BEGINNING);

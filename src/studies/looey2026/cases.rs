@@ -1,12 +1,15 @@
 //! Table 1: how soon tracking and estimate converge after a step.
 
-use super::strand::{Disturbance, Parameters};
-use super::{Experiment, HOLD_S, MODEL, Method, STEP_AT_S, TOLERANCES, WATCHED_S, operating_point};
+use super::strand::{InputDisturbance, StrandParameters};
+use super::{
+    AdaptationMethod, HOLD_S, MODEL, STEP_AT_S, StrandExperiment, TOLERANCES, WATCHED_S,
+    operating_point,
+};
 use crate::extruder::adaptive::SubSystemError;
 
 /// A case of table 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Case {
+pub struct TableCase {
     /// Its number.
     pub number: u32,
     /// What is disturbed.
@@ -30,7 +33,7 @@ pub enum SubSystem {
 }
 
 /// Table 1.
-pub const TABLE: [Case; 10] = [
+pub const TABLE: [TableCase; 10] = [
     case(1, SubSystem::Nozzle, 0.0025, 4.87, 7.97),
     case(2, SubSystem::Nozzle, -0.0025, 4.77, 8.64),
     case(3, SubSystem::Nozzle, -0.005, 5.60, 8.51),
@@ -43,8 +46,14 @@ pub const TABLE: [Case; 10] = [
     case(10, SubSystem::Strand, 10.0, 2.43, 31.00),
 ];
 
-const fn case(number: u32, of: SubSystem, size: f64, tracking_s: f64, estimate_s: f64) -> Case {
-    Case { number, of, size, tracking_s, estimate_s }
+const fn case(
+    number: u32,
+    of: SubSystem,
+    size: f64,
+    tracking_s: f64,
+    estimate_s: f64,
+) -> TableCase {
+    TableCase { number, of, size, tracking_s, estimate_s }
 }
 
 /// When tracking and estimate stay within their tolerances, after the step
@@ -57,21 +66,23 @@ pub struct Convergence {
     pub estimate_s: Option<f64>,
 }
 
-impl Case {
+impl TableCase {
     /// Runs it with a law.
-    pub fn run(&self, method: Method) -> Result<Convergence, SubSystemError> {
+    pub fn run(&self, method: AdaptationMethod) -> Result<Convergence, SubSystemError> {
         let (from_s, to_s) = (STEP_AT_S, f64::INFINITY);
-        let step = |size| Disturbance::Step { size, from_s, to_s };
+        let step = |size| InputDisturbance::Step { size, from_s, to_s };
         let (feed, plate, part, input_gain) = match self.of {
-            SubSystem::Nozzle => (step(self.size), Disturbance::None, 0, MODEL.nozzle.input_gain),
+            SubSystem::Nozzle => {
+                (step(self.size), InputDisturbance::None, 0, MODEL.nozzle.input_gain)
+            }
             SubSystem::Strand => {
                 let size = 0.01 * self.size * operating_point().plate_m_per_s;
-                (Disturbance::None, step(size), 1, MODEL.strand.input_gain)
+                (InputDisturbance::None, step(size), 1, MODEL.strand.input_gain)
             }
         };
         let length_s = STEP_AT_S + WATCHED_S;
-        let parameters = Parameters::Constant;
-        let experiment = Experiment { method, parameters, feed, plate, length_s };
+        let parameters = StrandParameters::Constant;
+        let experiment = StrandExperiment { method, parameters, feed, plate, length_s };
         let mut outside = [0.0; 2];
         experiment.run(|moment| {
             let action = &moment.actions[part];

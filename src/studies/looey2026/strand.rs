@@ -1,12 +1,12 @@
 //! The plant of Mohammadi Looey et al. 2026: speed in the nozzle and speed of
 //! the strand on the moving plate.
 
-use crate::extruder::adaptive::{Inputs, StrandModel};
+use crate::extruder::adaptive::{StrandInputs, StrandModel};
 
 /// An unknown part of an input over time, in the unit of that input; time in
 /// seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Disturbance {
+pub enum InputDisturbance {
     /// Nothing.
     #[default]
     None,
@@ -30,7 +30,7 @@ pub enum Disturbance {
     },
 }
 
-impl Disturbance {
+impl InputDisturbance {
     /// Its value at a time, as it is from that time on.
     pub fn at(&self, t_s: f64) -> f64 {
         match *self {
@@ -60,19 +60,19 @@ pub struct Ramp {
 
 /// How the plant's parameters go with its inputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Parameters {
+pub enum StrandParameters {
     /// Constant, eqs. (6) and (7): the plant that the law is designed for.
     Constant,
     /// In proportion to the inputs, eqs. (1)–(5), and equal to the constants
     /// at these.
-    WithInputs(Inputs),
+    WithInputs(StrandInputs),
 }
 
 /// The plant's state and parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strand {
     model: StrandModel,
-    parameters: Parameters,
+    parameters: StrandParameters,
     /// `p_d1`, which is constant here.
     pub pressure_gradient: f64,
     /// v̄1 \[m/s\].
@@ -85,9 +85,9 @@ impl Strand {
     /// A plant with both speeds in the steady state of its inputs.
     pub fn steady(
         model: StrandModel,
-        parameters: Parameters,
+        parameters: StrandParameters,
         pressure_gradient: f64,
-        inputs: Inputs,
+        inputs: StrandInputs,
     ) -> Self {
         let (nozzle, strand) = (model.nozzle, model.strand);
         let feed = nozzle.input_gain * inputs.mass_flow_kg_per_s;
@@ -102,7 +102,7 @@ impl Strand {
     /// Goes on for `dt_s` with inputs that are held and disturbances that run
     /// straight from their first to their last value (Runge–Kutta, fourth
     /// order).
-    pub fn step(&mut self, inputs: Inputs, feed: Ramp, plate: Ramp, dt_s: f64) {
+    pub fn step(&mut self, inputs: StrandInputs, feed: Ramp, plate: Ramp, dt_s: f64) {
         let slope = |state: [f64; 2], part: f64| {
             let at = |ramp: Ramp| ramp.first + part * (ramp.last - ramp.first);
             self.slope(
@@ -125,8 +125,10 @@ impl Strand {
     fn slope(&self, [nozzle, strand]: [f64; 2], feed: f64, plate: f64) -> [f64; 2] {
         let model = &self.model;
         let (by_feed, by_plate) = match self.parameters {
-            Parameters::Constant => (1.0, 1.0),
-            Parameters::WithInputs(at) => (feed / at.mass_flow_kg_per_s, plate / at.plate_m_per_s),
+            StrandParameters::Constant => (1.0, 1.0),
+            StrandParameters::WithInputs(at) => {
+                (feed / at.mass_flow_kg_per_s, plate / at.plate_m_per_s)
+            }
         };
         let pressure = model.pressure_gain * self.pressure_gradient;
         let push = model.push_per_s * model.swell * nozzle;

@@ -2,24 +2,27 @@
 
 use maud::{Markup, html};
 
-use super::strand::Parameters;
-use super::{Case, Experiment, Method, Moment, RAMPS_PER_S, SubSystem, TABLE};
+use super::strand::StrandParameters;
+use super::{
+    AdaptationMethod, RAMPS_PER_S, StrandExperiment, StrandSample, SubSystem, TABLE, TableCase,
+};
 use crate::io::progress::Progress;
 use crate::report::chart::area::{Area, XAxis};
 use crate::report::chart::legend::legend;
 use crate::report::chart::palette;
-use crate::report::chart::plot::{Layer as Drawn, Plot, y_range};
-use crate::report::chart::series::Series;
+use crate::report::chart::plot::{Plot, PlotLayer as Drawn, y_range};
+use crate::report::chart::series::Curve;
 use crate::studies::error::ReproduceError;
 
 use crate::studies::looey2026 as experiments;
-use crate::studies::row::Rows;
-use crate::studies::source::Source;
+use crate::studies::row::TableRows;
+use crate::studies::source::Publication;
 use crate::studies::study::{Effort, Reproduced, Section};
 
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 14;
-const METHODS: [Method; 3] = [Method::NotAdaptive, Method::Paper, Method::Ours];
+const METHODS: [AdaptationMethod; 3] =
+    [AdaptationMethod::NotAdaptive, AdaptationMethod::Paper, AdaptationMethod::Ours];
 /// Every so many milliseconds is drawn.
 const DRAWN_EVERY: u64 = 20;
 /// When the disturbances of the case studies end \[s\].
@@ -28,7 +31,7 @@ const MM: f64 = 1000.0;
 
 /// Runs the experiments; none has noise that needs more than one seed.
 pub fn run(_: Effort, progress: &mut Progress) -> Result<Reproduced, ReproduceError> {
-    let mut rows = Rows::of(Source::Looey2026);
+    let mut rows = TableRows::of(Publication::Looey2026);
     for case in &TABLE {
         convergence(case, &mut rows)?;
         progress.advance();
@@ -62,8 +65,8 @@ pub fn run(_: Effort, progress: &mut Progress) -> Result<Reproduced, ReproduceEr
     })
 }
 
-fn convergence(case: &Case, rows: &mut Rows) -> Result<(), ReproduceError> {
-    let (paper, ours) = (case.run(Method::Paper)?, case.run(Method::Ours)?);
+fn convergence(case: &TableCase, rows: &mut TableRows) -> Result<(), ReproduceError> {
+    let (paper, ours) = (case.run(AdaptationMethod::Paper)?, case.run(AdaptationMethod::Ours)?);
     let name = match case.of {
         SubSystem::Nozzle => format!("case {}: {:+.4} kg/s", case.number, case.size),
         SubSystem::Strand => format!("case {}: {:+} % (not claimed)", case.number, case.size),
@@ -75,9 +78,11 @@ fn convergence(case: &Case, rows: &mut Rows) -> Result<(), ReproduceError> {
     Ok(())
 }
 
-fn ramp_constants(rows: &mut Rows) -> Result<(), ReproduceError> {
-    let (paper, ours) =
-        (experiments::ramp_errors(Method::Paper)?, experiments::ramp_errors(Method::Ours)?);
+fn ramp_constants(rows: &mut TableRows) -> Result<(), ReproduceError> {
+    let (paper, ours) = (
+        experiments::ramp_errors(AdaptationMethod::Paper)?,
+        experiments::ramp_errors(AdaptationMethod::Ours)?,
+    );
     let names = [
         (format!("ramp of {} kg/s² in the feed", RAMPS_PER_S[0]), "e1 that stays"),
         (format!("ramp of {} m/s² in the plate", RAMPS_PER_S[1]), "e3 that stays"),
@@ -92,8 +97,8 @@ fn ramp_constants(rows: &mut Rows) -> Result<(), ReproduceError> {
     Ok(())
 }
 
-fn noise(rows: &mut Rows) -> Result<(), ReproduceError> {
-    let found = [Method::Paper, Method::Ours].map(experiments::command_noise);
+fn noise(rows: &mut TableRows) -> Result<(), ReproduceError> {
+    let found = [AdaptationMethod::Paper, AdaptationMethod::Ours].map(experiments::command_noise);
     let [paper, ours] = found;
     let what = ("noise of ṁ over that of v̄1", "kg/m");
     rows.push("white noise on v̄1, 100 Hz", what, [None, Some(paper?), Some(ours?)]);
@@ -105,12 +110,12 @@ struct Study {
     name: &'static str,
     /// The sub-system that is disturbed.
     part: usize,
-    experiment: fn(Method, Parameters) -> Experiment,
+    experiment: fn(AdaptationMethod, StrandParameters) -> StrandExperiment,
 }
 
 /// What a law did, thinned for drawing.
 #[derive(Default)]
-struct Course {
+struct StudyTrace {
     speed: Vec<(f64, f64)>,
     error: Vec<(f64, f64)>,
     estimate: Vec<(f64, f64)>,
@@ -122,9 +127,9 @@ struct Course {
 }
 
 impl Study {
-    fn show(&self, rows: &mut Rows) -> Result<Section, ReproduceError> {
-        let linear = self.all(Parameters::Constant)?;
-        let real = self.all(Parameters::WithInputs(experiments::operating_point()))?;
+    fn show(&self, rows: &mut TableRows) -> Result<Section, ReproduceError> {
+        let linear = self.all(StrandParameters::Constant)?;
+        let real = self.all(StrandParameters::WithInputs(experiments::operating_point()))?;
         self.rows(&linear, "", rows);
         self.rows(&real, ", parameters with the inputs", rows);
         Ok(Section {
@@ -136,12 +141,12 @@ impl Study {
         })
     }
 
-    fn rows(&self, [fixed, paper, ours]: &[Course; 3], plant: &str, rows: &mut Rows) {
+    fn rows(&self, [fixed, paper, ours]: &[StudyTrace; 3], plant: &str, rows: &mut TableRows) {
         let name = format!("{}{plant}", self.name);
         let end = ("error at the end of it", "mm/s");
         let without = format!("{name}, not adaptive");
         rows.push(without, end, [None, Some(fixed.end_mm_per_s), None]);
-        let mut push = |quantity, of: fn(&Course) -> f64| {
+        let mut push = |quantity, of: fn(&StudyTrace) -> f64| {
             rows.push(&name, (quantity, "mm/s"), [None, Some(of(paper)), Some(of(ours))]);
         };
         push(end.0, |course| course.end_mm_per_s);
@@ -149,13 +154,17 @@ impl Study {
         push("largest error, other sub-system", |course| course.other_mm_per_s);
     }
 
-    fn all(&self, parameters: Parameters) -> Result<[Course; 3], ReproduceError> {
+    fn all(&self, parameters: StrandParameters) -> Result<[StudyTrace; 3], ReproduceError> {
         let [a, b, c] = METHODS.map(|method| self.course(method, parameters));
         Ok([a?, b?, c?])
     }
 
-    fn course(&self, method: Method, parameters: Parameters) -> Result<Course, ReproduceError> {
-        let mut course = Course::default();
+    fn course(
+        &self,
+        method: AdaptationMethod,
+        parameters: StrandParameters,
+    ) -> Result<StudyTrace, ReproduceError> {
+        let mut course = StudyTrace::default();
         let mut count = 0_u64;
         (self.experiment)(method, parameters).run(|moment| {
             course.see(moment, self.part);
@@ -167,12 +176,12 @@ impl Study {
         Ok(course)
     }
 
-    fn draw(&self, [fixed, paper, ours]: &[Course; 3]) -> Markup {
+    fn draw(&self, [fixed, paper, ours]: &[StudyTrace; 3]) -> Markup {
         let (speed, unit) = [("v̄1 [mm/s]", "Δ1 [g/s]"), ("ū3 [mm/s]", "Δ3 [mm/s]")][self.part];
-        let pick = |of: fn(&Course) -> &Vec<(f64, f64)>| {
-            [fixed, paper, ours].map(|course| of(course).iter().copied().collect::<Series>())
+        let pick = |of: fn(&StudyTrace) -> &Vec<(f64, f64)>| {
+            [fixed, paper, ours].map(|course| of(course).iter().copied().collect::<Curve>())
         };
-        let truth: Series = fixed.unknown.iter().copied().collect();
+        let truth: Curve = fixed.unknown.iter().copied().collect();
         let error = ["e1 [mm/s]", "e3 [mm/s]"][self.part];
         html! {
             (legend(&[
@@ -188,8 +197,8 @@ impl Study {
     }
 }
 
-impl Course {
-    fn see(&mut self, moment: &Moment, part: usize) {
+impl StudyTrace {
+    fn see(&mut self, moment: &StrandSample, part: usize) {
         let [own, other] = [part, 1 - part].map(|part| moment.actions[part].error.abs() * MM);
         self.largest_mm_per_s = self.largest_mm_per_s.max(own);
         self.other_mm_per_s = self.other_mm_per_s.max(other);
@@ -198,7 +207,7 @@ impl Course {
         }
     }
 
-    fn draw(&mut self, moment: &Moment, part: usize) {
+    fn draw(&mut self, moment: &StrandSample, part: usize) {
         let action = &moment.actions[part];
         let at = |value: f64| (moment.t_s, value * MM);
         self.speed.push(at(moment.speeds[part]));
@@ -211,10 +220,10 @@ impl Course {
 /// What the courses should be.
 enum Wanted<'a> {
     Level(f64),
-    Course(&'a Series),
+    Course(&'a Curve),
 }
 
-fn plot(y_title: &str, [fixed, paper, ours]: &[Series; 3], wanted: &Wanted<'_>) -> Markup {
+fn plot(y_title: &str, [fixed, paper, ours]: &[Curve; 3], wanted: &Wanted<'_>) -> Markup {
     let Some(range) = fixed.extent() else { return html! {} };
     let axis = XAxis::time(range);
     let mut shown = vec![fixed, paper, ours];
@@ -226,7 +235,7 @@ fn plot(y_title: &str, [fixed, paper, ours]: &[Series; 3], wanted: &Wanted<'_>) 
         }
         Wanted::Course(course) => {
             shown.push(course);
-            vec![Drawn::Wish(course, palette::TARGET)]
+            vec![Drawn::Demand(course, palette::TARGET)]
         }
     };
     layers.extend([

@@ -6,7 +6,7 @@ use crate::sim::pressure::TICK_S;
 
 /// What a run came to.
 #[derive(Debug, Clone, Default)]
-pub struct Course {
+pub struct PressureResponse {
     /// Time \[s\], tick by tick.
     pub time_s: Vec<f64>,
     /// What was wanted \[MPa\].
@@ -38,7 +38,7 @@ pub struct LoadFigures {
     pub iae: f64,
 }
 
-impl Course {
+impl PressureResponse {
     /// The figures of a step from rest to its last target.
     pub fn step_figures(&self) -> StepFigures {
         let target = self.target.last().copied().unwrap_or_default();

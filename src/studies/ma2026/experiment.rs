@@ -2,19 +2,21 @@
 
 use std::f64::consts::TAU;
 
-use super::course::Course;
-use super::plant::{Factors, LAG_S, LOAD_RPM, NOISE_MPA2, OFF, STEP_MPA, WANDER_MPA2, model};
+use super::course::PressureResponse;
+use super::plant::{
+    DRIFT_MPA2, Factors, LAG_S, LOAD_RPM, MODEL_ERROR, NOISE_MPA2, STEP_MPA, model,
+};
 use crate::core::time::Stamp;
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::CommandLimits;
-use crate::extruder::pressure::kalman::Noise;
-use crate::extruder::pressure::pi::{Pi, PiGains};
-use crate::extruder::pressure::predictive::Predictive;
+use crate::extruder::pressure::kalman::PressureNoise;
+use crate::extruder::pressure::pi::{PressurePi, PressurePiGains};
+use crate::extruder::pressure::predictive::PredictiveController;
 use crate::extruder::pressure::smith::SmithPi;
 use crate::extruder::pressure::tuning::Tuning;
 use crate::extruder::pressure::vsfc::{Vsfc, VsfcGains};
-use crate::extruder::pressure::{PressureError, PressureLaw, Running};
-use crate::sim::pressure::{Disturbed, Drift, Load, SimPressure};
+use crate::extruder::pressure::{InitialState, PressureController, PressureError};
+use crate::sim::pressure::{Disturbances, GainWave, LoadChange, SimPressure};
 
 /// Ticks of the plant from reading to reading: 50 Hz.
 const READ_EVERY: u64 = 4;
@@ -23,7 +25,7 @@ pub const STEP_EVERY: u64 = 10;
 
 /// A law that is tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Tried {
+pub enum TestedController {
     /// The paper's comparison, a proportional-integral law.
     Pi,
     /// The paper's own.
@@ -38,15 +40,15 @@ pub enum Tried {
 
 /// An experiment.
 #[derive(Debug, Clone)]
-pub struct Experiment {
+pub struct PressureExperiment {
     /// The process, by how far it is from the model.
     pub factors: Factors,
     /// What disturbs it.
-    pub disturbed: Disturbed,
+    pub disturbed: Disturbances,
     /// What is wanted before it begins \[MPa\].
     pub before: f64,
     /// What is wanted from then on.
-    pub target: Target,
+    pub target: PressureTarget,
     /// How long it takes \[s\].
     pub takes_s: f64,
     /// Ticks of the plant from command to command.
@@ -55,7 +57,7 @@ pub struct Experiment {
 
 /// What is wanted over time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Target {
+pub enum PressureTarget {
     /// Always the same \[MPa\].
     Steady(f64),
     /// A wave about a mean \[MPa\] with a period \[s\].
@@ -69,7 +71,7 @@ pub enum Target {
     },
 }
 
-impl Target {
+impl PressureTarget {
     /// At a time \[s\].
     pub fn at(&self, at_s: f64) -> f64 {
         match *self {
@@ -81,7 +83,7 @@ impl Target {
     }
 }
 
-impl Tried {
+impl TestedController {
     /// Its name in tables.
     pub const fn name(self) -> &'static str {
         match self {
@@ -94,42 +96,45 @@ impl Tried {
     }
 
     /// The law, taking over from what runs.
-    pub fn law(self, running: Running) -> Result<Box<dyn PressureLaw>, PressureError> {
+    pub fn controller(
+        self,
+        running: InitialState,
+    ) -> Result<Box<dyn PressureController>, PressureError> {
         let model = model()?;
-        let noise = Noise::new(WANDER_MPA2, NOISE_MPA2)?;
+        let noise = PressureNoise::new(DRIFT_MPA2, NOISE_MPA2)?;
         let limits = CommandLimits::new(0.0, 3.0, 1e6)?;
         Ok(match self {
-            Self::Pi => Box::new(Pi::new(PiGains::MA2026, noise, limits, running)),
+            Self::Pi => Box::new(PressurePi::new(PressurePiGains::MA2026, noise, limits, running)),
             Self::Vsfc => {
                 let gains = VsfcGains::ma2026(noise)?;
                 Box::new(Vsfc::new(model, gains, noise, limits, running))
             }
             Self::SmithPi => {
-                let gains = PiGains::new(1.0, LAG_S, 1.0)?;
+                let gains = PressurePiGains::new(1.0, LAG_S, 1.0)?;
                 Box::new(SmithPi::new(model, gains, 0.23, noise, limits, running))
             }
             Self::Predictive | Self::Previewed => {
-                let tuning = Tuning::of(&model, &noise, OFF / 2.0)?;
-                Box::new(Predictive::new(model, tuning, limits, running))
+                let tuning = Tuning::of(&model, &noise, MODEL_ERROR / 2.0)?;
+                Box::new(PredictiveController::new(model, tuning, limits, running))
             }
         })
     }
 }
 
-impl std::fmt::Display for Tried {
+impl std::fmt::Display for TestedController {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.name())
     }
 }
 
-impl Experiment {
+impl PressureExperiment {
     /// From rest to [`STEP_MPA`].
     pub fn step(factors: Factors) -> Self {
         Self {
             factors,
-            disturbed: Disturbed::default(),
+            disturbed: Disturbances::default(),
             before: 0.0,
-            target: Target::Steady(STEP_MPA),
+            target: PressureTarget::Steady(STEP_MPA),
             takes_s: 10.0,
             step_every: STEP_EVERY,
         }
@@ -137,8 +142,8 @@ impl Experiment {
 
     /// A sine of 0.1 MPa about 0.65 MPa, 20 s long, five times, with noise.
     pub fn sine(seed: u64) -> Self {
-        let target = Target::Sine { mean: 0.65, amplitude: 0.1, period_s: 20.0 };
-        let disturbed = Disturbed { noise_mpa2: NOISE_MPA2, seed, ..Disturbed::default() };
+        let target = PressureTarget::Sine { mean: 0.65, amplitude: 0.1, period_s: 20.0 };
+        let disturbed = Disturbances { noise_mpa2: NOISE_MPA2, seed, ..Disturbances::default() };
         Self {
             factors: Factors::NONE,
             disturbed,
@@ -151,10 +156,13 @@ impl Experiment {
 
     /// Two minutes at [`STEP_MPA`] with a gain that drifts, and noise.
     pub fn steady(seed: u64) -> Self {
-        let drift =
-            vec![Drift { share: 0.03, period_s: 60.0 }, Drift { share: 0.015, period_s: 17.0 }];
-        let disturbed = Disturbed { drift, load: None, noise_mpa2: NOISE_MPA2, seed };
-        let target = Target::Steady(STEP_MPA);
+        let drift = vec![
+            GainWave { amplitude: 0.03, period_s: 60.0 },
+            GainWave { amplitude: 0.015, period_s: 17.0 },
+        ];
+        let disturbed =
+            Disturbances { gain_waves: drift, load: None, noise_mpa2: NOISE_MPA2, seed };
+        let target = PressureTarget::Steady(STEP_MPA);
         Self {
             factors: Factors::NONE,
             disturbed,
@@ -167,9 +175,9 @@ impl Experiment {
 
     /// A step of the load after 5 s at [`STEP_MPA`].
     pub fn load(factors: Factors) -> Self {
-        let load = Some(Load { at_s: 5.0, rpm: LOAD_RPM });
-        let disturbed = Disturbed { load, ..Disturbed::default() };
-        let target = Target::Steady(STEP_MPA);
+        let load = Some(LoadChange { at_s: 5.0, rpm: LOAD_RPM });
+        let disturbed = Disturbances { load, ..Disturbances::default() };
+        let target = PressureTarget::Steady(STEP_MPA);
         Self { factors, disturbed, before: STEP_MPA, target, takes_s: 25.0, step_every: STEP_EVERY }
     }
 
@@ -181,22 +189,22 @@ impl Experiment {
     }
 
     /// Runs it with a law.
-    pub fn run(&self, tried: Tried) -> Result<Course, PressureError> {
+    pub fn run(&self, tried: TestedController) -> Result<PressureResponse, PressureError> {
         let before = MPa::new(self.before).unwrap_or_default();
         let speed = Rpm::new(self.before / self.factors.gain).unwrap_or_default();
-        let running = Running { pressure: before, target: before, speed };
-        let mut law = tried.law(running)?;
+        let running = InitialState { pressure: before, target: before, speed };
+        let mut controller = tried.controller(running)?;
         let process = self.factors.process()?;
         let fastest = Rpm::constant(3.0);
         let mut plant = SimPressure::new(process, self.disturbed.clone(), fastest, running);
-        let mut course = Course::default();
+        let mut course = PressureResponse::default();
         let mut tick = 0;
         while plant.now_s() <= self.takes_s {
             let now_s = plant.now_s();
             course.target.push(self.target.at(now_s));
             course.time_s.push(now_s);
             course.pressure.push(plant.pressure());
-            self.act(tick, law.as_mut(), &mut plant, tried == Tried::Previewed);
+            self.act(tick, controller.as_mut(), &mut plant, tried == TestedController::Previewed);
             course.speed.push(plant.speed_rpm());
             plant.advance();
             tick += 1;
@@ -204,16 +212,22 @@ impl Experiment {
         Ok(course)
     }
 
-    fn act(&self, tick: u64, law: &mut dyn PressureLaw, plant: &mut SimPressure, previewed: bool) {
+    fn act(
+        &self,
+        tick: u64,
+        controller: &mut dyn PressureController,
+        plant: &mut SimPressure,
+        previewed: bool,
+    ) {
         let now = Stamp::from_secs(plant.now_s());
         if tick.is_multiple_of(READ_EVERY) {
             // Simulated readings are never late and always plausible.
-            let _ = law.measured(now, plant.read());
+            let _ = controller.measured(now, plant.read());
         }
         if tick.is_multiple_of(self.step_every.max(1)) {
-            let ahead = if previewed { law.lead().secs() } else { 0.0 };
+            let ahead = if previewed { controller.preview().secs() } else { 0.0 };
             let target = MPa::new(self.target.at(plant.now_s() + ahead)).unwrap_or_default();
-            plant.command(law.step(now, target).speed);
+            plant.command(controller.step(now, target).speed);
         }
     }
 }

@@ -1,13 +1,13 @@
 //! How far a process may be from the model until a law swings, tried out.
 
-use super::experiment::{Experiment, Tried};
+use super::experiment::{PressureExperiment, TestedController};
 use super::plant::{DEAD_TIME_S, Factors, LOAD_RPM};
 use crate::extruder::pressure::PressureError;
-use crate::sim::pressure::Load;
+use crate::sim::pressure::LoadChange;
 
 /// How far a process may be from the model until a law no longer comes to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Margins {
+pub struct MismatchMargins {
     /// Gain over that of the model.
     pub gain: f64,
     /// Dead time beyond that of the model \[s\].
@@ -16,17 +16,17 @@ pub struct Margins {
 
 /// The margins of a law, tried out: 40 s after a step of the load the pressure
 /// still swings by more than 5 kPa.
-pub fn margins(tried: Tried) -> Result<Margins, PressureError> {
+pub fn margins(tried: TestedController) -> Result<MismatchMargins, PressureError> {
     let gain = largest(1.0, 12.0, |gain| rests(tried, Factors { gain, ..Factors::NONE }))?;
     let dead_time =
         largest(1.0, 12.0, |dead_time| rests(tried, Factors { dead_time, ..Factors::NONE }))?;
-    Ok(Margins { gain, dead_time_s: (dead_time - 1.0) * DEAD_TIME_S })
+    Ok(MismatchMargins { gain, dead_time_s: (dead_time - 1.0) * DEAD_TIME_S })
 }
 
-fn rests(tried: Tried, factors: Factors) -> Result<bool, PressureError> {
-    let mut experiment = Experiment::load(factors);
+fn rests(tried: TestedController, factors: Factors) -> Result<bool, PressureError> {
+    let mut experiment = PressureExperiment::load(factors);
     let rpm = LOAD_RPM / factors.gain;
-    experiment.disturbed.load = Some(Load { at_s: 5.0, rpm });
+    experiment.disturbed.load = Some(LoadChange { at_s: 5.0, rpm });
     experiment.takes_s = 60.0;
     let (sigma, _) = experiment.run(tried)?.steadiness(45.0);
     Ok(sigma < 0.005)

@@ -6,7 +6,7 @@ use crate::extruder::pressure::{Fopdt, PressureError};
 /// paper).
 pub const NOISE_MPA2: f64 = 4.98e-5;
 /// Variance of the wandering that the paper's filter is set for \[MPa²\].
-pub const WANDER_MPA2: f64 = 2e-5;
+pub const DRIFT_MPA2: f64 = 2e-5;
 /// Lag of the process \[s\].
 pub const LAG_S: f64 = 0.84;
 /// Dead time of the process \[s\].
@@ -17,7 +17,7 @@ pub const STEP_MPA: f64 = 0.6;
 pub const LOAD_RPM: f64 = 0.1;
 /// How far the process may be from the model, as a share: two standard
 /// deviations of what our law allows for.
-pub const OFF: f64 = 0.2;
+pub const MODEL_ERROR: f64 = 0.2;
 
 /// The process by the factors that gain, lag and dead time are off.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +36,7 @@ impl Factors {
 
     /// Each alone by [`OFF`] up and down.
     pub const fn singles() -> [(&'static str, Self); 6] {
-        let (more, less) = (1.0 + OFF, 1.0 - OFF);
+        let (more, less) = (1.0 + MODEL_ERROR, 1.0 - MODEL_ERROR);
         [
             ("gain +20 %", Self { gain: more, ..Self::NONE }),
             ("gain −20 %", Self { gain: less, ..Self::NONE }),
@@ -49,7 +49,7 @@ impl Factors {
 
     /// All 27 combinations of up, not and down.
     pub fn all() -> impl Iterator<Item = Self> {
-        let each = [1.0 - OFF, 1.0, 1.0 + OFF];
+        let each = [1.0 - MODEL_ERROR, 1.0, 1.0 + MODEL_ERROR];
         each.into_iter().flat_map(move |gain| {
             each.into_iter().flat_map(move |lag| {
                 each.into_iter().map(move |dead_time| Self { gain, lag, dead_time })

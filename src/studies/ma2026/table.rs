@@ -2,7 +2,7 @@
 
 use maud::html;
 
-use super::experiment::{Experiment, Tried};
+use super::experiment::{PressureExperiment, TestedController};
 use super::margins::margins;
 use super::plant::Factors;
 use crate::core::units::{Mm, MmPerS};
@@ -13,8 +13,8 @@ use crate::report::chart::palette;
 use crate::report::chart::palette::Ink;
 use crate::report::chart::range::Range;
 use crate::studies::error::ReproduceError;
-use crate::studies::row::Rows;
-use crate::studies::source::Source;
+use crate::studies::row::TableRows;
+use crate::studies::source::Publication;
 use crate::studies::study::{Effort, Reproduced, Section};
 
 mod draw;
@@ -26,13 +26,14 @@ pub const EXPERIMENTS: u64 = 6;
 const SEEDS: u64 = 5;
 const KPA: f64 = 1000.0;
 /// The paper's two laws, in its order, with their colours.
-const THEIRS: [(Tried, Ink); 2] = [(Tried::Pi, palette::DEMAND), (Tried::Vsfc, palette::PAPER)];
-const OURS: (Tried, Ink) = (Tried::Predictive, palette::OURS);
+const THEIRS: [(TestedController, Ink); 2] =
+    [(TestedController::Pi, palette::DEMAND), (TestedController::Vsfc, palette::PAPER)];
+const OURS: (TestedController, Ink) = (TestedController::Predictive, palette::OURS);
 
 /// Runs the experiments.
 pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, ReproduceError> {
     let seeds = effort.seeds.unwrap_or(SEEDS);
-    let mut work = Work { seeds, rows: Rows::of(Source::Ma2026) };
+    let mut work = Work { seeds, rows: TableRows::of(Publication::Ma2026) };
     work.targets();
     let mut sections = Vec::new();
     let parts = [Work::step, Work::robustness, Work::sine, Work::steady, Work::load, Work::margins];
@@ -51,7 +52,7 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
 
 struct Work {
     seeds: u64,
-    rows: Rows,
+    rows: TableRows,
 }
 
 type Part = Result<Option<Section>, ReproduceError>;
@@ -69,7 +70,7 @@ impl Work {
     }
 
     fn step(&mut self) -> Part {
-        let experiment = Experiment::step(Factors::NONE);
+        let experiment = PressureExperiment::step(Factors::NONE);
         let ours = experiment.run(OURS.0)?;
         let best = ours.step_figures();
         let mut drawn = Vec::new();
@@ -84,7 +85,7 @@ impl Work {
             self.rows.push(&case, ("IAE", "MPa·s"), [None, Some(found.iae), Some(best.iae)]);
             drawn.push((tried.name(), ink, course));
         }
-        let smith = experiment.run(Tried::SmithPi)?.step_figures();
+        let smith = experiment.run(TestedController::SmithPi)?.step_figures();
         let case = "step 0 → 0.6 MPa, Smith-PI with two degrees of freedom";
         let (overshoot, rise) = (Some(smith.overshoot), smith.rise_s);
         self.rows.push(case, ("overshoot", "%"), [None, overshoot, Some(best.overshoot)]);
@@ -100,7 +101,7 @@ impl Work {
     fn robustness(&mut self) -> Part {
         let mut drawn = Vec::new();
         for (name, factors) in Factors::singles() {
-            let experiment = Experiment::step(factors);
+            let experiment = PressureExperiment::step(factors);
             let ours = experiment.run(OURS.0)?;
             let best = ours.step_figures();
             for (tried, _) in THEIRS {
@@ -132,9 +133,11 @@ impl Work {
     }
 
     fn sine(&mut self) -> Part {
-        let rms = |tried| self.mean(|seed| Ok(Experiment::sine(seed).run(tried)?.tracking(20.0).0));
-        let (unaware, best) = (rms(OURS.0)?, rms(Tried::Previewed)?);
-        let found = [rms(Tried::Pi)?, rms(Tried::Vsfc)?];
+        let rms = |tried| {
+            self.mean(|seed| Ok(PressureExperiment::sine(seed).run(tried)?.tracking(20.0).0))
+        };
+        let (unaware, best) = (rms(OURS.0)?, rms(TestedController::Previewed)?);
+        let found = [rms(TestedController::Pi)?, rms(TestedController::Vsfc)?];
         for (((tried, _), found), published) in THEIRS.into_iter().zip(found).zip([0.0153, 0.0193])
         {
             let case = format!("sine 0.65 ± 0.1 MPa, 20 s, {}", tried.name());
@@ -144,8 +147,8 @@ impl Work {
         let case = "sine 0.65 ± 0.1 MPa, 20 s, nothing known ahead";
         self.rows.push(case, ("RMSE", "kPa"), [None, None, Some(unaware * KPA)]);
         let mut drawn = Vec::new();
-        for (tried, ink) in THEIRS.into_iter().chain([(Tried::Previewed, OURS.1)]) {
-            drawn.push((tried.name(), ink, Experiment::sine(0).run(tried)?));
+        for (tried, ink) in THEIRS.into_iter().chain([(TestedController::Previewed, OURS.1)]) {
+            drawn.push((tried.name(), ink, PressureExperiment::sine(0).run(tried)?));
         }
         Ok(Some(Section {
             heading: "Sine".to_owned(),
@@ -164,7 +167,9 @@ impl Work {
 
     fn steady(&mut self) -> Part {
         let figure = |tried, pick: fn((f64, f64)) -> f64| {
-            self.mean(|seed| Ok(pick(Experiment::steady(seed).run(tried)?.steadiness(20.0))))
+            self.mean(|seed| {
+                Ok(pick(PressureExperiment::steady(seed).run(tried)?.steadiness(20.0)))
+            })
         };
         let sigma = |pair: (f64, f64)| pair.0 * KPA;
         let cv = |pair: (f64, f64)| pair.1;
@@ -182,7 +187,7 @@ impl Work {
         }
         let mut drawn = Vec::new();
         for (tried, ink) in THEIRS.into_iter().chain([OURS]) {
-            drawn.push((tried.name(), ink, Experiment::steady(0).run(tried)?));
+            drawn.push((tried.name(), ink, PressureExperiment::steady(0).run(tried)?));
         }
         Ok(Some(Section {
             heading: "Steady extrusion with drift".to_owned(),
@@ -199,7 +204,7 @@ impl Work {
     }
 
     fn load(&mut self) -> Part {
-        let experiment = Experiment::load(Factors::NONE);
+        let experiment = PressureExperiment::load(Factors::NONE);
         let ours = experiment.run(OURS.0)?;
         let best = ours.load_figures(5.0);
         let mut drawn = Vec::new();
@@ -217,7 +222,7 @@ impl Work {
             drawn.push((tried.name(), ink, course));
         }
         let peak = self.mean(|seed| {
-            let course = Experiment::load(Factors::NONE).noisy(seed).run(OURS.0)?;
+            let course = PressureExperiment::load(Factors::NONE).noisy(seed).run(OURS.0)?;
             Ok(course.load_figures(5.0).peak)
         })?;
         let case = "step of the load, with noise";
@@ -234,7 +239,7 @@ impl Work {
 
     fn margins(&mut self) -> Part {
         let best = margins(OURS.0)?;
-        for tried in [Tried::Pi, Tried::Vsfc, Tried::SmithPi] {
+        for tried in [TestedController::Pi, TestedController::Vsfc, TestedController::SmithPi] {
             let found = margins(tried)?;
             let case = format!("margins, {}", tried.name());
             self.rows.push(&case, ("gain", "1"), [None, Some(found.gain), Some(best.gain)]);
@@ -256,10 +261,10 @@ impl Work {
 }
 
 /// The largest overshoot over all combinations of errors \[%\].
-fn worst(tried: Tried) -> Result<f64, ReproduceError> {
+fn worst(tried: TestedController) -> Result<f64, ReproduceError> {
     let mut worst = 0.0_f64;
     for factors in Factors::all() {
-        worst = worst.max(Experiment::step(factors).run(tried)?.step_figures().overshoot);
+        worst = worst.max(PressureExperiment::step(factors).run(tried)?.step_figures().overshoot);
     }
     Ok(worst)
 }

@@ -1,8 +1,8 @@
 use super::*;
 use crate::numeric::average::mean;
 
-fn step(tried: Tried, factors: Factors) -> StepFigures {
-    Experiment::step(factors).run(tried).unwrap().step_figures()
+fn step(tried: TestedController, factors: Factors) -> StepFigures {
+    PressureExperiment::step(factors).run(tried).unwrap().step_figures()
 }
 
 /// Means over seeds.
@@ -11,13 +11,15 @@ fn over_seeds(seeds: u64, figures: impl Fn(u64) -> (f64, f64)) -> (f64, f64) {
     (mean(all.iter().map(|f| f.0)), mean(all.iter().map(|f| f.1)))
 }
 
-fn sine(tried: Tried) -> f64 {
-    over_seeds(3, |seed| Experiment::sine(seed).run(tried).unwrap().tracking(20.0)).0
+fn sine(tried: TestedController) -> f64 {
+    over_seeds(3, |seed| PressureExperiment::sine(seed).run(tried).unwrap().tracking(20.0)).0
 }
 
 #[test]
 fn the_published_overshoots_and_rises_come_out() {
-    for (tried, overshoot, rise) in [(Tried::Pi, 23.37, 0.96), (Tried::Vsfc, 17.37, 1.06)] {
+    for (tried, overshoot, rise) in
+        [(TestedController::Pi, 23.37, 0.96), (TestedController::Vsfc, 17.37, 1.06)]
+    {
         let found = step(tried, Factors::NONE);
         assert!((found.overshoot - overshoot).abs() < 0.5, "{tried:?} {found:?}");
         assert!((found.rise_s.unwrap() - rise).abs() < 0.02, "{tried:?} {found:?}");
@@ -27,7 +29,7 @@ fn the_published_overshoots_and_rises_come_out() {
 #[test]
 fn the_sines_errors_come_out() {
     for (tried, published, independent) in
-        [(Tried::Pi, 0.0153, 0.0144), (Tried::Vsfc, 0.0193, 0.0194)]
+        [(TestedController::Pi, 0.0153, 0.0144), (TestedController::Vsfc, 0.0193, 0.0194)]
     {
         let found = sine(tried);
         assert!((found / published - 1.0).abs() < 0.1, "{tried:?} {found}");
@@ -37,8 +39,8 @@ fn the_sines_errors_come_out() {
 
 #[test]
 fn drift_moves_the_screw_half_as_much_with_the_papers_law() {
-    for (tried, cv) in [(Tried::Pi, 2.56), (Tried::Vsfc, 1.18)] {
-        let steady = |seed| Experiment::steady(seed).run(tried).unwrap().steadiness(20.0);
+    for (tried, cv) in [(TestedController::Pi, 2.56), (TestedController::Vsfc, 1.18)] {
+        let steady = |seed| PressureExperiment::steady(seed).run(tried).unwrap().steadiness(20.0);
         let (_, found) = over_seeds(3, steady);
         assert!((found - cv).abs() < 0.05, "{tried:?} {found}");
     }
@@ -46,7 +48,7 @@ fn drift_moves_the_screw_half_as_much_with_the_papers_law() {
 
 #[test]
 fn ours_does_not_overshoot_and_rises_as_fast() {
-    let found = step(Tried::Predictive, Factors::NONE);
+    let found = step(TestedController::Predictive, Factors::NONE);
     assert!(found.overshoot < 0.5, "{found:?}");
     assert!(found.rise_s.unwrap() <= 0.96, "{found:?}");
 }
@@ -54,10 +56,13 @@ fn ours_does_not_overshoot_and_rises_as_fast() {
 #[test]
 fn ours_overshoots_less_than_5_percent_when_any_parameter_is_off_by_20_percent() {
     for (name, factors) in Factors::singles() {
-        let found = step(Tried::Predictive, factors);
+        let found = step(TestedController::Predictive, factors);
         assert!(found.overshoot < 5.0, "{name}: {found:?}");
         let noisy = |seed| {
-            let course = Experiment::step(factors).noisy(seed).run(Tried::Predictive).unwrap();
+            let course = PressureExperiment::step(factors)
+                .noisy(seed)
+                .run(TestedController::Predictive)
+                .unwrap();
             (course.step_figures().overshoot, 0.0)
         };
         let (overshoot, _) = over_seeds(10, noisy);
@@ -67,7 +72,10 @@ fn ours_overshoots_less_than_5_percent_when_any_parameter_is_off_by_20_percent()
 
 #[test]
 fn ours_answers_a_load_at_once() {
-    let found = Experiment::load(Factors::NONE).run(Tried::Predictive).unwrap().load_figures(5.0);
+    let found = PressureExperiment::load(Factors::NONE)
+        .run(TestedController::Predictive)
+        .unwrap()
+        .load_figures(5.0);
     assert!(found.peak <= 0.50 && found.iae <= 0.40, "{found:?}");
     // No law can be better than one that knows of the load at once.
     assert!(found.peak > 1.0 - f64::exp(-DEAD_TIME_S / LAG_S), "{found:?}");
@@ -75,13 +83,15 @@ fn ours_answers_a_load_at_once() {
 
 #[test]
 fn ours_follows_a_sine_that_it_is_told_of() {
-    let found = sine(Tried::Previewed);
+    let found = sine(TestedController::Previewed);
     assert!(found <= 0.0025, "{found}");
 }
 
 #[test]
 fn ours_is_as_quiet_as_the_papers_law() {
-    let steady = |seed| Experiment::steady(seed).run(Tried::Predictive).unwrap().steadiness(20.0);
+    let steady = |seed| {
+        PressureExperiment::steady(seed).run(TestedController::Predictive).unwrap().steadiness(20.0)
+    };
     let (sigma, cv) = over_seeds(10, steady);
     assert!(cv <= 1.2, "{cv}");
     assert!(sigma <= 0.0147, "{sigma}");
@@ -89,9 +99,9 @@ fn ours_is_as_quiet_as_the_papers_law() {
 
 #[test]
 fn commands_at_200_hz_reach_the_same() {
-    let mut fast = Experiment::step(Factors::NONE);
+    let mut fast = PressureExperiment::step(Factors::NONE);
     fast.step_every = 1;
-    let found = fast.run(Tried::Predictive).unwrap().step_figures();
+    let found = fast.run(TestedController::Predictive).unwrap().step_figures();
     assert!(found.overshoot < 0.5, "{found:?}");
     assert!(found.rise_s.unwrap() < 0.97, "{found:?}");
 }
@@ -99,9 +109,9 @@ fn commands_at_200_hz_reach_the_same() {
 #[test]
 fn all_errors_at_once_leave_it_at_rest() {
     for factors in Factors::all() {
-        let mut experiment = Experiment::load(factors);
+        let mut experiment = PressureExperiment::load(factors);
         experiment.takes_s = 40.0;
-        let (sigma, _) = experiment.run(Tried::Predictive).unwrap().steadiness(35.0);
+        let (sigma, _) = experiment.run(TestedController::Predictive).unwrap().steadiness(35.0);
         assert!(sigma < 0.002, "{factors:?}: {sigma}");
     }
 }
@@ -111,7 +121,7 @@ fn margins_are_what_the_frequency_response_says() {
     // An independent program: gain margin 2.234; phase 54.7° at 1.697 rad/s,
     // so 0.562 s of dead time. Sampling, the filter and the plant's tick take
     // their part of both.
-    let found = margins(Tried::Pi).unwrap();
+    let found = margins(TestedController::Pi).unwrap();
     assert!((1.8..2.234).contains(&found.gain), "{found:?}");
     assert!((0.40..0.562).contains(&found.dead_time_s), "{found:?}");
 }

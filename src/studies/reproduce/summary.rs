@@ -4,40 +4,40 @@
 use maud::{Markup, html};
 
 use super::table::number;
-use crate::studies::row::Row;
+use crate::studies::row::TableRow;
 use crate::studies::study::Reproduced;
 
 /// Shares of a published number within which it counts as met.
-const NEAR: [f64; 2] = [0.02, 0.1];
+const NEAR_FRACTIONS: [f64; 2] = [0.02, 0.1];
 
 /// Counts of rows with a published number.
 #[derive(Debug)]
-pub struct Summary<'a> {
+pub struct PaperSummary<'a> {
     /// Rows that have one.
     pub published: usize,
     /// Those of them that were simulated to within 2 % and 10 %.
     pub near: [usize; 2],
     /// The one that is furthest off as a share of the published number, and that
     /// share; none where nothing can be compared.
-    pub furthest: Option<(&'a Row, f64)>,
+    pub furthest: Option<(&'a TableRow, f64)>,
     /// Those that the simulation never gets to.
     pub absent: usize,
 }
 
-impl<'a> Summary<'a> {
+impl<'a> PaperSummary<'a> {
     /// Of a source's rows.
-    pub fn of(rows: &'a [Row]) -> Self {
+    pub fn of(rows: &'a [TableRow]) -> Self {
         let published = || rows.iter().filter_map(|row| Some((row, row.published?)));
-        let off: Vec<(&Row, f64)> = published()
-            .filter_map(|(row, told)| {
-                let by = (row.simulated? - told).abs();
+        let off: Vec<(&TableRow, f64)> = published()
+            .filter_map(|(row, published_value)| {
+                let by = (row.simulated? - published_value).abs();
                 // Nothing is met by nothing alone.
-                Some((row, if by == 0.0 { 0.0 } else { by / told.abs() }))
+                Some((row, if by == 0.0 { 0.0 } else { by / published_value.abs() }))
             })
             .collect();
         Self {
             published: published().count(),
-            near: NEAR.map(|share| off.iter().filter(|(_, by)| *by <= share).count()),
+            near: NEAR_FRACTIONS.map(|share| off.iter().filter(|(_, by)| *by <= share).count()),
             furthest: off.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)),
             absent: published().filter(|(row, _)| row.simulated.is_none()).count(),
         }
@@ -48,7 +48,7 @@ impl<'a> Summary<'a> {
         self.furthest.map_or_else(
             || "–".to_owned(),
             |(row, _)| {
-                let Row { case, quantity, unit, .. } = row;
+                let TableRow { case, quantity, unit, .. } = row;
                 let unit = if *unit == "1" { String::new() } else { format!(" {unit}") };
                 let [published, simulated] = [row.published, row.simulated].map(number);
                 format!(
@@ -93,7 +93,7 @@ pub fn markup(sources: &[Reproduced]) -> Markup {
                     th.number { "within 10 %" } th.number { "not reached" } th { "furthest off" }
                 } }
                 tbody { @for (at, source) in sources.iter().enumerate() {
-                    @let summary = Summary::of(&source.rows);
+                    @let summary = PaperSummary::of(&source.rows);
                     tr {
                         td { a href={ "#source-" (at) } { (source.title) } }
                         td.number { (summary.published) }
@@ -111,9 +111,9 @@ pub fn markup(sources: &[Reproduced]) -> Markup {
 mod tests {
     use super::*;
 
-    fn row(published: Option<f64>, simulated: Option<f64>) -> Row {
+    fn row(published: Option<f64>, simulated: Option<f64>) -> TableRow {
         let (seed, case, quantity) = ("ma2026", "step".to_owned(), "overshoot");
-        Row { seed, case, quantity, unit: "%", published, simulated, ours: None }
+        TableRow { seed, case, quantity, unit: "%", published, simulated, ours: None }
     }
 
     #[test]
@@ -126,11 +126,11 @@ mod tests {
             row(Some(7.0), None),
             row(None, Some(3.0)),
         ];
-        let summary = Summary::of(&rows);
+        let summary = PaperSummary::of(&rows);
         assert_eq!((summary.published, summary.near, summary.absent), (5, [2, 3], 1));
         let said = summary.text();
         assert!(said.starts_with("Of 5 published numbers 2 are simulated to within 2 %"), "{said}");
         assert!(said.contains("1 not reached. Furthest off: step, overshoot: 4.00 %"), "{said}");
-        assert!(Summary::of(&rows[5..]).text().contains("no number to compare"));
+        assert!(PaperSummary::of(&rows[5..]).text().contains("no number to compare"));
     }
 }

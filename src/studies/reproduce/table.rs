@@ -2,13 +2,13 @@
 
 use maud::{Markup, html};
 
-use crate::studies::row::Row;
+use crate::studies::row::TableRow;
 
 const HEADS: [&str; 6] = ["case", "quantity", "unit", "published", "simulated", "ours"];
 
 /// The rows as plain text.
-pub fn plain(rows: &[Row]) -> String {
-    let longest = |of: fn(&Row) -> &str, least: usize| {
+pub fn plain(rows: &[TableRow]) -> String {
+    let longest = |of: fn(&TableRow) -> &str, least: usize| {
         rows.iter().map(|row| of(row).chars().count()).max().unwrap_or(0).max(least)
     };
     let case_width = longest(|row| &row.case, 4);
@@ -30,7 +30,7 @@ pub fn plain(rows: &[Row]) -> String {
 }
 
 /// The rows on a page.
-pub fn markup(rows: &[Row]) -> Markup {
+pub fn markup(rows: &[TableRow]) -> Markup {
     html! {
         table {
             thead { tr {
@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn columns_are_as_wide_as_what_stands_in_them() {
         let quantity = "a quantity with a name of some length";
-        let row = |case: &str, quantity| Row {
+        let row = |case: &str, quantity| TableRow {
             seed: "ma2026",
             case: case.into(),
             quantity,

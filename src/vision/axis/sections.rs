@@ -3,29 +3,29 @@
 
 use nalgebra::Vector2;
 
-use super::width_input::Scene;
+use super::width_input::WidthInput;
 use crate::core::geometry::SurfacePoint;
-use crate::numeric::gauss_legendre::NODES;
+use crate::numeric::gauss_legendre::GAUSS_LEGENDRE_5;
 use crate::vision::curve::Curve;
 
 /// Distance of the places from which an edge's direction and bend on the
 /// surface are taken.
-const BESIDE: f64 = 0.15;
+const DIFFERENCE_STEP: f64 = 0.15;
 
 /// An edge about a place, on the surface.
-struct Local {
+struct LocalEdge {
     at: SurfacePoint,
     slope: Vector2<f64>,
     bend: Vector2<f64>,
 }
 
-impl Local {
-    fn of(scene: &Scene<'_>, curve: &Curve, t: f64) -> Option<Self> {
+impl LocalEdge {
+    fn of(scene: &WidthInput<'_>, curve: &Curve, t: f64) -> Option<Self> {
         let at = scene.on_surface(curve, t)?;
-        let before = scene.on_surface(curve, t - BESIDE)? - at;
-        let after = scene.on_surface(curve, t + BESIDE)? - at;
-        let slope = (after - before) / (2.0 * BESIDE);
-        let bend = (after + before) / (BESIDE * BESIDE);
+        let before = scene.on_surface(curve, t - DIFFERENCE_STEP)? - at;
+        let after = scene.on_surface(curve, t + DIFFERENCE_STEP)? - at;
+        let slope = (after - before) / (2.0 * DIFFERENCE_STEP);
+        let bend = (after + before) / (DIFFERENCE_STEP * DIFFERENCE_STEP);
         Some(Self { at, slope, bend })
     }
 
@@ -61,7 +61,7 @@ pub struct Sections {
 
 impl Sections {
     /// Cuts the bead along the gauge; `None` where an edge has no point on the surface.
-    pub fn cut(scene: &Scene<'_>, curves: &[Curve; 2]) -> Option<Self> {
+    pub fn cut(scene: &WidthInput<'_>, curves: &[Curve; 2]) -> Option<Self> {
         let mut sections = Self {
             mean: 0.0,
             terms: [0.0; 3],
@@ -69,9 +69,9 @@ impl Sections {
             oblique_by_bend: 0.0,
             scales: [0.0; 2],
         };
-        for (t, weight) in NODES {
-            let left = Local::of(scene, &curves[0], t)?;
-            let right = Local::of(scene, &curves[1], t)?;
+        for (t, weight) in GAUSS_LEGENDRE_5 {
+            let left = LocalEdge::of(scene, &curves[0], t)?;
+            let right = LocalEdge::of(scene, &curves[1], t)?;
             let axis = (left.slope + right.slope).try_normalize(1e-12)?;
             let middle = nalgebra::center(&left.at, &right.at);
             let across = right.crossing(middle, axis) - left.crossing(middle, axis);
@@ -89,13 +89,13 @@ impl Sections {
         sections.mean.is_finite().then_some(sections)
     }
 
-    fn measure_scales(&mut self, scene: &Scene<'_>, curves: &[Curve; 2]) -> Option<()> {
+    fn measure_scales(&mut self, scene: &WidthInput<'_>, curves: &[Curve; 2]) -> Option<()> {
         let middles = [scene.on_surface(&curves[0], 0.0)?, scene.on_surface(&curves[1], 0.0)?];
         let across = (middles[1] - middles[0]).try_normalize(1e-12)?;
         let slope = |side: usize| -> Option<Vector2<f64>> {
             Some(
-                scene.on_surface(&curves[side], BESIDE)?
-                    - scene.on_surface(&curves[side], -BESIDE)?,
+                scene.on_surface(&curves[side], DIFFERENCE_STEP)?
+                    - scene.on_surface(&curves[side], -DIFFERENCE_STEP)?,
             )
         };
         let axis = (slope(0)? + slope(1)?).try_normalize(1e-12)?;

@@ -1,25 +1,25 @@
 //! How sure a width is, and how rough the bead.
 
 use super::sections::Sections;
-use super::width_input::{Memory, Scene, Side};
-use crate::numeric::number::float;
+use super::width_input::{LocatedEdge, WidthInput, WidthScratch};
+use crate::numeric::number::to_f64;
 use crate::vision::curve::Curve;
-use crate::vision::located::Located;
-use crate::vision::scatter::{self, Offset};
-use crate::vision::waviness::{CURVED, Evidence, Midline, ORDERS, Waves, legendre, norm};
+use crate::vision::located::CaliperEdge;
+use crate::vision::scatter::{self, EdgeResidual};
+use crate::vision::waviness::{CURVE_ORDERS, Evidence, Midline, ORDERS, WaveKind, legendre, norm};
 
 /// Share of the rows from which on nothing but the bead itself is seen.
-const ALL_BUT_FEW: f64 = 0.98;
+const MIN_COMPLETE_FRACTION: f64 = 0.98;
 /// Inflation of a variance that an edge's misfit may hide, and by how much more
 /// for what it shows: a texture's shift of an edge hangs together over so many
 /// rows.
-const HIDDEN: f64 = 1.2;
-const ALONG: f64 = 15.0;
+const MIN_INFLATION_LIMIT: f64 = 1.2;
+const INFLATION_PER_MISFIT: f64 = 15.0;
 /// Squared slopes of an axis, in variances of what waves make, that are none.
-const OBLIQUE: f64 = 3.0;
+const MIN_OBLIQUE_RATIO: f64 = 3.0;
 
 /// How sure the width is, and how rough the bead.
-pub struct Spread {
+pub struct WidthUncertainty {
     /// Standard deviation of the width \[mm\], without the calibration's share.
     pub sigma: f64,
     /// What the doubt about the axis' direction takes from the width in the
@@ -27,44 +27,44 @@ pub struct Spread {
     pub shortened: f64,
 }
 
-impl Spread {
+impl WidthUncertainty {
     /// Of a width that was cut along these curves of the two edges.
     pub fn of(
-        scene: &Scene<'_>,
+        scene: &WidthInput<'_>,
         curves: &[Curve; 2],
         sections: &Sections,
-        memory: &mut Memory,
+        memory: &mut WidthScratch,
     ) -> Self {
         let (mut variance, mut noise) = (0.0, 0.0);
         for (side, curve) in curves.iter().enumerate() {
             let scale = sections.scales[side] * sections.scales[side];
-            let per_place = mean_variance(scene.sides[side].places);
+            let per_place = mean_variance(scene.sides[side].positions);
             if let Some(of_mean) = scene.sides[side].mean_variance {
                 variance += scale * of_mean;
                 noise += scale * per_place;
                 continue;
             }
             let off = &memory.off[side];
-            let inflation = scatter::inflation(off, per_place, &mut memory.values)
+            let inflation = scatter::variance_inflation(off, per_place, &mut memory.values)
                 .unwrap_or_else(|| scene.sides[side].inflation_with_gaps(off, curve, per_place))
-                .min(scene.sides[side].most_inflation());
+                .min(scene.sides[side].max_inflation());
             let of_mean = per_place * inflation * curve.mean_variance;
             variance += scale * (of_mean + scene.sides[side].common_variance);
             noise += scale * per_place * inflation;
         }
         let roughness = Self::roughness(scene, sections, memory, noise);
-        variance += Self::hidden(scene, sections, roughness, memory);
-        let (shortened, of_tilt) = Self::tilted(scene, curves, sections, memory);
+        variance += Self::variance_of_gaps(scene, sections, roughness, memory);
+        let (shortened, of_tilt) = Self::tilt_bias_and_variance(scene, curves, sections, memory);
         Self { sigma: (variance + of_tilt).sqrt(), shortened }
     }
 
     /// By how much the doubt about the axis' direction makes the width too
     /// short, and the variance that it leaves.
-    fn tilted(
-        scene: &Scene<'_>,
+    fn tilt_bias_and_variance(
+        scene: &WidthInput<'_>,
         curves: &[Curve; 2],
         sections: &Sections,
-        memory: &mut Memory,
+        memory: &mut WidthScratch,
     ) -> (f64, f64) {
         let oblique = sections.oblique * sections.oblique;
         let Some(waves) = scene.waves(curves, sections, memory) else {
@@ -74,31 +74,37 @@ impl Spread {
             return (shortened, oblique * tilt + of_bend + 2.0 * shortened * shortened);
         };
         let midline = Midline::of(curves);
-        let per_slope = scene.cosine_squared(curves, 0.0) / (scene.reach() * scene.reach());
+        let per_slope =
+            scene.cosine_squared(curves, 0.0) / (scene.half_length() * scene.half_length());
         let first = per_slope * scene.cosine_squared(curves, 0.0) * waves[0];
         // Bends that waves explain are none of the axis.
         let bends = midline.bends_of(&waves);
         let per_bend = 0.5 * sections.mean * per_slope;
         // Waves make a slope of their own; only what is beyond them is that of
         // an axis, along which an error of the direction counts.
-        let beyond = (oblique - OBLIQUE * sections.mean * sections.mean * first).max(0.0);
-        let of_slope = 0.5 * scene.kind_of_waves().slope_share() * sections.mean * first;
-        let of_bends = per_bend * bends.doubt;
+        let beyond = (oblique - MIN_OBLIQUE_RATIO * sections.mean * sections.mean * first).max(0.0);
+        let of_slope = 0.5 * scene.kind_of_waves().slope_fraction() * sections.mean * first;
+        let of_bends = per_bend * bends.of_waves_sigma;
         // Along a bent bead the waves' bend is an error of the direction as well.
-        let by_bend = sections.oblique_by_bend / scene.reach();
-        let of_axis = beyond * first + bends.chance_bent * by_bend * by_bend * waves[1];
+        let by_bend = sections.oblique_by_bend / scene.half_length();
+        let of_axis = beyond * first + bends.bent_probability * by_bend * by_bend * waves[1];
         let variance = of_axis + of_slope * of_slope + of_bends * of_bends;
         (of_slope + per_bend * bends.of_waves, variance)
     }
 
     /// Standard deviation of the width along the gauge, without the noise of
     /// its places.
-    fn roughness(scene: &Scene<'_>, sections: &Sections, memory: &Memory, noise: f64) -> f64 {
+    fn roughness(
+        scene: &WidthInput<'_>,
+        sections: &Sections,
+        memory: &WidthScratch,
+        noise: f64,
+    ) -> f64 {
         let (mut square, mut n) = (0.0, 0.0);
         for (band, (left, right)) in memory.off[0].iter().zip(&memory.off[1]).enumerate() {
             let (Some(left), Some(right)) = (left, right) else { continue };
             let off = sections.scales[1] * right - sections.scales[0] * left;
-            let width = sections.at(scene.place(band)) + off - sections.mean;
+            let width = sections.at(scene.normalised_position(band)) + off - sections.mean;
             square += width * width;
             n += 1.0;
         }
@@ -107,16 +113,22 @@ impl Spread {
 
     /// The bands that are missing hide bead that counts; its waviness is an error then,
     /// which hangs together over neighbouring bands. Each edge has half of it.
-    fn hidden(scene: &Scene<'_>, sections: &Sections, roughness: f64, memory: &mut Memory) -> f64 {
+    fn variance_of_gaps(
+        scene: &WidthInput<'_>,
+        sections: &Sections,
+        roughness: f64,
+        memory: &mut WidthScratch,
+    ) -> f64 {
         let mut variance = 0.0;
         for (number, side) in scene.sides.iter().enumerate() {
-            let seen: f64 = side.places.iter().flatten().map(|located| located.share).sum();
-            let missing = 1.0 - seen / float(side.places.len());
+            let seen: f64 =
+                side.positions.iter().flatten().map(|located| located.row_fraction).sum();
+            let missing = 1.0 - seen / to_f64(side.positions.len());
             if missing > 0.0 {
                 memory.values.clear();
                 memory.values.extend(memory.off[number].iter().flatten());
                 let waves = scatter::correlated_variance(&memory.values);
-                let waves = (waves - mean_variance(side.places)).max(0.0);
+                let waves = (waves - mean_variance(side.positions)).max(0.0);
                 let waves = waves * sections.scales[number] * sections.scales[number];
                 variance += waves.max(0.5 * roughness * roughness) * missing / seen.max(1.0);
             }
@@ -128,8 +140,12 @@ impl Spread {
     /// halves of the gauge: where lines across the gauge run obliquely to the bead,
     /// an axis that is off takes them for longer or shorter. From how far the
     /// middles lie off their course, and over how many bands that hangs together.
-    fn tilt_variances(scene: &Scene<'_>, curves: &[Curve; 2], memory: &mut Memory) -> [f64; 2] {
-        let Memory { off: [left, right], values } = memory;
+    fn tilt_variances(
+        scene: &WidthInput<'_>,
+        curves: &[Curve; 2],
+        memory: &mut WidthScratch,
+    ) -> [f64; 2] {
+        let WidthScratch { off: [left, right], values } = memory;
         values.clear();
         let both = left.iter().zip(right.iter());
         values.extend(both.filter_map(|(left, right)| Some(f64::midpoint((*left)?, (*right)?))));
@@ -137,18 +153,18 @@ impl Spread {
         let slope = f64::midpoint(curves[0].slope_variance, curves[1].slope_variance);
         let bend = f64::midpoint(curves[0].bend_variance, curves[1].bend_variance);
         let cosine = scene.cosine_squared(curves, 0.0);
-        let per_term = per_place / (scene.reach() * scene.reach());
+        let per_term = per_place / (scene.half_length() * scene.half_length());
         [slope * per_term * cosine * cosine, bend * per_term]
     }
 }
 
-impl Side<'_> {
+impl LocatedEdge<'_> {
     /// By how much places with gaps between them scatter more than noise
     /// explains.
     fn inflation_with_gaps(&self, off: &[Option<f64>], curve: &Curve, per_place: f64) -> f64 {
-        let places = off.iter().zip(self.places);
+        let places = off.iter().zip(self.positions);
         let places = places.filter_map(|(off, located)| {
-            Some(Offset { px: (*off)?, share: located.as_ref()?.share })
+            Some(EdgeResidual { px: (*off)?, row_fraction: located.as_ref()?.row_fraction })
         });
         scatter::inflation_with_gaps(places, per_place, curve.count)
     }
@@ -156,20 +172,20 @@ impl Side<'_> {
     /// Most that neighbouring places can hang together: what moves an edge,
     /// unless it is the bead itself, leaves a misfit. Edges that are covered
     /// here and there may hide anything.
-    fn most_inflation(&self) -> f64 {
-        let seen: f64 = self.places.iter().flatten().map(|located| located.share).sum();
-        if seen < ALL_BUT_FEW * float(self.places.len()) {
+    fn max_inflation(&self) -> f64 {
+        let seen: f64 = self.positions.iter().flatten().map(|located| located.row_fraction).sum();
+        if seen < MIN_COMPLETE_FRACTION * to_f64(self.positions.len()) {
             return f64::INFINITY;
         }
-        HIDDEN + ALONG * (self.misfit * self.misfit - 1.0).max(0.0)
+        MIN_INFLATION_LIMIT + INFLATION_PER_MISFIT * (self.misfit * self.misfit - 1.0).max(0.0)
     }
 }
 
-impl Scene<'_> {
+impl WidthInput<'_> {
     /// Edges that are known row by row are torn.
-    fn kind_of_waves(&self) -> Waves {
+    fn kind_of_waves(&self) -> WaveKind {
         let is_torn = self.sides.iter().any(|side| side.mean_variance.is_some());
-        if is_torn { Waves::Torn } else { Waves::Smooth }
+        if is_torn { WaveKind::Torn } else { WaveKind::Smooth }
     }
 
     /// How much of the midline's coefficients of the orders 1 to 4 is the
@@ -180,12 +196,12 @@ impl Scene<'_> {
         &self,
         curves: &[Curve; 2],
         sections: &Sections,
-        memory: &Memory,
-    ) -> Option<[f64; CURVED]> {
+        memory: &WidthScratch,
+    ) -> Option<[f64; CURVE_ORDERS]> {
         let mut off = [[0.0; ORDERS]; 2];
         let mut bands = [0.0f64; 2];
         for (band, places) in memory.off[0].iter().zip(&memory.off[1]).enumerate() {
-            let values = legendre(self.place(band));
+            let values = legendre(self.normalised_position(band));
             for (side, place) in [places.0, places.1].into_iter().enumerate() {
                 let Some(place) = place else { continue };
                 bands[side] += 1.0;
@@ -195,7 +211,7 @@ impl Scene<'_> {
             }
         }
         let scale = f64::midpoint(sections.scales[0], sections.scales[1]);
-        let per_place = self.sides.iter().map(|side| mean_variance(side.places)).sum::<f64>();
+        let per_place = self.sides.iter().map(|side| mean_variance(side.positions)).sum::<f64>();
         let mut evidence = Evidence::default();
         for order in 1..=ORDERS {
             let rest = |side: usize| norm(order) * off[side][order - 1] / bands[side].max(1.0);
@@ -207,7 +223,7 @@ impl Scene<'_> {
                 };
             let noise = norm(order) * per_place / (4.0 * bands[0].min(bands[1]).max(1.0));
             evidence.add(order, half_width, noise);
-            if order == 3 || order > CURVED {
+            if order == 3 || order > CURVE_ORDERS {
                 evidence.add(order, f64::midpoint(all(0), all(1)), noise);
             }
         }
@@ -216,10 +232,10 @@ impl Scene<'_> {
 }
 
 /// Mean variance of an edge's places, for a place of all of a band's rows.
-fn mean_variance(places: &[Option<Located>]) -> f64 {
+fn mean_variance(places: &[Option<CaliperEdge>]) -> f64 {
     let (mut sum, mut n) = (0.0, 0.0);
     for located in places.iter().flatten() {
-        sum += located.variance * located.share;
+        sum += located.variance * located.row_fraction;
         n += 1.0;
     }
     sum / f64::max(n, 1.0)

@@ -2,16 +2,16 @@
 
 use crate::calibration::SurfaceMap;
 use crate::core::geometry::SurfacePoint;
-use crate::vision::curve::{Curve, Point};
+use crate::vision::curve::{Curve, EdgePoint};
 use crate::vision::gauge::Gauge;
-use crate::vision::located::Located;
-use crate::vision::strip::View;
+use crate::vision::located::CaliperEdge;
+use crate::vision::strip::GaugeView;
 
 /// One edge as it was found.
 #[derive(Debug, Clone, Copy)]
-pub struct Side<'a> {
+pub struct LocatedEdge<'a> {
     /// Its places, band by band.
-    pub places: &'a [Option<Located>],
+    pub positions: &'a [Option<CaliperEdge>],
     /// Variance of the whole edge's position that all places share \[px²\].
     pub common_variance: f64,
     /// What a row leaves of the step that it is held against, in standard
@@ -24,9 +24,9 @@ pub struct Side<'a> {
 
 /// What a width is taken from.
 #[derive(Debug, Clone, Copy)]
-pub struct Scene<'a> {
+pub struct WidthInput<'a> {
     /// The gauge over the image.
-    pub view: &'a View,
+    pub view: &'a GaugeView,
     /// From pixels to millimetres.
     pub surface: &'a SurfaceMap,
     /// What is expected.
@@ -34,49 +34,53 @@ pub struct Scene<'a> {
     /// Middles of the bands along the bead \[px\].
     pub middles: &'a [f64],
     /// Left and right edge.
-    pub sides: [Side<'a>; 2],
+    pub sides: [LocatedEdge<'a>; 2],
 }
 
 /// Memory that is kept from frame to frame.
 #[derive(Debug, Clone, Default)]
-pub struct Memory {
+pub struct WidthScratch {
     pub(super) off: [Vec<Option<f64>>; 2],
     pub(super) values: Vec<f64>,
 }
 
-impl Scene<'_> {
+impl WidthInput<'_> {
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     pub(super) fn centre(&self) -> f64 {
         (self.view.along - 1) as f64 / 2.0
     }
 
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    pub(super) fn reach(&self) -> f64 {
+    pub(super) fn half_length(&self) -> f64 {
         self.view.along as f64 / 2.0
     }
 
     /// Place of a band along the gauge, −1 to 1.
-    pub(super) fn place(&self, band: usize) -> f64 {
-        (self.middles[band] - self.centre()) / self.reach()
+    pub(super) fn normalised_position(&self, band: usize) -> f64 {
+        (self.middles[band] - self.centre()) / self.half_length()
     }
 
-    pub(super) fn points(&self, side: usize) -> impl Iterator<Item = Point> + Clone {
-        let places = self.sides[side].places.iter().enumerate();
+    pub(super) fn points(&self, side: usize) -> impl Iterator<Item = EdgePoint> + Clone {
+        let places = self.sides[side].positions.iter().enumerate();
         places.filter_map(|(band, located)| {
             let located = (*located)?;
-            Some(Point { t: self.place(band), u: located.at, weight: located.share })
+            Some(EdgePoint {
+                t: self.normalised_position(band),
+                u: located.at,
+                weight: located.row_fraction,
+            })
         })
     }
 
     /// Square of the cosine between the bead and the gauge's axis at a place.
     pub(super) fn cosine_squared(&self, curves: &[Curve; 2], t: f64) -> f64 {
-        let slope = f64::midpoint(curves[0].slope(t), curves[1].slope(t)) / self.reach();
+        let slope = f64::midpoint(curves[0].slope(t), curves[1].slope(t)) / self.half_length();
         1.0 / (1.0 + slope * slope)
     }
 
     /// The point of an edge on the surface.
     pub(super) fn on_surface(&self, curve: &Curve, t: f64) -> Option<SurfacePoint> {
-        let v = self.centre() + t * self.reach();
+        let v = self.centre() + t * self.half_length();
         self.surface.to_mm(self.view.to_image(curve.at(t), v))
     }
 }

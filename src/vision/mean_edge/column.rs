@@ -1,17 +1,17 @@
 //! How much a column of pixels along the bead varies.
 
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 /// Sums over the pixels of a column.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Column {
+pub struct ColumnSums {
     sum: f64,
     squares: f64,
     /// Of values times their places about the middle row.
     across: f64,
 }
 
-impl Column {
+impl ColumnSums {
     /// Adds a value.
     pub fn add(&mut self, place: f64, value: f64) {
         self.sum += value;
@@ -21,7 +21,7 @@ impl Column {
 
     /// Variance of the values of so many rows about the straight line through them.
     pub fn variance_about_line(&self, rows: usize) -> f64 {
-        let count = float(rows);
+        let count = to_f64(rows);
         let along = count * (count * count - 1.0) / 12.0;
         let square = self.squares - self.sum * self.sum / count;
         (square - self.across * self.across / along).max(0.0) / (count - 2.0).max(1.0)

@@ -3,13 +3,13 @@
 /// A course along the gauge: its mean position, and half of what it moves by from end to
 /// end \[px\]; the bend is a parabola's with a mean of zero.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Bent {
+pub struct ParabolicCourse {
     pub at: f64,
     pub tilt: f64,
     pub bend: f64,
 }
 
-impl Bent {
+impl ParabolicCourse {
     /// Position at a place along the gauge, −1 to 1 \[px\].
     pub fn at(&self, place: f64) -> f64 {
         self.at + self.tilt * place + self.bend * bend_at(place)

@@ -1,14 +1,14 @@
 //! What is looked at for an edge on the mean over its rows.
 
-use crate::numeric::number::{float, floor, narrow};
+use crate::numeric::number::{floor_to_index, narrow_to_f32, to_f64};
 use crate::vision::row_range::RowRange;
-use crate::vision::strip::{Grey, Strip};
+use crate::vision::strip::{GaugeRows, GreyPixel};
 
 /// What is looked at.
 #[derive(Debug, Clone, Copy)]
-pub struct Scene<'a, T> {
+pub struct MeanEdgeInput<'a, T> {
     /// The gauge's pixels.
-    pub strip: &'a Strip<'a, T>,
+    pub strip: &'a GaugeRows<'a, T>,
     /// Rows of its caliper lines.
     pub lines: &'a [RowRange],
     /// Distance of the two edges \[px\].
@@ -19,16 +19,16 @@ pub struct Scene<'a, T> {
     pub bright: bool,
 }
 
-impl<T: Grey> Scene<'_, T> {
+impl<T: GreyPixel> MeanEdgeInput<'_, T> {
     /// Last column.
     pub(super) fn last(&self) -> f64 {
-        float(self.strip.across - 1)
+        to_f64(self.strip.across - 1)
     }
 
     /// Where a row lies along the gauge: from −1 to 1.
-    pub(super) fn place(&self, row: usize) -> f64 {
-        let half = 0.5 * float(self.strip.along);
-        (float(row) + 0.5 - half) / half
+    pub(super) fn normalised_position(&self, row: usize) -> f64 {
+        let half = 0.5 * to_f64(self.strip.along);
+        (to_f64(row) + 0.5 - half) / half
     }
 
     /// Reads pixels of a row from the one at or before a position on; returns how far the
@@ -36,8 +36,8 @@ impl<T: Grey> Scene<'_, T> {
     #[inline(always)]
     pub(super) fn fetch(&self, row: usize, from: f64, out: &mut [f32]) -> f32 {
         let pixels = self.strip.row(row);
-        let of = |pixel: T| T::float(pixel.add_to(T::Sum::default()));
-        let first = floor(from);
+        let of = |pixel: T| T::sum_to_f32(pixel.add_to(T::Sum::default()));
+        let first = floor_to_index(from);
         let start = usize::try_from(first).ok();
         if let Some(inside) = start.and_then(|start| pixels.get(start..start + out.len())) {
             out.iter_mut().zip(inside).for_each(|(out, pixel)| *out = of(*pixel));
@@ -46,7 +46,7 @@ impl<T: Grey> Scene<'_, T> {
                 *out = of(self.strip.nearest(row, at));
             }
         }
-        narrow(from - from.floor())
+        narrow_to_f32(from - from.floor())
     }
 
     /// Sign by which a bright bead's grey levels and a dark one's are higher than the ground's.

@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::descent::{LAST_PX, LONGEST_PX, MAX_STEPS};
+use super::descent::{CONVERGED_PX, MAX_ITERATIONS, MAX_STEP_PX};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::{float, narrow, whole};
+use crate::numeric::number::{narrow_to_f32, round_to_count, to_f64};
 use crate::numeric::rank;
 
 /// Half of the window about an edge \[px\]: longer than a pattern of usual size, so that
@@ -17,16 +17,16 @@ pub(super) const WINDOW: usize = 2 * HALF_PX + 1;
 
 /// Standard deviations of the ground's level within which that beside an edge is
 /// ground's.
-const UNLIKE: f64 = 5.0;
+const MAX_LEVEL_SIGMAS: f64 = 5.0;
 /// The same as a fraction of the step: a flank is no blurred step to the last grey level.
-const NEARLY: f64 = 0.05;
+const LEVEL_TOLERANCE: f64 = 0.05;
 /// Places of a window that tell how far a pattern moves it.
 const MIN_SAMPLES: f64 = 10.0;
 
 /// Weights of a window's pixels for place and levels, of least squares.
 #[derive(Debug, Clone)]
-pub(super) struct Weights {
-    pub(super) place: [f64; WINDOW],
+pub(super) struct EdgeWeights {
+    pub(super) position: [f64; WINDOW],
     pub(super) levels: [[f64; WINDOW]; 2],
     /// Share of the bead.
     pub(super) bead: [f64; WINDOW],
@@ -34,16 +34,16 @@ pub(super) struct Weights {
     pub(super) pixels: usize,
 }
 
-impl Weights {
+impl EdgeWeights {
     /// `None` where the window is too short.
     pub(super) fn new(table: &StepTable, blur_px: f64, half: usize) -> Option<Self> {
-        if half < MIN_HALF_PX || 3.0 * blur_px > float(half) {
+        if half < MIN_HALF_PX || 3.0 * blur_px > to_f64(half) {
             return None;
         }
         let mut design = [[0.0; WINDOW]; 3];
         let mut normal = Matrix3::zeros();
         for k in 0..=2 * half {
-            let z = (float(k) - float(half)) / blur_px;
+            let z = (to_f64(k) - to_f64(half)) / blur_px;
             let (bead, density) = table.at(z);
             let row = Vector3::new(-density / blur_px, 1.0 - bead, bead);
             normal += row * row.transpose();
@@ -59,7 +59,12 @@ impl Weights {
             }
         }
         let [place, ground, level] = weights;
-        Some(Self { place, levels: [ground, level], bead: design[2], pixels: 2 * half + 1 })
+        Some(Self {
+            position: place,
+            levels: [ground, level],
+            bead: design[2],
+            pixels: 2 * half + 1,
+        })
     }
 
     /// Step from ground to bead in a window's mean profile \[grey levels\].
@@ -70,17 +75,17 @@ impl Weights {
     /// Descends from the middle of a profile to where the window shows the edge in its own.
     /// Returns the sum of the squares that a step leaves of it, in that of its height;
     /// `None` where none lies within the profile.
-    pub(super) fn rest(&self, profile: &[f64]) -> Option<f64> {
-        let room = float(profile.len() - self.pixels);
+    pub(super) fn residual_at_edge(&self, profile: &[f64]) -> Option<f64> {
+        let room = to_f64(profile.len() - self.pixels);
         let mut at = 0.5 * room;
         let mut window = [0.0; WINDOW];
         let window = &mut window[..self.pixels];
-        for _ in 0..MAX_STEPS {
+        for _ in 0..MAX_ITERATIONS {
             if !(0.0..=room).contains(&at) {
                 return None;
             }
-            let first = whole(narrow(at.floor())).min(profile.len() - self.pixels);
-            let share = at - float(first);
+            let first = round_to_count(narrow_to_f32(at.floor())).min(profile.len() - self.pixels);
+            let share = at - to_f64(first);
             let after = profile[first + 1..].iter().chain(profile.last());
             for ((value, one), other) in window.iter_mut().zip(&profile[first..]).zip(after) {
                 *value = one + share * (other - one);
@@ -89,17 +94,17 @@ impl Weights {
             if step <= 0.0 {
                 return None;
             }
-            let by = product(&self.place, window) / step;
-            if by.abs() < LAST_PX {
-                return Some(self.left_over(window));
+            let by = product(&self.position, window) / step;
+            if by.abs() < CONVERGED_PX {
+                return Some(self.residual(window));
             }
-            at += by.clamp(-LONGEST_PX, LONGEST_PX);
+            at += by.clamp(-MAX_STEP_PX, MAX_STEP_PX);
         }
         None
     }
 
     /// Sum of the squares that a step leaves of a window, in that of its height.
-    fn left_over(&self, window: &[f64]) -> f64 {
+    fn residual(&self, window: &[f64]) -> f64 {
         let [ground, bead] = self.levels.map(|weights| product(&weights, window));
         let left = window.iter().zip(&self.bead).map(|(value, share)| {
             let expected = ground + share * (bead - ground);
@@ -109,40 +114,40 @@ impl Weights {
     }
 
     /// What the ground makes of an edge's position, as far as the bead does not hide it.
-    pub(super) fn on_ground(&self, ground: &[f64]) -> Samples {
+    pub(super) fn on_ground(&self, ground: &[f64]) -> ShiftSamples {
         self.samples(ground, |share| 1.0 - share)
     }
 
     /// The same of the bead.
-    pub(super) fn on_bead(&self, bead: &[f64]) -> Samples {
+    pub(super) fn on_bead(&self, bead: &[f64]) -> ShiftSamples {
         self.samples(bead, |share| share)
     }
 
     /// Whether the level beside an edge is one that places of the ground farther away
     /// have: of a groove it is not, or where a neighbouring bead lies beyond.
-    pub(super) fn is_like(&self, ground: &[f64], level: f64, step: f64) -> bool {
+    pub(super) fn is_ground_level(&self, ground: &[f64], level: f64, step: f64) -> bool {
         let share = self.bead.iter().map(|bead| 1.0 - bead);
         let sum: f64 = share.clone().take(self.pixels).sum();
         let share: Vec<f64> = share.take(self.pixels).collect();
         let levels = ground.windows(self.pixels).map(|window| product(&share, window) / sum);
-        let mut levels: Vec<f32> = levels.map(narrow).collect();
+        let mut levels: Vec<f32> = levels.map(narrow_to_f32).collect();
         let Some(middle) = rank::median(&mut levels) else { return true };
         let deviation = rank::median_deviation(&mut levels, middle).map_or(0.0, f64::from);
         let spread = rank::SIGMA_PER_MEDIAN * deviation;
-        (level - f64::from(middle)).abs() < UNLIKE * spread + NEARLY * step
+        (level - f64::from(middle)).abs() < MAX_LEVEL_SIGMAS * spread + LEVEL_TOLERANCE * step
     }
 
     /// The step's height times positions [grey levels·px].
-    fn samples(&self, profile: &[f64], share: impl Fn(f64) -> f64) -> Samples {
+    fn samples(&self, profile: &[f64], share: impl Fn(f64) -> f64) -> ShiftSamples {
         let seen = |weights: [f64; WINDOW]| -> Vec<f64> {
             let seen = weights.iter().zip(&self.bead).map(|(weight, bead)| weight * share(*bead));
             seen.take(self.pixels).collect()
         };
-        let (place, change) = (seen(self.place), seen(self.change()));
-        let mut samples = Samples::default();
+        let (place, change) = (seen(self.position), seen(self.place_gradient()));
+        let mut samples = ShiftSamples::default();
         for window in profile.windows(self.pixels) {
             let found = product(&place, window);
-            samples.squares += found * found;
+            samples.sum_of_squares += found * found;
             samples.drifts += found * product(&change, window);
             samples.count += 1.0;
         }
@@ -150,9 +155,9 @@ impl Weights {
     }
 
     /// How the weights for the place change where the window moves inwards, for each pixel.
-    fn change(&self) -> [f64; WINDOW] {
+    fn place_gradient(&self) -> [f64; WINDOW] {
         std::array::from_fn(|k| {
-            let at = |k: usize| if k < self.pixels { self.place[k] } else { 0.0 };
+            let at = |k: usize| if k < self.pixels { self.position[k] } else { 0.0 };
             let before = if k == 0 { 0.0 } else { at(k - 1) };
             0.5 * (before - at(k + 1))
         })
@@ -165,20 +170,20 @@ pub(super) fn product(weights: &[f64], values: &[f64]) -> f64 {
 
 /// What places without an edge make of an edge's position.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Samples {
+pub struct ShiftSamples {
     /// Sum of the squares of what they make of it.
-    pub(super) squares: f64,
+    pub(super) sum_of_squares: f64,
     /// Sum of that times how it changes where the window moves inwards.
     pub(super) drifts: f64,
     /// Their number.
     pub(super) count: f64,
 }
 
-impl Samples {
+impl ShiftSamples {
     /// Of both sides of a bead together: ground is ground.
     pub fn with(self, other: Self) -> Self {
         Self {
-            squares: self.squares + other.squares,
+            sum_of_squares: self.sum_of_squares + other.sum_of_squares,
             drifts: self.drifts + other.drifts,
             count: self.count + other.count,
         }
@@ -187,7 +192,7 @@ impl Samples {
     /// The same of a step of such a height.
     pub(super) fn over(self, step: f64) -> Self {
         let square = step * step;
-        Self { squares: self.squares / square, drifts: self.drifts / square, ..self }
+        Self { sum_of_squares: self.sum_of_squares / square, drifts: self.drifts / square, ..self }
     }
 
     /// Mean shift inwards \[px\]: the window rests where a pattern and the edge together
@@ -199,7 +204,7 @@ impl Samples {
 
     /// Variance of a position \[px²\]; not a number of too few samples.
     pub fn variance(self) -> f64 {
-        if self.count < MIN_SAMPLES { f64::NAN } else { self.squares / self.count }
+        if self.count < MIN_SAMPLES { f64::NAN } else { self.sum_of_squares / self.count }
     }
 }
 
@@ -223,40 +228,40 @@ mod tests {
     }
 
     /// Where the window rests that looks for an edge at 0.
-    fn found(weights: &Weights, table: &StepTable, texture: &[f64]) -> f64 {
+    fn found(weights: &EdgeWeights, table: &StepTable, texture: &[f64]) -> f64 {
         let grey = |at: f64| {
             let (bead, _) = table.at(at / BLUR_PX);
-            let place = at + float(SIDE);
+            let place = at + to_f64(SIDE);
             let before = whole(place);
-            let noise =
-                texture[before] + (place - float(before)) * (texture[before + 1] - texture[before]);
+            let noise = texture[before]
+                + (place - to_f64(before)) * (texture[before + 1] - texture[before]);
             bead * (STEP + noise)
         };
         let mut at = 0.0;
         for _ in 0..30 {
             let profile: Vec<f64> =
-                (0..=2 * HALF).map(|k| grey(at + float(k) - float(HALF))).collect();
-            at += product(&weights.place, &profile) / weights.step(&profile);
+                (0..=2 * HALF).map(|k| grey(at + to_f64(k) - to_f64(HALF))).collect();
+            at += product(&weights.position, &profile) / weights.step(&profile);
         }
         at
     }
 
     fn whole(place: f64) -> usize {
-        crate::numeric::number::whole(narrow(place.floor()))
+        crate::numeric::number::round_to_count(narrow_to_f32(place.floor()))
     }
 
     #[test]
     fn a_textured_bead_draws_its_edge_in_by_as_much_as_its_texture_tells() {
         let table = StepTable::default();
-        let weights = Weights::new(&table, BLUR_PX, HALF).unwrap();
+        let weights = EdgeWeights::new(&table, BLUR_PX, HALF).unwrap();
         let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
         let (mut mean, mut told) = (0.0, 0.0);
         let trials = 4000;
         for _ in 0..trials {
             let texture = texture(&mut random);
-            mean += found(&weights, &table, &texture) / float(trials);
+            mean += found(&weights, &table, &texture) / to_f64(trials);
             let bead = &texture[SIDE + 6..2 * SIDE];
-            told += weights.on_bead(bead).over(STEP).shift() / float(trials);
+            told += weights.on_bead(bead).over(STEP).shift() / to_f64(trials);
         }
         // The mean of 4,000 is known to 0.007 px.
         assert!(told > 0.03, "{told}");

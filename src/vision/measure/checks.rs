@@ -1,96 +1,101 @@
 //! What is not believed: edges that disagree with themselves or with each other,
 //! and steps that are too low.
 
-use super::pattern_limits::{STRONGEST_OF_LINES, STRONGEST_PATTERN};
-use super::work::{Way, Work};
+use super::pattern_limits::{MAX_PATTERN, MAX_PATTERN_LINE_BY_LINE};
+use super::work::{EdgeModel, MeasureState};
 use crate::numeric::normal_distribution::ROOT_TWO_PI;
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 use crate::numeric::rank;
 use crate::vision::gauge::EdgeKind;
-use crate::vision::ground::{Place, Side};
+use crate::vision::ground::{EdgePosition, EdgeSide};
 use crate::vision::outlier;
 use crate::vision::reject::Reject;
 use crate::vision::row_range::RowRange;
-use crate::vision::strip::{Grey, Strip};
-use crate::vision::trace::Tracer;
+use crate::vision::strip::{GaugeRows, GreyPixel};
+use crate::vision::trace::EdgeTracer;
 use crate::vision::width::WidthMeasurement;
 
 /// Share of the rows from which each edge must come.
-const NEED_ROWS: f64 = 0.4;
+const MIN_ROW_FRACTION: f64 = 0.4;
 /// The same where each row is known to be clear.
-const NEED_CLEAR_ROWS: f64 = 0.16;
+const MIN_CLEAR_ROW_FRACTION: f64 = 0.16;
 /// Misfit of a blurred step from which on, if both have it, edges are located
 /// line by line: one alone is more likely covered than of another kind.
-pub(super) const STRANGE: f64 = 2.0;
+pub(super) const MAX_STEP_MISFIT: f64 = 2.0;
 /// The same for one edge alone.
-const VERY_STRANGE: f64 = 8.0;
+const MAX_SINGLE_MISFIT: f64 = 8.0;
 /// Largest standard deviation of a width whose edges are covered in part
 /// \[px\]: beyond it, what is left of an edge does not tell its course.
-const COVERED_SIGMA_PX: f64 = 0.185;
+const MAX_OCCLUDED_SIGMA_PX: f64 = 0.185;
 /// The same where a covered edge seems to wind: what winds aside looks covered as
 /// well, so that too little is left of such an edge.
-const WINDING_SIGMA_PX: f64 = 0.08;
+const MAX_WINDING_SIGMA_PX: f64 = 0.08;
 /// Share of clear rows from which on an edge's course is sure enough.
-const PLENTY_CLEAR: f64 = 0.6;
+const MIN_SURE_CLEAR_FRACTION: f64 = 0.6;
 /// Distance from the border of the gauge that an edge needs, in its blurs and at
 /// least \[px\]: a step that is cut short there seems to lie farther inside.
-const BORDER_BLURS: f64 = 3.0;
-const BORDER_PX: f64 = 3.0;
+const BOUNDARY_BLURS: f64 = 3.0;
+const MIN_BOUNDARY_PX: f64 = 3.0;
 /// Share of an edge's places that may be nearer.
-const NEARER: f64 = 0.05;
+const MAX_NEAR_BOUNDARY_FRACTION: f64 = 0.05;
 /// Largest scatter of neighbouring edges about each other \[px\] that still is
 /// an edge, not noise.
 const MAX_SCATTER_PX: f64 = 1.5;
 /// The same where both edges show in all rows but for a few sparks: then they are
 /// as rough as they look, and what scatters more is no bead.
-const WHOLE_SCATTER_PX: f64 = 4.0;
+const MAX_COMPLETE_SCATTER_PX: f64 = 4.0;
 /// Share of the rows that counts as all.
-pub(super) const WHOLE_SHARE: f64 = 0.95;
+pub(super) const COMPLETE_FRACTION: f64 = 0.95;
 /// The same where one edge was hidden and had to be located line by line.
-const LOST_SCATTER_PX: f64 = 0.5;
+const MAX_LOST_SCATTER_PX: f64 = 0.5;
 
 /// Share of a pattern beside an edge that counts for its place: at the edge it is half
 /// covered by the bead, and the widths of drawn beads tell a little less.
-const PATTERN_SHARE: f64 = 0.46;
+const PATTERN_WEIGHT: f64 = 0.46;
 /// Pattern as a fraction of the contrast below which weights that know the texture leave
 /// nothing else of it: with both, z of compressed images of a quality above 65 is 0.86.
-const FAINT_PATTERN: f64 = 0.1;
+const MAX_FAINT_PATTERN: f64 = 0.1;
 /// Widest blur of an edge that is measured \[px\]: rendered motion, a box of 20.8 px,
 /// is measured without fault up to 7.4 px of blur, and was off by some pixels from
 /// 7.5 px on.
-pub(super) const WIDEST_BLUR_PX: f64 = 7.4;
+pub(super) const MAX_BLUR_PX: f64 = 7.4;
 /// The same of a box of even motion with a lens's blur: motion of 15.8 px. Flanks of longer
 /// ones were taken for shading once in some hundred frames, and the width was 1 px off.
-pub(super) const WIDEST_MOTION_PX: f64 = 4.8;
+pub(super) const MAX_MOTION_BLUR_PX: f64 = 4.8;
 
-impl Work {
+impl MeasureState {
     /// Whether one edge alone is hidden: then it is covered, not of another kind
     /// than the other one.
     pub(super) fn one_is_lost(&self) -> bool {
-        let lost = |side: &Tracer| side.is_hidden() && side.misfit_of_a_row() > STRANGE;
+        let lost = |side: &EdgeTracer| side.is_lost() && side.misfit_of_a_row() > MAX_STEP_MISFIT;
         lost(&self.left) != lost(&self.right)
     }
 
     /// Takes out calipers that disagree with their neighbours, on either edge.
-    pub(super) fn sort_out(&mut self, bright: bool) -> Result<(), Reject> {
-        self.drop_contradictions(bright);
+    pub(super) fn reject_outliers(&mut self, bright: bool) -> Result<(), Reject> {
+        self.drop_inconsistent(bright);
         let mut worst: f64 = 0.0;
         for side in [&mut self.left, &mut self.right] {
-            if side.is_covered() {
-                side.drop_strays(self.least_off_px);
+            if side.is_occluded() {
+                side.drop_strays(self.min_outlier_px);
             }
             let edges = side.edges_mut();
-            worst = worst.max(outlier::sort_out(edges, self.least_off_px, &mut self.scatter));
+            worst = worst.max(outlier::remove_outliers(
+                edges,
+                self.min_outlier_px,
+                &mut self.scratch_f64,
+            ));
         }
-        let got = self.left.used_share().min(self.right.used_share());
-        let enough =
-            [&self.left, &self.right].iter().all(|side| side.used_share() >= need_of(side));
+        let got = self.left.used_fraction().min(self.right.used_fraction());
+        let enough = [&self.left, &self.right]
+            .iter()
+            .all(|side| side.used_fraction() >= min_row_fraction(side));
         let limit = self.scatter_limit();
         if worst > limit {
             return Err(Reject::Scattered { got_px: worst, limit_px: limit });
         }
         if !enough {
-            let need = f64::max(need_of(&self.left), need_of(&self.right));
+            let need = f64::max(min_row_fraction(&self.left), min_row_fraction(&self.right));
             return Err(Reject::NoPair { got, need });
         }
         Ok(())
@@ -98,7 +103,7 @@ impl Work {
 
     /// Takes out places that step the wrong way for the bead's polarity, and lines
     /// whose two edges cross.
-    fn drop_contradictions(&mut self, bright: bool) {
+    fn drop_inconsistent(&mut self, bright: bool) {
         let sides = [(&mut self.left, bright), (&mut self.right, !bright)];
         for (side, steps_up) in sides {
             for edge in side.edges_mut() {
@@ -124,9 +129,9 @@ impl Work {
 
     /// Looks at the pattern beside the bead: adds to the edges' variance what it may
     /// move them by, and refuses one that is as strong as an edge.
-    pub(super) fn check_ground<T: Grey>(
+    pub(super) fn check_ground<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
+        strip: &GaugeRows<'_, T>,
         of_both: fn(f64, f64) -> f64,
     ) -> Result<(), Reject> {
         let noise = f64::from(self.noise.grey);
@@ -140,9 +145,10 @@ impl Work {
             if !tracer.is_on_ground {
                 continue;
             }
-            place(tracer, &self.lines, &mut self.places);
+            edge_positions(tracer, &self.lines, &mut self.positions);
             let blur_px = tracer.blur_px;
-            let side = Side { places: &self.places, outwards, blur_px, room_px: f64::INFINITY };
+            let side =
+                EdgeSide { positions: &self.positions, outwards, blur_px, room_px: f64::INFINITY };
             if self.gauge.edge == EdgeKind::Auto {
                 self.is_beside_groove |= tracer.is_beside_groove(outwards > 0.0, noise / contrast);
             }
@@ -150,34 +156,35 @@ impl Work {
             *strength = pattern.size_grey / contrast;
             // Rough edges know what the ground beside them leaves open, weights that know a
             // texture what a faint one does.
-            let is_in_weights = tracer.knows_texture() && *strength < FAINT_PATTERN;
+            let is_in_weights = tracer.is_textured() && *strength < MAX_FAINT_PATTERN;
             if tracer.uncertainty.mean_variance.is_none() && !is_in_weights {
-                let px_per_grey = PATTERN_SHARE * ROOT_TWO_PI * tracer.blur_px / contrast;
+                let px_per_grey = PATTERN_WEIGHT * ROOT_TWO_PI * tracer.blur_px / contrast;
                 tracer.uncertainty.ground_variance =
                     pattern.mean_variance * px_per_grey * px_per_grey;
             }
         }
-        self.pattern_share = strengths[0].min(strengths[1]);
-        let (got, limit) = (of_both(strengths[0], strengths[1]), STRONGEST_PATTERN);
+        self.pattern_ratio = strengths[0].min(strengths[1]);
+        let (got, limit) = (of_both(strengths[0], strengths[1]), MAX_PATTERN);
         if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
     /// Refuses edges in a pattern that were located line by line: parts of it were taken for
     /// them.
     pub(super) fn check_lines_in_pattern(&self) -> Result<(), Reject> {
-        let (got, limit) = (self.pattern_share, STRONGEST_OF_LINES);
-        let is_among = self.way == Way::Lines && got > limit;
+        let (got, limit) = (self.pattern_ratio, MAX_PATTERN_LINE_BY_LINE);
+        let is_among = self.edge_model == EdgeModel::LineByLine && got > limit;
         if is_among { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
     /// Scatter of an edge from which on it is noise \[px\].
     fn scatter_limit(&self) -> f64 {
         let sides = [&self.left, &self.right];
-        let whole = |side: &&Tracer| side.is_clear() && side.used_share() > WHOLE_SHARE;
+        let whole =
+            |side: &&EdgeTracer| side.is_clear() && side.used_fraction() > COMPLETE_FRACTION;
         if self.is_lost {
-            LOST_SCATTER_PX
+            MAX_LOST_SCATTER_PX
         } else if sides.iter().all(whole) {
-            WHOLE_SCATTER_PX
+            MAX_COMPLETE_SCATTER_PX
         } else {
             MAX_SCATTER_PX
         }
@@ -188,7 +195,7 @@ impl Work {
         self.contrasts = [self.contrast(true), self.contrast(false)];
         let got = self.contrasts[0].min(self.contrasts[1]);
         if got < need {
-            return Err(self.too_much_light().unwrap_or(Reject::LowContrast { got, need }));
+            return Err(self.saturation().unwrap_or(Reject::LowContrast { got, need }));
         }
         Ok(())
     }
@@ -196,22 +203,24 @@ impl Work {
     /// Median height of an edge's steps \[grey levels\].
     fn contrast(&mut self, left: bool) -> f64 {
         let side = if left { &self.left } else { &self.right };
-        self.scatter.clear();
-        self.scatter.extend(side.edges().iter().flatten().map(|edge| edge.height.abs()));
-        rank::median(&mut self.scatter).unwrap_or(0.0)
+        self.scratch_f64.clear();
+        self.scratch_f64.extend(side.edges().iter().flatten().map(|edge| edge.height.abs()));
+        rank::median(&mut self.scratch_f64).unwrap_or(0.0)
     }
 
     /// Refuses a bead of whose edges too little is uncovered to tell where they
     /// run.
-    pub(super) fn check_covered(&self, found: &WidthMeasurement) -> Result<(), Reject> {
+    pub(super) fn check_occlusion(&self, found: &WidthMeasurement) -> Result<(), Reject> {
         let got_px = found.sigma.get() / found.width.get() * f64::from(self.width_px);
         let sides = [&self.left, &self.right];
-        let sparse = |side: &&Tracer| side.is_covered() && side.used_share() < PLENTY_CLEAR;
-        let winding = |side: &&Tracer| side.is_covered() && side.seems_winding();
+        let sparse = |side: &&EdgeTracer| {
+            side.is_occluded() && side.used_fraction() < MIN_SURE_CLEAR_FRACTION
+        };
+        let winding = |side: &&EdgeTracer| side.is_occluded() && side.seems_winding();
         let (limit, unsure) = if sides.iter().any(winding) {
-            (WINDING_SIGMA_PX, true)
+            (MAX_WINDING_SIGMA_PX, true)
         } else {
-            (COVERED_SIGMA_PX, sides.iter().any(sparse))
+            (MAX_OCCLUDED_SIGMA_PX, sides.iter().any(sparse))
         };
         if unsure && got_px > limit {
             return Err(Reject::Occluded { got_px, limit_px: limit });
@@ -220,10 +229,10 @@ impl Work {
     }
 
     /// Refuses a bead whose edges the border of the gauge cuts short.
-    pub(super) fn check_border(&self, across: usize) -> Result<(), Reject> {
-        let last = float(across.saturating_sub(1));
+    pub(super) fn check_boundary(&self, across: usize) -> Result<(), Reject> {
+        let last = to_f64(across.saturating_sub(1));
         for side in [&self.left, &self.right] {
-            let need_px = f64::max(BORDER_PX, BORDER_BLURS * side.blur_px);
+            let need_px = f64::max(MIN_BOUNDARY_PX, BOUNDARY_BLURS * side.blur_px);
             let places = side.edges().iter().flatten();
             let distances = places.map(|edge| edge.at.min(last - edge.at));
             let (mut near, mut all, mut got_px) = (0.0, 0.0, f64::INFINITY);
@@ -234,7 +243,7 @@ impl Work {
                     got_px = got_px.min(distance.max(0.0));
                 }
             }
-            if near > NEARER * all {
+            if near > MAX_NEAR_BOUNDARY_FRACTION * all {
                 return Err(Reject::Clipped { got_px, need_px });
             }
         }
@@ -243,19 +252,25 @@ impl Work {
 }
 
 /// Where an edge lies on the caliper lines that show it.
-pub(super) fn place(tracer: &Tracer, lines: &[RowRange], places: &mut Vec<Place>) {
+pub(super) fn edge_positions(
+    tracer: &EdgeTracer,
+    lines: &[RowRange],
+    places: &mut Vec<EdgePosition>,
+) {
     let edges = tracer.edges().iter().zip(lines);
     places.clear();
-    places.extend(edges.filter_map(|(edge, &rows)| Some(Place { rows, at: edge.as_ref()?.at })));
+    places.extend(
+        edges.filter_map(|(edge, &rows)| Some(EdgePosition { rows, at: edge.as_ref()?.at })),
+    );
 }
 
 /// Share of the rows from which an edge must come.
-fn need_of(side: &Tracer) -> f64 {
-    if side.is_covered() { NEED_CLEAR_ROWS } else { NEED_ROWS }
+fn min_row_fraction(side: &EdgeTracer) -> f64 {
+    if side.is_occluded() { MIN_CLEAR_ROW_FRACTION } else { MIN_ROW_FRACTION }
 }
 
 /// Whether edges are no blurred steps, from their misfits.
-pub fn is_strange(misfits: [f64; 2]) -> bool {
-    misfits.iter().all(|&misfit| misfit > STRANGE)
-        || misfits.iter().any(|&misfit| misfit > VERY_STRANGE)
+pub fn are_not_steps(misfits: [f64; 2]) -> bool {
+    misfits.iter().all(|&misfit| misfit > MAX_STEP_MISFIT)
+        || misfits.iter().any(|&misfit| misfit > MAX_SINGLE_MISFIT)
 }

@@ -1,7 +1,7 @@
 //! What a compression of the picture leaves open of a width.
 
-use super::work::Work;
-use crate::vision::trace::Tracer;
+use super::work::MeasureState;
+use crate::vision::trace::EdgeTracer;
 
 /// Noise of a profile that moves its edges as a compression does that takes the pixels' noise
 /// away \[grey levels\]. Straight edges of rendered JPEGs with a noise of 4 were off as by 2.2
@@ -11,12 +11,12 @@ const COMPRESSION_GREY: f64 = 1.7;
 /// Fraction of saturated pixels from which on these have no noise, and not a compression.
 const FEW_SATURATED: f64 = 0.01;
 
-impl Work {
+impl MeasureState {
     /// Variance of an edge's place from what a compression leaves of its profile, which all
     /// rows share \[px²\]: the Cramér–Rao bound for a profile with so much noise. 0 where the
     /// pixels' noise is there.
-    pub(super) fn variance_of_compression(&self, edge: &Tracer, contrast_grey: f64) -> f64 {
-        if !self.noise.is_taken_away || self.bands.saturated_share() >= FEW_SATURATED {
+    pub(super) fn variance_of_compression(&self, edge: &EdgeTracer, contrast_grey: f64) -> f64 {
+        if !self.noise.is_suppressed || self.bands.saturated_fraction() >= FEW_SATURATED {
             return 0.0;
         }
         let noise = COMPRESSION_GREY / contrast_grey;

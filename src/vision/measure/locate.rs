@@ -1,47 +1,47 @@
 //! The bead's two edges, from their contours to sub-pixel places: each in the
 //! way that suits it.
 
-use super::checks::is_strange;
-use super::search::Found;
-use super::work::{NEED_SHARE, OFF_PX, Way, Work};
+use super::checks::are_not_steps;
+use super::search::ContourPair;
+use super::work::{EdgeModel, MIN_LINE_FRACTION, MIN_OUTLIER_PX, MeasureState};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::narrow;
+use crate::numeric::number::narrow_to_f32;
 use crate::numeric::rank;
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::light;
 use crate::vision::motion::BlurShapes;
 use crate::vision::occluded;
-use crate::vision::overlay::Look;
+use crate::vision::overlay::StepFit;
 use crate::vision::pixel_noise::PixelNoise;
 use crate::vision::reject::Reject;
 use crate::vision::saturated;
-use crate::vision::strip::{Grey, Strip};
-use crate::vision::trace::{Scene, Tracer};
+use crate::vision::strip::{GaugeRows, GreyPixel};
+use crate::vision::trace::{EdgeTracer, TraceInput};
 
 /// Least deviation that makes an outlier of a caliper line that was fitted for
 /// itself \[px\].
-const LINE_OFF_PX: f64 = 0.75;
+const MIN_LINE_OUTLIER_PX: f64 = 0.75;
 /// Ground on either side of the bead that its noise is taken from \[px\].
-const BESIDE_PX: f32 = 12.0;
+const NOISE_MARGIN_PX: f32 = 12.0;
 /// Distance of an edge's median from its contour's that makes it another \[px\]: grains of
 /// 12 px beside an edge draw its contour along by less.
-const ELSEWHERE_PX: f32 = 14.0;
+const OTHER_EDGE_PX: f32 = 14.0;
 /// Share by which the blur of one edge differs from the other's.
-const DIFFERENT: f64 = 0.04;
+const BLUR_DIFFERENCE: f64 = 0.04;
 
-impl Work {
+impl MeasureState {
     #[inline(always)]
-    pub(super) fn trace<T: Grey>(
+    pub(super) fn trace<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
-        pair: Found,
+        strip: &GaugeRows<'_, T>,
+        pair: ContourPair,
     ) -> Result<(), Reject> {
         let (lefts, rights) = pair.sides(&self.ups, &self.downs);
         let (lefts, rights) = (&lefts.all()[pair.pair.left].at, &rights.all()[pair.pair.right].at);
-        let about = about(lefts, rights, strip.across);
+        let about = columns_about(lefts, rights, strip.across);
         self.noise = PixelNoise::read(strip, about);
-        self.width_px = narrowest(lefts, rights, &mut self.memory);
-        let scene = Scene {
+        self.width_px = narrow_distance(lefts, rights, &mut self.scratch);
+        let scene = TraceInput {
             strip,
             bands: &self.bands,
             lines: &self.lines,
@@ -49,24 +49,24 @@ impl Work {
             width_px: self.width_px,
             bead_after: true,
         };
-        let right_scene = Scene { bead_after: false, ..scene };
+        let right_scene = TraceInput { bead_after: false, ..scene };
         let scenes = [scene, right_scene];
         let mut seen = [None; 2];
         self.blur_shapes.reset();
-        (self.is_lost, self.way) = (false, Way::Steps);
+        (self.is_lost, self.edge_model) = (false, EdgeModel::Steps);
         // A loop, so that what is inlined into it is compiled once for both.
         let sides = [(&mut self.left, lefts), (&mut self.right, rights)];
         for ((tracer, rough), (scene, seen)) in sides.into_iter().zip(scenes.iter().zip(&mut seen))
         {
-            *seen = tracer.look(self.blur_shapes.table(), scene, rough.iter().copied());
+            *seen = tracer.fit_first(self.blur_shapes.table(), scene, rough.iter().copied());
         }
-        let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
+        let failed = Reject::NoPair { got: 0.0, need: MIN_LINE_FRACTION };
         if let [Some(_), Some(_)] = seen {
-            let cut_off = [self.left.is_cut_off(&scene), self.right.is_cut_off(&right_scene)];
+            let cut_off = [self.left.clipped_sides(&scene), self.right.clipped_sides(&right_scene)];
             if cut_off != [[false; 2]; 2] {
-                (self.least_off_px, self.way) = (OFF_PX, Way::CutOff);
+                (self.min_outlier_px, self.edge_model) = (MIN_OUTLIER_PX, EdgeModel::Clipped);
                 let tracers = [&mut self.left, &mut self.right];
-                let bead = saturated::Bead { scenes, lefts, rights };
+                let bead = saturated::SaturatedBead { scenes, lefts, rights };
                 self.noise.grey = bead.trace(tracers, self.blur_shapes.table(), cut_off)?;
                 return Ok(());
             }
@@ -80,30 +80,30 @@ impl Work {
             }
             if let (Some(left), Some(right)) = (self.left.surroundings(), self.right.surroundings())
             {
-                light::bend([left, right], self.width_px.into());
+                light::apply_falloff([left, right], self.width_px.into());
             }
             for (tracer, scene) in [&mut self.left, &mut self.right].into_iter().zip(&scenes) {
                 tracer.trace(table, scene, blur);
             }
-            if self.left.is_hidden() || self.right.is_hidden() {
+            if self.left.is_lost() || self.right.is_lost() {
                 let candidates = &self.candidates;
-                let bead = occluded::Bead { scenes, candidates, bright: pair.bright };
+                let bead = occluded::OccludedBead { scenes, candidates, bright: pair.bright };
                 let tracers = [&mut self.left, &mut self.right];
-                bead.uncover(tracers, table, blur, &mut self.parallel);
+                bead.locate_from_clear_rows(tracers, table, blur, &mut self.parallel);
                 let contours = [(&self.left, lefts.as_slice()), (&self.right, rights)];
-                if let Some([one, other]) = widths_apart(contours, &mut self.memory) {
+                if let Some([one, other]) = widths_apart(contours, &mut self.scratch) {
                     return Err(self.ambiguous(one, other));
                 }
             }
             self.is_lost = self.one_is_lost();
             let found = self.left.is_located() && self.right.is_located();
-            let misfits = [&self.left, &self.right].map(Tracer::misfit_of_a_row);
-            if found && !self.is_lost && !is_strange(misfits) {
-                self.least_off_px = OFF_PX;
+            let misfits = [&self.left, &self.right].map(EdgeTracer::misfit_of_a_row);
+            if found && !self.is_lost && !are_not_steps(misfits) {
+                self.min_outlier_px = MIN_OUTLIER_PX;
                 return Ok(());
             }
         }
-        (self.least_off_px, self.way) = (LINE_OFF_PX, Way::Lines);
+        (self.min_outlier_px, self.edge_model) = (MIN_LINE_OUTLIER_PX, EdgeModel::LineByLine);
         // What is no blurred step does not tell how a motion blurs it.
         let lens = self.blur_shapes.lens();
         let left = self.left.refine(lens, &scene);
@@ -115,44 +115,48 @@ impl Work {
 /// Looks at both edges again with the blur's shape that fits best, where it is not a
 /// lens's alone; the blur of each with that shape.
 #[inline(always)]
-fn choose_blur<T: Grey>(
+fn choose_blur<T: GreyPixel>(
     shapes: &mut BlurShapes,
-    [left, right]: [&mut Tracer; 2],
-    scenes: &[Scene<'_, T>; 2],
+    [left, right]: [&mut EdgeTracer; 2],
+    scenes: &[TraceInput<'_, T>; 2],
 ) -> Option<[Option<BlurEstimate>; 2]> {
-    let again = |table: &StepTable, before: Option<[&Look; 2]>| {
+    let again = |table: &StepTable, before: Option<[&StepFit; 2]>| {
         [(&left, 0), (&right, 1)]
-            .map(|(edge, k)| edge.look_again(table, &scenes[k], before.map(|looks| looks[k])))
+            .map(|(edge, k)| edge.refit(table, &scenes[k], before.map(|looks| looks[k])))
     };
-    let looks = shapes.choose([left.seen()?, right.seen()?], again)?;
-    left.take_look(looks[0]);
-    right.take_look(looks[1]);
+    let looks = shapes.choose([left.step_fit()?, right.step_fit()?], again)?;
+    left.take_fit(looks[0]);
+    right.take_fit(looks[1]);
     Some(looks.map(|look| Some(look.blur())))
 }
 
 /// Blur that both edges have, seen through one lens, and how far one may differ
 /// from it, from that of each; `None` where neither has one.
 fn common_blur(seen: [Option<BlurEstimate>; 2]) -> Option<BlurEstimate> {
-    let weight = |BlurEstimate { px, sd_px }| 1.0 / (sd_px * sd_px + (DIFFERENT * px).powi(2));
+    let weight =
+        |BlurEstimate { px, sd_px }| 1.0 / (sd_px * sd_px + (BLUR_DIFFERENCE * px).powi(2));
     let (mut sum, mut weights) = (0.0, 0.0);
     for seen in seen.into_iter().flatten() {
         sum += weight(seen) * seen.px;
         weights += weight(seen);
     }
     let blur = sum / weights;
-    (weights > 0.0).then_some(BlurEstimate { px: blur, sd_px: DIFFERENT * blur })
+    (weights > 0.0).then_some(BlurEstimate { px: blur, sd_px: BLUR_DIFFERENCE * blur })
 }
 
 /// Width between edges of which one was uncovered elsewhere than where its contour runs, and
 /// between the contours \[px\]: a seam or a rib may have been taken for the edge. `None`
 /// where both run along their contours.
-fn widths_apart(sides: [(&Tracer, &[Option<f32>]); 2], memory: &mut Vec<f32>) -> Option<[f32; 2]> {
+fn widths_apart(
+    sides: [(&EdgeTracer, &[Option<f32>]); 2],
+    memory: &mut Vec<f32>,
+) -> Option<[f32; 2]> {
     let [left, right] = sides.map(|(tracer, contour)| {
         memory.clear();
         memory.extend(contour.iter().flatten());
         let contour = rank::median(memory).unwrap_or(f32::NAN);
-        let found = narrow(tracer.middle());
-        let is_elsewhere = tracer.is_covered() && (found - contour).abs() > ELSEWHERE_PX;
+        let found = narrow_to_f32(tracer.middle());
+        let is_elsewhere = tracer.is_occluded() && (found - contour).abs() > OTHER_EDGE_PX;
         [if is_elsewhere { found } else { contour }, contour]
     });
     let [uncovered, contours] = [0, 1].map(|of| right[of] - left[of]);
@@ -165,15 +169,19 @@ fn widths_apart(sides: [(&Tracer, &[Option<f32>]); 2], memory: &mut Vec<f32>) ->
     clippy::cast_sign_loss,
     reason = "saturates at 0 and is cut to the gauge"
 )]
-fn about(left: &[Option<f32>], right: &[Option<f32>], across: usize) -> std::ops::Range<usize> {
+fn columns_about(
+    left: &[Option<f32>],
+    right: &[Option<f32>],
+    across: usize,
+) -> std::ops::Range<usize> {
     let low = left.iter().flatten().fold(f32::INFINITY, |low, &at| low.min(at));
     let high = right.iter().flatten().fold(0.0, |high: f32, &at| high.max(at));
-    let (from, to) = ((low - BESIDE_PX) as usize, (high + BESIDE_PX) as usize);
+    let (from, to) = ((low - NOISE_MARGIN_PX) as usize, (high + NOISE_MARGIN_PX) as usize);
     from.min(across - 1)..to.clamp(from + 1, across)
 }
 
 /// A narrow distance between two contours \[px\], for the size of windows.
-fn narrowest(left: &[Option<f32>], right: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
+fn narrow_distance(left: &[Option<f32>], right: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
     memory.clear();
     memory.extend(left.iter().zip(right).filter_map(|(left, right)| Some((*right)? - (*left)?)));
     let rank = memory.len() / 10;

@@ -3,75 +3,75 @@
 
 use std::ops::RangeInclusive;
 
-use super::checks::{STRANGE, WIDEST_BLUR_PX, WIDEST_MOTION_PX};
-use super::rough_edges::WIDEST_ROUGH_PX;
-use super::work::{Way, Work};
+use super::checks::{MAX_BLUR_PX, MAX_MOTION_BLUR_PX, MAX_STEP_MISFIT};
+use super::rough_edges::MAX_ROUGH_BLUR_PX;
+use super::work::{EdgeModel, MeasureState};
 use crate::vision::reject::Reject;
 use crate::vision::rough::RoughFit;
-use crate::vision::trace::Tracer;
+use crate::vision::trace::EdgeTracer;
 use crate::vision::width::WidthMeasurement;
 
 /// Share of an edge's rows that may be sorted out: more are bays, or grains.
-const FEW_GAPS: f64 = 0.06;
+const MAX_GAP_FRACTION: f64 = 0.06;
 /// The same of rows that noise does not explain: a single bay of 2 px in 200 rows.
-const FEW_UNFIT: f64 = 0.01;
+const MAX_UNFIT_FRACTION: f64 = 0.01;
 /// Narrowest bead whose level is read free of its flanks by rough edges \[px\].
-const NARROW_PX: f32 = 40.0;
+const MAX_NARROW_WIDTH_PX: f32 = 40.0;
 /// Contrast of a rough edge over that of the blurred step below which it is another edge:
 /// holes within the bead leave 0.8.
-const FAINTER: f64 = 0.7;
+const MIN_CONTRAST_RATIO: f64 = 0.7;
 /// Contrast of an edge as a fraction of the other's below which it may be a rib's, and
 /// the distance at which another edge is not the same \[px\].
-const LOPSIDED: f64 = 0.6;
-const ELSEWHERE_PX: f64 = 3.0;
+const MIN_SIDES_CONTRAST_RATIO: f64 = 0.6;
+const OTHER_EDGE_PX: f64 = 3.0;
 /// The distance of a rough edge from what was located line by line up to which both are the
 /// same \[px\].
-const SAME_PX: f64 = 0.25;
+const SAME_EDGE_PX: f64 = 0.25;
 /// By how much the levels outside the two edges differ, as a share of the higher contrast,
 /// where something else lies beside one than beside the other, so that a narrow groove may: one
 /// of 2 to 2.5 px that is a little darker than the ground moves a blurred step by a third of a
 /// pixel and shows in nothing else.
-const TWO_GROUNDS: f64 = 0.1;
+const MIN_GROUND_DIFFERENCE: f64 = 0.1;
 /// Pattern beside both edges, as a fraction of the contrast, from which on a blurred step
 /// may have parts of it in its flank: widths were up to 3 px off by seven times what steps say.
-const NOTABLE_PATTERN: f64 = 0.2;
+const MIN_PATTERN: f64 = 0.2;
 /// Factor of sigma where edges in such a pattern were located line by line: of 30,000 drawn
 /// widths some were off by up to seven of the sigmas that lines say.
-const LINES_IN_PATTERN: f64 = 2.0;
+const PATTERN_SIGMA_FACTOR: f64 = 2.0;
 /// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
 /// wide flank, and its blur from which on it is: steps within the ramps of motions of 15 px and
 /// more have 2.9 px, those beside a shadow the lens's.
-const PART_OF_FLANK: f64 = 0.55;
-const PART_BLUR_PX: f64 = 2.5;
+const MAX_PARTIAL_CONTRAST: f64 = 0.55;
+const MIN_PARTIAL_BLUR_PX: f64 = 2.5;
 /// The same as a fraction of the levels' difference a few pixels before and after it, below
 /// which a ramp, a rib or a shadow may lie there.
-const PART_OF_LEVELS: f64 = 0.8;
+const MIN_LEVEL_RATIO: f64 = 0.8;
 /// Range of the same of one edge alone, where either is wide: below it the rest of its flank
 /// was taken for shading, beyond it shading for its flank. Drawn edges of up to 20 px of
 /// motion, or up to 6 px of blur, whose widths were right had 0.99 to 1.056, those that were
 /// 0.5 px and more off up to 0.944 or 1.1.
-const WHOLE_FLANK: RangeInclusive<f64> = 0.97..=1.08;
+const FULL_FLANK_CONTRAST: RangeInclusive<f64> = 0.97..=1.08;
 /// Blur of a step from which on it may be a part of a flank \[px\].
-const WIDE_PX: f64 = 3.5;
+const WIDE_BLUR_PX: f64 = 3.5;
 /// How much farther out than a blurred step a rough edge may lie \[px\].
-const WIDER_PX: f64 = 1.0;
+const MAX_OUTWARD_PX: f64 = 1.0;
 /// Contrast of a rough edge over that of the blurred step from which on it is higher: by
 /// sparks on 5 % of the bead it is 1.05 to 1.1.
-const HIGHER: f64 = 1.04;
+const MAX_CONTRAST_RATIO: f64 = 1.04;
 /// Share of odd pixels about an edge up to which it is bead and ground alone: drawn torn
 /// beads, ones with holes and ones in low light have up to 0.003, of 522 with grooves that
 /// were refused as covered 11 have more, and grains that passed for bays from 0.005 on.
-const FEW_ODD: f64 = 0.004;
+const MAX_ODD_FRACTION: f64 = 0.004;
 /// By how much the share of odd pixels about an edge exceeds that within the bead where
 /// grains lie on it: concrete beads have up to 0.022, grains of 6 and 12 px on a third of
 /// the rows 0.027 to 0.14.
-const GRAINS: f64 = 0.024;
+const GRAIN_ODD_FRACTION: f64 = 0.024;
 
-impl Work {
+impl MeasureState {
     /// Whether edges that were measured as blurred steps may be something else. Where they
     /// pass the end of the scale, rows do not tell: half of their height is not seen.
-    pub(super) fn may_be_more_than_steps(&self) -> bool {
-        if self.way == Way::CutOff {
+    pub(super) fn may_not_be_steps(&self) -> bool {
+        if self.edge_model == EdgeModel::Clipped {
             return false;
         }
         let is_other = self.is_refined() || self.is_beside_groove || self.is_wide();
@@ -86,59 +86,62 @@ impl Work {
 
     /// Whether edges were located line by line.
     fn is_refined(&self) -> bool {
-        self.way == Way::Lines
+        self.edge_model == EdgeModel::LineByLine
     }
 
     /// Whether the flanks are so wide that rows alone do not tell bays in them.
     fn is_wide(&self) -> bool {
-        self.left.blur_px.max(self.right.blur_px) > WIDE_PX
+        self.left.blur_px.max(self.right.blur_px) > WIDE_BLUR_PX
     }
 
     /// Whether the bead is too narrow for its level to be read free of its flanks.
     fn is_narrow(&self) -> bool {
-        self.width_px <= NARROW_PX
+        self.width_px <= MAX_NARROW_WIDTH_PX
     }
 
     /// Whether more than a few places of an edge were sorted out, or some that surely show
     /// something else.
     pub(super) fn has_gaps(&self) -> bool {
-        let used = self.left.used_share().min(self.right.used_share());
-        used < 1.0 - FEW_GAPS || self.left.unfit().max(self.right.unfit()) > FEW_UNFIT
+        let used = self.left.used_fraction().min(self.right.used_fraction());
+        used < 1.0 - MAX_GAP_FRACTION
+            || self.left.unfit_fraction().max(self.right.unfit_fraction()) > MAX_UNFIT_FRACTION
     }
 
     /// Whether rough edges are not higher than the blurred steps: then what was sorted
     /// out shows ground. Dark grains beside an edge, sparks within and shading make rough
     /// edges higher; holes within make them lower.
     fn is_no_higher(&self, fits: &[RoughFit; 2]) -> bool {
-        fits.iter().zip(self.contrasts).all(|(fit, step)| fit.contrast < HIGHER * step)
+        fits.iter().zip(self.contrasts).all(|(fit, step)| fit.contrast < MAX_CONTRAST_RATIO * step)
     }
 
     /// Whether grains may be what covers the edges of a frame whose blurred steps were
     /// refused. Occluded ones are known, and grains taken for ground make rough ones higher.
     pub(super) fn may_be_grains(&self, refused: &Reject, fits: &[RoughFit; 2]) -> bool {
         let is_higher = matches!(refused, Reject::Occluded { .. }) && !self.is_no_higher(fits);
-        is_higher || fits.iter().any(|fit| fit.exceeds_texture(FEW_ODD))
+        is_higher || fits.iter().any(|fit| fit.exceeds_texture(MAX_ODD_FRACTION))
     }
 
     /// Whether a rough edge is so much fainter than the blurred step that it is another.
     fn is_fainter(&self, fits: &[RoughFit; 2]) -> bool {
-        fits.iter().zip(self.contrasts).any(|(fit, step)| fit.contrast < FAINTER * step)
+        fits.iter().zip(self.contrasts).any(|(fit, step)| fit.contrast < MIN_CONTRAST_RATIO * step)
     }
 
     /// Whether the blurred steps are parts of flanks that are wider than any blur.
     fn are_parts_of_flanks(&self, fits: &[RoughFit; 2]) -> bool {
         let mut sides = fits.iter().zip(self.contrasts);
-        let is_wide = self.is_refined() && fits.iter().any(|fit| fit.blur_px > WIDEST_ROUGH_PX)
-            || fits.iter().all(|fit| fit.blur_px > WIDEST_BLUR_PX);
-        let may_be_part = self.left.blur_px.max(self.right.blur_px) > PART_BLUR_PX;
-        is_wide || may_be_part && sides.all(|(fit, step)| step < PART_OF_FLANK * fit.contrast)
+        let is_wide = self.is_refined() && fits.iter().any(|fit| fit.blur_px > MAX_ROUGH_BLUR_PX)
+            || fits.iter().all(|fit| fit.blur_px > MAX_BLUR_PX);
+        let may_be_part = self.left.blur_px.max(self.right.blur_px) > MIN_PARTIAL_BLUR_PX;
+        is_wide
+            || may_be_part && sides.all(|(fit, step)| step < MAX_PARTIAL_CONTRAST * fit.contrast)
     }
 
     /// Refuses wide steps of which one is a part of its flank, or more.
     pub(super) fn check_flanks(&self, fits: &[RoughFit; 2]) -> Result<(), Reject> {
         let mut sides = fits.iter().zip(self.contrasts);
-        let is_whole = sides.all(|(fit, step)| WHOLE_FLANK.contains(&(step / fit.contrast)));
-        let (got_px, limit_px) = (fits[0].blur_px.max(fits[1].blur_px), WIDEST_MOTION_PX);
+        let is_whole =
+            sides.all(|(fit, step)| FULL_FLANK_CONTRAST.contains(&(step / fit.contrast)));
+        let (got_px, limit_px) = (fits[0].blur_px.max(fits[1].blur_px), MAX_MOTION_BLUR_PX);
         if self.is_wide() && !is_whole && got_px > limit_px {
             return Err(Reject::Blurred { got_px, limit_px });
         }
@@ -146,16 +149,16 @@ impl Work {
     }
 
     /// Whether one edge has much less contrast than the other.
-    fn are_lopsided(&self) -> bool {
+    fn have_unequal_contrast(&self) -> bool {
         let [left, right] = self.contrasts;
-        left.min(right) < LOPSIDED * left.max(right)
+        left.min(right) < MIN_SIDES_CONTRAST_RATIO * left.max(right)
     }
 
     /// Whether something else lies outside the one edge than outside the other.
     fn has_two_grounds(&self) -> bool {
         let ([left, _], [_, right]) = (self.left.levels(), self.right.levels());
         let [one, other] = self.contrasts;
-        (left - right).abs() > TWO_GROUNDS * one.max(other)
+        (left - right).abs() > MIN_GROUND_DIFFERENCE * one.max(other)
     }
 
     /// How far rough edges lie from where edges were located before \[px\]: the farther of both.
@@ -167,12 +170,12 @@ impl Work {
 
     /// Whether rough edges lie elsewhere than the blurred steps.
     fn is_elsewhere(&self) -> bool {
-        self.apart_px() > ELSEWHERE_PX
+        self.apart_px() > OTHER_EDGE_PX
     }
 
     /// Standard deviation of the width between rough edges in that of the one that was found:
     /// less than 1 where it is surer.
-    fn sigma_share(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> f64 {
+    fn sigma_ratio(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> f64 {
         let rough_px = fits.iter().map(|fit| fit.variance).sum::<f64>().sqrt();
         rough_px * self.mm_per_px / found.sigma.get()
     }
@@ -184,7 +187,7 @@ impl Work {
     /// of the levels' difference, or none fits and rows tell a narrow groove, sigma contains how
     /// far the rows' edges lie elsewhere. Nothing is added on narrow beads, whose level rows do
     /// not read free of the flanks.
-    pub(super) fn at_least_as_unsure(
+    pub(super) fn with_row_uncertainty(
         &self,
         fits: &[RoughFit; 2],
         found: WidthMeasurement,
@@ -193,31 +196,37 @@ impl Work {
             return found;
         }
         let may_be_grooved = fits.iter().any(|fit| fit.is_narrow_groove);
-        let is_doubted = are_clean(fits, GRAINS)
+        let is_uncertain = are_clean(fits, GRAIN_ODD_FRACTION)
             && (self.has_gaps() || may_be_grooved && self.has_two_grounds());
-        let is_in_pattern = self.pattern_share > NOTABLE_PATTERN;
-        let share = match self.way {
-            Way::Steps if is_doubted || is_in_pattern => self.sigma_share(fits, &found).max(1.0),
-            Way::Lines if is_in_pattern => LINES_IN_PATTERN,
+        let is_in_pattern = self.pattern_ratio > MIN_PATTERN;
+        let sigma_factor = match self.edge_model {
+            EdgeModel::Steps if is_uncertain || is_in_pattern => {
+                self.sigma_ratio(fits, &found).max(1.0)
+            }
+            EdgeModel::LineByLine if is_in_pattern => PATTERN_SIGMA_FACTOR,
             _ => 1.0,
         };
-        let off = self.mm_per_px * self.off_rows_px(fits) / found.sigma.get();
-        WidthMeasurement { sigma: found.sigma * (share * share + off * off).sqrt(), ..found }
+        let off = self.mm_per_px * self.row_offset_px(fits) / found.sigma.get();
+        WidthMeasurement {
+            sigma: found.sigma * (sigma_factor * sigma_factor + off * off).sqrt(),
+            ..found
+        }
     }
 
     /// How far edges lie from the rows' \[px\] where a step is but a part of the levels'
     /// difference, or the rows tell a narrow groove and no step fits, or not on all rows beside
     /// grounds that differ.
-    fn off_rows_px(&self, fits: &[RoughFit; 2]) -> f64 {
+    fn row_offset_px(&self, fits: &[RoughFit; 2]) -> f64 {
         let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
         let shows_two_grounds =
-            self.has_gaps() && self.has_two_grounds() && are_clean(fits, GRAINS);
+            self.has_gaps() && self.has_two_grounds() && are_clean(fits, GRAIN_ODD_FRACTION);
         let off = [0, 1].map(|k| {
             let (found, rough) = sides[k];
-            let is_fit = self.way == Way::Steps && found.misfit_of_a_row() < STRANGE;
+            let is_fit =
+                self.edge_model == EdgeModel::Steps && found.misfit_of_a_row() < MAX_STEP_MISFIT;
             let is_step = is_fit && !shows_two_grounds;
             let off = (rough.middle() - found.middle()).abs();
-            let is_part = is_part(found, self.contrasts[k]) && off < WIDER_PX;
+            let is_part = is_part(found, self.contrasts[k]) && off < MAX_OUTWARD_PX;
             if is_part || !is_step && fits[k].is_narrow_groove { off } else { 0.0 }
         });
         off[0] + off[1]
@@ -229,7 +238,7 @@ impl Work {
         let sides = [(&self.left, &self.rough[0], -1.0), (&self.right, &self.rough[1], 1.0)];
         sides.iter().zip(fits).any(|((steps, rough, outwards), fit)| {
             let out = outwards * (rough.middle() - steps.middle());
-            !fit.is_narrow_groove && out > WIDER_PX
+            !fit.is_narrow_groove && out > MAX_OUTWARD_PX
         })
     }
 
@@ -237,25 +246,25 @@ impl Work {
     /// is, bays in an edge that were sorted out as grains, or edges that no blurred step fits and
     /// whose rows show their course better than lines do.
     pub(super) fn explains_more(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> bool {
-        if self.are_lopsided() && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
+        if self.have_unequal_contrast() && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
             return true;
         }
         if self.is_wider(fits) || self.is_elsewhere() && self.is_fainter(fits) {
             return false;
         }
-        let two_levels = are_clean(fits, FEW_ODD);
+        let two_levels = are_clean(fits, MAX_ODD_FRACTION);
         // Texture that is known on both sides looks like a groove here and there.
-        let knows_texture = self.left.knows_texture() && self.right.knows_texture();
+        let knows_texture = self.left.is_textured() && self.right.is_textured();
         let hidden = !knows_texture && fits.iter().any(|fit| fit.is_narrow_groove);
         if self.is_refined() {
             let has_grains = fits.iter().any(has_grains);
             let grooved = hidden || fits.iter().any(|fit| fit.is_groove);
             let is_rough =
-                two_levels && self.apart_px() < SAME_PX && self.sigma_share(fits, found) < 1.0;
+                two_levels && self.apart_px() < SAME_EDGE_PX && self.sigma_ratio(fits, found) < 1.0;
             !has_grains && (is_rough || grooved && (two_levels || !self.is_lost))
         } else {
             // Grains here and there look like a groove in the mean over the gauge.
-            let is_covered = self.left.is_covered() || self.right.is_covered();
+            let is_covered = self.left.is_occluded() || self.right.is_occluded();
             let has_bays =
                 two_levels && !self.is_narrow() && self.has_gaps() && self.is_no_higher(fits);
             !self.is_wide() && (has_bays || hidden && !is_covered)
@@ -264,17 +273,17 @@ impl Work {
 }
 
 /// Whether a step is but a part of the difference of the levels on either side of it.
-fn is_part(tracer: &Tracer, step: f64) -> bool {
+fn is_part(tracer: &EdgeTracer, step: f64) -> bool {
     let [before, after] = tracer.levels();
-    step < PART_OF_LEVELS * (after - before).abs()
+    step < MIN_LEVEL_RATIO * (after - before).abs()
 }
 
 /// Whether less than such a share of the pixels about either edge shows neither bead nor ground.
 fn are_clean(fits: &[RoughFit; 2], max_odd_share: f64) -> bool {
-    fits.iter().all(|fit| fit.odd_share < max_odd_share)
+    fits.iter().all(|fit| fit.odd_fraction < max_odd_share)
 }
 
 /// Whether more shows about an edge than bead with its texture and ground.
 pub fn has_grains(fit: &RoughFit) -> bool {
-    fit.exceeds_texture(GRAINS)
+    fit.exceeds_texture(GRAIN_ODD_FRACTION)
 }

@@ -1,40 +1,44 @@
 //! Beads that have a texture, or lie on ground that has a pattern.
 
-use super::checks::{WHOLE_SHARE, place};
+use super::checks::{COMPLETE_FRACTION, edge_positions};
 use super::model_selection::has_grains;
 use super::pattern_limits::{
-    STRONGEST_BESIDE_WHOLE, STRONGEST_PATTERN, check_pattern, doubt_of_blur, in_texture,
+    MAX_PATTERN, MAX_PATTERN_BESIDE_COMPLETE, blur_inflation, check_pattern, with_texture_variance,
 };
 use super::uniformity;
-use super::work::{NEED_SHARE, Work};
+use super::work::{MIN_LINE_FRACTION, MeasureState};
 use crate::calibration::SurfaceMap;
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 use crate::vision::coarse::{LinePair, StepLine};
 use crate::vision::gauge::WidthRangePx;
-use crate::vision::ground::{Place, Side, TOLD};
-use crate::vision::mean_edge::{BLURS_PX, Scene};
+use crate::vision::ground::{EdgePosition, EdgeSide, MIN_EXCESS_VARIANCE};
+use crate::vision::mean_edge::{BLURS_PX, MeanEdgeInput};
 use crate::vision::reject::Reject;
 use crate::vision::row_range::RowRange;
-use crate::vision::strip::{Grey, Strip, View};
-use crate::vision::trace::Tracer;
+use crate::vision::strip::{GaugeRows, GaugeView, GreyPixel};
+use crate::vision::trace::EdgeTracer;
 use crate::vision::width::WidthMeasurement;
 
 /// Weakest pattern, as a fraction of the contrast, beside which blurred steps are not
 /// good enough: one of less draws them outwards by hardly 0.02 px.
-const NOTABLE: f64 = 0.06;
+const MIN_PATTERN: f64 = 0.06;
 /// The same of the bead's texture: sparks over 5 % of a smooth bead look like up to 0.12.
-const NOTABLE_TEXTURE: f64 = 0.13;
+const MIN_TEXTURE: f64 = 0.13;
 /// The least of both edges' as a fraction of the other's where it is the same texture.
-const ALIKE: f64 = 0.4;
+const MIN_TEXTURE_RATIO: f64 = 0.4;
 /// The same half-way between two lines, as a share of it.
-const HALF_WAY: f32 = 0.5;
+const MIDDLE_TEXTURE_RATIO: f32 = 0.5;
 /// Blur beyond which a bead's texture is free of a flank that is not known yet \[px\].
-const LARGE_BLUR_PX: f64 = 3.0;
-impl Work {
+const ASSUMED_BLUR_PX: f64 = 3.0;
+impl MeasureState {
     /// Standard deviation of the pattern that the ground has on both sides of a pair of
     /// lines \[grey levels\]; 0 where one side has none: what is on one side alone is a
     /// groove or a neighbour.
-    pub(super) fn ground_pattern<T: Grey>(&mut self, strip: &Strip<'_, T>, pair: &LinePair) -> f64 {
+    pub(super) fn ground_pattern<T: GreyPixel>(
+        &mut self,
+        strip: &GaugeRows<'_, T>,
+        pair: &LinePair,
+    ) -> f64 {
         let noise = f64::from(self.noise.grey);
         let mut least = f64::INFINITY;
         let sides = self.mean_edges.iter_mut().zip(&pair.sides);
@@ -43,7 +47,7 @@ impl Work {
             least = least.min(edge.pattern(&scene, line).unwrap_or(0.0));
         }
         let variance = least * least;
-        if variance > (1.0 + TOLD) * noise * noise {
+        if variance > (1.0 + MIN_EXCESS_VARIANCE) * noise * noise {
             (variance - noise * noise).sqrt()
         } else {
             0.0
@@ -53,11 +57,11 @@ impl Work {
     /// Measures a bead whose texture shows before any edge is located. `None` where none
     /// does, where it lies on ground of the same kind, and where grains may lie on its edges.
     #[inline(never)]
-    pub(super) fn measure_busy<T: Grey>(
+    pub(super) fn measure_busy<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
+        strip: &GaugeRows<'_, T>,
         range: WidthRangePx,
-        view: &View,
+        view: &GaugeView,
         surface: &SurfaceMap,
     ) -> Option<Result<WidthMeasurement, Reject>> {
         let pair = self.find_lines(strip, range).ok()?;
@@ -72,41 +76,42 @@ impl Work {
         if fits.iter().any(has_grains) {
             return None;
         }
-        let fits = in_texture(&pair, fits);
-        Some(self.take_rough_beside(pattern, true, &fits, strip, view, surface))
+        let fits = with_texture_variance(&pair, fits);
+        Some(self.width_of_rough_beside(pattern, true, &fits, strip, view, surface))
     }
 
     /// Measures a bead that was measured already, where it or the ground has a pattern.
     /// `None` where neither has, or a weak one, and where the mean profile tells no edges and
     /// the pattern is bearable beside blurred steps.
     #[inline(never)]
-    pub(super) fn measure_textured<T: Grey>(
+    pub(super) fn measure_textured<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
+        strip: &GaugeRows<'_, T>,
         range: WidthRangePx,
-        view: &View,
+        view: &GaugeView,
         surface: &SurfaceMap,
     ) -> Option<Result<WidthMeasurement, Reject>> {
         let shares = self.texture_between_steps(strip);
-        let is_textured = rms(shares) > NOTABLE_TEXTURE;
-        if !is_textured && self.pattern_share == 0.0 {
+        let is_textured = rms(shares) > MIN_TEXTURE;
+        if !is_textured && self.pattern_ratio == 0.0 {
             return None;
         }
         let Ok(pair) = self.find_lines(strip, range) else {
-            return self.check_whole(is_textured && are_alike(shares)).err().map(Err);
+            return self.check_complete(is_textured && are_alike(shares)).err().map(Err);
         };
         let pattern = self.ground_pattern(strip, &pair);
         let contrast = self.contrasts[0].min(self.contrasts[1]);
-        if !is_textured && pattern < NOTABLE * contrast {
+        if !is_textured && pattern < MIN_PATTERN * contrast {
             return None;
         }
         let found = self.measure_patterned((&pair, pattern), strip, view, surface);
         if found.is_some() {
             return found;
         }
-        let is_whole = self.left.used_share().min(self.right.used_share()) > WHOLE_SHARE;
+        let is_whole =
+            self.left.used_fraction().min(self.right.used_fraction()) > COMPLETE_FRACTION;
         let checked = if is_whole {
-            self.check_whole(is_textured)
+            self.check_complete(is_textured)
         } else {
             check_pattern(pattern / contrast, is_textured)
         };
@@ -115,23 +120,23 @@ impl Work {
 
     /// Refuses blurred steps of a plain bead all along which they show, beside a strong
     /// pattern on both sides.
-    fn check_whole(&self, is_textured: bool) -> Result<(), Reject> {
-        let (got, limit) = (self.pattern_share, STRONGEST_BESIDE_WHOLE);
+    fn check_complete(&self, is_textured: bool) -> Result<(), Reject> {
+        let (got, limit) = (self.pattern_ratio, MAX_PATTERN_BESIDE_COMPLETE);
         if !is_textured && got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
     /// Standard deviation of the bead's texture beside either of two blurred steps, as a
     /// fraction of its contrast.
-    fn texture_between_steps<T: Grey>(&mut self, strip: &Strip<'_, T>) -> [f64; 2] {
+    fn texture_between_steps<T: GreyPixel>(&mut self, strip: &GaugeRows<'_, T>) -> [f64; 2] {
         let sides = [(&self.left, 1.0), (&self.right, -1.0)];
         let room_px = self.right.middle() - self.left.middle();
         let mut shares = [0.0; 2];
         for (((tracer, inwards), contrast), share) in
             sides.into_iter().zip(self.contrasts).zip(&mut shares)
         {
-            place_all(tracer, &self.lines, &mut self.places);
+            all_edge_positions(tracer, &self.lines, &mut self.positions);
             let blur_px = tracer.blur_px;
-            let side = Side { places: &self.places, outwards: inwards, blur_px, room_px };
+            let side = EdgeSide { positions: &self.positions, outwards: inwards, blur_px, room_px };
             let texture = self.ground.texture(strip, &side, self.noise.grey.into());
             *share = texture.unwrap_or(0.0) / contrast;
         }
@@ -140,16 +145,16 @@ impl Work {
 
     /// Whether it has one beside both of two lines, and half-way between them: lines in the
     /// ground's pattern have that beside them, and a plain bead between.
-    pub(super) fn is_textured_between_lines<T: Grey>(
+    pub(super) fn is_textured_between_lines<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
+        strip: &GaugeRows<'_, T>,
         pair: &LinePair,
     ) -> bool {
         let [left, right] = pair.sides;
         let middle = StepLine {
             at: f32::midpoint(left.at, right.at),
             slope: f32::midpoint(left.slope, right.slope),
-            step: HALF_WAY * left.step.min(right.step),
+            step: MIDDLE_TEXTURE_RATIO * left.step.min(right.step),
         };
         let width_px = pair.width_px();
         [(left, 1.0), (right, -1.0), (middle, 1.0), (middle, -1.0)]
@@ -158,36 +163,36 @@ impl Work {
     }
 
     /// Whether a texture shows on one side of a line that is strong for its step.
-    fn is_textured_beside<T: Grey>(
+    fn is_textured_beside<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
+        strip: &GaugeRows<'_, T>,
         line: &StepLine,
         inwards: f64,
         width_px: f32,
     ) -> bool {
-        let middle = 0.5 * (float(strip.along) - 1.0);
-        self.places.clear();
-        self.places.extend(self.lines.iter().map(|&rows| {
+        let middle = 0.5 * (to_f64(strip.along) - 1.0);
+        self.positions.clear();
+        self.positions.extend(self.lines.iter().map(|&rows| {
             let off = rows.middle() - middle;
-            Place { rows, at: f64::from(line.at) + off * f64::from(line.slope) }
+            EdgePosition { rows, at: f64::from(line.at) + off * f64::from(line.slope) }
         }));
-        let side = Side {
-            places: &self.places,
+        let side = EdgeSide {
+            positions: &self.positions,
             outwards: inwards,
-            blur_px: LARGE_BLUR_PX,
+            blur_px: ASSUMED_BLUR_PX,
             room_px: width_px.into(),
         };
         let texture = self.ground.texture(strip, &side, self.noise.grey.into());
-        texture.is_some_and(|texture| texture > NOTABLE_TEXTURE * f64::from(line.step))
+        texture.is_some_and(|texture| texture > MIN_TEXTURE * f64::from(line.step))
     }
 
     /// Measures a bead whose ground has a pattern of such a standard deviation
     /// \[grey levels\]; `None` where the mean profile tells no edges, as beside a groove.
-    pub(super) fn measure_patterned<T: Grey>(
+    pub(super) fn measure_patterned<T: GreyPixel>(
         &mut self,
         lines: (&LinePair, f64),
-        strip: &Strip<'_, T>,
-        view: &View,
+        strip: &GaugeRows<'_, T>,
+        view: &GaugeView,
         surface: &SurfaceMap,
     ) -> Option<Result<WidthMeasurement, Reject>> {
         if lines.0.has_groove() {
@@ -197,18 +202,18 @@ impl Work {
         (!matches!(found, Err(Reject::NoPair { .. }))).then_some(found)
     }
 
-    fn measure_mean_profile<T: Grey>(
+    fn measure_mean_profile<T: GreyPixel>(
         &mut self,
         (pair, pattern): (&LinePair, f64),
-        strip: &Strip<'_, T>,
-        view: &View,
+        strip: &GaugeRows<'_, T>,
+        view: &GaugeView,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
-        let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
+        let failed = Reject::NoPair { got: 0.0, need: MIN_LINE_FRACTION };
         let scenes = [true, false].map(|after| scene(strip, &self.lines, pair, after));
         let [left, right] = &mut self.mean_edges;
-        let of_left = left.approach(&scenes[0], &pair.sides[0], self.blur_shapes.lens());
-        let of_right = right.approach(&scenes[1], &pair.sides[1], self.blur_shapes.lens());
+        let of_left = left.fit_blurs(&scenes[0], &pair.sides[0], self.blur_shapes.lens());
+        let of_right = right.fit_blurs(&scenes[1], &pair.sides[1], self.blur_shapes.lens());
         // Both edges are seen through one lens.
         let left_over = |k: &usize| of_left[*k] + of_right[*k];
         let best = (0..BLURS_PX.len()).min_by(|a, b| left_over(a).total_cmp(&left_over(b)));
@@ -217,8 +222,8 @@ impl Work {
         let one = left.locate(&scenes[0], self.blur_shapes.lens(), blur_px).ok_or(failed)?;
         let other = right.locate(&scenes[1], self.blur_shapes.lens(), blur_px).ok_or(failed)?;
         let got = pattern / one.contrast.min(other.contrast);
-        if got > STRONGEST_PATTERN {
-            return Err(Reject::Patterned { got, limit: STRONGEST_PATTERN });
+        if got > MAX_PATTERN {
+            return Err(Reject::Patterned { got, limit: MAX_PATTERN });
         }
         let ground = one.samples[0].with(other.samples[0]).variance();
         let bead = one.samples[1].with(other.samples[1]).variance();
@@ -226,20 +231,20 @@ impl Work {
             return Err(failed);
         }
         // An edge beside a strong pattern is drawn to its bright places.
-        let beside = ground * (1.0 + (got / STRONGEST_PATTERN).powi(4)) + bead;
+        let beside = ground * (1.0 + (got / MAX_PATTERN).powi(4)) + bead;
         // A flank's slope falls with its blur, and what a texture moves an edge by grows with it.
-        let doubt = doubt_of_blur(blur_px);
-        let variance = beside * if pattern > 0.0 { doubt } else { doubt * doubt };
+        let inflation = blur_inflation(blur_px);
+        let variance = beside * if pattern > 0.0 { inflation } else { inflation * inflation };
         let fits = [one, other].map(|fit| fit.as_rough(blur_px, variance));
-        uniformity::check(&fits, uniformity::middle_grey(strip, pair))?;
+        uniformity::check_uniformity(&fits, uniformity::middle_grey(strip, pair))?;
         self.left_px.clear();
         self.right_px.clear();
         let [left, right] = &self.mean_edges;
         self.left.take_rough(left.lines(), &fits[0]);
         self.right.take_rough(right.lines(), &fits[1]);
         self.check_contrast()?;
-        self.check_border(strip.across)?;
-        self.width_on(view, surface)
+        self.check_boundary(strip.across)?;
+        self.width_on_surface(view, surface)
     }
 }
 
@@ -251,12 +256,12 @@ fn rms([left, right]: [f64; 2]) -> f64 {
 /// Whether a bead has the same texture beside both edges: one of them may lie in the ground's
 /// pattern.
 fn are_alike([left, right]: [f64; 2]) -> bool {
-    left.min(right) >= ALIKE * left.max(right)
+    left.min(right) >= MIN_TEXTURE_RATIO * left.max(right)
 }
 
 /// Where an edge lies on all caliper lines: where it is not located, between those beside it.
-fn place_all(tracer: &Tracer, lines: &[RowRange], places: &mut Vec<Place>) {
-    place(tracer, lines, places);
+fn all_edge_positions(tracer: &EdgeTracer, lines: &[RowRange], places: &mut Vec<EdgePosition>) {
+    edge_positions(tracer, lines, places);
     if places.len() == lines.len() {
         return;
     }
@@ -270,16 +275,16 @@ fn place_all(tracer: &Tracer, lines: &[RowRange], places: &mut Vec<Place>) {
         let (one, other) =
             (located[..after].last().unwrap_or(first), located[after..].first().unwrap_or(last));
         let share = if other.0 > one.0 { (row - one.0) / (other.0 - one.0) } else { 0.0 };
-        Place { rows, at: one.1 + share * (other.1 - one.1) }
+        EdgePosition { rows, at: one.1 + share * (other.1 - one.1) }
     }));
 }
 
 /// What is looked at for one edge of a pair.
-fn scene<'a, T: Grey>(
-    strip: &'a Strip<'a, T>,
+fn scene<'a, T: GreyPixel>(
+    strip: &'a GaugeRows<'a, T>,
     lines: &'a [RowRange],
     pair: &LinePair,
     bead_after: bool,
-) -> Scene<'a, T> {
-    Scene { strip, lines, width_px: pair.width_px(), bead_after, bright: pair.bright }
+) -> MeanEdgeInput<'a, T> {
+    MeanEdgeInput { strip, lines, width_px: pair.width_px(), bead_after, bright: pair.bright }
 }

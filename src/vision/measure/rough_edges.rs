@@ -1,48 +1,48 @@
 //! Beads whose edges are no blurred steps: torn ones, grooves, texture.
 
-use super::pattern_limits::{check_pattern, in_texture};
+use super::pattern_limits::{check_pattern, with_texture_variance};
 use super::uniformity;
-use super::work::{NEED_SHARE, Work};
+use super::work::{MIN_LINE_FRACTION, MeasureState};
 use crate::calibration::SurfaceMap;
-use crate::numeric::number::{float, narrow};
+use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::vision::coarse::{LinePair, StepLine};
 use crate::vision::gauge::{EdgeKind, Polarity, WidthRangePx};
-use crate::vision::line::Line;
+use crate::vision::line::LineSums;
 use crate::vision::reject::Reject;
-use crate::vision::rough::{RoughFit, Scene};
-use crate::vision::strip::{Grey, Strip, View};
+use crate::vision::rough::{RoughFit, RoughInput};
+use crate::vision::strip::{GaugeRows, GaugeView, GreyPixel};
 use crate::vision::vectors;
 use crate::vision::width::WidthMeasurement;
 
 /// The search range allows 1.5 times too wide and too narrow single places; lines
 /// are means over the gauge, and stay nearer.
-const LINE_SLACK: f32 = 1.4;
+const LINE_RANGE_FACTOR: f32 = 1.4;
 
 /// Widest blur of a rough edge \[px\]: what lies outside is looked for within 20 px, and
 /// a flank of three blurs must end before.
-pub const WIDEST_ROUGH_PX: f64 = 6.3;
+pub const MAX_ROUGH_BLUR_PX: f64 = 6.3;
 /// Blur up to which the level outside is read free of the flank \[px\], and by how much an edge
 /// may be off for each pixel that it exceeds it: drawn edges of 5.7 to 6 px, by motion, lay 0.45 px
 /// too far out.
-const WHOLE_FLANK_PX: f64 = 5.0;
-const OFF_PER_BLUR: f64 = 0.5;
+const MAX_CLEAR_BLUR_PX: f64 = 5.0;
+const OFFSET_PER_BLUR: f64 = 0.5;
 /// Part of the width beside either edge where its flank may be \[of the width\]: the
 /// bead's texture is taken from between.
-const TEXTURE_MARGIN: f32 = 0.15;
+const TEXTURE_MARGIN_FRACTION: f32 = 0.15;
 /// How much stronger than a typical line of texture an edge must be: on layers that
 /// are seen from the side, whose lower edges fade into shadow, lines of texture were
 /// taken for edges up to 4.8; the edges of concrete beads have 5 to 17.
-const STANDS_OUT: f64 = 5.0;
+const MIN_TEXTURE_RATIO: f64 = 5.0;
 
-impl Work {
+impl MeasureState {
     /// Measures a bead by where its rows pass half height. `refused` is why it was not
     /// measured by blurred steps.
-    pub(super) fn measure_rough<T: Grey>(
+    pub(super) fn measure_rough<T: GreyPixel>(
         &mut self,
         refused: &Reject,
-        strip: &Strip<'_, T>,
+        strip: &GaugeRows<'_, T>,
         range: WidthRangePx,
-        view: &View,
+        view: &GaugeView,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         let pair = self.find_lines(strip, range)?;
@@ -58,25 +58,25 @@ impl Work {
             return Err(*refused);
         }
         let fits = self.fit_rough(strip, &pair)?;
-        if is_covered(refused) && self.may_be_grains(refused, &fits) {
+        if may_be_occluded(refused) && self.may_be_grains(refused, &fits) {
             return Err(*refused);
         }
-        let fits = if is_textured { in_texture(&pair, fits) } else { fits };
-        self.take_rough_beside(pattern, is_textured, &fits, strip, view, surface)
+        let fits = if is_textured { with_texture_variance(&pair, fits) } else { fits };
+        self.width_of_rough_beside(pattern, is_textured, &fits, strip, view, surface)
     }
 
     /// Looks for a bead with rough edges.
     #[cold]
     #[inline(never)]
-    pub(super) fn find_rough<T: Grey>(
+    pub(super) fn find_rough<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
+        strip: &GaugeRows<'_, T>,
         range: WidthRangePx,
     ) -> Result<[RoughFit; 2], Reject> {
         let pair = match self.find_lines(strip, range) {
             // Holes within the bead that lie one behind the other look like ribs and texture.
             Err(Reject::Ambiguous { .. } | Reject::Vague { .. })
-                if self.has_gaps() && self.pattern_share == 0.0 =>
+                if self.has_gaps() && self.pattern_ratio == 0.0 =>
             {
                 self.pair_of_steps(strip)
             }
@@ -86,34 +86,41 @@ impl Work {
     }
 
     /// The lines along two blurred steps.
-    fn pair_of_steps<T: Grey>(&self, strip: &Strip<'_, T>) -> LinePair {
-        let middle = 0.5 * (float(strip.along) - 1.0);
+    fn pair_of_steps<T: GreyPixel>(&self, strip: &GaugeRows<'_, T>) -> LinePair {
+        let middle = 0.5 * (to_f64(strip.along) - 1.0);
         let sides = [&self.left, &self.right].map(|tracer| {
-            let mut line = Line::default();
+            let mut line = LineSums::default();
             for (edge, &rows) in tracer.edges().iter().zip(&self.lines) {
                 if let Some(edge) = edge {
-                    line.add(rows.middle() - middle, edge.at, edge.share);
+                    line.add(rows.middle() - middle, edge.at, edge.row_fraction);
                 }
             }
             let [at, next] = [0.0, 1.0].map(|row| line.at(row).0);
-            (narrow(at), narrow(next - at))
+            (narrow_to_f32(at), narrow_to_f32(next - at))
         });
-        let steps = self.contrasts.map(narrow);
+        let steps = self.contrasts.map(narrow_to_f32);
         let [left, right] =
             [0, 1].map(|k| StepLine { at: sides[k].0, slope: sides[k].1, step: steps[k] });
         let bright = self.left.edges().iter().flatten().any(|edge| edge.height > 0.0);
         let bare = (left.step * right.step).sqrt();
-        LinePair { sides: [left, right], bright, score: bare, bare, strengths: steps }
+        LinePair {
+            sides: [left, right],
+            bright,
+            score: bare,
+            score_without_grooves: bare,
+            strengths: steps,
+        }
     }
 
     /// Looks for the bead's edges as lines.
-    pub(super) fn find_lines<T: Grey>(
+    pub(super) fn find_lines<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
+        strip: &GaugeRows<'_, T>,
         range: WidthRangePx,
     ) -> Result<LinePair, Reject> {
-        let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
-        let range = WidthRangePx { min: LINE_SLACK * range.min, max: range.max / LINE_SLACK };
+        let failed = Reject::NoPair { got: 0.0, need: MIN_LINE_FRACTION };
+        let range =
+            WidthRangePx { min: LINE_RANGE_FACTOR * range.min, max: range.max / LINE_RANGE_FACTOR };
         let usual_px = (range.min * range.max).sqrt();
         vectors::widest(
             #[inline(always)]
@@ -124,19 +131,19 @@ impl Work {
         let may_be_groove = self.gauge.edge != EdgeKind::Step;
         self.coarse.pairs(range, polarities, may_be_groove, &mut self.pairs);
         let pair = *self.pairs.first().ok_or(failed)?;
-        self.check_stands_out(&pair)?;
+        self.check_prominence(&pair)?;
         self.check_rivals(&pair)?;
         Ok(pair)
     }
 
     /// Follows rough edges near two lines.
-    pub(super) fn fit_rough<T: Grey>(
+    pub(super) fn fit_rough<T: GreyPixel>(
         &mut self,
-        strip: &Strip<'_, T>,
+        strip: &GaugeRows<'_, T>,
         pair: &LinePair,
     ) -> Result<[RoughFit; 2], Reject> {
-        let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
-        let scene = Scene {
+        let failed = Reject::NoPair { got: 0.0, need: MIN_LINE_FRACTION };
+        let scene = RoughInput {
             strip,
             lines: &self.lines,
             noise: self.noise.grey,
@@ -147,7 +154,7 @@ impl Work {
             table: self.blur_shapes.lens(),
         };
         let [left, right] = &mut self.rough;
-        let right_scene = Scene { bead_after: false, ..scene };
+        let right_scene = RoughInput { bead_after: false, ..scene };
         let both = vectors::widest(
             #[inline(always)]
             || {
@@ -160,57 +167,61 @@ impl Work {
         let left_fit = left.locate(&scene, right_blur).ok_or(failed)?;
         let right_fit = right.locate(&right_scene, left_blur).ok_or(failed)?;
         let got = left_fit.rows_fraction.min(right_fit.rows_fraction);
-        if got < NEED_SHARE {
-            return Err(Reject::NoPair { got, need: NEED_SHARE });
+        if got < MIN_LINE_FRACTION {
+            return Err(Reject::NoPair { got, need: MIN_LINE_FRACTION });
         }
-        uniformity::check(&[left_fit, right_fit], uniformity::middle_grey(strip, pair))?;
+        uniformity::check_uniformity(&[left_fit, right_fit], uniformity::middle_grey(strip, pair))?;
         Ok([left_fit, right_fit])
     }
 
     /// The same as [`Self::take_rough`] beside a pattern of such a standard deviation
     /// \[grey levels\], where that is bearable.
-    pub(super) fn take_rough_beside<T: Grey>(
+    pub(super) fn width_of_rough_beside<T: GreyPixel>(
         &mut self,
         pattern: f64,
         is_textured: bool,
         fits: &[RoughFit; 2],
-        strip: &Strip<'_, T>,
-        view: &View,
+        strip: &GaugeRows<'_, T>,
+        view: &GaugeView,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         check_pattern(pattern / fits[0].contrast.min(fits[1].contrast), is_textured)?;
-        self.take_rough(fits, strip, view, surface)
+        self.width_of_rough(fits, strip, view, surface)
     }
 
     /// The width of the bead whose rough edges were found.
-    pub(super) fn take_rough<T: Grey>(
+    pub(super) fn width_of_rough<T: GreyPixel>(
         &mut self,
         fits: &[RoughFit; 2],
-        strip: &Strip<'_, T>,
-        view: &View,
+        strip: &GaugeRows<'_, T>,
+        view: &GaugeView,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         self.left_px.clear();
         self.right_px.clear();
-        let [left, right] = fits.map(with_flank);
+        let [left, right] = fits.map(with_flank_variance);
         self.left.take_rough(self.rough[0].lines(), &left);
         self.right.take_rough(self.rough[1].lines(), &right);
         self.check_contrast()?;
-        self.check_blur(WIDEST_ROUGH_PX)?;
+        self.check_blur(MAX_ROUGH_BLUR_PX)?;
         self.check_ground(strip, f64::min)?;
-        self.check_border(strip.across)?;
-        self.width_on(view, surface)
+        self.check_boundary(strip.across)?;
+        self.width_on_surface(view, surface)
     }
 }
 
-impl Work {
+impl MeasureState {
     /// Refuses a pair that the bead's texture may have made.
-    fn check_stands_out(&self, pair: &LinePair) -> Result<(), Reject> {
+    fn check_prominence(&self, pair: &LinePair) -> Result<(), Reject> {
         let [left, right] = pair.sides;
-        let margin = TEXTURE_MARGIN * pair.width_px();
-        let texture = self.coarse.between(left.at + margin, right.at - margin);
+        let margin = TEXTURE_MARGIN_FRACTION * pair.width_px();
+        let texture = self.coarse.texture_between(left.at + margin, right.at - margin);
         let got = f64::from(pair.strengths[0].min(pair.strengths[1]) / texture.max(f32::EPSILON));
-        if got < STANDS_OUT { Err(Reject::Vague { got, need: STANDS_OUT }) } else { Ok(()) }
+        if got < MIN_TEXTURE_RATIO {
+            Err(Reject::Vague { got, need: MIN_TEXTURE_RATIO })
+        } else {
+            Ok(())
+        }
     }
 
     /// Refuses a pair beside which another one fits as well that ends at a seam or a
@@ -222,13 +233,13 @@ impl Work {
 }
 
 /// An edge with the doubt that a flank leaves which is not seen whole.
-fn with_flank(fit: RoughFit) -> RoughFit {
-    let off_px = OFF_PER_BLUR * (fit.blur_px - WHOLE_FLANK_PX).max(0.0);
+fn with_flank_variance(fit: RoughFit) -> RoughFit {
+    let off_px = OFFSET_PER_BLUR * (fit.blur_px - MAX_CLEAR_BLUR_PX).max(0.0);
     RoughFit { variance: fit.variance + off_px * off_px, ..fit }
 }
 
 /// Whether a frame was refused for what hides its edges, which may be grains.
-fn is_covered(refused: &Reject) -> bool {
+fn may_be_occluded(refused: &Reject) -> bool {
     matches!(refused, Reject::Scattered { .. } | Reject::Occluded { .. } | Reject::NoPair { .. })
 }
 

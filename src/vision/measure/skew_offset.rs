@@ -1,24 +1,24 @@
 //! What the skew of both edges' flanks makes of a width.
 
-use super::work::{Way, Work};
-use crate::vision::overlay::Look;
-use crate::vision::trace::Tracer;
-use crate::vision::width::Skew;
+use super::work::{EdgeModel, MeasureState};
+use crate::vision::overlay::StepFit;
+use crate::vision::trace::EdgeTracer;
+use crate::vision::width::WidthSkew;
 
 /// Standard deviations of a skew from which on it shows: from 3 on, one clean frame in 1,500 had
 /// as much by noise.
-const SHOWS: f64 = 4.0;
+const MIN_SKEW_SIGMAS: f64 = 4.0;
 
-impl Work {
+impl MeasureState {
     /// How far the skew of both flanks moves the width; `None` where the edges are not
     /// located as blurred steps.
-    pub(super) fn skew(&self) -> Option<Skew> {
-        if self.way != Way::Steps {
+    pub(super) fn skew(&self) -> Option<WidthSkew> {
+        if self.edge_model != EdgeModel::Steps {
             return None;
         }
         let table = self.blur_shapes.table();
         let (left, right) = (self.left.skew(table)?, self.right.skew(table)?);
-        Some(Skew {
+        Some(WidthSkew {
             offset_px: left.aside_px - right.aside_px,
             variance: left.variance + right.variance,
         })
@@ -26,12 +26,14 @@ impl Work {
 
     /// Variance that a skew adds to the width where the frame shows it \[px²\].
     pub(super) fn skew_variance(&self) -> f64 {
-        let is_strange = |edge: &Tracer| edge.seen().is_some_and(Look::is_strange);
+        let is_strange = |edge: &EdgeTracer| edge.step_fit().is_some_and(StepFit::is_not_step);
         if !is_strange(&self.left) && !is_strange(&self.right) {
             return 0.0;
         }
-        let square = |skew: &Skew| skew.offset_px * skew.offset_px;
-        let shown = self.skew().filter(|skew| square(skew) > SHOWS * SHOWS * skew.variance);
+        let square = |skew: &WidthSkew| skew.offset_px * skew.offset_px;
+        let shown = self
+            .skew()
+            .filter(|skew| square(skew) > MIN_SKEW_SIGMAS * MIN_SKEW_SIGMAS * skew.variance);
         shown.as_ref().map_or(0.0, square)
     }
 }

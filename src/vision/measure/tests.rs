@@ -5,7 +5,7 @@ use crate::core::geometry::{Pose, Roi, Size};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::core::units::WidthRange;
-use crate::vision::gauge::{Axis, EdgeKind, Polarity};
+use crate::vision::gauge::{BeadAxis, EdgeKind, Polarity};
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -44,7 +44,7 @@ fn frame_of_gamma_in_noise(gamma: f64, noise_grey: f64, seed: u64) -> Frame {
 fn gauge(from: usize, to: usize) -> Gauge {
     Gauge::new(
         Roi { x: from, y: 0, width: to - from, height: 60 },
-        Axis::Vertical,
+        BeadAxis::Vertical,
         Polarity::Bright,
         WidthRange { min: Mm::constant(10.0), max: Mm::constant(400.0) },
     )

@@ -2,39 +2,39 @@
 
 use crate::core::geometry::ImagePoint;
 use crate::vision::axis;
-use crate::vision::coarse::{Coarse, LinePair};
-use crate::vision::contour::Contours;
-use crate::vision::edge::Candidates;
+use crate::vision::coarse::{LinePair, LineSearch};
+use crate::vision::contour::EdgeContours;
+use crate::vision::edge::StepCandidates;
 use crate::vision::gauge::Gauge;
-use crate::vision::ground::{Ground, Place};
+use crate::vision::ground::{EdgePosition, PatternSearch};
 use crate::vision::mean_edge::MeanEdge;
 use crate::vision::motion::BlurShapes;
-use crate::vision::parallel::Parallel;
+use crate::vision::parallel::ParallelEdges;
 use crate::vision::pixel_noise::PixelNoise;
 use crate::vision::pool::Bands;
 use crate::vision::rough::RoughEdge;
 use crate::vision::row_range::RowRange;
-use crate::vision::trace::Tracer;
+use crate::vision::trace::EdgeTracer;
 
 /// Share of the caliper lines that must show each of the two edges.
-pub(super) const NEED_SHARE: f64 = 0.6;
+pub(super) const MIN_LINE_FRACTION: f64 = 0.6;
 /// Least deviation from its neighbours that makes a caliper an outlier \[px\].
-pub(super) const OFF_PX: f64 = 0.3;
+pub(super) const MIN_OUTLIER_PX: f64 = 0.3;
 
 /// How edges were located.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Way {
+pub(super) enum EdgeModel {
     /// As blurred steps, all rows together.
     Steps,
     /// From what is seen below the end of the scale.
-    CutOff,
+    Clipped,
     /// Line by line.
-    Lines,
+    LineByLine,
 }
 
 /// What a measurement works on.
 #[derive(Debug, Clone)]
-pub(super) struct Work {
+pub(super) struct MeasureState {
     pub(super) gauge: Gauge,
     pub(super) blur_shapes: BlurShapes,
     pub(super) bands: Bands,
@@ -43,37 +43,37 @@ pub(super) struct Work {
     /// Scale across the gauge's middle.
     pub(super) mm_per_px: f64,
     pub(super) width_px: f32,
-    pub(super) memory: Vec<f32>,
+    pub(super) scratch: Vec<f32>,
     pub(super) response: Vec<i16>,
-    pub(super) candidates: Vec<Candidates>,
-    pub(super) ups: Contours,
-    pub(super) downs: Contours,
-    pub(super) parallel: Parallel,
-    pub(super) coarse: Coarse,
+    pub(super) candidates: Vec<StepCandidates>,
+    pub(super) ups: EdgeContours,
+    pub(super) downs: EdgeContours,
+    pub(super) parallel: ParallelEdges,
+    pub(super) coarse: LineSearch,
     pub(super) pairs: Vec<LinePair>,
     pub(super) rough: [RoughEdge; 2],
     pub(super) mean_edges: [MeanEdge; 2],
-    pub(super) left: Tracer,
-    pub(super) right: Tracer,
-    pub(super) least_off_px: f64,
+    pub(super) left: EdgeTracer,
+    pub(super) right: EdgeTracer,
+    pub(super) min_outlier_px: f64,
     pub(super) is_lost: bool,
-    pub(super) way: Way,
+    pub(super) edge_model: EdgeModel,
     /// Whether a narrow groove may lie beside an edge.
     pub(super) is_beside_groove: bool,
     /// Standard deviation of the pattern that the ground has on both sides, as a
     /// fraction of the contrast; 0 where one side has none.
-    pub(super) pattern_share: f64,
+    pub(super) pattern_ratio: f64,
     pub(super) contrasts: [f64; 2],
-    pub(super) scatter: Vec<f64>,
+    pub(super) scratch_f64: Vec<f64>,
     pub(super) middles: Vec<f64>,
-    pub(super) places: Vec<Place>,
-    pub(super) ground: Ground,
-    pub(super) axis: axis::Memory,
+    pub(super) positions: Vec<EdgePosition>,
+    pub(super) ground: PatternSearch,
+    pub(super) axis: axis::WidthScratch,
     pub(super) left_px: Vec<ImagePoint>,
     pub(super) right_px: Vec<ImagePoint>,
 }
 
-impl Work {
+impl MeasureState {
     /// For a gauge.
     pub(super) fn new(gauge: Gauge) -> Self {
         Self {
@@ -84,29 +84,29 @@ impl Work {
             noise: PixelNoise::default(),
             mm_per_px: 0.0,
             width_px: 0.0,
-            memory: Vec::new(),
+            scratch: Vec::new(),
             response: Vec::new(),
             candidates: Vec::new(),
-            ups: Contours::default(),
-            downs: Contours::default(),
-            parallel: Parallel::default(),
-            coarse: Coarse::default(),
+            ups: EdgeContours::default(),
+            downs: EdgeContours::default(),
+            parallel: ParallelEdges::default(),
+            coarse: LineSearch::default(),
             pairs: Vec::new(),
             rough: Default::default(),
             mean_edges: Default::default(),
-            left: Tracer::default(),
-            right: Tracer::default(),
-            least_off_px: OFF_PX,
+            left: EdgeTracer::default(),
+            right: EdgeTracer::default(),
+            min_outlier_px: MIN_OUTLIER_PX,
             is_lost: false,
-            way: Way::Steps,
+            edge_model: EdgeModel::Steps,
             is_beside_groove: false,
-            pattern_share: 0.0,
+            pattern_ratio: 0.0,
             contrasts: [0.0; 2],
-            scatter: Vec::new(),
+            scratch_f64: Vec::new(),
             middles: Vec::new(),
-            places: Vec::new(),
-            ground: Ground::default(),
-            axis: axis::Memory::default(),
+            positions: Vec::new(),
+            ground: PatternSearch::default(),
+            axis: axis::WidthScratch::default(),
             left_px: Vec::new(),
             right_px: Vec::new(),
         }

@@ -3,22 +3,22 @@
 //! beside a bead.
 
 use super::Overlay;
-use super::shape::{Beside, Shading};
-use super::step::FlankedStep;
+use super::shape::{SideShading, SideShape};
+use super::step::StepWithNeighbours;
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::normal_equations::Normal;
+use crate::numeric::normal_equations::NormalEquations;
 
 /// Farthest that a parabola follows the surroundings \[px\].
-const FARTHEST_PX: f64 = 32.0;
+const MAX_EXTENT_PX: f64 = 32.0;
 /// Pixels that tell a parabola, before others are held against it.
-const LEAST_PX: f64 = 8.0;
+const MIN_START_PX: f64 = 8.0;
 /// Pixels that it must hold for.
-const ENOUGH_PX: f64 = 12.0;
+const MIN_EXTENT_PX: f64 = 12.0;
 /// A bend is believed from so many standard deviations on.
-const SURE: f64 = 4.0;
+const MIN_BEND_SIGMAS: f64 = 4.0;
 /// Slope at the far end of a parabola, as a fraction of that at the edge, from which on it
 /// turns back: light that falls off does not, a rib beside the edge does.
-const TURNS_BACK: f64 = 0.3;
+const MAX_REVERSED_SLOPE: f64 = 0.3;
 /// Unit of distances, so that the equations are well scaled \[px\].
 const UNIT_PX: f64 = 10.0;
 
@@ -27,21 +27,21 @@ impl Overlay {
     /// bend shows.
     #[cold]
     #[inline(never)]
-    pub(super) fn curved(
+    pub(super) fn parabolic_side(
         &self,
         table: &StepTable,
-        edge: FlankedStep<'_>,
+        edge: StepWithNeighbours<'_>,
         noise: f64,
         sign: f64,
         room: f64,
-    ) -> Option<Beside> {
+    ) -> Option<SideShape> {
         let height = edge.step.after - edge.step.before;
         let first = 3.0 * edge.step.blur;
-        let mut normal = Normal::<3>::default();
+        let mut normal = NormalEquations::<3>::default();
         let (mut end, mut rows) = (first, 0.0);
-        while end + 2.0 <= room.min(FARTHEST_PX) {
+        while end + 2.0 <= room.min(MAX_EXTENT_PX) {
             let (mut place, mut miss, mut weight) = (0.0, 0.0, 0.0);
-            self.beside_step(table, edge, sign, end, |away, off, rows| {
+            self.each_beside(table, edge, sign, end, |away, off, rows| {
                 place += rows * away;
                 miss += rows * off;
                 weight += rows;
@@ -50,37 +50,38 @@ impl Overlay {
                 break;
             }
             let (place, miss) = (place / weight, miss / weight);
-            if end >= first + LEAST_PX {
+            if end >= first + MIN_START_PX {
                 let solved = normal.solve()?;
                 let row = terms(place);
                 let expected: f64 =
                     row.iter().zip(solved.unknowns.iter()).map(|(a, b)| a * b).sum();
                 let row = nalgebra::SVector::from(row);
                 let variance = (row.transpose() * solved.covariance() * row)[0];
-                let doubt = noise * noise * (variance + 1.0 / weight);
-                if (miss - expected).abs() > 4.0 * doubt.sqrt() + 0.006 * height {
+                let variance_of_miss = noise * noise * (variance + 1.0 / weight);
+                if (miss - expected).abs() > 4.0 * variance_of_miss.sqrt() + 0.006 * height {
                     break;
                 }
             }
-            self.beside_step(table, edge, sign, end, |away, off, rows| {
+            self.each_beside(table, edge, sign, end, |away, off, rows| {
                 normal.add(terms(away), off, rows);
             });
             rows += weight;
             end += 2.0;
         }
-        if end < first + ENOUGH_PX {
+        if end < first + MIN_EXTENT_PX {
             return None;
         }
         let solved = normal.solve()?;
         let covariance = solved.covariance() * noise * noise;
         let (slope, bend) = (solved.unknowns[1], solved.unknowns[2]);
         let slope_at_end = slope + 2.0 * bend * end / UNIT_PX;
-        let turns_back = -slope_at_end * slope.signum() > TURNS_BACK * slope.abs();
-        let sure = bend * bend > SURE * SURE * covariance[(2, 2)] && !turns_back;
-        sure.then(|| Beside {
+        let turns_back = -slope_at_end * slope.signum() > MAX_REVERSED_SLOPE * slope.abs();
+        let sure =
+            bend * bend > MIN_BEND_SIGMAS * MIN_BEND_SIGMAS * covariance[(2, 2)] && !turns_back;
+        sure.then(|| SideShape {
             extent: end,
-            shading: Shading { slope: slope / UNIT_PX, bend: bend / (UNIT_PX * UNIT_PX) },
-            doubt: (covariance[(0, 0)] - noise * noise / rows).max(0.0),
+            shading: SideShading { slope: slope / UNIT_PX, bend: bend / (UNIT_PX * UNIT_PX) },
+            level_variance: (covariance[(0, 0)] - noise * noise / rows).max(0.0),
         })
     }
 }

@@ -4,28 +4,28 @@
 use nalgebra::SVector;
 
 use super::Overlay;
-use super::look::{Look, MAX_STEPS, SHADING_SD, place_limit};
-use super::step::{Extent, Flank, Flanks, LEAST_BLUR_PX, Step};
+use super::look::{MAX_ITERATIONS, SHADING_SIGMA, StepFit, max_sample_px};
+use super::step::{BlurredStep, Extent, MIN_BLUR_PX, NeighbourStep, NeighbourSteps};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::normal_equations::Normal;
+use crate::numeric::normal_equations::NormalEquations;
 use crate::vision::blur_estimate::BlurEstimate;
 
 /// Unknowns: place, blur, levels and shading of the edge, then place, height and
 /// blur of what lies before it and after it.
 const UNKNOWNS: usize = 12;
 /// Number of the first unknown of a flank on either side.
-const FLANKS: [usize; 2] = [6, 9];
+const FIRST_FLANK_UNKNOWN: [usize; 2] = [6, 9];
 /// Samples beyond a flank that tell its course, in blurs.
 const BEYOND_BLURS: f64 = 2.0;
 /// Share of the edge's blur by which a flank's usually differs.
-const OTHER_BLUR: f64 = 0.5;
+const FLANK_BLUR_SIGMA: f64 = 0.5;
 /// Samples up to so many blurs before the flank are used for the edge.
-const SPARED_BLURS: f64 = 1.0;
+const FLANK_MARGIN_BLURS: f64 = 1.0;
 /// By how much the fit with flanks may leave more than the one without \[shares
 /// of the step\].
-const WORSE: f64 = 0.01;
+const MAX_MISFIT_INCREASE: f64 = 0.01;
 /// Weight that holds an unknown.
-const FIXED: f64 = 1e12;
+const FIXED_WEIGHT: f64 = 1e12;
 
 impl Overlay {
     /// Fits an edge and the steps beside it. `start` has rough ones, and the
@@ -35,15 +35,15 @@ impl Overlay {
     pub(super) fn fit_flanks(
         &self,
         table: &StepTable,
-        start: &Look,
+        start: &StepFit,
         known: Option<BlurEstimate>,
-    ) -> Option<Look> {
+    ) -> Option<StepFit> {
         let mut look = *start;
-        for _ in 0..MAX_STEPS {
+        for _ in 0..MAX_ITERATIONS {
             let (mut normal, _) = self.linearise_flanks(table, &look);
             hold(&mut normal, &look, known);
             let solved = normal.solve()?;
-            let moved = follow(&mut look, &solved.unknowns);
+            let moved = take_step(&mut look, &solved.unknowns);
             if moved < 1e-3 {
                 break;
             }
@@ -54,18 +54,23 @@ impl Overlay {
         look.residual = look.noise;
         let solved = normal.solve()?;
         look.blur_sd = look.noise * solved.variance(1).max(0.0).sqrt();
-        look.doubt = look.noise * look.noise * doubt(&mut normal)?;
-        look.room = spared(&look);
-        let share = (used(misfit, &look), used(start.noise * start.noise, start));
-        (is_sound(&look, start) && share.0 <= share.1 + WORSE).then_some(look)
+        look.added_variance = look.noise * look.noise * added_variance(&mut normal)?;
+        look.room = samples_of_edge(&look);
+        let share =
+            (relative_misfit(misfit, &look), relative_misfit(start.noise * start.noise, start));
+        (is_sound(&look, start) && share.0 <= share.1 + MAX_MISFIT_INCREASE).then_some(look)
     }
 
     /// Normal equations about an edge and its flanks, and the mean square of
     /// what they leave.
-    fn linearise_flanks(&self, table: &StepTable, look: &Look) -> (Normal<UNKNOWNS>, f64) {
+    fn linearise_flanks(
+        &self,
+        table: &StepTable,
+        look: &StepFit,
+    ) -> (NormalEquations<UNKNOWNS>, f64) {
         let flanks = &look.flanks;
         let Extent { before: from, after: to } = reach(look);
-        let mut normal = Normal::default();
+        let mut normal = NormalEquations::default();
         let many = 3.0 * flanks.0.iter().flatten().map(|_| 1.0).sum::<f64>();
         let (mut square, mut n) = (0.0, -6.0 - many);
         for mean in self.means() {
@@ -74,7 +79,9 @@ impl Overlay {
                 let (own, level) = look.linear_at(table, at);
                 row[..6].copy_from_slice(&own);
                 let mut miss = value - level;
-                for ((flank, sign), first) in flanks.0.iter().zip([-1.0, 1.0]).zip(FLANKS) {
+                for ((flank, sign), first) in
+                    flanks.0.iter().zip([-1.0, 1.0]).zip(FIRST_FLANK_UNKNOWN)
+                {
                     let Some(flank) = flank else { continue };
                     let (adds, slopes) = flank.reaches(table, at, sign);
                     miss -= adds;
@@ -90,92 +97,92 @@ impl Overlay {
 }
 
 /// Farthest samples on either side \[px\].
-fn reach(look: &Look) -> Extent {
-    let Look { step, room, flanks, .. } = look;
+fn reach(look: &StepFit) -> Extent {
+    let StepFit { step, room, flanks, .. } = look;
     let plain = 4.5 * step.blur + 2.0;
-    let of = |flank: &Option<Flank>, room: f64| match flank {
-        Some(flank) => (flank.at.abs() + BEYOND_BLURS * flank.blur).min(place_limit()),
-        None => plain.min(room).min(place_limit()),
+    let of = |flank: &Option<NeighbourStep>, room: f64| match flank {
+        Some(flank) => (flank.at.abs() + BEYOND_BLURS * flank.blur).min(max_sample_px()),
+        None => plain.min(room).min(max_sample_px()),
     };
     Extent { before: of(&flanks.0[0], room.before), after: of(&flanks.0[1], room.after) }
 }
 
 /// Holds what is known, and unknowns that there are not.
-fn hold(normal: &mut Normal<UNKNOWNS>, look: &Look, known: Option<BlurEstimate>) {
+fn hold(normal: &mut NormalEquations<UNKNOWNS>, look: &StepFit, known: Option<BlurEstimate>) {
     let weight = |sd: f64| (look.noise / sd).powi(2);
-    normal.hold(4, weight(SHADING_SD), -look.shading[0]);
-    normal.hold(5, weight(SHADING_SD), -look.shading[1]);
+    normal.add_prior(4, weight(SHADING_SIGMA), -look.shading[0]);
+    normal.add_prior(5, weight(SHADING_SIGMA), -look.shading[1]);
     if let Some(BlurEstimate { px, sd_px }) = known {
-        normal.hold(1, weight(sd_px), px - look.step.blur);
+        normal.add_prior(1, weight(sd_px), px - look.step.blur);
     }
-    for (flank, first) in look.flanks.0.iter().zip(FLANKS) {
+    for (flank, first) in look.flanks.0.iter().zip(FIRST_FLANK_UNKNOWN) {
         match flank {
             Some(flank) => {
-                let usual = weight(OTHER_BLUR * look.step.blur);
-                normal.hold(first + 2, usual, look.step.blur - flank.blur);
+                let usual = weight(FLANK_BLUR_SIGMA * look.step.blur);
+                normal.add_prior(first + 2, usual, look.step.blur - flank.blur);
             }
-            None => (first..first + 3).for_each(|which| normal.hold(which, FIXED, 0.0)),
+            None => (first..first + 3).for_each(|which| normal.add_prior(which, FIXED_WEIGHT, 0.0)),
         }
     }
 }
 
 /// Takes a step of the fit; returns how far the edge moved \[px\].
-fn follow(look: &mut Look, moved: &SVector<f64, UNKNOWNS>) -> f64 {
+fn take_step(look: &mut StepFit, moved: &SVector<f64, UNKNOWNS>) -> f64 {
     let step = look.step;
     let most = 0.5 * step.blur;
-    look.step = Step {
+    look.step = BlurredStep {
         at: step.at + moved[0].clamp(-most, most),
-        blur: (step.blur + moved[1].clamp(-0.5 * most, 0.5 * most)).max(LEAST_BLUR_PX),
+        blur: (step.blur + moved[1].clamp(-0.5 * most, 0.5 * most)).max(MIN_BLUR_PX),
         before: step.before + moved[2],
         after: step.after + moved[3],
     };
     look.shading[0] += moved[4];
     look.shading[1] += moved[5];
-    for (flank, first) in look.flanks.0.iter_mut().zip(FLANKS) {
+    for (flank, first) in look.flanks.0.iter_mut().zip(FIRST_FLANK_UNKNOWN) {
         let Some(flank) = flank else { continue };
         flank.at += moved[first].clamp(-most, most);
         flank.height += moved[first + 1];
         flank.blur =
-            (flank.blur + moved[first + 2].clamp(-0.5 * most, 0.5 * most)).max(LEAST_BLUR_PX);
+            (flank.blur + moved[first + 2].clamp(-0.5 * most, 0.5 * most)).max(MIN_BLUR_PX);
     }
     moved[0].abs() + moved[1].abs()
 }
 
 /// What the blur and the flanks add to the variance of the edge's place, for
 /// samples of variance 1 \[px²\].
-fn doubt(normal: &mut Normal<UNKNOWNS>) -> Option<f64> {
+fn added_variance(normal: &mut NormalEquations<UNKNOWNS>) -> Option<f64> {
     // Doubt about shading counts where it shows, not wherever it may be.
-    normal.hold(4, FIXED, 0.0);
-    normal.hold(5, FIXED, 0.0);
+    normal.add_prior(4, FIXED_WEIGHT, 0.0);
+    normal.add_prior(5, FIXED_WEIGHT, 0.0);
     let all = normal.solve()?.variance(0);
-    normal.hold(1, FIXED, 0.0);
-    for which in FLANKS[0]..UNKNOWNS {
-        normal.hold(which, FIXED, 0.0);
+    normal.add_prior(1, FIXED_WEIGHT, 0.0);
+    for which in FIRST_FLANK_UNKNOWN[0]..UNKNOWNS {
+        normal.add_prior(which, FIXED_WEIGHT, 0.0);
     }
     Some((all - normal.solve()?.variance(0)).max(0.0))
 }
 
 /// The samples that the edge is located from.
-fn spared(look: &Look) -> Extent {
-    let of = |flank: &Option<Flank>, room: f64| {
+fn samples_of_edge(look: &StepFit) -> Extent {
+    let of = |flank: &Option<NeighbourStep>, room: f64| {
         flank.as_ref().map_or(room, |flank| {
-            ((flank.at - look.step.at).abs() - SPARED_BLURS * flank.blur).max(look.step.blur)
+            ((flank.at - look.step.at).abs() - FLANK_MARGIN_BLURS * flank.blur).max(look.step.blur)
         })
     };
-    let Flanks([before, after]) = &look.flanks;
+    let NeighbourSteps([before, after]) = &look.flanks;
     Extent { before: of(before, look.room.before), after: of(after, look.room.after) }
 }
 
 /// What a fit leaves, in shares of its own step.
-fn used(square: f64, look: &Look) -> f64 {
+fn relative_misfit(square: f64, look: &StepFit) -> f64 {
     square.sqrt() / (look.step.after - look.step.before).abs()
 }
 
 /// Whether the edge is still the one that was looked at, and the flanks lie
 /// beside it.
-fn is_sound(look: &Look, start: &Look) -> bool {
+fn is_sound(look: &StepFit, start: &StepFit) -> bool {
     let step = look.step;
-    let beside = |(flank, sign): (&Option<Flank>, f64)| {
+    let beside = |(flank, sign): (&Option<NeighbourStep>, f64)| {
         flank.is_none_or(|flank| {
             sign * (flank.at - step.at) > 1.5 * step.blur
                 && flank.blur < 3.0 * step.blur

@@ -3,14 +3,14 @@
 //! share · (1 − share). A blurred step that is fitted to it lies aside of the edge.
 
 use super::Overlay;
-use super::look::{Look, SHADING_SD};
+use super::look::{SHADING_SIGMA, StepFit};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::normal_equations::Normal;
-use crate::numeric::number::float;
+use crate::numeric::normal_equations::NormalEquations;
+use crate::numeric::number::to_f64;
 
 /// Unknowns of a blurred step with its shading, and the bump.
 const UNKNOWNS: usize = 7;
-const BUMP: usize = 6;
+const BUMP_UNKNOWN: usize = 6;
 
 /// How far an edge lies from where a blurred step without a bump puts it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,32 +24,33 @@ pub struct EdgeSkew {
 impl Overlay {
     /// The skew of the flank of an edge that was looked at. `None` where steps beside it
     /// reach into its pixels, or it cannot be told.
-    pub fn skew(&self, table: &StepTable, look: &Look) -> Option<EdgeSkew> {
+    pub fn skew(&self, table: &StepTable, look: &StepFit) -> Option<EdgeSkew> {
         if look.flanks.any() {
             return None;
         }
         let edge = look.step;
         let (from, to) = look.fitted();
-        let mut normal = Normal::<UNKNOWNS>::default();
+        let mut normal = NormalEquations::<UNKNOWNS>::default();
         for mean in self.means() {
             for (at, value) in mean.samples(from, to) {
                 let (of_step, level) = look.linear_at(table, at);
                 let mut row = [0.0; UNKNOWNS];
-                row[..BUMP].copy_from_slice(&of_step);
+                row[..BUMP_UNKNOWN].copy_from_slice(&of_step);
                 let (share, _) = table.at((at - edge.at) / edge.blur);
-                row[BUMP] = share * (1.0 - share) * (edge.after - edge.before);
+                row[BUMP_UNKNOWN] = share * (1.0 - share) * (edge.after - edge.before);
                 normal.add(row, value - level, mean.weight);
             }
         }
         for (side, shading) in look.shading.iter().enumerate() {
-            normal.hold(4 + side, (look.pixel_noise / SHADING_SD).powi(2), -shading);
+            normal.add_prior(4 + side, (look.pixel_noise / SHADING_SIGMA).powi(2), -shading);
         }
         let solved = normal.solve()?;
         let covariance = solved.covariance();
-        let (bump, of_bump) = (solved.unknowns[BUMP], covariance[(BUMP, BUMP)]);
-        let per_bump = covariance[(0, BUMP)] / of_bump;
+        let (bump, of_bump) =
+            (solved.unknowns[BUMP_UNKNOWN], covariance[(BUMP_UNKNOWN, BUMP_UNKNOWN)]);
+        let per_bump = covariance[(0, BUMP_UNKNOWN)] / of_bump;
         // What the bump explains is no noise.
-        let others = (look.samples() - float(UNKNOWNS)).max(1.0);
+        let others = (look.samples() - to_f64(UNKNOWNS)).max(1.0);
         let explained = bump * bump / (of_bump * others);
         let noise = (look.residual.powi(2) - explained).max(look.pixel_noise.powi(2));
         let variance = noise * of_bump * per_bump * per_bump;

@@ -1,13 +1,13 @@
 //! Whether a narrow groove may lie beside an edge.
 
-use super::{Overlay, PHASES, REACH};
+use super::{HALF_SPAN, Overlay, PHASES};
 
 /// Places beside the edge within which a narrow groove lies \[px\].
-const GROOVE_PX: usize = 9;
+const MAX_GROOVE_PX: usize = 9;
 /// By how much what lies beyond a groove is nearer to the bead's level at least: a fraction
 /// of the step, and standard deviations of noise.
-const RISE: f64 = 0.015;
-const RISE_SIGMAS: f64 = 5.0;
+const MIN_RISE: f64 = 0.015;
+const MIN_RISE_SIGMAS: f64 = 5.0;
 
 impl Overlay {
     /// Whether the level beside the edge, after it or before it, comes nearer to that on its
@@ -19,8 +19,8 @@ impl Overlay {
             return false;
         }
         let (mut lowest, mut rise) = (f64::INFINITY, 0.0_f64);
-        for away in 1..=GROOVE_PX {
-            let at = if after { REACH + away } else { REACH - away };
+        for away in 1..=MAX_GROOVE_PX {
+            let at = if after { HALF_SPAN + away } else { HALF_SPAN - away };
             let sum: f64 = (0..PHASES)
                 .map(|phase| f64::from(self.counts[phase]) * f64::from(self.mean[phase][at]))
                 .sum();
@@ -28,6 +28,6 @@ impl Overlay {
             lowest = lowest.min(level);
             rise = rise.max(level - lowest);
         }
-        rise > RISE + RISE_SIGMAS * noise / rows.sqrt()
+        rise > MIN_RISE + MIN_RISE_SIGMAS * noise / rows.sqrt()
     }
 }

@@ -3,32 +3,32 @@
 
 use nalgebra::SVector;
 
-use super::look::Look;
+use super::look::StepFit;
 use super::{Overlay, PHASES};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::normal_equations::Normal;
-use crate::numeric::number::float;
+use crate::numeric::normal_equations::NormalEquations;
+use crate::numeric::number::to_f64;
 
 /// Place and blur of the step, its two levels, and the shading before and after it.
 const UNKNOWNS: usize = 6;
 /// Unknowns that each phase has of its own: place and levels. Rows were laid down by a path
 /// and levels with a noise of their own, and which phase a row is in comes from the path.
-const OF_PHASE: [usize; 3] = [0, 2, 3];
+const PHASE_UNKNOWNS: [usize; 3] = [0, 2, 3];
 
 /// The equations about a step.
-pub struct Linear {
-    phases: [Normal<UNKNOWNS>; PHASES],
+pub struct LinearisedStep {
+    phases: [NormalEquations<UNKNOWNS>; PHASES],
     /// Sum of the squared misses, of samples of weight 1.
-    square: f64,
+    sum_of_squares: f64,
     /// Number of samples, and of the phases that have some.
     samples: f64,
     used: f64,
 }
 
-impl Linear {
+impl LinearisedStep {
     /// Those of all phases together.
     #[inline(always)]
-    pub fn normal(&self) -> Normal<UNKNOWNS> {
+    pub fn normal(&self) -> NormalEquations<UNKNOWNS> {
         let [first, second] = &self.phases;
         first.plus(second)
     }
@@ -36,19 +36,20 @@ impl Linear {
     /// Mean square of what is left, for a sample of weight 1.
     #[inline(always)]
     pub fn mean_square(&self) -> f64 {
-        self.square / (self.samples - float(UNKNOWNS)).max(1.0)
+        self.sum_of_squares / (self.samples - to_f64(UNKNOWNS)).max(1.0)
     }
 
     /// The same after a step of the fit, where each phase has a place and levels of its own.
     #[inline(always)]
     pub fn within_phases_after(&self, step: &SVector<f64, UNKNOWNS>) -> f64 {
-        let lowered: f64 = self.phases.iter().map(|phase| phase.lowered_by(step)).sum();
-        let mut left = self.square - lowered;
-        let mut freedom = self.samples - float(UNKNOWNS);
+        let lowered: f64 = self.phases.iter().map(|phase| phase.decrease_after(step)).sum();
+        let mut left = self.sum_of_squares - lowered;
+        let mut freedom = self.samples - to_f64(UNKNOWNS);
         if self.used > 1.0 {
-            let of_phases = self.phases.iter().map(|phase| phase.after(step).part(OF_PHASE));
-            left -= of_phases.map(|phase| phase.lowers()).sum::<f64>();
-            freedom -= float(OF_PHASE.len());
+            let of_phases =
+                self.phases.iter().map(|phase| phase.after(step).of_unknowns(PHASE_UNKNOWNS));
+            left -= of_phases.map(|phase| phase.max_decrease()).sum::<f64>();
+            freedom -= to_f64(PHASE_UNKNOWNS.len());
         }
         left.max(0.0) / freedom.max(1.0)
     }
@@ -57,15 +58,15 @@ impl Linear {
 impl Overlay {
     /// The equations about the step of a look, without flanks.
     #[inline(always)]
-    pub(super) fn linearise(&self, table: &StepTable, look: &Look) -> Linear {
+    pub(super) fn linearise(&self, table: &StepTable, look: &StepFit) -> LinearisedStep {
         let (from, to) = look.fitted();
-        let phases = std::array::from_fn(|_| Normal::default());
-        let mut linear = Linear { phases, square: 0.0, samples: 0.0, used: 0.0 };
+        let phases = std::array::from_fn(|_| NormalEquations::default());
+        let mut linear = LinearisedStep { phases, sum_of_squares: 0.0, samples: 0.0, used: 0.0 };
         for (normal, mean) in linear.phases.iter_mut().zip(self.means()) {
             for (at, value) in mean.samples(from, to) {
                 let (row, level) = look.linear_at(table, at);
                 let miss = value - level;
-                linear.square += mean.weight * miss * miss;
+                linear.sum_of_squares += mean.weight * miss * miss;
                 linear.samples += 1.0;
                 normal.add(row, miss, mean.weight);
             }

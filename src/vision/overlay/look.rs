@@ -1,26 +1,26 @@
 //! What a first look at an edge tells: the step, how sure its blur is, what it leaves, and how far
 //! there is nothing else.
 
-use super::REACH;
-use super::step::{Extent, Flank, Flanks, Step};
+use super::HALF_SPAN;
+use super::step::{BlurredStep, Extent, NeighbourStep, NeighbourSteps};
 use crate::numeric::blurred_step::StepTable;
 use crate::vision::blur_estimate::BlurEstimate;
 
 /// How far from the edge samples are fitted, in blurs and pixels beside.
 const FIT_BLURS: f64 = 4.5;
-const FIT_BESIDE_PX: f64 = 2.0;
+const FIT_MARGIN_PX: f64 = 2.0;
 /// Misfit from which on the edge alone leaves more than noise does.
-const STRANGE: f64 = 1.3;
+const MIN_NOTABLE_MISFIT: f64 = 1.3;
 /// Shading that is usual close to an edge, as a standard deviation \[1/px\].
-pub const SHADING_SD: f64 = 0.02;
+pub const SHADING_SIGMA: f64 = 0.02;
 /// Steps of a fit at most.
-pub const MAX_STEPS: usize = 16;
+pub const MAX_ITERATIONS: usize = 16;
 
 /// A first look at an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
+pub struct StepFit {
     /// The step.
-    pub step: Step,
+    pub step: BlurredStep,
     /// Standard deviation of its blur \[px\].
     pub blur_sd: f64,
     /// Change of the level before and after it \[1/px away from it\].
@@ -37,24 +37,24 @@ pub struct Look {
     /// How far there is nothing but this edge.
     pub room: Extent,
     /// Steps beside it that reach into its pixels.
-    pub(super) flanks: Flanks,
+    pub(super) flanks: NeighbourSteps,
     /// What they and the blur add to the variance of its place \[px²\]; 0 where
     /// there are none.
-    pub(super) doubt: f64,
+    pub(super) added_variance: f64,
 }
 
 /// Distances from an edge between which nothing else lies \[px\].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Distances {
+pub struct SideRange {
     /// Beyond the flank.
     pub near: usize,
     /// The end.
     pub far: usize,
 }
 
-impl Look {
+impl StepFit {
     /// Samples beside the edge on either side.
-    pub fn beside(&self) -> [Distances; 2] {
+    pub fn beside(&self) -> [SideRange; 2] {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -62,10 +62,10 @@ impl Look {
         )]
         let whole = |distance: f64| distance.max(0.0) as usize;
         let near = 3.0 * self.step.blur + 1.0;
-        let to = |room: f64| whole(room).min(REACH);
+        let to = |room: f64| whole(room).min(HALF_SPAN);
         [
-            Distances { near: whole((near - self.step.at).ceil()), far: to(self.room.before) },
-            Distances { near: whole((near + self.step.at).ceil()), far: to(self.room.after) },
+            SideRange { near: whole((near - self.step.at).ceil()), far: to(self.room.before) },
+            SideRange { near: whole((near + self.step.at).ceil()), far: to(self.room.after) },
         ]
     }
 
@@ -87,8 +87,8 @@ impl Look {
     }
 
     /// Whether the step leaves more than noise does.
-    pub fn is_strange(&self) -> bool {
-        self.misfit() >= STRANGE
+    pub fn is_not_step(&self) -> bool {
+        self.misfit() >= MIN_NOTABLE_MISFIT
     }
 
     /// The misfit of one place and levels for all phases.
@@ -98,7 +98,7 @@ impl Look {
 
     /// Number of samples about the edge that the misfit is the mean of.
     pub fn samples(&self) -> f64 {
-        let reach = FIT_BLURS * self.step.blur + FIT_BESIDE_PX;
+        let reach = FIT_BLURS * self.step.blur + FIT_MARGIN_PX;
         let Extent { before, after } = self.room;
         self.phases * (reach.min(before) + reach.min(after))
     }
@@ -106,9 +106,9 @@ impl Look {
     /// Ends of the samples about the edge that are fitted \[px from the path\].
     #[inline(always)]
     pub(super) fn fitted(&self) -> (f64, f64) {
-        let reach = FIT_BLURS * self.step.blur + FIT_BESIDE_PX;
-        let from = (self.step.at - reach.min(self.room.before)).max(-place_limit());
-        let to = (self.step.at + reach.min(self.room.after)).min(place_limit());
+        let reach = FIT_BLURS * self.step.blur + FIT_MARGIN_PX;
+        let from = (self.step.at - reach.min(self.room.before)).max(-max_sample_px());
+        let to = (self.step.at + reach.min(self.room.after)).min(max_sample_px());
         (from, to)
     }
 
@@ -132,18 +132,18 @@ impl Look {
 
     /// The same look up to half-way to the steps beside the edge.
     pub(super) fn without_flanks(&self) -> Self {
-        let half = |flank: &Option<Flank>, room: f64| {
+        let half = |flank: &Option<NeighbourStep>, room: f64| {
             flank.as_ref().map_or(room, |flank| 0.5 * (flank.at - self.step.at).abs())
         };
-        let Flanks([before, after]) = &self.flanks;
+        let NeighbourSteps([before, after]) = &self.flanks;
         let room =
             Extent { before: half(before, self.room.before), after: half(after, self.room.after) };
-        Self { room, flanks: Flanks::default(), doubt: 0.0, ..*self }
+        Self { room, flanks: NeighbourSteps::default(), added_variance: 0.0, ..*self }
     }
 
     /// The same look where texture makes samples less sure than noise does:
     /// `noise` is what independent ones as unsure would have.
-    pub fn in_texture(self, noise: f64) -> Self {
+    pub fn with_texture(self, noise: f64) -> Self {
         let blur_sd = self.blur_sd * (noise / self.noise).max(1.0);
         Self {
             blur_sd,
@@ -157,6 +157,6 @@ impl Look {
 
 /// Farthest place of a sample from the path \[px\].
 #[expect(clippy::cast_precision_loss, reason = "the window is short")]
-pub fn place_limit() -> f64 {
-    REACH as f64 - 1.0
+pub fn max_sample_px() -> f64 {
+    HALF_SPAN as f64 - 1.0
 }

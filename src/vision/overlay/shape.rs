@@ -1,23 +1,23 @@
 //! The shape of an edge, from a look at it: how far its surroundings on either side are plain,
 //! and how they are shaded.
 
-use super::look::Look;
-use super::step::{Extent, FlankedStep, Flanks, LEAST_BLUR_PX, Step};
-use super::{Overlay, ROUNDING};
+use super::look::StepFit;
+use super::step::{BlurredStep, Extent, MIN_BLUR_PX, NeighbourSteps, StepWithNeighbours};
+use super::{Overlay, ROUNDING_VARIANCE_PX2};
 use crate::numeric::blurred_step::StepTable;
 use crate::vision::blur_estimate::BlurEstimate;
-use crate::vision::line::Line;
+use crate::vision::line::LineSums;
 
 /// How the level beside an edge changes away from it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Shading {
+pub struct SideShading {
     /// Change at the edge \[1/px\].
     pub slope: f64,
     /// Half the change of that \[1/px²\].
     pub bend: f64,
 }
 
-impl Shading {
+impl SideShading {
     /// The same in shares of a step of which the given one is a share.
     pub fn of(self, share: f64) -> Self {
         Self { slope: self.slope / share, bend: self.bend / share }
@@ -26,33 +26,33 @@ impl Shading {
 
 /// One side of an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Beside {
+pub(super) struct SideShape {
     /// How far there is nothing else \[px\].
     pub extent: f64,
     /// How its level changes, in shares of the step that was given.
-    pub shading: Shading,
+    pub shading: SideShading,
     /// Variance that the doubt about it leaves to the level at the edge.
-    pub doubt: f64,
+    pub level_variance: f64,
 }
 
 /// An edge as the overlay shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shape {
+pub struct StepShape {
     /// The step.
-    pub step: Step,
+    pub step: BlurredStep,
     /// How far the surroundings are plain, and what is used of them.
     pub extent: Extent,
     /// How the level changes away from the edge, before it and after it, in
     /// shares of the step.
-    pub shading: [Shading; 2],
+    pub shading: [SideShading; 2],
     /// Steps beside the edge that reach into its pixels, in shares of its own.
-    pub flanks: Flanks,
+    pub flanks: NeighbourSteps,
     /// Variance of the edge's position that doubt about the shading and about
     /// flanks leaves \[px²\].
     pub variance: f64,
 }
 
-impl Shape {
+impl StepShape {
     /// Whether there is more beside the edge than even slopes.
     pub fn is_bent(&self) -> bool {
         self.flanks.any() || self.shading.iter().any(|shading| shading.bend != 0.0)
@@ -64,75 +64,80 @@ impl Overlay {
     /// after it or before it, their slope in shares of the step that was given
     /// \[1/px away from it\], and the variance that its doubt leaves to the
     /// level at the edge.
-    pub fn beside(
+    pub fn side_slope(
         &self,
         table: &StepTable,
-        look: &Look,
-        step: &Step,
+        look: &StepFit,
+        step: &BlurredStep,
         after: bool,
     ) -> (f64, (f64, f64)) {
         let (sign, room) = if after { (1.0, look.room.after) } else { (-1.0, look.room.before) };
-        let (extent, line) = self.plain(
+        let (extent, line) = self.plain_extent(
             table,
-            FlankedStep { step, flanks: &look.flanks },
+            StepWithNeighbours { step, flanks: &look.flanks },
             look.pixel_noise,
             sign,
             room,
         );
-        (extent, line.sure_slope(look.pixel_noise))
+        (extent, line.shrunk_slope(look.pixel_noise))
     }
 
     /// Reads the edge's shape from a look at it and what is known of its blur.
     #[inline(always)]
-    pub fn shape(&self, table: &StepTable, look: &Look, blur: BlurEstimate) -> Option<Shape> {
+    pub fn shape(
+        &self,
+        table: &StepTable,
+        look: &StepFit,
+        blur: BlurEstimate,
+    ) -> Option<StepShape> {
         let look = self.fit_known(table, look, blur)?;
-        let Look { step, noise, room, flanks, doubt, .. } = look;
-        let sharp = step.blur * step.blur - ROUNDING;
-        let step = Step { blur: sharp.max(LEAST_BLUR_PX.powi(2)).sqrt(), ..step };
-        let edge = FlankedStep { step: &step, flanks: &flanks };
+        let StepFit { step, noise, room, flanks, added_variance, .. } = look;
+        let sharp = step.blur * step.blur - ROUNDING_VARIANCE_PX2;
+        let step = BlurredStep { blur: sharp.max(MIN_BLUR_PX.powi(2)).sqrt(), ..step };
+        let edge = StepWithNeighbours { step: &step, flanks: &flanks };
         let pixel_noise = look.pixel_noise;
-        let before = self.one_side(table, edge, noise, pixel_noise, -1.0, room.before);
-        let after = self.one_side(table, edge, noise, pixel_noise, 1.0, room.after);
+        let before = self.side_shape(table, edge, noise, pixel_noise, -1.0, room.before);
+        let after = self.side_shape(table, edge, noise, pixel_noise, 1.0, room.after);
         // A level that is off by a share moves the edge by √π blurs times it.
         let per_level = std::f64::consts::PI * step.blur * step.blur;
-        Some(Shape {
+        Some(StepShape {
             step,
             extent: Extent { before: before.extent, after: after.extent },
             shading: [before.shading, after.shading],
             flanks,
-            variance: per_level * (before.doubt + after.doubt) + doubt,
+            variance: per_level * (before.level_variance + after.level_variance) + added_variance,
         })
     }
 
     /// One side of the edge: along a straight line, or along a parabola where
     /// that ends early. `noise` is that of a row's samples and that of a pixel.
     #[inline(always)]
-    fn one_side(
+    fn side_shape(
         &self,
         table: &StepTable,
-        edge: FlankedStep<'_>,
+        edge: StepWithNeighbours<'_>,
         noise: f64,
         pixel_noise: f64,
         sign: f64,
         room: f64,
-    ) -> Beside {
-        let (extent, line) = self.plain(table, edge, noise, sign, room);
+    ) -> SideShape {
+        let (extent, line) = self.plain_extent(table, edge, noise, sign, room);
         if extent + 2.0 <= room
-            && let Some(curved) = self.curved(table, edge, noise, sign, room)
+            && let Some(curved) = self.parabolic_side(table, edge, noise, sign, room)
         {
             return curved;
         }
-        let (slope, doubt) = line.sure_slope(pixel_noise);
-        Beside { extent, shading: Shading { slope, bend: 0.0 }, doubt }
+        let (slope, variance) = line.shrunk_slope(pixel_noise);
+        SideShape { extent, shading: SideShading { slope, bend: 0.0 }, level_variance: variance }
     }
 
     /// Samples of two pixels beside the edge, from a distance on: how far each
     /// lies away from it, what it is beyond the level there, and its weight.
     #[inline(always)]
-    pub(super) fn beside_step(
+    pub(super) fn each_beside(
         &self,
         table: &StepTable,
-        FlankedStep { step, flanks }: FlankedStep<'_>,
+        StepWithNeighbours { step, flanks }: StepWithNeighbours<'_>,
         sign: f64,
         from: f64,
         mut add: impl FnMut(f64, f64, f64),
@@ -152,21 +157,21 @@ impl Overlay {
     /// How far from the edge a side is plain, that is a straight line within
     /// what noise explains, and that line.
     #[inline(always)]
-    fn plain(
+    fn plain_extent(
         &self,
         table: &StepTable,
-        edge: FlankedStep<'_>,
+        edge: StepWithNeighbours<'_>,
         noise: f64,
         sign: f64,
         room: f64,
-    ) -> (f64, Line) {
+    ) -> (f64, LineSums) {
         let height = edge.step.after - edge.step.before;
         let first = 3.0 * edge.step.blur;
-        let mut line = Line::default();
+        let mut line = LineSums::default();
         let mut end = first.min(room);
         while end + 2.0 <= room {
-            let mut block = Line::default();
-            self.beside_step(table, edge, sign, end, |away, off, weight| {
+            let mut block = LineSums::default();
+            self.each_beside(table, edge, sign, end, |away, off, weight| {
                 block.add(away, off, weight);
             });
             if block.weight <= 0.0 {
@@ -174,9 +179,9 @@ impl Overlay {
             }
             let (expected, variance) = line.at(block.middle());
             let off = block.mean() - expected;
-            let doubt = noise * noise * (variance + 1.0 / block.weight);
+            let variance = noise * noise * (variance + 1.0 / block.weight);
             // The first few pixels show the slope.
-            if line.shows_slope() && off.abs() > 4.0 * doubt.sqrt() + 0.006 * height {
+            if line.shows_slope() && off.abs() > 4.0 * variance.sqrt() + 0.006 * height {
                 break;
             }
             line.join(&block);

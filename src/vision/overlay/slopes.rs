@@ -1,11 +1,11 @@
 //! How steeply the overlay runs, place by place: where the edge is steepest,
 //! and whether another step lies beside it.
 
-use super::step::{Extent, Flank, Step};
-use super::{Overlay, PHASES, REACH, SPAN};
+use super::step::{BlurredStep, Extent, NeighbourStep};
+use super::{HALF_SPAN, Overlay, PHASES, SPAN};
 
 /// Distance from the path within which the edge lies \[px\].
-const NEAR_PX: f64 = 8.0;
+const MAX_EDGE_OFFSET_PX: f64 = 8.0;
 
 /// What shows a step beside the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,9 +17,9 @@ pub struct SlopeLimits {
 }
 
 /// Mean slopes over two pixels \[1/px\], each phase's share of the mean of both.
-pub struct Slopes([[f32; SPAN]; PHASES]);
+pub struct ProfileSlopes([[f32; SPAN]; PHASES]);
 
-impl Slopes {
+impl ProfileSlopes {
     /// Those of an overlay.
     #[inline(always)]
     pub fn of(overlay: &Overlay) -> Self {
@@ -38,7 +38,7 @@ impl Slopes {
     /// About a distance in half pixels.
     #[inline(always)]
     fn at(&self, half: i16) -> f32 {
-        let middle = i16::try_from(REACH).unwrap_or(0);
+        let middle = i16::try_from(HALF_SPAN).unwrap_or(0);
         let mut sum = 0.0;
         for (phase, slopes) in (0i16..).zip(&self.0) {
             // The nearest sample, of two as near the one farther out.
@@ -52,7 +52,10 @@ impl Slopes {
     /// Steepest slope of the overlay near the path \[1/px\], and where.
     #[inline(always)]
     pub fn steepest(&self, room: Extent) -> Option<(f64, f64)> {
-        let (from, to) = (halves(-room.before.min(NEAR_PX)), halves(room.after.min(NEAR_PX)));
+        let (from, to) = (
+            halves(-room.before.min(MAX_EDGE_OFFSET_PX)),
+            halves(room.after.min(MAX_EDGE_OFFSET_PX)),
+        );
         let mut best = (0.0, 0);
         for half in from..=to {
             let slope = self.at(half);
@@ -68,11 +71,11 @@ impl Slopes {
     #[inline(always)]
     pub fn up_to_neighbour(
         &self,
-        start: Step,
+        start: BlurredStep,
         limits: SlopeLimits,
         sign: i16,
         room: f64,
-    ) -> (f64, Option<Flank>) {
+    ) -> (f64, Option<NeighbourStep>) {
         let notable = (5.0 * limits.noise).max(limits.notable / start.blur.max(1.0)) as f32;
         let first = (0.5 * start.blur).clamp(0.5, 3.0);
         let mut lowest = (f32::INFINITY, room);
@@ -92,7 +95,13 @@ impl Slopes {
 
     /// The step whose slope rises from a place on, in half pixels.
     #[cold]
-    fn flank(&self, blur: f64, from: i16, sign: i16, steps: std::ops::Range<i16>) -> Option<Flank> {
+    fn flank(
+        &self,
+        blur: f64,
+        from: i16,
+        sign: i16,
+        steps: std::ops::Range<i16>,
+    ) -> Option<NeighbourStep> {
         let mut best = (0.0f32, 0, 0.0f32);
         for step in steps {
             let half = from + sign * step;
@@ -106,7 +115,7 @@ impl Slopes {
         }
         let (_, half, slope) = best;
         let height = f64::from(sign) * f64::from(slope) * blur * std::f64::consts::TAU.sqrt();
-        (half != 0).then_some(Flank { at: f64::from(half) / 2.0, height, blur })
+        (half != 0).then_some(NeighbourStep { at: f64::from(half) / 2.0, height, blur })
     }
 }
 

@@ -3,9 +3,9 @@
 use crate::numeric::blurred_step::StepTable;
 
 /// Smallest blur of a step \[px\].
-pub const LEAST_BLUR_PX: f64 = 0.3;
+pub const MIN_BLUR_PX: f64 = 0.3;
 /// Farthest that a flank is fitted, in blurs: from there on its tail is nothing.
-const NEAR_BLURS: f64 = 7.0;
+const MAX_NEIGHBOUR_BLURS: f64 = 7.0;
 
 /// Samples that are free of anything but this edge, on either side \[px\].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,7 +18,7 @@ pub struct Extent {
 
 /// A blurred step, its levels in shares of the step that was given.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
+pub struct BlurredStep {
     /// How far it lies from the path \[px\].
     pub at: f64,
     /// Blur as the standard deviation of a Gaussian \[px\], integration over
@@ -32,7 +32,7 @@ pub struct Step {
 
 /// A step beside the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Flank {
+pub struct NeighbourStep {
     /// Its place, beside the path \[px\].
     pub at: f64,
     /// What it adds to the level beyond it, in shares of the edge's step.
@@ -41,7 +41,7 @@ pub struct Flank {
     pub blur: f64,
 }
 
-impl Flank {
+impl NeighbourStep {
     /// What it adds to the level at a place, and the derivatives of that by
     /// place, height and blur. `sign` is −1 for one before the edge, 1 for one
     /// after it.
@@ -56,9 +56,9 @@ impl Flank {
 
 /// The steps beside an edge: before it and after it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Flanks(pub [Option<Flank>; 2]);
+pub struct NeighbourSteps(pub [Option<NeighbourStep>; 2]);
 
-impl Flanks {
+impl NeighbourSteps {
     /// Whether there are any.
     pub fn any(&self) -> bool {
         self.0.iter().any(Option::is_some)
@@ -67,7 +67,7 @@ impl Flanks {
     /// What they add to the level at a place beside the path, in shares of the
     /// step.
     pub fn at(&self, table: &StepTable, at: f64) -> f64 {
-        let one = |(flank, sign): (&Option<Flank>, f64)| {
+        let one = |(flank, sign): (&Option<NeighbourStep>, f64)| {
             flank.as_ref().map_or(0.0, |flank| flank.reaches(table, at, sign).0)
         };
         self.0.iter().zip([-1.0, 1.0]).map(one).sum()
@@ -76,23 +76,27 @@ impl Flanks {
     /// The same flanks about an edge that lies at a place beside the path and
     /// has another step, of which the given one is a share.
     pub fn about(&self, at: f64, share: f64) -> Self {
-        let moved =
-            |flank: Flank| Flank { at: flank.at - at, height: flank.height / share, ..flank };
+        let moved = |flank: NeighbourStep| NeighbourStep {
+            at: flank.at - at,
+            height: flank.height / share,
+            ..flank
+        };
         Self(self.0.map(|flank| flank.map(moved)))
     }
 
     /// Only those near enough to an edge to reach into its pixels.
-    pub fn near(&self, step: &Step) -> Self {
-        let near = |flank: &Flank| (flank.at - step.at).abs() < NEAR_BLURS * step.blur;
+    pub fn near(&self, step: &BlurredStep) -> Self {
+        let near =
+            |flank: &NeighbourStep| (flank.at - step.at).abs() < MAX_NEIGHBOUR_BLURS * step.blur;
         Self(self.0.map(|flank| flank.filter(near)))
     }
 }
 
 /// A step and the steps beside it.
 #[derive(Debug, Clone, Copy)]
-pub struct FlankedStep<'a> {
+pub struct StepWithNeighbours<'a> {
     /// The step.
-    pub step: &'a Step,
+    pub step: &'a BlurredStep,
     /// Those beside it.
-    pub flanks: &'a Flanks,
+    pub flanks: &'a NeighbourSteps,
 }

@@ -1,67 +1,67 @@
 //! The fit of a blurred step to an overlay: a first look, and others from it on.
 
 use super::Overlay;
-use super::look::{Look, MAX_STEPS, SHADING_SD};
-use super::slopes::{SlopeLimits, Slopes};
-use super::step::{Extent, Flanks, LEAST_BLUR_PX, Step};
+use super::look::{MAX_ITERATIONS, SHADING_SIGMA, StepFit};
+use super::slopes::{ProfileSlopes, SlopeLimits};
+use super::step::{BlurredStep, Extent, MIN_BLUR_PX, NeighbourSteps};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 use crate::vision::blur_estimate::BlurEstimate;
 
 /// Largest blur of a step \[px\].
-const MOST_BLUR_PX: f64 = 15.0;
+const MAX_BLUR_PX: f64 = 15.0;
 /// A step \[px, or blurs\] after which another would change next to nothing: each
 /// squares what is left.
-const CONVERGED: f64 = 8e-3;
+const CONVERGED_STEP: f64 = 8e-3;
 /// Slope that shows another step beside the edge, times the blur: a twelfth of what the
 /// edge itself has. The fraction of it that is enough where the edge alone leaves more than
 /// noise does and such a step explains it, as beside a rib of a tenth of the contrast.
-const NOTABLE: f64 = 0.032;
-const WEAK_SHARE: f64 = 0.5;
+const MIN_NEIGHBOUR_SLOPE: f64 = 0.032;
+const WEAK_SLOPE_RATIO: f64 = 0.5;
 
 impl Overlay {
     /// Looks at the edge. `noise` is the standard deviation of a pixel as a
     /// share of the step, `room` how far to look. `None` where no step can be
     /// fitted.
     #[inline(always)]
-    pub fn look(&self, table: &StepTable, noise: f64, room: Extent) -> Option<Look> {
-        let slopes = Slopes::of(self);
+    pub fn first_fit(&self, table: &StepTable, noise: f64, room: Extent) -> Option<StepFit> {
+        let slopes = ProfileSlopes::of(self);
         let (slope, at) = slopes.steepest(room)?;
-        let blur = (0.2 / slope).clamp(0.5, MOST_BLUR_PX);
-        let step = Step { at, blur, before: 0.0, after: 1.0 };
+        let blur = (0.2 / slope).clamp(0.5, MAX_BLUR_PX);
+        let step = BlurredStep { at, blur, before: 0.0, after: 1.0 };
         let whole_room = room;
-        let (room, flanks) = self.up_to_neighbours(&slopes, step, noise, NOTABLE, room);
-        let look = Look {
+        let (room, flanks) = self.up_to_neighbours(&slopes, step, noise, MIN_NEIGHBOUR_SLOPE, room);
+        let look = StepFit {
             step,
             blur_sd: f64::INFINITY,
             shading: [0.0; 2],
             pixel_noise: noise,
             noise,
             residual: noise,
-            phases: float(self.means().count()),
+            phases: to_f64(self.means().count()),
             room,
-            flanks: Flanks::default(),
-            doubt: 0.0,
+            flanks: NeighbourSteps::default(),
+            added_variance: 0.0,
         };
         let look = self.fit(table, look, None)?;
         let flanks = flanks.near(&look.step);
         if flanks.any() {
-            let start = Look { flanks, ..look };
+            let start = StepFit { flanks, ..look };
             return Some(self.fit_flanks(table, &start, None).unwrap_or(look));
         }
-        if !look.is_strange() {
+        if !look.is_not_step() {
             return Some(look);
         }
         // A weaker step beside it, if that explains what is left.
-        let weaker = WEAK_SHARE * NOTABLE;
+        let weaker = WEAK_SLOPE_RATIO * MIN_NEIGHBOUR_SLOPE;
         let (_, flanks) = self.up_to_neighbours(&slopes, step, noise, weaker, whole_room);
-        let start = Look { flanks: flanks.near(&look.step), ..look };
+        let start = StepFit { flanks: flanks.near(&look.step), ..look };
         let found = start.flanks.any().then(|| self.fit_flanks(table, &start, None)).flatten();
-        Some(found.filter(|found| !found.is_strange()).unwrap_or(look))
+        Some(found.filter(|found| !found.is_not_step()).unwrap_or(look))
     }
 
     /// Fits the edge of a look with another shape of the blur.
-    pub fn fit_again(&self, table: &StepTable, look: &Look) -> Option<Look> {
+    pub fn refit(&self, table: &StepTable, look: &StepFit) -> Option<StepFit> {
         self.fit_from(table, look, None)
     }
 
@@ -70,9 +70,9 @@ impl Overlay {
     pub(super) fn fit_known(
         &self,
         table: &StepTable,
-        look: &Look,
+        look: &StepFit,
         blur: BlurEstimate,
-    ) -> Option<Look> {
+    ) -> Option<StepFit> {
         let fitted = self.fit_from(table, look, Some(blur));
         if fitted.is_some() || !look.flanks.any() {
             return fitted;
@@ -85,9 +85,9 @@ impl Overlay {
     fn fit_from(
         &self,
         table: &StepTable,
-        look: &Look,
+        look: &StepFit,
         known: Option<BlurEstimate>,
-    ) -> Option<Look> {
+    ) -> Option<StepFit> {
         if look.flanks.any() {
             return self.fit_flanks(table, look, known);
         }
@@ -100,49 +100,54 @@ impl Overlay {
     #[inline(always)]
     fn up_to_neighbours(
         &self,
-        slopes: &Slopes,
-        start: Step,
+        slopes: &ProfileSlopes,
+        start: BlurredStep,
         noise: f64,
         notable: f64,
         room: Extent,
-    ) -> (Extent, Flanks) {
+    ) -> (Extent, NeighbourSteps) {
         let limits = SlopeLimits { noise: noise / (2.0 * self.used().max(1.0)).sqrt(), notable };
         let (before, flank_before) = slopes.up_to_neighbour(start, limits, -1, room.before);
         let (after, flank_after) = slopes.up_to_neighbour(start, limits, 1, room.after);
-        (Extent { before, after }, Flanks([flank_before, flank_after]))
+        (Extent { before, after }, NeighbourSteps([flank_before, flank_after]))
     }
 
     /// Fits place, blur, levels and a little shading about the edge.
     #[inline(always)]
-    fn fit(&self, table: &StepTable, start: Look, known: Option<BlurEstimate>) -> Option<Look> {
+    fn fit(
+        &self,
+        table: &StepTable,
+        start: StepFit,
+        known: Option<BlurEstimate>,
+    ) -> Option<StepFit> {
         let mut look = start;
         let mut last = None;
         let hold = |sd: f64| (start.noise / sd).powi(2);
         // Shading is held near none, because over a short way it could pass
         // for a shift of the edge.
-        let of_shading = (start.pixel_noise / SHADING_SD).powi(2);
-        for _ in 0..MAX_STEPS {
+        let of_shading = (start.pixel_noise / SHADING_SIGMA).powi(2);
+        for _ in 0..MAX_ITERATIONS {
             let step = look.step;
             let linear = self.linearise(table, &look);
             let mut normal = linear.normal();
-            normal.hold(4, of_shading, -look.shading[0]);
-            normal.hold(5, of_shading, -look.shading[1]);
+            normal.add_prior(4, of_shading, -look.shading[0]);
+            normal.add_prior(5, of_shading, -look.shading[1]);
             if let Some(BlurEstimate { px, sd_px }) = known {
-                normal.hold(1, hold(sd_px), px - step.blur);
+                normal.add_prior(1, hold(sd_px), px - step.blur);
             }
             let solved = normal.solve()?;
             let moved = solved.unknowns;
-            look.step = Step {
+            look.step = BlurredStep {
                 at: step.at + moved[0].clamp(-step.blur, step.blur),
                 blur: (step.blur + moved[1].clamp(-0.5 * step.blur, 0.5 * step.blur))
-                    .clamp(LEAST_BLUR_PX, MOST_BLUR_PX),
+                    .clamp(MIN_BLUR_PX, MAX_BLUR_PX),
                 before: step.before + moved[2],
                 after: step.after + moved[3],
             };
             look.shading[0] += moved[4];
             look.shading[1] += moved[5];
             last = Some((linear, solved));
-            if moved[0].abs() < CONVERGED && moved[1].abs() < CONVERGED * step.blur {
+            if moved[0].abs() < CONVERGED_STEP && moved[1].abs() < CONVERGED_STEP * step.blur {
                 break;
             }
         }

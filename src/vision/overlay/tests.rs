@@ -5,9 +5,9 @@ use crate::core::time::Stamp;
 use crate::numeric::blurred_step::StepTable;
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::edge_windows::Grouping;
-use crate::vision::gauge::Axis;
+use crate::vision::gauge::BeadAxis;
 use crate::vision::row_range::RowRange;
-use crate::vision::strip::{Strips, Turner, View};
+use crate::vision::strip::{GaugeRowsOfDepth, GaugeView, RowLayout};
 
 const ROWS: usize = 100;
 const COLUMNS: usize = 160;
@@ -33,10 +33,10 @@ fn overlay(beside: impl Fn(f64) -> f64) -> Overlay {
     let values = (0..ROWS).flat_map(|_| (0..columns).map(shown)).collect();
     let frame =
         Frame::new(0, Stamp::START, Size::new(COLUMNS, ROWS), Pixels::Grey16(values)).unwrap();
-    let view = View::new(Roi { x: 0, y: 0, width: COLUMNS, height: ROWS }, Axis::Vertical);
-    let mut turner = Turner::default();
-    let Strips::Words(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
-    let mut sheet = Sheet::default();
+    let view = GaugeView::new(Roi { x: 0, y: 0, width: COLUMNS, height: ROWS }, BeadAxis::Vertical);
+    let mut turner = RowLayout::default();
+    let GaugeRowsOfDepth::Words(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
+    let mut sheet = EdgeWindows::default();
     sheet.read(&strip, &LINES, Grouping { steepest: 0.0, max_rows: 1 }, |_| EXPECTED);
     let mut overlay = Overlay::default();
     overlay.lay(&sheet);
@@ -44,10 +44,10 @@ fn overlay(beside: impl Fn(f64) -> f64) -> Overlay {
 }
 
 /// The shape of the edge with its blur known to four percent.
-fn shape(overlay: &Overlay) -> Shape {
+fn shape(overlay: &Overlay) -> StepShape {
     let table = StepTable::default();
     let room = Extent { before: 45.0, after: 45.0 };
-    let look = overlay.look(&table, NOISE, room).unwrap();
+    let look = overlay.first_fit(&table, NOISE, room).unwrap();
     overlay
         .shape(&table, &look, BlurEstimate { px: look.step.blur, sd_px: 0.04 * BLUR_PX })
         .unwrap()

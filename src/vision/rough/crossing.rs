@@ -1,26 +1,26 @@
 //! Where a row passes from what lies outside to the bead.
 
-use super::window::Row;
-use crate::numeric::number::single;
-use crate::numeric::number::whole;
-use crate::vision::edge_windows::SPAN;
+use super::window::WindowRow;
+use crate::numeric::number::round_to_count;
+use crate::numeric::number::to_f32;
+use crate::vision::edge_windows::WINDOW_PX;
 
 /// How far inside the edge's course a row is summed \[px\]: beyond a usual flank.
-pub const INSIDE_PX: f32 = 5.0;
+pub const SUMMED_INSIDE_PX: f32 = 5.0;
 /// How far inside its course an edge may be torn \[px\].
-const DEEPEST_PX: f32 = 25.0;
+const MAX_TEAR_PX: f32 = 25.0;
 /// Bead in a pixel, as a fraction, beyond which it is a spark or a shadow and counts
 /// for no more. Wide, so that noise is cut off on neither side.
-const FRACTIONS: (f32, f32) = (-1.0, 2.0);
+const FRACTION_RANGE: (f32, f32) = (-1.0, 2.0);
 /// Fractions beyond which a pixel shows something else than the two.
-const ODD: (f32, f32) = (-0.2, 1.2);
+const NORMAL_FRACTIONS: (f32, f32) = (-0.2, 1.2);
 /// How much farther inside a grain on the edge may reach \[px\].
 const GRAIN_PX: usize = 8;
 /// Fraction of the bead that a pixel inside the edge must show.
-const BEAD: f32 = 0.5;
+const MIN_BEAD_FRACTION: f32 = 0.5;
 /// The length of a Gaussian flank from a fifth to four fifths of its height,
 /// 1.683 s, over the sum of f·(1 − f) along it, s/√π.
-const FLANK: f32 = 2.983;
+const FLANK_LENGTH_FACTOR: f32 = 2.983;
 
 /// Where a row passes the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,7 +33,7 @@ pub struct Crossing {
 
 /// What a row shows besides.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shown {
+pub struct RowFeatures {
     /// Length of the flank \[px\], from a fifth to four fifths of its height.
     pub flank: f32,
     /// Share of the pixels about the edge that are clearly darker than what lies outside
@@ -45,7 +45,7 @@ pub struct Shown {
 
 /// Levels about a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Flank {
+pub struct RowLevels {
     /// Where what lies outside ends at the latest \[px\].
     pub start: f32,
     /// Level outside \[grey levels\].
@@ -63,41 +63,46 @@ pub struct Flank {
 /// torn open as much is missing as there is of it. `None` where no bead is within
 /// reach of the course.
 #[inline(always)]
-pub fn of(row: &Row, flank: &Flank) -> Option<Crossing> {
-    let first = whole(flank.start).clamp(1, SPAN - 2);
+pub fn find(row: &WindowRow, flank: &RowLevels) -> Option<Crossing> {
+    let first = round_to_count(flank.start).clamp(1, WINDOW_PX - 2);
     let scale = 1.0 / (flank.inside - flank.outside);
     let bead = |k: usize| (row[k] - flank.outside) * scale;
-    let mut last = whole(flank.course + INSIDE_PX).clamp(first, SPAN - 1);
-    let end = whole(flank.course + DEEPEST_PX).min(SPAN - 1);
-    while bead(last) < BEAD {
+    let mut last = round_to_count(flank.course + SUMMED_INSIDE_PX).clamp(first, WINDOW_PX - 1);
+    let end = round_to_count(flank.course + MAX_TEAR_PX).min(WINDOW_PX - 1);
+    while bead(last) < MIN_BEAD_FRACTION {
         last += 1;
         if last > end {
             return None;
         }
     }
-    let share = |pixel: f32| ((pixel - flank.outside) * scale).clamp(FRACTIONS.0, FRACTIONS.1);
-    let at = single(last) + 0.5 - sum_of(&row[first..=last], share);
+    let share =
+        |pixel: f32| ((pixel - flank.outside) * scale).clamp(FRACTION_RANGE.0, FRACTION_RANGE.1);
+    let at = to_f32(last) + 0.5 - sum_of(&row[first..=last], share);
     Some(Crossing { at, summed: (first, last) })
 }
 
 /// What else a row shows whose crossing was found with the same levels.
 #[inline(always)]
-pub fn shown(row: &Row, flank: &Flank, Crossing { summed: (first, last), .. }: Crossing) -> Shown {
+pub fn features(
+    row: &WindowRow,
+    flank: &RowLevels,
+    Crossing { summed: (first, last), .. }: Crossing,
+) -> RowFeatures {
     let scale = 1.0 / (flank.inside - flank.outside);
     let fraction = |pixel: f32| (pixel - flank.outside) * scale;
     let mixed = |pixel: f32| {
-        let shown = fraction(pixel).clamp(0.0, 1.0);
-        shown * (1.0 - shown)
+        let covered = fraction(pixel).clamp(0.0, 1.0);
+        covered * (1.0 - covered)
     };
     let is_odd = |pixel: f32| {
         let fraction = fraction(pixel);
-        if fraction < ODD.0 || fraction > ODD.1 { 1.0 } else { 0.0 }
+        if fraction < NORMAL_FRACTIONS.0 || fraction > NORMAL_FRACTIONS.1 { 1.0 } else { 0.0 }
     };
-    let odd_share = |pixels: &[f32]| sum_of(pixels, is_odd) / single(pixels.len().max(1));
-    let end = whole(flank.course + flank.within_px).min(SPAN);
+    let odd_share = |pixels: &[f32]| sum_of(pixels, is_odd) / to_f32(pixels.len().max(1));
+    let end = round_to_count(flank.course + flank.within_px).min(WINDOW_PX);
     let about = &row[first..=last];
-    Shown {
-        flank: FLANK * sum_of(about, mixed),
+    RowFeatures {
+        flank: FLANK_LENGTH_FACTOR * sum_of(about, mixed),
         odd: odd_share(about),
         odd_within: odd_share(&row[(last + GRAIN_PX).min(end)..end]),
     }
@@ -105,17 +110,17 @@ pub fn shown(row: &Row, flank: &Flank, Crossing { summed: (first, last), .. }: C
 
 /// Sum of what is made of each pixel, in as many sums as fit the processor's vectors.
 #[inline(always)]
-fn sum_of(pixels: &[f32], of: impl Fn(f32) -> f32) -> f32 {
+fn sum_of(pixels: &[f32], term: impl Fn(f32) -> f32) -> f32 {
     let mut sums = [0.0; 8];
     let chunks = pixels.chunks_exact(sums.len());
     let rest = chunks.remainder();
     for chunk in chunks {
         for (sum, pixel) in sums.iter_mut().zip(chunk) {
-            *sum += of(*pixel);
+            *sum += term(*pixel);
         }
     }
     for (sum, pixel) in sums.iter_mut().zip(rest) {
-        *sum += of(*pixel);
+        *sum += term(*pixel);
     }
     sums.iter().sum()
 }
@@ -124,17 +129,17 @@ fn sum_of(pixels: &[f32], of: impl Fn(f32) -> f32) -> f32 {
 mod tests {
     use super::*;
 
-    fn row(of: impl Fn(f32) -> f32) -> Row {
-        std::array::from_fn(|k| of(single(k)))
+    fn row(level: impl Fn(f32) -> f32) -> WindowRow {
+        std::array::from_fn(|k| level(to_f32(k)))
     }
 
-    const FLANK: Flank =
-        Flank { start: 40.0, outside: 20.0, inside: 120.0, course: 58.0, within_px: 30.0 };
+    const FLANK: RowLevels =
+        RowLevels { start: 40.0, outside: 20.0, inside: 120.0, course: 58.0, within_px: 30.0 };
 
     #[test]
     fn a_ramp_is_passed_in_its_middle() {
         let ramp = row(|u| (20.0 + 10.0 * (u - 50.3)).clamp(20.0, 120.0));
-        let found = of(&ramp, &FLANK).unwrap();
+        let found = find(&ramp, &FLANK).unwrap();
         assert!((found.at - 55.3).abs() < 1e-3, "{found:?}");
     }
 
@@ -143,27 +148,27 @@ mod tests {
         let sigma = 2.0;
         let height = |u: f32| 0.5 * (1.0 + libm::erff((u - 53.2) / (sigma * 2.0f32.sqrt())));
         let row = row(|u| 20.0 + 100.0 * height(u));
-        let found = of(&row, &FLANK).unwrap();
+        let found = find(&row, &FLANK).unwrap();
         assert!((found.at - 53.2).abs() < 0.01, "{found:?}");
-        let shown = shown(&row, &FLANK, found);
-        assert!((shown.flank - 1.683 * sigma).abs() < 0.02, "{shown:?}");
+        let found = features(&row, &FLANK, found);
+        assert!((found.flank - 1.683 * sigma).abs() < 0.02, "{found:?}");
     }
 
     #[test]
     fn an_edge_that_is_torn_deep_lies_at_the_end_of_the_tear() {
         let torn = row(|u| if u < 70.0 { 20.0 } else { 120.0 });
-        let found = of(&torn, &FLANK).unwrap();
+        let found = find(&torn, &FLANK).unwrap();
         assert!((found.at - 69.5).abs() < 1e-3, "{found:?}");
     }
 
     #[test]
     fn a_spark_at_the_edge_is_odd_and_texture_all_over_the_bead_is_not() {
         let step = |u: f32| if u < 58.0 { 20.0 } else { 120.0 };
-        let texture = |u: f32| if whole(u).is_multiple_of(3) { 40.0 } else { 0.0 };
-        let odd = |of: &dyn Fn(f32) -> f32| {
-            let row = row(of);
-            let shown = shown(&row, &FLANK, super::of(&row, &FLANK).unwrap());
-            shown.odd - shown.odd_within
+        let texture = |u: f32| if round_to_count(u).is_multiple_of(3) { 40.0 } else { 0.0 };
+        let odd = |level: &dyn Fn(f32) -> f32| {
+            let row = row(level);
+            let found = features(&row, &FLANK, find(&row, &FLANK).unwrap());
+            found.odd - found.odd_within
         };
         assert!(odd(&step).abs() < 1e-6);
         assert!(odd(&|u| if (50.0..54.0).contains(&u) { -60.0 } else { step(u) }) > 0.1);
@@ -172,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_row_that_stays_dark_shows_no_edge() {
-        assert_eq!(of(&row(|_| 20.0), &FLANK), None);
-        assert_eq!(of(&row(|u| if u < 85.0 { 20.0 } else { 120.0 }), &FLANK), None);
+        assert_eq!(find(&row(|_| 20.0), &FLANK), None);
+        assert_eq!(find(&row(|u| if u < 85.0 { 20.0 } else { 120.0 }), &FLANK), None);
     }
 }

@@ -2,18 +2,18 @@
 //! A groove that is not much wider than the blur does not show how dark it is; what is
 //! known of other grooves then says how wide it is.
 
-use super::levels::{LENGTH, MeanProfile, OUTSIDE};
+use super::levels::{MeanProfile, OUTSIDE_PX, PROFILE_PX};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::normal_equations::{Normal, Solved};
-use crate::numeric::number::float;
+use crate::numeric::normal_equations::{NormalEquations, NormalSolution};
+use crate::numeric::number::to_f64;
 use crate::vision::gauge::EdgeKind;
 use crate::vision::vectors;
 use nalgebra::SVector;
 
 /// Grey of a groove as a fraction of the bead's, and its standard deviation: grooves of
 /// real concrete that are wide enough to show it have 1 to 74 beside beads of 131.
-const GREY: f64 = 0.13;
-const GREY_SIGMA: f64 = 0.12;
+const GROOVE_GREY: f64 = 0.13;
+const GROOVE_GREY_SIGMA: f64 = 0.12;
 /// The same of the bead beside the edge about its level farther inside: light.
 pub(super) const BEAD_SIGMA: f64 = 0.03;
 /// Places beyond the groove, and within the bead, that are fitted \[px\].
@@ -21,33 +21,33 @@ const BEYOND_PX: usize = 9;
 const WITHIN_PX: usize = 7;
 /// Standard deviation of a mean profile about the model, as a fraction of the bead's
 /// level, beside noise and texture: a lens's blur is no Gaussian, a camera not linear.
-const MISFIT: f64 = 0.004;
+const MODEL_MISFIT_SIGMA: f64 = 0.004;
 /// Rounds of the fit, and the change of position of the groove's
 /// width at which it ends \[px\].
-const ROUNDS: usize = 40;
+const MAX_ITERATIONS: usize = 40;
 const CONVERGED_PX: f64 = 3e-3;
 const CONVERGED_WIDTH_PX: f64 = 0.03;
 /// Largest change of position, width and blur in a round \[px\].
-const STEP_PX: f64 = 0.7;
+const MAX_STEP_PX: f64 = 0.7;
 /// Largest mean square of the residuals of a groove that is a blurred box.
 const MAX_MISFIT: f64 = 30.0;
 /// Width of a narrow groove, from which the fit starts \[px\].
-const NARROW_PX: f64 = 2.0;
+const START_WIDTH_PX: f64 = 2.0;
 /// Least standard deviation and largest value of the variance of the far side about the
 /// near one \[px²\].
-const APART_PX2: f64 = 0.02;
-const MAX_APART_PX2: f64 = 30.0;
+const FAR_SIDE_SIGMA_PX2: f64 = 0.02;
+const MAX_FAR_SIDE_PX2: f64 = 30.0;
 /// Ranges of width and blur \[px\].
-const WIDTH_PX: (f64, f64) = (0.5, 30.0);
-const BLUR_PX: (f64, f64) = (0.6, 6.0);
+const WIDTH_RANGE_PX: (f64, f64) = (0.5, 30.0);
+const BLUR_RANGE_PX: (f64, f64) = (0.6, 6.0);
 /// Weight that holds an unknown.
-const HELD: f64 = 1e9;
+const FIXED_WEIGHT: f64 = 1e9;
 /// Places at the far end of ground that may be those of a groove's far side \[px\].
 const FAR_END_PX: usize = 4;
 /// By how much the sum of squares must fall until a dark line beside an edge on ground is
 /// as likely as none. A wider one than that is ground.
 const DIP_COST: f64 = 6.0;
-const WIDEST_DIP_PX: f64 = 9.0;
+const MAX_DIP_PX: f64 = 9.0;
 /// Unknowns of the fit.
 const UNKNOWNS: usize = 8;
 /// Standard deviation of the slope of what lies beyond, from place to place, as a fraction
@@ -56,22 +56,22 @@ const BEYOND_SLOPE: f64 = 0.01;
 
 /// Shape of an edge in the mean over its rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EdgeShape {
+pub struct GrooveShape {
     /// Where the bead begins, in the mean profile \[px\].
     pub at: f64,
     /// Its variance \[px²\].
     pub variance: f64,
     /// How likely it is that a groove lies beside it that does not show how dark it is.
-    pub groove_share: f64,
+    pub groove_probability: f64,
     /// Blur of the bead's edge.
-    pub blur: Blur,
+    pub blur: MeanBlur,
     /// How much the bead's level beside the edge differs from that farther inside, in
     /// standard deviations of what light does.
     pub level_off: f64,
-    model: Model,
+    model: GrooveModel,
 }
 
-impl EdgeShape {
+impl GrooveShape {
     /// Width of the groove beside the edge \[px\].
     pub fn width(&self) -> f64 {
         self.model.width
@@ -79,13 +79,13 @@ impl EdgeShape {
 
     /// Likeliest value of one shape or another one, the latter so likely, and the
     /// variance of both (Bayesian model averaging).
-    fn or(&self, other: &Self, share: f64) -> Self {
+    fn average_with(&self, other: &Self, share: f64) -> Self {
         let apart = other.at - self.at;
         let mean = |one: f64, other: f64| one + share * (other - one);
         Self {
             at: mean(self.at, other.at),
             variance: mean(self.variance, other.variance) + share * (1.0 - share) * apart * apart,
-            groove_share: mean(self.groove_share, other.groove_share),
+            groove_probability: mean(self.groove_probability, other.groove_probability),
             blur: if share > 0.5 { other.blur } else { self.blur },
             level_off: mean(self.level_off, other.level_off),
             model: if share > 0.5 { other.model } else { self.model },
@@ -95,7 +95,7 @@ impl EdgeShape {
 
 /// Blur of an edge in the mean over its rows, lens and what is too fine to be followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Blur {
+pub struct MeanBlur {
     /// Standard deviation of the Gaussian \[px\].
     pub px: f64,
     /// Its variance \[px²\].
@@ -104,24 +104,24 @@ pub struct Blur {
 
 /// What is known before the fit.
 #[derive(Debug, Clone, Copy)]
-pub struct Known<'a> {
+pub struct GroovePrior<'a> {
     /// A blurred step.
     pub table: &'a StepTable,
     /// Variance of the mean profile for each pixel across \[grey levels²\].
     pub variance: f64,
     /// Blur of the bead's edge.
-    pub blur: Blur,
+    pub blur: MeanBlur,
     /// What the edge looks like.
     pub edge: EdgeKind,
     /// Variance of the edge's profile along the bead \[px²\].
     pub roughness: f64,
     /// What was found in the same profile with another blur.
-    pub before: Option<EdgeShape>,
+    pub before: Option<GrooveShape>,
 }
 
 /// A dark line between two levels, blurred.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Model {
+struct GrooveModel {
     /// Where the bead begins \[px\].
     at: f64,
     width: f64,
@@ -137,10 +137,10 @@ struct Model {
     slope: f64,
 }
 
-impl Model {
+impl GrooveModel {
     /// Whether it is a narrow line that is darker than what lies beyond.
     fn is_dip(&self) -> bool {
-        self.width > WIDTH_PX.0 && self.width < WIDEST_DIP_PX && self.grey < self.beyond
+        self.width > WIDTH_RANGE_PX.0 && self.width < MAX_DIP_PX && self.grey < self.beyond
     }
 
     /// The unknowns in the order of the derivatives.
@@ -150,15 +150,15 @@ impl Model {
 
     /// The model after a step, within the ranges of its unknowns.
     fn after(&self, step: &SVector<f64, UNKNOWNS>, bead: f64) -> Self {
-        let limited = |k: usize| step[k].clamp(-STEP_PX, STEP_PX);
+        let limited = |k: usize| step[k].clamp(-MAX_STEP_PX, MAX_STEP_PX);
         Self {
             at: self.at + limited(0),
-            width: (self.width + limited(1)).clamp(WIDTH_PX.0, WIDTH_PX.1),
-            blur: (self.blur + limited(2)).clamp(BLUR_PX.0, BLUR_PX.1),
+            width: (self.width + limited(1)).clamp(WIDTH_RANGE_PX.0, WIDTH_RANGE_PX.1),
+            blur: (self.blur + limited(2)).clamp(BLUR_RANGE_PX.0, BLUR_RANGE_PX.1),
             beyond: self.beyond + step[3],
             grey: (self.grey + step[4]).clamp(0.0, bead),
             bead: self.bead + step[5],
-            apart: (self.apart + step[6]).clamp(0.0, MAX_APART_PX2),
+            apart: (self.apart + step[6]).clamp(0.0, MAX_FAR_SIDE_PX2),
             slope: self.slope + step[7],
         }
     }
@@ -168,20 +168,20 @@ impl Model {
     #[inline(always)]
     fn value(&self, place: f64, table: &StepTable) -> (f64, [f64; UNKNOWNS]) {
         let far_blur = (self.blur * self.blur + self.apart).sqrt();
-        let near = Edge::of(place - self.at, self.blur, table);
-        let far = Edge::of(place - self.at + self.width, far_blur, table);
+        let near = StepValue::of(place - self.at, self.blur, table);
+        let far = StepValue::of(place - self.at + self.width, far_blur, table);
         let (up, down) = (self.bead - self.grey, self.beyond - self.grey);
-        let (outside, away) = (1.0 - near.share, self.at - place);
+        let (outside, away) = (1.0 - near.fraction, self.at - place);
         let shade = self.slope * away;
-        let value = self.beyond - down * far.share + up * near.share + shade * outside;
+        let value = self.beyond - down * far.fraction + up * near.fraction + shade * outside;
         let of_near = up - shade;
         let row = [
             down * far.slope - of_near * near.slope + self.slope * outside,
             -down * far.slope,
             -down * far.by_blur * self.blur / far_blur + of_near * near.by_blur,
-            1.0 - far.share,
-            far.share - near.share,
-            near.share,
+            1.0 - far.fraction,
+            far.fraction - near.fraction,
+            near.fraction,
             -down * far.by_blur * 0.5 / far_blur,
             away * outside,
         ];
@@ -190,47 +190,47 @@ impl Model {
 }
 
 /// A blurred step from 0 to 1.
-struct Edge {
-    share: f64,
+struct StepValue {
+    fraction: f64,
     slope: f64,
     by_blur: f64,
 }
 
-impl Edge {
+impl StepValue {
     #[inline(always)]
     fn of(off: f64, blur: f64, table: &StepTable) -> Self {
         let u = off / blur;
         let (share, density) = table.at(u);
         let slope = density / blur;
-        Self { share, slope, by_blur: -u * slope }
+        Self { fraction: share, slope, by_blur: -u * slope }
     }
 }
 
 /// What is fitted, and how what is known weighs in.
 #[derive(Clone, Copy)]
-struct Problem<'a> {
+struct GrooveProblem<'a> {
     table: &'a StepTable,
     mean: &'a MeanProfile,
     /// First place and the one after the last.
     places: (usize, usize),
     weight: f64,
     /// What is known of the unknowns, and their standard deviations.
-    prior: Model,
+    prior: GrooveModel,
     sigmas: [f64; UNKNOWNS],
 }
 
 /// A fit that has ended.
-struct Fitted {
-    model: Model,
+struct GrooveFit {
+    model: GrooveModel,
     /// Sum of the squared residuals, and the same with those of what is known.
     squares: f64,
     cost: f64,
-    solved: Solved<UNKNOWNS>,
+    solved: NormalSolution<UNKNOWNS>,
 }
 
 /// Fits a dark line to the mean profile across an edge, or a step where the ground beside
 /// it shows none. `None` where the bead is not brighter than black, or neither fits.
-pub fn fit(mean: &MeanProfile, known: &Known<'_>) -> Option<EdgeShape> {
+pub fn fit(mean: &MeanProfile, known: &GroovePrior<'_>) -> Option<GrooveShape> {
     let bead = mean.bead();
     if bead <= 0.0 {
         return None;
@@ -239,48 +239,56 @@ pub fn fit(mean: &MeanProfile, known: &Known<'_>) -> Option<EdgeShape> {
     let trimmed = if mean.outside.0 > 0 { mean.outside.0 + FAR_END_PX } else { 0 };
     let beyond = mean.outside.0.saturating_sub(BEYOND_PX);
     let first = if mean.on_ground { trimmed.min(mean.darkest()) } else { beyond };
-    let last = (OUTSIDE + WITHIN_PX).min(LENGTH);
-    let narrow = Model {
-        at: float(OUTSIDE),
-        width: NARROW_PX,
+    let last = (OUTSIDE_PX + WITHIN_PX).min(PROFILE_PX);
+    let narrow = GrooveModel {
+        at: to_f64(OUTSIDE_PX),
+        width: START_WIDTH_PX,
         blur: known.blur.px,
         beyond: brightest(mean, first),
-        grey: GREY * bead,
+        grey: GROOVE_GREY * bead,
         bead,
         apart: 0.0,
         slope: 0.0,
     };
     let sigmas = [
         f64::INFINITY,
-        WIDTH_PX.1,
+        WIDTH_RANGE_PX.1,
         known.blur.variance.sqrt(),
         bead,
-        GREY_SIGMA * bead,
+        GROOVE_GREY_SIGMA * bead,
         BEAD_SIGMA * bead,
-        known.roughness + APART_PX2,
-        if mean.on_ground { BEYOND_SLOPE * bead } else { BEYOND_SLOPE * APART_PX2 },
+        known.roughness + FAR_SIDE_SIGMA_PX2,
+        if mean.on_ground { BEYOND_SLOPE * bead } else { BEYOND_SLOPE * FAR_SIDE_SIGMA_PX2 },
     ];
-    let weight = 1.0 / (known.variance + (MISFIT * bead).powi(2));
+    let weight = 1.0 / (known.variance + (MODEL_MISFIT_SIGMA * bead).powi(2));
     let (table, places) = (known.table, (first, last));
-    let groove = Problem { table, mean, places, weight, prior: narrow, sigmas };
+    let groove = GrooveProblem { table, mean, places, weight, prior: narrow, sigmas };
     if mean.on_ground {
-        let step = Model { width: WIDTH_PX.1, grey: narrow.beyond, ..narrow };
-        let sigmas =
-            [sigmas[0], APART_PX2, sigmas[2], sigmas[3], bead, sigmas[5], APART_PX2, sigmas[7]];
-        let problem = Problem { prior: step, sigmas, ..groove };
+        let step = GrooveModel { width: WIDTH_RANGE_PX.1, grey: narrow.beyond, ..narrow };
+        let sigmas = [
+            sigmas[0],
+            FAR_SIDE_SIGMA_PX2,
+            sigmas[2],
+            sigmas[3],
+            bead,
+            sigmas[5],
+            FAR_SIDE_SIGMA_PX2,
+            sigmas[7],
+        ];
+        let problem = GrooveProblem { prior: step, sigmas, ..groove };
         let step = problem.descend(problem.solve(&step)?)?;
-        let before = known.before.map(|shape| shape.model).filter(Model::is_dip);
+        let before = known.before.map(|shape| shape.model).filter(GrooveModel::is_dip);
         let dip = groove.descend_from([Some(narrow), before]);
         let dip = dip.filter(|dip| dip.model.is_dip());
-        let step_shape = groove.judge(&step, 0.0);
+        let step_shape = groove.shape_of(&step, 0.0);
         let Some(dip) = dip else { return step_shape };
         let share = match known.edge {
             EdgeKind::Auto => 1.0 / (1.0 + libm::exp(0.5 * (DIP_COST + dip.cost - step.cost))),
             EdgeKind::Step => 0.0,
             EdgeKind::Groove => 1.0,
         };
-        return match (step_shape, groove.judge(&dip, 1.0)) {
-            (Some(step), Some(dip)) => Some(step.or(&dip, share)),
+        return match (step_shape, groove.shape_of(&dip, 1.0)) {
+            (Some(step), Some(dip)) => Some(step.average_with(&dip, share)),
             (step, dip) => dip.or(step),
         };
     }
@@ -291,14 +299,17 @@ pub fn fit(mean: &MeanProfile, known: &Known<'_>) -> Option<EdgeShape> {
         Some(shape) => [Some(shape.model), None],
         None => [Some(narrow), Some(wide(mean, narrow, last))],
     };
-    groove.judge(&groove.descend_from(starts)?, 1.0)
+    groove.shape_of(&groove.descend_from(starts)?, 1.0)
 }
 
 /// The same groove as wide as the grey that is missing up to a place.
-fn wide(mean: &MeanProfile, narrow: Model, last: usize) -> Model {
-    let Model { bead, grey, .. } = narrow;
+fn wide(mean: &MeanProfile, narrow: GrooveModel, last: usize) -> GrooveModel {
+    let GrooveModel { bead, grey, .. } = narrow;
     let missing: f64 = (mean.darkest()..last).map(|k| bead - f64::from(mean.grey[k])).sum();
-    Model { width: (2.0 * missing / (bead - grey)).clamp(NARROW_PX, 0.5 * WIDTH_PX.1), ..narrow }
+    GrooveModel {
+        width: (2.0 * missing / (bead - grey)).clamp(START_WIDTH_PX, 0.5 * WIDTH_RANGE_PX.1),
+        ..narrow
+    }
 }
 
 /// Brightest level from a place on up to the darkest one \[grey levels\].
@@ -307,16 +318,16 @@ fn brightest(mean: &MeanProfile, from: usize) -> f64 {
     f64::from(places.iter().fold(f32::NEG_INFINITY, |most, &grey| most.max(grey)))
 }
 
-impl Problem<'_> {
+impl GrooveProblem<'_> {
     /// The normal equations at a model.
-    fn solve(&self, model: &Model) -> Option<Fitted> {
-        let mut normal = Normal::<UNKNOWNS>::default();
+    fn solve(&self, model: &GrooveModel) -> Option<GrooveFit> {
+        let mut normal = NormalEquations::<UNKNOWNS>::default();
         let (mut squares, mut held) = (0.0, 0.0);
         vectors::widest(
             #[inline(always)]
             || {
                 for k in self.places.0..self.places.1 {
-                    let (value, row) = model.value(float(k), self.table);
+                    let (value, row) = model.value(to_f64(k), self.table);
                     let miss = f64::from(self.mean.grey[k]) - value;
                     squares += self.weight * miss * miss;
                     normal.add(row, miss, self.weight);
@@ -326,32 +337,32 @@ impl Problem<'_> {
         let (values, priors) = (model.unknowns(), self.prior.unknowns());
         for (which, sigma) in self.sigmas.iter().enumerate() {
             let miss = priors[which] - values[which];
-            normal.hold(which, sigma.powi(-2), miss);
+            normal.add_prior(which, sigma.powi(-2), miss);
             held += (miss / sigma).powi(2);
         }
         // What is at the end of its range stays there.
         let ends = [(4, model.grey <= 0.0), (6, model.apart <= 0.0)];
         for (which, _) in ends.into_iter().filter(|(_, is_at_end)| *is_at_end) {
             if normal.vector[which] < 0.0 {
-                normal.hold(which, HELD, 0.0);
+                normal.add_prior(which, FIXED_WEIGHT, 0.0);
             }
         }
         let solved = normal.solve()?;
-        Some(Fitted { model: *model, squares, cost: squares + held, solved })
+        Some(GrooveFit { model: *model, squares, cost: squares + held, solved })
     }
 
     /// The least squares from the start on that fits best.
-    fn descend_from(&self, starts: [Option<Model>; 2]) -> Option<Fitted> {
+    fn descend_from(&self, starts: [Option<GrooveModel>; 2]) -> Option<GrooveFit> {
         let solved = starts.into_iter().flatten().filter_map(|start| self.solve(&start));
         self.descend(solved.min_by(|one, other| one.cost.total_cmp(&other.cost))?)
     }
 
     /// The least squares from a start on: Gauss–Newton, with steps that are halved until
     /// they descend.
-    fn descend(&self, start: Fitted) -> Option<Fitted> {
+    fn descend(&self, start: GrooveFit) -> Option<GrooveFit> {
         let mut best = start;
         let mut share = 1.0;
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ITERATIONS {
             let step = share * best.solved.unknowns;
             if step[0].abs() < CONVERGED_PX && step[1].abs() < CONVERGED_WIDTH_PX {
                 break;
@@ -368,16 +379,23 @@ impl Problem<'_> {
     }
 
     /// What a fit says, if it fits.
-    fn judge(&self, fitted: &Fitted, groove_share: f64) -> Option<EdgeShape> {
+    fn shape_of(&self, fitted: &GrooveFit, groove_share: f64) -> Option<GrooveShape> {
         let (model, solved) = (&fitted.model, &fitted.solved);
-        let freedom = float((self.places.1 - self.places.0).saturating_sub(UNKNOWNS).max(1));
+        let freedom = to_f64((self.places.1 - self.places.0).saturating_sub(UNKNOWNS).max(1));
         let misfit = fitted.squares / freedom;
         let inflation = misfit.max(1.0);
-        let blur = Blur { px: model.blur, variance: solved.variance(2) * inflation };
+        let blur = MeanBlur { px: model.blur, variance: solved.variance(2) * inflation };
         let variance = solved.variance(0) * inflation;
         let level_off = (model.bead - self.prior.bead).abs() / self.sigmas[5];
         let model = *model;
-        let shape = EdgeShape { at: model.at, variance, groove_share, blur, level_off, model };
+        let shape = GrooveShape {
+            at: model.at,
+            variance,
+            groove_probability: groove_share,
+            blur,
+            level_off,
+            model,
+        };
         (misfit < MAX_MISFIT).then_some(shape)
     }
 }

@@ -1,55 +1,55 @@
 //! Grey levels on either side of an edge, along its course, and where each row
 //! passes from one to the other.
 
-use super::crossing::{self, Crossing, Flank};
+use super::crossing::{self, Crossing, RowLevels};
 use super::kernel;
-use super::rough_input::Scene;
-use super::window::{BLOCK_ROWS, STRAIGHT_ROWS, Windows};
-use crate::numeric::number::whole;
-use crate::numeric::number::{float, single};
+use super::rough_input::RoughInput;
+use super::window::{BLOCK_ROWS, RowWindows, STRAIGHT_ROWS};
+use crate::numeric::number::round_to_count;
+use crate::numeric::number::{to_f32, to_f64};
 use crate::numeric::rank;
-use crate::vision::edge_windows::SPAN;
+use crate::vision::edge_windows::WINDOW_PX;
 use crate::vision::gauge::EdgeKind;
 
 /// Pixels outside that are searched for what the bead stands against: a groove's
 /// darkest place or the ground.
-pub const OUTSIDE: usize = 20;
+pub const OUTSIDE_PX: usize = 20;
 /// First and last pixel inside whose mean is the bead's level: beyond the flank,
 /// and near enough to have the light of the edge.
-const INSIDE: (f32, f32) = (6.0, 30.0);
+const INSIDE_PX: (f32, f32) = (6.0, 30.0);
 /// Fraction of the width within which these lie.
 const INSIDE_FRACTION: (f32, f32) = (0.14, 0.42);
 /// Pixels of a course's profile.
-pub const LENGTH: usize = OUTSIDE + 30;
+pub const PROFILE_PX: usize = OUTSIDE_PX + 30;
 /// How much darker than the bead a hole in it is at least: in median deviations of the
 /// bead's places, four standard deviations of a Gaussian, and as a fraction of the contrast.
-const HOLE_SPREADS: f32 = 6.0;
-const HOLE: f32 = 0.2;
+const MIN_HOLE_DEVIATIONS: f32 = 6.0;
+const MIN_HOLE_DEPTH: f32 = 0.2;
 /// Rows over which the bead's level is averaged, as the standard deviation of a
 /// Gaussian: more than texture is long, less than the light changes within.
 const INSIDE_ROWS: f64 = 48.0;
 /// The same for what lies outside: a groove changes more quickly.
 const OUTSIDE_ROWS: f64 = 6.0;
 /// Fraction of the step within which a place outside is as dark as the darkest.
-const SAME: f32 = 0.1;
+const SAME_LEVEL_FRACTION: f32 = 0.1;
 /// As many such places in a row are ground; fewer are a groove.
-const GROUND_PX: usize = 8;
+const MIN_GROUND_PX: usize = 8;
 /// Blocks whose mean is one look at how much darker a groove is than what lies beyond
 /// it, and how many standard errors darker it must be where it is shallow and where it
 /// is deep: a pattern of the ground has some ten places, one of which is three darker by
 /// chance.
-const LOOK_BLOCKS: usize = 4;
+const SAMPLE_BLOCKS: usize = 4;
 const DARKER_SIGMAS: (f32, f32) = (4.0, 2.5);
 /// Difference that makes it deep, as a fraction of the step to the bead.
-const DEEP: f32 = 0.4;
+const MIN_DEEP_FRACTION: f32 = 0.4;
 /// Distance from the darkest place from which on what lies beyond is told \[px\].
-const BEYOND_PX: usize = 6;
+const BEYOND_GROOVE_PX: usize = 6;
 /// Ground beside the edge whose mean is its level, where it has a pattern \[px\].
-const NEAR_PX: usize = 16;
+const NEAR_GROUND_PX: usize = 16;
 /// Places of the ground that the flank may reach into.
 const FLANK_FOOT_PX: usize = 3;
 /// Height of a groove's far side, as a fraction of the near one.
-const GROOVE_FAR_SIDE: f32 = 0.3;
+const MIN_FAR_SIDE: f32 = 0.3;
 /// Depth of a groove as a fraction of the bead's level: hardly any light comes out
 /// of it. A narrow one seems less deep than it is, for the camera's blur fills it.
 const GROOVE_DEPTH: f32 = 0.87;
@@ -59,25 +59,25 @@ pub const DEPTH_SIGMA: f64 = 0.08;
 /// Length of a groove's floor, in distances from its darkest place to the bead, at
 /// which it certainly is filled by blur, and from which on it certainly is not: a
 /// box of four and five times the blur's standard deviation (0.87 and 1.01).
-const FILLED: (f32, f32) = (0.87, 1.0);
+const FILLED_FLOOR_RATIO: (f32, f32) = (0.87, 1.0);
 /// Height of a groove's far side, as a fraction of the near one, from which on its depth
 /// may be hidden, and at which it certainly may: beside plain ground a darker line is
 /// shade, or a lens's or a compression's.
-const ENCLOSED: (f32, f32) = (0.4, 0.6);
+const ENCLOSED_FAR_SIDE: (f32, f32) = (0.4, 0.6);
 
 /// Pixels of a profile that may lie outside, in whole vectors of the processor.
-const AROUND: usize = (OUTSIDE + 1).next_multiple_of(8);
+const AROUND_PX: usize = (OUTSIDE_PX + 1).next_multiple_of(8);
 
 /// The mean profile across an edge, from [`OUTSIDE`] pixels before it on.
-pub type Profile = [f32; LENGTH];
+pub type BlockProfile = [f32; PROFILE_PX];
 
 /// Levels along an edge; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
-pub struct Levels {
-    blocks: Vec<Profile>,
+pub struct EdgeLevels {
+    blocks: Vec<BlockProfile>,
     /// Rows of a block.
     block: usize,
-    smooth: Vec<[f32; AROUND]>,
+    smooth: Vec<[f32; AROUND_PX]>,
     beside: Vec<BlockLevels>,
     mean: Option<MeanProfile>,
     /// Kernels of the smoothing for the levels inside and outside.
@@ -116,7 +116,7 @@ struct BlockLevels {
 #[derive(Debug, Clone, Copy)]
 pub struct MeanProfile {
     /// Grey levels.
-    pub grey: [f32; LENGTH],
+    pub grey: [f32; PROFILE_PX],
     /// Places whose mean is the level inside.
     pub inside: (usize, usize),
     /// Places whose mean is the level outside.
@@ -133,7 +133,7 @@ impl MeanProfile {
         let bead = mean_of(&self.grey, self.inside);
         let darkest = self.grey[darkest_of(&self.grey, 0)];
         let beyond = self.grey[..self.outside.0].iter().fold(darkest, |most: f32, &v| most.max(v));
-        beyond - darkest > GROOVE_FAR_SIDE * (bead - darkest)
+        beyond - darkest > MIN_FAR_SIDE * (bead - darkest)
     }
 
     /// The darkest place outside.
@@ -152,7 +152,7 @@ impl MeanProfile {
         let places = &self.grey[from..to.max(from + 1)];
         let mean = mean_of(&self.grey, (from, to.max(from + 1)));
         let squares: f32 = places.iter().map(|grey| (grey - mean).powi(2)).sum();
-        f64::from(squares / single(places.len())).sqrt()
+        f64::from(squares / to_f32(places.len())).sqrt()
     }
 
     /// Places whose mean is the level of the ground: without those where the flank
@@ -162,11 +162,11 @@ impl MeanProfile {
     }
 }
 
-impl Levels {
+impl EdgeLevels {
     /// Step from outside to the bead in the mean \[grey levels\].
     pub fn contrast(&self) -> f64 {
         let sum: f32 = self.beside.iter().map(|levels| levels.inside - levels.outside).sum();
-        f64::from(sum) / float(self.beside.len().max(1))
+        f64::from(sum) / to_f64(self.beside.len().max(1))
     }
 
     /// The profile of the whole edge.
@@ -175,7 +175,7 @@ impl Levels {
     }
 
     /// Profiles of the blocks, aligned along the course.
-    pub fn blocks(&self) -> &[Profile] {
+    pub fn blocks(&self) -> &[BlockProfile] {
         &self.blocks
     }
 
@@ -193,13 +193,13 @@ impl Levels {
     #[inline(always)]
     pub fn read<T>(
         &mut self,
-        windows: &Windows,
+        windows: &RowWindows,
         course: &[f32],
-        scene: &Scene<'_, T>,
+        scene: &RoughInput<'_, T>,
     ) -> Option<()> {
         if self.kernels[0].is_empty() {
             self.kernels =
-                [INSIDE_ROWS, OUTSIDE_ROWS].map(|rows| kernel::gaussian(rows / float(BLOCK_ROWS)));
+                [INSIDE_ROWS, OUTSIDE_ROWS].map(|rows| kernel::gaussian(rows / to_f64(BLOCK_ROWS)));
         }
         self.block = windows.block();
         self.align(windows, course);
@@ -224,24 +224,24 @@ impl Levels {
 
     /// Means of the blocks' rows, aligned on the course to the nearest pixel.
     #[inline(always)]
-    fn align(&mut self, windows: &Windows, course: &[f32]) {
+    fn align(&mut self, windows: &RowWindows, course: &[f32]) {
         self.blocks.clear();
         for (rows, course) in windows.all().chunks(self.block).zip(course.chunks(self.block)) {
-            let mut sums = [0.0; LENGTH];
+            let mut sums = [0.0; PROFILE_PX];
             for (row, &at) in rows.iter().zip(course) {
-                let start = whole(at.max(0.0)).cast_signed() - OUTSIDE.cast_signed();
+                let start = round_to_count(at.max(0.0)).cast_signed() - OUTSIDE_PX.cast_signed();
                 let within = usize::try_from(start).ok().and_then(|start| row.get(start..));
-                if let Some(pixels) = within.and_then(<[f32]>::first_chunk::<LENGTH>) {
+                if let Some(pixels) = within.and_then(<[f32]>::first_chunk::<PROFILE_PX>) {
                     for (sum, pixel) in sums.iter_mut().zip(pixels) {
                         *sum += pixel;
                     }
                     continue;
                 }
                 for (k, sum) in (start..).zip(&mut sums) {
-                    *sum += row[k.clamp(0, SPAN.cast_signed() - 1).unsigned_abs()];
+                    *sum += row[k.clamp(0, WINDOW_PX.cast_signed() - 1).unsigned_abs()];
                 }
             }
-            let scale = 1.0 / single(rows.len());
+            let scale = 1.0 / to_f32(rows.len());
             for sum in &mut sums {
                 *sum *= scale;
             }
@@ -252,14 +252,14 @@ impl Levels {
     /// Where every so many rows pass from outside to the bead; not a number where they do
     /// not, and between them.
     #[inline(always)]
-    pub fn cross(&self, windows: &Windows, course: &[f32], every: usize, out: &mut Crossings) {
+    pub fn cross(&self, windows: &RowWindows, course: &[f32], every: usize, out: &mut Crossings) {
         let rows = windows.all();
         out.found.clear();
         out.found.resize(rows.len(), None);
         out.at.clear();
         out.at.resize(rows.len(), f32::NAN);
         for row in (0..rows.len()).step_by(every) {
-            let found = crossing::of(&rows[row], &self.flank(row, course[row]));
+            let found = crossing::find(&rows[row], &self.flank(row, course[row]));
             out.found[row] = found;
             out.at[row] = found.map_or(f32::NAN, |found| found.at);
         }
@@ -267,7 +267,7 @@ impl Levels {
 
     /// What else the rows show whose crossings were found along the same course.
     #[inline(always)]
-    pub fn describe(&self, windows: &Windows, course: &[f32], out: &mut Crossings) {
+    pub fn describe(&self, windows: &RowWindows, course: &[f32], out: &mut Crossings) {
         let Crossings { at: _, flank, gap, odd, odd_within, off_course, found } = out;
         let looks = found.len().div_ceil(STRAIGHT_ROWS);
         for values in [&mut *flank, gap, odd, odd_within] {
@@ -277,7 +277,7 @@ impl Levels {
         for (look, row) in (0..found.len()).step_by(STRAIGHT_ROWS).enumerate() {
             let Some(found) = found[row] else { continue };
             let levels = self.flank(row, course[row]);
-            let shown = crossing::shown(&windows.all()[row], &levels, found);
+            let shown = crossing::features(&windows.all()[row], &levels, found);
             flank[look] = shown.flank;
             gap[look] = found.at - levels.start;
             odd[look] = shown.odd;
@@ -294,16 +294,16 @@ impl Levels {
 
     /// Levels about a row at which the course passes such a position \[px\].
     #[inline(always)]
-    fn flank(&self, row: usize, course: f32) -> Flank {
+    fn flank(&self, row: usize, course: f32) -> RowLevels {
         let levels = self.between(row);
         let ground = self.mean.filter(|mean| mean.on_ground);
-        let start = ground.map_or(levels.darkest, |mean| mean.outside.1 - GROUND_PX / 2);
-        Flank {
-            start: course + single(start) - single(OUTSIDE),
+        let start = ground.map_or(levels.darkest, |mean| mean.outside.1 - MIN_GROUND_PX / 2);
+        RowLevels {
+            start: course + to_f32(start) - to_f32(OUTSIDE_PX),
             outside: levels.outside - self.hidden_depth(&levels),
             inside: levels.inside,
             course,
-            within_px: self.mean.map_or(0.0, |mean| single(mean.inside.1 - OUTSIDE)),
+            within_px: self.mean.map_or(0.0, |mean| to_f32(mean.inside.1 - OUTSIDE_PX)),
         }
     }
 
@@ -319,10 +319,10 @@ impl Levels {
     #[inline(always)]
     fn between(&self, row: usize) -> BlockLevels {
         let last = self.beside.len() - 1;
-        let place = ((single(row) + 0.5) / single(self.block) - 0.5).clamp(0.0, single(last));
-        let before = whole(place.floor()).min(last);
+        let place = ((to_f32(row) + 0.5) / to_f32(self.block) - 0.5).clamp(0.0, to_f32(last));
+        let before = round_to_count(place.floor()).min(last);
         let (one, other) = (self.beside[before], self.beside[(before + 1).min(last)]);
-        let fraction = place - single(before);
+        let fraction = place - to_f32(before);
         BlockLevels {
             outside: one.outside + fraction * (other.outside - one.outside),
             inside: one.inside + fraction * (other.inside - one.inside),
@@ -332,56 +332,57 @@ impl Levels {
 }
 
 /// The profile of the whole edge; `None` where it does not step up.
-fn mean_profile(blocks: &[Profile], width_px: f32) -> Option<MeanProfile> {
-    let mut grey = [0.0; LENGTH];
+fn mean_profile(blocks: &[BlockProfile], width_px: f32) -> Option<MeanProfile> {
+    let mut grey = [0.0; PROFILE_PX];
     for profile in blocks {
-        for k in 0..LENGTH {
+        for k in 0..PROFILE_PX {
             grey[k] += profile[k];
         }
     }
     for value in &mut grey {
-        *value /= single(blocks.len());
+        *value /= to_f32(blocks.len());
     }
-    let from = whole((INSIDE_FRACTION.0 * width_px).clamp(2.0, INSIDE.0));
-    let to = whole((INSIDE_FRACTION.1 * width_px).min(INSIDE.1)).max(from + 1);
-    let inside = (OUTSIDE + from, (OUTSIDE + to).min(LENGTH));
+    let from = round_to_count((INSIDE_FRACTION.0 * width_px).clamp(2.0, INSIDE_PX.0));
+    let to = round_to_count((INSIDE_FRACTION.1 * width_px).min(INSIDE_PX.1)).max(from + 1);
+    let inside = (OUTSIDE_PX + from, (OUTSIDE_PX + to).min(PROFILE_PX));
     let bead = mean_of(&grey, inside);
     let darkest = darkest_of(&grey, 0);
-    let limit = grey[darkest] + SAME * (bead - grey[darkest]);
+    let limit = grey[darkest] + SAME_LEVEL_FRACTION * (bead - grey[darkest]);
     let mut outside = (darkest, darkest + 1);
     while outside.0 > 0 && grey[outside.0 - 1] < limit {
         outside.0 -= 1;
     }
-    while outside.1 < OUTSIDE && grey[outside.1] < limit {
+    while outside.1 < OUTSIDE_PX && grey[outside.1] < limit {
         outside.1 += 1;
     }
     if !is_darker(blocks, darkest, bead - grey[darkest]) {
         outside = plain(&grey, bead);
     }
-    let on_ground = outside.1 - outside.0 >= GROUND_PX;
+    let on_ground = outside.1 - outside.0 >= MIN_GROUND_PX;
     let beyond = grey[..outside.0].iter().fold(grey[darkest], |most: f32, &v| most.max(v));
     let far_side = (beyond - grey[darkest]) / (bead - grey[darkest]);
-    let enclosed = ((far_side - ENCLOSED.0) / (ENCLOSED.1 - ENCLOSED.0)).clamp(0.0, 1.0);
+    let enclosed = ((far_side - ENCLOSED_FAR_SIDE.0) / (ENCLOSED_FAR_SIDE.1 - ENCLOSED_FAR_SIDE.0))
+        .clamp(0.0, 1.0);
     let filled = if on_ground { 0.0 } else { enclosed * filled(&grey, outside, bead) };
     (bead > grey[darkest]).then_some(MeanProfile { grey, inside, outside, on_ground, filled })
 }
 
 /// Whether a place is darker than what lies beyond it along the whole edge, and not only
 /// by the ground's pattern.
-fn is_darker(blocks: &[Profile], darkest: usize, step: f32) -> bool {
-    if darkest < BEYOND_PX + 3 {
+fn is_darker(blocks: &[BlockProfile], darkest: usize, step: f32) -> bool {
+    if darkest < BEYOND_GROOVE_PX + 3 {
         return false;
     }
-    let before = (0, darkest.saturating_sub(BEYOND_PX));
-    let after = (darkest + BEYOND_PX, OUTSIDE - FLANK_FOOT_PX);
+    let before = (0, darkest.saturating_sub(BEYOND_GROOVE_PX));
+    let after = (darkest + BEYOND_GROOVE_PX, OUTSIDE_PX - FLANK_FOOT_PX);
     let stretches = [before, after].into_iter().filter(|(from, to)| from + 2 < *to);
     let places: Vec<usize> = stretches.flat_map(|(from, to)| from..to).collect();
-    let looks = blocks.chunks(LOOK_BLOCKS).map(|blocks| {
-        let darker = |profile: &Profile| {
+    let looks = blocks.chunks(SAMPLE_BLOCKS).map(|blocks| {
+        let darker = |profile: &BlockProfile| {
             let beyond: f32 = places.iter().map(|&k| profile[k]).sum();
-            beyond / single(places.len()) - profile[darkest]
+            beyond / to_f32(places.len()) - profile[darkest]
         };
-        blocks.iter().map(darker).sum::<f32>() / single(blocks.len())
+        blocks.iter().map(darker).sum::<f32>() / to_f32(blocks.len())
     });
     let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
     for darker in looks {
@@ -391,37 +392,38 @@ fn is_darker(blocks: &[Profile], darkest: usize, step: f32) -> bool {
     }
     let mean = sum / count;
     let variance = (squares / count - mean * mean).max(0.0) / (count - 1.0_f32).max(1.0);
-    let need = if mean > DEEP * step { DARKER_SIGMAS.1 } else { DARKER_SIGMAS.0 };
+    let need = if mean > MIN_DEEP_FRACTION * step { DARKER_SIGMAS.1 } else { DARKER_SIGMAS.0 };
     mean > need * variance.sqrt()
 }
 
 /// Places of the ground, where it has a pattern.
-fn plain(grey: &Profile, bead: f32) -> (usize, usize) {
-    let ground = mean_of(grey, (0, OUTSIDE / 2));
-    let limit = ground + SAME * (bead - ground);
-    let foot = (1..=OUTSIDE).rev().find(|&k| grey[k - 1] < limit).unwrap_or(OUTSIDE);
-    (foot.saturating_sub(NEAR_PX), foot.max(1))
+fn plain(grey: &BlockProfile, bead: f32) -> (usize, usize) {
+    let ground = mean_of(grey, (0, OUTSIDE_PX / 2));
+    let limit = ground + SAME_LEVEL_FRACTION * (bead - ground);
+    let foot = (1..=OUTSIDE_PX).rev().find(|&k| grey[k - 1] < limit).unwrap_or(OUTSIDE_PX);
+    (foot.saturating_sub(NEAR_GROUND_PX), foot.max(1))
 }
 
 /// How far a groove looks too narrow to show its depth, from the length of its floor
 /// against its width.
-fn filled(grey: &Profile, floor: (usize, usize), bead: f32) -> f32 {
+fn filled(grey: &BlockProfile, floor: (usize, usize), bead: f32) -> f32 {
     let darkest = darkest_of(grey, floor.0);
     let depth = bead - grey[darkest];
-    let limit = grey[darkest] + SAME * depth;
+    let limit = grey[darkest] + SAME_LEVEL_FRACTION * depth;
     // Where the limit lies between a place of the floor and the next one.
     let part = |within: usize, beyond: usize| {
         ((limit - grey[within]) / (grey[beyond] - grey[within])).clamp(0.0, 1.0)
     };
     let before = if floor.0 > 0 { part(floor.0, floor.0 - 1) } else { 0.0 };
-    let length = single(floor.1 - 1 - floor.0) + before + part(floor.1 - 1, floor.1);
-    let missing = grey[darkest + 1..].iter().take(OUTSIDE).map(|value| (bead - value) / depth);
+    let length = to_f32(floor.1 - 1 - floor.0) + before + part(floor.1 - 1, floor.1);
+    let missing = grey[darkest + 1..].iter().take(OUTSIDE_PX).map(|value| (bead - value) / depth);
     let half = 0.5 + missing.map(|missing| missing.max(0.0)).sum::<f32>();
-    ((FILLED.1 - length / half) / (FILLED.1 - FILLED.0)).clamp(0.0, 1.0)
+    ((FILLED_FLOOR_RATIO.1 - length / half) / (FILLED_FLOOR_RATIO.1 - FILLED_FLOOR_RATIO.0))
+        .clamp(0.0, 1.0)
 }
 
 impl BlockLevels {
-    fn read_outside(&mut self, profile: &[f32; AROUND], mean: &MeanProfile) {
+    fn read_outside(&mut self, profile: &[f32; AROUND_PX], mean: &MeanProfile) {
         self.darkest = darkest_of(profile, mean.outside.0.saturating_sub(3));
         self.outside =
             if mean.on_ground { mean_of(profile, mean.ground()) } else { profile[self.darkest] };
@@ -438,7 +440,7 @@ struct BeadLevel {
 /// Levels of the bead itself: places that show a hole in it are passed over. Every fourth
 /// place of every second block tells what a hole is.
 #[inline(always)]
-fn bead_levels(blocks: &[Profile], mean: &MeanProfile) -> Vec<BeadLevel> {
+fn bead_levels(blocks: &[BlockProfile], mean: &MeanProfile) -> Vec<BeadLevel> {
     let (from, to) = mean.inside;
     let mut values = Vec::with_capacity(blocks.len() * (to - from).div_ceil(8));
     for profile in blocks.iter().step_by(2) {
@@ -447,7 +449,7 @@ fn bead_levels(blocks: &[Profile], mean: &MeanProfile) -> Vec<BeadLevel> {
     let median = rank::median(&mut values).unwrap_or(0.0);
     let spread = rank::median_deviation(&mut values, median).unwrap_or(0.0);
     let contrast = median - mean.grey[darkest_of(&mean.grey, 0)];
-    let limit = median - (HOLE_SPREADS * spread).max(HOLE * contrast);
+    let limit = median - (MIN_HOLE_DEVIATIONS * spread).max(MIN_HOLE_DEPTH * contrast);
     let mut levels = Vec::with_capacity(blocks.len());
     for profile in blocks {
         let (mut sum, mut places) = (0.0, 0.0);
@@ -491,16 +493,16 @@ fn smooth_values(values: &[f32], kernel: &[f32]) -> Vec<f32> {
 
 /// Smooths what lies outside in the blocks' profiles along the bead.
 #[inline(always)]
-fn smooth(blocks: &[Profile], kernel: &[f32], out: &mut Vec<[f32; AROUND]>) {
+fn smooth(blocks: &[BlockProfile], kernel: &[f32], out: &mut Vec<[f32; AROUND_PX]>) {
     let half = kernel.len() - 1;
-    out.resize(blocks.len(), [0.0; AROUND]);
+    out.resize(blocks.len(), [0.0; AROUND_PX]);
     for (block, out) in out.iter_mut().enumerate() {
-        let (mut sums, mut total) = ([0.0; AROUND], 0.0);
+        let (mut sums, mut total) = ([0.0; AROUND_PX], 0.0);
         let near = block.saturating_sub(half)..(block + half + 1).min(blocks.len());
         for (other, profile) in near.clone().zip(&blocks[near]) {
             let weight = kernel[other.abs_diff(block)];
             total += weight;
-            for k in 0..AROUND {
+            for k in 0..AROUND_PX {
                 sums[k] += weight * profile[k];
             }
         }
@@ -512,8 +514,8 @@ fn smooth(blocks: &[Profile], kernel: &[f32], out: &mut Vec<[f32; AROUND]>) {
 
 /// Darkest place outside, from a place on.
 fn darkest_of(profile: &[f32], from: usize) -> usize {
-    let mut darkest = from.min(OUTSIDE);
-    for place in darkest + 1..=OUTSIDE {
+    let mut darkest = from.min(OUTSIDE_PX);
+    for place in darkest + 1..=OUTSIDE_PX {
         if profile[place] < profile[darkest] {
             darkest = place;
         }
@@ -522,5 +524,5 @@ fn darkest_of(profile: &[f32], from: usize) -> usize {
 }
 
 fn mean_of(profile: &[f32], (from, to): (usize, usize)) -> f32 {
-    profile[from..to].iter().sum::<f32>() / single(to - from)
+    profile[from..to].iter().sum::<f32>() / to_f32(to - from)
 }

@@ -1,28 +1,28 @@
 //! How far pixel noise and texture move the mean position of an edge.
 
-use super::crossing::INSIDE_PX;
-use super::levels::{Crossings, DEPTH_SIGMA, LENGTH, Levels, OUTSIDE, Profile};
-use super::rough_input::Scene;
-use super::window::Windows;
+use super::crossing::SUMMED_INSIDE_PX;
+use super::levels::{BlockProfile, Crossings, DEPTH_SIGMA, EdgeLevels, OUTSIDE_PX, PROFILE_PX};
+use super::rough_input::RoughInput;
+use super::window::RowWindows;
 use crate::numeric::normal_distribution::ROOT_TWO_PI;
-use crate::numeric::number::whole;
-use crate::numeric::number::{float, narrow};
-use crate::vision::strip::Grey;
+use crate::numeric::number::round_to_count;
+use crate::numeric::number::{narrow_to_f32, to_f64};
+use crate::vision::strip::GreyPixel;
 
 /// Blocks over which texture is taken to be correlated at most.
 const MAX_LAG: usize = 6;
 /// Fraction of the irregular length of a flank by which an edge may lie elsewhere in it: half,
 /// were the flank an even ramp. Of drawn bays, whose widths have 0.75 times the standard
 /// deviation that a quarter predicts, it is less.
-const FLANK_FRACTION: f64 = 0.2;
+const FLANK_SIGMA_FRACTION: f64 = 0.2;
 /// How far the ground's pattern between its level and the edge may be off, in standard
 /// deviations of the level from place to place: an edge that is drawn outwards by bright
 /// places finds more of them.
-const PATTERN_SIGMAS: f64 = 1.2;
+const PATTERN_LEVEL_SIGMAS: f64 = 1.2;
 
 /// What noise leaves open.
 #[derive(Debug, Clone, Copy)]
-pub struct Noise {
+pub struct PositionNoise {
     /// Variance of the mean over all rows \[px²\].
     pub of_mean: f64,
     /// Variance of a single row, as if rows were independent \[px²\].
@@ -34,12 +34,12 @@ pub struct Noise {
 }
 
 /// Variance of the mean position; `None` where the flank has no slope.
-pub fn of_mean<T: Grey>(
-    windows: &Windows,
-    levels: &Levels,
+pub fn of_mean<T: GreyPixel>(
+    windows: &RowWindows,
+    levels: &EdgeLevels,
     crossings: &Crossings,
-    scene: &Scene<'_, T>,
-) -> Option<Noise> {
+    scene: &RoughInput<'_, T>,
+) -> Option<PositionNoise> {
     let mean = levels.mean()?;
     let slope = slope(&mean.grey);
     if slope <= 0.0 {
@@ -50,26 +50,27 @@ pub fn of_mean<T: Grey>(
     let half = 0.5 * mean_of(&crossings.flank);
     // Texture that is summed on either side of the edge stands for bead that is not
     // there, or the other way round.
-    let inside = Stretch { places: mean.inside, summed: f64::from(INSIDE_PX) + half };
+    let inside = SideSegment { places: mean.inside, summed: f64::from(SUMMED_INSIDE_PX) + half };
     let mut grey = texture(levels, &inside, |block| levels.inside(block));
     if mean.on_ground {
-        let outside = Stretch { places: mean.ground(), summed: mean_of(&crossings.gap).max(1.0) };
+        let outside =
+            SideSegment { places: mean.ground(), summed: mean_of(&crossings.gap).max(1.0) };
         grey += texture(levels, &outside, |block| levels.outside(block));
     } else {
         let pixel = f64::from(scene.noise).powi(2) * windows.noise_gain() / rows;
         grey += pixel * 2.0 * half;
     }
-    let of_flank = FLANK_FRACTION * FLANK_FRACTION * irregularity(&crossings.flank);
+    let of_flank = FLANK_SIGMA_FRACTION * FLANK_SIGMA_FRACTION * irregularity(&crossings.flank);
     // What a groove's depth leaves open is the same for both edges.
     let of_depth = DEPTH_SIGMA * f64::from(mean.filled) * mean_of(&crossings.gap);
     let of_pattern = if mean.on_ground {
-        PATTERN_SIGMAS * mean.ground_spread() * mean_of(&crossings.gap) / contrast
+        PATTERN_LEVEL_SIGMAS * mean.ground_spread() * mean_of(&crossings.gap) / contrast
     } else {
         0.0
     };
     let of_lines = grey / (contrast * contrast) + of_flank;
     let of_mean = of_lines + 2.0 * of_depth * of_depth + of_pattern * of_pattern;
-    Some(Noise {
+    Some(PositionNoise {
         of_mean,
         of_row: of_mean * rows,
         lines_fraction: of_lines / of_mean,
@@ -79,24 +80,24 @@ pub fn of_mean<T: Grey>(
 
 /// Variance of the mean profile for each pixel across \[grey levels²\]: noise and
 /// texture of the bead, and of the ground where it is more, their correlation included.
-pub fn of_profile(levels: &Levels) -> Option<f64> {
+pub fn of_profile(levels: &EdgeLevels) -> Option<f64> {
     let mean = levels.mean()?;
-    let summed = f64::from(INSIDE_PX);
-    let inside = Stretch { places: mean.inside, summed };
+    let summed = f64::from(SUMMED_INSIDE_PX);
+    let inside = SideSegment { places: mean.inside, summed };
     let bead = texture(levels, &inside, |block| levels.inside(block));
-    let outside = Stretch { places: mean.ground(), summed };
+    let outside = SideSegment { places: mean.ground(), summed };
     let ground = mean.on_ground.then(|| texture(levels, &outside, |block| levels.outside(block)));
     Some(bead.max(ground.unwrap_or(0.0)) / summed)
 }
 
 /// Variance of an edge's profile about a straight line \[px²\].
 pub fn roughness(crossings: &Crossings) -> f64 {
-    let middle = 0.5 * (float(crossings.at.len()) - 1.0);
+    let middle = 0.5 * (to_f64(crossings.at.len()) - 1.0);
     let places = crossings.at.iter().enumerate().filter(|(_, at)| at.is_finite());
     let (mut count, mut line, mut squares) = (0.0, [0.0; 2], [0.0; 2]);
     let mean = mean_of(&crossings.at);
     for (row, at) in places {
-        let (off, at) = (float(row) - middle, f64::from(*at) - mean);
+        let (off, at) = (to_f64(row) - middle, f64::from(*at) - mean);
         count += 1.0;
         line[0] += off * at;
         line[1] += off * off;
@@ -118,19 +119,19 @@ pub fn fine_roughness(crossings: &Crossings, rows: usize) -> f64 {
 }
 
 /// Slope of the mean profile at the edge \[grey levels/px\].
-fn slope(profile: &Profile) -> f64 {
-    let steps = profile[OUTSIDE - 3..OUTSIDE + 4].windows(2);
+fn slope(profile: &BlockProfile) -> f64 {
+    let steps = profile[OUTSIDE_PX - 3..OUTSIDE_PX + 4].windows(2);
     steps.map(|pair| f64::from(pair[1] - pair[0])).fold(0.0, f64::max)
 }
 
 /// Mean of the values that are numbers.
 pub fn mean_of(values: &[f32]) -> f64 {
     let seen = || values.iter().filter(|value| value.is_finite());
-    seen().map(|&value| f64::from(value)).sum::<f64>() / float(seen().count().max(1))
+    seen().map(|&value| f64::from(value)).sum::<f64>() / to_f64(seen().count().max(1))
 }
 
 /// Places beside an edge.
-struct Stretch {
+struct SideSegment {
     /// First place and the one after the last, of a profile.
     places: (usize, usize),
     /// How many such places are summed for the edge's position \[px\].
@@ -140,11 +141,11 @@ struct Stretch {
 /// Variance of the mean over the rows of the sum of so many places of texture and
 /// noise \[grey levels²\], the correlation along the bead included: from as many
 /// sums as there is room for beside each other.
-fn texture(levels: &Levels, stretch: &Stretch, level: impl Fn(usize) -> f32) -> f64 {
+fn texture(levels: &EdgeLevels, stretch: &SideSegment, level: impl Fn(usize) -> f32) -> f64 {
     let blocks = levels.blocks();
     let count = blocks.len();
-    let (from, to) = (stretch.places.0, stretch.places.1.min(LENGTH));
-    let size = whole(narrow(stretch.summed)).clamp(1, to - from);
+    let (from, to) = (stretch.places.0, stretch.places.1.min(PROFILE_PX));
+    let size = round_to_count(narrow_to_f32(stretch.summed)).clamp(1, to - from);
     let mut covariances = [0.0f64; MAX_LAG + 1];
     let mut sums = vec![0.0; count];
     let mut stretches = 0.0;
@@ -153,10 +154,10 @@ fn texture(levels: &Levels, stretch: &Stretch, level: impl Fn(usize) -> f32) -> 
             let places = &blocks[block][start..start + size];
             *sum = places.iter().map(|&grey| f64::from(grey - level(block))).sum::<f64>();
         }
-        let mean = sums.iter().sum::<f64>() / float(count);
+        let mean = sums.iter().sum::<f64>() / to_f64(count);
         for (lag, covariance) in covariances.iter_mut().enumerate() {
             let pairs = sums.iter().skip(lag).zip(&sums);
-            *covariance += pairs.map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>() / float(count);
+            *covariance += pairs.map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>() / to_f64(count);
         }
         stretches += 1.0;
     }
@@ -167,7 +168,7 @@ fn texture(levels: &Levels, stretch: &Stretch, level: impl Fn(usize) -> f32) -> 
         }
         sum += 2.0 * covariance;
     }
-    sum / stretches / float(count) * (stretch.summed / float(size)).powi(2)
+    sum / stretches / to_f64(count) * (stretch.summed / to_f64(size)).powi(2)
 }
 
 /// Variance of the mean length of the flanks \[px²\], their correlation along the
@@ -178,13 +179,13 @@ fn irregularity(flanks: &[f32]) -> f64 {
     if count == 0 {
         return 0.0;
     }
-    let mean = seen().sum::<f64>() / float(count);
+    let mean = seen().sum::<f64>() / to_f64(count);
     let off =
         flanks.iter().map(|&flank| if flank.is_finite() { f64::from(flank) - mean } else { 0.0 });
     let off: Vec<f64> = off.collect();
     let covariance = |lag: usize| {
         let pairs = off.iter().zip(&off[lag..]);
-        pairs.map(|(one, other)| one * other).sum::<f64>() / float(count)
+        pairs.map(|(one, other)| one * other).sum::<f64>() / to_f64(count)
     };
     let mut sum = covariance(0);
     for lag in 1..flanks.len() / 4 {
@@ -194,5 +195,5 @@ fn irregularity(flanks: &[f32]) -> f64 {
         }
         sum += 2.0 * next;
     }
-    sum / float(count)
+    sum / to_f64(count)
 }

@@ -3,13 +3,13 @@
 use crate::numeric::blurred_step::StepTable;
 use crate::vision::gauge::EdgeKind;
 use crate::vision::row_range::RowRange;
-use crate::vision::strip::Strip;
+use crate::vision::strip::GaugeRows;
 
 /// What is looked at.
 #[derive(Debug, Clone, Copy)]
-pub struct Scene<'a, T> {
+pub struct RoughInput<'a, T> {
     /// The gauge's pixels.
-    pub strip: &'a Strip<'a, T>,
+    pub strip: &'a GaugeRows<'a, T>,
     /// Rows of its caliper lines.
     pub lines: &'a [RowRange],
     /// Standard deviation of a pixel's noise \[grey levels\].

@@ -1,11 +1,11 @@
 //! The course of an edge through its windows: the strongest step from dark to
 //! bright that runs along the bead, by dynamic programming over blocks of rows.
 
-use super::window::{Row, Windows};
-use crate::numeric::number::single;
-use crate::numeric::number::whole;
+use super::window::{RowWindows, WindowRow};
+use crate::numeric::number::round_to_count;
+use crate::numeric::number::to_f32;
 use crate::numeric::rank;
-use crate::vision::edge_windows::SPAN;
+use crate::vision::edge_windows::WINDOW_PX;
 
 /// Pixels on either side that are compared for a step, as a fraction of the
 /// bead's width: wide against texture, narrow against the bead.
@@ -18,7 +18,7 @@ const MAX_ASIDE: usize = 8;
 /// block is long, and out again, for one and a half blocks' own step.
 const ASIDE_COST: f32 = 0.2;
 /// Rank of the typical step among the blocks' strongest.
-const TYPICAL: f32 = 0.7;
+const TYPICAL_RANK: f32 = 0.7;
 /// Fraction of the width within which an edge lies about its rough course.
 const CORRIDOR_FRACTION: f32 = 0.4;
 /// Half of the corridor at most \[px\].
@@ -26,15 +26,15 @@ const MAX_CORRIDOR_PX: f32 = 40.0;
 
 /// The course of an edge; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
-pub struct Route {
-    steps: Vec<Row>,
-    scores: Vec<Row>,
+pub struct EdgeRoute {
+    steps: Vec<WindowRow>,
+    scores: Vec<WindowRow>,
     strongest: Vec<f32>,
     blocks: Vec<f32>,
     rows: Vec<f32>,
 }
 
-impl Route {
+impl EdgeRoute {
     /// Positions of the last course, row by row \[px\] in its window.
     pub fn rows(&self) -> &[f32] {
         &self.rows
@@ -42,12 +42,12 @@ impl Route {
 
     /// Finds the course; `None` where nothing steps up.
     #[inline(always)]
-    pub fn find(&mut self, windows: &Windows, width_px: f32) -> Option<()> {
+    pub fn find(&mut self, windows: &RowWindows, width_px: f32) -> Option<()> {
         let reach = (REACH_FRACTION * width_px).clamp(REACH_PX.0, REACH_PX.1);
-        let reach = whole(reach.min(width_px / 3.0)).max(2);
+        let reach = round_to_count(reach.min(width_px / 3.0)).max(2);
         let corridor = (CORRIDOR_FRACTION * width_px).min(MAX_CORRIDOR_PX);
-        let middle = SPAN / 2;
-        let half = whole(corridor).clamp(2, middle - reach - 1);
+        let middle = WINDOW_PX / 2;
+        let half = round_to_count(corridor).clamp(2, middle - reach - 1);
         let inside = middle - half..middle + half + 1;
         self.respond(windows, reach);
         self.link(inside)?;
@@ -68,9 +68,9 @@ impl Route {
                 last = Some(number);
                 continue;
             }
-            let span = single((number - from).max(1));
+            let span = to_f32((number - from).max(1));
             for between in from..=number {
-                self.rows[between] = start + (at - start) * single(between - from) / span;
+                self.rows[between] = start + (at - start) * to_f32(between - from) / span;
             }
             last = Some(number);
         }
@@ -83,35 +83,35 @@ impl Route {
     /// Steps of the blocks: the mean of some pixels after a place less that of
     /// those before it, over three blocks with weights 1, 2, 1.
     #[inline(always)]
-    fn respond(&mut self, windows: &Windows, reach: usize) {
+    fn respond(&mut self, windows: &RowWindows, reach: usize) {
         let count = windows.count().div_ceil(windows.block());
-        self.scores.resize(count, [0.0; SPAN]);
-        self.steps.resize(count, [0.0; SPAN]);
+        self.scores.resize(count, [0.0; WINDOW_PX]);
+        self.steps.resize(count, [0.0; WINDOW_PX]);
         for (rows, sums) in windows.all().chunks(windows.block()).zip(&mut self.scores) {
             sums.fill(0.0);
             for row in rows {
-                for k in 0..SPAN {
+                for k in 0..WINDOW_PX {
                     sums[k] += row[k];
                 }
             }
-            let scale = 1.0 / single(rows.len());
+            let scale = 1.0 / to_f32(rows.len());
             for sum in sums.iter_mut() {
                 *sum *= scale;
             }
         }
         for block in 0..count {
             let (before, after) = (block.saturating_sub(1), (block + 1).min(count - 1));
-            let mut totals = [0.0; SPAN + 1];
-            for k in 0..SPAN {
+            let mut totals = [0.0; WINDOW_PX + 1];
+            for k in 0..WINDOW_PX {
                 let mean = 0.25 * (self.scores[before][k] + self.scores[after][k])
                     + 0.5 * self.scores[block][k];
                 totals[k + 1] = totals[k] + mean;
             }
             let out = &mut self.steps[block];
             out.fill(0.0);
-            for k in reach..SPAN - reach {
+            for k in reach..WINDOW_PX - reach {
                 let step = totals[k + reach] - 2.0 * totals[k] + totals[k - reach];
-                out[k] = step / single(reach);
+                out[k] = step / to_f32(reach);
             }
         }
     }
@@ -119,10 +119,11 @@ impl Route {
     /// The course with the largest sum of steps less the cost of running aside.
     #[inline(always)]
     fn link(&mut self, inside: std::ops::Range<usize>) -> Option<()> {
-        let most = |steps: &Row| steps[inside.clone()].iter().fold(0.0, |a: f32, &b| a.max(b));
+        let most =
+            |steps: &WindowRow| steps[inside.clone()].iter().fold(0.0, |a: f32, &b| a.max(b));
         self.strongest.clear();
         self.strongest.extend(self.steps.iter().map(most));
-        let rank = whole(TYPICAL * single(self.strongest.len().saturating_sub(1)));
+        let rank = round_to_count(TYPICAL_RANK * to_f32(self.strongest.len().saturating_sub(1)));
         let typical = rank::at(&mut self.strongest, rank).filter(|&step| step > 0.0)?;
         for block in 0..self.steps.len() {
             let (before, here) = self.scores.split_at_mut(block);
@@ -143,7 +144,7 @@ impl Route {
                 at = came_from(scores, &inside, at);
             }
             // A step at k lies between the pixels k − 1 and k.
-            self.blocks.push(single(at) - 0.5);
+            self.blocks.push(to_f32(at) - 0.5);
         }
         self.blocks.reverse();
         Some(())
@@ -154,11 +155,11 @@ impl Route {
         let blocks = &self.blocks;
         self.rows.clear();
         for number in 0..blocks.len() * block {
-            let place = (single(number) + 0.5) / single(block) - 0.5;
-            let place = place.clamp(0.0, single(blocks.len() - 1));
-            let before = whole(place.floor()).min(blocks.len() - 1);
+            let place = (to_f32(number) + 0.5) / to_f32(block) - 0.5;
+            let place = place.clamp(0.0, to_f32(blocks.len() - 1));
+            let before = round_to_count(place.floor()).min(blocks.len() - 1);
             let after = (before + 1).min(blocks.len() - 1);
-            let fraction = place - single(before);
+            let fraction = place - to_f32(before);
             self.rows.push(blocks[before] + fraction * (blocks[after] - blocks[before]));
         }
     }
@@ -166,8 +167,8 @@ impl Route {
 
 /// Best score of the block before from which each place can be reached.
 #[inline(always)]
-fn best_before(scores: &Row, inside: &std::ops::Range<usize>, best: &mut Row) {
-    let mut padded = [f32::NEG_INFINITY; SPAN + 2 * MAX_ASIDE];
+fn best_before(scores: &WindowRow, inside: &std::ops::Range<usize>, best: &mut WindowRow) {
+    let mut padded = [f32::NEG_INFINITY; WINDOW_PX + 2 * MAX_ASIDE];
     padded[MAX_ASIDE..][inside.clone()].copy_from_slice(&scores[inside.clone()]);
     best.fill(f32::NEG_INFINITY);
     for from in 0..=2 * MAX_ASIDE {
@@ -180,7 +181,7 @@ fn best_before(scores: &Row, inside: &std::ops::Range<usize>, best: &mut Row) {
 }
 
 /// Place in the block before from which the course comes to a place.
-fn came_from(scores: &Row, inside: &std::ops::Range<usize>, at: usize) -> usize {
+fn came_from(scores: &WindowRow, inside: &std::ops::Range<usize>, at: usize) -> usize {
     let near = at.saturating_sub(MAX_ASIDE).max(inside.start)..(at + MAX_ASIDE + 1).min(inside.end);
     let score = |from: usize| scores[from] - aside_cost(from, at);
     // Of equal scores the first.
@@ -188,5 +189,5 @@ fn came_from(scores: &Row, inside: &std::ops::Range<usize>, at: usize) -> usize 
 }
 
 fn aside_cost(from: usize, to: usize) -> f32 {
-    ASIDE_COST * single(from.abs_diff(to))
+    ASIDE_COST * to_f32(from.abs_diff(to))
 }

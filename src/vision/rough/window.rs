@@ -2,15 +2,15 @@
 //! the brighter side, and smoothed.
 
 use super::kernel;
-use super::rough_input::Scene;
-use crate::numeric::number::{float, narrow};
+use super::rough_input::RoughInput;
+use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::vision::coarse::StepLine;
-use crate::vision::edge_windows::{Grouping, SPAN, Sheet};
+use crate::vision::edge_windows::{EdgeWindows, Grouping, WINDOW_PX};
 use crate::vision::row_range::RowRange;
-use crate::vision::strip::Grey;
+use crate::vision::strip::GreyPixel;
 
 /// Pixels of a row.
-pub type Row = [f32; SPAN];
+pub type WindowRow = [f32; WINDOW_PX];
 
 /// Standard deviation of the smoothing across \[px\]: a third of a usual blur, so
 /// that it hardly widens the flank.
@@ -26,16 +26,16 @@ pub const BLOCK_ROWS: usize = 4;
 /// standard deviations.
 const FINE_ROWS: usize = 5;
 /// Rows of a gauge from which on two are taken together: there are plenty.
-const MANY_ROWS: usize = 400;
+const MIN_PAIRED_ROWS: usize = 400;
 
 /// The rows of one edge.
 #[derive(Debug, Clone, Default)]
-pub struct Windows {
-    sheet: Sheet,
+pub struct RowWindows {
+    sheet: EdgeWindows,
     /// Caliper line of each row.
     lines: Vec<usize>,
-    rows: Vec<Row>,
-    across: Vec<Row>,
+    rows: Vec<WindowRow>,
+    across: Vec<WindowRow>,
     bead_after: bool,
     /// Columns of the gauge.
     width: f32,
@@ -43,7 +43,7 @@ pub struct Windows {
     together: usize,
 }
 
-impl Windows {
+impl RowWindows {
     /// Rows of a block along the bead.
     pub fn block(&self) -> usize {
         BLOCK_ROWS / self.together
@@ -60,7 +60,7 @@ impl Windows {
     }
 
     /// The smoothed pixels of all rows \[grey levels\], dark beads negated.
-    pub fn all(&self) -> &[Row] {
+    pub fn all(&self) -> &[WindowRow] {
         &self.rows
     }
 
@@ -81,7 +81,7 @@ impl Windows {
             return None;
         }
         let first = self.first(number);
-        let last = narrow(float(SPAN - 1));
+        let last = narrow_to_f32(to_f64(WINDOW_PX - 1));
         let at = if self.bead_after { first + at } else { first + last - at };
         (0.0..=self.width - 1.0).contains(&at).then(|| at.into())
     }
@@ -100,14 +100,14 @@ impl Windows {
 
     /// Reads the rows along a line.
     #[inline(always)]
-    pub fn read<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) {
+    pub fn read<T: GreyPixel>(&mut self, scene: &RoughInput<'_, T>, line: &StepLine) {
         let strip = scene.strip;
-        let middle = narrow(float(strip.along) - 1.0) / 2.0;
-        let together = if strip.along > MANY_ROWS { 2 } else { 1 };
+        let middle = narrow_to_f32(to_f64(strip.along) - 1.0) / 2.0;
+        let together = if strip.along > MIN_PAIRED_ROWS { 2 } else { 1 };
         if self.together != together {
             self.together = together;
             self.kernels =
-                [kernel::gaussian(ACROSS_PX), kernel::gaussian(ALONG_PX / float(together))];
+                [kernel::gaussian(ACROSS_PX), kernel::gaussian(ALONG_PX / to_f64(together))];
         }
         let at = |v: f32| [line.at + line.slope * (v - middle), 0.0, 1.0];
         // Caliper lines of an odd number of rows would leave single ones over.
@@ -116,22 +116,22 @@ impl Windows {
         self.lines.clear();
         let mut line = 0;
         for window in self.sheet.windows() {
-            let is_beyond = |end: usize| narrow(float(end)) <= window.middle + 0.5;
+            let is_beyond = |end: usize| narrow_to_f32(to_f64(end)) <= window.middle + 0.5;
             while scene.lines.get(line).is_some_and(|line| is_beyond(line.end)) {
                 line += 1;
             }
             self.lines.push(line);
         }
         self.bead_after = scene.bead_after;
-        self.width = narrow(float(strip.across));
+        self.width = narrow_to_f32(to_f64(strip.across));
         let sign = if scene.bright { 1.0 } else { -1.0 };
         let count = self.sheet.windows().len();
-        self.across.resize(count, [0.0; SPAN]);
-        self.rows.resize(count, [0.0; SPAN]);
+        self.across.resize(count, [0.0; WINDOW_PX]);
+        self.rows.resize(count, [0.0; WINDOW_PX]);
         for (number, row) in self.across.iter_mut().enumerate() {
             smooth_row(self.sheet.pixels(number), (sign, scene.bead_after), &self.kernels[0], row);
         }
-        let mut along = [0.0; LONGEST + 1];
+        let mut along = [0.0; MAX_KERNEL_HALF + 1];
         for (weight, of_kernel) in along.iter_mut().zip(&self.kernels[1]) {
             *weight = *of_kernel;
         }
@@ -142,40 +142,45 @@ impl Windows {
 /// Convolves a row, multiplied by a sign and in reverse where its bead lies before, with a
 /// symmetric kernel; beyond the ends the last pixel goes on.
 #[inline(always)]
-fn smooth_row(row: &Row, (sign, bead_after): (f32, bool), kernel: &[f32], out: &mut Row) {
+fn smooth_row(
+    row: &WindowRow,
+    (sign, bead_after): (f32, bool),
+    kernel: &[f32],
+    out: &mut WindowRow,
+) {
     const PAD: usize = 4;
-    let mut padded = [0.0; SPAN + 2 * PAD];
+    let mut padded = [0.0; WINDOW_PX + 2 * PAD];
     if bead_after {
-        for k in 0..SPAN {
+        for k in 0..WINDOW_PX {
             padded[PAD + k] = sign * row[k];
         }
     } else {
-        for k in 0..SPAN {
-            padded[PAD + k] = sign * row[SPAN - 1 - k];
+        for k in 0..WINDOW_PX {
+            padded[PAD + k] = sign * row[WINDOW_PX - 1 - k];
         }
     }
-    let (first, last) = (padded[PAD], padded[PAD + SPAN - 1]);
+    let (first, last) = (padded[PAD], padded[PAD + WINDOW_PX - 1]);
     padded[..PAD].fill(first);
-    padded[PAD + SPAN..].fill(last);
-    for k in 0..SPAN {
+    padded[PAD + WINDOW_PX..].fill(last);
+    for k in 0..WINDOW_PX {
         out[k] = kernel[0] * padded[PAD + k];
     }
     for (offset, weight) in kernel.iter().enumerate().skip(1).take(PAD) {
-        for k in 0..SPAN {
+        for k in 0..WINDOW_PX {
             out[k] += weight * (padded[PAD + k - offset] + padded[PAD + k + offset]);
         }
     }
 }
 
 /// Pixels that are convolved together: what the processor holds in its vectors.
-const TOGETHER: usize = 16;
+const VECTOR_PIXELS: usize = 16;
 /// Samples of a kernel beside its middle at most.
-const LONGEST: usize = 8;
+const MAX_KERNEL_HALF: usize = 8;
 
 /// Convolves along the bead. Beyond the ends the rows come again in reverse, so
 /// that each row weighs as much as any other in the mean of all.
 #[inline(always)]
-fn smooth_along(rows: &[Row], kernel: &[f32; LONGEST + 1], out: &mut [Row]) {
+fn smooth_along(rows: &[WindowRow], kernel: &[f32; MAX_KERNEL_HALF + 1], out: &mut [WindowRow]) {
     let count = rows.len().cast_signed();
     let mirrored = |v: isize| {
         let v = if v < 0 { -1 - v } else { v };
@@ -184,20 +189,20 @@ fn smooth_along(rows: &[Row], kernel: &[f32; LONGEST + 1], out: &mut [Row]) {
     };
     for (number, out) in (0..).zip(out.iter_mut()) {
         let middle = &rows[mirrored(number)];
-        let mut near = [[middle; 2]; LONGEST];
+        let mut near = [[middle; 2]; MAX_KERNEL_HALF];
         for (offset, near) in (1..).zip(&mut near) {
             *near = [&rows[mirrored(number - offset)], &rows[mirrored(number + offset)]];
         }
-        for (part, out) in out.as_chunks_mut::<TOGETHER>().0.iter_mut().enumerate() {
-            let pixels = &middle.as_chunks::<TOGETHER>().0[part];
-            let mut sums = [0.0; TOGETHER];
-            for k in 0..TOGETHER {
+        for (part, out) in out.as_chunks_mut::<VECTOR_PIXELS>().0.iter_mut().enumerate() {
+            let pixels = &middle.as_chunks::<VECTOR_PIXELS>().0[part];
+            let mut sums = [0.0; VECTOR_PIXELS];
+            for k in 0..VECTOR_PIXELS {
                 sums[k] = kernel[0] * pixels[k];
             }
-            for offset in 0..LONGEST {
-                let before = &near[offset][0].as_chunks::<TOGETHER>().0[part];
-                let after = &near[offset][1].as_chunks::<TOGETHER>().0[part];
-                for k in 0..TOGETHER {
+            for offset in 0..MAX_KERNEL_HALF {
+                let before = &near[offset][0].as_chunks::<VECTOR_PIXELS>().0[part];
+                let after = &near[offset][1].as_chunks::<VECTOR_PIXELS>().0[part];
+                for k in 0..VECTOR_PIXELS {
                     sums[k] += kernel[offset + 1] * (before[k] + after[k]);
                 }
             }

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 
 use crate::calibration::SurfaceMap;
 use crate::core::geometry::SurfacePoint;
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 use crate::vision::width::Caliper;
 
 /// Largest fraction of the lines that may be missing: the others stand in for them.
@@ -63,21 +63,21 @@ impl LocalWidths {
         let sections: Vec<Section> = calipers
             .filter_map(|caliper| Section::of(&caliper, filter.noise_fractions, surface))
             .collect();
-        let missing = float(lines - sections.len().min(lines));
-        if sections.len() < MIN_LINES || missing > MAX_MISSING * float(lines) {
+        let missing = to_f64(lines - sections.len().min(lines));
+        if sections.len() < MIN_LINES || missing > MAX_MISSING * to_f64(lines) {
             return None;
         }
         let axis = axis(&sections)?;
         let (first, last) = (sections.first()?, sections.last()?);
         let length_mm = (last.middle - first.middle).dot(&axis);
-        let spacing_mm = length_mm / float(last.number - first.number);
+        let spacing_mm = length_mm / to_f64(last.number - first.number);
         let mm_per_px = spacing_mm / filter.line_px;
         let normal = Vector2::new(-axis.y, axis.x);
         let noise_mm2 = sections.iter().map(|section| section.noise_mm2).sum::<f64>();
         Some(Self {
             widths_mm: fill(lines, &sections, |section| section.across.dot(&normal).abs()),
             spacing_mm,
-            noise_mm2: noise_mm2 / float(sections.len()),
+            noise_mm2: noise_mm2 / to_f64(sections.len()),
             filter_mm: filter.filter_px * mm_per_px,
             blur_mm: filter.blur_px * mm_per_px,
         })
@@ -85,7 +85,7 @@ impl LocalWidths {
 
     /// Length of the gauge along the bead \[mm\].
     pub fn gauge_mm(&self) -> f64 {
-        self.spacing_mm * float(self.widths_mm.len())
+        self.spacing_mm * to_f64(self.widths_mm.len())
     }
 }
 
@@ -112,7 +112,7 @@ impl Section {
 fn axis(sections: &[Section]) -> Option<Vector2<f64>> {
     let middle = |part: &[Section]| {
         let sum: Vector2<f64> = part.iter().map(|section| section.middle.coords).sum();
-        sum / float(part.len())
+        sum / to_f64(part.len())
     };
     let (before, after) = sections.split_at(sections.len() / 2);
     (middle(after) - middle(before)).try_normalize(f64::MIN_POSITIVE)
@@ -129,7 +129,7 @@ fn fill(lines: usize, sections: &[Section], value: impl Fn(&Section) -> f64) -> 
         match (next.checked_sub(1).map(|k| &sections[k]), sections.get(next)) {
             (_, Some(here)) if here.number == line => value(here),
             (Some(before), Some(after)) => {
-                let part = float(line - before.number) / float(after.number - before.number);
+                let part = to_f64(line - before.number) / to_f64(after.number - before.number);
                 value(before) + part * (value(after) - value(before))
             }
             (Some(end), None) | (None, Some(end)) => value(end),
@@ -143,14 +143,14 @@ fn fill(lines: usize, sections: &[Section], value: impl Fn(&Section) -> f64) -> 
 mod tests {
     use super::*;
     use crate::core::geometry::ImagePoint;
-    use crate::vision::width::EdgePlace;
+    use crate::vision::width::CaliperPoint;
 
     /// A bead of 40 px that slants, whose lines 3 and 4 are missing.
     fn slanted(slope: f64) -> Vec<Caliper> {
         let place =
-            |x: f64, y: f64| Some(EdgePlace { at: ImagePoint::new(x, y), sigma_px: Some(0.1) });
+            |x: f64, y: f64| Some(CaliperPoint { at: ImagePoint::new(x, y), sigma_px: Some(0.1) });
         let caliper = |number: usize| {
-            let y = 4.0 * float(number);
+            let y = 4.0 * to_f64(number);
             Caliper { number, left: place(slope * y, y), right: place(40.0 + slope * y, y) }
         };
         (0..20).filter(|number| !(3..5).contains(number)).map(caliper).collect()

@@ -3,19 +3,19 @@
 
 use super::local::LocalWidths;
 use crate::core::units::Mm;
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 /// Smallest part of the gauge that two frames must share to be compared.
-const MIN_SHARED: f64 = 0.3;
+const MIN_OVERLAP_FRACTION: f64 = 0.3;
 /// Mean square of the difference of two pieces, in that of unlike ones, below which they
 /// are taken for the same. Unlike ones are taken for the same now and then, which makes
 /// the estimate look less sure than it is.
-const SAME: f64 = 0.35;
+const MAX_SAME_DIFFERENCE: f64 = 0.35;
 /// New part of a frame whose widths are too noisy to be compared: as little as of a
 /// camera that takes twenty frames of each piece.
-const UNKNOWN: f64 = 0.05;
+const ASSUMED_NEW_FRACTION: f64 = 0.05;
 /// Noise in the widths' variance from which on they are.
-const NOISY: f64 = 0.3;
+const MAX_NOISE_FRACTION: f64 = 0.3;
 
 /// Compares each frame with an earlier one, as long as both show enough of the same bead.
 #[derive(Debug, Clone, Default)]
@@ -40,23 +40,23 @@ impl Overlap {
     fn compare(&mut self, widths: &LocalWidths) -> f64 {
         let (before, now) = (&self.reference, &widths.widths_mm);
         let unlike = variance(before) + variance(now);
-        if 2.0 * widths.noise_mm2 > NOISY * unlike {
+        if 2.0 * widths.noise_mm2 > MAX_NOISE_FRACTION * unlike {
             self.refer_to(widths);
-            return UNKNOWN;
+            return ASSUMED_NEW_FRACTION;
         }
-        let lines = float(now.len());
-        let most = now.len() - whole(MIN_SHARED * lines);
+        let lines = to_f64(now.len());
+        let most = now.len() - whole(MIN_OVERLAP_FRACTION * lines);
         let differs = |shift: usize| {
             let ahead = difference(&before[shift..], now);
             ahead.min(difference(&now[shift..], before)) / unlike
         };
         let shifts = (0..=most).map(|shift| (shift, differs(shift)));
         let best = shifts.min_by(|one, other| one.1.total_cmp(&other.1));
-        let Some((shift, _)) = best.filter(|(_, differs)| *differs < SAME) else {
+        let Some((shift, _)) = best.filter(|(_, differs)| *differs < MAX_SAME_DIFFERENCE) else {
             self.refer_to(widths);
             return 1.0;
         };
-        let fresh = float(shift.saturating_sub(self.moved)) / lines;
+        let fresh = to_f64(shift.saturating_sub(self.moved)) / lines;
         self.moved = self.moved.max(shift);
         if 2 * shift > most {
             self.refer_to(widths);
@@ -71,14 +71,14 @@ impl Overlap {
 }
 
 fn variance(values: &[f64]) -> f64 {
-    let mean = values.iter().sum::<f64>() / float(values.len());
-    values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / float(values.len())
+    let mean = values.iter().sum::<f64>() / to_f64(values.len());
+    values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / to_f64(values.len())
 }
 
 /// Mean square of the difference, as far as both go.
 fn difference(one: &[f64], other: &[f64]) -> f64 {
     let shared = one.len().min(other.len());
-    one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / float(shared)
+    one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / to_f64(shared)
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few lines")]

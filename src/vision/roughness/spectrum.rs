@@ -9,38 +9,38 @@
 use std::f64::consts::PI;
 
 use super::local::LocalWidths;
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 /// Correlation lengths are looked for from this fraction of the lines' distance, or of
 /// the smoothing, up to one gauge.
-const SHORTEST: f64 = 0.5;
+const MIN_LENGTH_FACTOR: f64 = 0.5;
 /// Their number.
-const LENGTHS: usize = 28;
+const LENGTH_COUNT: usize = 28;
 /// Blurs along the bead that are tried, as fractions of the smallest one that flanks have
 /// shown: torn flanks look more blurred than the lens makes them, and motion across the
 /// bead blurs nothing along it.
-pub const BLURS: [f64; 4] = [0.4, 0.6, 0.8, 1.0];
+pub const BLUR_FACTORS: [f64; 4] = [0.4, 0.6, 0.8, 1.0];
 /// Waves that smoothing leaves less than this part of their square are left out: what is
 /// left of them says more about the smoothing than about the bead.
-const MIN_LEFT: f64 = 0.2;
+const MIN_TRANSMITTED: f64 = 0.2;
 /// Steps of a doubling of the smoothing that is taken for the same.
-const SAME_SMOOTHING: f64 = 4.0;
+const SMOOTHING_STEPS_PER_OCTAVE: f64 = 4.0;
 /// A Gaussian is taken for nothing beyond so many standard deviations.
-const FAR: f64 = 6.0;
+const MAX_GAUSSIAN_SIGMAS: f64 = 6.0;
 
 /// What frames must share so that their coefficients may be added up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Kind {
+pub struct FrameKind {
     lines: usize,
     filter: i32,
 }
 
-impl Kind {
+impl FrameKind {
     /// That of a frame.
     pub fn of(widths: &LocalWidths) -> Self {
         let ratio = (widths.filter_mm / widths.spacing_mm).max(0.1);
         #[expect(clippy::cast_possible_truncation, reason = "within some tens")]
-        let filter = (SAME_SMOOTHING * ratio.log2()).round() as i32;
+        let filter = (SMOOTHING_STEPS_PER_OCTAVE * ratio.log2()).round() as i32;
         Self { lines: widths.widths_mm.len(), filter }
     }
 }
@@ -48,7 +48,7 @@ impl Kind {
 /// Sums of the squares of frames' cosine coefficients.
 #[derive(Debug, Clone)]
 pub struct Spectrum {
-    kind: Kind,
+    kind: FrameKind,
     spacing_mm: f64,
     filter_mm: f64,
     basis: Vec<f64>,
@@ -70,7 +70,7 @@ impl Spectrum {
     pub fn new(like: &LocalWidths) -> Self {
         let n = like.widths_mm.len();
         let mut spectrum = Self {
-            kind: Kind::of(like),
+            kind: FrameKind::of(like),
             spacing_mm: like.spacing_mm,
             filter_mm: like.filter_mm,
             basis: (1..n).flat_map(|k| cosine(k, n)).collect(),
@@ -88,19 +88,20 @@ impl Spectrum {
     pub fn expect(&mut self, lengths_mm: &[f64], blur_mm: f64) {
         let n = self.kind.lines;
         let all = self.smoothing_mm(blur_mm);
-        let used = (1..n).take_while(|&k| self.left(k, all) >= MIN_LEFT).count().max(1);
+        let used = (1..n).take_while(|&k| self.left(k, all) >= MIN_TRANSMITTED).count().max(1);
         let of = |blur: f64, length_mm: f64| {
-            let process = Smoothed { length_mm, smoothing_mm: self.smoothing_mm(blur * blur_mm) };
+            let process =
+                SmoothedProcess { length_mm, smoothing_mm: self.smoothing_mm(blur * blur_mm) };
             let by_lag: Vec<f64> =
-                (0..n).map(|lag| process.covariance(float(lag) * self.spacing_mm)).collect();
+                (0..n).map(|lag| process.covariance(to_f64(lag) * self.spacing_mm)).collect();
             self.basis.chunks_exact(n).take(used).map(|wave| variance(wave, &by_lag)).collect()
         };
         let lengths = |blur: f64| lengths_mm.iter().map(|&length| of(blur, length)).collect();
-        self.expected = BLURS.into_iter().map(lengths).collect();
+        self.expected = BLUR_FACTORS.into_iter().map(lengths).collect();
     }
 
     /// Whether a frame belongs to it.
-    pub fn is_of(&self, kind: Kind) -> bool {
+    pub fn is_of(&self, kind: FrameKind) -> bool {
         self.kind == kind
     }
 
@@ -124,7 +125,7 @@ impl Spectrum {
 
     /// What a Gaussian leaves of the square of a wave.
     fn left(&self, k: usize, smoothing_mm: f64) -> f64 {
-        let angle = PI * float(k) * smoothing_mm / (float(self.kind.lines) * self.spacing_mm);
+        let angle = PI * to_f64(k) * smoothing_mm / (to_f64(self.kind.lines) * self.spacing_mm);
         libm::exp(-angle * angle)
     }
 }
@@ -132,16 +133,16 @@ impl Spectrum {
 /// Correlation lengths that are looked for \[mm\], evenly spaced in their logarithm.
 pub fn lengths_mm(like: &LocalWidths) -> Vec<f64> {
     let smoothing = like.filter_mm.max(like.blur_mm);
-    let from = SHORTEST * like.spacing_mm.max(smoothing);
+    let from = MIN_LENGTH_FACTOR * like.spacing_mm.max(smoothing);
     let ratio = (like.gauge_mm() / from).max(1.0);
-    let length = |k: usize| from * libm::pow(ratio, float(k) / float(LENGTHS - 1));
-    (0..LENGTHS).map(length).collect()
+    let length = |k: usize| from * libm::pow(ratio, to_f64(k) / to_f64(LENGTH_COUNT - 1));
+    (0..LENGTH_COUNT).map(length).collect()
 }
 
 /// A cosine over n places of which the sum of the squares is 1.
 fn cosine(k: usize, n: usize) -> impl Iterator<Item = f64> {
-    let scale = (2.0 / float(n)).sqrt();
-    (0..n).map(move |i| scale * libm::cos(PI * float(k) * (float(i) + 0.5) / float(n)))
+    let scale = (2.0 / to_f64(n)).sqrt();
+    (0..n).map(move |i| scale * libm::cos(PI * to_f64(k) * (to_f64(i) + 0.5) / to_f64(n)))
 }
 
 /// Variance of a sum of values with these weights, from their covariance by lag.
@@ -155,17 +156,17 @@ fn variance(weights: &[f64], by_lag: &[f64]) -> f64 {
 
 /// An exponential process of variance 1 after a Gaussian.
 #[derive(Debug, Clone, Copy)]
-struct Smoothed {
+struct SmoothedProcess {
     length_mm: f64,
     smoothing_mm: f64,
 }
 
-impl Smoothed {
+impl SmoothedProcess {
     /// Covariance at a distance: exp(−|d|/length) convolved with the Gaussian twice.
     fn covariance(&self, distance_mm: f64) -> f64 {
         let spread = 2.0_f64.sqrt() * self.smoothing_mm / self.length_mm;
         let distance = distance_mm / self.length_mm;
-        if distance > FAR * spread {
+        if distance > MAX_GAUSSIAN_SIGMAS * spread {
             return libm::exp(0.5 * spread * spread - distance);
         }
         let side = |distance: f64| {
@@ -182,7 +183,7 @@ mod tests {
 
     #[test]
     fn the_covariance_is_that_of_the_convolution() {
-        let process = Smoothed { length_mm: 3.0, smoothing_mm: 2.0 };
+        let process = SmoothedProcess { length_mm: 3.0, smoothing_mm: 2.0 };
         for distance in [0.0, 1.0, 5.0, 20.0] {
             let step = 0.01;
             let spread = 2.0 * 2.0_f64.sqrt();

@@ -3,7 +3,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
-use crate::numeric::number::float;
+use crate::numeric::number::to_f64;
 
 const SPACING_MM: f64 = 4.0;
 const LINES: usize = 25;
@@ -15,7 +15,7 @@ const PLACES: usize = 16;
 fn bead(roughness: f64, length: f64, lines: usize, seed: u64) -> Vec<f64> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-    let keep = (-SPACING_MM / float(PLACES) / length).exp();
+    let keep = (-SPACING_MM / to_f64(PLACES) / length).exp();
     let mut last = normal();
     let mut line = || {
         let mut sum = 0.0;
@@ -23,7 +23,7 @@ fn bead(roughness: f64, length: f64, lines: usize, seed: u64) -> Vec<f64> {
             last = keep * last + (1.0 - keep * keep).sqrt() * normal();
             sum += roughness * last;
         }
-        30.0 + sum / float(PLACES) + NOISE_MM * normal()
+        30.0 + sum / to_f64(PLACES) + NOISE_MM * normal()
     };
     (0..lines).map(|_| line()).collect()
 }
@@ -139,7 +139,7 @@ fn noise_is_no_roughness() {
         let mut smooth = bead(0.0, 10.0, 20 * LINES, seed);
         // The bead's own width changes from gauge to gauge.
         for (line, width) in smooth.iter_mut().enumerate() {
-            *width += 3.0 * float(line / LINES);
+            *width += 3.0 * to_f64(line / LINES);
         }
         estimate(&smooth, LINES, None).is_some()
     });
@@ -161,8 +161,8 @@ fn a_mean_over_a_gauge_scatters_as_the_closed_form_says() {
     assert!((of(1e5) / (2.0 * (20.0_f64 / 1e5).sqrt()) - 1.0).abs() < 1e-3);
     let means: Vec<f64> = bead(2.0, 10.0, 40_000, 5)
         .chunks_exact(LINES)
-        .map(|gauge| gauge.iter().sum::<f64>() / float(LINES) - 30.0)
+        .map(|gauge| gauge.iter().sum::<f64>() / to_f64(LINES) - 30.0)
         .collect();
-    let square = means.iter().map(|mean| mean * mean).sum::<f64>() / float(means.len());
+    let square = means.iter().map(|mean| mean * mean).sum::<f64>() / to_f64(means.len());
     assert!((square.sqrt() / of(100.0) - 1.0).abs() < 0.06, "{}", square.sqrt());
 }

@@ -1,14 +1,14 @@
 //! A template for textured surroundings: what a row says of the place is
 //! weighted so that the texture disturbs it least.
 
-use super::{LANES, MAX_CHUNKS, PHASES, Template};
-use crate::numeric::number::float;
-use crate::vision::texture::Texture;
-use crate::vision::whiten::{MOST, Whitener};
+use super::{LANES, MAX_CHUNKS, SUBPIXEL_PHASES, StepTemplate};
+use crate::numeric::number::to_f64;
+use crate::vision::texture::SurfaceTexture;
+use crate::vision::whiten::{MAX_PIXELS, NoiseWhitener};
 
 /// How far places scatter in texture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scatter {
+pub struct TexturePositionVariance {
     /// Variance of the mean place of many rows, times their number and the
     /// squared step \[grey levels²·px²\].
     pub of_mean: f64,
@@ -16,30 +16,35 @@ pub struct Scatter {
     pub of_window: f64,
 }
 
-impl Template {
+impl StepTemplate {
     /// Replaces the slope of the step, by which residuals are weighted for the
     /// place, by weights that know the texture \[grey levels\]. `None` where
     /// that cannot be done: then the template has to be made anew.
-    pub fn whiten(&mut self, whitener: &mut Whitener, texture: &Texture) -> Option<Scatter> {
+    pub fn whiten(
+        &mut self,
+        whitener: &mut NoiseWhitener,
+        texture: &SurfaceTexture,
+    ) -> Option<TexturePositionVariance> {
         let (first, count) = self.counting()?;
-        let covariances: [f64; MOST] = std::array::from_fn(|d| texture.over_rows(float(d)));
+        let covariances: [f64; MAX_PIXELS] = std::array::from_fn(|d| texture.over_rows(to_f64(d)));
         let noise = |distance: usize| if distance == 0 { texture.noise } else { 0.0 };
         if !whitener.prepare(count, |d| noise(d) + covariances[d]) {
             return None;
         }
         let beside = self.texture_beside(first, texture);
-        let mut scatter = Scatter { of_mean: 0.0, of_window: 0.0 };
-        for phase in 0..PHASES {
+        let mut scatter = TexturePositionVariance { of_mean: 0.0, of_window: 0.0 };
+        for phase in 0..SUBPIXEL_PHASES {
             let parts = &mut self.parts[phase * MAX_CHUNKS..][..self.chunks];
-            let (mut slope, mut after) = ([0.0; MOST], [0.0; MOST]);
+            let (mut slope, mut after) = ([0.0; MAX_PIXELS], [0.0; MAX_PIXELS]);
             for k in 0..count {
                 let (part, lane) = (&parts[(first + k) / LANES], (first + k) % LANES);
                 slope[k] = part.slope[lane].into();
                 after[k] = part.after[lane].into();
             }
             whitener.weights(&mut slope, &after)?;
-            let weights = Weights::of(&slope[..count], &beside);
-            scatter.of_mean += weights.variance(texture.noise, |d| covariances[d]) / float(PHASES);
+            let weights = TextureWeights::of(&slope[..count], &beside);
+            scatter.of_mean +=
+                weights.variance(texture.noise, |d| covariances[d]) / to_f64(SUBPIXEL_PHASES);
             for part in parts.iter_mut() {
                 (part.slope, part.mask) = ([0.0; LANES], [0.0; LANES]);
             }
@@ -51,7 +56,7 @@ impl Template {
                 part.slope[lane] = weight;
             }
             if phase == 0 {
-                let within = |distance| texture.within_window(float(distance));
+                let within = |distance| texture.within_window(to_f64(distance));
                 scatter.of_window = weights.variance(texture.noise_of_window(), within);
             }
         }
@@ -63,11 +68,11 @@ impl Template {
 
     /// Shares of the texture that the pixels have from the first one that counts on. One phase
     /// stands for all: their edges lie apart by less than a texture's correlation length.
-    fn texture_beside(&self, first: usize, texture: &Texture) -> [f64; MOST] {
-        let parts = &self.parts[PHASES / 2 * MAX_CHUNKS..][..self.chunks];
+    fn texture_beside(&self, first: usize, texture: &SurfaceTexture) -> [f64; MAX_PIXELS] {
+        let parts = &self.parts[SUBPIXEL_PHASES / 2 * MAX_CHUNKS..][..self.chunks];
         std::array::from_fn(|k| {
             let (part, lane) = ((first + k) / LANES, (first + k) % LANES);
-            parts.get(part).map_or(0.0, |part| texture.beside(part.after[lane].into()))
+            parts.get(part).map_or(0.0, |part| texture.level_at(part.after[lane].into()))
         })
     }
 
@@ -76,29 +81,29 @@ impl Template {
     fn counting(&self) -> Option<(usize, usize)> {
         let counts = |k: usize| {
             let part = |phase: usize| &self.parts[phase * MAX_CHUNKS + k / LANES];
-            (0..PHASES).all(|phase| part(phase).mask[k % LANES] > 0.0)
+            (0..SUBPIXEL_PHASES).all(|phase| part(phase).mask[k % LANES] > 0.0)
         };
         let pixels = self.chunks * LANES;
         let first = (0..pixels).find(|&k| counts(k))?;
         let count = (first..pixels).take_while(|&k| counts(k)).count();
-        (self.core == (0..self.chunks) && (LANES / 2..=MOST).contains(&count))
+        (self.core == (0..self.chunks) && (LANES / 2..=MAX_PIXELS).contains(&count))
             .then_some((first, count))
     }
 }
 
 /// Weights of pixels.
-struct Weights {
+struct TextureWeights {
     /// Sum of their squares.
     square: f64,
     /// The same weights times the texture's share at each pixel.
-    textured: [f64; MOST],
+    textured: [f64; MAX_PIXELS],
     count: usize,
 }
 
-impl Weights {
-    fn of(weights: &[f64], beside: &[f64; MOST]) -> Self {
+impl TextureWeights {
+    fn of(weights: &[f64], beside: &[f64; MAX_PIXELS]) -> Self {
         let square = weights.iter().map(|weight| weight * weight).sum();
-        let mut textured = [0.0; MOST];
+        let mut textured = [0.0; MAX_PIXELS];
         for (product, (weight, share)) in textured.iter_mut().zip(weights.iter().zip(beside)) {
             *product = weight * share;
         }
@@ -125,9 +130,9 @@ mod tests {
     #[test]
     fn texture_of_one_side_counts_where_it_is() {
         let weights = [1.0, -2.0, 0.5, 3.0, -1.0];
-        let mut beside = [0.0; MOST];
+        let mut beside = [0.0; MAX_PIXELS];
         beside[..5].copy_from_slice(&[0.0, 0.1, 0.7, 1.3, 1.4]);
-        let covariance = |distance: usize| 4.0 * libm::exp(-float(distance * distance) / 9.0);
+        let covariance = |distance: usize| 4.0 * libm::exp(-to_f64(distance * distance) / 9.0);
         let mut expected = 0.0;
         for i in 0..5 {
             for j in 0..5 {
@@ -136,7 +141,7 @@ mod tests {
                 expected += weights[i] * weights[j] * (noise + texture);
             }
         }
-        let got = Weights::of(&weights, &beside).variance(0.3, covariance);
+        let got = TextureWeights::of(&weights, &beside).variance(0.3, covariance);
         assert!((got - expected).abs() < 1e-12, "{got} {expected}");
     }
 }

@@ -1,31 +1,35 @@
 //! Levels on either side of an edge, band by band.
 
-use super::{Extent, Scene, Tracer};
-use crate::numeric::number::narrow;
+use super::{EdgeTracer, Extent, TraceInput};
+use crate::numeric::number::narrow_to_f32;
 use crate::numeric::rank;
 use crate::vision::path;
-use crate::vision::strip::Grey;
+use crate::vision::strip::GreyPixel;
 
 /// Where levels are picked first: distance from the edge, and apart \[px\].
-const PICK: (f32, f32) = (5.0, 3.0);
+const PICK_PX: (f32, f32) = (5.0, 3.0);
 
-impl Tracer {
+impl EdgeTracer {
     /// Levels on either side of the edge in every band, as the median of a few
     /// places in its profile and of its neighbours.
     #[inline(always)]
-    pub(super) fn pick_levels<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+    pub(super) fn pick_levels<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         self.pick_raw_levels(scene);
         self.smooth_levels();
     }
 
     /// Picks levels anew along the course, where it was drawn through better places
     /// and it is known how far there is nothing but the edge \[px\].
-    pub(super) fn pick_levels_within<T: Grey>(&mut self, scene: &Scene<'_, T>, room: Extent) {
+    pub(super) fn pick_levels_within<T: GreyPixel>(
+        &mut self,
+        scene: &TraceInput<'_, T>,
+        room: Extent,
+    ) {
         let (path, course) = (&mut self.values.path, &self.course);
         path.clear();
-        let middles = (0..scene.bands.count()).map(|band| narrow(scene.bands.middle(band)));
+        let middles = (0..scene.bands.count()).map(|band| narrow_to_f32(scene.bands.middle(band)));
         path.extend(middles.map(|middle| course.at(middle)[0]));
-        self.pick_levels_in(scene, [narrow(room.before), narrow(room.after)]);
+        self.pick_levels_in(scene, [narrow_to_f32(room.before), narrow_to_f32(room.after)]);
         self.smooth_levels();
         self.levels.draw(scene.bands, &self.values.path, &self.values.before, &self.values.step);
         self.course.take_levels(&self.levels);
@@ -43,7 +47,7 @@ impl Tracer {
     }
 
     /// Picks levels on either side of the edge, each band for itself.
-    pub(super) fn pick_raw_levels<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+    pub(super) fn pick_raw_levels<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let inside = 0.45 * scene.width_px;
         let room = if scene.bead_after { [f32::INFINITY, inside] } else { [inside, f32::INFINITY] };
         self.pick_levels_in(scene, room);
@@ -51,7 +55,7 @@ impl Tracer {
 
     /// The same no farther from the edge than there is room before it and after it
     /// \[px\].
-    fn pick_levels_in<T: Grey>(&mut self, scene: &Scene<'_, T>, room: [f32; 2]) {
+    fn pick_levels_in<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, room: [f32; 2]) {
         self.values.before.clear();
         self.values.step.clear();
         let (left, right) = (picked(-1.0, room[0]), picked(1.0, room[1]));
@@ -83,8 +87,8 @@ impl Tracer {
 /// Distances from an edge at which its level on one side is picked \[px\].
 #[expect(clippy::cast_possible_truncation, reason = "a few pixels")]
 fn picked(sign: f32, room: f32) -> [isize; 5] {
-    let near = PICK.0.min(0.4 * room);
-    let apart = PICK.1.min((room - near) / 5.0);
+    let near = PICK_PX.0.min(0.4 * room);
+    let apart = PICK_PX.1.min((room - near) / 5.0);
     [0.0, 1.0, 2.0, 3.0, 4.0].map(|k| (sign * (near + k * apart)).round() as isize)
 }
 

@@ -2,12 +2,12 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::group::Group;
-use crate::vision::located::Located;
+use super::group::RowGroup;
+use crate::vision::located::CaliperEdge;
 
 /// Share of the plain pixels that must be as they are expected for their level
 /// to be believed.
-const LEAST_PLAIN: f64 = 0.6;
+const MIN_PLAIN_FRACTION: f64 = 0.6;
 
 /// Sums over the rows of a band that count.
 #[derive(Debug, Clone, Copy, Default)]
@@ -28,7 +28,7 @@ pub struct BandSums {
 
 impl BandSums {
     /// Adds rows that count.
-    pub fn add(&mut self, group: &Group, core: &Matrix3<f64>) {
+    pub fn add(&mut self, group: &RowGroup, core: &Matrix3<f64>) {
         let (sums, weight) = (&group.sums, f64::from(group.weight));
         self.rows += weight;
         // The unknown is the step times the distance from the path.
@@ -48,14 +48,14 @@ impl BandSums {
         extra: [f64; 2],
         plain: [f64; 2],
         least_share: f64,
-    ) -> Option<(f64, Located)> {
+    ) -> Option<(f64, CaliperEdge)> {
         if self.rows < least_share * self.all_rows || self.rows < 1.0 {
             return None;
         }
         let mut matrix = core * self.rows;
         let mut vector = Vector3::from(self.vector);
         for (side, (count, sum)) in [self.before, self.after].into_iter().enumerate() {
-            if count >= LEAST_PLAIN * plain[side] * self.held_rows {
+            if count >= MIN_PLAIN_FRACTION * plain[side] * self.held_rows {
                 let weight = 1.0 / (1.0 / count + extra[side] / variance);
                 matrix[(side + 1, side + 1)] += weight;
                 vector[side + 1] += weight * sum / count;
@@ -65,7 +65,7 @@ impl BandSums {
         let height = self.step + found[2] - found[1];
         let variance = variance * variance_of_place / (self.step * self.step);
         let share = self.rows / self.all_rows;
-        Some((found[0] / self.step, Located { at: 0.0, variance, height, share }))
+        Some((found[0] / self.step, CaliperEdge { at: 0.0, variance, height, row_fraction: share }))
     }
 }
 

@@ -2,33 +2,33 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{NEAR_ENOUGH, Scene, Tracer};
-use crate::numeric::number::{float, narrow};
+use super::{EdgeTracer, MAX_PATH_ERROR_BLURS, TraceInput};
+use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::numeric::rank;
-use crate::vision::located::Located;
-use crate::vision::strip::Grey;
+use crate::vision::located::CaliperEdge;
+use crate::vision::strip::GreyPixel;
 
 /// Share of its rows that a band must have left to count.
-const LEAST_SHARE: f64 = 0.5;
+const MIN_ROW_FRACTION: f64 = 0.5;
 /// The same where rows are known to be clear, one by one.
-const LEAST_CLEAR_SHARE: f64 = 0.2;
+const MIN_CLEAR_ROW_FRACTION: f64 = 0.2;
 /// Extra deviation of levels that is believed, in standard deviations of its
 /// own doubt.
-const BELIEVED: f64 = 2.5;
+const MIN_EXCESS_SIGMAS: f64 = 2.5;
 
-impl Tracer {
+impl EdgeTracer {
     /// Solves every band; returns whether the path was near enough for that.
     #[inline(always)]
-    pub(super) fn locate<T: Grey>(&mut self, scene: &Scene<'_, T>, blur: f64) -> bool {
+    pub(super) fn locate<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: f64) -> bool {
         let variance = match self.textured.scatter {
-            Some(scatter) => scatter.of_mean * self.left_of_texture(),
+            Some(scatter) => scatter.of_mean * self.texture_variance_ratio(),
             None => f64::from(scene.noise).powi(2),
         };
         let core = self.row_fit.template.products.matrix();
         let extra = [0, 1].map(|side| self.extra_variance(core, variance, side));
         let plain = self.row_fit.template.plain_pixels();
         let least_share =
-            if self.occlusion.clear.is_empty() { LEAST_SHARE } else { LEAST_CLEAR_SHARE };
+            if self.occlusion.clear.is_empty() { MIN_ROW_FRACTION } else { MIN_CLEAR_ROW_FRACTION };
         self.edges.clear();
         let textured = self.textured.texture.is_some();
         let mut off: f64 = 0.0;
@@ -38,12 +38,12 @@ impl Tracer {
                     let bent = if textured { 0.0 } else { moved / blur };
                     let moved = moved * (1.0 + bent * bent / 12.0);
                     off = off.max(moved.abs());
-                    let [path, _, _] = self.course.at(narrow(scene.lines[band].middle()));
-                    Located { at: f64::from(path) + moved, ..located }
+                    let [path, _, _] = self.course.at(narrow_to_f32(scene.lines[band].middle()));
+                    CaliperEdge { at: f64::from(path) + moved, ..located }
                 });
             self.edges.push(located);
         }
-        if off <= NEAR_ENOUGH * blur {
+        if off <= MAX_PATH_ERROR_BLURS * blur {
             return true;
         }
         self.redraw(scene);
@@ -54,7 +54,7 @@ impl Tracer {
     /// compression's correlations change sign and no texture has them, so that rows differ less
     /// than it says. The mean over the rows does by half as much: rendered JPEGs of qualities of
     /// 65 to 90 have a z of 0.9 to 1.0 then.
-    fn left_of_texture(&self) -> f64 {
+    fn texture_variance_ratio(&self) -> f64 {
         f64::midpoint(1.0, self.misfit.powi(2).min(1.0))
     }
 
@@ -82,9 +82,14 @@ impl Tracer {
         if self.scratch.scatter.len() < 6 {
             return 0.0;
         }
-        let bands = float(self.scratch.scatter.len());
-        let ratio = rank::median(&mut self.scratch.scatter).unwrap_or(0.0) / rank::MEDIAN_SQUARE;
-        let doubt = 2.3 / bands.sqrt();
-        if ratio < 1.0 + BELIEVED * doubt { 0.0 } else { (ratio - 1.0) * explained / bands }
+        let bands = to_f64(self.scratch.scatter.len());
+        let ratio =
+            rank::median(&mut self.scratch.scatter).unwrap_or(0.0) / rank::MEDIAN_OF_SQUARED_NORMAL;
+        let ratio_sigma = 2.3 / bands.sqrt();
+        if ratio < 1.0 + MIN_EXCESS_SIGMAS * ratio_sigma {
+            0.0
+        } else {
+            (ratio - 1.0) * explained / bands
+        }
     }
 }

@@ -1,41 +1,44 @@
 //! An edge one side of which passes the end of the camera's scale.
 
-use super::{Extent, Look, MAX_PASSES, NEAR_ENOUGH, Scene, State, Step, Tracer, typical};
+use super::{
+    BlurredStep, EdgeState, EdgeTracer, Extent, MAX_PASSES, MAX_PATH_ERROR_BLURS, StepFit,
+    TraceInput, typical,
+};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::narrow;
+use crate::numeric::number::narrow_to_f32;
 use crate::numeric::rank;
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::clipped_step;
-use crate::vision::located::Located;
+use crate::vision::located::CaliperEdge;
 use crate::vision::path;
-use crate::vision::strip::Grey;
+use crate::vision::strip::GreyPixel;
 
 /// Upper end of the camera's scale \[grey levels of 256\].
-const END: f64 = 255.0;
+const SCALE_END_GREY: f64 = 255.0;
 /// Levels that come so near it are cut off by noise, in standard deviations.
-const NEAR_END: f64 = 1.5;
+const NEAR_END_SIGMAS: f64 = 1.5;
 
 /// Times that a path is smoothed at most before an edge that is cut off is read
 /// along it.
-const SMOOTHINGS: usize = 4;
+const MAX_SMOOTHINGS: usize = 4;
 /// A path that runs farther off the places than noise puts them no longer follows its
 /// edge, which is rough: in the mean square, so many times the variance of a place,
-const SMOOTHED_AWAY: f32 = 4.0;
+const MAX_SMOOTHING_RATIO: f32 = 4.0;
 /// and this much of the blur, which softens the flank too little to matter.
-const BESIDE_BLURS: f32 = 0.1;
+const MAX_SMOOTHING_BLURS: f32 = 0.1;
 
-impl Tracer {
+impl EdgeTracer {
     /// Blur of the edge that was looked at.
     pub fn blur(&self) -> Option<BlurEstimate> {
-        self.seen.as_ref().map(Look::blur)
+        self.step_fit.as_ref().map(StepFit::blur)
     }
 
     /// Whether the levels on either side of the edge that was looked at pass the
     /// end of the scale, or come so near that noise does: before it, after it.
-    pub fn is_cut_off<T: Grey>(&self, scene: &Scene<'_, T>) -> [bool; 2] {
-        let Some(seen) = &self.seen else { return [false; 2] };
+    pub fn clipped_sides<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> [bool; 2] {
+        let Some(seen) = &self.step_fit else { return [false; 2] };
         let (before, step) = self.mean_levels();
-        let limit = END - NEAR_END * f64::from(scene.noise);
+        let limit = SCALE_END_GREY - NEAR_END_SIGMAS * f64::from(scene.noise);
         [seen.step.before, seen.step.after].map(|level| before + step * level > limit)
     }
 
@@ -46,13 +49,13 @@ impl Tracer {
 
     /// Locates an edge that is cut off at the end of the scale on one side.
     /// Returns what is known of it, `None` where that is nothing.
-    pub fn trace_cut_off<T: Grey>(
+    pub fn trace_clipped<T: GreyPixel>(
         &mut self,
         table: &StepTable,
-        scene: &Scene<'_, T>,
+        scene: &TraceInput<'_, T>,
         hidden_after: bool,
-    ) -> Option<clipped_step::Found> {
-        let seen = self.seen?;
+    ) -> Option<clipped_step::ClippedStepFit> {
+        let seen = self.step_fit?;
         let (before, height) = self.mean_levels();
         let Extent { before: room_before, after: room_after } = seen.room;
         let (visible, room) = if hidden_after {
@@ -62,42 +65,54 @@ impl Tracer {
         };
         let visible = before + height * visible;
         let noise = f64::from(scene.noise);
-        let mut task = clipped_step::Scene { hidden_after, noise, white: END, room, shading: 0.0 };
-        let Step { at, blur, .. } = seen.step;
-        let start = clipped_step::Step { at, blur, visible, hidden: END + 0.3 * (END - visible) };
+        let mut task = clipped_step::ClippedScene {
+            clipped_after: hidden_after,
+            noise,
+            white: SCALE_END_GREY,
+            room,
+            shading: 0.0,
+        };
+        let BlurredStep { at, blur, .. } = seen.step;
+        let start = clipped_step::ClippedStep {
+            at,
+            blur,
+            visible,
+            clipped: SCALE_END_GREY + 0.3 * (SCALE_END_GREY - visible),
+        };
         let rough = self.cut_off.fit(table, &task, &self.overlay, start, None)?;
         self.shift_course(rough.step.at, 0.0, 1.0);
-        self.locate_cut_off(table, scene, &task, &rough);
+        self.locate_clipped(table, scene, &task, &rough);
         // A path that jitters rounds off the corner at the end of the scale,
         // which looks like a higher level.
         self.straighten(scene, rough.step.blur);
         self.overlay.lay(&self.sheet);
-        let start = clipped_step::Step { at: 0.0, ..rough.step };
+        let start = clipped_step::ClippedStep { at: 0.0, ..rough.step };
         let first = self.cut_off.fit(table, &task, &self.overlay, start, None)?;
         // The surroundings that can be seen, beside the step as it really is.
         let share = |level: f64| (level - before) / height;
-        let (visible, hidden) = (share(first.step.visible), share(first.step.hidden));
+        let (visible, hidden) = (share(first.step.visible), share(first.step.clipped));
         let (before, after) = if hidden_after { (visible, hidden) } else { (hidden, visible) };
-        let step = Step { at: first.step.at, blur: first.step.blur, before, after };
-        let (extent, (slope, doubt)) = self.overlay.beside(table, &seen, &step, !hidden_after);
+        let step = BlurredStep { at: first.step.at, blur: first.step.blur, before, after };
+        let (extent, (slope, level_variance)) =
+            self.overlay.side_slope(table, &seen, &step, !hidden_after);
         task.room[0] = extent;
         task.shading = slope * height;
         let blur = self.cut_off.expected_blur(&first);
         let found = self.cut_off.fit(table, &task, &self.overlay, first.step, blur)?;
-        self.cut_off.remember(&found);
+        self.cut_off.keep_blur(&found);
         let per_level = std::f64::consts::PI * found.step.blur * found.step.blur;
         self.blur_px = found.step.blur;
         self.uncertainty.common_variance =
-            found.variance + per_level * doubt / (after - before).powi(2);
+            found.variance + per_level * level_variance / (after - before).powi(2);
         self.shift_course(found.step.at, 0.0, 1.0);
-        self.locate_cut_off(table, scene, &task, &found);
-        self.state = State::Open;
+        self.locate_clipped(table, scene, &task, &found);
+        self.state = EdgeState::Clear;
         Some(found)
     }
 
     /// Draws a path through the edges that were found, as smooth as the edge is.
-    fn straighten<T: Grey>(&mut self, scene: &Scene<'_, T>, blur: f64) {
-        let places = self.edges.iter().map(|edge| edge.map(|edge| narrow(edge.at)));
+    fn straighten<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: f64) {
+        let places = self.edges.iter().map(|edge| edge.map(|edge| narrow_to_f32(edge.at)));
         if !path::fill(places, &mut self.scratch.rough) {
             return;
         }
@@ -108,12 +123,13 @@ impl Tracer {
             .flatten()
             .fold((0.0, 0.0), |(sum, n), edge| (sum + edge.variance, n + 1.0));
         let variance = sum / f64::max(n, 1.0);
-        let limit = SMOOTHED_AWAY * narrow(variance) + (BESIDE_BLURS * narrow(blur)).powi(2);
+        let limit = MAX_SMOOTHING_RATIO * narrow_to_f32(variance)
+            + (MAX_SMOOTHING_BLURS * narrow_to_f32(blur)).powi(2);
         self.occlusion.free.clear();
         self.occlusion.free.extend_from_slice(&self.scratch.rough);
-        for _ in 0..SMOOTHINGS {
+        for _ in 0..MAX_SMOOTHINGS {
             path::smooth(&self.scratch.rough, &mut self.values.path);
-            if self.smoothed_away() > limit {
+            if self.smoothing_error() > limit {
                 break;
             }
             std::mem::swap(&mut self.scratch.rough, &mut self.values.path);
@@ -124,23 +140,24 @@ impl Tracer {
 
     /// Mean square of how far the path lies off the places that it was drawn through,
     /// from the median, so that a few wild ones do not count \[px²\].
-    fn smoothed_away(&mut self) -> f32 {
+    fn smoothing_error(&mut self) -> f32 {
         self.scratch.sorted.clear();
         let offs =
             self.values.path.iter().zip(&self.occlusion.free).map(|(path, at)| (path - at).powi(2));
         self.scratch.sorted.extend(offs);
-        rank::median(&mut self.scratch.sorted).unwrap_or(0.0) / narrow(rank::MEDIAN_SQUARE)
+        rank::median(&mut self.scratch.sorted).unwrap_or(0.0)
+            / narrow_to_f32(rank::MEDIAN_OF_SQUARED_NORMAL)
     }
 
-    fn locate_cut_off<T: Grey>(
+    fn locate_clipped<T: GreyPixel>(
         &mut self,
         table: &StepTable,
-        scene: &Scene<'_, T>,
-        task: &clipped_step::Scene,
-        found: &clipped_step::Found,
+        scene: &TraceInput<'_, T>,
+        task: &clipped_step::ClippedScene,
+        found: &clipped_step::ClippedStepFit,
     ) {
-        let height = found.step.hidden - found.step.visible;
-        let height = if task.hidden_after { height } else { -height };
+        let height = found.step.clipped - found.step.visible;
+        let height = if task.clipped_after { height } else { -height };
         for _ in 0..MAX_PASSES {
             let (edges, course) = (&mut self.edges, &self.course);
             let mut off: f64 = 0.0;
@@ -148,13 +165,19 @@ impl Tracer {
             let (sheet, lines) = (&self.sheet, scene.lines.len());
             self.misfit = self.cut_off.locate(table, task, sheet, lines, found, |line, located| {
                 edges.push(located.map(|located| {
-                    let [path, _, _] = course.at(narrow(scene.lines[line].middle()));
-                    let clipped_step::Line { moved, variance, share } = located;
+                    let [path, _, _] = course.at(narrow_to_f32(scene.lines[line].middle()));
+                    let clipped_step::ClippedLine { moved, variance, row_fraction: share } =
+                        located;
                     off = off.max(moved.abs());
-                    Located { at: f64::from(path) + moved, variance, height, share }
+                    CaliperEdge {
+                        at: f64::from(path) + moved,
+                        variance,
+                        height,
+                        row_fraction: share,
+                    }
                 }));
             });
-            if off <= NEAR_ENOUGH * found.step.blur {
+            if off <= MAX_PATH_ERROR_BLURS * found.step.blur {
                 break;
             }
             self.redraw(scene);

@@ -4,7 +4,7 @@ use crate::vision::template::RowSums;
 
 /// A few rows that are held against the edge together.
 #[derive(Debug, Clone, Copy)]
-pub struct Group {
+pub struct RowGroup {
     /// The band that they belong to.
     pub band: usize,
     /// Number of rows.
@@ -20,7 +20,7 @@ pub struct Group {
     pub misfit: f32,
 }
 
-impl Group {
+impl RowGroup {
     /// Rows that are not to be held.
     pub fn hidden(band: usize, weight: f32) -> Self {
         let (ahead, moved, misfit) = (0.0, 0.0, f32::INFINITY);

@@ -1,73 +1,77 @@
 //! An edge that grains or spots cover in part: which rows show it and nothing
 //! else. All that is known of it is taken from those rows alone.
 
-use super::{CLEAR_FIT, MANY_SIGMA, State, Tracer, typical};
+use super::{EdgeState, EdgeTracer, MAX_CLEAR_MISFIT, NOISE_SIGMAS, typical};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::narrow;
-use crate::numeric::number::single;
+use crate::numeric::number::narrow_to_f32;
+use crate::numeric::number::to_f32;
 use crate::numeric::rank;
 use crate::vision::blur_estimate::BlurEstimate;
-use crate::vision::consensus::agree;
-use crate::vision::overlay::{Extent, Shape};
+use crate::vision::consensus::keep_consensus;
+use crate::vision::overlay::{Extent, StepShape};
 use crate::vision::path;
-use crate::vision::strip::Grey;
-use crate::vision::template::{PlainSums, Template};
-use crate::vision::trace::Scene;
+use crate::vision::strip::GreyPixel;
+use crate::vision::template::{PlainSums, StepTemplate};
+use crate::vision::trace::TraceInput;
 
 /// Distance from the course of most bands from which a band is off \[px\].
-const OFF_PX: f32 = 0.8;
+const MAX_OFFSET_PX: f32 = 0.8;
 /// The same for a level, as a share of the step, and in standard deviations of
 /// a pixel beside.
-const OFF_LEVEL: f32 = 0.08;
-const OFF_LEVEL_SIGMA: f32 = 1.0;
+const MAX_LEVEL_OFFSET: f32 = 0.08;
+const MAX_LEVEL_OFFSET_SIGMAS: f32 = 1.0;
 /// How often rows are judged, each time by an edge that was read from those
 /// which passed before.
-const PASSES: usize = 3;
+const MAX_PASSES: usize = 3;
 /// Percentage of the rows that is taken to be clear whatever happens: the one
 /// that fits worst of them tells what fits.
-const SURELY_CLEAR: usize = 30;
+const CLEAR_PERCENTILE: usize = 30;
 /// By how much the squares that a row leaves may exceed that one's.
-const UNLIKE: f32 = 3.2;
+const MAX_MISFIT_RATIO: f32 = 3.2;
 /// The same at most, as a multiple of what noise leaves.
-const MOST_UNLIKE: f32 = 3.0;
+const MAX_NOISE_RATIO: f32 = 3.0;
 /// Farthest that the levels beside an edge may be from those a little away, as
 /// a share of the step: grains have levels of their own.
-const OTHER_LEVELS: f64 = 0.25;
+const MAX_LEVEL_DIFFERENCE: f64 = 0.25;
 /// Courses that are tried, and the share of clear rows along one that is enough
 /// to look for no other.
-const ATTEMPTS: usize = 3;
-const SURE: f32 = 0.4;
+const MAX_ATTEMPTS: usize = 3;
+const ENOUGH_CLEAR_FRACTION: f32 = 0.4;
 const NONE_CLEAR: f32 = 0.0;
 /// Farthest that a clear row's edge lies from its neighbours', in standard
 /// deviations.
-const FAR_SIGMA: f32 = 3.5;
+const MAX_OFFSET_SIGMAS: f32 = 3.5;
 /// What covers a row shades those beside it through the blur: so many blurs of
 /// distance are kept from it, fewer where little else is left.
-const BESIDE_BLURS: [f64; 4] = [2.0, 1.5, 1.0, 0.5];
+const MARGIN_BLURS: [f64; 4] = [2.0, 1.5, 1.0, 0.5];
 /// Share of the rows, and number of them, that are wanted and needed.
-const WANTED: (f32, f32) = (0.25, 20.0);
-const NEEDED: (f32, f32) = (0.12, 12.0);
+const WANTED_CLEAR_ROWS: (f32, f32) = (0.25, 20.0);
+const MIN_CLEAR_ROWS: (f32, f32) = (0.12, 12.0);
 /// Share of the rows that may show the same edge elsewhere, one after the
 /// other: more are not covered, but a bead of another shape.
-const ELSEWHERE: f32 = 0.08;
+const MAX_ELSEWHERE_FRACTION: f32 = 0.08;
 /// Distance from which on a row's edge is elsewhere \[px\].
-const ELSEWHERE_PX: f32 = 1.0;
+const MIN_ELSEWHERE_PX: f32 = 1.0;
 /// Share of an edge's places that may be strays.
-const MOST_STRAYS: f32 = 0.25;
+const MAX_STRAY_FRACTION: f32 = 0.25;
 
-impl Tracer {
+impl EdgeTracer {
     /// Locates an edge from the rows that show it and nothing else. Returns
     /// whether there are enough of them.
     #[cold]
     #[inline(never)]
-    pub(super) fn uncover<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
+    pub(super) fn locate_occluded<T: GreyPixel>(
+        &mut self,
+        table: &StepTable,
+        scene: &TraceInput<'_, T>,
+    ) -> bool {
         self.look_row_by_row();
         self.occlusion.free.clear();
         self.occlusion.free.extend_from_slice(&self.values.picked);
         let mut best = (NONE_CLEAR, 0);
-        for attempt in 0..ATTEMPTS {
+        for attempt in 0..MAX_ATTEMPTS {
             let clear = self.try_course(table, scene).unwrap_or(NONE_CLEAR);
-            if clear >= SURE {
+            if clear >= ENOUGH_CLEAR_FRACTION {
                 best = (clear, attempt);
                 break;
             }
@@ -77,20 +81,20 @@ impl Tracer {
                 self.occlusion.free.clear();
                 self.occlusion.free.extend_from_slice(&self.occlusion.best_free);
             }
-            if attempt + 1 < ATTEMPTS {
-                self.set_course_aside();
+            if attempt + 1 < MAX_ATTEMPTS {
+                self.exclude_course();
             }
         }
         if best.0 == NONE_CLEAR {
             return false;
         }
-        if best.0 < SURE {
+        if best.0 < ENOUGH_CLEAR_FRACTION {
             std::mem::swap(&mut self.occlusion.free, &mut self.occlusion.best_free);
             if self.try_course(table, scene).is_none() {
                 return false;
             }
         }
-        self.finish(table, scene)
+        self.locate_from_clear_rows(table, scene)
     }
 
     /// Rows are judged one by one, each against noise alone: what covers some of
@@ -108,18 +112,18 @@ impl Tracer {
     /// bands without.
     #[cold]
     #[inline(never)]
-    pub fn uncover_along<T: Grey>(
+    pub fn locate_occluded_along<T: GreyPixel>(
         &mut self,
         table: &StepTable,
-        scene: &Scene<'_, T>,
+        scene: &TraceInput<'_, T>,
         blur: BlurEstimate,
         places: &[f32],
     ) {
         self.look_row_by_row();
         self.occlusion.free.clear();
         self.occlusion.free.extend_from_slice(places);
-        if self.try_course(table, scene).is_some() && self.finish(table, scene) {
-            self.state = State::Covered;
+        if self.try_course(table, scene).is_some() && self.locate_from_clear_rows(table, scene) {
+            self.state = EdgeState::Occluded;
         } else {
             self.trace_again(table, scene, blur);
         }
@@ -132,15 +136,20 @@ impl Tracer {
     pub fn drop_strays(&mut self, least_px: f64) {
         self.scratch.rough.clear();
         let places = self.edges.iter();
-        self.scratch.rough.extend(places.map(|edge| edge.map_or(f32::NAN, |edge| narrow(edge.at))));
+        self.scratch
+            .rough
+            .extend(places.map(|edge| edge.map_or(f32::NAN, |edge| narrow_to_f32(edge.at))));
         self.scratch.sorted.clear();
         self.scratch
             .sorted
-            .extend(self.edges.iter().flatten().map(|edge| narrow(edge.variance.sqrt())));
+            .extend(self.edges.iter().flatten().map(|edge| narrow_to_f32(edge.variance.sqrt())));
         let count = self.scratch.sorted.len();
         let Some(sigma) = rank::median(&mut self.scratch.sorted) else { return };
-        let left = agree(&mut self.scratch.rough, narrow(least_px).max(MANY_SIGMA * sigma));
-        if single(count - left) > MOST_STRAYS * single(count) {
+        let left = keep_consensus(
+            &mut self.scratch.rough,
+            narrow_to_f32(least_px).max(NOISE_SIGMAS * sigma),
+        );
+        if to_f32(count - left) > MAX_STRAY_FRACTION * to_f32(count) {
             return;
         }
         for (edge, at) in self.edges.iter_mut().zip(&self.scratch.rough) {
@@ -152,21 +161,29 @@ impl Tracer {
 
     /// Locates the edge from its clear rows. Returns whether they show one.
     #[inline(never)]
-    fn finish<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
+    fn locate_from_clear_rows<T: GreyPixel>(
+        &mut self,
+        table: &StepTable,
+        scene: &TraceInput<'_, T>,
+    ) -> bool {
         let Some(shape) = self.read_shape(table, scene) else { return false };
         self.row_fit.template.tabulate(table, &shape, false);
         self.blur_px = shape.step.blur;
         self.uncertainty.common_variance = shape.variance;
-        self.hold(scene);
-        self.gather(scene);
+        self.compare_rows(scene);
+        self.sum_bands(scene);
         self.locate(scene, shape.step.blur);
-        self.misfit < CLEAR_FIT
+        self.misfit < MAX_CLEAR_MISFIT
     }
 
     /// Tells the clear rows along the course that most of the free bands agree
     /// on, and their share. `None` where there are too few.
     #[inline(never)]
-    fn try_course<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> Option<f32> {
+    fn try_course<T: GreyPixel>(
+        &mut self,
+        table: &StepTable,
+        scene: &TraceInput<'_, T>,
+    ) -> Option<f32> {
         self.occlusion.clear.clear();
         if !self.take_course(scene) {
             return None;
@@ -174,12 +191,12 @@ impl Tracer {
         self.read(scene);
         let (windows, trusted) = (self.sheet.windows(), &self.occlusion.trusted);
         let clear = |number: usize| trusted[scene.bands.band_of(windows[number].middle)];
-        self.overlay.settle(&self.sheet, clear);
-        for _ in 0..PASSES {
+        self.overlay.lay_robustly(&self.sheet, clear);
+        for _ in 0..MAX_PASSES {
             let shape = self.read_shape(table, scene)?;
             self.row_fit.template.tabulate(table, &shape, false);
             self.occlusion.clear.clear();
-            self.hold(scene);
+            self.compare_rows(scene);
             if !self.judge_rows(scene, shape.step.blur) {
                 return None;
             }
@@ -188,11 +205,11 @@ impl Tracer {
             let clear = &self.occlusion.clear;
             self.overlay.lay_clear(&self.sheet, |number| clear[number]);
         }
-        Some(self.clear_share())
+        Some(self.clear_fraction())
     }
 
     /// Takes the bands that agreed out of those that are free to.
-    fn set_course_aside(&mut self) {
+    fn exclude_course(&mut self) {
         for (free, trusted) in self.occlusion.free.iter_mut().zip(&self.occlusion.trusted) {
             if *trusted {
                 *free = f32::NAN;
@@ -201,10 +218,10 @@ impl Tracer {
     }
 
     /// The course that most bands agree on, in place and levels.
-    fn take_course<T: Grey>(&mut self, scene: &Scene<'_, T>) -> bool {
+    fn take_course<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         self.scratch.rough.clear();
         self.scratch.rough.extend_from_slice(&self.occlusion.free);
-        if agree(&mut self.scratch.rough, OFF_PX) < 4 {
+        if keep_consensus(&mut self.scratch.rough, MAX_OFFSET_PX) < 4 {
             return false;
         }
         self.occlusion.trusted.clear();
@@ -213,17 +230,17 @@ impl Tracer {
         std::mem::swap(&mut self.scratch.rough, &mut self.values.path);
         self.pick_raw_levels(scene);
         let step = typical(&self.values.step).abs();
-        let off = OFF_LEVEL * step + OFF_LEVEL_SIGMA * scene.noise;
+        let off = MAX_LEVEL_OFFSET * step + MAX_LEVEL_OFFSET_SIGMAS * scene.noise;
         // The level after the edge stands in for the step until it is smooth.
         for (step, before) in self.values.step.iter_mut().zip(&self.values.before) {
             *step += before;
         }
         std::mem::swap(&mut self.values.before, &mut self.scratch.rough);
-        agree(&mut self.scratch.rough, off);
+        keep_consensus(&mut self.scratch.rough, off);
         self.fill_rough();
         std::mem::swap(&mut self.values.before, &mut self.scratch.rough);
         std::mem::swap(&mut self.values.step, &mut self.scratch.rough);
-        agree(&mut self.scratch.rough, off);
+        keep_consensus(&mut self.scratch.rough, off);
         self.fill_rough();
         std::mem::swap(&mut self.values.step, &mut self.scratch.rough);
         for (step, before) in self.values.step.iter_mut().zip(&self.values.before) {
@@ -244,33 +261,37 @@ impl Tracer {
     /// Reads the edge's shape from the overlay and takes it over. Rows are
     /// known to be clear about the edge only: beside it spots may lie anywhere,
     /// and would pass for shading.
-    fn read_shape<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> Option<Shape> {
+    fn read_shape<T: GreyPixel>(
+        &mut self,
+        table: &StepTable,
+        scene: &TraceInput<'_, T>,
+    ) -> Option<StepShape> {
         let noise = f64::from(scene.noise) / f64::from(typical(&self.values.step).abs());
         let room = self.room(scene);
-        let look = self.overlay.look(table, noise, room)?;
-        let core = Template::core_half(look.step.blur);
+        let look = self.overlay.first_fit(table, noise, room)?;
+        let core = StepTemplate::core_half(look.step.blur);
         let room = Extent { before: room.before.min(core), after: room.after.min(core) };
-        let look = self.overlay.look(table, noise, room)?;
+        let look = self.overlay.first_fit(table, noise, room)?;
         let shape = self.overlay.shape(
             table,
             &look,
             BlurEstimate { px: look.step.blur, sd_px: f64::INFINITY },
         )?;
         let other = f64::max(shape.step.before.abs(), (shape.step.after - 1.0).abs());
-        if other > OTHER_LEVELS {
+        if other > MAX_LEVEL_DIFFERENCE {
             return None;
         }
-        Some(self.adopt(shape))
+        Some(self.apply_shape(shape))
     }
 
     /// Tells which rows are clear; returns whether there are enough.
     #[inline(never)]
-    fn judge_rows<T: Grey>(&mut self, scene: &Scene<'_, T>, blur: f64) -> bool {
-        let limit = self.limit_of_rows(scene.noise);
-        let far = self.far_of_rows(scene, limit);
+    fn judge_rows<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: f64) -> bool {
+        let limit = self.max_row_misfit(scene.noise);
+        let far = self.max_row_offset(scene, limit);
         let weight = self.row_fit.groups.first().map_or(1.0, |group| group.weight);
-        let rows = single(scene.strip.along);
-        for blurs in BESIDE_BLURS {
+        let rows = to_f32(scene.strip.along);
+        for blurs in MARGIN_BLURS {
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
@@ -283,30 +304,30 @@ impl Tracer {
                 let hit = self.row_fit.groups[near].iter().any(|group| group.misfit > limit);
                 self.occlusion.clear.push(!hit && group.moved.abs() <= far);
             }
-            let clear = self.clear_share() * rows;
-            if clear >= f32::max(WANTED.0 * rows, WANTED.1) {
+            let clear = self.clear_fraction() * rows;
+            if clear >= f32::max(WANTED_CLEAR_ROWS.0 * rows, WANTED_CLEAR_ROWS.1) {
                 break;
             }
         }
-        let clear = self.clear_share() * rows;
-        clear >= f32::max(NEEDED.0 * rows, NEEDED.1)
-            && self.elsewhere(scene, limit) <= ELSEWHERE * rows
+        let clear = self.clear_fraction() * rows;
+        clear >= f32::max(MIN_CLEAR_ROWS.0 * rows, MIN_CLEAR_ROWS.1)
+            && self.elsewhere(scene, limit) <= MAX_ELSEWHERE_FRACTION * rows
     }
 
     /// Squares that a clear row leaves at most.
-    fn limit_of_rows(&mut self, noise: f32) -> f32 {
+    fn max_row_misfit(&mut self, noise: f32) -> f32 {
         self.scratch.sorted.clear();
         self.scratch.sorted.extend(self.row_fit.groups.iter().map(|group| group.misfit));
-        let rank = self.scratch.sorted.len() * SURELY_CLEAR / 100;
+        let rank = self.scratch.sorted.len() * CLEAR_PERCENTILE / 100;
         let sure = rank::at(&mut self.scratch.sorted, rank).unwrap_or(f32::INFINITY);
-        let pixels = narrow(self.row_fit.template.products.pixels);
-        let noise = noise * noise * (pixels + MANY_SIGMA * (2.0 * pixels).sqrt());
-        noise.max(f32::min(UNLIKE * sure, MOST_UNLIKE * noise))
+        let pixels = narrow_to_f32(self.row_fit.template.products.pixels);
+        let noise = noise * noise * (pixels + NOISE_SIGMAS * (2.0 * pixels).sqrt());
+        noise.max(f32::min(MAX_MISFIT_RATIO * sure, MAX_NOISE_RATIO * noise))
     }
 
     /// How far the edge of a clear row lies from the course at most \[px\].
-    fn far_of_rows<T: Grey>(&mut self, scene: &Scene<'_, T>, limit: f32) -> f32 {
-        let stiffness = narrow(self.row_fit.template.products.slope_slope);
+    fn max_row_offset<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, limit: f32) -> f32 {
+        let stiffness = narrow_to_f32(self.row_fit.template.products.slope_slope);
         let step = typical(&self.values.step).abs();
         let weight = self.row_fit.groups.first().map_or(1.0, |group| group.weight);
         let noise = scene.noise / (step * stiffness.sqrt() * weight.sqrt());
@@ -314,18 +335,18 @@ impl Tracer {
         let likely = self.row_fit.groups.iter().filter(|group| group.misfit <= limit);
         self.scratch.sorted.extend(likely.map(|group| group.moved.abs()));
         let median = rank::median(&mut self.scratch.sorted).unwrap_or(0.0);
-        FAR_SIGMA * noise.max(1.48 * median)
+        MAX_OFFSET_SIGMAS * noise.max(1.48 * median)
     }
 
-    fn clear_share(&self) -> f32 {
+    fn clear_fraction(&self) -> f32 {
         let clear = self.occlusion.clear.iter().filter(|clear| **clear).count();
-        single(clear) / single(self.occlusion.clear.len().max(1))
+        to_f32(clear) / to_f32(self.occlusion.clear.len().max(1))
     }
 
     /// Longest run of rows that do not fit, but show the same edge where their
     /// band has one.
     #[inline(never)]
-    fn elsewhere<T: Grey>(&self, scene: &Scene<'_, T>, limit: f32) -> f32 {
+    fn elsewhere<T: GreyPixel>(&self, scene: &TraceInput<'_, T>, limit: f32) -> f32 {
         let (mut longest, mut run) = (0.0f32, 0.0);
         let windows = self.sheet.windows();
         for (number, (group, clear)) in
@@ -334,7 +355,11 @@ impl Tracer {
             let window = &windows[number];
             let at = self.values.picked[scene.bands.band_of(window.middle)];
             let [path, before, step] = window.expected;
-            if *clear || group.misfit <= limit || at.is_nan() || (at - path).abs() < ELSEWHERE_PX {
+            if *clear
+                || group.misfit <= limit
+                || at.is_nan()
+                || (at - path).abs() < MIN_ELSEWHERE_PX
+            {
                 run = 0.0;
                 continue;
             }
@@ -342,7 +367,7 @@ impl Tracer {
             let expected = Self::expected([at, before, step], noise);
             let mut plain = PlainSums::default();
             let pixels = (self.sheet.pixels(number).as_slice(), window.first);
-            let sums = self.row_fit.template.hold(pixels, &expected, &mut plain);
+            let sums = self.row_fit.template.compare(pixels, &expected, &mut plain);
             let fits = sums.is_some_and(|sums| self.misfit(&sums, group.weight) <= limit);
             run = if fits { run + group.weight } else { 0.0 };
             longest = longest.max(run);
@@ -351,7 +376,7 @@ impl Tracer {
     }
 
     /// Leads the course through the clear rows.
-    fn follow<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+    fn follow<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         self.scratch.rough.clear();
         let mut first = 0;
         for band in 0..scene.lines.len() {
@@ -367,7 +392,7 @@ impl Tracer {
         }
         self.fill_rough();
         for (at, &line) in self.scratch.rough.iter_mut().zip(scene.lines) {
-            *at += self.course.at(narrow(line.middle()))[0];
+            *at += self.course.at(narrow_to_f32(line.middle()))[0];
         }
         self.course.redraw(scene.lines, &self.scratch.rough, &mut self.scratch.course);
     }

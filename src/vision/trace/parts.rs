@@ -1,25 +1,25 @@
 //! What a tracer keeps of an edge, by what it is for.
 
 use super::band_sums::BandSums;
-use super::group::Group;
-use crate::vision::template::textured::Scatter;
-use crate::vision::template::{PlainSums, Template};
-use crate::vision::texture::Texture;
-use crate::vision::whiten::Whitener;
+use super::group::RowGroup;
+use crate::vision::template::textured::TexturePositionVariance;
+use crate::vision::template::{PlainSums, StepTemplate};
+use crate::vision::texture::SurfaceTexture;
+use crate::vision::whiten::NoiseWhitener;
 
 /// What is known of an edge.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) enum State {
+pub(super) enum EdgeState {
     /// Nothing yet.
     #[default]
-    Unseen,
+    NotFound,
     /// Nothing covers it, as far as it shows.
-    Open,
+    Clear,
     /// It is covered in part, and located from its clear rows alone.
-    Covered,
+    Occluded,
     /// It seems to be covered, but no clear rows were found: it is located as if
     /// it were open.
-    Hidden,
+    Unresolved,
 }
 
 /// What is known of an edge band by band.
@@ -37,7 +37,7 @@ pub(super) struct BandValues {
 
 /// Whether an edge winds between bands.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Winding {
+pub(super) struct WindingState {
     /// Whether the course was picked from line to line.
     pub(super) is_followed: bool,
     /// How far bands lie off the line between their neighbours; more than 1 where the
@@ -47,19 +47,19 @@ pub(super) struct Winding {
 
 /// The texture beside an edge, and weights that know it.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Textured {
-    pub(super) texture: Option<Texture>,
-    pub(super) whitener: Whitener,
+pub(super) struct TexturedFit {
+    pub(super) texture: Option<SurfaceTexture>,
+    pub(super) whitener: NoiseWhitener,
     /// How far places scatter with these weights.
-    pub(super) scatter: Option<Scatter>,
+    pub(super) scatter: Option<TexturePositionVariance>,
 }
 
 /// Rows held against the edge.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RowFit {
-    pub(super) template: Template,
+    pub(super) template: StepTemplate,
     /// Rows that were held together.
-    pub(super) groups: Vec<Group>,
+    pub(super) groups: Vec<RowGroup>,
     /// Plain pixels of each band.
     pub(super) plain: Vec<PlainSums>,
     /// Sums over the rows of each band.
@@ -83,7 +83,7 @@ pub(super) struct Occlusion {
 
 /// Scratch memory.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Scratch {
+pub(super) struct TraceScratch {
     /// Rough values, one a band or a line.
     pub(super) rough: Vec<f32>,
     pub(super) sorted: Vec<f32>,
@@ -94,7 +94,7 @@ pub(super) struct Scratch {
 
 /// How sure the places of an edge are, beside what each of them says.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Uncertainty {
+pub struct EdgeUncertainty {
     /// Variance of the whole edge's position that all places share, from
     /// shading that is not known better \[px²\].
     pub common_variance: f64,

@@ -4,28 +4,28 @@
 use nalgebra::Matrix3;
 
 use super::band_sums::BandSums;
-use super::group::Group;
-use super::{MANY_SIGMA, Scene, Tracer};
-use crate::numeric::number::{float, narrow};
+use super::group::RowGroup;
+use super::{EdgeTracer, NOISE_SIGMAS, TraceInput};
+use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::numeric::rank;
-use crate::vision::strip::Grey;
-use crate::vision::template::{Expected, PlainSums, RowSums};
+use crate::vision::strip::GreyPixel;
+use crate::vision::template::{ExpectedStep, PlainSums, RowSums};
 
 /// A row that fits worse than the median by so many times does not count.
-const UNLIKE: f32 = 2.5;
+const MAX_MISFIT_RATIO: f32 = 2.5;
 /// Rows of a band may differ by this much beside their noise \[px\].
-const WAVY_PX: f32 = 0.5;
+const ROW_WAVINESS_PX: f32 = 0.5;
 /// Wild pixels that a row may have; more are a grain.
-const FEW_WILD: f32 = 2.0;
+const MAX_WILD_PIXELS: f32 = 2.0;
 /// By how much the squares that a row leaves exceed what may be noise, where it
 /// is covered for certain.
-const UNFIT: f32 = 1.5;
+const UNFIT_MISFIT_RATIO: f32 = 1.5;
 
-impl Tracer {
+impl EdgeTracer {
     /// Holds every window against the edge.
     #[inline(always)]
-    pub(super) fn hold<T: Grey>(&mut self, scene: &Scene<'_, T>) {
-        let softness = 1.0 / narrow(self.row_fit.template.products.slope_slope);
+    pub(super) fn compare_rows<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
+        let softness = 1.0 / narrow_to_f32(self.row_fit.template.products.slope_slope);
         self.row_fit.groups.clear();
         self.row_fit.plain.clear();
         self.row_fit.plain.resize(scene.lines.len(), PlainSums::default());
@@ -34,7 +34,7 @@ impl Tracer {
         for (number, window) in self.sheet.windows().iter().enumerate() {
             let (band, weight) = (window.line, window.rows);
             if self.occlusion.clear.get(number) == Some(&false) {
-                self.row_fit.groups.push(Group::hidden(band, weight));
+                self.row_fit.groups.push(RowGroup::hidden(band, weight));
                 continue;
             }
             let [path, _, step] = window.expected;
@@ -43,41 +43,42 @@ impl Tracer {
             }
             let expected = Self::expected(window.expected, noise);
             let pixels = (self.sheet.pixels(number).as_slice(), window.first);
-            let sums = self.row_fit.template.hold(pixels, &expected, &mut self.row_fit.plain[band]);
+            let sums =
+                self.row_fit.template.compare(pixels, &expected, &mut self.row_fit.plain[band]);
             let sums = sums.unwrap_or(RowSums::OUT_OF_SIGHT);
             let ahead = expected.at - path;
             let moved = ahead - sums.slope * softness / step;
             let misfit = self.misfit(&sums, weight);
-            self.row_fit.groups.push(Group { band, weight, ahead, sums, moved, misfit });
+            self.row_fit.groups.push(RowGroup { band, weight, ahead, sums, moved, misfit });
         }
     }
 
     /// What the mean of some rows is held against, whose pixels have a noise.
     #[inline(always)]
-    pub(super) fn expected(edge: [f32; 3], noise: f32) -> Expected {
-        let (noise, step) = (MANY_SIGMA * noise, edge[2].abs());
-        Expected::new(edge, [noise + 0.05 * step, noise + 0.15 * step])
+    pub(super) fn expected(edge: [f32; 3], noise: f32) -> ExpectedStep {
+        let (noise, step) = (NOISE_SIGMAS * noise, edge[2].abs());
+        ExpectedStep::new(edge, [noise + 0.05 * step, noise + 0.15 * step])
     }
 
     /// Sum of the squares of what does not fit, as if of a single row, so that
     /// groups of all sizes compare \[grey levels²\].
     #[inline(always)]
     pub(super) fn misfit(&self, sums: &RowSums, weight: f32) -> f32 {
-        if sums.wild > FEW_WILD {
+        if sums.wild > MAX_WILD_PIXELS {
             return f32::INFINITY;
         }
         // Weights that know a texture are not the slope of the step.
         if self.textured.texture.is_some() {
-            return weight * sums.squares;
+            return weight * sums.sum_of_squares;
         }
-        let stiffness = narrow(self.row_fit.template.products.slope_slope);
-        weight * (sums.squares - sums.slope * sums.slope / stiffness)
+        let stiffness = narrow_to_f32(self.row_fit.template.products.slope_slope);
+        weight * (sums.sum_of_squares - sums.slope * sums.slope / stiffness)
     }
 
     /// Sums up the rows of each band, without those on which a grain or a
     /// spark lies.
     #[inline(always)]
-    pub(super) fn gather<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+    pub(super) fn sum_bands<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let products = self.row_fit.template.products;
         self.scratch.sorted.clear();
         self.scratch.sorted.extend(self.row_fit.groups.iter().map(|group| group.misfit));
@@ -86,20 +87,22 @@ impl Tracer {
             self.scratch.sorted.retain(|misfit| misfit.is_finite());
         }
         let median = rank::median(&mut self.scratch.sorted).unwrap_or(f32::INFINITY);
-        let pixels = narrow(products.pixels);
+        let pixels = narrow_to_f32(products.pixels);
         let together =
             self.row_fit.groups.iter().fold(1.0, |most: f32, group| most.max(group.weight));
         let variance = together * self.pixel_variance(scene, together);
-        let alike = self.textured.texture.map_or(1.0, |texture| narrow(texture.pixels_alike()));
-        let limit = variance * (pixels + MANY_SIGMA * (2.0 * pixels * alike).sqrt());
-        let limit = limit.max(UNLIKE * median);
+        let alike =
+            self.textured.texture.map_or(1.0, |texture| narrow_to_f32(texture.effective_pixels()));
+        let limit = variance * (pixels + NOISE_SIGMAS * (2.0 * pixels * alike).sqrt());
+        let limit = limit.max(MAX_MISFIT_RATIO * median);
         self.misfit = f64::from(median / (variance * pixels)).sqrt();
         // The variance of a window in texture has the texture's share of it already.
-        self.together = if self.textured.texture.is_some() { 1.0 } else { together.into() };
-        let covered =
-            |group: &&Group| group.misfit > UNFIT * limit || group.misfit == f32::INFINITY;
+        self.max_group_rows = if self.textured.texture.is_some() { 1.0 } else { together.into() };
+        let covered = |group: &&RowGroup| {
+            group.misfit > UNFIT_MISFIT_RATIO * limit || group.misfit == f32::INFINITY
+        };
         let unfit = self.row_fit.groups.iter().filter(covered).count();
-        self.unfit = float(unfit) / float(self.row_fit.groups.len().max(1));
+        self.unfit_fraction = to_f64(unfit) / to_f64(self.row_fit.groups.len().max(1));
         if self.occlusion.clear.is_empty() {
             self.spread_misfits(limit);
         }
@@ -110,7 +113,7 @@ impl Tracer {
             while end < self.row_fit.groups.len() && self.row_fit.groups[end].band == band {
                 end += 1;
             }
-            let sums = self.gather_band(scene, (band, first..end), limit, &products.matrix());
+            let sums = self.sum_band(scene, (band, first..end), limit, &products.matrix());
             self.row_fit.solved.push(sums);
             first = end;
         }
@@ -131,21 +134,21 @@ impl Tracer {
     }
 
     #[inline(always)]
-    fn gather_band<T: Grey>(
+    fn sum_band<T: GreyPixel>(
         &mut self,
-        scene: &Scene<'_, T>,
+        scene: &TraceInput<'_, T>,
         (band, groups): (usize, std::ops::Range<usize>),
         limit: f32,
         core: &Matrix3<f64>,
     ) -> BandSums {
-        let stiffness = narrow(core[(0, 0)]);
-        let [_, _, step] = self.course.at(narrow(scene.lines[band].middle()));
+        let stiffness = narrow_to_f32(core[(0, 0)]);
+        let [_, _, step] = self.course.at(narrow_to_f32(scene.lines[band].middle()));
         let groups = &self.row_fit.groups[groups];
         self.scratch.sorted.clear();
         let fitting = groups.iter().filter(|group| group.misfit <= limit);
         self.scratch.sorted.extend(fitting.map(|group| group.moved));
         let typical = median_of_few(&mut self.scratch.sorted);
-        let in_texture = self.textured.scatter.map(|scatter| narrow(scatter.of_window));
+        let in_texture = self.textured.scatter.map(|scatter| narrow_to_f32(scatter.of_window));
         let of_window = |weight: f32| {
             in_texture.unwrap_or(scene.noise * scene.noise / (weight * stiffness)).sqrt()
         };
@@ -157,7 +160,7 @@ impl Tracer {
             ..BandSums::default()
         };
         for group in groups {
-            let far = MANY_SIGMA * of_window(group.weight) / step.abs() + WAVY_PX;
+            let far = NOISE_SIGMAS * of_window(group.weight) / step.abs() + ROW_WAVINESS_PX;
             let counts = group.misfit <= limit && (group.moved - typical).abs() <= far;
             sums.all_rows += f64::from(group.weight);
             if self.occlusion.clear.is_empty() || group.misfit < f32::INFINITY {

@@ -1,39 +1,39 @@
 //! An edge that winds more quickly than the bands of the first pick show it, as that of
 //! a rough bead does in a tall gauge: it is picked anew, caliper line by caliper line.
 
-use super::{COVERED_SHARE, Look, Scene, Tracer, typical};
+use super::{EdgeTracer, MAX_UNFIT_FRACTION, StepFit, TraceInput, typical};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::narrow;
-use crate::numeric::number::single;
+use crate::numeric::number::narrow_to_f32;
+use crate::numeric::number::to_f32;
 use crate::numeric::rank;
-use crate::vision::edge_windows::{Grouping, MIDDLE, PLENTY, SPAN, Window};
+use crate::vision::edge_windows::{EdgeWindow, Grouping, MAX_SINGLE_ROWS, MIDDLE_PX, WINDOW_PX};
 use crate::vision::path;
-use crate::vision::strip::Grey;
+use crate::vision::strip::GreyPixel;
 
 /// How far a band lies off the line between its neighbours from which on an edge winds
 /// \[px\]: three of four bands do. Grains on a tenth of the rows do not make an edge
 /// wind; those on a third do.
-const WINDING_PX: f32 = 0.12;
+const MIN_WINDING_PX: f32 = 0.12;
 /// The same for each share of the step that the noise of a pixel is \[px\]: picks
 /// scatter by it.
-const WINDING_IN_NOISE_PX: f32 = 2.5;
+const WINDING_PER_NOISE_PX: f32 = 2.5;
 /// Share of its rows that an edge may lose to a spark or two; one that loses more
 /// may wind.
-const MOST_LOST: f64 = 0.12;
+const MAX_LOST_FRACTION: f64 = 0.12;
 /// Times that a winding edge is followed.
-const PASSES: usize = 3;
+const MAX_PASSES: usize = 3;
 /// How far beside the line between two bands the edge is looked for \[px\].
-const ASIDE_PX: usize = 8;
+const SEARCH_HALF_PX: usize = 8;
 /// Pixels on either side of a step that tell its height.
-const REACH: usize = 4;
+const STEP_HALF_WIDTH: usize = 4;
 /// Share of the expected step that a line must show.
-const LEAST_STEP: f32 = 0.25;
+const MIN_STEP_FRACTION: f32 = 0.25;
 
-impl Tracer {
+impl EdgeTracer {
     /// Draws the path of a winding edge from line to line, where there are more lines
     /// than bands.
     #[inline(always)]
-    pub(super) fn follow_windings<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+    pub(super) fn follow_windings<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         self.winding.excess = if could_wind(scene) { self.winding(scene.noise) } else { 0.0 };
         if self.seems_winding() {
             self.pick_lines(scene);
@@ -41,8 +41,8 @@ impl Tracer {
     }
 
     /// Whether an edge that could wind has lost more rows than sparks explain.
-    pub(super) fn lost_rows<T: Grey>(&self, scene: &Scene<'_, T>) -> bool {
-        could_wind(scene) && self.used_share() < 1.0 - MOST_LOST
+    pub(super) fn lost_rows<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> bool {
+        could_wind(scene) && self.used_fraction() < 1.0 - MAX_LOST_FRACTION
     }
 
     /// Whether the edge winds more quickly than bands show it, as far as they tell.
@@ -53,7 +53,8 @@ impl Tracer {
     /// How far most bands lie off the line between their neighbours, 1 where that is
     /// more than picks scatter.
     fn winding(&mut self, noise: f32) -> f32 {
-        let least = WINDING_PX.max(WINDING_IN_NOISE_PX * noise / typical(&self.values.step).abs());
+        let least =
+            MIN_WINDING_PX.max(WINDING_PER_NOISE_PX * noise / typical(&self.values.step).abs());
         self.scratch.sorted.clear();
         let offs =
             self.values.picked.windows(3).map(|near| (near[1] - 0.5 * (near[0] + near[2])).abs());
@@ -66,24 +67,24 @@ impl Tracer {
     /// few rows show it: then it winds, and nothing covers it.
     #[cold]
     #[inline(never)]
-    pub(super) fn trace_winding<T: Grey>(
+    pub(super) fn trace_winding<T: GreyPixel>(
         &mut self,
         table: &StepTable,
-        scene: &Scene<'_, T>,
+        scene: &TraceInput<'_, T>,
     ) -> bool {
-        if !could_wind(scene) || self.seen.is_none() || !self.pick_lines(scene) {
+        if !could_wind(scene) || self.step_fit.is_none() || !self.pick_lines(scene) {
             return false;
         }
-        for _ in 0..PASSES {
+        for _ in 0..MAX_PASSES {
             self.lay_over(table, scene);
-            let Some(Look { room, .. }) = self.seen else { return false };
+            let Some(StepFit { room, .. }) = self.step_fit else { return false };
             self.pick_levels_within(scene, room);
             let Some(blur) = self.lay_over(table, scene) else { return false };
             self.take_shape(table, blur);
             if !self.trace_open(table, scene) {
                 return false;
             }
-            if self.unfit <= COVERED_SHARE && !self.lost_rows(scene) {
+            if self.unfit_fraction <= MAX_UNFIT_FRACTION && !self.lost_rows(scene) {
                 return true;
             }
             self.redraw(scene);
@@ -93,11 +94,11 @@ impl Tracer {
 
     /// Fills the rough places with the edges that were found; where none was, a
     /// winding edge stays on its course, and another one runs straight on.
-    pub(super) fn fill_from_edges<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+    pub(super) fn fill_from_edges<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let (course, winds) = (&self.course, self.winding.is_followed);
         let places = self.edges.iter().zip(scene.lines).map(|(edge, &line)| match edge {
-            Some(edge) => Some(narrow(edge.at)),
-            None => winds.then(|| course.at(narrow(line.middle()))[0]),
+            Some(edge) => Some(narrow_to_f32(edge.at)),
+            None => winds.then(|| course.at(narrow_to_f32(line.middle()))[0]),
         });
         path::fill(places, &mut self.scratch.rough);
     }
@@ -106,12 +107,12 @@ impl Tracer {
     /// Returns whether there is any.
     #[cold]
     #[inline(never)]
-    fn pick_lines<T: Grey>(&mut self, scene: &Scene<'_, T>) -> bool {
+    fn pick_lines<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         let picked = self.values.picked.iter().map(|at| at.is_finite().then_some(*at));
         if !path::fill(picked, &mut self.values.path) {
             return false;
         }
-        path::take_out_wild(&mut self.values.path, &mut self.scratch.sorted);
+        path::remove_outliers(&mut self.values.path, &mut self.scratch.sorted);
         let rest = self.values.path.iter().map(|at| at.is_finite().then_some(*at));
         path::fill(rest, &mut self.scratch.rough);
         std::mem::swap(&mut self.values.path, &mut self.scratch.rough);
@@ -138,24 +139,24 @@ impl Tracer {
 
 /// Whether there are more lines than bands, so that an edge may wind between these,
 /// and plenty of rows, so that those of a line are read together.
-fn could_wind<T: Grey>(scene: &Scene<'_, T>) -> bool {
-    scene.lines.len() > scene.bands.count() && scene.strip.along > PLENTY
+fn could_wind<T: GreyPixel>(scene: &TraceInput<'_, T>) -> bool {
+    scene.lines.len() > scene.bands.count() && scene.strip.along > MAX_SINGLE_ROWS
 }
 
 /// Place of the highest step of the expected kind in a window \[px\].
-fn pick(window: &Window, pixels: &[f32; SPAN]) -> Option<f32> {
+fn pick(window: &EdgeWindow, pixels: &[f32; WINDOW_PX]) -> Option<f32> {
     let [_, _, step] = window.expected;
     let height = |k: usize| {
-        let sum = |from: usize| pixels[from..from + REACH].iter().sum::<f32>();
-        (sum(k) - sum(k - REACH)) / step
+        let sum = |from: usize| pixels[from..from + STEP_HALF_WIDTH].iter().sum::<f32>();
+        (sum(k) - sum(k - STEP_HALF_WIDTH)) / step
     };
-    let near = MIDDLE - ASIDE_PX..=MIDDLE + 1 + ASIDE_PX;
+    let near = MIDDLE_PX - SEARCH_HALF_PX..=MIDDLE_PX + 1 + SEARCH_HALF_PX;
     let best = near.max_by(|&a, &b| height(a).total_cmp(&height(b)))?;
     let [before, here, after] = [height(best - 1), height(best), height(best + 1)];
     let bend = before + after - 2.0 * here;
-    let enough = here >= LEAST_STEP * single(REACH) && bend < 0.0;
+    let enough = here >= MIN_STEP_FRACTION * to_f32(STEP_HALF_WIDTH) && bend < 0.0;
     let ahead = (0.5 * (before - after) / bend).clamp(-1.0, 1.0);
-    enough.then(|| place(window.first) + single(best) - 0.5 + ahead)
+    enough.then(|| place(window.first) + to_f32(best) - 0.5 + ahead)
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a place near the gauge")]
@@ -167,17 +168,17 @@ fn place(at: isize) -> f32 {
 mod tests {
     use super::*;
 
-    fn window(at: f64, heights: [f64; 2]) -> (Window, [f32; SPAN]) {
+    fn window(at: f64, heights: [f64; 2]) -> (EdgeWindow, [f32; WINDOW_PX]) {
         let table = StepTable::default();
         let level = |from: f64, k: usize| {
-            let (step, _) = table.at((f64::from(single(k)) + 100.0 - from) / 1.5);
+            let (step, _) = table.at((f64::from(to_f32(k)) + 100.0 - from) / 1.5);
             step
         };
         let pixels = std::array::from_fn(|k| {
-            narrow(40.0 + heights[0] * level(at, k) + heights[1] * level(at - 30.0, k))
+            narrow_to_f32(40.0 + heights[0] * level(at, k) + heights[1] * level(at - 30.0, k))
         });
-        let expected = [156.0, 40.0, narrow(heights[0])];
-        (Window { line: 0, rows: 8.0, middle: 3.5, first: 100, expected }, pixels)
+        let expected = [156.0, 40.0, narrow_to_f32(heights[0])];
+        (EdgeWindow { line: 0, rows: 8.0, middle: 3.5, first: 100, expected }, pixels)
     }
 
     #[test]

@@ -4,32 +4,32 @@
 use std::f64::consts::TAU;
 
 /// Standard deviation of either part before anything is seen.
-const AMPLITUDE: f64 = 0.03;
+const AMPLITUDE_SIGMA: f64 = 0.03;
 /// How far either part wanders in a radian, as a standard deviation.
-const WANDER: f64 = 2e-4;
+const DRIFT_PER_ROOT_RAD: f64 = 2e-4;
 /// Standard deviation of the level before anything is seen.
-const LEVEL: f64 = 0.1;
+const LEVEL_SIGMA: f64 = 0.1;
 /// Most of a squared surprise that counts, for an outlier is no evidence.
-const MOST: f64 = 9.0;
+const MAX_SQUARED_INNOVATION: f64 = 9.0;
 
 /// Level, the part that is now at its largest, and the part a quarter of a
 /// period ahead of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tone {
+pub struct Harmonic {
     rad_per_s: f64,
     parts: [f64; 3],
     /// Covariance of level and parts: (0,0), (0,1), (0,2), (1,1), (1,2), (2,2).
-    spread: [f64; 6],
+    covariance: [f64; 6],
     known: bool,
 }
 
-impl Tone {
+impl Harmonic {
     /// Of a period \[s\]; infinite for a level alone.
     pub fn new(period_s: f64) -> Self {
         let rad_per_s = TAU / period_s;
-        let part = if rad_per_s > 0.0 { AMPLITUDE * AMPLITUDE } else { 0.0 };
-        let spread = [LEVEL * LEVEL, 0.0, 0.0, part, 0.0, part];
-        Self { rad_per_s, parts: [0.0; 3], spread, known: false }
+        let part = if rad_per_s > 0.0 { AMPLITUDE_SIGMA * AMPLITUDE_SIGMA } else { 0.0 };
+        let spread = [LEVEL_SIGMA * LEVEL_SIGMA, 0.0, 0.0, part, 0.0, part];
+        Self { rad_per_s, parts: [0.0; 3], covariance: spread, known: false }
     }
 
     /// Period \[s\].
@@ -39,22 +39,22 @@ impl Tone {
 
     /// Takes a value `dt_s` after the last one, and says how well it was
     /// foretold: the logarithm of its likelihood.
-    pub fn take(&mut self, dt_s: f64, value: f64, variance: f64, drift: f64) -> f64 {
+    pub fn update(&mut self, dt_s: f64, value: f64, variance: f64, drift: f64) -> f64 {
         if !self.known {
             self.known = true;
             self.parts[0] = value;
             return 0.0;
         }
-        self.turn(dt_s, drift);
-        let [p00, p01, p02, p11, p12, p22] = self.spread;
+        self.rotate(dt_s, drift);
+        let [p00, p01, p02, p11, p12, p22] = self.covariance;
         let (h0, h1, h2) = (p00 + p01, p01 + p11, p02 + p12);
         let total = (h0 + h1).max(0.0) + variance;
         let by = value - self.parts[0] - self.parts[1];
-        let squared = (by * by / total).min(MOST);
-        let most = (MOST * total).sqrt();
+        let squared = (by * by / total).min(MAX_SQUARED_INNOVATION);
+        let most = (MAX_SQUARED_INNOVATION * total).sqrt();
         let by = by.clamp(-most, most) / total;
         self.parts = [self.parts[0] + h0 * by, self.parts[1] + h1 * by, self.parts[2] + h2 * by];
-        self.spread = [
+        self.covariance = [
             p00 - h0 * h0 / total,
             p01 - h0 * h1 / total,
             p02 - h0 * h2 / total,
@@ -65,32 +65,32 @@ impl Tone {
         -0.5 * (squared + libm::log(total))
     }
 
-    fn turn(&mut self, dt_s: f64, drift: f64) {
+    fn rotate(&mut self, dt_s: f64, drift: f64) {
         let angle = self.rad_per_s * dt_s;
-        let [p00, p01, p02, p11, p12, p22] = self.spread;
+        let [p00, p01, p02, p11, p12, p22] = self.covariance;
         if angle == 0.0 {
-            self.spread[0] = p00 + drift;
+            self.covariance[0] = p00 + drift;
             return;
         }
         let (sin, cos) = libm::sincos(angle);
         let [level, a, b] = self.parts;
         self.parts = [level, cos * a + sin * b, cos * b - sin * a];
-        let wander = 2.0 * WANDER * WANDER * angle;
+        let part_drift = 2.0 * DRIFT_PER_ROOT_RAD * DRIFT_PER_ROOT_RAD * angle;
         let (cc, ss, cs) = (cos * cos, sin * sin, cos * sin);
-        self.spread = [
+        self.covariance = [
             p00 + drift,
             cos * p01 + sin * p02,
             cos * p02 - sin * p01,
-            cc * p11 + 2.0 * cs * p12 + ss * p22 + wander,
+            cc * p11 + 2.0 * cs * p12 + ss * p22 + part_drift,
             (cc - ss) * p12 + cs * (p22 - p11),
-            ss * p11 - 2.0 * cs * p12 + cc * p22 + wander,
+            ss * p11 - 2.0 * cs * p12 + cc * p22 + part_drift,
         ];
     }
 
     /// The level has changed, and it is known to a variance by how much.
     pub fn shift(&mut self, by: f64, variance: f64) {
         self.parts[0] += by;
-        self.spread[0] += variance;
+        self.covariance[0] += variance;
     }
 
     /// The pulsation `dt_s` after the last value.
@@ -115,9 +115,9 @@ mod tests {
     fn a_pulsation_of_its_period_is_foretold() {
         let period = 2.3;
         let truth = |at: f64| 3.7 + 0.02 * (TAU * at / period + 0.4).sin();
-        let mut tone = Tone::new(period);
+        let mut tone = Harmonic::new(period);
         for k in 0..600 {
-            let _ = tone.take(0.02, truth(0.02 * f64::from(k)), 1e-6, 1e-9);
+            let _ = tone.update(0.02, truth(0.02 * f64::from(k)), 1e-6, 1e-9);
         }
         let last = 0.02 * 599.0;
         for ahead in [0.0, 0.5, 1.3] {
@@ -130,9 +130,9 @@ mod tests {
 
     #[test]
     fn a_level_alone_has_no_pulsation() {
-        let mut tone = Tone::new(f64::INFINITY);
+        let mut tone = Harmonic::new(f64::INFINITY);
         for k in 0..100 {
-            let _ = tone.take(0.1, 3.7 + 0.01 * f64::from(k % 2), 1e-4, 1e-8);
+            let _ = tone.update(0.1, 3.7 + 0.01 * f64::from(k % 2), 1e-4, 1e-8);
         }
         assert_eq!(tone.at(0.3), 0.0);
     }

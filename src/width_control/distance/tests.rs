@@ -6,7 +6,7 @@ use crate::sim::hash;
 /// A robot that does at once what it is told, and a bead of a power of its
 /// speed times a flow.
 struct Line {
-    law: ByDistance,
+    law: DistanceController,
     /// What the frames between two places show in place of the bead.
     glare: Option<(f64, f64, f64)>,
     now_s: f64,
@@ -36,9 +36,9 @@ fn settings() -> DistanceSettings {
 
 impl Line {
     fn new(settings: DistanceSettings) -> Self {
-        let law = ByDistance::new(settings);
+        let controller = DistanceController::new(settings);
         let (now_s, path, speed, frame) = (0.0, 0.0, 112.5, 0);
-        Self { law, glare: None, now_s, path, speed, laid: Vec::new(), frame }
+        Self { law: controller, glare: None, now_s, path, speed, laid: Vec::new(), frame }
     }
 
     /// One frame's time: lay, report, see, and command from 200 mm on.
@@ -69,7 +69,7 @@ impl Line {
             && let Some(speed) = self.law.speed(target, now, Span::from_secs(STEP_S))
         {
             self.speed = speed.get().clamp(60.0, 150.0);
-            self.law.steers(path);
+            self.law.engaged(path);
         }
         trace
     }
@@ -116,7 +116,7 @@ fn a_step_of_the_flow_is_told_from_an_outlier_and_answered() {
     while line.path < 900.0 + OFFSET + 25.0 {
         seen.extend(line.step(0.25, flow, 0.36).map(|trace| trace.use_of_width));
     }
-    assert!(seen.contains(&Use::Change), "{seen:?}");
+    assert!(seen.contains(&WidthUse::Change), "{seen:?}");
     assert!(line.error().abs() < 0.6, "{}", line.error());
 }
 
@@ -127,9 +127,9 @@ fn a_bead_that_does_not_answer_the_speed_contradicts_the_model() {
     let mut found = None;
     while line.path < 2500.0 {
         let _ = line.step(0.0, flow, 0.36);
-        found = found.or(line.law.distrust());
+        found = found.or(line.law.fallback_reason());
     }
-    assert_eq!(found, Some(Distrust::ModelContradicted));
+    assert_eq!(found, Some(FallbackReason::ModelContradicted));
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn a_model_that_holds_is_never_contradicted() {
         let flow = |at: f64| if (700.0..1400.0).contains(&at) { 0.95 } else { 1.0 };
         while line.path < 3000.0 {
             let _ = line.step(exponent, flow, 0.36);
-            assert_eq!(line.law.distrust(), None, "at {} mm", line.path);
+            assert_eq!(line.law.fallback_reason(), None, "at {} mm", line.path);
         }
     }
 }
@@ -161,16 +161,16 @@ fn another_bead_begins_with_what_was_learnt() {
 
 #[test]
 fn nothing_seen_is_no_speed_and_a_width_without_a_path_is_no_reason() {
-    let mut law = ByDistance::new(settings());
+    let mut controller = DistanceController::new(settings());
     let (now, span) = (Stamp::START, Span::from_secs(0.2));
-    assert_eq!(law.speed(Mm::constant(TARGET), now, span), None);
-    let trace = law.measured(
+    assert_eq!(controller.speed(Mm::constant(TARGET), now, span), None);
+    let trace = controller.measured(
         Mm::constant(100.0),
         MeasuredWidth { width: Mm::constant(40.0), sigma: Mm::constant(0.3) },
         Mm::constant(42.0),
     );
-    assert_eq!(trace.use_of_width, Use::NotPaired);
-    assert!(!law.is_ready());
+    assert_eq!(trace.use_of_width, WidthUse::NotMatched);
+    assert!(!controller.is_ready());
 }
 
 #[test]
@@ -182,7 +182,7 @@ fn a_change_that_was_a_glare_is_undone_by_the_first_widths_after_it() {
         let found = line.step(0.25, |_| 1.0, 0.36);
         seen.extend(found.filter(|_| line.path > 900.0).map(|trace| trace.use_of_width));
     }
-    assert!(seen.contains(&Use::Change), "{seen:?}");
+    assert!(seen.contains(&WidthUse::Change), "{seen:?}");
     assert!(line.error().abs() < 0.4, "{}", line.error());
     // What was laid while it was believed is little.
     let off = |(at, width): &&(f64, f64)| *at > 600.0 && (width - TARGET).abs() > 0.6;
@@ -192,31 +192,33 @@ fn a_change_that_was_a_glare_is_undone_by_the_first_widths_after_it() {
 
 #[test]
 fn a_width_that_was_laid_while_the_flow_was_changed_far_says_nothing() {
-    let mut law = ByDistance::new(settings());
+    let mut controller = DistanceController::new(settings());
     let mut uses = Vec::new();
     for k in 0..200_u32 {
         let at = f64::from(k) * STEP_S;
         // A flow that comes up within a second, and no plan that knows it exactly.
-        let share = (at / 2.0).clamp(0.1, 1.0);
+        let fraction = (at / 2.0).clamp(0.1, 1.0);
         let path = Mm::new(100.0 * at).unwrap();
-        law.reported(Stamp::from_secs(at), path, MmPerS::constant(100.0), share);
+        controller.reported(Stamp::from_secs(at), path, MmPerS::constant(100.0), fraction);
         let width = MeasuredWidth { width: Mm::constant(30.0), sigma: Mm::constant(0.3) };
-        uses.push(law.measured(path, width, Mm::constant(TARGET)).use_of_width);
+        uses.push(controller.measured(path, width, Mm::constant(TARGET)).use_of_width);
     }
     let bead_at = |path: f64| (path + OFFSET) / (100.0 * STEP_S);
     let (early, late) = (bead_at(100.0), bead_at(260.0));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "frames")]
     let at = |frame: f64| uses[frame as usize];
-    assert_eq!(at(early), Use::NotPaired);
-    assert_ne!(at(late), Use::NotPaired);
+    assert_eq!(at(early), WidthUse::NotMatched);
+    assert_ne!(at(late), WidthUse::NotMatched);
 }
 
 #[test]
 fn the_law_is_the_same_for_a_bead_of_any_width() {
     let driven = |at: f64| if at.rem_euclid(400.0) < 200.0 { 100.0 } else { 110.0 };
     for times in [0.05, 1.0, 6.0] {
-        let mut law =
-            ByDistance::new(DistanceSettings { offset_sigma: Mm::constant(0.5), ..settings() });
+        let mut controller = DistanceController::new(DistanceSettings {
+            offset_sigma: Mm::constant(0.5),
+            ..settings()
+        });
         let mut seen = Vec::new();
         let mut path = 0.0;
         for k in 0..600_u32 {
@@ -224,22 +226,23 @@ fn the_law_is_the_same_for_a_bead_of_any_width() {
             let speed = driven(path);
             path += speed * STEP_S;
             let now = Stamp::from_secs(STEP_S * f64::from(k + 1));
-            law.reported(now, Mm::constant(path), MmPerS::constant(speed), 1.0);
-            let place = path - OFFSET;
-            let laid = driven(place);
+            controller.reported(now, Mm::constant(path), MmPerS::constant(speed), 1.0);
+            let position = path - OFFSET;
+            let laid = driven(position);
             // Widths of bead laid at two speeds are not what this is about.
-            let near = (place - GAUGE).div_euclid(200.0) != (place + GAUGE).div_euclid(200.0);
-            if place < GAUGE || near {
+            let near = (position - GAUGE).div_euclid(200.0) != (position + GAUGE).div_euclid(200.0);
+            if position < GAUGE || near {
                 continue;
             }
             let [random, _] = hash::normal_pair(hash::mix(&[5, u64::from(k)]));
             let width = times * 40.0 * (f64::powf(laid / 112.5, -0.25) + 0.009 * random);
             let (width, sigma) = (Mm::constant(width), Mm::constant(times * 40.0 * 0.009));
-            let trace = law.measured(Mm::constant(path), MeasuredWidth { width, sigma }, width);
-            assert!(law.is_ready());
+            let trace =
+                controller.measured(Mm::constant(path), MeasuredWidth { width, sigma }, width);
+            assert!(controller.is_ready());
             seen.push((trace.use_of_width, trace.level_mm.get() / times));
         }
-        assert!(seen.iter().all(|(taken, _)| *taken != Use::Change), "{times}: {seen:?}");
+        assert!(seen.iter().all(|(taken, _)| *taken != WidthUse::Change), "{times}: {seen:?}");
         let last = seen.last().unwrap().1;
         assert!((last - 40.0).abs() < 0.3, "{times}: {last}");
     }
@@ -253,18 +256,18 @@ fn a_bead_that_is_never_paired_with_a_speed_is_told() {
     while line.path < OFFSET + 60.0 {
         let _ = line.step(0.25, |_| 1.0, 0.36);
     }
-    assert_eq!(line.law.distrust(), None);
+    assert_eq!(line.law.fallback_reason(), None);
     while line.path < OFFSET + 120.0 {
         let _ = line.step(0.25, |_| 1.0, 0.36);
     }
-    assert_eq!(line.law.distrust(), Some(Distrust::Unpaired));
+    assert_eq!(line.law.fallback_reason(), Some(FallbackReason::Unmatched));
     line.law.begin_bead();
-    assert_eq!(line.law.distrust(), None);
+    assert_eq!(line.law.fallback_reason(), None);
 }
 
 #[test]
 fn a_speed_that_is_not_reported_exactly_teaches_no_exponent() {
-    let mut law = ByDistance::new(settings());
+    let mut controller = DistanceController::new(settings());
     let mut path = 0.0;
     for k in 0..800_u32 {
         // Half a percent of noise on the reports, milliseconds on their arrival, and widths
@@ -273,10 +276,10 @@ fn a_speed_that_is_not_reported_exactly_teaches_no_exponent() {
         path += 112.5 * STEP_S;
         let at = Stamp::from_secs(STEP_S * f64::from(k + 1) + 1e-3 * late.abs().min(5.0));
         let reported = MmPerS::constant(112.5 * (1.0 + 0.005 * speed));
-        law.reported(at, Mm::constant(path), reported, 1.0);
+        controller.reported(at, Mm::constant(path), reported, 1.0);
         if path > OFFSET + GAUGE {
             let exact = MeasuredWidth { width: Mm::constant(38.61), sigma: Mm::constant(0.002) };
-            let trace = law.measured(Mm::constant(path), exact, exact.width);
+            let trace = controller.measured(Mm::constant(path), exact, exact.width);
             assert!((trace.exponent - 0.25).abs() < 0.01, "{k}: {trace:?}");
             assert!((trace.offset_mm.get() - OFFSET).abs() < 0.05 * OFFSET, "{k}: {trace:?}");
         }

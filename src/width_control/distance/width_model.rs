@@ -9,43 +9,43 @@ const EXPONENT_SIGMA: f64 = 0.4;
 const EXPONENT_RANGE: (f64, f64) = (0.7, 2.2);
 /// Standard deviation of b above which it is hardly known, as a share of what it was begun
 /// with.
-const HARDLY: f64 = 0.1;
+const POORLY_KNOWN_SIGMA: f64 = 0.1;
 /// Difference of ln v to what is known best from which a width tells of b: a robot's
 /// reports are not that exact, and what they scatter would pull b towards 0.
-const APART: f64 = 0.015;
+const MIN_LN_SPEED_DIFFERENCE: f64 = 0.015;
 /// Standard deviation that b keeps at an end of its range, as a share of it.
-const AT_END: f64 = 0.3;
+const SIGMA_AT_RANGE_END: f64 = 0.3;
 /// Standard deviation that the first width leaves in ln A: it may be an
 /// outlier itself.
-const FIRST: f64 = 0.1;
+const FIRST_SIGMA: f64 = 0.1;
 /// Standard deviation by which ln A may have changed from one bead to the next.
-const BETWEEN_BEADS: f64 = 0.02;
+const BETWEEN_BEADS_SIGMA: f64 = 0.02;
 /// Squared distance, in variances, from which a width is far from what was
 /// foretold.
-const FAR: f64 = 12.25;
+const OUTLIER_SQUARED: f64 = 12.25;
 
 /// ln A and b with their covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Level {
+pub struct WidthModel {
     ln_width: f64,
     exponent: f64,
     /// Variance of ln A, covariance, variance of b.
-    spread: [f64; 3],
-    begun_with: f64,
-    learns: bool,
+    covariance: [f64; 3],
+    prior_exponent: f64,
+    learns_exponent: bool,
     known: bool,
     place_mm: Option<f64>,
 }
 
 /// A width beside the speed that it was laid at.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sight {
+pub struct WidthObservation {
     /// ln w, freed of the pulsation and of the speed's spread within the gauge.
     pub ln_width: f64,
     /// ln(v/v₀).
     pub ln_speed: f64,
     /// Share of the gauge that lies beyond the last change of the flow.
-    pub cover: f64,
+    pub covered_fraction: f64,
     /// ln A before that change.
     pub old_ln_width: f64,
     /// Variance of `ln_width`.
@@ -54,35 +54,35 @@ pub struct Sight {
 
 /// A width against what was foretold.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Surprise {
+pub struct WidthInnovation {
     /// Difference of the logarithms.
     pub by: f64,
     /// Variance that it should have.
     pub variance: f64,
 }
 
-impl Surprise {
+impl WidthInnovation {
     /// The difference squared, in variances.
-    pub fn squared(&self) -> f64 {
+    pub fn normalised_squared(&self) -> f64 {
         self.by * self.by / self.variance
     }
 
     /// Whether it is hardly ever that large.
-    pub fn is_far(&self) -> bool {
-        self.squared() > FAR
+    pub fn is_outlier(&self) -> bool {
+        self.normalised_squared() > OUTLIER_SQUARED
     }
 }
 
-impl Level {
+impl WidthModel {
     /// Nothing is known but b, which is held where it does not learn.
     pub fn new(exponent: f64, learns: bool) -> Self {
         let sigma = if learns { EXPONENT_SIGMA * exponent } else { 0.0 };
         Self {
             ln_width: 0.0,
             exponent,
-            spread: [1.0, 0.0, sigma * sigma],
-            begun_with: exponent,
-            learns,
+            covariance: [1.0, 0.0, sigma * sigma],
+            prior_exponent: exponent,
+            learns_exponent: learns,
             known: false,
             place_mm: None,
         }
@@ -91,7 +91,7 @@ impl Level {
     /// A new bead, whose flow may be another.
     pub fn begin_bead(&mut self) {
         self.place_mm = None;
-        self.spread[0] += BETWEEN_BEADS * BETWEEN_BEADS;
+        self.covariance[0] += BETWEEN_BEADS_SIGMA * BETWEEN_BEADS_SIGMA;
     }
 
     /// Whether a width has been seen.
@@ -110,122 +110,127 @@ impl Level {
     }
 
     /// Whether little is known yet of b but what it was begun with.
-    pub fn hardly_knows_exponent(&self) -> bool {
-        self.spread[2] > (HARDLY * self.begun_with).powi(2)
+    pub fn exponent_is_uncertain(&self) -> bool {
+        self.covariance[2] > (POORLY_KNOWN_SIGMA * self.prior_exponent).powi(2)
     }
 
     /// Whether a width of bead laid at ln(v/v₀) tells of b: its speed lies clearly off the
     /// one of which the width is known best.
-    pub fn tells_exponent(&self, ln_speed: f64) -> bool {
-        let [_, both, exponent] = self.spread;
-        exponent > 0.0 && (ln_speed - both / exponent).abs() > APART
+    pub fn informs_exponent(&self, ln_speed: f64) -> bool {
+        let [_, both, exponent] = self.covariance;
+        exponent > 0.0 && (ln_speed - both / exponent).abs() > MIN_LN_SPEED_DIFFERENCE
     }
 
     /// Standard deviation of ln A for the exponent that is believed.
     pub fn sigma(&self) -> f64 {
-        let [level, both, exponent] = self.spread;
+        let [level, both, exponent] = self.covariance;
         let known = if exponent > 0.0 { both * both / exponent } else { 0.0 };
         (level - known).max(0.0).sqrt()
     }
 
     /// Variance of ln w that is foretold at ln(v/v₀).
-    pub fn spread(&self, ln_speed: f64) -> f64 {
-        let [level, both, exponent] = self.spread;
+    pub fn predicted_variance(&self, ln_speed: f64) -> f64 {
+        let [level, both, exponent] = self.covariance;
         (level - 2.0 * ln_speed * both + ln_speed * ln_speed * exponent).max(0.0)
     }
 
     /// ln w that is foretold at ln(v/v₀).
-    pub fn foretold(&self, ln_speed: f64) -> f64 {
+    pub fn predicted(&self, ln_speed: f64) -> f64 {
         self.ln_width - self.exponent * ln_speed
     }
 
     /// Way from the newest place to another \[mm\].
-    pub fn way_to(&self, place_mm: f64) -> f64 {
-        self.place_mm.map_or(0.0, |last| (place_mm - last).max(0.0))
+    pub fn distance_to(&self, position_mm: f64) -> f64 {
+        self.place_mm.map_or(0.0, |last| (position_mm - last).max(0.0))
     }
 
     /// Goes on to a place, over which ln A has drifted by a variance.
-    pub fn move_to(&mut self, place_mm: f64, drift: f64) {
-        self.place_mm = Some(self.place_mm.map_or(place_mm, |last| last.max(place_mm)));
-        self.spread[0] += drift;
+    pub fn advance_to(&mut self, position_mm: f64, drift: f64) {
+        self.place_mm = Some(self.place_mm.map_or(position_mm, |last| last.max(position_mm)));
+        self.covariance[0] += drift;
     }
 
     /// What was seen against what was foretold.
-    pub fn surprise(&self, sight: &Sight) -> Surprise {
-        let [level, both, exponent] = self.spread;
+    pub fn innovation(&self, sight: &WidthObservation) -> WidthInnovation {
+        let [level, both, exponent] = self.covariance;
         let [by_level, by_exponent] = sight.slopes();
-        let foretold = self.ln_width * sight.cover + sight.old_ln_width * (1.0 - sight.cover)
+        let predicted = self.ln_width * sight.covered_fraction
+            + sight.old_ln_width * (1.0 - sight.covered_fraction)
             - self.exponent * sight.ln_speed;
         let spread = by_level * by_level * level
             + 2.0 * by_level * by_exponent * both
             + by_exponent * by_exponent * exponent;
-        Surprise { by: sight.ln_width - foretold, variance: spread.max(0.0) + sight.variance }
+        WidthInnovation {
+            by: sight.ln_width - predicted,
+            variance: spread.max(0.0) + sight.variance,
+        }
     }
 
     /// Takes a width. Where b is not to learn it stays, and what it leaves open
     /// is kept in mind (Schmidt 1966).
-    pub fn update(&mut self, sight: &Sight, learns: bool) {
+    pub fn update(&mut self, sight: &WidthObservation, learns: bool) {
         if !self.known {
             self.begin(sight);
             return;
         }
-        let surprise = self.surprise(sight);
+        let innovation = self.innovation(sight);
         // No single width moves what is hardly known by more than half: it may
         // be an outlier.
-        let spread = surprise.variance - sight.variance;
+        let spread = innovation.variance - sight.variance;
         let noise = sight.variance.max(spread);
         let total = spread + noise;
         let [a, b] = sight.slopes();
-        let [level, both, exponent] = self.spread;
+        let [level, both, exponent] = self.covariance;
         let by_level = (level * a + both * b) / total;
         let by_exponent =
-            if learns && self.learns { (both * a + exponent * b) / total } else { 0.0 };
-        self.ln_width += by_level * surprise.by;
-        self.exponent += by_exponent * surprise.by;
-        self.spread = shrunk(self.spread, [by_level, by_exponent], [a, b], noise);
+            if learns && self.learns_exponent { (both * a + exponent * b) / total } else { 0.0 };
+        self.ln_width += by_level * innovation.by;
+        self.exponent += by_exponent * innovation.by;
+        self.covariance =
+            updated_covariance(self.covariance, [by_level, by_exponent], [a, b], noise);
         self.keep_exponent_in_range();
     }
 
-    fn begin(&mut self, sight: &Sight) {
+    fn begin(&mut self, sight: &WidthObservation) {
         let u = sight.ln_speed;
         self.ln_width = sight.ln_width + self.exponent * u;
-        let exponent = self.spread[2];
-        self.spread = [FIRST * FIRST + u * u * exponent, u * exponent, exponent];
+        let exponent = self.covariance[2];
+        self.covariance = [FIRST_SIGMA * FIRST_SIGMA + u * u * exponent, u * exponent, exponent];
         self.known = true;
     }
 
     /// At an end of its range b is what it is, and A what goes with it.
     fn keep_exponent_in_range(&mut self) {
         let (least, most) = EXPONENT_RANGE;
-        let within = self.exponent.clamp(least * self.begun_with, most * self.begun_with);
-        let [level, both, exponent] = self.spread;
+        let within = self.exponent.clamp(least * self.prior_exponent, most * self.prior_exponent);
+        let [level, both, exponent] = self.covariance;
         if within == self.exponent || exponent <= 0.0 {
             return;
         }
         let slope = both / exponent;
         self.ln_width += slope * (within - self.exponent);
         self.exponent = within;
-        let kept = exponent.min((AT_END * self.begun_with).powi(2));
-        self.spread = [(level - slope * both).max(0.0), 0.0, kept];
+        let kept = exponent.min((SIGMA_AT_RANGE_END * self.prior_exponent).powi(2));
+        self.covariance = [(level - slope * both).max(0.0), 0.0, kept];
     }
 
     /// The same after the flow has changed by a share.
-    pub fn changed(mut self, size: f64, variance: f64) -> Self {
+    pub fn after_change(mut self, size: f64, variance: f64) -> Self {
         self.ln_width += size;
-        self.spread[0] += variance;
+        self.covariance[0] += variance;
         self
     }
 }
 
-impl Sight {
+impl WidthObservation {
     /// By how much what is foretold grows with ln A and with b.
     fn slopes(&self) -> [f64; 2] {
-        [self.cover, -self.ln_speed]
+        [self.covered_fraction, -self.ln_speed]
     }
 }
 
 /// Covariance after an update with any gain (Joseph's form).
-fn shrunk(spread: [f64; 3], gain: [f64; 2], slopes: [f64; 2], noise: f64) -> [f64; 3] {
+fn updated_covariance(spread: [f64; 3], gain: [f64; 2], slopes: [f64; 2], noise: f64) -> [f64; 3] {
     let [level, both, exponent] = spread;
     let before = Matrix2::new(level, both, both, exponent);
     let gain = Vector2::from(gain);
@@ -238,53 +243,59 @@ fn shrunk(spread: [f64; 3], gain: [f64; 2], slopes: [f64; 2], noise: f64) -> [f6
 mod tests {
     use super::*;
 
-    fn sight(ln_width: f64, ln_speed: f64) -> Sight {
-        Sight { ln_width, ln_speed, cover: 1.0, old_ln_width: 0.0, variance: 1e-6 }
+    fn sight(ln_width: f64, ln_speed: f64) -> WidthObservation {
+        WidthObservation {
+            ln_width,
+            ln_speed,
+            covered_fraction: 1.0,
+            old_ln_width: 0.0,
+            variance: 1e-6,
+        }
     }
 
     #[test]
     fn two_speeds_tell_both_numbers() {
-        let mut level = Level::new(0.25, true);
+        let mut level = WidthModel::new(0.25, true);
         for k in 0..40 {
-            level.move_to(f64::from(k), 1e-12);
+            level.advance_to(f64::from(k), 1e-12);
             let u = if k < 20 { 0.0 } else { -0.4 };
             level.update(&sight(3.7 - 0.31 * u, u), true);
         }
         assert!((level.exponent() - 0.31).abs() < 1e-3, "{level:?}");
         assert!((level.ln_width() - 3.7).abs() < 1e-3);
-        assert!((level.foretold(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 1e-4);
+        assert!((level.predicted(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 1e-4);
     }
 
     #[test]
     fn an_exponent_that_does_not_learn_stays_and_a_takes_it_up() {
-        let mut level = Level::new(0.25, false);
+        let mut level = WidthModel::new(0.25, false);
         for k in 0..60 {
             let u = if k < 20 { 0.0 } else { -0.4 };
-            level.move_to(f64::from(k), 1e-6);
+            level.advance_to(f64::from(k), 1e-6);
             level.update(&sight(3.7 - 0.31 * u, u), true);
         }
         assert_eq!(level.exponent(), 0.25);
-        assert!((level.foretold(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 1e-3);
+        assert!((level.predicted(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 1e-3);
     }
 
     #[test]
     fn at_the_end_of_its_range_the_exponent_holds_and_the_width_is_still_foretold() {
-        let mut level = Level::new(0.25, true);
+        let mut level = WidthModel::new(0.25, true);
         for k in 0..60 {
             let u = if k < 20 { 0.0 } else { -0.4 };
-            level.move_to(f64::from(k), 1e-7);
+            level.advance_to(f64::from(k), 1e-7);
             level.update(&sight(3.7 - 0.05 * u, u), true);
         }
         assert!((level.exponent() - 0.7 * 0.25).abs() < 1e-12);
-        assert!((level.foretold(-0.4) - (3.7 + 0.05 * 0.4)).abs() < 2e-3, "{level:?}");
+        assert!((level.predicted(-0.4) - (3.7 + 0.05 * 0.4)).abs() < 2e-3, "{level:?}");
     }
 
     #[test]
     fn one_first_width_that_is_far_off_is_forgotten() {
-        let mut level = Level::new(0.25, true);
+        let mut level = WidthModel::new(0.25, true);
         level.update(&sight(3.9, 0.0), true);
         for k in 1..12 {
-            level.move_to(f64::from(k), 1e-9);
+            level.advance_to(f64::from(k), 1e-9);
             level.update(&sight(3.7, 0.0), true);
         }
         assert!((level.ln_width() - 3.7).abs() < 1e-3, "{level:?}");
@@ -292,12 +303,12 @@ mod tests {
 
     #[test]
     fn the_spread_stays_that_of_a_covariance() {
-        let mut level = Level::new(0.25, true);
+        let mut level = WidthModel::new(0.25, true);
         for k in 0..500 {
             let u = 0.3 * f64::from(k).sin();
-            level.move_to(f64::from(k), 1e-8);
+            level.advance_to(f64::from(k), 1e-8);
             level.update(&sight(3.7 - 0.22 * u, u), k % 3 != 0);
-            let [p, q, r] = level.spread;
+            let [p, q, r] = level.covariance;
             assert!(p > 0.0 && r > 0.0 && q * q <= p * r * (1.0 + 1e-9), "{level:?}");
         }
     }

@@ -9,7 +9,7 @@ use crate::document::Table;
 use crate::width_control::controller::{
     SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
 };
-use crate::width_control::limiter::Limits;
+use crate::width_control::limiter::SpeedLimits;
 
 /// A constant speed in a cell.
 pub const REGISTRATION: Registration = Registration { name: "constant", needs_gains: false, read };
@@ -31,7 +31,7 @@ impl Strategy for ConstantStrategy {
         Box::new(ConstantControl { speed: self.speed })
     }
 
-    fn check(&self, control: &Table<'_>, _: MmPerS, limits: Limits) {
+    fn check(&self, control: &Table<'_>, _: MmPerS, limits: SpeedLimits) {
         if self.speed < limits.min_speed || self.speed > limits.max_speed {
             let (low, high) = (limits.min_speed, limits.max_speed);
             let found = self.speed.get().to_string();

@@ -11,7 +11,9 @@ use crate::document::Table;
 use crate::width_control::controller::{
     BeadReport, Outlook, SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
 };
-use crate::width_control::distance::{ByDistance, DistanceSettings, Distrust, MeasuredWidth};
+use crate::width_control::distance::{
+    DistanceController, DistanceSettings, FallbackReason, MeasuredWidth,
+};
 
 /// Control by distance in a cell.
 pub const REGISTRATION: Registration = Registration { name: "distance", needs_gains: false, read };
@@ -55,7 +57,7 @@ impl Strategy for DistanceStrategy {
         };
         let gains = cell.gains.unwrap_or_else(|| cautious_gains(cell, self.exponent));
         Box::new(DistanceControl {
-            by_distance: ByDistance::new(settings),
+            by_distance: DistanceController::new(settings),
             pi: PiControl::new(gains, cell.max_gap),
             fallback: None,
             start_length: cell.start_length,
@@ -72,9 +74,9 @@ impl Strategy for DistanceStrategy {
 /// the bead.
 #[derive(Debug, Clone, PartialEq)]
 struct DistanceControl {
-    by_distance: ByDistance,
+    by_distance: DistanceController,
     pi: PiControl,
-    fallback: Option<Distrust>,
+    fallback: Option<FallbackReason>,
     start_length: Mm,
     camera_offset: Mm,
 }
@@ -82,7 +84,11 @@ struct DistanceControl {
 impl DistanceControl {
     /// A first reason to fall back stays for the bead.
     fn look_for_fallback(&mut self, is_path_known: bool) {
-        let why = if is_path_known { self.by_distance.distrust() } else { Some(Distrust::NoPath) };
+        let why = if is_path_known {
+            self.by_distance.fallback_reason()
+        } else {
+            Some(FallbackReason::NoPath)
+        };
         self.fallback = self.fallback.or(why);
     }
 
@@ -110,7 +116,7 @@ impl WidthController for DistanceControl {
     }
 
     fn robot_reported(&mut self, report: &BeadReport) {
-        self.by_distance.reported(report.at, report.path, report.speed, report.flow_share);
+        self.by_distance.reported(report.at, report.path, report.speed, report.flow_ratio);
         self.look_for_fallback(report.is_path_known);
     }
 
@@ -148,7 +154,7 @@ impl WidthController for DistanceControl {
             outlook.tracked.filter(|_| !self.pi.is_running())?
         };
         let Some((path, laid)) = outlook.path.zip(outlook.laid) else { return Some(seen_at) };
-        self.by_distance.steers(path);
+        self.by_distance.engaged(path);
         // Where no bead can be seen yet, none is missing.
         Some(if laid < self.camera_offset { outlook.now } else { seen_at })
     }
@@ -160,7 +166,7 @@ impl WidthController for DistanceControl {
         }
     }
 
-    fn fallback(&self) -> Option<Distrust> {
+    fn fallback(&self) -> Option<FallbackReason> {
         self.fallback
     }
 }

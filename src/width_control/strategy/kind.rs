@@ -9,7 +9,7 @@ use crate::core::time::Span;
 use crate::core::units::{Mm, MmPerS, WidthRange};
 use crate::document::Table;
 use crate::width_control::controller::WidthController;
-use crate::width_control::limiter::Limits;
+use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::pi::PiGains;
 
 /// A width controller as a cell chooses it.
@@ -30,7 +30,7 @@ pub trait Strategy: Any + Debug + Send + Sync {
 
     /// Refuses settings that leave what the robot may do. `control` is the table that
     /// they were read from.
-    fn check(&self, _control: &Table<'_>, _start: MmPerS, _limits: Limits) {}
+    fn check(&self, _control: &Table<'_>, _start: MmPerS, _limits: SpeedLimits) {}
 
     /// Whether the bead within the whole gauge must have been laid before it is seen.
     fn sees_only_laid_bead(&self) -> bool {

@@ -9,27 +9,27 @@ use crate::document::Table;
 use crate::width_control::controller::{
     SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
 };
-use crate::width_control::limiter::Limits;
+use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::steps::{StepSettings, Steps};
 
 /// Steps of the speed in a cell.
 pub const REGISTRATION: Registration = Registration { name: "steps", needs_gains: false, read };
 
 /// Change of the speed in a step, as a fraction of the start speed.
-const STEP_SHARE: f64 = 0.1;
+const DEFAULT_STEP_FRACTION: f64 = 0.1;
 /// Fractions that a step may have: less shows in no width, more is no small step.
-pub const STEP_SHARES: std::ops::RangeInclusive<f64> = 0.02..=0.3;
+pub const STEP_FRACTIONS: std::ops::RangeInclusive<f64> = 0.02..=0.3;
 
 /// Steps of the speed, each by this fraction of the start speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepsStrategy {
     /// Change of the speed over the start speed.
-    pub share: f64,
+    pub step_fraction: f64,
 }
 
 fn read(control: &Table<'_>) -> Option<Arc<dyn Strategy>> {
-    let share = control.number_or("step_share", STEP_SHARES, STEP_SHARE)?;
-    Some(Arc::new(StepsStrategy { share }))
+    let share = control.number_or("step_share", STEP_FRACTIONS, DEFAULT_STEP_FRACTION)?;
+    Some(Arc::new(StepsStrategy { step_fraction: share }))
 }
 
 impl StepsStrategy {
@@ -37,8 +37,8 @@ impl StepsStrategy {
     pub fn settings(&self, cell: &CellFacts) -> StepSettings {
         StepSettings {
             start_speed: cell.start_speed,
-            share: self.share,
-            reach: cell.camera_offset + cell.gauge_length * 0.5,
+            step_ratio: self.step_fraction,
+            camera_reach: cell.camera_offset + cell.gauge_length * 0.5,
             width_range: cell.width_range,
         }
     }
@@ -50,8 +50,8 @@ impl Strategy for StepsStrategy {
         Box::new(StepsControl { steps, start_speed })
     }
 
-    fn check(&self, control: &Table<'_>, start: MmPerS, limits: Limits) {
-        let share = self.share;
+    fn check(&self, control: &Table<'_>, start: MmPerS, limits: SpeedLimits) {
+        let share = self.step_fraction;
         let (slow, fast) = (start * (1.0 - share), start * (1.0 + share));
         if slow < limits.min_speed || fast > limits.max_speed {
             let (low, high) = (limits.min_speed, limits.max_speed);

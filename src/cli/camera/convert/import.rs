@@ -3,21 +3,21 @@
 use anyhow::Context;
 
 use super::arguments::ConvertArgs;
-use crate::calibration::board::{Board, Marks};
-use crate::calibration::equations::Model;
+use crate::calibration::board::{Board, Markers};
+use crate::calibration::equations::CameraModel;
 use crate::calibration::exchange::{Import, Intrinsics};
-use crate::calibration::{Quality, file};
+use crate::calibration::{CalibrationQuality, file};
 use crate::cli::arguments::WrongArguments;
-use crate::cli::bed_plane::{Boards, Plane, looked_for};
+use crate::cli::bed_plane::{BedPlane, BoardsOnBed, find_corners};
 use crate::cli::board_arguments::{InnerCorners, board_of};
 use crate::cli::print::print;
 use crate::core::units::Mm;
 
 /// Corners on the bed may be so far off \[px\]; beyond that the pictures do not belong
 /// to this camera, or the boards lay on no plane.
-const MOST_OFF_PX: f64 = 0.5;
+const MAX_RMS_PX: f64 = 0.5;
 /// A sharp picture of a flat board and a sound lens leave less \[px\].
-const DOUBTED_PX: f64 = 0.3;
+const SUSPECT_RMS_PX: f64 = 0.3;
 
 /// The text of a calibration: the camera of others, and a bed plane from pictures.
 pub fn text(
@@ -28,12 +28,12 @@ pub fn text(
     let (Some(corners), Some(square)) = (args.board, args.square_mm) else {
         return Err(WrongArguments::new("--plane needs --board and --square-mm").into());
     };
-    let marks = args.marker_mm.map(|side| Marks { side, dictionary: args.dictionary });
+    let marks = args.marker_mm.map(|side| Markers { side, dictionary: args.dictionary });
     let board = board_of(corners, square, marks)?;
     let plane = bed_plane(args, &board, &import.intrinsics)?;
     print(&plane.text());
     let Intrinsics { image_size_px, camera, .. } = &import.intrinsics;
-    if let Some(px) = camera.fold(*image_size_px) {
+    if let Some(px) = camera.non_monotonic_at(*image_size_px) {
         notes.push(format!(
             "the lens model turns over before pixel ({:.0}, {:.0}), and nothing can be measured there; \
              calibrate with pictures of a board in the corners of the picture",
@@ -41,17 +41,17 @@ pub fn text(
         ));
     }
     let reprojection_rms_px = plane.on_bed.rms_px;
-    let quality = Quality {
+    let quality = CalibrationQuality {
         reprojection_rms_px,
-        width_sigma_share: None,
+        width_relative_sigma: None,
         seen_px: None,
         heights_mm: None,
         uncertainty: None,
     };
-    if reprojection_rms_px > DOUBTED_PX {
+    if reprojection_rms_px > SUSPECT_RMS_PX {
         notes.push(format!(
             "corners are {reprojection_rms_px:.2} px off, a sharp picture of a flat board and a \
-             sound lens give less than {DOUBTED_PX}: is this the camera's calibration, with this \
+             sound lens give less than {SUSPECT_RMS_PX}: is this the camera's calibration, with this \
              focus and zoom?"
         ));
     }
@@ -79,16 +79,16 @@ pub fn text(
     Ok(text)
 }
 
-fn bed_plane(args: &ConvertArgs, board: &Board, known: &Intrinsics) -> anyhow::Result<Plane> {
-    let mut boards = Boards::of(board);
+fn bed_plane(args: &ConvertArgs, board: &Board, known: &Intrinsics) -> anyhow::Result<BedPlane> {
+    let mut boards = BoardsOnBed::of(board);
     for path in &args.plane {
-        let (image, corners) = looked_for(path, board, known.image_size_px)?;
+        let (image, corners) = find_corners(path, board, known.image_size_px)?;
         boards.add(image, corners)?;
     }
-    let model = Model { camera: known.camera, bend_mm: [0.0; 2] };
-    let other = format!("{MOST_OFF_PX} px is the most that is taken");
-    let (images, on_bed) = boards.fit(&model, MOST_OFF_PX, &other)?;
-    Ok(Plane {
+    let model = CameraModel { camera: known.camera, bend_mm: [0.0; 2] };
+    let other = format!("{MAX_RMS_PX} px is the most that is taken");
+    let (images, on_bed) = boards.fit(&model, MAX_RMS_PX, &other)?;
+    Ok(BedPlane {
         images,
         assumed: false,
         passed_over: Vec::new(),

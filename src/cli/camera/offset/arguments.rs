@@ -40,10 +40,10 @@ pub struct OffsetArgs {
     #[arg(long, value_name = "MM", value_parser = parse_length)]
     pub max_mm: Option<Mm>,
     #[command(flatten)]
-    pub board: Told,
+    pub board: OptionalBoard,
     /// Picture: where the nozzle touches the board, in squares from its first inner
     /// corner along a row and along a column; beyond it is negative
-    #[arg(long, value_name = "X,Y", value_parser = parse_place, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y", value_parser = parse_position, allow_hyphen_values = true)]
     pub nozzle_at: Option<[f64; 2]>,
     /// Picture: standard deviation of that place [mm]
     /// [default: 0.5]
@@ -61,14 +61,14 @@ pub struct OffsetArgs {
 
 /// The board, if one was told: a recording needs none.
 #[derive(Debug)]
-pub struct Told {
+pub struct OptionalBoard {
     /// A whole board.
     pub board: Option<BoardArgs>,
     /// A part of one, without its counts.
     pub is_part: bool,
 }
 
-impl Args for Told {
+impl Args for OptionalBoard {
     fn augment_args(command: Command) -> Command {
         // As for an update, in which nothing is required.
         BoardArgs::augment_args_for_update(command)
@@ -79,12 +79,12 @@ impl Args for Told {
     }
 }
 
-impl FromArgMatches for Told {
+impl FromArgMatches for OptionalBoard {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        let is_told = matches.contains_id("board");
-        let board = is_told.then(|| BoardArgs::from_arg_matches(matches)).transpose()?;
+        let is_given = matches.contains_id("board");
+        let board = is_given.then(|| BoardArgs::from_arg_matches(matches)).transpose()?;
         let is_part = ["square_mm", "marker_mm"].iter().any(|part| matches.contains_id(part));
-        Ok(Self { board, is_part: is_part && !is_told })
+        Ok(Self { board, is_part: is_part && !is_given })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
@@ -93,7 +93,7 @@ impl FromArgMatches for Told {
     }
 }
 
-fn parse_place(text: &str) -> Result<[f64; 2], String> {
+fn parse_position(text: &str) -> Result<[f64; 2], String> {
     let number = |side: &str| side.trim().parse::<f64>().ok().filter(|at| at.abs() <= 1e3);
     text.split_once(',')
         .and_then(|(x, y)| Some([number(x)?, number(y)?]))

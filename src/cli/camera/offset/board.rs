@@ -6,27 +6,27 @@ use nalgebra::Vector2;
 use super::answer::tell;
 use super::arguments::OffsetArgs;
 use crate::assembly::LoadedCell;
-use crate::calibration::offset::{Found, Gauge, OffsetError, Touch, find};
+use crate::calibration::offset::{NozzleOffset, NozzleOffsetError, OffsetGauge, Touch, find};
 use crate::cell::file::{Mount, Purpose};
 use crate::cli::arguments::WrongArguments;
-use crate::cli::board_image::{check_size, look_at};
+use crate::cli::board_image::{check_size, find_board};
 use crate::core::geometry::GridSize;
 use crate::core::units::Mm;
 use crate::sim::view::gauge_middle;
-use crate::vision::Axis;
+use crate::vision::BeadAxis;
 
 /// Standard deviation of a place that somebody told by eye.
-const TOUCH: Mm = Mm::constant(0.5);
+const TOUCH_SIGMA: Mm = Mm::constant(0.5);
 /// Way across the path that is more than somebody's eye \[mm\].
 const SIDEWAYS_MM: f64 = 3.0;
 /// Share by which a board may measure larger or smaller than it was said to be.
-const SCALE: f64 = 0.005;
+const MAX_SCALE_ERROR: f64 = 0.005;
 /// The same beyond which nothing is told.
-const NO_BOARD: f64 = 0.03;
+const REFUSED_SCALE_ERROR: f64 = 0.03;
 /// Corners further off a true board than this are of another plane \[mm\].
 const NOT_FLAT_MM: f64 = 2.0;
 /// Squares beyond the outermost ones that a nozzle may be told to be.
-const BEYOND: f64 = 2.0;
+const SQUARES_BEYOND: f64 = 2.0;
 /// Corners further off a true board than this were not measured on its plane \[mm\].
 const FLAT_MM: f64 = 0.5;
 
@@ -52,7 +52,7 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     let GridSize { columns, rows } = board.corners();
     for (at, count) in at.into_iter().zip([columns, rows]) {
         #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
-        let (from, to) = (-1.0 - BEYOND, count as f64 + BEYOND);
+        let (from, to) = (-1.0 - SQUARES_BEYOND, count as f64 + SQUARES_BEYOND);
         if !(from..=to).contains(&at) {
             let what = format!("--nozzle-at: found {at}, expected {from} to {to} on this board");
             return Err(WrongArguments::new(what).into());
@@ -61,11 +61,11 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     let touch = touch(args, at)?;
     let loaded = LoadedCell::read(cell, Purpose::Measure)?;
     let Some(expected) = loaded.calibration.image_size_px() else {
-        let what = format!("{}: {}", cell.display(), OffsetError::NoCamera);
+        let what = format!("{}: {}", cell.display(), NozzleOffsetError::NoCamera);
         return Err(WrongArguments::new(what).into());
     };
     let name = args.input.display().to_string();
-    let sighting = look_at(&board, &name, &args.input).with_context(|| name.clone())?;
+    let sighting = find_board(&board, &name, &args.input).with_context(|| name.clone())?;
     check_size(&sighting, expected)?;
     if touch.robot_z.is_some() && loaded.cell.mount == Some(Mount::Fixed) {
         let what = format!(
@@ -77,7 +77,7 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     let found = find(&loaded.calibration, &gauge(&loaded), &board, &sighting.corners, &touch)
         .map_err(anyhow::Error::from)
         .with_context(|| name.clone())?;
-    if found.scale_error.abs() > NO_BOARD || found.rms_mm > NOT_FLAT_MM {
+    if found.scale_error.abs() > REFUSED_SCALE_ERROR || found.rms_mm > NOT_FLAT_MM {
         bail!(
             "{name}: the board measures {:+.1} % of its size, and its corners lie {:.2} mm off a true \
              one: it does not lie on the bed of this calibration with its face {} above it; see \
@@ -92,7 +92,7 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
 }
 
 fn touch(args: &OffsetArgs, at: [f64; 2]) -> Result<Touch, WrongArguments> {
-    let sigma = args.touch_sigma_mm.unwrap_or(TOUCH);
+    let sigma = args.touch_sigma_mm.unwrap_or(TOUCH_SIGMA);
     let thickness = args.board_thickness_mm.unwrap_or(Mm::ZERO);
     for (name, value) in [("--touch-sigma-mm", sigma), ("--board-thickness-mm", thickness)] {
         if value < Mm::ZERO {
@@ -100,18 +100,18 @@ fn touch(args: &OffsetArgs, at: [f64; 2]) -> Result<Touch, WrongArguments> {
             return Err(WrongArguments::new(what));
         }
     }
-    Ok(Touch { at, sigma, thickness, robot_z: args.robot_z_mm })
+    Ok(Touch { position: at, sigma, thickness, robot_z: args.robot_z_mm })
 }
 
 /// The nozzle lies beyond the top of a vertical gauge and beyond the right end of a
 /// horizontal one.
-fn gauge(loaded: &LoadedCell) -> Gauge {
+fn gauge(loaded: &LoadedCell) -> OffsetGauge {
     let cell = &loaded.cell;
     let (ahead, right) = match cell.gauge.axis {
-        Axis::Vertical => (Vector2::new(0.0, -1.0), Vector2::new(1.0, 0.0)),
-        Axis::Horizontal => (Vector2::new(1.0, 0.0), Vector2::new(0.0, 1.0)),
+        BeadAxis::Vertical => (Vector2::new(0.0, -1.0), Vector2::new(1.0, 0.0)),
+        BeadAxis::Horizontal => (Vector2::new(1.0, 0.0), Vector2::new(0.0, 1.0)),
     };
-    Gauge {
+    OffsetGauge {
         middle: gauge_middle(&cell.gauge.roi),
         ahead,
         right,
@@ -120,7 +120,7 @@ fn gauge(loaded: &LoadedCell) -> Gauge {
     }
 }
 
-fn answer(found: &Found, touch: Touch, now: Option<Mm>) {
+fn answer(found: &NozzleOffset, touch: Touch, now: Option<Mm>) {
     let parts = found.parts;
     let sigma = parts.sigma().get();
     say!(
@@ -146,7 +146,7 @@ fn answer(found: &Found, touch: Touch, now: Option<Mm>) {
         parts.corners.get(),
         parts.height.get()
     );
-    let ([x, y], first) = (touch.at, found.first_corner);
+    let ([x, y], first) = (touch.position, found.first_corner);
     say!(
         "board      the nozzle is {x},{y} squares from the corner at {:.1}, {:.1} px, taken for the \
          first",
@@ -154,7 +154,7 @@ fn answer(found: &Found, touch: Touch, now: Option<Mm>) {
         first.y
     );
     say!("           corners lie {:.3} mm off a true board (RMS)", found.rms_mm);
-    if found.scale_error.abs() > SCALE || found.rms_mm > FLAT_MM {
+    if found.scale_error.abs() > MAX_SCALE_ERROR || found.rms_mm > FLAT_MM {
         say!(
             "           WARNING: it measures {:+.2} % of its size; see --square-mm, \
              --board-thickness-mm",

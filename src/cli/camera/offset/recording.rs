@@ -7,17 +7,17 @@ use super::arguments::OffsetArgs;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::cli::arguments::WrongArguments;
-use crate::cli::camera_offset::{farthest, gauge};
-use crate::cli::recorded::attached;
+use crate::cli::camera_offset::{gauge, max_offset};
+use crate::cli::recorded::attached_cell;
 use crate::core::units::Mm;
 use crate::identify::camera_offset::SpeedRange;
-use crate::identify::camera_offset::{EXPONENTS, Found, Search, find};
+use crate::identify::camera_offset::{EXPONENT_RANGE, OffsetEstimate, OffsetSearch, find};
 use crate::io::recording::Recording;
-use crate::report::offset::{Print, print};
+use crate::report::offset::{RecordedBead, recorded_bead};
 
 /// Runs the command for a recording.
 pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
-    let farthest = farthest(args.max_mm)?;
+    let max_offset = max_offset(args.max_mm)?;
     let mut recording = Recording::open(&args.input).map_err(WrongArguments::new)?;
     let cell = match &args.cell {
         Some(path) => Some(LoadedCell::read(path, Purpose::Measure)?),
@@ -25,27 +25,27 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     };
     let (cell, calibration) = match cell {
         Some(loaded) => (loaded.cell, loaded.calibration),
-        None => attached(&recording, Purpose::Measure)?,
+        None => attached_cell(&recording, Purpose::Measure)?,
     };
     let name = args.input.display().to_string();
-    let print = print(&mut recording).context("the recording cannot be read on")?;
+    let recorded = recorded_bead(&mut recording).context("the recording cannot be read on")?;
     if let Some(what) = recording.integrity().summary() {
         tell!("warning: {name}: {what}");
     }
-    let gauge = gauge(&cell, &calibration, &print.states)?;
-    let found = find(&print.states, &print.widths, Search { gauge, farthest })
+    let gauge = gauge(&cell, &calibration, &recorded.states)?;
+    let found = find(&recorded.states, &recorded.widths, OffsetSearch { gauge, max_offset })
         .with_context(|| format!("{name} does not tell the offset"))?;
     let now = cell.run.as_ref().map(|run| run.camera.offset);
-    answer(&found, &print, gauge, now);
+    answer(&found, &recorded, gauge, now);
     Ok(())
 }
 
-fn answer(found: &Found, print: &Print, gauge: Mm, now: Option<Mm>) {
+fn answer(found: &OffsetEstimate, print: &RecordedBead, gauge: Mm, now: Option<Mm>) {
     let SpeedRange { min: from, max: to } = found.speeds;
     let (offset, sigma) = (found.offset.get(), found.sigma.get());
     say!("offset     {offset:.2} ± {sigma:.2} mm from the nozzle to the middle of the gauge");
     let bound = if found.at_bound {
-        let (least, most) = EXPONENTS;
+        let (least, most) = EXPONENT_RANGE;
         format!(", at the end of {least} to {most}: see that the widths follow the speed")
     } else {
         String::new()
@@ -56,8 +56,8 @@ fn answer(found: &Found, print: &Print, gauge: Mm, now: Option<Mm>) {
         "widths     {} used, {} left out, {} frames refused; {:.2} % RMS off that bead",
         found.used,
         found.left_out,
-        print.refused,
-        100.0 * found.scatter
+        print.rejected,
+        100.0 * found.residual_rms
     );
     say!("gauge      {:.1} mm long", gauge.get());
     tell(offset, sigma, now);

@@ -7,25 +7,25 @@ use clap::Args;
 
 use super::data;
 use super::forms::{
-    Forms, Wanted, parse_dead_time, parse_forms, parse_gap, parse_hampel, parse_smooth,
+    DeadTimeArg, Forms, parse_dead_time, parse_forms, parse_gap, parse_hampel, parse_smooth,
 };
 use crate::cli::arguments::WrongArguments;
-use crate::cli::extruder::log::bead::{Bead, LAID_FLOW};
-use crate::cli::extruder::log::columns::{Columns, refuse_same};
+use crate::cli::extruder::log::bead::{BeadArgs, LAID_FLOW};
+use crate::cli::extruder::log::columns::{ColumnArgs, refuse_same};
 use crate::cli::extruder::setting::SettingArgs;
 use crate::core::quantity::Quantity;
 use crate::identify::experiment::Experiment;
-use crate::identify::fit::{DeadTime, Settings, Structure};
+use crate::identify::fit::{DeadTime, FitSettings, Structure};
 use crate::numeric::hampel::Hampel;
 use crate::numeric::savgol::SavGol;
 use crate::report::identify::Logs;
 
 /// Dead times are looked for up to this share of the record…
-const DEAD_TIME_SHARE: f64 = 0.125;
+const DEAD_TIME_FRACTION: f64 = 0.125;
 /// …and up to this \[s\], unless a range is told.
 const DEAD_TIME_S: f64 = 10.0;
 /// Share of the data that is kept to validate with.
-const VALIDATE_SHARE: f64 = 0.3;
+const VALIDATE_FRACTION: f64 = 0.3;
 
 /// Finds a model of an extruder in logged data, for a cell to use.
 #[derive(Debug, Args)]
@@ -54,12 +54,12 @@ pub struct IdentifyArgs {
     #[arg(long, value_name = "COLUMN")]
     pub output: Option<String>,
     #[command(flatten)]
-    pub columns: Columns,
+    pub columns: ColumnArgs,
     /// Longest gap that is bridged by a line [s] [default: five steps]
     #[arg(long, value_name = "S", value_parser = parse_gap, allow_negative_numbers = true)]
     pub max_gap_s: Option<f64>,
     #[command(flatten)]
-    pub bead: Bead,
+    pub bead: BeadArgs,
     /// Form: fopdt, sopdt or sopdt-real, also with -zero; poles,zeros; or compare for
     /// fopdt, fopdt-zero, sopdt, sopdt-zero and 3,2; may be repeated
     #[arg(long, value_name = "FORM", value_parser = parse_forms, default_value = "compare")]
@@ -72,13 +72,13 @@ pub struct IdentifyArgs {
         default_value = "estimate",
         allow_hyphen_values = true
     )]
-    pub dead_time_s: Wanted,
+    pub dead_time_s: DeadTimeArg,
     /// Data to validate with, of the same columns
     #[arg(long, value_name = "OTHER", conflicts_with = "validate_share")]
     pub validate: Option<PathBuf>,
     /// Last part of the data, kept to validate with [default: 0.3]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
-    pub validate_share: Option<f64>,
+    pub validate_fraction: Option<f64>,
     /// The data begin at rest, at the first value of the input
     #[arg(long)]
     pub from_rest: bool,
@@ -119,13 +119,13 @@ fn validates_with_itself(other: &Path) -> anyhow::Error {
 
 impl IdentifyArgs {
     /// The output's name where it is made of other columns.
-    fn made(&self) -> Option<&'static str> {
+    fn derived_output(&self) -> Option<&'static str> {
         self.bead.makes_flow().then_some(LAID_FLOW)
     }
 
     /// The data, and what is odd about their units.
     pub fn logs(&self) -> Result<(Logs, Vec<String>)> {
-        let output = self.output.as_deref().or(self.made());
+        let output = self.output.as_deref().or(self.derived_output());
         let (Some(path), Some(input), Some(output)) = (&self.data, &self.input, output) else {
             let what = "needs both --input and --output (or --area or --width with --speed); \
                         `truebead extruder columns` lists the columns";
@@ -142,9 +142,9 @@ impl IdentifyArgs {
             filters,
         };
         let read = |path| data::read(path, &request);
-        let (log, mut doubts) = read(path)?;
+        let (log, mut warnings) = read(path)?;
         let source = path.display().to_string();
-        let share = self.validate_share.unwrap_or(VALIDATE_SHARE);
+        let share = self.validate_fraction.unwrap_or(VALIDATE_FRACTION);
         if !(0.0..=0.9).contains(&share) {
             let what = format!("--validate-share {share}: expected 0 to 0.9");
             return Err(WrongArguments::new(what).into());
@@ -155,8 +155,10 @@ impl IdentifyArgs {
                 if (&rest.input, &rest.output) == (&log.input, &log.output) {
                     return Err(validates_with_itself(other));
                 }
-                doubts.extend(
-                    more.into_iter().filter(|doubt| !doubts.contains(doubt)).collect::<Vec<_>>(),
+                warnings.extend(
+                    more.into_iter()
+                        .filter(|warning| !warnings.contains(warning))
+                        .collect::<Vec<_>>(),
                 );
                 (log, Some((rest, other.display().to_string())))
             }
@@ -170,19 +172,20 @@ impl IdentifyArgs {
             |column: &str| -> Result<Quantity, WrongArguments> { self.columns.quantity(column) };
         let (input, output) = (quantity(input)?, quantity(output)?);
         let from_rest = self.from_rest;
-        Ok((Logs { input, output, source, estimation, validation, from_rest }, doubts))
+        Ok((Logs { input, output, source, estimation, validation, from_rest }, warnings))
     }
 
     /// The forms that are fitted.
-    pub fn forms(&self, data: &Experiment) -> Vec<Settings> {
-        let most_s = (DEAD_TIME_SHARE * data.duration_s()).min(DEAD_TIME_S);
-        let dead_time = self.dead_time_s.0.unwrap_or(DeadTime::Estimated { least_s: 0.0, most_s });
+    pub fn forms(&self, data: &Experiment) -> Vec<FitSettings> {
+        let most_s = (DEAD_TIME_FRACTION * data.duration_s()).min(DEAD_TIME_S);
+        let dead_time =
+            self.dead_time_s.0.unwrap_or(DeadTime::Estimated { min_s: 0.0, max_s: most_s });
         let mut forms: Vec<Structure> = Vec::new();
         for form in self.model.iter().flat_map(|forms| &forms.0) {
             if !forms.contains(form) {
                 forms.push(*form);
             }
         }
-        forms.into_iter().map(|form| Settings::new(form, dead_time)).collect()
+        forms.into_iter().map(|form| FitSettings::new(form, dead_time)).collect()
     }
 }

@@ -5,14 +5,14 @@ use std::path::Path;
 use anyhow::{Context, Result, anyhow};
 
 use crate::cli::arguments::WrongArguments;
-use crate::cli::extruder::log::bead::Bead;
-use crate::cli::extruder::log::columns::Columns;
-use crate::cli::extruder::log::rows::{Rows, at_line, check_told};
-use crate::cli::extruder::log::source::Source;
-use crate::identify::experiment::{Experiment, Rules, doubt_unit};
+use crate::cli::extruder::log::bead::BeadArgs;
+use crate::cli::extruder::log::columns::ColumnArgs;
+use crate::cli::extruder::log::rows::{TableColumns, at_line, check_unit_overrides};
+use crate::cli::extruder::log::source::LogSource;
+use crate::identify::experiment::{Experiment, Rules, implausible_unit};
 use crate::identify::series::paired;
-use crate::identify::table::Table;
-use crate::io::recorded::Recorded;
+use crate::identify::table::DataTable;
+use crate::io::recorded::BeadColumns;
 use crate::numeric::hampel::Hampel;
 use crate::numeric::savgol::SavGol;
 
@@ -32,11 +32,11 @@ pub struct Request<'a> {
     /// Column of the output, where it is not made of others.
     pub output: Option<&'a str>,
     /// Time, units and part of the log.
-    pub columns: &'a Columns,
+    pub columns: &'a ColumnArgs,
     /// Longest gap that is bridged \[s\].
     pub max_gap_s: Option<f64>,
     /// Where the output was measured, or what it is made of.
-    pub bead: &'a Bead,
+    pub bead: &'a BeadArgs,
     /// How the output is cleaned.
     pub filters: Filters,
 }
@@ -44,34 +44,39 @@ pub struct Request<'a> {
 /// Reads a table or a recording, and what is odd about it.
 pub fn read(path: &Path, request: &Request<'_>) -> Result<(Experiment, Vec<String>)> {
     let name = path.display().to_string();
-    match Source::read(path, &request.bead.layer)? {
-        Source::Table(table) => of_table(&table, &name, request),
-        Source::Recording(found) => {
+    match LogSource::read(path, &request.bead.layer)? {
+        LogSource::Table(table) => of_table(&table, &name, request),
+        LogSource::Recording(found) => {
             request.bead.refuse_columns()?;
             of_recording(&found, &name, request)
         }
     }
 }
 
-fn of_table(table: &Table, name: &str, request: &Request<'_>) -> Result<(Experiment, Vec<String>)> {
+fn of_table(
+    table: &DataTable,
+    name: &str,
+    request: &Request<'_>,
+) -> Result<(Experiment, Vec<String>)> {
     let Request { input: input_name, output: output_name, columns, bead, filters, max_gap_s } =
         *request;
-    check_told(columns, table.names(), name)?;
-    let rows = Rows { table, name, columns };
+    check_unit_overrides(columns, table.names(), name)?;
+    let rows = TableColumns { table, name, columns };
     let (time_name, unit_s) = columns.time(table.names())?;
     let (mut input, mut output) = (rows.column(input_name)?, bead.output(&rows, output_name)?);
     let mut time_s: Vec<f64> = rows.column(&time_name)?.iter().map(|time| time * unit_s).collect();
-    let mut doubts = Vec::new();
+    let mut warnings = Vec::new();
     let output_name = output_name.filter(|_| !bead.makes_flow());
     for (column, values) in
         [(Some(input_name), &input), (output_name, &output)].into_iter().filter_map(both)
     {
         let unit = columns.quantity(column)?.unit;
-        let doubt = doubt_unit(column, unit, values).filter(|_| columns.told(column).is_none());
-        doubts.extend(doubt);
+        let warning = implausible_unit(column, unit, values)
+            .filter(|_| columns.unit_override(column).is_none());
+        warnings.extend(warning);
     }
     if output.len() < table.len() {
-        doubts.push(format!(
+        warnings.push(format!(
             "the last {} of {} rows are left out: their bead has not been measured",
             table.len() - output.len(),
             table.len()
@@ -79,12 +84,12 @@ fn of_table(table: &Table, name: &str, request: &Request<'_>) -> Result<(Experim
     }
     let first = columns.cut(&mut time_s, &mut input, &mut output);
     let (output, more) = clean(output, &filters).with_context(|| name.to_owned())?;
-    doubts.extend(more);
-    let time_is_told = columns.told(&time_name).is_some();
-    let rules = Rules { max_gap_s, time_is_told };
+    warnings.extend(more);
+    let time_unit_is_given = columns.unit_override(&time_name).is_some();
+    let rules = Rules { max_gap_s, is_time_unit_known: time_unit_is_given };
     let taken = Experiment::new(&time_s, &input, &output, &rules);
     let taken = taken.map_err(|error| at_line(table, first, name, error))?;
-    Ok((taken, doubts))
+    Ok((taken, warnings))
 }
 
 fn both<'a>((name, values): (Option<&'a str>, &'a Vec<f64>)) -> Option<(&'a str, &'a Vec<f64>)> {
@@ -92,7 +97,7 @@ fn both<'a>((name, values): (Option<&'a str>, &'a Vec<f64>)) -> Option<(&'a str,
 }
 
 fn of_recording(
-    found: &Recorded,
+    found: &BeadColumns,
     name: &str,
     request: &Request<'_>,
 ) -> Result<(Experiment, Vec<String>)> {
@@ -101,7 +106,7 @@ fn of_recording(
     if known.is_empty() {
         return Err(anyhow!("{name}: {}", found.notes.join("; ")));
     }
-    check_told(columns, &known, name)?;
+    check_unit_overrides(columns, &known, name)?;
     if let Some(time) = &columns.time {
         let what = format!("{name}: --time {time}: a recording's columns have its own clock");
         return Err(WrongArguments::new(what).into());
@@ -118,16 +123,16 @@ fn of_recording(
     let (input, mut output) = (column(request.input)?, column(request.output.unwrap_or_default())?);
     let (values, more) = clean(output.values, &filters).with_context(|| name.to_owned())?;
     output.values = values;
-    let rules = Rules { max_gap_s, time_is_told: true };
+    let rules = Rules { max_gap_s, is_time_unit_known: true };
     let taken = paired(&input, &output, &rules).with_context(|| name.to_owned())?;
     Ok((taken, found.notes.iter().cloned().chain(more).collect()))
 }
 
 fn clean(mut output: Vec<f64>, filters: &Filters) -> Result<(Vec<f64>, Vec<String>)> {
-    let mut told = Vec::new();
+    let mut notes = Vec::new();
     if let Some(hampel) = filters.hampel {
         let cleaned = hampel.filter(&output);
-        told.push(format!(
+        notes.push(format!(
             "{} of {} samples of the output were outliers and replaced (--hampel)",
             cleaned.replaced.len(),
             output.len()
@@ -136,11 +141,11 @@ fn clean(mut output: Vec<f64>, filters: &Filters) -> Result<(Vec<f64>, Vec<Strin
     }
     if let Some(smooth) = filters.smooth {
         output = smooth.filter(&output)?;
-        told.push(format!(
+        notes.push(format!(
             "the output was smoothed over {} samples (--smooth): what is faster than that is not in \
              the model",
             smooth.window()
         ));
     }
-    Ok((output, told))
+    Ok((output, notes))
 }

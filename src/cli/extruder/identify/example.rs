@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use crate::cli::arguments::WrongArguments;
 use crate::rows::output::{make_folder, write_whole};
 use crate::sim::flow_log;
-use crate::sim::melt::Machine;
+use crate::sim::melt::MeltParameters;
 use crate::sim::melt_log::{example as plan, record, to_csv};
 
 /// What its logs are called.
@@ -30,7 +30,7 @@ pub fn write(folder: &Path) -> Result<()> {
     let other = flow_log::gaussian().context("the example")?;
     write_whole(folder, LOGS[0], log.to_csv().as_bytes())?;
     write_whole(folder, LOGS[1], other.to_csv().as_bytes())?;
-    let recorded = record(Machine::USUAL, STARTS_SEED, &plan());
+    let recorded = record(MeltParameters::TYPICAL, STARTS_SEED, &plan());
     write_whole(folder, LOGS[2], to_csv(&recorded).as_bytes())?;
     let truth = flow_log::truth().context("the example")?;
     let [log, other, starts] = LOGS.map(|name| folder.join(name).display().to_string());
@@ -42,7 +42,7 @@ pub fn write(folder: &Path) -> Result<()> {
         truth.dc_gain(),
         truth.dead_time_s()
     );
-    let voids = Machine::USUAL.voids.map(|(mm3, s)| format!("{mm3} mm³ within {s} s"));
+    let voids = MeltParameters::TYPICAL.voids.map(|(mm3, s)| format!("{mm3} mm³ within {s} s"));
     say!("           starts: melt recedes while the screw stands, {}", voids.join(" and "));
     say!(
         "try        truebead extruder identify {log} --input screw_rpm --output flow_mm3_per_s --validate {other}"

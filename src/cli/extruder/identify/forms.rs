@@ -1,6 +1,6 @@
 //! How forms, dead times and filters are written.
 
-use crate::identify::fit::{DeadTime, MOST_POLES, Structure};
+use crate::identify::fit::{DeadTime, MAX_POLES, Structure};
 use crate::numeric::hampel::Hampel;
 use crate::numeric::savgol::SavGol;
 
@@ -11,7 +11,7 @@ pub struct Forms(pub Vec<Structure>);
 /// A dead time that is told, or where it is looked for; none for the usual
 /// range.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wanted(pub Option<DeadTime>);
+pub struct DeadTimeArg(pub Option<DeadTime>);
 
 /// One word for a form, or for those that are compared.
 pub fn parse_forms(text: &str) -> Result<Forms, String> {
@@ -39,8 +39,8 @@ fn parse_counts(text: &str) -> Result<Structure, String> {
         "expected compare, fopdt, fopdt-zero, sopdt, sopdt-zero, sopdt-real, sopdt-real-zero, or \
          numbers of poles and zeros such as 2,1",
     )?;
-    if poles == 0 || poles > MOST_POLES || zeros > poles {
-        return Err(format!("expected 1 to {MOST_POLES} poles, and no more zeros than poles"));
+    if poles == 0 || poles > MAX_POLES || zeros > poles {
+        return Err(format!("expected 1 to {MAX_POLES} poles, and no more zeros than poles"));
     }
     Ok(Structure::Transfer { poles, zeros })
 }
@@ -51,19 +51,19 @@ fn pair<T: std::str::FromStr>(text: &str) -> Option<(T, T)> {
 }
 
 /// A dead time, a range of them, or `estimate`.
-pub fn parse_dead_time(text: &str) -> Result<Wanted, String> {
+pub fn parse_dead_time(text: &str) -> Result<DeadTimeArg, String> {
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|s| (0.0..=1e4).contains(s));
     if text == "estimate" {
-        return Ok(Wanted(None));
+        return Ok(DeadTimeArg(None));
     }
     let wanted = match text.split_once("..") {
         Some((from, to)) => number(from)
             .zip(number(to))
             .filter(|(from, to)| from < to)
-            .map(|(least_s, most_s)| DeadTime::Estimated { least_s, most_s }),
-        None => number(text).map(DeadTime::Given),
+            .map(|(least_s, most_s)| DeadTime::Estimated { min_s: least_s, max_s: most_s }),
+        None => number(text).map(DeadTime::Known),
     };
-    wanted.map(|wanted| Wanted(Some(wanted))).ok_or_else(|| {
+    wanted.map(|wanted| DeadTimeArg(Some(wanted))).ok_or_else(|| {
         "expected 0 to 10000 s, a range of them such as 0..3, or estimate".to_owned()
     })
 }
@@ -104,8 +104,8 @@ mod tests {
         for wrong in ["1,2", "5,0", "0,0", "second"] {
             assert!(parse_forms(wrong).is_err(), "{wrong}");
         }
-        assert_eq!(parse_dead_time("0.4").unwrap().0, Some(DeadTime::Given(0.4)));
-        let range = DeadTime::Estimated { least_s: 0.0, most_s: 3.0 };
+        assert_eq!(parse_dead_time("0.4").unwrap().0, Some(DeadTime::Known(0.4)));
+        let range = DeadTime::Estimated { min_s: 0.0, max_s: 3.0 };
         assert_eq!(parse_dead_time("0..3").unwrap().0, Some(range));
         assert!(parse_dead_time("3..1").is_err() && parse_dead_time("-1").is_err());
         assert!(parse_hampel("5,3").is_ok() && parse_hampel("0,3").is_err());

@@ -4,8 +4,8 @@
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 
-use super::layer::Layer;
-use super::rows::Rows;
+use super::layer::LayerArgs;
+use super::rows::TableColumns;
 use crate::cli::arguments::WrongArguments;
 use crate::core::quantity::Unit;
 use crate::core::units::Mm;
@@ -17,9 +17,9 @@ use crate::identify::flow::at_moments;
 pub const LAID_FLOW: &str = "laid_flow_mm3_per_s";
 /// What was measured on the bead.
 #[derive(Debug, Args)]
-pub struct Bead {
+pub struct BeadArgs {
     #[command(flatten)]
-    pub layer: Layer,
+    pub layer: LayerArgs,
     /// Column of the path length [mm], for --measured-at-offset-mm
     #[arg(long, value_name = "COLUMN", requires = "measured_at_offset_mm")]
     pub position: Option<String>,
@@ -40,7 +40,7 @@ pub struct Bead {
     pub speed: Option<String>,
 }
 
-impl Bead {
+impl BeadArgs {
     /// Whether the output is a flow that is made of other columns.
     pub const fn makes_flow(&self) -> bool {
         self.area.is_some() || self.width.is_some()
@@ -48,13 +48,13 @@ impl Bead {
 
     /// Refuses options that a recording has no use for.
     pub fn refuse_columns(&self) -> Result<(), WrongArguments> {
-        let told = [
+        let given = [
             ("--position", &self.position),
             ("--area", &self.area),
             ("--width", &self.width),
             ("--speed", &self.speed),
         ];
-        match told.iter().find(|(_, column)| column.is_some()) {
+        match given.iter().find(|(_, column)| column.is_some()) {
             Some((option, _)) => Err(WrongArguments::new(format!(
                 "{option} is for tables: a recording has the flow of its bead already, brought to \
                  when it was laid, as --output {LAID_FLOW}"
@@ -65,7 +65,7 @@ impl Bead {
 
     /// The output of a table, where it is not made of others the column of this name, one value a row from its beginning; fewer where
     /// the bead has not come to its measurement when the table ends.
-    pub fn output(&self, rows: &Rows<'_>, output: Option<&str>) -> Result<Vec<f64>> {
+    pub fn output(&self, rows: &TableColumns<'_>, output: Option<&str>) -> Result<Vec<f64>> {
         if self.position.is_none() && self.layer.measured_at_offset_mm.is_some_and(|mm| mm > 0.0) {
             let what = "--measured-at-offset-mm needs --position, the way along the bead";
             return Err(WrongArguments::new(what).into());
@@ -89,7 +89,12 @@ impl Bead {
     }
 
     /// What was measured, at the moments of extrusion.
-    fn aligned(&self, rows: &Rows<'_>, measured: &[f64], position: &str) -> Result<Vec<f64>> {
+    fn aligned(
+        &self,
+        rows: &TableColumns<'_>,
+        measured: &[f64],
+        position: &str,
+    ) -> Result<Vec<f64>> {
         let way = rows.in_unit(position, Unit::Mm)?;
         let offset = self.layer.offset()?.unwrap_or(0.0);
         let found = to_extruded(&way, measured, offset).map_err(|error| match error {
@@ -112,7 +117,7 @@ impl Bead {
     }
 
     /// Areas of a bead with round sides.
-    fn areas(&self, rows: &Rows<'_>, width: &str) -> Result<Vec<f64>> {
+    fn areas(&self, rows: &TableColumns<'_>, width: &str) -> Result<Vec<f64>> {
         let height = self.layer.layer_height()?.unwrap_or_default();
         let area = |(row, width_mm): (usize, &f64)| -> Result<f64> {
             let place = || format!("{}, line {}, column {width}", rows.name, rows.table.line(row));

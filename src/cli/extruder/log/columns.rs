@@ -4,17 +4,17 @@ use clap::Args;
 
 use crate::cli::arguments::WrongArguments;
 use crate::core::quantity::{Quantity, Unit};
-use crate::identify::series::Series;
+use crate::identify::series::TimeSeries;
 
 /// Time, units and part of a log.
 #[derive(Debug, Args)]
-pub struct Columns {
+pub struct ColumnArgs {
     /// Column of time [default: the one that begins with time]
     #[arg(long, value_name = "COLUMN")]
     pub time: Option<String>,
     /// Unit of a column, such as nozzle=bar; may be repeated
-    #[arg(long, value_name = "COLUMN=UNIT", value_parser = parse_told)]
-    pub unit: Vec<Told>,
+    #[arg(long, value_name = "COLUMN=UNIT", value_parser = parse_unit_override)]
+    pub unit: Vec<UnitOverride>,
     /// Leave out what was logged before this moment [s]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub from_s: Option<f64>,
@@ -25,7 +25,7 @@ pub struct Columns {
 
 /// A column's unit that was told.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Told {
+pub struct UnitOverride {
     column: String,
     unit: String,
 }
@@ -33,16 +33,16 @@ pub struct Told {
 /// Seconds that a unit of time is long.
 const TIMES: [(&str, f64); 3] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
 
-impl Columns {
+impl ColumnArgs {
     /// What a column of the input or the output holds.
     pub fn quantity(&self, column: &str) -> Result<Quantity, WrongArguments> {
-        let told = match self.told(column) {
+        let given = match self.unit_override(column) {
             None => None,
             Some(word) => Some(Unit::of_word(word).ok_or_else(|| {
                 WrongArguments::new(format!("--unit {column}={word}: expected one of {}", units()))
             })?),
         };
-        Quantity::of_column(column, told).ok_or_else(|| {
+        Quantity::of_column(column, given).ok_or_else(|| {
             WrongArguments::new(format!(
                 "the name {column} does not end with a unit (one of {}); tell it with --unit \
                  {column}=UNIT",
@@ -57,7 +57,7 @@ impl Columns {
         let mut candidates =
             known.iter().filter(|name| name.to_ascii_lowercase().starts_with("time"));
         let column = match (&self.time, candidates.next(), candidates.next()) {
-            (Some(told), ..) => told,
+            (Some(given), ..) => given,
             (None, Some(only), None) => only,
             (None, None, _) => {
                 let what = format!("no column begins with time; name it with --time ({list})");
@@ -69,7 +69,8 @@ impl Columns {
                 return Err(WrongArguments::new(what));
             }
         };
-        let word = self.told(column).or_else(|| column.rsplit_once('_').map(|(_, end)| end));
+        let word =
+            self.unit_override(column).or_else(|| column.rsplit_once('_').map(|(_, end)| end));
         let unit = TIMES.iter().find(|unit| Some(unit.0) == word).ok_or_else(|| {
             WrongArguments::new(format!(
                 "the unit of {column} is not told; add --unit {column}=s, {column}=ms or {column}=us"
@@ -79,8 +80,8 @@ impl Columns {
     }
 
     /// The unit of a column as it was told.
-    pub fn told(&self, column: &str) -> Option<&str> {
-        self.unit.iter().find(|told| told.column == column).map(|told| told.unit.as_str())
+    pub fn unit_override(&self, column: &str) -> Option<&str> {
+        self.unit.iter().find(|given| given.column == column).map(|given| given.unit.as_str())
     }
 
     fn span(&self) -> (f64, f64) {
@@ -102,17 +103,17 @@ impl Columns {
     }
 
     /// Keeps of a column of a recording what was asked for.
-    pub fn cut_series(&self, column: &Series) -> Series {
+    pub fn cut_series(&self, column: &TimeSeries) -> TimeSeries {
         let (from_s, to_s) = self.span();
         column.within(from_s, to_s)
     }
 
     /// A column that a unit was told of and that is not there.
-    pub fn stray(&self, known: &[String]) -> Option<&str> {
+    pub fn unknown_column(&self, known: &[String]) -> Option<&str> {
         self.unit
             .iter()
-            .map(|told| told.column.as_str())
-            .find(|told| !known.iter().any(|name| name == told))
+            .map(|given| given.column.as_str())
+            .find(|given| !known.iter().any(|name| name == given))
     }
 }
 
@@ -120,10 +121,10 @@ fn units() -> String {
     Unit::all().map(Unit::word).collect::<Vec<_>>().join(", ")
 }
 
-fn parse_told(text: &str) -> Result<Told, String> {
+fn parse_unit_override(text: &str) -> Result<UnitOverride, String> {
     let (column, unit) =
         text.split_once('=').ok_or("write the column and its unit, such as nozzle=bar")?;
-    Ok(Told { column: column.trim().to_owned(), unit: unit.trim().to_owned() })
+    Ok(UnitOverride { column: column.trim().to_owned(), unit: unit.trim().to_owned() })
 }
 
 /// Refuses one column that is named twice.

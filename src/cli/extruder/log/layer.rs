@@ -10,7 +10,7 @@ const LENGTHS_MM: std::ops::RangeInclusive<f64> = 0.0..=1e5;
 
 /// What a recording's cell says of its bead, unless it is given.
 #[derive(Debug, Clone, Copy, Default, Args)]
-pub struct Layer {
+pub struct LayerArgs {
     /// From the nozzle back to the measurement [mm] [default: the cell's]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub measured_at_offset_mm: Option<f64>,
@@ -19,7 +19,7 @@ pub struct Layer {
     pub layer_height_mm: Option<f64>,
 }
 
-impl Layer {
+impl LayerArgs {
     /// Height of a layer as it was told.
     pub fn layer_height(&self) -> Result<Option<Mm>, WrongArguments> {
         let Some(height) = self.layer_height_mm else { return Ok(None) };
@@ -35,7 +35,7 @@ impl Layer {
             Some(offset) if !LENGTHS_MM.contains(&offset) => Err(WrongArguments::new(format!(
                 "--measured-at-offset-mm {offset}: expected 0 to 1e5 mm"
             ))),
-            told => Ok(told),
+            given => Ok(given),
         }
     }
 }

@@ -2,27 +2,27 @@
 
 use anyhow::{Context, Result, anyhow};
 
-use super::columns::Columns;
+use super::columns::ColumnArgs;
 use crate::cli::arguments::WrongArguments;
 use crate::core::quantity::Unit;
 use crate::identify::experiment::ExperimentError;
-use crate::identify::table::{Table, TableError};
+use crate::identify::table::{DataTable, DataTableError};
 
 /// The columns of a table.
-pub struct Rows<'a> {
+pub struct TableColumns<'a> {
     /// The table.
-    pub table: &'a Table,
+    pub table: &'a DataTable,
     /// What messages call it.
     pub name: &'a str,
     /// What its columns hold.
-    pub columns: &'a Columns,
+    pub columns: &'a ColumnArgs,
 }
 
-impl Rows<'_> {
+impl TableColumns<'_> {
     /// The numbers of a column.
     pub fn column(&self, column: &str) -> Result<Vec<f64>> {
         match self.table.column(column) {
-            Err(error @ TableError::NoColumn { .. }) => {
+            Err(error @ DataTableError::NoColumn { .. }) => {
                 Err(WrongArguments::new(format!("{}: {error}", self.name)).into())
             }
             other => other.with_context(|| self.name.to_owned()),
@@ -46,8 +46,12 @@ impl Rows<'_> {
 }
 
 /// Refuses a unit that is told of a column which is not there.
-pub fn check_told(columns: &Columns, known: &[String], name: &str) -> Result<(), WrongArguments> {
-    match columns.stray(known) {
+pub fn check_unit_overrides(
+    columns: &ColumnArgs,
+    known: &[String],
+    name: &str,
+) -> Result<(), WrongArguments> {
+    match columns.unknown_column(known) {
         None => Ok(()),
         Some(stray) => {
             let list = known.join(", ");
@@ -58,7 +62,12 @@ pub fn check_told(columns: &Columns, known: &[String], name: &str) -> Result<(),
 }
 
 /// The line in the file beside the number of the sample.
-pub fn at_line(table: &Table, first: usize, name: &str, error: ExperimentError) -> anyhow::Error {
+pub fn at_line(
+    table: &DataTable,
+    first: usize,
+    name: &str,
+    error: ExperimentError,
+) -> anyhow::Error {
     let sample = match &error {
         ExperimentError::Order { at, .. } | ExperimentError::Outlier { at, .. } => Some(*at),
         ExperimentError::Gap { gap, .. } => Some(gap.after),

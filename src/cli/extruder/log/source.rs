@@ -6,29 +6,29 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 
-use super::layer::Layer;
+use super::layer::LayerArgs;
 use crate::cell::Cell;
 use crate::cell::file::Purpose;
 use crate::cli::arguments::WrongArguments;
 use crate::core::units::Mm;
-use crate::identify::table::Table;
-use crate::io::recorded::{Facts, Recorded, columns};
+use crate::identify::table::DataTable;
+use crate::io::recorded::{BeadColumns, CellFacts, columns};
 use crate::io::recording::Recording;
 
 /// How an MCAP file begins.
 const MAGIC: &[u8] = b"\x89MCAP";
 
 /// Data as they were read.
-pub enum Source {
+pub enum LogSource {
     /// Columns on moments of their own.
-    Recording(Recorded),
+    Recording(BeadColumns),
     /// Rows.
-    Table(Table),
+    Table(DataTable),
 }
 
-impl Source {
+impl LogSource {
     /// Reads either.
-    pub fn read(path: &Path, layer: &Layer) -> Result<Self> {
+    pub fn read(path: &Path, layer: &LayerArgs) -> Result<Self> {
         let name = path.display().to_string();
         let wrong = |what: &dyn std::fmt::Display| WrongArguments::new(format!("{name}: {what}"));
         let mut begins = Vec::new();
@@ -42,11 +42,11 @@ impl Source {
         let text = String::from_utf8(bytes).map_err(|_| {
             wrong(&"this is no text; expected a table (CSV) with a line of names, or a recording")
         })?;
-        Ok(Self::Table(Table::parse(&text).map_err(|error| wrong(&error))?))
+        Ok(Self::Table(DataTable::parse(&text).map_err(|error| wrong(&error))?))
     }
 }
 
-fn recorded(path: &Path, layer: &Layer) -> Result<Recorded> {
+fn recorded(path: &Path, layer: &LayerArgs) -> Result<BeadColumns> {
     let mut recording = Recording::open(path).map_err(WrongArguments::new)?;
     let facts = facts(&recording, layer)?;
     let name = recording.file().to_owned();
@@ -56,7 +56,7 @@ fn recorded(path: &Path, layer: &Layer) -> Result<Recorded> {
 }
 
 /// What the cell file says that is attached.
-fn facts(recording: &Recording, layer: &Layer) -> Result<Facts> {
+fn facts(recording: &Recording, layer: &LayerArgs) -> Result<CellFacts> {
     let file = recording.file();
     if recording.run().is_none() {
         let what = format!(
@@ -78,11 +78,11 @@ fn facts(recording: &Recording, layer: &Layer) -> Result<Facts> {
         return Err(WrongArguments::new(what).into());
     };
     let extruder = run.extruder.as_ref().map(|part| &part.extruder);
-    let told = layer.layer_height()?;
+    let given = layer.layer_height()?;
     let offset = layer.offset()?;
-    Ok(Facts {
+    Ok(CellFacts {
         command: extruder.map(|extruder| extruder.drive.unit()),
-        layer_height: told.or(extruder.map(|extruder| extruder.layer_height)),
+        layer_height: given.or(extruder.map(|extruder| extruder.layer_height)),
         offset: offset.map_or(run.camera.offset, |mm| Mm::new(mm).unwrap_or(run.camera.offset)),
     })
 }

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::arguments::AccuracyArgs;
 use crate::calibration::SurfaceMap;
 use crate::cli::arguments::WrongArguments;
-use crate::cli::print::Voice;
+use crate::cli::print::Verbosity;
 use crate::core::frame::Pixels;
 use crate::core::geometry::Size;
 use crate::io::progress::Progress;
@@ -21,7 +21,7 @@ use crate::rows::output;
 use crate::studies::accuracy::drawn;
 use crate::studies::accuracy::drawn::{DrawnFrame, DrawnSet};
 use crate::studies::accuracy::drawn_table::{
-    Deviation, DrawnOutcome, Refusal, figures, markdown, table,
+    Deviation, DrawnOutcome, FrameRejection, figures, markdown, table,
 };
 use crate::vision::Measurer;
 
@@ -31,7 +31,7 @@ const FRAMES: u64 = 30_000;
 const ALL: &str = "all";
 
 /// Renders and measures the sets that are named.
-pub fn judge(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
+pub fn judge(args: &AccuracyArgs, voice: Verbosity) -> Result<ExitCode> {
     let sets = named(&args.random)?;
     let frames = args.frames.unwrap_or(FRAMES);
     let first = args.first_frame;
@@ -96,7 +96,7 @@ fn measure(drawn: &DrawnFrame, number: u64) -> DrawnOutcome {
         }),
         Err(reject) => {
             let names_gamma = reject.to_string().contains("gamma");
-            Err(Refusal { status: reject.status(), names_gamma })
+            Err(FrameRejection { status: reject.status(), names_gamma })
         }
     };
     DrawnOutcome { frame: number, parameters: drawn.parameters.clone(), width }

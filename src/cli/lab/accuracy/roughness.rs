@@ -8,24 +8,24 @@ use rayon::prelude::*;
 
 use super::arguments::AccuracyArgs;
 use crate::calibration::SurfaceMap;
-use crate::cli::print::Voice;
+use crate::cli::print::Verbosity;
 use crate::core::units::Mm;
 use crate::io::progress::Progress;
 use crate::rows::output;
 use crate::studies::accuracy::drawn::LongBead;
 use crate::studies::accuracy::roughness_table::{
-    BeadOutcome, Found, OwnMeanError, Ratio, figures, markdown, table,
+    BeadOutcome, OwnMeanError, Ratio, RoughnessEstimate, figures, markdown, table,
 };
 use crate::vision::{Measurer, Roughness, RoughnessEstimator};
 
 /// Length of each bead in its correlation lengths.
-const LENGTHS: f64 = 50.0;
+const CORRELATION_LENGTHS: f64 = 50.0;
 /// How far a bead moves on from frame to frame \[px\]: by a gauge, and as little as that
 /// each piece is seen in ten frames.
-const ADVANCES: [usize; 2] = [100, 10];
+const ADVANCES_PX: [usize; 2] = [100, 10];
 
 /// Renders and measures the beads.
-pub fn judge(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
+pub fn judge(args: &AccuracyArgs, voice: Verbosity) -> Result<ExitCode> {
     if let Some(out) = &args.out {
         output::make_folder(out)?;
     }
@@ -33,8 +33,8 @@ pub fn judge(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
     let outcomes: Result<Vec<[BeadOutcome; 2]>> = (0..args.beads)
         .into_par_iter()
         .map(|number| {
-            let bead = LongBead::draw(number, LENGTHS);
-            let [apart, overlapping] = ADVANCES.map(|advance| pass(&bead, advance));
+            let bead = LongBead::draw(number, CORRELATION_LENGTHS);
+            let [apart, overlapping] = ADVANCES_PX.map(|advance| pass(&bead, advance));
             progress.lock().unwrap_or_else(PoisonError::into_inner).advance();
             Ok([apart?, overlapping?])
         })
@@ -42,7 +42,7 @@ pub fn judge(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
     progress.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
     let outcomes = outcomes?;
     let mut all = Vec::new();
-    for (way, advance) in ADVANCES.into_iter().enumerate() {
+    for (way, advance) in ADVANCES_PX.into_iter().enumerate() {
         let of_way: Vec<BeadOutcome> = outcomes.iter().map(|both| both[way].clone()).collect();
         all.extend(figures(advance, &of_way, LongBead::lengths_px()));
     }
@@ -75,19 +75,19 @@ fn pass(bead: &LongBead, advance: usize) -> Result<BeadOutcome> {
         }
     }
     let found = estimator.estimate().map(|found| found_of(&found, bead)).transpose()?;
-    Ok(BeadOutcome { length_px: bead.length_px(), found, widths })
+    Ok(BeadOutcome { length_px: bead.length_px(), estimate: found, widths })
 }
 
-fn found_of(found: &Roughness, bead: &LongBead) -> Result<Found> {
+fn found_of(found: &Roughness, bead: &LongBead) -> Result<RoughnessEstimate> {
     let ratio = |found: Mm, sigma: Mm, truth: f64| Ratio {
         value: found.get() / truth,
         sigma: sigma.get() / found.get(),
     };
     #[expect(clippy::cast_precision_loss, reason = "rows of a picture")]
     let gauge = Mm::new(bead.gauge_rows() as f64)?;
-    Ok(Found {
+    Ok(RoughnessEstimate {
         roughness: ratio(found.roughness, found.roughness_sigma, bead.roughness_px()),
         length: ratio(found.length, found.length_sigma, bead.length_px()),
-        of_gauge_mean_px: found.of_gauge_mean(gauge).get(),
+        gauge_mean_sigma_px: found.of_gauge_mean(gauge).get(),
     })
 }

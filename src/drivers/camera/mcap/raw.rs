@@ -1,6 +1,6 @@
 //! `foxglove.RawImage` as a frame.
 
-use crate::core::frame::{Channel, Frame, Layout, Pixels};
+use crate::core::frame::{Channel, Frame, Pixels, SampleLayout};
 use crate::core::geometry::Size;
 use crate::core::time::Stamp;
 use crate::io::foxglove::RawImage;
@@ -23,12 +23,12 @@ pub fn decode(
     captured_at: Stamp,
 ) -> Result<Frame, String> {
     let (layout, depth) = match image.encoding.as_str() {
-        "mono8" | "8UC1" => (Layout::Grey, Depth::Eight),
-        "mono16" | "16UC1" => (Layout::Grey, Depth::Sixteen),
-        "rgb8" => (Layout::Rgb, Depth::Eight),
-        "rgba8" => (Layout::Rgba, Depth::Eight),
-        "bgr8" | "8UC3" => (Layout::Bgr, Depth::Eight),
-        "bgra8" => (Layout::Bgra, Depth::Eight),
+        "mono8" | "8UC1" => (SampleLayout::Grey, Depth::Eight),
+        "mono16" | "16UC1" => (SampleLayout::Grey, Depth::Sixteen),
+        "rgb8" => (SampleLayout::Rgb, Depth::Eight),
+        "rgba8" => (SampleLayout::Rgba, Depth::Eight),
+        "bgr8" | "8UC3" => (SampleLayout::Bgr, Depth::Eight),
+        "bgra8" => (SampleLayout::Bgra, Depth::Eight),
         other => return Err(format!("its encoding is \"{other}\"; read are {KNOWN}")),
     };
     let sample_bytes = match depth {

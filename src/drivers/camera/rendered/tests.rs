@@ -1,19 +1,19 @@
 use super::*;
 use crate::calibration::Calibration;
-use crate::cell::Source;
+use crate::cell::ImageSource;
 use crate::core::frame::Frame;
 use crate::core::geometry::Roi;
 use crate::core::robot::RobotMode;
 use crate::core::units::WidthRange;
 use crate::core::units::{Mm, MmPerS};
-use crate::scenario::bead::{BeadModel, Roughness};
+use crate::scenario::bead::{BeadModel, EdgeRoughness};
 use crate::scenario::disturbance::Flow;
-use crate::scenario::image::Picture;
-use crate::vision::{Axis, Gauge, Polarity};
+use crate::scenario::image::ImageModel;
+use crate::vision::{BeadAxis, Gauge, Polarity};
 
 const SMOOTH_STEADY: Simulation = Simulation {
     seed: 1,
-    level: crate::scenario::table::Level::Frames,
+    width_source: crate::scenario::table::WidthSource::Frames,
     path: Mm::constant(2000.0),
     frame_spacing: None,
     step: Span::from_millis(20),
@@ -23,9 +23,9 @@ const SMOOTH_STEADY: Simulation = Simulation {
     random_phase: false,
     gauge_length: Mm::ZERO,
     width_noise: Mm::ZERO,
-    outlier_share: 0.0,
+    outlier_fraction: 0.0,
     outlier_size: 0.0,
-    missing_share: 0.0,
+    missing_fraction: 0.0,
     bead: BeadModel {
         width_mm: 10.0,
         at_speed_mm_per_s: 100.0,
@@ -33,14 +33,14 @@ const SMOOTH_STEADY: Simulation = Simulation {
         slow_below_mm_per_s: 0.0,
         slow_exponent: 0.25,
     },
-    roughness: Roughness { size_mm: 0.0, length_mm: 5.0 },
+    roughness: EdgeRoughness { sigma_mm: 0.0, length_mm: 5.0 },
     flow: Flow::STEADY,
-    picture: Picture {
+    image: ImageModel {
         size_px: [160, 120],
         blur_px: 1.0,
         noise_grey: 0.0,
         light_ratio: 1.0,
-        ..Picture::USUAL
+        ..ImageModel::DEFAULT
     },
 };
 
@@ -49,13 +49,13 @@ fn camera() -> (RenderedCamera, RobotView, Sender<()>) {
         calipers: 32,
         ..Gauge::new(
             Roi { x: 10, y: 10, width: 140, height: 100 },
-            Axis::Vertical,
+            BeadAxis::Vertical,
             Polarity::Bright,
             WidthRange { min: Mm::constant(1.0), max: Mm::constant(15.0) },
         )
     };
-    let described = Camera {
-        source: Source::Rendered,
+    let described = CameraSettings {
+        source: ImageSource::Rendered,
         source_name: "rendered".to_string(),
         rate_hz: 500.0,
         mount: Mount::Flange,
@@ -64,7 +64,7 @@ fn camera() -> (RenderedCamera, RobotView, Sender<()>) {
         deadline: Span::from_millis(2000),
     };
     let scale = Calibration::Scale { mm_per_px: 0.1, sigma: None };
-    let picture = SMOOTH_STEADY.picture;
+    let picture = SMOOTH_STEADY.image;
     let renderer = Renderer::new(scale, Mm::ZERO, gauge, picture, 1).unwrap();
     let (stop, stopped) = bounded(1);
     let (camera, view) =

@@ -1,17 +1,23 @@
 use super::*;
-use crate::extruder::screw::feedback::Setpoint;
-use crate::extruder::screw::{PiecewiseExponential, Pulsation, Saturated, ScrewDesign};
+use crate::extruder::screw::feedback::PlugSetpoint;
+use crate::extruder::screw::{PiecewiseExponential, SaturatedLinear, ScrewDesign, SpeedPulsation};
 use proptest::prelude::*;
 
-const SETPOINT: Setpoint = Setpoint { plug: Mm::constant(160.0), most: 0.9 };
+const SETPOINT: PlugSetpoint = PlugSetpoint { plug: Mm::constant(160.0), max_fill: 0.9 };
 
 fn settings(scheme: Scheme) -> ScrewSettings {
-    let pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+    let pulsation = SpeedPulsation { relative_amplitude: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
     let screw = ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap();
-    let law = PiecewiseExponential::new(&screw, SETPOINT, 36.0).unwrap();
-    let law = FillLaw::Exponential(law);
-    let before = screw.holding(0.1);
-    ScrewSettings { screw, law, scheme, period: Span::from_millis(5), before }
+    let controller = PiecewiseExponential::new(&screw, SETPOINT, 36.0).unwrap();
+    let controller = FillFeedback::Exponential(controller);
+    let before = screw.holding_fill(0.1);
+    ScrewSettings {
+        screw,
+        feedback: controller,
+        scheme,
+        period: Span::from_millis(5),
+        initial_fill: before,
+    }
 }
 
 fn control(scheme: Scheme) -> ScrewControl {
@@ -28,7 +34,7 @@ fn a_plug_that_is_held_stays_foretold_and_arrives_after_its_delay() {
         let step = control(scheme).step(at(0), Mm::constant(100.0)).unwrap();
         assert!((step.plug.get() - 100.0).abs() < 1e-9, "{scheme:?}");
         assert!((step.arrival.secs() - 1.137).abs() < 6e-3, "{scheme:?}");
-        assert!((step.fill - settings(scheme).law.fill(0.1)).abs() < 1e-9);
+        assert!((step.fill - settings(scheme).feedback.fill(0.1)).abs() < 1e-9);
     }
 }
 
@@ -39,7 +45,7 @@ fn a_plug_that_no_screw_has_is_refused_and_the_feed_stays_in_force() {
         let fed = control.step(at(0), Mm::constant(150.0)).unwrap().fill;
         for (tick, plug) in (1..).zip([-0.1, 200.0, 1e6]) {
             let fault = control.step(at(5 * tick), Mm::constant(plug)).unwrap_err();
-            assert!(matches!(fault, ScrewFault::Outside { .. }), "{plug}");
+            assert!(matches!(fault, ScrewFault::PlugOutsideScrew { .. }), "{plug}");
             assert_eq!(control.fed(), fed);
         }
         assert!(control.step(at(20), Mm::constant(150.0)).is_ok());
@@ -72,20 +78,23 @@ fn steps_come_in_order_and_where_the_scheme_can_take_them() {
 #[test]
 fn what_was_applied_counts_and_not_what_was_decided() {
     for scheme in [Scheme::Exact, Scheme::Paper] {
-        let (mut told, mut untold) = (control(scheme), control(scheme));
+        let (mut informed, mut uninformed) = (control(scheme), control(scheme));
         for tick in 0..100 {
             let plug = Mm::constant(120.0);
-            let _ = untold.step(at(5 * tick), plug).unwrap();
-            let _ = told.step(at(5 * tick), plug).unwrap();
-            told.applied(at(5 * tick), 0.1).unwrap();
-            assert_eq!(told.fed(), 0.1);
+            let _ = uninformed.step(at(5 * tick), plug).unwrap();
+            let _ = informed.step(at(5 * tick), plug).unwrap();
+            informed.applied(at(5 * tick), 0.1).unwrap();
+            assert_eq!(informed.fed(), 0.1);
         }
-        let foretold = |control: &mut ScrewControl| {
+        let predicted = |control: &mut ScrewControl| {
             control.step(at(500), Mm::constant(120.0)).unwrap().plug.get()
         };
-        assert!(foretold(&mut told) + 5.0 < foretold(&mut untold));
+        assert!(predicted(&mut informed) + 5.0 < predicted(&mut uninformed));
         for fill in [-0.1, 1.0, f64::NAN] {
-            assert!(matches!(told.applied(at(500), fill), Err(ScrewFault::Share { .. })));
+            assert!(matches!(
+                informed.applied(at(500), fill),
+                Err(ScrewFault::FillOutOfRange { .. })
+            ));
         }
     }
 }
@@ -94,12 +103,12 @@ fn what_was_applied_counts_and_not_what_was_decided() {
 fn settings_that_cannot_be_are_refused() {
     let sound = settings(Scheme::Exact);
     let refused = |settings| ScrewControl::new(&settings).unwrap_err();
-    let filled = ScrewSettings { before: 1.0, ..sound };
-    assert!(matches!(refused(filled), ScrewError::Before { .. }));
+    let filled = ScrewSettings { initial_fill: 1.0, ..sound };
+    assert!(matches!(refused(filled), ScrewError::InitialFill { .. }));
     let still = ScrewSettings { period: Span::ZERO, ..sound };
     assert!(matches!(refused(still), ScrewError::NotPositive { name: "period", .. }));
     let often = ScrewSettings { period: Span::from_ns(1_000), ..sound };
-    assert!(matches!(refused(often), ScrewError::Memory { .. }));
+    assert!(matches!(refused(often), ScrewError::TooManySteps { .. }));
     let belt = Screw { conveying: Conveying::AtSpeedOnTheWay, ..sound.screw };
     let belt = ScrewSettings { screw: belt, scheme: Scheme::Paper, ..sound };
     assert_eq!(refused(belt), ScrewError::SchemeOnTheWay);
@@ -112,7 +121,7 @@ proptest! {
     #[test]
     fn the_feed_keeps_its_limits_whatever_is_measured(
         plugs in prop::collection::vec(-20.0..220.0_f64, 1..300),
-        share in 0.0..0.9_f64,
+        relative_amplitude in 0.0..0.9_f64,
         rad_per_s in 0.0..8.0_f64,
         phase_rad in -4.0..4.0_f64,
         slope in 7.0..2_000.0_f64,
@@ -120,18 +129,18 @@ proptest! {
         belt in any::<bool>(),
         straight in any::<bool>(),
     ) {
-        let pulsation = Pulsation { share, rad_per_s, phase_rad };
+        let pulsation = SpeedPulsation { relative_amplitude, rad_per_s, phase_rad };
         let screw = ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap();
         let conveying =
             if belt && !paper { Conveying::AtSpeedOnTheWay } else { Conveying::AtPresentSpeed };
         let screw = Screw { conveying, ..screw };
-        let law = if straight {
-            FillLaw::Saturated(Saturated::new(&screw, SETPOINT, slope).unwrap())
+        let feedback = if straight {
+            FillFeedback::Saturated(SaturatedLinear::new(&screw, SETPOINT, slope).unwrap())
         } else {
-            FillLaw::Exponential(PiecewiseExponential::new(&screw, SETPOINT, slope).unwrap())
+            FillFeedback::Exponential(PiecewiseExponential::new(&screw, SETPOINT, slope).unwrap())
         };
         let scheme = if paper { Scheme::Paper } else { Scheme::Exact };
-        let settings = ScrewSettings { screw, law, ..settings(scheme) };
+        let settings = ScrewSettings { screw, feedback, ..settings(scheme) };
         let mut control = ScrewControl::new(&settings).unwrap();
         for (tick, plug) in (0..).zip(plugs) {
             let step = control.step(at(5 * tick), Mm::constant(plug));

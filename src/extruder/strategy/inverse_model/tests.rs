@@ -1,7 +1,9 @@
 use super::*;
 use crate::core::units::Rpm;
 use crate::extruder::CommandLimits;
-use crate::extruder::feedforward::{ExtruderModel, InverseSettings, RightZeros, ScrewSpeed};
+use crate::extruder::feedforward::{
+    ExtruderModel, InverseSettings, RightHalfPlaneZeros, ScrewSpeed,
+};
 use crate::extruder::strategy::tests::report;
 use crate::numeric::lti::{Between, Simulator, TransferFunction};
 
@@ -12,29 +14,34 @@ fn law(
     limits: CommandLimits,
     about: OperatingPoint,
     time_constant_s: f64,
-) -> Foreseen {
+) -> InverseFeedforward {
     let settings = InverseSettings {
         time_constant_s,
-        right_zeros: RightZeros::Refuse,
-        known_ahead: Span::ZERO,
-        late: Span::from_secs(1.0),
+        right_zeros: RightHalfPlaneZeros::Refuse,
+        preview: Span::ZERO,
+        max_delay: Span::from_secs(1.0),
         limits,
         period: PERIOD,
     };
-    Foreseen::new(Tracker::new(model, &settings).unwrap(), about)
+    InverseFeedforward::new(Tracker::new(model, &settings).unwrap(), about)
 }
 
 /// Shares of a wanted flow over time, and the commands.
-fn course(law: &mut Foreseen, plant: &mut Simulator, flow: f64, limits: CommandLimits) -> Vec<f64> {
+fn course(
+    controller: &mut InverseFeedforward,
+    plant: &mut Simulator,
+    flow: f64,
+    limits: CommandLimits,
+) -> Vec<f64> {
     let wanted = Mm3PerS::constant(flow);
-    let mut told = limits.apply(law.begin(Stamp::START, wanted).value, 0.0, PERIOD).0;
-    law.settle(Stamp::START, told);
-    let mut course = vec![plant.step(told) / flow];
+    let mut last = limits.apply(controller.begin(Stamp::START, wanted).value, 0.0, PERIOD).0;
+    controller.settle(Stamp::START, last);
+    let mut course = vec![plant.step(last) / flow];
     for _ in 0..1000 {
-        law.foresee(PERIOD, wanted);
-        told = limits.apply(law.wish().value, told, PERIOD).0;
-        law.settle(Stamp::START, told);
-        course.push(plant.step(told) / flow);
+        controller.feedforward(PERIOD, wanted);
+        last = limits.apply(controller.demand().value, last, PERIOD).0;
+        controller.settle(Stamp::START, last);
+        course.push(plant.step(last) / flow);
     }
     course
 }
@@ -49,17 +56,17 @@ fn without_limits_the_flow_comes_with_the_placed_poles() {
     ] {
         let model = TransferFunction::new(&num, &den, 0.0).unwrap();
         let limits = CommandLimits::new(-1e6, 1e6, 1e12).unwrap();
-        let mut law = law(&model, limits, OperatingPoint::default(), 0.1);
+        let mut controller = law(&model, limits, OperatingPoint::default(), 0.1);
         let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
-        let course = course(&mut law, &mut plant, 500.0, limits);
-        for (k, share) in (0_u32..).zip(&course).skip(20) {
+        let course = course(&mut controller, &mut plant, 500.0, limits);
+        for (k, fraction) in (0_u32..).zip(&course).skip(20) {
             let x = f64::from(k) * 0.005 / 0.1;
             let expected = match poles {
                 0 => 1.0,
                 1 => 1.0 - f64::exp(-x),
                 _ => 1.0 - (1.0 + x) * f64::exp(-x),
             };
-            assert!((share - expected).abs() < 0.04, "{num:?} {k}: {share} {expected}");
+            assert!((fraction - expected).abs() < 0.04, "{num:?} {k}: {fraction} {expected}");
         }
         assert!((course[1000] - 1.0).abs() < 1e-6, "{num:?}");
     }
@@ -69,16 +76,16 @@ fn without_limits_the_flow_comes_with_the_placed_poles() {
 fn an_extruder_that_stood_is_brought_to_its_flow_within_its_limits() {
     let model = TransferFunction::new(&[18.0], &[0.656, 0.975, 1.0], 0.0).unwrap();
     let limits = CommandLimits::new(0.0, 60.0, 400.0).unwrap();
-    let mut law = law(&model, limits, OperatingPoint::default(), 0.25);
+    let mut controller = law(&model, limits, OperatingPoint::default(), 0.25);
     let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
-    let course = course(&mut law, &mut plant, 540.0, limits);
+    let course = course(&mut controller, &mut plant, 540.0, limits);
     let settled =
-        |course: &[f64]| course.iter().rposition(|share| (share - 1.0).abs() > 0.05).unwrap();
+        |course: &[f64]| course.iter().rposition(|fraction| (fraction - 1.0).abs() > 0.05).unwrap();
     let mut steady = Simulator::new(&model, 0.005, Between::Held).unwrap();
     let alone: Vec<f64> = (0..2000).map(|_| steady.step(30.0) / 540.0).collect();
     let (with, without) = (settled(&course), settled(&alone));
     assert!(2 * with < without, "{with} {without}");
-    let most = course.iter().fold(0.0_f64, |most, share| most.max(*share));
+    let most = course.iter().fold(0.0_f64, |most, fraction| most.max(*fraction));
     assert!(most < 1.03, "{most}");
 }
 
@@ -93,20 +100,19 @@ fn an_encoder_tells_of_a_drive_that_no_model_knows() {
     // The screw turns a quarter less than it is told.
     let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
     let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
-    let told_of =
-        |screw| {
-            let mut law = law(&model, limits, OperatingPoint::default(), 0.1)
-                .foretelling(forecast(&model, screw, Span::ZERO));
-            let mut told = law.begin(Stamp::START, Mm3PerS::constant(480.0)).value;
-            for _ in 0..2000 {
-                law.settle(Stamp::START, told);
-                let screw_rpm = Some(Rpm::new(0.75 * told).unwrap());
-                law.hear(Stamp::START, &ExtruderReport { screw_rpm, ..report() }).unwrap();
-                law.foresee(PERIOD, Mm3PerS::constant(480.0));
-                told = law.wish().value;
-            }
-            (law.needs().len(), law.foretold().unwrap().get())
-        };
+    let told_of = |screw| {
+        let mut controller = law(&model, limits, OperatingPoint::default(), 0.1)
+            .with_forecast(forecast(&model, screw, Span::ZERO));
+        let mut last = controller.begin(Stamp::START, Mm3PerS::constant(480.0)).value;
+        for _ in 0..2000 {
+            controller.settle(Stamp::START, last);
+            let screw_rpm = Some(Rpm::new(0.75 * last).unwrap());
+            controller.reported(Stamp::START, &ExtruderReport { screw_rpm, ..report() }).unwrap();
+            controller.feedforward(PERIOD, Mm3PerS::constant(480.0));
+            last = controller.demand().value;
+        }
+        (controller.required_readings().len(), controller.predicted_flow().unwrap().get())
+    };
     let (needs, flow) = told_of(ScrewSpeed::Measured);
     assert!(needs == 1 && (flow - 360.0).abs() < 0.1, "{needs} {flow}");
     let (needs, flow) = told_of(ScrewSpeed::Modelled);
@@ -119,22 +125,25 @@ fn what_will_flow_is_told_from_what_was_applied() {
     let limits = CommandLimits::new(0.0, 60.0, 1e6).unwrap();
     let about = OperatingPoint { command: 30.0, flow_mm3_per_s: 360.0 };
     let ahead = Span::from_millis(100);
-    let mut law =
-        law(&model, limits, about, 0.25).foretelling(forecast(&model, ScrewSpeed::Modelled, ahead));
+    let mut controller = law(&model, limits, about, 0.25).with_forecast(forecast(
+        &model,
+        ScrewSpeed::Modelled,
+        ahead,
+    ));
     let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
-    let mut told = law.begin(Stamp::START, Mm3PerS::constant(480.0)).value.min(60.0);
-    assert_eq!(law.foretold(), Some(Mm3PerS::ZERO));
-    let (mut foretold, mut flows) = (Vec::new(), Vec::new());
+    let mut last = controller.begin(Stamp::START, Mm3PerS::constant(480.0)).value.min(60.0);
+    assert_eq!(controller.predicted_flow(), Some(Mm3PerS::ZERO));
+    let (mut predicted, mut flows) = (Vec::new(), Vec::new());
     for _ in 0..600 {
-        law.settle(Stamp::START, told);
-        flows.push(plant.step(told));
-        law.foresee(PERIOD, Mm3PerS::constant(480.0));
-        foretold.push(law.foretold().unwrap().get());
-        told = law.wish().value.clamp(0.0, 60.0);
+        controller.settle(Stamp::START, last);
+        flows.push(plant.step(last));
+        controller.feedforward(PERIOD, Mm3PerS::constant(480.0));
+        predicted.push(controller.predicted_flow().unwrap().get());
+        last = controller.demand().value.clamp(0.0, 60.0);
     }
     // 100 ms are 20 periods.
-    for (told, flow) in foretold.iter().zip(&flows[20..]) {
-        assert!((told - flow).abs() < 5.0, "{told} {flow}");
+    for (last, flow) in predicted.iter().zip(&flows[20..]) {
+        assert!((last - flow).abs() < 5.0, "{last} {flow}");
     }
     assert!(flows[30] < 5.0 && flows[599] > 475.0);
 }
@@ -143,17 +152,16 @@ fn what_will_flow_is_told_from_what_was_applied() {
 fn ticks_that_are_missed_are_made_up_for() {
     let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
     let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
-    let ended =
-        |ticks: i64, count: usize| {
-            let mut law = law(&model, limits, OperatingPoint::default(), 0.25)
-                .foretelling(forecast(&model, ScrewSpeed::Modelled, Span::ZERO));
-            let _ = law.begin(Stamp::START, Mm3PerS::constant(480.0));
-            law.settle(Stamp::START, 40.0);
-            for _ in 0..count {
-                law.foresee(Span::from_millis(5 * ticks), Mm3PerS::constant(480.0));
-            }
-            (law.wish().value, law.foretold().unwrap().get())
-        };
+    let ended = |ticks: i64, count: usize| {
+        let mut controller = law(&model, limits, OperatingPoint::default(), 0.25)
+            .with_forecast(forecast(&model, ScrewSpeed::Modelled, Span::ZERO));
+        let _ = controller.begin(Stamp::START, Mm3PerS::constant(480.0));
+        controller.settle(Stamp::START, 40.0);
+        for _ in 0..count {
+            controller.feedforward(Span::from_millis(5 * ticks), Mm3PerS::constant(480.0));
+        }
+        (controller.demand().value, controller.predicted_flow().unwrap().get())
+    };
     let (whole, missed) = (ended(1, 60), ended(3, 20));
     assert!((whole.0 - missed.0).abs() < 1e-9 && (whole.1 - missed.1).abs() < 1e-9);
 }
@@ -162,11 +170,11 @@ fn ticks_that_are_missed_are_made_up_for() {
 fn until_the_pump_runs_it_is_told_what_a_steady_flow_takes() {
     let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
     let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
-    let mut law = law(&model, limits, OperatingPoint::default(), 0.1);
-    assert!((law.begin(Stamp::START, Mm3PerS::constant(480.0)).value - 40.0).abs() < 1e-9);
-    law.settle(Stamp::START, 40.0);
-    law.foresee(PERIOD, Mm3PerS::constant(480.0));
-    assert!(law.wish().value > 100.0, "{}", law.wish().value);
+    let mut controller = law(&model, limits, OperatingPoint::default(), 0.1);
+    assert!((controller.begin(Stamp::START, Mm3PerS::constant(480.0)).value - 40.0).abs() < 1e-9);
+    controller.settle(Stamp::START, 40.0);
+    controller.feedforward(PERIOD, Mm3PerS::constant(480.0));
+    assert!(controller.demand().value > 100.0, "{}", controller.demand().value);
 }
 
 #[test]
@@ -177,9 +185,9 @@ fn poles_that_are_quicker_than_the_commands_are_refused() {
             &model,
             &InverseSettings {
                 time_constant_s,
-                right_zeros: RightZeros::Refuse,
-                known_ahead: Span::ZERO,
-                late: Span::ZERO,
+                right_zeros: RightHalfPlaneZeros::Refuse,
+                preview: Span::ZERO,
+                max_delay: Span::ZERO,
                 limits: CommandLimits::new(0.0, 90.0, 1e6).unwrap(),
                 period: PERIOD,
             },
@@ -195,12 +203,12 @@ fn a_model_about_another_point_is_followed_from_there() {
     let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
     let about = OperatingPoint { command: 30.0, flow_mm3_per_s: 400.0 };
     let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
-    let mut law = law(&model, limits, about, 0.1);
-    let mut told = law.begin(Stamp::START, Mm3PerS::constant(460.0)).value;
+    let mut controller = law(&model, limits, about, 0.1);
+    let mut last = controller.begin(Stamp::START, Mm3PerS::constant(460.0)).value;
     for _ in 0..2000 {
-        law.settle(Stamp::START, told.clamp(0.0, 90.0));
-        law.foresee(PERIOD, Mm3PerS::constant(460.0));
-        told = law.wish().value;
+        controller.settle(Stamp::START, last.clamp(0.0, 90.0));
+        controller.feedforward(PERIOD, Mm3PerS::constant(460.0));
+        last = controller.demand().value;
     }
-    assert!((told - 35.0).abs() < 1e-9, "{told}");
+    assert!((last - 35.0).abs() < 1e-9, "{last}");
 }

@@ -1,7 +1,7 @@
 //! Starts and stops of an extruder that is known to start and to stop late.
 
 use super::*;
-use crate::extruder::start_stop::Laid;
+use crate::extruder::start_stop::BeadConditions;
 use crate::identify::start_stop::parameters::StartStop;
 
 const SPEED: MmPerS = MmPerS::constant(50.0);
@@ -18,10 +18,16 @@ const MACHINE: StartStop = StartStop {
 const LEAST_SHARE: f64 = 0.1;
 
 fn bench() -> Bench {
-    let laid = Laid { flow: FLOW, speed: SPEED, least_share: LEAST_SHARE, robot_lag: Span::ZERO };
-    let timing = Some(Timing::new(MACHINE, laid).unwrap());
-    let setup = ExtruderSetup { timing, ..setup(Law::Constant(Constant(30.0))) };
-    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let laid = BeadConditions {
+        flow: FLOW,
+        speed: SPEED,
+        min_speed_ratio: LEAST_SHARE,
+        robot_lag: Span::ZERO,
+    };
+    let timing = Some(StartStopTiming::new(MACHINE, laid).unwrap());
+    let setup =
+        ExtruderSetup { timing, ..setup(ExtruderStrategy::Constant(ConstantCommand(30.0))) };
+    let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.side = Supervisor::new(setup);
     bench.side.link_came_up();
     bench
@@ -32,16 +38,16 @@ fn the_robot_waits_for_the_first_flow_and_then_follows_it() {
     let mut bench = bench();
     // The void of a pause that nobody knows the length of is filled in one second.
     assert_eq!(bench.go(1.1), ExtruderState::Running);
-    assert_eq!(bench.side.robot_share(), LEAST_SHARE);
-    assert!(bench.side.flow_share() < 1e-6);
+    assert_eq!(bench.side.robot_speed_ratio(), LEAST_SHARE);
+    assert!(bench.side.flow_ratio() < 1e-6);
     bench.go(0.2);
-    let share = bench.side.flow_share();
-    assert!((share - (1.0 - (-1.0_f64).exp())).abs() < 0.05, "{share}");
-    assert!((bench.side.robot_share() - share).abs() < 1e-9);
-    let foretold = bench.side.trace().foretold_mm3_per_s.unwrap();
-    assert!((foretold / FLOW - share).abs() < 1e-9);
+    let fraction = bench.side.flow_ratio();
+    assert!((fraction - (1.0 - (-1.0_f64).exp())).abs() < 0.05, "{fraction}");
+    assert!((bench.side.robot_speed_ratio() - fraction).abs() < 1e-9);
+    let predicted = bench.side.trace().predicted_mm3_per_s.unwrap();
+    assert!((predicted / FLOW - fraction).abs() < 1e-9);
     bench.go(0.7);
-    assert_eq!((bench.side.robot_share(), bench.side.flow_share()), (1.0, 1.0));
+    assert_eq!((bench.side.robot_speed_ratio(), bench.side.flow_ratio()), (1.0, 1.0));
     assert!(bench.sent.iter().all(|(_, command)| command.value == 30.0 && command.pump_on));
 }
 
@@ -56,30 +62,30 @@ fn a_pump_that_hardly_stood_is_waited_for_hardly_at_all() {
     bench.report = Some(report(PumpMode::On, 30.0));
     // V(1 s) = 500·(1 − e^(−1/20)) = 24 mm³, in 0.05 s, after 0.2 s.
     bench.go(0.22);
-    assert!(bench.side.flow_share() < 0.2);
+    assert!(bench.side.flow_ratio() < 0.2);
     bench.go(0.5);
-    assert!(bench.side.flow_share() > 0.98, "{}", bench.side.flow_share());
+    assert!(bench.side.flow_ratio() > 0.98, "{}", bench.side.flow_ratio());
 }
 
 #[test]
 fn the_pump_stops_before_the_bead_ends_and_the_valve_stays_open_for_what_comes() {
     let mut bench = bench();
     bench.go(3.0);
-    let way = bench.side.way_of_stop(SPEED).unwrap();
+    let way = bench.side.stop_distance(SPEED).unwrap();
     assert!((4.0..20.0).contains(&way.get()), "{way}");
-    let half = bench.side.way_of_stop(SPEED * 0.5).unwrap();
+    let half = bench.side.stop_distance(SPEED * 0.5).unwrap();
     assert!((half.get() - 0.5 * way.get()).abs() < 1e-9);
     bench.laying = Laying::Ending(FLOW);
     assert_eq!(bench.go(0.005), ExtruderState::Ending);
     assert_eq!(bench.last(), ExtruderCommand { pump_on: false, valve_open: true, value: 0.0 });
     bench.report = Some(report(PumpMode::Off, 0.0));
     bench.go(0.3);
-    let share = bench.side.flow_share();
-    assert!((0.2..0.6).contains(&share), "{share}");
-    assert_eq!(bench.side.robot_share(), share);
+    let fraction = bench.side.flow_ratio();
+    assert!((0.2..0.6).contains(&fraction), "{fraction}");
+    assert_eq!(bench.side.robot_speed_ratio(), fraction);
     bench.go(5.0);
     assert_eq!(bench.side.state(), ExtruderState::Ending);
-    assert_eq!(bench.side.robot_share(), LEAST_SHARE);
+    assert_eq!(bench.side.robot_speed_ratio(), LEAST_SHARE);
     bench.laying = Laying::Idle;
     assert_eq!(bench.go(0.1), ExtruderState::Off);
     assert_eq!(bench.last(), ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 });
@@ -98,7 +104,7 @@ fn the_next_bead_begins_though_the_robot_was_not_seen_idle() {
     bench.report = Some(report(PumpMode::On, 30.0));
     assert_eq!(bench.go(0.1), ExtruderState::Running);
     assert!(bench.last().pump_on);
-    assert!(bench.side.flow_share() < 1.0);
+    assert!(bench.side.flow_ratio() < 1.0);
 }
 
 #[test]

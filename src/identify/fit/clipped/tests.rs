@@ -66,7 +66,7 @@ fn a_varied_input_that_stands_at_its_limits_is_cut_off() {
     ] {
         let cut = input(row).unwrap_err();
         assert!(cut.column == Column::Input && limits.contains(&cut.value), "{cut}");
-        assert!(cut.share_percent > 10.0 && cut.longest > RUN, "{cut}");
+        assert!(cut.clipped_percent > 10.0 && cut.longest > MIN_RUN, "{cut}");
     }
 }
 
@@ -75,12 +75,12 @@ fn random_levels_that_are_held_and_cut_at_one_limit_are_cut_off() {
     let levels = gaussian(80);
     assert_eq!(input(held(levels.iter().copied(), 25)), Ok(()));
     let cut = input(held(levels.iter().map(|level| level.min(33.0)), 25)).unwrap_err();
-    assert_eq!((cut.end, cut.value), (End::Largest, 33.0));
+    assert_eq!((cut.end, cut.value), (Extreme::Largest, 33.0));
     // A short log that is cut often.
     let short = levels.iter().take(32).map(|level| level.min(31.0));
     assert_eq!(input(held(short, 75)).unwrap_err().value, 31.0);
     let share = levels.iter().filter(|level| **level > 33.0).count();
-    assert!((cut.share_percent - f64::from(u32::try_from(share).unwrap()) / 0.8).abs() < 2.6);
+    assert!((cut.clipped_percent - f64::from(u32::try_from(share).unwrap()) / 0.8).abs() < 2.6);
     let said = cut.to_string();
     assert!(said.contains("the input is cut off") && said.contains("--from-s"), "{said}");
 }
@@ -127,7 +127,7 @@ fn an_output_cut_off_is_told_from_one_that_rests() {
     let clipped = Samples::new(sine(600), cut.clone(), 0.1).unwrap().check_clipped();
     assert!(matches!(
         clipped,
-        Err(Clipped { column: Column::Output, end: End::Largest, value: 0.8, .. })
+        Err(Clipped { column: Column::Output, end: Extreme::Largest, value: 0.8, .. })
     ));
     let clipped = Samples::new(cut, sine(600), 0.1).unwrap().check_clipped();
     assert!(matches!(clipped, Err(Clipped { column: Column::Input, .. })));

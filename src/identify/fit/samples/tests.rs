@@ -23,7 +23,7 @@ fn what_is_no_record_is_refused() {
 #[test]
 fn an_input_that_does_not_change_is_refused() {
     let with = |input: Vec<f64>| {
-        Samples::new(input, sine(50), 0.1).unwrap().check_input(Before::SettledAtFirst)
+        Samples::new(input, sine(50), 0.1).unwrap().check_input(InitialCondition::SettledAtFirst)
     };
     assert_eq!(with(vec![3.0; 50]), Err(SamplesError::ConstantInput { value: 3.0 }));
     let hardly = sine(50).iter().map(|u| 1000.0 + 0.01 * u).collect();
@@ -31,7 +31,7 @@ fn an_input_that_does_not_change_is_refused() {
     assert_eq!(with(sine(50)), Ok(()));
     let still = Samples::new(sine(50), vec![1.0; 50], 0.1).unwrap();
     assert_eq!(
-        still.check_input(Before::SettledAtFirst),
+        still.check_input(InitialCondition::SettledAtFirst),
         Err(SamplesError::ConstantOutput { value: 1.0 })
     );
 }

@@ -68,12 +68,12 @@ fn step_answer(p: &[f64]) -> Vec<f64> {
 fn step_fit(seed: u64) -> Fit {
     let output = plus(&step_answer(&STEP_TRUTH), &white(seed, 500, 4.98e-5_f64.sqrt()));
     let samples = Samples::new(vec![0.6; 500], output, 0.02).unwrap();
-    let settings = Settings {
-        before: Before::Settled { input: 0.0 },
-        level: Level::Known(0.0),
-        ..Settings::new(
+    let settings = FitSettings {
+        initial_state: InitialCondition::Settled { input: 0.0 },
+        level: OutputLevel::Known(0.0),
+        ..FitSettings::new(
             Structure::FirstOrder { zero: false },
-            DeadTime::Estimated { least_s: 0.0, most_s: 2.0 },
+            DeadTime::Estimated { min_s: 0.0, max_s: 2.0 },
         )
     };
     fit(&samples, &settings).unwrap()
@@ -106,10 +106,10 @@ fn flow_fit(seed: u64) -> Fit {
     let clean = flow_answer(&flow_truth());
     let output = plus(&clean, &white(seed, clean.len(), 0.17 * spread_of(&clean)));
     let samples = Samples::new(prbs(60, 50), output, 0.02).unwrap();
-    let settings = Settings {
-        before: Before::Settled { input: 0.0 },
-        level: Level::Known(0.0),
-        ..Settings::new(Structure::Transfer { poles: 2, zeros: 2 }, DeadTime::Given(0.0))
+    let settings = FitSettings {
+        initial_state: InitialCondition::Settled { input: 0.0 },
+        level: OutputLevel::Known(0.0),
+        ..FitSettings::new(Structure::Transfer { poles: 2, zeros: 2 }, DeadTime::Known(0.0))
     };
     fit(&samples, &settings).unwrap()
 }

@@ -44,13 +44,13 @@ fn the_fit_is_never_worse_than_the_truth() {
         let clean: Vec<f64> = input.iter().map(|u| simulator.step(*u)).collect();
         let noise = white(seed, clean.len(), 0.1 * spread_of(&clean));
         let samples = Samples::new(input, plus(&clean, &noise), 0.05).unwrap();
-        let settings = Settings {
+        let settings = FitSettings {
             between,
-            before: Before::Settled { input: 0.0 },
+            initial_state: InitialCondition::Settled { input: 0.0 },
             accept_undetermined: true,
-            ..Settings::new(
+            ..FitSettings::new(
                 Structure::Transfer { poles: tf.order(), zeros },
-                DeadTime::Estimated { least_s: 0.0, most_s: 3.0 },
+                DeadTime::Estimated { min_s: 0.0, max_s: 3.0 },
             )
         };
         let truth = noise.iter().map(|e| e * e).sum::<f64>();

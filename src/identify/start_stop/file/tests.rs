@@ -3,17 +3,17 @@
 use super::*;
 
 fn file() -> StartStopFile {
-    let setting = Setting { material: Some("PLA".to_owned()), ..Setting::default() };
+    let setting = Conditions { material: Some("PLA".to_owned()), ..Conditions::default() };
     StartStopFile {
-        setting,
+        conditions: setting,
         parameters: assemble([1.0 / 3.0, 0.25, 640.0, 21.5], [0.2, 0.15, 0.11, 0.7]),
         sigma: assemble([0.01, 0.002, 8.0, 1e-7], [0.0, 0.001, 0.002, 0.03]),
-        seen: Seen {
+        data: FitData {
             starts: 11,
             stops: 12,
             idle_range_s: [0.5, 240.0],
             flow_range_mm3_per_s: [398.0, 401.5],
-            delay_scatter_s: 0.012,
+            delay_sigma_s: 0.012,
         },
     }
 }
@@ -37,7 +37,7 @@ fn everything_that_is_wrong_is_told_at_once() {
     let said = parse("starts.toml", &text).unwrap_err().to_string();
     for part in [
         "starts.toml: 6 problems",
-        "line 1: version: found 2",
+        "line 1: found 2",
         "start.void_mm3: found -640.0, expected a number from 0 to",
         "start.rise_sigma_s: found nothing",
         "stop.fall_s: found 0.0, expected a number from 0.000001",

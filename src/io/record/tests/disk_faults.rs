@@ -31,7 +31,8 @@ fn a_full_disk_ends_the_recording_and_leaves_a_beginning_that_reads_back() {
 #[test]
 fn the_report_counts_what_full_chunks_hold() {
     let disk = Disk::with_room(700_000);
-    let tuning = Tuning { flush_every: Duration::from_secs(3600), ..Tuning::default() };
+    let tuning =
+        RecorderLimits { flush_every: Duration::from_secs(3600), ..RecorderLimits::default() };
     let (mut recorder, alarms) = start_with(&config(), disk.clone(), tuning).unwrap();
     let mut noise = 1_u64;
     let mut text = || {
@@ -92,7 +93,7 @@ fn a_slow_disk_costs_frames_but_no_event() {
 #[test]
 fn a_disk_that_stands_still_ends_control_and_loses_nothing_that_was_taken() {
     let disk = Disk::default();
-    let tuning = Tuning { events: 16, ..quick() };
+    let tuning = RecorderLimits { events: 16, ..quick() };
     let (mut recorder, alarms) = start_with(&config(), disk.clone(), tuning).unwrap();
     disk.stall();
     let mut taken = 0;
@@ -122,5 +123,5 @@ fn what_is_taken_reaches_the_disk_without_further_events() {
 
 #[test]
 fn the_flush_period_is_within_half_a_second() {
-    assert!(Tuning::default().flush_every < Duration::from_millis(500));
+    assert!(RecorderLimits::default().flush_every < Duration::from_millis(500));
 }

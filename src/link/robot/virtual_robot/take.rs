@@ -1,6 +1,6 @@
 //! What the robot does with a line of the PC.
 
-use super::{Doing, RobotCell};
+use super::{Phase, VirtualRobot};
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
 use crate::link::frame::{ErrCode, LineRefusal, Validity};
@@ -8,7 +8,7 @@ use crate::link::robot::params::RobotParams;
 use crate::link::robot::pc_line::PcLine;
 use crate::link::robot::robot_line::{RobotLine, mode_word};
 
-impl RobotCell {
+impl VirtualRobot {
     /// Takes a line of the PC; the answer is `HELLO`, or `ERR` where the line
     /// is refused.
     pub fn take(&mut self, now: Stamp, line: PcLine) -> Option<RobotLine> {
@@ -35,8 +35,8 @@ impl RobotCell {
             self.sequence.apply(seq);
         }
         // Out of motion there is nothing to stop, and STOP is left by hand only.
-        if matches!(self.doing, Doing::Print { .. } | Doing::Hold { .. }) {
-            self.doing = Doing::Stop;
+        if matches!(self.phase, Phase::Print { .. } | Phase::Hold { .. }) {
+            self.phase = Phase::Stop;
         }
         counted
     }
@@ -51,7 +51,7 @@ impl RobotCell {
         if let Some(code) = self.faults.refuse {
             return Err(LineRefusal::on_purpose(code));
         }
-        if !matches!(self.doing, Doing::Print { .. } | Doing::Hold { .. }) {
+        if !matches!(self.phase, Phase::Print { .. } | Phase::Hold { .. }) {
             let mode = mode_word(self.mode());
             return Err(LineRefusal::new(ErrCode::Mode, format!("no setpoint is taken in {mode}")));
         }
@@ -61,7 +61,7 @@ impl RobotCell {
             return Err(LineRefusal::new(ErrCode::Range, text));
         }
         let until = self.clock().void_at(self.at, validity)?;
-        self.doing = Doing::Print { target: speed, until };
+        self.phase = Phase::Print { target: speed, until };
         self.sequence.apply(seq);
         Ok(())
     }

@@ -13,10 +13,10 @@ fn mm_per_s(value: f64) -> MmPerS {
     MmPerS::constant(value)
 }
 
-fn printing(bead: Option<f64>) -> RobotCell {
+fn printing(bead: Option<f64>) -> VirtualRobot {
     let bead = bead.map(Mm::constant);
     let params = RobotParams { bead, clock_start_ms: CLOCK_MS, ..RobotParams::default() };
-    let mut cell = RobotCell::new(params, Stamp::START).unwrap();
+    let mut cell = VirtualRobot::new(params, Stamp::START).unwrap();
     cell.connect(Stamp::START);
     cell.take(Stamp::START, PcLine::Hello);
     assert!(cell.begin_bead(Stamp::START, Mm::ZERO));
@@ -37,7 +37,7 @@ fn refusal(answer: Option<RobotLine>) -> ErrCode {
 
 #[test]
 fn hello_is_answered_with_the_limits() {
-    let mut cell = RobotCell::new(RobotParams::default(), Stamp::START).unwrap();
+    let mut cell = VirtualRobot::new(RobotParams::default(), Stamp::START).unwrap();
     let answer = cell.take(Stamp::START, PcLine::Hello).unwrap();
     assert_eq!(answer.format(), "HELLO 1 truebead-sim 60 150 60\n");
 }
@@ -149,7 +149,7 @@ fn a_stop_is_obeyed_even_where_the_count_is_broken() {
 
 #[test]
 fn stop_out_of_motion_needs_no_acknowledging() {
-    let mut cell = RobotCell::new(RobotParams::default(), Stamp::START).unwrap();
+    let mut cell = VirtualRobot::new(RobotParams::default(), Stamp::START).unwrap();
     cell.take(ms(0), PcLine::Hello);
     assert_eq!(cell.take(ms(0), PcLine::Stop { seq: 1 }), None);
     assert_eq!(cell.mode(), RobotMode::Idle);
@@ -170,10 +170,10 @@ fn a_bead_ends_where_it_ends_however_seldom_one_looks() {
 fn faults_can_be_rehearsed() {
     let mut cell = printing(None);
     cell.take(ms(0), speed(1, 100.0, 1000, 0));
-    cell.set_faults(ms(0), Faults { follows: 0.8, mute: true, ..Faults::default() });
+    cell.set_faults(ms(0), RobotFaults { speed_ratio: 0.8, mute: true, ..RobotFaults::default() });
     assert!((cell.state(ms(900)).speed_mm_per_s.get() - 80.0).abs() < 1e-3);
     assert_eq!(cell.report(ms(900)), None);
-    cell.set_faults(ms(900), Faults { refuse: Some(ErrCode::Mode), ..Faults::default() });
+    cell.set_faults(ms(900), RobotFaults { refuse: Some(ErrCode::Mode), ..RobotFaults::default() });
     assert_eq!(refusal(cell.take(ms(900), speed(2, 100.0, 300, 900))), ErrCode::Mode);
     cell.fail(ms(901));
     assert_eq!(cell.state(ms(5000)).mode, RobotMode::Fault);
@@ -182,11 +182,11 @@ fn faults_can_be_rehearsed() {
 #[test]
 fn a_robot_that_cannot_be_is_refused() {
     let start = mm_per_s(200.0);
-    let error = RobotCell::new(RobotParams { start, ..RobotParams::default() }, Stamp::START);
+    let error = VirtualRobot::new(RobotParams { start, ..RobotParams::default() }, Stamp::START);
     let text = error.unwrap_err().to_string();
     assert_eq!(text, "the start speed must be within 60 mm/s to 150 mm/s, found 200 mm/s");
     let params = RobotParams { bandwidth_hz: f64::NAN, ..RobotParams::default() };
-    assert!(RobotCell::new(params, Stamp::START).is_err());
+    assert!(VirtualRobot::new(params, Stamp::START).is_err());
 }
 
 proptest! {

@@ -10,7 +10,7 @@ struct Plant {
 
 struct Case {
     plant: Plant,
-    method: Method,
+    method: DiscretisationMethod,
     num: &'static [f64],
     den: &'static [f64],
 }
@@ -28,139 +28,139 @@ const DT_S: f64 = 0.005;
 const CASES: [Case; 23] = [
     Case {
         plant: DRIVE,
-        method: Method::ZeroOrderHold,
+        method: DiscretisationMethod::ZeroOrderHold,
         num: &[0.0, 1.414_786_004_555_088_2, -1.414_220_847_539_002_3],
         den: &[1.0, -1.963_122_970_963_488, 0.963_139_081_482_760_6],
     },
     Case {
         plant: DRIVE,
-        method: Method::Bilinear,
+        method: DiscretisationMethod::Bilinear,
         num: &[0.707_472_820_504_558, 0.000_282_610_359_425_228_3, -0.707_190_210_145_131_6],
         den: &[1.0, -1.963_118_864_724_862, 0.963_134_977_060_063_1],
     },
     Case {
         plant: DRIVE,
-        method: Method::FirstOrderHold,
+        method: DiscretisationMethod::FirstOrderHold,
         num: &[0.711_773_868_747_122_6, -0.008_477_219_556_032_09, -0.702_731_492_175_005_1],
         den: &[1.0, -1.963_122_970_963_488, 0.963_139_081_482_760_6],
     },
     Case {
         plant: DRIVE,
-        method: Method::ImpulseInvariant,
+        method: DiscretisationMethod::ImpulseInvariant,
         num: &[1.441_234_405_778_069_7, -1.440_657_567_348_737, 0.0],
         den: &[1.0, -1.963_122_970_963_488, 0.963_139_081_482_760_6],
     },
     Case {
         plant: DRIVE,
-        method: Method::BackwardDifference,
+        method: DiscretisationMethod::BackwardDifference,
         num: &[1.389_597_683_874_132_2, -1.389_042_699_615_561_4, 0.0],
         den: &[1.0, -1.963_770_981_980_414_3, 0.963_786_802_512_300_6],
     },
     Case {
         plant: FLOW,
-        method: Method::ZeroOrderHold,
+        method: DiscretisationMethod::ZeroOrderHold,
         num: &[9.175, -17.611_173_840_309_69, 8.458_092_967_893_725],
         den: &[1.0, -1.936_666_862_840_546_8, 0.937_817_417_289_672_5],
     },
     Case {
         plant: FLOW,
-        method: Method::Bilinear,
+        method: DiscretisationMethod::Bilinear,
         num: &[9.253_860_796_767_135, -17.763_209_065_892_283, 8.531_270_552_897_768],
         den: &[1.0, -1.936_663_899_643_257, 0.937_814_619_763_520_8],
     },
     Case {
         plant: FLOW,
-        method: Method::FirstOrderHold,
+        method: DiscretisationMethod::FirstOrderHold,
         num: &[9.253_746_348_967_516, -17.762_970_092_788_68, 8.531_142_871_405_203],
         den: &[1.0, -1.936_666_862_840_546_8, 0.937_817_417_289_672_5],
     },
     Case {
         plant: FLOW,
-        method: Method::BackwardDifference,
+        method: DiscretisationMethod::BackwardDifference,
         num: &[9.333_343_814_647_81, -17.923_986_378_671_43, 8.611_885_998_340_506],
         den: &[1.0, -1.937_510_090_220_651_5, 0.938_625_176_930_845_4],
     },
     Case {
         plant: WHEEL,
-        method: Method::ZeroOrderHold,
+        method: DiscretisationMethod::ZeroOrderHold,
         num: &[0.0, 0.312_630_071_268_986_45],
         den: &[1.0, -0.875_792_581_935_245_8],
     },
     Case {
         plant: WHEEL,
-        method: Method::Bilinear,
+        method: DiscretisationMethod::Bilinear,
         num: &[0.156_529_850_746_268_68, 0.156_529_850_746_268_68],
         den: &[1.0, -0.875_621_890_547_263_7],
     },
     Case {
         plant: WHEEL,
-        method: Method::FirstOrderHold,
+        method: DiscretisationMethod::FirstOrderHold,
         num: &[0.159_769_262_631_842_2, 0.152_860_808_637_144_24],
         den: &[1.0, -0.875_792_581_935_245_8],
     },
     Case {
         plant: WHEEL,
-        method: Method::ImpulseInvariant,
+        method: DiscretisationMethod::ImpulseInvariant,
         num: &[0.333_819_628_647_214_8, 0.0],
         den: &[1.0, -0.875_792_581_935_245_8],
     },
     Case {
         plant: WHEEL,
-        method: Method::BackwardDifference,
+        method: DiscretisationMethod::BackwardDifference,
         num: &[0.294_730_679_156_908_65, 0.0],
         den: &[1.0, -0.882_903_981_264_637],
     },
     Case {
         plant: COMPENSATOR,
-        method: Method::ZeroOrderHold,
+        method: DiscretisationMethod::ZeroOrderHold,
         num: &[1.497_814_858_959_078, -1.341_490_130_994_292_2],
         den: &[1.0, -0.606_530_659_712_633_4],
     },
     Case {
         plant: COMPENSATOR,
-        method: Method::Bilinear,
+        method: DiscretisationMethod::Bilinear,
         num: &[1.277_711_561_382_598_2, -1.118_792_212_951_926_8],
         den: &[1.0, -0.6],
     },
     Case {
         plant: COMPENSATOR,
-        method: Method::FirstOrderHold,
+        method: DiscretisationMethod::FirstOrderHold,
         num: &[1.263_337_364_001_593_5, -1.107_012_636_036_807_3],
         den: &[1.0, -0.606_530_659_712_633_4],
     },
     Case {
         plant: COMPENSATOR,
-        method: Method::BackwardDifference,
+        method: DiscretisationMethod::BackwardDifference,
         num: &[1.130_976_029_664_945, -0.998_543_239_306_051_9],
         den: &[1.0, -0.666_666_666_666_666_6],
     },
     Case {
         plant: FIRST_ORDER,
-        method: Method::ZeroOrderHold,
+        method: DiscretisationMethod::ZeroOrderHold,
         num: &[0.0, 0.005_934_700_630_277_9],
         den: &[1.0, -0.994_065_299_369_722_1],
     },
     Case {
         plant: FIRST_ORDER,
-        method: Method::Bilinear,
+        method: DiscretisationMethod::Bilinear,
         num: &[0.002_967_359_050_445_095_3, 0.002_967_359_050_445_095_3],
         den: &[1.0, -0.994_065_281_899_109_8],
     },
     Case {
         plant: FIRST_ORDER,
-        method: Method::FirstOrderHold,
+        method: DiscretisationMethod::FirstOrderHold,
         num: &[0.002_970_294_113_316_396_3, 0.002_964_406_516_961_504],
         den: &[1.0, -0.994_065_299_369_722_1],
     },
     Case {
         plant: FIRST_ORDER,
-        method: Method::ImpulseInvariant,
+        method: DiscretisationMethod::ImpulseInvariant,
         num: &[0.005_952_380_952_380_931, 0.0],
         den: &[1.0, -0.994_065_299_369_722_1],
     },
     Case {
         plant: FIRST_ORDER,
-        method: Method::BackwardDifference,
+        method: DiscretisationMethod::BackwardDifference,
         num: &[0.005_917_159_763_313_64, 0.0],
         den: &[1.0, -0.994_082_840_236_686_4],
     },
@@ -185,7 +185,7 @@ fn the_models_of_the_thesis_are_those_of_another_tool_to_a_billionth() {
 #[test]
 fn matched_poles_and_zeros_stand_at_their_exponentials_and_keep_the_gain() {
     let tf = TransferFunction::new(&[439.0, 35.08], &[1.523, 11.44, 1.0], 0.0).unwrap();
-    let found = tf.discretise(DT_S, Method::MatchedPoleZero).unwrap();
+    let found = tf.discretise(DT_S, DiscretisationMethod::MatchedPoleZero).unwrap();
     for pole in tf.poles() {
         assert!(evaluate(&found.den, exp(pole * DT_S)).norm() < 1e-12);
     }
@@ -196,11 +196,11 @@ fn matched_poles_and_zeros_stand_at_their_exponentials_and_keep_the_gain() {
     assert_eq!(found.num[0], 0.0, "it answers one step later");
     // A double lag: one zero at -1.
     let lag = TransferFunction::new(&[1.0], &[1.0, 2.0, 1.0], 0.0).unwrap();
-    let found = lag.discretise(0.1, Method::MatchedPoleZero).unwrap();
+    let found = lag.discretise(0.1, DiscretisationMethod::MatchedPoleZero).unwrap();
     assert!((found.num[1] - found.num[2]).abs() < 1e-15 && found.num[0] == 0.0, "{found:?}");
     // An integrator keeps its size and sign where it can be compared.
     let integrator = TransferFunction::new(&[-2.0], &[1.0, 0.0], 0.0).unwrap();
-    let found = integrator.discretise(0.1, Method::MatchedPoleZero).unwrap();
+    let found = integrator.discretise(0.1, DiscretisationMethod::MatchedPoleZero).unwrap();
     assert!((found.num[1] + 0.2).abs() < 1e-3, "{found:?}");
 }
 
@@ -209,7 +209,7 @@ fn a_hold_keeps_a_dead_time_that_ends_within_a_step() {
     let tf = FirstOrder { gain: 1.0, time_constant_s: 0.84, zero_s: 0.0, dead_time_s: 0.417 }
         .transfer()
         .unwrap();
-    let found = tf.discretise(0.02, Method::ZeroOrderHold).unwrap();
+    let found = tf.discretise(0.02, DiscretisationMethod::ZeroOrderHold).unwrap();
     assert_eq!((found.delay, found.num.len()), (20, 3));
     // The modified z-transform of a first-order lag: m = 1 - rest/dt.
     let (whole, part) = (libm::exp(-0.02 / 0.84), libm::exp(-0.003 / 0.84));
@@ -221,9 +221,10 @@ fn a_hold_keeps_a_dead_time_that_ends_within_a_step() {
 fn the_recursion_gives_what_the_states_give() {
     let tf = TransferFunction::new(&[439.0, 35.08], &[1.523, 11.44, 1.0], 0.054).unwrap();
     let input: Vec<f64> = (0..400_u32).map(|k| f64::from((k * 7919) % 13)).collect();
-    for (method, between) in
-        [(Method::ZeroOrderHold, Between::Held), (Method::FirstOrderHold, Between::Linear)]
-    {
+    for (method, between) in [
+        (DiscretisationMethod::ZeroOrderHold, Between::Held),
+        (DiscretisationMethod::FirstOrderHold, Between::Linear),
+    ] {
         let mut recursion = tf.discretise(DT_S, method).unwrap().recursion();
         let mut simulator = Simulator::new(&tf, DT_S, between).unwrap();
         for u in &input {
@@ -238,10 +239,13 @@ fn the_recursion_gives_what_the_states_give() {
 #[test]
 fn what_a_method_cannot_keep_is_refused() {
     let tf = TransferFunction::new(&[1.0, 2.0], &[1.0, 1.0], 0.0).unwrap();
-    assert_eq!(tf.discretise(DT_S, Method::ImpulseInvariant), Err(ModelError::Feedthrough));
+    assert_eq!(
+        tf.discretise(DT_S, DiscretisationMethod::ImpulseInvariant),
+        Err(ModelError::Feedthrough)
+    );
     let late = tf.with_dead_time(0.054).unwrap();
-    let words = late.discretise(DT_S, Method::Bilinear).unwrap_err().to_string();
+    let words = late.discretise(DT_S, DiscretisationMethod::Bilinear).unwrap_err().to_string();
     assert!(words.contains("10.800 steps of 0.005 s"), "{words}");
     let whole = tf.with_dead_time(0.055).unwrap();
-    assert_eq!(whole.discretise(DT_S, Method::Bilinear).unwrap().delay, 11);
+    assert_eq!(whole.discretise(DT_S, DiscretisationMethod::Bilinear).unwrap().delay, 11);
 }

@@ -3,15 +3,15 @@
 use maud::{Markup, html};
 
 use super::StartStudy;
-use crate::identify::series::Series as Logged;
-use crate::identify::start_stop::file::{Named, START, STOP};
+use crate::identify::series::TimeSeries as Logged;
+use crate::identify::start_stop::file::{ParameterKey, START_PARAMETERS, STOP_PARAMETERS};
 use crate::report::chart::area::{Area, XAxis};
 use crate::report::chart::legend::legend;
 use crate::report::chart::palette::{DEMAND, FLOW, MODEL, SCREW};
-use crate::report::chart::pauses::{Drawn, over_pauses};
-use crate::report::chart::plot::{Layer, Plot, y_range};
+use crate::report::chart::pauses::{PauseLayer, over_pauses};
+use crate::report::chart::plot::{Plot, PlotLayer, y_range};
 use crate::report::chart::range::Range;
-use crate::report::chart::series::Series;
+use crate::report::chart::series::Curve;
 use crate::report::html::whole_page;
 use crate::report::identify::table::significant;
 
@@ -67,7 +67,7 @@ fn verdict(study: &StartStudy) -> Markup {
     html! {
         div class={ "verdict " (class) } {
             b { (word) }
-            (format!(" Delays scatter about the model by {:.3} s.", study.fit.delay_scatter_s))
+            (format!(" Delays scatter about the model by {:.3} s.", study.fit.delay_sigma_s))
             @if !study.warnings.is_empty() {
                 ul { @for warning in &study.warnings { li { (warning) } } }
             }
@@ -76,7 +76,7 @@ fn verdict(study: &StartStudy) -> Markup {
 }
 
 fn parameters(study: &StartStudy) -> Markup {
-    let row = |one: &Named| {
+    let row = |one: &ParameterKey| {
         html! { tr {
             td { (one.key) } td { (one.about) }
             td.number { (significant((one.of)(&study.fit.parameters))) }
@@ -92,7 +92,7 @@ fn parameters(study: &StartStudy) -> Markup {
                     th { "parameter" } th { "what it is" } th.number { "value" }
                     th.number { "standard error" } th { "unit" }
                 } }
-                tbody { @for one in START.iter().chain(&STOP) { (row(one)) } }
+                tbody { @for one in START_PARAMETERS.iter().chain(&STOP_PARAMETERS) { (row(one)) } }
             } }
         }
     }
@@ -101,35 +101,41 @@ fn parameters(study: &StartStudy) -> Markup {
 fn delays(study: &StartStudy) -> Markup {
     let seen: Vec<(f64, f64)> =
         study.fit.starts.iter().map(|start| (start.idle_s, start.delay_s)).collect();
-    let longest_s = study.file.seen.idle_range_s[1];
+    let longest_s = study.file.data.idle_range_s[1];
     let (of, flow) = (&study.fit.parameters, study.flow_mm3_per_s());
     // Even steps where the axis has them.
     let step = longest_s.ln_1p() / f64::from(POINTS);
     let idle = (0..=POINTS).map(|k| (f64::from(k) * step).exp_m1());
     let model: Vec<(f64, f64)> = idle.map(|idle_s| (idle_s, of.delay_s(idle_s, flow))).collect();
-    let layers = [Drawn::Curve(&model, MODEL), Drawn::Points(&seen, FLOW)];
+    let layers = [PauseLayer::Curve(&model, MODEL), PauseLayer::Points(&seen, FLOW)];
     over_pauses(Area::wide(270.0), "delay of the first flow [s]", &layers)
 }
 
 fn stops(study: &StartStudy) -> Markup {
     let seen = &study.fit.stops;
-    let all: Vec<Series> = seen
+    let all: Vec<Curve> = seen
         .iter()
         .map(|stop| {
-            share(&study.logs.flow, stop.at_s, Range::new(0.0, stop.seen_s), stop.flow_mm3_per_s)
+            relative_flow(
+                &study.logs.flow,
+                stop.at_s,
+                Range::new(0.0, stop.observed_s),
+                stop.flow_mm3_per_s,
+            )
         })
         .collect();
-    let longest_s = seen.iter().map(|stop| stop.seen_s).fold(0.0, f64::max);
-    let model = curve(Range::new(0.0, longest_s), |since_s| study.fit.parameters.falling(since_s));
+    let longest_s = seen.iter().map(|stop| stop.observed_s).fold(0.0, f64::max);
+    let model =
+        curve(Range::new(0.0, longest_s), |since_s| study.fit.parameters.remaining_flow(since_s));
     laid_over("time since the command to stop [s]", Range::new(0.0, longest_s), &all, &model)
 }
 
 fn starts(study: &StartStudy) -> Markup {
     let seen = study.fit.starts.iter();
-    let all: Vec<Series> = seen
+    let all: Vec<Curve> = seen
         .map(|start| {
             let first_s = start.at_s + start.delay_s;
-            share(&study.logs.flow, first_s, ABOUT_FIRST_FLOW_S, start.flow_mm3_per_s)
+            relative_flow(&study.logs.flow, first_s, ABOUT_FIRST_FLOW_S, start.flow_mm3_per_s)
         })
         .collect();
     let rise_s = study.fit.parameters.rise_s;
@@ -139,17 +145,17 @@ fn starts(study: &StartStudy) -> Markup {
 }
 
 /// The flow over another, from a moment on.
-fn share(flow: &Logged, at_s: f64, range: Range, even: f64) -> Series {
+fn relative_flow(flow: &Logged, at_s: f64, range: Range, even: f64) -> Curve {
     let part = flow.within(at_s + range.min, at_s + range.max);
-    let mut series = Series::default();
+    let mut series = Curve::default();
     for (time_s, value) in part.time_s.iter().zip(&part.values) {
         series.push(time_s - at_s, value / even);
     }
     series
 }
 
-fn curve(range: Range, of: impl Fn(f64) -> f64) -> Series {
-    let mut series = Series::default();
+fn curve(range: Range, of: impl Fn(f64) -> f64) -> Curve {
+    let mut series = Curve::default();
     for k in 0..=POINTS {
         let at_s = range.min + range.length() * f64::from(k) / f64::from(POINTS);
         series.push(at_s, of(at_s));
@@ -157,10 +163,11 @@ fn curve(range: Range, of: impl Fn(f64) -> f64) -> Series {
     series
 }
 
-fn laid_over(title: &str, range: Range, all: &[Series], model: &Series) -> Markup {
+fn laid_over(title: &str, range: Range, all: &[Curve], model: &Curve) -> Markup {
     let axis = XAxis { title: title.to_owned(), range, divisor: 1.0 };
-    let shown: Vec<&Series> = all.iter().chain([model]).collect();
-    let layers = all.iter().map(|one| Layer::Data(one, FLOW)).chain([Layer::Curve(model, MODEL)]);
+    let shown: Vec<&Curve> = all.iter().chain([model]).collect();
+    let layers =
+        all.iter().map(|one| PlotLayer::Data(one, FLOW)).chain([PlotLayer::Curve(model, MODEL)]);
     let plot = Plot {
         area: Area::wide(270.0),
         x: &axis,
@@ -177,23 +184,23 @@ fn record(study: &StartStudy) -> Markup {
     let ends = (logs.flow.time_s.first().copied(), logs.flow.time_s.last().copied());
     let axis = XAxis::time(Range::new(ends.0.unwrap_or(0.0), ends.1.unwrap_or(1.0)));
     let drawn = |logged: &Logged| {
-        let mut series = Series::default();
+        let mut series = Curve::default();
         logged.time_s.iter().zip(&logged.values).for_each(|(x, y)| series.push(*x, *y));
         series
     };
     let (command, flow) = (drawn(&logs.command), drawn(&logs.flow));
-    let plot = |title: &str, series: &Series, layer, height| {
+    let plot = |title: &str, series: &Curve, layer, height| {
         Plot {
             area: Area::wide(height),
             x: &axis,
             y_title: title,
             y_range: y_range(&[series], &[0.0]),
-            layers: vec![Layer::Level(0.0, DEMAND, ""), layer],
+            layers: vec![PlotLayer::Level(0.0, DEMAND, ""), layer],
         }
         .draw()
     };
     html! {
-        (plot("flow [mm³/s]", &flow, Layer::Data(&flow, FLOW), 220.0))
-        (plot(&logs.input.to_string(), &command, Layer::Stairs(&command, SCREW), 150.0))
+        (plot("flow [mm³/s]", &flow, PlotLayer::Data(&flow, FLOW), 220.0))
+        (plot(&logs.input.to_string(), &command, PlotLayer::Stairs(&command, SCREW), 150.0))
     }
 }

@@ -1,12 +1,12 @@
 //! Starts and stops as text.
 
 use super::StartStudy;
-use crate::identify::number::brief;
-use crate::identify::start_stop::file::{Named, START, STOP};
+use crate::identify::number::three_digits;
+use crate::identify::start_stop::file::{ParameterKey, START_PARAMETERS, STOP_PARAMETERS};
 use crate::report::identify::table::{put, significant};
 
 /// Pauses after which the delay is told \[s\].
-const TOLD_S: [f64; 4] = [1.0, 10.0, 60.0, 200.0];
+const SHOWN_PAUSES_S: [f64; 4] = [1.0, 10.0, 60.0, 200.0];
 
 /// A short table.
 pub fn text(study: &StartStudy) -> String {
@@ -14,9 +14,9 @@ pub fn text(study: &StartStudy) -> String {
     data(&mut text, study);
     let line = format!("{:<24}{:>12}{:>14}  {}", "", "value", "std. error", "unit");
     put(&mut text, "start", &line);
-    parameters(&mut text, study, &START);
+    parameters(&mut text, study, &START_PARAMETERS);
     put(&mut text, "stop", &line);
-    parameters(&mut text, study, &STOP);
+    parameters(&mut text, study, &STOP_PARAMETERS);
     meaning(&mut text, study);
     for warning in &study.warnings {
         put(&mut text, "warning", warning);
@@ -25,8 +25,8 @@ pub fn text(study: &StartStudy) -> String {
 }
 
 fn data(text: &mut String, study: &StartStudy) {
-    let (logs, seen) = (&study.logs, &study.file.seen);
-    let lasts_s = |series: &crate::identify::series::Series| {
+    let (logs, seen) = (&study.logs, &study.file.data);
+    let lasts_s = |series: &crate::identify::series::TimeSeries| {
         series.time_s.last().zip(series.time_s.first()).map_or(0.0, |(last, first)| last - first)
     };
     let line = format!(
@@ -39,8 +39,8 @@ fn data(text: &mut String, study: &StartStudy) {
     put(text, "data", &line);
     put(text, "input", &logs.input.to_string());
     put(text, "output", &logs.output.to_string());
-    let [shortest_s, longest_s] = seen.idle_range_s.map(brief);
-    let [least, most] = seen.flow_range_mm3_per_s.map(brief);
+    let [shortest_s, longest_s] = seen.idle_range_s.map(three_digits);
+    let [least, most] = seen.flow_range_mm3_per_s.map(three_digits);
     let line = format!(
         "{} after pauses of {shortest_s} to {longest_s} s, to {least} to {most} mm³/s",
         seen.starts
@@ -57,7 +57,7 @@ fn data(text: &mut String, study: &StartStudy) {
     put(text, "stops", &seen.stops.to_string());
 }
 
-fn parameters(text: &mut String, study: &StartStudy, list: &[Named]) {
+fn parameters(text: &mut String, study: &StartStudy, list: &[ParameterKey]) {
     for one in list {
         let [value, sigma] =
             [&study.fit.parameters, &study.fit.sigma].map(|of| significant((one.of)(of)));
@@ -68,19 +68,19 @@ fn parameters(text: &mut String, study: &StartStudy, list: &[Named]) {
 /// What the parameters come to for a bead of the log.
 fn meaning(text: &mut String, study: &StartStudy) {
     let (of, flow) = (&study.fit.parameters, study.flow_mm3_per_s());
-    let [_, longest_s] = study.file.seen.idle_range_s;
-    let seen = TOLD_S.iter().filter(|idle_s| **idle_s <= longest_s);
-    let told = |idle_s: &f64| format!("{:.2} s after {idle_s} s", of.delay_s(*idle_s, flow));
-    let delays: Vec<String> = seen.map(told).collect();
-    put(text, "first flow", &format!("at {} mm³/s: {}", brief(flow), delays.join(", ")));
+    let [_, longest_s] = study.file.data.idle_range_s;
+    let seen = SHOWN_PAUSES_S.iter().filter(|idle_s| **idle_s <= longest_s);
+    let given = |idle_s: &f64| format!("{:.2} s after {idle_s} s", of.delay_s(*idle_s, flow));
+    let delays: Vec<String> = seen.map(given).collect();
+    put(text, "first flow", &format!("at {} mm³/s: {}", three_digits(flow), delays.join(", ")));
     put(
         text,
         "scatter",
-        &format!("{:.4} s of the delays about the model", study.fit.delay_scatter_s),
+        &format!("{:.4} s of the delays about the model", study.fit.delay_sigma_s),
     );
     let line = format!(
         "{} mm³ come after the command to stop; the flow is down to a tenth {:.2} s after it",
-        brief(flow * of.after_stop_s()),
+        three_digits(flow * of.total_after_stop_s()),
         of.falls_to_s(0.1)
     );
     put(text, "after it", &line);

@@ -4,13 +4,13 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{GrayImage, ImageFormat};
 
 use super::draw::Draw;
-use super::scene::Scene;
+use super::scene::DrawnScene;
 
 /// White of the camera \[grey levels\].
 const WHITE: f64 = 255.0;
 
 /// Pixels of a picture from the light on them.
-pub fn expose(light: &[f32], scene: &Scene, draw: &mut Draw) -> Vec<u8> {
+pub fn expose(light: &[f32], scene: &DrawnScene, draw: &mut Draw) -> Vec<u8> {
     let vignetting = Vignetting::new(scene);
     let pixel = |(number, &light): (usize, &f32)| {
         let light = f64::from(light).max(0.0) * vignetting.at(number);
@@ -41,7 +41,7 @@ struct Vignetting {
 
 impl Vignetting {
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    fn new(scene: &Scene) -> Self {
+    fn new(scene: &DrawnScene) -> Self {
         let (width, height) = scene.size;
         let middle = (0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
         let corner = middle.0.powi(2) + middle.1.powi(2);
@@ -74,20 +74,20 @@ mod tests {
 
     #[test]
     fn gamma_and_vignetting_are_as_defined() {
-        let still = Scene { noise_grey: 0.0, size: (21, 11), ..Scene::default() };
+        let still = DrawnScene { noise_grey: 0.0, size: (21, 11), ..DrawnScene::default() };
         let light = vec![70.0; 21 * 11];
-        let with_gamma = Scene { gamma: 0.45, ..still.clone() };
+        let with_gamma = DrawnScene { gamma: 0.45, ..still.clone() };
         let pixels = expose(&light, &with_gamma, &mut Draw::new("test", 1));
         // 255·(70/255)^0.45 = 142.5.
         assert!(pixels.iter().all(|&grey| grey.abs_diff(142) <= 1), "{:?}", &pixels[..5]);
-        let dark = Scene { vignetting: 4.0, ..still };
+        let dark = DrawnScene { vignetting: 4.0, ..still };
         let pixels = expose(&vec![200.0; 21 * 11], &dark, &mut Draw::new("test", 1));
         assert_eq!([pixels[0], pixels[5 * 21 + 10], pixels[230]], [50, 200, 50]);
     }
 
     #[test]
     fn noise_has_the_standard_deviation_asked_for() {
-        let scene = Scene { noise_grey: 4.0, size: (200, 200), ..Scene::default() };
+        let scene = DrawnScene { noise_grey: 4.0, size: (200, 200), ..DrawnScene::default() };
         let pixels = expose(&vec![100.0; 40_000], &scene, &mut Draw::new("test", 2));
         let squares: f64 = pixels.iter().map(|&grey| (f64::from(grey) - 100.0).powi(2)).sum();
         // Rounding adds 1/12 to the variance; 40,000 pixels tell it to 0.7 %.

@@ -11,7 +11,7 @@ use crate::sim::hash;
 
 /// A number that was drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Parameter {
+pub struct DrawnParameter {
     /// What it is, with its unit.
     pub name: &'static str,
     /// Its value.
@@ -24,7 +24,7 @@ pub struct Parameter {
 #[derive(Debug, Clone)]
 pub struct Draw {
     random: Xoshiro256PlusPlus,
-    record: Vec<Parameter>,
+    record: Vec<DrawnParameter>,
 }
 
 impl Draw {
@@ -39,7 +39,7 @@ impl Draw {
     /// Uniform in the logarithm, and kept in the record.
     pub fn log(&mut self, name: &'static str, range: Range<f64>) -> f64 {
         let value = self.log_unnamed(range.clone());
-        self.keep(name, value, range);
+        self.note(name, value, range);
         value
     }
 
@@ -49,8 +49,8 @@ impl Draw {
     }
 
     /// Keeps a number that follows from others in the record.
-    pub fn keep(&mut self, name: &'static str, value: f64, range: Range<f64>) {
-        self.record.push(Parameter { name, value, range: (range.start, range.end) });
+    pub fn note(&mut self, name: &'static str, value: f64, range: Range<f64>) {
+        self.record.push(DrawnParameter { name, value, range: (range.start, range.end) });
     }
 
     /// Uniform between two numbers.
@@ -74,7 +74,7 @@ impl Draw {
     }
 
     /// What was drawn by name.
-    pub fn record(self) -> Vec<Parameter> {
+    pub fn record(self) -> Vec<DrawnParameter> {
         self.record
     }
 

@@ -2,7 +2,7 @@
 
 use super::draw::Draw;
 use super::recipes;
-use super::scene::Scene;
+use super::scene::DrawnScene;
 
 /// A kind of frames.
 #[derive(Debug, Clone, Copy)]
@@ -16,7 +16,7 @@ pub struct DrawnSet {
     /// What must be reached.
     pub requirements: Requirements,
     /// Draws a frame.
-    pub(super) scene: fn(&mut Draw) -> Scene,
+    pub(super) scene: fn(&mut Draw) -> DrawnScene,
 }
 
 /// What a set must reach; what is none is not asked for.
@@ -36,7 +36,7 @@ pub struct Requirements {
     pub names_gamma: bool,
 }
 
-const NOTHING: Requirements = Requirements {
+const NO_REQUIREMENTS: Requirements = Requirements {
     measured: None,
     bias_px: None,
     z: None,
@@ -46,18 +46,23 @@ const NOTHING: Requirements = Requirements {
 };
 /// Three of 30,000.
 const SILENT: Option<f64> = Some(1e-4);
-const NOT_SILENT: Requirements = Requirements { silent: SILENT, ..NOTHING };
+const NOT_SILENT: Requirements = Requirements { silent: SILENT, ..NO_REQUIREMENTS };
 const ROUGH: Requirements =
     Requirements { measured: Some(0.99), bias_px: Some(0.1), z: Some((0.8, 1.2)), ..NOT_SILENT };
-const FAULTY: Requirements =
-    Requirements { measured: Some(0.98), bias_px: Some(0.05), z: Some((0.9, 1.2)), ..NOTHING };
+const FAULTY: Requirements = Requirements {
+    measured: Some(0.98),
+    bias_px: Some(0.05),
+    z: Some((0.9, 1.2)),
+    ..NO_REQUIREMENTS
+};
 const RIBS: Requirements = Requirements { z: None, silent: SILENT, ..FAULTY };
 const STRONG_RIBS: Requirements = Requirements { statuses: Some(&["ambiguous"]), ..NOT_SILENT };
 const MOTION: Requirements = Requirements { measured: Some(0.99), bias_px: None, ..FAULTY };
 const GROUND: Requirements = Requirements { measured: Some(0.95), ..FAULTY };
 const GAMMA_GIVEN: Requirements =
-    Requirements { measured: Some(0.99), bias_px: Some(0.02), ..NOTHING };
-const GAMMA: Requirements = Requirements { z: Some((0.0, 1.2)), names_gamma: true, ..NOTHING };
+    Requirements { measured: Some(0.99), bias_px: Some(0.02), ..NO_REQUIREMENTS };
+const GAMMA: Requirements =
+    Requirements { z: Some((0.0, 1.2)), names_gamma: true, ..NO_REQUIREMENTS };
 const GAMMA_NEAR: Requirements = Requirements { measured: Some(0.95), ..GAMMA };
 
 /// All sets.

@@ -7,7 +7,7 @@ use super::camera;
 use super::draw::Draw;
 use super::paint::{Painted, paint};
 use super::recipes;
-use super::scene::Scene;
+use super::scene::DrawnScene;
 use crate::core::frame::{Frame, Pixels, WrongSize};
 use crate::core::geometry::Size;
 use crate::core::time::Stamp;
@@ -17,13 +17,13 @@ use crate::vision::Gauge;
 /// Name of its random numbers.
 const NAME: &str = "roughness";
 /// Edges of the bead that wave each for itself.
-const EDGES: f64 = 2.0;
+const EDGE_COUNT: f64 = 2.0;
 
 /// A bead of so many correlation lengths. A pixel is a millimetre.
 #[derive(Debug, Clone)]
 pub struct LongBead {
     /// Of one frame.
-    scene: Scene,
+    scene: DrawnScene,
     painted: Painted,
     rows: usize,
     number: u64,
@@ -50,7 +50,7 @@ impl LongBead {
         )]
         let rows = (lengths * scene.edges.length_px).ceil() as usize;
         let rows = rows.max(scene.size.1);
-        let long = Scene { size: (scene.size.0, rows), ..scene.clone() };
+        let long = DrawnScene { size: (scene.size.0, rows), ..scene.clone() };
         let painted = paint(&long, &mut draw);
         Self { scene, painted, rows, number }
     }
@@ -77,7 +77,7 @@ impl LongBead {
 
     /// Standard deviation of its local width \[px\].
     pub fn roughness_px(&self) -> f64 {
-        EDGES.sqrt() * self.scene.edges.roughness_px
+        EDGE_COUNT.sqrt() * self.scene.edges.roughness_px
     }
 
     /// Correlation length of that \[px\].

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::draw::Draw;
 use super::profile::{height_of, rough};
-use super::scene::{Groove, Holes, Scene};
+use super::scene::{DrawnScene, Groove, Holes};
 
 /// Smallest width of a groove, as a fraction of its mean: its two rough sides do not
 /// cross.
@@ -18,7 +18,7 @@ const HOLE_CLEARANCE_PX: f64 = 14.0;
 
 /// What begins at a place of a line and goes on to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
+pub struct BrightnessStep {
     /// Where it begins \[px\].
     pub at_px: f64,
     /// Its brightness \[grey levels\].
@@ -45,7 +45,7 @@ impl Disc {
 
 /// Where the scene's borders lie on every line, [`PER_PX`](super::profile::PER_PX) lines a pixel.
 #[derive(Debug, Clone)]
-pub struct Outline {
+pub struct DrawnOutline {
     left: Vec<f64>,
     right: Vec<f64>,
     /// Far sides of the grooves.
@@ -63,14 +63,14 @@ struct Straight {
     half: f64,
 }
 
-impl Outline {
+impl DrawnOutline {
     /// Draws the borders of so many lines. Place and width of the bead differ from
     /// frame to frame by up to a pixel.
-    pub fn draw(scene: &Scene, count: usize, draw: &mut Draw) -> Self {
+    pub fn draw(scene: &DrawnScene, count: usize, draw: &mut Draw) -> Self {
         #[expect(clippy::cast_precision_loss, reason = "pixels of a row")]
         let middle = scene.size.0 as f64 / 2.0;
         let bead = Straight {
-            axis: middle + draw.between(-scene.place_px, scene.place_px),
+            axis: middle + draw.between(-scene.position_jitter_px, scene.position_jitter_px),
             half: scene.width_px / 2.0 + draw.between(-0.5, 0.5),
         };
         let edges = scene.edges;
@@ -78,7 +78,7 @@ impl Outline {
         let (left, right) = (torn(draw), torn(draw));
         let far_side = |groove: Option<Groove>, outwards: f64, near: &[f64], draw: &mut Draw| {
             let groove = groove?;
-            let common = common_share(groove.width_px, edges.roughness_px);
+            let common = common_fraction(groove.width_px, edges.roughness_px);
             let own = (1.0 - common * common).sqrt();
             let gap = |(near, fresh): (&f64, f64)| {
                 let mean = groove.width_px + outwards * (common * near + own * fresh - near);
@@ -114,9 +114,9 @@ impl Outline {
 
     /// What lies along a line, from left to right; the first begins beyond the
     /// picture.
-    pub fn steps(&self, scene: &Scene, line: usize) -> Vec<Step> {
+    pub fn steps(&self, scene: &DrawnScene, line: usize) -> Vec<BrightnessStep> {
         let (left, right) = (self.left[line], self.right[line]);
-        let step = |at_px: f64, grey: f64, concrete: bool| Step { at_px, grey, concrete };
+        let step = |at_px: f64, grey: f64, concrete: bool| BrightnessStep { at_px, grey, concrete };
         let beyond = |side: usize, at_px: f64| match scene.grooves[side] {
             Some(groove) if groove.neighbour => step(at_px, scene.bead_grey, true),
             _ => step(at_px, scene.ground_grey, false),
@@ -169,7 +169,7 @@ impl Outline {
 /// How much of a groove's far side repeats its near side, so that its width spreads as
 /// much as it may: two sides of the roughness r with the correlation c differ by
 /// r·√(2 − 2c).
-fn common_share(width_px: f64, roughness_px: f64) -> f64 {
+fn common_fraction(width_px: f64, roughness_px: f64) -> f64 {
     let spread = MAX_GROOVE_SPREAD * width_px / roughness_px.max(f64::MIN_POSITIVE);
     (1.0 - 0.5 * spread * spread).max(0.0)
 }
@@ -203,7 +203,7 @@ fn dig(dug: &Holes, bead: Straight, lines: usize, draw: &mut Draw) -> Vec<Disc> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::studies::accuracy::drawn::profile::PER_PX;
+    use crate::studies::accuracy::drawn::profile::POINTS_PER_PX;
     use crate::studies::accuracy::drawn::scene::Tear;
 
     #[test]
@@ -211,9 +211,9 @@ mod tests {
         for width_px in [2.0, 10.0, 40.0] {
             let groove = Groove { width_px, grey: 10.0, neighbour: true };
             let edges = Tear { roughness_px: 3.0, length_px: 8.0 };
-            let scene = Scene { grooves: [Some(groove); 2], edges, ..Scene::default() };
-            let count = 20_000 * PER_PX;
-            let outline = Outline::draw(&scene, count, &mut Draw::new("groove", 1));
+            let scene = DrawnScene { grooves: [Some(groove); 2], edges, ..DrawnScene::default() };
+            let count = 20_000 * POINTS_PER_PX;
+            let outline = DrawnOutline::draw(&scene, count, &mut Draw::new("groove", 1));
             let far = outline.far[1].as_ref().unwrap();
             let gaps: Vec<f64> =
                 far.iter().zip(&outline.right).map(|(far, near)| far - near).collect();

@@ -6,10 +6,10 @@
 use std::ops::Range;
 
 use super::draw::Draw;
-use super::outline::{Outline, Step};
-use super::profile::PER_PX;
-use super::scene::Scene;
-use crate::scenario::image::Texture;
+use super::outline::{BrightnessStep, DrawnOutline};
+use super::profile::POINTS_PER_PX;
+use super::scene::DrawnScene;
+use crate::scenario::image::TexturePattern;
 use crate::sim::convolve::{convolve_lines, kernel};
 use crate::sim::edge::coverage;
 use crate::sim::texture::texture;
@@ -17,7 +17,7 @@ use crate::sim::texture::texture;
 /// Blurs beyond which a step is taken for complete: Φ(−5) is 3·10⁻⁷.
 const REACH_BLURS: f64 = 5.0;
 /// Places of the table of a step in a pixel; linear between them, it is exact to 10⁻⁴.
-const PLACES: f64 = 64.0;
+const TABLE_POINTS_PER_PX: f64 = 64.0;
 
 /// A painted scene.
 #[derive(Debug, Clone)]
@@ -28,14 +28,14 @@ pub struct Painted {
     /// Area of the unblurred bead over the picture's height \[px\].
     pub truth_px: f64,
     /// Where its borders lie, and the picture's first line of it.
-    outline: Outline,
+    outline: DrawnOutline,
     first_line: usize,
 }
 
 impl Painted {
     /// Area of the unblurred bead within some rows over their height \[px\].
     pub fn mean_width_px(&self, rows: Range<usize>) -> f64 {
-        let line = |row: usize| self.first_line + row * PER_PX;
+        let line = |row: usize| self.first_line + row * POINTS_PER_PX;
         self.outline.mean_width(line(rows.start)..line(rows.end))
     }
 
@@ -46,19 +46,19 @@ impl Painted {
 }
 
 /// Paints a scene. A texture is that of the picture: the blur does not weaken it.
-pub fn paint(scene: &Scene, draw: &mut Draw) -> Painted {
+pub fn paint(scene: &DrawnScene, draw: &mut Draw) -> Painted {
     let (width, height) = scene.size;
     let blur = kernel(scene.blur_px);
     // The blur reaches beyond the first and the last row.
     let margin = blur.len();
     let rows = height + 2 * margin;
-    let outline = Outline::draw(scene, rows * PER_PX, draw);
+    let outline = DrawnOutline::draw(scene, rows * POINTS_PER_PX, draw);
     let edge = StepTable::new(scene.blur_px, scene.motion_px);
     let within = |values: &[f32]| values[margin * width..(margin + height) * width].to_vec();
-    let layer = |value: &dyn Fn(&Step) -> f64| {
+    let layer = |value: &dyn Fn(&BrightnessStep) -> f64| {
         let mut values = vec![0.0; width * rows];
         for (row, values) in values.chunks_exact_mut(width).enumerate() {
-            let lines = row * PER_PX..(row + 1) * PER_PX;
+            let lines = row * POINTS_PER_PX..(row + 1) * POINTS_PER_PX;
             edge.fill(values, lines.map(|line| outline.steps(scene, line)), value);
         }
         convolve_lines(&mut values, width, &blur);
@@ -69,15 +69,16 @@ pub fn paint(scene: &Scene, draw: &mut Draw) -> Painted {
     if textures.iter().any(|patches| patches.size_grey > 0.0) {
         let concrete = layer(&|step| f64::from(u8::from(step.concrete)));
         for (patches, on_concrete) in textures.into_iter().zip([true, false]) {
-            let asked = Texture { size_grey: patches.size_grey, length_px: patches.length_px };
+            let asked =
+                TexturePattern { sigma_grey: patches.size_grey, length_px: patches.length_px };
             let Some(pattern) = texture(&asked, width, height, draw.key()) else { continue };
             for ((light, share), value) in light.iter_mut().zip(&concrete).zip(pattern) {
                 *light += value * if on_concrete { *share } else { 1.0 - share };
             }
         }
     }
-    let first_line = margin * PER_PX;
-    let truth_px = outline.mean_width(first_line..(margin + height) * PER_PX);
+    let first_line = margin * POINTS_PER_PX;
+    let truth_px = outline.mean_width(first_line..(margin + height) * POINTS_PER_PX);
     Painted { light, truth_px, outline, first_line }
 }
 
@@ -92,12 +93,12 @@ impl StepTable {
     fn new(blur_px: f64, motion_px: f64) -> Self {
         let reach_px = REACH_BLURS * blur_px + 0.5 * (1.0 + motion_px);
         let value = |place: u32| {
-            let inside = f64::from(place) / PLACES - reach_px;
+            let inside = f64::from(place) / TABLE_POINTS_PER_PX - reach_px;
             // The mean over the pixel and over the motion: two sides of one box.
             coverage(inside, [1.0, motion_px], blur_px)
         };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small")]
-        let last = (2.0 * reach_px * PLACES).ceil() as u32;
+        let last = (2.0 * reach_px * TABLE_POINTS_PER_PX).ceil() as u32;
         Self { reach_px, values: (0..=last).map(value).collect() }
     }
 
@@ -109,7 +110,7 @@ impl StepTable {
         reason = "a place within the table"
     )]
     fn at(&self, inside_px: f64) -> f64 {
-        let place = ((inside_px + self.reach_px) * PLACES).max(0.0);
+        let place = ((inside_px + self.reach_px) * TABLE_POINTS_PER_PX).max(0.0);
         let below = place as usize;
         match self.values.get(below..below + 2) {
             Some(ends) => ends[0] + (place - below as f64) * (ends[1] - ends[0]),
@@ -127,10 +128,10 @@ impl StepTable {
     fn fill(
         &self,
         row: &mut [f32],
-        lines: impl Iterator<Item = Vec<Step>>,
-        value: &dyn Fn(&Step) -> f64,
+        lines: impl Iterator<Item = Vec<BrightnessStep>>,
+        value: &dyn Fn(&BrightnessStep) -> f64,
     ) {
-        let share = 1.0 / PER_PX as f64;
+        let share = 1.0 / POINTS_PER_PX as f64;
         let mut flanks = vec![0.0; row.len()];
         // What is complete from a pixel on.
         let mut complete = vec![0.0; row.len() + 1];

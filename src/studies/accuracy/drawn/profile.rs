@@ -3,12 +3,12 @@
 use super::draw::Draw;
 
 /// Places of a profile in a pixel.
-pub const PER_PX: usize = 4;
+pub const POINTS_PER_PX: usize = 4;
 
 /// Where a place of a profile lies \[px\], from the profile's end.
 #[expect(clippy::cast_precision_loss, reason = "a few thousand places")]
 pub fn height_of(place: usize) -> f64 {
-    (place as f64 + 0.5) / PER_PX as f64
+    (place as f64 + 0.5) / POINTS_PER_PX as f64
 }
 
 /// Deviations of an edge \[px\], [`PER_PX`] a pixel: of the standard deviation
@@ -18,7 +18,7 @@ pub fn rough(count: usize, roughness_px: f64, length_px: f64, draw: &mut Draw) -
         return vec![0.0; count];
     }
     #[expect(clippy::cast_precision_loss, reason = "small")]
-    let keep = libm::exp(-1.0 / (length_px * PER_PX as f64));
+    let keep = libm::exp(-1.0 / (length_px * POINTS_PER_PX as f64));
     let fresh = (1.0 - keep * keep).sqrt();
     let mut last = draw.normal();
     let deviations = (0..count).map(|_| {

@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use super::draw::Draw;
-use super::scene::{Groove, Holes, Patches, Rib, Scene, Tear};
+use super::scene::{DrawnScene, Groove, Holes, Patches, Rib, Tear};
 
 /// Roughness of torn edges \[px\].
 const TORN_PX: Range<f64> = 0.5..6.0;
@@ -93,39 +93,39 @@ fn rough(draw: &mut Draw, roughness_px: Range<f64>) -> Tear {
     let length_px = draw.log("length_px", LENGTH_PX);
     let most = roughness_px.end.min(STEEPEST * length_px);
     let drawn = draw.log_unnamed(roughness_px.start..most);
-    draw.keep("roughness_px", drawn, roughness_px);
+    draw.note("roughness_px", drawn, roughness_px);
     Tear { roughness_px: drawn, length_px }
 }
 
 /// The default scene; every other one has rough edges.
-fn usual(draw: &mut Draw) -> Scene {
+fn usual(draw: &mut Draw) -> DrawnScene {
     half_rough(draw, ROUGHNESS_PX)
 }
 
-fn half_rough(draw: &mut Draw, roughness_px: Range<f64>) -> Scene {
+fn half_rough(draw: &mut Draw, roughness_px: Range<f64>) -> DrawnScene {
     if draw.one_of(2.0) {
-        return Scene { edges: rough(draw, roughness_px), ..Scene::default() };
+        return DrawnScene { edges: rough(draw, roughness_px), ..DrawnScene::default() };
     }
-    draw.keep("length_px", 0.0, LENGTH_PX);
-    draw.keep("roughness_px", 0.0, roughness_px);
-    Scene::default()
+    draw.note("length_px", 0.0, LENGTH_PX);
+    draw.note("roughness_px", 0.0, roughness_px);
+    DrawnScene::default()
 }
 
 /// Edges that are torn.
-pub fn torn(draw: &mut Draw) -> Scene {
-    Scene { edges: rough(draw, TORN_PX), ..Scene::default() }
+pub fn torn(draw: &mut Draw) -> DrawnScene {
+    DrawnScene { edges: rough(draw, TORN_PX), ..DrawnScene::default() }
 }
 
 /// Closed holes within the bead, and bays in its edges through which the ground is seen.
-pub fn holes(draw: &mut Draw) -> Scene {
+pub fn holes(draw: &mut Draw) -> DrawnScene {
     let size_px = draw.log("hole_px", HOLE_PX);
     let count = whole(draw.log("bays", BAYS));
     let grey = draw.log("hole_grey", GROOVE_GREY);
-    Scene { holes: Some(Holes { count, size_px, grey }), ..usual(draw) }
+    DrawnScene { holes: Some(Holes { count, size_px, grey }), ..usual(draw) }
 }
 
 /// A groove on either side, and beyond it ground or another bead.
-pub fn grooves(draw: &mut Draw) -> Scene {
+pub fn grooves(draw: &mut Draw) -> DrawnScene {
     let mut groove = |width, grey| Groove {
         width_px: draw.log(width, GROOVE_PX),
         grey: draw.log(grey, GROOVE_GREY),
@@ -133,26 +133,26 @@ pub fn grooves(draw: &mut Draw) -> Scene {
     };
     let left = groove("left_groove_px", "left_groove_grey");
     let right = groove("right_groove_px", "right_groove_grey");
-    Scene { grooves: [Some(left), Some(right)], ..half_rough(draw, CONCRETE_PX) }
+    DrawnScene { grooves: [Some(left), Some(right)], ..half_rough(draw, CONCRETE_PX) }
 }
 
 /// Aggregate of the bead.
-pub fn texture(draw: &mut Draw) -> Scene {
+pub fn texture(draw: &mut Draw) -> DrawnScene {
     let size_grey = draw.log("texture_grey", TEXTURE_GREY);
     let length_px = draw.log("texture_px", TEXTURE_PX);
-    Scene { texture: Patches { size_grey, length_px }, ..half_rough(draw, CONCRETE_PX) }
+    DrawnScene { texture: Patches { size_grey, length_px }, ..half_rough(draw, CONCRETE_PX) }
 }
 
 /// A faint bead in much noise.
-pub fn low_light(draw: &mut Draw) -> Scene {
+pub fn low_light(draw: &mut Draw) -> DrawnScene {
     let contrast = draw.log("contrast_grey", LOW_CONTRAST_GREY);
     let noise_grey = draw.log("noise_grey", LOW_LIGHT_NOISE_GREY);
     let ground_grey = LOW_LIGHT_GROUND_GREY;
-    Scene { bead_grey: ground_grey + contrast, ground_grey, noise_grey, ..usual(draw) }
+    DrawnScene { bead_grey: ground_grey + contrast, ground_grey, noise_grey, ..usual(draw) }
 }
 
 /// One or two lines along the bead; two lie on either side of its axis.
-pub fn ribs(draw: &mut Draw, contrast: Range<f64>) -> Scene {
+pub fn ribs(draw: &mut Draw, contrast: Range<f64>) -> DrawnScene {
     let share = draw.log("rib_of_contrast", contrast);
     let width_px = draw.log("rib_px", RIB_PX);
     let scene = usual(draw);
@@ -170,60 +170,60 @@ pub fn ribs(draw: &mut Draw, contrast: Range<f64>) -> Scene {
     } else {
         vec![rib(width_px, -1.0, draw), rib(width_px, 1.0, draw)]
     };
-    Scene { ribs, ..scene }
+    DrawnScene { ribs, ..scene }
 }
 
 /// Motion across the bead while the shutter is open.
-pub fn motion(draw: &mut Draw, length_px: Range<f64>) -> Scene {
+pub fn motion(draw: &mut Draw, length_px: Range<f64>) -> DrawnScene {
     let motion_px = draw.log("motion_px", length_px);
-    Scene { motion_px, ..usual(draw) }
+    DrawnScene { motion_px, ..usual(draw) }
 }
 
 /// A pattern on the ground.
-pub fn pattern(draw: &mut Draw, of_contrast: Range<f64>) -> Scene {
+pub fn pattern(draw: &mut Draw, of_contrast: Range<f64>) -> DrawnScene {
     let contrast = draw.log("contrast_grey", CONTRAST_GREY);
     let weakest = of_contrast.start.max(WEAKEST_PATTERN_GREY / contrast);
     let share = draw.log_unnamed(weakest..of_contrast.end);
-    draw.keep("pattern_of_contrast", share, of_contrast);
+    draw.note("pattern_of_contrast", share, of_contrast);
     let length_px = draw.log("pattern_px", PATTERN_PX);
     let scene = usual(draw);
     let ground_texture = Patches { size_grey: share * contrast, length_px };
-    Scene { bead_grey: scene.ground_grey + contrast, ground_texture, ..scene }
+    DrawnScene { bead_grey: scene.ground_grey + contrast, ground_texture, ..scene }
 }
 
 /// A camera with a gamma.
-pub fn gamma(draw: &mut Draw, range: Range<f64>) -> Scene {
+pub fn gamma(draw: &mut Draw, range: Range<f64>) -> DrawnScene {
     let gamma = draw.log("gamma", range);
-    Scene { gamma, ..usual(draw) }
+    DrawnScene { gamma, ..usual(draw) }
 }
 
 /// A frame that was a JPEG.
-pub fn jpeg(draw: &mut Draw) -> Scene {
+pub fn jpeg(draw: &mut Draw) -> DrawnScene {
     let quality = draw.log("quality", QUALITY);
     let jpeg = u8::try_from(whole(quality)).ok();
-    Scene { jpeg, place_px: 0.5 * BLOCK_PX, ..usual(draw) }
+    DrawnScene { jpeg, position_jitter_px: 0.5 * BLOCK_PX, ..usual(draw) }
 }
 
 /// Light that falls towards the corners.
-pub fn vignetting(draw: &mut Draw) -> Scene {
+pub fn vignetting(draw: &mut Draw) -> DrawnScene {
     let vignetting = draw.log("vignetting", VIGNETTING);
-    Scene { vignetting, ..usual(draw) }
+    DrawnScene { vignetting, ..usual(draw) }
 }
 
 /// Blur of the lens.
-pub fn blur(draw: &mut Draw) -> Scene {
+pub fn blur(draw: &mut Draw) -> DrawnScene {
     let blur_px = draw.log("blur_px", BLUR_PX);
-    Scene { blur_px, ..usual(draw) }
+    DrawnScene { blur_px, ..usual(draw) }
 }
 
 /// Beads of all widths; a narrow one is seen sharply, and torn less.
-pub fn narrow(draw: &mut Draw) -> Scene {
+pub fn narrow(draw: &mut Draw) -> DrawnScene {
     let width_px = draw.log("width_px", WIDTH_PX);
     let scene = usual(draw);
     let blur_px = scene.blur_px.min((width_px - WIDTH_SPREAD_PX) / MIN_BLURS);
     let roughness_px = scene.edges.roughness_px.min(NARROW_ROUGHNESS * width_px);
     let edges = Tear { roughness_px, ..scene.edges };
-    Scene { width_px, edges, blur_px, ..scene }
+    DrawnScene { width_px, edges, blur_px, ..scene }
 }
 
 /// The nearest count.

@@ -3,7 +3,7 @@
 /// A bead and its surroundings. Lengths in pixels, brightness in grey levels of a
 /// camera with gamma 1.
 #[derive(Debug, Clone)]
-pub struct Scene {
+pub struct DrawnScene {
     /// Columns and rows; the bead runs along the rows' normal.
     pub size: (usize, usize),
     /// Width of the bead before its edges are torn.
@@ -13,7 +13,7 @@ pub struct Scene {
     /// Brightness of the ground.
     pub ground_grey: f64,
     /// How far its axis lies from the picture's middle at most.
-    pub place_px: f64,
+    pub position_jitter_px: f64,
     /// How its edges are torn.
     pub edges: Tear,
     /// Aggregate on beads, as the picture shows it.
@@ -91,14 +91,14 @@ pub struct Rib {
     pub over_grey: f64,
 }
 
-impl Default for Scene {
+impl Default for DrawnScene {
     /// The bead of `ACCURACY.md`: 332 px, 150 on 70, σ = 4, s = 1.5.
     fn default() -> Self {
         let none = Patches { size_grey: 0.0, length_px: 1.0 };
         Self {
             size: (640, 100),
             width_px: 332.0,
-            place_px: 1.0,
+            position_jitter_px: 1.0,
             bead_grey: 150.0,
             ground_grey: 70.0,
             edges: Tear { roughness_px: 0.0, length_px: 10.0 },
@@ -117,7 +117,7 @@ impl Default for Scene {
     }
 }
 
-impl Scene {
+impl DrawnScene {
     /// Step from the ground to the bead \[grey levels\].
     pub fn contrast(&self) -> f64 {
         self.bead_grey - self.ground_grey

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::studies::accuracy::drawn::Parameter;
+use crate::studies::accuracy::drawn::DrawnParameter;
 
 /// Errors of more standard deviations than this, and of more pixels, are silent.
 const SILENT_SIGMAS: f64 = 5.0;
@@ -16,9 +16,9 @@ pub struct DrawnOutcome {
     /// Its number within the set.
     pub frame: u64,
     /// What was drawn for it.
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<DrawnParameter>,
     /// Error and standard deviation, or why it was refused.
-    pub width: Result<Deviation, Refusal>,
+    pub width: Result<Deviation, FrameRejection>,
 }
 
 /// How far off a width is \[px\].
@@ -39,7 +39,7 @@ impl Deviation {
 
 /// Why a frame gave no width.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Refusal {
+pub struct FrameRejection {
     /// The status in `widths.csv`.
     pub status: &'static str,
     /// Whether its words name the camera's gamma.
@@ -52,11 +52,11 @@ pub struct DrawnFigures {
     /// The set's name.
     pub set: &'static str,
     /// Which of its frames.
-    pub part: Part,
+    pub part: SetPart,
     /// Their number.
     pub frames: usize,
     /// Share that gave a width.
-    pub measured_share: f64,
+    pub measured_fraction: f64,
     /// Mean error \[px\].
     pub bias_px: Option<f64>,
     /// Root of the mean square of the error \[px\].
@@ -66,7 +66,7 @@ pub struct DrawnFigures {
     /// Frames whose width is off by more than 5 standard deviations and 0.3 px.
     pub silent: usize,
     /// How many frames were refused, by status.
-    pub refused: BTreeMap<&'static str, usize>,
+    pub rejected: BTreeMap<&'static str, usize>,
     /// How many refusals do not name the camera's gamma.
     pub without_gamma: usize,
     /// Frames with the largest errors over sigma.
@@ -78,7 +78,7 @@ pub struct DrawnFigures {
 /// Some frames of a set.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Part {
+pub enum SetPart {
     /// Every frame.
     All,
     /// Those whose value lies within a third, in the logarithm, of its range.

@@ -2,21 +2,21 @@
 
 use std::collections::BTreeMap;
 
-use super::figures::{DrawnFigures, DrawnOutcome, Part};
+use super::figures::{DrawnFigures, DrawnOutcome, SetPart};
 use super::limits;
 use crate::numeric::statistics::Moments;
-use crate::studies::accuracy::drawn::{DrawnSet, Parameter};
-use crate::studies::accuracy::figures::share;
+use crate::studies::accuracy::drawn::{DrawnParameter, DrawnSet};
+use crate::studies::accuracy::figures::fraction;
 
 /// Parts of a range, equal in the logarithm.
-const PARTS: u32 = 3;
+const RANGE_PARTS: u32 = 3;
 /// Frames of the largest errors that are listed.
-const WORST: usize = 5;
+const WORST_FRAMES: usize = 5;
 
 /// Figures of a set: over all frames first, then within the thirds of each range.
 pub fn figures(set: &DrawnSet, outcomes: &[DrawnOutcome]) -> Vec<DrawnFigures> {
     let all: Vec<&DrawnOutcome> = outcomes.iter().collect();
-    let mut figures = vec![figures_of(set, Part::All, &all)];
+    let mut figures = vec![figures_of(set, SetPart::All, &all)];
     let Some(first) = outcomes.first() else { return figures };
     for parameter in &first.parameters {
         let value = |outcome: &DrawnOutcome| {
@@ -26,7 +26,7 @@ pub fn figures(set: &DrawnSet, outcomes: &[DrawnOutcome]) -> Vec<DrawnFigures> {
                 .find(|other| other.name == parameter.name)
                 .map(|one| one.value)
         };
-        let mut parts = vec![Vec::new(); PARTS as usize];
+        let mut parts = vec![Vec::new(); RANGE_PARTS as usize];
         let mut zero = Vec::new();
         for outcome in outcomes {
             match value(outcome) {
@@ -36,12 +36,12 @@ pub fn figures(set: &DrawnSet, outcomes: &[DrawnOutcome]) -> Vec<DrawnFigures> {
             }
         }
         if !zero.is_empty() {
-            let part = Part::Zero { parameter: parameter.name };
+            let part = SetPart::Zero { parameter: parameter.name };
             figures.push(figures_of(set, part, &zero));
         }
-        for (number, some) in (0..PARTS).zip(parts) {
+        for (number, some) in (0..RANGE_PARTS).zip(parts) {
             let (from, to) = (end(parameter, number), end(parameter, number + 1));
-            let part = Part::Third { parameter: parameter.name, from, to };
+            let part = SetPart::Third { parameter: parameter.name, from, to };
             figures.push(figures_of(set, part, &some));
         }
     }
@@ -49,7 +49,7 @@ pub fn figures(set: &DrawnSet, outcomes: &[DrawnOutcome]) -> Vec<DrawnFigures> {
 }
 
 /// Figures of some frames of a set.
-fn figures_of(set: &DrawnSet, part: Part, outcomes: &[&DrawnOutcome]) -> DrawnFigures {
+fn figures_of(set: &DrawnSet, part: SetPart, outcomes: &[&DrawnOutcome]) -> DrawnFigures {
     let (mut errors, mut ratios) = (Moments::default(), Moments::default());
     let mut refused = BTreeMap::new();
     let (mut silent, mut without_gamma) = (0, 0);
@@ -74,14 +74,14 @@ fn figures_of(set: &DrawnSet, part: Part, outcomes: &[&DrawnOutcome]) -> DrawnFi
         set: set.name,
         part,
         frames: outcomes.len(),
-        measured_share: share(by_ratio.len(), outcomes.len()),
+        measured_fraction: fraction(by_ratio.len(), outcomes.len()),
         bias_px: errors.mean(),
         rmse_px: errors.rms(),
         z: ratios.rms(),
         silent,
-        refused,
+        rejected: refused,
         without_gamma,
-        worst: by_ratio.iter().take(WORST).map(|(_, frame)| *frame).collect(),
+        worst: by_ratio.iter().take(WORST_FRAMES).map(|(_, frame)| *frame).collect(),
         missed: Vec::new(),
     };
     figures.missed = limits::misses(&figures, &set.requirements, by_ratio.len());
@@ -89,15 +89,15 @@ fn figures_of(set: &DrawnSet, part: Part, outcomes: &[&DrawnOutcome]) -> DrawnFi
 }
 
 /// Where a part begins.
-fn end(parameter: &Parameter, number: u32) -> f64 {
+fn end(parameter: &DrawnParameter, number: u32) -> f64 {
     let (from, to) = parameter.range;
-    from * libm::exp(f64::from(number) / f64::from(PARTS) * libm::log(to / from))
+    from * libm::exp(f64::from(number) / f64::from(RANGE_PARTS) * libm::log(to / from))
 }
 
 /// In which part a value lies.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-fn part_of(parameter: &Parameter, value: f64) -> usize {
+fn part_of(parameter: &DrawnParameter, value: f64) -> usize {
     let (from, to) = parameter.range;
-    let place = f64::from(PARTS) * libm::log(value / from) / libm::log(to / from);
-    place.clamp(0.0, f64::from(PARTS - 1)) as usize
+    let position = f64::from(RANGE_PARTS) * libm::log(value / from) / libm::log(to / from);
+    position.clamp(0.0, f64::from(RANGE_PARTS - 1)) as usize
 }

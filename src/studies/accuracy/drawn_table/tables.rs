@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::figures::{DrawnFigures, Part};
+use super::figures::{DrawnFigures, SetPart};
 use crate::studies::accuracy::drawn::DrawnSet;
 use crate::studies::accuracy::table::{aligned, marked};
 
@@ -28,12 +28,12 @@ fn cells(figures: &DrawnFigures) -> [String; COLUMNS] {
     let listed = |parts: Vec<String>, apart: &str| {
         if parts.is_empty() { "–".to_owned() } else { parts.join(apart) }
     };
-    let refused = figures.refused.iter().map(|(status, count)| format!("{status} {count}"));
+    let refused = figures.rejected.iter().map(|(status, count)| format!("{status} {count}"));
     [
         figures.set.to_owned(),
         named(&figures.part),
         figures.frames.to_string(),
-        number(Some(100.0 * figures.measured_share), 2),
+        number(Some(100.0 * figures.measured_fraction), 2),
         number(figures.bias_px, 3),
         number(figures.rmse_px, 3),
         number(figures.z, 2),
@@ -47,11 +47,11 @@ fn cells(figures: &DrawnFigures) -> [String; COLUMNS] {
     ]
 }
 
-fn named(part: &Part) -> String {
+fn named(part: &SetPart) -> String {
     match part {
-        Part::All => "all".to_owned(),
-        Part::Third { parameter, from, to } => format!("{parameter} {from:.3} to {to:.3}"),
-        Part::Zero { parameter } => format!("{parameter} 0"),
+        SetPart::All => "all".to_owned(),
+        SetPart::Third { parameter, from, to } => format!("{parameter} {from:.3} to {to:.3}"),
+        SetPart::Zero { parameter } => format!("{parameter} 0"),
     }
 }
 
@@ -62,7 +62,7 @@ pub fn table(figures: &[DrawnFigures]) -> String {
 
 /// The figures in Markdown: a table of the sets, and a section of each with its ranges.
 pub fn markdown(sets: &[DrawnSet], figures: &[DrawnFigures]) -> String {
-    let whole = figures.iter().filter(|figures| figures.part == Part::All);
+    let whole = figures.iter().filter(|figures| figures.part == SetPart::All);
     let mut text = format!("# All sets\n\n{}", marked(&HEADS, whole.map(cells)));
     for set in sets {
         let parts: Vec<&DrawnFigures> =
@@ -79,7 +79,7 @@ pub fn markdown(sets: &[DrawnSet], figures: &[DrawnFigures]) -> String {
 fn ranges(parts: &[&DrawnFigures]) -> String {
     let mut ranges: Vec<(&str, f64, f64)> = Vec::new();
     for part in parts {
-        let Part::Third { parameter, from, to } = part.part else { continue };
+        let SetPart::Third { parameter, from, to } = part.part else { continue };
         match ranges.last_mut() {
             Some(last) if last.0 == parameter => last.2 = to,
             _ => ranges.push((parameter, from, to)),

@@ -1,16 +1,16 @@
 use super::*;
-use crate::studies::accuracy::drawn::{self, DrawnSet, Parameter};
+use crate::studies::accuracy::drawn::{self, DrawnParameter, DrawnSet};
 
 fn set(name: &str) -> DrawnSet {
     drawn::named(name).remove(0)
 }
 
-fn outcome(frame: u32, width: Result<Deviation, Refusal>) -> DrawnOutcome {
+fn outcome(frame: u32, width: Result<Deviation, FrameRejection>) -> DrawnOutcome {
     let value = 0.5 * libm::exp(f64::from(frame) / 300.0 * libm::log(12.0));
     let roughness = if frame.is_multiple_of(2) { 0.0 } else { 1.0 };
     let parameters = vec![
-        Parameter { name: "blur_px", value, range: (0.5, 6.0) },
-        Parameter { name: "roughness_px", value: roughness, range: (0.5, 2.0) },
+        DrawnParameter { name: "blur_px", value, range: (0.5, 6.0) },
+        DrawnParameter { name: "roughness_px", value: roughness, range: (0.5, 2.0) },
     ];
     DrawnOutcome { frame: frame.into(), parameters, width }
 }
@@ -19,8 +19,8 @@ fn off(error_px: f64) -> Deviation {
     Deviation { error_px, sigma_px: 0.1 }
 }
 
-fn refused(status: &'static str, names_gamma: bool) -> Refusal {
-    Refusal { status, names_gamma }
+fn refused(status: &'static str, names_gamma: bool) -> FrameRejection {
+    FrameRejection { status, names_gamma }
 }
 
 /// Frames whose errors are as their sigma.
@@ -37,7 +37,7 @@ fn frames_are_counted_within_thirds_and_judged() {
     assert_eq!(all_kept.len(), 1 + 3 + 4);
     assert!(all_kept.iter().all(|part| part.missed.is_empty()), "{all_kept:?}");
     assert_eq!(all_kept[1].frames + all_kept[2].frames + all_kept[3].frames, 300);
-    assert_eq!(all_kept[4].part, Part::Zero { parameter: "roughness_px" });
+    assert_eq!(all_kept[4].part, SetPart::Zero { parameter: "roughness_px" });
     let rough: Vec<usize> = all_kept[4..].iter().map(|part| part.frames).collect();
     assert_eq!(rough, [150, 0, 150, 0]);
     outcomes[299].width = Ok(off(4.0));
@@ -45,7 +45,7 @@ fn frames_are_counted_within_thirds_and_judged() {
         outcome.width = Err(refused("unsure", true));
     }
     let bad = figures(&set, &outcomes);
-    assert_eq!((bad[0].silent, bad[0].worst[0], bad[0].refused["unsure"]), (1, 299, 40));
+    assert_eq!((bad[0].silent, bad[0].worst[0], bad[0].rejected["unsure"]), (1, 299, 40));
     let missed = &bad[0].missed;
     assert!(missed[0].starts_with("measured 86.67") && missed[1].starts_with("z 2."), "{missed:?}");
     assert!(bad[1].missed.is_empty() && !bad[3].missed.is_empty(), "{bad:?}");

@@ -2,7 +2,7 @@
 
 /// Limits of a set's figures; `None` bears any.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Limits {
+pub struct SetLimits {
     /// Largest magnitude of the mean error \[px\].
     pub bias_px: Option<f64>,
     /// Largest magnitude of the mean error \[mm\].
@@ -14,9 +14,9 @@ pub struct Limits {
     /// The same as a multiple of the bound for an unknown direction.
     pub rmse_over_free_bound: Option<f64>,
     /// Smallest share of the frames that give a width.
-    pub measured_share: Option<f64>,
+    pub measured_fraction: Option<f64>,
     /// Largest share of the frames that give a silently wrong width.
-    pub silent_share: Option<f64>,
+    pub silent_fraction: Option<f64>,
     /// Smallest and largest root of the mean square of the error over its
     /// standard deviation.
     pub rms_over_sigma: Option<[f64; 2]>,
@@ -25,60 +25,61 @@ pub struct Limits {
     pub within_interval: Option<[f64; 2]>,
 }
 
-const NONE: Limits = Limits {
+const NO_LIMITS: SetLimits = SetLimits {
     bias_px: None,
     bias_mm: None,
     rmse_px: None,
     rmse_mm: None,
     rmse_over_free_bound: None,
-    measured_share: None,
-    silent_share: None,
+    measured_fraction: None,
+    silent_fraction: None,
     rms_over_sigma: None,
     within_interval: None,
 };
 
-impl Limits {
+impl SetLimits {
     /// A standard deviation that can be trusted.
     pub const TRUST: Self =
-        Self { rms_over_sigma: Some([0.9, 1.1]), within_interval: Some([0.93, 0.97]), ..NONE };
+        Self { rms_over_sigma: Some([0.9, 1.1]), within_interval: Some([0.93, 0.97]), ..NO_LIMITS };
     /// A straight bead that nothing disturbs.
     pub const CLEAN: Self = Self {
         bias_px: Some(0.005),
         rmse_over_free_bound: Some(1.10),
-        measured_share: Some(1.0),
+        measured_fraction: Some(1.0),
         ..Self::TRUST
     };
     /// One whose contrast is little more than three times the noise.
     pub const FAINT: Self = Self {
         bias_px: Some(0.02),
         rmse_over_free_bound: Some(1.25),
-        measured_share: Some(0.995),
+        measured_fraction: Some(0.995),
         ..Self::TRUST
     };
     /// One that is seen by a tilted camera through a lens with distortion.
     pub const TILTED: Self = Self {
         bias_mm: Some(0.005),
         rmse_mm: Some(0.01),
-        measured_share: Some(1.0),
+        measured_fraction: Some(1.0),
         ..Self::TRUST
     };
     /// A bead in poor light, with dirt on it, or with something beside it.
     pub const DISTURBED: Self = Self {
         bias_px: Some(0.05),
         rmse_px: Some(0.10),
-        measured_share: Some(0.99),
+        measured_fraction: Some(0.99),
         ..Self::CORNER
     };
     /// A rough bead, every row of which shows.
     pub const ROUGH: Self = Self {
         bias_px: Some(0.02),
         rmse_px: Some(0.05),
-        measured_share: Some(0.99),
-        silent_share: Some(1e-4),
+        measured_fraction: Some(0.99),
+        silent_fraction: Some(1e-4),
         ..Self::TRUST
     };
     /// A curve of three widths or more.
-    pub const CURVE: Self = Self { bias_px: Some(0.02), measured_share: Some(0.99), ..NONE };
+    pub const CURVE: Self =
+        Self { bias_px: Some(0.02), measured_fraction: Some(0.99), ..NO_LIMITS };
     /// A corner: it may be refused, and may be uncertain, but not be wrong.
-    pub const CORNER: Self = Self { silent_share: Some(1e-4), ..NONE };
+    pub const CORNER: Self = Self { silent_fraction: Some(1e-4), ..NO_LIMITS };
 }

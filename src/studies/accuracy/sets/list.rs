@@ -1,17 +1,18 @@
 //! The sets by name.
 
-use super::{Limits, MM_PER_PX, Set};
-use crate::scenario::bead::Roughness;
+use super::{MM_PER_PX, Set, SetLimits};
+use crate::scenario::bead::EdgeRoughness;
 use crate::scenario::image::{
-    Bend, Grains, Motion, Neighbour, Picture, Shading, Shadow, Side, Spots, Texture,
+    BeadSide, Bend, EdgeShading, Grains, ImageModel, MotionBlur, Neighbour, Shadow, Spots,
+    TexturePattern,
 };
-use crate::vision::{Axis, Polarity};
+use crate::vision::{BeadAxis, Polarity};
 
 const WIDE_MM: f64 = 42.0;
 const NARROW_MM: f64 = 12.7;
-const SMOOTH: Roughness = Roughness { size_mm: 0.0, length_mm: 5.0 };
+const SMOOTH: EdgeRoughness = EdgeRoughness { sigma_mm: 0.0, length_mm: 5.0 };
 /// Contrast 80, blur 1.5 px, noise 4, even light.
-const PLAIN: Picture = Picture { light_ratio: 1.0, ..Picture::USUAL };
+const PLAIN: ImageModel = ImageModel { light_ratio: 1.0, ..ImageModel::DEFAULT };
 
 /// All sets, in the order in which they are reported.
 pub fn all() -> Vec<Set> {
@@ -25,36 +26,36 @@ pub(super) fn plain(name: &'static str) -> Set {
         rows: 100,
         width_mm: WIDE_MM,
         roughness: SMOOTH,
-        axis: Axis::Vertical,
+        axis: BeadAxis::Vertical,
         polarity: Polarity::Bright,
         tilted: false,
-        limits: Limits::CLEAN,
+        limits: SetLimits::CLEAN,
     }
 }
 
 fn slant(name: &'static str, slant_deg: f64, blur_px: f64) -> Set {
-    let picture = Picture { blur_px, slant_deg, ..PLAIN };
+    let picture = ImageModel { blur_px, slant_deg, ..PLAIN };
     Set { picture, width_mm: NARROW_MM, ..plain(name) }
 }
 
-fn disturbed(name: &'static str, disturb: impl FnOnce(&mut Picture)) -> Set {
-    let mut set = Set { limits: Limits::DISTURBED, ..plain(name) };
+fn disturbed(name: &'static str, disturb: impl FnOnce(&mut ImageModel)) -> Set {
+    let mut set = Set { limits: SetLimits::DISTURBED, ..plain(name) };
     disturb(&mut set.picture);
     set
 }
 
-fn bent(name: &'static str, rows: u32, bend: Bend, limits: Limits) -> Set {
+fn bent(name: &'static str, rows: u32, bend: Bend, limits: SetLimits) -> Set {
     Set { rows, width_mm: NARROW_MM, limits, ..disturbed(name, |picture| picture.bend = bend) }
 }
 
 fn clean() -> Vec<Set> {
-    let blurred = |name, blur_px| Set { picture: Picture { blur_px, ..PLAIN }, ..plain(name) };
-    let dark = Picture { bead_grey: 70.0, ground_grey: 150.0, ..PLAIN };
+    let blurred = |name, blur_px| Set { picture: ImageModel { blur_px, ..PLAIN }, ..plain(name) };
+    let dark = ImageModel { bead_grey: 70.0, ground_grey: 150.0, ..PLAIN };
     vec![
         blurred("blur-0.8", 0.8),
         blurred("blur-1.5", 1.5),
         blurred("blur-3", 3.0),
-        Set { axis: Axis::Horizontal, ..plain("horizontal") },
+        Set { axis: BeadAxis::Horizontal, ..plain("horizontal") },
         Set { picture: dark, polarity: Polarity::Dark, ..plain("dark-bead") },
     ]
 }
@@ -72,35 +73,35 @@ fn slanted() -> Vec<Set> {
 
 /// Nothing disturbs these either.
 fn other() -> Vec<Set> {
-    let faint = Picture { bead_grey: 90.0, blur_px: 2.0, noise_grey: 6.0, ..PLAIN };
-    let roughness = Roughness { size_mm: 0.1, length_mm: 5.0 };
+    let faint = ImageModel { bead_grey: 90.0, blur_px: 2.0, noise_grey: 6.0, ..PLAIN };
+    let roughness = EdgeRoughness { sigma_mm: 0.1, length_mm: 5.0 };
     let tilted = Set { rows: 500, width_mm: 37.0, tilted: true, ..plain("tilted") };
     vec![
-        Set { roughness, limits: Limits::TRUST, ..plain("rough") },
-        Set { picture: faint, limits: Limits::FAINT, ..plain("faint") },
-        Set { limits: Limits::TILTED, ..tilted },
+        Set { roughness, limits: SetLimits::TRUST, ..plain("rough") },
+        Set { picture: faint, limits: SetLimits::FAINT, ..plain("faint") },
+        Set { limits: SetLimits::TILTED, ..tilted },
     ]
 }
 
 fn lit() -> Vec<Set> {
-    let shading = Shading { side: Side::Left, ..PLAIN.shading };
+    let shading = EdgeShading { side: BeadSide::Left, ..PLAIN.shading };
     let light = |direction: f64| {
-        move |picture: &mut Picture| {
+        move |picture: &mut ImageModel| {
             (picture.light_ratio, picture.light_deg) = (4.0, Some(direction));
         }
     };
     let saturated = |bead_grey: f64, ground_grey: f64| {
-        move |picture: &mut Picture| {
+        move |picture: &mut ImageModel| {
             (picture.bead_grey, picture.ground_grey) = (bead_grey, ground_grey);
         }
     };
     let glaring = disturbed("saturated-ground", saturated(200.0, 280.0));
     vec![
         disturbed("shading-bead", |picture| {
-            picture.shading = Shading { bead_grey_per_px: 1.0, ..shading };
+            picture.shading = EdgeShading { bead_grey_per_px: 1.0, ..shading };
         }),
         disturbed("shading-ground", |picture| {
-            picture.shading = Shading { ground_grey_per_px: 1.0, ..shading };
+            picture.shading = EdgeShading { ground_grey_per_px: 1.0, ..shading };
         }),
         disturbed("light-across", light(0.0)),
         disturbed("light-along", light(90.0)),
@@ -113,10 +114,13 @@ fn lit() -> Vec<Set> {
 }
 
 fn covered() -> Vec<Set> {
-    let spots =
-        |size_px: f64| move |picture: &mut Picture| picture.spots = Spots { share: 0.05, size_px };
+    let spots = |size_px: f64| {
+        move |picture: &mut ImageModel| picture.spots = Spots { covered_fraction: 0.05, size_px }
+    };
     let grains = |size_px: f64, grey: f64| {
-        move |picture: &mut Picture| picture.grains = Grains { rows_share: 0.3, size_px, grey }
+        move |picture: &mut ImageModel| {
+            picture.grains = Grains { rows_fraction: 0.3, size_px, grey }
+        }
     };
     vec![
         disturbed("spots", spots(4.0)),
@@ -129,16 +133,16 @@ fn covered() -> Vec<Set> {
 }
 
 fn beside() -> Vec<Set> {
-    let shadow = |distance_px: f64, share: f64, side: Side| {
-        let shadow = Shadow { distance_px, width_px: 20.0, share, side };
-        move |picture: &mut Picture| picture.shadow = shadow
+    let shadow = |distance_px: f64, share: f64, side: BeadSide| {
+        let shadow = Shadow { distance_px, width_px: 20.0, contrast_fraction: share, side };
+        move |picture: &mut ImageModel| picture.shadow = shadow
     };
-    let neighbour = Neighbour { gap_px: 20.0, share: 0.6, ..PLAIN.neighbour };
+    let neighbour = Neighbour { gap_px: 20.0, contrast_fraction: 0.6, ..PLAIN.neighbour };
     vec![
-        disturbed("shadow-6", shadow(6.0, 0.7, Side::Left)),
-        disturbed("shadow-6-both", shadow(6.0, 0.7, Side::Both)),
-        disturbed("shadow-10", shadow(10.0, 0.7, Side::Left)),
-        disturbed("bright-band", shadow(10.0, -0.5, Side::Left)),
+        disturbed("shadow-6", shadow(6.0, 0.7, BeadSide::Left)),
+        disturbed("shadow-6-both", shadow(6.0, 0.7, BeadSide::Both)),
+        disturbed("shadow-10", shadow(10.0, 0.7, BeadSide::Left)),
+        disturbed("bright-band", shadow(10.0, -0.5, BeadSide::Left)),
         disturbed("older-bead", |picture| picture.neighbour = neighbour),
     ]
 }
@@ -146,14 +150,14 @@ fn beside() -> Vec<Set> {
 fn odd() -> Vec<Set> {
     let layer = disturbed("layer-on-layer", |picture| {
         (picture.bead_grey, picture.noise_grey) = (82.0, 2.0);
-        picture.texture = Texture { size_grey: 2.0, length_px: 4.0 };
+        picture.texture = TexturePattern { sigma_grey: 2.0, length_px: 4.0 };
     });
     vec![
         disturbed("motion", |picture| {
-            picture.motion = Motion { length_px: 6.0, direction_deg: 15.0 };
+            picture.motion = MotionBlur { length_px: 6.0, direction_deg: 15.0 };
         }),
         // Weights that know the texture's autocorrelation leave 0.0985 px.
-        Set { rows: 400, limits: Limits { rmse_px: Some(0.103), ..layer.limits }, ..layer },
+        Set { rows: 400, limits: SetLimits { rmse_px: Some(0.103), ..layer.limits }, ..layer },
     ]
 }
 
@@ -161,18 +165,24 @@ fn odd() -> Vec<Set> {
 fn rough() -> Vec<Set> {
     let tall = |set: Set, size_mm: f64, length_mm: f64| Set {
         rows: 500,
-        roughness: Roughness { size_mm, length_mm },
+        roughness: EdgeRoughness { sigma_mm: size_mm, length_mm },
         ..set
     };
-    let disturbed = |name, disturb: &dyn Fn(&mut Picture)| tall(disturbed(name, disturb), 0.2, 4.0);
+    let disturbed =
+        |name, disturb: &dyn Fn(&mut ImageModel)| tall(disturbed(name, disturb), 0.2, 4.0);
     let shadow = |share: f64| {
-        let shadow = Shadow { distance_px: 10.0, width_px: 20.0, share, side: Side::Left };
-        move |picture: &mut Picture| picture.shadow = shadow
+        let shadow = Shadow {
+            distance_px: 10.0,
+            width_px: 20.0,
+            contrast_fraction: share,
+            side: BeadSide::Left,
+        };
+        move |picture: &mut ImageModel| picture.shadow = shadow
     };
     let slanted = slant("rough-tall-slant-15", 15.0, 1.5);
     vec![
-        Set { limits: Limits::ROUGH, ..tall(plain("rough-tall"), 0.38, 3.16) },
-        Set { limits: Limits::DISTURBED, ..tall(slanted, 0.2, 4.0) },
+        Set { limits: SetLimits::ROUGH, ..tall(plain("rough-tall"), 0.38, 3.16) },
+        Set { limits: SetLimits::DISTURBED, ..tall(slanted, 0.2, 4.0) },
         disturbed("rough-tall-shadow", &shadow(0.7)),
         disturbed("rough-tall-band", &shadow(-0.5)),
         disturbed("rough-tall-saturated", &|picture| {
@@ -184,10 +194,10 @@ fn rough() -> Vec<Set> {
 fn bends() -> Vec<Set> {
     let curve = |name, rows, radius_widths: f64| {
         let radius_mm = radius_widths * 100.0 * MM_PER_PX;
-        bent(name, rows, Bend { radius_mm, corner_deg: 0.0 }, Limits::CURVE)
+        bent(name, rows, Bend { radius_mm, corner_deg: 0.0 }, SetLimits::CURVE)
     };
     let corner = |name, corner_deg: f64| {
-        bent(name, 100, Bend { radius_mm: 0.0, corner_deg }, Limits::CORNER)
+        bent(name, 100, Bend { radius_mm: 0.0, corner_deg }, SetLimits::CORNER)
     };
     vec![
         curve("curve-3-widths", 100, 3.0),

@@ -9,8 +9,8 @@ use super::experiments::Experiments;
 use crate::core::units::Mm;
 use crate::io::progress::Progress;
 use crate::studies::barjuei2022::{
-    Contender, Disturbance, LAYERS, LayerResult, Rates, Wrong, lay, settles_unseen, step_settles,
-    unrest, wrong,
+    ControlSetup, FlowDisturbance, LAYERS, LayerResult, LoopRates, Mismatch, error_ratio, lay,
+    mismatched, settles_unseen, step_settles,
 };
 use crate::studies::error::ReproduceError;
 use crate::studies::study::Section;
@@ -18,8 +18,8 @@ use crate::studies::study::Section;
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 5;
 /// Both columns of rates by distance, with what they are called.
-const COLUMNS: [(Rates, &str); 2] =
-    [(Rates::PAPER, "10 Hz vision, 5 Hz link"), (Rates::FAST, "50 Hz vision, 20 Hz link")];
+const COLUMNS: [(LoopRates, &str); 2] =
+    [(LoopRates::PAPER, "10 Hz vision, 5 Hz link"), (LoopRates::FAST, "50 Hz vision, 20 Hz link")];
 /// Wavelengths that are asked for by name \[mm\], and those of the curve.
 const WAVES_MM: [f64; 2] = [2400.0, 1200.0];
 const CURVE_MM: [f64; 16] = [
@@ -40,7 +40,7 @@ pub fn run(work: &mut Experiments, progress: &mut Progress) -> Result<Section, R
     progress.advance();
     work.without_noise()?;
     progress.advance();
-    work.told_wrong()?;
+    work.mismatched()?;
     progress.advance();
     let waves = work.waves()?;
     progress.advance();
@@ -65,10 +65,10 @@ impl Experiments {
     fn by_distance(
         &self,
         cell: &crate::cell::Cell,
-        rates: Rates,
+        rates: LoopRates,
         target_mm: f64,
     ) -> Result<LayerResult, ReproduceError> {
-        let (cell, run) = Contender::by_distance(rates).enter(cell, &self.run, target_mm);
+        let (cell, run) = ControlSetup::by_distance(rates).enter(cell, &self.run, target_mm);
         Ok(lay(&cell, &run, self.seeds)?)
     }
 
@@ -76,7 +76,7 @@ impl Experiments {
     fn noise(&mut self) -> Result<(), ReproduceError> {
         for layer in &LAYERS {
             let target = layer.target_mm;
-            let (cell, run) = Contender::Paper.enter(&self.cell, &self.run, target);
+            let (cell, run) = ControlSetup::Paper.enter(&self.cell, &self.run, target);
             let theirs = lay(&cell, &run, self.seeds)?;
             for (rates, name) in COLUMNS {
                 let ours = self.by_distance(&self.cell, rates, target)?;
@@ -100,7 +100,7 @@ impl Experiments {
         quiet.simulation.width_noise = Mm::ZERO;
         for layer in &LAYERS {
             let target = layer.target_mm;
-            let (cell, run) = Contender::Paper.enter(&quiet, &self.run, target);
+            let (cell, run) = ControlSetup::Paper.enter(&quiet, &self.run, target);
             let theirs = lay(&cell, &run, self.seeds)?;
             for (rates, name) in COLUMNS {
                 let ours = self.by_distance(&quiet, rates, target)?;
@@ -110,16 +110,16 @@ impl Experiments {
                 let ratio = ours.error_integral_mm2 / theirs.error_integral_mm2;
                 let what = ("integral of the error's size, over the paper's", "1");
                 self.rows.push(&case, what, [None, Some(1.0), Some(ratio)]);
-                let who = Contender::by_distance(rates);
+                let who = ControlSetup::by_distance(rates);
                 let unseen = settles_unseen(&quiet, &self.run, who, target, self.seeds)?;
                 let what = ("settles with nothing seen before after", "mm");
                 self.rows.push(&case, what, [None, None, Some(unseen)]);
             }
         }
         let step = |who| step_settles(&quiet, &self.run, who, self.seeds);
-        let theirs = step(Contender::Paper)?;
+        let theirs = step(ControlSetup::Paper)?;
         for (rates, name) in COLUMNS {
-            let ours = step(Contender::by_distance(rates))?;
+            let ours = step(ControlSetup::by_distance(rates))?;
             let case = format!("8 % flow step, {name}");
             let found = [theirs, ours].map(|way| way.is_finite().then_some(way));
             self.rows.push(case, ("settles to 0.5 mm after", "mm"), [None, found[0], found[1]]);
@@ -128,26 +128,26 @@ impl Experiments {
     }
 
     /// A controller that is told wrong, and a camera that sees wrong.
-    fn told_wrong(&mut self) -> Result<(), ReproduceError> {
-        let offset = |factor| Wrong { offset: factor, ..Wrong::NOTHING };
-        let all = |factor| Wrong { offset: factor, outliers: 0.1, missing: 0.2 };
+    fn mismatched(&mut self) -> Result<(), ReproduceError> {
+        let offset = |factor| Mismatch { offset: factor, ..Mismatch::NONE };
+        let all = |factor| Mismatch { offset: factor, outliers: 0.1, missing: 0.2 };
         let cases = [
-            ("nothing wrong", 0.25, Wrong::NOTHING),
+            ("nothing wrong", 0.25, Mismatch::NONE),
             ("distance 20 % too long", 0.25, offset(1.2)),
             ("distance 20 % too short", 0.25, offset(0.8)),
-            ("b 50 % too large", 0.375, Wrong::NOTHING),
-            ("b 50 % too small", 0.125, Wrong::NOTHING),
-            ("one width in ten an outlier", 0.25, Wrong { outliers: 0.1, ..Wrong::NOTHING }),
-            ("one width in five missing", 0.25, Wrong { missing: 0.2, ..Wrong::NOTHING }),
+            ("b 50 % too large", 0.375, Mismatch::NONE),
+            ("b 50 % too small", 0.125, Mismatch::NONE),
+            ("one width in ten an outlier", 0.25, Mismatch { outliers: 0.1, ..Mismatch::NONE }),
+            ("one width in five missing", 0.25, Mismatch { missing: 0.2, ..Mismatch::NONE }),
             ("all of it, too long and too large", 0.375, all(1.2)),
             ("all of it, too long and too small", 0.125, all(1.2)),
             ("all of it, too short and too large", 0.375, all(0.8)),
             ("all of it, too short and too small", 0.125, all(0.8)),
         ];
         for (rates, name) in COLUMNS {
-            for (what, exponent, told) in cases {
-                let who = Contender::Distance(rates, exponent);
-                let found = wrong(&self.cell, &self.run, who, told, self.seeds)?;
+            for (what, exponent, mismatch) in cases {
+                let who = ControlSetup::Distance(rates, exponent);
+                let found = mismatched(&self.cell, &self.run, who, mismatch, self.seeds)?;
                 let case = format!("42 mm, {what}, {name}");
                 for (quantity, found) in [
                     ("RMS error of the bead once settled", found.median_mm),
@@ -164,7 +164,7 @@ impl Experiments {
     fn waves(&mut self) -> Result<Vec<(f64, [f64; 3])>, ReproduceError> {
         let mut curve = Vec::new();
         for wavelength in CURVE_MM {
-            let ratios = self.answer(Disturbance::Wave(wavelength))?;
+            let ratios = self.answer(FlowDisturbance::Wave(wavelength))?;
             curve.push((wavelength, ratios));
             if WAVES_MM.contains(&wavelength) {
                 self.push_ratios(&format!("flow sine of {wavelength} mm"), ratios);
@@ -180,7 +180,7 @@ impl Experiments {
     fn pulsations(&mut self) -> Result<Vec<(f64, [f64; 3])>, ReproduceError> {
         let mut curve = Vec::new();
         for period in PERIODS_S {
-            let ratios = self.answer(Disturbance::Pulsation(period))?;
+            let ratios = self.answer(FlowDisturbance::Pulsation(period))?;
             self.push_ratios(&format!("pulsation of {period} s"), ratios);
             curve.push((period, ratios));
         }
@@ -188,12 +188,12 @@ impl Experiments {
     }
 
     /// The paper's loop, and by distance at both rates.
-    fn answer(&self, what: Disturbance) -> Result<[f64; 3], ReproduceError> {
+    fn answer(&self, what: FlowDisturbance) -> Result<[f64; 3], ReproduceError> {
         let seeds = disturbed_seeds(self.seeds);
-        let by = |who| unrest(&self.cell, &self.run, who, what, seeds);
+        let by = |who| error_ratio(&self.cell, &self.run, who, what, seeds);
         let [(slow, _), (fast, _)] = COLUMNS;
-        let ours = [slow, fast].map(Contender::by_distance);
-        Ok([by(Contender::Paper)?, by(ours[0])?, by(ours[1])?])
+        let ours = [slow, fast].map(ControlSetup::by_distance);
+        Ok([by(ControlSetup::Paper)?, by(ours[0])?, by(ours[1])?])
     }
 
     fn push_ratios(&mut self, case: &str, [paper, slow, fast]: [f64; 3]) {

@@ -5,18 +5,18 @@ use maud::{Markup, html};
 use crate::report::chart::area::{Area, XAxis};
 use crate::report::chart::legend::legend;
 use crate::report::chart::palette;
-use crate::report::chart::plot::{Layer as Drawn, Plot, y_range};
-use crate::report::chart::series::Series;
+use crate::report::chart::plot::{Plot, PlotLayer as Drawn, y_range};
+use crate::report::chart::series::Curve;
 use crate::studies::barjuei2022::StandOff;
-use crate::trials::score::Score;
-use crate::width_control::limiter::Limits;
+use crate::trials::score::LayerScore;
+use crate::width_control::limiter::SpeedLimits;
 
 /// A layer by the paper's loop and by distance: widths and speeds over path.
-pub fn layer(limits: Limits, target: f64, theirs: &Score, ours: &Score) -> Markup {
+pub fn layer(limits: SpeedLimits, target: f64, theirs: &LayerScore, ours: &LayerScore) -> Markup {
     let [width, our_width] =
-        [theirs, ours].map(|score| score.widths.iter().copied().collect::<Series>());
+        [theirs, ours].map(|score| score.widths.iter().copied().collect::<Curve>());
     let [speed, our_speed] =
-        [theirs, ours].map(|score| score.speeds.iter().copied().collect::<Series>());
+        [theirs, ours].map(|score| score.speeds.iter().copied().collect::<Curve>());
     let Some(range) = speed.extent() else { return html! {} };
     let axis = XAxis::path(range);
     let name = format!("{target} mm");
@@ -64,7 +64,7 @@ pub fn layer(limits: Limits, target: f64, theirs: &Score, ours: &Score) -> Marku
 /// The stand-off curve with the single scale and with the full calibration.
 pub fn stand_off(curve: &[StandOff]) -> Markup {
     let pick = |value: fn(&StandOff) -> f64| {
-        curve.iter().map(|point| (point.nearer_mm, value(point))).collect::<Series>()
+        curve.iter().map(|point| (point.nearer_mm, value(point))).collect::<Curve>()
     };
     let (scale, full) = (pick(|p| p.scale_error_mm), pick(|p| p.full_error_mm));
     let Some(range) = scale.extent() else { return html! {} };
@@ -89,8 +89,7 @@ pub fn stand_off(curve: &[StandOff]) -> Markup {
 /// Error of the bead over that of one which nobody corrects, over the length of
 /// a wave or the period of a pulsation; 1 is no better than leaving it alone.
 pub fn ratios(title: &str, points: &[(f64, [f64; 3])]) -> Markup {
-    let of =
-        |which: usize| points.iter().map(|(x, ratios)| (*x, ratios[which])).collect::<Series>();
+    let of = |which: usize| points.iter().map(|(x, ratios)| (*x, ratios[which])).collect::<Curve>();
     let [paper, slow, fast] = [of(0), of(1), of(2)];
     let Some(range) = paper.extent() else { return html! {} };
     let axis = XAxis { title: title.to_owned(), range, divisor: 1.0 };
@@ -101,7 +100,7 @@ pub fn ratios(title: &str, points: &[(f64, [f64; 3])]) -> Markup {
         y_range: y_range(&[&paper, &slow, &fast], &[0.0, 1.0]),
         layers: vec![
             Drawn::Curve(&paper, palette::PAPER),
-            Drawn::Wish(&slow, palette::OURS),
+            Drawn::Demand(&slow, palette::OURS),
             Drawn::Curve(&fast, palette::OURS),
             Drawn::Level(1.0, palette::TARGET, "no control"),
         ],

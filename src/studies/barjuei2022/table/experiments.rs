@@ -2,7 +2,7 @@
 
 use crate::cell::Cell;
 use crate::cell::file::RunPart;
-use crate::studies::row::Rows;
+use crate::studies::row::TableRows;
 
 /// The experiments' cell, how often they are run and what came out.
 pub(super) struct Experiments {
@@ -10,5 +10,5 @@ pub(super) struct Experiments {
     pub(super) run: RunPart,
     pub(super) seeds: u64,
     pub(super) frame_seeds: u64,
-    pub(super) rows: Rows,
+    pub(super) rows: TableRows,
 }

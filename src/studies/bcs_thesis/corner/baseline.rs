@@ -1,13 +1,13 @@
 //! What is usual: an extruder that is driven constantly, or in proportion to the robot's
 //! speed.
 
-use super::plant::{Laid, Run};
+use super::plant::{CornerRun, WidthProfile};
 use super::scenario::{BEAD, CornerError, Scenario};
 use crate::plan::SpeedProfile;
 
 /// How the voltage is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Drive {
+pub enum DriveMode {
     /// It stays.
     Constant,
     /// In proportion to the robot's speed at that moment.
@@ -18,7 +18,7 @@ pub enum Drive {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Baseline {
     /// Its voltage.
-    pub drive: Drive,
+    pub drive: DriveMode,
     /// Whether the robot goes as planned, and not at its nominal speed.
     pub planned_speed: bool,
 }
@@ -26,14 +26,18 @@ pub struct Baseline {
 impl Baseline {
     /// Each voltage with its own and with the planned speed.
     pub const ALL: [Self; 4] = [
-        Self { drive: Drive::Constant, planned_speed: false },
-        Self { drive: Drive::Constant, planned_speed: true },
-        Self { drive: Drive::Proportional, planned_speed: false },
-        Self { drive: Drive::Proportional, planned_speed: true },
+        Self { drive: DriveMode::Constant, planned_speed: false },
+        Self { drive: DriveMode::Constant, planned_speed: true },
+        Self { drive: DriveMode::Proportional, planned_speed: false },
+        Self { drive: DriveMode::Proportional, planned_speed: true },
     ];
 
     /// A run at the level of the voltage that holds the width on a straight.
-    pub fn run(self, scenario: &Scenario, planned: &SpeedProfile) -> Result<Run, CornerError> {
+    pub fn run(
+        self,
+        scenario: &Scenario,
+        planned: &SpeedProfile,
+    ) -> Result<CornerRun, CornerError> {
         let nominal = scenario.nominal()?;
         let speed = if self.planned_speed { planned } else { &nominal };
         self.at_level(scenario, speed, 1.0)
@@ -45,7 +49,7 @@ impl Baseline {
         self,
         scenario: &Scenario,
         planned: &SpeedProfile,
-    ) -> Result<Run, CornerError> {
+    ) -> Result<CornerRun, CornerError> {
         let nominal = scenario.nominal()?;
         let speed = if self.planned_speed { planned } else { &nominal };
         let level = best_level(&self.at_level(scenario, speed, 1.0)?.quiet());
@@ -57,19 +61,21 @@ impl Baseline {
         scenario: &Scenario,
         speed: &SpeedProfile,
         level: f64,
-    ) -> Result<Run, CornerError> {
+    ) -> Result<CornerRun, CornerError> {
         let volts = level * BEAD.area_mm2 / Scenario::extruder()?.dc_gain();
         match self.drive {
-            Drive::Constant => Run::new(scenario, speed, |_| volts * scenario.speed_mm_per_s),
-            Drive::Proportional => {
-                Run::new(scenario, speed, |now| volts * speed.speed_at(speed.path_at(now)))
+            DriveMode::Constant => {
+                CornerRun::new(scenario, speed, |_| volts * scenario.speed_mm_per_s)
+            }
+            DriveMode::Proportional => {
+                CornerRun::new(scenario, speed, |now| volts * speed.speed_at(speed.path_at(now)))
             }
         }
     }
 }
 
 /// Least squares of level·(1 + error) − 1.
-fn best_level(laid: &Laid) -> f64 {
+fn best_level(laid: &WidthProfile) -> f64 {
     let (mut first, mut second) = (0.0, 0.0);
     for (_, error) in laid.along() {
         first += 1.0 + error;

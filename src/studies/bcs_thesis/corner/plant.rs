@@ -10,10 +10,10 @@ use crate::studies::bcs_thesis::{drive, flow};
 /// Step of the plant \[s\].
 const STEP_S: f64 = 0.001;
 /// Distance of the places that are judged \[mm\], and how many there are on either side.
-const EVERY_MM: f64 = 0.5;
-const PLACES: i32 = 200;
+const POSITION_SPACING_MM: f64 = 0.5;
+const POSITIONS_PER_SIDE: i32 = 200;
 /// A flow that differs by less than this share from that before the corner is not changed.
-const CHANGED: f64 = 0.01;
+const MIN_FLOW_CHANGE: f64 = 0.01;
 
 /// Root mean square of the error of the width, as a share of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +26,7 @@ pub struct Errors {
 
 /// A run as the model has it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Run {
+pub struct CornerRun {
     speed: SpeedProfile,
     /// Every millisecond \[mm³/s\].
     flow: Vec<f64>,
@@ -34,11 +34,11 @@ pub struct Run {
 
 /// By which share the width is off along the path.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Laid {
+pub struct WidthProfile {
     errors: Vec<f64>,
 }
 
-impl Laid {
+impl WidthProfile {
     /// Root mean square within ±100 mm of the corner.
     pub fn rms(&self) -> f64 {
         mean_square(&self.errors).sqrt()
@@ -46,7 +46,7 @@ impl Laid {
 
     /// At the judged place nearest to one \[mm\].
     pub fn at(&self, path_mm: f64) -> f64 {
-        let nearest = places()
+        let nearest = positions()
             .zip(&self.errors)
             .min_by(|a, b| (a.0 - path_mm).abs().total_cmp(&(b.0 - path_mm).abs()));
         nearest.map_or(0.0, |(_, error)| *error)
@@ -54,11 +54,11 @@ impl Laid {
 
     /// Places \[mm\] and errors.
     pub fn along(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        places().zip(self.errors.iter().copied())
+        positions().zip(self.errors.iter().copied())
     }
 }
 
-impl Run {
+impl CornerRun {
     /// Of a speed and a voltage over time, which is held from one command to the next and
     /// kept within the drive's limits. The extruder has settled at the first voltage.
     pub fn new(
@@ -89,7 +89,7 @@ impl Run {
 
     /// Place \[mm\], speed \[mm/s\] and flow \[mm³/s\], every millisecond within ±100 mm of the
     /// corner.
-    pub fn course(&self) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
+    pub fn trajectory(&self) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
         let all = moments(self.speed.duration_s()).zip(&self.flow).map(|(now, flow)| {
             let path_mm = self.speed.path_at(now);
             (path_mm, self.speed.speed_at(path_mm), *flow)
@@ -98,12 +98,12 @@ impl Run {
     }
 
     /// What is laid as the model has it.
-    pub fn quiet(&self) -> Laid {
+    pub fn quiet(&self) -> WidthProfile {
         self.quiet_over(BEAD.nozzle_mm)
     }
 
     /// The same as the mean over another length than the nozzle's \[mm\].
-    pub fn quiet_over(&self, length_mm: f64) -> Laid {
+    pub fn quiet_over(&self, length_mm: f64) -> WidthProfile {
         self.laid(&self.flow, length_mm)
     }
 
@@ -117,8 +117,8 @@ impl Run {
 
     /// What is laid with flow that no model tells, which hangs together over its
     /// correlation time.
-    pub fn noisy(&self, seed: u64) -> Laid {
-        let sigma = UNMODELLED.share * self.change();
+    pub fn noisy(&self, seed: u64) -> WidthProfile {
+        let sigma = UNMODELLED.ratio * self.change();
         let kept = libm::exp(-STEP_S / UNMODELLED.correlation_s);
         let fresh = (1.0 - kept * kept).sqrt();
         let mut noise = normal_pair(mix(&[seed, 3, 0]))[0];
@@ -132,10 +132,12 @@ impl Run {
 
     /// Root mean square that the noise alone is expected to leave.
     pub fn floor(&self) -> f64 {
-        let sigma = UNMODELLED.share * self.change();
+        let sigma = UNMODELLED.ratio * self.change();
         let (full, half) = (BEAD.area_mm2 * BEAD.nozzle_mm, 0.5 * BEAD.nozzle_mm);
-        let spread: Vec<f64> = places()
-            .map(|at| UNMODELLED.spread(self.time(at + half) - self.time(at - half)).sqrt())
+        let spread: Vec<f64> = positions()
+            .map(|at| {
+                UNMODELLED.volume_variance(self.time(at + half) - self.time(at - half)).sqrt()
+            })
             .collect();
         sigma / full * mean_square(&spread).sqrt()
     }
@@ -145,8 +147,8 @@ impl Run {
     /// flow to the last; the larger of the two.
     pub fn change(&self) -> f64 {
         let first = self.flow.first().copied().unwrap_or(0.0);
-        let changed = |flow: &f64| (flow - first).abs() > CHANGED * first;
-        let judged = [-JUDGED_MM, JUDGED_MM].map(|at| whole(self.speed.time_at(at) / STEP_S));
+        let changed = |flow: &f64| (flow - first).abs() > MIN_FLOW_CHANGE * first;
+        let judged = [-JUDGED_MM, JUDGED_MM].map(|at| floor_index(self.speed.time_at(at) / STEP_S));
         let from = self.flow.iter().position(changed).unwrap_or(judged[0]).min(judged[0]);
         let to = self.flow.iter().rposition(changed).unwrap_or(judged[1]).max(judged[1]);
         deviation(&self.flow, from, to).max(deviation(&self.flow, judged[0], judged[1]))
@@ -157,7 +159,7 @@ impl Run {
         self.speed.time_at(path_mm)
     }
 
-    fn laid(&self, flow: &[f64], length_mm: f64) -> Laid {
+    fn laid(&self, flow: &[f64], length_mm: f64) -> WidthProfile {
         let mut sum = 0.0;
         let pairs = flow.iter().zip(flow.iter().skip(1));
         let volume: Vec<f64> = std::iter::once(0.0)
@@ -168,7 +170,7 @@ impl Run {
             .collect();
         let (full, half) = (BEAD.area_mm2 * length_mm, 0.5 * length_mm);
         let at = |time_s: f64| {
-            let step = whole(time_s / STEP_S).min(volume.len().saturating_sub(2));
+            let step = floor_index(time_s / STEP_S).min(volume.len().saturating_sub(2));
             let first = volume.get(step).copied().unwrap_or(0.0);
             let next = volume.get(step + 1).copied().unwrap_or(first);
             #[expect(clippy::cast_precision_loss, reason = "a few seconds of milliseconds")]
@@ -176,14 +178,14 @@ impl Run {
             first + share * (next - first)
         };
         let errors =
-            places().map(|s| (at(self.time(s + half)) - at(self.time(s - half))) / full - 1.0);
-        Laid { errors: errors.collect() }
+            positions().map(|s| (at(self.time(s + half)) - at(self.time(s - half))) / full - 1.0);
+        WidthProfile { errors: errors.collect() }
     }
 }
 
 /// Places that are judged \[mm\].
-fn places() -> impl Iterator<Item = f64> {
-    (-PLACES..=PLACES).map(|k| EVERY_MM * f64::from(k))
+fn positions() -> impl Iterator<Item = f64> {
+    (-POSITIONS_PER_SIDE..=POSITIONS_PER_SIDE).map(|k| POSITION_SPACING_MM * f64::from(k))
 }
 
 /// Milliseconds from 0 s on \[s\].
@@ -200,6 +202,6 @@ fn deviation(flow: &[f64], from: usize, to: usize) -> f64 {
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a short time")]
-fn whole(steps: f64) -> usize {
+fn floor_index(steps: f64) -> usize {
     steps.max(0.0) as usize
 }

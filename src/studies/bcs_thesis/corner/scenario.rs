@@ -3,8 +3,8 @@
 use crate::extruder::limits::{CommandLimits, LimitError};
 use crate::numeric::lti::{ModelError, TransferFunction};
 use crate::plan::{
-    Bead, Limits, PathLimits, Plan, PlanError, ProfileError, RobotLimits, SpeedProfile, Task,
-    Unmodelled, solve, time_optimal,
+    BeadGeometry, FlowUncertainty, PathLimits, Plan, PlanError, PlanLimits, PlanTask,
+    RobotMotionLimits, SpeedProfile, SpeedProfileError, solve, time_optimal,
 };
 use crate::studies::bcs_thesis::{drive, flow};
 
@@ -15,10 +15,10 @@ const AFTER_MM: f64 = 400.0;
 pub const JUDGED_MM: f64 = 100.0;
 /// Share of the change's standard deviation that no model tells, and how long it hangs
 /// together \[s\].
-pub const UNMODELLED: Unmodelled = Unmodelled { share: 0.17, correlation_s: 0.15 };
+pub const UNMODELLED: FlowUncertainty = FlowUncertainty { ratio: 0.17, correlation_s: 0.15 };
 /// The bead. Its length is given; a plan that counted on it to the last percent would be of
 /// little use for any other.
-pub const BEAD: Bead = Bead { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_doubt: 0.07 };
+pub const BEAD: BeadGeometry = BeadGeometry { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_sigma: 0.07 };
 
 /// The corner and what may be done about it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,7 +58,7 @@ impl Default for Scenario {
 pub enum CornerError {
     /// The robot's speed.
     #[error("the corner's speed: {0}")]
-    Profile(#[from] ProfileError),
+    Profile(#[from] SpeedProfileError),
     /// The plant.
     #[error("the corner's extruder: {0}")]
     Model(#[from] ModelError),
@@ -72,10 +72,10 @@ pub enum CornerError {
 
 impl Scenario {
     /// The quickest speed that the path and the acceleration allow.
-    pub fn nominal(&self) -> Result<SpeedProfile, ProfileError> {
+    pub fn nominal(&self) -> Result<SpeedProfile, SpeedProfileError> {
         let mut limits = PathLimits::new(-BEFORE_MM, self.speed_mm_per_s);
-        limits.to(0.0, self.speed_mm_per_s, self.apex_mm_per_s);
-        limits.to(AFTER_MM, self.speed_mm_per_s, self.speed_mm_per_s);
+        limits.extend_to(0.0, self.speed_mm_per_s, self.apex_mm_per_s);
+        limits.extend_to(AFTER_MM, self.speed_mm_per_s, self.speed_mm_per_s);
         time_optimal(&limits, self.accel_mm_per_s2)
     }
 
@@ -90,14 +90,14 @@ impl Scenario {
     }
 
     /// A plan within a time that may be added \[s\].
-    pub fn plan(&self, budget_s: f64, unmodelled: Unmodelled) -> Result<Plan, CornerError> {
-        let robot = RobotLimits {
+    pub fn plan(&self, budget_s: f64, unmodelled: FlowUncertainty) -> Result<Plan, CornerError> {
+        let robot = RobotMotionLimits {
             accel_mm_per_s2: self.accel_mm_per_s2,
             slowest_mm_per_s: self.apex_mm_per_s,
         };
-        let limits = Limits { robot, drive: self.drive()?, budget_s };
+        let limits = PlanLimits { robot, drive: self.drive()?, budget_s };
         let extruder = Self::extruder()?;
-        let task = Task { limits, bead: BEAD, unmodelled, extruder: &extruder };
+        let task = PlanTask { limits, bead: BEAD, unmodelled, extruder: &extruder };
         Ok(solve(&task, &self.nominal()?)?)
     }
 }

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::Control;
-use super::course::Course;
-use super::wheel::Run;
+use super::WheelControl;
+use super::course::ExtruderRun;
+use super::wheel::WheelRun;
 use crate::extruder::feedforward::FeedforwardError;
 use crate::numeric::average::mean;
 
@@ -14,7 +14,7 @@ pub struct Compared {
     /// Root mean square of the section, off over on.
     pub ratio: f64,
     /// The same of the seed with the smallest.
-    pub least_ratio: f64,
+    pub min_ratio: f64,
     /// Root mean square of the section about its own mean, off and on \[mm²\].
     pub area_rmse_mm2: [f64; 2],
     /// Its mean size \[mm²\].
@@ -24,24 +24,28 @@ pub struct Compared {
     /// \[mm\].
     pub width_mae_mm: [f64; 2],
     /// The first seed, off and on.
-    pub example: [Run; 2],
+    pub example: [WheelRun; 2],
 }
 
 /// Runs every seed off and with a control. At least one seed.
-pub fn compare(seeds: u64, share: f64, control: Control) -> Result<Compared, FeedforwardError> {
-    let runs: Result<Vec<[Run; 2]>, FeedforwardError> = (1..=seeds.max(1))
+pub fn compare(
+    seeds: u64,
+    share: f64,
+    control: WheelControl,
+) -> Result<Compared, FeedforwardError> {
+    let runs: Result<Vec<[WheelRun; 2]>, FeedforwardError> = (1..=seeds.max(1))
         .into_par_iter()
         .map(|seed| {
-            let course = Course::new(seed, share)?;
-            Ok([course.run(Control::Off)?, course.run(control)?])
+            let course = ExtruderRun::new(seed, share)?;
+            Ok([course.run(WheelControl::Off)?, course.run(control)?])
         })
         .collect();
     let runs = runs?;
-    let ratio = |[off, on]: &[Run; 2]| off.area_rmse_mm2 / on.area_rmse_mm2;
-    let both = |of: fn(&Run) -> f64| [0, 1].map(|i| mean(runs.iter().map(|run| of(&run[i]))));
+    let ratio = |[off, on]: &[WheelRun; 2]| off.area_rmse_mm2 / on.area_rmse_mm2;
+    let both = |of: fn(&WheelRun) -> f64| [0, 1].map(|i| mean(runs.iter().map(|run| of(&run[i]))));
     Ok(Compared {
         ratio: mean(runs.iter().map(ratio)),
-        least_ratio: runs.iter().map(ratio).fold(f64::INFINITY, f64::min),
+        min_ratio: runs.iter().map(ratio).fold(f64::INFINITY, f64::min),
         area_rmse_mm2: both(|run| run.area_rmse_mm2),
         area_mae_mm2: both(|run| run.area_mae_mm2),
         width_rmse_mm: both(|run| run.width_rmse_mm),

@@ -22,11 +22,11 @@ pub const MM_PER_S_PER_RPM: f64 = std::f64::consts::PI * 254.762 / 60.0;
 pub const CORRELATION_S: f64 = 0.15;
 /// Share of the flow's standard deviation that the thesis' model leaves:
 /// NRMSE 83 %.
-pub const UNMODELLED_SHARE: f64 = 0.17;
+pub const UNMODELLED_FRACTION: f64 = 0.17;
 
 /// What happens to the extruder in a run, whatever the wheel does.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course {
+pub struct ExtruderRun {
     pub(super) seed: u64,
     /// Drive voltage \[V\] at every step.
     pub(super) voltage: Vec<f64>,
@@ -38,7 +38,7 @@ pub struct Course {
     pub(super) unmodelled: f64,
 }
 
-impl Course {
+impl ExtruderRun {
     /// Of a seed and of the share of the flow's standard deviation that is not
     /// modelled.
     pub fn new(seed: u64, unmodelled_share: f64) -> Result<Self, FeedforwardError> {

@@ -1,9 +1,9 @@
 //! The wheel, what is laid on it and what sensors see of that.
 
-use super::course::{AREA_MM2, Course, JUDGED_FROM_S, MM_PER_S_PER_RPM, STEP_S, at, to_steps};
+use super::course::{AREA_MM2, ExtruderRun, JUDGED_FROM_S, MM_PER_S_PER_RPM, STEP_S, at, to_steps};
 use crate::core::units::Mm3PerS;
 use crate::extruder::feedforward::FeedforwardError;
-use crate::extruder::feedforward::FlowSeen;
+use crate::extruder::feedforward::FlowMeasurement;
 use crate::numeric::average::mean;
 use crate::numeric::lti::{Between, Simulator};
 use crate::sim::hash::{mix, normal_pair};
@@ -17,7 +17,7 @@ const HEIGHT_MM: f64 = 3.654;
 const PRESSURE_MPA: f64 = 0.6;
 const PRESSURE_VARIANCE_MPA2: f64 = 4.98e-5;
 const CAMERA_SIGMA_MM2: f64 = 0.2;
-const CAMERA_LATE_STEPS: usize = 20;
+const CAMERA_DELAY_STEPS: usize = 20;
 
 /// What is measured at 50 Hz. The plant's own noise is known to the observer
 /// by its size and its correlation time, as an identified model tells them.
@@ -35,7 +35,7 @@ pub struct Sensors {
 
 /// What came of a run, over the time that is judged.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Run {
+pub struct WheelRun {
     /// Root mean square of the section about its own mean \[mm²\].
     pub area_rmse_mm2: f64,
     /// Mean size of the same \[mm²\].
@@ -66,7 +66,7 @@ pub(super) struct Wheel {
 }
 
 impl Wheel {
-    pub(super) fn new(course: &Course) -> Result<Self, FeedforwardError> {
+    pub(super) fn new(course: &ExtruderRun) -> Result<Self, FeedforwardError> {
         let model = motor()?;
         let mut motor = Simulator::new(&model, STEP_S, Between::Held)?;
         motor.settle(course.mean_flow / AREA_MM2 / MM_PER_S_PER_RPM / model.dc_gain())?;
@@ -74,7 +74,7 @@ impl Wheel {
         Ok(Self { motor, speeds: list(), path: list(), areas: list() })
     }
 
-    pub(super) fn step(&mut self, course: &Course, command: f64) {
+    pub(super) fn step(&mut self, course: &ExtruderRun, command: f64) {
         let speed = self.motor.step(command) * MM_PER_S_PER_RPM;
         let flow = course.flow.get(self.areas.len()).copied().unwrap_or(0.0);
         let before = self.path.last().copied().unwrap_or(0.0);
@@ -85,20 +85,20 @@ impl Wheel {
 
     /// What the sensors tell before this step: of the pressure now, of the
     /// section as it was under the camera when the picture was taken.
-    pub(super) fn seen(
+    pub(super) fn sensor_readings(
         &self,
-        course: &Course,
+        course: &ExtruderRun,
         step: u64,
         sensors: &Sensors,
-    ) -> [Option<FlowSeen>; 2] {
+    ) -> [Option<FlowMeasurement>; 2] {
         let [first, second] = normal_pair(mix(&[course.seed, 3, step]));
         let camera = sensors.camera_mm.and_then(|behind| self.section(step, behind, first));
         let pressure = sensors.pressure.then(|| pressure(course, step, sensors.exponent, second));
         [camera, pressure.flatten()]
     }
 
-    fn section(&self, step: u64, behind_mm: f64, noise: f64) -> Option<FlowSeen> {
-        let taken = usize::try_from(step).ok()?.checked_sub(CAMERA_LATE_STEPS)?;
+    fn section(&self, step: u64, behind_mm: f64, noise: f64) -> Option<FlowMeasurement> {
+        let taken = usize::try_from(step).ok()?.checked_sub(CAMERA_DELAY_STEPS)?;
         let from = *self.path.get(taken)? - behind_mm;
         let laid = self.path.partition_point(|path| *path < from);
         let (area, speed) = (self.areas.get(laid)?, self.speeds.get(laid)?);
@@ -106,23 +106,23 @@ impl Wheel {
         if from < 0.0 {
             return None;
         }
-        Some(FlowSeen {
+        Some(FlowMeasurement {
             at: at(laid as u64),
             flow: Mm3PerS::new((area + CAMERA_SIGMA_MM2 * noise) * speed).ok()?,
             sigma: Mm3PerS::new(CAMERA_SIGMA_MM2 * speed).ok()?,
         })
     }
 
-    pub(super) fn judge(&self, course: &Course) -> Run {
+    pub(super) fn judge(&self, course: &ExtruderRun) -> WheelRun {
         let from = to_steps(JUDGED_FROM_S);
         let areas = self.areas.get(from..).unwrap_or_default();
         let widths: Vec<f64> = areas.iter().map(|area| width_mm(*area)).collect();
-        let (area_rmse_mm2, area_mae_mm2) = scatter(areas);
-        let (width_rmse_mm, width_mae_mm) = scatter(&widths);
+        let (area_rmse_mm2, area_mae_mm2) = rms_and_mae(areas);
+        let (width_rmse_mm, width_mae_mm) = rms_and_mae(&widths);
         let thin = |row: &[f64]| -> Vec<(f64, f64)> {
             (0_u32..).zip(row).step_by(20).map(|(i, y)| (f64::from(i) * STEP_S, *y)).collect()
         };
-        Run {
+        WheelRun {
             area_rmse_mm2,
             area_mae_mm2,
             area_mean_mm2: mean(areas.iter().copied()),
@@ -137,13 +137,13 @@ impl Wheel {
 }
 
 /// The flow that the controller reads from the pressure now.
-fn pressure(course: &Course, step: u64, exponent: f64, noise: f64) -> Option<FlowSeen> {
+fn pressure(course: &ExtruderRun, step: u64, exponent: f64, noise: f64) -> Option<FlowMeasurement> {
     let flow = course.flow.get(usize::try_from(step).ok()?)?;
     let truth = PRESSURE_MPA * libm::pow(flow / course.mean_flow, 1.0 / EXPONENT);
     let sigma = PRESSURE_VARIANCE_MPA2.sqrt();
     let seen = (truth + sigma * noise).max(0.0) / PRESSURE_MPA;
     let slope = course.mean_flow * exponent / PRESSURE_MPA;
-    Some(FlowSeen {
+    Some(FlowMeasurement {
         at: at(step),
         flow: Mm3PerS::new(course.mean_flow * libm::pow(seen, exponent)).ok()?,
         sigma: Mm3PerS::new(slope * sigma).ok()?,
@@ -156,7 +156,7 @@ fn width_mm(area_mm2: f64) -> f64 {
 }
 
 /// Root mean square and mean size about the mean.
-fn scatter(values: &[f64]) -> (f64, f64) {
+fn rms_and_mae(values: &[f64]) -> (f64, f64) {
     let middle = mean(values.iter().copied());
     let square = mean(values.iter().map(|value| (value - middle).powi(2)));
     (square.sqrt(), mean(values.iter().map(|value| (value - middle).abs())))

@@ -2,11 +2,11 @@
 //! or came where none was wanted.
 
 use crate::core::time::Span;
-use crate::extruder::start_stop::{Laid, Pause, Timing};
-use crate::sim::melt::{Machine, Melt};
+use crate::extruder::start_stop::{BeadConditions, Pause, StartStopTiming};
+use crate::sim::melt::{Melt, MeltParameters};
 
 /// How starts and stops are timed.
-pub trait Strategy {
+pub trait StartStopStrategy {
     /// A start after a pause: from the command to run until the robot goes
     /// \[s\], and the speed of a robot that goes, so long after that command,
     /// as a share of its start speed.
@@ -17,28 +17,28 @@ pub trait Strategy {
     fn ends(&self) -> (f64, impl Fn(Span) -> f64);
 }
 
-impl Strategy for Timing {
+impl StartStopStrategy for StartStopTiming {
     fn begins(&self, pause: &Pause) -> (f64, impl Fn(Span) -> f64) {
         let start = self.start(pause);
-        (start.robot().secs(), move |since| start.robot_share(since))
+        (start.robot_start().secs(), move |since| start.speed_ratio(since))
     }
 
     fn ends(&self) -> (f64, impl Fn(Span) -> f64) {
         let stop = self.stop();
-        (stop.way().get(), move |since| stop.robot_share(since))
+        (stop.distance().get(), move |since| stop.speed_ratio(since))
     }
 }
 
 /// What is missing on the path and what came where none was wanted \[mm³\].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Score {
+pub struct StartStopScore {
     /// Less than the path needed, while the robot travelled it.
     pub void_mm3: f64,
     /// More than the path needed, and all that came while the robot stood.
     pub drool_mm3: f64,
 }
 
-impl Score {
+impl StartStopScore {
     /// Both together \[mm³\].
     pub fn sum_mm3(&self) -> f64 {
         self.void_mm3 + self.drool_mm3
@@ -56,9 +56,9 @@ impl Score {
 
 /// A robot and the beads that it lays.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bench {
+pub struct StartStopBench {
     /// Flow and speed; the share is that of a strategy.
-    pub laid: Laid,
+    pub laid: BeadConditions,
     /// Length of a bead \[mm\].
     pub bead_mm: f64,
     /// Time constant with which the robot follows the speed that it is told
@@ -68,7 +68,7 @@ pub struct Bench {
 
 /// A moment of a start or a stop that is watched.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moment {
+pub struct FlowSample {
     /// Since the pump was told \[s\].
     pub since_s: f64,
     /// What comes out of the nozzle \[mm³/s\].
@@ -79,49 +79,49 @@ pub struct Moment {
 
 /// A stop and the start after it, from when the pump was told.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Watched {
+pub struct StartStopTrace {
     /// The stop.
-    pub stop: Vec<Moment>,
+    pub stop: Vec<FlowSample>,
     /// The start.
-    pub start: Vec<Moment>,
+    pub start: Vec<FlowSample>,
 }
 
 /// Pauses that starts are judged after \[s\].
-pub const IDLE_S: [f64; 7] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0];
+pub const PAUSES_S: [f64; 7] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0];
 /// A stop or a start is watched for so long \[s\].
-pub const WATCHED_S: f64 = 4.0;
+pub const TRACE_S: f64 = 4.0;
 
 /// Where a pause and the beads beside it have come to.
-struct Run<'a, S> {
-    bench: &'a Bench,
+struct BenchRun<'a, S> {
+    bench: &'a StartStopBench,
     strategy: &'a S,
     melt: Melt,
-    speed_share: f64,
-    score: Score,
+    speed_fraction: f64,
+    score: StartStopScore,
     /// What the pump was told last, and when.
-    told: Told,
-    watched: Watched,
+    last_command: LastCommand,
+    trace: StartStopTrace,
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Told {
+enum LastCommand {
     Stop { at_s: f64 },
     Run { at_s: f64 },
 }
 
-impl Bench {
+impl StartStopBench {
     /// The end of a bead, a pause from the moment when the robot was at its end,
     /// and the bead after it; a score for each pause \[s\] in its order.
-    pub fn lay<S: Strategy>(
+    pub fn lay<S: StartStopStrategy>(
         &self,
-        machine: Machine,
+        machine: MeltParameters,
         seed: u64,
         strategy: &S,
         idle_s: &[f64],
-    ) -> Vec<Score> {
+    ) -> Vec<StartStopScore> {
         let mut run = self.run(machine, seed, strategy);
         let one = |idle_s: &f64| {
-            run.score = Score::default();
+            run.score = StartStopScore::default();
             run.pause(*idle_s);
             run.score
         };
@@ -129,35 +129,40 @@ impl Bench {
     }
 
     /// The end of a bead, a pause \[s\] and the start after it, to be looked at.
-    pub fn watch<S: Strategy>(
+    pub fn watch<S: StartStopStrategy>(
         &self,
-        machine: Machine,
+        machine: MeltParameters,
         seed: u64,
         strategy: &S,
         idle_s: f64,
-    ) -> Watched {
+    ) -> StartStopTrace {
         let mut run = self.run(machine, seed, strategy);
         run.pause(idle_s);
-        run.watched
+        run.trace
     }
 
-    fn run<'a, S>(&'a self, machine: Machine, seed: u64, strategy: &'a S) -> Run<'a, S> {
-        Run {
+    fn run<'a, S>(
+        &'a self,
+        machine: MeltParameters,
+        seed: u64,
+        strategy: &'a S,
+    ) -> BenchRun<'a, S> {
+        BenchRun {
             bench: self,
             strategy,
-            melt: Melt::flowing(machine, seed),
-            speed_share: 1.0,
-            score: Score::default(),
-            told: Told::Run { at_s: f64::NEG_INFINITY },
-            watched: Watched::default(),
+            melt: Melt::steady(machine, seed),
+            speed_fraction: 1.0,
+            score: StartStopScore::default(),
+            last_command: LastCommand::Run { at_s: f64::NEG_INFINITY },
+            trace: StartStopTrace::default(),
         }
     }
 }
 
-impl<S: Strategy> Run<'_, S> {
+impl<S: StartStopStrategy> BenchRun<'_, S> {
     /// The end of a bead, a pause from then on, and the bead after it.
     fn pause(&mut self, idle_s: f64) {
-        self.watched = Watched::default();
+        self.trace = StartStopTrace::default();
         let stopped_s = self.finish();
         self.stand_until(self.melt.now_s() + idle_s);
         self.begin(stopped_s);
@@ -165,29 +170,29 @@ impl<S: Strategy> Run<'_, S> {
 
     /// Goes on by one step with the robot told a share of its speed; returns the
     /// way that it made \[mm\].
-    fn step(&mut self, told_share: f64) -> f64 {
+    fn step(&mut self, commanded_fraction: f64) -> f64 {
         let (dt_s, came_mm3) = self.melt.advance();
         let kept = libm::exp(-dt_s / self.bench.robot_s);
-        self.speed_share = if told_share > 0.0 {
-            told_share + (self.speed_share - told_share) * kept
+        self.speed_fraction = if commanded_fraction > 0.0 {
+            commanded_fraction + (self.speed_fraction - commanded_fraction) * kept
         } else {
             0.0
         };
-        let wanted_mm3 = self.bench.laid.flow.get() * self.speed_share * dt_s;
+        let wanted_mm3 = self.bench.laid.flow.get() * self.speed_fraction * dt_s;
         self.score.void_mm3 += (wanted_mm3 - came_mm3).max(0.0);
         self.score.drool_mm3 += (came_mm3 - wanted_mm3).max(0.0);
         self.note(came_mm3 / dt_s, wanted_mm3 / dt_s);
-        self.bench.laid.speed.get() * self.speed_share * dt_s
+        self.bench.laid.speed.get() * self.speed_fraction * dt_s
     }
 
     fn note(&mut self, flow_mm3_per_s: f64, wanted_mm3_per_s: f64) {
-        let (at_s, kept) = match self.told {
-            Told::Stop { at_s } => (at_s, &mut self.watched.stop),
-            Told::Run { at_s } => (at_s, &mut self.watched.start),
+        let (at_s, kept) = match self.last_command {
+            LastCommand::Stop { at_s } => (at_s, &mut self.trace.stop),
+            LastCommand::Run { at_s } => (at_s, &mut self.trace.start),
         };
         let since_s = self.melt.now_s() - at_s;
-        if since_s <= WATCHED_S {
-            kept.push(Moment { since_s, flow_mm3_per_s, wanted_mm3_per_s });
+        if since_s <= TRACE_S {
+            kept.push(FlowSample { since_s, flow_mm3_per_s, wanted_mm3_per_s });
         }
     }
 
@@ -196,11 +201,11 @@ impl<S: Strategy> Run<'_, S> {
     fn finish(&mut self) -> f64 {
         let stopped_s = self.melt.now_s();
         self.melt.command(0.0);
-        self.told = Told::Stop { at_s: stopped_s };
-        let (mut rest_mm, share) = self.strategy.ends();
+        self.last_command = LastCommand::Stop { at_s: stopped_s };
+        let (mut rest_mm, fraction) = self.strategy.ends();
         while rest_mm > 0.0 {
             let since = Span::from_secs(self.melt.now_s() - stopped_s);
-            rest_mm -= self.step(share(since));
+            rest_mm -= self.step(fraction(since));
         }
         stopped_s
     }
@@ -213,18 +218,18 @@ impl<S: Strategy> Run<'_, S> {
 
     /// Starts a bead and lays it up to where its end begins.
     fn begin(&mut self, stopped_s: f64) {
-        let told_s = self.melt.now_s();
+        let commanded_s = self.melt.now_s();
         let flow = self.bench.laid.flow;
-        let pause = Pause { idle: Span::from_secs(told_s - stopped_s), before: flow };
+        let pause = Pause { idle: Span::from_secs(commanded_s - stopped_s), flow_before: flow };
         self.melt.command(flow.get());
-        self.told = Told::Run { at_s: told_s };
-        let (waits_s, share) = self.strategy.begins(&pause);
-        self.stand_until(told_s + waits_s);
+        self.last_command = LastCommand::Run { at_s: commanded_s };
+        let (wait_s, fraction) = self.strategy.begins(&pause);
+        self.stand_until(commanded_s + wait_s);
         let (end_mm, _) = self.strategy.ends();
         let mut rest_mm = self.bench.bead_mm - end_mm;
         while rest_mm > 0.0 {
-            let since = Span::from_secs(self.melt.now_s() - told_s);
-            rest_mm -= self.step(share(since));
+            let since = Span::from_secs(self.melt.now_s() - commanded_s);
+            rest_mm -= self.step(fraction(since));
         }
     }
 }

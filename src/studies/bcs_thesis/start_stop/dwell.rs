@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::bench::{Bench, Score, Strategy};
+use super::bench::{StartStopBench, StartStopScore, StartStopStrategy};
 use crate::core::time::Span;
 use crate::extruder::start_stop::Pause;
-use crate::sim::melt::Machine;
+use crate::sim::melt::MeltParameters;
 
 /// The same times at every start and every stop. bcs-thesis, section 1.3.4.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,7 +18,7 @@ pub struct Dwell {
     pub speed_mm_per_s: f64,
 }
 
-impl Strategy for Dwell {
+impl StartStopStrategy for Dwell {
     fn begins(&self, _: &Pause) -> (f64, impl Fn(Span) -> f64) {
         (self.start_s, |_| 1.0)
     }
@@ -29,43 +29,48 @@ impl Strategy for Dwell {
 }
 
 /// Longest dwell times that are tried \[s\].
-const LONGEST_S: [f64; 2] = [4.0, 1.5];
+const MAX_DWELL_S: [f64; 2] = [4.0, 1.5];
 /// Halvings of a range by the golden section.
-const STEPS: u32 = 8;
+const GOLDEN_STEPS: u32 = 8;
 /// Steps of the coarse row.
-const COARSE: u32 = 10;
+const COARSE_STEPS: u32 = 10;
 /// Turns between the two times.
 const ROUNDS: u32 = 2;
 
 /// The pair of dwell times with the least void and drool over all these pauses
 /// and seeds: as well as fixed times can be tuned.
-pub fn tune(bench: &Bench, machine: Machine, idle_s: &[f64], seeds: std::ops::Range<u64>) -> Dwell {
+pub fn tune(
+    bench: &StartStopBench,
+    machine: MeltParameters,
+    idle_s: &[f64],
+    seeds: std::ops::Range<u64>,
+) -> Dwell {
     let cost = |dwell: &Dwell| -> f64 {
         let of = |seed| bench.lay(machine, seed, dwell, idle_s);
         // Collected, so that the sum does not hang on which seed ends first.
-        let scores: Vec<Vec<Score>> = seeds.clone().into_par_iter().map(of).collect();
-        scores.iter().flatten().map(Score::sum_mm3).sum()
+        let scores: Vec<Vec<StartStopScore>> = seeds.clone().into_par_iter().map(of).collect();
+        scores.iter().flatten().map(StartStopScore::sum_mm3).sum()
     };
     let speed_mm_per_s = bench.laid.speed.get();
     let mut best = Dwell { start_s: 1.0, stop_s: 0.3, speed_mm_per_s };
     for _ in 0..ROUNDS {
-        let [start_most, stop_most] = LONGEST_S;
-        best.start_s = least(start_most, |start_s| cost(&Dwell { start_s, ..best }));
-        best.stop_s = least(stop_most, |stop_s| cost(&Dwell { stop_s, ..best }));
+        let [start_most, stop_most] = MAX_DWELL_S;
+        best.start_s = minimise(start_most, |start_s| cost(&Dwell { start_s, ..best }));
+        best.stop_s = minimise(stop_most, |stop_s| cost(&Dwell { stop_s, ..best }));
     }
     best
 }
 
 /// Where a function from zero to an end is least: the best of a coarse row,
 /// then the golden section about it.
-fn least(most: f64, cost: impl Fn(f64) -> f64) -> f64 {
-    let step = most / f64::from(COARSE);
-    let coarse = (0..=COARSE).map(|k| f64::from(k) * step);
+fn minimise(max: f64, cost: impl Fn(f64) -> f64) -> f64 {
+    let step = max / f64::from(COARSE_STEPS);
+    let coarse = (0..=COARSE_STEPS).map(|k| f64::from(k) * step);
     let costs = coarse.map(|at| (at, cost(at)));
     let near = costs.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(at, _)| at);
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     let (mut low, mut high) = ((near - step).max(0.0), near + step);
-    for _ in 0..STEPS {
+    for _ in 0..GOLDEN_STEPS {
         let [left, right] = [high - golden * (high - low), low + golden * (high - low)];
         if cost(left) < cost(right) { high = right } else { low = left }
     }

@@ -5,43 +5,48 @@ use std::sync::LazyLock;
 use super::bench::*;
 use super::dwell::{Dwell, tune};
 use super::*;
-use crate::extruder::start_stop::Timing;
+use crate::extruder::start_stop::StartStopTiming;
 use crate::identify::start_stop::StartStopFit;
 use crate::identify::start_stop::parameters::StartStop;
 use crate::sim::melt::*;
 use crate::studies::bcs_thesis::start_stop::experiment::bench;
 
 /// A machine from which nothing random comes.
-const STILL: Machine = Machine { void_scatter: 0.0, wander: (0.0, 0.15), ..Machine::USUAL };
+const STILL: MeltParameters =
+    MeltParameters { void_sigma: 0.0, flow_noise: (0.0, 0.15), ..MeltParameters::TYPICAL };
 
-fn fitted(machine: Machine, seed: u64) -> StartStopFit {
+fn fitted(machine: MeltParameters, seed: u64) -> StartStopFit {
     experiment::fitted(machine, seed).unwrap()
 }
 
 /// What is found of as many recordings as there are seeds.
 static FOUND: LazyLock<Vec<StartStopFit>> =
-    LazyLock::new(|| (0..SEEDS).map(|seed| fitted(Machine::USUAL, seed)).collect());
+    LazyLock::new(|| (0..SEEDS).map(|seed| fitted(MeltParameters::TYPICAL, seed)).collect());
 
 /// All pauses and seeds together, a seed's mean.
-fn mean<S: Strategy>(bench: &Bench, machine: Machine, of: impl Fn(u64) -> S) -> Score {
-    let all = (0..SEEDS).flat_map(|seed| bench.lay(machine, seed, &of(seed), &IDLE_S));
-    let sum = all.fold(Score::default(), Score::and);
+fn mean<S: StartStopStrategy>(
+    bench: &StartStopBench,
+    machine: MeltParameters,
+    of: impl Fn(u64) -> S,
+) -> StartStopScore {
+    let all = (0..SEEDS).flat_map(|seed| bench.lay(machine, seed, &of(seed), &PAUSES_S));
+    let sum = all.fold(StartStopScore::default(), StartStopScore::and);
     let n = f64::from(u32::try_from(SEEDS).unwrap());
-    Score { void_mm3: sum.void_mm3 / n, drool_mm3: sum.drool_mm3 / n }
+    StartStopScore { void_mm3: sum.void_mm3 / n, drool_mm3: sum.drool_mm3 / n }
 }
 
 const SEEDS: u64 = 20;
 
 #[test]
 fn starts_and_stops_that_are_foretold_lose_a_fifth_of_what_the_best_fixed_dwell_times_lose() {
-    let (machine, follows) = (Machine::USUAL, bench(experiment::FOLLOWS_SHARE));
-    let foretold = |bench: &Bench, seed: u64| {
-        Timing::new(FOUND[usize::try_from(seed).unwrap()].parameters, bench.laid).unwrap()
+    let (machine, follows) = (MeltParameters::TYPICAL, bench(experiment::MIN_SPEED_FRACTION));
+    let foretold = |bench: &StartStopBench, seed: u64| {
+        StartStopTiming::new(FOUND[usize::try_from(seed).unwrap()].parameters, bench.laid).unwrap()
     };
     let found = experiment::run(machine, SEEDS).unwrap();
     let [naive, best, steady, ours] =
         [&found.naive, &found.fixed, &found.keeps, &found.follows].map(|all| experiment::sum(all));
-    let ratio = |a: Score, b: Score| a.sum_mm3() / b.sum_mm3();
+    let ratio = |a: StartStopScore, b: StartStopScore| a.sum_mm3() / b.sum_mm3();
     assert!(ratio(best, ours) > 7.5, "{best:?} {ours:?}");
     assert!(best.void_mm3 > 12.0 * ours.void_mm3, "{best:?} {ours:?}");
     assert!(best.drool_mm3 > 5.0 * ours.drool_mm3, "{best:?} {ours:?}");
@@ -53,7 +58,7 @@ fn starts_and_stops_that_are_foretold_lose_a_fifth_of_what_the_best_fixed_dwell_
     let fixed = mean(&follows, machine, |seed| {
         let own = *foretold(&follows, seed).parameters();
         let fixed = StartStop { void_mm3: 0.0, first_flow_s: 0.9, ..own };
-        Timing::new(fixed, follows.laid).unwrap()
+        StartStopTiming::new(fixed, follows.laid).unwrap()
     });
     assert!(ratio(fixed, ours) > 5.0, "{fixed:?} {ours:?}");
     // A robot that goes no slower than a fifth of its speed is enough.
@@ -64,21 +69,23 @@ fn starts_and_stops_that_are_foretold_lose_a_fifth_of_what_the_best_fixed_dwell_
 
 #[test]
 fn a_machine_that_is_slower_to_start_and_drools_longer_gains_as_well() {
-    let machine = Machine {
+    let machine = MeltParameters {
         dead_time_s: 0.2,
         stored_s: 0.6,
         shear_thinning: 0.5,
         voids: [(900.0, 30.0), (200.0, 120.0)],
-        ..Machine::USUAL
+        ..MeltParameters::TYPICAL
     };
     let (keeps, follows) = (bench(1.0), bench(0.05));
-    let timing = |seed| Timing::new(fitted(machine, seed).parameters, follows.laid);
-    let best = tune(&keeps, machine, &IDLE_S, 0..2);
-    let sum = |scores: Vec<Score>| scores.into_iter().fold(Score::default(), Score::and).sum_mm3();
+    let timing = |seed| StartStopTiming::new(fitted(machine, seed).parameters, follows.laid);
+    let best = tune(&keeps, machine, &PAUSES_S, 0..2);
+    let sum = |scores: Vec<StartStopScore>| {
+        scores.into_iter().fold(StartStopScore::default(), StartStopScore::and).sum_mm3()
+    };
     let (mut fixed, mut ours) = (0.0, 0.0);
     for seed in 0..5 {
-        fixed += sum(keeps.lay(machine, seed, &best, &IDLE_S));
-        ours += sum(follows.lay(machine, seed, &timing(seed).unwrap(), &IDLE_S));
+        fixed += sum(keeps.lay(machine, seed, &best, &PAUSES_S));
+        ours += sum(follows.lay(machine, seed, &timing(seed).unwrap(), &PAUSES_S));
     }
     assert!(fixed > 5.0 * ours, "{fixed} {ours}");
 }
@@ -86,7 +93,7 @@ fn a_machine_that_is_slower_to_start_and_drools_longer_gains_as_well() {
 #[test]
 fn the_volume_that_is_missing_after_a_start_is_the_void_and_what_is_on_its_way() {
     for idle_s in [30.0, 300.0] {
-        let mut melt = Melt::flowing(STILL, 1);
+        let mut melt = Melt::steady(STILL, 1);
         melt.command(0.0);
         while melt.now_s() < idle_s {
             melt.advance();
@@ -98,7 +105,7 @@ fn the_volume_that_is_missing_after_a_start_is_the_void_and_what_is_on_its_way()
             let (dt_s, came_mm3) = melt.advance();
             missing += 400.0 * dt_s - came_mm3;
         }
-        let Machine { dead_time_s, screw_s, stored_s, .. } = STILL;
+        let MeltParameters { dead_time_s, screw_s, stored_s, .. } = STILL;
         let on_its_way = 400.0 * (dead_time_s + screw_s + stored_s);
         assert!((missing - void_mm3 - on_its_way).abs() < 5.0, "{missing} {void_mm3}");
     }
@@ -116,7 +123,7 @@ fn what_is_fitted_is_what_the_melt_does() {
         assert!((of.first_flow_s - 0.2).abs() < 0.06, "{of:?}");
         // What is on its way in drive and screw, and what is stored, less what leaks.
         let most = STILL.dead_time_s + STILL.screw_s + STILL.stored_s;
-        assert!(of.after_stop_s() < most && of.after_stop_s() > 0.8 * most, "{of:?}");
+        assert!(of.total_after_stop_s() < most && of.total_after_stop_s() > 0.8 * most, "{of:?}");
         assert_eq!((fit.starts.len(), fit.stops.len()), (12, 12));
     }
 }
@@ -146,7 +153,7 @@ fn the_standard_errors_are_those_that_recordings_show() {
 #[test]
 fn a_seed_gives_the_same_beads_again_and_another_gives_others() {
     let dwell = Dwell { start_s: 1.0, stop_s: 0.3, speed_mm_per_s: 40.0 };
-    let lay = |seed| bench(1.0).lay(Machine::USUAL, seed, &dwell, &[3.0]);
+    let lay = |seed| bench(1.0).lay(MeltParameters::TYPICAL, seed, &dwell, &[3.0]);
     assert_eq!(lay(4), lay(4));
     assert_ne!(lay(4), lay(5));
 }
@@ -154,8 +161,8 @@ fn a_seed_gives_the_same_beads_again_and_another_gives_others() {
 #[test]
 fn what_is_watched_is_a_stop_and_a_start() {
     let dwell = Dwell { start_s: 1.0, stop_s: 0.3, speed_mm_per_s: 40.0 };
-    let watched = bench(1.0).watch(Machine::USUAL, 1, &dwell, 30.0);
-    let flow = |moments: &[Moment], at_s: f64| {
+    let watched = bench(1.0).watch(MeltParameters::TYPICAL, 1, &dwell, 30.0);
+    let flow = |moments: &[FlowSample], at_s: f64| {
         moments.iter().find(|moment| moment.since_s >= at_s).unwrap().flow_mm3_per_s
     };
     assert!(flow(&watched.stop, 0.0) > 380.0 && flow(&watched.stop, 3.0) < 40.0);

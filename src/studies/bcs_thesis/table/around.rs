@@ -1,6 +1,6 @@
 //! What is drawn of a run through the corner.
 
-use crate::studies::bcs_thesis::corner::Run;
+use crate::studies::bcs_thesis::corner::CornerRun;
 
 /// What is drawn of a run.
 #[derive(Debug)]
@@ -17,10 +17,10 @@ pub struct Around {
 
 impl Around {
     /// Of a run.
-    pub fn of(name: &'static str, run: &Run) -> Self {
+    pub fn of(name: &'static str, run: &CornerRun) -> Self {
         let percent = |(at, error): (f64, f64)| (at, 100.0 * error);
         let over = |of: fn((f64, f64, f64)) -> f64| -> Vec<(f64, f64)> {
-            run.course().map(|here| (here.0, of(here))).collect()
+            run.trajectory().map(|here| (here.0, of(here))).collect()
         };
         let error = run.quiet().along().map(percent).collect();
         Self { name, error, speed: over(|here| here.1), flow: over(|here| here.2) }

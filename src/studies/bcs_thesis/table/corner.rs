@@ -7,10 +7,10 @@ use super::around::Around;
 use super::draw;
 use crate::plan::Plan;
 use crate::studies::bcs_thesis::corner::{
-    Baseline, CornerError, Drive, Errors, JUDGED_MM, Row, Run, Scenario, UNMODELLED,
+    Baseline, BudgetRow, CornerError, CornerRun, DriveMode, Errors, JUDGED_MM, Scenario, UNMODELLED,
 };
 use crate::studies::error::ReproduceError;
-use crate::studies::row::Rows;
+use crate::studies::row::TableRows;
 use crate::studies::study::{Effort, Section};
 
 /// Seeds of the flow that no model tells.
@@ -23,12 +23,12 @@ const QUICK_S: [f64; 4] = [0.0, 0.2, 0.5, 1.0];
 
 /// The figures' case.
 const CASE: &str = "90° corner, at most 1 s added";
-const STRAIGHT: &str = "90° corner, level that suits the straight";
-const LEAST: &str = "90° corner, level of the least error within ±100 mm";
+const STRAIGHT_LEVEL: &str = "90° corner, level that suits the straight";
+const BEST_LEVEL: &str = "90° corner, level of the least error within ±100 mm";
 
 /// The plan counts on the mean over the nozzle's length; this is what the same runs leave
 /// where another length is looked at.
-const OTHER: &str = "90° corner, planned for 20 mm, without noise";
+const OTHER_LENGTHS: &str = "90° corner, planned for 20 mm, without noise";
 const LENGTHS: [(f64, &str); 5] = [
     (10.0, "width error RMS, mean over 10 mm"),
     (15.0, "width error RMS, mean over 15 mm"),
@@ -38,22 +38,22 @@ const LENGTHS: [(f64, &str); 5] = [
 ];
 
 /// Runs the corner for every time, and tells of the longest.
-pub fn corner(effort: Effort, rows: &mut Rows) -> Result<Section, ReproduceError> {
+pub fn corner(effort: Effort, rows: &mut TableRows) -> Result<Section, ReproduceError> {
     let seeds = effort.seeds.unwrap_or(SEEDS);
     let budgets: &[f64] = if seeds < QUICK_SEEDS { &QUICK_S } else { &BUDGETS_S };
     let scenario = Scenario::default();
-    let found: Result<Vec<Row>, CornerError> =
+    let found: Result<Vec<BudgetRow>, CornerError> =
         budgets.par_iter().map(|budget_s| scenario.row(*budget_s, seeds)).collect();
     let found = found?;
     let Some(last) = found.last() else { return Err(ReproduceError::NoRun) };
     let plan = scenario.plan(last.budget_s, UNMODELLED)?;
     push(last, rows);
-    push_least(&scenario, &plan, (last.planned, seeds), rows)?;
+    push_best_level(&scenario, &plan, (last.planned, seeds), rows)?;
     let [constant, proportional, planned] = runs(&scenario, &plan)?;
     for (length_mm, quantity) in LENGTHS {
         let [theirs, ours] =
             [&constant, &planned].map(|run| Some(100.0 * run.quiet_over(length_mm).rms()));
-        rows.push(OTHER, (quantity, "%"), [None, theirs, ours]);
+        rows.push(OTHER_LENGTHS, (quantity, "%"), [None, theirs, ours]);
     }
     let drawn = [
         Around::of("constant extruder", &constant),
@@ -67,7 +67,7 @@ pub fn corner(effort: Effort, rows: &mut Rows) -> Result<Section, ReproduceError
     })
 }
 
-fn hint(last: &Row, seeds: u64) -> String {
+fn hint(last: &BudgetRow, seeds: u64) -> String {
     format!(
         "100 mm/s, 2 mm/s at the apex, 2 m/s², the thesis' G1 and G2 from 0 to 10 V, nozzle of \
          20 mm; errors of the width are root mean squares within ±{JUDGED_MM:.0} mm of the corner \
@@ -77,18 +77,18 @@ fn hint(last: &Row, seeds: u64) -> String {
          Of 1 s the plan takes {:.2} s. Runs over path are drawn without noise. What the apex lays \
          too much, the plan takes off a nozzle's length before and after it, where the mean over \
          exactly that length does not see it: over 10 to 30 mm less is gained, as the table says.",
-        100.0 * UNMODELLED.share,
+        100.0 * UNMODELLED.ratio,
         last.added_s,
     )
 }
 
-fn push(last: &Row, rows: &mut Rows) {
+fn push(last: &BudgetRow, rows: &mut TableRows) {
     let ours = Some(100.0 * last.planned.noisy);
     let best = |drive| Some(100.0 * last.ratio(drive) * last.planned.noisy);
     let kinds = [
-        (Drive::Constant, ["width error RMS, constant extruder", "ratio to constant extruder"]),
+        (DriveMode::Constant, ["width error RMS, constant extruder", "ratio to constant extruder"]),
         (
-            Drive::Proportional,
+            DriveMode::Proportional,
             ["width error RMS, proportional extruder", "ratio to proportional extruder"],
         ),
     ];
@@ -98,7 +98,7 @@ fn push(last: &Row, rows: &mut Rows) {
     for (drive, [_, ratio]) in kinds {
         rows.push(CASE, (ratio, "1"), [None, None, Some(last.ratio(drive))]);
     }
-    let bound = last.bound_ratio(Drive::Constant);
+    let bound = last.bound_ratio(DriveMode::Constant);
     rows.push(
         CASE,
         ("ratio to constant extruder, bound without noise", "1"),
@@ -106,38 +106,38 @@ fn push(last: &Row, rows: &mut Rows) {
     );
     rows.push(CASE, ("time added", "s"), [None, None, Some(last.added_s)]);
     for (baseline, errors) in &last.baselines {
-        push_one(STRAIGHT, *baseline, *errors, last.planned, rows);
+        push_one(STRAIGHT_LEVEL, *baseline, *errors, last.planned, rows);
     }
 }
 
 /// The stricter reading: each baseline at the level that leaves its own least error here.
-fn push_least(
+fn push_best_level(
     scenario: &Scenario,
     plan: &Plan,
     (planned, seeds): (Errors, u64),
-    rows: &mut Rows,
+    rows: &mut TableRows,
 ) -> Result<(), CornerError> {
     for baseline in Baseline::ALL {
         let errors = baseline.run_at_best_level(scenario, &plan.speed)?.errors(seeds);
-        push_one(LEAST, baseline, errors, planned, rows);
+        push_one(BEST_LEVEL, baseline, errors, planned, rows);
     }
     Ok(())
 }
 
-fn push_one(case: &str, baseline: Baseline, errors: Errors, ours: Errors, rows: &mut Rows) {
+fn push_one(case: &str, baseline: Baseline, errors: Errors, ours: Errors, rows: &mut TableRows) {
     let quantity = match (baseline.drive, baseline.planned_speed) {
-        (Drive::Constant, false) => "width error RMS, constant, own speed",
-        (Drive::Constant, true) => "width error RMS, constant, planned speed",
-        (Drive::Proportional, false) => "width error RMS, proportional, own speed",
-        (Drive::Proportional, true) => "width error RMS, proportional, planned speed",
+        (DriveMode::Constant, false) => "width error RMS, constant, own speed",
+        (DriveMode::Constant, true) => "width error RMS, constant, planned speed",
+        (DriveMode::Proportional, false) => "width error RMS, proportional, own speed",
+        (DriveMode::Proportional, true) => "width error RMS, proportional, planned speed",
     };
     let values = [errors, ours].map(|errors| Some(100.0 * errors.noisy));
     rows.push(case, (quantity, "%"), [None, values[0], values[1]]);
 }
 
 /// The baselines as they are usual, at the robot's own speed, and the plan.
-fn runs(scenario: &Scenario, plan: &Plan) -> Result<[Run; 3], CornerError> {
+fn runs(scenario: &Scenario, plan: &Plan) -> Result<[CornerRun; 3], CornerError> {
     let own = |drive| Baseline { drive, planned_speed: false }.run(scenario, &plan.speed);
-    let planned = Run::new(scenario, &plan.speed, |time| plan.command_at(time))?;
-    Ok([own(Drive::Constant)?, own(Drive::Proportional)?, planned])
+    let planned = CornerRun::new(scenario, &plan.speed, |time| plan.command_at(time))?;
+    Ok([own(DriveMode::Constant)?, own(DriveMode::Proportional)?, planned])
 }

@@ -7,13 +7,13 @@ use crate::report::chart::area::{Area, XAxis};
 use crate::report::chart::legend::legend;
 use crate::report::chart::palette;
 use crate::report::chart::palette::Ink;
-use crate::report::chart::plot::{Layer as Drawn, Plot, y_range};
+use crate::report::chart::plot::{Plot, PlotLayer as Drawn, y_range};
 use crate::report::chart::range::Range;
-use crate::report::chart::series::Series;
+use crate::report::chart::series::Curve;
 use crate::studies::bcs_thesis as plant;
-use crate::studies::bcs_thesis::corner::{BEAD, Drive, JUDGED_MM, Row};
+use crate::studies::bcs_thesis::corner::{BEAD, BudgetRow, DriveMode, JUDGED_MM};
 use crate::studies::bcs_thesis::fit_table::{FitRow, FitTable};
-use crate::studies::bcs_thesis::on_off::{Compared, Run};
+use crate::studies::bcs_thesis::on_off::{Compared, WheelRun};
 
 /// What is drawn once more, more closely \[s\].
 const CLOSER_S: Range = Range::new(40.0, 60.0);
@@ -28,10 +28,10 @@ pub struct CameraGain {
 }
 
 /// A curve, its name and its colour.
-type Curve<'a> = (&'a [(f64, f64)], &'static str, Ink);
+type NamedPoints<'a> = (&'a [(f64, f64)], &'static str, Ink);
 
-fn plot(y_title: &str, axis: &XAxis, curves: &[Curve<'_>], level: Option<f64>) -> Markup {
-    let drawn: Vec<Series> =
+fn plot(y_title: &str, axis: &XAxis, curves: &[NamedPoints<'_>], level: Option<f64>) -> Markup {
+    let drawn: Vec<Curve> =
         curves.iter().map(|(points, ..)| points.iter().copied().collect()).collect();
     let shown: Vec<_> = drawn.iter().collect();
     let levels: Vec<f64> = level.into_iter().collect();
@@ -85,14 +85,14 @@ pub fn runs(thesis: &Compared, ours: &Compared) -> Markup {
     let [off, on] = &thesis.example;
     let [_, best] = &ours.example;
     let axis = time(off);
-    let runs = |of: fn(&Run) -> &[(f64, f64)]| {
+    let runs = |of: fn(&WheelRun) -> &[(f64, f64)]| {
         [
             (of(off), "off", palette::DEMAND),
             (of(on), "the thesis' controller", palette::PAPER),
             (of(best), "ours", palette::OURS),
         ]
     };
-    let near = |run: &Run| -> Vec<(f64, f64)> {
+    let near = |run: &WheelRun| -> Vec<(f64, f64)> {
         run.area
             .iter()
             .copied()
@@ -133,7 +133,7 @@ pub fn exact([thesis, ours]: &[Compared; 2]) -> Markup {
     plot("section − 45 [mm²]", &axis, &curves, None)
 }
 
-fn time(run: &Run) -> XAxis {
+fn time(run: &WheelRun) -> XAxis {
     XAxis::time(Range::new(0.0, run.area.last().map_or(1.0, |(t, _)| *t)))
 }
 
@@ -151,13 +151,13 @@ pub fn sensing(found: &[CameraGain], bound: &[CameraGain]) -> Markup {
 }
 
 /// What is gained for the time that is added, and runs around the corner.
-pub fn corner(rows: &[Row], runs: &[Around; 3]) -> Markup {
-    let of = |value: &dyn Fn(&Row) -> f64| -> Vec<(f64, f64)> {
+pub fn corner(rows: &[BudgetRow], runs: &[Around; 3]) -> Markup {
+    let of = |value: &dyn Fn(&BudgetRow) -> f64| -> Vec<(f64, f64)> {
         rows.iter().map(|row| (row.budget_s, value(row))).collect()
     };
-    let bound = of(&|row| row.bound_ratio(Drive::Constant));
-    let constant = of(&|row| row.ratio(Drive::Constant));
-    let proportional = of(&|row| row.ratio(Drive::Proportional));
+    let bound = of(&|row| row.bound_ratio(DriveMode::Constant));
+    let constant = of(&|row| row.ratio(DriveMode::Constant));
+    let proportional = of(&|row| row.ratio(DriveMode::Proportional));
     let ratios = [
         (bound.as_slice(), "bound for the constant one, without noise", palette::LIMIT),
         (constant.as_slice(), "a constant extruder over ours", palette::PAPER),
@@ -167,7 +167,7 @@ pub fn corner(rows: &[Row], runs: &[Around; 3]) -> Markup {
     let time = XAxis { title: "time that may be added [s]".to_owned(), range, divisor: 1.0 };
     let path = XAxis::path(Range::new(-JUDGED_MM, JUDGED_MM));
     let inks = [palette::PAPER, palette::DEMAND, palette::OURS];
-    let over = |pick: fn(&Around) -> &[(f64, f64)]| -> Vec<Curve<'_>> {
+    let over = |pick: fn(&Around) -> &[(f64, f64)]| -> Vec<NamedPoints<'_>> {
         runs.iter().zip(inks).map(|(run, ink)| (pick(run), run.name, ink)).collect()
     };
     html! {

@@ -4,11 +4,11 @@
 
 mod draw;
 
-use crate::sim::melt::Machine;
-use crate::studies::bcs_thesis::start_stop::bench::{IDLE_S, Score};
-use crate::studies::bcs_thesis::start_stop::experiment::{FOLLOWS_SHARE, Losses, run, sum};
+use crate::sim::melt::MeltParameters;
+use crate::studies::bcs_thesis::start_stop::bench::{PAUSES_S, StartStopScore};
+use crate::studies::bcs_thesis::start_stop::experiment::{Losses, MIN_SPEED_FRACTION, run, sum};
 use crate::studies::error::ReproduceError;
-use crate::studies::row::Rows;
+use crate::studies::row::TableRows;
 use crate::studies::study::Section;
 
 const CASES: [&str; 3] = [
@@ -17,17 +17,17 @@ const CASES: [&str; 3] = [
     "starts and stops, no dwell at all",
 ];
 /// A volume of a score, with what it is called.
-type Volume = (&'static str, fn(&Score) -> f64);
+type Volume = (&'static str, fn(&StartStopScore) -> f64);
 const VOLUMES: [Volume; 3] = [
     ("void volume", |score| score.void_mm3),
     ("drool volume", |score| score.drool_mm3),
-    ("both", Score::sum_mm3),
+    ("both", StartStopScore::sum_mm3),
 ];
 
 /// Runs the experiment. In the table, what is simulated of the source's own are
 /// the best fixed dwell times.
-pub fn section(seeds: u64, rows: &mut Rows) -> Result<Section, ReproduceError> {
-    let found = run(Machine::USUAL, seeds)?;
+pub fn section(seeds: u64, rows: &mut TableRows) -> Result<Section, ReproduceError> {
+    let found = run(MeltParameters::TYPICAL, seeds)?;
     let [follows, keeps, none] = CASES;
     push(follows, [&found.fixed, &found.follows], rows);
     push(keeps, [&found.fixed, &found.keeps], rows);
@@ -46,16 +46,16 @@ pub fn section(seeds: u64, rows: &mut Rows) -> Result<Section, ReproduceError> {
              and fall as void and as surplus, whatever is known of them. The machine knows more \
              than the model: a void that opens in two parts and varies by 3 %, melt that is stored \
              under pressure, drips, a flow that wanders.",
-            IDLE_S.len(),
+            PAUSES_S.len(),
             found.dwell.start_s,
             found.dwell.stop_s,
-            100.0 * FOLLOWS_SHARE
+            100.0 * MIN_SPEED_FRACTION
         ),
         drawing: draw::all(&found),
     })
 }
 
-fn push(case: &'static str, [theirs, ours]: [&Losses; 2], rows: &mut Rows) {
+fn push(case: &'static str, [theirs, ours]: [&Losses; 2], rows: &mut TableRows) {
     let [theirs, ours] = [theirs, ours].map(|losses| sum(losses));
     for (name, of) in VOLUMES {
         rows.push(case, (name, "mm³"), [None, Some(of(&theirs)), Some(of(&ours))]);

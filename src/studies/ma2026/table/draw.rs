@@ -6,20 +6,20 @@ use crate::report::chart::area::{Area, XAxis};
 use crate::report::chart::legend::legend;
 use crate::report::chart::palette;
 use crate::report::chart::palette::Ink;
-use crate::report::chart::plot::{Layer as Drawn, Plot, y_range};
+use crate::report::chart::plot::{Plot, PlotLayer as Drawn, y_range};
 use crate::report::chart::range::Range;
-use crate::report::chart::series::Series;
+use crate::report::chart::series::Curve;
 
-use crate::studies::ma2026::{Course, Factors};
+use crate::studies::ma2026::{Factors, PressureResponse};
 
 /// Ticks from point to point of a drawing.
 const DRAWN_EVERY: usize = 4;
 
 /// A law's name, its colour and what it did.
-pub type Named = (&'static str, Ink, Course);
+pub type NamedResponse = (&'static str, Ink, PressureResponse);
 
 /// Pressure and screw speed of some laws, with the target.
-pub fn courses(drawn: &[Named], range: Range) -> Markup {
+pub fn courses(drawn: &[NamedResponse], range: Range) -> Markup {
     html! {
         (curves(drawn, range, "pressure [MPa]", |course, at| course.pressure.get(at).copied()))
         (curves(drawn, range, "screw speed [rpm]", |course, at| course.speed.get(at).copied()))
@@ -28,24 +28,24 @@ pub fn courses(drawn: &[Named], range: Range) -> Markup {
 
 /// One quantity of some laws; with the pressure the target, too.
 pub fn curves(
-    drawn: &[Named],
+    drawn: &[NamedResponse],
     range: Range,
     y_title: &str,
-    value: impl Fn(&Course, usize) -> Option<f64>,
+    value: impl Fn(&PressureResponse, usize) -> Option<f64>,
 ) -> Markup {
-    let all: Vec<Series> =
+    let all: Vec<Curve> =
         drawn.iter().map(|(_, _, course)| thinned(course, range, &value)).collect();
     let target = drawn.first().map(|(_, _, course)| {
-        thinned(course, range, &|course: &Course, at| course.target.get(at).copied())
+        thinned(course, range, &|course: &PressureResponse, at| course.target.get(at).copied())
     });
     let target = target.filter(|_| y_title.starts_with("pressure"));
     let axis = XAxis::time(range);
-    let mut shown: Vec<&Series> = all.iter().collect();
+    let mut shown: Vec<&Curve> = all.iter().collect();
     let mut layers = Vec::new();
     let mut names: Vec<(&str, Ink, &str)> = Vec::new();
     if let Some(target) = &target {
         shown.push(target);
-        layers.push(Drawn::Wish(target, palette::TARGET));
+        layers.push(Drawn::Demand(target, palette::TARGET));
         names.push(("target", palette::TARGET, "dash"));
     }
     for ((name, ink, _), series) in drawn.iter().zip(&all) {
@@ -61,7 +61,7 @@ pub fn curves(
 
 /// Our step responses with every single error of the model, each in a colour
 /// that stands for no method.
-pub fn singles(drawn: &[Course]) -> Markup {
+pub fn singles(drawn: &[PressureResponse]) -> Markup {
     let inks = [
         palette::PRIMING,
         palette::HOLDING,
@@ -70,7 +70,7 @@ pub fn singles(drawn: &[Course]) -> Markup {
         palette::TRACKING,
         palette::SCREW,
     ];
-    let named: Vec<Named> = Factors::singles()
+    let named: Vec<NamedResponse> = Factors::singles()
         .into_iter()
         .zip(inks)
         .zip(drawn)
@@ -80,10 +80,10 @@ pub fn singles(drawn: &[Course]) -> Markup {
 }
 
 fn thinned(
-    course: &Course,
+    course: &PressureResponse,
     range: Range,
-    value: &impl Fn(&Course, usize) -> Option<f64>,
-) -> Series {
+    value: &impl Fn(&PressureResponse, usize) -> Option<f64>,
+) -> Curve {
     course
         .time_s
         .iter()

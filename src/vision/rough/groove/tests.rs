@@ -8,28 +8,29 @@ const BLUR_PX: f64 = 1.6;
 fn profile(slope: f64, groove_px: f64, groove_grey: f64) -> MeanProfile {
     let at = 20.3;
     let share = |place: f64| 0.5 * libm::erfc(-place / (BLUR_PX * 2.0_f64.sqrt()));
-    let mut grey = [0.0; LENGTH];
+    let mut grey = [0.0; PROFILE_PX];
     for (k, value) in grey.iter_mut().enumerate() {
-        let place = float(k) - at;
+        let place = to_f64(k) - at;
         let ground = 70.0 - slope * place.min(0.0);
         let (near, far) = (share(place), share(place + groove_px));
         let level = ground + (groove_grey - ground) * far + (BEAD - groove_grey) * near;
-        *value = crate::numeric::number::narrow(level);
+        *value = crate::numeric::number::narrow_to_f32(level);
     }
     MeanProfile { grey, inside: (26, 50), outside: (2, 18), on_ground: true, filled: 0.0 }
 }
 
-fn fitted(mean: &MeanProfile) -> EdgeShape {
-    let blur = Blur { px: BLUR_PX, variance: 0.01 };
+fn fitted(mean: &MeanProfile) -> GrooveShape {
+    let blur = MeanBlur { px: BLUR_PX, variance: 0.01 };
     let (table, edge) = (&StepTable::default(), EdgeKind::Auto);
-    fit(mean, &Known { table, variance: 0.25, blur, edge, roughness: 0.0, before: None }).unwrap()
+    fit(mean, &GroovePrior { table, variance: 0.25, blur, edge, roughness: 0.0, before: None })
+        .unwrap()
 }
 
 #[test]
 fn plain_and_shaded_ground_have_no_groove() {
     for slope in [0.0, 0.5, 1.0] {
         let shape = fitted(&profile(slope, 0.0, 70.0));
-        assert!(shape.groove_share < 0.25, "{slope}: {shape:?}");
+        assert!(shape.groove_probability < 0.25, "{slope}: {shape:?}");
     }
 }
 
@@ -37,7 +38,7 @@ fn plain_and_shaded_ground_have_no_groove() {
 fn a_groove_that_blur_fills_is_found_on_plain_and_shaded_ground() {
     for slope in [0.0, 0.5] {
         let shape = fitted(&profile(slope, 2.5, 20.0));
-        assert!(shape.groove_share > 0.9, "{slope}: {shape:?}");
+        assert!(shape.groove_probability > 0.9, "{slope}: {shape:?}");
         let off = shape.at - 20.3;
         assert!(off.abs() < 3.0 * shape.variance.sqrt(), "{slope}: {shape:?}");
     }
@@ -46,8 +47,8 @@ fn a_groove_that_blur_fills_is_found_on_plain_and_shaded_ground() {
 #[test]
 fn sigma_contains_what_two_likely_shapes_leave_open() {
     let step = fitted(&profile(0.0, 0.0, 70.0));
-    let other = EdgeShape { at: step.at + 1.0, ..step };
-    let both = step.or(&other, 0.5);
+    let other = GrooveShape { at: step.at + 1.0, ..step };
+    let both = step.average_with(&other, 0.5);
     assert!((both.at - step.at - 0.5).abs() < 1e-9);
     assert!((both.variance - step.variance - 0.25).abs() < 1e-9);
 }

@@ -5,12 +5,12 @@ const TORN: Tear = Tear { roughness_px: 3.0, length_px: 8.0 };
 
 /// What a person would count who cuts every pixel in sixteen: all that cannot be
 /// reached from outside over what is darker than half the bead.
-fn counted_width(scene: &Scene, seed: u64) -> (f64, f64) {
+fn counted_width(scene: &DrawnScene, seed: u64) -> (f64, f64) {
     const CUT: usize = 4;
     let (width, height) = scene.size;
-    let lines = height * PER_PX;
-    let margin = kernel(scene.blur_px).len() * PER_PX;
-    let outline = Outline::draw(scene, lines + 2 * margin, &mut Draw::new("count", seed));
+    let lines = height * POINTS_PER_PX;
+    let margin = kernel(scene.blur_px).len() * POINTS_PER_PX;
+    let outline = DrawnOutline::draw(scene, lines + 2 * margin, &mut Draw::new("count", seed));
     let columns = width * CUT;
     let half = 0.5 * (scene.bead_grey + scene.ground_grey);
     let dark: Vec<bool> = (0..lines)
@@ -43,10 +43,10 @@ fn counted_width(scene: &Scene, seed: u64) -> (f64, f64) {
 
 #[test]
 fn the_true_width_is_the_area_that_is_counted() {
-    let torn = Scene { edges: TORN, ..Scene::default() };
+    let torn = DrawnScene { edges: TORN, ..DrawnScene::default() };
     let holes = Some(Holes { count: 4, size_px: 9.0, grey: 20.0 });
-    let small = Scene { width_px: 60.0, size: (120, 100), ..torn.clone() };
-    for scene in [torn.clone(), Scene { holes, ..torn }, small] {
+    let small = DrawnScene { width_px: 60.0, size: (120, 100), ..torn.clone() };
+    for scene in [torn.clone(), DrawnScene { holes, ..torn }, small] {
         for seed in 0..4 {
             let (counted, truth) = counted_width(&scene, seed);
             // Rounding to a quarter of a pixel in 800 places: 0.072·√2/√400 = 0.005 px.
@@ -57,10 +57,10 @@ fn the_true_width_is_the_area_that_is_counted() {
 
 #[test]
 fn the_light_of_a_picture_is_that_of_its_areas() {
-    let scene = Scene { edges: TORN, blur_px: 0.0, ..Scene::default() };
+    let scene = DrawnScene { edges: TORN, blur_px: 0.0, ..DrawnScene::default() };
     let bare = paint(&scene, &mut Draw::new("test", 5));
     let rib = Rib { at_px: 20.0, width_px: 7.3, over_grey: -30.0 };
-    let ribbed = Scene { ribs: vec![rib], ..scene.clone() };
+    let ribbed = DrawnScene { ribs: vec![rib], ..scene.clone() };
     let ribbed = paint(&ribbed, &mut Draw::new("test", 5));
     let sum = |painted: &Painted| painted.light.iter().map(|&light| f64::from(light)).sum::<f64>();
     let area = (sum(&bare) / 100.0 - 70.0 * 640.0) / 80.0;
@@ -68,9 +68,9 @@ fn the_light_of_a_picture_is_that_of_its_areas() {
     assert!((sum(&ribbed) - sum(&bare) + 100.0 * 30.0 * 7.3).abs() < 2.0);
     assert!((ribbed.truth_px - bare.truth_px).abs() < 1e-9);
     // A moved and blurred picture has the same light.
-    let moved = Scene { blur_px: 3.0, motion_px: 20.0, ..scene.clone() };
+    let moved = DrawnScene { blur_px: 3.0, motion_px: 20.0, ..scene.clone() };
     let moved = paint(
-        &Scene { edges: Tear { roughness_px: 0.0, ..TORN }, ..moved },
+        &DrawnScene { edges: Tear { roughness_px: 0.0, ..TORN }, ..moved },
         &mut Draw::new("test", 5),
     );
     let area = (sum(&moved) / 100.0 - 70.0 * 640.0) / 80.0;
@@ -83,10 +83,10 @@ fn a_blurred_edge_is_exact_wherever_it_lies_within_a_pixel() {
         let table = StepTable::new(blur_px, motion_px);
         for place in 0..10_u32 {
             let at_px = 60.0 + 0.1 * f64::from(place) + 0.03;
-            let ground = Step { at_px: f64::NEG_INFINITY, grey: 70.0, concrete: false };
-            let steps = vec![ground, Step { at_px, grey: 150.0, concrete: true }];
+            let ground = BrightnessStep { at_px: f64::NEG_INFINITY, grey: 70.0, concrete: false };
+            let steps = vec![ground, BrightnessStep { at_px, grey: 150.0, concrete: true }];
             let mut row = vec![0.0; 120];
-            let lines = std::iter::repeat_n(steps, PER_PX);
+            let lines = std::iter::repeat_n(steps, POINTS_PER_PX);
             table.fill(&mut row, lines, &|step| step.grey);
             for (pixel, &light) in row.iter().enumerate() {
                 let left = f64::from(u32::try_from(pixel).unwrap());
@@ -117,12 +117,12 @@ fn a_blurred_edge_is_exact_wherever_it_lies_within_a_pixel() {
 fn beyond_a_groove_lies_ground_or_a_bead() {
     let groove = |neighbour| Some(Groove { width_px: 30.0, grey: 10.0, neighbour });
     let grooves = [groove(true), groove(false)];
-    let scene = Scene { grooves, edges: TORN, ..Scene::default() };
+    let scene = DrawnScene { grooves, edges: TORN, ..DrawnScene::default() };
     let painted = paint(&scene, &mut Draw::new("test", 6));
     let row = &painted.light[50 * 640..][..640];
     let places = [20, 139, 320, 501, 620].map(|column: usize| row[column].round());
     assert_eq!(places, [150.0, 10.0, 150.0, 10.0, 70.0]);
-    let bare = paint(&Scene { grooves: [None; 2], ..scene }, &mut Draw::new("test", 6));
+    let bare = paint(&DrawnScene { grooves: [None; 2], ..scene }, &mut Draw::new("test", 6));
     assert!((bare.truth_px - painted.truth_px).abs() < 1e-9);
 }
 
@@ -130,7 +130,7 @@ fn beyond_a_groove_lies_ground_or_a_bead() {
 fn a_texture_has_in_the_picture_the_size_asked_for() {
     let texture =
         crate::studies::accuracy::drawn::scene::Patches { size_grey: 12.0, length_px: 4.0 };
-    let scene = Scene { texture, ..Scene::default() };
+    let scene = DrawnScene { texture, ..DrawnScene::default() };
     let painted = paint(&scene, &mut Draw::new("test", 7));
     let inside: Vec<f64> = (0..100)
         .flat_map(|row| painted.light[row * 640 + 200..row * 640 + 440].iter())
