@@ -2,10 +2,10 @@
 //! it is found from pictures of a checkerboard.
 
 pub mod board;
+pub mod board_observation;
 pub mod bundle;
 pub mod camera;
 pub mod charuco;
-pub mod choose;
 pub mod collect;
 pub mod corner;
 pub mod covariance;
@@ -19,25 +19,25 @@ pub mod focus;
 mod grey;
 pub mod homography;
 pub mod lens;
-pub mod map;
+pub mod lens_selection;
 mod marker;
 pub mod model;
 pub mod next_view;
-pub mod offset;
+pub mod nozzle_offset;
 pub mod outline;
 pub mod plane;
-mod pull;
-pub mod quality;
-pub mod refusal;
+pub mod rejection;
+pub mod relative_sigma;
+pub mod relative_sigma_map;
 pub mod scale;
-pub mod share;
-pub mod share_map;
-pub mod sighting;
 pub mod solve;
 #[cfg(test)]
 mod synthetic;
 pub mod uncertainty;
 pub mod verify;
+pub mod view_information;
+pub mod warnings;
+pub mod width_map;
 
 pub use camera::Camera;
 pub use model::{Calibration, CalibrationQuality, SurfaceMap};

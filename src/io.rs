@@ -1,14 +1,14 @@
 //! Files, devices, sockets and the clock: everything outside the core.
 
+pub mod atomic_file;
+pub mod bead_columns;
 pub mod calibration_file;
 pub mod clock;
 pub mod foxglove;
 pub mod image_file;
 pub mod model_file;
 pub mod progress;
-pub mod record;
-pub mod recorded;
+pub mod recorder;
 pub mod recording;
 pub mod replay;
 pub mod stop;
-pub mod whole_file;

@@ -40,7 +40,8 @@ use crate::drivers::extruder::{
 use crate::drivers::robot::{LinkClient, LinkConfig, LinkConfigError, LinkTiming};
 use crate::extruder::{ExtruderSetup, FlowDemand};
 use crate::io::clock::RunClock;
-use crate::io::record::{self, Incomplete, RecordConfig, RecordReport};
+use crate::io::recorder;
+use crate::io::recorder::{Incomplete, RecordConfig, RecordReport};
 use crate::rows::log::RunLog;
 use crate::rows::output::LogError;
 use crate::rows::summary::{RunNote, Summary};
@@ -148,7 +149,7 @@ pub enum LiveError {
 pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     let (ending_tell, ending_told) = bounded::<()>(0);
     let (source, robot_view) = open_camera(&live, ending_told)?;
-    let (recorder, alarm) = record::start(&live.record, &live.out)?;
+    let (recorder, alarm) = recorder::start(&live.record, &live.out)?;
     let (robot_events, from_robot) = unbounded();
     let link = LinkClient::start(link_config(&live.run), live.clock, robot_events)?;
     let (extruder, from_extruder) = open_extruder(&live)?;

@@ -1,15 +1,17 @@
 //! The simulated cell: a bead, the world around it and the pictures of it.
 
-pub mod bend;
-pub mod boards;
+pub mod bead_follower;
+pub mod bead_path;
+pub mod board_studio;
 pub mod cell;
 pub mod contour;
 pub mod convolve;
+pub mod coverage;
 pub mod discs;
 pub mod edge;
 pub mod extruder;
+pub mod flow_drift;
 pub mod flow_log;
-pub mod follow;
 pub mod frame_series;
 pub mod grains;
 pub mod hash;
@@ -22,12 +24,10 @@ pub mod outline;
 pub mod pressure;
 pub mod render;
 pub mod screw;
-pub mod seen;
 pub mod shade;
 pub mod spots;
 pub mod texture;
 pub mod tint;
 pub mod truth;
 pub mod view;
-mod wander;
 pub mod waviness;

@@ -5,12 +5,12 @@ pub mod controller;
 pub mod distance;
 pub mod limiter;
 pub mod odometer;
+pub mod path_history;
 pub mod pi;
 pub mod settings;
 pub mod steps;
 pub mod strategy;
 pub mod target;
-pub mod transport;
 
 pub use distance::{DistanceTrace, FallbackReason};
 pub use limiter::SpeedLimit;

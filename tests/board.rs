@@ -13,7 +13,7 @@ use truebead::calibration::{Camera, file};
 use truebead::core::frame::Frame;
 use truebead::core::geometry::Pose;
 use truebead::core::units::Mm;
-use truebead::sim::boards::{BoardStudio, Exposure};
+use truebead::sim::board_studio::{BoardStudio, Exposure};
 
 const SIZE: [u32; 2] = [640, 480];
 

@@ -8,14 +8,14 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use nalgebra::{Point2, Rotation3, Vector2, Vector3};
 use truebead::calibration::board::Board;
-use truebead::calibration::sighting;
+use truebead::calibration::board_observation;
 use truebead::calibration::{Calibration, Camera};
 use truebead::core::frame::{Channel, Frame};
 use truebead::core::geometry::Pose;
 use truebead::core::time::Stamp;
 use truebead::core::units::Mm;
 use truebead::io::{calibration_file, image_file};
-use truebead::sim::boards::{BoardStudio, Exposure};
+use truebead::sim::board_studio::{BoardStudio, Exposure};
 
 /// Thirteen pictures of a board with 9x6 inner corners, of squares of 25 mm, if
 /// they are there.

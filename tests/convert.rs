@@ -14,7 +14,7 @@ use truebead::calibration::{Calibration, CalibrationQuality, Camera, file};
 use truebead::core::geometry::Pose;
 use truebead::core::units::Mm;
 use truebead::io::calibration_file;
-use truebead::sim::boards::{BoardStudio, Exposure};
+use truebead::sim::board_studio::{BoardStudio, Exposure};
 
 const SIZE: [u32; 2] = [640, 480];
 

@@ -7,7 +7,7 @@ mod common;
 
 use std::fs;
 
-use truebead::identify::profile::file::parse;
+use truebead::identify::command_profile::file::parse;
 
 use common::{said, truebead};
 

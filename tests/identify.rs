@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use truebead::identify::file;
+use truebead::identify::model_file;
 use truebead::sim::flow_log;
 use truebead::sim::hash::{mix, normal_pair};
 
@@ -97,7 +97,7 @@ fn the_example_becomes_a_model_that_is_found_in_a_library() {
     assert_eq!(json["compared"].as_array().unwrap().len(), 2);
     assert!(fs::read_to_string(at("models/pla/report.html")).unwrap().contains("<svg"));
     let text = fs::read_to_string(at("models/pla/model.toml")).unwrap();
-    assert!(file::parse("model.toml", &text).unwrap().transfer.is_stable());
+    assert!(model_file::parse("model.toml", &text).unwrap().transfer.is_stable());
     // In the library of a cell.
     let kept = "models/pla-0.4mm-210c-rpm-to-mm3_per_s.toml";
     assert!(answer.contains(kept), "{answer}");

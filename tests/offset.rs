@@ -13,7 +13,7 @@ use truebead::calibration::board::Board;
 use truebead::calibration::{Camera, file};
 use truebead::core::geometry::Pose;
 use truebead::core::units::Mm;
-use truebead::sim::boards::{BoardStudio, Exposure};
+use truebead::sim::board_studio::{BoardStudio, Exposure};
 
 use common::{said, truebead};
 

@@ -15,7 +15,7 @@ use truebead::calibration::{Camera, file};
 use truebead::core::frame::Frame;
 use truebead::core::geometry::Pose;
 use truebead::core::units::Mm;
-use truebead::sim::boards::{BoardStudio, Exposure};
+use truebead::sim::board_studio::{BoardStudio, Exposure};
 
 const SIZE: [u32; 2] = [720, 540];
 /// Heights of the surface above the bed: 20 mm, and 20 mm less and more \[mm\].

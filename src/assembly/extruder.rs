@@ -21,10 +21,10 @@ use crate::extruder::strategy::{
     AdaptiveNozzle, ConstantCommand, InverseFeedforward, Playback, PressureLoop, ScrewFill,
 };
 use crate::extruder::{ExtruderSetup, ExtruderStrategy};
-use crate::identify::profile;
+use crate::identify::command_profile;
 use crate::io::model_file;
-use crate::io::record::ExtruderFile;
-use crate::io::record::format::{
+use crate::io::recorder::ExtruderFile;
+use crate::io::recorder::format::{
     MODEL_ATTACHMENT, PLAN_ATTACHMENT, PROFILE_ATTACHMENT, STARTS_ATTACHMENT,
 };
 use crate::numeric::lti::TransferFunction;
@@ -204,7 +204,7 @@ fn forecast(
 fn playback(file: &ExtruderFile, part: &ExtruderPart) -> Result<Playback, AssemblyError> {
     let wrong = |what: String| wrong_file(file, &what);
     let (profile, quantity) =
-        profile::file::parse(&file.text).map_err(|error| wrong(error.to_string()))?;
+        command_profile::file::parse(&file.text).map_err(|error| wrong(error.to_string()))?;
     let unit = part.extruder.drive.unit();
     if quantity.unit != unit {
         return Err(wrong(format!(

@@ -8,8 +8,8 @@ use crate::cell::file::ExtruderPart;
 use crate::core::units::MPa;
 use crate::extruder::ExtruderStrategy;
 use crate::extruder::strategy::Playback;
-use crate::identify::file as model;
-use crate::identify::profile::ProfilePoint;
+use crate::identify::command_profile::ProfilePoint;
+use crate::identify::model_file as model;
 
 /// What a strategy comes to where it gives the wanted flow for long.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::extruder::file_of_strategy;
 use crate::extruder::ExtruderSetup;
-use crate::io::record::ExtruderFile;
+use crate::io::recorder::ExtruderFile;
 use crate::sim::cell::CommandedExtruder;
 
 /// The extruder side of a cell that is commanded.

@@ -68,7 +68,7 @@ mod tests {
     use crate::core::geometry::Pose;
     use crate::core::time::Stamp;
     use crate::core::units::Mm;
-    use crate::sim::boards::{BoardStudio, Exposure};
+    use crate::sim::board_studio::{BoardStudio, Exposure};
     use nalgebra::Vector3;
 
     const SIZE: [u32; 2] = [400, 300];

@@ -2,8 +2,8 @@
 //! with the board lying still on the bed, then one of every place in which it is held.
 
 use super::board::Board;
-use super::refusal::BoardRejection;
-use super::sighting::{BoardObservation, shift_px};
+use super::board_observation::{BoardObservation, shift_px};
+use super::rejection::BoardRejection;
 
 /// Looks in a row in which the board must lie still for the bed, and how far it may seem
 /// to move from one to the next \[px\].

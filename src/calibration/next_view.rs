@@ -7,9 +7,9 @@ use rayon::prelude::*;
 use super::board::{Board, observe_all};
 use super::covariance::{CalibrationCovariance, DerivedValue};
 use super::equations::Correspondence;
-use super::map;
-use super::share;
+use super::relative_sigma;
 use super::solve::Solution;
+use super::width_map;
 use crate::core::geometry::{ImagePoint, Pose};
 use crate::core::units::Mm;
 
@@ -72,14 +72,16 @@ pub fn best(
     heights: &[Mm],
 ) -> Option<NextView> {
     let requested = heights.iter().flat_map(|&height| {
-        map::where_seen(covariance, bead_mm, height).into_iter().map(move |ends| (ends, height))
+        width_map::where_seen(covariance, bead_mm, height)
+            .into_iter()
+            .map(move |ends| (ends, height))
     });
     let mut beads: Vec<Bead> = requested.collect();
     if beads.is_empty() {
-        beads = share::beads_where_seen(covariance);
+        beads = relative_sigma::beads_where_seen(covariance);
     }
     let readings = readings(covariance, &beads);
-    let before = share::largest(covariance, &readings)?;
+    let before = relative_sigma::largest(covariance, &readings)?;
     let distance_mm = mean_distance_mm(solution);
     let tried: Vec<NextView> = candidates()
         .into_par_iter()
@@ -89,12 +91,12 @@ pub fn best(
                     let lies = on_bed(board, covariance, at)?;
                     let corners = seen_whole(board, covariance, &covariance.on_bed(lies))?;
                     let with = covariance.with_another_on_bed(lies, &corners)?;
-                    share::largest(&with, &self::readings(&with, &beads))?
+                    relative_sigma::largest(&with, &self::readings(&with, &beads))?
                 }
                 BoardPosture::Free { .. } => {
                     let pose = pose(board, covariance, at, hold, distance_mm)?;
                     let corners = seen_whole(board, covariance, &pose)?;
-                    share::largest(&covariance.with_another(&pose, &corners)?, &readings)?
+                    relative_sigma::largest(&covariance.with_another(&pose, &corners)?, &readings)?
                 }
             };
             Some(NextView { posture: hold, at, relative_sigma: (before, after) })

@@ -1,33 +1,33 @@
 //! From pictures of a board to the camera model.
 
+pub mod data;
 mod error;
 mod solution;
-pub(super) mod views;
 
 pub use error::{MIN_VIEWS, SolveError};
 pub use solution::{BoardView, Solution};
 
 use super::board::Board;
+use super::board_observation::BoardObservation;
 use super::bundle;
 use super::bundle::{BundleFit, Guess};
 use super::camera::NUMBERS;
-use super::choose;
-use super::choose::LensTrial;
 use super::equations::{BoardPlacement, CameraModel, Correspondence, FreeParameters, SHARED};
 use super::homography;
 use super::lens::Lens;
-use super::pull;
-use super::pull::ViewInformation;
-use super::sighting::BoardObservation;
+use super::lens_selection;
+use super::lens_selection::LensTrial;
+use super::view_information;
+use super::view_information::ViewInformation;
 use crate::core::geometry::{ImagePoint, Pose};
+use data::{CalibrationData, root_mean_square};
 use error::MAX_RMS_PX;
-use views::{CalibrationData, root_mean_square};
 
 /// Fits the camera to sightings that are all of one size, with the lens and the bend
 /// of the board that foretell pictures best which took no part in the fit.
 pub fn solve(board: &Board, sightings: &[BoardObservation]) -> Result<Solution, SolveError> {
     let views = CalibrationData::of(board, sightings)?;
-    let (fit, free, trials) = choose::best(&views)
+    let (fit, free, trials) = lens_selection::best(&views)
         .ok_or(SolveError::NoCamera { focal_px: views.start.model.camera.focal_px })?;
     solution(&views, sightings, &fit, free, trials)
 }
@@ -39,7 +39,7 @@ pub fn solve_with(
     lens: Lens,
 ) -> Result<Solution, SolveError> {
     let views = CalibrationData::of(board, sightings)?;
-    let trial = choose::up_to(&views, lens)
+    let trial = lens_selection::up_to(&views, lens)
         .ok_or(SolveError::NoCamera { focal_px: views.start.model.camera.focal_px })?;
     let free = FreeParameters { lens: Some(lens), bend: false };
     solution(&views, sightings, &trial.0, free, vec![trial.1])
@@ -62,7 +62,7 @@ fn solution(
     }
     let noise_px = views.noise_variance_px2(fit, free).sqrt();
     let design_effect = ViewInformation::all(views, fit, free)
-        .and_then(|pulls| pull::design_effect(&pulls, free, noise_px * noise_px))
+        .and_then(|pulls| view_information::design_effect(&pulls, free, noise_px * noise_px))
         .unwrap_or(1.0);
     let of_numbers_px = noise_px * design_effect.sqrt();
     let spreads = views.unit_sigmas(fit, free).filter(|_| of_numbers_px.is_finite());

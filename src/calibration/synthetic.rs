@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::Camera;
 use super::board::{Board, CornerObservation, observe_all};
-use super::sighting::BoardObservation;
+use super::board_observation::BoardObservation;
 use crate::core::geometry::{ImagePoint, Pose};
 use crate::core::units::Mm;
 

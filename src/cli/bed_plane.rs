@@ -8,9 +8,9 @@ use nalgebra::{Point3, Vector3};
 
 use super::board_image::{check_size, find_board};
 use crate::calibration::board::{Board, CornerObservation};
+use crate::calibration::board_observation::is_same_position;
 use crate::calibration::equations::{CameraModel, Correspondence};
 use crate::calibration::plane::OnBed;
-use crate::calibration::sighting::is_same_position;
 use crate::core::units::Mm;
 
 /// The bed plane and where it comes from.

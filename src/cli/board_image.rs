@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use crate::calibration::board::Board;
-use crate::calibration::refusal::BoardRejection;
-use crate::calibration::sighting;
-use crate::calibration::sighting::BoardObservation;
+use crate::calibration::board_observation;
+use crate::calibration::board_observation::BoardObservation;
+use crate::calibration::rejection::BoardRejection;
 use crate::core::frame::Channel;
 use crate::core::time::Stamp;
 use crate::io::image_file;
@@ -18,7 +18,7 @@ pub fn find_board(
 ) -> Result<BoardObservation, BoardRejection> {
     let frame = image_file::read(path, Channel::Grey, 0, Stamp::START)
         .map_err(|error| BoardRejection::Unreadable(error.to_string()))?;
-    sighting::observe(board, name, &frame)
+    board_observation::observe(board, name, &frame)
 }
 
 /// Fails for a picture that is not of the size that a calibration is for.

@@ -2,8 +2,8 @@
 
 mod arguments;
 mod conclusion;
+pub mod images;
 mod live;
-mod pictures;
 mod plane;
 mod report;
 
@@ -12,14 +12,14 @@ use std::process::ExitCode;
 
 pub use self::arguments::CalibrateArgs;
 use self::conclusion::CalibrationResult;
-use self::pictures::{CalibrationImages, find_boards};
 use super::arguments::{WrongArguments, check_writable};
 use super::print::print;
 use crate::calibration::board::Board;
-use crate::calibration::sighting;
+use crate::calibration::board_observation;
 use crate::core::units::Mm;
 use crate::drivers::camera::folder::list_images;
-use crate::io::whole_file::write_atomic;
+use crate::io::atomic_file::write_atomic;
+use images::{CalibrationImages, find_boards};
 
 /// Runs the command; the table and the figures go to standard output. Fails
 /// without writing anything where no calibration can be found.
@@ -56,8 +56,8 @@ fn look_into(
         .map_err(|error| WrongArguments::new(format!("{}: {}", error.source_name, error.what)))?;
     plane::check(&args.plane, &files)?;
     let mut looks = find_boards(board, &files);
-    sighting::reject_other_sizes(&mut looks);
-    sighting::reject_duplicates(board, &mut looks);
+    board_observation::reject_other_sizes(&mut looks);
+    board_observation::reject_duplicates(board, &mut looks);
     Ok(CalibrationImages { files, found: looks, on_bed: args.plane.clone() })
 }
 

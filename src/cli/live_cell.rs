@@ -12,7 +12,7 @@ use crate::assembly::{LoadedCell, range_warning};
 use crate::cell::file::RunPart;
 use crate::core::time::Span;
 use crate::io::clock::RunClock;
-use crate::io::record::{ExtruderFile, RecordConfig};
+use crate::io::recorder::{ExtruderFile, RecordConfig};
 use crate::io::stop::StopSignal;
 use crate::live::{self, LiveExtruder, LiveReport, LiveRun};
 use crate::report::run::RunPage;

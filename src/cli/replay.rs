@@ -15,7 +15,7 @@ use crate::assembly::extruder;
 use crate::cell::file::{ExtruderPart, Purpose};
 use crate::control::Controller;
 use crate::control::step::Step;
-use crate::io::record::ExtruderFile;
+use crate::io::recorder::ExtruderFile;
 use crate::io::recording::{RecordedEntry, Recording};
 use crate::io::replay::{Difference, ReplayReport, replay};
 

@@ -8,7 +8,8 @@ use crate::cell::file::KeepFrames;
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::Stamp;
-use crate::io::record::{self, RecordConfig, RecorderHandle};
+use crate::io::recorder;
+use crate::io::recorder::{RecordConfig, RecorderHandle};
 use crate::run::ports::{RecordError, Recorder};
 use crate::sim::cell::CommandedExtruder;
 
@@ -36,7 +37,7 @@ impl SimRecorder {
             calibration_text: loaded.calibration_text.clone(),
             extruder_files: loaded.extruder()?.map_or_else(Vec::new, |side| side.files),
         };
-        let (recorder, _) = record::start(&config, folder)?;
+        let (recorder, _) = recorder::start(&config, folder)?;
         Ok(Self(Some(recorder.waiting())))
     }
 

@@ -13,7 +13,7 @@ use crate::extruder::{ExtruderSetup, FlowDemand};
 use crate::width_control::controller::{WidthController, WidthTrace};
 use crate::width_control::limiter::SpeedLimit;
 use crate::width_control::odometer::Odometer;
-use crate::width_control::transport::PathHistory;
+use crate::width_control::path_history::PathHistory;
 
 /// The controller of a cell: the width by the robot's speed and, where the
 /// cell says so, the flow by the extruder.

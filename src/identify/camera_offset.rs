@@ -18,23 +18,23 @@
 //! of blocks because a bead with a few steps of the speed has too few blocks, and over a
 //! number of effective samples because that leaves the answer itself as it is.
 
-mod course;
 mod data;
 mod error;
 mod estimate;
 mod observation;
 mod offset_profile;
+pub mod speed_profile;
 mod whiten;
 
 #[cfg(test)]
 mod tests;
 
-use course::SpeedProfile;
 use data::PooledWidths;
 pub use error::{CameraOffsetError, MIN_PIECES, MIN_WIDTHS};
 pub use estimate::{EXPONENT_RANGE, OffsetEstimate, OffsetStudy, SpeedRange, WidthAtSpeed};
 use observation::BeadObservation;
 use offset_profile::{NearlyAsGood, OffsetProfile};
+use speed_profile::SpeedProfile;
 use whiten::WidthNoise;
 
 use crate::core::robot::RobotState;

@@ -6,8 +6,8 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::command_profile::{CommandProfile, CommandProfileError, ProfilePoint};
 use super::prbs::{NoSuchLength, Prbs};
-use super::profile::{CommandProfile, CommandProfileError, ProfilePoint};
 
 /// Draws of a Gaussian level after which one outside the limits is cut to them.
 const MAX_DRAWS: u32 = 64;

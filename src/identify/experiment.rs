@@ -3,14 +3,13 @@
 
 mod error;
 mod outlier;
-mod suspicion;
 
 use std::fmt;
 
 pub use self::error::{DataColumn, ExperimentError, MIN_SAMPLES};
-pub use self::suspicion::implausible_unit;
 use super::grid::{SampleGap, TimeGrid, usual_step};
 use crate::numeric::number::to_f64;
+pub use unit_check::implausible_unit;
 
 /// Usual steps between these can be of an extruder's log \[s\]; beyond them the
 /// unit of time is another.
@@ -227,3 +226,4 @@ fn is_held(values: &[f64]) -> bool {
 
 #[cfg(test)]
 mod tests;
+pub mod unit_check;

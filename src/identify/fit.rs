@@ -36,7 +36,6 @@ mod estimate;
 mod identifiability;
 mod levenberg;
 mod linear;
-mod loose;
 mod named;
 mod problem;
 mod quality;
@@ -53,11 +52,11 @@ pub use compare::{ComparedModel, ModelComparison, compare};
 pub use detrended::DetrendedGain;
 pub use error::FitError;
 pub use estimate::{Fit, FitNote, Parameter};
-pub use loose::Undetermined;
 pub use quality::FitQuality;
 pub use samples::{Samples, SamplesError};
 pub use settings::{DeadTime, FitSettings, InitialCondition, MAX_POLES, OutputLevel, Structure};
 pub use trend::{DOMINANT_FRACTION, Trend};
+pub use undetermined::Undetermined;
 
 use crate::numeric::lti::Between;
 use problem::FitProblem;
@@ -119,3 +118,4 @@ fn with_dead_time_to_a_step(
 
 #[cfg(test)]
 mod tests;
+pub mod undetermined;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::file::ModelFile;
+use super::model_file::ModelFile;
 use crate::core::quantity::Unit;
 
 /// Nozzles that differ by less are the same \[mm\].
@@ -207,7 +207,7 @@ mod tests {
 
     use super::*;
     use crate::core::quantity::Quantity;
-    use crate::identify::file::Conditions;
+    use crate::identify::model_file::Conditions;
     use crate::numeric::lti::TransferFunction;
 
     fn entry(

@@ -12,15 +12,13 @@
 //! comes of it. Standard errors are those that the starts and the stops show
 //! among themselves.
 
+pub mod delay;
 mod episodes;
 mod error;
 mod estimate;
-mod fall;
 pub mod file;
 mod least_squares;
 pub mod parameters;
-mod rise;
-mod void;
 
 pub use error::StartStopFitError;
 pub use estimate::{ObservedStart, ObservedStop, StartStopFit};
@@ -32,9 +30,9 @@ use parameters::StartStop;
 /// \[mm³/s\]. Fails where the recording does not tell them.
 pub fn fit(command: &TimeSeries, flow: &TimeSeries) -> Result<StartStopFit, StartStopFitError> {
     let episodes = episodes::find(command, flow)?;
-    let fall = fall::fit(&episodes.stops)?;
-    let rise = rise::fit(&episodes.starts, &fall.model)?;
-    let void = void::fit(&rise.starts)?;
+    let fall = stop::fit(&episodes.stops)?;
+    let rise = start::fit(&episodes.starts, &fall.model)?;
+    let void = delay::fit(&rise.starts)?;
     let parameters = assemble(&fall.model, rise.time_constant_s, &void.value);
     let sigma = assemble(&fall.sigma, rise.sigma_s, &void.sigma);
     let starts = rise.starts.iter().map(|start| ObservedStart {
@@ -51,7 +49,7 @@ pub fn fit(command: &TimeSeries, flow: &TimeSeries) -> Result<StartStopFit, Star
     })
 }
 
-fn assemble(fall: &fall::StopResponse, rise_s: f64, void: &void::IdleDelay) -> StartStop {
+fn assemble(fall: &stop::StopResponse, rise_s: f64, void: &delay::IdleDelay) -> StartStop {
     StartStop {
         first_flow_s: void.first_flow_s,
         rise_s,
@@ -64,5 +62,7 @@ fn assemble(fall: &fall::StopResponse, rise_s: f64, void: &void::IdleDelay) -> S
     }
 }
 
+pub mod start;
+pub mod stop;
 #[cfg(test)]
 mod tests;

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use crate::document::Problems;
-use crate::identify::file::{self, ModelFile};
 use crate::identify::library::{Library, ModelEntry};
+use crate::identify::model_file;
+use crate::identify::model_file::ModelFile;
 
 /// A model that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -36,7 +37,7 @@ pub enum ModelFileError {
 pub fn read(path: &Path) -> Result<ModelFile, ModelFileError> {
     let text = fs::read_to_string(path)
         .map_err(|what| ModelFileError::Read { path: path.to_owned(), what })?;
-    Ok(file::parse(&path.display().to_string(), &text)?)
+    Ok(model_file::parse(&path.display().to_string(), &text)?)
 }
 
 /// The models of a folder, and why others cannot be used.

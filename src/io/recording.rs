@@ -3,9 +3,9 @@
 //! that one of many gigabytes needs no more memory than a short one.
 
 mod chunk;
+pub mod index;
 pub mod messages;
 pub mod stream;
-pub mod summary;
 
 #[cfg(test)]
 mod tests;
@@ -18,7 +18,7 @@ use std::path::Path;
 use messages::{Item, Message, Messages, Topic};
 pub use stream::Integrity;
 
-use super::record::format::{
+use super::recorder::format::{
     CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, EVENT_TOPIC, EventRow, FORMAT_VERSION, IMAGE_TOPIC,
     RUN_METADATA, RunInfo, STEP_TOPIC, StepRow,
 };

@@ -9,11 +9,11 @@
 //! ```
 
 mod drive_line;
+pub mod endpoint;
 mod extruder_line;
-mod gate;
 mod numbers;
 
 pub use drive_line::DriveLine;
+pub use endpoint::{ExtruderEndpoint, ExtruderFaults};
 pub use extruder_line::{ExtruderHello, ExtruderLine, ExtruderStatus, pump_word};
-pub use gate::{ExtruderEndpoint, ExtruderFaults};
 pub use numbers::on_wire;

@@ -27,7 +27,7 @@ use crate::drivers::camera::rendered::RobotView;
 use crate::drivers::extruder::{ExtruderClient, ExtruderEvent};
 use crate::drivers::robot::RobotEvent;
 use crate::io::clock::RunClock;
-use crate::io::record::RecorderHandle;
+use crate::io::recorder::RecorderHandle;
 use crate::rows::names;
 use crate::rows::summary::RunNote;
 use crate::run::ports::RecordError;

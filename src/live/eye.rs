@@ -15,7 +15,7 @@ use crate::core::geometry::ImagePoint;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::io::clock::RunClock;
-use crate::io::record::FrameTap;
+use crate::io::recorder::FrameTap;
 use crate::run::ports::{FrameSource, Grab};
 use crate::vision::{Measurer, Reject, Roughness, RoughnessEstimator, WidthMeasurement};
 

@@ -8,12 +8,12 @@ use maud::{Markup, html};
 
 use super::html::reloading_page;
 use crate::calibration::board::Board;
-use crate::calibration::map;
-use crate::calibration::map::WidthMap;
+use crate::calibration::board_observation::Observations;
 use crate::calibration::next_view::NextView;
-use crate::calibration::quality;
-use crate::calibration::sighting::Observations;
 use crate::calibration::solve::Solution;
+use crate::calibration::warnings;
+use crate::calibration::width_map;
+use crate::calibration::width_map::WidthMap;
 use crate::core::geometry::GridSize;
 use drawing::{Drawing, residuals, width_map};
 
@@ -77,8 +77,8 @@ impl CalibrationPage<'_> {
     }
 
     fn verdict(&self) -> Markup {
-        let warnings = quality::warnings(self.solution);
-        let worst = map::worst_mm(self.maps);
+        let warnings = warnings::warnings(self.solution);
+        let worst = width_map::worst_mm(self.maps);
         let fails = self.limit_mm.is_some_and(|limit| worst.is_none_or(|worst| worst > limit));
         let (class, word) = match (fails, worst, warnings.is_empty()) {
             (true, ..) | (_, None, _) => ("bad", "Not good enough."),
@@ -177,8 +177,8 @@ impl CalibrationPage<'_> {
         &self,
         name: &str,
         look: &Result<
-            crate::calibration::sighting::BoardObservation,
-            crate::calibration::refusal::BoardRejection,
+            crate::calibration::board_observation::BoardObservation,
+            crate::calibration::rejection::BoardRejection,
         >,
         largest: f64,
     ) -> Markup {
@@ -191,7 +191,7 @@ impl CalibrationPage<'_> {
                         td.number { (view.corners.len()) }
                         td.number { (format!("{:.3}", view.rms_px)) }
                         td.number { (format!("{:.3}", view.max_px)) }
-                        td.number { (format!("{:.0}", quality::tilt_deg(view))) }
+                        td.number { (format!("{:.0}", warnings::tilt_deg(view))) }
                         td.number {
                             @if let Some(focus) = sighting.focus {
                                 (format!("{:.1} × {:.1}", focus.along_rows_px, focus.along_columns_px))

@@ -2,7 +2,6 @@
 //! files that tell it.
 
 mod curves;
-mod doubts;
 mod json;
 mod model;
 mod page;
@@ -10,13 +9,13 @@ mod refusal;
 pub mod starts;
 mod table;
 
-use crate::identify::ahead::output_lead;
+use crate::identify::autocorrelation::Autocorrelation;
 use crate::identify::experiment::Experiment;
 use crate::identify::fit::{
     ComparedModel, DetrendedGain, Fit, FitError, FitNote, FitSettings, InitialCondition,
     ModelComparison, Samples, SamplesError, compare,
 };
-use crate::identify::residual::Autocorrelation;
+use crate::identify::output_lead::output_lead;
 use crate::numeric::lti::Between;
 
 pub use json::to_json;
@@ -64,7 +63,7 @@ pub fn study(logs: Logs, forms: &[FitSettings]) -> Result<ModelStudy, NoModel> {
             form: form(fit.settings.structure),
             estimation: fit.quality.fit_percent,
             validation: quality.fit_percent,
-            drift: doubts::output_drift(&logs),
+            drift: warnings::output_drift(&logs),
         });
     }
     let steady = DetrendedGain::of(&estimation, &fit.settings);
@@ -119,7 +118,7 @@ fn undetermined(note: &FitNote) -> Option<String> {
 
 fn none(comparison: &ModelComparison, logs: &Logs) -> NoModel {
     let is_given = |row: &ComparedModel| matches!(row.fit, Err(FitError::Drift { .. }));
-    let drift = doubts::output_drift(logs).filter(|_| !comparison.rows.iter().any(is_given));
+    let drift = warnings::output_drift(logs).filter(|_| !comparison.rows.iter().any(is_given));
     NoModel::None { forms: comparison.rows.iter().map(refused).collect(), drift }
 }
 
@@ -138,3 +137,4 @@ fn other_gain(study: &ModelStudy, steady: &DetrendedGain) -> Option<String> {
 
 #[cfg(test)]
 mod tests;
+pub mod warnings;

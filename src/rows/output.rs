@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::io::whole_file;
+use crate::io::atomic_file;
 
 /// An output that could not be written, where, and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -103,7 +103,7 @@ impl Write for Partial {
 /// Writes a file whose content is at hand. A failure leaves nothing behind.
 pub fn write_whole(folder: &Path, name: &str, content: &[u8]) -> Result<PathBuf, LogError> {
     let path = folder.join(name);
-    whole_file::write_atomic(&path, content)
+    atomic_file::write_atomic(&path, content)
         .map_err(|error| LogError::Write { path: error.path, source: error.what })?;
     Ok(path)
 }

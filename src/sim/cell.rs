@@ -5,8 +5,8 @@
 
 mod camera;
 mod clock;
+pub mod observer;
 mod port;
-mod witness;
 
 use crate::calibration::Calibration;
 use crate::cell::Cell;
@@ -28,7 +28,7 @@ use super::laid::{LaidBead, PathSpeed};
 use super::render::RenderError;
 
 pub use camera::FrameObservation;
-pub use witness::{NoObserver, Observer};
+pub use observer::{NoObserver, Observer};
 
 use std::collections::VecDeque;
 

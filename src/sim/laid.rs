@@ -1,6 +1,6 @@
 //! The bead as it has been laid: where its edges lie, along the path.
 
-use super::wander::FlowDrift;
+use super::flow_drift::FlowDrift;
 use super::waviness::Waviness;
 use crate::scenario::bead::{BeadModel, EdgeRoughness};
 use crate::scenario::disturbance::Flow;

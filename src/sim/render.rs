@@ -4,10 +4,10 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::bend::BeadPath;
+use super::bead_path::BeadPath;
+use super::coverage::{BeadCoverage, Masks};
 use super::light::Light;
 use super::outline::{BeadEdges, BeadOutline};
-use super::seen::{BeadCoverage, Masks};
 use super::shade::{self, BeadShape};
 use super::tint::Tint;
 use super::truth::{self, Truth};

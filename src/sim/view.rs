@@ -7,7 +7,7 @@
 
 use nalgebra::Vector2;
 
-use super::bend::BeadPath;
+use super::bead_path::BeadPath;
 use crate::calibration::SurfaceMap;
 use crate::core::geometry::{ImagePoint, Roi, SurfacePoint};
 use crate::vision::{BeadAxis, Gauge};

@@ -3,8 +3,8 @@
 //! paper's cases a and b), fed open loop, by the law without a predictor, and
 //! by the law with one.
 
-pub mod course;
 pub mod experiment;
+pub mod response;
 pub mod robustness;
 pub mod run;
 pub mod table;
@@ -16,7 +16,7 @@ use crate::extruder::screw::{
     SpeedPulsation, TurnUnit,
 };
 
-pub use course::{Cycle, PlugResponse, PlugSample};
+pub use response::{Cycle, PlugResponse, PlugSample};
 pub use run::{FeedMethod, RunPlan, follow};
 
 /// Plug at the start.

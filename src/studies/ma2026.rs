@@ -2,17 +2,17 @@
 //! drift and steps of the load, with the paper's laws and with ours, on the
 //! same plant.
 
-pub mod course;
 pub mod experiment;
 pub mod margins;
 pub mod plant;
+pub mod response;
 pub mod table;
 #[cfg(test)]
 mod tests;
 
-pub use course::{LoadFigures, PressureResponse, StepFigures};
 pub use experiment::{PressureExperiment, PressureTarget, STEP_EVERY, TestedController};
 pub use margins::{MismatchMargins, margins};
 pub use plant::{
     DEAD_TIME_S, DRIFT_MPA2, Factors, LAG_S, LOAD_RPM, MODEL_ERROR, NOISE_MPA2, STEP_MPA, model,
 };
+pub use response::{LoadFigures, PressureResponse, StepFigures};

@@ -5,7 +5,7 @@
 use maud::html;
 
 use super::error::ReproduceError;
-use super::source::Publication;
+use super::publication::Publication;
 use super::study::{Effort, Reproduced};
 use crate::io::progress::Progress;
 use crate::report::html::whole_page;

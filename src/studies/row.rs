@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::source::Publication;
+use super::publication::Publication;
 
 /// One quantity of one experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -172,8 +172,8 @@ fn error_profile(trials: &[LayerTrial], target_mm: f64) -> Vec<BeadPoint> {
 mod tests {
     use std::path::Path;
 
+    use super::*;
     use crate::cell::file::Purpose;
-    use crate::trials::compare::*;
 
     fn contender(name: &str, text: &str) -> Contender {
         let cell = Cell::parse(Path::new(name), text, Purpose::Run).unwrap();

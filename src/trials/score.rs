@@ -90,7 +90,7 @@ impl Observer for LayerScore {
 
 #[cfg(test)]
 mod tests {
-    use crate::trials::score::*;
+    use super::*;
 
     #[test]
     fn what_was_never_seen_has_no_error() {

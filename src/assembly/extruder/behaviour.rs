@@ -9,9 +9,9 @@ use crate::core::units::Rpm;
 use crate::extruder::feedforward::ScrewSpeed;
 use crate::extruder::rheology::DragFlow;
 use crate::extruder::strategy::OperatingPoint;
-use crate::identify::file as model;
-use crate::io::record::ExtruderFile;
-use crate::io::recorded::COMMAND;
+use crate::identify::model_file as model;
+use crate::io::bead_columns::COMMAND;
+use crate::io::recorder::ExtruderFile;
 use crate::numeric::lti::TransferFunction;
 
 /// What messages say of a strategy that was given no file.

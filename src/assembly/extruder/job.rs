@@ -7,7 +7,7 @@ use super::behaviour::wrong_file;
 use crate::assembly::error::AssemblyError;
 use crate::cell::file::{ExtruderPart, RunPart};
 use crate::extruder::trajectory::{self, PlannedJob};
-use crate::io::record::ExtruderFile;
+use crate::io::recorder::ExtruderFile;
 
 /// How far the section of a plan may lie from the cell's, as a share.
 const SECTION_TOLERANCE: f64 = 0.02;

@@ -8,7 +8,7 @@ use crate::core::units::Mm;
 use crate::extruder::start_stop::{BeadConditions, StartStopTiming};
 use crate::extruder::trajectory::PlannedJob;
 use crate::identify::start_stop::file;
-use crate::io::record::ExtruderFile;
+use crate::io::recorder::ExtruderFile;
 
 /// Reads the file of starts and stops for the bead of the cell.
 pub fn timing(

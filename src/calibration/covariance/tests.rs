@@ -3,7 +3,7 @@ use nalgebra::Vector3;
 
 use crate::calibration::CalibrationQuality;
 use crate::calibration::lens::Lens;
-use crate::calibration::share;
+use crate::calibration::relative_sigma;
 use crate::calibration::solve;
 use crate::calibration::synthetic;
 use crate::calibration::synthetic::{SIZE, TRUTH, board, poses};
@@ -117,7 +117,7 @@ fn three_boards_on_the_bed_tell_its_plane_better_than_one() {
 fn the_share_is_no_smaller_than_that_of_a_bead_in_the_middle() {
     let (solution, [_, later, _]) = solved(2);
     let covariance = covariance(&solution, &later);
-    let share = share::where_seen(&covariance).unwrap();
+    let share = relative_sigma::where_seen(&covariance).unwrap();
     let (ends, height) = beads()[0];
     let (width, sigma) = covariance.width_mm(ends, height).unwrap();
     assert!(share >= sigma / width && share < 0.002, "{share}");
@@ -137,9 +137,9 @@ fn the_share_is_no_smaller_than_that_of_a_bead_in_the_middle() {
 #[test]
 fn more_noise_leaves_more_and_boards_all_alike_do_not_settle_the_camera() {
     let (solution, [_, later, _]) = solved(3);
-    let share = share::where_seen(&covariance(&solution, &later)).unwrap();
+    let share = relative_sigma::where_seen(&covariance(&solution, &later)).unwrap();
     let noisy = Solution { noise_px: 2.0 * solution.noise_px, ..solution.clone() };
-    let doubled = share::where_seen(&covariance(&noisy, &later)).unwrap();
+    let doubled = relative_sigma::where_seen(&covariance(&noisy, &later)).unwrap();
     assert!((doubled / share - 2.0).abs() < 1e-9);
     let straight = Pose::new(Vector3::zeros(), Vector3::new(-80.0, -50.0, 420.0));
     let mut alike = solution;

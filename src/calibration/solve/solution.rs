@@ -2,8 +2,8 @@
 
 use crate::calibration::Camera;
 use crate::calibration::board::{Board, CornerObservation};
-use crate::calibration::choose::LensTrial;
 use crate::calibration::equations::{CameraModel, Correspondence, FreeParameters, SHARED};
+use crate::calibration::lens_selection::LensTrial;
 use crate::core::geometry::{ImagePoint, Pose};
 
 /// One picture in the solution.

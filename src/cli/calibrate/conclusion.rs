@@ -3,24 +3,24 @@
 use anyhow::Context;
 
 use super::arguments::CalibrateArgs;
-use super::pictures::CalibrationImages;
+use super::images::CalibrationImages;
 use super::{plane, report};
 use crate::calibration::board::Board;
+use crate::calibration::board_observation::BoardObservation;
 use crate::calibration::covariance::CalibrationCovariance;
-use crate::calibration::map;
-use crate::calibration::map::WidthMap;
 use crate::calibration::next_view;
 use crate::calibration::next_view::NextView;
-use crate::calibration::quality;
-use crate::calibration::share;
-use crate::calibration::sighting::BoardObservation;
+use crate::calibration::relative_sigma;
 use crate::calibration::solve;
 use crate::calibration::solve::Solution;
+use crate::calibration::warnings;
+use crate::calibration::width_map;
+use crate::calibration::width_map::WidthMap;
 use crate::calibration::{Calibration, CalibrationQuality, file};
 use crate::cli::bed_plane::BedPlane;
 use crate::core::geometry::GridSize;
 use crate::core::units::Mm;
-use crate::io::whole_file::write_atomic;
+use crate::io::atomic_file::write_atomic;
 use crate::report::calibration::CalibrationPage;
 
 /// A camera that was found, and how well.
@@ -50,7 +50,7 @@ impl<'a> CalibrationResult<'a> {
         let solution = solve::solve(board, &seen)?;
         let plane = plane::find(args, board, &solution, pictures)?;
         // Corners' noise is the least of the errors where the focal length is loose.
-        let covariance = quality::settles_camera(&solution)
+        let covariance = warnings::settles_camera(&solution)
             .then(|| CalibrationCovariance::of(board, &solution, &plane.on_bed, plane.thickness))
             .flatten();
         let mut conclusion = Self {
@@ -80,7 +80,8 @@ impl<'a> CalibrationResult<'a> {
         }
         let usual = [Mm::ZERO, Mm::new((camera_mm / 20.0).round()).unwrap_or(Mm::ZERO)];
         let heights = if given.is_empty() { &usual[..] } else { given };
-        let Some(bead) = self.args.bead_mm.map(Mm::get).or_else(|| map::typical_bead_mm(known))
+        let Some(bead) =
+            self.args.bead_mm.map(Mm::get).or_else(|| width_map::typical_bead_mm(known))
         else {
             return Ok(());
         };
@@ -92,7 +93,7 @@ impl<'a> CalibrationResult<'a> {
     /// The largest standard deviation of the bead's width where boards were seen \[mm\], at
     /// any of the heights; `None` where that cannot be told.
     pub fn worst_mm(&self) -> Option<f64> {
-        map::worst_mm(&self.maps)
+        width_map::worst_mm(&self.maps)
     }
 
     /// Whether a width is known less well than it must be.
@@ -106,7 +107,7 @@ impl<'a> CalibrationResult<'a> {
     fn width_sigma_fraction(&self) -> Option<f64> {
         let bead = self.maps.first().map(|map| map.bead_mm);
         let given = self.worst_mm().zip(bead).map(|(worst, bead)| worst / bead);
-        given.or_else(|| share::where_seen(self.covariance.as_ref()?))
+        given.or_else(|| relative_sigma::where_seen(self.covariance.as_ref()?))
     }
 
     /// The answer, but for the list of pictures.

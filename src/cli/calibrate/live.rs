@@ -10,23 +10,23 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::arguments::CalibrateArgs;
 use super::conclusion::CalibrationResult;
-use super::pictures::{CalibrationImages, taken_so_far};
+use super::images::{CalibrationImages, taken_so_far};
 use crate::calibration::board::Board;
+use crate::calibration::board_observation;
 use crate::calibration::collect::{Collector, Decision};
 use crate::calibration::coverage::{Coverage, PARTS, SIDES};
-use crate::calibration::quality;
-use crate::calibration::sighting;
 use crate::calibration::solve::MIN_VIEWS;
+use crate::calibration::warnings;
 use crate::cell::file::ImageSource;
 use crate::cli::arguments::WrongArguments;
 use crate::core::frame::{Channel, Frame};
 use crate::core::time::Span;
 use crate::drivers::camera::open;
 use crate::drivers::camera::open::LiveOptions;
+use crate::io::atomic_file::write_atomic;
 use crate::io::clock::RunClock;
 use crate::io::image_file;
 use crate::io::stop::StopSignal;
-use crate::io::whole_file::write_atomic;
 use crate::run::ports::{FrameSource, Grab};
 
 /// Longest wait for a picture \[s\].
@@ -157,7 +157,7 @@ impl<'a> Taking<'a> {
 
     /// Whether the pictures are enough.
     fn examine(&mut self, frame: &Frame) -> anyhow::Result<bool> {
-        match self.collector.add(sighting::observe(self.board, "", frame)) {
+        match self.collector.add(board_observation::observe(self.board, "", frame)) {
             Decision::Kept(number) => self.keep(number, frame),
             news => {
                 self.screen.state(&words(&news));
@@ -242,7 +242,7 @@ fn is_enough(args: &CalibrateArgs, conclusion: &CalibrationResult<'_>) -> bool {
         Some(_) => !conclusion.fails(),
         None => conclusion.worst_mm().is_some() && conclusion.next.is_none(),
     };
-    known && quality::warnings(&conclusion.solution).is_empty()
+    known && warnings::warnings(&conclusion.solution).is_empty()
 }
 
 /// How far the pictures have come.
@@ -270,7 +270,7 @@ fn progress(args: &CalibrateArgs, conclusion: &CalibrationResult<'_>) -> String 
             .next
             .as_ref()
             .map_or_else(String::new, |next| format!("would help most: {next}")),
-        quality::warnings(&conclusion.solution)
+        warnings::warnings(&conclusion.solution)
             .first()
             .map_or_else(String::new, ToString::to_string),
     ];

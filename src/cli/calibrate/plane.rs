@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 
 use super::arguments::CalibrateArgs;
-use super::pictures::CalibrationImages;
+use super::images::CalibrationImages;
 use crate::calibration::board::{Board, CornerObservation};
+use crate::calibration::board_observation::Observations;
 use crate::calibration::charuco::MarkerError;
-use crate::calibration::refusal::BoardRejection;
-use crate::calibration::sighting::Observations;
+use crate::calibration::rejection::BoardRejection;
 use crate::calibration::solve::Solution;
 use crate::cli::arguments::WrongArguments;
 use crate::cli::bed_plane::{BedPlane, BoardsOnBed, find_corners};

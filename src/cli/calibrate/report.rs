@@ -3,15 +3,15 @@
 use std::fmt::Write;
 
 use crate::calibration::Calibration;
+use crate::calibration::board_observation::Observations;
 use crate::calibration::camera::NUMBERS;
 use crate::calibration::covariance::CalibrationCovariance;
-use crate::calibration::map;
-use crate::calibration::map::WidthMap;
 use crate::calibration::next_view::NextView;
-use crate::calibration::quality;
 use crate::calibration::scale::single_scale;
-use crate::calibration::sighting::Observations;
 use crate::calibration::solve::{SHARED_NAMES, Solution};
+use crate::calibration::warnings;
+use crate::calibration::width_map;
+use crate::calibration::width_map::WidthMap;
 use crate::core::units::Mm;
 
 /// One line an image: corners and errors, or why it is not used.
@@ -145,7 +145,7 @@ pub fn width(
         line!(out, "  degrees to several sides");
         return out;
     };
-    let given = maps.first().filter(|_| map::worst_mm(maps).is_some());
+    let given = maps.first().filter(|_| width_map::worst_mm(maps).is_some());
     let bead = given.map_or_else(
         || " of a bead that fills a third of where boards were seen,".to_owned(),
         |map| format!(" ({:.4} mm in {} mm)", share * map.bead_mm, map.bead_mm),
@@ -190,7 +190,7 @@ pub fn maps(maps: &[WidthMap], limit: Option<Mm>) -> String {
         );
     }
     if let Some(limit) = limit {
-        match map::worst_mm(maps) {
+        match width_map::worst_mm(maps) {
             None => line!(out, "  FAIL: such a bead is not seen whole where boards were seen"),
             Some(mm) if mm > limit.get() => {
                 line!(out, "  FAIL: {mm:.4} mm where boards were seen, more than {limit}");
@@ -269,7 +269,7 @@ pub fn scale(
 /// Reasons for doubt.
 pub fn warnings(solution: &Solution) -> String {
     let mut out = String::new();
-    let warnings = quality::warnings(solution);
+    let warnings = warnings::warnings(solution);
     if !warnings.is_empty() {
         line!(out);
     }

@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::cli::arguments::WrongArguments;
 use crate::cli::board_arguments::BoardArgs;
-use crate::io::whole_file::write_atomic;
+use crate::io::atomic_file::write_atomic;
 use crate::report::sheet::{BoardSheet, Paper};
 
 /// Makes a checkerboard to print, at its true size.

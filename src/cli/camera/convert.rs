@@ -12,8 +12,8 @@ use crate::calibration::{Calibration, CalibrationQuality};
 use crate::cli::arguments::{WrongArguments, check_writable};
 use crate::cli::print::Verbosity;
 use crate::core::units::Mm;
+use crate::io::atomic_file::write_atomic;
 use crate::io::calibration_file;
-use crate::io::whole_file::write_atomic;
 
 /// Runs the command. What the other format cannot hold goes to standard error.
 pub fn run(args: &ConvertArgs, voice: Verbosity) -> anyhow::Result<()> {

@@ -7,10 +7,10 @@ use nalgebra::Vector2;
 
 use crate::assembly::LoadedCell;
 use crate::calibration::Calibration;
-use crate::calibration::map::{Cells, MAP_CELLS};
-use crate::calibration::share_map::{MapBead, RelativeSigmaMap, relative_sigma_at};
+use crate::calibration::relative_sigma_map::{MapBead, RelativeSigmaMap, relative_sigma_at};
+use crate::calibration::width_map::{Cells, MAP_CELLS};
 use crate::core::geometry::{ImagePoint, Roi};
-use crate::io::whole_file::write_atomic;
+use crate::io::atomic_file::write_atomic;
 use crate::report::calibration::cell::CellCalibrationPage;
 use crate::vision::gauge::BeadAxis;
 

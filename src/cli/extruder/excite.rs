@@ -8,10 +8,10 @@ use clap::{Args, Subcommand};
 use crate::cli::arguments::WrongArguments;
 use crate::cli::arguments::refuse_replacing;
 use crate::core::quantity::{Quantity, Unit};
+use crate::identify::command_profile::{CommandProfile, file};
+use crate::identify::digits::six_digits;
 use crate::identify::excitation::{Excitation, Waveform};
-use crate::identify::number::six_digits;
-use crate::identify::profile::{CommandProfile, file};
-use crate::io::whole_file::write_atomic;
+use crate::io::atomic_file::write_atomic;
 
 /// Levels held for less are a slip of the unit \[s\].
 const SHORTEST_S: f64 = 1e-3;

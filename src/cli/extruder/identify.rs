@@ -12,7 +12,7 @@ use anyhow::{Context, Result};
 pub use self::arguments::IdentifyArgs;
 use super::keep;
 use crate::cli::arguments::free_folder;
-use crate::identify::file::{Conditions, to_toml};
+use crate::identify::model_file::{Conditions, to_toml};
 use crate::report::identify::{ModelStudy, page, study, text, to_json};
 use crate::rows::output::{make_folder, write_whole};
 

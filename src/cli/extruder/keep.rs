@@ -7,8 +7,8 @@ use anyhow::{Context, Result, anyhow};
 
 use crate::cli::arguments::WrongArguments;
 use crate::cli::arguments::refuse_replacing;
-use crate::identify::file::parse;
 use crate::identify::library::file_name;
+use crate::identify::model_file::parse;
 use crate::io::model_file::read_library;
 use crate::rows::output::{make_folder, write_whole};
 

@@ -8,8 +8,8 @@ use clap::Args;
 
 use crate::cli::arguments::WrongArguments;
 use crate::core::quantity::Unit;
-use crate::identify::file::ModelFile;
 use crate::identify::library::{Library, ModelEntry, ModelQuery, TOLERANCE_C};
+use crate::identify::model_file::ModelFile;
 use crate::io::model_file::{ModelFolder, read, read_library};
 
 /// Lists a folder of models, or tells which of them a cell would use.

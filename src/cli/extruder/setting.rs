@@ -3,7 +3,7 @@
 use clap::Args;
 
 use crate::cli::arguments::WrongArguments;
-use crate::identify::file::Conditions;
+use crate::identify::model_file::Conditions;
 
 /// Material, nozzle and temperature.
 #[derive(Debug, Args)]

@@ -10,10 +10,10 @@ use clap::{Args, ValueEnum};
 use crate::cli::print::Verbosity;
 use crate::io::progress::Progress;
 use crate::rows::output;
+use crate::studies::publication::Publication;
 use crate::studies::reproduce::summary::PaperSummary;
 use crate::studies::reproduce::{page, table};
 use crate::studies::row::TableRow;
-use crate::studies::source::Publication;
 use crate::studies::study::{Effort, Reproduced};
 
 /// Runs the experiments of a source paper beside its published numbers.

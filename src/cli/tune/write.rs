@@ -10,7 +10,7 @@ use super::experiment::DISTANCE_KEYS;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::cli::arguments::{WrongArguments, refuse_replacing};
-use crate::io::whole_file::write_atomic;
+use crate::io::atomic_file::write_atomic;
 use crate::report::tuned::Tuned;
 
 /// Keys of the file that name another file.

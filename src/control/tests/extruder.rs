@@ -9,7 +9,7 @@ use crate::extruder::{
     ExtruderState, ExtruderStrategy, FlowFollows, PumpMode, RobotFollows,
 };
 use crate::extruder::{ExtruderSetup, FlowDemand};
-use crate::identify::profile::{CommandProfile, ProfilePoint};
+use crate::identify::command_profile::{CommandProfile, ProfilePoint};
 
 const TICK_S: f64 = 0.005;
 const SPEED: f64 = 112.5;

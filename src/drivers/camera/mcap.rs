@@ -19,9 +19,9 @@ use crate::core::frame::{Channel, Frame};
 use crate::core::time::Stamp;
 use crate::io::foxglove::{COMPRESSED_IMAGE, CompressedImage, RAW_IMAGE, RawImage, timestamp_ns};
 use crate::io::image_file;
-use crate::io::record::format::EVENT_TOPIC;
+use crate::io::recorder::format::EVENT_TOPIC;
 use crate::io::recording::messages::{Message, Topic};
-use crate::io::recording::{RecordedEntry, Recording, RecordingError, summary};
+use crate::io::recording::{RecordedEntry, Recording, RecordingError, index};
 use crate::run::ports::{FrameSource, Grab, SourceError};
 
 /// Frames of one topic of an MCAP.
@@ -62,7 +62,7 @@ impl McapSource {
                 return Err(fault(&name, wrong_kind(&message.topic)));
             }
         };
-        let expected = summary::messages_of(path, &first.topic.name);
+        let expected = index::messages_of(path, &first.topic.name);
         let topic = Arc::clone(&first.topic);
         Ok(Self {
             recording,

@@ -12,7 +12,7 @@ use crate::core::time::{Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::run::ports::{FrameSource, Grab, SourceError};
 use crate::scenario::table::Simulation;
-use crate::sim::follow::{BeadFollower, BeadRecipe};
+use crate::sim::bead_follower::{BeadFollower, BeadRecipe};
 use crate::sim::render::Renderer;
 
 /// Reports that wait for the camera: some 20 s of a robot that reports every

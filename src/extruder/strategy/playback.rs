@@ -5,7 +5,7 @@ use super::interface::{CommandDemand, ExtruderController, UnusableReading};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm3PerS;
 use crate::extruder::report::ExtruderReport;
-use crate::identify::profile::CommandProfile;
+use crate::identify::command_profile::CommandProfile;
 
 /// One command for as long as bead is laid, in the unit of the command.
 #[derive(Debug, Clone, Copy, PartialEq)]

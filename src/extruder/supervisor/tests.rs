@@ -2,7 +2,7 @@ use super::*;
 use crate::core::units::Rpm;
 use crate::extruder::strategy::{ConstantCommand, Playback};
 use crate::extruder::{ExtruderFault, ExtruderHold, PumpMode};
-use crate::identify::profile::{CommandProfile, ProfilePoint};
+use crate::identify::command_profile::{CommandProfile, ProfilePoint};
 
 const TICK: Span = Span::from_millis(5);
 const FLOW: Mm3PerS = Mm3PerS::constant(500.0);

@@ -1,7 +1,7 @@
 //! Widths beside the speeds that may have laid them.
 
-use super::course::{PowerIntegral, SpeedProfile};
 use super::observation::BeadObservation;
+use super::speed_profile::{PowerIntegral, SpeedProfile};
 use super::whiten::PathPosition;
 use crate::core::units::Mm;
 use crate::numeric::number::to_f64;

@@ -1,10 +1,10 @@
 //! What is left of the widths, over the offset: least squares for level and exponent at
 //! each.
 
-use super::course::SpeedProfile;
 use super::data::{PooledWidths, median};
 use super::estimate::{EXPONENT_RANGE, WidthAtSpeed};
 use super::observation::BeadObservation;
+use super::speed_profile::SpeedProfile;
 use super::whiten::{PathWhitener, WidthNoise};
 use crate::core::units::Mm;
 use crate::numeric::number::to_f64;

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
+use crate::identify::digits::six_digits;
 use crate::identify::grid::SampleGap;
-use crate::identify::number::six_digits;
 
 /// Samples that a model takes at least.
 pub const MIN_SAMPLES: usize = 50;

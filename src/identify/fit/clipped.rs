@@ -4,7 +4,7 @@
 use std::fmt;
 
 use super::row::min_max;
-use crate::identify::number::six_digits;
+use crate::identify::digits::six_digits;
 use crate::numeric::number::to_f64;
 
 /// Levels, each about once, from which on a signal goes through many.

@@ -1,8 +1,8 @@
 //! Why there is no fit.
 
-use super::loose::Undetermined;
 use super::samples::SamplesError;
-use crate::identify::number::{six_digits, three_digits};
+use super::undetermined::Undetermined;
+use crate::identify::digits::{six_digits, three_digits};
 use crate::numeric::lti::ModelError;
 
 /// Why there is no fit, with what was found.

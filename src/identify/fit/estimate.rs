@@ -4,11 +4,11 @@ use nalgebra::DMatrix;
 
 use super::error::FitError;
 use super::linear::least_squares;
-use super::loose::Undetermined;
 use super::problem::free_responses;
 use super::quality::FitQuality;
 use super::samples::{Samples, SamplesError};
 use super::settings::{FitSettings, InitialCondition};
+use super::undetermined::Undetermined;
 use crate::numeric::lti::{Simulator, TransferFunction};
 
 /// A parameter that was estimated.

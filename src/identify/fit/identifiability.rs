@@ -2,10 +2,10 @@
 
 use nalgebra::{Complex, DMatrix};
 
-use super::loose::Undetermined;
 use super::named::NamedParameters;
 use super::problem::FitProblem;
 use super::spread::Covariances;
+use super::undetermined::Undetermined;
 use crate::numeric::lti::polynomial;
 
 /// By how many standard errors a coefficient must differ from zero.

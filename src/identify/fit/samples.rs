@@ -5,7 +5,7 @@ use super::clipped;
 use super::clipped::Clipped;
 use super::row::min_max;
 use super::settings::InitialCondition;
-use crate::identify::number::six_digits;
+use crate::identify::digits::six_digits;
 
 /// Size that no sample reaches; larger ones would overflow where they are
 /// squared and multiplied.

@@ -1,6 +1,6 @@
 //! Why a recording does not tell how an extruder starts and stops.
 
-use crate::identify::number::three_digits;
+use crate::identify::digits::three_digits;
 
 /// What is wrong with a recording, with what was found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

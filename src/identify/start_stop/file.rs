@@ -3,7 +3,7 @@
 use super::estimate::StartStopFit;
 use super::parameters::StartStop;
 use crate::document::{Document, Problems, Table};
-use crate::identify::file::{Conditions, number, put, put_conditions, read_conditions, row};
+use crate::identify::model_file::{Conditions, number, put, put_conditions, read_conditions, row};
 
 /// A parameter as files and tables name it.
 #[derive(Debug, Clone, Copy)]

@@ -5,7 +5,7 @@ use super::*;
 use crate::cell::file::KeepFrames;
 use crate::core::frame::{Frame, Pixels};
 use crate::core::geometry::Size;
-use crate::io::record::{RecordConfig, start};
+use crate::io::recorder::{RecordConfig, start};
 use crate::run::ports::Recorder;
 
 const EVENTS: u64 = 800;

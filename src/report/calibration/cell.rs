@@ -3,7 +3,7 @@
 use maud::html;
 
 use super::drawing::sigma_map;
-use crate::calibration::share_map::RelativeSigmaMap;
+use crate::calibration::relative_sigma_map::RelativeSigmaMap;
 use crate::core::geometry::Roi;
 use crate::report::html::whole_page;
 

@@ -2,9 +2,9 @@
 
 use maud::{Markup, html};
 
-use crate::calibration::map::{Cells, MAP_CELLS, WidthMap};
-use crate::calibration::share_map::RelativeSigmaMap;
+use crate::calibration::relative_sigma_map::RelativeSigmaMap;
 use crate::calibration::solve::{BoardView, Solution};
+use crate::calibration::width_map::{Cells, MAP_CELLS, WidthMap};
 use crate::numeric::rank;
 use crate::report::chart::palette::{GAUGE, Ink, LEFT_EDGE, LIMIT, REJECTED, WIDTH};
 

@@ -1,10 +1,11 @@
 //! A model with its data and all that is known of it.
 
 use crate::core::quantity::Quantity;
+use crate::identify::autocorrelation::Autocorrelation;
 use crate::identify::experiment::Experiment;
-use crate::identify::file::{self, Conditions, ModelFile, ParameterUncertainty};
 use crate::identify::fit::{Fit, FitQuality, ModelComparison, Structure};
-use crate::identify::residual::Autocorrelation;
+use crate::identify::model_file;
+use crate::identify::model_file::{Conditions, ModelFile, ParameterUncertainty};
 
 /// Data and what they are called.
 #[derive(Debug, Clone)]
@@ -67,7 +68,7 @@ impl ModelStudy {
         let input = &self.logs.estimation.input;
         let start = (f64::INFINITY, f64::NEG_INFINITY);
         let input_range = input.iter().fold(start, |(low, high), v| (low.min(*v), high.max(*v)));
-        let parameters = fit.parameters.iter().map(|one| file::SavedParameter {
+        let parameters = fit.parameters.iter().map(|one| model_file::SavedParameter {
             name: one.name.clone(),
             value: one.value,
             standard_error: one.sigma,
@@ -85,7 +86,7 @@ impl ModelStudy {
                 // Symmetric, so that rows are columns.
                 covariance: fit.covariance.iter().copied().collect(),
             }),
-            fit: Some(file::FitSummary {
+            fit: Some(model_file::FitSummary {
                 step_s: self.logs.estimation.step_s,
                 estimation_percent: fit.quality.fit_percent,
                 validation_percent: self.validation.map(|quality| quality.fit_percent),

@@ -1,7 +1,7 @@
 //! Why no model can be trusted.
 
-use crate::identify::ahead::OutputLead;
 use crate::identify::fit::SamplesError;
+use crate::identify::output_lead::OutputLead;
 
 /// No model that can be trusted.
 #[derive(Debug, thiserror::Error)]

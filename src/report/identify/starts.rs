@@ -8,8 +8,8 @@ pub use page::page;
 pub use text::text;
 
 use crate::core::quantity::Quantity;
-use crate::identify::file::Conditions;
-use crate::identify::number::three_digits;
+use crate::identify::digits::three_digits;
+use crate::identify::model_file::Conditions;
 use crate::identify::series::TimeSeries;
 use crate::identify::start_stop::file::{
     ParameterKey, START_PARAMETERS, STOP_PARAMETERS, StartStopFile,

@@ -5,9 +5,10 @@
 use super::*;
 use crate::core::quantity::{Quantity, Unit};
 use crate::identify::experiment::Rules;
-use crate::identify::file::{self, Conditions};
 use crate::identify::fit::DeadTime;
 use crate::identify::fit::Structure;
+use crate::identify::model_file;
+use crate::identify::model_file::Conditions;
 use crate::sim::flow_log;
 use crate::sim::flow_log::FlowLog;
 
@@ -60,8 +61,8 @@ fn a_known_extruder_is_found_again_and_its_file_is_read_again() {
     let setting =
         Conditions { material: Some("PLA".to_owned()), nozzle_mm: Some(0.4), temperature_c: None };
     let model = found.model(setting);
-    let text = file::to_toml(&model, &[super::text(&found)]);
-    assert_eq!(file::parse("model.toml", &text).unwrap(), model);
+    let text = model_file::to_toml(&model, &[super::text(&found)]);
+    assert_eq!(model_file::parse("model.toml", &text).unwrap(), model);
     assert_eq!((model.input_range, model.operating_point.0), ((25.0, 35.0), 30.0));
     assert!((model.operating_point.1 - 540.0).abs() < 1.0);
     // The page shows every curve, and no number that is none.

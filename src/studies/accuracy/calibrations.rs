@@ -4,16 +4,16 @@
 use nalgebra::{Point3, Rotation3, Vector3};
 
 use crate::calibration::board::{Board, BoardError, observe_all};
+use crate::calibration::board_observation;
+use crate::calibration::board_observation::BoardObservation;
 use crate::calibration::covariance::CalibrationCovariance;
 use crate::calibration::plane::{OnBed, bed_from_board};
-use crate::calibration::sighting;
-use crate::calibration::sighting::BoardObservation;
 use crate::calibration::solve;
 use crate::calibration::solve::Solution;
 use crate::calibration::{Calibration, CalibrationQuality, Camera};
 use crate::core::geometry::{ImagePoint, Pose};
 use crate::core::units::Mm;
-use crate::sim::boards::{BoardStudio, Exposure};
+use crate::sim::board_studio::{BoardStudio, Exposure};
 use crate::sim::hash;
 
 /// Tilts of boards that are held before a camera \[degrees\].
@@ -195,7 +195,7 @@ impl CalibrationBench {
         let rig = &self.case;
         if let Some(studio) = &self.studio {
             let frame = studio.take(&rig.board, pose, Exposure::SHARP, seed).ok()?;
-            return sighting::observe(&rig.board, "", &frame).ok();
+            return board_observation::observe(&rig.board, "", &frame).ok();
         }
         let corners = rig.board.corners_mm().into_iter().zip(0..).map(|(corner, i)| {
             let [x, y] = hash::normal_pair(hash::mix(&[seed, i]));

@@ -3,13 +3,13 @@
 //! flow.
 
 mod compare;
-mod course;
+pub mod extruder_run;
 #[cfg(test)]
 mod tests;
 mod wheel;
 
 pub use compare::{Compared, compare};
-pub use course::{
+pub use extruder_run::{
     AREA_MM2, CORRELATION_S, ExtruderRun, JUDGED_FROM_S, MM_PER_S_PER_RPM, UNMODELLED_FRACTION,
 };
 pub use wheel::{EXPONENT, Sensors, WheelRun};
@@ -23,7 +23,7 @@ use crate::extruder::feedforward::{
 };
 use crate::extruder::limits::CommandLimits;
 use crate::numeric::lti::TransferFunction;
-use course::at;
+use extruder_run::at;
 use wheel::Wheel;
 
 /// Steps between two commands: 200 Hz.

@@ -19,8 +19,8 @@ use crate::io::progress::Progress;
 use crate::numeric::lti::{DiscretisationMethod, TransferFunction};
 use crate::studies::bcs_thesis as plant;
 use crate::studies::error::ReproduceError;
+use crate::studies::publication::Publication;
 use crate::studies::row::TableRows;
-use crate::studies::source::Publication;
 use crate::studies::study::{Effort, Reproduced, Section};
 
 /// What progress is told of.

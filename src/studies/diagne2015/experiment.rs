@@ -1,6 +1,6 @@
 //! Everything that is tried on one course of the conveying speed.
 
-use super::course::{Cycle, PlugResponse};
+use super::response::{Cycle, PlugResponse};
 use super::run::{FeedMethod, RunError, RunPlan, follow};
 use super::{
     CYCLE_S, PulsationCase, SETPOINT, SETTLING_BAND_MM, START, paper_controller, saturated,

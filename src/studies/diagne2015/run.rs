@@ -4,7 +4,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::course::{PlugResponse, PlugSample};
+use super::response::{PlugResponse, PlugSample};
 use super::{SETPOINT, START};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;

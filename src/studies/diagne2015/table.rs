@@ -20,8 +20,8 @@ use crate::report::chart::plot::{Plot, PlotLayer as Drawn, y_range};
 use crate::report::chart::range::Range;
 use crate::report::chart::series::Curve;
 use crate::studies::error::ReproduceError;
+use crate::studies::publication::Publication;
 use crate::studies::row::TableRows;
-use crate::studies::source::Publication;
 use crate::studies::study::{Reproduced, Section};
 
 /// What progress is told of.

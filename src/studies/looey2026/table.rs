@@ -15,8 +15,8 @@ use crate::report::chart::series::Curve;
 use crate::studies::error::ReproduceError;
 
 use crate::studies::looey2026 as experiments;
+use crate::studies::publication::Publication;
 use crate::studies::row::TableRows;
-use crate::studies::source::Publication;
 use crate::studies::study::{Effort, Reproduced, Section};
 
 /// What progress is told of.

@@ -2,10 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use super::course::PressureResponse;
 use super::plant::{
     DRIFT_MPA2, Factors, LAG_S, LOAD_RPM, MODEL_ERROR, NOISE_MPA2, STEP_MPA, model,
 };
+use super::response::PressureResponse;
 use crate::core::time::Stamp;
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::CommandLimits;

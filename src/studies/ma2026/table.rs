@@ -13,8 +13,8 @@ use crate::report::chart::palette;
 use crate::report::chart::palette::Ink;
 use crate::report::chart::range::Range;
 use crate::studies::error::ReproduceError;
+use crate::studies::publication::Publication;
 use crate::studies::row::TableRows;
-use crate::studies::source::Publication;
 use crate::studies::study::{Effort, Reproduced, Section};
 
 mod draw;

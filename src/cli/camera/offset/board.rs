@@ -6,7 +6,9 @@ use nalgebra::Vector2;
 use super::answer::tell;
 use super::arguments::OffsetArgs;
 use crate::assembly::LoadedCell;
-use crate::calibration::offset::{NozzleOffset, NozzleOffsetError, OffsetGauge, Touch, find};
+use crate::calibration::nozzle_offset::{
+    NozzleOffset, NozzleOffsetError, OffsetGauge, Touch, find,
+};
 use crate::cell::file::{Mount, Purpose};
 use crate::cli::arguments::WrongArguments;
 use crate::cli::board_image::{check_size, find_board};

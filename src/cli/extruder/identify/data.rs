@@ -12,7 +12,7 @@ use crate::cli::extruder::log::source::LogSource;
 use crate::identify::experiment::{Experiment, Rules, implausible_unit};
 use crate::identify::series::paired;
 use crate::identify::table::DataTable;
-use crate::io::recorded::BeadColumns;
+use crate::io::bead_columns::BeadColumns;
 use crate::numeric::hampel::Hampel;
 use crate::numeric::savgol::SavGol;
 

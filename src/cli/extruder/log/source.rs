@@ -12,7 +12,7 @@ use crate::cell::file::Purpose;
 use crate::cli::arguments::WrongArguments;
 use crate::core::units::Mm;
 use crate::identify::table::DataTable;
-use crate::io::recorded::{BeadColumns, CellFacts, columns};
+use crate::io::bead_columns::{BeadColumns, CellFacts, columns};
 use crate::io::recording::Recording;
 
 /// How an MCAP file begins.

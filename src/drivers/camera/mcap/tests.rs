@@ -11,7 +11,7 @@ use crate::core::geometry::Size;
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::units::{Mm, MmPerS};
 use crate::io::foxglove::timestamp;
-use crate::io::record::{RecordConfig, start};
+use crate::io::recorder::{RecordConfig, start};
 use crate::run::ports::Recorder;
 
 fn frame(seq: u64, ms: u64) -> Frame {

@@ -1,7 +1,7 @@
 //! Starts and stops as text.
 
 use super::StartStudy;
-use crate::identify::number::three_digits;
+use crate::identify::digits::three_digits;
 use crate::identify::start_stop::file::{ParameterKey, START_PARAMETERS, STOP_PARAMETERS};
 use crate::report::identify::table::{put, significant};
 

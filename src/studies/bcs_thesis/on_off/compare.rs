@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::WheelControl;
-use super::course::ExtruderRun;
+use super::extruder_run::ExtruderRun;
 use super::wheel::WheelRun;
 use crate::extruder::feedforward::FeedforwardError;
 use crate::numeric::average::mean;

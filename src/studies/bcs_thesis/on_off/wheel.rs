@@ -1,6 +1,8 @@
 //! The wheel, what is laid on it and what sensors see of that.
 
-use super::course::{AREA_MM2, ExtruderRun, JUDGED_FROM_S, MM_PER_S_PER_RPM, STEP_S, at, to_steps};
+use super::extruder_run::{
+    AREA_MM2, ExtruderRun, JUDGED_FROM_S, MM_PER_S_PER_RPM, STEP_S, at, to_steps,
+};
 use crate::core::units::Mm3PerS;
 use crate::extruder::feedforward::FeedforwardError;
 use crate::extruder::feedforward::FlowMeasurement;

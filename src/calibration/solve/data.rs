@@ -2,6 +2,7 @@
 
 use super::error::{MIN_VIEWS, SolveError};
 use crate::calibration::board::Board;
+use crate::calibration::board_observation::BoardObservation;
 use crate::calibration::bundle::{BundleFit, Guess};
 use crate::calibration::equations::Equations;
 use crate::calibration::equations::{
@@ -9,7 +10,6 @@ use crate::calibration::equations::{
 };
 use crate::calibration::factor::{Elimination, Factor};
 use crate::calibration::homography;
-use crate::calibration::sighting::BoardObservation;
 use crate::numeric::number::to_f64;
 
 /// What is fitted to, and where it begins.

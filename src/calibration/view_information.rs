@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use super::bundle::BundleFit;
 use super::equations::{Equations, FreeParameters, SHARED, restrict_to_free};
 use super::factor::{Elimination, Factor};
-use super::solve::views::CalibrationData;
+use super::solve::data::CalibrationData;
 
 /// Design effect below which it is no less but by chance: its own standard error is some
 /// 0.16 with a dozen pictures. Not 1, so that it is right on average for independent corners.

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use crossbeam_channel::Sender;
 
 use super::encode::FrameJob;
-use super::shared::RecorderState;
+use super::state::RecorderState;
 use crate::cell::file::KeepFrames;
 use crate::core::frame::Frame;
 

@@ -4,9 +4,9 @@
 use super::episodes::Episode;
 use super::error::StartStopFitError;
 use super::estimate::ObservedStart;
-use super::fall::StopResponse;
 use super::least_squares::minimise;
 use super::parameters::StartStop;
+use super::stop::StopResponse;
 use crate::numeric::rank;
 
 /// What was found of the starts.

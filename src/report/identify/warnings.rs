@@ -1,9 +1,9 @@
 //! What a reader should know of a model before it is used.
 
 use super::model::{Logs, ModelStudy};
+use crate::identify::digits::three_digits;
 use crate::identify::experiment::Experiment;
 use crate::identify::fit::{DOMINANT_FRACTION, Fit, FitNote, Trend};
-use crate::identify::number::three_digits;
 
 /// A model that is further off other data than off its own by this factor is
 /// told. Errors are compared and not fits, which grow with the excitation.

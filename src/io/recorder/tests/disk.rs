@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-use crate::io::record::sink::Sink;
+use crate::io::recorder::sink::Sink;
 
 #[derive(Debug, Default)]
 struct State {

@@ -3,8 +3,8 @@
 
 use nalgebra::Vector2;
 
-use super::map::Cells;
-use super::{SurfaceMap, map};
+use super::width_map::Cells;
+use super::{SurfaceMap, width_map};
 use crate::core::geometry::{ImagePoint, Roi};
 
 /// Relative standard deviations of the width of one bead that runs one way.
@@ -36,7 +36,7 @@ impl RelativeSigmaMap {
     pub fn of(surface: &SurfaceMap, bead: &MapBead, counts: Cells) -> Option<Self> {
         let image_size_px = surface.image_size_px()?;
         surface.uncertainty()?;
-        let cells = map::middles(image_size_px.map(f64::from), counts)
+        let cells = width_map::middles(image_size_px.map(f64::from), counts)
             .map(|middle| relative_sigma_at(surface, bead, middle))
             .collect();
         Some(Self { bead_mm: bead.width_mm, image_size_px, counts, cells })
@@ -76,7 +76,7 @@ impl RelativeSigmaMap {
 
 /// Of a bead with its middle at a pixel. `None` where it is not seen whole.
 pub fn relative_sigma_at(surface: &SurfaceMap, bead: &MapBead, middle: ImagePoint) -> Option<f64> {
-    let ends = map::ends(surface, middle, bead.across, bead.width_mm)?;
+    let ends = width_map::ends(surface, middle, bead.across, bead.width_mm)?;
     surface.width_relative_sigma_of(ends)
 }
 

@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use crate::calibration::board::Board;
-use crate::calibration::sighting::{BoardObservation, Observations};
+use crate::calibration::board_observation::{BoardObservation, Observations};
 use crate::cli::board_image::find_board;
 
 /// Pictures that were looked at.

@@ -1,7 +1,8 @@
 //! What the pixels see before light, texture and noise: shares of bead, and
 //! the grey that disturbances add.
 
-use super::discs::{self, Backdrop, DiscLayer, Mask};
+use super::discs;
+use super::discs::{Backdrop, DiscLayer, Mask};
 use super::motion::ShutterPosition;
 use super::shade::BeadShape;
 use super::tint::{BeadLine, Tint};

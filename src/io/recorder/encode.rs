@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 use crossbeam_channel::{Receiver, Sender};
 use prost::Message as _;
 
-use super::shared::RecorderState;
+use super::state::RecorderState;
 use crate::core::frame::Frame;
 use crate::core::time::Stamp;
 use crate::io::foxglove::{CompressedImage, timestamp};

@@ -8,7 +8,7 @@ use super::focus::{Focus, FocusFault};
 use super::grey::GreyImage;
 use super::outline;
 use super::outline::BoardOutline;
-use super::refusal::{BoardRejection, MIN_CORNERS, MIN_LINES};
+use super::rejection::{BoardRejection, MIN_CORNERS, MIN_LINES};
 use crate::bridge;
 use crate::core::frame::Frame;
 use crate::core::geometry::{GridSize, ImagePoint};

@@ -11,8 +11,8 @@ use super::config::RecorderLimits;
 use super::encode::EncodedFrame;
 use super::mux::{Mux, MuxError};
 use super::report::{Counts, RecordReport};
-use super::shared::{AnsweredEvent, RecorderState};
 use super::sink::{RetryingWriter, Sink};
+use super::state::{AnsweredEvent, RecorderState};
 use crate::run::ports::RecordError;
 
 /// What the writer listens to.

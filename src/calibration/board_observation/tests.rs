@@ -1,6 +1,6 @@
-use super::*;
 use crate::calibration::Camera;
 use crate::calibration::board::observe_all;
+use crate::calibration::board_observation::*;
 use crate::calibration::dictionary::Dictionary;
 use crate::calibration::synthetic;
 use crate::calibration::synthetic::poses;
@@ -8,7 +8,7 @@ use crate::core::frame::Pixels;
 use crate::core::geometry::{GridSize, Pose, Size};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
-use crate::sim::boards::{BoardStudio, Exposure};
+use crate::sim::board_studio::{BoardStudio, Exposure};
 use nalgebra::{Vector2, Vector3};
 
 fn board(columns: usize, rows: usize) -> Board {

@@ -19,8 +19,8 @@ mod encode;
 pub mod format;
 mod mux;
 mod report;
-mod shared;
 pub mod sink;
+pub mod state;
 mod tap;
 mod writer;
 
@@ -46,8 +46,8 @@ use format::{CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, FORMAT_VERSION, RunInfo};
 use mux::Mux;
 use report::Counts;
 pub use report::{Incomplete, RecordReport};
-use shared::{AnsweredEvent, RecorderState};
 use sink::{FileSink, RetryingWriter, Sink};
+use state::{AnsweredEvent, RecorderState};
 pub use tap::FrameTap;
 use writer::{WriterInputs, WriterThread};
 

@@ -9,8 +9,8 @@ use super::bundle::{BundleFit, Guess};
 use super::equations::{FreeParameters, SHARED, restrict_to_free};
 use super::factor::Factor;
 use super::lens::Lens;
-use super::pull::ViewInformation;
-use super::solve::views::CalibrationData;
+use super::solve::data::CalibrationData;
+use super::view_information::ViewInformation;
 
 /// Share of the smallest held-out error by which a lens may foretell worse and be
 /// taken for as good. Of those that are as good the one with the most coefficients is

@@ -258,7 +258,7 @@ fn blurred_stripes(Blurred { at, blur }: Blurred) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::sighting;
+    use crate::calibration::board_observation;
     use crate::core::units::Mm;
     use nalgebra::Vector3;
 
@@ -278,7 +278,7 @@ mod tests {
             let tilt = Vector3::new(0.35 * turn.cos(), 0.35 * turn.sin(), 0.03 * turn);
             let pose = Pose::new(tilt, Vector3::new(-80.0, -50.0, 400.0 + 5.0 * turn));
             let frame = studio.take(&board, &pose, Exposure::SHARP, seed.into()).unwrap();
-            let found = sighting::observe(&board, "", &frame).unwrap().corners;
+            let found = board_observation::observe(&board, "", &frame).unwrap().corners;
             let found: Vec<_> = found.iter().map(|corner| corner.px).collect();
             let truth: Vec<_> = board
                 .corners_mm()

@@ -7,8 +7,8 @@ use crate::document::Problems;
 use crate::document::{Document, Table};
 use crate::numeric::lti::TransferFunction;
 
-pub use self::write::to_toml;
-pub(super) use self::write::{number, put, put_conditions, row};
+pub use write::to_toml;
+pub(super) use write::{number, put, put_conditions, row};
 
 /// Most coefficients of a numerator or a denominator.
 pub const MAX_COEFFICIENTS: usize = 8;

@@ -2,14 +2,14 @@ use nalgebra::{Point3, Rotation3, Vector3};
 
 use super::*;
 use crate::calibration::board::Markers;
+use crate::calibration::board_observation;
+use crate::calibration::board_observation::BoardObservation;
 use crate::calibration::dictionary::Dictionary;
-use crate::calibration::sighting;
-use crate::calibration::sighting::BoardObservation;
 use crate::calibration::{CalibrationQuality, Camera};
 use crate::core::frame::{Frame, Pixels};
 use crate::core::geometry::{Pose, Size};
 use crate::core::time::Stamp;
-use crate::sim::boards::{BoardStudio, Exposure};
+use crate::sim::board_studio::{BoardStudio, Exposure};
 use crate::sim::hash;
 
 const SIZE: [u32; 2] = [640, 480];
@@ -86,7 +86,7 @@ fn seen(off: [f64; 2], height: f64, seed: u64) -> BoardObservation {
     let place = [MIDDLE[0] + RIGHT + off[0], MIDDLE[1] + AHEAD + off[1]];
     let studio = BoardStudio::new(&camera(), SIZE);
     let frame = studio.take(&board(), &lies(AT, place, height), Exposure::SHARP, seed).unwrap();
-    sighting::observe(&board(), "", &frame).unwrap()
+    board_observation::observe(&board(), "", &frame).unwrap()
 }
 
 fn found(sighting: &BoardObservation, touch: &Touch) -> NozzleOffset {
@@ -142,7 +142,7 @@ fn a_board_with_markers_has_one_reading_and_may_be_covered_in_part() {
     });
     let covered =
         Frame::new(0, Stamp::START, Size::new(640, 480), Pixels::Grey8(values.collect())).unwrap();
-    let corners = sighting::observe(&marked, "", &covered).unwrap().corners;
+    let corners = board_observation::observe(&marked, "", &covered).unwrap().corners;
     assert!((30..54).contains(&corners.len()), "{}", corners.len());
     let touch = Touch { position: at, ..touch(0.0) };
     let found = find(&calibration(), &gauge(), &marked, &corners, &touch).unwrap();
@@ -194,7 +194,7 @@ fn the_nozzle_is_beyond_the_right_end_of_a_horizontal_gauge() {
     let pose = Pose::from_parts(bed.rotation() * axes, place(65.0 - 180.0, -1.2 + 50.0));
     let studio = BoardStudio::new(&camera(), SIZE);
     let frame = studio.take(&board(), &pose, Exposure::SHARP, 3).unwrap();
-    let corners = sighting::observe(&board(), "", &frame).unwrap().corners;
+    let corners = board_observation::observe(&board(), "", &frame).unwrap().corners;
     let touch = Touch { position: [9.0, 2.5], ..touch(0.0) };
     let found = find(&calibration, &gauge, &board(), &corners, &touch).unwrap();
     let off = (found.along_mm - 95.0).hypot(found.across_mm - 1.2);
@@ -209,7 +209,7 @@ fn what_has_no_one_answer_is_refused() {
     let studio = BoardStudio::new(&camera(), SIZE);
     let pose = lies(AT, place, THICKNESS);
     let frame = studio.take(&even, &pose, Exposure::SHARP, 4).unwrap();
-    let corners = sighting::observe(&even, "", &frame).unwrap().corners;
+    let corners = board_observation::observe(&even, "", &frame).unwrap().corners;
     let asked = |gauge: &OffsetGauge, at| {
         let touch = Touch { position: at, ..touch(0.5) };
         find(&calibration(), gauge, &even, &corners, &touch).map(|found| found.along_mm)

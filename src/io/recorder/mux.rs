@@ -16,7 +16,7 @@ use super::format::{
     RunInfo, STEP_SCHEMA, STEP_TOPIC, StepMessage,
 };
 use super::report::Counts;
-use super::shared::AnsweredEvent;
+use super::state::AnsweredEvent;
 use crate::core::time::Stamp;
 use crate::io::foxglove;
 
