@@ -47,7 +47,10 @@ fn frames() -> Vec<Frame> {
 }
 
 fn sightings() -> Vec<BoardObservation> {
-    frames().iter().map(|frame| sighting::observe(&board(), "", frame).expect("a board")).collect()
+    frames()
+        .iter()
+        .map(|frame| board_observation::observe(&board(), "", frame).expect("a board"))
+        .collect()
 }
 
 fn solution() -> Solution {
@@ -60,7 +63,7 @@ fn find_and_refine(bencher: Bencher<'_, '_>) {
     let mut next = 0;
     bencher.bench_local(|| {
         next = (next + 1) % frames.len();
-        sighting::observe(&board, "", black_box(&frames[next])).expect("a board")
+        board_observation::observe(&board, "", black_box(&frames[next])).expect("a board")
     });
 }
 
@@ -78,7 +81,7 @@ fn covariance(solution: &Solution) -> CalibrationCovariance {
 #[divan::bench]
 fn width_map(bencher: Bencher<'_, '_>) {
     let covariance = covariance(&solution());
-    bencher.bench_local(|| map::WidthMap::of(black_box(&covariance), 42.0, Mm::ZERO));
+    bencher.bench_local(|| width_map::WidthMap::of(black_box(&covariance), 42.0, Mm::ZERO));
 }
 
 #[divan::bench]

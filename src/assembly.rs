@@ -78,8 +78,8 @@ impl LoadedCell {
             return Ok(());
         }
         Err(AssemblyError::unfit(format!(
-            "{}: camera.offset_mm: found {}, expected {:.1} or more with law = \"distance\": that \
-             is half the length of bead within the gauge, and what is seen must have been laid",
+            "{}: camera.offset_mm: found {}, expected {:.1} or more with strategy = \"distance\": that \
+             is half the length of bead within the gauge, and the camera must look at bead that is laid",
             self.path.display(),
             offset.get(),
             half.get()

@@ -5,6 +5,7 @@ pub mod csv;
 mod file_text;
 mod keys;
 mod problem;
+mod renamed;
 mod scalar;
 mod table;
 mod value;

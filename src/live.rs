@@ -14,11 +14,11 @@
 //! not, is the same: hold, extruder off, stop the robot, finish the recording,
 //! join.
 
+pub mod capture;
 mod control;
-mod eye;
 mod latency;
 mod mailbox;
-mod scribe;
+pub mod run_logger;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -49,10 +49,10 @@ use crate::run::ports::{FrameSource, RecordError, SourceError};
 use crate::run::runner::Runner;
 use crate::sim::render::{RenderError, Renderer};
 
+use capture::CapturePipeline;
 pub use control::Ending;
 use control::{ControlThread, ExtruderWatch, LinkPort, Sources, StepsWatch};
-use eye::CapturePipeline;
-use scribe::RunLogger;
+use run_logger::RunLogger;
 
 /// What a live run needs.
 pub struct LiveRun {
@@ -147,16 +147,16 @@ pub enum LiveError {
 
 /// Runs a cell until it is told to stop, its time is over or it fails.
 pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
-    let (ending_tell, ending_told) = bounded::<()>(0);
-    let (source, robot_view) = open_camera(&live, ending_told)?;
+    let (camera_stop, camera_end) = bounded::<()>(0);
+    let (source, robot_view) = open_camera(&live, camera_end)?;
     let (recorder, alarm) = recorder::start(&live.record, &live.out)?;
     let (robot_events, from_robot) = unbounded();
     let link = LinkClient::start(link_config(&live.run), live.clock, robot_events)?;
     let (extruder, from_extruder) = open_extruder(&live)?;
     let robot_z = Arc::new(AtomicU64::new(f64::NAN.to_bits()));
-    let eye = CapturePipeline::start(
+    let capture = CapturePipeline::start(
         source,
-        eye::Optics {
+        capture::Optics {
             cell: live.cell.clone(),
             calibration: live.calibration.clone(),
             robot_z: Arc::clone(&robot_z),
@@ -164,7 +164,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         recorder.frames(),
         live.clock,
     )?;
-    let scribe = RunLogger::start(live.log)?;
+    let logger = RunLogger::start(live.log)?;
     let watch = live
         .extruder
         .as_ref()
@@ -182,7 +182,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         robot_z,
         robot_view,
         latencies: latency::Latencies::default(),
-        logger: &scribe,
+        logger: &logger,
         notice: live.notice,
         limits: live.run.limits,
         unfit: None,
@@ -192,16 +192,16 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         setpoint: None,
     };
     let ending = control.run(&Sources {
-        seen: &eye.seen,
+        seen: &capture.seen,
         robot: &from_robot,
         extruder: &from_extruder,
         alarm: &alarm,
         stop: &live.stop,
     });
     let pump_runs = control.extruder.as_ref().is_some_and(|side| !side.rests());
-    drop(ending_tell);
-    let seen = eye.seen.clone();
-    let superseded = eye.stop();
+    drop(camera_stop);
+    let seen = capture.seen.clone();
+    let superseded = capture.stop();
     control.take_rest(&seen);
     if let Some(extruder) = control.runner.extruder_mut().take() {
         extruder.close();
@@ -210,23 +210,21 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     port.close();
     let dropped = recorder.frames_dropped();
     let recording = recorder.finish();
-    scribe.note(RunNote::FramesSuperseded(superseded));
-    scribe.note(RunNote::FramesDroppedByRecorder(dropped));
+    logger.note(RunNote::FramesSuperseded(superseded));
+    logger.note(RunNote::FramesDroppedByRecorder(dropped));
     if let Ending::RobotLimits(why) | Ending::ExtruderUnfit(why) = &ending {
-        scribe.note(RunNote::Remark(format!("The run was refused: {why}.")));
+        logger.note(RunNote::Remark(format!("The run was refused: {why}.")));
     }
     if pump_runs {
-        scribe.note(RunNote::Remark(
-            "The pump was told to stop and did not say that it stops.".to_owned(),
-        ));
+        logger.note(RunNote::Remark("The pump did not confirm the stop.".to_owned()));
     }
     if let Err(incomplete) = &recording {
-        scribe.note(RunNote::RecordsLost(1));
-        scribe.note(RunNote::Remark(format!(
+        logger.note(RunNote::RecordsLost(1));
+        logger.note(RunNote::Remark(format!(
             "the recording misses the end of the run: {incomplete}"
         )));
     }
-    Ok(LiveReport { summary: scribe.finish()?, ending, pump_runs, recording })
+    Ok(LiveReport { summary: logger.finish()?, ending, pump_runs, recording })
 }
 
 /// The link to the extruder, where it is commanded, and what it reports.

@@ -48,7 +48,7 @@ fn sightings(set: &str) -> Option<Vec<BoardObservation>> {
     paths.sort();
     let look = |path: &std::path::PathBuf| {
         let frame = image_file::read(path, Channel::Grey, 0, Stamp::START).unwrap();
-        sighting::observe(&board(), &path.display().to_string(), &frame).unwrap()
+        board_observation::observe(&board(), &path.display().to_string(), &frame).unwrap()
     };
     Some(paths.par_iter().map(look).collect())
 }

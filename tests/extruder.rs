@@ -274,7 +274,7 @@ fn a_robot_that_goes_by_the_flow_has_its_width_while_the_extruder_runs_up() {
     let late = format!("{plant}\nscrew_lag_s = 0.3");
     let blind = foreseen(&[(plant, &late)]);
     let key = "robot_follows = \"flow\"";
-    let seen = foreseen(&[(plant, &late), (key, &format!("{key}\nforetold_from = \"encoder\""))]);
+    let seen = foreseen(&[(plant, &late), (key, &format!("{key}\npredicted_from = \"encoder\""))]);
     assert!(since_control(&seen) < 0.75 * since_control(&blind), "{seen} {blind}");
 }
 

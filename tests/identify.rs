@@ -453,7 +453,7 @@ fn the_noise_of_a_pressure_is_told_in_the_keys_of_a_cell() {
         line.split_whitespace().nth(2).unwrap().parse::<f64>().unwrap()
     };
     assert!((value("sensor_noise_mpa") / 0.007 - 1.0).abs() < 0.05, "{told}");
-    assert!((value("wander_mpa2").sqrt() / 0.001 - 1.0).abs() < 0.25, "{told}");
+    assert!((value("drift_mpa2").sqrt() / 0.001 - 1.0).abs() < 0.25, "{told}");
     for (column, code, words) in
         [("screw_rpm", 2, "expected a pressure"), ("nozzle_mpa", 2, "nozzle_mpa")]
     {

@@ -182,9 +182,9 @@ fn with_render(keys: &str) -> Result<Cell, String> {
 
 #[test]
 fn disturbances_are_read_from_the_cell() {
-    let keys = "bead_grey = 300.0\nlight_deg = 90.0\nspot_share = 0.05\nspot_size_px = 5.0\n\
+    let keys = "bead_grey = 300.0\nlight_deg = 90.0\nspot_fraction = 0.05\nspot_size_px = 5.0\n\
                 shading_side = \"both\"\nmotion_px = 6.0\nmotion_deg = 15.0\ncurve_radius_mm = -80.0\n\
-                grain_rows_share = 0.3\nshadow_px = 6.0\nneighbour_gap_px = 20.0\n\
+                grain_rows_fraction = 0.3\nshadow_px = 6.0\nneighbour_gap_px = 20.0\n\
                 texture_grey = 2.0\nbead_shading_grey_per_px = -1.0";
     let picture = with_render(keys).unwrap().simulation.image;
     assert_eq!((picture.bead_grey, picture.light_deg), (300.0, Some(90.0)));

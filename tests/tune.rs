@@ -28,7 +28,7 @@ fn a_simulated_cell_is_found_and_its_recording_replays_bit_for_bit() {
     let (cell, out) = (cell(folder.path(), "barjuei2022.toml"), path(folder.path(), "out"));
     let before = fs::read(&cell).unwrap();
     let text = said(&mut truebead(&["tune", &cell, "--out", &out, "--simulated"]), 0);
-    assert!(text.contains("unstable") && text.contains("law = \"distance\""), "{text}");
+    assert!(text.contains("unstable") && text.contains("strategy = \"distance\""), "{text}");
     assert_eq!(fs::read(&cell).unwrap(), before, "the cell was touched");
     let json = fs::read_to_string(format!("{out}/tune.json")).unwrap();
     let json: Value = serde_json::from_str(&json).unwrap();
@@ -69,7 +69,7 @@ fn what_is_written_differs_in_the_proposed_keys_only_and_holds_the_width() {
     let of = |text: &str| text.parse::<toml::Table>().unwrap();
     let (before, after) = (of(&before), of(&after));
     let proposed = [
-        "law",
+        "strategy",
         "exponent",
         "drift_per_root_m",
         "kp_per_s",
@@ -120,7 +120,7 @@ fn steps_that_leave_the_limits_are_refused_with_their_line() {
         )
     };
     let refused = try_share("0.2", 2);
-    assert!(refused.contains("step_share") && refused.contains("130 mm/s"), "{refused}");
+    assert!(refused.contains("step_fraction") && refused.contains("130 mm/s"), "{refused}");
     assert!(refused.contains("distance.toml:"), "{refused}");
     assert!(try_share("0.5", 2).contains("0.02 to 0.3"));
     let _ = try_share("0.15", 0);

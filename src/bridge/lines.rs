@@ -47,7 +47,7 @@ pub fn canny_hough(
     prepare();
     if !roi.fits(frame.size()) || roi.width == 0 || roi.height == 0 {
         let (width, height) = (frame.width(), frame.height());
-        let what = format!("{roi:?} is not within a picture of {width}x{height} px");
+        let what = format!("{roi:?} is not within an image of {width}x{height} px");
         return Err(BridgeError { task: TASK, what });
     }
     let image = grey8_mat(frame)?;

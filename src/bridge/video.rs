@@ -34,7 +34,7 @@ pub struct VideoReader {
 }
 
 const OPEN: &str = "opening a video source";
-const READ: &str = "reading a picture";
+const READ: &str = "reading an image";
 const APPSINK: &str = " ! appsink drop=true max-buffers=1 sync=false";
 
 impl VideoReader {
@@ -140,7 +140,7 @@ fn frame_of(
         1 => SampleLayout::Grey,
         3 => SampleLayout::Bgr,
         4 => SampleLayout::Bgra,
-        other => return Err(fault(format!("a picture with {other} channels is not known"))),
+        other => return Err(fault(format!("an image with {other} channels is not known"))),
     };
     let flat = image.reshape(1, 0).map_err(during(READ))?;
     let pixels = match image.depth() {

@@ -88,7 +88,7 @@ impl CalibrationCovariance {
         })
     }
 
-    /// The same if there were another picture of a board, with as much noise.
+    /// The same if there were another image of a board, with as much noise.
     /// `None` where the board would not be in front of the camera.
     pub fn with_another(&self, pose: &Pose, corners: &[Correspondence]) -> Option<Self> {
         let place = BoardPlacement::of_one(*pose);

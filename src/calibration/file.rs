@@ -88,12 +88,12 @@ fn read_uncertainty(table: &Table<'_>) -> Option<CalibrationUncertainty> {
 
 fn read_quality(table: &Table<'_>) -> Option<CalibrationQuality> {
     let rms = table.number("reprojection_rms_px", RMS_PX);
-    let width_sigma_share = table.optional_number("width_sigma_share", RELATIVE_SIGMA_RANGE);
+    let width_relative_sigma = table.optional_number("width_relative_sigma", RELATIVE_SIGMA_RANGE);
     let seen_px = table.optional_numbers::<4>("seen_px", CENTRE_PX);
     let heights_mm = table.optional_numbers::<2>("heights_mm", LENGTH_MM);
     Some(CalibrationQuality {
         reprojection_rms_px: rms?,
-        width_relative_sigma: width_sigma_share,
+        width_relative_sigma,
         seen_px,
         heights_mm,
         uncertainty: None,
@@ -125,7 +125,7 @@ fn read_camera(table: &Table<'_>, size: Option<[u32; 2]>) -> Option<Camera> {
     let camera =
         Camera { focal_px: [focal.0?, focal.1?], centre_px: [centre.0?, centre.1?], distortion };
     if size.is_some_and(|size| !camera.reaches_middle(size)) {
-        let found = "a lens that cannot be undone in the middle of the picture";
+        let found = "a lens that cannot be undone in the middle of the image";
         table.report("distortion", found, "coefficients of this camera");
         return None;
     }
@@ -191,7 +191,7 @@ pub fn to_toml(
         if let Some(share) = quality.width_relative_sigma {
             let _ = writeln!(
                 text,
-                "width_sigma_share = {share:?} # standard deviation that it leaves in a width, of the width"
+                "width_relative_sigma = {share:?} # standard deviation of a width due to the calibration, over the width"
             );
         }
         if let Some(seen) = quality.seen_px {
@@ -332,10 +332,13 @@ mod tests {
             parse("x", text).unwrap().surface(Mm::constant(20.0), None).width_relative_sigma()
         };
         assert_eq!(share(EXAMPLE), None);
-        assert_eq!(share(&with("width_sigma_share = 0.0004")), Some(0.0004));
+        assert_eq!(share(&with("width_relative_sigma = 0.0004")), Some(0.0004));
         for wrong in ["1.5", "-0.1", "nan"] {
-            let said = said(&with(&format!("width_sigma_share = {wrong}")));
-            assert!(said.contains(&format!("quality.width_sigma_share: found {wrong}")), "{said}");
+            let said = said(&with(&format!("width_relative_sigma = {wrong}")));
+            assert!(
+                said.contains(&format!("quality.width_relative_sigma: found {wrong}")),
+                "{said}"
+            );
         }
     }
 

@@ -22,7 +22,7 @@ pub struct CalibrationQuality {
     /// Lowest and highest corner of the boards above the bed \[mm\]. Files may lack it.
     pub heights_mm: Option<[f64; 2]>,
     /// What is left open in camera and bed plane: from it comes the standard deviation of
-    /// a width wherever it is seen. Files may lack it; then `width_sigma_share` holds
+    /// a width wherever it is seen. Files may lack it; then `width_relative_sigma` holds
     /// everywhere.
     pub uncertainty: Option<CalibrationUncertainty>,
 }
@@ -158,7 +158,7 @@ impl SurfaceMap {
     /// Relative standard deviation that the calibration behind the map leaves
     /// in a width, the same error in every width; `None` where it is not known. The
     /// largest that a usual bead has where boards were seen:
-    /// [`Self::width_sigma_share_of`] is that of one width.
+    /// [`Self::width_relative_sigma_of`] is that of one width.
     pub fn width_relative_sigma(&self) -> Option<f64> {
         self.with_height(self.width_relative_sigma)
     }

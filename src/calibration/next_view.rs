@@ -236,9 +236,9 @@ fn position_words(at: RelativePoint) -> String {
         words[usize::from(part > 0.34) + usize::from(part > 0.66)]
     };
     match (third(at.y, ["upper", "", "lower"]), third(at.x, ["left", "", "right"])) {
-        ("", "") => "middle of the picture".to_owned(),
-        ("", across) => format!("{across} part of the picture"),
-        (down, "") => format!("{down} part of the picture"),
-        (down, across) => format!("{down} {across} corner of the picture"),
+        ("", "") => "middle of the image".to_owned(),
+        ("", across) => format!("{across} part of the image"),
+        (down, "") => format!("{down} part of the image"),
+        (down, across) => format!("{down} {across} corner of the image"),
     }
 }

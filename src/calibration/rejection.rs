@@ -29,7 +29,7 @@ pub enum BoardRejection {
     /// A board with other counts.
     #[error(
         "a board with {}x{} inner corners shows, not one with {}x{}: see that all of it is in \
-         the picture, or correct --board",
+         the image, or correct --board",
         found.columns, found.rows, expected.columns, expected.rows
     )]
     OtherBoard {
@@ -83,7 +83,7 @@ pub enum BoardRejection {
         /// How far \[px\].
         motion_px: f64,
     },
-    /// The board is where it was in another picture.
+    /// The board is where it was in another image.
     #[error("the board is where it is in {of} (within {shift_px:.1} px), which says nothing new")]
     Duplicate {
         /// The other picture's name.

@@ -10,7 +10,7 @@ use crate::core::units::Mm;
 /// One size for all pixels, and the sizes they really have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SingleScale {
-    /// Millimetres a pixel in the middle of the picture, mean of all
+    /// Millimetres a pixel in the middle of the image, mean of all
     /// directions.
     pub mm_per_px: f64,
     /// Half the difference between the largest and the smallest size of that

@@ -12,14 +12,14 @@ use crate::numeric::rank;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Warning {
     /// Few pictures.
-    #[error("only {found} pictures show the board; {MIN_VIEWS} or more average errors better")]
+    #[error("only {found} images show the board; {MIN_VIEWS} or more average errors better")]
     FewViews {
         /// Pictures that show it.
         found: usize,
     },
     /// Parts of the picture were never seen with a board.
     #[error(
-        "the boards cover {covered} of {PARTS} parts of the picture; distortion is a guess in \
+        "the boards cover {covered} of {PARTS} parts of the image; distortion is a guess in \
          the others, so bring the board into the corners too"
     )]
     Coverage {
@@ -37,7 +37,7 @@ pub enum Warning {
     },
     /// The model does not fit.
     #[error(
-        "the reprojection error is {rms_px:.2} px, a sharp picture of a flat board gives less \
+        "the reprojection error is {rms_px:.2} px, a sharp image of a flat board gives less \
          than {MAX_RMS_PX}: look for blur, a bent board, or a wrong corner count"
     )]
     HighError {
@@ -54,8 +54,8 @@ pub enum Warning {
     },
     /// The distortion polynomial turns over within the picture.
     #[error(
-        "the lens model turns over before pixel ({x:.0}, {y:.0}), and nothing can be measured \
-         there; bring the board into the corners of the picture"
+        "the lens model is not monotonic before pixel ({x:.0}, {y:.0}), and nothing can be measured \
+         there; bring the board into the corners of the image"
     )]
     NonMonotonic {
         /// Column \[px\].
@@ -64,7 +64,7 @@ pub enum Warning {
         y: f64,
     },
     /// The focal length is loose.
-    #[error("the focal length is known to {percent:.1} % only; more tilted pictures help")]
+    #[error("uncertainty of the focal length {percent:.1} % (1 sigma); more tilted images help")]
     UncertainFocal {
         /// Standard deviation over value.
         percent: f64,

@@ -29,7 +29,7 @@ pub fn read_control(
     target: Option<WidthTarget>,
 ) -> Option<WidthControlSettings> {
     let names = STRATEGIES.map(|strategy| (strategy.name, strategy));
-    let strategy = control.required_choice("law", &names);
+    let strategy = control.required_choice("strategy", &names);
     let gains = read_gains(control);
     // PI control that is but fallen back to, or not used, may be without gains.
     let gains_optional = strategy.is_some_and(|strategy| !strategy.needs_gains)

@@ -92,7 +92,7 @@ impl ExtruderSettings {
         if robot_follows == Some(RobotFollows::Flow)
             && strategy.as_ref().is_some_and(|known| !matches!(known, Strategy::Feedforward(_)))
         {
-            let expected = "strategy = \"feedforward\", whose model foretells the flow";
+            let expected = "strategy = \"feedforward\", whose model predicts the flow";
             table.report("robot_follows", "\"flow\"", expected);
         }
         let max_gap = table.number("max_gap_s", 0.01..=60.0);

@@ -51,7 +51,7 @@ impl BedPlane {
                 "  WARNING     {} after it cannot be used: if the board lay on the bed there, take",
                 self.passed_over.join(", ")
             );
-            line!(out, "              that picture again, or name another with --plane");
+            line!(out, "              that image again, or name another with --plane");
         }
         if self.images.len() > 1 {
             line!(
@@ -124,7 +124,7 @@ impl<'a> BoardsOnBed<'a> {
         if images.len() > 1 {
             bail!(
                 "the boards in {names} do not lie on one plane: corners are {:.2} px off (RMS), the \
-                 board that is furthest off by {:.1} mm; name pictures of boards that all lie flat on \
+                 board that is furthest off by {:.1} mm; name images of boards that all lie flat on \
                  the bed",
                 on_bed.rms_px,
                 on_bed.off_mm

@@ -19,7 +19,7 @@ pub struct InnerCorners {
     pub rows: usize,
 }
 
-/// A board, as it is told on the command line.
+/// A board, as it is given on the command line.
 #[derive(Debug, Args)]
 pub struct BoardArgs {
     /// Inner corners of the board: columns x rows, each one fewer than the squares

@@ -27,7 +27,7 @@ pub fn check_size(sighting: &BoardObservation, expected: [u32; 2]) -> anyhow::Re
     anyhow::ensure!(
         sighting.image_size_px == expected,
         "{}: {width}x{height} px, but the calibration is for {right}x{bottom} px: take the \
-         picture as the camera was calibrated, or calibrate anew",
+         image as the camera was calibrated, or calibrate anew",
         sighting.name
     );
     Ok(())

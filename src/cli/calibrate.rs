@@ -27,7 +27,7 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     let board = args.board.board()?;
     check_arguments(args)?;
     if let (Some(_), Some(folder)) = (&args.input, &args.images) {
-        let what = format!("--pictures {}: only with --camera", folder.display());
+        let what = format!("--images {}: only with --camera", folder.display());
         return Err(WrongArguments::new(what).into());
     }
     let pictures = match &args.input {

@@ -72,7 +72,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     }
     about_surface(&loaded);
     calibration_map::tell(&loaded, args.report.as_deref())?;
-    say!("  suffices for process, render");
+    say!("  ready for process, render");
     match run {
         Ok(loaded) => {
             let Some(run) = &loaded.cell.run else { return Ok(ExitCode::SUCCESS) };
@@ -82,7 +82,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
             about_extruder(&loaded, side.as_ref())?;
         }
         Err(missing) => {
-            say!("  not for run, simulate; these need besides:");
+            say!("  not for run, simulate; missing:");
             for problem in &missing.list {
                 say!("    {}: {}", problem.key, problem.expected);
             }
@@ -169,12 +169,12 @@ fn about_purposes(run: &RunPart) {
     ];
     for (purpose, met, _) in needs {
         if met {
-            say!("  suffices for {purpose}");
+            say!("  ready for {purpose}");
         }
     }
     for (purpose, met, missing) in needs {
         if !met {
-            say!("  not for {purpose}; this needs besides:");
+            say!("  not for {purpose}; missing:");
             say!("    {missing}");
         }
     }
@@ -187,7 +187,7 @@ fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::R
     let (extruder, unit) = (&part.extruder, part.extruder.drive.unit_word());
     let (low, high) = extruder.limits.range();
     say!(
-        "  extruder     told {low} to {high} {unit}, {:.1} mm³/s wanted",
+        "  extruder     commands {low} to {high} {unit}, {:.1} mm³/s wanted",
         part.demand.nominal().get()
     );
     if let Some(steady) = side.map_or(Ok(None), |side| steady_state(part, side))? {
@@ -263,7 +263,7 @@ fn about_controller(loaded: &LoadedCell, run: &RunPart) {
     if let Some(steps) = loaded.cell.steps(run, &loaded.calibration) {
         let (slow, fast) = steps.speeds();
         say!(
-            "  law          none: steps between {:.1} and {:.1} mm/s, over {:.2} m",
+            "  strategy     none: steps between {:.1} and {:.1} mm/s, over {:.2} m",
             slow.get(),
             fast.get(),
             steps.length().get() / 1e3
@@ -271,7 +271,7 @@ fn about_controller(loaded: &LoadedCell, run: &RunPart) {
     }
     let Some(given) = run.control.strategy.as_kind::<DistanceStrategy>() else { return };
     let learnt = if given.learns_exponent { ", learnt as the bead is laid" } else { "" };
-    say!("  law          by distance, b = {}{learnt}", given.exponent);
+    say!("  strategy     by distance, b = {}{learnt}", given.exponent);
     let gauge = loaded.cell.gauge_length(&loaded.calibration);
     say!(
         "               gauge {:.1} mm long, {:.1} ± {:.1} mm behind the nozzle",

@@ -85,7 +85,8 @@ pub fn run(args: &CompareArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
 /// The controllers on the plant of the first cell.
 fn contenders(args: &CompareArgs) -> anyhow::Result<Vec<Contender>> {
     if args.scenarios.len() > MAX_CONTROLLERS {
-        let what = format!("{} cells: {MAX_CONTROLLERS} can be told apart", args.scenarios.len());
+        let what =
+            format!("{} cells: {MAX_CONTROLLERS} can be distinguished", args.scenarios.len());
         return Err(WrongArguments::new(what).into());
     }
     let mut contenders: Vec<Contender> = Vec::new();

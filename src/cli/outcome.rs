@@ -95,7 +95,7 @@ pub fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
         }
         _ if report.pump_runs => {
             tell!(
-                "error: the pump was told to stop and did not say that it stops; look at the extruder"
+                "error: the pump was commanded to stop and did not say that it stops; look at the extruder"
             );
             return ExitCode::FAILURE;
         }
@@ -123,7 +123,7 @@ pub fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
     let share = report.summary.rejected_fraction();
     if share > max_rejected_share && report.ending != Ending::Asked {
         tell!(
-            "warning: {:.1} % of the frames were refused, the cell bears {:.1} %",
+            "warning: {:.1} % of the frames were refused, the cell's limit is {:.1} %",
             share * 100.0,
             max_rejected_share * 100.0
         );

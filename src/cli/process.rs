@@ -273,7 +273,7 @@ fn conclude(
     let most = loaded.cell.recording.max_rejected_share;
     if share > most {
         tell!(
-            "warning: {:.1} % of the frames were refused, the cell bears {:.1} %",
+            "warning: {:.1} % of the frames were refused, the cell's limit is {:.1} %",
             share * 100.0,
             most * 100.0
         );

@@ -9,6 +9,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::file_text::FileText;
 use super::keys::{resembles, shared_ends};
+use super::renamed::present_name;
 use super::scalar::as_written;
 
 /// One table of a document. Keys that nobody asked for are violations, which
@@ -129,9 +130,6 @@ impl<'a> Table<'a> {
 
 impl Drop for Table<'_> {
     fn drop(&mut self) {
-        if self.unknown_keys_allowed.get() {
-            return;
-        }
         let asked = self.asked.borrow();
         for key in self.items.into_iter().flat_map(|items| items.keys()) {
             let name = key.get_ref().as_ref();
@@ -139,6 +137,14 @@ impl Drop for Table<'_> {
                 continue;
             }
             let line = self.text.line_of(key.span().start);
+            if let Some(present) = present_name(name, |key| asked.contains(key)) {
+                let expected = format!("\"{present}\"");
+                self.text.report(Some(line), &self.key_path(name), "a former name", expected);
+                continue;
+            }
+            if self.unknown_keys_allowed.get() {
+                continue;
+            }
             let likely = asked.iter().filter(|known| resembles(known, name));
             let near = likely.max_by_key(|known| shared_ends(known, name).iter().sum::<usize>());
             let expected = match near {

@@ -74,7 +74,7 @@ pub struct StrandInputs {
 
 /// Which sub-system's law cannot be set up, and why.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("adaptive law of the {part}: {why}")]
+#[error("adaptive controller of the {part}: {why}")]
 pub struct SubSystemError {
     /// `nozzle` or `strand`.
     pub part: &'static str,

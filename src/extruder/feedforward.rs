@@ -56,7 +56,7 @@ pub enum FeedforwardError {
     /// A zero whose inverse is not stable.
     #[error(
         "the model has a zero at {re:.4} ± {im:.4}i 1/s, in the right half plane: its inverse \
-         would grow without bound. Mirror it (the output is then late by 2·Re/|z|²), or fit a \
+         would grow without bound. Mirror it (the output is then delayed by 2·Re/|z|²), or fit a \
          model with fewer zeros"
     )]
     NonMinimumPhase {
@@ -81,7 +81,7 @@ pub enum FeedforwardError {
     /// The output would be later than it may be.
     #[error(
         "the dead time of {dead_time_s:.4} s is longer than the {known_s:.4} s for which the \
-         demand is known ahead and the {late_s:.4} s that the output may be late: plan further \
+         demand is known ahead and the {late_s:.4} s that the output may be delayed: plan further \
          ahead, or allow for it"
     )]
     DeadTime {

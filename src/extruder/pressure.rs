@@ -57,7 +57,7 @@ pub enum PressureError {
     #[error("the screw's speed [rpm]: {0}")]
     Limits(#[from] LimitError),
     /// Too little to tell the noise from.
-    #[error("the noise was to be told from {found} readings: at least {wanted} are needed")]
+    #[error("noise identification from {found} readings: at least {wanted} are needed")]
     TooFew {
         /// Readings that were given.
         found: usize,
@@ -66,7 +66,7 @@ pub enum PressureError {
     },
     /// Readings that never change, or that tell no noise.
     #[error(
-        "the readings tell no noise (their changes have a variance of {variance:.3e} MPa²): \
+        "the readings show no noise (their changes have a variance of {variance:.3e} MPa²): \
          a sensor that is stuck, readings that were smoothed before, or a pressure that moves far \
          more than they scatter"
     )]

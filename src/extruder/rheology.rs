@@ -25,7 +25,7 @@ pub enum RheologyError {
         found: f64,
     },
     /// The result is beyond the numbers.
-    #[error("{what} is beyond any machine: check the units of the law and of what was asked for")]
+    #[error("{what} is beyond any machine: check the units of the power law and of the request")]
     TooLarge {
         /// Name of the quantity, with its unit.
         what: &'static str,

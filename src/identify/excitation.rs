@@ -64,7 +64,7 @@ pub enum ExcitationError {
     },
     /// One level from the beginning to the end.
     #[error(
-        "{value} from the beginning to the end: a model can be told only from an input that changes; \
+        "{value} from the beginning to the end: a model can be identified only from an input that changes; \
          give levels that differ, and time for more than one of them"
     )]
     Constant {

@@ -15,9 +15,9 @@ use std::time::Duration;
 
 use crossbeam_channel::{Receiver, never, select};
 
-use super::eye::CameraMessage;
+use super::capture::CameraMessage;
 use super::latency::Latencies;
-use super::scribe::RunLogger;
+use super::run_logger::RunLogger;
 use crate::control::event::Event;
 use crate::control::step::{Command, State, Step};
 use crate::core::robot::RobotMode;

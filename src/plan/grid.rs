@@ -174,11 +174,11 @@ impl QuickChanges {
 /// Lengths over which the nozzle may average \[mm\] and how likely each is: three that have
 /// the mean and the standard deviation of what is known.
 fn lengths(bead: &BeadGeometry) -> Vec<(f64, f64)> {
-    let BeadGeometry { nozzle_mm, nozzle_sigma: nozzle_doubt, .. } = *bead;
-    if nozzle_doubt <= 0.0 {
+    let BeadGeometry { nozzle_mm, nozzle_sigma, .. } = *bead;
+    if nozzle_sigma <= 0.0 {
         return vec![(nozzle_mm, 1.0)];
     }
-    let away = nozzle_mm * (nozzle_doubt * std::f64::consts::SQRT_2).min(MAX_LENGTH_ERROR);
+    let away = nozzle_mm * (nozzle_sigma * std::f64::consts::SQRT_2).min(MAX_LENGTH_ERROR);
     vec![(nozzle_mm - away, 0.25), (nozzle_mm, 0.5), (nozzle_mm + away, 0.25)]
 }
 

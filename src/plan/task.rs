@@ -137,7 +137,7 @@ impl PlanTask<'_> {
         ];
         let others = [
             ("the time that may be added", self.limits.budget_s),
-            ("the share of the unmodelled flow", self.unmodelled.ratio),
+            ("the fraction of unmodelled flow", self.unmodelled.ratio),
         ];
         let others = others.map(|(what, value)| (what, value, "a number of 0 or more is needed"));
         for (what, value, wanted) in numbers {

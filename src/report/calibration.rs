@@ -99,13 +99,13 @@ impl CalibrationPage<'_> {
                         }
                         "."
                     }
-                    _ => "How well a width is known cannot be told from these pictures."
+                    _ => "How well a width is known cannot be determined from these images."
                 }
                 ul {
-                    @for doubt in &warnings { li { (doubt) } }
+                    @for warning in &warnings { li { (warning) } }
                     @if let Some(next) = self.next {
                         li {
-                            "One more picture would help most with " (next)
+                            "One more image would help most with " (next)
                             (format!(
                                 ": {:.3} % of a width instead of {:.3} %.",
                                 100.0 * next.relative_sigma.1, 100.0 * next.relative_sigma.0
@@ -125,7 +125,7 @@ impl CalibrationPage<'_> {
                     p.hint {
                         (format!(
                             "Standard deviation of the width of a bead of {} mm [mm] whose middle is \
-                             in a cell, the larger one of a bead along the picture and one across it, \
+                             in a cell, the larger one of a bead along the image and one across it, \
                              from the corners. Dashed: where boards were seen; beads that lie in it with both ends count for the number above. Empty \
                              cells do not see such a bead whole. A height that is 1 mm wrong changes \
                              it by {:.4} mm.",
@@ -144,9 +144,9 @@ impl CalibrationPage<'_> {
             section {
                 h2 { "Where boards were seen, and what is left there" }
                 p.hint {
-                    "Each corner of each picture, with its way from where the model expects it, "
+                    "Each corner of each image, with its way from where the model expects it, "
                     (format!("drawn {times:.0} times as long. "))
-                    "Ways that point the same in one part of the picture are the lens's, ways that \
+                    "Ways that point the same in one part of the image are the lens's, ways that \
                      point the same on one board are the board's or its motion's."
                 }
                 (residuals(self.solution, times))
@@ -158,7 +158,7 @@ impl CalibrationPage<'_> {
         let largest = self.solution.views.iter().map(|view| view.max_px).fold(0.0, f64::max);
         html! {
             section {
-                h2 { "Pictures" }
+                h2 { "Images" }
                 div.wide {
                     table {
                         tr {

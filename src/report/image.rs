@@ -193,7 +193,7 @@ fn as_f64(length: usize) -> f64 {
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "a side of a picture, clamped from below"
+    reason = "a side of an image, clamped from below"
 )]
 fn whole(length: f64) -> u32 {
     length.round().max(1.0) as u32

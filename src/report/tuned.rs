@@ -74,10 +74,10 @@ impl Tuned {
         let proposal = propose(&plant, run);
         let world = TestCell::new(cell, run, &plant);
         let now = ControllerCandidate::now(run);
-        let laws = now
+        let candidates = now
             .into_iter()
             .chain([ControllerCandidate::pi(&proposal), ControllerCandidate::distance(&proposal)]);
-        let predictions = laws.map(|who| world.predict(&who)).collect::<Result<_, _>>()?;
+        let predictions = candidates.map(|who| world.predict(&who)).collect::<Result<_, _>>()?;
         let misled = ControllerCandidate::mismatched(&proposal);
         let misled = misled.iter().map(|who| world.predict(who)).collect::<Result<_, _>>()?;
         let at = slowest_loop(&plant, target_mm, &run.limits);
@@ -111,7 +111,7 @@ impl Tuned {
         warnings.extend(self.robot_warning());
         for one in self.predictions.iter().filter(|one| one.stopped > 0) {
             warnings.push(format!(
-                "{}: the controller gave up {} of {SEEDS} foretold beads",
+                "{}: the controller gave up {} of {SEEDS} predicted beads",
                 one.name, one.stopped
             ));
         }
@@ -119,9 +119,9 @@ impl Tuned {
             && distance.steady_rms_mm > pi.steady_rms_mm
         {
             warnings.push(
-                "the law by distance is foretold to be no steadier than the PI law on this cell; \
-                 it needs a robot that follows within a part of the way to the camera (--law pi \
-                 writes the PI law)"
+                "the distance controller is predicted to be no steadier than the PI controller on this cell; \
+                 it needs a robot that follows within a part of the way to the camera (--controller pi \
+                 writes the PI controller)"
                     .to_owned(),
             );
         }
@@ -170,7 +170,7 @@ impl Tuned {
         (robot.residual_mm_per_s > MAX_GAIN_RATIO * (to - from).get()).then(|| {
             format!(
                 "the robot answers otherwise than by a dead time, a lag and a largest slope: {:.1} \
-                 mm/s RMS are left of its reported speed; what is foretold is not to be trusted",
+                 mm/s RMS are left of its reported speed; what is predicted is not to be trusted",
                 robot.residual_mm_per_s
             )
         })

@@ -86,9 +86,9 @@ pub fn read(root: &Table<'_>) -> Option<Simulation> {
     let random_phase = world.choice("phase", &[("random", true), ("aligned", false)]);
     let gauge_length = world.number_or("gauge_length_mm", 0.0..=1e4, 0.0);
     let noise = world.number_or("width_noise_mm", 0.0..=100.0, 0.36);
-    let outliers = world.number_or("outlier_share", 0.0..=1.0, 0.0);
+    let outliers = world.number_or("outlier_fraction", 0.0..=1.0, 0.0);
     let outlier_size = world.number_or("outlier_size", 0.0..=0.9, 0.2);
-    let missing = world.number_or("missing_share", 0.0..=1.0, 0.0);
+    let missing = world.number_or("missing_fraction", 0.0..=1.0, 0.0);
     Some(Simulation {
         seed: seed?,
         width_source: level?,
@@ -136,9 +136,9 @@ fn read_roughness(table: &Table<'_>) -> Option<EdgeRoughness> {
 fn read_flow(table: &Table<'_>) -> Option<Flow> {
     let step_at = table.number_or("flow_step_at_mm", 0.0..=1e7, 0.0);
     let step_ratio = table.number_or("flow_step_ratio", 0.05..=10.0, 1.0);
-    let wave = table.number_or("flow_wave_share", 0.0..=0.9, 0.0);
+    let wave = table.number_or("flow_wave_amplitude", 0.0..=0.9, 0.0);
     let wavelength = table.number_or("flow_wavelength_mm", 1.0..=1e6, 1000.0);
-    let pulse = table.number_or("flow_pulse_share", 0.0..=0.9, 0.0);
+    let pulse = table.number_or("flow_pulse_amplitude", 0.0..=0.9, 0.0);
     let period = table.number_or("flow_pulse_period_s", 0.01..=1e4, 2.0);
     let drift = table.number_or("flow_drift_per_root_m", 0.0..=1.0, 0.0);
     Some(Flow {
@@ -237,14 +237,14 @@ fn read_shading(table: &Table<'_>) -> Option<EdgeShading> {
 
 fn read_spots(table: &Table<'_>) -> Option<Spots> {
     let usual = ImageModel::DEFAULT.spots;
-    let share = table.number_or("spot_share", 0.0..=0.9, usual.covered_fraction);
+    let share = table.number_or("spot_fraction", 0.0..=0.9, usual.covered_fraction);
     let size = table.number_or("spot_size_px", 1.0..=200.0, usual.size_px);
     Some(Spots { covered_fraction: share?, size_px: size? })
 }
 
 fn read_grains(table: &Table<'_>) -> Option<Grains> {
     let usual = ImageModel::DEFAULT.grains;
-    let share = table.number_or("grain_rows_share", 0.0..=0.9, usual.rows_fraction);
+    let share = table.number_or("grain_rows_fraction", 0.0..=0.9, usual.rows_fraction);
     let size = table.number_or("grain_size_px", 1.0..=200.0, usual.size_px);
     let grey = table.number_or("grain_grey", 0.0..=1000.0, usual.grey);
     Some(Grains { rows_fraction: share?, size_px: size?, grey: grey? })
@@ -254,7 +254,7 @@ fn read_shadow(table: &Table<'_>) -> Option<Shadow> {
     let usual = ImageModel::DEFAULT.shadow;
     let distance = table.number_or("shadow_px", 0.0..=1000.0, usual.distance_px);
     let width = table.number_or("shadow_width_px", 0.0..=1000.0, usual.width_px);
-    let share = table.number_or("shadow_share", -2.0..=2.0, usual.contrast_fraction);
+    let share = table.number_or("shadow_contrast_fraction", -2.0..=2.0, usual.contrast_fraction);
     let side = table.choice("shadow_side", &SIDES);
     Some(Shadow {
         distance_px: distance?,
@@ -268,7 +268,7 @@ fn read_neighbour(table: &Table<'_>) -> Option<Neighbour> {
     let usual = ImageModel::DEFAULT.neighbour;
     let gap = table.number_or("neighbour_gap_px", 0.0..=1000.0, usual.gap_px);
     let width = table.number_or("neighbour_width_px", 0.0..=10_000.0, usual.width_px);
-    let share = table.number_or("neighbour_share", 0.0..=2.0, usual.contrast_fraction);
+    let share = table.number_or("neighbour_contrast_fraction", 0.0..=2.0, usual.contrast_fraction);
     let side = table.choice("neighbour_side", &SIDES);
     Some(Neighbour { gap_px: gap?, width_px: width?, contrast_fraction: share?, side: side? })
 }

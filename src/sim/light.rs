@@ -3,7 +3,7 @@
 use crate::numeric::number::to_f64;
 use crate::scenario::image::ImageModel;
 
-/// Light of every pixel; 1 in the middle of the picture.
+/// Light of every pixel; 1 in the middle of the image.
 #[derive(Debug, Clone, Copy)]
 pub struct Light {
     first: f64,

@@ -33,7 +33,7 @@ const TEXTURE_STREAM: u64 = 3;
 /// The bead's edges are projected through the camera and its distortion; every
 /// pixel is the exact integral of the blurred edge's tangent over its area.
 /// Shading, shadows, spots and grains are added to that, blurred and moved like
-/// the edges. Light, which is 1 in the middle of the picture, multiplies the
+/// the edges. Light, which is 1 in the middle of the image, multiplies the
 /// result; texture and noise are added before rounding, and what is above 255
 /// is saturated. A frame depends on the seed and its number, not on
 /// the frames before it. For the direction of travel see [`super::view`].
@@ -63,7 +63,7 @@ pub struct Rendered {
 pub enum RenderError {
     /// The gauge does not lie within the picture.
     #[error(
-        "the gauge reaches to ({}, {}) px, the picture has {} x {} px; make one fit the other",
+        "the gauge reaches to ({}, {}) px, the image has {} x {} px; make one fit the other",
         end.0, end.1, image.0, image.1
     )]
     GaugeOutside {

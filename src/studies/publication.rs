@@ -11,7 +11,7 @@ pub enum Publication {
     Diagne2015,
     /// Ma et al. 2026: pressure at the nozzle.
     Ma2026,
-    /// Mohammadi Looey et al. 2026: adaptive law of nozzle and plate.
+    /// Mohammadi Looey et al. 2026: adaptive control of nozzle and plate.
     Looey2026,
 }
 
@@ -40,7 +40,7 @@ impl Publication {
             }
             Self::Diagne2015 => "Diagne et al. 2015: screw with a delay of time and state",
             Self::Ma2026 => "Ma et al. 2026: pressure at the nozzle",
-            Self::Looey2026 => "Mohammadi Looey et al. 2026: adaptive law of nozzle and plate",
+            Self::Looey2026 => "Mohammadi Looey et al. 2026: adaptive control of nozzle and plate",
         }
     }
 }

@@ -29,8 +29,10 @@ const SCALE: Calibration = Calibration::Scale { mm_per_px: 0.126_582, sigma: Non
 /// The cell of 50 Hz that ships with the program, with steps for its law.
 fn cell(share: f64) -> Cell {
     let text = include_str!("../../cells/distance.toml");
-    let text =
-        text.replace("law = \"distance\"", &format!("law = \"steps\"\nstep_share = {share}"));
+    let text = text.replace(
+        "strategy = \"distance\"",
+        &format!("strategy = \"steps\"\nstep_fraction = {share}"),
+    );
     let text = text.replace("\nexponent = 0.25", "\n# exponent = 0.25");
     let mut cell = Cell::parse(Path::new("steps.toml"), &text, Purpose::Run).unwrap();
     cell.simulation.bead.slow_below_mm_per_s = 0.0;

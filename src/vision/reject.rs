@@ -202,12 +202,12 @@ impl fmt::Display for Reject {
             ),
             Self::Blinded { visible, need } => write!(
                 f,
-                "{:.0} % of the step between ground and bead lies within the camera's scale; it tells too little of the edge's place, {:.0} % and more are needed; a shorter exposure or less light shows more of it",
+                "{:.0} % of the step between ground and bead lies within the camera's scale; it tells too little of the edge's position, {:.0} % and more are needed; a shorter exposure or less light shows more of it",
                 visible * 100.0,
                 need * 100.0
             ),
             Self::WidthOutOfRange { got_mm, min_mm, max_mm } => {
-                write!(f, "width of {got_mm:.2} mm, believed are {min_mm} to {max_mm} mm; if that is the bead, width_range_mm has to contain it")
+                write!(f, "width of {got_mm:.2} mm, plausible are {min_mm} to {max_mm} mm; if that is the bead, width_range_mm has to contain it")
             }
             Self::Crooked { got_rad, limit_rad } => write!(
                 f,
@@ -225,7 +225,7 @@ impl fmt::Display for Reject {
             ),
             Self::Scattered { got_px, limit_px } => write!(
                 f,
-                "the places of an edge scatter by {got_px:.2} px about each other, {limit_px:.2} are bearable: something lies on it, or it is the edge of no bead; a gauge that holds one bead and plain ground beside it helps"
+                "the positions of an edge scatter by {got_px:.2} px about each other, {limit_px:.2} are bearable: something lies on it, or it is the edge of no bead; a gauge that holds one bead and plain ground beside it helps"
             ),
             Self::Occluded { got_px, limit_px } => write!(
                 f,
@@ -263,7 +263,7 @@ impl fmt::Display for Reject {
             ),
             Self::Vague { got, need } => write!(
                 f,
-                "no bead that stands out from the texture of the picture: the likeliest edge is {got:.1} times as strong as lines of texture, {need:.1} are needed; check that a bead lies in roi_px along bead_axis, with this polarity and width_range_mm; if it does, light that makes both edges clear or a longer gauge helps"
+                "no bead that stands out from the texture of the image: the likeliest edge is {got:.1} times as strong as lines of texture, {need:.1} are needed; check that a bead lies in roi_px along bead_axis, with this polarity and width_range_mm; if it does, light that makes both edges clear or a longer gauge helps"
             ),
             Self::Ambiguous { first_mm, second_mm } => write!(
                 f,
@@ -271,7 +271,7 @@ impl fmt::Display for Reject {
             ),
             Self::Clipped { got_px, need_px } => write!(
                 f,
-                "an edge lies {got_px:.1} px from the border of the gauge, {need_px:.1} are needed; a gauge that is wider across the bead helps"
+                "an edge lies {got_px:.1} px from the boundary of the gauge, {need_px:.1} are needed; a gauge that is wider across the bead helps"
             ),
             Self::WrongSize { image: (width, height) } => {
                 write!(f, "the gauge does not fit an image of {width}x{height} px; roi_px has to lie within it")

@@ -166,7 +166,7 @@ impl<'a, T: GreyPixel> GaugeRows<'a, T> {
     }
 }
 
-/// Frames laid out in rows across the bead; keeps the memory for those of
+/// Frames laid out in rows across the bead; keeps the length of the history for those of
 /// horizontal beads, which have to be turned, and for light where the camera has
 /// a gamma.
 #[derive(Debug, Clone, Default)]

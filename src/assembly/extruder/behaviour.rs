@@ -87,7 +87,7 @@ fn model_behaviour(
     }
     if keys.predicted_from == ScrewSpeed::Measured && model.input.name == COMMAND {
         let what = "found a model whose input was the command, expected one of the screw as it \
-                    was measured (identify --input screw_rpm) for foretold_from = \"encoder\"";
+                    was measured (identify --input screw_rpm) for predicted_from = \"encoder\"";
         return Err(extruder_error(cell, what));
     }
     let (command, flow_mm3_per_s) = model.operating_point;

@@ -44,7 +44,7 @@ pub fn check_bead_length(
     if shortest <= stop_length {
         return Err(AssemblyError::unfit(format!(
             "{cell}: robot.bead_length_mm or a planned bead: found {shortest}, expected more than \
-             {stop_length}, which is laid after the pump was told to stop: leave extruder.starts out"
+             {stop_length}, which is laid after the order to stop: leave extruder.starts out"
         )));
     }
     Ok(())

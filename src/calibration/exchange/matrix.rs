@@ -22,7 +22,7 @@ impl YamlFields<'_> {
         let coefficients = self.coefficients(&row, counts);
         let camera = Camera { distortion: coefficients?, ..pinhole? };
         if size.is_some_and(|size| !camera.reaches_middle(size)) {
-            let found = "a lens that cannot be undone in the middle of the picture";
+            let found = "a lens that cannot be undone in the middle of the image";
             self.problem(Some(row.line), &row.key, found, "coefficients of this camera");
             return None;
         }

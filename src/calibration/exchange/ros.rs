@@ -60,7 +60,7 @@ fn read_model(fields: &YamlFields<'_>, notes: &mut Vec<String>) -> Option<&'stat
                 MODEL,
                 "distortion_model",
                 "plumb_bob or rational_polynomial; other lenses are not known here: calibrate \
-                 from pictures of a board (`truebead calibrate`)",
+                 from images of a board (`truebead calibrate`)",
             );
             None
         }
@@ -71,13 +71,13 @@ fn read_model(fields: &YamlFields<'_>, notes: &mut Vec<String>) -> Option<&'stat
 /// than those that are measured.
 fn check_whole_picture(fields: &YamlFields<'_>, [width, height]: [Option<u32>; 2]) {
     for key in ["binning_x", "binning_y"] {
-        fields.check_whole(&[key], &[0, 1], "0 or 1, pictures with all their pixels");
+        fields.check_whole(&[key], &[0, 1], "0 or 1, images with all their pixels");
     }
     for (key, whole) in
         [("x_offset", None), ("y_offset", None), ("width", width), ("height", height)]
     {
         let sound = [Some(0), whole].into_iter().flatten().collect::<Vec<_>>();
-        fields.check_whole(&["roi", key], &sound, "0 or the whole picture");
+        fields.check_whole(&["roi", key], &sound, "0 or the whole image");
     }
 }
 
@@ -96,7 +96,7 @@ fn note_rectification(fields: &YamlFields<'_>, camera: Option<&Matrix>, notes: &
         (false, true) => "projection_matrix is",
         (true, true) => "rectification_matrix and projection_matrix are",
     };
-    notes.push(format!("{names} for rectified pictures, and left out: pictures here are raw"));
+    notes.push(format!("{names} for rectified images, and ignored: images here are raw"));
 }
 
 /// The projection of a single camera: its own matrix, and no shift.

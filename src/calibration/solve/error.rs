@@ -12,15 +12,15 @@ pub(super) const MAX_RMS_PX: f64 = 3.0;
 pub enum SolveError {
     /// Too few pictures show the board.
     #[error(
-        "{found} picture(s) show the board, at least {MIN_VIEWS} must: take 10 to 20, \
-         tilted to several sides, that fill the picture between them"
+        "{found} image(s) show the board, at least {MIN_VIEWS} must: take 10 to 20, \
+         tilted to several sides, that fill the image between them"
     )]
     TooFew {
         /// Pictures that show it.
         found: usize,
     },
     /// One of the pictures says nothing of where its board was.
-    #[error("{name}: the corners fit no board before a camera; leave the picture out")]
+    #[error("{name}: the corners fit no board before a camera; leave the image out")]
     NoPose {
         /// The picture's name.
         name: String,
@@ -28,7 +28,7 @@ pub enum SolveError {
     /// The corners are nowhere near where any camera would see them.
     #[error(
         "the corners are {rms_px:.1} px off where the best camera would see them, more than \
-         {MAX_RMS_PX} px: look for a wrong count of corners (--board), or pictures with another \
+         {MAX_RMS_PX} px: look for a wrong count of corners (--board), or images with another \
          zoom or focus among them"
     )]
     NoFit {

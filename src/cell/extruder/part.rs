@@ -94,12 +94,12 @@ fn check_plant(
         PlantKind::Melt(_) => None,
     };
     if let Some(taken) = taken.filter(|taken| *taken != extruder.drive) {
-        let found = format!("a plant that is told \"{}\"", taken.word());
+        let found = format!("a plant that takes \"{}\"", taken.word());
         let given = extruder.drive.word();
         plant_table.report(
             "kind",
             found,
-            format!("one that is told \"{given}\", as [extruder] says"),
+            format!("one that takes \"{given}\", as [extruder] says"),
         );
         return;
     }
@@ -111,8 +111,11 @@ fn check_plant(
         Strategy::Constant { .. } | Strategy::Profile { .. } => None,
     };
     let limited = extruder.max_pressure.map(|_| RequiredReading::Pressure);
-    let key =
-        if let Strategy::Feedforward(_) = extruder.strategy { "foretold_from" } else { "strategy" };
+    let key = if let Strategy::Feedforward(_) = extruder.strategy {
+        "predicted_from"
+    } else {
+        "strategy"
+    };
     for (key, need) in [(key, needed), ("max_pressure_mpa", limited)] {
         if let Some(need) = need.filter(|need| !kind.reports(*need)) {
             let (reading, plant) = match need {

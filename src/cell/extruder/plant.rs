@@ -250,11 +250,11 @@ fn read_linear(table: &Table<'_>, transfer: TransferFunction) -> Option<LinearPl
 fn read_melt(table: &Table<'_>) -> Option<MeltPlant> {
     let gain = table.number("gain_mm3_per_s", 1e-9..=1e12);
     let dead_time = table.number_or("dead_time_s", 0.0..=60.0, 0.12);
-    let screw = table.number_or("screw_s", 1e-3..=60.0, 0.07);
+    let screw = table.number_or("screw_lag_s", 1e-3..=60.0, 0.07);
     let stored = table.number_or("stored_s", 1e-3..=60.0, 0.3);
     let void = table.number_or("void_mm3", 0.0..=1e9, 650.0);
-    let void_sigma = table.number_or("void_scatter", 0.0..=1.0, 0.03);
-    let flow_sigma = table.number_or("flow_scatter", 0.0..=1.0, 0.01);
+    let void_sigma = table.number_or("void_sigma", 0.0..=1.0, 0.03);
+    let flow_sigma = table.number_or("flow_sigma", 0.0..=1.0, 0.01);
     Some(MeltPlant {
         gain_mm3_per_s: gain?,
         dead_time_s: dead_time?,
@@ -269,9 +269,9 @@ fn read_melt(table: &Table<'_>) -> Option<MeltPlant> {
 fn read_pressure_plant(table: &Table<'_>) -> Option<PressurePlant> {
     let process = read_process(table);
     let nozzle = read_nozzle(table);
-    let max_speed = table.number("fastest_rpm", 1e-6..=1e6);
+    let max_speed = table.number("max_rpm", 1e-6..=1e6);
     let noise = table.number_or("sensor_noise_mpa", 0.0..=1e3, 0.0);
-    let wave = table.number_or("gain_wave_share", 0.0..=0.9, 0.0);
+    let wave = table.number_or("gain_wave_fraction", 0.0..=0.9, 0.0);
     let period = table.number_or("gain_wave_period_s", 0.1..=1e6, 60.0);
     let load = table.number_or("load_rpm", -1e6..=1e6, 0.0);
     let load_at = table.number_or("load_at_s", 0.0..=1e6, 0.0);

@@ -49,21 +49,21 @@ pub(super) fn read(table: &Table<'_>, context: &ReadContext<'_>) -> Option<Press
     let model = read_process(table);
     let nozzle = read_nozzle(table);
     let sigma = table.number("sensor_noise_mpa", 1e-9..=1e3);
-    let drift = table.number_or("wander_mpa2", 0.0..=1e3, 2e-5);
-    let word = table.choice("law", &CONTROLLER_WORDS);
+    let drift = table.number_or("drift_mpa2", 0.0..=1e3, 2e-5);
+    let word = table.choice("controller", &CONTROLLER_WORDS);
     if word.is_none() {
         table.allow_unknown_keys();
     }
     if context.rates.feedforward_hz > MAX_LOOP_HZ {
         let found = format!("a pressure loop at {} Hz", context.rates.feedforward_hz);
-        table.report("law", found, format!("feedforward_rate_hz of at most {MAX_LOOP_HZ}"));
+        table.report("controller", found, format!("feedforward_rate_hz of at most {MAX_LOOP_HZ}"));
     }
     let noise = or_report(table, "sensor_noise_mpa", PressureNoise::new(drift?, sigma?.powi(2)));
     let choice = match word? {
         ControllerWord::Predictive => {
-            let uncertainty = table.number_or("model_doubt", 0.01..=0.2, 0.1)?;
+            let uncertainty = table.number_or("model_uncertainty", 0.01..=0.2, 0.1)?;
             let tuning = Tuning::of(&model?, &noise?, uncertainty);
-            or_report(table, "model_doubt", tuning).map(PressureChoice::Predictive)
+            or_report(table, "model_uncertainty", tuning).map(PressureChoice::Predictive)
         }
         ControllerWord::Vsfc => read_vsfc(table, noise?).map(PressureChoice::Vsfc),
         ControllerWord::Pi => read_pi(table).map(PressureChoice::Pi),
@@ -80,7 +80,7 @@ pub(super) fn read(table: &Table<'_>, context: &ReadContext<'_>) -> Option<Press
 fn read_vsfc(table: &Table<'_>, noise: PressureNoise) -> Option<VsfcGains> {
     let kp = table.number("kp_rpm_per_mpa", 0.0..=1e9);
     let ki = table.number("ki_rpm_per_mpa_s", 0.0..=1e9);
-    let zone_fraction = table.number_or("weak_zone_share", 0.0..=1.0, 0.3);
+    let zone_fraction = table.number_or("weak_zone_fraction", 0.0..=1.0, 0.3);
     or_report(table, "kp_rpm_per_mpa", VsfcGains::new(kp?, ki?, zone_fraction?, noise.sigma()))
 }
 

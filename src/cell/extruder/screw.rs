@@ -35,7 +35,7 @@ pub fn read_screw(table: &Table<'_>, default: Option<ScrewDesign>) -> Option<Scr
     let channel = number("channel_m4", 1e-20..=1.0, |default| default.channel_m4);
     let density = number("density_kg_per_m3", 1.0..=1e5, |default| default.density_kg_per_m3);
     let unit = table.choice("turn_unit", &[("rad", TurnUnit::RadPerS), ("rev", TurnUnit::RevPerS)]);
-    let fraction = table.number_or("pulsation_share", 0.0..=0.99, 0.0);
+    let fraction = table.number_or("pulsation_fraction", 0.0..=0.99, 0.0);
     let rad = table.number_or("pulsation_rad_per_s", 0.0..=1e4, 0.0);
     let phase = table.number_or("pulsation_phase_rad", -1e3..=1e3, 0.0);
     let design = ScrewDesign {
@@ -65,10 +65,10 @@ pub(super) fn read_predictor(
 ) -> Option<ScrewSettings> {
     let screw = read_screw(table, None);
     let setpoint = table.number("filled_mm", 1e-3..=1e5);
-    let max_fill = table.number("most_filling", 1e-3..=0.999);
+    let max_fill = table.number("max_filling", 1e-3..=0.999);
     let slope = table.number("slope_per_m", 1e-3..=1e6);
     let feedback = table.choice(
-        "law",
+        "feedback",
         &[("exponential", FeedbackWord::Exponential), ("saturated", FeedbackWord::Saturated)],
     );
     let (screw, slope) = (screw?, slope?);
@@ -83,7 +83,11 @@ pub(super) fn read_predictor(
     };
     let verdict = Feasibility::judge(&screw);
     if !verdict.is_feasible() {
-        table.report("pulsation_share", "a screw whose feed may never arrive", verdict.to_string());
+        table.report(
+            "pulsation_fraction",
+            "a screw whose feed may never arrive",
+            verdict.to_string(),
+        );
     }
     match feedback {
         Ok(feedback) => Some(ScrewSettings {

@@ -129,7 +129,7 @@ impl Strategy {
             StrategyWord::Adaptive => {
                 require_command(table, context, CommandQuantity::MassFlow);
                 adaptive::read(&table.required_table("adaptive")?, context)
-                    .map(|law| Self::Adaptive(Box::new(law)))
+                    .map(|settings| Self::Adaptive(Box::new(settings)))
             }
         }
     }
@@ -152,18 +152,18 @@ fn read_feedforward(table: &Table<'_>, context: &ReadContext<'_>) -> Option<Feed
     } else {
         table.number("time_constant_s", 1e-3..=60.0)
     };
-    let max_delay = table.number_or("late_s", 0.0..=60.0, 0.0);
+    let max_delay = table.number_or("max_delay_s", 0.0..=60.0, 0.0);
     let right_zeros = table.choice(
         "right_zeros",
         &[("refuse", RightHalfPlaneZeros::Refuse), ("mirror", RightHalfPlaneZeros::Mirror)],
     );
     let predicted_from = table.choice(
-        "foretold_from",
+        "predicted_from",
         &[("command", ScrewSpeed::Modelled), ("encoder", ScrewSpeed::Measured)],
     );
     if predicted_from == Some(ScrewSpeed::Measured) && context.drive != CommandQuantity::Rpm {
         let expected = "\"command\", or command = \"rpm\", which is what an encoder reports";
-        table.report("foretold_from", "\"encoder\"", expected);
+        table.report("predicted_from", "\"encoder\"", expected);
     }
     Some(FeedforwardKeys {
         model: model?,

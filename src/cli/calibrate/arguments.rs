@@ -12,34 +12,34 @@ use crate::core::units::Mm;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  truebead calibrate pictures/ --board 9x6 --square-mm 20 --out calib.toml
+  truebead calibrate images/ --board 9x6 --square-mm 20 --out calib.toml
 
-Take 10 to 20 sharp pictures of a flat board, tilted to several sides and in
-all parts of the picture. Take the last one with the board flat on the bed, or
-name that picture with --plane. calib/README.md tells more.
+Take 10 to 20 sharp images of a flat board, tilted to several sides and in
+all parts of the image. Take the last one with the board flat on the bed, or
+name that image with --plane. calib/README.md tells more.
 
 Besides the calibration file a report.html is written: what a width is known
-to, all over the picture, and what one more picture would bring.
+to, all over the image, and what one more image would bring.
 
   truebead calibrate --camera camera:0 --board 9x6 --square-mm 20 \\
     --bead-mm 40 --max-width-sigma-mm 0.05 --out calib.toml
 
-takes the pictures, too: first of the board lying on the bed, then of every
+takes the images, too: first of the board lying on the bed, then of every
 place in which it is held, and ends when the width of the bead is known as well
 as was asked for.")]
 pub struct CalibrateArgs {
     /// Folder of images of a board
     #[arg(required_unless_present = "camera", conflicts_with = "camera")]
     pub input: Option<PathBuf>,
-    /// Take the pictures now, with this camera, as a cell names it: camera:0,
+    /// Take the images now, with this camera, as a cell names it: camera:0,
     /// gst:PIPELINE, an http address, or recorded frames
     #[arg(long, value_name = "SOURCE")]
     pub camera: Option<String>,
-    /// Folder for the pictures that are taken
-    /// [default: beside the calibration file, with its name and -pictures]
+    /// Folder for the images that are taken
+    /// [default: beside the calibration file, with its name and -images]
     #[arg(long, value_name = "DIR", requires = "camera")]
     pub images: Option<PathBuf>,
-    /// Pictures a second from an http address or from recorded frames
+    /// Images a second from an http address or from recorded frames
     #[arg(long, value_name = "HZ", requires = "camera", default_value_t = 10.0)]
     pub rate_hz: f64,
     #[command(flatten)]
@@ -58,11 +58,11 @@ pub struct CalibrateArgs {
     /// The robot's z when the image that fixes the plane was taken [mm]
     #[arg(long, value_name = "MM", default_value = "0", value_parser = parse_length, allow_hyphen_values = true)]
     pub robot_z_mm: Mm,
-    /// Width of the bead that will be measured, for what is told about it [mm]
-    /// [default: a third of the picture's width]
+    /// Width of the bead that will be measured, for what is reported about it [mm]
+    /// [default: a third of the image's width]
     #[arg(long, value_name = "MM", value_parser = parse_length)]
     pub bead_mm: Option<Mm>,
-    /// Height of its top edges above the bed, for what is told about it; give it again
+    /// Height of its top edges above the bed, for what is reported about it; give it again
     /// for further layers [mm]
     /// [default: 0, and a twentieth of the camera's height]
     #[arg(long, value_name = "MM", value_parser = parse_length)]

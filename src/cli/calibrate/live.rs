@@ -36,8 +36,8 @@ const MAX_VIEWS: usize = 60;
 /// Seconds after which the report loads itself anew.
 const RELOAD_S: u32 = 3;
 
-/// Takes pictures until the width of the bead is known as well as was asked for, a
-/// further picture brings nothing, there are [`MOST_VIEWS`], the camera ends, or the user
+/// Takes images until the width of the bead is known as well as was asked for, a
+/// further image brings nothing, there are [`MOST_VIEWS`], the camera ends, or the user
 /// ends it.
 pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<CalibrationImages> {
     let name = args.camera.as_deref().unwrap_or_default();
@@ -76,7 +76,7 @@ fn source(name: &str) -> Result<ImageSource, WrongArguments> {
     }
 }
 
-/// A folder without other pictures in it: these would be taken for some of this camera.
+/// A folder without other images in it: these would be taken for some of this camera.
 fn folder(args: &CalibrateArgs) -> Result<PathBuf, WrongArguments> {
     let beside = || {
         let stem = args.out.file_stem().unwrap_or(args.out.as_os_str()).to_string_lossy();
@@ -91,8 +91,8 @@ fn folder(args: &CalibrateArgs) -> Result<PathBuf, WrongArguments> {
         return Ok(folder);
     }
     Err(WrongArguments::new(format!(
-        "{}: expected an empty folder, or none; name another with --pictures, or calibrate from \
-         the pictures in it with `truebead calibrate {}`",
+        "{}: expected an empty folder, or none; name another with --images, or calibrate from \
+         the images in it with `truebead calibrate {}`",
         folder.display(),
         folder.display()
     )))
@@ -129,7 +129,7 @@ impl<'a> Taking<'a> {
 
     fn run(&mut self, camera: &mut dyn FrameSource, stop: &StopSignal) -> anyhow::Result<()> {
         self.screen
-            .say("lay the board flat on the bed, in the middle of the picture, and let it lie");
+            .say("lay the board flat on the bed, in the middle of the image, and let it lie");
         while !stop.requested() {
             let is_enough = match camera.next_frame() {
                 Ok(Some(Grab::Frame { frame, .. })) => self.examine(&frame)?,
@@ -143,7 +143,7 @@ impl<'a> Taking<'a> {
                 }
                 Err(error) if self.files.is_empty() => return Err(error.into()),
                 Err(error) => {
-                    self.screen.say(&format!("{error}; ending with the pictures so far"));
+                    self.screen.say(&format!("{error}; ending with the images so far"));
                     break;
                 }
             };
@@ -171,7 +171,7 @@ impl<'a> Taking<'a> {
         let path = self.folder.join(&name);
         let png = image_file::encode_png(frame)?;
         write_atomic(&path, &png).with_context(|| {
-            format!("the {} pictures before it are in {}", number - 1, self.folder.display())
+            format!("the {} images before it are in {}", number - 1, self.folder.display())
         })?;
         self.collector.name_last(&name);
         self.files.push(path);
@@ -181,7 +181,7 @@ impl<'a> Taking<'a> {
         self.screen.say(&format!("view {number}: {what}{corners} corners -> {name}"));
         if number == 1 {
             self.screen.say(
-                "take the board up; hold it still for a moment in every part of the picture, tilted \
+                "take the board up; hold it still for a moment in every part of the image, tilted \
                  by 20 to 45 degrees to all sides",
             );
         }
@@ -230,13 +230,13 @@ impl<'a> Taking<'a> {
             bail!("the camera has not shown the board lying still on the bed; nothing was written");
         }
         let pictures = taken_so_far(&self.files, self.collector.kept());
-        say!("{} pictures in {}\n", self.files.len(), self.folder.display());
+        say!("{} images in {}\n", self.files.len(), self.folder.display());
         Ok(pictures)
     }
 }
 
 /// Whether nothing speaks against the calibration, and widths are known as well as was
-/// asked for, or as well as one more picture would let them be known.
+/// asked for, or as well as one more image would let them be known.
 fn is_enough(args: &CalibrateArgs, conclusion: &CalibrationResult<'_>) -> bool {
     let known = match args.max_width_sigma_mm {
         Some(_) => !conclusion.fails(),
@@ -245,12 +245,12 @@ fn is_enough(args: &CalibrateArgs, conclusion: &CalibrationResult<'_>) -> bool {
     known && warnings::warnings(&conclusion.solution).is_empty()
 }
 
-/// How far the pictures have come.
+/// How far the images have come.
 fn progress(args: &CalibrateArgs, conclusion: &CalibrationResult<'_>) -> String {
     let coverage = Coverage::of(&conclusion.solution);
     let mut text = String::new();
     let width = conclusion.worst_mm().map_or_else(
-        || "how well a width is known cannot be told yet".to_owned(),
+        || "how well a width is known cannot be determined yet".to_owned(),
         |worst| format!("a width is known to {worst:.4} mm where boards were seen"),
     );
     let asked = args.max_width_sigma_mm;
@@ -264,7 +264,7 @@ fn progress(args: &CalibrateArgs, conclusion: &CalibrationResult<'_>) -> String 
         format!("; missing: {}", missing.join(", "))
     };
     let beside = [
-        format!("boards in {} of {PARTS} parts of the picture", coverage.count()),
+        format!("boards in {} of {PARTS} parts of the image", coverage.count()),
         format!("side that was nearer: {}{missing}", tilts.collect::<Vec<_>>().join(", ")),
         conclusion
             .next

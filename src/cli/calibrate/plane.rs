@@ -67,7 +67,7 @@ pub fn find(
         boards.add(image, corners)?;
     }
     let most_px = (MAX_RMS_RATIO * solution.rms_px).max(MIN_ACCEPTED_RMS_PX);
-    let other = format!("the other pictures have {:.2} px", solution.rms_px);
+    let other = format!("the other images have {:.2} px", solution.rms_px);
     let (images, on_bed) = boards.fit(&solution.model, most_px, &other)?;
     Ok(BedPlane {
         images,

@@ -64,14 +64,13 @@ fn name_column(looks: &Observations) -> usize {
 /// The models of the lens that were tried, and which one was taken.
 pub fn lens(solution: &Solution) -> String {
     let mut out = String::new();
-    line!(out, "\nlens: what each model leaves, and of pictures that took no part in it");
+    line!(out, "\nlens: what each model leaves, and of images that took no part in it");
     line!(out, "  {:28}  rms px  held out px", "coefficients");
     for trial in &solution.trials {
         let name = trial.free.lens.map_or("", |lens| lens.name());
         let bend = if trial.free.bend { ", bent board" } else { "" };
-        let held_out = trial
-            .cross_validation_px
-            .map_or_else(|| "not told".to_owned(), |px| format!("{px:.4}"));
+        let held_out =
+            trial.cross_validation_px.map_or_else(|| "unknown".to_owned(), |px| format!("{px:.4}"));
         let folds = if trial.is_non_monotonic { "  turns over within the picture" } else { "" };
         let mark = if trial.free == solution.free { "  <- taken" } else { "" };
         line!(
@@ -113,7 +112,7 @@ pub fn camera(solution: &Solution) -> String {
     if solution.design_effect > REPORTED_EFFECT {
         line!(
             out,
-            "  the pictures contradict each other more than such noise explains (a board that is"
+            "  the images contradict each other more than such noise explains (a board that is"
         );
         line!(
             out,
@@ -139,9 +138,9 @@ pub fn width(
     let (Some(covariance), Some(share)) = (covariance, quality) else {
         line!(
             out,
-            "\nhow well a width on the bed is known cannot be told, and is not in the file: the"
+            "\nhow well a width on the bed is known cannot be determined, and is not in the file: the"
         );
-        line!(out, "  pictures do not tell the camera's numbers apart; tilt the board by 20 to 45");
+        line!(out, "  images do not tell the camera's numbers apart; tilt the board by 20 to 45");
         line!(out, "  degrees to several sides");
         return out;
     };
@@ -171,13 +170,13 @@ pub fn maps(maps: &[WidthMap], limit: Option<Mm>) -> String {
     let mut out = String::new();
     let Some(first) = maps.first() else {
         if limit.is_some() {
-            line!(out, "\nFAIL: how well a width is known cannot be told");
+            line!(out, "\nFAIL: how well a width is known cannot be determined");
         }
         return out;
     };
     line!(out, "\nstandard deviation of the width of a bead of {} mm", first.bead_mm);
     line!(out, "  {:>10}  {:>16}  {:>22}  if its height", "its height", "where boards", "all over");
-    line!(out, "  {:>10}  {:>16}  {:>22}  is 1 mm wrong", "above bed", "were seen", "the picture");
+    line!(out, "  {:>10}  {:>16}  {:>22}  is 1 mm wrong", "above bed", "were seen", "the image");
     for map in maps {
         let worst = map.worst_where_seen_mm.map_or_else(|| "-".into(), |mm| format!("{mm:.4} mm"));
         let range = map.range_mm();
@@ -209,12 +208,12 @@ pub fn next_view(covariance: Option<&CalibrationCovariance>, next: Option<&NextV
     match (covariance, next) {
         (None, _) => {}
         (Some(_), Some(next)) => {
-            line!(out, "\none more picture would help most with");
+            line!(out, "\none more image would help most with");
             line!(out, "  {next}:");
             let (before, after) = next.relative_sigma;
             line!(out, "  {:.3} % of a width instead of {:.3} %", 100.0 * after, 100.0 * before);
         }
-        (Some(_), None) => line!(out, "\none more picture would bring less than 3 %"),
+        (Some(_), None) => line!(out, "\none more image would bring less than 3 %"),
     }
     out
 }
@@ -229,7 +228,7 @@ pub fn scale(
     let Some(scale) = single_scale(calibration, face) else {
         line!(
             out,
-            "\nno single mm-per-pixel number: the middle of the picture does not see the plane"
+            "\nno single mm-per-pixel number: the middle of the image does not see the plane"
         );
         return out;
     };
@@ -238,7 +237,7 @@ pub fn scale(
         covariance.and_then(|covariance| covariance.mm_per_px(face)).map(|(_, sigma)| sigma);
     let spread = sigma.map_or_else(String::new, |sigma| format!(" ± {sigma:.6}"));
     line!(out, "\nsingle number: {:.6}{spread} mm/px", scale.mm_per_px);
-    line!(out, "  holds in the middle of the picture for a surface {face} above the bed;");
+    line!(out, "  holds in the middle of the image for a surface {face} above the bed;");
     line!(
         out,
         "  elsewhere on it a pixel is {:.6} to {:.6} mm, so that a width comes out",

@@ -100,7 +100,7 @@ fn check(args: &ConvertArgs, to: To) -> Result<(), WrongArguments> {
     }
     match (to, args.plane.is_empty()) {
         (To::Truebead, true) if ends_in(&args.input, YAML) => wrong(format!(
-            "{input} holds no bed plane: lay a board flat on the bed, take a picture, and give \
+            "{input} holds no bed plane: lay a board flat on the bed, take an image, and give \
              --plane IMAGE --board COLUMNSxROWS --square-mm MM"
         )),
         (To::Ros | To::Opencv, false) => {
@@ -147,12 +147,12 @@ impl ConvertSource {
         let is_given = |quality: &CalibrationQuality| {
             let CalibrationQuality {
                 reprojection_rms_px: _,
-                width_relative_sigma: width_sigma_share,
+                width_relative_sigma,
                 seen_px,
                 heights_mm,
                 uncertainty,
             } = quality;
-            width_sigma_share.is_some()
+            width_relative_sigma.is_some()
                 || seen_px.is_some()
                 || heights_mm.is_some()
                 || uncertainty.is_some()
@@ -164,7 +164,7 @@ impl ConvertSource {
             if quality.as_ref().is_some_and(is_given) {
                 lost.push("how well a width is known and where boards were seen");
             }
-            way_back = "; keep the .toml: on the way back the bed plane needs pictures of a board \
+            way_back = "; keep the .toml: on the way back the bed plane needs images of a board \
                         (--plane), and the calibration's part of sigma_mm stays unknown";
         }
         let intrinsics = self.intrinsics();

@@ -22,7 +22,7 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<ExitCode> {
         args.refuse("a recording", &args.of_picture())?;
         recording::run(args)?;
     } else {
-        args.refuse("a picture", &[("--max-mm", args.max_mm.is_some())])?;
+        args.refuse("an image", &[("--max-mm", args.max_mm.is_some())])?;
         board::run(args)?;
     }
     Ok(ExitCode::SUCCESS)
@@ -32,7 +32,7 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<ExitCode> {
 fn is_recording(path: &Path) -> Result<bool, WrongArguments> {
     let wrong = |what: String| WrongArguments::new(format!("{}: {what}", path.display()));
     if path.is_dir() {
-        return Err(wrong("a folder, expected a recording or a picture".to_owned()));
+        return Err(wrong("a folder, expected a recording or an image".to_owned()));
     }
     let mut begin = Vec::new();
     File::open(path)

@@ -36,10 +36,10 @@ Example:
   truebead camera verify today.png --board 9x6 --square-mm 20 --calibration calib.toml
 
 Lay the board flat on the bed, the robot where it was when the bed plane was
-fixed, and take one picture. Exit status 1 where the calibration does not hold
+fixed, and take one image. Exit status 1 where the calibration does not hold
 any more.")]
 pub struct VerifyArgs {
-    /// Picture of the board on the bed
+    /// Image of the board on the bed
     image: PathBuf,
     #[command(flatten)]
     board: BoardArgs,
@@ -49,7 +49,7 @@ pub struct VerifyArgs {
     /// Height of the board's printed face above the bed [mm]
     #[arg(long, value_name = "MM", default_value = "0", value_parser = parse_length)]
     board_thickness_mm: Mm,
-    /// Largest error of a width that is borne [% of the width]
+    /// Largest error of a width that is accepted [% of the width]
     #[arg(long, value_name = "PERCENT", default_value_t = MAX_ERROR_PERCENT)]
     max_error_percent: f64,
 }
@@ -66,7 +66,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         return Err(WrongArguments::new("the board's thickness cannot be below 0 mm").into());
     }
     if !args.image.is_file() {
-        let what = format!("{}: no such picture", args.image.display());
+        let what = format!("{}: no such image", args.image.display());
         return Err(WrongArguments::new(what).into());
     }
     let calibration = calibration_file::read(&args.calibration)?;
@@ -129,7 +129,7 @@ fn tell(found: &Findings, args: &VerifyArgs, borne: f64, rms_px: Option<f64>) {
         say!(
             "  as if the board lay {:.2} mm {} than {} above the bed: see that --square-mm and \
              --board-thickness-mm are right, and that the robot stands at the z of the bed \
-             plane's picture; otherwise the camera has moved, so take the bed plane anew \
+             plane's image; otherwise the camera has moved, so take the bed plane anew \
              (calibrate --plane)",
             found.height_mm.abs(),
             if found.height_mm > 0.0 { "higher" } else { "lower" },

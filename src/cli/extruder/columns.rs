@@ -89,7 +89,7 @@ fn of_table(table: &DataTable, columns: &ColumnArgs) -> Vec<ColumnLine> {
 }
 
 fn unit(name: &str, columns: &ColumnArgs) -> String {
-    columns.quantity(name).map_or_else(|_| "not told".to_owned(), |found| found.unit.to_string())
+    columns.quantity(name).map_or_else(|_| "unknown".to_owned(), |found| found.unit.to_string())
 }
 
 impl ColumnLine {

@@ -99,7 +99,7 @@ fn parse_level(text: &str) -> Result<f64, String> {
     level.ok_or_else(|| "expected numbers with a comma between them, such as 20,40,30".to_owned())
 }
 
-/// Levels that are told, one after the other
+/// Levels that are given, one after the other
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -191,7 +191,7 @@ impl CommonArgs {
         self.check_commanded()?;
         if self.hold_s < SHORTEST_S {
             return Err(WrongArguments::new(format!(
-                "--hold-s {}: expected {SHORTEST_S} s or more: no extruder is told so often, and none \
+                "--hold-s {}: expected {SHORTEST_S} s or more: no extruder is commanded so often, and none \
                  answers so fast",
                 self.hold_s
             )));
@@ -211,7 +211,7 @@ impl CommonArgs {
     fn check_commanded(&self) -> Result<(), WrongArguments> {
         match Unit::of_column(&self.quantity) {
             Some(unit @ (Unit::Mm | Unit::Mm2)) => Err(WrongArguments::new(format!(
-                "--quantity {}: no extruder is told a {}; that is what comes of it. Expected what is \
+                "--quantity {}: no extruder is commanded a {}; that is what comes of it. Expected what is \
                  commanded, such as screw_rpm, drive_v, nozzle_mpa or flow_mm3_per_s",
                 self.quantity,
                 if unit == Unit::Mm { "width or a length" } else { "section" }

@@ -19,7 +19,7 @@ Examples:
   truebead extruder models models/
   truebead extruder models models/ --material PLA --nozzle-mm 0.4 --temperature-c 207
 
-A file that is no model is told, and the others are listed and found all the same.
+A file that is no model is reported, and the others are listed and found all the same.
 
 Exit status: 0 listed or found, 1 no such model or more than one, 2 wrong arguments
 or a list with a file that is no model.")]

@@ -91,13 +91,13 @@ fn tell(column: &str, noise: &PressureNoise, count: usize, step_s: Option<f64>) 
     say!("# {column}: {count} readings{every}");
     say!("sensor_noise_mpa = {:.3e}   # standard deviation of a reading", noise.sigma().get());
     say!(
-        "wander_mpa2 = {:.3e}        # variance that the pressure itself gains between two readings; \
+        "drift_mpa2 = {:.3e}        # variance that the pressure itself gains between two readings; \
          a cell that reads at another io_rate_hz takes it times the ratio of the intervals",
         noise.drift_mpa2()
     );
     if noise.drift_mpa2() > MAX_DRIFT_RATIO * noise.reading_mpa2() {
         tell!(
-            "warning: the pressure moves by more than its readings scatter; a noise is told from \
+            "warning: the pressure moves by more than its readings scatter; a noise is identified from \
              a command that stands: cut the rest off with --from-s and --to-s"
         );
     }

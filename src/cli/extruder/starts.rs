@@ -31,7 +31,7 @@ Example:
   truebead extruder identify --example example/
   truebead extruder starts example/starts.csv --input screw_rpm --output flow_mm3_per_s
 
-How late the first flow comes is told by the time that the pump stood before. The
+How late the first flow comes is given by the time that the pump stood before. The
 file starts.toml is for the key starts of [extruder] in a cell.")]
 pub struct StartsArgs {
     /// Table of logged data

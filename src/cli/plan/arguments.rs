@@ -88,9 +88,14 @@ impl PlanArgs {
             ("--budget-s", Some(self.budget_s), least as fn(f64) -> bool, "0 or more seconds"),
             ("--nozzle-mm", self.nozzle_mm, above, "a length above 0"),
             ("--apex-mm-per-s", Some(self.apex_mm_per_s), above, "a speed above 0"),
-            ("--nozzle-doubt", Some(self.nozzle_sigma), least, "a share of 0 or more"),
+            ("--nozzle-sigma", Some(self.nozzle_sigma), least, "a share of 0 or more"),
             ("--corner-mm", self.corner_mm, least, "a length of 0 or more"),
-            ("--unmodelled-share", Some(self.unmodelled_fraction), least, "a share of 0 or more"),
+            (
+                "--unmodelled-fraction",
+                Some(self.unmodelled_fraction),
+                least,
+                "a share of 0 or more",
+            ),
         ];
         for (name, value, sound, expected) in numbers {
             if let Some(value) = value.filter(|value| !sound(*value)) {

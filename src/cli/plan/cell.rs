@@ -68,7 +68,7 @@ impl PlannedExtruder {
         let name = loaded.path.display().to_string();
         let absent = |what: &str| WrongArguments::new(format!("{name}: {what}"));
         let Some(run) = &loaded.cell.run else {
-            return Err(absent("found no robot, expected a cell that suffices for run").into());
+            return Err(absent("found no robot, expected a cell that is ready for run").into());
         };
         let Some(part) = &run.extruder else {
             let what = "[extruder]: found nothing, expected an extruder with a model: strategy = \

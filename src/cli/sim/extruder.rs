@@ -44,7 +44,7 @@ pub struct ExtruderSimArgs {
     /// Its name, one word
     #[arg(long, default_value = "truebead-sim")]
     name: String,
-    /// To rehearse a fault: the pump fails so long after it was first told to run [s]
+    /// To rehearse a fault: the pump fails so long after it was first commanded to run [s]
     #[arg(long, value_name = "S", value_parser = parse_until,
           allow_hyphen_values = true)]
     fail_after_s: Option<f64>,

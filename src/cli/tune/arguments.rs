@@ -17,7 +17,7 @@ Examples:
   truebead tune my-cell.toml --out again --recording runs/monday/recording.mcap
   truebead tune my-cell.toml --out again --recording tuned/recording.mcap --write new-cell.toml
 
-Runs the cell with steps of the robot's speed in place of its law: after the first
+Runs the cell with steps of the robot's speed in place of its controller: after the first
 stretch eleven pieces of bead, each at the start speed or --step-share more or less,
 within [limits]. It says beforehand how much bead that takes. A width near an end of
 gauge.width_range_mm ends the steps; whatever else fails, the cell holds and stops as
@@ -30,7 +30,7 @@ cell also run/, with the report of that run. Nothing is applied: the cell file s
 is, and --write makes a copy with the proposed settings, beside the cell where that names
 other files.
 
-Exit status: 0 found, 1 not to be told from this bead, 2 wrong arguments or
+Exit status: 0 found, 1 not to be determined from this bead, 2 wrong arguments or
 configuration, 3 the run lost records or refused too many frames.")]
 pub struct TuneArgs {
     /// Cell file
@@ -40,7 +40,7 @@ pub struct TuneArgs {
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Change of the speed, as a share of the start speed
-    /// [default: 0.1, or that of a cell whose law is steps]
+    /// [default: 0.1, or that of a cell whose controller is steps]
     #[arg(long, value_name = "S", value_parser = parse_fraction, conflicts_with = "recording")]
     pub step_fraction: Option<f64>,
     /// Lay the cell's simulated bead; nothing real moves
@@ -56,10 +56,10 @@ pub struct TuneArgs {
     /// Write a copy of the cell with the proposed settings
     #[arg(long, value_name = "TUNED.toml")]
     pub write: Option<PathBuf>,
-    /// The law of that copy: distance or pi
+    /// The controller of that copy: distance or pi
     #[arg(
         long,
-        value_name = "LAW",
+        value_name = "STRATEGY",
         default_value = "distance",
         requires = "write",
         hide_possible_values = true

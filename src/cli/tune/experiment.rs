@@ -62,18 +62,18 @@ pub fn run(
     Ok((recording, outcome::status(&report, share)))
 }
 
-/// The cell with steps in place of its law. Its text is what is attached to the
+/// The cell with steps in place of its controller. Its text is what is attached to the
 /// recording, so that a replay runs what ran.
 fn derived(args: &TuneArgs, loaded: &LoadedCell) -> anyhow::Result<LoadedCell> {
     let mut document: DocumentMut = loaded.text.parse().context("the cell file")?;
-    document["control"]["law"] = value("steps");
+    document["control"]["controller"] = value("steps");
     if let Some(control) = document["control"].as_table_like_mut() {
         for key in DISTANCE_KEYS {
             control.remove(key);
         }
     }
     if let Some(share) = args.step_fraction {
-        document["control"]["step_share"] = value(share);
+        document["control"]["step_fraction"] = value(share);
     }
     let read = |document: &DocumentMut| {
         LoadedCell::from_text(&loaded.path, document.to_string(), Purpose::Run)
@@ -128,7 +128,7 @@ fn announce(
     );
     if !args.simulated {
         tell!(
-            "the robot is told to stop when the camera has seen the last piece; Ctrl-C ends it \
+            "the robot is commanded to stop when the camera has seen the last piece; Ctrl-C ends it \
              before"
         );
     }

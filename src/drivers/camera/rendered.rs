@@ -63,7 +63,7 @@ impl RenderedCamera {
             flow: simulation.flow,
             seed: simulation.seed,
         };
-        let (told, reports) = bounded(WAITING_REPORTS);
+        let (robot_states, reports) = bounded(WAITING_REPORTS);
         let source = Self {
             renderer,
             follower: BeadFollower::new(recipe),
@@ -77,7 +77,7 @@ impl RenderedCamera {
             due: None,
             first: None,
         };
-        (source, RobotView(told))
+        (source, RobotView(robot_states))
     }
 
     /// Waits until the next frame is due; false when the camera was stopped.

@@ -31,7 +31,7 @@ pub(super) fn keep_up<D: Dialect>(
 ) {
     let timing = out.timing;
     let mut delay = timing.first_delay;
-    let mut told = None;
+    let mut reported = None;
     while !out.closing() {
         let Ok(ended) = session(out, events) else { return };
         let broken = out.lost();
@@ -39,12 +39,12 @@ pub(super) fn keep_up<D: Dialect>(
             return;
         }
         let reason = broken.unwrap_or_else(|| ended.why.to_string());
-        if ended.was_up || told.as_ref() != Some(&reason) {
+        if ended.was_up || reported.as_ref() != Some(&reason) {
             let down = LinkEvent::Down { at: out.clock.now(), reason: reason.clone() };
             if events.send(down).is_err() {
                 return;
             }
-            told = Some(reason);
+            reported = Some(reason);
         }
         if ended.was_good {
             delay = timing.first_delay;

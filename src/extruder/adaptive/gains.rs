@@ -22,7 +22,7 @@ pub struct AdaptiveGains {
     pub feedback: f64,
     /// What is fed back beyond k from the error against the reference model
     /// \[unit of u per unit of y\]. It makes the error faster without changing
-    /// the answer to the reference; 0 is the paper's law.
+    /// the answer to the reference; 0 is the paper's controller.
     pub error_feedback: f64,
     /// How the unknown part is learnt.
     pub adaptation: Adaptation,
@@ -87,7 +87,7 @@ pub struct EstimateBounds {
     pub bound: Option<f64>,
     /// σ: the estimate is forgotten at this rate, which bounds it where noise
     /// would let it drift. In exchange a constant Δ leaves an error
-    /// b·σ·Δ/(α·σ + γ·p·b²), with the error's pole −α; 0 is the paper's law
+    /// b·σ·Δ/(α·σ + γ·p·b²), with the error's pole −α; 0 is the paper's controller
     /// \[1/s\].
     pub leakage_per_s: f64,
 }

@@ -82,7 +82,7 @@ impl MracController {
         self.last = None;
     }
 
-    /// Sets the estimate, as the paper's law that does not adapt is given what
+    /// Sets the estimate, as the paper's controller that does not adapt is given what
     /// it knows beforehand.
     pub fn set_estimate(&mut self, uncertainty: f64) {
         self.estimate.value = uncertainty;

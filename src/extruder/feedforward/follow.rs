@@ -62,7 +62,7 @@ impl SpeedFeedforward {
         memory: Span,
     ) -> Result<Self, FeedforwardError> {
         let period_s = positive("the period", period.secs())?;
-        let memory_s = positive("the memory", memory.secs())?;
+        let memory_s = positive("the length of the history", memory.secs())?;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "above zero")]
         let length = (memory_s / period_s).ceil().min(1e6) as usize + 2;
         let past = FlowHistory { flows: vec![0.0; length], newest: 0, at: None, period_s };
@@ -86,7 +86,7 @@ impl SpeedFeedforward {
     }
 
     /// Compares a measurement with what the model said then. One that is older
-    /// than the memory, or lies in the future, is left out: `false`.
+    /// than the length of the history, or lies in the future, is left out: `false`.
     pub fn measure(&mut self, seen: &FlowMeasurement) -> bool {
         let (Some(observer), Some(then)) = (&mut self.observer, self.history.at(seen.at)) else {
             return false;

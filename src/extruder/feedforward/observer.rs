@@ -52,7 +52,7 @@ impl FlowObserver {
         let sigma = positive("the standard deviation of the flow", part.sigma.get())?;
         positive("the correlation time", part.correlation_s)?;
         if part.drift.get() < 0.0 {
-            let (what, value) = ("the wander of the offset", part.drift.get());
+            let (what, value) = ("the drift of the offset", part.drift.get());
             return Err(FeedforwardError::NotPositive { what, value });
         }
         // Beforehand the offset may be as large as the noise is in ten times

@@ -19,7 +19,7 @@ impl PressureNoise {
     /// From the variance of the wandering from one reading to the next and
     /// that of a reading \[MPa²\].
     pub fn new(wander_mpa2: f64, reading_mpa2: f64) -> Result<Self, PressureError> {
-        within("the wandering's variance [MPa²]", wander_mpa2, 0.0..=1e6, "between 0 and 1e6")?;
+        within("the drift's variance [MPa²]", wander_mpa2, 0.0..=1e6, "between 0 and 1e6")?;
         let wanted = "above 1e-18 and at most 1e6";
         within("the readings' variance [MPa²]", reading_mpa2, 1e-18..=1e6, wanted)?;
         Ok(Self { drift: wander_mpa2, reading: reading_mpa2 })

@@ -58,7 +58,12 @@ impl Tuning {
         noise: &PressureNoise,
         model_sigma: f64,
     ) -> Result<Self, PressureError> {
-        within("the model's doubt", model_sigma, 0.01..=0.2, "between 0.01 and 0.2")?;
+        within(
+            "the model's relative standard deviation",
+            model_sigma,
+            0.01..=0.2,
+            "between 0.01 and 0.2",
+        )?;
         let (lag, dead) = (model.lag_s(), model.dead_time_s());
         let sigma = noise.sigma().get();
         Ok(Self {

@@ -30,7 +30,7 @@ impl VsfcGains {
     pub fn new(kp: f64, ki: f64, creep: f64, sigma: MPa) -> Result<Self, PressureError> {
         within("the proportional gain [rpm/MPa]", kp, 0.0..=1e9, "between 0 and 1e9")?;
         within("the integral gain [rpm/(MPa·s)]", ki, 0.0..=1e9, "between 0 and 1e9")?;
-        within("the integral's share in the weak zone", creep, 0.0..=1.0, "between 0 and 1")?;
+        within("the integral's fraction in the weak zone", creep, 0.0..=1.0, "between 0 and 1")?;
         within("the noise [MPa]", sigma.get(), 0.0..=1e3, "between 0 and 1000")?;
         let sigma = sigma.get();
         let (dead_zone, weak_zone) = (3.0 * sigma, 6.0 * sigma);

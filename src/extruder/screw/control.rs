@@ -104,7 +104,7 @@ pub enum ScrewFault {
         period: Span,
     },
     /// A share that cannot have been fed.
-    #[error("a share of {fill} cannot have been fed; it must be from 0 to below 1")]
+    #[error("a fill ratio of {fill} cannot have been fed; it must be from 0 to below 1")]
     FillOutOfRange {
         /// What was told.
         fill: f64,

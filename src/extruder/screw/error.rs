@@ -61,7 +61,7 @@ pub enum ScrewError {
     },
     /// A feed before the start that cannot have been.
     #[error(
-        "a share of {fill} before the start cannot have been fed; it must be from 0 to below 1"
+        "a fill ratio of {fill} before the start cannot have been fed; it must be from 0 to below 1"
     )]
     InitialFill {
         /// What was given.

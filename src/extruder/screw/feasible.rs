@@ -161,7 +161,7 @@ impl fmt::Display for Feasibility {
             write!(
                 f,
                 "not feasible: at a plug of {worst_mm:.0} mm the delay can grow by {growth:.3} s a \
-                 second, so that what is fed then arrives late or never; ε·ω·{factor:.4} = \
+                 second, so that material fed then arrives delayed or never; ε·ω·{factor:.4} = \
                  {pulsation_rad_per_s:.4} rad/s must be below {:.4}: a weaker or slower pulsation, \
                  a faster or shorter screw",
                 self.thresholds.reach

@@ -45,7 +45,7 @@ pub enum PlanTableError {
         expected: &'static str,
     },
     /// A bead of which there are fewer than two rows.
-    #[error("found a bead with fewer than two rows, expected its whole course")]
+    #[error("found a bead with fewer than two rows, expected its whole trajectory")]
     Short,
 }
 

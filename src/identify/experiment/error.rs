@@ -78,7 +78,7 @@ pub enum ExperimentError {
     },
     /// A column that does not move.
     #[error(
-        "the {side} is {} all the time: nothing can be told from it{}",
+        "the {side} is {} all the time: nothing can be identified from it{}",
         six_digits(*.value), if *.side == DataColumn::Input { "; excite it (truebead extruder excite writes profiles)" } else {
             "; see that its sensor is connected"
         }
@@ -131,7 +131,7 @@ pub enum ExperimentError {
     },
     /// One column twice.
     #[error(
-        "input and output are the same from sample to sample: a model tells the one from the other. \
+        "input and output are the same from sample to sample: a model predicts one from the other. \
          Was a command logged in place of what came of it?"
     )]
     Identical,

@@ -51,7 +51,7 @@ pub enum SamplesError {
     },
     /// An input that never changes.
     #[error(
-        "the input is {} throughout; a model can be told only from an input that changes",
+        "the input is {} throughout; a model can be identified only from an input that changes",
         six_digits(*.value)
     )]
     ConstantInput {

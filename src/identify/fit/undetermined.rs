@@ -49,7 +49,7 @@ impl fmt::Display for Undetermined {
             Self::Pole { poles, coefficient, sigma, pair } => {
                 write!(
                     f,
-                    "the data do not tell {poles} pole{} from {}: in a denominator that ends with \
+                    "the data do not distinguish {poles} pole{} from {}: in a denominator that ends with \
                      1 the coefficient of s^{poles} is {coefficient:.2e} with a standard error of \
                      {sigma:.2e}, which is no more than chance",
                     if *poles == 1 { "" } else { "s" },
@@ -59,13 +59,13 @@ impl fmt::Display for Undetermined {
             }
             Self::Gain { gain, sigma } => write!(
                 f,
-                "the data do not tell the gain: {gain:.2e} with a standard error of {sigma:.2e} \
+                "the data do not determine the gain: {gain:.2e} with a standard error of {sigma:.2e} \
                  may be none at all. Look whether the output answers the input, and whether \
                  something else held it (a closed loop does)"
             ),
             Self::DeadTime { dead_time_s, sigma_s } => write!(
                 f,
-                "the data do not tell the dead time: {dead_time_s:.3} s with a standard error of \
+                "the data do not determine the dead time: {dead_time_s:.3} s with a standard error of \
                  {sigma_s:.3} s, longer than itself and than the slowest time constant"
             ),
             Self::Combination { names, pair } => {

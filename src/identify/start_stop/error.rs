@@ -69,7 +69,7 @@ pub enum StartStopFitError {
     },
     /// The pump was told to run and nothing came.
     #[error(
-        "the pump was told to run at {at_s:.2} s for {lasted_s:.1} s and no flow came: \
+        "the pump was commanded to run at {at_s:.2} s for {lasted_s:.1} s and no flow came: \
          {} mm³/s, in other runs up to {} mm³/s. Look for a blocked nozzle or a log of another bead",
         three_digits(*.flow_mm3_per_s), three_digits(*.max_mm3_per_s)
     )]
@@ -86,8 +86,8 @@ pub enum StartStopFitError {
     /// Flow that does not cease.
     #[error(
         "{observed_s:.1} s after the stop at {at_s:.2} s, which was looked at longest, the flow is still \
-         {percent:.0} % of that before; expected below {max_percent:.0} %. Does the command tell the \
-         pump to stop, is the zero of the flow right?"
+         {percent:.0} % of that before; expected below {max_percent:.0} %. Does the command stop the \
+         pump, is the zero of the flow right?"
     )]
     FlowContinues {
         /// When the pump was told to stop \[s\].
@@ -117,7 +117,7 @@ pub enum StartStopFitError {
     },
     /// A time constant that the pauses do not bracket.
     #[error(
-        "the pauses do not tell how fast the void opens: a time constant of {} ± {} s from pauses \
+        "the pauses do not determine how fast the void opens: a time constant of {} ± {} s from pauses \
          of {} to {} s. Add pauses {}", three_digits(*.found_s), three_digits(*.sigma_s), three_digits(*.shortest_s),
         three_digits(*.longest_s), if *.found_s > 0.5 * *.longest_s { "of several times that" } else {
             "about that long, and shorter ones" }

@@ -149,12 +149,12 @@ pub fn to_toml(file: &StartStopFile, notes: &[String]) -> String {
         }
     }
     let seen = &file.data;
-    put(&mut text, "\n[seen]");
+    put(&mut text, "\n[data]");
     put(&mut text, &format!("starts = {}", seen.starts));
     put(&mut text, &format!("stops = {}", seen.stops));
     put(&mut text, &format!("idle_range_s = {}", row(&seen.idle_range_s)));
     put(&mut text, &format!("flow_range_mm3_per_s = {}", row(&seen.flow_range_mm3_per_s)));
-    put(&mut text, &format!("delay_scatter_s = {}", number(seen.delay_sigma_s)));
+    put(&mut text, &format!("delay_sigma_s = {}", number(seen.delay_sigma_s)));
     text
 }
 
@@ -175,7 +175,7 @@ fn read_root(root: &Table<'_>) -> Option<StartStopFile> {
     let start = root.required_table("start").and_then(|table| read_part(&table, &START_PARAMETERS));
     let stop_table = root.required_table("stop");
     let stop = stop_table.as_ref().and_then(|table| read_part(table, &STOP_PARAMETERS));
-    let seen = root.required_table("seen").and_then(|table| read_seen(&table));
+    let seen = root.required_table("data").and_then(|table| read_seen(&table));
     version?;
     let ([first, first_sigma], [last, last_sigma]) = (start?, stop?);
     let parameters = assemble(first, last);
@@ -210,13 +210,13 @@ fn read_seen(table: &Table<'_>) -> Option<FitData> {
     let (starts, stops) = (count("starts"), count("stops"));
     let idle_range_s = table.numbers("idle_range_s", 0.0..=MAX_VALUE);
     let flow_range_mm3_per_s = table.numbers("flow_range_mm3_per_s", 0.0..=MAX_VALUE);
-    let delay_scatter_s = table.number("delay_scatter_s", 0.0..=MAX_VALUE);
+    let delay_sigma_s = table.number("delay_sigma_s", 0.0..=MAX_VALUE);
     Some(FitData {
         starts: starts?,
         stops: stops?,
         idle_range_s: idle_range_s?,
         flow_range_mm3_per_s: flow_range_mm3_per_s?,
-        delay_sigma_s: delay_scatter_s?,
+        delay_sigma_s: delay_sigma_s?,
     })
 }
 

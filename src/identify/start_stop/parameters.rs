@@ -31,7 +31,7 @@ pub enum StartStopError {
         time_constant_s: f64,
     },
     /// A share of the start speed that is none.
-    #[error("the least share of the start speed is {value}; it must be above 0 and at most 1")]
+    #[error("the minimum fraction of the start speed is {value}; it must be above 0 and at most 1")]
     StartSpeedFraction {
         /// What was found.
         value: f64,

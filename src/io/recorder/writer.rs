@@ -77,7 +77,7 @@ impl<S: Sink> WriterThread<S> {
         self.push_ready();
     }
 
-    /// After a failure frames are not worth the memory that they would wait
+    /// After a failure frames are not worth the length of the history that they would wait
     /// in.
     fn frame(&mut self, frame: &EncodedFrame) {
         if self.shared.failure().is_some() {

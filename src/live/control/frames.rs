@@ -1,11 +1,11 @@
 //! The frames' part of the control thread.
 
-use super::super::eye::MeasuredFrame;
 use super::ControlThread;
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
+use crate::live::capture::MeasuredFrame;
 use crate::rows::frame_row::{ControlColumns, FrameRow};
 use crate::vision::Reject;
 

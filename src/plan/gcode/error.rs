@@ -62,7 +62,7 @@ pub enum GcodeError {
     },
     /// An arc that does not reach.
     #[error(
-        "line {line}: an arc of radius {radius_mm:.3} mm to a place {way_mm:.3} mm away; at least \
+        "line {line}: an arc of radius {radius_mm:.3} mm to a position {way_mm:.3} mm away; at least \
          half of that is needed, and a full circle needs I and J"
     )]
     Radius {

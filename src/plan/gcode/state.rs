@@ -111,7 +111,7 @@ impl ModalState {
         if line_words.axes.iter().all(Option::is_none) && !circle {
             return Ok(LineMotion::None);
         }
-        let found = || "a place without a move".to_owned();
+        let found = || "a position without a move".to_owned();
         let wanted = "write G0, G1, G2 or G3 on it or before";
         let mode = self.mode.ok_or_else(|| GcodeError::Code { line, found: found(), wanted })?;
         let from = self.here;

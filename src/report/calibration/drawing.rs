@@ -141,7 +141,7 @@ pub fn width_map(solution: &Solution, map: &WidthMap) -> Markup {
         [left, top, right, bottom]
     };
     drawing.svg(
-        "standard deviation of a width over the picture",
+        "standard deviation of a width over the image",
         &html! {
             (drawing.cells(&map.cells, map.range_mm(), area, short))
             @if let Some([from, to]) = solution.seen_px() {

@@ -72,7 +72,7 @@ impl Plot<'_> {
         match layer {
             PlotLayer::Curve(series, ink) => curve(&series.points(), place, "curve", *ink),
             PlotLayer::Data(series, ink) => curve(&series.points(), place, "data", *ink),
-            PlotLayer::Demand(series, ink) => curve(&series.points(), place, "wish", *ink),
+            PlotLayer::Demand(series, ink) => curve(&series.points(), place, "demand", *ink),
             PlotLayer::Stairs(series, ink) => {
                 html! { path.stairs d=(stairs(&series.points(), place)) stroke=(ink.css()) {} }
             }

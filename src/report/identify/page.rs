@@ -23,11 +23,11 @@ pub fn page(study: &ModelStudy) -> String {
             h2 { "What the model was fitted to" }
             (curves::over_time(study, &logs.estimation, &study.fit.predicted))
         }
-        @if let (Some((data, from)), Some(foretold)) = (&logs.validation, &study.predicted) {
+        @if let (Some((data, from)), Some(predicted)) = (&logs.validation, &study.predicted) {
             section {
                 h2 { "What it was validated with" }
                 p.hint { (from) ", from " (format!("{:.2}", data.start_s)) " s on" }
-                (curves::over_time(study, data, foretold))
+                (curves::over_time(study, data, predicted))
             }
         }
         (answers(study))
@@ -58,7 +58,7 @@ fn verdict(study: &ModelStudy) -> Markup {
             b { (word) }
             (format!("The model fits its own data to {:.1} %", study.fit.quality.fit_percent))
             @match study.validation {
-                Some(other) => (format!(" and foretells other data to {:.1} %.", other.fit_percent)),
+                Some(other) => (format!(" and predicts other data to {:.1} %.", other.fit_percent)),
                 None => ".",
             }
             @if !study.warnings.is_empty() {

@@ -19,7 +19,7 @@ pub enum NoModel {
     },
     /// It does not foretell other data.
     #[error(
-        "the model ({form}, {estimation:.1} % on its own data) does not foretell the data to \
+        "the model ({form}, {estimation:.1} % on its own data) does not predict the data to \
          validate with: {validation:.1} %, no better than their mean. Are both of the same machine \
          and material, and is the input the one that moves the output?{}", drift_sentence(.drift.as_ref())
     )]

@@ -57,8 +57,8 @@ impl ModelStudy {
         let outside = self.residuals.fraction_outside();
         if outside > 0.05 {
             warnings.push(format!(
-                "what the model leaves hangs together ({:.0} % of the lags outside the 99 % band; the \
-                 {} samples say as much as {:.0} independent ones): the noise is coloured, or \
+                "what the model leaves is autocorrelated ({:.0} % of the lags outside the 99 % band; the \
+                 {} samples say as much as {:.0} independent ones): the noise is correlated, or \
                  something is missing in the model; the standard errors allow for it",
                 100.0 * outside,
                 self.fit.residuals.len(),
@@ -134,7 +134,7 @@ fn of_note(note: &FitNote) -> String {
                 .to_owned()
         }
         FitNote::DeadTimeToAStep { dead_time_s } => format!(
-            "the dead time of {dead_time_s:.4} s is told to a whole step only: the form passes its \
+            "the dead time of {dead_time_s:.4} s is known to a whole step only: the form passes its \
              input straight through"
         ),
         FitNote::Undetermined(loose) => loose.to_string(),

@@ -60,7 +60,7 @@ fn section(bead: &PlannedBead, facts: &PlanFacts) -> Markup {
     let wanted = |path_mm: f64| speed.speed_at(path_mm) * facts.area_mm2;
     let flows = [
         (along(speed, wanted), "what the planned speed takes", palette::DEMAND, true),
-        (at_time(&|t| bead.planned.flow_at(t)), "foretold", palette::FLOW, false),
+        (at_time(&|t| bead.planned.flow_at(t)), "predicted", palette::FLOW, false),
     ];
     let command = at_time(&|t| bead.plan.command_at(t) + facts.idle);
     let commands = [(command, "command", palette::SCREW, false)];
@@ -79,9 +79,9 @@ fn section(bead: &PlannedBead, facts: &PlanFacts) -> Markup {
     html! {
         section {
             h2 { (bead.name) }
-            p.hint { "Foretold from the model, as the mean over the nozzle's length; what no model \
+            p.hint { "Predicted by the model, as the mean over the nozzle's length; what no model \
                 tells comes on top. Dips of the speed a nozzle's length apart count on that length; \
-                a larger --nozzle-doubt has fewer of them." }
+                a larger --nozzle-sigma has fewer of them." }
             (plot("width [mm]", &path, &widths, Some(facts.width_mm)))
             (plot("width error [mm]", &path, &planned, Some(0.0)))
             (plot("speed [mm/s]", &path, &speeds, None))

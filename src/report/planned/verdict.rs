@@ -39,7 +39,7 @@ fn sentences(beads: &[PlannedBead], facts: &PlanFacts, far_off: bool) -> String 
         String::new()
     };
     let mut words = vec![format!(
-        "The width is foretold to stray by {:.2} mm RMS ({:.1} %){less}.",
+        "The width is predicted to stray by {:.2} mm RMS ({:.1} %){less}.",
         planned * facts.width_mm,
         100.0 * planned
     )];

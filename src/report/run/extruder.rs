@@ -130,7 +130,7 @@ impl ExtruderCharts {
         let entries = [
             (&self.demand, ("wanted", palette::TARGET, "dash")),
             (flow, (name, palette::FLOW, "")),
-            (&self.predicted, ("foretold by the model", palette::MODEL, "dash")),
+            (&self.predicted, ("predicted by the model", palette::MODEL, "dash")),
         ];
         html! { (legend::legend(&legend::drawn(&entries))) (plot.draw()) }
     }

@@ -171,7 +171,7 @@ fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
     let share = |seconds: f64| seconds / total.max(1e-9);
     let mut sentences = Vec::new();
     if extruder.fault_reasons.contains_key(&extruder_fault(ExtruderFault::RunsOn)) {
-        sentences.push("The pump ran although it was told to stop.".to_owned());
+        sentences.push("The pump ran although it was commanded to stop.".to_owned());
     }
     for (why, seconds) in &extruder.held_for_s {
         sentences.push(format!(

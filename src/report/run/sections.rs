@@ -180,7 +180,7 @@ pub fn images(report: &RunReport<'_>) -> Markup {
                     ("right or lower edge", palette::RIGHT_EDGE, "dot"),
                     ("gauge", palette::GAUGE, "dash"), ("gauge of a refused frame", palette::REJECTED, "dash"),
                 ]))
-                p.hint { "A click enlarges a picture; a click beside it puts it back." }
+                p.hint { "A click enlarges an image; a click beside it puts it back." }
                 div.pictures { @for picture in report.images { figure tabindex="0" {
                     img alt=(format!("frame {}", picture.frame)) src=(data_uri(&picture.jpeg));
                     figcaption { b { "frame " (picture.frame) } " · " (picture.caption) }
@@ -217,7 +217,7 @@ pub fn image_quality(report: &RunReport<'_>) -> Markup {
     };
     html! {
         section {
-            h2 { "How good the pictures are" }
+            h2 { "How good the images are" }
             (advice(report.summary))
             p.hint { "Much contrast, little blur and noise and no saturation make a sure width. A \
                 slow drift tells of dust on the lens or of changing light." }
@@ -243,7 +243,7 @@ fn advice(summary: &Summary) -> Markup {
             p { "There is nothing to improve about light and lens." }
         }
         @if let Some(bound) = bound {
-            p.hint { "In such pictures no method can place an edge in one row with a standard \
+            p.hint { "In such images no method can place an edge in one row with a standard \
                 deviation below " (format!("{bound:.3}")) " px; a hundred rows make that ten times \
                 less." }
         }

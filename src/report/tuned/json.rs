@@ -11,7 +11,7 @@ impl Tuned {
         let plant = &self.plant;
         let robot = match &plant.robot {
             Ok(robot) => json!(robot),
-            Err(error) => json!({ "not_told": error.to_string() }),
+            Err(error) => json!({ "undetermined": error.to_string() }),
         };
         let loops: Vec<Value> = self
             .loops()
@@ -50,7 +50,7 @@ impl Tuned {
                 "ki_per_s2": self.proposal.pi.gains.ki_per_s2,
             },
             "loops": loops,
-            "foretold": { "settled_within_mm": self.band_mm, "laws": self.predictions, "told_wrong": self.mismatched },
+            "predicted": { "settled_within_mm": self.band_mm, "controllers": self.predictions, "mismatched": self.mismatched },
             "warnings": self.warnings(),
         });
         let mut text = format!("{all:#}");

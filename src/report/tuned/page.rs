@@ -58,7 +58,7 @@ impl Tuned {
                 b { (word) }
                 @if let Some(best) = best {
                     (format!(
-                        " By distance the bead is foretold to be {:.2} mm RMS off its target once \
+                        " By distance the bead is predicted to be {:.2} mm RMS off its target once \
                          steady.",
                         best.steady_rms_mm
                     ))
@@ -139,7 +139,7 @@ impl Tuned {
         let at = self.proposal.pi.at;
         html! {
             section {
-                h2 { "Margins of the PI law" }
+                h2 { "Margins of the PI controller" }
                 p.hint { (format!(
                     "At {} mm/s, the slowest of [limits], where a loop around this bead is nearest \
                      to the edge: {:.3} mm for each mm/s, behind {:.3} s of dead time. The proposed \
@@ -183,9 +183,9 @@ impl Tuned {
         let limits = bounds.map(|bound| PlotLayer::Level(bound, LIMIT, ""));
         html! {
             section {
-                h2 { "What is foretold" }
+                h2 { "What is predicted" }
                 p.hint { (format!(
-                    "Beads of the cell as it was found, {SEEDS} with each law; the first of them is \
+                    "Beads of the cell as it was found, {SEEDS} with each controller; the first of them is \
                      drawn, in means over the gauge. At {:.0} mm the flow rises by {:.0} %. The table tells the way from \
                      the start of control, and from the flow's step, until the bead is within \
                      {:.2} mm of its target for good, and the RMS error once it is steady and of \
@@ -198,10 +198,10 @@ impl Tuned {
                     &beads.iter().collect::<Vec<_>>()))
                 (plot(&axis, "robot's speed [mm/s]", 200.0, &bounds,
                     curves(&speeds, CONTROLLERS).chain(limits).collect(), &[]))
-                (table("law", &self.predictions))
-                p.hint { "The law by distance has no gains that could swing. What stands for a \
-                    margin is how far what it is told may be wrong:" }
-                (table("the law by distance", &self.mismatched))
+                (table("controller", &self.predictions))
+                p.hint { "the distance controller has no gains that could swing. What stands for a \
+                    margin is how far what it is given may be wrong:" }
+                (table("the distance controller", &self.mismatched))
             }
         }
     }

@@ -120,8 +120,8 @@ impl Tuned {
     /// the target.
     pub fn loops(&self) -> Vec<(String, PiGains, Option<LoopMargins>)> {
         let now = self.present_gains.iter().map(|(gains, _)| ("now", *gains));
-        let laws = now.chain([("proposed", self.proposal.pi.gains)]);
-        let each = laws.flat_map(|(name, gains)| {
+        let settings = now.chain([("proposed", self.proposal.pi.gains)]);
+        let each = settings.flat_map(|(name, gains)| {
             [self.proposal.pi.at, self.usual].map(|at| {
                 let name = format!("{name}, {:.0} mm/s", at.speed_mm_per_s);
                 (name, gains, at.margins(gains))
@@ -156,7 +156,7 @@ impl Tuned {
     fn predictions_table(&self, text: &mut String) {
         let _ = writeln!(
             text,
-            "foretold for {} mm, {SEEDS} beads each, in means over the gauge; settled is within {:.2} mm \
+            "predicted for {} mm, {SEEDS} beads each, in means over the gauge; settled is within {:.2} mm \
              for good",
             self.target_mm, self.band_mm
         );
@@ -169,7 +169,7 @@ impl Tuned {
         for one in &self.predictions {
             row(text, one);
         }
-        let _ = writeln!(text, "by distance, told wrong");
+        let _ = writeln!(text, "by distance, with a wrong model");
         for one in &self.mismatched {
             row(text, one);
         }
@@ -178,7 +178,7 @@ impl Tuned {
     /// The proposed lines of the cell file.
     pub fn lines(&self) -> String {
         let mut text =
-            String::from("# proposed; nothing is applied\n[control]\nlaw = \"distance\"\n");
+            String::from("# proposed; nothing is applied\n[control]\nstrategy = \"distance\"\n");
         let learns = if self.proposal.distance.learns { "yes" } else { "no" };
         let _ = writeln!(text, "exponent_learns = \"{learns}\"");
         let settings = self.settings(true, 1.0);
@@ -188,7 +188,7 @@ impl Tuned {
             }
             for (_, key, value) in settings.iter().filter(|(of, ..)| *of == table) {
                 let comment = match *key {
-                    "kp_per_s" => "  # fallen back to, or with law = \"pi\"",
+                    "kp_per_s" => "  # fallen back to, or with controller = \"pi\"",
                     _ => "",
                 };
                 let _ = writeln!(text, "{key} = {value}{comment}");

@@ -81,7 +81,7 @@ fn on_contrast(contrast: f64, noise: f64) -> Option<String> {
     (low || contrast < MIN_CONTRAST_GREY).then(|| {
         format!(
             "Contrast {contrast:.0} grey levels of 256: light the bead more from the side, or \
-             measure another colour channel. Twice the contrast halves the scatter of the widths, \
+             measure another channel. Twice the contrast halves the scatter of the widths, \
              and what shadows and stains do to them."
         )
     })
@@ -110,7 +110,7 @@ fn on_blur(blur: f64) -> Option<String> {
         format!(
             "Blur {blur:.1} px: refocus on the top edges of the bead, or shorten the exposure if \
              it smears (torn edges look blurred in focus as well). At {REFERENCE_BLUR_PX} px widths of a \
-             smooth bead would scatter {:.0} % less, and a shadow be told from an edge {:.0} px \
+             smooth bead would scatter {:.0} % less, and a shadow be distinguished from an edge {:.0} px \
              away, not only {:.0} px.",
             (1.0 - (REFERENCE_BLUR_PX / blur).sqrt()) * 100.0,
             RESOLVED_AT_BLURS * REFERENCE_BLUR_PX,
@@ -122,7 +122,7 @@ fn on_blur(blur: f64) -> Option<String> {
 fn on_rows(share: f64) -> Option<String> {
     (share < MIN_USED_FRACTION).then(|| {
         format!(
-            "Only {:.0} % of the rows show the edges: look at the pictures for grains, glare and \
+            "Only {:.0} % of the rows show the edges: look at the images for grains, glare and \
              shadows on them.",
             share * 100.0
         )

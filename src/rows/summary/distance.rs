@@ -40,13 +40,13 @@ impl DistanceSummary {
             format!(" The flow pulsates with a period of {period:.2} s.")
         });
         let fallback = self.fallback_reason.map_or("", |why| match why {
-            FallbackReason::NoPath => " The PI law took over: the robot reports no path.",
+            FallbackReason::NoPath => " The PI controller took over: the robot reports no path.",
             FallbackReason::Unmatched => {
-                " The PI law took over: the bead under the camera is none whose speed is known; is \
+                " The PI controller took over: the bead under the camera is none whose speed is known; is \
                  offset_mm right?"
             }
             FallbackReason::ModelContradicted => {
-                " The PI law took over: the width did not answer the speed as the model says."
+                " The PI controller took over: the width did not answer the speed as the model says."
             }
         });
         format!(

@@ -1,5 +1,5 @@
 //! A transfer function from command to flow, with what no model tells: an
-//! unknown input, and a flow that wanders.
+//! unknown input, and a flow that drifts.
 
 use super::plant::{STEP, SimPlant};
 use crate::cell::extruder::LinearPlant;

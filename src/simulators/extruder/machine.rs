@@ -70,6 +70,6 @@ impl LinkMachine for ExtruderMachine {
         self.reported = (pump, valve);
         let valve = if valve { "open" } else { "shut" };
         let pump = pump_word(pump);
-        Some(format!("pump {pump}, valve {valve}, told {:.3}", gated.command().value))
+        Some(format!("pump {pump}, valve {valve}, command {:.3}", gated.command().value))
     }
 }

@@ -74,7 +74,7 @@ impl CalibrationFigures {
             case: rig.name,
             source: match source {
                 CornerSource::Corners => "corners",
-                CornerSource::Images => "pictures",
+                CornerSource::Images => "images",
             },
             views: rig.views,
             noise_px: (source == CornerSource::Corners).then_some(rig.noise_px),
@@ -102,7 +102,11 @@ impl CalibrationFigures {
             missed.push(format!("{} trials without a calibration", self.trials - self.found));
         }
         if self.ratio[0] < 1.0 - open || self.ratio[1] > 1.0 + open {
-            missed.push(format!("scatter/foretold beyond {:.2} to {:.2}", 1.0 - open, 1.0 + open));
+            missed.push(format!(
+                "RMS error/predicted sigma beyond {:.2} to {:.2}",
+                1.0 - open,
+                1.0 + open
+            ));
         }
         let (low, high) =
             (COVERAGE_RANGE.0.min(0.95 - open_share), COVERAGE_RANGE.1.max(0.95 + open_share));
@@ -132,8 +136,8 @@ const HEADS: [&str; COLUMNS] = [
     "views",
     "noise px",
     "trials",
-    "scatter % of width",
-    "scatter/foretold",
+    "RMS error % of width",
+    "RMS error/predicted sigma",
     "in 95 %",
     "bias/σ",
     "limits",

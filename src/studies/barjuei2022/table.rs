@@ -72,9 +72,9 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
         "Medians over {seeds} seeds, {frame_seeds} where every frame is rendered; means over \
          {disturbed} for flow sines and pulsations, and where it says mean. Errors are \
          those of the measured width over all bead of a 2 m layer that the camera saw, or, where \
-         it says so, of the bead itself from 30 mm after control began. Ours is the law by \
-         distance, which is told the camera's distance, the noise, b = 0.25 and nothing else of \
-         the plant, and hears of a width 20 ms late; where frames are rendered, ours is the \
+         it says so, of the bead itself from 30 mm after control began. Ours is the controller by \
+         distance, which is given the camera's distance, the noise, b = 0.25 and nothing else of \
+         the plant, and gets a width 20 ms after capture; where frames are rendered, ours is the \
          measurement alone, in the paper's loop."
     );
     let title = "Shojaei Barjuei et al. 2022";

@@ -102,12 +102,12 @@ fn about(effort: Effort) -> String {
     format!(
         "Means over {seeds} seeds; over {fits} for the models of the flow, {starts} for starts and \
          stops, {corner} for the corner, {camera} for the camera's distance. The section is judged about its own mean from 15 to 90 s. Off, \
-         the simulated sections scatter more than the published ones, because the thesis does not \
+         the simulated sections vary more than the published ones, because the thesis does not \
          say how far its voltage went; widths follow from sections at a height of 3.65 mm, \
-         while the thesis' bead changed its shape as well. Of the 17 % that no model tells, the \
+         while the thesis' bead changed its shape as well. Of the 17 % that is not modelled, the \
          thesis' feedforward leaves all; ours reads the melt pressure at 50 Hz (noise of Ma et al. \
          2026) and supposes that the unmodelled flow shows in it. A camera alone comes too late: \
-         the noise is forgotten within 0.15 s, and the bead needs longer to be seen.",
+         the noise has a correlation time of 0.15 s, and the bead needs longer to be seen.",
         fits = of(FIT_SEEDS),
         starts = of(START_SEEDS),
         corner = of(corner::SEEDS),

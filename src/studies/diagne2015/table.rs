@@ -31,9 +31,9 @@ const BEGINNING: Range = Range::new(0.0, 3.0);
 const ALL: Range = Range::new(0.0, 60.0);
 const ABOUT: &str = "The paper prints curves and no numbers of them, so that nothing stands under \
     published. Simulated: plant, delay and predictor in the paper's scheme, Euler steps of 1 ms. \
-    Ours: the predictor of high order on a plant that is integrated to high order; where a law is \
-    named, on that law. Settled means within 1.2 mm, 2 % of the step from 100 to 160 mm, for good. \
-    The largest share fed is 0.9; the paper does not print its own.";
+    Ours: the predictor of high order on a plant that is integrated to high order; where a controller is \
+    named, on that controller. Settled means within 1.2 mm, 2 % of the step from 100 to 160 mm, for good. \
+    The largest fill is 0.9; the paper does not print its own.";
 
 /// Runs the experiments.
 pub fn run(progress: &mut Progress) -> Result<Reproduced, ReproduceError> {
@@ -129,8 +129,8 @@ fn case_rows(rows: &mut TableRows, found: &Examined) {
     push(("open loop settles", "s"), settles(&found.open), None);
     let swing = found.cycle();
     let peaks = swing.map(|swing| swing.peak_to_peak_mm);
-    push(("no predictor: swing, peak to peak", "mm"), peaks, None);
-    push(("no predictor: period of the swing", "s"), swing.map(|swing| swing.period_s), None);
+    push(("no predictor: oscillation, peak to peak", "mm"), peaks, None);
+    push(("no predictor: period of the oscillation", "s"), swing.map(|swing| swing.period_s), None);
     let (informed, uninformed) = (&found.informed, &found.uninformed);
     for (quantity, pair) in [
         ("predictor (time and state) settles", informed),
@@ -147,7 +147,7 @@ fn case_rows(rows: &mut TableRows, found: &Examined) {
     }
     let [theirs, ours] = found.max_deviation_mm.map(Some);
     push(("farthest from the delay-free loop", "mm"), theirs, ours);
-    let steeper = ["law between limits, 60/m, settles", "… 100/m, settles", "… 200/m, settles"];
+    let steeper = ["saturated controller, 60/m, settles", "… 100/m, settles", "… 200/m, settles"];
     for (quantity, course) in steeper.into_iter().zip(&found.straight) {
         push((quantity, "s"), None, settles(course));
     }
@@ -168,10 +168,10 @@ fn robustness_rows(rows: &mut TableRows) -> Result<(), RunError> {
             |what, of: fn(&RobustnessOutcome) -> Option<f64>, ours: &RobustnessOutcome| {
                 rows.push(&title, what, [None, of(&theirs), of(ours)]);
             };
-        push(("settles, paper's law", "s"), |found| found.settles_s, &same);
-        push(("settles, law between limits", "s"), |found| found.settles_s, &ours);
-        push(("overshoots by, paper's law", "mm"), |found| Some(found.overshoot_mm), &same);
-        push(("overshoots by, law between limits", "mm"), |f| Some(f.overshoot_mm), &ours);
+        push(("settles, paper's controller", "s"), |found| found.settles_s, &same);
+        push(("settles, saturated controller", "s"), |found| found.settles_s, &ours);
+        push(("overshoots by, paper's controller", "mm"), |found| Some(found.overshoot_mm), &same);
+        push(("overshoots by, saturated controller", "mm"), |f| Some(f.overshoot_mm), &ours);
         push(("RMS error at the end", "mm"), |found| Some(found.steady_error_mm), &ours);
         push(("RMS change of the feed at the end", ""), |found| Some(found.feed_change), &ours);
     }
@@ -192,14 +192,14 @@ fn case_section(found: &Examined) -> Section {
     let lines = [
         line("predictor, state only", palette::FLOW, &found.uninformed.paper),
         line("predictor, time and state", palette::PAPER, &found.informed.paper),
-        line("ours, law between limits", palette::OURS, &found.straight[0]),
+        line("ours, saturated controller", palette::OURS, &found.straight[0]),
     ];
     let short: Vec<&Line<'_>> = [&open, &bare].into_iter().chain(&lines).collect();
     let (plug, fill, delay): (Of, Of, Of) = (|s| s.plug_mm, |s| s.fill, |s| s.delay_s);
     let drawing = html! {
         (names(&short))
         (draw(&short, BEGINNING, ("filled length x [mm]", plug), Some(SETPOINT.plug.get())))
-        (draw(&short, BEGINNING, ("share fed U", fill), Some(SETPOINT.max_fill)))
+        (draw(&short, BEGINNING, ("fill U", fill), Some(SETPOINT.max_fill)))
         (draw(&short, BEGINNING, ("delay D [s]", delay), None))
         (names(&[&open, &bare]))
         (draw(&[&open, &bare], ALL, ("filled length x [mm]", plug), Some(SETPOINT.plug.get())))
@@ -278,8 +278,8 @@ fn draw_prediction(found: &Examined) -> Markup {
     };
     html! {
         (legend(&[
-            ("plug, paper's law with our predictor", palette::OURS, ""),
-            ("foretold, drawn when it was to come", palette::MODEL, ""),
+            ("plug, paper's controller with our predictor", palette::OURS, ""),
+            ("predicted, drawn at the time predicted for", palette::MODEL, ""),
             ("delay-free loop from the first effect on", palette::TARGET, "dash"),
         ]))
         (plot.draw())

@@ -186,7 +186,7 @@ impl Study {
         html! {
             (legend(&[
                 ("not adaptive", palette::DEMAND, ""),
-                ("the paper's law", palette::PAPER, ""),
+                ("the paper's controller", palette::PAPER, ""),
                 ("ours", palette::OURS, ""),
                 ("wanted, or true", palette::TARGET, "dash"),
             ]))

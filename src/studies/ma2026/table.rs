@@ -44,7 +44,7 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
     let about = format!(
         "Means over {seeds} seeds where there is noise. The plant is the paper's: dead time \
          0.41 s, lag 0.84 s, gain 1; sensor at 50 Hz, commands at 20 Hz. The paper names no \
-         gains; those of its two laws are fitted to its step figures, all else follows. Our law \
+         gains; those of its two controllers are fitted to its step figures, all else follows. Our controller \
          has one tuning for all experiments, by rules from the model and the noise."
     );
     Ok(Reproduced { title: "Ma et al. 2026", about, rows: work.rows.into_vec(), sections })
@@ -125,7 +125,7 @@ impl Work {
         }
         Ok(Some(Section {
             heading: "A model that is off by 20 %".to_owned(),
-            hint: "Our law, from rest to 0.6 MPa, with gain, lag or dead time of the plant 20 % \
+            hint: "Our controller, from rest to 0.6 MPa, with gain, lag or dead time of the plant 20 % \
                    above or below the model's, one at a time."
                 .to_owned(),
             drawing: singles(&drawn),
@@ -152,8 +152,8 @@ impl Work {
         }
         Ok(Some(Section {
             heading: "Sine".to_owned(),
-            hint: "0.65 ± 0.1 MPa in 20 s, with noise. Ours is told the target ahead, as far as \
-                   the robot's path tells it."
+            hint: "0.65 ± 0.1 MPa in 20 s, with noise. Ours is given the target ahead, as far as \
+                   the robot's path determines it."
                 .to_owned(),
             drawing: html! {
                 (courses(&drawn, Range::new(20.0, 60.0)))
@@ -230,7 +230,7 @@ impl Work {
         drawn.push(("ours", OURS.1, ours));
         Ok(Some(Section {
             heading: "Step of the load".to_owned(),
-            hint: "0.1 at the plant's input after 5 s, without noise. No law can keep the error \
+            hint: "0.1 at the plant's input after 5 s, without noise. No controller can keep the error \
                    below 0.386 of it: the correction comes a dead time late."
                 .to_owned(),
             drawing: courses(&drawn, Range::new(4.0, 12.0)),

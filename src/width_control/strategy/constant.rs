@@ -1,4 +1,4 @@
-//! `law = "constant"`: the robot keeps one speed, whatever is measured. What a bead does
+//! `strategy = "constant"`: the robot keeps one speed, whatever is measured. What a bead does
 //! without width control, to compare with.
 
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! `law = "distance"`: the width is held by where along the path bead was laid, with PI
+//! `strategy = "distance"`: the width is held by where along the path bead was laid, with PI
 //! control to fall back to.
 
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! `law = "pi"`: proportional-integral control on the widths as they are seen, as in
+//! `strategy = "pi"`: proportional-integral control on the widths as they are seen, as in
 //! Shojaei Barjuei et al. 2022.
 
 use std::sync::Arc;

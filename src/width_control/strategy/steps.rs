@@ -1,4 +1,4 @@
-//! `law = "steps"`: the width is not held at all; the speed goes through steps, from
+//! `strategy = "steps"`: the width is not held at all; the speed goes through steps, from
 //! which a cell can be tuned.
 
 use std::sync::Arc;
@@ -28,7 +28,7 @@ pub struct StepsStrategy {
 }
 
 fn read(control: &Table<'_>) -> Option<Arc<dyn Strategy>> {
-    let share = control.number_or("step_share", STEP_FRACTIONS, DEFAULT_STEP_FRACTION)?;
+    let share = control.number_or("step_fraction", STEP_FRACTIONS, DEFAULT_STEP_FRACTION)?;
     Some(Arc::new(StepsStrategy { step_fraction: share }))
 }
 
@@ -56,7 +56,11 @@ impl Strategy for StepsStrategy {
         if slow < limits.min_speed || fast > limits.max_speed {
             let (low, high) = (limits.min_speed, limits.max_speed);
             let found = format!("{share}, which is {:.1} to {:.1} mm/s", slow.get(), fast.get());
-            control.report("step_share", found, format!("speeds within [limits], {low} to {high}"));
+            control.report(
+                "step_fraction",
+                found,
+                format!("speeds within [limits], {low} to {high}"),
+            );
         }
     }
 }

@@ -19,7 +19,7 @@ const MAX_RMS_PX: f64 = 0.5;
 /// A sharp picture of a flat board and a sound lens leave less \[px\].
 const SUSPECT_RMS_PX: f64 = 0.3;
 
-/// The text of a calibration: the camera of others, and a bed plane from pictures.
+/// The text of a calibration: the camera of others, and a bed plane from images.
 pub fn text(
     args: &ConvertArgs,
     import: &Import,
@@ -35,8 +35,8 @@ pub fn text(
     let Intrinsics { image_size_px, camera, .. } = &import.intrinsics;
     if let Some(px) = camera.non_monotonic_at(*image_size_px) {
         notes.push(format!(
-            "the lens model turns over before pixel ({:.0}, {:.0}), and nothing can be measured there; \
-             calibrate with pictures of a board in the corners of the picture",
+            "the lens model is non-monotonic before pixel ({:.0}, {:.0}), and nothing can be measured there; \
+             calibrate with pictures of a board in the corners of the image",
             px.x, px.y
         ));
     }
@@ -50,15 +50,15 @@ pub fn text(
     };
     if reprojection_rms_px > SUSPECT_RMS_PX {
         notes.push(format!(
-            "corners are {reprojection_rms_px:.2} px off, a sharp picture of a flat board and a \
+            "corners are {reprojection_rms_px:.2} px off, a sharp image of a flat board and a \
              sound lens give less than {SUSPECT_RMS_PX}: is this the camera's calibration, with this \
              focus and zoom?"
         ));
     }
     notes.push(format!(
         "how well a width is known does not stand in {}, and sigma_mm will not contain it: \
-         `truebead camera verify` with a further picture shows what is wrong, `truebead calibrate` \
-         with pictures of a board tells it",
+         `truebead camera verify` with a further image shows what is wrong, `truebead calibrate` \
+         with images of a board tells it",
         args.input.display()
     ));
     let InnerCorners { columns, rows } = corners;
@@ -66,7 +66,7 @@ pub fn text(
         "Camera and lens from {} ({}).\n\
          Bed plane: {} below the face of a board with {columns}x{rows} inner corners and squares \
          of {square} in {}.\n\
-         How well a width is known is not known; the error is that of the bed plane's pictures.",
+         How well a width is known is not known; the error is that of the bed plane's images.",
         args.input.display(),
         import.format.name(),
         plane.thickness,

@@ -20,15 +20,15 @@ the speed that the robot had there. The speed must have changed clearly while
 bead was laid; one run with some steps of the target width or of the speed is
 enough.
 
-From a picture: lay a board on the bed so that the camera sees it and it reaches
+From an image: lay a board on the bed so that the camera sees it and it reaches
 under the nozzle. Let the nozzle touch it, tell where in squares from the first
 inner corner (-1,-1 is the outer corner of the outermost square), and take the
-picture in that pose.
+image in that pose.
 
-Exit status: 0 found, 1 not to be told from this input, 2 wrong arguments.")]
+Exit status: 0 found, 1 not to be determined from this input, 2 wrong arguments.")]
 pub struct OffsetArgs {
     /// A recording of this program, also one that was cut short (.mcap.partial), or a
-    /// picture of a board
+    /// image of a board
     #[arg(value_name = "RECORDING.mcap|IMAGE")]
     pub input: PathBuf,
     /// Cell file
@@ -41,25 +41,25 @@ pub struct OffsetArgs {
     pub max_mm: Option<Mm>,
     #[command(flatten)]
     pub board: OptionalBoard,
-    /// Picture: where the nozzle touches the board, in squares from its first inner
+    /// Image: where the nozzle touches the board, in squares from its first inner
     /// corner along a row and along a column; beyond it is negative
     #[arg(long, value_name = "X,Y", value_parser = parse_position, allow_hyphen_values = true)]
     pub nozzle_at: Option<[f64; 2]>,
-    /// Picture: standard deviation of that place [mm]
+    /// Image: standard deviation of that place [mm]
     /// [default: 0.5]
     #[arg(long, value_name = "MM", value_parser = parse_length)]
     pub touch_sigma_mm: Option<Mm>,
-    /// Picture: height of the board's printed face above the bed [mm]
+    /// Image: height of the board's printed face above the bed [mm]
     /// [default: 0]
     #[arg(long, value_name = "MM", value_parser = parse_length)]
     pub board_thickness_mm: Option<Mm>,
-    /// Picture: the robot's z when it was taken, for a camera on the flange [mm]
+    /// Image: the robot's z when it was taken, for a camera on the flange [mm]
     /// [default: that of the calibration]
     #[arg(long, value_name = "MM", value_parser = parse_length, allow_hyphen_values = true)]
     pub robot_z_mm: Option<Mm>,
 }
 
-/// The board, if one was told: a recording needs none.
+/// The board, if one was given: a recording needs none.
 #[derive(Debug)]
 pub struct OptionalBoard {
     /// A whole board.

@@ -32,7 +32,7 @@ const SQUARES_BEYOND: f64 = 2.0;
 /// Corners further off a true board than this were not measured on its plane \[mm\].
 const FLAT_MM: f64 = 0.5;
 
-/// Runs the command for a picture.
+/// Runs the command for an image.
 pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     let needed = [
         ("--cell CELL.toml", args.cell.is_some()),
@@ -44,7 +44,7 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     let (Some(cell), Some(board), Some(at)) = (&args.cell, &args.board.board, args.nozzle_at)
     else {
         let what = format!(
-            "{}: a picture (no recording) needs {} besides",
+            "{}: an image (no recording) needs {} besides",
             args.input.display(),
             missing.join(", ")
         );

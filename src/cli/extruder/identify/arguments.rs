@@ -109,7 +109,7 @@ pub struct IdentifyArgs {
 
 fn validates_with_itself(other: &Path) -> anyhow::Error {
     let what = format!(
-        "--validate {}: these are the data that the model is fitted to, and a model foretells those \
+        "--validate {}: these are the data that the model is fitted to, and a model predicts those \
          whatever it is worth; name another log, or leave --validate out: the last part of the data \
          is kept for it then",
         other.display()

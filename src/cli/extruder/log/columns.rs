@@ -73,7 +73,7 @@ impl ColumnArgs {
             self.unit_override(column).or_else(|| column.rsplit_once('_').map(|(_, end)| end));
         let unit = TIMES.iter().find(|unit| Some(unit.0) == word).ok_or_else(|| {
             WrongArguments::new(format!(
-                "the unit of {column} is not told; add --unit {column}=s, {column}=ms or {column}=us"
+                "the unit of {column} is unknown; add --unit {column}=s, {column}=ms or {column}=us"
             ))
         })?;
         Ok((column.clone(), unit.1))
@@ -133,7 +133,7 @@ pub fn refuse_same(input: &str, output: &str) -> Result<(), WrongArguments> {
         return Ok(());
     }
     Err(WrongArguments::new(format!(
-        "--input and --output are both {input}: a model tells the one from the other; name what the \
-         extruder is told, and what comes of it"
+        "--input and --output are both {input}: a model predicts one from the other; name what the \
+         extruder is commanded, and what comes of it"
     )))
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-/// Measures rendered sets of pictures and says how far off the widths are.
+/// Measures rendered sets of images and says how far off the widths are.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -13,15 +13,15 @@ Example:
 Every set is rendered and measured like the frames of a cell with defaults.
 Silent: widths that are more than half a pixel off, as a share of all frames.
 Bound: the smallest standard deviation that the width of a straight bead can
-have in a picture that nothing disturbs; free bound: the same where its
+have in an image that nothing disturbs; free bound: the same where its
 direction is not known. The last column names the limits that are missed; the
 status is 1 where there are any. ACCURACY.md says what every set is.
 
   truebead lab accuracy --calibration
 
 calibrates cameras whose truth is known, from corners with noise and from
-rendered pictures of boards, and compares the scatter of widths with what the
-calibrations foretell.
+rendered images of boards, and compares the scatter of widths with what the
+calibrations predict.
 
   truebead lab accuracy --random torn,grooves --frames 3000 --keep-frames 20 --out random
 
@@ -54,13 +54,13 @@ pub struct AccuracyArgs {
     #[arg(long, value_name = "K", default_value = "0", requires_all = ["random", "out"])]
     pub keep_frames: u64,
     /// Calibrations instead of widths: whether widths scatter as much from one to the
-    /// next as each foretells of itself
+    /// next as each predicts of itself
     #[arg(long)]
     pub calibration: bool,
     /// Calibrations of each camera from corners with noise; 0: none
     #[arg(long, value_name = "N", default_value = "2000", value_parser = parse_trials)]
     pub trials: u64,
-    /// Calibrations of each camera from rendered pictures; 0: none
+    /// Calibrations of each camera from rendered images; 0: none
     #[arg(long, value_name = "N", default_value = "100", value_parser = parse_trials)]
     pub rendered_trials: u64,
     /// Roughness of torn beads from successive frames, instead of widths

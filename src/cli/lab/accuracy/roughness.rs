@@ -83,7 +83,7 @@ fn found_of(found: &Roughness, bead: &LongBead) -> Result<RoughnessEstimate> {
         value: found.get() / truth,
         sigma: sigma.get() / found.get(),
     };
-    #[expect(clippy::cast_precision_loss, reason = "rows of a picture")]
+    #[expect(clippy::cast_precision_loss, reason = "rows of an image")]
     let gauge = Mm::new(bead.gauge_rows() as f64)?;
     Ok(RoughnessEstimate {
         roughness: ratio(found.roughness, found.roughness_sigma, bead.roughness_px()),

@@ -11,7 +11,7 @@ use crate::drivers::camera::fault;
 use crate::run::ports::SourceError;
 
 /// Longest wait for the thread to end with its source.
-const FAREWELL: Duration = Duration::from_secs(1);
+const MAX_SHUTDOWN: Duration = Duration::from_secs(1);
 
 /// Something that gives pictures; each call waits for the next one.
 pub(super) trait Capture {
@@ -62,7 +62,7 @@ impl Worker {
     pub(super) fn stop(self) {
         drop(self.stay);
         loop {
-            match self.news.recv_timeout(FAREWELL) {
+            match self.news.recv_timeout(MAX_SHUTDOWN) {
                 Ok(_) => {}
                 Err(RecvTimeoutError::Timeout) => return,
                 Err(RecvTimeoutError::Disconnected) => break,

@@ -51,7 +51,7 @@ pub fn run(work: &mut Experiments, progress: &mut Progress) -> Result<Section, R
         hint: "Sines of 3 % along the path with the camera 60 mm behind the nozzle, and steady \
                pulsations of 3 % from five periods after they were first seen. No feedback can do \
                anything about what is shorter than its dead time; what repeats itself can be \
-               foretold."
+               predicted."
             .to_owned(),
         drawing: html! {
             (draw::ratios("wavelength [mm]", &waves))

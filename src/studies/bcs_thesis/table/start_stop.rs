@@ -45,7 +45,7 @@ pub fn section(seeds: u64, rows: &mut TableRows) -> Result<Section, ReproduceErr
              {:.0} % of its speed with the flow; one that keeps its speed lays the flow's own rise \
              and fall as void and as surplus, whatever is known of them. The machine knows more \
              than the model: a void that opens in two parts and varies by 3 %, melt that is stored \
-             under pressure, drips, a flow that wanders.",
+             under pressure, drips, a flow that drifts.",
             PAUSES_S.len(),
             found.dwell.start_s,
             found.dwell.stop_s,

@@ -39,8 +39,8 @@ pub fn all(found: &StartStopResults) -> Markup {
         }
         (legend(&[("best fixed dwell", PAPER, ""), ("ours, robot follows", OURS, "")]))
         div.pair {
-            (speeds([&fixed.stop, &ours.stop], "robot's share of its speed after the stop"))
-            (speeds([&fixed.start, &ours.start], "robot's share of its speed after the start"))
+            (speeds([&fixed.stop, &ours.stop], "robot's speed over nominal after the stop"))
+            (speeds([&fixed.start, &ours.start], "robot's speed over nominal after the start"))
         }
     }
 }

@@ -40,10 +40,10 @@ pub struct RunLogger {
 impl RunLogger {
     /// Starts to write.
     pub fn start(log: RunLog) -> std::io::Result<Self> {
-        let (facts, told) = unbounded();
+        let (facts, written) = unbounded();
         let waiting = Arc::new(AtomicUsize::new(0));
         let pictures = Arc::clone(&waiting);
-        let write = move || write_all(log, &told, &pictures);
+        let write = move || write_all(log, &written, &pictures);
         let thread = Builder::new().name("log".to_owned()).spawn(write)?;
         Ok(Self { facts, waiting, thread })
     }
@@ -77,7 +77,7 @@ impl RunLogger {
         self.tell(Fact::Note(note));
     }
 
-    /// A scribe that has failed keeps its error for the end.
+    /// A log that has failed keeps its error for the end.
     fn tell(&self, fact: Fact) {
         let _ = self.facts.send(fact);
     }
@@ -91,10 +91,10 @@ impl RunLogger {
 
 fn write_all(
     mut log: RunLog,
-    told: &Receiver<Fact>,
+    facts: &Receiver<Fact>,
     waiting: &AtomicUsize,
 ) -> Result<Summary, LogError> {
-    for fact in told {
+    for fact in facts {
         match fact {
             Fact::Frame { row, picture: Some((frame, left, right)) } => {
                 waiting.fetch_sub(1, Ordering::Relaxed);

@@ -25,11 +25,11 @@ pub struct Optics {
     pub cell: Cell,
     /// What a pixel means in it.
     pub calibration: Calibration,
-    /// The robot's newest z \[mm\], as bits; NaN where it has told none.
+    /// The robot's newest z \[mm\], as bits; NaN where it has reported none.
     pub robot_z: Arc<AtomicU64>,
 }
 
-/// What the eye tells control.
+/// What the capture pipeline gives control.
 #[derive(Debug)]
 pub enum CameraMessage {
     /// A frame was looked at.
@@ -86,10 +86,10 @@ impl CapturePipeline {
     ) -> std::io::Result<Self> {
         let (tell, seen) = unbounded();
         let mailbox = Arc::new(Mailbox::default());
-        let (filling, told) = (Arc::clone(&mailbox), tell.clone());
+        let (filling, messages) = (Arc::clone(&mailbox), tell.clone());
         let camera = Builder::new()
             .name("camera".to_owned())
-            .spawn(move || take_frames(source, &filling, &told, clock))?;
+            .spawn(move || take_frames(source, &filling, &messages, clock))?;
         let taking = Arc::clone(&mailbox);
         let measure = Builder::new()
             .name("measure".to_owned())
