@@ -18,9 +18,19 @@ use crate::calibration::{Calibration, SurfaceMap};
 use crate::cell::Cell;
 use crate::cell::file::{CalibrationSource, ExtruderPart, Purpose};
 use crate::core::units::Mm;
+use crate::document::Problems;
+use crate::drivers::Devices;
 use crate::io::calibration_file;
 use crate::sim::cell::CommandedExtruder;
 use crate::sim::extruder::SimExtruder;
+
+/// Reads a cell and the devices that it chooses from a file's text; `path` is what messages
+/// call it and where relative paths start.
+pub fn read_cell(path: &Path, text: &str, purpose: Purpose) -> Result<(Cell, Devices), Problems> {
+    let mut devices = Devices::default();
+    let cell = Cell::parse_with(path, text, purpose, &mut devices)?;
+    Ok((cell, devices))
+}
 
 /// A cell, its calibration, and their texts for the recording.
 #[derive(Debug, Clone)]
@@ -31,6 +41,8 @@ pub struct LoadedCell {
     pub text: String,
     /// What stands in it.
     pub cell: Cell,
+    /// The devices that it chooses.
+    pub devices: Devices,
     /// What a pixel means in it.
     pub calibration: Calibration,
     /// The calibration file's text, where there is one.
@@ -50,7 +62,7 @@ impl LoadedCell {
     /// The same, for a text that is there already; `path` is what messages
     /// call it and where relative paths start.
     pub fn from_text(path: &Path, text: String, purpose: Purpose) -> Result<Self, AssemblyError> {
-        let cell = Cell::parse(path, &text, purpose)?;
+        let (cell, devices) = read_cell(path, &text, purpose)?;
         let (calibration, calibration_text) = match &cell.calibration {
             CalibrationSource::Scale { mm_per_px, sigma } => {
                 (Calibration::Scale { mm_per_px: *mm_per_px, sigma: *sigma }, None)
@@ -64,7 +76,8 @@ impl LoadedCell {
                 (calibration, Some(text))
             }
         };
-        let loaded = Self { path: path.to_owned(), text, cell, calibration, calibration_text };
+        let path = path.to_owned();
+        let loaded = Self { path, text, cell, devices, calibration, calibration_text };
         loaded.check_camera_offset()?;
         Ok(loaded)
     }

@@ -3,6 +3,7 @@
 
 pub mod control;
 mod controller;
+pub mod drivers;
 pub mod extruder;
 pub mod file;
 

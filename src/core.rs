@@ -4,6 +4,7 @@ pub mod frame;
 pub mod geometry;
 pub mod quantity;
 pub mod readback;
+pub mod refusal;
 pub mod robot;
 pub mod time;
 pub mod units;

@@ -3,4 +3,9 @@
 pub mod camera;
 pub mod extruder;
 pub mod line;
+pub mod registry;
 pub mod robot;
+mod start_error;
+
+pub use registry::Devices;
+pub use start_error::StartError;

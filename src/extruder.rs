@@ -29,7 +29,7 @@ pub use demand::{FlowDemand, FlowFollows, RobotFollows, RobotSpeed};
 pub use drive::CommandQuantity;
 pub use limits::{CommandLimit, CommandLimits};
 pub use readings::ReadingFilters;
-pub use report::{ExtruderCommand, ExtruderReport, PumpMode};
+pub use report::{ExtruderCommand, ExtruderLimits, ExtruderReport, PumpMode};
 pub use state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
 pub use strategy::ExtruderStrategy;
 pub use supervisor::{ExtruderSetup, Laying, Supervisor};

@@ -21,5 +21,6 @@ pub use frame::{
     MIN_VALID_MS, VERSION,
 };
 pub use robot::{
-    ParamError, PcLine, PrintJob, RobotFaults, RobotLine, RobotParams, VirtualRobot, on_wire,
+    ParamError, PcLine, PrintJob, RobotFaults, RobotLine, RobotParams, RobotStatus, VirtualRobot,
+    on_wire,
 };

@@ -16,6 +16,7 @@
 
 pub mod capture;
 mod control;
+mod journal;
 mod latency;
 mod mailbox;
 pub mod run_logger;
@@ -28,16 +29,13 @@ use crossbeam_channel::{Receiver, bounded, never, unbounded};
 
 use crate::calibration::Calibration;
 use crate::cell::Cell;
-use crate::cell::extruder::ExtruderLink;
-use crate::cell::file::{ImageSource, RunPart};
+use crate::cell::file::RunPart;
 use crate::control::Controller;
 use crate::core::time::Span;
-use crate::drivers::camera::open;
-use crate::drivers::camera::rendered::{RenderedCamera, RobotView};
-use crate::drivers::extruder::{
-    ExtruderClient, ExtruderConfig, ExtruderConfigError, ExtruderEvent,
-};
-use crate::drivers::robot::{LinkClient, LinkConfig, LinkConfigError, LinkTiming};
+use crate::drivers::StartError;
+use crate::drivers::camera::open::{self, OpenError};
+use crate::drivers::extruder::{CommandRange, ExtruderDriver, ExtruderStart};
+use crate::drivers::robot::{RobotDriver, RobotStart};
 use crate::extruder::{ExtruderSetup, FlowDemand};
 use crate::io::clock::RunClock;
 use crate::io::recorder;
@@ -45,13 +43,13 @@ use crate::io::recorder::{Incomplete, RecordConfig, RecordReport};
 use crate::rows::log::RunLog;
 use crate::rows::output::LogError;
 use crate::rows::summary::{RunNote, Summary};
-use crate::run::ports::{FrameSource, RecordError, SourceError};
+use crate::run::ports::{ExtruderEvent, ExtruderPort, RecordError, RobotPort};
 use crate::run::runner::Runner;
-use crate::sim::render::{RenderError, Renderer};
 
 use capture::CapturePipeline;
 pub use control::Ending;
-use control::{ControlThread, ExtruderWatch, LinkPort, Sources, StepsWatch};
+use control::{ControlThread, ExtruderWatch, LiveInputs, StepsWatch};
+use journal::Journal;
 use run_logger::RunLogger;
 
 /// What a live run needs.
@@ -60,6 +58,8 @@ pub struct LiveRun {
     pub cell: Cell,
     /// Its run part.
     pub run: RunPart,
+    /// Its robot.
+    pub robot: Arc<dyn RobotDriver>,
     /// Its extruder, where it is commanded.
     pub extruder: Option<LiveExtruder>,
     /// What a pixel means in it.
@@ -90,20 +90,15 @@ pub struct LiveExtruder {
     /// The flow that is wanted.
     pub demand: FlowDemand,
     /// How it is reached.
-    pub link: ExtruderLink,
+    pub driver: Arc<dyn ExtruderDriver>,
+    /// How long a command holds at the extruder \[ms\].
+    pub valid_ms: u64,
 }
 
 impl LiveExtruder {
-    fn config(&self) -> ExtruderConfig {
+    fn range(&self) -> CommandRange {
         let (min, max) = self.setup.limits.range();
-        ExtruderConfig {
-            address: self.link.address.clone(),
-            drive: self.setup.quantity,
-            min,
-            max,
-            valid_ms: self.link.valid_ms,
-            timing: LinkTiming::default(),
-        }
+        CommandRange { quantity: self.setup.quantity, min, max }
     }
 }
 
@@ -124,19 +119,13 @@ pub struct LiveReport {
 pub enum LiveError {
     /// The camera gives nothing.
     #[error(transparent)]
-    Camera(#[from] SourceError),
-    /// The bead cannot be rendered with this cell.
-    #[error("the simulated bead cannot be rendered: {0}")]
-    Render(#[from] RenderError),
+    Camera(#[from] OpenError),
     /// The recording cannot begin.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// The robot link cannot begin.
+    /// The driver of the robot or of the extruder cannot start.
     #[error(transparent)]
-    Link(#[from] LinkConfigError),
-    /// The extruder link cannot begin.
-    #[error(transparent)]
-    ExtruderLink(#[from] ExtruderConfigError),
+    Device(#[from] StartError),
     /// Results cannot be written.
     #[error(transparent)]
     Log(#[from] LogError),
@@ -148,10 +137,22 @@ pub enum LiveError {
 /// Runs a cell until it is told to stop, its time is over or it fails.
 pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     let (camera_stop, camera_end) = bounded::<()>(0);
-    let (source, robot_view) = open_camera(&live, camera_end)?;
+    let camera = open::CellCamera {
+        cell: &live.cell,
+        camera: &live.run.camera,
+        calibration: &live.calibration,
+    };
+    let (source, robot_view) = camera.open(live.clock, camera_end)?;
     let (recorder, alarm) = recorder::start(&live.record, &live.out)?;
     let (robot_events, from_robot) = unbounded();
-    let link = LinkClient::start(link_config(&live.run), live.clock, robot_events)?;
+    let robot = live.robot.start(RobotStart {
+        clock: live.clock,
+        min: live.run.limits.min_speed,
+        max: live.run.limits.max_speed,
+        start_speed: live.run.robot.start_speed,
+        valid_ms: u64::from(live.run.robot.valid_ms),
+        events: robot_events,
+    })?;
     let (extruder, from_extruder) = open_extruder(&live)?;
     let robot_z = Arc::new(AtomicU64::new(f64::NAN.to_bits()));
     let capture = CapturePipeline::start(
@@ -165,24 +166,31 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         live.clock,
     )?;
     let logger = RunLogger::start(live.log)?;
-    let watch = live
-        .extruder
-        .as_ref()
-        .map(|side| ExtruderWatch::new(side.config(), side.setup.feedforward_period));
+    let watch = live.extruder.as_ref().map(|side| {
+        let driver = Arc::clone(&side.driver);
+        ExtruderWatch::new(driver, side.range(), side.setup.feedforward_period)
+    });
     let mut controller = Controller::new(live.cell.controller_setup(&live.run, &live.calibration));
     if let Some(side) = live.extruder {
         controller = controller.with_extruder(side.setup, side.demand);
     }
     let mut control = ControlThread {
-        runner: Runner::with_extruder(controller, LinkPort::new(link), extruder, recorder),
+        inputs: LiveInputs {
+            clock: live.clock,
+            camera: capture.seen.clone(),
+            robot: from_robot,
+            extruder: from_extruder,
+            alarm,
+            stop: live.stop,
+        },
+        runner: Runner::with_extruder(controller, robot, extruder, recorder),
         extruder: watch,
-        clock: live.clock,
         period: Span::from_secs(1.0 / live.run.robot.rate_hz),
         duration: live.duration,
         robot_z,
         robot_view,
         latencies: latency::Latencies::default(),
-        logger: &logger,
+        journal: &logger,
         notice: live.notice,
         limits: live.run.limits,
         unfit: None,
@@ -191,23 +199,15 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         speed: None,
         setpoint: None,
     };
-    let ending = control.run(&Sources {
-        seen: &capture.seen,
-        robot: &from_robot,
-        extruder: &from_extruder,
-        alarm: &alarm,
-        stop: &live.stop,
-    });
+    let ending = control.run();
     let pump_runs = control.extruder.as_ref().is_some_and(|side| !side.rests());
     drop(camera_stop);
     let seen = capture.seen.clone();
     let superseded = capture.stop();
     control.take_rest(&seen);
-    if let Some(extruder) = control.runner.extruder_mut().take() {
-        extruder.close();
-    }
-    let (_, port, recorder) = control.runner.into_parts();
-    port.close();
+    control.runner.extruder_mut().close();
+    control.runner.robot_mut().close();
+    let (_, _, recorder) = control.runner.into_parts();
     let dropped = recorder.frames_dropped();
     let recording = recorder.finish();
     logger.note(RunNote::FramesSuperseded(superseded));
@@ -227,44 +227,13 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     Ok(LiveReport { summary: logger.finish()?, ending, pump_runs, recording })
 }
 
-/// The link to the extruder, where it is commanded, and what it reports.
+/// The extruder, where it is commanded, and what it reports.
 fn open_extruder(
     live: &LiveRun,
-) -> Result<(Option<ExtruderClient>, Receiver<ExtruderEvent>), ExtruderConfigError> {
+) -> Result<(Option<Box<dyn ExtruderPort>>, Receiver<ExtruderEvent>), StartError> {
     let Some(side) = &live.extruder else { return Ok((None, never())) };
     let (events, from_extruder) = unbounded();
-    let client = ExtruderClient::start(side.config(), live.clock, events)?;
-    Ok((Some(client), from_extruder))
-}
-
-/// The camera of the cell; the rendered one also wants to hear of the robot.
-fn open_camera(
-    live: &LiveRun,
-    ending: Receiver<()>,
-) -> Result<(Box<dyn FrameSource>, Option<RobotView>), LiveError> {
-    let camera = &live.run.camera;
-    if camera.source != ImageSource::Rendered {
-        let options = open::LiveOptions::of(camera, live.cell.channel);
-        return Ok((open::live(options, live.clock, ending)?, None));
-    }
-    let simulation = &live.cell.simulation;
-    let renderer = Renderer::new(
-        live.calibration.clone(),
-        live.cell.surface_height,
-        live.cell.gauge,
-        simulation.image,
-        simulation.seed,
-    )?;
-    let (source, view) = RenderedCamera::new(renderer, simulation, camera, live.clock, ending);
-    Ok((Box::new(source), Some(view)))
-}
-
-fn link_config(run: &RunPart) -> LinkConfig {
-    LinkConfig {
-        address: run.robot.address.clone(),
-        min: run.limits.min_speed,
-        max: run.limits.max_speed,
-        valid_ms: u64::from(run.robot.valid_ms),
-        timing: LinkTiming::default(),
-    }
+    let (clock, range, valid_ms) = (live.clock, side.range(), side.valid_ms);
+    let port = side.driver.start(ExtruderStart { clock, range, valid_ms, events })?;
+    Ok((Some(port), from_extruder))
 }

@@ -5,7 +5,6 @@
 mod adaptive;
 mod command;
 mod context;
-mod link;
 mod part;
 mod plant;
 mod pressure;
@@ -17,7 +16,6 @@ use std::path::{Path, PathBuf};
 
 pub use adaptive::AdaptiveSettings;
 pub use context::ExtruderRates;
-pub use link::ExtruderLink;
 pub use part::{BeadStart, CellContext, ExtruderPart};
 pub use plant::{
     ExtruderPlant, GainRipple, InputLoad, LinearPlant, MeltPlant, PlantKind, PressurePlant,
@@ -66,9 +64,12 @@ pub struct ExtruderSettings {
     pub starts: Option<PathBuf>,
     /// The plan of the job, if the cell names one.
     pub plan: Option<PathBuf>,
-    /// How a live run reaches it, if the file says so.
-    pub link: Option<ExtruderLink>,
+    /// How long a command holds at the extruder \[ms\].
+    pub valid_ms: u64,
 }
+
+/// How long a command holds at the extruder unless the file says so \[ms\].
+const VALID_MS: u64 = 300;
 
 impl ExtruderSettings {
     /// Reads `[extruder]`.
@@ -124,7 +125,7 @@ impl ExtruderSettings {
                             comes the strategy stands at its first command";
             table.report("starts", "how the extruder starts and stops", expected);
         }
-        let link = link::read(table, rates.map(|rates| rates.io_hz));
+        let valid_ms = read_valid_ms(table, rates.map(|rates| rates.io_hz));
         Some(Self {
             drive: drive?,
             limits: limits?,
@@ -139,7 +140,7 @@ impl ExtruderSettings {
             filters: filters?,
             starts,
             plan,
-            link,
+            valid_ms: valid_ms?,
         })
     }
 
@@ -175,6 +176,21 @@ impl ExtruderSettings {
             plan: None,
         }
     }
+}
+
+/// How long a command holds at an extruder that is commanded and reports `io_hz` times a
+/// second \[ms\].
+fn read_valid_ms(table: &Table<'_>, io_hz: Option<f64>) -> Option<u64> {
+    let valid_ms = table.integer_or("valid_ms", 100..=1000, VALID_MS)?;
+    if let Some(io_hz) = io_hz
+        && table.has("driver")
+        && u32::try_from(valid_ms).is_ok_and(|ms| f64::from(ms) < 1.5e3 / io_hz)
+    {
+        let expected =
+            format!("at least {:.0}, one and a half periods of io_rate_hz", 1.5e3 / io_hz);
+        table.report("valid_ms", valid_ms.to_string(), expected);
+    }
+    Some(valid_ms)
 }
 
 /// A flow that follows the robot, and a robot that follows the flow, would lead

@@ -10,6 +10,7 @@ mod robot;
 use std::path::Path;
 
 use super::control;
+use super::drivers::{DriverTables, NoDrivers};
 use super::extruder::{BeadStart, CellContext};
 use crate::calibration::{Calibration, SurfaceMap};
 use crate::core::frame::Channel;
@@ -109,11 +110,22 @@ pub struct RecordingSettings {
 
 impl Cell {
     /// Reads a cell from a file's text. `file` is what messages call it, and
-    /// the folder that relative paths start from.
+    /// the folder that relative paths start from. Keys of drivers are left unread.
     pub fn parse(file: &Path, text: &str, purpose: Purpose) -> Result<Self, Problems> {
+        Self::parse_with(file, text, purpose, &mut NoDrivers)
+    }
+
+    /// The same, with what reads the keys of drivers.
+    pub fn parse_with(
+        file: &Path,
+        text: &str,
+        purpose: Purpose,
+        drivers: &mut dyn DriverTables,
+    ) -> Result<Self, Problems> {
         let name = file.display().to_string();
         let document = Document::parse(&name, text, purpose == Purpose::Run);
-        let cell = read_cell(&document.root(), file.parent().unwrap_or(Path::new("")));
+        let folder = file.parent().unwrap_or(Path::new(""));
+        let cell = read_cell(&document.root(), folder, drivers);
         document.finish(cell)
     }
 }
@@ -152,7 +164,7 @@ impl Cell {
     }
 }
 
-fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
+fn read_cell(root: &Table<'_>, folder: &Path, drivers: &mut dyn DriverTables) -> Option<Cell> {
     let calibration = root.required_table("calibration");
     let calibration_source = calibration.as_ref().and_then(|t| read_calibration(t, folder));
     let surface_height =
@@ -179,7 +191,11 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let frame_rate_hz = camera_table.as_ref().and_then(|t| t.number("rate_hz", 0.01..=10_000.0));
     let camera = camera_table.as_ref().and_then(|t| read_camera(t, folder, mount, frame_rate_hz));
     let limits = root.run_table("limits").as_ref().and_then(control::read_limits);
-    let robot = root.run_table("robot").as_ref().and_then(|t| read_robot(t, limits));
+    let robot_table = root.run_table("robot");
+    if let Some(table) = &robot_table {
+        drivers.read_robot(table, folder);
+    }
+    let robot = robot_table.as_ref().and_then(|t| read_robot(t, limits));
     if let (Some(table), Some(control), Some(limits), Some(robot)) =
         (&control_table, &control, limits, &robot)
     {
@@ -188,12 +204,8 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let simulation = table::read(root);
     let speed = robot.as_ref().map(|robot| robot.start_speed);
     let bead = width.zip(speed).map(|(width, speed)| BeadStart { width, speed });
-    let context = CellContext {
-        bead,
-        robot_address: robot.as_ref().map(|robot| robot.address.as_str()),
-        simulation: simulation.as_ref(),
-    };
-    let extruder = ExtruderPart::read(root, folder, &context);
+    let context = CellContext { bead, simulation: simulation.as_ref() };
+    let extruder = ExtruderPart::read(root, folder, &context, drivers);
     let run = match (control, limits, camera, robot) {
         (Some(control), Some(limits), Some(camera), Some(robot)) => {
             Some(RunPart { control, limits, camera, robot, extruder })

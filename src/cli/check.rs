@@ -11,13 +11,13 @@ use nalgebra::Point3;
 use super::arguments::WrongArguments;
 use super::arguments::check_writable;
 use super::print::warn;
-use crate::assembly::{ExtruderSide, LoadedCell, range_warning, steady_state};
+use crate::assembly::{ExtruderSide, LoadedCell, range_warning, read_cell, steady_state};
 use crate::calibration::Calibration;
-use crate::cell::Cell;
 use crate::cell::file::{ImageSource, Purpose, RunPart};
 use crate::core::geometry::Size;
 use crate::core::time::Span;
 use crate::core::units::Mm;
+use crate::drivers::Devices;
 use crate::extruder::start_stop::Pause;
 use crate::width_control::strategy::distance::DistanceStrategy;
 
@@ -55,8 +55,8 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     }
     let loaded = LoadedCell::read(&args.cell, Purpose::Measure)?;
     check_height(&loaded)?;
-    let run = Cell::parse(&args.cell, &loaded.text, Purpose::Run);
-    let run = run.map(|cell| LoadedCell { cell, ..loaded.clone() });
+    let run = read_cell(&args.cell, &loaded.text, Purpose::Run);
+    let run = run.map(|(cell, devices)| LoadedCell { cell, devices, ..loaded.clone() });
     // Everything that the extruder's strategy refers to, before anything is called
     // sound.
     let side = run.as_ref().map_or(Ok(None), LoadedCell::extruder)?;
@@ -76,7 +76,8 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     match run {
         Ok(loaded) => {
             let Some(run) = &loaded.cell.run else { return Ok(ExitCode::SUCCESS) };
-            about_purposes(run);
+            about_purposes(run, &loaded.devices);
+            about_robot(&loaded.devices);
             about_run(run);
             about_controller(&loaded, run);
             about_extruder(&loaded, side.as_ref())?;
@@ -158,11 +159,11 @@ fn about_surface(loaded: &LoadedCell) {
 
 /// What a cell suffices for that has all that a run needs of a robot's side,
 /// and what is missing of the extruder's for the rest.
-fn about_purposes(run: &RunPart) {
+fn about_purposes(run: &RunPart, devices: &Devices) {
     let (reached, answered) = run
         .extruder
         .as_ref()
-        .map_or((true, true), |part| (part.extruder.link.is_some(), part.plant.is_some()));
+        .map_or((true, true), |part| (devices.extruder.is_some(), part.plant.is_some()));
     let needs = [
         ("run", reached, "extruder.driver, address: \"line\" and host:port"),
         ("simulate", answered, "extruder_plant: what answers the extruder's commands"),
@@ -207,11 +208,11 @@ fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::R
     if part.plant.is_some() {
         let _ = loaded.plant(part)?;
     }
-    if let Some(link) = &extruder.link {
+    if let Some(device) = &loaded.devices.extruder {
         say!(
             "               reached at {}, a command holds for {} ms",
-            link.address,
-            link.valid_ms
+            device.driver.address(),
+            extruder.valid_ms
         );
     }
     Ok(())
@@ -282,6 +283,17 @@ fn about_controller(loaded: &LoadedCell, run: &RunPart) {
     if gauge > run.camera.offset * 0.5 {
         say!("  WARNING      gauge.roi_px is more than half as long as offset_mm: a shorter one");
         say!("               shows changes of the bead sooner");
+    }
+}
+
+/// How the robot is reached, and what its driver can do.
+fn about_robot(devices: &Devices) {
+    let Some(robot) = &devices.robot else { return };
+    let (name, can) = (robot.registration.name, robot.registration.capabilities);
+    say!("  robot        {name}, {}: {can}", robot.driver.address());
+    if !can.setpoints_expire {
+        say!("  WARNING      a setpoint never expires at this robot: it does not stop by itself");
+        say!("               where it loses the PC");
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use anyhow::Context;
 
@@ -11,6 +12,7 @@ use super::print::{Verbosity, warn};
 use crate::assembly::{LoadedCell, range_warning};
 use crate::cell::file::RunPart;
 use crate::core::time::Span;
+use crate::drivers::robot::RobotDriver;
 use crate::io::clock::RunClock;
 use crate::io::recorder::{ExtruderFile, RecordConfig};
 use crate::io::stop::StopSignal;
@@ -64,12 +66,14 @@ pub fn live(
 ) -> anyhow::Result<LiveReport> {
     refuse_a_recording_in(folders.recording)?;
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
+    let robot = loaded.devices.robot.as_ref().context("the cell names no robot")?;
+    let robot = Arc::clone(&robot.driver);
     let (extruder, extruder_files) = live_extruder(&loaded, &run)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
     let log = RunPage::log(LogOptions {
         folder: folders.log.to_owned(),
         title,
-        header: about(&loaded, &run, extruder.as_ref()),
+        header: about(&loaded, &run, &*robot, extruder.as_ref()),
         gauge: loaded.cell.gauge,
         target: loaded.cell.target.as_ref().map(WidthTarget::nominal),
         max_rejected_fraction: loaded.cell.recording.max_rejected_share,
@@ -86,6 +90,7 @@ pub fn live(
     let quiet = voice.quiet;
     Ok(live::run(LiveRun {
         run,
+        robot,
         extruder,
         calibration: loaded.calibration,
         clock,
@@ -108,14 +113,15 @@ pub fn live(
 fn about(
     loaded: &LoadedCell,
     run: &RunPart,
+    robot: &dyn RobotDriver,
     extruder: Option<&LiveExtruder>,
 ) -> Vec<(String, String)> {
     let mut about = vec![
         ("cell".into(), loaded.path.display().to_string()),
         ("camera".into(), run.camera.source_name.clone()),
-        ("robot".into(), run.robot.address.clone()),
+        ("robot".into(), robot.address()),
     ];
-    about.extend(extruder.map(|side| ("extruder".into(), side.link.address.clone())));
+    about.extend(extruder.map(|side| ("extruder".into(), side.driver.address())));
     about.push(("calibration".into(), loaded.calibration_words()));
     about
 }
@@ -129,7 +135,7 @@ fn live_extruder(
     let (Some(part), Some(side)) = (&run.extruder, loaded.extruder()?) else {
         return Ok((None, Vec::new()));
     };
-    let Some(link) = part.extruder.link.clone() else {
+    let Some(device) = &loaded.devices.extruder else {
         return Err(WrongArguments::new(format!(
             "{}: extruder.driver: found nothing, expected \"line\" and an address: a live run \
              has to reach its extruder (truebead simulate needs neither)",
@@ -139,5 +145,11 @@ fn live_extruder(
     };
     warn(&side.warnings);
     warn(range_warning(part, &side)?.as_slice());
-    Ok((Some(LiveExtruder { setup: side.setup, demand: part.demand, link }), side.files))
+    let live = LiveExtruder {
+        setup: side.setup,
+        demand: part.demand,
+        driver: Arc::clone(&device.driver),
+        valid_ms: part.extruder.valid_ms,
+    };
+    Ok((Some(live), side.files))
 }

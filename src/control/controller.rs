@@ -117,7 +117,7 @@ impl Controller {
                 self.link_went_down(now);
                 None
             }
-            Event::Refused { .. }
+            Event::SetpointRefused { .. }
             | Event::Extruder(_)
             | Event::ExtruderUp
             | Event::ExtruderDown { .. }

@@ -2,12 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::core::refusal::RefusalReason;
 use crate::core::robot::{RobotLimits, RobotState};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::extruder::ExtruderReport;
 
-/// What the controller is told. Recorded as it is, so that a replay feeds the
+/// What the controller reacts to. Recorded as it is, so that a replay feeds the
 /// same events to the same code.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -44,12 +45,12 @@ pub enum Event {
         /// Why, in words for the operator.
         reason: String,
     },
-    /// The robot refused a line.
-    Refused {
-        /// Number of the setpoint that was refused.
-        seq: u64,
-        /// `STALE`, `RANGE`, `SEQUENCE`, `MODE` or `FORM`.
-        code: String,
+    /// The robot refused a setpoint or a stop.
+    SetpointRefused {
+        /// Why.
+        reason: RefusalReason,
+        /// What was refused and why, in words for the operator.
+        text: String,
     },
     /// It is time for a setpoint: the fixed rate of the robot link.
     Tick,
@@ -62,12 +63,12 @@ pub enum Event {
         /// Why, in words for the operator.
         reason: String,
     },
-    /// The extruder refused a line.
+    /// The extruder refused a command.
     ExtruderRefused {
-        /// Number of the command that was refused.
-        seq: u64,
-        /// `STALE`, `RANGE`, `SEQUENCE`, `MODE` or `FORM`.
-        code: String,
+        /// Why.
+        reason: RefusalReason,
+        /// What was refused and why, in words for the operator.
+        text: String,
     },
     /// It is time for a step of the extruder's feedforward.
     ExtruderTick,

@@ -76,8 +76,8 @@ impl Line {
 
     fn robot(&mut self, mode: RobotMode, path: f64, speed: f64) -> Step {
         self.give(&Event::Robot(RobotState {
-            t_ms: 0,
-            seq: 1,
+            robot_time_ms: None,
+            has_setpoint: true,
             mode,
             speed_mm_per_s: MmPerS::constant(speed),
             path_mm: Mm::constant(path),

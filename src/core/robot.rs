@@ -1,10 +1,10 @@
-//! What a robot reports of itself.
+//! What a robot reports of itself, whatever it is connected by.
 
 use serde::{Deserialize, Serialize};
 
 use crate::core::units::{Mm, MmPerS};
 
-/// What the robot does, in the words of the link.
+/// What the robot does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub enum RobotMode {
@@ -27,13 +27,14 @@ impl RobotMode {
     }
 }
 
-/// One `STATE` of the robot.
+/// One report of the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RobotState {
-    /// The robot's own clock \[ms\].
-    pub t_ms: u64,
-    /// Last setpoint that it applied on this connection; 0 is none.
-    pub seq: u64,
+    /// Time of the report on the robot's own clock \[ms\]; none where it has no clock.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot_time_ms: Option<u64>,
+    /// Whether it has applied a setpoint on this connection.
+    pub has_setpoint: bool,
     /// What it does.
     pub mode: RobotMode,
     /// Speed along the path.
@@ -44,7 +45,7 @@ pub struct RobotState {
     pub z_mm: Mm,
 }
 
-/// What the robot says of itself when the link comes up.
+/// What the robot can do, as it reports when the link comes up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RobotLimits {
     /// Its name.

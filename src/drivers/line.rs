@@ -6,6 +6,7 @@
 //! thread ([`Client::send`]), so that no queue stands between a decision and
 //! the socket.
 
+mod address;
 mod client;
 mod connection;
 mod dialect;
@@ -14,8 +15,9 @@ mod outgoing;
 mod timing;
 mod written;
 
+pub use address::read_address;
 pub use client::Client;
 pub use dialect::{Dialect, EventOf, Heard, LinkEvent};
 pub use outgoing::Open;
 pub use timing::LinkTiming;
-pub use written::{Unsent, Written};
+pub use written::Written;

@@ -1,7 +1,8 @@
-//! What an extruder says of itself, and what it is told.
+//! What an extruder reports, and what it is commanded.
 
 use serde::{Deserialize, Serialize};
 
+use super::drive::CommandQuantity;
 use crate::core::units::{MPa, Mm, Mm3PerS, Rpm};
 
 /// What the pump of an extruder does.
@@ -39,6 +40,20 @@ pub struct ExtruderReport {
     /// Length of the screw that is filled, measured from the die's end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub filled_mm: Option<Mm>,
+}
+
+/// What an extruder can do, as it reports when the link comes up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtruderLimits {
+    /// Its name.
+    pub name: String,
+    /// What it is commanded in.
+    pub quantity: CommandQuantity,
+    /// Smallest command that it takes while the pump is to run, in the unit of
+    /// `quantity`.
+    pub min: f64,
+    /// Largest command that it takes, in the same unit.
+    pub max: f64,
 }
 
 /// What is to be sent to the extruder.

@@ -15,5 +15,5 @@ mod numbers;
 
 pub use drive_line::DriveLine;
 pub use endpoint::{ExtruderEndpoint, ExtruderFaults};
-pub use extruder_line::{ExtruderHello, ExtruderLine, ExtruderStatus, pump_word};
+pub use extruder_line::{ExtruderLine, ExtruderStatus, pump_word};
 pub use numbers::on_wire;

@@ -14,5 +14,5 @@ pub use job::PrintJob;
 pub use numbers::on_wire;
 pub use params::{ParamError, RobotParams};
 pub use pc_line::PcLine;
-pub use robot_line::{RobotLine, mode_word};
+pub use robot_line::{RobotLine, RobotStatus, mode_word};
 pub use virtual_robot::{RobotFaults, VirtualRobot};

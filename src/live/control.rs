@@ -5,63 +5,52 @@ mod ending;
 mod extruder;
 mod extruder_watch;
 mod frames;
-mod port;
+mod inputs;
 mod robot;
 mod steps;
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
-use std::time::Duration;
 
-use crossbeam_channel::{Receiver, never, select};
+use crossbeam_channel::Receiver;
 
 use super::capture::CameraMessage;
+use super::journal::Journal;
 use super::latency::Latencies;
-use super::run_logger::RunLogger;
 use crate::control::event::Event;
 use crate::control::step::{Command, State, Step};
 use crate::core::robot::RobotMode;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::MmPerS;
 use crate::drivers::camera::rendered::RobotView;
-use crate::drivers::extruder::{ExtruderClient, ExtruderEvent};
-use crate::drivers::robot::RobotEvent;
-use crate::io::clock::RunClock;
-use crate::io::recorder::RecorderHandle;
 use crate::rows::names;
 use crate::rows::summary::RunNote;
-use crate::run::ports::RecordError;
+use crate::run::ports::{ExtruderPort, Recorder, RobotEvent, RobotPort};
 use crate::run::runner::{Handled, Runner};
 use crate::width_control::limiter::SpeedLimits;
 
 pub use ending::Ending;
 pub use extruder_watch::ExtruderWatch;
-pub use port::LinkPort;
+pub use inputs::{Input, Inputs, LiveInputs};
 pub use steps::StepsWatch;
 
 /// Longest wait for the robot to say that it has stopped.
 const SHUTDOWN_TIMEOUT: Span = Span::from_millis(600);
 
-/// Where events come from.
-pub struct Sources<'a> {
-    pub seen: &'a Receiver<CameraMessage>,
-    pub robot: &'a Receiver<RobotEvent>,
-    pub extruder: &'a Receiver<ExtruderEvent>,
-    pub alarm: &'a Receiver<RecordError>,
-    pub stop: &'a Receiver<()>,
-}
+/// The runner of a live run.
+pub type LiveRunner<K> = Runner<Box<dyn RobotPort>, K, Option<Box<dyn ExtruderPort>>>;
 
 /// The control thread's own.
-pub struct ControlThread<'a> {
-    pub runner: Runner<LinkPort, RecorderHandle, Option<ExtruderClient>>,
+pub struct ControlThread<'a, I, K> {
+    pub inputs: I,
+    pub runner: LiveRunner<K>,
     pub extruder: Option<ExtruderWatch>,
-    pub clock: RunClock,
     pub period: Span,
     pub duration: Option<Span>,
     pub robot_z: Arc<AtomicU64>,
     pub robot_view: Option<RobotView>,
     pub latencies: Latencies,
-    pub logger: &'a RunLogger,
+    pub journal: &'a dyn Journal,
     pub notice: Box<dyn FnMut(&str) + Send>,
     pub limits: SpeedLimits,
     pub unfit: Option<Ending>,
@@ -71,35 +60,29 @@ pub struct ControlThread<'a> {
     pub setpoint: Option<MmPerS>,
 }
 
-impl ControlThread<'_> {
+impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     /// Runs until something ends it, and then ends it in order.
-    pub fn run(&mut self, sources: &Sources<'_>) -> Ending {
-        let ending = self.until_ended(sources);
+    pub fn run(&mut self) -> Ending {
+        let ending = self.until_ended();
         self.give(Event::Stop);
-        self.shut_down(sources);
+        self.inputs.ignore_camera();
+        self.shut_down();
         ending
     }
 
     /// Waits a little for robot and extruder to say that they rest.
-    fn shut_down(&mut self, sources: &Sources<'_>) {
-        let until = self.clock.now() + SHUTDOWN_TIMEOUT;
+    fn shut_down(&mut self) {
+        let until = self.inputs.now() + SHUTDOWN_TIMEOUT;
         let mut stopped = false;
         while !(stopped && self.extruder.as_ref().is_none_or(ExtruderWatch::rests)) {
-            let left = until - self.clock.now();
-            if left <= Span::ZERO {
-                return;
-            }
-            select! {
-                recv(sources.robot) -> message => {
-                    let Ok(event) = message else { return };
+            match self.inputs.next(until) {
+                Some(Input::Robot(event)) => {
                     stopped |= has_stopped(&event);
                     self.take_robot_event(event);
                 }
-                recv(sources.extruder) -> message => {
-                    let Ok(event) = message else { return };
-                    self.take_extruder_event(event);
-                }
-                default(duration(left)) => return,
+                Some(Input::Extruder(event)) => self.take_extruder_event(event),
+                Some(Input::DeviceGone) | None => return,
+                Some(_) => {}
             }
         }
     }
@@ -116,14 +99,14 @@ impl ControlThread<'_> {
         }
     }
 
-    fn until_ended(&mut self, sources: &Sources<'_>) -> Ending {
-        let mut due = self.clock.now() + self.period;
-        let mut extruder_due = self.extruder.as_ref().map(|side| self.clock.now() + side.period());
-        let over = self.duration.map(|duration| self.clock.now() + duration);
-        let (mut seen, mut alarm, none) = (sources.seen.clone(), sources.alarm.clone(), never());
+    fn until_ended(&mut self) -> Ending {
+        let start = self.inputs.now();
+        let mut due = start + self.period;
+        let mut extruder_due = self.extruder.as_ref().map(|side| start + side.period());
+        let over = self.duration.map(|duration| start + duration);
         let mut lost: Option<String> = None;
         loop {
-            let now = self.clock.now();
+            let now = self.inputs.now();
             if over.is_some_and(|over| now >= over) {
                 return Ending::TimeOver;
             }
@@ -132,7 +115,7 @@ impl ControlThread<'_> {
             }
             if now >= due {
                 self.tick(due);
-                due = next_due(due, self.period, self.clock.now());
+                due = next_due(due, self.period, self.inputs.now());
                 if let Some(why) = &lost
                     && matches!(self.shown, Some(State::Fault(_) | State::Idle))
                 {
@@ -145,37 +128,32 @@ impl ControlThread<'_> {
             {
                 let period = side.period();
                 self.give(Event::ExtruderTick);
-                extruder_due = Some(next_due(at, period, self.clock.now()));
+                extruder_due = Some(next_due(at, period, self.inputs.now()));
                 continue;
             }
-            let wait = [over, extruder_due].into_iter().flatten().fold(due, Stamp::min) - now;
-            select! {
-                recv(seen) -> message => match message {
-                    Ok(CameraMessage::Frame(look)) => self.look(*look),
-                    Ok(CameraMessage::Unreadable { seq, at, reason }) => self.unreadable(seq, at, &reason),
-                    Ok(CameraMessage::Ended(None)) | Err(_) => return Ending::LastFrame,
-                    Ok(CameraMessage::Ended(Some(reason))) => {
-                        (self.notice)(&format!("camera lost: {reason}"));
-                        self.give(Event::CameraLost { reason: reason.clone() });
-                        lost = Some(reason);
-                        seen = none.clone();
-                    }
-                },
-                recv(sources.robot) -> message => {
-                    if let Ok(event) = message { self.take_robot_event(event); }
+            let until = [over, extruder_due].into_iter().flatten().fold(due, Stamp::min);
+            match self.inputs.next(until) {
+                Some(Input::Camera(CameraMessage::Frame(look))) => self.look(*look),
+                Some(Input::Camera(CameraMessage::Unreadable { seq, at, reason })) => {
+                    self.unreadable(seq, at, &reason);
                 }
-                recv(sources.extruder) -> message => {
-                    if let Ok(event) = message { self.take_extruder_event(event); }
+                Some(Input::Camera(CameraMessage::Ended(None)) | Input::CameraGone) => {
+                    return Ending::LastFrame;
                 }
-                recv(alarm) -> message => {
-                    if let Ok(error) = message {
-                        self.runner.lose_recording(self.clock.now(), error.clone());
-                        return Ending::RecordingLost(error.0);
-                    }
-                    alarm = never();
+                Some(Input::Camera(CameraMessage::Ended(Some(reason)))) => {
+                    (self.notice)(&format!("camera lost: {reason}"));
+                    self.give(Event::CameraLost { reason: reason.clone() });
+                    lost = Some(reason);
+                    self.inputs.ignore_camera();
                 }
-                recv(sources.stop) -> _ => return Ending::Asked,
-                default(duration(wait)) => {}
+                Some(Input::Robot(event)) => self.take_robot_event(event),
+                Some(Input::Extruder(event)) => self.take_extruder_event(event),
+                Some(Input::RecordingLost(error)) => {
+                    self.runner.lose_recording(self.inputs.now(), error.clone());
+                    return Ending::RecordingLost(error.0);
+                }
+                Some(Input::StopRequested) => return Ending::Asked,
+                Some(Input::DeviceGone) | None => {}
             }
             if let Some(ending) = self.unfit.take() {
                 return ending;
@@ -188,18 +166,23 @@ impl ControlThread<'_> {
 
     /// Hands an event to the runner and its answer to the log.
     fn give(&mut self, event: Event) -> Handled {
-        let now = self.clock.now();
+        let now = self.inputs.now();
         let handled = self.runner.handle(now, &event);
-        if let (Some(_), Some(Command::Speed(speed))) = (handled.sent, handled.step.command) {
+        for failed in [&handled.robot, &handled.extruder] {
+            if let Some(Err(reason)) = failed {
+                tracing::debug!(%reason, "a command was not sent");
+            }
+        }
+        if let (Some(Ok(_)), Some(Command::Speed(speed))) = (&handled.robot, handled.step.command) {
             self.setpoint = Some(speed);
-            self.logger.note(RunNote::SetpointSent);
+            self.journal.note(RunNote::SetpointSent);
         }
         if let Some(steps) = &mut self.steps {
             steps.see(&handled.step);
         }
         self.show(now, &handled.step);
         self.show_extruder(now, &handled.step);
-        self.logger.step(now, event, handled.step.clone());
+        self.journal.step(now, event, handled.step.clone());
         handled
     }
 
@@ -219,12 +202,10 @@ impl ControlThread<'_> {
 
     fn tick(&mut self, due: Stamp) {
         let handled = self.give(Event::Tick);
-        let is_speed = matches!(handled.step.command, Some(Command::Speed(_)));
-        let written = self.runner.robot_mut().written;
-        match (handled.sent, written) {
-            (Some(_), Some(written)) if is_speed => {
-                for latency in self.latencies.sent(due, written.at) {
-                    self.logger.latency(latency);
+        match (handled.robot, handled.step.command) {
+            (Some(Ok(sent)), Some(Command::Speed(_))) => {
+                for latency in self.latencies.sent(due, sent.at) {
+                    self.journal.latency(latency);
                 }
             }
             _ => self.latencies.forget(),
@@ -236,10 +217,6 @@ impl ControlThread<'_> {
 fn has_stopped(event: &RobotEvent) -> bool {
     let RobotEvent::State { state, .. } = event else { return false };
     matches!(state.mode, RobotMode::Stop | RobotMode::Idle | RobotMode::Fault)
-}
-
-fn duration(span: Span) -> Duration {
-    Duration::from_nanos(u64::try_from(span.ns()).unwrap_or(0))
 }
 
 /// The next time on the fixed grid; what was overslept is left out.

@@ -7,11 +7,10 @@ use std::thread::{Builder, JoinHandle};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 
+use super::journal::{FrameWithEdges, Journal};
 use super::latency::Latency;
 use crate::control::event::Event;
 use crate::control::step::Step;
-use crate::core::frame::Frame;
-use crate::core::geometry::ImagePoint;
 use crate::core::time::Stamp;
 use crate::rows::frame_row::FrameRow;
 use crate::rows::log::RunLog;
@@ -23,7 +22,7 @@ use crate::vision::Edges;
 const WAITING_PICTURES: usize = 16;
 
 enum Fact {
-    Frame { row: FrameRow, picture: Option<(Arc<Frame>, Vec<ImagePoint>, Vec<ImagePoint>)> },
+    Frame { row: FrameRow, picture: Option<FrameWithEdges> },
     Step { now: Stamp, event: Event, step: Step },
     Latency(Latency),
     Note(RunNote),
@@ -48,37 +47,8 @@ impl RunLogger {
         Ok(Self { facts, waiting, thread })
     }
 
-    /// A frame that was looked at, with its picture and edges.
-    pub fn frame(
-        &self,
-        row: &FrameRow,
-        picture: Option<(Arc<Frame>, Vec<ImagePoint>, Vec<ImagePoint>)>,
-    ) {
-        let room = self.waiting.load(Ordering::Relaxed) < WAITING_PICTURES;
-        let picture = picture.filter(|_| room);
-        if picture.is_some() {
-            self.waiting.fetch_add(1, Ordering::Relaxed);
-        }
-        self.tell(Fact::Frame { row: *row, picture });
-    }
-
-    /// An event and its answer.
-    pub fn step(&self, now: Stamp, event: Event, step: Step) {
-        self.tell(Fact::Step { now, event, step });
-    }
-
-    /// A frame's way to a setpoint.
-    pub fn latency(&self, latency: Latency) {
-        self.tell(Fact::Latency(latency));
-    }
-
-    /// Another fact.
-    pub fn note(&self, note: RunNote) {
-        self.tell(Fact::Note(note));
-    }
-
     /// A log that has failed keeps its error for the end.
-    fn tell(&self, fact: Fact) {
+    fn keep(&self, fact: Fact) {
         let _ = self.facts.send(fact);
     }
 
@@ -86,6 +56,29 @@ impl RunLogger {
     pub fn finish(self) -> Result<Summary, LogError> {
         drop(self.facts);
         self.thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    }
+}
+
+impl Journal for RunLogger {
+    fn frame(&self, row: &FrameRow, image: Option<FrameWithEdges>) {
+        let room = self.waiting.load(Ordering::Relaxed) < WAITING_PICTURES;
+        let picture = image.filter(|_| room);
+        if picture.is_some() {
+            self.waiting.fetch_add(1, Ordering::Relaxed);
+        }
+        self.keep(Fact::Frame { row: *row, picture });
+    }
+
+    fn step(&self, now: Stamp, event: Event, step: Step) {
+        self.keep(Fact::Step { now, event, step });
+    }
+
+    fn latency(&self, latency: Latency) {
+        self.keep(Fact::Latency(latency));
+    }
+
+    fn note(&self, note: RunNote) {
+        self.keep(Fact::Note(note));
     }
 }
 

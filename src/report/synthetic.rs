@@ -145,8 +145,8 @@ fn measured(frame: u64, width: f64) -> WidthMeasurement {
 
 fn robot(time: f64, path: f64) -> Event {
     Event::Robot(RobotState {
-        t_ms: 0,
-        seq: 0,
+        robot_time_ms: None,
+        has_setpoint: false,
         mode: RobotMode::Print,
         speed_mm_per_s: MmPerS::new(speed_at(time)).unwrap(),
         path_mm: Mm::new(path).unwrap(),

@@ -11,6 +11,7 @@ use crate::cell::file::RunPart;
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::frame::Frame;
+use crate::core::refusal::RefusalReason;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, Mm3PerS};
 use crate::extruder::{CommandQuantity, ExtruderStrategy};
@@ -100,7 +101,7 @@ pub struct RunLog {
     page: Box<dyn RunObserver>,
     remarks: Vec<String>,
     /// Reasons for which the extruder refused lines.
-    refused: Vec<String>,
+    refused: Vec<RefusalReason>,
 }
 
 impl RunLog {
@@ -145,17 +146,16 @@ impl RunLog {
             Event::CameraLost { reason } => {
                 self.remark(now, "the camera gives no more frames", reason);
             }
-            Event::Refused { seq, code } => {
-                self.remark(now, "the robot refused a line", &format!("number {seq}, {code}"));
+            Event::SetpointRefused { text, .. } => {
+                self.remark(now, "the robot refused a line", text);
             }
             Event::ExtruderDown { reason } => {
                 self.remark(now, "the link to the extruder was lost", reason);
             }
             // They come at the rate of the commands; the recording has them all.
-            Event::ExtruderRefused { seq, code } if !self.refused.contains(code) => {
-                self.refused.push(code.clone());
-                let why = format!("number {seq}, {code}");
-                self.remark(now, "the extruder refused a line, the first of its kind", &why);
+            Event::ExtruderRefused { reason, text } if !self.refused.contains(reason) => {
+                self.refused.push(*reason);
+                self.remark(now, "the extruder refused a line, the first of its kind", text);
             }
             _ => {}
         }

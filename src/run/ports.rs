@@ -4,8 +4,10 @@
 use crate::control::event::Event;
 use crate::control::step::{Command, Step};
 use crate::core::frame::Frame;
+use crate::core::refusal::RefusalReason;
+use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::time::Stamp;
-use crate::extruder::ExtruderCommand;
+use crate::extruder::{ExtruderCommand, ExtruderLimits, ExtruderReport};
 
 /// Gives frames, one after the other.
 pub trait FrameSource: Send {
@@ -53,35 +55,191 @@ pub struct SourceError {
     pub what: String,
 }
 
+/// What a device reports, with the time of arrival; `L` is what it can do, `S` what it does.
+#[derive(Debug, Clone, PartialEq)]
+pub enum DeviceEvent<L, S> {
+    /// The link came up, or came up again.
+    Up {
+        /// When.
+        at: Stamp,
+        /// What the device can do.
+        limits: L,
+    },
+    /// The device reported its state.
+    State {
+        /// When the report arrived.
+        at: Stamp,
+        /// The state.
+        state: S,
+    },
+    /// The device refused a command.
+    Refused {
+        /// When the refusal arrived.
+        at: Stamp,
+        /// Why.
+        reason: RefusalReason,
+        /// What was refused and why, in words for the operator.
+        text: String,
+    },
+    /// The link was lost, or could not be made. Reported again only when the reason changes.
+    Down {
+        /// When.
+        at: Stamp,
+        /// Why, in words for the operator.
+        reason: String,
+    },
+}
+
+/// What a robot reports.
+pub type RobotEvent = DeviceEvent<RobotLimits, RobotState>;
+/// What an extruder reports.
+pub type ExtruderEvent = DeviceEvent<ExtruderLimits, ExtruderReport>;
+
+impl From<RobotEvent> for Event {
+    fn from(event: RobotEvent) -> Self {
+        match event {
+            RobotEvent::Up { limits: robot, .. } => Self::LinkUp { robot },
+            RobotEvent::State { state, .. } => Self::Robot(state),
+            RobotEvent::Refused { reason, text, .. } => Self::SetpointRefused { reason, text },
+            RobotEvent::Down { reason, .. } => Self::LinkDown { reason },
+        }
+    }
+}
+
+impl From<ExtruderEvent> for Event {
+    fn from(event: ExtruderEvent) -> Self {
+        match event {
+            ExtruderEvent::Up { .. } => Self::ExtruderUp,
+            ExtruderEvent::State { state, .. } => Self::Extruder(state),
+            ExtruderEvent::Refused { reason, text, .. } => Self::ExtruderRefused { reason, text },
+            ExtruderEvent::Down { reason, .. } => Self::ExtruderDown { reason },
+        }
+    }
+}
+
+/// A command has left the PC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sent {
+    /// Just after its bytes were written.
+    pub at: Stamp,
+}
+
+/// Why a command has not left the PC. None of these ends a run: a link reports its own
+/// loss as a [`DeviceEvent`].
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SendError {
+    /// The link is down.
+    #[error("the {device} is not connected")]
+    NotConnected {
+        /// `robot` or `extruder`.
+        device: &'static str,
+    },
+    /// The device has not reported its state yet.
+    #[error("the {device} has not sent a STATE yet")]
+    NoState {
+        /// `robot` or `extruder`.
+        device: &'static str,
+    },
+    /// Setpoints are sent only to a robot that lays bead.
+    #[error("the robot is not printing: it says {mode:?}")]
+    NotPrinting {
+        /// Its last mode.
+        mode: RobotMode,
+    },
+    /// Outside the limits of the cell or of the device.
+    #[error("{value} {unit} is not within {min} to {max}")]
+    OutsideLimits {
+        /// What was to be sent.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// Smallest that is allowed.
+        min: f64,
+        /// Largest that is allowed.
+        max: f64,
+    },
+    /// The device is not the one that the cell was written for.
+    #[error("{0}")]
+    Unfit(String),
+    /// The device refused it at once.
+    #[error("the {device} refused it: {text}")]
+    Refused {
+        /// `robot` or `extruder`.
+        device: &'static str,
+        /// Why, in words for the operator.
+        text: String,
+    },
+    /// The bytes could not be written in time; the connection is given up.
+    #[error("writing to the {device} failed: {reason}")]
+    Write {
+        /// `robot` or `extruder`.
+        device: &'static str,
+        /// What the system says.
+        reason: String,
+    },
+}
+
 /// Takes commands to the robot.
-pub trait RobotPort {
-    /// Sends a command and returns its number on the link, or `None` where the
-    /// robot cannot take it now (no connection, or not printing); that is not
-    /// an error, because the link reports its own loss as an [`Event`].
-    fn send(&mut self, now: Stamp, command: Command) -> Option<u64>;
+pub trait RobotPort: Send {
+    /// Sends a command, or says why it cannot leave now.
+    fn send(&mut self, now: Stamp, command: Command) -> Result<Sent, SendError>;
+
+    /// Ends the link in order. The last setpoint expires at the robot.
+    fn close(&mut self) {}
 }
 
 /// Takes commands to the extruder.
-pub trait ExtruderPort {
-    /// Sends a command; false where the extruder cannot take it now, which is
-    /// not an error, because the link reports its own loss as an [`Event`].
-    fn send(&mut self, now: Stamp, command: ExtruderCommand) -> bool;
+pub trait ExtruderPort: Send {
+    /// Sends a command, or says why it cannot leave now.
+    fn send(&mut self, now: Stamp, command: ExtruderCommand) -> Result<Sent, SendError>;
+
+    /// Ends the link in order. The last command expires at the extruder.
+    fn close(&mut self) {}
 }
 
-/// The extruder of a cell whose extruder goes its own way.
+/// The extruder of a cell whose extruder is not commanded.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NoExtruder;
 
 impl ExtruderPort for NoExtruder {
-    fn send(&mut self, _: Stamp, _: ExtruderCommand) -> bool {
-        false
+    fn send(&mut self, _: Stamp, _: ExtruderCommand) -> Result<Sent, SendError> {
+        Err(SendError::NotConnected { device: "extruder" })
     }
 }
 
 /// An extruder or none, where a cell may have one.
 impl<X: ExtruderPort> ExtruderPort for Option<X> {
-    fn send(&mut self, now: Stamp, command: ExtruderCommand) -> bool {
-        self.as_mut().is_some_and(|extruder| extruder.send(now, command))
+    fn send(&mut self, now: Stamp, command: ExtruderCommand) -> Result<Sent, SendError> {
+        match self {
+            Some(extruder) => extruder.send(now, command),
+            None => NoExtruder.send(now, command),
+        }
+    }
+
+    fn close(&mut self) {
+        if let Some(extruder) = self {
+            extruder.close();
+        }
+    }
+}
+
+impl RobotPort for Box<dyn RobotPort> {
+    fn send(&mut self, now: Stamp, command: Command) -> Result<Sent, SendError> {
+        self.as_mut().send(now, command)
+    }
+
+    fn close(&mut self) {
+        self.as_mut().close();
+    }
+}
+
+impl ExtruderPort for Box<dyn ExtruderPort> {
+    fn send(&mut self, now: Stamp, command: ExtruderCommand) -> Result<Sent, SendError> {
+        self.as_mut().send(now, command)
+    }
+
+    fn close(&mut self) {
+        self.as_mut().close();
     }
 }
 

@@ -1,7 +1,7 @@
 //! Drives a controller and what it is plugged into: every event goes through
 //! here, whether the cell is live or simulated.
 
-use super::ports::{ExtruderPort, NoExtruder, RecordError, Recorder, RobotPort};
+use super::ports::{ExtruderPort, NoExtruder, RecordError, Recorder, RobotPort, SendError, Sent};
 use crate::control::Controller;
 use crate::control::event::Event;
 use crate::control::step::Step;
@@ -22,8 +22,10 @@ pub struct Runner<R, K, X = NoExtruder> {
 pub struct Handled {
     /// The controller's answer.
     pub step: Step,
-    /// Number of the line that was sent to the robot, if one was.
-    pub sent: Option<u64>,
+    /// What became of the command to the robot, if there was one.
+    pub robot: Option<Result<Sent, SendError>>,
+    /// What became of the command to the extruder, if there was one.
+    pub extruder: Option<Result<Sent, SendError>>,
 }
 
 impl<R: RobotPort, K: Recorder> Runner<R, K> {
@@ -46,16 +48,15 @@ impl<R: RobotPort, K: Recorder, X: ExtruderPort> Runner<R, K, X> {
     /// cannot be recorded ends control in hold.
     pub fn handle(&mut self, now: Stamp, event: &Event) -> Handled {
         let step = self.controller.step(now, event);
-        if let Some(command) = step.extruder.and_then(|extruder| extruder.command) {
-            let _ = self.extruder.send(now, command);
-        }
-        let sent = step.command.and_then(|command| self.robot.send(now, command));
+        let command = step.extruder.and_then(|extruder| extruder.command);
+        let extruder = command.map(|command| self.extruder.send(now, command));
+        let robot = step.command.map(|command| self.robot.send(now, command));
         if self.failure.is_none()
             && let Err(error) = self.recorder.record(now, event, &step)
         {
             self.lose_recording(now, error);
         }
-        Handled { step, sent }
+        Handled { step, robot, extruder }
     }
 
     /// Tells the controller that the recording is lost.
@@ -105,8 +106,8 @@ mod tests {
     struct NoRobot;
 
     impl RobotPort for NoRobot {
-        fn send(&mut self, _: Stamp, _: Command) -> Option<u64> {
-            None
+        fn send(&mut self, _: Stamp, _: Command) -> Result<Sent, SendError> {
+            Err(SendError::NotConnected { device: "robot" })
         }
     }
 

@@ -239,8 +239,8 @@ impl<K: Recorder> SimCell<K> {
                 }
                 ClockEvent::Tick => {
                     let handled = self.tell(&Event::Tick, witness);
-                    if let (Some(_), Some(Command::Speed(speed))) =
-                        (handled.sent, handled.step.command)
+                    if let (Some(Ok(_)), Some(Command::Speed(speed))) =
+                        (handled.robot, handled.step.command)
                     {
                         self.setpoint = Some(speed);
                     }

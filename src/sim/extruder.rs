@@ -6,7 +6,7 @@ use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm3PerS;
 use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
 use crate::numeric::lti::ModelError;
-use crate::run::ports::ExtruderPort;
+use crate::run::ports::{ExtruderPort, SendError, Sent};
 
 mod filled;
 mod linear;
@@ -132,7 +132,7 @@ impl SimExtruder {
 }
 
 impl ExtruderPort for SimExtruder {
-    fn send(&mut self, now: Stamp, command: ExtruderCommand) -> bool {
+    fn send(&mut self, now: Stamp, command: ExtruderCommand) -> Result<Sent, SendError> {
         self.advance(now);
         let pump_delay = if command.pump_on { self.delays.start } else { self.delays.stop };
         self.pump.tell(now, command.pump_on, pump_delay);
@@ -144,7 +144,7 @@ impl ExtruderPort for SimExtruder {
         // What needs no time is done at once.
         self.pump.advance(now);
         self.valve.advance(now);
-        true
+        Ok(Sent { at: now })
     }
 }
 
@@ -181,14 +181,14 @@ mod tests {
     fn pump_and_valve_take_their_time() {
         let mut extruder = extruder();
         let on = ExtruderCommand { pump_on: true, valve_open: true, value: 5.0 };
-        assert!(extruder.send(Stamp::START, on));
+        assert!(extruder.send(Stamp::START, on).is_ok());
         assert_eq!(extruder.report().pump, PumpMode::Starting);
         assert_eq!(flow_at(&mut extruder, 0.29), 0.0);
         assert!(extruder.report().valve_open);
         assert_eq!(flow_at(&mut extruder, 0.302), 50.0);
         assert_eq!(extruder.report().pump, PumpMode::On);
         let off = ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 };
-        assert!(extruder.send(Stamp::from_secs(1.0), off));
+        assert!(extruder.send(Stamp::from_secs(1.0), off).is_ok());
         assert_eq!(extruder.report().pump, PumpMode::Stopping);
         assert_eq!(flow_at(&mut extruder, 1.06), 0.0);
         assert_eq!(extruder.report().pump, PumpMode::Stopping);
@@ -200,10 +200,10 @@ mod tests {
     fn material_flows_until_a_pump_has_stopped() {
         let mut extruder = extruder();
         let on = ExtruderCommand { pump_on: true, valve_open: true, value: 5.0 };
-        assert!(extruder.send(Stamp::START, on));
+        assert!(extruder.send(Stamp::START, on).is_ok());
         extruder.advance(Stamp::from_secs(1.0));
         let off = ExtruderCommand { pump_on: false, value: 0.0, ..on };
-        assert!(extruder.send(Stamp::from_secs(1.0), off));
+        assert!(extruder.send(Stamp::from_secs(1.0), off).is_ok());
         assert_eq!(flow_at(&mut extruder, 1.19), 50.0);
         assert_eq!(flow_at(&mut extruder, 1.202), 0.0);
     }

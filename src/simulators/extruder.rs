@@ -8,9 +8,10 @@ use std::sync::Arc;
 use super::machine::Notice;
 use super::server::Server;
 use crate::core::time::Span;
+use crate::extruder::ExtruderLimits;
 use crate::extruder::{ExtruderCommand, PumpMode};
 use crate::io::clock::RunClock;
-use crate::link::extruder::{ExtruderEndpoint, ExtruderFaults, ExtruderHello};
+use crate::link::extruder::{ExtruderEndpoint, ExtruderFaults};
 use crate::sim::extruder::SimExtruder;
 
 mod machine;
@@ -23,7 +24,7 @@ use shared::{GatedPlant, SharedExtruder};
 #[derive(Debug)]
 pub struct ExtruderOptions {
     /// What it says of itself.
-    pub hello: ExtruderHello,
+    pub hello: ExtruderLimits,
     /// What answers commands.
     pub plant: SimExtruder,
     /// Time between two `STATE` lines, 5 to 200 ms on an extruder that keeps

@@ -6,10 +6,11 @@ use std::sync::Arc;
 
 use super::machine::Notice;
 use super::server::Server;
-use crate::core::robot::{RobotMode, RobotState};
+use crate::core::robot::RobotMode;
 use crate::core::time::Span;
 use crate::core::units::Mm;
 use crate::io::clock::RunClock;
+use crate::link::RobotStatus;
 use crate::link::{ParamError, PrintJob, RobotFaults, RobotParams, VirtualRobot};
 
 mod machine;
@@ -78,7 +79,7 @@ impl RobotSim {
     }
 
     /// Its true state now.
-    pub fn state(&self) -> RobotState {
+    pub fn state(&self) -> RobotStatus {
         self.shared.cell().state(self.shared.clock.now())
     }
 

@@ -149,7 +149,7 @@ fn reports_under_setpoints(states: &[(Stamp, RobotState)], from_s: f64) -> Vec<R
     let mut before: Option<(Stamp, f64)> = None;
     for (at, state) in states {
         let path = state.path_mm.get();
-        if state.mode != RobotMode::Print || state.seq == 0 || at.secs() < from_s {
+        if state.mode != RobotMode::Print || !state.has_setpoint || at.secs() < from_s {
             before = None;
             continue;
         }

@@ -233,8 +233,8 @@ fn ramped(dead_s: f64, lag_s: f64, slope: f64, noise: f64) -> Log {
             let key = crate::sim::hash::mix(&[9, u64::from(tick)]);
             let seen = speed + noise * crate::sim::hash::normal_pair(key)[0];
             let state = RobotState {
-                t_ms: 0,
-                seq: 1,
+                robot_time_ms: None,
+                has_setpoint: true,
                 mode: RobotMode::Print,
                 speed_mm_per_s: MmPerS::constant(seen),
                 path_mm: Mm::constant(path),

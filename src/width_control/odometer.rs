@@ -63,8 +63,8 @@ mod tests {
 
     fn report(path: f64, mode: RobotMode) -> RobotState {
         RobotState {
-            t_ms: 0,
-            seq: 1,
+            robot_time_ms: None,
+            has_setpoint: true,
             mode,
             speed_mm_per_s: MmPerS::constant(100.0),
             path_mm: Mm::constant(path),

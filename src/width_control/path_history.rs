@@ -70,8 +70,8 @@ mod tests {
 
     fn report(path: f64, speed: f64) -> RobotState {
         RobotState {
-            t_ms: 0,
-            seq: 0,
+            robot_time_ms: None,
+            has_setpoint: false,
             mode: RobotMode::Print,
             speed_mm_per_s: MmPerS::constant(speed),
             path_mm: Mm::constant(path),

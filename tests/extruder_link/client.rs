@@ -6,19 +6,22 @@ use std::time::Duration;
 use crossbeam_channel::{Receiver, unbounded};
 use truebead::cell::extruder::LinearPlant;
 use truebead::core::time::Span;
-use truebead::drivers::extruder::{ExtruderClient, ExtruderConfig, ExtruderEvent, ExtruderNotSent};
+use truebead::drivers::extruder::CommandRange;
+use truebead::drivers::extruder::line::{ExtruderClient, ExtruderConfig, LineEvent};
 use truebead::drivers::line::LinkTiming;
-use truebead::extruder::{CommandQuantity, ExtruderCommand, PumpMode};
+use truebead::extruder::{CommandQuantity, ExtruderCommand, ExtruderLimits, PumpMode};
 use truebead::io::clock::RunClock;
 use truebead::link::ErrCode;
-use truebead::link::extruder::{ExtruderFaults, ExtruderHello, ExtruderStatus};
+use truebead::link::extruder::{ExtruderFaults, ExtruderStatus, on_wire};
 use truebead::numeric::lti::TransferFunction;
+use truebead::run::ports::SendError;
 use truebead::sim::extruder::{Delays, LinearPlantSim, SimExtruder};
 use truebead::simulators::extruder::{ExtruderOptions, ExtruderSim};
 
 /// What should happen does so long before; only a failure waits for it.
 const PATIENCE: Duration = Duration::from_secs(20);
 const RUN: ExtruderCommand = ExtruderCommand { pump_on: true, valve_open: true, value: 60.0 };
+const RANGE: CommandRange = CommandRange { quantity: CommandQuantity::Rpm, min: 0.0, max: 90.0 };
 const OFF: ExtruderCommand = ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 };
 
 fn sim_on(listener: TcpListener) -> ExtruderSim {
@@ -33,9 +36,9 @@ fn sim_on(listener: TcpListener) -> ExtruderSim {
     };
     let plant = LinearPlantSim::new(&plant, 1).unwrap();
     let options = ExtruderOptions {
-        hello: ExtruderHello {
+        hello: ExtruderLimits {
             name: "sim".into(),
-            drive: CommandQuantity::Rpm,
+            quantity: CommandQuantity::Rpm,
             min: 0.0,
             max: 90.0,
         },
@@ -54,9 +57,7 @@ fn sim() -> ExtruderSim {
 fn config(address: SocketAddr) -> ExtruderConfig {
     ExtruderConfig {
         address: address.to_string(),
-        drive: CommandQuantity::Rpm,
-        min: 0.0,
-        max: 90.0,
+        range: RANGE,
         valid_ms: 1000,
         timing: LinkTiming {
             hello: Duration::from_secs(5),
@@ -69,17 +70,18 @@ fn config(address: SocketAddr) -> ExtruderConfig {
 
 struct Pc {
     link: ExtruderClient,
-    events: Receiver<ExtruderEvent>,
+    events: Receiver<LineEvent>,
 }
 
 impl Pc {
     fn start(config: ExtruderConfig) -> Self {
         let (sender, events) = unbounded();
-        let link = ExtruderClient::start(config, RunClock::start(), sender).unwrap();
+        let report = move |event| sender.send(event).is_ok();
+        let link = ExtruderClient::start(config, RunClock::start(), report).unwrap();
         Self { link, events }
     }
 
-    fn until<T>(&self, wanted: impl Fn(ExtruderEvent) -> Option<T>) -> T {
+    fn until<T>(&self, wanted: impl Fn(LineEvent) -> Option<T>) -> T {
         loop {
             if let Some(found) = wanted(self.events.recv_timeout(PATIENCE).unwrap()) {
                 return found;
@@ -89,21 +91,21 @@ impl Pc {
 
     fn until_state(&self, wanted: impl Fn(&ExtruderStatus) -> bool) -> ExtruderStatus {
         self.until(|event| match event {
-            ExtruderEvent::State { state, .. } if wanted(&state) => Some(state),
+            LineEvent::State { state, .. } if wanted(&state) => Some(state),
             _ => None,
         })
     }
 
     fn until_down(&self) -> String {
         self.until(|event| match event {
-            ExtruderEvent::Down { reason, .. } => Some(reason),
+            LineEvent::Down { reason, .. } => Some(reason),
             _ => None,
         })
     }
 
-    fn until_up(&self) -> ExtruderHello {
+    fn until_up(&self) -> ExtruderLimits {
         self.until(|event| match event {
-            ExtruderEvent::Up { hello, .. } => Some(hello),
+            LineEvent::Up { hello, .. } => Some(hello),
             _ => None,
         })
     }
@@ -114,7 +116,7 @@ fn commands_turn_the_pump_and_run_out_with_pump_and_valve_at_rest() {
     let sim = sim();
     let pc = Pc::start(ExtruderConfig { valid_ms: 200, ..config(sim.local_addr()) });
     let hello = pc.until_up();
-    assert_eq!((hello.drive, hello.min, hello.max), (CommandQuantity::Rpm, 0.0, 90.0));
+    assert_eq!((hello.quantity, hello.min, hello.max), (CommandQuantity::Rpm, 0.0, 90.0));
     let mut seq = 0;
     // A machine that is busy may need more than one before one is in time.
     let flowing = loop {
@@ -143,7 +145,7 @@ fn an_extruder_that_vanishes_is_found_again_and_counts_from_one() {
     pc.until_state(|state| state.seq == 1);
     sim.stop();
     pc.until_down();
-    assert_eq!(pc.link.send(RUN).unwrap_err(), ExtruderNotSent::NotConnected);
+    assert_eq!(pc.link.send(RUN).unwrap_err(), SendError::NotConnected { device: "extruder" });
     assert!(pc.until_down().contains(&format!("no extruder at {address}")));
     let sim = sim_on(TcpListener::bind(address).unwrap());
     pc.until_up();
@@ -178,7 +180,7 @@ fn a_failed_pump_is_reported_and_no_command_makes_it_run() {
     pc.until_state(|state| state.report.pump == PumpMode::Fault);
     pc.link.send(RUN).unwrap();
     let code = pc.until(|event| match event {
-        ExtruderEvent::Refused { code, .. } => Some(code),
+        LineEvent::Refused { code, .. } => Some(code),
         _ => None,
     });
     assert_eq!(code, ErrCode::Mode);
@@ -189,15 +191,27 @@ fn a_failed_pump_is_reported_and_no_command_makes_it_run() {
 fn nothing_leaves_for_an_extruder_that_does_not_fit_the_cell() {
     let sim = sim();
     for (config, told) in [
-        (ExtruderConfig { max: 120.0, ..config(sim.local_addr()) }, "takes 0 to 90 rpm"),
-        (ExtruderConfig { drive: CommandQuantity::Flow, ..config(sim.local_addr()) }, "mm3_per_s"),
+        (
+            ExtruderConfig {
+                range: CommandRange { max: 120.0, ..RANGE },
+                ..config(sim.local_addr())
+            },
+            "takes 0 to 90 rpm",
+        ),
+        (
+            ExtruderConfig {
+                range: CommandRange { quantity: CommandQuantity::Flow, ..RANGE },
+                ..config(sim.local_addr())
+            },
+            "mm3_per_s",
+        ),
     ] {
         let pc = Pc::start(config.clone());
         let hello = pc.until_up();
-        assert!(config.unfit(&hello).unwrap().contains(told));
+        assert!(config.range.unfit(&hello, on_wire).unwrap().contains(told));
         pc.until_state(|_| true);
         let refused = pc.link.send(OFF).unwrap_err();
-        assert!(matches!(&refused, ExtruderNotSent::Unfit(why) if why.contains(told)), "{refused}");
+        assert!(matches!(&refused, SendError::Unfit(why) if why.contains(told)), "{refused}");
     }
     let pc = Pc::start(config(sim.local_addr()));
     pc.until_state(|_| true);

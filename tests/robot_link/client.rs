@@ -5,12 +5,12 @@ use std::time::Duration;
 use truebead::control::step::Command;
 use truebead::core::robot::RobotMode;
 use truebead::core::time::Stamp;
-use truebead::drivers::robot::{
-    LinkClient, LinkConfig, LinkConfigError, LinkTiming, NotSent, RobotEvent,
-};
+use truebead::drivers::StartError;
+use truebead::drivers::line::LinkTiming;
+use truebead::drivers::robot::line::{LineEvent, LinkClient, LinkConfig};
 use truebead::io::clock::RunClock;
 use truebead::link::{ErrCode, RobotFaults};
-use truebead::run::ports::RobotPort;
+use truebead::run::ports::{RobotPort, SendError, Sent};
 
 use crate::support::{Pc, Talk, config, listener, sim, sim_on, speed};
 
@@ -21,7 +21,7 @@ fn hello_then_a_stream_of_setpoints() {
     let sim = sim();
     let mut pc = Pc::start(config(sim.local_addr()));
     let robot = pc.until(|event| match event {
-        RobotEvent::Up { hello: robot, .. } => Some(robot.clone()),
+        LineEvent::Up { hello: robot, .. } => Some(robot.clone()),
         _ => None,
     });
     assert_eq!((robot.min_mm_per_s, robot.max_mm_per_s), (speed(60.0), speed(150.0)));
@@ -36,8 +36,8 @@ fn hello_then_a_stream_of_setpoints() {
     }
     let state = pc.until_state(|state| state.seq == 5);
     assert_eq!(state.mode, RobotMode::Print);
-    let seq = RobotPort::send(&mut pc.link, Stamp::START, Command::Speed(speed(90.0)));
-    assert_eq!(seq, Some(6));
+    let sent = RobotPort::send(&mut pc.link, Stamp::START, Command::Speed(speed(90.0)));
+    assert!(matches!(sent, Ok(Sent { at }) if at > before));
     pc.until_state(|state| (state.speed_mm_per_s.get() - 90.0).abs() < 0.1);
     let path = sim.history().windows(2).all(|pair| pair[0].state.path_mm <= pair[1].state.path_mm);
     assert!(path);
@@ -62,7 +62,7 @@ fn setpoints_that_end_lead_to_hold_and_then_to_stop() {
     pc.until_mode(RobotMode::Stop);
     pc.until_state(|state| state.speed_mm_per_s.get() < 0.1);
     let refused = pc.link.send(Command::Speed(speed(100.0))).unwrap_err();
-    assert_eq!(refused, NotSent::NotPrinting { mode: RobotMode::Stop });
+    assert_eq!(refused, SendError::NotPrinting { mode: RobotMode::Stop });
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn a_stop_leaves_in_any_mode() {
     let pc = Pc::start(config(sim.local_addr()));
     assert_eq!(pc.until_state(|_| true).mode, RobotMode::Idle);
     let refused = pc.link.send(Command::Speed(speed(100.0))).unwrap_err();
-    assert_eq!(refused, NotSent::NotPrinting { mode: RobotMode::Idle });
+    assert_eq!(refused, SendError::NotPrinting { mode: RobotMode::Idle });
     assert_eq!(pc.link.send(Command::Stop).unwrap().seq, 1);
     pc.until_state(|state| state.seq == 1);
     assert!(sim.begin_bead(truebead::core::units::Mm::ZERO));
@@ -99,7 +99,10 @@ fn a_robot_that_vanishes_is_found_again() {
     pc.until_state(|state| state.seq == 1);
     sim.stop();
     pc.until_down();
-    assert_eq!(pc.link.send(Command::Stop).unwrap_err(), NotSent::NotConnected);
+    assert_eq!(
+        pc.link.send(Command::Stop).unwrap_err(),
+        SendError::NotConnected { device: "robot" }
+    );
     assert!(pc.until_down().contains(&format!("no robot at {address}")));
     let sim = sim_on(std::net::TcpListener::bind(address).unwrap(), 1);
     pc.until_up();
@@ -152,15 +155,18 @@ fn a_robot_of_another_version_is_not_taken() {
 fn what_lies_outside_the_limits_never_leaves_the_pc() {
     let listener = listener();
     let min = speed(70.0);
-    let pc = Pc::start(LinkConfig { min, ..config(listener.local_addr().unwrap()) });
+    let mut pc = Pc::start(LinkConfig { min, ..config(listener.local_addr().unwrap()) });
     let mut robot = Talk::answer(&listener, HELLO);
     pc.until_up();
-    assert_eq!(pc.link.send(Command::Speed(speed(100.0))).unwrap_err(), NotSent::NoState);
+    assert_eq!(
+        pc.link.send(Command::Speed(speed(100.0))).unwrap_err(),
+        SendError::NoState { device: "robot" }
+    );
     robot.say("STATE 4711 0 PRINT 112.5 0 0\n");
     pc.until_mode(RobotMode::Print);
     for value in [69.9, 130.1, 0.0, -100.0, f64::MAX] {
         let refused = pc.link.send(Command::Speed(speed(value))).unwrap_err();
-        assert!(matches!(refused, NotSent::OutsideLimits { .. }), "{value}: {refused}");
+        assert!(matches!(refused, SendError::OutsideLimits { .. }), "{value}: {refused}");
     }
     pc.link.send(Command::Speed(speed(130.0))).unwrap();
     pc.link.send(Command::Speed(speed(70.0))).unwrap();
@@ -179,7 +185,7 @@ fn a_refusal_is_reported() {
     sim.set_faults(RobotFaults { refuse: Some(ErrCode::Range), ..RobotFaults::default() });
     pc.link.send(Command::Speed(speed(100.0))).unwrap();
     let refused = pc.until(|event| match event {
-        RobotEvent::Refused { seq, code, .. } => Some((*seq, *code)),
+        LineEvent::Refused { seq, code, .. } => Some((*seq, *code)),
         _ => None,
     });
     assert_eq!(refused, (1, ErrCode::Range));
@@ -197,15 +203,24 @@ fn a_robot_that_takes_no_bytes_does_not_hold_the_pc_up() {
             break why;
         }
     };
-    assert_eq!(failed, NotSent::Write { reason: "the robot does not take any bytes".to_owned() });
-    assert_eq!(pc.link.send(Command::Stop).unwrap_err(), NotSent::NotConnected);
+    assert_eq!(
+        failed,
+        SendError::Write {
+            device: "robot",
+            reason: "the robot does not take any bytes".to_owned()
+        }
+    );
+    assert_eq!(
+        pc.link.send(Command::Stop).unwrap_err(),
+        SendError::NotConnected { device: "robot" }
+    );
     assert_eq!(pc.until_down(), failed.to_string());
 }
 
 #[test]
 fn a_client_ends_while_nobody_answers() {
     let address = listener().local_addr().unwrap();
-    let pc = Pc::start(config(address));
+    let mut pc = Pc::start(config(address));
     assert!(pc.until_down().starts_with("no robot at 127.0.0.1"));
     pc.link.close();
     assert!(pc.events.try_iter().count() <= 1, "one reason is told once");
@@ -213,13 +228,10 @@ fn a_client_ends_while_nobody_answers() {
 
 #[test]
 fn a_configuration_that_cannot_work_is_refused() {
-    let start = |config| {
-        let (sender, _events) = crossbeam_channel::unbounded();
-        LinkClient::start(config, RunClock::start(), sender).unwrap_err()
-    };
+    let start = |config| LinkClient::start(config, RunClock::start(), |_| true).unwrap_err();
     let good = config(([127, 0, 0, 1], 1).into());
     let found = start(LinkConfig { valid_ms: 50, ..good.clone() });
-    assert_eq!(found, LinkConfigError::Valid { found: 50 });
+    assert_eq!(found, StartError::Valid { found: 50 });
     let found = start(LinkConfig { min: speed(200.0), ..good });
-    assert!(matches!(found, LinkConfigError::Limits { .. }));
+    assert!(matches!(found, StartError::Limits { .. }));
 }

@@ -5,12 +5,13 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, unbounded};
-use truebead::core::robot::{RobotMode, RobotState};
+use truebead::core::robot::RobotMode;
 use truebead::core::time::Span;
 use truebead::core::units::{Mm, MmPerS};
-use truebead::drivers::robot::{LinkClient, LinkConfig, LinkTiming, RobotEvent};
+use truebead::drivers::line::LinkTiming;
+use truebead::drivers::robot::line::{LineEvent, LinkClient, LinkConfig};
 use truebead::io::clock::RunClock;
-use truebead::link::{PrintJob, RobotParams};
+use truebead::link::{PrintJob, RobotParams, RobotStatus};
 use truebead::simulators::robot::{RobotOptions, RobotSim};
 
 /// What should happen does so long before; only a failure waits for it.
@@ -57,18 +58,19 @@ pub fn config(address: SocketAddr) -> LinkConfig {
 /// A client and what it reports.
 pub struct Pc {
     pub link: LinkClient,
-    pub events: Receiver<RobotEvent>,
+    pub events: Receiver<LineEvent>,
 }
 
 impl Pc {
     pub fn start(config: LinkConfig) -> Self {
         let (sender, events) = unbounded();
-        let link = LinkClient::start(config, RunClock::start(), sender).unwrap();
+        let report = move |event| sender.send(event).is_ok();
+        let link = LinkClient::start(config, RunClock::start(), report).unwrap();
         Self { link, events }
     }
 
     /// The first event from now on that is wanted.
-    pub fn until<T>(&self, wanted: impl Fn(&RobotEvent) -> Option<T>) -> T {
+    pub fn until<T>(&self, wanted: impl Fn(&LineEvent) -> Option<T>) -> T {
         loop {
             let event = self.events.recv_timeout(PATIENCE).expect("the event never came");
             if let Some(found) = wanted(&event) {
@@ -78,24 +80,24 @@ impl Pc {
     }
 
     pub fn until_up(&self) {
-        self.until(|event| matches!(event, RobotEvent::Up { .. }).then_some(()));
+        self.until(|event| matches!(event, LineEvent::Up { .. }).then_some(()));
     }
 
     pub fn until_down(&self) -> String {
         self.until(|event| match event {
-            RobotEvent::Down { reason, .. } => Some(reason.clone()),
+            LineEvent::Down { reason, .. } => Some(reason.clone()),
             _ => None,
         })
     }
 
-    pub fn until_state(&self, wanted: impl Fn(&RobotState) -> bool) -> RobotState {
+    pub fn until_state(&self, wanted: impl Fn(&RobotStatus) -> bool) -> RobotStatus {
         self.until(|event| match event {
-            RobotEvent::State { state, .. } if wanted(state) => Some(*state),
+            LineEvent::State { state, .. } if wanted(state) => Some(*state),
             _ => None,
         })
     }
 
-    pub fn until_mode(&self, mode: RobotMode) -> RobotState {
+    pub fn until_mode(&self, mode: RobotMode) -> RobotStatus {
         self.until_state(|state| state.mode == mode)
     }
 }

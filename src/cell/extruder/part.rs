@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use super::{ExtruderPlant, ExtruderSettings, PlantKind, Strategy};
+use crate::cell::drivers::DriverTables;
 use crate::core::units::{Mm, Mm3PerS, MmPerS};
 use crate::document::Table;
 use crate::extruder::strategy::RequiredReading;
@@ -37,8 +38,6 @@ pub struct BeadStart {
 pub struct CellContext<'a> {
     /// The bead.
     pub bead: Option<BeadStart>,
-    /// Host and port of the robot.
-    pub robot_address: Option<&'a str>,
     /// The simulated bead.
     pub simulation: Option<&'a Simulation>,
 }
@@ -46,7 +45,12 @@ pub struct CellContext<'a> {
 impl ExtruderPart {
     /// Reads both tables for what stands beside them; none where the extruder
     /// goes its own way, and where a violation was reported.
-    pub fn read(root: &Table<'_>, folder: &Path, context: &CellContext<'_>) -> Option<Self> {
+    pub fn read(
+        root: &Table<'_>,
+        folder: &Path,
+        context: &CellContext<'_>,
+        drivers: &mut dyn DriverTables,
+    ) -> Option<Self> {
         let plant_table = root.optional_run_table("extruder_plant");
         let plant = plant_table.as_ref().and_then(ExtruderPlant::read);
         let Some(table) = root.optional_run_table("extruder") else {
@@ -59,15 +63,10 @@ impl ExtruderPart {
             }
             return None;
         };
+        drivers.read_extruder(&table, folder);
         let extruder = ExtruderSettings::read(&table, folder)?;
         if let (Some(plant), Some(plant_table)) = (&plant, &plant_table) {
             check_plant(&extruder, &table, &plant.kind, plant_table);
-        }
-        if let Some(link) = &extruder.link
-            && context.robot_address == Some(&link.address)
-        {
-            let expected = "another than robot.address: each has a controller of its own";
-            table.report("address", format!("\"{}\"", link.address), expected);
         }
         let BeadStart { width, speed } = context.bead?;
         let demand = extruder.demand(&table, width, speed)?;

@@ -1,4 +1,4 @@
-//! `[robot]`: how a live run reaches the robot, and how a bead begins.
+//! `[robot]`: how often the robot gets setpoints, and how a bead begins.
 
 use crate::core::units::{Mm, MmPerS};
 use crate::document::Table;
@@ -7,8 +7,6 @@ use crate::width_control::limiter::SpeedLimits;
 /// The robot of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotSettings {
-    /// Host and port of the robot controller.
-    pub address: String,
     /// Setpoints a second.
     pub rate_hz: f64,
     /// Speed of the first stretch.
@@ -22,16 +20,11 @@ pub struct RobotSettings {
 }
 
 pub(super) fn read_robot(table: &Table<'_>, limits: Option<SpeedLimits>) -> Option<RobotSettings> {
-    let driver = table.required_choice("driver", &[("line", ())]);
-    let address = table.text("address");
     let rate_hz = table.number("rate_hz", 0.5..=1000.0);
     let start_speed = table.number("start_speed_mm_per_s", 0.0..=10_000.0);
     let start_length = table.number("start_length_mm", 0.0..=1e6);
     let bead_length = table.optional_number("bead_length_mm", 1e-3..=1e9);
     let valid_ms = table.integer_or("valid_ms", 100..=1000, 600);
-    if address.is_some_and(|address| !address.contains(':')) {
-        table.report("address", format!("\"{}\"", address.unwrap_or_default()), "host:port");
-    }
     if let (Some(rate_hz), Some(valid_ms)) = (rate_hz, valid_ms)
         && u32::try_from(valid_ms).is_ok_and(|ms| f64::from(ms) < 1.5e3 / rate_hz)
     {
@@ -46,9 +39,7 @@ pub(super) fn read_robot(table: &Table<'_>, limits: Option<SpeedLimits>) -> Opti
             format!("a speed within [limits], {} to {}", limits.min_speed, limits.max_speed);
         table.report("start_speed_mm_per_s", speed.to_string(), expected);
     }
-    driver?;
     Some(RobotSettings {
-        address: address?.to_string(),
         rate_hz: rate_hz?,
         start_speed: MmPerS::new(start_speed?).ok()?,
         start_length: Mm::new(start_length?).ok()?,

@@ -13,8 +13,8 @@ use crate::assembly::LoadedCell;
 use crate::cell::file::{ExtruderPart, Purpose};
 use crate::cli::arguments::WrongArguments;
 use crate::core::time::{Span, Stamp};
+use crate::extruder::ExtruderLimits;
 use crate::io::clock::RunClock;
-use crate::link::extruder::ExtruderHello;
 use crate::simulators::extruder::{ExtruderOptions, ExtruderSim};
 
 /// Times between two STATE lines that an extruder may have [s].
@@ -92,9 +92,9 @@ fn options(args: &ExtruderSimArgs, loaded: &LoadedCell) -> anyhow::Result<Extrud
     })
 }
 
-fn hello(args: &ExtruderSimArgs, part: &ExtruderPart) -> ExtruderHello {
+fn hello(args: &ExtruderSimArgs, part: &ExtruderPart) -> ExtruderLimits {
     let (min, max) = part.extruder.limits.range();
-    ExtruderHello { name: args.name.clone(), drive: part.extruder.drive, min, max }
+    ExtruderLimits { name: args.name.clone(), quantity: part.extruder.drive, min, max }
 }
 
 fn state_period(part: &ExtruderPart) -> Span {

@@ -8,14 +8,18 @@ use super::fault;
 use super::folder::Folder;
 use super::live::{Live, Patience};
 use super::mcap::{McapSource, RobotZ};
+use super::rendered::{RenderedCamera, RobotView};
 use super::snapshot::{Snapshot, SnapshotSettings};
 use super::video::VideoFile;
 use crate::bridge::VideoInput;
+use crate::calibration::Calibration;
+use crate::cell::Cell;
 use crate::cell::file::{CameraSettings, ImageSource};
 use crate::core::frame::Channel;
 use crate::core::time::Span;
 use crate::io::clock::RunClock;
 use crate::run::ports::{FrameSource, Grab, SourceError};
+use crate::sim::render::{RenderError, Renderer};
 
 /// Failures in a row after which a live source counts as lost.
 const ATTEMPTS: u32 = 5;
@@ -128,6 +132,53 @@ pub fn live(
         ImageSource::Rendered => {
             Err(fault(camera.name, "the rendered camera is opened with its bead"))
         }
+    }
+}
+
+/// A camera that cannot be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// The source gives nothing.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// The bead cannot be rendered with this cell.
+    #[error("the simulated bead cannot be rendered: {0}")]
+    Render(#[from] RenderError),
+}
+
+/// The camera of a cell that runs, of whatever kind.
+#[derive(Debug, Clone, Copy)]
+pub struct CellCamera<'a> {
+    /// The cell.
+    pub cell: &'a Cell,
+    /// Its camera.
+    pub camera: &'a CameraSettings,
+    /// What a pixel means in it.
+    pub calibration: &'a Calibration,
+}
+
+impl CellCamera<'_> {
+    /// Opens it; `stop` ends it. The rendered camera is also to be given what the robot
+    /// reports.
+    pub fn open(
+        self,
+        clock: RunClock,
+        stop: Receiver<()>,
+    ) -> Result<(Box<dyn FrameSource>, Option<RobotView>), OpenError> {
+        let Self { cell, camera, calibration } = self;
+        if camera.source != ImageSource::Rendered {
+            return Ok((live(LiveOptions::of(camera, cell.channel), clock, stop)?, None));
+        }
+        let simulation = &cell.simulation;
+        let renderer = Renderer::new(
+            calibration.clone(),
+            cell.surface_height,
+            cell.gauge,
+            simulation.image,
+            simulation.seed,
+        )?;
+        let (source, view) = RenderedCamera::new(renderer, simulation, camera, clock, stop);
+        Ok((Box::new(source), Some(view)))
     }
 }
 

@@ -10,8 +10,10 @@ use super::connection;
 use super::dialect::{Dialect, EventOf};
 use super::outgoing::{Open, Outgoing};
 use super::timing::LinkTiming;
-use super::written::{Unsent, Written};
+use super::written::Written;
+use crate::drivers::StartError;
 use crate::io::clock::RunClock;
+use crate::run::ports::SendError;
 
 /// Longest wait for the connection's thread when closing. Only a name server
 /// or a host that does not answer takes that long.
@@ -34,34 +36,37 @@ struct Running {
 }
 
 impl<D: Dialect> Client<D> {
-    /// Starts to connect to `address`, `host:port`. `events` should be
-    /// unbounded: where it is full the thread waits, and where its receiver is
-    /// gone the thread ends. Fails where the system gives no thread.
+    /// Starts to connect to `address`, `host:port`. `report` is called in the link's
+    /// thread with what the other side reports; where it returns false, nobody listens
+    /// any more and the thread ends. Fails where the system gives no thread.
     pub fn start(
         address: String,
         timing: LinkTiming,
         clock: RunClock,
-        events: Sender<EventOf<D>>,
-    ) -> std::io::Result<Self> {
+        report: impl Fn(EventOf<D>) -> bool + Send + 'static,
+    ) -> Result<Self, StartError> {
         let outgoing = Arc::new(Outgoing::new(address, timing, clock));
         let (quit, quitting) = bounded(0);
         let (ending, ended) = bounded::<()>(0);
         let shared = Arc::clone(&outgoing);
         let body = move || {
-            connection::keep_up(&shared, &events, &quitting);
+            connection::keep_up(&shared, &report, &quitting);
             drop(ending);
         };
-        let handle = std::thread::Builder::new().name(format!("{}-link", D::NAME)).spawn(body)?;
+        let handle = std::thread::Builder::new()
+            .name(format!("{}-link", D::NAME))
+            .spawn(body)
+            .map_err(|error| StartError::Thread { device: D::NAME, reason: error.to_string() })?;
         Ok(Self { outgoing, thread: Some(Running { handle, quit, ended }) })
     }
 
     /// Writes the line that `line` makes of what is known of the present
     /// connection, and counts it. Blocks for [`LinkTiming::write`] at most; a
     /// write that takes longer closes the connection.
-    pub fn send<E: From<Unsent>>(
+    pub fn send(
         &self,
-        line: impl FnOnce(&Open<D>) -> Result<String, E>,
-    ) -> Result<Written, E> {
+        line: impl FnOnce(&Open<D>) -> Result<String, SendError>,
+    ) -> Result<Written, SendError> {
         self.outgoing.send(line)
     }
 
@@ -71,11 +76,7 @@ impl<D: Dialect> Client<D> {
     }
 
     /// Says `BYE` and ends the thread. What was commanded last runs out.
-    pub fn close(mut self) {
-        self.end();
-    }
-
-    fn end(&mut self) {
+    pub fn close(&mut self) {
         let Some(Running { handle, quit, ended }) = self.thread.take() else { return };
         self.outgoing.close();
         drop(quit);
@@ -90,6 +91,6 @@ impl<D: Dialect> Client<D> {
 
 impl<D: Dialect> Drop for Client<D> {
     fn drop(&mut self) {
-        self.end();
+        self.close();
     }
 }

@@ -3,7 +3,7 @@
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
+use crossbeam_channel::{Receiver, RecvTimeoutError};
 
 use super::dialect::{Dialect, EventOf, Heard, LinkEvent};
 use super::incoming::{Incoming, Lost, Why};
@@ -12,7 +12,11 @@ use crate::core::time::{Span, Stamp};
 use crate::link::PcLine;
 
 /// Nobody listens to the events any more.
-struct Deaf;
+struct NobodyListens;
+
+fn listens(listens: bool) -> Result<(), NobodyListens> {
+    if listens { Ok(()) } else { Err(NobodyListens) }
+}
 
 /// How a session ended.
 struct Ended {
@@ -26,14 +30,14 @@ struct Ended {
 /// Connects again and again until the link is closed or nobody listens.
 pub(super) fn keep_up<D: Dialect>(
     out: &Outgoing<D>,
-    events: &Sender<EventOf<D>>,
+    report: &dyn Fn(EventOf<D>) -> bool,
     quitting: &Receiver<()>,
 ) {
     let timing = out.timing;
     let mut delay = timing.first_delay;
     let mut reported = None;
     while !out.closing() {
-        let Ok(ended) = session(out, events) else { return };
+        let Ok(ended) = session(out, report) else { return };
         let broken = out.lost();
         if out.closing() {
             return;
@@ -41,7 +45,7 @@ pub(super) fn keep_up<D: Dialect>(
         let reason = broken.unwrap_or_else(|| ended.why.to_string());
         if ended.was_up || reported.as_ref() != Some(&reason) {
             let down = LinkEvent::Down { at: out.clock.now(), reason: reason.clone() };
-            if events.send(down).is_err() {
+            if !report(down) {
                 return;
             }
             reported = Some(reason);
@@ -56,7 +60,10 @@ pub(super) fn keep_up<D: Dialect>(
     }
 }
 
-fn session<D: Dialect>(out: &Outgoing<D>, events: &Sender<EventOf<D>>) -> Result<Ended, Deaf> {
+fn session<D: Dialect>(
+    out: &Outgoing<D>,
+    report: &dyn Fn(EventOf<D>) -> bool,
+) -> Result<Ended, NobodyListens> {
     let ended = |why| Ok(Ended { why: Lost::of::<D>(why), was_up: false, was_good: false });
     let stream = match connect(out) {
         Ok(stream) => stream,
@@ -67,13 +74,13 @@ fn session<D: Dialect>(out: &Outgoing<D>, events: &Sender<EventOf<D>>) -> Result
         Err(why) => return ended(why),
     };
     out.opened(stream, hello.clone());
-    events.send(LinkEvent::Up { at, hello }).map_err(|_| Deaf)?;
+    listens(report(LinkEvent::Up { at, hello }))?;
     // A close that came while the other side was being greeted found nothing
     // to shut.
     if out.closing() {
         out.close();
     }
-    listen(out, events, &mut incoming, at)
+    listen(out, report, &mut incoming, at)
 }
 
 fn connect<D: Dialect>(out: &Outgoing<D>) -> Result<TcpStream, Why> {
@@ -112,10 +119,10 @@ fn greet<D: Dialect>(
 
 fn listen<D: Dialect>(
     out: &Outgoing<D>,
-    events: &Sender<EventOf<D>>,
+    report: &dyn Fn(EventOf<D>) -> bool,
     incoming: &mut Incoming<D>,
     up_at: Stamp,
-) -> Result<Ended, Deaf> {
+) -> Result<Ended, NobodyListens> {
     let silence = out.timing.silence;
     let (mut heard, mut was_good) = (up_at, false);
     let why = loop {
@@ -132,7 +139,7 @@ fn listen<D: Dialect>(
             Ok(None) => break Why::Silence(silence),
             Err(why) => break why,
         };
-        events.send(event).map_err(|_| Deaf)?;
+        listens(report(event))?;
     };
     Ok(Ended { why: Lost::of::<D>(why), was_up: true, was_good })
 }

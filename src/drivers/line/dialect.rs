@@ -2,8 +2,10 @@
 
 use std::fmt::Debug;
 
+use crate::core::refusal::RefusalReason;
 use crate::core::time::Stamp;
 use crate::link::{ErrCode, LineError};
+use crate::run::ports::DeviceEvent;
 
 /// A line of the other side.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,3 +78,27 @@ pub enum LinkEvent<H, S> {
 
 /// What the link to a dialect reports.
 pub type EventOf<D> = LinkEvent<<D as Dialect>::Hello, <D as Dialect>::State>;
+
+impl<H, W, S: From<W>> From<LinkEvent<H, W>> for DeviceEvent<H, S> {
+    fn from(event: LinkEvent<H, W>) -> Self {
+        match event {
+            LinkEvent::Up { at, hello: limits } => Self::Up { at, limits },
+            LinkEvent::State { at, state } => Self::State { at, state: state.into() },
+            LinkEvent::Refused { at, seq, code, text } => {
+                let text = format!("line {seq}: {} {text}", code.word());
+                Self::Refused { at, reason: reason(code), text }
+            }
+            LinkEvent::Down { at, reason } => Self::Down { at, reason },
+        }
+    }
+}
+
+fn reason(code: ErrCode) -> RefusalReason {
+    match code {
+        ErrCode::Stale => RefusalReason::Expired,
+        ErrCode::Range => RefusalReason::OutOfRange,
+        ErrCode::Sequence => RefusalReason::OutOfOrder,
+        ErrCode::Mode => RefusalReason::WrongMode,
+        ErrCode::Form => RefusalReason::Malformed,
+    }
+}

@@ -7,9 +7,10 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::dialect::Dialect;
 use super::timing::LinkTiming;
-use super::written::{Unsent, Written};
+use super::written::Written;
 use crate::io::clock::RunClock;
 use crate::link::PcLine;
+use crate::run::ports::SendError;
 
 /// The writing half of the link, shared with the thread that reads.
 #[derive(Debug)]
@@ -86,12 +87,12 @@ impl<D: Dialect> Outgoing<D> {
         }
     }
 
-    pub(super) fn send<E: From<Unsent>>(
+    pub(super) fn send(
         &self,
-        line: impl FnOnce(&Open<D>) -> Result<String, E>,
-    ) -> Result<Written, E> {
+        line: impl FnOnce(&Open<D>) -> Result<String, SendError>,
+    ) -> Result<Written, SendError> {
         let mut guard = self.lock();
-        let open = guard.open.as_mut().ok_or(Unsent::NotConnected)?;
+        let open = guard.open.as_mut().ok_or(SendError::NotConnected { device: D::NAME })?;
         let line = line(open)?;
         match write_line(&mut open.stream, &line) {
             Ok(()) => {
@@ -104,7 +105,7 @@ impl<D: Dialect> Outgoing<D> {
                 let reason = reason::<D>(&error);
                 let broken = Some(format!("writing to the {} failed: {reason}", D::NAME));
                 *guard = State { open: None, broken };
-                Err(Unsent::Write { reason }.into())
+                Err(SendError::Write { device: D::NAME, reason })
             }
         }
     }

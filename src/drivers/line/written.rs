@@ -1,4 +1,4 @@
-//! What becomes of a line that is to leave the PC.
+//! A line that has left the PC.
 
 use crate::core::time::Stamp;
 
@@ -9,16 +9,4 @@ pub struct Written {
     pub seq: u64,
     /// Just after its bytes were written.
     pub at: Stamp,
-}
-
-/// Why no line of any kind can leave the PC.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Unsent {
-    /// The link is down.
-    NotConnected,
-    /// The bytes could not be written in time; the connection is given up.
-    Write {
-        /// What the system says.
-        reason: String,
-    },
 }

@@ -149,7 +149,8 @@ impl Bead {
     fn push(&mut self, at: Stamp, state: &RobotState) {
         let last = self.paths.last().copied().unwrap_or(f64::NEG_INFINITY);
         self.times.push(at);
-        self.clocks.push(Span::from_millis(i64::try_from(state.t_ms).unwrap_or(0)).secs());
+        let on_robot = state.robot_time_ms.and_then(|ms| i64::try_from(ms).ok());
+        self.clocks.push(on_robot.map_or(at.secs(), |ms| Span::from_millis(ms).secs()));
         self.paths.push(state.path_mm.get().max(last));
         self.speeds.push(state.speed_mm_per_s.get().abs());
     }

@@ -131,8 +131,8 @@ impl Way {
 
 fn state(tick: usize, path: f64, speed: f64) -> RobotState {
     RobotState {
-        t_ms: tick as u64 * 2,
-        seq: 0,
+        robot_time_ms: Some(tick as u64 * 2),
+        has_setpoint: false,
         mode: RobotMode::Print,
         speed_mm_per_s: MmPerS::new(speed).unwrap(),
         path_mm: Mm::new(path).unwrap(),

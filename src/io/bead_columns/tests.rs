@@ -33,8 +33,8 @@ fn passed(place: f64) -> f64 {
 
 fn robot(mode: RobotMode, t: f64) -> Event {
     Event::Robot(RobotState {
-        t_ms: 0,
-        seq: 0,
+        robot_time_ms: None,
+        has_setpoint: false,
         mode,
         speed_mm_per_s: MmPerS::constant(speed(t)),
         path_mm: Mm::constant(way(t)),

@@ -6,6 +6,7 @@ use crate::cell::file::KeepFrames;
 use crate::control::step::{State, Trace};
 use crate::core::frame::{Channel, Pixels};
 use crate::core::geometry::Size;
+use crate::core::refusal::RefusalReason;
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::units::{Mm, MmPerS};
 use crate::io::image_file;
@@ -117,8 +118,8 @@ fn every_kind_of_event_comes_back_and_is_described_by_the_schema() {
     let schema: serde_json::Value = serde_json::from_str(format::EVENT_SCHEMA).unwrap();
     let known = schema["properties"]["event"]["properties"].as_object().unwrap();
     let state = RobotState {
-        t_ms: 1,
-        seq: 2,
+        robot_time_ms: Some(1),
+        has_setpoint: true,
         mode: RobotMode::Print,
         speed_mm_per_s: MmPerS::constant(112.5),
         path_mm: Mm::constant(3.25),
@@ -142,7 +143,7 @@ fn every_kind_of_event_comes_back_and_is_described_by_the_schema() {
         Event::Robot(state),
         Event::LinkUp { robot },
         Event::LinkDown { reason: "gone \"away\"\n".into() },
-        Event::Refused { seq: 4, code: "STALE".into() },
+        Event::SetpointRefused { reason: RefusalReason::Expired, text: "line 4: STALE".into() },
         Event::Tick,
         Event::CameraLost { reason: "ü".into() },
         Event::RecordingLost,

@@ -3,9 +3,9 @@
 //! behind it.
 
 use super::drive_line::DriveLine;
-use super::extruder_line::{ExtruderHello, ExtruderLine, ExtruderStatus};
+use super::extruder_line::{ExtruderLine, ExtruderStatus};
 use crate::core::time::Stamp;
-use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
+use crate::extruder::{ExtruderCommand, ExtruderLimits, ExtruderReport, PumpMode};
 use crate::link::frame::{DeviceClock, ErrCode, LineRefusal, Sequence, Validity};
 
 /// What stands without a command.
@@ -23,7 +23,7 @@ pub struct ExtruderFaults {
 /// An extruder's end of the link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderEndpoint {
-    hello: ExtruderHello,
+    limits: ExtruderLimits,
     clock: DeviceClock,
     sequence: Sequence,
     /// The running command and when it is void.
@@ -35,9 +35,9 @@ pub struct ExtruderEndpoint {
 impl ExtruderEndpoint {
     /// Of an extruder whose pump stands and whose clock shows `clock_start_ms`
     /// at stamp 0.
-    pub const fn new(hello: ExtruderHello, clock_start_ms: u64) -> Self {
+    pub const fn new(limits: ExtruderLimits, clock_start_ms: u64) -> Self {
         Self {
-            hello,
+            limits,
             clock: DeviceClock { device: "extruder", start_ms: clock_start_ms },
             sequence: Sequence::new(),
             command: None,
@@ -106,7 +106,7 @@ impl ExtruderEndpoint {
         match line {
             DriveLine::Hello => {
                 self.sequence.greet();
-                Some(ExtruderLine::Hello(self.hello.clone()))
+                Some(ExtruderLine::Hello(self.limits.clone()))
             }
             DriveLine::Bye => None,
             DriveLine::Drive { seq, command, valid_ms, ref_t_ms } => {
@@ -130,9 +130,9 @@ impl ExtruderEndpoint {
         if self.failed && command.pump_on {
             return Err(LineRefusal::new(ErrCode::Mode, "the pump has failed"));
         }
-        let ExtruderHello { drive, min, max, .. } = &self.hello;
+        let ExtruderLimits { quantity, min, max, .. } = &self.limits;
         if command.pump_on && !(*min..=*max).contains(&command.value) {
-            let (value, unit) = (command.value, drive.unit());
+            let (value, unit) = (command.value, quantity.unit());
             let text = format!("{value} {unit} is not within {min} to {max}");
             return Err(LineRefusal::new(ErrCode::Range, text));
         }
@@ -155,9 +155,13 @@ mod tests {
     }
 
     fn gate() -> ExtruderEndpoint {
-        let hello =
-            ExtruderHello { name: "test".into(), drive: CommandQuantity::Rpm, min: 5.0, max: 90.0 };
-        ExtruderEndpoint::new(hello, 7000)
+        let limits = ExtruderLimits {
+            name: "test".into(),
+            quantity: CommandQuantity::Rpm,
+            min: 5.0,
+            max: 90.0,
+        };
+        ExtruderEndpoint::new(limits, 7000)
     }
 
     fn greeted() -> ExtruderEndpoint {

@@ -2,25 +2,11 @@
 
 use super::numbers::{NUMBERS, switch};
 use crate::core::units::{MPa, Mm, Mm3PerS, Rpm};
-use crate::extruder::{CommandQuantity, ExtruderReport, PumpMode};
+use crate::extruder::{CommandQuantity, ExtruderLimits, ExtruderReport, PumpMode};
 use crate::link::frame::{DeviceLine, LineBody, LineError, LineFields, one_word};
 
 /// A line from the extruder to the PC; a `STATE` comes every 5 to 200 ms.
-pub type ExtruderLine = DeviceLine<ExtruderHello, ExtruderStatus>;
-
-/// What an extruder says of itself.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ExtruderHello {
-    /// Its name, one word.
-    pub name: String,
-    /// What it is commanded in.
-    pub drive: CommandQuantity,
-    /// Smallest command that it takes while the pump is to run, in the unit of
-    /// `drive`.
-    pub min: f64,
-    /// Largest command that it takes, in the same unit.
-    pub max: f64,
-}
+pub type ExtruderLine = DeviceLine<ExtruderLimits, ExtruderStatus>;
 
 /// What an extruder does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,23 +19,29 @@ pub struct ExtruderStatus {
     pub report: ExtruderReport,
 }
 
-impl LineBody for ExtruderHello {
+impl From<ExtruderStatus> for ExtruderReport {
+    fn from(status: ExtruderStatus) -> Self {
+        status.report
+    }
+}
+
+impl LineBody for ExtruderLimits {
     fn read(fields: &mut LineFields<'_>) -> Result<Self, LineError> {
         let name = fields.word("name")?.to_owned();
         let word = fields.word("unit")?;
         let expected = "rpm, v, mpa, mm3_per_s, kg_per_s or filling";
-        let drive = CommandQuantity::of_unit_word(word)
+        let quantity = CommandQuantity::of_unit_word(word)
             .ok_or_else(|| fields.field_error("unit", expected, word))?;
         let min = fields.number("min")?;
         let max = fields.number("max")?;
         if min > max {
             return Err(LineError::Range { min, max });
         }
-        Ok(Self { name, drive, min, max })
+        Ok(Self { name, quantity, min, max })
     }
 
     fn write(&self) -> String {
-        let (unit, name) = (self.drive.unit_word(), one_word(&self.name, "extruder"));
+        let (unit, name) = (self.quantity.unit_word(), one_word(&self.name, "extruder"));
         let (min, max) = (NUMBERS.write(self.min), NUMBERS.write(self.max));
         format!("{name} {unit} {min} {max}")
     }

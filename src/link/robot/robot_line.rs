@@ -6,7 +6,32 @@ use crate::core::units::{Mm, MmPerS};
 use crate::link::frame::{DeviceLine, LineBody, LineError, LineFields, one_word};
 
 /// A line from the robot to the PC; a `STATE` comes every 20 to 200 ms.
-pub type RobotLine = DeviceLine<RobotLimits, RobotState>;
+pub type RobotLine = DeviceLine<RobotLimits, RobotStatus>;
+
+/// A `STATE` of the robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RobotStatus {
+    /// The robot's own clock \[ms\].
+    pub t_ms: u64,
+    /// Last setpoint that it applied on this connection; 0 is none.
+    pub seq: u64,
+    /// What it does.
+    pub mode: RobotMode,
+    /// Speed along the path.
+    pub speed_mm_per_s: MmPerS,
+    /// Distance of the nozzle along the path.
+    pub path_mm: Mm,
+    /// Height of the nozzle in the robot's frame.
+    pub z_mm: Mm,
+}
+
+impl From<RobotStatus> for RobotState {
+    fn from(status: RobotStatus) -> Self {
+        let RobotStatus { t_ms, seq, mode, speed_mm_per_s, path_mm, z_mm } = status;
+        let (robot_time_ms, has_setpoint) = (Some(t_ms), seq != 0);
+        Self { robot_time_ms, has_setpoint, mode, speed_mm_per_s, path_mm, z_mm }
+    }
+}
 
 impl LineBody for RobotLimits {
     fn read(fields: &mut LineFields<'_>) -> Result<Self, LineError> {
@@ -27,7 +52,7 @@ impl LineBody for RobotLimits {
     }
 }
 
-impl LineBody for RobotState {
+impl LineBody for RobotStatus {
     fn read(fields: &mut LineFields<'_>) -> Result<Self, LineError> {
         let t_ms = fields.whole("t_ms")?;
         let seq = fields.whole("seq")?;
@@ -125,7 +150,7 @@ mod tests {
             (any::<u64>(), any::<u64>(), mode, speed(), speed(), speed()).prop_map(
                 |(t_ms, seq, mode, speed_mm_per_s, path, z)| {
                     let (path_mm, z_mm) = (Mm::constant(path.get()), Mm::constant(z.get()));
-                    RobotLine::State(RobotState { t_ms, seq, mode, speed_mm_per_s, path_mm, z_mm })
+                    RobotLine::State(RobotStatus { t_ms, seq, mode, speed_mm_per_s, path_mm, z_mm })
                 }
             ),
             (any::<u64>(), code, "[ -~]{0,90}").prop_map(|(seq, code, text)| RobotLine::Err {

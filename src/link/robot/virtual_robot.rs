@@ -18,8 +18,8 @@
 
 use super::motion::{PathMotion, SpeedLoop, seconds};
 use super::params::{ParamError, RobotParams};
-use super::robot_line::RobotLine;
-use crate::core::robot::{RobotLimits, RobotMode, RobotState};
+use super::robot_line::{RobotLine, RobotStatus};
+use crate::core::robot::{RobotLimits, RobotMode};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
 use crate::link::frame::{DeviceClock, ErrCode, MAX_VALID_MS, Sequence};
@@ -171,10 +171,10 @@ impl VirtualRobot {
     }
 
     /// Its true state.
-    pub fn state(&mut self, now: Stamp) -> RobotState {
+    pub fn state(&mut self, now: Stamp) -> RobotStatus {
         self.advance(now);
         let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
-        RobotState {
+        RobotStatus {
             t_ms: self.clock().ms(self.at),
             seq: self.sequence.applied(),
             mode: self.mode(),

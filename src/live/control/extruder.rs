@@ -1,16 +1,15 @@
 //! The extruder's part of the control thread: what its link reports, and what
 //! the operator is told of it.
 
-use super::ControlThread;
 use super::ending::Ending;
-use crate::control::event::Event;
+use super::{ControlThread, Inputs};
 use crate::control::step::Step;
 use crate::core::time::Stamp;
-use crate::drivers::extruder::ExtruderEvent;
 use crate::extruder::ExtruderState;
 use crate::rows::names;
+use crate::run::ports::{ExtruderEvent, Recorder};
 
-impl ControlThread<'_> {
+impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     /// Hands the controller what the extruder reports. An extruder that does
     /// not fit the cell is never told of, so that nothing is sent to it.
     pub(super) fn take_extruder_event(&mut self, event: ExtruderEvent) {
@@ -18,21 +17,13 @@ impl ControlThread<'_> {
         if let Some(words) = watch.note(&event) {
             (self.notice)(&words);
         }
-        let event = match event {
-            ExtruderEvent::Up { hello, .. } => match watch.config.unfit(&hello) {
-                Some(why) => {
-                    self.unfit = Some(Ending::ExtruderUnfit(why));
-                    return;
-                }
-                None => Event::ExtruderUp,
-            },
-            ExtruderEvent::State { state, .. } => Event::Extruder(state.report),
-            ExtruderEvent::Down { reason, .. } => Event::ExtruderDown { reason },
-            ExtruderEvent::Refused { seq, code, .. } => {
-                Event::ExtruderRefused { seq, code: code.word().to_owned() }
-            }
-        };
-        self.give(event);
+        if let ExtruderEvent::Up { limits, .. } = &event
+            && let Some(why) = watch.unfit(limits)
+        {
+            self.unfit = Some(Ending::ExtruderUnfit(why));
+            return;
+        }
+        self.give(event.into());
     }
 
     /// Tells the operator of a new state of the extruder side.

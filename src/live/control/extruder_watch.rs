@@ -1,26 +1,36 @@
 //! What the control thread keeps of its extruder.
 
+use std::sync::Arc;
+
+use crate::core::refusal::RefusalReason;
 use crate::core::time::Span;
-use crate::drivers::extruder::{ExtruderConfig, ExtruderEvent};
-use crate::extruder::{ExtruderState, PumpMode};
-use crate::link::ErrCode;
+use crate::drivers::extruder::{CommandRange, ExtruderDriver};
+use crate::extruder::{ExtruderLimits, ExtruderState, PumpMode};
+use crate::run::ports::ExtruderEvent;
 
 /// What the control thread keeps of its extruder.
 pub struct ExtruderWatch {
-    pub(super) config: ExtruderConfig,
+    driver: Arc<dyn ExtruderDriver>,
+    range: CommandRange,
     period: Span,
     /// The state that the operator was told last.
     pub(super) shown: ExtruderState,
     /// Reasons of refusals that the operator was told.
-    refused: Vec<ErrCode>,
+    refused: Vec<RefusalReason>,
     pump: Option<PumpMode>,
 }
 
 impl ExtruderWatch {
     /// Of an extruder that has not been heard of, with the time from one step
     /// of its side to the next.
-    pub const fn new(config: ExtruderConfig, period: Span) -> Self {
-        Self { config, period, shown: ExtruderState::Off, refused: Vec::new(), pump: None }
+    pub fn new(driver: Arc<dyn ExtruderDriver>, range: CommandRange, period: Span) -> Self {
+        let (shown, refused) = (ExtruderState::Off, Vec::new());
+        Self { driver, range, period, shown, refused, pump: None }
+    }
+
+    /// Why an extruder cannot be commanded by the cell, if it cannot.
+    pub(super) fn unfit(&self, extruder: &ExtruderLimits) -> Option<String> {
+        self.range.unfit(extruder, |command| self.driver.as_received(command))
     }
 
     /// The time from one step to the next.
@@ -37,12 +47,12 @@ impl ExtruderWatch {
     pub(super) fn note(&mut self, event: &ExtruderEvent) -> Option<String> {
         match event {
             ExtruderEvent::State { state, .. } => {
-                self.pump = Some(state.report.pump);
+                self.pump = Some(state.pump);
                 None
             }
-            ExtruderEvent::Up { hello, .. } => {
+            ExtruderEvent::Up { limits, .. } => {
                 self.refused.clear();
-                Some(format!("extruder `{}` is connected", hello.name))
+                Some(format!("extruder `{}` is connected", limits.name))
             }
             ExtruderEvent::Down { reason, .. } => {
                 self.pump = None;
@@ -50,10 +60,10 @@ impl ExtruderWatch {
             }
             // Commands go on at their rate, and so do refusals: one of a kind is
             // enough.
-            ExtruderEvent::Refused { code, .. } if self.refused.contains(code) => None,
-            ExtruderEvent::Refused { seq, code, text, .. } => {
-                self.refused.push(*code);
-                Some(format!("extruder refused line {seq}: {} {text}", code.word()))
+            ExtruderEvent::Refused { reason, .. } if self.refused.contains(reason) => None,
+            ExtruderEvent::Refused { reason, text, .. } => {
+                self.refused.push(*reason);
+                Some(format!("extruder refused {text}"))
             }
         }
     }

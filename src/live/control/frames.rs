@@ -1,15 +1,16 @@
 //! The frames' part of the control thread.
 
-use super::ControlThread;
+use super::{ControlThread, Inputs};
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::live::capture::MeasuredFrame;
 use crate::rows::frame_row::{ControlColumns, FrameRow};
+use crate::run::ports::Recorder;
 use crate::vision::Reject;
 
-impl ControlThread<'_> {
+impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     /// A frame that was looked at: the event, its answer and the log's row.
     pub(super) fn look(&mut self, look: MeasuredFrame) {
         let MeasuredFrame { frame, had_at, outcome, roughness, edges } = look;
@@ -27,7 +28,7 @@ impl ControlThread<'_> {
         };
         let step = self.give(event).step;
         if step.trace.demand_mm_per_s.is_some() || step.trace.distance.is_some() {
-            self.latencies.used(had_at, self.clock.now());
+            self.latencies.used(had_at, self.inputs.now());
         }
         let row = FrameRow {
             frame: seq,
@@ -36,7 +37,7 @@ impl ControlThread<'_> {
             outcome: outcome.map_err(|reject| reject.status()),
             roughness,
         };
-        self.logger.frame(&row, Some((frame, edges.0, edges.1)));
+        self.journal.frame(&row, Some((frame, edges.0, edges.1)));
     }
 
     /// A frame that cannot be read.
@@ -53,7 +54,7 @@ impl ControlThread<'_> {
             roughness: None,
             control,
         };
-        self.logger.frame(&row, None);
+        self.journal.frame(&row, None);
     }
 
     fn columns(&self, step: &Step, width: Option<Mm>) -> ControlColumns {

@@ -2,13 +2,13 @@
 
 use std::sync::atomic::Ordering;
 
-use super::ControlThread;
 use super::ending::Ending;
+use super::{ControlThread, Inputs};
 use crate::core::robot::RobotLimits;
-use crate::drivers::robot::RobotEvent;
+use crate::run::ports::{Recorder, RobotEvent};
 use crate::width_control::limiter::SpeedLimits;
 
-impl ControlThread<'_> {
+impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     /// Hands the controller what the robot reports.
     pub(super) fn take_robot_event(&mut self, event: RobotEvent) {
         match &event {
@@ -19,17 +19,14 @@ impl ControlThread<'_> {
                     view.observe(*at, state);
                 }
             }
-            RobotEvent::Up { hello: robot, .. } => {
+            RobotEvent::Up { limits: robot, .. } => {
                 (self.notice)(&format!("robot `{}` is connected", robot.name));
                 self.unfit = unfit(&self.limits, robot).map(Ending::RobotLimits);
             }
             RobotEvent::Down { reason, .. } => (self.notice)(&format!("robot: {reason}")),
-            RobotEvent::Refused { seq, code, text, .. } => {
-                (self.notice)(&format!("robot refused line {seq}: {} {text}", code.word()));
-            }
+            RobotEvent::Refused { text, .. } => (self.notice)(&format!("robot refused {text}")),
         }
-        let (_, event) = event.into_event();
-        self.give(event);
+        self.give(event.into());
     }
 }
 

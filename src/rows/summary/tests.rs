@@ -13,8 +13,8 @@ fn seconds(secs: f64) -> Stamp {
 
 fn robot(path: f64) -> Event {
     Event::Robot(RobotState {
-        t_ms: 0,
-        seq: 0,
+        robot_time_ms: None,
+        has_setpoint: false,
         mode: RobotMode::Print,
         speed_mm_per_s: MmPerS::constant(100.0),
         path_mm: Mm::new(path).unwrap(),

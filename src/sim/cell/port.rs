@@ -6,7 +6,7 @@ use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::link::{PcLine, RobotLine, VirtualRobot};
-use crate::run::ports::RobotPort;
+use crate::run::ports::{RobotPort, SendError, Sent};
 
 /// A robot within the process.
 #[derive(Debug)]
@@ -33,23 +33,23 @@ impl SimPort {
     pub fn begin(&mut self, now: Stamp, z: Mm) -> RobotState {
         self.cell.acknowledge(now);
         self.cell.begin_bead(now, z);
-        self.cell.state(now)
+        self.cell.state(now).into()
     }
 
     /// The robot's state.
     pub fn state(&mut self, now: Stamp) -> RobotState {
-        self.cell.state(now)
+        self.cell.state(now).into()
     }
 }
 
 impl RobotPort for SimPort {
-    fn send(&mut self, now: Stamp, command: Command) -> Option<u64> {
+    fn send(&mut self, now: Stamp, command: Command) -> Result<Sent, SendError> {
         let state = self.cell.state(now);
         let seq = self.seq + 1;
         let line = match command {
             Command::Speed(speed) => {
                 if !matches!(state.mode, RobotMode::Print | RobotMode::Hold) {
-                    return None;
+                    return Err(SendError::NotPrinting { mode: state.mode });
                 }
                 PcLine::Speed { seq, speed, valid_ms: self.valid_ms, ref_t_ms: state.t_ms }
             }
@@ -57,8 +57,8 @@ impl RobotPort for SimPort {
         };
         self.seq = seq;
         match self.cell.take(now, line) {
-            Some(RobotLine::Err { .. }) => None,
-            _ => Some(seq),
+            Some(RobotLine::Err { text, .. }) => Err(SendError::Refused { device: "robot", text }),
+            _ => Ok(Sent { at: now }),
         }
     }
 }

@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::io::clock::RunClock;
+use crate::link::RobotStatus;
 use crate::link::VirtualRobot;
 
 /// Samples of the truth that are kept; at 50 a second more than an hour.
@@ -17,7 +17,7 @@ pub struct TrueState {
     /// When.
     pub at: Stamp,
     /// Its state.
-    pub state: RobotState,
+    pub state: RobotStatus,
 }
 
 /// What the robot's thread shares with the handle.
@@ -41,7 +41,7 @@ impl SharedRobot {
         self.history.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn remember(&self, at: Stamp, state: RobotState) {
+    pub(super) fn remember(&self, at: Stamp, state: RobotStatus) {
         let mut history = self.history();
         if history.len() == MAX_HISTORY {
             history.pop_front();

@@ -43,8 +43,8 @@ mod tests {
         assert_eq!(heights.z_at(Stamp::from_ns(5)), None);
         for (ns, z) in [(10, 20.0), (20, 20.0), (30, 40.0)] {
             let state = RobotState {
-                t_ms: 0,
-                seq: 0,
+                robot_time_ms: None,
+                has_setpoint: false,
                 mode: RobotMode::Print,
                 speed_mm_per_s: MmPerS::ZERO,
                 path_mm: Mm::ZERO,

@@ -104,8 +104,8 @@ fn a_recording_gives_its_frames_back_with_their_times_and_heights() {
     let given: Vec<Frame> = (0..4).map(|seq| frame(seq, 100 + seq * 20)).collect();
     for (frame, z) in given.iter().zip([20.0, 20.0, 40.0, 40.0]) {
         let state = RobotState {
-            t_ms: 0,
-            seq: 0,
+            robot_time_ms: None,
+            has_setpoint: false,
             mode: RobotMode::Print,
             speed_mm_per_s: MmPerS::ZERO,
             path_mm: Mm::ZERO,

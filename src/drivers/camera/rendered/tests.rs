@@ -74,8 +74,8 @@ fn camera() -> (RenderedCamera, RobotView, Sender<()>) {
 
 fn printing(path_mm: f64) -> RobotState {
     RobotState {
-        t_ms: 0,
-        seq: 0,
+        robot_time_ms: None,
+        has_setpoint: false,
         mode: RobotMode::Print,
         speed_mm_per_s: MmPerS::constant(100.0),
         path_mm: Mm::constant(path_mm),

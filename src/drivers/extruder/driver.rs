@@ -1,0 +1,88 @@
+//! What an extruder driver is: its registration, its settings, and how it starts.
+
+use std::fmt::Debug;
+use std::path::Path;
+use std::sync::Arc;
+
+use crossbeam_channel::Sender;
+
+use crate::document::Table;
+use crate::drivers::StartError;
+use crate::extruder::{CommandQuantity, ExtruderLimits};
+use crate::io::clock::RunClock;
+use crate::run::ports::{ExtruderEvent, ExtruderPort};
+
+/// An extruder driver as a cell chooses it.
+#[derive(Debug)]
+pub struct Registration {
+    /// Its name in `driver` of `[extruder]`.
+    pub name: &'static str,
+    /// Reads its own keys of `[extruder]`; none where they are wrong. Relative paths start
+    /// from the folder.
+    pub read: fn(&Table<'_>, &Path) -> Option<Arc<dyn ExtruderDriver>>,
+}
+
+/// An extruder with its driver's settings.
+pub trait ExtruderDriver: Debug + Send + Sync {
+    /// Where the extruder is, for messages and reports, such as `host:port`.
+    fn address(&self) -> String;
+
+    /// A command as the extruder receives it, in steps of the link.
+    fn as_received(&self, command: f64) -> f64 {
+        command
+    }
+
+    /// Starts to connect. The extruder reports on `start.events` from then on.
+    fn start(&self, start: ExtruderStart) -> Result<Box<dyn ExtruderPort>, StartError>;
+}
+
+/// What every extruder driver starts with.
+#[derive(Debug)]
+pub struct ExtruderStart {
+    /// The clock that the run counts by.
+    pub clock: RunClock,
+    /// What the cell commands.
+    pub range: CommandRange,
+    /// How long a command is valid after the report that it refers to \[ms\].
+    pub valid_ms: u64,
+    /// Takes what the extruder reports. Unbounded: a driver never waits for it.
+    pub events: Sender<ExtruderEvent>,
+}
+
+/// The commands of a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommandRange {
+    /// What is commanded.
+    pub quantity: CommandQuantity,
+    /// Smallest command, in the unit of `quantity`.
+    pub min: f64,
+    /// Largest command, in the same unit.
+    pub max: f64,
+}
+
+impl CommandRange {
+    /// Why an extruder cannot be commanded by this cell, if it cannot. `as_received` is a
+    /// command as the extruder receives it.
+    pub fn unfit(
+        &self,
+        extruder: &ExtruderLimits,
+        as_received: impl Fn(f64) -> f64,
+    ) -> Option<String> {
+        let ExtruderLimits { name, quantity, min, max } = extruder;
+        let (unit, cell) = (quantity.unit_word(), self.quantity.unit_word());
+        if *quantity != self.quantity {
+            return Some(format!(
+                "extruder `{name}` is commanded in {unit}, [extruder] of the cell commands {cell}; \
+                 both must be the same"
+            ));
+        }
+        let fits = *min <= as_received(self.min) && as_received(self.max) <= *max;
+        (!fits).then(|| {
+            format!(
+                "extruder `{name}` takes {min} to {max} {unit}, [extruder] of the cell allows \
+                 {} to {}; make them lie within the extruder's",
+                self.min, self.max
+            )
+        })
+    }
+}

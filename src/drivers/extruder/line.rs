@@ -1,0 +1,147 @@
+//! `driver = "line"`: an extruder that speaks the line link over TCP (`robot/EXTRUDER.md`).
+
+use std::sync::Arc;
+
+use super::{CommandRange, ExtruderDriver, ExtruderStart, Registration};
+use crate::core::time::Stamp;
+use crate::document::Table;
+use crate::drivers::StartError;
+use crate::drivers::line::{
+    Client, Dialect, Heard, LinkEvent, LinkTiming, Open, Written, read_address,
+};
+use crate::extruder::{ExtruderCommand, ExtruderLimits};
+use crate::io::clock::RunClock;
+use crate::link::extruder::{DriveLine, ExtruderLine, ExtruderStatus, on_wire};
+use crate::link::{LineError, MAX_VALID_MS, MIN_VALID_MS};
+use crate::run::ports::{ExtruderPort, SendError, Sent};
+
+/// The driver in the list of all.
+pub const REGISTRATION: Registration = Registration { name: "line", read: |table, _| read(table) };
+
+/// An extruder at an address.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LineExtruder {
+    /// `host:port`.
+    pub address: String,
+}
+
+fn read(table: &Table<'_>) -> Option<Arc<dyn ExtruderDriver>> {
+    Some(Arc::new(LineExtruder { address: read_address(table)? }))
+}
+
+impl ExtruderDriver for LineExtruder {
+    fn address(&self) -> String {
+        self.address.clone()
+    }
+
+    fn as_received(&self, command: f64) -> f64 {
+        on_wire(command)
+    }
+
+    fn start(&self, start: ExtruderStart) -> Result<Box<dyn ExtruderPort>, StartError> {
+        let ExtruderStart { clock, range, valid_ms, events } = start;
+        let (address, timing) = (self.address.clone(), LinkTiming::default());
+        let config = ExtruderConfig { address, range, valid_ms, timing };
+        let report = move |event: LineEvent| events.send(event.into()).is_ok();
+        Ok(Box::new(ExtruderClient::start(config, clock, report)?))
+    }
+}
+
+/// How to reach an extruder, and what may be sent to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtruderConfig {
+    /// `host:port`.
+    pub address: String,
+    /// What the cell commands.
+    pub range: CommandRange,
+    /// How long a command is valid after the `STATE` that it refers to \[ms\],
+    /// 100 to 1000. It should cover a few periods of the commands.
+    pub valid_ms: u64,
+    /// Timeouts and delays.
+    pub timing: LinkTiming,
+}
+
+/// An extruder at the other end.
+#[derive(Debug, Clone, Copy)]
+pub struct Extruder;
+
+impl Dialect for Extruder {
+    type Hello = ExtruderLimits;
+    type State = ExtruderStatus;
+    const NAME: &'static str = "extruder";
+
+    fn understand(text: &str) -> Result<Heard<ExtruderLimits, ExtruderStatus>, LineError> {
+        Ok(match ExtruderLine::parse(text)? {
+            ExtruderLine::Hello(hello) => Heard::Hello(hello),
+            ExtruderLine::State(status) => Heard::State(status),
+            ExtruderLine::Err { seq, code, text } => Heard::Err { seq, code, text },
+        })
+    }
+}
+
+/// What the link to an extruder reports, with the time of arrival.
+pub type LineEvent = LinkEvent<ExtruderLimits, ExtruderStatus>;
+
+/// An extruder at the other end of a TCP connection that is kept up.
+#[derive(Debug)]
+pub struct ExtruderClient {
+    config: ExtruderConfig,
+    client: Client<Extruder>,
+}
+
+impl ExtruderClient {
+    /// Starts to connect. `report` is called in the link's thread with what the extruder
+    /// reports; where it returns false, the thread ends.
+    pub fn start(
+        config: ExtruderConfig,
+        clock: RunClock,
+        report: impl Fn(LineEvent) -> bool + Send + 'static,
+    ) -> Result<Self, StartError> {
+        if !(MIN_VALID_MS..=MAX_VALID_MS).contains(&config.valid_ms) {
+            return Err(StartError::Valid { found: config.valid_ms });
+        }
+        let client = Client::start(config.address.clone(), config.timing, clock, report)?;
+        Ok(Self { config, client })
+    }
+
+    /// Writes a command, once there was a `STATE`, within the limits of the
+    /// cell, and only to an extruder that takes all of them. Blocks for
+    /// [`LinkTiming::write`] at most; a write that takes longer closes the
+    /// connection.
+    pub fn send(&self, command: ExtruderCommand) -> Result<Written, SendError> {
+        self.client.send(|open| self.config.line(open, command))
+    }
+
+    /// Whether the extruder has answered `HELLO` on the present connection.
+    pub fn connected(&self) -> bool {
+        self.client.connected()
+    }
+}
+
+impl ExtruderConfig {
+    fn line(&self, open: &Open<Extruder>, command: ExtruderCommand) -> Result<String, SendError> {
+        let status = open.newest.ok_or(SendError::NoState { device: Extruder::NAME })?;
+        if let Some(why) = self.range.unfit(&open.hello, on_wire) {
+            return Err(SendError::Unfit(why));
+        }
+        let (min, max) = (on_wire(self.range.min), on_wire(self.range.max));
+        let value = on_wire(command.value);
+        if !(min..=max).contains(&value) {
+            let unit = self.range.quantity.unit_word();
+            return Err(SendError::OutsideLimits { value, unit, min, max });
+        }
+        let (seq, valid_ms, ref_t_ms) = (open.next_seq, self.valid_ms, status.t_ms);
+        let command = ExtruderCommand { value, ..command };
+        Ok(DriveLine::Drive { seq, command, valid_ms, ref_t_ms }.format())
+    }
+}
+
+impl ExtruderPort for ExtruderClient {
+    fn send(&mut self, _now: Stamp, command: ExtruderCommand) -> Result<Sent, SendError> {
+        ExtruderClient::send(self, command).map(|written| Sent { at: written.at })
+    }
+
+    fn close(&mut self) {
+        self.client.close();
+    }
+}

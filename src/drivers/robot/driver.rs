@@ -1,0 +1,88 @@
+//! What a robot driver is: its registration, what it can do, and how it starts.
+
+use std::fmt;
+use std::path::Path;
+use std::sync::Arc;
+
+use crossbeam_channel::Sender;
+
+use crate::core::units::MmPerS;
+use crate::document::Table;
+use crate::drivers::StartError;
+use crate::io::clock::RunClock;
+use crate::run::ports::{RobotEvent, RobotPort};
+
+/// A robot driver as a cell chooses it.
+#[derive(Debug)]
+pub struct Registration {
+    /// Its name in `driver` of `[robot]`.
+    pub name: &'static str,
+    /// What its robots can do.
+    pub capabilities: Capabilities,
+    /// Reads its own keys of `[robot]`; none where they are wrong. Relative paths start
+    /// from the folder.
+    pub read: fn(&Table<'_>, &Path) -> Option<Arc<dyn RobotDriver>>,
+}
+
+/// What the robots of a driver can do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
+pub struct Capabilities {
+    /// They report the slowest and the fastest setpoint that they take.
+    pub reports_limits: bool,
+    /// A setpoint expires at the robot, so that one that loses the PC stops by itself.
+    pub setpoints_expire: bool,
+    /// They report the length of the path.
+    pub reports_path: bool,
+    /// They report the nozzle's position in space, beyond its height.
+    pub reports_position: bool,
+    /// They report the direction in which the nozzle moves.
+    pub reports_heading: bool,
+    /// They report the speed at which they move.
+    pub reads_speed_back: bool,
+    /// Steps in which a setpoint is taken.
+    pub resolution: MmPerS,
+}
+
+impl fmt::Display for Capabilities {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let facts = [
+            (self.reports_limits, "own limits"),
+            (self.setpoints_expire, "setpoints expire"),
+            (self.reports_path, "path"),
+            (self.reports_position, "position"),
+            (self.reports_heading, "heading"),
+            (self.reads_speed_back, "speed read back"),
+        ];
+        for (_, words) in facts.iter().filter(|(has, _)| *has) {
+            write!(f, "{words}, ")?;
+        }
+        write!(f, "steps of {}", self.resolution)
+    }
+}
+
+/// A robot with its driver's settings.
+pub trait RobotDriver: fmt::Debug + Send + Sync {
+    /// Where the robot is, for messages and reports, such as `host:port`.
+    fn address(&self) -> String;
+
+    /// Starts to connect. The robot reports on `start.events` from then on.
+    fn start(&self, start: RobotStart) -> Result<Box<dyn RobotPort>, StartError>;
+}
+
+/// What every robot driver starts with.
+#[derive(Debug)]
+pub struct RobotStart {
+    /// The clock that the run counts by.
+    pub clock: RunClock,
+    /// Slowest setpoint of the cell.
+    pub min: MmPerS,
+    /// Fastest setpoint of the cell.
+    pub max: MmPerS,
+    /// Speed at which a bead begins.
+    pub start_speed: MmPerS,
+    /// How long a setpoint is valid after the report that it refers to \[ms\].
+    pub valid_ms: u64,
+    /// Takes what the robot reports. Unbounded: a driver never waits for it.
+    pub events: Sender<RobotEvent>,
+}

@@ -1,0 +1,30 @@
+//! Where a live run's log goes, behind a port.
+
+use std::sync::Arc;
+
+use super::latency::Latency;
+use crate::control::event::Event;
+use crate::control::step::Step;
+use crate::core::frame::Frame;
+use crate::core::geometry::ImagePoint;
+use crate::core::time::Stamp;
+use crate::rows::frame_row::FrameRow;
+use crate::rows::summary::RunNote;
+
+/// A frame and the edges that were found in it, left and right.
+pub type FrameWithEdges = (Arc<Frame>, Vec<ImagePoint>, Vec<ImagePoint>);
+
+/// Takes down what happens in a live run.
+pub trait Journal {
+    /// A frame that was measured or rejected, with its image.
+    fn frame(&self, row: &FrameRow, image: Option<FrameWithEdges>);
+
+    /// An event and the step that answered it.
+    fn step(&self, now: Stamp, event: Event, step: Step);
+
+    /// The time from a frame to its setpoint.
+    fn latency(&self, latency: Latency);
+
+    /// Another fact.
+    fn note(&self, note: RunNote);
+}
