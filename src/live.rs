@@ -16,7 +16,7 @@
 
 pub mod capture;
 mod control;
-mod journal;
+pub mod journal;
 mod latency;
 mod mailbox;
 pub mod run_logger;
@@ -34,7 +34,7 @@ use crate::control::Controller;
 use crate::core::time::Span;
 use crate::drivers::StartError;
 use crate::drivers::camera::open::{self, OpenError};
-use crate::drivers::extruder::{CommandRange, ExtruderDriver, ExtruderStart};
+use crate::drivers::extruder::{DriveRange, ExtruderDriver, ExtruderStart};
 use crate::drivers::robot::{RobotDriver, RobotStart};
 use crate::extruder::{ExtruderSetup, FlowDemand};
 use crate::io::clock::RunClock;
@@ -96,9 +96,9 @@ pub struct LiveExtruder {
 }
 
 impl LiveExtruder {
-    fn range(&self) -> CommandRange {
+    fn range(&self) -> DriveRange {
         let (min, max) = self.setup.limits.range();
-        CommandRange { quantity: self.setup.quantity, min, max }
+        DriveRange { quantity: self.setup.quantity, min, max }
     }
 }
 

@@ -6,7 +6,7 @@
 mod driver;
 pub mod line;
 
-pub use driver::{CommandRange, ExtruderDriver, ExtruderStart, Registration};
+pub use driver::{DriveRange, ExtruderDriver, ExtruderRegistration, ExtruderStart};
 
 /// Every extruder driver that a cell may choose.
-pub const EXTRUDERS: [&Registration; 1] = [&line::REGISTRATION];
+pub const EXTRUDERS: [&ExtruderRegistration; 1] = [&line::REGISTRATION];

@@ -12,9 +12,9 @@ use crate::document::Table;
 #[derive(Debug, Clone, Default)]
 pub struct Devices {
     /// The robot, and what it can do.
-    pub robot: Option<Device<dyn RobotDriver, robot::Registration>>,
+    pub robot: Option<Device<dyn RobotDriver, robot::RobotRegistration>>,
     /// The extruder, where the cell says how to reach it.
-    pub extruder: Option<Device<dyn ExtruderDriver, extruder::Registration>>,
+    pub extruder: Option<Device<dyn ExtruderDriver, extruder::ExtruderRegistration>>,
 }
 
 /// A device: its driver with settings, and the driver's registration.

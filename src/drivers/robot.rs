@@ -6,7 +6,7 @@ mod driver;
 pub mod line;
 pub mod log;
 
-pub use driver::{Capabilities, Registration, RobotDriver, RobotStart};
+pub use driver::{Capabilities, RobotDriver, RobotRegistration, RobotStart};
 
 /// Every robot driver that a cell may choose.
-pub const ROBOTS: [&Registration; 2] = [&line::REGISTRATION, &log::REGISTRATION];
+pub const ROBOTS: [&RobotRegistration; 2] = [&line::REGISTRATION, &log::REGISTRATION];

@@ -31,7 +31,7 @@ use crate::width_control::limiter::SpeedLimits;
 
 pub use ending::Ending;
 pub use extruder_watch::ExtruderWatch;
-pub use inputs::{Input, Inputs, LiveInputs};
+pub use inputs::{Inputs, LiveInput, LiveInputs};
 pub use steps::StepsWatch;
 
 /// Longest wait for the robot to say that it has stopped.
@@ -76,12 +76,12 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
         let mut stopped = false;
         while !(stopped && self.extruder.as_ref().is_none_or(ExtruderWatch::rests)) {
             match self.inputs.next(until) {
-                Some(Input::Robot(event)) => {
+                Some(LiveInput::Robot(event)) => {
                     stopped |= has_stopped(&event);
                     self.take_robot_event(event);
                 }
-                Some(Input::Extruder(event)) => self.take_extruder_event(event),
-                Some(Input::DeviceGone) | None => return,
+                Some(LiveInput::Extruder(event)) => self.take_extruder_event(event),
+                Some(LiveInput::DeviceGone) | None => return,
                 Some(_) => {}
             }
         }
@@ -133,27 +133,27 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
             }
             let until = [over, extruder_due].into_iter().flatten().fold(due, Stamp::min);
             match self.inputs.next(until) {
-                Some(Input::Camera(CameraMessage::Frame(look))) => self.look(*look),
-                Some(Input::Camera(CameraMessage::Unreadable { seq, at, reason })) => {
+                Some(LiveInput::Camera(CameraMessage::Frame(look))) => self.look(*look),
+                Some(LiveInput::Camera(CameraMessage::Unreadable { seq, at, reason })) => {
                     self.unreadable(seq, at, &reason);
                 }
-                Some(Input::Camera(CameraMessage::Ended(None)) | Input::CameraGone) => {
+                Some(LiveInput::Camera(CameraMessage::Ended(None)) | LiveInput::CameraGone) => {
                     return Ending::LastFrame;
                 }
-                Some(Input::Camera(CameraMessage::Ended(Some(reason)))) => {
+                Some(LiveInput::Camera(CameraMessage::Ended(Some(reason)))) => {
                     (self.notice)(&format!("camera lost: {reason}"));
                     self.give(Event::CameraLost { reason: reason.clone() });
                     lost = Some(reason);
                     self.inputs.ignore_camera();
                 }
-                Some(Input::Robot(event)) => self.take_robot_event(event),
-                Some(Input::Extruder(event)) => self.take_extruder_event(event),
-                Some(Input::RecordingLost(error)) => {
+                Some(LiveInput::Robot(event)) => self.take_robot_event(event),
+                Some(LiveInput::Extruder(event)) => self.take_extruder_event(event),
+                Some(LiveInput::RecordingLost(error)) => {
                     self.runner.lose_recording(self.inputs.now(), error.clone());
                     return Ending::RecordingLost(error.0);
                 }
-                Some(Input::StopRequested) => return Ending::Asked,
-                Some(Input::DeviceGone) | None => {}
+                Some(LiveInput::StopRequested) => return Ending::Asked,
+                Some(LiveInput::DeviceGone) | None => {}
             }
             if let Some(ending) = self.unfit.take() {
                 return ending;
@@ -227,3 +227,6 @@ fn next_due(due: Stamp, period: Span, now: Stamp) -> Stamp {
     }
     next
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,8 +6,8 @@ use std::time::Duration;
 use crossbeam_channel::{Receiver, unbounded};
 use truebead::cell::extruder::LinearPlant;
 use truebead::core::time::Span;
-use truebead::drivers::extruder::CommandRange;
-use truebead::drivers::extruder::line::{ExtruderClient, ExtruderConfig, LineEvent};
+use truebead::drivers::extruder::DriveRange;
+use truebead::drivers::extruder::line::{ExtruderClient, ExtruderConfig, ExtruderLineEvent};
 use truebead::drivers::line::LinkTiming;
 use truebead::extruder::{CommandQuantity, ExtruderCommand, ExtruderLimits, PumpMode};
 use truebead::io::clock::RunClock;
@@ -21,7 +21,7 @@ use truebead::simulators::extruder::{ExtruderOptions, ExtruderSim};
 /// What should happen does so long before; only a failure waits for it.
 const PATIENCE: Duration = Duration::from_secs(20);
 const RUN: ExtruderCommand = ExtruderCommand { pump_on: true, valve_open: true, value: 60.0 };
-const RANGE: CommandRange = CommandRange { quantity: CommandQuantity::Rpm, min: 0.0, max: 90.0 };
+const RANGE: DriveRange = DriveRange { quantity: CommandQuantity::Rpm, min: 0.0, max: 90.0 };
 const OFF: ExtruderCommand = ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 };
 
 fn sim_on(listener: TcpListener) -> ExtruderSim {
@@ -70,7 +70,7 @@ fn config(address: SocketAddr) -> ExtruderConfig {
 
 struct Pc {
     link: ExtruderClient,
-    events: Receiver<LineEvent>,
+    events: Receiver<ExtruderLineEvent>,
 }
 
 impl Pc {
@@ -81,7 +81,7 @@ impl Pc {
         Self { link, events }
     }
 
-    fn until<T>(&self, wanted: impl Fn(LineEvent) -> Option<T>) -> T {
+    fn until<T>(&self, wanted: impl Fn(ExtruderLineEvent) -> Option<T>) -> T {
         loop {
             if let Some(found) = wanted(self.events.recv_timeout(PATIENCE).unwrap()) {
                 return found;
@@ -91,21 +91,21 @@ impl Pc {
 
     fn until_state(&self, wanted: impl Fn(&ExtruderStatus) -> bool) -> ExtruderStatus {
         self.until(|event| match event {
-            LineEvent::State { state, .. } if wanted(&state) => Some(state),
+            ExtruderLineEvent::State { state, .. } if wanted(&state) => Some(state),
             _ => None,
         })
     }
 
     fn until_down(&self) -> String {
         self.until(|event| match event {
-            LineEvent::Down { reason, .. } => Some(reason),
+            ExtruderLineEvent::Down { reason, .. } => Some(reason),
             _ => None,
         })
     }
 
     fn until_up(&self) -> ExtruderLimits {
         self.until(|event| match event {
-            LineEvent::Up { hello, .. } => Some(hello),
+            ExtruderLineEvent::Up { hello, .. } => Some(hello),
             _ => None,
         })
     }
@@ -180,7 +180,7 @@ fn a_failed_pump_is_reported_and_no_command_makes_it_run() {
     pc.until_state(|state| state.report.pump == PumpMode::Fault);
     pc.link.send(RUN).unwrap();
     let code = pc.until(|event| match event {
-        LineEvent::Refused { code, .. } => Some(code),
+        ExtruderLineEvent::Refused { code, .. } => Some(code),
         _ => None,
     });
     assert_eq!(code, ErrCode::Mode);
@@ -193,14 +193,14 @@ fn nothing_leaves_for_an_extruder_that_does_not_fit_the_cell() {
     for (config, told) in [
         (
             ExtruderConfig {
-                range: CommandRange { max: 120.0, ..RANGE },
+                range: DriveRange { max: 120.0, ..RANGE },
                 ..config(sim.local_addr())
             },
             "takes 0 to 90 rpm",
         ),
         (
             ExtruderConfig {
-                range: CommandRange { quantity: CommandQuantity::Flow, ..RANGE },
+                range: DriveRange { quantity: CommandQuantity::Flow, ..RANGE },
                 ..config(sim.local_addr())
             },
             "mm3_per_s",

@@ -7,7 +7,7 @@ use truebead::core::robot::RobotMode;
 use truebead::core::time::Stamp;
 use truebead::drivers::StartError;
 use truebead::drivers::line::LinkTiming;
-use truebead::drivers::robot::line::{LineEvent, LinkClient, LinkConfig};
+use truebead::drivers::robot::line::{LinkClient, LinkConfig, RobotLineEvent};
 use truebead::io::clock::RunClock;
 use truebead::link::{ErrCode, RobotFaults};
 use truebead::run::ports::{RobotPort, SendError, Sent};
@@ -21,7 +21,7 @@ fn hello_then_a_stream_of_setpoints() {
     let sim = sim();
     let mut pc = Pc::start(config(sim.local_addr()));
     let robot = pc.until(|event| match event {
-        LineEvent::Up { hello: robot, .. } => Some(robot.clone()),
+        RobotLineEvent::Up { hello: robot, .. } => Some(robot.clone()),
         _ => None,
     });
     assert_eq!((robot.min_mm_per_s, robot.max_mm_per_s), (speed(60.0), speed(150.0)));
@@ -185,7 +185,7 @@ fn a_refusal_is_reported() {
     sim.set_faults(RobotFaults { refuse: Some(ErrCode::Range), ..RobotFaults::default() });
     pc.link.send(Command::Speed(speed(100.0))).unwrap();
     let refused = pc.until(|event| match event {
-        LineEvent::Refused { seq, code, .. } => Some((*seq, *code)),
+        RobotLineEvent::Refused { seq, code, .. } => Some((*seq, *code)),
         _ => None,
     });
     assert_eq!(refused, (1, ErrCode::Range));

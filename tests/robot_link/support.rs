@@ -9,7 +9,7 @@ use truebead::core::robot::RobotMode;
 use truebead::core::time::Span;
 use truebead::core::units::{Mm, MmPerS};
 use truebead::drivers::line::LinkTiming;
-use truebead::drivers::robot::line::{LineEvent, LinkClient, LinkConfig};
+use truebead::drivers::robot::line::{LinkClient, LinkConfig, RobotLineEvent};
 use truebead::io::clock::RunClock;
 use truebead::link::{PrintJob, RobotParams, RobotStatus};
 use truebead::simulators::robot::{RobotOptions, RobotSim};
@@ -58,7 +58,7 @@ pub fn config(address: SocketAddr) -> LinkConfig {
 /// A client and what it reports.
 pub struct Pc {
     pub link: LinkClient,
-    pub events: Receiver<LineEvent>,
+    pub events: Receiver<RobotLineEvent>,
 }
 
 impl Pc {
@@ -70,7 +70,7 @@ impl Pc {
     }
 
     /// The first event from now on that is wanted.
-    pub fn until<T>(&self, wanted: impl Fn(&LineEvent) -> Option<T>) -> T {
+    pub fn until<T>(&self, wanted: impl Fn(&RobotLineEvent) -> Option<T>) -> T {
         loop {
             let event = self.events.recv_timeout(PATIENCE).expect("the event never came");
             if let Some(found) = wanted(&event) {
@@ -80,19 +80,19 @@ impl Pc {
     }
 
     pub fn until_up(&self) {
-        self.until(|event| matches!(event, LineEvent::Up { .. }).then_some(()));
+        self.until(|event| matches!(event, RobotLineEvent::Up { .. }).then_some(()));
     }
 
     pub fn until_down(&self) -> String {
         self.until(|event| match event {
-            LineEvent::Down { reason, .. } => Some(reason.clone()),
+            RobotLineEvent::Down { reason, .. } => Some(reason.clone()),
             _ => None,
         })
     }
 
     pub fn until_state(&self, wanted: impl Fn(&RobotStatus) -> bool) -> RobotStatus {
         self.until(|event| match event {
-            LineEvent::State { state, .. } if wanted(state) => Some(*state),
+            RobotLineEvent::State { state, .. } if wanted(state) => Some(*state),
             _ => None,
         })
     }

@@ -14,7 +14,7 @@ use crate::run::ports::{ExtruderEvent, ExtruderPort};
 
 /// An extruder driver as a cell chooses it.
 #[derive(Debug)]
-pub struct Registration {
+pub struct ExtruderRegistration {
     /// Its name in `driver` of `[extruder]`.
     pub name: &'static str,
     /// Reads its own keys of `[extruder]`; none where they are wrong. Relative paths start
@@ -42,7 +42,7 @@ pub struct ExtruderStart {
     /// The clock that the run counts by.
     pub clock: RunClock,
     /// What the cell commands.
-    pub range: CommandRange,
+    pub range: DriveRange,
     /// How long a command is valid after the report that it refers to \[ms\].
     pub valid_ms: u64,
     /// Takes what the extruder reports. Unbounded: a driver never waits for it.
@@ -51,7 +51,7 @@ pub struct ExtruderStart {
 
 /// The commands of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CommandRange {
+pub struct DriveRange {
     /// What is commanded.
     pub quantity: CommandQuantity,
     /// Smallest command, in the unit of `quantity`.
@@ -60,7 +60,7 @@ pub struct CommandRange {
     pub max: f64,
 }
 
-impl CommandRange {
+impl DriveRange {
     /// Why an extruder cannot be commanded by this cell, if it cannot. `as_received` is a
     /// command as the extruder receives it.
     pub fn unfit(

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{CommandRange, ExtruderDriver, ExtruderStart, Registration};
+use super::{DriveRange, ExtruderDriver, ExtruderRegistration, ExtruderStart};
 use crate::core::time::Stamp;
 use crate::document::Table;
 use crate::drivers::StartError;
@@ -16,7 +16,8 @@ use crate::link::{LineError, MAX_VALID_MS, MIN_VALID_MS};
 use crate::run::ports::{ExtruderPort, SendError, Sent};
 
 /// The driver in the list of all.
-pub const REGISTRATION: Registration = Registration { name: "line", read: |table, _| read(table) };
+pub const REGISTRATION: ExtruderRegistration =
+    ExtruderRegistration { name: "line", read: |table, _| read(table) };
 
 /// An extruder at an address.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,7 +43,7 @@ impl ExtruderDriver for LineExtruder {
         let ExtruderStart { clock, range, valid_ms, events } = start;
         let (address, timing) = (self.address.clone(), LinkTiming::default());
         let config = ExtruderConfig { address, range, valid_ms, timing };
-        let report = move |event: LineEvent| events.send(event.into()).is_ok();
+        let report = move |event: ExtruderLineEvent| events.send(event.into()).is_ok();
         Ok(Box::new(ExtruderClient::start(config, clock, report)?))
     }
 }
@@ -53,7 +54,7 @@ pub struct ExtruderConfig {
     /// `host:port`.
     pub address: String,
     /// What the cell commands.
-    pub range: CommandRange,
+    pub range: DriveRange,
     /// How long a command is valid after the `STATE` that it refers to \[ms\],
     /// 100 to 1000. It should cover a few periods of the commands.
     pub valid_ms: u64,
@@ -63,9 +64,9 @@ pub struct ExtruderConfig {
 
 /// An extruder at the other end.
 #[derive(Debug, Clone, Copy)]
-pub struct Extruder;
+pub struct ExtruderDialect;
 
-impl Dialect for Extruder {
+impl Dialect for ExtruderDialect {
     type Hello = ExtruderLimits;
     type State = ExtruderStatus;
     const NAME: &'static str = "extruder";
@@ -80,13 +81,13 @@ impl Dialect for Extruder {
 }
 
 /// What the link to an extruder reports, with the time of arrival.
-pub type LineEvent = LinkEvent<ExtruderLimits, ExtruderStatus>;
+pub type ExtruderLineEvent = LinkEvent<ExtruderLimits, ExtruderStatus>;
 
 /// An extruder at the other end of a TCP connection that is kept up.
 #[derive(Debug)]
 pub struct ExtruderClient {
     config: ExtruderConfig,
-    client: Client<Extruder>,
+    client: Client<ExtruderDialect>,
 }
 
 impl ExtruderClient {
@@ -95,7 +96,7 @@ impl ExtruderClient {
     pub fn start(
         config: ExtruderConfig,
         clock: RunClock,
-        report: impl Fn(LineEvent) -> bool + Send + 'static,
+        report: impl Fn(ExtruderLineEvent) -> bool + Send + 'static,
     ) -> Result<Self, StartError> {
         if !(MIN_VALID_MS..=MAX_VALID_MS).contains(&config.valid_ms) {
             return Err(StartError::Valid { found: config.valid_ms });
@@ -119,8 +120,12 @@ impl ExtruderClient {
 }
 
 impl ExtruderConfig {
-    fn line(&self, open: &Open<Extruder>, command: ExtruderCommand) -> Result<String, SendError> {
-        let status = open.newest.ok_or(SendError::NoState { device: Extruder::NAME })?;
+    fn line(
+        &self,
+        open: &Open<ExtruderDialect>,
+        command: ExtruderCommand,
+    ) -> Result<String, SendError> {
+        let status = open.newest.ok_or(SendError::NoState { device: ExtruderDialect::NAME })?;
         if let Some(why) = self.range.unfit(&open.hello, on_wire) {
             return Err(SendError::Unfit(why));
         }

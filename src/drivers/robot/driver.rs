@@ -14,7 +14,7 @@ use crate::run::ports::{RobotEvent, RobotPort};
 
 /// A robot driver as a cell chooses it.
 #[derive(Debug)]
-pub struct Registration {
+pub struct RobotRegistration {
     /// Its name in `driver` of `[robot]`.
     pub name: &'static str,
     /// What its robots can do.

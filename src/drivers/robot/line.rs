@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Capabilities, Registration, RobotDriver, RobotStart};
+use super::{Capabilities, RobotDriver, RobotRegistration, RobotStart};
 use crate::control::step::Command;
 use crate::core::robot::{RobotLimits, RobotMode};
 use crate::core::time::Stamp;
@@ -17,7 +17,7 @@ use crate::link::{LineError, MAX_VALID_MS, MIN_VALID_MS, PcLine, RobotLine, Robo
 use crate::run::ports::{RobotPort, SendError, Sent};
 
 /// The driver in the list of all.
-pub const REGISTRATION: Registration = Registration {
+pub const REGISTRATION: RobotRegistration = RobotRegistration {
     name: "line",
     capabilities: Capabilities {
         reports_limits: true,
@@ -52,7 +52,7 @@ impl RobotDriver for LineRobot {
         let RobotStart { clock, min, max, valid_ms, events, .. } = start;
         let (address, timing) = (self.address.clone(), LinkTiming::default());
         let config = LinkConfig { address, min, max, valid_ms, timing };
-        let report = move |event: LineEvent| events.send(event.into()).is_ok();
+        let report = move |event: RobotLineEvent| events.send(event.into()).is_ok();
         Ok(Box::new(LinkClient::start(config, clock, report)?))
     }
 }
@@ -75,9 +75,9 @@ pub struct LinkConfig {
 
 /// A robot at the other end.
 #[derive(Debug, Clone, Copy)]
-pub struct Robot;
+pub struct RobotDialect;
 
-impl Dialect for Robot {
+impl Dialect for RobotDialect {
     type Hello = RobotLimits;
     type State = RobotStatus;
     const NAME: &'static str = "robot";
@@ -92,13 +92,13 @@ impl Dialect for Robot {
 }
 
 /// What the link to a robot reports, with the time of arrival.
-pub type LineEvent = LinkEvent<RobotLimits, RobotStatus>;
+pub type RobotLineEvent = LinkEvent<RobotLimits, RobotStatus>;
 
 /// A robot at the other end of a TCP connection that is kept up.
 #[derive(Debug)]
 pub struct LinkClient {
     config: LinkConfig,
-    client: Client<Robot>,
+    client: Client<RobotDialect>,
 }
 
 impl LinkClient {
@@ -107,7 +107,7 @@ impl LinkClient {
     pub fn start(
         config: LinkConfig,
         clock: RunClock,
-        report: impl Fn(LineEvent) -> bool + Send + 'static,
+        report: impl Fn(RobotLineEvent) -> bool + Send + 'static,
     ) -> Result<Self, StartError> {
         if !(MIN_VALID_MS..=MAX_VALID_MS).contains(&config.valid_ms) {
             return Err(StartError::Valid { found: config.valid_ms });
@@ -140,8 +140,8 @@ impl LinkClient {
 }
 
 impl LinkConfig {
-    fn setpoint(&self, open: &Open<Robot>, speed: MmPerS) -> Result<PcLine, SendError> {
-        let state = open.newest.ok_or(SendError::NoState { device: Robot::NAME })?;
+    fn setpoint(&self, open: &Open<RobotDialect>, speed: MmPerS) -> Result<PcLine, SendError> {
+        let state = open.newest.ok_or(SendError::NoState { device: RobotDialect::NAME })?;
         if !matches!(state.mode, RobotMode::Print | RobotMode::Hold) {
             return Err(SendError::NotPrinting { mode: state.mode });
         }

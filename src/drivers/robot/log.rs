@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use crossbeam_channel::{RecvTimeoutError, Sender, unbounded};
 
-use super::{Capabilities, Registration, RobotDriver, RobotStart};
+use super::{Capabilities, RobotDriver, RobotRegistration, RobotStart};
 use crate::control::step::Command;
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::time::Stamp;
@@ -21,7 +21,7 @@ use crate::drivers::StartError;
 use crate::run::ports::{RobotEvent, RobotPort, SendError, Sent};
 
 /// The driver in the list of all.
-pub const REGISTRATION: Registration = Registration {
+pub const REGISTRATION: RobotRegistration = RobotRegistration {
     name: "log",
     capabilities: Capabilities {
         reports_limits: true,

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use crate::core::refusal::RefusalReason;
 use crate::core::time::Span;
-use crate::drivers::extruder::{CommandRange, ExtruderDriver};
+use crate::drivers::extruder::{DriveRange, ExtruderDriver};
 use crate::extruder::{ExtruderLimits, ExtruderState, PumpMode};
 use crate::run::ports::ExtruderEvent;
 
 /// What the control thread keeps of its extruder.
 pub struct ExtruderWatch {
     driver: Arc<dyn ExtruderDriver>,
-    range: CommandRange,
+    range: DriveRange,
     period: Span,
     /// The state that the operator was told last.
     pub(super) shown: ExtruderState,
@@ -23,7 +23,7 @@ pub struct ExtruderWatch {
 impl ExtruderWatch {
     /// Of an extruder that has not been heard of, with the time from one step
     /// of its side to the next.
-    pub fn new(driver: Arc<dyn ExtruderDriver>, range: CommandRange, period: Span) -> Self {
+    pub fn new(driver: Arc<dyn ExtruderDriver>, range: DriveRange, period: Span) -> Self {
         let (shown, refused) = (ExtruderState::Off, Vec::new());
         Self { driver, range, period, shown, refused, pump: None }
     }

@@ -12,7 +12,7 @@ use crate::run::ports::{ExtruderEvent, RecordError, RobotEvent};
 
 /// One thing that happened.
 #[derive(Debug)]
-pub enum Input {
+pub enum LiveInput {
     /// The capture pipeline has something.
     Camera(CameraMessage),
     /// The capture pipeline has ended without a word.
@@ -35,7 +35,7 @@ pub trait Inputs {
     fn now(&self) -> Stamp;
 
     /// Waits for what happens next, at most until a time; none at that time.
-    fn next(&mut self, until: Stamp) -> Option<Input>;
+    fn next(&mut self, until: Stamp) -> Option<LiveInput>;
 
     /// Nothing of the camera is wanted any more.
     fn ignore_camera(&mut self);
@@ -62,7 +62,7 @@ impl Inputs for LiveInputs {
         self.clock.now()
     }
 
-    fn next(&mut self, until: Stamp) -> Option<Input> {
+    fn next(&mut self, until: Stamp) -> Option<LiveInput> {
         loop {
             let wait = (until - self.clock.now()).max(Span::ZERO);
             let wait = Duration::from_nanos(u64::try_from(wait.ns()).unwrap_or(0));
@@ -70,34 +70,34 @@ impl Inputs for LiveInputs {
                 recv(self.camera) -> message => return Some(message.map_or_else(
                     |_| {
                         self.camera = never();
-                        Input::CameraGone
+                        LiveInput::CameraGone
                     },
-                    Input::Camera,
+                    LiveInput::Camera,
                 )),
                 recv(self.robot) -> message => return Some(message.map_or_else(
                     |_| {
                         self.robot = never();
-                        Input::DeviceGone
+                        LiveInput::DeviceGone
                     },
-                    Input::Robot,
+                    LiveInput::Robot,
                 )),
                 recv(self.extruder) -> message => return Some(message.map_or_else(
                     |_| {
                         self.extruder = never();
-                        Input::DeviceGone
+                        LiveInput::DeviceGone
                     },
-                    Input::Extruder,
+                    LiveInput::Extruder,
                 )),
                 recv(self.alarm) -> message => {
                     // A recorder whose sender is gone has nothing to complain about.
                     self.alarm = never();
                     if let Ok(error) = message {
-                        return Some(Input::RecordingLost(error));
+                        return Some(LiveInput::RecordingLost(error));
                     }
                 }
                 recv(self.stop) -> _ => {
                     self.stop = never();
-                    return Some(Input::StopRequested);
+                    return Some(LiveInput::StopRequested);
                 }
                 default(wait) => return None,
             }
