@@ -31,6 +31,7 @@ mod process;
 mod recorded;
 mod replay;
 mod run;
+mod schema;
 mod sim;
 mod simulate;
 mod simulated_cell;

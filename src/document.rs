@@ -2,6 +2,7 @@
 //! every violation on the way, with its line, instead of ending at the first.
 
 pub mod csv;
+pub mod describe;
 mod file_text;
 mod keys;
 mod problem;

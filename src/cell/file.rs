@@ -15,8 +15,8 @@ use super::extruder::{BeadStart, CellContext};
 use crate::calibration::{Calibration, SurfaceMap};
 use crate::core::frame::Channel;
 use crate::core::units::Mm;
-use crate::document::Problems;
-use crate::document::{Document, Table};
+use crate::document::describe::{KeySpec, describe};
+use crate::document::{Document, Problems, Table};
 use crate::scenario::table;
 use crate::scenario::table::{Simulation, WidthSource};
 use crate::vision::Gauge;
@@ -127,6 +127,13 @@ impl Cell {
         let folder = file.parent().unwrap_or(Path::new(""));
         let cell = read_cell(&document.root(), folder, drivers);
         document.finish(cell)
+    }
+
+    /// Every key that a cell file may have, with those of the drivers.
+    pub fn keys<D: DriverTables>(drivers: impl Fn() -> D) -> Vec<KeySpec> {
+        describe(|root| {
+            let _ = read_cell(root, Path::new(""), &mut drivers());
+        })
     }
 }
 

@@ -11,6 +11,7 @@ use nalgebra::Point3;
 use super::arguments::WrongArguments;
 use super::arguments::check_writable;
 use super::print::warn;
+use super::schema;
 use crate::assembly::{ExtruderSide, LoadedCell, range_warning, read_cell, steady_state};
 use crate::calibration::Calibration;
 use crate::cell::file::{ImageSource, Purpose, RunPart};
@@ -38,24 +39,36 @@ one.
   truebead check my-cell.toml --report calibration.html
 
 draws what the calibration leaves in a width, all over the image, with the gauge
-in it.")]
+in it.
+
+  truebead check --schema > cell.schema.json
+
+is for an editor: `#:schema cell.schema.json` in the first line of a cell file.")]
 pub struct CheckArgs {
     /// Cell file
-    cell: PathBuf,
+    #[arg(required_unless_present = "schema")]
+    cell: Option<PathBuf>,
     /// Page to write: what the calibration leaves in a width, all over the image, with
     /// the gauge in it
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    /// Print the JSON Schema of cell files instead, for editors that complete TOML by one
+    #[arg(long, exclusive = true)]
+    schema: bool,
 }
 
 /// Runs the command; the findings go to standard output.
 pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
+    let Some(cell) = &args.cell else {
+        say!("{:#}", schema::of_a_cell());
+        return Ok(ExitCode::SUCCESS);
+    };
     if let Some(report) = &args.report {
         check_writable("report", report)?;
     }
-    let loaded = LoadedCell::read(&args.cell, Purpose::Measure)?;
+    let loaded = LoadedCell::read(cell, Purpose::Measure)?;
     check_height(&loaded)?;
-    let run = read_cell(&args.cell, &loaded.text, Purpose::Run);
+    let run = read_cell(cell, &loaded.text, Purpose::Run);
     let run = run.map(|(cell, devices)| LoadedCell { cell, devices, ..loaded.clone() });
     // Everything that the extruder's strategy refers to, before anything is called
     // sound.
@@ -65,7 +78,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     }
     run.as_ref().map_or(Ok(()), LoadedCell::check_camera_offset)?;
     check_gauge(&loaded)?;
-    say!("{}: sound", args.cell.display());
+    say!("{}: sound", cell.display());
     say!("  calibration  {}", loaded.calibration_words());
     if let Calibration::Full { image_size_px: [width, height], .. } = loaded.calibration {
         say!("  images       {width}x{height} px");

@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::describe::Describer;
 use super::file_text::FileText;
 use super::keys::{resembles, shared_ends};
 use super::renamed::present_name;
@@ -22,6 +23,8 @@ pub struct Table<'a> {
     strict: bool,
     asked: RefCell<BTreeSet<&'static str>>,
     unknown_keys_allowed: Cell<bool>,
+    /// Notes down what is asked for, where no file is read.
+    describer: Option<&'a Describer>,
 }
 
 impl<'a> Table<'a> {
@@ -35,7 +38,36 @@ impl<'a> Table<'a> {
             strict: true,
             asked: RefCell::default(),
             unknown_keys_allowed: Cell::new(false),
+            describer: None,
         }
+    }
+
+    /// The outermost table of a file that is not there.
+    pub(super) fn described(text: &'a FileText<'a>, describer: &'a Describer) -> Self {
+        Table {
+            text,
+            path: String::new(),
+            items: None,
+            line: None,
+            strict: true,
+            asked: RefCell::default(),
+            unknown_keys_allowed: Cell::new(false),
+            describer: Some(describer),
+        }
+    }
+
+    /// Whether no file is read, with what notes down the questions.
+    pub(super) const fn describer(&self) -> Option<&'a Describer> {
+        self.describer
+    }
+
+    pub(super) fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// Whether the key stands in the file, which is no question of the reader's own.
+    pub(super) fn stands(&self, key: &'static str) -> bool {
+        self.get(key).is_some()
     }
 
     /// Lets unknown keys of this table pass: which there may be hangs on one
@@ -54,6 +86,7 @@ impl<'a> Table<'a> {
             strict,
             asked: RefCell::default(),
             unknown_keys_allowed: Cell::new(false),
+            describer: self.describer,
         }
     }
 
@@ -81,11 +114,22 @@ impl<'a> Table<'a> {
 
     /// Whether the key stands in the file.
     pub fn has(&self, key: &'static str) -> bool {
-        self.get(key).is_some()
+        match self.describer {
+            Some(describer) => {
+                let words = ["not given", "given"].map(str::to_owned);
+                describer.answer(&self.path, key, words.to_vec()) == 1
+            }
+            None => self.stands(key),
+        }
     }
 
     /// A table within this one; `None` where there is none.
     pub fn table(&self, key: &'static str) -> Option<Table<'a>> {
+        if let Some(describer) = self.describer {
+            let words = ["given", "not given"].map(str::to_owned);
+            let stands = describer.answer(&self.path, key, words.to_vec()) == 0;
+            return stands.then(|| self.child(key, None, true));
+        }
         match self.get(key)?.get_ref() {
             DeValue::Table(items) => Some(self.child(key, Some(items), true)),
             other => {
@@ -97,7 +141,7 @@ impl<'a> Table<'a> {
 
     /// A table within this one, empty where there is none.
     pub fn table_or_empty(&self, key: &'static str) -> Option<Table<'a>> {
-        if self.has(key) { self.table(key) } else { Some(self.child(key, None, true)) }
+        if self.stands(key) { self.table(key) } else { Some(self.child(key, None, true)) }
     }
 
     /// A table that only a run needs: there it must be and must be complete,
@@ -121,7 +165,10 @@ impl<'a> Table<'a> {
 
     /// A table that must be there.
     pub fn required_table(&self, key: &'static str) -> Option<Table<'a>> {
-        if !self.has(key) {
+        if self.describer.is_some() {
+            return Some(self.child(key, None, true));
+        }
+        if !self.stands(key) {
             self.report(key, "nothing", format!("a table [{}]", self.key_path(key)));
         }
         self.table(key)

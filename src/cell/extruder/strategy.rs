@@ -110,7 +110,9 @@ impl Strategy {
                 let range = context
                     .limits
                     .map_or((*ANY_COMMAND.start(), *ANY_COMMAND.end()), |limits| limits.range());
-                table.number(key, range.0..=range.1).map(|value| Self::Constant { value })
+                table
+                    .number_within(key, range.0..=range.1, "the limits of the command")
+                    .map(|value| Self::Constant { value })
             }
             StrategyWord::Profile => {
                 table.text("profile").map(|file| Self::Profile { file: context.folder.join(file) })
