@@ -2,12 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use structure::tree::Tree;
-use structure::{circles, uses};
+use structure::{circles, constants, uses};
 
 /// Every room with the rooms that it may use. A room stands after all that it uses, so
 /// that there is no circle.
@@ -271,4 +271,29 @@ fn the_core_opens_nothing_and_reads_no_clock() {
             }
         }
     }
+}
+
+/// Numeric constants whose origin is not stated, by file: `file count`.
+const UNSOURCED: &str = include_str!("unsourced.txt");
+
+#[test]
+fn no_file_has_more_constants_without_a_source_than_are_listed() {
+    let mut found: BTreeMap<String, usize> = BTreeMap::new();
+    for constant in constants::numeric(&tree()).iter().filter(|constant| !constant.sourced) {
+        *found.entry(constant.file.display().to_string()).or_default() += 1;
+    }
+    let listed: BTreeMap<String, usize> = UNSOURCED
+        .lines()
+        .map(|line| line.split_once(' ').unwrap())
+        .map(|(file, count)| (file.to_owned(), count.parse().unwrap()))
+        .collect();
+    let changed: Vec<String> = found
+        .keys()
+        .chain(listed.keys())
+        .collect::<BTreeSet<_>>()
+        .into_iter()
+        .filter(|file| found.get(*file) != listed.get(*file))
+        .map(|file| format!("{file}: {:?} found, {:?} listed", found.get(file), listed.get(file)))
+        .collect();
+    assert!(changed.is_empty(), "cite a source, or lower the list: {changed:#?}");
 }
