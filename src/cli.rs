@@ -1,4 +1,4 @@
-//! What a person types: one file a command.
+//! The commands: one file each.
 //!
 //! Results go to standard output or files, everything else to standard error.
 //! Exit status: 0 done; 1 failed, or a verdict that is "no"; 2 wrong arguments
@@ -144,7 +144,7 @@ pub fn main() -> ExitCode {
     })
 }
 
-/// Sends the library's words to standard error.
+/// Sends the library's messages to standard error.
 fn listen(cli: &Cli) {
     let level = match (cli.quiet, cli.verbose) {
         (true, _) => "error",

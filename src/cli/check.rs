@@ -1,4 +1,4 @@
-//! `truebead check`: whether a cell file is sound, and what it suffices for.
+//! `truebead check`: whether a cell file is valid, and for which commands it is ready.
 
 mod calibration_map;
 
@@ -8,8 +8,7 @@ use std::process::ExitCode;
 use clap::Args;
 use nalgebra::Point3;
 
-use super::arguments::WrongArguments;
-use super::arguments::check_writable;
+use super::arguments::{WrongArguments, check_writable};
 use super::print::warn;
 use crate::assembly::{ExtruderSide, LoadedCell, range_warning, steady_state};
 use crate::calibration::Calibration;
@@ -21,9 +20,9 @@ use crate::core::units::Mm;
 use crate::extruder::start_stop::Pause;
 use crate::width_control::strategy::distance::DistanceStrategy;
 
-/// Ratio of speeds in one cell that nobody means.
+/// Ratio of the speed limits above which one of them has a wrong unit.
 const MAX_SPEED_RATIO: f64 = 200.0;
-/// Distance of the camera that nobody means.
+/// Offset of the camera below which it has a wrong unit.
 const MIN_CAMERA_OFFSET: Mm = Mm::constant(0.5);
 
 /// Validates a cell file and all it refers to.
@@ -57,8 +56,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     check_height(&loaded)?;
     let run = Cell::parse(&args.cell, &loaded.text, Purpose::Run);
     let run = run.map(|cell| LoadedCell { cell, ..loaded.clone() });
-    // Everything that the extruder's strategy refers to, before anything is called
-    // sound.
+    // All files of the extruder's strategy are checked before the cell is called sound.
     let side = run.as_ref().map_or(Ok(None), LoadedCell::extruder)?;
     if let Some(side) = &side {
         warn(&side.warnings);
@@ -101,17 +99,17 @@ fn above_surface_mm(loaded: &LoadedCell) -> Option<f64> {
 fn check_height(loaded: &LoadedCell) -> Result<(), WrongArguments> {
     let height = loaded.cell.surface_height;
     match above_surface_mm(loaded) {
-        Some(above) if above <= 0.0 => Err(WrongArguments::new(format!(
+        Some(above) if above <= 0.0 => Err(wrong!(
             "{}: calibration.surface_height_mm: found {height}, expected less than the camera's \
              {:.1} mm above the bed",
             loaded.path.display(),
             above + height.get()
-        ))),
+        )),
         _ => Ok(()),
     }
 }
 
-/// Tells where a cell uses a calibration beyond what it was made for.
+/// Warns where a cell uses a calibration beyond the boards that it was made from.
 fn about_surface(loaded: &LoadedCell) {
     let (height, roi) = (loaded.cell.surface_height, loaded.cell.gauge.roi);
     let has_sigma = loaded.cell.surface_height_sigma > Mm::ZERO;
@@ -156,8 +154,8 @@ fn about_surface(loaded: &LoadedCell) {
     }
 }
 
-/// What a cell suffices for that has all that a run needs of a robot's side,
-/// and what is missing of the extruder's for the rest.
+/// Prints the commands for which a cell with a complete robot side is ready, and what its extruder
+/// lacks for the others.
 fn about_purposes(run: &RunPart) {
     let (reached, answered) = run
         .extruder
@@ -180,7 +178,7 @@ fn about_purposes(run: &RunPart) {
     }
 }
 
-/// Tells of the extruder side, with all that it refers to.
+/// Prints the extruder side, with the files that it refers to.
 fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::Result<()> {
     let part = loaded.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
     let Some(part) = part else { return Ok(()) };
@@ -217,7 +215,7 @@ fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::R
     Ok(())
 }
 
-/// Tells of what is known ahead: starts, stops and the plan of a job.
+/// Prints what is known ahead: starts, stops and the plan of a job.
 fn about_starts_and_plan(side: &ExtruderSide) {
     if let Some(timing) = &side.setup.timing {
         let pause = Pause { idle: Span::from_secs(300.0), flow_before: timing.conditions().flow };
@@ -249,16 +247,16 @@ fn check_gauge(loaded: &LoadedCell) -> Result<(), WrongArguments> {
     if roi.fits(Size::new(width as usize, height as usize)) {
         return Ok(());
     }
-    Err(WrongArguments::new(format!(
+    Err(wrong!(
         "{}: gauge.roi_px: found columns to {} and rows to {}, expected a gauge within the \
          {width}x{height} px that were calibrated",
         loaded.path.display(),
         roi.x + roi.width,
         roi.y + roi.height
-    )))
+    ))
 }
 
-/// Tells what the width is held by, where it is not the PI law.
+/// Prints the strategy, where it is not PI control.
 fn about_controller(loaded: &LoadedCell, run: &RunPart) {
     if let Some(steps) = loaded.cell.steps(run, &loaded.calibration) {
         let (slow, fast) = steps.speeds();

@@ -2,7 +2,7 @@
 
 use clap::error::{ContextKind, ContextValue};
 
-/// Commands of old and where they are.
+/// Former commands with their present names.
 const COMMANDS: [(&str, &str); 12] = [
     ("board", "camera board"),
     ("verify", "camera verify"),
@@ -22,7 +22,7 @@ const COMMANDS: [(&str, &str); 12] = [
 const OPTIONS: [(&str, &str); 2] =
     [("--starts", "extruder starts"), ("--noise", "extruder noise --column")];
 
-/// What is said of a name that has changed; none of another mistake.
+/// The message for a name that has changed; none for another mistake.
 pub fn refusal(error: &clap::Error) -> Option<String> {
     let found = |kind| match error.get(kind) {
         Some(ContextValue::String(name)) => Some(name.as_str()),
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn another_mistake_is_told_as_it_is() {
+    fn another_mistake_keeps_its_message() {
         assert_eq!(refusal(&parsed("simulated")), None);
         assert_eq!(refusal(&parsed("run --fast")), None);
     }

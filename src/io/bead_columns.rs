@@ -15,7 +15,7 @@ use crate::io::recording::{RecordedEntry, RecordingError};
 /// Name of the command's column, before its unit.
 pub const COMMAND: &str = "command";
 
-/// What has to be known of the cell.
+/// Facts of the cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CellFacts {
     /// Unit of the extruder's command, where it is commanded.
@@ -26,17 +26,17 @@ pub struct CellFacts {
     pub offset: Mm,
 }
 
-/// What a recording holds.
+/// The contents of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BeadColumns {
     /// Columns, on the clock of the run; those without a sample are left out.
     pub columns: Vec<TimeSeries>,
-    /// What the reader should know of them.
+    /// Remarks about them.
     pub notes: Vec<String>,
 }
 
-/// The columns of one bead: the longest stretch over which the robot lays bead
-/// and the pump, where it reports, runs. Fails where the recording cannot be
+/// The columns of one bead: the longest interval over which the robot lays bead and the pump,
+/// where it reports, runs. Fails where the recording cannot be
 /// read on.
 pub fn columns(
     entries: impl IntoIterator<Item = Result<RecordedEntry, RecordingError>>,
@@ -53,7 +53,7 @@ pub fn columns(
     Ok(collector.finish(facts))
 }
 
-/// A stretch of time \[s\].
+/// An interval of time \[s\].
 #[derive(Debug, Clone, Copy)]
 struct BeadInterval {
     from_s: f64,
@@ -66,7 +66,7 @@ impl BeadInterval {
     }
 }
 
-/// Stretches of time over which something is so.
+/// Intervals over which a condition holds.
 #[derive(Debug, Default)]
 struct Intervals {
     all: Vec<BeadInterval>,
@@ -154,8 +154,7 @@ impl ColumnCollector {
         }
     }
 
-    /// The longest stretch of a bead with a running pump, and how many there
-    /// are.
+    /// The longest interval of a bead with a running pump, and the number of all.
     fn longest_interval(&self) -> (Option<BeadInterval>, usize) {
         let both = |bead: &BeadInterval| -> Vec<BeadInterval> {
             if !self.has_pump {
@@ -165,7 +164,7 @@ impl ColumnCollector {
                 from_s: pump.from_s.max(bead.from_s),
                 to_s: pump.to_s.min(bead.to_s),
             });
-            cut.filter(|stretch| stretch.length_s() > 0.0).collect()
+            cut.filter(|interval| interval.length_s() > 0.0).collect()
         };
         let all: Vec<BeadInterval> = self.laying.all.iter().flat_map(both).collect();
         let longest = all.iter().max_by(|a, b| a.length_s().total_cmp(&b.length_s()));
@@ -198,7 +197,7 @@ impl ColumnCollector {
     }
 }
 
-/// One bead as robot and camera tell of it.
+/// One bead in the reports of robot and camera.
 struct BeadSeries {
     path: TimeSeries,
     speed: TimeSeries,
@@ -241,7 +240,7 @@ impl BeadSeries {
         ([width, flow], note)
     }
 
-    /// When the nozzle first was at a place of the path \[s\].
+    /// When the nozzle first was at a position on the path \[s\].
     fn time_at(&self, position: f64) -> Option<f64> {
         let after = self.path.values.partition_point(|path| *path < position);
         let before = after.checked_sub(1)?;

@@ -209,7 +209,7 @@ impl ControlThread<'_> {
             return;
         }
         let words = match &step.state {
-            State::Holding(why) => format!("holding: {}", names::in_words(names::hold(why))),
+            State::Holding(why) => format!("holding: {}", names::in_words(names::of(why))),
             State::Fault(why) => format!("fault: {}", names::in_words(&names::fault(why))),
             state => state.name().to_owned(),
         };

@@ -1,5 +1,5 @@
 //! A made-up run for the tests: a sine of a width, every state, a limit,
-//! refused frames, pictures. The same every time.
+//! rejected frames, images. The same every time.
 
 #![expect(
     clippy::cast_precision_loss,
@@ -16,15 +16,13 @@ use crate::core::frame::{Frame, Pixels};
 use crate::core::geometry::{ImagePoint, Roi, Size};
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::Stamp;
-use crate::core::units::WidthRange;
-use crate::core::units::{Mm, MmPerS, MmPerS2};
+use crate::core::units::{Mm, MmPerS, MmPerS2, WidthRange};
 use crate::report::run::RunPage;
 use crate::rows::frame_row::{ControlColumns, FrameRow, sample};
 use crate::rows::log::{ControlFacts, LogOptions};
 use crate::rows::summary::{RunNote, Summary};
 use crate::vision::{BeadAxis, Edges, Gauge, Polarity, WidthMeasurement};
-use crate::width_control::limiter::SpeedLimit;
-use crate::width_control::limiter::SpeedLimits;
+use crate::width_control::limiter::{SpeedLimit, SpeedLimits};
 
 const SIZE: (usize, usize) = (720, 540);
 const MM_PER_PX: f64 = 0.126_582;
@@ -234,7 +232,7 @@ pub fn process(folder: &Path) -> Summary {
 
 pub const HOURS_OF_FRAMES: u64 = 100_000;
 
-/// Three hours at ten frames a second, without pictures.
+/// Three hours at ten frames a second, without images.
 pub fn hours(folder: &Path) -> Summary {
     let mut log = RunPage::log(options(folder, "A long run", true)).unwrap();
     for frame in 0..HOURS_OF_FRAMES {

@@ -53,9 +53,7 @@ pub fn run(args: &SheetArgs) -> anyhow::Result<()> {
         Some("pdf") => sheet.pdf(),
         Some("svg") => sheet.svg().into_bytes(),
         _ => {
-            let what =
-                format!("--out {}: expected a name that ends in .pdf or .svg", args.out.display());
-            return Err(WrongArguments::new(what).into());
+            refuse!("--out {}: expected a name that ends in .pdf or .svg", args.out.display());
         }
     };
     write_atomic(&args.out, &bytes)?;

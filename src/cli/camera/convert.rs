@@ -22,8 +22,7 @@ pub fn run(args: &ConvertArgs, voice: Verbosity) -> anyhow::Result<()> {
     let (source, mut notes) = read(args)?;
     let text = match (&source, to) {
         (ConvertSource::Truebead(..), To::Truebead) => {
-            let what = format!("{}: it is truebead's already", args.input.display());
-            return Err(WrongArguments::new(what).into());
+            refuse!("{}: it is truebead's already", args.input.display());
         }
         (ConvertSource::Other(import), To::Truebead) => import::text(args, import, &mut notes)?,
         (source, To::Ros) => {
@@ -55,8 +54,8 @@ fn ends_in(path: &Path, endings: &[&str]) -> bool {
 const YAML: &[&str] = &["yaml", "yml"];
 const TOML: &[&str] = &["toml"];
 
-/// Whose file is wanted; its name must say what is in it, by which others choose how
-/// they read it.
+/// The format of the output; its name must have the ending by which other programs recognise
+/// it.
 fn target(args: &ConvertArgs) -> Result<To, WrongArguments> {
     let is_toml = ends_in(&args.out, TOML);
     let out = args.out.display();
@@ -110,12 +109,12 @@ fn check(args: &ConvertArgs, to: To) -> Result<(), WrongArguments> {
     }
 }
 
-/// What is converted.
+/// The source of a conversion.
 #[expect(clippy::large_enum_variant, reason = "there is one, read once")]
 enum ConvertSource {
-    /// A calibration of ours: what others can hold of it, and what the pictures said.
+    /// A calibration of truebead: its intrinsics, and its quality.
     Truebead(Intrinsics, Option<CalibrationQuality>),
-    /// A file of others.
+    /// A file of ROS or OpenCV.
     Other(Import),
 }
 
@@ -142,7 +141,7 @@ impl ConvertSource {
         }
     }
 
-    /// What a file of this format does not hold, in words; `None` where nothing is lost.
+    /// A note about the data that the format cannot hold; `None` where nothing is lost.
     fn left_out(&self, to: To) -> Option<String> {
         let is_given = |quality: &CalibrationQuality| {
             let CalibrationQuality {

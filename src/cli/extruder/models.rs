@@ -96,9 +96,7 @@ impl ModelsArgs {
             return Ok(None);
         };
         if !(self.tolerance_c >= 0.0 && nozzle_mm.is_finite() && temperature_c.is_finite()) {
-            return Err(WrongArguments::new(
-                "expected finite numbers, and a tolerance of 0 or more",
-            ));
+            refuse!("expected finite numbers, and a tolerance of 0 or more");
         }
         Ok(Some(ModelQuery {
             material: material.clone(),

@@ -99,8 +99,7 @@ impl PlanArgs {
         ];
         for (name, value, sound, expected) in numbers {
             if let Some(value) = value.filter(|value| !sound(*value)) {
-                let what = format!("{name} {value}: expected {expected}");
-                return Err(WrongArguments::new(what));
+                refuse!("{name} {value}: expected {expected}");
             }
         }
         Ok(())

@@ -53,13 +53,13 @@ fn of_gcode(
         apex_mm_per_s: args.apex_mm_per_s,
         ends: args.ends.unwrap_or(BeadEndsArgument::Rest).into(),
     };
-    let stretches = gcode::read(text, &settings).map_err(|error| wrong_job(&args.job, &error))?;
-    let bead = |stretch: gcode::GcodeBead| {
-        let name = format!("Along the bead from line {} on", stretch.line);
-        let nominal = stretch
+    let beads = gcode::read(text, &settings).map_err(|error| wrong_job(&args.job, &error))?;
+    let job_bead = |bead: gcode::GcodeBead| {
+        let name = format!("Along the bead from line {} on", bead.line);
+        let nominal = bead
             .nominal(extruder.accel_mm_per_s2)
-            .map_err(|error| wrong_job(&args.job, &format!("line {}: {error}", stretch.line)))?;
-        Ok(JobBead { name, nominal, position: stretch.position })
+            .map_err(|error| wrong_job(&args.job, &format!("line {}: {error}", bead.line)))?;
+        Ok(JobBead { name, nominal, position: bead.position })
     };
-    stretches.into_iter().map(bead).collect()
+    beads.into_iter().map(job_bead).collect()
 }

@@ -67,7 +67,7 @@ pub struct TuneArgs {
     pub controller: ControllerArg,
 }
 
-/// A law that is written.
+/// A strategy that is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ControllerArg {
     /// By distance
@@ -77,8 +77,8 @@ pub enum ControllerArg {
 }
 
 fn parse_fraction(text: &str) -> Result<f64, String> {
-    let share = text.trim().parse().ok().filter(|share| STEP_FRACTIONS.contains(share));
-    share.ok_or_else(|| {
+    let fraction = text.trim().parse().ok().filter(|value| STEP_FRACTIONS.contains(value));
+    fraction.ok_or_else(|| {
         format!("expected a share from {} to {}", STEP_FRACTIONS.start(), STEP_FRACTIONS.end())
     })
 }

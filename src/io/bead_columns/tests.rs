@@ -1,4 +1,4 @@
-//! A bead whose truth is known, told as a recording tells it.
+//! A bead whose truth is known, as a recording.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
@@ -22,7 +22,7 @@ fn flow(t: f64) -> f64 {
     400.0 + 60.0 * (2.0 * t).sin()
 }
 
-/// When the nozzle passed a place, by bisection.
+/// When the nozzle passed a position, by bisection.
 fn passed(place: f64) -> f64 {
     let halve = |(low, high): (f64, f64), _| {
         let middle = f64::midpoint(low, high);
@@ -78,7 +78,7 @@ fn bead(begins_s: f64, lasts_s: f64) -> Vec<RecordedEntry> {
         let captured_at = Stamp::from_secs(begins_s + t);
         let width_mm = Mm::constant(width);
         let measured = Event::Measured { frame: 0, captured_at, width_mm, sigma_mm: Mm::ZERO };
-        // The picture arrives later than it was taken.
+        // The frame arrives later than it was captured.
         (t + 0.07, measured)
     }));
     told.extend(each(0.02).map(|t| (t, Event::ExtruderTick)));

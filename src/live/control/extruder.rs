@@ -44,7 +44,7 @@ impl ControlThread<'_> {
         watch.shown = side.state;
         let words = match side.state {
             ExtruderState::Holding(why) => {
-                format!("holding: {}", names::in_words(names::extruder_hold(why)))
+                format!("holding: {}", names::in_words(names::of(why)))
             }
             ExtruderState::Fault(why) => {
                 format!("fault: {}", names::in_words(&names::extruder_fault(why)))

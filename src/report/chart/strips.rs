@@ -1,21 +1,23 @@
-//! Strips under a plot: what held from when to when.
+//! Strips under a plot: states, limits or rejected frames over time.
 
 use maud::{Markup, html};
 
 use super::area::{Area, LEFT, XAxis, round};
-use super::axis::Extent;
+use super::axis::PageExtent;
 use super::palette::Ink;
-use super::strip::{Segment, Strip};
+use super::strip::{Strip, StripSegment};
 use crate::rows::names::in_words;
 
+/// Height of a strip \[px of the drawing\].
 const ROW_HEIGHT: f64 = 20.0;
+/// Gap between strips \[px of the drawing\].
 const GAP: f64 = 8.0;
-/// Narrowest spell that is drawn, so that one frame among thousands is seen.
+/// Smallest width of a segment \[px of the drawing\], so that one frame among thousands is seen.
 const MIN_WIDTH: f64 = 1.6;
-/// Rough width of a letter of the labels.
+/// Approximate width of a letter of the labels \[px of the drawing\].
 const LETTER_WIDTH: f64 = 6.6;
 
-/// One strip with its name and the colour of each spell; none draws nothing.
+/// One strip with its name and the colour of each segment; a segment without one is not drawn.
 pub struct StripRow<'a> {
     /// Name at the left.
     pub name: &'a str,
@@ -41,7 +43,7 @@ pub fn draw(axis: &XAxis, rows: &[StripRow<'_>]) -> Markup {
 }
 
 fn draw_row(area: &Area, axis: &XAxis, row: &StripRow<'_>, y: f64) -> Markup {
-    let Extent { from: left, to: right } = area.across();
+    let PageExtent { from: left, to: right } = area.across();
     html! {
         text.title x=(LEFT - 8.0) y=(y + 14.5) text-anchor="end" { (row.name) }
         rect.lane x=(left) y=(y) width=(right - left) height=(ROW_HEIGHT) rx="2" {}
@@ -51,7 +53,7 @@ fn draw_row(area: &Area, axis: &XAxis, row: &StripRow<'_>, y: f64) -> Markup {
     }
 }
 
-fn draw_spell(area: &Area, axis: &XAxis, spell: &Segment, ink: Ink, y: f64) -> Markup {
+fn draw_spell(area: &Area, axis: &XAxis, spell: &StripSegment, ink: Ink, y: f64) -> Markup {
     let place = area.x(axis);
     let (from, to) = (round(place(spell.from)), round(place(spell.to)));
     let width = round((to - from).max(MIN_WIDTH));

@@ -5,12 +5,9 @@
 use super::*;
 use crate::core::quantity::{Quantity, Unit};
 use crate::identify::experiment::Rules;
-use crate::identify::fit::DeadTime;
-use crate::identify::fit::Structure;
-use crate::identify::model_file;
-use crate::identify::model_file::Conditions;
-use crate::sim::flow_log;
-use crate::sim::flow_log::FlowLog;
+use crate::identify::fit::{DeadTime, Structure};
+use crate::identify::model_file::{self, Conditions};
+use crate::sim::flow_log::{self, FlowLog};
 
 fn experiment(log: &FlowLog) -> Experiment {
     let rules = Rules::default();
@@ -139,7 +136,7 @@ fn a_drift_is_no_answer() {
     }
 }
 
-/// All forms that are compared where nothing is told.
+/// All forms that are compared by default.
 fn usual_forms() -> Vec<FitSettings> {
     [
         Structure::FirstOrder { zero: false },
@@ -162,7 +159,7 @@ fn a_drift_that_poles_and_zeros_take_up_is_refused_with_the_gain_without_it() {
             Err(NoModel::Drifts { steady, sigma, .. }) => {
                 assert!((steady - 19.05).abs() < 4.0 * sigma + 0.2, "{slope}: {steady}");
             }
-            // The least of them may be told beside the answer.
+            // The smallest of them may be reported beside the result.
             Ok(found) => {
                 let off = (found.fit.model.dc_gain() / 19.05 - 1.0).abs();
                 let told = found.warnings.iter().any(|warning| warning.contains("drift"));

@@ -55,8 +55,8 @@ impl Canvas {
             return;
         }
         let at = |along: f64| {
-            let share = (along / length).min(1.0);
-            (from.0 + dx * share, from.1 + dy * share)
+            let fraction = (along / length).min(1.0);
+            (from.0 + dx * fraction, from.1 + dy * fraction)
         };
         let mut along = 0.0;
         while along < length {

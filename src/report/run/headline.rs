@@ -3,45 +3,34 @@
 use maud::{Markup, html};
 
 use crate::extruder::ExtruderFault;
+use crate::report::html::{VerdictLevel, number};
 use crate::rows::names::{extruder_fault, in_words};
 use crate::rows::summary::{ControlSummary, ExtruderSummary, ProfileSummary, Summary};
 
-/// Share of what was wanted from which on an error is worth a word.
+/// Error, as a fraction of the target, above which the verdict mentions it.
 const FAR_OFF_ERROR: f64 = 0.05;
-/// Share of the time from which on a limit is.
+/// Fraction of the time above which the verdict mentions a limit.
 const LONG_LIMITED_FRACTION: f64 = 0.10;
 
 /// How a run went.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum VerdictLevel {
-    /// Nothing to worry about.
-    Good,
-    /// Something to look at.
-    Caution,
-    /// It failed at its task.
-    Bad,
-}
-
-/// How a run went, in plain words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Verdict {
-    /// In one word.
+    /// Its level.
     pub level: VerdictLevel,
-    /// In a few sentences.
+    /// A few sentences.
     pub text: String,
 }
 
-/// Judges a run. `max_rejected_share` is the share of refused frames that the
-/// cell bears.
-pub fn verdict(summary: &Summary, max_rejected_share: f64) -> Verdict {
+/// Judges a run. `max_rejected_fraction` is the cell's limit of rejected frames.
+pub fn verdict(summary: &Summary, max_rejected_fraction: f64) -> Verdict {
     let mut level = VerdictLevel::Good;
     let mut sentences = vec![width_sentence(summary)];
     if summary.measured == 0 {
         level = VerdictLevel::Bad;
-    } else if summary.rejected_fraction() > max_rejected_share {
+    } else if summary.rejected_fraction() > max_rejected_fraction {
         level = VerdictLevel::Caution;
     }
-    sentences.push(rejected_sentence(summary, max_rejected_share));
+    sentences.push(rejected_sentence(summary, max_rejected_fraction));
     if let Some(control) = &summary.control {
         let (control_level, more) = control_sentences(control);
         level = level.max(control_level);
@@ -90,7 +79,7 @@ fn width_sentence(summary: &Summary) -> String {
     }
 }
 
-/// Whether the extruder played a profile: the width then moves on purpose.
+/// Whether the extruder played a profile, which changes the width on purpose.
 fn is_excited(summary: &Summary) -> bool {
     summary.extruder.as_ref().is_some_and(|extruder| extruder.profile.is_some())
 }
@@ -116,7 +105,7 @@ fn held_sentence(control: &ControlSummary, target: f64) -> String {
     }
 }
 
-fn rejected_sentence(summary: &Summary, max_rejected_share: f64) -> String {
+fn rejected_sentence(summary: &Summary, max_rejected_fraction: f64) -> String {
     let share = (1.0 - summary.rejected_fraction()) * 100.0;
     let frames = summary.frames_with_bead();
     let of_bead = if frames == summary.frames { "" } else { " that could show bead" };
@@ -124,34 +113,33 @@ fn rejected_sentence(summary: &Summary, max_rejected_share: f64) -> String {
         "There was no frame at all.".to_string()
     } else if frames == 0 {
         "No frame could show bead: none was laid.".to_string()
-    } else if summary.rejected_fraction() > max_rejected_share {
+    } else if summary.rejected_fraction() > max_rejected_fraction {
         format!(
             "Only {share:.1} % of {frames} frames{of_bead} were measured; the cell asks for {:.0} %.",
-            (1.0 - max_rejected_share) * 100.0
+            (1.0 - max_rejected_fraction) * 100.0
         )
     } else {
         format!("{share:.1} % of {frames} frames{of_bead} were measured.")
     }
 }
 
-/// An error that nobody asked for: more than a twentieth of the target once
-/// settled or in all, or a limit that acted for a tenth of the run.
+/// An error of more than a twentieth of the target once settled or in all, or a limit that
+/// acted for a tenth of the run.
 fn far_off(control: &ControlSummary, summary: &Summary) -> Option<String> {
     let (error, target) = (control.width_error_rms_settled_mm?, summary.target_width_mm?);
     let share = control.limited_s / summary.duration_s.unwrap_or(f64::INFINITY);
-    if error > FAR_OFF_ERROR * target && !is_excited(summary) {
-        Some(format!("That is {:.0} % of the target.", 100.0 * error / target))
-    } else if let Some(sentence) = far_off_before(control, target).filter(|_| !is_excited(summary))
-    {
-        Some(sentence)
-    } else if share > LONG_LIMITED_FRACTION {
-        Some(format!("The robot stood at a limit for {:.0} % of the time.", 100.0 * share))
-    } else {
+    let far_off = if is_excited(summary) {
         None
-    }
+    } else if error > FAR_OFF_ERROR * target {
+        Some(format!("That is {:.0} % of the target.", 100.0 * error / target))
+    } else {
+        far_off_before(control, target)
+    };
+    let limited = || format!("The robot stood at a limit for {:.0} % of the time.", 100.0 * share);
+    far_off.or_else(|| (share > LONG_LIMITED_FRACTION).then(limited))
 }
 
-/// An error over all bead laid under control, as at a corner within what counts as settling.
+/// An error over all bead laid under control, such as at a corner during settling.
 fn far_off_before(control: &ControlSummary, target: f64) -> Option<String> {
     let (rms, worst) = (control.width_error_rms_mm?, control.width_error_worst?);
     (rms > FAR_OFF_ERROR * target).then(|| {
@@ -165,7 +153,7 @@ fn far_off_before(control: &ControlSummary, target: f64) -> Option<String> {
     })
 }
 
-/// What the extruder side did that one should know; nothing where it did well.
+/// Sentences about faults, holds and limits of the extruder side; none where it did well.
 fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
     let total: f64 = extruder.states_s.values().sum();
     let share = |seconds: f64| seconds / total.max(1e-9);
@@ -201,24 +189,19 @@ fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
 
 /// Whether a profile was played to its end, and whether the bead went on.
 fn profile_sentence(profile: &ProfileSummary) -> (VerdictLevel, String) {
-    let ProfileSummary {
-        duration_s: lasts_s,
-        played_fraction: played_share,
-        after_end_s: outlasted_s,
-    } = *profile;
-    if played_share < 1.0 {
-        let sentence = format!(
-            "The bead ended before the profile: {:.1} % of its {lasts_s:.1} s were played.",
-            100.0 * played_share
-        );
-        (VerdictLevel::Caution, sentence)
+    let ProfileSummary { duration_s, played_fraction, after_end_s } = *profile;
+    let sentence = if played_fraction < 1.0 {
+        format!(
+            "The bead ended before the profile: {:.1} % of its {duration_s:.1} s were played.",
+            100.0 * played_fraction
+        )
     } else {
-        let sentence = format!(
-            "The profile of {lasts_s:.1} s was played to its end; bead was laid for {outlasted_s:.1} s \
-             more, with its last command."
-        );
-        (VerdictLevel::Good, sentence)
-    }
+        format!(
+            "The profile of {duration_s:.1} s was played to its end; bead was laid for \
+             {after_end_s:.1} s more, with its last command."
+        )
+    };
+    (VerdictLevel::with_caution(played_fraction < 1.0), sentence)
 }
 
 fn control_sentences(control: &ControlSummary) -> (VerdictLevel, Vec<String>) {
@@ -305,8 +288,4 @@ fn spread(summary: &Summary) -> String {
         Some(target) => format!("{std}, target {target} mm"),
         None => format!("{std} mm from frame to frame"),
     }
-}
-
-fn number(value: Option<f64>, places: usize) -> String {
-    value.map_or("–".to_string(), |value| format!("{value:.places$}"))
 }

@@ -1,4 +1,4 @@
-//! What a reason for refusing a frame means, and what to do about it.
+//! Meaning and remedy of each reason for which a frame is rejected.
 
 /// Meaning and remedy of a status in `widths.csv`.
 pub fn of(status: &str) -> (&'static str, &'static str) {

@@ -9,7 +9,7 @@ use crate::tune::stability::LoopMargins;
 use crate::width_control::pi::PiGains;
 
 impl Tuned {
-    /// All that was found, foretold and proposed.
+    /// All findings, predictions and proposals.
     pub fn plain(&self) -> String {
         let mut text = String::new();
         for (name, words) in self.findings() {
@@ -25,7 +25,7 @@ impl Tuned {
         text
     }
 
-    /// What was found, by name and in words.
+    /// Findings, by name and in words.
     pub fn findings(&self) -> Vec<(&'static str, String)> {
         let plant = &self.plant;
         let (width, exponent, offset) = (plant.width_mm, plant.exponent, plant.offset_mm);
@@ -116,8 +116,8 @@ impl Tuned {
         )
     }
 
-    /// Names, gains and margins of the PI laws, each at the worst speed and at that of
-    /// the target.
+    /// Names, gains and margins of the PI controllers, each at the worst speed and at that of the
+    /// target.
     pub fn loops(&self) -> Vec<(String, PiGains, Option<LoopMargins>)> {
         let now = self.present_gains.iter().map(|(gains, _)| ("now", *gains));
         let settings = now.chain([("proposed", self.proposal.pi.gains)]);
@@ -216,12 +216,12 @@ fn row(text: &mut String, one: &BeadPrediction) {
     );
 }
 
-/// A margin that may have no end.
+/// A margin with its unit; it may be infinite.
 fn with_unit(margin: f64, words: impl Fn(f64) -> String) -> String {
     if margin.is_finite() { words(margin) } else { "no end".to_owned() }
 }
 
-/// Margins as they are told.
+/// Margins as they are printed.
 pub fn margin_words(margins: Option<LoopMargins>) -> [String; 4] {
     let Some(margins) = margins else { return ["–", "–", "–", "–"].map(str::to_owned) };
     if !margins.is_stable {

@@ -1,4 +1,4 @@
-//! What the law by distance made of the widths.
+//! The summary of the distance controller.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use crate::control::step::Step;
 use crate::width_control::distance::WidthUse;
 use crate::width_control::{DistanceTrace, FallbackReason};
 
-/// Widths by what became of them, and what was believed at last.
+/// Widths by their use, and the last estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DistanceSummary {
     /// Widths that were taken.
@@ -15,7 +15,7 @@ pub struct DistanceSummary {
     pub outliers: u64,
     /// Changes of the flow that were found.
     pub changes: u64,
-    /// Widths of bead whose speed was not known.
+    /// Widths of bead without a known speed.
     pub without_speed_history: u64,
     /// Width at the start speed \[mm\].
     pub level_mm: f64,
@@ -23,11 +23,11 @@ pub struct DistanceSummary {
     pub level_sigma_mm: f64,
     /// Exponent b.
     pub exponent: f64,
-    /// Where the camera seems to look \[mm\].
+    /// Estimated distance of the camera behind the nozzle \[mm\].
     pub offset_mm: f64,
     /// Period of a pulsation, where one was seen \[s\].
     pub pulsation_s: Option<f64>,
-    /// Why the PI law took over, if it did.
+    /// Why the PI controller took over, if it did.
     pub fallback_reason: Option<FallbackReason>,
 }
 
@@ -57,7 +57,7 @@ impl DistanceSummary {
     }
 }
 
-/// Adds up what became of widths.
+/// Counts the uses of widths.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct DistanceTally {
     counts: [u64; 4],
@@ -80,7 +80,7 @@ impl DistanceTally {
         self.last = Some(trace);
     }
 
-    /// The sum; none where the law was not asked for.
+    /// The sum; none without a distance controller.
     pub fn finish(&self) -> Option<DistanceSummary> {
         let last = self.last?;
         let [taken, outliers, changes, not_paired] = self.counts;

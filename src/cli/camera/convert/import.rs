@@ -1,4 +1,4 @@
-//! A camera of others becomes a calibration: the bed plane comes from pictures.
+//! From a camera of ROS or OpenCV to a calibration: the bed plane comes from images.
 
 use anyhow::Context;
 
@@ -7,16 +7,16 @@ use crate::calibration::board::{Board, Markers};
 use crate::calibration::equations::CameraModel;
 use crate::calibration::exchange::{Import, Intrinsics};
 use crate::calibration::{CalibrationQuality, file};
-use crate::cli::arguments::WrongArguments;
 use crate::cli::bed_plane::{BedPlane, BoardsOnBed, find_corners};
 use crate::cli::board_arguments::{InnerCorners, board_of};
 use crate::cli::print::print;
 use crate::core::units::Mm;
 
-/// Corners on the bed may be so far off \[px\]; beyond that the pictures do not belong
-/// to this camera, or the boards lay on no plane.
+/// Largest reprojection error (RMS) of corners on the bed \[px\]; beyond it the images are not of
+/// this camera, or the boards lay on no plane.
 const MAX_RMS_PX: f64 = 0.5;
-/// A sharp picture of a flat board and a sound lens leave less \[px\].
+/// Reprojection error (RMS) from which a note is printed \[px\]; a sharp image of a flat board
+/// with a valid lens model has less.
 const SUSPECT_RMS_PX: f64 = 0.3;
 
 /// The text of a calibration: the camera of others, and a bed plane from images.
@@ -26,7 +26,7 @@ pub fn text(
     notes: &mut Vec<String>,
 ) -> anyhow::Result<String> {
     let (Some(corners), Some(square)) = (args.board, args.square_mm) else {
-        return Err(WrongArguments::new("--plane needs --board and --square-mm").into());
+        refuse!("--plane needs --board and --square-mm");
     };
     let marks = args.marker_mm.map(|side| Markers { side, dictionary: args.dictionary });
     let board = board_of(corners, square, marks)?;

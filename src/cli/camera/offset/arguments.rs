@@ -101,8 +101,8 @@ fn parse_position(text: &str) -> Result<[f64; 2], String> {
 }
 
 impl OffsetArgs {
-    /// Options for a picture alone, and whether they were given.
-    pub fn of_picture(&self) -> [(&'static str, bool); 6] {
+    /// Options for an image alone, and whether they were given.
+    pub fn of_image(&self) -> [(&'static str, bool); 6] {
         [
             ("--board", self.board.board.is_some()),
             ("--square-mm or --marker-mm", self.board.is_part),
@@ -117,10 +117,9 @@ impl OffsetArgs {
     pub fn refuse(&self, kind: &str, options: &[(&str, bool)]) -> Result<(), WrongArguments> {
         match options.iter().find(|(_, given)| *given) {
             None => Ok(()),
-            Some((name, _)) => Err(WrongArguments::new(format!(
-                "{name} means nothing for {kind}, and {} is one",
-                self.input.display()
-            ))),
+            Some((name, _)) => {
+                Err(wrong!("{name} means nothing for {kind}, and {} is one", self.input.display()))
+            }
         }
     }
 }

@@ -8,8 +8,7 @@ use crate::numeric::savgol::SavGol;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Forms(pub Vec<Structure>);
 
-/// A dead time that is told, or where it is looked for; none for the usual
-/// range.
+/// A known dead time, or the range in which it is estimated; none for the default range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeadTimeArg(pub Option<DeadTime>);
 

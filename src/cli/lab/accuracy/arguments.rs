@@ -76,7 +76,7 @@ pub struct AccuracyArgs {
     pub out: Option<PathBuf>,
 }
 
-/// A scatter takes two.
+/// A standard deviation takes at least two trials.
 fn parse_trials(text: &str) -> Result<u64, String> {
     let count = text.trim().parse::<u64>().ok();
     count
