@@ -79,7 +79,7 @@ fn source(name: &str) -> Result<ImageSource, WrongArguments> {
 fn folder(args: &CalibrateArgs) -> Result<PathBuf, WrongArguments> {
     let beside = || {
         let stem = args.out.file_stem().unwrap_or(args.out.as_os_str()).to_string_lossy();
-        args.out.with_file_name(format!("{stem}-pictures"))
+        args.out.with_file_name(format!("{stem}-images"))
     };
     let folder = args.images.clone().unwrap_or_else(beside);
     let is_empty = match std::fs::read_dir(&folder) {

@@ -74,7 +74,7 @@ pub struct IdentifyArgs {
     )]
     pub dead_time_s: DeadTimeArg,
     /// Data to validate with, of the same columns
-    #[arg(long, value_name = "OTHER", conflicts_with = "validate_share")]
+    #[arg(long, value_name = "OTHER", conflicts_with = "validate_fraction")]
     pub validate: Option<PathBuf>,
     /// Last part of the data, kept to validate with [default: 0.3]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
@@ -144,7 +144,7 @@ impl IdentifyArgs {
         let source = path.display().to_string();
         let fraction = self.validate_fraction.unwrap_or(VALIDATE_FRACTION);
         if !(0.0..=0.9).contains(&fraction) {
-            refuse!("--validate-share {fraction}: expected 0 to 0.9");
+            refuse!("--validate-fraction {fraction}: expected 0 to 0.9");
         }
         let (estimation, validation) = match &self.validate {
             Some(other) => {
