@@ -46,7 +46,7 @@ use tracing_subscriber::EnvFilter;
 use print::Verbosity;
 use status::status_of;
 
-/// Keeps an extruded bead at the width that was asked for.
+/// Keeps an extruded bead at its target width.
 ///
 /// A camera looks at the fresh bead, its width is measured, and the robot's
 /// speed is corrected over TCP. Try `truebead demo` first: it runs the whole

@@ -54,7 +54,7 @@ fn the_camera_of_the_real_pictures_is_found() {
     let share = quality.unwrap().width_relative_sigma.unwrap();
     // The largest where boards were seen, with the design effect of a board that is bent.
     assert!((1e-4..2e-2).contains(&share), "{share}");
-    assert!(said.contains("a width is known to"), "{said}");
+    assert!(said.contains("uncertainty of a width"), "{said}");
     // The focal length that OpenCV's own samples give for these pictures.
     assert!((camera.focal_px[0] - 532.83).abs() < 0.8, "fx {}", camera.focal_px[0]);
     assert!((camera.centre_px[0] - 342.5).abs() < 1.5 && (camera.centre_px[1] - 233.9).abs() < 1.5);
@@ -220,10 +220,7 @@ fn pictures_that_are_no_good_are_left_out_and_say_why() {
     assert!(said.contains("12 of 20 images show the board"), "{said}");
     assert!(said.contains("boards      2 on one plane, to 0.0"), "{said}");
     let page = fs::read_to_string(scratch.path().join("report.html")).unwrap();
-    assert!(
-        page.contains("wrong-moved.png") && page.contains("What a width is known to"),
-        "{page}"
-    );
+    assert!(page.contains("wrong-moved.png") && page.contains("Uncertainty of a width"), "{page}");
     let Calibration::Full { camera: found, quality, .. } = calibration_file::read(&out).unwrap()
     else {
         unreachable!()

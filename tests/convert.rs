@@ -76,7 +76,7 @@ fn there_and_back_every_digit_stays_and_what_does_not_is_said() {
     calibration(&folder.join("calib.toml"));
     let mut run = convert(folder, "calib.toml --to ros --camera-name left_2 --out info.yaml");
     let said = errors(&run.assert().success());
-    for words in ["the bed plane and the robot's z", "how well a width is known", "keep the .toml"]
+    for words in ["the bed plane and the robot's z", "the uncertainty of a width", "keep the .toml"]
     {
         assert!(said.contains(words), "no \"{words}\" in {said}");
     }

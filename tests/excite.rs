@@ -39,7 +39,7 @@ fn profiles_are_written_as_a_cell_plays_them() {
     let unit = said(&mut excite("steps --levels 1,2 --hold-s 1 --quantity speed"), 2);
     assert!(unit.contains("ends with its unit"), "{unit}");
     let endless = said(&mut excite("gaussian --low 2 --high 4 --hold-s 1 --quantity drive_v"), 2);
-    assert!(endless.contains("tell --duration-s"), "{endless}");
+    assert!(endless.contains("give --duration-s"), "{endless}");
     let one = said(&mut excite("steps --levels 20 --hold-s 15 --quantity rpm"), 2);
     assert!(one.contains("1 level: a step takes two"), "{one}");
     let same = said(&mut excite("steps --levels 20,20 --hold-s 15 --quantity rpm"), 2);

@@ -224,7 +224,7 @@ fn a_plant_that_never_reports_what_is_gone_by_is_refused() {
 }
 
 #[test]
-fn check_says_what_a_cell_suffices_for_and_what_is_missing() {
+fn check_names_the_commands_that_a_cell_is_ready_for_and_what_is_missing() {
     let folder = tempfile::tempdir().unwrap();
     let checked = |changes: &[(&str, &str)]| {
         fs::write(folder.path().join("cell.toml"), changed(CELL, changes)).unwrap();
@@ -233,14 +233,14 @@ fn check_says_what_a_cell_suffices_for_and_what_is_missing() {
         String::from_utf8(output.stdout).unwrap()
     };
     let both = checked(&[]);
-    assert!(both.contains("suffices for run\n") && both.contains("suffices for simulate\n"));
+    assert!(both.contains("ready for run\n") && both.contains("ready for simulate\n"));
     let link = "driver = \"line\"                 # driver, address: for a live run only\n\
                 address = \"127.0.0.1:5654\"\n";
     let simulates = checked(&[(link, "")]);
-    assert!(simulates.contains("suffices for simulate\n"), "{simulates}");
+    assert!(simulates.contains("ready for simulate\n"), "{simulates}");
     assert!(simulates.contains("not for run;") && simulates.contains("extruder.driver"));
     let runs = checked(&[(plant(), "")]);
-    assert!(runs.contains("suffices for run\n"), "{runs}");
+    assert!(runs.contains("ready for run\n"), "{runs}");
     assert!(runs.contains("not for simulate;") && runs.contains("extruder_plant"), "{runs}");
 }
 

@@ -66,7 +66,7 @@ fn a_demo_tells_the_offset_of_its_cell() {
     assert!(is_the_demos(&answer), "{answer}");
     let too_near = said(&mut offset(&recording, &["--max-mm", "40"]), 1);
     assert!(
-        too_near.contains("does not tell the offset: the widths fit best at the end"),
+        too_near.contains("does not determine the offset: the widths fit best at the end"),
         "{too_near}"
     );
     let wrong = said(&mut offset(&recording, &["--nozzle-at", "-1,-1"]), 2);

@@ -36,13 +36,13 @@ one.
 
   truebead check my-cell.toml --report calibration.html
 
-draws what the calibration leaves in a width, all over the image, with the gauge
-in it.")]
+draws the uncertainty of a width by the calibration, over the image, with the
+gauge.")]
 pub struct CheckArgs {
     /// Cell file
     cell: PathBuf,
-    /// Page to write: what the calibration leaves in a width, all over the image, with
-    /// the gauge in it
+    /// Page to write: the uncertainty of a width by the calibration, over the image, with
+    /// the gauge
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
 }

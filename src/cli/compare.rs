@@ -26,11 +26,11 @@ Example:
 
 Each cell is a controller: its [control], [camera], [robot] and [limits]. The bead, what
 disturbs it and the measurement's noise are those of the first cell, [bead] and
-[simulation], and the same for all; how late a width comes and how often the robot
-reports is each cell's own.
+[simulation], and the same for all; the delay of a width and the rate of the robot's
+reports are each cell's own.
 
 Leaves compare.json and report.html, and prints the table. Errors are those of the bead
-itself, from 30 mm after control began, where simulate tells those that were measured; ±
+itself, from 30 mm after control began, where simulate has those of the measurement; ±
 is 95 % confidence of the mean over seeds, and where a bead settled is the median. A bead
 of level \"frames\" renders every frame and takes minutes.
 
@@ -46,8 +46,8 @@ pub struct CompareArgs {
     #[arg(long, value_name = "N", default_value_t = 100,
           value_parser = clap::value_parser!(u64).range(1..=100_000))]
     seeds: u64,
-    /// Widths that are asked for in place of the cells' own [mm]
-    /// [default: the first cell's, where it asks for one]
+    /// Target widths in place of the cells' own [mm]
+    /// [default: the first cell's, where it has one]
     #[arg(long, value_name = "W,W…", value_delimiter = ',')]
     widths: Vec<f64>,
 }

@@ -51,7 +51,7 @@ pub fn print_figures(summary: &Summary) {
         let kept = extruder.flow_controlled;
         if let (Some(error), Some(mean)) = (kept.error_rms_mm3_per_s, kept.mean_mm3_per_s) {
             say!(
-                "flow       {mean:.1} mm³/s on average, {error:.1} mm³/s RMS from what was wanted, \
+                "flow       {mean:.1} mm³/s on average, {error:.1} mm³/s RMS from the demand, \
                  since control began"
             );
         } else if let Some(mean) = extruder.flow_mean_mm3_per_s {
@@ -110,7 +110,7 @@ pub fn status(report: &LiveReport, max_rejected: f64) -> ExitCode {
         let why = match report.ending {
             Ending::LastFrame => "the camera's frames ended before the robot printed",
             _ if !connected => {
-                "no robot was heard; see that it listens where [robot] address says. Nothing was \
+                "no robot answered; see that it listens where [robot] address says. Nothing was \
                  laid"
             }
             _ => "the robot never printed; start its program. Nothing was laid",

@@ -226,7 +226,7 @@ impl BeadSeries {
         }
         let note = match facts.layer_height {
             None if !width.is_empty() => Some(
-                "there is no laid_flow_mm3_per_s: the cell has no layer height; tell it with \
+                "there is no laid_flow_mm3_per_s: the cell has no layer height; give it with \
                  --layer-height-mm"
                     .to_owned(),
             ),

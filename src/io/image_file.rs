@@ -32,7 +32,7 @@ pub enum DecodeError {
     #[error("it is not a PNG, JPEG, TIFF, BMP, PNM or WebP image")]
     UnknownFormat,
     /// A JPEG without its end, whose missing part would be decoded as grey.
-    #[error("it is cut off before its end")]
+    #[error("it is truncated")]
     Truncated,
     /// The format is known, the content is broken or not supported.
     #[error("it cannot be decoded: {0}")]

@@ -64,12 +64,12 @@ impl CalibrationPage<'_> {
         html! {
             div.about {
                 span { (kind) " " b { (columns) "x" (rows) " corners, " (self.board.square()) } }
-                span { "pictures " b { (self.solution.views.len()) " of " (self.images.len()) } }
+                span { "images " b { (self.solution.views.len()) " of " (self.images.len()) } }
                 span { "size " b { (width) "x" (height) " px" } }
                 span { "lens " b { (model) } }
                 span { "reprojection error " b { (format!("{:.3} px", self.solution.rms_px)) } }
                 @if let Some(px) = self.solution.cross_validation_px {
-                    span { "held out " b { (format!("{px:.3} px")) } }
+                    span { "left out " b { (format!("{px:.3} px")) } }
                 }
             }
         }
@@ -90,15 +90,15 @@ impl CalibrationPage<'_> {
                 @match (worst, self.maps.first()) {
                     (Some(worst), Some(map)) => {
                         (format!(
-                            "The width of a bead of {} mm is known to {worst:.4} mm (one standard \
-                             deviation) or better where boards were seen", map.bead_mm
+                            "The uncertainty of the width of a bead of {} mm is {worst:.4} mm (1 sigma) or \
+                             less where boards were seen", map.bead_mm
                         ))
                         @if let Some(limit) = self.limit_mm {
                             (format!("; {limit} mm is allowed"))
                         }
                         "."
                     }
-                    _ => "How well a width is known cannot be determined from these images."
+                    _ => "The uncertainty of a width cannot be determined from these images."
                 }
                 ul {
                     @for warning in &warnings { li { (warning) } }
@@ -120,7 +120,7 @@ impl CalibrationPage<'_> {
         html! {
             @for map in self.maps {
                 section {
-                    h2 { "What a width is known to, " (map.surface_height) " above the bed" }
+                    h2 { "Uncertainty of a width, " (map.surface_height) " above the bed" }
                     p.hint {
                         (format!(
                             "Standard deviation of the width of a bead of {} mm [mm] whose middle is \
@@ -141,11 +141,11 @@ impl CalibrationPage<'_> {
         let times = drawing::magnification(self.solution);
         html! {
             section {
-                h2 { "Where boards were seen, and what is left there" }
+                h2 { "Where boards were seen, and the residuals there" }
                 p.hint {
-                    "Each corner of each image, with its way from where the model expects it, "
+                    "Each corner of each image, with its residual, from where the model expects it, "
                     (format!("drawn {times:.0} times as long. "))
-                    "Ways that point the same in one part of the image are the lens's, ways that \
+                    "Residuals that point the same in one part of the image are the lens's, residuals that \
                      point the same on one board are the board's or its motion's."
                 }
                 (residuals(self.solution, times))

@@ -50,7 +50,7 @@ const QUANTITIES: [Quantity; 6] = [
     Quantity("RMS error over that of the first", "1", Average::Mean, |one| one.ratio),
     Quantity("settled within 0.5 mm after", "mm", Average::Median, |one| one.settled_mm),
     Quantity("integral of the error's size", "mm²", Average::Mean, |one| one.integral_mm2),
-    Quantity("scatter once settled", "mm", Average::Mean, |one| one.sigma_mm),
+    Quantity("standard deviation once settled", "mm", Average::Mean, |one| one.sigma_mm),
 ];
 
 impl Quantity {
@@ -162,7 +162,7 @@ impl ControllerComparison {
         let body = html! {
             p.hint { "The same bead and the same disturbances for all, " (self.seeds) " seeds each. \
                 Errors are those of the bead itself, from " (JUDGED_AFTER_MM) " mm after control \
-                began, scatter from " (SIGMA_AFTER_MM) " mm after; ± is 95 % confidence of the mean \
+                began, standard deviations from " (SIGMA_AFTER_MM) " mm after; ± is 95 % confidence of the mean \
                 over seeds. Where it settled is the median." }
             section {
                 h2 { "Numbers" }

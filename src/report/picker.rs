@@ -87,7 +87,7 @@ impl FramePicker {
         }
         let sigma = measured.sigma.get();
         if self.largest_sigma.as_ref().is_none_or(|(most, _)| sigma > most * MIN_SIGMA_RATIO) {
-            self.largest_sigma = Some((sigma, keep("least sure")));
+            self.largest_sigma = Some((sigma, keep("largest sigma")));
         }
         if self.measured.is_multiple_of(self.stride) {
             self.spread.push(keep(""));

@@ -104,7 +104,8 @@ impl Tuned {
     /// Warnings before anything of this is used.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
-        warnings.extend(self.log.cut_short().map(|why| format!("{why}; fewer pieces tell less")));
+        warnings
+            .extend(self.log.cut_short().map(|why| format!("{why}; fewer pieces determine less")));
         warnings.extend(self.gains_warning());
         warnings.extend(self.offset_warning());
         if let Err(error) = &self.plant.robot {
@@ -162,7 +163,7 @@ impl Tuned {
                 margins.gain, margins.phase_deg
             )
         } else {
-            format!("the cell's PI gains are unstable at {at} mm/s: the width would swing up")
+            format!("the cell's PI gains are unstable at {at} mm/s: the width would oscillate")
         })
     }
 
@@ -171,8 +172,8 @@ impl Tuned {
         let SpeedRange { min: from, max: to } = self.plant.study.estimate.speeds;
         (robot.residual_mm_per_s > MAX_GAIN_RATIO * (to - from).get()).then(|| {
             format!(
-                "the robot answers otherwise than by a dead time, a lag and a largest slope: {:.1} \
-                 mm/s RMS are left of its reported speed; what is predicted is not to be trusted",
+                "the robot does not respond with a dead time, a lag and a largest slope: the residual of \
+                 its reported speed is {:.1} mm/s RMS; the predictions are not valid",
                 robot.residual_mm_per_s
             )
         })

@@ -231,11 +231,11 @@ fn progress(args: &CalibrateArgs, result: &CalibrationResult<'_>) -> String {
     let coverage = Coverage::of(&result.solution);
     let mut text = String::new();
     let width = result.worst_mm().map_or_else(
-        || "how well a width is known cannot be determined yet".to_owned(),
-        |worst| format!("a width is known to {worst:.4} mm where boards were seen"),
+        || "the uncertainty of a width cannot be determined yet".to_owned(),
+        |worst| format!("uncertainty of a width {worst:.4} mm (1 sigma) where boards were seen"),
     );
     let asked = args.max_width_sigma_mm;
-    let asked = asked.map_or_else(String::new, |limit| format!(" ({} mm asked for)", limit.get()));
+    let asked = asked.map_or_else(String::new, |limit| format!(" (limit {} mm)", limit.get()));
     let _ = writeln!(text, "  {width}{asked}");
     let tilts = SIDES.iter().zip(coverage.tilts).map(|(side, count)| format!("{side} {count}"));
     let missing = coverage.missing_tilts();
@@ -263,7 +263,7 @@ fn words(news: &Decision) -> String {
         Decision::Moving => "the board moves: hold it still".to_owned(),
         Decision::Waiting => "still: a moment".to_owned(),
         Decision::Known(number) => format!("the board is where it was in view {number}: move it"),
-        Decision::OtherSize => "the camera's pictures have changed their size".to_owned(),
+        Decision::OtherSize => "the size of the camera's images has changed".to_owned(),
         Decision::Refused(refusal) => refusal.to_string(),
     }
 }

@@ -54,8 +54,7 @@ pub fn find(
     let mut boards = BoardsOnBed::of(board);
     let mut passed_over = Vec::new();
     if named.is_empty() {
-        let (last, later) =
-            last_with_board(solution, found).context("no picture shows the board")?;
+        let (last, later) = last_with_board(solution, found).context("no image shows the board")?;
         boards.add(last.to_owned(), corners_of(solution, last).unwrap_or_default())?;
         passed_over = later;
     }

@@ -61,14 +61,14 @@ fn name_column(observed: &Observations) -> usize {
 /// The lens models with their reprojection errors, and the one that is used.
 pub fn lens(solution: &Solution) -> String {
     let mut out = String::new();
-    line!(out, "\nlens: what each model leaves, and of images that took no part in it");
-    line!(out, "  {:28}  rms px  held out px", "coefficients");
+    line!(out, "\nlens: reprojection error of each model, and on images left out of its fit");
+    line!(out, "  {:28}  rms px  left out px", "coefficients");
     for trial in &solution.trials {
         let name = trial.free.lens.map_or("", |lens| lens.name());
         let bend = if trial.free.bend { ", bent board" } else { "" };
         let held_out =
             trial.cross_validation_px.map_or_else(|| "unknown".to_owned(), |px| format!("{px:.4}"));
-        let folds = if trial.is_non_monotonic { "  turns over within the picture" } else { "" };
+        let folds = if trial.is_non_monotonic { "  non-monotonic within the image" } else { "" };
         let mark = if trial.free == solution.free { "  <- taken" } else { "" };
         line!(
             out,
@@ -132,8 +132,8 @@ pub fn width(
     let (Some(covariance), Some(share)) = (covariance, quality) else {
         line!(
             out,
-            "\nhow well a width on the bed is known cannot be determined, and is not in the file: the\n  \
-             images do not tell the camera's numbers apart; tilt the board by 20 to 45\n  \
+            "\nthe uncertainty of a width on the bed cannot be determined, and is not in the file: the\n  \
+             images do not determine the camera's parameters; tilt the board by 20 to 45\n  \
              degrees to several sides"
         );
         return out;
@@ -143,14 +143,18 @@ pub fn width(
         || " of a bead that fills a third of where boards were seen,".to_owned(),
         |map| format!(" ({:.4} mm in {} mm)", share * map.bead_mm, map.bead_mm),
     );
-    line!(out, "\na width is known to {:.3} %{bead} where boards were seen,", 100.0 * share);
-    line!(out, "  as far as the corners tell; sigma_mm of each width contains what is left open");
-    line!(out, "  at its own place, which `truebead check` draws with the gauge");
+    line!(
+        out,
+        "\nuncertainty of a width {:.3} %{bead} (1 sigma) where boards were seen,",
+        100.0 * share
+    );
+    line!(out, "  from the noise of the corners; sigma_mm of each width contains the uncertainty");
+    line!(out, "  at its own position, which `truebead check` draws with the gauge");
     let [[left, top], [right, bottom]] = covariance.seen_px().map(|px| [px.x, px.y]);
     line!(
         out,
         "  boards were seen in columns {left:.0} to {right:.0} and rows {top:.0} to {bottom:.0}; \
-         beads of another\n  width have another share: give yours as --bead-mm"
+         beads of another\n  width have another uncertainty: give yours as --bead-mm"
     );
     out
 }
@@ -160,7 +164,7 @@ pub fn maps(maps: &[WidthMap], limit: Option<Mm>) -> String {
     let mut out = String::new();
     let Some(first) = maps.first() else {
         if limit.is_some() {
-            line!(out, "\nFAIL: how well a width is known cannot be determined");
+            line!(out, "\nFAIL: the uncertainty of a width cannot be determined");
         }
         return out;
     };

@@ -161,7 +161,7 @@ impl ConvertSource {
         if let Self::Truebead(_, quality) = self {
             lost.push("the bed plane and the robot's z");
             if quality.as_ref().is_some_and(is_given) {
-                lost.push("how well a width is known and where boards were seen");
+                lost.push("the uncertainty of a width and where boards were seen");
             }
             way_back = "; keep the .toml: on the way back the bed plane needs images of a board \
                         (--plane), and the calibration's part of sigma_mm stays unknown";
@@ -177,6 +177,6 @@ impl ConvertSource {
             [] => (*last).to_owned(),
             _ => format!("{}, and {last}", first.join(", ")),
         })?;
-        Some(format!("{format} has no place for {lost}{way_back}"))
+        Some(format!("{format} cannot hold {lost}{way_back}"))
     }
 }

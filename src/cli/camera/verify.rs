@@ -98,14 +98,14 @@ fn tell(found: &Findings, args: &VerifyArgs, accepted: f64, rms_px: Option<f64>)
     );
     say!("corners lie {:.3} mm off a true board (RMS)", found.rms_mm);
     say!(
-        "by its size the board is {:+.2} mm above its place and tilted by {:.2}° against the bed",
+        "by its size the board is {:+.2} mm above its position and tilted by {:.2}° against the bed",
         found.height_mm,
         found.tilt_deg
     );
     let before = rms_px.map_or_else(String::new, |px| format!(" ({px:.3} px when calibrated)"));
     say!("reprojection error of the lens alone {:.3} px{before}", found.reprojection_rms_px);
     let how = format!(
-        "{} % are borne, and {ACCEPTED_SIGMAS} standard deviations of what the calibration leaves",
+        "{} % are accepted, and {ACCEPTED_SIGMAS} standard deviations of the calibration",
         args.max_error_percent
     );
     if found.holds(accepted) {

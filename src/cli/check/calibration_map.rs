@@ -28,10 +28,12 @@ pub fn tell(loaded: &LoadedCell, page: Option<&Path>) -> anyhow::Result<()> {
     let Some(text) = RelativeSigmaMap::of(&surface, &bead, TEXT_CELLS) else {
         if let Some(fraction) = surface.width_relative_sigma() {
             let percent = 100.0 * fraction;
-            say!("  sigma        the calibration leaves {percent:.3} % of every width open: one");
+            say!(
+                "  sigma        uncertainty of every width by the calibration {percent:.3} %: one"
+            );
             say!("               number for the whole image; `calibrate` anew makes a map");
         } else {
-            say!("  sigma        what the calibration leaves in a width is not known");
+            say!("  sigma        the uncertainty of a width by the calibration is unknown");
         }
         anyhow::ensure!(page.is_none(), "--report: the calibration file has no [uncertainty]");
         return Ok(());
@@ -39,7 +41,7 @@ pub fn tell(loaded: &LoadedCell, page: Option<&Path>) -> anyhow::Result<()> {
     let roi = loaded.cell.gauge.roi;
     let in_gauge = relative_sigma_at(&surface, &bead, middle(roi));
     say!(
-        "  sigma        what the calibration leaves in a width of {:.1} mm [% of it], where its",
+        "  sigma        uncertainty of a width of {:.1} mm by the calibration [% of it], where its",
         { bead.width_mm }
     );
     say!("               middle is seen; [ ] in the gauge, - not seen whole");

@@ -32,7 +32,7 @@ Which hold time: about a third of the time in which the extruder answers; it is 
 up to 0.44 / hold time. The whole should last ten times as long as the slowest answer.
 
 The file has the columns time_s and the quantity; each value holds until the next line,
-and the last line tells the end.")]
+and the last line marks the end.")]
 pub struct ExciteArgs {
     #[command(subcommand)]
     kind: Kind,
@@ -149,7 +149,7 @@ pub fn run(args: &ExciteArgs) -> Result<()> {
             (shape, f64::midpoint(prbs.low, prbs.high), &prbs.all)
         }
         Kind::Gaussian(gaussian) if gaussian.all.duration_s.is_none() => {
-            refuse!("random levels go on for ever: tell --duration-s");
+            refuse!("random levels have no end: give --duration-s");
         }
         Kind::Gaussian(gaussian) => {
             let &GaussianArgs { low, high, seed, .. } = gaussian;

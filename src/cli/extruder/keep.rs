@@ -26,7 +26,7 @@ pub fn refuse_taken(folder: &Path, name: &str) -> Result<(), WrongArguments> {
 pub fn add(library: &Path, text: &str, kept: &Path) -> Result<PathBuf> {
     let kept = kept.display().to_string();
     let model = parse(&kept, text)?;
-    let name = file_name(&model).context("the model tells no material, nozzle and temperature")?;
+    let name = file_name(&model).context("the model has no material, nozzle and temperature")?;
     make_folder(library)?;
     let found = read_library(library)?;
     for broken in &found.broken {

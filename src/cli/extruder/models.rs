@@ -12,7 +12,7 @@ use crate::identify::library::{Library, ModelEntry, ModelQuery, TOLERANCE_C};
 use crate::identify::model_file::ModelFile;
 use crate::io::model_file::{ModelFolder, read, read_library};
 
-/// Lists a folder of models, or tells which of them a cell would use.
+/// Lists a folder of models, or finds the one that a cell would use.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

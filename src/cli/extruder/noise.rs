@@ -87,7 +87,7 @@ fn tell(column: &str, noise: &PressureNoise, count: usize, step_s: Option<f64>) 
     );
     if noise.drift_mpa2() > MAX_DRIFT_RATIO * noise.reading_mpa2() {
         tell!(
-            "warning: the pressure moves by more than its readings scatter; a noise is identified from \
+            "warning: the pressure drifts by more than the noise of its readings; a noise is identified from \
              a command that stands: cut the rest off with --from-s and --to-s"
         );
     }

@@ -30,7 +30,7 @@ Example:
   truebead extruder identify --example example/
   truebead extruder starts example/starts.csv --input screw_rpm --output flow_mm3_per_s
 
-How late the first flow comes is given by the time that the pump stood before. The
+The delay of the first flow depends on the time for which the pump stood before. The
 file starts.toml is for the key starts of [extruder] in a cell.")]
 pub struct StartsArgs {
     /// Table of logged data
@@ -113,7 +113,7 @@ fn in_mm3_per_s(column: &str, quantity: &Quantity) -> Result<f64, WrongArguments
     };
     Err(wrong!(
         "--output {column}: found {found}, expected a flow in mm³/s or l/min{hint} (--unit \
-         {column}=mm3_per_s tells another unit)"
+         {column}=mm3_per_s gives another unit)"
     ))
 }
 

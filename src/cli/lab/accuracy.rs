@@ -88,7 +88,7 @@ impl Texts {
 }
 
 fn judge_calibrations(args: &AccuracyArgs, voice: Verbosity) -> Result<ExitCode> {
-    let cases = calibrations::cases().context("the rigs' boards")?;
+    let cases = calibrations::cases().context("the boards of the test benches")?;
     let cases = chosen(&args.sets, cases, |case| case.name)?;
     make_folder(args)?;
     let corners = cases.iter().map(|case| (case, CornerSource::Corners, args.trials));

@@ -28,7 +28,7 @@ pub fn read(args: &PlanArgs, extruder: &PlannedExtruder) -> Result<Vec<JobBead>,
         [("--corner-mm", args.corner_mm.is_some()), ("--ends", args.ends.is_some())]
     {
         if is_given {
-            let what = format!("{name} is for G-code; a table tells its speed at every place");
+            let what = format!("{name} is for G-code; a table has its speed at every position");
             return Err(wrong_job(path, &what));
         }
     }

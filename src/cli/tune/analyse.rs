@@ -32,10 +32,10 @@ pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<T
     let facts = TuneFacts { gauge, max_offset: farthest, start_speed: run.robot.start_speed };
     let plant = IdentifiedCell::of(&log, &facts).with_context(|| {
         if log.states.is_empty() {
-            return format!("{name}: no robot was heard, and no bead was laid");
+            return format!("{name}: no report of a robot, and no bead was laid");
         }
         if let Some(why) = log.cut_short() {
-            return format!("{name} does not tell what the cell is like: {why}");
+            return format!("{name} does not determine the cell: {why}");
         }
         let extruder = if run.extruder.is_some() {
             " (the cell commands its extruder: where the flow follows the speed, the width does \
@@ -43,7 +43,7 @@ pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<T
         } else {
             ""
         };
-        format!("{name} does not tell what the cell is like{extruder}")
+        format!("{name} does not determine the cell{extruder}")
     })?;
     let target = run.control.target.nominal();
     let speed = plant.speed_for(target.get());

@@ -18,12 +18,12 @@ Examples:
   truebead tune my-cell.toml --out again --recording tuned/recording.mcap --write new-cell.toml
 
 Runs the cell with steps of the robot's speed in place of its controller: after the first
-stretch eleven pieces of bead, each at the start speed or --step-fraction more or less,
+segment eleven pieces of bead, each at the start speed or --step-fraction more or less,
 within [limits]. It says beforehand how much bead that takes. A width near an end of
 gauge.width_range_mm ends the steps; whatever else fails, the cell holds and stops as
 in any run. With --simulated nothing is moved: the cell's own simulated bead is laid.
 
-With --recording nothing is run; any run tells in which the speed changed clearly.
+With --recording nothing is run; any run serves in which the speed changed clearly.
 
 Leaves tune.json, report.html and, of an experiment, recording.mcap; of one on the real
 cell also run/, with the report of that run. Nothing is applied: the cell file stays as it
@@ -39,7 +39,7 @@ pub struct TuneArgs {
     /// Folder for the results
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Change of the speed, as a share of the start speed
+    /// Change of the speed, as a fraction of the start speed
     /// [default: 0.1, or that of a cell whose controller is steps]
     #[arg(long, value_name = "S", value_parser = parse_fraction, conflicts_with = "recording")]
     pub step_fraction: Option<f64>,
@@ -49,7 +49,7 @@ pub struct TuneArgs {
     /// Look at a recording instead
     #[arg(long, value_name = "FILE.mcap")]
     pub recording: Option<PathBuf>,
-    /// Largest distance of the camera that is tried [mm]
+    /// Largest offset of the camera that is tried [mm]
     /// [default: 1000]
     #[arg(long, value_name = "MM", value_parser = parse_length)]
     pub max_mm: Option<Mm>,
@@ -79,6 +79,6 @@ pub enum ControllerArg {
 fn parse_fraction(text: &str) -> Result<f64, String> {
     let fraction = text.trim().parse().ok().filter(|value| STEP_FRACTIONS.contains(value));
     fraction.ok_or_else(|| {
-        format!("expected a share from {} to {}", STEP_FRACTIONS.start(), STEP_FRACTIONS.end())
+        format!("expected a fraction from {} to {}", STEP_FRACTIONS.start(), STEP_FRACTIONS.end())
     })
 }

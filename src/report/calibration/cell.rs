@@ -31,12 +31,12 @@ impl CellCalibrationPage<'_> {
         let body = html! {
             div.about { span { "calibration " b { (self.calibration) } } }
             section {
-                h2 { "What the calibration leaves in a width" }
+                h2 { "Uncertainty of a width by the calibration" }
                 p.hint {
                     (format!(
                         "Standard deviation of the width of a bead of {} mm [% of it] whose \
                          middle is in a cell, at the cell's surface height. Every sigma_mm \
-                         contains it for its own width and place; it is one error, the same in \
+                         contains it for its own width and position; it is one error, the same in \
                          every frame. Solid: the gauge. Dashed: where boards were seen. Empty \
                          cells do not see such a bead whole.",
                         self.map.bead_mm

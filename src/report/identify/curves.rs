@@ -85,7 +85,7 @@ pub fn autocorrelation(study: &ModelStudy) -> Markup {
         PlotLayer::Curve(&curve, LEFT),
     ];
     let y_range = y_range(&[&curve], &[-2.0 * bound, 2.0 * bound]);
-    wide_plot(&axis, "autocorrelation of what is left", 210.0, y_range, layers)
+    wide_plot(&axis, "autocorrelation of the residuals", 210.0, y_range, layers)
 }
 
 /// The response to a step of one unit, with its band.

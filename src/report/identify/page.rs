@@ -107,9 +107,9 @@ fn compared(study: &ModelStudy) -> Markup {
 fn answers(study: &ModelStudy) -> Markup {
     html! {
         section {
-            h2 { "How it answers" }
+            h2 { "Responses" }
             p.hint { "The bands are two standard deviations wide to either side; they come from the \
-                noise of the data, not from what the model leaves out." }
+                noise of the data, not from unmodelled dynamics." }
             (legend(&[("model", MODEL, ""), ("± 2 standard deviations", MODEL, "area")]))
             (curves::step(study))
             (curves::bode(study))
@@ -120,7 +120,7 @@ fn answers(study: &ModelStudy) -> Markup {
 fn residuals(study: &ModelStudy) -> Markup {
     html! {
         section {
-            h2 { "What it leaves" }
+            h2 { "Residuals" }
             p.hint { (independent(&study.fit)) }
             (curves::residuals(study))
             (curves::autocorrelation(study))

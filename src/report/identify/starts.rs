@@ -61,7 +61,7 @@ fn all_warnings(fit: &StartStopFit) -> Vec<String> {
     let mut warnings = Vec::new();
     if fit.starts.len() < FEW_STARTS {
         warnings.push(format!(
-            "{} starts leave the standard errors themselves uncertain; {FEW_STARTS} or more tell \
+            "{} starts leave the standard errors themselves uncertain; {FEW_STARTS} or more determine \
              them",
             fit.starts.len()
         ));
@@ -70,7 +70,7 @@ fn all_warnings(fit: &StartStopFit) -> Vec<String> {
         |one: &&ParameterKey| (one.of)(&fit.sigma) > LOOSE_FRACTION * (one.of)(&fit.parameters);
     for one in START_PARAMETERS.iter().chain(&STOP_PARAMETERS).filter(loose) {
         warnings.push(format!(
-            "{} is {} ± {} {}: hardly known; more {} of the same kind tell it",
+            "{} is {} ± {} {}: hardly known; more {} of the same kind determine it",
             one.key,
             three_digits((one.of)(&fit.parameters)),
             three_digits((one.of)(&fit.sigma)),

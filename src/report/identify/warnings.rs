@@ -34,7 +34,7 @@ impl ModelStudy {
         }
         match self.validation {
             None => warnings.push(
-                "nothing was validated with: a fit to its own data says little; give --validate or \
+                "there are no validation data: a fit to its own data says little; give --validate or \
                  --validate-fraction"
                     .to_owned(),
             ),
@@ -58,7 +58,7 @@ impl ModelStudy {
         let outside = self.residuals.fraction_outside();
         if outside > 0.05 {
             warnings.push(format!(
-                "what the model leaves is autocorrelated ({:.0} % of the lags outside the 99 % band; the \
+                "the residuals are autocorrelated ({:.0} % of the lags outside the 99 % band; the \
                  {} samples say as much as {:.0} independent ones): the noise is correlated, or \
                  something is missing in the model; the standard errors allow for it",
                 100.0 * outside,
@@ -75,7 +75,7 @@ impl ModelStudy {
         (data.duration_s() < needed_s).then(|| {
             format!(
                 "the {:.1} s to validate with are short for a time constant of {:.2} s: {needed_s:.1} \
-                 s or more would tell",
+                 s or more would serve",
                 data.duration_s(),
                 self.slowest_s()
             )
@@ -98,7 +98,7 @@ impl ModelStudy {
 /// Warning of a linear drift in the residuals.
 fn of_drift(fit: &Fit, logs: &Logs) -> Option<String> {
     let line = Trend::significant_in(&fit.residuals)?;
-    Some(drifting(logs, &line, "what the model leaves"))
+    Some(drifting(logs, &line, "the residuals"))
 }
 
 /// Warning of an output that a linear drift dominates, while the input has none.
@@ -135,7 +135,7 @@ fn of_note(note: &FitNote) -> String {
                 .to_owned()
         }
         FitNote::DeadTimeToAStep { dead_time_s } => format!(
-            "the dead time of {dead_time_s:.4} s is known to a whole step only: the form passes its \
+            "the dead time of {dead_time_s:.4} s is determined to a whole step only: the form passes its \
              input straight through"
         ),
         FitNote::Undetermined(loose) => loose.to_string(),

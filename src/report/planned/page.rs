@@ -73,8 +73,8 @@ fn section(bead: &PlannedBead, facts: &PlanFacts) -> Markup {
     html! {
         section {
             h2 { (bead.name) }
-            p.hint { "Predicted by the model, as the mean over the nozzle's length; what no model \
-                tells comes on top. Dips of the speed a nozzle's length apart count on that length; \
+            p.hint { "Predicted by the model, as the mean over the nozzle's length; unmodelled flow \
+                comes on top. Dips of the speed a nozzle's length apart count on that length; \
                 a larger --nozzle-sigma has fewer of them." }
             (plot("width [mm]", &path, &widths, Some(facts.width_mm)))
             (plot("width error [mm]", &path, &planned, Some(0.0)))

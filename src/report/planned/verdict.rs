@@ -25,7 +25,7 @@ fn sentences(beads: &[PlannedBead], facts: &PlanFacts, far_off: bool) -> String 
         less = format!(", {ratio:.1} times less than without a plan, for {added_s:.2} s more");
     }
     let mut words = vec![format!(
-        "The width is predicted to stray by {:.2} mm RMS ({:.1} %){less}.",
+        "The predicted width error is {:.2} mm RMS ({:.1} %){less}.",
         planned * facts.width_mm,
         100.0 * planned
     )];

@@ -58,7 +58,7 @@ impl DistanceCharts {
         ];
         html! {
             (legend(&[
-                ("width at the start speed, as it is believed", palette::MODEL, ""),
+                ("estimated width at the start speed", palette::MODEL, ""),
                 ("± 2 standard deviations", palette::MODEL, "area"),
             ]))
             (wide_plot(axis, "A [mm]", 220.0, y_range(&[&self.level], &[]), layers))

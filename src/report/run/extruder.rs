@@ -116,7 +116,7 @@ impl ExtruderCharts {
         ];
         let y_range = y_range(&[&self.demand, flow, &self.predicted], &[0.0]);
         let entries = [
-            (&self.demand, ("wanted", palette::TARGET, "dash")),
+            (&self.demand, ("demand", palette::TARGET, "dash")),
             (flow, (name, palette::FLOW, "")),
             (&self.predicted, ("predicted by the model", palette::MODEL, "dash")),
         ];
@@ -160,7 +160,7 @@ fn times(summary: &ExtruderSummary) -> Markup {
     };
     html! {
         table {
-            thead { tr { th { "" } th { "" } th.number { "time" } th.number { "share" } } }
+            thead { tr { th { "" } th { "" } th.number { "time" } th.number { "fraction" } } }
             tbody {
                 @for (name, seconds) in &summary.states_s { (row("state", name, *seconds)) }
                 @for (name, seconds) in &summary.held_for_s {

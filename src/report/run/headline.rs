@@ -71,8 +71,7 @@ fn width_sentence(summary: &Summary) -> String {
     match (&summary.control, summary.target_width_mm) {
         (Some(control), Some(target)) => held_sentence(control, target),
         (_, Some(target)) => format!(
-            "The bead is {mean:.3} mm wide on average{spread}; {} than the {target} mm that are \
-             asked for.",
+            "The bead is {mean:.3} mm wide on average{spread}; {} than its target of {target} mm.",
             more_or_less(mean - target)
         ),
         _ => format!("The bead is {mean:.3} mm wide on average{spread}."),
@@ -115,7 +114,7 @@ fn rejected_sentence(summary: &Summary, max_rejected_fraction: f64) -> String {
         "No frame could show bead: none was laid.".to_string()
     } else if summary.rejected_fraction() > max_rejected_fraction {
         format!(
-            "Only {share:.1} % of {frames} frames{of_bead} were measured; the cell asks for {:.0} %.",
+            "Only {share:.1} % of {frames} frames{of_bead} were measured; the cell's limit is {:.0} %.",
             (1.0 - max_rejected_fraction) * 100.0
         )
     } else {
@@ -211,7 +210,8 @@ fn control_sentences(control: &ControlSummary) -> (VerdictLevel, Vec<String>) {
         level = VerdictLevel::Bad;
         let why: Vec<String> = control.fault_reasons.keys().map(|name| in_words(name)).collect();
         let times = if control.faults == 1 { "once" } else { "more than once" };
-        sentences.push(format!("Control gave up {times} ({}).", why.join(", ")));
+        sentences
+            .push(format!("The controller stopped with a fault {times} ({}).", why.join(", ")));
     } else {
         sentences.push("There was no fault.".to_string());
     }
@@ -226,7 +226,7 @@ fn control_sentences(control: &ControlSummary) -> (VerdictLevel, Vec<String>) {
         sentences.push(format!("Control held for {held:.1} s."));
     }
     if control.limited_s >= 0.05 {
-        sentences.push(format!("A limit shaped the speed for {:.1} s.", control.limited_s));
+        sentences.push(format!("Speed limited for {:.1} s.", control.limited_s));
     }
     if control.records_lost > 0 {
         level = level.max(VerdictLevel::Caution);
@@ -254,7 +254,7 @@ pub fn tiles(summary: &Summary) -> Markup {
                 }
                 @if let Some(extruder) = &summary.extruder && extruder.flow_mean_mm3_per_s.is_some() {
                     (tile("flow", &number(extruder.flow_controlled.mean_mm3_per_s.or(extruder.flow_mean_mm3_per_s), 0), "mm³/s",
-                        &format!("{} mm³/s RMS from what was wanted since control began", number(extruder.flow_controlled.error_rms_mm3_per_s, 0))))
+                        &format!("{} mm³/s RMS from the demand since control began", number(extruder.flow_controlled.error_rms_mm3_per_s, 0))))
                 }
             } @else {
                 (tile("uncertainty", &number(summary.sigma_mean_mm, 3), "mm", "mean standard deviation"))

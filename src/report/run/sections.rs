@@ -52,7 +52,7 @@ pub fn over_path(report: &RunReport<'_>) -> Markup {
         section {
             h2 { "Along the bead" }
             p.hint { "Width and speed stand where the bead was laid: below a width is the speed of \
-                the nozzle at that very place, before the camera saw it." }
+                the nozzle at that very position, before the camera saw it." }
             (width_plot(report, &axis, |twice| &twice.path))
             (speed_plot(report, &axis, |twice| &twice.path))
         }
@@ -137,7 +137,7 @@ pub fn rejections(summary: &Summary) -> Markup {
                 h2 { "Refused frames" }
                 div.wide { table {
                     thead { tr {
-                        th { "status" } th.number { "frames" } th.number { "share" }
+                        th { "status" } th.number { "frames" } th.number { "fraction" }
                         th { "what it means" } th { "what to do" }
                     } }
                     tbody { @for (status, count) in rejected {
@@ -206,8 +206,8 @@ pub fn image_quality(report: &RunReport<'_>) -> Markup {
         section {
             h2 { "How good the images are" }
             (advice(report.run.summary))
-            p.hint { "Much contrast, little blur and noise and no saturation make a sure width. A \
-                slow drift tells of dust on the lens or of changing light." }
+            p.hint { "Much contrast, little blur and noise and no saturation make a certain width. A \
+                slow drift means dust on the lens or of changing light." }
             div.pair {
                 (small(&charts.contrast, 10.0, "contrast [grey levels of 256]"))
                 (small(&charts.blur, 0.1, "blur of the edges [px]"))

@@ -77,7 +77,7 @@ impl Tuned {
             section {
                 h2 { "The bead" }
                 p.hint { "Widths where they had been laid, with the model that was fitted; the \
-                    robot's speed there; and what is left of the widths." }
+                    robot's speed there; and the residuals of the widths." }
                 (legend(&[("measured width", WIDTH, ""), ("model", MODEL, "")]))
                 (plot(&axis, "width [mm]", 240.0, &[], vec![
                     PlotLayer::Data(&widths, WIDTH), PlotLayer::Curve(&model, MODEL),
@@ -85,7 +85,7 @@ impl Tuned {
                 (plot(&axis, "robot's speed [mm/s]", 150.0, &[], vec![
                     PlotLayer::Curve(&speeds, SPEED),
                 ], &[&speeds]))
-                (plot(&axis, "left [% of the width]", 150.0, &[0.0], vec![
+                (plot(&axis, "residual [% of the width]", 150.0, &[0.0], vec![
                     PlotLayer::Curve(&left, WIDTH), PlotLayer::Level(0.0, TARGET, ""),
                 ], &[&left]))
             }
@@ -165,7 +165,7 @@ impl Tuned {
                 h2 { "What is predicted" }
                 p.hint { (format!(
                     "Beads of the cell as it was found, {SEEDS} with each controller; the first of them is \
-                     drawn, in means over the gauge. At {:.0} mm the flow rises by {:.0} %. The table tells the way from \
+                     drawn, in means over the gauge. At {:.0} mm the flow rises by {:.0} %. The table has the distance from \
                      the start of control, and from the flow's step, until the bead is within \
                      {:.2} mm of its target for good, and the RMS error once it is steady and of \
                      all.",

@@ -68,11 +68,11 @@ impl Tuned {
     }
 
     fn noise_words(&self) -> String {
-        let (width, scatter) = (self.plant.width_mm.value, &self.plant.width_noise);
-        let rough = if scatter.roughness > 0.0 {
+        let (width, noise) = (self.plant.width_mm.value, &self.plant.width_noise);
+        let rough = if noise.roughness > 0.0 {
             format!(
                 "the bead is rough by {:.3} mm in means over the gauge",
-                scatter.roughness * width
+                noise.roughness * width
             )
         } else {
             "no roughness seen beyond it".to_owned()
@@ -80,15 +80,15 @@ impl Tuned {
         format!(
             "{:.3} ± {:.3} mm from width to width ({:.2} %); {rough}",
             self.plant.noise_mm(),
-            scatter.per_width.sigma * width,
-            100.0 * scatter.per_width.value
+            noise.per_width.sigma * width,
+            100.0 * noise.per_width.value
         )
     }
 
     fn robot_words(&self) -> String {
         match &self.plant.robot {
             Ok(robot) => format!(
-                "answers after {:.0} ± {:.1} ms with a lag of {:.0} ± {:.1} ms{}; {:.2} mm/s RMS left",
+                "responds after {:.0} ± {:.1} ms with a lag of {:.0} ± {:.1} ms{}; {:.2} mm/s RMS left",
                 1e3 * robot.dead_time_s.value,
                 1e3 * robot.dead_time_s.sigma,
                 1e3 * robot.lag_s.value,
@@ -105,7 +105,7 @@ impl Tuned {
     fn timing_words(&self) -> String {
         let timing = &self.plant.timing;
         format!(
-            "widths {:.1} ms late ({:.1} ms p99); measured frames every {:.1} ms, reports {:.1} ms ({:.1} ms \
+            "widths delayed by {:.1} ms ({:.1} ms p99); measured frames every {:.1} ms, reports {:.1} ms ({:.1} ms \
              p99), setpoints {:.1} ms",
             1e3 * timing.latency_s,
             1e3 * timing.latency_p99_s,

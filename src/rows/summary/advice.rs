@@ -62,7 +62,7 @@ fn on_saturation(fraction: f64) -> Option<String> {
     (fraction > CLIPPED_FRACTION).then(|| {
         format!(
             "{:.0} % of the gauge's pixels are saturated: shorten the exposure, or turn the light \
-             out of the mirror direction. What is cut off moves the edges, and sigma does not \
+             out of the mirror direction. Clipped pixels move the edges, and sigma does not \
              know it.",
             fraction * 100.0
         )
@@ -80,7 +80,7 @@ fn on_contrast(contrast: f64, noise: f64) -> Option<String> {
     (low || contrast < MIN_CONTRAST_GREY).then(|| {
         format!(
             "Contrast {contrast:.0} grey levels of 256: light the bead more from the side, or \
-             measure another channel. Twice the contrast halves the scatter of the widths, \
+             measure another channel. Twice the contrast halves the noise of the widths, \
              and what shadows and stains do to them."
         )
     })
@@ -92,7 +92,7 @@ fn on_noise(contrast: f64, noise: f64) -> Option<String> {
     (precision_lost(contrast, noise) > MIN_GAIN_OF_ADVICE && !by_contrast_alone).then(|| {
         format!(
             "Noise {noise:.1} grey levels: more light or a longer exposure in place of gain. Half \
-             the noise halves the scatter of the widths."
+             the noise halves that of the widths."
         )
     })
 }
@@ -100,7 +100,7 @@ fn on_noise(contrast: f64, noise: f64) -> Option<String> {
 fn on_blur(blur: f64) -> Option<String> {
     if blur < MIN_BLUR_PX {
         return Some(format!(
-            "Blur {blur:.1} px: the lens is sharper than the pixels, so that the place of an edge \
+            "Blur {blur:.1} px: the lens is sharper than the pixels, so that the position of an edge \
              within a pixel is not seen, and sigma is too small. Put it out of focus a little, to \
              0.8 px or more."
         ));
@@ -109,7 +109,7 @@ fn on_blur(blur: f64) -> Option<String> {
         format!(
             "Blur {blur:.1} px: refocus on the top edges of the bead, or shorten the exposure if \
              it smears (torn edges look blurred in focus as well). At {REFERENCE_BLUR_PX} px widths of a \
-             smooth bead would scatter {:.0} % less, and a shadow be distinguished from an edge {:.0} px \
+             smooth bead would have {:.0} % less noise, and a shadow be distinguished from an edge {:.0} px \
              away, not only {:.0} px.",
             (1.0 - (REFERENCE_BLUR_PX / blur).sqrt()) * 100.0,
             RESOLVED_AT_BLURS * REFERENCE_BLUR_PX,
@@ -136,7 +136,7 @@ fn on_skew(offset: f64, sigma: f64) -> Option<String> {
             "The flanks of the edges are skewed: widths look {:.2} ± {sigma:.2} px too {way} by that, \
              which sigma contains only where a single frame shows it. Causes are a camera whose grey \
              is not proportional to light (switch its gamma off, or give gamma in [gauge]), the rounded \
-             shoulders of a bead, or the soft border of a shadow beside it.",
+             shoulders of a bead, or the soft boundary of a shadow beside it.",
             offset.abs()
         )
     })

@@ -34,8 +34,7 @@ pub struct DistanceSummary {
 impl DistanceSummary {
     /// In a sentence or two.
     pub fn words(&self) -> String {
-        let Self { samples_used: taken, outliers, changes, level_mm, exponent, offset_mm, .. } =
-            self;
+        let Self { samples_used, outliers, changes, level_mm, exponent, offset_mm, .. } = self;
         let pulsation = self.pulsation_s.map_or(String::new(), |period| {
             format!(" The flow pulsates with a period of {period:.2} s.")
         });
@@ -46,13 +45,13 @@ impl DistanceSummary {
                  offset_mm right?"
             }
             FallbackReason::ModelContradicted => {
-                " The PI controller took over: the width did not answer the speed as the model says."
+                " The PI controller took over: the width did not respond to the speed as the model predicts."
             }
         });
         format!(
-            "Widths taken {taken}, outliers {outliers}, changes of the flow {changes}. At last the \
-             bead was believed to be {level_mm:.2} mm wide at the start speed, with b = \
-             {exponent:.3}, seen {offset_mm:.1} mm behind the nozzle.{pulsation}{fallback}"
+            "Widths used {samples_used}, outliers {outliers}, changes of the flow {changes}. Last estimates: \
+             {level_mm:.2} mm wide at the start speed, b = \
+             {exponent:.3}, camera {offset_mm:.1} mm behind the nozzle.{pulsation}{fallback}"
         )
     }
 }

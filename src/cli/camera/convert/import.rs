@@ -36,7 +36,7 @@ pub fn text(
     if let Some(px) = camera.non_monotonic_at(*image_size_px) {
         notes.push(format!(
             "the lens model is non-monotonic before pixel ({:.0}, {:.0}), and nothing can be measured there; \
-             calibrate with pictures of a board in the corners of the image",
+             calibrate with images of a board in the corners of the image",
             px.x, px.y
         ));
     }
@@ -56,9 +56,9 @@ pub fn text(
         ));
     }
     notes.push(format!(
-        "how well a width is known does not stand in {}, and sigma_mm will not contain it: \
+        "the uncertainty of a width is not in {}, and sigma_mm will not contain it: \
          `truebead camera verify` with a further image shows what is wrong, `truebead calibrate` \
-         with images of a board tells it",
+         with images of a board determines it",
         args.input.display()
     ));
     let InnerCorners { columns, rows } = corners;
@@ -66,7 +66,7 @@ pub fn text(
         "Camera and lens from {} ({}).\n\
          Bed plane: {} below the face of a board with {columns}x{rows} inner corners and squares \
          of {square} in {}.\n\
-         How well a width is known is not known; the error is that of the bed plane's images.",
+         The uncertainty of a width is unknown; the error is that of the bed plane's images.",
         args.input.display(),
         import.format.name(),
         plane.thickness,
@@ -86,7 +86,7 @@ fn bed_plane(args: &ConvertArgs, board: &Board, known: &Intrinsics) -> anyhow::R
         boards.add(image, corners)?;
     }
     let model = CameraModel { camera: known.camera, bend_mm: [0.0; 2] };
-    let other = format!("{MAX_RMS_PX} px is the most that is taken");
+    let other = format!("{MAX_RMS_PX} px is the limit");
     let (images, on_bed) = boards.fit(&model, MAX_RMS_PX, &other)?;
     Ok(BedPlane {
         images,

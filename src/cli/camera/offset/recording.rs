@@ -30,7 +30,7 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     warn_of_damage(&recording);
     let gauge = gauge(&cell, &calibration, &recorded.states)?;
     let found = find(&recorded.states, &recorded.widths, OffsetSearch { gauge, max_offset })
-        .with_context(|| format!("{name} does not tell the offset"))?;
+        .with_context(|| format!("{name} does not determine the offset"))?;
     let now = cell.run.as_ref().map(|run| run.camera.offset);
     answer(&found, &recorded, gauge, now);
     Ok(())

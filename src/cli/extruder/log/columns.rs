@@ -45,7 +45,7 @@ impl ColumnArgs {
         };
         Quantity::of_column(column, given).ok_or_else(|| {
             wrong!(
-                "the name {column} does not end with a unit (one of {}); tell it with --unit \
+                "the name {column} does not end with a unit (one of {}); give it with --unit \
                  {column}=UNIT",
                 units()
             )

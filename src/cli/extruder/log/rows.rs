@@ -42,7 +42,7 @@ impl TableColumns<'_> {
         let found = self.columns.quantity(column)?.unit;
         if found != unit {
             refuse!(
-                "{}: {column} is in {found}, expected {unit} (--unit {column}={} tells another)",
+                "{}: {column} is in {found}, expected {unit} (--unit {column}={} gives another)",
                 self.name,
                 unit.word()
             );

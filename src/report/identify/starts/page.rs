@@ -40,7 +40,7 @@ pub fn page(study: &StartStudy) -> String {
         }
         section {
             h2 { "The stops" }
-            p.hint { "All stops over each other, each as a share of its flow before." }
+            p.hint { "All stops over each other, each as a fraction of its flow before." }
             (legend(&[("stops", FLOW, ""), ("model", MODEL, "")]))
             (stops(study))
         }
@@ -56,7 +56,10 @@ pub fn page(study: &StartStudy) -> String {
 }
 
 fn judged(study: &StartStudy) -> Markup {
-    let text = format!(" Delays scatter about the model by {:.3} s.", study.fit.delay_sigma_s);
+    let text = format!(
+        " Standard deviation of the delays about the model {:.3} s.",
+        study.fit.delay_sigma_s
+    );
     verdict(VerdictLevel::with_caution(!study.warnings.is_empty()), &text, &study.warnings)
 }
 

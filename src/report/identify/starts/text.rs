@@ -73,11 +73,7 @@ fn meaning(text: &mut String, study: &StartStudy) {
     let given = |idle_s: &f64| format!("{:.2} s after {idle_s} s", of.delay_s(*idle_s, flow));
     let delays: Vec<String> = seen.map(given).collect();
     put(text, "first flow", &format!("at {} mm³/s: {}", three_digits(flow), delays.join(", ")));
-    put(
-        text,
-        "scatter",
-        &format!("{:.4} s of the delays about the model", study.fit.delay_sigma_s),
-    );
+    put(text, "sigma", &format!("{:.4} s of the delays about the model", study.fit.delay_sigma_s));
     let line = format!(
         "{} mm³ come after the command to stop; the flow is down to a tenth {:.2} s after it",
         three_digits(flow * of.total_after_stop_s()),
