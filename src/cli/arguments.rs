@@ -1,5 +1,6 @@
 //! Arguments that several commands have, and the error for wrong ones.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use crate::core::units::Mm;
@@ -29,13 +30,15 @@ pub fn parse_length(text: &str) -> Result<Mm, String> {
     Mm::new(value).map_err(|error| error.to_string())
 }
 
-/// A length of time that somebody would run a cell for.
+/// A number within a range; `expected` is the message for another one.
+pub fn parse_within(text: &str, range: RangeInclusive<f64>, expected: &str) -> Result<f64, String> {
+    let value = text.trim().parse().ok().filter(|value| range.contains(value));
+    value.ok_or_else(|| expected.to_owned())
+}
+
+/// A duration of a run \[s\].
 pub fn parse_seconds(text: &str) -> Result<f64, String> {
-    text.trim()
-        .parse()
-        .ok()
-        .filter(|seconds| (0.1..=1e7).contains(seconds))
-        .ok_or_else(|| "expected a number of seconds, 0.1 or more".to_owned())
+    parse_within(text, 0.1..=1e7, "expected a number of seconds, 0.1 or more")
 }
 
 /// Refuses a file in a folder that does not exist, before the long work; `name` is the option's.

@@ -115,8 +115,10 @@ fn about_surface(loaded: &LoadedCell) {
     let has_sigma = loaded.cell.surface_height_sigma > Mm::ZERO;
     let Some(above) = above_surface_mm(loaded) else {
         if has_sigma {
-            say!("  WARNING      surface_height_sigma_mm has no effect beside mm_per_px, which");
-            say!("               knows no height");
+            say!(
+                "  WARNING      surface_height_sigma_mm has no effect beside mm_per_px, which\n               \
+                 knows no height"
+            );
         }
         return;
     };
@@ -132,49 +134,42 @@ fn about_surface(loaded: &LoadedCell) {
         && !(low..=high).contains(&height.get())
     {
         say!(
-            "  WARNING      surface_height_mm: {height} lies outside the {low} to {high} mm above"
+            "  WARNING      surface_height_mm: {height} lies outside the {low} to {high} mm above\n               \
+             the bed at which boards were seen"
         );
-        say!("               the bed at which boards were seen");
     }
     let Some([left, top, right, bottom]) = quality.seen_px else { return };
     let ends = [roi.x, roi.y, roi.x + roi.width - 1, roi.y + roi.height - 1];
     let [first_x, first_y, last_x, last_y] =
         ends.map(|px| u32::try_from(px).map_or(f64::MAX, f64::from));
     if first_x < left || first_y < top || last_x > right || last_y > bottom {
-        say!(
-            "  WARNING      gauge.roi_px reaches beyond where boards were seen, columns {left:.0}"
-        );
-        let (first, rest) = if quality.uncertainty.is_some() {
-            ("sigma_mm there is", "extrapolated by the model of the lens")
+        let effect = if quality.uncertainty.is_some() {
+            "sigma_mm there is\n               extrapolated by the model of the lens"
         } else {
-            ("a width there is known", "less well than sigma_mm says")
+            "a width there is known\n               less well than sigma_mm says"
         };
-        say!("               to {right:.0} and rows {top:.0} to {bottom:.0}; {first}");
-        say!("               {rest}");
+        say!(
+            "  WARNING      gauge.roi_px reaches beyond where boards were seen, columns {left:.0}\n               \
+             to {right:.0} and rows {top:.0} to {bottom:.0}; {effect}"
+        );
     }
 }
 
 /// Prints the commands for which a cell with a complete robot side is ready, and what its extruder
 /// lacks for the others.
 fn about_purposes(run: &RunPart) {
-    let (reached, answered) = run
-        .extruder
-        .as_ref()
-        .map_or((true, true), |part| (part.extruder.link.is_some(), part.plant.is_some()));
+    let part = run.extruder.as_ref();
+    let has_link = part.is_none_or(|part| part.extruder.link.is_some());
+    let has_plant = part.is_none_or(|part| part.plant.is_some());
     let needs = [
-        ("run", reached, "extruder.driver, address: \"line\" and host:port"),
-        ("simulate", answered, "extruder_plant: what answers the extruder's commands"),
+        ("run", has_link, "extruder.driver, address: \"line\" and host:port"),
+        ("simulate", has_plant, "extruder_plant: what answers the extruder's commands"),
     ];
-    for (purpose, met, _) in needs {
-        if met {
-            say!("  ready for {purpose}");
-        }
+    for (purpose, ..) in needs.iter().filter(|(_, is_met, _)| *is_met) {
+        say!("  ready for {purpose}");
     }
-    for (purpose, met, missing) in needs {
-        if !met {
-            say!("  not for {purpose}; missing:");
-            say!("    {missing}");
-        }
+    for (purpose, _, missing) in needs.iter().filter(|(_, is_met, _)| !*is_met) {
+        say!("  not for {purpose}; missing:\n    {missing}");
     }
 }
 
@@ -206,11 +201,8 @@ fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::R
         let _ = loaded.plant(part)?;
     }
     if let Some(link) = &extruder.link {
-        say!(
-            "               reached at {}, a command holds for {} ms",
-            link.address,
-            link.valid_ms
-        );
+        let (address, valid_ms) = (&link.address, link.valid_ms);
+        say!("               reached at {address}, a command holds for {valid_ms} ms");
     }
     Ok(())
 }
@@ -220,11 +212,9 @@ fn about_starts_and_plan(side: &ExtruderSide) {
     if let Some(timing) = &side.setup.timing {
         let pause = Pause { idle: Span::from_secs(300.0), flow_before: timing.conditions().flow };
         say!(
-            "  starts       the flow comes {:.2} s after the command where the pump stood for 5 min;",
-            timing.start(&pause).first_flow().secs()
-        );
-        say!(
-            "               it stops {:.1} before a bead ends whose length is known",
+            "  starts       the flow comes {:.2} s after the command where the pump stood for 5 min;\n               \
+             it stops {:.1} before a bead ends whose length is known",
+            timing.start(&pause).first_flow().secs(),
             timing.stop().distance()
         );
     }
@@ -278,8 +268,10 @@ fn about_controller(loaded: &LoadedCell, run: &RunPart) {
         run.camera.offset_sigma.get()
     );
     if gauge > run.camera.offset * 0.5 {
-        say!("  WARNING      gauge.roi_px is more than half as long as offset_mm: a shorter one");
-        say!("               shows changes of the bead sooner");
+        say!(
+            "  WARNING      gauge.roi_px is more than half as long as offset_mm: a shorter one\n               \
+             shows changes of the bead sooner"
+        );
     }
 }
 

@@ -58,8 +58,8 @@ mod tests {
         for (old, new) in COMMANDS {
             let said = refusal(&parsed(&format!("{old} --option"))).unwrap();
             assert_eq!(said, format!("`truebead {old}` is `truebead {new}` now"));
-            let told = parsed(&format!("{new} --no-such-option"));
-            assert_eq!(told.kind(), clap::error::ErrorKind::UnknownArgument, "{new}");
+            let error = parsed(&format!("{new} --no-such-option"));
+            assert_eq!(error.kind(), clap::error::ErrorKind::UnknownArgument, "{new}");
         }
         let starts = refusal(&parsed("extruder identify log.csv --starts")).unwrap();
         assert!(starts.contains("`truebead extruder starts`"), "{starts}");

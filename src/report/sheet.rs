@@ -95,28 +95,14 @@ impl BoardSheet {
         let bar = if has_room { BAR_MM[0] } else { BAR_MM[1] };
         let base = top + height + 14.0;
         black.extend(ruler(middle - bar / 2.0, base, bar));
-        let words = vec![
-            (
-                middle,
-                base + 5.0,
-                format!(
-                    "Print at 100 %. This bar is {bar} mm long; ten squares are {} mm. Measure both.",
-                    shown(10.0 * side)
-                ),
-            ),
-            (
-                middle,
-                base + 9.5,
-                format!(
-                    "truebead: --board {columns}x{rows} --square-mm {}{}",
-                    shown(side),
-                    options(board)
-                ),
-            ),
-        ];
+        let (ten, side, options) = (shown(10.0 * side), shown(side), options(board));
+        let check = format!(
+            "Print at 100 %. This bar is {bar} mm long; ten squares are {ten} mm. Measure both."
+        );
+        let command = format!("truebead: --board {columns}x{rows} --square-mm {side}{options}");
+        let words = vec![(middle, base + 5.0, check), (middle, base + 9.5, command)];
         let kind = if board.is_plain() { "Checkerboard" } else { "ChArUco board" };
-        let title =
-            format!("{kind}, {columns}x{rows} inner corners, squares of {} mm", shown(side));
+        let title = format!("{kind}, {columns}x{rows} inner corners, squares of {side} mm");
         Ok(Self { paper, title, black, words })
     }
 
@@ -131,25 +117,17 @@ impl BoardSheet {
              <path fill=\"#000\" shape-rendering=\"crispEdges\" d=\"",
             self.title
         );
-        for [x, y, width, height] in &self.black {
-            let _ = write!(
-                text,
-                "M{} {}h{}v{}h-{}z",
-                shown(*x),
-                shown(*y),
-                shown(*width),
-                shown(*height),
-                shown(*width)
-            );
+        for black in &self.black {
+            let [x, y, width, height] = black.map(shown);
+            let _ = write!(text, "M{x} {y}h{width}v{height}h-{width}z");
         }
         text.push_str("\"/>\n");
         for (x, y, words) in &self.words {
+            let (x, y) = (shown(*x), shown(*y));
             let _ = writeln!(
                 text,
-                "  <text x=\"{}\" y=\"{}\" font-family=\"sans-serif\" font-size=\"{LETTERS_MM}\" \
-                 text-anchor=\"middle\">{words}</text>",
-                shown(*x),
-                shown(*y)
+                "  <text x=\"{x}\" y=\"{y}\" font-family=\"sans-serif\" font-size=\"{LETTERS_MM}\" \
+                 text-anchor=\"middle\">{words}</text>"
             );
         }
         text.push_str("</svg>\n");

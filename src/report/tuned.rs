@@ -139,11 +139,11 @@ impl Tuned {
         }
         let all = self.log.refused + self.log.widths.len() as u64;
         #[expect(clippy::cast_precision_loss, reason = "counts of frames")]
-        let share = self.log.refused as f64 / all.max(1) as f64;
-        if share > MANY_REJECTED {
+        let fraction = self.log.refused as f64 / all.max(1) as f64;
+        if fraction > MANY_REJECTED {
             warnings.push(format!(
                 "{:.0} % of the frames gave no width; see why with truebead process",
-                100.0 * share
+                100.0 * fraction
             ));
         }
         warnings

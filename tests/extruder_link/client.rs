@@ -188,16 +188,19 @@ fn a_failed_pump_is_reported_and_no_command_makes_it_run() {
 #[test]
 fn nothing_leaves_for_an_extruder_that_does_not_fit_the_cell() {
     let sim = sim();
-    for (config, told) in [
+    for (config, printed) in [
         (ExtruderConfig { max: 120.0, ..config(sim.local_addr()) }, "takes 0 to 90 rpm"),
         (ExtruderConfig { drive: CommandQuantity::Flow, ..config(sim.local_addr()) }, "mm3_per_s"),
     ] {
         let pc = Pc::start(config.clone());
         let hello = pc.until_up();
-        assert!(config.unfit(&hello).unwrap().contains(told));
+        assert!(config.unfit(&hello).unwrap().contains(printed));
         pc.until_state(|_| true);
         let refused = pc.link.send(OFF).unwrap_err();
-        assert!(matches!(&refused, ExtruderNotSent::Unfit(why) if why.contains(told)), "{refused}");
+        assert!(
+            matches!(&refused, ExtruderNotSent::Unfit(why) if why.contains(printed)),
+            "{refused}"
+        );
     }
     let pc = Pc::start(config(sim.local_addr()));
     pc.until_state(|_| true);

@@ -238,12 +238,10 @@ fn progress(args: &CalibrateArgs, result: &CalibrationResult<'_>) -> String {
     let asked = asked.map_or_else(String::new, |limit| format!(" (limit {} mm)", limit.get()));
     let _ = writeln!(text, "  {width}{asked}");
     let tilts = SIDES.iter().zip(coverage.tilts).map(|(side, count)| format!("{side} {count}"));
-    let missing = coverage.missing_tilts();
-    let missing = if missing.is_empty() {
-        String::new()
-    } else {
-        format!("; missing: {}", missing.join(", "))
-    };
+    let mut missing = coverage.missing_tilts().join(", ");
+    if !missing.is_empty() {
+        missing.insert_str(0, "; missing: ");
+    }
     let beside = [
         format!("boards in {} of {PARTS} parts of the image", coverage.count()),
         format!("side that was nearer: {}{missing}", tilts.collect::<Vec<_>>().join(", ")),

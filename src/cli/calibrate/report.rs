@@ -80,8 +80,8 @@ pub fn lens(solution: &Solution) -> String {
     out
 }
 
-/// Design effect from which it is reported: three of its standard errors above 1, which are
-/// some 0.16 with a dozen images.
+/// Design effect from which it is reported. Derived: 1 + 3·0.16, three of its standard errors
+/// above 1 with a dozen images.
 const REPORTED_EFFECT: f64 = 1.5;
 /// Length of the longest name of a parameter \[letters\].
 const NAME: usize = 18;
@@ -129,7 +129,7 @@ pub fn width(
         Calibration::Full { quality: Some(quality), .. } => quality.width_relative_sigma,
         _ => None,
     };
-    let (Some(covariance), Some(share)) = (covariance, quality) else {
+    let (Some(covariance), Some(sigma)) = (covariance, quality) else {
         line!(
             out,
             "\nthe uncertainty of a width on the bed cannot be determined, and is not in the file: the\n  \
@@ -141,12 +141,12 @@ pub fn width(
     let given = maps.first().filter(|_| width_map::worst_mm(maps).is_some());
     let bead = given.map_or_else(
         || " of a bead that fills a third of where boards were seen,".to_owned(),
-        |map| format!(" ({:.4} mm in {} mm)", share * map.bead_mm, map.bead_mm),
+        |map| format!(" ({:.4} mm in {} mm)", sigma * map.bead_mm, map.bead_mm),
     );
     line!(
         out,
         "\nuncertainty of a width {:.3} %{bead} (1 sigma) where boards were seen,",
-        100.0 * share
+        100.0 * sigma
     );
     line!(out, "  from the noise of the corners; sigma_mm of each width contains the uncertainty");
     line!(out, "  at its own position, which `truebead check` draws with the gauge");

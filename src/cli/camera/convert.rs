@@ -74,36 +74,35 @@ fn target(args: &ConvertArgs) -> Result<To, WrongArguments> {
 
 fn check(args: &ConvertArgs, to: To) -> Result<(), WrongArguments> {
     check_writable("out", &args.out)?;
-    let wrong = |what: String| Err(WrongArguments::new(what));
     let input = args.input.display();
     if !ends_in(&args.input, TOML) && !ends_in(&args.input, YAML) {
-        return wrong(format!(
+        refuse!(
             "{input}: expected a name that ends in .toml, .yaml or .yml; other formats of ROS and \
              OpenCV are not read, write YAML there"
-        ));
+        );
     }
     if !args.input.is_file() {
-        return wrong(format!("{input}: no such file"));
+        refuse!("{input}: no such file");
     }
     if args.out.canonicalize().is_ok_and(|out| args.input.canonicalize().is_ok_and(|i| i == out)) {
-        return wrong(format!("--out {input}: it is the input, name another file"));
+        refuse!("--out {input}: it is the input, name another file");
     }
     if let Some(path) = args.plane.iter().find(|path| !path.is_file()) {
-        return wrong(format!("--plane {}: no such file", path.display()));
+        refuse!("--plane {}: no such file", path.display());
     }
     if args.board_thickness_mm.is_some_and(|thickness| thickness < Mm::ZERO) {
-        return wrong("the board's thickness cannot be below 0 mm".to_owned());
+        refuse!("the board's thickness cannot be below 0 mm");
     }
     if args.camera_name.is_some() && to != To::Ros {
-        return wrong("--camera-name: only ROS's files have one (--to ros)".to_owned());
+        refuse!("--camera-name: only ROS's files have one (--to ros)");
     }
     match (to, args.plane.is_empty()) {
-        (To::Truebead, true) if ends_in(&args.input, YAML) => wrong(format!(
+        (To::Truebead, true) if ends_in(&args.input, YAML) => refuse!(
             "{input} holds no bed plane: lay a board flat on the bed, take an image, and give \
              --plane IMAGE --board COLUMNSxROWS --square-mm MM"
-        )),
+        ),
         (To::Ros | To::Opencv, false) => {
-            wrong("--plane: files of ROS and OpenCV hold no bed plane; leave it out".to_owned())
+            refuse!("--plane: files of ROS and OpenCV hold no bed plane; leave it out")
         }
         _ => Ok(()),
     }

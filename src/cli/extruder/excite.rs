@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
+use super::log::columns::units;
 use crate::cli::arguments::{WrongArguments, refuse_replacing};
 use crate::core::quantity::{Quantity, Unit};
 use crate::identify::command_profile::{CommandProfile, file};
@@ -179,12 +180,8 @@ pub fn run(args: &ExciteArgs) -> Result<()> {
 impl CommonArgs {
     fn check(&self) -> Result<(), WrongArguments> {
         if Quantity::of_column(&self.quantity, None).is_none() || self.quantity.contains(',') {
-            let units: Vec<&str> = Unit::all().map(Unit::word).collect();
-            refuse!(
-                "--quantity {}: expected a name that ends with its unit, one of {}",
-                self.quantity,
-                units.join(", ")
-            );
+            let (name, units) = (&self.quantity, units());
+            refuse!("--quantity {name}: expected a name that ends with its unit, one of {units}");
         }
         self.check_commanded()?;
         if self.hold_s < SHORTEST_S {
@@ -201,9 +198,7 @@ impl CommonArgs {
         }
         Ok(())
     }
-}
 
-impl CommonArgs {
     /// Refuses a quantity of the bead, which cannot be commanded.
     fn check_commanded(&self) -> Result<(), WrongArguments> {
         match Unit::of_column(&self.quantity) {

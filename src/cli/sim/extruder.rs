@@ -8,6 +8,7 @@ use clap::Args;
 use super::{print, serve};
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
+use crate::cli::arguments::parse_within;
 use crate::core::time::Span;
 use crate::io::clock::RunClock;
 use crate::link::extruder::ExtruderHello;
@@ -59,8 +60,7 @@ pub fn run(args: &ExtruderSimArgs) -> anyhow::Result<()> {
 
 /// Time until a rehearsed fault.
 fn parse_until(text: &str) -> Result<f64, String> {
-    let seconds = text.trim().parse().ok().filter(|seconds| (0.0..=1e7).contains(seconds));
-    seconds.ok_or_else(|| "expected seconds after the start of the pump, 0 to 1e7".to_owned())
+    parse_within(text, 0.0..=1e7, "expected seconds after the start of the pump, 0 to 1e7")
 }
 
 fn options(args: &ExtruderSimArgs, loaded: &LoadedCell) -> anyhow::Result<ExtruderOptions> {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use crate::cli::arguments::parse_length;
+use crate::cli::arguments::{parse_length, parse_within};
 use crate::core::units::Mm;
 use crate::width_control::strategy::steps::STEP_FRACTIONS;
 
@@ -77,8 +77,6 @@ pub enum ControllerArg {
 }
 
 fn parse_fraction(text: &str) -> Result<f64, String> {
-    let fraction = text.trim().parse().ok().filter(|value| STEP_FRACTIONS.contains(value));
-    fraction.ok_or_else(|| {
-        format!("expected a fraction from {} to {}", STEP_FRACTIONS.start(), STEP_FRACTIONS.end())
-    })
+    let (min, max) = (STEP_FRACTIONS.start(), STEP_FRACTIONS.end());
+    parse_within(text, STEP_FRACTIONS, &format!("expected a fraction from {min} to {max}"))
 }

@@ -27,7 +27,7 @@ pub fn drawn<'a>(entries: &[(&PlotCurve, LegendEntry<'a>)]) -> Vec<LegendEntry<'
 
 /// The states that a strip shows, and whether a limit acted.
 pub fn of_strips(names: &[&'static str], states: &Strip, limits: &Strip) -> Markup {
-    let shown = |name: &str| states.segments().iter().any(|spell| spell.mark.name == name);
+    let shown = |name: &str| states.segments().iter().any(|segment| segment.mark.name == name);
     let drawn = names.iter().filter(|name| shown(name));
     let mut entries: Vec<LegendEntry<'_>> =
         drawn.filter_map(|name| Some((*name, palette::state(name)?, "block"))).collect();
@@ -39,7 +39,7 @@ pub fn of_strips(names: &[&'static str], states: &Strip, limits: &Strip) -> Mark
 
 /// Whether a strip shows anything worth drawing.
 pub fn has_marks(strip: &Strip) -> bool {
-    strip.segments().iter().any(|spell| spell.mark.severity > 0)
+    strip.segments().iter().any(|segment| segment.mark.severity > 0)
 }
 
 #[cfg(test)]

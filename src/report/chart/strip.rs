@@ -109,7 +109,10 @@ mod tests {
             strip.push(f64::from(i), mark);
         }
         assert!(strip.segments().len() <= MAX_SEGMENTS);
-        let bad: Vec<_> = strip.segments().iter().filter(|spell| spell.mark == BAD).collect();
-        assert!(bad.iter().any(|spell| (spell.from..=spell.to).contains(&77_777.0)), "{bad:?}");
+        let bad: Vec<_> = strip.segments().iter().filter(|segment| segment.mark == BAD).collect();
+        assert!(
+            bad.iter().any(|segment| (segment.from..=segment.to).contains(&77_777.0)),
+            "{bad:?}"
+        );
     }
 }

@@ -47,24 +47,24 @@ fn draw_row(area: &Area, axis: &XAxis, row: &StripRow<'_>, y: f64) -> Markup {
     html! {
         text.title x=(LEFT - 8.0) y=(y + 14.5) text-anchor="end" { (row.name) }
         rect.lane x=(left) y=(y) width=(right - left) height=(ROW_HEIGHT) rx="2" {}
-        @for spell in row.strip.segments() {
-            @if let Some(ink) = (row.ink)(spell.mark.name) { (draw_spell(area, axis, spell, ink, y)) }
+        @for segment in row.strip.segments() {
+            @if let Some(ink) = (row.ink)(segment.mark.name) { (draw_segment(area, axis, segment, ink, y)) }
         }
     }
 }
 
-fn draw_spell(area: &Area, axis: &XAxis, spell: &StripSegment, ink: Ink, y: f64) -> Markup {
-    let place = area.x(axis);
-    let (from, to) = (round(place(spell.from)), round(place(spell.to)));
+fn draw_segment(area: &Area, axis: &XAxis, segment: &StripSegment, ink: Ink, y: f64) -> Markup {
+    let x = area.x(axis);
+    let (from, to) = (round(x(segment.from)), round(x(segment.to)));
     let width = round((to - from).max(MIN_WIDTH));
-    let name = in_words(spell.mark.name);
+    let name = in_words(segment.mark.name);
     let letters = name.chars().fold(2.0, |sum, _| sum + 1.0);
     let decimals = usize::from(axis.divisor > 1.0 || axis.range.length() < 600.0);
     html! {
         rect x=(from) y=(y) width=(width) height=(ROW_HEIGHT) fill=(ink.css()) {
             title {
-                (name) ", " (format!("{:.*}", decimals, spell.from / axis.divisor))
-                " to " (format!("{:.*}", decimals, spell.to / axis.divisor))
+                (name) ", " (format!("{:.*}", decimals, segment.from / axis.divisor))
+                " to " (format!("{:.*}", decimals, segment.to / axis.divisor))
             }
         }
         @if letters * LETTER_WIDTH < width {

@@ -15,7 +15,7 @@ use crate::report::chart::{
 
 /// Points of a curve of the model.
 const POINTS: u32 = 400;
-/// Half width of a band \[standard deviations\]: about 95 % of a normal distribution.
+/// Half width of a band \[standard deviations\]. Derived: P(|z| < 2) is 95 % for a normal deviate.
 const WIDE: f64 = 2.0;
 /// Colour of residuals, which belong neither to the model nor to the data.
 const LEFT: Ink = DEMAND;

@@ -162,8 +162,8 @@ fn a_drift_that_poles_and_zeros_take_up_is_refused_with_the_gain_without_it() {
             // The smallest of them may be reported beside the result.
             Ok(found) => {
                 let off = (found.fit.model.dc_gain() / 19.05 - 1.0).abs();
-                let told = found.warnings.iter().any(|warning| warning.contains("drift"));
-                assert!(off < 0.2 && told, "{slope}: {off} {:?}", found.warnings);
+                let is_reported = found.warnings.iter().any(|warning| warning.contains("drift"));
+                assert!(off < 0.2 && is_reported, "{slope}: {off} {:?}", found.warnings);
             }
             Err(other) => assert!(other.to_string().contains("drift"), "{other}"),
         }
@@ -184,7 +184,7 @@ fn a_log_without_drift_has_the_same_gain_without_its_line() {
 }
 
 #[test]
-fn a_drift_behind_another_refusal_is_told() {
+fn a_drift_behind_another_refusal_is_reported() {
     let (first, rest) = with(|time_s, flow| flow + 5.0 * time_s).split(0.3).unwrap();
     let data = logs(first, Some(rest));
     let said = study(data, &[settings(Structure::FirstOrder { zero: false })]).unwrap_err();
@@ -193,13 +193,13 @@ fn a_drift_behind_another_refusal_is_told() {
 }
 
 #[test]
-fn a_drift_beside_the_answer_is_told() {
+fn a_drift_beside_the_result_is_reported() {
     let drifting = with(|time_s, flow| flow + 0.25 * time_s);
     let found =
         study(logs(drifting, None), &[settings(Structure::SecondOrderOscillating { zero: false })]);
     let warnings = found.unwrap().warnings;
-    for told in ["the output drifts up by", "once a straight line in time is taken off"] {
-        assert!(warnings.iter().any(|warning| warning.contains(told)), "{warnings:?}");
+    for words in ["the output drifts up by", "once a straight line in time is taken off"] {
+        assert!(warnings.iter().any(|warning| warning.contains(words)), "{warnings:?}");
     }
 }
 
@@ -214,7 +214,7 @@ fn an_output_on_a_clock_that_is_behind_is_refused() {
 }
 
 #[test]
-fn forms_that_are_refused_alike_are_told_once() {
+fn forms_that_are_refused_alike_are_reported_once() {
     let one = |form: &str, why: &str| (form.to_owned(), why.to_owned());
     let forms = vec![one("fopdt", "a"), one("3,2", "b"), one("sopdt", "a")];
     let refusal = NoModel::None { forms, drift: None };

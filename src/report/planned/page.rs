@@ -22,7 +22,7 @@ type NamedCurve = (PlotCurve, &'static str, Ink, bool);
 pub fn page(
     beads: &[PlannedBead],
     facts: &PlanFacts,
-    about: &[(String, String)],
+    about: &[(&str, String)],
     warnings: &[String],
 ) -> String {
     let mut drawn: Vec<&PlannedBead> = beads.iter().collect();

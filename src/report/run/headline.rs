@@ -105,7 +105,7 @@ fn held_sentence(control: &ControlSummary, target: f64) -> String {
 }
 
 fn rejected_sentence(summary: &Summary, max_rejected_fraction: f64) -> String {
-    let share = (1.0 - summary.rejected_fraction()) * 100.0;
+    let percent = (1.0 - summary.rejected_fraction()) * 100.0;
     let frames = summary.frames_with_bead();
     let of_bead = if frames == summary.frames { "" } else { " that could show bead" };
     if summary.frames == 0 {
@@ -114,11 +114,11 @@ fn rejected_sentence(summary: &Summary, max_rejected_fraction: f64) -> String {
         "No frame could show bead: none was laid.".to_string()
     } else if summary.rejected_fraction() > max_rejected_fraction {
         format!(
-            "Only {share:.1} % of {frames} frames{of_bead} were measured; the cell's limit is {:.0} %.",
+            "Only {percent:.1} % of {frames} frames{of_bead} were measured; the cell's limit is {:.0} %.",
             (1.0 - max_rejected_fraction) * 100.0
         )
     } else {
-        format!("{share:.1} % of {frames} frames{of_bead} were measured.")
+        format!("{percent:.1} % of {frames} frames{of_bead} were measured.")
     }
 }
 
@@ -126,7 +126,7 @@ fn rejected_sentence(summary: &Summary, max_rejected_fraction: f64) -> String {
 /// acted for a tenth of the run.
 fn far_off(control: &ControlSummary, summary: &Summary) -> Option<String> {
     let (error, target) = (control.width_error_rms_settled_mm?, summary.target_width_mm?);
-    let share = control.limited_s / summary.duration_s.unwrap_or(f64::INFINITY);
+    let fraction = control.limited_s / summary.duration_s.unwrap_or(f64::INFINITY);
     let far_off = if is_excited(summary) {
         None
     } else if error > FAR_OFF_ERROR * target {
@@ -134,8 +134,9 @@ fn far_off(control: &ControlSummary, summary: &Summary) -> Option<String> {
     } else {
         far_off_before(control, target)
     };
-    let limited = || format!("The robot stood at a limit for {:.0} % of the time.", 100.0 * share);
-    far_off.or_else(|| (share > LONG_LIMITED_FRACTION).then(limited))
+    let limited =
+        || format!("The robot stood at a limit for {:.0} % of the time.", 100.0 * fraction);
+    far_off.or_else(|| (fraction > LONG_LIMITED_FRACTION).then(limited))
 }
 
 /// An error over all bead laid under control, such as at a corner during settling.
@@ -155,24 +156,20 @@ fn far_off_before(control: &ControlSummary, target: f64) -> Option<String> {
 /// Sentences about faults, holds and limits of the extruder side; none where it did well.
 fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
     let total: f64 = extruder.states_s.values().sum();
-    let share = |seconds: f64| seconds / total.max(1e-9);
     let mut sentences = Vec::new();
     if extruder.fault_reasons.contains_key(&extruder_fault(ExtruderFault::RunsOn)) {
         sentences.push("The pump ran although it was commanded to stop.".to_owned());
     }
     for (why, seconds) in &extruder.held_for_s {
-        sentences.push(format!(
-            "The extruder kept its last command for {seconds:.1} s ({}).",
-            in_words(why)
-        ));
+        let why = in_words(why);
+        sentences.push(format!("The extruder kept its last command for {seconds:.1} s ({why})."));
     }
-    for (limit, seconds) in &extruder.limited_by_s {
-        if share(*seconds) > LONG_LIMITED_FRACTION {
-            sentences.push(format!(
-                "The extruder's command stood at a limit for {:.0} % of the time ({limit}).",
-                100.0 * share(*seconds)
-            ));
-        }
+    let limited = extruder.limited_by_s.iter().map(|(limit, s)| (limit, s / total.max(1e-9)));
+    for (limit, fraction) in limited.filter(|(_, fraction)| *fraction > LONG_LIMITED_FRACTION) {
+        sentences.push(format!(
+            "The extruder's command stood at a limit for {:.0} % of the time ({limit}).",
+            100.0 * fraction
+        ));
     }
     let kept = extruder.flow_controlled;
     if let (Some(error), Some(mean)) = (kept.error_mean_mm3_per_s, kept.mean_mm3_per_s)
@@ -237,8 +234,8 @@ fn control_sentences(control: &ControlSummary) -> (VerdictLevel, Vec<String>) {
 
 /// The figures as tiles.
 pub fn tiles(summary: &Summary) -> Markup {
-    let share = (1.0 - summary.rejected_fraction()) * 100.0;
-    let measured = if summary.frames == 0 { None } else { Some(share) };
+    let percent = (1.0 - summary.rejected_fraction()) * 100.0;
+    let measured = if summary.frames == 0 { None } else { Some(percent) };
     html! {
         div.tiles {
             (tile("frames", &summary.frames.to_string(), "", &duration(summary)))

@@ -202,7 +202,7 @@ fn plot(
 }
 
 fn table(head: &str, of: &[BeadPrediction]) -> Markup {
-    let way = |way: Option<f64>| way.map_or("not".to_owned(), |mm| format!("{mm:.0}"));
+    let distance = |mm: Option<f64>| mm.map_or("not".to_owned(), |mm| format!("{mm:.0}"));
     html! {
         div.wide { table {
             thead { tr {
@@ -212,8 +212,8 @@ fn table(head: &str, of: &[BeadPrediction]) -> Markup {
             } }
             tbody { @for one in of { tr {
                 td { (one.name) }
-                td.number { (way(one.start_settles_mm)) }
-                td.number { (way(one.step_settles_mm)) }
+                td.number { (distance(one.start_settles_mm)) }
+                td.number { (distance(one.step_settles_mm)) }
                 td.number { (format!("{:.3}", one.steady_rms_mm)) }
                 td.number { (format!("{:.3}", one.whole_rms_mm)) }
                 td.number { (format!(

@@ -202,14 +202,14 @@ impl Tuned {
 }
 
 fn row(text: &mut String, one: &BeadPrediction) {
-    let way = |way: Option<f64>| way.map_or("not".to_owned(), |mm| format!("{mm:.0} mm"));
+    let distance = |mm: Option<f64>| mm.map_or("not".to_owned(), |mm| format!("{mm:.0} mm"));
     let (fast, slow) = one.speeds_mm_per_s;
     let _ = writeln!(
         text,
         "{:<28} {:>14} {:>16} {:>8.3} mm {:>7.3} mm {:>16}",
         one.name,
-        way(one.start_settles_mm),
-        way(one.step_settles_mm),
+        distance(one.start_settles_mm),
+        distance(one.step_settles_mm),
         one.steady_rms_mm,
         one.whole_rms_mm,
         format!("{slow:.0} to {fast:.0} mm/s")

@@ -16,8 +16,8 @@ use crate::rows::frame_row::FrameRow;
 use crate::rows::names;
 use crate::width_control::limiter::SpeedLimit;
 
-/// Path length after the start of control from which the bead counts as
-/// settled.
+/// Path length after the start of control from which the bead counts as settled, by the contract
+/// of `summary.json` for `width_error_rms_settled_mm`.
 const SETTLED_AFTER: Mm = Mm::constant(500.0);
 
 /// The figures of the controller.

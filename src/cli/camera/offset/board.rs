@@ -34,15 +34,15 @@ const FLAT_MM: f64 = 0.5;
 
 /// Runs the command for an image.
 pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
-    let needed = [
-        ("--cell CELL.toml", args.cell.is_some()),
-        ("--board COLUMNSxROWS with --square-mm", args.board.board.is_some()),
-        ("--nozzle-at X,Y", args.nozzle_at.is_some()),
-    ];
-    let missing: Vec<&str> =
-        needed.iter().filter(|(_, given)| !given).map(|(name, _)| *name).collect();
     let (Some(cell), Some(board), Some(at)) = (&args.cell, &args.board.board, args.nozzle_at)
     else {
+        let needed = [
+            ("--cell CELL.toml", args.cell.is_some()),
+            ("--board COLUMNSxROWS with --square-mm", args.board.board.is_some()),
+            ("--nozzle-at X,Y", args.nozzle_at.is_some()),
+        ];
+        let missing: Vec<&str> =
+            needed.iter().filter(|(_, given)| !given).map(|(name, _)| *name).collect();
         refuse!(
             "{}: an image (no recording) needs {} besides",
             args.input.display(),
@@ -129,9 +129,9 @@ fn answer(found: &NozzleOffset, touch: Touch, now: Option<Mm>) {
     say!("sideways   {:.2} mm to the {side} of the gauge's axis", found.across_mm.abs());
     if found.across_mm.abs() > SIDEWAYS_MM + 3.0 * sigma {
         say!(
-            "           WARNING: on a straight path the bead would pass the gauge's middle so far"
+            "           WARNING: on a straight path the bead would pass the gauge's middle so far\n           \
+             off; see --nozzle-at, or whether the camera is turned against the path"
         );
-        say!("           off; see --nozzle-at, or whether the camera is turned against the path");
     }
     let calibration = parts.calibration.map_or_else(
         || "calibration not known".to_owned(),
@@ -146,19 +146,17 @@ fn answer(found: &NozzleOffset, touch: Touch, now: Option<Mm>) {
     let ([x, y], first) = (touch.position, found.first_corner);
     say!(
         "board      the nozzle is {x},{y} squares from the corner at {:.1}, {:.1} px, taken for the \
-         first",
+         first\n           corners lie {:.3} mm off a true board (RMS)",
         first.x,
-        first.y
+        first.y,
+        found.rms_mm
     );
-    say!("           corners lie {:.3} mm off a true board (RMS)", found.rms_mm);
     if found.scale_error.abs() > MAX_SCALE_ERROR || found.rms_mm > FLAT_MM {
         say!(
             "           WARNING: it measures {:+.2} % of its size; see --square-mm, \
-             --board-thickness-mm",
+             --board-thickness-mm\n           \
+             and --robot-z-mm, or whether the calibration holds (truebead camera verify)",
             100.0 * found.scale_error
-        );
-        say!(
-            "           and --robot-z-mm, or whether the calibration holds (truebead camera verify)"
         );
     }
     tell(found.along_mm, sigma, now);

@@ -1,5 +1,6 @@
 //! How forms, dead times and filters are written.
 
+use crate::cli::arguments::parse_within;
 use crate::identify::fit::{DeadTime, MAX_POLES, Structure};
 use crate::numeric::hampel::Hampel;
 use crate::numeric::savgol::SavGol;
@@ -69,8 +70,7 @@ pub fn parse_dead_time(text: &str) -> Result<DeadTimeArg, String> {
 
 /// A gap that is bridged.
 pub fn parse_gap(text: &str) -> Result<f64, String> {
-    let gap = text.trim().parse::<f64>().ok().filter(|s| (0.0..=1e4).contains(s));
-    gap.ok_or_else(|| "expected 0 to 10000 s".to_owned())
+    parse_within(text, 0.0..=1e4, "expected 0 to 10000 s")
 }
 
 /// K,T.

@@ -94,9 +94,9 @@ impl BeadArgs {
         measured: &[f64],
         position: &str,
     ) -> Result<Vec<f64>> {
-        let way = rows.in_unit(position, Unit::Mm)?;
+        let path = rows.in_unit(position, Unit::Mm)?;
         let offset = self.layer.offset()?.unwrap_or(0.0);
-        let found = to_extruded(&way, measured, offset).map_err(|error| match error {
+        let found = to_extruded(&path, measured, offset).map_err(|error| match error {
             AlignError::Falls { at, .. } | AlignError::NotFinite { at, .. } => {
                 let line = rows.table.line(at.saturating_sub(1));
                 anyhow!(error).context(format!("{}, line {line}, column {position}", rows.name))
@@ -105,7 +105,7 @@ impl BeadArgs {
         })?;
         let found: Vec<f64> = found.into_iter().map_while(|value| value).collect();
         if found.is_empty() {
-            let went = way.last().copied().unwrap_or(0.0) - way.first().copied().unwrap_or(0.0);
+            let went = path.last().copied().unwrap_or(0.0) - path.first().copied().unwrap_or(0.0);
             return Err(anyhow!(
                 "{}: nothing of the bead comes to where it is measured: {position} goes on by \
                  {went} mm, and --measured-at-offset-mm is {offset}",

@@ -115,7 +115,8 @@ impl ColumnArgs {
     }
 }
 
-fn units() -> String {
+/// The words of all units, for messages.
+pub fn units() -> String {
     Unit::all().map(Unit::word).collect::<Vec<_>>().join(", ")
 }
 

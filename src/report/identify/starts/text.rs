@@ -41,16 +41,15 @@ fn data(text: &mut String, study: &StartStudy) {
     put(text, "output", &logs.output.to_string());
     let [shortest_s, longest_s] = seen.idle_range_s.map(three_digits);
     let [least, most] = seen.flow_range_mm3_per_s.map(three_digits);
+    let (starts, left_out) = (seen.starts, study.left_out());
     let line = format!(
-        "{} after pauses of {shortest_s} to {longest_s} s, to {least} to {most} mm³/s",
-        seen.starts
+        "{starts} after pauses of {shortest_s} to {longest_s} s, to {least} to {most} mm³/s"
     );
     put(text, "starts", &line);
-    if study.left_out() > 0 {
+    if left_out > 0 {
         let line = format!(
-            "{} left out: the pump ran when the record began, the run after it was too short or \
-             uneven, or samples are missing",
-            study.left_out()
+            "{left_out} left out: the pump ran when the record began, the run after it was too short \
+             or uneven, or samples are missing"
         );
         put(text, "", &line);
     }
