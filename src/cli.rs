@@ -83,28 +83,28 @@ enum Command {
 Example:
   truebead camera board --board 9x6 --square-mm 20 --out board.pdf"
     )]
-    Camera(camera::CameraCommand),
+    Camera(camera::CameraGroup),
     #[command(
         subcommand,
         after_help = "\
 Example:
   truebead extruder columns log.csv"
     )]
-    Extruder(extruder::ExtruderCommand),
+    Extruder(extruder::ExtruderGroup),
     #[command(
         subcommand,
         after_help = "\
 Example:
   truebead sim robot --endless"
     )]
-    Sim(sim::SimCommand),
+    Sim(sim::SimGroup),
     #[command(
         subcommand,
         after_help = "\
 Example:
   truebead lab reproduce barjuei2022 --out barjuei2022"
     )]
-    Lab(lab::LabCommand),
+    Lab(lab::LabGroup),
 }
 
 /// Runs the program.

@@ -15,16 +15,16 @@ use crate::core::time::Stamp;
 
 /// Machines that answer the links of a robot and of an extruder
 #[derive(Debug, Subcommand)]
-pub enum SimCommand {
+pub enum SimGroup {
     Robot(robot::RobotSimArgs),
     Extruder(extruder::ExtruderSimArgs),
 }
 
 /// Runs one of them.
-pub fn run(command: &SimCommand) -> anyhow::Result<ExitCode> {
+pub fn run(command: &SimGroup) -> anyhow::Result<ExitCode> {
     match command {
-        SimCommand::Robot(args) => robot::run(args),
-        SimCommand::Extruder(args) => extruder::run(args),
+        SimGroup::Robot(args) => robot::run(args),
+        SimGroup::Extruder(args) => extruder::run(args),
     }
     .map(|()| ExitCode::SUCCESS)
 }

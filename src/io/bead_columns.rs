@@ -17,7 +17,7 @@ pub const COMMAND: &str = "command";
 
 /// Facts of the cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CellFacts {
+pub struct BeadFacts {
     /// Unit of the extruder's command, where it is commanded.
     pub command: Option<Unit>,
     /// Height of a layer, if it is known.
@@ -40,7 +40,7 @@ pub struct BeadColumns {
 /// read on.
 pub fn columns(
     entries: impl IntoIterator<Item = Result<RecordedEntry, RecordingError>>,
-    facts: &CellFacts,
+    facts: &BeadFacts,
 ) -> Result<BeadColumns, RecordingError> {
     let mut collector = ColumnCollector::new(facts);
     for entry in entries {
@@ -97,7 +97,7 @@ struct ColumnCollector {
 }
 
 impl ColumnCollector {
-    fn new(facts: &CellFacts) -> Self {
+    fn new(facts: &BeadFacts) -> Self {
         let measured = |name: &str| TimeSeries::new(name, false);
         let unit = facts.command.unwrap_or(Unit::One).word();
         Self {
@@ -171,7 +171,7 @@ impl ColumnCollector {
         (longest.copied(), all.len())
     }
 
-    fn finish(self, facts: &CellFacts) -> BeadColumns {
+    fn finish(self, facts: &BeadFacts) -> BeadColumns {
         let mut notes = Vec::new();
         let (interval, count) = self.longest_interval();
         let Some(interval) = interval else {
@@ -208,7 +208,7 @@ impl BeadSeries {
     /// The width and the flow of the bead at the moments when it was laid: what
     /// the camera sees left the nozzle when that was the offset further back
     /// along the path.
-    fn laid(&self, facts: &CellFacts) -> ([TimeSeries; 2], Option<String>) {
+    fn laid(&self, facts: &BeadFacts) -> ([TimeSeries; 2], Option<String>) {
         let mut width = TimeSeries::new("laid_width_mm", false);
         let mut flow = TimeSeries::new("laid_flow_mm3_per_s", false);
         let mut too_narrow = 0_usize;

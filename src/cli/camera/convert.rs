@@ -143,17 +143,10 @@ impl ConvertSource {
     /// A note about the data that the format cannot hold; `None` where nothing is lost.
     fn left_out(&self, to: To) -> Option<String> {
         let is_given = |quality: &CalibrationQuality| {
-            let CalibrationQuality {
-                reprojection_rms_px: _,
-                width_relative_sigma,
-                seen_px,
-                heights_mm,
-                uncertainty,
-            } = quality;
-            width_relative_sigma.is_some()
-                || seen_px.is_some()
-                || heights_mm.is_some()
-                || uncertainty.is_some()
+            quality.width_relative_sigma.is_some()
+                || quality.seen_px.is_some()
+                || quality.heights_mm.is_some()
+                || quality.uncertainty.is_some()
         };
         let mut lost = Vec::new();
         let mut way_back = "";

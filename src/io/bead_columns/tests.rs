@@ -97,15 +97,15 @@ fn bead(begins_s: f64, lasts_s: f64) -> Vec<RecordedEntry> {
     events.into_iter().flat_map(entry).collect()
 }
 
-fn facts() -> CellFacts {
-    CellFacts {
+fn facts() -> BeadFacts {
+    BeadFacts {
         command: Some(Unit::Rpm),
         layer_height: Some(Mm::constant(HEIGHT)),
         offset: Mm::constant(OFFSET),
     }
 }
 
-fn found(entries: Vec<RecordedEntry>, facts: &CellFacts) -> BeadColumns {
+fn found(entries: Vec<RecordedEntry>, facts: &BeadFacts) -> BeadColumns {
     columns(entries.into_iter().map(Ok), facts).unwrap()
 }
 
@@ -150,11 +150,11 @@ fn the_longest_of_several_beads_is_taken() {
 
 #[test]
 fn columns_that_cannot_be_made_are_named_in_notes() {
-    let without = CellFacts { layer_height: None, ..facts() };
+    let without = BeadFacts { layer_height: None, ..facts() };
     let columns = found(bead(0.0, 5.0), &without);
     assert_eq!(*names(&columns).last().unwrap(), "laid_width_mm");
     assert!(columns.notes[0].contains("--layer-height-mm"), "{:?}", columns.notes);
-    let high = CellFacts { layer_height: Some(Mm::constant(9.0)), ..facts() };
+    let high = BeadFacts { layer_height: Some(Mm::constant(9.0)), ..facts() };
     let columns = found(bead(0.0, 5.0), &high);
     assert!(
         columns.notes[0].contains("are less than the layer's height of 9"),

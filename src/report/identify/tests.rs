@@ -82,7 +82,7 @@ fn another_machine_is_not_foretold() {
     let data = logs(experiment(&flow_log::binary().unwrap()), Some(experiment(&other)));
     let refusal = study(data, &[settings(Structure::SecondOrderOscillating { zero: false })]);
     let said = refusal.unwrap_err().to_string();
-    assert!(said.contains("does not foretell") && said.contains("same machine"), "{said}");
+    assert!(said.contains("does not predict") && said.contains("same machine"), "{said}");
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn one_log_alone_is_warned_of() {
         &[settings(Structure::SecondOrderOscillating { zero: false })],
     );
     let found = found.unwrap();
-    assert!(found.warnings.iter().any(|warning| warning.contains("nothing was validated with")));
+    assert!(found.warnings.iter().any(|warning| warning.contains("no validation data")));
     assert!(found.validation.is_none() && found.predicted.is_none());
     let page = page(&found);
     assert!(!page.contains("What it was validated with"));

@@ -13,7 +13,7 @@ use crate::cli::recorded::{begins_with, open, refuse_foreign};
 use crate::core::units::Mm;
 use crate::identify::series::TimeSeries;
 use crate::identify::table::DataTable;
-use crate::io::bead_columns::{BeadColumns, CellFacts, columns};
+use crate::io::bead_columns::{BeadColumns, BeadFacts, columns};
 use crate::io::recording::Recording;
 
 /// First bytes of an MCAP file (MCAP specification, § Magic).
@@ -67,7 +67,7 @@ fn recorded(path: &Path, layer: &LayerArgs) -> Result<BeadColumns> {
 }
 
 /// What the cell file says that is attached.
-fn facts(recording: &Recording, layer: &LayerArgs) -> Result<CellFacts> {
+fn facts(recording: &Recording, layer: &LayerArgs) -> Result<BeadFacts> {
     let file = recording.file();
     refuse_foreign(recording)?;
     let Some(text) = recording.cell() else {
@@ -84,7 +84,7 @@ fn facts(recording: &Recording, layer: &LayerArgs) -> Result<CellFacts> {
     let extruder = run.extruder.as_ref().map(|part| &part.extruder);
     let given = layer.layer_height()?;
     let offset = layer.offset()?;
-    Ok(CellFacts {
+    Ok(BeadFacts {
         command: extruder.map(|extruder| extruder.drive.unit()),
         layer_height: given.or(extruder.map(|extruder| extruder.layer_height)),
         offset: offset.map_or(run.camera.offset, |mm| Mm::new(mm).unwrap_or(run.camera.offset)),
