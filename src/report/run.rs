@@ -1,6 +1,7 @@
 //! `report.html` of a run: one page that refers to no other file.
 
 mod charts;
+mod contents;
 mod distance;
 mod extruder;
 mod headline;

@@ -1,20 +1,19 @@
 //! `truebead lab accuracy`: errors of widths in images whose truth is known.
 
 mod arguments;
+mod publish;
 mod random;
 mod roughness;
 
-use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use rayon::prelude::*;
-use serde::Serialize;
 
 pub use self::arguments::AccuracyArgs;
+use self::publish::{Texts, make_folder};
 use crate::cli::print::Verbosity;
 use crate::io::progress::SharedProgress;
-use crate::rows::output;
 use crate::studies::accuracy::calibration_table::{self, CalibrationFigures};
 use crate::studies::accuracy::calibrations::{
     self, CalibrationBench, CalibrationCase, CornerSource,
@@ -54,38 +53,6 @@ pub fn run(args: &AccuracyArgs, voice: Verbosity) -> Result<ExitCode> {
     let texts = Texts { table: table(&figures), markdown: markdown(&figures) };
     let missed = figures.iter().any(|figures| figures.kept == Some(false));
     texts.publish(args, "accuracy", &figures, missed)
-}
-
-/// Makes the folder for the results, where one is asked for.
-fn make_folder(args: &AccuracyArgs) -> Result<()> {
-    Ok(args.out.as_deref().map_or(Ok(()), |out: &Path| output::make_folder(out))?)
-}
-
-/// Figures for a terminal and for a file.
-struct Texts {
-    table: String,
-    markdown: String,
-}
-
-impl Texts {
-    /// Prints the table and writes `name.json` and `name.md` where a folder is asked for.
-    /// Status 1 where a limit is missed.
-    fn publish<T: Serialize>(
-        &self,
-        args: &AccuracyArgs,
-        name: &str,
-        figures: &[T],
-        missed: bool,
-    ) -> Result<ExitCode> {
-        if let Some(out) = &args.out {
-            let file = format!("{name}.json");
-            let json = serde_json::to_vec_pretty(figures).context(file.clone())?;
-            output::write_whole(out, &file, &json)?;
-            output::write_whole(out, &format!("{name}.md"), self.markdown.as_bytes())?;
-        }
-        say!("{}", self.table.trim_end());
-        Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
-    }
 }
 
 fn judge_calibrations(args: &AccuracyArgs, voice: Verbosity) -> Result<ExitCode> {

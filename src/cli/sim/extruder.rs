@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{print, serve};
+use super::serve::{print, serve};
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::cli::arguments::parse_within;

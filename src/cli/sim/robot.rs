@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::{print, serve};
+use super::serve::{print, serve};
 use crate::cli::arguments::WrongArguments;
 use crate::core::time::Span;
 use crate::core::units::{Mm, MmPerS, MmPerS2, NotFinite};

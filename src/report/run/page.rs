@@ -3,13 +3,14 @@
 use maud::html;
 
 use super::charts::Charts;
+use super::contents::RunReport;
 use super::{headline, sections};
 use crate::control::{Event, Step};
 use crate::core::frame::Frame;
 use crate::core::time::Stamp;
 use crate::core::units::Mm3PerS;
 use crate::report::html::{about, titled_page, verdict};
-use crate::report::picker::{ChosenFrame, FramePicker};
+use crate::report::picker::FramePicker;
 use crate::rows::frame_row::FrameRow;
 use crate::rows::log::{FinishedRun, LogOptions, RunLog, RunObserver};
 use crate::rows::output::{LogError, write_whole};
@@ -55,17 +56,6 @@ impl RunObserver for RunPage {
         let report = RunReport { run, charts: &self.charts, images: &self.images.finish() };
         write_whole(&run.options.folder, "report.html", report.page().as_bytes()).map(drop)
     }
-}
-
-/// The contents of a page.
-#[derive(Debug)]
-pub struct RunReport<'a> {
-    /// Facts, summary and remarks.
-    pub run: &'a FinishedRun<'a>,
-    /// The plots' data.
-    pub charts: &'a Charts,
-    /// Frames with their edges.
-    pub images: &'a [ChosenFrame],
 }
 
 impl RunReport<'_> {

@@ -4,7 +4,7 @@ use base64::Engine as _;
 use maud::{Markup, html};
 
 use super::charts::TimeAndPath;
-use super::page::RunReport;
+use super::contents::RunReport;
 use super::remedies;
 use crate::numeric::statistics::{Distribution, as_f64};
 use crate::report::chart::{

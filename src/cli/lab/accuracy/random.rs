@@ -9,8 +9,8 @@ use anyhow::{Context, Result};
 use image::{GrayImage, ImageFormat};
 use rayon::prelude::*;
 
-use super::Texts;
 use super::arguments::AccuracyArgs;
+use super::publish::Texts;
 use crate::calibration::SurfaceMap;
 use crate::cli::print::Verbosity;
 use crate::core::frame::Pixels;

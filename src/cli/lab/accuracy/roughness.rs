@@ -6,7 +6,7 @@ use anyhow::Result;
 use rayon::prelude::*;
 
 use super::arguments::AccuracyArgs;
-use super::{Texts, make_folder};
+use super::publish::{Texts, make_folder};
 use crate::calibration::SurfaceMap;
 use crate::cli::print::Verbosity;
 use crate::core::units::Mm;
