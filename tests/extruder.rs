@@ -388,7 +388,7 @@ fn a_profile_tells_how_far_it_was_played() {
     let share = |changes: &[(&str, &str)]| {
         let summary = runs_through(cell, changes, 0.4);
         let profile = &summary["extruder"]["profile"];
-        (number(profile, "played_fraction"), number(profile, "outlasted_s"))
+        (number(profile, "played_fraction"), number(profile, "after_end_s"))
     };
     let path = cell.lines().find(|line| line.starts_with("path_mm")).unwrap();
     let (cut_off, none) = share(&[(path, "path_mm = 4000.0")]);
