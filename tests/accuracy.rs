@@ -88,10 +88,10 @@ fn drawn_sets_are_counted_and_judged_and_frames_kept() {
     let whole: Vec<&Value> = figures.iter().filter(|figures| figures["part"] == "all").collect();
     assert_eq!(whole.len(), 18);
     for figures in &whole {
-        let refused = figures["refused"].as_object().unwrap().values();
-        let refused: u64 = refused.map(|count| count.as_u64().unwrap()).sum();
+        let rejected = figures["rejected"].as_object().unwrap().values();
+        let rejected: u64 = rejected.map(|count| count.as_u64().unwrap()).sum();
         let measured = 300.0 * figures["measured_fraction"].as_f64().unwrap();
-        assert!((measured + f64::from(u32::try_from(refused).unwrap()) - 300.0).abs() < 1e-6);
+        assert!((measured + f64::from(u32::try_from(rejected).unwrap()) - 300.0).abs() < 1e-6);
     }
     let missed = figures.iter().any(|figures| !figures["missed"].as_array().unwrap().is_empty());
     assert_eq!(status, Some(i32::from(missed)));
