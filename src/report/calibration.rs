@@ -143,7 +143,7 @@ impl CalibrationPage<'_> {
             section {
                 h2 { "Where boards were seen, and the residuals there" }
                 p.hint {
-                    "Each corner of each image, with its residual, from where the model expects it, "
+                    "Each corner of each image, with its residual from the expected position, "
                     (format!("drawn {times:.0} times as long. "))
                     "Residuals that point the same in one part of the image are the lens's, residuals that \
                      point the same on one board are the board's or its motion's."

@@ -50,7 +50,7 @@ const QUANTITIES: [Quantity; 6] = [
     Quantity("RMS error over that of the first", "1", Average::Mean, |one| one.ratio),
     Quantity("settled within 0.5 mm after", "mm", Average::Median, |one| one.settled_mm),
     Quantity("integral of the error's size", "mm²", Average::Mean, |one| one.integral_mm2),
-    Quantity("standard deviation once settled", "mm", Average::Mean, |one| one.sigma_mm),
+    Quantity("scatter once settled", "mm", Average::Mean, |one| one.sigma_mm),
 ];
 
 impl Quantity {

@@ -87,3 +87,21 @@ pub fn about<N: Render, V: Render>(facts: impl IntoIterator<Item = (N, V)>) -> M
 pub fn number(value: Option<f64>, places: usize) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.places$}"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_verdict_has_its_level_and_its_warnings() {
+        let warned = verdict(VerdictLevel::with_caution(true), &"Text.", &["a", "b"]);
+        assert_eq!(
+            warned.into_string(),
+            "<div class=\"verdict caution\"><b>Look closer.</b>Text.\
+             <ul><li>a</li><li>b</li></ul></div>"
+        );
+        let none: [&str; 0] = [];
+        let good = verdict(VerdictLevel::with_caution(false), &"Text.", &none).into_string();
+        assert!(good.contains("good") && !good.contains("<ul>"), "{good}");
+    }
+}

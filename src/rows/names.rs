@@ -37,3 +37,31 @@ pub fn in_words(name: &str) -> String {
         name.replace('_', " ")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::step::Hold;
+    use crate::extruder::{CommandLimit, ExtruderHold};
+    use crate::width_control::limiter::SpeedLimit;
+
+    #[test]
+    fn names_are_those_of_the_recording() {
+        let name = |json: Result<serde_json::Value, _>| json.unwrap();
+        for limit in [SpeedLimit::None, SpeedLimit::MinSpeed, SpeedLimit::RobotSlower] {
+            assert_eq!(name(serde_json::to_value(limit)), of(limit));
+        }
+        assert_eq!(name(serde_json::to_value(Hold::NoWidth)), of(&Hold::NoWidth));
+        assert_eq!(name(serde_json::to_value(CommandLimit::Rise)), of(CommandLimit::Rise));
+    }
+
+    #[test]
+    fn a_fault_has_its_reason_in_its_name() {
+        assert_eq!(fault(&Fault::RobotStopped), "robot_stopped");
+        assert_eq!(fault(&Fault::HeldTooLong(Hold::LinkDown)), "held_too_long_link_down");
+        let held = ExtruderFault::HeldTooLong(ExtruderHold::NoReading);
+        let name = fault(&Fault::Extruder(held));
+        assert_eq!(name, "extruder_held_too_long_no_reading");
+        assert_eq!(in_words(&name), "extruder: held too long: no reading");
+    }
+}

@@ -207,7 +207,7 @@ pub fn image_quality(report: &RunReport<'_>) -> Markup {
             h2 { "How good the images are" }
             (advice(report.run.summary))
             p.hint { "Much contrast, little blur and noise and no saturation make a certain width. A \
-                slow drift means dust on the lens or of changing light." }
+                slow drift means dust on the lens or changing light." }
             div.pair {
                 (small(&charts.contrast, 10.0, "contrast [grey levels of 256]"))
                 (small(&charts.blur, 0.1, "blur of the edges [px]"))

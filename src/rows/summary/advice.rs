@@ -231,4 +231,13 @@ mod tests {
         let bound = row_bound_px(&hints(80.0, 4.0, 1.5, 0.0, 1.0)).unwrap();
         assert!((bound - 1.883 * 4.0 / 80.0 * 1.5f64.sqrt()).abs() < 1e-4, "{bound}");
     }
+
+    #[test]
+    fn thresholds_are_those_of_a_normal_deviate() {
+        let beyond = |sigmas: f64| libm::erfc(sigmas / std::f64::consts::SQRT_2);
+        // Half of the gauge, and of a normal deviate only the upper end.
+        let clipped = 0.5 * 0.5 * beyond(2.0);
+        assert!((CLIPPED_FRACTION / clipped - 1.0).abs() < 0.15, "{clipped}");
+        assert!((beyond(SKEW_SIGMAS) / 6e-5 - 1.0).abs() < 0.1);
+    }
 }

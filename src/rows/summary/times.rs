@@ -25,3 +25,19 @@ impl Times {
         self.0.values().fold(Span::ZERO, |sum, span| sum + *span).secs()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_of_a_name_are_summed_without_rounding() {
+        let mut times = Times::default();
+        for _ in 0..10 {
+            times.add("a", Span::from_secs(0.1));
+        }
+        times.add("b", Span::from_secs(2.0));
+        assert_eq!(times.seconds(), BTreeMap::from([("a", 1.0), ("b", 2.0)]));
+        assert_eq!(times.total_s(), 3.0);
+    }
+}
