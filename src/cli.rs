@@ -1,4 +1,4 @@
-//! What a person types: one file a command.
+//! The commands: one file each.
 //!
 //! Results go to standard output or files, everything else to standard error.
 //! Exit status: 0 done; 1 failed, or a verdict that is "no"; 2 wrong arguments
@@ -47,7 +47,7 @@ use tracing_subscriber::EnvFilter;
 use print::Verbosity;
 use status::status_of;
 
-/// Keeps an extruded bead at the width that was asked for.
+/// Keeps an extruded bead at its target width.
 ///
 /// A camera looks at the fresh bead, its width is measured, and the robot's
 /// speed is corrected over TCP. Try `truebead demo` first: it runs the whole
@@ -84,28 +84,28 @@ enum Command {
 Example:
   truebead camera board --board 9x6 --square-mm 20 --out board.pdf"
     )]
-    Camera(camera::CameraCommand),
+    Camera(camera::CameraGroup),
     #[command(
         subcommand,
         after_help = "\
 Example:
   truebead extruder columns log.csv"
     )]
-    Extruder(extruder::ExtruderCommand),
+    Extruder(extruder::ExtruderGroup),
     #[command(
         subcommand,
         after_help = "\
 Example:
   truebead sim robot --endless"
     )]
-    Sim(sim::SimCommand),
+    Sim(sim::SimGroup),
     #[command(
         subcommand,
         after_help = "\
 Example:
   truebead lab reproduce barjuei2022 --out barjuei2022"
     )]
-    Lab(lab::LabCommand),
+    Lab(lab::LabGroup),
 }
 
 /// Runs the program.
@@ -145,7 +145,7 @@ pub fn main() -> ExitCode {
     })
 }
 
-/// Sends the library's words to standard error.
+/// Sends the library's messages to standard error.
 fn listen(cli: &Cli) {
     let level = match (cli.quiet, cli.verbose) {
         (true, _) => "error",

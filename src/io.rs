@@ -1,4 +1,4 @@
-//! Files, devices, sockets and the clock: everything outside the core.
+//! Files, recordings, the clock and signals.
 
 pub mod atomic_file;
 pub mod bead_columns;

@@ -1,4 +1,4 @@
-//! What people look at: pages, plots, overlays, boards to print.
+//! Results for people: pages, plots, overlays, boards to print.
 
 pub mod calibration;
 pub mod chart;

@@ -1,4 +1,4 @@
-//! What a run leaves as data: `widths.csv`, `edges.csv`, `summary.json`.
+//! The data of a run: `widths.csv`, `edges.csv`, `summary.json`.
 
 pub mod edges;
 pub mod frame_row;

@@ -16,7 +16,7 @@ fn accuracy(args: &[&str]) -> Command {
 }
 
 #[test]
-fn clear_pictures_are_measured_to_their_bound_and_others_not_far_off() {
+fn clear_images_are_measured_to_their_bound_and_others_not_far_off() {
     let out = tempfile::tempdir().unwrap();
     let folder = out.path().to_str().unwrap();
     let args = ["--frames", "60", "--silent-frames", "30", "--out", folder];
@@ -34,7 +34,7 @@ fn clear_pictures_are_measured_to_their_bound_and_others_not_far_off() {
         if clear.iter().any(|name| set.starts_with(name)) {
             assert_eq!((number("frames"), number("measured_fraction")), (60.0, 1.0), "{set}");
             assert_eq!(number("silent_fraction"), 0.0, "{set}");
-            // Sixty frames tell a scatter to nine percent.
+            // Sixty frames determine a standard deviation to nine percent.
             assert!(number("rmse_over_free_bound") < 1.4, "{figures}");
             assert!((0.7..1.35).contains(&number("rms_over_sigma")), "{figures}");
             assert!(number("bias_px").abs() < 0.5 * number("rmse_px"), "{figures}");

@@ -42,7 +42,7 @@ fn save(frame: &Frame, path: &Path) {
     picture.save(path).unwrap();
 }
 
-/// A calibration file and a picture of a board that lies so much above the bed.
+/// A calibration file and a image of a board that lies so much above the bed.
 fn scene(folder: &Path, higher_mm: f64) -> (PathBuf, PathBuf) {
     let (calibration, picture) = (folder.join("calib.toml"), folder.join("board.png"));
     let bed = bed_from_board(&pose(0.0), Mm::ZERO);
@@ -63,7 +63,7 @@ fn verify(calibration: &Path, picture: &Path, more: &[&str]) -> Command {
 }
 
 #[test]
-fn a_calibration_that_holds_is_told_from_one_that_does_not() {
+fn a_calibration_that_holds_is_distinguished_from_one_that_does_not() {
     let scratch = tempfile::tempdir().unwrap();
     let (calibration, picture) = scene(scratch.path(), 0.0);
     let run = verify(&calibration, &picture, &[]).assert().code(0);

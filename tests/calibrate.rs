@@ -1,4 +1,4 @@
-//! `truebead calibrate` on real pictures of a board, and with bad input.
+//! `truebead calibrate` on real images of a board, and with bad input.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
 
@@ -17,13 +17,13 @@ use truebead::core::units::Mm;
 use truebead::io::{calibration_file, image_file};
 use truebead::sim::board_studio::{BoardStudio, Exposure};
 
-/// Thirteen pictures of a board with 9x6 inner corners, of squares of 25 mm, if
+/// Thirteen images of a board with 9x6 inner corners, of squares of 25 mm, if
 /// they are there.
 fn chessboard() -> Option<PathBuf> {
     sample("chessboard")
 }
 
-/// A folder of real pictures beside the project, if it is there.
+/// A folder of real images beside the project, if it is there.
 fn sample(name: &str) -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(name);
     if !folder.is_dir() {
@@ -41,7 +41,7 @@ fn calibrate(input: &Path, out: &Path, more: &[&str]) -> Command {
 }
 
 #[test]
-fn the_camera_of_the_real_pictures_is_found() {
+fn the_camera_of_the_real_images_is_found() {
     let Some(folder) = chessboard() else { return };
     let scratch = tempfile::tempdir().unwrap();
     let out = scratch.path().join("calib.toml");
@@ -54,15 +54,15 @@ fn the_camera_of_the_real_pictures_is_found() {
     let share = quality.unwrap().width_relative_sigma.unwrap();
     // The largest where boards were seen, with the design effect of a board that is bent.
     assert!((1e-4..2e-2).contains(&share), "{share}");
-    assert!(said.contains("a width is known to"), "{said}");
-    // The focal length that OpenCV's own samples give for these pictures.
+    assert!(said.contains("uncertainty of a width"), "{said}");
+    // The focal length that OpenCV's own samples give for these images.
     assert!((camera.focal_px[0] - 532.83).abs() < 0.8, "fx {}", camera.focal_px[0]);
     assert!((camera.centre_px[0] - 342.5).abs() < 1.5 && (camera.centre_px[1] - 233.9).abs() < 1.5);
 }
 
-/// In one of them the board is close to the edge of the picture.
+/// In one of them the board is close to the edge of the image.
 #[test]
-fn every_picture_of_the_other_camera_is_used() {
+fn every_image_of_the_other_camera_is_used() {
     let Some(folder) = sample("chessboard_right") else { return };
     let scratch = tempfile::tempdir().unwrap();
     let run = calibrate(&folder, &scratch.path().join("calib.toml"), &[]).assert().success();
@@ -114,7 +114,7 @@ fn wrong_arguments_end_with_2_and_leave_nothing() {
 }
 
 #[test]
-fn pictures_without_a_board_end_with_1_and_say_which() {
+fn images_without_a_board_end_with_1_and_say_which() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path().join("pictures");
     fs::create_dir(&folder).unwrap();
@@ -162,7 +162,7 @@ fn save(frame: &Frame, path: &Path) {
     picture.unwrap().save(path).unwrap();
 }
 
-/// A folder with good pictures, and the studio they were taken in.
+/// A folder with good images, and the studio they were taken in.
 fn pictures(folder: &Path) -> BoardStudio {
     let studio = BoardStudio::new(&camera(), SIZE);
     fs::create_dir(folder).unwrap();
@@ -177,9 +177,9 @@ fn said(run: &assert_cmd::assert::Assert) -> String {
     String::from_utf8_lossy(&run.get_output().stdout).into_owned()
 }
 
-/// Every line of the table of bad pictures in `calib/README.md`.
+/// Every line of the table of bad images in `calib/README.md`.
 #[test]
-fn pictures_that_are_no_good_are_left_out_and_say_why() {
+fn images_that_are_no_good_are_left_out_and_say_why() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path().join("pictures");
     let studio = pictures(&folder);
@@ -220,10 +220,7 @@ fn pictures_that_are_no_good_are_left_out_and_say_why() {
     assert!(said.contains("12 of 20 images show the board"), "{said}");
     assert!(said.contains("boards      2 on one plane, to 0.0"), "{said}");
     let page = fs::read_to_string(scratch.path().join("report.html")).unwrap();
-    assert!(
-        page.contains("wrong-moved.png") && page.contains("What a width is known to"),
-        "{page}"
-    );
+    assert!(page.contains("wrong-moved.png") && page.contains("Uncertainty of a width"), "{page}");
     let Calibration::Full { camera: found, quality, .. } = calibration_file::read(&out).unwrap()
     else {
         unreachable!()
@@ -235,7 +232,7 @@ fn pictures_that_are_no_good_are_left_out_and_say_why() {
 }
 
 #[test]
-fn check_draws_what_is_left_open_with_the_gauge_and_knows_older_files() {
+fn check_draws_the_uncertainty_with_the_gauge_and_knows_older_files() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path().join("pictures");
     pictures(&folder);
@@ -251,17 +248,17 @@ fn check_draws_what_is_left_open_with_the_gauge_and_knows_older_files() {
         said(&command.arg("check").arg(&cell).args(more).assert().success())
     };
     let page = scratch.path().join("check.html");
-    let told = check(&["--report", page.to_str().unwrap()]);
-    assert!(told.contains("in the middle of the gauge"), "{told}");
+    let printed = check(&["--report", page.to_str().unwrap()]);
+    assert!(printed.contains("in the middle of the gauge"), "{printed}");
     // Rows are named by their middles; the gauge covers five cells of one.
-    let row = told.lines().find(|line| line.trim_start().starts_with("200 "));
-    assert_eq!(row.unwrap().matches('[').count(), 5, "{told}");
+    let row = printed.lines().find(|line| line.trim_start().starts_with("200 "));
+    assert_eq!(row.unwrap().matches('[').count(), 5, "{printed}");
     assert!(fs::read_to_string(page).unwrap().contains("Solid: the gauge"));
     let old = fs::read_to_string(&out).unwrap();
     let (old, _) = old.split_once("[uncertainty]").unwrap();
     fs::write(&out, old).unwrap();
-    let told = check(&[]);
-    assert!(told.contains("number for the whole image"), "{told}");
+    let printed = check(&[]);
+    assert!(printed.contains("number for the whole image"), "{printed}");
 }
 
 #[test]
@@ -279,7 +276,7 @@ fn a_calibration_passes_or_fails_by_what_it_leaves_in_a_width() {
     assert!(passed.contains("PASS: ") && passed.contains("of a bead of 42 mm"), "{passed}");
     let failed = verdict("0.00001", 1);
     assert!(failed.contains("FAIL: "), "{failed}");
-    // The plane is that of boards that all lay on the bed, each in a place of its own.
+    // The plane is that of boards that all lay on the bed, each at a position of its own.
     let apart = ["--plane", "view02.png", "--plane", "view05.png"];
     let run = calibrate(&folder, &out, &apart).assert().code(1);
     let refused = String::from_utf8_lossy(&run.get_output().stderr).into_owned();
@@ -288,7 +285,7 @@ fn a_calibration_passes_or_fails_by_what_it_leaves_in_a_width() {
     let run = calibrate(&folder, &out, &twice).assert().code(1);
     let refused = String::from_utf8_lossy(&run.get_output().stderr).into_owned();
     assert!(refused.contains("is where it is in view10.png"), "{refused}");
-    // A later picture of the same name is another one.
+    // A later image of the same name is another one.
     fs::create_dir(scratch.path().join("later")).unwrap();
     let later = scratch.path().join("later/view10.png");
     fs::copy(folder.join("view03.png"), &later).unwrap();

@@ -1,4 +1,4 @@
-//! Whether calibrations from disjoint halves of real pictures differ as much as they
+//! Whether calibrations from disjoint halves of real images differ as much as they
 //! predict: the corners' true errors, the real lens and the real board are in that.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
@@ -22,13 +22,13 @@ use truebead::core::time::Stamp;
 use truebead::core::units::Mm;
 use truebead::io::image_file;
 
-/// OpenCV's sample pictures by both cameras of a pair.
+/// OpenCV's sample images by both cameras of a pair.
 const SETS: [&str; 2] = ["chessboard", "chessboard_right"];
-/// Splits of both sets together; every picture is left out of its halves in turn.
+/// Splits of both sets together; every image is left out of its halves in turn.
 const SPLITS: usize = 200;
-/// Cells along each side of the board in the picture that is in neither half.
+/// Cells along each side of the board in the image that is in neither half.
 const GRID: u32 = 5;
-/// Half of the length whose size is compared, along the picture's rows \[px\].
+/// Half of the length whose size is compared, along the image's rows \[px\].
 const HALF_PX: f64 = 50.0;
 /// RMS of the difference over what was predicted.
 const RATIO: std::ops::RangeInclusive<f64> = 0.6..=1.6;
@@ -53,7 +53,7 @@ fn sightings(set: &str) -> Option<Vec<BoardObservation>> {
     Some(paths.par_iter().map(look).collect())
 }
 
-/// The plane of a board before the camera of one half of the pictures.
+/// The plane of a board before the camera of one half of the images.
 struct Face {
     surface: SurfaceMap,
     /// How many times larger its standard deviations are than those of independent corners.
@@ -69,7 +69,7 @@ fn face(half: &[BoardObservation], corners: &[Correspondence]) -> Face {
         width_relative_sigma: None,
         seen_px: None,
         heights_mm: None,
-        // Both halves see the same corners of this picture: their noise is no difference.
+        // Both halves see the same corners of this image: their noise is no difference.
         uncertainty: Some(covariance.uncertainty_of_camera()),
     };
     let calibration = Calibration::Full {
@@ -87,7 +87,7 @@ fn lengths(sighting: &BoardObservation) -> Vec<[Point2<f64>; 2]> {
     let corner = |column: usize, row: usize| sighting.corners[row * 9 + column].px;
     let part = |i: u32| (f64::from(i) + 0.5) / f64::from(GRID);
     let middle = |i: u32| {
-        // Between the four corners around the place, as if the square were a parallelogram.
+        // Between the four corners around the position, as if the square were a parallelogram.
         let (x, y) = (8.0 * part(i % GRID), 5.0 * part(i / GRID));
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small")]
         let (column, row) = ((x as usize).min(7), (y as usize).min(4));
@@ -107,8 +107,8 @@ struct Length {
     independent: f64,
 }
 
-/// What one split says at each place: difference over its predicted standard deviation,
-/// and both as a share of the length.
+/// The result of one split at each position: difference over its predicted standard deviation,
+/// and both as a fraction of the length.
 struct Compared {
     ratio: f64,
     /// The same if every corner were off by itself.
@@ -149,7 +149,7 @@ fn rms(compared: &[Compared], value: fn(&Compared) -> f64) -> f64 {
 }
 
 #[test]
-fn halves_of_real_pictures_differ_as_much_as_they_predict() {
+fn halves_of_real_images_differ_as_much_as_they_predict() {
     let sets: Option<Vec<Vec<BoardObservation>>> = SETS.iter().map(|set| sightings(set)).collect();
     let Some(sets) = sets else { return };
     let compared: Vec<(usize, Vec<Compared>)> = (0..SPLITS)

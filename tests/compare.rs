@@ -12,7 +12,7 @@ fn cell(name: &str) -> String {
 }
 
 #[test]
-fn controllers_are_told_apart_at_every_width() {
+fn controllers_differ_at_every_width() {
     let out = tempfile::tempdir().unwrap();
     let folder = out.path().to_str().unwrap();
     let cells = [cell("barjuei2022.toml"), cell("distance.toml")];

@@ -1,4 +1,4 @@
-//! `truebead camera convert`: there and back, with a bed plane from pictures, and with bad
+//! `truebead camera convert`: there and back, with a bed plane from images, and with bad
 //! input.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
@@ -76,7 +76,7 @@ fn there_and_back_every_digit_stays_and_what_does_not_is_said() {
     calibration(&folder.join("calib.toml"));
     let mut run = convert(folder, "calib.toml --to ros --camera-name left_2 --out info.yaml");
     let said = errors(&run.assert().success());
-    for words in ["the bed plane and the robot's z", "how well a width is known", "keep the .toml"]
+    for words in ["the bed plane and the robot's z", "the uncertainty of a width", "keep the .toml"]
     {
         assert!(said.contains(words), "no \"{words}\" in {said}");
     }
@@ -126,7 +126,7 @@ fn the_bed_is_where_the_boards_lay() {
             assert!((height - 8.0).abs() < 0.15, "{height} mm above the bed");
         }
     }
-    // Nothing of it is written where the boards lie on no plane, or in one place.
+    // Nothing of it is written where the boards lie on no plane, or at one position.
     let mut raised = poses[1];
     raised = Pose::from_parts(
         raised.rotation() * Rotation3::new(Vector3::new(0.15, 0.0, 0.0)),

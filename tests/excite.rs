@@ -39,7 +39,7 @@ fn profiles_are_written_as_a_cell_plays_them() {
     let unit = said(&mut excite("steps --levels 1,2 --hold-s 1 --quantity speed"), 2);
     assert!(unit.contains("ends with its unit"), "{unit}");
     let endless = said(&mut excite("gaussian --low 2 --high 4 --hold-s 1 --quantity drive_v"), 2);
-    assert!(endless.contains("tell --duration-s"), "{endless}");
+    assert!(endless.contains("give --duration-s"), "{endless}");
     let one = said(&mut excite("steps --levels 20 --hold-s 15 --quantity rpm"), 2);
     assert!(one.contains("1 level: a step takes two"), "{one}");
     let same = said(&mut excite("steps --levels 20,20 --hold-s 15 --quantity rpm"), 2);
@@ -49,7 +49,7 @@ fn profiles_are_written_as_a_cell_plays_them() {
 }
 
 #[test]
-fn what_no_extruder_can_be_told_is_refused() {
+fn a_quantity_that_cannot_be_commanded_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let excite = |args: &str, code: i32| {
         let mut command = truebead(&["extruder", "excite", "prbs", "--low", "20", "--high", "40"]);
@@ -61,7 +61,7 @@ fn what_no_extruder_can_be_told_is_refused() {
         let laid = excite(&format!("--hold-s 1 --quantity {quantity}"), 2);
         assert!(laid.contains(what) && laid.contains("such as screw_rpm"), "{laid}");
     }
-    // Shorter than a cell tells it anything, unless that is set.
+    // Shorter than the period of a cell's commands, unless that is set.
     let fast = excite("--hold-s 0.004 --quantity screw_rpm", 0);
     assert!(fast.contains("set io_rate_hz of the cell to 250"), "{fast}");
 }

@@ -98,7 +98,7 @@ fn the_robot_slows_down_where_less_flows() {
 }
 
 #[test]
-fn every_violation_is_told_at_once_with_its_line() {
+fn every_violation_is_reported_at_once_with_its_line() {
     let (status, said, _) = simulated(&[
         ("max_rpm = 90.0", "max_rpm = -90.0"),
         ("strategy = \"constant\"", "strategy = \"constnat\""),
@@ -137,7 +137,7 @@ fn a_profile_is_played_and_a_bad_one_has_its_line() {
         .unwrap();
     let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out"]);
     assert_eq!(output.status.code(), Some(0), "{output:?}");
-    for (profile, told) in [
+    for (profile, printed) in [
         ("time_s,screw_rpm\n0,60\n5,fast\n9,60\n", "line 3"),
         ("time_s,drive_v\n0,60\n5,60\n", "expected a quantity in rpm"),
         ("time_s,screw_rpm\n0,60\n5,600\n9,600\n", "expected 0 to 90"),
@@ -146,7 +146,7 @@ fn a_profile_is_played_and_a_bad_one_has_its_line() {
         let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out2"]);
         let said = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains("steps.csv") && said.contains(told), "{said}");
+        assert!(said.contains("steps.csv") && said.contains(printed), "{said}");
     }
 }
 
@@ -171,7 +171,7 @@ fn readings_are_filtered_before_the_strategy_goes_by_them() {
     let (status, said, summary) = with(filters);
     assert_eq!(status, Some(0), "{said}");
     assert!(off(&summary).abs() < 0.03, "{summary}");
-    for (wrong, told) in [
+    for (wrong, printed) in [
         ("", "extruder.readings.spike_half_width"),
         ("smooth_window = 8", "expected an odd number from 3 to 101"),
         ("spike_half_width = 0", "extruder.readings.spike_half_width"),
@@ -180,7 +180,7 @@ fn readings_are_filtered_before_the_strategy_goes_by_them() {
     ] {
         let (status, said, _) = with(wrong);
         assert_eq!(status, Some(2), "{said}");
-        assert!(said.contains(told), "{told}: {said}");
+        assert!(said.contains(printed), "{printed}: {said}");
     }
 }
 
@@ -201,7 +201,7 @@ fn a_simulation_leaves_no_recording_of_another_beside_its_results() {
 
 #[test]
 fn a_plant_that_never_reports_what_is_gone_by_is_refused() {
-    for (from, to, told) in [
+    for (from, to, printed) in [
         (
             "max_gap_s = 0.2 ",
             "max_pressure_mpa = 2.0\nmax_gap_s = 0.2 ",
@@ -215,7 +215,7 @@ fn a_plant_that_never_reports_what_is_gone_by_is_refused() {
     ] {
         let (status, said, _) = simulated(&[(from, to)]);
         assert_eq!(status, Some(2), "{said}");
-        assert!(said.contains("line ") && said.contains(told), "{said}");
+        assert!(said.contains("line ") && said.contains(printed), "{said}");
     }
     let cell = include_str!("../cells/extruder-adaptive.toml");
     let (status, said, _) = simulated_cell(cell, &[("flow_sensor_noise_mm3_per_s = 200.0", "")]);
@@ -224,7 +224,7 @@ fn a_plant_that_never_reports_what_is_gone_by_is_refused() {
 }
 
 #[test]
-fn check_says_what_a_cell_suffices_for_and_what_is_missing() {
+fn check_names_the_commands_that_a_cell_is_ready_for_and_what_is_missing() {
     let folder = tempfile::tempdir().unwrap();
     let checked = |changes: &[(&str, &str)]| {
         fs::write(folder.path().join("cell.toml"), changed(CELL, changes)).unwrap();
@@ -269,7 +269,7 @@ fn a_robot_that_goes_by_the_flow_has_its_width_while_the_extruder_runs_up() {
     let with = foreseen(&[]);
     assert!(since_control(&with) < 0.08, "{with}");
     assert!(2.0 * since_control(&with) < since_control(&alone), "{with} {alone}");
-    // A screw that follows late is known by its encoder.
+    // A screw that follows with a delay is known by its encoder.
     let plant = "start_delay_s = 0.1";
     let late = format!("{plant}\nscrew_lag_s = 0.3");
     let blind = foreseen(&[(plant, &late)]);
@@ -306,7 +306,7 @@ fn runs_through(cell: &str, changes: &[(&str, &str)], settled_mm: f64) -> serde_
     summary
 }
 
-/// By what share the flow was off on average since control began.
+/// Relative error of the flow on average since control began.
 fn off(summary: &serde_json::Value) -> f64 {
     let kept = &summary["extruder"]["flow_controlled"];
     number(kept, "error_mean_mm3_per_s") / number(kept, "mean_mm3_per_s")
@@ -340,14 +340,14 @@ fn a_screw_that_was_weighed_needs_no_model() {
     let slim = weighed.replace("78000", "7800");
     let (_, said) = checked(&[(constant, &slim)]);
     assert!(said.contains("WARNING") && said.contains("[extruder] allows 0 to 90 rpm"), "{said}");
-    for (wrong, told) in [
+    for (wrong, printed) in [
         (format!("{weighed}\nmodel = \"m.toml\""), "one of model, library and mm3_per_turn"),
         (weighed.replace("78000.0", "-1.0"), "extruder.mm3_per_turn"),
         (format!("{weighed}\nmaterial = \"PLA\""), "mm3_per_turn stands in for a model"),
     ] {
         let (status, said) = checked(&[(constant, &wrong)]);
         assert!(status == Some(2) || said.contains("not for run"), "{said}");
-        assert!(said.contains(told), "{said}");
+        assert!(said.contains(printed), "{said}");
     }
 }
 
@@ -388,7 +388,7 @@ fn a_profile_tells_how_far_it_was_played() {
     let share = |changes: &[(&str, &str)]| {
         let summary = runs_through(cell, changes, 0.4);
         let profile = &summary["extruder"]["profile"];
-        (number(profile, "played_fraction"), number(profile, "outlasted_s"))
+        (number(profile, "played_fraction"), number(profile, "after_end_s"))
     };
     let path = cell.lines().find(|line| line.starts_with("path_mm")).unwrap();
     let (cut_off, none) = share(&[(path, "path_mm = 4000.0")]);
@@ -452,7 +452,7 @@ fn a_simulation_that_is_ended_leaves_what_it_has() {
 }
 
 #[test]
-fn a_bad_rate_is_told_alone() {
+fn a_bad_rate_is_reported_alone() {
     let (status, said, _) =
         simulated(&[("layer_height_mm", "control_rate_hz = 1e6\nlayer_height_mm")]);
     assert_eq!(status, Some(2));

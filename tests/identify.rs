@@ -165,7 +165,7 @@ fn cells_that_are_no_numbers_are_named_with_line_and_column() {
 }
 
 #[test]
-fn gaps_are_named_and_bridged_where_that_is_told() {
+fn gaps_are_named_and_bridged_on_request() {
     let cut = |lines: &mut Vec<String>| drop(lines.drain(1000..1050));
     let said_so = refused(cut, &[]);
     assert!(said_so.contains("line 1000: a gap of 1.020 s after 19.960 s"), "{said_so}");
@@ -185,8 +185,8 @@ fn time_that_falls_or_repeats_or_is_in_another_unit() {
     let said_so = refused(milliseconds, &[]);
     assert!(said_so.contains("steps. Is the column in ms?"), "{said_so}");
     let folder = tempfile::tempdir().unwrap();
-    let told = log(folder.path(), milliseconds);
-    let answer = said(&mut identify(&told, &["--unit", "time_s=ms"]), 0);
+    let logged = log(folder.path(), milliseconds);
+    let answer = said(&mut identify(&logged, &["--unit", "time_s=ms"]), 0);
     assert!(answer.contains("at 50.00 Hz"), "{answer}");
 }
 
@@ -342,14 +342,17 @@ fn what_a_recording_cannot_be_asked_for() {
         let mut command = truebead(&["extruder", "identify", recording]);
         said(command.args(args.split(' ')).arg("--out").arg(folder.path().join("m")), code)
     };
-    let told = ask("--input command_v --output width_mm", 2);
-    assert!(told.contains("no column command_v; the columns are command_rpm,"), "{told}");
-    let told = ask("--input command_rpm", 2);
-    assert!(told.contains("needs both --input and --output"), "{told}");
-    let told = ask("--input command_rpm --width width_mm --speed a --layer-height-mm 1", 2);
-    assert!(told.contains("--width is for tables") && told.contains("laid_flow"), "{told}");
-    let told = ask("--input command_rpm --output width_mm --from-s 9.9", 1);
-    assert!(told.contains("a model takes 50 or more"), "{told}");
+    let printed = ask("--input command_v --output width_mm", 2);
+    assert!(printed.contains("no column command_v; the columns are command_rpm,"), "{printed}");
+    let printed = ask("--input command_rpm", 2);
+    assert!(printed.contains("needs both --input and --output"), "{printed}");
+    let printed = ask("--input command_rpm --width width_mm --speed a --layer-height-mm 1", 2);
+    assert!(
+        printed.contains("--width is for tables") && printed.contains("laid_flow"),
+        "{printed}"
+    );
+    let printed = ask("--input command_rpm --output width_mm --from-s 9.9", 1);
+    assert!(printed.contains("a model takes 50 or more"), "{printed}");
     // A recording is not written over.
     let mut again = truebead(&["simulate", "--record"]);
     again.arg(folder.path().join("cell.toml")).arg("--out").arg(folder.path().join("run"));
@@ -402,9 +405,9 @@ fn a_flow_that_was_measured_on_the_bead_is_the_flow_at_the_nozzle() {
             assert!((found - truth).abs() < 4.0 * sigma, "{of}: {name} {found} ± {sigma}");
         }
     }
-    // Without the way, area and speed are of different moments, and no model tells their product.
-    let told = ask("--area area_mm2 --speed wheel_mm_per_s --validate-fraction 0", 1);
-    assert!(told.contains("no model can be trusted"), "{told}");
+    // Without the way, area and speed are of different moments, and no model predicts their product.
+    let printed = ask("--area area_mm2 --speed wheel_mm_per_s --validate-fraction 0", 1);
+    assert!(printed.contains("no model can be trusted"), "{printed}");
     for (args, code, expected) in [
         ("--area area_mm2", 2, "--speed"),
         ("--area area_mm2 --speed way_mm", 2, "way_mm is in mm, expected mm/s"),
@@ -421,8 +424,8 @@ fn a_flow_that_was_measured_on_the_bead_is_the_flow_at_the_nozzle() {
         ),
         ("--area thick_mm2 --speed wheel_mm_per_s", 2, "there is no column thick_mm2"),
     ] {
-        let told = ask(args, code);
-        assert!(told.contains(expected), "{args}: {told}");
+        let printed = ask(args, code);
+        assert!(printed.contains(expected), "{args}: {printed}");
     }
     let list = said(truebead(&["extruder", "columns"]).arg(&log), 0);
     assert!(list.contains("area_mm2 ") && list.contains("50.00 Hz"), "{list}");
@@ -430,7 +433,7 @@ fn a_flow_that_was_measured_on_the_bead_is_the_flow_at_the_nozzle() {
 }
 
 #[test]
-fn the_noise_of_a_pressure_is_told_in_the_keys_of_a_cell() {
+fn the_noise_of_a_pressure_is_printed_in_the_keys_of_a_cell() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("standing.csv");
     // 7 kPa of noise on a pressure that gains 1 kPa from reading to reading.
@@ -447,18 +450,18 @@ fn the_noise_of_a_pressure_is_told_in_the_keys_of_a_cell() {
         let mut command = truebead(&["extruder", "noise"]);
         said(command.arg(&file).args(more), code)
     };
-    let told = of(&["--column", "nozzle_bar"], 0);
+    let printed = of(&["--column", "nozzle_bar"], 0);
     let value = |key: &str| {
-        let line = told.lines().find(|line| line.starts_with(key)).unwrap();
+        let line = printed.lines().find(|line| line.starts_with(key)).unwrap();
         line.split_whitespace().nth(2).unwrap().parse::<f64>().unwrap()
     };
-    assert!((value("sensor_noise_mpa") / 0.007 - 1.0).abs() < 0.05, "{told}");
-    assert!((value("drift_mpa2").sqrt() / 0.001 - 1.0).abs() < 0.25, "{told}");
+    assert!((value("sensor_noise_mpa") / 0.007 - 1.0).abs() < 0.05, "{printed}");
+    assert!((value("drift_mpa2").sqrt() / 0.001 - 1.0).abs() < 0.25, "{printed}");
     for (column, code, words) in
         [("screw_rpm", 2, "expected a pressure"), ("nozzle_mpa", 2, "nozzle_mpa")]
     {
-        let told = of(&["--column", column], code);
-        assert!(told.contains(words), "{told}");
+        let printed = of(&["--column", column], code);
+        assert!(printed.contains(words), "{printed}");
     }
     let few = of(&["--column", "nozzle_bar", "--from-s", "118"], 1);
     assert!(few.contains("at least 200"), "{few}");

@@ -79,7 +79,7 @@ fn recordings_hold_the_plan_and_the_starts_and_replay_the_same() {
 
 #[test]
 fn a_plan_for_another_cell_is_refused_before_anything_moves() {
-    for (from, to, told) in [
+    for (from, to, printed) in [
         ("min_speed_mm_per_s = 2.0", "min_speed_mm_per_s = 20.0", "--apex-mm-per-s 20"),
         ("max_rpm = 60.0", "max_rpm = 50.0", "limits of [extruder]"),
         ("max_rpm_per_s = 200.0", "max_rpm_per_s = 100.0", "rpm a second, expected 100 at most"),
@@ -98,7 +98,7 @@ fn a_plan_for_another_cell_is_refused_before_anything_moves() {
     ] {
         let folder = tempfile::tempdir().unwrap();
         let words = simulate(folder.path(), CORNER, &[(from, to)], 2);
-        assert!(words.contains(told), "{told}: {words}");
+        assert!(words.contains(printed), "{printed}: {words}");
     }
     let folder = tempfile::tempdir().unwrap();
     let plan = folder.path().join("plan.csv");

@@ -70,7 +70,7 @@ fn the_demo_closes_the_loop_and_its_recording_replays_bit_for_bit() {
 }
 
 /// Every tenth frame was recorded; measured again it has the same width. Frames are
-/// told by their time after the first one: a busy machine may pass some over, and the
+/// identified by their time after the first one: a busy machine may pass some over, and the
 /// tenth that was seen is then not the tenth of the camera.
 fn same_widths(run: &Path, again: &Path) {
     let rows = |folder: &Path| -> Vec<(f64, String, String)> {

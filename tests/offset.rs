@@ -26,7 +26,7 @@ fn offset(input: &Path, more: &[&str]) -> Command {
 }
 
 /// The line for the cell file.
-fn told_mm(answer: &str) -> f64 {
+fn printed_mm(answer: &str) -> f64 {
     let line = answer.lines().find(|line| line.starts_with("offset_mm = ")).unwrap();
     line.trim_start_matches("offset_mm = ").parse().unwrap()
 }
@@ -58,7 +58,7 @@ fn a_demo_tells_the_offset_of_its_cell() {
     fs::write(&path, cell.replace("offset_mm = 88.4", "offset_mm = 120.0")).unwrap();
     let answer = said(&mut offset(&recording, &["--cell", path.to_str().unwrap()]), 0);
     assert!(is_the_demos(&answer) && answer.contains("too much"), "{answer}");
-    // A recording that was cut short tells as much as it has.
+    // A recording that was cut short is used as far as it goes.
     let whole = fs::read(&recording).unwrap();
     let partial = out.join("recording.mcap.partial");
     fs::write(&partial, &whole[..whole.len() * 19 / 20]).unwrap();
@@ -66,7 +66,7 @@ fn a_demo_tells_the_offset_of_its_cell() {
     assert!(is_the_demos(&answer), "{answer}");
     let too_near = said(&mut offset(&recording, &["--max-mm", "40"]), 1);
     assert!(
-        too_near.contains("does not tell the offset: the widths fit best at the end"),
+        too_near.contains("does not determine the offset: the widths fit best at the end"),
         "{too_near}"
     );
     let wrong = said(&mut offset(&recording, &["--nozzle-at", "-1,-1"]), 2);
@@ -82,8 +82,8 @@ fn camera() -> Camera {
     Camera::pinhole([900.0, 900.0], [319.5, 239.5])
 }
 
-/// A cell whose gauge's middle is the picture's, and a picture of a board of which the
-/// place 4,-1 is 80 mm ahead of it.
+/// A cell whose gauge's middle is the image's, and a image of a board of which the
+/// position 4,-1 is 80 mm ahead of it.
 fn scene(folder: &Path) -> (PathBuf, PathBuf) {
     let (cell, picture) = (folder.join("cell.toml"), folder.join("board.png"));
     let text = file::to_toml(&camera(), &bed(), SIZE, Mm::ZERO, None, &[]);
@@ -103,14 +103,14 @@ fn scene(folder: &Path) -> (PathBuf, PathBuf) {
 }
 
 #[test]
-fn a_board_under_the_nozzle_tells_the_offset() {
+fn a_board_under_the_nozzle_gives_the_offset() {
     let folder = tempfile::tempdir().unwrap();
     let (cell, picture) = scene(folder.path());
     let cell = cell.to_str().unwrap();
     let board = ["--cell", cell, "--board", "9x6", "--square-mm", "20"];
     let with = |more: &[&'static str]| -> Vec<&str> { [&board[..], more].concat() };
     let answer = said(&mut offset(&picture, &with(&["--nozzle-at", "4,-1"])), 0);
-    assert!((told_mm(&answer) - 80.0).abs() < 0.11, "{answer}");
+    assert!((printed_mm(&answer) - 80.0).abs() < 0.11, "{answer}");
     assert!(answer.contains("± 0.50 mm") && answer.contains("has no offset_mm"), "{answer}");
     let aside = said(&mut offset(&picture, &with(&["--nozzle-at=-1,-1"])), 0);
     assert!(aside.contains("100.0") && aside.contains("WARNING"), "{aside}");
@@ -129,7 +129,7 @@ fn a_board_under_the_nozzle_tells_the_offset() {
 }
 
 #[test]
-fn what_is_neither_recording_nor_picture_is_refused() {
+fn what_is_neither_recording_nor_image_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     assert!(said(&mut offset(folder.path(), &[]), 2).contains("a folder, expected a recording"));
     assert!(said(&mut offset(Path::new("none.mcap"), &[]), 2).contains("none.mcap"));

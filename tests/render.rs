@@ -97,8 +97,8 @@ fn measured_widths_are_those_of_the_bead() {
 fn the_calibrations_share_is_in_the_sigma_of_each_width_and_in_nothing_else() {
     const SHARE: f64 = 0.002;
     let (mut cell, calibration) = scenario("tilted");
-    let mut told = calibration.clone();
-    let Calibration::Full { quality, .. } = &mut told else { unreachable!() };
+    let mut with_sigma = calibration.clone();
+    let Calibration::Full { quality, .. } = &mut with_sigma else { unreachable!() };
     *quality = Some(CalibrationQuality {
         reprojection_rms_px: 0.2,
         width_relative_sigma: Some(SHARE),
@@ -109,7 +109,7 @@ fn the_calibrations_share_is_in_the_sigma_of_each_width_and_in_nothing_else() {
     let frame = FrameSeries::new(&cell, calibration.clone()).unwrap().render(0).unwrap().frame;
     for method in [MeasureMethod::Caliper, MeasureMethod::EdgeLines] {
         cell.gauge.method = method;
-        let [without, with] = [&calibration, &told].map(|calibration| {
+        let [without, with] = [&calibration, &with_sigma].map(|calibration| {
             let surface = calibration.surface(cell.surface_height, None);
             Measurer::new(cell.gauge, None).measure(&frame, &surface).unwrap()
         });

@@ -1,5 +1,5 @@
-//! From pictures of a board to widths at any height: the whole way that a user goes, with
-//! rendered pictures, whose truth is known, and their noise.
+//! From images of a board to widths at any height: the whole way that a user goes, with
+//! rendered images, whose truth is known, and their noise.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
 
@@ -35,7 +35,7 @@ fn held(turn: f64, tilt: f64, at: [f64; 3]) -> Pose {
     Pose::from_parts(rotation, Vector3::from(at) - rotation * Vector3::new(60.0, 37.5, 0.0))
 }
 
-/// Boards all over the picture, and the one on the bed, under a camera that is not quite
+/// Boards all over the image, and the one on the bed, under a camera that is not quite
 /// upright.
 fn poses() -> (Pose, Vec<Pose>) {
     let bed = held(0.7, 0.09, [4.0, -3.0, 500.0]);
@@ -147,8 +147,8 @@ fn widths_are_right_at_any_height_after_a_calibration_that_was_taken_live() {
     let said = String::from_utf8_lossy(&live.get_output().stdout).into_owned();
     assert!(said.contains("view 1: the bed plane, 54 corners -> view-001.png"), "{said}");
     assert!(said.contains("PASS: "), "{said}");
-    // It ends as soon as that is so, and the pictures are there.
-    let views = fs::read_dir(folder.join("calib-pictures")).unwrap().count();
+    // It ends as soon as that is so, and the images are there.
+    let views = fs::read_dir(folder.join("calib-images")).unwrap().count();
     assert!((8..=17).contains(&views), "{views}");
     assert!(!fs::read_to_string(folder.join("report.html")).unwrap().contains("http-equiv"));
 
@@ -176,7 +176,7 @@ fn widths_are_right_at_any_height_after_a_calibration_that_was_taken_live() {
 }
 
 #[test]
-fn what_a_live_calibration_cannot_do_is_told() {
+fn a_live_calibration_refuses_wrong_options() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let out = folder.join("calib.toml");
@@ -209,7 +209,7 @@ fn what_a_live_calibration_cannot_do_is_told() {
     image::GrayImage::new(640, 480).save(film.join("0.png")).unwrap();
     let (status, said) = calibrate(&["--camera", text(&film)]);
     assert!(status == 1 && said.contains("has not shown the board lying still"), "{said}");
-    assert!(!folder.join("calib-pictures").exists() && !out.exists());
+    assert!(!folder.join("calib-images").exists() && !out.exists());
     let (status, said) = calibrate(&["--camera", text(&film), "--images", text(&film)]);
     assert!(status == 2 && said.contains("expected an empty folder"), "{status} {said}");
 }

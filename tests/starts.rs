@@ -1,5 +1,5 @@
 //! `truebead extruder starts`: from a log of starts and stops to a file, and
-//! what a log that does not tell them is answered with.
+//! the refusal of a log that does not determine them.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
@@ -47,8 +47,8 @@ fn answer(
 fn the_example_becomes_a_file_that_is_read_again() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let told = said(&mut truebead(&["extruder", "identify", "--example", &at("example")]), 0);
-    assert!(told.contains("starts.csv") && told.contains("520 mm³ within 18 s"), "{told}");
+    let printed = said(&mut truebead(&["extruder", "identify", "--example", &at("example")]), 0);
+    assert!(printed.contains("starts.csv") && printed.contains("520 mm³ within 18 s"), "{printed}");
     let log = at("example/starts.csv");
     let columns = ["--input", "screw_rpm", "--output", "flow_mm3_per_s"];
     let holds_for = ["--material", "PLA", "--nozzle-mm", "4", "--temperature-c", "210"];

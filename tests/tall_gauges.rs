@@ -1,5 +1,5 @@
 //! Gauges of all heights: how rows are taken together depends on their number, and
-//! what the sets of pictures show at 100 rows has to hold at others.
+//! what the sets of images show at 100 rows has to hold at others.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
 

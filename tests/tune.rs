@@ -47,7 +47,7 @@ fn a_simulated_cell_is_found_and_its_recording_replays_bit_for_bit() {
     let recording = format!("{out}/recording.mcap");
     let replayed = said(&mut truebead(&["replay", &recording]), 0);
     assert!(replayed.contains("all the same bit for bit"), "{replayed}");
-    // The same recording tells the same again; an experiment does not replace it.
+    // The same recording gives the same result again; an experiment does not replace it.
     let again = path(folder.path(), "again");
     let once_more =
         said(&mut truebead(&["tune", &cell, "--out", &again, "--recording", &recording]), 0);

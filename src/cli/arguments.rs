@@ -1,18 +1,19 @@
-//! Arguments that several commands have, and what is wrong with them.
+//! Arguments that several commands have, and the error for wrong ones.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use crate::core::units::Mm;
 
-/// Lengths beyond this are mistyped \[mm\].
+/// Largest length that is accepted \[mm\]: 100 m, beyond which a number is mistyped.
 const LONGEST_MM: f64 = 1e5;
-/// Arguments that cannot be followed; ends with exit status 2.
+/// Wrong arguments; the program ends with exit status 2.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct WrongArguments(String);
 
 impl WrongArguments {
-    /// With what was found and what was expected.
+    /// With the value that was found and the values that are expected.
     #[expect(clippy::needless_pass_by_value, reason = "an error or a new text at every call")]
     pub fn new(what: impl ToString) -> Self {
         Self(what.to_string())
@@ -29,25 +30,25 @@ pub fn parse_length(text: &str) -> Result<Mm, String> {
     Mm::new(value).map_err(|error| error.to_string())
 }
 
-/// A length of time that somebody would run a cell for.
-pub fn parse_seconds(text: &str) -> Result<f64, String> {
-    text.trim()
-        .parse()
-        .ok()
-        .filter(|seconds| (0.1..=1e7).contains(seconds))
-        .ok_or_else(|| "expected a number of seconds, 0.1 or more".to_owned())
+/// A number within a range; `expected` is the message for another one.
+pub fn parse_within(text: &str, range: RangeInclusive<f64>, expected: &str) -> Result<f64, String> {
+    let value = text.trim().parse().ok().filter(|value| range.contains(value));
+    value.ok_or_else(|| expected.to_owned())
 }
 
-/// Finds a mistyped place for a file before the long work; `name` is the option's.
+/// A duration of a run \[s\].
+pub fn parse_seconds(text: &str) -> Result<f64, String> {
+    parse_within(text, 0.1..=1e7, "expected a number of seconds, 0.1 or more")
+}
+
+/// Refuses a file in a folder that does not exist, before the long work; `name` is the option's.
 pub fn check_writable(name: &str, path: &Path) -> Result<(), WrongArguments> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-        let what = format!("--{name} {}: no folder {}", path.display(), folder.display());
-        return Err(WrongArguments::new(what));
+        refuse!("--{name} {}: no folder {}", path.display(), folder.display());
     }
     if path.is_dir() {
-        let what = format!("--{name} {}: a folder, expected a file", path.display());
-        return Err(WrongArguments::new(what));
+        refuse!("--{name} {}: a folder, expected a file", path.display());
     }
     Ok(())
 }
@@ -66,27 +67,26 @@ pub fn free_folder(name: &str) -> PathBuf {
         .unwrap_or(first)
 }
 
-/// Refuses a folder that holds a recording: what is about to be written there
-/// would replace it, or stand beside one that it does not belong to.
+/// Refuses a folder that holds a recording: new results would replace it, or be mixed with those
+/// of another run.
 pub fn refuse_a_recording_in(folder: &Path) -> Result<(), WrongArguments> {
     let names = ["recording.mcap", "recording.mcap.partial"];
     match names.map(|name| folder.join(name)).into_iter().find(|file| file.exists()) {
-        Some(found) => Err(WrongArguments::new(format!(
+        Some(found) => Err(wrong!(
             "{} is there already, of another run; name another folder with --out",
             found.display()
-        ))),
+        )),
         None => Ok(()),
     }
 }
 
-/// Refuses the name of an output that is there already: what somebody wrote is
-/// never replaced.
+/// Refuses the name of an output that exists: a file is never replaced.
 pub fn refuse_replacing(path: &Path, what: &str) -> Result<(), WrongArguments> {
     if !path.exists() {
         return Ok(());
     }
-    Err(WrongArguments::new(format!(
+    Err(wrong!(
         "{} is there already and would be lost; name another {what} with --out",
         path.display()
-    )))
+    ))
 }

@@ -13,13 +13,13 @@ use crate::calibration::equations::{CameraModel, Correspondence};
 use crate::calibration::plane::OnBed;
 use crate::core::units::Mm;
 
-/// The bed plane and where it comes from.
+/// The bed plane and its source.
 pub struct BedPlane {
     /// The images whose boards lay on the bed.
     pub images: Vec<String>,
-    /// Whether nobody has named them.
+    /// Whether they are assumed and not named.
     pub assumed: bool,
-    /// Images that come later, and were refused though they show a board.
+    /// Later images that show a board but were rejected.
     pub passed_over: Vec<String>,
     /// The boards on the bed.
     pub on_bed: OnBed,
@@ -30,7 +30,7 @@ pub struct BedPlane {
 }
 
 impl BedPlane {
-    /// Where the bed is, and what was assumed about it.
+    /// The bed plane and the assumptions about it, as text.
     pub fn text(&self) -> String {
         let mut out = String::new();
         let how = if self.assumed {
@@ -42,40 +42,33 @@ impl BedPlane {
         let height = bed.apply_inverse(Point3::origin()).z;
         let up = bed.rotation() * Vector3::z();
         let tilt_deg = (-up.z).clamp(-1.0, 1.0).acos().to_degrees();
-        line!(out, "\nbed plane");
-        line!(out, "  image       {} ({how})", self.images.join(", "));
+        line!(out, "\nbed plane\n  image       {} ({how})", self.images.join(", "));
         line!(out, "  corners     {:.3} px off (RMS)", self.on_bed.rms_px);
         if !self.passed_over.is_empty() {
+            let images = self.passed_over.join(", ");
             line!(
                 out,
-                "  WARNING     {} after it cannot be used: if the board lay on the bed there, take",
-                self.passed_over.join(", ")
+                "  WARNING     {images} after it cannot be used: if the board lay on the bed there, take\n              \
+                 that image again, or name another with --plane"
             );
-            line!(out, "              that image again, or name another with --plane");
         }
-        if self.images.len() > 1 {
-            line!(
-                out,
-                "  boards      {} on one plane, to {:.2} mm",
-                self.images.len(),
-                self.on_bed.off_mm
-            );
+        let count = self.images.len();
+        if count > 1 {
+            line!(out, "  boards      {count} on one plane, to {:.2} mm", self.on_bed.off_mm);
         }
         line!(
             out,
-            "  board       its printed face lies {} above the bed (--board-thickness-mm)",
-            self.thickness
-        );
-        line!(out, "  robot       z = {} when that image was taken (--robot-z-mm)", self.robot_z);
-        line!(
-            out,
-            "  camera      {height:.1} mm above the bed, its view {tilt_deg:.1}° off straight down"
+            "  board       its printed face lies {} above the bed (--board-thickness-mm)\n  \
+             robot       z = {} when that image was taken (--robot-z-mm)\n  \
+             camera      {height:.1} mm above the bed, its view {tilt_deg:.1}° off straight down",
+            self.thickness,
+            self.robot_z
         );
         out
     }
 }
 
-/// Boards of one kind that are said to lie on the bed, each with its image.
+/// Boards of one kind on the bed, each with its image.
 pub struct BoardsOnBed<'a> {
     board: &'a Board,
     corners: Vec<(String, Vec<CornerObservation>)>,
@@ -87,7 +80,7 @@ impl<'a> BoardsOnBed<'a> {
         Self { board, corners: Vec::new() }
     }
 
-    /// Fails for one that is where another is.
+    /// Adds a board. Fails for one at the position of another.
     pub fn add(&mut self, image: String, corners: Vec<CornerObservation>) -> anyhow::Result<()> {
         let is_twin = |(_, other): &&(String, Vec<CornerObservation>)| {
             is_same_position(self.board, other, &corners)
@@ -102,52 +95,48 @@ impl<'a> BoardsOnBed<'a> {
         Ok(())
     }
 
-    /// One plane through all of them, with the images' names. Fails where corners are
-    /// further off it than `most_px` (RMS); `other` says what they are held against.
+    /// One plane through all boards, with the images' names. Fails where the corners' reprojection
+    /// error exceeds `max_px` (RMS); `other` names the limit in the message.
     pub fn fit(
         self,
         model: &CameraModel,
-        most_px: f64,
+        max_px: f64,
         other: &str,
     ) -> anyhow::Result<(Vec<String>, OnBed)> {
-        let placed = self
-            .corners
-            .into_iter()
-            .map(|(image, seen)| (image, self.board.correspondences(&seen)));
-        let (images, boards): (Vec<String>, Vec<Vec<Correspondence>>) = placed.unzip();
+        let all = self.corners.into_iter();
+        let (images, boards): (Vec<String>, Vec<Vec<Correspondence>>) =
+            all.map(|(image, corners)| (image, self.board.correspondences(&corners))).unzip();
         let names = images.join(", ");
         let on_bed = OnBed::fit(model, boards)
             .with_context(|| format!("the corners in {names} fit no plane"))?;
-        if on_bed.rms_px <= most_px {
+        if on_bed.rms_px <= max_px {
             return Ok((images, on_bed));
         }
+        let OnBed { rms_px, off_mm, .. } = on_bed;
         if images.len() > 1 {
             bail!(
-                "the boards in {names} do not lie on one plane: corners are {:.2} px off (RMS), the \
-                 board that is furthest off by {:.1} mm; name images of boards that all lie flat on \
-                 the bed",
-                on_bed.rms_px,
-                on_bed.off_mm
+                "the boards in {names} do not lie on one plane: corners are {rms_px:.2} px off (RMS), \
+                 the board that is furthest off by {off_mm:.1} mm; name images of boards that all lie \
+                 flat on the bed"
             );
         }
         bail!(
-            "{names}: corners are {:.2} px off (RMS) where {other}; was it taken with the same camera, \
-             focus and zoom?",
-            on_bed.rms_px
+            "{names}: corners are {rms_px:.2} px off (RMS) where {other}; was it taken with the same \
+             camera, focus and zoom?"
         );
     }
 }
 
-/// The board's corners in an image that took no part in finding the camera, which must
-/// be of the size \[px\] that the camera is for.
+/// The board's corners in an image that the camera was not calibrated from. Fails where its size
+/// \[px\] is not that of the calibration.
 pub fn find_corners(
     path: &Path,
     board: &Board,
     image_size_px: [u32; 2],
 ) -> anyhow::Result<(String, Vec<CornerObservation>)> {
     let name = path.display().to_string();
-    let sighting = find_board(board, &name, path)
+    let found = find_board(board, &name, path)
         .with_context(|| format!("--plane {name} does not show the bed plane"))?;
-    check_size(&sighting, image_size_px)?;
-    Ok((name, sighting.corners))
+    check_size(&found, image_size_px)?;
+    Ok((name, found.corners))
 }

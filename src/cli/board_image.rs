@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use crate::calibration::board::Board;
-use crate::calibration::board_observation;
-use crate::calibration::board_observation::BoardObservation;
+use crate::calibration::board_observation::{self, BoardObservation};
 use crate::calibration::rejection::BoardRejection;
 use crate::core::frame::Channel;
 use crate::core::time::Stamp;
@@ -21,14 +20,14 @@ pub fn find_board(
     board_observation::observe(board, name, &frame)
 }
 
-/// Fails for a picture that is not of the size that a calibration is for.
-pub fn check_size(sighting: &BoardObservation, expected: [u32; 2]) -> anyhow::Result<()> {
-    let ([width, height], [right, bottom]) = (sighting.image_size_px, expected);
+/// Fails for an image whose size is not that of the calibration.
+pub fn check_size(found: &BoardObservation, expected: [u32; 2]) -> anyhow::Result<()> {
+    let ([width, height], [right, bottom]) = (found.image_size_px, expected);
     anyhow::ensure!(
-        sighting.image_size_px == expected,
+        found.image_size_px == expected,
         "{}: {width}x{height} px, but the calibration is for {right}x{bottom} px: take the \
          image as the camera was calibrated, or calibrate anew",
-        sighting.name
+        found.name
     );
     Ok(())
 }

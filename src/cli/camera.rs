@@ -13,7 +13,7 @@ use super::print::Verbosity;
 
 /// Boards to print, calibrations, and where the camera looks
 #[derive(Debug, Subcommand)]
-pub enum CameraCommand {
+pub enum CameraGroup {
     Board(board::SheetArgs),
     Verify(verify::VerifyArgs),
     Convert(convert::ConvertArgs),
@@ -21,11 +21,11 @@ pub enum CameraCommand {
 }
 
 /// Runs one of them.
-pub fn run(command: &CameraCommand, voice: Verbosity) -> anyhow::Result<ExitCode> {
+pub fn run(command: &CameraGroup, voice: Verbosity) -> anyhow::Result<ExitCode> {
     match command {
-        CameraCommand::Board(args) => board::run(args).map(|()| ExitCode::SUCCESS),
-        CameraCommand::Verify(args) => verify::run(args),
-        CameraCommand::Convert(args) => convert::run(args, voice).map(|()| ExitCode::SUCCESS),
-        CameraCommand::Offset(args) => offset::run(args),
+        CameraGroup::Board(args) => board::run(args).map(|()| ExitCode::SUCCESS),
+        CameraGroup::Verify(args) => verify::run(args),
+        CameraGroup::Convert(args) => convert::run(args, voice).map(|()| ExitCode::SUCCESS),
+        CameraGroup::Offset(args) => offset::run(args),
     }
 }

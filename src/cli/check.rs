@@ -1,4 +1,4 @@
-//! `truebead check`: whether a cell file is sound, and what it suffices for.
+//! `truebead check`: whether a cell file is valid, and for which commands it is ready.
 
 mod calibration_map;
 
@@ -8,8 +8,7 @@ use std::process::ExitCode;
 use clap::Args;
 use nalgebra::Point3;
 
-use super::arguments::WrongArguments;
-use super::arguments::check_writable;
+use super::arguments::{WrongArguments, check_writable};
 use super::print::warn;
 use super::schema;
 use crate::assembly::{ExtruderSide, LoadedCell, range_warning, read_cell, steady_state};
@@ -22,9 +21,9 @@ use crate::drivers::Devices;
 use crate::extruder::start_stop::Pause;
 use crate::width_control::strategy::distance::DistanceStrategy;
 
-/// Ratio of speeds in one cell that nobody means.
+/// Ratio of the speed limits above which one of them has a wrong unit.
 const MAX_SPEED_RATIO: f64 = 200.0;
-/// Distance of the camera that nobody means.
+/// Offset of the camera below which it has a wrong unit.
 const MIN_CAMERA_OFFSET: Mm = Mm::constant(0.5);
 
 /// Validates a cell file and all it refers to.
@@ -38,8 +37,8 @@ one.
 
   truebead check my-cell.toml --report calibration.html
 
-draws what the calibration leaves in a width, all over the image, with the gauge
-in it.
+draws the uncertainty of a width by the calibration, over the image, with the
+gauge.
 
   truebead check --schema > cell.schema.json
 
@@ -48,8 +47,8 @@ pub struct CheckArgs {
     /// Cell file
     #[arg(required_unless_present = "schema")]
     cell: Option<PathBuf>,
-    /// Page to write: what the calibration leaves in a width, all over the image, with
-    /// the gauge in it
+    /// Page to write: the uncertainty of a width by the calibration, over the image, with
+    /// the gauge
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     /// Print the JSON Schema of cell files instead, for editors that complete TOML by one
@@ -70,8 +69,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     check_height(&loaded)?;
     let run = read_cell(cell, &loaded.text, Purpose::Run);
     let run = run.map(|(cell, devices)| LoadedCell { cell, devices, ..loaded.clone() });
-    // Everything that the extruder's strategy refers to, before anything is called
-    // sound.
+    // All files of the extruder's strategy are checked before the cell is called sound.
     let side = run.as_ref().map_or(Ok(None), LoadedCell::extruder)?;
     if let Some(side) = &side {
         warn(&side.warnings);
@@ -115,24 +113,26 @@ fn above_surface_mm(loaded: &LoadedCell) -> Option<f64> {
 fn check_height(loaded: &LoadedCell) -> Result<(), WrongArguments> {
     let height = loaded.cell.surface_height;
     match above_surface_mm(loaded) {
-        Some(above) if above <= 0.0 => Err(WrongArguments::new(format!(
+        Some(above) if above <= 0.0 => Err(wrong!(
             "{}: calibration.surface_height_mm: found {height}, expected less than the camera's \
              {:.1} mm above the bed",
             loaded.path.display(),
             above + height.get()
-        ))),
+        )),
         _ => Ok(()),
     }
 }
 
-/// Tells where a cell uses a calibration beyond what it was made for.
+/// Warns where a cell uses a calibration beyond the boards that it was made from.
 fn about_surface(loaded: &LoadedCell) {
     let (height, roi) = (loaded.cell.surface_height, loaded.cell.gauge.roi);
     let has_sigma = loaded.cell.surface_height_sigma > Mm::ZERO;
     let Some(above) = above_surface_mm(loaded) else {
         if has_sigma {
-            say!("  WARNING      surface_height_sigma_mm has no effect beside mm_per_px, which");
-            say!("               knows no height");
+            say!(
+                "  WARNING      surface_height_sigma_mm has no effect beside mm_per_px, which\n               \
+                 knows no height"
+            );
         }
         return;
     };
@@ -148,53 +148,46 @@ fn about_surface(loaded: &LoadedCell) {
         && !(low..=high).contains(&height.get())
     {
         say!(
-            "  WARNING      surface_height_mm: {height} lies outside the {low} to {high} mm above"
+            "  WARNING      surface_height_mm: {height} lies outside the {low} to {high} mm above\n               \
+             the bed at which boards were seen"
         );
-        say!("               the bed at which boards were seen");
     }
     let Some([left, top, right, bottom]) = quality.seen_px else { return };
     let ends = [roi.x, roi.y, roi.x + roi.width - 1, roi.y + roi.height - 1];
     let [first_x, first_y, last_x, last_y] =
         ends.map(|px| u32::try_from(px).map_or(f64::MAX, f64::from));
     if first_x < left || first_y < top || last_x > right || last_y > bottom {
-        say!(
-            "  WARNING      gauge.roi_px reaches beyond where boards were seen, columns {left:.0}"
-        );
-        let (first, rest) = if quality.uncertainty.is_some() {
-            ("sigma_mm there is", "extrapolated by the model of the lens")
+        let effect = if quality.uncertainty.is_some() {
+            "sigma_mm there is\n               extrapolated by the model of the lens"
         } else {
-            ("a width there is known", "less well than sigma_mm says")
+            "a width there is known\n               less well than sigma_mm says"
         };
-        say!("               to {right:.0} and rows {top:.0} to {bottom:.0}; {first}");
-        say!("               {rest}");
+        say!(
+            "  WARNING      gauge.roi_px reaches beyond where boards were seen, columns {left:.0}\n               \
+             to {right:.0} and rows {top:.0} to {bottom:.0}; {effect}"
+        );
     }
 }
 
-/// What a cell suffices for that has all that a run needs of a robot's side,
-/// and what is missing of the extruder's for the rest.
+/// Prints the commands for which a cell with a complete robot side is ready, and what its extruder
+/// lacks for the others.
 fn about_purposes(run: &RunPart, devices: &Devices) {
-    let (reached, answered) = run
-        .extruder
-        .as_ref()
-        .map_or((true, true), |part| (devices.extruder.is_some(), part.plant.is_some()));
+    let part = run.extruder.as_ref();
+    let has_link = part.is_none_or(|_| devices.extruder.is_some());
+    let has_plant = part.is_none_or(|part| part.plant.is_some());
     let needs = [
-        ("run", reached, "extruder.driver, address: \"line\" and host:port"),
-        ("simulate", answered, "extruder_plant: what answers the extruder's commands"),
+        ("run", has_link, "extruder.driver, address: \"line\" and host:port"),
+        ("simulate", has_plant, "extruder_plant: what answers the extruder's commands"),
     ];
-    for (purpose, met, _) in needs {
-        if met {
-            say!("  ready for {purpose}");
-        }
+    for (purpose, ..) in needs.iter().filter(|(_, is_met, _)| *is_met) {
+        say!("  ready for {purpose}");
     }
-    for (purpose, met, missing) in needs {
-        if !met {
-            say!("  not for {purpose}; missing:");
-            say!("    {missing}");
-        }
+    for (purpose, _, missing) in needs.iter().filter(|(_, is_met, _)| !*is_met) {
+        say!("  not for {purpose}; missing:\n    {missing}");
     }
 }
 
-/// Tells of the extruder side, with all that it refers to.
+/// Prints the extruder side, with the files that it refers to.
 fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::Result<()> {
     let part = loaded.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
     let Some(part) = part else { return Ok(()) };
@@ -222,25 +215,20 @@ fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::R
         let _ = loaded.plant(part)?;
     }
     if let Some(device) = &loaded.devices.extruder {
-        say!(
-            "               reached at {}, a command holds for {} ms",
-            device.driver.address(),
-            extruder.valid_ms
-        );
+        let (address, valid_ms) = (device.driver.address(), extruder.valid_ms);
+        say!("               reached at {address}, a command holds for {valid_ms} ms");
     }
     Ok(())
 }
 
-/// Tells of what is known ahead: starts, stops and the plan of a job.
+/// Prints what is known ahead: starts, stops and the plan of a job.
 fn about_starts_and_plan(side: &ExtruderSide) {
     if let Some(timing) = &side.setup.timing {
         let pause = Pause { idle: Span::from_secs(300.0), flow_before: timing.conditions().flow };
         say!(
-            "  starts       the flow comes {:.2} s after the command where the pump stood for 5 min;",
-            timing.start(&pause).first_flow().secs()
-        );
-        say!(
-            "               it stops {:.1} before a bead ends whose length is known",
+            "  starts       the flow comes {:.2} s after the command where the pump stood for 5 min;\n               \
+             it stops {:.1} before a bead ends whose length is known",
+            timing.start(&pause).first_flow().secs(),
             timing.stop().distance()
         );
     }
@@ -263,16 +251,16 @@ fn check_gauge(loaded: &LoadedCell) -> Result<(), WrongArguments> {
     if roi.fits(Size::new(width as usize, height as usize)) {
         return Ok(());
     }
-    Err(WrongArguments::new(format!(
+    Err(wrong!(
         "{}: gauge.roi_px: found columns to {} and rows to {}, expected a gauge within the \
          {width}x{height} px that were calibrated",
         loaded.path.display(),
         roi.x + roi.width,
         roi.y + roi.height
-    )))
+    ))
 }
 
-/// Tells what the width is held by, where it is not the PI law.
+/// Prints the strategy, where it is not PI control.
 fn about_controller(loaded: &LoadedCell, run: &RunPart) {
     if let Some(steps) = loaded.cell.steps(run, &loaded.calibration) {
         let (slow, fast) = steps.speeds();
@@ -294,8 +282,10 @@ fn about_controller(loaded: &LoadedCell, run: &RunPart) {
         run.camera.offset_sigma.get()
     );
     if gauge > run.camera.offset * 0.5 {
-        say!("  WARNING      gauge.roi_px is more than half as long as offset_mm: a shorter one");
-        say!("               shows changes of the bead sooner");
+        say!(
+            "  WARNING      gauge.roi_px is more than half as long as offset_mm: a shorter one\n               \
+             shows changes of the bead sooner"
+        );
     }
 }
 

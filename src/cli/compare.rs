@@ -6,19 +6,17 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::Args;
 
-use super::arguments::WrongArguments;
 use super::print::Verbosity;
 use crate::assembly::LoadedCell;
 use crate::cell::file::{Purpose, RunPart};
-use crate::core::units::Mm;
-use crate::core::units::WidthRange;
+use crate::core::units::{Mm, WidthRange};
 use crate::io::progress::Progress;
 use crate::report::compare::ControllerComparison;
 use crate::rows::output;
 use crate::trials::compare::{Contender, Figures};
 
-/// Most controllers: as many as there are colours.
-const MAX_CONTROLLERS: usize = 6;
+/// Largest number of controllers: that of [`crate::report::chart::palette::CONTROLLERS`].
+const MAX_CONTROLLERS: usize = crate::report::chart::palette::CONTROLLERS.len();
 
 /// Lays the same simulated bead with several controllers and compares them.
 #[derive(Debug, Args)]
@@ -28,11 +26,11 @@ Example:
 
 Each cell is a controller: its [control], [camera], [robot] and [limits]. The bead, what
 disturbs it and the measurement's noise are those of the first cell, [bead] and
-[simulation], and the same for all; how late a width comes and how often the robot
-reports is each cell's own.
+[simulation], and the same for all; the delay of a width and the rate of the robot's
+reports are each cell's own.
 
 Leaves compare.json and report.html, and prints the table. Errors are those of the bead
-itself, from 30 mm after control began, where simulate tells those that were measured; ±
+itself, from 30 mm after control began, where simulate has those of the measurement; ±
 is 95 % confidence of the mean over seeds, and where a bead settled is the median. A bead
 of level \"frames\" renders every frame and takes minutes.
 
@@ -48,8 +46,8 @@ pub struct CompareArgs {
     #[arg(long, value_name = "N", default_value_t = 100,
           value_parser = clap::value_parser!(u64).range(1..=100_000))]
     seeds: u64,
-    /// Widths that are asked for in place of the cells' own [mm]
-    /// [default: the first cell's, where it asks for one]
+    /// Target widths in place of the cells' own [mm]
+    /// [default: the first cell's, where it has one]
     #[arg(long, value_name = "W,W…", value_delimiter = ',')]
     widths: Vec<f64>,
 }
@@ -85,9 +83,7 @@ pub fn run(args: &CompareArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
 /// The controllers on the plant of the first cell.
 fn contenders(args: &CompareArgs) -> anyhow::Result<Vec<Contender>> {
     if args.scenarios.len() > MAX_CONTROLLERS {
-        let what =
-            format!("{} cells: {MAX_CONTROLLERS} can be distinguished", args.scenarios.len());
-        return Err(WrongArguments::new(what).into());
+        refuse!("{} cells: {MAX_CONTROLLERS} can be distinguished", args.scenarios.len());
     }
     let mut contenders: Vec<Contender> = Vec::new();
     for path in &args.scenarios {
@@ -110,15 +106,13 @@ fn contenders(args: &CompareArgs) -> anyhow::Result<Vec<Contender>> {
 fn run_part(loaded: &LoadedCell) -> anyhow::Result<RunPart> {
     let path = loaded.path.display();
     let Some(run) = loaded.cell.run.clone() else {
-        let what = format!("{path}: it lacks tables that a simulation needs");
-        return Err(WrongArguments::new(what).into());
+        refuse!("{path}: it lacks tables that a simulation needs");
     };
     if run.extruder.is_some() {
-        let what = format!(
+        refuse!(
             "{path}: found [extruder], expected a cell whose extruder goes its own way; \
              `truebead simulate` lays a bead with both"
         );
-        return Err(WrongArguments::new(what).into());
     }
     Ok(run)
 }
@@ -135,12 +129,11 @@ fn widths(args: &CompareArgs, contenders: &[Contender]) -> anyhow::Result<Vec<Mm
     if args.widths.is_empty() {
         let changes = contenders.iter().find(|who| !who.run.control.target.is_constant());
         if let Some(who) = changes {
-            let what = format!(
+            refuse!(
                 "{}: found a target that changes along the path or by layer, expected one width: \
                  name widths to compare with --widths",
                 who.name
             );
-            return Err(WrongArguments::new(what).into());
         }
         let own = contenders.first().map(|who| who.run.control.target.nominal());
         return Ok(own.into_iter().collect());
@@ -149,18 +142,16 @@ fn widths(args: &CompareArgs, contenders: &[Contender]) -> anyhow::Result<Vec<Mm
     let widths: Option<Vec<Mm>> = args.widths.iter().map(sound).collect();
     let widths = widths.ok_or_else(|| {
         let found: Vec<String> = args.widths.iter().map(f64::to_string).collect();
-        let what = format!("--widths: found {}, expected 0.1 to 1000 mm each", found.join(","));
-        WrongArguments::new(what)
+        wrong!("--widths: found {}, expected 0.1 to 1000 mm each", found.join(","))
     })?;
     for who in contenders {
         let range = who.cell.gauge.width_range;
         if let Some(width) = widths.iter().find(|width| !range.contains(**width)) {
             let WidthRange { min: low, max: high } = range;
-            let what = format!(
+            refuse!(
                 "--widths: found {width}, expected {low} to {high}, which is the width_range_mm of {}",
                 who.name
             );
-            return Err(WrongArguments::new(what).into());
         }
     }
     Ok(widths)

@@ -16,7 +16,7 @@ use clap::Subcommand;
 
 /// Models of an extruder, from test signals to a library
 #[derive(Debug, Subcommand)]
-pub enum ExtruderCommand {
+pub enum ExtruderGroup {
     Excite(excite::ExciteArgs),
     Identify(Box<identify::IdentifyArgs>),
     Starts(starts::StartsArgs),
@@ -26,13 +26,13 @@ pub enum ExtruderCommand {
 }
 
 /// Runs one of them.
-pub fn run(command: &ExtruderCommand) -> anyhow::Result<ExitCode> {
+pub fn run(command: &ExtruderGroup) -> anyhow::Result<ExitCode> {
     match command {
-        ExtruderCommand::Excite(args) => excite::run(args).map(|()| ExitCode::SUCCESS),
-        ExtruderCommand::Identify(args) => identify::run(args).map(|()| ExitCode::SUCCESS),
-        ExtruderCommand::Starts(args) => starts::run(args).map(|()| ExitCode::SUCCESS),
-        ExtruderCommand::Noise(args) => noise::run(args).map(|()| ExitCode::SUCCESS),
-        ExtruderCommand::Columns(args) => columns::run(args).map(|()| ExitCode::SUCCESS),
-        ExtruderCommand::Models(args) => models::run(args),
+        ExtruderGroup::Excite(args) => excite::run(args).map(|()| ExitCode::SUCCESS),
+        ExtruderGroup::Identify(args) => identify::run(args).map(|()| ExitCode::SUCCESS),
+        ExtruderGroup::Starts(args) => starts::run(args).map(|()| ExitCode::SUCCESS),
+        ExtruderGroup::Noise(args) => noise::run(args).map(|()| ExitCode::SUCCESS),
+        ExtruderGroup::Columns(args) => columns::run(args).map(|()| ExitCode::SUCCESS),
+        ExtruderGroup::Models(args) => models::run(args),
     }
 }

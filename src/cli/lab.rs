@@ -12,17 +12,17 @@ use super::print::Verbosity;
 
 /// Experiments of papers, accuracy, and frames with their truth
 #[derive(Debug, Subcommand)]
-pub enum LabCommand {
+pub enum LabGroup {
     Reproduce(reproduce::ReproduceArgs),
     Accuracy(accuracy::AccuracyArgs),
     Render(render::RenderArgs),
 }
 
 /// Runs one of them.
-pub fn run(command: &LabCommand, voice: Verbosity) -> anyhow::Result<ExitCode> {
+pub fn run(command: &LabGroup, voice: Verbosity) -> anyhow::Result<ExitCode> {
     match command {
-        LabCommand::Reproduce(args) => reproduce::run(args, voice),
-        LabCommand::Accuracy(args) => accuracy::run(args, voice),
-        LabCommand::Render(args) => render::run(args, voice).map(|()| ExitCode::SUCCESS),
+        LabGroup::Reproduce(args) => reproduce::run(args, voice),
+        LabGroup::Accuracy(args) => accuracy::run(args, voice),
+        LabGroup::Render(args) => render::run(args, voice).map(|()| ExitCode::SUCCESS),
     }
 }

@@ -1,4 +1,4 @@
-//! A cell that runs: from what was loaded to the run's report.
+//! A live run: from a loaded cell to the run's report.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use anyhow::Context;
 
-use super::arguments::{WrongArguments, refuse_a_recording_in};
+use super::arguments::refuse_a_recording_in;
 use super::outcome;
 use super::print::{Verbosity, warn};
 use crate::assembly::{LoadedCell, range_warning};
@@ -18,10 +18,11 @@ use crate::io::recorder::{ExtruderFile, RecordConfig};
 use crate::io::stop::StopSignal;
 use crate::live::{self, LiveExtruder, LiveReport, LiveRun};
 use crate::report::run::RunPage;
-use crate::rows::log::{ControlFacts, LogOptions};
+use crate::rows::log::{ControlFacts, LogOptions, RunLog};
+use crate::rows::output::LogError;
 use crate::width_control::target::WidthTarget;
 
-/// Runs a cell that has been loaded, into a folder, and tells how it went.
+/// Runs a loaded cell into a folder, and prints the outcome.
 pub fn drive(
     loaded: LoadedCell,
     out: &Path,
@@ -30,10 +31,10 @@ pub fn drive(
     clock: RunClock,
     voice: Verbosity,
 ) -> anyhow::Result<ExitCode> {
-    let max_rejected_share = loaded.cell.recording.max_rejected_share;
+    let max_rejected = loaded.cell.recording.max_rejected_share;
     let until = Until { duration_s, ends_with_steps: false };
     let report = live(loaded, Folders { recording: out, log: out }, title, until, clock, voice)?;
-    Ok(outcome::tell(&report, out, max_rejected_share))
+    Ok(outcome::tell(&report, out, max_rejected))
 }
 
 /// What ends a run besides the operator.
@@ -41,7 +42,7 @@ pub fn drive(
 pub struct Until {
     /// This time \[s\].
     pub duration_s: Option<f64>,
-    /// The end of a course of steps.
+    /// The end of the steps.
     pub ends_with_steps: bool,
 }
 
@@ -70,15 +71,10 @@ pub fn live(
     let robot = Arc::clone(&robot.driver);
     let (extruder, extruder_files) = live_extruder(&loaded, &run)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
-    let log = RunPage::log(LogOptions {
-        folder: folders.log.to_owned(),
-        title,
-        header: about(&loaded, &run, &*robot, extruder.as_ref()),
-        gauge: loaded.cell.gauge,
-        target: loaded.cell.target.as_ref().map(WidthTarget::nominal),
-        max_rejected_fraction: loaded.cell.recording.max_rejected_share,
-        control: Some(ControlFacts::of(&run, extruder.as_ref().map(|side| &side.setup.strategy))),
-    })?;
+    let strategy = extruder.as_ref().map(|side| &side.setup.strategy);
+    let control = Some(ControlFacts::of(&run, strategy));
+    let header = about(&run, &*robot, &loaded.path, extruder.as_ref());
+    let log = log(&loaded, folders.log, title, header, control)?;
     let record = RecordConfig {
         frames: loaded.cell.recording.frames,
         epoch_ns: clock.epoch_unix_ns(),
@@ -109,25 +105,45 @@ pub fn live(
     })?)
 }
 
-/// What stands at the head of the report.
-fn about(
+/// Begins the log of a cell, with names and values under the report's title, to which the
+/// calibration is added.
+pub fn log<'a>(
     loaded: &LoadedCell,
+    folder: &Path,
+    title: String,
+    header: impl IntoIterator<Item = (&'a str, String)>,
+    control: Option<ControlFacts>,
+) -> Result<RunLog, LogError> {
+    let header = header.into_iter().chain([("calibration", loaded.calibration_words())]);
+    RunPage::log(LogOptions {
+        folder: folder.to_owned(),
+        title,
+        header: header.map(|(name, value)| (name.to_owned(), value)).collect(),
+        gauge: loaded.cell.gauge,
+        target: loaded.cell.target.as_ref().map(WidthTarget::nominal),
+        max_rejected_fraction: loaded.cell.recording.max_rejected_share,
+        control,
+    })
+}
+
+/// Names and values under the title of a live run's report.
+fn about(
     run: &RunPart,
     robot: &dyn RobotDriver,
+    cell: &Path,
     extruder: Option<&LiveExtruder>,
-) -> Vec<(String, String)> {
+) -> Vec<(&'static str, String)> {
     let mut about = vec![
-        ("cell".into(), loaded.path.display().to_string()),
-        ("camera".into(), run.camera.source_name.clone()),
-        ("robot".into(), robot.address()),
+        ("cell", cell.display().to_string()),
+        ("camera", run.camera.source_name.clone()),
+        ("robot", robot.address()),
     ];
-    about.extend(extruder.map(|side| ("extruder".into(), side.driver.address())));
-    about.push(("calibration".into(), loaded.calibration_words()));
+    about.extend(extruder.map(|side| ("extruder", side.driver.address())));
     about
 }
 
-/// The extruder side of a live run and the files behind it; none
-/// where the cell has none. Refuses an extruder that nothing says how to reach.
+/// The extruder side of a live run and the files behind it; none where the cell has none.
+/// Refuses an extruder without an address.
 fn live_extruder(
     loaded: &LoadedCell,
     run: &RunPart,
@@ -136,12 +152,11 @@ fn live_extruder(
         return Ok((None, Vec::new()));
     };
     let Some(device) = &loaded.devices.extruder else {
-        return Err(WrongArguments::new(format!(
+        refuse!(
             "{}: extruder.driver: found nothing, expected \"line\" and an address: a live run \
              has to reach its extruder (truebead simulate needs neither)",
             loaded.path.display()
-        ))
-        .into());
+        );
     };
     warn(&side.warnings);
     warn(range_warning(part, &side)?.as_slice());

@@ -2,7 +2,7 @@
 
 use clap::error::{ContextKind, ContextValue};
 
-/// Commands of old and where they are.
+/// Former commands with their present names.
 const COMMANDS: [(&str, &str); 12] = [
     ("board", "camera board"),
     ("verify", "camera verify"),
@@ -22,7 +22,7 @@ const COMMANDS: [(&str, &str); 12] = [
 const OPTIONS: [(&str, &str); 2] =
     [("--starts", "extruder starts"), ("--noise", "extruder noise --column")];
 
-/// What is said of a name that has changed; none of another mistake.
+/// The message for a name that has changed; none for another mistake.
 pub fn refusal(error: &clap::Error) -> Option<String> {
     let found = |kind| match error.get(kind) {
         Some(ContextValue::String(name)) => Some(name.as_str()),
@@ -58,15 +58,15 @@ mod tests {
         for (old, new) in COMMANDS {
             let said = refusal(&parsed(&format!("{old} --option"))).unwrap();
             assert_eq!(said, format!("`truebead {old}` is `truebead {new}` now"));
-            let told = parsed(&format!("{new} --no-such-option"));
-            assert_eq!(told.kind(), clap::error::ErrorKind::UnknownArgument, "{new}");
+            let error = parsed(&format!("{new} --no-such-option"));
+            assert_eq!(error.kind(), clap::error::ErrorKind::UnknownArgument, "{new}");
         }
         let starts = refusal(&parsed("extruder identify log.csv --starts")).unwrap();
         assert!(starts.contains("`truebead extruder starts`"), "{starts}");
     }
 
     #[test]
-    fn another_mistake_is_told_as_it_is() {
+    fn another_mistake_keeps_its_message() {
         assert_eq!(refusal(&parsed("simulated")), None);
         assert_eq!(refusal(&parsed("run --fast")), None);
     }

@@ -1,4 +1,4 @@
-//! What a live run says at its end, and its exit status.
+//! The figures that a run prints at its end, and its exit status.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -9,14 +9,14 @@ use crate::rows::names;
 use crate::rows::summary::Summary;
 
 /// Prints the figures of a run to standard output, and gives its status.
-pub fn tell(report: &LiveReport, out: &Path, max_rejected_share: f64) -> ExitCode {
+pub fn tell(report: &LiveReport, out: &Path, max_rejected: f64) -> ExitCode {
     print_figures(&report.summary);
     say!("report     {}", out.join("report.html").display());
     match &report.recording {
         Ok(recording) => say!("recording  {}", recording.path.display()),
         Err(incomplete) => tell!("warning: {incomplete}"),
     }
-    status(report, max_rejected_share)
+    status(report, max_rejected)
 }
 
 /// The figures, to standard output.
@@ -51,7 +51,7 @@ pub fn print_figures(summary: &Summary) {
         let kept = extruder.flow_controlled;
         if let (Some(error), Some(mean)) = (kept.error_rms_mm3_per_s, kept.mean_mm3_per_s) {
             say!(
-                "flow       {mean:.1} mm³/s on average, {error:.1} mm³/s RMS from what was wanted, \
+                "flow       {mean:.1} mm³/s on average, {error:.1} mm³/s RMS from the demand, \
                  since control began"
             );
         } else if let Some(mean) = extruder.flow_mean_mm3_per_s {
@@ -72,8 +72,8 @@ pub fn print_figures(summary: &Summary) {
     }
 }
 
-/// The status of a run, with what is wrong about it told.
-pub fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
+/// The status of a run; prints the reason where it is not 0.
+pub fn status(report: &LiveReport, max_rejected: f64) -> ExitCode {
     let faults = report.summary.control.as_ref().map_or(0, |control| control.faults);
     match &report.ending {
         Ending::CameraLost(why) => {
@@ -110,7 +110,7 @@ pub fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
         let why = match report.ending {
             Ending::LastFrame => "the camera's frames ended before the robot printed",
             _ if !connected => {
-                "no robot was heard; see that it listens where [robot] address says. Nothing was \
+                "no robot answered; see that it listens where [robot] address says. Nothing was \
                  laid"
             }
             _ => "the robot never printed; start its program. Nothing was laid",
@@ -118,16 +118,25 @@ pub fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
         tell!("warning: {why}, and nothing was controlled");
         return ExitCode::from(WITH_LOSS);
     }
-    // A run that somebody ends early may have seen little more than the bead's
-    // beginning; that is no loss.
-    let share = report.summary.rejected_fraction();
-    if share > max_rejected_share && report.ending != Ending::Asked {
-        tell!(
-            "warning: {:.1} % of the frames were refused, the cell's limit is {:.1} %",
-            share * 100.0,
-            max_rejected_share * 100.0
-        );
-        return ExitCode::from(WITH_LOSS);
+    // A run that is ended early may show little more than the start of the bead; that is no
+    // loss.
+    if report.ending != Ending::Asked
+        && let Some(status) = status_of_rejections(&report.summary, max_rejected)
+    {
+        return status;
     }
     if report.recording.is_err() { ExitCode::from(WITH_LOSS) } else { ExitCode::SUCCESS }
+}
+
+/// Warns of too many rejected frames, and gives the status for them.
+pub fn status_of_rejections(summary: &Summary, max_rejected: f64) -> Option<ExitCode> {
+    let rejected = summary.rejected_fraction();
+    (rejected > max_rejected).then(|| {
+        tell!(
+            "warning: {:.1} % of the frames were refused, the cell's limit is {:.1} %",
+            rejected * 100.0,
+            max_rejected * 100.0
+        );
+        ExitCode::from(WITH_LOSS)
+    })
 }

@@ -78,38 +78,30 @@ fn slowest(beads: &[PlannedBead], nozzle_mm: f64) -> Option<f64> {
     inside.reduce(f64::min)
 }
 
-fn summary(beads: &[PlannedBead], extruder: &PlannedExtruder) -> Vec<(String, String)> {
+fn summary(beads: &[PlannedBead], extruder: &PlannedExtruder) -> Vec<(&'static str, String)> {
     let facts = &extruder.facts;
     let sum = |of: fn(&PlannedBead) -> f64| beads.iter().map(of).sum::<f64>();
     let count =
         if beads.len() == 1 { "1 bead".to_owned() } else { format!("{} beads", beads.len()) };
     let error = |of: fn(&PlannedBead) -> &WidthPrediction| {
-        let share = rms(beads, of);
-        format!("{:.3} mm ({:.1} %)", share * facts.width_mm, 100.0 * share)
+        let error = rms(beads, of);
+        format!("{:.3} mm ({:.1} %)", error * facts.width_mm, 100.0 * error)
     };
     let CommandRange { min: low, max: high } = range(beads, extruder);
+    // Rounding alone may make it less than nothing.
+    let added_s = sum(|bead| bead.plan.added_s).max(0.0);
+    let following = error(|bead| &bead.proportional);
     let mut lines = vec![
         ("length", format!("{:.1} mm in {count}", sum(PlannedBead::length_mm))),
         ("nominal", format!("{:.2} s", sum(|bead| bead.nominal.duration_s()))),
-        (
-            "planned",
-            format!(
-                "{:.2} s, {:.2} s added",
-                sum(|bead| bead.plan.speed.duration_s()),
-                // Rounding alone may make it less than nothing.
-                sum(|bead| bead.plan.added_s).max(0.0)
-            ),
-        ),
+        ("planned", format!("{:.2} s, {added_s:.2} s added", sum(|b| b.plan.speed.duration_s()))),
         ("error", format!("{} RMS of the width, planned", error(|bead| &bead.planned))),
         ("constant", format!("{} not planned, constant command", error(|bead| &bead.constant))),
-        (
-            "following",
-            format!("{} not planned, in proportion to the speed", error(|bead| &bead.proportional)),
-        ),
+        ("following", format!("{following} not planned, in proportion to the speed")),
     ];
     if let Some(slowest) = slowest(beads, extruder.nozzle_mm) {
         lines.push(("slowest", format!("{slowest:.1} mm/s")));
     }
     lines.push(("command", format!("{low:.3} to {high:.3} {}", facts.unit)));
-    lines.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+    lines
 }

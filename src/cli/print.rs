@@ -1,9 +1,8 @@
-//! What a command prints: results on standard output, all else on standard error.
+//! Output of commands: results on standard output, all else on standard error.
 
 use std::io::Write as _;
 
-/// Writes a line to standard output. One that nobody reads any more is no reason to
-/// end: a run goes on when the pipe behind it is closed.
+/// Writes a line to standard output. A closed pipe is no reason to stop: a run goes on.
 macro_rules! say {
     () => { say!("") };
     ($($text:tt)*) => {{
@@ -12,12 +11,22 @@ macro_rules! say {
     }};
 }
 
-/// Writes a line to standard error. Where nobody can be told, the work still goes on.
+/// Writes a line to standard error. A closed standard error is no reason to stop.
 macro_rules! tell {
     ($($text:tt)*) => {{
         use std::io::Write;
         _ = writeln!(std::io::stderr(), $($text)*);
     }};
+}
+
+/// The arguments are wrong, in words as for `format!`.
+macro_rules! wrong {
+    ($($text:tt)*) => { $crate::cli::arguments::WrongArguments::new(format_args!($($text)*)) };
+}
+
+/// Returns that the arguments are wrong.
+macro_rules! refuse {
+    ($($text:tt)*) => { return Err(wrong!($($text)*).into()) };
 }
 
 /// Adds a line to a text, which cannot fail.
@@ -33,14 +42,14 @@ pub fn print(text: &str) {
     let _ = std::io::stdout().write_all(text.as_bytes());
 }
 
-/// How much a command says on standard error.
+/// How much a command prints on standard error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Verbosity {
     /// Nothing but errors.
     pub quiet: bool,
 }
 
-/// Prints warnings about a cell; nothing of them keeps it from running.
+/// Prints warnings about a cell.
 pub fn warn(warnings: &[String]) {
     for warning in warnings {
         tell!("warning: {warning}");

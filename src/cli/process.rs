@@ -10,28 +10,26 @@ use clap::Args;
 use crossbeam_channel::{Sender, bounded};
 
 use super::arguments::WrongArguments;
+use super::live_cell::log;
+use super::outcome::status_of_rejections;
 use super::print::Verbosity;
-use super::status::WITH_LOSS;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::drivers::camera::mcap::RobotZ;
-use crate::drivers::camera::open;
-use crate::drivers::camera::open::OfflineOptions;
+use crate::drivers::camera::open::{self, OfflineOptions};
 use crate::io::progress::Progress;
 use crate::io::stop::StopSignal;
 use crate::report::overlays::OverlayWriter;
-use crate::report::run::RunPage;
 use crate::rows::edges::EdgesWriter;
 use crate::rows::frame_row::FrameRow;
-use crate::rows::log::{LogOptions, RunLog};
+use crate::rows::log::RunLog;
 use crate::rows::summary::{RunNote, Summary};
 use crate::run::ports::{FrameSource, Grab, SourceError};
 use crate::vision::{Measurer, Reject, RoughnessEstimator};
-use crate::width_control::target::WidthTarget;
 
-/// Frames that may wait between reading and measuring.
+/// Frames that may wait between reading and measuring, which trades memory against idle cores.
 const QUEUE_LENGTH: usize = 8;
-/// Unreadable frames that are named one by one.
+/// Unreadable frames that are named one by one, which keeps the terminal readable.
 const MAX_NAMED_UNREADABLE: u64 = 10;
 
 /// Measures the bead in recorded frames.
@@ -78,55 +76,32 @@ pub fn run(args: &ProcessArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     };
     let recorded = open::recorded(&args.input, options).map_err(wrong_input)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
-    let log = RunPage::log(LogOptions {
-        folder: args.out.clone(),
-        title: format!("Widths of {}", args.input.display()),
-        header: vec![
-            ("input".into(), args.input.display().to_string()),
-            ("cell".into(), args.cell.display().to_string()),
-            ("calibration".into(), loaded.calibration_words()),
-        ],
-        gauge: loaded.cell.gauge,
-        target: loaded.cell.target.as_ref().map(WidthTarget::nominal),
-        max_rejected_fraction: loaded.cell.recording.max_rejected_share,
-        control: None,
-    })?;
+    let (input, cell) = (args.input.display().to_string(), args.cell.display().to_string());
+    let title = format!("Widths of {input}");
+    let log = log(&loaded, &args.out, title, [("input", input), ("cell", cell)], None)?;
     let total = recorded.source.expected_frames();
     let progress = Progress::new("measuring", "frames", total, voice.quiet);
     let edges = args.edges.then(|| EdgesWriter::create(&args.out)).transpose()?;
     let overlays = args.overlays.then(|| OverlayWriter::create(&args.out, loaded.cell.gauge));
-    let overlays = overlays.transpose()?;
-    let robot_z = recorded.robot_z.as_ref();
-    let roughness = RoughnessEstimator::default();
-    let refusals = BTreeMap::new();
-    let bench = Measuring {
+    let measuring = Measuring {
         loaded: &loaded,
-        robot_z,
+        robot_z: recorded.robot_z.as_ref(),
         progress,
         log,
-        roughness,
+        roughness: RoughnessEstimator::default(),
         edges,
-        overlays,
-        first_rejections: refusals,
+        overlays: overlays.transpose()?,
+        first_rejections: BTreeMap::new(),
     };
-    let measured = bench.measure_all(recorded.source, &stop)?;
-    Ok(conclude(args, &measured, &loaded))
+    let (summary, first_rejections) = measuring.measure_all(recorded.source, &stop)?;
+    Ok(conclude(args, &summary, &first_rejections, &loaded))
 }
 
-/// The first frame that was refused with a status, and why.
-struct FirstRejection {
-    frame: u64,
-    why: Reject,
-}
-
-/// What was measured, and the first refusal of each status.
-struct MeasuredFrames {
-    summary: Summary,
-    first_rejections: BTreeMap<&'static str, FirstRejection>,
-}
+/// The first frame that was rejected with each status, and why.
+type FirstRejections = BTreeMap<&'static str, (u64, Reject)>;
 
 fn wrong_input(SourceError { source_name, what }: SourceError) -> WrongArguments {
-    WrongArguments::new(format!("{source_name}: {what}"))
+    wrong!("{source_name}: {what}")
 }
 
 /// Where frames are measured one after the other.
@@ -138,17 +113,17 @@ struct Measuring<'a> {
     roughness: RoughnessEstimator,
     edges: Option<EdgesWriter>,
     overlays: Option<OverlayWriter>,
-    first_rejections: BTreeMap<&'static str, FirstRejection>,
+    first_rejections: FirstRejections,
 }
 
 impl Measuring<'_> {
-    /// Reads in a thread of its own, measures here. A source that fails in
-    /// the middle ends the work with what there is, and says so.
+    /// Reads in a separate thread, measures here. A source that fails in the middle ends the
+    /// work with a warning; the results so far are kept.
     fn measure_all(
         mut self,
         mut source: Box<dyn FrameSource>,
         stop: &StopSignal,
-    ) -> anyhow::Result<MeasuredFrames> {
+    ) -> anyhow::Result<(Summary, FirstRejections)> {
         let (send, frames) = bounded(QUEUE_LENGTH);
         let ending = AtomicBool::new(false);
         let failed = std::thread::scope(|scope| -> anyhow::Result<Option<SourceError>> {
@@ -183,7 +158,7 @@ impl Measuring<'_> {
         if let Some(edges) = self.edges {
             edges.finish()?;
         }
-        Ok(MeasuredFrames { summary, first_rejections: self.first_rejections })
+        Ok((summary, self.first_rejections))
     }
 
     fn measure(
@@ -200,8 +175,7 @@ impl Measuring<'_> {
                     .measure(&frame, &surface)
                     .inspect_err(|why| {
                         tracing::info!("frame {}: {why}", frame.seq);
-                        let first = FirstRejection { frame: frame.seq, why: *why };
-                        self.first_rejections.entry(why.status()).or_insert(first);
+                        self.first_rejections.entry(why.status()).or_insert((frame.seq, *why));
                     })
                     .map(|found| measurer.with_skew(found))
                     .map_err(|reject| reject.status());
@@ -249,13 +223,14 @@ fn read(
 
 fn conclude(
     args: &ProcessArgs,
-    MeasuredFrames { summary, first_rejections: refusals }: &MeasuredFrames,
+    summary: &Summary,
+    first_rejections: &FirstRejections,
     loaded: &LoadedCell,
 ) -> ExitCode {
     say!("{} frames, {} measured", summary.frames, summary.measured);
     for (status, count) in &summary.rejected {
         say!("  {count} {status}");
-        if let Some(FirstRejection { frame, why }) = refusals.get(status) {
+        if let Some((frame, why)) = first_rejections.get(status) {
             say!("    frame {frame}: {why}");
         }
     }
@@ -269,15 +244,6 @@ fn conclude(
         say!("hint: {sentence}");
     }
     say!("{}", args.out.join("report.html").display());
-    let share = summary.rejected_fraction();
-    let most = loaded.cell.recording.max_rejected_share;
-    if share > most {
-        tell!(
-            "warning: {:.1} % of the frames were refused, the cell's limit is {:.1} %",
-            share * 100.0,
-            most * 100.0
-        );
-        return ExitCode::from(WITH_LOSS);
-    }
-    ExitCode::SUCCESS
+    status_of_rejections(summary, loaded.cell.recording.max_rejected_share)
+        .unwrap_or(ExitCode::SUCCESS)
 }

@@ -1,4 +1,4 @@
-//! `truebead replay`: does today's controller answer as the recorded one did?
+//! `truebead replay`: whether today's controller gives the recorded steps.
 
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::arguments::WrongArguments;
-use super::recorded::attached_cell;
+use super::recorded::{attached_cell, open, refuse_foreign, warn_of_damage};
 use super::status::WITH_LOSS;
 use crate::assembly::extruder;
 use crate::cell::file::{ExtruderPart, Purpose};
@@ -45,16 +45,14 @@ pub struct ReplayArgs {
 
 /// Runs the command.
 pub fn run(args: &ReplayArgs) -> anyhow::Result<ExitCode> {
-    let mut recording = Recording::open(&args.recording).map_err(WrongArguments::new)?;
+    let mut recording = open(&args.recording)?;
     let mut controller = recorded_controller(&recording)?;
     let progress = progress_bar();
     let report =
         replay(with_progress(&mut recording, &progress), |now, event| controller.step(now, event));
     progress.finish_and_clear();
     let report = report.context("the replay ends here")?;
-    if let Some(what) = recording.integrity().summary() {
-        tell!("warning: {}: {what}", recording.file());
-    }
+    warn_of_damage(&recording);
     let status = tell(&report);
     if report.compared == 0 && report.gap.is_none() {
         bail!("{}: nothing to compare, it holds no steps", recording.file());
@@ -65,17 +63,12 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<ExitCode> {
 /// The controller as it was at the start of the run.
 fn recorded_controller(recording: &Recording) -> anyhow::Result<Controller> {
     let file = recording.file();
-    if recording.run().is_none() {
-        bail!(WrongArguments::new(format!(
-            "{file}: not a recording of truebead: it has no metadata record \"run\" at its start"
-        )));
-    }
+    refuse_foreign(recording)?;
     let (cell, calibration) = attached_cell(recording, Purpose::Run)
         .context("the controller cannot be set up")
         .map_err(WrongArguments::new)?;
     let Some(run) = cell.run.clone() else {
-        let what = format!("cell.toml in {file}: it lacks tables that a run needs");
-        bail!(WrongArguments::new(what));
+        refuse!("cell.toml in {file}: it lacks tables that a run needs");
     };
     let controller = Controller::new(cell.controller_setup(&run, &calibration));
     let Some(part) = &run.extruder else { return Ok(controller) };
@@ -87,15 +80,14 @@ fn recorded_controller(recording: &Recording) -> anyhow::Result<Controller> {
 
 /// The files that the extruder side is made from.
 fn recorded_files(recording: &Recording, part: &ExtruderPart) -> anyhow::Result<Vec<ExtruderFile>> {
+    let from = recording.file();
     let file = |name| {
         let Some(text) = recording.attachment(name) else {
-            bail!(WrongArguments::new(format!(
-                "{}: the attachment {name} is missing, so the extruder side cannot be set up",
-                recording.file()
-            )));
+            refuse!(
+                "{from}: the attachment {name} is missing, so the extruder side cannot be set up"
+            );
         };
-        let source = format!("{name} in {}", recording.file());
-        Ok(ExtruderFile { name, source, text: text.to_owned() })
+        Ok(ExtruderFile { name, source: format!("{name} in {from}"), text: text.to_owned() })
     };
     extruder::attachments(&part.extruder).into_iter().map(file).collect()
 }

@@ -2,6 +2,7 @@
 
 mod extruder;
 mod robot;
+mod serve;
 
 use std::process::ExitCode;
 
@@ -9,16 +10,16 @@ use clap::Subcommand;
 
 /// Machines that answer the links of a robot and of an extruder
 #[derive(Debug, Subcommand)]
-pub enum SimCommand {
+pub enum SimGroup {
     Robot(robot::RobotSimArgs),
     Extruder(extruder::ExtruderSimArgs),
 }
 
 /// Runs one of them.
-pub fn run(command: &SimCommand) -> anyhow::Result<ExitCode> {
+pub fn run(command: &SimGroup) -> anyhow::Result<ExitCode> {
     match command {
-        SimCommand::Robot(args) => robot::run(args),
-        SimCommand::Extruder(args) => extruder::run(args),
+        SimGroup::Robot(args) => robot::run(args),
+        SimGroup::Extruder(args) => extruder::run(args),
     }
     .map(|()| ExitCode::SUCCESS)
 }

@@ -9,6 +9,7 @@ use anyhow::Context;
 use clap::Args;
 
 use super::arguments::refuse_a_recording_in;
+use super::live_cell::log;
 use super::outcome;
 use super::print::Verbosity;
 use super::simulated_cell::{SimRecorder, simulated_extruder};
@@ -21,13 +22,11 @@ use crate::core::time::Stamp;
 use crate::core::units::{Mm, Mm3PerS};
 use crate::io::progress::Progress;
 use crate::io::stop::StopSignal;
-use crate::report::run::RunPage;
 use crate::rows::frame_row::{ControlColumns, FrameRow};
-use crate::rows::log::{ControlFacts, LogOptions, RunLog};
+use crate::rows::log::{ControlFacts, RunLog};
 use crate::rows::output::LogError;
-use crate::rows::summary::RunNote;
+use crate::rows::summary::{RunNote, Summary};
 use crate::sim::cell::{FrameObservation, LayerEnd, Observer, SimCell};
-use crate::width_control::target::WidthTarget;
 
 /// Runs the closed loop on a simulated cell.
 #[derive(Debug, Args)]
@@ -65,24 +64,15 @@ pub fn run(args: &SimulateArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     }
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
     let extruder = simulated_extruder(&loaded)?;
-    let controller = extruder.as_ref().map(|rig| rig.setup.strategy.clone());
+    let control = ControlFacts::of(&run, extruder.as_ref().map(|side| &side.setup.strategy));
     let calibration = loaded.calibration.clone();
     let recorder = SimRecorder::of(args.record.then_some(&args.out), &loaded)?;
     let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, recorder, extruder)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
-    let log = RunPage::log(LogOptions {
-        folder: args.out.clone(),
-        title: format!("Simulation of {}", args.scenario.display()),
-        header: vec![
-            ("scenario".into(), args.scenario.display().to_string()),
-            ("seed".into(), loaded.cell.simulation.seed.to_string()),
-            ("calibration".into(), loaded.calibration_words()),
-        ],
-        gauge: loaded.cell.gauge,
-        target: loaded.cell.target.as_ref().map(WidthTarget::nominal),
-        max_rejected_fraction: loaded.cell.recording.max_rejected_share,
-        control: Some(ControlFacts::of(&run, controller.as_ref())),
-    })?;
+    let (scenario, seed) = (args.scenario.display().to_string(), loaded.cell.simulation.seed);
+    let title = format!("Simulation of {scenario}");
+    let header = [("scenario", scenario), ("seed", seed.to_string())];
+    let log = log(&loaded, &args.out, title, header, Some(control))?;
     let progress = Progress::new("simulating", "s", None, voice.quiet);
     let mut logger = Logger { log, stop, failed: None, progress };
     #[expect(clippy::disallowed_methods, reason = "how much faster than the clock")]
@@ -110,7 +100,7 @@ pub fn run(args: &SimulateArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     Ok(status(&loaded, &summary, end))
 }
 
-fn status(loaded: &LoadedCell, summary: &crate::rows::summary::Summary, end: LayerEnd) -> ExitCode {
+fn status(loaded: &LoadedCell, summary: &Summary, end: LayerEnd) -> ExitCode {
     if !end.complete {
         tell!("error: the robot stopped before the end of the bead; the report says why");
         return ExitCode::FAILURE;
@@ -122,7 +112,7 @@ fn status(loaded: &LoadedCell, summary: &crate::rows::summary::Summary, end: Lay
     ExitCode::SUCCESS
 }
 
-/// Takes the simulation down.
+/// Logs the simulation.
 struct Logger {
     log: RunLog,
     stop: StopSignal,
@@ -145,7 +135,7 @@ impl Observer for Logger {
     }
 
     fn is_done(&self) -> bool {
-        // What cannot be written is not simulated to its end either.
+        // A simulation that cannot be written ends.
         self.failed.is_some() || self.stop.requested()
     }
 
@@ -153,22 +143,22 @@ impl Observer for Logger {
         self.log.flow(now, wanted, flow);
     }
 
-    fn frame(&mut self, sight: &FrameObservation<'_>) {
+    fn frame(&mut self, observed: &FrameObservation<'_>) {
         if self.failed.is_some() {
             return;
         }
         let row = FrameRow {
-            frame: sight.seq,
-            time_s: Some(sight.captured_at.secs()),
-            outcome: sight.outcome,
+            frame: observed.seq,
+            time_s: Some(observed.captured_at.secs()),
+            outcome: observed.outcome,
             roughness: None,
             control: Some(ControlColumns::of(
-                sight.step,
-                sight.outcome.ok().map(|measured| measured.width),
-                sight.speed,
-                sight.setpoint,
+                observed.step,
+                observed.outcome.ok().map(|measured| measured.width),
+                observed.speed,
+                observed.setpoint,
             )),
         };
-        self.failed = self.log.frame(&row, sight.frame, sight.edges).err();
+        self.failed = self.log.frame(&row, observed.frame, observed.edges).err();
     }
 }

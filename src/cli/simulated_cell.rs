@@ -1,4 +1,4 @@
-//! What a simulated cell is made of besides its file: its extruder and its recorder.
+//! Extruder and recorder of a simulated cell.
 
 use std::path::PathBuf;
 
@@ -8,12 +8,11 @@ use crate::cell::file::KeepFrames;
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::Stamp;
-use crate::io::recorder;
-use crate::io::recorder::{RecordConfig, RecorderHandle};
+use crate::io::recorder::{self, RecordConfig, RecorderHandle};
 use crate::run::ports::{RecordError, Recorder};
 use crate::sim::cell::CommandedExtruder;
 
-/// The extruder side of a simulated cell, with what is to be said about it.
+/// The extruder side of a simulated cell; prints its warnings.
 pub fn simulated_extruder(loaded: &LoadedCell) -> anyhow::Result<Option<CommandedExtruder>> {
     let side = loaded.simulated_extruder()?;
     if let Some(side) = &side {
@@ -22,11 +21,11 @@ pub fn simulated_extruder(loaded: &LoadedCell) -> anyhow::Result<Option<Commande
     Ok(side.map(|side| side.extruder))
 }
 
-/// Keeps what happened, where that is asked for.
+/// Records the simulation, where a folder is given.
 pub struct SimRecorder(Option<RecorderHandle>);
 
 impl SimRecorder {
-    /// Into a folder, if one is given.
+    /// Begins the recording.
     pub fn of(folder: Option<&PathBuf>, loaded: &LoadedCell) -> anyhow::Result<Self> {
         let Some(folder) = folder else { return Ok(Self(None)) };
         let config = RecordConfig {
@@ -41,7 +40,7 @@ impl SimRecorder {
         Ok(Self(Some(recorder.waiting())))
     }
 
-    /// Gives the recording its name.
+    /// Gives the recording its final name.
     pub fn finish(self) -> anyhow::Result<()> {
         if let Some(recorder) = self.0 {
             recorder.finish()?;

@@ -8,11 +8,11 @@ use crate::document::Problems;
 use crate::io::calibration_file::CalibrationFileError;
 use crate::io::model_file::ModelFileError;
 
-/// Status of a command that finished, but with too many frames refused or
-/// records lost.
+/// Status of a command that finished, but rejected too many frames or lost records (the program's
+/// contract with its callers: README.md, exit status).
 pub const WITH_LOSS: u8 = 3;
 
-/// Configuration and arguments are told from failures at work.
+/// Status 2 for wrong arguments or configuration, 1 for other failures.
 pub fn status_of(error: &anyhow::Error) -> ExitCode {
     let wrong = error.chain().any(|cause| {
         cause.is::<WrongArguments>()

@@ -10,7 +10,6 @@ use std::process::ExitCode;
 use anyhow::Context;
 
 pub use self::arguments::TuneArgs;
-use super::arguments::WrongArguments;
 use super::camera_offset::max_offset;
 use super::print::Verbosity;
 use crate::assembly::LoadedCell;
@@ -30,8 +29,7 @@ pub fn run(args: &TuneArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
         None => experiment::run(args, &loaded, voice)?,
     };
     if !recording.exists() {
-        let what = format!("{}: there is no such recording", recording.display());
-        return Err(WrongArguments::new(what).into());
+        refuse!("{}: there is no such recording", recording.display());
     }
     if !voice.quiet {
         tell!("looking at {}: this takes some seconds", recording.display());

@@ -1,6 +1,7 @@
 //! What a controller decides, and why.
 
 use serde::{Deserialize, Serialize};
+use strum::IntoStaticStr;
 
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS};
@@ -20,8 +21,9 @@ pub enum Command {
 }
 
 /// Why the controller does not track.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Hold {
     /// No width for longer than the cell allows.
     NoWidth,
@@ -42,8 +44,9 @@ pub enum Hold {
 }
 
 /// Why the controller gave up. Left only by a new bead.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Fault {
     /// Held for longer than the cell allows, for this reason.
     HeldTooLong(Hold),
@@ -58,8 +61,9 @@ pub enum Fault {
 }
 
 /// The state that the controller is in after a step.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum State {
     /// The robot is not printing.
     #[default]
@@ -77,13 +81,7 @@ pub enum State {
 impl State {
     /// The state's name, without its reason.
     pub fn name(&self) -> &'static str {
-        match self {
-            Self::Idle => "idle",
-            Self::Priming => "priming",
-            Self::Tracking => "tracking",
-            Self::Holding(_) => "holding",
-            Self::Fault(_) => "fault",
-        }
+        self.into()
     }
 }
 

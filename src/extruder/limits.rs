@@ -2,6 +2,7 @@
 //! says which of them acted.
 
 use serde::{Deserialize, Serialize};
+use strum::IntoStaticStr;
 
 use crate::core::time::Span;
 
@@ -33,8 +34,9 @@ pub enum LimitError {
 }
 
 /// Which limit shaped a command.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum CommandLimit {
     /// None.
     #[default]

@@ -1,13 +1,15 @@
 //! The state of the extruder side, and the numbers behind a command.
 
 use serde::{Deserialize, Serialize};
+use strum::IntoStaticStr;
 
 use super::limits::CommandLimit;
 use crate::core::units::Mm3PerS;
 
 /// Why the last command is kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum ExtruderHold {
     /// The extruder's link is down.
     LinkDown,
@@ -23,8 +25,9 @@ pub enum ExtruderHold {
 }
 
 /// Why the extruder was stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum ExtruderFault {
     /// Held for longer than the cell allows, for this reason.
     HeldTooLong(ExtruderHold),
@@ -43,8 +46,9 @@ pub enum ExtruderFault {
 }
 
 /// What the extruder side is doing after a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum ExtruderState {
     /// No bead is laid; the pump is off, and the valve shut unless it lets too high
     /// a pressure out.
@@ -65,15 +69,8 @@ pub enum ExtruderState {
 
 impl ExtruderState {
     /// The state's name, without its reason.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Off => "off",
-            Self::Starting => "starting",
-            Self::Running => "running",
-            Self::Holding(_) => "holding",
-            Self::Ending => "ending",
-            Self::Fault(_) => "fault",
-        }
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 }
 

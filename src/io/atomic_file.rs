@@ -11,11 +11,11 @@ use std::path::{Path, PathBuf};
 pub struct WriteError {
     /// Where it should have gone.
     pub path: PathBuf,
-    /// What the system says; told with the path, and not once more as its cause.
+    /// The system's error; part of the message, and not once more its source.
     pub what: io::Error,
 }
 
-/// What any program would ask for; the user's umask takes its part off.
+/// Permissions of a new file: read and write for all, less the umask (IEEE 1003.1, creat()).
 const MODE: u32 = 0o666;
 
 /// Writes beside the final name and renames when everything is on the disk.

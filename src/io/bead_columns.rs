@@ -15,9 +15,9 @@ use crate::io::recording::{RecordedEntry, RecordingError};
 /// Name of the command's column, before its unit.
 pub const COMMAND: &str = "command";
 
-/// What has to be known of the cell.
+/// Facts of the cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CellFacts {
+pub struct BeadFacts {
     /// Unit of the extruder's command, where it is commanded.
     pub command: Option<Unit>,
     /// Height of a layer, if it is known.
@@ -26,21 +26,21 @@ pub struct CellFacts {
     pub offset: Mm,
 }
 
-/// What a recording holds.
+/// The contents of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BeadColumns {
     /// Columns, on the clock of the run; those without a sample are left out.
     pub columns: Vec<TimeSeries>,
-    /// What the reader should know of them.
+    /// Remarks about them.
     pub notes: Vec<String>,
 }
 
-/// The columns of one bead: the longest stretch over which the robot lays bead
-/// and the pump, where it reports, runs. Fails where the recording cannot be
+/// The columns of one bead: the longest interval over which the robot lays bead and the pump,
+/// where it reports, runs. Fails where the recording cannot be
 /// read on.
 pub fn columns(
     entries: impl IntoIterator<Item = Result<RecordedEntry, RecordingError>>,
-    facts: &CellFacts,
+    facts: &BeadFacts,
 ) -> Result<BeadColumns, RecordingError> {
     let mut collector = ColumnCollector::new(facts);
     for entry in entries {
@@ -53,7 +53,7 @@ pub fn columns(
     Ok(collector.finish(facts))
 }
 
-/// A stretch of time \[s\].
+/// An interval of time \[s\].
 #[derive(Debug, Clone, Copy)]
 struct BeadInterval {
     from_s: f64,
@@ -66,7 +66,7 @@ impl BeadInterval {
     }
 }
 
-/// Stretches of time over which something is so.
+/// Intervals over which a condition holds.
 #[derive(Debug, Default)]
 struct Intervals {
     all: Vec<BeadInterval>,
@@ -97,7 +97,7 @@ struct ColumnCollector {
 }
 
 impl ColumnCollector {
-    fn new(facts: &CellFacts) -> Self {
+    fn new(facts: &BeadFacts) -> Self {
         let measured = |name: &str| TimeSeries::new(name, false);
         let unit = facts.command.unwrap_or(Unit::One).word();
         Self {
@@ -154,8 +154,7 @@ impl ColumnCollector {
         }
     }
 
-    /// The longest stretch of a bead with a running pump, and how many there
-    /// are.
+    /// The longest interval of a bead with a running pump, and the number of all.
     fn longest_interval(&self) -> (Option<BeadInterval>, usize) {
         let both = |bead: &BeadInterval| -> Vec<BeadInterval> {
             if !self.has_pump {
@@ -165,14 +164,14 @@ impl ColumnCollector {
                 from_s: pump.from_s.max(bead.from_s),
                 to_s: pump.to_s.min(bead.to_s),
             });
-            cut.filter(|stretch| stretch.length_s() > 0.0).collect()
+            cut.filter(|interval| interval.length_s() > 0.0).collect()
         };
         let all: Vec<BeadInterval> = self.laying.all.iter().flat_map(both).collect();
         let longest = all.iter().max_by(|a, b| a.length_s().total_cmp(&b.length_s()));
         (longest.copied(), all.len())
     }
 
-    fn finish(self, facts: &CellFacts) -> BeadColumns {
+    fn finish(self, facts: &BeadFacts) -> BeadColumns {
         let mut notes = Vec::new();
         let (interval, count) = self.longest_interval();
         let Some(interval) = interval else {
@@ -198,7 +197,7 @@ impl ColumnCollector {
     }
 }
 
-/// One bead as robot and camera tell of it.
+/// One bead in the reports of robot and camera.
 struct BeadSeries {
     path: TimeSeries,
     speed: TimeSeries,
@@ -209,7 +208,7 @@ impl BeadSeries {
     /// The width and the flow of the bead at the moments when it was laid: what
     /// the camera sees left the nozzle when that was the offset further back
     /// along the path.
-    fn laid(&self, facts: &CellFacts) -> ([TimeSeries; 2], Option<String>) {
+    fn laid(&self, facts: &BeadFacts) -> ([TimeSeries; 2], Option<String>) {
         let mut width = TimeSeries::new("laid_width_mm", false);
         let mut flow = TimeSeries::new("laid_flow_mm3_per_s", false);
         let mut too_narrow = 0_usize;
@@ -227,7 +226,7 @@ impl BeadSeries {
         }
         let note = match facts.layer_height {
             None if !width.is_empty() => Some(
-                "there is no laid_flow_mm3_per_s: the cell has no layer height; tell it with \
+                "there is no laid_flow_mm3_per_s: the cell has no layer height; give it with \
                  --layer-height-mm"
                     .to_owned(),
             ),
@@ -241,7 +240,7 @@ impl BeadSeries {
         ([width, flow], note)
     }
 
-    /// When the nozzle first was at a place of the path \[s\].
+    /// When the nozzle first was at a position on the path \[s\].
     fn time_at(&self, position: f64) -> Option<f64> {
         let after = self.path.values.partition_point(|path| *path < position);
         let before = after.checked_sub(1)?;

@@ -3,12 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use crate::calibration::exchange;
-use crate::calibration::exchange::Import;
+use crate::calibration::exchange::{self, Import};
 use crate::calibration::{Calibration, file};
 use crate::document::Problems;
 
-/// Bytes of a camera in the YAML of others, at most.
+/// Largest size of a camera in YAML \[bytes\]: hundreds of times a usual file.
 const MAX_YAML_BYTES: u64 = 1_000_000;
 
 /// A calibration file that cannot be used.

@@ -14,6 +14,7 @@ pub const RAW_IMAGE: &str = "foxglove.RawImage";
 
 const TIMESTAMP: &str = ".google.protobuf.Timestamp";
 const TIMESTAMP_FILE: &str = "google/protobuf/timestamp.proto";
+/// Nanoseconds of a second. By definition.
 const NS_PER_S: u64 = 1_000_000_000;
 
 /// `foxglove.CompressedImage`.
@@ -80,40 +81,33 @@ pub fn timestamp_ns(stamp: Option<&Timestamp>) -> Option<u64> {
 /// The schema record of [`CompressedImage`]: a `FileDescriptorSet` that holds
 /// all that it refers to.
 pub fn compressed_image_schema() -> Vec<u8> {
-    let image = FileDescriptorProto {
-        name: Some("foxglove/CompressedImage.proto".into()),
-        package: Some("foxglove".into()),
-        dependency: vec![TIMESTAMP_FILE.into()],
-        message_type: vec![DescriptorProto {
-            name: Some("CompressedImage".into()),
-            field: vec![
-                field("timestamp", 1, Type::Message, Some(TIMESTAMP)),
-                field("frame_id", 4, Type::String, None),
-                field("data", 2, Type::Bytes, None),
-                field("format", 3, Type::String, None),
-            ],
-            ..DescriptorProto::default()
-        }],
-        syntax: Some("proto3".into()),
-        ..FileDescriptorProto::default()
-    };
-    FileDescriptorSet { file: vec![timestamp_file(), image] }.encode_to_vec()
+    let fields = vec![
+        field("timestamp", 1, Type::Message, Some(TIMESTAMP)),
+        field("frame_id", 4, Type::String, None),
+        field("data", 2, Type::Bytes, None),
+        field("format", 3, Type::String, None),
+    ];
+    let mut image = file("foxglove/CompressedImage.proto", "foxglove", "CompressedImage", fields);
+    image.dependency = vec![TIMESTAMP_FILE.into()];
+    let fields = vec![field("seconds", 1, Type::Int64, None), field("nanos", 2, Type::Int32, None)];
+    let timestamp = file(TIMESTAMP_FILE, "google.protobuf", "Timestamp", fields);
+    FileDescriptorSet { file: vec![timestamp, image] }.encode_to_vec()
 }
 
-fn timestamp_file() -> FileDescriptorProto {
+/// A file with one message.
+fn file(
+    name: &str,
+    package: &str,
+    message: &str,
+    field: Vec<FieldDescriptorProto>,
+) -> FileDescriptorProto {
+    let name_of = |name: &str| Some(name.to_owned());
     FileDescriptorProto {
-        name: Some(TIMESTAMP_FILE.into()),
-        package: Some("google.protobuf".into()),
-        message_type: vec![DescriptorProto {
-            name: Some("Timestamp".into()),
-            field: vec![
-                field("seconds", 1, Type::Int64, None),
-                field("nanos", 2, Type::Int32, None),
-            ],
-            ..DescriptorProto::default()
-        }],
-        syntax: Some("proto3".into()),
-        ..FileDescriptorProto::default()
+        name: name_of(name),
+        package: name_of(package),
+        message_type: vec![DescriptorProto { name: name_of(message), field, ..Default::default() }],
+        syntax: name_of("proto3"),
+        ..Default::default()
     }
 }
 

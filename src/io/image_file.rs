@@ -17,10 +17,12 @@ use crate::core::time::Stamp;
 pub const EXTENSIONS: [&str; 12] =
     ["png", "jpg", "jpeg", "tif", "tiff", "bmp", "pgm", "ppm", "pbm", "pnm", "pam", "webp"];
 
+/// Marker SOS of a JPEG (ISO 10918-1, table B.1).
 const START_OF_SCAN: [u8; 2] = [0xff, 0xda];
+/// Marker EOI of a JPEG (ISO 10918-1, table B.1).
 const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
 
-/// Bytes that are not a picture that can be measured.
+/// Bytes that are no image that can be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum DecodeError {
     /// No bytes at all, as left by a writer that was stopped.
@@ -30,7 +32,7 @@ pub enum DecodeError {
     #[error("it is not a PNG, JPEG, TIFF, BMP, PNM or WebP image")]
     UnknownFormat,
     /// A JPEG without its end, whose missing part would be decoded as grey.
-    #[error("it is cut off before its end")]
+    #[error("it is truncated")]
     Truncated,
     /// The format is known, the content is broken or not supported.
     #[error("it cannot be decoded: {0}")]
@@ -98,8 +100,8 @@ pub fn read(
         .map_err(|what| ImageFileError::Decode { path: path.to_owned(), what })
 }
 
-/// Decodes the bytes of an image file; the format is told from the first
-/// bytes, not from a name. An orientation in the metadata is not applied:
+/// Decodes the bytes of an image file; the format is recognised by the first
+/// bytes, not by a name. An orientation in the metadata is not applied:
 /// pixels are where the sensor had them.
 pub fn decode(
     bytes: &[u8],
@@ -240,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_picture_is_said_to_be_none() {
+    fn what_is_no_image_is_refused() {
         use ImageFormat::{Bmp, Jpeg, Png, Pnm, Tiff, WebP};
         let fault = |bytes: &[u8]| decode(bytes, Channel::Grey, 0, Stamp::START).unwrap_err();
         assert!(matches!(fault(b""), DecodeError::Empty));
@@ -258,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn image_names_are_told_from_others() {
+    fn image_names_are_recognised() {
         assert!(has_image_extension(Path::new("a/left01.JPG")));
         assert!(!has_image_extension(Path::new("times.csv")));
         assert!(!has_image_extension(Path::new("png")));

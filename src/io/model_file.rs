@@ -5,8 +5,7 @@ use std::{fs, io};
 
 use crate::document::Problems;
 use crate::identify::library::{Library, ModelEntry};
-use crate::identify::model_file;
-use crate::identify::model_file::ModelFile;
+use crate::identify::model_file::{self, ModelFile};
 
 /// A model that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -50,8 +49,8 @@ pub struct ModelFolder {
 }
 
 /// Reads every `.toml` of a folder, not of those within it. A file that is wrong
-/// does not hide the others: the caller tells of it, as a model that was meant to
-/// be found may be missed.
+/// does not hide the others; the caller reports it, because a model that a cell needs may be
+/// missing.
 pub fn read_library(folder: &Path) -> Result<ModelFolder, ModelFileError> {
     let failed = |what| ModelFileError::Folder { path: folder.to_owned(), what };
     let mut paths = Vec::new();

@@ -1,16 +1,17 @@
 //! Progress on standard error: a bar on a terminal, plain lines otherwise.
 
 use std::io::{IsTerminal, Write};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Work shorter than this gives no plain line.
+/// Time before the first plain line: short work prints none.
 const FIRST_LINE: Duration = Duration::from_secs(2);
-/// Time between plain lines.
+/// Time between plain lines, which trades the length of a log against news.
 const NEXT_LINE: Duration = Duration::from_secs(5);
 
-/// How far a piece of work has come.
+/// Progress of a task.
 #[derive(Debug)]
 pub struct Progress {
     bar: ProgressBar,
@@ -22,8 +23,8 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Begins; `what` is the work ("measuring"), `unit` what is counted
-    /// ("frames"). Says nothing if `quiet`.
+    /// Begins; `what` is the work ("measuring"), `unit` what is counted ("frames"). Prints
+    /// nothing if `quiet`.
     pub fn new(what: &'static str, unit: &'static str, total: Option<u64>, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let target = if terminal && !quiet {
@@ -59,10 +60,10 @@ impl Progress {
         self.set(self.bar.position() + 1);
     }
 
-    /// Writes a line above the bar, for a word on the way.
+    /// Writes a line above the bar.
     pub fn note(&self, line: &str) {
         self.bar.suspend(|| {
-            // Where standard error is gone there is nobody to tell.
+            // A closed standard error is no reason to stop.
             let _ = writeln!(std::io::stderr(), "{line}");
         });
     }
@@ -80,6 +81,27 @@ impl Progress {
         self.printed = true;
         let line = line(self.what, self.unit, done, self.bar.length(), self.bar.elapsed());
         let _ = writeln!(std::io::stderr(), "{line}{end}");
+    }
+}
+
+/// Progress of work that several threads do.
+#[derive(Debug)]
+pub struct SharedProgress(Mutex<Progress>);
+
+impl SharedProgress {
+    /// As [`Progress::new`], with a known total.
+    pub fn new(what: &'static str, unit: &'static str, total: u64, quiet: bool) -> Self {
+        Self(Mutex::new(Progress::new(what, unit, Some(total), quiet)))
+    }
+
+    /// One more is done.
+    pub fn advance(&self) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).advance();
+    }
+
+    /// As [`Progress::finish`].
+    pub fn finish(self) {
+        self.0.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
     }
 }
 

@@ -52,7 +52,7 @@ pub use tap::FrameTap;
 use writer::{WriterInputs, WriterThread};
 
 /// The recorder as the control thread holds it. Dropping it finishes the
-/// recording as [`Self::finish`] does, but tells nobody how that went.
+/// recording as [`Self::finish`] does, without a report.
 pub struct RecorderHandle {
     next: u64,
     /// Whether a full queue is waited for.
@@ -215,7 +215,7 @@ impl RecorderHandle {
     /// whose end is the writer's.
     fn close(&mut self) -> Option<RecordReport> {
         let writer = self.writer.take()?;
-        // An encoder that has already ended needs no telling.
+        // The encoder may have ended already.
         self.tap.jobs.send(FrameJob::Close).unwrap_or_default();
         self.answered = None;
         writer.join().ok()

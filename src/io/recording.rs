@@ -1,4 +1,4 @@
-//! Reads recordings back: finished or cut short, this program's or another's.
+//! Reads recordings: finished or cut short, of this program or another.
 //! A recording is read from its beginning to its end, a chunk at a time, so
 //! that one of many gigabytes needs no more memory than a short one.
 
@@ -19,14 +19,14 @@ use messages::{Item, Message, Messages, Topic};
 pub use stream::Integrity;
 
 use super::recorder::format::{
-    CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, EVENT_TOPIC, EventRow, FORMAT_VERSION, IMAGE_TOPIC,
-    RUN_METADATA, RunInfo, STEP_TOPIC, StepRow,
+    CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, EVENT_TOPIC, EventMessage, FORMAT_VERSION,
+    IMAGE_TOPIC, RUN_METADATA, RunInfo, STEP_TOPIC, StepMessage,
 };
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::Stamp;
 
-/// Bytes that are read ahead.
+/// Bytes that are read ahead: some pages of the file, for fewer calls of the system.
 const BUFFER_BYTES: usize = 1 << 16;
 
 /// Why a recording cannot be read, or not on.
@@ -89,22 +89,22 @@ pub enum RecordingError {
 /// Something that was recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RecordedEntry {
-    /// What the controller was told.
+    /// An event.
     Event {
         /// Counts the events of the run from 0.
         n: u64,
-        /// When it was told.
+        /// Time at which the controller takes it.
         now: Stamp,
-        /// What.
+        /// The event.
         event: Event,
     },
-    /// What it answered.
+    /// The step that answers an event.
     Step {
         /// Number of the event.
         n: u64,
-        /// When it was told.
+        /// Time at which the controller takes it.
         now: Stamp,
-        /// What it answered.
+        /// The step.
         step: Box<Step>,
     },
     /// A frame, still encoded as `foxglove.CompressedImage`.
@@ -242,20 +242,14 @@ impl Recording {
         };
         Ok(match message.topic.name.as_str() {
             EVENT_TOPIC => {
-                let row: EventRow = serde_json::from_slice(&message.data).map_err(bad)?;
-                Some(RecordedEntry::Event {
-                    n: row.n,
-                    now: Stamp::from_ns(row.now_ns),
-                    event: row.event,
-                })
+                let EventMessage { n, now_ns, event } =
+                    serde_json::from_slice(&message.data).map_err(bad)?;
+                Some(RecordedEntry::Event { n, now: Stamp::from_ns(now_ns), event })
             }
             STEP_TOPIC => {
-                let row: StepRow = serde_json::from_slice(&message.data).map_err(bad)?;
-                Some(RecordedEntry::Step {
-                    n: row.n,
-                    now: Stamp::from_ns(row.now_ns),
-                    step: Box::new(row.step),
-                })
+                let StepMessage { n, now_ns, step, .. } =
+                    serde_json::from_slice(&message.data).map_err(bad)?;
+                Some(RecordedEntry::Step { n, now: Stamp::from_ns(now_ns), step: Box::new(step) })
             }
             IMAGE_TOPIC => Some(RecordedEntry::Frame(message)),
             _ => None,

@@ -11,13 +11,13 @@ use crate::io::recording::{RecordedEntry, RecordingError};
 pub struct Difference {
     /// Number of the event.
     pub n: u64,
-    /// When the controller was told.
+    /// Time at which the controller takes it.
     pub now: Stamp,
-    /// What it was told.
+    /// The event.
     pub event: Event,
-    /// What it answered in the run.
+    /// The step of the run.
     pub recorded: Step,
-    /// What it answers now.
+    /// The step of the replay.
     pub replayed: Step,
 }
 
@@ -27,7 +27,7 @@ pub struct Difference {
 pub struct MissingEvents {
     /// First event that is missing, with its step or without.
     pub expected: u64,
-    /// Event or step that stands in its place.
+    /// Event or step that comes instead.
     pub found: u64,
 }
 

@@ -9,7 +9,7 @@ use crossbeam_channel::{Receiver, Sender, unbounded};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
-/// Tells that the command is to end.
+/// A request to end the command.
 #[derive(Debug, Clone)]
 pub struct StopSignal {
     requested: Arc<AtomicBool>,
@@ -46,7 +46,7 @@ fn wait(signals: &mut Signals, requested: &AtomicBool, sender: &Sender<()>) {
             // The person insists; 128 + the signal is what a shell would say.
             std::process::exit(128 + signal);
         }
-        // Where standard error is gone there is nobody to tell.
+        // A closed standard error is no reason to fail.
         let _ = writeln!(io::stderr(), "ending in order; once more ends at once");
         if sender.send(()).is_err() {
             return;

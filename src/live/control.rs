@@ -192,7 +192,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
             return;
         }
         let words = match &step.state {
-            State::Holding(why) => format!("holding: {}", names::in_words(names::hold(why))),
+            State::Holding(why) => format!("holding: {}", names::in_words(names::of(why))),
             State::Fault(why) => format!("fault: {}", names::in_words(&names::fault(why))),
             state => state.name().to_owned(),
         };

@@ -1,19 +1,19 @@
-//! `report.html` of a calibration: where boards were seen, what is left between seen
-//! and expected, and what a width is known to, all over the picture.
+//! `report.html` of a calibration: where boards were seen, residuals of the corners, and the
+//! standard deviation of a width over the image.
 
 pub mod cell;
 mod drawing;
 
 use maud::{Markup, html};
 
-use super::html::reloading_page;
+use super::html::{reloading_page, titled};
 use crate::calibration::board::Board;
-use crate::calibration::board_observation::Observations;
+use crate::calibration::board_observation::{BoardObservation, Observations};
 use crate::calibration::next_view::NextView;
+use crate::calibration::rejection::BoardRejection;
 use crate::calibration::solve::Solution;
 use crate::calibration::warnings;
-use crate::calibration::width_map;
-use crate::calibration::width_map::WidthMap;
+use crate::calibration::width_map::{self, WidthMap};
 use crate::core::geometry::GridSize;
 use drawing::{Drawing, residuals, width_map};
 
@@ -22,21 +22,22 @@ use drawing::{Drawing, residuals, width_map};
 pub struct CalibrationPage<'a> {
     /// The board.
     pub board: &'a Board,
-    /// What became of each picture.
+    /// The board in each image, or why it was rejected.
     pub images: &'a Observations,
     /// The camera.
     pub solution: &'a Solution,
-    /// What a width is known to, a surface each; empty where that cannot be told.
+    /// Standard deviation of a width, one map for each surface; empty where it cannot be
+    /// determined.
     pub maps: &'a [WidthMap],
     /// The largest standard deviation that is allowed \[mm\].
     pub limit_mm: Option<f64>,
-    /// What one more picture would bring.
+    /// The further image that would help most.
     pub next: Option<&'a NextView>,
     /// The whole answer as text.
     pub text: &'a str,
     /// The calibration file.
     pub calibration_file: &'a str,
-    /// Seconds after which the page loads itself anew, while pictures are still taken.
+    /// Seconds after which the page reloads itself, while images are still taken.
     pub reload_s: Option<u32>,
 }
 
@@ -45,16 +46,14 @@ impl CalibrationPage<'_> {
     pub fn page(&self) -> String {
         let title = format!("Calibration {}", self.calibration_file);
         let body = html! {
-            h1 { (title) }
             (self.about())
             (self.verdict())
             (self.maps())
             (self.coverage())
             (self.views())
             section { h2 { "The answer as text" } pre.wide { (self.text) } }
-            footer { "Written by truebead " (env!("CARGO_PKG_VERSION")) "." }
         };
-        reloading_page(&title, self.reload_s, &body).into_string()
+        reloading_page(&title, self.reload_s, &titled(&title, &body, ".")).into_string()
     }
 
     fn about(&self) -> Markup {
@@ -65,12 +64,12 @@ impl CalibrationPage<'_> {
         html! {
             div.about {
                 span { (kind) " " b { (columns) "x" (rows) " corners, " (self.board.square()) } }
-                span { "pictures " b { (self.solution.views.len()) " of " (self.images.len()) } }
+                span { "images " b { (self.solution.views.len()) " of " (self.images.len()) } }
                 span { "size " b { (width) "x" (height) " px" } }
                 span { "lens " b { (model) } }
                 span { "reprojection error " b { (format!("{:.3} px", self.solution.rms_px)) } }
                 @if let Some(px) = self.solution.cross_validation_px {
-                    span { "held out " b { (format!("{px:.3} px")) } }
+                    span { "left out " b { (format!("{px:.3} px")) } }
                 }
             }
         }
@@ -91,15 +90,15 @@ impl CalibrationPage<'_> {
                 @match (worst, self.maps.first()) {
                     (Some(worst), Some(map)) => {
                         (format!(
-                            "The width of a bead of {} mm is known to {worst:.4} mm (one standard \
-                             deviation) or better where boards were seen", map.bead_mm
+                            "The uncertainty of the width of a bead of {} mm is {worst:.4} mm (1 sigma) or \
+                             less where boards were seen", map.bead_mm
                         ))
                         @if let Some(limit) = self.limit_mm {
                             (format!("; {limit} mm is allowed"))
                         }
                         "."
                     }
-                    _ => "How well a width is known cannot be determined from these images."
+                    _ => "The uncertainty of a width cannot be determined from these images."
                 }
                 ul {
                     @for warning in &warnings { li { (warning) } }
@@ -121,7 +120,7 @@ impl CalibrationPage<'_> {
         html! {
             @for map in self.maps {
                 section {
-                    h2 { "What a width is known to, " (map.surface_height) " above the bed" }
+                    h2 { "Uncertainty of a width, " (map.surface_height) " above the bed" }
                     p.hint {
                         (format!(
                             "Standard deviation of the width of a bead of {} mm [mm] whose middle is \
@@ -142,11 +141,11 @@ impl CalibrationPage<'_> {
         let times = drawing::magnification(self.solution);
         html! {
             section {
-                h2 { "Where boards were seen, and what is left there" }
+                h2 { "Where boards were seen, and the residuals there" }
                 p.hint {
-                    "Each corner of each image, with its way from where the model expects it, "
+                    "Each corner of each image, with its residual from the expected position, "
                     (format!("drawn {times:.0} times as long. "))
-                    "Ways that point the same in one part of the image are the lens's, ways that \
+                    "Residuals that point the same in one part of the image are the lens's, residuals that \
                      point the same on one board are the board's or its motion's."
                 }
                 (residuals(self.solution, times))
@@ -166,7 +165,7 @@ impl CalibrationPage<'_> {
                             th.number { "largest [px]" } th.number { "tilt [°]" }
                             th.number { "blur [px]" } th { "" }
                         }
-                        @for (name, look) in self.images { (self.view(name, look, largest)) }
+                        @for (name, observed) in self.images { (self.view(name, observed, largest)) }
                     }
                 }
             }
@@ -176,24 +175,21 @@ impl CalibrationPage<'_> {
     fn view(
         &self,
         name: &str,
-        look: &Result<
-            crate::calibration::board_observation::BoardObservation,
-            crate::calibration::rejection::BoardRejection,
-        >,
+        observed: &Result<BoardObservation, BoardRejection>,
         largest: f64,
     ) -> Markup {
         let view = self.solution.views.iter().find(|view| view.name == name);
         html! {
             tr {
                 td { (name) }
-                @match (look, view) {
-                    (Ok(sighting), Some(view)) => {
+                @match (observed, view) {
+                    (Ok(board), Some(view)) => {
                         td.number { (view.corners.len()) }
                         td.number { (format!("{:.3}", view.rms_px)) }
                         td.number { (format!("{:.3}", view.max_px)) }
                         td.number { (format!("{:.0}", warnings::tilt_deg(view))) }
                         td.number {
-                            @if let Some(focus) = sighting.focus {
+                            @if let Some(focus) = board.focus {
                                 (format!("{:.1} × {:.1}", focus.along_rows_px, focus.along_columns_px))
                             }
                         }

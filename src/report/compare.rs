@@ -1,17 +1,13 @@
-//! Controllers beside each other: a table, `compare.json` and a page.
+//! Comparison of controllers: a table, `compare.json` and a page.
 
 use std::fmt::Write as _;
 
 use maud::{Markup, html};
 use serde::Serialize;
 
-use super::chart::area::{Area, XAxis};
-use super::chart::legend::legend;
-use super::chart::palette;
-use super::chart::palette::Ink;
-use super::chart::plot::{Plot, PlotLayer, y_range};
-use super::chart::series::Curve;
-use super::html::whole_page;
+use super::chart::{Ink, PlotCurve, PlotLayer, XAxis, legend, palette, wide_plot, y_range};
+use super::html::titled_page;
+use crate::numeric::statistics::as_f64;
 use crate::trials::compare::{Figures, JUDGED_AFTER_MM, SIGMA_AFTER_MM, SeedStatistics};
 
 /// One number of one controller at one width, as `compare.json` has it.
@@ -19,9 +15,9 @@ use crate::trials::compare::{Figures, JUDGED_AFTER_MM, SIGMA_AFTER_MM, SeedStati
 pub struct ComparedNumber {
     /// The controller.
     pub controller: String,
-    /// Width that was asked for \[mm\].
+    /// Target width \[mm\].
     pub width_mm: f64,
-    /// What was found.
+    /// The quantity.
     pub quantity: &'static str,
     /// Its unit.
     pub unit: &'static str,
@@ -33,7 +29,7 @@ pub struct ComparedNumber {
     pub median: Option<f64>,
 }
 
-/// All that was compared.
+/// The figures of all controllers.
 #[derive(Debug)]
 pub struct ControllerComparison {
     /// Names of the controllers.
@@ -44,37 +40,41 @@ pub struct ControllerComparison {
     pub widths: Vec<(f64, Vec<Figures>)>,
 }
 
-/// What is told of a controller: name, unit, and how it is told.
-const QUANTITIES: [(&str, &str, Average); 6] = [
-    ("mean size of the error", "mm", Average::Mean),
-    ("RMS error", "mm", Average::Mean),
-    ("RMS error over that of the first", "1", Average::Mean),
-    ("settled within 0.5 mm after", "mm", Average::Median),
-    ("integral of the error's size", "mm²", Average::Mean),
-    ("scatter once settled", "mm", Average::Mean),
+/// A quantity of a controller: its name, its unit, how seeds are averaged, and its value.
+struct Quantity(&'static str, &'static str, Average, fn(&Figures) -> SeedStatistics);
+
+/// The quantities that are compared.
+const QUANTITIES: [Quantity; 6] = [
+    Quantity("mean size of the error", "mm", Average::Mean, |one| one.mean_error_mm),
+    Quantity("RMS error", "mm", Average::Mean, |one| one.rms_error_mm),
+    Quantity("RMS error over that of the first", "1", Average::Mean, |one| one.ratio),
+    Quantity("settled within 0.5 mm after", "mm", Average::Median, |one| one.settled_mm),
+    Quantity("integral of the error's size", "mm²", Average::Mean, |one| one.integral_mm2),
+    Quantity("scatter once settled", "mm", Average::Mean, |one| one.sigma_mm),
 ];
 
-/// What is told of controllers that failed.
+impl Quantity {
+    /// Its name with its unit.
+    fn title(&self) -> String {
+        if self.1 == "1" { self.0.to_owned() } else { format!("{} [{}]", self.0, self.1) }
+    }
+
+    /// Its average over the seeds of a controller.
+    fn average(&self, figures: &Figures) -> String {
+        average(&(self.3)(figures), self.2)
+    }
+}
+
+/// Name of the number of seeds that failed.
 const FAILED: &str = "seeds never controlled, or stopped";
 
-/// How a number over seeds is told in a table.
+/// How a number over seeds is averaged in a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Average {
     /// Mean and confidence.
     Mean,
     /// Median: some seeds may have none.
     Median,
-}
-
-fn estimates(figures: &Figures) -> [SeedStatistics; 6] {
-    [
-        figures.mean_error_mm,
-        figures.rms_error_mm,
-        figures.ratio,
-        figures.settled_mm,
-        figures.integral_mm2,
-        figures.sigma_mm,
-    ]
 }
 
 fn average(estimate: &SeedStatistics, how: Average) -> String {
@@ -87,7 +87,7 @@ fn average(estimate: &SeedStatistics, how: Average) -> String {
     }
 }
 
-/// Digits that are worth comparing: thousandths below 2, tenths from 20 on.
+/// Thousandths below 2, hundredths below 20, tenths from there on.
 fn short(value: f64) -> String {
     match value.abs() {
         size if size < 2.0 => format!("{value:.3}"),
@@ -102,28 +102,19 @@ impl ControllerComparison {
         let mut numbers = Vec::new();
         for (width_mm, all) in &self.widths {
             for (controller, figures) in self.controllers.iter().zip(all) {
-                #[expect(clippy::cast_precision_loss, reason = "seeds are few")]
-                let failed = Some(figures.failed_seeds as f64);
-                numbers.push(ComparedNumber {
+                let number = |quantity, unit, over: SeedStatistics| ComparedNumber {
                     controller: controller.clone(),
                     width_mm: *width_mm,
-                    quantity: FAILED,
-                    unit: "1",
-                    mean: failed,
-                    confidence_95: None,
-                    median: failed,
-                });
-                for ((quantity, unit, _), estimate) in QUANTITIES.iter().zip(estimates(figures)) {
-                    numbers.push(ComparedNumber {
-                        controller: controller.clone(),
-                        width_mm: *width_mm,
-                        quantity,
-                        unit,
-                        mean: estimate.mean,
-                        confidence_95: estimate.confidence,
-                        median: estimate.median,
-                    });
-                }
+                    quantity,
+                    unit,
+                    mean: over.mean,
+                    confidence_95: over.confidence,
+                    median: over.median,
+                };
+                let failed = Some(as_f64(figures.failed_seeds as u64));
+                let failed = SeedStatistics { mean: failed, confidence: None, median: failed };
+                numbers.push(number(FAILED, "1", failed));
+                numbers.extend(QUANTITIES.iter().map(|one| number(one.0, one.1, (one.3)(figures))));
             }
         }
         numbers
@@ -139,10 +130,9 @@ impl ControllerComparison {
             let head = format!("{width} mm");
             let _ = write!(text, "  {head:>16}");
         }
-        for (at, (quantity, unit, how)) in QUANTITIES.iter().enumerate() {
-            let unit = if *unit == "1" { String::new() } else { format!(" [{unit}]") };
-            let _ = write!(text, "\n{quantity}{unit}\n");
-            self.lines(&mut text, widest, |found| average(&estimates(found)[at], *how));
+        for quantity in &QUANTITIES {
+            let _ = write!(text, "\n{}\n", quantity.title());
+            self.lines(&mut text, widest, |found| quantity.average(found));
         }
         if self.has_failures() {
             let _ = writeln!(text, "\n{FAILED}");
@@ -170,10 +160,9 @@ impl ControllerComparison {
     /// The page.
     pub fn page(&self) -> String {
         let body = html! {
-            h1 { "Controllers beside each other" }
             p.hint { "The same bead and the same disturbances for all, " (self.seeds) " seeds each. \
                 Errors are those of the bead itself, from " (JUDGED_AFTER_MM) " mm after control \
-                began, scatter from " (SIGMA_AFTER_MM) " mm after; ± is 95 % confidence of the mean \
+                began, standard deviations from " (SIGMA_AFTER_MM) " mm after; ± is 95 % confidence of the mean \
                 over seeds. Where it settled is the median." }
             section {
                 h2 { "Numbers" }
@@ -185,10 +174,8 @@ impl ControllerComparison {
                     (self.draw(*width, all))
                 }
             }
-            footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
-                ". The numbers are in compare.json." }
         };
-        whole_page("Controllers beside each other", &body).into_string()
+        titled_page("Controllers beside each other", &body, ". The numbers are in compare.json.")
     }
 
     fn table(&self) -> Markup {
@@ -198,38 +185,31 @@ impl ControllerComparison {
                     th { "quantity" } th { "controller" }
                     @for (width, _) in &self.widths { th.number { (width) " mm" } }
                 } }
-                tbody { @for (at, (quantity, unit, how)) in QUANTITIES.iter().enumerate() {
-                    @for (who, name) in self.controllers.iter().enumerate() { tr {
-                        td { @if who == 0 {
-                            (quantity) @if *unit != "1" { " [" (unit) "]" }
-                        } }
-                        td { (name) }
-                        @for (_, all) in &self.widths { td.number {
-                            @if let Some(found) = all.get(who) {
-                                (average(&estimates(found)[at], *how))
-                            }
-                        } }
-                    } }
+                tbody { @for quantity in &QUANTITIES {
+                    (self.rows(&quantity.title(), |found| quantity.average(found)))
                 } }
                 @if self.has_failures() {
-                    tbody { @for (who, name) in self.controllers.iter().enumerate() { tr {
-                        td { @if who == 0 { (FAILED) } }
-                        td { (name) }
-                        @for (_, all) in &self.widths { td.number {
-                            @if let Some(found) = all.get(who) { (found.failed_seeds) }
-                        } }
-                    } } }
+                    tbody { (self.rows(FAILED, |found| found.failed_seeds.to_string())) }
                 }
             }
         }
     }
 
+    /// A row for each controller with a word for each width.
+    fn rows(&self, title: &str, word: impl Fn(&Figures) -> String) -> Markup {
+        html! { @for (who, name) in self.controllers.iter().enumerate() { tr {
+            td { @if who == 0 { (title) } }
+            td { (name) }
+            @for (_, all) in &self.widths { td.number { @if let Some(found) = all.get(who) { (word(found)) } } }
+        } } }
+    }
+
     fn draw(&self, width: f64, all: &[Figures]) -> Markup {
-        let errors: Vec<Curve> =
+        let errors: Vec<PlotCurve> =
             all.iter().map(|found| found.error_profile.iter().copied().collect()).collect();
-        let beads: Vec<Curve> =
+        let beads: Vec<PlotCurve> =
             all.iter().map(|found| found.example.iter().copied().collect()).collect();
-        let Some(range) = errors.iter().find_map(Curve::extent) else { return html! {} };
+        let Some(range) = errors.iter().find_map(PlotCurve::extent) else { return html! {} };
         let axis = XAxis::path(range);
         let name = format!("{width} mm");
         let target = PlotLayer::Level(width, palette::TARGET, name.as_str());
@@ -250,20 +230,13 @@ impl ControllerComparison {
 fn curves(
     axis: &XAxis,
     y_title: &str,
-    of: &[Curve],
+    of: &[PlotCurve],
     shown: &[f64],
     level: Option<PlotLayer<'_>>,
 ) -> Markup {
-    let all: Vec<&Curve> = of.iter().collect();
+    let all: Vec<&PlotCurve> = of.iter().collect();
     let curves = of.iter().zip(palette::CONTROLLERS).map(|(one, ink)| PlotLayer::Curve(one, ink));
-    let plot = Plot {
-        area: Area::wide(240.0),
-        x: axis,
-        y_title,
-        y_range: y_range(&all, shown),
-        layers: curves.chain(level).collect(),
-    };
-    plot.draw()
+    wide_plot(axis, y_title, 240.0, y_range(&all, shown), curves.chain(level).collect())
 }
 
 #[cfg(test)]

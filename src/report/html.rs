@@ -1,15 +1,30 @@
-//! The frame of every page: a head with its style sheet, which needs nothing but itself.
+//! The frame of every page: head, style sheet, title, verdict and footer. A page refers to no
+//! other file.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
 use super::chart::palette;
 
-/// A page that needs nothing but itself, around its content.
+/// A page around its content, without title and footer.
 pub fn whole_page(title: &str, body: &Markup) -> Markup {
     reloading_page(title, None, body)
 }
 
-/// The same; with a number of seconds after which it loads itself anew.
+/// A page with its title above its content and a footer that ends with `note`.
+pub fn titled_page(title: &str, body: &Markup, note: &str) -> String {
+    whole_page(title, &titled(title, body, note)).into_string()
+}
+
+/// The content of a page between its title and its footer.
+pub fn titled(title: &str, body: &Markup, note: &str) -> Markup {
+    html! {
+        h1 { (title) }
+        (body)
+        footer { "Written by truebead " (env!("CARGO_PKG_VERSION")) (note) }
+    }
+}
+
+/// A page that reloads itself after a number of seconds, where one is given.
 pub fn reloading_page(title: &str, reload_s: Option<u32>, body: &Markup) -> Markup {
     let style = include_str!("style.css");
     html! {
@@ -26,5 +41,67 @@ pub fn reloading_page(title: &str, reload_s: Option<u32>, body: &Markup) -> Mark
             }
             body { main { (body) } }
         }
+    }
+}
+
+/// How the subject of a page did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum VerdictLevel {
+    /// Nothing to worry about.
+    Good,
+    /// Something to look at.
+    Caution,
+    /// The task failed.
+    Bad,
+}
+
+impl VerdictLevel {
+    /// Good, or a reason for caution.
+    pub const fn with_caution(is_cautious: bool) -> Self {
+        if is_cautious { Self::Caution } else { Self::Good }
+    }
+}
+
+/// The verdict of a page: its level in one word, sentences, and a list of warnings.
+pub fn verdict(level: VerdictLevel, text: &impl Render, warnings: &[impl Render]) -> Markup {
+    let (class, word) = match level {
+        VerdictLevel::Good => ("good", "Good."),
+        VerdictLevel::Caution => ("caution", "Look closer."),
+        VerdictLevel::Bad => ("bad", "Failed."),
+    };
+    html! {
+        div class={ "verdict " (class) } {
+            b { (word) }
+            (text)
+            @if !warnings.is_empty() { ul { @for warning in warnings { li { (warning) } } } }
+        }
+    }
+}
+
+/// Names and values under a title.
+pub fn about<N: Render, V: Render>(facts: impl IntoIterator<Item = (N, V)>) -> Markup {
+    html! { div.about { @for (name, value) in facts { span { (name) " " b { (value) } } } } }
+}
+
+/// A number with so many decimals; a dash where there is none.
+pub fn number(value: Option<f64>, places: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.places$}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_verdict_has_its_level_and_its_warnings() {
+        let warned = verdict(VerdictLevel::with_caution(true), &"Text.", &["a", "b"]);
+        assert_eq!(
+            warned.into_string(),
+            "<div class=\"verdict caution\"><b>Look closer.</b>Text.\
+             <ul><li>a</li><li>b</li></ul></div>"
+        );
+        let none: [&str; 0] = [];
+        let good = verdict(VerdictLevel::with_caution(false), &"Text.", &none).into_string();
+        assert!(good.contains("good") && !good.contains("<ul>"), "{good}");
     }
 }

@@ -1,5 +1,4 @@
-//! A model from logged data: what was found, whether it can be trusted, and the
-//! files that tell it.
+//! A model from logged data: fit, validation, and the files with the result.
 
 mod curves;
 mod json;
@@ -24,24 +23,24 @@ pub use page::page;
 pub use refusal::NoModel;
 pub use table::text;
 
-/// A gain that differs by so many standard errors and by this share of itself
-/// once a line in time is taken off is that of a drift…
+/// A gain that changes by more standard errors and by a larger fraction than this once a linear
+/// drift is removed is that of the drift…
 const CERTAIN_SIGMAS: f64 = 5.0;
 const CERTAIN_FRACTION: f64 = 0.2;
-/// …and one that differs by so much may be.
+/// …and one that changes by more than this may be.
 const LIKELY_SIGMAS: f64 = 4.0;
 const LIKELY_FRACTION: f64 = 0.03;
 
-/// Lags of the residuals that are looked at, at most.
+/// Largest number of lags of the residuals' autocorrelation.
 const LAGS: usize = 300;
 
-/// Fits all forms and takes one, or says why none can be trusted.
+/// Fits all forms and chooses one. Fails with the reasons where none is accepted.
 pub fn study(logs: Logs, forms: &[FitSettings]) -> Result<ModelStudy, NoModel> {
     let estimation = samples(&logs.estimation)?;
     let validation = logs.validation.as_ref().map(|(data, _)| samples(data)).transpose()?;
     let before =
         if logs.from_rest { InitialCondition::SettledAtFirst } else { InitialCondition::Unknown };
-    // What is left of one log does not begin at rest.
+    // The last part of a log does not begin at rest.
     let is_rest_of_it = logs.validation.as_ref().is_some_and(|(_, from)| *from == logs.source);
     let before_validation = if is_rest_of_it { InitialCondition::Unknown } else { before };
     let held = logs.estimation.input_is_held;
@@ -93,8 +92,8 @@ pub fn study(logs: Logs, forms: &[FitSettings]) -> Result<ModelStudy, NoModel> {
 
 /// Whether a model's gain is that of a drift.
 fn is_drift_gain(steady: &DetrendedGain, fit: &Fit) -> bool {
-    let (sigmas, share) = steady.difference(fit.model.dc_gain());
-    sigmas > CERTAIN_SIGMAS && share > CERTAIN_FRACTION
+    let (sigmas, fraction) = steady.difference(fit.model.dc_gain());
+    sigmas > CERTAIN_SIGMAS && fraction > CERTAIN_FRACTION
 }
 
 fn samples(data: &Experiment) -> Result<Samples, SamplesError> {
@@ -122,11 +121,11 @@ fn none(comparison: &ModelComparison, logs: &Logs) -> NoModel {
     NoModel::None { forms: comparison.rows.iter().map(refused).collect(), drift }
 }
 
-/// What is said of a gain that a drift may have moved.
+/// Warning of a gain that a drift may have changed.
 fn other_gain(study: &ModelStudy, steady: &DetrendedGain) -> Option<String> {
     let gain = study.fit.model.dc_gain();
-    let (sigmas, share) = steady.difference(gain);
-    (sigmas > LIKELY_SIGMAS && share > LIKELY_FRACTION).then(|| {
+    let (sigmas, fraction) = steady.difference(gain);
+    (sigmas > LIKELY_SIGMAS && fraction > LIKELY_FRACTION).then(|| {
         format!(
             "the gain is {gain:.4}, but {:.4} ± {:.4} once a straight line in time is taken off \
              input and output: the output drifts, and the model follows it in part",

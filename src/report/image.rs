@@ -1,5 +1,4 @@
-//! A frame with the found edges drawn in, where they were found to a fraction
-//! of a pixel.
+//! A frame with the measured edges drawn in, to a fraction of a pixel.
 
 mod canvas;
 
@@ -11,22 +10,22 @@ use crate::core::geometry::{ImagePoint, Roi};
 use crate::vision::{Edges, Gauge, WidthMeasurement};
 use canvas::Canvas;
 
-/// Longest side of a picture \[px\].
+/// Longest side of a drawing \[px\], which trades detail against the size of a page.
 const SIDE: usize = 720;
-/// A small gauge is enlarged by at most this.
+/// Largest magnification of a small gauge.
 const MAX_SCALE: f64 = 6.0;
-/// A picture whose brightest pixel is darker than this is brightened.
+/// An image whose brightest pixel is darker than this is brightened \[grey levels\].
 const DARK: u8 = 110;
 const WHITE: Rgb = [255, 255, 255];
 const BLACK: Rgb = [0, 0, 0];
 
-/// The surroundings of the gauge, cut out of a frame, with what was found
-/// there. Of bounded size, whatever the camera.
+/// The surroundings of the gauge, cut out of a frame, with the result of the measurement. Its
+/// size is bounded, whatever the camera.
 #[derive(Debug, Clone)]
-pub struct Snapshot {
+pub struct GaugeCutout {
     /// Number of the frame.
     pub frame: u64,
-    /// What was found, or why it was refused.
+    /// The measurement, or the status of a rejected frame.
     pub outcome: Result<WidthMeasurement, &'static str>,
     cut: image::GrayImage,
     /// Top left corner of the cut in the frame, and pixels of the cut for
@@ -38,7 +37,7 @@ pub struct Snapshot {
     right: Vec<ImagePoint>,
 }
 
-impl Snapshot {
+impl GaugeCutout {
     /// Cuts a snapshot out of a frame.
     pub fn take(
         frame: &Frame,
@@ -93,8 +92,8 @@ impl Snapshot {
         Some(bytes)
     }
 
-    /// From raw image pixels to pixels of the drawing. The borders of the
-    /// pixels fall together, not their centres.
+    /// From raw image pixels to pixels of the drawing. The outlines of the pixels coincide, not
+    /// their centres.
     fn position(&self, point: ImagePoint, enlarge: f64) -> (f64, f64) {
         let scale = self.scale * enlarge;
         let along = |value: f64, corner: usize| (value + 0.5 - as_f64(corner)) * scale - 0.5;
@@ -131,17 +130,6 @@ impl Snapshot {
     }
 }
 
-/// A frame with the gauge, the edges and the width drawn in, cut to the
-/// surroundings of the gauge, as a PNG; none if it cannot be encoded.
-pub fn draw(
-    frame: &Frame,
-    gauge: &Gauge,
-    edges: Option<Edges<'_>>,
-    outcome: Result<WidthMeasurement, &'static str>,
-) -> Option<Vec<u8>> {
-    Snapshot::take(frame, gauge, edges, outcome).png()
-}
-
 /// The gauge and a margin around it, within the image: corner and size. The
 /// whole image where the gauge lies outside of it.
 fn surroundings(roi: Roi, (width, height): (usize, usize)) -> ((usize, usize), (usize, usize)) {
@@ -156,7 +144,7 @@ fn surroundings(roi: Roi, (width, height): (usize, usize)) -> ((usize, usize), (
 
 type CutOut = ((usize, usize), (usize, usize));
 
-/// Cuts out a part and makes it smaller if it is too large; tells the scale.
+/// Cuts out a part and makes it smaller if it is too large; returns it with its scale.
 fn cut_out(frame: &Frame, ((x, y), (width, height)): CutOut) -> (image::GrayImage, f64) {
     let grey = frame.to_grey8();
     let rows = grey.chunks_exact(frame.width()).skip(y).take(height);
@@ -173,7 +161,7 @@ fn cut_out(frame: &Frame, ((x, y), (width, height)): CutOut) -> (image::GrayImag
     (small, scale)
 }
 
-/// A dark picture is of no use to a reader.
+/// Stretches the grey levels of a dark image, in which a reader would see nothing.
 fn brightened(mut grey: image::GrayImage) -> image::GrayImage {
     let brightest = grey.pixels().map(|pixel| pixel.0[0]).max().unwrap_or(255);
     if (1..DARK).contains(&brightest) {

@@ -1,5 +1,4 @@
-//! What a recording says of a bead: where the robot was, and the widths that were
-//! measured meanwhile.
+//! A bead in a recording: the robot's reports and the measured widths.
 
 use crate::control::event::Event;
 use crate::core::robot::RobotState;

@@ -1,10 +1,9 @@
-//! `overlays/`: every frame with its gauge and edges drawn in, for whoever wants to
-//! see with their own eyes what was measured.
+//! `overlays/`: every frame with its gauge and edges drawn in, to check measurements by eye.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::image;
+use super::image::GaugeCutout;
 use crate::core::frame::Frame;
 use crate::rows::output::{LogError, write_whole};
 use crate::vision::{Edges, Gauge, WidthMeasurement};
@@ -38,9 +37,8 @@ impl OverlayWriter {
         edges: Edges<'_>,
         outcome: Result<WidthMeasurement, &'static str>,
     ) -> Result<(), LogError> {
-        let Some(png) = image::draw(frame, &self.gauge, Some(edges), outcome) else {
-            return Ok(());
-        };
+        let cutout = GaugeCutout::take(frame, &self.gauge, Some(edges), outcome);
+        let Some(png) = cutout.png() else { return Ok(()) };
         write_whole(&self.folder, &name(frame.seq, outcome), &png).map(drop)
     }
 }

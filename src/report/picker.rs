@@ -1,21 +1,22 @@
-//! Chooses some frames for the report while they pass by: the first, the
-//! least sure, some refused ones, and a spread over the whole run.
+//! Chooses some frames for the report during the run: the first, the most uncertain, some
+//! rejected ones, and an even spread over the run.
 
-use super::image::Snapshot;
+use super::image::GaugeCutout;
 use crate::core::frame::Frame;
 use crate::rows::frame_row::FrameRow;
 use crate::rows::names::in_words;
 use crate::vision::{Edges, Gauge};
 
-/// Most pictures in a report.
+/// Largest number of frames in a report, which trades detail against the size of the page.
 const MAX_FRAMES: usize = 12;
-/// Refused frames among them, each for another reason.
+/// Largest number of rejected frames among them, each with another reason.
 const MAX_REJECTED_FRAMES: usize = 4;
-/// Snapshots of the spread that are kept before every second is let go.
+/// Frames of the even spread that are kept before every second one is dropped.
 const MAX_SPREAD_FRAMES: usize = 16;
-/// A frame replaces the least sure one only if it is clearly less sure, so
-/// that a slow drift does not copy every frame.
+/// Ratio of standard deviations from which a frame replaces the most uncertain one, so that a
+/// slow drift does not copy every frame.
 const MIN_SIGMA_RATIO: f64 = 1.05;
+/// Quality of the images of a page (1 to 100), which trades detail against its size.
 const JPEG_QUALITY: u8 = 82;
 
 /// A frame of the report.
@@ -29,22 +30,22 @@ pub struct ChosenFrame {
     pub jpeg: Vec<u8>,
 }
 
-/// A snapshot with its time and why it was kept.
+/// A frame with its time and the reason for which it is kept.
 #[derive(Debug, Clone)]
-struct KeptSnapshot {
-    snapshot: Snapshot,
+struct KeptCutout {
+    snapshot: GaugeCutout,
     time_s: Option<f64>,
     why: &'static str,
 }
 
-/// Keeps a bounded number of snapshots.
+/// Keeps a bounded number of frames.
 #[derive(Debug)]
 pub struct FramePicker {
     gauge: Gauge,
-    first: Option<KeptSnapshot>,
-    largest_sigma: Option<(f64, KeptSnapshot)>,
-    rejected: Vec<KeptSnapshot>,
-    spread: Vec<KeptSnapshot>,
+    first: Option<KeptCutout>,
+    largest_sigma: Option<(f64, KeptCutout)>,
+    rejected: Vec<KeptCutout>,
+    spread: Vec<KeptCutout>,
     stride: u64,
     measured: u64,
 }
@@ -63,11 +64,11 @@ impl FramePicker {
         }
     }
 
-    /// A frame that was looked at; most are let go at once.
+    /// Takes a frame; most are dropped at once.
     pub fn offer(&mut self, row: &FrameRow, frame: &Frame, edges: Option<Edges<'_>>) {
         let gauge = self.gauge;
-        let keep = |why| KeptSnapshot {
-            snapshot: Snapshot::take(frame, &gauge, edges, row.outcome),
+        let keep = |why| KeptCutout {
+            snapshot: GaugeCutout::take(frame, &gauge, edges, row.outcome),
             time_s: row.time_s,
             why,
         };
@@ -86,7 +87,7 @@ impl FramePicker {
         }
         let sigma = measured.sigma.get();
         if self.largest_sigma.as_ref().is_none_or(|(most, _)| sigma > most * MIN_SIGMA_RATIO) {
-            self.largest_sigma = Some((sigma, keep("least sure")));
+            self.largest_sigma = Some((sigma, keep("largest sigma")));
         }
         if self.measured.is_multiple_of(self.stride) {
             self.spread.push(keep(""));
@@ -104,7 +105,7 @@ impl FramePicker {
 
     /// The chosen frames in their order, drawn.
     pub fn finish(self) -> Vec<ChosenFrame> {
-        let mut chosen: Vec<KeptSnapshot> = self.rejected;
+        let mut chosen: Vec<KeptCutout> = self.rejected;
         chosen.extend(self.first);
         let least_sure = self.largest_sigma.map(|(_, kept)| kept);
         if let Some(kept) = least_sure.filter(|kept| is_new(&chosen, kept)) {
@@ -122,7 +123,7 @@ impl FramePicker {
 }
 
 /// A frame is not shown twice.
-fn is_new(chosen: &[KeptSnapshot], kept: &KeptSnapshot) -> bool {
+fn is_new(chosen: &[KeptCutout], kept: &KeptCutout) -> bool {
     chosen.iter().all(|other| other.snapshot.frame != kept.snapshot.frame)
 }
 
@@ -132,7 +133,7 @@ fn evenly(count: usize, wanted: usize) -> Vec<usize> {
     (1..=wanted).map(|part| part * count / wanted - 1).collect()
 }
 
-fn draw(kept: &KeptSnapshot) -> Option<ChosenFrame> {
+fn draw(kept: &KeptCutout) -> Option<ChosenFrame> {
     let mut parts = Vec::new();
     if let Some(time_s) = kept.time_s {
         parts.push(format!("{time_s:.2} s"));

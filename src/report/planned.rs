@@ -1,4 +1,4 @@
-//! What `truebead plan` leaves behind: `plan.csv` and a page.
+//! Results of `truebead plan`: `plan.csv` and a page.
 
 mod page;
 mod table;
@@ -13,32 +13,32 @@ use crate::plan::{Plan, SpeedProfile, WidthPrediction};
 /// A bead of a job, planned.
 #[derive(Debug)]
 pub struct PlannedBead {
-    /// What it is called, such as `line 3`; its place where nothing names it.
+    /// Its name, such as `line 3`; its position in the job where the job does not name it.
     pub name: String,
     /// The speed without a plan, as fast as the robot's acceleration allows.
     pub nominal: SpeedProfile,
     /// Path and position \[mm\], in order.
     pub position: Vec<(f64, [f64; 3])>,
-    /// The plan, with commands that count from [`Facts::idle`].
+    /// The plan, with commands relative to [`PlanFacts::idle`].
     pub plan: Plan,
-    /// What comes of it.
+    /// Prediction for the plan.
     pub planned: WidthPrediction,
-    /// What comes of the nominal speed with a constant command.
+    /// Prediction for the nominal speed with a constant command.
     pub constant: WidthPrediction,
-    /// What comes of it with a command in proportion to the speed.
+    /// Prediction for the nominal speed with a command in proportion to it.
     pub proportional: WidthPrediction,
 }
 
-/// What is the same for all beads.
+/// Facts that hold for all beads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlanFacts {
-    /// Width that is wanted \[mm\].
+    /// Target width \[mm\].
     pub width_mm: f64,
-    /// Section that is wanted \[mm²\].
+    /// Target cross-section \[mm²\].
     pub area_mm2: f64,
     /// Command at which the model has no flow, in its unit.
     pub idle: f64,
-    /// What is commanded.
+    /// Unit of the command.
     pub unit: Unit,
 }
 
@@ -49,13 +49,13 @@ impl PlannedBead {
     }
 }
 
-/// Root mean square of the width's error over beads, as a share of the width.
+/// Root mean square of the relative width error over beads.
 pub fn rms<'a>(
     beads: impl IntoIterator<Item = &'a PlannedBead>,
     of: fn(&PlannedBead) -> &WidthPrediction,
 ) -> f64 {
     let all = beads.into_iter().flat_map(|bead| of(bead).width.iter());
     let (sum, count) =
-        all.fold((0.0, 0.0), |(sum, count), (_, share)| (sum + share * share, count + 1.0));
+        all.fold((0.0, 0.0), |(sum, count), (_, error)| (sum + error * error, count + 1.0));
     if count > 0.0 { f64::sqrt(sum / count) } else { 0.0 }
 }

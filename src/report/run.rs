@@ -1,11 +1,10 @@
-//! `report.html` of a run: one page that needs nothing but itself.
+//! `report.html` of a run: one page that refers to no other file.
 
 mod charts;
 mod contents;
 mod distance;
 mod extruder;
 mod headline;
-mod layout;
 mod page;
 mod remedies;
 mod sections;

@@ -7,16 +7,18 @@ use pdf_writer::{Content, Name, Pdf, Rect, Ref, Str};
 use crate::calibration::board::Board;
 use crate::core::geometry::GridSize;
 
-/// Points of a PDF in a millimetre.
+/// Points of a PDF in a millimetre. By definition a point is 1/72 inch (ISO 32000-1, 8.3.2.3).
 const POINTS: f64 = 72.0 / 25.4;
-/// White between the squares and the paper's border \[mm\]: printers leave some, and
-/// the finder of boards needs a bright margin around the outer squares.
+/// White between the squares and the paper's edge \[mm\]: printers need some, and the
+/// detection of boards needs a bright margin around the outer squares.
 const MARGIN_MM: f64 = 8.0;
-/// Room below the squares for bar and words \[mm\].
+/// Height below the squares for bar and text \[mm\].
 const FOOT_MM: f64 = 24.0;
 /// Length of the bar, and of a short one on small paper \[mm\].
 const BAR_MM: [f64; 2] = [100.0, 50.0];
+/// Width of a line \[mm\].
 const LINE_MM: f64 = 0.3;
+/// Size of the letters \[mm\].
 const LETTERS_MM: f64 = 3.4;
 
 /// Paper, across.
@@ -93,28 +95,14 @@ impl BoardSheet {
         let bar = if has_room { BAR_MM[0] } else { BAR_MM[1] };
         let base = top + height + 14.0;
         black.extend(ruler(middle - bar / 2.0, base, bar));
-        let words = vec![
-            (
-                middle,
-                base + 5.0,
-                format!(
-                    "Print at 100 %. This bar is {bar} mm long; ten squares are {} mm. Measure both.",
-                    shown(10.0 * side)
-                ),
-            ),
-            (
-                middle,
-                base + 9.5,
-                format!(
-                    "truebead: --board {columns}x{rows} --square-mm {}{}",
-                    shown(side),
-                    options(board)
-                ),
-            ),
-        ];
+        let (ten, side, options) = (shown(10.0 * side), shown(side), options(board));
+        let check = format!(
+            "Print at 100 %. This bar is {bar} mm long; ten squares are {ten} mm. Measure both."
+        );
+        let command = format!("truebead: --board {columns}x{rows} --square-mm {side}{options}");
+        let words = vec![(middle, base + 5.0, check), (middle, base + 9.5, command)];
         let kind = if board.is_plain() { "Checkerboard" } else { "ChArUco board" };
-        let title =
-            format!("{kind}, {columns}x{rows} inner corners, squares of {} mm", shown(side));
+        let title = format!("{kind}, {columns}x{rows} inner corners, squares of {side} mm");
         Ok(Self { paper, title, black, words })
     }
 
@@ -129,25 +117,17 @@ impl BoardSheet {
              <path fill=\"#000\" shape-rendering=\"crispEdges\" d=\"",
             self.title
         );
-        for [x, y, width, height] in &self.black {
-            let _ = write!(
-                text,
-                "M{} {}h{}v{}h-{}z",
-                shown(*x),
-                shown(*y),
-                shown(*width),
-                shown(*height),
-                shown(*width)
-            );
+        for black in &self.black {
+            let [x, y, width, height] = black.map(shown);
+            let _ = write!(text, "M{x} {y}h{width}v{height}h-{width}z");
         }
         text.push_str("\"/>\n");
         for (x, y, words) in &self.words {
+            let (x, y) = (shown(*x), shown(*y));
             let _ = writeln!(
                 text,
-                "  <text x=\"{}\" y=\"{}\" font-family=\"sans-serif\" font-size=\"{LETTERS_MM}\" \
-                 text-anchor=\"middle\">{words}</text>",
-                shown(*x),
-                shown(*y)
+                "  <text x=\"{x}\" y=\"{y}\" font-family=\"sans-serif\" font-size=\"{LETTERS_MM}\" \
+                 text-anchor=\"middle\">{words}</text>"
             );
         }
         text.push_str("</svg>\n");
@@ -214,7 +194,7 @@ fn markers(board: &Board, (left, top): (f64, f64)) -> Vec<[f64; 4]> {
     black
 }
 
-/// The options that tell a board's markers.
+/// The options that describe a board's markers.
 fn options(board: &Board) -> String {
     board.markers().map_or_else(String::new, |marks| {
         format!(" --marker-mm {} --dictionary {}", shown(marks.side.get()), marks.dictionary.name())
@@ -231,7 +211,7 @@ fn ruler(left: f64, base: f64, length: f64) -> Vec<[f64; 4]> {
     for mark in 0..=marks {
         let at = left + length * f64::from(mark) / f64::from(marks);
         let tall = if mark == 0 || mark == marks { 6.0 } else { 3.0 };
-        // The outer borders of the outer marks are the bar's length apart.
+        // The outer sides of the outer marks are the bar's length apart.
         let x = match mark {
             0 => at,
             _ if mark == marks => at - LINE_MM,
@@ -254,7 +234,7 @@ fn points(mm: f64) -> f32 {
     (mm * POINTS) as f32
 }
 
-/// Without needless digits.
+/// Rounded to 0.1 µm.
 fn shown(mm: f64) -> f64 {
     (mm * 1e4).round() / 1e4
 }
@@ -306,7 +286,7 @@ mod tests {
     fn markers_are_drawn_in_the_white_squares() {
         let marks = Markers { side: Mm::constant(12.0), dictionary: Dictionary::Four };
         let sheet = BoardSheet::of(&board(20.0).with_marks(marks).unwrap(), A4).unwrap();
-        // The second square of the first row, 20 mm from the left border of the squares,
+        // The second square of the first row, 20 mm from the left side of the squares,
         // has the first marker: its second row of cells is black, white, black, white,
         // white, black.
         let (left, top) = (sheet.black[0][0] + 20.0 + 4.0, sheet.black[0][1] + 4.0 + 2.0);

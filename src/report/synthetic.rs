@@ -1,5 +1,5 @@
 //! A made-up run for the tests: a sine of a width, every state, a limit,
-//! refused frames, pictures. The same every time.
+//! rejected frames, images. The same every time.
 
 #![expect(
     clippy::cast_precision_loss,
@@ -16,15 +16,13 @@ use crate::core::frame::{Frame, Pixels};
 use crate::core::geometry::{ImagePoint, Roi, Size};
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::Stamp;
-use crate::core::units::WidthRange;
-use crate::core::units::{Mm, MmPerS, MmPerS2};
+use crate::core::units::{Mm, MmPerS, MmPerS2, WidthRange};
 use crate::report::run::RunPage;
 use crate::rows::frame_row::{ControlColumns, FrameRow, sample};
 use crate::rows::log::{ControlFacts, LogOptions};
 use crate::rows::summary::{RunNote, Summary};
 use crate::vision::{BeadAxis, Edges, Gauge, Polarity, WidthMeasurement};
-use crate::width_control::limiter::SpeedLimit;
-use crate::width_control::limiter::SpeedLimits;
+use crate::width_control::limiter::{SpeedLimit, SpeedLimits};
 
 const SIZE: (usize, usize) = (720, 540);
 const MM_PER_PX: f64 = 0.126_582;
@@ -108,7 +106,7 @@ fn refused_at(frame: u64, time: f64) -> Option<&'static str> {
     }
 }
 
-fn picture(frame: u64, width_px: f64, edges: &mut [Vec<ImagePoint>; 2]) -> Frame {
+fn image(frame: u64, width_px: f64, edges: &mut [Vec<ImagePoint>; 2]) -> Frame {
     let middle = 360.0 + 6.0 * chance(frame);
     let wave = |y: f64, side: f64| middle + side * (width_px / 2.0 + 1.5 * (y / 40.0 + side).sin());
     let mut pixels = Vec::with_capacity(SIZE.0 * SIZE.1);
@@ -157,12 +155,12 @@ fn robot(time: f64, path: f64) -> Event {
 fn setpoint(time: f64) -> Step {
     let speed = MmPerS::new(speed_at(time)).unwrap();
     let limit = if speed.get() <= 60.0 { SpeedLimit::MinSpeed } else { SpeedLimit::None };
-    let wish = MmPerS::new(speed.get() - if limit == SpeedLimit::None { 0.3 } else { 9.0 }).ok();
+    let demand = MmPerS::new(speed.get() - if limit == SpeedLimit::None { 0.3 } else { 9.0 }).ok();
     let moving = !matches!(state_at(time), State::Idle | State::Fault(_));
     Step {
         command: moving.then_some(Command::Speed(speed)),
         state: state_at(time),
-        trace: Trace { limit, demand_mm_per_s: wish, ..Trace::default() },
+        trace: Trace { limit, demand_mm_per_s: demand, ..Trace::default() },
         extruder: None,
     }
 }
@@ -204,9 +202,9 @@ pub fn run(folder: &Path) -> Summary {
             control: Some(control),
         };
         let shown = frame.is_multiple_of(50) || outcome.is_err();
-        let picture = shown.then(|| picture(frame, width / MM_PER_PX, &mut edges));
+        let image = shown.then(|| image(frame, width / MM_PER_PX, &mut edges));
         let found = Edges { left: &edges[0], right: &edges[1] };
-        log.frame(&row, picture.as_ref(), outcome.is_ok().then_some(found)).unwrap();
+        log.frame(&row, image.as_ref(), outcome.is_ok().then_some(found)).unwrap();
     }
     log.step(
         Stamp::from_secs(18.62),
@@ -223,18 +221,18 @@ pub fn process(folder: &Path) -> Summary {
     for frame in 0..300_u64 {
         let width = 42.0 + 0.5 * (frame as f64 * 0.05).sin() + 0.05 * chance(frame);
         let outcome = if frame < 80 { Err("no_pair") } else { Ok(measured(frame, width)) };
-        let picture = (frame.is_multiple_of(20) || frame == 0)
-            .then(|| picture(frame, width / MM_PER_PX, &mut edges));
+        let image = (frame.is_multiple_of(20) || frame == 0)
+            .then(|| image(frame, width / MM_PER_PX, &mut edges));
         let found = Edges { left: &edges[0], right: &edges[1] };
         let row = FrameRow { frame, time_s: None, outcome, roughness: None, control: None };
-        log.frame(&row, picture.as_ref(), outcome.is_ok().then_some(found)).unwrap();
+        log.frame(&row, image.as_ref(), outcome.is_ok().then_some(found)).unwrap();
     }
     log.finish().unwrap()
 }
 
 pub const HOURS_OF_FRAMES: u64 = 100_000;
 
-/// Three hours at ten frames a second, without pictures.
+/// Three hours at ten frames a second, without images.
 pub fn hours(folder: &Path) -> Summary {
     let mut log = RunPage::log(options(folder, "A long run", true)).unwrap();
     for frame in 0..HOURS_OF_FRAMES {

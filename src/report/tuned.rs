@@ -1,4 +1,4 @@
-//! What tuning found and proposes: a table, `tune.json` and a page.
+//! Results of tuning: a table, `tune.json` and a page.
 
 mod json;
 mod page;
@@ -17,27 +17,28 @@ use crate::tune::{IdentifiedCell, Log};
 use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::pi::PiGains;
 
-/// Standard deviations from which a setting of the cell counts as wrong.
+/// Standard deviations from which a setting of the cell counts as wrong. Derived: P(|z| > 3) is
+/// 0.27 % for a normal deviate.
 const PLAUSIBLE_MISMATCH: f64 = 3.0;
-/// Part of the speeds' range that may be left of the robot's answer.
+/// Residual of the robot's response (RMS) that is accepted, as a fraction of the speeds' range.
 const MAX_GAIN_RATIO: f64 = 0.1;
-/// Part of widths that were refused from which the noise is not to be trusted.
+/// Fraction of rejected frames above which the noise is not representative.
 const MANY_REJECTED: f64 = 0.2;
 
-/// A recording that was looked at, and what follows.
+/// An analysed recording with its proposals.
 #[derive(Debug, Clone)]
 pub struct Tuned {
     /// The recording.
     pub recording: String,
     /// The cell that is tuned.
     pub cell: String,
-    /// What was recorded.
+    /// The recorded run.
     pub log: Log,
-    /// What was found.
+    /// The identified cell.
     pub plant: IdentifiedCell,
-    /// What is proposed.
+    /// The proposal.
     pub proposal: Proposal,
-    /// Width that is asked for \[mm\].
+    /// Target width \[mm\].
     pub target_mm: f64,
     /// The cell's limits.
     pub limits: SpeedLimits,
@@ -48,10 +49,10 @@ pub struct Tuned {
     pub present_gains: Option<(PiGains, Option<LoopMargins>)>,
     /// The loop at the speed at which the target is laid.
     pub usual: LoopPlant,
-    /// What the laws would do: as it is now where it holds a width, the proposed PI,
-    /// the proposed law by distance.
+    /// Predictions for the controllers: the present one where it controls the width, the proposed
+    /// PI controller, the proposed distance controller.
     pub predictions: Vec<BeadPrediction>,
-    /// The law by distance as proposed, and told wrong.
+    /// Predictions for the proposed distance controller with a mismatched model.
     pub mismatched: Vec<BeadPrediction>,
     /// Band within which a bead counts as settled \[mm\].
     pub band_mm: f64,
@@ -60,7 +61,7 @@ pub struct Tuned {
 }
 
 impl Tuned {
-    /// Proposes settings for what was found, and lays beads with them. Fails where the
+    /// Proposes settings for the identified cell, and simulates beads with them. Fails where the
     /// cell cannot be simulated.
     pub fn of(
         recording: String,
@@ -78,8 +79,9 @@ impl Tuned {
             .into_iter()
             .chain([ControllerCandidate::pi(&proposal), ControllerCandidate::distance(&proposal)]);
         let predictions = candidates.map(|who| world.predict(&who)).collect::<Result<_, _>>()?;
-        let misled = ControllerCandidate::mismatched(&proposal);
-        let misled = misled.iter().map(|who| world.predict(who)).collect::<Result<_, _>>()?;
+        let mismatched = ControllerCandidate::mismatched(&proposal);
+        let mismatched =
+            mismatched.iter().map(|who| world.predict(who)).collect::<Result<_, _>>()?;
         let at = slowest_loop(&plant, target_mm, &run.limits);
         Ok(Self {
             recording,
@@ -92,17 +94,18 @@ impl Tuned {
             usual: LoopPlant::at(&plant, target_mm, speed_within(&plant, target_mm, &run.limits)),
             present_gains: run.control.gains.map(|gains| (gains, at.margins(gains))),
             predictions,
-            mismatched: misled,
+            mismatched,
             band_mm: world.band_mm,
             step_at_mm: world.step_at_mm,
             plant,
         })
     }
 
-    /// What somebody should know before anything of this is used.
+    /// Warnings before anything of this is used.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
-        warnings.extend(self.log.cut_short().map(|why| format!("{why}; fewer pieces tell less")));
+        warnings
+            .extend(self.log.cut_short().map(|why| format!("{why}; fewer pieces determine less")));
         warnings.extend(self.gains_warning());
         warnings.extend(self.offset_warning());
         if let Err(error) = &self.plant.robot {
@@ -136,11 +139,11 @@ impl Tuned {
         }
         let all = self.log.refused + self.log.widths.len() as u64;
         #[expect(clippy::cast_precision_loss, reason = "counts of frames")]
-        let share = self.log.refused as f64 / all.max(1) as f64;
-        if share > MANY_REJECTED {
+        let fraction = self.log.refused as f64 / all.max(1) as f64;
+        if fraction > MANY_REJECTED {
             warnings.push(format!(
                 "{:.0} % of the frames gave no width; see why with truebead process",
-                100.0 * share
+                100.0 * fraction
             ));
         }
         warnings
@@ -160,7 +163,7 @@ impl Tuned {
                 margins.gain, margins.phase_deg
             )
         } else {
-            format!("the cell's PI gains are unstable at {at} mm/s: the width would swing up")
+            format!("the cell's PI gains are unstable at {at} mm/s: the width would oscillate")
         })
     }
 
@@ -169,8 +172,8 @@ impl Tuned {
         let SpeedRange { min: from, max: to } = self.plant.study.estimate.speeds;
         (robot.residual_mm_per_s > MAX_GAIN_RATIO * (to - from).get()).then(|| {
             format!(
-                "the robot answers otherwise than by a dead time, a lag and a largest slope: {:.1} \
-                 mm/s RMS are left of its reported speed; what is predicted is not to be trusted",
+                "the robot does not respond with a dead time, a lag and a largest slope: the residual of \
+                 its reported speed is {:.1} mm/s RMS; the predictions are not valid",
                 robot.residual_mm_per_s
             )
         })
@@ -228,7 +231,7 @@ fn speed_within(plant: &IdentifiedCell, target_mm: f64, limits: &SpeedLimits) ->
     plant.speed_for(target_mm).max(min).min(max)
 }
 
-/// To so many digits that count.
+/// Rounded to so many significant digits.
 fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
 }

@@ -1,9 +1,9 @@
-//! `edges.csv`: where each caliper line found the two edges, for whoever wants
-//! the bead's course along the gauge, or to know what a width was taken from.
+//! `edges.csv`: the two edge points of each caliper line, which show the bead's course along
+//! the gauge and the data behind a width.
 
 use std::path::{Path, PathBuf};
 
-use super::output::{LogError, Partial};
+use super::output::{LogError, PartialTable};
 use super::widths::decimals;
 use crate::vision::{Caliper, CaliperPoint};
 
@@ -21,20 +21,12 @@ pub const EDGE_COLUMNS: [&str; 8] = [
 
 /// Writes `edges.csv.partial` and renames it at the end.
 #[derive(Debug)]
-pub struct EdgesWriter {
-    csv: csv::Writer<Partial>,
-    path: PathBuf,
-}
+pub struct EdgesWriter(PartialTable);
 
 impl EdgesWriter {
     /// Begins the file in a folder that is there.
     pub fn create(folder: &Path) -> Result<Self, LogError> {
-        let partial = Partial::create(folder, "edges.csv")?;
-        let mut writer =
-            Self { csv: csv::Writer::from_writer(partial), path: folder.join("edges.csv.partial") };
-        let written = writer.csv.write_record(EDGE_COLUMNS);
-        written.map_err(|error| writer.error(error.into()))?;
-        Ok(writer)
+        PartialTable::create(folder, "edges.csv", EDGE_COLUMNS).map(Self)
     }
 
     /// Adds the lines of a frame on which an edge was found.
@@ -46,33 +38,22 @@ impl EdgesWriter {
         for caliper in calipers {
             let [left, right] = [caliper.left, caliper.right].map(position_fields);
             let numbers = [frame.to_string(), caliper.number.to_string()];
-            let written = self.csv.write_record(numbers.iter().chain(&left).chain(&right));
-            written.map_err(|error| self.error(error.into()))?;
+            self.0.row(numbers.iter().chain(&left).chain(&right))?;
         }
         Ok(())
     }
 
     /// Gives the file its final name, which it returns.
-    pub fn finish(mut self) -> Result<PathBuf, LogError> {
-        self.csv.flush().map_err(|error| self.error(error))?;
-        let path = self.path;
-        let partial = self
-            .csv
-            .into_inner()
-            .map_err(|error| LogError::Write { path, source: error.into_error() })?;
-        partial.finish()
-    }
-
-    fn error(&self, source: std::io::Error) -> LogError {
-        LogError::Write { path: self.path.clone(), source }
+    pub fn finish(self) -> Result<PathBuf, LogError> {
+        self.0.finish()
     }
 }
 
-/// Place and standard deviation of an edge; empty where there is none.
-fn position_fields(place: Option<CaliperPoint>) -> [String; 3] {
-    let x = place.map(|place| place.at.x);
-    let y = place.map(|place| place.at.y);
-    let sigma = place.and_then(|place| place.sigma_px);
+/// Position and standard deviation of an edge \[px\]; empty where there is none.
+fn position_fields(point: Option<CaliperPoint>) -> [String; 3] {
+    let x = point.map(|point| point.at.x);
+    let y = point.map(|point| point.at.y);
+    let sigma = point.and_then(|point| point.sigma_px);
     [x, y, sigma].map(|value| decimals(value, 6))
 }
 
@@ -82,7 +63,7 @@ mod tests {
     use crate::core::geometry::ImagePoint;
 
     #[test]
-    fn a_line_has_what_was_found_on_it() {
+    fn a_row_has_the_edges_of_its_line() {
         let folder = tempfile::tempdir().unwrap();
         let mut writer = EdgesWriter::create(folder.path()).unwrap();
         let left = CaliperPoint { at: ImagePoint::new(100.25, 7.5), sigma_px: Some(0.125) };

@@ -1,4 +1,4 @@
-//! What is known of one frame once it has been looked at.
+//! The result of one frame.
 
 use crate::control::step::Step;
 use crate::core::units::{Mm, MmPerS};
@@ -10,16 +10,15 @@ use crate::width_control::limiter::SpeedLimit;
 pub struct FrameRow {
     /// Number of the frame, from 0.
     pub frame: u64,
-    /// Time of the frame \[s\]; none where nothing tells it. In a run it is the
-    /// capture stamp, so that it shares its start with the steps.
+    /// Time of the frame \[s\]; none where it is unknown. In a run it is the capture stamp, on the
+    /// same clock as the steps.
     pub time_s: Option<f64>,
     /// The width, or the status of a frame that was refused.
     pub outcome: Result<WidthMeasurement, &'static str>,
     /// Roughness of the bead from all frames up to this one; none while it is not
     /// determined.
     pub roughness: Option<Roughness>,
-    /// What the controller knew at that frame; none where there is no
-    /// controller.
+    /// State of the controller at that frame; none without a controller.
     pub control: Option<ControlColumns>,
 }
 
@@ -41,7 +40,7 @@ pub struct ControlColumns {
     pub state: &'static str,
     /// The limit that acted on the last setpoint.
     pub limit: SpeedLimit,
-    /// Width that was asked for where that bead was laid.
+    /// Target width where that bead was laid.
     pub target: Option<Mm>,
 }
 

@@ -1,5 +1,4 @@
-//! Takes down a run, one fact at a time, and leaves `widths.csv`, `summary.json` and
-//! what its page makes of it.
+//! Logs a run, one fact at a time, into `widths.csv`, `summary.json` and a page.
 
 use std::path::PathBuf;
 
@@ -19,10 +18,10 @@ use crate::numeric::statistics::Distribution;
 use crate::vision::{Edges, Gauge};
 use crate::width_control::limiter::SpeedLimits;
 
-/// Most remarks that a report lists.
+/// Largest number of remarks in a report.
 const MAX_REMARKS: usize = 40;
 
-/// What is known before the first frame.
+/// Facts before the first frame.
 #[derive(Debug, Clone)]
 pub struct LogOptions {
     /// The output folder; made if it is not there.
@@ -33,27 +32,27 @@ pub struct LogOptions {
     pub header: Vec<(String, String)>,
     /// Where the bead is measured.
     pub gauge: Gauge,
-    /// Width that is asked for, if known.
+    /// Target width, if known.
     pub target: Option<Mm>,
-    /// Share of refused frames that the cell bears.
+    /// Limit of rejected frames, as a fraction.
     pub max_rejected_fraction: f64,
     /// What only a run with a controller has.
     pub control: Option<ControlFacts>,
 }
 
-/// What is known of the controller before the first step.
+/// Facts about the controller before the first step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlFacts {
-    /// What setpoints may be.
+    /// Limits of setpoints.
     pub limits: SpeedLimits,
-    /// What the extruder is told, where it is commanded.
+    /// Quantity of the extruder's command, where it is commanded.
     pub extruder: Option<CommandQuantity>,
     /// How long the profile is that it plays, where it plays one.
     pub profile: Option<Span>,
 }
 
 impl ControlFacts {
-    /// Of a cell's run, with the law of its extruder.
+    /// The facts of a cell's run, with the strategy of its extruder.
     pub fn of(run: &RunPart, controller: Option<&ExtruderStrategy>) -> Self {
         let extruder = run.extruder.as_ref().map(|part| part.extruder.drive);
         let profile = controller.and_then(|controller| match controller {
@@ -64,7 +63,7 @@ impl ControlFacts {
     }
 }
 
-/// What people look at after a run, fed with the same facts as the rows.
+/// The page of a run, made from the same facts as the rows.
 pub trait RunObserver: std::fmt::Debug + Send {
     /// A frame that was looked at, with its image and edges where they are at hand.
     fn frame(&mut self, row: &FrameRow, image: Option<(&Frame, Option<Edges<'_>>)>);
@@ -79,7 +78,7 @@ pub trait RunObserver: std::fmt::Debug + Send {
     fn write(self: Box<Self>, run: &FinishedRun<'_>) -> Result<(), LogError>;
 }
 
-/// What is known of a run at its end.
+/// The results of a run.
 #[derive(Debug, Clone, Copy)]
 pub struct FinishedRun<'a> {
     /// What was known before its first frame.
@@ -120,17 +119,17 @@ impl RunLog {
         })
     }
 
-    /// A frame that was looked at. The picture and the edges are for the
-    /// report and may be left out.
+    /// A frame that was measured or rejected. The image and the edges are for the report and may
+    /// be left out.
     pub fn frame(
         &mut self,
         row: &FrameRow,
-        picture: Option<&Frame>,
+        image: Option<&Frame>,
         edges: Option<Edges<'_>>,
     ) -> Result<(), LogError> {
         self.widths.write(row)?;
         self.summary.frame(row);
-        self.page.frame(row, picture.map(|frame| (frame, edges)));
+        self.page.frame(row, image.map(|frame| (frame, edges)));
         Ok(())
     }
 

@@ -1,79 +1,29 @@
 //! Names of reasons as they stand in files, and as people read them.
 
-use crate::control::step::{Fault, Hold};
-use crate::extruder::{CommandLimit, ExtruderFault, ExtruderHold};
-use crate::width_control::limiter::SpeedLimit;
+use crate::control::step::Fault;
+use crate::extruder::ExtruderFault;
 
-/// Name of a limit in `widths.csv` and `summary.json`.
-pub fn limit(limit: SpeedLimit) -> &'static str {
-    match limit {
-        SpeedLimit::None => "none",
-        SpeedLimit::MinSpeed => "min_speed",
-        SpeedLimit::MaxSpeed => "max_speed",
-        SpeedLimit::Acceleration => "acceleration",
-        SpeedLimit::Deceleration => "deceleration",
-        SpeedLimit::RobotSlower => "robot_slower",
-        SpeedLimit::RobotFaster => "robot_faster",
-    }
+/// Name of a limit, or of a reason without its own reason.
+pub fn of(value: impl Into<&'static str>) -> &'static str {
+    value.into()
 }
 
-/// Name of a reason for holding.
-pub fn hold(hold: &Hold) -> &'static str {
-    match hold {
-        Hold::NoWidth => "no_width",
-        Hold::RobotHolds => "robot_holds",
-        Hold::LinkDown => "link_down",
-        Hold::SpeedMismatch => "speed_mismatch",
-        Hold::RobotLimits => "robot_limits",
-        Hold::RecordingLost => "recording_lost",
-        Hold::CameraLost => "camera_lost",
-        Hold::Stopping => "stopping",
-    }
-}
-
-/// Name of a fault.
+/// Name of a fault, with its reason.
 pub fn fault(fault: &Fault) -> String {
+    let name = of(fault);
     match fault {
-        Fault::HeldTooLong(why) => format!("held_too_long_{}", hold(why)),
-        Fault::SpeedMismatch => "speed_mismatch".to_string(),
-        Fault::Robot => "robot".to_string(),
-        Fault::RobotStopped => "robot_stopped".to_string(),
-        Fault::Extruder(why) => format!("extruder_{}", extruder_fault(*why)),
+        Fault::HeldTooLong(why) => format!("{name}_{}", of(why)),
+        Fault::Extruder(why) => format!("{name}_{}", extruder_fault(*why)),
+        _ => name.to_owned(),
     }
 }
 
-/// Name of a reason for the extruder's holding.
-pub const fn extruder_hold(hold: ExtruderHold) -> &'static str {
-    match hold {
-        ExtruderHold::LinkDown => "link_down",
-        ExtruderHold::NoReading => "no_reading",
-        ExtruderHold::BadReading => "bad_reading",
-        ExtruderHold::ValveShut => "valve_shut",
-        ExtruderHold::SpeedMismatch => "speed_mismatch",
-    }
-}
-
-/// Name of a fault of the extruder side.
+/// Name of a fault of the extruder side, with its reason.
 pub fn extruder_fault(fault: ExtruderFault) -> String {
+    let name = of(fault);
     match fault {
-        ExtruderFault::HeldTooLong(why) => format!("held_too_long_{}", extruder_hold(why)),
-        ExtruderFault::NoAnswer => "no_answer".to_owned(),
-        ExtruderFault::DidNotStart => "did_not_start".to_owned(),
-        ExtruderFault::RunsOn => "runs_on".to_owned(),
-        ExtruderFault::Pump => "pump".to_owned(),
-        ExtruderFault::Overpressure => "overpressure".to_owned(),
-        ExtruderFault::SpeedMismatch => "speed_mismatch".to_owned(),
-    }
-}
-
-/// Name of a limit that acted on the extruder's command.
-pub const fn command_limit(limit: CommandLimit) -> &'static str {
-    match limit {
-        CommandLimit::None => "none",
-        CommandLimit::Min => "min",
-        CommandLimit::Max => "max",
-        CommandLimit::Rise => "rise",
-        CommandLimit::Fall => "fall",
+        ExtruderFault::HeldTooLong(why) => format!("{name}_{}", of(why)),
+        _ => name.to_owned(),
     }
 }
 
@@ -85,5 +35,33 @@ pub fn in_words(name: &str) -> String {
         format!("held too long: {}", in_words(why))
     } else {
         name.replace('_', " ")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::step::Hold;
+    use crate::extruder::{CommandLimit, ExtruderHold};
+    use crate::width_control::limiter::SpeedLimit;
+
+    #[test]
+    fn names_are_those_of_the_recording() {
+        let name = |json: Result<serde_json::Value, _>| json.unwrap();
+        for limit in [SpeedLimit::None, SpeedLimit::MinSpeed, SpeedLimit::RobotSlower] {
+            assert_eq!(name(serde_json::to_value(limit)), of(limit));
+        }
+        assert_eq!(name(serde_json::to_value(Hold::NoWidth)), of(&Hold::NoWidth));
+        assert_eq!(name(serde_json::to_value(CommandLimit::Rise)), of(CommandLimit::Rise));
+    }
+
+    #[test]
+    fn a_fault_has_its_reason_in_its_name() {
+        assert_eq!(fault(&Fault::RobotStopped), "robot_stopped");
+        assert_eq!(fault(&Fault::HeldTooLong(Hold::LinkDown)), "held_too_long_link_down");
+        let held = ExtruderFault::HeldTooLong(ExtruderHold::NoReading);
+        let name = fault(&Fault::Extruder(held));
+        assert_eq!(name, "extruder_held_too_long_no_reading");
+        assert_eq!(in_words(&name), "extruder: held too long: no reading");
     }
 }

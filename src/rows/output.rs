@@ -75,15 +75,11 @@ impl Partial {
         Ok(Self { file, growing, path: folder.join(name) })
     }
 
-    /// The error that this file meets.
-    pub fn error(&self, source: io::Error) -> LogError {
-        LogError::Write { path: self.growing.clone(), source }
-    }
-
     /// Gives the file its final name.
     pub fn finish(self) -> Result<PathBuf, LogError> {
-        self.file.sync_all().map_err(|source| self.error(source))?;
-        match fs::rename(&self.growing, &self.path) {
+        let growing = self.growing;
+        self.file.sync_all().map_err(|source| LogError::Write { path: growing.clone(), source })?;
+        match fs::rename(&growing, &self.path) {
             Ok(()) => Ok(self.path),
             Err(source) => Err(LogError::Write { path: self.path, source }),
         }
@@ -97,6 +93,53 @@ impl Write for Partial {
 
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()
+    }
+}
+
+/// A table that grows as `NAME.partial` and gets its name when it is whole.
+#[derive(Debug)]
+pub struct PartialTable {
+    csv: csv::Writer<Partial>,
+    path: PathBuf,
+}
+
+impl PartialTable {
+    /// Begins the table in a folder that is there, with its head.
+    pub fn create(
+        folder: &Path,
+        name: &str,
+        head: impl IntoIterator<Item: AsRef<[u8]>>,
+    ) -> Result<Self, LogError> {
+        let partial = Partial::create(folder, name)?;
+        let path = partial.growing.clone();
+        let mut table = Self { csv: csv::Writer::from_writer(partial), path };
+        table.row(head)?;
+        Ok(table)
+    }
+
+    /// Adds a row.
+    pub fn row(&mut self, row: impl IntoIterator<Item: AsRef<[u8]>>) -> Result<(), LogError> {
+        self.csv.write_record(row).map_err(|error| self.error(error.into()))
+    }
+
+    /// Hands all rows to the operating system.
+    pub fn flush(&mut self) -> Result<(), LogError> {
+        self.csv.flush().map_err(|error| self.error(error))
+    }
+
+    /// Gives the file its final name, which it returns.
+    pub fn finish(mut self) -> Result<PathBuf, LogError> {
+        self.flush()?;
+        let path = self.path;
+        let partial = self
+            .csv
+            .into_inner()
+            .map_err(|error| LogError::Write { path, source: error.into_error() })?;
+        partial.finish()
+    }
+
+    fn error(&self, source: io::Error) -> LogError {
+        LogError::Write { path: self.path.clone(), source }
     }
 }
 

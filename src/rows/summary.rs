@@ -1,4 +1,4 @@
-//! `summary.json`: what a run came to, in numbers.
+//! `summary.json`: the figures of a run.
 
 pub mod advice;
 mod control;
@@ -8,6 +8,7 @@ mod follow;
 mod image_quality;
 mod note;
 mod profile;
+mod times;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -34,17 +35,16 @@ use crate::core::units::{Mm, Mm3PerS};
 use crate::numeric::statistics::{Distribution, Moments, WeightedMean, as_f64};
 use crate::vision::Roughness;
 
-/// What a run came to. What is not known is null.
+/// The figures of a run. An unknown figure is null.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// Frames that there were.
+    /// Number of frames.
     pub frames: u64,
     /// Frames whose width was measured.
     pub measured: u64,
-    /// The others: status in `widths.csv` and how many.
+    /// The others: status in `widths.csv` and number.
     pub rejected: BTreeMap<&'static str, u64>,
-    /// Refused frames of a run in which no bead of it was under the camera yet,
-    /// or any more; they are no loss.
+    /// Rejected frames while no bead of the run was under the camera; they are no loss.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected_without_bead: Option<u64>,
     /// Mean of the measured widths.
@@ -57,22 +57,22 @@ pub struct Summary {
     /// beside the others.
     #[serde(flatten)]
     pub roughness: RoughnessSummary,
-    /// How good the pictures were.
+    /// Quality of the images.
     pub image_quality: ImageQuality,
-    /// What could be better about light and lens, in words.
+    /// Advice about light and lens.
     pub advice: Vec<String>,
-    /// From the first moment that is known to the last.
+    /// Time from the first to the last known moment.
     pub duration_s: Option<f64>,
-    /// Width that was asked for.
+    /// Target width.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_width_mm: Option<f64>,
-    /// What only a run with a controller has; its keys stand beside the others.
+    /// Figures of a run with a controller; its keys stand beside the others.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub control: Option<ControlSummary>,
-    /// What only a run has whose width is held by distance.
+    /// Figures of a run with the distance controller.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance: Option<DistanceSummary>,
-    /// What only a run has whose extruder is commanded.
+    /// Figures of a run whose extruder is commanded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub extruder: Option<ExtruderSummary>,
 }
@@ -113,8 +113,8 @@ impl RoughnessSummary {
 }
 
 impl Summary {
-    /// Share of the frames that were refused or unreadable, of those that could
-    /// show bead; 0 of none.
+    /// Rejected or unreadable frames as a fraction of those that could show bead; 0 if there
+    /// are none.
     pub fn rejected_fraction(&self) -> f64 {
         let frames = self.frames_with_bead();
         if frames == 0 { 0.0 } else { as_f64(frames - self.measured.min(frames)) / as_f64(frames) }
@@ -136,7 +136,7 @@ impl Summary {
 }
 
 /// Takes facts one at a time, in constant memory, and adds them up.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct SummaryBuilder {
     target: Option<Mm>,
     frames: u64,
@@ -161,26 +161,7 @@ pub struct SummaryBuilder {
 impl SummaryBuilder {
     /// `with_control` for runs with a controller.
     pub fn new(target: Option<Mm>, with_control: bool) -> Self {
-        Self {
-            target,
-            frames: 0,
-            rejected: BTreeMap::new(),
-            rejected_without_bead: 0,
-            width: Moments::default(),
-            sigma: Moments::default(),
-            roughness: None,
-            saturated: Moments::default(),
-            used: Moments::default(),
-            contrast: Distribution::default(),
-            blur: Distribution::default(),
-            noise: Distribution::default(),
-            skew: WeightedMean::default(),
-            first_s: None,
-            last_s: None,
-            control: with_control.then(ControlTally::default),
-            distance: DistanceTally::default(),
-            extruder: ExtruderTally::default(),
-        }
+        Self { target, control: with_control.then(ControlTally::default), ..Self::default() }
     }
 
     /// The same for a run whose extruder plays a profile of this length.
@@ -190,7 +171,7 @@ impl SummaryBuilder {
         self
     }
 
-    /// A frame that was looked at.
+    /// A frame that was measured or rejected.
     pub fn frame(&mut self, row: &FrameRow) {
         self.frames += 1;
         self.cover_time(row.time_s);
@@ -235,8 +216,7 @@ impl SummaryBuilder {
         self.extruder.flow(wanted, flow);
     }
 
-    /// The latency of a setpoint and what its sender waited by its own
-    /// schedule, as the contract defines them.
+    /// The latency of a setpoint and the wait for its sender's schedule \[ms\].
     pub fn latency(&mut self, latency_ms: f64, send_wait_ms: f64) {
         if let Some(control) = &mut self.control {
             control.latency(latency_ms, send_wait_ms);

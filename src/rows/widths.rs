@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::frame_row::{ControlColumns, FrameRow};
 use super::names;
-use super::output::{LogError, Partial};
+use super::output::{LogError, PartialTable};
 use crate::vision::{Roughness, WidthMeasurement};
 
 /// Columns of every file; the first nine are promised to other programs.
@@ -39,16 +39,16 @@ pub const CONTROL_COLUMNS: [&str; 7] = [
     "target_mm",
 ];
 
-/// Rows after which the file is flushed where no time tells sooner.
+/// Rows after which the file is flushed where frames have no time.
 const FLUSH_ROWS: u32 = 50;
+/// Time after which the file is flushed \[s\]: what a killed run loses at most.
 const FLUSH_AFTER_S: f64 = 1.0;
 
 /// Writes `widths.csv.partial`, which a killed run leaves with all but its
 /// last second, and renames it at the end.
 #[derive(Debug)]
 pub struct WidthsWriter {
-    csv: csv::Writer<Partial>,
-    path: PathBuf,
+    table: PartialTable,
     with_control: bool,
     unflushed: u32,
     flushed_at_s: Option<f64>,
@@ -58,25 +58,17 @@ impl WidthsWriter {
     /// Begins the file in a folder that is there. `with_control` adds the
     /// columns of a run.
     pub fn create(folder: &Path, with_control: bool) -> Result<Self, LogError> {
-        let partial = Partial::create(folder, "widths.csv")?;
-        let mut writer = Self {
-            csv: csv::Writer::from_writer(partial),
-            path: folder.join("widths.csv.partial"),
-            with_control,
-            unflushed: 0,
-            flushed_at_s: None,
-        };
         let control: &[&str] = if with_control { &CONTROL_COLUMNS } else { &[] };
-        let written = writer.csv.write_record(WIDTH_COLUMNS.iter().chain(control));
-        written.map_err(|error| writer.error(error.into()))?;
+        let head = WIDTH_COLUMNS.iter().chain(control);
+        let table = PartialTable::create(folder, "widths.csv", head)?;
+        let mut writer = Self { table, with_control, unflushed: 0, flushed_at_s: None };
         writer.flush()?;
         Ok(writer)
     }
 
     /// Adds a row.
     pub fn write(&mut self, row: &FrameRow) -> Result<(), LogError> {
-        let written = self.write_fields(row);
-        written.map_err(|error| self.error(error.into()))?;
+        self.table.row(self.fields(row))?;
         self.unflushed += 1;
         let since = row.time_s.zip(self.flushed_at_s).map(|(now, then)| now - then);
         if self.unflushed >= FLUSH_ROWS || since.is_some_and(|span| span >= FLUSH_AFTER_S) {
@@ -89,48 +81,25 @@ impl WidthsWriter {
     }
 
     /// Gives the file its final name, which it returns.
-    pub fn finish(mut self) -> Result<PathBuf, LogError> {
-        self.flush()?;
-        let path = self.path;
-        let partial = self
-            .csv
-            .into_inner()
-            .map_err(|error| LogError::Write { path, source: error.into_error() })?;
-        partial.finish()
+    pub fn finish(self) -> Result<PathBuf, LogError> {
+        self.table.finish()
     }
 
-    fn write_fields(&mut self, row: &FrameRow) -> Result<(), csv::Error> {
-        self.csv.write_field(row.frame.to_string())?;
-        self.csv.write_field(decimals(row.time_s, 9))?;
-        match &row.outcome {
-            Ok(measured) => {
-                self.csv.write_field("ok")?;
-                for field in measured_fields(measured, row.roughness) {
-                    self.csv.write_field(field)?;
-                }
-            }
-            Err(status) => {
-                self.csv.write_field(status)?;
-                for _ in 3..WIDTH_COLUMNS.len() {
-                    self.csv.write_field("")?;
-                }
-            }
-        }
+    fn fields(&self, row: &FrameRow) -> Vec<String> {
+        let status = row.outcome.as_ref().map_or_else(|status| *status, |_| "ok");
+        let mut fields = vec![row.frame.to_string(), decimals(row.time_s, 9), status.to_owned()];
+        let measured =
+            row.outcome.as_ref().map(|measured| measured_fields(measured, row.roughness));
+        fields.extend(measured.unwrap_or_default());
         if self.with_control {
-            for field in control_fields(row.control.as_ref().filter(|_| row.outcome.is_ok())) {
-                self.csv.write_field(field)?;
-            }
+            fields.extend(control_fields(row.control.as_ref().filter(|_| row.outcome.is_ok())));
         }
-        self.csv.write_record(None::<&[u8]>)
+        fields
     }
 
     fn flush(&mut self) -> Result<(), LogError> {
         self.unflushed = 0;
-        self.csv.flush().map_err(|error| self.error(error))
-    }
-
-    fn error(&self, source: std::io::Error) -> LogError {
-        LogError::Write { path: self.path.clone(), source }
+        self.table.flush()
     }
 }
 
@@ -162,12 +131,12 @@ fn control_fields(control: Option<&ControlColumns>) -> [String; 7] {
         decimals(control.speed.map(f64::from), 6),
         decimals(control.setpoint.map(f64::from), 6),
         control.state.to_string(),
-        names::limit(control.limit).to_string(),
+        names::of(control.limit).to_owned(),
         decimals(control.target.map(f64::from), 6),
     ]
 }
 
-/// A number with fixed decimals; empty where it is unknown or not finite.
+/// A number with fixed decimals and no negative zero; empty where it is unknown or not finite.
 pub fn decimals(value: Option<f64>, places: usize) -> String {
     let Some(value) = value.filter(|value| value.is_finite()) else { return String::new() };
     let text = format!("{value:.places$}");

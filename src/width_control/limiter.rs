@@ -2,13 +2,15 @@
 //! acted.
 
 use serde::{Deserialize, Serialize};
+use strum::IntoStaticStr;
 
 use crate::core::time::Span;
 use crate::core::units::{MmPerS, MmPerS2};
 
 /// Which limit acted on a setpoint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum SpeedLimit {
     /// None.
     #[default]

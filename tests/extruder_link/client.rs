@@ -190,28 +190,16 @@ fn a_failed_pump_is_reported_and_no_command_makes_it_run() {
 #[test]
 fn nothing_leaves_for_an_extruder_that_does_not_fit_the_cell() {
     let sim = sim();
-    for (config, told) in [
-        (
-            ExtruderConfig {
-                range: DriveRange { max: 120.0, ..RANGE },
-                ..config(sim.local_addr())
-            },
-            "takes 0 to 90 rpm",
-        ),
-        (
-            ExtruderConfig {
-                range: DriveRange { quantity: CommandQuantity::Flow, ..RANGE },
-                ..config(sim.local_addr())
-            },
-            "mm3_per_s",
-        ),
+    for (range, part) in [
+        (DriveRange { max: 120.0, ..RANGE }, "takes 0 to 90 rpm"),
+        (DriveRange { quantity: CommandQuantity::Flow, ..RANGE }, "mm3_per_s"),
     ] {
-        let pc = Pc::start(config.clone());
-        let hello = pc.until_up();
-        assert!(config.range.unfit(&hello, on_wire).unwrap().contains(told));
+        let pc = Pc::start(ExtruderConfig { range, ..config(sim.local_addr()) });
+        let limits = pc.until_up();
+        assert!(range.unfit(&limits, on_wire).unwrap().contains(part));
         pc.until_state(|_| true);
         let refused = pc.link.send(OFF).unwrap_err();
-        assert!(matches!(&refused, SendError::Unfit(why) if why.contains(told)), "{refused}");
+        assert!(matches!(&refused, SendError::Unfit(why) if why.contains(part)), "{refused}");
     }
     let pc = Pc::start(config(sim.local_addr()));
     pc.until_state(|_| true);

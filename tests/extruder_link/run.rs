@@ -135,7 +135,7 @@ fn robot_and_extruder_run_together_and_the_recording_replays() {
     let Bench { extruder, robot, .. } = bench;
     let heard = extruder.end();
     assert!(heard.contains("pump ON, valve open") && heard.contains("pump OFF"), "{heard}");
-    // The pump was told to stop; its command did not run out.
+    // The pump was commanded to stop; its command did not run out.
     let off = heard.find("pump OFF").unwrap();
     let bye = heard.find("the PC said BYE").unwrap();
     assert!(off < bye, "{heard}");
@@ -170,11 +170,11 @@ fn an_extruder_that_vanishes_stops_the_robot() {
     assert!(CELL.contains(long));
     let bench = Bench::new(&CELL.replace(long, "max_hold_s = 1.0  # a longer hold"), &[], &[]);
     let mut run = bench.start("15");
-    let mut told = BufReader::new(run.stderr.take().unwrap()).lines().map_while(Result::ok);
-    assert!(told.any(|line| line.contains("extruder running")));
+    let mut printed = BufReader::new(run.stderr.take().unwrap()).lines().map_while(Result::ok);
+    assert!(printed.any(|line| line.contains("extruder running")));
     let Bench { folder, robot, extruder } = bench;
     drop(extruder);
-    let rest: Vec<String> = told.collect();
+    let rest: Vec<String> = printed.collect();
     assert_eq!(wait(run).status.code(), Some(1), "{rest:?}");
     assert!(rest.iter().any(|line| line.contains("extruder holding: link down")), "{rest:?}");
     let file = folder.path().join("out/summary.json");
@@ -223,15 +223,18 @@ fn an_extruder_with_narrower_limits_or_another_unit_is_refused() {
     let narrow = [("max_rpm = 90.0", "max_rpm = 70.0")];
     let bench = Bench::new(CELL, &narrow, &[]);
     let output = wait(bench.start("20"));
-    let told = said(&output);
-    assert_eq!(output.status.code(), Some(2), "{told}");
-    assert!(told.contains("takes 0 to 70 rpm") && told.contains("allows 0 to 90"), "{told}");
+    let printed = said(&output);
+    assert_eq!(output.status.code(), Some(2), "{printed}");
+    assert!(
+        printed.contains("takes 0 to 70 rpm") && printed.contains("allows 0 to 90"),
+        "{printed}"
+    );
     let flow = [("command = \"rpm\"", "command = \"flow\""), ("_rpm", "_mm3_per_s")];
     let bench = Bench::new(CELL, &flow, &[]);
     let output = wait(bench.start("20"));
-    let told = said(&output);
-    assert_eq!(output.status.code(), Some(2), "{told}");
-    assert!(told.contains("is commanded in mm3_per_s"), "{told}");
+    let printed = said(&output);
+    assert_eq!(output.status.code(), Some(2), "{printed}");
+    assert!(printed.contains("is commanded in mm3_per_s"), "{printed}");
 }
 
 fn refused(cell: &str, command: &str) -> String {

@@ -12,9 +12,9 @@ fn it_says_where_it_listens_what_happens_and_ends_in_order() {
     let mut command = Command::new(PROGRAM);
     command.args(["sim", "robot", "--listen", "127.0.0.1:0", "--pause-s", "0", "--name", "tx"]);
     let mut robot = command.stderr(Stdio::piped()).spawn().unwrap();
-    let mut told = BufReader::new(robot.stderr.take().unwrap());
+    let mut printed = BufReader::new(robot.stderr.take().unwrap());
     let mut line = String::new();
-    told.read_line(&mut line).unwrap();
+    printed.read_line(&mut line).unwrap();
     let address = line.split_whitespace().find_map(|word| word.trim_end_matches(';').parse().ok());
     let mut pc = Talk::call(address.expect("the first line names the address"));
     pc.say("HELLO 1 me\n");
@@ -26,7 +26,7 @@ fn it_says_where_it_listens_what_happens_and_ends_in_order() {
     assert!(killed.success());
     assert_eq!(robot.wait().unwrap().code(), Some(0));
     let mut rest = String::new();
-    told.read_to_string(&mut rest).unwrap();
+    printed.read_to_string(&mut rest).unwrap();
     for wanted in ["PC connected from 127.0.0.1", "IDLE -> PRINT", "ended"] {
         assert!(rest.contains(wanted), "{rest}");
     }
@@ -38,13 +38,13 @@ fn what_cannot_be_is_refused_with_status_2_and_a_taken_address_with_1() {
         let output = Command::new(PROGRAM).args(["sim", "robot"]).args(args).output().unwrap();
         (output.status.code(), String::from_utf8(output.stderr).unwrap())
     };
-    let (status, told) = run(&["--listen", "127.0.0.1:0", "--start", "200"]);
+    let (status, printed) = run(&["--listen", "127.0.0.1:0", "--start", "200"]);
     assert_eq!(status, Some(2));
-    assert!(told.contains("the start speed must be within 60 mm/s to 150 mm/s, found 200 mm/s"));
+    assert!(printed.contains("the start speed must be within 60 mm/s to 150 mm/s, found 200 mm/s"));
     assert_eq!(run(&["--min", "nan"]).0, Some(2));
     assert_eq!(run(&["--state-ms", "5"]).0, Some(2));
     let taken = listener();
-    let (status, told) = run(&["--listen", &taken.local_addr().unwrap().to_string()]);
+    let (status, printed) = run(&["--listen", &taken.local_addr().unwrap().to_string()]);
     assert_eq!(status, Some(1));
-    assert!(told.contains("name a free address with --listen"), "{told}");
+    assert!(printed.contains("name a free address with --listen"), "{printed}");
 }

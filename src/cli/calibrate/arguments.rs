@@ -16,17 +16,17 @@ Example:
 
 Take 10 to 20 sharp images of a flat board, tilted to several sides and in
 all parts of the image. Take the last one with the board flat on the bed, or
-name that image with --plane. calib/README.md tells more.
+name that image with --plane. calib/README.md has more.
 
-Besides the calibration file a report.html is written: what a width is known
-to, all over the image, and what one more image would bring.
+Besides the calibration file a report.html is written: the uncertainty of a
+width over the image, and what one more image would bring.
 
   truebead calibrate --camera camera:0 --board 9x6 --square-mm 20 \\
     --bead-mm 40 --max-width-sigma-mm 0.05 --out calib.toml
 
-takes the images, too: first of the board lying on the bed, then of every
-place in which it is held, and ends when the width of the bead is known as well
-as was asked for.")]
+takes the images, too: first of the board lying on the bed, then at every
+position in which it is held, and ends when the uncertainty of the bead's width
+is within its limit.")]
 pub struct CalibrateArgs {
     /// Folder of images of a board
     #[arg(required_unless_present = "camera", conflicts_with = "camera")]

@@ -1,4 +1,4 @@
-//! What the pictures of a board lead to: camera, bed plane, and what they leave open.
+//! The result of a calibration: camera, bed plane, and their uncertainty.
 
 use anyhow::Context;
 
@@ -8,32 +8,27 @@ use super::{plane, report};
 use crate::calibration::board::Board;
 use crate::calibration::board_observation::BoardObservation;
 use crate::calibration::covariance::CalibrationCovariance;
-use crate::calibration::next_view;
-use crate::calibration::next_view::NextView;
-use crate::calibration::relative_sigma;
-use crate::calibration::solve;
-use crate::calibration::solve::Solution;
-use crate::calibration::warnings;
-use crate::calibration::width_map;
-use crate::calibration::width_map::WidthMap;
-use crate::calibration::{Calibration, CalibrationQuality, file};
+use crate::calibration::next_view::{self, NextView};
+use crate::calibration::solve::{self, Solution};
+use crate::calibration::width_map::{self, WidthMap};
+use crate::calibration::{Calibration, CalibrationQuality, file, relative_sigma, warnings};
 use crate::cli::bed_plane::BedPlane;
 use crate::core::geometry::GridSize;
 use crate::core::units::Mm;
 use crate::io::atomic_file::write_atomic;
 use crate::report::calibration::CalibrationPage;
 
-/// A camera that was found, and how well.
+/// A calibrated camera with its uncertainty.
 pub struct CalibrationResult<'a> {
     args: &'a CalibrateArgs,
     board: &'a Board,
-    pictures: &'a CalibrationImages,
+    images: &'a CalibrationImages,
     /// The camera.
     pub solution: Solution,
     plane: BedPlane,
     covariance: Option<CalibrationCovariance>,
     maps: Vec<WidthMap>,
-    /// What one more picture would bring.
+    /// The further image that would help most.
     pub next: Option<NextView>,
 }
 
@@ -43,31 +38,23 @@ impl<'a> CalibrationResult<'a> {
     pub fn of(
         args: &'a CalibrateArgs,
         board: &'a Board,
-        pictures: &'a CalibrationImages,
+        images: &'a CalibrationImages,
     ) -> anyhow::Result<Self> {
-        let looks = pictures.found.iter();
-        let seen: Vec<BoardObservation> = looks.filter_map(|(_, look)| look.clone().ok()).collect();
+        let all = images.found.iter();
+        let seen: Vec<BoardObservation> = all.filter_map(|(_, board)| board.clone().ok()).collect();
         let solution = solve::solve(board, &seen)?;
-        let plane = plane::find(args, board, &solution, pictures)?;
-        // Corners' noise is the least of the errors where the focal length is loose.
+        let plane = plane::find(args, board, &solution, images)?;
+        // Where the focal length is undetermined, the corners' noise is not the largest error.
         let covariance = warnings::settles_camera(&solution)
             .then(|| CalibrationCovariance::of(board, &solution, &plane.on_bed, plane.thickness))
             .flatten();
-        let mut conclusion = Self {
-            args,
-            board,
-            pictures,
-            solution,
-            plane,
-            covariance,
-            maps: Vec::new(),
-            next: None,
-        };
-        conclusion.find_width_sigma()?;
-        Ok(conclusion)
+        let (maps, next) = (Vec::new(), None);
+        let mut result = Self { args, board, images, solution, plane, covariance, maps, next };
+        result.find_width_sigma()?;
+        Ok(result)
     }
 
-    /// Works out what is left open in the width of the bead.
+    /// Computes the standard deviation of the bead's width.
     fn find_width_sigma(&mut self) -> anyhow::Result<()> {
         let Some(known) = &self.covariance else { return Ok(()) };
         let camera_mm = known.camera_height_mm();
@@ -91,26 +78,26 @@ impl<'a> CalibrationResult<'a> {
     }
 
     /// The largest standard deviation of the bead's width where boards were seen \[mm\], at
-    /// any of the heights; `None` where that cannot be told.
+    /// any of the heights; `None` where it cannot be determined.
     pub fn worst_mm(&self) -> Option<f64> {
         width_map::worst_mm(&self.maps)
     }
 
-    /// Whether a width is known less well than it must be.
+    /// Whether the standard deviation of a width exceeds its limit.
     pub fn fails(&self) -> bool {
         let limit = self.args.max_width_sigma_mm;
         limit.is_some_and(|limit| self.worst_mm().is_none_or(|worst| worst > limit.get()))
     }
 
-    /// Share of a width that the calibration leaves open where boards were seen: of the
-    /// bead that was told or is usual, at the worst of the heights.
+    /// Relative standard deviation of a width where boards were seen: of the given bead or a
+    /// typical one, at the worst of the heights.
     fn width_sigma_fraction(&self) -> Option<f64> {
         let bead = self.maps.first().map(|map| map.bead_mm);
         let given = self.worst_mm().zip(bead).map(|(worst, bead)| worst / bead);
         given.or_else(|| relative_sigma::where_seen(self.covariance.as_ref()?))
     }
 
-    /// The answer, but for the list of pictures.
+    /// The result as text, without the list of images.
     pub fn text(&self, calibration: &Calibration) -> String {
         let covariance = self.covariance.as_ref();
         [
@@ -126,11 +113,11 @@ impl<'a> CalibrationResult<'a> {
         .concat()
     }
 
-    /// The report; with a number of seconds after which it loads itself anew.
+    /// The report, which reloads itself after a number of seconds where one is given.
     pub fn page(&self, text: &str, reload_s: Option<u32>) -> String {
         CalibrationPage {
             board: self.board,
-            images: &self.pictures.found,
+            images: &self.images.found,
             solution: &self.solution,
             maps: &self.maps,
             limit_mm: self.args.max_width_sigma_mm.map(Mm::get),

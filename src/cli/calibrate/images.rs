@@ -10,42 +10,40 @@ use crate::calibration::board::Board;
 use crate::calibration::board_observation::{BoardObservation, Observations};
 use crate::cli::board_image::find_board;
 
-/// Pictures that were looked at.
+/// Images in which the board was looked for.
 pub struct CalibrationImages {
     /// Their files, in their order.
     pub files: Vec<PathBuf>,
-    /// What they show.
+    /// The board in each, or why it was rejected.
     pub found: Observations,
-    /// Those whose boards lay on the bed; none where the last one is to be taken.
+    /// Those whose boards lay on the bed; empty where the last one is used.
     pub on_bed: Vec<PathBuf>,
 }
 
-/// Looks for the board in all of these.
+/// Looks for the board in all files.
 pub fn find_boards(board: &Board, files: &[PathBuf]) -> Observations {
     let bar = progress(files.len());
-    let looks = files
-        .par_iter()
-        .map(|path| {
-            let name = name_of(path);
-            let look = find_board(board, &name, path);
-            bar.inc(1);
-            (name, look)
-        })
-        .collect();
+    let look = |path: &PathBuf| {
+        let name = name_of(path);
+        let found = find_board(board, &name, path);
+        bar.inc(1);
+        (name, found)
+    };
+    let found = files.par_iter().map(look).collect();
     bar.finish_and_clear();
-    looks
+    found
 }
 
-/// Names of files, without their folders.
+/// Name of a file, without its folder.
 fn name_of(path: &std::path::Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
-/// Pictures that a camera has taken so far, the first with the board on the bed.
+/// Images that a camera has taken so far, the first with the board on the bed.
 pub fn taken_so_far(files: &[PathBuf], kept: &[BoardObservation]) -> CalibrationImages {
-    let looks = kept.iter().map(|sighting| (sighting.name.clone(), Ok(sighting.clone())));
+    let found = kept.iter().map(|board| (board.name.clone(), Ok(board.clone())));
     let on_bed = files.first().cloned().into_iter().collect();
-    CalibrationImages { files: files.to_vec(), found: looks.collect(), on_bed }
+    CalibrationImages { files: files.to_vec(), found: found.collect(), on_bed }
 }
 
 fn progress(count: usize) -> ProgressBar {

@@ -1,4 +1,4 @@
-//! Pictures for a calibration, taken while the board is held before the camera.
+//! Images for a calibration, taken while the board is held before the camera.
 
 use std::fmt::Write as _;
 use std::io::{IsTerminal, Write as _};
@@ -12,32 +12,30 @@ use super::arguments::CalibrateArgs;
 use super::conclusion::CalibrationResult;
 use super::images::{CalibrationImages, taken_so_far};
 use crate::calibration::board::Board;
-use crate::calibration::board_observation;
 use crate::calibration::collect::{Collector, Decision};
 use crate::calibration::coverage::{Coverage, PARTS, SIDES};
 use crate::calibration::solve::MIN_VIEWS;
-use crate::calibration::warnings;
+use crate::calibration::{board_observation, warnings};
 use crate::cell::file::ImageSource;
 use crate::cli::arguments::WrongArguments;
 use crate::core::frame::{Channel, Frame};
 use crate::core::time::Span;
-use crate::drivers::camera::open;
-use crate::drivers::camera::open::LiveOptions;
+use crate::drivers::camera::open::{self, LiveOptions};
 use crate::io::atomic_file::write_atomic;
 use crate::io::clock::RunClock;
 use crate::io::image_file;
 use crate::io::stop::StopSignal;
 use crate::run::ports::{FrameSource, Grab};
 
-/// Longest wait for a picture \[s\].
+/// Longest wait for an image \[s\], which trades a slow camera against a lost one.
 const FRAME_TIMEOUT_S: f64 = 5.0;
-/// More pictures than this say nothing more that is worth the while.
+/// Largest number of images: more of them hardly reduce the uncertainty.
 const MAX_VIEWS: usize = 60;
-/// Seconds after which the report loads itself anew.
+/// Seconds after which the report reloads itself.
 const RELOAD_S: u32 = 3;
 
 /// Takes images until the width of the bead is known as well as was asked for, a
-/// further image brings nothing, there are [`MOST_VIEWS`], the camera ends, or the user
+/// further image brings nothing, there are [`MAX_VIEWS`], the camera ends, or the user
 /// ends it.
 pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<CalibrationImages> {
     let name = args.camera.as_deref().unwrap_or_default();
@@ -55,7 +53,8 @@ pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<CalibrationIm
     let is_folder_new = !folder.exists();
     std::fs::create_dir_all(&folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let mut taking = Taking::new(args, board, folder, is_folder_new);
+    let (collector, files, screen) = (Collector::new(*board), Vec::new(), Screen::new());
+    let mut taking = Taking { args, board, folder, is_folder_new, collector, files, screen };
     let done = taking.run(camera.as_mut(), &stop);
     if taking.files.is_empty() {
         taking.clear();
@@ -66,21 +65,21 @@ pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<CalibrationIm
 
 fn source(name: &str) -> Result<ImageSource, WrongArguments> {
     match ImageSource::parse(name, Path::new("")) {
-        None => Err(WrongArguments::new(format!(
-            "--camera {name}: expected camera: and a whole number, such as camera:0"
-        ))),
-        Some(ImageSource::Rendered) => Err(WrongArguments::new(
-            "--camera rendered: the rendered camera shows a bead, not a board; name a real one",
+        None => {
+            Err(wrong!("--camera {name}: expected camera: and a whole number, such as camera:0"))
+        }
+        Some(ImageSource::Rendered) => Err(wrong!(
+            "--camera rendered: the rendered camera shows a bead, not a board; name a real one"
         )),
         Some(source) => Ok(source),
     }
 }
 
-/// A folder without other images in it: these would be taken for some of this camera.
+/// A folder without other images, which would be mistaken for images of this camera.
 fn folder(args: &CalibrateArgs) -> Result<PathBuf, WrongArguments> {
     let beside = || {
         let stem = args.out.file_stem().unwrap_or(args.out.as_os_str()).to_string_lossy();
-        args.out.with_file_name(format!("{stem}-pictures"))
+        args.out.with_file_name(format!("{stem}-images"))
     };
     let folder = args.images.clone().unwrap_or_else(beside);
     let is_empty = match std::fs::read_dir(&folder) {
@@ -90,15 +89,15 @@ fn folder(args: &CalibrateArgs) -> Result<PathBuf, WrongArguments> {
     if is_empty {
         return Ok(folder);
     }
-    Err(WrongArguments::new(format!(
+    Err(wrong!(
         "{}: expected an empty folder, or none; name another with --images, or calibrate from \
          the images in it with `truebead calibrate {}`",
         folder.display(),
         folder.display()
-    )))
+    ))
 }
 
-/// What has been taken, and what is said about it.
+/// The images taken so far, and the output about them.
 struct Taking<'a> {
     args: &'a CalibrateArgs,
     board: &'a Board,
@@ -110,23 +109,6 @@ struct Taking<'a> {
 }
 
 impl<'a> Taking<'a> {
-    fn new(
-        args: &'a CalibrateArgs,
-        board: &'a Board,
-        folder: PathBuf,
-        is_folder_new: bool,
-    ) -> Self {
-        Self {
-            args,
-            board,
-            folder,
-            is_folder_new,
-            collector: Collector::new(*board),
-            files: Vec::new(),
-            screen: Screen::new(),
-        }
-    }
-
     fn run(&mut self, camera: &mut dyn FrameSource, stop: &StopSignal) -> anyhow::Result<()> {
         self.screen
             .say("lay the board flat on the bed, in the middle of the image, and let it lie");
@@ -155,7 +137,7 @@ impl<'a> Taking<'a> {
         Ok(())
     }
 
-    /// Whether the pictures are enough.
+    /// Takes a frame; returns whether the images are enough.
     fn examine(&mut self, frame: &Frame) -> anyhow::Result<bool> {
         match self.collector.add(board_observation::observe(self.board, "", frame)) {
             Decision::Kept(number) => self.keep(number, frame),
@@ -191,33 +173,32 @@ impl<'a> Taking<'a> {
         Ok(self.assess(number) || number >= MAX_VIEWS)
     }
 
-    /// Says how far the pictures have come, and writes the report; whether they are
-    /// enough. While there are few they may make no camera; then more are taken.
+    /// Prints the progress and writes the report; returns whether the images are enough. A few
+    /// images may not determine a camera; then more are taken.
     fn assess(&mut self, number: usize) -> bool {
-        let pictures = taken_so_far(&self.files, self.collector.kept());
-        let conclusion = match CalibrationResult::of(self.args, self.board, &pictures) {
-            Ok(conclusion) => conclusion,
+        let images = taken_so_far(&self.files, self.collector.kept());
+        let result = match CalibrationResult::of(self.args, self.board, &images) {
+            Ok(result) => result,
             Err(error) => {
                 self.screen.say(&format!("  not yet a calibration: {error:#}"));
                 return false;
             }
         };
-        self.screen.say(&progress(self.args, &conclusion));
-        let page =
-            conclusion.calibration().map(|c| conclusion.page(&conclusion.text(&c), Some(RELOAD_S)));
+        self.screen.say(&progress(self.args, &result));
+        let page = result.calibration().map(|c| result.page(&result.text(&c), Some(RELOAD_S)));
         let report = self.args.report();
         match page.map(|page| write_atomic(&report, page.as_bytes())) {
             Ok(Ok(())) if number == MIN_VIEWS => {
                 self.screen.say(&format!("  open {} to follow it", report.display()));
             }
             Ok(Ok(())) | Err(_) => {}
-            // It is written once more at the end, and fails there if it must.
+            // It is written once more at the end; an error there is final.
             Ok(Err(error)) => self.screen.state(&error.to_string()),
         }
-        is_enough(self.args, &conclusion)
+        is_enough(self.args, &result)
     }
 
-    /// Takes the folder away again, into which nothing was put.
+    /// Removes the folder where it is new and empty.
     fn clear(&self) {
         if self.is_folder_new {
             let _ = std::fs::remove_dir(&self.folder);
@@ -229,50 +210,43 @@ impl<'a> Taking<'a> {
         if self.files.is_empty() {
             bail!("the camera has not shown the board lying still on the bed; nothing was written");
         }
-        let pictures = taken_so_far(&self.files, self.collector.kept());
+        let images = taken_so_far(&self.files, self.collector.kept());
         say!("{} images in {}\n", self.files.len(), self.folder.display());
-        Ok(pictures)
+        Ok(images)
     }
 }
 
-/// Whether nothing speaks against the calibration, and widths are known as well as was
-/// asked for, or as well as one more image would let them be known.
-fn is_enough(args: &CalibrateArgs, conclusion: &CalibrationResult<'_>) -> bool {
+/// Whether the calibration has no warnings, and the standard deviation of a width meets its limit
+/// or, without a limit, one more image would not reduce it.
+fn is_enough(args: &CalibrateArgs, result: &CalibrationResult<'_>) -> bool {
     let known = match args.max_width_sigma_mm {
-        Some(_) => !conclusion.fails(),
-        None => conclusion.worst_mm().is_some() && conclusion.next.is_none(),
+        Some(_) => !result.fails(),
+        None => result.worst_mm().is_some() && result.next.is_none(),
     };
-    known && warnings::warnings(&conclusion.solution).is_empty()
+    known && warnings::warnings(&result.solution).is_empty()
 }
 
-/// How far the images have come.
-fn progress(args: &CalibrateArgs, conclusion: &CalibrationResult<'_>) -> String {
-    let coverage = Coverage::of(&conclusion.solution);
+/// Uncertainty and coverage of the images so far.
+fn progress(args: &CalibrateArgs, result: &CalibrationResult<'_>) -> String {
+    let coverage = Coverage::of(&result.solution);
     let mut text = String::new();
-    let width = conclusion.worst_mm().map_or_else(
-        || "how well a width is known cannot be determined yet".to_owned(),
-        |worst| format!("a width is known to {worst:.4} mm where boards were seen"),
+    let width = result.worst_mm().map_or_else(
+        || "the uncertainty of a width cannot be determined yet".to_owned(),
+        |worst| format!("uncertainty of a width {worst:.4} mm (1 sigma) where boards were seen"),
     );
     let asked = args.max_width_sigma_mm;
-    let asked = asked.map_or_else(String::new, |limit| format!(" ({} mm asked for)", limit.get()));
+    let asked = asked.map_or_else(String::new, |limit| format!(" (limit {} mm)", limit.get()));
     let _ = writeln!(text, "  {width}{asked}");
     let tilts = SIDES.iter().zip(coverage.tilts).map(|(side, count)| format!("{side} {count}"));
-    let missing = coverage.missing_tilts();
-    let missing = if missing.is_empty() {
-        String::new()
-    } else {
-        format!("; missing: {}", missing.join(", "))
-    };
+    let mut missing = coverage.missing_tilts().join(", ");
+    if !missing.is_empty() {
+        missing.insert_str(0, "; missing: ");
+    }
     let beside = [
         format!("boards in {} of {PARTS} parts of the image", coverage.count()),
         format!("side that was nearer: {}{missing}", tilts.collect::<Vec<_>>().join(", ")),
-        conclusion
-            .next
-            .as_ref()
-            .map_or_else(String::new, |next| format!("would help most: {next}")),
-        warnings::warnings(&conclusion.solution)
-            .first()
-            .map_or_else(String::new, ToString::to_string),
+        result.next.as_ref().map_or_else(String::new, |next| format!("would help most: {next}")),
+        warnings::warnings(&result.solution).first().map_or_else(String::new, ToString::to_string),
     ];
     for (row, beside) in coverage.cells.iter().zip(beside) {
         let row: String = row.iter().map(|&seen| if seen { '#' } else { '.' }).collect();
@@ -287,7 +261,7 @@ fn words(news: &Decision) -> String {
         Decision::Moving => "the board moves: hold it still".to_owned(),
         Decision::Waiting => "still: a moment".to_owned(),
         Decision::Known(number) => format!("the board is where it was in view {number}: move it"),
-        Decision::OtherSize => "the camera's pictures have changed their size".to_owned(),
+        Decision::OtherSize => "the size of the camera's images has changed".to_owned(),
         Decision::Refused(refusal) => refusal.to_string(),
     }
 }
@@ -318,7 +292,7 @@ impl Screen {
         self.bar.set_message(text.to_owned());
         let kind: String = text.chars().filter(|letter| !letter.is_ascii_digit()).collect();
         if self.is_plain && kind != self.last {
-            // Where standard error is gone there is nobody to tell.
+            // A closed standard error is no reason to stop.
             let _ = writeln!(std::io::stderr(), "{text}");
         }
         self.last = kind;

@@ -14,21 +14,18 @@ use crate::calibration::solve::Solution;
 use crate::cli::arguments::WrongArguments;
 use crate::cli::bed_plane::{BedPlane, BoardsOnBed, find_corners};
 
-/// Corners on the bed may be so many times further off than those of the other
-/// pictures, and so far in any case \[px\]; beyond that the pictures do not belong to
-/// this camera, or the boards lay on no plane.
+/// Reprojection error (RMS) of corners on the bed that is accepted, as a multiple of that of the
+/// other images. Beyond it the images are not of this camera, or the boards lay on no plane.
 const MAX_RMS_RATIO: f64 = 4.0;
+/// Reprojection error (RMS) that is accepted in any case \[px\]: a very good calibration must not
+/// refuse a usual image.
 const MIN_ACCEPTED_RMS_PX: f64 = 0.3;
 
 /// Finds a mistyped image before the long work.
 pub fn check(planes: &[PathBuf], files: &[PathBuf]) -> Result<(), WrongArguments> {
     match planes.iter().find(|path| !path.is_file() && index_of(path, files).is_none()) {
         Some(path) => {
-            let what = format!(
-                "--plane {}: no such image in the folder, and no such file",
-                path.display()
-            );
-            Err(WrongArguments::new(what))
+            Err(wrong!("--plane {}: no such image in the folder, and no such file", path.display()))
         }
         None => Ok(()),
     }
@@ -51,24 +48,23 @@ pub fn find(
     args: &CalibrateArgs,
     board: &Board,
     solution: &Solution,
-    pictures: &CalibrationImages,
+    images: &CalibrationImages,
 ) -> anyhow::Result<BedPlane> {
-    let CalibrationImages { files, found: looks, on_bed: named } = pictures;
+    let CalibrationImages { files, found, on_bed: named } = images;
     let mut boards = BoardsOnBed::of(board);
     let mut passed_over = Vec::new();
     if named.is_empty() {
-        let (last, later) =
-            last_with_board(solution, looks).context("no picture shows the board")?;
+        let (last, later) = last_with_board(solution, found).context("no image shows the board")?;
         boards.add(last.to_owned(), corners_of(solution, last).unwrap_or_default())?;
         passed_over = later;
     }
     for path in named {
-        let (image, corners) = on_bed(path, board, solution, (files, looks))?;
+        let (image, corners) = on_bed(path, board, solution, (files, found))?;
         boards.add(image, corners)?;
     }
-    let most_px = (MAX_RMS_RATIO * solution.rms_px).max(MIN_ACCEPTED_RMS_PX);
+    let max_px = (MAX_RMS_RATIO * solution.rms_px).max(MIN_ACCEPTED_RMS_PX);
     let other = format!("the other images have {:.2} px", solution.rms_px);
-    let (images, on_bed) = boards.fit(&solution.model, most_px, &other)?;
+    let (images, on_bed) = boards.fit(&solution.model, max_px, &other)?;
     Ok(BedPlane {
         images,
         assumed: named.is_empty(),
@@ -79,15 +75,15 @@ pub fn find(
     })
 }
 
-/// The last picture that shows a board, or its twin where the board was in its place
-/// before; and those after it that show a board, but were refused.
+/// The last image that shows a board, or its duplicate at the same position; and the images after
+/// it that show a board, but were rejected.
 fn last_with_board<'a>(
     solution: &'a Solution,
-    looks: &'a Observations,
+    found: &'a Observations,
 ) -> Option<(&'a str, Vec<String>)> {
     let mut later = Vec::new();
-    for (name, look) in looks.iter().rev() {
-        match look {
+    for (name, board) in found.iter().rev() {
+        match board {
             Ok(_) if solution.views.iter().any(|view| view.name == *name) => {
                 return Some((name, later));
             }
@@ -108,22 +104,22 @@ fn corners_of(solution: &Solution, name: &str) -> Option<Vec<CornerObservation>>
     solution.views.iter().find(|view| view.name == name).map(|view| view.corners.clone())
 }
 
-/// The board's corners in the named picture: out of the folder's where it took part,
-/// else looked for anew.
+/// The board's corners in the named image: those of the calibration where it took part, else
+/// found again.
 fn on_bed(
     path: &Path,
     board: &Board,
     solution: &Solution,
-    (files, looks): (&[PathBuf], &Observations),
+    (files, found): (&[PathBuf], &Observations),
 ) -> anyhow::Result<(String, Vec<CornerObservation>)> {
-    if let Some((file, (name, look))) =
-        index_of(path, files).and_then(|index| Some((files.get(index)?, looks.get(index)?)))
+    if let Some((file, (name, observed))) =
+        index_of(path, files).and_then(|index| Some((files.get(index)?, found.get(index)?)))
     {
-        return match look {
+        return match observed {
             Ok(_) => corners_of(solution, name)
                 .map(|corners| (name.clone(), corners))
                 .with_context(|| format!("--plane {name}: not used")),
-            // A board that is in one place twice still lies on the bed.
+            // A board that is twice at one position still lies on the bed.
             Err(BoardRejection::Duplicate { .. }) => {
                 find_corners(file, board, solution.image_size_px)
             }

@@ -1,32 +1,30 @@
-//! What `calibrate` prints.
+//! The text that `calibrate` prints.
 
 use std::fmt::Write;
 
-use crate::calibration::Calibration;
 use crate::calibration::board_observation::Observations;
 use crate::calibration::camera::NUMBERS;
 use crate::calibration::covariance::CalibrationCovariance;
 use crate::calibration::next_view::NextView;
-use crate::calibration::scale::single_scale;
+use crate::calibration::scale::{SingleScale, single_scale};
 use crate::calibration::solve::{SHARED_NAMES, Solution};
-use crate::calibration::warnings;
-use crate::calibration::width_map;
-use crate::calibration::width_map::WidthMap;
+use crate::calibration::width_map::{self, WidthMap};
+use crate::calibration::{Calibration, warnings};
 use crate::core::units::Mm;
 
-/// One line an image: corners and errors, or why it is not used.
-pub fn images(looks: &Observations, solution: &Solution) -> String {
+/// One line for each image: corners and errors, or why it is not used.
+pub fn images(observed: &Observations, solution: &Solution) -> String {
     let mut out = String::new();
-    let column = name_column(looks);
+    let column = name_column(observed);
     line!(out, "{:column$}  corners  rms px  max px", "image");
-    for (name, look) in looks {
+    for (name, board) in observed {
         let view = solution.views.iter().find(|view| view.name == *name);
-        match (look, view) {
-            (Err(refusal), _) => line!(out, "{name:column$}        -  {refusal}"),
-            (Ok(sighting), Some(view)) => line!(
+        match (board, view) {
+            (Err(why), _) => line!(out, "{name:column$}        -  {why}"),
+            (Ok(board), Some(view)) => line!(
                 out,
                 "{name:column$}  {:7}  {:6.3}  {:6.3}",
-                sighting.corners.len(),
+                board.corners.len(),
                 view.rms_px,
                 view.max_px
             ),
@@ -37,41 +35,40 @@ pub fn images(looks: &Observations, solution: &Solution) -> String {
         out,
         "\n{} of {} images show the board; reprojection error {:.4} px (RMS)",
         solution.views.len(),
-        looks.len(),
+        observed.len(),
         solution.rms_px
     );
     out
 }
 
-/// One line an image that is not used, for the case that nothing else can be
-/// said.
-pub fn refusals(looks: &Observations) -> String {
+/// One line for each image where no calibration is found.
+pub fn refusals(observed: &Observations) -> String {
     let mut out = String::new();
-    let column = name_column(looks);
-    for (name, look) in looks {
-        match look {
+    let column = name_column(observed);
+    for (name, board) in observed {
+        match board {
             Ok(_) => line!(out, "{name:column$}  shows the board"),
-            Err(refusal) => line!(out, "{name:column$}  {refusal}"),
+            Err(why) => line!(out, "{name:column$}  {why}"),
         }
     }
     out
 }
 
-fn name_column(looks: &Observations) -> usize {
-    looks.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max("image".len())
+fn name_column(observed: &Observations) -> usize {
+    observed.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max("image".len())
 }
 
-/// The models of the lens that were tried, and which one was taken.
+/// The lens models with their reprojection errors, and the one that is used.
 pub fn lens(solution: &Solution) -> String {
     let mut out = String::new();
-    line!(out, "\nlens: what each model leaves, and of images that took no part in it");
-    line!(out, "  {:28}  rms px  held out px", "coefficients");
+    line!(out, "\nlens: reprojection error of each model, and on images left out of its fit");
+    line!(out, "  {:28}  rms px  left out px", "coefficients");
     for trial in &solution.trials {
         let name = trial.free.lens.map_or("", |lens| lens.name());
         let bend = if trial.free.bend { ", bent board" } else { "" };
         let held_out =
             trial.cross_validation_px.map_or_else(|| "unknown".to_owned(), |px| format!("{px:.4}"));
-        let folds = if trial.is_non_monotonic { "  turns over within the picture" } else { "" };
+        let folds = if trial.is_non_monotonic { "  non-monotonic within the image" } else { "" };
         let mark = if trial.free == solution.free { "  <- taken" } else { "" };
         line!(
             out,
@@ -83,10 +80,10 @@ pub fn lens(solution: &Solution) -> String {
     out
 }
 
-/// Design effect from which on it is no chance: its own standard error is some 0.16 with a
-/// dozen pictures.
+/// Design effect from which it is reported. Derived: 1 + 3·0.16, three of its standard errors
+/// above 1 with a dozen images.
 const REPORTED_EFFECT: f64 = 1.5;
-/// Letters of the longest name of a number.
+/// Length of the longest name of a parameter \[letters\].
 const NAME: usize = 18;
 
 /// Intrinsics and distortion with their standard deviations.
@@ -110,21 +107,18 @@ pub fn camera(solution: &Solution) -> String {
     }
     line!(out, "  noise of a corner: {:.3} px", solution.noise_px);
     if solution.design_effect > REPORTED_EFFECT {
+        let times = solution.design_effect.sqrt();
         line!(
             out,
-            "  the images contradict each other more than such noise explains (a board that is"
+            "  the images contradict each other more than such noise explains (a board that is\n  \
+             not flat, a lens that no model describes): all standard deviations are {times:.1} times\n  \
+             as large as that of independent corners"
         );
-        line!(
-            out,
-            "  not flat, a lens that no model describes): all standard deviations are {:.1} times",
-            solution.design_effect.sqrt()
-        );
-        line!(out, "  as large as that of independent corners");
     }
     out
 }
 
-/// How far a width can be trusted.
+/// Relative standard deviation of a width.
 pub fn width(
     calibration: &Calibration,
     covariance: Option<&CalibrationCovariance>,
@@ -135,42 +129,42 @@ pub fn width(
         Calibration::Full { quality: Some(quality), .. } => quality.width_relative_sigma,
         _ => None,
     };
-    let (Some(covariance), Some(share)) = (covariance, quality) else {
+    let (Some(covariance), Some(sigma)) = (covariance, quality) else {
         line!(
             out,
-            "\nhow well a width on the bed is known cannot be determined, and is not in the file: the"
+            "\nthe uncertainty of a width on the bed cannot be determined, and is not in the file: the\n  \
+             images do not determine the camera's parameters; tilt the board by 20 to 45\n  \
+             degrees to several sides"
         );
-        line!(out, "  images do not tell the camera's numbers apart; tilt the board by 20 to 45");
-        line!(out, "  degrees to several sides");
         return out;
     };
     let given = maps.first().filter(|_| width_map::worst_mm(maps).is_some());
     let bead = given.map_or_else(
         || " of a bead that fills a third of where boards were seen,".to_owned(),
-        |map| format!(" ({:.4} mm in {} mm)", share * map.bead_mm, map.bead_mm),
+        |map| format!(" ({:.4} mm in {} mm)", sigma * map.bead_mm, map.bead_mm),
     );
-    line!(out, "\na width is known to {:.3} %{bead} where boards were seen,", 100.0 * share);
-    line!(out, "  as far as the corners tell; sigma_mm of each width contains what is left open");
-    line!(out, "  at its own place, which `truebead check` draws with the gauge");
-    let [from, to] = covariance.seen_px();
     line!(
         out,
-        "  boards were seen in columns {:.0} to {:.0} and rows {:.0} to {:.0}; beads of another",
-        from.x,
-        to.x,
-        from.y,
-        to.y
+        "\nuncertainty of a width {:.3} %{bead} (1 sigma) where boards were seen,",
+        100.0 * sigma
     );
-    line!(out, "  width have another share: give yours as --bead-mm");
+    line!(out, "  from the noise of the corners; sigma_mm of each width contains the uncertainty");
+    line!(out, "  at its own position, which `truebead check` draws with the gauge");
+    let [[left, top], [right, bottom]] = covariance.seen_px().map(|px| [px.x, px.y]);
+    line!(
+        out,
+        "  boards were seen in columns {left:.0} to {right:.0} and rows {top:.0} to {bottom:.0}; \
+         beads of another\n  width have another uncertainty: give yours as --bead-mm"
+    );
     out
 }
 
-/// What is left open in the width of one bead, in millimetres, at each height.
+/// Standard deviation of the width of one bead \[mm\] at each height.
 pub fn maps(maps: &[WidthMap], limit: Option<Mm>) -> String {
     let mut out = String::new();
     let Some(first) = maps.first() else {
         if limit.is_some() {
-            line!(out, "\nFAIL: how well a width is known cannot be determined");
+            line!(out, "\nFAIL: the uncertainty of a width cannot be determined");
         }
         return out;
     };
@@ -202,7 +196,7 @@ pub fn maps(maps: &[WidthMap], limit: Option<Mm>) -> String {
     out
 }
 
-/// What one more picture would bring.
+/// The further image that would help most.
 pub fn next_view(covariance: Option<&CalibrationCovariance>, next: Option<&NextView>) -> String {
     let mut out = String::new();
     match (covariance, next) {
@@ -218,7 +212,7 @@ pub fn next_view(covariance: Option<&CalibrationCovariance>, next: Option<&NextV
     out
 }
 
-/// The single number of the 2022 paper, and what it is worth.
+/// The single scale of Shojaei Barjuei et al. 2022, and its errors over the image.
 pub fn scale(
     calibration: &Calibration,
     covariance: Option<&CalibrationCovariance>,
@@ -226,46 +220,36 @@ pub fn scale(
 ) -> String {
     let mut out = String::new();
     let Some(scale) = single_scale(calibration, face) else {
-        line!(
-            out,
-            "\nno single mm-per-pixel number: the middle of the image does not see the plane"
-        );
+        let what = "no single mm-per-pixel number: the middle of the image does not see the plane";
+        line!(out, "\n{what}");
         return out;
     };
-    let percent = |size: f64| 100.0 * (scale.mm_per_px / size - 1.0);
+    let SingleScale { mm_per_px, smallest, largest, uneven } = scale;
+    let [low, high] = [largest, smallest].map(|size| 100.0 * (mm_per_px / size - 1.0));
     let sigma =
         covariance.and_then(|covariance| covariance.mm_per_px(face)).map(|(_, sigma)| sigma);
     let spread = sigma.map_or_else(String::new, |sigma| format!(" ± {sigma:.6}"));
-    line!(out, "\nsingle number: {:.6}{spread} mm/px", scale.mm_per_px);
-    line!(out, "  holds in the middle of the image for a surface {face} above the bed;");
     line!(
         out,
-        "  elsewhere on it a pixel is {:.6} to {:.6} mm, so that a width comes out",
-        scale.smallest,
-        scale.largest
+        "\nsingle number: {mm_per_px:.6}{spread} mm/px\n  \
+         holds in the middle of the image for a surface {face} above the bed;\n  \
+         elsewhere on it a pixel is {smallest:.6} to {largest:.6} mm, so that a width comes out\n  \
+         {low:+.1} to {high:+.1} % wrong; to use it, write mm_per_px = {mm_per_px:.6} in place of\n  \
+         file = … in the [calibration] of a cell file"
     );
-    line!(
-        out,
-        "  {:+.1} to {:+.1} % wrong; to use it, write mm_per_px = {:.6} in place of",
-        percent(scale.largest),
-        percent(scale.smallest),
-        scale.mm_per_px
-    );
-    line!(out, "  file = … in the [calibration] of a cell file");
     if let Some(sigma) = sigma {
-        line!(out, "  and, for a bead in the middle, mm_per_px_sigma = {:.6} beside it:", {
-            sigma.hypot(scale.uneven)
-        });
         line!(
             out,
-            "  the pixel there is {:.6} mm longer one way than the other",
-            2.0 * scale.uneven
+            "  and, for a bead in the middle, mm_per_px_sigma = {:.6} beside it:\n  \
+             the pixel there is {:.6} mm longer one way than the other",
+            sigma.hypot(uneven),
+            2.0 * uneven
         );
     }
     out
 }
 
-/// Reasons for doubt.
+/// Warnings about the calibration.
 pub fn warnings(solution: &Solution) -> String {
     let mut out = String::new();
     let warnings = warnings::warnings(solution);

@@ -16,7 +16,7 @@ Example:
   truebead camera board --board 9x6 --square-mm 20 --out board.pdf
 
 Print it at 100 %, without \"fit to page\", and measure the bar below it. Glue it
-to something flat and stiff. calib/README.md tells how to take the images.")]
+to something flat and stiff. calib/README.md says how to take the images.")]
 pub struct SheetArgs {
     #[command(flatten)]
     board: BoardArgs,
@@ -53,9 +53,7 @@ pub fn run(args: &SheetArgs) -> anyhow::Result<()> {
         Some("pdf") => sheet.pdf(),
         Some("svg") => sheet.svg().into_bytes(),
         _ => {
-            let what =
-                format!("--out {}: expected a name that ends in .pdf or .svg", args.out.display());
-            return Err(WrongArguments::new(what).into());
+            refuse!("--out {}: expected a name that ends in .pdf or .svg", args.out.display());
         }
     };
     write_atomic(&args.out, &bytes)?;

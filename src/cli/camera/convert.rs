@@ -22,8 +22,7 @@ pub fn run(args: &ConvertArgs, voice: Verbosity) -> anyhow::Result<()> {
     let (source, mut notes) = read(args)?;
     let text = match (&source, to) {
         (ConvertSource::Truebead(..), To::Truebead) => {
-            let what = format!("{}: it is truebead's already", args.input.display());
-            return Err(WrongArguments::new(what).into());
+            refuse!("{}: it is truebead's already", args.input.display());
         }
         (ConvertSource::Other(import), To::Truebead) => import::text(args, import, &mut notes)?,
         (source, To::Ros) => {
@@ -55,8 +54,8 @@ fn ends_in(path: &Path, endings: &[&str]) -> bool {
 const YAML: &[&str] = &["yaml", "yml"];
 const TOML: &[&str] = &["toml"];
 
-/// Whose file is wanted; its name must say what is in it, by which others choose how
-/// they read it.
+/// The format of the output; its name must have the ending by which other programs recognise
+/// it.
 fn target(args: &ConvertArgs) -> Result<To, WrongArguments> {
     let is_toml = ends_in(&args.out, TOML);
     let out = args.out.display();
@@ -75,47 +74,46 @@ fn target(args: &ConvertArgs) -> Result<To, WrongArguments> {
 
 fn check(args: &ConvertArgs, to: To) -> Result<(), WrongArguments> {
     check_writable("out", &args.out)?;
-    let wrong = |what: String| Err(WrongArguments::new(what));
     let input = args.input.display();
     if !ends_in(&args.input, TOML) && !ends_in(&args.input, YAML) {
-        return wrong(format!(
+        refuse!(
             "{input}: expected a name that ends in .toml, .yaml or .yml; other formats of ROS and \
              OpenCV are not read, write YAML there"
-        ));
+        );
     }
     if !args.input.is_file() {
-        return wrong(format!("{input}: no such file"));
+        refuse!("{input}: no such file");
     }
     if args.out.canonicalize().is_ok_and(|out| args.input.canonicalize().is_ok_and(|i| i == out)) {
-        return wrong(format!("--out {input}: it is the input, name another file"));
+        refuse!("--out {input}: it is the input, name another file");
     }
     if let Some(path) = args.plane.iter().find(|path| !path.is_file()) {
-        return wrong(format!("--plane {}: no such file", path.display()));
+        refuse!("--plane {}: no such file", path.display());
     }
     if args.board_thickness_mm.is_some_and(|thickness| thickness < Mm::ZERO) {
-        return wrong("the board's thickness cannot be below 0 mm".to_owned());
+        refuse!("the board's thickness cannot be below 0 mm");
     }
     if args.camera_name.is_some() && to != To::Ros {
-        return wrong("--camera-name: only ROS's files have one (--to ros)".to_owned());
+        refuse!("--camera-name: only ROS's files have one (--to ros)");
     }
     match (to, args.plane.is_empty()) {
-        (To::Truebead, true) if ends_in(&args.input, YAML) => wrong(format!(
+        (To::Truebead, true) if ends_in(&args.input, YAML) => refuse!(
             "{input} holds no bed plane: lay a board flat on the bed, take an image, and give \
              --plane IMAGE --board COLUMNSxROWS --square-mm MM"
-        )),
+        ),
         (To::Ros | To::Opencv, false) => {
-            wrong("--plane: files of ROS and OpenCV hold no bed plane; leave it out".to_owned())
+            refuse!("--plane: files of ROS and OpenCV hold no bed plane; leave it out")
         }
         _ => Ok(()),
     }
 }
 
-/// What is converted.
+/// The source of a conversion.
 #[expect(clippy::large_enum_variant, reason = "there is one, read once")]
 enum ConvertSource {
-    /// A calibration of ours: what others can hold of it, and what the pictures said.
+    /// A calibration of truebead: its intrinsics, and its quality.
     Truebead(Intrinsics, Option<CalibrationQuality>),
-    /// A file of others.
+    /// A file of ROS or OpenCV.
     Other(Import),
 }
 
@@ -142,27 +140,20 @@ impl ConvertSource {
         }
     }
 
-    /// What a file of this format does not hold, in words; `None` where nothing is lost.
+    /// A note about the data that the format cannot hold; `None` where nothing is lost.
     fn left_out(&self, to: To) -> Option<String> {
         let is_given = |quality: &CalibrationQuality| {
-            let CalibrationQuality {
-                reprojection_rms_px: _,
-                width_relative_sigma,
-                seen_px,
-                heights_mm,
-                uncertainty,
-            } = quality;
-            width_relative_sigma.is_some()
-                || seen_px.is_some()
-                || heights_mm.is_some()
-                || uncertainty.is_some()
+            quality.width_relative_sigma.is_some()
+                || quality.seen_px.is_some()
+                || quality.heights_mm.is_some()
+                || quality.uncertainty.is_some()
         };
         let mut lost = Vec::new();
         let mut way_back = "";
         if let Self::Truebead(_, quality) = self {
             lost.push("the bed plane and the robot's z");
             if quality.as_ref().is_some_and(is_given) {
-                lost.push("how well a width is known and where boards were seen");
+                lost.push("the uncertainty of a width and where boards were seen");
             }
             way_back = "; keep the .toml: on the way back the bed plane needs images of a board \
                         (--plane), and the calibration's part of sigma_mm stays unknown";
@@ -178,6 +169,6 @@ impl ConvertSource {
             [] => (*last).to_owned(),
             _ => format!("{}, and {last}", first.join(", ")),
         })?;
-        Some(format!("{format} has no place for {lost}{way_back}"))
+        Some(format!("{format} cannot hold {lost}{way_back}"))
     }
 }

@@ -5,21 +5,20 @@ mod arguments;
 mod board;
 mod recording;
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 use std::process::ExitCode;
 
 pub use self::arguments::OffsetArgs;
 use crate::cli::arguments::WrongArguments;
+use crate::cli::recorded::begins_with;
 
-/// What an MCAP file begins with.
+/// First bytes of an MCAP file (MCAP specification, § Magic).
 const MCAP: &[u8] = b"\x89MCAP0\r\n";
 
 /// Runs the command; the answer goes to standard output.
 pub fn run(args: &OffsetArgs) -> anyhow::Result<ExitCode> {
     if is_recording(&args.input)? {
-        args.refuse("a recording", &args.of_picture())?;
+        args.refuse("a recording", &args.of_image())?;
         recording::run(args)?;
     } else {
         args.refuse("an image", &[("--max-mm", args.max_mm.is_some())])?;
@@ -28,15 +27,11 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Told by what the file begins with, whatever it is called.
+/// Decided by the first bytes of the file, whatever its name.
 fn is_recording(path: &Path) -> Result<bool, WrongArguments> {
-    let wrong = |what: String| WrongArguments::new(format!("{}: {what}", path.display()));
+    let wrong = |what: String| wrong!("{}: {what}", path.display());
     if path.is_dir() {
         return Err(wrong("a folder, expected a recording or an image".to_owned()));
     }
-    let mut begin = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(MCAP.len() as u64).read_to_end(&mut begin))
-        .map_err(|error| wrong(error.to_string()))?;
-    Ok(begin == MCAP)
+    begins_with(path, MCAP).map_err(|error| wrong(error.to_string()))
 }

@@ -8,25 +8,25 @@ use clap::Args;
 
 use crate::calibration::Calibration;
 use crate::calibration::verify::{Findings, verify};
-use crate::cli::arguments::WrongArguments;
 use crate::cli::arguments::parse_length;
 use crate::cli::board_arguments::BoardArgs;
 use crate::cli::board_image::{check_size, find_board};
 use crate::core::units::Mm;
 use crate::io::calibration_file;
 
-/// Largest error of a width that is borne unless another is given \[%\].
+/// Default of the largest error of a width that is accepted \[%\].
 const MAX_ERROR_PERCENT: f64 = 0.2;
-/// Standard deviations of what the calibration itself leaves that are borne, too.
+/// Standard deviations of the calibration's own uncertainty that are accepted besides. Derived:
+/// P(|z| > 3) is 0.27 % for a normal deviate.
 const ACCEPTED_SIGMAS: f64 = 3.0;
-/// A lens leaves so many times what it left when it was calibrated.
+/// Ratio of the lens's reprojection error to that of its calibration above which it has changed.
 const MAX_LENS_RATIO: f64 = 2.0;
-/// A lens that leaves less is sound in any case \[px\].
+/// Reprojection error below which a lens is unchanged in any case \[px\].
 const LENS_CHANGED_PX: f64 = 0.15;
-/// A board that is further off its place than this is higher, and not the noise
-/// \[mm\].
+/// Height error above which the board is reported as higher or lower \[mm\]; below it, noise
+/// explains it.
 const HIGHER_MM: f64 = 0.3;
-/// A board that is tilted against the bed by more than this does not lie on it \[°\].
+/// Tilt against the bed above which a board does not lie flat \[°\].
 const FLAT_DEG: f64 = 2.0;
 
 /// Measures a board on the bed and says whether the calibration still holds.
@@ -58,38 +58,35 @@ pub struct VerifyArgs {
 pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     let board = args.board.board()?;
     if !(args.max_error_percent.is_finite() && args.max_error_percent > 0.0) {
-        let what =
-            format!("--max-error-percent: found {}, expected more than 0", args.max_error_percent);
-        return Err(WrongArguments::new(what).into());
+        refuse!("--max-error-percent: found {}, expected more than 0", args.max_error_percent);
     }
     if args.board_thickness_mm < Mm::ZERO {
-        return Err(WrongArguments::new("the board's thickness cannot be below 0 mm").into());
+        refuse!("the board's thickness cannot be below 0 mm");
     }
     if !args.image.is_file() {
-        let what = format!("{}: no such image", args.image.display());
-        return Err(WrongArguments::new(what).into());
+        refuse!("{}: no such image", args.image.display());
     }
     let calibration = calibration_file::read(&args.calibration)?;
     let name = args.image.display().to_string();
-    let sighting = find_board(&board, &name, &args.image).with_context(|| name.clone())?;
+    let seen = find_board(&board, &name, &args.image).with_context(|| name.clone())?;
     if let Some(expected) = calibration.image_size_px() {
-        check_size(&sighting, expected)?;
+        check_size(&seen, expected)?;
     }
-    let found = verify(&calibration, &board, &sighting.corners, args.board_thickness_mm)
+    let found = verify(&calibration, &board, &seen.corners, args.board_thickness_mm)
         .map_err(anyhow::Error::from)
         .with_context(|| name.clone())?;
-    let (rms_px, share) = match &calibration {
+    let (rms_px, sigma) = match &calibration {
         Calibration::Full { quality: Some(quality), .. } => {
             (Some(quality.reprojection_rms_px), quality.width_relative_sigma)
         }
         _ => (None, None),
     };
-    let borne = (args.max_error_percent / 100.0).hypot(ACCEPTED_SIGMAS * share.unwrap_or(0.0));
-    tell(&found, args, borne, rms_px);
-    Ok(if found.holds(borne) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    let accepted = (args.max_error_percent / 100.0).hypot(ACCEPTED_SIGMAS * sigma.unwrap_or(0.0));
+    tell(&found, args, accepted, rms_px);
+    Ok(if found.holds(accepted) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn tell(found: &Findings, args: &VerifyArgs, borne: f64, rms_px: Option<f64>) {
+fn tell(found: &Findings, args: &VerifyArgs, accepted: f64, rms_px: Option<f64>) {
     let (column, row, length) = found.worst_at;
     say!("a square measures {:.4} mm ({:+.3} %)", found.square_mm, 100.0 * found.scale_error);
     say!(
@@ -101,24 +98,24 @@ fn tell(found: &Findings, args: &VerifyArgs, borne: f64, rms_px: Option<f64>) {
     );
     say!("corners lie {:.3} mm off a true board (RMS)", found.rms_mm);
     say!(
-        "by its size the board is {:+.2} mm above its place and tilted by {:.2}° against the bed",
+        "by its size the board is {:+.2} mm above its position and tilted by {:.2}° against the bed",
         found.height_mm,
         found.tilt_deg
     );
     let before = rms_px.map_or_else(String::new, |px| format!(" ({px:.3} px when calibrated)"));
     say!("reprojection error of the lens alone {:.3} px{before}", found.reprojection_rms_px);
     let how = format!(
-        "{} % are borne, and {ACCEPTED_SIGMAS} standard deviations of what the calibration leaves",
+        "{} % are accepted, and {ACCEPTED_SIGMAS} standard deviations of the calibration",
         args.max_error_percent
     );
-    if found.holds(borne) {
+    if found.holds(accepted) {
         say!(
             "HOLDS: beyond the corners' noise no width is more than {:.3} % wrong ({how})",
-            100.0 * borne
+            100.0 * accepted
         );
         return;
     }
-    say!("DOES NOT HOLD: a width is more than {:.3} % wrong ({how})", 100.0 * borne);
+    say!("DOES NOT HOLD: a width is more than {:.3} % wrong ({how})", 100.0 * accepted);
     let has_changed =
         |px: f64| found.reprojection_rms_px > (MAX_LENS_RATIO * px).max(LENS_CHANGED_PX);
     if rms_px.is_some_and(has_changed) {

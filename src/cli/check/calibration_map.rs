@@ -1,5 +1,4 @@
-//! What the calibration leaves in a width, all over the image, with the gauge in it: as
-//! text, and as a page.
+//! Relative standard deviation of a width over the image, with the gauge: as text and as a page.
 
 use std::path::Path;
 
@@ -17,8 +16,8 @@ use crate::vision::gauge::BeadAxis;
 /// Cells of the map in text, along the image and across it.
 const TEXT_CELLS: Cells = Cells { columns: 8, rows: 6 };
 
-/// Prints it, and writes the page where one is asked for. Says so where the calibration
-/// has no more than one number for the whole image, or none.
+/// Prints the map, and writes the page where one is asked for. A calibration with one number for
+/// the whole image, or none, has no map.
 pub fn tell(loaded: &LoadedCell, page: Option<&Path>) -> anyhow::Result<()> {
     let Calibration::Full { quality, .. } = &loaded.calibration else {
         anyhow::ensure!(page.is_none(), "--report: mm_per_px has no map of its uncertainty");
@@ -27,12 +26,14 @@ pub fn tell(loaded: &LoadedCell, page: Option<&Path>) -> anyhow::Result<()> {
     let surface = loaded.surface(None);
     let bead = bead(loaded);
     let Some(text) = RelativeSigmaMap::of(&surface, &bead, TEXT_CELLS) else {
-        if let Some(share) = surface.width_relative_sigma() {
-            let percent = 100.0 * share;
-            say!("  sigma        the calibration leaves {percent:.3} % of every width open: one");
+        if let Some(fraction) = surface.width_relative_sigma() {
+            let percent = 100.0 * fraction;
+            say!(
+                "  sigma        uncertainty of every width by the calibration {percent:.3} %: one"
+            );
             say!("               number for the whole image; `calibrate` anew makes a map");
         } else {
-            say!("  sigma        what the calibration leaves in a width is not known");
+            say!("  sigma        the uncertainty of a width by the calibration is unknown");
         }
         anyhow::ensure!(page.is_none(), "--report: the calibration file has no [uncertainty]");
         return Ok(());
@@ -40,18 +41,18 @@ pub fn tell(loaded: &LoadedCell, page: Option<&Path>) -> anyhow::Result<()> {
     let roi = loaded.cell.gauge.roi;
     let in_gauge = relative_sigma_at(&surface, &bead, middle(roi));
     say!(
-        "  sigma        what the calibration leaves in a width of {:.1} mm [% of it], where its",
+        "  sigma        uncertainty of a width of {:.1} mm by the calibration [% of it], where its",
         { bead.width_mm }
     );
     say!("               middle is seen; [ ] in the gauge, - not seen whole");
     for line in lines(&text, roi) {
         say!("               {line}");
     }
-    if let Some(share) = in_gauge {
+    if let Some(fraction) = in_gauge {
         say!(
             "               {:.3} % or {:.4} mm in the middle of the gauge",
-            100.0 * share,
-            share * bead.width_mm
+            100.0 * fraction,
+            fraction * bead.width_mm
         );
     }
     let Some(path) = page else { return Ok(()) };
@@ -101,8 +102,8 @@ fn lines(map: &RelativeSigmaMap, gauge: Roi) -> Vec<String> {
         let cells: String = (0..columns)
             .map(|column| {
                 let cell = row * columns + column;
-                let share = map.cells.get(cell as usize).copied().flatten();
-                let words = share.map_or_else(|| "-".to_owned(), percent);
+                let fraction = map.cells.get(cell as usize).copied().flatten();
+                let words = fraction.map_or_else(|| "-".to_owned(), percent);
                 if map.is_in(gauge, cell) {
                     format!(" [{words:>5}]")
                 } else {
@@ -115,9 +116,9 @@ fn lines(map: &RelativeSigmaMap, gauge: Roi) -> Vec<String> {
     lines
 }
 
-/// Three digits, if they count.
-fn percent(share: f64) -> String {
-    let percent = 100.0 * share;
+/// Three significant digits.
+fn percent(fraction: f64) -> String {
+    let percent = 100.0 * fraction;
     let places = if percent < 1.0 {
         3
     } else if percent < 10.0 {

@@ -11,14 +11,8 @@ use super::log::source::LogSource;
 use crate::identify::grid::usual_step;
 use crate::identify::table::DataTable;
 
-/// One line of the list.
-struct ColumnLine {
-    name: String,
-    unit: String,
-    samples: String,
-    rate: String,
-    range: String,
-}
+/// One line of the list: name, unit, samples, rate and range.
+type ColumnLine = [String; 5];
 
 /// Lists the columns of a table or a recording, with their units and ranges.
 #[derive(Debug, Args)]
@@ -44,21 +38,14 @@ pub fn run(args: &ColumnsArgs) -> Result<()> {
         LogSource::Recording(found) => {
             let lines = found.columns.iter().map(|column| {
                 let column = columns.cut_series(column);
-                ColumnLine::of(&column.name, columns, &column.values, usual_step(&column.time_s))
+                column_line(&column.name, columns, &column.values, usual_step(&column.time_s))
             });
             (lines.collect(), found.notes.clone())
         }
     };
-    let width = lines.iter().map(|line| line.name.len()).max().unwrap_or(0).max("column".len());
-    say!(
-        "{:<width$}  {:<8}{:>9}{:>12}  {}",
-        "column",
-        "unit",
-        "samples",
-        "rate",
-        "from least to most"
-    );
-    for ColumnLine { name, unit, samples, rate, range } in lines {
+    let head = ["column", "unit", "samples", "rate", "from least to most"].map(str::to_owned);
+    let width = lines.iter().map(|[name, ..]| name.len()).max().unwrap_or(0).max("column".len());
+    for [name, unit, samples, rate, range] in [head].into_iter().chain(lines) {
         say!("{name:<width$}  {unit:<8}{samples:>9}{rate:>12}  {range}");
     }
     for note in notes {
@@ -75,14 +62,11 @@ fn of_table(table: &DataTable, columns: &ColumnArgs) -> Vec<ColumnLine> {
         usual_step(&time).map(|step| step * unit_s)
     });
     let line = |name: &String| match table.column(name) {
-        Ok(values) => ColumnLine::of(name, columns, &values, step_s),
-        Err(error) => ColumnLine {
-            name: name.clone(),
-            unit: unit(name, columns),
-            samples: "–".to_owned(),
-            rate: "–".to_owned(),
-            range: error.to_string(),
-        },
+        Ok(values) => column_line(name, columns, &values, step_s),
+        Err(error) => {
+            let none = "–".to_owned();
+            [name.clone(), unit(name, columns), none.clone(), none, error.to_string()]
+        }
     };
     let is_time = |name: &&String| time.as_ref().is_some_and(|(time, _)| time == *name);
     table.names().iter().filter(|name| !is_time(name)).map(line).collect()
@@ -92,17 +76,16 @@ fn unit(name: &str, columns: &ColumnArgs) -> String {
     columns.quantity(name).map_or_else(|_| "unknown".to_owned(), |found| found.unit.to_string())
 }
 
-impl ColumnLine {
-    fn of(name: &str, columns: &ColumnArgs, values: &[f64], step_s: Option<f64>) -> Self {
-        let start = (f64::INFINITY, f64::NEG_INFINITY);
-        let (low, high) = values.iter().fold(start, |(low, high), v| (low.min(*v), high.max(*v)));
-        let rate = step_s.filter(|step| *step > 0.0);
-        Self {
-            name: name.to_owned(),
-            unit: unit(name, columns),
-            samples: values.len().to_string(),
-            rate: rate.map_or_else(|| "–".to_owned(), |step| format!("{:.2} Hz", 1.0 / step)),
-            range: if values.is_empty() { String::new() } else { format!("{low:.4} to {high:.4}") },
-        }
-    }
+fn column_line(
+    name: &str,
+    columns: &ColumnArgs,
+    values: &[f64],
+    step_s: Option<f64>,
+) -> ColumnLine {
+    let start = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = values.iter().fold(start, |(low, high), v| (low.min(*v), high.max(*v)));
+    let rate = step_s.filter(|step| *step > 0.0);
+    let rate = rate.map_or_else(|| "–".to_owned(), |step| format!("{:.2} Hz", 1.0 / step));
+    let range = if values.is_empty() { String::new() } else { format!("{low:.4} to {high:.4}") };
+    [name.to_owned(), unit(name, columns), values.len().to_string(), rate, range]
 }

@@ -5,17 +5,17 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
-use crate::cli::arguments::WrongArguments;
-use crate::cli::arguments::refuse_replacing;
+use super::log::columns::units;
+use crate::cli::arguments::{WrongArguments, refuse_replacing};
 use crate::core::quantity::{Quantity, Unit};
 use crate::identify::command_profile::{CommandProfile, file};
 use crate::identify::digits::six_digits;
 use crate::identify::excitation::{Excitation, Waveform};
 use crate::io::atomic_file::write_atomic;
 
-/// Levels held for less are a slip of the unit \[s\].
+/// Shortest hold time that is accepted \[s\]; a shorter one has a wrong unit.
 const SHORTEST_S: f64 = 1e-3;
-/// How often a cell tells its extruder something, unless it says otherwise \[s\].
+/// Default period of a cell's commands \[s\]: io_rate_hz of 50 Hz.
 const DEFAULT_PERIOD_S: f64 = 0.02;
 
 /// Writes a profile that excites an extruder, so that its model can be found.
@@ -33,7 +33,7 @@ Which hold time: about a third of the time in which the extruder answers; it is 
 up to 0.44 / hold time. The whole should last ten times as long as the slowest answer.
 
 The file has the columns time_s and the quantity; each value holds until the next line,
-and the last line tells the end.")]
+and the last line marks the end.")]
 pub struct ExciteArgs {
     #[command(subcommand)]
     kind: Kind,
@@ -150,8 +150,7 @@ pub fn run(args: &ExciteArgs) -> Result<()> {
             (shape, f64::midpoint(prbs.low, prbs.high), &prbs.all)
         }
         Kind::Gaussian(gaussian) if gaussian.all.duration_s.is_none() => {
-            let what = "random levels go on for ever: tell --duration-s";
-            return Err(WrongArguments::new(what).into());
+            refuse!("random levels have no end: give --duration-s");
         }
         Kind::Gaussian(gaussian) => {
             let &GaussianArgs { low, high, seed, .. } = gaussian;
@@ -181,41 +180,34 @@ pub fn run(args: &ExciteArgs) -> Result<()> {
 impl CommonArgs {
     fn check(&self) -> Result<(), WrongArguments> {
         if Quantity::of_column(&self.quantity, None).is_none() || self.quantity.contains(',') {
-            let units: Vec<&str> = Unit::all().map(Unit::word).collect();
-            return Err(WrongArguments::new(format!(
-                "--quantity {}: expected a name that ends with its unit, one of {}",
-                self.quantity,
-                units.join(", ")
-            )));
+            let (name, units) = (&self.quantity, units());
+            refuse!("--quantity {name}: expected a name that ends with its unit, one of {units}");
         }
         self.check_commanded()?;
         if self.hold_s < SHORTEST_S {
-            return Err(WrongArguments::new(format!(
+            refuse!(
                 "--hold-s {}: expected {SHORTEST_S} s or more: no extruder is commanded so often, and none \
                  answers so fast",
                 self.hold_s
-            )));
+            );
         }
         for (name, value) in [("--lead-in-s", self.lead_in_s), ("--lead-out-s", self.lead_out_s)] {
             if !(0.0..=86_400.0).contains(&value) {
-                let what = format!("{name} {value}: expected 0 to 86400 s");
-                return Err(WrongArguments::new(what));
+                refuse!("{name} {value}: expected 0 to 86400 s");
             }
         }
         Ok(())
     }
-}
 
-impl CommonArgs {
-    /// What an extruder lays is not what it is told.
+    /// Refuses a quantity of the bead, which cannot be commanded.
     fn check_commanded(&self) -> Result<(), WrongArguments> {
         match Unit::of_column(&self.quantity) {
-            Some(unit @ (Unit::Mm | Unit::Mm2)) => Err(WrongArguments::new(format!(
+            Some(unit @ (Unit::Mm | Unit::Mm2)) => Err(wrong!(
                 "--quantity {}: no extruder is commanded a {}; that is what comes of it. Expected what is \
                  commanded, such as screw_rpm, drive_v, nozzle_mpa or flow_mm3_per_s",
                 self.quantity,
                 if unit == Unit::Mm { "width or a length" } else { "section" }
-            ))),
+            )),
             _ => Ok(()),
         }
     }
@@ -235,8 +227,8 @@ fn tell(profile: &CommandProfile, column: &str, out: &Path) {
     say!("values     {} to {} {unit}", six_digits(low), six_digits(high));
 }
 
-/// Which frequencies it excites. Stairs excite most what is slowest, and what is
-/// held a few times only has no band of its own.
+/// Prints the excited frequencies. Steps excite the slowest dynamics most, and a few levels have
+/// no band.
 fn print_band(excitation: &Excitation, (low_hz, high_hz): (f64, f64)) {
     let hold_s = six_digits(excitation.hold_s);
     if matches!(excitation.shape, Waveform::Stairs(_)) || low_hz >= high_hz {

@@ -40,7 +40,7 @@ pub fn run(args: &IdentifyArgs) -> Result<()> {
     Ok(())
 }
 
-/// Writes all that is told of a model, and returns the text of its own file.
+/// Writes all files of a model, and returns the text of `model.toml`.
 fn write(found: &ModelStudy, setting: Conditions, folder: &Path) -> Result<String> {
     make_folder(folder)?;
     let notes = [
@@ -51,8 +51,7 @@ fn write(found: &ModelStudy, setting: Conditions, folder: &Path) -> Result<Strin
     let json = serde_json::to_vec_pretty(&to_json(found)).context("identify.json")?;
     write_whole(folder, "identify.json", &json)?;
     write_whole(folder, "report.html", page(found).as_bytes())?;
-    // Last, for a model that is there is never replaced: what failed can be tried
-    // again.
+    // Last: an existing model is never replaced, so that a failed command can be repeated.
     write_whole(folder, keep::MODEL, model.as_bytes())?;
     Ok(model)
 }

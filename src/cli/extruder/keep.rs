@@ -1,12 +1,10 @@
-//! Where a model is kept: in a folder of its own, and in a library that cells
-//! look it up in.
+//! Where a model is saved: in a folder of its own, and in a library for cells.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow};
 
-use crate::cli::arguments::WrongArguments;
-use crate::cli::arguments::refuse_replacing;
+use crate::cli::arguments::{WrongArguments, refuse_replacing};
 use crate::identify::library::file_name;
 use crate::identify::model_file::parse;
 use crate::io::model_file::read_library;
@@ -24,11 +22,11 @@ pub fn refuse_taken(folder: &Path, name: &str) -> Result<(), WrongArguments> {
 }
 
 /// Adds the text of a model, which `kept` holds as well, to a library. Fails
-/// where another model holds for the same: a cell could not tell them apart.
+/// where the library has another model for the same conditions: a cell could not choose.
 pub fn add(library: &Path, text: &str, kept: &Path) -> Result<PathBuf> {
     let kept = kept.display().to_string();
     let model = parse(&kept, text)?;
-    let name = file_name(&model).context("the model tells no material, nozzle and temperature")?;
+    let name = file_name(&model).context("the model has no material, nozzle and temperature")?;
     make_folder(library)?;
     let found = read_library(library)?;
     for broken in &found.broken {

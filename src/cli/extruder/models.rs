@@ -6,13 +6,14 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::Args;
 
+use super::log::columns::units;
 use crate::cli::arguments::WrongArguments;
 use crate::core::quantity::Unit;
 use crate::identify::library::{Library, ModelEntry, ModelQuery, TOLERANCE_C};
 use crate::identify::model_file::ModelFile;
 use crate::io::model_file::{ModelFolder, read, read_library};
 
-/// Lists a folder of models, or tells which of them a cell would use.
+/// Lists a folder of models, or finds the one that a cell would use.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -54,11 +55,8 @@ pub struct ModelsArgs {
 }
 
 /// A unit by its word.
-pub fn parse_unit(word: &str) -> Result<Unit, String> {
-    Unit::of_word(word).ok_or_else(|| {
-        let words: Vec<&str> = Unit::all().map(Unit::word).collect();
-        format!("expected one of {}", words.join(", "))
-    })
+fn parse_unit(word: &str) -> Result<Unit, String> {
+    Unit::of_word(word).ok_or_else(|| format!("expected one of {}", units()))
 }
 
 /// Runs the command; the answer goes to standard output.
@@ -96,9 +94,7 @@ impl ModelsArgs {
             return Ok(None);
         };
         if !(self.tolerance_c >= 0.0 && nozzle_mm.is_finite() && temperature_c.is_finite()) {
-            return Err(WrongArguments::new(
-                "expected finite numbers, and a tolerance of 0 or more",
-            ));
+            refuse!("expected finite numbers, and a tolerance of 0 or more");
         }
         Ok(Some(ModelQuery {
             material: material.clone(),
@@ -116,22 +112,9 @@ fn table(entries: &[ModelEntry]) {
         say!("no models here; `truebead extruder identify` makes them");
         return;
     }
-    let mut rows = vec![
-        [
-            "file",
-            "material",
-            "nozzle",
-            "temperature",
-            "from",
-            "to",
-            "form",
-            "gain",
-            "dead time",
-            "fit",
-        ]
-        .map(str::to_owned),
-    ];
-    rows.extend(entries.iter().map(|entry| row(&entry.name, &entry.model)));
+    let head = "file,material,nozzle,temperature,from,to,form,gain,dead time,fit";
+    let mut rows = vec![head.split(',').map(str::to_owned).collect::<Vec<String>>()];
+    rows.extend(entries.iter().map(|entry| row(&entry.name, &entry.model).to_vec()));
     let width = |column: usize| {
         rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max()
     };

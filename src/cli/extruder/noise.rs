@@ -1,5 +1,5 @@
-//! How much a pressure's readings scatter and the pressure wanders, in the keys
-//! that a cell's pressure loop takes its thresholds from.
+//! `truebead extruder noise`: standard deviation of a pressure's readings and drift of the
+//! pressure, as keys of a cell's pressure loop.
 
 use std::path::PathBuf;
 
@@ -9,15 +9,15 @@ use clap::Args;
 use super::log::columns::ColumnArgs;
 use super::log::layer::LayerArgs;
 use super::log::rows::TableColumns;
-use super::log::source::LogSource;
+use super::log::source::{LogSource, recorded_column};
 use crate::cli::arguments::WrongArguments;
 use crate::core::quantity::Unit;
 use crate::core::units::MPa;
 use crate::extruder::pressure::kalman::PressureNoise;
 use crate::identify::grid::usual_step;
 
-/// A pressure's own steps from reading to reading over the scatter of the
-/// readings: beyond it, it was hardly at rest.
+/// Ratio of the variance of the drift between two readings to the variance of a reading, beyond
+/// which the pressure was not at rest.
 const MAX_DRIFT_RATIO: f64 = 1.0;
 
 /// Finds the noise of a pressure, as keys of [extruder.pressure].
@@ -45,24 +45,14 @@ pub fn run(args: &NoiseArgs) -> Result<()> {
     let name = data.display().to_string();
     let (time_s, values) = match LogSource::read(data, &LayerArgs::default())? {
         LogSource::Table(table) => {
-            let (time, unit_s) = columns.time(table.names())?;
             let rows = TableColumns { table: &table, name: &name, columns };
-            let mut time_s: Vec<f64> =
-                rows.column(&time)?.iter().map(|time| time * unit_s).collect();
+            let (mut time_s, _) = rows.time_s()?;
             let mut values = rows.column(column)?;
             columns.cut(&mut time_s, &mut values.clone(), &mut values);
             (time_s, values)
         }
         LogSource::Recording(found) => {
-            let series = found.columns.iter().find(|series| series.name == *column);
-            let series = series.ok_or_else(|| {
-                let known: Vec<_> = found.columns.iter().map(|c| c.name.as_str()).collect();
-                WrongArguments::new(format!(
-                    "{name}: there is no column {column}; the columns are {}",
-                    known.join(", ")
-                ))
-            })?;
-            let kept = columns.cut_series(series);
+            let kept = recorded_column(&found, &name, column, columns)?;
             (kept.time_s, kept.values)
         }
     };
@@ -74,15 +64,15 @@ pub fn run(args: &NoiseArgs) -> Result<()> {
     Ok(())
 }
 
-/// What a column is multiplied by to be in MPa.
+/// Factor from the unit of a column to MPa.
 fn in_mpa(column: &str, columns: &ColumnArgs) -> Result<f64, WrongArguments> {
     match columns.quantity(column)?.unit {
         Unit::MPa => Ok(1.0),
         Unit::KPa => Ok(1e-3),
         Unit::Bar => Ok(0.1),
-        other => Err(WrongArguments::new(format!(
-            "--column {column}: found {other}, expected a pressure in MPa, kPa or bar"
-        ))),
+        other => {
+            Err(wrong!("--column {column}: found {other}, expected a pressure in MPa, kPa or bar"))
+        }
     }
 }
 
@@ -97,7 +87,7 @@ fn tell(column: &str, noise: &PressureNoise, count: usize, step_s: Option<f64>) 
     );
     if noise.drift_mpa2() > MAX_DRIFT_RATIO * noise.reading_mpa2() {
         tell!(
-            "warning: the pressure moves by more than its readings scatter; a noise is identified from \
+            "warning: the pressure drifts by more than the noise of its readings; a noise is identified from \
              a command that stands: cut the rest off with --from-s and --to-s"
         );
     }

@@ -1,4 +1,4 @@
-//! What a model holds for.
+//! Conditions for which a model is valid.
 
 use clap::Args;
 
@@ -20,7 +20,7 @@ pub struct SettingArgs {
 }
 
 impl SettingArgs {
-    /// What the model holds for.
+    /// The conditions of the model.
     pub fn setting(&self) -> Result<Conditions, WrongArguments> {
         let given = [
             ("--nozzle-mm", self.nozzle_mm, 0.01..=1e3, "0.01 to 1000 mm"),
@@ -28,11 +28,11 @@ impl SettingArgs {
         ];
         for (name, value, range, expected) in given {
             if let Some(value) = value.filter(|value| !range.contains(value)) {
-                return Err(WrongArguments::new(format!("{name} {value}: expected {expected}")));
+                refuse!("{name} {value}: expected {expected}");
             }
         }
         if self.material.as_ref().is_some_and(|name| name.trim().is_empty()) {
-            return Err(WrongArguments::new("--material: expected a name"));
+            refuse!("--material: expected a name");
         }
         Ok(Conditions {
             material: self.material.clone(),

@@ -11,8 +11,7 @@ use super::log::layer::LayerArgs;
 use super::log::rows::{TableColumns, at_line, check_unit_overrides};
 use super::log::source::LogSource;
 use super::setting::SettingArgs;
-use crate::cli::arguments::WrongArguments;
-use crate::cli::arguments::free_folder;
+use crate::cli::arguments::{WrongArguments, free_folder};
 use crate::core::quantity::{Quantity, Unit};
 use crate::identify::experiment::{Rules, check_time};
 use crate::identify::series::TimeSeries;
@@ -21,7 +20,7 @@ use crate::identify::table::DataTable;
 use crate::report::identify::starts::{StartLogs, StartStudy, page, study, text};
 use crate::rows::output::{make_folder, write_whole};
 
-/// Litres a minute in mm³/s.
+/// One litre per minute in mm³/s. By definition.
 const MM3_PER_S_PER_L_PER_MIN: f64 = 1e6 / 60.0;
 
 /// Finds from a log the delay of starts and what drools after a stop.
@@ -31,7 +30,7 @@ Example:
   truebead extruder identify --example example/
   truebead extruder starts example/starts.csv --input screw_rpm --output flow_mm3_per_s
 
-How late the first flow comes is given by the time that the pump stood before. The
+The delay of the first flow depends on the time for which the pump stood before. The
 file starts.toml is for the key starts of [extruder] in a cell.")]
 pub struct StartsArgs {
     /// Table of logged data
@@ -73,7 +72,7 @@ fn write_all(found: &StartStudy, folder: &Path) -> Result<()> {
     let notes = [format!("Fitted by truebead {version} to {}.", found.logs.source), text(found)];
     make_folder(folder)?;
     write_whole(folder, "report.html", page(found).as_bytes())?;
-    // Last, for one that is there is never replaced: what failed can be tried again.
+    // Last: an existing file is never replaced, so that a failed command can be repeated.
     write_whole(folder, keep::STARTS, to_toml(&found.file, &notes).as_bytes())?;
     Ok(())
 }
@@ -85,11 +84,10 @@ fn read(args: &StartsArgs) -> Result<StartLogs> {
     let table = match LogSource::read(data, &LayerArgs::default())? {
         LogSource::Table(table) => table,
         LogSource::Recording(_) => {
-            let what = format!(
+            refuse!(
                 "{name}: expected a table: of a recording only the longest bead with a \
                  running pump is looked at, and there is no stop in it"
             );
-            return Err(WrongArguments::new(what).into());
         }
     };
     check_unit_overrides(columns, table.names(), &name)?;
@@ -102,7 +100,7 @@ fn read(args: &StartsArgs) -> Result<StartLogs> {
     Ok(StartLogs { source: name.clone(), input: input_units, output: output_units, command, flow })
 }
 
-/// What a flow is multiplied by to be in mm³/s.
+/// Factor from the unit of a column to mm³/s.
 fn in_mm3_per_s(column: &str, quantity: &Quantity) -> Result<f64, WrongArguments> {
     let found = quantity.unit;
     let hint = match found {
@@ -113,22 +111,20 @@ fn in_mm3_per_s(column: &str, quantity: &Quantity) -> Result<f64, WrongArguments
         }
         _ => "",
     };
-    Err(WrongArguments::new(format!(
+    Err(wrong!(
         "--output {column}: found {found}, expected a flow in mm³/s or l/min{hint} (--unit \
-         {column}=mm3_per_s tells another unit)"
-    )))
+         {column}=mm3_per_s gives another unit)"
+    ))
 }
 
 /// Two columns of a table at their moments.
 fn series(args: &StartsArgs, rows: &TableColumns<'_>, names: [&str; 2]) -> Result<[TimeSeries; 2]> {
     let (columns, table): (_, &DataTable) = (&args.columns, rows.table);
-    let (time, unit_s) = columns.time(table.names())?;
-    let mut time_s: Vec<f64> = rows.column(&time)?.iter().map(|at| at * unit_s).collect();
+    let (mut time_s, is_time_unit_known) = rows.time_s()?;
     let [input, output] = names;
     let (mut command, mut flow) = (rows.column(input)?, rows.column(output)?);
     let first = columns.cut(&mut time_s, &mut command, &mut flow);
-    let rules =
-        Rules { max_gap_s: None, is_time_unit_known: columns.unit_override(&time).is_some() };
+    let rules = Rules { max_gap_s: None, is_time_unit_known };
     check_time(&time_s, &rules).map_err(|error| at_line(table, first, rows.name, error))?;
     let made = |name: &str, is_held, values| TimeSeries {
         name: name.to_owned(),

@@ -3,7 +3,6 @@
 use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result};
 use clap::Args;
@@ -13,10 +12,9 @@ use rayon::prelude::*;
 use crate::assembly::LoadedCell;
 use crate::cell::Cell;
 use crate::cell::file::{CalibrationSource, Purpose};
-use crate::cli::arguments::WrongArguments;
 use crate::cli::print::Verbosity;
 use crate::core::frame::Frame;
-use crate::io::progress::Progress;
+use crate::io::progress::SharedProgress;
 use crate::sim::frame_series::FrameSeries;
 use crate::sim::truth::Truth;
 
@@ -46,7 +44,7 @@ pub fn run(args: &RenderArgs, voice: Verbosity) -> Result<()> {
     let LoadedCell { cell, calibration, text, .. } =
         LoadedCell::read(&args.scenario, Purpose::Measure)?;
     let series = FrameSeries::new(&cell, calibration)
-        .map_err(|error| WrongArguments::new(format!("{}: {error}", args.scenario.display())))?;
+        .map_err(|error| wrong!("{}: {error}", args.scenario.display()))?;
     refuse_files_in(&args.out)?;
     let frames = args.frames.map_or(series.frames(), |most| most.min(series.frames()));
     let parent = match args.out.parent() {
@@ -81,13 +79,11 @@ fn refuse_files_in(out: &Path) -> Result<()> {
         Ok(mut entries) => entries.next().is_some(),
         Err(error) if error.kind() == ErrorKind::NotFound => false,
         Err(error) => {
-            let what = format!("--out {}: {error}; name a new folder", out.display());
-            return Err(WrongArguments::new(what).into());
+            refuse!("--out {}: {error}; name a new folder", out.display());
         }
     };
     if used {
-        let what = format!("--out {} holds files already; name a new folder", out.display());
-        return Err(WrongArguments::new(what).into());
+        refuse!("--out {} holds files already; name a new folder", out.display());
     }
     Ok(())
 }
@@ -99,7 +95,7 @@ fn write_frames(
     folder: &Path,
     voice: Verbosity,
 ) -> Result<Vec<Option<Truth>>> {
-    let progress = Mutex::new(Progress::new("rendering", "frames", Some(frames), voice.quiet));
+    let progress = SharedProgress::new("rendering", "frames", frames, voice.quiet);
     let truths = (0..frames)
         .into_par_iter()
         .map(|number| {
@@ -107,11 +103,11 @@ fn write_frames(
             let path = folder.join(format!("frame_{number:05}.png"));
             write_png(&rendered.frame, &path)
                 .with_context(|| format!("cannot write frame {number}"))?;
-            progress.lock().unwrap_or_else(PoisonError::into_inner).advance();
+            progress.advance();
             Ok(rendered.truth)
         })
         .collect();
-    progress.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
+    progress.finish();
     truths
 }
 
@@ -132,16 +128,8 @@ fn write_tables(series: &FrameSeries, truths: &[Option<Truth>], folder: &Path) -
     let mut times = csv::Writer::from_path(folder.join("times.csv"))?;
     let mut table = csv::Writer::from_path(folder.join("truth.csv"))?;
     times.write_record(["frame", "time_s"])?;
-    table.write_record([
-        "frame",
-        "time_s",
-        "width_mm",
-        "left_x_px",
-        "left_y_px",
-        "right_x_px",
-        "right_y_px",
-        "roughness_mm",
-    ])?;
+    let head = "frame,time_s,width_mm,left_x_px,left_y_px,right_x_px,right_y_px,roughness_mm";
+    table.write_record(head.split(','))?;
     for (number, truth) in (0..).zip(truths) {
         let time = format!("{:.6}", series.time_s(number));
         times.write_record([number.to_string(), time.clone()])?;

@@ -40,7 +40,7 @@ pub struct PlanArgs {
     /// [default: the target width]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub nozzle_mm: Option<f64>,
-    /// How well that length is known: its standard deviation as a share of it; the more, the
+    /// How well that length is known: its standard deviation as a fraction of it; the more, the
     /// less the plan makes use of it
     #[arg(long, value_name = "SHARE", default_value_t = 0.3, allow_negative_numbers = true)]
     pub nozzle_sigma: f64,
@@ -55,7 +55,7 @@ pub struct PlanArgs {
     /// stops them itself [default: rest]
     #[arg(long, value_name = "rest|moving", hide_possible_values = true)]
     pub ends: Option<BeadEndsArgument>,
-    /// Flow that no model tells: its standard deviation as a share of that of the flow's
+    /// Unmodelled flow: its standard deviation as a fraction of that of the flow's
     /// change; the more, the less the flow is changed
     #[arg(long, value_name = "SHARE", default_value_t = 0.17, allow_negative_numbers = true)]
     pub unmodelled_fraction: f64,
@@ -88,19 +88,18 @@ impl PlanArgs {
             ("--budget-s", Some(self.budget_s), least as fn(f64) -> bool, "0 or more seconds"),
             ("--nozzle-mm", self.nozzle_mm, above, "a length above 0"),
             ("--apex-mm-per-s", Some(self.apex_mm_per_s), above, "a speed above 0"),
-            ("--nozzle-sigma", Some(self.nozzle_sigma), least, "a share of 0 or more"),
+            ("--nozzle-sigma", Some(self.nozzle_sigma), least, "a fraction of 0 or more"),
             ("--corner-mm", self.corner_mm, least, "a length of 0 or more"),
             (
                 "--unmodelled-fraction",
                 Some(self.unmodelled_fraction),
                 least,
-                "a share of 0 or more",
+                "a fraction of 0 or more",
             ),
         ];
         for (name, value, sound, expected) in numbers {
             if let Some(value) = value.filter(|value| !sound(*value)) {
-                let what = format!("{name} {value}: expected {expected}");
-                return Err(WrongArguments::new(what));
+                refuse!("{name} {value}: expected {expected}");
             }
         }
         Ok(())

@@ -16,7 +16,7 @@ pub struct JobBead {
     pub position: Vec<(f64, [f64; 3])>,
 }
 
-/// What is wrong with a job, with its file's name.
+/// The error of a wrong job, with its file's name.
 pub fn wrong_job(job: &Path, what: &impl ToString) -> WrongArguments {
-    WrongArguments::new(format!("job {}: {}", job.display(), what.to_string()))
+    wrong!("job {}: {}", job.display(), what.to_string())
 }

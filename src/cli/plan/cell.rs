@@ -1,4 +1,4 @@
-//! What a plan takes from its cell.
+//! The cell of a plan: model, limits and bead.
 
 use super::arguments::PlanArgs;
 use super::bead::{JobBead, wrong_job};
@@ -16,8 +16,8 @@ use crate::numeric::lti::TransferFunction;
 use crate::plan;
 use crate::report::planned::PlanFacts;
 
-/// How long the flow that no model tells hangs together \[s\], as in the bead
-/// characterisation thesis.
+/// Correlation time of the unmodelled flow \[s\]: white noise through a lag of 0.15 s in table 3 of
+/// the bead characterisation thesis (papers.md, 001).
 const CORRELATION_S: f64 = 0.15;
 
 /// A range of commands, in the unit of the drive.
@@ -29,28 +29,19 @@ pub struct CommandRange {
     pub max: f64,
 }
 
-/// What a model was identified with.
-#[derive(Debug)]
-struct Identified {
-    /// What messages call the model.
-    source: String,
-    /// Smallest and largest input.
-    range: CommandRange,
-}
-
-/// The cell as a plan sees it.
+/// The part of a cell that a plan needs.
 #[derive(Debug)]
 pub struct PlannedExtruder {
     /// What messages call the cell.
     name: String,
-    /// From the command, counted from [`Facts::idle`], to mm³/s.
+    /// From the command, relative to [`PlanFacts::idle`], to mm³/s.
     transfer: TransferFunction,
     /// Limits of such a command, of which none lets the flow run backwards.
     drive: CommandLimits,
     /// Limits of the command itself.
     command_limits: CommandLimits,
-    /// What the model was identified with, where it was.
-    identified: Option<Identified>,
+    /// Name of the model and range of its input, where it was identified.
+    identified: Option<(String, CommandRange)>,
     /// Largest speed \[mm/s\].
     pub fastest_mm_per_s: f64,
     /// Acceleration \[mm/s²\].
@@ -66,7 +57,7 @@ impl PlannedExtruder {
     pub fn read(args: &PlanArgs) -> anyhow::Result<Self> {
         let loaded = LoadedCell::read(&args.cell, Purpose::Run)?;
         let name = loaded.path.display().to_string();
-        let absent = |what: &str| WrongArguments::new(format!("{name}: {what}"));
+        let absent = |what: &str| wrong!("{name}: {what}");
         let Some(run) = &loaded.cell.run else {
             return Err(absent("found no robot, expected a cell that is ready for run").into());
         };
@@ -91,13 +82,12 @@ impl PlannedExtruder {
     fn of(
         args: &PlanArgs,
         (run, part): (&RunPart, &ExtruderPart),
-        (name, identified): (String, Option<Identified>),
+        (name, identified): (String, Option<(String, CommandRange)>),
         behaviour: Behaviour,
     ) -> anyhow::Result<Self> {
         let Behaviour { transfer, operating_point: about } = behaviour;
         if !run.control.target.is_constant() {
-            let what = format!("{name}: found a target that changes, expected one target_width_mm");
-            return Err(WrongArguments::new(what).into());
+            refuse!("{name}: found a target that changes, expected one target_width_mm");
         }
         let target = run.control.target.nominal();
         let area = section(target, part.extruder.layer_height).map_err(WrongArguments::new)?;
@@ -105,7 +95,7 @@ impl PlannedExtruder {
         let idle = about.command - about.flow_mm3_per_s / transfer.dc_gain();
         let (min, max) = limits.about(idle).range();
         let drive = CommandLimits::new(min.max(0.0), max, limits.rate_per_s())
-            .map_err(|error| WrongArguments::new(format!("{name}: [extruder]: {error}")))?;
+            .map_err(|error| wrong!("{name}: [extruder]: {error}"))?;
         Ok(Self {
             name,
             transfer,
@@ -124,7 +114,7 @@ impl PlannedExtruder {
         })
     }
 
-    /// What is planned for.
+    /// The task of the planner.
     pub fn task(&self, args: &PlanArgs) -> plan::PlanTask<'_> {
         let robot = plan::RobotMotionLimits {
             accel_mm_per_s2: self.accel_mm_per_s2,
@@ -179,13 +169,12 @@ impl PlannedExtruder {
         Ok(())
     }
 
-    /// What is to be said of commands beyond what the model was identified with, if they are.
+    /// Warning of commands beyond the range of the model's data, if there are any.
     pub fn beyond(&self, planned: CommandRange) -> Option<String> {
-        let Identified { source, range } = self.identified.as_ref()?;
-        let (CommandRange { min: least, max: most }, CommandRange { min: low, max: high }) =
-            (*range, planned);
+        let (source, CommandRange { min: least, max: most }) = self.identified.as_ref()?;
+        let CommandRange { min: low, max: high } = planned;
         let unit = self.facts.unit;
-        (low < least || high > most).then(|| {
+        (low < *least || high > *most).then(|| {
             format!(
                 "{source}: it was identified from {least} to {most} {unit}, and the plan has \
                  commands from {low:.4} to {high:.4} {unit}; what it says there is a guess"
@@ -194,10 +183,9 @@ impl PlannedExtruder {
     }
 }
 
-fn identified(file: Option<&ExtruderFile>) -> anyhow::Result<Option<Identified>> {
+fn identified(file: Option<&ExtruderFile>) -> anyhow::Result<Option<(String, CommandRange)>> {
     let Some(file) = file else { return Ok(None) };
     let model = model::parse(&file.source, &file.text)?;
     let (min, max) = model.input_range;
-    let range = CommandRange { min, max };
-    Ok(Some(Identified { source: file.source.clone(), range }))
+    Ok(Some((file.source.clone(), CommandRange { min, max })))
 }

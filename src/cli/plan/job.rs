@@ -28,7 +28,7 @@ pub fn read(args: &PlanArgs, extruder: &PlannedExtruder) -> Result<Vec<JobBead>,
         [("--corner-mm", args.corner_mm.is_some()), ("--ends", args.ends.is_some())]
     {
         if is_given {
-            let what = format!("{name} is for G-code; a table tells its speed at every place");
+            let what = format!("{name} is for G-code; a table has its speed at every position");
             return Err(wrong_job(path, &what));
         }
     }
@@ -53,13 +53,13 @@ fn of_gcode(
         apex_mm_per_s: args.apex_mm_per_s,
         ends: args.ends.unwrap_or(BeadEndsArgument::Rest).into(),
     };
-    let stretches = gcode::read(text, &settings).map_err(|error| wrong_job(&args.job, &error))?;
-    let bead = |stretch: gcode::GcodeBead| {
-        let name = format!("Along the bead from line {} on", stretch.line);
-        let nominal = stretch
+    let beads = gcode::read(text, &settings).map_err(|error| wrong_job(&args.job, &error))?;
+    let job_bead = |bead: gcode::GcodeBead| {
+        let name = format!("Along the bead from line {} on", bead.line);
+        let nominal = bead
             .nominal(extruder.accel_mm_per_s2)
-            .map_err(|error| wrong_job(&args.job, &format!("line {}: {error}", stretch.line)))?;
-        Ok(JobBead { name, nominal, position: stretch.position })
+            .map_err(|error| wrong_job(&args.job, &format!("line {}: {error}", bead.line)))?;
+        Ok(JobBead { name, nominal, position: bead.position })
     };
-    stretches.into_iter().map(bead).collect()
+    beads.into_iter().map(job_bead).collect()
 }

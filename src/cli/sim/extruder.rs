@@ -1,23 +1,20 @@
 //! `truebead sim extruder`: an extruder controller that answers the extruder
 //! link.
 
-use std::net::TcpListener;
 use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::Args;
-use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::iterator::Signals;
 
+use super::serve::{print, serve};
 use crate::assembly::LoadedCell;
-use crate::cell::file::{ExtruderPart, Purpose};
-use crate::cli::arguments::WrongArguments;
-use crate::core::time::{Span, Stamp};
+use crate::cell::file::Purpose;
+use crate::cli::arguments::parse_within;
+use crate::core::time::Span;
 use crate::extruder::ExtruderLimits;
 use crate::io::clock::RunClock;
 use crate::simulators::extruder::{ExtruderOptions, ExtruderSim};
 
-/// Times between two STATE lines that an extruder may have [s].
+/// Shortest and longest time between two STATE lines \[s\] (robot/EXTRUDER.md).
 const STATE_PERIODS_S: (f64, f64) = (0.005, 0.2);
 
 /// An extruder that answers the extruder link.
@@ -55,53 +52,33 @@ pub struct ExtruderSimArgs {
 pub fn run(args: &ExtruderSimArgs) -> anyhow::Result<()> {
     let loaded = LoadedCell::read(&args.cell, Purpose::Run)?;
     let options = options(args, &loaded)?;
-    let listener = TcpListener::bind(&args.listen).with_context(|| {
-        format!("cannot listen on {}; name a free address with --listen", args.listen)
-    })?;
-    // Before the extruder answers, so that no signal falls between.
-    let mut signals = Signals::new([SIGINT, SIGTERM]).context("cannot wait for signals")?;
-    let sim = ExtruderSim::spawn(listener, RunClock::start(), options, Box::new(print))?;
-    tell!("extruder `{}` listens on {}; Ctrl-C ends it", args.name, sim.local_addr());
-    signals.forever().next();
-    sim.stop();
-    tell!("ended");
-    Ok(())
+    let spawn =
+        |listener| Ok(ExtruderSim::spawn(listener, RunClock::start(), options, Box::new(print))?);
+    let what = format!("extruder `{}`", args.name);
+    serve(&what, &args.listen, spawn, ExtruderSim::local_addr, ExtruderSim::stop)
 }
 
 /// Time until a rehearsed fault.
 fn parse_until(text: &str) -> Result<f64, String> {
-    let seconds = text.trim().parse().ok().filter(|seconds| (0.0..=1e7).contains(seconds));
-    seconds.ok_or_else(|| "expected seconds after the start of the pump, 0 to 1e7".to_owned())
+    parse_within(text, 0.0..=1e7, "expected seconds after the start of the pump, 0 to 1e7")
 }
 
 fn options(args: &ExtruderSimArgs, loaded: &LoadedCell) -> anyhow::Result<ExtruderOptions> {
     let part = loaded.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
     let Some(part) = part else {
-        return Err(WrongArguments::new(format!(
+        refuse!(
             "{}: [extruder]: found nothing, expected the extruder that is to be simulated",
             loaded.path.display()
-        ))
-        .into());
+        );
     };
+    let (min, max) = part.extruder.limits.range();
+    let (shortest_s, longest_s) = STATE_PERIODS_S;
+    let period_s = (1.0 / part.extruder.rates.io_hz).clamp(shortest_s, longest_s);
     Ok(ExtruderOptions {
-        hello: hello(args, part),
+        hello: ExtruderLimits { name: args.name.clone(), quantity: part.extruder.drive, min, max },
         plant: loaded.plant(part)?,
-        state_period: state_period(part),
+        state_period: Span::from_secs(period_s),
         clock_start_ms: 0,
         fails_after: args.fail_after_s.map(Span::from_secs),
     })
-}
-
-fn hello(args: &ExtruderSimArgs, part: &ExtruderPart) -> ExtruderLimits {
-    let (min, max) = part.extruder.limits.range();
-    ExtruderLimits { name: args.name.clone(), quantity: part.extruder.drive, min, max }
-}
-
-fn state_period(part: &ExtruderPart) -> Span {
-    let (shortest, longest) = STATE_PERIODS_S;
-    Span::from_secs((1.0 / part.extruder.rates.io_hz).clamp(shortest, longest))
-}
-
-fn print(at: Stamp, text: &str) {
-    tell!("{:9.3} s  {text}", at.secs());
 }

@@ -1,14 +1,10 @@
 //! `truebead sim robot`: a robot controller that answers the robot link.
 
-use std::net::TcpListener;
-
-use anyhow::Context;
 use clap::Args;
-use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::iterator::Signals;
 
+use super::serve::{print, serve};
 use crate::cli::arguments::WrongArguments;
-use crate::core::time::{Span, Stamp};
+use crate::core::time::Span;
 use crate::core::units::{Mm, MmPerS, MmPerS2, NotFinite};
 use crate::io::clock::RunClock;
 use crate::link::{PrintJob, RobotParams};
@@ -85,21 +81,16 @@ pub struct RobotSimArgs {
 /// Runs the robot until SIGINT or SIGTERM. Fails where it cannot listen, and
 /// with [`WrongArguments`] where the robot that was described cannot be.
 pub fn run(args: &RobotSimArgs) -> anyhow::Result<()> {
-    let listener = TcpListener::bind(&args.listen).with_context(|| {
-        format!("cannot listen on {}; name a free address with --listen", args.listen)
-    })?;
-    // Before the robot answers, so that no signal falls between.
-    let mut signals = Signals::new([SIGINT, SIGTERM]).context("cannot wait for signals")?;
-    let sim = match RobotSim::spawn(listener, RunClock::start(), options(args), Box::new(print)) {
-        Ok(sim) => sim,
-        Err(RobotSimError::Params(error)) => return Err(WrongArguments::new(error).into()),
-        Err(error) => return Err(error.into()),
+    let spawn = |listener| {
+        RobotSim::spawn(listener, RunClock::start(), options(args), Box::new(print)).map_err(
+            |error| match error {
+                RobotSimError::Params(error) => WrongArguments::new(error).into(),
+                error => error.into(),
+            },
+        )
     };
-    tell!("robot `{}` listens on {}; Ctrl-C ends it", args.name, sim.local_addr());
-    signals.forever().next();
-    sim.stop();
-    tell!("ended");
-    Ok(())
+    let what = format!("robot `{}`", args.name);
+    serve(&what, &args.listen, spawn, RobotSim::local_addr, RobotSim::stop)
 }
 
 fn options(args: &RobotSimArgs) -> RobotOptions {
@@ -117,10 +108,6 @@ fn options(args: &RobotSimArgs) -> RobotOptions {
     let layers = if args.endless { 1 } else { args.layers };
     let job = PrintJob::new(layers, args.layer_height_mm, params.z, args.pause_s);
     RobotOptions { params, job, state_period: Span::from_millis(i64::from(args.state_ms)) }
-}
-
-fn print(at: Stamp, text: &str) {
-    tell!("{:9.3} s  {text}", at.secs());
 }
 
 fn parse_name(text: &str) -> Result<String, String> {

@@ -1,4 +1,4 @@
-//! From a recording to what is proposed.
+//! From a recording to proposed settings.
 
 use std::path::Path;
 
@@ -6,26 +6,24 @@ use anyhow::Context;
 
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
-use crate::cli::arguments::WrongArguments;
 use crate::cli::camera_offset::gauge;
-use crate::cli::recorded::attached_cell;
+use crate::cli::recorded::{attached_cell, open, warn_of_damage};
 use crate::core::units::Mm;
 use crate::io::recording::{RecordedEntry, Recording};
 use crate::report::tuned::Tuned;
 use crate::tune::{IdentifiedCell, Log, TuneFacts};
 
-/// How far beyond the limits, as a factor, the target's speed may lie for anything to be
-/// foretold.
+/// Factor by which the target's speed may lie beyond the limits: farther from the recorded
+/// speeds no bead is predicted.
 const MAX_SPEED_BEYOND_LIMITS: f64 = 3.0;
 
-/// Reads a recording and looks at it with the eyes of a cell.
+/// Identifies a cell from a recording and proposes its settings. Fails where the recording does
+/// not determine the cell.
 pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<Tuned> {
     let name = path.display().to_string();
-    let mut recording = Recording::open(path).map_err(WrongArguments::new)?;
+    let mut recording = open(path)?;
     let log = log(&mut recording).context("the recording cannot be read on")?;
-    if let Some(what) = recording.integrity().summary() {
-        tell!("warning: {name}: {what}");
-    }
+    warn_of_damage(&recording);
     // The gauge is that of the run, whatever the cell has become since.
     let (cell, calibration) = attached_cell(&recording, Purpose::Run)
         .unwrap_or_else(|_| (loaded.cell.clone(), loaded.calibration.clone()));
@@ -34,10 +32,10 @@ pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<T
     let facts = TuneFacts { gauge, max_offset: farthest, start_speed: run.robot.start_speed };
     let plant = IdentifiedCell::of(&log, &facts).with_context(|| {
         if log.states.is_empty() {
-            return format!("{name}: no robot was heard, and no bead was laid");
+            return format!("{name}: no report of a robot, and no bead was laid");
         }
         if let Some(why) = log.cut_short() {
-            return format!("{name} does not tell what the cell is like: {why}");
+            return format!("{name} does not determine the cell: {why}");
         }
         let extruder = if run.extruder.is_some() {
             " (the cell commands its extruder: where the flow follows the speed, the width does \
@@ -45,7 +43,7 @@ pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<T
         } else {
             ""
         };
-        format!("{name} does not tell what the cell is like{extruder}")
+        format!("{name} does not determine the cell{extruder}")
     })?;
     let target = run.control.target.nominal();
     let speed = plant.speed_for(target.get());

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use crate::cli::arguments::parse_length;
+use crate::cli::arguments::{parse_length, parse_within};
 use crate::core::units::Mm;
 use crate::width_control::strategy::steps::STEP_FRACTIONS;
 
@@ -18,12 +18,12 @@ Examples:
   truebead tune my-cell.toml --out again --recording tuned/recording.mcap --write new-cell.toml
 
 Runs the cell with steps of the robot's speed in place of its controller: after the first
-stretch eleven pieces of bead, each at the start speed or --step-fraction more or less,
+segment eleven pieces of bead, each at the start speed or --step-fraction more or less,
 within [limits]. It says beforehand how much bead that takes. A width near an end of
 gauge.width_range_mm ends the steps; whatever else fails, the cell holds and stops as
 in any run. With --simulated nothing is moved: the cell's own simulated bead is laid.
 
-With --recording nothing is run; any run tells in which the speed changed clearly.
+With --recording nothing is run; any run serves in which the speed changed clearly.
 
 Leaves tune.json, report.html and, of an experiment, recording.mcap; of one on the real
 cell also run/, with the report of that run. Nothing is applied: the cell file stays as it
@@ -39,7 +39,7 @@ pub struct TuneArgs {
     /// Folder for the results
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Change of the speed, as a share of the start speed
+    /// Change of the speed, as a fraction of the start speed
     /// [default: 0.1, or that of a cell whose controller is steps]
     #[arg(long, value_name = "S", value_parser = parse_fraction, conflicts_with = "recording")]
     pub step_fraction: Option<f64>,
@@ -49,7 +49,7 @@ pub struct TuneArgs {
     /// Look at a recording instead
     #[arg(long, value_name = "FILE.mcap")]
     pub recording: Option<PathBuf>,
-    /// Largest distance of the camera that is tried [mm]
+    /// Largest offset of the camera that is tried [mm]
     /// [default: 1000]
     #[arg(long, value_name = "MM", value_parser = parse_length)]
     pub max_mm: Option<Mm>,
@@ -67,7 +67,7 @@ pub struct TuneArgs {
     pub controller: ControllerArg,
 }
 
-/// A law that is written.
+/// A strategy that is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ControllerArg {
     /// By distance
@@ -77,8 +77,6 @@ pub enum ControllerArg {
 }
 
 fn parse_fraction(text: &str) -> Result<f64, String> {
-    let share = text.trim().parse().ok().filter(|share| STEP_FRACTIONS.contains(share));
-    share.ok_or_else(|| {
-        format!("expected a share from {} to {}", STEP_FRACTIONS.start(), STEP_FRACTIONS.end())
-    })
+    let (min, max) = (STEP_FRACTIONS.start(), STEP_FRACTIONS.end());
+    parse_within(text, STEP_FRACTIONS, &format!("expected a fraction from {min} to {max}"))
 }

@@ -1,4 +1,4 @@
-//! The experiment: the cell with steps in place of its law, live or simulated.
+//! The experiment: the cell with steps in place of its strategy, live or simulated.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -24,13 +24,12 @@ use crate::rows::output;
 use crate::sim::cell::{FrameObservation, Observer, SimCell};
 use crate::width_control::steps::{StepSettings, StepsProgress};
 
-/// Keys of `[control]` that only other laws know.
+/// Keys of `[control]` that only the distance controller has.
 pub const DISTANCE_KEYS: [&str; 3] = ["exponent", "exponent_learns", "drift_per_root_m"];
-/// Bead beyond the camera's sight of the last piece, for the run-up and the way out
-/// \[mm\].
+/// Bead beyond the last piece that the camera sees, for the robot's acceleration \[mm\].
 const EXTRA_LENGTH_MM: f64 = 50.0;
 
-/// Runs it into the folder, and gives the recording with the status of the run.
+/// Runs it into the folder; returns the recording and the status of the run.
 pub fn run(
     args: &TuneArgs,
     loaded: &LoadedCell,
@@ -46,7 +45,7 @@ pub fn run(
         simulate(&args.out, &loaded)?;
         return Ok((recording, ExitCode::SUCCESS));
     }
-    let share = loaded.cell.recording.max_rejected_share;
+    let max_rejected = loaded.cell.recording.max_rejected_share;
     let until = Until { duration_s: None, ends_with_steps: true };
     let title = format!("Experiment on {}", args.cell.display());
     let log = args.out.join("run");
@@ -59,7 +58,7 @@ pub fn run(
         voice,
     )?;
     let recording = report.recording.as_ref().map_or(recording, |whole| whole.path.clone());
-    Ok((recording, outcome::status(&report, share)))
+    Ok((recording, outcome::status(&report, max_rejected)))
 }
 
 /// The cell with steps in place of its controller. Its text is what is attached to the
@@ -72,8 +71,8 @@ fn derived(args: &TuneArgs, loaded: &LoadedCell) -> anyhow::Result<LoadedCell> {
             control.remove(key);
         }
     }
-    if let Some(share) = args.step_fraction {
-        document["control"]["step_fraction"] = value(share);
+    if let Some(fraction) = args.step_fraction {
+        document["control"]["step_fraction"] = value(fraction);
     }
     let read = |document: &DocumentMut| {
         LoadedCell::from_text(&loaded.path, document.to_string(), Purpose::Run)
@@ -97,14 +96,14 @@ fn steps(loaded: &LoadedCell) -> anyhow::Result<StepSettings> {
     loaded.cell.steps(run, &loaded.calibration).context("the cell has no course of steps")
 }
 
-/// Bead that it takes from the robot's start on.
+/// Length of bead of the experiment, from the robot's start on.
 fn whole_length(loaded: &LoadedCell, steps: &StepSettings) -> anyhow::Result<Mm> {
     let run = loaded.cell.run.as_ref().context("the cell was not read for a run")?;
     let begins = run.robot.start_length.max(steps.camera_reach * 1.5);
     Ok(begins + steps.length_until_seen() + Mm::constant(EXTRA_LENGTH_MM))
 }
 
-/// Says what is about to happen.
+/// Prints the plan of the experiment.
 fn announce(
     args: &TuneArgs,
     loaded: &LoadedCell,

@@ -32,31 +32,30 @@ pub fn refuse(path: &Path, cell: &Path, loaded: &LoadedCell) -> anyhow::Result<(
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         folder.unwrap_or(Path::new(".")).canonicalize()
     };
-    let to = folder(path).map_err(|error| {
-        WrongArguments::new(format!("--write {}: its folder: {error}", path.display()))
-    })?;
+    let to =
+        folder(path).map_err(|error| wrong!("--write {}: its folder: {error}", path.display()))?;
     if folder(cell).is_ok_and(|from| from == to) {
         return Ok(());
     }
     let document: DocumentMut = loaded.text.parse().context("the cell file")?;
     match PATHS.into_iter().find(|(table, key)| is_relative(&document, table, key)) {
         None => Ok(()),
-        Some((table, key)) => Err(WrongArguments::new(format!(
+        Some((table, key)) => Err(wrong!(
             "--write {}: {table}.{key} of {} is relative to its folder and would lead elsewhere; \
              name a file beside the cell",
             path.display(),
             cell.display()
-        ))
+        )
         .into()),
     }
 }
 
 fn refuse_replacing_written(path: &Path) -> Result<(), WrongArguments> {
     refuse_replacing(path, "file").map_err(|_| {
-        WrongArguments::new(format!(
+        wrong!(
             "{} is there already and would be lost; name another file with --write",
             path.display()
-        ))
+        )
     })
 }
 

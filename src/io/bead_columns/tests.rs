@@ -1,4 +1,4 @@
-//! A bead whose truth is known, told as a recording tells it.
+//! A bead whose truth is known, as a recording.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
@@ -22,7 +22,7 @@ fn flow(t: f64) -> f64 {
     400.0 + 60.0 * (2.0 * t).sin()
 }
 
-/// When the nozzle passed a place, by bisection.
+/// When the nozzle passed a position, by bisection.
 fn passed(place: f64) -> f64 {
     let halve = |(low, high): (f64, f64), _| {
         let middle = f64::midpoint(low, high);
@@ -56,7 +56,7 @@ fn reported(pump: PumpMode, t: f64) -> Event {
 /// A bead that begins at a moment and lasts so long; the pump runs from 0.3 s
 /// on.
 fn bead(begins_s: f64, lasts_s: f64) -> Vec<RecordedEntry> {
-    let mut told: Vec<(f64, Event)> = Vec::new();
+    let mut events: Vec<(f64, Event)> = Vec::new();
     let each = |period_s: f64| {
         let mut t = 0.0;
         std::iter::from_fn(move || {
@@ -64,13 +64,13 @@ fn bead(begins_s: f64, lasts_s: f64) -> Vec<RecordedEntry> {
             (t <= lasts_s).then_some(t)
         })
     };
-    told.extend(each(0.02).map(|t| (t, robot(RobotMode::Print, t))));
-    told.push((lasts_s + 0.02, robot(RobotMode::Idle, lasts_s)));
-    told.extend(
+    events.extend(each(0.02).map(|t| (t, robot(RobotMode::Print, t))));
+    events.push((lasts_s + 0.02, robot(RobotMode::Idle, lasts_s)));
+    events.extend(
         each(0.021)
             .map(|t| (t, reported(if t < 0.3 { PumpMode::Starting } else { PumpMode::On }, t))),
     );
-    told.extend(each(0.05).filter(|t| way(*t) > OFFSET).map(|t| {
+    events.extend(each(0.05).filter(|t| way(*t) > OFFSET).map(|t| {
         let laid_s = passed(way(t) - OFFSET);
         let area = flow(laid_s) / speed(laid_s);
         let pi_4 = std::f64::consts::FRAC_PI_4;
@@ -78,11 +78,11 @@ fn bead(begins_s: f64, lasts_s: f64) -> Vec<RecordedEntry> {
         let captured_at = Stamp::from_secs(begins_s + t);
         let width_mm = Mm::constant(width);
         let measured = Event::Measured { frame: 0, captured_at, width_mm, sigma_mm: Mm::ZERO };
-        // The picture arrives later than it was taken.
+        // The frame arrives later than it was captured.
         (t + 0.07, measured)
     }));
-    told.extend(each(0.02).map(|t| (t, Event::ExtruderTick)));
-    told.sort_by(|a, b| a.0.total_cmp(&b.0));
+    events.extend(each(0.02).map(|t| (t, Event::ExtruderTick)));
+    events.sort_by(|a, b| a.0.total_cmp(&b.0));
     let entry = |(t, event)| {
         let now = Stamp::from_secs(begins_s + t);
         let command = ExtruderCommand { pump_on: true, valve_open: true, value: 20.0 };
@@ -94,18 +94,18 @@ fn bead(begins_s: f64, lasts_s: f64) -> Vec<RecordedEntry> {
             RecordedEntry::Step { n: 0, now, step: Box::new(step) },
         ]
     };
-    told.into_iter().flat_map(entry).collect()
+    events.into_iter().flat_map(entry).collect()
 }
 
-fn facts() -> CellFacts {
-    CellFacts {
+fn facts() -> BeadFacts {
+    BeadFacts {
         command: Some(Unit::Rpm),
         layer_height: Some(Mm::constant(HEIGHT)),
         offset: Mm::constant(OFFSET),
     }
 }
 
-fn found(entries: Vec<RecordedEntry>, facts: &CellFacts) -> BeadColumns {
+fn found(entries: Vec<RecordedEntry>, facts: &BeadFacts) -> BeadColumns {
     columns(entries.into_iter().map(Ok), facts).unwrap()
 }
 
@@ -149,16 +149,20 @@ fn the_longest_of_several_beads_is_taken() {
 }
 
 #[test]
-fn what_cannot_be_made_is_told() {
-    let without = CellFacts { layer_height: None, ..facts() };
-    let told = found(bead(0.0, 5.0), &without);
-    assert_eq!(*names(&told).last().unwrap(), "laid_width_mm");
-    assert!(told.notes[0].contains("--layer-height-mm"), "{:?}", told.notes);
-    let high = CellFacts { layer_height: Some(Mm::constant(9.0)), ..facts() };
-    let told = found(bead(0.0, 5.0), &high);
-    assert!(told.notes[0].contains("are less than the layer's height of 9"), "{:?}", told.notes);
+fn columns_that_cannot_be_made_are_named_in_notes() {
+    let without = BeadFacts { layer_height: None, ..facts() };
+    let columns = found(bead(0.0, 5.0), &without);
+    assert_eq!(*names(&columns).last().unwrap(), "laid_width_mm");
+    assert!(columns.notes[0].contains("--layer-height-mm"), "{:?}", columns.notes);
+    let high = BeadFacts { layer_height: Some(Mm::constant(9.0)), ..facts() };
+    let columns = found(bead(0.0, 5.0), &high);
+    assert!(
+        columns.notes[0].contains("are less than the layer's height of 9"),
+        "{:?}",
+        columns.notes
+    );
     let idle =
         vec![RecordedEntry::Event { n: 0, now: Stamp::START, event: robot(RobotMode::Idle, 0.0) }];
-    let told = found(idle, &facts());
-    assert!(told.columns.is_empty() && told.notes[0].contains("no bead was laid"));
+    let columns = found(idle, &facts());
+    assert!(columns.columns.is_empty() && columns.notes[0].contains("no bead was laid"));
 }

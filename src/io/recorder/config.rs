@@ -1,4 +1,4 @@
-//! What a recording is begun with.
+//! Settings of a recording.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
 //! Turns frames into PNG within `foxglove.CompressedImage`, in a thread of its
-//! own, so that an event never waits for a picture.
+//! own, so that an event never waits for an image.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -31,7 +31,7 @@ pub struct EncodedFrame {
     pub message: Vec<u8>,
 }
 
-/// Encodes until told to close or until nobody takes the result.
+/// Encodes until it is closed or its receiver is gone.
 pub fn run(
     jobs: &Receiver<FrameJob>,
     out: &Sender<EncodedFrame>,

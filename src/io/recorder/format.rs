@@ -1,14 +1,11 @@
-//! What is where in a recording: topics, schemas, metadata and attachments.
-//! The recorder and the reader share it.
+//! The layout of a recording, for the recorder and the reader: topics, schemas, metadata and
+//! attachments.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::control::event::Event;
-use crate::control::step::Step;
-
-/// Version of this layout. A reader refuses a newer one.
+/// Version of this layout; a reader refuses a newer one. By definition 1 is the first.
 pub const FORMAT_VERSION: u32 = 1;
 
 /// Events, as JSON.
@@ -41,50 +38,29 @@ pub const EVENT_SCHEMA: &str = include_str!("event.schema.json");
 /// JSON schema of [`STEP_TOPIC`].
 pub const STEP_SCHEMA: &str = include_str!("step.schema.json");
 
-/// A message on [`EVENT_TOPIC`].
-#[derive(Debug, Serialize)]
-pub struct EventMessage<'a> {
+/// A message on [`EVENT_TOPIC`]: written with `&Event`, read with [`Event`](crate::control::Event).
+#[derive(Debug, Serialize, Deserialize)]
+pub struct EventMessage<E> {
     /// Counts the events of the run from 0.
     pub n: u64,
-    /// When the controller was told \[ns since the run began\].
+    /// Time at which the controller takes it \[ns since the start of the run\].
     pub now_ns: u64,
-    /// What it was told.
-    pub event: &'a Event,
+    /// The event.
+    pub event: E,
 }
 
-/// A message on [`STEP_TOPIC`].
-#[derive(Debug, Serialize)]
-pub struct StepMessage<'a> {
-    /// Number of the event that this answers.
+/// A message on [`STEP_TOPIC`]: written with `&Step`, read with [`Step`](crate::control::Step).
+#[derive(Debug, Serialize, Deserialize)]
+pub struct StepMessage<S> {
+    /// Number of the event that this step answers.
     pub n: u64,
-    /// When the controller was told \[ns since the run began\].
+    /// Time at which the controller takes the event \[ns since the start of the run\].
     pub now_ns: u64,
-    /// Name of the state after it, where a viewer finds it.
+    /// Name of the state after the step, for viewers; not read back.
+    #[serde(skip_deserializing)]
     pub state: &'static str,
-    /// What it answered.
-    pub step: &'a Step,
-}
-
-/// A message on [`EVENT_TOPIC`], as read.
-#[derive(Debug, Deserialize)]
-pub struct EventRow {
-    /// See [`EventMessage`].
-    pub n: u64,
-    /// See [`EventMessage`].
-    pub now_ns: u64,
-    /// See [`EventMessage`].
-    pub event: Event,
-}
-
-/// A message on [`STEP_TOPIC`], as read.
-#[derive(Debug, Deserialize)]
-pub struct StepRow {
-    /// See [`StepMessage`].
-    pub n: u64,
-    /// See [`StepMessage`].
-    pub now_ns: u64,
-    /// See [`StepMessage`].
-    pub step: Step,
+    /// The step.
+    pub step: S,
 }
 
 /// What a recording says of its run.

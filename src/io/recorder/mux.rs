@@ -24,8 +24,8 @@ use crate::io::foxglove;
 /// sooner.
 const CHUNK_BYTES: u64 = 1 << 20;
 
-/// Why a record could not be made. Memory does not fail; what is left is a
-/// value that has no JSON form.
+/// Why a record could not be made. Memory does not fail; a value may have
+/// no JSON form.
 #[derive(Debug, thiserror::Error)]
 pub enum MuxError {
     /// The MCAP writer refused.

@@ -1,4 +1,4 @@
-//! What a recording came to.
+//! The result of a recording.
 
 use std::path::PathBuf;
 

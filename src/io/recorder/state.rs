@@ -1,4 +1,4 @@
-//! What the threads of a recorder share and pass on.
+//! Data that the threads of a recorder have in common.
 
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicU64;
@@ -31,7 +31,7 @@ impl RecorderState {
         Self { failure: OnceLock::new(), alarm, frames_dropped: AtomicU64::new(0) }
     }
 
-    /// The first failure counts, is told once, and is what comes back.
+    /// Only the first failure counts; it is reported once and returned.
     pub(super) fn fail(&self, why: RecordError) -> RecordError {
         if self.failure.set(why.clone()).is_ok() {
             tracing::error!("recording ends here: {}", why.0);

@@ -1,4 +1,4 @@
-//! Where frames enter the recorder.
+//! The input of the recorder for frames.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;

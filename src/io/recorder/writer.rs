@@ -90,7 +90,7 @@ impl<S: Sink> WriterThread<S> {
     }
 
     /// Frames that were encoded but not written when the events ended; the
-    /// encoder has been told to close.
+    /// encoder is closed.
     fn late_frames(&mut self, frames: &Receiver<EncodedFrame>) {
         loop {
             match frames.recv_timeout(self.tuning.flush_every) {
@@ -108,7 +108,7 @@ impl<S: Sink> WriterThread<S> {
     }
 
     /// Writes the chunks that are complete. After a failure the flush period
-    /// sets the pace of further tries.
+    /// sets the rate of further tries.
     fn push_ready(&mut self) {
         self.mux.take(self.output.waiting());
         if self.shared.failure().is_none() && !self.output.waiting().is_empty() {

@@ -7,7 +7,8 @@ use ::mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReader
 
 /// Largest chunk that is unpacked; a larger one is a damaged length.
 const MAX_CHUNK_BYTES: usize = 1 << 28;
-/// Shortest attachment: two times, two empty strings, a length and a CRC.
+/// Shortest attachment (MCAP specification, § Attachment): two times, two empty strings, a length
+/// and a CRC: 8 + 8 + 4 + 4 + 8 + 4.
 const MIN_ATTACHMENT_BYTES: usize = 36;
 
 /// A record with its data owned.

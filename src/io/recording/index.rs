@@ -1,4 +1,4 @@
-//! What the index at the end of a finished file says.
+//! The index at the end of a finished file.
 
 use std::fs::File;
 use std::io::{Read, Seek};

@@ -11,7 +11,7 @@ use super::chunk::{self, OwnedRecord};
 
 /// Largest record that is taken; a longer one is a damaged length.
 const MAX_RECORD_BYTES: u64 = 1 << 30;
-/// Opcode and length in front of every record.
+/// Bytes of opcode (1) and length (8) in front of every record (MCAP specification, § Records).
 const HEAD_BYTES: u64 = 9;
 /// Notes that are kept in words; further ones are only counted.
 const MAX_NOTES: usize = 8;
@@ -28,7 +28,7 @@ pub struct Integrity {
     /// Records and chunks in the middle that could not be read and were
     /// skipped.
     pub damaged: u64,
-    /// The first few of them, in words, each with its place.
+    /// The first few of them, in words, each with its position.
     pub notes: Vec<String>,
 }
 
@@ -68,7 +68,7 @@ impl Integrity {
     }
 }
 
-/// Records of a file in its order, those of a chunk in its place.
+/// Records of a file in its order, those of a chunk at the chunk's position.
 pub struct RecordStream<R> {
     source: R,
     len: u64,

@@ -35,7 +35,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
         watch.shown = side.state;
         let words = match side.state {
             ExtruderState::Holding(why) => {
-                format!("holding: {}", names::in_words(names::extruder_hold(why)))
+                format!("holding: {}", names::in_words(names::of(why)))
             }
             ExtruderState::Fault(why) => {
                 format!("fault: {}", names::in_words(&names::extruder_fault(why)))

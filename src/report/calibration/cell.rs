@@ -1,11 +1,11 @@
-//! A page that shows what a calibration leaves in the widths of a cell, with its gauge.
+//! The page of a cell's calibration: its standard deviation over the image, with the gauge.
 
 use maud::html;
 
 use super::drawing::sigma_map;
 use crate::calibration::relative_sigma_map::RelativeSigmaMap;
 use crate::core::geometry::Roi;
-use crate::report::html::whole_page;
+use crate::report::html::titled_page;
 
 /// What the page is made of.
 #[derive(Debug)]
@@ -14,11 +14,11 @@ pub struct CellCalibrationPage<'a> {
     pub cell: &'a str,
     /// Calibration and surface in words.
     pub calibration: &'a str,
-    /// What is left open, over the image.
+    /// Relative standard deviation of a width over the image.
     pub map: &'a RelativeSigmaMap,
     /// The gauge.
     pub gauge: Roi,
-    /// What is left open in the middle of the gauge, as a share of the width.
+    /// The same in the middle of the gauge, as a fraction of the width.
     pub in_gauge: Option<f64>,
     /// First column and row, last column and row between which boards were seen \[px\].
     pub covered_px: Option<[f64; 4]>,
@@ -29,34 +29,32 @@ impl CellCalibrationPage<'_> {
     pub fn page(&self) -> String {
         let title = format!("Calibration of {}", self.cell);
         let body = html! {
-            h1 { (title) }
             div.about { span { "calibration " b { (self.calibration) } } }
             section {
-                h2 { "What the calibration leaves in a width" }
+                h2 { "Uncertainty of a width by the calibration" }
                 p.hint {
                     (format!(
                         "Standard deviation of the width of a bead of {} mm [% of it] whose \
                          middle is in a cell, at the cell's surface height. Every sigma_mm \
-                         contains it for its own width and place; it is one error, the same in \
+                         contains it for its own width and position; it is one error, the same in \
                          every frame. Solid: the gauge. Dashed: where boards were seen. Empty \
                          cells do not see such a bead whole.",
                         self.map.bead_mm
                     ))
                 }
-                @if let Some(share) = self.in_gauge {
+                @if let Some(fraction) = self.in_gauge {
                     p {
                         (format!(
                             "In the middle of the gauge: {:.3} %, or {:.4} mm.",
-                            100.0 * share,
-                            share * self.map.bead_mm
+                            100.0 * fraction,
+                            fraction * self.map.bead_mm
                         ))
                     }
                 }
                 (sigma_map(self.map, corners_px(self.gauge), self.covered_px))
             }
-            footer { "Written by truebead " (env!("CARGO_PKG_VERSION")) "." }
         };
-        whole_page(&title, &body).into_string()
+        titled_page(&title, &body, ".")
     }
 }
 

@@ -1,4 +1,4 @@
-//! Drawings over the camera's picture.
+//! Drawings over the camera's image.
 
 use maud::{Markup, html};
 
@@ -8,15 +8,16 @@ use crate::calibration::width_map::{Cells, MAP_CELLS, WidthMap};
 use crate::numeric::rank;
 use crate::report::chart::palette::{GAUGE, Ink, LEFT_EDGE, LIMIT, REJECTED, WIDTH};
 
-/// Width of a drawing on the page [units of its own].
+/// Width of a drawing on the page \[units of its own\].
 const WIDE: f64 = 960.0;
-/// Room at the left and at the lower side for the axes.
+/// Margins at the left and at the bottom for the axes \[units of its own\].
 const MARGIN: (f64, f64) = (52.0, 44.0);
-/// Part of a square's side that the median way between seen and expected is drawn as.
+/// Length at which the median residual is drawn, as a fraction of a square's side.
 const DRAWN: f64 = 0.15;
+/// Width and height of a bar \[px of the page\].
 const BAR: (f64, f64) = (160.0, 12.0);
 
-/// The camera's picture on the page.
+/// The camera's image on the page.
 #[derive(Debug, Clone, Copy)]
 pub struct Drawing {
     size_px: [f64; 2],
@@ -60,7 +61,7 @@ impl Drawing {
         }
     }
 
-    /// A bar for the typical and the largest error, each as a part of the longest.
+    /// A bar for the typical and the largest error, each as a fraction of the longest bar.
     pub fn bar(typical: f64, largest: f64) -> Markup {
         let (long, high) = BAR;
         let part = |part: f64| round(long * part.clamp(0.0, 1.0));
@@ -84,14 +85,14 @@ fn round(value: f64) -> f64 {
     (value * 10.0).round() / 10.0
 }
 
-/// How much longer than they are ways are drawn, so that they can be seen.
+/// Magnification at which residuals are drawn, so that they can be seen.
 pub fn magnification(solution: &Solution) -> f64 {
-    let mut ways: Vec<f64> = solution
+    let mut lengths_px: Vec<f64> = solution
         .views
         .iter()
         .flat_map(|view| view.errors_px.iter().map(nalgebra::Matrix::norm))
         .collect();
-    let median = rank::median(&mut ways).unwrap_or(1.0).max(1e-6);
+    let median = rank::median(&mut lengths_px).unwrap_or(1.0).max(1e-6);
     let times = DRAWN * typical_side(solution) / median;
     // A round number is easier to divide by.
     let power = 10_f64.powf(times.log10().floor());
@@ -108,7 +109,7 @@ fn typical_side(solution: &Solution) -> f64 {
     rank::median(&mut sides).unwrap_or(10.0)
 }
 
-/// Every corner with its way from where it is expected.
+/// Every corner with its residual: from the expected to the observed position.
 pub fn residuals(solution: &Solution, times: f64) -> Markup {
     let drawing = Drawing::of(solution.image_size_px);
     let corners =
@@ -128,7 +129,7 @@ pub fn residuals(solution: &Solution, times: f64) -> Markup {
     )
 }
 
-/// What a width is known to, cell by cell, with where boards were seen.
+/// Standard deviation of a width, cell by cell, with the area where boards were seen.
 pub fn width_map(solution: &Solution, map: &WidthMap) -> Markup {
     let drawing = Drawing::of(solution.image_size_px);
     let [width, height] = drawing.size_px;
@@ -151,13 +152,14 @@ pub fn width_map(solution: &Solution, map: &WidthMap) -> Markup {
     )
 }
 
-/// What a width is known to, cell by cell, with the gauge and where boards were seen.
+/// Relative standard deviation of a width, cell by cell, with the gauge and the area where
+/// boards were seen.
 pub fn sigma_map(map: &RelativeSigmaMap, gauge_px: [f64; 4], seen_px: Option<[f64; 4]>) -> Markup {
     let drawing = Drawing::of(map.image_size_px);
     drawing.svg(
         "relative standard deviation of a width over the image, with the gauge",
         &html! {
-            (drawing.cells(&map.cells, map.range(), |i| map.cell_px(i), |share| short(100.0 * share)))
+            (drawing.cells(&map.cells, map.range(), |i| map.cell_px(i), |fraction| short(100.0 * fraction)))
             @if let Some(seen) = seen_px { (drawing.frame(seen, LIMIT, true)) }
             (drawing.frame(gauge_px, GAUGE, false))
         },
@@ -165,7 +167,7 @@ pub fn sigma_map(map: &RelativeSigmaMap, gauge_px: [f64; 4], seen_px: Option<[f6
 }
 
 impl Drawing {
-    /// Cells that are the darker the more they hold, each with its value.
+    /// Cells, darker for larger values, each with its value in words.
     fn cells(
         self,
         cells: &[Option<f64>],
@@ -202,7 +204,7 @@ impl Drawing {
     }
 }
 
-/// Two digits that count.
+/// Two significant digits.
 fn short(mm: f64) -> String {
     let places = if mm < 0.001 {
         5

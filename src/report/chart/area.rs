@@ -2,23 +2,23 @@
 
 use maud::{Markup, html};
 
-use super::axis::{AxisScale, Extent};
-use super::range::Range;
+use super::axis::{AxisScale, PageExtent};
+use super::range::ValueRange;
 
 /// An x axis that several plots share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct XAxis {
-    /// What runs along it, with its unit.
+    /// Its quantity, with its unit.
     pub title: String,
     /// Smallest and largest value, before the division.
-    pub range: Range,
+    pub range: ValueRange,
     /// Values are divided by this for the ticks.
     pub divisor: f64,
 }
 
 impl XAxis {
     /// Time \[s\], in minutes or hours where it is long.
-    pub fn time(range: Range) -> Self {
+    pub fn time(range: ValueRange) -> Self {
         let (unit, divisor) = match range.length() {
             long if long > 7200.0 => ("h", 3600.0),
             long if long > 600.0 => ("min", 60.0),
@@ -28,19 +28,19 @@ impl XAxis {
     }
 
     /// Frames by their number.
-    pub fn frames(range: Range) -> Self {
+    pub fn frames(range: ValueRange) -> Self {
         Self { title: "frame".to_string(), range, divisor: 1.0 }
     }
 
     /// Path length \[mm\], in metres where it is long.
-    pub fn path(range: Range) -> Self {
+    pub fn path(range: ValueRange) -> Self {
         let (unit, divisor) = if range.length() > 10_000.0 { ("m", 1000.0) } else { ("mm", 1.0) };
         Self { title: format!("distance along the path [{unit}]"), range, divisor }
     }
 
-    fn scale(&self, page: Extent) -> AxisScale {
-        let Range { min, max } = self.range;
-        AxisScale::linear(Range::new(min / self.divisor, max / self.divisor), page)
+    fn scale(&self, page: PageExtent) -> AxisScale {
+        let ValueRange { min, max } = self.range;
+        AxisScale::linear(ValueRange::new(min / self.divisor, max / self.divisor), page)
     }
 }
 
@@ -57,8 +57,9 @@ pub struct Area {
     pub bottom: f64,
 }
 
-/// Left margin, the same for all plots so that they stand in line.
+/// Left margin \[px of the drawing\], the same for all plots so that they align.
 pub const LEFT: f64 = 62.0;
+/// Right margin \[px of the drawing\].
 const RIGHT: f64 = 14.0;
 
 impl Area {
@@ -73,13 +74,13 @@ impl Area {
     }
 
     /// Left and right end of the grid.
-    pub fn across(&self) -> Extent {
-        Extent { from: LEFT, to: self.width - RIGHT }
+    pub fn across(&self) -> PageExtent {
+        PageExtent { from: LEFT, to: self.width - RIGHT }
     }
 
     /// Lower and upper end of the grid, in the order of a y axis.
-    pub fn upwards(&self) -> Extent {
-        Extent { from: self.height - self.bottom, to: self.top }
+    pub fn upwards(&self) -> PageExtent {
+        PageExtent { from: self.height - self.bottom, to: self.top }
     }
 
     /// The x axis on this area.
@@ -101,8 +102,8 @@ impl Area {
 
     /// The same for ticks of another scale.
     pub fn vertical_grid(&self, ticks: &[(f64, String)], scale: &AxisScale, title: &str) -> Markup {
-        let Extent { from: bottom, to: top } = self.upwards();
-        let Extent { from: left, to: right } = self.across();
+        let PageExtent { from: bottom, to: top } = self.upwards();
+        let PageExtent { from: left, to: right } = self.across();
         html! {
             @for (value, label) in ticks {
                 @let x = round(scale.position(*value));
@@ -116,8 +117,8 @@ impl Area {
 
     /// Horizontal grid lines, their labels and the axis title above them.
     pub fn y_grid(&self, scale: &AxisScale, title: &str) -> Markup {
-        let Extent { from: left, to: right } = self.across();
-        let Extent { from: bottom, to: top } = self.upwards();
+        let PageExtent { from: left, to: right } = self.across();
+        let PageExtent { from: bottom, to: top } = self.upwards();
         let wanted = if bottom - top > 150.0 { 6 } else { 4 };
         html! {
             @for (value, label) in scale.ticks(wanted) {
@@ -129,7 +130,7 @@ impl Area {
         }
     }
 
-    /// Wraps what has been drawn.
+    /// The drawing around its content.
     pub fn svg(&self, label: &str, inner: &Markup) -> Markup {
         html! {
             svg viewBox=(format!("0 0 {} {}", self.width, self.height)) role="img" aria-label=(label) {
@@ -140,8 +141,8 @@ impl Area {
 
     /// Draws only what lies within the grid.
     pub fn clipped(&self, inner: &Markup) -> Markup {
-        let Extent { from: left, to: right } = self.across();
-        let Extent { from: bottom, to: top } = self.upwards();
+        let PageExtent { from: left, to: right } = self.across();
+        let PageExtent { from: bottom, to: top } = self.upwards();
         let (width, height) = (right - left, bottom - top);
         html! {
             svg x=(left) y=(top) width=(width) height=(height)
@@ -150,7 +151,7 @@ impl Area {
     }
 }
 
-/// A place on the page with one decimal, which is finer than can be seen.
-pub fn round(place: f64) -> f64 {
-    (place * 10.0).round() / 10.0 + 0.0
+/// A position on the page with one decimal, which is finer than can be seen.
+pub fn round(position: f64) -> f64 {
+    (position * 10.0).round() / 10.0 + 0.0
 }

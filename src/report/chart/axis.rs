@@ -1,18 +1,18 @@
-//! Axes: round ticks, and from values to places on the page.
+//! Axes: round ticks, and the map from values to positions on the page.
 
-use super::range::Range;
+use super::range::ValueRange;
 
 /// Where an axis begins and ends on the page \[px of the drawing\]; upwards it begins at
 /// the larger number.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Extent {
+pub struct PageExtent {
     /// Where its smallest value stands.
     pub from: f64,
     /// Where its largest value stands.
     pub to: f64,
 }
 
-/// A linear or logarithmic map from values to a stretch of the page.
+/// A linear or logarithmic map from values to positions on the page.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisScale {
     low: f64,
@@ -24,33 +24,33 @@ pub struct AxisScale {
 
 impl AxisScale {
     /// Values onto a part of the page. A range without extent is widened.
-    pub fn linear(values: Range, page: Extent) -> Self {
+    pub fn linear(values: ValueRange, page: PageExtent) -> Self {
         let (low, high) = widened(values.min, values.max);
-        let Extent { from, to } = page;
+        let PageExtent { from, to } = page;
         Self { low, high, from, to, log: false }
     }
 
     /// The same for positive values on a logarithmic axis.
-    pub fn log(values: Range, page: Extent) -> Self {
+    pub fn log(values: ValueRange, page: PageExtent) -> Self {
         let low = values.min.max(1e-9);
         let high = if values.max > low { values.max } else { low * 2.0 };
-        let Extent { from, to } = page;
+        let PageExtent { from, to } = page;
         Self { low, high, from, to, log: true }
     }
 
-    /// The place of a value on the page.
+    /// Position of a value on the page \[px of the drawing\].
     pub fn position(&self, value: f64) -> f64 {
-        let share = if self.log {
+        let fraction = if self.log {
             (value.max(1e-9) / self.low).ln() / (self.high / self.low).ln()
         } else {
             (value - self.low) / (self.high - self.low)
         };
-        self.from + share * (self.to - self.from)
+        self.from + fraction * (self.to - self.from)
     }
 
     /// Smallest and largest value.
-    pub fn range(&self) -> Range {
-        Range::new(self.low, self.high)
+    pub fn range(&self) -> ValueRange {
+        ValueRange::new(self.low, self.high)
     }
 
     /// Round values within the range, about `wanted` of them, with their
@@ -96,8 +96,8 @@ impl AxisScale {
 }
 
 fn widened(low: f64, high: f64) -> (f64, f64) {
-    let least = (low.abs().max(high.abs()) * 1e-6).max(1e-6);
-    if high - low > least {
+    let min_length = (low.abs().max(high.abs()) * 1e-6).max(1e-6);
+    if high - low > min_length {
         (low, high)
     } else {
         let middle = f64::midpoint(low, high);
@@ -130,40 +130,48 @@ mod tests {
 
     #[test]
     fn ticks_are_round() {
-        let page = Extent { from: 0.0, to: 100.0 };
+        let page = PageExtent { from: 0.0, to: 100.0 };
         assert_eq!(
-            labels(AxisScale::linear(Range::new(0.0, 20.0), page), 5),
+            labels(AxisScale::linear(ValueRange::new(0.0, 20.0), page), 5),
             ["0", "5", "10", "15", "20"]
         );
         assert_eq!(
-            labels(AxisScale::linear(Range::new(41.83, 42.21), page), 4),
+            labels(AxisScale::linear(ValueRange::new(41.83, 42.21), page), 4),
             ["41.9", "42.0", "42.1", "42.2"]
         );
         assert_eq!(
-            labels(AxisScale::linear(Range::new(-0.5, 0.5), page), 2),
+            labels(AxisScale::linear(ValueRange::new(-0.5, 0.5), page), 2),
             ["-0.5", "0.0", "0.5"]
         );
-        assert_eq!(labels(AxisScale::log(Range::new(0.3, 6.0), page), 5), ["0.5", "1", "2", "5"]);
-        assert_eq!(labels(AxisScale::log(Range::new(0.9, 3.1), page), 5), ["1", "1.5", "2", "3"]);
+        assert_eq!(
+            labels(AxisScale::log(ValueRange::new(0.3, 6.0), page), 5),
+            ["0.5", "1", "2", "5"]
+        );
+        assert_eq!(
+            labels(AxisScale::log(ValueRange::new(0.9, 3.1), page), 5),
+            ["1", "1.5", "2", "3"]
+        );
     }
 
     #[test]
     fn a_range_without_extent_still_has_an_axis() {
-        let scale = AxisScale::linear(Range::new(42.0, 42.0), Extent { from: 0.0, to: 100.0 });
+        let scale =
+            AxisScale::linear(ValueRange::new(42.0, 42.0), PageExtent { from: 0.0, to: 100.0 });
         assert!((scale.position(42.0) - 50.0).abs() < 1e-9);
         assert!(!scale.ticks(5).is_empty());
         assert!(
-            !AxisScale::log(Range::new(0.0, 0.0), Extent { from: 0.0, to: 1.0 })
+            !AxisScale::log(ValueRange::new(0.0, 0.0), PageExtent { from: 0.0, to: 1.0 })
                 .position(0.0)
                 .is_nan()
         );
     }
 
     #[test]
-    fn values_have_their_place() {
-        let scale = AxisScale::linear(Range::new(0.0, 10.0), Extent { from: 200.0, to: 100.0 });
+    fn values_have_their_position() {
+        let scale =
+            AxisScale::linear(ValueRange::new(0.0, 10.0), PageExtent { from: 200.0, to: 100.0 });
         assert!((scale.position(2.5) - 175.0).abs() < 1e-9);
-        let log = AxisScale::log(Range::new(1.0, 100.0), Extent { from: 0.0, to: 100.0 });
+        let log = AxisScale::log(ValueRange::new(1.0, 100.0), PageExtent { from: 0.0, to: 100.0 });
         assert!((log.position(10.0) - 50.0).abs() < 1e-9);
     }
 }

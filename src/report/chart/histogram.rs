@@ -1,13 +1,14 @@
-//! How latencies are distributed, on a logarithmic axis.
+//! Histogram of latencies on a logarithmic axis.
 
 use maud::{Markup, html};
 
 use super::area::{Area, round};
-use super::axis::{AxisScale, Extent};
+use super::axis::{AxisScale, PageExtent};
 use super::palette;
-use super::range::Range;
+use super::range::ValueRange;
 use crate::numeric::statistics::{Distribution, as_f64};
 
+/// Bars per factor of two, which trades resolution against noise of the counts.
 const BARS_PER_OCTAVE: usize = 8;
 
 /// Bars of counts over milliseconds, with lines at the median and at 99 %.
@@ -15,10 +16,10 @@ pub fn draw(latencies: &Distribution) -> Markup {
     let bars = latencies.bars(BARS_PER_OCTAVE);
     let (Some(first), Some(last)) = (bars.first(), bars.last()) else { return html! {} };
     let area = Area::wide(230.0);
-    let x = AxisScale::log(Range::new(first.0.min(last.1 / 4.0), last.1), area.across());
+    let x = AxisScale::log(ValueRange::new(first.0.min(last.1 / 4.0), last.1), area.across());
     let most = bars.iter().map(|bar| bar.2).max().unwrap_or(1);
-    let y = AxisScale::linear(Range::new(0.0, as_f64(most) * 1.12), area.upwards());
-    let Extent { from: bottom, to: top } = area.upwards();
+    let y = AxisScale::linear(ValueRange::new(0.0, as_f64(most) * 1.12), area.upwards());
+    let PageExtent { from: bottom, to: top } = area.upwards();
     let inner = html! {
         (area.y_grid(&y, "setpoints"))
         (area.vertical_grid(&x.ticks(0), &x, "latency [ms]"))

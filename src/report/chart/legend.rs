@@ -1,10 +1,9 @@
-//! What the colours of a plot mean, of what is drawn and nothing else.
+//! Legends that name only what is drawn.
 
 use maud::{Markup, html};
 
-use super::palette;
-use super::palette::Ink;
-use super::series::Curve;
+use super::palette::{self, Ink};
+use super::series::PlotCurve;
 use super::strip::Strip;
 
 /// Name, colour and kind of line ("", "dash", "area", "block" or "dot").
@@ -21,14 +20,14 @@ pub fn legend(entries: &[LegendEntry<'_>]) -> Markup {
 }
 
 /// The entries whose series has something to draw.
-pub fn drawn<'a>(entries: &[(&Curve, LegendEntry<'a>)]) -> Vec<LegendEntry<'a>> {
+pub fn drawn<'a>(entries: &[(&PlotCurve, LegendEntry<'a>)]) -> Vec<LegendEntry<'a>> {
     let drawn = entries.iter().filter(|(series, _)| !series.is_empty());
     drawn.map(|(_, entry)| *entry).collect()
 }
 
 /// The states that a strip shows, and whether a limit acted.
 pub fn of_strips(names: &[&'static str], states: &Strip, limits: &Strip) -> Markup {
-    let shown = |name: &str| states.segments().iter().any(|spell| spell.mark.name == name);
+    let shown = |name: &str| states.segments().iter().any(|segment| segment.mark.name == name);
     let drawn = names.iter().filter(|name| shown(name));
     let mut entries: Vec<LegendEntry<'_>> =
         drawn.filter_map(|name| Some((*name, palette::state(name)?, "block"))).collect();
@@ -40,7 +39,7 @@ pub fn of_strips(names: &[&'static str], states: &Strip, limits: &Strip) -> Mark
 
 /// Whether a strip shows anything worth drawing.
 pub fn has_marks(strip: &Strip) -> bool {
-    strip.segments().iter().any(|spell| spell.mark.severity > 0)
+    strip.segments().iter().any(|segment| segment.mark.severity > 0)
 }
 
 #[cfg(test)]
@@ -50,7 +49,7 @@ mod tests {
 
     #[test]
     fn what_is_not_drawn_is_not_named() {
-        let (mut some, none) = (Curve::default(), Curve::default());
+        let (mut some, none) = (PlotCurve::default(), PlotCurve::default());
         some.push(0.0, 1.0);
         let entry = |name| (name, palette::SPEED, "");
         let named = drawn(&[(&some, entry("robot")), (&none, entry("demand"))]);

@@ -1,6 +1,6 @@
-//! The report's colours: one for each thing, the same everywhere, told apart
-//! with every kind of colour vision (Okabe and Ito, "Color Universal Design",
-//! 2008, with two purples for the speeds).
+//! The report's colours: one for each quantity, the same everywhere, distinguishable with every
+//! kind of colour vision (Okabe and Ito, "Color Universal Design", 2008, with two purples for
+//! the speeds).
 
 use std::fmt::Write as _;
 
@@ -25,49 +25,49 @@ const fn ink(name: &'static str, light: Rgb, dark: Rgb) -> Ink {
 
 /// The measured width, and what is derived from it.
 pub const WIDTH: Ink = ink("width", [0, 114, 178], [76, 172, 226]);
-/// What was asked for.
+/// Target values.
 pub const TARGET: Ink = ink("target", [40, 44, 52], [224, 228, 236]);
 /// Speed that the robot reports.
 pub const SPEED: Ink = ink("speed", [120, 28, 86], [226, 130, 190]);
 /// Setpoint that was sent.
 pub const SETPOINT: Ink = ink("setpoint", [204, 121, 167], [156, 86, 134]);
-/// Speed that the controller would like.
+/// Demand of the controller before the limiter.
 pub const DEMAND: Ink = ink("demand", [150, 150, 158], [128, 132, 142]);
 /// Limits of the cell, and the time during which one acts.
 pub const LIMIT: Ink = ink("limit", [128, 114, 20], [204, 194, 92]);
-/// Refused frames.
+/// Rejected frames.
 pub const REJECTED: Ink = ink("rejected", [213, 94, 0], [236, 122, 38]);
-/// Material that leaves the nozzle a second, measured or simulated.
+/// Flow through the nozzle, measured or simulated.
 pub const FLOW: Ink = ink("flow", [0, 138, 140], [64, 196, 196]);
 /// Pressure at the nozzle.
 pub const PRESSURE: Ink = ink("pressure", [92, 72, 168], [160, 146, 230]);
-/// Speed of a screw or of a wheel, and whatever else an extruder is told.
+/// Speed of a screw or of a wheel, and other commands of an extruder.
 pub const SCREW: Ink = ink("screw", [150, 94, 40], [206, 152, 98]);
 /// Length of a screw that is filled.
 pub const FILLED: Ink = ink("filled", [82, 84, 116], [166, 168, 202]);
-/// What a model foretells; stands out of the data under it.
+/// Predictions of a model, in contrast to the data under them.
 pub const MODEL: Ink = ink("model", [176, 16, 48], [255, 128, 128]);
-/// What a source's own method does, beside this program's.
+/// The method of a paper, beside this program's.
 pub const PAPER: Ink = ink("paper", [213, 94, 0], [236, 122, 38]);
-/// What this program's best method does.
+/// This program's best method.
 pub const OURS: Ink = ink("ours", [0, 114, 178], [76, 172, 226]);
 /// The robot is not printing.
 pub const IDLE: Ink = ink("idle", [190, 196, 206], [140, 148, 160]);
-/// First stretch, at the start speed.
+/// The first segment of a bead, at the start speed.
 pub const PRIMING: Ink = ink("priming", [86, 180, 233], [86, 180, 233]);
 /// The width is being corrected.
 pub const TRACKING: Ink = ink("tracking", [0, 158, 115], [0, 158, 115]);
-/// A pump was stopped early, and what still comes fills the bead.
+/// The pump was stopped before the end of the bead; the remaining flow fills it.
 pub const ENDING: Ink = ink("ending", [148, 190, 84], [148, 190, 84]);
 /// The speed is kept.
 pub const HOLDING: Ink = ink("holding", [230, 159, 0], [230, 159, 0]);
-/// The controller gave up.
+/// The controller stopped with a fault.
 pub const FAULT: Ink = ink("fault", [213, 94, 0], [236, 94, 20]);
-/// Left (upper) edge in a picture.
+/// Left (upper) edge in an image.
 pub const LEFT_EDGE: Ink = ink("left-edge", [86, 180, 233], [86, 180, 233]);
-/// Right (lower) edge in a picture.
+/// Right (lower) edge in an image.
 pub const RIGHT_EDGE: Ink = ink("right-edge", [240, 228, 66], [240, 228, 66]);
-/// The gauge in a picture.
+/// The gauge in an image.
 pub const GAUGE: Ink = ink("gauge", [0, 158, 115], [0, 158, 115]);
 
 /// Controllers beside each other, in order.

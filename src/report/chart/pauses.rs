@@ -1,5 +1,4 @@
-//! A plot over the pause before a start, in which a second and five minutes can
-//! both be seen.
+//! A plot over the pause before a start, on an axis that shows both seconds and minutes.
 
 use std::fmt::Write as _;
 
@@ -8,13 +7,13 @@ use maud::{Markup, html};
 use super::area::{Area, round};
 use super::axis::AxisScale;
 use super::palette::Ink;
-use super::range::Range;
+use super::range::ValueRange;
 use super::series::CurvePoint;
 
-/// Pauses that the axis names \[s\].
+/// Ticks of the axis \[s\].
 const TICKS_S: [f64; 9] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0];
 
-/// What is drawn over pauses \[s\], in the order of their length.
+/// A layer over pauses \[s\], in the order of their length.
 #[derive(Debug)]
 pub enum PauseLayer<'a> {
     /// A curve from point to point.
@@ -39,9 +38,9 @@ pub fn over_pauses(area: Area, y_title: &str, layers: &[PauseLayer<'_>]) -> Mark
     let longest_s = all().map(|(idle_s, _)| *idle_s).fold(1.0, f64::max);
     let most = all().map(|(_, value)| *value).fold(0.0, f64::max);
     let low = all().map(|(_, value)| *value).fold(0.0, f64::min);
-    let high = Range::new(low, most).with_margin(0.06).max;
-    let x = AxisScale::linear(Range::new(0.0, axis_position(1.05 * longest_s)), area.across());
-    let y = AxisScale::linear(Range::new(low, high), area.upwards());
+    let high = ValueRange::new(low, most).with_margin(0.06).max;
+    let x = AxisScale::linear(ValueRange::new(0.0, axis_position(1.05 * longest_s)), area.across());
+    let y = AxisScale::linear(ValueRange::new(low, high), area.upwards());
     let shown = TICKS_S.iter().filter(|tick| **tick <= 1.05 * longest_s);
     let ticks: Vec<(f64, String)> =
         shown.map(|tick| (axis_position(*tick), tick.to_string())).collect();
@@ -55,7 +54,7 @@ pub fn over_pauses(area: Area, y_title: &str, layers: &[PauseLayer<'_>]) -> Mark
     )
 }
 
-/// Long pauses are drawn together, short ones apart.
+/// Position of a pause: ln(1 + pause), which spreads short pauses.
 fn axis_position(idle_s: f64) -> f64 {
     idle_s.max(0.0).ln_1p()
 }
@@ -89,7 +88,7 @@ mod tests {
     use crate::report::chart::palette;
 
     #[test]
-    fn every_pause_has_its_place() {
+    fn every_pause_has_its_position() {
         let points = [(0.0, 1.0), (1.0, 2.0), (300.0, 4.0)];
         let layers =
             [PauseLayer::Marked(&points, palette::OURS), PauseLayer::Points(&[], palette::FLOW)];

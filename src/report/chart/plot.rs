@@ -5,24 +5,24 @@ use std::fmt::Write as _;
 use maud::{Markup, html};
 
 use super::area::{Area, XAxis, round};
-use super::axis::{AxisScale, Extent};
+use super::axis::{AxisScale, PageExtent};
 use super::palette::Ink;
-use super::range::Range;
-use super::series::{Curve, CurvePoint, unbroken};
+use super::range::ValueRange;
+use super::series::{CurvePoint, PlotCurve, unbroken};
 
-/// What is drawn into a plot.
+/// A layer of a plot.
 #[derive(Debug)]
 pub enum PlotLayer<'a> {
     /// A curve from sample to sample.
-    Curve(&'a Curve, Ink),
+    Curve(&'a PlotCurve, Ink),
     /// A pale curve of noisy data, for another to be seen over it.
-    Data(&'a Curve, Ink),
-    /// A thin dashed curve, for what is wished rather than done.
-    Demand(&'a Curve, Ink),
+    Data(&'a PlotCurve, Ink),
+    /// A thin dashed curve, for a demand rather than an action.
+    Demand(&'a PlotCurve, Ink),
     /// A value that holds until the next one.
-    Stairs(&'a Curve, Ink),
+    Stairs(&'a PlotCurve, Ink),
     /// The area between the envelopes of two series.
-    Band(&'a Curve, &'a Curve, Ink),
+    Band(&'a PlotCurve, &'a PlotCurve, Ink),
     /// A dashed line at a value, with a label at its right end.
     Level(f64, Ink, &'a str),
 }
@@ -30,24 +30,37 @@ pub enum PlotLayer<'a> {
 /// A plot that is ready to be drawn.
 #[derive(Debug)]
 pub struct Plot<'a> {
-    /// Its place.
+    /// Its size on the page.
     pub area: Area,
     /// Its x axis.
     pub x: &'a XAxis,
-    /// What runs upwards, with its unit.
+    /// The quantity of the y axis, with its unit.
     pub y_title: &'a str,
     /// Smallest and largest value; see [`y_range`].
-    pub y_range: Range,
+    pub y_range: ValueRange,
     /// What is drawn, the lowest first.
     pub layers: Vec<PlotLayer<'a>>,
 }
 
-/// The range that shows all of these series and values, with a little air.
-pub fn y_range(series: &[&Curve], values: &[f64]) -> Range {
+/// A plot across the page, with its height \[px of the drawing\] and its layers, the lowest
+/// first.
+pub fn wide_plot(
+    x: &XAxis,
+    y_title: &str,
+    height: f64,
+    y_range: ValueRange,
+    layers: Vec<PlotLayer<'_>>,
+) -> Markup {
+    Plot { area: Area::wide(height), x, y_title, y_range, layers }.draw()
+}
+
+/// The range that shows all of these series and values, with a margin of 6 % on both sides.
+pub fn y_range(series: &[&PlotCurve], values: &[f64]) -> ValueRange {
     let ranges = series.iter().filter_map(|series| series.range());
-    let all =
-        ranges.chain(values.iter().map(|value| Range::new(*value, *value))).reduce(Range::joined);
-    all.unwrap_or(Range::new(0.0, 1.0)).with_margin(0.06)
+    let all = ranges
+        .chain(values.iter().map(|value| ValueRange::new(*value, *value)))
+        .reduce(ValueRange::joined);
+    all.unwrap_or(ValueRange::new(0.0, 1.0)).with_margin(0.06)
 }
 
 impl Plot<'_> {
@@ -68,20 +81,20 @@ impl Plot<'_> {
 
     fn layer(&self, layer: &PlotLayer<'_>, y: &AxisScale) -> Markup {
         let x = self.area.x(self.x);
-        let place = |point: &CurvePoint| (round(x(point.0)), round(y.position(point.1)));
+        let position = |point: &CurvePoint| (round(x(point.0)), round(y.position(point.1)));
         match layer {
-            PlotLayer::Curve(series, ink) => curve(&series.points(), place, "curve", *ink),
-            PlotLayer::Data(series, ink) => curve(&series.points(), place, "data", *ink),
-            PlotLayer::Demand(series, ink) => curve(&series.points(), place, "demand", *ink),
+            PlotLayer::Curve(series, ink) => curve(&series.points(), position, "curve", *ink),
+            PlotLayer::Data(series, ink) => curve(&series.points(), position, "data", *ink),
+            PlotLayer::Demand(series, ink) => curve(&series.points(), position, "demand", *ink),
             PlotLayer::Stairs(series, ink) => {
-                html! { path.stairs d=(stairs(&series.points(), place)) stroke=(ink.css()) {} }
+                html! { path.stairs d=(stairs(&series.points(), position)) stroke=(ink.css()) {} }
             }
             PlotLayer::Band(lower, upper, ink) => {
                 let (low, high) = (lower.lower_envelope(), upper.upper_envelope());
-                html! { path.band d=(outline(&low, &high, place)) fill=(ink.css()) {} }
+                html! { path.band d=(outline(&low, &high, position)) fill=(ink.css()) {} }
             }
             PlotLayer::Level(value, ink, _) => {
-                let Extent { from: left, to: right } = self.area.across();
+                let PageExtent { from: left, to: right } = self.area.across();
                 let at = round(y.position(*value));
                 html! { line.level x1=(left) x2=(right) y1=(at) y2=(at) stroke=(ink.css()) {} }
             }
@@ -101,7 +114,7 @@ impl Plot<'_> {
 
 fn curve(
     points: &[CurvePoint],
-    place: impl Fn(&CurvePoint) -> CurvePoint,
+    position: impl Fn(&CurvePoint) -> CurvePoint,
     class: &str,
     ink: Ink,
 ) -> Markup {
@@ -109,11 +122,11 @@ fn curve(
     let mut lone = Vec::new();
     for part in unbroken(points) {
         if let [only] = part {
-            lone.push(place(only));
+            lone.push(position(only));
             continue;
         }
         for (index, point) in part.iter().enumerate() {
-            append(&mut path, if index == 0 { 'M' } else { 'L' }, place(point));
+            append(&mut path, if index == 0 { 'M' } else { 'L' }, position(point));
         }
     }
     html! {
@@ -122,12 +135,12 @@ fn curve(
     }
 }
 
-fn stairs(points: &[CurvePoint], place: impl Fn(&CurvePoint) -> CurvePoint) -> String {
+fn stairs(points: &[CurvePoint], position: impl Fn(&CurvePoint) -> CurvePoint) -> String {
     let mut path = String::new();
     for part in unbroken(points) {
         let mut last_y = None;
         for point in part {
-            let (x, y) = place(point);
+            let (x, y) = position(point);
             match last_y {
                 None => append(&mut path, 'M', (x, y)),
                 Some(last_y) => {
@@ -146,7 +159,7 @@ fn stairs(points: &[CurvePoint], place: impl Fn(&CurvePoint) -> CurvePoint) -> S
 fn outline(
     low: &[CurvePoint],
     high: &[CurvePoint],
-    place: impl Fn(&CurvePoint) -> CurvePoint,
+    position: impl Fn(&CurvePoint) -> CurvePoint,
 ) -> String {
     let mut path = String::new();
     let mut start = 0;
@@ -157,7 +170,7 @@ fn outline(
             continue;
         }
         for (index, point) in part.iter().chain(upper.iter().rev()).enumerate() {
-            append(&mut path, if index == 0 { 'M' } else { 'L' }, place(point));
+            append(&mut path, if index == 0 { 'M' } else { 'L' }, position(point));
         }
         path.push('Z');
     }
@@ -176,19 +189,19 @@ mod tests {
 
     #[test]
     fn a_curve_runs_through_its_samples() {
-        let axis = XAxis::time(Range::new(0.0, 10.0));
+        let axis = XAxis::time(ValueRange::new(0.0, 10.0));
         let area = Area::wide(200.0);
-        let samples: Curve = [(0.0, 0.0), (10.0, 1.0)].into_iter().collect();
+        let samples: PlotCurve = [(0.0, 0.0), (10.0, 1.0)].into_iter().collect();
         let plot = Plot {
             area,
             x: &axis,
             y_title: "y [mm]",
-            y_range: Range::new(0.0, 1.0),
+            y_range: ValueRange::new(0.0, 1.0),
             layers: vec![PlotLayer::Curve(&samples, palette::WIDTH)],
         };
         let drawn = plot.draw().into_string();
-        let Extent { from: left, to: right } = area.across();
-        let Extent { from: bottom, to: top } = area.upwards();
+        let PageExtent { from: left, to: right } = area.across();
+        let PageExtent { from: bottom, to: top } = area.upwards();
         assert!(drawn.contains(&format!("M{left} {bottom}L{right} {top}")), "{drawn}");
         assert!(drawn.contains("time [s]") && drawn.contains("y [mm]"));
     }
@@ -201,7 +214,7 @@ mod tests {
 
     #[test]
     fn nothing_is_drawn_of_nothing() {
-        let (empty, axis) = (Curve::default(), XAxis::path(Range::new(0.0, 0.0)));
+        let (empty, axis) = (PlotCurve::default(), XAxis::path(ValueRange::new(0.0, 0.0)));
         let plot = Plot {
             area: Area::half(150.0),
             x: &axis,

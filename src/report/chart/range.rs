@@ -2,14 +2,14 @@
 
 /// A range of values.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Range {
+pub struct ValueRange {
     /// Smallest value.
     pub min: f64,
     /// Largest value.
     pub max: f64,
 }
 
-impl Range {
+impl ValueRange {
     /// A range by its ends.
     pub const fn new(min: f64, max: f64) -> Self {
         Self { min, max }

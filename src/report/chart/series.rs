@@ -2,12 +2,12 @@
 //! bucket that keeps their smallest and their largest, so that no spike is
 //! lost.
 
-use super::range::Range;
+use super::range::ValueRange;
 
 /// A point of a curve, in the units of its axes.
 pub type CurvePoint = (f64, f64);
 
-/// Buckets that are kept; each gives up to two points.
+/// Largest number of buckets; each gives up to two points, more than a page has pixels across.
 const MAX_BUCKETS: usize = 1000;
 
 /// The extremes of some neighbouring samples.
@@ -36,22 +36,22 @@ impl Bucket {
     }
 }
 
-/// Samples in the order of their coming, thinned by doubling buckets.
+/// Samples in their order, thinned by doubling the size of the buckets.
 #[derive(Debug, Clone)]
-pub struct Curve {
+pub struct PlotCurve {
     buckets: Vec<Bucket>,
     per_bucket: u64,
 }
 
-impl Default for Curve {
+impl Default for PlotCurve {
     fn default() -> Self {
         Self { buckets: Vec::new(), per_bucket: 1 }
     }
 }
 
-impl Curve {
-    /// Takes a sample; one that is not finite is left out. x that falls begins
-    /// anew, as a path does with a new bead.
+impl PlotCurve {
+    /// Takes a sample; one that is not finite is left out. Where x falls, as a path does with a new
+    /// bead, a new bucket begins.
     pub fn push(&mut self, x: f64, y: f64) {
         if !(x.is_finite() && y.is_finite()) {
             return;
@@ -104,19 +104,19 @@ impl Curve {
     }
 
     /// Smallest and largest value.
-    pub fn range(&self) -> Option<Range> {
+    pub fn range(&self) -> Option<ValueRange> {
         self.buckets
             .iter()
-            .map(|bucket| Range::new(bucket.low.1, bucket.high.1))
-            .reduce(Range::joined)
+            .map(|bucket| ValueRange::new(bucket.low.1, bucket.high.1))
+            .reduce(ValueRange::joined)
     }
 
     /// Smallest and largest x.
-    pub fn extent(&self) -> Option<Range> {
+    pub fn extent(&self) -> Option<ValueRange> {
         self.buckets
             .iter()
-            .map(|bucket| Range::new(bucket.first_x, bucket.last_x))
-            .reduce(Range::joined)
+            .map(|bucket| ValueRange::new(bucket.first_x, bucket.last_x))
+            .reduce(ValueRange::joined)
     }
 }
 
@@ -136,7 +136,7 @@ pub fn unbroken(points: &[CurvePoint]) -> Vec<&[CurvePoint]> {
 }
 
 /// Points as a curve that can be drawn.
-impl FromIterator<CurvePoint> for Curve {
+impl FromIterator<CurvePoint> for PlotCurve {
     fn from_iter<I: IntoIterator<Item = CurvePoint>>(points: I) -> Self {
         let mut series = Self::default();
         for (x, y) in points {
@@ -153,18 +153,18 @@ mod tests {
 
     #[test]
     fn a_short_curve_is_kept_as_it_is() {
-        let mut series = Curve::default();
+        let mut series = PlotCurve::default();
         for point in [(0.0, 1.0), (1.0, 5.0), (2.0, f64::NAN), (3.0, 2.0)] {
             series.push(point.0, point.1);
         }
         assert_eq!(series.points(), [(0.0, 1.0), (1.0, 5.0), (3.0, 2.0)]);
-        assert_eq!(series.range(), Some(Range::new(1.0, 5.0)));
-        assert_eq!(series.extent(), Some(Range::new(0.0, 3.0)));
+        assert_eq!(series.range(), Some(ValueRange::new(1.0, 5.0)));
+        assert_eq!(series.extent(), Some(ValueRange::new(0.0, 3.0)));
     }
 
     #[test]
     fn a_lone_spike_survives_a_million_samples() {
-        let mut series = Curve::default();
+        let mut series = PlotCurve::default();
         for i in 0..1_000_000_u32 {
             let y = if i == 654_321 { 99.0 } else { f64::from(i % 7) };
             series.push(f64::from(i), y);
@@ -186,13 +186,13 @@ mod tests {
     proptest! {
         #[test]
         fn extremes_are_kept(values in prop::collection::vec(-1e6..1e6, 1..5000)) {
-            let mut series = Curve::default();
+            let mut series = PlotCurve::default();
             for (i, y) in (0_u32..).zip(&values) {
                 series.push(f64::from(i), *y);
             }
             let least = values.iter().copied().fold(f64::INFINITY, f64::min);
             let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            prop_assert_eq!(series.range(), Some(Range::new(least, largest)));
+            prop_assert_eq!(series.range(), Some(ValueRange::new(least, largest)));
             prop_assert!(series.points().len() <= 2000);
         }
     }

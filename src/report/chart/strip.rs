@@ -1,12 +1,12 @@
-//! What held from when to when, in bounded memory: states, limits, refused
-//! frames. Where it changes too fast to be drawn the worse is kept.
+//! States, limits or rejected frames over time, in bounded memory. Where the mark changes too fast
+//! to be drawn, the more severe one is kept.
 
-/// Spells that are kept before they are gathered.
+/// Segments that are kept before short ones are merged.
 const MAX_SEGMENTS: usize = 2000;
-/// Spells that a gathered strip is made of, at the most about twice as many.
+/// Segments of equal length that short ones are merged into; at most about twice as many remain.
 const MERGED_SEGMENTS: f64 = 750.0;
 
-/// What held; the higher severity wins where there is no room for both.
+/// What holds; the higher severity wins where both cannot be drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Mark {
     /// 0 is nothing worth drawing.
@@ -15,26 +15,25 @@ pub struct Mark {
     pub name: &'static str,
 }
 
-/// A stretch over which a mark held.
+/// A segment over which a mark holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Segment {
-    /// Where it began.
+pub struct StripSegment {
+    /// Start.
     pub from: f64,
-    /// Where it ended.
+    /// End.
     pub to: f64,
-    /// What held.
+    /// The mark.
     pub mark: Mark,
 }
 
-/// Spells one after the other.
+/// Consecutive segments.
 #[derive(Debug, Clone, Default)]
 pub struct Strip {
-    segments: Vec<Segment>,
+    segments: Vec<StripSegment>,
 }
 
 impl Strip {
-    /// From `x` on this holds. x must not fall; where it does it counts as the
-    /// last one.
+    /// From `x` on this mark holds. An x that falls counts as the last one.
     pub fn push(&mut self, x: f64, mark: Mark) {
         if !x.is_finite() {
             return;
@@ -47,14 +46,14 @@ impl Strip {
                 return;
             }
         }
-        self.segments.push(Segment { from, to: from, mark });
+        self.segments.push(StripSegment { from, to: from, mark });
         if self.segments.len() > MAX_SEGMENTS {
             self.merge_short();
         }
     }
 
-    /// What has been gathered so far.
-    pub fn segments(&self) -> &[Segment] {
+    /// The segments so far.
+    pub fn segments(&self) -> &[StripSegment] {
         &self.segments
     }
 
@@ -63,17 +62,17 @@ impl Strip {
             return;
         };
         let cell = (last.to - first.from) / MERGED_SEGMENTS;
-        let mut gathered: Vec<Segment> = Vec::with_capacity(MAX_SEGMENTS);
-        for spell in self.segments.drain(..) {
-            match gathered.last_mut() {
-                Some(last) if last.mark == spell.mark || spell.to - last.from <= cell => {
-                    last.to = spell.to;
-                    last.mark = last.mark.max(spell.mark);
+        let mut merged: Vec<StripSegment> = Vec::with_capacity(MAX_SEGMENTS);
+        for segment in self.segments.drain(..) {
+            match merged.last_mut() {
+                Some(last) if last.mark == segment.mark || segment.to - last.from <= cell => {
+                    last.to = segment.to;
+                    last.mark = last.mark.max(segment.mark);
                 }
-                _ => gathered.push(spell),
+                _ => merged.push(segment),
             }
         }
-        self.segments = gathered;
+        self.segments = merged;
     }
 }
 
@@ -85,7 +84,7 @@ mod tests {
     const BAD: Mark = Mark { severity: 1, name: "bad" };
 
     #[test]
-    fn a_spell_lasts_until_the_next() {
+    fn a_segment_lasts_until_the_next() {
         let mut strip = Strip::default();
         for (x, mark) in [(0.0, GOOD), (1.0, GOOD), (2.0, BAD), (3.0, GOOD)] {
             strip.push(x, mark);
@@ -110,7 +109,10 @@ mod tests {
             strip.push(f64::from(i), mark);
         }
         assert!(strip.segments().len() <= MAX_SEGMENTS);
-        let bad: Vec<_> = strip.segments().iter().filter(|spell| spell.mark == BAD).collect();
-        assert!(bad.iter().any(|spell| (spell.from..=spell.to).contains(&77_777.0)), "{bad:?}");
+        let bad: Vec<_> = strip.segments().iter().filter(|segment| segment.mark == BAD).collect();
+        assert!(
+            bad.iter().any(|segment| (segment.from..=segment.to).contains(&77_777.0)),
+            "{bad:?}"
+        );
     }
 }

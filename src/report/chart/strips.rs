@@ -1,21 +1,23 @@
-//! Strips under a plot: what held from when to when.
+//! Strips under a plot: states, limits or rejected frames over time.
 
 use maud::{Markup, html};
 
 use super::area::{Area, LEFT, XAxis, round};
-use super::axis::Extent;
+use super::axis::PageExtent;
 use super::palette::Ink;
-use super::strip::{Segment, Strip};
+use super::strip::{Strip, StripSegment};
 use crate::rows::names::in_words;
 
+/// Height of a strip \[px of the drawing\].
 const ROW_HEIGHT: f64 = 20.0;
+/// Gap between strips \[px of the drawing\].
 const GAP: f64 = 8.0;
-/// Narrowest spell that is drawn, so that one frame among thousands is seen.
+/// Smallest width of a segment \[px of the drawing\], so that one frame among thousands is seen.
 const MIN_WIDTH: f64 = 1.6;
-/// Rough width of a letter of the labels.
+/// Approximate width of a letter of the labels \[px of the drawing\].
 const LETTER_WIDTH: f64 = 6.6;
 
-/// One strip with its name and the colour of each spell; none draws nothing.
+/// One strip with its name and the colour of each segment; a segment without one is not drawn.
 pub struct StripRow<'a> {
     /// Name at the left.
     pub name: &'a str,
@@ -41,28 +43,28 @@ pub fn draw(axis: &XAxis, rows: &[StripRow<'_>]) -> Markup {
 }
 
 fn draw_row(area: &Area, axis: &XAxis, row: &StripRow<'_>, y: f64) -> Markup {
-    let Extent { from: left, to: right } = area.across();
+    let PageExtent { from: left, to: right } = area.across();
     html! {
         text.title x=(LEFT - 8.0) y=(y + 14.5) text-anchor="end" { (row.name) }
         rect.lane x=(left) y=(y) width=(right - left) height=(ROW_HEIGHT) rx="2" {}
-        @for spell in row.strip.segments() {
-            @if let Some(ink) = (row.ink)(spell.mark.name) { (draw_spell(area, axis, spell, ink, y)) }
+        @for segment in row.strip.segments() {
+            @if let Some(ink) = (row.ink)(segment.mark.name) { (draw_segment(area, axis, segment, ink, y)) }
         }
     }
 }
 
-fn draw_spell(area: &Area, axis: &XAxis, spell: &Segment, ink: Ink, y: f64) -> Markup {
-    let place = area.x(axis);
-    let (from, to) = (round(place(spell.from)), round(place(spell.to)));
+fn draw_segment(area: &Area, axis: &XAxis, segment: &StripSegment, ink: Ink, y: f64) -> Markup {
+    let x = area.x(axis);
+    let (from, to) = (round(x(segment.from)), round(x(segment.to)));
     let width = round((to - from).max(MIN_WIDTH));
-    let name = in_words(spell.mark.name);
+    let name = in_words(segment.mark.name);
     let letters = name.chars().fold(2.0, |sum, _| sum + 1.0);
     let decimals = usize::from(axis.divisor > 1.0 || axis.range.length() < 600.0);
     html! {
         rect x=(from) y=(y) width=(width) height=(ROW_HEIGHT) fill=(ink.css()) {
             title {
-                (name) ", " (format!("{:.*}", decimals, spell.from / axis.divisor))
-                " to " (format!("{:.*}", decimals, spell.to / axis.divisor))
+                (name) ", " (format!("{:.*}", decimals, segment.from / axis.divisor))
+                " to " (format!("{:.*}", decimals, segment.to / axis.divisor))
             }
         }
         @if letters * LETTER_WIDTH < width {

@@ -6,22 +6,21 @@ use super::model::ModelStudy;
 use crate::core::quantity::Unit;
 use crate::identify::band::{self, Band};
 use crate::identify::experiment::Experiment;
-use crate::report::chart::area::{Area, XAxis, round};
-use crate::report::chart::axis::AxisScale;
-use crate::report::chart::legend::legend;
+use crate::numeric::statistics::as_f64;
+use crate::report::chart::area::round;
 use crate::report::chart::palette::{DEMAND, FLOW, Ink, MODEL, PRESSURE, SCREW, TARGET};
-use crate::report::chart::plot::{Plot, PlotLayer, y_range};
-use crate::report::chart::range::Range;
-use crate::report::chart::series::Curve;
+use crate::report::chart::{
+    Area, AxisScale, PlotCurve, PlotLayer, ValueRange, XAxis, legend, wide_plot, y_range,
+};
 
-/// Points of a curve that a model gives.
+/// Points of a curve of the model.
 const POINTS: u32 = 400;
-/// A band is drawn this many standard deviations wide to either side.
+/// Half width of a band \[standard deviations\]. Derived: P(|z| < 2) is 95 % for a normal deviate.
 const WIDE: f64 = 2.0;
-/// What is left belongs neither to the model nor to the data.
+/// Colour of residuals, which belong neither to the model nor to the data.
 const LEFT: Ink = DEMAND;
 
-/// The colour of a quantity.
+/// Colour of a quantity, by its unit.
 fn ink(unit: Unit) -> Ink {
     match unit {
         Unit::MPa | Unit::KPa | Unit::Bar => PRESSURE,
@@ -30,100 +29,66 @@ fn ink(unit: Unit) -> Ink {
     }
 }
 
-fn series(at: impl Iterator<Item = f64>, values: impl Iterator<Item = f64>) -> Curve {
-    let mut series = Curve::default();
-    at.zip(values).for_each(|(x, y)| series.push(x, y));
-    series
+fn series(at: impl Iterator<Item = f64>, values: impl Iterator<Item = f64>) -> PlotCurve {
+    at.zip(values).collect()
 }
 
 fn times(data: &Experiment) -> impl Iterator<Item = f64> {
-    (0..data.len())
-        .map(|k| data.start_s + crate::numeric::statistics::as_f64(k as u64) * data.step_s)
+    (0..data.len()).map(|k| data.start_s + as_f64(k as u64) * data.step_s)
 }
 
-/// Input and output over time, with what the model says of the output.
+/// Input and output over time, with the output that the model predicts.
 pub fn over_time(study: &ModelStudy, data: &Experiment, predicted: &[f64]) -> Markup {
     let logs = &study.logs;
     let end = data.start_s + data.duration_s();
-    let axis = XAxis::time(Range::new(data.start_s, end));
+    let axis = XAxis::time(ValueRange::new(data.start_s, end));
     let input = series(times(data), data.input.iter().copied());
     let output = series(times(data), data.output.iter().copied());
     let model = series(times(data), predicted.iter().copied());
     let (above, below) = (logs.output.to_string(), logs.input.to_string());
-    let answer = Plot {
-        area: Area::wide(270.0),
-        x: &axis,
-        y_title: &above,
-        y_range: y_range(&[&output, &model], &[]),
-        layers: vec![
-            PlotLayer::Data(&output, ink(logs.output.unit)),
-            PlotLayer::Curve(&model, MODEL),
-        ],
-    };
-    let layer = if data.input_is_held {
-        PlotLayer::Stairs(&input, ink(logs.input.unit))
-    } else {
-        PlotLayer::Curve(&input, ink(logs.input.unit))
-    };
-    let command = Plot {
-        area: Area::wide(150.0),
-        x: &axis,
-        y_title: &below,
-        y_range: y_range(&[&input], &[]),
-        layers: vec![layer],
-    };
+    let (input_ink, output_ink) = (ink(logs.input.unit), ink(logs.output.unit));
+    let layers = vec![PlotLayer::Data(&output, output_ink), PlotLayer::Curve(&model, MODEL)];
+    let kind = if data.input_is_held { PlotLayer::Stairs } else { PlotLayer::Curve };
     html! {
-        (legend(&[("measured", ink(logs.output.unit), ""), ("model", MODEL, ""),
-            ("input", ink(logs.input.unit), "")]))
-        (answer.draw())
-        (command.draw())
+        (legend(&[("measured", output_ink, ""), ("model", MODEL, ""), ("input", input_ink, "")]))
+        (wide_plot(&axis, &above, 270.0, y_range(&[&output, &model], &[]), layers))
+        (wide_plot(&axis, &below, 150.0, y_range(&[&input], &[]), vec![kind(&input, input_ink)]))
     }
 }
 
-/// What the model leaves of its own data.
+/// Residuals of the model on its own data.
 pub fn residuals(study: &ModelStudy) -> Markup {
     let data = &study.logs.estimation;
     let left = series(times(data), study.fit.residuals.iter().copied());
     let title = format!("measured − model [{}]", study.logs.output.unit);
-    let axis = XAxis::time(Range::new(data.start_s, data.start_s + data.duration_s()));
-    let plot = Plot {
-        area: Area::wide(170.0),
-        x: &axis,
-        y_title: &title,
-        y_range: y_range(&[&left], &[0.0]),
-        layers: vec![PlotLayer::Data(&left, LEFT), PlotLayer::Level(0.0, TARGET, "")],
-    };
-    plot.draw()
+    let axis = XAxis::time(ValueRange::new(data.start_s, data.start_s + data.duration_s()));
+    let layers = vec![PlotLayer::Data(&left, LEFT), PlotLayer::Level(0.0, TARGET, "")];
+    wide_plot(&axis, &title, 170.0, y_range(&[&left], &[0.0]), layers)
 }
 
-/// How what the model leaves hangs together, from the first lag on: at none it
-/// is 1 whatever is left, and the rest would be drawn too small beside that.
+/// Autocorrelation of the residuals from lag 1 on. At lag 0 it is always 1, and the other
+/// values would be drawn too small beside that.
 pub fn autocorrelation(study: &ModelStudy) -> Markup {
     let step_s = study.logs.estimation.step_s;
     let lags = &study.residuals.lags;
-    let at = |k: usize| crate::numeric::statistics::as_f64(k as u64) * step_s;
+    let at = |k: usize| as_f64(k as u64) * step_s;
     let curve = series((1..lags.len()).map(at), lags.iter().copied().skip(1));
     let bound = study.residuals.bound;
     let axis = XAxis {
         title: "lag [s]".to_owned(),
-        range: Range::new(0.0, at(lags.len().max(2) - 1)),
+        range: ValueRange::new(0.0, at(lags.len().max(2) - 1)),
         divisor: 1.0,
     };
-    let plot = Plot {
-        area: Area::wide(210.0),
-        x: &axis,
-        y_title: "autocorrelation of what is left",
-        y_range: y_range(&[&curve], &[-2.0 * bound, 2.0 * bound]),
-        layers: vec![
-            PlotLayer::Level(bound, TARGET, "99 % of white noise"),
-            PlotLayer::Level(-bound, TARGET, ""),
-            PlotLayer::Curve(&curve, LEFT),
-        ],
-    };
-    plot.draw()
+    let layers = vec![
+        PlotLayer::Level(bound, TARGET, "99 % of white noise"),
+        PlotLayer::Level(-bound, TARGET, ""),
+        PlotLayer::Curve(&curve, LEFT),
+    ];
+    let y_range = y_range(&[&curve], &[-2.0 * bound, 2.0 * bound]);
+    wide_plot(&axis, "autocorrelation of the residuals", 210.0, y_range, layers)
 }
 
-/// The answer to a step of one unit, with its band.
+/// The response to a step of one unit, with its band.
 pub fn step(study: &ModelStudy) -> Markup {
     let fit = &study.fit;
     let end_s = fit.model.dead_time_s() + 7.0 * study.slowest_s();
@@ -133,22 +98,16 @@ pub fn step(study: &ModelStudy) -> Markup {
     let title = format!("{} after a step of 1 {}", study.logs.output, study.logs.input.unit);
     let [low, value, high] = edges(&band);
     let gain = fit.model.dc_gain();
-    let axis = XAxis::time(Range::new(0.0, end_s));
-    let plot = Plot {
-        area: Area::wide(210.0),
-        x: &axis,
-        y_title: &title,
-        y_range: y_range(&[&low, &high], &[0.0]),
-        layers: vec![
-            PlotLayer::Level(gain, TARGET, "gain"),
-            PlotLayer::Band(&low, &high, MODEL),
-            PlotLayer::Curve(&value, MODEL),
-        ],
-    };
-    plot.draw()
+    let axis = XAxis::time(ValueRange::new(0.0, end_s));
+    let layers = vec![
+        PlotLayer::Level(gain, TARGET, "gain"),
+        PlotLayer::Band(&low, &high, MODEL),
+        PlotLayer::Curve(&value, MODEL),
+    ];
+    wide_plot(&axis, &title, 210.0, y_range(&[&low, &high], &[0.0]), layers)
 }
 
-fn edges(band: &Band) -> [Curve; 3] {
+fn edges(band: &Band) -> [PlotCurve; 3] {
     [-WIDE, 0.0, WIDE].map(|times| {
         let values = band.value.iter().zip(&band.sigma).map(|(value, sigma)| value + times * sigma);
         series(band.at.iter().copied(), values)
@@ -169,8 +128,8 @@ pub fn bode(study: &ModelStudy) -> Markup {
     }
 }
 
-/// From one period in the whole record to well beyond the fastest pole, but no
-/// further than the samples can tell.
+/// Frequencies \[Hz\] from one period in the whole record to well beyond the fastest pole, but
+/// not beyond the Nyquist frequency of the samples.
 fn frequencies(study: &ModelStudy) -> Vec<f64> {
     let data = &study.logs.estimation;
     let poles = study.fit.model.poles();
@@ -184,12 +143,14 @@ fn frequencies(study: &ModelStudy) -> Vec<f64> {
 fn over_frequency(band: &Band, title: &str) -> Markup {
     let area = Area::half(230.0);
     let lowest = band.at.first().copied().unwrap_or(0.1);
-    let ends = Range::new(lowest, band.at.last().copied().unwrap_or(1.0));
+    let ends = ValueRange::new(lowest, band.at.last().copied().unwrap_or(1.0));
     let x = AxisScale::log(ends, area.across());
     let all = edges(band);
-    let range = all.iter().filter_map(Curve::range).reduce(Range::joined);
-    let y =
-        AxisScale::linear(range.unwrap_or(Range::new(0.0, 1.0)).with_margin(0.06), area.upwards());
+    let range = all.iter().filter_map(PlotCurve::range).reduce(ValueRange::joined);
+    let y = AxisScale::linear(
+        range.unwrap_or(ValueRange::new(0.0, 1.0)).with_margin(0.06),
+        area.upwards(),
+    );
     let path = |times: f64, back: bool| -> String {
         let points = band.at.iter().zip(&band.value).zip(&band.sigma);
         let points = points.map(|((f, value), sigma)| {

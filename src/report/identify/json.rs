@@ -1,4 +1,4 @@
-//! What was found, for programs.
+//! `identify.json`: a fitted model for programs.
 
 use serde_json::{Value, json};
 

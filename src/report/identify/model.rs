@@ -1,49 +1,48 @@
-//! A model with its data and all that is known of it.
+//! A model with its data, its quality and its warnings.
 
 use crate::core::quantity::Quantity;
 use crate::identify::autocorrelation::Autocorrelation;
 use crate::identify::experiment::Experiment;
 use crate::identify::fit::{Fit, FitQuality, ModelComparison, Structure};
-use crate::identify::model_file;
-use crate::identify::model_file::{Conditions, ModelFile, ParameterUncertainty};
+use crate::identify::model_file::{self, Conditions, ModelFile, ParameterUncertainty};
 
-/// Data and what they are called.
+/// Logged data with their names.
 #[derive(Debug, Clone)]
 pub struct Logs {
-    /// What goes in.
+    /// The input.
     pub input: Quantity,
-    /// What comes out.
+    /// The output.
     pub output: Quantity,
-    /// Where the data are from.
+    /// The data's source.
     pub source: String,
     /// What the model is fitted to.
     pub estimation: Experiment,
-    /// What it is validated with, and where that is from.
+    /// Validation data and their source.
     pub validation: Option<(Experiment, String)>,
     /// Whether the logs begin at rest.
     pub from_rest: bool,
 }
 
-/// A model with all that is known of it.
+/// A model with its data, its quality and its warnings.
 #[derive(Debug)]
 pub struct ModelStudy {
     /// The data.
     pub logs: Logs,
-    /// All that were fitted.
+    /// All fitted models.
     pub comparison: ModelComparison,
-    /// The one that was taken.
+    /// The chosen model.
     pub fit: Fit,
-    /// How well it foretells other data.
+    /// Its fit to the validation data.
     pub validation: Option<FitQuality>,
-    /// What it foretells there.
+    /// Its prediction of the validation data.
     pub predicted: Option<Vec<f64>>,
-    /// Whether what it leaves hangs together.
+    /// Autocorrelation of the residuals.
     pub residuals: Autocorrelation,
     /// What the reader should know before the model is used.
     pub warnings: Vec<String>,
 }
 
-/// A form by the word that the command takes for it.
+/// The word for a form, as the command line takes it.
 pub fn form(structure: Structure) -> String {
     let zero = |zero| if zero { "-zero" } else { "" };
     match structure {
@@ -62,7 +61,7 @@ impl ModelStudy {
         1.0 / slowest
     }
 
-    /// The model as a file keeps it.
+    /// The model as it is saved in a file.
     pub fn model(&self, setting: Conditions) -> ModelFile {
         let fit = &self.fit;
         let input = &self.logs.estimation.input;

@@ -5,18 +5,22 @@ use maud::{Markup, html};
 use super::curves;
 use super::model::{ModelStudy, form};
 use super::table::{independent, significant, transfer};
-use crate::report::chart::legend::legend;
+use crate::report::chart::legend;
 use crate::report::chart::palette::MODEL;
-use crate::report::html::whole_page;
+use crate::report::html::{VerdictLevel, about, number, titled_page, verdict};
 
 /// The page.
 pub fn page(study: &ModelStudy) -> String {
     let logs = &study.logs;
     let title = format!("Model {} → {}", logs.input, logs.output);
     let body = html! {
-        h1 { (title) }
-        (about(study))
-        (verdict(study))
+        (about([
+            ("data", logs.source.clone()),
+            ("samples", logs.estimation.len().to_string()),
+            ("rate", format!("{:.2} Hz", 1.0 / logs.estimation.step_s)),
+            ("form", form(study.fit.settings.structure)),
+        ]))
+        (judged(study))
         (parameters(study))
         (compared(study))
         section {
@@ -32,40 +36,17 @@ pub fn page(study: &ModelStudy) -> String {
         }
         (answers(study))
         (residuals(study))
-        footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
-            ". The numbers are in identify.json, the model is in model.toml." }
     };
-    whole_page(&title, &body).into_string()
+    titled_page(&title, &body, ". The numbers are in identify.json, the model is in model.toml.")
 }
 
-fn about(study: &ModelStudy) -> Markup {
-    let data = &study.logs.estimation;
-    html! {
-        div.about {
-            span { "data " b { (study.logs.source) } }
-            span { "samples " b { (data.len()) } }
-            span { "rate " b { (format!("{:.2} Hz", 1.0 / data.step_s)) } }
-            span { "form " b { (form(study.fit.settings.structure)) } }
-        }
-    }
-}
-
-fn verdict(study: &ModelStudy) -> Markup {
-    let (class, word) =
-        if study.warnings.is_empty() { ("good", "Good.") } else { ("caution", "Look closer.") };
-    html! {
-        div class={ "verdict " (class) } {
-            b { (word) }
-            (format!("The model fits its own data to {:.1} %", study.fit.quality.fit_percent))
-            @match study.validation {
-                Some(other) => (format!(" and predicts other data to {:.1} %.", other.fit_percent)),
-                None => ".",
-            }
-            @if !study.warnings.is_empty() {
-                ul { @for warning in &study.warnings { li { (warning) } } }
-            }
-        }
-    }
+fn judged(study: &ModelStudy) -> Markup {
+    let own = format!("The model fits its own data to {:.1} %", study.fit.quality.fit_percent);
+    let text = match study.validation {
+        Some(other) => format!("{own} and predicts other data to {:.1} %.", other.fit_percent),
+        None => format!("{own}."),
+    };
+    verdict(VerdictLevel::with_caution(!study.warnings.is_empty()), &text, &study.warnings)
 }
 
 fn parameters(study: &ModelStudy) -> Markup {
@@ -96,9 +77,6 @@ fn compared(study: &ModelStudy) -> Markup {
     if comparison.rows.len() < 2 {
         return html! {};
     }
-    let number = |value: Option<f64>, places: usize| {
-        value.map_or_else(|| "–".to_owned(), |value| format!("{value:.places$}"))
-    };
     html! {
         section {
             h2 { "Forms that were compared" }
@@ -129,9 +107,9 @@ fn compared(study: &ModelStudy) -> Markup {
 fn answers(study: &ModelStudy) -> Markup {
     html! {
         section {
-            h2 { "How it answers" }
+            h2 { "Responses" }
             p.hint { "The bands are two standard deviations wide to either side; they come from the \
-                noise of the data, not from what the model leaves out." }
+                noise of the data, not from unmodelled dynamics." }
             (legend(&[("model", MODEL, ""), ("± 2 standard deviations", MODEL, "area")]))
             (curves::step(study))
             (curves::bode(study))
@@ -142,7 +120,7 @@ fn answers(study: &ModelStudy) -> Markup {
 fn residuals(study: &ModelStudy) -> Markup {
     html! {
         section {
-            h2 { "What it leaves" }
+            h2 { "Residuals" }
             p.hint { (independent(&study.fit)) }
             (curves::residuals(study))
             (curves::autocorrelation(study))

@@ -1,9 +1,9 @@
-//! Why no model can be trusted.
+//! Reasons for which no model is accepted.
 
 use crate::identify::fit::SamplesError;
 use crate::identify::output_lead::OutputLead;
 
-/// No model that can be trusted.
+/// No model is accepted.
 #[derive(Debug, thiserror::Error)]
 pub enum NoModel {
     /// The data.
@@ -14,10 +14,10 @@ pub enum NoModel {
     None {
         /// Each form, and why it is none.
         forms: Vec<(String, String)>,
-        /// What is said of an output that drifts.
+        /// Sentence about a drifting output.
         drift: Option<String>,
     },
-    /// It does not foretell other data.
+    /// It does not predict other data.
     #[error(
         "the model ({form}, {estimation:.1} % on its own data) does not predict the data to \
          validate with: {validation:.1} %, no better than their mean. Are both of the same machine \
@@ -30,7 +30,7 @@ pub enum NoModel {
         estimation: f64,
         /// Fit to the others \[%\].
         validation: f64,
-        /// What is said of an output that drifts.
+        /// Sentence about a drifting output.
         drift: Option<String>,
     },
     /// It follows a drift of the output.
@@ -60,7 +60,7 @@ pub enum NoModel {
     Ahead(OutputLead),
 }
 
-/// A line for each reason, before it the forms that it holds for.
+/// A line for each reason, with the forms to which it applies.
 fn lines(refused: &[(String, String)]) -> String {
     let mut lines: Vec<(String, &str)> = Vec::new();
     for (form, why) in refused {

@@ -1,5 +1,4 @@
-//! Starts and stops of an extruder from logged data: what was found, as text and
-//! as a page.
+//! Starts and stops of an extruder from logged data, as text and as a page.
 
 mod page;
 mod text;
@@ -16,27 +15,28 @@ use crate::identify::start_stop::file::{
 };
 use crate::identify::start_stop::{StartStopFit, StartStopFitError, fit};
 
-/// A standard error above this share of a parameter is told.
+/// A standard error above this fraction of a parameter is reported.
 const LOOSE_FRACTION: f64 = 0.3;
-/// With fewer starts a scatter is hardly known.
+/// With fewer starts a standard deviation is hardly determined. Derived: its own relative error
+/// is 1/√(2(n − 1)) = 0.27 for n = 8.
 const FEW_STARTS: usize = 8;
 
-/// What was logged and what it is called.
+/// Logged data with their names.
 #[derive(Debug, Clone)]
 pub struct StartLogs {
-    /// Where the data are from.
+    /// The data's source.
     pub source: String,
-    /// What the extruder is told.
+    /// The extruder's command.
     pub input: Quantity,
-    /// What comes of it, as it was logged.
+    /// The flow, as it was logged.
     pub output: Quantity,
-    /// What the extruder is told, in its own unit.
+    /// The command, in its own unit.
     pub command: TimeSeries,
-    /// What comes of it \[mm³/s\].
+    /// The flow \[mm³/s\].
     pub flow: TimeSeries,
 }
 
-/// Starts and stops with all that is known of them.
+/// Starts and stops with their warnings.
 #[derive(Debug)]
 pub struct StartStudy {
     /// The data.
@@ -45,11 +45,11 @@ pub struct StartStudy {
     pub fit: StartStopFit,
     /// The same as a file keeps it.
     pub file: StartStopFile,
-    /// What the reader should know before they are used.
+    /// Warnings before they are used.
     pub warnings: Vec<String>,
 }
 
-/// Fits starts and stops, or says why the data do not tell them.
+/// Fits starts and stops. Fails where the data do not determine them.
 pub fn study(logs: StartLogs, setting: Conditions) -> Result<StartStudy, StartStopFitError> {
     let fit = fit(&logs.command, &logs.flow)?;
     let file = StartStopFile::of(&fit, setting);
@@ -61,7 +61,7 @@ fn all_warnings(fit: &StartStopFit) -> Vec<String> {
     let mut warnings = Vec::new();
     if fit.starts.len() < FEW_STARTS {
         warnings.push(format!(
-            "{} starts leave the standard errors themselves uncertain; {FEW_STARTS} or more tell \
+            "{} starts leave the standard errors themselves uncertain; {FEW_STARTS} or more determine \
              them",
             fit.starts.len()
         ));
@@ -70,7 +70,7 @@ fn all_warnings(fit: &StartStopFit) -> Vec<String> {
         |one: &&ParameterKey| (one.of)(&fit.sigma) > LOOSE_FRACTION * (one.of)(&fit.parameters);
     for one in START_PARAMETERS.iter().chain(&STOP_PARAMETERS).filter(loose) {
         warnings.push(format!(
-            "{} is {} ± {} {}: hardly known; more {} of the same kind tell it",
+            "{} is {} ± {} {}: hardly known; more {} of the same kind determine it",
             one.key,
             three_digits((one.of)(&fit.parameters)),
             three_digits((one.of)(&fit.sigma)),
@@ -82,13 +82,13 @@ fn all_warnings(fit: &StartStopFit) -> Vec<String> {
 }
 
 impl StartStudy {
-    /// Starts that tell nothing: the first one, after whatever was before the
-    /// record, and those without an even flow after them.
+    /// Starts without information: the first one, whose pause began before the record, and those
+    /// without an even flow after them.
     pub const fn left_out(&self) -> usize {
         self.fit.runs.saturating_sub(self.fit.starts.len())
     }
 
-    /// The flow about which the delays are told \[mm³/s\].
+    /// The flow for which delays are given \[mm³/s\].
     pub fn flow_mm3_per_s(&self) -> f64 {
         let [low, high] = self.file.data.flow_range_mm3_per_s;
         f64::midpoint(low, high)

@@ -1,11 +1,13 @@
-//! What was found, as text.
+//! A fitted model as text.
 
 use std::fmt::Write;
 
 use super::model::{ModelStudy, form};
-use crate::identify::fit::{ComparedModel, Fit, FitNote};
+use crate::identify::experiment::Experiment;
+use crate::identify::fit::{ComparedModel, Fit, FitNote, FitQuality};
+use crate::report::html::number;
 
-/// Least width of the names of forms.
+/// Minimum width of the column with the names of forms \[letters\].
 const NAME: usize = 10;
 
 /// A short table.
@@ -29,7 +31,7 @@ pub fn put(text: &mut String, head: &str, line: &str) {
 
 fn data(text: &mut String, study: &ModelStudy) {
     let logs = &study.logs;
-    let described = |data: &crate::identify::experiment::Experiment| {
+    let described = |data: &Experiment| {
         format!(
             "{} samples, {:.1} s at {:.2} Hz from {:.2} s on",
             data.len(),
@@ -60,11 +62,8 @@ fn compared(text: &mut String, study: &ModelStudy) {
         for row in rows {
             put(text, "", &one(row, width));
         }
-        put(
-            text,
-            "chosen",
-            &format!("{}: {}", form(study.fit.settings.structure), study.comparison.reason),
-        );
+        let chosen = form(study.fit.settings.structure);
+        put(text, "chosen", &format!("{chosen}: {}", study.comparison.reason));
     } else {
         put(text, "form", &form(study.fit.settings.structure));
     }
@@ -75,9 +74,6 @@ fn one(row: &ComparedModel, width: usize) -> String {
     match &row.fit {
         Err(why) => format!("{name:<width$}{why}"),
         Ok(fit) => {
-            let number = |value: Option<f64>, digits: usize| {
-                value.map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))
-            };
             let loose = if fit.is_determined() { "" } else { "  not determined by the data" };
             format!(
                 "{name:<width$}{:>10}{:>10.2}{:>13}{:>12}{loose}",
@@ -96,11 +92,8 @@ fn parameters(text: &mut String, study: &ModelStudy) {
     put(text, "model", &line);
     for one in &fit.parameters {
         let [value, sigma] = [one.value, one.sigma].map(significant);
-        put(
-            text,
-            "",
-            &format!("{:<18}{value:>12}{sigma:>14}  {}", one.name, study.unit_of(&one.name)),
-        );
+        let unit = study.unit_of(&one.name);
+        put(text, "", &format!("{:<18}{value:>12}{sigma:>14}  {unit}", one.name));
     }
     if fit.parameter("dead_time_s").is_none() {
         let to_a_step = |note: &FitNote| matches!(note, FitNote::DeadTimeToAStep { .. });
@@ -155,27 +148,18 @@ pub fn significant(value: f64) -> String {
 
 fn quality(text: &mut String, study: &ModelStudy) {
     let unit = study.logs.output.unit;
-    let own = study.fit.quality;
-    let line = format!(
-        "{:.2} % NRMSE, RMSE {} {unit}, MAE {} {unit}",
-        own.fit_percent,
-        significant(own.rmse),
-        significant(own.mae)
-    );
-    put(text, "fit", &line);
+    let words = |of: FitQuality| {
+        let [rmse, mae] = [of.rmse, of.mae].map(significant);
+        format!("{:.2} % NRMSE, RMSE {rmse} {unit}, MAE {mae} {unit}", of.fit_percent)
+    };
+    put(text, "fit", &words(study.fit.quality));
     put(text, "residuals", &independent(&study.fit));
     if let Some(other) = study.validation {
-        let line = format!(
-            "{:.2} % NRMSE, RMSE {} {unit}, MAE {} {unit}",
-            other.fit_percent,
-            significant(other.rmse),
-            significant(other.mae)
-        );
-        put(text, "validated", &line);
+        put(text, "validated", &words(other));
     }
 }
 
-/// How many samples the colour of the residuals leaves.
+/// Number of residuals, and the number of independent ones with the same information.
 pub fn independent(fit: &Fit) -> String {
     format!(
         "{} samples that say as much as {:.0} independent ones",

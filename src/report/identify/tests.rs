@@ -5,12 +5,9 @@
 use super::*;
 use crate::core::quantity::{Quantity, Unit};
 use crate::identify::experiment::Rules;
-use crate::identify::fit::DeadTime;
-use crate::identify::fit::Structure;
-use crate::identify::model_file;
-use crate::identify::model_file::Conditions;
-use crate::sim::flow_log;
-use crate::sim::flow_log::FlowLog;
+use crate::identify::fit::{DeadTime, Structure};
+use crate::identify::model_file::{self, Conditions};
+use crate::sim::flow_log::{self, FlowLog};
 
 fn experiment(log: &FlowLog) -> Experiment {
     let rules = Rules::default();
@@ -108,7 +105,7 @@ fn one_log_alone_is_warned_of() {
         &[settings(Structure::SecondOrderOscillating { zero: false })],
     );
     let found = found.unwrap();
-    assert!(found.warnings.iter().any(|warning| warning.contains("nothing was validated with")));
+    assert!(found.warnings.iter().any(|warning| warning.contains("no validation data")));
     assert!(found.validation.is_none() && found.predicted.is_none());
     let page = page(&found);
     assert!(!page.contains("What it was validated with"));
@@ -139,7 +136,7 @@ fn a_drift_is_no_answer() {
     }
 }
 
-/// All forms that are compared where nothing is told.
+/// All forms that are compared by default.
 fn usual_forms() -> Vec<FitSettings> {
     [
         Structure::FirstOrder { zero: false },
@@ -162,11 +159,11 @@ fn a_drift_that_poles_and_zeros_take_up_is_refused_with_the_gain_without_it() {
             Err(NoModel::Drifts { steady, sigma, .. }) => {
                 assert!((steady - 19.05).abs() < 4.0 * sigma + 0.2, "{slope}: {steady}");
             }
-            // The least of them may be told beside the answer.
+            // The smallest of them may be reported beside the result.
             Ok(found) => {
                 let off = (found.fit.model.dc_gain() / 19.05 - 1.0).abs();
-                let told = found.warnings.iter().any(|warning| warning.contains("drift"));
-                assert!(off < 0.2 && told, "{slope}: {off} {:?}", found.warnings);
+                let is_reported = found.warnings.iter().any(|warning| warning.contains("drift"));
+                assert!(off < 0.2 && is_reported, "{slope}: {off} {:?}", found.warnings);
             }
             Err(other) => assert!(other.to_string().contains("drift"), "{other}"),
         }
@@ -187,7 +184,7 @@ fn a_log_without_drift_has_the_same_gain_without_its_line() {
 }
 
 #[test]
-fn a_drift_behind_another_refusal_is_told() {
+fn a_drift_behind_another_refusal_is_reported() {
     let (first, rest) = with(|time_s, flow| flow + 5.0 * time_s).split(0.3).unwrap();
     let data = logs(first, Some(rest));
     let said = study(data, &[settings(Structure::FirstOrder { zero: false })]).unwrap_err();
@@ -196,13 +193,13 @@ fn a_drift_behind_another_refusal_is_told() {
 }
 
 #[test]
-fn a_drift_beside_the_answer_is_told() {
+fn a_drift_beside_the_result_is_reported() {
     let drifting = with(|time_s, flow| flow + 0.25 * time_s);
     let found =
         study(logs(drifting, None), &[settings(Structure::SecondOrderOscillating { zero: false })]);
     let warnings = found.unwrap().warnings;
-    for told in ["the output drifts up by", "once a straight line in time is taken off"] {
-        assert!(warnings.iter().any(|warning| warning.contains(told)), "{warnings:?}");
+    for words in ["the output drifts up by", "once a straight line in time is taken off"] {
+        assert!(warnings.iter().any(|warning| warning.contains(words)), "{warnings:?}");
     }
 }
 
@@ -217,7 +214,7 @@ fn an_output_on_a_clock_that_is_behind_is_refused() {
 }
 
 #[test]
-fn forms_that_are_refused_alike_are_told_once() {
+fn forms_that_are_refused_alike_are_reported_once() {
     let one = |form: &str, why: &str| (form.to_owned(), why.to_owned());
     let forms = vec![one("fopdt", "a"), one("3,2", "b"), one("sopdt", "a")];
     let refusal = NoModel::None { forms, drift: None };

@@ -1,22 +1,23 @@
-//! What a reader should know of a model before it is used.
+//! Warnings about a model before it is used.
 
 use super::model::{Logs, ModelStudy};
 use crate::identify::digits::three_digits;
 use crate::identify::experiment::Experiment;
 use crate::identify::fit::{DOMINANT_FRACTION, Fit, FitNote, Trend};
 
-/// A model that is further off other data than off its own by this factor is
-/// told. Errors are compared and not fits, which grow with the excitation.
+/// Ratio of the RMS errors on validation data and on its own data above which a model is
+/// reported. Errors are compared and not fits, which grow with the excitation.
 const OVERFIT: f64 = 1.25;
-/// A fit below this is told \[%\].
+/// A fit below this is reported \[%\].
 const POOR_PERCENT: f64 = 50.0;
-/// Data that validate last at least so many of the slowest time constants.
+/// Minimum length of validation data \[slowest time constants\].
 const TIME_CONSTANTS: f64 = 5.0;
-/// A record shorter than so many of the slowest time constants shows no end of it.
+/// Minimum length of a record \[slowest time constants\]. Derived: a first-order response is
+/// then 1 − exp(−3) = 95 % complete.
 const RECORD_TIME_CONSTANTS: f64 = 3.0;
 
 impl ModelStudy {
-    /// What the reader should know before the model is used.
+    /// Warnings before the model is used.
     pub(super) fn all_warnings(&self) -> Vec<String> {
         let mut warnings: Vec<String> =
             self.logs.estimation.notes.iter().map(|note| format!("data: {note}")).collect();
@@ -33,7 +34,7 @@ impl ModelStudy {
         }
         match self.validation {
             None => warnings.push(
-                "nothing was validated with: a fit to its own data says little; give --validate or \
+                "there are no validation data: a fit to its own data says little; give --validate or \
                  --validate-fraction"
                     .to_owned(),
             ),
@@ -57,7 +58,7 @@ impl ModelStudy {
         let outside = self.residuals.fraction_outside();
         if outside > 0.05 {
             warnings.push(format!(
-                "what the model leaves is autocorrelated ({:.0} % of the lags outside the 99 % band; the \
+                "the residuals are autocorrelated ({:.0} % of the lags outside the 99 % band; the \
                  {} samples say as much as {:.0} independent ones): the noise is correlated, or \
                  something is missing in the model; the standard errors allow for it",
                 100.0 * outside,
@@ -74,14 +75,14 @@ impl ModelStudy {
         (data.duration_s() < needed_s).then(|| {
             format!(
                 "the {:.1} s to validate with are short for a time constant of {:.2} s: {needed_s:.1} \
-                 s or more would tell",
+                 s or more would serve",
                 data.duration_s(),
                 self.slowest_s()
             )
         })
     }
 
-    /// A time constant that the record hardly shows may be a drift.
+    /// A time constant near the length of the record may be a drift.
     fn short_record(&self) -> Option<String> {
         let (slowest_s, record_s) = (self.slowest_s(), self.logs.estimation.duration_s());
         (record_s < RECORD_TIME_CONSTANTS * slowest_s).then(|| {
@@ -94,13 +95,13 @@ impl ModelStudy {
     }
 }
 
-/// What is said of a straight line in time in what a model leaves.
+/// Warning of a linear drift in the residuals.
 fn of_drift(fit: &Fit, logs: &Logs) -> Option<String> {
     let line = Trend::significant_in(&fit.residuals)?;
-    Some(drifting(logs, &line, "what the model leaves"))
+    Some(drifting(logs, &line, "the residuals"))
 }
 
-/// What is said of an output that such a line dominates, and not the input.
+/// Warning of an output that a linear drift dominates, while the input has none.
 pub(super) fn output_drift(logs: &Logs) -> Option<String> {
     let Experiment { input, output, .. } = &logs.estimation;
     let line =
@@ -134,7 +135,7 @@ fn of_note(note: &FitNote) -> String {
                 .to_owned()
         }
         FitNote::DeadTimeToAStep { dead_time_s } => format!(
-            "the dead time of {dead_time_s:.4} s is known to a whole step only: the form passes its \
+            "the dead time of {dead_time_s:.4} s is determined to a whole step only: the form passes its \
              input straight through"
         ),
         FitNote::Undetermined(loose) => loose.to_string(),

@@ -47,7 +47,9 @@ impl Canvas {
 
     /// A dashed line.
     pub fn dashes(&mut self, from: CanvasPoint, to: CanvasPoint, radius: f64, ink: Rgb) {
+        /// Length of a dash \[px\].
         const DASH: f64 = 9.0;
+        /// Distance from dash to dash \[px\].
         const PERIOD: f64 = 15.0;
         let (dx, dy) = (to.0 - from.0, to.1 - from.1);
         let length = dx.hypot(dy);
@@ -55,8 +57,8 @@ impl Canvas {
             return;
         }
         let at = |along: f64| {
-            let share = (along / length).min(1.0);
-            (from.0 + dx * share, from.1 + dy * share)
+            let fraction = (along / length).min(1.0);
+            (from.0 + dx * fraction, from.1 + dy * fraction)
         };
         let mut along = 0.0;
         while along < length {

@@ -2,8 +2,7 @@ use super::*;
 use crate::core::frame::Pixels;
 use crate::core::geometry::Size;
 use crate::core::time::Stamp;
-use crate::core::units::Mm;
-use crate::core::units::WidthRange;
+use crate::core::units::{Mm, WidthRange};
 use crate::rows::frame_row::sample;
 use crate::vision::{BeadAxis, Polarity};
 
@@ -49,8 +48,9 @@ fn an_edge_is_drawn_where_it_was_found() {
     let roi = Roi { x: 40, y: 20, width: 100, height: 60 };
     let edge = [ImagePoint::new(60.25, 50.0)];
     let edges = Edges { left: &edge, right: &[] };
-    let snapshot = Snapshot::take(&grey((200, 100), 128), &gauge(roi), Some(edges), Err("no_pair"));
-    let image = snapshot.draw();
+    let cutout =
+        GaugeCutout::take(&grey((200, 100), 128), &gauge(roi), Some(edges), Err("no_pair"));
+    let image = cutout.draw();
     // The cut is 116 px wide and begins at 32, 12; it is enlarged six times.
     assert_eq!(image.dimensions(), (116 * 6, 76 * 6));
     let (x, y) = centre_of(&image, LEFT_EDGE.light);
@@ -59,22 +59,22 @@ fn an_edge_is_drawn_where_it_was_found() {
 }
 
 #[test]
-fn a_picture_is_small_whatever_the_camera() {
+fn a_drawing_is_small_whatever_the_camera() {
     let roi = Roi { x: 10, y: 10, width: 2900, height: 1900 };
-    let snapshot = Snapshot::take(
+    let cutout = GaugeCutout::take(
         &grey((3000, 2000), 128),
         &gauge(roi),
         None,
         Ok(sample::measured(42.0, 0.1)),
     );
-    assert_eq!(snapshot.draw().width(), 720);
-    assert!(snapshot.jpeg(80).unwrap().len() < 100_000);
-    assert!(snapshot.png().unwrap().starts_with(b"\x89PNG"));
+    assert_eq!(cutout.draw().width(), 720);
+    assert!(cutout.jpeg(80).unwrap().len() < 100_000);
+    assert!(cutout.png().unwrap().starts_with(b"\x89PNG"));
 }
 
 #[test]
 fn a_gauge_outside_the_image_is_no_obstacle() {
     let roi = Roi { x: 500, y: 500, width: 100, height: 100 };
-    let png = draw(&grey((64, 48), 20), &gauge(roi), None, Err("wrong_size"));
+    let png = GaugeCutout::take(&grey((64, 48), 20), &gauge(roi), None, Err("wrong_size")).png();
     assert!(png.is_some());
 }

@@ -5,28 +5,24 @@ use maud::{Markup, html};
 use super::verdict::verdict;
 use super::{PlanFacts, PlannedBead, rms};
 use crate::plan::{SpeedProfile, WidthPrediction};
-use crate::report::chart::area::{Area, XAxis};
-use crate::report::chart::legend::legend;
-use crate::report::chart::palette;
-use crate::report::chart::palette::Ink;
-use crate::report::chart::plot::{Plot, PlotLayer, y_range};
-use crate::report::chart::range::Range;
-use crate::report::chart::series::Curve;
-use crate::report::html::whole_page;
+use crate::report::chart::{
+    Ink, PlotCurve, PlotLayer, ValueRange, XAxis, legend, palette, wide_plot, y_range,
+};
+use crate::report::html;
 
-/// Beads that are drawn; of more, those with the largest errors.
+/// Largest number of beads that are drawn: those with the largest errors.
 const DRAWN: usize = 12;
 /// Points of a curve over path.
 const POINTS: u32 = 2000;
 
 /// A curve, its name, its colour and whether it is only demanded.
-type NamedCurve = (Curve, &'static str, Ink, bool);
+type NamedCurve = (PlotCurve, &'static str, Ink, bool);
 
 /// The page, with names and values under its title, and with warnings.
 pub fn page(
     beads: &[PlannedBead],
     facts: &PlanFacts,
-    about: &[(String, String)],
+    about: &[(&str, String)],
     warnings: &[String],
 ) -> String {
     let mut drawn: Vec<&PlannedBead> = beads.iter().collect();
@@ -36,21 +32,19 @@ pub fn page(
         drawn.truncate(DRAWN);
     }
     let body = html! {
-        h1 { "A job that is planned ahead" }
-        div.about { @for (name, value) in about { span { (name) " " b { (value) } } } }
+        (html::about(about.iter().map(|(name, value)| (name, value))))
         (verdict(beads, facts, warnings))
         @if drawn.len() < beads.len() {
             p.hint { "Of " (beads.len()) " beads the " (DRAWN) " with the largest errors are drawn." }
         }
         @for bead in drawn { (section(bead, facts)) }
-        footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
-            ". Every moment of the plan is in plan.csv." }
     };
-    whole_page("A job that is planned ahead", &body).into_string()
+    let note = ". Every moment of the plan is in plan.csv.";
+    html::titled_page("A job that is planned ahead", &body, note)
 }
 
 fn section(bead: &PlannedBead, facts: &PlanFacts) -> Markup {
-    let path = XAxis::path(Range::new(bead.nominal.start_mm(), bead.nominal.end_mm()));
+    let path = XAxis::path(ValueRange::new(bead.nominal.start_mm(), bead.nominal.end_mm()));
     let speed = &bead.plan.speed;
     let at_time = |of: &dyn Fn(f64) -> f64| along(speed, |path_mm| of(speed.time_at(path_mm)));
     let speeds = [
@@ -79,8 +73,8 @@ fn section(bead: &PlannedBead, facts: &PlanFacts) -> Markup {
     html! {
         section {
             h2 { (bead.name) }
-            p.hint { "Predicted by the model, as the mean over the nozzle's length; what no model \
-                tells comes on top. Dips of the speed a nozzle's length apart count on that length; \
+            p.hint { "Predicted by the model, as the mean over the nozzle's length; unmodelled flow \
+                comes on top. Dips of the speed a nozzle's length apart count on that length; \
                 a larger --nozzle-sigma has fewer of them." }
             (plot("width [mm]", &path, &widths, Some(facts.width_mm)))
             (plot("width error [mm]", &path, &planned, Some(0.0)))
@@ -91,31 +85,23 @@ fn section(bead: &PlannedBead, facts: &PlanFacts) -> Markup {
     }
 }
 
-/// The width over path as it strays about a value \[mm\].
-fn widths_about(middle_mm: f64, of: &WidthPrediction, facts: &PlanFacts) -> Curve {
-    let mut series = Curve::default();
-    for (at, share) in &of.width {
-        series.push(*at, middle_mm + facts.width_mm * share);
-    }
-    series
+/// Predicted width error over path, about a value \[mm\].
+fn widths_about(middle_mm: f64, of: &WidthPrediction, facts: &PlanFacts) -> PlotCurve {
+    of.width.iter().map(|(at, error)| (*at, middle_mm + facts.width_mm * error)).collect()
 }
 
 /// A value along the path of a speed.
-fn along(speed: &SpeedProfile, of: impl Fn(f64) -> f64) -> Curve {
+fn along(speed: &SpeedProfile, of: impl Fn(f64) -> f64) -> PlotCurve {
     let (start, length) = (speed.start_mm(), speed.end_mm() - speed.start_mm());
     let even = (0..=POINTS).map(|k| start + length * f64::from(k) / f64::from(POINTS));
     // The nodes as well, so that no apex lies between two points.
-    let mut places: Vec<f64> = even.chain(speed.path().iter().copied()).collect();
-    places.sort_by(f64::total_cmp);
-    let mut series = Curve::default();
-    for place in places {
-        series.push(place, of(place));
-    }
-    series
+    let mut positions: Vec<f64> = even.chain(speed.path().iter().copied()).collect();
+    positions.sort_by(f64::total_cmp);
+    positions.into_iter().map(|position| (position, of(position))).collect()
 }
 
 fn plot(y_title: &str, x: &XAxis, curves: &[NamedCurve], target: Option<f64>) -> Markup {
-    let shown: Vec<&Curve> = curves.iter().map(|curve| &curve.0).collect();
+    let shown: Vec<&PlotCurve> = curves.iter().map(|curve| &curve.0).collect();
     let levels: Vec<f64> = target.into_iter().collect();
     let mut layers: Vec<PlotLayer<'_>> =
         levels.iter().map(|level| PlotLayer::Level(*level, palette::TARGET, "")).collect();
@@ -129,6 +115,6 @@ fn plot(y_title: &str, x: &XAxis, curves: &[NamedCurve], target: Option<f64>) ->
     names.extend(levels.iter().map(|_| ("target", palette::TARGET, "dash")));
     html! {
         (legend(&names))
-        (Plot { area: Area::wide(220.0), x, y_title, y_range: y_range(&shown, &levels), layers }.draw())
+        (wide_plot(x, y_title, 220.0, y_range(&shown, &levels), layers))
     }
 }

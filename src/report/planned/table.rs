@@ -1,29 +1,18 @@
-//! `plan.csv`: what robot and extruder do at each moment.
+//! `plan.csv`: robot and extruder at each moment of a plan.
 
 use super::{PlanFacts, PlannedBead};
 
-/// Time from row to row \[s\]; a point of the job has a row of its own.
+/// Time between rows \[s\]; a point of the job has a row of its own.
 const STEP_S: f64 = 0.01;
-/// A row on the even grid is left out this near to one of a point \[s\].
+/// A row of the even grid is left out within this time of a row of a point \[s\].
 const CORNER_STEP_S: f64 = 1e-3;
 
 /// The table of all beads. Time begins anew with each.
 pub fn to_csv(beads: &[PlannedBead], facts: &PlanFacts) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let command = format!("command_{}", facts.unit.word());
-    writer.write_record([
-        "bead",
-        "time_s",
-        "path_mm",
-        "x_mm",
-        "y_mm",
-        "z_mm",
-        "speed_mm_per_s",
-        "nominal_speed_mm_per_s",
-        command.as_str(),
-        "flow_mm3_per_s",
-        "width_mm",
-    ])?;
+    let head = "bead,time_s,path_mm,x_mm,y_mm,z_mm,speed_mm_per_s,nominal_speed_mm_per_s";
+    writer.write_record(head.split(',').chain([&command, "flow_mm3_per_s", "width_mm"]))?;
     for (number, bead) in (1_u32..).zip(beads) {
         for time_s in moments(bead) {
             writer.write_record(row(number, bead, time_s, facts))?;
@@ -58,32 +47,25 @@ fn row(number: u32, bead: &PlannedBead, time_s: f64, facts: &PlanFacts) -> [Stri
     let path_mm = bead.plan.speed.path_at(time_s).min(bead.nominal.end_mm());
     let [x, y, z] = position_at(&bead.position, path_mm);
     let width = fraction_at(&bead.planned.width, path_mm)
-        .map_or_else(String::new, |share| format!("{:.4}", facts.width_mm * (1.0 + share)));
-    [
-        number.to_string(),
-        format!("{time_s:.6}"),
-        format!("{path_mm:.6}"),
-        format!("{x:.6}"),
-        format!("{y:.6}"),
-        format!("{z:.6}"),
-        format!("{:.6}", bead.plan.speed.speed_at(path_mm)),
-        format!("{:.6}", bead.nominal.speed_at(path_mm)),
-        format!("{:.6}", bead.plan.command_at(time_s) + facts.idle),
-        format!("{:.4}", bead.planned.flow_at(time_s)),
-        width,
-    ]
+        .map_or_else(String::new, |error| format!("{:.4}", facts.width_mm * (1.0 + error)));
+    let (speed, nominal) = (bead.plan.speed.speed_at(path_mm), bead.nominal.speed_at(path_mm));
+    let command = bead.plan.command_at(time_s) + facts.idle;
+    let [time, path, x, y, z, speed, nominal, command] =
+        [time_s, path_mm, x, y, z, speed, nominal, command].map(|value| format!("{value:.6}"));
+    let flow = format!("{:.4}", bead.planned.flow_at(time_s));
+    [number.to_string(), time, path, x, y, z, speed, nominal, command, flow, width]
 }
 
 /// Between two points the nozzle goes straight.
 fn position_at(position: &[(f64, [f64; 3])], path_mm: f64) -> [f64; 3] {
     let after = position.partition_point(|(at, _)| *at < path_mm);
-    let last = position.last().map_or([0.0; 3], |(_, place)| *place);
+    let last = position.last().map_or([0.0; 3], |(_, point)| *point);
     let Some((to_mm, to)) = position.get(after) else { return last };
     let Some((from_mm, from)) = after.checked_sub(1).and_then(|at| position.get(at)) else {
         return *to;
     };
-    let share = (path_mm - from_mm) / (to_mm - from_mm);
-    std::array::from_fn(|axis| from[axis] + share * (to[axis] - from[axis]))
+    let fraction = (path_mm - from_mm) / (to_mm - from_mm);
+    std::array::from_fn(|axis| from[axis] + fraction * (to[axis] - from[axis]))
 }
 
 /// None within half a nozzle of the ends, where no full mean is.

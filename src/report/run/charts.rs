@@ -1,5 +1,4 @@
-//! What the plots are drawn from, gathered one fact at a time in bounded
-//! memory.
+//! The data of the plots, collected one fact at a time in bounded memory.
 
 use super::distance::DistanceCharts;
 use super::extruder::ExtruderCharts;
@@ -7,8 +6,8 @@ use crate::control::event::Event;
 use crate::control::step::{State, Step};
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
-use crate::report::chart::series::Curve;
-use crate::report::chart::strip::{Mark, Strip};
+use crate::numeric::statistics::as_f64;
+use crate::report::chart::{Mark, PlotCurve, Strip};
 use crate::rows::frame_row::FrameRow;
 use crate::rows::names;
 use crate::rows::summary::StateFollower;
@@ -17,9 +16,9 @@ use crate::rows::summary::StateFollower;
 #[derive(Debug, Default)]
 pub struct TimeAndPath {
     /// Over time, or over frames where no time is known.
-    pub time: Curve,
+    pub time: PlotCurve,
     /// Over the distance along the path.
-    pub path: Curve,
+    pub path: PlotCurve,
 }
 
 impl TimeAndPath {
@@ -43,33 +42,33 @@ pub struct Charts {
     pub width_low: TimeAndPath,
     /// Width plus two standard deviations.
     pub width_high: TimeAndPath,
-    /// Width that was asked for there.
+    /// Target width there.
     pub target: TimeAndPath,
     /// Speed that the robot reports.
     pub speed: TimeAndPath,
     /// Setpoints.
     pub setpoint: TimeAndPath,
-    /// What the controller would like.
+    /// Demand of the controller before the limiter.
     pub demand: TimeAndPath,
     /// Contrast hint.
-    pub contrast: Curve,
+    pub contrast: PlotCurve,
     /// Blur hint.
-    pub blur: Curve,
+    pub blur: PlotCurve,
     /// Noise hint.
-    pub noise: Curve,
-    /// Share of saturated pixels \[%\].
-    pub saturated: Curve,
-    /// Share of the rows that the width comes from \[%\].
-    pub used: Curve,
+    pub noise: PlotCurve,
+    /// Saturated pixels \[%\].
+    pub saturated: PlotCurve,
+    /// Rows that the width comes from \[%\].
+    pub used: PlotCurve,
     /// Standard deviation of the width \[mm\].
-    pub sigma: Curve,
-    /// Refused frames.
+    pub sigma: PlotCurve,
+    /// Rejected frames.
     pub rejected: Strip,
     /// States of the controller.
     pub states: Strip,
     /// Limits that acted.
     pub limits: Strip,
-    /// The law by distance.
+    /// The distance controller.
     pub distance: DistanceCharts,
     /// The extruder side.
     pub extruder: ExtruderCharts,
@@ -77,11 +76,10 @@ pub struct Charts {
 }
 
 impl Charts {
-    /// A frame that was looked at.
+    /// A frame that was measured or rejected.
     pub fn frame(&mut self, row: &FrameRow) {
         let timed = *self.timed.get_or_insert(row.time_s.is_some());
-        let x =
-            if timed { row.time_s } else { Some(crate::numeric::statistics::as_f64(row.frame)) };
+        let x = if timed { row.time_s } else { Some(as_f64(row.frame)) };
         let Some(x) = x else { return };
         let measured = match &row.outcome {
             Err(status) => return self.rejected.push(x, Mark { severity: 1, name: status }),
@@ -125,7 +123,7 @@ impl Charts {
             self.demand.push(time, path, MmPerS::get(demand));
         }
         self.states.push(time, state_mark(self.follower.state()));
-        let limit = names::limit(self.follower.limit());
+        let limit = names::of(self.follower.limit());
         self.limits.push(time, Mark { severity: u8::from(limit != "none"), name: limit });
     }
 }

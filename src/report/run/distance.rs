@@ -1,23 +1,19 @@
-//! What the law by distance believed along the bead.
+//! Estimates of the distance controller along the bead.
 
 use maud::{Markup, html};
 
 use crate::control::step::Step;
-use crate::report::chart::area::{Area, XAxis};
-use crate::report::chart::legend;
-use crate::report::chart::palette;
-use crate::report::chart::plot::{Plot, PlotLayer, y_range};
-use crate::report::chart::series::Curve;
+use crate::report::chart::{PlotCurve, PlotLayer, XAxis, legend, palette, wide_plot, y_range};
 use crate::rows::summary::DistanceSummary;
 
-/// What the plots are drawn from, over where the bead was laid.
+/// Estimates over the path on which the bead was laid.
 #[derive(Debug, Default)]
 pub struct DistanceCharts {
-    level: Curve,
-    level_low: Curve,
-    level_high: Curve,
-    exponent: Curve,
-    offset: Curve,
+    level: PlotCurve,
+    level_low: PlotCurve,
+    level_high: PlotCurve,
+    exponent: PlotCurve,
+    offset: PlotCurve,
 }
 
 impl DistanceCharts {
@@ -38,7 +34,7 @@ impl DistanceCharts {
         self.offset.push(path, trace.offset_mm.get());
     }
 
-    /// The section of the page; nothing where the law was not asked for.
+    /// The section of the page; nothing without a distance controller.
     pub fn section(&self, summary: Option<&DistanceSummary>) -> Markup {
         let (Some(range), Some(summary)) = (self.level.extent(), summary) else {
             return html! {};
@@ -56,33 +52,21 @@ impl DistanceCharts {
     }
 
     fn level(&self, axis: &XAxis) -> Markup {
-        let plot = Plot {
-            area: Area::wide(220.0),
-            x: axis,
-            y_title: "A [mm]",
-            y_range: y_range(&[&self.level], &[]),
-            layers: vec![
-                PlotLayer::Band(&self.level_low, &self.level_high, palette::MODEL),
-                PlotLayer::Curve(&self.level, palette::MODEL),
-            ],
-        };
+        let layers = vec![
+            PlotLayer::Band(&self.level_low, &self.level_high, palette::MODEL),
+            PlotLayer::Curve(&self.level, palette::MODEL),
+        ];
         html! {
-            (legend::legend(&[
-                ("width at the start speed, as it is believed", palette::MODEL, ""),
+            (legend(&[
+                ("estimated width at the start speed", palette::MODEL, ""),
                 ("± 2 standard deviations", palette::MODEL, "area"),
             ]))
-            (plot.draw())
+            (wide_plot(axis, "A [mm]", 220.0, y_range(&[&self.level], &[]), layers))
         }
     }
 }
 
-fn curve(axis: &XAxis, y_title: &str, of: &Curve) -> Markup {
-    let plot = Plot {
-        area: Area::wide(120.0),
-        x: axis,
-        y_title,
-        y_range: y_range(&[of], &[]),
-        layers: vec![PlotLayer::Curve(of, palette::MODEL)],
-    };
-    plot.draw()
+fn curve(axis: &XAxis, y_title: &str, of: &PlotCurve) -> Markup {
+    let layers = vec![PlotLayer::Curve(of, palette::MODEL)];
+    wide_plot(axis, y_title, 120.0, y_range(&[of], &[]), layers)
 }

@@ -1,5 +1,4 @@
-//! The extruder side of a run: what was wanted of the nozzle, what it was told,
-//! and what its sensors said.
+//! The extruder side of a run: wanted flow, commands, and readings of its sensors.
 
 use maud::{Markup, html};
 
@@ -8,33 +7,28 @@ use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::Mm3PerS;
 use crate::extruder::{CommandQuantity, ExtruderReport, ExtruderState};
-use crate::report::chart::area::{Area, XAxis};
-use crate::report::chart::legend;
-use crate::report::chart::palette;
-use crate::report::chart::palette::Ink;
-use crate::report::chart::plot::{Plot, PlotLayer, y_range};
-use crate::report::chart::series::Curve;
-use crate::report::chart::strip::{Mark, Strip};
-use crate::report::chart::strips;
-use crate::report::chart::strips::StripRow;
+use crate::report::chart::{
+    Ink, Mark, PlotCurve, PlotLayer, Strip, StripRow, XAxis, legend, palette, strips, wide_plot,
+    y_range,
+};
 use crate::rows::names;
 use crate::rows::summary::ExtruderSummary;
 
 /// The states of the extruder side.
 const STATES: [&str; 6] = ["off", "starting", "running", "ending", "holding", "fault"];
 
-/// What the plots of the extruder side are drawn from.
+/// The data of the plots of the extruder side.
 #[derive(Debug, Default)]
 pub struct ExtruderCharts {
-    demand: Curve,
-    predicted: Curve,
-    flow: Curve,
-    sensed_flow: Curve,
-    command: Curve,
-    feedforward: Curve,
-    screw: Curve,
-    pressure: Curve,
-    filled: Curve,
+    demand: PlotCurve,
+    predicted: PlotCurve,
+    flow: PlotCurve,
+    sensed_flow: PlotCurve,
+    command: PlotCurve,
+    feedforward: PlotCurve,
+    screw: PlotCurve,
+    pressure: PlotCurve,
+    filled: PlotCurve,
     states: Strip,
     limits: Strip,
 }
@@ -55,7 +49,7 @@ impl ExtruderCharts {
             ExtruderState::Fault(_) => 4,
         };
         self.states.push(time, Mark { severity, name: side.state.name() });
-        let limit = names::command_limit(side.trace.limit);
+        let limit = names::of(side.trace.limit);
         self.limits.push(time, Mark { severity: u8::from(limit != "none"), name: limit });
         if let Some(command) = side.command {
             self.command.push(time, command.value);
@@ -67,24 +61,23 @@ impl ExtruderCharts {
         }
     }
 
-    /// The true flow, where a simulation knows it.
+    /// The true flow of a simulation.
     pub fn flow(&mut self, now: Stamp, flow: Mm3PerS) {
         self.flow.push(now.secs(), flow.get());
     }
 
     fn state(&mut self, time: f64, report: &ExtruderReport) {
-        let push = |series: &mut Curve, value: Option<f64>| {
-            if let Some(value) = value {
-                series.push(time, value);
-            }
-        };
-        push(&mut self.screw, report.screw_rpm.map(f64::from));
-        push(&mut self.sensed_flow, report.flow_mm3_per_s.map(f64::from));
-        push(&mut self.pressure, report.pressure_mpa.map(f64::from));
-        push(&mut self.filled, report.filled_mm.map(f64::from));
+        for (series, value) in [
+            (&mut self.screw, report.screw_rpm.map(f64::from)),
+            (&mut self.sensed_flow, report.flow_mm3_per_s.map(f64::from)),
+            (&mut self.pressure, report.pressure_mpa.map(f64::from)),
+            (&mut self.filled, report.filled_mm.map(f64::from)),
+        ] {
+            value.into_iter().for_each(|value| series.push(time, value));
+        }
     }
 
-    /// The section of the page, for an extruder that is told this drive.
+    /// The section of the page, for an extruder whose drive takes this command.
     pub fn section(&self, drive: CommandQuantity, summary: Option<&ExtruderSummary>) -> Markup {
         let Some(range) = self.command.extent() else { return html! {} };
         let axis = XAxis::time(range);
@@ -110,29 +103,27 @@ impl ExtruderCharts {
     }
 
     fn flow_plot(&self, axis: &XAxis) -> Markup {
-        // A live run knows what a sensor tells, if there is one.
+        // A live run knows the flow only from a sensor.
         let (flow, name) = if self.flow.is_empty() {
             (&self.sensed_flow, "measured")
         } else {
             (&self.flow, "at the nozzle")
         };
-        let plot = Plot {
-            area: Area::wide(240.0),
-            x: axis,
-            y_title: "flow [mm³/s]",
-            y_range: y_range(&[&self.demand, flow, &self.predicted], &[0.0]),
-            layers: vec![
-                PlotLayer::Demand(&self.demand, palette::TARGET),
-                PlotLayer::Curve(flow, palette::FLOW),
-                PlotLayer::Demand(&self.predicted, palette::MODEL),
-            ],
-        };
+        let layers = vec![
+            PlotLayer::Demand(&self.demand, palette::TARGET),
+            PlotLayer::Curve(flow, palette::FLOW),
+            PlotLayer::Demand(&self.predicted, palette::MODEL),
+        ];
+        let y_range = y_range(&[&self.demand, flow, &self.predicted], &[0.0]);
         let entries = [
-            (&self.demand, ("wanted", palette::TARGET, "dash")),
+            (&self.demand, ("demand", palette::TARGET, "dash")),
             (flow, (name, palette::FLOW, "")),
             (&self.predicted, ("predicted by the model", palette::MODEL, "dash")),
         ];
-        html! { (legend::legend(&legend::drawn(&entries))) (plot.draw()) }
+        html! {
+            (legend(&legend::drawn(&entries)))
+            (wide_plot(axis, "flow [mm³/s]", 240.0, y_range, layers))
+        }
     }
 
     fn command_plot(&self, axis: &XAxis, title: &str, with_screw: bool) -> Markup {
@@ -150,18 +141,14 @@ impl ExtruderCharts {
             shown.push(&self.screw);
             entries.push((&self.screw, ("screw", palette::SCREW, "")));
         }
-        let plot = Plot {
-            area: Area::wide(220.0),
-            x: axis,
-            y_title: title,
-            y_range: y_range(&shown, &[0.0]),
-            layers,
-        };
-        html! { (legend::legend(&legend::drawn(&entries))) (plot.draw()) }
+        html! {
+            (legend(&legend::drawn(&entries)))
+            (wide_plot(axis, title, 220.0, y_range(&shown, &[0.0]), layers))
+        }
     }
 }
 
-/// How long what held.
+/// The time in each state and at each limit.
 fn times(summary: &ExtruderSummary) -> Markup {
     let total: f64 = summary.states_s.values().sum();
     let row = |what: &str, name: &str, seconds: f64| {
@@ -173,7 +160,7 @@ fn times(summary: &ExtruderSummary) -> Markup {
     };
     html! {
         table {
-            thead { tr { th { "" } th { "" } th.number { "time" } th.number { "share" } } }
+            thead { tr { th { "" } th { "" } th.number { "time" } th.number { "fraction" } } }
             tbody {
                 @for (name, seconds) in &summary.states_s { (row("state", name, *seconds)) }
                 @for (name, seconds) in &summary.held_for_s {
@@ -189,18 +176,12 @@ fn times(summary: &ExtruderSummary) -> Markup {
     }
 }
 
-fn sensor(axis: &XAxis, series: &Curve, title: &str, ink: Ink) -> Markup {
+fn sensor(axis: &XAxis, series: &PlotCurve, title: &str, ink: Ink) -> Markup {
     if series.is_empty() {
         return html! {};
     }
-    let plot = Plot {
-        area: Area::wide(200.0),
-        x: axis,
-        y_title: title,
-        y_range: y_range(&[series], &[0.0]),
-        layers: vec![PlotLayer::Curve(series, ink)],
-    };
-    plot.draw()
+    let layers = vec![PlotLayer::Curve(series, ink)];
+    wide_plot(axis, title, 200.0, y_range(&[series], &[0.0]), layers)
 }
 
 fn limit(name: &str) -> Option<Ink> {

@@ -3,45 +3,34 @@
 use maud::{Markup, html};
 
 use crate::extruder::ExtruderFault;
+use crate::report::html::{VerdictLevel, number};
 use crate::rows::names::{extruder_fault, in_words};
 use crate::rows::summary::{ControlSummary, ExtruderSummary, ProfileSummary, Summary};
 
-/// Share of what was wanted from which on an error is worth a word.
+/// Error, as a fraction of the target, above which the verdict mentions it.
 const FAR_OFF_ERROR: f64 = 0.05;
-/// Share of the time from which on a limit is.
+/// Fraction of the time above which the verdict mentions a limit.
 const LONG_LIMITED_FRACTION: f64 = 0.10;
 
 /// How a run went.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum VerdictLevel {
-    /// Nothing to worry about.
-    Good,
-    /// Something to look at.
-    Caution,
-    /// It failed at its task.
-    Bad,
-}
-
-/// How a run went, in plain words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Verdict {
-    /// In one word.
+    /// Its level.
     pub level: VerdictLevel,
-    /// In a few sentences.
+    /// A few sentences.
     pub text: String,
 }
 
-/// Judges a run. `max_rejected_share` is the share of refused frames that the
-/// cell bears.
-pub fn verdict(summary: &Summary, max_rejected_share: f64) -> Verdict {
+/// Judges a run. `max_rejected_fraction` is the cell's limit of rejected frames.
+pub fn verdict(summary: &Summary, max_rejected_fraction: f64) -> Verdict {
     let mut level = VerdictLevel::Good;
     let mut sentences = vec![width_sentence(summary)];
     if summary.measured == 0 {
         level = VerdictLevel::Bad;
-    } else if summary.rejected_fraction() > max_rejected_share {
+    } else if summary.rejected_fraction() > max_rejected_fraction {
         level = VerdictLevel::Caution;
     }
-    sentences.push(rejected_sentence(summary, max_rejected_share));
+    sentences.push(rejected_sentence(summary, max_rejected_fraction));
     if let Some(control) = &summary.control {
         let (control_level, more) = control_sentences(control);
         level = level.max(control_level);
@@ -82,15 +71,14 @@ fn width_sentence(summary: &Summary) -> String {
     match (&summary.control, summary.target_width_mm) {
         (Some(control), Some(target)) => held_sentence(control, target),
         (_, Some(target)) => format!(
-            "The bead is {mean:.3} mm wide on average{spread}; {} than the {target} mm that are \
-             asked for.",
+            "The bead is {mean:.3} mm wide on average{spread}; {} than its target of {target} mm.",
             more_or_less(mean - target)
         ),
         _ => format!("The bead is {mean:.3} mm wide on average{spread}."),
     }
 }
 
-/// Whether the extruder played a profile: the width then moves on purpose.
+/// Whether the extruder played a profile, which changes the width on purpose.
 fn is_excited(summary: &Summary) -> bool {
     summary.extruder.as_ref().is_some_and(|extruder| extruder.profile.is_some())
 }
@@ -116,42 +104,42 @@ fn held_sentence(control: &ControlSummary, target: f64) -> String {
     }
 }
 
-fn rejected_sentence(summary: &Summary, max_rejected_share: f64) -> String {
-    let share = (1.0 - summary.rejected_fraction()) * 100.0;
+fn rejected_sentence(summary: &Summary, max_rejected_fraction: f64) -> String {
+    let percent = (1.0 - summary.rejected_fraction()) * 100.0;
     let frames = summary.frames_with_bead();
     let of_bead = if frames == summary.frames { "" } else { " that could show bead" };
     if summary.frames == 0 {
         "There was no frame at all.".to_string()
     } else if frames == 0 {
         "No frame could show bead: none was laid.".to_string()
-    } else if summary.rejected_fraction() > max_rejected_share {
+    } else if summary.rejected_fraction() > max_rejected_fraction {
         format!(
-            "Only {share:.1} % of {frames} frames{of_bead} were measured; the cell asks for {:.0} %.",
-            (1.0 - max_rejected_share) * 100.0
+            "Only {percent:.1} % of {frames} frames{of_bead} were measured; the cell's limit is {:.0} %.",
+            (1.0 - max_rejected_fraction) * 100.0
         )
     } else {
-        format!("{share:.1} % of {frames} frames{of_bead} were measured.")
+        format!("{percent:.1} % of {frames} frames{of_bead} were measured.")
     }
 }
 
-/// An error that nobody asked for: more than a twentieth of the target once
-/// settled or in all, or a limit that acted for a tenth of the run.
+/// An error of more than a twentieth of the target once settled or in all, or a limit that
+/// acted for a tenth of the run.
 fn far_off(control: &ControlSummary, summary: &Summary) -> Option<String> {
     let (error, target) = (control.width_error_rms_settled_mm?, summary.target_width_mm?);
-    let share = control.limited_s / summary.duration_s.unwrap_or(f64::INFINITY);
-    if error > FAR_OFF_ERROR * target && !is_excited(summary) {
-        Some(format!("That is {:.0} % of the target.", 100.0 * error / target))
-    } else if let Some(sentence) = far_off_before(control, target).filter(|_| !is_excited(summary))
-    {
-        Some(sentence)
-    } else if share > LONG_LIMITED_FRACTION {
-        Some(format!("The robot stood at a limit for {:.0} % of the time.", 100.0 * share))
-    } else {
+    let fraction = control.limited_s / summary.duration_s.unwrap_or(f64::INFINITY);
+    let far_off = if is_excited(summary) {
         None
-    }
+    } else if error > FAR_OFF_ERROR * target {
+        Some(format!("That is {:.0} % of the target.", 100.0 * error / target))
+    } else {
+        far_off_before(control, target)
+    };
+    let limited =
+        || format!("The robot stood at a limit for {:.0} % of the time.", 100.0 * fraction);
+    far_off.or_else(|| (fraction > LONG_LIMITED_FRACTION).then(limited))
 }
 
-/// An error over all bead laid under control, as at a corner within what counts as settling.
+/// An error over all bead laid under control, such as at a corner during settling.
 fn far_off_before(control: &ControlSummary, target: f64) -> Option<String> {
     let (rms, worst) = (control.width_error_rms_mm?, control.width_error_worst?);
     (rms > FAR_OFF_ERROR * target).then(|| {
@@ -165,27 +153,23 @@ fn far_off_before(control: &ControlSummary, target: f64) -> Option<String> {
     })
 }
 
-/// What the extruder side did that one should know; nothing where it did well.
+/// Sentences about faults, holds and limits of the extruder side; none where it did well.
 fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
     let total: f64 = extruder.states_s.values().sum();
-    let share = |seconds: f64| seconds / total.max(1e-9);
     let mut sentences = Vec::new();
     if extruder.fault_reasons.contains_key(&extruder_fault(ExtruderFault::RunsOn)) {
         sentences.push("The pump ran although it was commanded to stop.".to_owned());
     }
     for (why, seconds) in &extruder.held_for_s {
-        sentences.push(format!(
-            "The extruder kept its last command for {seconds:.1} s ({}).",
-            in_words(why)
-        ));
+        let why = in_words(why);
+        sentences.push(format!("The extruder kept its last command for {seconds:.1} s ({why})."));
     }
-    for (limit, seconds) in &extruder.limited_by_s {
-        if share(*seconds) > LONG_LIMITED_FRACTION {
-            sentences.push(format!(
-                "The extruder's command stood at a limit for {:.0} % of the time ({limit}).",
-                100.0 * share(*seconds)
-            ));
-        }
+    let limited = extruder.limited_by_s.iter().map(|(limit, s)| (limit, s / total.max(1e-9)));
+    for (limit, fraction) in limited.filter(|(_, fraction)| *fraction > LONG_LIMITED_FRACTION) {
+        sentences.push(format!(
+            "The extruder's command stood at a limit for {:.0} % of the time ({limit}).",
+            100.0 * fraction
+        ));
     }
     let kept = extruder.flow_controlled;
     if let (Some(error), Some(mean)) = (kept.error_mean_mm3_per_s, kept.mean_mm3_per_s)
@@ -201,24 +185,19 @@ fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
 
 /// Whether a profile was played to its end, and whether the bead went on.
 fn profile_sentence(profile: &ProfileSummary) -> (VerdictLevel, String) {
-    let ProfileSummary {
-        duration_s: lasts_s,
-        played_fraction: played_share,
-        after_end_s: outlasted_s,
-    } = *profile;
-    if played_share < 1.0 {
-        let sentence = format!(
-            "The bead ended before the profile: {:.1} % of its {lasts_s:.1} s were played.",
-            100.0 * played_share
-        );
-        (VerdictLevel::Caution, sentence)
+    let ProfileSummary { duration_s, played_fraction, after_end_s } = *profile;
+    let sentence = if played_fraction < 1.0 {
+        format!(
+            "The bead ended before the profile: {:.1} % of its {duration_s:.1} s were played.",
+            100.0 * played_fraction
+        )
     } else {
-        let sentence = format!(
-            "The profile of {lasts_s:.1} s was played to its end; bead was laid for {outlasted_s:.1} s \
-             more, with its last command."
-        );
-        (VerdictLevel::Good, sentence)
-    }
+        format!(
+            "The profile of {duration_s:.1} s was played to its end; bead was laid for \
+             {after_end_s:.1} s more, with its last command."
+        )
+    };
+    (VerdictLevel::with_caution(played_fraction < 1.0), sentence)
 }
 
 fn control_sentences(control: &ControlSummary) -> (VerdictLevel, Vec<String>) {
@@ -228,7 +207,8 @@ fn control_sentences(control: &ControlSummary) -> (VerdictLevel, Vec<String>) {
         level = VerdictLevel::Bad;
         let why: Vec<String> = control.fault_reasons.keys().map(|name| in_words(name)).collect();
         let times = if control.faults == 1 { "once" } else { "more than once" };
-        sentences.push(format!("Control gave up {times} ({}).", why.join(", ")));
+        sentences
+            .push(format!("The controller stopped with a fault {times} ({}).", why.join(", ")));
     } else {
         sentences.push("There was no fault.".to_string());
     }
@@ -243,7 +223,7 @@ fn control_sentences(control: &ControlSummary) -> (VerdictLevel, Vec<String>) {
         sentences.push(format!("Control held for {held:.1} s."));
     }
     if control.limited_s >= 0.05 {
-        sentences.push(format!("A limit shaped the speed for {:.1} s.", control.limited_s));
+        sentences.push(format!("Speed limited for {:.1} s.", control.limited_s));
     }
     if control.records_lost > 0 {
         level = level.max(VerdictLevel::Caution);
@@ -254,8 +234,8 @@ fn control_sentences(control: &ControlSummary) -> (VerdictLevel, Vec<String>) {
 
 /// The figures as tiles.
 pub fn tiles(summary: &Summary) -> Markup {
-    let share = (1.0 - summary.rejected_fraction()) * 100.0;
-    let measured = if summary.frames == 0 { None } else { Some(share) };
+    let percent = (1.0 - summary.rejected_fraction()) * 100.0;
+    let measured = if summary.frames == 0 { None } else { Some(percent) };
     html! {
         div.tiles {
             (tile("frames", &summary.frames.to_string(), "", &duration(summary)))
@@ -271,7 +251,7 @@ pub fn tiles(summary: &Summary) -> Markup {
                 }
                 @if let Some(extruder) = &summary.extruder && extruder.flow_mean_mm3_per_s.is_some() {
                     (tile("flow", &number(extruder.flow_controlled.mean_mm3_per_s.or(extruder.flow_mean_mm3_per_s), 0), "mm³/s",
-                        &format!("{} mm³/s RMS from what was wanted since control began", number(extruder.flow_controlled.error_rms_mm3_per_s, 0))))
+                        &format!("{} mm³/s RMS from the demand since control began", number(extruder.flow_controlled.error_rms_mm3_per_s, 0))))
                 }
             } @else {
                 (tile("uncertainty", &number(summary.sigma_mean_mm, 3), "mm", "mean standard deviation"))
@@ -305,8 +285,4 @@ fn spread(summary: &Summary) -> String {
         Some(target) => format!("{std}, target {target} mm"),
         None => format!("{std} mm from frame to frame"),
     }
-}
-
-fn number(value: Option<f64>, places: usize) -> String {
-    value.map_or("–".to_string(), |value| format!("{value:.places$}"))
 }

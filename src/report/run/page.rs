@@ -1,11 +1,15 @@
-//! The page of a run, gathered while it goes on.
+//! The page of a run, collected during the run.
+
+use maud::html;
 
 use super::charts::Charts;
 use super::contents::RunReport;
+use super::{headline, sections};
 use crate::control::{Event, Step};
 use crate::core::frame::Frame;
 use crate::core::time::Stamp;
 use crate::core::units::Mm3PerS;
+use crate::report::html::{about, titled_page, verdict};
 use crate::report::picker::FramePicker;
 use crate::rows::frame_row::FrameRow;
 use crate::rows::log::{FinishedRun, LogOptions, RunLog, RunObserver};
@@ -20,12 +24,12 @@ pub struct RunPage {
 }
 
 impl RunPage {
-    /// Of a run that measures within a gauge.
+    /// The page of a run that measures within a gauge.
     pub fn new(gauge: Gauge) -> Self {
         Self { charts: Charts::default(), images: FramePicker::new(gauge) }
     }
 
-    /// Begins the log of a run that leaves such a page as `report.html`.
+    /// Begins the log of a run that writes such a page as `report.html`.
     pub fn log(options: LogOptions) -> Result<RunLog, LogError> {
         let page = Self::new(options.gauge);
         RunLog::create(options, Box::new(page))
@@ -49,20 +53,32 @@ impl RunObserver for RunPage {
     }
 
     fn write(self: Box<Self>, run: &FinishedRun<'_>) -> Result<(), LogError> {
-        let options = run.options;
-        let report = RunReport {
-            title: &options.title,
-            header: &options.header,
-            max_rejected_fraction: options.max_rejected_fraction,
-            summary: run.summary,
-            charts: &self.charts,
-            limits: options.control.map(|control| control.limits),
-            extruder: options.control.and_then(|control| control.extruder),
-            latencies: run.latencies,
-            images: &self.images.finish(),
-            remarks: run.remarks,
+        let report = RunReport { run, charts: &self.charts, images: &self.images.finish() };
+        write_whole(&run.options.folder, "report.html", report.page().as_bytes()).map(drop)
+    }
+}
+
+impl RunReport<'_> {
+    /// The page.
+    pub fn page(&self) -> String {
+        let (options, summary) = (&self.run.options, self.run.summary);
+        let judged = headline::verdict(summary, options.max_rejected_fraction);
+        let body = html! {
+            (about(options.header.iter().map(|(name, value)| (name, value))))
+            (verdict(judged.level, &judged.text, self.run.remarks))
+            (headline::tiles(summary))
+            (sections::over_time(self))
+            (sections::over_path(self))
+            (self.charts.distance.section(summary.distance.as_ref()))
+            @if let Some(drive) = options.control.and_then(|control| control.extruder) {
+                (self.charts.extruder.section(drive, summary.extruder.as_ref()))
+            }
+            (sections::rejections(summary))
+            (sections::images(self.images))
+            (sections::image_quality(self))
+            (sections::latency(self.run.latencies))
         };
-        write_whole(&options.folder, "report.html", report.page().as_bytes())?;
-        Ok(())
+        let note = ". The numbers are in summary.json, every frame is in widths.csv.";
+        titled_page(&options.title, &body, note)
     }
 }

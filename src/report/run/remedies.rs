@@ -1,4 +1,4 @@
-//! What a reason for refusing a frame means, and what to do about it.
+//! Meaning and remedy of each reason for which a frame is rejected.
 
 /// Meaning and remedy of a status in `widths.csv`.
 pub fn of(status: &str) -> (&'static str, &'static str) {
@@ -28,7 +28,7 @@ pub fn of(status: &str) -> (&'static str, &'static str) {
             "Turn the camera or the gauge with the bead; in sharp curves this is to be expected.",
         ),
         "clipped" => (
-            "An edge lies so near the border of the gauge that it is cut short.",
+            "An edge lies so near the boundary of the gauge that it is clipped.",
             "Make roi_px larger across the bead, or bring the bead back to its middle.",
         ),
         "unsure" => (

@@ -6,22 +6,13 @@ use maud::{Markup, html};
 use super::charts::TimeAndPath;
 use super::contents::RunReport;
 use super::remedies;
-use crate::numeric::statistics::as_f64;
-use crate::report::chart::area::{Area, XAxis};
-use crate::report::chart::histogram;
-use crate::report::chart::legend;
-use crate::report::chart::palette;
-use crate::report::chart::palette::Ink;
-use crate::report::chart::plot::{Plot, PlotLayer, y_range};
-use crate::report::chart::range::Range;
-use crate::report::chart::series::Curve;
-use crate::report::chart::strip::Strip;
-use crate::report::chart::strips;
-use crate::report::chart::strips::StripRow;
-use crate::rows::summary::Summary;
-use crate::rows::summary::advice;
-
-use crate::report::chart::legend::legend;
+use crate::numeric::statistics::{Distribution, as_f64};
+use crate::report::chart::{
+    Area, Ink, Plot, PlotCurve, PlotLayer, Strip, StripRow, ValueRange, XAxis, histogram, legend,
+    palette, strips, wide_plot, y_range,
+};
+use crate::report::picker::ChosenFrame;
+use crate::rows::summary::{Summary, advice};
 
 /// The states of the width controller.
 const STATES: [&str; 5] = ["idle", "priming", "tracking", "holding", "fault"];
@@ -39,7 +30,7 @@ pub fn over_time(report: &RunReport<'_>) -> Markup {
             h2 { @if timed { "Over time" } @else { "Frame by frame" } }
             (width_plot(report, &axis, |twice| &twice.time))
             (strips::draw(&axis, &[StripRow { name: "refused", strip: &charts.rejected, ink: rejected_ink }]))
-            @if report.summary.control.is_some() {
+            @if report.run.summary.control.is_some() {
                 (speed_plot(report, &axis, |twice| &twice.time))
                 (strips::draw(&axis, &[
                     StripRow { name: "state", strip: &charts.states, ink: palette::state },
@@ -61,19 +52,23 @@ pub fn over_path(report: &RunReport<'_>) -> Markup {
         section {
             h2 { "Along the bead" }
             p.hint { "Width and speed stand where the bead was laid: below a width is the speed of \
-                the nozzle at that very place, before the camera saw it." }
+                the nozzle at that very position, before the camera saw it." }
             (width_plot(report, &axis, |twice| &twice.path))
             (speed_plot(report, &axis, |twice| &twice.path))
         }
     }
 }
 
-fn width_plot(report: &RunReport<'_>, axis: &XAxis, pick: fn(&TimeAndPath) -> &Curve) -> Markup {
+fn width_plot(
+    report: &RunReport<'_>,
+    axis: &XAxis,
+    pick: fn(&TimeAndPath) -> &PlotCurve,
+) -> Markup {
     let charts = report.charts;
     let width = pick(&charts.width);
     let profile = pick(&charts.target);
     let varies = profile.range().is_some_and(|range| range.length() > 1e-6);
-    let target = report.summary.target_width_mm.filter(|_| !varies);
+    let target = report.run.summary.target_width_mm.filter(|_| !varies);
     let values: Vec<f64> = target.into_iter().collect();
     let name = target.map(|target| format!("{target} mm")).unwrap_or_default();
     let mut layers = vec![
@@ -84,13 +79,7 @@ fn width_plot(report: &RunReport<'_>, axis: &XAxis, pick: fn(&TimeAndPath) -> &C
     if varies {
         layers.push(PlotLayer::Curve(profile, palette::TARGET));
     }
-    let plot = Plot {
-        area: Area::wide(270.0),
-        x: axis,
-        y_title: "width [mm]",
-        y_range: y_range(&[width, if varies { profile } else { width }], &values),
-        layers,
-    };
+    let y_range = y_range(&[width, if varies { profile } else { width }], &values);
     let mut entries = Vec::new();
     if !width.is_empty() {
         entries.push(("width", palette::WIDTH, ""));
@@ -102,14 +91,19 @@ fn width_plot(report: &RunReport<'_>, axis: &XAxis, pick: fn(&TimeAndPath) -> &C
     if legend::has_marks(&charts.rejected) && !axis.title.starts_with("distance") {
         entries.push(("refused frames, in the strip", palette::REJECTED, "block"));
     }
-    html! { (legend(&entries)) (plot.draw()) }
+    html! { (legend(&entries)) (wide_plot(axis, "width [mm]", 270.0, y_range, layers)) }
 }
 
-fn speed_plot(report: &RunReport<'_>, axis: &XAxis, pick: fn(&TimeAndPath) -> &Curve) -> Markup {
+fn speed_plot(
+    report: &RunReport<'_>,
+    axis: &XAxis,
+    pick: fn(&TimeAndPath) -> &PlotCurve,
+) -> Markup {
     let charts = report.charts;
     let (speed, setpoint) = (pick(&charts.speed), pick(&charts.setpoint));
     let demand = pick(&charts.demand);
-    let bounds = report.limits.map(|limits| [limits.min_speed.get(), limits.max_speed.get()]);
+    let limits = report.run.options.control.map(|control| control.limits);
+    let bounds = limits.map(|limits| [limits.min_speed.get(), limits.max_speed.get()]);
     let names = bounds.map(|bounds| bounds.map(|bound| format!("{bound} mm/s")));
     let mut layers = vec![
         PlotLayer::Demand(demand, palette::DEMAND),
@@ -120,14 +114,8 @@ fn speed_plot(report: &RunReport<'_>, axis: &XAxis, pick: fn(&TimeAndPath) -> &C
         let levels = bounds.iter().zip(names);
         layers.extend(levels.map(|(bound, name)| PlotLayer::Level(*bound, palette::LIMIT, name)));
     }
-    let plot = Plot {
-        area: Area::wide(270.0),
-        x: axis,
-        y_title: "speed [mm/s]",
-        // A demand far beyond the limits would press everything else flat.
-        y_range: y_range(&[speed, setpoint], bounds.as_ref().map_or(&[], |bounds| bounds)),
-        layers,
-    };
+    // A demand far beyond the limits would press everything else flat.
+    let y_range = y_range(&[speed, setpoint], bounds.as_ref().map_or(&[], |bounds| bounds));
     let mut entries = legend::drawn(&[
         (speed, ("robot", palette::SPEED, "")),
         (setpoint, ("setpoint", palette::SETPOINT, "")),
@@ -136,12 +124,11 @@ fn speed_plot(report: &RunReport<'_>, axis: &XAxis, pick: fn(&TimeAndPath) -> &C
     if bounds.is_some() {
         entries.push(("limits of the cell", palette::LIMIT, "dash"));
     }
-    html! { (legend(&entries)) (plot.draw()) }
+    html! { (legend(&entries)) (wide_plot(axis, "speed [mm/s]", 270.0, y_range, layers)) }
 }
 
-/// Which frames were refused, why, and what to do.
-pub fn rejections(report: &RunReport<'_>) -> Markup {
-    let summary = report.summary;
+/// Rejected frames by reason, with meaning and remedy.
+pub fn rejections(summary: &Summary) -> Markup {
     let mut rejected: Vec<_> = summary.rejected.iter().collect();
     rejected.sort_by(|a, b| b.1.cmp(a.1));
     html! {
@@ -150,7 +137,7 @@ pub fn rejections(report: &RunReport<'_>) -> Markup {
                 h2 { "Refused frames" }
                 div.wide { table {
                     thead { tr {
-                        th { "status" } th.number { "frames" } th.number { "share" }
+                        th { "status" } th.number { "frames" } th.number { "fraction" }
                         th { "what it means" } th { "what to do" }
                     } }
                     tbody { @for (status, count) in rejected {
@@ -170,9 +157,9 @@ pub fn rejections(report: &RunReport<'_>) -> Markup {
 }
 
 /// Some frames with the edges drawn in.
-pub fn images(report: &RunReport<'_>) -> Markup {
+pub fn images(images: &[ChosenFrame]) -> Markup {
     html! {
-        @if !report.images.is_empty() {
+        @if !images.is_empty() {
             section {
                 h2 { "What the camera saw" }
                 (legend(&[
@@ -181,9 +168,9 @@ pub fn images(report: &RunReport<'_>) -> Markup {
                     ("gauge", palette::GAUGE, "dash"), ("gauge of a refused frame", palette::REJECTED, "dash"),
                 ]))
                 p.hint { "A click enlarges an image; a click beside it puts it back." }
-                div.pictures { @for picture in report.images { figure tabindex="0" {
-                    img alt=(format!("frame {}", picture.frame)) src=(data_uri(&picture.jpeg));
-                    figcaption { b { "frame " (picture.frame) } " · " (picture.caption) }
+                div.pictures { @for image in images { figure tabindex="0" {
+                    img alt=(format!("frame {}", image.frame)) src=(data_uri(&image.jpeg));
+                    figcaption { b { "frame " (image.frame) } " · " (image.caption) }
                 } } }
             }
         }
@@ -194,23 +181,23 @@ fn data_uri(jpeg: &[u8]) -> String {
     format!("data:image/jpeg;base64,{}", base64::engine::general_purpose::STANDARD.encode(jpeg))
 }
 
-/// How good the pictures are.
+/// Quality of the images over time.
 pub fn image_quality(report: &RunReport<'_>) -> Markup {
     let charts = report.charts;
     let Some(range) = charts.contrast.extent() else { return html! {} };
-    // Widths that were simulated without a picture have no hints.
+    // Widths that were simulated without an image have no hints.
     if charts.contrast.range().is_none_or(|range| range.max <= 0.0) {
         return html! {};
     }
     let axis = if charts.timed == Some(true) { XAxis::time(range) } else { XAxis::frames(range) };
-    // A steady hint is drawn as steady, not as its last digits.
-    let small = |series: &Curve, least_top: f64, y_title: &str| {
+    // The range ends at least at `least_top`, so that a steady value looks steady.
+    let small = |series: &PlotCurve, least_top: f64, y_title: &str| {
         let range = y_range(&[series], &[0.0]);
         Plot {
             area: Area::half(190.0),
             x: &axis,
             y_title,
-            y_range: Range::new(range.min.max(0.0), range.max.max(least_top)),
+            y_range: ValueRange::new(range.min.max(0.0), range.max.max(least_top)),
             layers: vec![PlotLayer::Curve(series, palette::WIDTH)],
         }
         .draw()
@@ -218,9 +205,9 @@ pub fn image_quality(report: &RunReport<'_>) -> Markup {
     html! {
         section {
             h2 { "How good the images are" }
-            (advice(report.summary))
-            p.hint { "Much contrast, little blur and noise and no saturation make a sure width. A \
-                slow drift tells of dust on the lens or of changing light." }
+            (advice(report.run.summary))
+            p.hint { "Much contrast, little blur and noise and no saturation make a certain width. A \
+                slow drift means dust on the lens or changing light." }
             div.pair {
                 (small(&charts.contrast, 10.0, "contrast [grey levels of 256]"))
                 (small(&charts.blur, 0.1, "blur of the edges [px]"))
@@ -233,7 +220,7 @@ pub fn image_quality(report: &RunReport<'_>) -> Markup {
     }
 }
 
-/// What could be better about light and lens.
+/// Advice about light and lens.
 fn advice(summary: &Summary) -> Markup {
     let bound = advice::row_bound_px(&summary.image_quality);
     html! {
@@ -250,10 +237,10 @@ fn advice(summary: &Summary) -> Markup {
     }
 }
 
-/// How long a frame takes to become a setpoint.
-pub fn latency(report: &RunReport<'_>) -> Markup {
+/// Latency from frame to setpoint.
+pub fn latency(latencies: Option<&Distribution>) -> Markup {
     html! {
-        @if let Some(latencies) = report.latencies.filter(|latencies| latencies.total() > 0) {
+        @if let Some(latencies) = latencies.filter(|latencies| latencies.total() > 0) {
             section {
                 h2 { "From frame to setpoint" }
                 p.hint { "From having the frame to having written the first setpoint that uses it, \
@@ -272,10 +259,10 @@ fn limit_ink(name: &str) -> Option<Ink> {
     (name != "none").then_some(palette::LIMIT)
 }
 
-fn strip_extent(strip: &Strip) -> Option<Range> {
-    Some(Range::new(strip.segments().first()?.from, strip.segments().last()?.to))
+fn strip_extent(strip: &Strip) -> Option<ValueRange> {
+    Some(ValueRange::new(strip.segments().first()?.from, strip.segments().last()?.to))
 }
 
-fn joined(extents: impl Iterator<Item = Option<Range>>) -> Option<Range> {
-    extents.flatten().reduce(Range::joined)
+fn joined(extents: impl Iterator<Item = Option<ValueRange>>) -> Option<ValueRange> {
+    extents.flatten().reduce(ValueRange::joined)
 }

@@ -17,8 +17,8 @@ fn page_of(name: &str, make: fn(&std::path::Path) -> Summary) -> (Summary, Strin
     (summary, std::fs::read_to_string(folder.join("report.html")).unwrap())
 }
 
-/// The page without its pictures, whose letters spell anything, and without
-/// its style sheet.
+/// The page without its images, whose base64 text may contain any word, and without its style
+/// sheet.
 fn text_of(page: &str) -> String {
     let body = page.split_once("</style>").unwrap().1;
     body.split('"').filter(|part| !part.starts_with("data:image/jpeg;base64,")).collect()

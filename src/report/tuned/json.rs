@@ -59,7 +59,7 @@ impl Tuned {
     }
 }
 
-/// Without numbers that are none.
+/// Infinite margins become null.
 fn of_loop(margins: LoopMargins) -> Value {
     json!({
         "is_stable": margins.is_stable,

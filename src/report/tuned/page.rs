@@ -5,31 +5,23 @@ use maud::{Markup, html};
 use super::Tuned;
 use super::text::margin_words;
 use crate::identify::camera_offset::WidthAtSpeed;
-use crate::report::chart::area::{Area, XAxis};
-use crate::report::chart::legend::legend;
-use crate::report::chart::palette::{
-    CONTROLLERS, Ink, LIMIT, MODEL, SETPOINT, SPEED, TARGET, WIDTH,
-};
-use crate::report::chart::plot::{Plot, PlotLayer, y_range};
-use crate::report::chart::series::Curve;
-
-use crate::report::html::whole_page;
+use crate::report::chart::palette::{CONTROLLERS, LIMIT, MODEL, SETPOINT, SPEED, TARGET, WIDTH};
+use crate::report::chart::{Ink, PlotCurve, PlotLayer, XAxis, legend, wide_plot, y_range};
+use crate::report::html::{VerdictLevel, about, titled_page, verdict};
 use crate::tune::predict::{BeadPrediction, FLOW_STEP, SEEDS};
 
-/// Time of the robot's answer that is shown about its steps \[s\].
+/// Time for which the robot's response to its steps is drawn \[s\].
 const SHOWN_S: f64 = 30.0;
 
 impl Tuned {
     /// The page.
     pub fn page(&self) -> String {
-        let title = "Tuning a cell";
         let body = html! {
-            h1 { (title) }
-            div.about {
-                span { "cell " b { (self.cell) } }
-                span { "recording " b { (self.recording) } }
-                span { "target " b { (self.target_mm) " mm" } }
-            }
+            (about([
+                ("cell", &self.cell),
+                ("recording", &self.recording),
+                ("target", &format!("{} mm", self.target_mm)),
+            ]))
             (self.verdict())
             (self.numbers())
             (self.bead())
@@ -42,32 +34,19 @@ impl Tuned {
                     " make a copy of it." }
                 pre { (self.lines()) }
             }
-            footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
-                ". The numbers are in tune.json." }
         };
-        whole_page(title, &body).into_string()
+        titled_page("Tuning a cell", &body, ". The numbers are in tune.json.")
     }
 
     fn verdict(&self) -> Markup {
         let warnings = self.warnings();
-        let (class, word) =
-            if warnings.is_empty() { ("good", "Good.") } else { ("caution", "Look closer.") };
-        let best = self.predictions.last();
-        html! {
-            div class={ "verdict " (class) } {
-                b { (word) }
-                @if let Some(best) = best {
-                    (format!(
-                        " By distance the bead is predicted to be {:.2} mm RMS off its target once \
-                         steady.",
-                        best.steady_rms_mm
-                    ))
-                }
-                @if !warnings.is_empty() {
-                    ul { @for warning in &warnings { li { (warning) } } }
-                }
-            }
-        }
+        let text = self.predictions.last().map_or_else(String::new, |best| {
+            format!(
+                " By distance the bead is predicted to be {:.2} mm RMS off its target once steady.",
+                best.steady_rms_mm
+            )
+        });
+        verdict(VerdictLevel::with_caution(!warnings.is_empty()), &text, &warnings)
     }
 
     fn numbers(&self) -> Markup {
@@ -86,7 +65,7 @@ impl Tuned {
         let study = &self.plant.study;
         let seen = |of: &dyn Fn(&WidthAtSpeed) -> f64| {
             let offset = self.plant.offset_mm.value;
-            study.widths.iter().map(|seen| (seen.path_mm - offset, of(seen))).collect::<Curve>()
+            study.widths.iter().map(|seen| (seen.path_mm - offset, of(seen))).collect::<PlotCurve>()
         };
         let widths = seen(&|seen| seen.ln_width.exp());
         let model = seen(&|seen| (seen.ln_width - study.residual(seen)).exp());
@@ -98,7 +77,7 @@ impl Tuned {
             section {
                 h2 { "The bead" }
                 p.hint { "Widths where they had been laid, with the model that was fitted; the \
-                    robot's speed there; and what is left of the widths." }
+                    robot's speed there; and the residuals of the widths." }
                 (legend(&[("measured width", WIDTH, ""), ("model", MODEL, "")]))
                 (plot(&axis, "width [mm]", 240.0, &[], vec![
                     PlotLayer::Data(&widths, WIDTH), PlotLayer::Curve(&model, MODEL),
@@ -106,7 +85,7 @@ impl Tuned {
                 (plot(&axis, "robot's speed [mm/s]", 150.0, &[], vec![
                     PlotLayer::Curve(&speeds, SPEED),
                 ], &[&speeds]))
-                (plot(&axis, "left [% of the width]", 150.0, &[0.0], vec![
+                (plot(&axis, "residual [% of the width]", 150.0, &[0.0], vec![
                     PlotLayer::Curve(&left, WIDTH), PlotLayer::Level(0.0, TARGET, ""),
                 ], &[&left]))
             }
@@ -118,10 +97,10 @@ impl Tuned {
         let from = begin.secs();
         let within = |at: f64| (from..from + SHOWN_S).contains(&at);
         let setpoints = self.log.setpoints.iter().map(|(at, speed)| (at.secs(), speed.get()));
-        let setpoints: Curve = setpoints.filter(|(at, _)| within(*at)).collect();
+        let setpoints: PlotCurve = setpoints.filter(|(at, _)| within(*at)).collect();
         let reported = self.log.states.iter();
         let reported = reported.map(|(at, state)| (at.secs(), state.speed_mm_per_s.get()));
-        let reported: Curve = reported.filter(|(at, _)| within(*at)).collect();
+        let reported: PlotCurve = reported.filter(|(at, _)| within(*at)).collect();
         let Some(range) = setpoints.extent() else { return html! {} };
         let axis = XAxis::time(range);
         html! {
@@ -165,11 +144,11 @@ impl Tuned {
     }
 
     fn predicted(&self) -> Markup {
-        let beads: Vec<Curve> =
-            self.predictions.iter().map(|one| one.bead.iter().copied().collect()).collect();
-        let speeds: Vec<Curve> =
-            self.predictions.iter().map(|one| one.speed.iter().copied().collect()).collect();
-        let Some(range) = beads.iter().find_map(Curve::extent) else { return html! {} };
+        let drawn = |of: fn(&BeadPrediction) -> &[(f64, f64)]| -> Vec<PlotCurve> {
+            self.predictions.iter().map(|one| of(one).iter().copied().collect()).collect()
+        };
+        let (beads, speeds) = (drawn(|one| &one.bead), drawn(|one| &one.speed));
+        let Some(range) = beads.iter().find_map(PlotCurve::extent) else { return html! {} };
         let axis = XAxis::path(range);
         let names: Vec<_> = self
             .predictions
@@ -186,7 +165,7 @@ impl Tuned {
                 h2 { "What is predicted" }
                 p.hint { (format!(
                     "Beads of the cell as it was found, {SEEDS} with each controller; the first of them is \
-                     drawn, in means over the gauge. At {:.0} mm the flow rises by {:.0} %. The table tells the way from \
+                     drawn, in means over the gauge. At {:.0} mm the flow rises by {:.0} %. The table has the distance from \
                      the start of control, and from the flow's step, until the bead is within \
                      {:.2} mm of its target for good, and the RMS error once it is steady and of \
                      all.",
@@ -207,7 +186,7 @@ impl Tuned {
     }
 }
 
-fn curves(of: &[Curve], inks: [Ink; 6]) -> impl Iterator<Item = PlotLayer<'_>> {
+fn curves(of: &[PlotCurve], inks: [Ink; 6]) -> impl Iterator<Item = PlotLayer<'_>> {
     of.iter().zip(inks).map(|(one, ink)| PlotLayer::Curve(one, ink))
 }
 
@@ -217,14 +196,13 @@ fn plot(
     height: f64,
     shown: &[f64],
     layers: Vec<PlotLayer<'_>>,
-    ranged: &[&Curve],
+    ranged: &[&PlotCurve],
 ) -> Markup {
-    let y_range = y_range(ranged, shown);
-    Plot { area: Area::wide(height), x: axis, y_title: title, y_range, layers }.draw()
+    wide_plot(axis, title, height, y_range(ranged, shown), layers)
 }
 
 fn table(head: &str, of: &[BeadPrediction]) -> Markup {
-    let way = |way: Option<f64>| way.map_or("not".to_owned(), |mm| format!("{mm:.0}"));
+    let distance = |mm: Option<f64>| mm.map_or("not".to_owned(), |mm| format!("{mm:.0}"));
     html! {
         div.wide { table {
             thead { tr {
@@ -234,8 +212,8 @@ fn table(head: &str, of: &[BeadPrediction]) -> Markup {
             } }
             tbody { @for one in of { tr {
                 td { (one.name) }
-                td.number { (way(one.start_settles_mm)) }
-                td.number { (way(one.step_settles_mm)) }
+                td.number { (distance(one.start_settles_mm)) }
+                td.number { (distance(one.step_settles_mm)) }
                 td.number { (format!("{:.3}", one.steady_rms_mm)) }
                 td.number { (format!("{:.3}", one.whole_rms_mm)) }
                 td.number { (format!(

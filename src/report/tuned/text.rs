@@ -9,7 +9,7 @@ use crate::tune::stability::LoopMargins;
 use crate::width_control::pi::PiGains;
 
 impl Tuned {
-    /// All that was found, foretold and proposed.
+    /// All findings, predictions and proposals.
     pub fn plain(&self) -> String {
         let mut text = String::new();
         for (name, words) in self.findings() {
@@ -25,7 +25,7 @@ impl Tuned {
         text
     }
 
-    /// What was found, by name and in words.
+    /// Findings, by name and in words.
     pub fn findings(&self) -> Vec<(&'static str, String)> {
         let plant = &self.plant;
         let (width, exponent, offset) = (plant.width_mm, plant.exponent, plant.offset_mm);
@@ -68,11 +68,11 @@ impl Tuned {
     }
 
     fn noise_words(&self) -> String {
-        let (width, scatter) = (self.plant.width_mm.value, &self.plant.width_noise);
-        let rough = if scatter.roughness > 0.0 {
+        let (width, noise) = (self.plant.width_mm.value, &self.plant.width_noise);
+        let rough = if noise.roughness > 0.0 {
             format!(
                 "the bead is rough by {:.3} mm in means over the gauge",
-                scatter.roughness * width
+                noise.roughness * width
             )
         } else {
             "no roughness seen beyond it".to_owned()
@@ -80,15 +80,15 @@ impl Tuned {
         format!(
             "{:.3} ± {:.3} mm from width to width ({:.2} %); {rough}",
             self.plant.noise_mm(),
-            scatter.per_width.sigma * width,
-            100.0 * scatter.per_width.value
+            noise.per_width.sigma * width,
+            100.0 * noise.per_width.value
         )
     }
 
     fn robot_words(&self) -> String {
         match &self.plant.robot {
             Ok(robot) => format!(
-                "answers after {:.0} ± {:.1} ms with a lag of {:.0} ± {:.1} ms{}; {:.2} mm/s RMS left",
+                "responds after {:.0} ± {:.1} ms with a lag of {:.0} ± {:.1} ms{}; {:.2} mm/s RMS left",
                 1e3 * robot.dead_time_s.value,
                 1e3 * robot.dead_time_s.sigma,
                 1e3 * robot.lag_s.value,
@@ -105,7 +105,7 @@ impl Tuned {
     fn timing_words(&self) -> String {
         let timing = &self.plant.timing;
         format!(
-            "widths {:.1} ms late ({:.1} ms p99); measured frames every {:.1} ms, reports {:.1} ms ({:.1} ms \
+            "widths delayed by {:.1} ms ({:.1} ms p99); measured frames every {:.1} ms, reports {:.1} ms ({:.1} ms \
              p99), setpoints {:.1} ms",
             1e3 * timing.latency_s,
             1e3 * timing.latency_p99_s,
@@ -116,8 +116,8 @@ impl Tuned {
         )
     }
 
-    /// Names, gains and margins of the PI laws, each at the worst speed and at that of
-    /// the target.
+    /// Names, gains and margins of the PI controllers, each at the worst speed and at that of the
+    /// target.
     pub fn loops(&self) -> Vec<(String, PiGains, Option<LoopMargins>)> {
         let now = self.present_gains.iter().map(|(gains, _)| ("now", *gains));
         let settings = now.chain([("proposed", self.proposal.pi.gains)]);
@@ -202,26 +202,26 @@ impl Tuned {
 }
 
 fn row(text: &mut String, one: &BeadPrediction) {
-    let way = |way: Option<f64>| way.map_or("not".to_owned(), |mm| format!("{mm:.0} mm"));
+    let distance = |mm: Option<f64>| mm.map_or("not".to_owned(), |mm| format!("{mm:.0} mm"));
     let (fast, slow) = one.speeds_mm_per_s;
     let _ = writeln!(
         text,
         "{:<28} {:>14} {:>16} {:>8.3} mm {:>7.3} mm {:>16}",
         one.name,
-        way(one.start_settles_mm),
-        way(one.step_settles_mm),
+        distance(one.start_settles_mm),
+        distance(one.step_settles_mm),
         one.steady_rms_mm,
         one.whole_rms_mm,
         format!("{slow:.0} to {fast:.0} mm/s")
     );
 }
 
-/// A margin that may have no end.
+/// A margin with its unit; it may be infinite.
 fn with_unit(margin: f64, words: impl Fn(f64) -> String) -> String {
     if margin.is_finite() { words(margin) } else { "no end".to_owned() }
 }
 
-/// Margins as they are told.
+/// Margins as they are printed.
 pub fn margin_words(margins: Option<LoopMargins>) -> [String; 4] {
     let Some(margins) = margins else { return ["–", "–", "–", "–"].map(str::to_owned) };
     if !margins.is_stable {

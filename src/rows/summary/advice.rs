@@ -1,36 +1,38 @@
-//! What the person who sets up light and lens can do better, in words, from how
-//! good the pictures of a run were.
+//! Advice about light and lens, from the quality of a run's images.
 //!
-//! The scale is the bound: the scatter of widths grows with noise over contrast
-//! and with the root of the blur (ACCURACY.md, "The two bounds"). A picture is
-//! held against one with 80 grey levels of contrast, 4 of noise and a blur of
-//! 1.5 px, for which the table of accuracy holds.
+//! The scale is the bound: the standard deviation of widths is proportional to noise over contrast
+//! and to the root of the blur (ACCURACY.md, "The two bounds"). An image is compared with one of 80
+//! grey levels of contrast, 4 of noise and a blur of 1.5 px, for which the table of accuracy holds.
 
 use super::image_quality::ImageQuality;
 
+/// Contrast of the sets where nothing else is said \[grey levels\] (ACCURACY.md, § The sets).
 const REFERENCE_CONTRAST_GREY: f64 = 80.0;
+/// Noise of the same \[grey levels\] (ACCURACY.md, § The sets).
 const REFERENCE_NOISE_GREY: f64 = 4.0;
+/// Blur of the same \[px\] (ACCURACY.md, § The sets).
 const REFERENCE_BLUR_PX: f64 = 1.5;
-/// Advice is given where it would make widths surer by this factor.
+/// Advice is given where it would divide the standard deviation of widths by this factor.
 const MIN_GAIN_OF_ADVICE: f64 = 1.5;
-/// Contrast below which shadows, stains and texture of a few grey levels bend
-/// an edge, whatever the noise.
+/// Contrast \[grey levels\] below which shadows, stains and texture of a few grey levels shift an
+/// edge, whatever the noise.
 const MIN_CONTRAST_GREY: f64 = 25.0;
 /// Blur up to which the limits of accuracy are held.
 const MAX_BLUR_PX: f64 = 3.2;
 /// Blur, the pixels' own included, below which an edge falls between pixels.
 const MIN_BLUR_PX: f64 = 0.55;
-/// Two steps are told apart from so many blurs on.
+/// Distance from which two steps are resolved \[blurs\].
 const RESOLVED_AT_BLURS: f64 = 4.0;
-/// Saturated share of the gauge from which the bead itself is cut off: noise
-/// alone does that where the bead is two of its standard deviations below the
-/// end of the scale.
+/// Saturated fraction of the gauge from which the bead itself is clipped. Derived: where half of
+/// the gauge is bead, two standard deviations of the noise below the end of the scale, noise alone
+/// saturates 0.5·(1 − Φ(2)) = 1.1 %.
 const CLIPPED_FRACTION: f64 = 0.01;
-/// Share of the rows below which something covers the edges.
+/// Fraction of the rows below which the edges are occluded.
 const MIN_USED_FRACTION: f64 = 0.9;
-/// Offset of widths by skewed flanks that is worth a word \[px\], and the standard
-/// deviations by which it has to be sure: one run in 10,000 without a skew has as much.
+/// Offset of widths by skewed flanks that is reported \[px\].
 const MIN_SKEW_PX: f64 = 0.05;
+/// The same in its standard deviations. Derived: a run without a skew has as much with
+/// P(|z| > 4) = 6e-5.
 const SKEW_SIGMAS: f64 = 4.0;
 
 /// One sentence for each thing to improve, the worst for the width first; none
@@ -59,18 +61,18 @@ pub fn row_bound_px(hints: &ImageQuality) -> Option<f64> {
     (contrast > 0.0 && blur > 0.0).then(|| root * noise / contrast * blur.sqrt())
 }
 
-fn on_saturation(share: f64) -> Option<String> {
-    (share > CLIPPED_FRACTION).then(|| {
+fn on_saturation(fraction: f64) -> Option<String> {
+    (fraction > CLIPPED_FRACTION).then(|| {
         format!(
             "{:.0} % of the gauge's pixels are saturated: shorten the exposure, or turn the light \
-             out of the mirror direction. What is cut off moves the edges, and sigma does not \
+             out of the mirror direction. Clipped pixels move the edges, and sigma does not \
              know it.",
-            share * 100.0
+            fraction * 100.0
         )
     })
 }
 
-/// How many times surer widths were with the reference's contrast and noise.
+/// Ratio of the standard deviation of widths to that with the reference's contrast and noise.
 fn precision_lost(contrast: f64, noise: f64) -> f64 {
     (noise / contrast) / (REFERENCE_NOISE_GREY / REFERENCE_CONTRAST_GREY)
 }
@@ -81,7 +83,7 @@ fn on_contrast(contrast: f64, noise: f64) -> Option<String> {
     (low || contrast < MIN_CONTRAST_GREY).then(|| {
         format!(
             "Contrast {contrast:.0} grey levels of 256: light the bead more from the side, or \
-             measure another channel. Twice the contrast halves the scatter of the widths, \
+             measure another channel. Twice the contrast halves the noise of the widths, \
              and what shadows and stains do to them."
         )
     })
@@ -93,7 +95,7 @@ fn on_noise(contrast: f64, noise: f64) -> Option<String> {
     (precision_lost(contrast, noise) > MIN_GAIN_OF_ADVICE && !by_contrast_alone).then(|| {
         format!(
             "Noise {noise:.1} grey levels: more light or a longer exposure in place of gain. Half \
-             the noise halves the scatter of the widths."
+             the noise halves that of the widths."
         )
     })
 }
@@ -101,7 +103,7 @@ fn on_noise(contrast: f64, noise: f64) -> Option<String> {
 fn on_blur(blur: f64) -> Option<String> {
     if blur < MIN_BLUR_PX {
         return Some(format!(
-            "Blur {blur:.1} px: the lens is sharper than the pixels, so that the place of an edge \
+            "Blur {blur:.1} px: the lens is sharper than the pixels, so that the position of an edge \
              within a pixel is not seen, and sigma is too small. Put it out of focus a little, to \
              0.8 px or more."
         ));
@@ -110,7 +112,7 @@ fn on_blur(blur: f64) -> Option<String> {
         format!(
             "Blur {blur:.1} px: refocus on the top edges of the bead, or shorten the exposure if \
              it smears (torn edges look blurred in focus as well). At {REFERENCE_BLUR_PX} px widths of a \
-             smooth bead would scatter {:.0} % less, and a shadow be distinguished from an edge {:.0} px \
+             smooth bead would have {:.0} % less noise, and a shadow be distinguished from an edge {:.0} px \
              away, not only {:.0} px.",
             (1.0 - (REFERENCE_BLUR_PX / blur).sqrt()) * 100.0,
             RESOLVED_AT_BLURS * REFERENCE_BLUR_PX,
@@ -119,12 +121,12 @@ fn on_blur(blur: f64) -> Option<String> {
     })
 }
 
-fn on_rows(share: f64) -> Option<String> {
-    (share < MIN_USED_FRACTION).then(|| {
+fn on_rows(fraction: f64) -> Option<String> {
+    (fraction < MIN_USED_FRACTION).then(|| {
         format!(
             "Only {:.0} % of the rows show the edges: look at the images for grains, glare and \
              shadows on them.",
-            share * 100.0
+            fraction * 100.0
         )
     })
 }
@@ -137,7 +139,7 @@ fn on_skew(offset: f64, sigma: f64) -> Option<String> {
             "The flanks of the edges are skewed: widths look {:.2} ± {sigma:.2} px too {way} by that, \
              which sigma contains only where a single frame shows it. Causes are a camera whose grey \
              is not proportional to light (switch its gamma off, or give gamma in [gauge]), the rounded \
-             shoulders of a bead, or the soft border of a shadow beside it.",
+             shoulders of a bead, or the soft boundary of a shadow beside it.",
             offset.abs()
         )
     })
@@ -168,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_for_which_the_accuracy_holds_need_no_advice() {
+    fn images_for_which_the_accuracy_holds_need_no_advice() {
         begins(&hints(80.0, 4.0, 1.5, 0.0, 1.0), &[]);
         begins(&hints(80.0, 4.0, 3.02, 0.0, 1.0), &[]);
         begins(&hints(80.0, 4.0, 0.85, 0.0, 1.0), &[]);
@@ -190,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn skewed_flanks_are_told_where_they_are_sure_and_matter() {
+    fn skewed_flanks_are_reported_where_they_are_significant_and_large() {
         let skewed = |offset: f64, sigma: f64| ImageQuality {
             skew_offset_px: Some(offset),
             skew_offset_sigma_px: Some(sigma),
@@ -228,5 +230,14 @@ mod tests {
     fn a_row_has_the_bound_of_the_documentation() {
         let bound = row_bound_px(&hints(80.0, 4.0, 1.5, 0.0, 1.0)).unwrap();
         assert!((bound - 1.883 * 4.0 / 80.0 * 1.5f64.sqrt()).abs() < 1e-4, "{bound}");
+    }
+
+    #[test]
+    fn thresholds_are_those_of_a_normal_deviate() {
+        let beyond = |sigmas: f64| libm::erfc(sigmas / std::f64::consts::SQRT_2);
+        // Half of the gauge, and of a normal deviate only the upper end.
+        let clipped = 0.5 * 0.5 * beyond(2.0);
+        assert!((CLIPPED_FRACTION / clipped - 1.0).abs() < 0.15, "{clipped}");
+        assert!((beyond(SKEW_SIGMAS) / 6e-5 - 1.0).abs() < 0.1);
     }
 }

@@ -1,4 +1,4 @@
-//! The part of the summary that only a run with a controller has.
+//! The summary of a run with a controller.
 
 use std::collections::BTreeMap;
 
@@ -6,23 +6,24 @@ use serde::Serialize;
 
 use super::follow::{Interval, StateFollower};
 use super::note::RunNote;
+use super::times::Times;
 use crate::control::event::Event;
 use crate::control::step::{State, Step};
-use crate::core::time::{Span, Stamp};
+use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::numeric::statistics::{Distribution, Moments};
 use crate::rows::frame_row::FrameRow;
 use crate::rows::names;
 use crate::width_control::limiter::SpeedLimit;
 
-/// Path length after the start of control from which the bead counts as
-/// settled.
+/// Path length after the start of control from which the bead counts as settled, by the contract
+/// of `summary.json` for `width_error_rms_settled_mm`.
 const SETTLED_AFTER: Mm = Mm::constant(500.0);
 
-/// What control came to.
+/// The figures of the controller.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ControlSummary {
-    /// Mean of |measured − wanted| over the bead laid after control began.
+    /// Mean of |measured − target| over the bead laid after control began.
     pub width_error_mean_mm: Option<f64>,
     /// Root mean square of the same.
     pub width_error_rms_mm: Option<f64>,
@@ -33,7 +34,7 @@ pub struct ControlSummary {
     pub width_error_worst: Option<LargestError>,
     /// Setpoints that were written to the robot.
     pub setpoints_sent: u64,
-    /// Time during which a limit shaped the speed.
+    /// Time during which a limit acted on the speed.
     pub limited_s: f64,
     /// The same for each limit.
     pub limited_by_s: BTreeMap<&'static str, f64>,
@@ -41,7 +42,7 @@ pub struct ControlSummary {
     pub held_s: f64,
     /// The same for each reason.
     pub held_for_s: BTreeMap<&'static str, f64>,
-    /// How often the controller gave up.
+    /// Number of faults.
     pub faults: u64,
     /// The same for each reason.
     pub fault_reasons: BTreeMap<String, u64>,
@@ -53,7 +54,7 @@ pub struct ControlSummary {
     pub latency_ms: Quantiles,
     /// Wait for the fixed-rate sender's turn.
     pub send_wait_ms: Quantiles,
-    /// Frames that were never looked at, because a newer one was there.
+    /// Frames that were not measured, because a newer one was there.
     pub frames_superseded: u64,
     /// Frames that the recorder could not keep up with.
     pub frames_dropped_by_recorder: u64,
@@ -68,7 +69,7 @@ pub struct ControlSummary {
 /// A width that is further off than all others.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LargestError {
-    /// Measured less wanted \[mm\].
+    /// Measured width less target \[mm\].
     pub error_mm: f64,
     /// Robot's path of the bead that it shows \[mm\].
     pub bead_path_mm: f64,
@@ -95,7 +96,7 @@ impl Quantiles {
     }
 }
 
-/// Adds up what control did.
+/// Adds up times, errors and counts of the controller.
 #[derive(Debug, Default)]
 pub struct ControlTally {
     follower: StateFollower,
@@ -200,13 +201,13 @@ impl ControlTally {
             width_error_rms_settled_mm: self.error_settled.rms(),
             width_error_worst: self.worst,
             setpoints_sent: self.setpoints,
-            limited_s: total(&self.limited_by),
-            limited_by_s: seconds(&self.limited_by),
-            held_s: total(&self.held_for),
-            held_for_s: seconds(&self.held_for),
+            limited_s: self.limited_by.total_s(),
+            limited_by_s: self.limited_by.seconds(),
+            held_s: self.held_for.total_s(),
+            held_for_s: self.held_for.seconds(),
             faults: self.fault_reasons.values().sum(),
             fault_reasons: self.fault_reasons.clone(),
-            states_s: seconds(&self.states),
+            states_s: self.states.seconds(),
             latency_ms: Quantiles::of(&self.latency),
             send_wait_ms: Quantiles::of(&self.send_wait),
             frames_superseded: self.superseded,
@@ -218,28 +219,12 @@ impl ControlTally {
     }
 
     fn add_time(&mut self, lapse: &Interval) {
-        add_time(&mut self.states, lapse.state.name(), lapse.span);
+        self.states.add(lapse.state.name(), lapse.span);
         if let State::Holding(why) = &lapse.state {
-            add_time(&mut self.held_for, names::hold(why), lapse.span);
+            self.held_for.add(names::of(why), lapse.span);
         }
         if lapse.limit != SpeedLimit::None {
-            add_time(&mut self.limited_by, names::limit(lapse.limit), lapse.span);
+            self.limited_by.add(names::of(lapse.limit), lapse.span);
         }
     }
-}
-
-/// Time for each reason, summed without rounding.
-type Times = BTreeMap<&'static str, Span>;
-
-fn add_time(times: &mut Times, reason: &'static str, span: Span) {
-    let sum = times.entry(reason).or_default();
-    *sum = *sum + span;
-}
-
-fn seconds(times: &Times) -> BTreeMap<&'static str, f64> {
-    times.iter().map(|(reason, span)| (*reason, span.secs())).collect()
-}
-
-fn total(times: &Times) -> f64 {
-    times.values().fold(Span::ZERO, |sum, span| sum + *span).secs()
 }

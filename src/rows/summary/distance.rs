@@ -1,4 +1,4 @@
-//! What the law by distance made of the widths.
+//! The summary of the distance controller.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use crate::control::step::Step;
 use crate::width_control::distance::WidthUse;
 use crate::width_control::{DistanceTrace, FallbackReason};
 
-/// Widths by what became of them, and what was believed at last.
+/// Widths by their use, and the last estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DistanceSummary {
     /// Widths that were taken.
@@ -15,7 +15,7 @@ pub struct DistanceSummary {
     pub outliers: u64,
     /// Changes of the flow that were found.
     pub changes: u64,
-    /// Widths of bead whose speed was not known.
+    /// Widths of bead without a known speed.
     pub without_speed_history: u64,
     /// Width at the start speed \[mm\].
     pub level_mm: f64,
@@ -23,19 +23,18 @@ pub struct DistanceSummary {
     pub level_sigma_mm: f64,
     /// Exponent b.
     pub exponent: f64,
-    /// Where the camera seems to look \[mm\].
+    /// Estimated distance of the camera behind the nozzle \[mm\].
     pub offset_mm: f64,
     /// Period of a pulsation, where one was seen \[s\].
     pub pulsation_s: Option<f64>,
-    /// Why the PI law took over, if it did.
+    /// Why the PI controller took over, if it did.
     pub fallback_reason: Option<FallbackReason>,
 }
 
 impl DistanceSummary {
     /// In a sentence or two.
     pub fn words(&self) -> String {
-        let Self { samples_used: taken, outliers, changes, level_mm, exponent, offset_mm, .. } =
-            self;
+        let Self { samples_used, outliers, changes, level_mm, exponent, offset_mm, .. } = self;
         let pulsation = self.pulsation_s.map_or(String::new(), |period| {
             format!(" The flow pulsates with a period of {period:.2} s.")
         });
@@ -46,18 +45,18 @@ impl DistanceSummary {
                  offset_mm right?"
             }
             FallbackReason::ModelContradicted => {
-                " The PI controller took over: the width did not answer the speed as the model says."
+                " The PI controller took over: the width did not respond to the speed as the model predicts."
             }
         });
         format!(
-            "Widths taken {taken}, outliers {outliers}, changes of the flow {changes}. At last the \
-             bead was believed to be {level_mm:.2} mm wide at the start speed, with b = \
-             {exponent:.3}, seen {offset_mm:.1} mm behind the nozzle.{pulsation}{fallback}"
+            "Widths used {samples_used}, outliers {outliers}, changes of the flow {changes}. Last estimates: \
+             {level_mm:.2} mm wide at the start speed, b = \
+             {exponent:.3}, camera {offset_mm:.1} mm behind the nozzle.{pulsation}{fallback}"
         )
     }
 }
 
-/// Adds up what became of widths.
+/// Counts the uses of widths.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct DistanceTally {
     counts: [u64; 4],
@@ -80,7 +79,7 @@ impl DistanceTally {
         self.last = Some(trace);
     }
 
-    /// The sum; none where the law was not asked for.
+    /// The sum; none without a distance controller.
     pub fn finish(&self) -> Option<DistanceSummary> {
         let last = self.last?;
         let [taken, outliers, changes, not_paired] = self.counts;

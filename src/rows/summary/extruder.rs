@@ -1,11 +1,11 @@
-//! The part of the summary that only a run whose extruder is commanded has.
+//! The summary of a run whose extruder is commanded.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use super::profile::{ProfileSummary, ProfileTally};
-
+use super::times::Times;
 use crate::control::event::Event;
 use crate::control::step::{State, Step};
 use crate::core::time::{Span, Stamp};
@@ -14,7 +14,7 @@ use crate::extruder::{CommandLimit, ExtruderFault, ExtruderState};
 use crate::numeric::statistics::Moments;
 use crate::rows::names;
 
-/// What the extruder side came to.
+/// The figures of the extruder side.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ExtruderSummary {
     /// Commands that were given.
@@ -27,8 +27,8 @@ pub struct ExtruderSummary {
     pub limited_by_s: BTreeMap<&'static str, f64>,
     /// Why the extruder was stopped, and how often.
     pub fault_reasons: BTreeMap<String, u64>,
-    /// Root mean square of flow less wanted flow while bead was laid, where a
-    /// simulation knows the flow or a sensor tells it.
+    /// Root mean square of flow less wanted flow while bead was laid, where a simulation or a
+    /// sensor gives the flow.
     pub flow_error_rms_mm3_per_s: Option<f64>,
     /// Mean of flow less wanted flow.
     pub flow_error_mean_mm3_per_s: Option<f64>,
@@ -76,14 +76,14 @@ impl FlowTally {
     }
 }
 
-/// Adds up what the extruder side did.
+/// Adds up times, flows and counts of the extruder side.
 #[derive(Debug, Default)]
 pub struct ExtruderTally {
     commands: u64,
     last: Option<(Stamp, ExtruderState, CommandLimit)>,
-    states: BTreeMap<&'static str, Span>,
-    held_for: BTreeMap<&'static str, Span>,
-    limited_by: BTreeMap<&'static str, Span>,
+    states: Times,
+    held_for: Times,
+    limited_by: Times,
     fault_reasons: BTreeMap<String, u64>,
     all: FlowTally,
     controlled: FlowTally,
@@ -134,15 +134,12 @@ impl ExtruderTally {
     /// None where no extruder was commanded.
     pub fn finish(&self) -> Option<ExtruderSummary> {
         self.last?;
-        let seconds = |times: &BTreeMap<&'static str, Span>| {
-            times.iter().map(|(name, span)| (*name, span.secs())).collect()
-        };
         let all = self.all.finish();
         Some(ExtruderSummary {
             commands: self.commands,
-            states_s: seconds(&self.states),
-            held_for_s: seconds(&self.held_for),
-            limited_by_s: seconds(&self.limited_by),
+            states_s: self.states.seconds(),
+            held_for_s: self.held_for.seconds(),
+            limited_by_s: self.limited_by.seconds(),
             fault_reasons: self.fault_reasons.clone(),
             flow_error_rms_mm3_per_s: all.error_rms_mm3_per_s,
             flow_error_mean_mm3_per_s: all.error_mean_mm3_per_s,
@@ -153,19 +150,15 @@ impl ExtruderTally {
     }
 
     fn add_time(&mut self, span: Span, state: ExtruderState, limit: CommandLimit) {
-        let add = |times: &mut BTreeMap<&'static str, Span>, name| {
-            let sum = times.entry(name).or_default();
-            *sum = *sum + span;
-        };
-        add(&mut self.states, state.name());
+        self.states.add(state.name(), span);
         if let Some(profile) = &mut self.profile {
             profile.add_time(span, state);
         }
         if let ExtruderState::Holding(why) = state {
-            add(&mut self.held_for, names::extruder_hold(why));
+            self.held_for.add(names::of(why), span);
         }
         if limit != CommandLimit::None {
-            add(&mut self.limited_by, names::command_limit(limit));
+            self.limited_by.add(names::of(limit), span);
         }
     }
 

@@ -7,7 +7,7 @@ use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
 use crate::width_control::limiter::SpeedLimit;
 
-/// Where a run stands after the steps that it has seen.
+/// The state of a run after the steps so far.
 #[derive(Debug, Default)]
 pub struct StateFollower {
     now: Option<Stamp>,
@@ -29,9 +29,8 @@ pub struct Interval {
 }
 
 impl StateFollower {
-    /// Takes the next step and tells of the time before it; nothing is before
-    /// the first. A limit acts from the step that names it to the next
-    /// setpoint without it.
+    /// Takes the next step and returns the interval before it; there is none before the first. A
+    /// limit acts from the step that names it to the next setpoint without it.
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) -> Option<Interval> {
         let lapse = self.now.map(|then| Interval {
             span: (now - then).max(Span::ZERO),

@@ -1,9 +1,8 @@
-//! How good the images of a run were.
+//! Quality of a run's images.
 
 use serde::Serialize;
 
-/// Medians over the measured frames, within 0.14 %, for whoever sets up light
-/// and lens.
+/// Medians over the measured frames, within 0.14 %, for setting up light and lens.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ImageQuality {
     /// Step from ground to bead \[grey levels of 256\].
@@ -12,12 +11,12 @@ pub struct ImageQuality {
     pub blur_median_px: Option<f64>,
     /// Noise of a pixel \[grey levels of 256\].
     pub noise_median_grey: Option<f64>,
-    /// Mean share of saturated pixels.
+    /// Mean fraction of saturated pixels.
     pub saturated_fraction_mean: Option<f64>,
-    /// Mean share of caliper lines in use.
+    /// Mean fraction of caliper lines in use.
     pub used_fraction_mean: Option<f64>,
     /// How far the skew of the edges' flanks moves widths: measured less true width in the
-    /// picture, the mean weighed by what each frame tells \[px\].
+    /// image, the mean weighted by the inverse variances of the frames \[px\].
     pub skew_offset_px: Option<f64>,
     /// Its standard deviation \[px\].
     pub skew_offset_sigma_px: Option<f64>,

@@ -1,11 +1,11 @@
-//! What a run's log is told besides its frames and steps.
+//! Facts for a run's log besides its frames and steps.
 
-/// A fact that neither a frame nor a step tells.
+/// A fact besides frames and steps.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RunNote {
     /// A setpoint was written to the robot.
     SetpointSent,
-    /// Frames that were never looked at, because a newer one was there.
+    /// Frames that were not measured, because a newer one was there.
     FramesSuperseded(u64),
     /// Frames that the recorder could not keep up with.
     FramesDroppedByRecorder(u64),

@@ -6,12 +6,12 @@ use serde::Serialize;
 use crate::core::time::Span;
 use crate::extruder::ExtruderState;
 
-/// How a profile and the beads on which it was played went together.
+/// How far a profile was played on its beads.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ProfileSummary {
     /// How long the profile is.
     pub duration_s: f64,
-    /// Share of it that was played, on the bead with the least of it.
+    /// Fraction of it that was played, on the bead with the smallest one.
     pub played_fraction: f64,
     /// Time for which bead was laid after its end.
     pub after_end_s: f64,
@@ -60,13 +60,10 @@ impl ProfileTally {
     /// None where no bead was laid.
     pub fn finish(mut self) -> Option<ProfileSummary> {
         self.end_bead();
-        let lasts_s = self.duration.secs();
-        let played_share = (self.min_played?.secs() / lasts_s).min(1.0);
-        Some(ProfileSummary {
-            duration_s: lasts_s,
-            played_fraction: played_share,
-            after_end_s: self.after_end.secs(),
-        })
+        let duration_s = self.duration.secs();
+        let played_fraction = (self.min_played?.secs() / duration_s).min(1.0);
+        let after_end_s = self.after_end.secs();
+        Some(ProfileSummary { duration_s, played_fraction, after_end_s })
     }
 }
 
@@ -76,7 +73,7 @@ mod tests {
     use crate::extruder::ExtruderHold;
 
     #[test]
-    fn a_profile_that_a_bead_cuts_off_and_one_that_a_bead_outlasts_are_told() {
+    fn a_profile_may_end_after_its_bead_and_before_it() {
         let mut tally = ProfileTally::new(Span::from_secs(10.0));
         assert_eq!(tally.finish(), None);
         let held = ExtruderState::Holding(ExtruderHold::NoReading);

@@ -11,7 +11,7 @@ use crate::report::chart::area::{Area, XAxis};
 use crate::report::chart::legend::legend;
 use crate::report::chart::palette;
 use crate::report::chart::plot::{Plot, PlotLayer as Drawn, y_range};
-use crate::report::chart::series::Curve;
+use crate::report::chart::series::PlotCurve as Curve;
 use crate::studies::error::ReproduceError;
 
 use crate::studies::looey2026 as experiments;

@@ -11,7 +11,7 @@ use crate::extruder::rheology::PowerLaw;
 use crate::io::progress::Progress;
 use crate::report::chart::palette;
 use crate::report::chart::palette::Ink;
-use crate::report::chart::range::Range;
+use crate::report::chart::range::ValueRange as Range;
 use crate::studies::error::ReproduceError;
 use crate::studies::publication::Publication;
 use crate::studies::row::TableRows;

@@ -18,7 +18,7 @@ Examples:
   truebead camera convert camera_info.yaml --plane bed.png --board 9x6 --square-mm 20 --out calib.toml
 
 Whose YAML it is, is recognised by its keys. ROS and OpenCV hold the camera and its
-lens, but no bed plane and nothing of how well a width is known: the way there
+lens, but neither the bed plane nor the uncertainty of a width: the way there
 and back loses both. A calibration for truebead therefore needs images of a
 board that lies flat on the bed.")]
 pub struct ConvertArgs {

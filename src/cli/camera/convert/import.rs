@@ -1,4 +1,4 @@
-//! A camera of others becomes a calibration: the bed plane comes from pictures.
+//! From a camera of ROS or OpenCV to a calibration: the bed plane comes from images.
 
 use anyhow::Context;
 
@@ -7,16 +7,16 @@ use crate::calibration::board::{Board, Markers};
 use crate::calibration::equations::CameraModel;
 use crate::calibration::exchange::{Import, Intrinsics};
 use crate::calibration::{CalibrationQuality, file};
-use crate::cli::arguments::WrongArguments;
 use crate::cli::bed_plane::{BedPlane, BoardsOnBed, find_corners};
 use crate::cli::board_arguments::{InnerCorners, board_of};
 use crate::cli::print::print;
 use crate::core::units::Mm;
 
-/// Corners on the bed may be so far off \[px\]; beyond that the pictures do not belong
-/// to this camera, or the boards lay on no plane.
+/// Largest reprojection error (RMS) of corners on the bed \[px\]; beyond it the images are not of
+/// this camera, or the boards lay on no plane.
 const MAX_RMS_PX: f64 = 0.5;
-/// A sharp picture of a flat board and a sound lens leave less \[px\].
+/// Reprojection error (RMS) from which a note is printed \[px\]; a sharp image of a flat board
+/// with a valid lens model has less.
 const SUSPECT_RMS_PX: f64 = 0.3;
 
 /// The text of a calibration: the camera of others, and a bed plane from images.
@@ -26,7 +26,7 @@ pub fn text(
     notes: &mut Vec<String>,
 ) -> anyhow::Result<String> {
     let (Some(corners), Some(square)) = (args.board, args.square_mm) else {
-        return Err(WrongArguments::new("--plane needs --board and --square-mm").into());
+        refuse!("--plane needs --board and --square-mm");
     };
     let marks = args.marker_mm.map(|side| Markers { side, dictionary: args.dictionary });
     let board = board_of(corners, square, marks)?;
@@ -36,7 +36,7 @@ pub fn text(
     if let Some(px) = camera.non_monotonic_at(*image_size_px) {
         notes.push(format!(
             "the lens model is non-monotonic before pixel ({:.0}, {:.0}), and nothing can be measured there; \
-             calibrate with pictures of a board in the corners of the image",
+             calibrate with images of a board in the corners of the image",
             px.x, px.y
         ));
     }
@@ -56,9 +56,9 @@ pub fn text(
         ));
     }
     notes.push(format!(
-        "how well a width is known does not stand in {}, and sigma_mm will not contain it: \
+        "the uncertainty of a width is not in {}, and sigma_mm will not contain it: \
          `truebead camera verify` with a further image shows what is wrong, `truebead calibrate` \
-         with images of a board tells it",
+         with images of a board determines it",
         args.input.display()
     ));
     let InnerCorners { columns, rows } = corners;
@@ -66,7 +66,7 @@ pub fn text(
         "Camera and lens from {} ({}).\n\
          Bed plane: {} below the face of a board with {columns}x{rows} inner corners and squares \
          of {square} in {}.\n\
-         How well a width is known is not known; the error is that of the bed plane's images.",
+         The uncertainty of a width is unknown; the error is that of the bed plane's images.",
         args.input.display(),
         import.format.name(),
         plane.thickness,
@@ -86,7 +86,7 @@ fn bed_plane(args: &ConvertArgs, board: &Board, known: &Intrinsics) -> anyhow::R
         boards.add(image, corners)?;
     }
     let model = CameraModel { camera: known.camera, bend_mm: [0.0; 2] };
-    let other = format!("{MAX_RMS_PX} px is the most that is taken");
+    let other = format!("{MAX_RMS_PX} px is the limit");
     let (images, on_bed) = boards.fit(&model, MAX_RMS_PX, &other)?;
     Ok(BedPlane {
         images,

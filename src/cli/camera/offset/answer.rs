@@ -1,8 +1,8 @@
-//! What was found beside what the cell has.
+//! The result beside the cell's present value.
 
 use crate::core::units::Mm;
 
-/// What the cell has now beside what was found, and the line for its file.
+/// Prints the cell's present value beside the result, and the lines for its file.
 pub fn tell(offset_mm: f64, sigma_mm: f64, now: Option<Mm>) {
     if let Some(now) = now.map(Mm::get) {
         let off = offset_mm - now;

@@ -21,13 +21,13 @@ bead was laid; one run with some steps of the target width or of the speed is
 enough.
 
 From an image: lay a board on the bed so that the camera sees it and it reaches
-under the nozzle. Let the nozzle touch it, tell where in squares from the first
+under the nozzle. Let the nozzle touch it, give its position in squares from the first
 inner corner (-1,-1 is the outer corner of the outermost square), and take the
 image in that pose.
 
 Exit status: 0 found, 1 not to be determined from this input, 2 wrong arguments.")]
 pub struct OffsetArgs {
-    /// A recording of this program, also one that was cut short (.mcap.partial), or a
+    /// A recording of this program, also one that was cut short (.mcap.partial), or an
     /// image of a board
     #[arg(value_name = "RECORDING.mcap|IMAGE")]
     pub input: PathBuf,
@@ -45,7 +45,7 @@ pub struct OffsetArgs {
     /// corner along a row and along a column; beyond it is negative
     #[arg(long, value_name = "X,Y", value_parser = parse_position, allow_hyphen_values = true)]
     pub nozzle_at: Option<[f64; 2]>,
-    /// Image: standard deviation of that place [mm]
+    /// Image: standard deviation of that position [mm]
     /// [default: 0.5]
     #[arg(long, value_name = "MM", value_parser = parse_length)]
     pub touch_sigma_mm: Option<Mm>,
@@ -101,8 +101,8 @@ fn parse_position(text: &str) -> Result<[f64; 2], String> {
 }
 
 impl OffsetArgs {
-    /// Options for a picture alone, and whether they were given.
-    pub fn of_picture(&self) -> [(&'static str, bool); 6] {
+    /// Options for an image alone, and whether they were given.
+    pub fn of_image(&self) -> [(&'static str, bool); 6] {
         [
             ("--board", self.board.board.is_some()),
             ("--square-mm or --marker-mm", self.board.is_part),
@@ -117,10 +117,9 @@ impl OffsetArgs {
     pub fn refuse(&self, kind: &str, options: &[(&str, bool)]) -> Result<(), WrongArguments> {
         match options.iter().find(|(_, given)| *given) {
             None => Ok(()),
-            Some((name, _)) => Err(WrongArguments::new(format!(
-                "{name} means nothing for {kind}, and {} is one",
-                self.input.display()
-            ))),
+            Some((name, _)) => {
+                Err(wrong!("{name} means nothing for {kind}, and {} is one", self.input.display()))
+            }
         }
     }
 }

@@ -1,4 +1,4 @@
-//! From a picture of a board that the nozzle touches.
+//! The offset from an image of a board that the nozzle touches.
 
 use anyhow::{Context, bail};
 use nalgebra::Vector2;
@@ -17,38 +17,37 @@ use crate::core::units::Mm;
 use crate::sim::view::gauge_middle;
 use crate::vision::BeadAxis;
 
-/// Standard deviation of a place that somebody told by eye.
+/// Default standard deviation of the touched position, which is read by eye.
 const TOUCH_SIGMA: Mm = Mm::constant(0.5);
-/// Way across the path that is more than somebody's eye \[mm\].
+/// Sideways distance that is more than an error of reading by eye \[mm\].
 const SIDEWAYS_MM: f64 = 3.0;
-/// Share by which a board may measure larger or smaller than it was said to be.
+/// Scale error of a board from which a warning is printed.
 const MAX_SCALE_ERROR: f64 = 0.005;
-/// The same beyond which nothing is told.
+/// Scale error of a board beyond which no offset is given.
 const REFUSED_SCALE_ERROR: f64 = 0.03;
-/// Corners further off a true board than this are of another plane \[mm\].
+/// Deviation of corners from a true board (RMS) beyond which they are not on the bed \[mm\].
 const NOT_FLAT_MM: f64 = 2.0;
-/// Squares beyond the outermost ones that a nozzle may be told to be.
+/// Distance beyond the outermost squares at which the nozzle may touch \[squares\].
 const SQUARES_BEYOND: f64 = 2.0;
-/// Corners further off a true board than this were not measured on its plane \[mm\].
+/// Deviation of corners from a true board (RMS) from which a warning is printed \[mm\].
 const FLAT_MM: f64 = 0.5;
 
 /// Runs the command for an image.
 pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
-    let needed = [
-        ("--cell CELL.toml", args.cell.is_some()),
-        ("--board COLUMNSxROWS with --square-mm", args.board.board.is_some()),
-        ("--nozzle-at X,Y", args.nozzle_at.is_some()),
-    ];
-    let missing: Vec<&str> =
-        needed.iter().filter(|(_, given)| !given).map(|(name, _)| *name).collect();
     let (Some(cell), Some(board), Some(at)) = (&args.cell, &args.board.board, args.nozzle_at)
     else {
-        let what = format!(
+        let needed = [
+            ("--cell CELL.toml", args.cell.is_some()),
+            ("--board COLUMNSxROWS with --square-mm", args.board.board.is_some()),
+            ("--nozzle-at X,Y", args.nozzle_at.is_some()),
+        ];
+        let missing: Vec<&str> =
+            needed.iter().filter(|(_, given)| !given).map(|(name, _)| *name).collect();
+        refuse!(
             "{}: an image (no recording) needs {} besides",
             args.input.display(),
             missing.join(", ")
         );
-        return Err(WrongArguments::new(what).into());
     };
     let board = board.board()?;
     let GridSize { columns, rows } = board.corners();
@@ -56,27 +55,24 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
         #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
         let (from, to) = (-1.0 - SQUARES_BEYOND, count as f64 + SQUARES_BEYOND);
         if !(from..=to).contains(&at) {
-            let what = format!("--nozzle-at: found {at}, expected {from} to {to} on this board");
-            return Err(WrongArguments::new(what).into());
+            refuse!("--nozzle-at: found {at}, expected {from} to {to} on this board");
         }
     }
     let touch = touch(args, at)?;
     let loaded = LoadedCell::read(cell, Purpose::Measure)?;
     let Some(expected) = loaded.calibration.image_size_px() else {
-        let what = format!("{}: {}", cell.display(), NozzleOffsetError::NoCamera);
-        return Err(WrongArguments::new(what).into());
+        refuse!("{}: {}", cell.display(), NozzleOffsetError::NoCamera);
     };
     let name = args.input.display().to_string();
-    let sighting = find_board(&board, &name, &args.input).with_context(|| name.clone())?;
-    check_size(&sighting, expected)?;
+    let seen = find_board(&board, &name, &args.input).with_context(|| name.clone())?;
+    check_size(&seen, expected)?;
     if touch.robot_z.is_some() && loaded.cell.mount == Some(Mount::Fixed) {
-        let what = format!(
+        refuse!(
             "--robot-z-mm: the camera of {} is fixed, and does not rise with the robot; leave it out",
             cell.display()
         );
-        return Err(WrongArguments::new(what).into());
     }
-    let found = find(&loaded.calibration, &gauge(&loaded), &board, &sighting.corners, &touch)
+    let found = find(&loaded.calibration, &gauge(&loaded), &board, &seen.corners, &touch)
         .map_err(anyhow::Error::from)
         .with_context(|| name.clone())?;
     if found.scale_error.abs() > REFUSED_SCALE_ERROR || found.rms_mm > NOT_FLAT_MM {
@@ -98,8 +94,7 @@ fn touch(args: &OffsetArgs, at: [f64; 2]) -> Result<Touch, WrongArguments> {
     let thickness = args.board_thickness_mm.unwrap_or(Mm::ZERO);
     for (name, value) in [("--touch-sigma-mm", sigma), ("--board-thickness-mm", thickness)] {
         if value < Mm::ZERO {
-            let what = format!("{name}: found {value}, expected 0 mm or more");
-            return Err(WrongArguments::new(what));
+            refuse!("{name}: found {value}, expected 0 mm or more");
         }
     }
     Ok(Touch { position: at, sigma, thickness, robot_z: args.robot_z_mm })
@@ -134,9 +129,9 @@ fn answer(found: &NozzleOffset, touch: Touch, now: Option<Mm>) {
     say!("sideways   {:.2} mm to the {side} of the gauge's axis", found.across_mm.abs());
     if found.across_mm.abs() > SIDEWAYS_MM + 3.0 * sigma {
         say!(
-            "           WARNING: on a straight path the bead would pass the gauge's middle so far"
+            "           WARNING: on a straight path the bead would pass the gauge's middle so far\n           \
+             off; see --nozzle-at, or whether the camera is turned against the path"
         );
-        say!("           off; see --nozzle-at, or whether the camera is turned against the path");
     }
     let calibration = parts.calibration.map_or_else(
         || "calibration not known".to_owned(),
@@ -151,19 +146,17 @@ fn answer(found: &NozzleOffset, touch: Touch, now: Option<Mm>) {
     let ([x, y], first) = (touch.position, found.first_corner);
     say!(
         "board      the nozzle is {x},{y} squares from the corner at {:.1}, {:.1} px, taken for the \
-         first",
+         first\n           corners lie {:.3} mm off a true board (RMS)",
         first.x,
-        first.y
+        first.y,
+        found.rms_mm
     );
-    say!("           corners lie {:.3} mm off a true board (RMS)", found.rms_mm);
     if found.scale_error.abs() > MAX_SCALE_ERROR || found.rms_mm > FLAT_MM {
         say!(
             "           WARNING: it measures {:+.2} % of its size; see --square-mm, \
-             --board-thickness-mm",
+             --board-thickness-mm\n           \
+             and --robot-z-mm, or whether the calibration holds (truebead camera verify)",
             100.0 * found.scale_error
-        );
-        say!(
-            "           and --robot-z-mm, or whether the calibration holds (truebead camera verify)"
         );
     }
     tell(found.along_mm, sigma, now);

@@ -1,4 +1,4 @@
-//! From a bead that was recorded.
+//! The offset from the recording of a bead.
 
 use anyhow::Context;
 
@@ -6,35 +6,31 @@ use super::answer::tell;
 use super::arguments::OffsetArgs;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
-use crate::cli::arguments::WrongArguments;
 use crate::cli::camera_offset::{gauge, max_offset};
-use crate::cli::recorded::attached_cell;
+use crate::cli::recorded::{attached_cell, open, warn_of_damage};
 use crate::core::units::Mm;
-use crate::identify::camera_offset::SpeedRange;
-use crate::identify::camera_offset::{EXPONENT_RANGE, OffsetEstimate, OffsetSearch, find};
-use crate::io::recording::Recording;
+use crate::identify::camera_offset::{
+    EXPONENT_RANGE, OffsetEstimate, OffsetSearch, SpeedRange, find,
+};
 use crate::report::offset::{RecordedBead, recorded_bead};
 
 /// Runs the command for a recording.
 pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     let max_offset = max_offset(args.max_mm)?;
-    let mut recording = Recording::open(&args.input).map_err(WrongArguments::new)?;
-    let cell = match &args.cell {
-        Some(path) => Some(LoadedCell::read(path, Purpose::Measure)?),
-        None => None,
-    };
-    let (cell, calibration) = match cell {
-        Some(loaded) => (loaded.cell, loaded.calibration),
+    let mut recording = open(&args.input)?;
+    let (cell, calibration) = match &args.cell {
+        Some(path) => {
+            let loaded = LoadedCell::read(path, Purpose::Measure)?;
+            (loaded.cell, loaded.calibration)
+        }
         None => attached_cell(&recording, Purpose::Measure)?,
     };
     let name = args.input.display().to_string();
     let recorded = recorded_bead(&mut recording).context("the recording cannot be read on")?;
-    if let Some(what) = recording.integrity().summary() {
-        tell!("warning: {name}: {what}");
-    }
+    warn_of_damage(&recording);
     let gauge = gauge(&cell, &calibration, &recorded.states)?;
     let found = find(&recorded.states, &recorded.widths, OffsetSearch { gauge, max_offset })
-        .with_context(|| format!("{name} does not tell the offset"))?;
+        .with_context(|| format!("{name} does not determine the offset"))?;
     let now = cell.run.as_ref().map(|run| run.camera.offset);
     answer(&found, &recorded, gauge, now);
     Ok(())

@@ -20,11 +20,11 @@ use crate::numeric::hampel::Hampel;
 use crate::numeric::savgol::SavGol;
 use crate::report::identify::Logs;
 
-/// Dead times are looked for up to this share of the record…
+/// Default upper bound of the dead time, as a fraction of the record…
 const DEAD_TIME_FRACTION: f64 = 0.125;
-/// …and up to this \[s\], unless a range is told.
+/// …and in seconds; the smaller one holds.
 const DEAD_TIME_S: f64 = 10.0;
-/// Share of the data that is kept to validate with.
+/// Default fraction of the data that is kept for validation.
 const VALIDATE_FRACTION: f64 = 0.3;
 
 /// Finds a model of an extruder in logged data, for a cell to use.
@@ -74,7 +74,7 @@ pub struct IdentifyArgs {
     )]
     pub dead_time_s: DeadTimeArg,
     /// Data to validate with, of the same columns
-    #[arg(long, value_name = "OTHER", conflicts_with = "validate_share")]
+    #[arg(long, value_name = "OTHER", conflicts_with = "validate_fraction")]
     pub validate: Option<PathBuf>,
     /// Last part of the data, kept to validate with [default: 0.3]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
@@ -108,13 +108,10 @@ pub struct IdentifyArgs {
 }
 
 fn validates_with_itself(other: &Path) -> anyhow::Error {
-    let what = format!(
-        "--validate {}: these are the data that the model is fitted to, and a model predicts those \
+    wrong!("--validate {}: these are the data that the model is fitted to, and a model predicts those \
          whatever it is worth; name another log, or leave --validate out: the last part of the data \
          is kept for it then",
-        other.display()
-    );
-    WrongArguments::new(what).into()
+        other.display()).into()
 }
 
 impl IdentifyArgs {
@@ -123,31 +120,31 @@ impl IdentifyArgs {
         self.bead.makes_flow().then_some(LAID_FLOW)
     }
 
-    /// The data, and what is odd about their units.
+    /// The data, with warnings about their units.
     pub fn logs(&self) -> Result<(Logs, Vec<String>)> {
         let output = self.output.as_deref().or(self.derived_output());
         let (Some(path), Some(input), Some(output)) = (&self.data, &self.input, output) else {
-            let what = "needs both --input and --output (or --area or --width with --speed); \
-                        `truebead extruder columns` lists the columns";
-            return Err(WrongArguments::new(what).into());
+            refuse!(
+                "needs both --input and --output (or --area or --width with --speed); \
+                        `truebead extruder columns` lists the columns"
+            );
         };
         refuse_same(input, output)?;
-        let filters = data::Filters { hampel: self.hampel, smooth: self.smooth };
         let request = data::Request {
             input,
             output: self.output.as_deref(),
             columns: &self.columns,
             max_gap_s: self.max_gap_s,
             bead: &self.bead,
-            filters,
+            hampel: self.hampel,
+            smooth: self.smooth,
         };
         let read = |path| data::read(path, &request);
         let (log, mut warnings) = read(path)?;
         let source = path.display().to_string();
-        let share = self.validate_fraction.unwrap_or(VALIDATE_FRACTION);
-        if !(0.0..=0.9).contains(&share) {
-            let what = format!("--validate-fraction {share}: expected 0 to 0.9");
-            return Err(WrongArguments::new(what).into());
+        let fraction = self.validate_fraction.unwrap_or(VALIDATE_FRACTION);
+        if !(0.0..=0.9).contains(&fraction) {
+            refuse!("--validate-fraction {fraction}: expected 0 to 0.9");
         }
         let (estimation, validation) = match &self.validate {
             Some(other) => {
@@ -162,8 +159,8 @@ impl IdentifyArgs {
                 );
                 (log, Some((rest, other.display().to_string())))
             }
-            None if share > 0.0 => {
-                let (first, rest) = log.split(share).with_context(|| source.clone())?;
+            None if fraction > 0.0 => {
+                let (first, rest) = log.split(fraction).with_context(|| source.clone())?;
                 (first, Some((rest, source.clone())))
             }
             None => (log, None),

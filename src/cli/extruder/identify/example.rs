@@ -1,16 +1,15 @@
-//! A log to try it with.
+//! Example logs of a simulated extruder.
 
 use std::path::Path;
 
 use anyhow::{Context, Result};
 
-use crate::cli::arguments::WrongArguments;
 use crate::rows::output::{make_folder, write_whole};
 use crate::sim::flow_log;
 use crate::sim::melt::MeltParameters;
 use crate::sim::melt_log::{example as plan, record, to_csv};
 
-/// What its logs are called.
+/// Names of the logs.
 const LOGS: [&str; 3] = ["log.csv", "other.csv", "starts.csv"];
 
 /// Seed of the starts and stops.
@@ -19,11 +18,10 @@ const STARTS_SEED: u64 = 1;
 /// Writes the logs of a simulated extruder.
 pub fn write(folder: &Path) -> Result<()> {
     if let Some(taken) = LOGS.map(|name| folder.join(name)).iter().find(|path| path.exists()) {
-        let what = format!(
+        refuse!(
             "{} is there already and would be lost; name another folder with --example",
             taken.display()
         );
-        return Err(WrongArguments::new(what).into());
     }
     make_folder(folder)?;
     let log = flow_log::binary().context("the example")?;

@@ -1,5 +1,6 @@
 //! How forms, dead times and filters are written.
 
+use crate::cli::arguments::parse_within;
 use crate::identify::fit::{DeadTime, MAX_POLES, Structure};
 use crate::numeric::hampel::Hampel;
 use crate::numeric::savgol::SavGol;
@@ -8,8 +9,7 @@ use crate::numeric::savgol::SavGol;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Forms(pub Vec<Structure>);
 
-/// A dead time that is told, or where it is looked for; none for the usual
-/// range.
+/// A known dead time, or the range in which it is estimated; none for the default range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeadTimeArg(pub Option<DeadTime>);
 
@@ -70,8 +70,7 @@ pub fn parse_dead_time(text: &str) -> Result<DeadTimeArg, String> {
 
 /// A gap that is bridged.
 pub fn parse_gap(text: &str) -> Result<f64, String> {
-    let gap = text.trim().parse::<f64>().ok().filter(|s| (0.0..=1e4).contains(s));
-    gap.ok_or_else(|| "expected 0 to 10000 s".to_owned())
+    parse_within(text, 0.0..=1e4, "expected 0 to 10000 s")
 }
 
 /// K,T.

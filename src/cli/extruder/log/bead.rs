@@ -1,5 +1,5 @@
-//! Options for an output that was measured on the bead, some way behind the
-//! nozzle: when it was extruded, and the flow that laid it.
+//! Options for an output that was measured on the bead behind the nozzle: the time of its
+//! extrusion, and its flow.
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
@@ -55,20 +55,19 @@ impl BeadArgs {
             ("--speed", &self.speed),
         ];
         match given.iter().find(|(_, column)| column.is_some()) {
-            Some((option, _)) => Err(WrongArguments::new(format!(
+            Some((option, _)) => Err(wrong!(
                 "{option} is for tables: a recording has the flow of its bead already, brought to \
                  when it was laid, as --output {LAID_FLOW}"
-            ))),
+            )),
             None => Ok(()),
         }
     }
 
-    /// The output of a table, where it is not made of others the column of this name, one value a row from its beginning; fewer where
-    /// the bead has not come to its measurement when the table ends.
+    /// The output of a table: the column of this name, where it is not made of others. One value for
+    /// each row from the first on; the last rows have none where their bead is not measured yet.
     pub fn output(&self, rows: &TableColumns<'_>, output: Option<&str>) -> Result<Vec<f64>> {
         if self.position.is_none() && self.layer.measured_at_offset_mm.is_some_and(|mm| mm > 0.0) {
-            let what = "--measured-at-offset-mm needs --position, the way along the bead";
-            return Err(WrongArguments::new(what).into());
+            refuse!("--measured-at-offset-mm needs --position, the way along the bead");
         }
         let measured = match (&self.area, &self.width) {
             (Some(area), _) => rows.in_unit(area, Unit::Mm2)?,
@@ -95,9 +94,9 @@ impl BeadArgs {
         measured: &[f64],
         position: &str,
     ) -> Result<Vec<f64>> {
-        let way = rows.in_unit(position, Unit::Mm)?;
+        let path = rows.in_unit(position, Unit::Mm)?;
         let offset = self.layer.offset()?.unwrap_or(0.0);
-        let found = to_extruded(&way, measured, offset).map_err(|error| match error {
+        let found = to_extruded(&path, measured, offset).map_err(|error| match error {
             AlignError::Falls { at, .. } | AlignError::NotFinite { at, .. } => {
                 let line = rows.table.line(at.saturating_sub(1));
                 anyhow!(error).context(format!("{}, line {line}, column {position}", rows.name))
@@ -106,7 +105,7 @@ impl BeadArgs {
         })?;
         let found: Vec<f64> = found.into_iter().map_while(|value| value).collect();
         if found.is_empty() {
-            let went = way.last().copied().unwrap_or(0.0) - way.first().copied().unwrap_or(0.0);
+            let went = path.last().copied().unwrap_or(0.0) - path.first().copied().unwrap_or(0.0);
             return Err(anyhow!(
                 "{}: nothing of the bead comes to where it is measured: {position} goes on by \
                  {went} mm, and --measured-at-offset-mm is {offset}",
@@ -120,9 +119,10 @@ impl BeadArgs {
     fn areas(&self, rows: &TableColumns<'_>, width: &str) -> Result<Vec<f64>> {
         let height = self.layer.layer_height()?.unwrap_or_default();
         let area = |(row, width_mm): (usize, &f64)| -> Result<f64> {
-            let place = || format!("{}, line {}, column {width}", rows.name, rows.table.line(row));
-            let bead = Mm::new(*width_mm).with_context(place)?;
-            Ok(section(bead, height).with_context(place)?.get())
+            let position =
+                || format!("{}, line {}, column {width}", rows.name, rows.table.line(row));
+            let bead = Mm::new(*width_mm).with_context(position)?;
+            Ok(section(bead, height).with_context(position)?.get())
         };
         rows.in_unit(width, Unit::Mm)?.iter().enumerate().map(area).collect()
     }

@@ -1,4 +1,4 @@
-//! Which part of a log is meant, its time, and what its columns hold.
+//! The part of a log that is used, its time, and the quantities of its columns.
 
 use clap::Args;
 
@@ -23,7 +23,7 @@ pub struct ColumnArgs {
     pub to_s: Option<f64>,
 }
 
-/// A column's unit that was told.
+/// The given unit of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnitOverride {
     column: String,
@@ -38,16 +38,17 @@ impl ColumnArgs {
     pub fn quantity(&self, column: &str) -> Result<Quantity, WrongArguments> {
         let given = match self.unit_override(column) {
             None => None,
-            Some(word) => Some(Unit::of_word(word).ok_or_else(|| {
-                WrongArguments::new(format!("--unit {column}={word}: expected one of {}", units()))
-            })?),
+            Some(word) => Some(
+                Unit::of_word(word)
+                    .ok_or_else(|| wrong!("--unit {column}={word}: expected one of {}", units()))?,
+            ),
         };
         Quantity::of_column(column, given).ok_or_else(|| {
-            WrongArguments::new(format!(
-                "the name {column} does not end with a unit (one of {}); tell it with --unit \
+            wrong!(
+                "the name {column} does not end with a unit (one of {}); give it with --unit \
                  {column}=UNIT",
                 units()
-            ))
+            )
         })
     }
 
@@ -60,26 +61,23 @@ impl ColumnArgs {
             (Some(given), ..) => given,
             (None, Some(only), None) => only,
             (None, None, _) => {
-                let what = format!("no column begins with time; name it with --time ({list})");
-                return Err(WrongArguments::new(what));
+                refuse!("no column begins with time; name it with --time ({list})");
             }
             (None, Some(_), Some(_)) => {
-                let what =
-                    format!("several columns begin with time; name one with --time ({list})");
-                return Err(WrongArguments::new(what));
+                refuse!("several columns begin with time; name one with --time ({list})");
             }
         };
         let word =
             self.unit_override(column).or_else(|| column.rsplit_once('_').map(|(_, end)| end));
         let unit = TIMES.iter().find(|unit| Some(unit.0) == word).ok_or_else(|| {
-            WrongArguments::new(format!(
+            wrong!(
                 "the unit of {column} is unknown; add --unit {column}=s, {column}=ms or {column}=us"
-            ))
+            )
         })?;
         Ok((column.clone(), unit.1))
     }
 
-    /// The unit of a column as it was told.
+    /// The given unit of a column.
     pub fn unit_override(&self, column: &str) -> Option<&str> {
         self.unit.iter().find(|given| given.column == column).map(|given| given.unit.as_str())
     }
@@ -108,7 +106,7 @@ impl ColumnArgs {
         column.within(from_s, to_s)
     }
 
-    /// A column that a unit was told of and that is not there.
+    /// A column that has a given unit and does not exist.
     pub fn unknown_column(&self, known: &[String]) -> Option<&str> {
         self.unit
             .iter()
@@ -117,7 +115,8 @@ impl ColumnArgs {
     }
 }
 
-fn units() -> String {
+/// The words of all units, for messages.
+pub fn units() -> String {
     Unit::all().map(Unit::word).collect::<Vec<_>>().join(", ")
 }
 
@@ -132,8 +131,8 @@ pub fn refuse_same(input: &str, output: &str) -> Result<(), WrongArguments> {
     if input != output {
         return Ok(());
     }
-    Err(WrongArguments::new(format!(
+    Err(wrong!(
         "--input and --output are both {input}: a model predicts one from the other; name what the \
          extruder is commanded, and what comes of it"
-    )))
+    ))
 }

@@ -20,21 +20,21 @@ pub struct LayerArgs {
 }
 
 impl LayerArgs {
-    /// Height of a layer as it was told.
+    /// The given height of a layer.
     pub fn layer_height(&self) -> Result<Option<Mm>, WrongArguments> {
         let Some(height) = self.layer_height_mm else { return Ok(None) };
         let taken = Mm::new(height).ok().filter(|_| height > 0.0 && LENGTHS_MM.contains(&height));
-        taken.map(Some).ok_or_else(|| {
-            WrongArguments::new(format!("--layer-height-mm {height}: expected above 0 to 1e5 mm"))
-        })
+        taken
+            .map(Some)
+            .ok_or_else(|| wrong!("--layer-height-mm {height}: expected above 0 to 1e5 mm"))
     }
 
-    /// The offset as it was told \[mm\].
+    /// The given offset \[mm\].
     pub fn offset(&self) -> Result<Option<f64>, WrongArguments> {
         match self.measured_at_offset_mm {
-            Some(offset) if !LENGTHS_MM.contains(&offset) => Err(WrongArguments::new(format!(
-                "--measured-at-offset-mm {offset}: expected 0 to 1e5 mm"
-            ))),
+            Some(offset) if !LENGTHS_MM.contains(&offset) => {
+                Err(wrong!("--measured-at-offset-mm {offset}: expected 0 to 1e5 mm"))
+            }
             given => Ok(given),
         }
     }

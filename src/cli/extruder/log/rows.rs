@@ -1,4 +1,4 @@
-//! The columns of a table, and what is wrong with them by line.
+//! The columns of a table, and errors in them by line.
 
 use anyhow::{Context, Result, anyhow};
 
@@ -23,10 +23,17 @@ impl TableColumns<'_> {
     pub fn column(&self, column: &str) -> Result<Vec<f64>> {
         match self.table.column(column) {
             Err(error @ DataTableError::NoColumn { .. }) => {
-                Err(WrongArguments::new(format!("{}: {error}", self.name)).into())
+                Err(wrong!("{}: {error}", self.name).into())
             }
             other => other.with_context(|| self.name.to_owned()),
         }
+    }
+
+    /// The time \[s\], and whether its unit is given.
+    pub fn time_s(&self) -> Result<(Vec<f64>, bool)> {
+        let (time, unit_s) = self.columns.time(self.table.names())?;
+        let time_s = self.column(&time)?.iter().map(|time| time * unit_s).collect();
+        Ok((time_s, self.columns.unit_override(&time).is_some()))
     }
 
     /// The numbers of a column in one unit.
@@ -34,18 +41,17 @@ impl TableColumns<'_> {
         let values = self.column(column)?;
         let found = self.columns.quantity(column)?.unit;
         if found != unit {
-            let what = format!(
-                "{}: {column} is in {found}, expected {unit} (--unit {column}={} tells another)",
+            refuse!(
+                "{}: {column} is in {found}, expected {unit} (--unit {column}={} gives another)",
                 self.name,
                 unit.word()
             );
-            return Err(WrongArguments::new(what).into());
         }
         Ok(values)
     }
 }
 
-/// Refuses a unit that is told of a column which is not there.
+/// Refuses a unit for a column that does not exist.
 pub fn check_unit_overrides(
     columns: &ColumnArgs,
     known: &[String],
@@ -55,8 +61,7 @@ pub fn check_unit_overrides(
         None => Ok(()),
         Some(stray) => {
             let list = known.join(", ");
-            let what = format!("{name}: --unit {stray}: no such column; the columns are {list}");
-            Err(WrongArguments::new(what))
+            Err(wrong!("{name}: --unit {stray}: no such column; the columns are {list}"))
         }
     }
 }

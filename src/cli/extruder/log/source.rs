@@ -1,21 +1,22 @@
-//! What the data are: a table, or a recording with its cell.
+//! The source of data: a table, or a recording with its cell.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use anyhow::{Context, Result};
 
+use super::columns::ColumnArgs;
 use super::layer::LayerArgs;
 use crate::cell::Cell;
 use crate::cell::file::Purpose;
 use crate::cli::arguments::WrongArguments;
+use crate::cli::recorded::{begins_with, open, refuse_foreign};
 use crate::core::units::Mm;
+use crate::identify::series::TimeSeries;
 use crate::identify::table::DataTable;
-use crate::io::bead_columns::{BeadColumns, CellFacts, columns};
+use crate::io::bead_columns::{BeadColumns, BeadFacts, columns};
 use crate::io::recording::Recording;
 
-/// How an MCAP file begins.
+/// First bytes of an MCAP file (MCAP specification, § Magic).
 const MAGIC: &[u8] = b"\x89MCAP";
 
 /// Data as they were read.
@@ -30,12 +31,8 @@ impl LogSource {
     /// Reads either.
     pub fn read(path: &Path, layer: &LayerArgs) -> Result<Self> {
         let name = path.display().to_string();
-        let wrong = |what: &dyn std::fmt::Display| WrongArguments::new(format!("{name}: {what}"));
-        let mut begins = Vec::new();
-        let opened = File::open(path).map_err(|error| wrong(&error))?;
-        let head = opened.take(MAGIC.len() as u64).read_to_end(&mut begins);
-        head.map_err(|error| wrong(&error))?;
-        if begins == MAGIC {
+        let wrong = |what: &dyn std::fmt::Display| wrong!("{name}: {what}");
+        if begins_with(path, MAGIC).map_err(|error| wrong(&error))? {
             return recorded(path, layer).map(Self::Recording);
         }
         let bytes = std::fs::read(path).map_err(|error| wrong(&error))?;
@@ -46,8 +43,22 @@ impl LogSource {
     }
 }
 
+/// A column of a recording, cut to the part that is used. Fails where there is none of this name.
+pub fn recorded_column(
+    found: &BeadColumns,
+    file: &str,
+    wanted: &str,
+    columns: &ColumnArgs,
+) -> Result<TimeSeries, WrongArguments> {
+    let series = found.columns.iter().find(|series| series.name == wanted);
+    series.map(|series| columns.cut_series(series)).ok_or_else(|| {
+        let known: Vec<_> = found.columns.iter().map(|series| series.name.as_str()).collect();
+        wrong!("{file}: there is no column {wanted}; the columns are {}", known.join(", "))
+    })
+}
+
 fn recorded(path: &Path, layer: &LayerArgs) -> Result<BeadColumns> {
-    let mut recording = Recording::open(path).map_err(WrongArguments::new)?;
+    let mut recording = open(path)?;
     let facts = facts(&recording, layer)?;
     let name = recording.file().to_owned();
     let mut found = columns(recording.by_ref(), &facts).with_context(|| name.clone())?;
@@ -56,31 +67,24 @@ fn recorded(path: &Path, layer: &LayerArgs) -> Result<BeadColumns> {
 }
 
 /// What the cell file says that is attached.
-fn facts(recording: &Recording, layer: &LayerArgs) -> Result<CellFacts> {
+fn facts(recording: &Recording, layer: &LayerArgs) -> Result<BeadFacts> {
     let file = recording.file();
-    if recording.run().is_none() {
-        let what = format!(
-            "{file}: not a recording of truebead: it has no metadata record \"run\" at its start"
-        );
-        return Err(WrongArguments::new(what).into());
-    }
+    refuse_foreign(recording)?;
     let Some(text) = recording.cell() else {
-        let what = format!(
+        refuse!(
             "{file}: the attachment cell.toml is missing, so the units of its commands and the \
              camera's offset are unknown"
         );
-        return Err(WrongArguments::new(what).into());
     };
     let name = format!("cell.toml in {file}");
     let cell = Cell::parse(Path::new(&name), text, Purpose::Run).map_err(WrongArguments::new)?;
     let Some(run) = cell.run else {
-        let what = format!("{name}: it lacks tables that a run needs");
-        return Err(WrongArguments::new(what).into());
+        refuse!("{name}: it lacks tables that a run needs");
     };
     let extruder = run.extruder.as_ref().map(|part| &part.extruder);
     let given = layer.layer_height()?;
     let offset = layer.offset()?;
-    Ok(CellFacts {
+    Ok(BeadFacts {
         command: extruder.map(|extruder| extruder.drive.unit()),
         layer_height: given.or(extruder.map(|extruder| extruder.layer_height)),
         offset: offset.map_or(run.camera.offset, |mm| Mm::new(mm).unwrap_or(run.camera.offset)),

@@ -11,7 +11,7 @@ Example:
   truebead lab accuracy --set blur-1.5 --set grains-6-dark --out accuracy
 
 Every set is rendered and measured like the frames of a cell with defaults.
-Silent: widths that are more than half a pixel off, as a share of all frames.
+Silent: widths that are more than half a pixel off, as a fraction of all frames.
 Bound: the smallest standard deviation that the width of a straight bead can
 have in an image that nothing disturbs; free bound: the same where its
 direction is not known. The last column names the limits that are missed; the
@@ -20,8 +20,8 @@ status is 1 where there are any. ACCURACY.md says what every set is.
   truebead lab accuracy --calibration
 
 calibrates cameras whose truth is known, from corners with noise and from
-rendered images of boards, and compares the scatter of widths with what the
-calibrations predict.
+rendered images of boards, and compares the standard deviation of widths with
+the one that the calibrations predict.
 
   truebead lab accuracy --random torn,grooves --frames 3000 --keep-frames 20 --out random
 
@@ -53,8 +53,8 @@ pub struct AccuracyArgs {
     /// and what was drawn for them as frames/SET.csv
     #[arg(long, value_name = "K", default_value = "0", requires_all = ["random", "out"])]
     pub keep_frames: u64,
-    /// Calibrations instead of widths: whether widths scatter as much from one to the
-    /// next as each predicts of itself
+    /// Calibrations instead of widths: whether the standard deviation of widths from one to
+    /// the next is the one that each predicts
     #[arg(long)]
     pub calibration: bool,
     /// Calibrations of each camera from corners with noise; 0: none
@@ -76,7 +76,7 @@ pub struct AccuracyArgs {
     pub out: Option<PathBuf>,
 }
 
-/// A scatter takes two.
+/// A standard deviation takes at least two trials.
 fn parse_trials(text: &str) -> Result<u64, String> {
     let count = text.trim().parse::<u64>().ok();
     count

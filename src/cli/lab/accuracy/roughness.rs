@@ -1,17 +1,16 @@
 //! `truebead lab accuracy --roughness`: long torn beads that pass through the gauge.
 
 use std::process::ExitCode;
-use std::sync::{Mutex, PoisonError};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use rayon::prelude::*;
 
 use super::arguments::AccuracyArgs;
+use super::publish::{Texts, make_folder};
 use crate::calibration::SurfaceMap;
 use crate::cli::print::Verbosity;
 use crate::core::units::Mm;
-use crate::io::progress::Progress;
-use crate::rows::output;
+use crate::io::progress::SharedProgress;
 use crate::studies::accuracy::drawn::LongBead;
 use crate::studies::accuracy::roughness_table::{
     BeadOutcome, OwnMeanError, Ratio, RoughnessEstimate, figures, markdown, table,
@@ -20,40 +19,33 @@ use crate::vision::{Measurer, Roughness, RoughnessEstimator};
 
 /// Length of each bead in its correlation lengths.
 const CORRELATION_LENGTHS: f64 = 50.0;
-/// How far a bead moves on from frame to frame \[px\]: by a gauge, and as little as that
-/// each piece is seen in ten frames.
+/// Advance of a bead from frame to frame \[px\]: the length of a gauge, and a tenth of it, so that
+/// each part is seen in ten frames.
 const ADVANCES_PX: [usize; 2] = [100, 10];
 
 /// Renders and measures the beads.
 pub fn judge(args: &AccuracyArgs, voice: Verbosity) -> Result<ExitCode> {
-    if let Some(out) = &args.out {
-        output::make_folder(out)?;
-    }
-    let progress = Mutex::new(Progress::new("measuring", "beads", Some(args.beads), voice.quiet));
+    make_folder(args)?;
+    let progress = SharedProgress::new("measuring", "beads", args.beads, voice.quiet);
     let outcomes: Result<Vec<[BeadOutcome; 2]>> = (0..args.beads)
         .into_par_iter()
         .map(|number| {
             let bead = LongBead::draw(number, CORRELATION_LENGTHS);
             let [apart, overlapping] = ADVANCES_PX.map(|advance| pass(&bead, advance));
-            progress.lock().unwrap_or_else(PoisonError::into_inner).advance();
+            progress.advance();
             Ok([apart?, overlapping?])
         })
         .collect();
-    progress.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
+    progress.finish();
     let outcomes = outcomes?;
     let mut all = Vec::new();
-    for (way, advance) in ADVANCES_PX.into_iter().enumerate() {
-        let of_way: Vec<BeadOutcome> = outcomes.iter().map(|both| both[way].clone()).collect();
-        all.extend(figures(advance, &of_way, LongBead::lengths_px()));
+    for (index, advance) in ADVANCES_PX.into_iter().enumerate() {
+        let of_advance: Vec<BeadOutcome> =
+            outcomes.iter().map(|both| both[index].clone()).collect();
+        all.extend(figures(advance, &of_advance, LongBead::lengths_px()));
     }
-    if let Some(out) = &args.out {
-        let json = serde_json::to_vec_pretty(&all).context("roughness.json")?;
-        output::write_whole(out, "roughness.json", &json)?;
-        output::write_whole(out, "roughness.md", markdown(&all).as_bytes())?;
-    }
-    say!("{}", table(&all).trim_end());
     let missed = all.iter().any(|figures| !figures.missed.is_empty());
-    Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    Texts { table: table(&all), markdown: markdown(&all) }.publish(args, "roughness", &all, missed)
 }
 
 /// Lets a bead pass through its gauge.

@@ -5,34 +5,30 @@ use maud::{Markup, html};
 use super::StartStudy;
 use crate::identify::series::TimeSeries as Logged;
 use crate::identify::start_stop::file::{ParameterKey, START_PARAMETERS, STOP_PARAMETERS};
-use crate::report::chart::area::{Area, XAxis};
-use crate::report::chart::legend::legend;
 use crate::report::chart::palette::{DEMAND, FLOW, MODEL, SCREW};
 use crate::report::chart::pauses::{PauseLayer, over_pauses};
-use crate::report::chart::plot::{Plot, PlotLayer, y_range};
-use crate::report::chart::range::Range;
-use crate::report::chart::series::Curve;
-use crate::report::html::whole_page;
+use crate::report::chart::{
+    Area, PlotCurve, PlotLayer, ValueRange, XAxis, legend, wide_plot, y_range,
+};
+use crate::report::html::{VerdictLevel, about, titled_page, verdict};
 use crate::report::identify::table::significant;
 
-/// Points of a curve that the model gives.
+/// Points of a curve of the model.
 const POINTS: u32 = 300;
-/// A start is shown from this before its first flow on, until that after it \[s\].
-const ABOUT_FIRST_FLOW_S: Range = Range::new(-0.5, 3.0);
+/// Interval about the first flow in which a start is drawn \[s\].
+const ABOUT_FIRST_FLOW_S: ValueRange = ValueRange::new(-0.5, 3.0);
 
 /// The page.
 pub fn page(study: &StartStudy) -> String {
     let logs = &study.logs;
-    let title = "Starts and stops";
     let body = html! {
-        h1 { (title) }
-        div.about {
-            span { "data " b { (logs.source) } }
-            span { "samples " b { (logs.flow.len()) } }
-            span { "starts " b { (study.fit.starts.len()) } }
-            span { "stops " b { (study.fit.stops.len()) } }
-        }
-        (verdict(study))
+        (about([
+            ("data", logs.source.clone()),
+            ("samples", logs.flow.len().to_string()),
+            ("starts", study.fit.starts.len().to_string()),
+            ("stops", study.fit.stops.len().to_string()),
+        ]))
+        (judged(study))
         (parameters(study))
         section {
             h2 { "The first flow" }
@@ -44,7 +40,7 @@ pub fn page(study: &StartStudy) -> String {
         }
         section {
             h2 { "The stops" }
-            p.hint { "All stops over each other, each as a share of its flow before." }
+            p.hint { "All stops over each other, each as a fraction of its flow before." }
             (legend(&[("stops", FLOW, ""), ("model", MODEL, "")]))
             (stops(study))
         }
@@ -55,24 +51,16 @@ pub fn page(study: &StartStudy) -> String {
             (starts(study))
         }
         section { h2 { "What was logged" } (record(study)) }
-        footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
-            ". The parameters are in starts.toml." }
     };
-    whole_page(title, &body).into_string()
+    titled_page("Starts and stops", &body, ". The parameters are in starts.toml.")
 }
 
-fn verdict(study: &StartStudy) -> Markup {
-    let (class, word) =
-        if study.warnings.is_empty() { ("good", "Good.") } else { ("caution", "Look closer.") };
-    html! {
-        div class={ "verdict " (class) } {
-            b { (word) }
-            (format!(" Delays scatter about the model by {:.3} s.", study.fit.delay_sigma_s))
-            @if !study.warnings.is_empty() {
-                ul { @for warning in &study.warnings { li { (warning) } } }
-            }
-        }
-    }
+fn judged(study: &StartStudy) -> Markup {
+    let text = format!(
+        " Standard deviation of the delays about the model {:.3} s.",
+        study.fit.delay_sigma_s
+    );
+    verdict(VerdictLevel::with_caution(!study.warnings.is_empty()), &text, &study.warnings)
 }
 
 fn parameters(study: &StartStudy) -> Markup {
@@ -113,26 +101,23 @@ fn delays(study: &StartStudy) -> Markup {
 
 fn stops(study: &StartStudy) -> Markup {
     let seen = &study.fit.stops;
-    let all: Vec<Curve> = seen
+    let all: Vec<PlotCurve> = seen
         .iter()
         .map(|stop| {
-            relative_flow(
-                &study.logs.flow,
-                stop.at_s,
-                Range::new(0.0, stop.observed_s),
-                stop.flow_mm3_per_s,
-            )
+            let observed = ValueRange::new(0.0, stop.observed_s);
+            relative_flow(&study.logs.flow, stop.at_s, observed, stop.flow_mm3_per_s)
         })
         .collect();
     let longest_s = seen.iter().map(|stop| stop.observed_s).fold(0.0, f64::max);
-    let model =
-        curve(Range::new(0.0, longest_s), |since_s| study.fit.parameters.remaining_flow(since_s));
-    laid_over("time since the command to stop [s]", Range::new(0.0, longest_s), &all, &model)
+    let model = curve(ValueRange::new(0.0, longest_s), |since_s| {
+        study.fit.parameters.remaining_flow(since_s)
+    });
+    laid_over("time since the command to stop [s]", ValueRange::new(0.0, longest_s), &all, &model)
 }
 
 fn starts(study: &StartStudy) -> Markup {
     let seen = study.fit.starts.iter();
-    let all: Vec<Curve> = seen
+    let all: Vec<PlotCurve> = seen
         .map(|start| {
             let first_s = start.at_s + start.delay_s;
             relative_flow(&study.logs.flow, first_s, ABOUT_FIRST_FLOW_S, start.flow_mm3_per_s)
@@ -144,60 +129,38 @@ fn starts(study: &StartStudy) -> Markup {
     laid_over("time since the first flow [s]", ABOUT_FIRST_FLOW_S, &all, &model)
 }
 
-/// The flow over another, from a moment on.
-fn relative_flow(flow: &Logged, at_s: f64, range: Range, even: f64) -> Curve {
+/// The flow as a ratio to an even flow, over the time since a moment.
+fn relative_flow(flow: &Logged, at_s: f64, range: ValueRange, even: f64) -> PlotCurve {
     let part = flow.within(at_s + range.min, at_s + range.max);
-    let mut series = Curve::default();
-    for (time_s, value) in part.time_s.iter().zip(&part.values) {
-        series.push(time_s - at_s, value / even);
-    }
-    series
+    part.time_s.iter().zip(&part.values).map(|(at, value)| (at - at_s, value / even)).collect()
 }
 
-fn curve(range: Range, of: impl Fn(f64) -> f64) -> Curve {
-    let mut series = Curve::default();
-    for k in 0..=POINTS {
-        let at_s = range.min + range.length() * f64::from(k) / f64::from(POINTS);
-        series.push(at_s, of(at_s));
-    }
-    series
+fn curve(range: ValueRange, of: impl Fn(f64) -> f64) -> PlotCurve {
+    let at = |k| range.min + range.length() * f64::from(k) / f64::from(POINTS);
+    (0..=POINTS).map(at).map(|at_s| (at_s, of(at_s))).collect()
 }
 
-fn laid_over(title: &str, range: Range, all: &[Curve], model: &Curve) -> Markup {
+fn laid_over(title: &str, range: ValueRange, all: &[PlotCurve], model: &PlotCurve) -> Markup {
     let axis = XAxis { title: title.to_owned(), range, divisor: 1.0 };
-    let shown: Vec<&Curve> = all.iter().chain([model]).collect();
+    let shown: Vec<&PlotCurve> = all.iter().chain([model]).collect();
     let layers =
         all.iter().map(|one| PlotLayer::Data(one, FLOW)).chain([PlotLayer::Curve(model, MODEL)]);
-    let plot = Plot {
-        area: Area::wide(270.0),
-        x: &axis,
-        y_title: "flow over the even flow",
-        y_range: y_range(&shown, &[0.0]),
-        layers: layers.collect(),
-    };
-    plot.draw()
+    let y_range = y_range(&shown, &[0.0]);
+    wide_plot(&axis, "flow over the even flow", 270.0, y_range, layers.collect())
 }
 
 /// Command and flow over time.
 fn record(study: &StartStudy) -> Markup {
     let logs = &study.logs;
     let ends = (logs.flow.time_s.first().copied(), logs.flow.time_s.last().copied());
-    let axis = XAxis::time(Range::new(ends.0.unwrap_or(0.0), ends.1.unwrap_or(1.0)));
-    let drawn = |logged: &Logged| {
-        let mut series = Curve::default();
-        logged.time_s.iter().zip(&logged.values).for_each(|(x, y)| series.push(*x, *y));
-        series
+    let axis = XAxis::time(ValueRange::new(ends.0.unwrap_or(0.0), ends.1.unwrap_or(1.0)));
+    let drawn = |logged: &Logged| -> PlotCurve {
+        logged.time_s.iter().copied().zip(logged.values.iter().copied()).collect()
     };
     let (command, flow) = (drawn(&logs.command), drawn(&logs.flow));
-    let plot = |title: &str, series: &Curve, layer, height| {
-        Plot {
-            area: Area::wide(height),
-            x: &axis,
-            y_title: title,
-            y_range: y_range(&[series], &[0.0]),
-            layers: vec![PlotLayer::Level(0.0, DEMAND, ""), layer],
-        }
-        .draw()
+    let plot = |title: &str, series: &PlotCurve, layer, height| {
+        let layers = vec![PlotLayer::Level(0.0, DEMAND, ""), layer];
+        wide_plot(&axis, title, height, y_range(&[series], &[0.0]), layers)
     };
     html! {
         (plot("flow [mm³/s]", &flow, PlotLayer::Data(&flow, FLOW), 220.0))

@@ -5,7 +5,7 @@ use crate::identify::digits::three_digits;
 use crate::identify::start_stop::file::{ParameterKey, START_PARAMETERS, STOP_PARAMETERS};
 use crate::report::identify::table::{put, significant};
 
-/// Pauses after which the delay is told \[s\].
+/// Pauses after which the delay is printed \[s\].
 const SHOWN_PAUSES_S: [f64; 4] = [1.0, 10.0, 60.0, 200.0];
 
 /// A short table.
@@ -41,16 +41,15 @@ fn data(text: &mut String, study: &StartStudy) {
     put(text, "output", &logs.output.to_string());
     let [shortest_s, longest_s] = seen.idle_range_s.map(three_digits);
     let [least, most] = seen.flow_range_mm3_per_s.map(three_digits);
+    let (starts, left_out) = (seen.starts, study.left_out());
     let line = format!(
-        "{} after pauses of {shortest_s} to {longest_s} s, to {least} to {most} mm³/s",
-        seen.starts
+        "{starts} after pauses of {shortest_s} to {longest_s} s, to {least} to {most} mm³/s"
     );
     put(text, "starts", &line);
-    if study.left_out() > 0 {
+    if left_out > 0 {
         let line = format!(
-            "{} left out: the pump ran when the record began, the run after it was too short or \
-             uneven, or samples are missing",
-            study.left_out()
+            "{left_out} left out: the pump ran when the record began, the run after it was too short \
+             or uneven, or samples are missing"
         );
         put(text, "", &line);
     }
@@ -65,7 +64,7 @@ fn parameters(text: &mut String, study: &StartStudy, list: &[ParameterKey]) {
     }
 }
 
-/// What the parameters come to for a bead of the log.
+/// The parameters' effect on a bead of the log.
 fn meaning(text: &mut String, study: &StartStudy) {
     let (of, flow) = (&study.fit.parameters, study.flow_mm3_per_s());
     let [_, longest_s] = study.file.data.idle_range_s;
@@ -73,11 +72,7 @@ fn meaning(text: &mut String, study: &StartStudy) {
     let given = |idle_s: &f64| format!("{:.2} s after {idle_s} s", of.delay_s(*idle_s, flow));
     let delays: Vec<String> = seen.map(given).collect();
     put(text, "first flow", &format!("at {} mm³/s: {}", three_digits(flow), delays.join(", ")));
-    put(
-        text,
-        "scatter",
-        &format!("{:.4} s of the delays about the model", study.fit.delay_sigma_s),
-    );
+    put(text, "sigma", &format!("{:.4} s of the delays about the model", study.fit.delay_sigma_s));
     let line = format!(
         "{} mm³ come after the command to stop; the flow is down to a tenth {:.2} s after it",
         three_digits(flow * of.total_after_stop_s()),

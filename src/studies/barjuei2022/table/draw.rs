@@ -6,7 +6,7 @@ use crate::report::chart::area::{Area, XAxis};
 use crate::report::chart::legend::legend;
 use crate::report::chart::palette;
 use crate::report::chart::plot::{Plot, PlotLayer as Drawn, y_range};
-use crate::report::chart::series::Curve;
+use crate::report::chart::series::PlotCurve as Curve;
 use crate::studies::barjuei2022::StandOff;
 use crate::trials::score::LayerScore;
 use crate::width_control::limiter::SpeedLimits;

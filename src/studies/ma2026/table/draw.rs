@@ -7,8 +7,8 @@ use crate::report::chart::legend::legend;
 use crate::report::chart::palette;
 use crate::report::chart::palette::Ink;
 use crate::report::chart::plot::{Plot, PlotLayer as Drawn, y_range};
-use crate::report::chart::range::Range;
-use crate::report::chart::series::Curve;
+use crate::report::chart::range::ValueRange as Range;
+use crate::report::chart::series::PlotCurve as Curve;
 
 use crate::studies::ma2026::{Factors, PressureResponse};
 

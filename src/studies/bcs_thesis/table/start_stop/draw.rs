@@ -7,8 +7,8 @@ use crate::report::chart::legend::legend;
 use crate::report::chart::palette::{DEMAND, FLOW, Ink, OURS, PAPER, SETPOINT, SPEED};
 use crate::report::chart::pauses::{PauseLayer, over_pauses};
 use crate::report::chart::plot::{Plot, PlotLayer, y_range};
-use crate::report::chart::range::Range;
-use crate::report::chart::series::Curve;
+use crate::report::chart::range::ValueRange as Range;
+use crate::report::chart::series::PlotCurve as Curve;
 use crate::studies::bcs_thesis::start_stop::bench::{FlowSample, PAUSES_S, StartStopScore};
 use crate::studies::bcs_thesis::start_stop::experiment::{
     Losses, StartStopResults, TRACED_PAUSE_S, bench,
