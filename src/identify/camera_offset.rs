@@ -21,9 +21,9 @@
 mod data;
 mod error;
 mod estimate;
+pub mod laid_speeds;
 mod observation;
 mod offset_profile;
-pub mod speed_profile;
 mod whiten;
 
 #[cfg(test)]
@@ -32,9 +32,9 @@ mod tests;
 use data::PooledWidths;
 pub use error::{CameraOffsetError, MIN_PIECES, MIN_WIDTHS};
 pub use estimate::{EXPONENT_RANGE, OffsetEstimate, OffsetStudy, SpeedRange, WidthAtSpeed};
+use laid_speeds::LaidSpeeds;
 use observation::BeadObservation;
 use offset_profile::{NearlyAsGood, OffsetProfile};
-use speed_profile::SpeedProfile;
 use whiten::WidthNoise;
 
 use crate::core::robot::RobotState;
@@ -60,7 +60,7 @@ const SETTLED_MM: f64 = 0.01;
 
 /// A width that was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MeasuredWidth {
+pub struct TimedWidth {
     /// When its frame was captured.
     pub at: Stamp,
     /// The width.
@@ -83,7 +83,7 @@ pub struct OffsetSearch {
 /// measured meanwhile.
 pub fn find(
     states: &[(Stamp, RobotState)],
-    widths: &[MeasuredWidth],
+    widths: &[TimedWidth],
     search: OffsetSearch,
 ) -> Result<OffsetEstimate, CameraOffsetError> {
     study(states, widths, search).map(|study| study.estimate)
@@ -92,12 +92,12 @@ pub fn find(
 /// The same with all that is known of the bead.
 pub fn study(
     states: &[(Stamp, RobotState)],
-    widths: &[MeasuredWidth],
+    widths: &[TimedWidth],
     search: OffsetSearch,
 ) -> Result<OffsetStudy, CameraOffsetError> {
-    let course = SpeedProfile::of(states).ok_or(CameraOffsetError::NoPath)?;
+    let course = LaidSpeeds::of(states).ok_or(CameraOffsetError::NoPath)?;
     let looks: Vec<BeadObservation> =
-        widths.iter().filter_map(|width| observation(&course, width)).collect();
+        widths.iter().filter_map(|width| observed(&course, width)).collect();
     if looks.len() < MIN_WIDTHS {
         return Err(CameraOffsetError::TooFew { found: looks.len() });
     }
@@ -136,7 +136,7 @@ pub fn study(
     })
 }
 
-fn observation(course: &SpeedProfile, width: &MeasuredWidth) -> Option<BeadObservation> {
+fn observed(course: &LaidSpeeds, width: &TimedWidth) -> Option<BeadObservation> {
     let (bead, path_mm) = course.path_at(width.at)?;
     let (value, sigma) = (width.width.get(), width.sigma.get());
     let sound = value > 0.0 && sigma >= 0.0;
@@ -158,7 +158,7 @@ struct Converged {
 
 /// Finds them in turn, each with what is known of the others.
 fn iterate(
-    course: &SpeedProfile,
+    course: &LaidSpeeds,
     looks: &[BeadObservation],
     search: OffsetSearch,
     speeds: SpeedRange,
@@ -200,7 +200,7 @@ impl Converged {
     /// Whether the best offset is one that the widths tell.
     fn check(
         &self,
-        course: &SpeedProfile,
+        course: &LaidSpeeds,
         looks: &[BeadObservation],
         search: OffsetSearch,
     ) -> Result<(), CameraOffsetError> {

@@ -6,7 +6,7 @@ use crate::control::step::{Command, Step};
 use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
-use crate::identify::camera_offset::MeasuredWidth;
+use crate::identify::camera_offset::TimedWidth;
 use crate::width_control::steps::{StepSettings, StepsProgress, StepsTrace};
 
 /// A run as it was recorded, in order.
@@ -15,7 +15,7 @@ pub struct Log {
     /// What the robot reported, when it arrived.
     pub states: Vec<(Stamp, RobotState)>,
     /// Widths that were measured, by capture.
-    pub widths: Vec<MeasuredWidth>,
+    pub widths: Vec<TimedWidth>,
     /// From capture to arrival at the controller of each, in the order of arrival \[s\].
     pub latencies_s: Vec<f64>,
     /// Speeds that were sent, and when.
@@ -33,7 +33,7 @@ impl Log {
             Event::Robot(state) => self.states.push((now, *state)),
             Event::Measured { captured_at, width_mm, sigma_mm, .. } => {
                 self.latencies_s.push((now - *captured_at).secs());
-                self.widths.push(MeasuredWidth {
+                self.widths.push(TimedWidth {
                     at: *captured_at,
                     width: *width_mm,
                     sigma: *sigma_mm,

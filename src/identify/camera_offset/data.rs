@@ -1,7 +1,7 @@
 //! Widths beside the speeds that may have laid them.
 
+use super::laid_speeds::{LaidSpeeds, PowerIntegral};
 use super::observation::BeadObservation;
-use super::speed_profile::{PowerIntegral, SpeedProfile};
 use super::whiten::PathPosition;
 use crate::core::units::Mm;
 use crate::numeric::number::to_f64;
@@ -33,7 +33,7 @@ pub struct PooledWidths {
 
 impl PooledWidths {
     /// `exponent` is roughly known; it counts only where the speed changes within a gauge.
-    pub fn of(course: &SpeedProfile, looks: &[BeadObservation], exponent: f64, gauge: Mm) -> Self {
+    pub fn of(course: &LaidSpeeds, looks: &[BeadObservation], exponent: f64, gauge: Mm) -> Self {
         let usual = median(looks.iter().map(|look| look.relative_sigma)).unwrap_or(0.0);
         // A measurement that believes in none of its widths, or in one of them blindly,
         // is not followed.

@@ -3,8 +3,8 @@
 
 use super::data::{PooledWidths, median};
 use super::estimate::{EXPONENT_RANGE, WidthAtSpeed};
+use super::laid_speeds::LaidSpeeds;
 use super::observation::BeadObservation;
-use super::speed_profile::SpeedProfile;
 use super::whiten::{PathWhitener, WidthNoise};
 use crate::core::units::Mm;
 use crate::numeric::number::to_f64;
@@ -307,7 +307,7 @@ impl OffsetProfile {
 /// Widths of bead whose speed is known at an offset, without the few that are far off
 /// their neighbours.
 pub fn without_outliers(
-    course: &SpeedProfile,
+    course: &LaidSpeeds,
     looks: &[BeadObservation],
     gauge: Mm,
     best: &OffsetFit,

@@ -42,7 +42,7 @@ const PLANT: Plant =
 /// What was recorded.
 struct Record {
     states: Vec<(Stamp, RobotState)>,
-    widths: Vec<MeasuredWidth>,
+    widths: Vec<TimedWidth>,
 }
 
 /// Path and speed over time, with steps of the demand.
@@ -118,7 +118,7 @@ impl Way {
                 let Some(width) = self.width(plant.exponent, from, to) else { continue };
                 let noise = plant.wander.0 * wander + plant.picture * normal.sample(&mut random);
                 let width = 40.0 * width * noise.exp();
-                record.widths.push(MeasuredWidth {
+                record.widths.push(TimedWidth {
                     at,
                     width: Mm::new(width).unwrap(),
                     sigma: Mm::constant(0.04),
@@ -247,12 +247,12 @@ fn a_new_bead_does_not_mix_with_the_old_one_and_a_wrong_width_counts_for_nothing
     // What lies under the camera before the new bead comes is the old one.
     let old = record.widths[100];
     record.widths.extend(
-        (0..30).map(|i| MeasuredWidth { at: Stamp::from_secs(9.0 + 0.02 * f64::from(i)), ..old }),
+        (0..30).map(|i| TimedWidth { at: Stamp::from_secs(9.0 + 0.02 * f64::from(i)), ..old }),
     );
     record.states.extend(second.states.iter().map(|(at, state)| (*at + later, *state)));
     record
         .widths
-        .extend(second.widths.iter().map(|width| MeasuredWidth { at: width.at + later, ..*width }));
+        .extend(second.widths.iter().map(|width| TimedWidth { at: width.at + later, ..*width }));
     let clean = found(&record).unwrap();
     assert!((clean.offset.get() - 90.0).abs() < 3.0 * clean.sigma.get(), "{clean:?}");
     assert!(clean.left_out >= 30, "{clean:?}");

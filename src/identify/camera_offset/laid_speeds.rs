@@ -25,7 +25,7 @@ const RUN_UP_PER_MM: f64 = 0.01;
 
 /// All beads of a recording.
 #[derive(Debug, Clone)]
-pub struct SpeedProfile {
+pub struct LaidSpeeds {
     beads: Vec<Bead>,
     min_speed: f64,
 }
@@ -54,7 +54,7 @@ pub struct PowerIntegral {
     ends: (f64, f64),
 }
 
-impl SpeedProfile {
+impl LaidSpeeds {
     /// Of what the robot reported, in order; `None` where it laid nothing.
     pub fn of(states: &[(Stamp, RobotState)]) -> Option<Self> {
         let mut beads: Vec<Bead> = Vec::new();
