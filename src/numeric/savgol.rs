@@ -4,6 +4,7 @@
 //! matrix is solved and none of them suffers from the powers of a long window.
 
 use super::number::to_f64;
+use super::row::dot;
 
 /// Highest degree that is of use.
 const MAX_DEGREE: usize = 8;
@@ -243,10 +244,6 @@ impl Derivatives {
         }
         self.before = std::mem::replace(&mut self.values, next);
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The residuals as coloured noise: an autoregressive model of them.
 
-use super::row::dot;
 use crate::numeric::number::to_f64;
+use crate::numeric::row::dot;
 
 /// Longest memory of the model of the residuals, and its share of the samples.
 const MAX_ORDER: usize = 30;

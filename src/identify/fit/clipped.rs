@@ -3,9 +3,9 @@
 
 use std::fmt;
 
-use super::row::min_max;
 use crate::identify::digits::six_digits;
 use crate::numeric::number::to_f64;
+use crate::numeric::row::min_max;
 
 /// Levels, each about once, from which on a signal goes through many.
 const MIN_LEVELS: usize = 10;

@@ -3,9 +3,9 @@
 use super::error::FitError;
 use super::estimate::Fit;
 use super::problem::FitProblem;
-use super::row::dot;
 use super::trend::{DOMINANT_FRACTION, Trend};
 use crate::numeric::number::to_f64;
+use crate::numeric::row::dot;
 
 /// Refuses a model of an output that a straight line in time dominates, and not
 /// the input, where the model tells no more than that line, or follows it with a

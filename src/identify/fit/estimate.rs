@@ -3,12 +3,12 @@
 use nalgebra::DMatrix;
 
 use super::error::FitError;
-use super::linear::least_squares;
 use super::problem::free_responses;
 use super::quality::FitQuality;
 use super::samples::{Samples, SamplesError};
 use super::settings::{FitSettings, InitialCondition};
 use super::undetermined::Undetermined;
+use crate::numeric::linear::least_squares;
 use crate::numeric::lti::{Simulator, TransferFunction};
 
 /// A parameter that was estimated.

@@ -6,9 +6,10 @@
 //! before), then dead time, output level and the free response where they are
 //! estimated.
 
-use super::row::standard_deviation;
 use super::samples::Samples;
 use super::settings::{DeadTime, FitSettings, InitialCondition, OutputLevel};
+use crate::numeric::average::standard_deviation;
+use crate::numeric::levenberg_marquardt::LeastSquares;
 use crate::numeric::lti::{Between, ModelError, Simulator, TransferFunction, polynomial};
 use crate::numeric::number::to_f64;
 
@@ -195,8 +196,29 @@ impl FitProblem {
         scales
     }
 
+    /// By central differences, one-sided at an end of the range.
+    fn finite_difference(&self, theta: &[f64], number: usize, step: f64) -> Option<Vec<f64>> {
+        let [least, most] = self.range(theta, number);
+        let moved = |by: f64| {
+            let mut moved = theta.to_vec();
+            moved[number] = (theta[number] + by).clamp(least, most);
+            self.predict(&moved).map(|y| (moved[number], y))
+        };
+        let here = || self.predict(theta).map(|y| (theta[number], y));
+        let (from, low) = moved(-step).or_else(here)?;
+        let (to, high) = moved(step).or_else(here)?;
+        Some(high.iter().zip(&low).map(|(a, b)| (a - b) / (to - from)).collect())
+    }
+}
+
+impl LeastSquares for FitProblem {
+    fn residuals(&self, theta: &[f64]) -> Option<Vec<f64>> {
+        let predicted = self.predict(theta)?;
+        Some(self.output.iter().zip(&predicted).map(|(y, p)| y - p).collect())
+    }
+
     /// Ends of the range of a parameter, some of which hang on others.
-    pub fn range(&self, theta: &[f64], number: usize) -> [f64; 2] {
+    fn range(&self, theta: &[f64], number: usize) -> [f64; 2] {
         let layout = self.layout();
         if Some(number) == layout.dead_time
             && let DeadTime::Estimated { min_s: least_s, max_s: most_s } = self.dead_time
@@ -211,17 +233,10 @@ impl FitProblem {
         [f64::MIN, f64::MAX]
     }
 
-    /// The parameters within their ranges.
-    pub fn project(&self, theta: &mut [f64]) {
-        for number in 0..theta.len() {
-            let [least, most] = self.range(theta, number);
-            theta[number] = theta[number].clamp(least, most);
-        }
-    }
-
     /// Slope of the prediction with every parameter; `None` beside the edge of
     /// what is stable.
-    pub fn jacobian(&self, theta: &[f64], scales: &[f64]) -> Option<Vec<Vec<f64>>> {
+    fn jacobian(&self, theta: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let scales = self.scales(theta);
         let (numbers, linear) = self.linear_columns(theta)?;
         let mut columns = vec![Vec::new(); theta.len()];
         for (number, column) in numbers.into_iter().zip(linear) {
@@ -234,20 +249,6 @@ impl FitProblem {
             }
         }
         Some(columns)
-    }
-
-    /// By central differences, one-sided at an end of the range.
-    fn finite_difference(&self, theta: &[f64], number: usize, step: f64) -> Option<Vec<f64>> {
-        let [least, most] = self.range(theta, number);
-        let moved = |by: f64| {
-            let mut moved = theta.to_vec();
-            moved[number] = (theta[number] + by).clamp(least, most);
-            self.predict(&moved).map(|y| (moved[number], y))
-        };
-        let here = || self.predict(theta).map(|y| (theta[number], y));
-        let (from, low) = moved(-step).or_else(here)?;
-        let (to, high) = moved(step).or_else(here)?;
-        Some(high.iter().zip(&low).map(|(a, b)| (a - b) / (to - from)).collect())
     }
 }
 

@@ -7,16 +7,17 @@ use super::drift::check_drift;
 use super::error::FitError;
 use super::estimate::{Fit, FitNote, Parameter};
 use super::identifiability::undetermined;
-use super::levenberg::Minimum;
 use super::named::NamedParameters;
 use super::problem::FitProblem;
 use super::quality::FitQuality;
-use super::row::{dot, standard_deviation};
 use super::settings::{DeadTime, FitSettings};
 use super::spread::{Covariances, covariances};
 use super::start;
+use crate::numeric::average::standard_deviation;
+use crate::numeric::levenberg_marquardt::{LeastSquares, Minimum};
 use crate::numeric::lti::polynomial;
 use crate::numeric::number::to_f64;
+use crate::numeric::row::dot;
 
 /// Turns the least squares into a fit, or says why it is none.
 pub(super) fn report(
@@ -96,7 +97,7 @@ fn assemble(problem: &FitProblem, settings: &FitSettings, best: &Minimum) -> Res
     let model = problem.transfer(theta).ok_or(FitError::NoStart)?;
     let predicted = problem.predict(theta).ok_or(FitError::NoStart)?;
     let scales = problem.scales(theta);
-    let columns = problem.jacobian(theta, &scales).ok_or(FitError::NoStart)?;
+    let columns = problem.jacobian(theta).ok_or(FitError::NoStart)?;
     let residuals: Vec<f64> = problem.output.iter().zip(&predicted).map(|(y, p)| y - p).collect();
     let noise = ArModel::of(&residuals);
     let spread = covariances(&columns, &noise, residuals.len());

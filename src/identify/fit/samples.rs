@@ -3,9 +3,9 @@
 
 use super::clipped;
 use super::clipped::Clipped;
-use super::row::min_max;
 use super::settings::InitialCondition;
 use crate::identify::digits::six_digits;
+use crate::numeric::row::min_max;
 
 /// Size that no sample reaches; larger ones would overflow where they are
 /// squared and multiplied.

@@ -4,8 +4,7 @@
 use nalgebra::DMatrix;
 
 use super::autoregression::ArModel;
-use super::linear::normal_matrix;
-use super::row::dot;
+use crate::numeric::linear::{normal_matrix, norms};
 
 /// Covariances of the parameters.
 pub(super) struct Covariances {
@@ -23,7 +22,7 @@ const MIN_EIGENVALUE: f64 = 1e-11;
 
 /// Of the slopes of the prediction and the residuals' colour.
 pub(super) fn covariances(columns: &[Vec<f64>], noise: &ArModel, samples: usize) -> Covariances {
-    let sizes: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt().max(f64::MIN_POSITIVE)).collect();
+    let sizes = norms(columns);
     let p = columns.len();
     let normal = normal_matrix(columns, &sizes);
     let eigen = normal.clone().symmetric_eigen();

@@ -4,12 +4,13 @@
 use nalgebra::Complex;
 
 use super::error::FitError;
-use super::levenberg::{Minimum, minimise, solve_linear};
-use super::linear::least_squares;
 use super::problem::FitProblem;
 use super::settings::{DeadTime, OutputLevel};
+use crate::numeric::levenberg_marquardt::{Descent, LeastSquares, Minimum, minimise};
+use crate::numeric::linear::least_squares;
 use crate::numeric::lti::{Between, Simulator, TransferFunction, polynomial};
 use crate::numeric::number::to_f64;
+use crate::numeric::row::dot;
 
 /// Bandwidths of the filter, evenly spread in their logarithm.
 const BANDWIDTHS: u32 = 5;
@@ -21,6 +22,11 @@ const FINAL_STARTS: usize = 2;
 const FIRST_STEPS: usize = 8;
 const MAX_STEPS: usize = 200;
 
+/// A step whose gain is below this fraction of the residuals' variance moves no parameter by a
+/// noticeable part of its standard error: one standard error changes the sum of squares by one
+/// variance.
+const MIN_GAIN: f64 = 1e-5;
+
 /// A longer record is thinned out to at least this many samples for the search;
 /// the last descent is on all of them.
 const MIN_SEARCH_SAMPLES: usize = 2000;
@@ -29,8 +35,14 @@ const MIN_SEARCH_SAMPLES: usize = 2000;
 pub(super) fn best(problem: &FitProblem) -> Result<Minimum, FitError> {
     let factor = problem.output.len() / MIN_SEARCH_SAMPLES;
     let followed = if factor < 2 { search(problem) } else { search(&problem.decimated(factor)) };
-    let ends = followed.iter().filter_map(|start| minimise(problem, &start.theta, MAX_STEPS));
+    let ends = followed.iter().filter_map(|start| descend(problem, start, MAX_STEPS));
     ends.min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares)).ok_or(FitError::NoStart)
+}
+
+fn descend(problem: &FitProblem, start: &Minimum, max_steps: usize) -> Option<Minimum> {
+    let min_relative_gain = MIN_GAIN / to_f64(problem.output.len());
+    let descent = Descent { max_steps, max_tries: 12, min_relative_gain, max_idle_steps: 2 };
+    minimise(problem, &start.theta, descent)
 }
 
 /// The few models from which it is worth while to go on.
@@ -43,7 +55,7 @@ fn search(problem: &FitProblem) -> Vec<Minimum> {
         starts.extend(from_fewer_poles(problem));
     }
     let mut followed: Vec<Minimum> =
-        starts.iter().filter_map(|start| minimise(problem, &start.theta, FIRST_STEPS)).collect();
+        starts.iter().filter_map(|start| descend(problem, start, FIRST_STEPS)).collect();
     followed.sort_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
     followed.truncate(FINAL_STARTS);
     followed
@@ -78,6 +90,25 @@ fn with_linear_part(problem: &FitProblem, den: &[f64], dead_time_s: f64) -> Opti
     problem.project(&mut theta);
     let squares = solve_linear(problem, &mut theta)?;
     Some(Minimum { theta, sum_of_squares: squares })
+}
+
+/// Puts the parameters that act in proportion where they fit best.
+fn solve_linear(problem: &FitProblem, theta: &mut [f64]) -> Option<f64> {
+    let (numbers, columns) = problem.linear_columns(theta)?;
+    let known = match problem.level {
+        OutputLevel::Known(level) => level,
+        OutputLevel::Estimated => 0.0,
+    };
+    let target: Vec<f64> = problem.output.iter().map(|y| y - known).collect();
+    let found = least_squares(&columns, &target)?;
+    let mut left = target;
+    for ((number, value), column) in numbers.into_iter().zip(&found).zip(&columns) {
+        theta[number] = *value;
+        for (left, c) in left.iter_mut().zip(column) {
+            *left -= value * c;
+        }
+    }
+    Some(dot(&left, &left))
 }
 
 fn candidates(problem: &FitProblem) -> Vec<Minimum> {
