@@ -8,11 +8,9 @@ use super::equations::{
     BoardPlacement, CameraModel, Correspondence, Equations, FreeParameters, SHARED,
 };
 use super::factor::{Elimination, Factor};
+use crate::numeric::levenberg_marquardt::Damping;
 
 const MAX_STEPS: usize = 100;
-/// Damping at first, as a share of each equation's own weight.
-const INITIAL_DAMPING: f64 = 1e-3;
-const MIN_DAMPING: f64 = 1e-12;
 /// Damping beyond which no step leads down any more.
 const MAX_DAMPING: f64 = 1e12;
 /// Share of the squares by which a step must lessen them for another one to be
@@ -42,7 +40,7 @@ pub struct BundleFit {
 /// A step of everything together.
 struct Step {
     shared: SVector<f64, SHARED>,
-    places: Vec<DVector<f64>>,
+    placements: Vec<DVector<f64>>,
 }
 
 /// Fits what is free to the boards that lie at each place, beginning with what is
@@ -53,14 +51,15 @@ pub fn fit(
     free: FreeParameters,
     boards: &[Vec<Vec<Correspondence>>],
 ) -> Option<BundleFit> {
-    let Guess { model, placements: places } = start;
-    let squares_px2 = sum_of_squares_px2(&model, &places, boards)?;
-    let mut best = BundleFit { model, placements: places, sum_of_squares_px2: squares_px2 };
-    let mut damping = INITIAL_DAMPING;
+    let Guess { model, placements } = start;
+    let sum_of_squares_px2 = sum_of_squares_px2(&model, &placements, boards)?;
+    let mut best = BundleFit { model, placements, sum_of_squares_px2 };
+    let mut damping = Damping::up_to(MAX_DAMPING);
     for _ in 0..MAX_STEPS {
         let equations = equations(&best, free, boards)?;
-        let (next, is_last) = descend(&best, free, &equations, boards, &mut damping);
-        let Some(next) = next else { break };
+        let Some((next, is_last)) = descend(&best, free, &equations, boards, &mut damping) else {
+            break;
+        };
         best = next;
         if is_last {
             break;
@@ -76,33 +75,19 @@ fn descend(
     free: FreeParameters,
     equations: &[Equations],
     boards: &[Vec<Vec<Correspondence>>],
-    damping: &mut f64,
-) -> (Option<BundleFit>, bool) {
-    while *damping < MAX_DAMPING {
-        let tried = step(equations, free, *damping).and_then(|step| {
-            let model = from.model.moved(&step.shared);
-            let places: Vec<BoardPlacement> = from
-                .placements
-                .iter()
-                .zip(&step.places)
-                .map(|(place, by)| place.moved(by))
-                .collect();
-            let squares_px2 = sum_of_squares_px2(&model, &places, boards)?;
-            (squares_px2 <= from.sum_of_squares_px2).then_some(BundleFit {
-                model,
-                placements: places,
-                sum_of_squares_px2: squares_px2,
-            })
-        });
-        if let Some(found) = tried {
-            let is_last = from.sum_of_squares_px2 - found.sum_of_squares_px2
-                <= MIN_RELATIVE_GAIN * from.sum_of_squares_px2;
-            *damping = (*damping * 0.1).max(MIN_DAMPING);
-            return (Some(found), is_last);
-        }
-        *damping *= 10.0;
-    }
-    (None, true)
+    damping: &mut Damping,
+) -> Option<(BundleFit, bool)> {
+    let next = damping.descend(usize::MAX, |damping| {
+        let step = step(equations, free, damping)?;
+        let model = from.model.moved(&step.shared);
+        let moved = from.placements.iter().zip(&step.placements).map(|(one, by)| one.moved(by));
+        let placements: Vec<BoardPlacement> = moved.collect();
+        let sum_of_squares_px2 = sum_of_squares_px2(&model, &placements, boards)?;
+        let is_lower = sum_of_squares_px2 <= from.sum_of_squares_px2;
+        is_lower.then_some(BundleFit { model, placements, sum_of_squares_px2 })
+    })?;
+    let gain_px2 = from.sum_of_squares_px2 - next.sum_of_squares_px2;
+    Some((next, gain_px2 <= MIN_RELATIVE_GAIN * from.sum_of_squares_px2))
 }
 
 fn sum_of_squares_px2(
@@ -155,13 +140,13 @@ fn step(equations: &[Equations], free: FreeParameters, damping: f64) -> Option<S
         as_shared(&shared)
     };
     let along = DVector::from_column_slice(shared.as_slice());
-    let places = eliminated
+    let placements = eliminated
         .iter()
         .map(|(elimination, damped)| {
             elimination.placement.solve(&(&damped.placement_side - &damped.both * &along))
         })
         .collect();
-    Some(Step { shared, places })
+    Some(Step { shared, placements })
 }
 
 fn as_shared(vector: &DVector<f64>) -> SVector<f64, SHARED> {
