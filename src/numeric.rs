@@ -16,6 +16,7 @@ pub mod normal_distribution;
 pub mod normal_equations;
 pub mod number;
 pub mod rank;
+pub mod root;
 pub mod row;
 pub mod savgol;
 pub mod statistics;

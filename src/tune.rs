@@ -1,6 +1,6 @@
 //! What a bead with steps of the speed tells of its cell, and what follows from it:
 //! the bead's model, noise, rates and the robot's answer; gains with their margins;
-//! and the response that each law would have.
+//! and the response that each controller would have.
 //!
 //! ```text
 //! recorded events and steps ─▶ log ─▶ plant (bead, noise, robot, timing)
@@ -33,7 +33,7 @@ pub struct Estimated {
     pub sigma: f64,
 }
 
-/// Why a recording tells nothing of its cell.
+/// Why a recording contains no information of its cell.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TuneError {
     /// The bead does not tell its model.

@@ -12,7 +12,7 @@ use super::{BridgeError, during, grey8_mat, prepare};
 use crate::core::frame::Frame;
 use crate::core::geometry::{GridSize, ImagePoint};
 
-/// Finds the inner corners of a checkerboard, so many of them, row by row \[px\]. `None` where the whole board is not in the picture.
+/// Finds the inner corners of a checkerboard, so many of them, row by row \[px\]. `None` where the whole board is not in the image.
 ///
 /// Quads in an adaptive threshold first; where these are not found, the slower
 /// search for saddle points (Duda and Frese 2018), which sees through blur and
@@ -43,7 +43,7 @@ fn search(image: &Mat, pattern: Size, corners: &mut Vector<Point2f>) -> opencv::
     find_chessboard_corners_sb(image, pattern, corners, saddles)
 }
 
-/// How many inner corners the largest board in a picture has, columns and rows.
+/// How many inner corners the largest board in a image has, columns and rows.
 /// `None` where there is none of at least 3 by 3.
 pub fn find_any_board(frame: &Frame) -> Result<Option<GridSize>, BridgeError> {
     prepare();
@@ -64,8 +64,7 @@ mod tests {
     use crate::calibration::Camera;
     use crate::calibration::board::Board;
     use crate::core::frame::Pixels;
-    use crate::core::geometry;
-    use crate::core::geometry::Pose;
+    use crate::core::geometry::{self, Pose};
     use crate::core::time::Stamp;
     use crate::core::units::Mm;
     use crate::sim::board_studio::{BoardStudio, Exposure};

@@ -13,7 +13,7 @@ use crate::core::geometry::{ImagePoint, Roi};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeSettings {
     /// Standard deviation of the Gaussian blur before the detector \[px\]; 0
-    /// leaves the picture as it is.
+    /// leaves the image as it is.
     pub blur_sigma_px: f64,
     /// Canny's lower and upper threshold on the gradient, on a scale of 8-bit
     /// grey values with Sobel's 3x3 kernel.
@@ -35,8 +35,8 @@ pub struct Segment {
     pub to: ImagePoint,
 }
 
-/// Straight edges within a region of the picture, in raw image pixels. No line
-/// at all is an empty list; a region outside the picture is an error. The
+/// Straight edges within a region of the image, in raw image pixels. No line
+/// at all is an empty list; a region outside the image is an error. The
 /// answer depends only on the arguments.
 pub fn canny_hough(
     frame: &Frame,
@@ -115,7 +115,7 @@ impl LineFinder {
 }
 
 /// A pixel index as OpenCV counts; the region has been checked to lie within a
-/// picture that OpenCV holds.
+/// image that OpenCV holds.
 fn coordinate(px: usize) -> i32 {
     i32::try_from(px).unwrap_or(i32::MAX)
 }

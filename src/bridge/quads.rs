@@ -1,4 +1,4 @@
-//! Dark quadrilaterals in a picture: what may be a marker.
+//! Dark quadrilaterals in a image: what may be a marker.
 
 use nalgebra::Point2;
 use opencv::core::{Mat, Point, Vector};
@@ -20,11 +20,11 @@ const MIN_DARKNESS: f64 = 7.0;
 const MIN_PERIMETER_PX: f64 = 36.0;
 /// Least area over that of a square with the same circumference.
 const MIN_FULLNESS: f64 = 0.25;
-/// How far an outline may be off straight sides, as a share of its length.
+/// How far an outline may be off straight sides, as a fraction of its length.
 const STRAIGHT_TOLERANCE: f64 = 0.04;
 
 /// Corners of dark convex quadrilaterals \[px\], to about a pixel, in the order in which
-/// they are passed clockwise in the picture. The same one may be found several times.
+/// they are passed clockwise in the image. The same one may be found several times.
 pub fn find_quads(frame: &Frame) -> Result<Vec<[ImagePoint; 4]>, BridgeError> {
     prepare();
     let image = grey8_mat(frame)?;

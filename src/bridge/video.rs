@@ -14,7 +14,7 @@ use crate::core::frame::{Channel, Frame, Pixels, SampleLayout};
 use crate::core::geometry::Size;
 use crate::core::time::Stamp;
 
-/// Where moving pictures come from.
+/// Where moving images come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum VideoInput {
     /// A video file.
@@ -22,11 +22,11 @@ pub enum VideoInput {
     /// A camera by its number.
     Camera(i32),
     /// A GStreamer pipeline. It may end in an `appsink` of its own; where it
-    /// names none, one that keeps only the newest picture is added.
+    /// names none, one that keeps only the newest image is added.
     Pipeline(String),
 }
 
-/// Reads pictures one after the other.
+/// Reads images one after the other.
 #[derive(Debug)]
 pub struct VideoReader {
     capture: VideoCapture,
@@ -58,7 +58,7 @@ impl VideoReader {
         }
         match input {
             VideoInput::File(_) => keep_grey_grey(&mut capture),
-            // Fewer pictures in the queue are fresher pictures. Not every
+            // Fewer images in the queue are fresher images. Not every
             // driver can; it makes no difference to what is read.
             VideoInput::Camera(_) => drop(capture.set(CAP_PROP_BUFFERSIZE, 1.0)),
             VideoInput::Pipeline(_) => {}
@@ -66,13 +66,13 @@ impl VideoReader {
         Ok(Self { capture, image: Mat::default() })
     }
 
-    /// Waits for the next picture without decoding it, so that the moment can
-    /// be noted. `false` at the end, or where no picture comes.
+    /// Waits for the next image without decoding it, so that the moment can
+    /// be noted. `false` at the end, or where no image comes.
     pub fn grab(&mut self) -> Result<bool, BridgeError> {
         self.capture.grab().map_err(during(READ))
     }
 
-    /// Decodes the picture that was grabbed. `None` where it cannot be.
+    /// Decodes the image that was grabbed. `None` where it cannot be.
     pub fn retrieve(
         &mut self,
         channel: Channel,
@@ -86,13 +86,13 @@ impl VideoReader {
         frame_of(&self.image, channel, seq, captured_at).map(Some)
     }
 
-    /// Pictures a second, where the input says so.
+    /// Images a second, where the input says so.
     pub fn fps(&self) -> Option<f64> {
         let fps = self.capture.get(CAP_PROP_FPS).ok()?;
         (fps.is_finite() && fps > 0.0).then_some(fps)
     }
 
-    /// Pictures in the file as its header has them, which may be an estimate.
+    /// Images in the file as its header has them, which may be an estimate.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -116,7 +116,7 @@ fn refusal(input: &VideoInput) -> &'static str {
     }
 }
 
-/// Asks for 16-bit grey pictures as they are stored; by default every picture
+/// Asks for 16-bit grey images as they are stored; by default every image
 /// is turned into 8-bit colour. OpenCV can from 4.7 on.
 fn keep_grey_grey(capture: &mut VideoCapture) {
     let deep_grey = f64::from(u32::from_le_bytes(*b"Y1\0\x10"));

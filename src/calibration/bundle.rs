@@ -1,6 +1,6 @@
-//! Camera, bend of the board and places of the boards that fit the corners best:
-//! least squares over all of them together (bundle adjustment), by Levenberg's and
-//! Marquardt's method.
+//! Bundle adjustment: camera, bend of the board and poses of the boards that minimise the
+//! squared reprojection errors (Triggs et al. 2000, *Bundle adjustment – a modern synthesis*),
+//! by the Levenberg-Marquardt method with the poses eliminated from the normal equations.
 
 use nalgebra::{DVector, SMatrix, SVector};
 
@@ -10,42 +10,43 @@ use super::equations::{
 use super::factor::{Elimination, Factor};
 use crate::numeric::levenberg_marquardt::Damping;
 
+/// Limit of accepted steps; a fit that needs more does not converge.
 const MAX_STEPS: usize = 100;
-/// Damping beyond which no step leads down any more.
+/// Damping beyond which steps are too short to lower the sum of squares.
 const MAX_DAMPING: f64 = 1e12;
-/// Share of the squares by which a step must lessen them for another one to be
-/// worth while.
+/// Smallest relative decrease of the sum of squares for which another step is taken: above the
+/// rounding of the sum.
 const MIN_RELATIVE_GAIN: f64 = 1e-13;
 
-/// What is roughly known before a fit.
+/// Initial values of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Guess {
     /// The camera and the board's bend.
     pub model: CameraModel,
-    /// Where the boards lie, in the order of the pictures.
+    /// Poses of the boards, in the order of the images.
     pub placements: Vec<BoardPlacement>,
 }
 
-/// What fits best.
+/// Result of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BundleFit {
     /// The camera and the board's bend.
     pub model: CameraModel,
-    /// Where the boards lie, in the order of the pictures.
+    /// Poses of the boards, in the order of the images.
     pub placements: Vec<BoardPlacement>,
-    /// Sum of the squares of what is left \[px²\].
+    /// Sum of the squared reprojection errors \[px²\].
     pub sum_of_squares_px2: f64,
 }
 
-/// A step of everything together.
+/// A step of all parameters.
 struct Step {
     shared: SVector<f64, SHARED>,
     placements: Vec<DVector<f64>>,
 }
 
-/// Fits what is free to the boards that lie at each place, beginning with what is
-/// roughly known. `None` where a board is behind the camera from the start, or a
-/// number never becomes finite.
+/// Fits the free parameters to the corners of the boards, a list of boards for each placement.
+/// `None` where a board of the initial guess is behind the camera, or a parameter is not
+/// finite.
 pub fn fit(
     start: Guess,
     free: FreeParameters,
@@ -68,8 +69,8 @@ pub fn fit(
     best.model.camera.numbers().iter().all(|number| number.is_finite()).then_some(best)
 }
 
-/// The next better fit, and whether it is as good as the last; `None` where no step
-/// leads down.
+/// The next better fit, and whether its gain is negligible; `None` where no step lowers the sum
+/// of squares.
 fn descend(
     from: &BundleFit,
     free: FreeParameters,
@@ -109,7 +110,7 @@ fn equations(
     each.map(|(place, boards)| Equations::of(&at.model, free, place, boards)).collect()
 }
 
-/// Solves the damped equations, the places eliminated first.
+/// Solves the damped equations, with the placements eliminated.
 fn step(equations: &[Equations], free: FreeParameters, damping: f64) -> Option<Step> {
     let mut left = SMatrix::<f64, SHARED, SHARED>::zeros();
     let mut side = SVector::<f64, SHARED>::zeros();
@@ -131,7 +132,7 @@ fn step(equations: &[Equations], free: FreeParameters, damping: f64) -> Option<S
         for i in 0..SHARED {
             let own: f64 = equations.iter().map(|one| one.shared[(i, i)]).sum();
             left[(i, i)] += damping * own;
-            // What is not free is told by nothing, whatever rounding leaves of it.
+            // Rows of fixed parameters hold rounding errors only.
             if !free.has(i) {
                 left[(i, i)] = 0.0;
             }

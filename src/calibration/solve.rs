@@ -1,4 +1,4 @@
-//! From pictures of a board to the camera model.
+//! The camera model from images of a board.
 
 pub mod data;
 mod error;
@@ -9,22 +9,19 @@ pub use solution::{BoardView, Solution};
 
 use super::board::Board;
 use super::board_observation::BoardObservation;
-use super::bundle;
-use super::bundle::{BundleFit, Guess};
-use super::camera::NUMBERS;
+use super::bundle::{self, BundleFit, Guess};
 use super::equations::{BoardPlacement, CameraModel, Correspondence, FreeParameters, SHARED};
 use super::homography;
+#[cfg(test)]
 use super::lens::Lens;
-use super::lens_selection;
-use super::lens_selection::LensTrial;
-use super::view_information;
-use super::view_information::ViewInformation;
+use super::lens_selection::{self, LensTrial};
+use super::view_information::{self, ViewInformation};
 use crate::core::geometry::{ImagePoint, Pose};
 use data::{CalibrationData, root_mean_square};
 use error::MAX_RMS_PX;
 
-/// Fits the camera to sightings that are all of one size, with the lens and the bend
-/// of the board that foretell pictures best which took no part in the fit.
+/// Fits the camera to images of one size, with the lens model and the bend of the board of
+/// least cross-validation error.
 pub fn solve(board: &Board, sightings: &[BoardObservation]) -> Result<Solution, SolveError> {
     let views = CalibrationData::of(board, sightings)?;
     let (fit, free, trials) = lens_selection::best(&views)
@@ -32,7 +29,8 @@ pub fn solve(board: &Board, sightings: &[BoardObservation]) -> Result<Solution, 
     solution(&views, sightings, &fit, free, trials)
 }
 
-/// The same with a lens that is given, on a flat board.
+/// The same with a given lens, on a flat board.
+#[cfg(test)]
 pub fn solve_with(
     board: &Board,
     sightings: &[BoardObservation],
@@ -88,8 +86,7 @@ fn solution(
     })
 }
 
-/// The pose of a board before a camera that is known. `None` where the corners fit
-/// none.
+/// Pose of a board before a known camera. `None` where the corners fit none.
 pub fn pose(model: &CameraModel, corners: &[Correspondence]) -> Option<Pose> {
     let start = homography::board_pose(&model.camera, corners)?;
     let fit = bundle::fit(
@@ -100,8 +97,8 @@ pub fn pose(model: &CameraModel, corners: &[Correspondence]) -> Option<Pose> {
     fit.placements.first().map(|place| place.pose)
 }
 
-/// Errors of one picture by this crate's own camera model, the one that
-/// measures later; a corner that it cannot project counts as infinitely far.
+/// Reprojection errors of one image by the camera model that measures later; a corner that
+/// cannot be projected counts as infinitely far.
 fn view(
     model: &CameraModel,
     sighting: &BoardObservation,
@@ -128,18 +125,12 @@ fn view(
     }
 }
 
-/// The names of the shared numbers, in order.
-pub const SHARED_NAMES: [&str; SHARED] = {
-    let mut names = [""; SHARED];
-    let mut i = 0;
-    while i < NUMBERS {
-        names[i] = super::camera::NAMES[i];
-        i += 1;
-    }
-    names[NUMBERS] = "bend along rows";
-    names[NUMBERS + 1] = "bend along columns";
-    names
-};
+/// Names of the shared parameters, in order.
+#[rustfmt::skip]
+pub const SHARED_NAMES: [&str; SHARED] = [
+    "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6",
+    "bend along rows", "bend along columns",
+];
 
 #[cfg(test)]
 mod tests;

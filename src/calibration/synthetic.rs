@@ -19,7 +19,7 @@ pub fn board() -> Board {
     Board::new(9, 6, Mm::constant(20.0)).unwrap()
 }
 
-/// A dozen poses of the board around the picture, tilted to all sides.
+/// A dozen poses of the board around the image, tilted to all sides.
 pub fn poses() -> Vec<Pose> {
     (0..12_u32)
         .map(|i| {
@@ -40,12 +40,12 @@ pub fn corners(pose: &Pose, mut off: impl FnMut() -> f64) -> Vec<ImagePoint> {
     board_mm.into_iter().map(seen).map(|p| ImagePoint::new(p.x + off(), p.y + off())).collect()
 }
 
-/// The same as the corners that a picture shows.
+/// The same as the corners that a image shows.
 pub fn seen(pose: &Pose, off: impl FnMut() -> f64) -> Vec<CornerObservation> {
     observe_all(&corners(pose, off))
 }
 
-/// The same as a picture.
+/// The same as a image.
 pub fn sighting(name: &str, pose: &Pose, off: impl FnMut() -> f64) -> BoardObservation {
     BoardObservation {
         name: name.to_owned(),

@@ -1,21 +1,21 @@
-//! What a model leaves: whether it still hangs together.
+//! Autocorrelation of the residuals of a model.
 
 use crate::numeric::number::to_f64;
 
-/// Of a normal variable 99 % lie within so many standard deviations.
+/// Derived: Φ⁻¹(0.995), the bound of 99 % of a normal variable in standard deviations.
 const NORMAL_99: f64 = 2.5758;
 
-/// How much a row repeats itself.
+/// The sample autocorrelation of a row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Autocorrelation {
-    /// Correlation with itself so many samples later, from 0 on, where it is 1.
+    /// Correlation by lag in samples, from 0, where it is 1.
     pub lags: Vec<f64>,
-    /// 99 % of the lags of white noise lie within plus and minus this.
+    /// 99 % of the lags of white noise are within ± this (Bartlett 1946).
     pub bound: f64,
 }
 
 impl Autocorrelation {
-    /// Up to a lag; of a row about its mean.
+    /// Up to a lag, about the mean of the row.
     pub fn of(row: &[f64], longest: usize) -> Self {
         let n = to_f64(row.len().max(1));
         let mean = row.iter().sum::<f64>() / n;
@@ -30,8 +30,7 @@ impl Autocorrelation {
         Self { lags: (0..=longest).map(correlation).collect(), bound: NORMAL_99 / n.sqrt() }
     }
 
-    /// Share of the lags from 1 on that white noise would hardly have: some 1 %
-    /// of them for white noise.
+    /// Fraction of the lags from 1 on that exceed the bound; about 1 % for white noise.
     pub fn fraction_outside(&self) -> f64 {
         let lags = self.lags.get(1..).unwrap_or_default();
         let outside = lags.iter().filter(|lag| lag.abs() > self.bound).count();

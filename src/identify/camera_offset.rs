@@ -1,22 +1,20 @@
-//! How far behind the nozzle the camera looks, from a bead whose speed changed while it
-//! was laid.
+//! Distance from the nozzle to the camera's gauge, from a bead whose speed changed while it was
+//! laid.
 //!
-//! A width that was measured while the nozzle was at the path p is that of bead laid at
-//! p − d. The bead is w = A·(v/v₀)^−b with the speed v that the robot reported there, in
-//! the mean over the gauge. For every d the level and b are fitted to ln w by least
-//! squares; what is left is least at the offset, and how steeply it grows there says how
-//! well the offset is known.
+//! A width that is measured while the nozzle is at path position p belongs to bead laid at p −
+//! d. The bead is w = A·(v/v₀)^−b, with the reported speed v averaged over the gauge. For each
+//! d, the level and b are fitted to ln w by least squares. The sum of squares is smallest at
+//! the offset, and its curvature gives the standard error.
 //!
-//! Widths are no independent numbers: gauges overlap, the bead is wavy and the flow
-//! drifts, and a controller answers to all that with the very speed that is looked at
-//! here. So widths are taken together over a gauge's length, and what is left of them is
-//! taken for independent noise on a course that wanders along the path, both as large as
-//! is likeliest. The squares are those of what each differs from what the ones before it
-//! foretell (`whiten`): a drift counts neither as many observations nor, where the
-//! controller follows it, as an answer of the bead to the speed (Ljung 1999, *System
-//! identification*, section 13.4, the direct approach). That is chosen over a bootstrap
-//! of blocks because a bead with a few steps of the speed has too few blocks, and over a
-//! number of effective samples because that leaves the answer itself as it is.
+//! Widths are not independent: gauges overlap, the bead is rough, the flow drifts, and a
+//! controller changes the very speed that is used here. Widths are therefore averaged over a
+//! gauge length, and their residuals are modelled as independent noise plus a first-order
+//! autoregressive process along the path, both with maximum likelihood. The sum of squares is
+//! that of the normalised innovations (`whiten`): a drift counts neither as many observations
+//! nor, where the controller follows it, as a response of the bead to the speed (Ljung 1999,
+//! *System identification*, section 13.4, the direct approach). A block bootstrap is not used
+//! because a bead with a few speed steps has too few blocks, and an effective sample size is
+//! not used because it would leave the estimate itself biased.
 
 mod data;
 mod error;
@@ -41,36 +39,36 @@ use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 
-/// Change of the speed below which no width shows it.
+/// Relative change of the speed below which no width responds measurably. A choice.
 const MIN_SPEED_CHANGE: f64 = 0.01;
-/// Part of a bead's speeds, at either end, that does not count as their range.
+/// Fraction of a bead's speeds at either end that is excluded from their range.
 const TAIL_FRACTION: f64 = 0.02;
-/// Squares, in units of the noise, by which a speed that tells must lessen what is left:
-/// five standard deviations, because many offsets are tried.
+/// Decrease of the sum of squares by the speed, in units of the noise variance, below which the
+/// speed has no effect. Derived: five standard deviations squared, for the many offsets that
+/// are tried.
 const MIN_GAIN: f64 = 25.0;
-/// Another offset is as good if it is worse by no more than four standard deviations, or
-/// explains nine tenths of what the best one does.
+/// Another offset is as good if its sum of squares is larger by at most four standard
+/// deviations squared, or if it explains nine tenths of what the best one does.
 const NEARLY_AS_GOOD: NearlyAsGood = NearlyAsGood { worse: 16.0, explained: 0.9 };
-/// Those that explain this part of it are held against the best.
+/// Offsets that explain this fraction of what the best one does are compared with it.
 const MIN_RIVAL_FRACTION: f64 = 0.4;
-/// Times that offset, exponent, noise and the widths that count are found anew.
+/// Limit of the iterations of offset, exponent, noise and outliers.
 const MAX_ITERATIONS: usize = 8;
-/// Change of the offset below which they are settled \[mm\].
+/// Change of the offset below which the iteration has converged \[mm\].
 const SETTLED_MM: f64 = 0.01;
 
-/// A width that was measured.
+/// A measured width with its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimedWidth {
     /// When its frame was captured.
     pub at: Stamp,
     /// The width.
     pub width: Mm,
-    /// Its standard deviation, as the measurement believes it; only how these compare
-    /// with each other counts.
+    /// Its standard deviation according to the measurement; only ratios matter.
     pub sigma: Mm,
 }
 
-/// Where an offset is looked for.
+/// Range of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OffsetSearch {
     /// Length of the gauge along the bead.
@@ -79,8 +77,7 @@ pub struct OffsetSearch {
     pub max_offset: Mm,
 }
 
-/// Finds the offset from what the robot reported, in order, and the widths that were
-/// measured meanwhile.
+/// The offset from the robot's reports, in order, and the measured widths.
 pub fn find(
     states: &[(Stamp, RobotState)],
     widths: &[TimedWidth],
@@ -89,7 +86,7 @@ pub fn find(
     study(states, widths, search).map(|study| study.estimate)
 }
 
-/// The same with all that is known of the bead.
+/// The same with the fitted model of the bead.
 pub fn study(
     states: &[(Stamp, RobotState)],
     widths: &[TimedWidth],
@@ -148,7 +145,7 @@ fn observed(course: &LaidSpeeds, width: &TimedWidth) -> Option<BeadObservation> 
     })
 }
 
-/// Offset, exponent, noise and the widths that count, which fit each other.
+/// Consistent offset, exponent, noise and set of widths.
 struct Converged {
     used: Vec<BeadObservation>,
     noise: WidthNoise,
@@ -156,7 +153,7 @@ struct Converged {
     best: offset_profile::OffsetFit,
 }
 
-/// Finds them in turn, each with what is known of the others.
+/// Estimates them in turn until they do not change.
 fn iterate(
     course: &LaidSpeeds,
     looks: &[BeadObservation],
@@ -197,7 +194,7 @@ fn iterate(
 }
 
 impl Converged {
-    /// Whether the best offset is one that the widths tell.
+    /// Whether the widths determine the best offset.
     fn check(
         &self,
         course: &LaidSpeeds,
@@ -212,7 +209,7 @@ impl Converged {
         }
         let rival =
             profile.rivals(best, farthest.get(), MIN_RIVAL_FRACTION).into_iter().find(|&rival| {
-                // Held against each other by widths that both can foretell.
+                // Compared on the widths that both can predict.
                 let both = |look: &&BeadObservation| {
                     [best.offset_mm, rival].iter().all(|&d| course.covers(look, d, search.gauge))
                 };

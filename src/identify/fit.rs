@@ -20,9 +20,9 @@
 //! is where the input stood before the first sample ([`Before`]); the output
 //! level is estimated unless it is known ([`Level`]).
 //!
-//! **Standard errors.** The output of an extruder carries coloured noise, and
+//! **Standard errors.** The output of an extruder carries autocorrelated noise, and
 //! errors that take it as white come out too small. [`Parameter`] gives both:
-//! `sigma` allows for the residuals' own colour (an autoregressive model of them
+//! `sigma` allows for the residuals' autocorrelation (an autoregressive model of them
 //! between the two halves of the sandwich), `sigma_if_white` does not.
 
 mod autoregression;
@@ -44,7 +44,7 @@ mod spread;
 mod start;
 mod trend;
 
-pub use clipped::{Clipped, Column, Extreme};
+pub use clipped::{Clipped, Extreme};
 pub use compare::{ComparedModel, ModelComparison, compare};
 pub use detrended::DetrendedGain;
 pub use error::FitError;
@@ -68,15 +68,11 @@ pub fn fit(samples: &Samples, settings: &FitSettings) -> Result<Fit, FitError> {
     let best = start::best(&problem)?;
     let straight_through = settings.structure.zeros() == settings.structure.poles();
     match settings.dead_time {
-        DeadTime::Estimated { min_s: least_s, max_s: most_s }
+        DeadTime::Estimated { min_s, max_s }
             if straight_through && settings.between == Between::Held =>
         {
-            with_dead_time_to_a_step(
-                samples,
-                settings,
-                [least_s, most_s],
-                problem.dead_time_s(&best.theta),
-            )
+            let near_s = problem.dead_time_s(&best.theta);
+            with_dead_time_to_a_step(samples, settings, [min_s, max_s], near_s)
         }
         _ => report::report(&problem, settings, &best),
     }
@@ -85,19 +81,19 @@ pub fn fit(samples: &Samples, settings: &FitSettings) -> Result<Fit, FitError> {
 /// Whole steps on either side of the first estimate that are tried.
 const NEIGHBOUR_STEPS: u32 = 2;
 
-/// With as many zeros as poles and a held input, a dead time within a step is
-/// another numerator: only the whole step can be told.
+/// With as many zeros as poles and a held input, a dead time within a step is equivalent to
+/// another numerator: only the whole step is identifiable.
 fn with_dead_time_to_a_step(
     samples: &Samples,
     settings: &FitSettings,
-    [least_s, most_s]: [f64; 2],
+    [min_s, max_s]: [f64; 2],
     near_s: f64,
 ) -> Result<Fit, FitError> {
     let dt_s = samples.dt_s();
     let first = (near_s / dt_s).floor() - f64::from(NEIGHBOUR_STEPS);
     let whole = (0..=2 * NEIGHBOUR_STEPS + 1).map(|k| (first + f64::from(k)) * dt_s);
     let mut found = Vec::new();
-    for dead_time_s in whole.filter(|dead_time_s| (least_s..=most_s).contains(dead_time_s)) {
+    for dead_time_s in whole.filter(|dead_time_s| (min_s..=max_s).contains(dead_time_s)) {
         let settings = FitSettings { dead_time: DeadTime::Known(dead_time_s), ..*settings };
         let problem = FitProblem::new(samples, &settings);
         found.extend(start::best(&problem).ok().map(|best| (settings, problem, best)));
@@ -105,8 +101,8 @@ fn with_dead_time_to_a_step(
     let least = found.iter().min_by(|a, b| a.2.sum_of_squares.total_cmp(&b.2.sum_of_squares));
     let (settings, problem, best) = least.ok_or(FitError::NoStart)?;
     let dead_time_s = problem.dead_time_s(&[]);
-    if dead_time_s + dt_s > most_s {
-        return Err(FitError::DeadTimeAtBound { end: "upper", bound_s: most_s });
+    if dead_time_s + dt_s > max_s {
+        return Err(FitError::DeadTimeAtBound { end: "upper", bound_s: max_s });
     }
     let mut fit = report::report(problem, settings, best)?;
     fit.notes.push(FitNote::DeadTimeToAStep { dead_time_s });

@@ -1,23 +1,23 @@
-//! The flow at the nozzle from the bead that it left: surface speed times area,
-//! both of the moment of extrusion (bcs-thesis, eq. (20)).
+//! The flow at the nozzle from the laid bead: surface speed times area, both at the moment of
+//! extrusion (bcs-thesis, eq. (20)).
 
 use super::align::{AlignError, to_extruded};
 
-/// What was logged of a bead, a value each a sample.
+/// A logged bead, one value per sample.
 #[derive(Debug, Clone, Copy)]
 pub struct LoggedBead<'a> {
-    /// Way of the surface below the nozzle \[mm\]; only grows.
+    /// Position of the surface below the nozzle \[mm\]; only grows.
     pub position_mm: &'a [f64],
     /// Its speed \[mm/s\].
     pub speed_mm_per_s: &'a [f64],
-    /// Area of the section that is being measured \[mm²\].
+    /// Area of the measured section \[mm²\].
     pub area_mm2: &'a [f64],
-    /// Way from the nozzle to where it is measured \[mm\].
+    /// Distance from the nozzle to the measurement \[mm\].
     pub offset_mm: f64,
 }
 
-/// Flow \[mm³/s\] at the moments of the samples. Shorter than the log by those
-/// whose material has not been measured when it ends.
+/// Flow \[mm³/s\] at the moments of the samples. Shorter than the log by the samples whose
+/// material was not measured before the end.
 pub fn extruded(logged: &LoggedBead<'_>) -> Result<Vec<f64>, AlignError> {
     let areas = to_extruded(logged.position_mm, logged.area_mm2, logged.offset_mm)?;
     let areas: Vec<f64> = areas.into_iter().map_while(|area| area).collect();

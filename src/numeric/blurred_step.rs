@@ -11,14 +11,14 @@ const ENTRIES_PER_SD: f64 = 64.0;
 /// Fraction of the variance up to which a box is none.
 const MIN_BOX_FRACTION: f64 = 1e-6;
 
-/// A blurred step at a place.
+/// A blurred step at a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Entry {
     /// Fraction of the step that is reached.
     fraction: f64,
     /// Its slope.
     density: f64,
-    /// What the integral of the share up to here is beyond z times the share.
+    /// What the integral of the fraction up to here is beyond z times the fraction.
     tail: f64,
 }
 
@@ -55,14 +55,14 @@ impl StepTable {
         self.box_fraction
     }
 
-    /// Share of the step and its slope.
+    /// Fraction of the step and its slope.
     #[inline]
     pub fn at(&self, z: f64) -> (f64, f64) {
         let entry = self.entry(z);
         (entry.fraction, entry.density)
     }
 
-    /// Share of the step, its slope, and the levels of two slopes that begin at the
+    /// Fraction of the step, its slope, and the levels of two slopes that begin at the
     /// step, blurred like it: one that falls towards it and one that rises after it.
     #[inline]
     pub fn with_slopes(&self, z: f64) -> (f64, f64, [f64; 2]) {

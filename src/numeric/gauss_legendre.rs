@@ -1,6 +1,6 @@
 //! Integrals by a few values of a function.
 
-/// Places and weights of the Gauss–Legendre rule of five places, on −1 to 1; the
+/// Positions and weights of the Gauss–Legendre rule of five positions, on −1 to 1; the
 /// weights add up to 2.
 pub const GAUSS_LEGENDRE_5: [(f64, f64); 5] = [
     (-0.906_179_845_938_664, 0.236_926_885_056_189),

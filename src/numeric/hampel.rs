@@ -77,11 +77,11 @@ impl Hampel {
     fn judge(&self, sample: f64, seen: impl Iterator<Item = f64>, scratch: &mut Vec<f64>) -> f64 {
         scratch.clear();
         scratch.extend(seen.filter(|value| value.is_finite()));
-        let Some(middle) = median(scratch) else { return sample };
+        let Some(middle) = rank::mean_median(scratch) else { return sample };
         for value in scratch.iter_mut() {
             *value = (*value - middle).abs();
         }
-        let deviation = median(scratch).unwrap_or(0.0);
+        let deviation = rank::mean_median(scratch).unwrap_or(0.0);
         let is_inlier =
             (sample - middle).abs() <= self.threshold * rank::SIGMA_PER_MEDIAN * deviation;
         if is_inlier { sample } else { middle }
@@ -117,18 +117,6 @@ impl LiveHampel {
         self.next = (self.next + 1) % length;
         self.filter.judge(sample, self.ring.iter().copied(), &mut self.scratch)
     }
-}
-
-/// The middle value, or the mean of the two: windows at the ends may have an
-/// even number of samples.
-fn median(values: &mut [f64]) -> Option<f64> {
-    let count = values.len();
-    let upper = rank::median(values)?;
-    if count % 2 == 1 {
-        return Some(upper);
-    }
-    let lower = rank::at(values, (count / 2).checked_sub(1)?)?;
-    Some(f64::midpoint(lower, upper))
 }
 
 #[cfg(test)]

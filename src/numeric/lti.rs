@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! process::{FirstOrder, SecondOrder} → TransferFunction
-//!   → discretise(dt, Method) → DiscreteTransfer → Recursion::step(u) → y
+//!   → discretise(dt, method) → DiscreteTransfer
 //!   → Simulator::new(tf, dt, Between) → step(u) → y      (exact, any dead time)
 //!   → margins(loop)
 //! ```
@@ -18,7 +18,7 @@ mod simulate;
 mod state;
 mod transfer;
 
-pub use discrete::{DiscreteTransfer, DiscretisationMethod, Recursion};
+pub use discrete::{DiscreteTransfer, DiscretisationMethod};
 pub use margins::{StabilityMargins, margins};
 pub use process::{FirstOrder, SecondOrder};
 pub use simulate::{Between, Simulator, simulate};

@@ -1,10 +1,32 @@
-//! Numbers as numbers of another kind, where nothing that counts is lost: places
+//! Numbers as numbers of another kind, where nothing that counts is lost: positions
 //! and counts are small, and a quantity of seven digits is enough for a pixel.
 
-/// A count or a whole place as a number.
-#[expect(clippy::cast_precision_loss, reason = "counts and places are small")]
-pub fn to_f64(number: usize) -> f64 {
-    number as f64
+/// A count or an index as a number.
+#[inline]
+pub fn to_f64(number: impl Count) -> f64 {
+    number.to_f64()
+}
+
+/// An integer that counts something; exact as a number up to 2⁵³.
+pub trait Count {
+    /// The same as a number.
+    fn to_f64(self) -> f64;
+}
+
+impl Count for usize {
+    #[expect(clippy::cast_precision_loss, reason = "counts and places are small")]
+    #[inline]
+    fn to_f64(self) -> f64 {
+        self as f64
+    }
+}
+
+impl Count for u64 {
+    #[expect(clippy::cast_precision_loss, reason = "counts are small")]
+    #[inline]
+    fn to_f64(self) -> f64 {
+        self as f64
+    }
 }
 
 /// The same in single precision.
@@ -19,11 +41,18 @@ pub fn narrow_to_f32(value: f64) -> f32 {
     value as f32
 }
 
-/// The last whole place that is not beyond a position.
+/// The last whole position that is not beyond a position.
 #[expect(clippy::cast_possible_truncation, reason = "positions are some thousand pixels")]
 #[inline(always)]
 pub fn floor_to_index(position: f64) -> isize {
     position.floor() as isize
+}
+
+/// The whole part of a number; 0 for a negative number and for NaN, saturating at the largest.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+#[inline]
+pub fn to_count(number: f64) -> usize {
+    number as usize
 }
 
 /// The nearest number of rows or pixels; 0 of less than none.

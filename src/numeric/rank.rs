@@ -3,6 +3,8 @@
 
 use std::cmp::Ordering;
 
+use super::number::{to_count, to_f64};
+
 /// Standard deviation of normal numbers over the median of their magnitudes.
 pub const SIGMA_PER_MEDIAN: f64 = 1.4826;
 
@@ -41,6 +43,27 @@ pub fn median<T: Ordered>(values: &mut [T]) -> Option<T> {
     at(values, middle)
 }
 
+/// The median of numbers from an iterator; the upper one of an even number. `None` of none.
+pub fn median_of(values: impl Iterator<Item = f64>) -> Option<f64> {
+    median(&mut values.collect::<Vec<_>>())
+}
+
+/// The median; the mean of the middle two of an even number. `None` of none.
+pub fn mean_median(values: &mut [f64]) -> Option<f64> {
+    let count = values.len();
+    let upper = median(values)?;
+    if count % 2 == 1 {
+        return Some(upper);
+    }
+    Some(f64::midpoint(at(values, count / 2 - 1)?, upper))
+}
+
+/// The value at the rank nearest to a fraction of the way from the smallest to the largest.
+/// `None` of none.
+pub fn quantile(values: &mut [f64], fraction: f64) -> Option<f64> {
+    at(values, to_count((fraction * to_f64(values.len().saturating_sub(1))).round()))
+}
+
 /// Median of how far values lie from `median`; their magnitudes are left in their place.
 /// `None` of none.
 #[inline(always)]
@@ -62,6 +85,21 @@ mod tests {
         assert_eq!(median(&mut values), Some(5.0));
         assert_eq!(median(&mut values[..0]), None);
         assert_eq!(at(&mut [1.0f32], 1), None);
+    }
+
+    #[test]
+    fn the_median_of_an_even_number_lies_between_the_middle_two() {
+        assert_eq!(mean_median(&mut [4.0, 1.0, 3.0, 2.0]), Some(2.5));
+        assert_eq!(mean_median(&mut [3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(mean_median(&mut []), None);
+    }
+
+    #[test]
+    fn a_quantile_is_the_value_at_the_nearest_rank() {
+        let mut values: Vec<f64> = (0..=100).rev().map(f64::from).collect();
+        assert_eq!(quantile(&mut values, 0.99), Some(99.0));
+        assert_eq!(quantile(&mut [7.0, 5.0], 0.5), Some(7.0));
+        assert_eq!(quantile(&mut [], 0.5), None);
     }
 
     #[test]

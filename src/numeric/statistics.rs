@@ -1,5 +1,7 @@
 //! Statistics of numbers that come one at a time, in constant memory.
 
+use super::number::{to_count, to_f64};
+
 /// Mean and standard deviation by Welford's recurrence.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Moments {
@@ -16,7 +18,7 @@ impl Moments {
         }
         self.count += 1;
         let delta = value - self.mean;
-        self.mean += delta / as_f64(self.count);
+        self.mean += delta / to_f64(self.count);
         self.squares += delta * (value - self.mean);
     }
 
@@ -32,13 +34,13 @@ impl Moments {
 
     /// Their sample standard deviation (n − 1); none of fewer than two.
     pub fn std(&self) -> Option<f64> {
-        (self.count > 1).then(|| (self.squares / as_f64(self.count - 1)).sqrt())
+        (self.count > 1).then(|| (self.squares / to_f64(self.count - 1)).sqrt())
     }
 
     /// The root of the mean of their squares.
     pub fn rms(&self) -> Option<f64> {
         let mean = self.mean()?;
-        Some((self.squares / as_f64(self.count) + mean * mean).sqrt())
+        Some((self.squares / to_f64(self.count) + mean * mean).sqrt())
     }
 }
 
@@ -121,11 +123,11 @@ impl Distribution {
         (self.total > 0).then_some(self.largest)
     }
 
-    /// The smallest number that at least the share `q` of all do not exceed.
+    /// The smallest number that at least the fraction `q` of all do not exceed.
     pub fn quantile(&self, q: f64) -> Option<f64> {
-        let mut left = (as_f64(self.total) * q.clamp(0.0, 1.0)).max(1.0);
+        let mut left = (to_f64(self.total) * q.clamp(0.0, 1.0)).max(1.0);
         for (index, count) in self.counts.iter().enumerate() {
-            left -= as_f64(*count);
+            left -= to_f64(*count);
             if left <= 0.0 && *count > 0 {
                 if index == 0 {
                     return Some(self.least);
@@ -158,27 +160,14 @@ impl Distribution {
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to the buckets; the cast of NaN is 0"
-)]
 fn bucket(value: f64) -> usize {
     let octaves = value.max(f64::MIN_POSITIVE).log2() - f64::from(OCTAVES.start);
-    ((octaves * as_f64(PER_OCTAVE as u64)).max(0.0) as usize).min(BUCKETS - 1)
+    to_count(octaves * to_f64(PER_OCTAVE)).min(BUCKETS - 1)
 }
 
 fn bounds(index: usize) -> (f64, f64) {
-    let at = |index: usize| {
-        (as_f64(index as u64) / as_f64(PER_OCTAVE as u64) + f64::from(OCTAVES.start)).exp2()
-    };
+    let at = |index: usize| (to_f64(index) / to_f64(PER_OCTAVE) + f64::from(OCTAVES.start)).exp2();
     (at(index), at(index + 1))
-}
-
-/// A count as a number for arithmetic.
-#[expect(clippy::cast_precision_loss, reason = "exact for the first 9e15 of anything counted")]
-pub fn as_f64(count: u64) -> f64 {
-    count as f64
 }
 
 #[cfg(test)]

@@ -9,14 +9,14 @@ use crate::width_control::strategy::Strategy;
 use crate::width_control::strategy::distance::DistanceStrategy;
 use crate::width_control::strategy::pi::PiStrategy;
 
-/// A law that is tried.
+/// A controller that is tried.
 #[derive(Debug, Clone)]
 pub struct ControllerCandidate {
     /// What it is called.
     pub name: String,
     /// Its width controller.
     pub strategy: Arc<dyn Strategy>,
-    /// Gains of the PI law.
+    /// Gains of the PI controller.
     pub gains: Option<PiGains>,
     /// The camera's distance that it is told \[mm\].
     pub offset_mm: f64,
@@ -25,7 +25,7 @@ pub struct ControllerCandidate {
 }
 
 impl ControllerCandidate {
-    /// As the cell has it now; none where its law holds no width.
+    /// As the cell has it now; none where its controller holds no width.
     pub fn now(run: &RunPart) -> Option<Self> {
         let strategy = &run.control.strategy;
         let name = if strategy.as_kind::<PiStrategy>().is_some() {
@@ -44,7 +44,7 @@ impl ControllerCandidate {
         })
     }
 
-    /// The proposed PI law.
+    /// The proposed PI controller.
     pub fn pi(proposal: &Proposal) -> Self {
         Self {
             name: "proposed PI".to_owned(),
@@ -55,7 +55,7 @@ impl ControllerCandidate {
         }
     }
 
-    /// The proposed law by distance.
+    /// The proposed distance controller.
     pub fn distance(proposal: &Proposal) -> Self {
         Self::of("proposed, by distance", &proposal.distance)
     }
@@ -74,7 +74,7 @@ impl ControllerCandidate {
         }
     }
 
-    /// The law by distance as it is proposed, and with what it is told wrong.
+    /// The distance controller as it is proposed, and with what it is told wrong.
     pub fn mismatched(proposal: &Proposal) -> Vec<Self> {
         let settings = proposal.distance;
         let cases: [(&str, f64, f64); 5] = [

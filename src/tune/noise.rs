@@ -1,4 +1,4 @@
-//! What the widths scatter by: independent from width to width, and what wanders along
+//! What the widths scatter by: independent from width to width, and what drifts along
 //! the path.
 
 use serde::Serialize;
@@ -28,16 +28,16 @@ const LN_LIKELIHOOD_DROP_95: f64 = 1.92;
 /// How the scatter divides.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PlantNoise {
-    /// From width to width, as a share of the width.
+    /// From width to width, as a fraction of the width.
     pub per_width: Estimated,
     /// What means over a gauge's length scatter by beyond that, from one to the next, as
-    /// a share: the bead is rough, and widths whose gauges overlap share it.
+    /// a fraction: the bead is rough, and widths whose gauges overlap share it.
     pub roughness: f64,
-    /// What wanders along the path.
+    /// What drifts along the path.
     pub drift: Drift,
 }
 
-/// How far the flow wanders along a metre, as a share.
+/// How far the flow drifts along a metre, as a fraction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Drift {
@@ -54,7 +54,7 @@ pub enum Drift {
     AtMost(f64),
 }
 
-/// Divides what is left of the widths.
+/// Divides the residuals of the widths.
 pub fn width_noise(study: &OffsetStudy) -> PlantNoise {
     let each = neighbour_noise(study, &study.widths);
     let pieces = neighbour_noise(study, &study.pieces).value;
@@ -70,7 +70,7 @@ pub fn width_noise(study: &OffsetStudy) -> PlantNoise {
     PlantNoise { per_width: each, roughness: rough, drift: drift(&study.pieces) }
 }
 
-/// From the differences of neighbours, which share what wanders.
+/// From the differences of neighbours, which share what drifts.
 fn neighbour_noise(study: &OffsetStudy, samples: &[WidthAtSpeed]) -> Estimated {
     let pairs = samples.iter().zip(samples.iter().skip(1));
     let same = pairs.filter(|(before, after)| before.bead == after.bead);
@@ -130,7 +130,7 @@ struct WalkLikelihood {
 impl WalkLikelihood {
     /// With the variance of a millimetre's walk over that of a piece's noise. The
     /// filter of Kalman (1960) gives what each piece differs from what those before it
-    /// foretell; the exponent is fitted to these.
+    /// predict; the exponent is fitted to these.
     fn of(pieces: &[WidthAtSpeed], ratio: f64) -> Self {
         let mut before: Option<&WidthAtSpeed> = None;
         let (mut variance, mut width, mut speed) = (UNKNOWN_VARIANCE, 0.0, 0.0);

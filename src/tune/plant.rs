@@ -110,7 +110,7 @@ impl IdentifiedCell {
         self.width_noise.per_width.value * self.width_mm.value
     }
 
-    /// How far the flow is taken to wander along a metre where a bead is simulated:
+    /// How far the flow is taken to drift along a metre where a bead is simulated:
     /// what was found, nothing where nothing was seen.
     pub fn drift_per_root_m(&self) -> f64 {
         match self.width_noise.drift {

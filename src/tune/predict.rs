@@ -1,4 +1,4 @@
-//! What each law would do on the cell as it was found: beads of the simulated cell.
+//! What each controller would do on the cell as it was found: beads of the simulated cell.
 
 use std::sync::Arc;
 
@@ -21,13 +21,13 @@ use crate::scenario::table::{Simulation, WidthSource};
 use crate::sim::cell::{FrameObservation, Observer, SimCell, SimCellError};
 use crate::width_control::target::WidthTarget;
 
-/// Step of the flow, as a share.
+/// Step of the flow, as a fraction.
 pub const FLOW_STEP: f64 = 0.08;
-/// Beads that are laid with each law.
+/// Beads that are laid with each controller.
 pub const SEEDS: u64 = 24;
 /// Least band about the target within which a bead counts as settled \[mm\].
 const MIN_BAND_MM: f64 = 0.5;
-/// Path from the first stretch to the flow's step, and from there to the end: at least
+/// Path from the first segment to the flow's step, and from there to the end: at least
 /// this \[mm\], and so many times the camera's distance.
 const MIN_SEGMENT_MM: f64 = 1200.0;
 const SEGMENT_OFFSETS: f64 = 15.0;
@@ -35,17 +35,17 @@ const SEGMENT_OFFSETS: f64 = 15.0;
 const STEADY_FRACTION: f64 = 1.0 / 3.0;
 /// Length over which a rough bead is taken to be alike, as a part of the gauge.
 const ROUGHNESS_LENGTH_FRACTION: f64 = 0.1;
-/// Places along the bead at which it is judged \[mm\].
+/// Positions along the bead at which it is judged \[mm\].
 const SAMPLE_SPACING_MM: f64 = 1.0;
 /// What is a single scale good for where widths are not rendered.
 const UNUSED_SCALE: Calibration = Calibration::Scale { mm_per_px: 0.1, sigma: None };
 /// Bandwidths that a simulated robot may have \[Hz\].
 const BANDWIDTHS_HZ: (f64, f64) = (0.01, 1000.0);
 
-/// What is foretold of a law.
+/// What is predicted of a controller.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BeadPrediction {
-    /// The law.
+    /// The controller.
     pub name: String,
     /// Way from the beginning of control until the bead is within the band, as the
     /// median of all beads; none where most are not before the flow steps \[mm\].
@@ -68,7 +68,7 @@ pub struct BeadPrediction {
     pub speed: Vec<(f64, f64)>,
 }
 
-/// The cell as it was found, on which laws are tried.
+/// The cell as it was found, on which controllers are tried.
 #[derive(Debug, Clone)]
 pub struct TestCell {
     cell: Cell,
@@ -82,8 +82,8 @@ pub struct TestCell {
 }
 
 impl TestCell {
-    /// Of a cell and what was found. Its rates, limits and first stretch are the
-    /// cell's; bead, noise, wandering, delays and the robot are those found. A dead
+    /// Of a cell and what was found. Its rates, limits and first segment are the
+    /// cell's; bead, noise, drift, delays and the robot are those found. A dead
     /// time of the robot is added to the camera's, which is the same to a loop; a largest
     /// slope of its speed becomes that of the setpoints.
     pub fn new(cell: &Cell, run: &RunPart, plant: &IdentifiedCell) -> Self {
@@ -110,7 +110,7 @@ impl TestCell {
         Self { cell, run, target_mm, band_mm, step_at_mm, end_mm }
     }
 
-    /// What a law would do.
+    /// What a controller would do.
     pub fn predict(&self, candidate: &ControllerCandidate) -> Result<BeadPrediction, SimCellError> {
         let laid: Vec<LaidRun> = (0..SEEDS)
             .into_par_iter()
@@ -150,7 +150,7 @@ impl TestCell {
         })
     }
 
-    /// Way from a place to where the bead stays within the band; infinite if it does
+    /// Way from a position to where the bead stays within the band; infinite if it does
     /// not before the end.
     fn settles(&self, one: &LaidRun, from_mm: f64, to_mm: f64) -> f64 {
         let within: Vec<_> =
@@ -177,7 +177,7 @@ impl TestCell {
             ..LaidRun::default()
         };
         let _ = sim.layer(Mm::ZERO, &mut laid);
-        // Of a rough bead no law sees more than the mean over the gauge.
+        // Of a rough bead no controller sees more than the mean over the gauge.
         let half_mm = 0.5 * cell.simulation.gauge_length.get();
         let mut at = 0.0;
         while at < self.end_mm {
@@ -250,11 +250,11 @@ fn apply_identified(simulation: &mut Simulation, plant: &IdentifiedCell) {
     };
 }
 
-/// Shortest length over which a roughness hangs together \[mm\].
+/// Shortest length over which a roughness is correlated \[mm\].
 const MIN_ROUGHNESS_LENGTH_MM: f64 = 0.1;
 
 /// A roughness that is found again in means over the gauge: of one that is alike as
-/// exp(−(distance/l)²), a mean over a long G keeps the share √π·l/G of the variance.
+/// exp(−(distance/l)²), a mean over a long G keeps the fraction √π·l/G of the variance.
 fn roughness(plant: &IdentifiedCell) -> EdgeRoughness {
     let measured_mm = plant.width_noise.roughness * plant.width_mm.value;
     let length_mm = ROUGHNESS_LENGTH_FRACTION * plant.gauge_mm;

@@ -11,8 +11,8 @@ use crate::width_control::pi::PiGains;
 use crate::width_control::strategy::Strategy;
 use crate::width_control::strategy::distance::DistanceStrategy;
 
-/// How far the flow is said to wander along a metre unless less is known; that of the
-/// law by distance.
+/// How far the flow is said to drift along a metre unless less is known; that of the
+/// distance controller.
 const DEFAULT_DRIFT: f64 = 0.0055;
 /// Range of what may be said.
 const DRIFT_RANGE: (f64, f64) = (1e-4, 0.2);
@@ -20,16 +20,16 @@ const DRIFT_RANGE: (f64, f64) = (1e-4, 0.2);
 /// their corners.
 const MIN_OFFSET_SIGMA_MM: f64 = 0.5;
 
-/// Settings of both laws.
+/// Settings of both controllers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Proposal {
-    /// For the law by distance.
+    /// For the distance controller.
     pub distance: DistanceProposal,
-    /// For the PI law.
+    /// For the PI controller.
     pub pi: PiProposal,
 }
 
-/// Settings of the law by distance.
+/// Settings of the distance controller.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DistanceProposal {
     /// b.
@@ -38,14 +38,14 @@ pub struct DistanceProposal {
     pub offset_mm: f64,
     /// Its standard deviation \[mm\].
     pub offset_sigma_mm: f64,
-    /// How far the flow wanders along a metre, as a share.
+    /// How far the flow drifts along a metre, as a fraction.
     pub drift_per_root_m: f64,
-    /// Whether b is learnt from the data: as the cell has it, and yes where its law is
+    /// Whether b is learnt from the data: as the cell has it, and yes where its controller is
     /// another.
     pub learns: bool,
 }
 
-/// Gains of the PI law on the error in mm, and the loop that they were made for.
+/// Gains of the PI controller on the error in mm, and the loop that they were made for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PiProposal {
     /// Gains.

@@ -27,7 +27,7 @@ const LN_SLOPE_PER_STEP: f64 = 20.0;
 const MAX_RESIDUAL_RATIO: f64 = 0.5;
 /// Smallest step of the search \[s\].
 const MIN_SEARCH_STEP_S: f64 = 1e-5;
-/// Change of setpoints that counts as a step, as a share.
+/// Change of setpoints that counts as a step, as a fraction.
 const MIN_SETPOINT_CHANGE: f64 = 0.01;
 /// Steps below which dead time and lag are not told.
 const MIN_STEPS: usize = 3;
@@ -47,7 +47,7 @@ pub struct RobotResponse {
     pub lag_s: Estimated,
     /// Largest slope of the speed, where the robot's own is one \[mm/s²\].
     pub slope_mm_per_s2: Option<f64>,
-    /// What is left of the reported speeds \[mm/s\], root mean square.
+    /// Residual of the reported speeds \[mm/s\], root mean square.
     pub residual_mm_per_s: f64,
     /// Steps of the setpoint that told it.
     pub steps: usize,
@@ -80,7 +80,7 @@ pub enum RobotResponseError {
          (root mean square)"
     )]
     DoesNotFollow {
-        /// What is left of the reported speeds \[mm/s\].
+        /// Residual of the reported speeds \[mm/s\].
         left: f64,
         /// How far they are from their mean \[mm/s\].
         moved: f64,

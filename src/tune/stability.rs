@@ -1,7 +1,7 @@
-//! Margins of the PI law around a bead that is seen late.
+//! Margins of the PI controller around a bead that is seen late.
 //!
 //! A change of the speed by Δv changes the width by −b·w/v·Δv, seen one distance of
-//! the camera later. With the sign turned by the law, the loop is
+//! the camera later. With the sign turned by the controller, the loop is
 //!
 //! ```text
 //! L(s) = (kp + ki/s) · K · e^(−s·T) / (τ·s + 1)     K = b·w/v
@@ -18,6 +18,7 @@ use serde::Serialize;
 
 use super::plant::IdentifiedCell;
 use crate::numeric::lti::{TransferFunction, margins};
+use crate::numeric::root::bisect;
 use crate::width_control::pi::PiGains;
 
 /// Least margins that a loop is to have: a factor, and degrees (Åström and Murray 2008,
@@ -109,11 +110,12 @@ impl LoopPlant {
             gain,
             phase_deg: phase.to_degrees(),
             delay_s,
-            sensitivity: is_stable
-                .then(|| self.transfer(gains))
-                .flatten()
-                .map(|l| margins(&l).sensitivity),
+            sensitivity: if is_stable { self.sensitivity(gains) } else { None },
         })
+    }
+
+    fn sensitivity(&self, gains: PiGains) -> Option<f64> {
+        Some(margins(&self.transfer(gains)?).sensitivity)
     }
 
     /// The loop as a transfer function.
@@ -132,7 +134,7 @@ const HALVINGS: u32 = 200;
 fn first_sign_change(end: f64, of: impl Fn(f64) -> f64) -> Option<f64> {
     let at = |k: u32| end * f64::from(k) / f64::from(STEPS);
     let k = (1..=STEPS).find(|&k| of(at(k)) < 0.0)?;
-    Some(bisect(at(k - 1), at(k), of))
+    Some(bisect(of, at(k - 1), at(k), HALVINGS))
 }
 
 /// The zero of a function that falls; none where it is positive throughout, or nowhere.
@@ -148,17 +150,5 @@ fn falling_root(of: impl Fn(f64) -> f64) -> Option<f64> {
             return None;
         }
     }
-    Some(bisect(low, high, of))
-}
-
-fn bisect(mut low: f64, mut high: f64, of: impl Fn(f64) -> f64) -> f64 {
-    for _ in 0..HALVINGS {
-        let middle = f64::midpoint(low, high);
-        if of(middle) > 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    f64::midpoint(low, high)
+    Some(bisect(of, low, high, HALVINGS))
 }

@@ -26,7 +26,7 @@ use crate::width_control::steps::StepsProgress;
 
 const SCALE: Calibration = Calibration::Scale { mm_per_px: 0.126_582, sigma: None };
 
-/// The cell of 50 Hz that ships with the program, with steps for its law.
+/// The cell of 50 Hz that ships with the program, with steps for its controller.
 fn cell(share: f64) -> Cell {
     let text = include_str!("../../cells/distance.toml");
     let text = text.replace(

@@ -31,6 +31,7 @@ pub fn timing(log: &Log) -> CellTiming {
     let setpoints: Vec<Stamp> = log.setpoints.iter().map(|(at, _)| *at).collect();
     let mut latencies = log.latencies_s.clone();
     let mut between = periods(&reports);
+    let quantile = |values: &mut [f64], fraction| rank::quantile(values, fraction).unwrap_or(0.0);
     CellTiming {
         latency_s: quantile(&mut latencies, 0.5),
         latency_p99_s: quantile(&mut latencies, 0.99),
@@ -44,16 +45,4 @@ pub fn timing(log: &Log) -> CellTiming {
 fn periods(times: &[Stamp]) -> Vec<f64> {
     let pairs = times.iter().zip(times.iter().skip(1));
     pairs.map(|(before, after)| (*after - *before).secs()).collect()
-}
-
-/// The value that this share of all does not exceed; 0 of none.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "a share of a count"
-)]
-fn quantile(values: &mut [f64], fraction: f64) -> f64 {
-    let rank = (fraction * values.len().saturating_sub(1) as f64).round() as usize;
-    rank::at(values, rank).unwrap_or(0.0)
 }

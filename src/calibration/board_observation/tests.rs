@@ -2,8 +2,8 @@ use crate::calibration::Camera;
 use crate::calibration::board::observe_all;
 use crate::calibration::board_observation::*;
 use crate::calibration::dictionary::Dictionary;
-use crate::calibration::synthetic;
-use crate::calibration::synthetic::poses;
+use crate::calibration::focus::FocusFault;
+use crate::calibration::synthetic::{self, poses};
 use crate::core::frame::Pixels;
 use crate::core::geometry::{GridSize, Pose, Size};
 use crate::core::time::Stamp;
@@ -15,7 +15,7 @@ fn board(columns: usize, rows: usize) -> Board {
     Board::new(columns, rows, Mm::constant(20.0)).unwrap()
 }
 
-/// What is said of a picture of a board, where one of 9x6 is looked for.
+/// What is said of a image of a board, where one of 9x6 is looked for.
 fn seen(shown: &Board, exposure: Exposure) -> Result<BoardObservation, BoardRejection> {
     let camera =
         Camera::pinhole([620.0, 622.0], [263.0, 198.0]).with_five([-0.2, 0.05, 0.0, 0.0, 0.0]);
@@ -62,11 +62,11 @@ fn other_boards_are_told_from_none() {
         Frame::new(0, Stamp::START, Size::new(400, 300), Pixels::Grey8(vec![90; 400 * 300]))
             .unwrap();
     let none = observe(&board(9, 6), "a.png", &empty).unwrap_err();
-    assert_eq!(none, BoardRejection::NoBoard { columns: 9, rows: 6 });
+    assert_eq!(none, BoardRejection::NoBoard(GridSize::new(9, 6)));
 }
 
-/// A board that fills the upper left of a picture to its very edge, what is around it
-/// painted over by what lies at each place, in squares from its first inner corner.
+/// A board that fills the upper left of a image to its very edge, what is around it
+/// painted over by what lies at each position, in squares from its first inner corner.
 fn at_the_edge(shown: &Board, behind: impl Fn(f64, f64) -> Option<u8>) -> Frame {
     let camera =
         Camera::pinhole([620.0, 622.0], [263.0, 198.0]).with_five([-0.2, 0.05, 0.0, 0.0, 0.0]);
@@ -128,7 +128,7 @@ fn marked(columns: usize, rows: usize, dictionary: Dictionary) -> Board {
     board(columns, rows).with_marks(marks).unwrap()
 }
 
-/// A picture of a board whose middle is somewhere before the camera.
+/// A image of a board whose middle is somewhere before the camera.
 fn picture(shown: &Board, at: Vector3<f64>, seed: u64) -> (Frame, Vec<Option<ImagePoint>>) {
     let camera =
         Camera::pinhole([900.0, 902.0], [323.0, 238.0]).with_five([-0.25, 0.05, 1e-3, -5e-4, 0.0]);
@@ -235,12 +235,16 @@ fn a_board_with_markers_tells_half_a_turn() {
 #[test]
 fn blur_is_told_from_motion() {
     let blurred = Exposure { blur_px: 5.0, ..Exposure::SHARP };
-    let Err(BoardRejection::Blurred { blur_px }) = seen(&board(9, 6), blurred) else {
+    let Err(BoardRejection::NotSharp(FocusFault::Blurred { blur_px })) =
+        seen(&board(9, 6), blurred)
+    else {
         panic!("a blurred board is seen");
     };
     assert!((4.0..6.0).contains(&blur_px), "{blur_px}");
     let moved = Exposure { motion_px: Vector2::new(9.0, 0.0), ..Exposure::SHARP };
-    let Err(BoardRejection::Moved { motion_px: way_px }) = seen(&board(9, 6), moved) else {
+    let Err(BoardRejection::NotSharp(FocusFault::Moved { motion_px: way_px })) =
+        seen(&board(9, 6), moved)
+    else {
         panic!("a moving board is seen");
     };
     assert!((7.0..11.0).contains(&way_px), "{way_px}");

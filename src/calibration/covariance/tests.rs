@@ -5,8 +5,7 @@ use crate::calibration::CalibrationQuality;
 use crate::calibration::lens::Lens;
 use crate::calibration::relative_sigma;
 use crate::calibration::solve;
-use crate::calibration::synthetic;
-use crate::calibration::synthetic::{SIZE, TRUTH, board, poses};
+use crate::calibration::synthetic::{self, SIZE, TRUTH, board, poses};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -20,7 +19,7 @@ fn later() -> Pose {
     Pose::new(Vector3::new(0.1, -0.2, 0.3), Vector3::new(-70.0, -60.0, 400.0))
 }
 
-/// The pictures of a calibration, and a bed from one of them, from one that was
+/// The images of a calibration, and a bed from one of them, from one that was
 /// taken later, and from that one with two more beside it.
 fn solved(seed: u64) -> (Solution, [OnBed; 3]) {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);

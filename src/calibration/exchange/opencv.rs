@@ -46,7 +46,7 @@ pub fn to_yaml(intrinsics: &Intrinsics) -> String {
             row(data)
         )
     };
-    // The head of all versions: the fifth writes another one, and reads both.
+    // Header of versions before 5; version 5 writes another one and reads both.
     [
         format!("%YAML:1.0\n---\nimage_width: {width}\nimage_height: {height}\n"),
         part("camera_matrix", [3, 3], &intrinsics.camera.matrix()),

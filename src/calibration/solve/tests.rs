@@ -1,9 +1,9 @@
 use super::*;
 use crate::calibration::Calibration;
 use crate::calibration::board::observe_all;
+use crate::calibration::camera::{NAMES, NUMBERS};
 use crate::calibration::plane::bed_from_board;
-use crate::calibration::synthetic;
-use crate::calibration::synthetic::{SIZE, TRUTH, board, poses};
+use crate::calibration::synthetic::{self, SIZE, TRUTH, board, poses};
 use crate::core::units::Mm;
 use nalgebra::Point3;
 use rand::SeedableRng;
@@ -133,4 +133,9 @@ fn a_pose_alone_is_found_with_a_known_camera() {
 fn too_few_pictures_are_no_calibration() {
     let few = solve(&board(), &sightings(0.0)[..2]).unwrap_err();
     assert_eq!(few, SolveError::TooFew { found: 2 });
+}
+
+#[test]
+fn the_first_shared_names_are_those_of_the_camera_parameters() {
+    assert_eq!(SHARED_NAMES[..NAMES.len()], NAMES);
 }

@@ -29,7 +29,7 @@ const FRAME: usize = 10;
 struct Plant {
     offset_mm: f64,
     exponent: f64,
-    /// Standard deviation of a picture's own noise, and of what wanders along the bead,
+    /// Standard deviation of a image's own noise, and of what drifts along the bead,
     /// as shares of the width; the length over which that forgets itself \[mm\].
     picture: f64,
     wander: (f64, f64),
@@ -81,7 +81,7 @@ fn steps(seconds: usize, seed: u64) -> Way {
 }
 
 impl Way {
-    /// Mean width over a stretch, before noise, as a share.
+    /// Mean width over a segment, before noise, as a fraction.
     fn width(&self, exponent: f64, from: f64, to: f64) -> Option<f64> {
         let last = self.paths.len() - 1;
         if from < 0.0 || to >= self.paths[last] {
@@ -144,7 +144,7 @@ fn found(record: &Record) -> Result<OffsetEstimate, CameraOffsetError> {
     find(&record.states, &record.widths, SEARCH)
 }
 
-/// Mean-square error in units of sigma, and the share within two of them.
+/// Mean-square error in units of sigma, and the fraction within two of them.
 fn coverage(seeds: u64, wander: (f64, f64), picture: f64) -> (f64, f64) {
     let errors: Vec<f64> = (0..seeds)
         .into_par_iter()
@@ -165,7 +165,7 @@ fn coverage(seeds: u64, wander: (f64, f64), picture: f64) -> (f64, f64) {
 
 #[test]
 fn the_truth_lies_within_two_sigma_as_often_as_it_should() {
-    // Waviness that gauges share, and a flow that drifts under noisy pictures.
+    // Waviness that gauges share, and a flow that drifts under noisy images.
     for (wander, picture) in [((5e-3, 100.0), 1e-3), ((1e-2, 1000.0), 6e-3)] {
         let (mean_square, within) = coverage(120, wander, picture);
         assert!((0.9..=0.99).contains(&within), "{wander:?}: {within}");
@@ -184,7 +184,7 @@ fn a_bead_of_constant_flow_tells_its_exponent_too() {
 
 #[test]
 fn a_controller_that_follows_a_drift_does_not_move_the_offset() {
-    // The flow wanders by 1 %, and the speed answers to the widths of a moment ago.
+    // The flow drifts by 1 %, and the speed answers to the widths of a moment ago.
     let plant = Plant { offset_mm: 120.0, wander: (1e-2, 1500.0), ..PLANT };
     let drift = |path: f64| 0.010 * (path / 190.0).sin() + 0.007 * (path / 77.0).sin();
     let answer = 0.8 / plant.exponent;

@@ -1,19 +1,19 @@
-//! Why no model can be found in data.
+//! Why data cannot be identified.
 
 use std::fmt;
 
 use crate::identify::digits::six_digits;
 use crate::identify::grid::SampleGap;
 
-/// Samples that a model takes at least.
+/// Smallest number of samples. A choice: five for each of ten parameters.
 pub const MIN_SAMPLES: usize = 50;
 
-/// Which of the two columns is meant.
+/// One of the two columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DataColumn {
-    /// What the extruder was told, or what drives it.
+    /// The command, or the measured quantity that drives the extruder.
     Input,
-    /// What came of it.
+    /// The response.
     Output,
 }
 
@@ -26,16 +26,16 @@ impl fmt::Display for DataColumn {
     }
 }
 
-/// Data that no model can be found in. Samples are counted from 0.
+/// Data that cannot be identified. Samples are counted from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ExperimentError {
-    /// Hardly anything there.
+    /// Too few samples.
     #[error("{got} samples: a model takes {MIN_SAMPLES} or more")]
     TooFew {
         /// Samples that there are.
         got: usize,
     },
-    /// Time that does not run on.
+    /// Time does not increase.
     #[error(
         "time {} at sample {}: {before_s} s, then {time_s} s; it must grow from line to line (write \
          it with more digits, or keep one run alone)",
@@ -57,6 +57,7 @@ pub enum ExperimentError {
         } else {
             "Is the column in s? Say so with --unit COLUMN=s"
         }
+    /// An implausible unit of time.
     )]
     TimeUnit {
         /// The usual step \[s\].
@@ -67,6 +68,7 @@ pub enum ExperimentError {
         "a gap of {:.3} s after {:.3} s (sample {}){}; gaps up to {limit_s:.3} s are bridged: use a \
          part without it, or allow longer ones with --max-gap-s", .gap.length_s, .gap.from_s,
         .gap.after + 1, if *.count > 1 { format!(", the longest of {count}") } else { String::new() }
+    /// A long gap.
     )]
     Gap {
         /// The longest one.
@@ -82,6 +84,7 @@ pub enum ExperimentError {
         six_digits(*.value), if *.side == DataColumn::Input { "; excite it (truebead extruder excite writes profiles)" } else {
             "; see that its sensor is connected"
         }
+    /// A constant column.
     )]
     Constant {
         /// Which one.
@@ -95,6 +98,7 @@ pub enum ExperimentError {
          cut the log elsewhere (--validate-share, --to-s), or name another one to validate with \
          (--validate)", six_digits(*.value),
         if *.validates { "kept to validate with" } else { "fitted to" }
+    /// A column that is constant in one of the parts of a log.
     )]
     ConstantPart {
         /// Which one.
@@ -116,6 +120,7 @@ pub enum ExperimentError {
         six_digits(.others[0]), six_digits(.others[1]), if *.side == DataColumn::Output {
             "; --hampel 5,5 replaces such samples"
         } else { "" }
+    /// A few samples far beyond all others.
     )]
     Outlier {
         /// Which column.
@@ -135,7 +140,7 @@ pub enum ExperimentError {
          Was a command logged in place of what came of it?"
     )]
     Identical,
-    /// A part that tells nothing.
+    /// Too few samples for validation.
     #[error("{got} samples are left to validate with: {MIN_SAMPLES} or more are needed")]
     ShortValidation {
         /// Samples that there are.

@@ -2,8 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::numeric::levenberg_marquardt;
-use crate::numeric::levenberg_marquardt::{Descent, LeastSquares};
+use crate::numeric::levenberg_marquardt::{self, Descent, LeastSquares};
 use crate::numeric::number::to_f64;
 
 /// An estimate and its standard errors.
@@ -19,7 +18,8 @@ pub(super) struct Estimate {
 /// Step of the difference quotients as a fraction of a parameter's range: a compromise between
 /// truncation and rounding.
 const RELATIVE_STEP: f64 = 1e-6;
-/// A descent of a handful of parameters ends within some ten steps; more are a fault.
+/// Limits of a descent. A choice: a fit of at most four parameters that needs more steps does
+/// not converge.
 const DESCENT: Descent =
     Descent { max_steps: 60, max_tries: 10, min_relative_gain: 1e-9, max_idle_steps: 1 };
 

@@ -19,7 +19,7 @@ const PAUSES_S: [f64; 8] = [30.0, 2.0, 8.0, 60.0, 200.0, 1.0, 15.0, 120.0];
 const RUNS_S: f64 = 5.0;
 const STEP_S: f64 = 0.02;
 
-/// The share of the flow that runs of 5 s with pauses between them give, by the model itself.
+/// The fraction of the flow that runs of 5 s with pauses between them give, by the model itself.
 fn recording(machine: StartStop, pauses_s: &[f64]) -> [TimeSeries; 2] {
     let (flow, speed) = (Mm3PerS::constant(400.0), MmPerS::constant(40.0));
     let laid = BeadConditions { flow, speed, min_speed_ratio: 1.0, robot_lag: Span::ZERO };

@@ -4,8 +4,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::polynomial::{add, evaluate, from_roots, multiply};
 use super::simulate::{Between, Sampled, split};
-use super::state::StateSpace;
 use super::transfer::{ModelError, TransferFunction};
+use crate::numeric::number::to_f64;
 
 /// How it gets there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,9 +18,6 @@ pub enum DiscretisationMethod {
     FirstOrderHold,
     /// Tustin's: s = (2/dt)(z − 1)/(z + 1).
     Bilinear,
-    /// The same impulse response at the samples, times dt. The jump at the first
-    /// sample counts in full.
-    ImpulseInvariant,
     /// s = (z − 1)/(dt·z).
     BackwardDifference,
     /// Poles and zeros go to e^(s·dt), missing zeros but one to −1, and the gain
@@ -43,9 +40,8 @@ pub struct DiscreteTransfer {
 }
 
 impl TransferFunction {
-    /// On a grid of `dt_s` \[s\]. Fails where the step is not above zero, where
-    /// the dead time is not whole steps and the method is not a hold, and for
-    /// the impulse-invariant method with as many zeros as poles.
+    /// On a grid of `dt_s` \[s\]. Fails where the step is not above zero, and where the dead
+    /// time is not a whole number of steps and the method is not a hold.
     pub fn discretise(
         &self,
         dt_s: f64,
@@ -73,7 +69,6 @@ impl TransferFunction {
             DiscretisationMethod::BackwardDifference => {
                 substitute(self, &[1.0 / dt_s, -1.0 / dt_s], &[1.0, 0.0])
             }
-            DiscretisationMethod::ImpulseInvariant => impulse(self, dt_s)?,
             DiscretisationMethod::MatchedPoleZero => matched(self, dt_s),
         };
         let length = num.len().max(den.len());
@@ -100,8 +95,7 @@ impl Resolvent {
         let mut current = DMatrix::identity(n, n);
         for k in 1..=n {
             let moved = state * &current;
-            #[expect(clippy::cast_precision_loss, reason = "an order is small")]
-            let coefficient = -moved.trace() / k as f64;
+            let coefficient = -moved.trace() / to_f64(k);
             adjoint.push(current);
             den.push(coefficient);
             current = moved + DMatrix::identity(n, n) * coefficient;
@@ -147,17 +141,7 @@ fn hold(
     Ok((num, resolvent.den))
 }
 
-fn impulse(tf: &TransferFunction, dt_s: f64) -> Result<(Vec<f64>, Vec<f64>), ModelError> {
-    let space = StateSpace::of(tf);
-    if space.d != 0.0 {
-        return Err(ModelError::Feedthrough);
-    }
-    let resolvent = Resolvent::of(&space.advance(dt_s).state);
-    let num = resolvent.num(&space.c, &space.b).iter().map(|c| c * dt_s).collect();
-    Ok((num, resolvent.den))
-}
-
-/// Puts upper(z)/lower(z) in the place of s.
+/// Puts upper(z)/lower(z) in the position of s.
 fn substitute(tf: &TransferFunction, upper: &[f64], lower: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let order = tf.order();
     let power = |row: &[f64], n: usize| (0..n).fold(vec![1.0], |p, _| multiply(&p, row));
@@ -208,48 +192,6 @@ impl DiscreteTransfer {
     /// Output for each unit of an input that has stood for long.
     pub fn dc_gain(&self) -> f64 {
         self.num.iter().sum::<f64>() / self.den.iter().sum::<f64>()
-    }
-
-    /// As something that is given one sample after the other.
-    pub fn recursion(&self) -> Recursion {
-        Recursion {
-            num: self.num.clone(),
-            den: self.den.clone(),
-            memory: vec![0.0; self.num.len()],
-            inputs: vec![0.0; self.delay],
-            place: 0,
-        }
-    }
-}
-
-/// A discrete transfer function with its memory (direct form II, transposed).
-/// A step allocates nothing.
-#[derive(Debug, Clone)]
-pub struct Recursion {
-    num: Vec<f64>,
-    den: Vec<f64>,
-    memory: Vec<f64>,
-    inputs: Vec<f64>,
-    place: usize,
-}
-
-impl Recursion {
-    /// Takes the input of this sample and returns its output.
-    pub fn step(&mut self, input: f64) -> f64 {
-        let input = self.delayed(input);
-        let output = self.num[0] * input + self.memory[0];
-        for i in 1..self.num.len() {
-            let later = self.memory[i];
-            self.memory[i - 1] = later + self.num[i] * input - self.den[i] * output;
-        }
-        output
-    }
-
-    fn delayed(&mut self, input: f64) -> f64 {
-        let Some(oldest) = self.inputs.get_mut(self.place) else { return input };
-        let delayed = std::mem::replace(oldest, input);
-        self.place = (self.place + 1) % self.inputs.len();
-        delayed
     }
 }
 

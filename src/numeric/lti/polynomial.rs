@@ -2,6 +2,8 @@
 
 use nalgebra::{Complex, DMatrix};
 
+use crate::numeric::number::to_f64;
+
 /// The same without zeros in front; a polynomial that is zero keeps one.
 pub fn trim(coefficients: &[f64]) -> &[f64] {
     let leading = coefficients.iter().take_while(|c| **c == 0.0).count();
@@ -58,8 +60,7 @@ pub(super) fn mean_size_of_roots(coefficients: &[f64]) -> f64 {
     let (Some(first), Some(last)) = (coefficients.first(), coefficients.last()) else {
         return 1.0;
     };
-    #[expect(clippy::cast_precision_loss, reason = "an order is small")]
-    let order = (coefficients.len() - 1) as f64;
+    let order = to_f64(coefficients.len() - 1);
     let mean = libm::pow((last / first).abs(), 1.0 / order.max(1.0));
     if mean.is_finite() && mean > 0.0 { mean } else { 1.0 }
 }

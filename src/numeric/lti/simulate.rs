@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::state::StateSpace;
 use super::transfer::{ModelError, TransferFunction};
+use crate::numeric::number::to_count;
 
 /// What the input does between two samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,7 +15,7 @@ pub enum Between {
     Linear,
 }
 
-/// Dead times that miss a whole number of steps by less than this share of one
+/// Dead times that miss a whole number of steps by less than this fraction of one
 /// are whole.
 const WHOLE_STEP_TOLERANCE: f64 = 1e-9;
 
@@ -68,8 +69,7 @@ pub(super) fn split(dead_time_s: f64, dt_s: f64) -> Result<(usize, f64), ModelEr
     let steps = dead_time_s / dt_s;
     let whole = (steps + WHOLE_STEP_TOLERANCE).floor();
     let rest = (steps - whole) * dt_s;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
-    Ok((whole as usize, if rest < WHOLE_STEP_TOLERANCE * dt_s { 0.0 } else { rest }))
+    Ok((to_count(whole), if rest < WHOLE_STEP_TOLERANCE * dt_s { 0.0 } else { rest }))
 }
 
 /// A model that is given one sample after the other. A step allocates nothing

@@ -2,8 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::polynomial;
-use super::polynomial::{evaluate, multiply, trim};
+use super::polynomial::{self, evaluate, multiply, trim};
 
 /// Why there is no such model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -72,9 +71,6 @@ pub enum ModelError {
         /// Step \[s\].
         dt_s: f64,
     },
-    /// An impulse that passes straight through has no samples.
-    #[error("an impulse passes straight through as many zeros as poles; take another method")]
-    Feedthrough,
 }
 
 /// b(s)/a(s)·e^(−Ls), with no more zeros than poles.
@@ -197,7 +193,7 @@ impl TransferFunction {
     }
 
     /// The inverse without the dead time in series with a filter, whose poles
-    /// take the place of those that the inverse lacks: the series of the result
+    /// take the position of those that the inverse lacks: the series of the result
     /// and this is the filter after the dead time. Fails where the filter has too
     /// few poles or a zero is in the right half plane.
     pub fn inverse_through(&self, filter: &Self) -> Result<Self, ModelError> {

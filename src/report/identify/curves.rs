@@ -37,8 +37,7 @@ fn series(at: impl Iterator<Item = f64>, values: impl Iterator<Item = f64>) -> C
 }
 
 fn times(data: &Experiment) -> impl Iterator<Item = f64> {
-    (0..data.len())
-        .map(|k| data.start_s + crate::numeric::statistics::as_f64(k as u64) * data.step_s)
+    (0..data.len()).map(|k| data.start_s + crate::numeric::number::to_f64(k) * data.step_s)
 }
 
 /// Input and output over time, with what the model says of the output.
@@ -101,7 +100,7 @@ pub fn residuals(study: &ModelStudy) -> Markup {
 pub fn autocorrelation(study: &ModelStudy) -> Markup {
     let step_s = study.logs.estimation.step_s;
     let lags = &study.residuals.lags;
-    let at = |k: usize| crate::numeric::statistics::as_f64(k as u64) * step_s;
+    let at = |k: usize| crate::numeric::number::to_f64(k) * step_s;
     let curve = series((1..lags.len()).map(at), lags.iter().copied().skip(1));
     let bound = study.residuals.bound;
     let axis = XAxis {

@@ -80,8 +80,7 @@ impl Charts {
     /// A frame that was looked at.
     pub fn frame(&mut self, row: &FrameRow) {
         let timed = *self.timed.get_or_insert(row.time_s.is_some());
-        let x =
-            if timed { row.time_s } else { Some(crate::numeric::statistics::as_f64(row.frame)) };
+        let x = if timed { row.time_s } else { Some(crate::numeric::number::to_f64(row.frame)) };
         let Some(x) = x else { return };
         let measured = match &row.outcome {
             Err(status) => return self.rejected.push(x, Mark { severity: 1, name: status }),

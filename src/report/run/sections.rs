@@ -6,7 +6,7 @@ use maud::{Markup, html};
 use super::charts::TimeAndPath;
 use super::contents::RunReport;
 use super::remedies;
-use crate::numeric::statistics::as_f64;
+use crate::numeric::number::to_f64;
 use crate::report::chart::area::{Area, XAxis};
 use crate::report::chart::histogram;
 use crate::report::chart::legend;
@@ -158,7 +158,7 @@ pub fn rejections(report: &RunReport<'_>) -> Markup {
                         tr {
                             td { code { (status) } }
                             td.number { (count) }
-                            td.number { (format!("{:.2} %", as_f64(*count) / as_f64(summary.frames.max(1)) * 100.0)) }
+                            td.number { (format!("{:.2} %", to_f64(*count) / to_f64(summary.frames.max(1)) * 100.0)) }
                             td { (meaning) }
                             td { (remedy) }
                         }

@@ -65,7 +65,7 @@ fn a_varied_input_that_stands_at_its_limits_is_cut_off() {
         (noise, [29.5, 30.5]),
     ] {
         let cut = input(row).unwrap_err();
-        assert!(cut.column == Column::Input && limits.contains(&cut.value), "{cut}");
+        assert!(cut.column == DataColumn::Input && limits.contains(&cut.value), "{cut}");
         assert!(cut.clipped_percent > 10.0 && cut.longest > MIN_RUN, "{cut}");
     }
 }
@@ -127,10 +127,10 @@ fn an_output_cut_off_is_told_from_one_that_rests() {
     let clipped = Samples::new(sine(600), cut.clone(), 0.1).unwrap().check_clipped();
     assert!(matches!(
         clipped,
-        Err(Clipped { column: Column::Output, end: Extreme::Largest, value: 0.8, .. })
+        Err(Clipped { column: DataColumn::Output, end: Extreme::Largest, value: 0.8, .. })
     ));
     let clipped = Samples::new(cut, sine(600), 0.1).unwrap().check_clipped();
-    assert!(matches!(clipped, Err(Clipped { column: Column::Input, .. })));
+    assert!(matches!(clipped, Err(Clipped { column: DataColumn::Input, .. })));
     let steps: Vec<f64> = (0..600_u32).map(|k| f64::from((k / 20 * 7) % 2)).collect();
     assert_eq!(Samples::new(steps, sine(600), 0.1).unwrap().check_clipped(), Ok(()));
     // Levels of a drive that takes its steps over some samples.

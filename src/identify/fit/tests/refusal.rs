@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A first order with dead time driven by a PRBS, with noise as a share of the
+/// A first order with dead time driven by a PRBS, with noise as a fraction of the
 /// output's standard deviation.
 fn driven(tf: &TransferFunction, noise_share: f64, seed: u64) -> Samples {
     let input = prbs(60, 25);
