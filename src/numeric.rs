@@ -1,4 +1,4 @@
-//! What a numerical library would hold: statistics, filters, linear systems, fits.
+//! Numerical methods: statistics, filters, linear systems, fits.
 
 #![expect(
     clippy::inline_always,

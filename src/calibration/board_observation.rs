@@ -132,18 +132,21 @@ pub type Observations = Vec<(String, Result<BoardObservation, BoardRejection>)>;
 /// Keeps the most frequent image size, the first one of equally frequent sizes, and rejects
 /// images of another size.
 pub fn reject_other_sizes(looks: &mut Observations) {
-    let sizes: Vec<[u32; 2]> =
-        looks.iter().filter_map(|(_, look)| look.as_ref().ok()).map(|s| s.image_size_px).collect();
+    let sizes: Vec<[u32; 2]> = looks
+        .iter()
+        .filter_map(|(_, observation)| observation.as_ref().ok())
+        .map(|s| s.image_size_px)
+        .collect();
     let count = |size: &[u32; 2]| sizes.iter().filter(|other| *other == size).count();
     // `max_by_key` returns the last of equal elements, hence the reversed order.
     let Some(expected) = sizes.iter().rev().max_by_key(|size| count(size)).copied() else {
         return;
     };
-    for (_, look) in looks {
-        if let Ok(BoardObservation { image_size_px: found, .. }) = look
+    for (_, observation) in looks {
+        if let Ok(BoardObservation { image_size_px: found, .. }) = observation
             && *found != expected
         {
-            *look = Err(BoardRejection::Size { found: *found, expected });
+            *observation = Err(BoardRejection::Size { found: *found, expected });
         }
     }
 }
@@ -152,8 +155,8 @@ pub fn reject_other_sizes(looks: &mut Observations) {
 pub fn reject_duplicates(board: &Board, looks: &mut Observations) {
     for later in 1..looks.len() {
         let Ok(sighting) = &looks[later].1 else { continue };
-        let twin = looks[..later].iter().find_map(|(_, look)| {
-            let earlier = look.as_ref().ok()?;
+        let twin = looks[..later].iter().find_map(|(_, observation)| {
+            let earlier = observation.as_ref().ok()?;
             let shift_px = shift_px(board, &earlier.corners, &sighting.corners)?;
             (shift_px < SAME_POSITION_PX).then(|| (earlier.name.clone(), shift_px))
         });
@@ -163,7 +166,7 @@ pub fn reject_duplicates(board: &Board, looks: &mut Observations) {
     }
 }
 
-/// Whether two images show the board in one place.
+/// Whether two images show the board in one position.
 pub fn is_same_position(board: &Board, a: &[CornerObservation], b: &[CornerObservation]) -> bool {
     shift_px(board, a, b).is_some_and(|shift_px| shift_px < SAME_POSITION_PX)
 }

@@ -93,11 +93,13 @@ fn descend(
 
 fn sum_of_squares_px2(
     model: &CameraModel,
-    places: &[BoardPlacement],
+    positions: &[BoardPlacement],
     boards: &[Vec<Vec<Correspondence>>],
 ) -> Option<f64> {
-    let each =
-        places.iter().zip(boards).map(|(place, boards)| model.sum_of_squares_px2(place, boards));
+    let each = positions
+        .iter()
+        .zip(boards)
+        .map(|(position, boards)| model.sum_of_squares_px2(position, boards));
     each.sum::<Option<f64>>().filter(|squares| squares.is_finite())
 }
 
@@ -107,7 +109,7 @@ fn equations(
     boards: &[Vec<Vec<Correspondence>>],
 ) -> Option<Vec<Equations>> {
     let each = at.placements.iter().zip(boards);
-    each.map(|(place, boards)| Equations::of(&at.model, free, place, boards)).collect()
+    each.map(|(position, boards)| Equations::of(&at.model, free, position, boards)).collect()
 }
 
 /// Solves the damped equations, with the placements eliminated.

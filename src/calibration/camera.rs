@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lens_that_turns_over_within_the_picture_is_told_wherever_it_does() {
+    fn a_lens_that_is_not_monotonic_within_the_image_is_detected_everywhere() {
         assert_eq!(LENS.non_monotonic_at([640, 480]), None);
         assert_eq!(Camera::pinhole([500.0; 2], [320.0, 240.0]).non_monotonic_at([640, 480]), None);
         // r(1 + k1 r²) is not monotonic at r = 1/√(-3 k1), where it reaches two thirds of that:

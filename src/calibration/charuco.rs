@@ -145,8 +145,8 @@ fn fraction(part: usize, of: usize) -> f64 {
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small share")]
-fn percent(share: f64) -> u32 {
-    (100.0 * share).round().clamp(0.0, 1e6) as u32
+fn percent(fraction: f64) -> u32 {
+    (100.0 * fraction).round().clamp(0.0, 1e6) as u32
 }
 
 /// The markers that lie on one board: the largest consensus set of all pairs (as RANSAC,
@@ -158,10 +158,10 @@ fn fitting(
     clear: f64,
     max_pairs: usize,
 ) -> Vec<PlacedMarker> {
-    let place = |&marker: &Marker| {
+    let position = |&marker: &Marker| {
         Some(PlacedMarker { on_board: layout.corners(marker.number, clear)?, marker })
     };
-    let placed: Vec<PlacedMarker> = markers.iter().filter_map(place).collect();
+    let placed: Vec<PlacedMarker> = markers.iter().filter_map(position).collect();
     // Pairs by their distance in the list, so that no marker is in most of the pairs.
     let count = placed.len();
     let pairs = (1..count).flat_map(|apart| (0..count - apart).map(move |i| (i, i + apart)));

@@ -54,8 +54,8 @@ impl Collector {
     }
 
     /// Decides on the next frame.
-    pub fn add(&mut self, look: Result<BoardObservation, BoardRejection>) -> Decision {
-        let now = match look {
+    pub fn add(&mut self, observation: Result<BoardObservation, BoardRejection>) -> Decision {
+        let now = match observation {
             Ok(now) => now,
             Err(refusal) => {
                 (self.last, self.still) = (None, 0);

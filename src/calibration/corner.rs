@@ -69,12 +69,12 @@ impl Pass<'_> {
         is_bent: bool,
     ) -> Vec<Option<ImagePoint>> {
         let GridSize { columns, rows } = self.board.corners();
-        let place = |index: usize| known[index].or(rough[index]);
+        let position = |index: usize| known[index].or(rough[index]);
         let refined = |index: usize| {
             let (column, row) = (index % columns, index / columns);
             let lines = [
-                BoardLine::along(column, columns, |i| place(row * columns + i))?,
-                BoardLine::along(row, rows, |i| place(i * columns + column))?,
+                BoardLine::along(column, columns, |i| position(row * columns + i))?,
+                BoardLine::along(row, rows, |i| position(i * columns + column))?,
             ];
             let lines =
                 if is_bent { lines } else { lines.map(|line| BoardLine { bend: 0.0, ..line }) };
@@ -87,7 +87,7 @@ impl Pass<'_> {
                 clear: self.board.marker_margin(),
                 marked,
             };
-            refined(self.grey, self.table, place(index)?, lines, &window)
+            refined(self.grey, self.table, position(index)?, lines, &window)
         };
         (0..known.len()).map(refined).collect()
     }

@@ -222,6 +222,9 @@ impl CalibrationCovariance {
     ) -> Option<DerivedValue> {
         let with =
             |model: &CameraModel, bed: &BoardPlacement| read(&self.map(model, bed, surface_height));
+        let slope = |step: f64, at: &dyn Fn(f64) -> Option<f64>| {
+            Some((at(step)? - at(-step)?) / (2.0 * step))
+        };
         let mut of_shared = DVector::zeros(SHARED);
         for number in (0..SHARED).filter(|&number| self.free.has(number)) {
             // Focal lengths and centre are in pixels, all other parameters in units of about
@@ -231,21 +234,17 @@ impl CalibrationCovariance {
             } else {
                 RELATIVE_STEP
             };
-            let mut by = SVector::<f64, SHARED>::zeros();
-            by[number] = step;
-            let up = with(&self.model.moved(&by), &self.bed)?;
-            let down = with(&self.model.moved(&-by), &self.bed)?;
-            of_shared[number] = (up - down) / (2.0 * step);
+            let unit = SVector::<f64, SHARED>::from_fn(|i, _| f64::from(u8::from(i == number)));
+            of_shared[number] =
+                slope(step, &|by| with(&self.model.moved(&(unit * by)), &self.bed))?;
         }
         let mut of_bed = DVector::zeros(self.bed.numbers());
         let distance = self.bed.pose.translation_mm().norm();
         for number in 0..POSE {
             let step = if number < 3 { RELATIVE_STEP } else { RELATIVE_STEP * distance };
-            let mut by = DVector::zeros(self.bed.numbers());
-            by[number] = step;
-            let up = with(&self.model, &self.bed.moved(&by))?;
-            let down = with(&self.model, &self.bed.moved(&-by))?;
-            of_bed[number] = (up - down) / (2.0 * step);
+            let unit =
+                DVector::from_fn(self.bed.numbers(), |i, _| f64::from(u8::from(i == number)));
+            of_bed[number] = slope(step, &|by| with(&self.model, &self.bed.moved(&(&unit * by))))?;
         }
         let alone = self.of_bed.placement.whiten(&as_matrix(&of_bed));
         let slope = of_shared - self.of_bed.follows.transpose() * alone.column(0);

@@ -93,11 +93,11 @@ mod tests {
             let depth = |at| view.pose.apply(at).z;
             let deg = |at: Point3<f64>| ((depth(-at) - depth(at)) / 2.0).asin().to_degrees();
             let (right, lower) = (deg(Point3::new(1.0, 0.0, 0.0)), deg(Point3::new(0.0, 1.0, 0.0)));
-            let told = nearer(&view);
-            for (is_so, deg) in told.into_iter().zip([-right, right, -lower, lower]) {
+            let reported = nearer(&view);
+            for (is_so, deg) in reported.into_iter().zip([-right, right, -lower, lower]) {
                 // The axes of the board are turned by 6 degrees against the image's.
                 if (deg - MIN_TILT_DEG).abs() > 3.0 {
-                    assert_eq!(is_so, deg > MIN_TILT_DEG, "{x} {y}: {told:?}");
+                    assert_eq!(is_so, deg > MIN_TILT_DEG, "{x} {y}: {reported:?}");
                 }
             }
         }

@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_told_in_both_ways() {
+    fn both_forms_of_a_name_are_known() {
         assert_eq!(Dictionary::named("4x4"), Some(Dictionary::Four));
         assert_eq!(Dictionary::named("DICT_6X6_250"), Some(Dictionary::Six));
         assert_eq!(Dictionary::named("5X5_1000"), Some(Dictionary::Five));

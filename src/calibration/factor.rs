@@ -23,10 +23,10 @@ pub struct Elimination {
 impl Elimination {
     /// `None` where the corners do not determine the placement.
     pub fn of(equations: &Equations) -> Option<Self> {
-        let place = Factor::of(&equations.placement)?;
-        let follows = place.whiten(&equations.both);
+        let position = Factor::of(&equations.placement)?;
+        let follows = position.whiten(&equations.both);
         let left = equations.shared - as_shared(&(follows.transpose() * &follows));
-        Some(Self { reduced: left, placement: place, follows })
+        Some(Self { reduced: left, placement: position, follows })
     }
 }
 

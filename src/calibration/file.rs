@@ -244,15 +244,15 @@ mod tests {
     #[test]
     fn the_uncertainty_is_read_row_by_row_and_refused_if_one_is_too_short() {
         let with = |row: &str| format!("{EXAMPLE}\n[uncertainty]\nfx = [2.5]\n{row}\n");
-        let share = |text: &str| {
+        let fraction = |text: &str| {
             let map = parse("x", text).unwrap().surface(Mm::ZERO, None);
             let ends = [Point2::new(300.0, 269.5), Point2::new(400.0, 269.5)];
             map.width_relative_sigma_of(ends).unwrap()
         };
         // A focal length along x that is 0.1 % off, and a bed that is 0.1 % further away.
-        assert!((share(&with("")) - 1e-3).abs() < 1e-9, "{}", share(&with("")));
+        assert!((fraction(&with("")) - 1e-3).abs() < 1e-9, "{}", fraction(&with("")));
         let zeros = "0.0, ".repeat(17);
-        let shifted = share(&with(&format!("shift_z = [{zeros} 0.4]")));
+        let shifted = fraction(&with(&format!("shift_z = [{zeros} 0.4]")));
         assert!((shifted - 1e-3 * 2.0_f64.sqrt()).abs() < 1e-9, "{shifted}");
         let short = said(&with("fy = [1.0]"));
         assert!(short.contains("uncertainty.fy") && short.contains("2 numbers"), "{short}");
@@ -317,11 +317,11 @@ mod tests {
     #[test]
     fn what_the_calibration_leaves_in_a_width_may_be_absent_but_not_more_than_all() {
         let with = |line: &str| EXAMPLE.replace("[quality]", &format!("[quality]\n{line}"));
-        let share = |text: &str| {
+        let fraction = |text: &str| {
             parse("x", text).unwrap().surface(Mm::constant(20.0), None).width_relative_sigma()
         };
-        assert_eq!(share(EXAMPLE), None);
-        assert_eq!(share(&with("width_relative_sigma = 0.0004")), Some(0.0004));
+        assert_eq!(fraction(EXAMPLE), None);
+        assert_eq!(fraction(&with("width_relative_sigma = 0.0004")), Some(0.0004));
         for wrong in ["1.5", "-0.1", "nan"] {
             let said = said(&with(&format!("width_relative_sigma = {wrong}")));
             assert!(

@@ -100,13 +100,13 @@ pub fn pose_from_homography(on_unit_plane: &Matrix3<f64>) -> Option<Pose> {
     let (first, second) = (on_unit_plane.column(0), on_unit_plane.column(1));
     let scale = 2.0 / (first.norm() + second.norm());
     let (x, y) = (first * scale, second * scale);
-    let place = on_unit_plane.column(2) * scale;
+    let position = on_unit_plane.column(2) * scale;
     let axes = Matrix3::from_columns(&[x, y, x.cross(&y)]);
     let decomposition = axes.svd(true, true);
     let rotation = decomposition.u? * decomposition.v_t?;
-    let finite = rotation.iter().chain(place.iter()).all(|number| number.is_finite());
-    (finite && place.z > 0.0)
-        .then(|| Pose::from_parts(Rotation3::from_matrix_unchecked(rotation), place))
+    let finite = rotation.iter().chain(position.iter()).all(|number| number.is_finite());
+    (finite && position.z > 0.0)
+        .then(|| Pose::from_parts(Rotation3::from_matrix_unchecked(rotation), position))
 }
 
 /// Pose of a board before a camera from its undistorted corners. `None` where the distortion

@@ -182,10 +182,10 @@ impl SurfaceMap {
         self.uncertainty.as_ref()
     }
 
-    fn with_height(&self, share: Option<f64>) -> Option<f64> {
-        match (share, self.height_relative_sigma) {
-            (Some(share), Some(of_height)) => Some(share.hypot(of_height)),
-            (share, of_height) => share.or(of_height),
+    fn with_height(&self, fraction: Option<f64>) -> Option<f64> {
+        match (fraction, self.height_relative_sigma) {
+            (Some(fraction), Some(of_height)) => Some(fraction.hypot(of_height)),
+            (fraction, of_height) => fraction.or(of_height),
         }
     }
 

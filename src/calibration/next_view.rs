@@ -116,10 +116,10 @@ fn readings(covariance: &CalibrationCovariance, beads: &[Bead]) -> Vec<DerivedVa
 fn candidates() -> Vec<(RelativePoint, BoardPosture)> {
     let part = |i: u32| (f64::from(i) + 0.5) / f64::from(POSITIONS_PER_SIDE);
     let mut all = Vec::new();
-    for place in 0..POSITIONS_PER_SIDE * POSITIONS_PER_SIDE {
+    for position in 0..POSITIONS_PER_SIDE * POSITIONS_PER_SIDE {
         let at = RelativePoint {
-            x: part(place % POSITIONS_PER_SIDE),
-            y: part(place / POSITIONS_PER_SIDE),
+            x: part(position % POSITIONS_PER_SIDE),
+            y: part(position / POSITIONS_PER_SIDE),
         };
         all.push((at, BoardPosture::OnBed));
         for distance in DISTANCES {
@@ -201,10 +201,10 @@ fn mean_distance_mm(solution: &Solution) -> f64 {
 
 impl std::fmt::Display for NextView {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let place = position_words(self.at);
+        let position = position_words(self.at);
         match self.posture {
             BoardPosture::OnBed => {
-                write!(f, "the board flat on the bed once more, in the {place} (--plane again)")
+                write!(f, "the board flat on the bed once more, in the {position} (--plane again)")
             }
             BoardPosture::Free { nearer, tilt_deg, distance } => {
                 let distance = match distance {
@@ -217,11 +217,11 @@ impl std::fmt::Display for NextView {
                     (-1, _) => "left",
                     (_, 1) => "lower",
                     (_, -1) => "upper",
-                    _ => return write!(f, "the board in the {place}{distance}, not tilted"),
+                    _ => return write!(f, "the board in the {position}{distance}, not tilted"),
                 };
                 write!(
                     f,
-                    "the board in the {place}{distance}, its {side} side {tilt_deg:.0} degrees \
+                    "the board in the {position}{distance}, its {side} side {tilt_deg:.0} degrees \
                      nearer than the other"
                 )
             }

@@ -193,11 +193,11 @@ pub fn find(
         }
         _ => return Err(NozzleOffsetError::Ambiguous { at: touch.position, along_mm }),
     };
-    let share = face.width_relative_sigma();
+    let fraction = face.width_relative_sigma();
     let parts = OffsetSigmas {
         touch: touch.sigma,
         corners: mm(lies.sigma_mm(nozzle)),
-        calibration: share.map(|share| mm(share * place.norm())),
+        calibration: fraction.map(|fraction| mm(fraction * place.norm())),
         height: gauge.surface_height_sigma * axes.slope,
     };
     Ok(NozzleOffset {

@@ -24,8 +24,8 @@ pub fn where_seen(covariance: &CalibrationCovariance) -> Option<f64> {
 
 /// Largest relative standard deviation of the widths of beads.
 pub fn largest(covariance: &CalibrationCovariance, readings: &[DerivedValue]) -> Option<f64> {
-    let share = |reading: &DerivedValue| covariance.sigma(reading) / reading.value;
-    readings.iter().map(share).filter(|share| share.is_finite()).reduce(f64::max)
+    let fraction = |reading: &DerivedValue| covariance.sigma(reading) / reading.value;
+    readings.iter().map(fraction).filter(|fraction| fraction.is_finite()).reduce(f64::max)
 }
 
 fn readings(covariance: &CalibrationCovariance) -> Vec<DerivedValue> {
@@ -45,14 +45,14 @@ pub fn beads_where_seen(covariance: &CalibrationCovariance) -> Vec<([ImagePoint;
 /// across it.
 fn beads([from, to]: [ImagePoint; 2]) -> impl Iterator<Item = [ImagePoint; 2]> {
     let size = to - from;
-    let place = |i: u32| {
+    let position = |i: u32| {
         BEAD_FRACTION / 2.0
             + (1.0 - BEAD_FRACTION) * f64::from(i) / f64::from(POSITIONS_PER_SIDE - 1)
     };
     let middles = (0..POSITIONS_PER_SIDE * POSITIONS_PER_SIDE).map(move |i| {
         from + size.component_mul(&Vector2::new(
-            place(i % POSITIONS_PER_SIDE),
-            place(i / POSITIONS_PER_SIDE),
+            position(i % POSITIONS_PER_SIDE),
+            position(i / POSITIONS_PER_SIDE),
         ))
     });
     let halves =

@@ -67,7 +67,7 @@ fn solution(
     let each: Vec<BoardView> = sightings
         .iter()
         .zip(fit.placements.iter().zip(&views.boards))
-        .map(|(sighting, (place, boards))| view(&fit.model, sighting, place.pose, &boards[0]))
+        .map(|(sighting, (position, boards))| view(&fit.model, sighting, position.pose, &boards[0]))
         .collect();
     Ok(Solution {
         model: fit.model,
@@ -94,7 +94,7 @@ pub fn pose(model: &CameraModel, corners: &[Correspondence]) -> Option<Pose> {
         FreeParameters::PLACEMENTS,
         &[vec![corners.to_vec()]],
     )?;
-    fit.placements.first().map(|place| place.pose)
+    fit.placements.first().map(|position| position.pose)
 }
 
 /// Reprojection errors of one image by the camera model that measures later; a corner that

@@ -26,8 +26,9 @@ pub fn poses() -> Vec<Pose> {
             let turn = f64::from(i) * 0.55;
             let tilt = 0.15 + 0.04 * f64::from(i);
             let rotation = Vector3::new(tilt * turn.cos(), tilt * turn.sin(), 0.1 * turn);
-            let place = Vector3::new(-80.0 + 25.0 * turn.cos(), -50.0 + 18.0 * turn.sin(), 420.0);
-            Pose::new(rotation, place)
+            let position =
+                Vector3::new(-80.0 + 25.0 * turn.cos(), -50.0 + 18.0 * turn.sin(), 420.0);
+            Pose::new(rotation, position)
         })
         .collect()
 }

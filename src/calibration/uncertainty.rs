@@ -89,8 +89,8 @@ impl CalibrationUncertainty {
         let way = ends[1].mm - ends[0].mm;
         let length = way.norm();
         let slopes = way.transpose() / length * (ends[1].slopes - ends[0].slopes);
-        let share = self.sigma(&slopes) / length;
-        share.is_finite().then_some(share)
+        let fraction = self.sigma(&slopes) / length;
+        fraction.is_finite().then_some(fraction)
     }
 }
 
@@ -106,8 +106,8 @@ pub struct PositionSlopes {
 impl PositionSlopes {
     /// For a point in the bed's axes \[mm\]: its displacement compensates the one of its image.
     /// `None` where the camera looks along the surface.
-    pub fn at(camera: &Camera, bed: &Pose, place: Point3<f64>) -> Option<Self> {
-        let in_camera = bed.apply(place);
+    pub fn at(camera: &Camera, bed: &Pose, position: Point3<f64>) -> Option<Self> {
+        let in_camera = bed.apply(position);
         let projection = camera.project_with_slopes(in_camera)?;
         let of_point: Matrix2x3<f64> = projection.of_point;
         let axes = bed.rotation();
@@ -119,7 +119,7 @@ impl PositionSlopes {
         by_number.fixed_columns_mut::<NUMBERS>(0).copy_from(&projection.of_camera);
         by_number.fixed_columns_mut::<3>(NUMBERS).copy_from(&(of_point * turned));
         by_number.fixed_columns_mut::<3>(NUMBERS + 3).copy_from(&of_point);
-        Some(Self { mm: place.xy(), slopes: -back * by_number })
+        Some(Self { mm: position.xy(), slopes: -back * by_number })
     }
 }
 

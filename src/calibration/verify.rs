@@ -130,8 +130,8 @@ fn worst(
             let noise = NOISE_SIGMAS * rms_px / (b.px - a.px).norm();
             if worst.is_none_or(|(most, of_it, _)| error.abs() - noise > most.abs() - of_it) {
                 let middle = |a: usize, b: usize| 0.5 * to_f64(a + b);
-                let place = (middle(column, other_column), middle(row, other_row), true_mm);
-                worst = Some((error, noise, place));
+                let position = (middle(column, other_column), middle(row, other_row), true_mm);
+                worst = Some((error, noise, position));
             }
         }
     }
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_board_that_is_higher_measures_larger_and_is_told_to_be_higher() {
+    fn a_higher_board_measures_larger_and_its_height_is_found() {
         let found = verify(&calibration(TRUTH), &board(), &seen(4.0), THICKNESS).unwrap();
         assert!((found.height_mm - 4.0).abs() < 1e-3, "{found:?}");
         // 4 mm of about 415 mm.

@@ -32,8 +32,8 @@ impl ViewInformation {
         free: FreeParameters,
     ) -> Option<Vec<Self>> {
         let each = fit.placements.iter().zip(&views.boards);
-        each.map(|(place, boards)| {
-            let equations = Equations::of(&fit.model, free, place, boards)?;
+        each.map(|(position, boards)| {
+            let equations = Equations::of(&fit.model, free, position, boards)?;
             let elimination = Elimination::of(&equations)?;
             let known = elimination.placement.solve(&equations.placement_side);
             let score = DVector::from_column_slice(equations.shared_side.as_slice())

@@ -183,20 +183,20 @@ mod tests {
     }
 
     #[test]
-    fn many_tilted_views_all_over_the_picture_raise_no_doubt() {
+    fn many_tilted_views_all_over_the_image_raise_no_warning() {
         assert_eq!(warnings(&solution(good())), vec![]);
     }
 
     #[test]
-    fn each_weakness_is_told() {
+    fn each_weakness_is_reported() {
         let mut odd = good();
         odd[4].rms_px = 0.9;
         let outlier = Warning::Outlier { name: "4".into(), times: 0.9 / 0.2 };
         assert_eq!(warnings(&solution(odd)), vec![outlier]);
         let same = |_| view("a", ImagePoint::new(50.0, 50.0), 0.1, 0.2);
-        let told = warnings(&solution((0..5).map(same).collect()));
+        let reported = warnings(&solution((0..5).map(same).collect()));
         assert!(matches!(
-            told[..],
+            reported[..],
             [
                 Warning::FewViews { found: 5 },
                 Warning::Coverage { covered: 1 },
@@ -207,7 +207,10 @@ mod tests {
         folded.model.camera.distortion[0] = -200.0;
         assert_eq!(warnings(&folded), vec![Warning::NonMonotonic { x: 0.0, y: 0.0 }]);
         let loose = Solution { sigma: Some([20.0; SHARED]), rms_px: 0.8, ..solution(good()) };
-        let told = warnings(&loose);
-        assert!(matches!(told[..], [Warning::HighError { .. }, Warning::UncertainFocal { .. }]));
+        let reported = warnings(&loose);
+        assert!(matches!(
+            reported[..],
+            [Warning::HighError { .. }, Warning::UncertainFocal { .. }]
+        ));
     }
 }

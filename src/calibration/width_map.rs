@@ -39,27 +39,22 @@ pub struct WidthMap {
 impl WidthMap {
     /// For beads of a width on a surface.
     pub fn of(covariance: &CalibrationCovariance, bead_mm: f64, surface_height: Mm) -> Self {
-        let mut worst: Option<f64> = None;
+        let mut worst_where_seen_mm: Option<f64> = None;
         let cells = beads(covariance, bead_mm, surface_height)
             .map(|beads| {
                 let sigmas = beads.iter().flatten().filter_map(|&ends| {
                     let (_, sigma_mm) = covariance.width_mm(ends, surface_height)?;
                     if is_where_seen(covariance, &ends) {
-                        worst = Some(worst.map_or(sigma_mm, |worst| worst.max(sigma_mm)));
+                        let worst = worst_where_seen_mm.map_or(sigma_mm, |mm| mm.max(sigma_mm));
+                        worst_where_seen_mm = Some(worst);
                     }
                     Some(sigma_mm)
                 });
                 sigmas.reduce(f64::max)
             })
             .collect();
-        let above = covariance.camera_height_mm() - surface_height.get();
-        Self {
-            bead_mm,
-            surface_height,
-            cells,
-            worst_where_seen_mm: worst,
-            mm_per_mm_height: bead_mm / above,
-        }
+        let mm_per_mm_height = bead_mm / (covariance.camera_height_mm() - surface_height.get());
+        Self { bead_mm, surface_height, cells, worst_where_seen_mm, mm_per_mm_height }
     }
 
     /// Smallest and largest of the cells \[mm\]; `None` without one.
@@ -183,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn the_picture_that_is_asked_for_brings_what_is_said_of_it() {
+    fn the_proposed_image_brings_the_predicted_gain() {
         let (solution, covariance) = covariance();
         let heights = [Mm::ZERO, Mm::constant(20.0)];
         let next = next_view::best(&board(), &solution, &covariance, 40.0, &heights).unwrap();

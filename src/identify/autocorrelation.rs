@@ -57,18 +57,28 @@ mod tests {
     }
 
     #[test]
-    fn white_noise_stays_within_its_bounds_and_coloured_noise_does_not() {
+    fn white_noise_stays_within_its_bounds_and_autocorrelated_noise_does_not() {
         let white = Autocorrelation::of(&noise(0.0), 200);
         assert_eq!((white.lags[0], white.lags.len()), (1.0, 201));
         assert!(white.fraction_outside() < 0.04, "{}", white.fraction_outside());
-        let coloured = Autocorrelation::of(&noise(0.9), 10);
-        assert!((coloured.lags[5] - 0.9_f64.powi(5)).abs() < 0.05, "{:?}", coloured.lags);
-        assert!(coloured.fraction_outside() > 0.9);
+        let autocorrelated = Autocorrelation::of(&noise(0.9), 10);
+        assert!(
+            (autocorrelated.lags[5] - 0.9_f64.powi(5)).abs() < 0.05,
+            "{:?}",
+            autocorrelated.lags
+        );
+        assert!(autocorrelated.fraction_outside() > 0.9);
     }
 
     #[test]
     fn nothing_correlates_with_nothing() {
         assert_eq!(Autocorrelation::of(&[], 5).lags, [0.0]);
         assert_eq!(Autocorrelation::of(&[3.0; 9], 3).lags, [0.0; 4]);
+    }
+
+    #[test]
+    fn the_bound_holds_99_of_100_normal_numbers() {
+        let phi = crate::numeric::normal_distribution::cumulative(NORMAL_99);
+        assert!((phi - 0.995).abs() < 1e-6);
     }
 }

@@ -93,18 +93,19 @@ pub fn study(
     search: OffsetSearch,
 ) -> Result<OffsetStudy, CameraOffsetError> {
     let course = LaidSpeeds::of(states).ok_or(CameraOffsetError::NoPath)?;
-    let looks: Vec<BeadObservation> =
+    let count = widths.len();
+    let observations: Vec<BeadObservation> =
         widths.iter().filter_map(|width| observed(&course, width)).collect();
-    if looks.len() < MIN_WIDTHS {
-        return Err(CameraOffsetError::TooFew { found: looks.len() });
+    if observations.len() < MIN_WIDTHS {
+        return Err(CameraOffsetError::TooFew { found: observations.len() });
     }
     let speeds = course.range(TAIL_FRACTION);
     let SpeedRange { min: from, max: to } = speeds;
     if to.get() < from.get() * (1.0 + MIN_SPEED_CHANGE) {
         return Err(CameraOffsetError::ConstantSpeed { from, to });
     }
-    let settled = iterate(&course, &looks, search, speeds)?;
-    settled.check(&course, &looks, search)?;
+    let settled = iterate(&course, &observations, search, speeds)?;
+    settled.check(&course, &observations, search)?;
     let Converged { profile, best, .. } = &settled;
     let found = OffsetEstimate {
         offset: mm(best.offset_mm),
@@ -113,7 +114,7 @@ pub fn study(
         at_bound: best.exponent <= EXPONENT_RANGE.0 || best.exponent >= EXPONENT_RANGE.1,
         speeds,
         used: settled.used.len(),
-        left_out: widths.len() - settled.used.len(),
+        left_out: count - settled.used.len(),
         residual_rms: profile.residual_rms(best),
     };
     if found.sigma >= found.offset {
@@ -121,14 +122,14 @@ pub fn study(
     }
     let covariance = profile.covariance(best, found.sigma.get());
     let (ln_level, mean_ln_speed) = profile.level(best);
-    let (seen, pieces) = profile.widths_at_speed(best);
+    let (widths, pieces) = profile.widths_at_speed(best);
     Ok(OffsetStudy {
         estimate: found,
         exponent_sigma: covariance[1].sqrt(),
         level_mm: ln_level.exp(),
         mean_speed_mm_per_s: mean_ln_speed.exp(),
         covariance,
-        widths: seen,
+        widths,
         pieces,
     })
 }
@@ -136,13 +137,9 @@ pub fn study(
 fn observed(course: &LaidSpeeds, width: &TimedWidth) -> Option<BeadObservation> {
     let (bead, path_mm) = course.path_at(width.at)?;
     let (value, sigma) = (width.width.get(), width.sigma.get());
-    let sound = value > 0.0 && sigma >= 0.0;
-    sound.then(|| BeadObservation {
-        bead,
-        path_mm,
-        ln_width: value.ln(),
-        relative_sigma: sigma / value,
-    })
+    let (ln_width, relative_sigma) = (value.ln(), sigma / value);
+    let is_sound = value > 0.0 && sigma >= 0.0;
+    is_sound.then_some(BeadObservation { bead, path_mm, ln_width, relative_sigma })
 }
 
 /// Consistent offset, exponent, noise and set of widths.
@@ -156,13 +153,13 @@ struct Converged {
 /// Estimates them in turn until they do not change.
 fn iterate(
     course: &LaidSpeeds,
-    looks: &[BeadObservation],
+    observations: &[BeadObservation],
     search: OffsetSearch,
     speeds: SpeedRange,
 ) -> Result<Converged, CameraOffsetError> {
     let mut noise = WidthNoise::INITIAL;
     let mut exponent = 0.5;
-    let mut used = looks.to_vec();
+    let mut used = observations.to_vec();
     let mut before_mm = f64::NAN;
     let mut round = 0;
     loop {
@@ -178,7 +175,8 @@ fn iterate(
             return Err(CameraOffsetError::NoResponse { from, to, max_offset: search.max_offset });
         }
         let likeliest = profile.likeliest_noise(&best);
-        let next = offset_profile::without_outliers(course, looks, search.gauge, &best, likeliest);
+        let next =
+            offset_profile::without_outliers(course, observations, search.gauge, &best, likeliest);
         if next.len() < MIN_WIDTHS {
             return Err(CameraOffsetError::TooFew { found: next.len() });
         }
@@ -198,7 +196,7 @@ impl Converged {
     fn check(
         &self,
         course: &LaidSpeeds,
-        looks: &[BeadObservation],
+        observations: &[BeadObservation],
         search: OffsetSearch,
     ) -> Result<(), CameraOffsetError> {
         let Self { profile, best, .. } = self;
@@ -213,7 +211,8 @@ impl Converged {
                 let both = |look: &&BeadObservation| {
                     [best.offset_mm, rival].iter().all(|&d| course.covers(look, d, search.gauge))
                 };
-                let shared: Vec<BeadObservation> = looks.iter().filter(both).copied().collect();
+                let shared: Vec<BeadObservation> =
+                    observations.iter().filter(both).copied().collect();
                 if shared.len() < MIN_WIDTHS {
                     return true;
                 }

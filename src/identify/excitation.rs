@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_played_is_told() {
+    fn invalid_excitations_are_reported() {
         let said = |excitation: Excitation| excitation.profile().unwrap_err().to_string();
         assert!(said(prbs(0.0, Some(5.0))).contains("held for 0 s"));
         assert!(said(prbs(1e-7, Some(5.0))).contains("a million times"));
@@ -290,5 +290,11 @@ mod tests {
         let shape = Waveform::Prbs { bits: 7, low: 4.0, high: 4.0 };
         let flat = Excitation { shape, hold_s: 1.0, duration_s: None };
         assert!(said(flat).contains("levels from 4 to 4"));
+    }
+
+    #[test]
+    fn a_held_level_has_half_its_power_density_at_the_constant() {
+        let x = std::f64::consts::PI * HALF_POWER_FREQUENCY;
+        assert!(((x.sin() / x).powi(2) - 0.5).abs() < 1e-3);
     }
 }

@@ -99,13 +99,12 @@ impl fmt::Display for ModelQuery {
 
 impl fmt::Display for ModelEntry {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ModelFile { conditions: setting, input, output, .. } = &self.model;
-        write!(f, "{} ({}", self.name, setting.material.as_deref().unwrap_or("no material"))?;
-        if let Some(nozzle_mm) = setting.nozzle_mm {
-            write!(f, ", {nozzle_mm} mm")?;
-        }
-        if let Some(temperature_c) = setting.temperature_c {
-            write!(f, ", {temperature_c} °C")?;
+        let ModelFile { conditions, input, output, .. } = &self.model;
+        write!(f, "{} ({}", self.name, conditions.material.as_deref().unwrap_or("no material"))?;
+        for (value, unit) in [(conditions.nozzle_mm, "mm"), (conditions.temperature_c, "°C")] {
+            if let Some(value) = value {
+                write!(f, ", {value} {unit}")?;
+            }
         }
         write!(f, ", {} to {})", input.unit, output.unit)
     }
@@ -152,18 +151,11 @@ impl Library {
             let off_c = setting.temperature_c? - query.temperature_c;
             (same && off_c.abs() <= query.tolerance_c).then_some(off_c)
         };
-        let near: Vec<ModelMatch<'_>> = self
-            .entries
-            .iter()
-            .filter_map(|entry| Some(ModelMatch { entry, temperature_difference_c: off(entry)? }))
-            .collect();
-        let least = near
-            .iter()
-            .map(|found| found.temperature_difference_c.abs())
-            .fold(f64::INFINITY, f64::min);
-        let is_nearest = |found: &&ModelMatch<'_>| {
-            found.temperature_difference_c.abs() < least + SAME_TEMPERATURE_C
-        };
+        let matches = |entry| Some(ModelMatch { entry, temperature_difference_c: off(entry)? });
+        let near: Vec<ModelMatch<'_>> = self.entries.iter().filter_map(matches).collect();
+        let distance_c = |found: &ModelMatch<'_>| found.temperature_difference_c.abs();
+        let least_c = near.iter().map(distance_c).fold(f64::INFINITY, f64::min);
+        let is_nearest = |found: &&ModelMatch<'_>| distance_c(found) < least_c + SAME_TEMPERATURE_C;
         let nearest: Vec<&ModelMatch<'_>> = near.iter().filter(is_nearest).collect();
         let names = |entries: &mut dyn Iterator<Item = &ModelEntry>| {
             entries.map(ModelEntry::to_string).collect()

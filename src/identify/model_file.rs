@@ -100,7 +100,7 @@ fn read_root(root: &Table<'_>) -> Option<ModelFile> {
     }
     let version = root.optional_integer("version", 1..=1);
     let kind = root.text("kind").map(str::to_owned);
-    let setting = read_conditions(root);
+    let conditions = read_conditions(root);
     let input = root.required_table("input").and_then(|table| read_input(&table));
     let output = root.required_table("output").and_then(|table| read_side(&table));
     let transfer = root.required_table("transfer").and_then(|table| read_transfer(&table));
@@ -110,7 +110,7 @@ fn read_root(root: &Table<'_>) -> Option<ModelFile> {
     let ((input, input_at), input_range) = input?;
     let (output, output_at) = output?;
     Some(ModelFile {
-        conditions: setting,
+        conditions,
         kind: kind?,
         input,
         output,

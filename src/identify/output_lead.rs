@@ -63,31 +63,28 @@ pub fn output_lead(
     let most_s = (LEAD_FRACTION * samples.duration_s()).min(MAX_LEAD_S);
     // First a rough estimate, then again near it: the input before the record is unknown for as
     // long as the dead time.
-    let leads =
-        LEAD_FRACTIONS.iter().filter_map(|share| with_lead(samples, settings, share * most_s));
+    let leads = LEAD_FRACTIONS
+        .iter()
+        .filter_map(|fraction| with_lead(samples, settings, fraction * most_s));
     let (lead_s, first) =
         leads.max_by(|a, b| a.1.quality.fit_percent.total_cmp(&b.1.quality.fit_percent))?;
     let about_s = lead_s - first.parameter("dead_time_s")?.value;
     let near_s = (1.5 * about_s + 2.0 * samples.dt_s()).min(most_s);
     let (lead_s, fit) = with_lead(samples, settings, near_s)?;
     let dead_time = fit.parameter("dead_time_s")?;
-    let (ahead_s, sigma_s) = (lead_s - dead_time.value, dead_time.sigma);
-    let is_ahead = ahead_s > MIN_SIGMAS * sigma_s && ahead_s > 1.5 * samples.dt_s();
+    let (lead_s, sigma_s) = (lead_s - dead_time.value, dead_time.sigma);
+    let is_ahead = lead_s > MIN_SIGMAS * sigma_s && lead_s > 1.5 * samples.dt_s();
     let slow = fit.model.poles().iter().any(|p| -p.re * SLOW_FRACTION * samples.duration_s() < 1.0);
     if !is_ahead || slow || fit.quality.fit_percent < MIN_FIT_PERCENT {
         return None;
     }
     let usual = causal_fit_percent(&shifted(samples, 0, fit.residuals.len())?, settings);
-    let answering_percent = found.map_or(usual, |found| usual.max(found.quality.fit_percent));
-    let ratio = residual_fraction(fit.quality.fit_percent) / residual_fraction(answering_percent);
+    let causal_fit_percent = found.map_or(usual, |found| usual.max(found.quality.fit_percent));
+    let fit_percent = fit.quality.fit_percent;
+    let ratio = residual_fraction(fit_percent) / residual_fraction(causal_fit_percent);
     let is_better = ratio < MAX_RESIDUAL_RATIO
         && -fit.independent_samples * libm::log(ratio) > MIN_LIKELIHOOD_RATIO;
-    is_better.then_some(OutputLead {
-        lead_s: ahead_s,
-        sigma_s,
-        fit_percent: fit.quality.fit_percent,
-        causal_fit_percent: answering_percent,
-    })
+    is_better.then_some(OutputLead { lead_s, sigma_s, fit_percent, causal_fit_percent })
 }
 
 fn has_dead_time(fit: &Fit) -> bool {

@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_of_either_are_told() {
+    fn gaps_of_either_are_reported() {
         let whole = series(0.02, 600, false, f64::sin);
         let mut broken = whole.clone();
         broken.time_s.drain(200..260);

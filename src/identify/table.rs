@@ -100,7 +100,7 @@ impl DataTable {
         let (mut rows, mut lines) = (Vec::new(), Vec::new());
         for row in reader.records() {
             let row = row.map_err(|error| of_line(&error))?;
-            lines.push(row.position().map_or(0, |place| line_of(text, place)));
+            lines.push(row.position().map_or(0, |position| line_of(text, position)));
             rows.push(row);
         }
         Ok(Self { names, rows, lines })
@@ -147,11 +147,11 @@ impl DataTable {
 }
 
 /// The reader's position of a row is before the skipped lines.
-fn line_of(text: &str, place: &csv::Position) -> u64 {
-    let at = usize::try_from(place.byte()).unwrap_or(usize::MAX);
+fn line_of(text: &str, position: &csv::Position) -> u64 {
+    let at = usize::try_from(position.byte()).unwrap_or(usize::MAX);
     let rest = text.get(at..).unwrap_or_default().lines();
     let left_out = rest.take_while(|line| line.trim().is_empty() || line.starts_with('#')).count();
-    place.line() + left_out as u64
+    position.line() + left_out as u64
 }
 
 fn number(cell: &str) -> Option<f64> {
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_table_is_told() {
+    fn invalid_tables_are_reported() {
         let said = |text: &str| DataTable::parse(text).unwrap_err().to_string();
         assert_eq!(said("\n\n"), "there is no line with the names of columns");
         assert_eq!(said("a,a\n1,2\n"), "two columns are called a");

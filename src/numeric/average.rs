@@ -1,4 +1,4 @@
-//! Mean and standard deviation of a list of numbers. Of none each is not a number.
+//! Mean and standard deviation of numbers; NaN without numbers.
 
 /// Mean.
 pub fn mean(values: impl Iterator<Item = f64>) -> f64 {

@@ -1,5 +1,5 @@
-//! Numbers as numbers of another kind, where nothing that counts is lost: positions
-//! and counts are small, and a quantity of seven digits is enough for a pixel.
+//! Conversions between kinds of numbers whose loss is harmless: indices and counts are small,
+//! and seven digits are enough for a pixel.
 
 /// A count or an index as a number.
 #[inline]
@@ -35,13 +35,13 @@ pub fn to_f32(number: usize) -> f32 {
     number as f32
 }
 
-/// A quantity in single precision.
+/// A number in single precision.
 #[expect(clippy::cast_possible_truncation, reason = "the quantity needs no more")]
 pub fn narrow_to_f32(value: f64) -> f32 {
     value as f32
 }
 
-/// The last whole position that is not beyond a position.
+/// The largest integer not above a number.
 #[expect(clippy::cast_possible_truncation, reason = "positions are some thousand pixels")]
 #[inline(always)]
 pub fn floor_to_index(position: f64) -> isize {
@@ -55,7 +55,7 @@ pub fn to_count(number: f64) -> usize {
     number as usize
 }
 
-/// The nearest number of rows or pixels; 0 of less than none.
+/// The nearest integer; 0 for a negative number.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -63,6 +63,6 @@ pub fn to_count(number: f64) -> usize {
 )]
 #[inline(always)]
 pub fn round_to_count(length: f32) -> usize {
-    // Faster than to round: what is cut off is the fraction.
+    // Faster than rounding: the cast truncates.
     (length + 0.5).max(0.0) as usize
 }

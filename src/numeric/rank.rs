@@ -1,14 +1,14 @@
-//! Medians and other ranks of values in scratch memory, which is left in another
-//! order.
+//! Medians and quantiles by selection; the values are left in another order.
 
 use std::cmp::Ordering;
 
 use super::number::{to_count, to_f64};
 
-/// Standard deviation of normal numbers over the median of their magnitudes.
+/// Derived: 1/Φ⁻¹(¾), the standard deviation of a normal distribution over its median absolute
+/// deviation.
 pub const SIGMA_PER_MEDIAN: f64 = 1.4826;
 
-/// Median of the square of a standard normal number.
+/// Derived: Φ⁻¹(¾)², the median of the square of a standard normal variable.
 pub const MEDIAN_OF_SQUARED_NORMAL: f64 = 0.455;
 
 /// Numbers that have an order.
@@ -29,14 +29,13 @@ impl Ordered for f64 {
     }
 }
 
-/// The value that so many others do not exceed; `None` where there are no more
-/// than that.
+/// The value at a rank, from 0 for the smallest; `None` if there are not as many.
 #[inline(always)]
 pub fn at<T: Ordered>(values: &mut [T], rank: usize) -> Option<T> {
     (rank < values.len()).then(|| *values.select_nth_unstable_by(rank, T::order).1)
 }
 
-/// The middle one, of two the upper; `None` of none.
+/// The median; the upper one of an even number. `None` of none.
 #[inline(always)]
 pub fn median<T: Ordered>(values: &mut [T]) -> Option<T> {
     let middle = values.len() / 2;
@@ -64,8 +63,7 @@ pub fn quantile(values: &mut [f64], fraction: f64) -> Option<f64> {
     at(values, to_count((fraction * to_f64(values.len().saturating_sub(1))).round()))
 }
 
-/// Median of how far values lie from `median`; their magnitudes are left in their place.
-/// `None` of none.
+/// Median absolute deviation from `median`; the deviations replace the values. `None` of none.
 #[inline(always)]
 pub fn median_deviation(values: &mut [f32], median: f32) -> Option<f32> {
     for value in &mut *values {
@@ -77,6 +75,13 @@ pub fn median_deviation(values: &mut [f32], median: f32) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numeric::normal_distribution::cumulative;
+
+    #[test]
+    fn the_constants_are_those_of_the_normal_distribution() {
+        assert!((cumulative(1.0 / SIGMA_PER_MEDIAN) - 0.75).abs() < 1e-5);
+        assert!((cumulative(MEDIAN_OF_SQUARED_NORMAL.sqrt()) - 0.75).abs() < 1e-4);
+    }
 
     #[test]
     fn ranks_are_those_of_the_sorted_values() {

@@ -1,17 +1,17 @@
-//! Smoothing without a shift: a polynomial fitted to a window by least squares
-//! and evaluated at one of its samples (bcs-thesis, eqs. (5), (6); Savitzky and
-//! Golay 1964). The coefficients are sums over orthonormal polynomials, so no
-//! matrix is solved and none of them suffers from the powers of a long window.
+//! Smoothing without a shift: a polynomial is fitted to a window by least squares and evaluated
+//! at one of its samples (bcs-thesis, eqs. (5), (6); Savitzky and Golay 1964). The coefficients
+//! are sums over orthonormal polynomials, which avoids the ill-conditioned powers of a long
+//! window.
 
 use super::number::to_f64;
 use super::row::dot;
 
-/// Highest degree that is of use.
+/// Largest degree. A choice: higher ones do not smooth.
 const MAX_DEGREE: usize = 8;
-/// Windows beyond this are no windows.
+/// Longest window. A choice against a mistyped number.
 const MAX_WINDOW: usize = 10_001;
 
-/// Numbers that make no filter.
+/// Invalid parameters of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SavGolError {
     /// The window's length.
@@ -39,13 +39,13 @@ pub enum SavGolError {
         /// The polynomial's degree.
         degree: usize,
     },
-    /// Time from sample to sample.
+    /// Sampling interval.
     #[error("{step_s} s from sample to sample: expected a time larger than zero")]
     Step {
         /// What was asked for.
         step_s: f64,
     },
-    /// Fewer samples than the window is long.
+    /// Fewer samples than the window.
     #[error("{got} samples: a window of {window} needs as many")]
     TooFew {
         /// Samples that there are.
@@ -55,7 +55,7 @@ pub enum SavGolError {
     },
 }
 
-/// A window, the degree of the polynomial, and which derivative is wanted.
+/// Window, degree of the polynomial, and order of the derivative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SavGol {
     window: usize,
@@ -65,7 +65,7 @@ pub struct SavGol {
 }
 
 impl SavGol {
-    /// That smooths: an odd window, a degree below its length.
+    /// A smoothing filter: an odd window, a degree below its length.
     pub fn new(window: usize, degree: usize) -> Result<Self, SavGolError> {
         if degree > MAX_DEGREE {
             return Err(SavGolError::Degree { degree });
@@ -76,7 +76,7 @@ impl SavGol {
         Ok(Self { window, degree, derivative: 0, step_s: 1.0 })
     }
 
-    /// That differentiates so many times, at so many seconds a sample.
+    /// A differentiating filter of some order, with the sampling interval.
     pub fn derivative(self, order: usize, step_s: f64) -> Result<Self, SavGolError> {
         if order > self.degree {
             return Err(SavGolError::Derivative { derivative: order, degree: self.degree });
@@ -92,10 +92,10 @@ impl SavGol {
         self.window
     }
 
-    /// What each sample of the window, the oldest first, is multiplied by to get
-    /// the value at sample `at` of it, counted from 0.
+    /// Weights of the samples of the window, the oldest first, for the value at sample `at`,
+    /// from 0.
     pub fn coefficients(&self, at: usize) -> Vec<f64> {
-        // The window reaches from −1 to 1.
+        // The window is mapped to −1 to 1.
         let half = to_f64(self.window / 2).max(1.0);
         let place = |sample: usize| (to_f64(sample) - to_f64(self.window / 2)) / half;
         let mut coefficients = vec![0.0; self.window];
@@ -124,8 +124,8 @@ impl SavGol {
         self.coefficients(at).iter().map(|coefficient| coefficient * coefficient).sum()
     }
 
-    /// As many values as samples: at the middle of each window, and at the ends
-    /// from the polynomial through the first and the last window.
+    /// As many values as samples: at the middle of each window, and at the ends from the
+    /// polynomials of the first and the last window.
     pub fn filter(&self, samples: &[f64]) -> Result<Vec<f64>, SavGolError> {
         let (got, window) = (samples.len(), self.window);
         let (Some(first), Some(last)) =
@@ -142,9 +142,8 @@ impl SavGol {
     }
 }
 
-/// The same for live use: the polynomial through the newest samples, at the
-/// last of them. It is noisier than in the middle, by
-/// [`SavGol::noise_gain`], and comes without delay for what is a polynomial.
+/// The same for live use: the polynomial of the newest samples, at the last of them. It is
+/// noisier than in the middle, by [`SavGol::noise_gain`], and has no delay for polynomials.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveSavGol {
     coefficients: Vec<f64>,
@@ -159,7 +158,7 @@ impl LiveSavGol {
         Self { ring: Vec::with_capacity(coefficients.len()), coefficients, next: 0 }
     }
 
-    /// Takes a sample; gives the value there, once the window is full.
+    /// Takes a sample; returns the value there once the window is full.
     pub fn step(&mut self, sample: f64) -> Option<f64> {
         match self.ring.get_mut(self.next) {
             Some(oldest) => *oldest = sample,
@@ -175,8 +174,7 @@ impl LiveSavGol {
     }
 }
 
-/// b'·q(k+1) = (x − a)·q(k) − b·q(k−1): what takes one polynomial of an
-/// orthonormal row to the next.
+/// b'·q(k+1) = (x − a)·q(k) − b·q(k−1): the recurrence of the orthonormal polynomials.
 #[derive(Debug, Clone, Copy)]
 struct Recurrence {
     centre: f64,
@@ -184,7 +182,7 @@ struct Recurrence {
     norm: f64,
 }
 
-/// One polynomial of the row at every sample, and the one before it.
+/// One polynomial at every sample, and the one before it.
 struct Basis {
     places: Vec<f64>,
     values: Vec<f64>,
@@ -214,7 +212,7 @@ impl Basis {
     }
 }
 
-/// Derivatives of the same polynomials at one place, from order 0 on.
+/// Derivatives of the same polynomials at one point, from order 0 on.
 struct Derivatives {
     place: f64,
     values: [f64; MAX_DEGREE + 1],

@@ -1,4 +1,4 @@
-//! Laws that are tried on a cell as it was found.
+//! Controllers that are tried on an identified cell.
 
 use std::sync::Arc;
 
@@ -18,14 +18,14 @@ pub struct ControllerCandidate {
     pub strategy: Arc<dyn Strategy>,
     /// Gains of the PI controller.
     pub gains: Option<PiGains>,
-    /// The camera's distance that it is told \[mm\].
+    /// The camera's distance in its settings \[mm\].
     pub offset_mm: f64,
     /// Its standard deviation \[mm\].
     pub offset_sigma_mm: f64,
 }
 
 impl ControllerCandidate {
-    /// As the cell has it now; none where its controller holds no width.
+    /// As configured in the cell; `None` where the strategy does not control the width.
     pub fn now(run: &RunPart) -> Option<Self> {
         let strategy = &run.control.strategy;
         let name = if strategy.as_kind::<PiStrategy>().is_some() {
@@ -74,7 +74,7 @@ impl ControllerCandidate {
         }
     }
 
-    /// The distance controller as it is proposed, and with what it is told wrong.
+    /// The distance controller as proposed, and with mismatched settings.
     pub fn mismatched(proposal: &Proposal) -> Vec<Self> {
         let settings = proposal.distance;
         let cases: [(&str, f64, f64); 5] = [

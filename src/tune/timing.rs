@@ -1,4 +1,4 @@
-//! Rates and delays, from when things happened.
+//! Rates and latencies of a cell.
 
 use serde::Serialize;
 
@@ -6,25 +6,25 @@ use super::Log;
 use crate::core::time::Stamp;
 use crate::numeric::rank;
 
-/// What a cell's clocks do \[s\]. Each is a median, with the 99th percentile where a
-/// late one matters.
+/// Rates and latencies of a cell \[s\]: medians, with the 99th percentile where a late event
+/// matters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CellTiming {
     /// From a frame's capture to its width's arrival at the controller.
     pub latency_s: f64,
-    /// The same, which one of a hundred exceeds.
+    /// Its 99th percentile.
     pub latency_p99_s: f64,
     /// Time from one measured frame to the next.
     pub frame_s: f64,
     /// Time from report to report.
     pub report_s: f64,
-    /// The same, which one of a hundred exceeds.
+    /// Its 99th percentile.
     pub report_p99_s: f64,
     /// Time from setpoint to setpoint.
     pub setpoint_s: f64,
 }
 
-/// Of a run; nothing where something never happened twice is 0.
+/// Of a run; 0 where something did not happen twice.
 pub fn timing(log: &Log) -> CellTiming {
     let frames: Vec<Stamp> = log.widths.iter().map(|width| width.at).collect();
     let reports: Vec<Stamp> = log.states.iter().map(|(at, _)| *at).collect();

@@ -31,10 +31,10 @@ impl MarkerGrid {
         // Two rows together have as many markers as a row has squares.
         let (pair, rest) = (number / columns, number % columns);
         let in_even = if first_has_marker { columns.div_ceil(2) } else { columns / 2 };
-        let (row, place) =
+        let (row, position) =
             if rest < in_even { (2 * pair, rest) } else { (2 * pair + 1, rest - in_even) };
         let starts = usize::from((row % 2 == 0) != first_has_marker);
-        (row < rows).then_some((2 * place + starts, row))
+        (row < rows).then_some((2 * position + starts, row))
     }
 
     /// The corners of a marker, in squares from the board's upper left corner.

@@ -50,9 +50,9 @@ impl CornerModel {
 
     /// Predicted value at a position, and its derivatives.
     #[inline]
-    pub fn at(&self, table: &StepTable, place: Vector2<f64>) -> (f64, SVector<f64, PARAMETERS>) {
+    pub fn at(&self, table: &StepTable, position: Vector2<f64>) -> (f64, SVector<f64, PARAMETERS>) {
         let CornerShape { at, bends, blur, levels: [mean, half, by_x, by_y], .. } = self.corner;
-        let from = place - at;
+        let from = position - at;
         let along = self.along.map(|direction| direction.dot(&from));
         let aside: [f64; 2] = std::array::from_fn(|line| {
             self.normals[line].dot(&from) - 0.5 * bends[line] * along[line] * along[line]
@@ -60,7 +60,7 @@ impl CornerModel {
         let steps = aside.map(|aside| table.at(aside / blur));
         let waves = steps.map(|(step, _)| 2.0 * step - 1.0);
         let slopes = steps.map(|(_, density)| 2.0 * density / blur);
-        let value = mean + half * waves[0] * waves[1] + by_x * place.x + by_y * place.y;
+        let value = mean + half * waves[0] * waves[1] + by_x * position.x + by_y * position.y;
         // Derivatives of the product with the distance from each line.
         let by_aside = [half * slopes[0] * waves[1], half * slopes[1] * waves[0]];
         let by_place = -(self.normals[0] * by_aside[0] + self.normals[1] * by_aside[1]);
@@ -74,8 +74,8 @@ impl CornerModel {
             by_blur,
             1.0,
             waves[0] * waves[1],
-            place.x,
-            place.y,
+            position.x,
+            position.y,
         ];
         (value, SVector::from(numbers))
     }
@@ -135,13 +135,13 @@ mod tests {
             blur: 0.9,
             levels: [120.0, -80.0, 0.5, -0.3],
         };
-        for place in [Vector2::new(1.0, 0.4), Vector2::new(-0.7, 1.1), Vector2::new(0.1, -2.0)] {
-            let (_, slopes) = CornerModel::of(corner).at(&table, place);
+        for position in [Vector2::new(1.0, 0.4), Vector2::new(-0.7, 1.1), Vector2::new(0.1, -2.0)] {
+            let (_, slopes) = CornerModel::of(corner).at(&table, position);
             for number in 0..PARAMETERS {
                 let mut step = SVector::<f64, PARAMETERS>::zeros();
                 step[number] = 0.02;
-                let up = CornerModel::of(corner.stepped(&step)).at(&table, place).0;
-                let down = CornerModel::of(corner.stepped(&-step)).at(&table, place).0;
+                let up = CornerModel::of(corner.stepped(&step)).at(&table, position).0;
+                let down = CornerModel::of(corner.stepped(&-step)).at(&table, position).0;
                 let by = (up - down) / 0.04;
                 // The table is good to some 1e-5 of the step.
                 assert!((by - slopes[number]).abs() < 0.3, "{number}: {by} {}", slopes[number]);

@@ -96,12 +96,12 @@ impl CameraModel {
     /// Sum of the squared reprojection errors \[px²\]; `None` behind the camera.
     pub fn sum_of_squares_px2(
         &self,
-        place: &BoardPlacement,
+        position: &BoardPlacement,
         boards: &[Vec<Correspondence>],
     ) -> Option<f64> {
         let mut sum = 0.0;
         for (board, corners) in boards.iter().enumerate() {
-            let pose = place.of_board(board);
+            let pose = position.of_board(board);
             for corner in corners {
                 let at = self.camera.project(pose.apply(self.on_board(corner)))?;
                 sum += (corner.observed - at).norm_squared();

@@ -155,7 +155,7 @@ extrinsic_parameters: !!opencv-matrix
     }
 
     #[test]
-    fn everything_that_is_wrong_is_reported_at_once_with_its_line() {
+    fn all_violations_are_reported_at_once_with_their_lines() {
         let text = FILE
             .replace("image_width: 640", "image_width: 640.5")
             .replace("5.3294e+02, 233.86", ".Inf, \"233.86\"")

@@ -31,7 +31,7 @@ pub(super) fn read(fields: &YamlFields<'_>, notes: &mut Vec<String>) -> Option<I
     let counts = read_model(fields, notes);
     let matrix = fields.matrix(CAMERA, "camera_matrix");
     let distortion = fields.matrix(DISTORTION, "distortion_coefficients");
-    check_whole_picture(fields, [width, height]);
+    check_whole_image(fields, [width, height]);
     note_rectification(fields, matrix.as_ref(), notes);
     let size = width.zip(height).map(|(width, height)| [width, height]);
     let camera = fields.camera(matrix, distortion, counts.unwrap_or(&[4, 5, 8]), size);
@@ -68,7 +68,7 @@ fn read_model(fields: &YamlFields<'_>, notes: &mut Vec<String>) -> Option<&'stat
 
 /// Refuses calibrations of a region of interest or of binned images, whose parameters do not
 /// apply to the full image.
-fn check_whole_picture(fields: &YamlFields<'_>, [width, height]: [Option<u32>; 2]) {
+fn check_whole_image(fields: &YamlFields<'_>, [width, height]: [Option<u32>; 2]) {
     for key in ["binning_x", "binning_y"] {
         fields.check_whole(&[key], &[0, 1], "0 or 1, images with all their pixels");
     }
@@ -215,7 +215,7 @@ roi:
         };
         // The projection is that of rectified images.
         let [note] = import.notes.as_slice() else { panic!("{:?}", import.notes) };
-        assert!(note.starts_with("projection_matrix is for rectified pictures"), "{note}");
+        assert!(note.starts_with("projection_matrix is for rectified images"), "{note}");
         assert_eq!((import.format, import.intrinsics), (Format::Ros, intrinsics));
         let four = FILE.replace("cols: 5", "cols: 4").replace(", 0.16]", "]");
         let four = parse("info.yaml", &four).unwrap().intrinsics.camera;
@@ -238,7 +238,7 @@ roi:
     }
 
     #[test]
-    fn a_part_of_the_picture_and_pixels_put_together_are_refused() {
+    fn a_region_of_interest_and_binned_pixels_are_refused() {
         for (from, to, words) in [
             ("binning_x: 0", "binning_x: 2", "line 30: found 2, expected 0 or 1"),
             ("x_offset: 0", "x_offset: 8", "roi.x_offset: found 8, expected 0 or the whole"),
@@ -264,7 +264,7 @@ roi:
     }
 
     #[test]
-    fn everything_that_is_wrong_is_reported_at_once_with_its_line() {
+    fn all_violations_are_reported_at_once_with_their_lines() {
         let text = FILE
             .replace("image_width: 640\n", "")
             .replace("image_height: 480", "image_height: -480")

@@ -93,7 +93,7 @@ fn found(sighting: &BoardObservation, touch: &Touch) -> NozzleOffset {
 }
 
 #[test]
-fn the_truth_lies_within_the_sigma_that_is_told() {
+fn the_truth_lies_within_the_reported_sigma() {
     let mut squares = 0.0;
     for seed in 0..10 {
         let off = hash::normal_pair(hash::mix(&[41, seed])).map(|z| 0.5 * z);

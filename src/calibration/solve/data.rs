@@ -37,7 +37,7 @@ impl CalibrationData {
             .filter_map(|b| homography::homography(&homography::pairs(&b[0])))
             .collect();
         let camera = homography::pinhole(&maps, size);
-        let places = sightings
+        let positions = sightings
             .iter()
             .zip(&boards)
             .map(|(sighting, corners)| {
@@ -48,7 +48,10 @@ impl CalibrationData {
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
             boards,
-            start: Guess { model: CameraModel { camera, bend_mm: [0.0; 2] }, placements: places },
+            start: Guess {
+                model: CameraModel { camera, bend_mm: [0.0; 2] },
+                placements: positions,
+            },
             size,
         })
     }
@@ -70,8 +73,8 @@ impl CalibrationData {
     /// Standard deviations of the shared parameters for a noise of 1 px.
     pub fn unit_sigmas(&self, fit: &BundleFit, free: FreeParameters) -> Option<[f64; SHARED]> {
         let mut left = nalgebra::SMatrix::<f64, SHARED, SHARED>::zeros();
-        for (place, boards) in fit.placements.iter().zip(&self.boards) {
-            left += Elimination::of(&Equations::of(&fit.model, free, place, boards)?)?.reduced;
+        for (position, boards) in fit.placements.iter().zip(&self.boards) {
+            left += Elimination::of(&Equations::of(&fit.model, free, position, boards)?)?.reduced;
         }
         let variances = Factor::of_shared(&restrict_to_free(left, free))?.variances();
         Some(std::array::from_fn(|number| variances[number].sqrt()))

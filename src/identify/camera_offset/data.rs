@@ -38,9 +38,9 @@ impl PooledWidths {
         let variance = |look: &BeadObservation| {
             if usual > 0.0 { (look.relative_sigma / usual).clamp(0.3, 10.0).powi(2) } else { 1.0 }
         };
-        let ends = ends_of_pools(looks, gauge.get().max(MIN_POOL_MM));
+        let pool_ends = ends_of_pools(looks, gauge.get().max(MIN_POOL_MM));
         let mut first = 0;
-        let place = |&end: &usize| {
+        let position = |&end: &usize| {
             let pool = &looks[std::mem::replace(&mut first, end)..end];
             let count = to_f64(pool.len());
             PathPosition {
@@ -49,16 +49,10 @@ impl PooledWidths {
                 variance: pool.iter().map(variance).sum::<f64>() / (count * count),
             }
         };
-        let places = ends.iter().map(place).collect();
+        let positions = pool_ends.iter().map(position).collect();
         let mean = looks.iter().map(|look| look.ln_width).sum::<f64>() / to_f64(looks.len());
-        Self {
-            observations: looks.to_vec(),
-            pool_ends: ends,
-            positions: places,
-            sums: course.sums(exponent),
-            gauge,
-            mean,
-        }
+        let (observations, sums) = (looks.to_vec(), course.sums(exponent));
+        Self { observations, pool_ends, positions, gauge, mean, sums }
     }
 
     /// Logarithms of the speeds that laid each of them, at an offset \[mm\].

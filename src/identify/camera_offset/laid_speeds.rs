@@ -159,8 +159,8 @@ impl Bead {
         }
         let before = after.checked_sub(1)?;
         let (from, to) = (*self.times.get(before)?, *self.times.get(after)?);
-        let share = (at - from).secs() / (to - from).secs();
-        Some(self.paths[before] + (self.paths[after] - self.paths[before]) * share)
+        let fraction = (at - from).secs() / (to - from).secs();
+        Some(self.paths[before] + (self.paths[after] - self.paths[before]) * fraction)
     }
 
     /// Speeds at the grid nodes, interpolated along the path.
@@ -173,8 +173,9 @@ impl Bead {
                 next += 1;
             }
             let (from, to) = (self.paths[next - 1], self.paths[next]);
-            let share = if to > from { ((path - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
-            self.speeds[next - 1] + (self.speeds[next] - self.speeds[next - 1]) * share
+            let fraction =
+                if to > from { ((path - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
+            self.speeds[next - 1] + (self.speeds[next] - self.speeds[next - 1]) * fraction
         })
     }
 

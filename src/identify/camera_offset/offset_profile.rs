@@ -5,7 +5,7 @@ use super::data::PooledWidths;
 use super::estimate::{EXPONENT_RANGE, WidthAtSpeed};
 use super::laid_speeds::LaidSpeeds;
 use super::observation::BeadObservation;
-use super::whiten::{PathWhitener, WidthNoise};
+use super::whiten::{PathPosition, PathWhitener, WidthNoise};
 use crate::core::units::Mm;
 use crate::numeric::number::{to_count, to_f64};
 use crate::numeric::rank;
@@ -90,7 +90,7 @@ impl OffsetProfile {
         let speeds = self.data.pooled(self.data.ln_speeds(offset_mm));
         let mean = speeds.iter().sum::<f64>() / to_f64(speeds.len());
         let speeds = self.whitener.apply(speeds.into_iter().map(|speed| speed - mean));
-        let (mut n, mut x, mut y, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        let [mut n, mut x, mut y, mut xx, mut xy, mut yy] = [0.0; 6];
         for ((speed, one), width) in speeds.zip(&self.ones).zip(&self.widths) {
             n += one * one;
             x += one * speed;
@@ -188,14 +188,18 @@ impl OffsetProfile {
             x += one * speed;
             xx += speed * speed;
         }
-        let share = self.variance(best) / (n * xx - x * x).max(f64::MIN_POSITIVE);
+        let fraction = self.variance(best) / (n * xx - x * x).max(f64::MIN_POSITIVE);
         let ends =
             [-1.0, 1.0].map(|side| self.fit_at((best.offset_mm + side * offset_sigma_mm).max(0.0)));
         let level_at =
             |fit: &OffsetFit| fit.level + fit.exponent * (fit.mean_ln_speed - best.mean_ln_speed);
         let level = 0.5 * (level_at(&ends[1]) - level_at(&ends[0]));
         let exponent = 0.5 * (ends[1].exponent - ends[0].exponent);
-        [share * xx + level * level, share * n + exponent * exponent, share * x + level * exponent]
+        [
+            fraction * xx + level * level,
+            fraction * n + exponent * exponent,
+            fraction * x + level * exponent,
+        ]
     }
 
     /// Logarithms of the level in mm and of the mean speed at which it holds.
@@ -205,38 +209,32 @@ impl OffsetProfile {
 
     /// The widths with their speeds, one by one and averaged over a gauge.
     pub fn widths_at_speed(&self, best: &OffsetFit) -> (Vec<WidthAtSpeed>, Vec<WidthAtSpeed>) {
-        let looks = self.data.observations.iter().zip(self.data.ln_speeds(best.offset_mm));
-        let each: Vec<WidthAtSpeed> = looks
-            .map(|(look, ln_speed)| WidthAtSpeed {
-                bead: look.bead,
-                path_mm: look.path_mm,
-                count: 1,
-                ln_width: look.ln_width,
-                ln_speed,
-            })
-            .collect();
+        let one = |(&BeadObservation { bead, path_mm, ln_width, .. }, ln_speed)| WidthAtSpeed {
+            bead,
+            path_mm,
+            count: 1,
+            ln_width,
+            ln_speed,
+        };
+        let speeds = self.data.ln_speeds(best.offset_mm);
+        let each: Vec<WidthAtSpeed> = self.data.observations.iter().zip(speeds).map(one).collect();
         let widths = self.data.pooled(each.iter().map(|seen| seen.ln_width));
         let speeds = self.data.pooled(each.iter().map(|seen| seen.ln_speed));
         let begins = std::iter::once(&0).chain(&self.data.pool_ends);
         let counts = begins.zip(&self.data.pool_ends).map(|(begin, end)| end - begin);
-        let places = self.data.positions.iter().zip(counts);
-        let pooled = places.zip(widths.into_iter().zip(speeds));
-        let pieces = pooled.map(|((place, count), (ln_width, ln_speed))| WidthAtSpeed {
-            bead: place.bead,
-            path_mm: place.path_mm,
-            count,
-            ln_width,
-            ln_speed,
-        });
-        let pieces = pieces.collect();
+        let pooled = self.data.positions.iter().zip(counts).zip(widths.into_iter().zip(speeds));
+        let piece = |((&PathPosition { bead, path_mm, .. }, count), (ln_width, ln_speed))| {
+            WidthAtSpeed { bead, path_mm, count, ln_width, ln_speed }
+        };
+        let pieces = pooled.map(piece).collect();
         (each, pieces)
     }
 
     /// Other local minima at which the speed explains this fraction of what it explains at the
     /// best one, with offsets in between at which it does not \[mm\].
-    pub fn rivals(&self, best: &OffsetFit, farthest_mm: f64, share: f64) -> Vec<f64> {
+    pub fn rivals(&self, best: &OffsetFit, farthest_mm: f64, fraction: f64) -> Vec<f64> {
         let tried: Vec<OffsetFit> = self.grid(farthest_mm).collect();
-        let explains = |fit: &OffsetFit| fit.explained() >= share * best.explained();
+        let explains = |fit: &OffsetFit| fit.explained() >= fraction * best.explained();
         let poor: Vec<f64> =
             tried.iter().filter(|fit| !explains(fit)).map(|fit| fit.offset_mm).collect();
         let is_apart = |offset_mm: f64| {
@@ -302,12 +300,12 @@ impl OffsetProfile {
 /// Widths of bead with known speed at an offset, without a few outliers.
 pub fn without_outliers(
     course: &LaidSpeeds,
-    looks: &[BeadObservation],
+    observations: &[BeadObservation],
     gauge: Mm,
     best: &OffsetFit,
     noise: WidthNoise,
 ) -> Vec<BeadObservation> {
-    let known = looks.iter().filter(|look| course.covers(look, best.offset_mm, gauge));
+    let known = observations.iter().filter(|look| course.covers(look, best.offset_mm, gauge));
     let known: Vec<BeadObservation> = known.copied().collect();
     if known.is_empty() {
         return known;

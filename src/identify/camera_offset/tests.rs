@@ -174,7 +174,7 @@ fn the_truth_lies_within_two_sigma_as_often_as_it_should() {
 }
 
 #[test]
-fn a_bead_of_constant_flow_tells_its_exponent_too() {
+fn a_bead_of_constant_flow_determines_its_exponent_too() {
     let plant = Plant { exponent: 1.0, offset_mm: 180.0, ..PLANT };
     let found = found(&steps(15, 1).record(plant, 1)).unwrap();
     assert!((found.offset.get() - 180.0).abs() < 3.0 * found.sigma.get(), "{found:?}");
@@ -263,7 +263,7 @@ fn a_new_bead_does_not_mix_with_the_old_one_and_a_wrong_width_counts_for_nothing
 }
 
 #[test]
-fn what_does_not_tell_is_refused_with_its_reason() {
+fn an_undetermined_offset_is_refused_with_its_reason() {
     let steady = demands(15, |tick, _| if tick < 3000 { 100.0 } else { 100.5 }).record(PLANT, 1);
     assert!(
         matches!(found(&steady), Err(CameraOffsetError::ConstantSpeed { .. })),
@@ -287,7 +287,7 @@ fn what_does_not_tell_is_refused_with_its_reason() {
 }
 
 #[test]
-fn a_speed_that_repeats_itself_is_ambiguous_until_the_range_is_told() {
+fn a_periodic_speed_is_ambiguous_until_the_range_is_limited() {
     // One period is 285 mm.
     let way = demands(20, |tick, _| 95.0 + 20.0 * (tick as f64 * TICK_S * 2.1).sin());
     let record = way.record(PLANT, 6);
@@ -299,13 +299,13 @@ fn a_speed_that_repeats_itself_is_ambiguous_until_the_range_is_told() {
 }
 
 #[test]
-fn differences_of_a_wandering_series_are_independent_and_of_one_size() {
+fn innovations_of_a_drifting_series_are_independent_and_normalised() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
     let normal = Normal::new(0.0, 1.0).unwrap();
     let noise = WidthNoise::all().find(|noise| *noise == WidthNoise::INITIAL).unwrap();
     let count = 40_000;
     let (mut path, mut wander) = (0.0, 3f64.sqrt() * normal.sample(&mut random));
-    let mut places = Vec::new();
+    let mut positions = Vec::new();
     let mut values = Vec::new();
     for i in 0..count {
         // Now and then the nozzle stands still.
@@ -314,10 +314,10 @@ fn differences_of_a_wandering_series_are_independent_and_of_one_size() {
         let kept = (-way / 80.0).exp();
         wander = kept * wander + (3.0 * (1.0 - kept * kept)).sqrt() * normal.sample(&mut random);
         let variance = if i % 3 == 0 { 4.0 } else { 1.0 };
-        places.push(PathPosition { bead: 0, path_mm: path, variance });
+        positions.push(PathPosition { bead: 0, path_mm: path, variance });
         values.push(wander + variance.sqrt() * normal.sample(&mut random));
     }
-    let left: Vec<f64> = PathWhitener::new(&places, noise).apply(values.into_iter()).collect();
+    let left: Vec<f64> = PathWhitener::new(&positions, noise).apply(values.into_iter()).collect();
     let mean = |lag: usize| {
         left.iter().zip(&left[lag..]).map(|(a, b)| a * b).sum::<f64>() / f64::from(count)
     };

@@ -64,23 +64,23 @@ struct Step {
 
 impl PathWhitener {
     /// For these positions, in order.
-    pub fn new(places: &[PathPosition], noise: WidthNoise) -> Self {
+    pub fn new(positions: &[PathPosition], noise: WidthNoise) -> Self {
         let mut variance = noise.variance;
         let mut before: Option<PathPosition> = None;
         let mut ln_variances = 0.0;
-        let steps = places
+        let steps = positions
             .iter()
-            .map(|place| {
+            .map(|position| {
                 let kept =
-                    before.filter(|before| before.bead == place.bead).map_or(0.0, |before| {
-                        (-(place.path_mm - before.path_mm).abs() / noise.correlation_length_mm)
+                    before.filter(|before| before.bead == position.bead).map_or(0.0, |before| {
+                        (-(position.path_mm - before.path_mm).abs() / noise.correlation_length_mm)
                             .exp()
                     });
                 variance = kept * kept * variance + noise.variance * (1.0 - kept * kept);
-                let total = variance + place.variance;
+                let total = variance + position.variance;
                 let gain = variance / total;
                 variance *= 1.0 - gain;
-                before = Some(*place);
+                before = Some(*position);
                 ln_variances += total.ln();
                 Step { correlation: kept, gain, weight: 1.0 / total.sqrt() }
             })

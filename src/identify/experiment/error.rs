@@ -49,7 +49,7 @@ pub enum ExperimentError {
         /// Its moment \[s\].
         time_s: f64,
     },
-    /// A unit of time that cannot be.
+    /// An implausible unit of time.
     #[error(
         "from sample to sample {} s, if the unit of time is right: no log of an extruder has \
          such steps. {}", six_digits(*.step_s), if *.step_s > 1.0 {
@@ -57,18 +57,16 @@ pub enum ExperimentError {
         } else {
             "Is the column in s? Say so with --unit COLUMN=s"
         }
-    /// An implausible unit of time.
     )]
     TimeUnit {
         /// The usual step \[s\].
         step_s: f64,
     },
-    /// Nothing logged for long.
+    /// A long gap.
     #[error(
         "a gap of {:.3} s after {:.3} s (sample {}){}; gaps up to {limit_s:.3} s are bridged: use a \
          part without it, or allow longer ones with --max-gap-s", .gap.length_s, .gap.from_s,
         .gap.after + 1, if *.count > 1 { format!(", the longest of {count}") } else { String::new() }
-    /// A long gap.
     )]
     Gap {
         /// The longest one.
@@ -78,13 +76,12 @@ pub enum ExperimentError {
         /// The longest that is bridged \[s\].
         limit_s: f64,
     },
-    /// A column that does not move.
+    /// A constant column.
     #[error(
         "the {side} is {} all the time: nothing can be identified from it{}",
         six_digits(*.value), if *.side == DataColumn::Input { "; excite it (truebead extruder excite writes profiles)" } else {
             "; see that its sensor is connected"
         }
-    /// A constant column.
     )]
     Constant {
         /// Which one.
@@ -92,13 +89,12 @@ pub enum ExperimentError {
         /// Its value.
         value: f64,
     },
-    /// A column that does not move in one of the parts that a log is cut into.
+    /// A column that is constant in one of the parts of a log.
     #[error(
         "the {side} is {} all the time from {from_s:.1} s to {to_s:.1} s, the part that is {}: \
          cut the log elsewhere (--validate-share, --to-s), or name another one to validate with \
          (--validate)", six_digits(*.value),
         if *.validates { "kept to validate with" } else { "fitted to" }
-    /// A column that is constant in one of the parts of a log.
     )]
     ConstantPart {
         /// Which one.
@@ -120,7 +116,6 @@ pub enum ExperimentError {
         six_digits(.others[0]), six_digits(.others[1]), if *.side == DataColumn::Output {
             "; --hampel 5,5 replaces such samples"
         } else { "" }
-    /// A few samples far beyond all others.
     )]
     Outlier {
         /// Which column.

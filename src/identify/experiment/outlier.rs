@@ -44,9 +44,9 @@ mod tests {
         (0..count).map(|k| 50.0 + 5.0 * (0.1 * f64::from(k)).sin()).collect()
     }
 
-    fn with(places: &[(usize, f64)]) -> Result<(), ExperimentError> {
+    fn with(positions: &[(usize, f64)]) -> Result<(), ExperimentError> {
         let mut values = swinging(3000);
-        for (at, value) in places {
+        for (at, value) in positions {
             values[*at] = *value;
         }
         check(DataColumn::Output, &values)

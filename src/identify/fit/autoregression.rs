@@ -97,8 +97,8 @@ pub(super) mod tests {
         let model = ArModel::of(&lagged(1, 20_000, 0.7));
         assert!((model.coefficients[0] + 0.7).abs() < 0.02, "{model:?}");
         assert!((model.innovation_sigma - 1.0).abs() < 0.02, "{model:?}");
-        let share = model.effective_samples(20_000) / 20_000.0;
-        assert!((share - 0.3 / 1.7).abs() < 0.03, "{share}");
+        let fraction = model.effective_samples(20_000) / 20_000.0;
+        assert!((fraction - 0.3 / 1.7).abs() < 0.03, "{fraction}");
         assert!(ArModel::of(&lagged(2, 20_000, 0.0)).effective_samples(20_000) > 19_000.0);
     }
 }

@@ -159,11 +159,11 @@ impl<'a> Signal<'a> {
             || at_end().filter(|stand| stand.final_rate >= ABRUPT_RATE).map(|stand| stand.before);
         let (grain, total) = (self.resolution(), at_end().count());
         let range = self.range[1] - self.range[0];
-        let has_turned = |stretch: &&[f64]| {
-            reversal(stretch) > MIN_REVERSAL * range && !is_at_one_rate(stretch, grain)
+        let has_turned = |segment: &&[f64]| {
+            reversal(segment) > MIN_REVERSAL * range && !is_at_one_rate(segment, grain)
         };
         let turned = abrupt().filter(has_turned).count();
-        let bent = abrupt().filter(|stretch| slows_down(stretch, grain)).count();
+        let bent = abrupt().filter(|segment| slows_down(segment, grain)).count();
         (turned >= MIN_ARRIVALS && 5 * turned >= total)
             || (bent > MIN_ARRIVALS && 5 * bent >= 4 * total)
     }
@@ -212,15 +212,15 @@ impl<'a> Signal<'a> {
 
     /// Last step of a segment before a run over its mean step; for a short segment, whether the
     /// run is a step away.
-    fn final_rate(&self, stretch: &[f64], from: usize) -> f64 {
-        let [_, .., before, last] = *stretch else {
+    fn final_rate(&self, segment: &[f64], from: usize) -> f64 {
+        let [_, .., before, last] = *segment else {
             let pair = self.row.get(from.saturating_sub(1)..=from).unwrap_or_default();
             let [least, most] = min_max(pair);
             let is_step = most - least > MIN_STEP * (self.range[1] - self.range[0]);
             return if is_step { 1.0 } else { 0.0 };
         };
-        let way: f64 = stretch.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
-        if way > 0.0 { (last - before).abs() * to_f64(stretch.len() - 1) / way } else { 1.0 }
+        let way: f64 = segment.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
+        if way > 0.0 { (last - before).abs() * to_f64(segment.len() - 1) / way } else { 1.0 }
     }
 
     /// Refuses a signal that stands at this value for long, between others, and
@@ -259,21 +259,21 @@ struct Plateau<'a> {
 }
 
 /// Path of a segment beyond its net change.
-fn reversal(stretch: &[f64]) -> f64 {
-    let way: f64 = stretch.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
-    way - net_change(stretch)
+fn reversal(segment: &[f64]) -> f64 {
+    let way: f64 = segment.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
+    way - net_change(segment)
 }
 
 /// From its first sample to its last.
-fn net_change(stretch: &[f64]) -> f64 {
-    let ends = stretch.first().zip(stretch.last());
+fn net_change(segment: &[f64]) -> f64 {
+    let ends = segment.first().zip(segment.last());
     ends.map_or(0.0, |(first, last)| (last - first).abs())
 }
 
 /// Whether nearly all changes from sample to sample are as large as their median,
 /// as those of a drive are that takes steps no faster.
-fn is_at_one_rate(stretch: &[f64], grain: f64) -> bool {
-    let steps = stretch.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+fn is_at_one_rate(segment: &[f64], grain: f64) -> bool {
+    let steps = segment.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
     let median = rank::median(&mut steps).unwrap_or(0.0);
     let near =
@@ -283,10 +283,10 @@ fn is_at_one_rate(stretch: &[f64], grain: f64) -> bool {
 
 /// Whether the last third of a segment is less steep than the middle one, beyond the rounding
 /// of its samples.
-fn slows_down(stretch: &[f64], grain: f64) -> bool {
-    let third = stretch.len().saturating_sub(1) / 3;
-    let last = stretch.get(stretch.len().saturating_sub(third + 1)..).unwrap_or_default();
-    let middle = stretch.get(third..=2 * third).unwrap_or_default();
+fn slows_down(segment: &[f64], grain: f64) -> bool {
+    let third = segment.len().saturating_sub(1) / 3;
+    let last = segment.get(segment.len().saturating_sub(third + 1)..).unwrap_or_default();
+    let middle = segment.get(third..=2 * third).unwrap_or_default();
     let (last, middle) = (net_change(last), net_change(middle));
     third > 0 && middle - last > RAMP_TOLERANCE.mul_add(middle, 2.0 * grain)
 }

@@ -54,9 +54,10 @@ impl NamedParameters {
             }
         }
         let layout = problem.layout();
-        for (name, place) in [("dead_time_s", layout.dead_time), ("output_level", layout.level)] {
-            if let Some(place) = place {
-                named.push(name, theta[place]);
+        for (name, position) in [("dead_time_s", layout.dead_time), ("output_level", layout.level)]
+        {
+            if let Some(position) = position {
+                named.push(name, theta[position]);
             }
         }
         Ok(named)

@@ -113,7 +113,7 @@ impl FitProblem {
     pub fn output_level(&self, theta: &[f64]) -> f64 {
         match self.level {
             OutputLevel::Known(level) => level,
-            OutputLevel::Estimated => self.layout().level.map_or(0.0, |place| theta[place]),
+            OutputLevel::Estimated => self.layout().level.map_or(0.0, |position| theta[position]),
         }
     }
 
@@ -156,8 +156,8 @@ impl FitProblem {
             numbers.push(i);
             columns.push(self.input.iter().map(|u| model.step(*u)).collect());
         }
-        if let Some(place) = layout.level {
-            numbers.push(place);
+        if let Some(position) = layout.level {
+            numbers.push(position);
             columns.push(vec![1.0; self.output.len()]);
         }
         if self.has_free_response {

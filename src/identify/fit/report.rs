@@ -82,7 +82,7 @@ fn check_dependence(problem: &FitProblem, fit: &Fit) -> Result<(), FitError> {
     let squares = dot(&fit.residuals, &fit.residuals) / to_f64(fit.residuals.len());
     let explained = 1.0 - squares / (whole * whole);
     let chance = (CHANCE_FACTOR * to_f64(fit.estimated) / fit.independent_samples).min(1.0);
-    // As a fraction of what is left: an F ratio.
+    // An F ratio: both over the residual variance.
     if explained < chance * (1.0 - explained) {
         let explained_percent = 100.0 * explained.max(0.0);
         let chance_percent = 100.0 * chance / (1.0 + chance);

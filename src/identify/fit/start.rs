@@ -84,8 +84,8 @@ fn with_linear_part(problem: &FitProblem, den: &[f64], dead_time_s: f64) -> Opti
     for (i, c) in den.iter().rev().skip(1).enumerate() {
         theta[layout.poles_from + i] = c / last;
     }
-    if let Some(place) = layout.dead_time {
-        theta[place] = dead_time_s;
+    if let Some(position) = layout.dead_time {
+        theta[position] = dead_time_s;
     }
     problem.project(&mut theta);
     let sum_of_squares = solve_linear(problem, &mut theta)?;

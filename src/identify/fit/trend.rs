@@ -116,4 +116,10 @@ mod tests {
             assert!((seen.rise - 2.0).abs() < 0.8, "{seen:?}");
         }
     }
+
+    #[test]
+    fn the_f_ratio_is_one_of_ten_thousand_by_chance() {
+        let phi = crate::numeric::normal_distribution::cumulative(MIN_F_RATIO.sqrt());
+        assert!((2.0 * (1.0 - phi) - 1e-4).abs() < 1e-5);
+    }
 }

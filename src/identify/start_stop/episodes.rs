@@ -221,3 +221,13 @@ fn check_flow(runs: &[Run], most: f64) -> Result<(), StartStopFitError> {
         }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_noise_factor_is_its_formula() {
+        assert!((NOISE_FACTOR - 3.0 * 1.2533 * 2.0 / (0.6745 * 2.0_f64.sqrt())).abs() < 0.005);
+    }
+}

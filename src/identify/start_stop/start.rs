@@ -67,7 +67,8 @@ fn modelled(start: &Episode, fall: &StartStop, since_s: f64, [delay_s, rise_s]: 
 fn solve(start: &Episode, fall: &StartStop, first: [f64; 2], rise: [f64; 2]) -> Option<[f64; 2]> {
     let residuals = |row: &[f64]| -> Vec<f64> {
         let &[delay_s, rise_s] = row else { return Vec::new() };
-        let of = |(at, share): &(f64, f64)| modelled(start, fall, *at, [delay_s, rise_s]) - share;
+        let of =
+            |(at, fraction): &(f64, f64)| modelled(start, fall, *at, [delay_s, rise_s]) - fraction;
         start.samples.iter().map(of).collect()
     };
     let longest_s = start.samples.last()?.0;
@@ -97,7 +98,7 @@ fn delay_of(start: &Episode, fall: &StartStop, rise_s: f64) -> Option<f64> {
 
 /// When the flow reaches half of its final value permanently \[s\].
 fn half_rise_s(start: &Episode) -> Option<f64> {
-    let above = |window: &[(f64, f64)]| window.iter().all(|(_, share)| *share > 0.5);
+    let above = |window: &[(f64, f64)]| window.iter().all(|(_, fraction)| *fraction > 0.5);
     let windows = || start.samples.windows(CONSECUTIVE_SAMPLES);
     // Flow from the run before is no first flow.
     let from = windows().position(|window| !above(window)).unwrap_or(0);

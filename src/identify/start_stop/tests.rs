@@ -28,10 +28,10 @@ fn recording(machine: StartStop, pauses_s: &[f64]) -> [TimeSeries; 2] {
     let mut seen = TimeSeries::new("flow_mm3_per_s", false);
     command.push(0.0, 40.0);
     let mut from_s = 0.0;
-    let mut log = |from_s: f64, lasts_s: f64, share: &dyn Fn(Span) -> f64| {
+    let mut log = |from_s: f64, lasts_s: f64, fraction: &dyn Fn(Span) -> f64| {
         let mut at = 0.0;
         while at < lasts_s {
-            seen.push(from_s + at, 400.0 * share(Span::from_secs(at)));
+            seen.push(from_s + at, 400.0 * fraction(Span::from_secs(at)));
             at += STEP_S;
         }
     };
@@ -101,7 +101,7 @@ fn the_unit_of_the_command_does_not_matter() {
 }
 
 #[test]
-fn pauses_that_tell_nothing_of_the_void_are_refused() {
+fn pauses_that_do_not_determine_the_void_are_refused() {
     use StartStopFitError as Error;
     assert_eq!(
         refused(MACHINE, &[10.0, 20.0]),

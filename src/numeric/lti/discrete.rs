@@ -1,4 +1,4 @@
-//! What a transfer function becomes on a grid of samples.
+//! Discretisation of a transfer function.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -7,33 +7,32 @@ use super::simulate::{Between, Sampled, split};
 use super::transfer::{ModelError, TransferFunction};
 use crate::numeric::number::to_f64;
 
-/// How it gets there.
+/// Method of discretisation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DiscretisationMethod {
-    /// Exact for an input that holds its sample (zero-order hold); a dead time
-    /// that ends within a step is kept exactly.
+    /// Exact for an input that is held between samples; also with a dead time that ends within
+    /// a step.
     ZeroOrderHold,
-    /// Exact for an input that runs straight between samples (first-order
-    /// hold); any dead time is kept exactly.
+    /// Exact for an input that is linear between samples; also with any dead time.
     FirstOrderHold,
     /// Tustin's: s = (2/dt)(z − 1)/(z + 1).
     Bilinear,
     /// s = (z − 1)/(dt·z).
     BackwardDifference,
-    /// Poles and zeros go to e^(s·dt), missing zeros but one to −1, and the gain
-    /// is kept at rest (with a pole or zero there: in size at 0.1/dt).
+    /// Poles and zeros are mapped to e^(s·dt), missing zeros but one to −1, and the static gain
+    /// is kept (with a pole or zero there: the magnitude at 0.1/dt).
     MatchedPoleZero,
 }
 
-/// b(z)/a(z)·z^(−delay): coefficients with the highest power first, numerator
-/// and denominator of one length, the denominator with a leading 1.
+/// b(z)/a(z)·z^(−delay): coefficients with the highest power first, numerator and denominator
+/// of equal length, the denominator with a leading 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiscreteTransfer {
     /// Numerator.
     pub num: Vec<f64>,
     /// Denominator.
     pub den: Vec<f64>,
-    /// Whole steps by which it answers later.
+    /// Additional delay in whole steps.
     pub delay: usize,
     /// Step \[s\].
     pub dt_s: f64,
@@ -80,8 +79,7 @@ impl TransferFunction {
     }
 }
 
-/// Coefficients of det(zI − Φ), and C·N·g of its adjoint Σ N(i)·z^(n−1−i)
-/// (Faddeev's method).
+/// Coefficients of det(zI − Φ), and the adjoint Σ N(i)·z^(n−1−i) (Faddeev–LeVerrier algorithm).
 struct Resolvent {
     den: Vec<f64>,
     adjoint: Vec<DMatrix<f64>>,
@@ -109,8 +107,7 @@ impl Resolvent {
     }
 }
 
-/// Polynomials in 1/z: `add` and `multiply` serve rows with the highest power
-/// first, so sums are taken on rows that were padded to one length.
+/// A row in powers of 1/z, delayed and padded to a length, for sums with `add`.
 fn delayed_row(row: &[f64], steps: usize, length: usize) -> Vec<f64> {
     let mut padded = vec![0.0; steps];
     padded.extend_from_slice(row);
@@ -141,7 +138,7 @@ fn hold(
     Ok((num, resolvent.den))
 }
 
-/// Puts upper(z)/lower(z) in the position of s.
+/// Substitutes upper(z)/lower(z) for s.
 fn substitute(tf: &TransferFunction, upper: &[f64], lower: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let order = tf.order();
     let power = |row: &[f64], n: usize| (0..n).fold(vec![1.0], |p, _| multiply(&p, row));
@@ -189,7 +186,7 @@ fn exp(s: Complex<f64>) -> Complex<f64> {
 }
 
 impl DiscreteTransfer {
-    /// Output for each unit of an input that has stood for long.
+    /// Static gain.
     pub fn dc_gain(&self) -> f64 {
         self.num.iter().sum::<f64>() / self.den.iter().sum::<f64>()
     }

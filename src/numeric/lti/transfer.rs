@@ -4,7 +4,7 @@ use nalgebra::Complex;
 
 use super::polynomial::{self, evaluate, multiply, trim};
 
-/// Why there is no such model.
+/// Why a model is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ModelError {
     /// A coefficient or time is NaN or infinite.
@@ -15,10 +15,10 @@ pub enum ModelError {
         /// What was found.
         value: f64,
     },
-    /// Nothing, or only zeros, below the line.
+    /// A zero denominator.
     #[error("the denominator is zero")]
     NoDenominator,
-    /// More zeros than poles: it would differentiate its input.
+    /// More zeros than poles.
     #[error(
         "{zeros} zeros and only {poles} poles: it differentiates its input; put a filter of at \
          least {} poles in series",
@@ -30,7 +30,7 @@ pub enum ModelError {
         /// Degree of the denominator.
         poles: usize,
     },
-    /// A dead time before now.
+    /// A negative dead time.
     #[error("a dead time of {seconds} s; it cannot be negative")]
     NegativeDeadTime {
         /// What was found \[s\].
@@ -44,7 +44,7 @@ pub enum ModelError {
         /// What was found.
         value: f64,
     },
-    /// An inverse that would grow without bound.
+    /// An unstable inverse.
     #[error(
         "a zero at {re:.4} ± {im:.4}i 1/s in the right half plane becomes an unstable pole of the \
          inverse"
@@ -58,7 +58,7 @@ pub enum ModelError {
     /// An integrator has no steady state for an input other than zero.
     #[error("a model with a pole at zero integrates and has no steady state")]
     NoSteadyState,
-    /// This method has no place for a part of a step.
+    /// A dead time that is not a whole number of steps, for a method that needs one.
     #[error(
         "the dead time of {dead_time_s} s is {steps:.3} steps of {dt_s} s; this method keeps \
          whole steps only: take a hold, or round the dead time"
@@ -154,8 +154,7 @@ impl TransferFunction {
         self.at(Complex::new(0.0, rad_per_s))
     }
 
-    /// Output for each unit of an input that has stood for long; infinite for an
-    /// integrator.
+    /// Static gain; infinite for an integrator.
     pub fn dc_gain(&self) -> f64 {
         let last = |row: &[f64]| row.last().copied().unwrap_or(0.0);
         last(&self.num) / last(&self.den)
@@ -176,8 +175,7 @@ impl TransferFunction {
         polynomial::is_hurwitz(&self.den)
     }
 
-    /// What goes through this and then through another; dead times add. Poles
-    /// and zeros that are equal are not cancelled.
+    /// This and another one in series; dead times add. Equal poles and zeros are not cancelled.
     pub fn series(&self, other: &Self) -> Result<Self, ModelError> {
         Self::new(
             &multiply(&self.num, &other.num),
@@ -186,16 +184,15 @@ impl TransferFunction {
         )
     }
 
-    /// The inverse without the dead time, which has none. Fails where there are
-    /// fewer zeros than poles or a zero is in the right half plane.
+    /// The inverse without the dead time. Fails where there are fewer zeros than poles or a
+    /// zero is in the right half plane.
     pub fn inverse(&self) -> Result<Self, ModelError> {
         self.inverse_through(&Self { num: vec![1.0], den: vec![1.0], dead_time_s: 0.0 })
     }
 
-    /// The inverse without the dead time in series with a filter, whose poles
-    /// take the position of those that the inverse lacks: the series of the result
-    /// and this is the filter after the dead time. Fails where the filter has too
-    /// few poles or a zero is in the right half plane.
+    /// The inverse without the dead time in series with a filter, whose poles make it proper:
+    /// the result in series with this is the filter after the dead time. Fails where the filter
+    /// has too few poles or a zero is in the right half plane.
     pub fn inverse_through(&self, filter: &Self) -> Result<Self, ModelError> {
         if self.num.iter().all(|c| *c == 0.0) {
             return Err(ModelError::NoDenominator);

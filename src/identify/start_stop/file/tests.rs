@@ -27,7 +27,7 @@ fn what_is_written_is_read_again() {
 }
 
 #[test]
-fn everything_that_is_wrong_is_told_at_once() {
+fn all_violations_are_reported_at_once() {
     let text = to_toml(&file(), &[])
         .replace("version = 1", "version = 2")
         .replace("void_mm3 = 640.0", "void_mm3 = -640.0")
