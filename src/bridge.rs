@@ -6,7 +6,7 @@ mod quads;
 mod video;
 
 pub use board::{find_any_board, find_board};
-pub use lines::{EdgeSettings, LineFinder, Segment, canny_hough};
+pub use lines::{EdgeSegment, EdgeSettings, LineFinder, canny_hough};
 pub use quads::find_quads;
 pub use video::{VideoInput, VideoReader};
 

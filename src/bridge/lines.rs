@@ -28,7 +28,7 @@ pub struct EdgeSettings {
 
 /// A straight edge between two pixels \[px\].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Segment {
+pub struct EdgeSegment {
     /// One end.
     pub from: ImagePoint,
     /// The other end.
@@ -41,7 +41,7 @@ pub fn canny_hough(
     frame: &Frame,
     roi: Roi,
     settings: &EdgeSettings,
-) -> Result<Vec<Segment>, BridgeError> {
+) -> Result<Vec<EdgeSegment>, BridgeError> {
     const TASK: &str = "finding straight edges";
     prepare();
     if !roi.fits(frame.size()) || roi.width == 0 || roi.height == 0 {
@@ -58,7 +58,7 @@ pub fn canny_hough(
     finder.run(&region).map_err(during(TASK))?;
     let end = |x: i32, y: i32| Point2::new(f64::from(left + x), f64::from(top + y));
     let lines = finder.lines.iter();
-    Ok(lines.map(|l| Segment { from: end(l[0], l[1]), to: end(l[2], l[3]) }).collect())
+    Ok(lines.map(|l| EdgeSegment { from: end(l[0], l[1]), to: end(l[2], l[3]) }).collect())
 }
 
 /// Blur, edge detector and Hough transform with memory that is reused from frame to frame, for
@@ -145,7 +145,7 @@ mod tests {
         let lines = canny_hough(&bar(), roi, &SETTINGS).unwrap();
         for edge in [59.5, 139.5] {
             let near =
-                |s: &&Segment| (s.from.x - edge).abs() <= 1.0 && (s.to.x - edge).abs() <= 1.0;
+                |s: &&EdgeSegment| (s.from.x - edge).abs() <= 1.0 && (s.to.x - edge).abs() <= 1.0;
             let length =
                 lines.iter().filter(near).map(|s| (s.to - s.from).norm()).fold(0.0, f64::max);
             assert!(length > 80.0, "edge at {edge}: {lines:?}");

@@ -47,15 +47,11 @@ pub fn observe_all(corners_px: &[ImagePoint]) -> Vec<CornerObservation> {
 pub enum BoardError {
     /// Too few or too many corners.
     #[error(
-        "a board has 3 to 100 inner corners along each side, found {columns}x{rows}; \
-         inner corners are where four squares meet, one fewer than the squares"
+        "a board has 3 to 100 inner corners along each side, found {}x{}; \
+         inner corners are where four squares meet, one fewer than the squares",
+        .0.columns, .0.rows
     )]
-    Corners {
-        /// Inner corners along a row.
-        columns: usize,
-        /// Inner corners along a column.
-        rows: usize,
-    },
+    Corners(GridSize),
     /// No size.
     #[error("the side of a square must be more than 0 mm, found {0}")]
     Square(Mm),
@@ -106,7 +102,7 @@ pub enum NotABoard {
 }
 
 /// Area of a square in the image below which it counts as collapsed to a line \[px²\]. A
-/// choice: far below the area of a square whose corners can be told apart.
+/// choice: far below the area of any square that can be detected.
 const SMALLEST_SQUARE_PX2: f64 = 1.0;
 
 impl Board {
@@ -114,7 +110,7 @@ impl Board {
     pub fn new(columns: usize, rows: usize, square: Mm) -> Result<Self, BoardError> {
         let sound = 3..=100;
         if !sound.contains(&columns) || !sound.contains(&rows) {
-            return Err(BoardError::Corners { columns, rows });
+            return Err(BoardError::Corners(GridSize { columns, rows }));
         }
         if square <= Mm::ZERO {
             return Err(BoardError::Square(square));
@@ -158,9 +154,8 @@ impl Board {
         let Some(marks) = self.markers.filter(|_| (column + row) % 2 == 1) else {
             return Vec::new();
         };
-        let squares = self.columns + 1;
         // White squares before it: half of the rows above, and of its own.
-        let before = row * squares + column;
+        let before = row * (self.columns + 1) + column;
         let number = before / 2;
         let all = marks.dictionary.side() + 2;
         let inner = 1..all - 1;
@@ -192,10 +187,9 @@ impl Board {
     /// The inner corners on the board \[mm\], row by row: x along a row, y along a column, the
     /// first at the origin.
     pub fn corners_mm(&self) -> Vec<Point3<f64>> {
-        let side = self.square.get();
-        (0..self.rows)
-            .flat_map(|row| (0..self.columns).map(move |column| (to_f64(column), to_f64(row))))
-            .map(|(x, y)| Point3::new(x * side, y * side, 0.0))
+        let (columns, side) = (self.columns, self.square.get());
+        (0..columns * self.rows)
+            .map(|i| Point3::new(to_f64(i % columns) * side, to_f64(i / columns) * side, 0.0))
             .collect()
     }
 

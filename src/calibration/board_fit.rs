@@ -74,9 +74,10 @@ impl BoardFit {
         (self.means[1] + product(on_board - self.means[0], self.factor)).into()
     }
 
-    /// Standard deviation of a rigid board's point in any direction \[mm\]. The noise of a corner
-    /// along one axis comes from the residuals of 2n coordinates less three parameters. The
-    /// rotation's share grows with the distance from the mean of the corners.
+    /// Standard deviation of a rigid board's point in any direction \[mm\]. The noise of a
+    /// corner along one axis follows from the residuals of 2n coordinates less three
+    /// parameters. The effect of the rotation grows with the distance from the mean of the
+    /// corners.
     pub fn sigma_mm(&self, at: Point2<f64>) -> f64 {
         let variance = self.rms_mm.powi(2) * self.count / (2.0 * self.count - 3.0);
         let away = (at.coords - self.means[1]).norm_squared();

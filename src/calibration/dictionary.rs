@@ -30,7 +30,8 @@ impl Dictionary {
     /// Markers of each dictionary. By definition of OpenCV's `DICT_4X4_1000` and the like.
     pub const MARKERS: usize = 1000;
 
-    /// Its name on the command line.
+    /// The dictionary of a name such as `4x4`, or OpenCV's `DICT_4X4_50`: OpenCV's smaller
+    /// dictionaries are the first markers of the same list.
     pub fn named(text: &str) -> Option<Self> {
         let lower = text.trim().to_lowercase();
         let name = lower.strip_prefix("dict_").unwrap_or(&lower);
@@ -39,7 +40,7 @@ impl Dictionary {
         Self::ALL.into_iter().find(|known| known.name() == cells && is_known)
     }
 
-    /// As it is told on the command line.
+    /// Its name on the command line.
     pub fn name(self) -> &'static str {
         ["4x4", "5x5", "6x6", "7x7"][self as usize]
     }

@@ -81,25 +81,21 @@ impl Calibration {
 
     /// Covariance of camera and bed plane, if known.
     pub fn uncertainty(&self) -> Option<CalibrationUncertainty> {
-        match self {
-            Self::Scale { .. } => None,
-            Self::Full { quality, .. } => quality.and_then(|quality| quality.uncertainty),
-        }
+        let Self::Full { quality, .. } = self else { return None };
+        quality.as_ref()?.uncertainty
     }
 
     fn width_relative_sigma(&self) -> Option<f64> {
         match self {
             Self::Scale { mm_per_px, sigma } => sigma.map(|sigma| sigma / mm_per_px),
-            Self::Full { quality, .. } => quality.and_then(|quality| quality.width_relative_sigma),
+            Self::Full { quality, .. } => quality.as_ref()?.width_relative_sigma,
         }
     }
 
     /// Size of the images \[px\]; `None` if it does not matter.
     pub fn image_size_px(&self) -> Option<[u32; 2]> {
-        match self {
-            Self::Scale { .. } => None,
-            Self::Full { image_size_px, .. } => Some(*image_size_px),
-        }
+        let Self::Full { image_size_px, .. } = self else { return None };
+        Some(*image_size_px)
     }
 }
 

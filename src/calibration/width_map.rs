@@ -183,7 +183,7 @@ mod tests {
         let heights = [Mm::ZERO, Mm::constant(20.0)];
         let next = next_view::best(&board(), &solution, &covariance, 40.0, &heights).unwrap();
         let (before, after) = next.relative_sigma;
-        // What it begins with is what the maps tell.
+        // Its initial uncertainty is that of the maps.
         let worst = heights
             .map(|height| WidthMap::of(&covariance, 40.0, height).worst_where_seen_mm.unwrap())
             .into_iter()

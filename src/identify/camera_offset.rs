@@ -100,9 +100,8 @@ pub fn study(
         return Err(CameraOffsetError::TooFew { found: observations.len() });
     }
     let speeds = course.range(TAIL_FRACTION);
-    let SpeedRange { min: from, max: to } = speeds;
-    if to.get() < from.get() * (1.0 + MIN_SPEED_CHANGE) {
-        return Err(CameraOffsetError::ConstantSpeed { from, to });
+    if speeds.max.get() < speeds.min.get() * (1.0 + MIN_SPEED_CHANGE) {
+        return Err(CameraOffsetError::ConstantSpeed { speeds });
     }
     let settled = iterate(&course, &observations, search, speeds)?;
     settled.check(&course, &observations, search)?;
@@ -171,8 +170,7 @@ fn iterate(
         }
         let best = profile.best(search.max_offset.get());
         if profile.gain(&best) < MIN_GAIN {
-            let SpeedRange { min: from, max: to } = speeds;
-            return Err(CameraOffsetError::NoResponse { from, to, max_offset: search.max_offset });
+            return Err(CameraOffsetError::NoResponse { speeds, max_offset: search.max_offset });
         }
         let likeliest = profile.likeliest_noise(&best);
         let next =

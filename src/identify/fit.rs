@@ -2,28 +2,26 @@
 //!
 //! ```text
 //! Samples::new(input, output, dt)
-//!   → fit(&samples, &Settings) → Fit{ model, parameters ± errors, quality, … }
-//!   → Fit::validate(&other samples, Before) → Quality
-//! compare(&samples, Some(&validation), &[Settings]) → Comparison{ rows, chosen, reason }
+//!   → fit(&samples, &FitSettings) → Fit{ model, parameters ± errors, quality, … }
+//!   → Fit::validate(&other samples, InitialCondition) → FitQuality
+//! compare(&samples, Some(&validation), &[FitSettings]) → ModelComparison{ rows, chosen, reason }
 //! ```
 //!
-//! **Method.** Output error in continuous time: the model is simulated exactly
-//! between the samples on the input alone and its parameters are those with the
-//! least sum of squared differences from the output (Levenberg 1944, Marquardt
-//! 1963). That is unbiased whatever the colour of the noise, as long as the noise
-//! does not depend on the input, and efficient where it is white. Starting
-//! values come from least squares behind a state-variable filter (Young 1970) at
-//! several bandwidths and all along the range of the dead time; the best few are
-//! carried to the end, so that no local minimum decides.
+//! **Method.** Output error in continuous time: the model is simulated exactly between the
+//! samples on the input alone, and its parameters minimise the sum of squared differences from
+//! the output (Levenberg 1944, Marquardt 1963). That is unbiased for any autocorrelation of the
+//! noise, as long as the noise does not depend on the input, and efficient for white noise.
+//! Initial values come from least squares with a state-variable filter (Young 1970) at several
+//! bandwidths and dead times; the best few are followed to the end, against local minima.
 //!
-//! **Operating point.** y = output level + G·(u − input level): the input level
-//! is where the input stood before the first sample ([`Before`]); the output
-//! level is estimated unless it is known ([`Level`]).
+//! **Operating point.** y = output level + G·(u − input level): the input level is the input
+//! before the first sample ([`InitialCondition`]); the output level is estimated unless it is
+//! known ([`OutputLevel`]).
 //!
-//! **Standard errors.** The output of an extruder carries autocorrelated noise, and
-//! errors that take it as white come out too small. [`Parameter`] gives both:
-//! `sigma` allows for the residuals' autocorrelation (an autoregressive model of them
-//! between the two halves of the sandwich), `sigma_if_white` does not.
+//! **Standard errors.** The output of an extruder has autocorrelated noise, and errors for
+//! white noise are too small. [`Parameter`] has both: `sigma` takes the autocorrelation of the
+//! residuals into account (an autoregressive model of them in the sandwich estimator),
+//! `sigma_if_white` does not.
 
 mod autoregression;
 mod check;
@@ -58,8 +56,8 @@ pub use undetermined::Undetermined;
 use crate::numeric::lti::Between;
 use problem::FitProblem;
 
-/// Fits one model. Fails where the data cannot tell one ([`SamplesError`]) and where
-/// the outcome is none ([`FitError`]); every message says what was found.
+/// Fits one model. Fails where the data do not allow identification ([`SamplesError`]) and
+/// where the result is invalid ([`FitError`]); every message says what was found.
 pub fn fit(samples: &Samples, settings: &FitSettings) -> Result<Fit, FitError> {
     check::check(settings, samples)?;
     samples.check_input(settings.initial_state)?;

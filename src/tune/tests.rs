@@ -180,7 +180,7 @@ fn widths_that_stay_out_hold_the_speed_and_then_stop_the_robot() {
     assert!(none.log.setpoints.iter().all(|(_, speed)| (speed.get() - 112.5).abs() < 1e-9));
     cell.simulation.missing_fraction = 0.0;
     cell.simulation.flow.step_at_mm = 900.0;
-    // Wider than anything that is believed, at once: no width at all.
+    // Wider than any plausible width, at once: no width at all.
     cell.simulation.flow.step_ratio = 2.0;
     let lost = laid(&cell, 1);
     assert!(lost.states.contains(&"holding") && lost.states.contains(&"fault"));

@@ -80,7 +80,7 @@ fn lies(at: [f64; 2], on_bed: [f64; 2], height: f64) -> Pose {
     Pose::from_parts(bed().rotation() * turn, bed().apply(origin.into()).coords)
 }
 
-/// The image of a board whose position `AT` is so far off where it is told to be.
+/// The image of a board that is displaced by this from the specified position `AT`.
 fn seen(off: [f64; 2], height: f64, seed: u64) -> BoardObservation {
     let place = [MIDDLE[0] + RIGHT + off[0], MIDDLE[1] + AHEAD + off[1]];
     let studio = BoardStudio::new(&camera(), SIZE);

@@ -1,6 +1,7 @@
 //! Why a bead does not determine the offset.
 
-use crate::core::units::{Mm, MmPerS};
+use super::estimate::SpeedRange;
+use crate::core::units::Mm;
 
 /// Smallest number of widths. A choice.
 pub const MIN_WIDTHS: usize = 50;
@@ -41,26 +42,22 @@ pub enum CameraOffsetError {
     #[error(
         "the speed changed by {:.1} % only ({:.1} to {:.1} mm/s), which shows in no width: run once \
          with steps of the target width, or of the speed, by 20 % or more",
-        100.0 * (to.get() / from.get() - 1.0), from.get(), to.get()
+        speeds.change_percent(), speeds.min.get(), speeds.max.get()
     )]
     ConstantSpeed {
-        /// Slowest speed.
-        from: MmPerS,
-        /// Fastest speed.
-        to: MmPerS,
+        /// Slowest and fastest speed.
+        speeds: SpeedRange,
     },
     /// The widths do not respond.
     #[error(
         "the speed changed by {:.1} % ({:.1} to {:.1} mm/s), but the widths do not follow it \
          clearly, at no offset up to {max_offset}: run once with larger or more abrupt steps of the \
          target width or of the speed",
-        100.0 * (to.get() / from.get() - 1.0), from.get(), to.get()
+        speeds.change_percent(), speeds.min.get(), speeds.max.get()
     )]
     NoResponse {
-        /// Slowest speed.
-        from: MmPerS,
-        /// Fastest speed.
-        to: MmPerS,
+        /// Slowest and fastest speed.
+        speeds: SpeedRange,
         /// Largest offset that was tried.
         max_offset: Mm,
     },

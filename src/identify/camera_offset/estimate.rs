@@ -15,6 +15,13 @@ pub struct SpeedRange {
     pub max: MmPerS,
 }
 
+impl SpeedRange {
+    /// Relative difference of the two \[%\].
+    pub(super) fn change_percent(&self) -> f64 {
+        100.0 * (self.max.get() / self.min.get() - 1.0)
+    }
+}
+
 /// An estimated offset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OffsetEstimate {

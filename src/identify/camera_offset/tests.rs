@@ -184,7 +184,7 @@ fn a_bead_of_constant_flow_determines_its_exponent_too() {
 
 #[test]
 fn a_controller_that_follows_a_drift_does_not_move_the_offset() {
-    // The flow drifts by 1 %, and the speed answers to the widths of a moment ago.
+    // The flow drifts by 1 %, and the speed responds to the widths of a moment ago.
     let plant = Plant { offset_mm: 120.0, wander: (1e-2, 1500.0), ..PLANT };
     let drift = |path: f64| 0.010 * (path / 190.0).sin() + 0.007 * (path / 77.0).sin();
     let answer = 0.8 / plant.exponent;

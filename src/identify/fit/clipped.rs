@@ -131,8 +131,7 @@ impl<'a> Signal<'a> {
         2 * held.sum::<usize>() > self.row.len()
     }
 
-    /// Whether nearly all changes from sample to sample are as large as their median, as for a
-    /// rate-limited drive.
+    /// Whether it changes at one rate, with rests in between.
     fn is_at_one_rate(&self) -> bool {
         is_at_one_rate(self.row, self.resolution())
     }
@@ -223,8 +222,8 @@ impl<'a> Signal<'a> {
         if way > 0.0 { (last - before).abs() * to_f64(segment.len() - 1) / way } else { 1.0 }
     }
 
-    /// Refuses a signal that stands at this value for long, between others, and
-    /// has not settled there.
+    /// Refuses a signal that stays at this value for long, between others, without having
+    /// settled.
     fn check(
         &self,
         column: DataColumn,
@@ -270,8 +269,8 @@ fn net_change(segment: &[f64]) -> f64 {
     ends.map_or(0.0, |(first, last)| (last - first).abs())
 }
 
-/// Whether nearly all changes from sample to sample are as large as their median,
-/// as those of a drive are that takes steps no faster.
+/// Whether nearly all changes from sample to sample are as large as their median, as for a
+/// rate-limited drive.
 fn is_at_one_rate(segment: &[f64], grain: f64) -> bool {
     let steps = segment.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();

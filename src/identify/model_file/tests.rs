@@ -1,4 +1,4 @@
-//! What is written is read again, and what is wrong is told.
+//! What is written is read again, and all violations are reported.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 

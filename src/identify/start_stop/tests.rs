@@ -156,7 +156,7 @@ fn a_flow_that_does_not_go_with_the_command_is_refused() {
 fn a_run_that_is_too_short_for_an_even_flow_is_left_out() {
     let [mut command, flow] = recording(MACHINE, &PAUSES_S);
     let all = fit(&command, &flow).unwrap();
-    // The last run is told to stop 0.5 s after it began.
+    // The last run is stopped 0.5 s after it began.
     let last_s = *command.time_s.last().unwrap();
     command.push(last_s + 0.5, 0.0);
     let fit = fit(&command, &flow).unwrap();
