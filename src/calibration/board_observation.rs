@@ -132,11 +132,8 @@ pub type Observations = Vec<(String, Result<BoardObservation, BoardRejection>)>;
 /// Keeps the most frequent image size, the first one of equally frequent sizes, and rejects
 /// images of another size.
 pub fn reject_other_sizes(looks: &mut Observations) {
-    let sizes: Vec<[u32; 2]> = looks
-        .iter()
-        .filter_map(|(_, observation)| observation.as_ref().ok())
-        .map(|s| s.image_size_px)
-        .collect();
+    let found = looks.iter().filter_map(|(_, observation)| observation.as_ref().ok());
+    let sizes: Vec<[u32; 2]> = found.map(|found| found.image_size_px).collect();
     let count = |size: &[u32; 2]| sizes.iter().filter(|other| *other == size).count();
     // `max_by_key` returns the last of equal elements, hence the reversed order.
     let Some(expected) = sizes.iter().rev().max_by_key(|size| count(size)).copied() else {

@@ -93,13 +93,11 @@ fn descend(
 
 fn sum_of_squares_px2(
     model: &CameraModel,
-    positions: &[BoardPlacement],
+    placements: &[BoardPlacement],
     boards: &[Vec<Vec<Correspondence>>],
 ) -> Option<f64> {
-    let each = positions
-        .iter()
-        .zip(boards)
-        .map(|(position, boards)| model.sum_of_squares_px2(position, boards));
+    let each = placements.iter().zip(boards);
+    let each = each.map(|(placement, boards)| model.sum_of_squares_px2(placement, boards));
     each.sum::<Option<f64>>().filter(|squares| squares.is_finite())
 }
 
@@ -143,13 +141,10 @@ fn step(equations: &[Equations], free: FreeParameters, damping: f64) -> Option<S
         as_shared(&shared)
     };
     let along = DVector::from_column_slice(shared.as_slice());
-    let placements = eliminated
-        .iter()
-        .map(|(elimination, damped)| {
-            elimination.placement.solve(&(&damped.placement_side - &damped.both * &along))
-        })
-        .collect();
-    Some(Step { shared, placements })
+    let placement = |(elimination, damped): &(Elimination, Equations)| {
+        elimination.placement.solve(&(&damped.placement_side - &damped.both * &along))
+    };
+    Some(Step { shared, placements: eliminated.iter().map(placement).collect() })
 }
 
 fn as_shared(vector: &DVector<f64>) -> SVector<f64, SHARED> {

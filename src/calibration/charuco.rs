@@ -210,8 +210,7 @@ fn check_size(placed: &[PlacedMarker], clear: f64) -> Result<(), MarkerError> {
     let Some(found) = size(placed, clear).filter(|_| placed.len() >= MIN_SIZE_MARKERS) else {
         return Ok(());
     };
-    let mut sides: Vec<f64> = placed.iter().map(|one| one.marker.side_px()).collect();
-    let side_px = rank::median(&mut sides).unwrap_or(0.0);
+    let side_px = rank::median_of(placed.iter().map(|one| one.marker.side_px())).unwrap_or(0.0);
     let off = (found / expected - 1.0).abs();
     if off > SIZE_TOLERANCE && off * side_px > SIZE_TOLERANCE_PX {
         let (found_percent, expected_percent) = (percent(found), percent(expected));
@@ -233,8 +232,8 @@ fn size(placed: &[PlacedMarker], clear: f64) -> Option<f64> {
         let expected = sides.sum::<Option<f64>>()? / 4.0;
         Some(one.marker.side_px() / expected)
     };
-    let mut ratios: Vec<f64> = placed.iter().filter_map(ratio).filter(|r| r.is_finite()).collect();
-    Some(rank::median(&mut ratios)? * (1.0 - 2.0 * clear))
+    let ratios = placed.iter().filter_map(ratio).filter(|ratio| ratio.is_finite());
+    Some(rank::median_of(ratios)? * (1.0 - 2.0 * clear))
 }
 
 /// Positions of the board's corners by the markers next to them.

@@ -74,10 +74,9 @@ impl Focus {
             return None;
         }
         let edge = |from: usize, to: usize| Some([corners[from]?, corners[to]?]);
-        let in_rows: Vec<[ImagePoint; 2]> = (0..columns * rows)
-            .filter(|i| i % columns + 1 < columns)
-            .filter_map(|i| edge(i, i + 1))
-            .collect();
+        let has_next = |i: &usize| i % columns + 1 < columns;
+        let in_rows: Vec<[ImagePoint; 2]> =
+            (0..columns * rows).filter(has_next).filter_map(|i| edge(i, i + 1)).collect();
         let in_columns: Vec<[ImagePoint; 2]> =
             (0..columns * (rows - 1)).filter_map(|i| edge(i, i + columns)).collect();
         // The surroundings of an edge are plain within this distance.
@@ -131,11 +130,8 @@ fn blur(grey: &GreyImage<'_>, [from, to]: &[ImagePoint; 2], reach: f64) -> Optio
     let contrast = (profile.last()? - profile.first()?).abs();
     // Slope over a whole pixel, which averages noise.
     let over = 4;
-    let steepest = profile
-        .iter()
-        .zip(profile.iter().skip(over))
-        .map(|(a, b)| (b - a).abs())
-        .fold(0.0, f64::max);
+    let rises = profile.iter().zip(profile.iter().skip(over)).map(|(a, b)| (b - a).abs());
+    let steepest = rises.fold(0.0, f64::max);
     (contrast > MIN_CONTRAST && steepest > 0.0)
         .then(|| contrast / (steepest * std::f64::consts::TAU.sqrt()))
 }

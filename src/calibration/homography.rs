@@ -112,11 +112,8 @@ pub fn pose_from_homography(on_unit_plane: &Matrix3<f64>) -> Option<Pose> {
 /// Pose of a board before a camera from its undistorted corners. `None` where the distortion
 /// cannot be inverted at too many corners, or the board is not in front.
 pub fn board_pose(camera: &Camera, corners: &[Correspondence]) -> Option<Pose> {
-    let pairs: Vec<_> = corners
-        .iter()
-        .filter_map(|corner| Some((corner.on_board, camera.ray(corner.observed)?)))
-        .collect();
-    pose_from_homography(&homography(&pairs)?)
+    let pair = |corner: &Correspondence| Some((corner.on_board, camera.ray(corner.observed)?));
+    pose_from_homography(&homography(&corners.iter().filter_map(pair).collect::<Vec<_>>())?)
 }
 
 #[cfg(test)]

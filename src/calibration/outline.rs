@@ -80,25 +80,20 @@ pub fn look(board: &Board, grey: &GreyImage<'_>, corners: &[ImagePoint]) -> Boar
             BoardSide::FirstRow => at(along, depth),
             BoardSide::LastRow => at(along, rows - 1 - depth),
         };
-        let count = if matches!(side, BoardSide::FirstColumn | BoardSide::LastColumn) {
-            rows
-        } else {
-            columns
+        // Length of the side, and number of its squares beyond, continued from those within.
+        let (count, first) = match side {
+            BoardSide::FirstColumn => (rows, 2),
+            BoardSide::LastColumn => (rows, columns),
+            BoardSide::FirstRow => (columns, 2),
+            BoardSide::LastRow => (columns, rows),
         };
         // The outermost corner and the next two further out.
-        let beyond: Vec<[ImagePoint; 3]> = (0..count)
-            .map(|along| {
-                let [first, second] = beyond([line(0, along), line(1, along), line(2, along)]);
-                [line(0, along), first, second]
-            })
-            .collect();
-        let row = |depth: usize| Row::of(grey, &beyond, depth);
-        // Numbers of the squares beyond, continued from those within.
-        let first = match side {
-            BoardSide::FirstColumn | BoardSide::FirstRow => 2,
-            BoardSide::LastColumn => columns,
-            BoardSide::LastRow => rows,
+        let outwards = |along: usize| {
+            let [first, second] = beyond([line(0, along), line(1, along), line(2, along)]);
+            [line(0, along), first, second]
         };
+        let beyond: Vec<[ImagePoint; 3]> = (0..count).map(outwards).collect();
+        let row = |depth: usize| Row::of(grey, &beyond, depth);
         if row(0).and_then(|row| row.alternates(contrast)) == Some(false) {
             outline.ends_early.push(side);
         } else if row(1).is_some_and(|row| row.continues(first, contrast)) {
@@ -118,15 +113,12 @@ impl Row {
     /// The row next to the board, or the one after it. `None` with too few of its squares in
     /// the image.
     fn of(grey: &GreyImage<'_>, beyond: &[[ImagePoint; 3]], depth: usize) -> Option<Self> {
-        let shades: Vec<(usize, Shade)> = beyond
-            .windows(2)
-            .enumerate()
-            .filter_map(|(along, pair)| {
-                let [near, far] = [pair[0], pair[1]];
-                let square = [near[depth], near[depth + 1], far[depth], far[depth + 1]];
-                Some((along, Shade::of(grey, square)?))
-            })
-            .collect();
+        let shade = |(along, pair): (usize, &[[ImagePoint; 3]])| {
+            let [near, far] = [pair[0], pair[1]];
+            let square = [near[depth], near[depth + 1], far[depth], far[depth + 1]];
+            Some((along, Shade::of(grey, square)?))
+        };
+        let shades: Vec<_> = beyond.windows(2).enumerate().filter_map(shade).collect();
         (shades.len() >= MIN_SQUARES.min(beyond.len() - 1)).then_some(Self { shades })
     }
 
@@ -141,9 +133,8 @@ impl Row {
     /// alternate, too.
     fn continues(&self, first: usize, contrast: f64) -> bool {
         let Some(found) = self.difference(first) else { return false };
-        let mut spreads: Vec<f64> = self.shades.iter().map(|(_, shade)| shade.spread).collect();
-        let is_plain = rank::median(&mut spreads)
-            .is_some_and(|spread| spread <= MAX_WITHIN_SQUARE * contrast.abs());
+        let spread = rank::median_of(self.shades.iter().map(|(_, shade)| shade.spread));
+        let is_plain = spread.is_some_and(|spread| spread <= MAX_WITHIN_SQUARE * contrast.abs());
         found.is_clear(contrast) && found.even_less_odd * contrast > 0.0 && is_plain
     }
 

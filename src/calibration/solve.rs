@@ -69,16 +69,15 @@ fn solution(
         .zip(fit.placements.iter().zip(&views.boards))
         .map(|(sighting, (position, boards))| view(&fit.model, sighting, position.pose, &boards[0]))
         .collect();
+    let used = trials.iter().find(|trial| trial.free == free);
+    let cross_validation_px = used.and_then(|trial| trial.cross_validation_px);
     Ok(Solution {
         model: fit.model,
         free,
         sigma: spreads.map(|spreads| spreads.map(|spread| spread * of_numbers_px)),
         image_size_px: views.size,
         rms_px,
-        cross_validation_px: trials
-            .iter()
-            .find(|t| t.free == free)
-            .and_then(|t| t.cross_validation_px),
+        cross_validation_px,
         noise_px,
         design_effect,
         trials,
@@ -106,14 +105,11 @@ fn view(
     corners: &[Correspondence],
 ) -> BoardView {
     let far = nalgebra::Vector2::repeat(f64::INFINITY);
-    let errors_px: Vec<_> = corners
-        .iter()
-        .map(|corner| {
-            let expected: Option<ImagePoint> =
-                model.camera.project(pose.apply(model.on_board(corner)));
-            expected.map_or(far, |px| corner.observed - px)
-        })
-        .collect();
+    let error_px = |corner: &Correspondence| {
+        let expected = model.camera.project(pose.apply(model.on_board(corner)));
+        expected.map_or(far, |px: ImagePoint| corner.observed - px)
+    };
+    let errors_px: Vec<_> = corners.iter().map(error_px).collect();
     let squares = errors_px.iter().map(nalgebra::Vector2::norm_squared).sum();
     BoardView {
         name: sighting.name.clone(),

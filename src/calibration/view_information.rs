@@ -73,12 +73,10 @@ pub fn design_effect(
         );
         found += score.dot(&inverse.solve(&score));
         let left = restrict_to_free(one.information, free);
-        let part = DMatrix::from_columns(
-            &left
-                .column_iter()
-                .map(|column| inverse.solve(&DVector::from_column_slice(column.as_slice())))
-                .collect::<Vec<_>>(),
-        );
+        let columns = left.column_iter();
+        let solve = |column: &[f64]| inverse.solve(&DVector::from_column_slice(column));
+        let columns: Vec<_> = columns.map(|column| solve(column.as_slice())).collect();
+        let part = DMatrix::from_columns(&columns);
         used += (&part * &part).trace();
     }
     let expected = noise_variance_px2 * (to_f64(free.count()) - used);

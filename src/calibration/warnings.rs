@@ -125,8 +125,7 @@ pub fn settles_camera(solution: &Solution) -> bool {
 }
 
 fn outliers(views: &[BoardView]) -> impl Iterator<Item = Warning> {
-    let mut errors: Vec<f64> = views.iter().map(|view| view.rms_px).collect();
-    let typical = rank::median(&mut errors).unwrap_or(f64::INFINITY);
+    let typical = rank::median_of(views.iter().map(|view| view.rms_px)).unwrap_or(f64::INFINITY);
     let times = move |view: &BoardView| view.rms_px / typical;
     let worse = views.iter().filter(move |view| times(view) > OUTLIER_RATIO);
     worse.map(move |view| Warning::Outlier { name: view.name.clone(), times: times(view) })

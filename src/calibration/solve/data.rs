@@ -32,12 +32,13 @@ impl CalibrationData {
         let size = first.image_size_px;
         let boards: Vec<_> =
             sightings.iter().map(|s| vec![board.correspondences(&s.corners)]).collect();
-        let maps: Vec<_> = boards
-            .iter()
-            .filter_map(|b| homography::homography(&homography::pairs(&b[0])))
-            .collect();
+        let map = |board: &Vec<Vec<Correspondence>>| {
+            homography::homography(&homography::pairs(&board[0]))
+        };
+        let maps: Vec<_> = boards.iter().filter_map(map).collect();
         let camera = homography::pinhole(&maps, size);
-        let positions = sightings
+        let model = CameraModel { camera, bend_mm: [0.0; 2] };
+        let placements = sightings
             .iter()
             .zip(&boards)
             .map(|(sighting, corners)| {
@@ -46,14 +47,7 @@ impl CalibrationData {
                     .ok_or_else(|| SolveError::NoPose { name: sighting.name.clone() })
             })
             .collect::<Result<Vec<_>, _>>()?;
-        Ok(Self {
-            boards,
-            start: Guess {
-                model: CameraModel { camera, bend_mm: [0.0; 2] },
-                placements: positions,
-            },
-            size,
-        })
+        Ok(Self { boards, start: Guess { model, placements }, size })
     }
 
     /// Number of corners in all images.

@@ -71,18 +71,18 @@ impl PathWhitener {
         let steps = positions
             .iter()
             .map(|position| {
-                let kept =
-                    before.filter(|before| before.bead == position.bead).map_or(0.0, |before| {
-                        (-(position.path_mm - before.path_mm).abs() / noise.correlation_length_mm)
-                            .exp()
-                    });
-                variance = kept * kept * variance + noise.variance * (1.0 - kept * kept);
+                let same_bead = before.filter(|before| before.bead == position.bead);
+                let way_mm = same_bead.map(|before| (position.path_mm - before.path_mm).abs());
+                let correlation =
+                    way_mm.map_or(0.0, |way_mm| (-way_mm / noise.correlation_length_mm).exp());
+                let kept = correlation * correlation;
+                variance = kept * variance + noise.variance * (1.0 - kept);
                 let total = variance + position.variance;
                 let gain = variance / total;
                 variance *= 1.0 - gain;
                 before = Some(*position);
                 ln_variances += total.ln();
-                Step { correlation: kept, gain, weight: 1.0 / total.sqrt() }
+                Step { correlation, gain, weight: 1.0 / total.sqrt() }
             })
             .collect();
         Self { steps, ln_variances }

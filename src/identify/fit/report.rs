@@ -109,14 +109,13 @@ fn assemble(problem: &FitProblem, settings: &FitSettings, best: &Minimum) -> Res
     let sigma = |of: &DMatrix<f64>, i: usize| {
         if of[(i, i)] > 0.0 { of[(i, i)].sqrt() } else { f64::INFINITY }
     };
-    let parameters: Vec<Parameter> = (0..named.names.len())
-        .map(|i| Parameter {
-            name: named.names[i].clone(),
-            value: named.values[i],
-            sigma: sigma(&covariance, i),
-            sigma_if_white: sigma(&covariance_if_white, i),
-        })
-        .collect();
+    let parameter = |i: usize| Parameter {
+        name: named.names[i].clone(),
+        value: named.values[i],
+        sigma: sigma(&covariance, i),
+        sigma_if_white: sigma(&covariance_if_white, i),
+    };
+    let parameters: Vec<Parameter> = (0..named.names.len()).map(parameter).collect();
     let undetermined = undetermined(problem, theta, &spread, &named, &turn);
     let real_poles = named.poles_are_real.then_some(FitNote::PolesAreReal);
     let notes = undetermined.map(FitNote::Undetermined).into_iter().chain(real_poles).collect();

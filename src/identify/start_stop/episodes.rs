@@ -83,10 +83,8 @@ pub(super) fn find(command: &TimeSeries, flow: &TimeSeries) -> Result<Episodes, 
     for run in &mut runs {
         run.is_steady &= run.flow > NO_FLOW_FRACTION * most;
     }
-    let starts: Vec<Episode> = runs
-        .windows(2)
-        .filter_map(|pair| if let [last, run] = pair { start(flow, last, run) } else { None })
-        .collect();
+    let pairs = runs.windows(2);
+    let starts: Vec<Episode> = pairs.filter_map(|pair| start(flow, &pair[0], &pair[1])).collect();
     let ends_s = flow.time_s.last().copied().unwrap_or(0.0);
     let nexts = runs.iter().skip(1).map(|next| next.from_s).chain([ends_s]);
     let stops: Vec<Episode> =

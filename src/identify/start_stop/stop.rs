@@ -77,12 +77,8 @@ fn fit_all(
     without: Option<(usize, [f64; 4])>,
 ) -> Result<[f64; 4], StartStopFitError> {
     let left_out = without.map(|(number, _)| number);
-    let samples: Vec<(f64, f64)> = stops
-        .iter()
-        .enumerate()
-        .filter(|(number, _)| Some(*number) != left_out)
-        .flat_map(|(_, stop)| stop.samples.iter().copied())
-        .collect();
+    let used = stops.iter().enumerate().filter(|(number, _)| Some(*number) != left_out);
+    let samples: Vec<_> = used.flat_map(|(_, stop)| stop.samples.iter().copied()).collect();
     let residuals = |row: &[f64]| -> Vec<f64> {
         let Some(model) = stop_of(row).map(model) else { return Vec::new() };
         samples.iter().map(|(at, share)| model.remaining_flow(*at) - share).collect()
