@@ -26,7 +26,7 @@ impl Lens {
         [1, 2, 4, 5, 8][self as usize]
     }
 
-    /// Number of camera parameters: the first ones in the order of [`super::camera::NAMES`].
+    /// Number of camera parameters: the first ones in the order of [`super::solve::SHARED_NAMES`].
     pub fn numbers(self) -> usize {
         NUMBERS - 8 + self.coefficients()
     }

@@ -122,14 +122,3 @@ impl PositionSlopes {
         Some(Self { mm: position.xy(), slopes: -back * by_number })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::calibration::camera::NAMES;
-
-    #[test]
-    fn the_first_rows_have_the_names_of_the_camera_parameters() {
-        assert_eq!(ROWS[..NUMBERS], NAMES);
-    }
-}

@@ -118,13 +118,9 @@ impl Experiment {
     }
 
     /// Samples.
+    #[expect(clippy::len_without_is_empty, reason = "an experiment has fifty samples or more")]
     pub fn len(&self) -> usize {
         self.input.len().min(self.output.len())
-    }
-
-    /// Whether there is no sample.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// How long it lasts \[s\].

@@ -1,29 +1,6 @@
 //! The flow at the nozzle from the laid bead: surface speed times area, both at the moment of
 //! extrusion (bcs-thesis, eq. (20)).
 
-use super::align::{AlignError, to_extruded};
-
-/// A logged bead, one value per sample.
-#[derive(Debug, Clone, Copy)]
-pub struct LoggedBead<'a> {
-    /// Position of the surface below the nozzle \[mm\]; only grows.
-    pub position_mm: &'a [f64],
-    /// Its speed \[mm/s\].
-    pub speed_mm_per_s: &'a [f64],
-    /// Area of the measured section \[mm²\].
-    pub area_mm2: &'a [f64],
-    /// Distance from the nozzle to the measurement \[mm\].
-    pub offset_mm: f64,
-}
-
-/// Flow \[mm³/s\] at the moments of the samples. Shorter than the log by the samples whose
-/// material was not measured before the end.
-pub fn extruded(logged: &LoggedBead<'_>) -> Result<Vec<f64>, AlignError> {
-    let areas = to_extruded(logged.position_mm, logged.area_mm2, logged.offset_mm)?;
-    let areas: Vec<f64> = areas.into_iter().map_while(|area| area).collect();
-    Ok(at_moments(logged.speed_mm_per_s, &areas))
-}
-
 /// Flow \[mm³/s\] from speeds \[mm/s\] and areas \[mm²\] of the same moments.
 pub fn at_moments(speed_mm_per_s: &[f64], area_mm2: &[f64]) -> Vec<f64> {
     speed_mm_per_s.iter().zip(area_mm2).map(|(speed, area)| speed * area).collect()
@@ -34,6 +11,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
     use super::*;
+    use crate::identify::align::to_extruded;
 
     #[test]
     fn the_flow_that_laid_a_bead_is_found_again() {
@@ -54,13 +32,9 @@ mod tests {
         let speed_mm_per_s: Vec<f64> = times.iter().map(|t| speed(*t)).collect();
         let area_at = |position: f64| flow(left(position - 40.0)) / speed(left(position - 40.0));
         let area_mm2: Vec<f64> = position_mm.iter().map(|p| area_at(*p)).collect();
-        let logged = LoggedBead {
-            position_mm: &position_mm,
-            speed_mm_per_s: &speed_mm_per_s,
-            area_mm2: &area_mm2,
-            offset_mm: 40.0,
-        };
-        let found = extruded(&logged).unwrap();
+        let areas = to_extruded(&position_mm, &area_mm2, 40.0).unwrap();
+        let areas: Vec<f64> = areas.into_iter().map_while(|area| area).collect();
+        let found = at_moments(&speed_mm_per_s, &areas);
         assert!(found.len() > 5700 && found.len() < 6000, "{}", found.len());
         for (time, found) in times.iter().zip(found) {
             assert!((found - flow(*time)).abs() < 0.01, "{time} s: {found}");

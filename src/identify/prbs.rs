@@ -9,11 +9,6 @@ pub struct NoSuchLength {
     pub bits: u32,
 }
 
-/// Fewest bits of a register.
-pub const MIN_BITS: u32 = 3;
-/// Most bits of a register: 18 hours of bits of one second each.
-pub const MAX_BITS: u32 = 16;
-
 /// An endless sequence with a period of 2^bits − 1 bits, one more one than zeros in each. It
 /// begins with `bits` ones.
 #[derive(Debug, Clone)]
@@ -94,7 +89,7 @@ mod tests {
 
     #[test]
     fn every_length_is_maximal() {
-        for bits in MIN_BITS..=MAX_BITS {
+        for bits in 3..=16 {
             let mut sequence = Prbs::new(bits).unwrap();
             let (first, period) = (sequence.register, sequence.period());
             let mut ones = 0;

@@ -2,7 +2,7 @@
 //! (defocus) and by a box (uniform motion during the exposure). Positions are in standard
 //! deviations of the total blur.
 
-use super::number::to_f64;
+use super::number::{to_count, to_f64};
 
 /// Half length of the table in standard deviations. Derived: beyond it the step differs from
 /// its end by Φ(−6) = 1e-9.
@@ -29,7 +29,6 @@ struct Entry {
 #[derive(Debug, Clone)]
 pub struct StepTable {
     entries: Vec<Entry>,
-    box_fraction: f64,
 }
 
 impl Default for StepTable {
@@ -41,21 +40,11 @@ impl Default for StepTable {
 
 impl StepTable {
     /// For a blur of which a box makes a fraction of the variance, from 0 to below 1.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "REACH and PER_SD are small and positive"
-    )]
     pub fn new(box_fraction: f64) -> Self {
-        let count = (2.0 * TABLE_HALF_RANGE_SD * ENTRIES_PER_SD) as u32 + 2;
-        let position = |k: u32| f64::from(k) / ENTRIES_PER_SD - TABLE_HALF_RANGE_SD;
+        let count = to_count(2.0 * TABLE_HALF_RANGE_SD * ENTRIES_PER_SD) + 2;
+        let position = |k: usize| to_f64(k) / ENTRIES_PER_SD - TABLE_HALF_RANGE_SD;
         let entries = (0..count).map(|k| Entry::of(position(k), box_fraction)).collect();
-        Self { entries, box_fraction }
-    }
-
-    /// Fraction of the blur's variance that a box makes.
-    pub fn box_fraction(&self) -> f64 {
-        self.box_fraction
+        Self { entries }
     }
 
     /// Value of the unit step and its slope.
@@ -79,12 +68,7 @@ impl StepTable {
         if position <= 0.0 {
             return Entry { fraction: 0.0, density: 0.0, tail: 0.0 };
         }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "positive here, and what is too large is beyond the table"
-        )]
-        let index = position as usize;
+        let index = to_count(position);
         let (Some(low), Some(high)) = (self.entries.get(index), self.entries.get(index + 1)) else {
             return Entry { fraction: 1.0, density: 0.0, tail: 0.0 };
         };

@@ -31,20 +31,6 @@ pub enum SavGolError {
         /// What was asked for.
         degree: usize,
     },
-    /// The derivative's order.
-    #[error("derivative {derivative} of a polynomial of degree {degree} is nothing")]
-    Derivative {
-        /// What was asked for.
-        derivative: usize,
-        /// The polynomial's degree.
-        degree: usize,
-    },
-    /// Sampling interval.
-    #[error("{step_s} s from sample to sample: expected a time larger than zero")]
-    Step {
-        /// What was asked for.
-        step_s: f64,
-    },
     /// Fewer samples than the window.
     #[error("{got} samples: a window of {window} needs as many")]
     TooFew {
@@ -55,13 +41,11 @@ pub enum SavGolError {
     },
 }
 
-/// Window, degree of the polynomial, and order of the derivative.
+/// Window and degree of the polynomial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SavGol {
     window: usize,
     degree: usize,
-    derivative: usize,
-    step_s: f64,
 }
 
 impl SavGol {
@@ -73,18 +57,7 @@ impl SavGol {
         if window.is_multiple_of(2) || window <= degree || window > MAX_WINDOW {
             return Err(SavGolError::Window { window, degree });
         }
-        Ok(Self { window, degree, derivative: 0, step_s: 1.0 })
-    }
-
-    /// A differentiating filter of some order, with the sampling interval.
-    pub fn derivative(self, order: usize, step_s: f64) -> Result<Self, SavGolError> {
-        if order > self.degree {
-            return Err(SavGolError::Derivative { derivative: order, degree: self.degree });
-        }
-        if !(step_s > 0.0 && step_s.is_finite()) {
-            return Err(SavGolError::Step { step_s });
-        }
-        Ok(Self { derivative: order, step_s, ..self })
+        Ok(Self { window, degree })
     }
 
     /// Samples of the window.
@@ -92,36 +65,24 @@ impl SavGol {
         self.window
     }
 
-    /// Weights of the samples of the window, the oldest first, for the value at sample `at`,
-    /// from 0.
+    /// Weights of the samples of the window, the oldest first, for the value at sample `at`, from
+    /// 0: the sum over the orthonormal polynomials of their values at both samples.
     pub fn coefficients(&self, at: usize) -> Vec<f64> {
         // The window is mapped to −1 to 1.
         let half = to_f64(self.window / 2).max(1.0);
-        let place = |sample: usize| (to_f64(sample) - to_f64(self.window / 2)) / half;
+        let position = |sample: usize| (to_f64(sample) - to_f64(self.window / 2)) / half;
         let mut coefficients = vec![0.0; self.window];
-        let mut basis = Basis::new((0..self.window).map(place).collect());
-        let mut there = Derivatives::new(place(at), 1.0 / to_f64(self.window).sqrt());
+        let mut basis = Basis::new((0..self.window).map(position).collect());
         for degree in 0..=self.degree {
             if degree > 0 {
-                there.advance(basis.advance());
+                basis.advance();
             }
-            let wanted = there.of_order(self.derivative);
+            let there = basis.values[at];
             for (coefficient, value) in coefficients.iter_mut().zip(&basis.values) {
-                *coefficient += wanted * value;
+                *coefficient += there * value;
             }
-        }
-        let order = i32::try_from(self.derivative).unwrap_or(0);
-        let scale = (half * self.step_s).powi(-order);
-        for coefficient in &mut coefficients {
-            *coefficient *= scale;
         }
         coefficients
-    }
-
-    /// Variance of the value at sample `at` of the window for samples with
-    /// independent noise of variance 1.
-    pub fn noise_gain(&self, at: usize) -> f64 {
-        self.coefficients(at).iter().map(|coefficient| coefficient * coefficient).sum()
     }
 
     /// As many values as samples: at the middle of each window, and at the ends from the
@@ -143,7 +104,7 @@ impl SavGol {
 }
 
 /// The same for live use: the polynomial of the newest samples, at the last of them. It is
-/// noisier than in the middle, by [`SavGol::noise_gain`], and has no delay for polynomials.
+/// noisier than in the middle, and has no delay for polynomials.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveSavGol {
     coefficients: Vec<f64>,
@@ -174,15 +135,8 @@ impl LiveSavGol {
     }
 }
 
-/// b'·q(k+1) = (x − a)·q(k) − b·q(k−1): the recurrence of the orthonormal polynomials.
-#[derive(Debug, Clone, Copy)]
-struct Recurrence {
-    centre: f64,
-    back: f64,
-    norm: f64,
-}
-
-/// One polynomial at every sample, and the one before it.
+/// One of the orthonormal polynomials at every sample, and the one before it, by the recurrence
+/// b'·q(k+1) = (x − a)·q(k) − b·q(k−1).
 struct Basis {
     places: Vec<f64>,
     values: Vec<f64>,
@@ -197,7 +151,7 @@ impl Basis {
         Self { places, values, before: vec![0.0; count], norm: 0.0 }
     }
 
-    fn advance(&mut self) -> Recurrence {
+    fn advance(&mut self) {
         let weighted = self.places.iter().zip(&self.values).map(|(x, q)| x * q * q);
         let (centre, back) = (weighted.sum::<f64>(), self.norm);
         let row = self.places.iter().zip(&self.values).zip(&self.before);
@@ -208,39 +162,6 @@ impl Basis {
         }
         self.before = std::mem::replace(&mut self.values, next);
         self.norm = norm;
-        Recurrence { centre, back, norm }
-    }
-}
-
-/// Derivatives of the same polynomials at one point, from order 0 on.
-struct Derivatives {
-    place: f64,
-    values: [f64; MAX_DEGREE + 1],
-    before: [f64; MAX_DEGREE + 1],
-}
-
-impl Derivatives {
-    fn new(place: f64, level: f64) -> Self {
-        let mut values = [0.0; MAX_DEGREE + 1];
-        values[0] = level;
-        Self { place, values, before: [0.0; MAX_DEGREE + 1] }
-    }
-
-    fn of_order(&self, order: usize) -> f64 {
-        self.values.get(order).copied().unwrap_or(0.0)
-    }
-
-    /// The recurrence, differentiated by Leibniz's rule.
-    fn advance(&mut self, by: Recurrence) {
-        let mut next = [0.0; MAX_DEGREE + 1];
-        let mut lower = 0.0;
-        for (order, to) in next.iter_mut().enumerate() {
-            let (value, before) = (self.of_order(order), self.before.get(order).unwrap_or(&0.0));
-            *to = (self.place - by.centre) * value + to_f64(order) * lower - by.back * before;
-            *to /= by.norm;
-            lower = value;
-        }
-        self.before = std::mem::replace(&mut self.values, next);
     }
 }
 

@@ -84,12 +84,6 @@ impl IdentifiedCell {
         })
     }
 
-    /// Width of bead that is laid at a speed \[mm\].
-    pub fn width_at(&self, speed_mm_per_s: f64) -> f64 {
-        let ratio = speed_mm_per_s / self.at_speed_mm_per_s;
-        self.width_mm.value * libm::pow(ratio, -self.exponent.value)
-    }
-
     /// Speed at which bead of a width is laid \[mm/s\].
     pub fn speed_for(&self, width_mm: f64) -> f64 {
         let ratio = self.width_mm.value / width_mm;

@@ -59,8 +59,6 @@ pub struct Fit {
     pub parameters: Vec<Parameter>,
     /// Covariance of the parameters, in their order, with the autocorrelation of the residuals.
     pub covariance: DMatrix<f64>,
-    /// The same for white residuals.
-    pub covariance_if_white: DMatrix<f64>,
     /// Predicted output.
     pub predicted: Vec<f64>,
     /// Output less prediction.
@@ -69,10 +67,6 @@ pub struct Fit {
     pub residual_sigma: f64,
     /// On the data of the estimation.
     pub quality: FitQuality,
-    /// Akaike's criterion for white residuals; less is better.
-    pub aic: f64,
-    /// Schwarz's criterion for white residuals; less is better.
-    pub bic: f64,
     /// Effective number of independent samples.
     pub independent_samples: f64,
     /// Remarks.

@@ -121,7 +121,6 @@ fn assemble(problem: &FitProblem, settings: &FitSettings, best: &Minimum) -> Res
     let notes = undetermined.map(FitNote::Undetermined).into_iter().chain(real_poles).collect();
     let (n, k) = (to_f64(residuals.len()), to_f64(theta.len()));
     let squares = dot(&residuals, &residuals);
-    let misfit = n * libm::log((squares / n).max(f64::MIN_POSITIVE));
     Ok(Fit {
         settings: *settings,
         model,
@@ -129,11 +128,8 @@ fn assemble(problem: &FitProblem, settings: &FitSettings, best: &Minimum) -> Res
         output_level: problem.output_level(theta),
         parameters,
         covariance,
-        covariance_if_white,
         residual_sigma: (squares / (n - k).max(1.0)).sqrt(),
         quality,
-        aic: misfit + 2.0 * k,
-        bic: misfit + k * libm::log(n),
         independent_samples: noise.effective_samples(residuals.len()),
         predicted,
         residuals,

@@ -185,12 +185,5 @@ fn exp(s: Complex<f64>) -> Complex<f64> {
     Complex::new(cos, sin) * libm::exp(s.re)
 }
 
-impl DiscreteTransfer {
-    /// Static gain.
-    pub fn dc_gain(&self) -> f64 {
-        self.num.iter().sum::<f64>() / self.den.iter().sum::<f64>()
-    }
-}
-
 #[cfg(test)]
 mod tests;

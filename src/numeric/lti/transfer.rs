@@ -184,12 +184,6 @@ impl TransferFunction {
         )
     }
 
-    /// The inverse without the dead time. Fails where there are fewer zeros than poles or a
-    /// zero is in the right half plane.
-    pub fn inverse(&self) -> Result<Self, ModelError> {
-        self.inverse_through(&Self { num: vec![1.0], den: vec![1.0], dead_time_s: 0.0 })
-    }
-
     /// The inverse without the dead time in series with a filter, whose poles make it proper:
     /// the result in series with this is the filter after the dead time. Fails where the filter
     /// has too few poles or a zero is in the right half plane.
@@ -248,7 +242,7 @@ mod tests {
         for w in [0.1, 10.0, 300.0] {
             assert!((both.at_frequency(w) - wanted.at_frequency(w)).norm() < 1e-12);
         }
-        let short = wheel.inverse();
+        let short = wheel.inverse_through(&TransferFunction::gain(1.0).unwrap());
         assert_eq!(short, Err(ModelError::Improper { zeros: 1, poles: 0 }));
     }
 
@@ -262,6 +256,9 @@ mod tests {
         let words = new(&[1.0, 0.0, 0.0], &[1.0], 0.0).unwrap_err().to_string();
         assert!(words.contains("at least 2 poles"), "{words}");
         let right = new(&[-1.0, 1.0], &[1.0, 1.0], 0.0).unwrap();
-        assert!(matches!(right.inverse(), Err(ModelError::InverseUnstable { re: 1.0, im: 0.0 })));
+        assert!(matches!(
+            right.inverse_through(&TransferFunction::gain(1.0).unwrap()),
+            Err(ModelError::InverseUnstable { re: 1.0, im: 0.0 })
+        ));
     }
 }

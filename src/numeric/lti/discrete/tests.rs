@@ -174,7 +174,8 @@ fn matched_poles_and_zeros_stand_at_their_exponentials_and_keep_the_gain() {
     for zero in tf.zeros() {
         assert!(evaluate(&found.num, exp(zero * DT_S)).norm() < 1e-12);
     }
-    assert!((found.dc_gain() - 35.08).abs() < 1e-6);
+    let dc_gain = found.num.iter().sum::<f64>() / found.den.iter().sum::<f64>();
+    assert!((dc_gain - 35.08).abs() < 1e-6);
     assert_eq!(found.num[0], 0.0, "it answers one step later");
     // A double lag: one zero at -1.
     let lag = TransferFunction::new(&[1.0], &[1.0, 2.0, 1.0], 0.0).unwrap();
