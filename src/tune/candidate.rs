@@ -46,13 +46,9 @@ impl ControllerCandidate {
 
     /// The proposed PI controller.
     pub fn pi(proposal: &Proposal) -> Self {
-        Self {
-            name: "proposed PI".to_owned(),
-            strategy: Arc::new(PiStrategy),
-            gains: Some(proposal.pi.gains),
-            offset_mm: proposal.distance.offset_mm,
-            offset_sigma_mm: proposal.distance.offset_sigma_mm,
-        }
+        let gains = Some(proposal.pi.gains);
+        let strategy = Arc::new(PiStrategy);
+        Self { strategy, gains, ..Self::of("proposed PI", &proposal.distance) }
     }
 
     /// The proposed distance controller.

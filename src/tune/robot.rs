@@ -5,8 +5,9 @@ use serde::Serialize;
 
 use super::{Estimated, Log};
 use crate::core::robot::{RobotMode, RobotState};
-use crate::core::time::{Span, Stamp};
+use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
+use crate::identify::camera_offset::laid_speeds::MAX_GAP;
 use crate::link::robot::motion::{PathMotion, SpeedLoop};
 use crate::numeric::number::to_f64;
 use crate::numeric::row::dot;
@@ -35,8 +36,6 @@ const MIN_SETPOINT_CHANGE: f64 = 0.01;
 const MIN_STEPS: usize = 3;
 /// Smallest number of reports.
 const MIN_REPORTS: usize = 20;
-/// Longest time between two reports of one segment.
-const MAX_REPORT_GAP: Span = Span::from_millis(500);
 /// Step of the difference quotients \[s\].
 const DERIVATIVE_STEP_S: f64 = 1e-3;
 
@@ -156,7 +155,7 @@ fn reports_under_setpoints(states: &[(Stamp, RobotState)], from_s: f64) -> Vec<R
             continue;
         }
         let follows =
-            before.is_some_and(|(last, at_path)| *at - last <= MAX_REPORT_GAP && path >= at_path);
+            before.is_some_and(|(last, at_path)| *at - last <= MAX_GAP && path >= at_path);
         let (at_s, speed) = (at.secs(), state.speed_mm_per_s.get());
         reports.push(Report { at_s, speed, is_first: !follows });
         before = Some((*at, path));

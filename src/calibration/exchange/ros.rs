@@ -15,6 +15,7 @@ const RECTIFICATION: Names = &["rectificationmatrix", "r"];
 const PROJECTION: Names = &["projectionmatrix", "p"];
 const MODEL: Names = &["distortionmodel"];
 const NAME: Names = &["cameraname"];
+/// By definition: the identity matrix, row by row.
 const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
 /// Whether the keys are those of ROS: some that only it has, or the image size as in a message.

@@ -10,7 +10,7 @@ use crate::numeric::rank;
 
 /// Longest time between two reports over which the speed is interpolated; a longer one is a
 /// lost link.
-const MAX_GAP: Span = Span::from_millis(500);
+pub const MAX_GAP: Span = Span::from_millis(500);
 /// A path that decreases by less is the same bead \[mm\]: rounding of the reports.
 const MAX_BACKSTEP_MM: f64 = 0.01;
 /// Grid along the path on which speeds are integrated \[mm\]. A choice: well below any gauge.

@@ -1,5 +1,7 @@
 //! Parameters of an extruder's starts and stops.
 
+use crate::numeric::root::BISECTIONS;
+
 /// Invalid parameters of an extruder or a bead.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum StartStopError {
@@ -165,6 +167,3 @@ impl StartStop {
         self.drool_s / self.drool_time_constant_s
     }
 }
-
-/// Derived: 60 bisections leave 2^-60 of the interval, below double precision.
-const BISECTIONS: u32 = 60;

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::Complex;
 
 use super::transfer::TransferFunction;
-use crate::numeric::root::bisect;
+use crate::numeric::root::{BISECTIONS, bisect};
 
 /// Margins of a loop that is stable with negative feedback. They are distances from the limit
 /// of stability without its side: an unstable loop may have large ones. `None` without such a
@@ -27,8 +27,6 @@ pub struct StabilityMargins {
 /// Frequencies at which a loop is evaluated first. A choice: some thousand per decade for the
 /// few decades about its roots.
 const GRID_POINTS: u32 = 6000;
-/// Derived: an interval halved 60 times is shorter than the last digit of its ends, 2^-53.
-const BISECTIONS: u32 = 60;
 
 /// Margins of a loop, controller and plant in series.
 pub fn margins(of_loop: &TransferFunction) -> StabilityMargins {
