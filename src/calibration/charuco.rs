@@ -125,14 +125,11 @@ fn among(
     let (dictionary, clear) = (marks.dictionary, board.marker_margin());
     let count = MarkerGrid::count(board);
     let markers = marker::read_all(grey, quads, dictionary, count);
-    let (fitting, layout) = [false, true]
-        .map(|first| {
-            let layout = MarkerGrid::of(board, first);
-            (fitting(&layout, &markers, clear, MAX_PAIRS), layout)
-        })
-        .into_iter()
-        .reduce(|a, b| if b.0.len() > a.0.len() { b } else { a })
-        .unwrap_or_else(|| (Vec::new(), MarkerGrid::of(board, false)));
+    let [a, b] = [false, true].map(|first| {
+        let layout = MarkerGrid::of(board, first);
+        (fitting(&layout, &markers, clear, MAX_PAIRS), layout)
+    });
+    let (fitting, layout) = if b.0.len() > a.0.len() { b } else { a };
     if fitting.len() < MIN_MARKERS || fraction(fitting.len(), markers.len()) < MIN_FIT_FRACTION {
         return Err(reason(board, dictionary, grey, quads, fitting.len(), markers.len()));
     }

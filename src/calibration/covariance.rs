@@ -229,11 +229,8 @@ impl CalibrationCovariance {
         for number in (0..SHARED).filter(|&number| self.free.has(number)) {
             // Focal lengths and centre are in pixels, all other parameters in units of about
             // one.
-            let step = if number < 4 {
-                RELATIVE_STEP * self.model.camera.focal_px[number % 2]
-            } else {
-                RELATIVE_STEP
-            };
+            let scale = if number < 4 { self.model.camera.focal_px[number % 2] } else { 1.0 };
+            let step = RELATIVE_STEP * scale;
             let unit = SVector::<f64, SHARED>::from_fn(|i, _| f64::from(u8::from(i == number)));
             of_shared[number] =
                 slope(step, &|by| with(&self.model.moved(&(unit * by)), &self.bed))?;

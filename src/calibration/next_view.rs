@@ -154,11 +154,8 @@ fn on_bed(
     let on_face = map.to_mm(position_px(covariance, at))?;
     // The bed's axes are the board's, with y turned over if z is.
     let first = covariance.on_bed([0.0; 3]);
-    let sign = if (first.rotation() * Vector3::z()).dot(&first.translation_mm()) > 0.0 {
-        -1.0
-    } else {
-        1.0
-    };
+    let is_away = (first.rotation() * Vector3::z()).dot(&first.translation_mm()) > 0.0;
+    let sign = if is_away { -1.0 } else { 1.0 };
     let middle = middle_mm(board);
     Some([on_face.x - middle.x, sign * on_face.y - middle.y, 0.0])
 }

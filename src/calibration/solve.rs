@@ -64,11 +64,10 @@ fn solution(
         .unwrap_or(1.0);
     let of_numbers_px = noise_px * design_effect.sqrt();
     let spreads = views.unit_sigmas(fit, free).filter(|_| of_numbers_px.is_finite());
-    let each: Vec<BoardView> = sightings
-        .iter()
-        .zip(fit.placements.iter().zip(&views.boards))
-        .map(|(sighting, (position, boards))| view(&fit.model, sighting, position.pose, &boards[0]))
-        .collect();
+    let each = sightings.iter().zip(fit.placements.iter().zip(&views.boards));
+    let each = each.map(|(sighting, (position, boards))| {
+        view(&fit.model, sighting, position.pose, &boards[0])
+    });
     let used = trials.iter().find(|trial| trial.free == free);
     let cross_validation_px = used.and_then(|trial| trial.cross_validation_px);
     Ok(Solution {
@@ -81,7 +80,7 @@ fn solution(
         noise_px,
         design_effect,
         trials,
-        views: each,
+        views: each.collect(),
     })
 }
 

@@ -141,15 +141,12 @@ impl Distribution {
     /// is not empty: lower and upper bound and count. `per_octave` must divide 256.
     pub fn bars(&self, per_octave: usize) -> Vec<(f64, f64, u64)> {
         let step = PER_OCTAVE / per_octave.clamp(1, PER_OCTAVE);
-        let mut bars: Vec<(f64, f64, u64)> = self
-            .counts
-            .chunks(step)
-            .enumerate()
-            .map(|(index, counts)| {
-                let (low, high) = (bounds(index * step).0, bounds((index + 1) * step).0);
-                (low, high, counts.iter().sum())
-            })
-            .collect();
+        let bar = |(index, counts): (usize, &[u64])| {
+            let (low, high) = (bounds(index * step).0, bounds((index + 1) * step).0);
+            (low, high, counts.iter().sum())
+        };
+        let mut bars: Vec<(f64, f64, u64)> =
+            self.counts.chunks(step).enumerate().map(bar).collect();
         let last = bars.iter().rposition(|bar| bar.2 > 0).map_or(0, |index| index + 1);
         bars.truncate(last);
         let first = bars.iter().position(|bar| bar.2 > 0).unwrap_or(0);

@@ -38,15 +38,12 @@ impl CalibrationData {
         let maps: Vec<_> = boards.iter().filter_map(map).collect();
         let camera = homography::pinhole(&maps, size);
         let model = CameraModel { camera, bend_mm: [0.0; 2] };
-        let placements = sightings
-            .iter()
-            .zip(&boards)
-            .map(|(sighting, corners)| {
-                homography::board_pose(&camera, &corners[0])
-                    .map(BoardPlacement::of_one)
-                    .ok_or_else(|| SolveError::NoPose { name: sighting.name.clone() })
-            })
-            .collect::<Result<Vec<_>, _>>()?;
+        let placement = |(sighting, corners): (&BoardObservation, &Vec<Vec<Correspondence>>)| {
+            let pose = homography::board_pose(&camera, &corners[0]);
+            let none = || SolveError::NoPose { name: sighting.name.clone() };
+            pose.map(BoardPlacement::of_one).ok_or_else(none)
+        };
+        let placements = sightings.iter().zip(&boards).map(placement).collect::<Result<_, _>>()?;
         Ok(Self { boards, start: Guess { model, placements }, size })
     }
 
