@@ -1,5 +1,4 @@
-//! The one place that knows OpenCV. Its types do not leave this module: frames
-//! and numbers go in, numbers and frames come out.
+//! The only module that uses OpenCV. Its types do not leave this module.
 
 mod board;
 mod lines;
@@ -7,7 +6,7 @@ mod quads;
 mod video;
 
 pub use board::{find_any_board, find_board};
-pub use lines::{EdgeSettings, LineFinder, Segment, canny_hough};
+pub use lines::{EdgeSegment, EdgeSettings, LineFinder, canny_hough};
 pub use quads::find_quads;
 pub use video::{VideoInput, VideoReader};
 
@@ -17,7 +16,7 @@ use opencv::core::{LogLevel, Mat, MatTraitConst, set_log_level, set_num_threads}
 
 use crate::core::frame::{Frame, Pixels};
 
-/// OpenCV refused a task.
+/// OpenCV failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{task} failed in OpenCV: {what}")]
 pub struct BridgeError {
@@ -32,22 +31,19 @@ fn during(task: &'static str) -> impl Fn(opencv::Error) -> BridgeError {
     move |error| BridgeError { task, what: error.message.trim().to_owned() }
 }
 
-/// Makes OpenCV work in the caller's thread, so that a measurement takes the
-/// same time whatever else runs, and keeps it from writing to standard error:
-/// what it has to say comes back as an error.
+/// Makes OpenCV work in the caller's thread, so that the time of a measurement does not depend
+/// on other threads, and suppresses its output on standard error: errors are returned.
 fn prepare() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        // Neither can fail in a way that matters: the work is the same with
-        // more threads and more words.
+        // A failure is harmless: OpenCV would use more threads or print more.
         let _ = set_num_threads(1);
         let _ = set_log_level(LogLevel::LOG_LEVEL_SILENT);
     });
 }
 
-/// The grey values with 8 bits as OpenCV's own matrix. What is darkest in a
-/// 16-bit image becomes 0, what is brightest 255, because 10 or 12 bits are
-/// often all that is used of 16.
+/// The grey values with 8 bits as OpenCV's matrix. 16 bits are scaled from their minimum and
+/// maximum, because cameras often use 10 or 12 of 16 bits.
 fn grey8_mat(frame: &Frame) -> Result<Mat, BridgeError> {
     match frame.pixels() {
         Pixels::Grey8(values) => mat_of(frame, values),

@@ -1,7 +1,8 @@
 //! What a pixel means in millimetres: the calibration model, its file, and how
-//! it is found from pictures of a checkerboard.
+//! it is found from images of a checkerboard.
 
 pub mod board;
+mod board_fit;
 pub mod board_observation;
 pub mod bundle;
 pub mod camera;

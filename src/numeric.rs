@@ -1,4 +1,4 @@
-//! What a numerical library would hold: statistics, filters, linear systems, fits.
+//! Numerical methods: statistics, filters, linear systems, fits.
 
 #![expect(
     clippy::inline_always,
@@ -9,10 +9,14 @@ pub mod average;
 pub mod blurred_step;
 pub mod gauss_legendre;
 pub mod hampel;
+pub mod levenberg_marquardt;
+pub mod linear;
 pub mod lti;
 pub mod normal_distribution;
 pub mod normal_equations;
 pub mod number;
 pub mod rank;
+pub mod root;
+pub mod row;
 pub mod savgol;
 pub mod statistics;

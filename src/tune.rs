@@ -1,6 +1,6 @@
-//! What a bead with steps of the speed tells of its cell, and what follows from it:
-//! the bead's model, noise, rates and the robot's answer; gains with their margins;
-//! and the response that each law would have.
+//! Identification of a cell from a bead with speed steps, and settings that follow: model of
+//! the bead, noise, timing and response of the robot; gains with their stability margins; and
+//! the predicted response of each controller.
 //!
 //! ```text
 //! recorded events and steps ─▶ log ─▶ plant (bead, noise, robot, timing)
@@ -33,13 +33,13 @@ pub struct Estimated {
     pub sigma: f64,
 }
 
-/// Why a recording tells nothing of its cell.
+/// Why a recording does not identify its cell.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TuneError {
-    /// The bead does not tell its model.
+    /// The offset is undetermined.
     #[error(transparent)]
     Bead(#[from] crate::identify::camera_offset::CameraOffsetError),
-    /// The widths hardly tell how the bead answers the speed.
+    /// The exponent is uncertain.
     #[error(
         "the exponent is {exponent:.2} ± {sigma:.2}, known no better than to a third of itself: \
          lay a longer bead, or one with larger steps (--step-fraction)"
@@ -50,7 +50,7 @@ pub enum TuneError {
         /// Its standard deviation.
         sigma: f64,
     },
-    /// The exponent is at an end of those that are tried.
+    /// The exponent is at an end of its range.
     #[error(
         "the exponent is at the end of what is tried, {exponent:.2}: the widths do not answer the \
          speed as a bead does; see that the camera looks at this robot's bead"

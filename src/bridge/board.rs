@@ -12,11 +12,12 @@ use super::{BridgeError, during, grey8_mat, prepare};
 use crate::core::frame::Frame;
 use crate::core::geometry::{GridSize, ImagePoint};
 
-/// Finds the inner corners of a checkerboard, so many of them, row by row \[px\]. `None` where the whole board is not in the picture.
+/// Finds a number of inner corners of a checkerboard, row by row \[px\]. `None` where the board
+/// is not entirely in the image.
 ///
-/// Quads in an adaptive threshold first; where these are not found, the slower
-/// search for saddle points (Duda and Frese 2018), which sees through blur and
-/// uneven light. [`crate::calibration::corner`] finds where exactly they are.
+/// Squares in an adaptive threshold first; if these are not found, the slower search for saddle
+/// points (Duda and Frese 2018), which tolerates blur and uneven light.
+/// [`crate::calibration::corner`] refines the corners.
 pub fn find_board(frame: &Frame, inner: GridSize) -> Result<Option<Vec<ImagePoint>>, BridgeError> {
     let GridSize { columns, rows } = inner;
     prepare();
@@ -43,8 +44,8 @@ fn search(image: &Mat, pattern: Size, corners: &mut Vector<Point2f>) -> opencv::
     find_chessboard_corners_sb(image, pattern, corners, saddles)
 }
 
-/// How many inner corners the largest board in a picture has, columns and rows.
-/// `None` where there is none of at least 3 by 3.
+/// Number of inner corners of the largest board in an image. `None` where there is none of at
+/// least 3 by 3.
 pub fn find_any_board(frame: &Frame) -> Result<Option<GridSize>, BridgeError> {
     prepare();
     let image = grey8_mat(frame)?;
@@ -64,8 +65,7 @@ mod tests {
     use crate::calibration::Camera;
     use crate::calibration::board::Board;
     use crate::core::frame::Pixels;
-    use crate::core::geometry;
-    use crate::core::geometry::Pose;
+    use crate::core::geometry::{self, Pose};
     use crate::core::time::Stamp;
     use crate::core::units::Mm;
     use crate::sim::board_studio::{BoardStudio, Exposure};

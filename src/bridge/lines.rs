@@ -1,5 +1,5 @@
-//! Straight edges the way the 2022 paper finds them: Canny's edge detector and
-//! the probabilistic Hough transform.
+//! Straight edges by the method of the 2022 paper: Canny's edge detector and the probabilistic
+//! Hough transform.
 
 use nalgebra::Point2;
 use opencv::core::{BORDER_DEFAULT, Mat, MatTraitConst, Rect, Size, ToInputArray, Vec4i, Vector};
@@ -9,40 +9,39 @@ use super::{BridgeError, during, grey8_mat, prepare};
 use crate::core::frame::{Frame, Pixels};
 use crate::core::geometry::{ImagePoint, Roi};
 
-/// Settings of the edge detector and the line finder.
+/// Settings of edge detector and Hough transform.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeSettings {
     /// Standard deviation of the Gaussian blur before the detector \[px\]; 0
-    /// leaves the picture as it is.
+    /// leaves the image as it is.
     pub blur_sigma_px: f64,
     /// Canny's lower and upper threshold on the gradient, on a scale of 8-bit
     /// grey values with Sobel's 3x3 kernel.
     pub thresholds: [f64; 2],
-    /// Votes that make a line.
+    /// Votes for a line.
     pub votes: u16,
-    /// Shorter lines are dropped \[px\].
+    /// Shortest line \[px\].
     pub shortest_px: f64,
     /// Longest gap that is bridged within a line \[px\].
     pub longest_gap_px: f64,
 }
 
-/// A straight piece of edge between two pixels of the image \[px\].
+/// A straight edge between two pixels \[px\].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Segment {
+pub struct EdgeSegment {
     /// One end.
     pub from: ImagePoint,
     /// The other end.
     pub to: ImagePoint,
 }
 
-/// Straight edges within a region of the picture, in raw image pixels. No line
-/// at all is an empty list; a region outside the picture is an error. The
-/// answer depends only on the arguments.
+/// Straight edges within a region of the image, in raw image pixels; empty without one. Fails
+/// for a region outside the image. The result depends only on the arguments.
 pub fn canny_hough(
     frame: &Frame,
     roi: Roi,
     settings: &EdgeSettings,
-) -> Result<Vec<Segment>, BridgeError> {
+) -> Result<Vec<EdgeSegment>, BridgeError> {
     const TASK: &str = "finding straight edges";
     prepare();
     if !roi.fits(frame.size()) || roi.width == 0 || roi.height == 0 {
@@ -53,17 +52,17 @@ pub fn canny_hough(
     let image = grey8_mat(frame)?;
     let (left, top) = (coordinate(roi.x), coordinate(roi.y));
     let window = Rect::new(left, top, coordinate(roi.width), coordinate(roi.height));
-    // A copy: on a view the filters would look at pixels outside the region.
+    // A copy: filters on a view would use pixels outside the region.
     let region = image.roi(window).and_then(|view| view.try_clone()).map_err(during(TASK))?;
     let mut finder = LineFinder::new(*settings);
     finder.run(&region).map_err(during(TASK))?;
     let end = |x: i32, y: i32| Point2::new(f64::from(left + x), f64::from(top + y));
     let lines = finder.lines.iter();
-    Ok(lines.map(|l| Segment { from: end(l[0], l[1]), to: end(l[2], l[3]) }).collect())
+    Ok(lines.map(|l| EdgeSegment { from: end(l[0], l[1]), to: end(l[2], l[3]) }).collect())
 }
 
-/// Blur, edge detector and line finder by themselves, with memory that they
-/// keep from frame to frame: what a benchmark compares with.
+/// Blur, edge detector and Hough transform with memory that is reused from frame to frame, for
+/// benchmarks.
 #[derive(Debug)]
 pub struct LineFinder {
     settings: EdgeSettings,
@@ -79,8 +78,8 @@ impl LineFinder {
         Self { settings, blurred: Mat::default(), edges: Mat::default(), lines: Vector::new() }
     }
 
-    /// Finds the straight edges of a whole frame of 8 bits, which is not
-    /// copied, and says how many there are. Fails on a frame of 16 bits.
+    /// Number of straight edges of a whole frame of 8 bits, which is not copied. Fails for 16
+    /// bits.
     pub fn count(&mut self, frame: &Frame) -> Result<usize, BridgeError> {
         const TASK: &str = "finding straight edges of a whole frame";
         let Pixels::Grey8(values) = frame.pixels() else {
@@ -114,8 +113,7 @@ impl LineFinder {
     }
 }
 
-/// A pixel index as OpenCV counts; the region has been checked to lie within a
-/// picture that OpenCV holds.
+/// A pixel index of OpenCV; the region was checked to be within the image.
 fn coordinate(px: usize) -> i32 {
     i32::try_from(px).unwrap_or(i32::MAX)
 }
@@ -147,7 +145,7 @@ mod tests {
         let lines = canny_hough(&bar(), roi, &SETTINGS).unwrap();
         for edge in [59.5, 139.5] {
             let near =
-                |s: &&Segment| (s.from.x - edge).abs() <= 1.0 && (s.to.x - edge).abs() <= 1.0;
+                |s: &&EdgeSegment| (s.from.x - edge).abs() <= 1.0 && (s.to.x - edge).abs() <= 1.0;
             let length =
                 lines.iter().filter(near).map(|s| (s.to - s.from).norm()).fold(0.0, f64::max);
             assert!(length > 80.0, "edge at {edge}: {lines:?}");
@@ -165,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn an_even_picture_has_no_edges_and_a_region_outside_is_refused() {
+    fn a_uniform_image_has_no_edges_and_a_region_outside_is_refused() {
         let even = Frame::new(
             0,
             Stamp::START,

@@ -1,4 +1,4 @@
-//! Dark quadrilaterals in a picture: what may be a marker.
+//! Dark quadrilaterals in an image, which may be markers.
 
 use nalgebra::Point2;
 use opencv::core::{Mat, Point, Vector};
@@ -11,20 +11,21 @@ use super::{BridgeError, during, grey8_mat, prepare};
 use crate::core::frame::Frame;
 use crate::core::geometry::ImagePoint;
 
-/// Sides of the squares over which a pixel is compared with the mean \[px\]: a marker's
-/// border must be dark in one of them at least.
+/// Window sizes of the adaptive threshold \[px\], for borders of markers of different sizes. A
+/// choice: factors of two.
 const NEIGHBOURHOODS_PX: [i32; 4] = [11, 23, 47, 95];
-/// Grey levels that dark is darker than the mean.
+/// Grey levels below the mean of the window that count as dark (the default of OpenCV's ArUco
+/// detector).
 const MIN_DARKNESS: f64 = 7.0;
-/// Least circumference of a quadrilateral \[px\].
+/// Smallest perimeter of a quadrilateral \[px\]: a smaller marker cannot be read.
 const MIN_PERIMETER_PX: f64 = 36.0;
-/// Least area over that of a square with the same circumference.
+/// Smallest area over that of a square of equal perimeter. A choice for inclined views.
 const MIN_FULLNESS: f64 = 0.25;
-/// How far an outline may be off straight sides, as a share of its length.
+/// Largest deviation of an outline from straight sides over its length. A choice.
 const STRAIGHT_TOLERANCE: f64 = 0.04;
 
-/// Corners of dark convex quadrilaterals \[px\], to about a pixel, in the order in which
-/// they are passed clockwise in the picture. The same one may be found several times.
+/// Corners of dark convex quadrilaterals \[px\], to about a pixel, clockwise in the image. A
+/// quadrilateral may be found several times.
 pub fn find_quads(frame: &Frame) -> Result<Vec<[ImagePoint; 4]>, BridgeError> {
     prepare();
     let image = grey8_mat(frame)?;

@@ -14,19 +14,19 @@ use crate::core::frame::{Channel, Frame, Pixels, SampleLayout};
 use crate::core::geometry::Size;
 use crate::core::time::Stamp;
 
-/// Where moving pictures come from.
+/// Source of a video.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum VideoInput {
     /// A video file.
     File(PathBuf),
     /// A camera by its number.
     Camera(i32),
-    /// A GStreamer pipeline. It may end in an `appsink` of its own; where it
-    /// names none, one that keeps only the newest picture is added.
+    /// A GStreamer pipeline. It may end in an `appsink`; otherwise one is added that keeps only
+    /// the newest image.
     Pipeline(String),
 }
 
-/// Reads pictures one after the other.
+/// Reads images one after the other.
 #[derive(Debug)]
 pub struct VideoReader {
     capture: VideoCapture,
@@ -38,12 +38,11 @@ const READ: &str = "reading an image";
 const APPSINK: &str = " ! appsink drop=true max-buffers=1 sync=false";
 
 impl VideoReader {
-    /// Opens an input; fails where OpenCV finds no decoder, device or pipeline
-    /// for it.
+    /// Opens a source; fails where OpenCV finds no decoder, device or pipeline for it.
     pub fn open(input: &VideoInput) -> Result<Self, BridgeError> {
         prepare();
-        // Asked by name: `CAP_ANY` would go on to GStreamer, which takes its
-        // time to refuse a file or a device, and complains on standard error.
+        // By name: `CAP_ANY` would try GStreamer, too, which is slow to refuse a file or a
+        // device, and prints errors.
         let capture = match input {
             VideoInput::File(path) => VideoCapture::from_file(path, CAP_FFMPEG),
             VideoInput::Camera(index) => VideoCapture::new(*index, CAP_V4L2),
@@ -58,21 +57,20 @@ impl VideoReader {
         }
         match input {
             VideoInput::File(_) => keep_grey_grey(&mut capture),
-            // Fewer pictures in the queue are fresher pictures. Not every
-            // driver can; it makes no difference to what is read.
+            // A short queue keeps images recent. Not every driver supports it.
             VideoInput::Camera(_) => drop(capture.set(CAP_PROP_BUFFERSIZE, 1.0)),
             VideoInput::Pipeline(_) => {}
         }
         Ok(Self { capture, image: Mat::default() })
     }
 
-    /// Waits for the next picture without decoding it, so that the moment can
-    /// be noted. `false` at the end, or where no picture comes.
+    /// Waits for the next image without decoding it, so that its time can be recorded. `false`
+    /// at the end, or without an image.
     pub fn grab(&mut self) -> Result<bool, BridgeError> {
         self.capture.grab().map_err(during(READ))
     }
 
-    /// Decodes the picture that was grabbed. `None` where it cannot be.
+    /// Decodes the grabbed image. `None` if that fails.
     pub fn retrieve(
         &mut self,
         channel: Channel,
@@ -86,13 +84,13 @@ impl VideoReader {
         frame_of(&self.image, channel, seq, captured_at).map(Some)
     }
 
-    /// Pictures a second, where the input says so.
+    /// Frame rate, if the source states it.
     pub fn fps(&self) -> Option<f64> {
         let fps = self.capture.get(CAP_PROP_FPS).ok()?;
         (fps.is_finite() && fps > 0.0).then_some(fps)
     }
 
-    /// Pictures in the file as its header has them, which may be an estimate.
+    /// Number of images in the file by its header, which may be an estimate.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -116,8 +114,8 @@ fn refusal(input: &VideoInput) -> &'static str {
     }
 }
 
-/// Asks for 16-bit grey pictures as they are stored; by default every picture
-/// is turned into 8-bit colour. OpenCV can from 4.7 on.
+/// Requests 16-bit grey images as they are stored; by default images are converted to 8-bit
+/// colour. OpenCV supports it from 4.7 on.
 fn keep_grey_grey(capture: &mut VideoCapture) {
     let deep_grey = f64::from(u32::from_le_bytes(*b"Y1\0\x10"));
     let format = capture.get(CAP_PROP_CODEC_PIXEL_FORMAT).unwrap_or(-1.0);

@@ -1,5 +1,5 @@
-//! The checkerboard, plain or with markers in its white squares: where its inner
-//! corners are, and whether what was found in a picture can be them.
+//! The checkerboard, plain or with markers in its white squares: the positions of its inner
+//! corners, and whether detected corners can be those of the board.
 
 use nalgebra::{Point2, Point3};
 
@@ -7,6 +7,7 @@ use super::dictionary::Dictionary;
 use super::equations::Correspondence;
 use crate::core::geometry::{GridSize, ImagePoint};
 use crate::core::units::Mm;
+use crate::numeric::number::to_f64;
 
 /// A checkerboard of `columns` by `rows` inner corners.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,22 +18,22 @@ pub struct Board {
     markers: Option<Markers>,
 }
 
-/// What makes a checkerboard one of `ChArUco`: a marker in every white square, which
-/// tells which square it is. They are numbered row by row from the upper left.
+/// The markers that make a checkerboard a `ChArUco` board: one in every white square, numbered
+/// row by row from the upper left.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Markers {
     /// Side of a marker, with its black border.
     pub side: Mm,
-    /// Where the markers are from.
+    /// Dictionary of the markers.
     pub dictionary: Dictionary,
 }
 
-/// A corner of the board in a picture.
+/// A corner of the board in an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CornerObservation {
-    /// Which one, counted row by row from 0.
+    /// Number of the corner, row by row from 0.
     pub index: usize,
-    /// Where it is seen \[px\].
+    /// Its position \[px\].
     pub px: ImagePoint,
 }
 
@@ -46,15 +47,11 @@ pub fn observe_all(corners_px: &[ImagePoint]) -> Vec<CornerObservation> {
 pub enum BoardError {
     /// Too few or too many corners.
     #[error(
-        "a board has 3 to 100 inner corners along each side, found {columns}x{rows}; \
-         inner corners are where four squares meet, one fewer than the squares"
+        "a board has 3 to 100 inner corners along each side, found {}x{}; \
+         inner corners are where four squares meet, one fewer than the squares",
+        .0.columns, .0.rows
     )]
-    Corners {
-        /// Inner corners along a row.
-        columns: usize,
-        /// Inner corners along a column.
-        rows: usize,
-    },
+    Corners(GridSize),
     /// No size.
     #[error("the side of a square must be more than 0 mm, found {0}")]
     Square(Mm),
@@ -80,7 +77,7 @@ pub enum BoardError {
     },
 }
 
-/// Sides of markers over those of squares.
+/// Accepted side of a marker over the side of a square.
 const MARKER: std::ops::RangeInclusive<f64> = 0.4..=0.9;
 
 /// Corners that are not those of a board.
@@ -104,8 +101,8 @@ pub enum NotABoard {
     },
 }
 
-/// Area of a square in the picture below which it has collapsed to a line
-/// \[px²\].
+/// Area of a square in the image below which it counts as collapsed to a line \[px²\]. A
+/// choice: far below the area of any square that can be detected.
 const SMALLEST_SQUARE_PX2: f64 = 1.0;
 
 impl Board {
@@ -113,7 +110,7 @@ impl Board {
     pub fn new(columns: usize, rows: usize, square: Mm) -> Result<Self, BoardError> {
         let sound = 3..=100;
         if !sound.contains(&columns) || !sound.contains(&rows) {
-            return Err(BoardError::Corners { columns, rows });
+            return Err(BoardError::Corners(GridSize { columns, rows }));
         }
         if square <= Mm::ZERO {
             return Err(BoardError::Square(square));
@@ -121,8 +118,8 @@ impl Board {
         Ok(Self { columns, rows, square, markers: None })
     }
 
-    /// The same with a marker in each white square. Fails where they do not fit, or
-    /// there are not as many.
+    /// The same board with a marker in each white square. Fails where the marker does not fit a
+    /// square, or the dictionary has too few markers.
     pub fn with_marks(self, marks: Markers) -> Result<Self, BoardError> {
         if !MARKER.contains(&(marks.side.get() / self.square.get())) {
             return Err(BoardError::Marker { side: marks.side, square: self.square });
@@ -144,22 +141,21 @@ impl Board {
         self.markers.is_none()
     }
 
-    /// Whether it looks the same after half a turn: without markers, and with the same
-    /// colour in opposite corners. Of others the square in the first corner is black.
+    /// Whether the board looks the same after half a turn: without markers, and with the same
+    /// colour in opposite corners. On any other plain board the square at the first corner is
+    /// black.
     pub fn is_symmetric(&self) -> bool {
         self.is_plain() && (self.columns + self.rows).is_multiple_of(2)
     }
 
-    /// The black cells of the marker in a square, counted from the upper left one, with
-    /// its border: column and row of each cell among the marker's, `side + 2` along each
-    /// side. Empty where there is none.
+    /// The black cells of the marker in a square, its border included: column and row among the
+    /// marker's `side + 2` cells along each side. Empty for a square without a marker.
     pub fn black_cells(&self, column: usize, row: usize) -> Vec<(usize, usize)> {
         let Some(marks) = self.markers.filter(|_| (column + row) % 2 == 1) else {
             return Vec::new();
         };
-        let squares = self.columns + 1;
         // White squares before it: half of the rows above, and of its own.
-        let before = row * squares + column;
+        let before = row * (self.columns + 1) + column;
         let number = before / 2;
         let all = marks.dictionary.side() + 2;
         let inner = 1..all - 1;
@@ -172,8 +168,8 @@ impl Board {
         cells.filter(|&(column, row)| !is_white(column, row)).collect()
     }
 
-    /// Width of the plain border between a marker and its square's sides, over the side
-    /// of a square; half a square without markers.
+    /// Width of the plain margin between a marker and the sides of its square, over the side of
+    /// a square; 0.5 without markers.
     pub fn marker_margin(&self) -> f64 {
         self.markers.map_or(0.5, |marks| 0.5 * (1.0 - marks.side.get() / self.square.get()))
     }
@@ -188,36 +184,33 @@ impl Board {
         self.square
     }
 
-    /// The inner corners on the board, row by row \[mm\]: x along a row, y along
-    /// a column, the first at the origin.
-    #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
+    /// The inner corners on the board \[mm\], row by row: x along a row, y along a column, the
+    /// first at the origin.
     pub fn corners_mm(&self) -> Vec<Point3<f64>> {
-        let side = self.square.get();
-        (0..self.rows)
-            .flat_map(|row| (0..self.columns).map(move |column| (column as f64, row as f64)))
-            .map(|(x, y)| Point3::new(x * side, y * side, 0.0))
+        let (columns, side) = (self.columns, self.square.get());
+        (0..columns * self.rows)
+            .map(|i| Point3::new(to_f64(i % columns) * side, to_f64(i / columns) * side, 0.0))
             .collect()
     }
 
-    /// The corners that were seen, where they are on a flat board \[mm\], and how far
-    /// they rise out of it where it is bent: along a row and along a column by a
-    /// parabola whose mean over all corners is 0, so that the board's plane stays
-    /// where it is.
-    #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
+    /// The observed corners with their positions on a flat board \[mm\], and the height of each
+    /// corner over the plane of a bent board for a bend of 1 mm: a parabola along a row and one
+    /// along a column, each with zero mean over all corners, so that the plane of the board
+    /// stays the same.
     pub fn correspondences(&self, seen: &[CornerObservation]) -> Vec<Correspondence> {
         let side = self.square.get();
         let rise = |at: usize, count: usize| {
-            let half = 0.5 * (count - 1) as f64;
-            let out = (at as f64 - half) / half;
-            // Mean of the squares of evenly spaced places from -1 to 1.
-            let mean = (count + 1) as f64 / (3.0 * (count - 1) as f64);
+            let half = 0.5 * to_f64(count - 1);
+            let out = (to_f64(at) - half) / half;
+            // Mean square of evenly spaced numbers from -1 to 1.
+            let mean = to_f64(count + 1) / (3.0 * to_f64(count - 1));
             mean - out * out
         };
         seen.iter()
             .map(|&CornerObservation { index, px }| {
                 let (column, row) = (index % self.columns, index / self.columns);
                 Correspondence {
-                    on_board: Point2::new(column as f64 * side, row as f64 * side),
+                    on_board: Point2::new(to_f64(column) * side, to_f64(row) * side),
                     bend: [rise(column, self.columns), rise(row, self.rows)],
                     observed: px,
                 }
@@ -225,9 +218,9 @@ impl Board {
             .collect()
     }
 
-    /// Checks that corners form a grid that is nowhere collinear or folded, and
-    /// puts rows that were counted in the mirror the right way round, so that
-    /// x, y and the view turn like the axes of the camera.
+    /// Checks that the corners form a grid that is nowhere collinear or folded. Reverses rows
+    /// that were counted in the mirror, so that x, y and the view are oriented like the axes of
+    /// the camera.
     pub fn order(&self, mut corners: Vec<ImagePoint>) -> Result<Vec<ImagePoint>, NotABoard> {
         let expected = self.columns * self.rows;
         if corners.len() != expected {
@@ -247,9 +240,9 @@ impl Board {
         Ok(corners)
     }
 
-    /// Signed area of a square in the picture \[px²\], positive where x turns to
-    /// y as in the picture's axes. The smaller of its two triangles, so that a
-    /// square with a corner turned in does not pass.
+    /// Signed area of a square in the image \[px²\], positive where x turns to y as in the axes
+    /// of the image. It is the smaller of the two triangles, so that a concave square does not
+    /// pass.
     fn square_area(&self, corners: &[ImagePoint], column: usize, row: usize) -> f64 {
         let at = |c: usize, r: usize| corners[(row + r) * self.columns + column + c];
         let first = (at(1, 0) - at(0, 0)).perp(&(at(0, 1) - at(0, 0)));

@@ -1,35 +1,35 @@
-//! What one picture shows of the board.
+//! The board in one image.
+
+use std::collections::BTreeSet;
 
 use super::board::{Board, CornerObservation, Markers};
-use super::charuco;
-use super::charuco::MarkerError;
+use super::charuco::{self, MarkerError};
 use super::corner;
-use super::focus::{Focus, FocusFault};
+use super::focus::Focus;
 use super::grey::GreyImage;
-use super::outline;
-use super::outline::BoardOutline;
+use super::outline::{self, BoardOutline};
 use super::rejection::{BoardRejection, MIN_CORNERS, MIN_LINES};
 use crate::bridge;
 use crate::core::frame::Frame;
 use crate::core::geometry::{GridSize, ImagePoint};
 
-/// Mean shift of the corners below which two pictures show the board in one place
-/// \[px\]: they say the same twice, and count as one.
+/// Mean shift of the corners below which two images show the board in one position and count as
+/// one \[px\]. A choice: well above the noise of a corner.
 const SAME_POSITION_PX: f64 = 1.0;
-/// The board as one picture shows it.
+/// The board as one image shows it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardObservation {
-    /// The picture's name.
+    /// Name of the image.
     pub name: String,
-    /// Its size \[px\].
+    /// Size of the image \[px\].
     pub image_size_px: [u32; 2],
     /// The inner corners that were found.
     pub corners: Vec<CornerObservation>,
-    /// How sharp they are, where that could be told.
+    /// Sharpness of the image; `None` where no edge has enough contrast.
     pub focus: Option<Focus>,
 }
 
-/// Looks for the board in a picture.
+/// Finds the board in an image. The rejection says why an image cannot be used.
 pub fn observe(
     board: &Board,
     name: &str,
@@ -41,12 +41,8 @@ pub fn observe(
         Some(marks) => with_markers(board, marks, frame, &grey)?,
     };
     let focus = Focus::of(board, &grey, &corners);
-    match focus.and_then(|focus| focus.fault()) {
-        Some(FocusFault::Blurred { blur_px }) => return Err(BoardRejection::Blurred { blur_px }),
-        Some(FocusFault::Moved { motion_px: way_px }) => {
-            return Err(BoardRejection::Moved { motion_px: way_px });
-        }
-        None => {}
+    if let Some(fault) = focus.and_then(|focus| focus.fault()) {
+        return Err(fault.into());
     }
     let side = |px: usize| u32::try_from(px).unwrap_or(u32::MAX);
     let image_size_px = [side(frame.width()), side(frame.height())];
@@ -63,14 +59,13 @@ fn checkerboard(
     grey: &GreyImage<'_>,
 ) -> Result<Vec<Option<ImagePoint>>, BoardRejection> {
     let expected = board.corners();
-    let GridSize { columns, rows } = expected;
     let Some(corners) = bridge::find_board(frame, expected)? else {
         return Err(match bridge::find_any_board(frame)? {
             Some(found) if oriented_like(found, expected) != expected => {
                 BoardRejection::OtherBoard { found: oriented_like(found, expected), expected }
             }
             _ if charuco::shows(frame)? => BoardRejection::Marked,
-            _ => BoardRejection::NoBoard { columns, rows },
+            _ => BoardRejection::NoBoard(expected),
         });
     };
     let mut corners = board.order(corners)?;
@@ -80,21 +75,21 @@ fn checkerboard(
         return Err(BoardRejection::Marked);
     }
     if !ends_early.is_empty() {
-        return Err(BoardRejection::Smaller { columns, rows, sides: ends_early });
+        return Err(BoardRejection::Smaller { board: expected, sides: ends_early });
     }
     if !goes_on.is_empty() {
-        return Err(BoardRejection::Larger { columns, rows, sides: goes_on });
+        return Err(BoardRejection::Larger { board: expected, sides: goes_on });
     }
     if is_first_bright && !board.is_symmetric() {
         corners.reverse();
     }
     let rough: Vec<Option<ImagePoint>> = corners.into_iter().map(Some).collect();
     let refined = corner::refine(board, grey, &rough, false);
-    // One that does not fit was seen, and stays where it is.
+    // A corner whose fit failed keeps its rough position.
     Ok(refined.into_iter().zip(rough).map(|(refined, rough)| refined.or(rough)).collect())
 }
 
-/// The corners of a board with markers that are in the picture, and not covered.
+/// The corners of a board with markers that are in the image and not occluded.
 fn with_markers(
     board: &Board,
     marks: Markers,
@@ -109,18 +104,11 @@ fn with_markers(
         Err(reason) => return Err(reason.into()),
     };
     let refined = corner::refine(board, grey, &found.expected, found.first_has_marker);
-    let seen: Vec<Option<ImagePoint>> = refined
-        .into_iter()
-        .zip(found.is_beside)
-        .map(|(px, is_beside)| px.filter(|_| is_beside))
-        .collect();
+    let both = refined.into_iter().zip(found.is_beside);
+    let seen: Vec<_> = both.map(|(px, is_beside)| px.filter(|_| is_beside)).collect();
     let columns = board.corners().columns;
     let lines = |line: &dyn Fn(usize) -> usize| {
-        let mut lines: Vec<usize> =
-            (0..seen.len()).filter(|&i| seen[i].is_some()).map(line).collect();
-        lines.sort_unstable();
-        lines.dedup();
-        lines.len()
+        (0..seen.len()).filter(|&i| seen[i].is_some()).map(line).collect::<BTreeSet<_>>().len()
     };
     let count = seen.iter().flatten().count();
     let (in_columns, in_rows) = (lines(&|i| i % columns), lines(&|i| i / columns));
@@ -130,43 +118,42 @@ fn with_markers(
     Ok(seen)
 }
 
-/// The longer side first if it is so on the other board: a plain board does not tell
-/// its rows from its columns.
+/// The size with its longer side where the other board has it: a plain board does not
+/// distinguish rows from columns.
 fn oriented_like(found: GridSize, expected: GridSize) -> GridSize {
     let GridSize { columns, rows } = found;
     let is_alike = (columns >= rows) == (expected.columns >= expected.rows);
     if is_alike { found } else { GridSize { columns: rows, rows: columns } }
 }
 
-/// What became of pictures, each with its name.
+/// Images by name, each with the board or the reason for its rejection.
 pub type Observations = Vec<(String, Result<BoardObservation, BoardRejection>)>;
 
-/// Keeps the size that most pictures have, the earlier one if two are as
-/// common, and refuses the others.
+/// Keeps the most frequent image size, the first one of equally frequent sizes, and rejects
+/// images of another size.
 pub fn reject_other_sizes(looks: &mut Observations) {
-    let sizes: Vec<[u32; 2]> =
-        looks.iter().filter_map(|(_, look)| look.as_ref().ok()).map(|s| s.image_size_px).collect();
+    let found = looks.iter().filter_map(|(_, observation)| observation.as_ref().ok());
+    let sizes: Vec<[u32; 2]> = found.map(|found| found.image_size_px).collect();
     let count = |size: &[u32; 2]| sizes.iter().filter(|other| *other == size).count();
-    // `max_by_key` keeps the last of equals, so it is asked from the end.
+    // `max_by_key` returns the last of equal elements, hence the reversed order.
     let Some(expected) = sizes.iter().rev().max_by_key(|size| count(size)).copied() else {
         return;
     };
-    for (_, look) in looks {
-        if let Ok(BoardObservation { image_size_px: found, .. }) = look
+    for (_, observation) in looks {
+        if let Ok(BoardObservation { image_size_px: found, .. }) = observation
             && *found != expected
         {
-            *look = Err(BoardRejection::Size { found: *found, expected });
+            *observation = Err(BoardRejection::Size { found: *found, expected });
         }
     }
 }
 
-/// Keeps one of the pictures that show the board in one place, the first, and refuses
-/// the others.
+/// Keeps the first of the images that show the board in one position and rejects the others.
 pub fn reject_duplicates(board: &Board, looks: &mut Observations) {
     for later in 1..looks.len() {
         let Ok(sighting) = &looks[later].1 else { continue };
-        let twin = looks[..later].iter().find_map(|(_, look)| {
-            let earlier = look.as_ref().ok()?;
+        let twin = looks[..later].iter().find_map(|(_, observation)| {
+            let earlier = observation.as_ref().ok()?;
             let shift_px = shift_px(board, &earlier.corners, &sighting.corners)?;
             (shift_px < SAME_POSITION_PX).then(|| (earlier.name.clone(), shift_px))
         });
@@ -176,13 +163,13 @@ pub fn reject_duplicates(board: &Board, looks: &mut Observations) {
     }
 }
 
-/// Whether two pictures show the board in one place.
+/// Whether two images show the board in one position.
 pub fn is_same_position(board: &Board, a: &[CornerObservation], b: &[CornerObservation]) -> bool {
     shift_px(board, a, b).is_some_and(|shift_px| shift_px < SAME_POSITION_PX)
 }
 
-/// Mean distance between the corners that two pictures share \[px\], whichever way
-/// round a symmetric board was counted. `None` without such corners.
+/// Mean distance between the corners that two images have in common \[px\]; of both orders of a
+/// symmetric board the smaller one. `None` without common corners.
 pub fn shift_px(board: &Board, a: &[CornerObservation], b: &[CornerObservation]) -> Option<f64> {
     let GridSize { columns, rows } = board.corners();
     let last = columns * rows - 1;

@@ -1,6 +1,6 @@
-//! Camera, bend of the board and places of the boards that fit the corners best:
-//! least squares over all of them together (bundle adjustment), by Levenberg's and
-//! Marquardt's method.
+//! Bundle adjustment: camera, bend of the board and poses of the boards that minimise the
+//! squared reprojection errors (Triggs et al. 2000, *Bundle adjustment – a modern synthesis*),
+//! by the Levenberg-Marquardt method with the poses eliminated from the normal equations.
 
 use nalgebra::{DVector, SMatrix, SVector};
 
@@ -8,59 +8,59 @@ use super::equations::{
     BoardPlacement, CameraModel, Correspondence, Equations, FreeParameters, SHARED,
 };
 use super::factor::{Elimination, Factor};
+use crate::numeric::levenberg_marquardt::Damping;
 
+/// Limit of accepted steps; a fit that needs more does not converge.
 const MAX_STEPS: usize = 100;
-/// Damping at first, as a share of each equation's own weight.
-const INITIAL_DAMPING: f64 = 1e-3;
-const MIN_DAMPING: f64 = 1e-12;
-/// Damping beyond which no step leads down any more.
+/// Damping beyond which steps are too short to lower the sum of squares.
 const MAX_DAMPING: f64 = 1e12;
-/// Share of the squares by which a step must lessen them for another one to be
-/// worth while.
+/// Smallest relative decrease of the sum of squares for which another step is taken: above the
+/// rounding of the sum.
 const MIN_RELATIVE_GAIN: f64 = 1e-13;
 
-/// What is roughly known before a fit.
+/// Initial values of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Guess {
     /// The camera and the board's bend.
     pub model: CameraModel,
-    /// Where the boards lie, in the order of the pictures.
+    /// Poses of the boards, in the order of the images.
     pub placements: Vec<BoardPlacement>,
 }
 
-/// What fits best.
+/// Result of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BundleFit {
     /// The camera and the board's bend.
     pub model: CameraModel,
-    /// Where the boards lie, in the order of the pictures.
+    /// Poses of the boards, in the order of the images.
     pub placements: Vec<BoardPlacement>,
-    /// Sum of the squares of what is left \[px²\].
+    /// Sum of the squared reprojection errors \[px²\].
     pub sum_of_squares_px2: f64,
 }
 
-/// A step of everything together.
+/// A step of all parameters.
 struct Step {
     shared: SVector<f64, SHARED>,
-    places: Vec<DVector<f64>>,
+    placements: Vec<DVector<f64>>,
 }
 
-/// Fits what is free to the boards that lie at each place, beginning with what is
-/// roughly known. `None` where a board is behind the camera from the start, or a
-/// number never becomes finite.
+/// Fits the free parameters to the corners of the boards, a list of boards for each placement.
+/// `None` where a board of the initial guess is behind the camera, or a parameter is not
+/// finite.
 pub fn fit(
     start: Guess,
     free: FreeParameters,
     boards: &[Vec<Vec<Correspondence>>],
 ) -> Option<BundleFit> {
-    let Guess { model, placements: places } = start;
-    let squares_px2 = sum_of_squares_px2(&model, &places, boards)?;
-    let mut best = BundleFit { model, placements: places, sum_of_squares_px2: squares_px2 };
-    let mut damping = INITIAL_DAMPING;
+    let Guess { model, placements } = start;
+    let sum_of_squares_px2 = sum_of_squares_px2(&model, &placements, boards)?;
+    let mut best = BundleFit { model, placements, sum_of_squares_px2 };
+    let mut damping = Damping::up_to(MAX_DAMPING);
     for _ in 0..MAX_STEPS {
         let equations = equations(&best, free, boards)?;
-        let (next, is_last) = descend(&best, free, &equations, boards, &mut damping);
-        let Some(next) = next else { break };
+        let Some((next, is_last)) = descend(&best, free, &equations, boards, &mut damping) else {
+            break;
+        };
         best = next;
         if is_last {
             break;
@@ -69,49 +69,35 @@ pub fn fit(
     best.model.camera.numbers().iter().all(|number| number.is_finite()).then_some(best)
 }
 
-/// The next better fit, and whether it is as good as the last; `None` where no step
-/// leads down.
+/// The next better fit, and whether its gain is negligible; `None` where no step lowers the sum
+/// of squares.
 fn descend(
     from: &BundleFit,
     free: FreeParameters,
     equations: &[Equations],
     boards: &[Vec<Vec<Correspondence>>],
-    damping: &mut f64,
-) -> (Option<BundleFit>, bool) {
-    while *damping < MAX_DAMPING {
-        let tried = step(equations, free, *damping).and_then(|step| {
-            let model = from.model.moved(&step.shared);
-            let places: Vec<BoardPlacement> = from
-                .placements
-                .iter()
-                .zip(&step.places)
-                .map(|(place, by)| place.moved(by))
-                .collect();
-            let squares_px2 = sum_of_squares_px2(&model, &places, boards)?;
-            (squares_px2 <= from.sum_of_squares_px2).then_some(BundleFit {
-                model,
-                placements: places,
-                sum_of_squares_px2: squares_px2,
-            })
-        });
-        if let Some(found) = tried {
-            let is_last = from.sum_of_squares_px2 - found.sum_of_squares_px2
-                <= MIN_RELATIVE_GAIN * from.sum_of_squares_px2;
-            *damping = (*damping * 0.1).max(MIN_DAMPING);
-            return (Some(found), is_last);
-        }
-        *damping *= 10.0;
-    }
-    (None, true)
+    damping: &mut Damping,
+) -> Option<(BundleFit, bool)> {
+    let next = damping.descend(usize::MAX, |damping| {
+        let step = step(equations, free, damping)?;
+        let model = from.model.moved(&step.shared);
+        let moved = from.placements.iter().zip(&step.placements).map(|(one, by)| one.moved(by));
+        let placements: Vec<BoardPlacement> = moved.collect();
+        let sum_of_squares_px2 = sum_of_squares_px2(&model, &placements, boards)?;
+        let is_lower = sum_of_squares_px2 <= from.sum_of_squares_px2;
+        is_lower.then_some(BundleFit { model, placements, sum_of_squares_px2 })
+    })?;
+    let gain_px2 = from.sum_of_squares_px2 - next.sum_of_squares_px2;
+    Some((next, gain_px2 <= MIN_RELATIVE_GAIN * from.sum_of_squares_px2))
 }
 
 fn sum_of_squares_px2(
     model: &CameraModel,
-    places: &[BoardPlacement],
+    placements: &[BoardPlacement],
     boards: &[Vec<Vec<Correspondence>>],
 ) -> Option<f64> {
-    let each =
-        places.iter().zip(boards).map(|(place, boards)| model.sum_of_squares_px2(place, boards));
+    let each = placements.iter().zip(boards);
+    let each = each.map(|(placement, boards)| model.sum_of_squares_px2(placement, boards));
     each.sum::<Option<f64>>().filter(|squares| squares.is_finite())
 }
 
@@ -121,10 +107,10 @@ fn equations(
     boards: &[Vec<Vec<Correspondence>>],
 ) -> Option<Vec<Equations>> {
     let each = at.placements.iter().zip(boards);
-    each.map(|(place, boards)| Equations::of(&at.model, free, place, boards)).collect()
+    each.map(|(position, boards)| Equations::of(&at.model, free, position, boards)).collect()
 }
 
-/// Solves the damped equations, the places eliminated first.
+/// Solves the damped equations, with the placements eliminated.
 fn step(equations: &[Equations], free: FreeParameters, damping: f64) -> Option<Step> {
     let mut left = SMatrix::<f64, SHARED, SHARED>::zeros();
     let mut side = SVector::<f64, SHARED>::zeros();
@@ -146,7 +132,7 @@ fn step(equations: &[Equations], free: FreeParameters, damping: f64) -> Option<S
         for i in 0..SHARED {
             let own: f64 = equations.iter().map(|one| one.shared[(i, i)]).sum();
             left[(i, i)] += damping * own;
-            // What is not free is told by nothing, whatever rounding leaves of it.
+            // Rows of fixed parameters hold rounding errors only.
             if !free.has(i) {
                 left[(i, i)] = 0.0;
             }
@@ -155,13 +141,10 @@ fn step(equations: &[Equations], free: FreeParameters, damping: f64) -> Option<S
         as_shared(&shared)
     };
     let along = DVector::from_column_slice(shared.as_slice());
-    let places = eliminated
-        .iter()
-        .map(|(elimination, damped)| {
-            elimination.placement.solve(&(&damped.placement_side - &damped.both * &along))
-        })
-        .collect();
-    Some(Step { shared, places })
+    let placement = |(elimination, damped): &(Elimination, Equations)| {
+        elimination.placement.solve(&(&damped.placement_side - &damped.both * &along))
+    };
+    Some(Step { shared, placements: eliminated.iter().map(placement).collect() })
 }
 
 fn as_shared(vector: &DVector<f64>) -> SVector<f64, SHARED> {

@@ -1,5 +1,5 @@
-//! Finds a board by the markers in its white squares: all of it need not be in the
-//! picture, and which way round it lies is known.
+//! Finds a board by the markers in its white squares: part of it may be outside the image, and
+//! its orientation is known.
 
 mod error;
 mod layout;
@@ -12,56 +12,58 @@ use super::board::{Board, Markers};
 use super::dictionary::Dictionary;
 use super::grey::GreyImage;
 use super::homography::homography;
-use super::marker;
-use super::marker::Marker;
+use super::marker::{self, Marker};
 use crate::bridge::{self, BridgeError};
 use crate::core::frame::Frame;
 use crate::core::geometry::{GridSize, ImagePoint};
+use crate::numeric::number::to_f64;
 use crate::numeric::rank;
 use layout::MarkerGrid;
 
-/// How far a marker's corner may be off its place, over the side of a square.
+/// Largest distance of a marker's corner from its predicted position, over the side of a
+/// square. A choice: well below half a square, so that no neighbour is mistaken for it.
 const MAX_CORNER_ERROR: f64 = 0.3;
-/// Pairs of markers from which the board's plane is guessed.
+/// Pairs of markers from which a homography of the board is estimated. A choice between time
+/// and the chance that no pair is free of errors.
 const MAX_PAIRS: usize = 400;
-/// The same where many counts of columns are tried.
+/// The same where many numbers of columns are tried.
 const MAX_PAIRS_PER_COUNT: usize = 60;
-/// Markers beside a place from which the picture of the place is foretold: few, so that
-/// the lens does not bend what lies between them.
+/// Markers next to a position by which it is predicted: few, so that the distortion between
+/// them is small.
 const NEIGHBOURS: usize = 4;
-/// A corner that is this far from the middle of a marker, over the side of a square, or
-/// nearer lies beside its square.
+/// A corner at most this far from the middle of a marker, over the side of a square, belongs to
+/// its square. Derived: the corners of a square are √½ = 0.71 from its middle.
 const MAX_BESIDE_DISTANCE: f64 = 0.75;
-/// How far beyond the markers that were seen corners are foretold.
+/// Corners are predicted up to this distance from the nearest marker, in squares.
 const MAX_EXTRAPOLATION: f64 = 2.3;
-/// Markers that must fit for a board to be one.
+/// Markers that must fit a board.
 const MIN_MARKERS: usize = 3;
-/// Share of the markers that must fit; the others are taken for something else.
+/// Fraction of the markers that must fit; the others are false detections.
 const MIN_FIT_FRACTION: f64 = 0.7;
-/// How far the size of the markers may be off what was told.
+/// Relative tolerance for the size of the markers.
 const SIZE_TOLERANCE: f64 = 0.12;
-/// The same \[px\]: a threshold takes up to a pixel off either side.
+/// The same \[px\]: thresholding takes up to a pixel off either side.
 const SIZE_TOLERANCE_PX: f64 = 3.0;
-/// Markers that tell their size.
+/// Markers from which their size is checked.
 const MIN_SIZE_MARKERS: usize = 8;
-/// Markers of other dictionaries are looked for among so many of each: the more there
-/// are, the more often something else passes for one.
+/// Markers of other dictionaries that are searched for: the more there are, the more false
+/// detections.
 const MARKERS_PER_DICTIONARY: usize = 250;
-/// Columns of inner corners that are tried where the markers do not fit.
+/// Numbers of inner corners along a row that are tried where the markers do not fit.
 const COLUMN_COUNTS: std::ops::RangeInclusive<usize> = 3..=40;
 
-/// The inner corners of a board with markers \[px\], to about a pixel.
+/// Predicted inner corners of a board with markers \[px\], to about a pixel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpectedCorners {
-    /// Where they should be, row by row; `None` far from every marker that was read.
+    /// Predicted positions, row by row; `None` far from every marker that was read.
     pub expected: Vec<Option<ImagePoint>>,
-    /// Which of them lie beside a square whose marker was read.
+    /// Whether a corner belongs to a square whose marker was read.
     pub is_beside: Vec<bool>,
-    /// Whether the upper left square, or else the one beside it, has a marker.
+    /// Whether the upper left square has a marker; otherwise its neighbour has one.
     pub first_has_marker: bool,
 }
 
-/// A marker and where it is on the board, in squares.
+/// A marker and its position on the board, in squares.
 #[derive(Debug, Clone, Copy)]
 struct PlacedMarker {
     on_board: [Point2<f64>; 4],
@@ -77,7 +79,7 @@ impl PlacedMarker {
         self.on_board.into_iter().zip(self.marker.corners)
     }
 
-    /// Largest distance of a corner from where the map puts it, over the side of a
+    /// Largest distance of a corner from its position under a homography, over the side of a
     /// square.
     fn off(&self, map: &Matrix3<f64>, clear: f64) -> f64 {
         let square_px = self.marker.side_px() / (1.0 - 2.0 * clear);
@@ -96,7 +98,7 @@ fn map_of<'a>(placed: impl Iterator<Item = &'a PlacedMarker>) -> Option<Matrix3<
     homography(&placed.flat_map(PlacedMarker::pairs).collect::<Vec<_>>())
 }
 
-/// Finds the board, and says what is wrong where it is not found.
+/// Finds the board, or the reason why it is not found.
 pub fn find(
     board: &Board,
     marks: Markers,
@@ -107,7 +109,7 @@ pub fn find(
     Ok(among(board, marks, &grey, &quads))
 }
 
-/// Whether a board with markers of some kind shows.
+/// Whether the image shows a board with markers of any dictionary.
 pub fn shows(frame: &Frame) -> Result<bool, BridgeError> {
     let quads = bridge::find_quads(frame)?;
     let grey = GreyImage::of(frame);
@@ -123,14 +125,11 @@ fn among(
     let (dictionary, clear) = (marks.dictionary, board.marker_margin());
     let count = MarkerGrid::count(board);
     let markers = marker::read_all(grey, quads, dictionary, count);
-    let (fitting, layout) = [false, true]
-        .map(|first| {
-            let layout = MarkerGrid::of(board, first);
-            (fitting(&layout, &markers, clear, MAX_PAIRS), layout)
-        })
-        .into_iter()
-        .reduce(|a, b| if b.0.len() > a.0.len() { b } else { a })
-        .unwrap_or_else(|| (Vec::new(), MarkerGrid::of(board, false)));
+    let [a, b] = [false, true].map(|first| {
+        let layout = MarkerGrid::of(board, first);
+        (fitting(&layout, &markers, clear, MAX_PAIRS), layout)
+    });
+    let (fitting, layout) = if b.0.len() > a.0.len() { b } else { a };
     if fitting.len() < MIN_MARKERS || fraction(fitting.len(), markers.len()) < MIN_FIT_FRACTION {
         return Err(reason(board, dictionary, grey, quads, fitting.len(), markers.len()));
     }
@@ -138,31 +137,29 @@ fn among(
     Ok(predict_corners(board, &fitting, layout.first_has_marker))
 }
 
-#[expect(clippy::cast_precision_loss, reason = "a count of markers")]
 fn fraction(part: usize, of: usize) -> f64 {
-    part as f64 / of.max(1) as f64
+    to_f64(part) / to_f64(of.max(1))
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small share")]
-fn percent(share: f64) -> u32 {
-    (100.0 * share).round().clamp(0.0, 1e6) as u32
+fn percent(fraction: f64) -> u32 {
+    (100.0 * fraction).round().clamp(0.0, 1e6) as u32
 }
 
-/// The markers that lie on one board: the most that two of them agree on, of so many
-/// pairs, and those that fit their neighbours.
+/// The markers that lie on one board: the largest consensus set of all pairs (as RANSAC,
+/// Fischler and Bolles 1981, but with pairs in a fixed order), and then those that fit their
+/// neighbours.
 fn fitting(
     layout: &MarkerGrid,
     markers: &[Marker],
     clear: f64,
     max_pairs: usize,
 ) -> Vec<PlacedMarker> {
-    let placed: Vec<PlacedMarker> = markers
-        .iter()
-        .filter_map(|&marker| {
-            Some(PlacedMarker { on_board: layout.corners(marker.number, clear)?, marker })
-        })
-        .collect();
-    // By their distance in the list, so that none is in most of the pairs.
+    let position = |&marker: &Marker| {
+        Some(PlacedMarker { on_board: layout.corners(marker.number, clear)?, marker })
+    };
+    let placed: Vec<PlacedMarker> = markers.iter().filter_map(position).collect();
+    // Pairs by their distance in the list, so that no marker is in most of the pairs.
     let count = placed.len();
     let pairs = (1..count).flat_map(|apart| (0..count - apart).map(move |i| (i, i + apart)));
     let fits =
@@ -173,16 +170,15 @@ fn fitting(
         .map(|map| placed.iter().map(|marker| fits(&map, marker)).collect::<Vec<bool>>())
         .max_by_key(|fits| fits.iter().filter(|&&fit| fit).count());
     let mut is_in = best.unwrap_or_else(|| vec![false; placed.len()]);
-    // What the lens bends away is reached from one marker to the next.
+    // Distortion makes distant markers miss the homography; they are reached over their
+    // neighbours.
     loop {
         let inside: Vec<PlacedMarker> = chosen(&placed, &is_in);
-        let more: Vec<usize> = (0..placed.len())
-            .filter(|&i| !is_in[i])
-            .filter(|&i| {
-                let near = nearest(&inside, placed[i].middle(), NEIGHBOURS);
-                map_of(near.iter()).is_some_and(|map| fits(&map, &placed[i]))
-            })
-            .collect();
+        let joins = |i: &usize| {
+            let near = nearest(&inside, placed[*i].middle(), NEIGHBOURS);
+            map_of(near.iter()).is_some_and(|map| fits(&map, &placed[*i]))
+        };
+        let more: Vec<usize> = (0..placed.len()).filter(|&i| !is_in[i]).filter(joins).collect();
         if inside.len() < 2 || more.is_empty() {
             return inside;
         }
@@ -196,7 +192,7 @@ fn chosen(placed: &[PlacedMarker], is_in: &[bool]) -> Vec<PlacedMarker> {
     placed.iter().zip(is_in).filter(|(_, is_in)| **is_in).map(|(placed, _)| *placed).collect()
 }
 
-/// The markers that are nearest to a place on the board, nearest first.
+/// The markers nearest to a position on the board, nearest first.
 fn nearest(placed: &[PlacedMarker], at: Point2<f64>, count: usize) -> Vec<PlacedMarker> {
     let mut sorted = placed.to_vec();
     let distance = |placed: &PlacedMarker| (placed.middle() - at).norm_squared();
@@ -205,14 +201,13 @@ fn nearest(placed: &[PlacedMarker], at: Point2<f64>, count: usize) -> Vec<Placed
     sorted
 }
 
-/// Refuses markers of another size than was told, where there are enough of them to tell.
+/// Rejects markers of another size than specified, if there are enough of them.
 fn check_size(placed: &[PlacedMarker], clear: f64) -> Result<(), MarkerError> {
     let expected = 1.0 - 2.0 * clear;
     let Some(found) = size(placed, clear).filter(|_| placed.len() >= MIN_SIZE_MARKERS) else {
         return Ok(());
     };
-    let mut sides: Vec<f64> = placed.iter().map(|one| one.marker.side_px()).collect();
-    let side_px = rank::median(&mut sides).unwrap_or(0.0);
+    let side_px = rank::median_of(placed.iter().map(|one| one.marker.side_px())).unwrap_or(0.0);
     let off = (found / expected - 1.0).abs();
     if off > SIZE_TOLERANCE && off * side_px > SIZE_TOLERANCE_PX {
         let (found_percent, expected_percent) = (percent(found), percent(expected));
@@ -221,8 +216,7 @@ fn check_size(placed: &[PlacedMarker], clear: f64) -> Result<(), MarkerError> {
     Ok(())
 }
 
-/// Side of the markers over that of a square, where the markers' middles tell the
-/// squares.
+/// Side of the markers over that of a square, with the squares from the middles of the markers.
 fn size(placed: &[PlacedMarker], clear: f64) -> Option<f64> {
     let ratio = |one: &PlacedMarker| {
         let near = nearest(placed, one.middle(), NEIGHBOURS + 1);
@@ -235,12 +229,11 @@ fn size(placed: &[PlacedMarker], clear: f64) -> Option<f64> {
         let expected = sides.sum::<Option<f64>>()? / 4.0;
         Some(one.marker.side_px() / expected)
     };
-    let mut ratios: Vec<f64> = placed.iter().filter_map(ratio).filter(|r| r.is_finite()).collect();
-    Some(rank::median(&mut ratios)? * (1.0 - 2.0 * clear))
+    let ratios = placed.iter().filter_map(ratio).filter(|ratio| ratio.is_finite());
+    Some(rank::median_of(ratios)? * (1.0 - 2.0 * clear))
 }
 
-/// Where the board's corners should be by the markers about them.
-#[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
+/// Positions of the board's corners by the markers next to them.
 fn predict_corners(
     board: &Board,
     placed: &[PlacedMarker],
@@ -249,7 +242,7 @@ fn predict_corners(
     let GridSize { columns, rows } = board.corners();
     let (mut expected, mut is_beside) = (Vec::new(), Vec::new());
     for i in 0..columns * rows {
-        let at = Point2::new((i % columns) as f64 + 1.0, (i / columns) as f64 + 1.0);
+        let at = Point2::new(to_f64(i % columns) + 1.0, to_f64(i / columns) + 1.0);
         let near = nearest(placed, at, NEIGHBOURS);
         let distance = near.first().map_or(f64::INFINITY, |first| (first.middle() - at).norm());
         let px = (distance < MAX_EXTRAPOLATION).then(|| map_of(near.iter())).flatten();
@@ -259,7 +252,7 @@ fn predict_corners(
     ExpectedCorners { expected, is_beside, first_has_marker }
 }
 
-/// What is wrong where the markers that were told do not make a board.
+/// Why markers of the specified dictionary do not form the board.
 fn reason(
     board: &Board,
     dictionary: Dictionary,
@@ -272,12 +265,8 @@ fn reason(
     if is_board(&marker::mirrored(quads), dictionary) {
         return MarkerError::Mirrored;
     }
-    let markers = marker::read_all(
-        grey,
-        quads,
-        dictionary,
-        MARKERS_PER_DICTIONARY.max(MarkerGrid::count(board)),
-    );
+    let count = MARKERS_PER_DICTIONARY.max(MarkerGrid::count(board));
+    let markers = marker::read_all(grey, quads, dictionary, count);
     let meant = columns_of(&markers, board.marker_margin());
     let expected = board.corners();
     if meant.is_some() || fit >= MIN_MARKERS {
@@ -291,13 +280,13 @@ fn reason(
     }
 }
 
-/// Whether markers of a dictionary show in the order of any board.
+/// Whether markers of a dictionary are in the order of any board.
 fn is_board(grey: &GreyImage<'_>, quads: &[[ImagePoint; 4]], dictionary: Dictionary) -> bool {
     let markers = marker::read_all(grey, quads, dictionary, MARKERS_PER_DICTIONARY);
     columns_of(&markers, 0.15).is_some()
 }
 
-/// Inner corners along a row of a board that markers fit.
+/// Number of inner corners along a row of the board that the markers fit.
 fn columns_of(markers: &[Marker], clear: f64) -> Option<usize> {
     let fits = |columns: usize| {
         let both = [false, true].map(|first_has_marker| {
@@ -306,7 +295,7 @@ fn columns_of(markers: &[Marker], clear: f64) -> Option<usize> {
         });
         both[0].max(both[1])
     };
-    // More than a row of them, which fits boards of any length.
+    // More than one row, because a single row fits boards of any number of rows.
     let is_enough = |columns: usize, fit: usize| {
         fit > MIN_MARKERS.max(columns.div_ceil(2))
             && fraction(fit, markers.len()) >= MIN_FIT_FRACTION

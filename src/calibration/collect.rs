@@ -1,22 +1,22 @@
-//! Which of a camera's pictures are kept while a board is held before it: the first one
-//! with the board lying still on the bed, then one of every place in which it is held.
+//! Selects images while a board is held before a camera: first one with the board at rest on
+//! the bed, then one for every new pose of the board.
 
 use super::board::Board;
 use super::board_observation::{BoardObservation, shift_px};
 use super::rejection::BoardRejection;
 
-/// Looks in a row in which the board must lie still for the bed, and how far it may seem
-/// to move from one to the next \[px\].
+/// Consecutive frames in which the board must be at rest on the bed, and its largest shift
+/// between two of them \[px\]. A choice between waiting time and blur.
 const BED_FRAMES: usize = 5;
 const BED_STILL_PX: f64 = 0.5;
-/// The same of a board that is held by hand.
+/// The same for a board that is held by hand.
 const HELD_FRAMES: usize = 2;
 const HELD_STILL_PX: f64 = 2.0;
-/// Mean shift of the corners against every picture that was kept from which on a place
-/// is a new one, as a share of the picture's width.
+/// Mean shift of the corners against every kept image from which a pose is new, as a fraction
+/// of the image width. A choice between many similar images and few different ones.
 const NEW_POSITION_SHIFT: f64 = 0.04;
 
-/// Takes what a camera sees, look by look.
+/// Decides frame by frame which images are kept.
 #[derive(Debug, Clone)]
 pub struct Collector {
     board: Board,
@@ -25,69 +25,66 @@ pub struct Collector {
     still: usize,
 }
 
-/// What is done with a look.
+/// Decision on a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Decision {
-    /// It is kept, as the picture with this number, counted from 1.
+    /// Kept, as the image with this number, counted from 1.
     Kept(usize),
-    /// The board has moved since the last look.
+    /// The board has moved since the last frame.
     Moving,
-    /// It lies still, but not yet long enough.
+    /// The board is at rest, but not long enough.
     Waiting,
-    /// It is where it was in the picture with this number.
+    /// The board is in the same pose as in the image with this number.
     Known(usize),
-    /// The size of the picture is another one.
+    /// The image has another size.
     OtherSize,
-    /// No board is seen, or it cannot be used.
+    /// No board was found, or it cannot be used.
     Refused(BoardRejection),
 }
 
 impl Collector {
-    /// Without a picture.
+    /// Without a image.
     pub fn new(board: Board) -> Self {
         Self { board, kept: Vec::new(), last: None, still: 0 }
     }
 
-    /// The pictures that were kept; the first shows the board on the bed.
+    /// The kept images; the first shows the board on the bed.
     pub fn kept(&self) -> &[BoardObservation] {
         &self.kept
     }
 
-    /// Decides on the next look.
-    pub fn add(&mut self, look: Result<BoardObservation, BoardRejection>) -> Decision {
-        let now = match look {
+    /// Decides on the next frame.
+    pub fn add(&mut self, observation: Result<BoardObservation, BoardRejection>) -> Decision {
+        let now = match observation {
             Ok(now) => now,
             Err(refusal) => {
                 (self.last, self.still) = (None, 0);
                 return Decision::Refused(refusal);
             }
         };
-        let (most_px, looks) = if self.kept.is_empty() {
+        let (max_px, frames) = if self.kept.is_empty() {
             (BED_STILL_PX, BED_FRAMES)
         } else {
             (HELD_STILL_PX, HELD_FRAMES)
         };
         let shift = self.last.as_ref().and_then(|last| self.shift_px(last, &now));
         self.last = Some(now.clone());
-        self.still = if shift.is_some_and(|px| px <= most_px) { self.still + 1 } else { 1 };
+        let is_still = shift.is_some_and(|px| px <= max_px);
+        self.still = if is_still { self.still + 1 } else { 1 };
         if self.kept.first().is_some_and(|first| first.image_size_px != now.image_size_px) {
             return Decision::OtherSize;
         }
         if let Some(known) = self.position_of(&now) {
             return Decision::Known(known);
         }
-        if self.still < looks {
-            return if shift.is_some_and(|px| px <= most_px) {
-                Decision::Waiting
-            } else {
-                Decision::Moving
-            };
+        if self.still < frames {
+            return if is_still { Decision::Waiting } else { Decision::Moving };
         }
         self.kept.push(now);
         Decision::Kept(self.kept.len())
     }
 
-    /// Gives the picture that was kept last its name.
+    /// Sets the name of the image that was kept last.
     pub fn name_last(&mut self, name: &str) {
         if let Some(last) = self.kept.last_mut() {
             name.clone_into(&mut last.name);
@@ -109,8 +106,7 @@ impl Collector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::synthetic;
-    use crate::calibration::synthetic::{board, poses};
+    use crate::calibration::synthetic::{self, board, poses};
     use crate::core::geometry::Pose;
     use nalgebra::Vector3;
 
@@ -144,7 +140,7 @@ mod tests {
             let pose = moved(&poses()[0], f64::from(step));
             assert_eq!(seen(&mut collector, &pose), Decision::Moving);
         }
-        let refusal = BoardRejection::NoBoard { columns: 9, rows: 6 };
+        let refusal = BoardRejection::NoBoard(crate::core::geometry::GridSize::new(9, 6));
         for _ in 0..4 {
             assert!(!matches!(seen(&mut collector, &poses()[0]), Decision::Kept(_)));
         }

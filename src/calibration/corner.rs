@@ -1,6 +1,6 @@
-//! The place of a board's corner, from all pixels around it: two blurred lines that
-//! cross, between which the grey values are fitted by least squares. With pixels that
-//! are off by chance no method finds it better.
+//! The position of a board's corner from all pixels around it: two crossing blurred lines, with
+//! the grey values between them fitted by least squares. For independent pixel noise no
+//! unbiased estimate has a smaller variance.
 
 mod shape;
 mod window;
@@ -11,27 +11,31 @@ use super::board::Board;
 use super::grey::GreyImage;
 use crate::core::geometry::{GridSize, ImagePoint, Size};
 use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::{to_count, to_f64};
 use shape::{CornerPixel, CornerShape, CornerSums, PARAMETERS};
 use window::{BoardLine, CornerWindow, Marked};
 
+/// Limit of trial steps, accepted or not.
 const MAX_STEPS: usize = 25;
-/// Damping at first, as a share of each equation's own weight.
+/// Damping at first, relative to the diagonal of the normal equations (Marquardt 1963).
 const INITIAL_DAMPING: f64 = 1e-3;
-/// Damping beyond which no step leads down any more.
+/// Damping beyond which steps are too short to lower the sum of squares.
 const MAX_DAMPING: f64 = 1e3;
-/// Step of the place at which it is found \[px\].
+/// Step of the position below which a fit has converged \[px\]. A choice: well below the noise
+/// of a corner.
 const CONVERGED_PX: f64 = 3e-4;
-/// How far the fit may go from where the corner was roughly seen, over the window.
+/// Largest distance of the fit from the rough corner, over the radius of the window.
 const MAX_SHIFT: f64 = 0.7;
+/// Initial standard deviation of the blur \[px\].
 const FIRST_BLUR_PX: f64 = 1.0;
-/// Half the contrast of a corner that is there \[grey levels\], and what it may leave of
-/// the pixels over it (RMS).
+/// Smallest half contrast of a corner that is present \[grey levels\], and largest RMS residual
+/// over half the contrast.
 const MIN_HALF_CONTRAST: f64 = 10.0;
 const MAX_RESIDUAL: f64 = 0.3;
 
-/// Refines the corners of a board, given row by row as far as they were seen. `None` is
-/// one whose surroundings do not fit, or leave the picture. Where white squares have
-/// markers, `first_has_marker` tells which are white, and their markers are left out.
+/// Refines the corners of a board, given row by row as far as they were found. `None` for a
+/// corner whose surroundings do not fit the model or leave the image. With markers in the white
+/// squares, `first_has_marker` says which squares are white; the markers are masked out.
 pub fn refine(
     board: &Board,
     grey: &GreyImage<'_>,
@@ -43,8 +47,7 @@ pub fn refine(
         return vec![None; rough.len()];
     }
     let pass = Pass { board, grey, table: &StepTable::default(), first_has_marker };
-    // How much the lens bends the lines is seen from where their corners are, and that
-    // only once these are known well.
+    // The curvature of the lines follows from the corners, once these are known well.
     let straight = pass.run(rough, rough, false);
     pass.run(&straight, rough, true)
 }
@@ -58,7 +61,7 @@ struct Pass<'a> {
 }
 
 impl Pass<'_> {
-    /// From places that are known, or else roughly known.
+    /// From positions that are known, or else roughly known.
     fn run(
         &self,
         known: &[Option<ImagePoint>],
@@ -66,12 +69,12 @@ impl Pass<'_> {
         is_bent: bool,
     ) -> Vec<Option<ImagePoint>> {
         let GridSize { columns, rows } = self.board.corners();
-        let place = |index: usize| known[index].or(rough[index]);
+        let position = |index: usize| known[index].or(rough[index]);
         let refined = |index: usize| {
             let (column, row) = (index % columns, index / columns);
             let lines = [
-                BoardLine::along(column, columns, |i| place(row * columns + i))?,
-                BoardLine::along(row, rows, |i| place(i * columns + column))?,
+                BoardLine::along(column, columns, |i| position(row * columns + i))?,
+                BoardLine::along(row, rows, |i| position(i * columns + column))?,
             ];
             let lines =
                 if is_bent { lines } else { lines.map(|line| BoardLine { bend: 0.0, ..line }) };
@@ -84,13 +87,13 @@ impl Pass<'_> {
                 clear: self.board.marker_margin(),
                 marked,
             };
-            refined(self.grey, self.table, place(index)?, lines, &window)
+            refined(self.grey, self.table, position(index)?, lines, &window)
         };
         (0..known.len()).map(refined).collect()
     }
 }
 
-/// A corner whose lines run like these.
+/// A corner with lines of these directions.
 fn refined(
     grey: &GreyImage<'_>,
     table: &StepTable,
@@ -129,26 +132,19 @@ fn refined(
     (is_sound && shows(window, &corner, &sums, samples.len())).then(|| rough + corner.at)
 }
 
-/// Whether a corner that was not seen, but foretold by markers, is there: bright and
-/// dark are where they should be, and nothing lies over it.
-#[expect(clippy::cast_precision_loss, reason = "a count of pixels")]
+/// Whether a corner that was predicted by markers is present: bright and dark are on the right
+/// sides, and nothing occludes it.
 fn shows(window: &CornerWindow, corner: &CornerShape, sums: &CornerSums, count: usize) -> bool {
     let Some(marked) = window.marked else { return true };
     let half = corner.levels[1];
-    // White squares have the markers; the contrast is that of the squares across over
-    // those along.
+    // White squares have the markers. The contrast is that of the squares across over those
+    // along.
     let white = if marked == Marked::Across { half } else { -half };
-    white > MIN_HALF_CONTRAST && (sums.sum_of_squares / count as f64).sqrt() < MAX_RESIDUAL * white
+    white > MIN_HALF_CONTRAST && (sums.sum_of_squares / to_f64(count)).sqrt() < MAX_RESIDUAL * white
 }
 
-/// The pixels within a circle about a corner, without those that a marker disturbs;
-/// `None` where it leaves the picture.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "checked to lie in the picture"
-)]
+/// The pixels within a circle about a corner, without those that a marker disturbs; `None`
+/// where the circle leaves the image.
 fn samples(
     grey: &GreyImage<'_>,
     rough: ImagePoint,
@@ -156,16 +152,16 @@ fn samples(
 ) -> Option<Vec<CornerPixel>> {
     let Size { width, height } = grey.size();
     let radius = window.radius();
-    let inside = |at: f64, side: usize| at - radius >= 0.0 && at + radius <= side as f64 - 1.0;
+    let inside = |at: f64, side: usize| at - radius >= 0.0 && at + radius <= to_f64(side) - 1.0;
     if !inside(rough.x, width) || !inside(rough.y, height) {
         return None;
     }
-    let (from_x, to_x) = ((rough.x - radius).ceil() as usize, (rough.x + radius) as usize);
-    let (from_y, to_y) = ((rough.y - radius).ceil() as usize, (rough.y + radius) as usize);
+    let (from_x, to_x) = (to_count((rough.x - radius).ceil()), to_count(rough.x + radius));
+    let (from_y, to_y) = (to_count((rough.y - radius).ceil()), to_count(rough.y + radius));
     let mut samples = Vec::with_capacity((to_x - from_x + 1) * (to_y - from_y + 1));
     for y in from_y..=to_y {
         for x in from_x..=to_x {
-            let at = Vector2::new(x as f64 - rough.x, y as f64 - rough.y);
+            let at = Vector2::new(to_f64(x) - rough.x, to_f64(y) - rough.y);
             if at.norm() <= radius && window.is_clear(at) {
                 samples.push(CornerPixel { at, value: grey.pixel(x, y) });
             }
@@ -174,7 +170,8 @@ fn samples(
     Some(samples)
 }
 
-/// Lines along the board's sides; levels from the pixels on either side of them.
+/// Initial values: lines along the sides of the board, levels from the pixels on either side of
+/// them.
 fn start(samples: &[CornerPixel], lines: [BoardLine; 2]) -> Option<CornerShape> {
     let sides = lines.map(|line| line.side);
     let bends = lines.map(|line| line.bend);
@@ -185,9 +182,7 @@ fn start(samples: &[CornerPixel], lines: [BoardLine; 2]) -> Option<CornerShape> 
     };
     let mean = |of: bool| {
         let values = || samples.iter().filter(|s| sign(&s.at) == of).map(|s| s.value);
-        #[expect(clippy::cast_precision_loss, reason = "a count of pixels")]
-        let count = values().count() as f64;
-        values().sum::<f64>() / count
+        values().sum::<f64>() / to_f64(values().count())
     };
     let (same, other) = (mean(true), mean(false));
     let levels = [f64::midpoint(same, other), 0.5 * (same - other), 0.0, 0.0];

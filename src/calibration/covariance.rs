@@ -1,11 +1,10 @@
-//! How far a calibration may be off because the corners that it was found from
-//! are: the covariance of the fit, and what it leaves in a width.
+//! Covariance of a calibration due to the noise of its corners, and the resulting standard
+//! deviation of a width.
 //!
-//! The fit is one of least squares, over the numbers of the camera that are free,
-//! the bend of the board where it was fitted, and the pose of the board in each
-//! picture. To first order in the noise of the corners the covariance is the inverse
-//! of its normal equations (Triggs et al. 2000, *Bundle adjustment – a modern
-//! synthesis*, sections 6.1 and 8.1).
+//! The fit is one of least squares over the free parameters of the camera, the bend of the
+//! board where it is fitted, and the pose of the board in each image. To first order in the
+//! noise of the corners the covariance is the inverse of its normal equations (Triggs et al.
+//! 2000, *Bundle adjustment – a modern synthesis*, sections 6.1 and 8.1).
 
 use nalgebra::{DMatrix, DVector, Point3, SMatrix, SVector};
 
@@ -24,12 +23,12 @@ use super::{Calibration, SurfaceMap};
 use crate::core::geometry::{ImagePoint, Pose};
 use crate::core::units::Mm;
 
-/// Step of the central differences, as a share of a focal length, as an angle
-/// \[rad\] or as a share of the board's distance: small against the bend of the model
-/// and large against rounding.
+/// Step of the central differences, as a fraction of a focal length, as an angle \[rad\] or as
+/// a fraction of the distance of the board: small against the curvature of the model and large
+/// against rounding.
 const RELATIVE_STEP: f64 = 1e-4;
 
-/// What the noise of the corners leaves open in a calibration.
+/// Covariance of a calibration due to the noise of its corners.
 #[derive(Debug, Clone)]
 pub struct CalibrationCovariance {
     model: CameraModel,
@@ -40,29 +39,29 @@ pub struct CalibrationCovariance {
     on_bed: Vec<Vec<Correspondence>>,
     thickness: Mm,
     noise_variance_px2: f64,
-    /// What all pictures say of the shared numbers, their boards' poses being free.
+    /// Information of all images on the shared parameters, with the poses eliminated.
     left: SMatrix<f64, SHARED, SHARED>,
     of_shared: Factor,
     of_bed: Elimination,
 }
 
-/// A number that is read off a surface, and how it answers to the calibration.
+/// A number that is derived from a surface map, with its derivatives.
 #[derive(Debug, Clone)]
 pub struct DerivedValue {
     /// The number itself.
     pub value: f64,
-    /// With the shared numbers, the bed going where they take it.
+    /// Derivative with the shared parameters, the bed plane following them.
     slope: DVector<f64>,
-    /// Variance that the corners of the boards on the bed add, in units of their
-    /// noise's.
+    /// Variance from the corners of the boards on the bed, in units of the variance of a
+    /// corner.
     of_bed: f64,
 }
 
 impl CalibrationCovariance {
-    /// Of a solution and the boards that fixed the bed plane, and the height of their
-    /// faces above the bed. Their pictures may be among the solution's or taken
-    /// later; in both cases their poses were fitted to their own corners with the
-    /// solution's camera. `None` where the pictures do not settle the camera.
+    /// From a solution, the boards that fixed the bed plane, and the height of their faces
+    /// above the bed. The images of these boards may be among those of the solution or taken
+    /// later; in both cases their poses were fitted with the solution's camera. `None` where
+    /// the images do not determine the camera.
     pub fn of(board: &Board, solution: &Solution, on_bed: &OnBed, thickness: Mm) -> Option<Self> {
         let (model, free) = (solution.model, solution.free);
         let mut left = SMatrix::<f64, SHARED, SHARED>::zeros();
@@ -88,8 +87,8 @@ impl CalibrationCovariance {
         })
     }
 
-    /// The same if there were another image of a board, with as much noise.
-    /// `None` where the board would not be in front of the camera.
+    /// The same with another image of a board with as much noise. `None` where the board would
+    /// not be in front of the camera.
     pub fn with_another(&self, pose: &Pose, corners: &[Correspondence]) -> Option<Self> {
         let place = BoardPlacement::of_one(*pose);
         let more = eliminate(&self.model, self.free, &place, &[corners.to_vec()])?;
@@ -97,9 +96,9 @@ impl CalibrationCovariance {
         Some(Self { of_shared: Factor::of_shared(&left)?, left, ..self.clone() })
     }
 
-    /// The same if there were another board on the bed, whose picture takes part in
-    /// both fits: where it lies on the plane of the first. `None` where it would not be
-    /// in front of the camera.
+    /// The same with another board on the bed, whose image takes part in both fits; `lies` is
+    /// its position on the plane of the first. `None` where it would not be in front of the
+    /// camera.
     pub fn with_another_on_bed(&self, lies: [f64; 3], corners: &[Correspondence]) -> Option<Self> {
         let mut bed = self.bed.clone();
         bed.others.push(lies);
@@ -110,13 +109,13 @@ impl CalibrationCovariance {
         Some(Self { bed, on_bed, of_bed, ..self.with_another(&pose, corners)? })
     }
 
-    /// Where a further board would lie that is on the bed.
+    /// Pose of a further board on the bed.
     pub fn on_bed(&self, lies: [f64; 3]) -> Pose {
         let others = vec![lies];
         BoardPlacement { pose: self.bed.pose, others }.of_board(1)
     }
 
-    /// Size of the pictures \[px\].
+    /// Size of the images \[px\].
     pub fn image_size_px(&self) -> [u32; 2] {
         self.image_size_px
     }
@@ -131,7 +130,7 @@ impl CalibrationCovariance {
         self.thickness
     }
 
-    /// How far the camera is above the bed \[mm\].
+    /// Height of the camera above the bed \[mm\].
     pub fn camera_height_mm(&self) -> f64 {
         bed_from_board(&self.bed.pose, self.thickness).apply_inverse(Point3::origin()).z
     }
@@ -141,49 +140,48 @@ impl CalibrationCovariance {
         &self.model
     }
 
-    /// Distance of two points of a surface, seen at these pixels, and its
-    /// standard deviation \[mm\]. `None` off the surface.
+    /// Distance of two points of a surface that are seen at these pixels, and its standard
+    /// deviation \[mm\]. `None` off the surface.
     pub fn width_mm(&self, ends: [ImagePoint; 2], surface_height: Mm) -> Option<(f64, f64)> {
         let reading = self.width(ends, surface_height)?;
         Some((reading.value, self.sigma(&reading)))
     }
 
-    /// The same before the noise is known.
+    /// The same without the standard deviation, for reuse with other covariances.
     pub fn width(&self, ends: [ImagePoint; 2], surface_height: Mm) -> Option<DerivedValue> {
         let width = |map: &SurfaceMap| Some((map.to_mm(ends[1])? - map.to_mm(ends[0])?).norm());
         self.read(surface_height, width)
     }
 
-    /// The number of [`scale::single_scale`] and its standard deviation
-    /// \[mm/px\]. `None` where the middle of the picture does not see the
-    /// surface.
+    /// The scale of [`scale::single_scale`] and its standard deviation \[mm/px\]. `None` where
+    /// the middle of the image does not see the surface.
     pub fn mm_per_px(&self, surface_height: Mm) -> Option<(f64, f64)> {
         let reading =
             self.read(surface_height, |map| scale::in_the_middle(map, self.image_size_px))?;
         Some((reading.value, self.sigma(&reading)))
     }
 
-    /// Standard deviation of a number that was read.
+    /// Standard deviation of a derived value.
     pub fn sigma(&self, reading: &DerivedValue) -> f64 {
         let whitened = self.of_shared.whiten(&as_matrix(&reading.slope));
         (self.noise_variance_px2 * (whitened.norm_squared() + reading.of_bed)).sqrt()
     }
 
-    /// What is left open in camera and bed plane together.
+    /// Uncertainty of camera and bed plane together.
     pub fn uncertainty(&self) -> CalibrationUncertainty {
         self.joint(1.0)
     }
 
-    /// The same without what the noise of the bed's own corners adds: two cameras that see
-    /// the same board share that.
+    /// The same without the noise of the bed's own corners, which two cameras that see the same
+    /// board have in common.
     pub fn uncertainty_of_camera(&self) -> CalibrationUncertainty {
         self.joint(0.0)
     }
 
     /// With so many times the variance of the corners of the boards on the bed.
     ///
-    /// The bed's pose answers to the shared numbers s as b = −V⁻¹W·s, with V its own
-    /// equations and W those of both; its own corners add V⁻¹.
+    /// The bed's pose follows the shared parameters s as b = −V⁻¹W·s, with V its own normal
+    /// equations and W the mixed ones; its own corners add V⁻¹.
     fn joint(&self, own: f64) -> CalibrationUncertainty {
         let numbers = self.bed.numbers();
         let own_root = self.of_bed.placement.whiten(&DMatrix::identity(numbers, numbers));
@@ -197,7 +195,7 @@ impl CalibrationCovariance {
         let mut of_bed = joint.view_mut((NUMBERS, NUMBERS), (POSE, POSE));
         of_bed += pose.transpose() * pose * own;
         joint *= self.noise_variance_px2;
-        // From the board's origin to the bed's, about which the bed turns.
+        // The bed rotates about its own origin, not about that of the board.
         let face = &self.bed.pose;
         let bed = bed_from_board(face, self.thickness);
         let arm = bed.translation_mm() - face.translation_mm();
@@ -212,11 +210,11 @@ impl CalibrationCovariance {
         self.map(&self.model, &self.bed, surface_height)
     }
 
-    /// What is read off the map of a surface, and its slopes.
+    /// A number derived from a surface map, with its derivatives.
     ///
-    /// A camera that is off takes the bed along, because that was fitted with it, and
-    /// makes up for a part of the error: the slope with the shared numbers contains
-    /// how the bed follows them.
+    /// An error of the camera changes the bed plane, which was fitted with it, and so is partly
+    /// compensated: the derivative with the shared parameters contains how the bed follows
+    /// them.
     fn read(
         &self,
         surface_height: Mm,
@@ -224,29 +222,26 @@ impl CalibrationCovariance {
     ) -> Option<DerivedValue> {
         let with =
             |model: &CameraModel, bed: &BoardPlacement| read(&self.map(model, bed, surface_height));
+        let slope = |step: f64, at: &dyn Fn(f64) -> Option<f64>| {
+            Some((at(step)? - at(-step)?) / (2.0 * step))
+        };
         let mut of_shared = DVector::zeros(SHARED);
         for number in (0..SHARED).filter(|&number| self.free.has(number)) {
-            // Focal lengths and centre in pixels, all else in units of about one.
-            let step = if number < 4 {
-                RELATIVE_STEP * self.model.camera.focal_px[number % 2]
-            } else {
-                RELATIVE_STEP
-            };
-            let mut by = SVector::<f64, SHARED>::zeros();
-            by[number] = step;
-            let up = with(&self.model.moved(&by), &self.bed)?;
-            let down = with(&self.model.moved(&-by), &self.bed)?;
-            of_shared[number] = (up - down) / (2.0 * step);
+            // Focal lengths and centre are in pixels, all other parameters in units of about
+            // one.
+            let scale = if number < 4 { self.model.camera.focal_px[number % 2] } else { 1.0 };
+            let step = RELATIVE_STEP * scale;
+            let unit = SVector::<f64, SHARED>::from_fn(|i, _| f64::from(u8::from(i == number)));
+            of_shared[number] =
+                slope(step, &|by| with(&self.model.moved(&(unit * by)), &self.bed))?;
         }
         let mut of_bed = DVector::zeros(self.bed.numbers());
         let distance = self.bed.pose.translation_mm().norm();
         for number in 0..POSE {
             let step = if number < 3 { RELATIVE_STEP } else { RELATIVE_STEP * distance };
-            let mut by = DVector::zeros(self.bed.numbers());
-            by[number] = step;
-            let up = with(&self.model, &self.bed.moved(&by))?;
-            let down = with(&self.model, &self.bed.moved(&-by))?;
-            of_bed[number] = (up - down) / (2.0 * step);
+            let unit =
+                DVector::from_fn(self.bed.numbers(), |i, _| f64::from(u8::from(i == number)));
+            of_bed[number] = slope(step, &|by| with(&self.model, &self.bed.moved(&(&unit * by))))?;
         }
         let alone = self.of_bed.placement.whiten(&as_matrix(&of_bed));
         let slope = of_shared - self.of_bed.follows.transpose() * alone.column(0);

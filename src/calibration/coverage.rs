@@ -1,31 +1,31 @@
-//! Where boards were seen in the picture, and how they were tilted: what is missing there
-//! is a guess.
+//! Parts of the image in which boards were seen, and their tilts.
 
 use nalgebra::Vector3;
 
 use super::solve::{BoardView, Solution};
+use crate::numeric::number::{to_count, to_f64};
 
-/// The picture is cut into this many parts along each side.
+/// Parts of the image along each side. A choice: a board covers about one part.
 pub const GRID_SIDE: usize = 4;
-/// All of its parts.
+/// Number of parts.
 pub const PARTS: usize = GRID_SIDE * GRID_SIDE;
-/// Tilt about an axis of the picture from which on it counts \[degrees\].
+/// Tilt about an axis of the image from which a board counts as tilted \[degrees\].
 const MIN_TILT_DEG: f64 = 10.0;
 
-/// What pictures of boards show.
+/// Positions and tilts of the boards in all images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Coverage {
-    /// Whether a corner was seen in a part of the picture, row by row.
+    /// Whether a corner was seen in a part of the image, row by row.
     pub cells: [[bool; GRID_SIDE]; GRID_SIDE],
-    /// Boards of which one side was nearer to the camera, in the order of [`SIDES`].
+    /// Boards with one side nearer to the camera, in the order of [`SIDES`].
     pub tilts: [usize; 4],
 }
 
-/// The sides of a board that may be nearer to the camera, as they are in the picture.
+/// The sides of a board in the image.
 pub const SIDES: [&str; 4] = ["left", "right", "upper", "lower"];
 
 impl Coverage {
-    /// Of all pictures of a calibration.
+    /// Of all images of a calibration.
     pub fn of(solution: &Solution) -> Self {
         let mut tilts = [0; 4];
         for view in &solution.views {
@@ -36,19 +36,19 @@ impl Coverage {
         Self { cells: cells(solution), tilts }
     }
 
-    /// Parts of the picture where a corner was seen.
+    /// Number of parts of the image with a corner.
     pub fn count(&self) -> usize {
         self.cells.iter().flatten().filter(|&&cell| cell).count()
     }
 
-    /// Sides that no board had nearer to the camera.
+    /// Sides that were never the nearer one.
     pub fn missing_tilts(&self) -> Vec<&'static str> {
         let sides = SIDES.iter().zip(self.tilts);
         sides.filter(|(_, count)| *count == 0).map(|(side, _)| *side).collect()
     }
 }
 
-/// Which sides of a board are nearer to the camera than its middle, in the order of
+/// The sides of a board that are nearer to the camera than its middle, in the order of
 /// [`SIDES`].
 fn nearer(view: &BoardView) -> [bool; 4] {
     let normal = view.pose.rotation() * Vector3::z();
@@ -58,17 +58,9 @@ fn nearer(view: &BoardView) -> [bool; 4] {
     [tilted(-normal.x), tilted(normal.x), tilted(-normal.y), tilted(normal.y)]
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "an index into a handful of cells, clamped to them"
-)]
 fn cells(solution: &Solution) -> [[bool; GRID_SIDE]; GRID_SIDE] {
     let [width, height] = solution.image_size_px.map(f64::from);
-    let index = |at: f64, size: f64| {
-        (at / size * GRID_SIDE as f64).clamp(0.0, (GRID_SIDE - 1) as f64) as usize
-    };
+    let index = |at: f64, size: f64| to_count(at / size * to_f64(GRID_SIDE)).min(GRID_SIDE - 1);
     let mut seen = [[false; GRID_SIDE]; GRID_SIDE];
     for corner in solution.views.iter().flat_map(|view| &view.corners) {
         seen[index(corner.px.y, height)][index(corner.px.x, width)] = true;
@@ -101,11 +93,11 @@ mod tests {
             let depth = |at| view.pose.apply(at).z;
             let deg = |at: Point3<f64>| ((depth(-at) - depth(at)) / 2.0).asin().to_degrees();
             let (right, lower) = (deg(Point3::new(1.0, 0.0, 0.0)), deg(Point3::new(0.0, 1.0, 0.0)));
-            let told = nearer(&view);
-            for (is_so, deg) in told.into_iter().zip([-right, right, -lower, lower]) {
-                // The axes of the board are turned by 6 degrees against the picture's.
+            let reported = nearer(&view);
+            for (is_so, deg) in reported.into_iter().zip([-right, right, -lower, lower]) {
+                // The axes of the board are turned by 6 degrees against the image's.
                 if (deg - MIN_TILT_DEG).abs() > 3.0 {
-                    assert_eq!(is_so, deg > MIN_TILT_DEG, "{x} {y}: {told:?}");
+                    assert_eq!(is_so, deg > MIN_TILT_DEG, "{x} {y}: {reported:?}");
                 }
             }
         }

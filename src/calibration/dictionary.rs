@@ -1,10 +1,9 @@
-//! Dictionaries of `ArUco` markers: which cells of a marker are white. The codes are
-//! those that OpenCV gives out under the same names.
+//! Dictionaries of `ArUco` markers: the white cells of each marker. The codes are those of
+//! OpenCV's dictionaries of the same names.
 
 use std::sync::OnceLock;
 
-/// Markers of one size: so many cells along each side, and a black border of one cell
-/// around them.
+/// Markers of one size: so many cells along each side, within a black border of one cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dictionary {
     /// 4x4 cells.
@@ -28,11 +27,11 @@ const TEXTS: [&str; 4] = [
 impl Dictionary {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Four, Self::Five, Self::Six, Self::Seven];
-    /// Markers of each.
+    /// Markers of each dictionary. By definition of OpenCV's `DICT_4X4_1000` and the like.
     pub const MARKERS: usize = 1000;
 
-    /// The one that is meant by `4x4`, or by OpenCV's `DICT_4X4_50` and its kin: these
-    /// are the first markers of the same list.
+    /// The dictionary of a name such as `4x4`, or OpenCV's `DICT_4X4_50`: OpenCV's smaller
+    /// dictionaries are the first markers of the same list.
     pub fn named(text: &str) -> Option<Self> {
         let lower = text.trim().to_lowercase();
         let name = lower.strip_prefix("dict_").unwrap_or(&lower);
@@ -41,46 +40,26 @@ impl Dictionary {
         Self::ALL.into_iter().find(|known| known.name() == cells && is_known)
     }
 
-    /// As it is told on the command line.
+    /// Its name on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Four => "4x4",
-            Self::Five => "5x5",
-            Self::Six => "6x6",
-            Self::Seven => "7x7",
-        }
+        ["4x4", "5x5", "6x6", "7x7"][self as usize]
     }
 
     /// Cells of the code along each side.
     pub fn side(self) -> usize {
-        4 + self.number()
+        4 + self as usize
     }
 
-    fn number(self) -> usize {
-        match self {
-            Self::Four => 0,
-            Self::Five => 1,
-            Self::Six => 2,
-            Self::Seven => 3,
-        }
-    }
-
-    /// Cells that may be misread: so few that what is no marker hardly ever passes for
-    /// one.
+    /// Cells that may be misread, few enough for false detections to be rare.
     pub fn max_errors(self) -> u32 {
-        match self {
-            Self::Four => 0,
-            Self::Five => 1,
-            Self::Six => 2,
-            Self::Seven => 3,
-        }
+        self as u32
     }
 
-    /// The codes, by their markers' numbers; the upper left cell is the highest bit.
+    /// The codes by number; the upper left cell is the highest bit.
     pub fn codes(self) -> &'static [u64] {
         static CODES: [OnceLock<Vec<u64>>; 4] = [const { OnceLock::new() }; 4];
-        CODES[self.number()].get_or_init(|| {
-            let words = TEXTS[self.number()].split_whitespace();
+        CODES[self as usize].get_or_init(|| {
+            let words = TEXTS[self as usize].split_whitespace();
             words.map(|word| u64::from_str_radix(word, 16).unwrap_or_default()).collect()
         })
     }
@@ -122,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_told_in_both_ways() {
+    fn both_forms_of_a_name_are_known() {
         assert_eq!(Dictionary::named("4x4"), Some(Dictionary::Four));
         assert_eq!(Dictionary::named("DICT_6X6_250"), Some(Dictionary::Six));
         assert_eq!(Dictionary::named("5X5_1000"), Some(Dictionary::Five));

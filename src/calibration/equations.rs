@@ -1,8 +1,6 @@
-//! The normal equations of boards before a camera: how every corner's place in
-//! the picture answers to the camera, to the board's bend and to where the board
-//! lies, summed over the corners, with the poses eliminated (the Schur
-//! complement; Triggs et al. 2000, *Bundle adjustment – a modern synthesis*,
-//! section 6.1).
+//! Normal equations of boards before a camera: derivatives of the corners' positions with the
+//! camera, the bend of the board and the poses, summed over the corners (Triggs et al. 2000,
+//! *Bundle adjustment – a modern synthesis*, section 6.1).
 
 mod unknowns;
 
@@ -17,26 +15,25 @@ use super::camera::{NUMBERS, Projection};
 use crate::core::geometry::Pose;
 
 const PLACEMENT_PARAMETERS: usize = POSE + ON_PLANE;
-/// The equations of one place; the right-hand sides are those of what is left
-/// between seen and expected.
+/// Normal equations of one placement, with the reprojection errors on the right-hand side.
 #[derive(Debug, Clone)]
 pub struct Equations {
-    /// Of what all pictures share.
+    /// Block of the shared parameters.
     pub shared: SMatrix<f64, SHARED, SHARED>,
-    /// Right-hand side for it.
+    /// Right-hand side of the shared parameters.
     pub shared_side: SVector<f64, SHARED>,
-    /// Of the place alone.
+    /// Block of the placement.
     pub placement: DMatrix<f64>,
-    /// Right-hand side for it.
+    /// Right-hand side of the placement.
     pub placement_side: DVector<f64>,
-    /// Of place and shared numbers together.
+    /// Mixed block of placement and shared parameters.
     pub both: DMatrix<f64>,
-    /// Sum of the squares of what is left \[px²\].
+    /// Sum of the squared reprojection errors \[px²\].
     pub sum_of_squares_px2: f64,
 }
 
 impl Equations {
-    /// Of the boards at a place, a list of corners each. `None` where one is behind
+    /// For the boards of one placement, a list of corners each. `None` where a corner is behind
     /// the camera.
     pub fn of(
         model: &CameraModel,
@@ -83,8 +80,8 @@ impl Equations {
             own_side += of_place.transpose() * left;
             both += of_place.transpose() * of_shared;
         }
-        // The pose of the first board is that of all; each further one has its own
-        // numbers besides.
+        // The pose of the first board applies to all; each further one has parameters of its
+        // own.
         let index = |i: usize| if i < POSE { i } else { i + ON_PLANE * board - ON_PLANE };
         let numbers = if board == 0 { POSE } else { PLACEMENT_PARAMETERS };
         for i in 0..numbers {
@@ -100,7 +97,7 @@ impl Equations {
     }
 }
 
-/// How a corner's place in the picture answers to the shared numbers.
+/// Derivative of a corner's position in the image with the shared parameters.
 fn of_shared(
     projection: &Projection,
     pose: &Pose,
@@ -120,7 +117,7 @@ fn of_shared(
     slopes
 }
 
-/// How it answers to the pose and, on a further board, to that board's own numbers.
+/// Derivative with the pose and, on a further board, with that board's own parameters.
 fn of_place(
     projection: &Projection,
     place: &BoardPlacement,
@@ -130,7 +127,7 @@ fn of_place(
 ) -> SMatrix<f64, 2, PLACEMENT_PARAMETERS> {
     let of_point: Matrix2x3<f64> = projection.of_point;
     let mut slopes = SMatrix::<f64, 2, PLACEMENT_PARAMETERS>::zeros();
-    // The pose turns about the first board's origin.
+    // The pose rotates about the origin of the first board.
     let from_origin = pose.apply(on_board) - Point3::from(place.pose.translation_mm());
     let turned: Matrix3<f64> = -from_origin.cross_matrix();
     slopes.fixed_columns_mut::<3>(0).copy_from(&(of_point * turned));

@@ -1,7 +1,7 @@
-//! Cameras in the files of others: ROS's `camera_info` and OpenCV's `FileStorage`,
-//! both as YAML. They hold a camera and its lens, but no bed plane and nothing of
-//! how well a width is known. Pixel (0, 0) is the centre of the top-left pixel there,
-//! too, and the coefficients are in the same order.
+//! Camera files of other programs: ROS's `camera_info` and OpenCV's `FileStorage`, both YAML.
+//! They hold a camera and its lens, but neither a bed plane nor the uncertainty of a width.
+//! Pixel (0, 0) is the centre of the top-left pixel there, too, and the coefficients are in the
+//! same order.
 
 mod fields;
 mod intrinsics;
@@ -16,8 +16,8 @@ pub use intrinsics::{Format, Import, Intrinsics};
 use crate::document::Problems;
 use fields::YamlFields;
 
-/// Reads the text of a YAML file; `file` is its name in what is said about it.
-/// Everything that is wrong is reported at once.
+/// Reads the text of a YAML file; `file` is its name in messages. All violations are reported
+/// at once, with their lines.
 pub fn parse(file: &str, text: &str) -> Result<Import, Problems> {
     let document = match yaml::parse(text) {
         Ok(document) => document,

@@ -1,42 +1,42 @@
-//! Normal equations solved: by a Cholesky factor, and with the numbers of one place
+//! Solution of normal equations by Cholesky factors, with the parameters of one placement
 //! eliminated (the Schur complement).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix};
 
 use super::equations::{Equations, SHARED};
 
-/// Share of a number's standard deviation, the others being known, below which the
-/// pictures do not tell it from the others.
+/// Smallest standard deviation of a parameter with the others known over that with the others
+/// unknown. A choice: below it rounding exceeds the information in the images.
 const MIN_PIVOT: f64 = 1e-5;
 
-/// The equations of one place with its own numbers eliminated.
+/// Normal equations of one placement with its own parameters eliminated.
 #[derive(Debug, Clone)]
 pub struct Elimination {
-    /// What the picture says of the shared numbers, the place being free.
+    /// Information on the shared parameters with the placement free.
     pub reduced: SMatrix<f64, SHARED, SHARED>,
-    /// What it says of the place, the shared numbers being known.
+    /// Information on the placement with the shared parameters known.
     pub placement: Factor,
-    /// How the place answers to the shared numbers, whitened.
+    /// How the placement follows the shared parameters, whitened.
     pub follows: DMatrix<f64>,
 }
 
 impl Elimination {
-    /// `None` where the corners do not fix the place.
+    /// `None` where the corners do not determine the placement.
     pub fn of(equations: &Equations) -> Option<Self> {
-        let place = Factor::of(&equations.placement)?;
-        let follows = place.whiten(&equations.both);
+        let position = Factor::of(&equations.placement)?;
+        let follows = position.whiten(&equations.both);
         let left = equations.shared - as_shared(&(follows.transpose() * &follows));
-        Some(Self { reduced: left, placement: place, follows })
+        Some(Self { reduced: left, placement: position, follows })
     }
 }
 
-/// A matrix between shared numbers, of fixed size.
+/// A matrix of the shared parameters with fixed size.
 fn as_shared(matrix: &DMatrix<f64>) -> SMatrix<f64, SHARED, SHARED> {
     SMatrix::from_fn(|row, column| matrix[(row, column)])
 }
 
-/// A positive definite matrix M, as what makes xᵀM⁻¹x a sum of squares. Numbers
-/// whose row and column are 0 are known: they have no variance.
+/// Factor of a positive definite matrix M by which xᵀM⁻¹x is a sum of squares. Parameters whose
+/// row and column are 0 are known and have no variance.
 #[derive(Debug, Clone)]
 pub struct Factor {
     /// Scales the matrix to a diagonal of ones.
@@ -46,7 +46,7 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// `None` for a matrix that is not positive definite, or nearly so.
+    /// `None` for a matrix that is not positive definite, or nearly singular.
     pub fn of(matrix: &DMatrix<f64>) -> Option<Self> {
         let unit = matrix.diagonal().map(|on| if on == 0.0 { 0.0 } else { 1.0 / on.sqrt() });
         let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, column| {
@@ -62,7 +62,7 @@ impl Factor {
         Self::of(&DMatrix::from_fn(SHARED, SHARED, |row, column| matrix[(row, column)]))
     }
 
-    /// Columns whose squares sum up to those of x in xᵀM⁻¹x.
+    /// Columns whose squared norms are xᵀM⁻¹x.
     pub fn whiten(&self, x: &DMatrix<f64>) -> DMatrix<f64> {
         let mut scaled = x.clone();
         for (mut row, unit) in scaled.row_iter_mut().zip(&self.unit) {
@@ -76,7 +76,7 @@ impl Factor {
         self.lower.solve(&x.component_mul(&self.unit)).component_mul(&self.unit)
     }
 
-    /// Variances of the numbers, in units of the noise's variance.
+    /// Variances of the parameters, in units of the noise variance.
     pub fn variances(&self) -> DVector<f64> {
         let whitened = self.whiten(&DMatrix::identity(self.unit.len(), self.unit.len()));
         DVector::from_iterator(

@@ -1,5 +1,4 @@
-//! The calibration file as text. Version 1; see `calib/README.md` for every
-//! key.
+//! The calibration file. Version 1; see `calib/README.md` for every key.
 
 use std::fmt::Write;
 
@@ -7,31 +6,29 @@ use nalgebra::{Point3, Vector3};
 
 use super::camera::COEFFICIENTS;
 use super::lens::Lens;
-use super::uncertainty;
-use super::uncertainty::CalibrationUncertainty;
+use super::uncertainty::{self, CalibrationUncertainty};
 use super::{Calibration, CalibrationQuality, Camera};
 use crate::core::geometry::Pose;
 use crate::core::units::Mm;
-use crate::document::Problems;
-use crate::document::{Document, Table};
+use crate::document::{Document, Problems, Table};
 
-/// Largest image side that is taken \[px\].
+/// Largest accepted image side \[px\].
 pub(super) const MAX_SIDE_PX: f64 = 65_536.0;
-/// A focal length of less is no lens, of more no camera \[px\].
+/// Accepted focal lengths \[px\].
 pub(super) const FOCAL_PX: std::ops::RangeInclusive<f64> = 1.0..=1e7;
 pub(super) const CENTRE_PX: std::ops::RangeInclusive<f64> = -1e6..=1e6;
 pub(super) const DISTORTION: std::ops::RangeInclusive<f64> = -1e6..=1e6;
-/// A Rodrigues vector is a turn of at most one round an axis.
+/// A Rodrigues vector is a rotation of at most one turn about each axis.
 const TURN_RAD: std::ops::RangeInclusive<f64> = -6.3..=6.3;
 const LENGTH_MM: std::ops::RangeInclusive<f64> = -1e6..=1e6;
 pub(super) const RMS_PX: std::ops::RangeInclusive<f64> = 0.0..=1e3;
-/// Standard deviations, in the units of their numbers, and parts of them.
+/// Accepted elements of the covariance factor, in the units of their parameters.
 const FACTOR_RANGE: std::ops::RangeInclusive<f64> = -1e9..=1e9;
-/// A calibration that leaves more than the width itself open is none.
+/// A relative standard deviation above 1 is no calibration.
 const RELATIVE_SIGMA_RANGE: std::ops::RangeInclusive<f64> = 0.0..=1.0;
 
-/// Reads the text of a calibration file; `file` is its name in what is said
-/// about it. Everything that is wrong is reported at once.
+/// Reads the text of a calibration file; `file` is its name in messages. All violations are
+/// reported at once.
 pub fn parse(file: &str, text: &str) -> Result<Calibration, Problems> {
     let document = Document::parse(file, text, true);
     let calibration = read_root(&document.root());
@@ -60,10 +57,7 @@ fn read_root(root: &Table<'_>) -> Option<Calibration> {
         robot_z,
         quality: match quality {
             Some(quality) => Some(CalibrationQuality {
-                uncertainty: match uncertainty {
-                    Some(uncertainty) => Some(uncertainty?),
-                    None => None,
-                },
+                uncertainty: uncertainty.map_or(Some(None), |found| found.map(Some))?,
                 ..quality?
             }),
             None => None,
@@ -71,7 +65,7 @@ fn read_root(root: &Table<'_>) -> Option<Calibration> {
     })
 }
 
-/// Each row is as long as its number counted from 1; one that is missing is known.
+/// The triangular factor, row by row; an absent row is that of a known parameter.
 fn read_uncertainty(table: &Table<'_>) -> Option<CalibrationUncertainty> {
     let mut is_sound = true;
     let rows = std::array::from_fn(|row| {
@@ -100,19 +94,19 @@ fn read_quality(table: &Table<'_>) -> Option<CalibrationQuality> {
     })
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "checked to be a whole number in range"
-)]
 fn read_size(root: &Table<'_>) -> Option<[u32; 2]> {
-    let size = root.numbers::<2>("image_size_px", 1.0..=MAX_SIDE_PX)?;
-    if size.iter().any(|side| side.fract() != 0.0) {
-        let [width, height] = size;
+    let [width, height] = root.numbers::<2>("image_size_px", 1.0..=MAX_SIDE_PX)?;
+    let size = whole_side(width).zip(whole_side(height)).map(<[u32; 2]>::from);
+    if size.is_none() {
         root.report("image_size_px", format!("[{width}, {height}]"), "whole numbers of pixels");
-        return None;
     }
-    Some(size.map(|side| side as u32))
+    size
+}
+
+/// A whole number of pixels from 1 to the largest side; `None` for any other number.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to fit")]
+pub(super) fn whole_side(side: f64) -> Option<u32> {
+    ((1.0..=MAX_SIDE_PX).contains(&side) && side.fract() == 0.0).then_some(side as u32)
 }
 
 fn read_camera(table: &Table<'_>, size: Option<[u32; 2]>) -> Option<Camera> {
@@ -146,8 +140,8 @@ fn read_bed(table: &Table<'_>) -> Option<(Pose, Mm)> {
     Some((bed, Mm::new(robot_z?).ok()?))
 }
 
-/// A camera model and bed plane as the text of a calibration file; each note
-/// becomes a comment at its head. Numbers keep every digit.
+/// A camera model and bed plane as the text of a calibration file; the notes become comments at
+/// its head. Numbers keep every digit.
 pub fn to_toml(
     camera: &Camera,
     bed: &Pose,
@@ -188,37 +182,33 @@ pub fn to_toml(
     if let Some(quality) = quality {
         let rms = quality.reprojection_rms_px;
         let _ = write!(text, "\n[quality]\nreprojection_rms_px = {rms:?}\n");
-        if let Some(share) = quality.width_relative_sigma {
-            let _ = writeln!(
-                text,
-                "width_relative_sigma = {share:?} # standard deviation of a width due to the calibration, over the width"
-            );
+        let [of_width, seen, heights] = [
+            "standard deviation of a width due to the calibration, over the width",
+            "first column and row, last column and row where boards were seen",
+            "lowest and highest corner of the boards above the bed",
+        ];
+        if let Some(sigma) = quality.width_relative_sigma {
+            let _ = writeln!(text, "width_relative_sigma = {sigma:?} # {of_width}");
         }
-        if let Some(seen) = quality.seen_px {
-            let _ = writeln!(
-                text,
-                "seen_px = {seen:?} # first column and row, last column and row where boards were seen"
-            );
+        if let Some(px) = quality.seen_px {
+            let _ = writeln!(text, "seen_px = {px:?} # {seen}");
         }
-        if let Some(heights) = quality.heights_mm {
-            let _ = writeln!(
-                text,
-                "heights_mm = {heights:?} # lowest and highest corner of the boards above the bed"
-            );
+        if let Some(mm) = quality.heights_mm {
+            let _ = writeln!(text, "heights_mm = {mm:?} # {heights}");
         }
         if let Some(uncertainty) = quality.uncertainty {
-            text.push_str(&uncertainty_text(&uncertainty));
+            put_uncertainty(&mut text, &uncertainty);
         }
     }
     text
 }
 
-/// What is left open, as a table.
-fn uncertainty_text(uncertainty: &CalibrationUncertainty) -> String {
-    let mut text =
-        "\n[uncertainty] # rows of the triangular L; camera and bed have the covariance \
-                    L * transpose(L)\n"
-            .to_owned();
+/// Appends the covariance factor as a table.
+fn put_uncertainty(text: &mut String, uncertainty: &CalibrationUncertainty) {
+    text.push_str(
+        "\n[uncertainty] # rows of the triangular L; camera and bed have the covariance ",
+    );
+    text.push_str("L * transpose(L)\n");
     for (name, values) in uncertainty.rows() {
         let unit = match name {
             "fx" | "fy" | "cx" | "cy" => " # px",
@@ -228,7 +218,6 @@ fn uncertainty_text(uncertainty: &CalibrationUncertainty) -> String {
         };
         let _ = writeln!(text, "{name} = {values:?}{unit}");
     }
-    text
 }
 
 #[cfg(test)]
@@ -255,15 +244,15 @@ mod tests {
     #[test]
     fn the_uncertainty_is_read_row_by_row_and_refused_if_one_is_too_short() {
         let with = |row: &str| format!("{EXAMPLE}\n[uncertainty]\nfx = [2.5]\n{row}\n");
-        let share = |text: &str| {
+        let fraction = |text: &str| {
             let map = parse("x", text).unwrap().surface(Mm::ZERO, None);
             let ends = [Point2::new(300.0, 269.5), Point2::new(400.0, 269.5)];
             map.width_relative_sigma_of(ends).unwrap()
         };
         // A focal length along x that is 0.1 % off, and a bed that is 0.1 % further away.
-        assert!((share(&with("")) - 1e-3).abs() < 1e-9, "{}", share(&with("")));
+        assert!((fraction(&with("")) - 1e-3).abs() < 1e-9, "{}", fraction(&with("")));
         let zeros = "0.0, ".repeat(17);
-        let shifted = share(&with(&format!("shift_z = [{zeros} 0.4]")));
+        let shifted = fraction(&with(&format!("shift_z = [{zeros} 0.4]")));
         assert!((shifted - 1e-3 * 2.0_f64.sqrt()).abs() < 1e-9, "{shifted}");
         let short = said(&with("fy = [1.0]"));
         assert!(short.contains("uncertainty.fy") && short.contains("2 numbers"), "{short}");
@@ -328,11 +317,11 @@ mod tests {
     #[test]
     fn what_the_calibration_leaves_in_a_width_may_be_absent_but_not_more_than_all() {
         let with = |line: &str| EXAMPLE.replace("[quality]", &format!("[quality]\n{line}"));
-        let share = |text: &str| {
+        let fraction = |text: &str| {
             parse("x", text).unwrap().surface(Mm::constant(20.0), None).width_relative_sigma()
         };
-        assert_eq!(share(EXAMPLE), None);
-        assert_eq!(share(&with("width_relative_sigma = 0.0004")), Some(0.0004));
+        assert_eq!(fraction(EXAMPLE), None);
+        assert_eq!(fraction(&with("width_relative_sigma = 0.0004")), Some(0.0004));
         for wrong in ["1.5", "-0.1", "nan"] {
             let said = said(&with(&format!("width_relative_sigma = {wrong}")));
             assert!(

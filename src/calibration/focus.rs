@@ -1,52 +1,64 @@
-//! How sharp a picture of a board is, along its rows and across them: a picture that
-//! is out of focus is blurred both ways, one that was taken in motion more in one.
+//! Sharpness of an image of a board along its rows and columns: an image that is out of focus
+//! is blurred in both directions, motion blurs one direction more.
 
 use nalgebra::Vector2;
 
 use super::board::Board;
 use super::grey::GreyImage;
 use crate::core::geometry::{GridSize, ImagePoint};
+use crate::numeric::number::{to_count, to_f64};
 use crate::numeric::rank;
 
-/// Blur from which on a picture is refused \[px\], or as a share of a square's side.
+/// Standard deviation of the blur from which an image is rejected \[px\], and the same as a
+/// fraction of a square's side. A choice: beyond it neighbouring lines of the board disturb a
+/// corner.
 const BLURRED_PX: f64 = 3.5;
 const BLURRED_FRACTION: f64 = 0.12;
-/// Way during the exposure from which on a picture is refused \[px\], if it blurs the
-/// board so many times as much one way as the other.
+/// Motion during the exposure from which an image is rejected \[px\], if it blurs one direction
+/// so many times as much as the other. A choice.
 const MOVED_PX: f64 = 3.0;
 const MOVED_RATIO: f64 = 1.5;
-/// Half the length over which an edge is looked at, as a share of a square's side.
+/// Half length of the profile across an edge, as a fraction of a square's side: it stays within
+/// the two squares.
 const REACH_FRACTION: f64 = 0.35;
+/// Largest half length of the profile \[px\].
 const MAX_REACH_PX: f64 = 15.0;
-/// The same as a share of the plain border about a marker.
+/// Half length of the profile as a fraction of the plain margin about a marker.
 const MARGIN_FRACTION: f64 = 0.9;
-/// Step of the profile across an edge \[px\].
+/// Step of the profile \[px\].
 const STEP_PX: f64 = 0.25;
-/// Part of a square's side that is left out at both of its ends.
+/// Fraction of a square's side that is left out at both of its ends, where other edges are
+/// near.
 const END_FRACTION: f64 = 0.25;
-/// Contrast below which an edge says nothing \[grey levels\].
+/// Smallest contrast of an edge that is used \[grey levels\].
 const MIN_CONTRAST: f64 = 10.0;
 
-/// Blur of the edges of a board's squares, as standard deviation \[px\].
+/// Standard deviation of the blur of a board's edges \[px\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Focus {
-    /// Along the board's rows: of the edges between its columns.
+    /// Along the rows: of the edges between columns.
     pub along_rows_px: f64,
-    /// Along its columns.
+    /// Along the columns.
     pub along_columns_px: f64,
-    /// Side of a square in the picture \[px\], in the median.
+    /// Median side of a square in the image \[px\].
     pub square_px: f64,
 }
 
-/// What is wrong with the sharpness of a picture.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Why an image is not sharp enough.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum FocusFault {
     /// Out of focus.
+    #[error(
+        "blurred by {blur_px:.1} px: focus the lens on the board, and calibrate with that focus"
+    )]
     Blurred {
         /// Standard deviation of the blur \[px\].
         blur_px: f64,
     },
     /// Taken in motion.
+    #[error(
+        "the board moved by {motion_px:.1} px during the exposure: hold it still, or expose shorter"
+    )]
     Moved {
         /// How far the board moved during the exposure \[px\].
         motion_px: f64,
@@ -54,34 +66,33 @@ pub enum FocusFault {
 }
 
 impl Focus {
-    /// Of a board whose corners were found, row by row as far as they were. `None` where
-    /// no edge between them shows.
+    /// From the corners, row by row as far as they were found. `None` without an edge of enough
+    /// contrast.
     pub fn of(board: &Board, grey: &GreyImage<'_>, corners: &[Option<ImagePoint>]) -> Option<Self> {
         let GridSize { columns, rows } = board.corners();
         if corners.len() != columns * rows {
             return None;
         }
         let edge = |from: usize, to: usize| Some([corners[from]?, corners[to]?]);
-        let in_rows: Vec<[ImagePoint; 2]> = (0..columns * rows)
-            .filter(|i| i % columns + 1 < columns)
-            .filter_map(|i| edge(i, i + 1))
-            .collect();
+        let has_next = |i: &usize| i % columns + 1 < columns;
+        let in_rows: Vec<[ImagePoint; 2]> =
+            (0..columns * rows).filter(has_next).filter_map(|i| edge(i, i + 1)).collect();
         let in_columns: Vec<[ImagePoint; 2]> =
             (0..columns * (rows - 1)).filter_map(|i| edge(i, i + columns)).collect();
-        // What lies beside an edge is plain so far.
+        // The surroundings of an edge are plain within this distance.
         let reach = REACH_FRACTION.min(MARGIN_FRACTION * board.marker_margin());
         // An edge along a column shows the blur along the rows.
         let along_rows_px = typical_blur(grey, &in_columns, reach)?;
         let along_columns_px = typical_blur(grey, &in_rows, reach)?;
         let sides = in_rows.iter().chain(&in_columns).map(|[from, to]| (to - from).norm());
-        Some(Self { along_rows_px, along_columns_px, square_px: typical(sides)? })
+        Some(Self { along_rows_px, along_columns_px, square_px: rank::median_of(sides)? })
     }
 
-    /// What is wrong with it, if anything.
+    /// The fault, if there is one.
     pub fn fault(&self) -> Option<FocusFault> {
         let less = self.along_rows_px.min(self.along_columns_px);
         let more = self.along_rows_px.max(self.along_columns_px);
-        // The variance of an even spread over a way is a twelfth of its square.
+        // The variance of a uniform distribution is a twelfth of its squared length.
         let way_px = (12.0 * (more * more - less * less)).sqrt();
         if way_px > MOVED_PX && more > MOVED_RATIO * less {
             return Some(FocusFault::Moved { motion_px: way_px });
@@ -92,51 +103,35 @@ impl Focus {
 }
 
 fn typical_blur(grey: &GreyImage<'_>, edges: &[[ImagePoint; 2]], reach: f64) -> Option<f64> {
-    typical(edges.iter().filter_map(|edge| blur(grey, edge, reach)))
+    rank::median_of(edges.iter().filter_map(|edge| blur(grey, edge, reach)))
 }
 
-fn typical(values: impl Iterator<Item = f64>) -> Option<f64> {
-    rank::median(&mut values.collect::<Vec<_>>())
-}
-
-/// Blur across an edge between two corners, from its contrast over its steepest
-/// slope, as a Gaussian's would be. `None` outside the picture or without contrast.
+/// Blur across the edge between two corners: for a Gaussian the steepest slope is the contrast
+/// over √(2π)·σ. `None` outside the image or without contrast.
 fn blur(grey: &GreyImage<'_>, [from, to]: &[ImagePoint; 2], reach: f64) -> Option<f64> {
     let along = to - from;
     let length = along.norm();
     let across = Vector2::new(-along.y, along.x) / length;
     let reach = (reach * length).min(MAX_REACH_PX);
-    let steps = count(reach / STEP_PX);
-    let samples = count((1.0 - 2.0 * END_FRACTION) * length).max(1);
+    let steps = to_count(reach / STEP_PX);
+    let samples = to_count((1.0 - 2.0 * END_FRACTION) * length).max(1);
     let mean = |aside: f64| -> Option<f64> {
         let mut sum = 0.0;
         for sample in 0..samples {
             let part = END_FRACTION
-                + (1.0 - 2.0 * END_FRACTION) * (f64::from(sample) + 0.5) / f64::from(samples);
+                + (1.0 - 2.0 * END_FRACTION) * (to_f64(sample) + 0.5) / to_f64(samples);
             sum += grey.at(from + along * part + across * aside)?;
         }
-        Some(sum / f64::from(samples))
+        Some(sum / to_f64(samples))
     };
     let profile: Vec<f64> = (0..=2 * steps)
-        .map(|step| mean((f64::from(step) - f64::from(steps)) * STEP_PX))
+        .map(|step| mean((to_f64(step) - to_f64(steps)) * STEP_PX))
         .collect::<Option<_>>()?;
     let contrast = (profile.last()? - profile.first()?).abs();
-    // Over a whole pixel, so that noise is no slope.
+    // Slope over a whole pixel, which averages noise.
     let over = 4;
-    let steepest = profile
-        .iter()
-        .zip(profile.iter().skip(over))
-        .map(|(a, b)| (b - a).abs())
-        .fold(0.0, f64::max);
+    let rises = profile.iter().zip(profile.iter().skip(over)).map(|(a, b)| (b - a).abs());
+    let steepest = rises.fold(0.0, f64::max);
     (contrast > MIN_CONTRAST && steepest > 0.0)
         .then(|| contrast / (steepest * std::f64::consts::TAU.sqrt()))
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a handful of steps along a square"
-)]
-fn count(steps: f64) -> u32 {
-    steps as u32
 }

@@ -1,10 +1,11 @@
-//! Grey values at pixels and between them, for what is read about a board's squares.
+//! Grey values at pixels and between them.
 
 use crate::core::frame::{Frame, Pixels};
 use crate::core::geometry::{ImagePoint, Size};
+use crate::numeric::number::{to_count, to_f64};
 
-/// The grey values of a picture. Those of 16 bits are scaled so that the brightest is
-/// 255, because 10 or 12 bits are often all that is used of 16.
+/// Grey values of an image. Those of 16 bits are scaled to a maximum of 255, because cameras
+/// often use 10 or 12 of 16 bits.
 #[derive(Debug)]
 pub struct GreyImage<'a> {
     pixels: &'a Pixels,
@@ -29,7 +30,7 @@ impl<'a> GreyImage<'a> {
         self.size
     }
 
-    /// The value of a pixel; 0 outside the picture.
+    /// The value of a pixel; 0 outside the image.
     pub fn pixel(&self, x: usize, y: usize) -> f64 {
         let index = y * self.size.width + x;
         let value = match self.pixels {
@@ -39,22 +40,16 @@ impl<'a> GreyImage<'a> {
         value.unwrap_or(0.0) * self.scale
     }
 
-    /// The value at a place, between pixels by linear interpolation; `None` outside
-    /// the picture.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "checked to lie in the picture"
-    )]
+    /// The value at a position, between pixels by linear interpolation; `None` outside
+    /// the image.
     pub fn at(&self, px: ImagePoint) -> Option<f64> {
         let Size { width, height } = self.size;
-        let inside = |at: f64, count: usize| at >= 0.0 && at < count as f64 - 1.0;
+        let inside = |at: f64, count: usize| at >= 0.0 && at < to_f64(count) - 1.0;
         if !inside(px.x, width) || !inside(px.y, height) {
             return None;
         }
-        let (x, y) = (px.x as usize, px.y as usize);
-        let (right, down) = (px.x - x as f64, px.y - y as f64);
+        let (x, y) = (to_count(px.x), to_count(px.y));
+        let (right, down) = (px.x - to_f64(x), px.y - to_f64(y));
         let above = self.pixel(x, y) * (1.0 - right) + self.pixel(x + 1, y) * right;
         let below = self.pixel(x, y + 1) * (1.0 - right) + self.pixel(x + 1, y + 1) * right;
         Some(above * (1.0 - down) + below * down)

@@ -1,20 +1,22 @@
-//! The first guess at a camera and at where boards lie, from how the board's plane
-//! is mapped into each picture (Zhang 2000).
+//! Initial estimate of a camera and of the poses of boards from the homographies of the board's
+//! plane (Zhang 2000).
 
 use nalgebra::{DMatrix, Matrix3, Point2, Rotation3, Vector3};
 
 use super::Camera;
 use super::equations::Correspondence;
 use crate::core::geometry::Pose;
+use crate::numeric::number::to_f64;
 
-/// Focal length over the longer side of the picture where the boards do not tell.
+/// Focal length over the longer side of the image where the boards do not determine it. A
+/// choice: a usual lens.
 const DEFAULT_FOCAL: f64 = 1.2;
-/// Focal lengths that are believed, over the longer side.
+/// Plausible focal lengths over the longer side.
 const PLAUSIBLE_FOCAL: std::ops::RangeInclusive<f64> = 0.2..=50.0;
 
-/// How the plane of a board \[mm\] is mapped into a picture, as homogeneous
-/// coordinates; by the direct linear transform. `None` for corners that lie on a
-/// line.
+/// The homography from the plane of a board \[mm\] to an image by the direct linear transform
+/// with normalised coordinates (Hartley and Zisserman 2004, algorithm 4.2). `None` for
+/// collinear corners.
 pub fn homography(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<Matrix3<f64>> {
     let from = normaliser(pairs.iter().map(|pair| pair.0))?;
     let to = normaliser(pairs.iter().map(|pair| pair.1))?;
@@ -35,16 +37,15 @@ pub fn homography(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<Matrix3<f64>> 
     let row = right.row(least);
     let normal = Matrix3::from_row_iterator(row.iter().copied());
     let found = to.try_inverse()? * normal * from;
-    // A board in front of the camera has a positive depth.
+    // The depth of a board in front of the camera is positive.
     let sign = if found[(2, 2)] < 0.0 { -1.0 } else { 1.0 };
     let size = found.norm() * sign;
     (size.abs() > 0.0 && size.is_finite()).then(|| found / size)
 }
 
-/// Moves points to their middle and scales them to a distance of about one.
+/// Shifts points to their mean and scales them to a mean distance of 1.
 fn normaliser(points: impl Iterator<Item = Point2<f64>> + Clone) -> Option<Matrix3<f64>> {
-    #[expect(clippy::cast_precision_loss, reason = "a count of corners")]
-    let count = points.clone().count() as f64;
+    let count = to_f64(points.clone().count());
     if count < 4.0 {
         return None;
     }
@@ -56,13 +57,13 @@ fn normaliser(points: impl Iterator<Item = Point2<f64>> + Clone) -> Option<Matri
     (distance > 0.0).then_some(moved)
 }
 
-/// Corners of a board as pairs of where they are and where they are seen.
+/// Corners as pairs of their positions on the board and in the image.
 pub fn pairs(corners: &[Correspondence]) -> Vec<(Point2<f64>, Point2<f64>)> {
     corners.iter().map(|corner| (corner.on_board, corner.observed)).collect()
 }
 
 /// A pinhole camera with square pixels and its axis through the middle of the
-/// picture, from the views of a board: two conditions a view on the focal length
+/// image, from the views of a board: two conditions a view on the focal length
 /// (Zhang 2000, equations 3 and 4).
 pub fn pinhole(homographies: &[Matrix3<f64>], image_size_px: [u32; 2]) -> Camera {
     let [width, height] = image_size_px.map(f64::from);
@@ -92,29 +93,27 @@ pub fn pinhole(homographies: &[Matrix3<f64>], image_size_px: [u32; 2]) -> Camera
     Camera::pinhole([focal * longer; 2], middle)
 }
 
-/// Where a board lies before a camera, from how its plane is mapped into the picture
-/// of a pinhole camera that is 1 away from it. `None` where it is not in front.
+/// Pose of a board from its homography into the plane z = 1; the rotation is the nearest one by
+/// singular value decomposition (Zhang 2000, appendix C). `None` where the board is not in
+/// front of the camera.
 pub fn pose_from_homography(on_unit_plane: &Matrix3<f64>) -> Option<Pose> {
     let (first, second) = (on_unit_plane.column(0), on_unit_plane.column(1));
     let scale = 2.0 / (first.norm() + second.norm());
     let (x, y) = (first * scale, second * scale);
-    let place = on_unit_plane.column(2) * scale;
+    let position = on_unit_plane.column(2) * scale;
     let axes = Matrix3::from_columns(&[x, y, x.cross(&y)]);
     let decomposition = axes.svd(true, true);
     let rotation = decomposition.u? * decomposition.v_t?;
-    let finite = rotation.iter().chain(place.iter()).all(|number| number.is_finite());
-    (finite && place.z > 0.0)
-        .then(|| Pose::from_parts(Rotation3::from_matrix_unchecked(rotation), place))
+    let finite = rotation.iter().chain(position.iter()).all(|number| number.is_finite());
+    (finite && position.z > 0.0)
+        .then(|| Pose::from_parts(Rotation3::from_matrix_unchecked(rotation), position))
 }
 
-/// The pose of a board that a camera sees, by undoing its lens first. `None` where
-/// the lens cannot be undone at too many corners, or the board is not in front.
+/// Pose of a board before a camera from its undistorted corners. `None` where the distortion
+/// cannot be inverted at too many corners, or the board is not in front.
 pub fn board_pose(camera: &Camera, corners: &[Correspondence]) -> Option<Pose> {
-    let pairs: Vec<_> = corners
-        .iter()
-        .filter_map(|corner| Some((corner.on_board, camera.ray(corner.observed)?)))
-        .collect();
-    pose_from_homography(&homography(&pairs)?)
+    let pair = |corner: &Correspondence| Some((corner.on_board, camera.ray(corner.observed)?));
+    pose_from_homography(&homography(&corners.iter().filter_map(pair).collect::<Vec<_>>())?)
 }
 
 #[cfg(test)]

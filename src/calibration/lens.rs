@@ -1,8 +1,8 @@
-//! Models of a lens: which of the coefficients of distortion are fitted.
+//! Models of a lens: the distortion coefficients that are fitted.
 
 use super::camera::NUMBERS;
 
-/// A model of a lens, by the coefficients it has; the others are 0.
+/// A lens model by its coefficients; the others are 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Lens {
     /// k1.
@@ -18,34 +18,22 @@ pub enum Lens {
 }
 
 impl Lens {
-    /// From the one with the fewest coefficients to the one with the most.
+    /// From the fewest to the most coefficients.
     pub const ALL: [Self; 5] = [Self::One, Self::Two, Self::Four, Self::Five, Self::Rational];
 
-    /// How many coefficients are fitted.
+    /// Number of coefficients.
     pub fn coefficients(self) -> usize {
-        match self {
-            Self::One => 1,
-            Self::Two => 2,
-            Self::Four => 4,
-            Self::Five => 5,
-            Self::Rational => 8,
-        }
+        [1, 2, 4, 5, 8][self as usize]
     }
 
-    /// How many of the camera's numbers are: in the order of
-    /// [`super::camera::NAMES`] the first so many.
+    /// Number of camera parameters: the first ones in the order of [`super::solve::SHARED_NAMES`].
     pub fn numbers(self) -> usize {
         NUMBERS - 8 + self.coefficients()
     }
 
     /// In words.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::One => "k1",
-            Self::Two => "k1 k2",
-            Self::Four => "k1 k2 p1 p2",
-            Self::Five => "k1 k2 p1 p2 k3",
-            Self::Rational => "k1 k2 p1 p2 k3 k4 k5 k6",
-        }
+        let names = ["k1", "k1 k2", "k1 k2 p1 p2", "k1 k2 p1 p2 k3", "k1 k2 p1 p2 k3 k4 k5 k6"];
+        names[self as usize]
     }
 }

@@ -1,42 +1,40 @@
-//! Which lens, and whether the board is bent: what foretells pictures best that took
-//! no part in the fit. A residual cannot decide that: it falls with every number
-//! that is fitted.
+//! Selection of the lens model and of the bend of the board by leave-one-out cross-validation
+//! (Stone 1974). A residual cannot select: it falls with every parameter that is fitted.
 
 use nalgebra::{DVector, SMatrix, SVector};
 
-use super::bundle;
-use super::bundle::{BundleFit, Guess};
+use super::bundle::{self, BundleFit, Guess};
 use super::equations::{FreeParameters, SHARED, restrict_to_free};
 use super::factor::Factor;
 use super::lens::Lens;
 use super::solve::data::CalibrationData;
 use super::view_information::ViewInformation;
 
-/// Share of the smallest held-out error by which a lens may foretell worse and be
-/// taken for as good. Of those that are as good the one with the most coefficients is
-/// chosen, because a coefficient that is left out counts as known. The rational one
-/// must foretell better by as much: where its numerator and its denominator nearly
-/// cancel, its numbers are anywhere.
+/// Relative difference of cross-validation errors that counts as none. Among models of equal
+/// error the one with most coefficients is used: a coefficient that is fixed would count as
+/// known exactly. The rational model must be better by as much, because its parameters are
+/// undetermined where numerator and denominator nearly cancel.
 const AS_GOOD_TOLERANCE: f64 = 0.005;
-/// Standard deviations from which on a bend of the board is believed.
+/// Standard deviations from which a bend of the board is significant. A choice.
 const MIN_BEND_SIGMAS: f64 = 4.0;
 
-/// What one choice gives.
+/// Result of one model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LensTrial {
     /// What was fitted.
     pub free: FreeParameters,
     /// Root mean square of all reprojection errors \[px\].
     pub rms_px: f64,
-    /// The same of pictures that took no part in fitting the camera, each left out
-    /// once \[px\]; `None` where the others do not settle the camera.
+    /// Root mean square error of each image with the camera from the others \[px\]; `None`
+    /// where the others do not determine the camera.
     pub cross_validation_px: Option<f64>,
-    /// Whether the lens turns over within the picture: then it is taken only if all do.
+    /// Whether the distortion is not monotonic within the image: such a model is used only if
+    /// all are.
     pub is_non_monotonic: bool,
 }
 
-/// Fits on a flat board with one lens after the other, each begun where the one before
-/// it ended, up to one with the most coefficients; those that lead nowhere left out.
+/// Fits on a flat board, one lens model after the other, each from the result before it; models
+/// without a fit are left out.
 fn fits(views: &CalibrationData, most: Lens) -> Vec<(BundleFit, LensTrial)> {
     let mut fits: Vec<(BundleFit, LensTrial)> = Vec::new();
     for lens in Lens::ALL.into_iter().filter(|lens| *lens <= most) {
@@ -50,12 +48,12 @@ fn fits(views: &CalibrationData, most: Lens) -> Vec<(BundleFit, LensTrial)> {
     fits
 }
 
-/// Where another fit begins.
+/// Initial values of another fit.
 fn guess(fit: &BundleFit) -> Guess {
     Guess { model: fit.model, placements: fit.placements.clone() }
 }
 
-/// The best choice and all that was tried. `None` where no lens leads to a camera.
+/// The best model and all that were tried. `None` where no model gives a camera.
 pub(super) fn best(views: &CalibrationData) -> Option<(BundleFit, FreeParameters, Vec<LensTrial>)> {
     let mut fits = fits(views, Lens::Rational);
     let chosen = chosen(&fits)?;
@@ -76,8 +74,8 @@ pub(super) fn best(views: &CalibrationData) -> Option<(BundleFit, FreeParameters
     Some((fit, chosen.free, trials))
 }
 
-/// Which of the fits on a flat board is taken; where nothing can be held out the one
-/// with the fewest coefficients. `None` without a fit.
+/// The model of a flat board that is used; without cross-validation the one with fewest
+/// coefficients. `None` without a fit.
 fn chosen(fits: &[(BundleFit, LensTrial)]) -> Option<usize> {
     let is_rational = |trial: &LensTrial| trial.free.lens == Some(Lens::Rational);
     let all_fold = fits.iter().all(|(_, trial)| trial.is_non_monotonic);
@@ -95,7 +93,8 @@ fn chosen(fits: &[(BundleFit, LensTrial)]) -> Option<usize> {
     fits.iter().rposition(is_as_good).or_else(simplest)
 }
 
-/// A fit with a lens that is given, by way of the simpler ones.
+/// A fit with a given lens, by way of the simpler ones.
+#[cfg(test)]
 pub(super) fn up_to(views: &CalibrationData, lens: Lens) -> Option<(BundleFit, LensTrial)> {
     fits(views, lens).pop().filter(|(_, trial)| trial.free.lens == Some(lens))
 }
@@ -108,23 +107,21 @@ fn is_bent(views: &CalibrationData, fit: &BundleFit, free: FreeParameters) -> bo
 }
 
 fn trial(views: &CalibrationData, fit: &BundleFit, free: FreeParameters) -> LensTrial {
-    let rms_px = views.rms_px(fit.sum_of_squares_px2);
-    let folds = fit.model.camera.non_monotonic_at(views.size).is_some();
     LensTrial {
         free,
-        rms_px,
+        rms_px: views.rms_px(fit.sum_of_squares_px2),
         cross_validation_px: cross_validation_px(views, fit, free),
-        is_non_monotonic: folds,
+        is_non_monotonic: fit.model.camera.non_monotonic_at(views.size).is_some(),
     }
 }
 
-/// Root mean square error of each picture with the camera that the others give and
-/// its own pose fitted \[px\].
+/// Root mean square error of each image with the camera from the others and its own pose fitted
+/// \[px\].
 ///
-/// To first order in what one picture moves the camera: at the best fit the others
-/// together pull as one picture pulls against them, so that without it the camera
-/// goes by ds = −(S − Sᵥ)⁻¹gᵥ, with S all pictures' equations, poses eliminated, and
-/// Sᵥ and gᵥ its own; of its errors that leaves |r|² + 2 gᵥᵀ(S − Sᵥ)⁻¹gᵥ + dsᵀSᵥds.
+/// To first order in the change of the camera: at the best fit the gradients of all images add
+/// up to 0, so that without image v the camera changes by ds = −(S − Sᵥ)⁻¹gᵥ, with S the
+/// information of all images, poses eliminated, and Sᵥ and gᵥ those of the image. Its squared
+/// errors are |r|² + 2 gᵥᵀ(S − Sᵥ)⁻¹gᵥ + dsᵀSᵥds.
 fn cross_validation_px(
     views: &CalibrationData,
     fit: &BundleFit,

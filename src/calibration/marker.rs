@@ -1,4 +1,4 @@
-//! `ArUco` markers: a dark quadrilateral is one if its cells are those of a marker.
+//! `ArUco` markers: dark quadrilaterals whose cells are the code of a marker.
 
 use nalgebra::{Matrix3, Point2};
 
@@ -6,35 +6,36 @@ use super::dictionary::Dictionary;
 use super::grey::GreyImage;
 use super::homography;
 use crate::core::geometry::ImagePoint;
+use crate::numeric::number::to_f64;
 
-/// Difference between white and black cells below which there is no marker \[grey
-/// levels\].
+/// Smallest difference between white and black cells \[grey levels\]. A choice above the noise
+/// of a dark image.
 const MIN_CONTRAST: f64 = 15.0;
-/// Share of the border's cells that may be misread.
+/// Fraction of the border's cells that may be misread.
 const MAX_BORDER_ERRORS: f64 = 0.1;
-/// A cell's colour is the mean of so many places along each of its sides, and this part
-/// of it about its middle.
+/// Samples along each side of a cell, and the part of the cell that they cover: its middle,
+/// away from blurred edges.
 const SAMPLES_PER_SIDE: u32 = 3;
 const SAMPLED_FRACTION: f64 = 0.5;
 
-/// A marker in a picture.
+/// A marker in an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Marker {
-    /// Its number in its dictionary.
+    /// Its number in the dictionary.
     pub number: usize,
-    /// The corners of its black border \[px\]: upper left, upper right, lower right,
-    /// lower left as it is read.
+    /// Corners of its black border \[px\]: upper left, upper right, lower right, lower left of
+    /// the upright marker.
     pub corners: [ImagePoint; 4],
 }
 
-/// Cells that were read, row by row; white is true.
+/// Cells, row by row; white is true.
 struct Cells {
     side: usize,
     white: Vec<bool>,
 }
 
-/// Reads markers among quadrilaterals whose corners run clockwise: those whose number
-/// is below `count`. Of one that was found several times the largest is kept.
+/// Reads markers among quadrilaterals with clockwise corners, if their number is below `count`.
+/// Of repeated detections the largest is kept.
 pub fn read_all(
     grey: &GreyImage<'_>,
     quads: &[[ImagePoint; 4]],
@@ -52,7 +53,7 @@ pub fn read_all(
     found
 }
 
-/// The quadrilaterals passed the other way round: as a mirror would show them.
+/// The quadrilaterals with reversed order, as a mirror shows them.
 pub fn mirrored(quads: &[[ImagePoint; 4]]) -> Vec<[ImagePoint; 4]> {
     quads.iter().map(|&[a, b, c, d]| [d, c, b, a]).collect()
 }
@@ -105,17 +106,15 @@ fn read(
 }
 
 impl Cells {
-    /// `None` where the quadrilateral leaves the picture, shows no contrast, or has no
-    /// dark border.
-    #[expect(clippy::cast_precision_loss, reason = "a handful of cells")]
+    /// `None` where the quadrilateral leaves the image, has no contrast, or no dark border.
     fn of(grey: &GreyImage<'_>, quad: &[ImagePoint; 4], side: usize) -> Option<Self> {
         let all = side + 2;
-        let end = all as f64;
+        let end = to_f64(all);
         let square = [[0.0, 0.0], [end, 0.0], [end, end], [0.0, end]].map(Point2::from);
         let pairs: Vec<_> = square.into_iter().zip(*quad).collect();
         let map = homography::homography(&pairs)?;
         let values: Vec<f64> = (0..all * all)
-            .map(|i| cell_brightness(grey, &map, (i % all) as f64, (i / all) as f64))
+            .map(|i| cell_brightness(grey, &map, to_f64(i % all), to_f64(i / all)))
             .collect::<Option<_>>()?;
         let (dark, bright) = values
             .iter()
@@ -127,19 +126,19 @@ impl Cells {
             |column: usize, row: usize| values[row * all + column] > f64::midpoint(dark, bright);
         let on_border = |i: &usize| [i % all, i / all].iter().any(|&at| at == 0 || at + 1 == all);
         let wrong = (0..all * all).filter(on_border).filter(|i| is_white(i % all, i / all)).count();
-        if wrong as f64 > MAX_BORDER_ERRORS * 4.0 * (end - 1.0) {
+        if to_f64(wrong) > MAX_BORDER_ERRORS * 4.0 * (end - 1.0) {
             return None;
         }
         let white = (0..side * side).map(|i| is_white(1 + i % side, 1 + i / side)).collect();
         Some(Self { side, white })
     }
 
-    /// As a number, the upper left cell as its highest bit.
+    /// The code; the upper left cell is its highest bit.
     fn code(&self) -> u64 {
         self.white.iter().fold(0, |code, &white| code << 1 | u64::from(white))
     }
 
-    /// As read from the next corner.
+    /// The cells rotated by a quarter turn.
     fn turned(&self) -> Self {
         let side = self.side;
         let at = |i: usize| self.white[(i % side) * side + side - 1 - i / side];
@@ -147,7 +146,7 @@ impl Cells {
     }
 }
 
-/// Mean grey value about the middle of a cell; `None` where it leaves the picture.
+/// Mean grey value about the middle of a cell; `None` outside the image.
 fn cell_brightness(grey: &GreyImage<'_>, map: &Matrix3<f64>, column: f64, row: f64) -> Option<f64> {
     let part =
         |k: u32| 0.5 + SAMPLED_FRACTION * (f64::from(k) / f64::from(SAMPLES_PER_SIDE - 1) - 0.5);

@@ -8,22 +8,21 @@ use super::uncertainty::{CalibrationUncertainty, PositionSlopes};
 use crate::core::geometry::{ImagePoint, Pose, SurfacePoint};
 use crate::core::units::Mm;
 
-/// How good the images said that a calibration is.
+/// Quality of a calibration, from its images.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CalibrationQuality {
     /// Root mean square of the reprojection errors \[px\].
     pub reprojection_rms_px: f64,
-    /// Relative standard deviation that the calibration leaves in a width; see
-    /// [`super::share::where_seen`]. Files may lack it.
+    /// Relative standard deviation of a width due to the calibration; see
+    /// [`super::relative_sigma::where_seen`]. Files may lack it.
     pub width_relative_sigma: Option<f64>,
-    /// First column and row, last column and row between which boards were seen, and
-    /// for which the share holds \[px\]. Files may lack it.
+    /// First column and row, last column and row between which boards were seen, and for which
+    /// `width_relative_sigma` holds \[px\]. Files may lack it.
     pub seen_px: Option<[f64; 4]>,
     /// Lowest and highest corner of the boards above the bed \[mm\]. Files may lack it.
     pub heights_mm: Option<[f64; 2]>,
-    /// What is left open in camera and bed plane: from it comes the standard deviation of
-    /// a width wherever it is seen. Files may lack it; then `width_relative_sigma` holds
-    /// everywhere.
+    /// Covariance of camera and bed plane, from which the standard deviation of a width follows
+    /// wherever it is seen. Files may lack it; then `width_relative_sigma` applies everywhere.
     pub uncertainty: Option<CalibrationUncertainty>,
 }
 
@@ -36,7 +35,7 @@ pub enum Calibration {
     Scale {
         /// Millimetres a pixel at the surface.
         mm_per_px: f64,
-        /// Its standard deviation \[mm/px\], if somebody has told it.
+        /// Its standard deviation \[mm/px\], if known.
         sigma: Option<f64>,
     },
     /// Camera model and bed plane; holds at any height.
@@ -50,7 +49,7 @@ pub enum Calibration {
         bed: Pose,
         /// The robot's z when the image that fixed the plane was taken.
         robot_z: Mm,
-        /// What the images said about it.
+        /// Its quality, if known.
         quality: Option<CalibrationQuality>,
     },
 }
@@ -80,27 +79,23 @@ impl Calibration {
         }
     }
 
-    /// What is left open in camera and bed plane, if somebody has told it.
+    /// Covariance of camera and bed plane, if known.
     pub fn uncertainty(&self) -> Option<CalibrationUncertainty> {
-        match self {
-            Self::Scale { .. } => None,
-            Self::Full { quality, .. } => quality.and_then(|quality| quality.uncertainty),
-        }
+        let Self::Full { quality, .. } = self else { return None };
+        quality.as_ref()?.uncertainty
     }
 
     fn width_relative_sigma(&self) -> Option<f64> {
         match self {
             Self::Scale { mm_per_px, sigma } => sigma.map(|sigma| sigma / mm_per_px),
-            Self::Full { quality, .. } => quality.and_then(|quality| quality.width_relative_sigma),
+            Self::Full { quality, .. } => quality.as_ref()?.width_relative_sigma,
         }
     }
 
-    /// Size of the images it is meant for \[px\]; `None` if it does not matter.
+    /// Size of the images \[px\]; `None` if it does not matter.
     pub fn image_size_px(&self) -> Option<[u32; 2]> {
-        match self {
-            Self::Scale { .. } => None,
-            Self::Full { image_size_px, .. } => Some(*image_size_px),
-        }
+        let Self::Full { image_size_px, .. } = self else { return None };
+        Some(*image_size_px)
     }
 }
 
@@ -110,7 +105,7 @@ pub struct SurfaceMap {
     kind: Kind,
     width_relative_sigma: Option<f64>,
     uncertainty: Option<CalibrationUncertainty>,
-    /// What the surface's height leaves open in a width, as a share of it.
+    /// Relative standard deviation of a width due to the height of the surface.
     height_relative_sigma: Option<f64>,
     image_size_px: Option<[u32; 2]>,
 }
@@ -133,15 +128,14 @@ impl SurfaceMap {
         }
     }
 
-    /// Size of the images that it is meant for \[px\]; `None` if it does not
-    /// matter.
+    /// Size of the images \[px\]; `None` if it does not matter.
     pub fn image_size_px(&self) -> Option<[u32; 2]> {
         self.image_size_px
     }
 
-    /// The same map with a surface whose height is known no better than this: a wrong
-    /// height is a wrong distance Z from the camera, and changes every width W by
-    /// W·Δh/Z. A map of one size for all pixels knows no height and stays as it is.
+    /// The same map with an uncertain surface height: a height error Δh at the distance Z from
+    /// the camera changes every width W by W·Δh/Z. A map of one scale for all pixels knows no
+    /// height and stays as it is.
     pub fn with_height_sigma(self, sigma: Mm) -> Self {
         let Kind::Plane { bed, height_mm, .. } = &self.kind else { return self };
         let above = bed.apply_inverse(Point3::origin()).z - height_mm;
@@ -155,18 +149,16 @@ impl SurfaceMap {
         }
     }
 
-    /// Relative standard deviation that the calibration behind the map leaves
-    /// in a width, the same error in every width; `None` where it is not known. The
-    /// largest that a usual bead has where boards were seen:
+    /// Relative standard deviation of a width due to the calibration, the same error in every
+    /// width; `None` if unknown. It is the largest one where boards were seen;
     /// [`Self::width_relative_sigma_of`] is that of one width.
     pub fn width_relative_sigma(&self) -> Option<f64> {
         self.with_height(self.width_relative_sigma)
     }
 
-    /// The same of the distance between two places that are seen at these pixels, in which
-    /// direction and wherever they are, and beyond where boards were seen, too. That of
-    /// every width where the calibration has no more than one number. `None` also off the
-    /// surface.
+    /// The same for the distance between two points that are seen at these pixels, anywhere in
+    /// the image and in any direction. That of every width where the calibration has only one
+    /// number. `None` also off the surface.
     pub fn width_relative_sigma_of(&self, ends: [ImagePoint; 2]) -> Option<f64> {
         let (Some(uncertainty), Kind::Plane { camera, bed, height_mm }) =
             (&self.uncertainty, &self.kind)
@@ -181,21 +173,20 @@ impl SurfaceMap {
         self.with_height(Some(uncertainty.relative_sigma([&first?, &last?])?))
     }
 
-    /// What is left open in camera and bed plane behind the map, if it is known.
+    /// Covariance of camera and bed plane behind the map, if known.
     pub fn uncertainty(&self) -> Option<&CalibrationUncertainty> {
         self.uncertainty.as_ref()
     }
 
-    fn with_height(&self, share: Option<f64>) -> Option<f64> {
-        match (share, self.height_relative_sigma) {
-            (Some(share), Some(of_height)) => Some(share.hypot(of_height)),
-            (share, of_height) => share.or(of_height),
+    fn with_height(&self, fraction: Option<f64>) -> Option<f64> {
+        match (fraction, self.height_relative_sigma) {
+            (Some(fraction), Some(of_height)) => Some(fraction.hypot(of_height)),
+            (fraction, of_height) => fraction.or(of_height),
         }
     }
 
-    /// Where the ray of a pixel meets the surface, in the bed's axes \[mm\].
-    /// The point is undistorted, never the image. `None` where the ray does
-    /// not come down on the surface.
+    /// Where the ray of a pixel meets the surface, in the bed's axes \[mm\]. The point is
+    /// undistorted, never the image. `None` where the ray does not meet the surface.
     pub fn to_mm(&self, px: ImagePoint) -> Option<SurfacePoint> {
         match &self.kind {
             Kind::Scale(mm_per_px) => Some(px * *mm_per_px),
@@ -213,8 +204,8 @@ impl SurfaceMap {
         }
     }
 
-    /// Where a point of the surface, in the bed's axes \[mm\], is seen \[px\].
-    /// `None` behind the camera.
+    /// Where a point of the surface, in the bed's axes \[mm\], is seen \[px\]. `None` behind
+    /// the camera.
     pub fn to_px(&self, mm: SurfacePoint) -> Option<ImagePoint> {
         match &self.kind {
             Kind::Scale(mm_per_px) => Some(mm / *mm_per_px),

@@ -1,5 +1,4 @@
-//! What one more picture of the board would bring, and how the board should be held
-//! for it.
+//! The next image of the board that reduces the uncertainty of a width most.
 
 use nalgebra::{Point3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -12,17 +11,18 @@ use super::solve::Solution;
 use super::width_map;
 use crate::core::geometry::{ImagePoint, Pose};
 use crate::core::units::Mm;
+use crate::numeric::number::to_f64;
 
 /// Tilts that are tried \[degrees\].
 const TILTS_DEG: [f64; 2] = [20.0, 40.0];
-/// Distances that are tried, over the usual one.
+/// Distances that are tried, over the mean of the images.
 const DISTANCES: [f64; 3] = [0.6, 0.8, 1.0];
-/// Places that are tried along each side of the picture.
+/// Positions that are tried along each side of the image.
 const POSITIONS_PER_SIDE: u32 = 3;
-/// Part of what is open that a picture must take away to be worth while.
+/// Smallest relative decrease of the uncertainty for which an image is proposed.
 const MIN_GAIN: f64 = 0.03;
 
-/// A point of the picture, as fractions of its width and height.
+/// A point of the image as fractions of its width and height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RelativePoint {
     /// From the left.
@@ -31,39 +31,38 @@ pub struct RelativePoint {
     pub y: f64,
 }
 
-/// A picture that would help.
+/// A proposed image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NextView {
-    /// How the board is held.
+    /// Pose of the board.
     pub posture: BoardPosture,
-    /// Middle of the board in the picture.
+    /// Middle of the board in the image.
     pub at: RelativePoint,
-    /// What a width is known to where boards were seen, before and after it: share of
-    /// the width.
+    /// Relative standard deviation of a width where boards were seen, before and after it.
     pub relative_sigma: (f64, f64),
 }
 
-/// How a board is held before the camera.
+/// Pose of a board before the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum BoardPosture {
     /// It lies on the bed.
     OnBed,
     /// It is held freely.
     Free {
-        /// The side of the board that is nearer to the camera: as the picture's axes, x
-        /// to the right and y down; (0, 0) for a board that is not tilted.
+        /// The side of the board that is nearer to the camera, in the axes of the image; (0, 0)
+        /// for a board that is not tilted.
         nearer: (i8, i8),
-        /// How far it is tilted \[degrees\].
+        /// Tilt \[degrees\].
         tilt_deg: f64,
-        /// Distance of the board over the mean of the others'.
+        /// Distance over the mean of the other images.
         distance: f64,
     },
 }
 
-/// The picture that would leave least open in the width of a bead, in mm, on surfaces of
-/// these heights, where boards were seen; where such a bead is not seen whole there, in
-/// that of one that fills a third of that part of the picture. `None` where no further
-/// one brings anything to speak of.
+/// The image that reduces the uncertainty most, for a bead of a width in mm on surfaces of
+/// these heights where boards were seen; if such a bead does not fit there, for one that fills
+/// a third of that part of the image. `None` where no image reduces it by more than a few per
+/// cent.
 pub fn best(
     board: &Board,
     solution: &Solution,
@@ -107,7 +106,7 @@ pub fn best(
     (best.relative_sigma.1 < (1.0 - MIN_GAIN) * before).then_some(best)
 }
 
-/// Ends of a bead in the picture, and the height of its surface.
+/// Ends of a bead in the image, and the height of its surface.
 type Bead = ([ImagePoint; 2], Mm);
 
 fn readings(covariance: &CalibrationCovariance, beads: &[Bead]) -> Vec<DerivedValue> {
@@ -117,10 +116,10 @@ fn readings(covariance: &CalibrationCovariance, beads: &[Bead]) -> Vec<DerivedVa
 fn candidates() -> Vec<(RelativePoint, BoardPosture)> {
     let part = |i: u32| (f64::from(i) + 0.5) / f64::from(POSITIONS_PER_SIDE);
     let mut all = Vec::new();
-    for place in 0..POSITIONS_PER_SIDE * POSITIONS_PER_SIDE {
+    for position in 0..POSITIONS_PER_SIDE * POSITIONS_PER_SIDE {
         let at = RelativePoint {
-            x: part(place % POSITIONS_PER_SIDE),
-            y: part(place / POSITIONS_PER_SIDE),
+            x: part(position % POSITIONS_PER_SIDE),
+            y: part(position / POSITIONS_PER_SIDE),
         };
         all.push((at, BoardPosture::OnBed));
         for distance in DISTANCES {
@@ -144,8 +143,8 @@ fn middle_mm(board: &Board) -> Vector3<f64> {
     board.corners_mm().last().map_or_else(Vector3::zeros, |far| far.coords / 2.0)
 }
 
-/// Where a board would lie on the bed, turned like the first one, with its middle at a
-/// place of the picture.
+/// Position of a board on the bed, with the orientation of the first one and its middle at a
+/// point of the image.
 fn on_bed(
     board: &Board,
     covariance: &CalibrationCovariance,
@@ -155,16 +154,13 @@ fn on_bed(
     let on_face = map.to_mm(position_px(covariance, at))?;
     // The bed's axes are the board's, with y turned over if z is.
     let first = covariance.on_bed([0.0; 3]);
-    let sign = if (first.rotation() * Vector3::z()).dot(&first.translation_mm()) > 0.0 {
-        -1.0
-    } else {
-        1.0
-    };
+    let is_away = (first.rotation() * Vector3::z()).dot(&first.translation_mm()) > 0.0;
+    let sign = if is_away { -1.0 } else { 1.0 };
     let middle = middle_mm(board);
     Some([on_face.x - middle.x, sign * on_face.y - middle.y, 0.0])
 }
 
-/// Where the board would be, its middle in the middle of the candidate's place.
+/// Pose of a board with its middle at the candidate's point of the image.
 fn pose(
     board: &Board,
     covariance: &CalibrationCovariance,
@@ -175,13 +171,13 @@ fn pose(
     let BoardPosture::Free { nearer, tilt_deg, distance } = hold else { return None };
     let ray = covariance.model().camera.ray(position_px(covariance, at))?;
     let (x, y) = (f64::from(nearer.0), f64::from(nearer.1));
-    // Turned about an axis of the picture so that the named side comes nearer.
+    // Rotated about an axis of the image so that the named side is nearer.
     let rotation = Rotation3::new(Vector3::new(-y, x, 0.0) * tilt_deg.to_radians());
     let middle = Vector3::new(ray.x, ray.y, 1.0) * (distance_mm * distance);
     Some(Pose::from_parts(rotation, middle - rotation * middle_mm(board)))
 }
 
-/// The corners as they would be seen; `None` if not all of them are.
+/// The corners as they would be seen; `None` if one is outside the image.
 fn seen_whole(
     board: &Board,
     covariance: &CalibrationCovariance,
@@ -196,17 +192,16 @@ fn seen_whole(
 }
 
 fn mean_distance_mm(solution: &Solution) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "a count of pictures")]
-    let count = solution.views.len().max(1) as f64;
+    let count = to_f64(solution.views.len().max(1));
     solution.views.iter().map(|view| view.pose.translation_mm().z).sum::<f64>() / count
 }
 
 impl std::fmt::Display for NextView {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let place = position_words(self.at);
+        let position = position_words(self.at);
         match self.posture {
             BoardPosture::OnBed => {
-                write!(f, "the board flat on the bed once more, in the {place} (--plane again)")
+                write!(f, "the board flat on the bed once more, in the {position} (--plane again)")
             }
             BoardPosture::Free { nearer, tilt_deg, distance } => {
                 let distance = match distance {
@@ -219,11 +214,11 @@ impl std::fmt::Display for NextView {
                     (-1, _) => "left",
                     (_, 1) => "lower",
                     (_, -1) => "upper",
-                    _ => return write!(f, "the board in the {place}{distance}, not tilted"),
+                    _ => return write!(f, "the board in the {position}{distance}, not tilted"),
                 };
                 write!(
                     f,
-                    "the board in the {place}{distance}, its {side} side {tilt_deg:.0} degrees \
+                    "the board in the {position}{distance}, its {side} side {tilt_deg:.0} degrees \
                      nearer than the other"
                 )
             }

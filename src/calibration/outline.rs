@@ -1,28 +1,25 @@
-//! Whether a checkerboard ends where it should: a larger board than the one that was
-//! told contains the smaller one, and every corner of it fits, but its origin and its
-//! counts are wrong.
+//! Whether a checkerboard ends where it should: a larger board contains the specified one, and
+//! all corners of the specified one fit, but its origin and its counts are wrong.
 
 use super::board::Board;
 use super::grey::GreyImage;
 use crate::core::geometry::{GridSize, ImagePoint};
 use crate::numeric::rank;
 
-/// Difference between squares of both colours from which on a row of squares belongs
-/// to a board, as a share of that between the squares within.
+/// Smallest difference between squares of both colours in a row beyond the board that belongs
+/// to a board, as a fraction of that within the board. A choice for uneven light.
 const MIN_CONTRAST_RATIO: f64 = 0.3;
 /// The same over the standard deviation of squares of one colour.
 const MIN_SIGMAS: f64 = 2.0;
-/// Scatter of squares of one colour, as a share of the same, from which on they are not
-/// plain.
+/// Largest standard deviation of plain squares of one colour, as a fraction of the difference
+/// between both colours.
 const MAX_UNEVENNESS: f64 = 0.15;
-/// Standard deviation within a square, as a share of that difference, up to which it is
-/// one colour: less than that of a square of whose places a third lie on the border to
-/// the next square.
+/// Largest standard deviation within a square of one colour, as a fraction of the same
+/// difference: less than that of a square with a third of its samples on the next square.
 const MAX_WITHIN_SQUARE: f64 = 0.25;
-/// Squares of a row that must lie in the picture for it to tell, if it has as many.
+/// Smallest number of squares of a row within the image for a decision, if the row has as many.
 const MIN_SQUARES: usize = 3;
-/// A square's colour is the mean of so many places along each of its sides, well
-/// within it.
+/// Samples along each side of a square, well within it.
 const SAMPLES_PER_SIDE: u32 = 3;
 
 /// A side of the board in the order of its corners.
@@ -42,24 +39,22 @@ impl BoardSide {
     const ALL: [Self; 4] = [Self::FirstColumn, Self::LastColumn, Self::FirstRow, Self::LastRow];
 }
 
-/// Where a board does not end as it should.
+/// Sides at which a board does not end as it should.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct BoardOutline {
-    /// Beyond these sides it goes on for a further row of squares.
+    /// Sides with a further row of squares.
     pub goes_on: Vec<BoardSide>,
-    /// Beyond these there is no row of squares at all: what was taken for corners there
-    /// are the ends of the board's squares, or none.
+    /// Sides without a row of squares: the corners there are the outer corners of the board, or
+    /// none.
     pub ends_early: Vec<BoardSide>,
-    /// Squares of one colour differ so much from each other that there may be something in
-    /// them.
+    /// Whether squares of one colour differ so much that they may contain markers.
     pub is_uneven: bool,
-    /// The first of the squares within is bright: on a board whose opposite corners have
-    /// two colours the corners were counted from the wrong end.
+    /// Whether the first inner square is bright: on a board that is not symmetric the corners
+    /// were counted from the wrong end.
     pub is_first_bright: bool,
 }
 
-/// Looks at the two rows of squares beyond each side; says nothing of a side where they
-/// leave the picture.
+/// Checks the two rows of squares beyond each side, as far as they are in the image.
 pub fn look(board: &Board, grey: &GreyImage<'_>, corners: &[ImagePoint]) -> BoardOutline {
     let mut outline = BoardOutline::default();
     let GridSize { columns, rows } = board.corners();
@@ -85,25 +80,20 @@ pub fn look(board: &Board, grey: &GreyImage<'_>, corners: &[ImagePoint]) -> Boar
             BoardSide::FirstRow => at(along, depth),
             BoardSide::LastRow => at(along, rows - 1 - depth),
         };
-        let count = if matches!(side, BoardSide::FirstColumn | BoardSide::LastColumn) {
-            rows
-        } else {
-            columns
+        // Length of the side, and number of its squares beyond, continued from those within.
+        let (count, first) = match side {
+            BoardSide::FirstColumn => (rows, 2),
+            BoardSide::LastColumn => (rows, columns),
+            BoardSide::FirstRow => (columns, 2),
+            BoardSide::LastRow => (columns, rows),
         };
-        // The outermost corner and the next two outwards.
-        let beyond: Vec<[ImagePoint; 3]> = (0..count)
-            .map(|along| {
-                let [first, second] = beyond([line(0, along), line(1, along), line(2, along)]);
-                [line(0, along), first, second]
-            })
-            .collect();
+        // The outermost corner and the next two further out.
+        let outwards = |along: usize| {
+            let [first, second] = beyond([line(0, along), line(1, along), line(2, along)]);
+            [line(0, along), first, second]
+        };
+        let beyond: Vec<[ImagePoint; 3]> = (0..count).map(outwards).collect();
         let row = |depth: usize| Row::of(grey, &beyond, depth);
-        // Columns and rows of the squares beyond, counted on from those within.
-        let first = match side {
-            BoardSide::FirstColumn | BoardSide::FirstRow => 2,
-            BoardSide::LastColumn => columns,
-            BoardSide::LastRow => rows,
-        };
         if row(0).and_then(|row| row.alternates(contrast)) == Some(false) {
             outline.ends_early.push(side);
         } else if row(1).is_some_and(|row| row.continues(first, contrast)) {
@@ -113,42 +103,38 @@ pub fn look(board: &Board, grey: &GreyImage<'_>, corners: &[ImagePoint]) -> Boar
     outline
 }
 
-/// The squares of a row beyond a side, as far as they lie in the picture.
+/// The squares of a row beyond a side, as far as they are in the image.
 struct Row {
     /// Each with its number along the side.
     shades: Vec<(usize, Shade)>,
 }
 
 impl Row {
-    /// The next row to the board, or the one after it. `None` where too few of its squares
-    /// lie in the picture.
+    /// The row next to the board, or the one after it. `None` with too few of its squares in
+    /// the image.
     fn of(grey: &GreyImage<'_>, beyond: &[[ImagePoint; 3]], depth: usize) -> Option<Self> {
-        let shades: Vec<(usize, Shade)> = beyond
-            .windows(2)
-            .enumerate()
-            .filter_map(|(along, pair)| {
-                let [near, far] = [pair[0], pair[1]];
-                let square = [near[depth], near[depth + 1], far[depth], far[depth + 1]];
-                Some((along, Shade::of(grey, square)?))
-            })
-            .collect();
+        let shade = |(along, pair): (usize, &[[ImagePoint; 3]])| {
+            let [near, far] = [pair[0], pair[1]];
+            let square = [near[depth], near[depth + 1], far[depth], far[depth + 1]];
+            Some((along, Shade::of(grey, square)?))
+        };
+        let shades: Vec<_> = beyond.windows(2).enumerate().filter_map(shade).collect();
         (shades.len() >= MIN_SQUARES.min(beyond.len() - 1)).then_some(Self { shades })
     }
 
-    /// Whether its squares alternate at all. `None` where all that are seen have one
-    /// colour on a board.
+    /// Whether its squares alternate. `None` where all squares in the image have one colour on
+    /// a board.
     fn alternates(&self, contrast: f64) -> Option<bool> {
         self.difference(0).map(|found| found.is_clear(contrast))
     }
 
-    /// Whether it is a row of the same board: its squares alternate in step with those
-    /// within, `first` being the number of its first square among them, and most are plain.
-    /// What lies behind a board may be bright and dark in turn, too.
+    /// Whether it is a row of the same board: its squares alternate in phase with those within,
+    /// `first` being the number of its first square, and most are plain. A background may
+    /// alternate, too.
     fn continues(&self, first: usize, contrast: f64) -> bool {
         let Some(found) = self.difference(first) else { return false };
-        let mut spreads: Vec<f64> = self.shades.iter().map(|(_, shade)| shade.spread).collect();
-        let is_plain = rank::median(&mut spreads)
-            .is_some_and(|spread| spread <= MAX_WITHIN_SQUARE * contrast.abs());
+        let spread = rank::median_of(self.shades.iter().map(|(_, shade)| shade.spread));
+        let is_plain = spread.is_some_and(|spread| spread <= MAX_WITHIN_SQUARE * contrast.abs());
         found.is_clear(contrast) && found.even_less_odd * contrast > 0.0 && is_plain
     }
 
@@ -157,7 +143,7 @@ impl Row {
     }
 }
 
-/// Between the squares of both colours \[grey levels\].
+/// Difference between the squares of both colours \[grey levels\].
 struct Difference {
     /// Mean of the even squares less that of the odd ones.
     even_less_odd: f64,
@@ -166,8 +152,7 @@ struct Difference {
 }
 
 impl Difference {
-    /// Between squares that are given with their numbers; `None` without one of either
-    /// colour.
+    /// From numbered squares; `None` without one of either colour.
     fn of(squares: impl Iterator<Item = (usize, f64)>) -> Option<Self> {
         let mut sums = [(0.0, 0.0, 0.0); 2];
         for (number, value) in squares {
@@ -189,8 +174,8 @@ impl Difference {
     }
 }
 
-/// The next two corners after three along a line, going outwards; the first two of
-/// the three are the outermost. To the second order, for the lens and the tilt.
+/// The next two corners after three along a line, by quadratic extrapolation for distortion and
+/// tilt; the first of the three is the outermost.
 fn beyond([outer, next, third]: [ImagePoint; 3]) -> [ImagePoint; 2] {
     let extend = |a: ImagePoint, b: ImagePoint, c: ImagePoint| {
         ImagePoint::from(a.coords * 3.0 - b.coords * 3.0 + c.coords)
@@ -199,15 +184,15 @@ fn beyond([outer, next, third]: [ImagePoint; 3]) -> [ImagePoint; 2] {
     [first, extend(first, outer, next)]
 }
 
-/// What a square looks like well within it \[grey levels\].
+/// Grey values well within a square \[grey levels\].
 struct Shade {
     mean: f64,
-    /// Standard deviation of its places.
+    /// Standard deviation of its samples.
     spread: f64,
 }
 
 impl Shade {
-    /// Of a square given row by row; `None` where it leaves the picture.
+    /// Of a square given row by row; `None` outside the image.
     fn of(grey: &GreyImage<'_>, square: [ImagePoint; 4]) -> Option<Self> {
         let [above, below] = [[square[0], square[1]], [square[2], square[3]]];
         let between = |ends: [ImagePoint; 2], part: f64| ends[0] + (ends[1] - ends[0]) * part;

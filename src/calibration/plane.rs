@@ -2,30 +2,30 @@
 
 use nalgebra::{Point3, Rotation3, Vector3};
 
-use super::bundle;
-use super::bundle::Guess;
+use super::bundle::{self, Guess};
 use super::equations::{BoardPlacement, CameraModel, Correspondence, FreeParameters};
 use super::solve;
 use crate::core::geometry::Pose;
 use crate::core::units::Mm;
+use crate::numeric::number::to_f64;
 
-/// Boards that lay on the bed, on one plane.
+/// Boards on the bed, in one plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OnBed {
-    /// Where they lay; the axes are those of the first.
+    /// Their poses; the axes are those of the first.
     pub place: BoardPlacement,
     /// Their corners.
     pub boards: Vec<Vec<Correspondence>>,
-    /// Root mean square of what the corners are off \[px\].
+    /// Root mean square reprojection error \[px\].
     pub rms_px: f64,
-    /// How far the board that is furthest off lies above or below the plane, where
-    /// its middle is, with a pose of its own \[mm\]; 0 for a single board.
+    /// Largest distance from the plane of the middle of a board with a pose of its own \[mm\];
+    /// 0 for a single board.
     pub off_mm: f64,
 }
 
 impl OnBed {
-    /// Fits one plane to boards that a known camera sees. `None` without a board, or
-    /// where the corners of one fit no pose.
+    /// Fits one plane to boards that a known camera sees. `None` without a board, or where the
+    /// corners of one fit no pose.
     pub fn fit(model: &CameraModel, boards: Vec<Vec<Correspondence>>) -> Option<Self> {
         let poses: Vec<Pose> =
             boards.iter().map(|corners| solve::pose(model, corners)).collect::<Option<_>>()?;
@@ -37,8 +37,7 @@ impl OnBed {
         let fit = bundle::fit(start, FreeParameters::PLACEMENTS, &all)?;
         let [boards] = all;
         let place = fit.placements.into_iter().next()?;
-        #[expect(clippy::cast_precision_loss, reason = "a count of corners")]
-        let corners = boards.iter().map(Vec::len).sum::<usize>().max(1) as f64;
+        let corners = to_f64(boards.iter().map(Vec::len).sum::<usize>().max(1));
         let off = poses.iter().zip(&boards).map(|(pose, corners)| {
             let middle = pose.apply(middle_of(corners));
             place.pose.apply_inverse(middle).z.abs()
@@ -54,7 +53,7 @@ impl OnBed {
     }
 }
 
-/// Where a board's axes lie on the plane of another, roughly.
+/// Approximate position of a board in the plane of another.
 fn in_plane_of(first: &Pose, other: &Pose) -> [f64; 3] {
     let origin = first.apply_inverse(Point3::from(other.translation_mm()));
     let along = first.turn_inverse(other.rotation() * Vector3::x());
@@ -62,8 +61,7 @@ fn in_plane_of(first: &Pose, other: &Pose) -> [f64; 3] {
 }
 
 fn middle_of(corners: &[Correspondence]) -> Point3<f64> {
-    #[expect(clippy::cast_precision_loss, reason = "a count of corners")]
-    let count = corners.len().max(1) as f64;
+    let count = to_f64(corners.len().max(1));
     let sum = corners.iter().map(|corner| corner.on_board.coords).sum::<nalgebra::Vector2<f64>>();
     Point3::new(sum.x / count, sum.y / count, 0.0)
 }
@@ -72,7 +70,7 @@ fn middle_of(corners: &[Correspondence]) -> Point3<f64> {
 /// `thickness` above the bed.
 ///
 /// Z of the bed points at the camera. A board whose Z points away from it, as
-/// is usual with corners counted like the picture's axes, is turned half round
+/// is usual with corners counted like the image's axes, is turned half round
 /// its x axis; its origin and x stay, y and z change sign.
 pub fn bed_from_board(board: &Pose, thickness: Mm) -> Pose {
     let face = board.translation_mm();
@@ -90,8 +88,7 @@ pub fn bed_from_board(board: &Pose, thickness: Mm) -> Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::synthetic;
-    use crate::calibration::synthetic::{TRUTH, board};
+    use crate::calibration::synthetic::{self, TRUTH, board};
 
     const TILT: [f64; 3] = [0.2, -0.3, 0.1];
 

@@ -1,31 +1,27 @@
-//! Why a picture of a board is not used, with what to do about it.
+//! Why an image of a board is not used, and what to do about it.
 
 use super::board::NotABoard;
 use super::charuco::MarkerError;
+use super::focus::FocusFault;
 use super::outline::BoardSide;
 use crate::bridge::BridgeError;
 use crate::core::geometry::GridSize;
 
-/// Corners of a board with markers that must show, in [`LEAST_LINES`] of its rows and as
-/// many columns.
+/// Corners of a board with markers that must be visible. A choice: a pose has six parameters, a
+/// corner gives two.
 pub const MIN_CORNERS: usize = 8;
-/// The rows and the columns.
+/// Rows and columns that these corners must cover.
 pub const MIN_LINES: usize = 3;
 
-/// Why a picture is not used.
+/// Why a image is not used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BoardRejection {
     /// It cannot be read.
     #[error("unreadable: {0}")]
     Unreadable(String),
     /// The board, all of it, is not to be seen.
-    #[error("no board with {columns}x{rows} inner corners")]
-    NoBoard {
-        /// Inner corners along a row.
-        columns: usize,
-        /// Inner corners along a column.
-        rows: usize,
-    },
+    #[error("no board with {}x{} inner corners", .0.columns, .0.rows)]
+    NoBoard(GridSize),
     /// A board with other counts.
     #[error(
         "a board with {}x{} inner corners shows, not one with {}x{}: see that all of it is in \
@@ -33,73 +29,56 @@ pub enum BoardRejection {
         found.columns, found.rows, expected.columns, expected.rows
     )]
     OtherBoard {
-        /// Inner corners that show, along a row and along a column.
+        /// Inner corners of the visible board.
         found: GridSize,
-        /// Those of the board that was told.
+        /// Inner corners of the specified board.
         expected: GridSize,
     },
-    /// A larger board, of which the one that was told would be a part.
+    /// A larger board, of which the specified one is a part.
     #[error(
-        "the board goes on beyond {columns}x{rows} inner corners, {}: count again and correct \
-         --board", sides_text(.sides)
+        "the board goes on beyond {}x{} inner corners, {}: count again and correct \
+         --board", board.columns, board.rows, sides_text(.sides)
     )]
     Larger {
-        /// Inner corners along a row that were told.
-        columns: usize,
-        /// Inner corners along a column.
-        rows: usize,
-        /// Where it goes on.
+        /// Inner corners of the board that was specified.
+        board: GridSize,
+        /// Where it continues.
         sides: Vec<BoardSide>,
     },
-    /// A smaller board, or something that looks like a corner of it.
+    /// A smaller board, or an occluded one.
     #[error(
-        "no row of squares {} of {columns}x{rows} inner corners: count again and correct \
-         --board, or see that nothing covers the board", sides_text(.sides)
+        "no row of squares {} of {}x{} inner corners: count again and correct \
+         --board, or see that nothing covers the board", sides_text(.sides), board.columns, board.rows
     )]
     Smaller {
-        /// Inner corners along a row that were told.
-        columns: usize,
-        /// Inner corners along a column.
-        rows: usize,
+        /// Inner corners of the board that was specified.
+        board: GridSize,
         /// Where it ends.
         sides: Vec<BoardSide>,
     },
     /// Something like a board, but not one.
     #[error("no sound board: {0}")]
     NotABoard(#[from] NotABoard),
-    /// Out of focus.
-    #[error(
-        "blurred by {blur_px:.1} px: focus the lens on the board, and calibrate with that focus"
-    )]
-    Blurred {
-        /// Standard deviation of the blur \[px\].
-        blur_px: f64,
-    },
-    /// Taken in motion.
-    #[error(
-        "the board moved by {motion_px:.1} px during the exposure: hold it still, or expose shorter"
-    )]
-    Moved {
-        /// How far \[px\].
-        motion_px: f64,
-    },
+    /// Out of focus, or taken in motion.
+    #[error(transparent)]
+    NotSharp(#[from] FocusFault),
     /// The board is where it was in another image.
     #[error("the board is where it is in {of} (within {shift_px:.1} px), which says nothing new")]
     Duplicate {
-        /// The other picture's name.
+        /// The other image's name.
         of: String,
         /// Mean shift of the corners \[px\].
         shift_px: f64,
     },
     /// It is not of the size that most others have.
-    #[error("size {found}, while most are {expected}", found = size_text(*.found), expected = size_text(*.expected))]
+    #[error("size {}, while most are {}", size_text(*.found), size_text(*.expected))]
     Size {
         /// Its size \[px\].
         found: [u32; 2],
-        /// The size of most pictures \[px\].
+        /// The size of most images \[px\].
         expected: [u32; 2],
     },
-    /// A board with markers where a plain one was told.
+    /// A board with markers where a plain one was specified.
     #[error(
         "a board with markers shows, not a plain one: give --marker-mm, and --dictionary if its \
          markers are not of 4x4 cells"

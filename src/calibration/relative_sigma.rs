@@ -1,5 +1,4 @@
-//! What a calibration leaves open in a width, as a share of the width, over a part
-//! of the picture.
+//! Relative standard deviation of a width due to a calibration, over a part of the image.
 
 use nalgebra::Vector2;
 
@@ -7,28 +6,26 @@ use super::covariance::{CalibrationCovariance, DerivedValue};
 use crate::core::geometry::ImagePoint;
 use crate::core::units::Mm;
 
-/// A bead for which the share is told fills this much of a side.
+/// Width of the bead as a fraction of the side of that part. A choice: a usual bead.
 const BEAD_FRACTION: f64 = 1.0 / 3.0;
-/// Middles of such beads along each side.
+/// Positions of such beads along each side.
 const POSITIONS_PER_SIDE: u32 = 5;
-/// The highest surface for which the share is told, as a part of the camera's
-/// height above the bed.
+/// Highest surface as a fraction of the height of the camera above the bed.
 const MAX_SURFACE_FRACTION: f64 = 0.05;
 
-/// Relative standard deviation of a width where boards were seen: the
-/// largest that a bead has which fills a third of that part of the picture,
-/// along either axis, anywhere in it, on the bed and on a surface that is a
-/// twentieth of the camera's height above it. The largest and not a mean,
-/// because a gauge stays in its place, and with it the error. `None` where
-/// no such bead is seen on the surface.
+/// Relative standard deviation of a width where boards were seen: the largest of a bead that
+/// fills a third of that part of the image, along either axis, anywhere in it, on the bed and
+/// on a surface at a twentieth of the height of the camera. The largest and not a mean, because
+/// a gauge stays at one position, and so does its error. `None` where no such bead is seen on
+/// the surface.
 pub fn where_seen(covariance: &CalibrationCovariance) -> Option<f64> {
     largest(covariance, &readings(covariance))
 }
 
-/// Largest share of beads that were read.
+/// Largest relative standard deviation of the widths of beads.
 pub fn largest(covariance: &CalibrationCovariance, readings: &[DerivedValue]) -> Option<f64> {
-    let share = |reading: &DerivedValue| covariance.sigma(reading) / reading.value;
-    readings.iter().map(share).filter(|share| share.is_finite()).reduce(f64::max)
+    let fraction = |reading: &DerivedValue| covariance.sigma(reading) / reading.value;
+    readings.iter().map(fraction).filter(|fraction| fraction.is_finite()).reduce(f64::max)
 }
 
 fn readings(covariance: &CalibrationCovariance) -> Vec<DerivedValue> {
@@ -36,26 +33,26 @@ fn readings(covariance: &CalibrationCovariance) -> Vec<DerivedValue> {
     beads.filter_map(|(ends, height)| covariance.width(ends, height)).collect()
 }
 
-/// Ends of beads all over the part of the picture where boards were seen, on the bed and
-/// on the highest surface.
+/// Ends of beads all over the part of the image where boards were seen, on the bed and on the
+/// highest surface.
 pub fn beads_where_seen(covariance: &CalibrationCovariance) -> Vec<([ImagePoint; 2], Mm)> {
     let above = Mm::new(MAX_SURFACE_FRACTION * covariance.camera_height_mm()).unwrap_or(Mm::ZERO);
     let on = |height| beads(covariance.seen_px()).map(move |ends| (ends, height));
     [Mm::ZERO, above].into_iter().flat_map(on).collect()
 }
 
-/// Ends of the beads for which the share is told, all of them within a part of
-/// the picture, and as far from its border along the bead as across it.
+/// Ends of these beads within a part of the image, as far from its boundary along the bead as
+/// across it.
 fn beads([from, to]: [ImagePoint; 2]) -> impl Iterator<Item = [ImagePoint; 2]> {
     let size = to - from;
-    let place = |i: u32| {
+    let position = |i: u32| {
         BEAD_FRACTION / 2.0
             + (1.0 - BEAD_FRACTION) * f64::from(i) / f64::from(POSITIONS_PER_SIDE - 1)
     };
     let middles = (0..POSITIONS_PER_SIDE * POSITIONS_PER_SIDE).map(move |i| {
         from + size.component_mul(&Vector2::new(
-            place(i % POSITIONS_PER_SIDE),
-            place(i / POSITIONS_PER_SIDE),
+            position(i % POSITIONS_PER_SIDE),
+            position(i / POSITIONS_PER_SIDE),
         ))
     });
     let halves =

@@ -1,13 +1,13 @@
-//! What a calibration leaves in the width of a bead all over the image, as its file tells
-//! it.
+//! Relative standard deviation of a bead's width all over the image, from the calibration file.
 
 use nalgebra::Vector2;
 
 use super::width_map::Cells;
 use super::{SurfaceMap, width_map};
 use crate::core::geometry::{ImagePoint, Roi};
+use crate::numeric::number::to_f64;
 
-/// Relative standard deviations of the width of one bead that runs one way.
+/// Relative standard deviations of the width of one bead in one direction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RelativeSigmaMap {
     /// Width of the bead \[mm\].
@@ -16,12 +16,12 @@ pub struct RelativeSigmaMap {
     pub image_size_px: [u32; 2],
     /// Cells along the image and across it.
     pub counts: Cells,
-    /// Of a bead whose middle is in the middle of a cell, row by row. `None` where such a
-    /// bead is not seen whole.
+    /// For a bead in the middle of each cell, row by row. `None` where the bead is not entirely
+    /// in the image.
     pub cells: Vec<Option<f64>>,
 }
 
-/// A bead of which the standard deviation is asked for.
+/// A bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapBead {
     /// Its width \[mm\].
@@ -31,8 +31,8 @@ pub struct MapBead {
 }
 
 impl RelativeSigmaMap {
-    /// On a surface. `None` for a calibration that knows no image, or no more of widths than
-    /// one number.
+    /// For a bead on a surface. `None` for a calibration without an image size or without a
+    /// covariance.
     pub fn of(surface: &SurfaceMap, bead: &MapBead, counts: Cells) -> Option<Self> {
         let image_size_px = surface.image_size_px()?;
         surface.uncertainty()?;
@@ -54,12 +54,11 @@ impl RelativeSigmaMap {
         [left, top, right, bottom]
     }
 
-    /// Whether a gauge covers the middle of a cell, or lies in it with its own.
-    #[expect(clippy::cast_precision_loss, reason = "pixels of an image")]
+    /// Whether a gauge contains the middle of a cell, or the cell the middle of the gauge.
     pub fn is_in(&self, gauge: Roi, cell: u32) -> bool {
         let [left, top, right, bottom] = self.cell_px(cell);
-        let from = Vector2::new(gauge.x as f64, gauge.y as f64) - Vector2::repeat(0.5);
-        let to = from + Vector2::new(gauge.width as f64, gauge.height as f64);
+        let from = Vector2::new(to_f64(gauge.x), to_f64(gauge.y)) - Vector2::repeat(0.5);
+        let to = from + Vector2::new(to_f64(gauge.width), to_f64(gauge.height));
         let is_on = |at: f64, low: f64, high: f64| (low..high).contains(&at);
         let along = |low: f64, high: f64, from: f64, to: f64| {
             is_on(f64::midpoint(low, high), from, to) || is_on(f64::midpoint(from, to), low, high)
@@ -67,14 +66,14 @@ impl RelativeSigmaMap {
         along(left, right, from.x, to.x) && along(top, bottom, from.y, to.y)
     }
 
-    /// Smallest and largest of the cells; `None` where no such bead is seen.
+    /// Smallest and largest of the cells; `None` without one.
     pub fn range(&self) -> Option<(f64, f64)> {
         let cells = || self.cells.iter().flatten().copied();
         Some((cells().reduce(f64::min)?, cells().reduce(f64::max)?))
     }
 }
 
-/// Of a bead with its middle at a pixel. `None` where it is not seen whole.
+/// For a bead with its middle at a pixel. `None` where it is not entirely in the image.
 pub fn relative_sigma_at(surface: &SurfaceMap, bead: &MapBead, middle: ImagePoint) -> Option<f64> {
     let ends = width_map::ends(surface, middle, bead.across, bead.width_mm)?;
     surface.width_relative_sigma_of(ends)
@@ -85,8 +84,7 @@ mod tests {
     use super::*;
     use crate::calibration::covariance::CalibrationCovariance;
     use crate::calibration::plane::OnBed;
-    use crate::calibration::synthetic;
-    use crate::calibration::synthetic::{SIZE, board, poses};
+    use crate::calibration::synthetic::{self, SIZE, board, poses};
     use crate::calibration::{Calibration, CalibrationQuality, solve};
     use crate::core::units::Mm;
 

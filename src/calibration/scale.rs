@@ -1,5 +1,4 @@
-//! The single number of the 2022 paper out of a full calibration, and how far
-//! it can be trusted.
+//! The scale of the 2022 paper from a full calibration, and its validity.
 
 use nalgebra::Point2;
 
@@ -7,28 +6,28 @@ use super::{Calibration, SurfaceMap};
 use crate::core::geometry::ImagePoint;
 use crate::core::units::Mm;
 
-/// One size for all pixels, and the sizes they really have.
+/// One scale for all pixels, and its range over the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SingleScale {
     /// Millimetres a pixel in the middle of the image, mean of all
     /// directions.
     pub mm_per_px: f64,
-    /// Half the difference between the largest and the smallest size of that
-    /// pixel: so wrong is the number for a bead that runs along one of them
-    /// \[mm/px\].
+    /// Half the difference between the largest and the smallest scale of that pixel over
+    /// direction: the error for a bead along one of them \[mm/px\].
     pub uneven: f64,
-    /// The smallest anywhere in the picture, in any direction \[mm/px\].
+    /// The smallest anywhere in the image, in any direction \[mm/px\].
     pub smallest: f64,
-    /// The largest anywhere in the picture, in any direction \[mm/px\].
+    /// The largest anywhere in the image, in any direction \[mm/px\].
     pub largest: f64,
 }
 
-/// Points along each side at which the size of a pixel is taken.
+/// Points along each side at which the scale is evaluated. A choice: the extremes are at the
+/// boundary.
 const GRID_POINTS: u32 = 9;
 
-/// The single number of Shojaei Barjuei et al. 2022, section 4.3.1, at a
-/// surface of this height. `None` where the middle of the picture does not see
-/// the surface, and for a calibration that knows no picture size.
+/// The scale of Shojaei Barjuei et al. 2022, section 4.3.1, at a surface of this height. `None`
+/// where the middle of the image does not see the surface, and for a calibration without an
+/// image size.
 pub fn single_scale(calibration: &Calibration, surface_height: Mm) -> Option<SingleScale> {
     let image_size_px = calibration.image_size_px()?;
     let [width, height] = image_size_px.map(|px| f64::from(px) - 1.0);
@@ -45,7 +44,7 @@ pub fn single_scale(calibration: &Calibration, surface_height: Mm) -> Option<Sin
     Some(SingleScale { mm_per_px, uneven, smallest, largest })
 }
 
-/// Millimetres a pixel in the middle of a picture of this size, mean of all
+/// Millimetres a pixel in the middle of a image of this size, mean of all
 /// directions; `None` where the middle does not see the surface.
 pub(super) fn in_the_middle(map: &SurfaceMap, image_size_px: [u32; 2]) -> Option<f64> {
     let [x, y] = image_size_px.map(|px| (f64::from(px) - 1.0) / 2.0);

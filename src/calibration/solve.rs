@@ -1,4 +1,4 @@
-//! From pictures of a board to the camera model.
+//! The camera model from images of a board.
 
 pub mod data;
 mod error;
@@ -9,22 +9,19 @@ pub use solution::{BoardView, Solution};
 
 use super::board::Board;
 use super::board_observation::BoardObservation;
-use super::bundle;
-use super::bundle::{BundleFit, Guess};
-use super::camera::NUMBERS;
+use super::bundle::{self, BundleFit, Guess};
 use super::equations::{BoardPlacement, CameraModel, Correspondence, FreeParameters, SHARED};
 use super::homography;
+#[cfg(test)]
 use super::lens::Lens;
-use super::lens_selection;
-use super::lens_selection::LensTrial;
-use super::view_information;
-use super::view_information::ViewInformation;
+use super::lens_selection::{self, LensTrial};
+use super::view_information::{self, ViewInformation};
 use crate::core::geometry::{ImagePoint, Pose};
 use data::{CalibrationData, root_mean_square};
 use error::MAX_RMS_PX;
 
-/// Fits the camera to sightings that are all of one size, with the lens and the bend
-/// of the board that foretell pictures best which took no part in the fit.
+/// Fits the camera to images of one size, with the lens model and the bend of the board of
+/// least cross-validation error.
 pub fn solve(board: &Board, sightings: &[BoardObservation]) -> Result<Solution, SolveError> {
     let views = CalibrationData::of(board, sightings)?;
     let (fit, free, trials) = lens_selection::best(&views)
@@ -32,7 +29,8 @@ pub fn solve(board: &Board, sightings: &[BoardObservation]) -> Result<Solution, 
     solution(&views, sightings, &fit, free, trials)
 }
 
-/// The same with a lens that is given, on a flat board.
+/// The same with a given lens, on a flat board.
+#[cfg(test)]
 pub fn solve_with(
     board: &Board,
     sightings: &[BoardObservation],
@@ -66,30 +64,27 @@ fn solution(
         .unwrap_or(1.0);
     let of_numbers_px = noise_px * design_effect.sqrt();
     let spreads = views.unit_sigmas(fit, free).filter(|_| of_numbers_px.is_finite());
-    let each: Vec<BoardView> = sightings
-        .iter()
-        .zip(fit.placements.iter().zip(&views.boards))
-        .map(|(sighting, (place, boards))| view(&fit.model, sighting, place.pose, &boards[0]))
-        .collect();
+    let each = sightings.iter().zip(fit.placements.iter().zip(&views.boards));
+    let each = each.map(|(sighting, (position, boards))| {
+        view(&fit.model, sighting, position.pose, &boards[0])
+    });
+    let used = trials.iter().find(|trial| trial.free == free);
+    let cross_validation_px = used.and_then(|trial| trial.cross_validation_px);
     Ok(Solution {
         model: fit.model,
         free,
         sigma: spreads.map(|spreads| spreads.map(|spread| spread * of_numbers_px)),
         image_size_px: views.size,
         rms_px,
-        cross_validation_px: trials
-            .iter()
-            .find(|t| t.free == free)
-            .and_then(|t| t.cross_validation_px),
+        cross_validation_px,
         noise_px,
         design_effect,
         trials,
-        views: each,
+        views: each.collect(),
     })
 }
 
-/// The pose of a board before a camera that is known. `None` where the corners fit
-/// none.
+/// Pose of a board before a known camera. `None` where the corners fit none.
 pub fn pose(model: &CameraModel, corners: &[Correspondence]) -> Option<Pose> {
     let start = homography::board_pose(&model.camera, corners)?;
     let fit = bundle::fit(
@@ -97,11 +92,11 @@ pub fn pose(model: &CameraModel, corners: &[Correspondence]) -> Option<Pose> {
         FreeParameters::PLACEMENTS,
         &[vec![corners.to_vec()]],
     )?;
-    fit.placements.first().map(|place| place.pose)
+    fit.placements.first().map(|position| position.pose)
 }
 
-/// Errors of one picture by this crate's own camera model, the one that
-/// measures later; a corner that it cannot project counts as infinitely far.
+/// Reprojection errors of one image by the camera model that measures later; a corner that
+/// cannot be projected counts as infinitely far.
 fn view(
     model: &CameraModel,
     sighting: &BoardObservation,
@@ -109,14 +104,11 @@ fn view(
     corners: &[Correspondence],
 ) -> BoardView {
     let far = nalgebra::Vector2::repeat(f64::INFINITY);
-    let errors_px: Vec<_> = corners
-        .iter()
-        .map(|corner| {
-            let expected: Option<ImagePoint> =
-                model.camera.project(pose.apply(model.on_board(corner)));
-            expected.map_or(far, |px| corner.observed - px)
-        })
-        .collect();
+    let error_px = |corner: &Correspondence| {
+        let expected = model.camera.project(pose.apply(model.on_board(corner)));
+        expected.map_or(far, |px: ImagePoint| corner.observed - px)
+    };
+    let errors_px: Vec<_> = corners.iter().map(error_px).collect();
     let squares = errors_px.iter().map(nalgebra::Vector2::norm_squared).sum();
     BoardView {
         name: sighting.name.clone(),
@@ -128,18 +120,12 @@ fn view(
     }
 }
 
-/// The names of the shared numbers, in order.
-pub const SHARED_NAMES: [&str; SHARED] = {
-    let mut names = [""; SHARED];
-    let mut i = 0;
-    while i < NUMBERS {
-        names[i] = super::camera::NAMES[i];
-        i += 1;
-    }
-    names[NUMBERS] = "bend along rows";
-    names[NUMBERS + 1] = "bend along columns";
-    names
-};
+/// Names of the shared parameters, in order.
+#[rustfmt::skip]
+pub const SHARED_NAMES: [&str; SHARED] = [
+    "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6",
+    "bend along rows", "bend along columns",
+];
 
 #[cfg(test)]
 mod tests;

@@ -19,15 +19,16 @@ pub fn board() -> Board {
     Board::new(9, 6, Mm::constant(20.0)).unwrap()
 }
 
-/// A dozen poses of the board around the picture, tilted to all sides.
+/// A dozen poses of the board around the image, tilted to all sides.
 pub fn poses() -> Vec<Pose> {
     (0..12_u32)
         .map(|i| {
             let turn = f64::from(i) * 0.55;
             let tilt = 0.15 + 0.04 * f64::from(i);
             let rotation = Vector3::new(tilt * turn.cos(), tilt * turn.sin(), 0.1 * turn);
-            let place = Vector3::new(-80.0 + 25.0 * turn.cos(), -50.0 + 18.0 * turn.sin(), 420.0);
-            Pose::new(rotation, place)
+            let position =
+                Vector3::new(-80.0 + 25.0 * turn.cos(), -50.0 + 18.0 * turn.sin(), 420.0);
+            Pose::new(rotation, position)
         })
         .collect()
 }
@@ -40,12 +41,12 @@ pub fn corners(pose: &Pose, mut off: impl FnMut() -> f64) -> Vec<ImagePoint> {
     board_mm.into_iter().map(seen).map(|p| ImagePoint::new(p.x + off(), p.y + off())).collect()
 }
 
-/// The same as the corners that a picture shows.
+/// The same as the corners that a image shows.
 pub fn seen(pose: &Pose, off: impl FnMut() -> f64) -> Vec<CornerObservation> {
     observe_all(&corners(pose, off))
 }
 
-/// The same as a picture.
+/// The same as a image.
 pub fn sighting(name: &str, pose: &Pose, off: impl FnMut() -> f64) -> BoardObservation {
     BoardObservation {
         name: name.to_owned(),

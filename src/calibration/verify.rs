@@ -1,61 +1,59 @@
-//! Whether a calibration still holds: a board of a known size on the bed is measured
-//! as a bead would be.
+//! Whether a calibration still holds: a board of known size on the bed is measured as a bead
+//! would be.
 
-use nalgebra::{Point2, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 
+use super::Calibration;
 use super::Camera;
 use super::board::{Board, CornerObservation};
+use super::board_fit::BoardFit;
 use super::equations::CameraModel;
 use super::plane::bed_from_board;
 use super::solve;
-use super::{Calibration, SurfaceMap};
 use crate::core::geometry::Pose;
 use crate::core::units::Mm;
+use crate::numeric::number::to_f64;
 
-/// Widths are compared over this part of the board at least.
+/// Distances are compared over at least this fraction of the board. A choice between noise and
+/// resolution.
 const MIN_PART: f64 = 0.3;
-/// Standard deviations that the noise of two corners may make of the error of their
-/// distance; there are hundreds of distances.
+/// Standard deviations by which the noise of two corners may change their distance: some
+/// hundred distances are compared.
 const NOISE_SIGMAS: f64 = 4.0;
 
-/// What a board on the bed says of a calibration.
+/// Result of the verification.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Findings {
-    /// Side of a square as it measures, in the mean \[mm\].
+    /// Measured side of a square \[mm\].
     pub square_mm: f64,
-    /// That over its true side, less one.
+    /// Measured over true side, less one.
     pub scale_error: f64,
-    /// The error of the distance along a row or a column, 0.3 of the board long or
-    /// longer, that is furthest beyond what the corners' noise explains, as a share of
-    /// the distance.
+    /// Relative error of the distance along a row or a column that exceeds the noise of the
+    /// corners most, at least 0.3 of the board long.
     pub worst_error: f64,
-    /// How much of it the corners' noise may make, as a share of the distance.
+    /// Part of it that the noise of the corners explains, as a fraction of the distance.
     pub noise: f64,
-    /// Middle and length of that distance: column and row on the board, counted from
-    /// 0, and mm.
+    /// Middle of that distance as column and row on the board, from 0, and its length \[mm\].
     pub worst_at: (f64, f64, f64),
-    /// Root mean square distance of the corners from a board of the measured size
-    /// \[mm\].
+    /// Root mean square distance of the corners from a board of the measured size \[mm\].
     pub rms_mm: f64,
-    /// How far the board lies above the place where it should be, by the size at which
-    /// it is seen \[mm\]: its middle.
+    /// Height of the board's middle above its true position, from its apparent size \[mm\].
     pub height_mm: f64,
-    /// How far it is tilted against the bed \[degrees\].
+    /// Tilt against the bed \[degrees\].
     pub tilt_deg: f64,
-    /// Root mean square of what is left between seen and expected corners with the best
-    /// pose of the board \[px\]: the lens alone, wherever the board lies.
+    /// Root mean square reprojection error with the best pose of the board \[px\]: the lens
+    /// alone, wherever the board is.
     pub reprojection_rms_px: f64,
 }
 
 impl Findings {
-    /// Whether no width is further off than this share of it, as far as the corners'
-    /// noise lets it be seen.
+    /// Whether no width has a larger relative error than this, beyond the noise of the corners.
     pub fn holds(&self, tolerance: f64) -> bool {
         self.scale_error.abs() <= tolerance && self.worst_error.abs() - self.noise <= tolerance
     }
 }
 
-/// Why a board says nothing of a calibration.
+/// Why a board does not verify a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum VerifyError {
     /// A single number has no camera.
@@ -83,12 +81,12 @@ pub fn verify(
         return Err(VerifyError::NoCamera);
     };
     let map = calibration.surface(thickness, None);
-    let on_bed = places(&map, corners).ok_or(VerifyError::OffBed)?;
-    let (scale, rms_mm) = similarity(board, corners, &on_bed).ok_or(VerifyError::OffBed)?;
+    let BoardFit { on_plane, scale, rms_mm, .. } =
+        BoardFit::similar(&map, board, corners).ok_or(VerifyError::OffBed)?;
     let (height_mm, tilt_deg, reprojection_rms_px) =
         board_pose(camera, bed, board, corners, thickness).ok_or(VerifyError::NoPose)?;
     let (worst_error, noise, worst_at) =
-        worst(board, corners, &on_bed, reprojection_rms_px).ok_or(VerifyError::TooLittle)?;
+        worst(board, corners, &on_plane, reprojection_rms_px).ok_or(VerifyError::TooLittle)?;
     Ok(Findings {
         square_mm: scale * board.square().get(),
         scale_error: scale - 1.0,
@@ -102,59 +100,12 @@ pub fn verify(
     })
 }
 
-fn places(map: &SurfaceMap, corners: &[CornerObservation]) -> Option<Vec<Point2<f64>>> {
-    corners.iter().map(|corner| map.to_mm(corner.px)).collect()
-}
-
-/// Scale and residual \[mm\] of the similarity that takes the board to where it was
-/// measured, by least squares; mirrored, because the bed's y and the board's run
-/// against each other.
-#[expect(clippy::cast_precision_loss, reason = "a count of corners")]
-fn similarity(
-    board: &Board,
-    corners: &[CornerObservation],
-    on_bed: &[Point2<f64>],
-) -> Option<(f64, f64)> {
-    let flat: Vec<Vector2<f64>> = board
-        .correspondences(corners)
-        .iter()
-        .map(|c| Vector2::new(c.on_board.x, -c.on_board.y))
-        .collect();
-    let count = flat.len() as f64;
-    let middle =
-        |points: &mut dyn Iterator<Item = Vector2<f64>>| points.sum::<Vector2<f64>>() / count;
-    let from = middle(&mut flat.iter().copied());
-    let to = middle(&mut on_bed.iter().map(|p| p.coords));
-    // Complex numbers: to − middle = s·(from − middle).
-    let (mut along, mut across, mut squares) = (0.0, 0.0, 0.0);
-    for (a, b) in flat.iter().zip(on_bed) {
-        let (a, b) = (a - from, b.coords - to);
-        along += a.dot(&b);
-        across += a.perp(&b);
-        squares += a.norm_squared();
-    }
-    let (re, im) = (along / squares, across / squares);
-    let left: f64 = flat
-        .iter()
-        .zip(on_bed)
-        .map(|(a, b)| {
-            let a = a - from;
-            let taken = Vector2::new(re * a.x - im * a.y, im * a.x + re * a.y);
-            (b.coords - to - taken).norm_squared()
-        })
-        .sum();
-    let scale = re.hypot(im);
-    scale.is_finite().then(|| (scale, (left / count).sqrt()))
-}
-
-/// The error of a distance along a row or a column that is furthest beyond its noise,
-/// as a share, with that noise and where it is. `None` where no two corners are as far
-/// apart in a row or a column.
-#[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
+/// The relative error of a distance along a row or a column that exceeds its noise most, with
+/// that noise and its position. `None` without two corners far enough apart.
 fn worst(
     board: &Board,
     corners: &[CornerObservation],
-    on_bed: &[Point2<f64>],
+    on_plane: &[Vector2<f64>],
     rms_px: f64,
 ) -> Option<(f64, f64, (f64, f64, f64))> {
     let columns = board.corners().columns;
@@ -170,25 +121,25 @@ fn worst(
             } else {
                 continue;
             };
-            if (along as f64) < MIN_PART * (total - 1) as f64 {
+            if to_f64(along) < MIN_PART * to_f64(total - 1) {
                 continue;
             }
-            let true_mm = along as f64 * board.square().get();
-            let error = (on_bed[j] - on_bed[i]).norm() / true_mm - 1.0;
-            // Two ends, each off by 1/√2 of the RMS along the way between them.
+            let true_mm = to_f64(along) * board.square().get();
+            let error = (on_plane[j] - on_plane[i]).norm() / true_mm - 1.0;
+            // Two ends, each with a standard deviation of RMS/√2 along the distance.
             let noise = NOISE_SIGMAS * rms_px / (b.px - a.px).norm();
             if worst.is_none_or(|(most, of_it, _)| error.abs() - noise > most.abs() - of_it) {
-                let middle = |a: usize, b: usize| 0.5 * (a + b) as f64;
-                let place = (middle(column, other_column), middle(row, other_row), true_mm);
-                worst = Some((error, noise, place));
+                let middle = |a: usize, b: usize| 0.5 * to_f64(a + b);
+                let position = (middle(column, other_column), middle(row, other_row), true_mm);
+                worst = Some((error, noise, position));
             }
         }
     }
     worst
 }
 
-/// Height of the board above its place \[mm\], its tilt \[degrees\], and what the best
-/// pose leaves \[px\].
+/// Height of the board above its position \[mm\], its tilt \[degrees\], and the reprojection
+/// error of the best pose \[px\].
 fn board_pose(
     camera: &Camera,
     bed: &Pose,
@@ -206,16 +157,14 @@ fn board_pose(
     let at = bed.apply_inverse(pose.apply(middle.into()));
     let (up, true_up) = (seen.rotation() * Vector3::z(), bed.rotation() * Vector3::z());
     let tilt_deg = up.cross(&true_up).norm().atan2(up.dot(&true_up)).to_degrees();
-    #[expect(clippy::cast_precision_loss, reason = "a count of corners")]
-    let rms_px = (squares / corners.len() as f64).sqrt();
+    let rms_px = (squares / to_f64(corners.len())).sqrt();
     Some((at.z - thickness.get(), tilt_deg, rms_px))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::synthetic;
-    use crate::calibration::synthetic::{SIZE, TRUTH, board};
+    use crate::calibration::synthetic::{self, SIZE, TRUTH, board};
 
     const THICKNESS: Mm = Mm::constant(3.0);
 
@@ -254,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_board_that_is_higher_measures_larger_and_is_told_to_be_higher() {
+    fn a_higher_board_measures_larger_and_its_height_is_found() {
         let found = verify(&calibration(TRUTH), &board(), &seen(4.0), THICKNESS).unwrap();
         assert!((found.height_mm - 4.0).abs() < 1e-3, "{found:?}");
         // 4 mm of about 415 mm.

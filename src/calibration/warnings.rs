@@ -1,6 +1,5 @@
-//! What should make one doubt a calibration. A small residual is not quality:
-//! pictures that are too few, too alike or too much in the middle fit well and
-//! say little.
+//! Warnings about a calibration. A small residual is not quality: images that are too few, too
+//! similar or too much in the middle fit well and contain little information.
 
 use nalgebra::Vector3;
 
@@ -8,16 +7,16 @@ use super::coverage::{Coverage, PARTS};
 use super::solve::{BoardView, Solution};
 use crate::numeric::rank;
 
-/// A reason for doubt, and what to do about it.
+/// A warning, and what to do about it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Warning {
-    /// Few pictures.
+    /// Few images.
     #[error("only {found} images show the board; {MIN_VIEWS} or more average errors better")]
     FewViews {
-        /// Pictures that show it.
+        /// Images that show it.
         found: usize,
     },
-    /// Parts of the picture were never seen with a board.
+    /// Parts of the image without corners.
     #[error(
         "the boards cover {covered} of {PARTS} parts of the image; distortion is a guess in \
          the others, so bring the board into the corners too"
@@ -26,7 +25,7 @@ pub enum Warning {
         /// Parts that saw a corner.
         covered: usize,
     },
-    /// Every board was seen from straight ahead.
+    /// No board is tilted.
     #[error(
         "no board is tilted by more than {tilt_deg:.0} degrees; distance and focal length are \
          hard to tell apart, so tilt it by 20 to 45 degrees to several sides"
@@ -44,15 +43,15 @@ pub enum Warning {
         /// Root mean square over all corners \[px\].
         rms_px: f64,
     },
-    /// One picture is much worse than the rest.
+    /// One image is much worse than the rest.
     #[error("{name} fits {times:.1} times worse than the others; look at it, or leave it out")]
     Outlier {
-        /// The picture's name.
+        /// The image's name.
         name: String,
         /// Its error over the median error.
         times: f64,
     },
-    /// The distortion polynomial turns over within the picture.
+    /// The distortion polynomial is not monotonic within the image.
     #[error(
         "the lens model is not monotonic before pixel ({x:.0}, {y:.0}), and nothing can be measured \
          there; bring the board into the corners of the image"
@@ -71,14 +70,23 @@ pub enum Warning {
     },
 }
 
+/// Number of images below which a warning is given. A choice: errors average as one over its
+/// root.
 const MIN_VIEWS: usize = 8;
+/// Parts of the image with corners below which a warning is given, of [`PARTS`].
 const MIN_CELLS: usize = 12;
+/// Largest tilt below which a warning is given \[degrees\]: the focal length follows from
+/// tilted boards only.
 const MIN_TILT_DEG: f64 = 15.0;
+/// Reprojection error above which a warning is given \[px\]. A choice: several times that of
+/// sharp images.
 const MAX_RMS_PX: f64 = 0.5;
+/// Reprojection error of an image over the median above which a warning is given.
 const OUTLIER_RATIO: f64 = 3.0;
+/// Relative standard deviation of the focal length above which a warning is given \[%\].
 const MAX_FOCAL_PERCENT: f64 = 1.0;
 
-/// Everything that should make one doubt this solution.
+/// All warnings about a solution.
 pub fn warnings(solution: &Solution) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let found = solution.views.len();
@@ -108,7 +116,7 @@ pub fn warnings(solution: &Solution) -> Vec<Warning> {
     warnings
 }
 
-/// Whether the pictures tell the camera's numbers apart at all.
+/// Whether the images determine the camera.
 pub fn settles_camera(solution: &Solution) -> bool {
     let loose = |warning: &Warning| {
         matches!(warning, Warning::UncertainFocal { .. } | Warning::NoTilt { .. })
@@ -117,8 +125,7 @@ pub fn settles_camera(solution: &Solution) -> bool {
 }
 
 fn outliers(views: &[BoardView]) -> impl Iterator<Item = Warning> {
-    let mut errors: Vec<f64> = views.iter().map(|view| view.rms_px).collect();
-    let typical = rank::median(&mut errors).unwrap_or(f64::INFINITY);
+    let typical = rank::median_of(views.iter().map(|view| view.rms_px)).unwrap_or(f64::INFINITY);
     let times = move |view: &BoardView| view.rms_px / typical;
     let worse = views.iter().filter(move |view| times(view) > OUTLIER_RATIO);
     worse.map(move |view| Warning::Outlier { name: view.name.clone(), times: times(view) })
@@ -168,27 +175,27 @@ mod tests {
         }
     }
 
-    /// Sixteen views that see a part of the picture each.
+    /// Sixteen views that see a part of the image each.
     fn good() -> Vec<BoardView> {
         let at = |i: u32| ImagePoint::new(f64::from(i % 4) * 25.0 + 5.0, f64::from(i / 4) * 25.0);
         (0..16).map(|i| view(&i.to_string(), at(i), 0.03 * f64::from(i), 0.2)).collect()
     }
 
     #[test]
-    fn many_tilted_views_all_over_the_picture_raise_no_doubt() {
+    fn many_tilted_views_all_over_the_image_raise_no_warning() {
         assert_eq!(warnings(&solution(good())), vec![]);
     }
 
     #[test]
-    fn each_weakness_is_told() {
+    fn each_weakness_is_reported() {
         let mut odd = good();
         odd[4].rms_px = 0.9;
         let outlier = Warning::Outlier { name: "4".into(), times: 0.9 / 0.2 };
         assert_eq!(warnings(&solution(odd)), vec![outlier]);
         let same = |_| view("a", ImagePoint::new(50.0, 50.0), 0.1, 0.2);
-        let told = warnings(&solution((0..5).map(same).collect()));
+        let reported = warnings(&solution((0..5).map(same).collect()));
         assert!(matches!(
-            told[..],
+            reported[..],
             [
                 Warning::FewViews { found: 5 },
                 Warning::Coverage { covered: 1 },
@@ -199,7 +206,10 @@ mod tests {
         folded.model.camera.distortion[0] = -200.0;
         assert_eq!(warnings(&folded), vec![Warning::NonMonotonic { x: 0.0, y: 0.0 }]);
         let loose = Solution { sigma: Some([20.0; SHARED]), rms_px: 0.8, ..solution(good()) };
-        let told = warnings(&loose);
-        assert!(matches!(told[..], [Warning::HighError { .. }, Warning::UncertainFocal { .. }]));
+        let reported = warnings(&loose);
+        assert!(matches!(
+            reported[..],
+            [Warning::HighError { .. }, Warning::UncertainFocal { .. }]
+        ));
     }
 }

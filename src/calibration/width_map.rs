@@ -1,5 +1,4 @@
-//! The standard deviation that a calibration leaves in a width, in millimetres, all
-//! over the picture.
+//! Standard deviation of a width due to a calibration, in millimetres, all over the image.
 
 use nalgebra::Vector2;
 
@@ -8,7 +7,7 @@ use super::covariance::CalibrationCovariance;
 use crate::core::geometry::ImagePoint;
 use crate::core::units::Mm;
 
-/// Cells that an image is cut into.
+/// Numbers of cells of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cells {
     /// How many along a row.
@@ -20,65 +19,59 @@ pub struct Cells {
 /// Cells of a map of widths.
 pub const MAP_CELLS: Cells = Cells { columns: 16, rows: 12 };
 
-/// What a calibration leaves in the width of a bead on one surface.
+/// Standard deviation of a bead's width on one surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WidthMap {
     /// Width of the bead \[mm\].
     pub bead_mm: f64,
     /// Height of the surface above the bed.
     pub surface_height: Mm,
-    /// Standard deviation of a bead whose middle is in the middle of a cell \[mm\],
-    /// the larger one of a bead along the picture and of one across it; row by row,
-    /// [`CELLS`]. `None` where such a bead is not seen whole.
+    /// Standard deviation for a bead in the middle of a cell \[mm\], the larger one of both
+    /// directions; row by row, [`MAP_CELLS`]. `None` where such a bead is not entirely in the
+    /// image.
     pub cells: Vec<Option<f64>>,
-    /// The largest, of beads that lie where boards were seen; `None` without one.
+    /// The largest, of beads where boards were seen; `None` without one.
     pub worst_where_seen_mm: Option<f64>,
-    /// How much the width of this bead changes if its height is wrong by 1 mm \[mm\].
+    /// Change of the width for a height error of 1 mm \[mm\].
     pub mm_per_mm_height: f64,
 }
 
 impl WidthMap {
     /// For beads of a width on a surface.
     pub fn of(covariance: &CalibrationCovariance, bead_mm: f64, surface_height: Mm) -> Self {
-        let mut worst: Option<f64> = None;
+        let mut worst_where_seen_mm: Option<f64> = None;
         let cells = beads(covariance, bead_mm, surface_height)
             .map(|beads| {
                 let sigmas = beads.iter().flatten().filter_map(|&ends| {
                     let (_, sigma_mm) = covariance.width_mm(ends, surface_height)?;
                     if is_where_seen(covariance, &ends) {
-                        worst = Some(worst.map_or(sigma_mm, |worst| worst.max(sigma_mm)));
+                        let worst = worst_where_seen_mm.map_or(sigma_mm, |mm| mm.max(sigma_mm));
+                        worst_where_seen_mm = Some(worst);
                     }
                     Some(sigma_mm)
                 });
                 sigmas.reduce(f64::max)
             })
             .collect();
-        let above = covariance.camera_height_mm() - surface_height.get();
-        Self {
-            bead_mm,
-            surface_height,
-            cells,
-            worst_where_seen_mm: worst,
-            mm_per_mm_height: bead_mm / above,
-        }
+        let mm_per_mm_height = bead_mm / (covariance.camera_height_mm() - surface_height.get());
+        Self { bead_mm, surface_height, cells, worst_where_seen_mm, mm_per_mm_height }
     }
 
-    /// Smallest and largest of the cells \[mm\]; `None` where no such bead is seen.
+    /// Smallest and largest of the cells \[mm\]; `None` without one.
     pub fn range_mm(&self) -> Option<(f64, f64)> {
         let cells = || self.cells.iter().flatten().copied();
         Some((cells().reduce(f64::min)?, cells().reduce(f64::max)?))
     }
 }
 
-/// The largest of several maps, where boards were seen \[mm\]; `None` where one of them
-/// does not tell.
+/// The largest of several maps where boards were seen \[mm\]; `None` where one of them has
+/// none.
 pub fn worst_mm(maps: &[WidthMap]) -> Option<f64> {
     let worst = maps.iter().map(|map| map.worst_where_seen_mm);
     worst.reduce(|a, b| Some(a?.max(b?))).flatten()
 }
 
-/// Ends of beads of a width that lie where boards were seen: those by which
-/// [`WidthMap::worst_where_seen_mm`] is told.
+/// Ends of beads of a width where boards were seen: those of [`WidthMap::worst_where_seen_mm`].
 pub fn where_seen(
     covariance: &CalibrationCovariance,
     bead_mm: f64,
@@ -93,7 +86,7 @@ fn is_where_seen(covariance: &CalibrationCovariance, ends: &[ImagePoint; 2]) -> 
     ends.iter().all(|px| (from.x..=to.x).contains(&px.x) && (from.y..=to.y).contains(&px.y))
 }
 
-/// Ends of a bead along the picture and of one across it, about the middle of each cell.
+/// Ends of a bead in either direction about the middle of each cell.
 fn beads(
     covariance: &CalibrationCovariance,
     bead_mm: f64,
@@ -105,7 +98,7 @@ fn beads(
     })
 }
 
-/// Middles of so many cells along and across an image of this size \[px\], row by row.
+/// Middles of the cells of an image of this size \[px\], row by row.
 pub(super) fn middles(size_px: [f64; 2], cells: Cells) -> impl Iterator<Item = ImagePoint> {
     let Cells { columns, rows } = cells;
     let part = |at: u32, count: u32| (f64::from(at) + 0.5) / f64::from(count);
@@ -115,8 +108,8 @@ pub(super) fn middles(size_px: [f64; 2], cells: Cells) -> impl Iterator<Item = I
     })
 }
 
-/// Ends of a bead of this width about a middle, along one axis of the picture.
-/// `None` where it is not seen whole, or the map knows no size of the picture.
+/// Ends of a bead of this width about a point, along one axis of the image. `None` where it is
+/// not entirely in the image, or the map has no image size.
 pub(super) fn ends(
     map: &SurfaceMap,
     middle: ImagePoint,
@@ -131,13 +124,14 @@ pub(super) fn ends(
     ends.iter().all(inside).then_some(ends)
 }
 
-/// A bead that fills a third of the picture's width on the bed, to two digits \[mm\]. `None` where the middle of the picture does not see the bed.
+/// A third of the image width on the bed, to two digits \[mm\]. `None` where the middle of the
+/// image does not see the bed.
 pub fn typical_bead_mm(covariance: &CalibrationCovariance) -> Option<f64> {
     let [width, height] = covariance.image_size_px().map(f64::from);
     let map = covariance.surface(Mm::ZERO);
     let end = |part: f64| map.to_mm(ImagePoint::new(part * width, height / 2.0));
     let third = (end(2.0 / 3.0)? - end(1.0 / 3.0)?).norm();
-    // To two digits.
+    // Rounded to two digits.
     let unit = 10_f64.powf(third.log10().floor() - 1.0);
     Some((third / unit).round() * unit)
 }
@@ -148,8 +142,7 @@ mod tests {
     use crate::calibration::next_view;
     use crate::calibration::plane::OnBed;
     use crate::calibration::solve;
-    use crate::calibration::synthetic;
-    use crate::calibration::synthetic::{board, poses};
+    use crate::calibration::synthetic::{self, board, poses};
 
     fn covariance() -> (solve::Solution, CalibrationCovariance) {
         let mut turn = 0.0_f64;
@@ -176,7 +169,7 @@ mod tests {
         let worst = map.worst_where_seen_mm.unwrap();
         assert!(least <= worst && worst < most, "{least} {worst} {most}");
         assert_eq!(map.cells.len(), 192);
-        // A corner of the picture has no room for a bead about its middle.
+        // A corner of the image has no room for a bead about its middle.
         assert_eq!(map.cells[0], None);
         let height = covariance.camera_height_mm();
         assert!((map.mm_per_mm_height - 40.0 / height).abs() < 1e-9);
@@ -185,12 +178,12 @@ mod tests {
     }
 
     #[test]
-    fn the_picture_that_is_asked_for_brings_what_is_said_of_it() {
+    fn the_proposed_image_brings_the_predicted_gain() {
         let (solution, covariance) = covariance();
         let heights = [Mm::ZERO, Mm::constant(20.0)];
         let next = next_view::best(&board(), &solution, &covariance, 40.0, &heights).unwrap();
         let (before, after) = next.relative_sigma;
-        // What it begins with is what the maps tell.
+        // Its initial uncertainty is that of the maps.
         let worst = heights
             .map(|height| WidthMap::of(&covariance, 40.0, height).worst_where_seen_mm.unwrap())
             .into_iter()

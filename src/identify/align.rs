@@ -1,13 +1,13 @@
-//! Measured is not extruded: a bead is measured some way behind the nozzle.
-//! In time that way changes with the speed, in position it is constant
-//! (bcs-thesis, 3.1.2 and table 2). Add the offset to each position, look ahead
-//! for the two samples that bracket the sum, and interpolate what was measured
-//! between them.
+//! Alignment of a measured output with the moment of extrusion: a bead is measured some
+//! distance behind the nozzle. The delay changes with the speed, the distance is constant
+//! (bcs-thesis, 3.1.2 and table 2). The value for a sample is the one that was measured once
+//! the material had moved on by the offset, interpolated between the two samples that bracket
+//! it.
 
-/// Samples that cannot be aligned. Counted from 1.
+/// Samples that cannot be aligned, counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum AlignError {
-    /// Columns of different length.
+    /// Columns of different lengths.
     #[error("{positions} positions and {measured} measured values: expected one of each a sample")]
     Length {
         /// Positions.
@@ -15,13 +15,13 @@ pub enum AlignError {
         /// Measured values.
         measured: usize,
     },
-    /// The place of measurement lies before the nozzle.
+    /// The position of measurement is ahead of the nozzle.
     #[error("an offset of {offset}: expected the way from nozzle to measurement, 0 or more")]
     Offset {
-        /// What was told.
+        /// The specified offset.
         offset: f64,
     },
-    /// A position that is less than the one before.
+    /// A position below the one before.
     #[error(
         "the position falls from {before} to {position} at sample {at}: expected one that only \
          grows; turn its sign, or use one bead alone"
@@ -44,10 +44,9 @@ pub enum AlignError {
     },
 }
 
-/// What was measured, at the moments of extrusion: for each sample the value
-/// that was measured once its material had come `offset` further, in the unit
-/// of the positions (mm, or clicks of an encoder). `None` at the end, where the
-/// material has not come that far.
+/// The measured values at the moments of extrusion, with the offset in the unit of the
+/// positions (mm, or encoder counts). `None` at the end, where the material has not moved as
+/// far.
 pub fn to_extruded(
     positions: &[f64],
     measured: &[f64],
@@ -57,7 +56,7 @@ pub fn to_extruded(
     let mut ahead = 0;
     let mut next = |position: f64| {
         let desired = position + offset;
-        // Positions only grow, and so does what is looked for.
+        // Positions only grow, and so does the one that is searched.
         while positions.get(ahead).is_some_and(|there| *there < desired) {
             ahead += 1;
         }

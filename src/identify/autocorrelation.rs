@@ -1,21 +1,21 @@
-//! What a model leaves: whether it still hangs together.
+//! Autocorrelation of the residuals of a model.
 
 use crate::numeric::number::to_f64;
 
-/// Of a normal variable 99 % lie within so many standard deviations.
+/// Derived: Φ⁻¹(0.995), the bound of 99 % of a normal variable in standard deviations.
 const NORMAL_99: f64 = 2.5758;
 
-/// How much a row repeats itself.
+/// The sample autocorrelation of a row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Autocorrelation {
-    /// Correlation with itself so many samples later, from 0 on, where it is 1.
+    /// Correlation by lag in samples, from 0, where it is 1.
     pub lags: Vec<f64>,
-    /// 99 % of the lags of white noise lie within plus and minus this.
+    /// 99 % of the lags of white noise are within ± this (Bartlett 1946).
     pub bound: f64,
 }
 
 impl Autocorrelation {
-    /// Up to a lag; of a row about its mean.
+    /// Up to a lag, about the mean of the row.
     pub fn of(row: &[f64], longest: usize) -> Self {
         let n = to_f64(row.len().max(1));
         let mean = row.iter().sum::<f64>() / n;
@@ -30,8 +30,7 @@ impl Autocorrelation {
         Self { lags: (0..=longest).map(correlation).collect(), bound: NORMAL_99 / n.sqrt() }
     }
 
-    /// Share of the lags from 1 on that white noise would hardly have: some 1 %
-    /// of them for white noise.
+    /// Fraction of the lags from 1 on that exceed the bound; about 1 % for white noise.
     pub fn fraction_outside(&self) -> f64 {
         let lags = self.lags.get(1..).unwrap_or_default();
         let outside = lags.iter().filter(|lag| lag.abs() > self.bound).count();
@@ -58,18 +57,28 @@ mod tests {
     }
 
     #[test]
-    fn white_noise_stays_within_its_bounds_and_coloured_noise_does_not() {
+    fn white_noise_stays_within_its_bounds_and_autocorrelated_noise_does_not() {
         let white = Autocorrelation::of(&noise(0.0), 200);
         assert_eq!((white.lags[0], white.lags.len()), (1.0, 201));
         assert!(white.fraction_outside() < 0.04, "{}", white.fraction_outside());
-        let coloured = Autocorrelation::of(&noise(0.9), 10);
-        assert!((coloured.lags[5] - 0.9_f64.powi(5)).abs() < 0.05, "{:?}", coloured.lags);
-        assert!(coloured.fraction_outside() > 0.9);
+        let autocorrelated = Autocorrelation::of(&noise(0.9), 10);
+        assert!(
+            (autocorrelated.lags[5] - 0.9_f64.powi(5)).abs() < 0.05,
+            "{:?}",
+            autocorrelated.lags
+        );
+        assert!(autocorrelated.fraction_outside() > 0.9);
     }
 
     #[test]
     fn nothing_correlates_with_nothing() {
         assert_eq!(Autocorrelation::of(&[], 5).lags, [0.0]);
         assert_eq!(Autocorrelation::of(&[3.0; 9], 3).lags, [0.0; 4]);
+    }
+
+    #[test]
+    fn the_bound_holds_99_of_100_normal_numbers() {
+        let phi = crate::numeric::normal_distribution::cumulative(NORMAL_99);
+        assert!((phi - 0.995).abs() < 1e-6);
     }
 }

@@ -1,15 +1,15 @@
-//! What the standard errors of a fit mean for its answers: a step response and
-//! a frequency response with their standard deviations, by the derivatives
-//! after each parameter.
+//! Step response and frequency response of a fitted model with their standard deviations,
+//! propagated to first order from the covariance of the parameters.
 
 use crate::numeric::lti::{FirstOrder, ModelError, SecondOrder, TransferFunction, simulate};
 
 use super::fit::{DeadTime, Fit, Structure};
 
-/// A parameter is moved by this share of its standard error for a derivative.
+/// Step of the difference quotients in standard errors of a parameter. A choice: small against
+/// the curvature, large against rounding.
 const RELATIVE_STEP: f64 = 1e-3;
 
-/// A curve with its standard deviation, a value each for every place.
+/// A curve with its standard deviation.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Band {
     /// Time \[s\] or frequency \[Hz\].
@@ -20,16 +20,16 @@ pub struct Band {
     pub sigma: Vec<f64>,
 }
 
-/// The answer to a step of one unit of the input at 0 s, every `step_s` for
-/// `count` samples, in units of the output.
+/// Response to a unit step of the input at 0 s, every `step_s` for `count` samples, in units of
+/// the output.
 pub fn step_response(fit: &Fit, step_s: f64, count: u32) -> Result<Band, ModelError> {
     let ones = vec![1.0; count as usize];
     let at = (0..count).map(|k| f64::from(k) * step_s).collect();
     with_sigma(fit, at, |model| simulate(model, &ones, step_s))
 }
 
-/// Gain \[dB\] and phase \[°\] at frequencies \[Hz\]; the phase is without jumps
-/// when the frequencies only grow.
+/// Gain \[dB\] and phase \[°\] at frequencies \[Hz\]; the phase is continuous for growing
+/// frequencies.
 pub fn frequency_response(fit: &Fit, hz: &[f64]) -> Result<[Band; 2], ModelError> {
     let gain = with_sigma(fit, hz.to_vec(), |model| {
         Ok(hz.iter().map(|f| 20.0 * libm::log10(model.at_frequency(radians(*f)).norm())).collect())
@@ -78,7 +78,7 @@ fn with_sigma(
     Ok(Band { at, sigma: sigma.collect(), value })
 }
 
-/// The model with one parameter moved; a dead time does not become negative.
+/// The model with one parameter changed; a dead time does not become negative.
 fn moved(fit: &Fit, number: usize, by: f64) -> Result<TransferFunction, ModelError> {
     let value = |name: &str| {
         let found = fit.parameters.iter().enumerate().find(|(_, one)| one.name == name);

@@ -1,29 +1,27 @@
-//! How far behind the nozzle the camera looks, from a bead whose speed changed while it
-//! was laid.
+//! Distance from the nozzle to the camera's gauge, from a bead whose speed changed while it was
+//! laid.
 //!
-//! A width that was measured while the nozzle was at the path p is that of bead laid at
-//! p − d. The bead is w = A·(v/v₀)^−b with the speed v that the robot reported there, in
-//! the mean over the gauge. For every d the level and b are fitted to ln w by least
-//! squares; what is left is least at the offset, and how steeply it grows there says how
-//! well the offset is known.
+//! A width that is measured while the nozzle is at path position p belongs to bead laid at p −
+//! d. The bead is w = A·(v/v₀)^−b, with the reported speed v averaged over the gauge. For each
+//! d, the level and b are fitted to ln w by least squares. The sum of squares is smallest at
+//! the offset, and its curvature gives the standard error.
 //!
-//! Widths are no independent numbers: gauges overlap, the bead is wavy and the flow
-//! drifts, and a controller answers to all that with the very speed that is looked at
-//! here. So widths are taken together over a gauge's length, and what is left of them is
-//! taken for independent noise on a course that wanders along the path, both as large as
-//! is likeliest. The squares are those of what each differs from what the ones before it
-//! foretell (`whiten`): a drift counts neither as many observations nor, where the
-//! controller follows it, as an answer of the bead to the speed (Ljung 1999, *System
-//! identification*, section 13.4, the direct approach). That is chosen over a bootstrap
-//! of blocks because a bead with a few steps of the speed has too few blocks, and over a
-//! number of effective samples because that leaves the answer itself as it is.
+//! Widths are not independent: gauges overlap, the bead is rough, the flow drifts, and a
+//! controller changes the very speed that is used here. Widths are therefore averaged over a
+//! gauge length, and their residuals are modelled as independent noise plus a first-order
+//! autoregressive process along the path, both with maximum likelihood. The sum of squares is
+//! that of the normalised innovations (`whiten`): a drift counts neither as many observations
+//! nor, where the controller follows it, as a response of the bead to the speed (Ljung 1999,
+//! *System identification*, section 13.4, the direct approach). A block bootstrap is not used
+//! because a bead with a few speed steps has too few blocks, and an effective sample size is
+//! not used because it would leave the estimate itself biased.
 
 mod data;
 mod error;
 mod estimate;
+pub mod laid_speeds;
 mod observation;
 mod offset_profile;
-pub mod speed_profile;
 mod whiten;
 
 #[cfg(test)]
@@ -32,45 +30,45 @@ mod tests;
 use data::PooledWidths;
 pub use error::{CameraOffsetError, MIN_PIECES, MIN_WIDTHS};
 pub use estimate::{EXPONENT_RANGE, OffsetEstimate, OffsetStudy, SpeedRange, WidthAtSpeed};
+use laid_speeds::LaidSpeeds;
 use observation::BeadObservation;
 use offset_profile::{NearlyAsGood, OffsetProfile};
-use speed_profile::SpeedProfile;
 use whiten::WidthNoise;
 
 use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 
-/// Change of the speed below which no width shows it.
+/// Relative change of the speed below which no width responds measurably. A choice.
 const MIN_SPEED_CHANGE: f64 = 0.01;
-/// Part of a bead's speeds, at either end, that does not count as their range.
+/// Fraction of a bead's speeds at either end that is excluded from their range.
 const TAIL_FRACTION: f64 = 0.02;
-/// Squares, in units of the noise, by which a speed that tells must lessen what is left:
-/// five standard deviations, because many offsets are tried.
+/// Decrease of the sum of squares by the speed, in units of the noise variance, below which the
+/// speed has no effect. Derived: five standard deviations squared, for the many offsets that
+/// are tried.
 const MIN_GAIN: f64 = 25.0;
-/// Another offset is as good if it is worse by no more than four standard deviations, or
-/// explains nine tenths of what the best one does.
+/// Another offset is as good if its sum of squares is larger by at most four standard
+/// deviations squared, or if it explains nine tenths of what the best one does.
 const NEARLY_AS_GOOD: NearlyAsGood = NearlyAsGood { worse: 16.0, explained: 0.9 };
-/// Those that explain this part of it are held against the best.
+/// Offsets that explain this fraction of what the best one does are compared with it.
 const MIN_RIVAL_FRACTION: f64 = 0.4;
-/// Times that offset, exponent, noise and the widths that count are found anew.
+/// Limit of the iterations of offset, exponent, noise and outliers.
 const MAX_ITERATIONS: usize = 8;
-/// Change of the offset below which they are settled \[mm\].
+/// Change of the offset below which the iteration has converged \[mm\].
 const SETTLED_MM: f64 = 0.01;
 
-/// A width that was measured.
+/// A measured width with its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MeasuredWidth {
+pub struct TimedWidth {
     /// When its frame was captured.
     pub at: Stamp,
     /// The width.
     pub width: Mm,
-    /// Its standard deviation, as the measurement believes it; only how these compare
-    /// with each other counts.
+    /// Its standard deviation according to the measurement; only ratios matter.
     pub sigma: Mm,
 }
 
-/// Where an offset is looked for.
+/// Range of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OffsetSearch {
     /// Length of the gauge along the bead.
@@ -79,35 +77,34 @@ pub struct OffsetSearch {
     pub max_offset: Mm,
 }
 
-/// Finds the offset from what the robot reported, in order, and the widths that were
-/// measured meanwhile.
+/// The offset from the robot's reports, in order, and the measured widths.
 pub fn find(
     states: &[(Stamp, RobotState)],
-    widths: &[MeasuredWidth],
+    widths: &[TimedWidth],
     search: OffsetSearch,
 ) -> Result<OffsetEstimate, CameraOffsetError> {
     study(states, widths, search).map(|study| study.estimate)
 }
 
-/// The same with all that is known of the bead.
+/// The same with the fitted model of the bead.
 pub fn study(
     states: &[(Stamp, RobotState)],
-    widths: &[MeasuredWidth],
+    widths: &[TimedWidth],
     search: OffsetSearch,
 ) -> Result<OffsetStudy, CameraOffsetError> {
-    let course = SpeedProfile::of(states).ok_or(CameraOffsetError::NoPath)?;
-    let looks: Vec<BeadObservation> =
-        widths.iter().filter_map(|width| observation(&course, width)).collect();
-    if looks.len() < MIN_WIDTHS {
-        return Err(CameraOffsetError::TooFew { found: looks.len() });
+    let course = LaidSpeeds::of(states).ok_or(CameraOffsetError::NoPath)?;
+    let count = widths.len();
+    let observations: Vec<BeadObservation> =
+        widths.iter().filter_map(|width| observed(&course, width)).collect();
+    if observations.len() < MIN_WIDTHS {
+        return Err(CameraOffsetError::TooFew { found: observations.len() });
     }
     let speeds = course.range(TAIL_FRACTION);
-    let SpeedRange { min: from, max: to } = speeds;
-    if to.get() < from.get() * (1.0 + MIN_SPEED_CHANGE) {
-        return Err(CameraOffsetError::ConstantSpeed { from, to });
+    if speeds.max.get() < speeds.min.get() * (1.0 + MIN_SPEED_CHANGE) {
+        return Err(CameraOffsetError::ConstantSpeed { speeds });
     }
-    let settled = iterate(&course, &looks, search, speeds)?;
-    settled.check(&course, &looks, search)?;
+    let settled = iterate(&course, &observations, search, speeds)?;
+    settled.check(&course, &observations, search)?;
     let Converged { profile, best, .. } = &settled;
     let found = OffsetEstimate {
         offset: mm(best.offset_mm),
@@ -116,7 +113,7 @@ pub fn study(
         at_bound: best.exponent <= EXPONENT_RANGE.0 || best.exponent >= EXPONENT_RANGE.1,
         speeds,
         used: settled.used.len(),
-        left_out: widths.len() - settled.used.len(),
+        left_out: count - settled.used.len(),
         residual_rms: profile.residual_rms(best),
     };
     if found.sigma >= found.offset {
@@ -124,31 +121,27 @@ pub fn study(
     }
     let covariance = profile.covariance(best, found.sigma.get());
     let (ln_level, mean_ln_speed) = profile.level(best);
-    let (seen, pieces) = profile.widths_at_speed(best);
+    let (widths, pieces) = profile.widths_at_speed(best);
     Ok(OffsetStudy {
         estimate: found,
         exponent_sigma: covariance[1].sqrt(),
         level_mm: ln_level.exp(),
         mean_speed_mm_per_s: mean_ln_speed.exp(),
         covariance,
-        widths: seen,
+        widths,
         pieces,
     })
 }
 
-fn observation(course: &SpeedProfile, width: &MeasuredWidth) -> Option<BeadObservation> {
+fn observed(course: &LaidSpeeds, width: &TimedWidth) -> Option<BeadObservation> {
     let (bead, path_mm) = course.path_at(width.at)?;
     let (value, sigma) = (width.width.get(), width.sigma.get());
-    let sound = value > 0.0 && sigma >= 0.0;
-    sound.then(|| BeadObservation {
-        bead,
-        path_mm,
-        ln_width: value.ln(),
-        relative_sigma: sigma / value,
-    })
+    let (ln_width, relative_sigma) = (value.ln(), sigma / value);
+    let is_sound = value > 0.0 && sigma >= 0.0;
+    is_sound.then_some(BeadObservation { bead, path_mm, ln_width, relative_sigma })
 }
 
-/// Offset, exponent, noise and the widths that count, which fit each other.
+/// Consistent offset, exponent, noise and set of widths.
 struct Converged {
     used: Vec<BeadObservation>,
     noise: WidthNoise,
@@ -156,16 +149,16 @@ struct Converged {
     best: offset_profile::OffsetFit,
 }
 
-/// Finds them in turn, each with what is known of the others.
+/// Estimates them in turn until they do not change.
 fn iterate(
-    course: &SpeedProfile,
-    looks: &[BeadObservation],
+    course: &LaidSpeeds,
+    observations: &[BeadObservation],
     search: OffsetSearch,
     speeds: SpeedRange,
 ) -> Result<Converged, CameraOffsetError> {
     let mut noise = WidthNoise::INITIAL;
     let mut exponent = 0.5;
-    let mut used = looks.to_vec();
+    let mut used = observations.to_vec();
     let mut before_mm = f64::NAN;
     let mut round = 0;
     loop {
@@ -177,11 +170,11 @@ fn iterate(
         }
         let best = profile.best(search.max_offset.get());
         if profile.gain(&best) < MIN_GAIN {
-            let SpeedRange { min: from, max: to } = speeds;
-            return Err(CameraOffsetError::NoResponse { from, to, max_offset: search.max_offset });
+            return Err(CameraOffsetError::NoResponse { speeds, max_offset: search.max_offset });
         }
         let likeliest = profile.likeliest_noise(&best);
-        let next = offset_profile::without_outliers(course, looks, search.gauge, &best, likeliest);
+        let next =
+            offset_profile::without_outliers(course, observations, search.gauge, &best, likeliest);
         if next.len() < MIN_WIDTHS {
             return Err(CameraOffsetError::TooFew { found: next.len() });
         }
@@ -197,11 +190,11 @@ fn iterate(
 }
 
 impl Converged {
-    /// Whether the best offset is one that the widths tell.
+    /// Whether the widths determine the best offset.
     fn check(
         &self,
-        course: &SpeedProfile,
-        looks: &[BeadObservation],
+        course: &LaidSpeeds,
+        observations: &[BeadObservation],
         search: OffsetSearch,
     ) -> Result<(), CameraOffsetError> {
         let Self { profile, best, .. } = self;
@@ -212,11 +205,12 @@ impl Converged {
         }
         let rival =
             profile.rivals(best, farthest.get(), MIN_RIVAL_FRACTION).into_iter().find(|&rival| {
-                // Held against each other by widths that both can foretell.
+                // Compared on the widths that both can predict.
                 let both = |look: &&BeadObservation| {
                     [best.offset_mm, rival].iter().all(|&d| course.covers(look, d, search.gauge))
                 };
-                let shared: Vec<BeadObservation> = looks.iter().filter(both).copied().collect();
+                let shared: Vec<BeadObservation> =
+                    observations.iter().filter(both).copied().collect();
                 if shared.len() < MIN_WIDTHS {
                     return true;
                 }

@@ -1,4 +1,4 @@
-//! A command over time, as stairs: each value holds until the next one.
+//! A command over time as a staircase: each value holds until the next one.
 
 pub mod file;
 
@@ -11,22 +11,22 @@ pub struct ProfilePoint {
     pub value: f64,
 }
 
-/// Two times of a sum of steps that differ by less are the same \[s\].
+/// Times that differ by less are equal \[s\]: rounding of a sum of steps.
 const TIME_TOLERANCE_S: f64 = 1e-9;
 
-/// Points that make no profile. Counted from 1.
+/// Points that form no profile, counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum CommandProfileError {
     /// There is none.
     #[error("a profile without a single value")]
     Empty,
-    /// The first one comes late.
+    /// The first one begins after 0 s.
     #[error("value 1 of a profile begins at {from_s} s: a profile begins at 0 s")]
     LateStart {
         /// When it begins \[s\].
         from_s: f64,
     },
-    /// Time that does not run on.
+    /// Time does not increase.
     #[error("value {at} of a profile begins at {from_s} s, the one before it at {before_s} s")]
     Order {
         /// Which one.
@@ -36,7 +36,7 @@ pub enum CommandProfileError {
         /// When the one before it does \[s\].
         before_s: f64,
     },
-    /// A number that is none.
+    /// A value is not finite.
     #[error("value {at} of a profile is {value}")]
     NotFinite {
         /// Which one.
@@ -85,8 +85,8 @@ impl CommandProfile {
         Ok(Self { points, end_s })
     }
 
-    /// The value at a moment \[s\]: the first before the beginning, the last
-    /// after the end.
+    /// The value at a moment \[s\]: the first one before the beginning, the last one after the
+    /// end.
     pub fn at(&self, time_s: f64) -> f64 {
         let begun = self.points.partition_point(|point| point.from_s <= time_s + TIME_TOLERANCE_S);
         let now = self.points.get(begun.saturating_sub(1)).or(self.points.last());
@@ -114,9 +114,8 @@ impl CommandProfile {
         self.points.iter().fold(start, |(low, high), p| (low.min(p.value), high.max(p.value)))
     }
 
-    /// With a level before and after it: the extruder settles before the
-    /// excitation begins, and its answer is seen to the end. Nothing is added
-    /// for a time of 0 s.
+    /// With a constant level before and after it: the extruder settles before the excitation,
+    /// and its response is recorded to the end. Nothing is added for 0 s.
     pub fn with_lead(
         self,
         level: f64,

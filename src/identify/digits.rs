@@ -1,11 +1,11 @@
-//! Numbers as sentences give them.
+//! Rounded numbers for messages.
 
-/// A value to six digits, without the tail that arithmetic leaves.
+/// A value to six significant digits, without trailing rounding errors.
 pub fn six_digits(value: f64) -> String {
     rounded(value, 5)
 }
 
-/// The same to three digits, for what is known about.
+/// The same to three digits, for approximate values.
 pub fn three_digits(value: f64) -> String {
     rounded(value, 2)
 }

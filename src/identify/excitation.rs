@@ -1,6 +1,5 @@
-//! What to excite an extruder with so that its model can be found: binary
-//! sequences, random Gaussian levels (bcs-thesis, 1.5.3) and stairs, as
-//! profiles that a cell can play.
+//! Excitation signals for identification: binary sequences, random Gaussian levels (bcs-thesis,
+//! 1.5.3) and stairs.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
@@ -8,15 +7,17 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::command_profile::{CommandProfile, CommandProfileError, ProfilePoint};
 use super::prbs::{NoSuchLength, Prbs};
+use crate::numeric::number::{to_count, to_f64};
 
-/// Draws of a Gaussian level after which one outside the limits is cut to them.
+/// Draws of a Gaussian level after which one outside the limits is clipped.
 const MAX_DRAWS: u32 = 64;
-/// Values that a profile may have: a day of ten a second.
+/// Largest number of values of a profile. A choice: a day at ten a second.
 const MAX_POINTS: f64 = 1e6;
-/// A level that is held for T has half its power below this share of 1/T.
+/// Derived: the solution of sinc²(x) = ½, the frequency times T at which a level held for T has
+/// half its power density.
 const HALF_POWER_FREQUENCY: f64 = 0.443;
 
-/// What cannot be played.
+/// An invalid excitation.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ExcitationError {
     /// No such binary sequence.
@@ -30,7 +31,7 @@ pub enum ExcitationError {
         /// Larger level.
         high: f64,
     },
-    /// A mean or a standard deviation that the limits leave no room for.
+    /// A mean or a standard deviation outside the limits.
     #[error(
         "mean {mean} and standard deviation {sigma}: the mean must lie between {low} and {high}, \
          and the standard deviation be larger than zero"
@@ -45,7 +46,7 @@ pub enum ExcitationError {
         /// Upper limit.
         high: f64,
     },
-    /// Times that make no profile.
+    /// Times that form no profile.
     #[error(
         "a level held for {hold_s} s in a profile of {duration_s} s: the first must be larger than \
          zero, and the second between the first and a million times as long"
@@ -76,20 +77,19 @@ pub enum ExcitationError {
     Profile(#[from] CommandProfileError),
 }
 
-/// A shape of excitation. Levels are in the unit of the quantity that is
-/// commanded.
+/// Waveform of an excitation, with levels in the unit of the command.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Waveform {
-    /// A sequence of maximal length between two levels.
+    /// A maximum-length sequence between two levels.
     Prbs {
         /// Length of the register, 3 to 16.
         bits: u32,
-        /// Level of a zero.
+        /// Smallest level; a draw below is repeated.
         low: f64,
         /// Level of a one.
         high: f64,
     },
-    /// Levels that are drawn anew each time.
+    /// Independent random levels.
     Gaussian {
         /// Their mean.
         mean: f64,
@@ -106,48 +106,38 @@ pub enum Waveform {
     Stairs(Vec<f64>),
 }
 
-/// An excitation whose levels are held.
+/// An excitation with held levels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excitation {
     /// Its shape.
     pub shape: Waveform,
-    /// How long each level is held \[s\]; the bit time of a sequence.
+    /// Duration of each level \[s\]; the bit time of a sequence.
     pub hold_s: f64,
-    /// How long it lasts \[s\]; none for one period of a sequence, and for each
-    /// of the stairs' levels once.
+    /// Total duration \[s\]; `None` for one period of a sequence, and for each level of stairs
+    /// once.
     pub duration_s: Option<f64>,
 }
 
 impl Excitation {
-    /// The profile; fails where the numbers make none.
+    /// The profile; fails for invalid parameters.
     pub fn profile(&self) -> Result<CommandProfile, ExcitationError> {
         let (hold_s, duration_s) = (self.hold_s, self.duration_s()?);
         let count = (duration_s / hold_s - 1e-9).ceil();
         if !(hold_s > 0.0 && (1.0..=MAX_POINTS).contains(&count)) {
             return Err(ExcitationError::Times { hold_s, duration_s });
         }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "checked to be 1 to a million"
-        )]
-        let values = self.shape.levels(count as u32)?;
-        if let Some(value) =
-            values.first().copied().filter(|first| values.iter().all(|v| v == first))
-        {
+        let values = self.shape.levels(to_count(count))?;
+        if let Some(&value) = values.first().filter(|first| values.iter().all(|v| v == *first)) {
             return Err(ExcitationError::Constant { value });
         }
         let points = (0_u32..).zip(values);
-        let points = points
-            .map(|(k, value)| ProfilePoint { from_s: f64::from(k) * hold_s, value })
-            .collect();
-        Ok(CommandProfile::new(points, duration_s)?)
+        let point = |(k, value)| ProfilePoint { from_s: f64::from(k) * hold_s, value };
+        Ok(CommandProfile::new(points.map(point).collect(), duration_s)?)
     }
 
-    /// Lowest and highest frequency that it excites with at least half of its
-    /// largest power density \[Hz\]: what is held for T falls as the square of
-    /// sinc(f·T), and below one period in the whole there is nothing. Stairs
-    /// fall earlier. Fails as [`Excitation::profile`] does.
+    /// Lowest and highest frequency with at least half of the largest power density \[Hz\]: the
+    /// spectrum of levels held for T is that of sinc²(f·T), and there is nothing below one
+    /// period. The spectrum of stairs falls earlier. Fails as [`Excitation::profile`] does.
     pub fn band_hz(&self) -> Result<(f64, f64), ExcitationError> {
         let duration_s = self.duration_s()?;
         let period_s = match self.shape {
@@ -160,8 +150,7 @@ impl Excitation {
     fn duration_s(&self) -> Result<f64, ExcitationError> {
         let levels = match &self.shape {
             Waveform::Prbs { bits, .. } => f64::from(Prbs::new(*bits)?.period()),
-            #[expect(clippy::cast_precision_loss, reason = "nobody writes so many")]
-            Waveform::Stairs(levels) => levels.len() as f64,
+            Waveform::Stairs(levels) => to_f64(levels.len()),
             Waveform::Gaussian { .. } => 0.0,
         };
         let duration_s = self.duration_s.unwrap_or(levels * self.hold_s);
@@ -174,11 +163,11 @@ impl Excitation {
 }
 
 impl Waveform {
-    fn levels(&self, count: u32) -> Result<Vec<f64>, ExcitationError> {
+    fn levels(&self, count: usize) -> Result<Vec<f64>, ExcitationError> {
         match *self {
             Self::Prbs { bits, low, high } => {
                 between(low, high)?;
-                let bits = Prbs::new(bits)?.take(count as usize);
+                let bits = Prbs::new(bits)?.take(count);
                 Ok(bits.map(|one| if one { high } else { low }).collect())
             }
             Self::Gaussian { mean, sigma, low, high, seed } => {
@@ -200,7 +189,7 @@ impl Waveform {
                 if levels.len() < 2 {
                     return Err(ExcitationError::Steps { got: levels.len() });
                 }
-                Ok(levels.iter().copied().cycle().take(count as usize).collect())
+                Ok(levels.iter().copied().cycle().take(count).collect())
             }
         }
     }
@@ -283,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_played_is_told() {
+    fn invalid_excitations_are_reported() {
         let said = |excitation: Excitation| excitation.profile().unwrap_err().to_string();
         assert!(said(prbs(0.0, Some(5.0))).contains("held for 0 s"));
         assert!(said(prbs(1e-7, Some(5.0))).contains("a million times"));
@@ -301,5 +290,11 @@ mod tests {
         let shape = Waveform::Prbs { bits: 7, low: 4.0, high: 4.0 };
         let flat = Excitation { shape, hold_s: 1.0, duration_s: None };
         assert!(said(flat).contains("levels from 4 to 4"));
+    }
+
+    #[test]
+    fn a_held_level_has_half_its_power_density_at_the_constant() {
+        let x = std::f64::consts::PI * HALF_POWER_FREQUENCY;
+        assert!(((x.sin() / x).powi(2) - 0.5).abs() < 1e-3);
     }
 }

@@ -1,5 +1,4 @@
-//! An input and an output on an even grid, once nothing speaks against finding
-//! a model in them.
+//! Input and output on an even grid, checked for identification.
 
 mod error;
 mod outlier;
@@ -8,16 +7,16 @@ use std::fmt;
 
 pub use self::error::{DataColumn, ExperimentError, MIN_SAMPLES};
 use super::grid::{SampleGap, TimeGrid, usual_step};
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{to_count, to_f64};
 pub use unit_check::implausible_unit;
 
-/// Usual steps between these can be of an extruder's log \[s\]; beyond them the
-/// unit of time is another.
+/// Plausible sampling intervals of an extruder's log \[s\]; others indicate another unit of
+/// time.
 const PLAUSIBLE_STEPS_S: std::ops::RangeInclusive<f64> = 2e-5..=2.0;
-/// A column that moves by less than this share of its size is constant.
+/// Range over size below which a column is constant: rounding.
 const MIN_RELATIVE_RANGE: f64 = 1e-9;
 
-/// What was done to the data, or is odd about them, in words.
+/// What was done to the data.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DataNote {
     /// Gaps that were bridged.
@@ -57,12 +56,12 @@ impl fmt::Display for DataNote {
     }
 }
 
-/// What may be done to data.
+/// What may be done to the data.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Rules {
-    /// Gaps up to this are bridged \[s\]; none for five steps.
+    /// Longest gap that is bridged \[s\]; `None` for five steps.
     pub max_gap_s: Option<f64>,
-    /// Whether the unit of time was told, and is not doubted.
+    /// Whether the unit of time was specified, and is not checked.
     pub is_time_unit_known: bool,
 }
 
@@ -77,8 +76,8 @@ pub struct Experiment {
     pub input: Vec<f64>,
     /// What comes out, in its own unit.
     pub output: Vec<f64>,
-    /// Whether the input holds each value until the next, as a command does,
-    /// and does not run straight to it.
+    /// Whether each input value holds until the next, as a command does, instead of being
+    /// interpolated.
     pub input_is_held: bool,
     /// What was done to the data.
     pub notes: Vec<DataNote>,
@@ -119,38 +118,26 @@ impl Experiment {
     }
 
     /// Samples.
+    #[expect(clippy::len_without_is_empty, reason = "an experiment has fifty samples or more")]
     pub fn len(&self) -> usize {
         self.input.len().min(self.output.len())
     }
 
-    /// Whether there is no sample.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// How long it lasts \[s\].
-    #[expect(clippy::cast_precision_loss, reason = "counts of samples")]
     pub fn duration_s(&self) -> f64 {
-        self.len().saturating_sub(1) as f64 * self.step_s
+        to_f64(self.len().saturating_sub(1)) * self.step_s
     }
 
     /// Moments of its samples \[s\].
-    #[expect(clippy::cast_precision_loss, reason = "counts of samples")]
     pub fn moments(&self) -> Vec<f64> {
-        (0..self.len()).map(|k| self.start_s + k as f64 * self.step_s).collect()
+        (0..self.len()).map(|k| self.start_s + to_f64(k) * self.step_s).collect()
     }
 
-    /// The beginning to fit to, and this share of it at the end to validate
-    /// with. The notes stay with the first. Fails where either is too short, or
-    /// the input or the output of either does not move.
+    /// The beginning for estimation, and this fraction at the end for validation. The notes
+    /// stay with the first. Fails where either is too short, or its input or output is
+    /// constant.
     pub fn split(mut self, fraction: f64) -> Result<(Self, Self), ExperimentError> {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            clippy::cast_precision_loss,
-            reason = "a share of a count"
-        )]
-        let kept = (self.len() as f64 * (1.0 - fraction.clamp(0.0, 1.0))).round() as usize;
+        let kept = to_count((to_f64(self.len()) * (1.0 - fraction.clamp(0.0, 1.0))).round());
         let left = self.len().saturating_sub(kept);
         if left < MIN_SAMPLES {
             return Err(ExperimentError::ShortValidation { got: left });
@@ -179,7 +166,7 @@ impl Experiment {
     }
 }
 
-/// Fails where time does not run on, or where no log has such steps.
+/// Fails where time does not increase, or the sampling interval is implausible.
 pub fn check_time(time_s: &[f64], rules: &Rules) -> Result<(), ExperimentError> {
     let falls = time_s.windows(2).position(|pair| pair[1] <= pair[0]);
     if let Some((at, pair)) = falls.and_then(|k| Some((k + 1, time_s.get(k..k + 2)?))) {
@@ -193,20 +180,29 @@ pub fn check_time(time_s: &[f64], rules: &Rules) -> Result<(), ExperimentError> 
 }
 
 fn bridge_gaps(grid: &TimeGrid, rules: &Rules) -> Result<Vec<DataNote>, ExperimentError> {
-    let limit_s = rules.max_gap_s.unwrap_or(grid.usual_limit_s());
     let mut notes = Vec::new();
-    if let Some(longest) = grid.longest().copied() {
-        // A limit of so many steps includes a gap of as many.
-        let is_long = |gap: &&SampleGap| gap.length_s > limit_s * (1.0 + 1e-6);
-        let count = grid.gaps.iter().filter(is_long).count();
-        if count > 0 {
-            return Err(ExperimentError::Gap { gap: longest, count, limit_s });
-        }
+    if let Some((longest, limit_s)) = check_gaps(grid, rules)? {
         notes.push(DataNote::Bridged { count: grid.gaps.len(), longest, limit_s });
     } else if grid.is_uneven {
         notes.push(DataNote::Resampled { step_s: grid.step_s });
     }
     Ok(notes)
+}
+
+/// The longest gap and the limit for gaps \[s\]; `None` without a gap. Fails where it is longer
+/// than the limit.
+pub(super) fn check_gaps(
+    grid: &TimeGrid,
+    rules: &Rules,
+) -> Result<Option<(SampleGap, f64)>, ExperimentError> {
+    let limit_s = rules.max_gap_s.unwrap_or(grid.usual_limit_s());
+    // A limit of so many steps includes a gap of as many.
+    let is_long = |gap: &&SampleGap| gap.length_s > limit_s * (1.0 + 1e-6);
+    let count = grid.gaps.iter().filter(is_long).count();
+    match grid.longest() {
+        Some(&gap) if count > 0 => Err(ExperimentError::Gap { gap, count, limit_s }),
+        longest => Ok(longest.map(|gap| (*gap, limit_s))),
+    }
 }
 
 fn check_moves(side: DataColumn, values: &[f64]) -> Result<(), ExperimentError> {

@@ -1,28 +1,5 @@
-//! The flow at the nozzle from the bead that it left: surface speed times area,
-//! both of the moment of extrusion (bcs-thesis, eq. (20)).
-
-use super::align::{AlignError, to_extruded};
-
-/// What was logged of a bead, a value each a sample.
-#[derive(Debug, Clone, Copy)]
-pub struct LoggedBead<'a> {
-    /// Way of the surface below the nozzle \[mm\]; only grows.
-    pub position_mm: &'a [f64],
-    /// Its speed \[mm/s\].
-    pub speed_mm_per_s: &'a [f64],
-    /// Area of the section that is being measured \[mm²\].
-    pub area_mm2: &'a [f64],
-    /// Way from the nozzle to where it is measured \[mm\].
-    pub offset_mm: f64,
-}
-
-/// Flow \[mm³/s\] at the moments of the samples. Shorter than the log by those
-/// whose material has not been measured when it ends.
-pub fn extruded(logged: &LoggedBead<'_>) -> Result<Vec<f64>, AlignError> {
-    let areas = to_extruded(logged.position_mm, logged.area_mm2, logged.offset_mm)?;
-    let areas: Vec<f64> = areas.into_iter().map_while(|area| area).collect();
-    Ok(at_moments(logged.speed_mm_per_s, &areas))
-}
+//! The flow at the nozzle from the laid bead: surface speed times area, both at the moment of
+//! extrusion (bcs-thesis, eq. (20)).
 
 /// Flow \[mm³/s\] from speeds \[mm/s\] and areas \[mm²\] of the same moments.
 pub fn at_moments(speed_mm_per_s: &[f64], area_mm2: &[f64]) -> Vec<f64> {
@@ -34,6 +11,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
     use super::*;
+    use crate::identify::align::to_extruded;
 
     #[test]
     fn the_flow_that_laid_a_bead_is_found_again() {
@@ -54,13 +32,9 @@ mod tests {
         let speed_mm_per_s: Vec<f64> = times.iter().map(|t| speed(*t)).collect();
         let area_at = |position: f64| flow(left(position - 40.0)) / speed(left(position - 40.0));
         let area_mm2: Vec<f64> = position_mm.iter().map(|p| area_at(*p)).collect();
-        let logged = LoggedBead {
-            position_mm: &position_mm,
-            speed_mm_per_s: &speed_mm_per_s,
-            area_mm2: &area_mm2,
-            offset_mm: 40.0,
-        };
-        let found = extruded(&logged).unwrap();
+        let areas = to_extruded(&position_mm, &area_mm2, 40.0).unwrap();
+        let areas: Vec<f64> = areas.into_iter().map_while(|area| area).collect();
+        let found = at_moments(&speed_mm_per_s, &areas);
         assert!(found.len() > 5700 && found.len() < 6000, "{}", found.len());
         for (time, found) in times.iter().zip(found) {
             assert!((found - flow(*time)).abs() < 0.01, "{time} s: {found}");

@@ -1,17 +1,16 @@
-//! From moments as they were logged to an even grid of samples.
+//! From logged times to an even grid of samples.
 
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{to_count, to_f64};
 use crate::numeric::rank;
 
-/// A step beyond this many usual ones has lost samples.
+/// Interval over the median one from which samples are lost: nearly two, for jitter.
 const GAP_STEPS: f64 = 1.8;
-/// Moments may be off the grid by this share of a step, as those are that were
-/// rounded when they were written.
+/// Deviation of a time from the grid, in steps, that is rounding.
 const ROUNDING_STEPS: f64 = 0.1;
-/// Gaps are bridged up to this many steps unless another limit is told.
+/// Longest gap that is bridged by default, in steps.
 const MAX_BRIDGED_STEPS: f64 = 5.0;
 
-/// Some moments after which nothing was logged for a while.
+/// A gap in the samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SampleGap {
     /// The sample before it, counted from 0.
@@ -22,7 +21,7 @@ pub struct SampleGap {
     pub length_s: f64,
 }
 
-/// Moments on an even grid.
+/// An even grid of times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeGrid {
     /// The first moment \[s\].
@@ -31,14 +30,14 @@ pub struct TimeGrid {
     pub step_s: f64,
     /// How many.
     pub count: usize,
-    /// Whether the samples are not on it as they are.
+    /// Whether the samples are off the grid.
     pub is_uneven: bool,
-    /// What was lost.
+    /// Lost samples.
     pub gaps: Vec<SampleGap>,
 }
 
 impl TimeGrid {
-    /// The grid of moments that only grow \[s\]; none of fewer than two.
+    /// The grid of increasing times \[s\]; `None` for fewer than two.
     pub fn of(time_s: &[f64]) -> Option<Self> {
         let (first, last) = (*time_s.first()?, *time_s.last()?);
         let usual = usual_step(time_s)?;
@@ -54,7 +53,7 @@ impl TimeGrid {
             (time - first - to_f64(k) * step_s).abs() > ROUNDING_STEPS * step_s
         };
         let is_uneven = !gaps.is_empty() || time_s.iter().enumerate().any(off);
-        let count = whole((last - first) / step_s + ROUNDING_STEPS) + 1;
+        let count = to_count((last - first) / step_s + ROUNDING_STEPS) + 1;
         Some(Self { start_s: first, step_s, count, is_uneven, gaps })
     }
 
@@ -63,12 +62,12 @@ impl TimeGrid {
         self.gaps.iter().max_by(|a, b| a.length_s.total_cmp(&b.length_s))
     }
 
-    /// Longest gap that is bridged unless another limit is told \[s\].
+    /// Longest gap that is bridged by default \[s\].
     pub fn usual_limit_s(&self) -> f64 {
         MAX_BRIDGED_STEPS * self.step_s
     }
 
-    /// Values at the moments of the grid, straight from sample to sample.
+    /// Values on the grid by linear interpolation.
     pub fn linear(&self, time_s: &[f64], values: &[f64]) -> Vec<f64> {
         self.resample(time_s, |before, share| {
             let low = values.get(before).copied().unwrap_or(0.0);
@@ -77,7 +76,7 @@ impl TimeGrid {
         })
     }
 
-    /// Values at the moments of the grid, each held until the next sample.
+    /// Values on the grid, each held until the next sample.
     pub fn held(&self, time_s: &[f64], values: &[f64]) -> Vec<f64> {
         self.resample(time_s, |before, share| {
             let at = before + usize::from(share > 1.0 - ROUNDING_STEPS);
@@ -85,8 +84,8 @@ impl TimeGrid {
         })
     }
 
-    /// A value at each moment, from the sample before it and the share of the
-    /// way to the next one.
+    /// A value at each grid time, from the sample before it and the fraction of the interval
+    /// since then.
     fn resample(&self, time_s: &[f64], value: impl Fn(usize, f64) -> f64) -> Vec<f64> {
         let mut before = 0;
         let mut at = |k: usize| {
@@ -106,17 +105,7 @@ impl TimeGrid {
 
 /// The median step.
 pub fn usual_step(time_s: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    rank::median(&mut steps)
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a count; a cast saturates"
-)]
-fn whole(count: f64) -> usize {
-    count as usize
+    rank::median_of(time_s.windows(2).map(|pair| pair[1] - pair[0]))
 }
 
 #[cfg(test)]

@@ -1,37 +1,36 @@
-//! Models by material, nozzle and temperature: which of those at hand is meant.
+//! Models by material, nozzle and temperature.
 
 use std::fmt;
 
 use super::model_file::ModelFile;
 use crate::core::quantity::Unit;
 
-/// Nozzles that differ by less are the same \[mm\].
+/// Nozzles that differ by less are the same \[mm\]: rounding of a diameter in hundredths.
 const SAME_NOZZLE_MM: f64 = 0.005;
-/// Temperatures that differ by less are the same \[°C\].
+/// Temperatures that differ by less are the same \[°C\]: rounding.
 const SAME_TEMPERATURE_C: f64 = 0.01;
-/// A model is used this far from its temperature unless another tolerance is
-/// told \[°C\].
+/// Default tolerance of the temperature \[°C\]. A choice.
 pub const TOLERANCE_C: f64 = 5.0;
 
-/// A model and where it is kept.
+/// A model and its file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelEntry {
     /// The file's name.
     pub name: String,
-    /// What stands in it.
+    /// Its content.
     pub model: ModelFile,
 }
 
-/// The models that are at hand, in the order of their files' names.
+/// The available models, in the order of their file names.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Library {
     entries: Vec<ModelEntry>,
 }
 
-/// What is looked for.
+/// A search for a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelQuery {
-    /// Material; capital letters do not count.
+    /// Material, case-insensitive.
     pub material: String,
     /// Diameter of the nozzle \[mm\].
     pub nozzle_mm: f64,
@@ -45,12 +44,12 @@ pub struct ModelQuery {
     pub output: Option<Unit>,
 }
 
-/// The model that was meant.
+/// The model that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelMatch<'a> {
     /// The model and its file.
     pub entry: &'a ModelEntry,
-    /// Its temperature less the one that was asked for \[°C\].
+    /// Its temperature less the requested one \[°C\].
     pub temperature_difference_c: f64,
 }
 
@@ -100,13 +99,12 @@ impl fmt::Display for ModelQuery {
 
 impl fmt::Display for ModelEntry {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ModelFile { conditions: setting, input, output, .. } = &self.model;
-        write!(f, "{} ({}", self.name, setting.material.as_deref().unwrap_or("no material"))?;
-        if let Some(nozzle_mm) = setting.nozzle_mm {
-            write!(f, ", {nozzle_mm} mm")?;
-        }
-        if let Some(temperature_c) = setting.temperature_c {
-            write!(f, ", {temperature_c} °C")?;
+        let ModelFile { conditions, input, output, .. } = &self.model;
+        write!(f, "{} ({}", self.name, conditions.material.as_deref().unwrap_or("no material"))?;
+        for (value, unit) in [(conditions.nozzle_mm, "mm"), (conditions.temperature_c, "°C")] {
+            if let Some(value) = value {
+                write!(f, ", {value} {unit}")?;
+            }
         }
         write!(f, ", {} to {})", input.unit, output.unit)
     }
@@ -124,8 +122,8 @@ impl Library {
         &self.entries
     }
 
-    /// The model that holds for the same as this one, so that [`Library::find`]
-    /// could not tell the two apart.
+    /// The model for the same conditions and quantities, which [`Library::find`] could not
+    /// distinguish from this one.
     pub fn same(&self, model: &ModelFile) -> Option<&ModelEntry> {
         let (setting, mut entries) = (&model.conditions, self.entries.iter());
         let material = setting.material.as_ref()?;
@@ -141,9 +139,8 @@ impl Library {
         })
     }
 
-    /// The model of this material and nozzle whose temperature is the nearest
-    /// within the tolerance. Models that do not tell all three are not looked
-    /// at.
+    /// The model of this material and nozzle with the nearest temperature within the tolerance.
+    /// Models without all three conditions are ignored.
     pub fn find(&self, query: &ModelQuery) -> Result<ModelMatch<'_>, LibraryError> {
         let off = |entry: &ModelEntry| {
             let setting = &entry.model.conditions;
@@ -154,18 +151,11 @@ impl Library {
             let off_c = setting.temperature_c? - query.temperature_c;
             (same && off_c.abs() <= query.tolerance_c).then_some(off_c)
         };
-        let near: Vec<ModelMatch<'_>> = self
-            .entries
-            .iter()
-            .filter_map(|entry| Some(ModelMatch { entry, temperature_difference_c: off(entry)? }))
-            .collect();
-        let least = near
-            .iter()
-            .map(|found| found.temperature_difference_c.abs())
-            .fold(f64::INFINITY, f64::min);
-        let is_nearest = |found: &&ModelMatch<'_>| {
-            found.temperature_difference_c.abs() < least + SAME_TEMPERATURE_C
-        };
+        let matches = |entry| Some(ModelMatch { entry, temperature_difference_c: off(entry)? });
+        let near: Vec<ModelMatch<'_>> = self.entries.iter().filter_map(matches).collect();
+        let distance_c = |found: &ModelMatch<'_>| found.temperature_difference_c.abs();
+        let least_c = near.iter().map(distance_c).fold(f64::INFINITY, f64::min);
+        let is_nearest = |found: &&ModelMatch<'_>| distance_c(found) < least_c + SAME_TEMPERATURE_C;
         let nearest: Vec<&ModelMatch<'_>> = near.iter().filter(is_nearest).collect();
         let names = |entries: &mut dyn Iterator<Item = &ModelEntry>| {
             entries.map(ModelEntry::to_string).collect()
@@ -184,9 +174,8 @@ impl Library {
     }
 }
 
-/// What a model's file is called in a library, by what it holds for, such as
-/// `pla-0.4mm-210c-rpm-to-mm3_per_s.toml`; none where its material, nozzle or
-/// temperature is not told.
+/// File name of a model in a library by its conditions, such as
+/// `pla-0.4mm-210c-rpm-to-mm3_per_s.toml`; `None` without material, nozzle or temperature.
 pub fn file_name(model: &ModelFile) -> Option<String> {
     let setting = &model.conditions;
     let material = setting.material.as_ref()?.trim().to_lowercase();

@@ -3,18 +3,17 @@
 mod write;
 
 use crate::core::quantity::{Quantity, Unit};
-use crate::document::Problems;
-use crate::document::{Document, Table};
+use crate::document::{Document, Problems, Table};
 use crate::numeric::lti::TransferFunction;
 
 pub use write::to_toml;
 pub(super) use write::{number, put, put_conditions, row};
 
-/// Most coefficients of a numerator or a denominator.
+/// Largest number of coefficients of a numerator or a denominator. A choice.
 pub const MAX_COEFFICIENTS: usize = 8;
-/// The same as counts that a row may have.
+/// Accepted lengths of a row of coefficients.
 const COUNTS: [usize; MAX_COEFFICIENTS] = [1, 2, 3, 4, 5, 6, 7, 8];
-/// Whatever is beyond is no coefficient of an extruder.
+/// Accepted coefficients.
 const COEFFICIENT_RANGE: std::ops::RangeInclusive<f64> = -1e15..=1e15;
 const DEAD_TIME_S: std::ops::RangeInclusive<f64> = 0.0..=1e4;
 const STEP_S: std::ops::RangeInclusive<f64> = 1e-6..=1e4;
@@ -22,7 +21,7 @@ const FIT_PERCENT: std::ops::RangeInclusive<f64> = -1e6..=100.0;
 const NOZZLE_MM: std::ops::RangeInclusive<f64> = 0.01..=1e3;
 const TEMPERATURE_C: std::ops::RangeInclusive<f64> = -100.0..=2000.0;
 
-/// What a model holds for; what is not told is `None`.
+/// Conditions for which a model holds; unknown ones are `None`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Conditions {
     /// Material by its name.
@@ -33,7 +32,7 @@ pub struct Conditions {
     pub temperature_c: Option<f64>,
 }
 
-/// A parameter as it was found.
+/// An estimated parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SavedParameter {
     /// Its name with its unit.
@@ -44,7 +43,7 @@ pub struct SavedParameter {
     pub standard_error: f64,
 }
 
-/// What the noise of the data leaves open.
+/// Uncertainty of the parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterUncertainty {
     /// The parameters that were fitted.
@@ -53,7 +52,7 @@ pub struct ParameterUncertainty {
     pub covariance: Vec<f64>,
 }
 
-/// What it was fitted to.
+/// Data of the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitSummary {
     /// From sample to sample \[s\].
@@ -64,8 +63,7 @@ pub struct FitSummary {
     pub validation_percent: Option<f64>,
 }
 
-/// A model of an extruder, and what is known of it:
-/// output − its operating point = G(s)·(input − its operating point).
+/// A model of an extruder: output − its operating point = G(s)·(input − its operating point).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelFile {
     /// What it holds for.
@@ -76,9 +74,9 @@ pub struct ModelFile {
     pub input: Quantity,
     /// What comes out.
     pub output: Quantity,
-    /// Smallest and largest input that the data had.
+    /// Smallest and largest input in the data.
     pub input_range: (f64, f64),
-    /// Input and output about which it is linear.
+    /// Input and output of the linearisation.
     pub operating_point: (f64, f64),
     /// G(s), stable.
     pub transfer: TransferFunction,
@@ -88,8 +86,8 @@ pub struct ModelFile {
     pub fit: Option<FitSummary>,
 }
 
-/// Reads the text of a model's file; `file` is its name in what is said about
-/// it. Everything that is wrong is reported at once.
+/// Reads the text of a model's file; `file` is its name in messages. All violations are
+/// reported at once.
 pub fn parse(file: &str, text: &str) -> Result<ModelFile, Problems> {
     let document = Document::parse(file, text, true);
     let model = read_root(&document.root());
@@ -102,7 +100,7 @@ fn read_root(root: &Table<'_>) -> Option<ModelFile> {
     }
     let version = root.optional_integer("version", 1..=1);
     let kind = root.text("kind").map(str::to_owned);
-    let setting = read_conditions(root);
+    let conditions = read_conditions(root);
     let input = root.required_table("input").and_then(|table| read_input(&table));
     let output = root.required_table("output").and_then(|table| read_side(&table));
     let transfer = root.required_table("transfer").and_then(|table| read_transfer(&table));
@@ -112,25 +110,19 @@ fn read_root(root: &Table<'_>) -> Option<ModelFile> {
     let ((input, input_at), input_range) = input?;
     let (output, output_at) = output?;
     Some(ModelFile {
-        conditions: setting,
+        conditions,
         kind: kind?,
         input,
         output,
         input_range,
         operating_point: (input_at, output_at),
         transfer: transfer?,
-        uncertainty: match uncertainty {
-            Some(uncertainty) => Some(uncertainty?),
-            None => None,
-        },
-        fit: match fit {
-            Some(fit) => Some(fit?),
-            None => None,
-        },
+        uncertainty: uncertainty.map_or(Some(None), |found| found.map(Some))?,
+        fit: fit.map_or(Some(None), |found| found.map(Some))?,
     })
 }
 
-/// What a file holds for, as far as it tells.
+/// The conditions, as far as the file has them.
 pub(super) fn read_conditions(root: &Table<'_>) -> Conditions {
     Conditions {
         material: root.optional_text("material").map(str::to_owned),
@@ -154,11 +146,8 @@ fn read_input(table: &Table<'_>) -> Option<Input> {
     let side = read_side(table);
     let [low, high] = table.numbers::<2>("range", COEFFICIENT_RANGE)?;
     if low >= high {
-        table.report(
-            "range",
-            format!("[{low}, {high}]"),
-            "the smallest and a larger largest input",
-        );
+        let expected = "the smallest and a larger largest input";
+        table.report("range", format!("[{low}, {high}]"), expected);
         return None;
     }
     Some((side?, (low, high)))
@@ -198,11 +187,8 @@ fn read_fit(table: &Table<'_>) -> Option<FitSummary> {
     let step_s = table.number("step_s", STEP_S);
     let estimation_percent = table.number("estimation_percent", FIT_PERCENT);
     let validation_percent = table.optional_number("validation_percent", FIT_PERCENT);
-    Some(FitSummary {
-        step_s: step_s?,
-        estimation_percent: estimation_percent?,
-        validation_percent,
-    })
+    let (step_s, estimation_percent) = (step_s?, estimation_percent?);
+    Some(FitSummary { step_s, estimation_percent, validation_percent })
 }
 
 #[cfg(test)]

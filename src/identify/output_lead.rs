@@ -1,59 +1,57 @@
-//! An output that answers before its input: two clocks that differ, or a loop that
-//! moves the input after the output.
+//! An output that leads its input: two clocks that differ, or a loop that changes the input
+//! after the output.
 //!
-//! The input is brought forward, so that a dead time below that lead is an output
-//! which is ahead. It counts where such a model fits much better than every one
-//! that only answers.
+//! The input is advanced, so that a dead time below that advance is a lead of the output. The
+//! lead is reported where such a model fits much better than every causal one.
 
 use super::fit::{DeadTime, Fit, FitNote, FitSettings, InitialCondition, Samples, Structure, fit};
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{to_count, to_f64};
 
-/// The output is looked for ahead by up to this share of the record…
+/// Largest lead over the length of the record…
 const LEAD_FRACTION: f64 = 0.125;
-/// …and up to this \[s\].
+/// …and in seconds \[s\].
 const MAX_LEAD_S: f64 = 10.0;
-/// Shares of that which are tried: dead times are looked for on a grid that is
-/// coarse where their range is wide.
+/// Fractions of that lead that are tried, because dead times are searched on a grid that is
+/// coarse for a wide range.
 const LEAD_FRACTIONS: [f64; 3] = [1.0, 0.25, 0.0625];
-/// What a model that runs ahead may leave at the most, of the squares of the best
-/// that does not.
+/// Largest sum of squared residuals with a lead over that of the best causal model.
 const MAX_RESIDUAL_RATIO: f64 = 0.8;
-/// The same as a likelihood ratio over independent samples.
+/// The same as a likelihood ratio over independent samples. A choice: far above the 3.84 of χ²
+/// at 95 %.
 const MIN_LIKELIHOOD_RATIO: f64 = 20.0;
-/// A fit below this tells nothing of clocks \[%\].
+/// Fit below which nothing is concluded about the clocks \[%\].
 const MIN_FIT_PERCENT: f64 = 30.0;
-/// A model that fits less well than this may be of an output that is ahead \[%\].
+/// Fit below which an output may lead \[%\].
 const POOR_FIT_PERCENT: f64 = 50.0;
-/// By how many standard errors the output must be ahead, and a dead time be seen.
+/// Standard errors of a significant lead or dead time. A choice.
 const MIN_SIGMAS: f64 = 3.0;
-/// A model slower than this share of the record may follow a drift.
+/// A time constant over the record above which a model may follow a drift.
 const SLOW_FRACTION: f64 = 1.0 / 3.0;
 
-/// Forms that are tried ahead.
+/// Structures that are tried with a lead.
 const LEADING_FORMS: [Structure; 3] = [
     Structure::FirstOrder { zero: false },
     Structure::SecondOrderOscillating { zero: false },
     Structure::SecondOrderOscillating { zero: true },
 ];
-/// Further forms that only answer: a lead looks like an output that is ahead.
+/// Further causal structures: a zero looks like a lead of the output.
 const CAUSAL_FORMS: [Structure; 2] =
     [Structure::FirstOrder { zero: true }, Structure::Transfer { poles: 3, zeros: 2 }];
 
-/// An output that is ahead.
+/// An output that leads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutputLead {
-    /// By how much about, with the form that fits best \[s\].
+    /// The lead with the best structure \[s\].
     pub lead_s: f64,
     /// Standard error of that \[s\].
     pub sigma_s: f64,
-    /// Fit of a model that runs ahead \[%\].
+    /// Fit of the model with a lead \[%\].
     pub fit_percent: f64,
-    /// Fit of the best that only answers \[%\]; 0 where none stands.
+    /// Fit of the best causal model \[%\]; 0 without one.
     pub causal_fit_percent: f64,
 }
 
-/// Whether the output is ahead; not looked for where the model that was found has
-/// a dead time and fits.
+/// Whether the output leads; not checked where the model has a dead time and fits well.
 pub fn output_lead(
     samples: &Samples,
     settings: &FitSettings,
@@ -63,33 +61,30 @@ pub fn output_lead(
         return None;
     }
     let most_s = (LEAD_FRACTION * samples.duration_s()).min(MAX_LEAD_S);
-    // Once to see about where, and again from near there: what the input did
-    // before the record is not known for as long as the dead time.
-    let leads =
-        LEAD_FRACTIONS.iter().filter_map(|share| with_lead(samples, settings, share * most_s));
+    // First a rough estimate, then again near it: the input before the record is unknown for as
+    // long as the dead time.
+    let leads = LEAD_FRACTIONS
+        .iter()
+        .filter_map(|fraction| with_lead(samples, settings, fraction * most_s));
     let (lead_s, first) =
         leads.max_by(|a, b| a.1.quality.fit_percent.total_cmp(&b.1.quality.fit_percent))?;
     let about_s = lead_s - first.parameter("dead_time_s")?.value;
     let near_s = (1.5 * about_s + 2.0 * samples.dt_s()).min(most_s);
     let (lead_s, fit) = with_lead(samples, settings, near_s)?;
     let dead_time = fit.parameter("dead_time_s")?;
-    let (ahead_s, sigma_s) = (lead_s - dead_time.value, dead_time.sigma);
-    let is_ahead = ahead_s > MIN_SIGMAS * sigma_s && ahead_s > 1.5 * samples.dt_s();
+    let (lead_s, sigma_s) = (lead_s - dead_time.value, dead_time.sigma);
+    let is_ahead = lead_s > MIN_SIGMAS * sigma_s && lead_s > 1.5 * samples.dt_s();
     let slow = fit.model.poles().iter().any(|p| -p.re * SLOW_FRACTION * samples.duration_s() < 1.0);
     if !is_ahead || slow || fit.quality.fit_percent < MIN_FIT_PERCENT {
         return None;
     }
     let usual = causal_fit_percent(&shifted(samples, 0, fit.residuals.len())?, settings);
-    let answering_percent = found.map_or(usual, |found| usual.max(found.quality.fit_percent));
-    let ratio = residual_fraction(fit.quality.fit_percent) / residual_fraction(answering_percent);
+    let causal_fit_percent = found.map_or(usual, |found| usual.max(found.quality.fit_percent));
+    let fit_percent = fit.quality.fit_percent;
+    let ratio = residual_fraction(fit_percent) / residual_fraction(causal_fit_percent);
     let is_better = ratio < MAX_RESIDUAL_RATIO
         && -fit.independent_samples * libm::log(ratio) > MIN_LIKELIHOOD_RATIO;
-    is_better.then_some(OutputLead {
-        lead_s: ahead_s,
-        sigma_s,
-        fit_percent: fit.quality.fit_percent,
-        causal_fit_percent: answering_percent,
-    })
+    is_better.then_some(OutputLead { lead_s, sigma_s, fit_percent, causal_fit_percent })
 }
 
 fn has_dead_time(fit: &Fit) -> bool {
@@ -101,18 +96,16 @@ fn has_dead_time(fit: &Fit) -> bool {
     }
 }
 
-/// Share of the output's squares that a fit leaves.
+/// Fraction of the output's sum of squares in the residuals.
 fn residual_fraction(fit_percent: f64) -> f64 {
     let left = (1.0 - 0.01 * fit_percent).max(1e-9);
     left * left
 }
 
-/// The best model of the output by an input that comes so much earlier, in whole
-/// steps.
+/// The best model for an input that is advanced by whole steps.
 fn with_lead(samples: &Samples, settings: &FitSettings, lead_s: f64) -> Option<(f64, Fit)> {
     let dt_s = samples.dt_s();
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
-    let steps = (lead_s / dt_s).floor().max(0.0) as usize;
+    let steps = to_count((lead_s / dt_s).floor());
     let lead_s = to_f64(steps) * dt_s;
     let forward = shifted(samples, steps, samples.len().checked_sub(steps)?)?;
     let range = DeadTime::Estimated { min_s: 0.0, max_s: 2.0 * lead_s.max(dt_s) };
@@ -120,7 +113,7 @@ fn with_lead(samples: &Samples, settings: &FitSettings, lead_s: f64) -> Option<(
     Some((lead_s, fits.min_by(|a, b| a.quality.rmse.total_cmp(&b.quality.rmse))?))
 }
 
-/// Fit of the best model that only answers \[%\].
+/// Fit of the best causal model \[%\].
 fn causal_fit_percent(samples: &Samples, settings: &FitSettings) -> f64 {
     let most_s = (LEAD_FRACTION * samples.duration_s()).min(MAX_LEAD_S);
     let range = DeadTime::Estimated { min_s: 0.0, max_s: most_s };
@@ -135,18 +128,13 @@ fn tried(
     structure: Structure,
     dead_time: DeadTime,
 ) -> Option<Fit> {
-    let before = InitialCondition::Unknown;
-    let settings = FitSettings {
-        structure,
-        dead_time,
-        initial_state: before,
-        accept_undetermined: true,
-        ..*settings
-    };
+    let (initial_state, accept_undetermined) = (InitialCondition::Unknown, true);
+    let settings =
+        FitSettings { structure, dead_time, initial_state, accept_undetermined, ..*settings };
     fit(samples, &settings).ok()
 }
 
-/// The first samples of the output, with those of the input from a later one on.
+/// The first samples of the output with those of the input from a later one on.
 fn shifted(samples: &Samples, from: usize, count: usize) -> Option<Samples> {
     let input = samples.input().get(from..from + count)?.to_vec();
     Samples::new(input, samples.output().get(..count)?.to_vec(), samples.dt_s()).ok()

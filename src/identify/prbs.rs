@@ -1,21 +1,16 @@
-//! Pseudo-random binary sequences of maximal length, from shift registers with
-//! feedback (bcs-thesis, eq. (15); taps of primitive polynomials).
+//! Pseudo-random binary sequences of maximum length from shift registers with feedback
+//! (bcs-thesis, eq. (15); taps of primitive polynomials).
 
-/// A register length for which there is no sequence here.
+/// An unsupported register length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("a sequence of {bits} bits: expected 3 to 16")]
 pub struct NoSuchLength {
-    /// What was asked for.
+    /// The requested length.
     pub bits: u32,
 }
 
-/// Fewest bits of a register.
-pub const MIN_BITS: u32 = 3;
-/// Most bits of a register: 18 hours of bits of one second each.
-pub const MAX_BITS: u32 = 16;
-
-/// A sequence without end, which repeats itself after 2^bits − 1 bits and has
-/// one more one than zeros in each period. It begins with `bits` ones.
+/// An endless sequence with a period of 2^bits − 1 bits, one more one than zeros in each. It
+/// begins with `bits` ones.
 #[derive(Debug, Clone)]
 pub struct Prbs {
     register: u32,
@@ -39,7 +34,7 @@ impl Prbs {
 impl Iterator for Prbs {
     type Item = bool;
 
-    /// The oldest bit leaves; the parity of the tapped ones enters.
+    /// The oldest bit leaves; the parity of the tapped bits enters.
     fn next(&mut self) -> Option<bool> {
         let oldest = self.register & 1 == 1;
         let entering = (self.register & self.taps).count_ones() & 1;
@@ -48,8 +43,8 @@ impl Iterator for Prbs {
     }
 }
 
-/// The places whose parity enters, the oldest bit being the lowest: a mask of
-/// x^t for each term but the highest of a primitive polynomial.
+/// Mask of the tapped bits, the oldest being the lowest: x^t for each term but the highest of a
+/// primitive polynomial.
 fn taps(bits: u32) -> Option<u32> {
     let inner: &[u32] = match bits {
         3 => &[2],
@@ -94,7 +89,7 @@ mod tests {
 
     #[test]
     fn every_length_is_maximal() {
-        for bits in MIN_BITS..=MAX_BITS {
+        for bits in 3..=16 {
             let mut sequence = Prbs::new(bits).unwrap();
             let (first, period) = (sequence.register, sequence.period());
             let mut ones = 0;

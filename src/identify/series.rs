@@ -1,8 +1,8 @@
-//! Columns with moments of their own, as a recording has them: each is sampled
-//! when its source spoke. Two of them are brought to the moments of the output.
+//! Columns with times of their own, as in a recording. Two of them are brought to the times of
+//! the output.
 
-use super::experiment::{Experiment, ExperimentError, MIN_SAMPLES, Rules};
-use super::grid::{SampleGap, TimeGrid, usual_step};
+use super::experiment::{Experiment, ExperimentError, MIN_SAMPLES, Rules, check_gaps};
+use super::grid::{TimeGrid, usual_step};
 
 /// One column.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,7 +23,7 @@ impl TimeSeries {
         Self { name: name.into(), time_s: Vec::new(), values: Vec::new(), is_held }
     }
 
-    /// Takes a value, unless it is no later than the last one.
+    /// Adds a value, unless it is not later than the last one.
     pub fn push(&mut self, time_s: f64, value: f64) {
         if self.time_s.last().is_none_or(|last| time_s > *last) {
             self.time_s.push(time_s);
@@ -41,10 +41,11 @@ impl TimeSeries {
         self.len() == 0
     }
 
-    /// What lies between two moments \[s\], these included.
+    /// The part between two moments \[s\], inclusive.
     #[must_use]
     pub fn within(&self, from_s: f64, to_s: f64) -> Self {
-        let (low, high) = self.index_range(from_s, to_s);
+        let low = self.time_s.partition_point(|time| *time < from_s);
+        let high = self.time_s.partition_point(|time| *time <= to_s).max(low);
         Self {
             name: self.name.clone(),
             time_s: self.time_s.get(low..high).unwrap_or_default().to_vec(),
@@ -53,14 +54,7 @@ impl TimeSeries {
         }
     }
 
-    /// The first sample at or after a moment, and that behind the last one at
-    /// or before another.
-    fn index_range(&self, from_s: f64, to_s: f64) -> (usize, usize) {
-        let low = self.time_s.partition_point(|time| *time < from_s);
-        (low, self.time_s.partition_point(|time| *time <= to_s).max(low))
-    }
-
-    /// Straight between samples; none outside of them.
+    /// Linear interpolation; `None` outside the samples.
     pub fn at(&self, time_s: f64) -> Option<f64> {
         let after = self.time_s.partition_point(|time| *time < time_s);
         let (to, high) = (*self.time_s.get(after)?, *self.values.get(after)?);
@@ -71,8 +65,8 @@ impl TimeSeries {
         Some(low + (high - low) * (time_s - from) / (to - from))
     }
 
-    /// The mean between two moments of values that are held. The last value is
-    /// held on; the first holds before.
+    /// Mean of held values between two moments. The last value is held on; the first holds
+    /// before.
     fn held_mean(&self, from_s: f64, to_s: f64) -> f64 {
         let first = self.time_s.partition_point(|time| *time <= from_s).saturating_sub(1);
         let value = |at: usize| self.values.get(at).or(self.values.last()).copied().unwrap_or(0.0);
@@ -89,9 +83,8 @@ impl TimeSeries {
         }
     }
 
-    /// At the moments of another column. What is held is the mean until the
-    /// next moment, so that a step between two moments comes neither too early
-    /// nor too late; what is measured is interpolated.
+    /// At the times of another column. A held column gives its mean until the next time, so
+    /// that a step between two times is neither early nor late; a measured one is interpolated.
     fn resampled_at(&self, moments: &[f64]) -> Vec<f64> {
         let usual = usual_step(moments).unwrap_or(0.0);
         let value = |(k, moment): (usize, &f64)| {
@@ -105,8 +98,8 @@ impl TimeSeries {
     }
 }
 
-/// An input and an output as far as there are both, on the output's grid.
-/// Fails as [`Experiment::new`] does, and on a gap of a measured input.
+/// Input and output where both exist, on the output's grid. Fails as [`Experiment::new`] does,
+/// and on a gap of a measured input.
 pub fn paired(
     input: &TimeSeries,
     output: &TimeSeries,
@@ -120,30 +113,15 @@ pub fn paired(
     if output.len() < MIN_SAMPLES {
         return Err(ExperimentError::TooFew { got: output.len() });
     }
-    if !input.is_held {
-        check_gaps(input, rules)?;
+    if let Some(grid) = TimeGrid::of(&input.time_s).filter(|_| !input.is_held) {
+        check_gaps(&grid, rules)?;
     }
     // The gaps of the output and its grid first, then what went in at each of its moments.
-    let taken = Experiment::new(
-        &output.time_s,
-        &input.resampled_at(&output.time_s),
-        &output.values,
-        rules,
-    )?;
+    let at_output = input.resampled_at(&output.time_s);
+    let taken = Experiment::new(&output.time_s, &at_output, &output.values, rules)?;
     let moments = taken.moments();
     let input_is_held = input.is_held;
     Ok(Experiment { input: input.resampled_at(&moments), input_is_held, ..taken })
-}
-
-fn check_gaps(input: &TimeSeries, rules: &Rules) -> Result<(), ExperimentError> {
-    let Some(grid) = TimeGrid::of(&input.time_s) else { return Ok(()) };
-    let limit_s = rules.max_gap_s.unwrap_or(grid.usual_limit_s());
-    let too_long = |gap: &&SampleGap| gap.length_s > limit_s * (1.0 + 1e-6);
-    let count = grid.gaps.iter().filter(too_long).count();
-    match grid.longest() {
-        Some(gap) if count > 0 => Err(ExperimentError::Gap { gap: *gap, count, limit_s }),
-        _ => Ok(()),
-    }
 }
 
 #[cfg(test)]
@@ -188,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_of_either_are_told() {
+    fn gaps_of_either_are_reported() {
         let whole = series(0.02, 600, false, f64::sin);
         let mut broken = whole.clone();
         broken.time_s.drain(200..260);

@@ -1,12 +1,12 @@
-//! Logged data as a table with named columns. Lines are counted as an editor
-//! counts them, the names being line 1.
+//! Logged data as a table with named columns. Lines are counted as in an editor, the names
+//! being line 1.
 
 use crate::document::csv::{LineProblem, describe};
 
 /// What is wrong with a table.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DataTableError {
-    /// Nothing in it.
+    /// An empty table.
     #[error("there is no line with the names of columns")]
     Empty,
     /// A line that is not one of a table.
@@ -17,7 +17,7 @@ pub enum DataTableError {
         /// What is wrong with it.
         what: String,
     },
-    /// A name that is there twice.
+    /// A repeated name.
     #[error("two columns are called {name}")]
     DuplicateColumn {
         /// The name.
@@ -43,7 +43,7 @@ pub enum DataTableError {
         column: String,
         /// What stands there.
         found: String,
-        /// How many more cells of the column are none.
+        /// Number of further such cells in the column.
         others: usize,
     },
 }
@@ -52,7 +52,7 @@ fn shown(found: &str) -> String {
     if found.is_empty() { "nothing".to_owned() } else { format!("\"{found}\"") }
 }
 
-/// A comma that was meant as a point.
+/// A comma in place of a decimal point.
 fn decimal_hint(found: &str) -> &'static str {
     if number(&found.replace(',', ".")).is_some() { " with a decimal point" } else { "" }
 }
@@ -65,7 +65,7 @@ fn and_more(count: usize) -> String {
     }
 }
 
-/// A table as it stands in a file.
+/// A table from a file.
 #[derive(Debug, Clone)]
 pub struct DataTable {
     names: Vec<String>,
@@ -73,13 +73,12 @@ pub struct DataTable {
     lines: Vec<u64>,
 }
 
-/// Shortest way to write a byte order mark.
+/// The byte order mark.
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
 impl DataTable {
-    /// Reads a file's text: separated by commas, or by semicolons or tabs where
-    /// the first line has those instead. Empty lines and lines that begin with
-    /// `#` are left out.
+    /// Reads a file's text, separated by commas, or by semicolons or tabs where the first line
+    /// has those. Empty lines and lines that begin with `#` are skipped.
     pub fn parse(text: &str) -> Result<Self, DataTableError> {
         let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
         let names = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#'));
@@ -101,7 +100,7 @@ impl DataTable {
         let (mut rows, mut lines) = (Vec::new(), Vec::new());
         for row in reader.records() {
             let row = row.map_err(|error| of_line(&error))?;
-            lines.push(row.position().map_or(0, |place| line_of(text, place)));
+            lines.push(row.position().map_or(0, |position| line_of(text, position)));
             rows.push(row);
         }
         Ok(Self { names, rows, lines })
@@ -113,13 +112,9 @@ impl DataTable {
     }
 
     /// Rows without the names.
+    #[expect(clippy::len_without_is_empty, reason = "nothing asks for it")]
     pub fn len(&self) -> usize {
         self.rows.len()
-    }
-
-    /// Whether there is no row.
-    pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
     }
 
     /// The line of a row in the file.
@@ -127,7 +122,7 @@ impl DataTable {
         self.lines.get(row).copied().unwrap_or(0)
     }
 
-    /// The numbers of a column; fails on the first cell that is none.
+    /// The numbers of a column; fails on the first invalid cell.
     pub fn column(&self, name: &str) -> Result<Vec<f64>, DataTableError> {
         let at = self.names.iter().position(|known| known == name).ok_or_else(|| {
             DataTableError::NoColumn { name: name.to_owned(), known: self.names.clone() }
@@ -147,13 +142,12 @@ impl DataTable {
     }
 }
 
-/// The reader's places of rows are before the empty lines and the remarks that
-/// it leaves out.
-fn line_of(text: &str, place: &csv::Position) -> u64 {
-    let at = usize::try_from(place.byte()).unwrap_or(usize::MAX);
+/// The reader's position of a row is before the skipped lines.
+fn line_of(text: &str, position: &csv::Position) -> u64 {
+    let at = usize::try_from(position.byte()).unwrap_or(usize::MAX);
     let rest = text.get(at..).unwrap_or_default().lines();
     let left_out = rest.take_while(|line| line.trim().is_empty() || line.starts_with('#')).count();
-    place.line() + left_out as u64
+    position.line() + left_out as u64
 }
 
 fn number(cell: &str) -> Option<f64> {
@@ -201,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_table_is_told() {
+    fn invalid_tables_are_reported() {
         let said = |text: &str| DataTable::parse(text).unwrap_err().to_string();
         assert_eq!(said("\n\n"), "there is no line with the names of columns");
         assert_eq!(said("a,a\n1,2\n"), "two columns are called a");

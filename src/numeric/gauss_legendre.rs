@@ -1,7 +1,7 @@
-//! Integrals by a few values of a function.
+//! Numerical integration.
 
-/// Places and weights of the Gauss–Legendre rule of five places, on −1 to 1; the
-/// weights add up to 2.
+/// Nodes and weights of the five-point Gauss-Legendre rule on −1 to 1 (Abramowitz and Stegun
+/// 1964, table 25.4); the weights add up to 2.
 pub const GAUSS_LEGENDRE_5: [(f64, f64); 5] = [
     (-0.906_179_845_938_664, 0.236_926_885_056_189),
     (-0.538_469_310_105_683, 0.478_628_670_499_366),

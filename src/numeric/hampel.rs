@@ -1,14 +1,14 @@
-//! Outliers: the Hampel filter (bcs-thesis, eqs. (1)–(4)). A sample that lies
-//! further from the median of its window than so many scaled median absolute
-//! deviations is replaced by that median. (The thesis says *mean* absolute
-//! deviation in words; its eq. (4) is the median.)
+//! Outlier removal by the Hampel filter (bcs-thesis, eqs. (1)–(4)): a sample whose distance
+//! from the median of its window exceeds a number of scaled median absolute deviations is
+//! replaced by that median. (The thesis calls it *mean* absolute deviation; its eq. (4) is the
+//! median.)
 
 use super::rank;
 
-/// Windows beyond this are no windows.
+/// Largest half width of a window. A choice against a mistyped number.
 const MAX_HALF_WIDTH: usize = 10_000;
 
-/// Numbers that make no filter.
+/// Invalid parameters of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum HampelError {
     /// Half of the window.
@@ -25,19 +25,19 @@ pub enum HampelError {
     },
 }
 
-/// The filter's two numbers.
+/// The filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hampel {
     half_width: usize,
     threshold: f64,
 }
 
-/// Samples without their outliers.
+/// Filtered samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cleaned {
-    /// As many as there were.
+    /// As many as samples.
     pub values: Vec<f64>,
-    /// Which ones were replaced, counted from 0.
+    /// Indices of the replaced samples.
     pub replaced: Vec<usize>,
 }
 
@@ -53,8 +53,8 @@ impl Hampel {
         Ok(Self { half_width, threshold })
     }
 
-    /// Looks K samples back and K ahead; at the ends the window is as long as
-    /// there are samples. What is not finite counts as an outlier.
+    /// Uses K samples before and after each; windows at the ends are shorter. Samples that are
+    /// not finite are outliers.
     pub fn filter(&self, samples: &[f64]) -> Cleaned {
         let mut window = Vec::with_capacity(2 * self.half_width + 1);
         let mut replaced = Vec::new();
@@ -72,24 +72,23 @@ impl Hampel {
         Cleaned { values, replaced }
     }
 
-    /// The sample, or the median of its window. The scratch is kept from call
-    /// to call so that nothing is allocated.
+    /// The sample, or the median of its window. `scratch` is reused to avoid allocations.
     fn judge(&self, sample: f64, seen: impl Iterator<Item = f64>, scratch: &mut Vec<f64>) -> f64 {
         scratch.clear();
         scratch.extend(seen.filter(|value| value.is_finite()));
-        let Some(middle) = median(scratch) else { return sample };
+        let Some(middle) = rank::mean_median(scratch) else { return sample };
         for value in scratch.iter_mut() {
             *value = (*value - middle).abs();
         }
-        let deviation = median(scratch).unwrap_or(0.0);
+        let deviation = rank::mean_median(scratch).unwrap_or(0.0);
         let is_inlier =
             (sample - middle).abs() <= self.threshold * rank::SIGMA_PER_MEDIAN * deviation;
         if is_inlier { sample } else { middle }
     }
 }
 
-/// The same for live use: the window is the newest 2K + 1 samples, of which the
-/// last one is judged. A change of level passes K samples late.
+/// The same for live use: the window is the newest 2K + 1 samples, and the last one is
+/// filtered. A step of the signal passes K samples late.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveHampel {
     filter: Hampel,
@@ -106,8 +105,8 @@ impl LiveHampel {
         Self { filter, ring, next: 0, scratch: Vec::with_capacity(length) }
     }
 
-    /// Takes a sample; gives it back, or the median in its place. One that is
-    /// not finite comes back as it is while none that is has been seen.
+    /// Takes a sample; returns it or the median. One that is not finite is returned as it is as
+    /// long as no finite one has come.
     pub fn step(&mut self, sample: f64) -> f64 {
         let length = 2 * self.filter.half_width + 1;
         match self.ring.get_mut(self.next) {
@@ -119,18 +118,6 @@ impl LiveHampel {
     }
 }
 
-/// The middle value, or the mean of the two: windows at the ends may have an
-/// even number of samples.
-fn median(values: &mut [f64]) -> Option<f64> {
-    let count = values.len();
-    let upper = rank::median(values)?;
-    if count % 2 == 1 {
-        return Some(upper);
-    }
-    let lower = rank::at(values, (count / 2).checked_sub(1)?)?;
-    Some(f64::midpoint(lower, upper))
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
@@ -139,7 +126,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn the_median_takes_an_outliers_place() {
+    fn an_outlier_is_replaced_by_the_median() {
         // Window of the fourth: 1, 3, 90, 2, 4 with the median 3, deviations 2, 0, 87, 1, 1:
         // scale 1.4826, so that 90 goes and its neighbours stay.
         let cleaned = Hampel::new(2, 3.0).unwrap().filter(&[2.0, 1.0, 3.0, 90.0, 2.0, 4.0, 3.0]);

@@ -1,10 +1,10 @@
-//! Linear models of an extruder: transfer functions in continuous time with
-//! dead time, what they are on a grid of samples, and their simulation.
+//! Linear models: transfer functions in continuous time with dead time, their discretisation
+//! and simulation.
 //!
 //! ```text
 //! process::{FirstOrder, SecondOrder} → TransferFunction
-//!   → discretise(dt, Method) → DiscreteTransfer → Recursion::step(u) → y
-//!   → Simulator::new(tf, dt, Between) → step(u) → y      (exact, any dead time)
+//!   → discretise(dt, method) → DiscreteTransfer
+//!   → Simulator::new(tf, dt, between) → step(u) → y      (exact, any dead time)
 //!   → margins(loop)
 //! ```
 //!
@@ -18,7 +18,7 @@ mod simulate;
 mod state;
 mod transfer;
 
-pub use discrete::{DiscreteTransfer, DiscretisationMethod, Recursion};
+pub use discrete::{DiscreteTransfer, DiscretisationMethod};
 pub use margins::{StabilityMargins, margins};
 pub use process::{FirstOrder, SecondOrder};
 pub use simulate::{Between, Simulator, simulate};

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, SMatrix, SVector};
 
-/// Normal equations of a small fit.
+/// Normal equations of a fit with few parameters.
 pub struct NormalEquations<const N: usize> {
     matrix: [[f64; N]; N],
     /// Right-hand side.
@@ -16,26 +16,28 @@ impl<const N: usize> Default for NormalEquations<N> {
 }
 
 impl<const N: usize> NormalEquations<N> {
-    /// Adds an observation: its derivatives, what it misses, its weight.
+    /// Adds an observation: its derivatives, its residual, its weight.
     #[inline(always)]
     pub fn add(&mut self, row: [f64; N], miss: f64, weight: f64) {
         for i in 0..N {
             let weighted = weight * row[i];
             self.vector[i] += weighted * miss;
-            // Whole rows, of which one half would do, fit the processor's vectors.
+            // Whole rows are faster in vector instructions than the triangle that would be
+            // enough.
             for (sum, other) in self.matrix[i].iter_mut().zip(row) {
                 *sum += weighted * other;
             }
         }
     }
 
-    /// Holds one unknown: `miss` from where it is held.
+    /// Adds a prior for one parameter: `miss` is the distance of the prior from the current
+    /// value.
     pub fn add_prior(&mut self, which: usize, weight: f64, miss: f64) {
         self.matrix[which][which] += weight;
         self.vector[which] += weight * miss;
     }
 
-    /// The equations with those of other observations.
+    /// The sum with the equations of other observations.
     #[inline(always)]
     pub fn plus(&self, other: &Self) -> Self {
         let sum = |row: usize, column: usize| self.matrix[row][column] + other.matrix[row][column];
@@ -45,20 +47,20 @@ impl<const N: usize> NormalEquations<N> {
         }
     }
 
-    /// By how much a step lowers the sum of squared misses.
+    /// Decrease of the weighted sum of squares by a step.
     #[inline(always)]
     pub fn decrease_after(&self, step: &SVector<f64, N>) -> f64 {
         2.0 * self.vector.dot(step) - (SMatrix::from(self.matrix) * step).dot(step)
     }
 
-    /// The equations about where a step leads.
+    /// The equations after a step.
     #[inline(always)]
     pub fn after(&self, step: &SVector<f64, N>) -> Self {
         let vector = self.vector - SMatrix::from(self.matrix) * step;
         Self { matrix: self.matrix, vector }
     }
 
-    /// The equations of some unknowns alone.
+    /// The equations of some parameters, with the others fixed.
     #[inline(always)]
     pub fn of_unknowns<const M: usize>(&self, of: [usize; M]) -> PartialEquations<M> {
         PartialEquations {
@@ -67,7 +69,7 @@ impl<const N: usize> NormalEquations<N> {
         }
     }
 
-    /// Solves them; `None` where they have no solution.
+    /// Solves them; `None` if they are singular.
     pub fn solve(&mut self) -> Option<NormalSolution<N>>
     where
         nalgebra::Const<N>: nalgebra::DimMin<nalgebra::Const<N>>,
@@ -82,15 +84,15 @@ impl<const N: usize> NormalEquations<N> {
     }
 }
 
-/// Normal equations of some of the unknowns.
+/// Normal equations of some of the parameters.
 pub struct PartialEquations<const M: usize> {
     matrix: SMatrix<f64, M, M>,
     vector: SVector<f64, M>,
 }
 
 impl<const M: usize> PartialEquations<M> {
-    /// By how much the unknowns can lower the sum of squared misses; 0 where the
-    /// observations do not tell them.
+    /// Largest decrease of the sum of squares by these parameters; 0 where the observations do
+    /// not determine them.
     #[inline(always)]
     pub fn max_decrease(&self) -> f64 {
         let unknowns = Cholesky::new(self.matrix);
@@ -100,20 +102,20 @@ impl<const M: usize> PartialEquations<M> {
 
 /// Solved equations.
 pub struct NormalSolution<const N: usize> {
-    /// The unknowns.
+    /// The parameters.
     pub unknowns: SVector<f64, N>,
     cholesky: Cholesky<f64, nalgebra::Const<N>>,
 }
 
 impl<const N: usize> NormalSolution<N> {
-    /// Variance of an unknown, for observations of variance 1.
+    /// Variance of a parameter for observations of variance 1.
     pub fn variance(&self, which: usize) -> f64 {
         let mut one = SVector::<f64, N>::zeros();
         one[which] = 1.0;
         self.cholesky.solve(&one)[which]
     }
 
-    /// Covariance of the unknowns, for observations of variance 1.
+    /// Covariance of the parameters for observations of variance 1.
     pub fn covariance(&self) -> SMatrix<f64, N, N> {
         self.cholesky.inverse()
     }

@@ -1,16 +1,17 @@
-//! Smoothing without a shift: a polynomial fitted to a window by least squares
-//! and evaluated at one of its samples (bcs-thesis, eqs. (5), (6); Savitzky and
-//! Golay 1964). The coefficients are sums over orthonormal polynomials, so no
-//! matrix is solved and none of them suffers from the powers of a long window.
+//! Smoothing without a shift: a polynomial is fitted to a window by least squares and evaluated
+//! at one of its samples (bcs-thesis, eqs. (5), (6); Savitzky and Golay 1964). The coefficients
+//! are sums over orthonormal polynomials, which avoids the ill-conditioned powers of a long
+//! window.
 
 use super::number::to_f64;
+use super::row::dot;
 
-/// Highest degree that is of use.
+/// Largest degree. A choice: higher ones do not smooth.
 const MAX_DEGREE: usize = 8;
-/// Windows beyond this are no windows.
+/// Longest window. A choice against a mistyped number.
 const MAX_WINDOW: usize = 10_001;
 
-/// Numbers that make no filter.
+/// Invalid parameters of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SavGolError {
     /// The window's length.
@@ -30,21 +31,7 @@ pub enum SavGolError {
         /// What was asked for.
         degree: usize,
     },
-    /// The derivative's order.
-    #[error("derivative {derivative} of a polynomial of degree {degree} is nothing")]
-    Derivative {
-        /// What was asked for.
-        derivative: usize,
-        /// The polynomial's degree.
-        degree: usize,
-    },
-    /// Time from sample to sample.
-    #[error("{step_s} s from sample to sample: expected a time larger than zero")]
-    Step {
-        /// What was asked for.
-        step_s: f64,
-    },
-    /// Fewer samples than the window is long.
+    /// Fewer samples than the window.
     #[error("{got} samples: a window of {window} needs as many")]
     TooFew {
         /// Samples that there are.
@@ -54,17 +41,15 @@ pub enum SavGolError {
     },
 }
 
-/// A window, the degree of the polynomial, and which derivative is wanted.
+/// Window and degree of the polynomial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SavGol {
     window: usize,
     degree: usize,
-    derivative: usize,
-    step_s: f64,
 }
 
 impl SavGol {
-    /// That smooths: an odd window, a degree below its length.
+    /// A smoothing filter: an odd window, a degree below its length.
     pub fn new(window: usize, degree: usize) -> Result<Self, SavGolError> {
         if degree > MAX_DEGREE {
             return Err(SavGolError::Degree { degree });
@@ -72,18 +57,7 @@ impl SavGol {
         if window.is_multiple_of(2) || window <= degree || window > MAX_WINDOW {
             return Err(SavGolError::Window { window, degree });
         }
-        Ok(Self { window, degree, derivative: 0, step_s: 1.0 })
-    }
-
-    /// That differentiates so many times, at so many seconds a sample.
-    pub fn derivative(self, order: usize, step_s: f64) -> Result<Self, SavGolError> {
-        if order > self.degree {
-            return Err(SavGolError::Derivative { derivative: order, degree: self.degree });
-        }
-        if !(step_s > 0.0 && step_s.is_finite()) {
-            return Err(SavGolError::Step { step_s });
-        }
-        Ok(Self { derivative: order, step_s, ..self })
+        Ok(Self { window, degree })
     }
 
     /// Samples of the window.
@@ -91,40 +65,28 @@ impl SavGol {
         self.window
     }
 
-    /// What each sample of the window, the oldest first, is multiplied by to get
-    /// the value at sample `at` of it, counted from 0.
+    /// Weights of the samples of the window, the oldest first, for the value at sample `at`, from
+    /// 0: the sum over the orthonormal polynomials of their values at both samples.
     pub fn coefficients(&self, at: usize) -> Vec<f64> {
-        // The window reaches from −1 to 1.
+        // The window is mapped to −1 to 1.
         let half = to_f64(self.window / 2).max(1.0);
-        let place = |sample: usize| (to_f64(sample) - to_f64(self.window / 2)) / half;
+        let position = |sample: usize| (to_f64(sample) - to_f64(self.window / 2)) / half;
         let mut coefficients = vec![0.0; self.window];
-        let mut basis = Basis::new((0..self.window).map(place).collect());
-        let mut there = Derivatives::new(place(at), 1.0 / to_f64(self.window).sqrt());
+        let mut basis = Basis::new((0..self.window).map(position).collect());
         for degree in 0..=self.degree {
             if degree > 0 {
-                there.advance(basis.advance());
+                basis.advance();
             }
-            let wanted = there.of_order(self.derivative);
+            let there = basis.values[at];
             for (coefficient, value) in coefficients.iter_mut().zip(&basis.values) {
-                *coefficient += wanted * value;
+                *coefficient += there * value;
             }
-        }
-        let order = i32::try_from(self.derivative).unwrap_or(0);
-        let scale = (half * self.step_s).powi(-order);
-        for coefficient in &mut coefficients {
-            *coefficient *= scale;
         }
         coefficients
     }
 
-    /// Variance of the value at sample `at` of the window for samples with
-    /// independent noise of variance 1.
-    pub fn noise_gain(&self, at: usize) -> f64 {
-        self.coefficients(at).iter().map(|coefficient| coefficient * coefficient).sum()
-    }
-
-    /// As many values as samples: at the middle of each window, and at the ends
-    /// from the polynomial through the first and the last window.
+    /// As many values as samples: at the middle of each window, and at the ends from the
+    /// polynomials of the first and the last window.
     pub fn filter(&self, samples: &[f64]) -> Result<Vec<f64>, SavGolError> {
         let (got, window) = (samples.len(), self.window);
         let (Some(first), Some(last)) =
@@ -141,9 +103,8 @@ impl SavGol {
     }
 }
 
-/// The same for live use: the polynomial through the newest samples, at the
-/// last of them. It is noisier than in the middle, by
-/// [`SavGol::noise_gain`], and comes without delay for what is a polynomial.
+/// The same for live use: the polynomial of the newest samples, at the last of them. It is
+/// noisier than in the middle, and has no delay for polynomials.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveSavGol {
     coefficients: Vec<f64>,
@@ -158,7 +119,7 @@ impl LiveSavGol {
         Self { ring: Vec::with_capacity(coefficients.len()), coefficients, next: 0 }
     }
 
-    /// Takes a sample; gives the value there, once the window is full.
+    /// Takes a sample; returns the value there once the window is full.
     pub fn step(&mut self, sample: f64) -> Option<f64> {
         match self.ring.get_mut(self.next) {
             Some(oldest) => *oldest = sample,
@@ -174,16 +135,8 @@ impl LiveSavGol {
     }
 }
 
-/// b'·q(k+1) = (x − a)·q(k) − b·q(k−1): what takes one polynomial of an
-/// orthonormal row to the next.
-#[derive(Debug, Clone, Copy)]
-struct Recurrence {
-    centre: f64,
-    back: f64,
-    norm: f64,
-}
-
-/// One polynomial of the row at every sample, and the one before it.
+/// One of the orthonormal polynomials at every sample, and the one before it, by the recurrence
+/// b'·q(k+1) = (x − a)·q(k) − b·q(k−1).
 struct Basis {
     places: Vec<f64>,
     values: Vec<f64>,
@@ -198,7 +151,7 @@ impl Basis {
         Self { places, values, before: vec![0.0; count], norm: 0.0 }
     }
 
-    fn advance(&mut self) -> Recurrence {
+    fn advance(&mut self) {
         let weighted = self.places.iter().zip(&self.values).map(|(x, q)| x * q * q);
         let (centre, back) = (weighted.sum::<f64>(), self.norm);
         let row = self.places.iter().zip(&self.values).zip(&self.before);
@@ -209,44 +162,7 @@ impl Basis {
         }
         self.before = std::mem::replace(&mut self.values, next);
         self.norm = norm;
-        Recurrence { centre, back, norm }
     }
-}
-
-/// Derivatives of the same polynomials at one place, from order 0 on.
-struct Derivatives {
-    place: f64,
-    values: [f64; MAX_DEGREE + 1],
-    before: [f64; MAX_DEGREE + 1],
-}
-
-impl Derivatives {
-    fn new(place: f64, level: f64) -> Self {
-        let mut values = [0.0; MAX_DEGREE + 1];
-        values[0] = level;
-        Self { place, values, before: [0.0; MAX_DEGREE + 1] }
-    }
-
-    fn of_order(&self, order: usize) -> f64 {
-        self.values.get(order).copied().unwrap_or(0.0)
-    }
-
-    /// The recurrence, differentiated by Leibniz's rule.
-    fn advance(&mut self, by: Recurrence) {
-        let mut next = [0.0; MAX_DEGREE + 1];
-        let mut lower = 0.0;
-        for (order, to) in next.iter_mut().enumerate() {
-            let (value, before) = (self.of_order(order), self.before.get(order).unwrap_or(&0.0));
-            *to = (self.place - by.centre) * value + to_f64(order) * lower - by.back * before;
-            *to /= by.norm;
-            lower = value;
-        }
-        self.before = std::mem::replace(&mut self.values, next);
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::chart::{Ink, PlotCurve, PlotLayer, XAxis, legend, palette, wide_plot, y_range};
 use super::html::titled_page;
-use crate::numeric::statistics::as_f64;
+use crate::numeric::number::to_f64;
 use crate::trials::compare::{Figures, JUDGED_AFTER_MM, SIGMA_AFTER_MM, SeedStatistics};
 
 /// One number of one controller at one width, as `compare.json` has it.
@@ -111,7 +111,7 @@ impl ControllerComparison {
                     confidence_95: over.confidence,
                     median: over.median,
                 };
-                let failed = Some(as_f64(figures.failed_seeds as u64));
+                let failed = Some(to_f64(figures.failed_seeds));
                 let failed = SeedStatistics { mean: failed, confidence: None, median: failed };
                 numbers.push(number(FAILED, "1", failed));
                 numbers.extend(QUANTITIES.iter().map(|one| number(one.0, one.1, (one.3)(figures))));

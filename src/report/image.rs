@@ -7,6 +7,7 @@ use image::imageops::FilterType;
 use super::chart::palette::{GAUGE, LEFT_EDGE, REJECTED, RIGHT_EDGE, Rgb};
 use crate::core::frame::Frame;
 use crate::core::geometry::{ImagePoint, Roi};
+use crate::numeric::number::to_f64;
 use crate::vision::{Edges, Gauge, WidthMeasurement};
 use canvas::Canvas;
 
@@ -96,13 +97,13 @@ impl GaugeCutout {
     /// their centres.
     fn position(&self, point: ImagePoint, enlarge: f64) -> (f64, f64) {
         let scale = self.scale * enlarge;
-        let along = |value: f64, corner: usize| (value + 0.5 - as_f64(corner)) * scale - 0.5;
+        let along = |value: f64, corner: usize| (value + 0.5 - to_f64(corner)) * scale - 0.5;
         (along(point.x, self.corner.0), along(point.y, self.corner.1))
     }
 
     fn draw_gauge(&self, canvas: &mut Canvas, enlarge: f64) {
-        let (left, top) = (as_f64(self.roi.x) - 0.5, as_f64(self.roi.y) - 0.5);
-        let (right, bottom) = (left + as_f64(self.roi.width), top + as_f64(self.roi.height));
+        let (left, top) = (to_f64(self.roi.x) - 0.5, to_f64(self.roi.y) - 0.5);
+        let (right, bottom) = (left + to_f64(self.roi.width), top + to_f64(self.roi.height));
         let ink = if self.outcome.is_ok() { GAUGE.light } else { REJECTED.light };
         let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
             .map(|(x, y)| self.position(ImagePoint::new(x, y), enlarge));
@@ -154,8 +155,8 @@ fn cut_out(frame: &Frame, ((x, y), (width, height)): CutOut) -> (image::GrayImag
     if width.max(height) <= SIDE {
         return (cut, 1.0);
     }
-    let scale = as_f64(SIDE) / as_f64(width.max(height));
-    let smaller = |length: usize| whole(as_f64(length) * scale);
+    let scale = to_f64(SIDE) / to_f64(width.max(height));
+    let smaller = |length: usize| whole(to_f64(length) * scale);
     let small =
         image::imageops::resize(&cut, smaller(width), smaller(height), FilterType::Triangle);
     (small, scale)
@@ -171,11 +172,6 @@ fn brightened(mut grey: image::GrayImage) -> image::GrayImage {
         }
     }
     grey
-}
-
-#[expect(clippy::cast_precision_loss, reason = "sides of an image are far below 2^52")]
-fn as_f64(length: usize) -> f64 {
-    length as f64
 }
 
 #[expect(

@@ -3,7 +3,7 @@
 use crate::control::event::Event;
 use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
-use crate::identify::camera_offset::MeasuredWidth;
+use crate::identify::camera_offset::TimedWidth;
 use crate::io::recording::{RecordedEntry, RecordingError};
 
 /// A bead as it was recorded.
@@ -12,7 +12,7 @@ pub struct RecordedBead {
     /// What the robot reported, when it arrived.
     pub states: Vec<(Stamp, RobotState)>,
     /// Widths that were measured.
-    pub widths: Vec<MeasuredWidth>,
+    pub widths: Vec<TimedWidth>,
     /// Frames that gave none.
     pub rejected: u64,
 }
@@ -27,11 +27,7 @@ pub fn recorded_bead(
         match event {
             Event::Robot(state) => bead.states.push((now, state)),
             Event::Measured { captured_at, width_mm, sigma_mm, .. } => {
-                bead.widths.push(MeasuredWidth {
-                    at: captured_at,
-                    width: width_mm,
-                    sigma: sigma_mm,
-                });
+                bead.widths.push(TimedWidth { at: captured_at, width: width_mm, sigma: sigma_mm });
             }
             Event::Rejected { .. } => bead.rejected += 1,
             _ => {}

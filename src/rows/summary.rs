@@ -32,7 +32,8 @@ use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, Mm3PerS};
-use crate::numeric::statistics::{Distribution, Moments, WeightedMean, as_f64};
+use crate::numeric::number::to_f64;
+use crate::numeric::statistics::{Distribution, Moments, WeightedMean};
 use crate::vision::Roughness;
 
 /// The figures of a run. An unknown figure is null.
@@ -117,7 +118,7 @@ impl Summary {
     /// are none.
     pub fn rejected_fraction(&self) -> f64 {
         let frames = self.frames_with_bead();
-        if frames == 0 { 0.0 } else { as_f64(frames - self.measured.min(frames)) / as_f64(frames) }
+        if frames == 0 { 0.0 } else { to_f64(frames - self.measured.min(frames)) / to_f64(frames) }
     }
 
     /// Frames less those that were refused where no bead of the run could be.

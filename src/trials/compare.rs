@@ -8,7 +8,8 @@ use super::score::BeadPoint;
 use crate::calibration::Calibration;
 use crate::cell::file::{Cell, RunPart};
 use crate::core::units::Mm;
-use crate::numeric::average::{mean, median};
+use crate::numeric::average::mean;
+use crate::numeric::rank::mean_median;
 use crate::sim::cell::SimCellError;
 use crate::width_control::target::WidthTarget;
 
@@ -64,7 +65,7 @@ impl SeedStatistics {
         let middle = mean(values.iter().copied());
         let variance = mean(values.iter().map(|value| (value - middle).powi(2)));
         let spread = (variance / (count - 1.0).max(1.0)).sqrt();
-        let median = median(&mut values);
+        let median = mean_median(&mut values).unwrap_or(f64::NAN);
         Self {
             mean: finite.then_some(middle),
             confidence: confidence_factor(count).filter(|_| finite).map(|times| times * spread),

@@ -1,4 +1,4 @@
-//! Laws that are tried on a cell as it was found.
+//! Controllers that are tried on an identified cell.
 
 use std::sync::Arc;
 
@@ -9,23 +9,23 @@ use crate::width_control::strategy::Strategy;
 use crate::width_control::strategy::distance::DistanceStrategy;
 use crate::width_control::strategy::pi::PiStrategy;
 
-/// A law that is tried.
+/// A controller that is tried.
 #[derive(Debug, Clone)]
 pub struct ControllerCandidate {
     /// What it is called.
     pub name: String,
     /// Its width controller.
     pub strategy: Arc<dyn Strategy>,
-    /// Gains of the PI law.
+    /// Gains of the PI controller.
     pub gains: Option<PiGains>,
-    /// The camera's distance that it is told \[mm\].
+    /// The camera's distance in its settings \[mm\].
     pub offset_mm: f64,
     /// Its standard deviation \[mm\].
     pub offset_sigma_mm: f64,
 }
 
 impl ControllerCandidate {
-    /// As the cell has it now; none where its law holds no width.
+    /// As configured in the cell; `None` where the strategy does not control the width.
     pub fn now(run: &RunPart) -> Option<Self> {
         let strategy = &run.control.strategy;
         let name = if strategy.as_kind::<PiStrategy>().is_some() {
@@ -44,18 +44,14 @@ impl ControllerCandidate {
         })
     }
 
-    /// The proposed PI law.
+    /// The proposed PI controller.
     pub fn pi(proposal: &Proposal) -> Self {
-        Self {
-            name: "proposed PI".to_owned(),
-            strategy: Arc::new(PiStrategy),
-            gains: Some(proposal.pi.gains),
-            offset_mm: proposal.distance.offset_mm,
-            offset_sigma_mm: proposal.distance.offset_sigma_mm,
-        }
+        let gains = Some(proposal.pi.gains);
+        let strategy = Arc::new(PiStrategy);
+        Self { strategy, gains, ..Self::of("proposed PI", &proposal.distance) }
     }
 
-    /// The proposed law by distance.
+    /// The proposed distance controller.
     pub fn distance(proposal: &Proposal) -> Self {
         Self::of("proposed, by distance", &proposal.distance)
     }
@@ -74,7 +70,7 @@ impl ControllerCandidate {
         }
     }
 
-    /// The law by distance as it is proposed, and with what it is told wrong.
+    /// The distance controller as proposed, and with mismatched settings.
     pub fn mismatched(proposal: &Proposal) -> Vec<Self> {
         let settings = proposal.distance;
         let cases: [(&str, f64, f64); 5] = [

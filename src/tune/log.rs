@@ -1,28 +1,28 @@
-//! What is taken of a run: reports, widths, setpoints, and how far a course of steps
-//! came.
+//! Data of a run: reports, widths, setpoints, and the progress of the speed steps.
 
 use crate::control::event::Event;
 use crate::control::step::{Command, Step};
 use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
-use crate::identify::camera_offset::MeasuredWidth;
+use crate::identify::camera_offset::TimedWidth;
 use crate::width_control::steps::{StepSettings, StepsProgress, StepsTrace};
 
 /// A run as it was recorded, in order.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Log {
-    /// What the robot reported, when it arrived.
+    /// The robot's reports with their arrival times.
     pub states: Vec<(Stamp, RobotState)>,
-    /// Widths that were measured, by capture.
-    pub widths: Vec<MeasuredWidth>,
-    /// From capture to arrival at the controller of each, in the order of arrival \[s\].
+    /// Measured widths, by time of capture.
+    pub widths: Vec<TimedWidth>,
+    /// Time from capture to arrival at the controller of each width, in the order of arrival
+    /// \[s\].
     pub latencies_s: Vec<f64>,
-    /// Speeds that were sent, and when.
+    /// Speed setpoints with the times at which they were sent.
     pub setpoints: Vec<(Stamp, MmPerS)>,
-    /// Frames that gave no width.
+    /// Frames without a width.
     pub refused: u64,
-    /// The newest that was said of a course of steps.
+    /// Latest progress of the speed steps.
     pub steps: Option<StepsTrace>,
 }
 
@@ -33,18 +33,15 @@ impl Log {
             Event::Robot(state) => self.states.push((now, *state)),
             Event::Measured { captured_at, width_mm, sigma_mm, .. } => {
                 self.latencies_s.push((now - *captured_at).secs());
-                self.widths.push(MeasuredWidth {
-                    at: *captured_at,
-                    width: *width_mm,
-                    sigma: *sigma_mm,
-                });
+                let (at, width, sigma) = (*captured_at, *width_mm, *sigma_mm);
+                self.widths.push(TimedWidth { at, width, sigma });
             }
             Event::Rejected { .. } => self.refused += 1,
             _ => {}
         }
     }
 
-    /// Takes an answer.
+    /// Takes a step of the controller.
     pub fn step(&mut self, now: Stamp, step: &Step) {
         if let Some(Command::Speed(speed)) = step.command {
             self.setpoints.push((now, speed));
@@ -52,8 +49,7 @@ impl Log {
         self.steps = step.trace.steps.or(self.steps);
     }
 
-    /// Why a course of steps was not seen to its end, if it was not; none where there was
-    /// none.
+    /// Why the speed steps were not completed; `None` if they were, or if there were none.
     pub fn cut_short(&self) -> Option<String> {
         let steps = self.steps?;
         if let Some(width) = steps.near_end_mm {
@@ -74,7 +70,7 @@ impl Log {
         }
     }
 
-    /// Puts widths into the order of their frames, whatever came in between.
+    /// Sorts the widths by time of capture.
     pub fn finish(&mut self) {
         self.widths.sort_by_key(|width| width.at);
     }

@@ -1,5 +1,4 @@
-//! What the widths scatter by: independent from width to width, and what wanders along
-//! the path.
+//! Noise of the widths: independent from width to width, and a random walk along the path.
 
 use serde::Serialize;
 
@@ -8,84 +7,81 @@ use crate::identify::camera_offset::{OffsetStudy, WidthAtSpeed};
 use crate::numeric::number::to_f64;
 use crate::numeric::rank;
 
-/// Relative standard deviation of such an estimate times the root of the count, for
-/// differences of neighbours, each of which is in two.
+/// Relative standard error of the noise times the root of the number of differences: 1.17 for
+/// independent ones (the median deviation), more for differences with common widths. A choice.
 const MEDIAN_ERROR_FACTOR: f64 = 1.5;
-/// Times its noise by which a piece must differ from the next to count as rough.
+/// Standard deviation of averaged widths over that expected from their noise, above which the
+/// bead is rough. A choice.
 const MIN_ROUGHNESS_RATIO: f64 = 1.3;
-/// Variances of the walk for each millimetre that are tried, over that of a piece:
-/// from the first by this factor.
+/// Variances of the random walk per millimetre that are tried, over that of an averaged width:
+/// a geometric sequence.
 const MIN_VARIANCE_RATIO: f64 = 1e-7;
 const VARIANCE_RATIO_STEP: f64 = 1.25;
 const VARIANCE_RATIOS: u32 = 100;
-/// What is nothing in such units: the course before the first width.
+/// A variance in such units that is practically infinite: the state before the first width.
 const UNKNOWN_VARIANCE: f64 = 1e9;
-/// Half the difference of logarithms of likelihood within which one and two standard
-/// deviations lie.
+/// Derived: half the χ² quantile of one degree of freedom at 68.3 %, 1.00/2 (Wilks 1938).
 const LN_LIKELIHOOD_DROP_1_SIGMA: f64 = 0.5;
+/// Derived: half the χ² quantile of one degree of freedom at 95 %, 3.84/2 (Wilks 1938).
 const LN_LIKELIHOOD_DROP_95: f64 = 1.92;
 
-/// How the scatter divides.
+/// Components of the noise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PlantNoise {
-    /// From width to width, as a share of the width.
+    /// From width to width, relative to the width.
     pub per_width: Estimated,
-    /// What means over a gauge's length scatter by beyond that, from one to the next, as
-    /// a share: the bead is rough, and widths whose gauges overlap share it.
+    /// Standard deviation of widths averaged over a gauge beyond that, relative: the bead is
+    /// rough, and widths with overlapping gauges have it in common.
     pub roughness: f64,
-    /// What wanders along the path.
+    /// Random walk along the path.
     pub drift: Drift,
 }
 
-/// How far the flow wanders along a metre, as a share.
+/// Random walk of the flow per root metre, relative.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Drift {
-    /// The likeliest, and what one standard deviation to either side is.
+    /// Estimate of maximum likelihood with its interval of one standard deviation.
     Estimated {
-        /// The likeliest.
+        /// The estimate.
         per_root_m: f64,
-        /// One standard deviation below.
+        /// Lower end of the interval.
         low: f64,
-        /// One above.
+        /// Upper end of the interval.
         high: f64,
     },
-    /// None was seen; with 95 % it is no more than this.
+    /// None is significant; the upper limit at 95 %.
     AtMost(f64),
 }
 
-/// Divides what is left of the widths.
+/// Components of the residuals of the widths.
 pub fn width_noise(study: &OffsetStudy) -> PlantNoise {
     let each = neighbour_noise(study, &study.widths);
     let pieces = neighbour_noise(study, &study.pieces).value;
     let widths: usize = study.pieces.iter().map(|piece| piece.count).sum();
     let per_piece = to_f64(widths) / to_f64(study.pieces.len()).max(1.0);
     let rough = (pieces.powi(2) - each.value.powi(2) / per_piece.max(1.0)).max(0.0).sqrt();
-    // Neighbours that share nothing of a gauge are no more apart than their noise.
-    let rough = if pieces > each.value / per_piece.max(1.0).sqrt() * MIN_ROUGHNESS_RATIO {
-        rough
-    } else {
-        0.0
-    };
-    PlantNoise { per_width: each, roughness: rough, drift: drift(&study.pieces) }
+    // Widths without a common part of a gauge differ by their noise only.
+    let is_rough = pieces > each.value / per_piece.max(1.0).sqrt() * MIN_ROUGHNESS_RATIO;
+    let roughness = if is_rough { rough } else { 0.0 };
+    PlantNoise { per_width: each, roughness, drift: drift(&study.pieces) }
 }
 
-/// From the differences of neighbours, which share what wanders.
+/// From the differences of neighbours, in which a drift cancels.
 fn neighbour_noise(study: &OffsetStudy, samples: &[WidthAtSpeed]) -> Estimated {
     let pairs = samples.iter().zip(samples.iter().skip(1));
     let same = pairs.filter(|(before, after)| before.bead == after.bead);
-    let mut sizes: Vec<f64> = same
-        .map(|(before, after)| (study.residual(after) - study.residual(before)).abs())
-        .collect();
+    let change = |(before, after)| study.residual(after) - study.residual(before);
+    let mut sizes: Vec<f64> = same.map(|pair| f64::abs(change(pair))).collect();
     let count = to_f64(sizes.len()).max(1.0);
     let value =
         rank::SIGMA_PER_MEDIAN * rank::median(&mut sizes).unwrap_or(0.0) / std::f64::consts::SQRT_2;
     Estimated { value, sigma: value * MEDIAN_ERROR_FACTOR / count.sqrt() }
 }
 
-/// The likeliest walk beside independent noise, whatever level and exponent are
-/// (restricted likelihood, Patterson and Thompson 1971). Pieces are a gauge long, so
-/// that what is rough within a gauge counts as noise.
+/// Random walk of maximum likelihood beside independent noise, with level and exponent
+/// eliminated (restricted likelihood, Patterson and Thompson 1971). The averaged widths are a
+/// gauge apart, so that roughness within a gauge counts as noise.
 fn drift(pieces: &[WidthAtSpeed]) -> Drift {
     let tried = (0..VARIANCE_RATIOS)
         .map(|k| MIN_VARIANCE_RATIO * VARIANCE_RATIO_STEP.powi(i32::try_from(k).unwrap_or(0)));
@@ -100,8 +96,7 @@ fn drift(pieces: &[WidthAtSpeed]) -> Drift {
     Drift::Estimated { per_root_m, low: low.min(per_root_m), high: high.max(per_root_m) }
 }
 
-/// Sizes of the walk between which it is likelier than a limit, on the line between two
-/// that were tried.
+/// Interval in which the likelihood exceeds a limit, by linear interpolation.
 fn likelihood_interval(each: &[WalkLikelihood], limit: f64) -> (f64, f64) {
     let is_within = |one: &WalkLikelihood| one.ln > limit;
     let cross = |inside: &WalkLikelihood, outside: Option<&WalkLikelihood>| match outside {
@@ -120,7 +115,7 @@ fn likelihood_interval(each: &[WalkLikelihood], limit: f64) -> (f64, f64) {
     (low.unwrap_or(f64::INFINITY), high.unwrap_or(0.0))
 }
 
-/// A size of the walk and how likely it is.
+/// A random walk and its log-likelihood.
 #[derive(Debug, Clone, Copy)]
 struct WalkLikelihood {
     per_root_m: f64,
@@ -128,13 +123,12 @@ struct WalkLikelihood {
 }
 
 impl WalkLikelihood {
-    /// With the variance of a millimetre's walk over that of a piece's noise. The
-    /// filter of Kalman (1960) gives what each piece differs from what those before it
-    /// foretell; the exponent is fitted to these.
+    /// With the variance of the walk per millimetre over that of an averaged width. The Kalman
+    /// filter (1960) gives the innovations, to which the exponent is fitted.
     fn of(pieces: &[WidthAtSpeed], ratio: f64) -> Self {
         let mut before: Option<&WidthAtSpeed> = None;
         let (mut variance, mut width, mut speed) = (UNKNOWN_VARIANCE, 0.0, 0.0);
-        let (mut n, mut xx, mut xy, mut yy, mut logs) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        let [mut n, mut xx, mut xy, mut yy, mut logs] = [0.0; 5];
         for piece in pieces {
             match before.filter(|before| before.bead == piece.bead) {
                 Some(before) => variance += ratio * (piece.path_mm - before.path_mm).abs(),
@@ -142,7 +136,7 @@ impl WalkLikelihood {
             }
             let total = variance + 1.0;
             let (y, x) = (piece.ln_width - width, piece.ln_speed - speed);
-            // The first of a bead tells its level and nothing else.
+            // The first of a bead determines its level only.
             if variance < UNKNOWN_VARIANCE {
                 n += 1.0;
                 xx += x * x / total;
@@ -161,5 +155,20 @@ impl WalkLikelihood {
         let noise = ((yy - slope * xy) / free).max(f64::MIN_POSITIVE);
         let ln = -0.5 * (free * noise.ln() + logs + xx.max(f64::MIN_POSITIVE).ln());
         Self { per_root_m: (1000.0 * ratio * noise).sqrt(), ln }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_drops_of_the_likelihood_hold_one_sigma_and_95_percent() {
+        for (drop, within) in
+            [(LN_LIKELIHOOD_DROP_1_SIGMA, 0.682_689), (LN_LIKELIHOOD_DROP_95, 0.95)]
+        {
+            let phi = crate::numeric::normal_distribution::cumulative((2.0_f64 * drop).sqrt());
+            assert!((2.0 * phi - 1.0 - within).abs() < 1e-4);
+        }
     }
 }

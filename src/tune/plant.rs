@@ -1,4 +1,4 @@
-//! The cell as a recording shows it.
+//! An identified cell.
 
 use serde::Serialize;
 
@@ -10,21 +10,21 @@ use crate::core::readback::ROBOT_LAG;
 use crate::core::units::{Mm, MmPerS};
 use crate::identify::camera_offset::{OffsetSearch, OffsetStudy, study};
 
-/// Part of the exponent as which its standard deviation says nothing any more.
+/// Relative standard deviation above which an exponent is useless. A choice.
 const MAX_RELATIVE_SIGMA: f64 = 1.0 / 3.0;
 
-/// What has to be known beforehand.
+/// Known facts about the cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TuneFacts {
     /// Length of the gauge along the bead.
     pub gauge: Mm,
     /// Largest distance of the camera that is tried.
     pub max_offset: Mm,
-    /// Speed at which the level of the bead is told.
+    /// Speed at which the level of the bead is given.
     pub start_speed: MmPerS,
 }
 
-/// What was found.
+/// An identified cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IdentifiedCell {
     /// Distance from the nozzle to the middle of the gauge \[mm\].
@@ -35,19 +35,19 @@ pub struct IdentifiedCell {
     pub width_mm: Estimated,
     /// The start speed v₀ \[mm/s\].
     pub at_speed_mm_per_s: f64,
-    /// How the widths scatter.
+    /// Noise of the widths.
     pub width_noise: PlantNoise,
-    /// How the robot answers its setpoints.
+    /// Response of the robot to setpoints.
     pub robot: Result<RobotResponse, RobotResponseError>,
-    /// Rates and delays.
+    /// Rates and latencies.
     pub timing: CellTiming,
     /// Length of the gauge \[mm\].
     pub gauge_mm: f64,
-    /// Widths beside the speeds that laid them.
+    /// Widths and the speeds that laid them.
     pub study: OffsetStudy,
 }
 
-/// Dead time and lag of a robot.
+/// Dead time and time constant of a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RobotDynamics {
     /// Dead time \[s\].
@@ -84,19 +84,13 @@ impl IdentifiedCell {
         })
     }
 
-    /// Width of bead that is laid at a speed \[mm\].
-    pub fn width_at(&self, speed_mm_per_s: f64) -> f64 {
-        let ratio = speed_mm_per_s / self.at_speed_mm_per_s;
-        self.width_mm.value * libm::pow(ratio, -self.exponent.value)
-    }
-
     /// Speed at which bead of a width is laid \[mm/s\].
     pub fn speed_for(&self, width_mm: f64) -> f64 {
         let ratio = self.width_mm.value / width_mm;
         self.at_speed_mm_per_s * libm::pow(ratio, 1.0 / self.exponent.value)
     }
 
-    /// The robot's answer; that of a usual robot where it was not told.
+    /// The robot's response; that of a typical robot if it was not identified.
     pub fn robot_dynamics(&self) -> RobotDynamics {
         let usual = RobotDynamics { dead_time_s: 0.0, lag_s: ROBOT_LAG.secs() };
         self.robot.map_or(usual, |robot| RobotDynamics {
@@ -110,8 +104,8 @@ impl IdentifiedCell {
         self.width_noise.per_width.value * self.width_mm.value
     }
 
-    /// How far the flow is taken to wander along a metre where a bead is simulated:
-    /// what was found, nothing where nothing was seen.
+    /// Random walk of the flow per root metre for simulated beads: the estimate, or zero if it
+    /// is not significant.
     pub fn drift_per_root_m(&self) -> f64 {
         match self.width_noise.drift {
             Drift::Estimated { per_root_m, .. } => per_root_m,

@@ -1,4 +1,4 @@
-//! What each law would do on the cell as it was found: beads of the simulated cell.
+//! Predicted response of each controller on the identified cell, by simulated beads.
 
 use std::sync::Arc;
 
@@ -14,6 +14,7 @@ use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS2};
+use crate::numeric::rank;
 use crate::run::runner::NoRecorder;
 use crate::scenario::bead::{BeadModel, EdgeRoughness};
 use crate::scenario::disturbance::Flow;
@@ -21,46 +22,46 @@ use crate::scenario::table::{Simulation, WidthSource};
 use crate::sim::cell::{FrameObservation, Observer, SimCell, SimCellError};
 use crate::width_control::target::WidthTarget;
 
-/// Step of the flow, as a share.
+/// Relative step of the flow. A choice.
 pub const FLOW_STEP: f64 = 0.08;
-/// Beads that are laid with each law.
+/// Simulated beads per controller. A choice between time and the standard error.
 pub const SEEDS: u64 = 24;
-/// Least band about the target within which a bead counts as settled \[mm\].
+/// Smallest band about the target in which a bead is settled \[mm\].
 const MIN_BAND_MM: f64 = 0.5;
-/// Path from the first stretch to the flow's step, and from there to the end: at least
-/// this \[mm\], and so many times the camera's distance.
+/// Path from the first segment to the flow step, and from there to the end: at least this
+/// \[mm\], and so many camera distances.
 const MIN_SEGMENT_MM: f64 = 1200.0;
 const SEGMENT_OFFSETS: f64 = 15.0;
-/// Part of the way before the flow's step over which a bead counts as steady.
+/// Fraction of the path before the flow step that counts as steady.
 const STEADY_FRACTION: f64 = 1.0 / 3.0;
-/// Length over which a rough bead is taken to be alike, as a part of the gauge.
+/// Correlation length of the roughness over the gauge. A choice.
 const ROUGHNESS_LENGTH_FRACTION: f64 = 0.1;
-/// Places along the bead at which it is judged \[mm\].
+/// Spacing of the widths along the bead \[mm\].
 const SAMPLE_SPACING_MM: f64 = 1.0;
-/// What is a single scale good for where widths are not rendered.
+/// A placeholder where widths are not rendered.
 const UNUSED_SCALE: Calibration = Calibration::Scale { mm_per_px: 0.1, sigma: None };
-/// Bandwidths that a simulated robot may have \[Hz\].
+/// Bandwidths of a simulated robot \[Hz\].
 const BANDWIDTHS_HZ: (f64, f64) = (0.01, 1000.0);
 
-/// What is foretold of a law.
+/// Predicted response of a controller.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BeadPrediction {
-    /// The law.
+    /// The controller.
     pub name: String,
-    /// Way from the beginning of control until the bead is within the band, as the
-    /// median of all beads; none where most are not before the flow steps \[mm\].
+    /// Path from the beginning of control until the bead is settled, median of all beads;
+    /// `None` where most are not before the flow step \[mm\].
     pub start_settles_mm: Option<f64>,
     /// The same from the flow's step to the end.
     pub step_settles_mm: Option<f64>,
-    /// Root mean square error before the flow's step, once it is steady \[mm\].
+    /// Root mean square error in the steady part before the flow step \[mm\].
     pub steady_rms_mm: f64,
     /// Root mean square error from the beginning of control to the end \[mm\].
     pub whole_rms_mm: f64,
-    /// Beads of which the controller gave up.
+    /// Beads with a fault.
     pub stopped: usize,
     /// Fastest and slowest setpoint after control began \[mm/s\].
     pub speeds_mm_per_s: (f64, f64),
-    /// Width of the first bead along the path, in means over the gauge \[mm\].
+    /// Width of the first bead along the path, averaged over the gauge \[mm\].
     #[serde(skip)]
     pub bead: Vec<(f64, f64)>,
     /// Speed of the robot along the path of the first bead \[mm/s\].
@@ -68,7 +69,7 @@ pub struct BeadPrediction {
     pub speed: Vec<(f64, f64)>,
 }
 
-/// The cell as it was found, on which laws are tried.
+/// The identified cell as a simulation.
 #[derive(Debug, Clone)]
 pub struct TestCell {
     cell: Cell,
@@ -82,10 +83,10 @@ pub struct TestCell {
 }
 
 impl TestCell {
-    /// Of a cell and what was found. Its rates, limits and first stretch are the
-    /// cell's; bead, noise, wandering, delays and the robot are those found. A dead
-    /// time of the robot is added to the camera's, which is the same to a loop; a largest
-    /// slope of its speed becomes that of the setpoints.
+    /// Of a cell and its identification. Rates, limits and first segment are those of the cell;
+    /// bead, noise, drift, delays and robot are the identified ones. A dead time of the robot
+    /// is added to the camera's, which is equivalent in a loop; its largest acceleration limits
+    /// the setpoints.
     pub fn new(cell: &Cell, run: &RunPart, plant: &IdentifiedCell) -> Self {
         let (mut cell, mut run) = (cell.clone(), run.clone());
         let target_mm = run.control.target.nominal().get();
@@ -110,12 +111,10 @@ impl TestCell {
         Self { cell, run, target_mm, band_mm, step_at_mm, end_mm }
     }
 
-    /// What a law would do.
+    /// The response of a controller.
     pub fn predict(&self, candidate: &ControllerCandidate) -> Result<BeadPrediction, SimCellError> {
-        let laid: Vec<LaidRun> = (0..SEEDS)
-            .into_par_iter()
-            .map(|seed| self.lay(candidate, seed))
-            .collect::<Result<_, _>>()?;
+        let runs = (0..SEEDS).into_par_iter().map(|seed| self.lay(candidate, seed));
+        let laid: Vec<LaidRun> = runs.collect::<Result<_, _>>()?;
         let square = |from: &dyn Fn(&LaidRun) -> f64, to_mm: f64| {
             let errors = laid.iter().flat_map(|one| {
                 let from_mm = from(one);
@@ -127,16 +126,15 @@ impl TestCell {
             if count > 0.0 { f64::sqrt(sum / count) } else { f64::NAN }
         };
         let median = |way: &dyn Fn(&LaidRun) -> f64| {
-            let mut ways: Vec<f64> = laid.iter().map(way).collect();
-            crate::numeric::rank::median(&mut ways).filter(|way| way.is_finite())
+            rank::median_of(laid.iter().map(way)).filter(|way| way.is_finite())
         };
-        // A mean over the gauge knows of the step half a gauge before it.
+        // A mean over the gauge contains the step from half a gauge before it.
         let steady_end_mm = self.step_at_mm - 0.5 * self.cell.simulation.gauge_length.get();
         let steady = |one: &LaidRun| {
             one.control_start_mm + (1.0 - STEADY_FRACTION) * (steady_end_mm - one.control_start_mm)
         };
-        let speeds = laid.iter().map(|one| one.setpoints);
-        let speeds = speeds.reduce(|a, b| (a.0.max(b.0), a.1.min(b.1))).unwrap_or_default();
+        let setpoints = laid.iter().map(|one| one.setpoints);
+        let speeds_mm_per_s = setpoints.reduce(|a, b| (a.0.max(b.0), a.1.min(b.1)));
         Ok(BeadPrediction {
             name: candidate.name.clone(),
             start_settles_mm: median(&|one| self.settles(one, one.control_start_mm, steady_end_mm)),
@@ -144,14 +142,14 @@ impl TestCell {
             steady_rms_mm: square(&steady, steady_end_mm),
             whole_rms_mm: square(&|one| one.control_start_mm, self.end_mm),
             stopped: laid.iter().filter(|one| one.stopped).count(),
-            speeds_mm_per_s: speeds,
+            speeds_mm_per_s: speeds_mm_per_s.unwrap_or_default(),
             bead: laid.first().map(|one| one.bead.clone()).unwrap_or_default(),
             speed: laid.into_iter().next().map(|one| one.speed).unwrap_or_default(),
         })
     }
 
-    /// Way from a place to where the bead stays within the band; infinite if it does
-    /// not before the end.
+    /// Path from a point to where the bead stays within the band; infinite if it does not
+    /// before the end.
     fn settles(&self, one: &LaidRun, from_mm: f64, to_mm: f64) -> f64 {
         let within: Vec<_> =
             one.bead.iter().filter(|(at, _)| (from_mm..to_mm).contains(at)).collect();
@@ -177,7 +175,7 @@ impl TestCell {
             ..LaidRun::default()
         };
         let _ = sim.layer(Mm::ZERO, &mut laid);
-        // Of a rough bead no law sees more than the mean over the gauge.
+        // A controller sees only the mean over the gauge.
         let half_mm = 0.5 * cell.simulation.gauge_length.get();
         let mut at = 0.0;
         while at < self.end_mm {
@@ -189,7 +187,7 @@ impl TestCell {
     }
 }
 
-/// A bead that was laid.
+/// A simulated bead.
 #[derive(Debug, Clone, Default)]
 struct LaidRun {
     bead: Vec<(f64, f64)>,
@@ -222,7 +220,7 @@ impl Observer for LaidRun {
     fn frame(&mut self, _: &FrameObservation<'_>) {}
 }
 
-/// Bead, noise, delays and robot as they were found.
+/// Applies bead, noise, delays and robot.
 fn apply_identified(simulation: &mut Simulation, plant: &IdentifiedCell) {
     let robot = plant.robot_dynamics();
     simulation.width_source = WidthSource::Widths;
@@ -250,16 +248,17 @@ fn apply_identified(simulation: &mut Simulation, plant: &IdentifiedCell) {
     };
 }
 
-/// Shortest length over which a roughness hangs together \[mm\].
+/// Shortest correlation length of a simulated roughness \[mm\].
 const MIN_ROUGHNESS_LENGTH_MM: f64 = 0.1;
 
-/// A roughness that is found again in means over the gauge: of one that is alike as
-/// exp(−(distance/l)²), a mean over a long G keeps the share √π·l/G of the variance.
+/// A roughness with the identified standard deviation of means over the gauge: with the
+/// autocorrelation exp(−(distance/l)²), a mean over a long gauge G keeps √π·l/G of the
+/// variance.
 fn roughness(plant: &IdentifiedCell) -> EdgeRoughness {
     let measured_mm = plant.width_noise.roughness * plant.width_mm.value;
     let length_mm = ROUGHNESS_LENGTH_FRACTION * plant.gauge_mm;
     if length_mm < MIN_ROUGHNESS_LENGTH_MM {
-        // Widths at points are as rough as the bead.
+        // Widths at points have the roughness of the bead.
         return EdgeRoughness { sigma_mm: measured_mm, length_mm: MIN_ROUGHNESS_LENGTH_MM };
     }
     let kept_fraction = std::f64::consts::PI.sqrt() * ROUGHNESS_LENGTH_FRACTION;

@@ -1,4 +1,4 @@
-//! Settings that follow from what was found.
+//! Proposed settings.
 
 use serde::Serialize;
 
@@ -11,25 +11,25 @@ use crate::width_control::pi::PiGains;
 use crate::width_control::strategy::Strategy;
 use crate::width_control::strategy::distance::DistanceStrategy;
 
-/// How far the flow is said to wander along a metre unless less is known; that of the
-/// law by distance.
+/// Random walk of the flow per root metre if less is not known; the default of the distance
+/// controller.
 const DEFAULT_DRIFT: f64 = 0.0055;
-/// Range of what may be said.
+/// Accepted random walks.
 const DRIFT_RANGE: (f64, f64) = (1e-4, 0.2);
-/// Least that is claimed of the camera's distance \[mm\]: nozzles drip and paths round
-/// their corners.
+/// Smallest standard deviation of the camera's distance \[mm\]: nozzles drip, and paths round
+/// their corners. A choice.
 const MIN_OFFSET_SIGMA_MM: f64 = 0.5;
 
-/// Settings of both laws.
+/// Settings of both controllers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Proposal {
-    /// For the law by distance.
+    /// Of the distance controller.
     pub distance: DistanceProposal,
-    /// For the PI law.
+    /// Of the PI controller.
     pub pi: PiProposal,
 }
 
-/// Settings of the law by distance.
+/// Settings of the distance controller.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DistanceProposal {
     /// b.
@@ -38,14 +38,14 @@ pub struct DistanceProposal {
     pub offset_mm: f64,
     /// Its standard deviation \[mm\].
     pub offset_sigma_mm: f64,
-    /// How far the flow wanders along a metre, as a share.
+    /// Random walk of the flow per root metre, relative.
     pub drift_per_root_m: f64,
-    /// Whether b is learnt from the data: as the cell has it, and yes where its law is
-    /// another.
+    /// Whether b is estimated online: as in the cell, and yes where its strategy is another
+    /// one.
     pub learns: bool,
 }
 
-/// Gains of the PI law on the error in mm, and the loop that they were made for.
+/// Gains of the PI controller for the error in mm, and the loop for which they are computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PiProposal {
     /// Gains.
@@ -56,7 +56,7 @@ pub struct PiProposal {
     pub margins: Option<LoopMargins>,
 }
 
-/// What follows from a plant for the width and the limits of a cell.
+/// Settings for the width and the limits of a cell.
 pub fn propose(plant: &IdentifiedCell, run: &RunPart) -> Proposal {
     let at = slowest_loop(plant, run.control.target.nominal().get(), &run.limits);
     let gains = gains(&at);
@@ -66,7 +66,7 @@ pub fn propose(plant: &IdentifiedCell, run: &RunPart) -> Proposal {
     }
 }
 
-/// The slowest speed: there a change of it makes most of a width, and is seen last.
+/// The loop at the slowest speed, where the gain and the dead time are largest.
 pub fn slowest_loop(plant: &IdentifiedCell, target_mm: f64, limits: &SpeedLimits) -> LoopPlant {
     LoopPlant::at(plant, target_mm, limits.min_speed.get().max(1.0))
 }
@@ -85,8 +85,8 @@ fn by_distance(plant: &IdentifiedCell, now: &dyn Strategy) -> DistanceProposal {
     }
 }
 
-/// The rule AMIGO for a lag behind a dead time, which leaves Ms = 1.4 (Åström and
-/// Hägglund 2006, *Advanced PID control*, section 7.3).
+/// The AMIGO rule for a first-order lag with dead time, for Ms = 1.4 (Åström and Hägglund 2006,
+/// *Advanced PID control*, section 7.3).
 pub fn gains(plant: &LoopPlant) -> PiGains {
     let LoopPlant { gain_s: gain, dead_time_s: dead, lag_s: lag, .. } = *plant;
     let dead = dead.max(1e-3);

@@ -1,59 +1,60 @@
-//! How the robot answers its setpoints: a dead time and a lag, from the setpoint's
-//! sending to the report of the speed, and a largest slope where it has one.
+//! Response of the robot to setpoints: a dead time and a time constant, from sending a setpoint
+//! to the report of the speed, and a largest acceleration if there is one.
 
 use serde::Serialize;
 
 use super::{Estimated, Log};
 use crate::core::robot::{RobotMode, RobotState};
-use crate::core::time::{Span, Stamp};
+use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
+use crate::identify::camera_offset::laid_speeds::MAX_GAP;
 use crate::link::robot::motion::{PathMotion, SpeedLoop};
 use crate::numeric::number::to_f64;
+use crate::numeric::row::dot;
 
-/// Dead times and lags that are tried \[s\].
+/// Largest dead time and time constant \[s\]. A choice: a slower robot cannot be controlled.
 const MAX_DEAD_TIME_S: f64 = 0.8;
 const MAX_LAG_S: f64 = 1.0;
-/// Steps of the first look at the dead time \[s\], and the lags of it.
+/// Grid of the dead time \[s\], and of the time constant.
 const DEAD_STEP_S: f64 = 0.02;
 const LAGS_S: [f64; 9] = [0.0, 0.01, 0.02, 0.04, 0.08, 0.16, 0.3, 0.5, 0.9];
-/// A lag below which it is none \[s\].
+/// Time constant below which it is zero \[s\].
 const MIN_LAG_S: f64 = 1e-6;
-/// Slopes of the speed that are tried, and one that is no limit \[mm/s²\].
+/// Accelerations that are tried, and one that is no limit \[mm/s²\].
 const SLOPES: [f64; 9] = [15.0, 30.0, 60.0, 120.0, 240.0, 480.0, 960.0, 1900.0, 3800.0];
 const NO_SLOPE: f64 = 1e9;
-/// Change of a slope's logarithm for a step of the search of a second.
+/// Change of the logarithm of the acceleration for a search step of one second.
 const LN_SLOPE_PER_STEP: f64 = 20.0;
-/// Part of the squares that may be left with a limit of the slope for it to count.
+/// Sum of squares with an acceleration limit over that without, below which there is one. A
+/// choice.
 const MAX_RESIDUAL_RATIO: f64 = 0.5;
 /// Smallest step of the search \[s\].
 const MIN_SEARCH_STEP_S: f64 = 1e-5;
-/// Change of setpoints that counts as a step, as a share.
+/// Relative change of setpoints that counts as a step.
 const MIN_SETPOINT_CHANGE: f64 = 0.01;
-/// Steps below which dead time and lag are not told.
+/// Smallest number of steps.
 const MIN_STEPS: usize = 3;
-/// Reports that are needed.
+/// Smallest number of reports.
 const MIN_REPORTS: usize = 20;
-/// Longest time between two reports that the answer is followed over.
-const MAX_REPORT_GAP: Span = Span::from_millis(500);
-/// Part of a lag within which its end shows in the reports.
+/// Step of the difference quotients \[s\].
 const DERIVATIVE_STEP_S: f64 = 1e-3;
 
-/// The robot's answer.
+/// Response of the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RobotResponse {
-    /// From the setpoint's sending until the reported speed begins to change \[s\].
+    /// From sending a setpoint until the reported speed changes \[s\].
     pub dead_time_s: Estimated,
     /// Time constant of the change \[s\].
     pub lag_s: Estimated,
-    /// Largest slope of the speed, where the robot's own is one \[mm/s²\].
+    /// Largest acceleration, if there is one \[mm/s²\].
     pub slope_mm_per_s2: Option<f64>,
-    /// What is left of the reported speeds \[mm/s\], root mean square.
+    /// Residual of the reported speeds \[mm/s\], root mean square.
     pub residual_mm_per_s: f64,
-    /// Steps of the setpoint that told it.
+    /// Number of setpoint steps.
     pub steps: usize,
 }
 
-/// Why the robot's answer is not told.
+/// Why the response is not identified.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RobotResponseError {
     /// The setpoints hardly changed.
@@ -65,7 +66,7 @@ pub enum RobotResponseError {
         /// Steps that were sent.
         found: usize,
     },
-    /// The robot hardly reported while it went by setpoints.
+    /// Too few reports under setpoints.
     #[error(
         "only {found} reports are of a robot that prints by setpoints, and {MIN_REPORTS} are \
          needed to see how it answers them"
@@ -74,36 +75,36 @@ pub enum RobotResponseError {
         /// Reports that were.
         found: usize,
     },
-    /// The reported speed follows something else.
+    /// The reported speed does not follow the setpoints.
     #[error(
         "the reported speed does not follow the setpoints: {left:.2} mm/s are left of {moved:.2} \
          (root mean square)"
     )]
     DoesNotFollow {
-        /// What is left of the reported speeds \[mm/s\].
+        /// Residual of the reported speeds \[mm/s\].
         left: f64,
-        /// How far they are from their mean \[mm/s\].
+        /// Standard deviation of the reported speeds \[mm/s\].
         moved: f64,
     },
 }
 
-/// A speed that was sent.
+/// A setpoint.
 #[derive(Debug, Clone, Copy)]
 struct Setpoint {
     at_s: f64,
     speed: f64,
 }
 
-/// A report that the answer is held against.
+/// A report.
 #[derive(Debug, Clone, Copy)]
 struct Report {
     at_s: f64,
     speed: f64,
-    /// Whether the answer is begun anew with it.
+    /// Whether it begins a segment.
     is_first: bool,
 }
 
-/// Finds dead time and lag by least squares.
+/// Dead time and time constant by least squares.
 pub fn fit_response(log: &Log) -> Result<RobotResponse, RobotResponseError> {
     let setpoint = |(at, speed): &(Stamp, MmPerS)| Setpoint { at_s: at.secs(), speed: speed.get() };
     let setpoints: Vec<Setpoint> = log.setpoints.iter().map(setpoint).collect();
@@ -116,16 +117,16 @@ pub fn fit_response(log: &Log) -> Result<RobotResponse, RobotResponseError> {
         return Err(RobotResponseError::TooFewReports { found: reports.len() });
     }
     let count = to_f64(reports.len());
-    let squares = |at: ResponseParameters| sum_of_squares(&setpoints, &reports, at);
+    let squares = |at: ResponseParameters| {
+        residuals(&setpoints, &reports, at).iter().map(|left| left * left).sum::<f64>()
+    };
     let best = search(&squares);
     let mean_square = squares(best) / count;
     let mean = reports.iter().map(|report| report.speed).sum::<f64>() / count;
     let moved = reports.iter().map(|report| (report.speed - mean).powi(2)).sum::<f64>() / count;
     if mean_square > 0.25 * moved {
-        return Err(RobotResponseError::DoesNotFollow {
-            left: mean_square.sqrt(),
-            moved: moved.sqrt(),
-        });
+        let (left, moved) = (mean_square.sqrt(), moved.sqrt());
+        return Err(RobotResponseError::DoesNotFollow { left, moved });
     }
     let [dead, lag] = sigmas(&setpoints, &reports, best, mean_square);
     Ok(RobotResponse {
@@ -142,8 +143,8 @@ fn count_steps(setpoints: &[Setpoint]) -> usize {
     pairs.filter(|(a, b)| (b.speed - a.speed).abs() > MIN_SETPOINT_CHANGE * a.speed.abs()).count()
 }
 
-/// Reports while the robot goes by setpoints. A bead's run-up, before its speed is
-/// once that of a setpoint, is no answer to one.
+/// Reports while the robot follows setpoints. The run-up of a bead, before the first setpoint,
+/// is no response.
 fn reports_under_setpoints(states: &[(Stamp, RobotState)], from_s: f64) -> Vec<Report> {
     let mut reports: Vec<Report> = Vec::new();
     let mut before: Option<(Stamp, f64)> = None;
@@ -154,21 +155,18 @@ fn reports_under_setpoints(states: &[(Stamp, RobotState)], from_s: f64) -> Vec<R
             continue;
         }
         let follows =
-            before.is_some_and(|(last, at_path)| *at - last <= MAX_REPORT_GAP && path >= at_path);
-        reports.push(Report {
-            at_s: at.secs(),
-            speed: state.speed_mm_per_s.get(),
-            is_first: !follows,
-        });
+            before.is_some_and(|(last, at_path)| *at - last <= MAX_GAP && path >= at_path);
+        let (at_s, speed) = (at.secs(), state.speed_mm_per_s.get());
+        reports.push(Report { at_s, speed, is_first: !follows });
         before = Some((*at, path));
     }
     reports
 }
 
-/// Dead time \[s\], lag \[s\] and logarithm of the largest slope of the speed in mm/s².
+/// Dead time \[s\], time constant \[s\] and logarithm of the largest acceleration in mm/s².
 type ResponseParameters = [f64; 3];
 
-/// What each reported speed differs from the model's.
+/// Reported speeds less those of the model.
 fn residuals(setpoints: &[Setpoint], reports: &[Report], answer: ResponseParameters) -> Vec<f64> {
     let [dead_s, lag_s, ln_slope] = answer;
     let accel = libm::exp(ln_slope);
@@ -197,11 +195,7 @@ fn residuals(setpoints: &[Setpoint], reports: &[Report], answer: ResponseParamet
     differences
 }
 
-fn sum_of_squares(setpoints: &[Setpoint], reports: &[Report], at: ResponseParameters) -> f64 {
-    residuals(setpoints, reports, at).iter().map(|left| left * left).sum()
-}
-
-/// The best without a limit of the slope; the best with one where that leaves much less.
+/// The best response without an acceleration limit, or with one where that is much better.
 fn search(squares: &impl Fn(ResponseParameters) -> f64) -> ResponseParameters {
     let free = pattern_search(squares, grid_search(squares, &[NO_SLOPE.ln()]), false);
     let slopes: Vec<f64> = SLOPES.iter().map(|slope| slope.ln()).collect();
@@ -209,7 +203,7 @@ fn search(squares: &impl Fn(ResponseParameters) -> f64) -> ResponseParameters {
     if squares(bound) < MAX_RESIDUAL_RATIO * squares(free) { bound } else { free }
 }
 
-/// On a grid.
+/// The best on a grid.
 fn grid_search(
     squares: &impl Fn(ResponseParameters) -> f64,
     ln_slopes: &[f64],
@@ -231,8 +225,8 @@ fn grid_search(
     best.0
 }
 
-/// By shorter and shorter steps in all directions, and along the valleys in which one
-/// of them stands for another.
+/// Pattern search (Hooke and Jeeves 1961) with successively shorter steps, also along
+/// directions in which two parameters compensate each other.
 fn pattern_search(
     squares: &impl Fn(ResponseParameters) -> f64,
     from: ResponseParameters,
@@ -261,8 +255,7 @@ fn pattern_search(
     best.0
 }
 
-/// Standard deviations by the slopes of the model at the best, for what is left as
-/// independent noise.
+/// Standard errors from the derivatives at the minimum, for independent residuals.
 fn sigmas(
     setpoints: &[Setpoint],
     reports: &[Report],
@@ -278,8 +271,7 @@ fn sigmas(
         low.into_iter().zip(high).map(move |(low, high)| (high - low) / way).collect::<Vec<_>>()
     };
     let [dead, lag] = [slope(0), slope(1)];
-    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let (dd, ll, dl) = (product(&dead, &dead), product(&lag, &lag), product(&dead, &lag));
+    let (dd, ll, dl) = (dot(&dead, &dead), dot(&lag, &lag), dot(&dead, &lag));
     let det = (dd * ll - dl * dl).max(f64::MIN_POSITIVE);
     [(variance * ll / det).sqrt(), (variance * dd / det).sqrt()].map(|sigma| sigma.min(MAX_LAG_S))
 }

@@ -1,16 +1,16 @@
-//! Margins of the PI law around a bead that is seen late.
+//! Stability margins of the PI controller with the dead time of the measurement.
 //!
-//! A change of the speed by Δv changes the width by −b·w/v·Δv, seen one distance of
-//! the camera later. With the sign turned by the law, the loop is
+//! A change of the speed by Δv changes the width by −b·w/v·Δv, measured one camera distance
+//! later. With the sign inverted by the controller, the loop is
 //!
 //! ```text
 //! L(s) = (kp + ki/s) · K · e^(−s·T) / (τ·s + 1)     K = b·w/v
 //! T = d/v + latency + robot's dead time + half a frame's and half a setpoint's period
 //! ```
 //!
-//! The halves are the mean delays of sampling and of holding. The gain of this loop
-//! falls with the frequency throughout, so that it has one crossover, and it is stable
-//! if and only if its gain is below 1 where its phase first is −180° (Nyquist 1932).
+//! The halves are the mean delays of sampling and holding. The gain of this loop falls with the
+//! frequency throughout, so that it has one crossover, and it is stable if and only if its gain
+//! is below 1 where its phase first is −180° (Nyquist 1932).
 
 use std::f64::consts::PI;
 
@@ -18,51 +18,51 @@ use serde::Serialize;
 
 use super::plant::IdentifiedCell;
 use crate::numeric::lti::{TransferFunction, margins};
+use crate::numeric::root::bisect;
 use crate::width_control::pi::PiGains;
 
-/// Least margins that a loop is to have: a factor, and degrees (Åström and Murray 2008,
-/// section 9.3).
+/// Smallest gain margin of a loop (Åström and Murray 2008, section 9.3).
 pub const MIN_GAIN_MARGIN: f64 = 2.0;
-/// See [`LEAST_GAIN`].
+/// Smallest phase margin of a loop \[degrees\] (Åström and Murray 2008, section 9.3).
 pub const MIN_PHASE_MARGIN_DEG: f64 = 45.0;
 
-/// The bead, the camera and the robot in the loop, at one speed.
+/// Bead, camera and robot at one speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LoopPlant {
     /// Speed of the robot \[mm/s\].
     pub speed_mm_per_s: f64,
-    /// Width for speed, K \[mm/(mm/s)\].
+    /// Static gain from speed to width, K \[mm/(mm/s)\].
     pub gain_s: f64,
-    /// All dead time, T \[s\].
+    /// Total dead time, T \[s\].
     pub dead_time_s: f64,
-    /// The robot's lag, τ \[s\].
+    /// Time constant of the robot, τ \[s\].
     pub lag_s: f64,
 }
 
-/// How far a loop is from the edge of stability.
+/// Stability margins of a loop.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LoopMargins {
-    /// Whether it is stable at all.
+    /// Whether it is stable.
     pub is_stable: bool,
-    /// Factor by which the gain may grow; below 1 it is too large.
+    /// Gain margin as a factor; below 1 the gain is too large.
     pub gain: f64,
-    /// Phase that may be lost \[deg\]; negative where there is too little already.
+    /// Phase margin \[deg\]; negative if the loop is unstable.
     pub phase_deg: f64,
-    /// Dead time that may come in \[s\].
+    /// Delay margin \[s\].
     pub delay_s: f64,
-    /// Most by which a disturbance is enlarged, Ms; none of a loop that is not stable.
+    /// Maximum sensitivity Ms; `None` for an unstable loop.
     pub sensitivity: Option<f64>,
 }
 
 impl LoopMargins {
-    /// Whether these are the margins that a loop is to have.
+    /// Whether gain and phase margin are sufficient.
     pub fn are_sufficient(&self) -> bool {
         self.is_stable && self.gain >= MIN_GAIN_MARGIN && self.phase_deg >= MIN_PHASE_MARGIN_DEG
     }
 }
 
 impl LoopPlant {
-    /// At a speed at which bead of the wanted width is laid.
+    /// At a speed at which bead of the target width is laid.
     pub fn at(plant: &IdentifiedCell, target_mm: f64, speed_mm_per_s: f64) -> Self {
         let timing = &plant.timing;
         let robot = plant.robot_dynamics();
@@ -83,24 +83,24 @@ impl LoopPlant {
         self.gain_s * controller / (self.lag_s * w).hypot(1.0)
     }
 
-    /// Its phase, without turns left out \[rad\].
+    /// Its continuous phase \[rad\].
     fn phase(&self, gains: PiGains, w: f64) -> f64 {
         let controller = -libm::atan2(gains.ki_per_s2, gains.kp_per_s * w);
         controller - libm::atan(self.lag_s * w) - self.dead_time_s * w
     }
 
-    /// Margins with gains on the error in mm; none where both are 0.
+    /// Margins with gains for the error in mm; `None` where both are 0.
     pub fn margins(&self, gains: PiGains) -> Option<LoopMargins> {
         if gains.kp_per_s <= 0.0 && gains.ki_per_s2 <= 0.0 {
             return None;
         }
-        // Behind this the dead time alone has turned the phase by more than that.
+        // Beyond this frequency the dead time alone turns the phase by more than 180°.
         let max_frequency = 2.0 * PI / self.dead_time_s.max(1e-6);
         let turned = first_sign_change(max_frequency, |w| self.phase(gains, w) + PI)?;
         let gain = 1.0 / self.magnitude(gains, turned);
         let is_stable = gain > 1.0;
         let crossover = falling_root(|w| self.magnitude(gains, w) - 1.0);
-        // A gain that is below 1 throughout leaves any phase, one above it none.
+        // A gain below 1 throughout has any phase margin, one above it none.
         let none = if is_stable { f64::INFINITY } else { f64::NEG_INFINITY };
         let phase = crossover.map_or(none, |w| PI + self.phase(gains, w));
         let delay_s = crossover.map_or(none, |w| (PI + self.phase(gains, w)) / w);
@@ -109,11 +109,12 @@ impl LoopPlant {
             gain,
             phase_deg: phase.to_degrees(),
             delay_s,
-            sensitivity: is_stable
-                .then(|| self.transfer(gains))
-                .flatten()
-                .map(|l| margins(&l).sensitivity),
+            sensitivity: if is_stable { self.sensitivity(gains) } else { None },
         })
+    }
+
+    fn sensitivity(&self, gains: PiGains) -> Option<f64> {
+        Some(margins(&self.transfer(gains)?).sensitivity)
     }
 
     /// The loop as a transfer function.
@@ -123,19 +124,19 @@ impl LoopPlant {
     }
 }
 
-/// Steps to the end within which no sign is missed.
+/// Steps of the search for a sign change. A choice.
 const STEPS: u32 = 4000;
-/// Halvings of an interval down to the last bit.
+/// Derived: 200 bisections leave any interval below double precision.
 const HALVINGS: u32 = 200;
 
-/// The first zero of a function that is positive at first.
+/// The first zero of a function that begins positive.
 fn first_sign_change(end: f64, of: impl Fn(f64) -> f64) -> Option<f64> {
     let at = |k: u32| end * f64::from(k) / f64::from(STEPS);
     let k = (1..=STEPS).find(|&k| of(at(k)) < 0.0)?;
-    Some(bisect(at(k - 1), at(k), of))
+    Some(bisect(of, at(k - 1), at(k), HALVINGS))
 }
 
-/// The zero of a function that falls; none where it is positive throughout, or nowhere.
+/// The zero of a falling function; `None` without one.
 fn falling_root(of: impl Fn(f64) -> f64) -> Option<f64> {
     let (mut low, mut high) = (1e-9, 1e-9);
     if of(low) <= 0.0 {
@@ -148,17 +149,5 @@ fn falling_root(of: impl Fn(f64) -> f64) -> Option<f64> {
             return None;
         }
     }
-    Some(bisect(low, high, of))
-}
-
-fn bisect(mut low: f64, mut high: f64, of: impl Fn(f64) -> f64) -> f64 {
-    for _ in 0..HALVINGS {
-        let middle = f64::midpoint(low, high);
-        if of(middle) > 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    f64::midpoint(low, high)
+    Some(bisect(of, low, high, HALVINGS))
 }

@@ -26,12 +26,12 @@ use crate::width_control::steps::StepsProgress;
 
 const SCALE: Calibration = Calibration::Scale { mm_per_px: 0.126_582, sigma: None };
 
-/// The cell of 50 Hz that ships with the program, with steps for its law.
-fn cell(share: f64) -> Cell {
+/// The cell of 50 Hz that ships with the program, with steps for its controller.
+fn cell(fraction: f64) -> Cell {
     let text = include_str!("../../cells/distance.toml");
     let text = text.replace(
         "strategy = \"distance\"",
-        &format!("strategy = \"steps\"\nstep_fraction = {share}"),
+        &format!("strategy = \"steps\"\nstep_fraction = {fraction}"),
     );
     let text = text.replace("\nexponent = 0.25", "\n# exponent = 0.25");
     let mut cell = Cell::parse(Path::new("steps.toml"), &text, Purpose::Run).unwrap();
@@ -114,7 +114,7 @@ fn what_is_found_scatters_about_the_truth_as_it_says() {
 }
 
 #[test]
-fn a_flow_that_wanders_is_told_from_noise_and_widens_what_is_said() {
+fn a_drifting_flow_is_distinguished_from_noise_and_widens_the_uncertainty() {
     let mut cell = cell(0.1);
     cell.simulation.flow.drift_per_root_m = 0.02;
     cell.simulation.path = Mm::constant(2500.0);
@@ -180,14 +180,14 @@ fn widths_that_stay_out_hold_the_speed_and_then_stop_the_robot() {
     assert!(none.log.setpoints.iter().all(|(_, speed)| (speed.get() - 112.5).abs() < 1e-9));
     cell.simulation.missing_fraction = 0.0;
     cell.simulation.flow.step_at_mm = 900.0;
-    // Wider than anything that is believed, at once: no width at all.
+    // Wider than any plausible width, at once: no width at all.
     cell.simulation.flow.step_ratio = 2.0;
     let lost = laid(&cell, 1);
     assert!(lost.states.contains(&"holding") && lost.states.contains(&"fault"));
 }
 
 #[test]
-fn a_recording_that_tells_nothing_is_refused_with_what_to_do() {
+fn a_recording_without_information_is_refused_with_a_remedy() {
     let mut steady = cell(0.1);
     let length = steady.simulation.path;
     steady.run.as_mut().unwrap().robot.start_length = length;
@@ -224,9 +224,9 @@ fn ramped(dead_s: f64, lag_s: f64, slope: f64, noise: f64) -> Log {
     let mut path = 0.0;
     for tick in 0..70_000_u32 {
         let at = f64::from(tick) * 1e-4;
-        let told = log.setpoints.iter().rev().find(|(then, _)| then.secs() + dead_s <= at);
-        let told = told.map_or(100.0, |(_, told)| told.get());
-        let change = (told - speed) * -libm::expm1(-1e-4 / lag_s);
+        let reported = log.setpoints.iter().rev().find(|(then, _)| then.secs() + dead_s <= at);
+        let reported = reported.map_or(100.0, |(_, reported)| reported.get());
+        let change = (reported - speed) * -libm::expm1(-1e-4 / lag_s);
         speed += change.clamp(-slope * 1e-4, slope * 1e-4);
         path += speed * 1e-4;
         if tick % 200 == 0 {
@@ -281,14 +281,14 @@ fn loop_of(dead_s: f64, lag_s: f64) -> LoopPlant {
 #[test]
 fn an_integral_behind_a_dead_time_has_the_margins_of_the_closed_form() {
     let plant = loop_of(1.2, 0.0);
-    for share in [0.2, 0.5, 0.9, 1.1] {
-        let cross = share * FRAC_PI_2 / plant.dead_time_s;
+    for fraction in [0.2, 0.5, 0.9, 1.1] {
+        let cross = fraction * FRAC_PI_2 / plant.dead_time_s;
         let gains = PiGains { kp_per_s: 0.0, ki_per_s2: cross / plant.gain_s };
         let found = plant.margins(gains).unwrap();
-        assert!((found.gain - 1.0 / share).abs() < 1e-9);
-        assert!((found.phase_deg - 90.0 * (1.0 - share)).abs() < 1e-9);
-        assert!((found.delay_s - FRAC_PI_2 * (1.0 - share) / cross).abs() < 1e-9);
-        assert_eq!(found.is_stable, share < 1.0);
+        assert!((found.gain - 1.0 / fraction).abs() < 1e-9);
+        assert!((found.phase_deg - 90.0 * (1.0 - fraction)).abs() < 1e-9);
+        assert!((found.delay_s - FRAC_PI_2 * (1.0 - fraction) / cross).abs() < 1e-9);
+        assert_eq!(found.is_stable, fraction < 1.0);
     }
     // A proportional part that never brings the gain to 1 has no crossover.
     let weak = PiGains { kp_per_s: 0.5 / plant.gain_s, ki_per_s2: 0.0 };

@@ -1,4 +1,4 @@
-//! Rates and delays, from when things happened.
+//! Rates and latencies of a cell.
 
 use serde::Serialize;
 
@@ -6,31 +6,32 @@ use super::Log;
 use crate::core::time::Stamp;
 use crate::numeric::rank;
 
-/// What a cell's clocks do \[s\]. Each is a median, with the 99th percentile where a
-/// late one matters.
+/// Rates and latencies of a cell \[s\]: medians, with the 99th percentile where a late event
+/// matters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CellTiming {
     /// From a frame's capture to its width's arrival at the controller.
     pub latency_s: f64,
-    /// The same, which one of a hundred exceeds.
+    /// Its 99th percentile.
     pub latency_p99_s: f64,
     /// Time from one measured frame to the next.
     pub frame_s: f64,
     /// Time from report to report.
     pub report_s: f64,
-    /// The same, which one of a hundred exceeds.
+    /// Its 99th percentile.
     pub report_p99_s: f64,
     /// Time from setpoint to setpoint.
     pub setpoint_s: f64,
 }
 
-/// Of a run; nothing where something never happened twice is 0.
+/// Of a run; 0 where something did not happen twice.
 pub fn timing(log: &Log) -> CellTiming {
     let frames: Vec<Stamp> = log.widths.iter().map(|width| width.at).collect();
     let reports: Vec<Stamp> = log.states.iter().map(|(at, _)| *at).collect();
     let setpoints: Vec<Stamp> = log.setpoints.iter().map(|(at, _)| *at).collect();
     let mut latencies = log.latencies_s.clone();
     let mut between = periods(&reports);
+    let quantile = |values: &mut [f64], fraction| rank::quantile(values, fraction).unwrap_or(0.0);
     CellTiming {
         latency_s: quantile(&mut latencies, 0.5),
         latency_p99_s: quantile(&mut latencies, 0.99),
@@ -44,16 +45,4 @@ pub fn timing(log: &Log) -> CellTiming {
 fn periods(times: &[Stamp]) -> Vec<f64> {
     let pairs = times.iter().zip(times.iter().skip(1));
     pairs.map(|(before, after)| (*after - *before).secs()).collect()
-}
-
-/// The value that this share of all does not exceed; 0 of none.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "a share of a count"
-)]
-fn quantile(values: &mut [f64], fraction: f64) -> f64 {
-    let rank = (fraction * values.len().saturating_sub(1) as f64).round() as usize;
-    rank::at(values, rank).unwrap_or(0.0)
 }

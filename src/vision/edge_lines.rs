@@ -6,7 +6,7 @@
 //! detector and the probabilistic Hough transform. It knows whole pixels only
 //! and no standard deviation of its own; [`SIGMA_PX`] stands for that.
 
-use crate::bridge::{EdgeSettings, Segment, canny_hough};
+use crate::bridge::{EdgeSegment, EdgeSettings, canny_hough};
 use crate::calibration::SurfaceMap;
 use crate::core::frame::Frame;
 use crate::core::geometry::ImagePoint;
@@ -109,7 +109,7 @@ fn point(gauge: &Gauge, across: f64, along: f64) -> ImagePoint {
 
 /// Lines along the bead, carried on to the gauge's ends; pieces of the same
 /// edge are one line with their mean position.
-fn edge_lines(gauge: &Gauge, segments: &[Segment]) -> Vec<EdgeLine> {
+fn edge_lines(gauge: &Gauge, segments: &[EdgeSegment]) -> Vec<EdgeLine> {
     let length = along(gauge);
     let mut lines: Vec<EdgeLine> = Vec::new();
     for segment in segments {

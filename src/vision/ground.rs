@@ -186,7 +186,7 @@ fn detrend(lines: &mut [ColumnValues]) {
     let count = narrow_to_f32(to_f64(lines.len()));
     let middle = (count - 1.0) / 2.0;
     let means = sum(lines.iter().copied()).map(|sum| sum / count);
-    let places = || (0..).map(move |k| narrow_to_f32(to_f64(k)) - middle);
+    let places = || (0_usize..).map(move |k| narrow_to_f32(to_f64(k)) - middle);
     let across = sum(lines.iter().zip(places()).map(|(line, place)| line.map(|v| place * v)));
     let along = count * (count * count - 1.0) / 12.0;
     let slopes = across.map(|across| across / along);

@@ -2,8 +2,8 @@ use crate::calibration::Camera;
 use crate::calibration::board::observe_all;
 use crate::calibration::board_observation::*;
 use crate::calibration::dictionary::Dictionary;
-use crate::calibration::synthetic;
-use crate::calibration::synthetic::poses;
+use crate::calibration::focus::FocusFault;
+use crate::calibration::synthetic::{self, poses};
 use crate::core::frame::Pixels;
 use crate::core::geometry::{GridSize, Pose, Size};
 use crate::core::time::Stamp;
@@ -15,7 +15,7 @@ fn board(columns: usize, rows: usize) -> Board {
     Board::new(columns, rows, Mm::constant(20.0)).unwrap()
 }
 
-/// What is said of a picture of a board, where one of 9x6 is looked for.
+/// What is said of a image of a board, where one of 9x6 is looked for.
 fn seen(shown: &Board, exposure: Exposure) -> Result<BoardObservation, BoardRejection> {
     let camera =
         Camera::pinhole([620.0, 622.0], [263.0, 198.0]).with_five([-0.2, 0.05, 0.0, 0.0, 0.0]);
@@ -40,7 +40,7 @@ fn a_sharp_board_is_seen_with_its_blur() {
 }
 
 #[test]
-fn other_boards_are_told_from_none() {
+fn another_board_is_distinguished_from_none() {
     let said = seen(&board(7, 5), Exposure::SHARP).unwrap_err().to_string();
     assert!(said.contains("x5 inner corners shows") || said.contains("x7 inner"), "{said}");
     assert!(said.contains("not one with 9x6"), "{said}");
@@ -62,11 +62,11 @@ fn other_boards_are_told_from_none() {
         Frame::new(0, Stamp::START, Size::new(400, 300), Pixels::Grey8(vec![90; 400 * 300]))
             .unwrap();
     let none = observe(&board(9, 6), "a.png", &empty).unwrap_err();
-    assert_eq!(none, BoardRejection::NoBoard { columns: 9, rows: 6 });
+    assert_eq!(none, BoardRejection::NoBoard(GridSize::new(9, 6)));
 }
 
-/// A board that fills the upper left of a picture to its very edge, what is around it
-/// painted over by what lies at each place, in squares from its first inner corner.
+/// A board that fills the upper left of a image to its very edge, what is around it
+/// painted over by what lies at each position, in squares from its first inner corner.
 fn at_the_edge(shown: &Board, behind: impl Fn(f64, f64) -> Option<u8>) -> Frame {
     let camera =
         Camera::pinhole([620.0, 622.0], [263.0, 198.0]).with_five([-0.2, 0.05, 0.0, 0.0, 0.0]);
@@ -128,7 +128,7 @@ fn marked(columns: usize, rows: usize, dictionary: Dictionary) -> Board {
     board(columns, rows).with_marks(marks).unwrap()
 }
 
-/// A picture of a board whose middle is somewhere before the camera.
+/// A image of a board whose middle is somewhere before the camera.
 fn picture(shown: &Board, at: Vector3<f64>, seed: u64) -> (Frame, Vec<Option<ImagePoint>>) {
     let camera =
         Camera::pinhole([900.0, 902.0], [323.0, 238.0]).with_five([-0.25, 0.05, 1e-3, -5e-4, 0.0]);
@@ -163,7 +163,7 @@ fn corners_between_markers_are_found_as_well_as_those_of_a_plain_board() {
 }
 
 #[test]
-fn a_board_that_is_partly_in_the_picture_is_seen_as_far_as_it_is() {
+fn a_board_that_is_partly_in_the_image_is_found_as_far_as_it_is() {
     let shown = marked(9, 6, Dictionary::Four);
     let (frame, truth) = picture(&shown, Vector3::new(110.0, 50.0, 420.0), 6);
     let sighting = observe(&shown, "a", &frame).unwrap();
@@ -194,7 +194,7 @@ fn mirrored(frame: &Frame) -> Frame {
 }
 
 #[test]
-fn what_is_wrong_with_a_board_with_markers_is_told() {
+fn each_fault_of_a_board_with_markers_is_reported() {
     let at = Vector3::new(0.0, 0.0, 420.0);
     let shown = marked(9, 6, Dictionary::Four);
     let (frame, _) = picture(&shown, at, 7);
@@ -221,7 +221,7 @@ fn what_is_wrong_with_a_board_with_markers_is_told() {
 }
 
 #[test]
-fn a_board_with_markers_tells_half_a_turn() {
+fn a_board_with_markers_shows_half_a_turn() {
     let shown = marked(9, 6, Dictionary::Four);
     let (frame, truth) = picture(&shown, Vector3::new(0.0, 0.0, 420.0), 8);
     let turned: Vec<u8> = frame.to_grey8().iter().rev().copied().collect();
@@ -233,14 +233,18 @@ fn a_board_with_markers_tells_half_a_turn() {
 }
 
 #[test]
-fn blur_is_told_from_motion() {
+fn blur_is_distinguished_from_motion() {
     let blurred = Exposure { blur_px: 5.0, ..Exposure::SHARP };
-    let Err(BoardRejection::Blurred { blur_px }) = seen(&board(9, 6), blurred) else {
+    let Err(BoardRejection::NotSharp(FocusFault::Blurred { blur_px })) =
+        seen(&board(9, 6), blurred)
+    else {
         panic!("a blurred board is seen");
     };
     assert!((4.0..6.0).contains(&blur_px), "{blur_px}");
     let moved = Exposure { motion_px: Vector2::new(9.0, 0.0), ..Exposure::SHARP };
-    let Err(BoardRejection::Moved { motion_px: way_px }) = seen(&board(9, 6), moved) else {
+    let Err(BoardRejection::NotSharp(FocusFault::Moved { motion_px: way_px })) =
+        seen(&board(9, 6), moved)
+    else {
         panic!("a moving board is seen");
     };
     assert!((7.0..11.0).contains(&way_px), "{way_px}");
@@ -249,29 +253,29 @@ fn blur_is_told_from_motion() {
 }
 
 #[test]
-fn a_board_that_was_seen_in_its_place_already_counts_once() {
+fn two_images_of_one_position_count_once() {
     let at =
         |name: &str, pose: &Pose| (name.to_owned(), Ok(synthetic::sighting(name, pose, || 0.0)));
     let first = poses()[0];
     let by =
         |mm: f64| Pose::from_parts(first.rotation(), first.translation_mm() + Vector3::x() * mm);
-    let mut looks = vec![at("a", &first), at("b", &by(0.1)), at("c", &by(2.0))];
-    reject_duplicates(&board(9, 6), &mut looks);
-    let said: Vec<bool> = looks.iter().map(|look| look.1.is_ok()).collect();
+    let mut observations = vec![at("a", &first), at("b", &by(0.1)), at("c", &by(2.0))];
+    reject_duplicates(&board(9, 6), &mut observations);
+    let said: Vec<bool> = observations.iter().map(|observation| observation.1.is_ok()).collect();
     assert_eq!(said, [true, false, true]);
-    let words = looks[1].1.as_ref().unwrap_err().to_string();
+    let words = observations[1].1.as_ref().unwrap_err().to_string();
     assert_eq!(words, "the board is where it is in a (within 0.3 px), which says nothing new");
 }
 
 #[test]
 fn a_symmetric_board_may_be_counted_from_either_end() {
-    let places: Vec<_> =
+    let positions: Vec<_> =
         (0..24).map(|i| ImagePoint::new(f64::from(i % 6), f64::from(i / 6))).collect();
-    let turned: Vec<_> = places.iter().rev().copied().collect();
-    let [one, other] = [observe_all(&places), observe_all(&turned)];
+    let turned: Vec<_> = positions.iter().rev().copied().collect();
+    let [one, other] = [observe_all(&positions), observe_all(&turned)];
     assert_eq!(shift_px(&board(6, 4), &one, &other), Some(0.0));
-    let told = shift_px(&board(8, 3), &one, &other).unwrap();
-    assert!(told > 1.0, "{told}");
+    let reported = shift_px(&board(8, 3), &one, &other).unwrap();
+    assert!(reported > 1.0, "{reported}");
 }
 
 /// Whichever end OpenCV counts from.
@@ -288,16 +292,16 @@ fn a_board_with_two_colours_in_opposite_corners_is_counted_from_the_black_one() 
 }
 
 #[test]
-fn pictures_of_another_size_are_refused() {
-    let mut looks: Observations = poses()
+fn images_of_another_size_are_refused() {
+    let mut observations: Observations = poses()
         .iter()
         .map(|pose| ("x".to_owned(), Ok(synthetic::sighting("x", pose, || 0.0))))
         .collect();
-    if let Ok(odd) = &mut looks[1].1 {
+    if let Ok(odd) = &mut observations[1].1 {
         odd.image_size_px = [540, 720];
     }
-    reject_other_sizes(&mut looks);
-    let said = looks[1].1.as_ref().unwrap_err().to_string();
+    reject_other_sizes(&mut observations);
+    let said = observations[1].1.as_ref().unwrap_err().to_string();
     assert_eq!(said, "size 540x720 px, while most are 720x540 px");
-    assert_eq!(looks.iter().filter(|look| look.1.is_ok()).count(), 11);
+    assert_eq!(observations.iter().filter(|observation| observation.1.is_ok()).count(), 11);
 }

@@ -19,7 +19,7 @@ pub enum MarkerError {
     Other {
         /// The dictionary of those that show.
         found: Dictionary,
-        /// The one that was told.
+        /// The specified one.
         expected: Dictionary,
     },
     /// They can be read in the mirror.
@@ -51,7 +51,7 @@ pub enum MarkerError {
     Size {
         /// Their size, over a square's side \[%\].
         found_percent: u32,
-        /// What was told \[%\].
+        /// The specified size \[%\].
         expected_percent: u32,
     },
 }

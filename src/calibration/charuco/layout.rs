@@ -1,19 +1,20 @@
-//! Which squares of a board have markers, and where on it they are.
+//! Positions of the markers on a board.
 
 use nalgebra::Point2;
 
 use crate::calibration::board::Board;
 use crate::core::geometry::GridSize;
+use crate::numeric::number::to_f64;
 
-/// Where markers are on a board.
+/// Positions of the markers on a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MarkerGrid {
     /// Squares along a row.
     pub columns: usize,
-    /// Squares along a column; a number beyond them has no place.
+    /// Squares along a column; a marker number beyond them has no position.
     pub rows: usize,
-    /// Whether the upper left square has one: as OpenCV before 4.6 had it on boards with
-    /// an even number of rows of squares.
+    /// Whether the upper left square has a marker, as in OpenCV before 4.6 on boards with an
+    /// even number of rows of squares.
     pub first_has_marker: bool,
 }
 
@@ -30,17 +31,16 @@ impl MarkerGrid {
         // Two rows together have as many markers as a row has squares.
         let (pair, rest) = (number / columns, number % columns);
         let in_even = if first_has_marker { columns.div_ceil(2) } else { columns / 2 };
-        let (row, place) =
+        let (row, position) =
             if rest < in_even { (2 * pair, rest) } else { (2 * pair + 1, rest - in_even) };
         let starts = usize::from((row % 2 == 0) != first_has_marker);
-        (row < rows).then_some((2 * place + starts, row))
+        (row < rows).then_some((2 * position + starts, row))
     }
 
     /// The corners of a marker, in squares from the board's upper left corner.
-    #[expect(clippy::cast_precision_loss, reason = "at most 100 squares a side")]
     pub fn corners(&self, number: usize, clear: f64) -> Option<[Point2<f64>; 4]> {
         let (column, row) = self.square(number)?;
-        let (left, top) = (column as f64 + clear, row as f64 + clear);
+        let (left, top) = (to_f64(column) + clear, to_f64(row) + clear);
         let side = 1.0 - 2.0 * clear;
         let [right, bottom] = [left + side, top + side];
         Some([[left, top], [right, top], [right, bottom], [left, bottom]].map(Point2::from))

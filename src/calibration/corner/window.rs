@@ -1,23 +1,27 @@
-//! The part of a corner's surroundings that shows two lines and nothing else.
+//! The window about a corner that shows two lines and nothing else.
 
 use nalgebra::Vector2;
 
 use crate::core::geometry::ImagePoint;
 
-/// Half side of the window over the distance to the nearest line of the board that
-/// does not run through the corner: less than one, for that line's blur.
+/// Radius of the window over the distance to the nearest other line of the board: less than
+/// one, for the blur of that line. A choice between noise and bias.
 const WINDOW_OVER_DISTANCE: f64 = 0.6;
+/// Smallest radius of the window \[px\]. A choice: a smaller circle holds too few pixels for
+/// nine parameters.
 const MIN_WINDOW_PX: f64 = 2.5;
+/// Largest radius of the window \[px\]; a larger one is slower and more sensitive to
+/// distortion.
 const MAX_WINDOW_PX: f64 = 9.0;
-/// How far a marker's blur reaches \[px\], and the part of the plain border beside it that
-/// is used in any case.
+/// Distance over which the blur of a marker reaches \[px\], and the fraction of the plain
+/// margin that is used in any case.
 const MARKER_BLUR_PX: f64 = 2.5;
 const MIN_MARGIN: f64 = 0.5;
 
-/// The white squares that have a marker, by the corner that they meet at.
+/// The white squares that have a marker, relative to their common corner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Marked {
-    /// The one before it along both rows and columns, and the one after it.
+    /// The square before the corner along both rows and columns, and the one after it.
     Along,
     /// The two others.
     Across,
@@ -28,14 +32,13 @@ pub enum Marked {
 pub struct BoardLine {
     /// From corner to corner \[px\].
     pub side: Vector2<f64>,
-    /// How much it bends \[1/px\], towards the left of its direction as the picture's
-    /// axes turn.
+    /// Curvature \[1/px\], positive to the left of the direction in the axes of the image.
     pub bend: f64,
 }
 
 impl BoardLine {
-    /// Through the corners on either side, as far as there are; straight where there
-    /// are not three in a row. `None` without another corner.
+    /// Through the neighbouring corners, as far as there are; straight without three corners in
+    /// a row. `None` without another corner.
     pub fn along(
         at: usize,
         count: usize,
@@ -57,11 +60,11 @@ impl BoardLine {
     }
 }
 
-/// The part of a corner's surroundings that shows two lines and nothing else.
+/// The window about a corner that shows two lines and nothing else.
 pub struct CornerWindow {
     /// To the next corners along a row and along a column \[px\].
     pub sides: [Vector2<f64>; 2],
-    /// Plain border about a marker, over the side of a square.
+    /// Plain margin about a marker, over the side of a square.
     pub clear: f64,
     pub marked: Option<Marked>,
 }
@@ -69,15 +72,14 @@ pub struct CornerWindow {
 impl CornerWindow {
     /// Radius \[px\].
     pub fn radius(&self) -> f64 {
-        // The nearest line that does not run through the corner is a side's end, or the
-        // one that runs through it beside the other side.
+        // The nearest other line is at the end of a side, or passes through it beside the other
+        // side.
         let area = self.sides[0].perp(&self.sides[1]).abs();
         let distance = (area / self.sides[0].norm()).min(area / self.sides[1].norm());
         (distance * WINDOW_OVER_DISTANCE).clamp(MIN_WINDOW_PX, MAX_WINDOW_PX)
     }
 
-    /// Whether a place, as seen from the corner, is no part of a marker, nor blurred by
-    /// one.
+    /// Whether a position relative to the corner is neither on a marker nor blurred by one.
     pub fn is_clear(&self, at: Vector2<f64>) -> bool {
         let Some(marked) = self.marked else { return true };
         let [row, column] = self.sides;

@@ -5,8 +5,7 @@ use crate::calibration::CalibrationQuality;
 use crate::calibration::lens::Lens;
 use crate::calibration::relative_sigma;
 use crate::calibration::solve;
-use crate::calibration::synthetic;
-use crate::calibration::synthetic::{SIZE, TRUTH, board, poses};
+use crate::calibration::synthetic::{self, SIZE, TRUTH, board, poses};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -20,7 +19,7 @@ fn later() -> Pose {
     Pose::new(Vector3::new(0.1, -0.2, 0.3), Vector3::new(-70.0, -60.0, 400.0))
 }
 
-/// The pictures of a calibration, and a bed from one of them, from one that was
+/// The images of a calibration, and a bed from one of them, from one that was
 /// taken later, and from that one with two more beside it.
 fn solved(seed: u64) -> (Solution, [OnBed; 3]) {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -55,7 +54,7 @@ fn beads() -> [([ImagePoint; 2], Mm); 3] {
 
 #[test]
 #[expect(clippy::cast_precision_loss, reason = "some seeds")]
-fn widths_scatter_over_many_calibrations_as_each_of_them_foretells() {
+fn widths_vary_over_many_calibrations_as_each_of_them_predicts() {
     let runs: Vec<[CalibrationCovariance; 3]> = (0..SEEDS)
         .into_par_iter()
         .map(|seed| {
@@ -69,9 +68,9 @@ fn widths_scatter_over_many_calibrations_as_each_of_them_foretells() {
             let (widths, sigmas): (Vec<f64>, Vec<f64>) = widths.unzip();
             let mean = widths.iter().sum::<f64>() / SEEDS as f64;
             let squares = widths.iter().map(|width| (width - mean).powi(2)).sum::<f64>();
-            let scatter = (squares / (SEEDS - 1) as f64).sqrt();
+            let spread = (squares / (SEEDS - 1) as f64).sqrt();
             let foretold = (sigmas.iter().map(|s| s * s).sum::<f64>() / SEEDS as f64).sqrt();
-            let ratio = scatter / foretold;
+            let ratio = spread / foretold;
             assert!((0.9..1.1).contains(&ratio), "bed {which}, {ends:?}: {ratio}");
         }
     }
@@ -98,14 +97,14 @@ fn the_joint_covariance_says_what_each_width_does() {
         };
         for (ends, height) in beads() {
             let (width, sigma) = covariance.width_mm(ends, height).unwrap();
-            let share = calibration.surface(height, None).width_relative_sigma_of(ends).unwrap();
-            assert!((share * width / sigma - 1.0).abs() < 1e-4, "{share} {sigma} {width}");
+            let fraction = calibration.surface(height, None).width_relative_sigma_of(ends).unwrap();
+            assert!((fraction * width / sigma - 1.0).abs() < 1e-4, "{fraction} {sigma} {width}");
         }
     }
 }
 
 #[test]
-fn three_boards_on_the_bed_tell_its_plane_better_than_one() {
+fn three_boards_on_the_bed_determine_its_plane_better_than_one() {
     let (solution, [_, one, three]) = solved(5);
     let [one, three] = [one, three].map(|bed| covariance(&solution, &bed));
     let (ends, height) = beads()[2];
@@ -117,10 +116,10 @@ fn three_boards_on_the_bed_tell_its_plane_better_than_one() {
 fn the_share_is_no_smaller_than_that_of_a_bead_in_the_middle() {
     let (solution, [_, later, _]) = solved(2);
     let covariance = covariance(&solution, &later);
-    let share = relative_sigma::where_seen(&covariance).unwrap();
+    let fraction = relative_sigma::where_seen(&covariance).unwrap();
     let (ends, height) = beads()[0];
     let (width, sigma) = covariance.width_mm(ends, height).unwrap();
-    assert!(share >= sigma / width && share < 0.002, "{share}");
+    assert!(fraction >= sigma / width && fraction < 0.002, "{fraction}");
     let (mm_per_px, sigma) = covariance.mm_per_px(THICKNESS).unwrap();
     let calibration = Calibration::Full {
         image_size_px: SIZE,
@@ -131,16 +130,16 @@ fn the_share_is_no_smaller_than_that_of_a_bead_in_the_middle() {
     };
     let scale = scale::single_scale(&calibration, THICKNESS).unwrap();
     assert_eq!(mm_per_px, scale.mm_per_px);
-    assert!(sigma > 0.0 && sigma / mm_per_px < share);
+    assert!(sigma > 0.0 && sigma / mm_per_px < fraction);
 }
 
 #[test]
 fn more_noise_leaves_more_and_boards_all_alike_do_not_settle_the_camera() {
     let (solution, [_, later, _]) = solved(3);
-    let share = relative_sigma::where_seen(&covariance(&solution, &later)).unwrap();
+    let fraction = relative_sigma::where_seen(&covariance(&solution, &later)).unwrap();
     let noisy = Solution { noise_px: 2.0 * solution.noise_px, ..solution.clone() };
     let doubled = relative_sigma::where_seen(&covariance(&noisy, &later)).unwrap();
-    assert!((doubled / share - 2.0).abs() < 1e-9);
+    assert!((doubled / fraction - 2.0).abs() < 1e-9);
     let straight = Pose::new(Vector3::zeros(), Vector3::new(-80.0, -50.0, 420.0));
     let mut alike = solution;
     alike.model.camera = TRUTH;
@@ -151,7 +150,7 @@ fn more_noise_leaves_more_and_boards_all_alike_do_not_settle_the_camera() {
 }
 
 #[test]
-fn another_picture_leaves_less_open() {
+fn another_image_reduces_the_uncertainty() {
     let (solution, [_, later, _]) = solved(4);
     let covariance = covariance(&solution, &later);
     let pose = poses()[7];

@@ -1,4 +1,4 @@
-//! What a calibration may fit: the camera, the bend of the board, and where boards lie.
+//! Parameters of a calibration: the camera, the bend of the board, and the poses of the boards.
 
 use nalgebra::{DVector, Point2, Point3, Rotation3, SMatrix, SVector, Vector3};
 
@@ -7,61 +7,61 @@ use crate::calibration::camera::NUMBERS;
 use crate::calibration::lens::Lens;
 use crate::core::geometry::{ImagePoint, Pose};
 
-/// What all pictures share: the camera's numbers and two for the board's bend.
+/// Parameters that all images share: those of the camera and two of the bend.
 pub const SHARED: usize = NUMBERS + 2;
-/// Numbers of a pose: a turn about the camera's axes \[rad\], then a shift \[mm\].
+/// Parameters of a pose. By definition: a rotation about the camera's axes \[rad\] and a shift
+/// \[mm\].
 pub const POSE: usize = 6;
-/// Numbers of a further board on the same plane: a shift along its two axes \[mm\]
-/// and a turn within it \[rad\].
+/// Parameters of a further board on the same plane. By definition: a shift along its two axes
+/// \[mm\] and a rotation within it \[rad\].
 pub const ON_PLANE: usize = 3;
 
-/// One corner of a board and where it is seen.
+/// A corner of a board and its observed position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Correspondence {
-    /// Where it is on a flat board \[mm\].
+    /// Position on a flat board \[mm\].
     pub on_board: Point2<f64>,
-    /// How far it rises out of the board's plane for each millimetre of bend along
-    /// its rows and along its columns.
+    /// Height over the plane of the board for each millimetre of bend along its rows and along
+    /// its columns.
     pub bend: [f64; 2],
-    /// Where it is seen \[px\].
+    /// Observed position \[px\].
     pub observed: ImagePoint,
 }
 
-/// A camera, and the bend of the board that it saw.
+/// A camera, and the bend of the board.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraModel {
     /// The camera.
     pub camera: Camera,
-    /// How far the middle of a board stands out of the plane through it, against the
-    /// middles of its sides, along its rows and along its columns \[mm\].
+    /// Height of the middle of the board over the line between the middles of opposite sides,
+    /// along its rows and along its columns \[mm\].
     pub bend_mm: [f64; 2],
 }
 
-/// Which of the shared numbers are fitted.
+/// The shared parameters that are fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FreeParameters {
-    /// The lens, with focal lengths and principal point; `None` where the camera is
-    /// known.
+    /// The lens, with focal lengths and principal point; `None` for a known camera.
     pub lens: Option<Lens>,
-    /// Whether the board's bend is fitted.
+    /// Whether the bend of the board is fitted.
     pub bend: bool,
 }
 
-/// Where boards lie: one, or several on one plane.
+/// Pose of a board, or of several boards on one plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardPlacement {
-    /// Axes of the first board in the camera's.
+    /// Axes of the first board in those of the camera.
     pub pose: Pose,
-    /// Where the others lie on its plane: a shift along its axes \[mm\] and a turn
+    /// Positions of the other boards on its plane: a shift along its axes \[mm\] and a rotation
     /// \[rad\].
     pub others: Vec<[f64; ON_PLANE]>,
 }
 
 impl FreeParameters {
-    /// Nothing but the places.
+    /// The poses only.
     pub const PLACEMENTS: Self = Self { lens: None, bend: false };
 
-    /// Whether one of the shared numbers is fitted.
+    /// Whether a shared parameter is fitted.
     pub fn has(self, number: usize) -> bool {
         if number < NUMBERS {
             self.lens.is_some_and(|lens| number < lens.numbers())
@@ -70,14 +70,14 @@ impl FreeParameters {
         }
     }
 
-    /// How many of the shared numbers are fitted.
+    /// Number of shared parameters that are fitted.
     pub fn count(self) -> usize {
         (0..SHARED).filter(|&number| self.has(number)).count()
     }
 }
 
 impl CameraModel {
-    /// With its shared numbers changed by these.
+    /// With a step of the shared parameters.
     pub fn moved(&self, step: &SVector<f64, SHARED>) -> Self {
         let mut numbers = self.camera.numbers();
         for (number, by) in numbers.iter_mut().zip(step) {
@@ -87,22 +87,21 @@ impl CameraModel {
         Self { camera: Camera::from_numbers(numbers), bend_mm }
     }
 
-    /// Where a corner is, in the board's axes \[mm\].
+    /// Position of a corner in the axes of the board \[mm\].
     pub fn on_board(&self, corner: &Correspondence) -> Point3<f64> {
         let z = self.bend_mm[0] * corner.bend[0] + self.bend_mm[1] * corner.bend[1];
         Point3::new(corner.on_board.x, corner.on_board.y, z)
     }
 
-    /// Sum of the squares of what is left between seen and expected \[px²\]; `None`
-    /// behind the camera.
+    /// Sum of the squared reprojection errors \[px²\]; `None` behind the camera.
     pub fn sum_of_squares_px2(
         &self,
-        place: &BoardPlacement,
+        position: &BoardPlacement,
         boards: &[Vec<Correspondence>],
     ) -> Option<f64> {
         let mut sum = 0.0;
         for (board, corners) in boards.iter().enumerate() {
-            let pose = place.of_board(board);
+            let pose = position.of_board(board);
             for corner in corners {
                 let at = self.camera.project(pose.apply(self.on_board(corner)))?;
                 sum += (corner.observed - at).norm_squared();
@@ -118,7 +117,7 @@ impl BoardPlacement {
         Self { pose, others: Vec::new() }
     }
 
-    /// Axes of one of the boards in the camera's.
+    /// Axes of one of the boards in those of the camera.
     pub fn of_board(&self, board: usize) -> Pose {
         let Some([x, y, turn]) = board.checked_sub(1).and_then(|i| self.others.get(i)) else {
             return self.pose;
@@ -131,7 +130,7 @@ impl BoardPlacement {
         )
     }
 
-    /// With its numbers changed by these.
+    /// With a step of its parameters.
     pub fn moved(&self, step: &DVector<f64>) -> Self {
         let turn = Rotation3::new(step.fixed_rows::<3>(0));
         let shift = step.fixed_rows::<3>(3);
@@ -145,14 +144,13 @@ impl BoardPlacement {
         }
     }
 
-    /// How many numbers it has.
+    /// Number of its parameters.
     pub fn numbers(&self) -> usize {
         POSE + ON_PLANE * self.others.len()
     }
 }
 
-/// Equations between shared numbers, without what rounding leaves of those that are
-/// not free.
+/// Equations of the shared parameters with zero rows and columns for those that are fixed.
 pub fn restrict_to_free(
     mut matrix: SMatrix<f64, SHARED, SHARED>,
     free: FreeParameters,

@@ -1,24 +1,25 @@
-//! A cursor over the keys of a calibration of others, which collects everything
-//! that is wrong. Keys that nobody asks for are theirs, and are passed over.
+//! The keys of another program's calibration, read with all violations collected. Unknown keys
+//! are ignored.
 
 use std::cell::RefCell;
 use std::ops::RangeInclusive;
 
 use super::yaml::{Node, Value};
-use crate::calibration::file::MAX_SIDE_PX;
+use crate::calibration::file::{MAX_SIDE_PX, whole_side};
 use crate::document::Problem;
+use crate::numeric::number::to_f64;
 
-/// Names that one thing goes by, in small letters and without `_`.
+/// Names of one key in lower case and without `_`.
 pub type Names = &'static [&'static str];
 
-/// A matrix, row by row, or a plain row of numbers.
+/// A matrix, row by row, or a plain list of numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matrix {
     /// Its key in the file.
     pub key: String,
-    /// Where it begins.
+    /// Line where it begins.
     pub line: usize,
-    /// Its numbers, all of them finite.
+    /// Its numbers, all finite.
     pub data: Vec<f64>,
 }
 
@@ -29,7 +30,7 @@ pub struct YamlFields<'a> {
 }
 
 impl<'a> YamlFields<'a> {
-    /// What is no mapping has no keys, which is reported.
+    /// Of a document's root; reports a root that is no mapping.
     pub fn of(root: &'a Node) -> Self {
         let items = mapping(root);
         let fields = Self { items: items.unwrap_or(&[]), problems: RefCell::default() };
@@ -40,22 +41,22 @@ impl<'a> YamlFields<'a> {
         fields
     }
 
-    /// How much was found wrong so far.
+    /// Number of violations so far.
     pub fn count_problems(&self) -> usize {
         self.problems.borrow().len()
     }
 
-    /// Everything that was found wrong.
+    /// All violations.
     pub fn into_problems(self) -> Vec<Problem> {
         self.problems.into_inner()
     }
 
-    /// Whether one of the names stands in the file.
+    /// Whether the file has a key of one of these names.
     pub fn has(&self, names: Names) -> bool {
         self.all(names).next().is_some()
     }
 
-    /// Whether the mapping of one of the names has this key.
+    /// Whether the mapping at one of these names has this key.
     pub fn has_within(&self, names: Names, key: &str) -> bool {
         self.all(names).any(|(_, node)| get(mapping(node).unwrap_or(&[]), key).is_some())
     }
@@ -64,7 +65,7 @@ impl<'a> YamlFields<'a> {
         self.items.iter().filter(|(key, _)| names.contains(&normal(key).as_str()))
     }
 
-    /// The value of one of the names; two of them would be two values.
+    /// The value at one of these names; reports a second one.
     fn find(&self, names: Names) -> Option<&'a (String, Node)> {
         let mut all = self.all(names);
         let first = all.next()?;
@@ -75,7 +76,7 @@ impl<'a> YamlFields<'a> {
         Some(first)
     }
 
-    /// The same where it must be there; `name` is the usual one.
+    /// The same for a required key; `name` is the usual one.
     fn required(&self, names: Names, name: &str, expected: &str) -> Option<&'a (String, Node)> {
         if !self.has(names) && !self.items.is_empty() {
             self.problem(None, name, "nothing", expected);
@@ -83,14 +84,14 @@ impl<'a> YamlFields<'a> {
         self.find(names)
     }
 
-    /// Reports that what stands there is not what is expected.
+    /// Reports that the value is not what is expected.
     pub fn report(&self, names: Names, name: &str, expected: &str) {
         if let Some((key, node)) = self.required(names, name, expected) {
             self.problem(Some(node.line), key, node.shown(), expected);
         }
     }
 
-    /// Adds to what is wrong.
+    /// Adds a violation.
     pub fn problem(
         &self,
         line: Option<usize>,
@@ -102,7 +103,7 @@ impl<'a> YamlFields<'a> {
         self.problems.borrow_mut().push(Problem { line, key: key.to_owned(), found, expected });
     }
 
-    /// A text; `None` where there is none.
+    /// A text; `None` if absent.
     pub fn text(&self, names: Names) -> Option<String> {
         match &self.find(names)?.1.value {
             Value::Plain(text) | Value::Quoted(text) => Some(text.clone()),
@@ -110,21 +111,21 @@ impl<'a> YamlFields<'a> {
         }
     }
 
-    /// One side of the picture \[px\].
+    /// A side of the image \[px\].
     pub fn side(&self, names: Names, name: &str) -> Option<u32> {
         let expected = format!("a whole number from 1 to {MAX_SIDE_PX}");
         let (key, node) = self.required(names, name, &expected)?;
-        let side = number(node).and_then(as_side);
+        let side = number(node).and_then(whole_side);
         if side.is_none() {
             self.problem(Some(node.line), key, node.shown(), expected);
         }
         side
     }
 
-    /// Both sides of the picture in one row \[px\].
+    /// Both sides of the image in one list \[px\].
     pub fn size(&self, names: Names, name: &str) -> Option<[u32; 2]> {
         let matrix = self.matrix(names, name)?;
-        let sides: Option<Vec<u32>> = matrix.data.iter().map(|&side| as_side(side)).collect();
+        let sides: Option<Vec<u32>> = matrix.data.iter().map(|&side| whole_side(side)).collect();
         let size = sides.and_then(|sides| sides.try_into().ok());
         if size.is_none() {
             let expected = format!("width and height, whole numbers from 1 to {MAX_SIDE_PX}");
@@ -133,7 +134,7 @@ impl<'a> YamlFields<'a> {
         size
     }
 
-    /// A number within a range; `None` where it is absent or wrong.
+    /// A number within a range; `None` if absent or invalid.
     pub fn optional_number(
         &self,
         names: Names,
@@ -149,7 +150,7 @@ impl<'a> YamlFields<'a> {
         found
     }
 
-    /// Reports a whole number that is there, but not one of those that are sound.
+    /// Reports a number that is present but not one of the accepted ones.
     pub fn check_whole(&self, path: &[&str], sound: &[u32], expected: &str) {
         let mut items = self.items;
         let mut found = None;
@@ -164,36 +165,24 @@ impl<'a> YamlFields<'a> {
         }
     }
 
-    /// The numbers of a matrix that must be there.
+    /// The numbers of a required matrix.
     pub fn matrix(&self, names: Names, name: &str) -> Option<Matrix> {
         let (key, node) = self.required(names, name, "rows, cols and data")?;
         let Some(items) = mapping(node) else { return self.row(key, node) };
-        let sides = [get(items, "rows"), get(items, "cols")];
-        let data = get(items, "data");
-        for (part, node_of) in [("rows", sides[0]), ("cols", sides[1]), ("data", data)] {
-            if node_of.is_none() {
-                self.problem(
-                    Some(node.line),
-                    &format!("{key}.{part}"),
-                    "nothing",
-                    "it beside the others",
-                );
-            }
+        let parts =
+            ["rows", "cols", "data"].map(|part| (format!("{key}.{part}"), get(items, part)));
+        for (part, _) in parts.iter().filter(|(_, found)| found.is_none()) {
+            self.problem(Some(node.line), part, "nothing", "it beside the others");
         }
-        for (part, side) in [("rows", sides[0]), ("cols", sides[1])] {
+        for (part, side) in parts.iter().take(2) {
             if let Some(side) = side.filter(|side| number(side).is_none()) {
-                self.problem(
-                    Some(side.line),
-                    &format!("{key}.{part}"),
-                    side.shown(),
-                    "a whole number",
-                );
+                self.problem(Some(side.line), part, side.shown(), "a whole number");
             }
         }
-        let [rows, cols] = sides.map(|side| side.and_then(number));
-        let matrix = self.row(&format!("{key}.data"), data?)?;
-        let count = rows? * cols?;
-        if f64::from(u32::try_from(matrix.data.len()).unwrap_or(u32::MAX)) != count {
+        let [rows, cols, (name, data)] = parts;
+        let matrix = self.row(&name, data?)?;
+        let count = rows.1.and_then(number)? * cols.1.and_then(number)?;
+        if to_f64(matrix.data.len()) != count {
             let found = format!("{} numbers", matrix.data.len());
             let expected = format!("rows x cols = {count}");
             self.problem(Some(matrix.line), &matrix.key, found, expected);
@@ -202,7 +191,7 @@ impl<'a> YamlFields<'a> {
         Some(Matrix { key: key.clone(), ..matrix })
     }
 
-    /// A row of numbers, or of rows of them.
+    /// A list of numbers, or of lists of numbers.
     fn row(&self, key: &str, node: &Node) -> Option<Matrix> {
         let Value::Sequence(items) = &node.value else {
             self.problem(Some(node.line), key, node.shown(), "numbers in brackets");
@@ -226,7 +215,7 @@ impl<'a> YamlFields<'a> {
         is_sound.then(|| Matrix { key: key.to_owned(), line: node.line, data })
     }
 
-    /// A matrix that may be absent, of one size; `None` where it is wrong, too.
+    /// An optional matrix of one size; `None` if absent or invalid.
     pub fn optional_matrix(
         &self,
         names: Names,
@@ -240,7 +229,7 @@ impl<'a> YamlFields<'a> {
         self.has_count(&matrix, &[rows * cols]).then_some(matrix)
     }
 
-    /// Whether a matrix has one of these counts of numbers, which is reported.
+    /// Whether a matrix has one of these numbers of elements; reports it otherwise.
     pub fn has_count(&self, matrix: &Matrix, counts: &[usize]) -> bool {
         let found = matrix.data.len();
         if counts.contains(&found) {
@@ -252,7 +241,7 @@ impl<'a> YamlFields<'a> {
     }
 }
 
-/// Capitals and `_` differ from version to version.
+/// A key without upper case and `_`, which differ from version to version.
 fn normal(key: &str) -> String {
     key.chars().filter(|&c| c != '_').flat_map(char::to_lowercase).collect()
 }
@@ -272,15 +261,6 @@ fn get<'a>(items: &'a [(String, Node)], key: &str) -> Option<&'a Node> {
 fn number(node: &Node) -> Option<f64> {
     let Value::Plain(text) = &node.value else { return None };
     text.parse::<f64>().ok().filter(|number| number.is_finite())
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "checked to be a whole number in range"
-)]
-fn as_side(side: f64) -> Option<u32> {
-    ((1.0..=MAX_SIDE_PX).contains(&side) && side.fract() == 0.0).then_some(side as u32)
 }
 
 /// Counts in words, such as `4, 5 or 8`.

@@ -1,4 +1,4 @@
-//! What files of others and ours have in common: a camera and its lens.
+//! A camera and its lens, as far as other programs' files hold them.
 
 use crate::calibration::Camera;
 
@@ -21,27 +21,27 @@ impl Format {
     }
 }
 
-/// What can be exchanged.
+/// A camera and its lens.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Intrinsics {
-    /// Size of the pictures \[px\].
+    /// Size of the images \[px\].
     pub image_size_px: [u32; 2],
     /// Camera and lens.
     pub camera: Camera,
-    /// Root mean square of the reprojection errors \[px\], where it is told; only
-    /// OpenCV's layout has a place for it.
+    /// Root mean square of the reprojection errors \[px\], if the file has it; only OpenCV's
+    /// layout does.
     pub rms_px: Option<f64>,
-    /// The camera's name, where it is told; only ROS's layout has a place for it.
+    /// Name of the camera, if the file has it; only ROS's layout does.
     pub camera_name: Option<String>,
 }
 
 /// A file that was read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Import {
-    /// Whose it is, by its keys.
+    /// Layout of the file, by its keys.
     pub format: Format,
-    /// What it holds.
+    /// Its content.
     pub intrinsics: Intrinsics,
-    /// What was assumed, and what else stands in it and is not taken over.
+    /// What was assumed, and what was ignored.
     pub notes: Vec<String>,
 }

@@ -1,15 +1,16 @@
-//! From a matrix and a row of coefficients to a camera that can measure.
+//! A camera from a matrix and a list of coefficients.
 
 use super::fields::{Matrix, YamlFields};
 use crate::calibration::Camera;
 use crate::calibration::camera::COEFFICIENTS;
 use crate::calibration::file::{CENTRE_PX, DISTORTION, FOCAL_PX};
 
-/// What OpenCV puts after the eight coefficients: thin prism and tilt.
+/// OpenCV's coefficients beyond the first eight: thin prism and tilt.
 const PRISM_AND_TILT: [&str; 6] = ["s1", "s2", "s3", "s4", "tau_x", "tau_y"];
 
 impl YamlFields<'_> {
-    /// The camera of its matrix and its coefficients, of which there may be so many.
+    /// The camera of a matrix and coefficients; `counts` are the accepted numbers of
+    /// coefficients.
     pub fn camera(
         &self,
         matrix: Option<Matrix>,

@@ -46,7 +46,7 @@ pub fn to_yaml(intrinsics: &Intrinsics) -> String {
             row(data)
         )
     };
-    // The head of all versions: the fifth writes another one, and reads both.
+    // Header of versions before 5; version 5 writes another one and reads both.
     [
         format!("%YAML:1.0\n---\nimage_width: {width}\nimage_height: {height}\n"),
         part("camera_matrix", [3, 3], &intrinsics.camera.matrix()),
@@ -155,7 +155,7 @@ extrinsic_parameters: !!opencv-matrix
     }
 
     #[test]
-    fn everything_that_is_wrong_is_reported_at_once_with_its_line() {
+    fn all_violations_are_reported_at_once_with_their_lines() {
         let text = FILE
             .replace("image_width: 640", "image_width: 640.5")
             .replace("5.3294e+02, 233.86", ".Inf, \"233.86\"")

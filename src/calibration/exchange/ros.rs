@@ -15,10 +15,10 @@ const RECTIFICATION: Names = &["rectificationmatrix", "r"];
 const PROJECTION: Names = &["projectionmatrix", "p"];
 const MODEL: Names = &["distortionmodel"];
 const NAME: Names = &["cameraname"];
+/// By definition: the identity matrix, row by row.
 const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
-/// Whether the keys are ROS's: some that only it has, or a picture's size as in a
-/// message.
+/// Whether the keys are those of ROS: some that only it has, or the image size as in a message.
 pub(super) fn is_ros(fields: &YamlFields<'_>) -> bool {
     let only_here: [Names; 6] =
         [NAME, MODEL, &["rectificationmatrix"], &["projectionmatrix"], &["binningx"], &["roi"]];
@@ -32,7 +32,7 @@ pub(super) fn read(fields: &YamlFields<'_>, notes: &mut Vec<String>) -> Option<I
     let counts = read_model(fields, notes);
     let matrix = fields.matrix(CAMERA, "camera_matrix");
     let distortion = fields.matrix(DISTORTION, "distortion_coefficients");
-    check_whole_picture(fields, [width, height]);
+    check_whole_image(fields, [width, height]);
     note_rectification(fields, matrix.as_ref(), notes);
     let size = width.zip(height).map(|(width, height)| [width, height]);
     let camera = fields.camera(matrix, distortion, counts.unwrap_or(&[4, 5, 8]), size);
@@ -45,7 +45,7 @@ pub(super) fn read(fields: &YamlFields<'_>, notes: &mut Vec<String>) -> Option<I
     })
 }
 
-/// How many coefficients the lens has.
+/// Accepted numbers of coefficients of the lens model.
 fn read_model(fields: &YamlFields<'_>, notes: &mut Vec<String>) -> Option<&'static [usize]> {
     const PLUMB_BOB: &[usize] = &[4, 5];
     if !fields.has(MODEL) {
@@ -67,9 +67,9 @@ fn read_model(fields: &YamlFields<'_>, notes: &mut Vec<String>) -> Option<&'stat
     }
 }
 
-/// Numbers of a part of the picture, or of one with fewer pixels, hold for others
-/// than those that are measured.
-fn check_whole_picture(fields: &YamlFields<'_>, [width, height]: [Option<u32>; 2]) {
+/// Refuses calibrations of a region of interest or of binned images, whose parameters do not
+/// apply to the full image.
+fn check_whole_image(fields: &YamlFields<'_>, [width, height]: [Option<u32>; 2]) {
     for key in ["binning_x", "binning_y"] {
         fields.check_whole(&[key], &[0, 1], "0 or 1, images with all their pixels");
     }
@@ -81,8 +81,7 @@ fn check_whole_picture(fields: &YamlFields<'_>, [width, height]: [Option<u32>; 2
     }
 }
 
-/// Pictures are measured as they come, and the two matrices say how others would be
-/// made of them.
+/// Images are measured as they are; the two matrices apply to rectified images.
 fn note_rectification(fields: &YamlFields<'_>, camera: Option<&Matrix>, notes: &mut Vec<String>) {
     let turned = fields
         .optional_matrix(RECTIFICATION, "rectification_matrix", [3, 3])
@@ -99,13 +98,13 @@ fn note_rectification(fields: &YamlFields<'_>, camera: Option<&Matrix>, notes: &
     notes.push(format!("{names} for rectified images, and ignored: images here are raw"));
 }
 
-/// The projection of a single camera: its own matrix, and no shift.
+/// Projection matrix of a single camera: its own matrix and no shift.
 fn unmoved(camera: &[f64]) -> Vec<f64> {
     camera.chunks(3).flat_map(|line| line.iter().copied().chain([0.0])).collect()
 }
 
-/// As the text of a file that ROS reads; what is rectified keeps the camera's own
-/// matrix. Numbers keep every digit.
+/// As the text of a file that ROS reads; the rectified image keeps the matrix of the camera.
+/// Numbers keep every digit.
 pub fn to_yaml(intrinsics: &Intrinsics, camera_name: &str) -> String {
     let [width, height] = intrinsics.image_size_px;
     let matrix = intrinsics.camera.matrix();
@@ -117,7 +116,7 @@ pub fn to_yaml(intrinsics: &Intrinsics, camera_name: &str) -> String {
     };
     [
         format!("image_width: {width}\nimage_height: {height}\n"),
-        // A text in quotes is one whatever it looks like; JSON's are YAML's, too.
+        // Quoted, so that no name is taken for another type; JSON strings are valid YAML.
         format!("camera_name: {}\n", serde_json::Value::from(camera_name)),
         part("camera_matrix", [3, 3], &matrix),
         format!("distortion_model: {model}\n"),
@@ -215,7 +214,7 @@ roi:
             rms_px: None,
             camera_name: Some("narrow_stereo/left".to_owned()),
         };
-        // The projection is that of rectified pictures.
+        // The projection is that of rectified images.
         let [note] = import.notes.as_slice() else { panic!("{:?}", import.notes) };
         assert!(note.starts_with("projection_matrix is for rectified images"), "{note}");
         assert_eq!((import.format, import.intrinsics), (Format::Ros, intrinsics));
@@ -240,7 +239,7 @@ roi:
     }
 
     #[test]
-    fn a_part_of_the_picture_and_pixels_put_together_are_refused() {
+    fn a_region_of_interest_and_binned_pixels_are_refused() {
         for (from, to, words) in [
             ("binning_x: 0", "binning_x: 2", "line 30: binning_x: found 2, expected 0 or 1"),
             ("x_offset: 0", "x_offset: 8", "roi.x_offset: found 8, expected 0 or the whole"),
@@ -266,7 +265,7 @@ roi:
     }
 
     #[test]
-    fn everything_that_is_wrong_is_reported_at_once_with_its_line() {
+    fn all_violations_are_reported_at_once_with_their_lines() {
         let text = FILE
             .replace("image_width: 640\n", "")
             .replace("image_height: 480", "image_height: -480")

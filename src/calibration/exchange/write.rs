@@ -1,4 +1,4 @@
-//! Numbers as text that every reader of YAML takes for the same number.
+//! Numbers as text that every YAML reader takes for the same number.
 
 /// The shortest digits that are read back as the same number. With a point and a
 /// signed exponent: readers of YAML 1.1 take `1e-5` for a text.

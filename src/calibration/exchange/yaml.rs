@@ -1,30 +1,35 @@
-//! YAML as a tree whose nodes know their line. Scalars stay the text that they are,
-//! so that a number is read once, by whoever wants it.
+//! YAML as a tree whose nodes know their lines. Scalars stay text, so that a number is parsed
+//! once, where it is used.
+//!
+//! The tree is built from the events of `saphyr-parser`. A document model such as `saphyr`'s
+//! would resolve aliases and overwrite repeated keys silently, where here both are refused with
+//! their lines, and it does not limit the depth.
 
 use saphyr_parser::{Event, Parser, ScalarStyle, ScanError};
 
 use crate::document::Problem;
 
-/// Calibrations are nested three deep.
+/// Largest depth of nesting; calibrations are nested three deep. A choice against stack
+/// overflow.
 const MAX_DEPTH: usize = 32;
 
 /// One node of the tree.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Node {
-    /// Line in the file, counted from 1.
+    /// Line in the file, from 1.
     pub line: usize,
-    /// What it is.
+    /// Its content.
     pub value: Value,
 }
 
-/// What a node is.
+/// Content of a node.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
     /// A text without quotes, such as a number.
     Plain(String),
     /// A text in quotes, or a block of lines.
     Quoted(String),
-    /// A row.
+    /// A list.
     Sequence(Vec<Node>),
     /// Keys with their values, in the order of the file.
     Mapping(Vec<(String, Node)>),
@@ -40,7 +45,7 @@ pub struct YamlDocument {
 }
 
 impl Node {
-    /// As it stands in the file, short enough for a message.
+    /// The value as it is in the file, shortened for a message.
     pub fn shown(&self) -> String {
         match &self.value {
             Value::Plain(text) if text.is_empty() => "nothing".to_owned(),
@@ -62,18 +67,17 @@ fn shortened(text: &str) -> String {
     shown
 }
 
-/// A sequence or mapping whose end has not come yet.
+/// A sequence or mapping whose end has not been read.
 enum Open {
     Sequence(usize, Vec<Node>),
     /// With the key whose value comes next, and its line.
     Mapping(usize, Vec<(String, Node)>, Option<String>),
 }
 
-/// Reads the first document that is not empty. Keys that stand twice, and what
-/// refers to other places of the file, are refused.
+/// Reads the first document that is not empty. Repeated keys and aliases are refused.
 pub fn parse(text: &str) -> Result<YamlDocument, Problem> {
-    // OpenCV before its fifth version begins with `%YAML:1.0`, which is no directive
-    // of YAML's; as a comment it does no harm, and the lines stay where they are.
+    // OpenCV before version 5 begins with `%YAML:1.0`, which is no directive of YAML. It is
+    // replaced by a comment, so that line numbers stay.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mended = text.strip_prefix("%YAML:").map(|rest| format!("#YAML:{rest}"));
     let mut parser = Parser::new_from_str(mended.as_deref().unwrap_or(text));
@@ -125,7 +129,7 @@ impl Open {
     }
 }
 
-/// Puts a whole node where it belongs; gives it back where nothing is open.
+/// Adds a complete node to the innermost open one; returns it where none is open.
 fn put(open: &mut [Open], node: Node) -> Result<Option<Node>, Problem> {
     match open.last_mut() {
         None => return Ok(Some(node)),
@@ -151,8 +155,7 @@ fn key_of(node: Node, before: &[(String, Node)]) -> Result<String, Problem> {
     }
 }
 
-/// Whether anything but the ends of documents comes. What is broken there is
-/// nobody's business.
+/// Whether another document has content. Errors in it are ignored.
 fn follows(mut parser: Parser<'_, saphyr_parser::StrInput<'_>>) -> bool {
     let is_content = |event: &Event<'_>| match event {
         Event::Scalar(text, ..) => !text.is_empty(),

@@ -2,8 +2,7 @@ use nalgebra::{Point3, Rotation3, Vector3};
 
 use super::*;
 use crate::calibration::board::Markers;
-use crate::calibration::board_observation;
-use crate::calibration::board_observation::BoardObservation;
+use crate::calibration::board_observation::{self, BoardObservation};
 use crate::calibration::dictionary::Dictionary;
 use crate::calibration::{CalibrationQuality, Camera};
 use crate::core::frame::{Frame, Pixels};
@@ -28,7 +27,7 @@ fn camera() -> Camera {
     Camera::pinhole([900.0, 901.0], [320.0, 240.0]).with_five([-0.15, 0.08, 0.0, 0.0, 0.0])
 }
 
-/// Tilted about the picture's x: its middle column lies along the bed's y.
+/// Tilted about the image's x: its middle column lies along the bed's y.
 fn bed() -> Pose {
     let turn = Vector3::new(std::f64::consts::PI + TILT, 0.0, 0.0);
     Pose::new(turn, Vector3::new(0.0, 0.0, 430.0))
@@ -71,7 +70,7 @@ fn touch(sigma_mm: f64) -> Touch {
     Touch { position: AT, sigma, thickness, robot_z: None }
 }
 
-/// The board so that a place of it, in squares, lies at a place of the bed; a little
+/// The board so that a position of it, in squares, lies at a position of the bed; a little
 /// turned.
 fn lies(at: [f64; 2], on_bed: [f64; 2], height: f64) -> Pose {
     let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
@@ -81,7 +80,7 @@ fn lies(at: [f64; 2], on_bed: [f64; 2], height: f64) -> Pose {
     Pose::from_parts(bed().rotation() * turn, bed().apply(origin.into()).coords)
 }
 
-/// The picture of a board whose place `AT` is so far off where it is told to be.
+/// The image of a board that is displaced by this from the specified position `AT`.
 fn seen(off: [f64; 2], height: f64, seed: u64) -> BoardObservation {
     let place = [MIDDLE[0] + RIGHT + off[0], MIDDLE[1] + AHEAD + off[1]];
     let studio = BoardStudio::new(&camera(), SIZE);
@@ -94,7 +93,7 @@ fn found(sighting: &BoardObservation, touch: &Touch) -> NozzleOffset {
 }
 
 #[test]
-fn the_truth_lies_within_the_sigma_that_is_told() {
+fn the_truth_lies_within_the_reported_sigma() {
     let mut squares = 0.0;
     for seed in 0..10 {
         let off = hash::normal_pair(hash::mix(&[41, seed])).map(|z| 0.5 * z);
@@ -172,7 +171,7 @@ fn a_height_that_is_not_known_moves_the_middle_of_a_gauge_seen_aslant() {
 
 #[test]
 fn the_nozzle_is_beyond_the_right_end_of_a_horizontal_gauge() {
-    // Straight down: the bed's y runs up in the picture.
+    // Straight down: the bed's y runs up in the image.
     let bed =
         Pose::new(Vector3::new(std::f64::consts::PI, 0.0, 0.0), Vector3::new(0.0, 0.0, 430.0));
     let calibration = Calibration::Full {

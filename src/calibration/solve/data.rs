@@ -1,4 +1,4 @@
-//! What a camera is fitted to: the corners of each picture, and a guess to begin with.
+//! Data of a camera fit: the corners of each image, and initial values.
 
 use super::error::{MIN_VIEWS, SolveError};
 use crate::calibration::board::Board;
@@ -12,19 +12,19 @@ use crate::calibration::factor::{Elimination, Factor};
 use crate::calibration::homography;
 use crate::numeric::number::to_f64;
 
-/// What is fitted to, and where it begins.
+/// Corners and initial values of a camera fit.
 #[derive(Debug)]
 pub struct CalibrationData {
-    /// The corners of the one board of each picture.
+    /// The corners of the one board of each image.
     pub boards: Vec<Vec<Vec<Correspondence>>>,
-    /// A camera and places that are roughly right.
+    /// Approximate camera and poses.
     pub start: Guess,
-    /// Size of the pictures \[px\].
+    /// Size of the images \[px\].
     pub size: [u32; 2],
 }
 
 impl CalibrationData {
-    /// Of sightings that are all of one size.
+    /// From images of one size.
     pub fn of(board: &Board, sightings: &[BoardObservation]) -> Result<Self, SolveError> {
         let Some(first) = sightings.first().filter(|_| sightings.len() >= MIN_VIEWS) else {
             return Err(SolveError::TooFew { found: sightings.len() });
@@ -32,47 +32,40 @@ impl CalibrationData {
         let size = first.image_size_px;
         let boards: Vec<_> =
             sightings.iter().map(|s| vec![board.correspondences(&s.corners)]).collect();
-        let maps: Vec<_> = boards
-            .iter()
-            .filter_map(|b| homography::homography(&homography::pairs(&b[0])))
-            .collect();
+        let map = |board: &Vec<Vec<Correspondence>>| {
+            homography::homography(&homography::pairs(&board[0]))
+        };
+        let maps: Vec<_> = boards.iter().filter_map(map).collect();
         let camera = homography::pinhole(&maps, size);
-        let places = sightings
-            .iter()
-            .zip(&boards)
-            .map(|(sighting, corners)| {
-                homography::board_pose(&camera, &corners[0])
-                    .map(BoardPlacement::of_one)
-                    .ok_or_else(|| SolveError::NoPose { name: sighting.name.clone() })
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        Ok(Self {
-            boards,
-            start: Guess { model: CameraModel { camera, bend_mm: [0.0; 2] }, placements: places },
-            size,
-        })
+        let model = CameraModel { camera, bend_mm: [0.0; 2] };
+        let placement = |(sighting, corners): (&BoardObservation, &Vec<Vec<Correspondence>>)| {
+            let pose = homography::board_pose(&camera, &corners[0]);
+            let none = || SolveError::NoPose { name: sighting.name.clone() };
+            pose.map(BoardPlacement::of_one).ok_or_else(none)
+        };
+        let placements = sightings.iter().zip(&boards).map(placement).collect::<Result<_, _>>()?;
+        Ok(Self { boards, start: Guess { model, placements }, size })
     }
 
-    /// Number of corners in all pictures.
+    /// Number of corners in all images.
     pub fn corners(&self) -> usize {
         self.boards.iter().flatten().map(Vec::len).sum()
     }
 
-    /// Variance of a corner's place in one direction \[px²\], from what the fit
-    /// leaves; not a number where there are too few corners to tell.
-    #[expect(clippy::cast_precision_loss, reason = "counts of corners and pictures")]
+    /// Variance of a corner's position in one direction \[px²\], from the residuals; not a
+    /// number with too few corners.
     pub fn noise_variance_px2(&self, fit: &BundleFit, free: FreeParameters) -> f64 {
         let numbers =
             free.count() + fit.placements.iter().map(BoardPlacement::numbers).sum::<usize>();
-        let left = (2 * self.corners()) as f64 - numbers as f64;
+        let left = to_f64(2 * self.corners()) - to_f64(numbers);
         if left > 0.0 { fit.sum_of_squares_px2 / left } else { f64::NAN }
     }
 
-    /// Standard deviations of the shared numbers for a noise of 1 px.
+    /// Standard deviations of the shared parameters for a noise of 1 px.
     pub fn unit_sigmas(&self, fit: &BundleFit, free: FreeParameters) -> Option<[f64; SHARED]> {
         let mut left = nalgebra::SMatrix::<f64, SHARED, SHARED>::zeros();
-        for (place, boards) in fit.placements.iter().zip(&self.boards) {
-            left += Elimination::of(&Equations::of(&fit.model, free, place, boards)?)?.reduced;
+        for (position, boards) in fit.placements.iter().zip(&self.boards) {
+            left += Elimination::of(&Equations::of(&fit.model, free, position, boards)?)?.reduced;
         }
         let variances = Factor::of_shared(&restrict_to_free(left, free))?.variances();
         Some(std::array::from_fn(|number| variances[number].sqrt()))

@@ -1,31 +1,32 @@
 //! Why no camera model is found.
 
-/// Pictures with a board below which the model cannot be told from the data:
-/// two poses fix the focal length only if nothing is wrong.
+/// Smallest number of images: two poses determine the focal length without redundancy (Zhang
+/// 2000, section 3.1).
 pub const MIN_VIEWS: usize = 3;
 
-/// Reprojection error beyond which a fit is none \[px\].
+/// Reprojection error beyond which a fit is refused \[px\]. A choice: a miscounted board
+/// exceeds it.
 pub(super) const MAX_RMS_PX: f64 = 3.0;
 
 /// No camera model can be found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SolveError {
-    /// Too few pictures show the board.
+    /// Too few images show the board.
     #[error(
         "{found} image(s) show the board, at least {MIN_VIEWS} must: take 10 to 20, \
          tilted to several sides, that fill the image between them"
     )]
     TooFew {
-        /// Pictures that show it.
+        /// Images that show it.
         found: usize,
     },
-    /// One of the pictures says nothing of where its board was.
+    /// The corners of an image fit no pose.
     #[error("{name}: the corners fit no board before a camera; leave the image out")]
     NoPose {
-        /// The picture's name.
+        /// The image's name.
         name: String,
     },
-    /// The corners are nowhere near where any camera would see them.
+    /// The corners do not fit any camera.
     #[error(
         "the corners are {rms_px:.1} px off where the best camera would see them, more than \
          {MAX_RMS_PX} px: look for a wrong count of corners (--board), or images with another \
@@ -35,7 +36,7 @@ pub enum SolveError {
         /// Root mean square of the reprojection errors \[px\].
         rms_px: f64,
     },
-    /// The fit ended at something that is no camera.
+    /// The fit ended at invalid parameters.
     #[error(
         "the fit did not settle on a camera (focal lengths {} and {} px): \
          tilt the board more, and check that it is flat and counted right",

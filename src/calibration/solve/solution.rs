@@ -1,4 +1,4 @@
-//! A camera that was found, and how well each picture agrees with it.
+//! A calibrated camera, and the residuals of each image.
 
 use crate::calibration::Camera;
 use crate::calibration::board::{Board, CornerObservation};
@@ -6,10 +6,10 @@ use crate::calibration::equations::{CameraModel, Correspondence, FreeParameters,
 use crate::calibration::lens_selection::LensTrial;
 use crate::core::geometry::{ImagePoint, Pose};
 
-/// One picture in the solution.
+/// One image in the solution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardView {
-    /// The picture's name.
+    /// The image's name.
     pub name: String,
     /// The board's axes in the camera's.
     pub pose: Pose,
@@ -19,36 +19,34 @@ pub struct BoardView {
     pub max_px: f64,
     /// The corners that were found.
     pub corners: Vec<CornerObservation>,
-    /// What each of them is off the place at which the model expects it \[px\].
+    /// Their reprojection errors \[px\].
     pub errors_px: Vec<nalgebra::Vector2<f64>>,
 }
 
-/// The camera, and how well each picture agrees.
+/// A calibrated camera, and the residuals of each image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
     /// Intrinsics, distortion, and the bend of the board.
     pub model: CameraModel,
     /// What was fitted.
     pub free: FreeParameters,
-    /// Standard deviations of the camera's numbers, then of the bend \[mm\]; `None`
-    /// where the pictures do not tell the numbers apart.
+    /// Standard deviations of the camera parameters, then of the bend \[mm\]; `None` where the
+    /// images do not determine them.
     pub sigma: Option<[f64; SHARED]>,
-    /// Size of the pictures \[px\].
+    /// Size of the images \[px\].
     pub image_size_px: [u32; 2],
     /// Root mean square of all reprojection errors \[px\].
     pub rms_px: f64,
-    /// The same of pictures that took no part in fitting the camera, each left out
-    /// once \[px\]; `None` where the others do not settle it.
+    /// Root mean square error of each image with the camera from the others \[px\]; `None`
+    /// where the others do not determine it.
     pub cross_validation_px: Option<f64>,
-    /// Standard deviation of a corner's place in one direction \[px\], from what the
-    /// fit leaves.
+    /// Standard deviation of a corner's position in one direction \[px\], from the residuals.
     pub noise_px: f64,
-    /// How many times larger the numbers' variances are than if every corner were off by
-    /// itself.
+    /// Ratio of the parameters' variances to those for independent corners.
     pub design_effect: f64,
-    /// All that was tried.
+    /// All models that were tried.
     pub trials: Vec<LensTrial>,
-    /// The pictures, in the order in which they were given.
+    /// The images, in the order in which they were given.
     pub views: Vec<BoardView>,
 }
 
@@ -58,8 +56,7 @@ impl Solution {
         &self.model.camera
     }
 
-    /// First and last column and row between which all corners were seen \[px\]; `None`
-    /// without a corner.
+    /// First and last column and row with corners \[px\]; `None` without a corner.
     pub fn seen_px(&self) -> Option<[ImagePoint; 2]> {
         let corners = || self.views.iter().flat_map(|view| view.corners.iter().map(|c| c.px));
         let (first, last) = (|a: ImagePoint, b| a.inf(&b), |a: ImagePoint, b| a.sup(&b));
@@ -83,7 +80,7 @@ impl Solution {
         Some([round(heights().reduce(f64::min)?), round(heights().reduce(f64::max)?)])
     }
 
-    /// The corners of a picture on the board.
+    /// The corners of a image on the board.
     pub fn corners(&self, board: &Board, view: usize) -> Vec<Correspondence> {
         self.views.get(view).map_or_else(Vec::new, |view| board.correspondences(&view.corners))
     }

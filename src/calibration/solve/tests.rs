@@ -1,9 +1,10 @@
 use super::*;
 use crate::calibration::Calibration;
 use crate::calibration::board::observe_all;
+use crate::calibration::camera::NUMBERS;
 use crate::calibration::plane::bed_from_board;
-use crate::calibration::synthetic;
-use crate::calibration::synthetic::{SIZE, TRUTH, board, poses};
+use crate::calibration::synthetic::{self, SIZE, TRUTH, board, poses};
+use crate::calibration::uncertainty::ROWS;
 use crate::core::units::Mm;
 use nalgebra::Point3;
 use rand::SeedableRng;
@@ -59,14 +60,14 @@ fn a_lens_and_a_bend_that_are_there_are_found_and_none_is_made_up() {
     let noise = Normal::new(0.0, 0.1).unwrap();
     for (sighting, pose) in bent.iter_mut().zip(poses()) {
         let corners = board().correspondences(&sighting.corners);
-        let places: Vec<_> = corners
+        let positions: Vec<_> = corners
             .iter()
             .map(|corner| {
                 let px = TRUTH.project(pose.apply(model.on_board(corner))).unwrap();
                 px + nalgebra::Vector2::new(noise.sample(&mut random), noise.sample(&mut random))
             })
             .collect();
-        sighting.corners = observe_all(&places);
+        sighting.corners = observe_all(&positions);
     }
     let found = solve(&board(), &bent).unwrap();
     assert!(found.free.bend, "{:?}", found.trials);
@@ -77,7 +78,7 @@ fn a_lens_and_a_bend_that_are_there_are_found_and_none_is_made_up() {
 
 /// The others fix the camera, and the pose of the one that is left out is fitted.
 #[test]
-fn the_held_out_error_is_that_of_really_leaving_pictures_out() {
+fn the_cross_validation_error_is_that_of_really_leaving_images_out() {
     let all = sightings(0.1);
     let solution = solve_with(&board(), &all, Lens::Five).unwrap();
     let (mut squares, mut corners) = (0.0, 0.0);
@@ -91,9 +92,9 @@ fn the_held_out_error_is_that_of_really_leaving_pictures_out() {
         corners += 54.0;
     }
     let left_out = f64::sqrt(squares / corners);
-    let told = solution.cross_validation_px.unwrap();
-    assert!((told / left_out - 1.0).abs() < 0.002, "{told} {left_out}");
-    assert!(told > solution.rms_px);
+    let reported = solution.cross_validation_px.unwrap();
+    assert!((reported / left_out - 1.0).abs() < 0.002, "{reported} {left_out}");
+    assert!(reported > solution.rms_px);
 }
 
 #[test]
@@ -130,7 +131,12 @@ fn a_pose_alone_is_found_with_a_known_camera() {
 }
 
 #[test]
-fn too_few_pictures_are_no_calibration() {
+fn too_few_images_are_no_calibration() {
     let few = solve(&board(), &sightings(0.0)[..2]).unwrap_err();
     assert_eq!(few, SolveError::TooFew { found: 2 });
+}
+
+#[test]
+fn the_camera_parameters_have_the_same_names_in_both_lists() {
+    assert_eq!(SHARED_NAMES[..NUMBERS], ROWS[..NUMBERS]);
 }

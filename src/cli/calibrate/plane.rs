@@ -91,7 +91,7 @@ fn last_with_board<'a>(
             Ok(_)
             | Err(
                 BoardRejection::Unreadable(_)
-                | BoardRejection::NoBoard { .. }
+                | BoardRejection::NoBoard(_)
                 | BoardRejection::NoMarkers(MarkerError::None { .. }),
             ) => {}
             Err(_) => later.push(name.clone()),

@@ -1,16 +1,18 @@
-//! Why a bead does not tell the offset.
+//! Why a bead does not determine the offset.
 
-use crate::core::units::{Mm, MmPerS};
+use super::estimate::SpeedRange;
+use crate::core::units::Mm;
 
-/// Widths below which nothing is told.
+/// Smallest number of widths. A choice.
 pub const MIN_WIDTHS: usize = 50;
-/// Gauges of path, side by side, below which the noise is not told from the bead.
+/// Smallest number of gauge lengths of path, from which the noise can be distinguished from the
+/// bead. A choice.
 pub const MIN_PIECES: usize = 10;
 
-/// Why a bead does not tell the offset.
+/// Why a bead does not determine the offset.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum CameraOffsetError {
-    /// Nothing says where the nozzle was.
+    /// No report has a position of the nozzle.
     #[error(
         "no robot state with a path that grew in PRINT or HOLD: the offset shows only while bead \
          is laid"
@@ -40,30 +42,26 @@ pub enum CameraOffsetError {
     #[error(
         "the speed changed by {:.1} % only ({:.1} to {:.1} mm/s), which shows in no width: run once \
          with steps of the target width, or of the speed, by 20 % or more",
-        100.0 * (to.get() / from.get() - 1.0), from.get(), to.get()
+        speeds.change_percent(), speeds.min.get(), speeds.max.get()
     )]
     ConstantSpeed {
-        /// Slowest speed.
-        from: MmPerS,
-        /// Fastest speed.
-        to: MmPerS,
+        /// Slowest and fastest speed.
+        speeds: SpeedRange,
     },
-    /// The widths do not show it.
+    /// The widths do not respond.
     #[error(
         "the speed changed by {:.1} % ({:.1} to {:.1} mm/s), but the widths do not follow it \
          clearly, at no offset up to {max_offset}: run once with larger or more abrupt steps of the \
          target width or of the speed",
-        100.0 * (to.get() / from.get() - 1.0), from.get(), to.get()
+        speeds.change_percent(), speeds.min.get(), speeds.max.get()
     )]
     NoResponse {
-        /// Slowest speed.
-        from: MmPerS,
-        /// Fastest speed.
-        to: MmPerS,
+        /// Slowest and fastest speed.
+        speeds: SpeedRange,
         /// Largest offset that was tried.
         max_offset: Mm,
     },
-    /// The best is at an end of what was tried.
+    /// The best offset is at an end of the search range.
     #[error(
         "the widths fit best at the end of what was tried, {at:.1} of 0 to {max_offset}: give more with \
          --max-mm if the camera is further away; otherwise the widths follow something else than \
@@ -76,7 +74,7 @@ pub enum CameraOffsetError {
         /// Largest offset that was tried.
         max_offset: Mm,
     },
-    /// Two offsets are as good.
+    /// Two offsets are equally good.
     #[error(
         "{:.1} mm and {:.1} mm fit about as well, as with a speed that repeats itself: run once \
          with steps at uneven distances, or give a --max-mm between the two",
@@ -88,7 +86,7 @@ pub enum CameraOffsetError {
         /// Another one.
         second: Mm,
     },
-    /// Known no better than itself.
+    /// The standard error is as large as the offset.
     #[error(
         "{:.1} ± {:.1} mm is no answer: run once with larger or more abrupt steps of the target \
          width or of the speed",

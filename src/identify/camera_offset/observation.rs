@@ -1,6 +1,6 @@
-//! A width, and where the nozzle was when it was measured.
+//! A width and the path position at which it was measured.
 
-/// A width, and where the nozzle was.
+/// A width and the path position at which it was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeadObservation {
     /// Number of the bead.
@@ -9,6 +9,6 @@ pub struct BeadObservation {
     pub path_mm: f64,
     /// Logarithm of the width in mm.
     pub ln_width: f64,
-    /// Standard deviation of the width, as a share of it.
+    /// Relative standard deviation of the width.
     pub relative_sigma: f64,
 }

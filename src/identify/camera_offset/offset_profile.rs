@@ -1,63 +1,62 @@
-//! What is left of the widths, over the offset: least squares for level and exponent at
+//! Sum of squared innovations of the widths over the offset, with level and exponent fitted at
 //! each.
 
-use super::data::{PooledWidths, median};
+use super::data::PooledWidths;
 use super::estimate::{EXPONENT_RANGE, WidthAtSpeed};
+use super::laid_speeds::LaidSpeeds;
 use super::observation::BeadObservation;
-use super::speed_profile::SpeedProfile;
-use super::whiten::{PathWhitener, WidthNoise};
+use super::whiten::{PathPosition, PathWhitener, WidthNoise};
 use crate::core::units::Mm;
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{to_count, to_f64};
+use crate::numeric::rank;
 
-/// Steps of the offset at first, as a part of the gauge's length, and their limits
-/// \[mm\].
+/// Initial step of the offset over the gauge length, and its range \[mm\]. A choice: a step of
+/// the speed is as wide as the gauge.
 const STEP_PER_GAUGE: f64 = 0.1;
 const STEP_RANGE_MM: (f64, f64) = (1.0, 5.0);
-/// Halvings by which the least is narrowed down after that.
+/// Limit of the refinements of a minimum.
 const MAX_HALVINGS: u32 = 40;
-/// Numbers that are fitted: level, exponent, offset, and the noise's length and size.
+/// By definition of the model: level, exponent, offset, and the noise's length and variance.
 const FITTED_PARAMETERS: f64 = 5.0;
-/// A width further off its neighbours than this many times the usual has something else
-/// wrong with it; no more than this share of all may be so.
+/// A width further from its neighbours than this many standard deviations is an outlier, if no
+/// more than a fraction of all are. A choice: no normal residual is as large.
 const OUTLIER_FACTOR: f64 = 8.0;
 const MAX_OUTLIER_FRACTION: f64 = 0.02;
-/// Standard deviations of normal numbers in a median of absolute ones.
-const SIGMA_PER_MAD: f64 = 1.4826;
 
-/// The best bead at an offset.
+/// The best model of the bead at an offset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OffsetFit {
     /// The offset \[mm\].
     pub offset_mm: f64,
     /// Exponent b.
     pub exponent: f64,
-    /// Level: logarithm of the width less the mean of all, where the speed is as its mean.
+    /// Level: logarithm of the width at the mean speed, less the mean of all.
     level: f64,
     /// Mean logarithm of the speed.
     mean_ln_speed: f64,
-    /// Sum of the squares of what is left.
+    /// Sum of the squared innovations.
     sum_of_squares: f64,
-    /// The same if the speed made no difference.
+    /// The same without an effect of the speed.
     sum_of_squares_constant: f64,
 }
 
 impl OffsetFit {
-    /// Squares that the speed takes away.
+    /// Sum of squares that the speed explains.
     fn explained(&self) -> f64 {
         self.sum_of_squares_constant - self.sum_of_squares
     }
 }
 
-/// When a fit is nearly as good as the best one: either is enough.
+/// When a fit is nearly as good as the best one; one condition is enough.
 #[derive(Debug, Clone, Copy)]
 pub struct NearlyAsGood {
-    /// By how much its sum of squares may be larger, in units of the noise's variance.
+    /// Largest excess of its sum of squares, in units of the noise variance.
     pub worse: f64,
     /// Fraction of what the best one explains that it must explain.
     pub explained: f64,
 }
 
-/// What is left at each offset, with a known noise.
+/// Fits at each offset for a known noise model.
 #[derive(Debug, Clone)]
 pub struct OffsetProfile {
     data: PooledWidths,
@@ -67,7 +66,7 @@ pub struct OffsetProfile {
 }
 
 impl OffsetProfile {
-    /// Of widths and the noise on them.
+    /// From widths and their noise model.
     pub fn new(data: PooledWidths, noise: WidthNoise) -> Self {
         let whitener = PathWhitener::new(&data.positions, noise);
         let ones = whitener.apply(data.positions.iter().map(|_| 1.0)).collect();
@@ -76,22 +75,22 @@ impl OffsetProfile {
         Self { data, whitener, ones, widths }
     }
 
-    /// How many pieces of path tell something of their own.
+    /// Number of averaged groups.
     pub fn pieces(&self) -> usize {
         self.widths.len()
     }
 
-    /// Steps in which offsets are tried at first \[mm\].
+    /// Initial step of the offset \[mm\].
     pub fn step_mm(&self) -> f64 {
         (STEP_PER_GAUGE * self.data.gauge.get()).clamp(STEP_RANGE_MM.0, STEP_RANGE_MM.1)
     }
 
-    /// The best bead at an offset.
+    /// The best model at an offset.
     pub fn fit_at(&self, offset_mm: f64) -> OffsetFit {
         let speeds = self.data.pooled(self.data.ln_speeds(offset_mm));
         let mean = speeds.iter().sum::<f64>() / to_f64(speeds.len());
         let speeds = self.whitener.apply(speeds.into_iter().map(|speed| speed - mean));
-        let (mut n, mut x, mut y, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        let [mut n, mut x, mut y, mut xx, mut xy, mut yy] = [0.0; 6];
         for ((speed, one), width) in speeds.zip(&self.ones).zip(&self.widths) {
             n += one * one;
             x += one * speed;
@@ -113,24 +112,23 @@ impl OffsetProfile {
         }
     }
 
-    /// The offset of 0 to `farthest_mm` that leaves least.
+    /// The offset from 0 to `farthest_mm` with the smallest sum of squares.
     pub fn best(&self, farthest_mm: f64) -> OffsetFit {
         let first = self.grid(farthest_mm).reduce(better).unwrap_or_else(|| self.fit_at(0.0));
         self.narrow(first, farthest_mm)
     }
 
-    /// The least that is left within a step of an offset \[mm\].
+    /// The minimum within a step of an offset \[mm\].
     pub fn near(&self, offset_mm: f64) -> OffsetFit {
         self.narrow(self.fit_at(offset_mm), f64::INFINITY)
     }
 
     fn grid(&self, farthest_mm: f64) -> impl Iterator<Item = OffsetFit> {
-        let steps = steps(farthest_mm / self.step_mm());
-        (0..=steps)
-            .map(move |step| self.fit_at((f64::from(step) * self.step_mm()).min(farthest_mm)))
+        let steps = to_count((farthest_mm / self.step_mm()).ceil());
+        (0..=steps).map(move |step| self.fit_at((to_f64(step) * self.step_mm()).min(farthest_mm)))
     }
 
-    /// By shorter and shorter steps to either side.
+    /// Refines a minimum by successively shorter steps.
     fn narrow(&self, from: OffsetFit, farthest_mm: f64) -> OffsetFit {
         let mut best = from;
         let mut step_mm = 0.5 * self.step_mm();
@@ -149,19 +147,18 @@ impl OffsetProfile {
         best
     }
 
-    /// Variance of the differences: what is left for each width, less what was fitted.
+    /// Variance of the innovations.
     fn variance(&self, best: &OffsetFit) -> f64 {
         best.sum_of_squares / (to_f64(self.widths.len()) - FITTED_PARAMETERS).max(1.0)
     }
 
-    /// What the speed explains, in units of the noise.
+    /// Sum of squares that the speed explains, in units of the noise variance.
     pub fn gain(&self, best: &OffsetFit) -> f64 {
         best.explained() / self.variance(best)
     }
 
-    /// Half the range of offsets within which the squares grow by one unit of the noise:
-    /// the standard deviation, wherever what is left is a parabola about its least
-    /// \[mm\].
+    /// Half the interval of offsets in which the sum of squares grows by one noise variance:
+    /// the standard deviation, if the profile is a parabola \[mm\].
     pub fn sigma_mm(&self, best: &OffsetFit) -> f64 {
         let limit = best.sum_of_squares + self.variance(best);
         let [below, above] = [-1.0, 1.0].map(|side| {
@@ -180,9 +177,8 @@ impl OffsetProfile {
         0.5 * (below + above)
     }
 
-    /// Variances of the level, as a share, and of the exponent, and their covariance:
-    /// those at a known offset, and what a standard deviation of the offset makes of
-    /// both.
+    /// Variances of the relative level and of the exponent, and their covariance: those at a
+    /// known offset, plus the effect of one standard deviation of the offset.
     pub fn covariance(&self, best: &OffsetFit, offset_sigma_mm: f64) -> [f64; 3] {
         let speeds = self.data.pooled(self.data.ln_speeds(best.offset_mm));
         let speeds = speeds.into_iter().map(|speed| speed - best.mean_ln_speed);
@@ -192,14 +188,18 @@ impl OffsetProfile {
             x += one * speed;
             xx += speed * speed;
         }
-        let share = self.variance(best) / (n * xx - x * x).max(f64::MIN_POSITIVE);
+        let fraction = self.variance(best) / (n * xx - x * x).max(f64::MIN_POSITIVE);
         let ends =
             [-1.0, 1.0].map(|side| self.fit_at((best.offset_mm + side * offset_sigma_mm).max(0.0)));
         let level_at =
             |fit: &OffsetFit| fit.level + fit.exponent * (fit.mean_ln_speed - best.mean_ln_speed);
         let level = 0.5 * (level_at(&ends[1]) - level_at(&ends[0]));
         let exponent = 0.5 * (ends[1].exponent - ends[0].exponent);
-        [share * xx + level * level, share * n + exponent * exponent, share * x + level * exponent]
+        [
+            fraction * xx + level * level,
+            fraction * n + exponent * exponent,
+            fraction * x + level * exponent,
+        ]
     }
 
     /// Logarithms of the level in mm and of the mean speed at which it holds.
@@ -207,41 +207,34 @@ impl OffsetProfile {
         (self.data.mean + best.level, best.mean_ln_speed)
     }
 
-    /// The widths beside their speeds, one by one and in means over a gauge.
+    /// The widths with their speeds, one by one and averaged over a gauge.
     pub fn widths_at_speed(&self, best: &OffsetFit) -> (Vec<WidthAtSpeed>, Vec<WidthAtSpeed>) {
-        let looks = self.data.observations.iter().zip(self.data.ln_speeds(best.offset_mm));
-        let each: Vec<WidthAtSpeed> = looks
-            .map(|(look, ln_speed)| WidthAtSpeed {
-                bead: look.bead,
-                path_mm: look.path_mm,
-                count: 1,
-                ln_width: look.ln_width,
-                ln_speed,
-            })
-            .collect();
+        let one = |(&BeadObservation { bead, path_mm, ln_width, .. }, ln_speed)| WidthAtSpeed {
+            bead,
+            path_mm,
+            count: 1,
+            ln_width,
+            ln_speed,
+        };
+        let speeds = self.data.ln_speeds(best.offset_mm);
+        let each: Vec<WidthAtSpeed> = self.data.observations.iter().zip(speeds).map(one).collect();
         let widths = self.data.pooled(each.iter().map(|seen| seen.ln_width));
         let speeds = self.data.pooled(each.iter().map(|seen| seen.ln_speed));
         let begins = std::iter::once(&0).chain(&self.data.pool_ends);
         let counts = begins.zip(&self.data.pool_ends).map(|(begin, end)| end - begin);
-        let places = self.data.positions.iter().zip(counts);
-        let pooled = places.zip(widths.into_iter().zip(speeds));
-        let pieces = pooled.map(|((place, count), (ln_width, ln_speed))| WidthAtSpeed {
-            bead: place.bead,
-            path_mm: place.path_mm,
-            count,
-            ln_width,
-            ln_speed,
-        });
-        let pieces = pieces.collect();
+        let pooled = self.data.positions.iter().zip(counts).zip(widths.into_iter().zip(speeds));
+        let piece = |((&PathPosition { bead, path_mm, .. }, count), (ln_width, ln_speed))| {
+            WidthAtSpeed { bead, path_mm, count, ln_width, ln_speed }
+        };
+        let pieces = pooled.map(piece).collect();
         (each, pieces)
     }
 
-    /// Offsets at which less is left than about them, and at which the speed explains this
-    /// share of what it does at the best one; between it and them lie offsets at which it
-    /// does not \[mm\].
-    pub fn rivals(&self, best: &OffsetFit, farthest_mm: f64, share: f64) -> Vec<f64> {
+    /// Other local minima at which the speed explains this fraction of what it explains at the
+    /// best one, with offsets in between at which it does not \[mm\].
+    pub fn rivals(&self, best: &OffsetFit, farthest_mm: f64, fraction: f64) -> Vec<f64> {
         let tried: Vec<OffsetFit> = self.grid(farthest_mm).collect();
-        let explains = |fit: &OffsetFit| fit.explained() >= share * best.explained();
+        let explains = |fit: &OffsetFit| fit.explained() >= fraction * best.explained();
         let poor: Vec<f64> =
             tried.iter().filter(|fit| !explains(fit)).map(|fit| fit.offset_mm).collect();
         let is_apart = |offset_mm: f64| {
@@ -261,7 +254,7 @@ impl OffsetProfile {
             || fit.explained() >= limits.explained * best.explained()
     }
 
-    /// The noise with which what is left at an offset is likeliest.
+    /// The noise model of maximum likelihood for the residuals at an offset.
     pub fn likeliest_noise(&self, best: &OffsetFit) -> WidthNoise {
         let left = self.data.pooled(self.residuals(best));
         let unlikely = |noise: WidthNoise| {
@@ -273,7 +266,7 @@ impl OffsetProfile {
         each.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(WidthNoise::INITIAL, |(_, noise)| noise)
     }
 
-    /// Logarithms of the widths less those of the bead's model.
+    /// Logarithms of the widths less those of the model.
     fn residuals(&self, fit: &OffsetFit) -> impl Iterator<Item = f64> {
         let OffsetFit { exponent, level, mean_ln_speed, .. } = *fit;
         let speeds = self.data.ln_speeds(fit.offset_mm);
@@ -282,38 +275,37 @@ impl OffsetProfile {
         })
     }
 
-    /// Root mean square of what is left, as a share of the width.
+    /// Relative residual of the widths (root mean square).
     pub fn residual_rms(&self, fit: &OffsetFit) -> f64 {
         let squares: f64 = self.residuals(fit).map(|left| left * left).sum();
         (squares / to_f64(self.data.observations.len())).sqrt()
     }
 
-    /// For each width whether it is far off those about it.
+    /// Whether each width is far from its neighbours.
     fn outliers(&self, fit: &OffsetFit) -> Vec<bool> {
         let mut left: Vec<f64> = self.residuals(fit).collect();
         let mut first = 0;
         for &end in &self.data.pool_ends {
             let pool = &mut left[std::mem::replace(&mut first, end)..end];
-            let middle = median(pool.iter().copied()).unwrap_or(0.0);
+            let middle = rank::median_of(pool.iter().copied()).unwrap_or(0.0);
             for left in pool {
                 *left = (*left - middle).abs();
             }
         }
-        let usual = SIGMA_PER_MAD * median(left.iter().copied()).unwrap_or(0.0);
+        let usual = rank::SIGMA_PER_MEDIAN * rank::median_of(left.iter().copied()).unwrap_or(0.0);
         left.iter().map(|left| *left > OUTLIER_FACTOR * usual).collect()
     }
 }
 
-/// Widths of bead whose speed is known at an offset, without the few that are far off
-/// their neighbours.
+/// Widths of bead with known speed at an offset, without a few outliers.
 pub fn without_outliers(
-    course: &SpeedProfile,
-    looks: &[BeadObservation],
+    course: &LaidSpeeds,
+    observations: &[BeadObservation],
     gauge: Mm,
     best: &OffsetFit,
     noise: WidthNoise,
 ) -> Vec<BeadObservation> {
-    let known = looks.iter().filter(|look| course.covers(look, best.offset_mm, gauge));
+    let known = observations.iter().filter(|look| course.covers(look, best.offset_mm, gauge));
     let known: Vec<BeadObservation> = known.copied().collect();
     if known.is_empty() {
         return known;
@@ -329,9 +321,4 @@ pub fn without_outliers(
 
 fn better(a: OffsetFit, b: OffsetFit) -> OffsetFit {
     if b.sum_of_squares < a.sum_of_squares { b } else { a }
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates at 0")]
-fn steps(count: f64) -> u32 {
-    count.ceil() as u32
 }

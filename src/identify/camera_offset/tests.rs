@@ -29,7 +29,7 @@ const FRAME: usize = 10;
 struct Plant {
     offset_mm: f64,
     exponent: f64,
-    /// Standard deviation of a picture's own noise, and of what wanders along the bead,
+    /// Standard deviation of a image's own noise, and of what drifts along the bead,
     /// as shares of the width; the length over which that forgets itself \[mm\].
     picture: f64,
     wander: (f64, f64),
@@ -42,7 +42,7 @@ const PLANT: Plant =
 /// What was recorded.
 struct Record {
     states: Vec<(Stamp, RobotState)>,
-    widths: Vec<MeasuredWidth>,
+    widths: Vec<TimedWidth>,
 }
 
 /// Path and speed over time, with steps of the demand.
@@ -81,7 +81,7 @@ fn steps(seconds: usize, seed: u64) -> Way {
 }
 
 impl Way {
-    /// Mean width over a stretch, before noise, as a share.
+    /// Mean width over a segment, before noise, as a fraction.
     fn width(&self, exponent: f64, from: f64, to: f64) -> Option<f64> {
         let last = self.paths.len() - 1;
         if from < 0.0 || to >= self.paths[last] {
@@ -118,7 +118,7 @@ impl Way {
                 let Some(width) = self.width(plant.exponent, from, to) else { continue };
                 let noise = plant.wander.0 * wander + plant.picture * normal.sample(&mut random);
                 let width = 40.0 * width * noise.exp();
-                record.widths.push(MeasuredWidth {
+                record.widths.push(TimedWidth {
                     at,
                     width: Mm::new(width).unwrap(),
                     sigma: Mm::constant(0.04),
@@ -144,7 +144,7 @@ fn found(record: &Record) -> Result<OffsetEstimate, CameraOffsetError> {
     find(&record.states, &record.widths, SEARCH)
 }
 
-/// Mean-square error in units of sigma, and the share within two of them.
+/// Mean-square error in units of sigma, and the fraction within two of them.
 fn coverage(seeds: u64, wander: (f64, f64), picture: f64) -> (f64, f64) {
     let errors: Vec<f64> = (0..seeds)
         .into_par_iter()
@@ -165,7 +165,7 @@ fn coverage(seeds: u64, wander: (f64, f64), picture: f64) -> (f64, f64) {
 
 #[test]
 fn the_truth_lies_within_two_sigma_as_often_as_it_should() {
-    // Waviness that gauges share, and a flow that drifts under noisy pictures.
+    // Waviness that gauges share, and a flow that drifts under noisy images.
     for (wander, picture) in [((5e-3, 100.0), 1e-3), ((1e-2, 1000.0), 6e-3)] {
         let (mean_square, within) = coverage(120, wander, picture);
         assert!((0.9..=0.99).contains(&within), "{wander:?}: {within}");
@@ -174,7 +174,7 @@ fn the_truth_lies_within_two_sigma_as_often_as_it_should() {
 }
 
 #[test]
-fn a_bead_of_constant_flow_tells_its_exponent_too() {
+fn a_bead_of_constant_flow_determines_its_exponent_too() {
     let plant = Plant { exponent: 1.0, offset_mm: 180.0, ..PLANT };
     let found = found(&steps(15, 1).record(plant, 1)).unwrap();
     assert!((found.offset.get() - 180.0).abs() < 3.0 * found.sigma.get(), "{found:?}");
@@ -184,7 +184,7 @@ fn a_bead_of_constant_flow_tells_its_exponent_too() {
 
 #[test]
 fn a_controller_that_follows_a_drift_does_not_move_the_offset() {
-    // The flow wanders by 1 %, and the speed answers to the widths of a moment ago.
+    // The flow drifts by 1 %, and the speed responds to the widths of a moment ago.
     let plant = Plant { offset_mm: 120.0, wander: (1e-2, 1500.0), ..PLANT };
     let drift = |path: f64| 0.010 * (path / 190.0).sin() + 0.007 * (path / 77.0).sin();
     let answer = 0.8 / plant.exponent;
@@ -247,12 +247,12 @@ fn a_new_bead_does_not_mix_with_the_old_one_and_a_wrong_width_counts_for_nothing
     // What lies under the camera before the new bead comes is the old one.
     let old = record.widths[100];
     record.widths.extend(
-        (0..30).map(|i| MeasuredWidth { at: Stamp::from_secs(9.0 + 0.02 * f64::from(i)), ..old }),
+        (0..30).map(|i| TimedWidth { at: Stamp::from_secs(9.0 + 0.02 * f64::from(i)), ..old }),
     );
     record.states.extend(second.states.iter().map(|(at, state)| (*at + later, *state)));
     record
         .widths
-        .extend(second.widths.iter().map(|width| MeasuredWidth { at: width.at + later, ..*width }));
+        .extend(second.widths.iter().map(|width| TimedWidth { at: width.at + later, ..*width }));
     let clean = found(&record).unwrap();
     assert!((clean.offset.get() - 90.0).abs() < 3.0 * clean.sigma.get(), "{clean:?}");
     assert!(clean.left_out >= 30, "{clean:?}");
@@ -263,7 +263,7 @@ fn a_new_bead_does_not_mix_with_the_old_one_and_a_wrong_width_counts_for_nothing
 }
 
 #[test]
-fn what_does_not_tell_is_refused_with_its_reason() {
+fn an_undetermined_offset_is_refused_with_its_reason() {
     let steady = demands(15, |tick, _| if tick < 3000 { 100.0 } else { 100.5 }).record(PLANT, 1);
     assert!(
         matches!(found(&steady), Err(CameraOffsetError::ConstantSpeed { .. })),
@@ -287,7 +287,7 @@ fn what_does_not_tell_is_refused_with_its_reason() {
 }
 
 #[test]
-fn a_speed_that_repeats_itself_is_ambiguous_until_the_range_is_told() {
+fn a_periodic_speed_is_ambiguous_until_the_range_is_limited() {
     // One period is 285 mm.
     let way = demands(20, |tick, _| 95.0 + 20.0 * (tick as f64 * TICK_S * 2.1).sin());
     let record = way.record(PLANT, 6);
@@ -299,13 +299,13 @@ fn a_speed_that_repeats_itself_is_ambiguous_until_the_range_is_told() {
 }
 
 #[test]
-fn differences_of_a_wandering_series_are_independent_and_of_one_size() {
+fn innovations_of_a_drifting_series_are_independent_and_normalised() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
     let normal = Normal::new(0.0, 1.0).unwrap();
     let noise = WidthNoise::all().find(|noise| *noise == WidthNoise::INITIAL).unwrap();
     let count = 40_000;
     let (mut path, mut wander) = (0.0, 3f64.sqrt() * normal.sample(&mut random));
-    let mut places = Vec::new();
+    let mut positions = Vec::new();
     let mut values = Vec::new();
     for i in 0..count {
         // Now and then the nozzle stands still.
@@ -314,10 +314,10 @@ fn differences_of_a_wandering_series_are_independent_and_of_one_size() {
         let kept = (-way / 80.0).exp();
         wander = kept * wander + (3.0 * (1.0 - kept * kept)).sqrt() * normal.sample(&mut random);
         let variance = if i % 3 == 0 { 4.0 } else { 1.0 };
-        places.push(PathPosition { bead: 0, path_mm: path, variance });
+        positions.push(PathPosition { bead: 0, path_mm: path, variance });
         values.push(wander + variance.sqrt() * normal.sample(&mut random));
     }
-    let left: Vec<f64> = PathWhitener::new(&places, noise).apply(values.into_iter()).collect();
+    let left: Vec<f64> = PathWhitener::new(&positions, noise).apply(values.into_iter()).collect();
     let mean = |lag: usize| {
         left.iter().zip(&left[lag..]).map(|(a, b)| a * b).sum::<f64>() / f64::from(count)
     };

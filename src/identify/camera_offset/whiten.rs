@@ -1,17 +1,17 @@
-//! What a number along the path differs from what those before it foretell.
+//! Normalised innovations of numbers along the path.
 //!
-//! The noise is that of each picture, independent, on a course that wanders along the
-//! path and forgets itself over a length (Ornstein and Uhlenbeck 1930). Kalman's filter
-//! (1960) gives the differences, which are independent of each other, for frames at any
-//! distances and for a nozzle that stands still. It is linear, and the same filter takes
-//! any series of numbers at these places.
+//! The noise of each frame is independent, on top of a stationary process whose correlation
+//! decays exponentially along the path (Ornstein and Uhlenbeck 1930). The Kalman filter (1960)
+//! gives the innovations, which are independent, for frames at any distances and for a nozzle
+//! at rest. It is linear, and applies to any series of numbers at these positions.
 
-/// Sizes of the wandering course that are tried, as variances in units of a picture's.
+/// Variances of the process that are tried, in units of a frame's noise variance. A choice: a
+/// factor of three is below the uncertainty of the estimate.
 const VARIANCES: [f64; 11] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0, 10_000.0];
-/// Lengths over which it forgets itself \[mm\].
+/// Correlation lengths that are tried \[mm\].
 const LENGTHS_MM: [f64; 9] = [3.0, 10.0, 20.0, 40.0, 80.0, 200.0, 600.0, 2000.0, 10_000.0];
 
-/// How widths scatter about the bead's model.
+/// Noise model of the widths.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WidthNoise {
     variance: f64,
@@ -19,10 +19,10 @@ pub struct WidthNoise {
 }
 
 impl WidthNoise {
-    /// Taken as long as nothing is known.
+    /// Initial value of the iteration.
     pub const INITIAL: Self = Self { variance: 3.0, correlation_length_mm: 80.0 };
 
-    /// All that are tried.
+    /// All noise models that are tried.
     pub fn all() -> impl Iterator<Item = Self> {
         let wandering = VARIANCES.into_iter().skip(1).flat_map(|variance| {
             LENGTHS_MM
@@ -34,61 +34,61 @@ impl WidthNoise {
     }
 }
 
-/// A place at which something was measured.
+/// Position of an observation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathPosition {
-    /// Number of the bead; what wanders begins anew with each.
+    /// Number of the bead; the process starts anew with each.
     pub bead: usize,
     /// Where along its path \[mm\].
     pub path_mm: f64,
-    /// Variance of the picture's noise, in units of the usual one.
+    /// Variance of the frame noise, in units of the typical one.
     pub variance: f64,
 }
 
-/// The filter of some places.
+/// The Kalman filter for some positions.
 #[derive(Debug, Clone)]
 pub struct PathWhitener {
     steps: Vec<Step>,
-    /// Sum of the logarithms of the variances of the differences.
+    /// Sum of the logarithms of the innovation variances.
     pub ln_variances: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Step {
-    /// How much of what was known holds here.
+    /// Correlation with the state before.
     correlation: f64,
     gain: f64,
-    /// One over the standard deviation of the difference.
+    /// One over the standard deviation of the innovation.
     weight: f64,
 }
 
 impl PathWhitener {
-    /// For these places, in order.
-    pub fn new(places: &[PathPosition], noise: WidthNoise) -> Self {
+    /// For these positions, in order.
+    pub fn new(positions: &[PathPosition], noise: WidthNoise) -> Self {
         let mut variance = noise.variance;
         let mut before: Option<PathPosition> = None;
         let mut ln_variances = 0.0;
-        let steps = places
+        let steps = positions
             .iter()
-            .map(|place| {
-                let kept =
-                    before.filter(|before| before.bead == place.bead).map_or(0.0, |before| {
-                        (-(place.path_mm - before.path_mm).abs() / noise.correlation_length_mm)
-                            .exp()
-                    });
-                variance = kept * kept * variance + noise.variance * (1.0 - kept * kept);
-                let total = variance + place.variance;
+            .map(|position| {
+                let same_bead = before.filter(|before| before.bead == position.bead);
+                let way_mm = same_bead.map(|before| (position.path_mm - before.path_mm).abs());
+                let correlation =
+                    way_mm.map_or(0.0, |way_mm| (-way_mm / noise.correlation_length_mm).exp());
+                let kept = correlation * correlation;
+                variance = kept * variance + noise.variance * (1.0 - kept);
+                let total = variance + position.variance;
                 let gain = variance / total;
                 variance *= 1.0 - gain;
-                before = Some(*place);
+                before = Some(*position);
                 ln_variances += total.ln();
-                Step { correlation: kept, gain, weight: 1.0 / total.sqrt() }
+                Step { correlation, gain, weight: 1.0 / total.sqrt() }
             })
             .collect();
         Self { steps, ln_variances }
     }
 
-    /// The differences of a series of numbers, in units of their standard deviations.
+    /// The innovations of a series of numbers, in units of their standard deviations.
     pub fn apply(&self, values: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
         let mut known = 0.0;
         self.steps.iter().zip(values).map(move |(step, value)| {

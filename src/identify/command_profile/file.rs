@@ -1,5 +1,5 @@
-//! A profile as a table: `time_s` and the quantity. The last line tells the
-//! end; it repeats the last value.
+//! A profile as a table of `time_s` and the quantity. The last line gives the end and repeats
+//! the last value.
 
 use std::fmt::Write;
 
@@ -10,7 +10,7 @@ use crate::identify::table::{DataTable, DataTableError};
 /// The column of time.
 const TIME: &str = "time_s";
 
-/// A file that holds no profile.
+/// A file without a valid profile.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProfileFileError {
     /// It is no table.
@@ -65,8 +65,8 @@ pub fn to_csv(profile: &CommandProfile, column: &str) -> String {
     let end = profile.points().last().map(|last| (profile.end_s(), last.value));
     let points = profile.points().iter().map(|point| (point.from_s, point.value));
     for (time_s, value) in points.chain(end) {
-        // To the nanosecond, without what a sum of steps leaves beyond. Writing to a
-        // string cannot fail.
+        // Rounded to the nanosecond, without the rounding errors of a sum of steps. Writing to
+        // a string cannot fail.
         let _ = writeln!(text, "{},{value}", (time_s * 1e9).round() / 1e9);
     }
     text

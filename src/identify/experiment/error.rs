@@ -1,19 +1,19 @@
-//! Why no model can be found in data.
+//! Why data cannot be identified.
 
 use std::fmt;
 
 use crate::identify::digits::six_digits;
 use crate::identify::grid::SampleGap;
 
-/// Samples that a model takes at least.
+/// Smallest number of samples. A choice: five for each of ten parameters.
 pub const MIN_SAMPLES: usize = 50;
 
-/// Which of the two columns is meant.
+/// One of the two columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DataColumn {
-    /// What the extruder was told, or what drives it.
+    /// The command, or the measured quantity that drives the extruder.
     Input,
-    /// What came of it.
+    /// The response.
     Output,
 }
 
@@ -26,16 +26,16 @@ impl fmt::Display for DataColumn {
     }
 }
 
-/// Data that no model can be found in. Samples are counted from 0.
+/// Data that cannot be identified. Samples are counted from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ExperimentError {
-    /// Hardly anything there.
+    /// Too few samples.
     #[error("{got} samples: a model takes {MIN_SAMPLES} or more")]
     TooFew {
         /// Samples that there are.
         got: usize,
     },
-    /// Time that does not run on.
+    /// Time does not increase.
     #[error(
         "time {} at sample {}: {before_s} s, then {time_s} s; it must grow from line to line (write \
          it with more digits, or keep one run alone)",
@@ -49,7 +49,7 @@ pub enum ExperimentError {
         /// Its moment \[s\].
         time_s: f64,
     },
-    /// A unit of time that cannot be.
+    /// An implausible unit of time.
     #[error(
         "from sample to sample {} s, if the unit of time is right: no log of an extruder has \
          such steps. {}", six_digits(*.step_s), if *.step_s > 1.0 {
@@ -62,7 +62,7 @@ pub enum ExperimentError {
         /// The usual step \[s\].
         step_s: f64,
     },
-    /// Nothing logged for long.
+    /// A long gap.
     #[error(
         "a gap of {:.3} s after {:.3} s (sample {}){}; gaps up to {limit_s:.3} s are bridged: use a \
          part without it, or allow longer ones with --max-gap-s", .gap.length_s, .gap.from_s,
@@ -76,7 +76,7 @@ pub enum ExperimentError {
         /// The longest that is bridged \[s\].
         limit_s: f64,
     },
-    /// A column that does not move.
+    /// A constant column.
     #[error(
         "the {side} is {} all the time: nothing can be identified from it{}",
         six_digits(*.value), if *.side == DataColumn::Input { "; excite it (truebead extruder excite writes profiles)" } else {
@@ -89,7 +89,7 @@ pub enum ExperimentError {
         /// Its value.
         value: f64,
     },
-    /// A column that does not move in one of the parts that a log is cut into.
+    /// A column that is constant in one of the parts of a log.
     #[error(
         "the {side} is {} all the time from {from_s:.1} s to {to_s:.1} s, the part that is {}: \
          cut the log elsewhere (--validate-fraction, --to-s), or name another one to validate with \
@@ -135,7 +135,7 @@ pub enum ExperimentError {
          Was a command logged in place of what came of it?"
     )]
     Identical,
-    /// A part that tells nothing.
+    /// Too few samples for validation.
     #[error("{got} samples are left to validate with: {MIN_SAMPLES} or more are needed")]
     ShortValidation {
         /// Samples that there are.

@@ -1,15 +1,15 @@
-//! Samples so far beyond all others that nothing measured them.
+//! Samples far beyond all others, which are no measurements.
 
 use super::error::{DataColumn, ExperimentError};
 
-/// A sample that lies this many times the others' range beyond them is no
-/// reading: one that a sensor can give, if a wrong one, is left to --hampel.
+/// Distance beyond the range of the others, in such ranges, from which a sample is no
+/// measurement. A choice: errors that a sensor may have are left to --hampel.
 const OUTLIER_RANGES: f64 = 20.0;
-/// One sample in so many may be such a one; more of them are the column itself.
+/// Samples per outlier; more outliers belong to the signal.
 const SAMPLES_PER_OUTLIER: usize = 1000;
 
-/// Refuses a column of which a few samples lie far beyond all others. Says
-/// nothing where the others do not move: pulses from rest are an excitation.
+/// Refuses a column with a few samples far beyond all others. Accepts it where the others are
+/// constant: pulses from rest are an excitation.
 pub(super) fn check(side: DataColumn, values: &[f64]) -> Result<(), ExperimentError> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -44,9 +44,9 @@ mod tests {
         (0..count).map(|k| 50.0 + 5.0 * (0.1 * f64::from(k)).sin()).collect()
     }
 
-    fn with(places: &[(usize, f64)]) -> Result<(), ExperimentError> {
+    fn with(positions: &[(usize, f64)]) -> Result<(), ExperimentError> {
         let mut values = swinging(3000);
-        for (at, value) in places {
+        for (at, value) in positions {
             values[*at] = *value;
         }
         check(DataColumn::Output, &values)

@@ -78,8 +78,8 @@ fn milliseconds_that_are_called_seconds_and_the_reverse() {
     assert!(refusal(&scaled(1000.0)).contains("Is the column in ms?"));
     assert!(refusal(&scaled(0.001)).contains("Is the column in s?"));
     let [time_s, input, output] = scaled(1000.0);
-    let told = Rules { is_time_unit_known: true, ..Rules::default() };
-    assert!(Experiment::new(&time_s, &input, &output, &told).is_ok());
+    let reported = Rules { is_time_unit_known: true, ..Rules::default() };
+    assert!(Experiment::new(&time_s, &input, &output, &reported).is_ok());
 }
 
 #[test]

@@ -1,11 +1,12 @@
-//! Values that can hardly be what they are said to be.
+//! Implausible values for a unit.
 
 use crate::core::quantity::Unit;
 
-/// No extruder works beyond this, in megapascal.
+/// Highest pressure of extruders \[MPa\]. A choice above the melt pressures of injection
+/// moulding.
 const MAX_PRESSURE_MPA: f64 = 150.0;
 
-/// A doubt about a column's unit, in words.
+/// A warning about a column's unit.
 pub fn implausible_unit(column: &str, unit: Unit, values: &[f64]) -> Option<String> {
     let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let is_beyond = unit == Unit::MPa && largest > MAX_PRESSURE_MPA;

@@ -1,13 +1,14 @@
-//! The residuals as coloured noise: an autoregressive model of them.
+//! Autoregressive model of the residuals.
 
-use super::row::dot;
 use crate::numeric::number::to_f64;
+use crate::numeric::row::dot;
 
-/// Longest memory of the model of the residuals, and its share of the samples.
+/// Largest order of the model, and samples for each coefficient. A choice: longer correlations
+/// are drifts.
 const MAX_ORDER: usize = 30;
 const SAMPLES_PER_LAG: usize = 20;
 
-/// The residuals as an autoregressive process: e(t) = −Σ a(k)·e(t−k) + white noise.
+/// Autoregressive process: e(t) = −Σ a(k)·e(t−k) + white noise.
 #[derive(Debug, Clone)]
 pub(super) struct ArModel {
     coefficients: Vec<f64>,
@@ -18,7 +19,8 @@ pub(super) struct ArModel {
 }
 
 impl ArModel {
-    /// By Yule's and Walker's equations, the order by BIC: stable at any rate.
+    /// By the Yule-Walker equations, which give a stable model, with the order of least BIC
+    /// (Schwarz 1978).
     pub fn of(residuals: &[f64]) -> Self {
         let n = to_f64(residuals.len());
         let longest = MAX_ORDER.min(residuals.len() / SAMPLES_PER_LAG);
@@ -33,7 +35,7 @@ impl ArModel {
             if power <= 0.0 {
                 break;
             }
-            // Levinson's and Durbin's recursion.
+            // The Levinson-Durbin recursion.
             let known: f64 = row.iter().rev().zip(&correlation[1..]).map(|(a, r)| a * r).sum();
             let reflection = -(correlation[order] + known) / power;
             let turned: Vec<f64> = row.iter().rev().map(|a| a * reflection).collect();
@@ -43,28 +45,22 @@ impl ArModel {
             let cost = n * libm::log(power.max(f64::MIN_POSITIVE)) + to_f64(order) * libm::log(n);
             if cost < least {
                 least = cost;
-                best = Self {
-                    coefficients: row.clone(),
-                    innovation_sigma: power.max(0.0).sqrt(),
-                    variance,
-                };
+                let innovation_sigma = power.max(0.0).sqrt();
+                best = Self { coefficients: row.clone(), innovation_sigma, variance };
             }
         }
         best
     }
 
-    /// How many independent samples have a mean as well known: fewer than there
-    /// are where neighbours resemble each other.
-    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
+    /// Number of independent samples whose mean has the same variance.
     pub fn effective_samples(&self, samples: usize) -> f64 {
-        let n = samples as f64;
+        let n = to_f64(samples);
         let sum = 1.0 + self.coefficients.iter().sum::<f64>();
         let at_rest = self.innovation_sigma * self.innovation_sigma / (sum * sum);
         if at_rest > 0.0 { (n * self.variance / at_rest).clamp(1.0, n) } else { n }
     }
 
-    /// A column as the noise sees it: Hᵀ·column, H·Hᵀ being the covariance of the
-    /// residuals.
+    /// Hᵀ·column, with H·Hᵀ the covariance of the residuals.
     pub fn weight(&self, column: &[f64]) -> Vec<f64> {
         let mut weighed = vec![0.0; column.len()];
         for t in (0..column.len()).rev() {
@@ -101,8 +97,8 @@ pub(super) mod tests {
         let model = ArModel::of(&lagged(1, 20_000, 0.7));
         assert!((model.coefficients[0] + 0.7).abs() < 0.02, "{model:?}");
         assert!((model.innovation_sigma - 1.0).abs() < 0.02, "{model:?}");
-        let share = model.effective_samples(20_000) / 20_000.0;
-        assert!((share - 0.3 / 1.7).abs() < 0.03, "{share}");
+        let fraction = model.effective_samples(20_000) / 20_000.0;
+        assert!((fraction - 0.3 / 1.7).abs() < 0.03, "{fraction}");
         assert!(ArModel::of(&lagged(2, 20_000, 0.0)).effective_samples(20_000) > 19_000.0);
     }
 }

@@ -1,43 +1,33 @@
-//! Signals that were cut off: they stand at an end of their range again and
-//! again, between samples that differ.
+//! Clipped signals: they repeat an end of their range, between samples that vary.
 
 use std::fmt;
 
-use super::row::min_max;
 use crate::identify::digits::six_digits;
+use crate::identify::experiment::DataColumn;
 use crate::numeric::number::to_f64;
+use crate::numeric::rank;
+use crate::numeric::row::min_max;
 
-/// Levels, each about once, from which on a signal goes through many.
+/// Single levels from which a signal counts as varying.
 const MIN_LEVELS: usize = 10;
-/// Shortest run of equal samples that looks cut off.
+/// Shortest run of equal samples that may be clipped.
 const MIN_RUN: usize = 3;
-/// Share of samples in such runs from which on a signal is refused.
+/// Fraction of samples in such runs above which a signal is refused.
 const MAX_CLIPPED_FRACTION: f64 = 0.02;
-/// Times that a command comes to an end of its range before that is a cut.
+/// Number of times that a command reaches an end of its range before it counts as clipped.
 const MIN_ARRIVALS: usize = 3;
-/// A command that goes back and forth by more than this share of its range has
-/// turned between its ends.
+/// Reversal over the range from which a command has turned between its ends.
 const MIN_REVERSAL: f64 = 0.05;
-/// Steps that differ by less than this share are of one rate.
+/// Relative difference of steps of one rate.
 const RATE_TOLERANCE: f64 = 0.02;
-/// A stretch that loses more than this share of its pace is no ramp.
+/// Relative decrease of the rate above which a segment is no ramp.
 const RAMP_TOLERANCE: f64 = 0.003;
-/// A command that slows down to less than this share of its mean step before it
-/// stands has settled there, and was not cut off.
+/// Last step over the mean step below which a command settles and is not clipped.
 const ABRUPT_RATE: f64 = 0.5;
 /// The same for any signal.
 const SETTLED_RATE: f64 = 0.1;
-/// A change by less than this share of the range is no step.
+/// Change over the range below which there is no step.
 const MIN_STEP: f64 = 0.01;
-
-/// One of the two columns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Column {
-    /// What goes in.
-    Input,
-    /// What comes out.
-    Output,
-}
 
 /// An end of a signal's range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,7 +38,7 @@ pub enum Extreme {
     Largest,
 }
 
-/// A signal that was cut off, and where.
+/// A clipped signal, and where.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "the {column} is cut off: {clipped_percent:.1} % of its samples stand at its {end}, {}, in \
@@ -57,41 +47,32 @@ pub enum Extreme {
 )]
 pub struct Clipped {
     /// Which column.
-    pub column: Column,
+    pub column: DataColumn,
     /// At which end of its range.
     pub end: Extreme,
     /// The value there.
     pub value: f64,
-    /// Share of the samples that stand there \[%\].
+    /// Fraction of the samples at that end \[%\].
     pub clipped_percent: f64,
     /// Runs of equal samples there.
     pub runs: usize,
     /// Samples of the longest of them.
     pub longest: usize,
-    /// Where that begins, from the first sample \[s\].
+    /// Beginning of that run, from the first sample \[s\].
     pub from_s: f64,
 }
 
-fn advice(column: Column) -> &'static str {
+fn advice(column: DataColumn) -> &'static str {
     match column {
-        Column::Input => {
+        DataColumn::Input => {
             "a model would take the cut for a part of the machine. Excite less, so that the command \
              stays within its limits, or use a part without it (--from-s, --to-s); steps and binary \
              sequences may stand at their ends"
         }
-        Column::Output => {
+        DataColumn::Output => {
             "a model would take the cut for a part of the machine. Set the sensor's range wider, or \
              excite less"
         }
-    }
-}
-
-impl fmt::Display for Column {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Input => "input",
-            Self::Output => "output",
-        })
     }
 }
 
@@ -104,13 +85,14 @@ impl fmt::Display for Extreme {
     }
 }
 
-/// Whether an input or an output, `dt_s` \[s\] from sample to sample, was cut off.
-/// Commands that step between levels are not taken for it, at once or over a ramp, nor
-/// an output that has not begun to move or has come to rest.
+/// Whether an input or an output, `dt_s` \[s\] from sample to sample, is clipped. Exempt are
+/// commands that step between levels, at once or over a ramp, and an output before its first
+/// response or at rest.
 pub(super) fn check(input: &[f64], output: &[f64], dt_s: f64) -> Result<(), Clipped> {
-    for (column, row) in [(Column::Input, input), (Column::Output, output)] {
+    for (column, row) in [(DataColumn::Input, input), (DataColumn::Output, output)] {
         let signal = Signal::new(row);
-        let is_command = column == Column::Input && (signal.is_held() || signal.is_at_one_rate());
+        let is_command =
+            column == DataColumn::Input && (signal.is_held() || signal.is_at_one_rate());
         for (end, value) in signal.ends() {
             let is_cut =
                 if is_command { signal.is_clipped_command(value) } else { signal.varies() };
@@ -143,13 +125,13 @@ impl<'a> Signal<'a> {
         self.range.contains(&value)
     }
 
-    /// Whether most samples stand in runs.
+    /// Whether most samples are in runs.
     fn is_held(&self) -> bool {
         let held = self.runs.iter().map(|run| run.len()).filter(|len| *len >= MIN_RUN);
         2 * held.sum::<usize>() > self.row.len()
     }
 
-    /// Whether it changes at one rate, and stands in between.
+    /// Whether it changes at one rate, with rests in between.
     fn is_at_one_rate(&self) -> bool {
         is_at_one_rate(self.row, self.resolution())
     }
@@ -161,32 +143,31 @@ impl<'a> Signal<'a> {
         single >= MIN_LEVELS && 2 * single >= between().map(|run| run.len()).sum()
     }
 
-    /// Whether a command that mostly stands was cut off at this end: it runs
-    /// into it, or it has many levels of which only this one comes back.
+    /// Whether a held command is clipped at this end: it runs into it, or has many levels of
+    /// which only this one repeats.
     fn is_clipped_command(&self, end: f64) -> bool {
         self.runs_into(end) || self.piles_up(end)
     }
 
-    /// Whether it comes to this end as a varied signal does that would go on
-    /// beyond it: without slowing down, after it has turned between its ends or on
-    /// a bend. A drive that takes steps no faster comes on a straight ramp, one
-    /// that settles slows down.
+    /// Whether it reaches this end as a varying signal that would continue beyond it: without
+    /// slowing down, after a reversal between its ends or on a curve. A rate-limited drive
+    /// arrives on a straight ramp, one that settles slows down.
     fn runs_into(&self, end: f64) -> bool {
         let at_end = || self.plateaus().filter(|stand| stand.value == end && stand.is_inside);
         let abrupt =
             || at_end().filter(|stand| stand.final_rate >= ABRUPT_RATE).map(|stand| stand.before);
         let (grain, total) = (self.resolution(), at_end().count());
         let range = self.range[1] - self.range[0];
-        let has_turned = |stretch: &&[f64]| {
-            reversal(stretch) > MIN_REVERSAL * range && !is_at_one_rate(stretch, grain)
+        let has_turned = |segment: &&[f64]| {
+            reversal(segment) > MIN_REVERSAL * range && !is_at_one_rate(segment, grain)
         };
         let turned = abrupt().filter(has_turned).count();
-        let bent = abrupt().filter(|stretch| slows_down(stretch, grain)).count();
+        let bent = abrupt().filter(|segment| slows_down(segment, grain)).count();
         (turned >= MIN_ARRIVALS && 5 * turned >= total)
             || (bent > MIN_ARRIVALS && 5 * bent >= 4 * total)
     }
 
-    /// The smallest difference between two samples, as a log rounds them.
+    /// Smallest difference between two samples, as rounded in the log.
     fn resolution(&self) -> f64 {
         let mut sorted = self.row.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -194,23 +175,22 @@ impl<'a> Signal<'a> {
         steps.fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether it holds many levels one after the other, each about once, but
-    /// this one again and again.
-    #[expect(clippy::cast_precision_loss, reason = "counts of levels")]
+    /// Whether it holds many levels one after the other, each about once, but this one
+    /// repeatedly.
     fn piles_up(&self, end: f64) -> bool {
         let held: Vec<f64> = self.plateaus().map(|stand| stand.value).collect();
         let mut inner: Vec<f64> = held.iter().copied().filter(|v| !self.is_end(*v)).collect();
-        // Pulses from one level to others come back to it after each of them.
+        // Pulses from one level return to it after each of them.
         let follow = held.windows(2).filter(|pair| !pair.iter().any(|v| self.is_end(*v))).count();
         let visits = held.iter().filter(|value| **value == end).count();
-        let inner_visits = inner.len() as f64;
+        let inner_visits = to_f64(inner.len());
         inner.sort_by(f64::total_cmp);
         inner.dedup();
-        let mean = inner_visits / inner.len().max(1) as f64;
+        let mean = inner_visits / to_f64(inner.len().max(1));
         inner.len() >= MIN_LEVELS
             && 2 * follow >= MIN_LEVELS
             && visits >= MIN_ARRIVALS
-            && visits as f64 >= MIN_ARRIVALS as f64 * mean
+            && to_f64(visits) >= to_f64(MIN_ARRIVALS) * mean
     }
 
     /// Runs of equal samples.
@@ -223,54 +203,51 @@ impl<'a> Signal<'a> {
             (run.len() >= MIN_RUN).then(|| {
                 free = begin;
                 let is_inside = from > 0 && begin < self.row.len();
-                let pace = self.final_rate(before, from);
-                Plateau { value: run[0], from, len: run.len(), is_inside, before, final_rate: pace }
+                let final_rate = self.final_rate(before, from);
+                Plateau { value: run[0], from, len: run.len(), is_inside, before, final_rate }
             })
         })
     }
 
-    /// Size of the last step of a stretch before a run as a share of its mean
-    /// one; of a stretch too short for that, whether the run is a step away.
-    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
-    fn final_rate(&self, stretch: &[f64], from: usize) -> f64 {
-        let [_, .., before, last] = *stretch else {
+    /// Last step of a segment before a run over its mean step; for a short segment, whether the
+    /// run is a step away.
+    fn final_rate(&self, segment: &[f64], from: usize) -> f64 {
+        let [_, .., before, last] = *segment else {
             let pair = self.row.get(from.saturating_sub(1)..=from).unwrap_or_default();
             let [least, most] = min_max(pair);
             let is_step = most - least > MIN_STEP * (self.range[1] - self.range[0]);
             return if is_step { 1.0 } else { 0.0 };
         };
-        let way: f64 = stretch.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
-        if way > 0.0 { (last - before).abs() * (stretch.len() - 1) as f64 / way } else { 1.0 }
+        let way: f64 = segment.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
+        if way > 0.0 { (last - before).abs() * to_f64(segment.len() - 1) / way } else { 1.0 }
     }
 
-    /// Refuses a signal that stands at this value for long, between others, and
-    /// has not settled there.
-    fn check(&self, column: Column, end: Extreme, value: f64, dt_s: f64) -> Result<(), Clipped> {
+    /// Refuses a signal that stays at this value for long, between others, without having
+    /// settled.
+    fn check(
+        &self,
+        column: DataColumn,
+        end: Extreme,
+        value: f64,
+        dt_s: f64,
+    ) -> Result<(), Clipped> {
         let is_cut = |stand: &Plateau<'_>| {
             stand.value == value && stand.is_inside && stand.final_rate > SETTLED_RATE
         };
         let cut: Vec<Plateau<'_>> = self.plateaus().filter(is_cut).collect();
         let samples: usize = cut.iter().map(|stand| stand.len).sum();
         let Some(longest) = cut.iter().max_by_key(|stand| stand.len) else { return Ok(()) };
-        let (share, from_s) =
-            (to_f64(samples) / to_f64(self.row.len()), to_f64(longest.from) * dt_s);
-        if share <= MAX_CLIPPED_FRACTION {
+        let fraction = to_f64(samples) / to_f64(self.row.len());
+        if fraction <= MAX_CLIPPED_FRACTION {
             return Ok(());
         }
-        let (share_percent, longest) = (100.0 * share, longest.len);
-        Err(Clipped {
-            column,
-            end,
-            value,
-            clipped_percent: share_percent,
-            runs: cut.len(),
-            longest,
-            from_s,
-        })
+        let (clipped_percent, from_s) = (100.0 * fraction, to_f64(longest.from) * dt_s);
+        let (runs, longest) = (cut.len(), longest.len);
+        Err(Clipped { column, end, value, clipped_percent, runs, longest, from_s })
     }
 }
 
-/// A run of equal samples, and those since the last one before it.
+/// A run of equal samples, and the samples since the run before it.
 struct Plateau<'a> {
     value: f64,
     from: usize,
@@ -280,36 +257,35 @@ struct Plateau<'a> {
     final_rate: f64,
 }
 
-/// How far a stretch goes back and forth.
-fn reversal(stretch: &[f64]) -> f64 {
-    let way: f64 = stretch.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
-    way - net_change(stretch)
+/// Path of a segment beyond its net change.
+fn reversal(segment: &[f64]) -> f64 {
+    let way: f64 = segment.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
+    way - net_change(segment)
 }
 
 /// From its first sample to its last.
-fn net_change(stretch: &[f64]) -> f64 {
-    let ends = stretch.first().zip(stretch.last());
+fn net_change(segment: &[f64]) -> f64 {
+    let ends = segment.first().zip(segment.last());
     ends.map_or(0.0, |(first, last)| (last - first).abs())
 }
 
-/// Whether nearly all changes from sample to sample are as large as their median,
-/// as those of a drive are that takes steps no faster.
-fn is_at_one_rate(stretch: &[f64], grain: f64) -> bool {
-    let steps = stretch.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+/// Whether nearly all changes from sample to sample are as large as their median, as for a
+/// rate-limited drive.
+fn is_at_one_rate(segment: &[f64], grain: f64) -> bool {
+    let steps = segment.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
-    steps.sort_by(f64::total_cmp);
-    let median = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+    let median = rank::median(&mut steps).unwrap_or(0.0);
     let near =
         |step: &&f64| (**step - median).abs() <= RATE_TOLERANCE.mul_add(median, 1.01 * grain);
     5 * steps.iter().filter(near).count() >= 4 * steps.len()
 }
 
-/// Whether the last third of a stretch is less steep than the middle one, by
-/// more than the rounding of its samples.
-fn slows_down(stretch: &[f64], grain: f64) -> bool {
-    let third = stretch.len().saturating_sub(1) / 3;
-    let last = stretch.get(stretch.len().saturating_sub(third + 1)..).unwrap_or_default();
-    let middle = stretch.get(third..=2 * third).unwrap_or_default();
+/// Whether the last third of a segment is less steep than the middle one, beyond the rounding
+/// of its samples.
+fn slows_down(segment: &[f64], grain: f64) -> bool {
+    let third = segment.len().saturating_sub(1) / 3;
+    let last = segment.get(segment.len().saturating_sub(third + 1)..).unwrap_or_default();
+    let middle = segment.get(third..=2 * third).unwrap_or_default();
     let (last, middle) = (net_change(last), net_change(middle));
     third > 0 && middle - last > RAMP_TOLERANCE.mul_add(middle, 2.0 * grain)
 }

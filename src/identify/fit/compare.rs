@@ -1,4 +1,4 @@
-//! Several models of the same data, and which of them to take.
+//! Comparison of several models of the same data.
 
 use super::autoregression::ArModel;
 use super::error::FitError;
@@ -7,37 +7,37 @@ use super::quality::FitQuality;
 use super::samples::Samples;
 use super::settings::{FitSettings, InitialCondition};
 use crate::numeric::number::to_f64;
+use crate::numeric::row::dot;
 
-/// One of the models that were compared.
+/// A compared model.
 #[derive(Debug, Clone)]
 pub struct ComparedModel {
-    /// What was fitted.
+    /// Its settings.
     pub settings: FitSettings,
     /// The fit, or why there is none.
     pub fit: Result<Fit, FitError>,
-    /// On the data of the validation, where there are such.
+    /// Its quality on validation data, if there are any.
     pub validation: Option<FitQuality>,
-    /// Schwarz's criterion with as many samples as are independent in the
-    /// residuals of the best model; less is better. `None` without a fit.
+    /// Schwarz's criterion (BIC) with the number of independent samples of the best model's
+    /// residuals; less is better. `None` without a fit.
     pub bic: Option<f64>,
 }
 
-/// All of them, and which to take.
+/// All models and the selected one.
 #[derive(Debug, Clone)]
 pub struct ModelComparison {
-    /// In the order in which they were given.
+    /// In the given order.
     pub rows: Vec<ComparedModel>,
-    /// The row to take; `None` where no fit stands.
+    /// Index of the selected model; `None` without a valid fit.
     pub chosen: Option<usize>,
-    /// Why this one, in words.
+    /// Why it was selected.
     pub reason: String,
 }
 
-/// Fits a list of models and chooses one. With validation data and what came
-/// before them: the one with the fewest parameters whose squared errors there are
-/// above the least by no more than the standard error of the difference. Without: the
-/// one with the least BIC, counted in independent samples. Models whose parameters
-/// the data do not determine are shown and not chosen.
+/// Fits a list of models and selects one. With validation data: the one with the fewest
+/// parameters whose mean squared error exceeds the least one by no more than the standard error
+/// of the difference. Without: the one of least BIC, in independent samples. Models with
+/// undetermined parameters are listed and not selected.
 pub fn compare(
     estimation: &Samples,
     validation: Option<(&Samples, InitialCondition)>,
@@ -148,13 +148,13 @@ fn by_validation(rows: &[ComparedModel], errors: &[Option<Vec<f64>>]) -> (Option
     (Some(chosen), reason)
 }
 
-/// Whether the mean of squared errors lies above another by no more than the
-/// standard error of their difference.
-#[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
+/// Whether a mean of squared errors exceeds another one by no more than the standard error of
+/// the difference.
 fn no_worse(a: &[f64], b: &[f64]) -> bool {
-    let n = a.len().min(b.len());
-    let mean = a.iter().zip(b).map(|(a, b)| a - b).sum::<f64>() / n.max(1) as f64;
+    let samples = a.len().min(b.len());
+    let n = to_f64(samples.max(1));
+    let mean = a.iter().zip(b).map(|(a, b)| a - b).sum::<f64>() / n;
     let about: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b - mean).collect();
-    let variance = about.iter().map(|d| d * d).sum::<f64>() / n.max(1) as f64;
-    mean <= (variance / ArModel::of(&about).effective_samples(n)).sqrt()
+    let variance = dot(&about, &about) / n;
+    mean <= (variance / ArModel::of(&about).effective_samples(samples)).sqrt()
 }

@@ -1,7 +1,6 @@
-//! The gain once a straight line in time is taken off input and output. The
-//! line of a drift goes with it, and what the output owes to the input stays:
-//! where the output does not drift, both gains are the same but for noise
-//! (a specification test in the sense of Hausman 1978).
+//! The gain after a straight line in time is removed from input and output. The line of a drift
+//! is removed with it, and the response to the input stays: without a drift both gains are
+//! equal but for noise (a specification test in the sense of Hausman 1978).
 
 use super::{Fit, FitError, FitSettings, InitialCondition, Samples, Structure, Trend, fit};
 
@@ -15,8 +14,8 @@ pub struct DetrendedGain {
 }
 
 impl DetrendedGain {
-    /// By a model of second order, or of first where the data show no more; none
-    /// where neither can be told, as where the input is a line itself.
+    /// With a model of second order, or of first order if the second is undetermined; `None` if
+    /// neither is determined, for example where the input is a line.
     pub fn of(samples: &Samples, settings: &FitSettings) -> Option<Self> {
         let level = |row: &[f64]| Trend::of(row).detrend(row);
         let (input, output) = (level(samples.input()), level(samples.output()));
@@ -36,7 +35,7 @@ impl DetrendedGain {
         Some(Self { gain: gain.value, sigma: gain.sigma })
     }
 
-    /// By how many standard errors another gain differs, and by what share.
+    /// Difference from another gain in standard errors, and relative.
     pub fn difference(&self, gain: f64) -> (f64, f64) {
         let by = (gain - self.gain).abs();
         (by / self.sigma, by / self.gain.abs())

@@ -1,15 +1,15 @@
-//! An output that goes its own way with time, and a model that follows it.
+//! An output that drifts independently of the input, and a model that follows it.
 
 use super::error::FitError;
 use super::estimate::Fit;
 use super::problem::FitProblem;
-use super::row::dot;
 use super::trend::{DOMINANT_FRACTION, Trend};
 use crate::numeric::number::to_f64;
+use crate::numeric::row::dot;
 
-/// Refuses a model of an output that a straight line in time dominates, and not
-/// the input, where the model tells no more than that line, or follows it with a
-/// time constant that the record is too short to show.
+/// Refuses a model of an output that a straight line in time dominates, but not the input,
+/// where the model explains no more than the line, or follows it with a time constant that is
+/// too long for the record.
 pub(super) fn check_drift(problem: &FitProblem, fit: &Fit) -> Result<(), FitError> {
     let line = Trend::of(&problem.output);
     if line.explained_fraction < DOMINANT_FRACTION
@@ -20,18 +20,13 @@ pub(super) fn check_drift(problem: &FitProblem, fit: &Fit) -> Result<(), FitErro
     let record_s = problem.duration_s();
     let is_slow = fit.model.poles().iter().any(|pole| -pole.re * record_s < 1.0);
     if is_slow || !explains_more(fit, &line) {
-        let share_percent = 100.0 * line.explained_fraction;
-        return Err(FitError::Drift {
-            explained_percent: share_percent,
-            rise: line.rise,
-            record_s,
-        });
+        let explained_percent = 100.0 * line.explained_fraction;
+        return Err(FitError::Drift { explained_percent, rise: line.rise, record_s });
     }
     Ok(())
 }
 
-/// By Schwarz's criterion, over the independent samples; a line has two
-/// parameters.
+/// By Schwarz's criterion over the independent samples; a line has two parameters.
 fn explains_more(fit: &Fit, line: &Trend) -> bool {
     let squares = dot(&fit.residuals, &fit.residuals).max(f64::MIN_POSITIVE);
     let n = fit.independent_samples.max(2.0);

@@ -11,7 +11,7 @@ pub enum FitError {
     /// The data themselves.
     #[error(transparent)]
     Data(#[from] SamplesError),
-    /// A number of poles and zeros that is not fitted.
+    /// Unsupported numbers of poles and zeros.
     #[error("{poles} poles and {zeros} zeros; give 1 to 4 poles and at most as many zeros")]
     Order {
         /// What was asked for.
@@ -19,7 +19,7 @@ pub enum FitError {
         /// What was asked for.
         zeros: usize,
     },
-    /// A range of dead times that is none.
+    /// An invalid range of dead times.
     #[error(
         "a dead time of {} to {} s; give a range that begins at 0 or above and ends \
          above that, by half the record ({max_allowed_s:.3} s) at the latest",
@@ -50,7 +50,7 @@ pub enum FitError {
          the right ones, or excite the input more"
     )]
     NoDependence {
-        /// Share of the output's variance that the model explains \[%\].
+        /// Fraction of the output's variance that the model explains \[%\].
         explained_percent: f64,
         /// Share that a model might explain of noise alone \[%\].
         chance_percent: f64,
@@ -67,7 +67,7 @@ pub enum FitError {
         /// Length of the record \[s\].
         record_s: f64,
     },
-    /// An output that drifts, and a model that follows the drift.
+    /// A drifting output, and a model that follows the drift.
     #[error(
         "the output drifts: a straight line in time explains {explained_percent:.1} % of it ({} by {} \
          over {record_s:.1} s) and not the input, and the model follows that line. Hold temperature \
@@ -77,14 +77,14 @@ pub enum FitError {
         }, three_digits(.rise.abs())
     )]
     Drift {
-        /// Share of the output's variance that the line explains \[%\].
+        /// Fraction of the output's variance that the line explains \[%\].
         explained_percent: f64,
         /// By how much it rises over the record, in units of the output.
         rise: f64,
         /// Length of the record \[s\].
         record_s: f64,
     },
-    /// The dead time ran into the end of its range.
+    /// The dead time is at an end of its range.
     #[error(
         "the dead time runs against the {end} end of its range, {} s; widen the range, or \
          look whether input and output are on one clock", six_digits(*.bound_s)
@@ -95,7 +95,7 @@ pub enum FitError {
         /// That end \[s\].
         bound_s: f64,
     },
-    /// Real poles were asked for and the data oscillate.
+    /// Real poles were requested, and the data oscillate.
     #[error(
         "two real poles were asked for, but the data say a damping of {damping:.2}; take the \
          oscillating second order"
@@ -104,16 +104,16 @@ pub enum FitError {
         /// ζ of the best fit.
         damping: f64,
     },
-    /// More parameters than the data can tell apart.
+    /// The data do not determine all parameters.
     #[error("{0}; take fewer poles or zeros, or excite the input more")]
     Undetermined(Undetermined),
-    /// Nothing that could be started from.
+    /// No initial model was found.
     #[error(
         "no model of this form could be started: the output does not follow the input with any \
          dead time in the range"
     )]
     NoStart,
-    /// A model that cannot be.
+    /// An invalid model.
     #[error(transparent)]
     Model(#[from] ModelError),
 }

@@ -1,17 +1,17 @@
-//! A model that was estimated, and what it says of other data.
+//! An estimated model and its prediction of other data.
 
 use nalgebra::DMatrix;
 
 use super::error::FitError;
-use super::linear::least_squares;
 use super::problem::free_responses;
 use super::quality::FitQuality;
 use super::samples::{Samples, SamplesError};
 use super::settings::{FitSettings, InitialCondition};
 use super::undetermined::Undetermined;
+use crate::numeric::linear::least_squares;
 use crate::numeric::lti::{Simulator, TransferFunction};
 
-/// A parameter that was estimated.
+/// An estimated parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
     /// Its name, as `Structure` gives it; further `dead_time_s`,
@@ -20,49 +20,46 @@ pub struct Parameter {
     /// Estimate, in seconds where the name ends so, else in units of the data and
     /// of 1/s.
     pub value: f64,
-    /// Standard error that allows for the colour of the residuals.
+    /// Standard error with the autocorrelation of the residuals.
     pub sigma: f64,
-    /// Standard error if the residuals were white. Where they are, both agree.
+    /// Standard error for white residuals. Where they are white, both agree.
     pub sigma_if_white: f64,
 }
 
-/// What a user should know of a fit that stands.
+/// A remark on a valid fit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FitNote {
-    /// The estimate of the dead time was its lower end of 0: it was taken out.
-    /// Where the fit is poor beside, the output may run ahead of the input.
+    /// The estimate of the dead time was 0, and it was removed. If the fit is poor, the output
+    /// may lead the input.
     NoDeadTime,
-    /// With as many zeros as poles and a held input the dead time can be told to a
-    /// whole step only; it has no standard error.
+    /// With as many zeros as poles and a held input the dead time is determined to a whole step
+    /// only; it has no standard error.
     DeadTimeToAStep {
         /// That whole number of steps \[s\].
         dead_time_s: f64,
     },
-    /// The data do not determine all parameters
-    /// ([`Settings::accept_undetermined`]).
+    /// The data do not determine all parameters ([`FitSettings::accept_undetermined`]).
     Undetermined(Undetermined),
-    /// The oscillating form came out with a damping above 1: its poles are real.
+    /// The oscillating form has a damping above 1: its poles are real.
     PolesAreReal,
 }
 
-/// A model with what is known of it.
+/// An estimated model.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// What was asked for; without dead time where [`Note::NoDeadTime`] says so.
+    /// The settings; without dead time where [`FitNote::NoDeadTime`] says so.
     pub settings: FitSettings,
     /// Output less output level over input less input level.
     pub model: TransferFunction,
-    /// Where the input stood before, in units of the input.
+    /// Input before the first sample.
     pub input_level: f64,
-    /// The output for an input that stands at the input level.
+    /// Output for a constant input at the input level.
     pub output_level: f64,
     /// Parameters with their errors.
     pub parameters: Vec<Parameter>,
-    /// Covariance of the parameters, in their order, with the residuals' colour.
+    /// Covariance of the parameters, in their order, with the autocorrelation of the residuals.
     pub covariance: DMatrix<f64>,
-    /// The same if the residuals were white.
-    pub covariance_if_white: DMatrix<f64>,
-    /// What the model says that the output was.
+    /// Predicted output.
     pub predicted: Vec<f64>,
     /// Output less prediction.
     pub residuals: Vec<f64>,
@@ -70,13 +67,9 @@ pub struct Fit {
     pub residual_sigma: f64,
     /// On the data of the estimation.
     pub quality: FitQuality,
-    /// Akaike's criterion for white residuals; less is better.
-    pub aic: f64,
-    /// Schwarz's criterion for white residuals; less is better.
-    pub bic: f64,
-    /// Number of samples that would say as much if they were independent.
+    /// Effective number of independent samples.
     pub independent_samples: f64,
-    /// What a user should know.
+    /// Remarks.
     pub notes: Vec<FitNote>,
     /// Number of estimated parameters, those of the free response included.
     pub estimated: usize,
@@ -93,9 +86,8 @@ impl Fit {
         !self.notes.iter().any(|note| matches!(note, FitNote::Undetermined(_)))
     }
 
-    /// What the model says of other data, with the fit's levels. With
-    /// [`Before::Unknown`] the free response, and nothing else, is estimated from
-    /// them.
+    /// Prediction of other data with the fit's levels. With [`InitialCondition::Unknown`] the
+    /// free response, and nothing else, is estimated from them.
     pub fn predict(
         &self,
         samples: &Samples,

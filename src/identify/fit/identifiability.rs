@@ -1,4 +1,4 @@
-//! Whether the data determine the parameters of a fit, and which they leave open.
+//! Whether the data determine the parameters of a fit.
 
 use nalgebra::{Complex, DMatrix};
 
@@ -8,16 +8,15 @@ use super::spread::Covariances;
 use super::undetermined::Undetermined;
 use crate::numeric::lti::polynomial;
 
-/// By how many standard errors a coefficient must differ from zero.
+/// Standard errors by which a coefficient must differ from zero. Derived: a normal error
+/// exceeds them with a probability of 4.6 %.
 const MIN_SIGMAS: f64 = 2.0;
-/// A pole and a zero that are closer than this share of their size all but
-/// cancel.
+/// Relative distance below which a pole and a zero nearly cancel.
 const MAX_CANCELLING_DISTANCE: f64 = 0.3;
-/// Parameters that move by this share of the one that moves most belong to a
-/// combination.
+/// Relative change of a parameter over the largest one from which it belongs to a combination.
 const MIN_RELATIVE_MOVE: f64 = 0.1;
 
-/// What the data leave open; none where they determine everything.
+/// What the data do not determine; `None` where they determine everything.
 pub(super) fn undetermined(
     problem: &FitProblem,
     theta: &[f64],
@@ -43,8 +42,7 @@ pub(super) fn undetermined(
     Some(Undetermined::Combination { names, pair: pair(problem, theta) })
 }
 
-/// A dead time whose standard error is beyond itself and beyond the slowest time
-/// constant, which no controller could go by.
+/// A dead time whose standard error exceeds itself and the slowest time constant.
 fn undetermined_dead_time(
     problem: &FitProblem,
     theta: &[f64],
@@ -58,7 +56,7 @@ fn undetermined_dead_time(
     is_loose.then_some(Undetermined::DeadTime { dead_time_s, sigma_s })
 }
 
-/// The reported parameters that move along the direction which nothing holds.
+/// The reported parameters that change along the weakest direction.
 fn combination(direction: &[f64], named: &NamedParameters, turn: &DMatrix<f64>) -> Vec<String> {
     let moves = |i: usize| {
         let sum: f64 = direction.iter().enumerate().map(|(j, by)| turn[(i, j)] * by).sum();
@@ -70,7 +68,7 @@ fn combination(direction: &[f64], named: &NamedParameters, turn: &DMatrix<f64>) 
     names.filter(|(_, by)| **by >= MIN_RELATIVE_MOVE * most).map(|(name, _)| name.clone()).collect()
 }
 
-/// The pole and the zero that are closest to each other, if they all but cancel.
+/// The pole and the zero that are closest to each other, if they nearly cancel.
 fn pair(problem: &FitProblem, theta: &[f64]) -> Option<(f64, f64)> {
     let model = problem.transfer(theta)?;
     let apart = |pole: &Complex<f64>, zero: &Complex<f64>| (pole - zero).norm() / pole.norm();

@@ -1,10 +1,11 @@
-//! The parameters under the names of the form that was asked for.
+//! The parameters of a fit under the names of its structure.
 
 use nalgebra::DMatrix;
 
 use super::error::FitError;
 use super::problem::FitProblem;
 use super::settings::Structure;
+use crate::numeric::number::to_f64;
 
 /// Names and values.
 pub(super) struct NamedParameters {
@@ -14,7 +15,7 @@ pub(super) struct NamedParameters {
 }
 
 impl NamedParameters {
-    /// Fails where real poles were asked for and the poles are not.
+    /// Fails where real poles were requested and the poles are complex.
     pub fn of(problem: &FitProblem, structure: Structure, theta: &[f64]) -> Result<Self, FitError> {
         let mut named = Self { names: Vec::new(), values: Vec::new(), poles_are_real: false };
         let alpha = |i: usize| theta[problem.zeros + i];
@@ -53,9 +54,10 @@ impl NamedParameters {
             }
         }
         let layout = problem.layout();
-        for (name, place) in [("dead_time_s", layout.dead_time), ("output_level", layout.level)] {
-            if let Some(place) = place {
-                named.push(name, theta[place]);
+        for (name, position) in [("dead_time_s", layout.dead_time), ("output_level", layout.level)]
+        {
+            if let Some(position) = position {
+                named.push(name, theta[position]);
             }
         }
         Ok(named)
@@ -73,7 +75,7 @@ impl NamedParameters {
         self.values.push(value);
     }
 
-    /// How the named parameters answer to those of the fit, by differences.
+    /// Derivatives of the named parameters with those of the fit, by difference quotients.
     pub fn jacobian(
         &self,
         problem: &FitProblem,
@@ -84,19 +86,16 @@ impl NamedParameters {
         let mut slopes = DMatrix::zeros(self.names.len(), theta.len());
         for (number, scale) in scales.iter().enumerate() {
             let mut moved = theta.to_vec();
-            // Small against the parameter itself, which may be far below its scale.
+            // Relative to the parameter itself, which may be far below its scale.
             let step =
                 RELATIVE_STEP * if theta[number] == 0.0 { *scale } else { theta[number].abs() };
             let mut at = |by: f64| {
                 moved[number] = theta[number] + by;
                 Self::of(problem, structure, &moved).ok().map(|named| named.values)
             };
-            let (down, up) = (at(-step), at(step));
-            let width = step * f64::from(u8::from(down.is_some()) + u8::from(up.is_some()));
-            let (low, high) = (
-                down.unwrap_or_else(|| self.values.clone()),
-                up.unwrap_or_else(|| self.values.clone()),
-            );
+            let ends = [at(-step), at(step)];
+            let width = step * to_f64(ends.iter().flatten().count());
+            let [low, high] = ends.map(|end| end.unwrap_or_else(|| self.values.clone()));
             for (row, (low, high)) in low.iter().zip(&high).enumerate() {
                 slopes[(row, number)] = if width > 0.0 { (high - low) / width } else { 0.0 };
             }
@@ -105,5 +104,5 @@ impl NamedParameters {
     }
 }
 
-/// Step of the differences as a part of the parameter.
+/// Step of the difference quotients over a parameter. A choice between truncation and rounding.
 const RELATIVE_STEP: f64 = 1e-6;

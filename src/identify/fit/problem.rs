@@ -1,23 +1,23 @@
-//! The fit as numbers: what parameters predict, and how that answers to them.
+//! Prediction of a model and its derivatives with the parameters.
 //!
-//! The parameters are those of b(s)/a(s) with a denominator that ends in 1, so
-//! that a pole which the data do not show goes to a coefficient of zero: the
-//! numerator β0…βm, the denominator α1…αn (each with the power of s that it stands
-//! before), then dead time, output level and the free response where they are
-//! estimated.
+//! The parameters are those of b(s)/a(s) with a denominator that ends in 1, so that a pole
+//! which the data do not determine has a coefficient of zero: the numerator β0…βm, the
+//! denominator α1…αn (each with its power of s), then dead time, output level and the free
+//! response where they are estimated.
 
-use super::row::standard_deviation;
 use super::samples::Samples;
 use super::settings::{DeadTime, FitSettings, InitialCondition, OutputLevel};
+use crate::numeric::average::standard_deviation;
+use crate::numeric::levenberg_marquardt::LeastSquares;
 use crate::numeric::lti::{Between, ModelError, Simulator, TransferFunction, polynomial};
 use crate::numeric::number::to_f64;
 
-/// A pole faster than this many in a step is not seen.
+/// Poles faster than this many per step are not observable. A choice.
 const MAX_POLE_RATE_PER_STEP: f64 = 50.0;
-/// A time constant longer than this many records is an integrator.
+/// A time constant longer than this many records is an integrator. A choice.
 const MAX_TIME_CONSTANT_RECORDS: f64 = 100.0;
 
-/// What is fitted to what.
+/// Data and settings of a fit.
 #[derive(Debug, Clone)]
 pub(super) struct FitProblem {
     /// Less the input level.
@@ -33,7 +33,7 @@ pub(super) struct FitProblem {
     pub between: Between,
 }
 
-/// Numbers of the parameters.
+/// Indices of the parameters.
 pub(super) struct ParameterLayout {
     pub poles_from: usize,
     pub dead_time: Option<usize>,
@@ -63,8 +63,8 @@ impl FitProblem {
         }
     }
 
-    /// The same with the means of so many samples each: input and output that are
-    /// averaged alike still belong together.
+    /// The same with means of so many samples: input and output that are averaged alike still
+    /// correspond.
     pub fn decimated(&self, factor: usize) -> Self {
         let n = to_f64(factor);
         let means = |row: &[f64]| -> Vec<f64> {
@@ -88,12 +88,11 @@ impl FitProblem {
         ParameterLayout { poles_from, dead_time, level, free_from, total }
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
     pub fn duration_s(&self) -> f64 {
-        self.output.len() as f64 * self.dt_s
+        to_f64(self.output.len()) * self.dt_s
     }
 
-    /// Denominator of a set of parameters, highest power first.
+    /// Denominator, highest power first.
     pub fn den(&self, theta: &[f64]) -> Vec<f64> {
         let from = self.zeros + 1;
         theta[from..from + self.poles].iter().rev().copied().chain([1.0]).collect()
@@ -114,17 +113,17 @@ impl FitProblem {
     pub fn output_level(&self, theta: &[f64]) -> f64 {
         match self.level {
             OutputLevel::Known(level) => level,
-            OutputLevel::Estimated => self.layout().level.map_or(0.0, |place| theta[place]),
+            OutputLevel::Estimated => self.layout().level.map_or(0.0, |position| theta[position]),
         }
     }
 
-    /// Whether these are parameters of a stable model at all.
+    /// Whether the parameters are those of a stable model.
     fn is_admissible(&self, theta: &[f64]) -> bool {
         let slow = theta[self.zeros + 1] > MAX_TIME_CONSTANT_RECORDS * self.duration_s();
         !slow && theta.iter().all(|p| p.is_finite()) && polynomial::is_hurwitz(&self.den(theta))
     }
 
-    /// The output that they predict; `None` of what is no stable model.
+    /// The predicted output; `None` for an inadmissible model.
     pub fn predict(&self, theta: &[f64]) -> Option<Vec<f64>> {
         if !self.is_admissible(theta) {
             return None;
@@ -141,9 +140,8 @@ impl FitProblem {
         Some(predicted)
     }
 
-    /// The answers of all parameters that act in proportion – numerator, level, free
-    /// response – for a denominator and dead time, and the numbers of these
-    /// parameters.
+    /// Responses of all linear parameters – numerator, level, free response – for a denominator
+    /// and dead time, and their indices.
     pub fn linear_columns(&self, theta: &[f64]) -> Option<(Vec<usize>, Vec<Vec<f64>>)> {
         if !self.is_admissible(theta) {
             return None;
@@ -158,8 +156,8 @@ impl FitProblem {
             numbers.push(i);
             columns.push(self.input.iter().map(|u| model.step(*u)).collect());
         }
-        if let Some(place) = layout.level {
-            numbers.push(place);
+        if let Some(position) = layout.level {
+            numbers.push(position);
             columns.push(vec![1.0; self.output.len()]);
         }
         if self.has_free_response {
@@ -169,8 +167,7 @@ impl FitProblem {
         Some((numbers, columns))
     }
 
-    /// Sizes that the parameters have, for steps and for the balance of the
-    /// equations.
+    /// Magnitudes of the parameters, for difference quotients.
     pub fn scales(&self, theta: &[f64]) -> Vec<f64> {
         let layout = self.layout();
         let tiny = f64::MIN_POSITIVE;
@@ -195,47 +192,6 @@ impl FitProblem {
         scales
     }
 
-    /// Ends of the range of a parameter, some of which hang on others.
-    pub fn range(&self, theta: &[f64], number: usize) -> [f64; 2] {
-        let layout = self.layout();
-        if Some(number) == layout.dead_time
-            && let DeadTime::Estimated { min_s: least_s, max_s: most_s } = self.dead_time
-        {
-            return [least_s, most_s];
-        }
-        let last_pole = layout.poles_from + self.poles - 1;
-        if number == last_pole {
-            let before = if self.poles == 1 { 1.0 } else { theta[last_pole - 1].abs() };
-            return [before * self.dt_s / MAX_POLE_RATE_PER_STEP, f64::MAX];
-        }
-        [f64::MIN, f64::MAX]
-    }
-
-    /// The parameters within their ranges.
-    pub fn project(&self, theta: &mut [f64]) {
-        for number in 0..theta.len() {
-            let [least, most] = self.range(theta, number);
-            theta[number] = theta[number].clamp(least, most);
-        }
-    }
-
-    /// Slope of the prediction with every parameter; `None` beside the edge of
-    /// what is stable.
-    pub fn jacobian(&self, theta: &[f64], scales: &[f64]) -> Option<Vec<Vec<f64>>> {
-        let (numbers, linear) = self.linear_columns(theta)?;
-        let mut columns = vec![Vec::new(); theta.len()];
-        for (number, column) in numbers.into_iter().zip(linear) {
-            columns[number] = column;
-        }
-        for number in 0..theta.len() {
-            if columns[number].is_empty() {
-                columns[number] =
-                    self.finite_difference(theta, number, RELATIVE_STEP * scales[number])?;
-            }
-        }
-        Some(columns)
-    }
-
     /// By central differences, one-sided at an end of the range.
     fn finite_difference(&self, theta: &[f64], number: usize, step: f64) -> Option<Vec<f64>> {
         let [least, most] = self.range(theta, number);
@@ -251,6 +207,46 @@ impl FitProblem {
     }
 }
 
+impl LeastSquares for FitProblem {
+    fn residuals(&self, theta: &[f64]) -> Option<Vec<f64>> {
+        let predicted = self.predict(theta)?;
+        Some(self.output.iter().zip(&predicted).map(|(y, p)| y - p).collect())
+    }
+
+    /// Range of a parameter, which may depend on others.
+    fn range(&self, theta: &[f64], number: usize) -> [f64; 2] {
+        let layout = self.layout();
+        if Some(number) == layout.dead_time
+            && let DeadTime::Estimated { min_s, max_s } = self.dead_time
+        {
+            return [min_s, max_s];
+        }
+        let last_pole = layout.poles_from + self.poles - 1;
+        if number == last_pole {
+            let before = if self.poles == 1 { 1.0 } else { theta[last_pole - 1].abs() };
+            return [before * self.dt_s / MAX_POLE_RATE_PER_STEP, f64::MAX];
+        }
+        [f64::MIN, f64::MAX]
+    }
+
+    /// Derivative of the prediction with every parameter; `None` at the limit of stability.
+    fn jacobian(&self, theta: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let scales = self.scales(theta);
+        let (numbers, linear) = self.linear_columns(theta)?;
+        let mut columns = vec![Vec::new(); theta.len()];
+        for (number, column) in numbers.into_iter().zip(linear) {
+            columns[number] = column;
+        }
+        for number in 0..theta.len() {
+            if columns[number].is_empty() {
+                columns[number] =
+                    self.finite_difference(theta, number, RELATIVE_STEP * scales[number])?;
+            }
+        }
+        Some(columns)
+    }
+}
+
 /// s to a power, as a numerator.
 fn power(i: usize) -> Vec<f64> {
     let mut num = vec![0.0; i + 1];
@@ -258,8 +254,8 @@ fn power(i: usize) -> Vec<f64> {
     num
 }
 
-/// What a state that is not at rest does by itself: the answer of c(s)/a(s) to a
-/// pulse one sample before the first.
+/// Free response of an initial state: the response of c(s)/a(s) to a pulse one sample before
+/// the first.
 fn free_response(
     num: &[f64],
     den: &[f64],
@@ -272,7 +268,7 @@ fn free_response(
     Ok((0..samples).map(|_| model.step(0.0)).collect())
 }
 
-/// The same for c = 1, s, …: together all that a state can do by itself.
+/// The same for c = 1, s, …: together they span all free responses.
 pub(super) fn free_responses(
     den: &[f64],
     dt_s: f64,
@@ -281,5 +277,6 @@ pub(super) fn free_responses(
     (0..den.len() - 1).map(|i| free_response(&power(i), den, dt_s, samples)).collect()
 }
 
-/// Step of the differences as a part of a parameter's size.
+/// Step of the difference quotients over the magnitude of a parameter. A choice between
+/// truncation and rounding.
 const RELATIVE_STEP: f64 = 1e-5;

@@ -1,24 +1,22 @@
-//! How well a prediction meets what was measured.
+//! Agreement of a prediction with measured data.
 
 use crate::numeric::number::to_f64;
 
-/// How well a prediction meets what was measured.
+/// Agreement of a prediction with measured data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitQuality {
-    /// 100·(1 − ‖y − ŷ‖/‖y − mean y‖) \[%\]: 100 for a perfect model, 0 for one
-    /// no better than the mean, below for worse. The bead characterisation
-    /// thesis, eq. (16).
+    /// 100·(1 − ‖y − ŷ‖/‖y − mean y‖) \[%\]: 100 for a perfect model, 0 for the mean, negative
+    /// for worse. The bead characterisation thesis, eq. (16).
     pub fit_percent: f64,
     /// Root mean square error, in units of the output. Eq. (17).
     pub rmse: f64,
-    /// Mean size of the error, in units of the output. Eq. (18).
+    /// Mean absolute error, in units of the output. Eq. (18).
     pub mae: f64,
 }
 
 impl FitQuality {
-    /// Of a prediction as long as what was measured; of the shorter part where
-    /// it is not. `None` where nothing was measured. An output that never
-    /// changes has a fit of minus infinity.
+    /// For a prediction as long as the data; otherwise over the shorter length. `None` without
+    /// data. A constant output has a fit of minus infinity.
     pub fn of(measured: &[f64], predicted: &[f64]) -> Option<Self> {
         let count = measured.len().min(predicted.len());
         let n = to_f64(count);

@@ -1,4 +1,4 @@
-//! From the least squares to a fit, or why it is none.
+//! From the minimum to a fit, or the reason why it is invalid.
 
 use nalgebra::DMatrix;
 
@@ -7,30 +7,31 @@ use super::drift::check_drift;
 use super::error::FitError;
 use super::estimate::{Fit, FitNote, Parameter};
 use super::identifiability::undetermined;
-use super::levenberg::Minimum;
 use super::named::NamedParameters;
 use super::problem::FitProblem;
 use super::quality::FitQuality;
-use super::row::{dot, standard_deviation};
 use super::settings::{DeadTime, FitSettings};
-use super::spread::{Covariances, covariances};
+use super::spread::covariances;
 use super::start;
+use crate::numeric::average::standard_deviation;
+use crate::numeric::levenberg_marquardt::{LeastSquares, Minimum};
 use crate::numeric::lti::polynomial;
 use crate::numeric::number::to_f64;
+use crate::numeric::row::dot;
 
-/// Turns the least squares into a fit, or says why it is none.
+/// Turns the minimum into a fit, or gives the reason why it is invalid.
 pub(super) fn report(
     problem: &FitProblem,
     settings: &FitSettings,
     best: &Minimum,
 ) -> Result<Fit, FitError> {
-    if let DeadTime::Estimated { min_s: least_s, max_s: most_s } = settings.dead_time {
+    if let DeadTime::Estimated { min_s, max_s } = settings.dead_time {
         let found = problem.dead_time_s(&best.theta);
-        if found <= least_s && least_s == 0.0 {
+        if found <= min_s && min_s == 0.0 {
             return without_dead_time(problem, settings);
         }
-        if found <= least_s || found >= most_s {
-            let end = if found <= least_s { "lower" } else { "upper" };
+        if found <= min_s || found >= max_s {
+            let end = if found <= min_s { "lower" } else { "upper" };
             return Err(FitError::DeadTimeAtBound { end, bound_s: found });
         }
     }
@@ -41,14 +42,12 @@ pub(super) fn report(
     if settings.accept_undetermined {
         return Ok(fit);
     }
-    let loose = fit.notes.iter().find_map(|note| match note {
-        FitNote::Undetermined(loose) => Some(loose.clone()),
-        _ => None,
-    });
-    match loose {
-        Some(loose) => Err(FitError::Undetermined(loose)),
-        None => Ok(fit),
+    for note in &fit.notes {
+        if let FitNote::Undetermined(what) = note {
+            return Err(FitError::Undetermined(what.clone()));
+        }
     }
+    Ok(fit)
 }
 
 fn without_dead_time(problem: &FitProblem, settings: &FitSettings) -> Result<Fit, FitError> {
@@ -60,7 +59,7 @@ fn without_dead_time(problem: &FitProblem, settings: &FitSettings) -> Result<Fit
     Ok(fit)
 }
 
-/// A time constant beyond this many records was not seen.
+/// A time constant beyond this many records is not observable. A choice.
 const MAX_TIME_CONSTANT_RECORDS: f64 = 10.0;
 
 fn check_stable(problem: &FitProblem, best: &Minimum) -> Result<(), FitError> {
@@ -73,8 +72,9 @@ fn check_stable(problem: &FitProblem, best: &Minimum) -> Result<(), FitError> {
     Ok(())
 }
 
-/// What a model explains of the output must be more than chance: five times
-/// what as many parameters explain of noise of the residuals' colour on average.
+/// Explained variance over that by chance, above which the output depends on the input. A
+/// choice: the mean by chance is that of as many parameters on noise with the residuals'
+/// autocorrelation.
 const CHANCE_FACTOR: f64 = 5.0;
 
 fn check_dependence(problem: &FitProblem, fit: &Fit) -> Result<(), FitError> {
@@ -82,7 +82,7 @@ fn check_dependence(problem: &FitProblem, fit: &Fit) -> Result<(), FitError> {
     let squares = dot(&fit.residuals, &fit.residuals) / to_f64(fit.residuals.len());
     let explained = 1.0 - squares / (whole * whole);
     let chance = (CHANCE_FACTOR * to_f64(fit.estimated) / fit.independent_samples).min(1.0);
-    // As a share of what is left: an F ratio.
+    // An F ratio: both over the residual variance.
     if explained < chance * (1.0 - explained) {
         let explained_percent = 100.0 * explained.max(0.0);
         let chance_percent = 100.0 * chance / (1.0 + chance);
@@ -96,31 +96,31 @@ fn assemble(problem: &FitProblem, settings: &FitSettings, best: &Minimum) -> Res
     let model = problem.transfer(theta).ok_or(FitError::NoStart)?;
     let predicted = problem.predict(theta).ok_or(FitError::NoStart)?;
     let scales = problem.scales(theta);
-    let columns = problem.jacobian(theta, &scales).ok_or(FitError::NoStart)?;
+    let columns = problem.jacobian(theta).ok_or(FitError::NoStart)?;
     let residuals: Vec<f64> = problem.output.iter().zip(&predicted).map(|(y, p)| y - p).collect();
     let noise = ArModel::of(&residuals);
     let spread = covariances(&columns, &noise, residuals.len());
     let named = NamedParameters::of(problem, settings.structure, theta)?;
-    let predicted_quality = FitQuality::of(&problem.output, &predicted).ok_or(FitError::NoStart)?;
+    let quality = FitQuality::of(&problem.output, &predicted).ok_or(FitError::NoStart)?;
     let turn = named.jacobian(problem, settings.structure, theta, &scales);
     let covariance = &turn * &spread.correlated * turn.transpose();
     let covariance_if_white = &turn * &spread.white * turn.transpose();
-    // Nothing holds a parameter whose variance is lost in rounding.
+    // A variance below zero by rounding is undetermined.
     let sigma = |of: &DMatrix<f64>, i: usize| {
         if of[(i, i)] > 0.0 { of[(i, i)].sqrt() } else { f64::INFINITY }
     };
-    let parameters: Vec<Parameter> = (0..named.names.len())
-        .map(|i| Parameter {
-            name: named.names[i].clone(),
-            value: named.values[i],
-            sigma: sigma(&covariance, i),
-            sigma_if_white: sigma(&covariance_if_white, i),
-        })
-        .collect();
-    let notes = notes(problem, theta, &spread, &named, &turn);
+    let parameter = |i: usize| Parameter {
+        name: named.names[i].clone(),
+        value: named.values[i],
+        sigma: sigma(&covariance, i),
+        sigma_if_white: sigma(&covariance_if_white, i),
+    };
+    let parameters: Vec<Parameter> = (0..named.names.len()).map(parameter).collect();
+    let undetermined = undetermined(problem, theta, &spread, &named, &turn);
+    let real_poles = named.poles_are_real.then_some(FitNote::PolesAreReal);
+    let notes = undetermined.map(FitNote::Undetermined).into_iter().chain(real_poles).collect();
     let (n, k) = (to_f64(residuals.len()), to_f64(theta.len()));
     let squares = dot(&residuals, &residuals);
-    let misfit = n * libm::log((squares / n).max(f64::MIN_POSITIVE));
     Ok(Fit {
         settings: *settings,
         model,
@@ -128,32 +128,12 @@ fn assemble(problem: &FitProblem, settings: &FitSettings, best: &Minimum) -> Res
         output_level: problem.output_level(theta),
         parameters,
         covariance,
-        covariance_if_white,
         residual_sigma: (squares / (n - k).max(1.0)).sqrt(),
-        quality: predicted_quality,
-        aic: misfit + 2.0 * k,
-        bic: misfit + k * libm::log(n),
+        quality,
         independent_samples: noise.effective_samples(residuals.len()),
         predicted,
         residuals,
         notes,
         estimated: theta.len(),
     })
-}
-
-fn notes(
-    problem: &FitProblem,
-    theta: &[f64],
-    spread: &Covariances,
-    named: &NamedParameters,
-    turn: &DMatrix<f64>,
-) -> Vec<FitNote> {
-    let mut notes: Vec<FitNote> = undetermined(problem, theta, spread, named, turn)
-        .map(FitNote::Undetermined)
-        .into_iter()
-        .collect();
-    if named.poles_are_real {
-        notes.push(FitNote::PolesAreReal);
-    }
-    notes
 }

@@ -1,14 +1,12 @@
-//! Samples of an input and an output, and whether a model can be told from
-//! them.
+//! Samples of an input and an output, checked for identification.
 
-use super::clipped;
-use super::clipped::Clipped;
-use super::row::min_max;
+use super::clipped::{self, Clipped};
 use super::settings::InitialCondition;
 use crate::identify::digits::six_digits;
+use crate::numeric::number::to_f64;
+use crate::numeric::row::min_max;
 
-/// Size that no sample reaches; larger ones would overflow where they are
-/// squared and multiplied.
+/// Magnitude above which squares and products might overflow.
 const MAX_VALUE: f64 = 1e12;
 
 /// What is wrong with the data.
@@ -22,7 +20,7 @@ pub enum SamplesError {
         /// Samples of the output.
         output: usize,
     },
-    /// Hardly any samples.
+    /// Too few samples.
     #[error("{found} samples; it needs at least {needed}")]
     TooFew {
         /// What was found.
@@ -30,7 +28,7 @@ pub enum SamplesError {
         /// What would do.
         needed: usize,
     },
-    /// A sample that is no number.
+    /// A sample that is not finite.
     #[error(
         "the {what} is {} at sample {at}, which nothing that is measured can be; cut the data \
          there or mend it first", six_digits(*.value)
@@ -43,13 +41,13 @@ pub enum SamplesError {
         /// First such sample, from 0.
         at: usize,
     },
-    /// A time step that is none.
+    /// An invalid time step.
     #[error("a time step of {dt_s} s; it must be above zero")]
     Step {
         /// What was found \[s\].
         dt_s: f64,
     },
-    /// An input that never changes.
+    /// A constant input.
     #[error(
         "the input is {} throughout; a model can be identified only from an input that changes",
         six_digits(*.value)
@@ -58,7 +56,7 @@ pub enum SamplesError {
         /// Its value.
         value: f64,
     },
-    /// An input that changes next to nothing.
+    /// An almost constant input.
     #[error(
         "the input changes by {range:.3e} at a level of {level:.4}, less than a part in ten \
          thousand; look at its unit, or excite it more"
@@ -69,13 +67,13 @@ pub enum SamplesError {
         /// Largest size.
         level: f64,
     },
-    /// An output that never changes.
+    /// A constant output.
     #[error("the output is {} throughout; look whether the sensor was on", six_digits(*.value))]
     ConstantOutput {
         /// Its value.
         value: f64,
     },
-    /// A signal that was cut off.
+    /// A clipped signal.
     #[error(transparent)]
     Clipped(#[from] Clipped),
 }
@@ -88,14 +86,14 @@ pub struct Samples {
     dt_s: f64,
 }
 
-/// A record shorter than this is none.
+/// Smallest number of samples. A choice.
 const MIN_SAMPLES: usize = 10;
-/// Change of an input as a part of its level that is noise of the arithmetic.
+/// Range of an input over its level below which it is constant but for rounding.
 const MIN_RELATIVE_RANGE: f64 = 1e-4;
 
 impl Samples {
-    /// Of equally long rows, `dt_s` \[s\] apart. Fails where a number is not
-    /// finite or there are fewer than ten.
+    /// Rows of equal length, `dt_s` \[s\] apart. Fails where a number is not finite or there
+    /// are fewer than ten.
     pub fn new(input: Vec<f64>, output: Vec<f64>, dt_s: f64) -> Result<Self, SamplesError> {
         if input.len() != output.len() {
             return Err(SamplesError::Lengths { input: input.len(), output: output.len() });
@@ -133,18 +131,16 @@ impl Samples {
     }
 
     /// Length of the record \[s\].
-    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
     pub fn duration_s(&self) -> f64 {
-        self.len() as f64 * self.dt_s
+        to_f64(self.len()) * self.dt_s
     }
 
-    /// Whether input or output were cut off.
+    /// Whether input or output are clipped.
     pub fn check_clipped(&self) -> Result<(), Clipped> {
         clipped::check(&self.input, &self.output, self.dt_s)
     }
 
-    /// Whether the input changes, if only from what came before, and so does the
-    /// output.
+    /// Whether the input changes, at least from its initial value, and the output, too.
     pub fn check_input(&self, before: InitialCondition) -> Result<(), SamplesError> {
         let [mut least, mut most] = min_max(&self.input);
         if let InitialCondition::Settled { input } = before {

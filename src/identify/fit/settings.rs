@@ -1,28 +1,28 @@
-//! What is fitted.
+//! Structure and settings of a fit.
 
 use crate::numeric::lti::Between;
 
-/// Most poles of a fit.
+/// Largest number of poles of a fit. A choice.
 pub const MAX_POLES: usize = 4;
 
-/// Form of the model.
+/// Structure of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Structure {
     /// K·(Tz·s + 1)/(T·s + 1)·e^(−Ls). Parameters `gain`, `time_constant_s`, `zero_s`.
     FirstOrder {
-        /// With Tz; without, it is 0.
+        /// With Tz; otherwise Tz = 0.
         zero: bool,
     },
     /// K·(Tz·s + 1)/((T1·s + 1)(T2·s + 1))·e^(−Ls). Parameters `gain`,
     /// `time_constant_1_s` (the longer), `time_constant_2_s`, `zero_s`.
     SecondOrderReal {
-        /// With Tz; without, it is 0.
+        /// With Tz; otherwise Tz = 0.
         zero: bool,
     },
     /// K·(Tz·s + 1)/(T²·s² + 2ζT·s + 1)·e^(−Ls). Parameters `gain`, `period_s`
     /// (one over the natural frequency), `damping`, `zero_s`.
     SecondOrderOscillating {
-        /// With Tz; without, it is 0.
+        /// With Tz; otherwise Tz = 0.
         zero: bool,
     },
     /// b(s)/a(s)·e^(−Ls), 1 to 4 poles, the denominator with a leading 1.
@@ -71,48 +71,46 @@ pub enum DeadTime {
     },
 }
 
-/// The output for an input that stands at the input level.
+/// Output for a constant input at the input level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum OutputLevel {
-    /// Known, in units of the output. A level that is truly known sharpens the
-    /// gain a lot where the input is a single step.
+    /// Known, in units of the output. A known level reduces the standard error of the gain much
+    /// where the input is a single step.
     Known(f64),
     /// A parameter of the fit, `output_level`.
     Estimated,
 }
 
-/// What came before the first sample.
+/// State before the first sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum InitialCondition {
-    /// The input had stood at this level for long and the output was at rest.
+    /// The input had been constant at this level and the output was settled.
     Settled {
         /// Input level, in units of the input.
         input: f64,
     },
     /// The same with the level of the first sample.
     SettledAtFirst,
-    /// Nothing is known: the input is taken to have stood at the first sample's
-    /// level for the dead time, and what the output still does by itself – one
-    /// number for each pole – is estimated, too.
+    /// Unknown: the input is taken as constant at the first sample's level for the dead time,
+    /// and the free response – one parameter for each pole – is estimated.
     Unknown,
 }
 
-/// What is fitted, and how the data are to be read.
+/// Settings of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitSettings {
     /// Form of the model.
     pub structure: Structure,
     /// Its dead time.
     pub dead_time: DeadTime,
-    /// What the input does between samples: held for commands, linear for
-    /// measured quantities.
+    /// Input between samples: held for commands, linear for measured quantities.
     pub between: Between,
     /// The output at the operating point.
     pub level: OutputLevel,
-    /// What came before the first sample.
+    /// State before the first sample.
     pub initial_state: InitialCondition,
-    /// Whether a model with parameters that the data do not determine is given
-    /// all the same, with [`super::Note::Undetermined`].
+    /// Whether a model with undetermined parameters is accepted, with
+    /// [`super::FitNote::Undetermined`].
     pub accept_undetermined: bool,
 }
 

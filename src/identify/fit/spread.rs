@@ -1,29 +1,29 @@
-//! How far the parameters may be off: the covariance of the estimate, for white
-//! residuals and for residuals of the colour that they have.
+//! Covariance of the estimate for white and for autocorrelated residuals (the sandwich
+//! estimator).
 
 use nalgebra::DMatrix;
 
 use super::autoregression::ArModel;
-use super::linear::normal_matrix;
-use super::row::dot;
+use crate::numeric::linear::{normal_matrix, norms};
+use crate::numeric::number::to_f64;
 
 /// Covariances of the parameters.
 pub(super) struct Covariances {
     /// For white residuals.
     pub white: DMatrix<f64>,
-    /// For residuals of their colour.
+    /// For residuals with their autocorrelation.
     pub correlated: DMatrix<f64>,
-    /// How the parameters move along the direction in which the data hold least,
-    /// where they hold next to nothing.
+    /// Direction of the parameters that the data determine least, where they hardly determine
+    /// it.
     pub weak_direction: Option<Vec<f64>>,
 }
 
-/// Least eigenvalue of the normalized equations that still tells something.
+/// Smallest eigenvalue of the normalised equations above rounding. A choice.
 const MIN_EIGENVALUE: f64 = 1e-11;
 
-/// Of the slopes of the prediction and the residuals' colour.
+/// From the derivatives of the prediction and the model of the residuals.
 pub(super) fn covariances(columns: &[Vec<f64>], noise: &ArModel, samples: usize) -> Covariances {
-    let sizes: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt().max(f64::MIN_POSITIVE)).collect();
+    let sizes = norms(columns);
     let p = columns.len();
     let normal = normal_matrix(columns, &sizes);
     let eigen = normal.clone().symmetric_eigen();
@@ -33,17 +33,12 @@ pub(super) fn covariances(columns: &[Vec<f64>], noise: &ArModel, samples: usize)
         let direction = eigen.eigenvectors.column(least);
         direction.iter().zip(&sizes).map(|(part, size)| part / size).collect()
     };
-    let loose: Option<Vec<f64>> = is_loose.then(along);
-    let endless = || DMatrix::from_diagonal_element(p, p, f64::INFINITY);
     let Some(inverse) = normal.try_inverse() else {
-        return Covariances {
-            white: endless(),
-            correlated: endless(),
-            weak_direction: loose.or_else(|| Some(along())),
-        };
+        let infinite = DMatrix::from_diagonal_element(p, p, f64::INFINITY);
+        let weak_direction = Some(along());
+        return Covariances { white: infinite.clone(), correlated: infinite, weak_direction };
     };
-    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
-    let freedom = samples as f64 / (samples.saturating_sub(p).max(1)) as f64;
+    let freedom = to_f64(samples) / to_f64(samples.saturating_sub(p).max(1));
     let weighed: Vec<Vec<f64>> = columns.iter().map(|c| noise.weight(c)).collect();
     let middle = normal_matrix(&weighed, &sizes);
     let scaled = |m: DMatrix<f64>| {
@@ -52,7 +47,7 @@ pub(super) fn covariances(columns: &[Vec<f64>], noise: &ArModel, samples: usize)
     Covariances {
         white: scaled(&inverse * noise.variance),
         correlated: scaled(&inverse * middle * &inverse),
-        weak_direction: loose,
+        weak_direction: is_loose.then(along),
     }
 }
 

@@ -1,39 +1,51 @@
-//! Where the descent starts: least squares behind a state-variable filter at
-//! several bandwidths and dead times, and models of one pole fewer.
+//! Initial models: least squares with state-variable filters at several bandwidths and dead
+//! times (Young 1970), and models with one pole fewer.
 
 use nalgebra::Complex;
 
 use super::error::FitError;
-use super::levenberg::{Minimum, minimise, solve_linear};
-use super::linear::least_squares;
 use super::problem::FitProblem;
 use super::settings::{DeadTime, OutputLevel};
+use crate::numeric::levenberg_marquardt::{Descent, LeastSquares, Minimum, minimise};
+use crate::numeric::linear::least_squares;
 use crate::numeric::lti::{Between, Simulator, TransferFunction, polynomial};
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{to_count, to_f64};
+use crate::numeric::row::dot;
 
-/// Bandwidths of the filter, evenly spread in their logarithm.
+/// Bandwidths of the filter, evenly spaced in their logarithm. A choice between time and the
+/// risk of a local minimum, as the next four.
 const BANDWIDTHS: u32 = 5;
-/// Dead times that are tried at the most.
+/// Largest number of dead times.
 const MAX_DEAD_TIMES: usize = 25;
-/// Starts that are followed a few steps, and to the end.
+/// Initial models that are followed for a few steps, and to the end.
 const FOLLOWED_STARTS: usize = 5;
 const FINAL_STARTS: usize = 2;
 const FIRST_STEPS: usize = 8;
 const MAX_STEPS: usize = 200;
 
-/// A longer record is thinned out to at least this many samples for the search;
-/// the last descent is on all of them.
+/// Relative gain of a step, times the number of samples, that is negligible: one standard error
+/// changes the sum of squares by one residual variance.
+const MIN_GAIN: f64 = 1e-5;
+
+/// A longer record is decimated to at least this many samples for the search; the last descent
+/// uses all of them.
 const MIN_SEARCH_SAMPLES: usize = 2000;
 
-/// The best model that any of the starts leads to.
+/// The best model from any initial model.
 pub(super) fn best(problem: &FitProblem) -> Result<Minimum, FitError> {
     let factor = problem.output.len() / MIN_SEARCH_SAMPLES;
     let followed = if factor < 2 { search(problem) } else { search(&problem.decimated(factor)) };
-    let ends = followed.iter().filter_map(|start| minimise(problem, &start.theta, MAX_STEPS));
+    let ends = followed.iter().filter_map(|start| descend(problem, start, MAX_STEPS));
     ends.min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares)).ok_or(FitError::NoStart)
 }
 
-/// The few models from which it is worth while to go on.
+fn descend(problem: &FitProblem, start: &Minimum, max_steps: usize) -> Option<Minimum> {
+    let min_relative_gain = MIN_GAIN / to_f64(problem.output.len());
+    let descent = Descent { max_steps, max_tries: 12, min_relative_gain, max_idle_steps: 2 };
+    minimise(problem, &start.theta, descent)
+}
+
+/// The few models that are followed further.
 fn search(problem: &FitProblem) -> Vec<Minimum> {
     let mut starts = candidates(problem);
     starts.sort_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
@@ -43,14 +55,14 @@ fn search(problem: &FitProblem) -> Vec<Minimum> {
         starts.extend(from_fewer_poles(problem));
     }
     let mut followed: Vec<Minimum> =
-        starts.iter().filter_map(|start| minimise(problem, &start.theta, FIRST_STEPS)).collect();
+        starts.iter().filter_map(|start| descend(problem, start, FIRST_STEPS)).collect();
     followed.sort_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
     followed.truncate(FINAL_STARTS);
     followed
 }
 
-/// The best model with a pole fewer and another that is hardly seen: a model
-/// with more poles is then never worse.
+/// The best model with one pole fewer and a further pole of little effect: a model with more
+/// poles is then never worse.
 fn from_fewer_poles(problem: &FitProblem) -> Vec<Minimum> {
     let poles = problem.poles - 1;
     let fewer = FitProblem { poles, zeros: problem.zeros.min(poles), ..problem.clone() };
@@ -63,8 +75,8 @@ fn from_fewer_poles(problem: &FitProblem) -> Vec<Minimum> {
     [0.1 * problem.dt_s, problem.dt_s, 0.2 * slow].into_iter().filter_map(with_pole).collect()
 }
 
-/// A start of a denominator (highest power first, of any scale) and a dead
-/// time, with the numerator that fits best.
+/// An initial model from a denominator (highest power first, any scale) and a dead time, with
+/// the best numerator.
 fn with_linear_part(problem: &FitProblem, den: &[f64], dead_time_s: f64) -> Option<Minimum> {
     let layout = problem.layout();
     let mut theta = vec![0.0; layout.total];
@@ -72,12 +84,31 @@ fn with_linear_part(problem: &FitProblem, den: &[f64], dead_time_s: f64) -> Opti
     for (i, c) in den.iter().rev().skip(1).enumerate() {
         theta[layout.poles_from + i] = c / last;
     }
-    if let Some(place) = layout.dead_time {
-        theta[place] = dead_time_s;
+    if let Some(position) = layout.dead_time {
+        theta[position] = dead_time_s;
     }
     problem.project(&mut theta);
-    let squares = solve_linear(problem, &mut theta)?;
-    Some(Minimum { theta, sum_of_squares: squares })
+    let sum_of_squares = solve_linear(problem, &mut theta)?;
+    Some(Minimum { theta, sum_of_squares })
+}
+
+/// Sets the linear parameters to their least-squares values.
+fn solve_linear(problem: &FitProblem, theta: &mut [f64]) -> Option<f64> {
+    let (numbers, columns) = problem.linear_columns(theta)?;
+    let known = match problem.level {
+        OutputLevel::Known(level) => level,
+        OutputLevel::Estimated => 0.0,
+    };
+    let target: Vec<f64> = problem.output.iter().map(|y| y - known).collect();
+    let found = least_squares(&columns, &target)?;
+    let mut left = target;
+    for ((number, value), column) in numbers.into_iter().zip(&found).zip(&columns) {
+        theta[number] = *value;
+        for (left, c) in left.iter_mut().zip(column) {
+            *left -= value * c;
+        }
+    }
+    Some(dot(&left, &left))
 }
 
 fn candidates(problem: &FitProblem) -> Vec<Minimum> {
@@ -96,26 +127,25 @@ fn candidates(problem: &FitProblem) -> Vec<Minimum> {
     found
 }
 
-/// Whole steps where the range is narrow, spread over it where it is wide.
+/// Whole steps of a narrow range, evenly spaced in a wide one.
 fn dead_times(problem: &FitProblem) -> Vec<f64> {
-    let DeadTime::Estimated { min_s: least_s, max_s: most_s } = problem.dead_time else {
+    let DeadTime::Estimated { min_s, max_s } = problem.dead_time else {
         return vec![problem.dead_time_s(&[])];
     };
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
-    let steps = ((most_s - least_s) / problem.dt_s).ceil() as usize;
+    let steps = to_count(((max_s - min_s) / problem.dt_s).ceil());
     let count = steps.clamp(1, MAX_DEAD_TIMES - 1);
-    let at = |k: usize| least_s + (most_s - least_s) * to_f64(k) / to_f64(count);
+    let at = |k: usize| min_s + (max_s - min_s) * to_f64(k) / to_f64(count);
     (0..=count).map(at).collect()
 }
 
-/// Input, output and a constant behind s^j/(s + λ)^n.
+/// Input, output and a constant, filtered by s^j/(s + λ)^n.
 struct Filtered {
     /// j from 0 to the number of zeros.
     input: Vec<Vec<f64>>,
     /// j from 0 to the number of poles.
     output: Vec<Vec<f64>>,
-    /// j from 0 to one below the number of poles; none where the level is known
-    /// and the record begins at rest.
+    /// j from 0 to one below the number of poles; empty where the level is known and the record
+    /// begins at rest.
     constant: Vec<Vec<f64>>,
 }
 
@@ -138,23 +168,16 @@ impl Filtered {
         let unsettled = problem.has_free_response || problem.level == OutputLevel::Estimated;
         let ones = vec![1.0; output.len()];
         let constants = if unsettled { n } else { 0 };
-        Some(
-            Self {
-                input: (0..=problem.zeros)
-                    .map(|j| through(&problem.input, j, problem.between))
-                    .collect::<Option<_>>()?,
-                output: (0..=n)
-                    .map(|j| through(&output, j, Between::Linear))
-                    .collect::<Option<_>>()?,
-                constant: (0..constants)
-                    .map(|j| through(&ones, j, Between::Held))
-                    .collect::<Option<_>>()?,
-            }
-            .unscaled(bandwidth, n),
-        )
+        let rows = |row: &[f64], count: usize, between: Between| {
+            (0..count).map(|j| through(row, j, between)).collect::<Option<Vec<_>>>()
+        };
+        let input = rows(&problem.input, problem.zeros + 1, problem.between)?;
+        let output = rows(&output, n + 1, Between::Linear)?;
+        let constant = rows(&ones, constants, Between::Held)?;
+        Some(Self { input, output, constant }.unscaled(bandwidth, n))
     }
 
-    /// The filter was run with a gain of about one; back to s^j/(s + λ)^n.
+    /// From the filter of unit gain to s^j/(s + λ)^n.
     fn unscaled(mut self, bandwidth: f64, n: usize) -> Self {
         let power = |j: usize| (j..n).fold(1.0, |p, _| p * bandwidth);
         for rows in [&mut self.input, &mut self.output, &mut self.constant] {
@@ -168,10 +191,9 @@ impl Filtered {
         self
     }
 
-    /// A stable denominator: s^n·y = −Σ a(j)·s^j·y + Σ b(j)·s^j·u(t − L), solved for a.
+    /// A stable denominator from s^n·y = −Σ a(j)·s^j·y + Σ b(j)·s^j·u(t − L).
     fn denominator(&self, problem: &FitProblem, dead_time_s: f64) -> Option<Vec<f64>> {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
-        let delay = (dead_time_s / problem.dt_s).round() as usize;
+        let delay = to_count((dead_time_s / problem.dt_s).round());
         let delayed = |row: &Vec<f64>| -> Vec<f64> {
             let zeros = std::iter::repeat_n(0.0, delay.min(row.len()));
             zeros.chain(row.iter().copied()).take(row.len()).collect()
@@ -187,8 +209,8 @@ impl Filtered {
     }
 }
 
-/// The same with poles that lie on the right mirrored, and none slower than the
-/// record or faster than a tenth of a step.
+/// The same with unstable poles mirrored, and none slower than the record or faster than a
+/// tenth of a step.
 fn stabilised(monic: &[f64], problem: &FitProblem) -> Vec<f64> {
     let (least, most) = (1.0 / problem.duration_s(), 10.0 / problem.dt_s);
     let mend = |pole: &Complex<f64>| {

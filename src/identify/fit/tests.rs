@@ -40,7 +40,7 @@ fn plus(a: &[f64], b: &[f64]) -> Vec<f64> {
 }
 
 fn spread_of(row: &[f64]) -> f64 {
-    super::row::standard_deviation(row)
+    crate::numeric::average::standard_deviation(row)
 }
 
 /// A maximal-length sequence of nine bits as −1 and 1.

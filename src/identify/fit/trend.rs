@@ -1,28 +1,29 @@
-//! A straight line in time through a row: how much of it is drift.
+//! A straight line in time through a row, and how much of it is drift.
 
 use super::autoregression::ArModel;
 use crate::numeric::number::to_f64;
 
-/// Least F ratio at which a line is more than chance.
+/// F ratio from which a line is significant. Derived: with many degrees of freedom the
+/// probability of 15.1 by chance is 1e-4.
 const MIN_F_RATIO: f64 = 15.0;
-/// A smaller share of a row is of no account.
+/// Explained fraction below which a line is negligible.
 const MIN_EXPLAINED: f64 = 0.1;
-/// A line that explains more than this share of a row dominates it.
+/// Explained fraction above which a line dominates a row.
 pub const DOMINANT_FRACTION: f64 = 0.5;
 
-/// The line that is nearest to a row.
+/// The least-squares line of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trend {
-    /// Share of the row's variance that it explains, 0 to 1.
+    /// Fraction of the variance that it explains.
     pub explained_fraction: f64,
-    /// By how much it rises from the first sample to the last.
+    /// Its change from the first sample to the last.
     pub rise: f64,
     /// Sum of squares about the line.
     pub residual_sum_of_squares: f64,
 }
 
 impl Trend {
-    /// Of a row at even times; of fewer than two samples there is none.
+    /// For a row at even times; zero for fewer than two samples.
     pub fn of(row: &[f64]) -> Self {
         let n = to_f64(row.len().max(1));
         let mean = row.iter().sum::<f64>() / n;
@@ -46,16 +47,15 @@ impl Trend {
         }
     }
 
-    /// A row without its line; the row's mean stays.
+    /// A row without its line; the mean stays.
     pub fn detrend(&self, row: &[f64]) -> Vec<f64> {
         let last = to_f64(row.len().max(2)) - 1.0;
         let slope = self.rise / last;
         row.iter().enumerate().map(|(k, value)| value - slope * (to_f64(k) - 0.5 * last)).collect()
     }
 
-    /// The line through a row where it is more than chance: more than a tenth of
-    /// the row, and more than as few samples would show as what it leaves says as
-    /// much as.
+    /// The line of a row where it is significant: more than a tenth of the variance, and an F
+    /// ratio over the independent samples above the bound.
     pub fn significant_in(row: &[f64]) -> Option<Self> {
         let trend = Self::of(row);
         if trend.explained_fraction < MIN_EXPLAINED {
@@ -115,5 +115,11 @@ mod tests {
             let seen = Trend::significant_in(&drifts).unwrap();
             assert!((seen.rise - 2.0).abs() < 0.8, "{seen:?}");
         }
+    }
+
+    #[test]
+    fn the_f_ratio_is_one_of_ten_thousand_by_chance() {
+        let phi = crate::numeric::normal_distribution::cumulative(MIN_F_RATIO.sqrt());
+        assert!((2.0 * (1.0 - phi) - 1e-4).abs() < 1e-5);
     }
 }

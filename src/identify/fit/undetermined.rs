@@ -1,44 +1,43 @@
-//! What the data leave open, told so that a reader knows what to leave out.
+//! What the data do not determine, with a message that says which parameters to leave out.
 
 use std::fmt;
 
-/// What is not determined.
+/// What the data do not determine.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Undetermined {
-    /// The highest coefficient of the denominator does not differ from zero, so
-    /// that the data show a pole fewer. Each parameter of a form that is told
-    /// over that coefficient may look well determined beside the others.
+    /// The highest coefficient of the denominator does not differ from zero, so that one pole
+    /// fewer is enough. Parameters that are divided by that coefficient may nevertheless look
+    /// well determined.
     Pole {
         /// Poles that were asked for.
         poles: usize,
         /// The coefficient of the highest power of s in a denominator that ends
         /// with 1.
         coefficient: f64,
-        /// Its standard error; infinite where nothing holds it.
+        /// Its standard error; infinite if undetermined.
         sigma: f64,
-        /// A pole and a zero that all but cancel \[1/s\].
+        /// A pole and a zero that nearly cancel \[1/s\].
         pair: Option<(f64, f64)>,
     },
-    /// The gain at rest does not differ from zero: the output goes its own way.
+    /// The static gain does not differ from zero: the output does not depend on the input.
     Gain {
         /// The gain.
         gain: f64,
-        /// Its standard error; infinite where nothing holds it.
+        /// Its standard error; infinite if undetermined.
         sigma: f64,
     },
     /// The dead time may be none, or several time constants.
     DeadTime {
         /// The dead time \[s\].
         dead_time_s: f64,
-        /// Its standard error \[s\]; infinite where nothing holds it.
+        /// Its standard error \[s\]; infinite if undetermined.
         sigma_s: f64,
     },
-    /// Parameters of which one makes up for a change of the others.
+    /// Parameters whose changes compensate each other.
     Combination {
         /// Their names.
         names: Vec<String>,
-        /// A pole and a zero that all but cancel \[1/s\]: the data do not tell
-        /// where.
+        /// A pole and a zero that nearly cancel \[1/s\], at an undetermined position.
         pair: Option<(f64, f64)>,
     },
 }

@@ -1,4 +1,4 @@
-//! What is written is read again, and what is wrong is told.
+//! What is written is read again, and all violations are reported.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
@@ -46,7 +46,7 @@ fn what_is_written_is_read_again() {
 }
 
 #[test]
-fn everything_that_is_wrong_is_told_at_once() {
+fn all_violations_are_reported_at_once() {
     let text = to_toml(&model(), &[])
         .replace("version = 1", "version = 2\nmatrial = \"PLA\"")
         .replace("unit = \"rpm\"", "unit = \"turns\"")

@@ -5,8 +5,7 @@ use std::fmt::Write;
 use super::{Conditions, FitSummary, ModelFile, ParameterUncertainty};
 use crate::core::quantity::Quantity;
 
-/// The text of a model's file; each note becomes a comment at its head. Numbers
-/// keep every digit.
+/// The text of a model's file; the notes become comments at its head. Numbers keep every digit.
 pub fn to_toml(model: &ModelFile, notes: &[String]) -> String {
     let mut text = String::new();
     for line in notes.iter().flat_map(|note| note.lines()) {
@@ -34,7 +33,7 @@ pub fn to_toml(model: &ModelFile, notes: &[String]) -> String {
     text
 }
 
-/// What a file holds for, as far as it is known.
+/// The conditions, as far as they are known.
 pub(in crate::identify) fn put_conditions(text: &mut String, setting: &Conditions) {
     if let Some(material) = &setting.material {
         put(text, &format!("material = {}", quoted(material)));

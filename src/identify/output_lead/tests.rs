@@ -43,16 +43,16 @@ fn ahead_by(input: &[f64], output: &[f64], steps: usize) -> Samples {
 }
 
 #[test]
-fn a_clock_that_is_behind_is_told_with_how_much() {
+fn a_clock_that_is_behind_is_reported_with_its_lead() {
     let machine = model(&[2.0], &[0.36, 0.72, 1.0], 0.3);
     for (seed, steps) in [(1, 26), (2, 40), (3, 70), (4, 90)] {
         let (input, output) = logged(&machine, seed);
         let samples = ahead_by(&input, &output, steps);
         let found = fit(&samples, &settings()).ok();
-        let told = output_lead(&samples, &settings(), found.as_ref()).unwrap();
+        let reported = output_lead(&samples, &settings(), found.as_ref()).unwrap();
         let truth_s = f64::from(u32::try_from(steps).unwrap()) * DT_S - 0.3;
-        assert!((told.lead_s - truth_s).abs() < 0.3, "{told:?}");
-        assert!(told.fit_percent > told.causal_fit_percent + 5.0, "{told:?}");
+        assert!((reported.lead_s - truth_s).abs() < 0.3, "{reported:?}");
+        assert!(reported.fit_percent > reported.causal_fit_percent + 5.0, "{reported:?}");
     }
 }
 

@@ -1,33 +1,26 @@
-//! The delay of the first flow over the pause before it: a void that opens and
-//! must be filled.
+//! Delay of the first flow over the pause before it: a void that opens and must be filled.
 
 use super::error::StartStopFitError;
 use super::estimate::ObservedStart;
 use super::least_squares::minimise;
 use crate::numeric::number::to_f64;
 
-/// Parameters of the delay; see [`crate::identify::start_stop::parameters::StartStop`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct IdleDelay {
-    pub first_flow_s: f64,
-    pub void_mm3: f64,
-    pub idle_time_constant_s: f64,
-}
-
-/// What was found of the delays.
+/// Fitted delays.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DelayFit {
-    pub value: IdleDelay,
-    pub sigma: IdleDelay,
+    /// L \[s\], V∞ \[mm³\] and τ \[s\].
+    pub value: [f64; 3],
+    /// Their standard errors.
+    pub sigma: [f64; 3],
     /// Standard deviation about the curve \[s\].
     pub residual_sigma_s: f64,
 }
 
-/// A growth of fewer standard deviations of a delay is none…
+/// Growth in standard deviations of a delay below which there is none…
 const MIN_SIGMAS: f64 = 4.0;
-/// …nor is one that no robot notices \[s\].
+/// …or in seconds, below which it is irrelevant for a robot \[s\].
 const MIN_GROWTH_S: f64 = 0.01;
-/// A standard error above this share of a time constant leaves it open.
+/// Relative standard error above which a time constant is undetermined.
 const MAX_RELATIVE_SIGMA: f64 = 0.5;
 
 /// Least squares of L + V∞·(1 − e^(−idle/τ))/Q.
@@ -51,25 +44,19 @@ pub(super) fn fit(starts: &[ObservedStart]) -> Result<DelayFit, StartStopFitErro
     let solved = ladder.filter_map(|tau| {
         minimise(&residuals, &[0.0, latest_s * flow, tau.min(longest_s)], &ranges)
     });
-    let best = solved
-        .min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares))
-        .ok_or(nothing.clone())?;
-    let of = |row: &[f64]| match *row {
-        [first_flow_s, void_mm3, idle_time_constant_s] => {
-            Some(IdleDelay { first_flow_s, void_mm3, idle_time_constant_s })
-        }
-        _ => None,
-    };
-    let (value, sigma) = of(&best.at).zip(of(&best.sigma)).ok_or(nothing)?;
-    let scatter_s = (best.sum_of_squares / (to_f64(starts.len()) - 3.0).max(1.0)).sqrt();
-    let found = DelayFit { value, sigma, residual_sigma_s: scatter_s };
+    let best = solved.min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
+    let best = best.ok_or(nothing.clone())?;
+    let row = |row: Vec<f64>| <[f64; 3]>::try_from(row).ok();
+    let (value, sigma) = row(best.at).zip(row(best.sigma)).ok_or(nothing)?;
+    let residual_sigma_s = (best.sum_of_squares / (to_f64(starts.len()) - 3.0).max(1.0)).sqrt();
+    let found = DelayFit { value, sigma, residual_sigma_s };
     check(&found, [shortest_s, longest_s], flow)?;
     Ok(found)
 }
 
 fn check(found: &DelayFit, pauses_s: [f64; 2], flow: f64) -> Result<(), StartStopFitError> {
     let [shortest_s, longest_s] = pauses_s;
-    let IdleDelay { void_mm3, idle_time_constant_s: found_s, .. } = found.value;
+    let [_, void_mm3, found_s] = found.value;
     let left = |idle_s: f64| void_mm3 * libm::exp(-idle_s / found_s);
     let grows_s = (left(shortest_s) - left(longest_s)) / flow;
     let sigma_s = found.residual_sigma_s;
@@ -77,7 +64,7 @@ fn check(found: &DelayFit, pauses_s: [f64; 2], flow: f64) -> Result<(), StartSto
         let grown = StartStopFitError::DelayDoesNotGrow { grows_s, sigma_s, shortest_s, longest_s };
         return Err(grown);
     }
-    let sigma_s = found.sigma.idle_time_constant_s;
+    let [_, _, sigma_s] = found.sigma;
     let bracketed = found_s < longest_s && found_s > 0.5 * shortest_s;
     if bracketed && sigma_s < MAX_RELATIVE_SIGMA * found_s {
         return Ok(());

@@ -1,5 +1,4 @@
-//! Starts and stops in a recording: when the command says so, and the flow
-//! about each.
+//! Starts and stops in a recording, by the command, with the flow about each.
 
 use super::error::StartStopFitError;
 use crate::identify::grid::usual_step;
@@ -7,29 +6,30 @@ use crate::identify::series::TimeSeries;
 use crate::numeric::number::to_f64;
 use crate::numeric::rank;
 
-/// A command above this share of its largest value runs the pump.
+/// Command over its largest value above which the pump runs.
 const RUN_FRACTION: f64 = 0.05;
-/// A start is looked at until then at the latest \[s\].
+/// Longest observation of a start \[s\].
 const MAX_START_S: f64 = 30.0;
-/// A stop is looked at for so long \[s\].
+/// Longest observation of a stop \[s\].
 const MAX_STOP_S: f64 = 6.0;
-/// A stop that was looked at for less tells nothing of the drool \[s\].
+/// Shortest observation of a stop that shows the drool \[s\].
 const MIN_STOP_S: f64 = 0.5;
-/// Less than this share of the samples tells neither.
+/// Smallest fraction of the samples that must be present.
 const MIN_COVERAGE: f64 = 0.8;
-/// A run tells its flow in this share at its end.
+/// Fraction at the end of a run from which its flow is taken.
 const STEADY_FRACTION: f64 = 0.4;
-/// A flow, or a command, that changes by more than this share is not even.
+/// Relative change of a flow, or of a command, that is still steady.
 const STEADY_TOLERANCE: f64 = 0.05;
-/// Three standard deviations of the difference of the medians of two halves, over
-/// the median step from a sample to the next and √n: 3·1.2533·2/(0.6745·√2).
+/// Derived: 3·1.2533·2/(0.6745·√2), three standard deviations of the difference of the medians
+/// of two halves, over the median change from sample to sample and √n.
 const NOISE_FACTOR: f64 = 7.88;
-/// A run whose flow is below this share of the largest has none…
+/// Flow over the largest one below which a run has none…
 const NO_FLOW_FRACTION: f64 = 0.1;
-/// …unless it is shorter than this share of the usual one.
+/// …unless it is shorter than this fraction of the median run.
 const SHORT_FRACTION: f64 = 0.5;
+/// Smallest number of samples of the flow.
 const MIN_SAMPLES: usize = 50;
-/// Fewer samples of an even flow do not tell it.
+/// Smallest number of samples of a steady flow.
 const MIN_STEADY_SAMPLES: usize = 10;
 
 /// Flow after a change of the command.
@@ -37,20 +37,20 @@ const MIN_STEADY_SAMPLES: usize = 10;
 pub(super) struct Episode {
     /// When the command changed \[s\].
     pub at_s: f64,
-    /// For a start: how long the pump had stood. For a stop: how long it then
-    /// stood, as far as that was seen \[s\].
+    /// For a start: the pause before it. For a stop: the pause after it, as far as it was
+    /// recorded \[s\].
     pub idle_s: f64,
-    /// Even flow of the run that begins or ends \[mm³/s\].
+    /// Steady flow of the run that begins or ends \[mm³/s\].
     pub flow: f64,
-    /// Even flow of the run before the pause \[mm³/s\].
+    /// Steady flow of the run before the pause \[mm³/s\].
     pub before: f64,
-    /// Time since the change \[s\] and flow over the even one.
+    /// Time since the change \[s\] and flow over the steady one.
     pub samples: Vec<(f64, f64)>,
     /// From one sample to the next \[s\].
     pub step_s: f64,
 }
 
-/// What a recording holds.
+/// Starts and stops of a recording.
 #[derive(Debug, Clone)]
 pub(super) struct Episodes {
     pub runs: usize,
@@ -58,19 +58,19 @@ pub(super) struct Episodes {
     pub stops: Vec<Episode>,
 }
 
-/// A time in which the pump is told to run, and its even flow.
+/// A time in which the pump runs by the command, and its steady flow.
 #[derive(Debug, Clone, Copy)]
 struct Run {
     from_s: f64,
     to_s: f64,
-    /// Whether it was told to stop at its end; otherwise the record ends.
+    /// Whether it ends with a stop; otherwise with the record.
     is_stop_commanded: bool,
     flow: f64,
-    /// Whether the command was the same all along and the flow even at its end.
+    /// Whether the command was constant and the flow steady at its end.
     is_steady: bool,
 }
 
-/// Finds starts after a pause that is known, and stops of an even flow.
+/// Finds starts after a known pause, and stops of a steady flow.
 pub(super) fn find(command: &TimeSeries, flow: &TimeSeries) -> Result<Episodes, StartStopFitError> {
     for (what, series, needed) in [("the command", command, 2), ("the flow", flow, MIN_SAMPLES)] {
         if series.len() < needed {
@@ -83,10 +83,8 @@ pub(super) fn find(command: &TimeSeries, flow: &TimeSeries) -> Result<Episodes, 
     for run in &mut runs {
         run.is_steady &= run.flow > NO_FLOW_FRACTION * most;
     }
-    let starts: Vec<Episode> = runs
-        .windows(2)
-        .filter_map(|pair| if let [last, run] = pair { start(flow, last, run) } else { None })
-        .collect();
+    let pairs = runs.windows(2);
+    let starts: Vec<Episode> = pairs.filter_map(|pair| start(flow, &pair[0], &pair[1])).collect();
     let ends_s = flow.time_s.last().copied().unwrap_or(0.0);
     let nexts = runs.iter().skip(1).map(|next| next.from_s).chain([ends_s]);
     let stops: Vec<Episode> =
@@ -108,7 +106,7 @@ fn stop(flow: &TimeSeries, run: &Run, next_s: f64) -> Option<Episode> {
     is_usable.then(|| episode(flow, [run.to_s, to_s], idle_s, [run.flow, run.flow]))?
 }
 
-/// The flow between two moments; none where much of it was lost.
+/// The flow between two moments; `None` where many samples are lost.
 fn episode(
     flow: &TimeSeries,
     [from_s, to_s]: [f64; 2],
@@ -129,8 +127,11 @@ fn check_count(
     stops: &[Episode],
     runs: &[Run],
 ) -> Result<(), StartStopFitError> {
+    /// Smallest number of starts: the delay has three parameters.
     const MIN_STARTS: usize = 5;
+    /// Smallest number of stops for a standard error.
     const MIN_STOPS: usize = 3;
+    /// Smallest ratio of the longest to the shortest pause that shows a time constant.
     const MIN_PAUSE_RATIO: f64 = 5.0;
     if starts.len() < MIN_STARTS {
         let (found, left_out) = (starts.len(), runs.len() - starts.len());
@@ -142,11 +143,8 @@ fn check_count(
     let idle = || starts.iter().map(|start| start.idle_s);
     let (shortest_s, longest_s) = (idle().fold(f64::MAX, f64::min), idle().fold(0.0, f64::max));
     if longest_s < MIN_PAUSE_RATIO * shortest_s {
-        return Err(StartStopFitError::PausesTooSimilar {
-            shortest_s,
-            longest_s,
-            factor: MIN_PAUSE_RATIO,
-        });
+        let factor = MIN_PAUSE_RATIO;
+        return Err(StartStopFitError::PausesTooSimilar { shortest_s, longest_s, factor });
     }
     Ok(())
 }
@@ -179,7 +177,7 @@ fn runs(command: &TimeSeries, flow: &TimeSeries) -> Result<Vec<Run>, StartStopFi
     Ok(found)
 }
 
-/// What the pump is told in a run.
+/// The command of a run.
 #[derive(Debug, Clone, Copy)]
 struct CommandedRun {
     from_s: f64,
@@ -194,10 +192,9 @@ fn run(flow: &TimeSeries, command: &CommandedRun, to_s: f64, is_stop_commanded: 
     let part = |from_s: f64, to_s: f64| rank::median(&mut flow.within(from_s, to_s).values);
     let [early, late] = [part(to_s - 2.0 * half_s, to_s - half_s), part(to_s - half_s, to_s)];
     let even = rank::median(&mut end.clone()).unwrap_or(0.0);
-    let mut off: Vec<f64> =
-        end.windows(2).filter_map(|pair| Some((pair.get(1)? - pair.first()?).abs())).collect();
-    let chance = NOISE_FACTOR * rank::median(&mut off).unwrap_or(0.0) / to_f64(end.len()).sqrt();
-    // A flow that still comes up grows from one half to the other.
+    let changes = rank::median_of(end.windows(2).map(|pair| (pair[1] - pair[0]).abs()));
+    let chance = NOISE_FACTOR * changes.unwrap_or(0.0) / to_f64(end.len()).sqrt();
+    // A flow that is still rising grows from one half to the other.
     let grows = late.zip(early).map_or(f64::INFINITY, |(late, early)| (late - early).abs());
     let is_level = command.high - command.low <= STEADY_TOLERANCE * command.high;
     let is_even = is_level
@@ -208,8 +205,7 @@ fn run(flow: &TimeSeries, command: &CommandedRun, to_s: f64, is_stop_commanded: 
 }
 
 fn check_flow(runs: &[Run], most: f64) -> Result<(), StartStopFitError> {
-    let mut lasted: Vec<f64> = runs.iter().map(|run| run.to_s - run.from_s).collect();
-    let usual_s = rank::median(&mut lasted).unwrap_or(0.0);
+    let usual_s = rank::median_of(runs.iter().map(|run| run.to_s - run.from_s)).unwrap_or(0.0);
     let dry = runs.iter().find(|run| {
         run.flow <= NO_FLOW_FRACTION * most && run.to_s - run.from_s >= SHORT_FRACTION * usual_s
     });
@@ -221,5 +217,15 @@ fn check_flow(runs: &[Run], most: f64) -> Result<(), StartStopFitError> {
             flow_mm3_per_s: run.flow,
             max_mm3_per_s: most,
         }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_noise_factor_is_its_formula() {
+        assert!((NOISE_FACTOR - 3.0 * 1.2533 * 2.0 / (0.6745 * 2.0_f64.sqrt())).abs() < 0.005);
     }
 }

@@ -1,11 +1,11 @@
-//! Why a recording does not tell how an extruder starts and stops.
+//! Why a recording does not determine starts and stops.
 
 use crate::identify::digits::three_digits;
 
-/// What is wrong with a recording, with what was found.
+/// What is wrong with a recording.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StartStopFitError {
-    /// Nothing to look at.
+    /// Too few samples.
     #[error("{what} has {found} samples; it needs at least {needed}")]
     TooFewSamples {
         /// `the command` or `the flow`.
@@ -15,13 +15,13 @@ pub enum StartStopFitError {
         /// How many would do.
         needed: usize,
     },
-    /// The pump was never told to run.
+    /// The pump never runs.
     #[error("the command never exceeds zero (its largest value is {}); is it the right column?", three_digits(*.max))]
     NeverCommanded {
         /// Largest value of the command.
         max: f64,
     },
-    /// Samples so far apart that a start is over before the next one.
+    /// A start is shorter than the sampling interval.
     #[error(
         "the flow is sampled every {step_s:.3} s and comes up within {rise_s:.3} s, in less than one \
          sample; sample it at least three times as often"
@@ -46,7 +46,7 @@ pub enum StartStopFitError {
         /// was too short or its command changed, or too many samples are missing.
         left_out: usize,
     },
-    /// Too few stops to tell how alike they are.
+    /// Too few stops for a standard error.
     #[error("{found} stops that can be looked at; it takes at least {needed}")]
     TooFewStops {
         /// Stops that count.
@@ -54,7 +54,7 @@ pub enum StartStopFitError {
         /// Stops that would do.
         needed: usize,
     },
-    /// Pauses that do not tell how the delay grows.
+    /// The pauses do not show how the delay grows.
     #[error(
         "all pauses are alike: from {} to {} s. How the delay grows with the pause shows only in \
          pauses that differ by a factor of {factor} or more", three_digits(*.shortest_s), three_digits(*.longest_s)
@@ -67,39 +67,39 @@ pub enum StartStopFitError {
         /// What they must differ by.
         factor: f64,
     },
-    /// The pump was told to run and nothing came.
+    /// The pump runs without flow.
     #[error(
         "the pump was commanded to run at {at_s:.2} s for {lasted_s:.1} s and no flow came: \
          {} mm³/s, in other runs up to {} mm³/s. Look for a blocked nozzle or a log of another bead",
         three_digits(*.flow_mm3_per_s), three_digits(*.max_mm3_per_s)
     )]
     NoFlow {
-        /// When it was told \[s\].
+        /// When it starts \[s\].
         at_s: f64,
-        /// How long it was told to run \[s\].
+        /// Duration of the run \[s\].
         lasted_s: f64,
         /// Flow at the end of that.
         flow_mm3_per_s: f64,
         /// Largest flow at the end of a run.
         max_mm3_per_s: f64,
     },
-    /// Flow that does not cease.
+    /// The flow does not stop.
     #[error(
         "{observed_s:.1} s after the stop at {at_s:.2} s, which was looked at longest, the flow is still \
          {percent:.0} % of that before; expected below {max_percent:.0} %. Does the command stop the \
          pump, is the zero of the flow right?"
     )]
     FlowContinues {
-        /// When the pump was told to stop \[s\].
+        /// When the pump stops \[s\].
         at_s: f64,
-        /// How long after that it was looked at \[s\].
+        /// Observation time after that \[s\].
         observed_s: f64,
-        /// What is left of the flow \[%\].
+        /// Remaining flow \[%\].
         percent: f64,
-        /// What may be left \[%\].
+        /// Largest accepted remaining flow \[%\].
         max_percent: f64,
     },
-    /// The delay has nothing to do with the pause.
+    /// The delay does not depend on the pause.
     #[error(
         "the delay of the first flow does not grow with the pause: by {grows_s:.3} ± {sigma_s:.3} s \
          from a pause of {} to one of {} s. A fixed delay is enough, or shorter pauses are missing",
@@ -132,7 +132,7 @@ pub enum StartStopFitError {
         /// Longest pause \[s\].
         longest_s: f64,
     },
-    /// Least squares that found nothing.
+    /// Least squares without a result.
     #[error("no {what} could be fitted to the flow; does the flow follow the command at all?")]
     NoFit {
         /// `rise`, `fall` or `delay`.

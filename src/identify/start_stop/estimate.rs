@@ -1,45 +1,45 @@
-//! What was found of an extruder's starts and stops.
+//! Estimated starts and stops of an extruder.
 
 use super::parameters::StartStop;
 
-/// A start as it was seen.
+/// An observed start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObservedStart {
     /// When the command began \[s\].
     pub at_s: f64,
-    /// How long the pump had stood \[s\].
+    /// Pause before it \[s\].
     pub idle_s: f64,
-    /// Flow that it came to \[mm³/s\].
+    /// Steady flow after it \[mm³/s\].
     pub flow_mm3_per_s: f64,
     /// From the command to the first flow \[s\].
     pub delay_s: f64,
-    /// What the fitted model says of it \[s\].
+    /// The same by the fitted model \[s\].
     pub modelled_s: f64,
 }
 
-/// A stop as it was seen.
+/// An observed stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObservedStop {
     /// When the command ended \[s\].
     pub at_s: f64,
     /// Flow before it \[mm³/s\].
     pub flow_mm3_per_s: f64,
-    /// How long the flow was looked at after it \[s\].
+    /// Observation time \[s\].
     pub observed_s: f64,
-    /// What came in that time, with what was on its way \[mm³\].
+    /// Volume in that time, with the material under way \[mm³\].
     pub volume_mm3: f64,
 }
 
-/// What was found.
+/// The estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StartStopFit {
     /// The parameters.
     pub parameters: StartStop,
     /// Their standard errors, each in its own unit.
     pub sigma: StartStop,
-    /// Runs of the pump, with those that tell nothing.
+    /// Runs of the pump, those without information included.
     pub runs: usize,
-    /// Starts after a pause that is known.
+    /// Starts after a known pause.
     pub starts: Vec<ObservedStart>,
     /// Stops.
     pub stops: Vec<ObservedStop>,

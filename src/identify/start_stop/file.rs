@@ -5,7 +5,7 @@ use super::parameters::StartStop;
 use crate::document::{Document, Problems, Table};
 use crate::identify::model_file::{Conditions, number, put, put_conditions, read_conditions, row};
 
-/// A parameter as files and tables name it.
+/// A parameter in files and tables.
 #[derive(Debug, Clone, Copy)]
 pub struct ParameterKey {
     /// Its key, which ends with its unit.
@@ -16,74 +16,53 @@ pub struct ParameterKey {
     pub unit: &'static str,
     /// What it is.
     pub about: &'static str,
-    /// Whether zero will not do.
+    /// Whether zero is refused.
     is_positive: bool,
     /// Its value.
     pub of: fn(&StartStop) -> f64,
 }
 
-const fn named(
-    [key, sigma_key, unit, about]: [&'static str; 4],
-    is_positive: bool,
-    of: fn(&StartStop) -> f64,
-) -> ParameterKey {
-    ParameterKey { key, sigma_key, unit, about, is_positive, of }
+macro_rules! parameter {
+    ($field:ident, $sigma_key:literal, $unit:literal, $is_positive:literal, $about:literal) => {
+        ParameterKey {
+            key: stringify!($field),
+            sigma_key: $sigma_key,
+            unit: $unit,
+            about: $about,
+            is_positive: $is_positive,
+            of: |of| of.$field,
+        }
+    };
 }
 
-/// Parameters of a start.
+/// Parameters of a start, in the order of [`StartStop::from_parts`].
+#[rustfmt::skip]
 pub const START_PARAMETERS: [ParameterKey; 4] = [
-    named(
-        ["first_flow_s", "first_flow_sigma_s", "s", "from the command to the first flow"],
-        false,
-        |of| of.first_flow_s,
-    ),
-    named(["rise_s", "rise_sigma_s", "s", "time constant with which it comes"], true, |of| {
-        of.rise_s
-    }),
-    named(["void_mm3", "void_sigma_mm3", "mm³", "what is empty after a long pause"], false, |of| {
-        of.void_mm3
-    }),
-    named(
-        [
-            "idle_time_constant_s",
-            "idle_time_constant_sigma_s",
-            "s",
-            "time constant with which the void opens",
-        ],
-        true,
-        |of| of.idle_time_constant_s,
-    ),
+    parameter!(first_flow_s, "first_flow_sigma_s", "s", false, "from the command to the first flow"),
+    parameter!(rise_s, "rise_sigma_s", "s", true, "time constant with which it comes"),
+    parameter!(void_mm3, "void_sigma_mm3", "mm³", false, "what is empty after a long pause"),
+    parameter!(idle_time_constant_s, "idle_time_constant_sigma_s", "s", true,
+        "time constant with which the void opens"),
 ];
 
-/// Parameters of a stop.
+/// Parameters of a stop, in the order of [`StartStop::from_parts`].
+#[rustfmt::skip]
 pub const STOP_PARAMETERS: [ParameterKey; 4] = [
-    named(["stop_s", "stop_sigma_s", "s", "from the command until the flow falls"], false, |of| {
-        of.stop_s
-    }),
-    named(
-        ["fall_s", "fall_sigma_s", "s", "time constant with which most of it falls"],
-        true,
-        |of| of.fall_s,
-    ),
-    named(
-        ["drool_s", "drool_sigma_s", "s", "what drools after that, over the flow before"],
-        false,
-        |of| of.drool_s,
-    ),
-    named(
-        ["drool_time_constant_s", "drool_time_constant_sigma_s", "s", "time constant of the drool"],
-        true,
-        |of| of.drool_time_constant_s,
-    ),
+    parameter!(stop_s, "stop_sigma_s", "s", false, "from the command until the flow falls"),
+    parameter!(fall_s, "fall_sigma_s", "s", true, "time constant with which most of it falls"),
+    parameter!(drool_s, "drool_sigma_s", "s", false,
+        "what drools after that, over the flow before"),
+    parameter!(drool_time_constant_s, "drool_time_constant_sigma_s", "s", true,
+        "time constant of the drool"),
 ];
 
-/// Beyond it lies no time \[s\] and no volume \[mm³\] of an extruder.
+/// Largest accepted time \[s\] and volume \[mm³\].
 const MAX_VALUE: f64 = 1e7;
-/// The shortest time constant that is one \[s\].
+/// Smallest accepted time constant \[s\].
 const MIN_TIME_CONSTANT_S: f64 = 1e-6;
 const COUNT_RANGE: std::ops::RangeInclusive<u64> = 0..=1_000_000;
 
-/// What the parameters were found from.
+/// Data of the estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitData {
     /// Starts.
@@ -98,32 +77,32 @@ pub struct FitData {
     pub delay_sigma_s: f64,
 }
 
-/// How an extruder starts and stops, and what is known of that.
+/// Starts and stops of an extruder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StartStopFile {
-    /// What it holds for.
+    /// Conditions for which it holds.
     pub conditions: Conditions,
     /// The parameters.
     pub parameters: StartStop,
     /// Their standard errors, each in its own unit.
     pub sigma: StartStop,
-    /// What they were found from.
+    /// Data of the estimate.
     pub data: FitData,
 }
 
 impl StartStopFile {
-    /// Of what was found.
-    pub fn of(fit: &StartStopFit, setting: Conditions) -> Self {
+    /// From an estimate.
+    pub fn of(fit: &StartStopFit, conditions: Conditions) -> Self {
         let idle = fit.starts.iter().map(|start| start.idle_s);
         let flows = fit.starts.iter().map(|start| start.flow_mm3_per_s);
-        let seen = FitData {
+        let data = FitData {
             starts: fit.starts.len() as u64,
             stops: fit.stops.len() as u64,
             idle_range_s: ends(idle),
             flow_range_mm3_per_s: ends(flows),
             delay_sigma_s: fit.delay_sigma_s,
         };
-        Self { conditions: setting, parameters: fit.parameters, sigma: fit.sigma, data: seen }
+        Self { conditions, parameters: fit.parameters, sigma: fit.sigma, data }
     }
 }
 
@@ -131,8 +110,7 @@ fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, 0.0], |[low, high], value| [low.min(value), high.max(value)])
 }
 
-/// The text of the file; each note becomes a comment at its head. Numbers keep
-/// every digit.
+/// The text of the file; the notes become comments at its head. Numbers keep every digit.
 pub fn to_toml(file: &StartStopFile, notes: &[String]) -> String {
     let mut text = String::new();
     for line in notes.iter().flat_map(|note| note.lines()) {
@@ -148,18 +126,18 @@ pub fn to_toml(file: &StartStopFile, notes: &[String]) -> String {
             put(&mut text, &format!("{} = {}", one.sigma_key, number((one.of)(&file.sigma))));
         }
     }
-    let seen = &file.data;
+    let data = &file.data;
     put(&mut text, "\n[data]");
-    put(&mut text, &format!("starts = {}", seen.starts));
-    put(&mut text, &format!("stops = {}", seen.stops));
-    put(&mut text, &format!("idle_range_s = {}", row(&seen.idle_range_s)));
-    put(&mut text, &format!("flow_range_mm3_per_s = {}", row(&seen.flow_range_mm3_per_s)));
-    put(&mut text, &format!("delay_sigma_s = {}", number(seen.delay_sigma_s)));
+    put(&mut text, &format!("starts = {}", data.starts));
+    put(&mut text, &format!("stops = {}", data.stops));
+    put(&mut text, &format!("idle_range_s = {}", row(&data.idle_range_s)));
+    put(&mut text, &format!("flow_range_mm3_per_s = {}", row(&data.flow_range_mm3_per_s)));
+    put(&mut text, &format!("delay_sigma_s = {}", number(data.delay_sigma_s)));
     text
 }
 
-/// Reads the text of such a file; `file` is its name in what is said about it.
-/// Everything that is wrong is reported at once.
+/// Reads the text of the file; `file` is its name in messages. All violations are reported at
+/// once.
 pub fn parse(file: &str, text: &str) -> Result<StartStopFile, Problems> {
     let document = Document::parse(file, text, true);
     let found = read_root(&document.root());
@@ -171,27 +149,23 @@ fn read_root(root: &Table<'_>) -> Option<StartStopFile> {
         root.report("version", "nothing", "version = 1");
     }
     let version = root.optional_integer("version", 1..=1);
-    let setting = read_conditions(root);
+    let conditions = read_conditions(root);
     let start = root.required_table("start").and_then(|table| read_part(&table, &START_PARAMETERS));
     let stop_table = root.required_table("stop");
     let stop = stop_table.as_ref().and_then(|table| read_part(table, &STOP_PARAMETERS));
-    let seen = root.required_table("data").and_then(|table| read_seen(&table));
+    let data = root.required_table("data").and_then(|table| read_data(&table));
     version?;
-    let ([first, first_sigma], [last, last_sigma]) = (start?, stop?);
-    let parameters = assemble(first, last);
+    let ([start, start_sigma], [stop, stop_sigma]) = (start?, stop?);
+    let parameters = StartStop::from_parts(start, stop);
     if let Err(error) = parameters.check() {
         stop_table?.report("drool_s", parameters.drool_s.to_string(), error.to_string());
         return None;
     }
-    Some(StartStopFile {
-        conditions: setting,
-        parameters,
-        sigma: assemble(first_sigma, last_sigma),
-        data: seen?,
-    })
+    let sigma = StartStop::from_parts(start_sigma, stop_sigma);
+    Some(StartStopFile { conditions, parameters, sigma, data: data? })
 }
 
-/// Values and standard errors of a table, in the order of its names.
+/// Values and standard errors of a table, in the order of its parameters.
 fn read_part(table: &Table<'_>, list: &[ParameterKey; 4]) -> Option<[[f64; 4]; 2]> {
     let least = |one: &ParameterKey| if one.is_positive { MIN_TIME_CONSTANT_S } else { 0.0 };
     let values = list.map(|one| table.number(one.key, least(&one)..=MAX_VALUE));
@@ -200,7 +174,7 @@ fn read_part(table: &Table<'_>, list: &[ParameterKey; 4]) -> Option<[[f64; 4]; 2
     Some([whole(values)?, whole(sigma)?])
 }
 
-fn read_seen(table: &Table<'_>) -> Option<FitData> {
+fn read_data(table: &Table<'_>) -> Option<FitData> {
     let count = |key: &'static str| {
         if !table.has(key) {
             table.report_absent(key, "a whole number");
@@ -218,22 +192,6 @@ fn read_seen(table: &Table<'_>) -> Option<FitData> {
         flow_range_mm3_per_s: flow_range_mm3_per_s?,
         delay_sigma_s: delay_sigma_s?,
     })
-}
-
-/// In the order of [`START`] and [`STOP`].
-const fn assemble(start: [f64; 4], stop: [f64; 4]) -> StartStop {
-    let [first_flow_s, rise_s, void_mm3, idle_time_constant_s] = start;
-    let [stop_s, fall_s, drool_s, drool_time_constant_s] = stop;
-    StartStop {
-        first_flow_s,
-        rise_s,
-        void_mm3,
-        idle_time_constant_s,
-        stop_s,
-        fall_s,
-        drool_s,
-        drool_time_constant_s,
-    }
 }
 
 #[cfg(test)]

@@ -1,121 +1,82 @@
-//! Least squares of few parameters within ranges, by Levenberg's and
-//! Marquardt's steps with differences for derivatives.
+//! Least squares of few parameters within ranges, with difference quotients as derivatives.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
-/// Where the steps ended.
+use crate::numeric::levenberg_marquardt::{self, Descent, LeastSquares};
+use crate::numeric::number::to_f64;
+
+/// An estimate and its standard errors.
 #[derive(Debug, Clone)]
-pub(super) struct LeastSquares {
+pub(super) struct Estimate {
     pub at: Vec<f64>,
     /// Sum of the squared residuals.
     pub sum_of_squares: f64,
-    /// Standard errors, for residuals that have nothing to do with each other.
+    /// Standard errors for independent residuals.
     pub sigma: Vec<f64>,
 }
 
-const MAX_STEPS: usize = 60;
-/// A parameter is moved by this share of its range for a derivative.
+/// Step of the difference quotients as a fraction of a parameter's range: a compromise between
+/// truncation and rounding.
 const RELATIVE_STEP: f64 = 1e-6;
-/// A step that gains less than this share of the squares gains nothing.
-const MIN_RELATIVE_GAIN: f64 = 1e-9;
+/// Limits of a descent. A choice: a fit of at most four parameters that needs more steps does
+/// not converge.
+const DESCENT: Descent =
+    Descent { max_steps: 60, max_tries: 10, min_relative_gain: 1e-9, max_idle_steps: 1 };
 
-/// Steps downhill from a start, every parameter within its range. `None` where
-/// the residuals are not finite or are fewer than the parameters.
-pub(super) fn minimise(
-    residuals: &dyn Fn(&[f64]) -> Vec<f64>,
-    start: &[f64],
-    ranges: &[[f64; 2]],
-) -> Option<LeastSquares> {
-    let mut at: Vec<f64> = start.iter().zip(ranges).map(|(x, [a, b])| x.clamp(*a, *b)).collect();
-    let mut left = DVector::from_vec(residuals(&at));
-    let mut squares = left.norm_squared();
-    if !squares.is_finite() || left.len() < at.len() {
-        return None;
-    }
-    let mut damping = 1e-3;
-    for _ in 0..MAX_STEPS {
-        let slopes = jacobian(residuals, &at, ranges);
-        let before = squares;
-        for _ in 0..10 {
-            let next = step(&slopes, &left, &at, ranges, damping);
-            let tried = next.map(|next| (DVector::from_vec(residuals(&next)), next));
-            match tried.filter(|(new, _)| new.norm_squared() < squares) {
-                Some((new, next)) => {
-                    (squares, left, at) = (new.norm_squared(), new, next);
-                    damping = (damping * 0.1).max(1e-12);
-                    break;
-                }
-                None => damping *= 10.0,
-            }
-        }
-        if before - squares <= MIN_RELATIVE_GAIN * before {
-            break;
-        }
-    }
-    let sigma = spread(&jacobian(residuals, &at, ranges), squares);
-    Some(LeastSquares { at, sum_of_squares: squares, sigma })
+/// Prediction less data as a function of the parameters, and their ranges.
+struct Problem<'a> {
+    errors: &'a dyn Fn(&[f64]) -> Vec<f64>,
+    ranges: &'a [[f64; 2]],
 }
 
-fn jacobian(
-    residuals: &dyn Fn(&[f64]) -> Vec<f64>,
-    at: &[f64],
-    ranges: &[[f64; 2]],
-) -> DMatrix<f64> {
-    let columns: Vec<DVector<f64>> = ranges
-        .iter()
-        .enumerate()
-        .map(|(number, [low, high])| {
+impl LeastSquares for Problem<'_> {
+    fn residuals(&self, at: &[f64]) -> Option<Vec<f64>> {
+        let left: Vec<f64> = (self.errors)(at).iter().map(|error| -error).collect();
+        let is_finite = left.iter().map(|left| left * left).sum::<f64>().is_finite();
+        (is_finite && left.len() >= at.len()).then_some(left)
+    }
+
+    fn jacobian(&self, at: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let column = |(number, [low, high]): (usize, &[f64; 2])| {
             let nudge = RELATIVE_STEP * (high - low);
             let moved = |by: f64| {
                 let mut at = at.to_vec();
-                if let Some(value) = at.get_mut(number) {
-                    *value += by;
-                }
-                DVector::from_vec(residuals(&at))
+                at[number] += by;
+                (self.errors)(&at)
             };
-            (moved(nudge) - moved(-nudge)) / (2.0 * nudge)
-        })
-        .collect();
-    DMatrix::from_columns(&columns)
-}
-
-/// One damped step. A parameter at an end of its range that would go beyond is
-/// held.
-fn step(
-    slopes: &DMatrix<f64>,
-    left: &DVector<f64>,
-    at: &[f64],
-    ranges: &[[f64; 2]],
-    damping: f64,
-) -> Option<Vec<f64>> {
-    let mut normal = slopes.transpose() * slopes;
-    let mut right = -(slopes.transpose() * left);
-    for (number, (value, [low, high])) in at.iter().zip(ranges).enumerate() {
-        let down = *right.get(number)?;
-        if (value <= low && down < 0.0) || (value >= high && down > 0.0) {
-            normal.row_mut(number).fill(0.0);
-            normal.column_mut(number).fill(0.0);
-            right.row_mut(number).fill(0.0);
-        }
-        let own = normal.get_mut((number, number))?;
-        *own = if *own > 0.0 { *own * (1.0 + damping) } else { 1.0 };
+            moved(nudge).iter().zip(moved(-nudge)).map(|(a, b)| (a - b) / (2.0 * nudge)).collect()
+        };
+        Some(self.ranges.iter().enumerate().map(column).collect())
     }
-    let by = normal.cholesky()?.solve(&right);
-    let next = at.iter().zip(&by).zip(ranges).map(|((x, by), [a, b])| (x + by).clamp(*a, *b));
-    Some(next.collect())
+
+    fn range(&self, _: &[f64], number: usize) -> [f64; 2] {
+        self.ranges[number]
+    }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "fewer than 2^52 samples")]
-fn spread(slopes: &DMatrix<f64>, squares: f64) -> Vec<f64> {
-    let free = slopes.nrows().saturating_sub(slopes.ncols()).max(1) as f64;
+/// The parameters, each within its range, with the least sum of squared errors. `None` where
+/// the errors at the start are not finite or fewer than the parameters.
+pub(super) fn minimise(
+    errors: &dyn Fn(&[f64]) -> Vec<f64>,
+    start: &[f64],
+    ranges: &[[f64; 2]],
+) -> Option<Estimate> {
+    let problem = Problem { errors, ranges };
+    let minimum = levenberg_marquardt::minimise(&problem, start, DESCENT)?;
+    let sigma = standard_errors(&problem.jacobian(&minimum.theta)?, minimum.sum_of_squares);
+    Some(Estimate { at: minimum.theta, sum_of_squares: minimum.sum_of_squares, sigma })
+}
+
+/// Roots of the diagonal of s²·(JᵀJ)⁻¹, with s² the residual variance; infinite where the data
+/// do not determine a parameter.
+fn standard_errors(columns: &[Vec<f64>], squares: f64) -> Vec<f64> {
+    let (n, p) = (columns.first().map_or(0, Vec::len), columns.len());
+    let slopes = DMatrix::from_fn(n, p, |row, column| columns[column][row]);
+    let free = to_f64(n.saturating_sub(p).max(1));
     let inverse = (slopes.transpose() * slopes).try_inverse();
-    let variance =
-        |number: usize| inverse.as_ref().and_then(|inverse| inverse.get((number, number)).copied());
-    let sigma = |number: usize| match variance(number) {
-        Some(own) if own > 0.0 => (own * squares / free).sqrt(),
-        _ => f64::INFINITY,
-    };
-    (0..slopes.ncols()).map(sigma).collect()
+    let variance = |i: usize| inverse.as_ref().map_or(0.0, |inverse| inverse[(i, i)]);
+    let sigma = |own: f64| if own > 0.0 { (own * squares / free).sqrt() } else { f64::INFINITY };
+    (0..p).map(|number| sigma(variance(number))).collect()
 }
 
 #[cfg(test)]

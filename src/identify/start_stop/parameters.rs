@@ -1,6 +1,8 @@
-//! What an extruder's starts and stops are like.
+//! Parameters of an extruder's starts and stops.
 
-/// Why there is no such extruder, or no such bead.
+use crate::numeric::root::BISECTIONS;
+
+/// Invalid parameters of an extruder or a bead.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum StartStopError {
     /// A number that must be finite and above zero.
@@ -30,7 +32,7 @@ pub enum StartStopError {
         /// Time constant of the drool \[s\].
         time_constant_s: f64,
     },
-    /// A share of the start speed that is none.
+    /// An invalid fraction of the start speed.
     #[error("the minimum fraction of the start speed is {value}; it must be above 0 and at most 1")]
     StartSpeedFraction {
         /// What was found.
@@ -38,32 +40,47 @@ pub enum StartStopError {
     },
 }
 
-/// Parameters of starts and stops, which `extruder identify` finds from recordings. They
-/// hold for a material, a nozzle and a temperature (bcs-thesis, section 5.2).
+/// Parameters of starts and stops, which `extruder identify` estimates from recordings, for one
+/// material, nozzle and temperature (bcs-thesis, section 5.2).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StartStop {
-    /// L: from the command to the first flow of an extruder that has not stood
-    /// \[s\].
+    /// L: from the command to the first flow without a pause \[s\].
     pub first_flow_s: f64,
-    /// T: time constant with which the flow comes \[s\].
+    /// T: time constant of the rising flow \[s\].
     pub rise_s: f64,
-    /// V∞: what must be filled before anything flows after a long pause \[mm³\].
+    /// V∞: volume to fill before the first flow after a long pause \[mm³\].
     pub void_mm3: f64,
-    /// τ: time constant with which that void opens \[s\].
+    /// τ: time constant of the opening void \[s\].
     pub idle_time_constant_s: f64,
     /// L': from the command to stop until the flow falls \[s\].
     pub stop_s: f64,
-    /// T': time constant with which most of the flow falls \[s\].
+    /// T': time constant of most of the falling flow \[s\].
     pub fall_s: f64,
-    /// D: what drools out slowly after that, for each unit of the flow before:
-    /// D·Q mm³ after Q mm³/s \[s\].
+    /// D: volume that drools slowly after that over the flow before: D·Q mm³ after Q mm³/s
+    /// \[s\].
     pub drool_s: f64,
     /// τd: time constant of the drool \[s\].
     pub drool_time_constant_s: f64,
 }
 
 impl StartStop {
-    /// Fails where a time or a volume cannot be.
+    /// From the parameters of a start, L, T, V∞ and τ, and those of a stop, L', T', D and τd.
+    pub const fn from_parts(start: [f64; 4], stop: [f64; 4]) -> Self {
+        let [first_flow_s, rise_s, void_mm3, idle_time_constant_s] = start;
+        let [stop_s, fall_s, drool_s, drool_time_constant_s] = stop;
+        Self {
+            first_flow_s,
+            rise_s,
+            void_mm3,
+            idle_time_constant_s,
+            stop_s,
+            fall_s,
+            drool_s,
+            drool_time_constant_s,
+        }
+    }
+
+    /// Fails for invalid times or volumes.
     pub fn check(&self) -> Result<(), StartStopError> {
         let positive = [
             ("the time constant of the rise [s]", self.rise_s),
@@ -77,7 +94,9 @@ impl StartStop {
             ("the delay of the stop [s]", self.stop_s),
             ("the drool [s]", self.drool_s),
         ];
-        if let Some((what, value)) = positive.into_iter().find(|(_, v)| !positive_number(*v)) {
+        if let Some((what, value)) =
+            positive.into_iter().find(|(_, v)| !(v.is_finite() && *v > 0.0))
+        {
             return Err(StartStopError::NotPositive { what, value });
         }
         let negative = |v: f64| !(v.is_finite() && v >= 0.0);
@@ -85,27 +104,23 @@ impl StartStop {
             return Err(StartStopError::Negative { what, value });
         }
         if self.drool_s > self.drool_time_constant_s {
-            return Err(StartStopError::TooMuchDrool {
-                drool_s: self.drool_s,
-                time_constant_s: self.drool_time_constant_s,
-            });
+            let (drool_s, time_constant_s) = (self.drool_s, self.drool_time_constant_s);
+            return Err(StartStopError::TooMuchDrool { drool_s, time_constant_s });
         }
         Ok(())
     }
 
-    /// V(idle): what is empty after the pump has stood so long \[mm³\].
+    /// V(idle): volume to fill after a pause \[mm³\].
     pub fn void_after(&self, idle_s: f64) -> f64 {
         -self.void_mm3 * libm::expm1(-idle_s.max(0.0) / self.idle_time_constant_s)
     }
 
-    /// d: from the command to the first flow after the pump has stood so long,
-    /// for a command that gives so much flow \[s\].
+    /// d: from the command to the first flow after a pause, for a commanded flow \[s\].
     pub fn delay_s(&self, idle_s: f64, flow_mm3_per_s: f64) -> f64 {
         self.first_flow_s + self.void_after(idle_s) / flow_mm3_per_s
     }
 
-    /// f: the flow so long after the command to stop, as a share of the flow
-    /// before.
+    /// f: flow after the stop command, as a fraction of the flow before.
     pub fn remaining_flow(&self, since_s: f64) -> f64 {
         let since_s = since_s - self.stop_s;
         if since_s <= 0.0 {
@@ -116,8 +131,7 @@ impl StartStop {
             + slow * libm::exp(-since_s / self.drool_time_constant_s)
     }
 
-    /// ∫f: what has come so long after the command to stop, for each unit of the
-    /// flow before \[s\].
+    /// ∫f: volume after the stop command over the flow before \[s\].
     pub fn delivered_s(&self, since_s: f64) -> f64 {
         let past_s = since_s - self.stop_s;
         if past_s <= 0.0 {
@@ -130,15 +144,15 @@ impl StartStop {
             - slow * drool_s * libm::expm1(-past_s / drool_s)
     }
 
-    /// The same after all has come \[s\].
+    /// The same after the flow has ceased \[s\].
     pub fn total_after_stop_s(&self) -> f64 {
         self.stop_s + (1.0 - self.slow_fraction()) * self.fall_s + self.drool_s
     }
 
-    /// When the flow has fallen to a share, from the command to stop \[s\].
+    /// When the flow has fallen to a fraction, from the stop command \[s\].
     pub fn falls_to_s(&self, share: f64) -> f64 {
         let share = share.clamp(f64::MIN_POSITIVE, 1.0);
-        // Slower than either part alone it cannot be.
+        // The flow falls no slower than its slowest part.
         let slowest_s = self.fall_s.max(self.drool_time_constant_s);
         let (mut low, mut high) = (self.stop_s, self.stop_s - slowest_s * libm::log(share));
         for _ in 0..BISECTIONS {
@@ -148,15 +162,8 @@ impl StartStop {
         high
     }
 
-    /// a: the share of the flow that falls slowly.
+    /// a: fraction of the flow that falls slowly.
     fn slow_fraction(&self) -> f64 {
         self.drool_s / self.drool_time_constant_s
     }
-}
-
-/// Halvings after which nothing of a second is left.
-const BISECTIONS: u32 = 60;
-
-fn positive_number(value: f64) -> bool {
-    value.is_finite() && value > 0.0
 }

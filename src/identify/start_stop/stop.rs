@@ -1,5 +1,4 @@
-//! What comes after a stop: all stops as one curve of the share of the flow
-//! before.
+//! Flow after a stop: all stops as one curve, relative to the flow before.
 
 use super::episodes::Episode;
 use super::error::StartStopFitError;
@@ -8,64 +7,40 @@ use super::least_squares::minimise;
 use super::parameters::StartStop;
 use crate::numeric::number::to_f64;
 
-/// Parameters of a fall; see [`StartStop`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(clippy::struct_field_names, reason = "times, all in seconds")]
-pub(super) struct StopResponse {
-    pub stop_s: f64,
-    pub fall_s: f64,
-    pub drool_s: f64,
-    pub drool_time_constant_s: f64,
-}
-
-/// What was found of the stops.
+/// Fitted stops.
 #[derive(Debug, Clone)]
 pub(super) struct StopFit {
-    pub model: StopResponse,
-    pub sigma: StopResponse,
+    /// L', T', D and τd \[s\].
+    pub value: [f64; 4],
+    /// Their standard errors \[s\].
+    pub sigma: [f64; 4],
     pub stops: Vec<ObservedStop>,
 }
 
-/// What may be left of the flow at the end of the longest look \[share\].
+/// Largest remaining flow at the end of the longest observation, over the flow before.
 const MAX_REMAINING: f64 = 0.1;
-/// The end of a look is this part of it.
+/// The end of an observation is one part in this many.
 const TAIL_DIVISOR: usize = 5;
-/// Ranges of L', T', a and τd.
+/// Ranges of L', T', a and τd. A choice around all known extruders.
 const PARAMETER_RANGES: [[f64; 2]; 4] = [[0.0, 3.0], [0.005, 5.0], [0.0, 0.9], [0.02, 30.0]];
 
-impl StopResponse {
-    fn of(row: &[f64]) -> Option<Self> {
-        let &[stop_s, fall_s, slow, drool_time_constant_s] = row else { return None };
-        let drool_s = slow * drool_time_constant_s;
-        Some(Self { stop_s, fall_s, drool_s, drool_time_constant_s })
-    }
-
-    /// As a model, of which the start is left open.
-    pub fn model(&self) -> StartStop {
-        StartStop {
-            first_flow_s: 0.0,
-            rise_s: self.fall_s,
-            void_mm3: 0.0,
-            idle_time_constant_s: 1.0,
-            stop_s: self.stop_s,
-            fall_s: self.fall_s,
-            drool_s: self.drool_s,
-            drool_time_constant_s: self.drool_time_constant_s,
-        }
-    }
-
-    fn row(&self) -> [f64; 4] {
-        [self.stop_s, self.fall_s, self.drool_s, self.drool_time_constant_s]
-    }
+/// A model with this response to a stop; its start is a placeholder.
+pub(super) fn model(stop: [f64; 4]) -> StartStop {
+    StartStop::from_parts([0.0, stop[1], 0.0, 1.0], stop)
 }
 
-/// Fits all stops together; the standard errors are those of leaving out one
-/// after the other.
+/// L', T', D and τd from the parameters of the fit, L', T', a and τd.
+fn stop_of(row: &[f64]) -> Option<[f64; 4]> {
+    let &[stop_s, fall_s, slow, drool_time_constant_s] = row else { return None };
+    Some([stop_s, fall_s, slow * drool_time_constant_s, drool_time_constant_s])
+}
+
+/// Fits all stops together; the standard errors are those of the jackknife.
 pub(super) fn fit(stops: &[Episode]) -> Result<StopFit, StartStopFitError> {
     check_ends(stops)?;
-    let model = fit_all(stops, None)?;
-    let without: Result<Vec<StopResponse>, _> =
-        (0..stops.len()).map(|number| fit_all(stops, Some((number, model)))).collect();
+    let value = fit_all(stops, None)?;
+    let without: Result<Vec<[f64; 4]>, _> =
+        (0..stops.len()).map(|number| fit_all(stops, Some((number, value)))).collect();
     let sigma = jackknife(&without?);
     let seen = |stop: &Episode| ObservedStop {
         at_s: stop.at_s,
@@ -73,10 +48,10 @@ pub(super) fn fit(stops: &[Episode]) -> Result<StopFit, StartStopFitError> {
         observed_s: stop.samples.last().map_or(0.0, |(at, _)| *at),
         volume_mm3: stop.flow * stop.step_s * stop.samples.iter().map(|(_, q)| q).sum::<f64>(),
     };
-    Ok(StopFit { model, sigma, stops: stops.iter().map(seen).collect() })
+    Ok(StopFit { value, sigma, stops: stops.iter().map(seen).collect() })
 }
 
-/// The flow must have ceased where it was looked at longest.
+/// The flow must have ceased at the end of the longest observation.
 fn check_ends(stops: &[Episode]) -> Result<(), StartStopFitError> {
     let seen_s = |stop: &Episode| stop.samples.last().map_or(0.0, |(at, _)| *at);
     let longest = stops.iter().max_by(|a, b| seen_s(a).total_cmp(&seen_s(b)));
@@ -99,65 +74,46 @@ fn check_ends(stops: &[Episode]) -> Result<(), StartStopFitError> {
 
 fn fit_all(
     stops: &[Episode],
-    without: Option<(usize, StopResponse)>,
-) -> Result<StopResponse, StartStopFitError> {
+    without: Option<(usize, [f64; 4])>,
+) -> Result<[f64; 4], StartStopFitError> {
     let left_out = without.map(|(number, _)| number);
-    let samples: Vec<(f64, f64)> = stops
-        .iter()
-        .enumerate()
-        .filter(|(number, _)| Some(*number) != left_out)
-        .flat_map(|(_, stop)| stop.samples.iter().copied())
-        .collect();
+    let used = stops.iter().enumerate().filter(|(number, _)| Some(*number) != left_out);
+    let samples: Vec<_> = used.flat_map(|(_, stop)| stop.samples.iter().copied()).collect();
     let residuals = |row: &[f64]| -> Vec<f64> {
-        let Some(falling) = StopResponse::of(row) else { return Vec::new() };
-        let model = falling.model();
+        let Some(model) = stop_of(row).map(model) else { return Vec::new() };
         samples.iter().map(|(at, share)| model.remaining_flow(*at) - share).collect()
     };
     let starts: Vec<[f64; 4]> = match without {
-        Some((_, near)) => {
-            vec![[
-                near.stop_s,
-                near.fall_s,
-                near.drool_s / near.drool_time_constant_s,
-                near.drool_time_constant_s,
-            ]]
+        Some((_, [stop_s, fall_s, drool_s, tau_s])) => {
+            vec![[stop_s, fall_s, drool_s / tau_s, tau_s]]
         }
         None => INITIAL_GUESSES.to_vec(),
     };
     let solved = starts.iter().filter_map(|start| minimise(&residuals, start, &PARAMETER_RANGES));
     let best = solved.min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
-    let found = best.and_then(|best| StopResponse::of(&best.at)).map(ordered);
+    let found = best.and_then(|best| stop_of(&best.at)).map(ordered);
     found.ok_or(StartStopFitError::NoFit { what: "fall" })
 }
 
-/// Starts of L', T', a and τd.
+/// Initial values of L', T', a and τd.
 const INITIAL_GUESSES: [[f64; 4]; 4] =
     [[0.1, 0.1, 0.2, 0.6], [0.1, 0.3, 0.1, 2.0], [0.3, 0.8, 0.2, 4.0], [0.05, 0.05, 0.3, 0.2]];
 
-/// The slow part is the drool.
-fn ordered(found: StopResponse) -> StopResponse {
-    if found.drool_time_constant_s >= found.fall_s {
-        return found;
+/// With the slower part as the drool.
+fn ordered([stop_s, fall_s, drool_s, tau_s]: [f64; 4]) -> [f64; 4] {
+    if tau_s >= fall_s {
+        return [stop_s, fall_s, drool_s, tau_s];
     }
-    let slow = 1.0 - found.drool_s / found.drool_time_constant_s;
-    StopResponse {
-        fall_s: found.drool_time_constant_s,
-        drool_s: slow * found.fall_s,
-        drool_time_constant_s: found.fall_s,
-        ..found
-    }
+    let slow = 1.0 - drool_s / tau_s;
+    [stop_s, tau_s, slow * fall_s, fall_s]
 }
 
-/// Standard errors from estimates that each leave out one.
-#[expect(clippy::cast_precision_loss, reason = "a recording has few stops")]
-fn jackknife(without: &[StopResponse]) -> StopResponse {
-    let n = without.len().max(1) as f64;
-    let mut sigma = [0.0; 4];
-    for (number, sigma) in sigma.iter_mut().enumerate() {
-        let values = || without.iter().filter_map(|one| one.row().get(number).copied());
+/// Standard errors from estimates that each leave out one (jackknife, Tukey 1958).
+fn jackknife(without: &[[f64; 4]]) -> [f64; 4] {
+    let n = to_f64(without.len().max(1));
+    std::array::from_fn(|number| {
+        let values = || without.iter().map(|one| one[number]);
         let mean = values().sum::<f64>() / n;
-        *sigma = ((n - 1.0) / n * values().map(|x| (x - mean).powi(2)).sum::<f64>()).sqrt();
-    }
-    let [stop_s, fall_s, drool_s, drool_time_constant_s] = sigma;
-    StopResponse { stop_s, fall_s, drool_s, drool_time_constant_s }
+        ((n - 1.0) / n * values().map(|x| (x - mean).powi(2)).sum::<f64>()).sqrt()
+    })
 }

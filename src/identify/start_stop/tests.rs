@@ -19,7 +19,7 @@ const PAUSES_S: [f64; 8] = [30.0, 2.0, 8.0, 60.0, 200.0, 1.0, 15.0, 120.0];
 const RUNS_S: f64 = 5.0;
 const STEP_S: f64 = 0.02;
 
-/// The share of the flow that runs of 5 s with pauses between them give, by the model itself.
+/// The fraction of the flow that runs of 5 s with pauses between them give, by the model itself.
 fn recording(machine: StartStop, pauses_s: &[f64]) -> [TimeSeries; 2] {
     let (flow, speed) = (Mm3PerS::constant(400.0), MmPerS::constant(40.0));
     let laid = BeadConditions { flow, speed, min_speed_ratio: 1.0, robot_lag: Span::ZERO };
@@ -28,10 +28,10 @@ fn recording(machine: StartStop, pauses_s: &[f64]) -> [TimeSeries; 2] {
     let mut seen = TimeSeries::new("flow_mm3_per_s", false);
     command.push(0.0, 40.0);
     let mut from_s = 0.0;
-    let mut log = |from_s: f64, lasts_s: f64, share: &dyn Fn(Span) -> f64| {
+    let mut log = |from_s: f64, lasts_s: f64, fraction: &dyn Fn(Span) -> f64| {
         let mut at = 0.0;
         while at < lasts_s {
-            seen.push(from_s + at, 400.0 * share(Span::from_secs(at)));
+            seen.push(from_s + at, 400.0 * fraction(Span::from_secs(at)));
             at += STEP_S;
         }
     };
@@ -101,7 +101,7 @@ fn the_unit_of_the_command_does_not_matter() {
 }
 
 #[test]
-fn pauses_that_tell_nothing_of_the_void_are_refused() {
+fn pauses_that_do_not_determine_the_void_are_refused() {
     use StartStopFitError as Error;
     assert_eq!(
         refused(MACHINE, &[10.0, 20.0]),
@@ -156,7 +156,7 @@ fn a_flow_that_does_not_go_with_the_command_is_refused() {
 fn a_run_that_is_too_short_for_an_even_flow_is_left_out() {
     let [mut command, flow] = recording(MACHINE, &PAUSES_S);
     let all = fit(&command, &flow).unwrap();
-    // The last run is told to stop 0.5 s after it began.
+    // The last run is stopped 0.5 s after it began.
     let last_s = *command.time_s.last().unwrap();
     command.push(last_s + 0.5, 0.0);
     let fit = fit(&command, &flow).unwrap();

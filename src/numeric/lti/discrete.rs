@@ -1,51 +1,46 @@
-//! What a transfer function becomes on a grid of samples.
+//! Discretisation of a transfer function.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::polynomial::{add, evaluate, from_roots, multiply};
 use super::simulate::{Between, Sampled, split};
-use super::state::StateSpace;
 use super::transfer::{ModelError, TransferFunction};
+use crate::numeric::number::to_f64;
 
-/// How it gets there.
+/// Method of discretisation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DiscretisationMethod {
-    /// Exact for an input that holds its sample (zero-order hold); a dead time
-    /// that ends within a step is kept exactly.
+    /// Exact for an input that is held between samples; also with a dead time that ends within
+    /// a step.
     ZeroOrderHold,
-    /// Exact for an input that runs straight between samples (first-order
-    /// hold); any dead time is kept exactly.
+    /// Exact for an input that is linear between samples; also with any dead time.
     FirstOrderHold,
     /// Tustin's: s = (2/dt)(z − 1)/(z + 1).
     Bilinear,
-    /// The same impulse response at the samples, times dt. The jump at the first
-    /// sample counts in full.
-    ImpulseInvariant,
     /// s = (z − 1)/(dt·z).
     BackwardDifference,
-    /// Poles and zeros go to e^(s·dt), missing zeros but one to −1, and the gain
-    /// is kept at rest (with a pole or zero there: in size at 0.1/dt).
+    /// Poles and zeros are mapped to e^(s·dt), missing zeros but one to −1, and the static gain
+    /// is kept (with a pole or zero there: the magnitude at 0.1/dt).
     MatchedPoleZero,
 }
 
-/// b(z)/a(z)·z^(−delay): coefficients with the highest power first, numerator
-/// and denominator of one length, the denominator with a leading 1.
+/// b(z)/a(z)·z^(−delay): coefficients with the highest power first, numerator and denominator
+/// of equal length, the denominator with a leading 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiscreteTransfer {
     /// Numerator.
     pub num: Vec<f64>,
     /// Denominator.
     pub den: Vec<f64>,
-    /// Whole steps by which it answers later.
+    /// Additional delay in whole steps.
     pub delay: usize,
     /// Step \[s\].
     pub dt_s: f64,
 }
 
 impl TransferFunction {
-    /// On a grid of `dt_s` \[s\]. Fails where the step is not above zero, where
-    /// the dead time is not whole steps and the method is not a hold, and for
-    /// the impulse-invariant method with as many zeros as poles.
+    /// On a grid of `dt_s` \[s\]. Fails where the step is not above zero, and where the dead
+    /// time is not a whole number of steps and the method is not a hold.
     pub fn discretise(
         &self,
         dt_s: f64,
@@ -73,7 +68,6 @@ impl TransferFunction {
             DiscretisationMethod::BackwardDifference => {
                 substitute(self, &[1.0 / dt_s, -1.0 / dt_s], &[1.0, 0.0])
             }
-            DiscretisationMethod::ImpulseInvariant => impulse(self, dt_s)?,
             DiscretisationMethod::MatchedPoleZero => matched(self, dt_s),
         };
         let length = num.len().max(den.len());
@@ -85,8 +79,7 @@ impl TransferFunction {
     }
 }
 
-/// Coefficients of det(zI − Φ), and C·N·g of its adjoint Σ N(i)·z^(n−1−i)
-/// (Faddeev's method).
+/// Coefficients of det(zI − Φ), and the adjoint Σ N(i)·z^(n−1−i) (Faddeev–LeVerrier algorithm).
 struct Resolvent {
     den: Vec<f64>,
     adjoint: Vec<DMatrix<f64>>,
@@ -100,8 +93,7 @@ impl Resolvent {
         let mut current = DMatrix::identity(n, n);
         for k in 1..=n {
             let moved = state * &current;
-            #[expect(clippy::cast_precision_loss, reason = "an order is small")]
-            let coefficient = -moved.trace() / k as f64;
+            let coefficient = -moved.trace() / to_f64(k);
             adjoint.push(current);
             den.push(coefficient);
             current = moved + DMatrix::identity(n, n) * coefficient;
@@ -115,8 +107,7 @@ impl Resolvent {
     }
 }
 
-/// Polynomials in 1/z: `add` and `multiply` serve rows with the highest power
-/// first, so sums are taken on rows that were padded to one length.
+/// A row in powers of 1/z, delayed and padded to a length, for sums with `add`.
 fn delayed_row(row: &[f64], steps: usize, length: usize) -> Vec<f64> {
     let mut padded = vec![0.0; steps];
     padded.extend_from_slice(row);
@@ -147,17 +138,7 @@ fn hold(
     Ok((num, resolvent.den))
 }
 
-fn impulse(tf: &TransferFunction, dt_s: f64) -> Result<(Vec<f64>, Vec<f64>), ModelError> {
-    let space = StateSpace::of(tf);
-    if space.d != 0.0 {
-        return Err(ModelError::Feedthrough);
-    }
-    let resolvent = Resolvent::of(&space.advance(dt_s).state);
-    let num = resolvent.num(&space.c, &space.b).iter().map(|c| c * dt_s).collect();
-    Ok((num, resolvent.den))
-}
-
-/// Puts upper(z)/lower(z) in the place of s.
+/// Substitutes upper(z)/lower(z) for s.
 fn substitute(tf: &TransferFunction, upper: &[f64], lower: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let order = tf.order();
     let power = |row: &[f64], n: usize| (0..n).fold(vec![1.0], |p, _| multiply(&p, row));
@@ -202,55 +183,6 @@ fn matched(tf: &TransferFunction, dt_s: f64) -> (Vec<f64>, Vec<f64>) {
 fn exp(s: Complex<f64>) -> Complex<f64> {
     let (sin, cos) = libm::sincos(s.im);
     Complex::new(cos, sin) * libm::exp(s.re)
-}
-
-impl DiscreteTransfer {
-    /// Output for each unit of an input that has stood for long.
-    pub fn dc_gain(&self) -> f64 {
-        self.num.iter().sum::<f64>() / self.den.iter().sum::<f64>()
-    }
-
-    /// As something that is given one sample after the other.
-    pub fn recursion(&self) -> Recursion {
-        Recursion {
-            num: self.num.clone(),
-            den: self.den.clone(),
-            memory: vec![0.0; self.num.len()],
-            inputs: vec![0.0; self.delay],
-            place: 0,
-        }
-    }
-}
-
-/// A discrete transfer function with its memory (direct form II, transposed).
-/// A step allocates nothing.
-#[derive(Debug, Clone)]
-pub struct Recursion {
-    num: Vec<f64>,
-    den: Vec<f64>,
-    memory: Vec<f64>,
-    inputs: Vec<f64>,
-    place: usize,
-}
-
-impl Recursion {
-    /// Takes the input of this sample and returns its output.
-    pub fn step(&mut self, input: f64) -> f64 {
-        let input = self.delayed(input);
-        let output = self.num[0] * input + self.memory[0];
-        for i in 1..self.num.len() {
-            let later = self.memory[i];
-            self.memory[i - 1] = later + self.num[i] * input - self.den[i] * output;
-        }
-        output
-    }
-
-    fn delayed(&mut self, input: f64) -> f64 {
-        let Some(oldest) = self.inputs.get_mut(self.place) else { return input };
-        let delayed = std::mem::replace(oldest, input);
-        self.place = (self.place + 1) % self.inputs.len();
-        delayed
-    }
 }
 
 #[cfg(test)]

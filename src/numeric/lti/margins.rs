@@ -1,32 +1,31 @@
-//! How far a loop is from the edge of stability.
+//! Stability margins of a loop.
 
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::Complex;
 
 use super::transfer::TransferFunction;
+use crate::numeric::root::{BISECTIONS, bisect};
 
-/// Margins of a loop that is stable when closed with a gain of −1. They say how
-/// far it is from the edge, not on which side: an unstable loop may show large
-/// ones. `None` where there is no such crossing, and with it no such limit.
+/// Margins of a loop that is stable with negative feedback. They are distances from the limit
+/// of stability without its side: an unstable loop may have large ones. `None` without such a
+/// crossing, and so without a limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StabilityMargins {
-    /// Frequency at which the loop's gain passes one \[rad/s\]; of several, that
-    /// with the smallest phase margin.
+    /// Gain crossover frequency \[rad/s\]; of several, that with the smallest phase margin.
     pub crossover_rad_per_s: Option<f64>,
-    /// Phase that may be lost there \[rad\].
+    /// Phase margin \[rad\].
     pub phase_rad: Option<f64>,
-    /// Factor by which the gain may grow.
+    /// Gain margin as a factor.
     pub gain: Option<f64>,
-    /// Further dead time that may come in \[s\]: the smallest over all
-    /// crossovers.
+    /// Delay margin \[s\]: the smallest over all crossovers.
     pub delay_s: Option<f64>,
-    /// The most that the loop enlarges a disturbance, Ms = max |1/(1 + L)|. One
-    /// over it is the smallest distance to −1.
+    /// Maximum sensitivity Ms = max |1/(1 + L)|, the inverse of the smallest distance to −1.
     pub sensitivity: f64,
 }
 
-/// Points of the first look, over all frequencies that matter.
+/// Frequencies at which a loop is evaluated first. A choice: some thousand per decade for the
+/// few decades about its roots.
 const GRID_POINTS: u32 = 6000;
 
 /// Margins of a loop, controller and plant in series.
@@ -46,10 +45,10 @@ pub fn margins(of_loop: &TransferFunction) -> StabilityMargins {
         }
         if let Some((last, then)) = before {
             if (then.norm() > 1.0) != (now.norm() > 1.0) {
-                crossovers.push(bisect(size, last, w));
+                crossovers.push(bisect(size, last, w, BISECTIONS));
             }
             if (then.im > 0.0) != (now.im > 0.0) && then.re < 0.0 && now.re < 0.0 {
-                let room = 1.0 / at(bisect(|w| at(w).im, last, w)).norm();
+                let room = 1.0 / at(bisect(|w| at(w).im, last, w, BISECTIONS)).norm();
                 if room > 1.0 {
                     gain = Some(gain.map_or(room, |least| least.min(room)));
                 }
@@ -77,7 +76,7 @@ fn frequencies(of_loop: &TransferFunction) -> Vec<f64> {
     if of_loop.dead_time_s() > 0.0 {
         sizes.push(1.0 / of_loop.dead_time_s());
     }
-    // A loop with roots at zero only has no frequency of its own but its gain.
+    // A loop with roots at zero only has no other frequency than its gain.
     sizes.push(of_loop.num()[0].abs().max(1e-9) / of_loop.den()[0].abs());
     let low = 1e-3 * sizes.iter().copied().fold(f64::MAX, f64::min);
     let high = 1e3 * sizes.iter().copied().fold(0.0, f64::max);
@@ -85,24 +84,10 @@ fn frequencies(of_loop: &TransferFunction) -> Vec<f64> {
     (0..GRID_POINTS).map(|k| low * libm::exp(ratio * f64::from(k))).collect()
 }
 
-/// Where a function changes sign.
-fn bisect(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
-    let above = f(low) > 0.0;
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if (f(middle) > 0.0) == above {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
-}
-
-/// The most of a function with one peak (golden section).
+/// Maximum of a function with one peak by golden-section search (Kiefer 1953).
 fn peak(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    for _ in 0..60 {
+    for _ in 0..BISECTIONS {
         let (left, right) = (high - golden * (high - low), low + golden * (high - low));
         if f(left) > f(right) { high = right } else { low = left }
     }

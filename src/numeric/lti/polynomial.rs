@@ -2,7 +2,9 @@
 
 use nalgebra::{Complex, DMatrix};
 
-/// The same without zeros in front; a polynomial that is zero keeps one.
+use crate::numeric::number::to_f64;
+
+/// Without leading zeros; one is kept of a zero polynomial.
 pub fn trim(coefficients: &[f64]) -> &[f64] {
     let leading = coefficients.iter().take_while(|c| **c == 0.0).count();
     let first = leading.min(coefficients.len().saturating_sub(1));
@@ -21,8 +23,8 @@ pub fn multiply(a: &[f64], b: &[f64]) -> Vec<f64> {
     }
     let mut product = vec![0.0; a.len() + b.len() - 1];
     for (i, x) in a.iter().enumerate() {
-        for (place, y) in product.iter_mut().skip(i).zip(b) {
-            *place += x * y;
+        for (position, y) in product.iter_mut().skip(i).zip(b) {
+            *position += x * y;
         }
     }
     product
@@ -32,14 +34,14 @@ pub fn multiply(a: &[f64], b: &[f64]) -> Vec<f64> {
 pub fn add(a: &[f64], b: &[f64]) -> Vec<f64> {
     let (long, short) = if a.len() >= b.len() { (a, b) } else { (b, a) };
     let mut sum = long.to_vec();
-    for (place, y) in sum.iter_mut().rev().zip(short.iter().rev()) {
-        *place += y;
+    for (position, y) in sum.iter_mut().rev().zip(short.iter().rev()) {
+        *position += y;
     }
     sum
 }
 
-/// The polynomial with these roots and a leading 1. Roots that are not real
-/// must come in conjugate pairs; what is imaginary in the result is dropped.
+/// The monic polynomial of these roots. Complex roots must come in conjugate pairs; imaginary
+/// parts of the result are dropped.
 pub fn from_roots(roots: &[Complex<f64>]) -> Vec<f64> {
     let mut product = vec![Complex::new(1.0, 0.0)];
     for root in roots {
@@ -52,20 +54,18 @@ pub fn from_roots(roots: &[Complex<f64>]) -> Vec<f64> {
     product.iter().map(|c| c.re).collect()
 }
 
-/// A frequency about which the roots lie: the geometric mean of their sizes, or
-/// 1 where one of them is zero or there are none.
+/// Geometric mean of the magnitudes of the roots; 1 if one of them is zero or there are none.
 pub(super) fn mean_size_of_roots(coefficients: &[f64]) -> f64 {
     let (Some(first), Some(last)) = (coefficients.first(), coefficients.last()) else {
         return 1.0;
     };
-    #[expect(clippy::cast_precision_loss, reason = "an order is small")]
-    let order = (coefficients.len() - 1) as f64;
+    let order = to_f64(coefficients.len() - 1);
     let mean = libm::pow((last / first).abs(), 1.0 / order.max(1.0));
     if mean.is_finite() && mean > 0.0 { mean } else { 1.0 }
 }
 
-/// Roots, as eigenvalues of the companion matrix of the polynomial in units of
-/// the roots' mean size, each polished with Newton's steps.
+/// Roots as eigenvalues of the companion matrix, scaled by the mean magnitude of the roots,
+/// each improved by Newton's steps.
 pub fn roots(coefficients: &[f64]) -> Vec<Complex<f64>> {
     let p = trim(coefficients);
     let zeros_at_origin = p.iter().rev().take_while(|c| **c == 0.0).count();
@@ -92,7 +92,7 @@ pub fn roots(coefficients: &[f64]) -> Vec<Complex<f64>> {
     found
 }
 
-/// Two of Newton's steps, each kept only if it comes nearer.
+/// Two Newton steps, each kept only if it reduces the residual.
 fn polish(p: &[f64], mut root: Complex<f64>) -> Complex<f64> {
     for _ in 0..2 {
         let (mut value, mut slope) = (Complex::new(0.0, 0.0), Complex::new(0.0, 0.0));
@@ -110,8 +110,8 @@ fn polish(p: &[f64], mut root: Complex<f64>) -> Complex<f64> {
     root
 }
 
-/// Whether all roots have a negative real part (Routh 1877): quick, without
-/// looking for them. A constant has none and passes.
+/// Whether all roots have negative real parts, by the criterion of Routh 1877. A constant has
+/// none and passes.
 pub fn is_hurwitz(coefficients: &[f64]) -> bool {
     let p = trim(coefficients);
     let mut upper: Vec<f64> = p.iter().step_by(2).copied().collect();

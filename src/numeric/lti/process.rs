@@ -1,4 +1,4 @@
-//! Process models: the few forms that describe most extruders.
+//! Process models of first and second order.
 
 use super::polynomial::multiply;
 use super::transfer::{ModelError, TransferFunction};
@@ -6,7 +6,7 @@ use super::transfer::{ModelError, TransferFunction};
 /// First order with dead time: K·(Tz·s + 1)/(T·s + 1)·e^(−Ls).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FirstOrder {
-    /// K: output for each unit of an input that has stood for long.
+    /// K: static gain.
     pub gain: f64,
     /// T \[s\].
     pub time_constant_s: f64,
@@ -21,7 +21,7 @@ pub struct FirstOrder {
 pub enum SecondOrder {
     /// K·(Tz·s + 1)/((T1·s + 1)(T2·s + 1))·e^(−Ls).
     Real {
-        /// K: output for each unit of an input that has stood for long.
+        /// K: static gain.
         gain: f64,
         /// T1 and T2 \[s\].
         time_constants_s: [f64; 2],
@@ -32,7 +32,7 @@ pub enum SecondOrder {
     },
     /// K·(Tz·s + 1)/(T²·s² + 2ζT·s + 1)·e^(−Ls).
     Oscillating {
-        /// K: output for each unit of an input that has stood for long.
+        /// K: static gain.
         gain: f64,
         /// T: one over the natural frequency \[s\].
         period_s: f64,
@@ -46,8 +46,8 @@ pub enum SecondOrder {
 }
 
 impl FirstOrder {
-    /// As a transfer function. Fails where the time constant is not above zero
-    /// or a number is not finite.
+    /// As a transfer function. Fails where the time constant is not above zero or a number is
+    /// not finite.
     pub fn transfer(&self) -> Result<TransferFunction, ModelError> {
         let t = positive("a time constant", self.time_constant_s)?;
         TransferFunction::new(&zero(self.gain, self.zero_s), &[t, 1.0], self.dead_time_s)

@@ -4,23 +4,22 @@ use nalgebra::{DMatrix, DVector};
 
 use super::state::StateSpace;
 use super::transfer::{ModelError, TransferFunction};
+use crate::numeric::number::to_count;
 
-/// What the input does between two samples.
+/// Input between two samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Between {
-    /// It holds the last sample, as a command does.
+    /// Constant at the last sample, as a command.
     Held,
-    /// It runs straight to the next sample, as a measured quantity does.
+    /// Linear to the next sample, as a measured quantity.
     Linear,
 }
 
-/// Dead times that miss a whole number of steps by less than this share of one
-/// are whole.
+/// Dead times within this fraction of a step of a whole number of steps are whole: rounding.
 const WHOLE_STEP_TOLERANCE: f64 = 1e-9;
 
-/// How a model moves from one sample to the next:
-/// x(k) = Φ·x(k−1) + Σ taps(j)·u(k−delay−j), y(k) = c·x(k) + Σ through(j)·u(k−delay−j).
-/// A dead time that ends within a step splits its input in two parts.
+/// Discrete state equations: x(k) = Φ·x(k−1) + Σ taps(j)·u(k−delay−j), y(k) = c·x(k) + Σ
+/// through(j)·u(k−delay−j). A dead time that ends within a step splits its input in two parts.
 #[derive(Debug, Clone)]
 pub(super) struct Sampled {
     pub state: DMatrix<f64>,
@@ -47,20 +46,20 @@ impl Sampled {
         let (taps, through) = match between {
             Between::Held => ([none(), second.constant, &second.state * first.constant], [0.0, d]),
             Between::Linear => {
-                let share = rest_s / dt_s;
+                let fraction = rest_s / dt_s;
                 let (rise, early) = (second.slope / dt_s, first.slope / dt_s);
-                let oldest = &second.state * (&first.constant * share - &early);
-                let middle = &second.state * (&first.constant * (1.0 - share) + &early)
+                let oldest = &second.state * (&first.constant * fraction - &early);
+                let middle = &second.state * (&first.constant * (1.0 - fraction) + &early)
                     + &second.constant
                     - &rise;
-                ([rise, middle, oldest], [d * (1.0 - share), d * share])
+                ([rise, middle, oldest], [d * (1.0 - fraction), d * fraction])
             }
         };
         Ok(Self { state, taps, c: space.c, through, delay })
     }
 }
 
-/// A dead time as whole steps and a rest \[s\].
+/// A dead time as whole steps and a remainder \[s\].
 pub(super) fn split(dead_time_s: f64, dt_s: f64) -> Result<(usize, f64), ModelError> {
     if !dt_s.is_finite() || dt_s <= 0.0 {
         return Err(ModelError::NotPositive { what: "the time step", value: dt_s });
@@ -68,12 +67,10 @@ pub(super) fn split(dead_time_s: f64, dt_s: f64) -> Result<(usize, f64), ModelEr
     let steps = dead_time_s / dt_s;
     let whole = (steps + WHOLE_STEP_TOLERANCE).floor();
     let rest = (steps - whole) * dt_s;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
-    Ok((whole as usize, if rest < WHOLE_STEP_TOLERANCE * dt_s { 0.0 } else { rest }))
+    Ok((to_count(whole), if rest < WHOLE_STEP_TOLERANCE * dt_s { 0.0 } else { rest }))
 }
 
-/// A model that is given one sample after the other. A step allocates nothing
-/// and takes well below a microsecond for a few poles.
+/// A model that takes one sample after the other. A step does not allocate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulator {
     order: usize,
@@ -84,10 +81,10 @@ pub struct Simulator {
     through: [f64; 2],
     x: Vec<f64>,
     next: Vec<f64>,
-    /// Inputs from the newest to the oldest that is still under way, as a ring.
+    /// Inputs from the newest to the oldest within the dead time, as a ring.
     inputs: Vec<f64>,
     newest: usize,
-    /// The steady state of an input of one; `None` for an integrator.
+    /// Steady state for a unit input; `None` for an integrator.
     steady: Option<Vec<f64>>,
 }
 
@@ -118,8 +115,8 @@ impl Simulator {
         self.inputs.fill(0.0);
     }
 
-    /// To the steady state of an input that has stood for long. Fails for an
-    /// integrator, unless the input is zero.
+    /// To the steady state of a constant input. Fails for an integrator, unless the input is
+    /// zero.
     pub fn settle(&mut self, input: f64) -> Result<(), ModelError> {
         if input == 0.0 {
             self.rest();
@@ -133,16 +130,15 @@ impl Simulator {
         Ok(())
     }
 
-    /// Takes the input of this sample and returns the output at the same
-    /// moment. A held input acts from this moment on, a linear one has run here
-    /// from the sample before.
+    /// Takes the input of this sample and returns the output at the same moment. A held input
+    /// acts from this moment on, a linear one has changed until this moment.
     pub fn step(&mut self, input: f64) -> f64 {
         let length = self.inputs.len();
         self.newest = if self.newest == 0 { length - 1 } else { self.newest - 1 };
         self.inputs[self.newest] = input;
         let delayed = |steps: usize| {
-            let place = self.newest + length - 3 + steps;
-            self.inputs[if place >= length { place - length } else { place }]
+            let position = self.newest + length - 3 + steps;
+            self.inputs[if position >= length { position - length } else { position }]
         };
         let [u0, u1, u2] = [delayed(0), delayed(1), delayed(2)];
         let [g0, g1, g2] = &self.taps;
@@ -159,8 +155,8 @@ impl Simulator {
     }
 }
 
-/// The output for a row of inputs, held between samples of `dt_s` \[s\], from
-/// rest with an input of zero. Fails where the step is not above zero.
+/// Output for held inputs, `dt_s` \[s\] apart, from rest with an input of zero. Fails where the
+/// step is not above zero.
 pub fn simulate(tf: &TransferFunction, input: &[f64], dt_s: f64) -> Result<Vec<f64>, ModelError> {
     let mut simulator = Simulator::new(tf, dt_s, Between::Held)?;
     Ok(input.iter().map(|u| simulator.step(*u)).collect())

@@ -1,13 +1,12 @@
-//! States of a transfer function, and how they move on while its input is
-//! constant or changes evenly.
+//! State space of a transfer function, and its transition matrices.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::polynomial::mean_size_of_roots;
 use super::transfer::{ModelError, TransferFunction};
 
-/// x' = A·x + B·u, y = C·x + D·u: the controllable form in units of the poles'
-/// mean size, so that its matrices stay of order one.
+/// x' = A·x + B·u, y = C·x + D·u: the controllable form in units of the mean magnitude of the
+/// poles, so that its matrices are of order one.
 #[derive(Debug, Clone)]
 pub struct StateSpace {
     /// A \[1/s\].
@@ -20,15 +19,14 @@ pub struct StateSpace {
     pub d: f64,
 }
 
-/// How a state moves on over a time h: x(h) = Φ·x(0) + constant·u(0) +
-/// slope·u'(0) with an input that is a straight line.
+/// Transition over a time h: x(h) = Φ·x(0) + constant·u(0) + slope·u'(0) with a linear input.
 #[derive(Debug, Clone)]
 pub struct Advance {
     /// Φ.
     pub state: DMatrix<f64>,
-    /// What an input of one adds that stands.
+    /// Effect of a constant unit input.
     pub constant: DVector<f64>,
-    /// What an input adds that grows by one each second.
+    /// Effect of an input that grows by one per second.
     pub slope: DVector<f64>,
 }
 
@@ -60,8 +58,8 @@ impl StateSpace {
         Self { a, b, c, d }
     }
 
-    /// Exact, by one exponential of the states with the input and its slope
-    /// appended (Van Loan 1978).
+    /// Exact, by one matrix exponential of the states with the input and its slope appended
+    /// (Van Loan 1978).
     pub fn advance(&self, h: f64) -> Advance {
         let n = self.b.len();
         let mut joined = DMatrix::zeros(n + 2, n + 2);
@@ -76,7 +74,7 @@ impl StateSpace {
         }
     }
 
-    /// The state in which an input of one keeps it. Fails for an integrator.
+    /// The steady state for a unit input. Fails for an integrator.
     pub fn steady(&self) -> Result<DVector<f64>, ModelError> {
         if self.b.is_empty() {
             return Ok(self.b.clone());

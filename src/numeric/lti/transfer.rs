@@ -2,10 +2,9 @@
 
 use nalgebra::Complex;
 
-use super::polynomial;
-use super::polynomial::{evaluate, multiply, trim};
+use super::polynomial::{self, evaluate, multiply, trim};
 
-/// Why there is no such model.
+/// Why a model is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ModelError {
     /// A coefficient or time is NaN or infinite.
@@ -16,10 +15,10 @@ pub enum ModelError {
         /// What was found.
         value: f64,
     },
-    /// Nothing, or only zeros, below the line.
+    /// A zero denominator.
     #[error("the denominator is zero")]
     NoDenominator,
-    /// More zeros than poles: it would differentiate its input.
+    /// More zeros than poles.
     #[error(
         "{zeros} zeros and only {poles} poles: it differentiates its input; put a filter of at \
          least {} poles in series",
@@ -31,7 +30,7 @@ pub enum ModelError {
         /// Degree of the denominator.
         poles: usize,
     },
-    /// A dead time before now.
+    /// A negative dead time.
     #[error("a dead time of {seconds} s; it cannot be negative")]
     NegativeDeadTime {
         /// What was found \[s\].
@@ -45,7 +44,7 @@ pub enum ModelError {
         /// What was found.
         value: f64,
     },
-    /// An inverse that would grow without bound.
+    /// An unstable inverse.
     #[error(
         "a zero at {re:.4} ± {im:.4}i 1/s in the right half plane becomes an unstable pole of the \
          inverse"
@@ -59,7 +58,7 @@ pub enum ModelError {
     /// An integrator has no steady state for an input other than zero.
     #[error("a model with a pole at zero integrates and has no steady state")]
     NoSteadyState,
-    /// This method has no place for a part of a step.
+    /// A dead time that is not a whole number of steps, for a method that needs one.
     #[error(
         "the dead time of {dead_time_s} s is {steps:.3} steps of {dt_s} s; this method keeps \
          whole steps only: take a hold, or round the dead time"
@@ -72,9 +71,6 @@ pub enum ModelError {
         /// Step \[s\].
         dt_s: f64,
     },
-    /// An impulse that passes straight through has no samples.
-    #[error("an impulse passes straight through as many zeros as poles; take another method")]
-    Feedthrough,
 }
 
 /// b(s)/a(s)·e^(−Ls), with no more zeros than poles.
@@ -158,8 +154,7 @@ impl TransferFunction {
         self.at(Complex::new(0.0, rad_per_s))
     }
 
-    /// Output for each unit of an input that has stood for long; infinite for an
-    /// integrator.
+    /// Static gain; infinite for an integrator.
     pub fn dc_gain(&self) -> f64 {
         let last = |row: &[f64]| row.last().copied().unwrap_or(0.0);
         last(&self.num) / last(&self.den)
@@ -180,8 +175,7 @@ impl TransferFunction {
         polynomial::is_hurwitz(&self.den)
     }
 
-    /// What goes through this and then through another; dead times add. Poles
-    /// and zeros that are equal are not cancelled.
+    /// This and another one in series; dead times add. Equal poles and zeros are not cancelled.
     pub fn series(&self, other: &Self) -> Result<Self, ModelError> {
         Self::new(
             &multiply(&self.num, &other.num),
@@ -190,16 +184,9 @@ impl TransferFunction {
         )
     }
 
-    /// The inverse without the dead time, which has none. Fails where there are
-    /// fewer zeros than poles or a zero is in the right half plane.
-    pub fn inverse(&self) -> Result<Self, ModelError> {
-        self.inverse_through(&Self { num: vec![1.0], den: vec![1.0], dead_time_s: 0.0 })
-    }
-
-    /// The inverse without the dead time in series with a filter, whose poles
-    /// take the place of those that the inverse lacks: the series of the result
-    /// and this is the filter after the dead time. Fails where the filter has too
-    /// few poles or a zero is in the right half plane.
+    /// The inverse without the dead time in series with a filter, whose poles make it proper:
+    /// the result in series with this is the filter after the dead time. Fails where the filter
+    /// has too few poles or a zero is in the right half plane.
     pub fn inverse_through(&self, filter: &Self) -> Result<Self, ModelError> {
         if self.num.iter().all(|c| *c == 0.0) {
             return Err(ModelError::NoDenominator);
@@ -255,7 +242,7 @@ mod tests {
         for w in [0.1, 10.0, 300.0] {
             assert!((both.at_frequency(w) - wanted.at_frequency(w)).norm() < 1e-12);
         }
-        let short = wheel.inverse();
+        let short = wheel.inverse_through(&TransferFunction::gain(1.0).unwrap());
         assert_eq!(short, Err(ModelError::Improper { zeros: 1, poles: 0 }));
     }
 
@@ -269,6 +256,9 @@ mod tests {
         let words = new(&[1.0, 0.0, 0.0], &[1.0], 0.0).unwrap_err().to_string();
         assert!(words.contains("at least 2 poles"), "{words}");
         let right = new(&[-1.0, 1.0], &[1.0, 1.0], 0.0).unwrap();
-        assert!(matches!(right.inverse(), Err(ModelError::InverseUnstable { re: 1.0, im: 0.0 })));
+        assert!(matches!(
+            right.inverse_through(&TransferFunction::gain(1.0).unwrap()),
+            Err(ModelError::InverseUnstable { re: 1.0, im: 0.0 })
+        ));
     }
 }

@@ -18,8 +18,10 @@ const NOISE_GAINS: [(usize, usize, f64); 4] = [
     (21, 3, 0.107_551_487_414_187_64),
 ];
 
-fn smoother(window: usize, degree: usize, derivative: usize) -> SavGol {
-    SavGol::new(window, degree).unwrap().derivative(derivative, 0.005).unwrap()
+/// Variance of the value at a sample of the window, for independent noise of variance 1.
+fn noise_gain(filter: &SavGol, at: usize) -> f64 {
+    let coefficients = filter.coefficients(at);
+    dot(&coefficients, &coefficients)
 }
 
 #[test]
@@ -27,14 +29,14 @@ fn coefficients_are_those_of_others() {
     for line in PUBLISHED.lines().filter(|line| !line.starts_with('#')) {
         let (case, row) = line.split_once(':').unwrap();
         let case: Vec<usize> = case.split(' ').map(|word| word.parse().unwrap()).collect();
-        let [window, degree, derivative] = case[..] else { unreachable!("{line}") };
+        let [window, degree, 0] = case[..] else { continue };
         let expected: Vec<f64> = row.split_whitespace().map(|word| word.parse().unwrap()).collect();
-        let coefficients = smoother(window, degree, derivative).coefficients(window / 2);
+        let coefficients = SavGol::new(window, degree).unwrap().coefficients(window / 2);
         let largest = expected.iter().fold(0.0_f64, |most, c| most.max(c.abs()));
         assert_eq!(coefficients.len(), expected.len());
         for (got, expected) in coefficients.iter().zip(&expected) {
             let off = (got - expected).abs() / largest;
-            assert!(off < 1e-12, "{window}, {degree}, {derivative}: {got} for {expected}");
+            assert!(off < 1e-12, "{window}, {degree}: {got} for {expected}");
         }
     }
 }
@@ -42,7 +44,7 @@ fn coefficients_are_those_of_others() {
 #[test]
 fn noise_gains_are_those_of_others_and_of_noise() {
     for (window, degree, expected) in NOISE_GAINS {
-        let gain = SavGol::new(window, degree).unwrap().noise_gain(window / 2);
+        let gain = noise_gain(&SavGol::new(window, degree).unwrap(), window / 2);
         assert!((gain / expected - 1.0).abs() < 1e-12, "{window}: {gain}");
     }
     let mut random = Xoshiro256PlusPlus::seed_from_u64(3);
@@ -50,28 +52,25 @@ fn noise_gains_are_those_of_others_and_of_noise() {
     let filter = SavGol::new(11, 3).unwrap();
     let smooth = filter.filter(&noise).unwrap();
     let variance = dot(&smooth, &smooth) / to_f64(smooth.len());
-    assert!((variance / filter.noise_gain(5) - 1.0).abs() < 0.03, "{variance}");
+    assert!((variance / noise_gain(&filter, 5) - 1.0).abs() < 0.03, "{variance}");
 }
 
 #[test]
 fn a_polynomial_stays_what_it_is_to_both_ends_and_live() {
     let cubic = |k: usize| {
         let t = to_f64(k) * 0.005;
-        [1.0 + 2.0 * t - 30.0 * t * t + 90.0 * t.powi(3), 2.0 - 60.0 * t + 270.0 * t * t]
+        1.0 + 2.0 * t - 30.0 * t * t + 90.0 * t.powi(3)
     };
-    let samples: Vec<f64> = (0..50).map(|k| cubic(k)[0]).collect();
-    for derivative in 0..2 {
-        let filter = smoother(9, 3, derivative);
-        let values = filter.filter(&samples).unwrap();
-        assert_eq!(values.len(), samples.len());
-        let mut live = LiveSavGol::new(&filter);
-        for (k, (value, sample)) in values.iter().zip(&samples).enumerate() {
-            let truth = cubic(k)[derivative];
-            assert!((value - truth).abs() < 1e-9, "{derivative}, {k}: {value} for {truth}");
-            match live.step(*sample) {
-                None => assert!(k < 8),
-                Some(now) => assert!(k >= 8 && (now - truth).abs() < 1e-9, "{k}: {now}"),
-            }
+    let samples: Vec<f64> = (0..50).map(cubic).collect();
+    let filter = SavGol::new(9, 3).unwrap();
+    let values = filter.filter(&samples).unwrap();
+    assert_eq!(values.len(), samples.len());
+    let mut live = LiveSavGol::new(&filter);
+    for (k, (value, truth)) in values.iter().zip(&samples).enumerate() {
+        assert!((value - truth).abs() < 1e-9, "{k}: {value} for {truth}");
+        match live.step(*truth) {
+            None => assert!(k < 8),
+            Some(now) => assert!(k >= 8 && (now - truth).abs() < 1e-9, "{k}: {now}"),
         }
     }
 }
@@ -81,8 +80,6 @@ fn numbers_that_make_no_filter_are_refused() {
     assert!(SavGol::new(10, 3).unwrap_err().to_string().contains("odd number from 5"));
     assert!(SavGol::new(3, 3).is_err() && SavGol::new(1, 0).is_ok());
     assert!(SavGol::new(21, 9).is_err());
-    assert!(SavGol::new(7, 2).unwrap().derivative(3, 0.01).is_err());
-    assert!(SavGol::new(7, 2).unwrap().derivative(1, 0.0).is_err());
     let few = SavGol::new(7, 2).unwrap().filter(&[1.0; 6]).unwrap_err();
     assert_eq!(few.to_string(), "6 samples: a window of 7 needs as many");
 }

@@ -6,7 +6,8 @@ use super::area::{Area, round};
 use super::axis::{AxisScale, PageExtent};
 use super::palette;
 use super::range::ValueRange;
-use crate::numeric::statistics::{Distribution, as_f64};
+use crate::numeric::number::to_f64;
+use crate::numeric::statistics::Distribution;
 
 /// Bars per factor of two, which trades resolution against noise of the counts.
 const BARS_PER_OCTAVE: usize = 8;
@@ -18,14 +19,14 @@ pub fn draw(latencies: &Distribution) -> Markup {
     let area = Area::wide(230.0);
     let x = AxisScale::log(ValueRange::new(first.0.min(last.1 / 4.0), last.1), area.across());
     let most = bars.iter().map(|bar| bar.2).max().unwrap_or(1);
-    let y = AxisScale::linear(ValueRange::new(0.0, as_f64(most) * 1.12), area.upwards());
+    let y = AxisScale::linear(ValueRange::new(0.0, to_f64(most) * 1.12), area.upwards());
     let PageExtent { from: bottom, to: top } = area.upwards();
     let inner = html! {
         (area.y_grid(&y, "setpoints"))
         (area.vertical_grid(&x.ticks(0), &x, "latency [ms]"))
         @for (low, high, count) in &bars {
             @let (from, to) = (x.position(*low), x.position(*high));
-            @let upper = y.position(as_f64(*count));
+            @let upper = y.position(to_f64(*count));
             @if *count > 0 {
                 rect x=(round(from + 0.5)) y=(round(upper)) width=(round((to - from - 1.0).max(0.5)))
                     height=(round((bottom - upper).max(1.0))) fill=(palette::SETPOINT.css()) {

@@ -6,7 +6,7 @@ use super::model::ModelStudy;
 use crate::core::quantity::Unit;
 use crate::identify::band::{self, Band};
 use crate::identify::experiment::Experiment;
-use crate::numeric::statistics::as_f64;
+use crate::numeric::number::to_f64;
 use crate::report::chart::area::round;
 use crate::report::chart::palette::{DEMAND, FLOW, Ink, MODEL, PRESSURE, SCREW, TARGET};
 use crate::report::chart::{
@@ -34,7 +34,7 @@ fn series(at: impl Iterator<Item = f64>, values: impl Iterator<Item = f64>) -> P
 }
 
 fn times(data: &Experiment) -> impl Iterator<Item = f64> {
-    (0..data.len()).map(|k| data.start_s + as_f64(k as u64) * data.step_s)
+    (0..data.len()).map(|k| data.start_s + to_f64(k) * data.step_s)
 }
 
 /// Input and output over time, with the output that the model predicts.
@@ -71,7 +71,7 @@ pub fn residuals(study: &ModelStudy) -> Markup {
 pub fn autocorrelation(study: &ModelStudy) -> Markup {
     let step_s = study.logs.estimation.step_s;
     let lags = &study.residuals.lags;
-    let at = |k: usize| as_f64(k as u64) * step_s;
+    let at = |k: usize| to_f64(k) * step_s;
     let curve = series((1..lags.len()).map(at), lags.iter().copied().skip(1));
     let bound = study.residuals.bound;
     let axis = XAxis {

@@ -6,7 +6,7 @@ use crate::control::event::Event;
 use crate::control::step::{State, Step};
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
-use crate::numeric::statistics::as_f64;
+use crate::numeric::number::to_f64;
 use crate::report::chart::{Mark, PlotCurve, Strip};
 use crate::rows::frame_row::FrameRow;
 use crate::rows::names;
@@ -79,7 +79,7 @@ impl Charts {
     /// A frame that was measured or rejected.
     pub fn frame(&mut self, row: &FrameRow) {
         let timed = *self.timed.get_or_insert(row.time_s.is_some());
-        let x = if timed { row.time_s } else { Some(as_f64(row.frame)) };
+        let x = if timed { row.time_s } else { Some(to_f64(row.frame)) };
         let Some(x) = x else { return };
         let measured = match &row.outcome {
             Err(status) => return self.rejected.push(x, Mark { severity: 1, name: status }),

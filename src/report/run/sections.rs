@@ -6,7 +6,8 @@ use maud::{Markup, html};
 use super::charts::TimeAndPath;
 use super::contents::RunReport;
 use super::remedies;
-use crate::numeric::statistics::{Distribution, as_f64};
+use crate::numeric::number::to_f64;
+use crate::numeric::statistics::Distribution;
 use crate::report::chart::{
     Area, Ink, Plot, PlotCurve, PlotLayer, Strip, StripRow, ValueRange, XAxis, histogram, legend,
     palette, strips, wide_plot, y_range,
@@ -145,7 +146,7 @@ pub fn rejections(summary: &Summary) -> Markup {
                         tr {
                             td { code { (status) } }
                             td.number { (count) }
-                            td.number { (format!("{:.2} %", as_f64(*count) / as_f64(summary.frames.max(1)) * 100.0)) }
+                            td.number { (format!("{:.2} %", to_f64(*count) / to_f64(summary.frames.max(1)) * 100.0)) }
                             td { (meaning) }
                             td { (remedy) }
                         }

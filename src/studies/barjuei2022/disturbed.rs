@@ -5,7 +5,8 @@ use rayon::prelude::*;
 use super::{ControlSetup, scale};
 use crate::cell::file::{Cell, RunPart};
 use crate::core::units::Mm;
-use crate::numeric::average::{mean, median};
+use crate::numeric::average::mean;
+use crate::numeric::rank::mean_median;
 use crate::sim::cell::SimCellError;
 use crate::trials::layer::LayerTrial;
 
@@ -99,7 +100,7 @@ pub fn step_settles(
         cell.simulation.flow.step_ratio = 1.08;
         Ok(LayerTrial::lay(&cell, &run, &scale(), seed)?.settles_within(at, 0.5))
     })?;
-    Ok(median(&mut found))
+    Ok(mean_median(&mut found).unwrap_or(f64::NAN))
 }
 
 /// What the controller is told wrong, and what its camera does.
@@ -144,7 +145,7 @@ pub fn mismatched(
         Ok(trial.rms_error(trial.control_start_mm + 500.0))
     })?;
     let mean_mm = mean(found.iter().copied());
-    Ok(BeadErrors { median_mm: median(&mut found), mean_mm })
+    Ok(BeadErrors { median_mm: mean_median(&mut found).unwrap_or(f64::NAN), mean_mm })
 }
 
 /// A number of every seed, in parallel.

@@ -4,7 +4,7 @@ use super::disturbed::each;
 use super::{ControlSetup, scale};
 use crate::cell::file::{Cell, RunPart};
 use crate::core::units::Mm;
-use crate::numeric::average::median;
+use crate::numeric::rank::mean_median;
 use crate::scenario::table::WidthSource;
 use crate::sim::cell::SimCellError;
 use crate::trials::compare::{JUDGED_AFTER_MM, SIGMA_AFTER_MM};
@@ -43,7 +43,7 @@ pub struct LayerResult {
 pub fn lay(cell: &Cell, run: &RunPart, seeds: u64) -> Result<LayerResult, SimCellError> {
     let trials = each(seeds, |seed| LayerTrial::lay(cell, run, &scale(), seed))?;
     let of = |value: &dyn Fn(&LayerTrial) -> f64| {
-        median(&mut trials.iter().map(value).collect::<Vec<f64>>())
+        mean_median(&mut trials.iter().map(value).collect::<Vec<f64>>()).unwrap_or(f64::NAN)
     };
     let settled = of(&|trial| trial.settles_within(trial.control_start_mm, 0.5));
     Ok(LayerResult {
@@ -77,7 +77,7 @@ pub fn settles_unseen(
     let mut found = each(seeds, |seed| {
         Ok(LayerTrial::lay(&cell, &run, &scale(), seed)?.settles_within(0.0, 0.5))
     })?;
-    Ok(median(&mut found))
+    Ok(mean_median(&mut found).unwrap_or(f64::NAN))
 }
 
 /// The paper's cell with every frame rendered and measured by a method.

@@ -256,7 +256,7 @@ mod tests {
         let weights = EdgeWeights::new(&table, BLUR_PX, HALF).unwrap();
         let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
         let (mut mean, mut told) = (0.0, 0.0);
-        let trials = 4000;
+        let trials = 4000_usize;
         for _ in 0..trials {
             let texture = texture(&mut random);
             mean += found(&weights, &table, &texture) / to_f64(trials);

@@ -65,7 +65,7 @@ fn a_varied_input_that_stands_at_its_limits_is_cut_off() {
         (noise, [29.5, 30.5]),
     ] {
         let cut = input(row).unwrap_err();
-        assert!(cut.column == Column::Input && limits.contains(&cut.value), "{cut}");
+        assert!(cut.column == DataColumn::Input && limits.contains(&cut.value), "{cut}");
         assert!(cut.clipped_percent > 10.0 && cut.longest > MIN_RUN, "{cut}");
     }
 }
@@ -79,8 +79,8 @@ fn random_levels_that_are_held_and_cut_at_one_limit_are_cut_off() {
     // A short log that is cut often.
     let short = levels.iter().take(32).map(|level| level.min(31.0));
     assert_eq!(input(held(short, 75)).unwrap_err().value, 31.0);
-    let share = levels.iter().filter(|level| **level > 33.0).count();
-    assert!((cut.clipped_percent - f64::from(u32::try_from(share).unwrap()) / 0.8).abs() < 2.6);
+    let fraction = levels.iter().filter(|level| **level > 33.0).count();
+    assert!((cut.clipped_percent - f64::from(u32::try_from(fraction).unwrap()) / 0.8).abs() < 2.6);
     let said = cut.to_string();
     assert!(said.contains("the input is cut off") && said.contains("--from-s"), "{said}");
 }
@@ -122,15 +122,15 @@ fn what_steps_between_levels_is_not_cut_off() {
 }
 
 #[test]
-fn an_output_cut_off_is_told_from_one_that_rests() {
+fn a_clipped_output_is_distinguished_from_one_at_rest() {
     let cut: Vec<f64> = sine(600).iter().map(|y| y.min(0.8)).collect();
     let clipped = Samples::new(sine(600), cut.clone(), 0.1).unwrap().check_clipped();
     assert!(matches!(
         clipped,
-        Err(Clipped { column: Column::Output, end: Extreme::Largest, value: 0.8, .. })
+        Err(Clipped { column: DataColumn::Output, end: Extreme::Largest, value: 0.8, .. })
     ));
     let clipped = Samples::new(cut, sine(600), 0.1).unwrap().check_clipped();
-    assert!(matches!(clipped, Err(Clipped { column: Column::Input, .. })));
+    assert!(matches!(clipped, Err(Clipped { column: DataColumn::Input, .. })));
     let steps: Vec<f64> = (0..600_u32).map(|k| f64::from((k / 20 * 7) % 2)).collect();
     assert_eq!(Samples::new(steps, sine(600), 0.1).unwrap().check_clipped(), Ok(()));
     // Levels of a drive that takes its steps over some samples.

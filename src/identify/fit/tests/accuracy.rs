@@ -32,17 +32,17 @@ fn hold(truth: &[f64], names: &[&str], bound: &[f64], fits: &[Fit], slack: f64) 
         let mean = fits.iter().map(|fit| of(fit).value).sum::<f64>() / n;
         let squares: f64 = fits.iter().map(|fit| (of(fit).value - mean).powi(2)).sum();
         let sigma = (squares / (n - 1.0)).sqrt();
-        let told = fits.iter().map(|fit| of(fit).sigma).sum::<f64>() / n;
+        let reported = fits.iter().map(|fit| of(fit).sigma).sum::<f64>() / n;
         let (ratio, bias) = ((sigma / bound).powi(2), (mean - truth) / sigma);
         println!(
             "{name}: variance/bound {ratio:.3}, bias {bias:.3} of an estimate's error ({:.2} of \
-             the mean's), told/seen {:.3}",
+             the mean's), reported/seen {:.3}",
             bias * n.sqrt(),
-            told / sigma
+            reported / sigma
         );
         assert!(ratio <= 1.2 + slack, "{name}: {ratio}");
         assert!(bias.abs() < 1.0, "{name}: {bias}");
-        assert!((told / sigma - 1.0).abs() < 0.1 + slack, "{name}: {told} {sigma}");
+        assert!((reported / sigma - 1.0).abs() < 0.1 + slack, "{name}: {reported} {sigma}");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A first order with dead time driven by a PRBS, with noise as a share of the
+/// A first order with dead time driven by a PRBS, with noise as a fraction of the
 /// output's standard deviation.
 fn driven(tf: &TransferFunction, noise_share: f64, seed: u64) -> Samples {
     let input = prbs(60, 25);
@@ -26,7 +26,7 @@ const LAG: Structure = Structure::FirstOrder { zero: false };
 const UP_TO_2_S: DeadTime = DeadTime::Estimated { min_s: 0.0, max_s: 2.0 };
 
 #[test]
-fn a_dead_time_is_found_to_a_part_of_a_step_and_its_range_is_told() {
+fn a_dead_time_is_found_to_a_part_of_a_step_within_its_range() {
     let samples = driven(&late(0.417), 0.02, 1);
     let found = fit(&samples, &from_rest(LAG, UP_TO_2_S)).unwrap();
     let dead_time = found.parameter("dead_time_s").unwrap();
@@ -41,7 +41,7 @@ fn a_dead_time_is_found_to_a_part_of_a_step_and_its_range_is_told() {
 }
 
 #[test]
-fn beside_a_zero_that_passes_straight_through_a_dead_time_is_told_to_a_step() {
+fn with_direct_feedthrough_a_dead_time_is_found_to_a_step() {
     let tf = |dead_time_s| {
         let model = FirstOrder { gain: 2.0, time_constant_s: 0.84, zero_s: 0.3, dead_time_s };
         model.transfer().unwrap()
@@ -91,7 +91,7 @@ fn an_output_that_integrates_is_refused() {
 }
 
 #[test]
-fn too_many_poles_are_told_by_name() {
+fn too_many_poles_are_reported_by_name() {
     let structure = Structure::Transfer { poles: 3, zeros: 0 };
     let settings = from_rest(structure, DeadTime::Known(0.0));
     for seed in 0..4 {
@@ -110,7 +110,7 @@ fn too_many_poles_are_told_by_name() {
 }
 
 #[test]
-fn what_is_open_is_told_and_not_one_parameter_of_it() {
+fn an_undetermined_combination_is_reported_with_all_its_parameters() {
     // Over its own highest coefficient each parameter may look well determined.
     let settings = from_rest(Structure::Transfer { poles: 3, zeros: 2 }, DeadTime::Known(0.0));
     for seed in 0..4 {
@@ -181,8 +181,8 @@ fn levels_and_an_unsettled_start_do_not_bias_the_model() {
 }
 
 #[test]
-fn coloured_noise_makes_larger_errors_and_they_are_told() {
-    let (mut squares, mut told, mut white) = (0.0, 0.0, 0.0);
+fn autocorrelated_noise_makes_larger_errors_and_they_are_reported() {
+    let (mut squares, mut reported, mut white) = (0.0, 0.0, 0.0);
     for seed in 0..30 {
         let input = prbs(60, 25);
         let clean = simulate(&late(0.417), &input, 0.02).unwrap();
@@ -191,11 +191,11 @@ fn coloured_noise_makes_larger_errors_and_they_are_told() {
         let found = fit(&samples, &from_rest(LAG, UP_TO_2_S)).unwrap();
         let gain = found.parameter("gain").unwrap();
         squares += (gain.value - 2.0).powi(2) / 30.0;
-        told += gain.sigma / 30.0;
+        reported += gain.sigma / 30.0;
         white += gain.sigma_if_white / 30.0;
     }
     let seen = squares.sqrt();
-    assert!((0.65..1.4).contains(&(told / seen)), "{told} {seen}");
+    assert!((0.65..1.4).contains(&(reported / seen)), "{reported} {seen}");
     assert!(white < 0.5 * seen, "{white} {seen}");
 }
 

@@ -3,11 +3,11 @@
 use super::*;
 
 fn file() -> StartStopFile {
-    let setting = Conditions { material: Some("PLA".to_owned()), ..Conditions::default() };
+    let conditions = Conditions { material: Some("PLA".to_owned()), ..Conditions::default() };
     StartStopFile {
-        conditions: setting,
-        parameters: assemble([1.0 / 3.0, 0.25, 640.0, 21.5], [0.2, 0.15, 0.11, 0.7]),
-        sigma: assemble([0.01, 0.002, 8.0, 1e-7], [0.0, 0.001, 0.002, 0.03]),
+        conditions,
+        parameters: StartStop::from_parts([1.0 / 3.0, 0.25, 640.0, 21.5], [0.2, 0.15, 0.11, 0.7]),
+        sigma: StartStop::from_parts([0.01, 0.002, 8.0, 1e-7], [0.0, 0.001, 0.002, 0.03]),
         data: FitData {
             starts: 11,
             stops: 12,
@@ -27,7 +27,7 @@ fn what_is_written_is_read_again() {
 }
 
 #[test]
-fn everything_that_is_wrong_is_told_at_once() {
+fn all_violations_are_reported_at_once() {
     let text = to_toml(&file(), &[])
         .replace("version = 1", "version = 2")
         .replace("void_mm3 = 640.0", "void_mm3 = -640.0")

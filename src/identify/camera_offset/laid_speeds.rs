@@ -5,27 +5,28 @@ use super::observation::BeadObservation;
 use crate::core::robot::RobotState;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{to_count, to_f64};
+use crate::numeric::rank;
 
-/// Longest time between two reports over which the speed is taken to have changed
-/// evenly; the link counts as lost after it.
-const MAX_GAP: Span = Span::from_millis(500);
-/// A path that falls back by less is the same bead \[mm\].
+/// Longest time between two reports over which the speed is interpolated; a longer one is a
+/// lost link.
+pub const MAX_GAP: Span = Span::from_millis(500);
+/// A path that decreases by less is the same bead \[mm\]: rounding of the reports.
 const MAX_BACKSTEP_MM: f64 = 0.01;
-/// Grid along the path on which speeds are summed up \[mm\].
+/// Grid along the path on which speeds are integrated \[mm\]. A choice: well below any gauge.
 const GRID_MM: f64 = 0.5;
 /// Longest bead \[mm\]; a longer one is a path that jumped.
 const MAX_LENGTH_MM: f64 = 1e7;
-/// Share of the usual speed below which a bead is at its beginning or its end, where its
-/// width is no power of the speed.
+/// Speed over the median below which a bead starts or ends, where its width is no power of the
+/// speed.
 const MIN_SPEED_FRACTION: f64 = 0.2;
-/// Growth of the speed over a millimetre, as a share, beyond which a bead that begins is
-/// still run up, or one that ends run out: there, too, its width is something else.
+/// Relative growth of the speed per millimetre from which a bead is still starting, or already
+/// ending, where its width is no power of the speed either.
 const RUN_UP_PER_MM: f64 = 0.01;
 
 /// All beads of a recording.
 #[derive(Debug, Clone)]
-pub struct SpeedProfile {
+pub struct LaidSpeeds {
     beads: Vec<Bead>,
     min_speed: f64,
 }
@@ -38,12 +39,11 @@ struct Bead {
     clocks: Vec<f64>,
     paths: Vec<f64>,
     speeds: Vec<f64>,
-    /// Nodes of the grid up to each, at which the bead was laid slower than the slowest, or
-    /// was run up or out.
+    /// Number of grid nodes up to each one where the bead was slow, starting or ending.
     slow: Vec<u32>,
 }
 
-/// Sums along one bead from which means over stretches of it are read.
+/// Integrals along one bead, for means over segments.
 #[derive(Debug, Clone)]
 pub struct PowerIntegral {
     start_mm: f64,
@@ -54,8 +54,8 @@ pub struct PowerIntegral {
     ends: (f64, f64),
 }
 
-impl SpeedProfile {
-    /// Of what the robot reported, in order; `None` where it laid nothing.
+impl LaidSpeeds {
+    /// From the robot's reports, in order; `None` without a bead.
     pub fn of(states: &[(Stamp, RobotState)]) -> Option<Self> {
         let mut beads: Vec<Bead> = Vec::new();
         let mut open = false;
@@ -74,55 +74,45 @@ impl SpeedProfile {
             }
         }
         beads.retain(|bead| bead.length_mm() > 0.0 && bead.length_mm() < MAX_LENGTH_MM);
-        let mut speeds: Vec<f64> = beads.iter().flat_map(Bead::on_grid).collect();
-        if speeds.is_empty() {
-            return None;
-        }
-        speeds.sort_by(f64::total_cmp);
-        let slowest = (MIN_SPEED_FRACTION * speeds[speeds.len() / 2]).max(f64::MIN_POSITIVE);
+        let median = rank::median_of(beads.iter().flat_map(Bead::on_grid))?;
+        let slowest = (MIN_SPEED_FRACTION * median).max(f64::MIN_POSITIVE);
         for bead in &mut beads {
             bead.mark_slow(slowest);
         }
         Some(Self { beads, min_speed: slowest })
     }
 
-    /// Bead and path of the nozzle at a moment \[mm\], on the line between two reports.
+    /// Bead and path position of the nozzle at a moment \[mm\], interpolated between two
+    /// reports.
     pub fn path_at(&self, at: Stamp) -> Option<(usize, f64)> {
         let number = self.beads.partition_point(|bead| bead.times.last() < Some(&at));
         Some((number, self.beads.get(number)?.path_at(at)?))
     }
 
-    /// Slowest and fastest speed along the path, without a share of it at either end of
-    /// the range and without what is too slow to count.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "a share of a count"
-    )]
+    /// Slowest and fastest speed along the path, without a fraction at either end of the range
+    /// and without slow parts.
     pub fn range(&self, tail: f64) -> SpeedRange {
         let speeds = self.beads.iter().flat_map(Bead::on_grid);
         let mut speeds: Vec<f64> = speeds.filter(|&speed| speed >= self.min_speed).collect();
         speeds.sort_by(f64::total_cmp);
         let last = speeds.len().saturating_sub(1);
-        let skip = (tail * last as f64) as usize;
+        let skip = to_count(tail * to_f64(last));
         let at =
             |i: usize| MmPerS::new(speeds.get(i).copied().unwrap_or(0.0)).unwrap_or(MmPerS::ZERO);
         SpeedRange { min: at(skip), max: at(last - skip) }
     }
 
-    /// Whether the speed is known, and large enough, all over the gauge of a width at an
-    /// offset \[mm\].
+    /// Whether the speed is known and high enough over the whole gauge of a width at an offset
+    /// \[mm\].
     pub fn covers(&self, look: &BeadObservation, offset_mm: f64, gauge: Mm) -> bool {
         let middle = look.path_mm - offset_mm;
         let half = 0.5 * gauge.get();
         self.beads.get(look.bead).is_some_and(|bead| bead.knows(middle - half, middle + half))
     }
 
-    /// How far along the path changes of speed may lie from where they are taken to be
-    /// \[mm\]: between two reports the robot came further than it would at an even
-    /// change if it slowed down later than that, or sped up sooner. The mean, weighted as
-    /// the changes tell the offset, by their squares.
+    /// Uncertainty of the position of speed changes along the path \[mm\]: between two reports
+    /// the robot moves further than with linear change of its speed if it slows down later, or
+    /// speeds up earlier. The mean is weighted by the squared changes, as in the offset.
     pub fn position_sigma_mm(&self) -> f64 {
         let (mut ways, mut changes) = (0.0, 0.0);
         for (way, change) in self.beads.iter().flat_map(Bead::changes) {
@@ -132,7 +122,7 @@ impl SpeedProfile {
         if changes > 0.0 { (ways / changes).abs() } else { 0.0 }
     }
 
-    /// Sums of every bead for an exponent.
+    /// Integrals of every bead for an exponent.
     pub fn sums(&self, exponent: f64) -> Vec<PowerIntegral> {
         self.beads.iter().map(|bead| bead.sums(exponent, self.min_speed)).collect()
     }
@@ -170,28 +160,28 @@ impl Bead {
         }
         let before = after.checked_sub(1)?;
         let (from, to) = (*self.times.get(before)?, *self.times.get(after)?);
-        let share = (at - from).secs() / (to - from).secs();
-        Some(self.paths[before] + (self.paths[after] - self.paths[before]) * share)
+        let fraction = (at - from).secs() / (to - from).secs();
+        Some(self.paths[before] + (self.paths[after] - self.paths[before]) * fraction)
     }
 
-    /// Speeds at the nodes of the grid: evenly from one report to the next along the
-    /// path.
+    /// Speeds at the grid nodes, interpolated along the path.
     fn on_grid(&self) -> impl Iterator<Item = f64> {
         let start = self.start_mm();
         let mut next = 1;
-        (0..=number(self.length_mm() / GRID_MM)).map(move |node| {
+        (0..=to_count(self.length_mm() / GRID_MM)).map(move |node| {
             let path = start + to_f64(node) * GRID_MM;
             while next + 1 < self.paths.len() && self.paths[next] < path {
                 next += 1;
             }
             let (from, to) = (self.paths[next - 1], self.paths[next]);
-            let share = if to > from { ((path - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
-            self.speeds[next - 1] + (self.speeds[next] - self.speeds[next - 1]) * share
+            let fraction =
+                if to > from { ((path - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
+            self.speeds[next - 1] + (self.speeds[next] - self.speeds[next - 1]) * fraction
         })
     }
 
-    /// Between any two reports: how much further the robot came than at an even change of
-    /// its speed \[mm\], times the mean speed, and the change.
+    /// For each pair of reports: the path beyond that of a linear speed change \[mm\] times the
+    /// mean speed, and the speed change.
     fn changes(&self) -> impl Iterator<Item = (f64, f64)> {
         (1..self.paths.len()).map(|i| {
             let pair = |values: &[f64]| (values[i - 1], values[i]);
@@ -218,9 +208,9 @@ impl Bead {
         if from < 0.0 || to > self.length_mm() {
             return false;
         }
-        // Both nodes about either end count: a gauge may be as short as a point.
-        let before = number(from / GRID_MM).checked_sub(1).and_then(|node| self.slow.get(node));
-        let after = self.slow.get(number(to / GRID_MM) + 1).or(self.slow.last());
+        // Both nodes about either end count: a gauge may have zero length.
+        let before = to_count(from / GRID_MM).checked_sub(1).and_then(|node| self.slow.get(node));
+        let after = self.slow.get(to_count(to / GRID_MM) + 1).or(self.slow.last());
         before.copied().unwrap_or(0) == after.copied().unwrap_or(0)
     }
 
@@ -239,7 +229,7 @@ impl Bead {
     }
 }
 
-/// Nodes from a bead's end inwards over which the speed still grows fast.
+/// Number of nodes from an end of a bead inwards over which the speed grows fast.
 fn run_up<'a>(speeds: impl Iterator<Item = &'a f64> + Clone, slowest: f64) -> usize {
     let grows = |here: f64, next: f64| next > here * (1.0 + RUN_UP_PER_MM * GRID_MM);
     let pairs = speeds.clone().zip(speeds.skip(1));
@@ -247,9 +237,8 @@ fn run_up<'a>(speeds: impl Iterator<Item = &'a f64> + Clone, slowest: f64) -> us
 }
 
 impl PowerIntegral {
-    /// Logarithm of the speed that lays a bead as wide as the mean over a stretch about a
-    /// place. Beyond the ends of what is known the speed is taken to have been as at
-    /// them.
+    /// Logarithm of the speed that lays a bead of the mean width over a segment about a point.
+    /// Beyond the ends of the bead the speed is taken as constant.
     pub fn ln_speed(&self, middle_mm: f64, length: Mm) -> f64 {
         let length = length.get().max(GRID_MM);
         let from = middle_mm - 0.5 * length;
@@ -263,16 +252,11 @@ impl PowerIntegral {
         if index <= 0.0 {
             return index * GRID_MM * self.ends.0;
         }
-        let node = number(index);
+        let node = to_count(index);
         if node >= last {
             return self.to_nodes[last] + (index - to_f64(last)) * GRID_MM * self.ends.1;
         }
         self.to_nodes[node]
             + (self.to_nodes[node + 1] - self.to_nodes[node]) * (index - to_f64(node))
     }
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates at 0")]
-fn number(place: f64) -> usize {
-    place as usize
 }
