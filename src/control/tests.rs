@@ -12,9 +12,9 @@ use crate::core::units::MmPerS2;
 use crate::core::units::{Mm, MmPerS, WidthRange};
 use crate::width_control::limiter::{SpeedLimit, SpeedLimits};
 use crate::width_control::pi::PiGains;
-use crate::width_control::settings::WidthControlSettings;
 use crate::width_control::strategy::constant::ConstantStrategy;
 use crate::width_control::strategy::pi::PiStrategy;
+use crate::width_control::strategy::{CellParameters, WidthControlSettings};
 use crate::width_control::target::WidthTarget;
 use std::sync::Arc;
 
@@ -33,15 +33,17 @@ pub fn setup() -> Setup {
             max_speed: MmPerS::constant(150.0),
             max_accel: MmPerS2::constant(2000.0),
         },
-        start_speed: MmPerS::constant(112.5),
+        cell: CellParameters {
+            start_speed: MmPerS::constant(112.5),
+            start_length: Mm::constant(200.0),
+            camera_offset: Mm::constant(88.4),
+            camera_offset_sigma: Mm::constant(8.84),
+            gauge_length: Mm::constant(12.7),
+            setpoint_period: Span::from_millis(200),
+            width_range: WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
+        },
         bead_length: None,
-        start_length: Mm::constant(200.0),
-        camera_offset: Mm::constant(88.4),
         alone_for: Span::from_millis(1600),
-        setpoint_period: Span::from_millis(200),
-        camera_offset_sigma: Mm::constant(8.84),
-        gauge_length: Mm::constant(12.7),
-        width_range: WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
     }
 }
 
@@ -259,7 +261,7 @@ fn what_cannot_be_recorded_ends_control_in_hold() {
 #[test]
 fn a_width_of_the_last_bead_does_not_start_control_of_this_one() {
     let mut line = Line::new();
-    line.controller.setup.start_length = Mm::constant(20.0);
+    line.controller.setup.cell.start_length = Mm::constant(20.0);
     line.now = 1.0;
     let _ = line.robot(RobotMode::Print, 500.0, 112.5);
     line.now = 1.4;

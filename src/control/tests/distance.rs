@@ -13,7 +13,8 @@ fn by_distance() -> Setup {
         DistanceStrategy { exponent: 0.25, learns_exponent: true, drift_per_root_m: 0.0055 };
     let mut setup = setup();
     setup.control.strategy = Arc::new(strategy);
-    Setup { setpoint_period: Span::from_secs(STEP_S), ..setup }
+    setup.cell.setpoint_period = Span::from_secs(STEP_S);
+    setup
 }
 
 /// A robot that does at once what it is told, over a bead of b = 0.25.
@@ -103,7 +104,7 @@ fn a_robot_that_tells_no_path_is_held_by_the_pi_law_and_the_record_says_why() {
 #[test]
 fn another_bead_is_held_from_its_first_millimetre_by_what_the_last_one_taught() {
     let mut setup = by_distance();
-    setup.start_length = Mm::ZERO;
+    setup.cell.start_length = Mm::ZERO;
     let mut cell = Cell::new(setup);
     let _ = cell.until(500.0);
     let _ = cell.line.robot(RobotMode::Idle, 500.0, 0.0);
@@ -116,7 +117,7 @@ fn another_bead_is_held_from_its_first_millimetre_by_what_the_last_one_taught() 
 #[test]
 fn a_bead_that_does_not_fill_the_gauge_yet_is_waited_for() {
     let mut setup = by_distance();
-    setup.start_length = Mm::ZERO;
+    setup.cell.start_length = Mm::ZERO;
     let mut line = Line::of(setup);
     line.now = 1.0;
     let _ = line.robot(RobotMode::Print, 0.0, 112.5);
