@@ -48,11 +48,8 @@ pub enum FeedforwardError {
         im: f64,
     },
     /// Nothing comes of a command that stands.
-    #[error("the model's gain at rest is {gain}: no command gives a steady output")]
-    NoGain {
-        /// What was found.
-        gain: f64,
-    },
+    #[error("the model's gain at rest is {0}: no command gives a steady output")]
+    NoGain(f64),
     /// A zero whose inverse is not stable.
     #[error(
         "the model has a zero at {re:.4} ± {im:.4}i 1/s, in the right half plane: its inverse \
@@ -132,5 +129,5 @@ fn usable_gain(model: &TransferFunction) -> Result<f64, FeedforwardError> {
         return Err(FeedforwardError::Unstable { re: pole.re, im: pole.im.abs() });
     }
     let gain = model.dc_gain();
-    if gain.is_finite() && gain != 0.0 { Ok(gain) } else { Err(FeedforwardError::NoGain { gain }) }
+    if gain.is_finite() && gain != 0.0 { Ok(gain) } else { Err(FeedforwardError::NoGain(gain)) }
 }

@@ -23,11 +23,8 @@ pub struct PathJob {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum JobError {
     /// A column is missing.
-    #[error("the heading has no column {column}: a job has {PATH}, x_mm, y_mm, z_mm and {SPEED}")]
-    Column {
-        /// Which one.
-        column: &'static str,
-    },
+    #[error("the heading has no column {0}: a job has {PATH}, x_mm, y_mm, z_mm and {SPEED}")]
+    Column(&'static str),
     /// A row that is not as long as the heading, or no text.
     #[error("line {line}: {what}")]
     Row {
@@ -92,7 +89,7 @@ pub fn read(text: &str) -> Result<PathJob, JobError> {
     let heading = reader.headers().map_err(|error| of_row(&error))?.clone();
     let column = |name: &'static str| {
         let at = heading.iter().position(|found| found == name);
-        Ok(Column { name, at: at.ok_or(JobError::Column { column: name })? })
+        Ok(Column { name, at: at.ok_or(JobError::Column(name))? })
     };
     let (path, speed) = (column(PATH)?, column(SPEED)?);
     let [x, y, z] = POSITION.map(column);

@@ -36,7 +36,7 @@ impl PathLimits {
 /// speed rises, stays at the piece's limit and falls.
 pub fn time_optimal(limits: &PathLimits, accel: f64) -> Result<SpeedProfile, SpeedProfileError> {
     if !(accel.is_finite() && accel > 0.0) {
-        return Err(SpeedProfileError::Acceleration { value: accel });
+        return Err(SpeedProfileError::Acceleration(accel));
     }
     check(limits)?;
     let square = |speed: &f64| speed * speed;
@@ -61,7 +61,7 @@ pub fn time_optimal(limits: &PathLimits, accel: f64) -> Result<SpeedProfile, Spe
 
 fn check(limits: &PathLimits) -> Result<(), SpeedProfileError> {
     if limits.path.len() < 2 {
-        return Err(SpeedProfileError::Short { nodes: limits.path.len() });
+        return Err(SpeedProfileError::Short(limits.path.len()));
     }
     let numbered = |speeds: &[f64]| (1..).zip(speeds.to_vec()).collect::<Vec<(usize, f64)>>();
     for (at, speed) in numbered(&limits.nodes) {
@@ -155,13 +155,13 @@ mod tests {
     #[test]
     fn limits_that_are_none_are_refused() {
         let mut limits = PathLimits::new(0.0, 10.0);
-        assert_eq!(time_optimal(&limits, 1.0), Err(SpeedProfileError::Short { nodes: 1 }));
+        assert_eq!(time_optimal(&limits, 1.0), Err(SpeedProfileError::Short(1)));
         limits.extend_to(0.0, 10.0, 10.0);
         assert!(matches!(time_optimal(&limits, 1.0), Err(SpeedProfileError::Order { at: 2, .. })));
         let mut limits = PathLimits::new(0.0, 10.0);
         limits.extend_to(5.0, 0.0, 10.0);
         assert!(matches!(time_optimal(&limits, 1.0), Err(SpeedProfileError::Speed { at: 1, .. })));
-        assert!(matches!(time_optimal(&limits, 0.0), Err(SpeedProfileError::Acceleration { .. })));
+        assert!(matches!(time_optimal(&limits, 0.0), Err(SpeedProfileError::Acceleration(_))));
     }
 
     proptest! {

@@ -5,12 +5,9 @@
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SpeedProfileError {
     /// One node is no way.
-    #[error("a speed profile of {nodes} points: at least 2 are needed")]
-    Short {
-        /// How many there are.
-        nodes: usize,
-    },
-    /// Path that does not run on.
+    #[error("a speed profile of {0} points: at least 2 are needed")]
+    Short(usize),
+    /// Path that does not run on \[mm/s²\].
     #[error(
         "point {at} of a speed profile lies at {path_mm} mm, the one before it at {before_mm} mm: \
          path must grow"
@@ -40,11 +37,8 @@ pub enum SpeedProfileError {
         to_mm: f64,
     },
     /// A robot that cannot change its speed.
-    #[error("an acceleration of {value} mm/s²: more than 0 is needed")]
-    Acceleration {
-        /// What was found \[mm/s²\].
-        value: f64,
-    },
+    #[error("an acceleration of {0} mm/s²: more than 0 is needed")]
+    Acceleration(f64),
 }
 
 impl SpeedProfileError {
@@ -52,7 +46,7 @@ impl SpeedProfileError {
     pub const fn point(&self) -> Option<usize> {
         match self {
             Self::Order { at, .. } | Self::Speed { at, .. } => Some(*at),
-            Self::Short { .. } | Self::StandsStill { .. } | Self::Acceleration { .. } => None,
+            Self::Short(_) | Self::StandsStill { .. } | Self::Acceleration(_) => None,
         }
     }
 }
@@ -97,7 +91,7 @@ impl SpeedProfile {
     /// From nodes in the order of the path.
     pub(super) fn of_squares(nodes: &[ProfileNode]) -> Result<Self, SpeedProfileError> {
         if nodes.len() < 2 {
-            return Err(SpeedProfileError::Short { nodes: nodes.len() });
+            return Err(SpeedProfileError::Short(nodes.len()));
         }
         let mut before: Option<ProfileNode> = None;
         let mut time = Vec::with_capacity(nodes.len());
@@ -263,7 +257,7 @@ mod tests {
     #[test]
     fn points_that_make_no_profile_are_refused() {
         let new = profile_of;
-        assert_eq!(new(&[(0.0, 1.0)]), Err(SpeedProfileError::Short { nodes: 1 }));
+        assert_eq!(new(&[(0.0, 1.0)]), Err(SpeedProfileError::Short(1)));
         assert!(matches!(
             new(&[(0.0, 1.0), (0.0, 1.0)]),
             Err(SpeedProfileError::Order { at: 2, .. })

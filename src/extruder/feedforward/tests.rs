@@ -113,7 +113,7 @@ fn a_model_that_no_command_can_hold_is_refused() {
     };
     assert!(matches!(new(&[1.0], &[1.0, -2.0]), FeedforwardError::Unstable { re, .. } if re > 1.9));
     assert!(matches!(new(&[1.0], &[1.0, 0.0]), FeedforwardError::Unstable { re: 0.0, .. }));
-    assert_eq!(new(&[1.0, 0.0], &[1.0, 2.0]), FeedforwardError::NoGain { gain: 0.0 });
+    assert_eq!(new(&[1.0, 0.0], &[1.0, 2.0]), FeedforwardError::NoGain(0.0));
     let stood = Inverse::new(&flow(), &InverseSettings { period: Span::ZERO, ..settings() });
     assert!(matches!(stood, Err(FeedforwardError::NotPositive { what: "the period", .. })));
 }

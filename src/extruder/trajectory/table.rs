@@ -13,17 +13,11 @@ const NUMBERS: [&str; 4] = ["time_s", "path_mm", "speed_mm_per_s", "flow_mm3_per
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlanTableError {
     /// A column is missing.
-    #[error("the heading has no column {column}; a plan comes from truebead plan")]
-    Column {
-        /// Which one.
-        column: String,
-    },
+    #[error("the heading has no column {0}; a plan comes from truebead plan")]
+    Column(String),
     /// Two columns of commands, or one in a unit that nobody knows.
-    #[error("the heading has {found} for the command, expected one column such as command_rpm")]
-    Command {
-        /// What was found.
-        found: String,
-    },
+    #[error("the heading has {0} for the command, expected one column such as command_rpm")]
+    Command(String),
     /// A row that is not as long as the heading, or no text.
     #[error("line {line}: {what}; was the file cut short? Plan the job again")]
     Row {
@@ -61,7 +55,7 @@ impl Columns {
     fn of(heading: &csv::StringRecord) -> Result<(Self, Unit), PlanTableError> {
         let index = |column: &str| {
             let at = heading.iter().position(|name| name == column);
-            at.ok_or_else(|| PlanTableError::Column { column: column.to_owned() })
+            at.ok_or_else(|| PlanTableError::Column(column.to_owned()))
         };
         let [time, path, speed, flow] = NUMBERS.map(index);
         let commands: Vec<(usize, &str)> =
@@ -69,10 +63,10 @@ impl Columns {
         let &[(command, name)] = commands.as_slice() else {
             let names: Vec<&str> = commands.iter().map(|(_, name)| *name).collect();
             let found = if names.is_empty() { "nothing".into() } else { names.join(", ") };
-            return Err(PlanTableError::Command { found });
+            return Err(PlanTableError::Command(found));
         };
         let unit = Unit::of_word(name.trim_start_matches(COMMAND));
-        let unit = unit.ok_or_else(|| PlanTableError::Command { found: name.to_owned() })?;
+        let unit = unit.ok_or_else(|| PlanTableError::Command(name.to_owned()))?;
         let columns = Self {
             bead: index(BEAD)?,
             numbers: [time?, path?, speed?, flow?],

@@ -12,11 +12,8 @@ pub enum GcodeError {
         found: String,
     },
     /// A comment without an end.
-    #[error("line {line}: a comment begins with ( and does not end; close it on its line")]
-    Comment {
-        /// Where.
-        line: usize,
-    },
+    #[error("line {0}: a comment begins with ( and does not end; close it on its line")]
+    Comment(usize),
     /// A code that could move the robot otherwise than is understood.
     #[error("line {line}: {found} is not understood; {wanted}")]
     Code {
@@ -28,11 +25,8 @@ pub enum GcodeError {
         wanted: &'static str,
     },
     /// A move without a feed.
-    #[error("line {line}: a move before any feed; write F and its speed a minute on it or before")]
-    NoFeed {
-        /// Where.
-        line: usize,
-    },
+    #[error("line {0}: a move before any feed; write F and its speed a minute on it or before")]
+    NoFeed(usize),
     /// A feed that is none.
     #[error("line {line}: F{found}; a feed above 0 is expected")]
     Feed {
@@ -42,11 +36,8 @@ pub enum GcodeError {
         found: f64,
     },
     /// An arc without a centre.
-    #[error("line {line}: an arc without a centre; write I and J, or R")]
-    NoCentre {
-        /// Where.
-        line: usize,
-    },
+    #[error("line {0}: an arc without a centre; write I and J, or R")]
+    NoCentre(usize),
     /// An arc whose ends are not equally far from its centre.
     #[error(
         "line {line}: the arc begins {from_mm:.3} mm from its centre and ends {to_mm:.3} mm from \

@@ -131,13 +131,13 @@ impl ModalState {
                 Move::arc(line, ArcEnds { from, to }, centre, mode == Mode::Left)?
             }
         };
-        Ok(LineMotion::Laid(moved, self.feed.ok_or(GcodeError::NoFeed { line })?))
+        Ok(LineMotion::Laid(moved, self.feed.ok_or(GcodeError::NoFeed(line))?))
     }
 
     fn centre(&self, line: usize, line_words: &LineWords) -> Result<Centre, GcodeError> {
         match (line_words.centre_offset, line_words.radius) {
             ([None, None], Some(radius)) => Ok(Centre::Radius(radius * self.unit_mm)),
-            ([None, None], None) => Err(GcodeError::NoCentre { line }),
+            ([None, None], None) => Err(GcodeError::NoCentre(line)),
             (beside, _) => Ok(Centre::Offset(beside.map(|c| c.unwrap_or(0.0) * self.unit_mm))),
         }
     }

@@ -47,7 +47,7 @@ fn uncomment(line: usize, text: &str) -> Result<String, GcodeError> {
     let mut rest = text.split(';').next().unwrap_or_default();
     while let Some((before, after)) = rest.split_once('(') {
         plain.push_str(before);
-        let (_, after) = after.split_once(')').ok_or(GcodeError::Comment { line })?;
+        let (_, after) = after.split_once(')').ok_or(GcodeError::Comment(line))?;
         rest = after;
     }
     plain.push_str(rest);
@@ -71,7 +71,7 @@ mod tests {
     fn what_is_no_word_is_told() {
         let error = words(7, "G1 X").unwrap_err();
         assert_eq!(error, GcodeError::Word { line: 7, found: "X".to_owned() });
-        assert_eq!(words(3, "G1 (open").unwrap_err(), GcodeError::Comment { line: 3 });
+        assert_eq!(words(3, "G1 (open").unwrap_err(), GcodeError::Comment(3));
         assert!(words(1, "G1 X1.2.3").is_err());
     }
 }
