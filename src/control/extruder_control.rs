@@ -31,9 +31,6 @@ impl ExtruderControl {
 
     /// Its fault, if it has one.
     pub fn fault(&self) -> Option<ExtruderFault> {
-        match self.supervisor.state() {
-            ExtruderState::Fault(why) => Some(why),
-            _ => None,
-        }
+        if let ExtruderState::Fault(why) = self.supervisor.state() { Some(why) } else { None }
     }
 }

@@ -100,10 +100,7 @@ impl Bead {
 
     /// Capture time up to which the width is known, while tracking.
     pub fn tracked(&self) -> Option<Stamp> {
-        match self.mode {
-            Mode::Tracking { seen_at } => Some(seen_at),
-            _ => None,
-        }
+        if let Mode::Tracking { seen_at } = self.mode { Some(seen_at) } else { None }
     }
 
     /// Whether tracking may begin with the next width.
@@ -126,18 +123,12 @@ impl Bead {
 impl Phase {
     /// The bead, while one is controlled.
     pub fn bead(&self) -> Option<&Bead> {
-        match self {
-            Self::Bead(bead) => Some(bead),
-            _ => None,
-        }
+        if let Self::Bead(bead) = self { Some(bead) } else { None }
     }
 
     /// The same, mutable.
     pub fn bead_mut(&mut self) -> Option<&mut Bead> {
-        match self {
-            Self::Bead(bead) => Some(bead),
-            _ => None,
-        }
+        if let Self::Bead(bead) = self { Some(bead) } else { None }
     }
 
     /// The last limit that acted on a setpoint.

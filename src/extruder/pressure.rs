@@ -160,9 +160,6 @@ fn within(
     range: std::ops::RangeInclusive<f64>,
     wanted: &'static str,
 ) -> Result<(), PressureError> {
-    if range.contains(&found) {
-        Ok(())
-    } else {
-        Err(PressureError::OutOfRange { what, found, wanted })
-    }
+    let error = PressureError::OutOfRange { what, found, wanted };
+    if range.contains(&found) { Ok(()) } else { Err(error) }
 }

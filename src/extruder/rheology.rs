@@ -58,11 +58,8 @@ impl PowerLaw {
     pub fn mass_g_per_min(&self, pressure: MPa) -> Result<f64, RheologyError> {
         not_negative("the pressure [MPa]", pressure.get())?;
         let mass = self.k * libm::pow(pressure.get(), self.exponent);
-        if mass.is_finite() {
-            Ok(mass)
-        } else {
-            Err(RheologyError::TooLarge("the mass flow [g/min]"))
-        }
+        let error = RheologyError::TooLarge("the mass flow [g/min]");
+        if mass.is_finite() { Ok(mass) } else { Err(error) }
     }
 
     /// Volume that leaves the nozzle at a pressure.
@@ -113,11 +110,8 @@ impl DragFlow {
 }
 
 fn positive(what: &'static str, found: f64) -> Result<(), RheologyError> {
-    if found.is_finite() && found > 0.0 {
-        Ok(())
-    } else {
-        Err(RheologyError::NotPositive { what, found })
-    }
+    let is_valid = found.is_finite() && found > 0.0;
+    if is_valid { Ok(()) } else { Err(RheologyError::NotPositive { what, found }) }
 }
 
 fn not_negative(what: &'static str, found: f64) -> Result<(), RheologyError> {

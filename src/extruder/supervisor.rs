@@ -220,10 +220,8 @@ impl Supervisor {
     }
 
     fn predicted_speed_ratio(&self) -> f64 {
-        match self.setup.robot_follows {
-            RobotFollows::Flow => self.predicted_flow_ratio().unwrap_or(1.0),
-            RobotFollows::Nothing => 1.0,
-        }
+        let follows = self.setup.robot_follows == RobotFollows::Flow;
+        self.predicted_flow_ratio().filter(|_| follows).unwrap_or(1.0)
     }
 
     /// Predicted over demanded flow; none without a demand and where a plan is followed, which

@@ -54,7 +54,8 @@ impl Pi {
     /// One step over `dt` since the last error. The integrator is frozen in a direction in
     /// which the applied speed cannot follow (anti-windup by conditional integration).
     pub fn step(&mut self, error: Mm, dt: Span, saturation: Saturation) -> Demand {
-        let increment = MmPerS::ZERO + integral_increment(self.gains, error, dt);
+        let increment = self.gains.ki_per_s2 * error.get() * dt.secs();
+        let increment = MmPerS::ZERO + MmPerS::new(increment).unwrap_or_default();
         let against = match saturation {
             Saturation::None => false,
             Saturation::Above => increment > MmPerS::ZERO,
@@ -70,10 +71,6 @@ impl Pi {
 
 fn proportional(gains: PiGains, error: Mm) -> MmPerS {
     MmPerS::new(gains.kp_per_s * error.get()).unwrap_or_default()
-}
-
-fn integral_increment(gains: PiGains, error: Mm, dt: Span) -> MmPerS {
-    MmPerS::new(gains.ki_per_s2 * error.get() * dt.secs()).unwrap_or_default()
 }
 
 #[cfg(test)]

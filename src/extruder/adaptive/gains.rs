@@ -149,22 +149,26 @@ pub enum GainError {
 }
 
 impl Adaptation {
-    /// γ·p·b, the gain from the error to the rate of the estimate; 0 without adaptation.
-    pub(super) fn rate(&self, input_gain: f64) -> f64 {
-        match self {
-            Self::Off => 0.0,
-            Self::Constant { learning_rate, weight } | Self::Ramp { learning_rate, weight, .. } => {
-                learning_rate * weight * input_gain
+    /// γ, p and λ; 0 for those that it does not have.
+    fn parameters(&self) -> [f64; 3] {
+        match *self {
+            Self::Off => [0.0; 3],
+            Self::Constant { learning_rate, weight } => [learning_rate, weight, 0.0],
+            Self::Ramp { learning_rate, weight, slope_rate_per_s } => {
+                [learning_rate, weight, slope_rate_per_s]
             }
         }
     }
 
+    /// γ·p·b, the gain from the error to the rate of the estimate; 0 without adaptation.
+    pub(super) fn rate(&self, input_gain: f64) -> f64 {
+        let [learning_rate, weight, _] = self.parameters();
+        learning_rate * weight * input_gain
+    }
+
     /// λ \[1/s\]; 0 where the slope is not estimated.
     pub(super) fn slope_rate_per_s(&self) -> f64 {
-        match self {
-            Self::Off | Self::Constant { .. } => 0.0,
-            Self::Ramp { slope_rate_per_s, .. } => *slope_rate_per_s,
-        }
+        self.parameters()[2]
     }
 }
 
@@ -214,17 +218,21 @@ pub(super) fn check(
     if leak < 0.0 {
         return Err(GainError::NotPositive { what: "the leakage", value: leak });
     }
-    match gains.adaptation {
-        Adaptation::Off => Ok(()),
-        Adaptation::Constant { learning_rate, weight } => learning(learning_rate, weight),
-        Adaptation::Ramp { learning_rate, weight, slope_rate_per_s: rate } => {
-            learning(learning_rate, weight)?;
-            positive("the slope's rate", rate)?;
-            let square = gains.adaptation.rate(plant.input_gain) * plant.input_gain;
-            let limit = slope_rate_limit(-pole, square, leak);
-            if rate < limit { Ok(()) } else { Err(GainError::SlopeRate { rate, limit }) }
+    if gains.adaptation == Adaptation::Off {
+        return Ok(());
+    }
+    let [learning_rate, weight, rate] = gains.adaptation.parameters();
+    positive("the learning rate", learning_rate)?;
+    positive("the weight of the error", weight)?;
+    if let Adaptation::Ramp { .. } = gains.adaptation {
+        positive("the slope's rate", rate)?;
+        let square = gains.adaptation.rate(plant.input_gain) * plant.input_gain;
+        let limit = slope_rate_limit(-pole, square, leak);
+        if rate >= limit || limit.is_nan() {
+            return Err(GainError::SlopeRate { rate, limit });
         }
     }
+    Ok(())
 }
 
 /// The λ below which all roots of (s + a)(s + σ)² + ω²(s + σ) + λω² lie in the left half plane
@@ -234,23 +242,12 @@ fn slope_rate_limit(a: f64, square: f64, leak: f64) -> f64 {
     (c2 * c1 - a * leak * leak - leak * square) / square
 }
 
-fn learning(learning_rate: f64, weight: f64) -> Result<(), GainError> {
-    positive("the learning rate", learning_rate)?;
-    positive("the weight of the error", weight)
-}
-
 fn positive(what: &'static str, value: f64) -> Result<(), GainError> {
     if value > 0.0 { Ok(()) } else { Err(GainError::NotPositive { what, value }) }
 }
 
 fn all_finite(plant: ScalarPlant, gains: &AdaptiveGains) -> Result<(), GainError> {
-    let (learning_rate, weight, slope) = match gains.adaptation {
-        Adaptation::Off => (0.0, 0.0, 0.0),
-        Adaptation::Constant { learning_rate, weight } => (learning_rate, weight, 0.0),
-        Adaptation::Ramp { learning_rate, weight, slope_rate_per_s } => {
-            (learning_rate, weight, slope_rate_per_s)
-        }
-    };
+    let [learning_rate, weight, slope] = gains.adaptation.parameters();
     let found = [
         ("the state gain", plant.state_gain_per_s),
         ("the input gain", plant.input_gain),

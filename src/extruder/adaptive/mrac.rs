@@ -20,7 +20,8 @@ const MAX_GAP_HOLDS: f64 = 4.0;
 pub struct MracController {
     plant: ScalarPlant,
     gains: AdaptiveGains,
-    hold: Span,
+    /// Time for which a command is held.
+    pub(super) hold: Span,
     /// The plant and the reference model over one held command.
     state_step: f64,
     input_step: f64,
@@ -61,11 +62,8 @@ impl MracController {
         let (estimate, model, last) = (UncertaintyEstimate::default(), 0.0, None);
         let controller = Self { plant, gains, hold, state_step, input_step, estimate, model, last };
         let radius = controller.error_radius();
-        if radius < 1.0 {
-            Ok(controller)
-        } else {
-            Err(GainError::SamplingTooSlow { hold_s: hold.secs(), radius })
-        }
+        let error = GainError::SamplingTooSlow { hold_s: hold.secs(), radius };
+        if radius < 1.0 { Ok(controller) } else { Err(error) }
     }
 
     /// Starts in a steady state: the reference model at the measured output, and the estimate
@@ -143,11 +141,6 @@ impl MracController {
         };
         let pole = self.plant.pole(self.gains.feedback + self.gains.error_feedback);
         RampErrors { output, estimate: -pole / self.plant.input_gain * output }
-    }
-
-    /// Time for which a command is held.
-    pub fn hold(&self) -> Span {
-        self.hold
     }
 
     /// The plant that it is made for.

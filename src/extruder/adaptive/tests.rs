@@ -30,12 +30,12 @@ fn plant(plant: ScalarPlant, y: f64, input: f64, unknown: (f64, f64), t: f64) ->
 
 /// Runs a controller on its plant and returns the actions.
 fn run(controller: &mut MracController, unknown: impl Fn(f64) -> f64, seconds: f64) -> Vec<Action> {
-    let h = controller.hold().secs();
+    let h = controller.hold.secs();
     let (mut y, mut t, mut dt, mut actions) = (0.0, 0.0, Span::ZERO, Vec::new());
     while t < seconds {
         let action = controller.step(y, 0.0, 0.0, dt);
         y = plant(controller.plant(), y, action.command, (unknown(t), unknown(t + h)), h);
-        (t, dt) = (t + h, controller.hold());
+        (t, dt) = (t + h, controller.hold);
         actions.push(action);
     }
     actions
@@ -69,7 +69,7 @@ fn a_ramp_leaves_the_errors_of_the_formula_at_any_rate_of_commands() {
             let actions = run(&mut controller, |t| slope * t, 60.0);
             let end = actions.last().unwrap();
             let steps = f64::from(u32::try_from(actions.len() - 1).unwrap());
-            let left = slope * steps * controller.hold().secs() - end.estimate;
+            let left = slope * steps * controller.hold.secs() - end.estimate;
             assert!((end.error / formula.output - 1.0).abs() < 1e-6, "{ms} ms: {end:?}");
             let within = if ms < 50 { 1e-4 } else { 1e-3 };
             assert!((left / formula.estimate - 1.0).abs() < within, "{ms} ms: {left} {formula:?}");
@@ -108,9 +108,9 @@ fn the_reference_is_followed_exactly_however_long_a_command_is_held() {
         for _ in 0..100 {
             let action = controller.step(y, reference, 0.0, dt);
             assert!(action.error.abs() < 1e-15, "{ms} ms: {action:?}");
-            y = plant(PLANT, y, action.command, (0.0, 0.0), controller.hold().secs());
+            y = plant(PLANT, y, action.command, (0.0, 0.0), controller.hold.secs());
             assert!((y - action.predicted).abs() < 1e-15);
-            dt = controller.hold();
+            dt = controller.hold;
         }
         let t = 0.1 * f64::from(u32::try_from(ms).unwrap());
         let truth = reference / 2.604 * (1.0 - libm::exp(-2.604 * t));
@@ -126,8 +126,8 @@ fn a_limit_causes_no_adaptation() {
         let action = controller.step(y, 0.2, 0.0, dt);
         let applied = action.command.min(0.05);
         controller.settle(applied);
-        y = plant(PLANT, y, applied, (0.0, 0.0), controller.hold().secs());
-        dt = controller.hold();
+        y = plant(PLANT, y, applied, (0.0, 0.0), controller.hold.secs());
+        dt = controller.hold;
         assert!(action.error.abs() < 1e-15 && action.estimate.abs() < 1e-15, "{action:?}");
     }
     assert!((y - 0.05).abs() < 3e-3, "{y}");

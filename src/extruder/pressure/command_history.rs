@@ -11,7 +11,7 @@ use super::Fopdt;
 const MAX_COMMANDS_PER_S: f64 = 250.0;
 
 /// A command from a moment on, and the states at that moment.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Entry {
     at_s: f64,
     /// Gain times command \[MPa\].
@@ -20,7 +20,7 @@ struct Entry {
 }
 
 /// States of a first lag of the commands and of a second lag of the first \[MPa\].
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LagStates {
     /// The pressure of a process with lag and gain and no dead time.
     pub first: f64,
@@ -109,12 +109,7 @@ impl CommandHistory {
     /// The command in force just before: one that begins now does not count.
     fn in_force(&self, at_s: f64) -> Entry {
         let later = self.entries.partition_point(|entry| entry.at_s < at_s);
-        let nothing = LagStates { first: 0.0, second: 0.0 };
-        self.entries.get(later.saturating_sub(1)).copied().unwrap_or(Entry {
-            at_s: f64::NEG_INFINITY,
-            drive: 0.0,
-            lags: nothing,
-        })
+        self.entries.get(later.saturating_sub(1)).copied().unwrap_or_default()
     }
 }
 

@@ -194,14 +194,9 @@ impl Hypothesis {
         self.covariance[(DEAD_TIME, DEAD_TIME)].max(0.0).sqrt() * filter.dead_time_s
     }
 
-    /// Relative error of the gain.
-    pub fn gain_error(&self) -> f64 {
-        self.state[GAIN].clamp(MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR)
-    }
-
-    /// Relative error of the lag.
-    pub fn lag_error(&self) -> f64 {
-        self.state[LAG].clamp(MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR)
+    /// Relative error of the gain, the lag or the dead time, within its bounds.
+    pub fn relative_error(&self, index: usize) -> f64 {
+        self.state[index].clamp(MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR)
     }
 
     /// Steady-state part of the pressure by the load \[MPa\].
@@ -211,8 +206,7 @@ impl Hypothesis {
 
     /// Dead time corrected by its estimated error \[s\].
     pub fn corrected_dead_time_s(&self, filter: &FilterSettings) -> f64 {
-        let fraction = self.state[DEAD_TIME].clamp(MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR);
-        (self.dead_time_s + fraction * filter.dead_time_s).max(0.0)
+        (self.dead_time_s + self.relative_error(DEAD_TIME) * filter.dead_time_s).max(0.0)
     }
 
     /// The pressure a dead time from now \[MPa\] by the commands until now, and its row of
@@ -220,8 +214,8 @@ impl Hypothesis {
     pub fn predict(&self, filter: &FilterSettings, now: &LagStates) -> (f64, ModelState) {
         let kept = libm::exp(-self.dead_time_s / filter.lag_s);
         let bent = now.second - now.first;
-        let pressure = now.first * (1.0 + self.gain_error())
-            + bent * self.lag_error()
+        let pressure = now.first * (1.0 + self.relative_error(GAIN))
+            + bent * self.relative_error(LAG)
             + kept * self.state[LOAD_NOW]
             + (1.0 - kept) * self.state[LOAD];
         (pressure, ModelState::from([kept, 1.0 - kept, now.first, bent, 0.0]))

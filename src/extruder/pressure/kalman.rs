@@ -40,7 +40,7 @@ impl PressureNoise {
             return Err(PressureError::NoNoise(variance));
         }
         let ratio = likeliest_drift(readings);
-        let reading = Likelihood::of(readings, ratio).reading;
+        let (reading, _) = likelihood(readings, ratio);
         if reading <= 0.01 * variance {
             return Err(PressureError::NoNoise(variance));
         }
@@ -64,37 +64,25 @@ impl PressureNoise {
     }
 }
 
-/// Likelihood of readings for a ratio of the variances of drift and reading, at the most likely
-/// variance of a reading for that ratio.
-#[derive(Debug, Clone, Copy)]
-struct Likelihood {
-    /// Variance of a reading \[MPa²\].
-    reading: f64,
-    /// Log likelihood, without the constant.
-    log: f64,
-}
-
-impl Likelihood {
-    fn of(readings: &[MPa], ratio: f64) -> Self {
-        let Some((first, rest)) = readings.split_first() else {
-            return Self { reading: 0.0, log: f64::NEG_INFINITY };
-        };
-        // In units of the readings' variance; starts from the first reading.
-        let (mut at, mut variance) = (first.get(), 1.0);
-        let (mut squares, mut logs, mut count) = (0.0, 0.0, 0.0);
-        for reading in rest {
-            let predicted = variance + ratio;
-            let innovation = predicted + 1.0;
-            let off = reading.get() - at;
-            squares += off * off / innovation;
-            logs += libm::log(innovation);
-            count += 1.0;
-            at += predicted / innovation * off;
-            variance = predicted / innovation;
-        }
-        let reading = squares / f64::max(count, 1.0);
-        Self { reading, log: -0.5 * (count * libm::log(reading) + logs) }
+/// The most likely variance of a reading \[MPa²\] for a ratio of the variances of drift and reading,
+/// and the log likelihood at it, without the constant.
+fn likelihood(readings: &[MPa], ratio: f64) -> (f64, f64) {
+    let Some((first, rest)) = readings.split_first() else { return (0.0, f64::NEG_INFINITY) };
+    // In units of the readings' variance; starts from the first reading.
+    let (mut at, mut variance) = (first.get(), 1.0);
+    let (mut squares, mut logs, mut count) = (0.0, 0.0, 0.0);
+    for reading in rest {
+        let predicted = variance + ratio;
+        let innovation = predicted + 1.0;
+        let off = reading.get() - at;
+        squares += off * off / innovation;
+        logs += libm::log(innovation);
+        count += 1.0;
+        at += predicted / innovation * off;
+        variance = predicted / innovation;
     }
+    let reading = squares / f64::max(count, 1.0);
+    (reading, -0.5 * (count * libm::log(reading) + logs))
 }
 
 /// Ratios of the variances of drift and reading below this count as no drift: over 10⁷ readings
@@ -104,7 +92,7 @@ const MIN_DRIFT_RATIO: f64 = 1e-7;
 /// The most likely ratio of the variances of drift and reading, between 1e-10 and 1e4, to one
 /// per cent.
 fn likeliest_drift(readings: &[MPa]) -> f64 {
-    let log_of = |exponent: f64| Likelihood::of(readings, libm::exp(exponent)).log;
+    let log_of = |exponent: f64| likelihood(readings, libm::exp(exponent)).1;
     let mut likeliest = -7.0;
     for (step, steps) in [(1.0, 16), (0.1, 9), (0.01, 9)] {
         let around = (-steps..=steps).map(|k| likeliest + step * f64::from(k));

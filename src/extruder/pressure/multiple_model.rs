@@ -145,8 +145,8 @@ impl MultipleModelFilter {
         for hypothesis in &self.hypotheses {
             let (pressure, _) = hypothesis.predict(&self.filter, now);
             mean.pressure += hypothesis.weight * pressure;
-            mean.gain += hypothesis.weight * hypothesis.gain_error();
-            mean.lag += hypothesis.weight * hypothesis.lag_error();
+            mean.gain += hypothesis.weight * hypothesis.relative_error(GAIN);
+            mean.lag += hypothesis.weight * hypothesis.relative_error(LAG);
             mean.load += hypothesis.weight * hypothesis.load();
         }
         let (mut variance, mut along) = (0.0, ModelState::zeros());

@@ -80,9 +80,6 @@ pub enum ScrewError {
 
 /// The number, if it is finite and positive.
 pub(super) fn positive(name: &'static str, value: f64) -> Result<f64, ScrewError> {
-    if value.is_finite() && value > 0.0 {
-        Ok(value)
-    } else {
-        Err(ScrewError::NotPositive { name, value })
-    }
+    let is_valid = value.is_finite() && value > 0.0;
+    if is_valid { Ok(value) } else { Err(ScrewError::NotPositive { name, value }) }
 }

@@ -25,11 +25,11 @@ pub struct GrowthBound {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Condition {
     /// Eq. (79): the growth increases with the plug, to less than 1 at the feed.
-    Increasing,
+    Increasing = 79,
     /// Eq. (80): the screw is short for its nozzle, θ2·L < 1.
-    Short,
+    Short = 80,
     /// Eq. (81): the screw is long for its nozzle, θ2·L > 1.
-    Long,
+    Long = 81,
 }
 
 /// Thresholds of the paper's conditions, in rad/s, for
@@ -127,11 +127,7 @@ impl Thresholds {
 
 impl fmt::Display for Condition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Increasing => "condition (79)",
-            Self::Short => "condition (80)",
-            Self::Long => "condition (81)",
-        })
+        write!(f, "condition ({})", *self as u8)
     }
 }
 

@@ -5,7 +5,7 @@ use crate::core::time::Span;
 use crate::core::units::Mm;
 use crate::identify::start_stop::parameters::StartStop;
 
-/// A stop, from the moment when the pump is told to stop.
+/// A stop, from the command to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stop {
     parameters: StartStop,
@@ -34,29 +34,29 @@ impl Stop {
         }
     }
 
-    /// How far from the end of the bead the pump is told to stop. A bead that is
-    /// shorter than this has no room for an even flow.
+    /// Distance from the end of the bead at which the pump is commanded to stop. A shorter bead never
+    /// has a steady flow.
     pub const fn distance(&self) -> Mm {
         self.distance
     }
 
-    /// From the command to stop until the robot is at the end of the bead.
+    /// Time from the command to the end of the bead.
     pub fn duration(&self) -> Span {
         Span::from_secs(self.duration_s)
     }
 
-    /// What drools out after the end of the bead \[mm³\].
+    /// Volume that drools out after the end of the bead \[mm³\].
     pub const fn drool_mm3(&self) -> f64 {
         self.drool_mm3
     }
 
-    /// The flow so long after the command, as a share of the flow before.
+    /// Flow over the flow before, a time after the command.
     pub fn flow_ratio(&self, since: Span) -> f64 {
         self.parameters.remaining_flow(since.secs())
     }
 
-    /// Speed that the robot is told so long after the command, as a share of its
-    /// start speed, until it is at the end; by its lag ahead of the flow.
+    /// Setpoint of the robot over its start speed, a time after the command; ahead of the flow by its
+    /// lag.
     pub fn speed_ratio(&self, since: Span) -> f64 {
         self.flow_ratio(since + self.robot_lag).clamp(self.min_speed_ratio, 1.0)
     }

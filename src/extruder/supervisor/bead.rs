@@ -1,4 +1,4 @@
-//! Begin, course and end of a bead.
+//! The beginning, the progress and the end of a bead.
 
 use super::{Phase, Supervisor};
 use crate::core::time::{Span, Stamp};
@@ -58,7 +58,7 @@ impl Supervisor {
     /// starts are for a constant command.
     fn rise(&mut self, now: Stamp, flow: Mm3PerS) {
         let Some(sequencer) = &mut self.start_stop else { return };
-        sequencer.set_demand(flow);
+        sequencer.demand = flow;
         let rises = sequencer.ratios(now);
         // A pump that starts later than its times say is waited for.
         if rises.is_none() && matches!(self.phase, Phase::Starting { .. }) {
@@ -66,7 +66,7 @@ impl Supervisor {
             return;
         }
         if self.phase == Phase::Running && rises.is_none_or(|rises| rises.flow > 0.0) {
-            sequencer.flow_established();
+            sequencer.has_flowed = true;
         }
         if rises.is_none() && self.ratios.is_some() {
             self.setup.strategy.controller_mut().flow_established(now, self.applied);

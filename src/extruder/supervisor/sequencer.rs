@@ -34,9 +34,9 @@ pub(super) struct StartStopSequencer {
     /// When the pump was commanded to stop, and the flow until then.
     stopped: Option<(Stamp, Mm3PerS)>,
     /// The last demanded flow.
-    demand: Mm3PerS,
+    pub(super) demand: Mm3PerS,
     /// Whether anything has flowed since the pump was commanded to run.
-    has_flowed: bool,
+    pub(super) has_flowed: bool,
     phase: StartStopPhase,
 }
 
@@ -61,11 +61,6 @@ impl StartStopSequencer {
         self.phase = StartStopPhase::Rising { start: self.timing.start(&pause), since: now };
     }
 
-    /// Sets the demanded flow.
-    pub(super) const fn set_demand(&mut self, flow: Mm3PerS) {
-        self.demand = flow;
-    }
-
     /// The pump stops before the bead ends, so that the flow after the stop fills the rest.
     pub(super) fn end(&mut self, now: Stamp) {
         self.phase = StartStopPhase::Falling { stop: self.timing.stop(), since: now };
@@ -79,11 +74,6 @@ impl StartStopSequencer {
         } else if std::mem::take(&mut self.has_flowed) {
             self.stopped = Some((now, self.demand));
         }
-    }
-
-    /// Material flows: the pause is over.
-    pub(super) const fn flow_established(&mut self) {
-        self.has_flowed = true;
     }
 
     /// The bead is over.

@@ -113,13 +113,7 @@ impl ChangeDetector {
     ) -> Option<WidthModel> {
         let trial = self.trial.as_mut()?;
         trial.before.advance_to(sample.position_mm, drift);
-        let before = trial.before.innovation(&WidthObservation {
-            ln_width,
-            ln_speed: sample.ln_speed,
-            covered_fraction: 1.0,
-            old_ln_width: 0.0,
-            variance: sample.variance(),
-        });
+        let before = trial.before.innovation(&observation(sample, ln_width, 1.0, 0.0));
         trial.log_odds += 0.5
             * (now.normalised_squared().min(MAX_SQUARED_INNOVATION)
                 - before.normalised_squared().min(MAX_SQUARED_INNOVATION));
@@ -141,13 +135,7 @@ impl ChangeDetector {
     pub fn observation(&self, sample: &MatchedWidth, ln_width: f64) -> WidthObservation {
         let (cover, old) =
             self.last.map_or((1.0, 0.0), |(at, old)| (self.cover(sample.position_mm, at), old));
-        WidthObservation {
-            ln_width,
-            ln_speed: sample.ln_speed,
-            covered_fraction: cover,
-            old_ln_width: old,
-            variance: sample.variance(),
-        }
+        observation(sample, ln_width, cover, old)
     }
 
     /// Fraction of the gauge around a position that lies after an onset.
@@ -257,6 +245,16 @@ impl ChangeDetector {
             squared_significance,
         })
     }
+}
+
+fn observation(
+    sample: &MatchedWidth,
+    ln_width: f64,
+    covered_fraction: f64,
+    old_ln_width: f64,
+) -> WidthObservation {
+    let (ln_speed, variance) = (sample.ln_speed, sample.variance());
+    WidthObservation { ln_width, ln_speed, covered_fraction, old_ln_width, variance }
 }
 
 /// Residual of a width to the prediction of the model before a change.

@@ -21,7 +21,7 @@ const MAX_FLOW_OFFSET_VARIANCE: f64 = 4.0;
 
 /// The piece of bead over which a width is the mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(clippy::struct_field_names, reason = "they share their unit")]
+#[expect(clippy::struct_field_names, reason = "all in millimetres")]
 pub struct GaugeInterval {
     /// Its middle along the path \[mm\].
     pub centre_mm: f64,

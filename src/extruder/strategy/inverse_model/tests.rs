@@ -36,14 +36,14 @@ fn response(
     let wanted = Mm3PerS::constant(flow);
     let mut last = limits.apply(controller.begin(Stamp::START, wanted).value, 0.0, PERIOD).0;
     controller.settle(Stamp::START, last);
-    let mut course = vec![plant.step(last) / flow];
+    let mut response_of = vec![plant.step(last) / flow];
     for _ in 0..1000 {
         controller.feedforward(PERIOD, wanted);
         last = limits.apply(controller.demand().value, last, PERIOD).0;
         controller.settle(Stamp::START, last);
-        course.push(plant.step(last) / flow);
+        response_of.push(plant.step(last) / flow);
     }
-    course
+    response_of
 }
 
 #[test]
@@ -58,8 +58,8 @@ fn without_limits_the_flow_follows_the_placed_poles() {
         let limits = CommandLimits::new(-1e6, 1e6, 1e12).unwrap();
         let mut controller = strategy(&model, limits, OperatingPoint::default(), 0.1);
         let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
-        let course = response(&mut controller, &mut plant, 500.0, limits);
-        for (k, fraction) in (0_u32..).zip(&course).skip(20) {
+        let response_of = response(&mut controller, &mut plant, 500.0, limits);
+        for (k, fraction) in (0_u32..).zip(&response_of).skip(20) {
             let x = f64::from(k) * 0.005 / 0.1;
             let expected = match poles {
                 0 => 1.0,
@@ -68,7 +68,7 @@ fn without_limits_the_flow_follows_the_placed_poles() {
             };
             assert!((fraction - expected).abs() < 0.04, "{num:?} {k}: {fraction} {expected}");
         }
-        assert!((course[1000] - 1.0).abs() < 1e-6, "{num:?}");
+        assert!((response_of[1000] - 1.0).abs() < 1e-6, "{num:?}");
     }
 }
 
@@ -78,14 +78,15 @@ fn an_extruder_at_rest_reaches_its_flow_within_its_limits() {
     let limits = CommandLimits::new(0.0, 60.0, 400.0).unwrap();
     let mut controller = strategy(&model, limits, OperatingPoint::default(), 0.25);
     let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
-    let course = response(&mut controller, &mut plant, 540.0, limits);
-    let settled =
-        |course: &[f64]| course.iter().rposition(|fraction| (fraction - 1.0).abs() > 0.05).unwrap();
+    let response_of = response(&mut controller, &mut plant, 540.0, limits);
+    let settled = |response_of: &[f64]| {
+        response_of.iter().rposition(|fraction| (fraction - 1.0).abs() > 0.05).unwrap()
+    };
     let mut steady = Simulator::new(&model, 0.005, Between::Held).unwrap();
     let alone: Vec<f64> = (0..2000).map(|_| steady.step(30.0) / 540.0).collect();
-    let (with, without) = (settled(&course), settled(&alone));
+    let (with, without) = (settled(&response_of), settled(&alone));
     assert!(2 * with < without, "{with} {without}");
-    let most = course.iter().fold(0.0_f64, |most, fraction| most.max(*fraction));
+    let most = response_of.iter().fold(0.0_f64, |most, fraction| most.max(*fraction));
     assert!(most < 1.03, "{most}");
 }
 
