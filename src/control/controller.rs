@@ -52,15 +52,8 @@ impl Controller {
     /// A controller before the first event.
     pub fn new(setup: Setup) -> Self {
         let width = setup.control.strategy.controller(&setup.cell, &setup.control);
-        Self {
-            setup,
-            width,
-            extruder: None,
-            phase: Phase::Idle,
-            bead: BeadOnPath::default(),
-            robot: RobotMonitor::default(),
-            camera_lost: false,
-        }
+        let (bead, robot) = (BeadOnPath::default(), RobotMonitor::default());
+        Self { setup, width, extruder: None, phase: Phase::Idle, bead, robot, camera_lost: false }
     }
 
     /// The same with an extruder that is commanded.

@@ -72,12 +72,8 @@ impl Controller {
             self.begin_bead(state, before);
         }
         self.bead.laid = state.path_mm - self.bead.start;
-        let report = BeadReport {
-            at: now,
-            path: state.path_mm,
-            speed: state.speed_mm_per_s,
-            flow_ratio: self.flow_ratio(now),
-        };
+        let (path, speed) = (state.path_mm, state.speed_mm_per_s);
+        let report = BeadReport { at: now, path, speed, flow_ratio: self.flow_ratio(now) };
         if self.robot.odometer.reports_no_path() {
             self.width.path_is_estimated();
         }

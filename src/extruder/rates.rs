@@ -20,11 +20,6 @@ impl Rate {
         Self::every(Span::from_secs(1.0 / hz))
     }
 
-    /// Time between two.
-    pub const fn period(&self) -> Span {
-        self.period
-    }
-
     /// Whether it is due at `now`; the first call is, and sets the grid.
     pub fn due(&mut self, now: Stamp) -> bool {
         let Some(next) = self.next else {

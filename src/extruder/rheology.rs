@@ -43,15 +43,11 @@ impl PowerLaw {
 
     /// From the flow at 1 MPa \[g/min\], the exponent and the melt's density
     /// \[g/cm³\]; fails on what is not finite and positive.
-    pub fn new(
-        g_per_min_at_1_mpa: f64,
-        exponent: f64,
-        density_g_per_cm3: f64,
-    ) -> Result<Self, RheologyError> {
-        positive("the flow at 1 MPa [g/min]", g_per_min_at_1_mpa)?;
+    pub fn new(g_per_min: f64, exponent: f64, g_per_cm3: f64) -> Result<Self, RheologyError> {
+        positive("the flow at 1 MPa [g/min]", g_per_min)?;
         positive("the exponent of the power law", exponent)?;
-        positive("the density [g/cm³]", density_g_per_cm3)?;
-        Ok(Self { k: g_per_min_at_1_mpa, exponent, density: density_g_per_cm3 })
+        positive("the density [g/cm³]", g_per_cm3)?;
+        Ok(Self { k: g_per_min, exponent, density: g_per_cm3 })
     }
 
     /// Mass that leaves the nozzle at a pressure \[g/min\].

@@ -37,13 +37,10 @@ impl StartStopTiming {
     /// Fails where a parameter, the flow, the speed or the speed ratio is out of range.
     pub fn new(parameters: StartStop, laid: BeadConditions) -> Result<Self, StartStopError> {
         parameters.check()?;
-        for (what, value) in [
-            ("the flow of a bead [mm³/s]", laid.flow.get()),
-            ("the robot's start speed [mm/s]", laid.speed.get()),
-        ] {
-            if value <= 0.0 {
-                return Err(StartStopError::NotPositive { what, value });
-            }
+        let flow = ("the flow of a bead [mm³/s]", laid.flow.get());
+        let speed = ("the robot's start speed [mm/s]", laid.speed.get());
+        if let Some((what, value)) = [flow, speed].into_iter().find(|(_, value)| *value <= 0.0) {
+            return Err(StartStopError::NotPositive { what, value });
         }
         if !(laid.min_speed_ratio > 0.0 && laid.min_speed_ratio <= 1.0) {
             return Err(StartStopError::StartSpeedFraction { value: laid.min_speed_ratio });

@@ -95,15 +95,13 @@ enum Phase {
 enum StopCompliance {
     /// It stands, or is not commanded to.
     Complies,
-    /// It reports that it runs.
-    RunsOn { since: Stamp },
-    /// It has reported so for longer than the longest hold.
-    TimedOut { since: Stamp },
+    /// It reports that it runs, or has done so for longer than the longest hold.
+    RunsOn { since: Stamp, timed_out: bool },
 }
 
 impl StopCompliance {
     const fn has_timed_out(self) -> bool {
-        matches!(self, Self::TimedOut { .. })
+        matches!(self, Self::RunsOn { timed_out: true, .. })
     }
 }
 

@@ -1,5 +1,7 @@
 //! The path of a job from a table: path length, position and nominal speed.
 
+use csv::StringRecord;
+
 use super::position::{Position, distance};
 use super::profile::{SpeedPoint, SpeedProfile, SpeedProfileError};
 use crate::document::csv::{LineProblem, describe};
@@ -100,24 +102,15 @@ pub fn read(text: &str) -> Result<PathJob, JobError> {
     Ok(PathJob { speed, position })
 }
 
-fn number(
-    record: &csv::StringRecord,
-    line: u64,
-    column: &'static str,
-    at: usize,
-) -> Result<f64, JobError> {
-    let found = record.get(at).unwrap_or_default();
+fn number(row: &StringRecord, line: u64, column: &'static str, at: usize) -> Result<f64, JobError> {
+    let found = row.get(at).unwrap_or_default();
     let value = found.parse().ok().filter(|value: &f64| value.is_finite());
     value.ok_or_else(|| JobError::Number { line, column, found: found.to_owned() })
 }
 
-fn check_distance(
-    line: u64,
-    before: (f64, Position),
-    here: (f64, Position),
-) -> Result<(), JobError> {
-    let way_mm = distance(before.1, here.1);
-    let path_mm = here.0 - before.0;
+fn check_distance(line: u64, from: (f64, Position), to: (f64, Position)) -> Result<(), JobError> {
+    let way_mm = distance(from.1, to.1);
+    let path_mm = to.0 - from.0;
     // A path that does not grow is an error of the profile.
     if path_mm > 0.0 && way_mm > path_mm * (1.0 + PATH_TOLERANCE.0) + PATH_TOLERANCE.1 {
         return Err(JobError::Way { line, path_mm, way_mm });

@@ -73,15 +73,8 @@ impl<'a> Subproblem<'a> {
             variables.iter().filter_map(|node| iterate.squares.get(*node).copied()).collect();
         variables.extend(nodes..nodes + iterate.knots.len());
         scale.resize(variables.len(), horizon.drive_span);
-        Self {
-            horizon,
-            bounds,
-            iterate,
-            columns,
-            variables,
-            scale,
-            rows: ConstraintRows::default(),
-        }
+        let rows = ConstraintRows::default();
+        Self { horizon, bounds, iterate, columns, variables, scale, rows }
     }
 
     /// Columns and indices of the free nodes.

@@ -43,6 +43,9 @@ pub trait WidthController: Debug + Send {
     }
 }
 
+/// A width controller of any strategy.
+pub type BoxedController = Box<dyn WidthController>;
+
 /// A report of the robot while it lays bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeadReport {

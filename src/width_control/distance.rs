@@ -164,14 +164,9 @@ impl DistanceController {
 
     /// A width of a frame that was captured with the nozzle at `nozzle_path`, and the target
     /// width where that bead was laid.
-    pub fn measured(
-        &mut self,
-        nozzle_path: Mm,
-        reading: WidthReading,
-        target: Mm,
-    ) -> DistanceTrace {
+    pub fn measured(&mut self, nozzle_path: Mm, width: WidthReading, target: Mm) -> DistanceTrace {
         self.check_history(nozzle_path.get());
-        let taken = match self.match_speed(nozzle_path.get(), reading) {
+        let taken = match self.match_speed(nozzle_path.get(), width) {
             Some(sample) => self.take_sample(&sample, nozzle_path.get(), target.get()),
             None => WidthUse::NotMatched,
         };
@@ -268,15 +263,9 @@ impl DistanceController {
     }
 
     /// Updates the model with a width whose pulsation is subtracted, or rejects the width.
-    fn update(
-        &mut self,
-        sample: &MatchedWidth,
-        ln_width: f64,
-        ln_target: f64,
-        drift: f64,
-    ) -> WidthUse {
+    fn update(&mut self, sample: &MatchedWidth, ln_w: f64, ln_target: f64, drift: f64) -> WidthUse {
         let before = self.model;
-        let observation = self.change_detector.observation(sample, ln_width);
+        let observation = self.change_detector.observation(sample, ln_w);
         let innovation = self.model.innovation(&observation);
         let consistent = self.consistency.is_consistent();
         if !(consistent && innovation.is_outlier()) {
@@ -288,11 +277,11 @@ impl DistanceController {
             };
             self.autocorrelation.update(sample.position_mm, alone);
         }
-        self.change_detector.push(sample, ln_width, before, consistent);
+        self.change_detector.push(sample, ln_w, before, consistent);
         let fraction = sample.variance() / innovation.variance;
         self.consistency.update(sample.laid_s, innovation, fraction);
         self.validation.update(sample, innovation, ln_target, drift);
-        if let Some(before) = self.change_detector.revert(sample, ln_width, innovation, drift) {
+        if let Some(before) = self.change_detector.revert(sample, ln_w, innovation, drift) {
             self.pulsation.shift(before.ln_width() - self.model.ln_width(), 0.0);
             self.model = before;
             return WidthUse::Taken;

@@ -15,13 +15,7 @@ pub(super) struct UncertaintyEstimate {
 
 impl UncertaintyEstimate {
     /// Adapts to an error, `dt_s` after the last one.
-    pub(super) fn learn(
-        &mut self,
-        plant: ScalarPlant,
-        gains: &AdaptiveGains,
-        error: f64,
-        dt_s: f64,
-    ) {
+    pub fn learn(&mut self, plant: ScalarPlant, gains: &AdaptiveGains, error: f64, dt_s: f64) {
         let mean = f64::midpoint(error, self.last_error.unwrap_or(error));
         self.last_error = Some(error);
         if gains.adaptation == Adaptation::Off {
@@ -40,20 +34,14 @@ impl UncertaintyEstimate {
         self.slope_per_s = if outward { 0.0 } else { slope };
     }
 
-    /// The estimate that is subtracted from the command that is held for `hold_s` from now.
-    pub(super) fn acting(
-        &self,
-        plant: ScalarPlant,
-        gains: &AdaptiveGains,
-        error: f64,
-        hold_s: f64,
-    ) -> f64 {
+    /// The estimate that is subtracted from the command that is held for `dt_s` from now.
+    pub fn acting(&self, plant: ScalarPlant, gains: &AdaptiveGains, error: f64, dt_s: f64) -> f64 {
         if gains.adaptation == Adaptation::Off {
             return self.value;
         }
         let speed = gains.adaptation.rate(plant.input_gain) * error + self.slope_per_s
             - gains.safety.leakage_per_s * self.value;
         let bound = gains.safety.bound.unwrap_or(f64::MAX);
-        (self.value + 0.5 * hold_s * speed).clamp(-bound, bound)
+        (self.value + 0.5 * dt_s * speed).clamp(-bound, bound)
     }
 }

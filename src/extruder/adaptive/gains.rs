@@ -192,11 +192,7 @@ pub(super) fn mean_exp(x: f64) -> f64 {
 
 /// Checks stability in continuous time: eq. (11), γ and p above zero, and the Routh–Hurwitz
 /// condition of the error where the slope is estimated.
-pub(super) fn check(
-    plant: ScalarPlant,
-    gains: &AdaptiveGains,
-    hold: Span,
-) -> Result<(), GainError> {
+pub fn check(plant: ScalarPlant, gains: &AdaptiveGains, hold: Span) -> Result<(), GainError> {
     all_finite(plant, gains)?;
     positive("the time that a command is held", hold.secs())?;
     if plant.input_gain == 0.0 {

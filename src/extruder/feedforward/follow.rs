@@ -16,7 +16,6 @@ pub struct SpeedFeedforward {
     axis: Inverse,
     /// Past flows of the model, to compare with delayed measurements.
     history: FlowHistory,
-    period: Span,
 }
 
 /// The command of one period.
@@ -67,23 +66,18 @@ impl SpeedFeedforward {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "above zero")]
         let length = (memory_s / period_s).ceil().min(1e6) as usize + 2;
         let past = FlowHistory { flows: vec![0.0; length].into(), at: None, period_s };
-        Ok(Self { forecast, observer, axis, history: past, period })
+        Ok(Self { forecast, observer, axis, history: past })
     }
 
     /// Starts in the steady state of a command of the extruder; the axis goes on from its applied
     /// command.
-    pub fn start(
-        &mut self,
-        command: f64,
-        area: Mm2,
-        axis_command: f64,
-    ) -> Result<(), FeedforwardError> {
+    pub fn start(&mut self, command: f64, area: Mm2, applied: f64) -> Result<(), FeedforwardError> {
         positive("the wanted section", area.get())?;
         self.forecast.start(command)?;
         let flow = self.forecast.step(command, None);
         self.history.flows.iter_mut().for_each(|past| *past = flow.get());
         self.history.at = None;
-        self.axis.start(flow.get() / area.get(), axis_command)
+        self.axis.start(flow.get() / area.get(), applied)
     }
 
     /// Compares a measurement with the model at that time. Returns `false` for one that is older
@@ -112,11 +106,6 @@ impl SpeedFeedforward {
     /// The command that was applied to the axis.
     pub fn settle(&mut self, applied: f64) {
         self.axis.settle(applied);
-    }
-
-    /// Time between two steps.
-    pub fn period(&self) -> Span {
-        self.period
     }
 }
 

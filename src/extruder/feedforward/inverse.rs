@@ -44,8 +44,6 @@ pub struct Inverse {
     limits: CommandLimits,
     period: Span,
     limit: CommandLimit,
-    dead_time_s: f64,
-    lag_s: f64,
     preview_s: f64,
     command: f64,
 }
@@ -80,28 +78,14 @@ impl Inverse {
         // A zero-order hold delays by half a period in the mean.
         let preview_s = (dead_time_s + lag_s + 0.5 * period_s).min(known_s);
         let limits = settings.limits;
-        Ok(Self {
-            simulator,
-            gain,
-            limits,
-            period: settings.period,
-            limit: CommandLimit::None,
-            dead_time_s,
-            lag_s,
-            preview_s,
-            command: limits.idle(),
-        })
+        let (period, limit, command) = (settings.period, CommandLimit::None, limits.idle());
+        Ok(Self { simulator, gain, limits, period, limit, preview_s, command })
     }
 
     /// Preview of the demand for [`Self::step`]: dead time, lag of the placed poles and half a
     /// period, at most what is available \[s\].
     pub fn preview_s(&self) -> f64 {
         self.preview_s
-    }
-
-    /// Delay of the output at low frequencies with a preview of [`Self::preview_s`] \[s\].
-    pub fn delay_s(&self) -> f64 {
-        self.dead_time_s + self.lag_s + 0.5 * self.period.secs() - self.preview_s
     }
 
     /// Starts from a constant demand and the applied command. Where the two differ, the command

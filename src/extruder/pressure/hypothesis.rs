@@ -108,9 +108,7 @@ impl Hypothesis {
         for index in [GAIN, LAG, DEAD_TIME] {
             covariance[(index, index)] = filter.prior(index);
         }
-        let mut state = ModelState::zeros();
-        state[LOAD_NOW] = load;
-        state[LOAD] = load;
+        let state = ModelState::from([load, load, 0.0, 0.0, 0.0]);
         Self { dead_time_s, weight, state, covariance }
     }
 

@@ -27,7 +27,7 @@ pub struct MultipleModelFilter {
 }
 
 /// The combined prediction, a dead time ahead.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PressurePrediction {
     /// Pressure \[MPa\].
     pub pressure: f64,
@@ -134,14 +134,7 @@ impl MultipleModelFilter {
 
     /// Predicts the pressure a dead time from now, from the commands until now.
     pub fn predict(&self, now: &LagStates) -> PressurePrediction {
-        let mut mean = PressurePrediction {
-            pressure: 0.0,
-            sigma: 0.0,
-            gain: 1.0,
-            lag: 1.0,
-            load: 0.0,
-            slopes: [0.0; 3],
-        };
+        let mut mean = PressurePrediction { gain: 1.0, lag: 1.0, ..PressurePrediction::default() };
         for hypothesis in &self.hypotheses {
             let (pressure, _) = hypothesis.predict(&self.filter, now);
             mean.pressure += hypothesis.weight * pressure;

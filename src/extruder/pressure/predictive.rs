@@ -74,17 +74,13 @@ impl PredictiveController {
 
     /// Direction and limit of the drive, so that the upper bound of the pressure does not pass
     /// the target; none where the reference has arrived.
-    fn bound(
-        &self,
-        prediction: &PressurePrediction,
-        segment: &ReferenceSegment,
-    ) -> Option<(f64, f64)> {
+    fn bound(&self, ahead: &PressurePrediction, segment: &ReferenceSegment) -> Option<(f64, f64)> {
         let to_go = segment.target - segment.from;
         if to_go.abs() <= self.tuning.sigma() {
             return None;
         }
         let sign = to_go.signum();
-        let bound = prediction.higher(sign * self.tuning.caution_sigmas);
+        let bound = ahead.higher(sign * self.tuning.caution_sigmas);
         let top = segment.target + sign * self.tuning.margin;
         Some((sign, self.drive(&bound, top, segment.period_s)))
     }

@@ -43,13 +43,8 @@ impl Reference {
     /// Begins at the present pressure. The distance to the target decays over `takeover_s`.
     pub fn new(lag_s: f64, takeover_s: f64, running: InitialState) -> Self {
         let at = running.pressure.get();
-        Self {
-            lag_s,
-            takeover_s,
-            pressure: at,
-            takeover_offset: running.target.get() - at,
-            period_s: FIRST_PERIOD_S,
-        }
+        let takeover_offset = running.target.get() - at;
+        Self { lag_s, takeover_s, pressure: at, takeover_offset, period_s: FIRST_PERIOD_S }
     }
 
     /// Lag of the end of a segment behind a target that moves at a constant rate, from the

@@ -84,12 +84,8 @@ pub struct PiecewiseExponential {
 impl PiecewiseExponential {
     /// Solves the gains for a slope at the setpoint S \[1/m\], which must be above
     /// [`PlugSetpoint::min_slope`].
-    pub fn new(
-        screw: &Screw,
-        setpoint: PlugSetpoint,
-        slope_per_m: f64,
-    ) -> Result<Self, ScrewError> {
-        let held = setpoint.check(screw)?;
+    pub fn new(screw: &Screw, target: PlugSetpoint, slope_per_m: f64) -> Result<Self, ScrewError> {
+        let held = target.check(screw)?;
         let least_per_m = held.min_slope();
         if !(slope_per_m > least_per_m && slope_per_m.is_finite()) {
             return Err(ScrewError::Slope { slope_per_m, least_per_m });
@@ -139,12 +135,8 @@ pub struct SaturatedLinear {
 
 impl SaturatedLinear {
     /// With a slope at the setpoint \[1/m\].
-    pub fn new(
-        screw: &Screw,
-        setpoint: PlugSetpoint,
-        slope_per_m: f64,
-    ) -> Result<Self, ScrewError> {
-        let held = setpoint.check(screw)?;
+    pub fn new(screw: &Screw, target: PlugSetpoint, slope_per_m: f64) -> Result<Self, ScrewError> {
+        let held = target.check(screw)?;
         positive("slope_per_m", slope_per_m)?;
         Ok(Self { setpoint: held, slope_per_m })
     }

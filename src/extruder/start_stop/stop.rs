@@ -12,8 +12,6 @@ pub struct Stop {
     min_speed_ratio: f64,
     robot_lag: Span,
     distance: Mm,
-    duration_s: f64,
-    drool_mm3: f64,
 }
 
 impl Stop {
@@ -23,31 +21,14 @@ impl Stop {
         let lasts_s = parameters.falls_to_s(0.5 * min_speed_ratio);
         let full_speed_s =
             parameters.delivered_s(follows_s) + min_speed_ratio * (lasts_s - follows_s);
-        let left_s = parameters.total_after_stop_s() - parameters.delivered_s(lasts_s);
-        Self {
-            parameters: *parameters,
-            min_speed_ratio,
-            robot_lag: laid.robot_lag,
-            distance: laid.speed * Span::from_secs(full_speed_s),
-            duration_s: lasts_s,
-            drool_mm3: laid.flow.get() * left_s,
-        }
+        let distance = laid.speed * Span::from_secs(full_speed_s);
+        Self { parameters: *parameters, min_speed_ratio, robot_lag: laid.robot_lag, distance }
     }
 
     /// Distance from the end of the bead at which the pump is commanded to stop. A shorter bead never
     /// has a steady flow.
     pub const fn distance(&self) -> Mm {
         self.distance
-    }
-
-    /// Time from the command to the end of the bead.
-    pub fn duration(&self) -> Span {
-        Span::from_secs(self.duration_s)
-    }
-
-    /// Volume that drools out after the end of the bead \[mm³\].
-    pub const fn drool_mm3(&self) -> f64 {
-        self.drool_mm3
     }
 
     /// Flow over the flow before, a time after the command.

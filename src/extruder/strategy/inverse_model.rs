@@ -61,16 +61,9 @@ struct FlowPredictor {
 impl InverseFeedforward {
     /// Before the first bead. The tracker works in deviations from the operating point.
     pub const fn new(tracker: Tracker, about: OperatingPoint) -> Self {
-        Self {
-            tracker,
-            about,
-            predictor: None,
-            planned: None,
-            is_on_plan: false,
-            applied: 0.0,
-            command: 0.0,
-            backlog_s: 0.0,
-        }
+        let (planned, is_on_plan) = (None, false);
+        let (applied, command, backlog_s) = (0.0, 0.0, 0.0);
+        Self { tracker, about, predictor: None, planned, is_on_plan, applied, command, backlog_s }
     }
 
     /// The same with a prediction of the flow. The forecast works in deviations from the

@@ -70,14 +70,8 @@ impl AppliedMean {
 impl AdaptiveNozzle {
     /// Before the first bead.
     pub fn new(controller: MracController, nozzle: NozzleModel) -> Self {
-        Self {
-            controller,
-            nozzle,
-            reference: 0.0,
-            demand: CommandDemand::default(),
-            begun: false,
-            applied: AppliedMean::default(),
-        }
+        let (demand, applied) = (CommandDemand::default(), AppliedMean::default());
+        Self { controller, nozzle, reference: 0.0, demand, begun: false, applied }
     }
 
     /// Speed in the nozzle \[m/s\].

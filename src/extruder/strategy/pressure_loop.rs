@@ -86,14 +86,8 @@ impl ActiveController {
 impl PressureLoop {
     /// Before the first bead.
     pub const fn new(settings: PressureSettings) -> Self {
-        Self {
-            settings,
-            active: None,
-            target: MPa::ZERO,
-            held_rpm: None,
-            command_rpm: 0.0,
-            limit: CommandLimit::None,
-        }
+        let (target, limit) = (MPa::ZERO, CommandLimit::None);
+        Self { settings, active: None, target, held_rpm: None, command_rpm: 0.0, limit }
     }
 
     /// Sets the target pressure for a flow; unchanged where the power law has none.

@@ -58,11 +58,8 @@ impl ExtruderController for ScrewFill {
     }
 
     fn demand(&self) -> CommandDemand {
-        CommandDemand {
-            value: self.fill,
-            feedforward: self.holding_fill,
-            feedback: self.fill - self.holding_fill,
-        }
+        let (value, feedforward) = (self.fill, self.holding_fill);
+        CommandDemand { value, feedforward, feedback: value - feedforward }
     }
 
     fn resume(&mut self, now: Stamp, applied: f64) {

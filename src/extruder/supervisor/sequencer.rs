@@ -43,13 +43,8 @@ pub(super) struct StartStopSequencer {
 impl StartStopSequencer {
     /// Before the first bead.
     pub(super) const fn new(timing: StartStopTiming) -> Self {
-        Self {
-            timing,
-            stopped: None,
-            demand: Mm3PerS::ZERO,
-            has_flowed: false,
-            phase: StartStopPhase::Steady,
-        }
+        let (demand, phase) = (Mm3PerS::ZERO, StartStopPhase::Steady);
+        Self { timing, stopped: None, demand, has_flowed: false, phase }
     }
 
     /// A bead begins.

@@ -60,13 +60,10 @@ impl Supervisor {
         }
         let since = match self.stop_compliance {
             StopCompliance::Complies => now,
-            StopCompliance::RunsOn { since } | StopCompliance::TimedOut { since } => since,
+            StopCompliance::RunsOn { since, .. } => since,
         };
-        self.stop_compliance = if now - since > self.setup.max_hold {
-            StopCompliance::TimedOut { since }
-        } else {
-            StopCompliance::RunsOn { since }
-        };
+        let timed_out = now - since > self.setup.max_hold;
+        self.stop_compliance = StopCompliance::RunsOn { since, timed_out };
     }
 
     /// Whether the pressure is too high. The valve is opened only while the extruder works,

@@ -113,11 +113,8 @@ impl PlannedTrajectory {
         let path_mm = path.get();
         let after = self.rows.partition_point(|row| row.path_mm < path_mm);
         let here = between(&self.rows, after, |row| row.path_mm, path_mm);
-        PlannedPoint {
-            time_s: here.time_s,
-            command: here.command,
-            flow: Mm3PerS::new(here.flow_mm3_per_s).unwrap_or_default(),
-        }
+        let flow = Mm3PerS::new(here.flow_mm3_per_s).unwrap_or_default();
+        PlannedPoint { time_s: here.time_s, command: here.command, flow }
     }
 
     /// Mean speed over a time from a position on.

@@ -67,12 +67,9 @@ impl Columns {
         };
         let unit = Unit::of_word(name.trim_start_matches(COMMAND));
         let unit = unit.ok_or_else(|| PlanTableError::Command(name.to_owned()))?;
-        let columns = Self {
-            bead: index(BEAD)?,
-            numbers: [time?, path?, speed?, flow?],
-            command,
-            command_name: name.to_owned(),
-        };
+        let bead = index(BEAD)?;
+        let numbers = [time?, path?, speed?, flow?];
+        let columns = Self { bead, numbers, command, command_name: name.to_owned() };
         Ok((columns, unit))
     }
 

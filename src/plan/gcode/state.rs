@@ -71,11 +71,10 @@ impl ModalState {
         let mut line_words = LineWords::default();
         for Word { letter, number } in words.iter().copied() {
             match letter {
-                'X' => line_words.axes[0] = Some(number),
-                'Y' => line_words.axes[1] = Some(number),
-                'Z' => line_words.axes[2] = Some(number),
-                'I' => line_words.centre_offset[0] = Some(number),
-                'J' => line_words.centre_offset[1] = Some(number),
+                'X'..='Z' => line_words.axes[letter as usize - 'X' as usize] = Some(number),
+                'I' | 'J' => {
+                    line_words.centre_offset[letter as usize - 'I' as usize] = Some(number)
+                }
                 'R' => line_words.radius = Some(number),
                 'F' if number > 0.0 => self.feed = Some(number * self.unit_mm / 60.0),
                 'F' => return Err(GcodeError::Feed { line, found: number }),

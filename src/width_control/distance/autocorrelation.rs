@@ -49,13 +49,9 @@ pub struct NoiseAutocorrelation {
 impl NoiseAutocorrelation {
     /// For a gauge \[mm\]; widths count as independent at first.
     pub fn new(gauge_mm: f64) -> Self {
-        Self {
-            gauge_mm,
-            innovations: VecDeque::with_capacity(MAX_INNOVATIONS),
-            excess_variance: 0.0,
-            correlated_variance: 0.0,
-            gauges: 0.0,
-        }
+        let innovations = VecDeque::with_capacity(MAX_INNOVATIONS);
+        let (excess_variance, correlated_variance, gauges) = (0.0, 0.0, 0.0);
+        Self { gauge_mm, innovations, excess_variance, correlated_variance, gauges }
     }
 
     /// A new bead, or a flow that has changed: earlier innovations say nothing about later

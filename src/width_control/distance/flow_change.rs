@@ -237,13 +237,8 @@ impl ChangeDetector {
         let (size, variance) = sums.size();
         let without_two = sums.without_two().squared_significance(unknown);
         let squared_significance = sums.squared_significance(unknown);
-        (without_two > MIN_SQUARED_SIZE_WITHOUT_TWO).then_some(FlowChange {
-            before,
-            onset_mm,
-            size,
-            variance,
-            squared_significance,
-        })
+        let change = FlowChange { before, onset_mm, size, variance, squared_significance };
+        (without_two > MIN_SQUARED_SIZE_WITHOUT_TWO).then_some(change)
     }
 }
 

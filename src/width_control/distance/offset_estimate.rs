@@ -117,10 +117,8 @@ impl OffsetEstimator {
     }
 
     fn best(&self) -> f64 {
-        self.hypotheses
-            .iter()
-            .map(|hypothesis| hypothesis.log_likelihood)
-            .fold(f64::NEG_INFINITY, f64::max)
+        let all = self.hypotheses.iter().map(|hypothesis| hypothesis.log_likelihood);
+        all.fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// Mean and standard deviation over all hypotheses.

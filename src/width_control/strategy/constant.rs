@@ -7,7 +7,7 @@ use super::kind::{CellParameters, Registration, WidthControlSettings, WidthStrat
 use crate::core::units::MmPerS;
 use crate::document::Table;
 use crate::width_control::controller::{
-    SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
+    BoxedController, SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
 };
 use crate::width_control::limiter::SpeedLimits;
 
@@ -27,7 +27,7 @@ fn read(control: &Table<'_>) -> Option<Arc<dyn WidthStrategy>> {
 }
 
 impl WidthStrategy for ConstantStrategy {
-    fn controller(&self, _: &CellParameters, _: &WidthControlSettings) -> Box<dyn WidthController> {
+    fn controller(&self, _: &CellParameters, _: &WidthControlSettings) -> BoxedController {
         Box::new(*self)
     }
 

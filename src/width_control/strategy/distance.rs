@@ -8,7 +8,8 @@ use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS};
 use crate::document::Table;
 use crate::width_control::controller::{
-    BeadReport, Outlook, SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
+    BeadReport, BoxedController, Outlook, SpeedRequest, Tracking, WidthController, WidthSample,
+    WidthTrace,
 };
 use crate::width_control::distance::{DistanceController, DistanceSettings, FallbackReason};
 
@@ -43,11 +44,7 @@ fn read(control: &Table<'_>) -> Option<Arc<dyn WidthStrategy>> {
 }
 
 impl WidthStrategy for DistanceStrategy {
-    fn controller(
-        &self,
-        cell: &CellParameters,
-        control: &WidthControlSettings,
-    ) -> Box<dyn WidthController> {
+    fn controller(&self, cell: &CellParameters, control: &WidthControlSettings) -> BoxedController {
         let settings = DistanceSettings {
             offset: cell.camera_offset,
             offset_sigma: cell.camera_offset_sigma,

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use crate::core::time::Span;
 use crate::core::units::{Mm, MmPerS, WidthRange};
 use crate::document::Table;
-use crate::width_control::controller::WidthController;
+use crate::width_control::controller::BoxedController;
 use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::pi::PiGains;
 use crate::width_control::target::WidthTarget;
@@ -27,11 +27,7 @@ pub struct Registration {
 /// A width controller with its settings.
 pub trait WidthStrategy: Any + Debug + Send + Sync {
     /// The controller for a cell.
-    fn controller(
-        &self,
-        cell: &CellParameters,
-        control: &WidthControlSettings,
-    ) -> Box<dyn WidthController>;
+    fn controller(&self, cell: &CellParameters, control: &WidthControlSettings) -> BoxedController;
 
     /// Reports settings that leave the robot's limits. `control` is the table that they
     /// were read from.

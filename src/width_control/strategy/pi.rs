@@ -7,7 +7,7 @@ use super::kind::{CellParameters, Registration, WidthControlSettings, WidthStrat
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
 use crate::width_control::controller::{
-    SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
+    BoxedController, SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
 };
 use crate::width_control::pi::{Demand, Pi, PiGains, Saturation};
 
@@ -20,11 +20,7 @@ pub const REGISTRATION: Registration =
 pub struct PiStrategy;
 
 impl WidthStrategy for PiStrategy {
-    fn controller(
-        &self,
-        cell: &CellParameters,
-        control: &WidthControlSettings,
-    ) -> Box<dyn WidthController> {
+    fn controller(&self, cell: &CellParameters, control: &WidthControlSettings) -> BoxedController {
         let target = control.target.nominal();
         let gains = control.gains.unwrap_or_else(|| cautious_gains(cell, target, 1.0));
         Box::new(PiControl::new(gains, control.max_gap))

@@ -7,7 +7,7 @@ use super::kind::{CellParameters, Registration, WidthControlSettings, WidthStrat
 use crate::core::units::MmPerS;
 use crate::document::Table;
 use crate::width_control::controller::{
-    SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
+    BoxedController, SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
 };
 use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::steps::{StepSettings, Steps};
@@ -48,11 +48,7 @@ impl StepsStrategy {
 }
 
 impl WidthStrategy for StepsStrategy {
-    fn controller(
-        &self,
-        cell: &CellParameters,
-        _: &WidthControlSettings,
-    ) -> Box<dyn WidthController> {
+    fn controller(&self, cell: &CellParameters, _: &WidthControlSettings) -> BoxedController {
         Box::new(Steps::new(self.settings(cell)))
     }
 
