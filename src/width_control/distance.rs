@@ -8,7 +8,7 @@
 //! ```text
 //! reports ─▶ speed history ─┐ speed where the bead under the camera was laid
 //! width ± σ ────────────────┴▶ sample ─▶ pulsation ─▶ flow change ─▶ width model (ln A, b) ─▶ speed
-//!                                └─▶ offset estimate (where the camera really looks)
+//!                                └─▶ offset estimate (the camera's true offset)
 //! ```
 //!
 //! There are no gains: how much a width moves the estimate follows from its own standard

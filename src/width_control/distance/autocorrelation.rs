@@ -1,12 +1,11 @@
-//! Autocorrelation of widths that should be independent. A rough bead and an unsteady flow
-//! show in every width that covers the same piece, so that ten frames of it say no more than
-//! one.
+//! Autocorrelation of widths that should be independent. A rough bead and an unsteady flow show
+//! in every width of the same piece, so that ten frames of it carry the information of one.
 //!
-//! For every width its normalised innovation is multiplied with itself and with those of the
-//! widths within one and a half gauges before it. The mean of the first, less one, and twice
-//! that of the others say by how much the noise of long means exceeds that of independent
-//! widths. What widths further back show of the same kind is subtracted: that is a drift of
-//! the flow, which is to be followed.
+//! For every width its normalised innovation is multiplied by itself and by those of the widths
+//! within one and a half gauges before it. The mean of the first, less one, and twice the mean sum
+//! of the others give the excess of the variance of long means over that of independent widths.
+//! The correlation with widths farther back is subtracted: that is a drift of the flow, which is to
+//! be followed.
 
 use std::collections::VecDeque;
 
