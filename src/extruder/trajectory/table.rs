@@ -78,7 +78,7 @@ impl Columns {
             let found = record.get(at).unwrap_or_default();
             let value =
                 found.parse().ok().filter(|value: &f64| value.is_finite() && *value >= least);
-            value.ok_or_else(|| wrong(line, column, found, expected))
+            value.ok_or_else(|| wrong(line, column, &found, expected))
         };
         let known = |k: usize| number(self.numbers[k], NUMBERS[k], 0.0, "a number of 0 or more");
         Ok(PlanRow {
@@ -123,7 +123,7 @@ pub fn read(text: &str) -> Result<PlannedJob, PlanTableError> {
     Ok(PlannedJob::new(unit, beads.into_iter().map(|(_, rows)| rows).collect()))
 }
 
-fn wrong(line: u64, column: &str, found: impl ToString, expected: &'static str) -> PlanTableError {
+fn wrong(line: u64, column: &str, found: &impl ToString, expected: &'static str) -> PlanTableError {
     PlanTableError::Number { line, column: column.to_owned(), found: found.to_string(), expected }
 }
 
@@ -134,20 +134,20 @@ const EXPECTED_START: &str = "a bead that begins at a speed above 0, for the cel
 fn check_first(row: &PlanRow, line: u64) -> Result<(), PlanTableError> {
     for (column, found) in [("time_s", row.time_s), ("path_mm", row.path_mm)] {
         if found > 0.0 {
-            return Err(wrong(line, column, found, "0 where a bead begins"));
+            return Err(wrong(line, column, &found, "0 where a bead begins"));
         }
     }
     let starts = row.speed_mm_per_s > 0.0;
-    if starts { Ok(()) } else { Err(wrong(line, "speed_mm_per_s", 0.0, EXPECTED_START)) }
+    if starts { Ok(()) } else { Err(wrong(line, "speed_mm_per_s", &0.0, EXPECTED_START)) }
 }
 
 fn check_order(before: Option<&PlanRow>, row: &PlanRow, line: u64) -> Result<(), PlanTableError> {
     match before {
         Some(before) if row.time_s <= before.time_s => {
-            Err(wrong(line, "time_s", row.time_s, "more than in the row before"))
+            Err(wrong(line, "time_s", &row.time_s, "more than in the row before"))
         }
         Some(before) if row.path_mm < before.path_mm => {
-            Err(wrong(line, "path_mm", row.path_mm, "no less than in the row before"))
+            Err(wrong(line, "path_mm", &row.path_mm, "no less than in the row before"))
         }
         _ => Ok(()),
     }
