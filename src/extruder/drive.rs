@@ -61,3 +61,18 @@ impl CommandQuantity {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unit_words_are_those_of_the_extruder_link_and_of_one_quantity_each() {
+        let words = CommandQuantity::WORDS.map(|known| known.1.unit_word());
+        assert_eq!(words, ["rpm", "v", "mpa", "mm3_per_s", "kg_per_s", "filling"]);
+        for (_, quantity) in CommandQuantity::WORDS {
+            assert_eq!(CommandQuantity::of_unit_word(quantity.unit_word()), Some(quantity));
+        }
+        assert_eq!(CommandQuantity::of_unit_word("1"), None);
+    }
+}

@@ -174,6 +174,12 @@ mod tests {
     }
 
     #[test]
+    fn the_smallest_number_of_readings_gives_a_variance_to_a_tenth() {
+        let relative_error = (2.0 / to_f64(MIN_READINGS)).sqrt();
+        assert!((relative_error - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
     fn readings_without_noise_are_refused() {
         let stuck = [MPa::constant(0.6); 300];
         assert!(matches!(PressureNoise::identify(&stuck), Err(PressureError::NoNoise(_))));

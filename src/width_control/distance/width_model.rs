@@ -305,6 +305,12 @@ mod tests {
     }
 
     #[test]
+    fn an_outlier_by_chance_is_once_in_2150_widths() {
+        let widths = 1.0 / libm::erfc((0.5 * OUTLIER_SQUARED).sqrt());
+        assert!((2140.0..2160.0).contains(&widths), "{widths}");
+    }
+
+    #[test]
     fn the_covariance_stays_positive_definite() {
         let mut model = WidthModel::new(0.25, true);
         for k in 0..500 {
