@@ -4,7 +4,8 @@
 use crate::numeric::lti::{Between, ModelError, Simulator, TransferFunction};
 use crate::numeric::number::to_f64;
 
-/// Grid of the flow \[s\], which is linear in between. The 200 Hz of the feedforward (papers.md, 001).
+/// Grid of the flow \[s\], which is linear in between: the 200 Hz of the controller in bcs-thesis,
+/// § 4.2.
 pub const TICK_S: f64 = 0.005;
 /// Ticks between two knots of the command. Fewer give the command more freedom and the plan more
 /// unknowns.

@@ -25,7 +25,8 @@ pub struct VsfcGains {
 impl VsfcGains {
     /// From the gains \[rpm/MPa, rpm/(MPa·s)\], the fraction of the integral gain in the weak
     /// zone, and the standard deviation of the noise: the dead zone is three of it, the weak
-    /// zone six. Within the dead zone the integral decays with 5 s (papers.md, 002).
+    /// zone six. Within the dead zone the integral decays with 5 s (fitted; the
+    /// paper gives none).
     pub fn new(kp: f64, ki: f64, creep: f64, sigma: MPa) -> Result<Self, PressureError> {
         within("the proportional gain [rpm/MPa]", kp, 0.0..=1e9, "between 0 and 1e9")?;
         within("the integral gain [rpm/(MPa·s)]", ki, 0.0..=1e9, "between 0 and 1e9")?;
