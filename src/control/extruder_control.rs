@@ -5,8 +5,8 @@ use std::sync::Arc;
 use crate::extruder::trajectory::{PlannedJob, PlannedPoint};
 use crate::extruder::{ExtruderFault, ExtruderSetup, ExtruderState, FlowDemand, Supervisor};
 
-/// The speed override where neither a plan nor the extruder changes the robot's speed. By
-/// definition 1.
+/// The speed override where neither a plan nor the extruder changes the robot's speed.
+/// By definition 1.
 pub const NO_OVERRIDE: f64 = 1.0;
 
 /// The extruder side of a controller.
