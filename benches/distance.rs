@@ -7,7 +7,7 @@
 use divan::Bencher;
 use truebead::core::time::{Span, Stamp};
 use truebead::core::units::{Mm, MmPerS};
-use truebead::width_control::distance::{DistanceController, DistanceSettings, MeasuredWidth};
+use truebead::width_control::distance::{DistanceController, DistanceSettings, WidthReading};
 
 const FRAME_S: f64 = 0.02;
 
@@ -43,7 +43,7 @@ impl Under {
         let now = Stamp::from_secs(at);
         self.law.reported(now, path, MmPerS::new(speed).expect("finite"), 1.0);
         let width = Mm::new(42.0 + 0.8 * (2.1 * at).sin()).expect("finite");
-        let measured = MeasuredWidth { width, sigma: Mm::constant(0.36) };
+        let measured = WidthReading { width, sigma: Mm::constant(0.36) };
         let target = Mm::constant(42.0);
         let _ = self.law.measured(path, measured, target);
         self.law.speed(target, now, Span::from_millis(50))

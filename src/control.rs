@@ -2,17 +2,17 @@
 //! nothing; live, simulated and replayed cells run this same code.
 //!
 //! - idle: the robot is not printing.
-//! - priming: first stretch of a bead, at the start speed, until a width of it is due.
-//! - tracking: the width controller sets the speed, once a width of this bead has been
-//!   seen or is not needed.
-//! - holding: the speed stays as it is, for a reason, but for what a plan, a start or
-//!   a stop makes of it; left when the reason goes, and a fault when it stays too long.
-//! - fault: the robot is told to stop; left when the robot is idle again.
+//! - priming: the first part of a bead is laid at the start speed, until a width is measured.
+//! - tracking: the width controller sets the speed.
+//! - holding: the width controller's speed is kept, for a reason; a plan, a start or a stop
+//!   still changes the robot's speed. Left when the reason goes; a hold that lasts too long
+//!   becomes a fault.
+//! - fault: the robot is commanded to stop; left when the robot is idle again.
 
 mod controller;
 pub mod event;
 mod extrude;
-mod extruder_side;
+mod extruder_control;
 mod phase;
 mod planned;
 mod robot;

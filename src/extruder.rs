@@ -1,6 +1,5 @@
-//! The extruder side: what to command the extruder so that the flow at the
-//! nozzle is what the robot is about to need. Like the width controller it
-//! keeps no clock and opens nothing.
+//! The extruder side: commands for the extruder, so that the flow at the nozzle is the one that
+//! the robot needs. It reads no clock and opens nothing.
 //!
 //! ```text
 //! demanded flow ───────┐

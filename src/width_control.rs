@@ -1,5 +1,5 @@
-//! The parts of the width controller. They keep no clock: time comes with
-//! each call.
+//! Width control: what sets the robot's speed so that the bead has its width. No part reads
+//! a clock: time is an argument of each call.
 
 pub mod controller;
 pub mod distance;
@@ -7,7 +7,6 @@ pub mod limiter;
 pub mod odometer;
 pub mod path_history;
 pub mod pi;
-pub mod settings;
 pub mod steps;
 pub mod strategy;
 pub mod target;

@@ -5,6 +5,7 @@ use crate::calibration::Calibration;
 use crate::control::Setup;
 use crate::core::time::Span;
 use crate::width_control::steps::StepSettings;
+use crate::width_control::strategy::CellParameters;
 use crate::width_control::strategy::steps::StepsStrategy;
 
 /// How long a robot holds before it stops, by its link's protocol.
@@ -17,14 +18,20 @@ impl Cell {
         Setup {
             control: run.control.clone(),
             limits: run.limits,
+            cell: self.parameters(run, calibration),
+            bead_length: run.robot.bead_length,
+            alone_for: Span::from_millis(i64::from(run.robot.valid_ms)) + HOLD_TIME,
+        }
+    }
+
+    fn parameters(&self, run: &RunPart, calibration: &Calibration) -> CellParameters {
+        CellParameters {
             width_range: self.gauge.width_range,
             start_speed: run.robot.start_speed,
             start_length: run.robot.start_length,
-            bead_length: run.robot.bead_length,
             camera_offset: run.camera.offset,
             camera_offset_sigma: run.camera.offset_sigma,
             gauge_length: self.gauge_length(calibration),
-            alone_for: Span::from_millis(i64::from(run.robot.valid_ms)) + HOLD_TIME,
             setpoint_period: Span::from_secs(1.0 / run.robot.rate_hz),
         }
     }
@@ -32,6 +39,6 @@ impl Cell {
     /// The course of steps that the cell asks for.
     pub fn steps(&self, run: &RunPart, calibration: &Calibration) -> Option<StepSettings> {
         let strategy = run.control.strategy.as_kind::<StepsStrategy>()?;
-        Some(strategy.settings(&self.controller_setup(run, calibration).facts()))
+        Some(strategy.settings(&self.parameters(run, calibration)))
     }
 }

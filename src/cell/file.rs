@@ -21,7 +21,7 @@ use crate::scenario::table;
 use crate::scenario::table::{Simulation, WidthSource};
 use crate::vision::Gauge;
 use crate::width_control::limiter::SpeedLimits;
-use crate::width_control::settings::WidthControlSettings;
+use crate::width_control::strategy::WidthControlSettings;
 use crate::width_control::target::WidthTarget;
 
 pub use super::extruder::ExtruderPart;

@@ -1,16 +1,15 @@
-//! The extruder side of a controller: what it hears of the robot's, and what
-//! it answers.
+//! The extruder side's answer to events, and what it has to know of the bead.
 
 use super::controller::Controller;
 use super::event::Event;
-use super::extruder_side::ExtruderSide;
-use super::phase::{Phase, Segment};
+use super::extruder_control::ExtruderControl;
+use super::phase::{BeadStage, Phase};
 use super::step::ExtruderStep;
 use crate::core::time::Stamp;
 use crate::extruder::{Laying, RobotSpeed};
 
 impl Controller {
-    /// The extruder side's answer to what concerns it.
+    /// The extruder side's answer; none to events of the robot side.
     pub(super) fn extrude(&mut self, now: Stamp, event: &Event) -> Option<ExtruderStep> {
         let planned = self.planned(now);
         if let Some(side) = &mut self.extruder {
@@ -18,36 +17,28 @@ impl Controller {
         }
         let laying = self.laying(now);
         if let (Laying::Ending(_), Some(bead)) = (&laying, self.phase.bead_mut()) {
-            bead.segment = Segment::Ending;
+            bead.stage = BeadStage::Ending;
         }
-        let ExtruderSide { supervisor, planned, .. } = self.extruder.as_mut()?;
+        let ExtruderControl { supervisor, planned, .. } = self.extruder.as_mut()?;
         let planned = planned.map(|planned| planned.command);
-        let command = match event {
-            Event::Extruder(report) => {
-                supervisor.reported(now, report);
-                None
-            }
-            Event::ExtruderUp => {
-                supervisor.link_came_up();
-                None
-            }
-            Event::ExtruderDown { .. } => {
-                supervisor.link_went_down(now);
-                None
-            }
+        let mut command = None;
+        match event {
+            Event::Extruder(report) => supervisor.reported(now, report),
+            Event::ExtruderUp => supervisor.link_came_up(),
+            Event::ExtruderDown { .. } => supervisor.link_went_down(now),
             Event::ExtruderTick => {
                 supervisor.plan(planned);
-                supervisor.tick(now, laying)
+                command = supervisor.tick(now, laying);
             }
-            Event::Stop => supervisor.stop(),
+            Event::Stop => command = supervisor.stop(),
             _ => return None,
-        };
+        }
         Some(ExtruderStep { command, state: supervisor.state(), trace: supervisor.trace() })
     }
 
-    /// What the extruder side has to know of the robot's.
+    /// Whether bead is laid, and the flow that it needs.
     fn laying(&self, now: Stamp) -> Laying {
-        let Some(ExtruderSide { demand, supervisor, planned, .. }) = &self.extruder else {
+        let Some(ExtruderControl { demand, supervisor, planned, .. }) = &self.extruder else {
             return Laying::Idle;
         };
         let bead = match &self.phase {
@@ -56,21 +47,21 @@ impl Controller {
             Phase::Bead(bead) if bead.is_faulty() => return Laying::Stopped,
             Phase::Bead(bead) => bead,
         };
-        // Nobody knows what a robot does that is not heard, but by then it has stopped.
+        // A robot without a connection stops by itself after this time.
         if self.robot.silent_since.is_some_and(|since| now - since > self.setup.alone_for) {
             return Laying::Stopped;
         }
-        let requested = bead.setpoint.map_or(self.setup.start_speed, |last| last.speed);
-        // No extruder keeps up with a robot that starts; it is ready for
-        // the speed that comes. Nor does it follow a robot that goes by its flow.
-        let goes_ahead = bead.segment == Segment::RunUp || supervisor.is_in_transition();
+        let requested = bead.setpoint.map_or(self.setup.cell.start_speed, |last| last.speed);
+        // During run-up the extruder is slower than the robot, so the flow is that of the
+        // speed to come. In a start or a stop the robot follows the flow, not the reverse.
+        let goes_ahead = bead.stage == BeadStage::RunUp || supervisor.is_in_transition();
         let robot = self.robot.state.filter(|_| !goes_ahead);
         let robot =
             robot.map(|robot| RobotSpeed { setpoint: requested, actual: robot.speed_mm_per_s });
         let flow = planned.map_or_else(|| demand.flow(robot), |planned| planned.flow);
-        let way = supervisor.stop_distance(requested);
-        let stops = bead.segment == Segment::Ending
-            || self.left(now).zip(way).is_some_and(|(left, way)| left <= way);
+        let stop_distance = supervisor.stop_distance(requested);
+        let stops = bead.stage == BeadStage::Ending
+            || self.left(now).zip(stop_distance).is_some_and(|(left, stop)| left <= stop);
         if stops { Laying::Ending(flow) } else { Laying::Bead(flow) }
     }
 }

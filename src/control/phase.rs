@@ -1,18 +1,18 @@
-//! What a controller is doing, with what it needs for it.
+//! The phase of a controller, with the data of each phase.
 
 use super::step::{Fault, Hold, State};
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS};
 use crate::width_control::limiter::SpeedLimit;
 
-/// What a controller is doing.
+/// The phase of a controller.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Phase {
     /// The robot is not printing.
     Idle,
-    /// A bead is being laid, or was until a fault.
+    /// A bead is being laid, or was before a fault.
     Bead(Bead),
-    /// A hold that only a new run ends, with the last limit that acted.
+    /// A hold that only a new run ends.
     Ended {
         /// Why.
         why: Hold,
@@ -24,99 +24,91 @@ pub enum Phase {
 /// Control of one bead.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bead {
-    /// What is being done on it.
+    /// Its mode.
     pub mode: Mode,
-    /// Which part of it the robot is at.
-    pub segment: Segment,
+    /// Its stage.
+    pub stage: BeadStage,
     /// The last setpoint, once there was one.
     pub setpoint: Option<Setpoint>,
     /// The last limit that acted.
     pub limit: SpeedLimit,
 }
 
-/// What is being done on a bead.
+/// The mode of control of a bead.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Mode {
-    /// Its first part is laid at the start speed, until a width of it is due.
+    /// The first part of the bead is laid at the start speed, until a width is measured.
     Priming,
     /// The width controller sets the speed.
     Tracking {
-        /// Until when the width is known.
+        /// Capture time up to which the width is known.
         seen_at: Stamp,
     },
-    /// The speed stays as it is.
+    /// The speed is kept.
     Holding {
-        /// From when on.
+        /// When the hold began.
         since: Stamp,
         /// Why.
         why: Hold,
     },
-    /// The robot is told to stop.
+    /// The robot is commanded to stop.
     Fault {
         /// Why.
         why: Fault,
     },
 }
 
-/// Which part of a bead the robot is at.
+/// The stage of a bead.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Segment {
-    /// It has not reached yet the speed that was requested.
+pub enum BeadStage {
+    /// The robot accelerates to the requested speed.
     RunUp,
-    /// It has.
+    /// The robot has reached it.
     Even,
-    /// The extruder was stopped because the bead ends; the robot slows down from then on.
+    /// The extruder was stopped ahead of the bead's end; the robot slows down.
     Ending,
 }
 
 /// The last setpoint of a bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setpoint {
-    /// When it was given.
+    /// When it was sent.
     pub at: Stamp,
-    /// The speed that went out.
+    /// The speed that was sent.
     pub speed: MmPerS,
-    /// What the width controller had requested, before a plan, a start or a stop had its
-    /// say.
+    /// The speed that the width controller requested, before the speed override.
     pub requested: MmPerS,
 }
 
-/// Where the bead that is laid lies on the path, or the last one that was.
+/// Position of the bead along the path: the one that is laid, or the last one.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct BeadOnPath {
-    /// Where on the path it began.
+    /// Path where it began.
     pub start: Mm,
-    /// How much of it was laid.
+    /// Length that is laid.
     pub laid: Mm,
-    /// Beads of a plan that were laid before it.
+    /// Number of beads of the plan that were laid before it.
     pub number: usize,
 }
 
 impl Bead {
     /// A bead that has just begun.
     pub fn new() -> Self {
-        Self {
-            mode: Mode::Priming,
-            segment: Segment::RunUp,
-            setpoint: None,
-            limit: SpeedLimit::None,
-        }
+        let (mode, stage) = (Mode::Priming, BeadStage::RunUp);
+        Self { mode, stage, setpoint: None, limit: SpeedLimit::None }
     }
 
-    /// Until when the width is known, where it is being tracked.
+    /// Capture time up to which the width is known, while tracking.
     pub fn tracked(&self) -> Option<Stamp> {
-        match self.mode {
-            Mode::Tracking { seen_at } => Some(seen_at),
-            _ => None,
-        }
+        if let Mode::Tracking { seen_at } = self.mode { Some(seen_at) } else { None }
     }
 
-    /// Whether tracking may begin as soon as there is a width.
+    /// Whether tracking may begin with the next width.
     pub fn waits_for_width(&self) -> bool {
         matches!(self.mode, Mode::Priming | Mode::Holding { why: Hold::NoWidth, .. })
     }
 
-    /// Whether it is held until the robot goes as it should.
+    /// Whether it is held for a reason that lies with the robot.
     pub fn waits_for_robot(&self) -> bool {
         let Mode::Holding { why, .. } = &self.mode else { return false };
         matches!(why, Hold::RobotHolds | Hold::LinkDown | Hold::SpeedMismatch)
@@ -131,18 +123,12 @@ impl Bead {
 impl Phase {
     /// The bead, while one is controlled.
     pub fn bead(&self) -> Option<&Bead> {
-        match self {
-            Self::Bead(bead) => Some(bead),
-            _ => None,
-        }
+        if let Self::Bead(bead) = self { Some(bead) } else { None }
     }
 
-    /// The same, to be changed.
+    /// The same, mutable.
     pub fn bead_mut(&mut self) -> Option<&mut Bead> {
-        match self {
-            Self::Bead(bead) => Some(bead),
-            _ => None,
-        }
+        if let Self::Bead(bead) = self { Some(bead) } else { None }
     }
 
     /// The last limit that acted on a setpoint.
@@ -154,7 +140,7 @@ impl Phase {
         }
     }
 
-    /// Holds a bead that is being laid; a first reason stays.
+    /// Holds a bead that is being laid. The first reason stays, except for a missing width.
     pub fn hold(&mut self, now: Stamp, why: Hold) {
         let Some(bead) = self.bead_mut() else { return };
         match &mut bead.mode {
@@ -164,12 +150,12 @@ impl Phase {
         }
     }
 
-    /// A hold that only a new run ends.
+    /// Ends control in a hold that only a new run ends.
     pub fn end(&mut self, why: Hold) {
         *self = Self::Ended { why, limit: self.limit() };
     }
 
-    /// The state as others see it.
+    /// The state as it is reported.
     pub fn state(&self) -> State {
         match self {
             Self::Idle => State::Idle,

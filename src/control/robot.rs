@@ -1,7 +1,7 @@
-//! What the robot reports: its mode, its path and how it follows its speed.
+//! Robot reports: mode, path, and whether the robot follows its setpoint.
 
 use super::controller::Controller;
-use super::phase::{Bead, Mode, Phase, Segment};
+use super::phase::{Bead, BeadStage, Mode, Phase};
 use super::step::{Fault, Hold};
 use crate::core::readback::SpeedMatch;
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
@@ -9,21 +9,24 @@ use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::width_control::controller::BeadReport;
 
-/// Share of the setpoint at which a robot that starts has run up.
+/// Fraction of the setpoint at which the run-up of a robot is over. A larger value is not
+/// reached by a robot that settles a few percent below its setpoint; a smaller one lets the
+/// extruder follow the acceleration.
 const RUN_UP_FRACTION: f64 = 0.95;
-/// Way that a bead may have by the first report of it.
+/// Longest path that may have been laid by the first report of a bead. A robot that stood
+/// farther back has moved without laying bead.
 const MAX_LAID_BEFORE_FIRST_REPORT: Mm = Mm::constant(50.0);
-/// A path that falls by less is that of the same bead.
+/// A path that falls by less belongs to the same bead: reports may jitter.
 const SAME_BEAD_TOLERANCE: Mm = Mm::constant(1.0);
 
 impl Controller {
     pub(super) fn reported(&mut self, now: Stamp, state: &RobotState) {
         let robot = &mut self.robot;
         let state = &robot.odometer.correct(now, state);
-        robot.transport.observe(now, state);
+        robot.path.observe(now, state);
         robot.state = Some(*state);
         robot.silent_since = None;
-        // Also where the bead before ended while nobody heard the robot.
+        // Also where the last bead ended while the link was down.
         let before = robot.last_path.replace(state.path_mm);
         robot.is_another_bead |=
             before.is_some_and(|last| state.path_mm < last - SAME_BEAD_TOLERANCE);
@@ -34,7 +37,7 @@ impl Controller {
             RobotMode::Idle => self.become_idle(),
             RobotMode::Print => self.printing(now, state, before),
             RobotMode::Hold => {
-                self.robot.follow.reset();
+                self.robot.speed_monitor.reset();
                 self.phase.hold(now, Hold::RobotHolds);
             }
             RobotMode::Stop => self.robot_stopped(Fault::RobotStopped),
@@ -45,11 +48,12 @@ impl Controller {
     fn become_idle(&mut self) {
         self.phase = Phase::Idle;
         self.robot.is_another_bead = false;
-        self.robot.follow_anew();
+        self.robot.speed_monitor.reset();
+        self.robot.speed_match = SpeedMatch::Follows;
     }
 
     fn robot_stopped(&mut self, why: Fault) {
-        self.robot.follow.reset();
+        self.robot.speed_monitor.reset();
         if let Some(bead) = self.phase.bead_mut()
             && !bead.is_faulty()
         {
@@ -58,9 +62,9 @@ impl Controller {
     }
 
     fn printing(&mut self, now: Stamp, state: &RobotState, before: Option<Mm>) {
-        // The extruder's strategy goes on over a new bead whose robot was not seen
-        // idle: its pump never stood, and what is known of it still holds. A fault
-        // stays until the robot is idle.
+        // The extruder side continues where the robot was not idle between two beads: the
+        // pump did not stop, and its state is still valid. A fault stays until the robot is
+        // idle.
         if self.robot.is_another_bead && !self.phase.bead().is_some_and(Bead::is_faulty) {
             self.become_idle();
         }
@@ -68,24 +72,22 @@ impl Controller {
             self.begin_bead(state, before);
         }
         self.bead.laid = state.path_mm - self.bead.start;
-        let report = BeadReport {
-            at: now,
-            path: state.path_mm,
-            speed: state.speed_mm_per_s,
-            flow_ratio: self.flow_ratio(now),
-            is_path_known: !self.robot.odometer.reports_no_path(),
-        };
+        let (path, speed) = (state.path_mm, state.speed_mm_per_s);
+        let report = BeadReport { at: now, path, speed, flow_ratio: self.flow_ratio(now) };
+        if self.robot.odometer.reports_no_path() {
+            self.width.path_is_estimated();
+        }
         self.width.robot_reported(&report);
         let Some(bead) = self.phase.bead_mut() else { return };
-        let requested = bead.setpoint.map_or(self.setup.start_speed, |last| last.speed);
-        if bead.segment == Segment::RunUp && state.speed_mm_per_s >= requested * RUN_UP_FRACTION {
-            bead.segment = Segment::Even;
+        let requested = bead.setpoint.map_or(self.setup.cell.start_speed, |last| last.speed);
+        if bead.stage == BeadStage::RunUp && state.speed_mm_per_s >= requested * RUN_UP_FRACTION {
+            bead.stage = BeadStage::Even;
         }
         if let Some(last) = bead.setpoint {
             let robot = &mut self.robot;
-            robot.verdict = robot.follow.observe(now, last.speed, state.speed_mm_per_s);
+            robot.speed_match = robot.speed_monitor.observe(now, last.speed, state.speed_mm_per_s);
         }
-        match self.robot.verdict {
+        match self.robot.speed_match {
             SpeedMatch::Lost if !bead.is_faulty() => {
                 bead.mode = Mode::Fault { why: Fault::SpeedMismatch };
             }
@@ -96,7 +98,7 @@ impl Controller {
     }
 
     fn begin_bead(&mut self, state: &RobotState, before: Option<Mm>) {
-        // It began where the robot was last heard standing, a little before this.
+        // The bead began where the last report before it had the robot standing.
         let stood = before.filter(|path| {
             state.path_mm - *path < MAX_LAID_BEFORE_FIRST_REPORT && state.path_mm >= *path
         });
@@ -106,12 +108,12 @@ impl Controller {
         self.width.begin_bead();
     }
 
-    /// The reason for a hold has gone: prime on, or wait for a width.
+    /// The reason for a hold has gone: priming goes on, or a width is waited for.
     fn resume(&mut self, now: Stamp, state: &RobotState) {
         let Some(bead) = self.phase.bead_mut() else { return };
         bead.mode = if self.camera_lost {
             Mode::Holding { since: now, why: Hold::CameraLost }
-        } else if state.path_mm - self.bead.start < self.setup.start_length {
+        } else if state.path_mm - self.bead.start < self.setup.cell.start_length {
             Mode::Priming
         } else {
             Mode::Holding { since: now, why: Hold::NoWidth }
@@ -131,7 +133,7 @@ impl Controller {
         self.robot.link_up = false;
         self.robot.state = None;
         self.robot.silent_since = self.robot.silent_since.or(Some(now));
-        self.robot.follow.reset();
+        self.robot.speed_monitor.reset();
         self.phase.hold(now, Hold::LinkDown);
     }
 }

@@ -12,9 +12,9 @@ use crate::core::units::MmPerS2;
 use crate::core::units::{Mm, MmPerS, WidthRange};
 use crate::width_control::limiter::{SpeedLimit, SpeedLimits};
 use crate::width_control::pi::PiGains;
-use crate::width_control::settings::WidthControlSettings;
 use crate::width_control::strategy::constant::ConstantStrategy;
 use crate::width_control::strategy::pi::PiStrategy;
+use crate::width_control::strategy::{CellParameters, WidthControlSettings};
 use crate::width_control::target::WidthTarget;
 use std::sync::Arc;
 
@@ -33,19 +33,21 @@ pub fn setup() -> Setup {
             max_speed: MmPerS::constant(150.0),
             max_accel: MmPerS2::constant(2000.0),
         },
-        start_speed: MmPerS::constant(112.5),
+        cell: CellParameters {
+            start_speed: MmPerS::constant(112.5),
+            start_length: Mm::constant(200.0),
+            camera_offset: Mm::constant(88.4),
+            camera_offset_sigma: Mm::constant(8.84),
+            gauge_length: Mm::constant(12.7),
+            setpoint_period: Span::from_millis(200),
+            width_range: WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
+        },
         bead_length: None,
-        start_length: Mm::constant(200.0),
-        camera_offset: Mm::constant(88.4),
         alone_for: Span::from_millis(1600),
-        setpoint_period: Span::from_millis(200),
-        camera_offset_sigma: Mm::constant(8.84),
-        gauge_length: Mm::constant(12.7),
-        width_range: WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
     }
 }
 
-/// A cell on a time line: a robot that reports, a camera that sees.
+/// A cell over time: a robot that reports, a camera that measures.
 struct Line {
     controller: Controller,
     now: f64,
@@ -102,7 +104,7 @@ impl Line {
         }
     }
 
-    /// Lays bead until the controller tracks a width that is right.
+    /// Lays bead until the controller tracks a width on target.
     fn tracking() -> Self {
         let mut line = Self::new();
         line.now = 1.0;
@@ -130,7 +132,7 @@ fn nothing_is_sent_to_a_robot_that_does_not_print() {
 }
 
 #[test]
-fn the_first_stretch_is_laid_at_the_start_speed_whatever_the_width() {
+fn the_first_part_is_laid_at_the_start_speed_whatever_the_width() {
     let mut line = Line::new();
     line.now = 1.0;
     let _ = line.robot(RobotMode::Print, 0.0, 112.5);
@@ -143,7 +145,7 @@ fn the_first_stretch_is_laid_at_the_start_speed_whatever_the_width() {
 }
 
 #[test]
-fn tracking_begins_without_a_bump_and_answers_too_wide_with_speed() {
+fn tracking_begins_bumpless_and_speeds_up_for_too_wide() {
     let mut line = Line::tracking();
     assert!((line.tick().unwrap() - 112.5).abs() < 1e-9);
     let _ = line.advance(0.1, 236.0, 112.5);
@@ -169,7 +171,7 @@ fn a_gap_is_held_and_not_integrated_across() {
 }
 
 #[test]
-fn a_hold_without_end_becomes_a_fault_that_stops_the_robot() {
+fn a_long_hold_becomes_a_fault_that_stops_the_robot() {
     let mut line = Line::tracking();
     let speed = line.tick().unwrap();
     for k in 1..=50 {
@@ -194,7 +196,7 @@ fn a_robot_that_does_not_follow_is_held_and_then_stopped() {
 }
 
 #[test]
-fn the_integral_waits_while_the_robot_is_slower_than_told() {
+fn the_integrator_is_frozen_while_the_robot_is_slower_than_its_setpoint() {
     let mut line = Line::tracking();
     let _ = line.tick();
     let _ = line.advance(0.1, 236.0, 106.0);
@@ -245,7 +247,7 @@ fn a_robot_with_narrower_limits_is_never_driven() {
 }
 
 #[test]
-fn what_cannot_be_recorded_ends_control_in_hold() {
+fn a_lost_recording_ends_control_in_hold() {
     let mut line = Line::tracking();
     let step = line.give(&Event::RecordingLost);
     assert_eq!(step.state, State::Holding(Hold::RecordingLost));
@@ -259,7 +261,7 @@ fn what_cannot_be_recorded_ends_control_in_hold() {
 #[test]
 fn a_width_of_the_last_bead_does_not_start_control_of_this_one() {
     let mut line = Line::new();
-    line.controller.setup.start_length = Mm::constant(20.0);
+    line.controller.setup.cell.start_length = Mm::constant(20.0);
     line.now = 1.0;
     let _ = line.robot(RobotMode::Print, 500.0, 112.5);
     line.now = 1.4;
@@ -271,7 +273,7 @@ fn a_width_of_the_last_bead_does_not_start_control_of_this_one() {
 }
 
 #[test]
-fn a_bead_of_which_no_width_comes_is_held_and_given_up() {
+fn a_bead_without_widths_is_held_and_then_a_fault() {
     let mut line = Line::new();
     let _ = line.robot(RobotMode::Print, 0.0, 112.5);
     let mut states = Vec::new();
@@ -290,7 +292,7 @@ fn a_bead_of_which_no_width_comes_is_held_and_given_up() {
 }
 
 #[test]
-fn a_camera_that_was_lost_while_the_robot_held_is_not_forgotten() {
+fn a_camera_lost_during_a_robot_hold_is_still_a_hold_after_it() {
     let mut line = Line::new();
     let _ = line.robot(RobotMode::Print, 0.0, 112.5);
     let _ = line.advance(0.5, 56.0, 112.5);
@@ -312,7 +314,7 @@ fn a_path_that_jitters_is_no_new_bead_and_one_in_a_fault_stays_in_it() {
 }
 
 #[test]
-fn a_new_bead_that_is_first_heard_in_hold_is_a_new_one() {
+fn a_new_bead_that_is_first_reported_in_hold_is_a_new_one() {
     let mut line = Line::tracking();
     let _ = line.advance(0.1, 500.0, 112.5);
     let _ = line.robot(RobotMode::Hold, 60.0, 0.0);

@@ -1,39 +1,48 @@
-//! Widths: where the bead in a frame was laid, and what the width controller makes of it.
+//! Measured widths: where the bead in a frame was laid, and the sample for the width
+//! controller.
 
-use super::controller::{Controller, Measured};
-use super::extruder_side::NO_OVERRIDE;
+use super::controller::Controller;
+use super::extruder_control::NO_OVERRIDE;
 use super::phase::{Bead, Mode, Phase};
 use super::step::Trace;
 use crate::core::readback::{ROBOT_LAG, SpeedMatch};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::width_control::controller::{Outlook, SpeedRequest, WidthSample, WidthTrace};
+use crate::width_control::distance::WidthReading;
 use crate::width_control::limiter::SpeedLimit;
 use crate::width_control::pi::Saturation;
 use crate::width_control::target::BeadSegment;
 
-/// Least share of its speed from which the speed of a robot that goes by the
-/// flow is taken for the width controller's: below, the robot's limits say more of it.
+/// Smallest speed override by which the robot's speed is divided to get the width
+/// controller's own. Below it the robot is at its own limits, and the quotient is not what
+/// the width controller requested.
 const MIN_OVERRIDE: f64 = 0.5;
 
 impl Controller {
-    pub(super) fn measured(&mut self, now: Stamp, measured: &Measured, trace: &mut Trace) {
-        self.locate(measured.at, trace);
-        let error = measured.width - self.target_of(trace);
+    pub(super) fn measured(
+        &mut self,
+        now: Stamp,
+        captured_at: Stamp,
+        reading: WidthReading,
+        trace: &mut Trace,
+    ) {
+        self.locate(captured_at, trace);
+        let error = reading.width - self.target_of(trace);
         trace.error_mm = Some(error);
-        let primed = trace
-            .nozzle_path_mm
-            .is_some_and(|path| path - self.bead.start >= self.setup.start_length);
-        let is_own_bead = trace.bead_expected;
-        let start_speed = self.setup.start_speed;
-        let driven = self.robot.state.map_or(start_speed, |robot| robot.speed_mm_per_s);
-        // A robot that goes by the flow or by a plan is slower or faster than the width asks.
+        let start = &self.setup.cell;
+        let primed =
+            trace.nozzle_path_mm.is_some_and(|path| path - self.bead.start >= start.start_length);
+        let driven = self.robot.state.map_or(start.start_speed, |robot| robot.speed_mm_per_s);
         let factor = self.speed_override(now).unwrap_or(NO_OVERRIDE);
+        let is_own_bead = trace.bead_expected;
+        if is_own_bead && self.robot.odometer.reports_no_path() {
+            self.width.path_is_estimated();
+        }
         let bead = self.phase.bead();
         let sample = WidthSample {
-            captured_at: measured.at,
-            width: measured.width,
-            sigma: measured.sigma,
+            captured_at,
+            reading,
             error,
             nozzle_path: trace.nozzle_path_mm,
             is_own_bead,
@@ -41,11 +50,14 @@ impl Controller {
             may_begin: primed && is_own_bead && bead.is_some_and(Bead::waits_for_width),
             driven: driven * (1.0 / factor.max(MIN_OVERRIDE)),
             saturation: self.saturation(),
-            is_path_known: !self.robot.odometer.reports_no_path(),
         };
         let mut of_width = WidthTrace::default();
         let tracking = self.width.measured(&sample, &mut of_width);
-        trace.take(&of_width);
+        trace.proportional_mm_per_s = of_width.proportional;
+        trace.integral_mm_per_s = of_width.integral;
+        trace.demand_mm_per_s = of_width.demand;
+        trace.distance = of_width.distance;
+        trace.steps = of_width.steps;
         if let (Some(tracking), Some(bead)) = (tracking, self.phase.bead_mut()) {
             bead.mode = Mode::Tracking { seen_at: tracking.seen_at };
             if let Some(last) = &mut bead.setpoint
@@ -56,52 +68,51 @@ impl Controller {
         }
     }
 
-    /// The width that was asked for where the bead in a frame was laid.
+    /// The target width where the bead in a frame was laid.
     fn target_of(&self, trace: &Trace) -> Mm {
         let z = self.robot.state.map_or(Mm::ZERO, |robot| robot.z_mm);
         let path = trace.bead_path_mm.map_or(Mm::ZERO, |path| path - self.bead.start);
         self.setup.control.target.at(z, path)
     }
 
-    /// Where the nozzle was when a frame was captured, and where the bead in
-    /// it had been laid.
+    /// Records where the nozzle was when a frame was captured, and where the bead in the
+    /// frame was laid.
     pub(super) fn locate(&mut self, captured_at: Stamp, trace: &mut Trace) {
         self.camera_lost = false;
         trace.captured_at = Some(captured_at);
-        trace.nozzle_path_mm = self.robot.transport.path_at(captured_at);
-        trace.bead_path_mm = trace.nozzle_path_mm.map(|path| path - self.setup.camera_offset);
+        trace.nozzle_path_mm = self.robot.path.path_at(captured_at);
+        trace.bead_path_mm = trace.nozzle_path_mm.map(|path| path - self.setup.cell.camera_offset);
         trace.bead_expected = self.phase != Phase::Idle
             && trace.bead_path_mm.is_some_and(|path| path >= self.bead.start);
     }
 
-    /// How things stand before a setpoint; none where no bead is controlled.
+    /// The state of a bead before a setpoint; none unless it is priming or tracking.
     pub(super) fn outlook(&self, now: Stamp) -> Option<Outlook> {
-        let bead = self.phase.bead()?;
-        Some(Outlook {
-            now,
-            path: self.robot.transport.path_at(now),
-            laid: self.laid_at(now),
-            is_priming: bead.mode == Mode::Priming,
-            tracked: bead.tracked(),
-        })
+        let tracked = match self.phase.bead()?.mode {
+            Mode::Priming => None,
+            Mode::Tracking { seen_at } => Some(seen_at),
+            Mode::Holding { .. } | Mode::Fault { .. } => return None,
+        };
+        let path = self.robot.path.path_at(now);
+        Some(Outlook { now, path, laid: self.laid_at(now), tracked })
     }
 
-    /// What the next setpoint is for: the piece of bead that it lays.
+    /// What the next setpoint is for: the piece of bead that is laid at it.
     pub(super) fn speed_request(&self, now: Stamp) -> SpeedRequest {
-        let lasts = self.setup.setpoint_period;
+        let lasts = self.setup.cell.setpoint_period;
         let target = self.robot.state.zip(self.laid_at(now)).map(|(state, laid)| {
             let from = laid + state.speed_mm_per_s * ROBOT_LAG;
             let piece = BeadSegment { from, to: from + state.speed_mm_per_s * lasts };
             self.setup.control.target.over(state.z_mm, piece)
         });
-        let path = self.robot.transport.path_at(now);
+        let path = self.robot.path.path_at(now);
         SpeedRequest { path, from: now + ROBOT_LAG, lasts, target }
     }
 
-    /// In which direction the robot cannot follow, from the limits that acted
-    /// on the last setpoint and from the speed that is read back.
+    /// The direction in which the robot cannot follow, from the limit that acted on the
+    /// last setpoint and from the speed that is read back.
     fn saturation(&self) -> Saturation {
-        match (self.phase.limit(), self.robot.verdict) {
+        match (self.phase.limit(), self.robot.speed_match) {
             (SpeedLimit::MaxSpeed | SpeedLimit::Acceleration, _) | (_, SpeedMatch::Slower) => {
                 Saturation::Above
             }
@@ -110,15 +121,5 @@ impl Controller {
             }
             _ => Saturation::None,
         }
-    }
-}
-
-impl Trace {
-    fn take(&mut self, of_width: &WidthTrace) {
-        self.proportional_mm_per_s = of_width.proportional;
-        self.integral_mm_per_s = of_width.integral;
-        self.demand_mm_per_s = of_width.demand;
-        self.distance = of_width.distance;
-        self.steps = of_width.steps;
     }
 }

@@ -1,19 +1,17 @@
-//! Model-reference adaptive control of an extruder that lays a strand on a
-//! moving plate (Mohammadi Looey et al. 2026): the feed ṁ holds the speed in
-//! the nozzle, the plate's speed `U_s` the speed of the strand, and what the
-//! model does not know is learnt as an offset of each input.
+//! Model-reference adaptive control of an extruder that lays a strand on a moving plate
+//! (Mohammadi Looey et al. 2026): the feed ṁ controls the speed in the nozzle, the plate's speed
+//! `U_s` the speed of the strand, and the uncertainty is estimated as an offset of each input.
 //!
-//! The paper's eqs. (8), (12), (13) and (18)–(25) mix up indices; with the
-//! plant (6), (7) the laws are
+//! The paper's eqs. (8), (12), (13) and (18)–(25) exchange indices; for the plant (6), (7) the
+//! control laws are
 //!
 //! ```text
 //! ṁ  = −k1·v̄1 + r1 − (β1/β3)·p_d1    − Δ̂1,   Δ̂1' = γ1·p1·β3·e1
 //! Us = −k3·ū3 + r3 − (β4·β5/β7)·v̄1  − Δ̂3,   Δ̂3' = γ3·p3·β7·e3
 //! ```
 //!
-//! and the error of either obeys ë + a·ė + γ·p·β²·e = β·Δ', so that a ramp of
-//! the uncertainty is followed with a constant error. [`Adaptation::Ramp`]
-//! learns the slope as well and leaves none.
+//! and either error obeys ë + a·ė + γ·p·β²·e = β·Δ', so that a ramp of the uncertainty leaves a
+//! constant error. [`Adaptation::Ramp`] estimates the slope as well and leaves none.
 
 mod estimate;
 mod gains;
@@ -30,20 +28,19 @@ use crate::core::time::Span;
 /// nozzle, ū3 \[m/s\] of the strand, ṁ \[kg/s\], `U_s` \[m/s\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StrandModel {
-    /// β1: speed in the nozzle for each unit of the pressure gradient and
-    /// second.
+    /// β1: acceleration in the nozzle per unit of the pressure gradient.
     pub pressure_gain: f64,
     /// β2 and β3.
     pub nozzle: ScalarPlant,
-    /// β4: speed behind the nozzle over that in it (bending and swelling).
+    /// β4: speed after the nozzle over that in it (bending and swelling).
     pub swell: f64,
-    /// β5: how the strand is driven by what comes from the nozzle \[1/s\].
+    /// β5: gain from the speed after the nozzle to the strand \[1/s\].
     pub push_per_s: f64,
     /// β6 and β7.
     pub strand: ScalarPlant,
 }
 
-/// What is measured.
+/// Measured speeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StrandReading {
     /// v̄1 \[m/s\].
@@ -54,7 +51,7 @@ pub struct StrandReading {
     pub pressure_gradient: f64,
 }
 
-/// What is wanted.
+/// Target speeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StrandTargets {
     /// v̄1 \[m/s\].
@@ -63,7 +60,7 @@ pub struct StrandTargets {
     pub strand_m_per_s: f64,
 }
 
-/// What is commanded.
+/// The inputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StrandInputs {
     /// ṁ \[kg/s\].
@@ -72,18 +69,18 @@ pub struct StrandInputs {
     pub plate_m_per_s: f64,
 }
 
-/// Which sub-system's law cannot be set up, and why.
+/// Why the controller of a sub-system cannot be set up.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("adaptive controller of the {part}: {why}")]
 pub struct SubSystemError {
     /// `nozzle` or `strand`.
     pub part: &'static str,
-    /// What is wrong.
+    /// The reason.
     #[source]
     pub why: GainError,
 }
 
-/// Both laws with what couples them.
+/// Both controllers with their coupling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Adaptive {
     model: StrandModel,
@@ -92,7 +89,7 @@ pub struct Adaptive {
 }
 
 impl Adaptive {
-    /// Both laws, with commands that are held for `hold`.
+    /// Both controllers, with commands that are held for `hold`.
     pub fn new(
         model: StrandModel,
         nozzle: AdaptiveGains,
@@ -112,18 +109,12 @@ impl Adaptive {
         Ok(Self { model, nozzle, strand })
     }
 
-    /// Starts bumpless from what is measured and applied in a steady state.
+    /// Starts bumpless from readings and inputs in a steady state.
     pub fn start(&mut self, reading: &StrandReading, applied: StrandInputs) {
         let (pressure, push) =
             self.coupling_inputs(reading.pressure_gradient, reading.nozzle_m_per_s);
         self.nozzle.start(reading.nozzle_m_per_s, applied.mass_flow_kg_per_s, pressure);
         self.strand.start(reading.strand_m_per_s, applied.plate_m_per_s, push);
-    }
-
-    /// Sets both estimates: of the feed \[kg/s\] and of the plate \[m/s\].
-    pub fn set_estimates(&mut self, feed_kg_per_s: f64, plate_m_per_s: f64) {
-        self.nozzle.set_estimate(feed_kg_per_s);
-        self.strand.set_estimate(plate_m_per_s);
     }
 
     /// One step of both, `dt` after the last one. Returns the actions of the
@@ -137,7 +128,7 @@ impl Adaptive {
         let (pressure, _) = self.coupling_inputs(reading.pressure_gradient, 0.0);
         let reference = self.nozzle.reference_for(targets.nozzle_m_per_s);
         let nozzle = self.nozzle.step(reading.nozzle_m_per_s, reference, pressure, dt);
-        // The nozzle moves while the plate's command is held: its mean counts.
+        // The nozzle's speed changes while the plate's command is held: its mean counts.
         let mean = f64::midpoint(nozzle.model + nozzle.error, nozzle.predicted);
         let (_, push) = self.coupling_inputs(0.0, mean);
         let reference = self.strand.reference_for(targets.strand_m_per_s);
@@ -145,23 +136,23 @@ impl Adaptive {
         (nozzle, strand)
     }
 
-    /// Tells what was applied in place of the commands.
+    /// The inputs that were applied in place of the commands.
     pub fn settle(&mut self, applied: StrandInputs) {
         self.nozzle.settle(applied.mass_flow_kg_per_s);
         self.strand.settle(applied.plate_m_per_s);
     }
 
-    /// The law of the nozzle.
+    /// The controller of the nozzle.
     pub fn nozzle(&self) -> &MracController {
         &self.nozzle
     }
 
-    /// The law of the strand.
+    /// The controller of the strand.
     pub fn strand(&self) -> &MracController {
         &self.strand
     }
 
-    /// What pressure and nozzle do, as inputs: (β1/β3)·p and (β4·β5/β7)·v̄1.
+    /// Coupling by pressure and nozzle, as inputs: (β1/β3)·p and (β4·β5/β7)·v̄1.
     fn coupling_inputs(&self, pressure_gradient: f64, nozzle_m_per_s: f64) -> (f64, f64) {
         let model = &self.model;
         let pressure = model.pressure_gain / model.nozzle.input_gain * pressure_gradient;

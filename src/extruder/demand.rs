@@ -1,38 +1,37 @@
-//! The flow that is wanted at the nozzle.
+//! The demanded flow at the nozzle.
 
 use crate::core::units::{Mm, Mm2, Mm3PerS, MmPerS};
 
-/// Most by which a robot that moves faster than it was told raises the flow.
+/// Largest flow ratio for a robot that moves faster than its setpoint. It bounds the flow that
+/// a wrong report can cause.
 const MAX_FLOW_RATIO: f64 = 1.5;
-/// Share of the setpoint by which the speed may differ before the flow follows:
-/// a robot is always a little behind a setpoint that changes, and a flow that
-/// followed that would undo some of the width controller's work.
+/// Relative difference of speed and setpoint up to which the flow does not follow. A robot lags
+/// behind a changing setpoint, and a flow that followed the lag would counteract the width
+/// controller; a larger value lets a robot that is limited lay a wider bead.
 const SPEED_DEADBAND: f64 = 0.05;
 
-/// What the flow goes by.
+/// What the flow follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FlowFollows {
     /// The start speed alone: the flow is the same all along the bead.
     StartSpeed,
-    /// The robot, as far as it moves slower or faster than it was told, once it
-    /// has run up: where it slows down by itself. What the width controller
-    /// adds or takes away is left out, for a flow that followed it would undo
-    /// it.
+    /// The robot's actual speed over its setpoint, after run-up. The width controller's
+    /// changes of the setpoint do not count, since a flow that followed them would
+    /// counteract them.
     Robot,
 }
 
-/// What the robot's speed goes by, besides the width that is seen.
+/// What the robot's speed follows, besides the measured width.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RobotFollows {
     /// Nothing else.
     Nothing,
-    /// The flow that the extruder's model foretells: where there is half the
-    /// flow that is wanted, the robot moves at half its speed, within its limits.
-    /// bcs-thesis, figure 33.
+    /// The flow that the extruder's model predicts: at half the demanded flow the robot moves
+    /// at half its speed, within its limits. bcs-thesis, figure 33.
     Flow,
 }
 
-/// What the robot was asked for, and what it does.
+/// Setpoint and actual speed of the robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobotSpeed {
     /// The last setpoint.
@@ -49,7 +48,7 @@ pub struct FlowDemand {
     follows: FlowFollows,
 }
 
-/// A bead whose section cannot be.
+/// A bead that has no section.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("a bead of {width} by {height}: its width must be at least its height")]
 pub struct SectionError {
@@ -59,8 +58,8 @@ pub struct SectionError {
     pub height: Mm,
 }
 
-/// Section of a bead with round sides: (W − H)·H + πH²/4. Ma et al. 2026, with
-/// the sign that an area has.
+/// Section of a bead with round sides: (W − H)·H + πH²/4. Ma et al. 2026, with the sign of the
+/// first term corrected.
 pub fn section(width: Mm, height: Mm) -> Result<Mm2, SectionError> {
     let (w, h) = (width.get(), height.get());
     if !(h > 0.0 && w >= h) {
@@ -81,8 +80,7 @@ impl FlowDemand {
         self.speed * self.section
     }
 
-    /// The flow that is wanted while the robot, told one speed, moves at
-    /// another; none where the robot says nothing.
+    /// The demanded flow; the nominal one without a report of the robot.
     pub fn flow(&self, robot: Option<RobotSpeed>) -> Mm3PerS {
         match (self.follows, robot) {
             (FlowFollows::Robot, Some(robot)) if robot.setpoint > MmPerS::ZERO => {
@@ -94,8 +92,7 @@ impl FlowDemand {
     }
 }
 
-/// The share that the flow goes by: 1 within the slack, nothing where the
-/// robot stands, without a step between.
+/// The flow ratio for a speed ratio: 1 within the dead band, 0 at standstill, continuous.
 fn flow_ratio(ratio: f64) -> f64 {
     if ratio < 1.0 - SPEED_DEADBAND {
         ratio / (1.0 - SPEED_DEADBAND)
@@ -121,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flow_that_follows_the_robot_leaves_the_width_controller_its_say() {
+    fn a_flow_that_follows_the_robot_ignores_changes_of_the_setpoint() {
         let flow = |follows, robot| {
             FlowDemand::new(Mm2::constant(4.0), MmPerS::constant(100.0), follows).flow(robot).get()
         };

@@ -1,4 +1,4 @@
-//! What an extruder can be told.
+//! The quantity of an extruder's command.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,16 +14,16 @@ pub enum CommandQuantity {
     Volts,
     /// Pressure at the nozzle, in megapascal.
     Pressure,
-    /// Volume a second \[mm³/s\].
+    /// Volume per second \[mm³/s\].
     Flow,
-    /// Mass a second \[kg/s\].
+    /// Mass per second \[kg/s\].
     MassFlow,
-    /// Share of a screw's channel that the feed fills, from 0 to 1.
+    /// Fraction of a screw's channel that the feed fills, from 0 to 1.
     Filling,
 }
 
 impl CommandQuantity {
-    /// All of them with the word that a cell file has for each.
+    /// All of them with the word of each in a cell file.
     pub const WORDS: [(&'static str, Self); 6] = [
         ("rpm", Self::Rpm),
         ("volts", Self::Volts),
@@ -33,30 +33,20 @@ impl CommandQuantity {
         ("filling", Self::Filling),
     ];
 
-    /// The word that a cell file has for it.
+    /// Its word in a cell file.
     pub fn word(self) -> &'static str {
         Self::WORDS.into_iter().find(|known| known.1 == self).map_or("", |known| known.0)
     }
 
-    /// All of them with the word for the unit that ends the keys of a cell file
-    /// and stands on the extruder link.
-    const UNIT_WORDS: [(&'static str, Self); 6] = [
-        ("rpm", Self::Rpm),
-        ("v", Self::Volts),
-        ("mpa", Self::Pressure),
-        ("mm3_per_s", Self::Flow),
-        ("kg_per_s", Self::MassFlow),
-        ("filling", Self::Filling),
-    ];
-
-    /// The word for its unit, such as `rpm`.
+    /// The word for its unit, such as `rpm`: the end of keys of a cell file, and the word on
+    /// the extruder link.
     pub fn unit_word(self) -> &'static str {
-        Self::UNIT_WORDS.into_iter().find(|known| known.1 == self).map_or("", |known| known.0)
+        if self == Self::Filling { "filling" } else { self.unit().word() }
     }
 
-    /// The one whose unit has this word.
+    /// The quantity whose unit has this word.
     pub fn of_unit_word(word: &str) -> Option<Self> {
-        Self::UNIT_WORDS.into_iter().find(|known| known.0 == word).map(|known| known.1)
+        Self::WORDS.map(|known| known.1).into_iter().find(|known| known.unit_word() == word)
     }
 
     /// Its unit.
@@ -69,5 +59,20 @@ impl CommandQuantity {
             Self::MassFlow => Unit::KgPerS,
             Self::Filling => Unit::One,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unit_words_are_those_of_the_extruder_link_and_of_one_quantity_each() {
+        let words = CommandQuantity::WORDS.map(|known| known.1.unit_word());
+        assert_eq!(words, ["rpm", "v", "mpa", "mm3_per_s", "kg_per_s", "filling"]);
+        for (_, quantity) in CommandQuantity::WORDS {
+            assert_eq!(CommandQuantity::of_unit_word(quantity.unit_word()), Some(quantity));
+        }
+        assert_eq!(CommandQuantity::of_unit_word("1"), None);
     }
 }

@@ -1,12 +1,11 @@
-//! Keeps an extruder's commands within its range and its fastest change, and
-//! says which of them acted.
+//! Keeps an extruder's commands within their range and rate, and reports which limit acted.
 
 use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
 use crate::core::time::Span;
 
-/// What a command may be, in the unit of the extruder's command.
+/// Range and rate of commands, in the unit of the extruder's command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CommandLimits {
     min: f64,
@@ -14,10 +13,10 @@ pub struct CommandLimits {
     rate_per_s: f64,
 }
 
-/// Limits that cannot be kept.
+/// Limits that leave no command.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum LimitError {
-    /// There is nothing between the smallest and the largest.
+    /// The range is empty.
     #[error("commands from {min} to {max}: the largest must be more than the smallest")]
     Empty {
         /// Smallest command.
@@ -25,15 +24,12 @@ pub enum LimitError {
         /// Largest command.
         max: f64,
     },
-    /// A command could never change.
-    #[error("commands that change by {rate_per_s} a second: more than 0 is needed")]
-    Rate {
-        /// Fastest change a second.
-        rate_per_s: f64,
-    },
+    /// A command could never change; fastest change per second.
+    #[error("commands that change by {0} a second: more than 0 is needed")]
+    Rate(f64),
 }
 
-/// Which limit shaped a command.
+/// Which limit acted on a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
@@ -52,13 +48,13 @@ pub enum CommandLimit {
 }
 
 impl CommandLimits {
-    /// From `min` to `max`, by at most `rate_per_s` a second.
+    /// From `min` to `max`, with at most `rate_per_s` of change per second.
     pub fn new(min: f64, max: f64, rate_per_s: f64) -> Result<Self, LimitError> {
         if !(min.is_finite() && max.is_finite() && min < max) {
             return Err(LimitError::Empty { min, max });
         }
         if !(rate_per_s.is_finite() && rate_per_s > 0.0) {
-            return Err(LimitError::Rate { rate_per_s });
+            return Err(LimitError::Rate(rate_per_s));
         }
         Ok(Self { min, max, rate_per_s })
     }
@@ -68,25 +64,24 @@ impl CommandLimits {
         (self.min, self.max)
     }
 
-    /// Fastest change a second.
+    /// Fastest change per second.
     pub const fn rate_per_s(&self) -> f64 {
         self.rate_per_s
     }
 
-    /// The same limits for differences from a command.
+    /// The same limits for deviations from a command.
     pub fn about(&self, command: f64) -> Self {
         Self { min: self.min - command, max: self.max - command, ..*self }
     }
 
-    /// The command while nothing is extruded: nothing, or what comes nearest.
+    /// The command while nothing is extruded: 0, or the nearest in range.
     pub const fn idle(&self) -> f64 {
         0.0_f64.clamp(self.min, self.max)
     }
 
-    /// The command nearest to a demand that keeps the limits, `dt` after the
-    /// last one. A demand that is not finite repeats the last command. Range
-    /// goes before the fastest change: a last command outside the range is
-    /// left at once.
+    /// The command nearest to a demand within the limits, `dt` after the last one. A demand
+    /// that is not finite repeats the last command. The range has priority over the rate: a
+    /// last command outside the range is left at once.
     pub fn apply(&self, demand: f64, last: f64, dt: Span) -> (f64, CommandLimit) {
         let last = if last.is_finite() { last.clamp(self.min, self.max) } else { self.min };
         if !demand.is_finite() {
@@ -132,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_that_leave_nothing_are_refused() {
+    fn empty_limits_are_refused() {
         assert!(CommandLimits::new(5.0, 5.0, 1.0).is_err());
         assert!(CommandLimits::new(0.0, f64::NAN, 1.0).is_err());
         let error = CommandLimits::new(0.0, 5.0, 0.0).unwrap_err().to_string();

@@ -1,18 +1,17 @@
-//! The pressure loop: what speed of the screw keeps the pressure at the nozzle
-//! where it is wanted. Ma et al. 2026, with a law of our own beside theirs.
+//! The pressure loop: control of the pressure at the nozzle by the screw's speed. The
+//! controllers of Ma et al. 2026, and a predictive one.
 //!
 //! ```text
-//!  target ──▶ law ──rpm──▶ limits ──▶ screw ··dead time, lag··▶ pressure
-//!              ▲                                                   │
-//!              └───────────────── readings, 50 Hz ─────────────────┘
+//!  target ──▶ controller ──rpm──▶ limits ──▶ screw ··dead time, lag··▶ pressure
+//!              ▲                                                          │
+//!              └──────────────────── readings, 50 Hz ─────────────────────┘
 //! ```
 //!
-//! The rates are apart. [`PressureLaw::measured`] takes a reading whenever there is
-//! one; [`PressureLaw::step`] gives a command whenever one is due, 20 times a second
-//! in the paper; what a law foresees from its own commands is exact at any
-//! rate, so that a feedforward at 200 Hz is the same call made more often.
-//! Every law is a plain struct that is given the time, allocates nothing in
-//! these two calls and never leaves its [`super::limits::CommandLimits`] \[rpm\].
+//! Readings and commands have independent rates. [`PressureController::measured`] takes each
+//! reading; [`PressureController::step`] gives each command, 20 a second in the paper. Model
+//! predictions are exact at any rate, so a feedforward at 200 Hz is the same call made more
+//! often. A controller reads no clock, allocates nothing in these two calls and never leaves
+//! its [`super::limits::CommandLimits`] \[rpm\].
 
 use super::limits::{CommandLimit, LimitError};
 use crate::core::time::{Span, Stamp};
@@ -37,10 +36,11 @@ mod tests;
 
 pub use call_times::InitialState;
 
-/// The longest dead time and lag that are taken \[s\].
+/// Longest dead time and lag that are accepted \[s\], as a bound on typing errors and on the
+/// memory of commands.
 pub const MAX_TIME_CONSTANT_S: f64 = 60.0;
 
-/// Settings that cannot be.
+/// Settings out of range.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum PressureError {
     /// A setting outside its range.
@@ -48,49 +48,43 @@ pub enum PressureError {
     OutOfRange {
         /// Name of the setting, with its unit.
         what: &'static str,
-        /// What was given.
+        /// The value.
         found: f64,
-        /// What it must be.
+        /// The range, in words.
         wanted: &'static str,
     },
-    /// Limits that leave nothing between them.
+    /// Limits of the command.
     #[error("the screw's speed [rpm]: {0}")]
     Limits(#[from] LimitError),
-    /// Too little to tell the noise from.
+    /// Too few readings to identify the noise.
     #[error("noise identification from {found} readings: at least {wanted} are needed")]
     TooFew {
-        /// Readings that were given.
+        /// Number of readings.
         found: usize,
         /// How many are needed.
         wanted: usize,
     },
-    /// Readings that never change, or that tell no noise.
+    /// Readings that show no noise; variance of the change from one to the next \[MPa²\].
     #[error(
-        "the readings show no noise (their changes have a variance of {variance:.3e} MPa²): \
+        "the readings show no noise (their changes have a variance of {0:.3e} MPa²): \
          a sensor that is stuck, readings that were smoothed before, or a pressure that moves far \
          more than they scatter"
     )]
-    NoNoise {
-        /// Variance of the change from one reading to the next \[MPa²\].
-        variance: f64,
-    },
+    NoNoise(f64),
 }
 
-/// A reading that a law does not take.
+/// A reading that a controller rejects.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ReadingRefused {
-    /// Older than what the law knows already.
-    #[error("a reading is {late_s} s older than the last one")]
-    OutOfOrder {
-        /// By how much \[s\].
-        late_s: f64,
-    },
-    /// Beyond what the machine could have.
+    /// Older than the last one, by a time \[s\].
+    #[error("a reading is {0} s older than the last one")]
+    OutOfOrder(f64),
+    /// Implausible.
     #[error("the pressure reads {found}: at most ±{most} can be; check the sensor and its scale")]
     Implausible {
-        /// What was read.
+        /// The reading.
         found: MPa,
-        /// The largest size that is taken.
+        /// The largest magnitude that is accepted.
         most: MPa,
     },
 }
@@ -105,8 +99,8 @@ pub struct Fopdt {
 }
 
 impl Fopdt {
-    /// From the gain \[MPa/rpm\], the lag and the dead time \[s\]. Fails on a
-    /// gain or a lag that is not positive and on times over [`LONGEST_S`].
+    /// From the gain \[MPa/rpm\], the lag and the dead time \[s\]. Fails on a gain or a lag that
+    /// is not positive and on times over [`MAX_TIME_CONSTANT_S`].
     pub fn new(gain_mpa_per_rpm: f64, lag_s: f64, dead_time_s: f64) -> Result<Self, PressureError> {
         within("the gain [MPa/rpm]", gain_mpa_per_rpm, 1e-9..=1e9, "between 1e-9 and 1e9")?;
         within("the lag [s]", lag_s, 1e-3..=MAX_TIME_CONSTANT_S, "between 0.001 and 60")?;
@@ -114,7 +108,7 @@ impl Fopdt {
         Ok(Self { gain: gain_mpa_per_rpm, lag_s, dead_time_s })
     }
 
-    /// Pressure for each rpm, once settled \[MPa/rpm\].
+    /// Static gain \[MPa/rpm\].
     pub const fn gain(&self) -> f64 {
         self.gain
     }
@@ -133,44 +127,39 @@ impl Fopdt {
 /// A command to the screw, within the limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScrewCommand {
-    /// Speed to turn at.
+    /// The speed.
     pub speed: Rpm,
-    /// The limit that shaped it.
+    /// The limit that acted on it.
     pub limit: CommandLimit,
 }
 
-/// A law of the pressure loop.
+/// A controller of the pressure loop.
 pub trait PressureController {
-    /// Takes a reading of the pressure at the nozzle. Refuses one that is
-    /// older than the last or beyond anything the machine could have, and is
-    /// then as if it had not been.
+    /// A reading of the pressure at the nozzle. Rejects one that is older than the last or
+    /// implausible, without a change of state.
     fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), ReadingRefused>;
 
-    /// The command from now on. `target` is what is wanted [`Self::lead`]
-    /// ahead where that is known, and what is wanted now where it is not. A
-    /// call that is not after the last one gives that one's command again.
+    /// The command from now on. `target` is the target pressure [`Self::preview`] ahead where
+    /// that is known, else now. A call that is not after the last one repeats its command.
     fn step(&mut self, now: Stamp, target: MPa) -> ScrewCommand;
 
-    /// Learns that something else than its last command went to the screw from
-    /// `now` on, where other limits than its own shaped it.
+    /// The speed that was applied from `now` on in place of the last command, where other
+    /// limits acted.
     fn settle(&mut self, now: Stamp, applied: Rpm);
 
-    /// How far ahead the law would like to know the target.
+    /// How far ahead the controller can use the target.
     fn preview(&self) -> Span {
         Span::ZERO
     }
 }
 
-/// Whether a number is within a range, as an error where it is not.
+/// Fails where a number is outside a range.
 fn within(
     what: &'static str,
     found: f64,
     range: std::ops::RangeInclusive<f64>,
     wanted: &'static str,
 ) -> Result<(), PressureError> {
-    if range.contains(&found) {
-        Ok(())
-    } else {
-        Err(PressureError::OutOfRange { what, found, wanted })
-    }
+    let error = PressureError::OutOfRange { what, found, wanted };
+    if range.contains(&found) { Ok(()) } else { Err(error) }
 }

@@ -1,10 +1,8 @@
-//! Several rates in one loop: each says when it is due, and none waits for
-//! another.
+//! Several independent rates in one loop.
 
 use crate::core::time::{Span, Stamp};
 
-/// Something that is done at a fixed rate. Times that were missed are left
-/// out, not made up for.
+/// A task at a fixed rate. Missed times are skipped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rate {
     period: Span,
@@ -17,14 +15,9 @@ impl Rate {
         Self { period, next: None }
     }
 
-    /// So many times a second \[Hz\].
+    /// At a frequency \[Hz\].
     pub fn hz(hz: f64) -> Self {
         Self::every(Span::from_secs(1.0 / hz))
-    }
-
-    /// The time from one to the next.
-    pub const fn period(&self) -> Span {
-        self.period
     }
 
     /// Whether it is due at `now`; the first call is, and sets the grid.
@@ -48,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rates_keep_their_grids_beside_each_other() {
+    fn rates_keep_their_own_grids() {
         let (mut fast, mut slow) = (Rate::hz(200.0), Rate::hz(20.0));
         let (mut many, mut few) = (0, 0);
         for tick in 0..1000_u32 {
@@ -60,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_overslept_is_left_out() {
+    fn missed_times_are_skipped() {
         let mut rate = Rate::hz(10.0);
         assert!(rate.due(Stamp::START));
         assert!(!rate.due(Stamp::from_secs(0.09)));

@@ -1,7 +1,6 @@
-//! What is done to readings before a law goes by them: lone spikes out, noise
-//! smoothed, each with what is known by now (bcs-thesis, section on signals;
-//! one-sided). The limit on the pressure and the watch over the screw go by
-//! the readings as they come.
+//! Filters of the readings for the strategy: single spikes removed, noise smoothed, each with
+//! past samples only (bcs-thesis, section on signals; one-sided). The limit on the pressure
+//! and the check of the screw's speed use the unfiltered readings.
 
 use super::report::ExtruderReport;
 use crate::core::units::{MPa, Mm, Mm3PerS};
@@ -11,13 +10,13 @@ use crate::numeric::savgol::{LiveSavGol, SavGol};
 /// Which filters readings pass, in this order; by default none.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ReadingFilters {
-    /// Spikes give way to the median; a real step passes half a window late.
+    /// Replaces spikes by the median; a true step is delayed by half a window.
     pub spikes: Option<Hampel>,
-    /// The end of a polynomial through the last readings.
+    /// The value at the end of a polynomial through the last readings.
     pub smoothing: Option<SavGol>,
 }
 
-/// The readings of a connection on their way to the law.
+/// The filters of one connection.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Readings {
     filters: ReadingFilters,
@@ -29,16 +28,16 @@ pub struct Readings {
 impl Readings {
     /// Before the first report.
     pub fn new(filters: ReadingFilters) -> Self {
-        let passage = ReadingFilter::new(filters);
-        Self { filters, pressure: passage.clone(), flow: passage.clone(), filled: passage }
+        let filter = ReadingFilter::new(filters);
+        Self { filters, pressure: filter.clone(), flow: filter.clone(), filled: filter }
     }
 
-    /// Forgets what was reported: after a gap it is no longer beside what comes.
+    /// Discards past readings, as after a gap.
     pub fn reset(&mut self) {
         *self = Self::new(self.filters);
     }
 
-    /// The report as the law is to see it.
+    /// The filtered report.
     pub fn filter(&mut self, report: &ExtruderReport) -> ExtruderReport {
         let filters = self.filters;
         let pressure = self.pressure.filter(report.pressure_mpa.map(f64::from), filters);
@@ -58,7 +57,7 @@ impl Readings {
 struct ReadingFilter {
     spikes: Option<LiveHampel>,
     smoothing: Option<LiveSavGol>,
-    /// Whether a reading has passed.
+    /// Whether a reading was filtered.
     begun: bool,
 }
 
@@ -73,8 +72,7 @@ impl ReadingFilter {
 
     fn filter(&mut self, reading: Option<f64>, filters: ReadingFilters) -> Option<f64> {
         let Some(reading) = reading else {
-            // What comes after a reading that was missing is no neighbour of what
-            // came before it.
+            // Readings before and after a missing one are not neighbours.
             if self.begun {
                 *self = Self::new(filters);
             }
@@ -110,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn without_filters_a_report_passes_as_it_is() {
+    fn without_filters_a_report_is_unchanged() {
         let mut readings = Readings::new(ReadingFilters::default());
         for mpa in [0.6, 7.0, 0.61] {
             assert_eq!(readings.filter(&report(mpa)), report(mpa));
@@ -118,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lone_spike_does_not_pass_and_a_step_passes_half_a_window_late() {
+    fn a_single_spike_is_removed_and_a_step_is_delayed_by_half_a_window() {
         let spikes = Hampel::new(2, 4.0).ok();
         let mut readings = Readings::new(ReadingFilters { spikes, smoothing: None });
         let nothing = ExtruderReport { pressure_mpa: None, ..report(0.0) };
@@ -129,13 +127,13 @@ mod tests {
         }
         let after: Vec<f64> = (200..204).map(|i| passed(&mut readings, noisy(i, 0.9))).collect();
         assert!(after[1] < 0.65 && after[2] > 0.85, "{after:?}");
-        // After a report without the reading there is nothing to compare with.
+        // After a report without the reading the filter starts again.
         assert_eq!(readings.filter(&nothing), nothing);
         assert!((passed(&mut readings, 0.3) - 0.3).abs() < 1e-12);
     }
 
     #[test]
-    fn smoothing_follows_a_ramp_without_delay_and_takes_noise_away() {
+    fn smoothing_follows_a_ramp_without_delay_and_reduces_noise() {
         let smoothing = SavGol::new(11, 1).ok();
         let mut readings = Readings::new(ReadingFilters { spikes: None, smoothing });
         let ramp: Vec<f64> = (0..30).map(|i| passed(&mut readings, 0.01 * f64::from(i))).collect();

@@ -1,4 +1,4 @@
-//! What an extruder reports, and what it is commanded.
+//! Reports of an extruder and commands to it.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,17 +11,17 @@ use crate::core::units::{MPa, Mm, Mm3PerS, Rpm};
 pub enum PumpMode {
     /// It stands.
     Off,
-    /// It was told to run and material does not flow yet.
+    /// It is commanded to run and material does not flow yet.
     Starting,
     /// It runs.
     On,
-    /// It was told to stop and material still flows.
+    /// It is commanded to stop and material still flows.
     Stopping,
     /// It stopped by a fault of its own.
     Fault,
 }
 
-/// One report of an extruder. What it has no sensor for is absent.
+/// One report of an extruder. Quantities without a sensor are absent.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ExtruderReport {
     /// What the pump does.
@@ -56,13 +56,13 @@ pub struct ExtruderLimits {
     pub max: f64,
 }
 
-/// What is to be sent to the extruder.
+/// A command to the extruder.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ExtruderCommand {
-    /// Whether the pump is to run.
+    /// Whether the pump has to run.
     pub pump_on: bool,
-    /// Whether the shut-off valve is to be open.
+    /// Whether the shut-off valve has to be open.
     pub valve_open: bool,
-    /// How much, in the unit of the cell's command.
+    /// Value, in the unit of the cell's command.
     pub value: f64,
 }

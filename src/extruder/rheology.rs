@@ -1,19 +1,18 @@
-//! Which pressure, and which speed of the screw, a print speed needs: the
-//! bead's section ([`super::demand::section`]) gives the flow, the nozzle's
-//! power law the pressure, the screw's drag flow its speed. Each both ways.
-//! Ma et al. 2026, eqs. (1) to (5).
+//! Pressure and screw speed for a print speed: the bead's section
+//! ([`super::demand::section`]) gives the flow, the nozzle's power law the pressure, the
+//! screw's drag flow its speed. Each both ways. Ma et al. 2026, eqs. (1) to (5).
 
 use crate::core::units::{MPa, Mm3PerS, Rpm};
 
-/// A bead, a law or a quantity that cannot be.
+/// A parameter or a quantity out of range.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RheologyError {
-    /// What must be positive is not.
+    /// Not positive.
     #[error("{what} is {found}: it must be finite and above 0")]
     NotPositive {
         /// Name of the quantity, with its unit.
         what: &'static str,
-        /// What was given.
+        /// The value.
         found: f64,
     },
     /// A flow or a pressure below zero.
@@ -21,15 +20,12 @@ pub enum RheologyError {
     Negative {
         /// Name of the quantity, with its unit.
         what: &'static str,
-        /// What was given.
+        /// The value.
         found: f64,
     },
-    /// The result is beyond the numbers.
-    #[error("{what} is beyond any machine: check the units of the power law and of the request")]
-    TooLarge {
-        /// Name of the quantity, with its unit.
-        what: &'static str,
-    },
+    /// The result overflows. Name of the quantity, with its unit.
+    #[error("{0} is beyond any machine: check the units of the power law and of the request")]
+    TooLarge(&'static str),
 }
 
 /// The melt in the nozzle: mass flow = k·P^α. Ma et al. 2026, eq. (4).
@@ -41,51 +37,44 @@ pub struct PowerLaw {
 }
 
 impl PowerLaw {
-    /// Polypropylene with 28 % of glass fibres through a nozzle of 3 mm
-    /// (Ma et al. 2026, figure 5 and table 1).
+    /// Polypropylene with 28 % of glass fibres through a nozzle of 3 mm (Ma et
+    /// al. 2026, figure 5 and table 1).
     pub const PP_GF28: Self = Self { k: 26.5, exponent: 1.58, density: 1.11 };
 
     /// From the flow at 1 MPa \[g/min\], the exponent and the melt's density
     /// \[g/cm³\]; fails on what is not finite and positive.
-    pub fn new(
-        g_per_min_at_1_mpa: f64,
-        exponent: f64,
-        density_g_per_cm3: f64,
-    ) -> Result<Self, RheologyError> {
-        positive("the flow at 1 MPa [g/min]", g_per_min_at_1_mpa)?;
+    pub fn new(g_per_min: f64, exponent: f64, g_per_cm3: f64) -> Result<Self, RheologyError> {
+        positive("the flow at 1 MPa [g/min]", g_per_min)?;
         positive("the exponent of the power law", exponent)?;
-        positive("the density [g/cm³]", density_g_per_cm3)?;
-        Ok(Self { k: g_per_min_at_1_mpa, exponent, density: density_g_per_cm3 })
+        positive("the density [g/cm³]", g_per_cm3)?;
+        Ok(Self { k: g_per_min, exponent, density: g_per_cm3 })
     }
 
     /// Mass that leaves the nozzle at a pressure \[g/min\].
     pub fn mass_g_per_min(&self, pressure: MPa) -> Result<f64, RheologyError> {
         not_negative("the pressure [MPa]", pressure.get())?;
         let mass = self.k * libm::pow(pressure.get(), self.exponent);
-        if mass.is_finite() {
-            Ok(mass)
-        } else {
-            Err(RheologyError::TooLarge { what: "the mass flow [g/min]" })
-        }
+        let error = RheologyError::TooLarge("the mass flow [g/min]");
+        if mass.is_finite() { Ok(mass) } else { Err(error) }
     }
 
     /// Volume that leaves the nozzle at a pressure.
     pub fn flow(&self, pressure: MPa) -> Result<Mm3PerS, RheologyError> {
         let cm3_per_min = self.mass_g_per_min(pressure)? / self.density;
         Mm3PerS::new(cm3_per_min * MM3_PER_S)
-            .map_err(|_| RheologyError::TooLarge { what: "the flow [mm³/s]" })
+            .map_err(|_| RheologyError::TooLarge("the flow [mm³/s]"))
     }
 
-    /// Pressure that gives a flow. Ma et al. 2026, eq. (5).
+    /// Pressure for a flow. Ma et al. 2026, eq. (5).
     pub fn pressure(&self, flow: Mm3PerS) -> Result<MPa, RheologyError> {
         not_negative("the flow [mm³/s]", flow.get())?;
         let mass = flow.get() / MM3_PER_S * self.density;
         MPa::new(libm::pow(mass / self.k, 1.0 / self.exponent))
-            .map_err(|_| RheologyError::TooLarge { what: "the pressure [MPa]" })
+            .map_err(|_| RheologyError::TooLarge("the pressure [MPa]"))
     }
 }
 
-/// mm³/s in a cm³/min.
+/// mm³/s in a cm³/min. By definition 1000 mm³ over 60 s.
 const MM3_PER_S: f64 = 1000.0 / 60.0;
 
 /// A screw that carries the same volume with every turn. Ma et al. 2026, eq. (1).
@@ -95,7 +84,7 @@ pub struct DragFlow {
 }
 
 impl DragFlow {
-    /// From the volume of a turn \[mm³\], as weighing gives it.
+    /// From the volume of a turn \[mm³\], as found by weighing.
     pub fn new(mm3_per_turn: f64) -> Result<Self, RheologyError> {
         positive("the volume of a turn [mm³]", mm3_per_turn)?;
         Ok(Self { mm3_per_turn })
@@ -105,23 +94,20 @@ impl DragFlow {
     pub fn speed(&self, flow: Mm3PerS) -> Result<Rpm, RheologyError> {
         not_negative("the flow [mm³/s]", flow.get())?;
         Rpm::new(flow.get() * 60.0 / self.mm3_per_turn)
-            .map_err(|_| RheologyError::TooLarge { what: "the screw's speed [rpm]" })
+            .map_err(|_| RheologyError::TooLarge("the screw's speed [rpm]"))
     }
 
     /// Flow that a speed of the screw carries.
     pub fn flow(&self, speed: Rpm) -> Result<Mm3PerS, RheologyError> {
         not_negative("the screw's speed [rpm]", speed.get())?;
         Mm3PerS::new(speed.get() / 60.0 * self.mm3_per_turn)
-            .map_err(|_| RheologyError::TooLarge { what: "the flow [mm³/s]" })
+            .map_err(|_| RheologyError::TooLarge("the flow [mm³/s]"))
     }
 }
 
 fn positive(what: &'static str, found: f64) -> Result<(), RheologyError> {
-    if found.is_finite() && found > 0.0 {
-        Ok(())
-    } else {
-        Err(RheologyError::NotPositive { what, found })
-    }
+    let is_valid = found.is_finite() && found > 0.0;
+    if is_valid { Ok(()) } else { Err(RheologyError::NotPositive { what, found }) }
 }
 
 fn not_negative(what: &'static str, found: f64) -> Result<(), RheologyError> {
@@ -152,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_law_that_cannot_be_is_refused_with_what_was_found() {
+    fn parameters_out_of_range_are_refused() {
         assert!(PowerLaw::new(26.5, 0.0, 1.11).is_err());
         assert!(PowerLaw::new(26.5, f64::NAN, 1.11).is_err());
         assert!(PowerLaw::PP_GF28.flow(MPa::constant(-0.1)).is_err());
@@ -162,13 +148,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn there_and_back_is_where_it_began(
+        fn flow_and_pressure_are_inverse_functions(
             pressure in 1e-6..50.0_f64, k in 0.1..1e3_f64, exponent in 0.3..4.0_f64,
             turn in 1.0..1e5_f64,
         ) {
-            let law = PowerLaw::new(k, exponent, 1.11).unwrap();
-            let flow = law.flow(MPa::constant(pressure)).unwrap();
-            prop_assert!((law.pressure(flow).unwrap().get() / pressure - 1.0).abs() < 1e-9);
+            let nozzle = PowerLaw::new(k, exponent, 1.11).unwrap();
+            let flow = nozzle.flow(MPa::constant(pressure)).unwrap();
+            prop_assert!((nozzle.pressure(flow).unwrap().get() / pressure - 1.0).abs() < 1e-9);
             let screw = DragFlow::new(turn).unwrap();
             let back = screw.flow(screw.speed(flow).unwrap()).unwrap();
             prop_assert!((back.get() - flow.get()).abs() <= 1e-12 * flow.get());

@@ -1,11 +1,10 @@
-//! A screw that is filled through its feed: Diagne et al. 2015. Between feed
-//! and plug the material rides along the screw, so that what is fed now
-//! reaches the plug after a delay that depends on time and on the plug itself.
+//! Control of a screw that is filled through its feed (Diagne et al. 2015). Between feed and plug
+//! the material is conveyed along the screw, so that the feed reaches the plug after a delay that
+//! depends on time and on the plug's length.
 //!
-//! [`Screw`] is the model, [`feasible`] says whether a feed can always reach
-//! the plug, [`feedback`] what to feed at a length of the plug, [`exact`] and
-//! [`euler`] where the plug will be when the feed arrives, and [`control`] all
-//! of it together.
+//! [`Screw`] is the model, [`feasible`] checks that every feed reaches the plug, [`feedback`] is
+//! the feed for a length of the plug, [`exact`] and [`euler`] predict the plug when the feed
+//! arrives, and [`control`] combines them.
 
 pub mod control;
 pub mod design;

@@ -13,14 +13,13 @@ use crate::core::units::Mm3PerS;
 pub enum ExtruderHold {
     /// The extruder's link is down.
     LinkDown,
-    /// No report for longer than the cell allows, or none with what the law
-    /// needs.
+    /// No report for longer than the cell allows, or none with what the strategy needs.
     NoReading,
-    /// What is reported cannot be true.
+    /// A report is implausible.
     BadReading,
-    /// The valve is shut although it was told to open.
+    /// The valve is closed although it is commanded to open.
     ValveShut,
-    /// The screw does not turn as it was told.
+    /// The screw does not turn at its commanded speed.
     SpeedMismatch,
 }
 
@@ -31,17 +30,17 @@ pub enum ExtruderHold {
 pub enum ExtruderFault {
     /// Held for longer than the cell allows, for this reason.
     HeldTooLong(ExtruderHold),
-    /// A bead began, or the pump begins anew on one, and no extruder reports.
+    /// A bead began, or the pump starts again on one, and no extruder reports.
     NoAnswer,
-    /// The pump was told to run and did not.
+    /// The pump was commanded to run and did not.
     DidNotStart,
-    /// The pump was told to stop and runs on. Left when it says that it stops.
+    /// The pump was commanded to stop and runs on. Left when it reports that it stops.
     RunsOn,
     /// The pump stopped by itself, or reports a fault.
     Pump,
     /// The pressure at the nozzle rose above what the cell allows.
     Overpressure,
-    /// The screw did not turn as it was told.
+    /// The screw did not turn at its commanded speed.
     SpeedMismatch,
 }
 
@@ -50,20 +49,19 @@ pub enum ExtruderFault {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum ExtruderState {
-    /// No bead is laid; the pump is off, and the valve shut unless it lets too high
-    /// a pressure out.
+    /// No bead is laid; the pump is off, and the valve closed unless it relieves the pressure.
     #[default]
     Off,
-    /// The pump was told to run.
+    /// The pump is commanded to run.
     Starting,
-    /// The law commands.
+    /// The strategy commands.
     Running,
     /// The last command is kept.
     Holding(ExtruderHold),
-    /// The pump was told to stop before the bead ends; what still comes fills the rest.
+    /// The pump was stopped before the bead ends; the flow after the stop fills the rest.
     Ending,
-    /// The pump was told to stop. Left when the robot is idle again, unless the
-    /// fault says more.
+    /// The pump is commanded to stop. Left when the robot is idle again, unless the fault says
+    /// more.
     Fault(ExtruderFault),
 }
 
@@ -77,14 +75,14 @@ impl ExtruderState {
 /// The numbers behind a command.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ExtruderTrace {
-    /// Flow that is wanted at the nozzle.
+    /// Demanded flow at the nozzle.
     pub flow_mm3_per_s: Mm3PerS,
-    /// Flow that the law foretells there, where it does.
+    /// Predicted flow there, where the strategy has a prediction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_mm3_per_s: Option<Mm3PerS>,
-    /// Part of the wish that was known beforehand, in the command's unit.
+    /// Feedforward part of the demand, in the command's unit.
     pub feedforward: f64,
-    /// Part that answers what was measured, in the command's unit.
+    /// Feedback part, in the command's unit.
     pub feedback: f64,
     /// The limit that acted.
     pub limit: CommandLimit,

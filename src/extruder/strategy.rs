@@ -1,4 +1,4 @@
-//! The strategies of the extruder side behind one face, [`Strategy`].
+//! The strategies of the extruder side, behind one trait, [`ExtruderController`].
 
 mod interface;
 mod inverse_model;
@@ -7,32 +7,32 @@ mod playback;
 mod pressure_loop;
 mod screw_fill;
 
-pub use interface::{CommandDemand, ExtruderController, RequiredReading, UnusableReading};
+pub use interface::{BadReading, CommandDemand, ExtruderController, RequiredReading};
 pub use inverse_model::{InverseFeedforward, OperatingPoint};
 pub use nozzle_speed::{AdaptiveNozzle, NozzleModel};
 pub use playback::{ConstantCommand, Playback};
 pub use pressure_loop::{PressureChoice, PressureLoop, PressureSettings};
 pub use screw_fill::ScrewFill;
 
-/// A strategy with its memory.
+/// A strategy with its state.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ExtruderStrategy {
     /// One command for as long as bead is laid.
     Constant(ConstantCommand),
-    /// Commands that were written down beforehand, for an experiment.
+    /// Commands of a table, for an experiment.
     Profile(Playback),
     /// The inverse of a model.
     Feedforward(Box<InverseFeedforward>),
-    /// The pressure at the nozzle.
+    /// Control of the pressure at the nozzle.
     Pressure(Box<PressureLoop>),
-    /// The filled length of a screw, foretold over its delay.
+    /// Control of the filled length of a screw, predicted over its delay.
     Screw(ScrewFill),
     /// Model-reference adaptive control of the speed in the nozzle.
     Adaptive(AdaptiveNozzle),
 }
 
 impl ExtruderStrategy {
-    /// The law behind the name.
+    /// Its controller.
     pub fn controller(&self) -> &dyn ExtruderController {
         match self {
             Self::Constant(controller) => controller,
@@ -44,7 +44,7 @@ impl ExtruderStrategy {
         }
     }
 
-    /// The same, to be stepped.
+    /// The same, mutable.
     pub fn controller_mut(&mut self) -> &mut dyn ExtruderController {
         match self {
             Self::Constant(controller) => controller,

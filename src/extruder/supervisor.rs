@@ -1,16 +1,16 @@
-//! The extruder side as a whole: when the pump runs and the valve is open,
-//! when the law commands, and what happens when something is missing. Like the
-//! width controller it is told what happened, and when.
+//! The supervisor of the extruder side: when the pump runs and the valve is open, when the
+//! strategy commands, and how faults are handled. Time is an argument of each call.
 //!
 //! - off: no bead is laid.
-//! - starting: the pump was told to run; the law stands where it begins.
-//! - running: the law commands, within its limits; while the flow of a start still
-//!   comes, where the cell knows that of its extruder, the law stands.
-//! - holding: the last command is kept, for a reason; left when the reason
-//!   goes, and a fault when it stays too long.
-//! - ending: the pump was stopped early, and what still comes fills the rest of the bead.
-//! - fault: the pump is stopped; left when the robot is idle again, and where
-//!   the pump runs on all the same, not before it says that it stops.
+//! - starting: the pump is commanded to run; the strategy keeps its first command.
+//! - running: the strategy commands, within the limits. While the flow of a start rises, where
+//!   the cell knows its times, the first command is kept.
+//! - holding: the last command is kept, for a reason. Left when the reason goes; a hold that
+//!   lasts too long becomes a fault.
+//! - ending: the pump was stopped early, and the flow after the stop fills the rest of the
+//!   bead.
+//! - fault: the pump is stopped. Left when the robot is idle again; where the pump runs on
+//!   although it is commanded to stop, not before it reports that it stops.
 
 mod bead;
 mod sequencer;
@@ -32,51 +32,51 @@ use crate::core::time::{Span, Stamp};
 use crate::core::units::{MPa, Mm, Mm3PerS, MmPerS};
 use sequencer::{StartStopSequencer, TransitionRatios};
 
-/// Most by which a robot that follows the flow is quickened.
+/// Largest speed ratio of a robot that follows the flow. A larger one corrects a larger surplus
+/// of flow and lets an error of the model speed the robot up more.
 const MAX_SPEED_RATIO: f64 = 1.5;
 
-/// Everything the extruder side has to know of its cell.
+/// Everything that the extruder side has to know of its cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderSetup {
     /// What is commanded.
     pub quantity: CommandQuantity,
     /// The strategy.
     pub strategy: ExtruderStrategy,
-    /// What commands may be.
+    /// Range and fastest change of commands.
     pub limits: CommandLimits,
-    /// Time from one step of the feedforward to the next; that of the ticks.
+    /// Time between two steps of the feedforward; that of the ticks.
     pub feedforward_period: Span,
-    /// Time from one step of the control to the next.
+    /// Time between two steps of the feedback.
     pub control_period: Span,
-    /// Time from one command to the next.
+    /// Time between two commands.
     pub io_period: Span,
-    /// Longest time without a report over which the law goes on.
+    /// Longest time without a report over which the strategy goes on.
     pub max_gap: Span,
     /// Longest hold, and longest start, before the pump is stopped.
     pub max_hold: Span,
     /// Pressure at which the pump is stopped, if there is one.
     pub max_pressure: Option<MPa>,
-    /// What readings pass before the law sees them.
+    /// Filters of the readings for the strategy.
     pub filters: ReadingFilters,
-    /// What the robot's speed goes by besides the width.
+    /// What the robot's speed follows besides the width.
     pub robot_follows: RobotFollows,
-    /// How it starts and stops, if that is known.
+    /// Times of its starts and stops, if known.
     pub timing: Option<StartStopTiming>,
-    /// The job that robot and extruder were planned for together, if there is one.
+    /// The planned job of robot and extruder, if there is one.
     pub plan: Option<Arc<PlannedJob>>,
 }
 
-/// What the robot's side says at a tick.
+/// Whether bead is laid, at a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Laying {
-    /// Bead is being laid, and this flow is wanted at the nozzle.
+    /// Bead is laid, with this demanded flow at the nozzle.
     Bead(Mm3PerS),
-    /// So little bead is left that what still comes of a pump that stops fills it; until
-    /// then this flow was wanted.
+    /// The rest of the bead is filled by the flow after a stop; this was the demanded flow.
     Ending(Mm3PerS),
-    /// The robot stopped where it should lay bead, or is being stopped.
+    /// The robot stopped on a bead, or is being stopped.
     Stopped,
-    /// Nothing is being done.
+    /// No bead is laid.
     Idle,
 }
 
@@ -90,20 +90,18 @@ enum Phase {
     Fault(ExtruderFault),
 }
 
-/// How a pump answers to being told to rest.
+/// Whether a pump complies with a command to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum StopCompliance {
-    /// It rests, or was not told to.
+    /// It stands, or is not commanded to.
     Complies,
-    /// It says that it runs all the same.
-    RunsOn { since: Stamp },
-    /// It has said so for longer than the cell is patient.
-    TimedOut { since: Stamp },
+    /// It reports that it runs, or has done so for longer than the longest hold.
+    RunsOn { since: Stamp, timed_out: bool },
 }
 
 impl StopCompliance {
     const fn has_timed_out(self) -> bool {
-        matches!(self, Self::TimedOut { .. })
+        matches!(self, Self::RunsOn { timed_out: true, .. })
     }
 }
 
@@ -113,7 +111,7 @@ pub struct Supervisor {
     setup: ExtruderSetup,
     phase: Phase,
     link_up: bool,
-    /// The last one, as the law sees it.
+    /// The last report, filtered.
     report: Option<(Stamp, ExtruderReport)>,
     readings: Readings,
     readback: SpeedMonitor,
@@ -126,24 +124,24 @@ pub struct Supervisor {
     bead_start: Stamp,
     /// When the last report came, on whatever connection.
     last_report_at: Option<Stamp>,
-    /// Whether the pump rests when it is told to. Beside the phase, so that what
-    /// stopped the pump first is not forgotten.
+    /// Whether the pump complies with a stop. Independent of the phase, which keeps the first
+    /// fault.
     stop_compliance: StopCompliance,
-    /// Whether the last report can be true.
+    /// Whether the last report is plausible.
     report_usable: bool,
-    /// Whether the valve stays open to let too high a pressure out.
+    /// Whether the valve stays open to relieve a pressure that is too high.
     relieving: bool,
     /// The last command that went out.
     last_command: Option<ExtruderCommand>,
-    /// Starts and stops, where the cell knows them.
+    /// Starts and stops, where the cell has their times.
     start_stop: Option<StartStopSequencer>,
-    /// What they make of the last tick.
+    /// The ratios of a start or a stop at the last tick.
     ratios: Option<TransitionRatios>,
     trace: ExtruderTrace,
 }
 
 impl Supervisor {
-    /// An extruder side that has heard nothing yet.
+    /// Before the first report.
     pub fn new(setup: ExtruderSetup) -> Self {
         Self {
             io: Rate::every(setup.io_period),
@@ -169,7 +167,7 @@ impl Supervisor {
         }
     }
 
-    /// The state in words for outside.
+    /// The state as it is reported.
     pub const fn state(&self) -> ExtruderState {
         match self.phase {
             _ if self.stop_compliance.has_timed_out() => {
@@ -189,54 +187,51 @@ impl Supervisor {
         self.trace
     }
 
-    /// Share of its speed at which the robot is to move: in a start and in a stop
-    /// that which belongs to it, else for a robot that follows the flow the
-    /// flow that is foretold over the one that is wanted; 1 where the robot
-    /// does not follow, or nothing is known of the flow.
+    /// Speed ratio of the robot: in a start and in a stop the one that belongs to it; else,
+    /// for a robot that follows the flow, predicted over demanded flow; 1 where the robot does
+    /// not follow, or there is no prediction.
     pub fn robot_speed_ratio(&self) -> f64 {
-        self.ratios.map_or_else(|| self.predicted_speed_ratio(), |shares| shares.robot)
+        self.ratios.map_or_else(|| self.predicted_speed_ratio(), |ratios| ratios.robot)
     }
 
-    /// The flow at the nozzle over the one that is wanted, by which the bead that is
-    /// laid is wider than the speed alone tells; 1 where nothing is known of it.
+    /// Flow at the nozzle over the demanded flow: the bead is as wide as one laid at the speed
+    /// divided by it. 1 where there is no prediction.
     pub fn flow_ratio(&self) -> f64 {
-        self.ratios.map_or_else(|| self.predicted_flow_ratio().unwrap_or(1.0), |shares| shares.flow)
+        self.ratios.map_or_else(|| self.predicted_flow_ratio().unwrap_or(1.0), |ratios| ratios.flow)
     }
 
-    /// Whether a start or a stop is on its way, by which the robot goes.
+    /// Whether a start or a stop is in progress, which the robot follows.
     pub const fn is_in_transition(&self) -> bool {
         self.ratios.is_some()
     }
 
-    /// How far from the end of a bead that is laid at this speed the pump is to stop;
-    /// none where nothing is known of stops.
+    /// Distance from the end of a bead at this speed at which the pump stops; none where the
+    /// times of stops are not known.
     pub fn stop_distance(&self, speed: MmPerS) -> Option<Mm> {
-        self.start_stop.as_ref().map(|pauses| pauses.stop_distance(speed))
+        self.start_stop.as_ref().map(|sequencer| sequencer.stop_distance(speed))
     }
 
-    /// The command that was planned for where the nozzle is now, which the law gives once
-    /// the flow has come; none without a plan.
+    /// Sets the planned command at the nozzle's position, which the strategy gives once the
+    /// flow is established; none without a plan.
     pub fn plan(&mut self, command: Option<f64>) {
         self.setup.strategy.controller_mut().plan(command);
     }
 
     fn predicted_speed_ratio(&self) -> f64 {
-        match self.setup.robot_follows {
-            RobotFollows::Flow => self.predicted_flow_ratio().unwrap_or(1.0),
-            RobotFollows::Nothing => 1.0,
-        }
+        let follows = self.setup.robot_follows == RobotFollows::Flow;
+        self.predicted_flow_ratio().filter(|_| follows).unwrap_or(1.0)
     }
 
-    /// The flow that is foretold over the one that is wanted, where one is and no plan has
-    /// foreseen how robot and flow go together.
+    /// Predicted over demanded flow; none without a demand and where a plan is followed, which
+    /// has matched robot and flow already.
     fn predicted_flow_ratio(&self) -> Option<f64> {
-        let wanted = self.trace.flow_mm3_per_s;
-        if self.setup.strategy.controller().is_on_plan() || wanted <= Mm3PerS::ZERO {
+        let demanded = self.trace.flow_mm3_per_s;
+        if self.setup.strategy.controller().is_on_plan() || demanded <= Mm3PerS::ZERO {
             return None;
         }
         self.trace
             .predicted_mm3_per_s
-            .map(|predicted| (predicted / wanted).clamp(0.0, MAX_SPEED_RATIO))
+            .map(|predicted| (predicted / demanded).clamp(0.0, MAX_SPEED_RATIO))
     }
 
     /// The link to the extruder came up.
@@ -254,8 +249,8 @@ impl Supervisor {
         self.hold(now, ExtruderHold::LinkDown);
     }
 
-    /// It is time for a step of the feedforward. Gives a command when one is
-    /// due, and at once when the pump is to stop.
+    /// A step of the feedforward is due. Returns a command when one is due, and at once when
+    /// the pump has to stop.
     pub fn tick(&mut self, now: Stamp, laying: Laying) -> Option<ExtruderCommand> {
         let dt = self.last_tick.replace(now).map_or(Span::ZERO, |last| now - last);
         match laying {
@@ -268,18 +263,18 @@ impl Supervisor {
         let command = self.command();
         let ran = self.last_command.is_some_and(|last| last.pump_on);
         let stops = ran && !command.pump_on;
-        // Nothing is sent on a connection before it is known what the pump does.
+        // Nothing is sent on a connection before its first report.
         if !(self.io.due(now) || stops) || !self.link_up || self.report.is_none() {
             return None;
         }
-        if let Some(pauses) = self.start_stop.as_mut().filter(|_| ran != command.pump_on) {
-            pauses.pump_switched(now, command.pump_on);
+        if let Some(sequencer) = self.start_stop.as_mut().filter(|_| ran != command.pump_on) {
+            sequencer.pump_switched(now, command.pump_on);
         }
         self.last_command = Some(command);
         self.last_command
     }
 
-    /// The run is being ended: the pump stops now.
+    /// The run ends: the pump stops now.
     pub fn stop(&mut self) -> Option<ExtruderCommand> {
         self.rest();
         if !self.link_up {
@@ -292,8 +287,8 @@ impl Supervisor {
     fn command(&self) -> ExtruderCommand {
         let on = !matches!(self.phase, Phase::Off | Phase::Ending | Phase::Fault(_));
         let value = if on { self.applied } else { self.setup.limits.idle() };
-        // A valve that shuts on too high a pressure keeps it in, and one that shuts before
-        // the end of a bead what was to fill it.
+        // A closed valve would keep in a pressure that is too high, or the flow that fills
+        // the end of a bead.
         let open = on || self.relieving || self.phase == Phase::Ending;
         ExtruderCommand { pump_on: on, valve_open: open, value }
     }
@@ -314,8 +309,8 @@ impl Supervisor {
         self.note(demand, limit);
     }
 
-    /// Lets the law answer the last report where that is due, and says whether
-    /// the report can be true.
+    /// Steps the feedback with the last report where that is due; returns whether the report
+    /// is plausible.
     fn answer(&mut self, now: Stamp) -> Option<bool> {
         let (_, report) = self.report?;
         if !self.control.due(now) {

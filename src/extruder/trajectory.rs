@@ -1,9 +1,9 @@
-//! A plan as a cell plays it: speed and command over the path, from `plan.csv`.
+//! A planned job: speed and command over the path, from `plan.csv`.
 
 mod job;
 mod table;
 #[cfg(test)]
 mod tests;
 
-pub use job::{PlannedJob, PlannedPoint, PlannedTrajectory, Range};
+pub use job::{PlannedJob, PlannedPoint, PlannedTrajectory};
 pub use table::{PlanTableError, read};

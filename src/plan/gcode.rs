@@ -1,10 +1,9 @@
-//! Path and speed limits from G-code: G0 to G3 in the plane XY with Z, absolute or
-//! relative, in millimetres or inches, feeds a minute. A rapid move (G0) lays nothing and
-//! ends one bead and begins the next.
+//! Path and speed limits from G-code: G0 to G3 in the plane XY with Z, absolute or relative, in
+//! millimetres or inches, feed per minute. A rapid move (G0) lays no bead: it ends one and begins the
+//! next.
 //!
-//! The dialect is small and the words are a letter and a number, so that they are read
-//! here, with lines in the errors; what is not understood and could move the robot is
-//! refused.
+//! The dialect is small, so it is parsed here, with line numbers in the errors. Codes that are not
+//! supported and could move the robot are refused.
 
 mod arc;
 mod error;
@@ -18,52 +17,51 @@ use super::profile::{SpeedProfile, SpeedProfileError};
 use arc::Move;
 use state::{LineMotion, ModalState};
 
-/// Length of the straight lines that a curve's positions are given by, at most \[mm\].
+/// Largest length of the chords of an arc \[mm\]; on an arc of 5 mm radius a chord is off by 25 µm.
 const MAX_CHORD_MM: f64 = 1.0;
-/// A turn whose cosine differs from 1 by less is none.
+/// Turns whose cosine is nearer to 1 are no corner: 1 − cos φ = 10⁻⁶ at φ = 0.08°.
 const MIN_TURN: f64 = 1e-6;
 
-/// How beads begin and end.
+/// Speed at the ends of beads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BeadEnds {
     /// At rest.
     Rest,
-    /// At the speed of their first and their last move, where something else starts and
-    /// stops them.
+    /// That of their first and last move, where the cell starts and stops them.
     Moving,
 }
 
-/// What the path's speed limits are made with.
+/// Settings of the speed limits along the path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GcodeSettings {
-    /// Where the nozzle is before the first line \[mm\].
+    /// Position of the nozzle before the first line \[mm\].
     pub start_mm: [f64; 3],
-    /// Largest speed, whatever a feed says \[mm/s\].
+    /// Largest speed, for any feed \[mm/s\].
     pub fastest_mm_per_s: f64,
     /// Acceleration, along the path and across it \[mm/s²\].
     pub accel_mm_per_s2: f64,
-    /// How far the nozzle may be thought to round a corner \[mm\]: the speed there is that
-    /// of the arc which touches both sides at this distance from the corner.
+    /// Junction deviation \[mm\]: the speed at a corner is that of the arc which is tangent to both
+    /// sides and passes the corner at this distance.
     pub corner_mm: f64,
-    /// Speed to which no corner is slowed further \[mm/s\].
+    /// Smallest speed at a corner \[mm/s\].
     pub apex_mm_per_s: f64,
-    /// How beads begin and end.
+    /// Speed at the ends of beads.
     pub ends: BeadEnds,
 }
 
-/// A bead: what is laid from one rapid move, or the start, to the next.
+/// A bead: the moves from one rapid move, or the start, to the next.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GcodeBead {
     /// Line of its first move.
     pub line: usize,
-    /// How fast its path may be passed; the path begins at 0 mm.
+    /// Speed limits along its path, which begins at 0 mm.
     pub limits: PathLimits,
     /// Path and position \[mm\].
     pub position: Vec<(f64, [f64; 3])>,
 }
 
 impl GcodeBead {
-    /// The quickest speed within the limits and an acceleration \[mm/s²\].
+    /// The time-optimal profile within the limits and an acceleration \[mm/s²\].
     pub fn nominal(&self, accel: f64) -> Result<SpeedProfile, SpeedProfileError> {
         time_optimal(&self.limits, accel)
     }
@@ -101,10 +99,10 @@ struct LaidMove {
     feed: f64,
 }
 
-/// The bead of some moves; `None` of none.
+/// The bead of moves; `None` without a move.
 fn bead_of(moves: &[LaidMove], settings: &GcodeSettings) -> Option<GcodeBead> {
     let LaidMove { line, moved: first, .. } = moves.first()?;
-    // A node is no faster than the pieces beside it.
+    // Nodes are limited by the pieces next to them.
     let end = match settings.ends {
         BeadEnds::Rest => 0.0,
         BeadEnds::Moving => settings.fastest_mm_per_s,
@@ -126,7 +124,7 @@ fn bead_of(moves: &[LaidMove], settings: &GcodeSettings) -> Option<GcodeBead> {
     Some(GcodeBead { line: *line, limits, position })
 }
 
-/// Shares of a move at which its positions are given.
+/// Fractions of a move at which its positions are given.
 fn chord_fractions(moved: &Move) -> impl Iterator<Item = f64> + use<> {
     let count =
         if moved.radius_mm().is_finite() { (moved.length_mm() / MAX_CHORD_MM).ceil() } else { 1.0 };
@@ -135,9 +133,9 @@ fn chord_fractions(moved: &Move) -> impl Iterator<Item = f64> + use<> {
     (1..=pieces).map(move |piece| f64::from(piece) / f64::from(pieces))
 }
 
-/// Largest speed at the corner between two moves \[mm/s\]: v² = a·δ·c/(1 − c), with c the
-/// cosine of half the turn. The arc that touches both sides and passes the corner at the
-/// distance δ has that radius, and its speed the acceleration across.
+/// Largest speed at the corner between two moves \[mm/s\]: v² = a·δ·c/(1 − c), with c the cosine of
+/// half the turn: the radius of the arc that is tangent to both sides and passes the corner at the
+/// distance δ, with the acceleration as centripetal.
 fn junction_speed(before: &Move, after: &Move, settings: &GcodeSettings) -> f64 {
     let (from, to) = (before.direction(1.0), after.direction(0.0));
     let cosine: f64 = from.iter().zip(to).map(|(a, b)| a * b).sum();
@@ -194,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn an_arc_is_as_long_as_it_is_and_as_slow_as_it_bends() {
+    fn an_arc_has_its_length_and_the_speed_of_its_radius() {
         // Half a circle to the left, r = 1 mm: π mm, v² = a·r.
         let all = read("G3 X0 Y2 I0 J1 F6000\n", &SETTINGS).unwrap();
         let profile = all[0].nominal(2000.0).unwrap();
@@ -203,7 +201,7 @@ mod tests {
         assert!((profile.speed_at(profile.end_mm() / 2.0) - top).abs() < 1e-9);
         let middle = all[0].position[2].1;
         assert!(distance(middle, [1.0, 1.0, 0.0]) < 1e-9, "{middle:?}");
-        // By its radius it is the same; the other way round it turns to the other side.
+        // The same by its radius; clockwise it turns to the other side.
         let radius = read("G3 X0 Y2 R1 F6000\n", &SETTINGS).unwrap();
         assert!((radius[0].limits.end_mm() - all[0].limits.end_mm()).abs() < 1e-6);
         let right = read("G2 X0 Y2 I0 J1 F6000\n", &SETTINGS).unwrap();
@@ -211,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_goes_straight_on_is_no_corner_and_a_rapid_move_ends_the_bead() {
+    fn a_straight_continuation_is_no_corner_and_a_rapid_move_ends_the_bead() {
         let text = "G1 X10 F6000\nX20\nG0 X30\nG1 X40\nM30\nG1 X500\n";
         let all = read(text, &SETTINGS).unwrap();
         assert_eq!(all.len(), 2);
@@ -221,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bead_that_something_else_starts_and_stops_begins_and_ends_at_its_feed() {
+    fn a_bead_with_moving_ends_begins_and_ends_at_its_feed() {
         let text = "G1 X200 F6000\nY200\nY300 F3000\nG0 X0\nG1 X50\n";
         let all = read(text, &GcodeSettings { ends: BeadEnds::Moving, ..SETTINGS }).unwrap();
         let speeds = |at: usize, path_mm: f64| all[at].nominal(2000.0).unwrap().speed_at(path_mm);
@@ -232,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_understood_is_refused_with_its_line() {
+    fn unsupported_codes_are_refused_with_their_line() {
         let word = |text: &str| read(text, &SETTINGS).unwrap_err().to_string();
         for (text, parts) in [
             ("G1 F600 X1\nG1 X2 Y=3", ["line 2", "Y="]),

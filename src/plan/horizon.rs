@@ -1,36 +1,36 @@
-//! One stretch of path that is planned at once: what a choice of speeds and commands comes
-//! to, and how that changes with each of them.
+//! A horizon: a segment of path that is planned at once. Its cost for speeds and commands, with
+//! gradient and Gauss–Newton Hessian.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::flow::{FlowModel, FlowTrajectory, KnotResponses, float, whole};
-use super::profile::{ProfileNode, SpeedProfile};
+use super::flow::{FlowModel, FlowTrajectory, KnotResponses, whole};
+use super::profile::SpeedProfile;
 use super::quadratic::Quadratic;
 use super::segment::PathSegment;
 use super::task::{BeadGeometry, FlowUncertainty};
 use super::time_gradient::PassingTimes;
+use crate::numeric::number::to_f64;
 
-/// Time between two looks at the flow, for its standard deviation \[s\].
+/// Time between two samples of the flow, for its variance \[s\].
 const FLOW_SAMPLE_S: f64 = 0.02;
-/// What a second more costs, against the squared error of the width along the path
-/// \[mm/s\]: next to nothing, so that no time is spent for nothing.
+/// Weight of time against the squared relative error of the width along the path \[mm/s\]: small, only
+/// so that no time is added without a benefit.
 const TIME_WEIGHT: f64 = 1e-3;
-/// What the squared change from one knot to the next costs, in squares of the drive's
-/// range \[mm\]: as little, so that the command does not swing for nothing.
+/// Weight of the squared change from one knot to the next, relative to the drive's range \[mm\]: small,
+/// only so that the command does not oscillate without a benefit.
 const ROUGH_WEIGHT: f64 = 1e-3;
 
-/// A piece of bead whose mean width counts.
+/// A window of bead whose mean width counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WidthWindow {
     /// Its middle \[mm\].
     pub at_mm: f64,
     /// Its length \[mm\].
     pub length_mm: f64,
-    /// What its squared error counts \[mm\].
+    /// Weight of its squared error \[mm\].
     pub weight: f64,
-    /// Whether the noise that a change of the flow brings is weighed here: near to what
-    /// the change is made for. Further away it would be weighed the more the longer the
-    /// horizon is.
+    /// Whether noise by a change of the flow is weighted here: near a quick change. Elsewhere its
+    /// weight would grow with the length of the horizon.
     pub near: bool,
 }
 
@@ -49,12 +49,12 @@ pub struct Iterate {
     pub knots: Vec<f64>,
 }
 
-/// A stretch of path and where it is judged.
+/// A segment of path with its windows.
 #[derive(Debug, Clone)]
 pub struct Horizon<'a> {
-    /// The bead that is wanted.
+    /// The target bead.
     pub bead: BeadGeometry,
-    /// The flow that no model tells.
+    /// The unmodelled flow.
     pub unmodelled: FlowUncertainty,
     /// Width of the drive's range.
     pub drive_span: f64,
@@ -62,51 +62,50 @@ pub struct Horizon<'a> {
     pub path: Vec<f64>,
     /// When the first node is passed \[s\].
     pub from_s: f64,
-    /// Stretches over which the variance of the flow's change is taken, whose mean counts
-    /// \[mm\].
+    /// Segments over which the variance of the flow is taken, whose mean counts \[mm\].
     pub change_segments: [PathSegment; 2],
-    /// Where the width is judged.
+    /// Windows of the width.
     pub windows: Vec<WidthWindow>,
-    /// What the command acts on.
+    /// The extruder.
     pub extruder: &'a FlowModel,
-    /// What each knot does.
+    /// Responses to each knot.
     pub knot_responses: &'a KnotResponses,
 }
 
-/// What a choice comes to.
+/// The evaluation of an iterate.
 #[derive(Debug, Clone)]
 pub struct Evaluation {
     /// The speed; times from the first node.
     pub profile: SpeedProfile,
     /// The flow.
     pub flow: FlowTrajectory,
-    /// Share by which the width of each window is off.
+    /// Relative error of the width of each window.
     errors: Vec<f64>,
     /// Its variance for a unit of the flow's variance \[(mm³/s)⁻²\].
     volume_variance: Vec<f64>,
     /// Variance of the flow's change \[(mm³/s)²\].
     change: f64,
-    /// What is to be least.
+    /// The cost.
     pub cost: f64,
 }
 
 impl Horizon<'_> {
-    /// What a choice comes to; `None` where the speeds are none.
+    /// Evaluates an iterate; `None` where its speeds are not valid.
     pub fn evaluate(&self, iterate: &Iterate) -> Option<Evaluation> {
         let profile = self.profile(&iterate.squares)?;
-        let course = self.extruder.predict(&iterate.knots);
+        let flow = self.extruder.predict(&iterate.knots);
         let mut errors = Vec::with_capacity(self.windows.len());
         let mut spread = Vec::with_capacity(self.windows.len());
         for window in &self.windows {
             let [from, to] = self.times(&profile, window);
             let full = self.volume(window);
-            errors.push((course.volume_at(to) - course.volume_at(from)) / full - 1.0);
+            errors.push((flow.volume_at(to) - flow.volume_at(from)) / full - 1.0);
             let noise = if window.near { self.unmodelled.volume_variance(to - from) } else { 0.0 };
             spread.push(noise / full.powi(2));
         }
-        let change = self.change_segments.iter().map(|stretch| {
-            let looks = self.flow_samples(&profile, *stretch).map(|at| course.flow_at(at));
-            DVector::from_vec(looks.collect()).variance() / float(self.change_segments.len())
+        let change = self.change_segments.iter().map(|segment| {
+            let samples = self.flow_samples(&profile, *segment).map(|at| flow.flow_at(at));
+            DVector::from_vec(samples.collect()).variance() / to_f64(self.change_segments.len())
         });
         let change = change.sum();
         let noise = self.unmodelled.ratio.powi(2) * change;
@@ -114,18 +113,15 @@ impl Horizon<'_> {
         let squares: f64 = windows.map(|((w, e), c)| w.weight * (e * e + noise * c)).sum();
         let rough: f64 = self.increments(iterate).map(|rise| rise * rise).sum();
         let cost = squares + TIME_WEIGHT * profile.duration_s() + self.rough_weight() * rough;
-        Some(Evaluation { profile, flow: course, errors, volume_variance: spread, change, cost })
+        Some(Evaluation { profile, flow, errors, volume_variance: spread, change, cost })
     }
 
-    /// The speed with some squares at the nodes.
+    /// The profile with squares of the speed at the nodes.
     pub fn profile(&self, squares: &[f64]) -> Option<SpeedProfile> {
-        let node =
-            |(path_mm, square): (&f64, &f64)| ProfileNode { path_mm: *path_mm, square: *square };
-        let nodes: Vec<_> = self.path.iter().zip(squares).map(node).collect();
-        SpeedProfile::of_squares(&nodes).ok()
+        SpeedProfile::of_squares(self.path.clone(), squares.to_vec()).ok()
     }
 
-    /// From each knot of a command to the next, the first from the command before.
+    /// Change of the command to each knot, the first from the decided command.
     fn increments(&self, iterate: &Iterate) -> impl Iterator<Item = f64> {
         let before = std::iter::once(self.extruder.command()).chain(iterate.knots.iter().copied());
         iterate.knots.iter().zip(before).map(|(knot, before)| knot - before)
@@ -135,37 +131,37 @@ impl Horizon<'_> {
         ROUGH_WEIGHT / self.drive_span.powi(2)
     }
 
-    /// When a window's ends are passed \[s\].
+    /// Times at which a window's ends are passed \[s\].
     fn times(&self, profile: &SpeedProfile, window: &WidthWindow) -> [f64; 2] {
         window.ends().map(|at| self.from_s + profile.time_at(at))
     }
 
-    /// Volume that a window should hold \[mm³\].
+    /// Target volume of a window \[mm³\].
     fn volume(&self, window: &WidthWindow) -> f64 {
         self.bead.area_mm2 * window.length_mm
     }
 
-    /// Moments at which the flow's change is taken \[s\].
+    /// Sample times of the flow \[s\].
     fn flow_samples(
         &self,
         profile: &SpeedProfile,
-        stretch: PathSegment,
+        segment: PathSegment,
     ) -> impl Iterator<Item = f64> + use<> {
-        let (from, to) = (profile.time_at(stretch.from_mm), profile.time_at(stretch.to_mm));
+        let (from, to) = (profile.time_at(segment.from_mm), profile.time_at(segment.to_mm));
         let start = self.from_s + from;
         (0..=whole((to - from) / FLOW_SAMPLE_S))
-            .map(move |sample| start + FLOW_SAMPLE_S * float(sample))
+            .map(move |sample| start + FLOW_SAMPLE_S * to_f64(sample))
     }
 
-    /// The quadratic model of the cost about an outcome, with Gauss's and Newton's Hessian,
-    /// for the squares of the speed and then the knots.
+    /// The quadratic model of the cost about an iterate, with the Gauss–Newton Hessian, for the squares
+    /// of the speed and then the knots.
     pub fn model(&self, iterate: &Iterate, at: &Evaluation) -> Quadratic {
         let nodes = self.path.len();
         let size = nodes + iterate.knots.len();
         let (jacobian, gradient) = self.linear(iterate, at);
         let mut model = Quadratic { hessian: &jacobian * jacobian.transpose() * 2.0, gradient };
-        for stretch in self.change_segments {
-            self.add_noise(at, stretch, &mut model);
+        for segment in self.change_segments {
+            self.add_noise(at, segment, &mut model);
         }
         let Quadratic { hessian, gradient } = &mut model;
         let weight = 2.0 * self.rough_weight();
@@ -182,8 +178,8 @@ impl Horizon<'_> {
         model
     }
 
-    /// Slopes of the weighted errors, a column a window, and the gradient of their squares,
-    /// of the time, and of the noise through the time that a window takes.
+    /// Jacobian of the weighted errors, a column per window, and the gradient of their squares, of the
+    /// time, and of the noise through the duration of a window.
     fn linear(&self, iterate: &Iterate, at: &Evaluation) -> (DMatrix<f64>, DVector<f64>) {
         let nodes = self.path.len();
         let size = nodes + iterate.knots.len();
@@ -218,19 +214,16 @@ impl Horizon<'_> {
         (jacobian, gradient)
     }
 
-    /// Adds the noise's cost through the variance of the flow, which is quadratic in the
-    /// knots.
-    fn add_noise(&self, at: &Evaluation, stretch: PathSegment, model: &mut Quadratic) {
+    /// Adds the cost of noise through the variance of the flow, which is quadratic in the knots.
+    fn add_noise(&self, at: &Evaluation, segment: PathSegment, model: &mut Quadratic) {
         let Quadratic { hessian, gradient } = model;
         let nodes = self.path.len();
         let knots = gradient.len() - nodes;
-        let looks: Vec<f64> = self.flow_samples(&at.profile, stretch).collect();
-        let mut flows = DVector::from_iterator(
-            looks.len(),
-            looks.iter().map(|sample| at.flow.flow_at(*sample)),
-        );
-        let mut slopes = DMatrix::zeros(knots, looks.len());
-        for (mut column, sample) in slopes.column_iter_mut().zip(&looks) {
+        let samples: Vec<f64> = self.flow_samples(&at.profile, segment).collect();
+        let flows = samples.iter().map(|sample| at.flow.flow_at(*sample));
+        let mut flows = DVector::from_iterator(samples.len(), flows);
+        let mut slopes = DMatrix::zeros(knots, samples.len());
+        for (mut column, sample) in slopes.column_iter_mut().zip(&samples) {
             let effects = self.knot_responses.at(sample - self.extruder.now_s(), knots);
             for (slope, (flow, _)) in column.iter_mut().zip(effects) {
                 *slope = flow;
@@ -243,7 +236,7 @@ impl Horizon<'_> {
         let windows = self.windows.iter().zip(&at.volume_variance);
         let spread: f64 = windows.map(|(window, spread)| window.weight * spread).sum();
         let factor = 2.0 * self.unmodelled.ratio.powi(2) * spread
-            / float(looks.len() * self.change_segments.len());
+            / to_f64(samples.len() * self.change_segments.len());
         let mut corner = hessian.view_mut((nodes, nodes), (knots, knots));
         corner += &slopes * slopes.transpose() * factor;
         let mut tail = gradient.rows_mut(nodes, knots);

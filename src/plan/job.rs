@@ -1,10 +1,12 @@
-//! The planned profile of a job from a table: path length, position and nominal speed.
+//! The path of a job from a table: path length, position and nominal speed.
+
+use csv::StringRecord;
 
 use super::position::{Position, distance};
 use super::profile::{SpeedPoint, SpeedProfile, SpeedProfileError};
 use crate::document::csv::{LineProblem, describe};
 
-/// Columns that are read; others are left alone.
+/// Columns that are read; others are ignored.
 const PATH: &str = "path_mm";
 const SPEED: &str = "speed_mm_per_s";
 const POSITION: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
@@ -14,77 +16,59 @@ const POSITION: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
 pub struct PathJob {
     /// Nominal speed over path.
     pub speed: SpeedProfile,
-    /// Where the nozzle is at each point of the path, in order: path and position \[mm\].
-    /// Between two points it goes straight.
+    /// Path and position of the nozzle \[mm\], in order; linear in between.
     pub position: Vec<(f64, [f64; 3])>,
 }
 
-/// A table that is no job. Lines are counted from 1, the heading included.
+/// Errors of a job table. Lines are counted from 1, the heading included.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum JobError {
     /// A column is missing.
-    #[error("the heading has no column {column}: a job has {PATH}, x_mm, y_mm, z_mm and {SPEED}")]
-    Column {
-        /// Which one.
-        column: &'static str,
-    },
-    /// A row that is not as long as the heading, or no text.
+    #[error("the heading has no column {0}: a job has {PATH}, x_mm, y_mm, z_mm and {SPEED}")]
+    Column(&'static str),
+    /// A row that is not as long as the heading, or not text.
     #[error("line {line}: {what}")]
     Row {
-        /// Where.
+        /// Line.
         line: u64,
-        /// What is wrong with it.
+        /// What is wrong.
         what: String,
     },
-    /// A field that is no number.
+    /// A field that is not a number.
     #[error("line {line}: {column} is \"{found}\"; a number is expected")]
     Number {
-        /// Where.
+        /// Line.
         line: u64,
-        /// Which column.
+        /// Column.
         column: &'static str,
-        /// What was found.
+        /// The field.
         found: String,
     },
-    /// Path that is shorter than the way between two positions.
+    /// Path that is shorter than the distance of two positions.
     #[error(
         "line {line}: {path_mm} mm of path for {way_mm:.3} mm of way since the line before; \
          path length is counted along the way"
     )]
     Way {
-        /// Where.
+        /// Line.
         line: u64,
         /// Path since the line before \[mm\].
         path_mm: f64,
-        /// Way between the positions \[mm\].
+        /// Distance of the positions \[mm\].
         way_mm: f64,
     },
-    /// The speeds make no profile; points are the rows below the heading.
+    /// The speeds give no profile; points are the rows below the heading.
     #[error("{}the speeds: {error}", line.map_or(String::new(), |line| format!("line {line}: ")))]
     Profile {
-        /// The line of the point that is wrong, if one is.
+        /// The line of the wrong point, if there is one.
         line: Option<u64>,
-        /// What is wrong with it.
+        /// What is wrong.
         error: SpeedProfileError,
     },
 }
 
-/// A way may be longer than its path by rounding: this share of it and this much \[mm\].
+/// Tolerance of a distance that exceeds its path by rounding: relative and absolute \[mm\].
 const PATH_TOLERANCE: (f64, f64) = (1e-3, 0.01);
-
-/// A column of the table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Column {
-    name: &'static str,
-    at: usize,
-}
-
-/// Where the nozzle is after some path.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Waypoint {
-    path_mm: f64,
-    position: Position,
-}
 
 /// Reads a job from the text of a table with a heading.
 pub fn read(text: &str) -> Result<PathJob, JobError> {
@@ -92,28 +76,24 @@ pub fn read(text: &str) -> Result<PathJob, JobError> {
     let heading = reader.headers().map_err(|error| of_row(&error))?.clone();
     let column = |name: &'static str| {
         let at = heading.iter().position(|found| found == name);
-        Ok(Column { name, at: at.ok_or(JobError::Column { column: name })? })
+        at.map(|at| (name, at)).ok_or(JobError::Column(name))
     };
     let (path, speed) = (column(PATH)?, column(SPEED)?);
     let [x, y, z] = POSITION.map(column);
     let axes = [x?, y?, z?];
     let (mut points, mut position, mut lines) = (Vec::new(), Vec::new(), Vec::new());
-    let mut before: Option<Waypoint> = None;
     for record in reader.records() {
         let record = record.map_err(|error| of_row(&error))?;
         let line = record.position().map_or(0, csv::Position::line);
-        let number = |column: Column| number(&record, line, column);
-        let here = Waypoint {
-            path_mm: number(path)?,
-            position: [number(axes[0])?, number(axes[1])?, number(axes[2])?],
-        };
-        if let Some(before) = before {
-            check_way(line, before, here)?;
+        let number = |(column, at)| number(&record, line, column, at);
+        let path_mm = number(path)?;
+        let here = (path_mm, [number(axes[0])?, number(axes[1])?, number(axes[2])?]);
+        if let Some(before) = position.last() {
+            check_distance(line, *before, here)?;
         }
         lines.push(line);
-        points.push(SpeedPoint { path_mm: here.path_mm, speed_mm_per_s: number(speed)? });
-        position.push((here.path_mm, here.position));
-        before = Some(here);
+        points.push(SpeedPoint { path_mm, speed_mm_per_s: number(speed)? });
+        position.push(here);
     }
     let speed = SpeedProfile::new(&points).map_err(|error| {
         let at = error.point().and_then(|point| point.checked_sub(1));
@@ -122,17 +102,16 @@ pub fn read(text: &str) -> Result<PathJob, JobError> {
     Ok(PathJob { speed, position })
 }
 
-fn number(record: &csv::StringRecord, line: u64, column: Column) -> Result<f64, JobError> {
-    let Column { name: column, at } = column;
-    let found = record.get(at).unwrap_or_default();
+fn number(row: &StringRecord, line: u64, column: &'static str, at: usize) -> Result<f64, JobError> {
+    let found = row.get(at).unwrap_or_default();
     let value = found.parse().ok().filter(|value: &f64| value.is_finite());
     value.ok_or_else(|| JobError::Number { line, column, found: found.to_owned() })
 }
 
-fn check_way(line: u64, before: Waypoint, here: Waypoint) -> Result<(), JobError> {
-    let way_mm = distance(before.position, here.position);
-    let path_mm = here.path_mm - before.path_mm;
-    // A path that does not grow is for the profile to say.
+fn check_distance(line: u64, from: (f64, Position), to: (f64, Position)) -> Result<(), JobError> {
+    let way_mm = distance(from.1, to.1);
+    let path_mm = to.0 - from.0;
+    // A path that does not grow is an error of the profile.
     if path_mm > 0.0 && way_mm > path_mm * (1.0 + PATH_TOLERANCE.0) + PATH_TOLERANCE.1 {
         return Err(JobError::Way { line, path_mm, way_mm });
     }
@@ -165,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_line() {
+    fn errors_name_their_line() {
         let word = |from: &str, to: &str| read(&TABLE.replace(from, to)).unwrap_err().to_string();
         assert!(word("z_mm", "height").contains("no column z_mm"));
         let words = word("50, 50, 0, 5, 2,", "50, 50, 0, 5, slow,");

@@ -1,9 +1,8 @@
-//! Limits of the speed along a path, and the quickest way to keep them.
+//! Limits of the speed along a path, and the time-optimal profile within them.
 
 use super::profile::{ProfileNode, SpeedProfile, SpeedProfileError};
 
-/// How fast a path may be passed: a limit for each node and one for each piece between
-/// two of them.
+/// Speed limits along a path: one for each node and one for each piece between two nodes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PathLimits {
     path: Vec<f64>,
@@ -12,17 +11,16 @@ pub struct PathLimits {
 }
 
 impl PathLimits {
-    /// A path that begins at a place \[mm\] with at most a speed \[mm/s\].
+    /// A path from a position \[mm\] with a speed limit there \[mm/s\].
     pub fn new(start_mm: f64, speed_mm_per_s: f64) -> Self {
         Self { path: vec![start_mm], nodes: vec![speed_mm_per_s], pieces: Vec::new() }
     }
 
-    /// Goes on to a place \[mm\], on the way with at most one speed and there with at most
-    /// another \[mm/s\].
-    pub fn extend_to(&mut self, path_mm: f64, on_the_way_mm_per_s: f64, there_mm_per_s: f64) {
+    /// Extends the path to a position \[mm\], with a speed limit up to there and one there \[mm/s\].
+    pub fn extend_to(&mut self, path_mm: f64, piece_mm_per_s: f64, node_mm_per_s: f64) {
         self.path.push(path_mm);
-        self.pieces.push(on_the_way_mm_per_s);
-        self.nodes.push(there_mm_per_s);
+        self.pieces.push(piece_mm_per_s);
+        self.nodes.push(node_mm_per_s);
     }
 
     /// Where the path ends \[mm\].
@@ -31,12 +29,12 @@ impl PathLimits {
     }
 }
 
-/// The quickest profile within the limits and an acceleration \[mm/s²\]: limits are carried
-/// forwards and backwards as far as the acceleration reaches, and between two nodes the
-/// speed rises, stays at the piece's limit and falls.
+/// The time-optimal profile within the limits and an acceleration \[mm/s²\]: a forward and a backward
+/// pass limit the acceleration, and between two nodes the speed rises, stays at the limit of the piece
+/// and falls.
 pub fn time_optimal(limits: &PathLimits, accel: f64) -> Result<SpeedProfile, SpeedProfileError> {
     if !(accel.is_finite() && accel > 0.0) {
-        return Err(SpeedProfileError::Acceleration { value: accel });
+        return Err(SpeedProfileError::Acceleration(accel));
     }
     check(limits)?;
     let square = |speed: &f64| speed * speed;
@@ -56,23 +54,20 @@ pub fn time_optimal(limits: &PathLimits, accel: f64) -> Result<SpeedProfile, Spe
         all.extend(piece_nodes(first, second, *top, accel));
     }
     all.extend(limits.path.last().zip(nodes.last()).map(node));
-    SpeedProfile::of_squares(&all)
+    let (path, squares) = all.iter().map(|node| (node.path_mm, node.square)).unzip();
+    SpeedProfile::of_squares(path, squares)
 }
 
 fn check(limits: &PathLimits) -> Result<(), SpeedProfileError> {
     if limits.path.len() < 2 {
-        return Err(SpeedProfileError::Short { nodes: limits.path.len() });
+        return Err(SpeedProfileError::Short(limits.path.len()));
     }
-    let numbered = |speeds: &[f64]| (1..).zip(speeds.to_vec()).collect::<Vec<(usize, f64)>>();
-    for (at, speed) in numbered(&limits.nodes) {
-        if !(speed.is_finite() && speed >= 0.0) {
-            return Err(SpeedProfileError::Speed { at, speed });
-        }
-    }
-    for (at, speed) in numbered(&limits.pieces) {
-        if !(speed.is_finite() && speed > 0.0) {
-            return Err(SpeedProfileError::Speed { at, speed });
-        }
+    let standing = |(_, speed): &(usize, f64)| !(speed.is_finite() && *speed > 0.0);
+    let negative = |node: &(usize, f64)| standing(node) && node.1 != 0.0;
+    let mut nodes = (1..).zip(limits.nodes.iter().copied());
+    let mut pieces = (1..).zip(limits.pieces.iter().copied());
+    if let Some((at, speed)) = nodes.find(negative).or_else(|| pieces.find(standing)) {
+        return Err(SpeedProfileError::Speed { at, speed });
     }
     let neighbours = limits.path.iter().zip(limits.path.iter().skip(1));
     for (at, (before_mm, path_mm)) in (2..).zip(neighbours) {
@@ -83,17 +78,14 @@ fn check(limits: &PathLimits) -> Result<(), SpeedProfileError> {
     Ok(())
 }
 
-/// The quickest speed below a profile that an acceleration allows \[mm/s²\].
+/// The fastest profile below another within an acceleration \[mm/s²\].
 pub fn attainable(profile: &SpeedProfile, accel: f64) -> Result<SpeedProfile, SpeedProfileError> {
     let mut squares = profile.squares().to_vec();
     limit_acceleration(profile.path(), &mut squares, accel);
-    let node = |(path_mm, square): (&f64, f64)| ProfileNode { path_mm: *path_mm, square };
-    let nodes: Vec<_> = profile.path().iter().zip(squares).map(node).collect();
-    SpeedProfile::of_squares(&nodes)
+    SpeedProfile::of_squares(profile.path().to_vec(), squares)
 }
 
-/// Lowers squares of the speed until each can be reached from the one before it and be
-/// left for the one after it.
+/// Lowers squares of the speed until each is reachable from the one before and after it.
 pub(super) fn limit_acceleration(path: &[f64], squares: &mut [f64], accel: f64) {
     for i in 1..squares.len().min(path.len()) {
         squares[i] = squares[i].min(squares[i - 1] + 2.0 * accel * (path[i] - path[i - 1]));
@@ -103,8 +95,7 @@ pub(super) fn limit_acceleration(path: &[f64], squares: &mut [f64], accel: f64) 
     }
 }
 
-/// The nodes that a piece needs between its ends: where it reaches the top, and where it
-/// leaves it.
+/// The inner nodes of a piece: where it reaches its limit, and where it leaves it.
 fn piece_nodes(
     first: ProfileNode,
     second: ProfileNode,
@@ -115,7 +106,7 @@ fn piece_nodes(
         (first, second);
     let peak = (0.5 * (b0 + b1) + accel * (s1 - s0)).min(top);
     let (up, down) = (s0 + (peak - b0) / (2.0 * accel), s1 - (peak - b1) / (2.0 * accel));
-    // Nodes nearer than this to another are the same.
+    // Nodes that are nearer to another coincide.
     let apart = 1e-9 * (s1 - s0);
     let rises =
         (up > s0 + apart && up < s1 - apart).then_some(ProfileNode { path_mm: up, square: peak });
@@ -144,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn from_rest_to_rest_is_a_triangle_where_the_way_is_short() {
+    fn a_short_path_from_rest_to_rest_is_a_triangle() {
         let mut limits = PathLimits::new(0.0, 0.0);
         limits.extend_to(10.0, 1000.0, 0.0);
         let profile = time_optimal(&limits, 1000.0).unwrap();
@@ -153,20 +144,20 @@ mod tests {
     }
 
     #[test]
-    fn limits_that_are_none_are_refused() {
+    fn invalid_limits_are_refused() {
         let mut limits = PathLimits::new(0.0, 10.0);
-        assert_eq!(time_optimal(&limits, 1.0), Err(SpeedProfileError::Short { nodes: 1 }));
+        assert_eq!(time_optimal(&limits, 1.0), Err(SpeedProfileError::Short(1)));
         limits.extend_to(0.0, 10.0, 10.0);
         assert!(matches!(time_optimal(&limits, 1.0), Err(SpeedProfileError::Order { at: 2, .. })));
         let mut limits = PathLimits::new(0.0, 10.0);
         limits.extend_to(5.0, 0.0, 10.0);
         assert!(matches!(time_optimal(&limits, 1.0), Err(SpeedProfileError::Speed { at: 1, .. })));
-        assert!(matches!(time_optimal(&limits, 0.0), Err(SpeedProfileError::Acceleration { .. })));
+        assert!(matches!(time_optimal(&limits, 0.0), Err(SpeedProfileError::Acceleration(_))));
     }
 
     proptest! {
         #[test]
-        fn every_limit_is_kept_and_the_speed_is_never_lower_than_need_be(
+        fn every_limit_is_kept(
             pieces in prop::collection::vec((0.1..50.0_f64, 1.0..200.0_f64, 0.0..200.0_f64), 1..20),
         ) {
             let accel = 500.0;

@@ -1,6 +1,6 @@
 //! Positions of the nozzle.
 
-/// Where the nozzle is: x, y, z \[mm\].
+/// Position of the nozzle: x, y, z \[mm\].
 pub type Position = [f64; 3];
 
 /// Distance of two positions \[mm\].

@@ -1,46 +1,46 @@
-//! What the model predicts for a speed and a command: flow over time and width over path.
+//! Prediction for a speed and a command: flow over time and width over path.
 
-use super::flow::{FlowTrajectory, TICK_S, float, simulate, whole};
+use super::flow::{FlowTrajectory, TICK_S, simulate, whole};
 use super::profile::SpeedProfile;
 use super::task::{PathValue, PlanError, PlanTask};
 use crate::core::time::Span;
 use crate::numeric::lti::ModelError;
+use crate::numeric::number::to_f64;
 
-/// Distance of the places for which the width is foretold, in lengths of the nozzle.
+/// Distance of the positions at which the width is predicted, in lengths of the nozzle.
 const POSITION_SPACING: f64 = 0.05;
 
 /// An extruder's command without a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum UnplannedCommand {
-    /// It stays at what the fastest speed takes.
+    /// Constant, for the fastest speed.
     Constant,
-    /// In proportion to the robot's speed at that moment, within the drive's limits.
+    /// Proportional to the robot's speed, within the drive's limits.
     Proportional,
 }
 
-/// What is foretold.
+/// A prediction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WidthPrediction {
     flow: FlowTrajectory,
-    /// Places \[mm\] and by which share of the wanted width the mean width over a nozzle's
-    /// length about each is off.
+    /// Positions \[mm\] and relative error of the mean width over a nozzle's length about each.
     pub width: Vec<PathValue>,
 }
 
 impl WidthPrediction {
-    /// Of a speed and a command over time \[s\], which is asked for in the order of time.
-    /// The extruder has settled at the first command.
+    /// For a speed and a command over time \[s\], which is evaluated in the order of time, from the
+    /// steady state of the first command.
     pub fn new(
         task: &PlanTask<'_>,
         speed: &SpeedProfile,
         command: impl FnMut(f64) -> f64,
     ) -> Result<Self, ModelError> {
-        let course = simulate(task.extruder, command, speed.duration_s())?;
-        let width = width(task, speed, &course);
-        Ok(Self { flow: course, width })
+        let flow = simulate(task.extruder, command, speed.duration_s())?;
+        let width = width(task, speed, &flow);
+        Ok(Self { flow, width })
     }
 
-    /// Of a speed and a command that nobody planned.
+    /// For a speed and a command without a plan.
     pub fn unplanned(
         task: &PlanTask<'_>,
         speed: &SpeedProfile,
@@ -52,9 +52,9 @@ impl WidthPrediction {
         let command = |now_s| match how {
             UnplannedCommand::Constant => constant,
             UnplannedCommand::Proportional => {
-                let wanted = constant * speed.speed_at(speed.path_at(now_s)) / fastest;
-                let before = last.unwrap_or(wanted);
-                let (command, _) = task.limits.drive.apply(wanted, before, Span::from_secs(TICK_S));
+                let demand = constant * speed.speed_at(speed.path_at(now_s)) / fastest;
+                let before = last.unwrap_or(demand);
+                let (command, _) = task.limits.drive.apply(demand, before, Span::from_secs(TICK_S));
                 last = Some(command);
                 command
             }
@@ -68,14 +68,14 @@ impl WidthPrediction {
     }
 }
 
-fn width(task: &PlanTask<'_>, speed: &SpeedProfile, course: &FlowTrajectory) -> Vec<PathValue> {
+fn width(task: &PlanTask<'_>, speed: &SpeedProfile, flow: &FlowTrajectory) -> Vec<PathValue> {
     let half = 0.5 * task.bead.nozzle_mm;
     let full = task.bead.area_mm2 * task.bead.nozzle_mm;
     let every = POSITION_SPACING * task.bead.nozzle_mm;
-    let volume = |path_mm: f64| course.volume_at(speed.time_at(path_mm));
+    let volume = |path_mm: f64| flow.volume_at(speed.time_at(path_mm));
     let first = speed.start_mm() + half;
     let count = whole((speed.end_mm() - half - first) / every);
-    let positions = (0..=count).map(|k| first + every * float(k));
+    let positions = (0..=count).map(|k| first + every * to_f64(k));
     let inside = positions.filter(|at| at + half <= speed.end_mm());
     inside.map(|at| (at, (volume(at + half) - volume(at - half)) / full - 1.0)).collect()
 }
@@ -110,7 +110,7 @@ mod tests {
         let (first, last) = (constant.width[0].1, constant.width.last().unwrap().1);
         assert!(first.abs() < 1e-9 && (last - 1.0).abs() < 1e-9, "{first} {last}");
         assert!((constant.flow_at(1.0) - 4500.0).abs() < 1e-6);
-        // In proportion it comes right in the end.
+        // Proportional, it is right in the steady state.
         let followed =
             WidthPrediction::unplanned(&task, &speed, UnplannedCommand::Proportional).unwrap();
         assert!(followed.width.last().unwrap().1.abs() < 0.01);

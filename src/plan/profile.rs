@@ -1,16 +1,13 @@
-//! Speed over path. Between two nodes the square of the speed runs straight, which
-//! is a steady acceleration, so that times are exact.
+//! Speed over path. Between two nodes the square of the speed is linear, that is the acceleration is
+//! constant, so that times are exact.
 
-/// Nodes that make no profile. Counted from 1.
+/// Nodes that give no profile. Counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SpeedProfileError {
-    /// One node is no way.
-    #[error("a speed profile of {nodes} points: at least 2 are needed")]
-    Short {
-        /// How many there are.
-        nodes: usize,
-    },
-    /// Path that does not run on.
+    /// Fewer than two nodes.
+    #[error("a speed profile of {0} points: at least 2 are needed")]
+    Short(usize),
+    /// Path that does not grow.
     #[error(
         "point {at} of a speed profile lies at {path_mm} mm, the one before it at {before_mm} mm: \
          path must grow"
@@ -18,49 +15,46 @@ pub enum SpeedProfileError {
     Order {
         /// Which point.
         at: usize,
-        /// Where it lies \[mm\].
+        /// Its position \[mm\].
         path_mm: f64,
-        /// Where the one before it lies \[mm\].
+        /// Position of the one before it \[mm\].
         before_mm: f64,
     },
-    /// A speed that is none.
+    /// A negative speed, or one that is not finite.
     #[error("point {at} of a speed profile has {speed} mm/s: a speed is 0 or more")]
     Speed {
         /// Which point.
         at: usize,
-        /// What was found \[mm/s\].
+        /// The speed \[mm/s\].
         speed: f64,
     },
-    /// It would stand for ever.
+    /// Two nodes at rest, between which the robot never moves.
     #[error("from {from_mm} mm to {to_mm} mm the speed is 0: the robot would never arrive")]
     StandsStill {
-        /// Where it would stand \[mm\].
+        /// The first \[mm\].
         from_mm: f64,
-        /// Where it would never arrive \[mm\].
+        /// The second \[mm\].
         to_mm: f64,
     },
-    /// A robot that cannot change its speed.
-    #[error("an acceleration of {value} mm/s²: more than 0 is needed")]
-    Acceleration {
-        /// What was found \[mm/s²\].
-        value: f64,
-    },
+    /// An acceleration that is not positive \[mm/s²\].
+    #[error("an acceleration of {0} mm/s²: more than 0 is needed")]
+    Acceleration(f64),
 }
 
 impl SpeedProfileError {
-    /// The point that is wrong, from 1, if one is.
+    /// The wrong point, from 1, if there is one.
     pub const fn point(&self) -> Option<usize> {
         match self {
             Self::Order { at, .. } | Self::Speed { at, .. } => Some(*at),
-            Self::Short { .. } | Self::StandsStill { .. } | Self::Acceleration { .. } => None,
+            Self::Short(_) | Self::StandsStill { .. } | Self::Acceleration(_) => None,
         }
     }
 }
 
-/// A speed at a place.
+/// A speed at a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedPoint {
-    /// Place \[mm\].
+    /// Position \[mm\].
     pub path_mm: f64,
     /// Speed there \[mm/s\].
     pub speed_mm_per_s: f64,
@@ -69,7 +63,7 @@ pub struct SpeedPoint {
 /// A node of a profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ProfileNode {
-    /// Place \[mm\].
+    /// Position \[mm\].
     pub(super) path_mm: f64,
     /// Square of the speed there \[mm²/s²\].
     pub(super) square: f64,
@@ -86,38 +80,31 @@ pub struct SpeedProfile {
 impl SpeedProfile {
     /// From points in the order of the path.
     pub fn new(points: &[SpeedPoint]) -> Result<Self, SpeedProfileError> {
-        let node = |point: &SpeedPoint| {
-            let speed = point.speed_mm_per_s;
-            ProfileNode { path_mm: point.path_mm, square: speed * speed.abs() }
-        };
-        let nodes: Vec<ProfileNode> = points.iter().map(node).collect();
-        Self::of_squares(&nodes)
+        let square = |point: &SpeedPoint| point.speed_mm_per_s * point.speed_mm_per_s.abs();
+        let (path, squares) = points.iter().map(|point| (point.path_mm, square(point))).unzip();
+        Self::of_squares(path, squares)
     }
 
-    /// From nodes in the order of the path.
-    pub(super) fn of_squares(nodes: &[ProfileNode]) -> Result<Self, SpeedProfileError> {
-        if nodes.len() < 2 {
-            return Err(SpeedProfileError::Short { nodes: nodes.len() });
+    /// From positions \[mm\] in order and the square of the speed at each \[mm²/s²\].
+    pub(super) fn of_squares(path: Vec<f64>, squares: Vec<f64>) -> Result<Self, SpeedProfileError> {
+        if path.len() < 2 {
+            return Err(SpeedProfileError::Short(path.len()));
         }
         let mut before: Option<ProfileNode> = None;
-        let mut time = Vec::with_capacity(nodes.len());
+        let mut time = Vec::with_capacity(path.len());
         let mut now = 0.0;
-        for (at, &ProfileNode { path_mm, square }) in (1..).zip(nodes) {
+        for (at, (&path_mm, &square)) in (1..).zip(path.iter().zip(&squares)) {
             if !(square.is_finite() && square >= 0.0) {
-                return Err(SpeedProfileError::Speed {
-                    at,
-                    speed: square.signum() * square.abs().sqrt(),
-                });
+                let speed = square.signum() * square.abs().sqrt();
+                return Err(SpeedProfileError::Speed { at, speed });
             }
             if let Some(ProfileNode { path_mm: before_mm, square: last }) = before {
                 if !(path_mm > before_mm && path_mm.is_finite()) {
                     return Err(SpeedProfileError::Order { at, path_mm, before_mm });
                 }
                 if last == 0.0 && square == 0.0 {
-                    return Err(SpeedProfileError::StandsStill {
-                        from_mm: before_mm,
-                        to_mm: path_mm,
-                    });
+                    let (from_mm, to_mm) = (before_mm, path_mm);
+                    return Err(SpeedProfileError::StandsStill { from_mm, to_mm });
                 }
                 now += 2.0 * (path_mm - before_mm) / (last.sqrt() + square.sqrt());
             } else if !path_mm.is_finite() {
@@ -126,11 +113,18 @@ impl SpeedProfile {
             time.push(now);
             before = Some(ProfileNode { path_mm, square });
         }
-        let (path, square) = nodes.iter().map(|node| (node.path_mm, node.square)).unzip();
-        Ok(Self { path, square, time })
+        Ok(Self { path, square: squares, time })
     }
 
-    /// Places of the nodes \[mm\].
+    /// The pieces between two nodes, in order.
+    pub(super) fn pieces(&self) -> impl Iterator<Item = (ProfileNode, ProfileNode)> + '_ {
+        let node =
+            |(path_mm, square): (&f64, &f64)| ProfileNode { path_mm: *path_mm, square: *square };
+        let nodes = self.path.iter().zip(&self.square).map(node);
+        nodes.clone().zip(nodes.skip(1))
+    }
+
+    /// Positions of the nodes \[mm\].
     pub fn path(&self) -> &[f64] {
         &self.path
     }
@@ -140,48 +134,45 @@ impl SpeedProfile {
         &self.square
     }
 
-    /// When the nodes are passed \[s\].
+    /// Times at which the nodes are passed \[s\].
     pub fn times(&self) -> &[f64] {
         &self.time
     }
 
-    /// Where it begins \[mm\].
+    /// Its beginning \[mm\].
     pub fn start_mm(&self) -> f64 {
         self.path.first().copied().unwrap_or(0.0)
     }
 
-    /// Where it ends \[mm\].
+    /// Its end \[mm\].
     pub fn end_mm(&self) -> f64 {
         self.path.last().copied().unwrap_or(0.0)
     }
 
-    /// How long it takes \[s\].
+    /// Its duration \[s\].
     pub fn duration_s(&self) -> f64 {
         self.time.last().copied().unwrap_or(0.0)
     }
 
-    /// Square of the speed at a place \[mm²/s²\]; beyond the ends that of the end.
+    /// Square of the speed at a position \[mm²/s²\]; constant beyond the ends.
     pub fn square_at(&self, path_mm: f64) -> f64 {
         let piece = self.piece(&self.path, path_mm);
         let fraction = ((path_mm - piece.path.0) / (piece.path.1 - piece.path.0)).clamp(0.0, 1.0);
         piece.square.0 + fraction * (piece.square.1 - piece.square.0)
     }
 
-    /// Speed at a place \[mm/s\].
+    /// Speed at a position \[mm/s\].
     pub fn speed_at(&self, path_mm: f64) -> f64 {
         self.square_at(path_mm).sqrt()
     }
 
-    /// When a place is passed \[s\]; beyond the ends at the speed of the end.
+    /// Time at which a position is passed \[s\]; beyond the ends at the speed of the end.
     pub fn time_at(&self, path_mm: f64) -> f64 {
         let piece = self.piece(&self.path, path_mm);
         let ahead = path_mm - piece.path.0;
         if ahead <= 0.0 {
-            return if ahead == 0.0 {
-                piece.time
-            } else {
-                piece.time + ahead / piece.square.0.sqrt()
-            };
+            let later = if ahead == 0.0 { 0.0 } else { ahead / piece.square.0.sqrt() };
+            return piece.time + later;
         }
         let beyond = (path_mm - self.end_mm()).max(0.0);
         let inside = ahead - beyond;
@@ -190,8 +181,7 @@ impl SpeedProfile {
         piece.time + 2.0 * inside / (piece.square.0.sqrt() + here) + later
     }
 
-    /// Where the nozzle is at a moment \[mm\]; before the start and after the end at the
-    /// speed of the end.
+    /// Position at a time \[mm\]; beyond the ends at the speed of the end.
     pub fn path_at(&self, time_s: f64) -> f64 {
         let piece = self.piece(&self.time, time_s);
         let since = time_s - piece.time;
@@ -201,8 +191,8 @@ impl SpeedProfile {
         }
         let beyond = (time_s - self.duration_s()).max(0.0);
         let inside = since - beyond;
-        let way = piece.path.1 - piece.path.0;
-        let rise = (piece.square.1 - piece.square.0) / (2.0 * way);
+        let length = piece.path.1 - piece.path.0;
+        let rise = (piece.square.1 - piece.square.0) / (2.0 * length);
         piece.path.0 + inside * (first + 0.5 * rise * inside) + beyond * last
     }
 
@@ -216,14 +206,14 @@ impl SpeedProfile {
     }
 }
 
-/// What lies between two nodes.
+/// The piece between two nodes.
 struct Piece {
     path: (f64, f64),
     square: (f64, f64),
     time: f64,
 }
 
-/// The profile through places \[mm\] with speeds \[mm/s\].
+/// The profile through positions \[mm\] with speeds \[mm/s\].
 #[cfg(test)]
 pub(super) fn profile_of(points: &[(f64, f64)]) -> Result<SpeedProfile, SpeedProfileError> {
     let point = |&(path_mm, speed_mm_per_s)| SpeedPoint { path_mm, speed_mm_per_s };
@@ -241,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn times_are_those_of_steady_accelerations() {
+    fn times_are_those_of_constant_accelerations() {
         let profile = dip();
         let times = [0.0, 0.08, 0.08 + 4.0 / 110.0, 0.08 + 4.0 / 110.0 + 6.0 / 60.0];
         for (time, wanted) in profile.times().iter().zip(times) {
@@ -251,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn place_and_moment_are_each_other_s_inverse_beyond_the_ends_too() {
+    fn position_and_time_are_inverse_functions_also_beyond_the_ends() {
         let profile = dip();
         for k in -20..=60 {
             let path = f64::from(k) * 0.25;
@@ -261,9 +251,9 @@ mod tests {
     }
 
     #[test]
-    fn points_that_make_no_profile_are_refused() {
+    fn invalid_points_are_refused() {
         let new = profile_of;
-        assert_eq!(new(&[(0.0, 1.0)]), Err(SpeedProfileError::Short { nodes: 1 }));
+        assert_eq!(new(&[(0.0, 1.0)]), Err(SpeedProfileError::Short(1)));
         assert!(matches!(
             new(&[(0.0, 1.0), (0.0, 1.0)]),
             Err(SpeedProfileError::Order { at: 2, .. })

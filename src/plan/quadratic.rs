@@ -1,5 +1,5 @@
-//! The convex problem of one round: ½·xᵀPx + qᵀx, with rows that must not exceed their
-//! bounds. Clarabel's interior point solves it.
+//! The convex problem of one iteration: minimise ½·xᵀPx + qᵀx subject to A·x ≤ b, by the interior-point
+//! solver Clarabel.
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
@@ -16,16 +16,16 @@ pub struct Quadratic {
     pub gradient: DVector<f64>,
 }
 
-/// A term value·x(column) of a row.
+/// A term value·x(column) of a constraint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Term {
-    /// Which unknown.
+    /// Index of the unknown.
     pub column: usize,
-    /// What it is multiplied with.
+    /// Its coefficient.
     pub value: f64,
 }
 
-/// Rows A·x ≤ bound, as (row, column, value).
+/// Constraints A·x ≤ bound, as (row, column, value).
 #[derive(Debug, Clone, Default)]
 pub struct ConstraintRows {
     indices: (Vec<usize>, Vec<usize>),
@@ -45,7 +45,7 @@ impl ConstraintRows {
     }
 }
 
-/// The least of a function under the rows; `None` where the solver finds none.
+/// The minimum of a function under constraints; `None` where the solver fails.
 pub fn minimise(function: &Quadratic, rows: ConstraintRows) -> Option<DVector<f64>> {
     let Quadratic { hessian: p, gradient: q } = function;
     let unknowns = q.len();

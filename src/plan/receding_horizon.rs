@@ -1,7 +1,7 @@
 //! A job of any length, planned a few seconds at a time (receding horizon).
 
 use super::descent::descend;
-use super::flow::{FlowModel, KNOT_S, KnotResponses, float, whole};
+use super::flow::{FlowModel, KNOT_S, KnotResponses, whole};
 use super::grid::QuickChanges;
 use super::horizon::{Evaluation, Horizon, Iterate};
 use super::limits::limit_acceleration;
@@ -9,63 +9,51 @@ use super::profile::{ProfileNode, SpeedProfile};
 use super::segment::PathSegment;
 use super::subproblem::Bounds;
 use super::task::{PlanError, PlanTask};
+use crate::numeric::number::to_f64;
 
-/// How far ahead a horizon reaches at the nominal speed \[s\]; beyond a quick change within
-/// it, it goes on for as long as the flow may take to come back.
+/// Length of a horizon at the nominal speed \[s\].
 const HORIZON_S: f64 = 5.0;
+/// Time after the last quick change in it by which a horizon is extended \[s\]: the flow recovers in
+/// about that time.
 const RECOVERY_S: f64 = 3.0;
-/// How long before a quick change its plan begins at the latest, and how long after it the
-/// next horizon may begin at the earliest \[s\].
+/// Latest begin of the horizon before a quick change \[s\]: the flow needs about that time to follow.
 const LEAD_S: f64 = 2.5;
+/// Time at the end of a horizon that is not decided \[s\]: its plan ignores what comes later.
 const TAIL_S: f64 = 1.5;
-/// At the end of a horizon the speed is the nominal one again, over this many lengths of
-/// the nozzle: otherwise a flow that never comes back would look best.
+/// Lengths of the nozzle at the end of a horizon over which the speed is the nominal one: otherwise a
+/// flow that never recovers would be the optimum.
 const PINNED_LENGTHS: f64 = 2.0;
 
-/// A job while it is planned.
+/// The state of planning a job.
 pub struct RecedingHorizon<'a> {
     task: &'a PlanTask<'a>,
     nominal: &'a SpeedProfile,
     quick: QuickChanges,
-    /// Places at which the nominal speed turns upwards \[mm\], which may take time each.
+    /// Positions of minima of the nominal speed \[mm\], each of which may add time.
     slow_positions: Vec<f64>,
     extruder: FlowModel,
-    /// Nodes that are decided.
+    /// Decided nodes.
     nodes: Vec<ProfileNode>,
-    /// When each is passed \[s\].
+    /// Time at which each is passed \[s\].
     times: Vec<f64>,
     knots: Vec<f64>,
 }
 
-/// What of a horizon is to be decided.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct OpenHorizon {
-    /// When its first node is passed \[s\].
-    from_s: f64,
-    /// Nodes that were decided before.
-    decided: usize,
-    /// To where it is decided \[mm\].
-    until_mm: f64,
-}
-
 impl<'a> RecedingHorizon<'a> {
-    /// From an extruder that has settled at a command.
+    /// From the steady state of a command.
     pub fn new(
         task: &'a PlanTask<'a>,
         nominal: &'a SpeedProfile,
         start: f64,
     ) -> Result<Self, PlanError> {
-        let first = nominal.path().first().zip(nominal.squares().first());
+        let first = nominal.pieces().next().map(|(first, _)| first);
         Ok(Self {
             task,
             nominal,
             quick: QuickChanges::of(nominal, task.limits.robot.accel_mm_per_s2),
             slow_positions: slow_positions(nominal),
             extruder: FlowModel::settled(task.extruder, start)?,
-            nodes: first
-                .map(|(s, b)| ProfileNode { path_mm: *s, square: *b })
-                .into_iter()
-                .collect(),
+            nodes: first.into_iter().collect(),
             times: vec![0.0],
             knots: Vec::new(),
         })
@@ -83,14 +71,15 @@ impl<'a> RecedingHorizon<'a> {
             let until = if to >= end { end } else { self.commit_position(here, to) };
             self.horizon(to, until)?;
         }
-        Ok((SpeedProfile::of_squares(&self.nodes)?, self.knots))
+        let (path, squares) = self.nodes.iter().map(|node| (node.path_mm, node.square)).unzip();
+        Ok((SpeedProfile::of_squares(path, squares)?, self.knots))
     }
 
     fn here(&self) -> f64 {
         self.nodes.last().map_or(self.nominal.start_mm(), |node| node.path_mm)
     }
 
-    /// The place that the nominal speed reaches after a time \[mm\].
+    /// The position that the nominal speed reaches after a time \[mm\].
     fn later(&self, position_mm: f64, by_s: f64) -> f64 {
         let at = self.nominal.time_at(position_mm) + by_s;
         if at >= self.nominal.duration_s() {
@@ -103,7 +92,7 @@ impl<'a> RecedingHorizon<'a> {
         let to = self.later(here, HORIZON_S);
         let quick = self.quick.within(PathSegment { from_mm: here, to_mm: to }).last();
         let to = quick.map_or(to, |quick| to.max(self.later(quick.to_mm, RECOVERY_S)));
-        // A rest shorter than that is planned at once.
+        // A short rest of the job belongs to this horizon.
         if self.later(to, HORIZON_S - LEAD_S) >= self.nominal.end_mm() {
             self.nominal.end_mm()
         } else {
@@ -111,7 +100,7 @@ impl<'a> RecedingHorizon<'a> {
         }
     }
 
-    /// Where the next horizon begins: as far from all quick changes as can be.
+    /// Begin of the next horizon: as far from all quick changes as possible.
     fn commit_position(&self, here: f64, to: f64) -> f64 {
         let first = self.later(here, HORIZON_S - LEAD_S);
         let unseen = self.quick.within(PathSegment { from_mm: to, to_mm: f64::INFINITY }).next();
@@ -122,7 +111,7 @@ impl<'a> RecedingHorizon<'a> {
         far.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(first, |(at, _)| at)
     }
 
-    /// Plans to one place and decides up to another.
+    /// Plans to one position and decides up to another.
     fn horizon(&mut self, to: f64, until: f64) -> Result<(), PlanError> {
         let here = self.here();
         let back = here - self.task.bead.nozzle_mm - 1e-9;
@@ -131,11 +120,8 @@ impl<'a> RecedingHorizon<'a> {
         let mut path: Vec<f64> = self.nodes.iter().skip(kept).map(|node| node.path_mm).collect();
         let mut squares: Vec<f64> = self.nodes.iter().skip(kept).map(|node| node.square).collect();
         let decided = path.len();
-        let ahead = self.quick.nodes(
-            self.nominal,
-            PathSegment { from_mm: here, to_mm: to },
-            self.task.bead.nozzle_mm,
-        );
+        let open = PathSegment { from_mm: here, to_mm: to };
+        let ahead = self.quick.nodes(self.nominal, open, self.task.bead.nozzle_mm);
         path.extend(ahead.iter().skip(1));
         squares.extend(ahead.iter().skip(1).map(|s| self.nominal.square_at(*s)));
         let bounds = self.bounds(&path, squares, decided, from_s, to);
@@ -158,9 +144,8 @@ impl<'a> RecedingHorizon<'a> {
             extruder: &self.extruder,
             knot_responses: &responses,
         };
-        let found = descend(&horizon, &bounds, first);
-        if let Some((iterate, outcome)) = found {
-            self.decide(&iterate, &outcome, OpenHorizon { from_s, decided, until_mm: until });
+        if let Some((iterate, evaluation)) = descend(&horizon, &bounds, first) {
+            self.decide(&iterate, &evaluation, from_s, decided, until);
         }
         Ok(())
     }
@@ -181,19 +166,26 @@ impl<'a> RecedingHorizon<'a> {
         let floor = path.iter().zip(&ceiling).enumerate().map(|(i, (s, high))| {
             if i < decided || *s >= pinned { *high } else { slowest.min(*high) }
         });
-        // All slow-downs up to here may take their time, and what was not taken before.
+        // Each minimum up to here may add its time; unused time carries over.
         let positions = self.slow_positions.iter().filter(|s| **s <= to).count();
-        let latest = self.nominal.time_at(to) + limits.budget_s * float(positions);
+        let latest = self.nominal.time_at(to) + limits.budget_s * to_f64(positions);
         let floor = floor.collect();
         let longest_s = latest - from_s;
         Bounds { floor, ceiling, accel, drive: limits.drive, longest_s }
     }
 
-    /// Keeps what is planned up to where the next horizon begins.
-    fn decide(&mut self, iterate: &Iterate, outcome: &Evaluation, open: OpenHorizon) {
-        let OpenHorizon { from_s, decided, until_mm } = open;
+    /// Decides the plan of a horizon that begins at `from_s` with `decided` nodes, up to the begin of
+    /// the next one \[mm\].
+    fn decide(
+        &mut self,
+        iterate: &Iterate,
+        evaluation: &Evaluation,
+        from_s: f64,
+        decided: usize,
+        until_mm: f64,
+    ) {
         let nodes =
-            outcome.profile.path().iter().zip(&iterate.squares).zip(outcome.profile.times());
+            evaluation.profile.path().iter().zip(&iterate.squares).zip(evaluation.profile.times());
         for ((s, b), time) in nodes.skip(decided) {
             self.nodes.push(ProfileNode { path_mm: *s, square: *b });
             self.times.push(from_s + time);
@@ -203,7 +195,7 @@ impl<'a> RecedingHorizon<'a> {
         }
         let reached = self.times.last().copied().unwrap_or(from_s);
         let open = (reached - self.extruder.now_s()) / KNOT_S;
-        // At the end of the job the last part of a knot counts as well.
+        // At the end of the job a part of a knot counts as one.
         let count = if self.here() >= self.nominal.end_mm() { open.ceil() } else { open };
         let knots: Vec<f64> = iterate.knots.iter().copied().take(whole(count)).collect();
         self.extruder.advance(&knots);
@@ -214,22 +206,19 @@ impl<'a> RecedingHorizon<'a> {
     }
 }
 
-/// Places at which a profile turns from falling to rising, the ends included where it is
-/// lower there \[mm\].
+/// Positions of the minima of a profile \[mm\], its ends included.
 fn slow_positions(profile: &SpeedProfile) -> Vec<f64> {
     let mut all = Vec::new();
     let mut falling = true;
-    let nodes = || profile.path().iter().zip(profile.squares());
-    for ((s0, b0), (_, b1)) in nodes().zip(nodes().skip(1)) {
-        if b1 > b0 && falling {
-            all.push(*s0);
+    for (from, to) in profile.pieces() {
+        if to.square > from.square && falling {
+            all.push(from.path_mm);
         }
-        if b1 != b0 {
-            falling = b1 < b0;
+        if to.square != from.square {
+            falling = to.square < from.square;
         }
     }
-    let fell = nodes().zip(nodes().skip(1)).any(|((_, b0), (_, b1))| b1 < b0);
-    if falling && fell {
+    if falling && profile.pieces().any(|(from, to)| to.square < from.square) {
         all.push(profile.end_mm());
     }
     all

@@ -1,10 +1,10 @@
-//! Pieces of path.
+//! Segments of path.
 
-/// A piece of path \[mm\].
+/// A segment of path \[mm\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathSegment {
-    /// Where it begins.
+    /// Its beginning.
     pub from_mm: f64,
-    /// Where it ends.
+    /// Its end.
     pub to_mm: f64,
 }

@@ -1,23 +1,24 @@
-//! A plan, and how it is made.
+//! A plan, and its solution.
 
-use super::flow::{KNOT_S, float, whole};
+use super::flow::{KNOT_S, between, whole};
 use super::limits::attainable;
 use super::prediction::WidthPrediction;
 use super::profile::SpeedProfile;
 use super::receding_horizon::RecedingHorizon;
 use super::task::{PathValue, PlanError, PlanTask};
+use crate::numeric::number::to_f64;
 
-/// Speed and command that belong together.
+/// Speed and command, planned together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// The robot's speed over path; time counts from its start.
     pub speed: SpeedProfile,
-    /// The command every [`Plan::EVERY_S`] from the start on; it runs straight between.
+    /// The command every [`Plan::EVERY_S`] from the start on; linear in between.
     pub command: Vec<f64>,
-    /// Places \[mm\] and by which share of the wanted width the mean width over a
-    /// nozzle's length about each is off, as far as the model tells.
+    /// Positions \[mm\] and predicted relative error of the mean width over a nozzle's length about
+    /// each.
     pub predicted_width: Vec<PathValue>,
-    /// Time that the plan takes longer than the nominal speed \[s\].
+    /// Duration of the plan beyond that of the nominal speed \[s\].
     pub added_s: f64,
 }
 
@@ -25,21 +26,17 @@ impl Plan {
     /// Time between two values of the command \[s\].
     pub const EVERY_S: f64 = KNOT_S;
 
-    /// The command at a moment; before the start that of the start, after the end that of
-    /// the end.
+    /// The command at a time; constant before the start and after the end.
     pub fn command_at(&self, time_s: f64) -> f64 {
         let last = self.command.len().saturating_sub(1);
-        let at = (time_s / KNOT_S).clamp(0.0, float(last));
+        let at = (time_s / KNOT_S).clamp(0.0, to_f64(last));
         let knot = whole(at);
-        let first = self.command.get(knot).copied().unwrap_or(0.0);
-        let next = self.command.get(knot + 1).copied().unwrap_or(first);
-        first + (at - float(knot)) * (next - first)
+        between(&self.command, knot, at - to_f64(knot))
     }
 }
 
-/// Plans speed and command for a nominal speed along a path. What the nominal speed asks
-/// beyond the robot's acceleration is taken off first. The extruder has settled at the
-/// first speed when the plan begins.
+/// Plans speed and command for a nominal speed along a path. The nominal speed is first limited to the
+/// robot's acceleration. The plan begins in the steady state of the first speed.
 pub fn solve(task: &PlanTask<'_>, nominal: &SpeedProfile) -> Result<Plan, PlanError> {
     task.check()?;
     let nominal = attainable(nominal, task.limits.robot.accel_mm_per_s2)?;

@@ -1,4 +1,4 @@
-//! One round: the convex subproblem about an iterate, and the change that solves it.
+//! The convex subproblem about an iterate, and the change that solves it.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,15 +8,15 @@ use super::quadratic::{ConstraintRows, Quadratic, Term, minimise};
 use super::time_gradient::PassingTimes;
 use crate::extruder::limits::CommandLimits;
 
-/// Added to the scaled Hessian's diagonal, for directions that cost nothing.
+/// Regularisation of the scaled Hessian's diagonal, for directions without cost.
 const RIDGE: f64 = 1e-7;
 
-/// What a choice has to keep.
+/// Bounds of an iterate.
 #[derive(Debug, Clone)]
 pub struct Bounds {
-    /// Least square of the speed at each node \[mm²/s²\].
+    /// Smallest square of the speed at each node \[mm²/s²\].
     pub floor: Vec<f64>,
-    /// Largest, which keeps the acceleration itself \[mm²/s²\].
+    /// Largest one, which keeps the acceleration \[mm²/s²\].
     pub ceiling: Vec<f64>,
     /// Acceleration \[mm/s²\].
     pub accel: f64,
@@ -26,36 +26,35 @@ pub struct Bounds {
     pub longest_s: f64,
 }
 
-/// The problem of a round, with its unknowns as shares: of the squares of the speed that
-/// are free, and of the drive's range.
+/// The subproblem, with relative unknowns: of the free squares of the speed, and of the drive's range.
 struct Subproblem<'a> {
     horizon: &'a Horizon<'a>,
     bounds: &'a Bounds,
-    choice: &'a Iterate,
-    /// Column of each node that is free.
+    iterate: &'a Iterate,
+    /// Column of each free node.
     columns: Vec<Option<usize>>,
     /// Node or, after all nodes, knot of each column.
     variables: Vec<usize>,
-    /// What a share of one is.
+    /// Scale of each column.
     scale: Vec<f64>,
     rows: ConstraintRows,
 }
 
-/// The change that the convex problem about a choice asks for, with squares of the speed
-/// that change by at most a share of themselves.
+/// The solution of the convex problem about an iterate, with relative changes of the squares of the
+/// speed within a trust radius.
 pub fn solve_subproblem(
     horizon: &Horizon<'_>,
     bounds: &Bounds,
     iterate: &Iterate,
-    outcome: &Evaluation,
+    evaluation: &Evaluation,
     trust_radius: f64,
 ) -> Option<Iterate> {
-    let mut round = Subproblem::new(horizon, bounds, iterate);
-    round.keep_speeds(trust_radius);
-    round.keep_acceleration();
-    round.keep_drive();
-    round.keep_time(outcome);
-    round.solve(outcome)
+    let mut problem = Subproblem::new(horizon, bounds, iterate);
+    problem.keep_speeds(trust_radius);
+    problem.keep_acceleration();
+    problem.keep_drive();
+    problem.keep_time(evaluation);
+    problem.solve(evaluation)
 }
 
 impl<'a> Subproblem<'a> {
@@ -74,30 +73,20 @@ impl<'a> Subproblem<'a> {
             variables.iter().filter_map(|node| iterate.squares.get(*node).copied()).collect();
         variables.extend(nodes..nodes + iterate.knots.len());
         scale.resize(variables.len(), horizon.drive_span);
-        Self {
-            horizon,
-            bounds,
-            choice: iterate,
-            columns,
-            variables,
-            scale,
-            rows: ConstraintRows::default(),
-        }
+        let rows = ConstraintRows::default();
+        Self { horizon, bounds, iterate, columns, variables, scale, rows }
     }
 
-    /// Columns and nodes that are free.
+    /// Columns and indices of the free nodes.
     fn free(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let nodes = self.choice.squares.len();
-        self.variables
-            .clone()
-            .into_iter()
-            .enumerate()
-            .filter(move |(_, variable)| *variable < nodes)
+        let nodes = self.iterate.squares.len();
+        let variables = self.variables.clone().into_iter().enumerate();
+        variables.filter(move |(_, variable)| *variable < nodes)
     }
 
     fn keep_speeds(&mut self, trust_radius: f64) {
         for (column, node) in self.free() {
-            let now = self.choice.squares[node];
+            let now = self.iterate.squares[node];
             let up = (self.bounds.ceiling[node] / now - 1.0).min(trust_radius);
             let down = (1.0 - self.bounds.floor[node] / now).min(trust_radius);
             self.rows.add_upper_bound([Term { column, value: 1.0 }], up.max(0.0));
@@ -106,13 +95,13 @@ impl<'a> Subproblem<'a> {
     }
 
     fn keep_acceleration(&mut self) {
-        let (path, squares) = (&self.horizon.path, &self.choice.squares);
+        let (path, squares) = (&self.horizon.path, &self.iterate.squares);
         for node in 1..squares.len() {
-            let most = 2.0 * self.bounds.accel * (path[node] - path[node - 1]);
-            let rise = (squares[node] - squares[node - 1]) / most;
+            let max_rise = 2.0 * self.bounds.accel * (path[node] - path[node - 1]);
+            let rise = (squares[node] - squares[node - 1]) / max_rise;
             let ends = [(node, 1.0), (node - 1, -1.0)];
             let term = |(end, sign): &(usize, f64)| {
-                Some(Term { column: self.columns[*end]?, value: sign * squares[*end] / most })
+                Some(Term { column: self.columns[*end]?, value: sign * squares[*end] / max_rise })
             };
             let terms: Vec<Term> = ends.iter().filter_map(term).collect();
             if terms.is_empty() {
@@ -128,35 +117,35 @@ impl<'a> Subproblem<'a> {
     fn keep_drive(&mut self) {
         let (min, max) = self.bounds.drive.range();
         let span = self.horizon.drive_span;
-        let most = self.bounds.drive.rate_per_s() * KNOT_S / span;
-        let first = self.variables.len() - self.choice.knots.len();
+        let max_rise = self.bounds.drive.rate_per_s() * KNOT_S / span;
+        let first = self.variables.len() - self.iterate.knots.len();
         let mut before = self.horizon.extruder.command();
-        for (column, now) in (first..).zip(&self.choice.knots) {
+        for (column, now) in (first..).zip(&self.iterate.knots) {
             self.rows.add_upper_bound([Term { column, value: 1.0 }], (max - now) / span);
             self.rows.add_upper_bound([Term { column, value: -1.0 }], (now - min) / span);
             let rise = (now - before) / span;
             for sign in [1.0, -1.0] {
                 let last = (column > first).then(|| Term { column: column - 1, value: -sign });
                 let terms = [Term { column, value: sign }].into_iter().chain(last);
-                self.rows.add_upper_bound(terms, (most - sign * rise).max(0.0));
+                self.rows.add_upper_bound(terms, (max_rise - sign * rise).max(0.0));
             }
             before = *now;
         }
     }
 
-    fn keep_time(&mut self, outcome: &Evaluation) {
-        let slope = PassingTimes::new(&outcome.profile).to_end();
-        let left = self.bounds.longest_s - outcome.profile.duration_s();
+    fn keep_time(&mut self, evaluation: &Evaluation) {
+        let slope = PassingTimes::new(&evaluation.profile).to_end();
+        let left = self.bounds.longest_s - evaluation.profile.duration_s();
         let value = |column: usize, node: usize| slope[node] * self.scale[column];
         let terms: Vec<_> =
             self.free().map(|(column, node)| Term { column, value: value(column, node) }).collect();
         self.rows.add_upper_bound(terms, left.max(0.0));
     }
 
-    fn solve(self, outcome: &Evaluation) -> Option<Iterate> {
-        let Quadratic { hessian, gradient } = self.horizon.model(self.choice, outcome);
+    fn solve(self, evaluation: &Evaluation) -> Option<Iterate> {
+        let Quadratic { hessian, gradient } = self.horizon.model(self.iterate, evaluation);
         let (variables, scale) = (&self.variables, &self.scale);
-        let size = 1.0 / outcome.cost.max(f64::MIN_POSITIVE);
+        let size = 1.0 / evaluation.cost.max(f64::MIN_POSITIVE);
         let p = DMatrix::from_fn(variables.len(), variables.len(), |i, j| {
             let ridge = if i == j { RIDGE } else { 0.0 };
             hessian[(variables[i], variables[j])] * scale[i] * scale[j] * size + ridge
@@ -165,8 +154,8 @@ impl<'a> Subproblem<'a> {
             variables.iter().zip(scale).map(|(variable, scale)| gradient[*variable] * scale * size);
         let q = DVector::from_iterator(variables.len(), scaled);
         let x = minimise(&Quadratic { hessian: p, gradient: q }, self.rows)?;
-        let nodes = self.choice.squares.len();
-        let mut all = vec![0.0; nodes + self.choice.knots.len()];
+        let nodes = self.iterate.squares.len();
+        let mut all = vec![0.0; nodes + self.iterate.knots.len()];
         for ((variable, scale), fraction) in variables.iter().zip(scale).zip(x.iter()) {
             all[*variable] = fraction * scale;
         }

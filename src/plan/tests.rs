@@ -1,4 +1,4 @@
-//! What a plan keeps, whatever it is for.
+//! Properties of every plan.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
@@ -25,7 +25,7 @@ fn task(extruder: &TransferFunction, budget_s: f64) -> PlanTask<'_> {
     }
 }
 
-/// A path with corners, from rest to rest if asked for.
+/// A path with corners, from rest to rest or moving.
 fn path(corners: &[f64], end_mm: f64, rest: bool) -> SpeedProfile {
     let ends = if rest { 0.0 } else { 100.0 };
     let mut limits = PathLimits::new(0.0, ends);
@@ -50,7 +50,10 @@ fn keeps_its_limits(plan: &Plan, nominal: &SpeedProfile, most_s: f64) {
         assert!((0.0..=10.0).contains(&pair[1]), "{pair:?}");
         assert!((pair[1] - pair[0]).abs() <= 20.0 * Plan::EVERY_S + 1e-9, "{pair:?}");
     }
-    assert!(Plan::EVERY_S * super::flow::float(plan.command.len()) >= plan.speed.duration_s());
+    assert!(
+        Plan::EVERY_S * crate::numeric::number::to_f64(plan.command.len())
+            >= plan.speed.duration_s()
+    );
     assert!(plan.added_s >= -1e-9 && plan.added_s <= most_s + 1e-9, "{}", plan.added_s);
     assert!((plan.speed.duration_s() - nominal.duration_s() - plan.added_s).abs() < 1e-9);
 }
@@ -61,7 +64,7 @@ fn rms(plan: &Plan, from: f64, to: f64) -> f64 {
 }
 
 #[test]
-fn a_straight_is_left_as_it_is() {
+fn a_straight_path_is_unchanged() {
     let extruder = extruder();
     let nominal = path(&[], 2000.0, false);
     let plan = solve(&task(&extruder, 1.0), &nominal).unwrap();
@@ -76,7 +79,7 @@ fn corners_of_a_long_job_are_planned_one_after_the_other() {
     let nominal = path(&[400.0, 520.0, 1600.0], 2300.0, false);
     let plan = solve(&task(&extruder, 0.5), &nominal).unwrap();
     keeps_its_limits(&plan, &nominal, 1.5);
-    // No time for anything: the surplus of each corner stays.
+    // Without added time the surplus of each corner stays.
     let none = solve(&task(&extruder, 0.0), &nominal).unwrap();
     keeps_its_limits(&none, &nominal, 0.0);
     for (from, to) in [(300.0, 620.0), (1500.0, 1700.0)] {
@@ -114,7 +117,7 @@ fn a_speed_that_the_drive_cannot_feed_is_refused() {
 }
 
 #[test]
-fn a_nominal_speed_that_jumps_is_taken_as_fast_as_the_robot_can() {
+fn a_step_of_the_nominal_speed_is_limited_to_the_acceleration() {
     let extruder = extruder();
     let nominal = profile_of(&[(0.0, 100.0), (200.0, 100.0), (200.1, 20.0), (400.0, 20.0)]);
     let plan = solve(&task(&extruder, 1.0), &nominal.unwrap()).unwrap();

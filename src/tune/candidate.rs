@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::propose::{DistanceProposal, Proposal};
 use crate::cell::file::RunPart;
 use crate::width_control::pi::PiGains;
-use crate::width_control::strategy::Strategy;
+use crate::width_control::strategy::WidthStrategy;
 use crate::width_control::strategy::distance::DistanceStrategy;
 use crate::width_control::strategy::pi::PiStrategy;
 
@@ -15,7 +15,7 @@ pub struct ControllerCandidate {
     /// What it is called.
     pub name: String,
     /// Its width controller.
-    pub strategy: Arc<dyn Strategy>,
+    pub strategy: Arc<dyn WidthStrategy>,
     /// Gains of the PI controller.
     pub gains: Option<PiGains>,
     /// The camera's distance in its settings \[mm\].

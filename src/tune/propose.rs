@@ -8,7 +8,7 @@ use super::stability::{LoopMargins, LoopPlant};
 use crate::cell::file::RunPart;
 use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::pi::PiGains;
-use crate::width_control::strategy::Strategy;
+use crate::width_control::strategy::WidthStrategy;
 use crate::width_control::strategy::distance::DistanceStrategy;
 
 /// Random walk of the flow per root metre if less is not known; the default of the distance
@@ -71,7 +71,7 @@ pub fn slowest_loop(plant: &IdentifiedCell, target_mm: f64, limits: &SpeedLimits
     LoopPlant::at(plant, target_mm, limits.min_speed.get().max(1.0))
 }
 
-fn by_distance(plant: &IdentifiedCell, now: &dyn Strategy) -> DistanceProposal {
+fn by_distance(plant: &IdentifiedCell, now: &dyn WidthStrategy) -> DistanceProposal {
     let drift_per_root_m = match plant.width_noise.drift {
         Drift::Estimated { per_root_m, .. } => per_root_m,
         Drift::AtMost(max) => DEFAULT_DRIFT.min(max),

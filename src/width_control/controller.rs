@@ -1,13 +1,12 @@
-//! What sets the robot's speed from the widths that are measured: one trait, and what
-//! goes in and out of it.
+//! The trait of a width controller, which sets the robot's speed from the measured widths,
+//! and its inputs and outputs.
 //!
-//! The caller keeps the state of the bead (priming, tracking, holding), limits setpoints
-//! and sends them. A width controller is told what happens on the bead and answers with
-//! a speed. It reads no clock: time comes with each call.
+//! The caller keeps the mode of the bead (priming, tracking, holding), limits setpoints and
+//! sends them. A width controller reads no clock: time is an argument of each call.
 
 use std::fmt::Debug;
 
-use super::distance::{DistanceTrace, FallbackReason};
+use super::distance::{DistanceTrace, FallbackReason, WidthReading};
 use super::pi::Saturation;
 use super::steps::StepsTrace;
 use crate::core::time::{Span, Stamp};
@@ -15,45 +14,49 @@ use crate::core::units::{Mm, MmPerS};
 
 /// Sets the robot's speed so that the bead has its width.
 pub trait WidthController: Debug + Send {
-    /// A new bead begins; nothing of the bead before is under the camera any more.
+    /// A new bead begins. The bead before it is no longer under the camera.
     fn begin_bead(&mut self) {}
+
+    /// The robot reports no path: the path of the next report or width is integrated from
+    /// its speed.
+    fn path_is_estimated(&mut self) {}
 
     /// The robot reported while it lays bead.
     fn robot_reported(&mut self, _: &BeadReport) {}
 
-    /// A width was measured. Answers with when it tracks from, where it sets the speed
-    /// from now on or goes on to do so; none where it does not (yet).
+    /// A width was measured. Returns whether this controller sets the speed from now on, or
+    /// continues to; none where it does not (yet).
     fn measured(&mut self, sample: &WidthSample, trace: &mut WidthTrace) -> Option<Tracking>;
 
-    /// A setpoint is due. A controller that can begin to track, or is tracking, without
-    /// a width of this moment answers with the time to which it counts as up to date.
+    /// A setpoint is due on a bead that is priming or tracking. A controller that can track
+    /// without a new width returns the time up to which the width counts as known.
     fn before_setpoint(&mut self, _: &Outlook) -> Option<Stamp> {
         None
     }
 
-    /// The speed of the next setpoint, while it tracks; none where it cannot tell, and
-    /// the last one stays.
+    /// The speed of the next setpoint, while tracking. None keeps the last one.
     fn speed(&mut self, request: &SpeedRequest, trace: &mut WidthTrace) -> Option<MmPerS>;
 
-    /// Why it has fallen back to another way of control on this bead, if it has.
+    /// Why it has fallen back to another controller on this bead, if it has.
     fn fallback(&self) -> Option<FallbackReason> {
         None
     }
 }
 
-/// What the robot reported while it lays bead.
+/// A width controller of any strategy.
+pub type BoxedController = Box<dyn WidthController>;
+
+/// A report of the robot while it lays bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeadReport {
-    /// When it was reported.
+    /// When it arrived.
     pub at: Stamp,
-    /// Where the nozzle is along the path.
+    /// Path of the nozzle.
     pub path: Mm,
     /// Speed along the path.
     pub speed: MmPerS,
-    /// Flow at the nozzle over that of the start speed, without a unit.
+    /// Flow at the nozzle over the flow at the start speed, without a unit.
     pub flow_ratio: f64,
-    /// Whether the path is really known, and not made up.
-    pub is_path_known: bool,
 }
 
 /// One measured width.
@@ -61,72 +64,64 @@ pub struct BeadReport {
 pub struct WidthSample {
     /// When its frame was captured.
     pub captured_at: Stamp,
-    /// The width.
-    pub width: Mm,
-    /// Its standard deviation.
-    pub sigma: Mm,
-    /// Measured less wanted width.
+    /// The width and its standard deviation.
+    pub reading: WidthReading,
+    /// Measured less target width.
     pub error: Mm,
-    /// Where the nozzle was along the path when the frame was captured; none where that
-    /// is not known.
+    /// Path of the nozzle when the frame was captured; none where that is not known.
     pub nozzle_path: Option<Mm>,
     /// Whether the bead in the frame is the one that is being laid.
     pub is_own_bead: bool,
-    /// Until when the width was known, while it is being tracked.
+    /// Capture time up to which the width was known, while tracking.
     pub tracked: Option<Stamp>,
     /// Whether tracking may begin with this width.
     pub may_begin: bool,
-    /// Speed to start from without a bump: the robot's, without what a plan, a start or
-    /// a stop makes of it.
+    /// Speed for a bumpless start: the robot's speed, divided by the speed override.
     pub driven: MmPerS,
     /// In which direction the robot cannot follow.
     pub saturation: Saturation,
-    /// Whether the path is really known, and not made up.
-    pub is_path_known: bool,
 }
 
 /// A controller sets the speed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tracking {
-    /// Until when the width is known now.
+    /// Capture time up to which the width is known.
     pub seen_at: Stamp,
-    /// Whether it started anew from the speed that is driven.
+    /// Whether it was started (again) from the robot's speed.
     pub is_new: bool,
 }
 
 impl Tracking {
-    /// Tracking goes on.
+    /// Tracking continues.
     pub fn on(seen_at: Stamp) -> Self {
         Self { seen_at, is_new: false }
     }
 }
 
-/// How things stand before a setpoint.
+/// The state of a bead before a setpoint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outlook {
     /// Now.
     pub now: Stamp,
-    /// Where the nozzle is along the path.
+    /// Path of the nozzle.
     pub path: Option<Mm>,
-    /// How far that is from where the bead began.
+    /// Length of bead that is laid.
     pub laid: Option<Mm>,
-    /// Whether the bead's first part is being laid, at the start speed.
-    pub is_priming: bool,
-    /// Until when the width was known, while it is being tracked.
+    /// Capture time up to which the width is known, while tracking; none while priming.
     pub tracked: Option<Stamp>,
 }
 
-/// What a speed is asked for.
+/// What a speed is requested for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedRequest {
-    /// Where the nozzle is along the path.
+    /// Path of the nozzle.
     pub path: Option<Mm>,
-    /// When the robot will go at that speed.
+    /// When the robot will have that speed.
     pub from: Stamp,
     /// For how long.
     pub lasts: Span,
-    /// The mean width that is wanted of the bead which is laid then; none where the
-    /// robot was not heard.
+    /// Mean target width of the bead that is laid in that time; none where the robot's
+    /// state is not known.
     pub target: Option<Mm>,
 }
 
@@ -135,12 +130,12 @@ pub struct SpeedRequest {
 pub struct WidthTrace {
     /// Part of the demand that is proportional to the error.
     pub proportional: Option<MmPerS>,
-    /// Part of the demand that was integrated.
+    /// Integral part of the demand.
     pub integral: Option<MmPerS>,
-    /// Speed that the controller would like.
+    /// Demanded speed.
     pub demand: Option<MmPerS>,
-    /// What control by distance made of the width.
+    /// State of control by distance after the width.
     pub distance: Option<DistanceTrace>,
-    /// How far a course of steps is.
+    /// Progress of a step experiment.
     pub steps: Option<StepsTrace>,
 }

@@ -1,5 +1,5 @@
 //! Width control by distance: every width is compared with the speed at which that piece of
-//! bead was laid, and the speed is set at which the next piece gets the wanted width.
+//! bead was laid, and the speed is set at which the next piece gets the target width.
 //!
 //! The bead is w = A·(v/v₀)^−b. The camera sees bead that was laid a fixed *distance*
 //! earlier, whatever the speed has been since, so that no dead time lies between a width and
@@ -8,7 +8,7 @@
 //! ```text
 //! reports ─▶ speed history ─┐ speed where the bead under the camera was laid
 //! width ± σ ────────────────┴▶ sample ─▶ pulsation ─▶ flow change ─▶ width model (ln A, b) ─▶ speed
-//!                                └─▶ offset estimate (where the camera really looks)
+//!                                └─▶ offset estimate (the camera's true offset)
 //! ```
 //!
 //! There are no gains: how much a width moves the estimate follows from its own standard
@@ -36,12 +36,13 @@ use autocorrelation::NoiseAutocorrelation;
 use flow_change::ChangeDetector;
 use offset_estimate::OffsetEstimator;
 use pulsation::FlowPulsation;
-use sample::{ConsistencyMonitor, GaugeInterval, Measured, WidthSample};
+pub use sample::WidthReading;
+use sample::{ConsistencyMonitor, GaugeInterval, MatchedWidth};
 use speed_history::SpeedHistory;
 use validation::ModelValidation;
 use width_model::{WidthInnovation, WidthModel};
 
-/// What the law has to know of its cell.
+/// Settings of control by distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DistanceSettings {
     /// Path length from the nozzle back to the middle of the gauge.
@@ -52,71 +53,61 @@ pub struct DistanceSettings {
     pub gauge: Mm,
     /// Speed v₀ at which the bead is A wide.
     pub reference_speed: MmPerS,
-    /// Exponent b that the bead is begun with.
+    /// Initial exponent b.
     pub exponent: f64,
-    /// Whether b is learnt from the data, within 0.7 and 2.2 times what it is
-    /// begun with.
+    /// Whether b is estimated from the widths, within 0.7 and 2.2 times its initial value.
     pub learns_exponent: bool,
-    /// How far the flow wanders along a metre of path, as a share: standard
-    /// deviation, growing with the root of the way.
+    /// Drift of the flow, a random walk along the path: standard deviation over a metre, as
+    /// a fraction.
     pub drift_per_root_m: f64,
 }
 
-/// A width as the camera gives it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MeasuredWidth {
-    /// Mean width over the gauge.
-    pub width: Mm,
-    /// Its standard deviation.
-    pub sigma: Mm,
-}
-
-/// What became of a width.
+/// How a width was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WidthUse {
-    /// It was taken.
+    /// It updated the model.
     #[default]
     Taken,
-    /// It is too far from what was foretold, and waits for others that agree.
+    /// It is too far from its prediction; several that agree would make a flow change.
     Outlier,
-    /// With those before it, it shows that the flow has changed.
+    /// With the widths before it, it shows that the flow has changed.
     Change,
-    /// No speed is known for the bead that it shows.
+    /// The speed at which that bead was laid is not known.
     NotMatched,
 }
 
-/// What the law believes, for the record.
+/// The estimates after a width, for the record.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DistanceTrace {
-    /// What became of this width.
+    /// How this width was used.
     pub use_of_width: WidthUse,
     /// Width at the reference speed, A.
     pub level_mm: Mm,
-    /// Its standard deviation if the exponent is the one that is believed.
+    /// Its standard deviation, given the exponent.
     pub level_sigma_mm: Mm,
     /// Exponent b.
     pub exponent: f64,
-    /// Where the camera seems to look.
+    /// Estimated camera offset.
     pub offset_mm: Mm,
-    /// Period of a pulsation of the flow, where one is seen \[s\].
+    /// Period of a pulsation of the flow, where one is detected \[s\].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pulsation_s: Option<f64>,
 }
 
-/// Why the law is not to be trusted.
+/// Why PI control takes over from control by distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FallbackReason {
-    /// The robot moves, and reports no path.
+    /// The robot moves and reports no path.
     NoPath,
-    /// The width does not answer the speed as the model says.
+    /// The width does not follow the speed as the model predicts.
     ModelContradicted,
-    /// The bead that is seen is none whose speed is known.
+    /// Widths could not be matched to speeds.
     Unmatched,
 }
 
-/// The law with what it has seen.
+/// Control by distance with its estimates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DistanceController {
     settings: DistanceSettings,
@@ -128,39 +119,33 @@ pub struct DistanceController {
     consistency: ConsistencyMonitor,
     autocorrelation: NoiseAutocorrelation,
     validation: ModelValidation,
-    /// The nozzle's path when the first of the last widths came that show bead of which no
-    /// speed is known \[mm\].
+    /// Path of the nozzle at the first of the latest widths without a known speed \[mm\].
     unmatched_since_mm: Option<f64>,
-    /// Whether there were too many of them on this bead.
+    /// Whether such widths lasted too long on this bead.
     is_unmatched: bool,
 }
 
 impl DistanceController {
-    /// A law that has seen nothing yet.
+    /// A controller before the first width.
     pub fn new(settings: DistanceSettings) -> Self {
-        let exponent = settings.exponent;
+        let DistanceSettings { offset, offset_sigma, gauge, .. } = settings;
+        let history_mm = HISTORY_FACTOR * (offset + gauge).get() + MAX_UNMATCHED_MM;
         Self {
             settings,
-            speed_history: SpeedHistory::new(
-                settings.reference_speed.get(),
-                history_length_mm(&settings),
-            ),
-            model: WidthModel::new(exponent, settings.learns_exponent),
-            change_detector: ChangeDetector::new(settings.gauge.get()),
+            speed_history: SpeedHistory::new(settings.reference_speed.get(), history_mm),
+            model: WidthModel::new(settings.exponent, settings.learns_exponent),
+            change_detector: ChangeDetector::new(gauge.get()),
             pulsation: FlowPulsation::new(),
-            offset: OffsetEstimator::new(
-                settings.offset_sigma / settings.offset.max(Mm::constant(1.0)),
-            ),
+            offset: OffsetEstimator::new(offset_sigma / offset.max(Mm::constant(1.0))),
             consistency: ConsistencyMonitor::default(),
-            autocorrelation: NoiseAutocorrelation::new(settings.gauge.get()),
+            autocorrelation: NoiseAutocorrelation::new(gauge.get()),
             validation: ModelValidation::default(),
             unmatched_since_mm: None,
             is_unmatched: false,
         }
     }
 
-    /// A new bead: where the old one was laid is forgotten, what was learnt of
-    /// the flow is kept, and doubted a little.
+    /// A new bead: the speed history is cleared; the model is kept with a larger variance.
     pub fn begin_bead(&mut self) {
         self.speed_history.clear();
         self.change_detector.clear();
@@ -171,40 +156,34 @@ impl DistanceController {
         (self.unmatched_since_mm, self.is_unmatched) = (None, false);
     }
 
-    /// What the robot reported: where the nozzle is, and how fast it moves. The
-    /// bead is as wide as one laid at the speed over the share of the flow.
-    pub fn reported(&mut self, at: Stamp, path: Mm, speed: MmPerS, flow_share: f64) {
-        self.speed_history.report(at.secs(), path.get(), speed.get(), flow_share);
+    /// A robot report: path of the nozzle and speed. The bead is as wide as one laid at
+    /// `speed / flow_ratio`.
+    pub fn reported(&mut self, at: Stamp, path: Mm, speed: MmPerS, flow_ratio: f64) {
+        self.speed_history.report(at.secs(), path.get(), speed.get(), flow_ratio);
     }
 
-    /// A width of a frame that was captured with the nozzle at `nozzle_path`, and the width
-    /// that had been wanted there.
-    pub fn measured(
-        &mut self,
-        nozzle_path: Mm,
-        measured: MeasuredWidth,
-        wanted: Mm,
-    ) -> DistanceTrace {
+    /// A width of a frame that was captured with the nozzle at `nozzle_path`, and the target
+    /// width where that bead was laid.
+    pub fn measured(&mut self, nozzle_path: Mm, width: WidthReading, target: Mm) -> DistanceTrace {
         self.check_history(nozzle_path.get());
-        let MeasuredWidth { width, sigma } = measured;
-        let taken = match self.match_speed(nozzle_path.get(), width.get(), sigma.get()) {
-            Some(pairing) => self.take_sample(&pairing, nozzle_path.get(), wanted.get()),
+        let taken = match self.match_speed(nozzle_path.get(), width) {
+            Some(sample) => self.take_sample(&sample, nozzle_path.get(), target.get()),
             None => WidthUse::NotMatched,
         };
         self.trace(taken)
     }
 
-    /// The law's speed is driven from here on: what is laid now, it answers for.
+    /// The robot is driven at this controller's speed from here on.
     pub fn engaged(&mut self, nozzle_path: Mm) {
         self.validation.engage(nozzle_path.get());
     }
 
-    /// Whether enough has been seen to set a speed.
+    /// Whether the model is known, so that a speed can be set.
     pub fn is_ready(&self) -> bool {
         self.model.is_known()
     }
 
-    /// Why the law is not to be trusted any more, if so.
+    /// Why another controller must take over, if so.
     pub fn fallback_reason(&self) -> Option<FallbackReason> {
         if self.is_unmatched {
             return Some(FallbackReason::Unmatched);
@@ -212,8 +191,8 @@ impl DistanceController {
         self.validation.is_contradicted().then_some(FallbackReason::ModelContradicted)
     }
 
-    /// The speed at which the bead comes out `width` wide in the mean over a
-    /// stretch of time; `None` before anything has been seen.
+    /// The speed at which the bead is `width` wide in the mean over a time; `None` before the
+    /// first width.
     pub fn speed(&self, width: Mm, from: Stamp, lasts: Span) -> Option<MmPerS> {
         if !self.is_ready() || width <= Mm::ZERO {
             return None;
@@ -226,8 +205,8 @@ impl DistanceController {
         MmPerS::new(speed).ok()
     }
 
-    /// Notices when no speed is known of the bead that is seen for longer than a bead's
-    /// beginning takes to come under the camera.
+    /// Notices when widths cannot be matched to speeds for longer than the start of a bead
+    /// takes to come under the camera.
     fn check_history(&mut self, nozzle_path: f64) {
         let (position, half) = (self.gauge_centre(nozzle_path), 0.5 * self.settings.gauge.get());
         if self.speed_history.mean_over(position - half, position + half).is_some() {
@@ -235,8 +214,8 @@ impl DistanceController {
             return;
         }
         let since = *self.unmatched_since_mm.get_or_insert(nozzle_path);
-        let longest = (self.settings.offset + self.settings.gauge).get() + MAX_UNMATCHED_MM;
-        self.is_unmatched |= nozzle_path - since > longest;
+        let limit = (self.settings.offset + self.settings.gauge).get() + MAX_UNMATCHED_MM;
+        self.is_unmatched |= nozzle_path - since > limit;
     }
 
     /// Middle of the gauge along the path \[mm\].
@@ -244,8 +223,8 @@ impl DistanceController {
         nozzle_path - self.settings.offset.get() * self.offset.factor()
     }
 
-    fn match_speed(&self, nozzle_path: f64, width: f64, sigma: f64) -> Option<WidthSample> {
-        if width <= 0.0 || self.speed_history.is_empty() {
+    fn match_speed(&self, nozzle_path: f64, reading: WidthReading) -> Option<MatchedWidth> {
+        if reading.width <= Mm::ZERO || self.speed_history.is_empty() {
             return None;
         }
         let offset = self.settings.offset.get();
@@ -254,70 +233,55 @@ impl DistanceController {
             length_mm: self.settings.gauge.get(),
             centre_tolerance_mm: OFFSET_SIGMAS * self.offset.sigma() * offset,
         };
-        let measured = Measured { width_mm: width, sigma_mm: sigma };
-        WidthSample::new(&self.speed_history, gauge, measured, self.model.exponent())
+        MatchedWidth::new(&self.speed_history, gauge, reading, self.model.exponent())
     }
 
-    fn take_sample(&mut self, seen: &WidthSample, nozzle_path: f64, wanted: f64) -> WidthUse {
-        // As much less as widths that hang together say.
-        let pairing =
-            &WidthSample { noise: seen.noise * self.autocorrelation.inflation(), ..*seen };
-        let drift = self.drift_per_mm() * self.model.distance_to(pairing.position_mm);
-        let pulsation = self.pulsation.at(pairing.laid_s);
-        let (gauge, offset) = (self.settings.gauge.get(), self.settings.offset.get());
+    fn take_sample(&mut self, seen: &MatchedWidth, nozzle_path: f64, target: f64) -> WidthUse {
+        // Correlated widths count less than independent ones.
+        let sample =
+            &MatchedWidth { noise: seen.noise * self.autocorrelation.inflation(), ..*seen };
+        let drift = self.drift_per_mm() * self.model.distance_to(sample.position_mm);
+        let pulsation = self.pulsation.at(sample.laid_s);
         let observation = offset_estimate::OffsetObservation {
             nozzle_path,
-            offset,
-            gauge,
-            ln_width: pairing.ln_width - pulsation,
+            offset: self.settings.offset.get(),
+            gauge: self.settings.gauge.get(),
+            ln_width: sample.ln_width - pulsation,
             exponent: self.model.exponent(),
-            variance: pairing.noise,
+            variance: sample.noise,
             drift,
         };
         self.offset.update(&self.speed_history, &observation);
-        self.model.advance_to(pairing.position_mm, drift);
-        let spread = self.model.predicted_variance(pairing.ln_speed);
-        let plain = pairing.ln_width + self.model.exponent() * pairing.ln_speed;
+        self.model.advance_to(sample.position_mm, drift);
+        let spread = self.model.predicted_variance(sample.ln_speed);
+        let plain = sample.ln_width + self.model.exponent() * sample.ln_speed;
         let correlated = seen.noise * self.autocorrelation.correlated_inflation()
             + seen.offset_sigma * seen.offset_sigma;
-        self.pulsation.update(
-            pairing.laid_s,
-            plain,
-            correlated + LEVEL_VARIANCE_FACTOR * spread,
-            drift,
-        );
-        self.update(pairing, pairing.ln_width - pulsation, libm::log(wanted.max(1e-3)), drift)
+        let variance = correlated + LEVEL_VARIANCE_FACTOR * spread;
+        self.pulsation.update(sample.laid_s, plain, variance, drift);
+        self.update(sample, sample.ln_width - pulsation, libm::log(target.max(1e-3)), drift)
     }
 
-    /// Takes a width that has been freed of the pulsation, or leaves it.
-    fn update(
-        &mut self,
-        pairing: &WidthSample,
-        ln_width: f64,
-        ln_wanted: f64,
-        drift: f64,
-    ) -> WidthUse {
+    /// Updates the model with a width whose pulsation is subtracted, or rejects the width.
+    fn update(&mut self, sample: &MatchedWidth, ln_w: f64, ln_target: f64, drift: f64) -> WidthUse {
         let before = self.model;
-        let sight = self.change_detector.observation(pairing, ln_width);
-        let innovation = self.model.innovation(&sight);
-        let calm = self.consistency.is_consistent();
-        if !(calm && innovation.is_outlier()) {
+        let observation = self.change_detector.observation(sample, ln_w);
+        let innovation = self.model.innovation(&observation);
+        let consistent = self.consistency.is_consistent();
+        if !(consistent && innovation.is_outlier()) {
             let correlated_variance =
-                pairing.variance() * (1.0 - 1.0 / self.autocorrelation.inflation());
+                sample.variance() * (1.0 - 1.0 / self.autocorrelation.inflation());
             let alone = WidthInnovation {
                 variance: innovation.variance - correlated_variance,
                 ..innovation
             };
-            self.autocorrelation.update(pairing.position_mm, alone);
+            self.autocorrelation.update(sample.position_mm, alone);
         }
-        self.change_detector.push(pairing, ln_width, before, calm);
-        self.consistency.update(
-            pairing.laid_s,
-            innovation,
-            pairing.variance() / innovation.variance,
-        );
-        self.validation.update(pairing, innovation, ln_wanted, drift);
-        if let Some(before) = self.change_detector.revert(pairing, ln_width, innovation, drift) {
+        self.change_detector.push(sample, ln_w, before, consistent);
+        let fraction = sample.variance() / innovation.variance;
+        self.consistency.update(sample.laid_s, innovation, fraction);
+        self.validation.update(sample, innovation, ln_target, drift);
+        if let Some(before) = self.change_detector.revert(sample, ln_w, innovation, drift) {
             self.pulsation.shift(before.ln_width() - self.model.ln_width(), 0.0);
             self.model = before;
             return WidthUse::Taken;
@@ -326,17 +290,17 @@ impl DistanceController {
             self.model.is_known() && innovation.is_outlier() && !self.consistency.is_inconsistent();
         if !outlier {
             let learns = self.consistency.is_consistent() || self.model.exponent_is_uncertain();
-            let tells =
-                self.model.informs_exponent(pairing.ln_speed) && !pairing.is_offset_sensitive();
-            self.model.update(&sight, learns && tells);
+            let informs =
+                self.model.informs_exponent(sample.ln_speed) && !sample.is_offset_sensitive();
+            self.model.update(&observation, learns && informs);
         }
-        let Some(found) = self.change_detector.find() else {
+        let Some(change) = self.change_detector.find() else {
             return if outlier { WidthUse::Outlier } else { WidthUse::Taken };
         };
         self.validation.reset_steady();
         self.autocorrelation.reset();
-        self.pulsation.shift(found.size, found.variance);
-        self.model = found.level_after(pairing.position_mm, self.drift_per_mm());
+        self.pulsation.shift(change.size, change.variance);
+        self.model = change.model_after(sample.position_mm, self.drift_per_mm());
         WidthUse::Change
     }
 
@@ -358,20 +322,17 @@ impl DistanceController {
     }
 }
 
-/// Bead behind the nozzle of which the law has to know the speed \[mm\]: to where the camera
-/// looks, and what it may look further.
-fn history_length_mm(settings: &DistanceSettings) -> f64 {
-    HISTORY_FACTOR * (settings.offset + settings.gauge).get() + MAX_UNMATCHED_MM
-}
-
-/// Times the way to the end of the gauge for which speeds are kept.
+/// Length of the speed history over the distance from the nozzle to the far end of the gauge.
+/// The estimated offset may exceed the stated one by at most 24 % (`offset_estimate`).
 const HISTORY_FACTOR: f64 = 2.0;
-/// Way over which widths without a speed are nothing to worry about, beside that to the
-/// camera \[mm\].
+/// Path over which widths may have no known speed, beyond the start of a bead \[mm\]. A
+/// longer one delays the fallback; with a shorter one a short loss of reports causes it.
 const MAX_UNMATCHED_MM: f64 = 50.0;
-/// Largest logarithm of a speed over the reference speed; beyond it limits act.
+/// Largest logarithm of a speed over the reference speed. It only keeps the exponential
+/// finite; the speed limits act long before.
 const MAX_LN_SPEED_RATIO: f64 = 5.0;
-/// Standard deviations of the offset by which a pairing may be wrong.
+/// Error of the offset that a sample allows for, in standard deviations.
 const OFFSET_SIGMAS: f64 = 2.0;
-/// How many times over a level that is hardly known counts against a pulsation.
+/// Weight of the variance of the predicted width in the observation of a pulsation. A larger
+/// value keeps an uncertain model from being taken for a pulsation, and detects one later.
 const LEVEL_VARIANCE_FACTOR: f64 = 4.0;

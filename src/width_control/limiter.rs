@@ -1,5 +1,4 @@
-//! Keeps setpoints within the cell's range and slew, and says which limit
-//! acted.
+//! Keeps setpoints within the cell's range and acceleration, and reports which limit acted.
 
 use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
@@ -15,44 +14,44 @@ pub enum SpeedLimit {
     /// None.
     #[default]
     None,
-    /// The slowest speed of the cell.
+    /// The lowest speed of the cell.
     MinSpeed,
-    /// The fastest speed of the cell.
+    /// The highest speed of the cell.
     MaxSpeed,
     /// The acceleration of the cell, while speeding up.
     Acceleration,
     /// The acceleration of the cell, while slowing down.
     Deceleration,
-    /// The robot's own: it moves slower than it was told.
+    /// The robot's own: it moves slower than its setpoint.
     RobotSlower,
-    /// The robot's own: it moves faster than it was told.
+    /// The robot's own: it moves faster than its setpoint.
     RobotFaster,
 }
 
-/// What a setpoint may be.
+/// Range and fastest change of setpoints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedLimits {
-    /// Slowest setpoint.
+    /// Lowest setpoint.
     pub min_speed: MmPerS,
-    /// Fastest setpoint.
+    /// Highest setpoint.
     pub max_speed: MmPerS,
     /// Fastest change of setpoints.
     pub max_accel: MmPerS2,
 }
 
-/// A setpoint that keeps the limits.
+/// A setpoint within the limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LimitedSpeed {
     /// The setpoint.
     pub speed: MmPerS,
-    /// The limit that shaped it.
+    /// The limit that acted on it.
     pub limit: SpeedLimit,
 }
 
 impl SpeedLimits {
-    /// The setpoint nearest to a demand that keeps the limits, `dt` after the
-    /// last one. Range goes before slew: a last setpoint outside the range is
-    /// left at once.
+    /// The setpoint nearest to a demand within the limits, `dt` after the last one. The
+    /// range has priority over the acceleration: a last setpoint outside the range is left
+    /// at once.
     pub fn apply(&self, demand: MmPerS, last: MmPerS, dt: Span) -> LimitedSpeed {
         let (ranged, range_limit) = if demand < self.min_speed {
             (self.min_speed, SpeedLimit::MinSpeed)
@@ -101,7 +100,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_demand_leaves_the_range_or_the_slew(
+        fn no_demand_leaves_the_range_or_the_acceleration(
             demand in -1e6..1e6, last in 60.0..150.0, dt_s in 0.0..1.0,
         ) {
             let (speed, _) = apply(demand, last, dt_s);

@@ -1,27 +1,28 @@
-//! The nozzle's path where a robot reports none: its speed, added up.
+//! The nozzle's path where a robot reports none: its speed, integrated.
 
 use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 
-/// Way by the speed over which a path that stands is believed.
+/// Integrated speed over which a constant path is accepted. A smaller value takes a robot
+/// that reports its path late for one that reports none.
 const MAX_UNREPORTED: Mm = Mm::constant(20.0);
 
-/// Watches whether the path that a robot reports goes on with its speed.
+/// Monitors whether the path that a robot reports grows with its speed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Odometer {
     last: Option<(Stamp, RobotState)>,
-    /// Way by the speed since the reported path last changed.
+    /// Integrated speed since the reported path last changed.
     unreported: Mm,
     /// Whether the robot reports no path.
     reports_no_path: bool,
-    /// What is added to the reported path.
+    /// Correction that is added to the reported path.
     added: Mm,
 }
 
 impl Odometer {
-    /// The report as it should be: with a path that goes on with the speed
-    /// where the robot's stands although it moves.
+    /// The report with a path that grows with the speed, also where the reported one is
+    /// constant although the robot moves.
     pub fn correct(&mut self, now: Stamp, state: &RobotState) -> RobotState {
         let falls = self.last.is_some_and(|(_, last)| state.path_mm < last.path_mm);
         if falls || !state.mode.lays_bead() {
@@ -31,15 +32,15 @@ impl Odometer {
             return *state;
         }
         if let Some((at, last)) = self.last {
-            let way = last.speed_mm_per_s * (now - at);
+            let moved = last.speed_mm_per_s * (now - at);
             if state.path_mm == last.path_mm {
-                self.unreported = self.unreported + way.max(Mm::ZERO);
+                self.unreported = self.unreported + moved.max(Mm::ZERO);
             } else if !self.reports_no_path {
                 self.unreported = Mm::ZERO;
             }
             if self.reports_no_path {
-                // A path that begins to grow late grows beside the speed's.
-                self.added = self.added + way - (state.path_mm - last.path_mm);
+                // A path that begins to grow later is counted once.
+                self.added = self.added + moved - (state.path_mm - last.path_mm);
             } else if self.unreported > MAX_UNREPORTED {
                 self.reports_no_path = true;
                 self.added = self.unreported;
@@ -73,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_that_is_reported_stays_as_it_is() {
+    fn a_reported_path_is_not_changed() {
         let mut odometer = Odometer::default();
         for k in 0..50 {
             let at = 0.1 * f64::from(k);
@@ -84,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn where_none_is_reported_the_speed_makes_one() {
+    fn a_missing_path_is_integrated_from_the_speed() {
         let mut odometer = Odometer::default();
         let mut path = 0.0;
         for k in 0..50 {
@@ -93,7 +94,7 @@ mod tests {
         }
         assert!(odometer.reports_no_path());
         assert!((path - (7.0 + 490.0)).abs() < 1e-6, "{path}");
-        // One that begins to count late, or anew, counts once.
+        // A path that begins to count later, or again, counts once.
         let late = odometer.correct(Stamp::from_secs(5.0), &report(17.0, RobotMode::Print));
         assert!((late.path_mm.get() - (path + 10.0)).abs() < 1e-6, "{late:?}");
         let anew = odometer.correct(Stamp::from_secs(5.1), &report(1.0, RobotMode::Print));

@@ -1,6 +1,5 @@
-//! Where along the path the nozzle was at a moment, from what the robot
-//! reported. What the camera sees now was laid when the nozzle was the
-//! camera's offset further back, whatever the speed has been since.
+//! The nozzle's path at a moment, from the robot's reports. The bead under the camera was
+//! laid when the nozzle was the camera's offset further back, whatever the speed since.
 
 use std::collections::VecDeque;
 
@@ -8,10 +7,10 @@ use crate::core::robot::RobotState;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
 
-/// Reports that are kept: more than three seconds at the fastest rate.
+/// Reports that are kept: 3.2 s at 50 Hz, more than a frame takes from capture to width.
 const MAX_REPORTS: usize = 160;
-/// Longest extrapolation beyond the newest report; the link counts as lost
-/// after this time.
+/// Longest extrapolation beyond the newest report. After this time the link counts as lost
+/// (`robot/PROTOCOL.md`, § Connections).
 const MAX_EXTRAPOLATION: Span = Span::from_millis(500);
 
 /// The nozzle's path over time.
@@ -34,8 +33,8 @@ impl Default for PathHistory {
 }
 
 impl PathHistory {
-    /// Takes a report that arrived at a moment. A path that falls belongs to
-    /// a new bead, and the old one is forgotten.
+    /// Adds a report that arrived at a moment. A path that falls belongs to a new bead, and
+    /// the reports of the old one are discarded.
     pub fn observe(&mut self, at: Stamp, state: &RobotState) {
         if self.reports.back().is_some_and(|last| state.path_mm < last.path || at <= last.at) {
             self.reports.clear();
@@ -46,9 +45,8 @@ impl PathHistory {
         self.reports.push_back(Report { at, path: state.path_mm, speed: state.speed_mm_per_s });
     }
 
-    /// Distance of the nozzle along the path at a moment: between two reports
-    /// on the line between them, after the newest at its speed. `None` before
-    /// the oldest and too long after the newest.
+    /// Path of the nozzle at a moment: interpolated between two reports, extrapolated after
+    /// the newest at its speed. `None` before the oldest and too long after the newest.
     pub fn path_at(&self, at: Stamp) -> Option<Mm> {
         let newest = self.reports.back()?;
         if at >= newest.at {
@@ -80,11 +78,11 @@ mod tests {
     }
 
     #[test]
-    fn between_reports_the_path_is_a_line_and_after_them_it_goes_on() {
-        let mut transport = PathHistory::default();
-        transport.observe(Stamp::from_secs(1.0), &report(100.0, 50.0));
-        transport.observe(Stamp::from_secs(1.2), &report(120.0, 60.0));
-        let path = |secs| transport.path_at(Stamp::from_secs(secs)).map(Mm::get);
+    fn the_path_is_interpolated_between_reports_and_extrapolated_after_them() {
+        let mut history = PathHistory::default();
+        history.observe(Stamp::from_secs(1.0), &report(100.0, 50.0));
+        history.observe(Stamp::from_secs(1.2), &report(120.0, 60.0));
+        let path = |secs| history.path_at(Stamp::from_secs(secs)).map(Mm::get);
         assert_eq!(path(0.9), None);
         assert!((path(1.05).unwrap() - 105.0).abs() < 1e-9);
         assert!((path(1.3).unwrap() - 126.0).abs() < 1e-9);
@@ -92,10 +90,10 @@ mod tests {
     }
 
     #[test]
-    fn a_new_bead_forgets_the_old() {
-        let mut transport = PathHistory::default();
-        transport.observe(Stamp::from_secs(1.0), &report(1900.0, 50.0));
-        transport.observe(Stamp::from_secs(1.1), &report(0.0, 50.0));
-        assert_eq!(transport.path_at(Stamp::from_secs(1.05)), None);
+    fn a_new_bead_discards_the_old() {
+        let mut history = PathHistory::default();
+        history.observe(Stamp::from_secs(1.0), &report(1900.0, 50.0));
+        history.observe(Stamp::from_secs(1.1), &report(0.0, 50.0));
+        assert_eq!(history.path_at(Stamp::from_secs(1.05)), None);
     }
 }

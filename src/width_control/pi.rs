@@ -1,63 +1,61 @@
-//! Proportional-integral law on the width error, with the time step as an
-//! argument. Shojaei Barjuei et al. 2022, eq. (4), with the sign that
-//! regulates: error = measured − wanted, so that a bead too wide speeds the
-//! robot up.
+//! Proportional-integral control on the width error, with the time step as an argument.
+//! Shojaei Barjuei et al. 2022, eq. (4), with the sign that regulates:
+//! error = measured − target, so that a bead that is too wide speeds the robot up.
 
 use crate::core::time::Span;
 use crate::core::units::{Mm, MmPerS};
 
-/// Gains of the law, on an error in millimetres.
+/// Gains on an error in millimetres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PiGains {
     /// Speed for each millimetre of error \[mm/s per mm\].
     pub kp_per_s: f64,
-    /// Speed gathered each second for each millimetre of error \[mm/s² per mm\].
+    /// Speed integrated each second for each millimetre of error \[mm/s² per mm\].
     pub ki_per_s2: f64,
 }
 
-/// In which direction what was applied cannot follow what was demanded.
+/// In which direction the applied speed cannot follow the demand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Saturation {
     /// It follows.
     #[default]
     None,
-    /// A higher speed cannot be had.
+    /// A higher speed cannot be reached.
     Above,
-    /// A lower speed cannot be had.
+    /// A lower speed cannot be reached.
     Below,
 }
 
-/// The law with its memory.
+/// The controller with its integrator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pi {
     gains: PiGains,
     integral: MmPerS,
 }
 
-/// A demand and the parts that it is made of.
+/// A demanded speed and its parts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Demand {
-    /// Speed that the law would like.
+    /// Demanded speed.
     pub speed: MmPerS,
-    /// Part that is proportional to the error.
+    /// Proportional part.
     pub proportional: MmPerS,
-    /// Part that has been gathered.
+    /// Integral part.
     pub integral: MmPerS,
 }
 
 impl Pi {
-    /// Starts so that the first demand at this error is the speed that is
-    /// being driven: no bump.
+    /// Starts so that the first demand at this error is the robot's speed (bumpless).
     pub fn start_bumpless(gains: PiGains, driven: MmPerS, error: Mm) -> Self {
         let proportional = proportional(gains, error);
         Self { gains, integral: driven - proportional }
     }
 
-    /// One step over `dt` since the last error. The integral is not gathered
-    /// further into a direction in which what was applied cannot follow
-    /// (anti-windup by conditional integration).
+    /// One step over `dt` since the last error. The integrator is frozen in a direction in
+    /// which the applied speed cannot follow (anti-windup by conditional integration).
     pub fn step(&mut self, error: Mm, dt: Span, saturation: Saturation) -> Demand {
-        let increment = MmPerS::ZERO + integral_increment(self.gains, error, dt);
+        let increment = self.gains.ki_per_s2 * error.get() * dt.secs();
+        let increment = MmPerS::ZERO + MmPerS::new(increment).unwrap_or_default();
         let against = match saturation {
             Saturation::None => false,
             Saturation::Above => increment > MmPerS::ZERO,
@@ -75,10 +73,6 @@ fn proportional(gains: PiGains, error: Mm) -> MmPerS {
     MmPerS::new(gains.kp_per_s * error.get()).unwrap_or_default()
 }
 
-fn integral_increment(gains: PiGains, error: Mm, dt: Span) -> MmPerS {
-    MmPerS::new(gains.ki_per_s2 * error.get() * dt.secs()).unwrap_or_default()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -94,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_demand_is_the_speed_that_is_driven() {
+    fn the_first_demand_is_the_robots_speed() {
         let error = Mm::constant(-3.4);
         let mut pi = Pi::start_bumpless(GAINS, MmPerS::constant(112.5), error);
         let demand = pi.step(error, Span::ZERO, Saturation::None);
@@ -102,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_error_is_gathered_with_the_time_that_passes() {
+    fn a_constant_error_is_integrated_over_time() {
         let mut often = Pi::start_bumpless(GAINS, MmPerS::ZERO, Mm::ZERO);
         let mut seldom = often;
         for _ in 0..9 {
@@ -115,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_gathered_against_a_limit_but_the_way_back_is_free() {
+    fn the_integrator_is_frozen_against_a_limit_and_free_to_return() {
         let mut pi = Pi::start_bumpless(GAINS, MmPerS::constant(60.0), Mm::ZERO);
         let low = pi.step(Mm::constant(-1.0), TENTH, Saturation::Below);
         assert_eq!(low.integral, MmPerS::constant(60.0));

@@ -1,17 +1,17 @@
-//! Steps of the speed along the path, from which the bead, the camera's distance
-//! and the robot can be found.
+//! A step experiment: steps of the speed along the path, from which the bead, the camera's
+//! offset and the robot are identified.
 //!
-//! Pieces are of uneven length, so that no shift of the course by another distance
-//! looks like the course itself: the camera's distance comes out of it without a
-//! second answer. Each is laid at the start speed or a share more or less.
+//! The pieces have unequal lengths, so that the autocorrelation of the profile has one clear
+//! maximum, at zero: the camera's offset is identified without ambiguity. Each piece is laid
+//! at the start speed or at a fraction more or less.
 
 use serde::{Deserialize, Serialize};
 
 use crate::core::units::{Mm, MmPerS, WidthRange};
 
-/// The pieces: length over the reach, and how many shares the speed is changed by.
-/// Drawn once, with lengths of 0.7 to 2 and no piece like the one before, from those
-/// whose course is least like itself at any other distance.
+/// The pieces: length over the camera's reach, and change of the speed in steps. Drawn at
+/// random once, with lengths of 0.7 to 2 and no two equal neighbours; of the draws the one
+/// with the smallest autocorrelation at other distances.
 const PIECES: [(f64, f64); 11] = [
     (1.3, 1.0),
     (0.8, -1.0),
@@ -25,29 +25,31 @@ const PIECES: [(f64, f64); 11] = [
     (1.2, 0.0),
     (0.85, -1.0),
 ];
-/// Shortest reach that pieces are made for: that of a camera on the nozzle.
+/// Shortest reach that pieces are made for, as of a camera at the nozzle. Shorter pieces
+/// would be laid before the robot has reached their speed.
 const SHORTEST_REACH: Mm = Mm::constant(20.0);
-/// Part of the range of widths at either of its ends that ends the experiment.
+/// Fraction of the accepted range of widths, at either end, in which a width ends the
+/// experiment.
 const RANGE_MARGIN: f64 = 0.05;
-/// Way after the last piece until the camera has seen it, over the reach: the
-/// camera's distance is not known well before the experiment.
+/// Path after the last piece until the camera has seen it, over the reach. More than 1:
+/// before the experiment the camera's offset is not known well.
 const CAMERA_REACHES: f64 = 1.5;
 
-/// What the course is made of.
+/// Settings of a step experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepSettings {
-    /// Speed about which it steps.
+    /// Speed that the steps are added to.
     pub start_speed: MmPerS,
-    /// Change of the speed, as a share of it.
+    /// Change of the speed, as a fraction of it.
     pub step_ratio: f64,
     /// Distance from the nozzle to the far end of the gauge.
     pub camera_reach: Mm,
-    /// Narrowest and widest width that is believed.
+    /// Narrowest and widest width that is accepted.
     pub width_range: WidthRange,
 }
 
 impl StepSettings {
-    /// Slowest and fastest speed that is asked for.
+    /// Slowest and fastest speed.
     pub fn speeds(&self) -> (MmPerS, MmPerS) {
         (self.start_speed * (1.0 - self.step_ratio), self.start_speed * (1.0 + self.step_ratio))
     }
@@ -66,22 +68,21 @@ impl StepSettings {
         self.unit() * PIECES.iter().map(|(length, _)| length).sum::<f64>()
     }
 
-    /// Path length from the first piece on until the camera has seen the last.
+    /// Path length from the first piece until the camera has seen the last.
     pub fn length_until_seen(&self) -> Mm {
         self.length() + self.unit() * CAMERA_REACHES
     }
 
-    /// Number of the piece at a way into the course, and its speed; none behind its
-    /// end.
-    fn piece(&self, way: Mm) -> Option<(u32, MmPerS)> {
+    /// Number and speed of the piece at a path length from the first; none after the last.
+    fn piece(&self, along: Mm) -> Option<(u32, MmPerS)> {
         let mut end = Mm::ZERO;
-        (0_u32..).zip(PIECES).find_map(|(number, (length, shares))| {
+        (0_u32..).zip(PIECES).find_map(|(number, (length, steps))| {
             end = end + self.unit() * length;
-            (way < end).then(|| (number, self.start_speed * (1.0 + self.step_ratio * shares)))
+            (along < end).then(|| (number, self.start_speed * (1.0 + self.step_ratio * steps)))
         })
     }
 
-    /// Whether a width is so near an end of the range that steps are not to go on.
+    /// Whether a width is so near an end of the range that the experiment ends.
     fn is_near_range_end(&self, width: Mm) -> bool {
         let WidthRange { min, max } = self.width_range;
         let margin = (max - min) * RANGE_MARGIN;
@@ -89,70 +90,65 @@ impl StepSettings {
     }
 }
 
-/// How far the experiment is.
+/// Progress of the experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StepsProgress {
     /// A piece is being laid; they count from 0.
     Piece(u32),
-    /// All pieces are laid, or none will be any more; the camera has yet to see the
-    /// last of them.
+    /// All pieces are laid, or the experiment was ended; the camera has not yet seen the
+    /// last piece.
     Seeing,
-    /// The camera has seen them.
+    /// The camera has seen all pieces.
     Over,
 }
 
 /// What the experiment did in a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StepsTrace {
-    /// How far it is.
+    /// Its progress.
     pub progress: StepsProgress,
-    /// The width that ended it before its time, because it came near an end of the
-    /// range of widths.
+    /// The width near an end of the accepted range that ended it, if one did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub near_end_mm: Option<Mm>,
 }
 
-/// The course of one bead.
+/// The step experiment of one bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Steps {
-    settings: StepSettings,
-    /// Where on the path it began.
+    /// Its settings.
+    pub settings: StepSettings,
+    /// Path where it began.
     begun: Option<Mm>,
-    /// Where it was ended before its time, and by which width.
+    /// Path and width that ended it early.
     ended: Option<(Mm, Mm)>,
 }
 
 impl Steps {
-    /// A course that has not begun.
+    /// An experiment that has not begun.
     pub fn new(settings: StepSettings) -> Self {
         Self { settings, begun: None, ended: None }
     }
 
-    /// A new bead, with a course of its own.
-    pub fn begin_bead(&mut self) {
-        *self = Self::new(self.settings);
-    }
-
-    /// The course begins with the nozzle at a place, unless it has begun.
+    /// Begins with the nozzle at a path, unless it has begun.
     pub fn begin(&mut self, path: Mm) {
         self.begun = self.begun.or(Some(path));
     }
 
-    /// Looks at a width, with the nozzle at a place: one near an end of the range
-    /// ends the steps for the rest of the bead.
-    pub fn measured(&mut self, path: Mm, width: Mm) {
+    /// Ends the steps for the rest of the bead if a width, measured with the nozzle at a
+    /// path, is near an end of the accepted range.
+    pub fn check_range(&mut self, path: Mm, width: Mm) {
         if self.begun.is_some() && self.settings.is_near_range_end(width) {
             self.ended = self.ended.or(Some((path, width)));
         }
     }
 
-    /// The speed to be driven with the nozzle at a place.
-    pub fn speed(&self, path: Mm) -> MmPerS {
+    /// The speed with the nozzle at a path.
+    pub fn speed_at(&self, path: Mm) -> MmPerS {
         self.piece(path).map_or(self.settings.start_speed, |(_, speed)| speed)
     }
 
-    /// How far the course is with the nozzle at a place.
+    /// Progress with the nozzle at a path.
     pub fn trace(&self, path: Mm) -> StepsTrace {
         let all = self.begun.map_or(path, |begun| begun + self.settings.length());
         let last = self.ended.map_or(all, |(at, _)| at.min(all));
@@ -193,11 +189,11 @@ mod tests {
     }
 
     #[test]
-    fn the_course_follows_the_path_and_ends_at_the_start_speed() {
+    fn speed_follows_the_pieces_and_ends_at_the_start_speed() {
         let steps = begun();
         let at =
-            |path: f64| (steps.speed(Mm::constant(path)).get(), steps.trace(Mm::constant(path)));
-        let close = |speed: f64, wanted: f64| assert!((speed - wanted).abs() < 1e-9, "{speed}");
+            |path: f64| (steps.speed_at(Mm::constant(path)).get(), steps.trace(Mm::constant(path)));
+        let close = |speed: f64, expected: f64| assert!((speed - expected).abs() < 1e-9, "{speed}");
         close(at(251.0).0, 110.0);
         close(at(381.0).0, 90.0);
         close(at(470.0).0, 100.0);
@@ -209,30 +205,30 @@ mod tests {
     }
 
     #[test]
-    fn a_width_near_an_end_of_the_range_ends_it_for_the_bead() {
+    fn a_width_near_an_end_of_the_range_ends_the_experiment() {
         let mut steps = begun();
-        steps.measured(Mm::constant(300.0), Mm::constant(40.0));
+        steps.check_range(Mm::constant(300.0), Mm::constant(40.0));
         assert_eq!(steps.trace(Mm::constant(300.0)).progress, StepsProgress::Piece(0));
-        steps.measured(Mm::constant(310.0), Mm::constant(58.5));
-        assert_eq!(steps.speed(Mm::constant(310.0)).get(), 100.0);
+        steps.check_range(Mm::constant(310.0), Mm::constant(58.5));
+        assert_eq!(steps.speed_at(Mm::constant(310.0)).get(), 100.0);
         let trace = steps.trace(Mm::constant(320.0));
         assert_eq!(trace.progress, StepsProgress::Seeing);
         assert_eq!(trace.near_end_mm, Some(Mm::constant(58.5)));
-        steps.measured(Mm::constant(330.0), Mm::constant(40.0));
+        steps.check_range(Mm::constant(330.0), Mm::constant(40.0));
         assert_eq!(steps.trace(Mm::constant(470.0)).progress, StepsProgress::Over);
-        steps.begin_bead();
-        assert_eq!(steps.trace(Mm::ZERO).near_end_mm, None);
     }
 
-    /// The course less its mean is nowhere as much like itself as at no shift at all.
+    /// The autocorrelation of the speed about its mean is below half of its maximum at every
+    /// shift of a piece or more.
     #[test]
-    fn no_other_distance_looks_like_the_course() {
-        let course =
+    fn the_autocorrelation_has_one_clear_maximum() {
+        let profile =
             |at: f64| settings().piece(Mm::constant(at)).map_or(0.0, |(_, v)| v.get() - 100.0);
-        let like = |shift: f64| {
-            (0..1400).map(f64::from).map(|at| course(at) * course(at + shift)).sum::<f64>()
+        let correlation = |shift: f64| {
+            (0..1400).map(f64::from).map(|at| profile(at) * profile(at + shift)).sum::<f64>()
         };
-        let most = (70..1400).map(|shift| like(f64::from(shift)).abs()).fold(0.0, f64::max);
-        assert!(most < 0.5 * like(0.0), "{most} of {}", like(0.0));
+        let largest =
+            (70..1400).map(|shift| correlation(f64::from(shift)).abs()).fold(0.0, f64::max);
+        assert!(largest < 0.5 * correlation(0.0), "{largest} of {}", correlation(0.0));
     }
 }

@@ -1,9 +1,9 @@
-//! The width that is asked for, along the path and by layer.
+//! The target width, along the path and by layer.
 
 use crate::core::units::Mm;
 
-/// Widths that are asked for. One number, one for each layer, or a course along
-/// the path of every bead.
+/// The target width: constant, one for each layer, or a profile along the path of every
+/// bead.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WidthTarget {
     width: Mm,
@@ -11,17 +11,17 @@ pub struct WidthTarget {
     layers: Option<Layers>,
 }
 
-/// A width at a place along the bead; straight in between. Two knots at one
-/// place are a step.
+/// A width at a position along the bead, linear in between. Two knots at one position are a
+/// step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Knot {
     /// Path length from where the bead begins.
     pub path: Mm,
-    /// Width there.
+    /// Width.
     pub width: Mm,
 }
 
-/// A piece of the bead, by path length from where the bead begins.
+/// A segment of the bead, by path length from where the bead begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeadSegment {
     /// Where it begins.
@@ -30,7 +30,7 @@ pub struct BeadSegment {
     pub to: Mm,
 }
 
-/// Layers, told by the robot's z.
+/// Layers, identified by the robot's z.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layers {
     /// The robot's z while it lays the first layer.
@@ -65,8 +65,8 @@ impl WidthTarget {
         Self { width, along: Vec::new(), layers: None }
     }
 
-    /// The same with a course along every bead: knots in the order of the path.
-    /// Before the first and after the last the width is theirs.
+    /// The same with a profile along every bead: knots in the order of the path. Before the
+    /// first and after the last knot the width is constant.
     pub fn along(mut self, knots: Vec<Knot>) -> Self {
         self.along = knots;
         self
@@ -78,12 +78,12 @@ impl WidthTarget {
         self
     }
 
-    /// The width that stands in the cell.
+    /// The width in the cell file.
     pub const fn nominal(&self) -> Mm {
         self.width
     }
 
-    /// The knots of the course along the path; empty where there is none.
+    /// The knots of the profile along the path; empty where there is none.
     pub fn knots(&self) -> &[Knot] {
         &self.along
     }
@@ -93,7 +93,7 @@ impl WidthTarget {
         self.layers.as_ref()
     }
 
-    /// Whether one width is asked for everywhere.
+    /// Whether the target is one width everywhere.
     pub fn is_constant(&self) -> bool {
         self.along.is_empty() && self.layers.as_ref().is_none_or(|layers| layers.widths.is_empty())
     }
@@ -104,9 +104,9 @@ impl WidthTarget {
         self.width_along(path).or_else(of_layer).unwrap_or(self.width)
     }
 
-    /// Mean width over a stretch of the bead.
-    pub fn over(&self, z: Mm, stretch: BeadSegment) -> Mm {
-        let BeadSegment { from, to } = stretch;
+    /// Mean width over a segment of the bead.
+    pub fn over(&self, z: Mm, segment: BeadSegment) -> Mm {
+        let BeadSegment { from, to } = segment;
         let length = to - from;
         if self.along.is_empty() || length <= Mm::ZERO {
             return self.at(z, from);
@@ -122,7 +122,7 @@ impl WidthTarget {
         Mm::new(area / length.get()).unwrap_or(self.width)
     }
 
-    /// Area of a piece without a knot within it \[mm²\].
+    /// Area of a segment without a knot within it \[mm²\].
     fn area(&self, from: Mm, to: Mm) -> f64 {
         let middle = from + (to - from) * 0.5;
         self.width_along(middle).unwrap_or(self.width).get() * (to - from).get()
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_course_steps_ramps_and_holds_its_ends() {
+    fn a_profile_steps_ramps_and_is_constant_at_its_ends() {
         let target = stepped();
         let at = |path| target.at(Mm::ZERO, mm(path)).get();
         assert_eq!((at(0.0), at(99.9)), (42.0, 42.0));
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_over_a_stretch_is_that_of_its_pieces() {
+    fn the_mean_over_a_segment_is_that_of_its_pieces() {
         let target = stepped();
         let over =
             |from, to| target.over(Mm::ZERO, BeadSegment { from: mm(from), to: mm(to) }).get();
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn layers_are_told_by_z_and_the_last_width_holds_above() {
+    fn layers_are_identified_by_z_and_the_last_width_holds_above() {
         let layers =
             Layers { first_z: mm(5.0), height: mm(20.0), widths: vec![mm(42.0), mm(40.0)] };
         let target = WidthTarget::constant(mm(44.0)).by_layer(layers);

@@ -1,4 +1,4 @@
-//! The width held by distance, event by event.
+//! Control by distance, event by event.
 
 use super::*;
 use crate::width_control::distance::FallbackReason;
@@ -7,30 +7,31 @@ use crate::width_control::target::Knot;
 
 const STEP_S: f64 = 0.05;
 
-/// The 2022 paper's cell, held by distance.
+/// The 2022 paper's cell, controlled by distance.
 fn by_distance() -> Setup {
     let strategy =
         DistanceStrategy { exponent: 0.25, learns_exponent: true, drift_per_root_m: 0.0055 };
     let mut setup = setup();
     setup.control.strategy = Arc::new(strategy);
-    Setup { setpoint_period: Span::from_secs(STEP_S), ..setup }
+    setup.cell.setpoint_period = Span::from_secs(STEP_S);
+    setup
 }
 
-/// A robot that does at once what it is told, over a bead of b = 0.25.
+/// A robot without lag, and a bead of b = 0.25.
 struct Cell {
     line: Line,
     path: f64,
     speed: f64,
-    /// Place and width, as it was laid.
+    /// Position and width, as laid.
     laid: Vec<(f64, f64)>,
-    /// Whether the robot says how far it has come.
-    tells_path: bool,
+    /// Whether the robot reports its path.
+    reports_path: bool,
 }
 
 impl Cell {
     fn new(setup: Setup) -> Self {
         let line = Line::of(setup);
-        let mut cell = Self { line, path: 0.0, speed: 112.5, laid: Vec::new(), tells_path: true };
+        let mut cell = Self { line, path: 0.0, speed: 112.5, laid: Vec::new(), reports_path: true };
         let _ = cell.line.robot(RobotMode::Print, 0.0, 112.5);
         cell
     }
@@ -39,13 +40,13 @@ impl Cell {
         38.61 * (speed / 112.5).powf(-0.25)
     }
 
-    /// One step of time: lay, report, see, and be told a speed.
+    /// One step of time: lay, report, measure, command.
     fn step(&mut self) -> Step {
         self.laid.push((self.path, Self::width_at(self.speed)));
         self.path += self.speed * STEP_S;
         self.line.now += STEP_S;
-        let told = if self.tells_path { self.path } else { 0.0 };
-        let _ = self.line.robot(RobotMode::Print, told, self.speed);
+        let reported = if self.reports_path { self.path } else { 0.0 };
+        let _ = self.line.robot(RobotMode::Print, reported, self.speed);
         let under = self.path - 88.4;
         let seen = self.laid.iter().rev().find(|(at, _)| *at <= under).map(|(_, width)| *width);
         let step = seen.map(|width| self.line.width(width)).unwrap_or_default();
@@ -65,18 +66,18 @@ impl Cell {
 }
 
 #[test]
-fn the_first_setpoint_after_the_start_is_that_of_the_wanted_width() {
+fn the_first_setpoint_after_the_start_is_that_of_the_target_width() {
     let mut cell = Cell::new(by_distance());
     let _ = cell.until(190.0);
     assert!((cell.speed - 112.5).abs() < 1e-9);
     let _ = cell.until(212.0);
     assert_eq!(cell.line.controller.state(), State::Tracking);
-    let wanted = 112.5 * (38.61_f64 / 42.0).powf(4.0);
-    assert!((cell.speed - wanted).abs() < 0.5, "{} {wanted}", cell.speed);
+    let expected = 112.5 * (38.61_f64 / 42.0).powf(4.0);
+    assert!((cell.speed - expected).abs() < 0.5, "{} {expected}", cell.speed);
 }
 
 #[test]
-fn a_step_of_the_target_is_driven_where_it_is_wanted() {
+fn a_step_of_the_target_is_laid_at_its_position() {
     let mut setup = by_distance();
     let knot = |path, width| Knot { path: Mm::constant(path), width: Mm::constant(width) };
     let knots = vec![knot(400.0, 42.0), knot(400.0, 40.0)];
@@ -91,9 +92,9 @@ fn a_step_of_the_target_is_driven_where_it_is_wanted() {
 }
 
 #[test]
-fn a_robot_that_tells_no_path_is_held_by_the_pi_law_and_the_record_says_why() {
+fn a_robot_without_a_path_falls_back_to_pi_control() {
     let mut cell = Cell::new(by_distance());
-    cell.tells_path = false;
+    cell.reports_path = false;
     let step = cell.until(600.0);
     assert_eq!(step.trace.fallback, Some(FallbackReason::NoPath));
     assert!(step.trace.integral_mm_per_s.is_some(), "{step:?}");
@@ -101,9 +102,9 @@ fn a_robot_that_tells_no_path_is_held_by_the_pi_law_and_the_record_says_why() {
 }
 
 #[test]
-fn another_bead_is_held_from_its_first_millimetre_by_what_the_last_one_taught() {
+fn the_next_bead_is_controlled_from_its_first_millimetre() {
     let mut setup = by_distance();
-    setup.start_length = Mm::ZERO;
+    setup.cell.start_length = Mm::ZERO;
     let mut cell = Cell::new(setup);
     let _ = cell.until(500.0);
     let _ = cell.line.robot(RobotMode::Idle, 500.0, 0.0);
@@ -114,9 +115,9 @@ fn another_bead_is_held_from_its_first_millimetre_by_what_the_last_one_taught() 
 }
 
 #[test]
-fn a_bead_that_does_not_fill_the_gauge_yet_is_waited_for() {
+fn control_waits_until_the_bead_fills_the_gauge() {
     let mut setup = by_distance();
-    setup.start_length = Mm::ZERO;
+    setup.cell.start_length = Mm::ZERO;
     let mut line = Line::of(setup);
     line.now = 1.0;
     let _ = line.robot(RobotMode::Print, 0.0, 112.5);

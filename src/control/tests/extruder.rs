@@ -1,5 +1,4 @@
-//! The extruder side through the controller: a link that goes and comes, and
-//! bead after bead.
+//! The extruder side through the controller: loss of the link, and successive beads.
 
 use super::*;
 use crate::core::units::{Mm2, Rpm};
@@ -14,10 +13,10 @@ use crate::identify::command_profile::{CommandProfile, ProfilePoint};
 const TICK_S: f64 = 0.005;
 const SPEED: f64 = 112.5;
 
-fn rig(law: ExtruderStrategy) -> (ExtruderSetup, FlowDemand) {
+fn test_bench(strategy: ExtruderStrategy) -> (ExtruderSetup, FlowDemand) {
     let setup = ExtruderSetup {
         quantity: CommandQuantity::Rpm,
-        strategy: law,
+        strategy,
         limits: CommandLimits::new(0.0, 60.0, 400.0).unwrap(),
         feedforward_period: Span::from_secs(TICK_S),
         control_period: Span::from_millis(50),
@@ -34,21 +33,21 @@ fn rig(law: ExtruderStrategy) -> (ExtruderSetup, FlowDemand) {
     (setup, demand)
 }
 
-/// A robot that prints or stands, and an extruder that does what it is told.
+/// A robot that prints or stands, and an extruder that follows its command.
 struct Cell {
     line: Line,
     mode: RobotMode,
     path: f64,
     ticks: u32,
     link: bool,
-    told: Option<ExtruderCommand>,
+    command: Option<ExtruderCommand>,
     sent: Vec<(f64, ExtruderCommand)>,
 }
 
 impl Cell {
-    fn new(law: ExtruderStrategy) -> Self {
+    fn new(strategy: ExtruderStrategy) -> Self {
         let mut line = Line::new();
-        let (setup, demand) = rig(law);
+        let (setup, demand) = test_bench(strategy);
         line.controller = line.controller.with_extruder(setup, demand);
         let mut cell = Self {
             line,
@@ -56,7 +55,7 @@ impl Cell {
             path: 0.0,
             ticks: 0,
             link: false,
-            told: None,
+            command: None,
             sent: Vec::new(),
         };
         cell.link(true);
@@ -70,7 +69,7 @@ impl Cell {
         assert!(self.line.give(&event).extruder.unwrap().command.is_none());
     }
 
-    /// Lets time pass; gives the state of the extruder side.
+    /// Advances time; returns the state of the extruder side.
     fn go(&mut self, secs: f64) -> ExtruderState {
         let until = self.line.now + secs - 1e-9;
         let mut state = ExtruderState::Off;
@@ -87,7 +86,7 @@ impl Cell {
             state = side.state;
             if let Some(command) = side.command {
                 assert!(self.link, "a command without a link");
-                self.told = Some(command);
+                self.command = Some(command);
                 self.sent.push((self.line.now, command));
             }
             self.ticks += 1;
@@ -100,11 +99,11 @@ impl Cell {
     }
 
     fn report(&self) -> ExtruderReport {
-        let on = self.told.filter(|told| told.pump_on);
+        let on = self.command.filter(|command| command.pump_on);
         ExtruderReport {
             pump: if on.is_some() { PumpMode::On } else { PumpMode::Off },
-            valve_open: self.told.is_some_and(|told| told.valve_open),
-            screw_rpm: Rpm::new(on.map_or(0.0, |told| told.value)).ok(),
+            valve_open: self.command.is_some_and(|command| command.valve_open),
+            screw_rpm: Rpm::new(on.map_or(0.0, |command| command.value)).ok(),
             pressure_mpa: None,
             flow_mm3_per_s: None,
             filled_mm: None,
@@ -112,7 +111,7 @@ impl Cell {
     }
 
     fn last(&self) -> ExtruderCommand {
-        self.told.unwrap()
+        self.command.unwrap()
     }
 }
 
@@ -130,7 +129,7 @@ fn a_lost_extruder_is_held_while_the_robot_goes_on() {
 }
 
 #[test]
-fn a_pump_does_not_outlast_a_robot_that_nobody_hears() {
+fn a_pump_stops_with_a_robot_that_is_silent() {
     let mut cell = Cell::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     cell.mode = RobotMode::Print;
     assert_eq!(cell.go(1.0), ExtruderState::Running);
@@ -142,7 +141,7 @@ fn a_pump_does_not_outlast_a_robot_that_nobody_hears() {
         let _ = cell.line.give(&Event::Extruder(report));
         let side = cell.line.give(&Event::ExtruderTick).extruder.unwrap();
         state = side.state;
-        cell.told = side.command.or(cell.told);
+        cell.command = side.command.or(cell.command);
         cell.line.now += TICK_S;
     }
     assert_eq!(state, ExtruderState::Off);
@@ -150,7 +149,7 @@ fn a_pump_does_not_outlast_a_robot_that_nobody_hears() {
 }
 
 #[test]
-fn an_extruder_that_stays_away_stops_the_robot_and_is_stopped_when_it_comes_back() {
+fn a_lost_extruder_stops_the_robot_and_is_stopped_when_it_returns() {
     let mut cell = Cell::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     cell.mode = RobotMode::Print;
     let _ = cell.go(1.0);
@@ -170,7 +169,7 @@ fn an_extruder_that_stays_away_stops_the_robot_and_is_stopped_when_it_comes_back
 }
 
 #[test]
-fn every_bead_begins_anew() {
+fn every_bead_restarts_the_profile() {
     let at = |from_s, value| ProfilePoint { from_s, value };
     let profile = CommandProfile::new(vec![at(0.0, 20.0), at(0.5, 50.0)], 2.0).unwrap();
     let mut cell = Cell::new(ExtruderStrategy::Profile(Playback::new(profile)));
@@ -209,10 +208,10 @@ bead,time_s,path_mm,speed_mm_per_s,command_rpm,flow_mm3_per_s
 ";
 
 fn planned() -> Cell {
-    let (setup, demand) = rig(ExtruderStrategy::Constant(ConstantCommand(30.0)));
+    let (setup, demand) = test_bench(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     let plan = Some(std::sync::Arc::new(crate::extruder::trajectory::read(PLAN).unwrap()));
     let mut cell = Cell::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
-    // The test puts the robot elsewhere, which no real one does: its speed jumps, too.
+    // The test moves the robot at once, so its speed may jump too.
     let limits = SpeedLimits {
         min_speed: MmPerS::constant(10.0),
         max_accel: MmPerS2::constant(1e5),
@@ -226,31 +225,31 @@ fn planned() -> Cell {
 }
 
 #[test]
-fn a_hold_goes_on_with_the_plan_and_keeps_the_width_controllers_part() {
+fn a_hold_follows_the_plan_and_keeps_the_width_controllers_ratio() {
     let mut cell = planned();
     let _ = cell.go(2.0);
-    // Too wide, which the controller answers with more speed.
-    let mut asked = cell.line.tick().unwrap();
+    // Too wide: the controller raises the speed.
+    let mut requested = cell.line.tick().unwrap();
     for _ in 0..6 {
         let _ = cell.line.width(46.0);
-        asked = cell.line.tick().unwrap();
+        requested = cell.line.tick().unwrap();
         let _ = cell.go(0.05);
     }
-    assert!(asked > SPEED * 1.03, "{asked}");
+    assert!(requested > SPEED * 1.03, "{requested}");
     let lost = Event::CameraLost { reason: "unplugged".into() };
     assert!(matches!(cell.line.give(&lost).state, State::Holding(_)));
     let held = cell.line.tick().unwrap();
-    assert!((held / asked - 1.0).abs() < 1e-6, "{held} after {asked}");
-    // Behind the plan's step, still held.
+    assert!((held / requested - 1.0).abs() < 1e-6, "{held} after {requested}");
+    // After the plan's step, still held.
     cell.path = 550.0;
     let _ = cell.go(0.02);
     let slowed = cell.line.tick().unwrap();
     assert!(matches!(cell.line.controller.state(), State::Holding(_)));
-    assert!((slowed / (asked / 2.0) - 1.0).abs() < 1e-6, "{slowed} after {asked}");
+    assert!((slowed / (requested / 2.0) - 1.0).abs() < 1e-6, "{slowed} after {requested}");
 }
 
 #[test]
-fn a_bead_that_was_broken_off_is_planned_again_and_one_that_was_laid_is_not() {
+fn an_interrupted_bead_is_planned_again_and_a_complete_one_is_not() {
     let mut cell = planned();
     let halfway = |cell: &mut Cell| {
         (cell.mode, cell.path) = (RobotMode::Print, 0.0);
@@ -306,8 +305,8 @@ fn a_bead_that_begins_while_the_link_is_down_is_the_next_of_the_plan() {
 }
 
 #[test]
-fn a_pump_goes_by_when_the_robot_was_last_heard_whatever_was_held_before() {
-    // Held for a lost camera when the link goes, and for want of widths long before it.
+fn a_pump_stops_by_the_last_report_of_the_robot_whatever_was_held_before() {
+    // Held for a lost camera when the link is lost, and for missing widths long before.
     for lost_before in [Some(Event::CameraLost { reason: "unplugged".into() }), None] {
         let mut cell = Cell::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
         cell.mode = RobotMode::Print;
@@ -326,7 +325,7 @@ fn a_pump_goes_by_when_the_robot_was_last_heard_whatever_was_held_before() {
             let report = cell.report();
             let _ = cell.line.give(&Event::Extruder(report));
             let side = cell.line.give(&Event::ExtruderTick).extruder.unwrap();
-            cell.told = side.command.or(cell.told);
+            cell.command = side.command.or(cell.command);
             let alone_s = cell.line.now - gone;
             assert!(cell.last().pump_on || alone_s > 1.55, "{lost_before:?}: {alone_s}");
             cell.line.now += TICK_S;

@@ -1,4 +1,4 @@
-//! The law of one sub-system: reference model, feedback, estimate.
+//! The controller of one sub-system: reference model, feedback, estimate.
 
 use nalgebra::Matrix4;
 
@@ -6,21 +6,22 @@ use super::estimate::UncertaintyEstimate;
 use super::gains::{Adaptation, AdaptiveGains, EstimateBounds, GainError, ScalarPlant, check};
 use crate::core::time::Span;
 
-/// Samples that may be missed before the time between two is a gap.
+/// Time between two samples from which they are a gap, in holds: three samples may be missing.
+/// Over a longer time the error is not the one that the estimate is updated for.
 const MAX_GAP_HOLDS: f64 = 4.0;
 
-/// Model-reference adaptive law of a first-order plant (Mohammadi Looey et al.
-/// 2026, eqs. (8)–(10)), sampled.
+/// Sampled model-reference adaptive controller of a first-order plant (Mohammadi Looey et al.
+/// 2026, eqs. (8)–(10)).
 ///
-/// The reference's part of the command is exact: with the unknown part
-/// compensated, the plant follows the reference model at the samples however
-/// long a command is held. The error's part is the continuous law, with the
-/// estimate led by half a sample ([`Self::step`]).
+/// The reference part of the command is exact: with the uncertainty compensated, the plant
+/// follows the reference model at the samples for any hold time. The error part is the
+/// continuous control law, with the estimate advanced by half a sample ([`Self::step`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MracController {
     plant: ScalarPlant,
     gains: AdaptiveGains,
-    hold: Span,
+    /// Time for which a command is held.
+    pub(super) hold: Span,
     /// The plant and the reference model over one held command.
     state_step: f64,
     input_step: f64,
@@ -29,7 +30,7 @@ pub struct MracController {
     last: Option<HeldInput>,
 }
 
-/// What has been held since the last step.
+/// The input since the last step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct HeldInput {
     reference: f64,
@@ -37,10 +38,10 @@ struct HeldInput {
     applied: f64,
 }
 
-/// A command and what it is made of.
+/// A command and its parts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Action {
-    /// u: what the input is to be until the next step.
+    /// u: the input until the next step.
     pub command: f64,
     /// Output of the reference model now.
     pub model: f64,
@@ -48,31 +49,26 @@ pub struct Action {
     pub error: f64,
     /// Δ̂ now.
     pub estimate: f64,
-    /// Where the output will be at the end of the hold if Δ̂ is right.
+    /// Predicted output at the end of the hold, if Δ̂ is right.
     pub predicted: f64,
 }
 
 impl MracController {
-    /// A law whose commands are held for `hold`. Fails where reference model
-    /// or error are not stable, in continuous time or at that rate of
-    /// commands, and where a gain has the wrong sign.
+    /// A controller whose commands are held for `hold`. Fails where reference model or error are
+    /// not stable, in continuous time or at that rate, and where a gain has the wrong sign.
     pub fn new(plant: ScalarPlant, gains: AdaptiveGains, hold: Span) -> Result<Self, GainError> {
         check(plant, &gains, hold)?;
         let (state_step, input_step) = plant.zero_order_hold(hold.secs());
         let (estimate, model, last) = (UncertaintyEstimate::default(), 0.0, None);
         let controller = Self { plant, gains, hold, state_step, input_step, estimate, model, last };
         let radius = controller.error_radius();
-        if radius < 1.0 {
-            Ok(controller)
-        } else {
-            Err(GainError::SamplingTooSlow { hold_s: hold.secs(), radius })
-        }
+        let error = GainError::SamplingTooSlow { hold_s: hold.secs(), radius };
+        if radius < 1.0 { Ok(controller) } else { Err(error) }
     }
 
-    /// Starts in a steady state: the reference model at the measured output,
-    /// and the estimate such that the input that is applied explains why the
-    /// output stands still. The next command at the reference of
-    /// [`Self::reference_for`] this output is that input: no bump.
+    /// Starts in a steady state: the reference model at the measured output, and the estimate
+    /// for which the applied input holds that output. The next command at the reference of
+    /// [`Self::reference_for`] this output is that input (bumpless).
     pub fn start(&mut self, measured: f64, applied: f64, known: f64) {
         let bound = self.gains.safety.bound.unwrap_or(f64::MAX);
         let needed = -self.plant.state_gain_per_s / self.plant.input_gain * measured;
@@ -82,8 +78,7 @@ impl MracController {
         self.last = None;
     }
 
-    /// Sets the estimate, as the paper's controller that does not adapt is given what
-    /// it knows beforehand.
+    /// Sets the estimate, as for the controller of the paper without adaptation.
     pub fn set_estimate(&mut self, uncertainty: f64) {
         self.estimate.value = uncertainty;
         self.estimate.slope_per_s = 0.0;
@@ -94,12 +89,10 @@ impl MracController {
         -self.model_pole() / self.plant.input_gain * output
     }
 
-    /// One step, `dt` after the last one: measured output y, reference r from
-    /// now on, known part w in the mean over the coming hold. A step after a
-    /// gap (more than four holds) learns nothing and takes the model up again
-    /// at the measured output; a reading that is no number is replaced by the
-    /// model's. What the drive makes of the command is told by
-    /// [`Self::settle`].
+    /// One step, `dt` after the last one: measured output y, reference r from now on, mean of the
+    /// known part w over the coming hold. A step after a gap (more than four holds) does not
+    /// adapt and restarts the model at the measured output; a reading that is not finite is
+    /// replaced by the model's. [`Self::settle`] sets the applied input.
     pub fn step(&mut self, measured: f64, reference: f64, known: f64, dt: Span) -> Action {
         self.advance_model(dt);
         let gap = dt.secs() > MAX_GAP_HOLDS * self.hold.secs();
@@ -125,8 +118,8 @@ impl MracController {
         Action { command, model: self.model, error, estimate: self.estimate.value, predicted }
     }
 
-    /// Tells what was applied in place of the command. The reference model is
-    /// led by the same difference, so that a limit is no error to learn from.
+    /// The input that was applied in place of the command. The reference model moves by the same
+    /// difference, so that a limit causes no adaptation.
     pub fn settle(&mut self, applied: f64) {
         if let Some(held) = &mut self.last
             && applied.is_finite()
@@ -135,9 +128,9 @@ impl MracController {
         }
     }
 
-    /// The errors that stay when Δ grows by `slope` a second: of the output,
-    /// c/(γ·p·b), and of the estimate; none where the slope is learnt, infinite
-    /// where nothing is learnt. Without leakage and bounds.
+    /// Steady-state errors when Δ grows by `slope` per second: of the output, c/(γ·p·b), and of
+    /// the estimate; zero where the slope is estimated, infinite without adaptation. Without
+    /// leakage and bounds.
     pub fn ramp_errors(&self, slope: f64) -> RampErrors {
         let output = match self.gains.adaptation {
             Adaptation::Off => slope * f64::INFINITY,
@@ -150,12 +143,7 @@ impl MracController {
         RampErrors { output, estimate: -pole / self.plant.input_gain * output }
     }
 
-    /// Time for which a command is held.
-    pub fn hold(&self) -> Span {
-        self.hold
-    }
-
-    /// The plant that the law is made for.
+    /// The plant that it is made for.
     pub fn plant(&self) -> ScalarPlant {
         self.plant
     }
@@ -169,8 +157,8 @@ impl MracController {
         self.plant.pole(self.gains.feedback)
     }
 
-    /// The input that takes the plant from the model's output to where the
-    /// model will be after the hold.
+    /// The input that takes the plant from the model's output to that of the model after the
+    /// hold.
     fn reference_input(&self, reference: f64) -> f64 {
         let (kept, driven) = self.model_zero_order_hold(self.hold.secs());
         let next = kept * self.model + driven * reference;
@@ -206,8 +194,7 @@ impl MracController {
             let acting = estimate.acting(self.plant, &free, error, hold_s);
             let fed_back = (free.feedback + free.error_feedback) * error;
             let next = self.state_step * error - self.input_step * (fed_back + acting);
-            // A law that does not learn keeps its estimate, which is no mode
-            // of the error.
+            // A constant estimate is no mode of the error.
             let kept = if free.adaptation == Adaptation::Off { 0.0 } else { estimate.value };
             [next, error, kept, estimate.slope_per_s]
         };
@@ -224,7 +211,7 @@ impl MracController {
     }
 }
 
-/// What a ramp of the uncertainty leaves for good.
+/// Steady-state errors of a ramp of the uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RampErrors {
     /// e∞ \[unit of y\].

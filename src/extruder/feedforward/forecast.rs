@@ -1,12 +1,11 @@
-//! The flow at the nozzle from what the extruder is told, or from its measured
-//! speed.
+//! The flow at the nozzle from the extruder's command, or from its measured speed.
 
 use super::{FeedforwardError, positive};
 use crate::core::time::Span;
 use crate::core::units::{Mm3PerS, Rpm};
-use crate::numeric::lti::{Between, ModelError, Simulator, TransferFunction};
+use crate::numeric::lti::{Between, Simulator, TransferFunction};
 
-/// What an extruder does with its command.
+/// Model of an extruder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderModel {
     /// G1: turns of the screw \[rpm\] over the command, as the drive's voltage
@@ -16,28 +15,20 @@ pub struct ExtruderModel {
     pub flow: TransferFunction,
 }
 
-impl ExtruderModel {
-    /// From command to flow, for [`Inverse`](super::Inverse). Fails where the
-    /// numbers are too large to be multiplied.
-    pub fn command_to_flow(&self) -> Result<TransferFunction, ModelError> {
-        self.drive.series(&self.flow)
-    }
-}
-
-/// Whether the screw's measured speed takes part.
+/// Where the screw's speed comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ScrewSpeed {
-    /// There is no encoder: the drive's model says it.
+    /// From the drive's model; there is no encoder.
     Modelled,
-    /// The encoder's in place of the drive's model (thesis, section 5.3.1);
-    /// what lies ahead comes from the model as a change from now.
+    /// From the encoder (bcs-thesis, section 5.3.1); the change until the forecast from the
+    /// drive's model.
     Measured,
 }
 
-/// The flow now, and as far ahead as is asked for.
+/// Forecast of the flow.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlowForecast {
-    /// The drive ahead, and now.
+    /// The drive ahead and now.
     drives: [Simulator; 2],
     flow: Simulator,
     screw: ScrewSpeed,
@@ -45,9 +36,8 @@ pub struct FlowForecast {
 }
 
 impl FlowForecast {
-    /// A forecast for `ahead` of now on a grid of `period`. What is told now
-    /// shows after the dead times, so that no forecast can reach further; it
-    /// fails there, and where a model is not stable.
+    /// A forecast `ahead` of now on a grid of `period`. Fails where that exceeds the dead times,
+    /// beyond which the flow depends on later commands, and where a model is not stable.
     pub fn new(
         model: &ExtruderModel,
         screw: ScrewSpeed,
@@ -73,21 +63,20 @@ impl FlowForecast {
         Ok(Self { drives: [drive(from_drive)?, drive(0.0)?], flow, screw, ahead_s })
     }
 
-    /// Takes up the steady state of a command.
+    /// Starts in the steady state of a command.
     pub fn start(&mut self, command: f64) -> Result<(), FeedforwardError> {
         for drive in &mut self.drives {
             drive.settle(command)?;
         }
-        // The probes leave the states where they are: a steady state stays.
+        // These steps do not change a steady state.
         let rpm = self.drives[1].step(command);
         let _ = self.drives[0].step(command);
         self.flow.settle(rpm)?;
         Ok(())
     }
 
-    /// One period with the command that is applied from now on and the screw's
-    /// speed as it is measured now, if it is. The flow [`Self::ahead_s`] from
-    /// now.
+    /// One period with the command from now on and the measured speed of the screw, if available.
+    /// Returns the flow [`Self::ahead_s`] from now.
     pub fn step(&mut self, command: f64, measured: Option<Rpm>) -> Mm3PerS {
         let [ahead, now] = &mut self.drives;
         let (ahead, now) = (ahead.step(command), now.step(command));
@@ -98,12 +87,12 @@ impl FlowForecast {
         Mm3PerS::new(self.flow.step(rpm)).unwrap_or_default()
     }
 
-    /// Whether the screw's measured speed takes part.
+    /// Where the screw's speed comes from.
     pub const fn screw(&self) -> ScrewSpeed {
         self.screw
     }
 
-    /// How far ahead of now its flow is \[s\].
+    /// How far ahead the forecast is \[s\].
     pub fn ahead_s(&self) -> f64 {
         self.ahead_s
     }

@@ -1,5 +1,4 @@
-//! From a demanded output to the command that gives it: the stable part of a
-//! model's inverse with placed poles.
+//! Inverse of a model with placed poles: the command for a demanded output.
 
 use nalgebra::Complex;
 
@@ -8,34 +7,32 @@ use crate::core::time::Span;
 use crate::extruder::limits::{CommandLimit, CommandLimits};
 use crate::numeric::lti::polynomial::{from_roots, multiply};
 use crate::numeric::lti::{Between, Simulator, TransferFunction};
+use crate::numeric::number::to_f64;
 
 /// How a model is inverted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InverseSettings {
-    /// Time constant of the poles that are placed where the inverse has none
-    /// of its own \[s\]: as many as the model has poles more than zeros.
+    /// Time constant of the placed poles \[s\], as many as the relative degree of the model.
     pub time_constant_s: f64,
-    /// What becomes of a zero in the right half plane.
+    /// How zeros in the right half plane are handled.
     pub right_zeros: RightHalfPlaneZeros,
-    /// How far ahead the demand is known.
+    /// Preview of the demand.
     pub preview: Span,
-    /// How late the output may be beyond that.
+    /// Allowed delay of the output beyond that.
     pub max_delay: Span,
-    /// Range and slew of the command.
+    /// Range and rate of the command.
     pub limits: CommandLimits,
     /// Time between two commands.
     pub period: Span,
 }
 
-/// What becomes of a zero in the right half plane, whose exact inverse would
-/// grow without bound.
+/// How a zero in the right half plane is handled, whose exact inverse is unstable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RightHalfPlaneZeros {
     /// The model is refused.
     Refuse,
-    /// Its mirror image is inverted: the size at every frequency is right, and
-    /// the output is late by 2·Re(z)/|z|² at low ones, which counts as dead
-    /// time.
+    /// Its mirror image is inverted: the gain at every frequency is right, and the output is
+    /// delayed by 2·Re(z)/|z|² at low ones, which counts as dead time.
     Mirror,
 }
 
@@ -47,17 +44,14 @@ pub struct Inverse {
     limits: CommandLimits,
     period: Span,
     limit: CommandLimit,
-    dead_time_s: f64,
-    lag_s: f64,
     preview_s: f64,
     command: f64,
 }
 
 impl Inverse {
-    /// Inverts a model. Fails where the model is not stable or has no gain at
-    /// rest, where it has a zero in the right half plane that is not to be
-    /// mirrored, where its dead time is longer than the demand is known ahead
-    /// and the output may be late, and where the settings make no sense.
+    /// Inverts a model. Fails where the model is not stable or has no static gain, where it has a
+    /// zero in the right half plane that must not be mirrored, where its dead time exceeds preview
+    /// and allowed delay, and where a setting is out of range.
     pub fn new(
         model: &TransferFunction,
         settings: &InverseSettings,
@@ -80,77 +74,58 @@ impl Inverse {
         let filter = TransferFunction::new(&[1.0], &poles, 0.0)?;
         let inverse = plant.inverse_through(&filter)?;
         let simulator = Simulator::new(&inverse, period_s, Between::Linear)?;
-        #[expect(clippy::cast_precision_loss, reason = "an order is small")]
-        let lag_s = missing as f64 * time_constant_s;
-        // A command that is held is half a period late in the mean.
+        let lag_s = to_f64(missing) * time_constant_s;
+        // A zero-order hold delays by half a period in the mean.
         let preview_s = (dead_time_s + lag_s + 0.5 * period_s).min(known_s);
         let limits = settings.limits;
-        Ok(Self {
-            simulator,
-            gain,
-            limits,
-            period: settings.period,
-            limit: CommandLimit::None,
-            dead_time_s,
-            lag_s,
-            preview_s,
-            command: limits.idle(),
-        })
+        let (period, limit, command) = (settings.period, CommandLimit::None, limits.idle());
+        Ok(Self { simulator, gain, limits, period, limit, preview_s, command })
     }
 
-    /// How far ahead of now the demand is to be read for [`Self::step`]: dead
-    /// time, lag of the placed poles and half a period, or as much of it as is
-    /// known ahead \[s\].
+    /// Preview of the demand for [`Self::step`]: dead time, lag of the placed poles and half a
+    /// period, at most what is available \[s\].
     pub fn preview_s(&self) -> f64 {
         self.preview_s
     }
 
-    /// How late the output is at low frequencies when the demand is read
-    /// [`Self::preview_s`] ahead \[s\].
-    pub fn delay_s(&self) -> f64 {
-        self.dead_time_s + self.lag_s + 0.5 * self.period.secs() - self.preview_s
-    }
-
-    /// Takes a steady state up: a demand that has stood for long, and the
-    /// command that is applied. Where the two do not belong together, the
-    /// command goes from there to the demand's at the rate that is allowed.
+    /// Starts from a constant demand and the applied command. Where the two differ, the command
+    /// goes to that of the demand at the rate limit.
     pub fn start(&mut self, demand: f64, applied: f64) -> Result<(), FeedforwardError> {
         self.simulator.settle(demand)?;
         self.command = applied;
         Ok(())
     }
 
-    /// The command of this period for the demand at [`Self::preview_s`] from
-    /// now. A demand that is no number leaves the command.
+    /// The command of this period for the demand [`Self::preview_s`] from now. A demand that is
+    /// not finite keeps the command.
     pub fn step(&mut self, demand: f64) -> f64 {
         if demand.is_finite() {
-            let wanted = self.simulator.step(demand);
-            (self.command, self.limit) = self.limits.apply(wanted, self.command, self.period);
+            let ideal = self.simulator.step(demand);
+            (self.command, self.limit) = self.limits.apply(ideal, self.command, self.period);
         }
         self.command
     }
 
-    /// Tells what was applied in place of the command, so that the slew is
-    /// counted from there.
+    /// The command that was applied, from which the rate limit counts.
     pub fn settle(&mut self, applied: f64) {
         if applied.is_finite() {
             self.command = applied;
         }
     }
 
-    /// The limit that shaped the last command.
+    /// The limit that acted on the last command.
     pub fn limit(&self) -> CommandLimit {
         self.limit
     }
 
-    /// Output for each unit of command at rest.
+    /// Static gain.
     pub fn gain(&self) -> f64 {
         self.gain
     }
 }
 
-/// The model without dead time and with its zeros in the left half plane, and
-/// by how much mirroring makes it late \[s\].
+/// The model without dead time and with its zeros in the left half plane, and the delay by
+/// mirroring \[s\].
 pub(super) fn minimum_phase(
     model: &TransferFunction,
     rule: RightHalfPlaneZeros,
@@ -160,10 +135,10 @@ pub(super) fn minimum_phase(
     let Some(first) = right.first() else {
         return Ok((model.with_dead_time(0.0)?, 0.0));
     };
-    // On the imaginary axis there is no mirror image that is stable.
+    // A zero on the imaginary axis has no stable mirror image.
     let on_the_axis = right.iter().any(|zero| zero.re <= 1e-9 * zero.norm());
     if rule == RightHalfPlaneZeros::Refuse || on_the_axis {
-        return Err(FeedforwardError::NonMinimumPhase { re: first.re, im: first.im.abs() });
+        return Err(FeedforwardError::NonMinimumPhase(*first));
     }
     let late_s = right.iter().map(|zero| 2.0 * zero.re / zero.norm_sqr()).sum();
     let mirrored: Vec<Complex<f64>> =

@@ -1,11 +1,9 @@
-//! The part of the flow that the model does not tell, from measurements that
-//! come late.
+//! Observer of the unmodelled flow, from delayed measurements.
 //!
-//! It is taken for the sum of an offset that wanders slowly and of a noise
-//! that is forgotten within a correlation time τ (white noise through a lag).
-//! Of the latter a measurement of age T tells at most the share e^(−T/τ): of
-//! its standard deviation √(1 − e^(−2T/τ)) stays whatever the controller, and
-//! the observer is the Kalman filter that gets there.
+//! The unmodelled flow is the sum of an offset that drifts slowly and of correlated noise with
+//! a correlation time τ (white noise through a lag). A measurement of age T predicts at most the
+//! fraction e^(−T/τ) of the latter: √(1 − e^(−2T/τ)) of its standard deviation remains for any
+//! controller, and the Kalman filter reaches that bound.
 
 use nalgebra::{Matrix2, RowVector2, Vector2};
 
@@ -13,18 +11,18 @@ use super::{FeedforwardError, positive};
 use crate::core::time::Stamp;
 use crate::core::units::Mm3PerS;
 
-/// What the part is like.
+/// Model of the unmodelled flow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UnmodelledFlow {
-    /// Standard deviation of the part that is forgotten.
+    /// Standard deviation of the correlated noise.
     pub sigma: Mm3PerS,
-    /// τ: after which a share of e^(−1) of it is left \[s\].
+    /// τ: its correlation time \[s\].
     pub correlation_s: f64,
-    /// How far the offset wanders in a second, as a standard deviation.
+    /// Drift of the offset: standard deviation over a second.
     pub drift: Mm3PerS,
 }
 
-/// A measurement of the flow, as a difference from the model's.
+/// Residual of a measured flow to the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlowResidual {
     /// When that flow left the nozzle.
@@ -46,8 +44,8 @@ pub struct FlowObserver {
 }
 
 impl FlowObserver {
-    /// An observer that knows nothing but what the part is like. Fails where
-    /// sizes and time are not above zero (the wander may be zero).
+    /// Before the first measurement. Fails where standard deviation and time are not positive (the
+    /// drift may be zero).
     pub fn new(part: UnmodelledFlow) -> Result<Self, FeedforwardError> {
         let sigma = positive("the standard deviation of the flow", part.sigma.get())?;
         positive("the correlation time", part.correlation_s)?;
@@ -55,14 +53,14 @@ impl FlowObserver {
             let (what, value) = ("the drift of the offset", part.drift.get());
             return Err(FeedforwardError::NotPositive { what, value });
         }
-        // Beforehand the offset may be as large as the noise is in ten times
-        // its size; the first measurements settle it.
+        // Initial standard deviation of the offset: ten times that of the noise, so that the
+        // first measurements determine it.
         let covariance = Matrix2::new(sigma * sigma, 0.0, 0.0, 100.0 * sigma * sigma);
         Ok(Self { model: part, state: Vector2::zeros(), covariance, at: None })
     }
 
-    /// Takes a measurement. One that is older than the last is weighed as if
-    /// only what it shares with the newer state counted.
+    /// Updates with a measurement. One that is older than the last is weighted by its correlation
+    /// with the newer state.
     pub fn measure(&mut self, seen: &FlowResidual) {
         let age_s = self.at.map_or(0.0, |at| (at - seen.at).secs());
         if age_s < 0.0 {
@@ -83,7 +81,7 @@ impl FlowObserver {
         self.at = Some(self.at.map_or(seen.at, |at| at.max(seen.at)));
     }
 
-    /// The part at a moment after the last measurement.
+    /// The unmodelled flow at a moment after the last measurement.
     pub fn estimate(&self, at: Stamp) -> Mm3PerS {
         let after_s = self.at.map_or(0.0, |last| (at - last).secs().max(0.0));
         Mm3PerS::new(self.predicted(after_s).sum()).unwrap_or_default()
@@ -115,9 +113,8 @@ impl FlowObserver {
     }
 }
 
-/// What share of the standard deviation of a noise that is forgotten within
-/// `correlation_s` is left after the best use of measurements without noise
-/// of an age: the bound for every controller that acts `age_s` after it saw.
+/// Fraction of the standard deviation of correlated noise that remains after optimal prediction
+/// from exact measurements of an age: the bound for every controller with that delay.
 pub fn unpredictable_fraction(age_s: f64, correlation_s: f64) -> f64 {
     (-libm::expm1(-2.0 * age_s / correlation_s)).max(0.0).sqrt()
 }

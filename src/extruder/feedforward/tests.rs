@@ -18,7 +18,7 @@ fn settings() -> InverseSettings {
 
 /// Voltage to flow of bcs-thesis: relative degree 1, dead time 54 ms.
 fn extruder() -> TransferFunction {
-    ExtruderModel { drive: drive(), flow: flow() }.command_to_flow().unwrap()
+    drive().series(&flow()).unwrap()
 }
 
 fn drive() -> TransferFunction {
@@ -55,25 +55,23 @@ fn follow(model: &TransferFunction, inverse: &mut Inverse, late_s: f64) -> f64 {
 }
 
 #[test]
-fn a_demand_that_is_known_ahead_is_met_when_it_is_due() {
+fn a_demand_with_preview_is_met_without_delay() {
     let mut inverse = Inverse::new(&extruder(), &settings()).unwrap();
     assert!((inverse.preview_s() - (0.054 + 0.05 + 0.0025)).abs() < 1e-12);
-    assert!(inverse.delay_s().abs() < 1e-12);
-    // What the placed pole's second order leaves: (ωτ)²/2 of the swing.
+    // Second order of the placed pole: (ωτ)²/2 of the amplitude.
     let left = 200.0 * 0.5 * (1.3_f64 * 0.05).powi(2) + 80.0 * 0.5 * (3.1_f64 * 0.05).powi(2);
     let largest = follow(&extruder(), &mut inverse, 0.0);
     assert!(largest < 1.2 * left, "{largest} {left}");
 }
 
 #[test]
-fn without_a_preview_it_is_late_by_what_is_told() {
+fn without_preview_the_delay_is_dead_time_lag_and_half_a_period() {
     let late =
         InverseSettings { preview: Span::ZERO, max_delay: Span::from_secs(0.06), ..settings() };
     let mut inverse = Inverse::new(&extruder(), &late).unwrap();
     assert_eq!(inverse.preview_s(), 0.0);
-    let late_s = inverse.delay_s();
-    assert!((late_s - 0.1065).abs() < 1e-12);
-    assert!(follow(&extruder(), &mut inverse, late_s) < 1.6);
+    // Dead time, lag of the placed pole and half a period.
+    assert!(follow(&extruder(), &mut inverse, 0.054 + 0.05 + 0.0025) < 1.6);
     let refused = Inverse::new(&extruder(), &InverseSettings { max_delay: Span::ZERO, ..late });
     let refused = refused.unwrap_err();
     assert!(matches!(refused, FeedforwardError::DeadTime { known_s: 0.0, late_s: 0.0, .. }));
@@ -90,10 +88,10 @@ fn as_many_zeros_as_poles_need_no_placed_pole() {
 }
 
 #[test]
-fn a_zero_in_the_right_half_plane_is_refused_or_mirrored_with_its_lateness() {
+fn a_zero_in_the_right_half_plane_is_refused_or_mirrored_with_its_delay() {
     let model = TransferFunction::new(&[-0.1, 1.0], &[0.5, 1.0], 0.02).unwrap();
     let refused = Inverse::new(&model, &settings()).unwrap_err();
-    assert_eq!(refused, FeedforwardError::NonMinimumPhase { re: 10.0, im: 0.0 });
+    assert_eq!(refused, FeedforwardError::NonMinimumPhase(Complex::new(10.0, 0.0)));
     let mirror = InverseSettings { right_zeros: RightHalfPlaneZeros::Mirror, ..settings() };
     let mut inverse = Inverse::new(&model, &mirror).unwrap();
     assert!((inverse.preview_s() - (0.02 + 0.2 + 0.0025)).abs() < 1e-12);
@@ -107,19 +105,19 @@ fn a_zero_in_the_right_half_plane_is_refused_or_mirrored_with_its_lateness() {
 }
 
 #[test]
-fn a_model_that_no_command_can_hold_is_refused() {
+fn an_unstable_model_is_refused() {
     let new = |num: &[f64], den: &[f64]| {
         Inverse::new(&TransferFunction::new(num, den, 0.0).unwrap(), &settings()).unwrap_err()
     };
-    assert!(matches!(new(&[1.0], &[1.0, -2.0]), FeedforwardError::Unstable { re, .. } if re > 1.9));
-    assert!(matches!(new(&[1.0], &[1.0, 0.0]), FeedforwardError::Unstable { re: 0.0, .. }));
-    assert_eq!(new(&[1.0, 0.0], &[1.0, 2.0]), FeedforwardError::NoGain { gain: 0.0 });
+    assert!(matches!(new(&[1.0], &[1.0, -2.0]), FeedforwardError::Unstable(pole) if pole.re > 1.9));
+    assert!(matches!(new(&[1.0], &[1.0, 0.0]), FeedforwardError::Unstable(pole) if pole.re == 0.0));
+    assert_eq!(new(&[1.0, 0.0], &[1.0, 2.0]), FeedforwardError::NoGain(0.0));
     let stood = Inverse::new(&flow(), &InverseSettings { period: Span::ZERO, ..settings() });
     assert!(matches!(stood, Err(FeedforwardError::NotPositive { what: "the period", .. })));
 }
 
 #[test]
-fn it_starts_without_a_bump_and_goes_over_at_the_rate_that_is_allowed() {
+fn it_starts_bumpless_and_changes_at_the_rate_limit() {
     let limits = CommandLimits::new(0.0, 5.0, 2.0).unwrap();
     let mut inverse = Inverse::new(&extruder(), &InverseSettings { limits, ..settings() }).unwrap();
     let at_rest = 2000.0 / inverse.gain();
@@ -167,7 +165,7 @@ fn the_forecast_is_the_plants_flow_as_far_ahead_as_the_dead_time() {
 }
 
 #[test]
-fn the_encoder_makes_good_for_a_drive_that_is_not_as_modelled() {
+fn the_encoder_corrects_a_drive_that_differs_from_its_model() {
     let model = ExtruderModel { drive: drive(), flow: flow() };
     let slow = FirstOrder { gain: 31.0, time_constant_s: 0.4, zero_s: 0.0, dead_time_s: 0.054 };
     let slow = slow.transfer().unwrap();
@@ -195,7 +193,7 @@ fn the_encoder_makes_good_for_a_drive_that_is_not_as_modelled() {
 }
 
 /// White noise through a lag, standard deviation 1, on a grid.
-fn coloured(steps: u64, dt_s: f64, lag_s: f64) -> Vec<f64> {
+fn correlated(steps: u64, dt_s: f64, lag_s: f64) -> Vec<f64> {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     let mut random = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(7);
@@ -217,7 +215,7 @@ fn the_observer_reaches_the_bound_that_age_sets() {
         correlation_s: 0.15,
         drift: Mm3PerS::constant(0.01),
     };
-    let noise = coloured(60_000, 0.01, 0.15);
+    let noise = correlated(60_000, 0.01, 0.15);
     for age in [2_usize, 10, 25] {
         let mut observer = FlowObserver::new(part).unwrap();
         let (mut sum, mut count, mut last, offset) = (0.0, 0.0, 0.0, 90.0);
@@ -241,7 +239,7 @@ fn the_observer_reaches_the_bound_that_age_sets() {
 }
 
 #[test]
-fn an_old_measurement_adds_to_a_fresh_one_and_spoils_nothing() {
+fn an_old_measurement_after_a_new_one_improves_the_estimate() {
     let part = UnmodelledFlow {
         sigma: Mm3PerS::constant(30.0),
         correlation_s: 0.15,
@@ -261,7 +259,7 @@ fn an_old_measurement_adds_to_a_fresh_one_and_spoils_nothing() {
 }
 
 #[test]
-fn measurements_from_before_the_memory_or_the_future_are_left_out() {
+fn measurements_older_than_the_memory_or_in_the_future_are_ignored() {
     let model = ExtruderModel { drive: drive(), flow: flow() };
     let forecast = FlowForecast::new(&model, ScrewSpeed::Modelled, Span::ZERO, PERIOD).unwrap();
     let part = UnmodelledFlow {

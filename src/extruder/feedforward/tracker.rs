@@ -1,7 +1,6 @@
-//! A demand followed with placed poles by feedback on the state of a model,
-//! which is told what was applied: the inverse of the model as long as nothing
-//! limits the command, and where something does, or the extruder stood before,
-//! the way from where it really is.
+//! Follows a demand with placed poles by state feedback on a model that is driven by the applied
+//! command: the inverse of the model without limits; with limits, or from rest, the transition
+//! from the true state.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,21 +8,22 @@ use super::inverse::{InverseSettings, minimum_phase};
 use super::{FeedforwardError, Inverse};
 use crate::core::time::Span;
 use crate::numeric::lti::{StateSpace, TransferFunction};
+use crate::numeric::number::to_f64;
 
-/// Periods of the command in one time constant of the placed poles: with fewer,
-/// the feedback, which is held over a period, swings.
+/// Smallest number of command periods in a time constant of the placed poles: with fewer the
+/// sampled feedback oscillates.
 const MIN_PERIODS: f64 = 4.0;
 
-/// The model's state with the feedback on it.
+/// The model's state with its feedback.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracker {
-    /// State over one period of a command that is held.
+    /// Transition of the state over one period of a held command.
     transition: DMatrix<f64>,
     input_vector: DVector<f64>,
-    /// The command for each unit of the state and of the demand.
+    /// Gains of the command on the state and on the demand.
     state_gain: DVector<f64>,
     demand_gain: f64,
-    /// State for each unit of a command that stands.
+    /// Steady state per unit of command.
     steady: DVector<f64>,
     gain: f64,
     period: Span,
@@ -32,11 +32,10 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// For a model without its dead time. What cannot be inverted is refused
-    /// as [`Inverse::new`] refuses it, and so are poles that the commands are
-    /// too rare for.
+    /// For a model without its dead time. Fails as [`Inverse::new`] does, and for poles that are too
+    /// fast for the commands.
     ///
-    /// With n poles more than zeros, the n-th derivative of the output is
+    /// With a relative degree of n, the n-th derivative of the output is
     /// C·Aⁿ·x + C·Aⁿ⁻¹·B·u; the command is the one at which
     /// (λ·d/dt + 1)ⁿ of the output is the demand.
     pub fn new(
@@ -47,26 +46,23 @@ impl Tracker {
         let (plant, _) = minimum_phase(model, settings.right_zeros)?;
         let space = StateSpace::of(&plant);
         let over = space.advance(settings.period.secs());
+        let (time_constant_s, period_s) = (settings.time_constant_s, settings.period.secs());
         let excess = model.den().len() - model.num().len();
-        let (by_state, by_demand) = if excess == 0 {
+        let (state_gain, demand_gain) = if excess == 0 {
             (-&space.c / space.d, 1.0 / space.d)
         } else {
-            feedback(&space, excess, settings.time_constant_s)
+            feedback(&space, excess, time_constant_s)
         };
-        let least_s = MIN_PERIODS * settings.period.secs();
-        if excess > 0 && settings.time_constant_s < least_s {
-            return Err(FeedforwardError::PolesTooFast {
-                time_constant_s: settings.time_constant_s,
-                period_s: settings.period.secs(),
-                least_s,
-            });
+        let least_s = MIN_PERIODS * period_s;
+        if excess > 0 && time_constant_s < least_s {
+            return Err(FeedforwardError::PolesTooFast { time_constant_s, period_s, least_s });
         }
         let order = space.b.len();
         Ok(Self {
             transition: over.state,
             input_vector: over.constant,
-            state_gain: by_state,
-            demand_gain: by_demand,
+            state_gain,
+            demand_gain,
             steady: space.steady()?,
             gain,
             period: settings.period,
@@ -75,23 +71,23 @@ impl Tracker {
         })
     }
 
-    /// Time that [`Self::pass`] goes on by.
+    /// Time of one [`Self::advance`].
     pub const fn period(&self) -> Span {
         self.period
     }
 
-    /// Output for each unit of a command that stands.
+    /// Static gain.
     pub const fn gain(&self) -> f64 {
         self.gain
     }
 
-    /// As after a command that has stood for long.
+    /// Starts in the steady state of a command.
     pub fn start(&mut self, applied: f64) {
         self.state.copy_from(&self.steady);
         self.state *= applied;
     }
 
-    /// One period passes with what was applied over it.
+    /// Advances one period with the command that was applied over it.
     pub fn advance(&mut self, applied: f64) {
         self.next.copy_from(&self.input_vector);
         self.next *= applied;
@@ -105,21 +101,19 @@ impl Tracker {
     }
 }
 
-/// The rows that act on the state and on the demand.
+/// The gains on the state and on the demand.
 fn feedback(space: &StateSpace, excess: usize, time_constant_s: f64) -> (DVector<f64>, f64) {
     let mut row = space.c.clone();
-    let mut wanted = DVector::zeros(space.b.len());
+    let mut target = DVector::zeros(space.b.len());
     let (mut binomial, mut power) = (1.0, 1.0);
     let mut lead_gain = 0.0;
     for derivative in 0..excess {
-        wanted += &row * (binomial * power);
+        target += &row * (binomial * power);
         lead_gain = row.dot(&space.b);
         row = space.a.tr_mul(&row);
-        #[expect(clippy::cast_precision_loss, reason = "an order is small")]
-        let step = (excess - derivative) as f64 / (derivative + 1) as f64;
-        binomial *= step;
+        binomial *= to_f64(excess - derivative) / to_f64(derivative + 1);
         power *= time_constant_s;
     }
-    let by_state = -(wanted / power + row) / lead_gain;
+    let by_state = -(target / power + row) / lead_gain;
     (by_state, 1.0 / (power * lead_gain))
 }

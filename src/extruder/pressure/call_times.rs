@@ -1,5 +1,5 @@
-//! What every law of the pressure loop keeps of its calls: the times of
-//! readings and commands, and the command in force.
+//! The times of readings and commands and the command in force, of every controller of the
+//! pressure loop.
 
 use super::kalman::Kalman;
 use super::{ReadingRefused, ScrewCommand};
@@ -7,8 +7,8 @@ use crate::core::time::{Span, Stamp};
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::{CommandLimit, CommandLimits};
 
-/// What runs where a law takes over: the pressure, what is wanted, and the
-/// screw's speed. The law's first command at the same target is that speed.
+/// Pressure, target and screw speed at takeover. The first command at the same target is that
+/// speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InitialState {
     /// Pressure at the nozzle.
@@ -19,13 +19,13 @@ pub struct InitialState {
     pub speed: Rpm,
 }
 
-/// The largest size of a reading that laws take.
+/// Largest magnitude of a reading that is accepted, as a check of the unit.
 pub const MAX_READING: MPa = MPa::constant(1e6);
 
-/// Longer than anything runs \[s\].
+/// Time since the last command at the first one \[s\]: long enough that the rate does not limit.
 const FIRST_STEP_S: f64 = 1e9;
 
-/// The times of a law's calls, and the command in force.
+/// The times of a controller's calls, and the command in force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CallTimes {
     last_read: Option<Stamp>,
@@ -40,11 +40,11 @@ impl CallTimes {
         Self { last_read: None, last_step: None, last_command: last }
     }
 
-    /// Takes note of a reading, and gives the time since the last \[s\].
+    /// Records a reading; returns the time since the last \[s\].
     pub fn read(&mut self, now: Stamp, pressure: MPa) -> Result<f64, ReadingRefused> {
         let since = self.last_read.map_or(0.0, |last| (now - last).secs());
         if since < 0.0 {
-            return Err(ReadingRefused::OutOfOrder { late_s: -since });
+            return Err(ReadingRefused::OutOfOrder(-since));
         }
         if pressure.abs() > MAX_READING {
             return Err(ReadingRefused::Implausible { found: pressure, most: MAX_READING });
@@ -53,7 +53,7 @@ impl CallTimes {
         Ok(since)
     }
 
-    /// Takes a reading into a filter.
+    /// Updates a filter with a reading.
     pub fn filter(
         &mut self,
         now: Stamp,
@@ -68,29 +68,21 @@ impl CallTimes {
     /// The time since the last command \[s\]: 0 at the first call, none where
     /// the call is not after the last.
     pub fn begin(&mut self, now: Stamp) -> Option<f64> {
-        match self.last_step {
-            None => {
-                self.last_step = Some(now);
-                Some(0.0)
-            }
-            Some(last) if now > last => {
-                self.last_step = Some(now);
-                Some((now - last).secs())
-            }
-            Some(_) => None,
+        if self.last_step.is_some_and(|last| now <= last) {
+            return None;
         }
+        Some(self.last_step.replace(now).map_or(0.0, |last| (now - last).secs()))
     }
 
-    /// Takes note of a demand, and gives the command for it.
+    /// Records a demand; returns the command for it.
     pub fn command(&mut self, limits: &CommandLimits, demand_rpm: f64, dt_s: f64) -> ScrewCommand {
-        // The first command may come any time after the speed that ran.
         let dt = Span::from_secs(if dt_s > 0.0 { dt_s } else { FIRST_STEP_S });
         let (speed, limit) = limits.apply(demand_rpm, self.last_command.speed.get(), dt);
         self.last_command = ScrewCommand { speed: Rpm::new(speed).unwrap_or_default(), limit };
         self.last_command
     }
 
-    /// Takes note that another speed is in force.
+    /// Records that another speed is in force.
     pub fn settle(&mut self, applied: Rpm) {
         self.last_command.speed = applied;
     }
@@ -101,7 +93,7 @@ impl CallTimes {
     }
 }
 
-/// Keeps what a law gathers within the numbers.
+/// Keeps an integral finite.
 pub fn bounded(value: f64) -> f64 {
     if value.is_nan() { 0.0 } else { value.clamp(-1e18, 1e18) }
 }

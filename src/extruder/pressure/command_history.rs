@@ -1,16 +1,17 @@
-//! Commands of the last while and what a lag makes of them, exactly: a command
-//! holds until the next, so the lag is known in closed form at any moment, and
-//! a dead time is a moment further back. It need be no multiple of any step.
+//! Past commands and the response of a lag to them in closed form: a command is held until the
+//! next, so the lag is exact at any moment. A dead time is a moment further back and need not be
+//! a multiple of any step.
 
 use std::collections::VecDeque;
 
 use super::Fopdt;
 
-/// Commands a second that are kept over the longest delay that is asked for.
+/// Commands per second that are kept over the longest dead time: more than the 200 Hz of the
+/// feedforward.
 const MAX_COMMANDS_PER_S: f64 = 250.0;
 
-/// A command from a moment on, and the lags at that moment.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A command from a moment on, and the states at that moment.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Entry {
     at_s: f64,
     /// Gain times command \[MPa\].
@@ -18,17 +19,17 @@ struct Entry {
     lags: LagStates,
 }
 
-/// One lag of the commands, and a second one of the first, both \[MPa\].
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// States of a first lag of the commands and of a second lag of the first \[MPa\].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LagStates {
     /// The pressure of a process with lag and gain and no dead time.
     pub first: f64,
-    /// The same once more through the lag.
+    /// The same through the lag once more, for the sensitivity to the lag.
     pub second: f64,
 }
 
 impl LagStates {
-    /// After `dt_s` under a steady drive (zero-order hold, closed form).
+    /// After `dt_s` of a constant drive (zero-order hold, closed form).
     fn after(self, drive: f64, dt_s: f64, lag_s: f64) -> Self {
         let x = dt_s.max(0.0) / lag_s;
         let kept = libm::exp(-x);
@@ -37,16 +38,16 @@ impl LagStates {
     }
 }
 
-/// What holds at a moment.
+/// The model at a moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelMoment {
     /// Gain times the command that was in force just before \[MPa\].
     pub drive: f64,
-    /// The lags.
+    /// The states.
     pub lags: LagStates,
 }
 
-/// The commands of the last while.
+/// Past commands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommandHistory {
     gain: f64,
@@ -58,8 +59,8 @@ pub struct CommandHistory {
 }
 
 impl CommandHistory {
-    /// As if `speed_rpm` had been commanded for ever. Keeps what is needed to
-    /// look back by `back_s`.
+    /// As if `speed_rpm` had always been commanded. Keeps what is needed to look back by
+    /// `back_s`.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -68,10 +69,10 @@ impl CommandHistory {
     pub fn new(model: &Fopdt, back_s: f64, speed_rpm: f64) -> Self {
         let drive = model.gain() * speed_rpm;
         let lags = LagStates { first: drive, second: drive };
-        let most = (back_s.clamp(0.0, 1e3) * MAX_COMMANDS_PER_S).ceil() as usize + 2;
-        let mut entries = VecDeque::with_capacity(most);
+        let capacity = (back_s.clamp(0.0, 1e3) * MAX_COMMANDS_PER_S).ceil() as usize + 2;
+        let mut entries = VecDeque::with_capacity(capacity);
         entries.push_back(Entry { at_s: f64::NEG_INFINITY, drive, lags });
-        Self { gain: model.gain(), lag_s: model.lag_s(), entries, capacity: most }
+        Self { gain: model.gain(), lag_s: model.lag_s(), entries, capacity }
     }
 
     /// A command from `at_s` on; not before the last one.
@@ -93,7 +94,7 @@ impl CommandHistory {
         }
     }
 
-    /// What holds at a moment. Before all that is kept, the earliest.
+    /// The model at a moment; before the oldest command, the oldest.
     pub fn at(&self, at_s: f64) -> ModelMoment {
         let entry = self.in_force(at_s);
         let dt_s = if entry.at_s.is_finite() { at_s - entry.at_s } else { 0.0 };
@@ -108,12 +109,7 @@ impl CommandHistory {
     /// The command in force just before: one that begins now does not count.
     fn in_force(&self, at_s: f64) -> Entry {
         let later = self.entries.partition_point(|entry| entry.at_s < at_s);
-        let nothing = LagStates { first: 0.0, second: 0.0 };
-        self.entries.get(later.saturating_sub(1)).copied().unwrap_or(Entry {
-            at_s: f64::NEG_INFINITY,
-            drive: 0.0,
-            lags: nothing,
-        })
+        self.entries.get(later.saturating_sub(1)).copied().unwrap_or_default()
     }
 }
 
@@ -158,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ring_that_went_round_still_knows_its_span() {
+    fn a_full_history_covers_its_span() {
         let mut history = CommandHistory::new(&model(), 0.5, 0.0);
         let mut all = CommandHistory::new(&model(), 100.0, 0.0);
         for i in 0..5000 {

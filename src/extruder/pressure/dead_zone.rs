@@ -1,21 +1,21 @@
-//! A tunnel around the feedforward: of a correction within the noise only a
-//! share is made, of one well beyond it all, with no jump between. The idea is
-//! the dead zone and the return to the feedforward of Ma et al. 2026; here it
-//! holds for the correction itself, so that nothing hunts at its rim.
+//! A dead zone around the feedforward: a fraction of a correction within the noise is applied,
+//! all of one well beyond it, continuous in between. After the dead zone and the return to the
+//! feedforward of Ma et al. 2026, but on the correction itself, which avoids limit cycles at its
+//! edge.
 
-/// The zones of corrections \[MPa\], and the share that is made within.
+/// The zones of corrections.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeadZone {
-    /// Share of a correction that is made within the dead zone, 0 to 1.
+    /// Fraction of a correction that is applied within the dead zone, 0 to 1.
     pub inner_gain: f64,
-    /// Size of correction up to which the share holds \[MPa\].
+    /// Size of correction up to which that fraction is applied \[MPa\].
     pub inner: f64,
-    /// Size from which on all of it is made \[MPa\].
+    /// Size from which all of it is applied \[MPa\].
     pub outer: f64,
 }
 
 impl DeadZone {
-    /// What is made of a correction \[MPa\]: odd, continuous, never falling.
+    /// The applied correction \[MPa\]: odd, continuous, monotonic.
     pub fn applied(&self, correction: f64) -> f64 {
         let size = correction.abs();
         let made = if size <= self.inner {
@@ -38,7 +38,7 @@ mod tests {
     const ZONE: DeadZone = DeadZone { inner_gain: 0.3, inner: 0.03, outer: 0.07 };
 
     #[test]
-    fn a_share_within_and_all_beyond() {
+    fn a_fraction_within_and_all_beyond() {
         assert!((ZONE.applied(0.02) - 0.006).abs() < 1e-15);
         assert_eq!(ZONE.applied(-0.07), -0.07);
         assert_eq!(ZONE.applied(5.0), 5.0);
@@ -46,7 +46,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_is_continuous_and_never_falls(at in -0.2..0.2_f64, more in 0.0..1e-3_f64) {
+        fn it_is_continuous_and_monotonic(at in -0.2..0.2_f64, more in 0.0..1e-3_f64) {
             let (low, high) = (ZONE.applied(at), ZONE.applied(at + more));
             prop_assert!(high >= low);
             prop_assert!(high - low <= 2.0 * more);

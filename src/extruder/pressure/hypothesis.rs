@@ -1,35 +1,35 @@
-//! The process for one dead time: the load, and the errors of gain, lag and dead time, by
-//! Kalman's filter (1960) with the model's own sensitivities as the row of the measurement.
-//! While the pressure moves, a difference from the model corrects the model; while it rests,
-//! the load.
+//! The process for one dead time: load and errors of gain, lag and dead time, by a Kalman filter
+//! (Kalman 1960) whose measurement row is the model's sensitivities. While the pressure moves an
+//! innovation corrects the model; at rest, the load.
 
 use nalgebra::{SMatrix, SVector};
 
 use super::command_history::{LagStates, ModelMoment};
 use super::tuning::Tuning;
 
-/// Load's part of the pressure now and once settled \[MPa\]; errors of gain,
-/// lag and dead time as shares.
+/// Part of the pressure by the load, now and in steady state \[MPa\]; relative errors of gain,
+/// lag and dead time.
 pub type ModelState = SVector<f64, 5>;
 /// Covariances of the state.
 pub type StateCovariance = SMatrix<f64, 5, 5>;
 
-/// Place of the load's part of the pressure now.
+/// Index of the part of the pressure by the load now. By definition of the state.
 pub const LOAD_NOW: usize = 0;
-/// Place of the load's part once settled.
+/// Index of that part in steady state. By definition of the state.
 pub const LOAD: usize = 1;
-/// Place of the gain's error.
+/// Index of the gain's error. By definition of the state.
 pub const GAIN: usize = 2;
-/// Place of the lag's error.
+/// Index of the lag's error. By definition of the state.
 pub const LAG: usize = 3;
-/// Place of the dead time's error.
+/// Index of the dead time's error. By definition of the state.
 pub const DEAD_TIME: usize = 4;
 
-/// How much of the change of slope within the dead time's doubt counts as
-/// noise: what the straight line of the sensitivity misses.
+/// Fraction of the change of slope within the uncertainty of the dead time that counts as
+/// noise: the error of the linearisation.
 const CURVATURE_NOISE: f64 = 0.27;
-/// Errors of gain and lag are taken to lie within these shares.
+/// Smallest relative error of gain and lag that is used: the inverse of the model stays bounded.
 const MIN_RELATIVE_ERROR: f64 = -0.4;
+/// Largest relative error of gain and lag that is used.
 const MAX_RELATIVE_ERROR: f64 = 0.5;
 
 /// Constants of the filter.
@@ -39,9 +39,9 @@ pub struct FilterSettings {
     pub lag_s: f64,
     /// The model's dead time \[s\].
     pub dead_time_s: f64,
-    /// Standard deviation of the dead time about this belief's own, as a share.
+    /// Relative standard deviation of the dead time about the hypothesis' own.
     pub dead_time_sigma: f64,
-    /// The law's settings.
+    /// Settings of the controller.
     pub tuning: Tuning,
 }
 
@@ -52,28 +52,27 @@ impl FilterSettings {
     }
 }
 
-/// What some time leaves of a belief. What is known of the model fades only
-/// while the pressure moves: at rest there would be nothing to learn it anew
-/// from.
+/// State transition over a time. Errors of the model return to their prior only while the
+/// pressure moves: at rest they are not observable.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transition {
-    /// Share of the load's way that is still to go.
+    /// Decay of the load's transient.
     load_decay: f64,
-    /// Share of what is known of the model's errors.
+    /// Decay of the model's errors.
     model_decay: f64,
-    /// Variance that the load has gained \[MPa²\].
+    /// Drift of the load, a variance \[MPa²\].
     load_drift: f64,
 }
 
 impl Transition {
-    /// After `dt_s` at rest, and after the same while the pressure moves.
+    /// Over `dt_s` at rest, and over the same while the pressure moves.
     pub fn after(filter: &FilterSettings, dt_s: f64) -> [Self; 2] {
-        let load = libm::exp(-dt_s / filter.lag_s);
-        let wandered = filter.tuning.load_drift * dt_s;
-        [1.0, libm::exp(-dt_s / filter.tuning.forgetting_s)].map(|known| Self {
-            load_decay: load,
-            model_decay: known,
-            load_drift: wandered,
+        let load_decay = libm::exp(-dt_s / filter.lag_s);
+        let load_drift = filter.tuning.load_drift * dt_s;
+        [1.0, libm::exp(-dt_s / filter.tuning.forgetting_s)].map(|model_decay| Self {
+            load_decay,
+            model_decay,
+            load_drift,
         })
     }
 }
@@ -81,16 +80,16 @@ impl Transition {
 /// An innovation and its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Innovation {
-    /// What was read less what was foretold \[MPa\].
+    /// Measured less predicted pressure \[MPa\].
     pub difference: f64,
     /// Its variance \[MPa²\].
     pub variance: f64,
 }
 
-/// The belief.
+/// A hypothesis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hypothesis {
-    /// The dead time that is believed in \[s\].
+    /// Its dead time \[s\].
     pub dead_time_s: f64,
     /// Its probability.
     pub weight: f64,
@@ -99,23 +98,21 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
-    /// Before the first reading, under a load that is known \[MPa\].
+    /// Before the first reading, under a known load \[MPa\].
     pub fn new(filter: &FilterSettings, dead_time_s: f64, weight: f64, load: f64) -> Self {
-        let sure = 2e-4 * filter.tuning.reading_variance;
+        let known = 2e-4 * filter.tuning.reading_variance;
         let mut covariance = StateCovariance::zeros();
         for index in [LOAD_NOW, LOAD] {
-            covariance[(index, index)] = sure;
+            covariance[(index, index)] = known;
         }
         for index in [GAIN, LAG, DEAD_TIME] {
             covariance[(index, index)] = filter.prior(index);
         }
-        let mut state = ModelState::zeros();
-        state[LOAD_NOW] = load;
-        state[LOAD] = load;
+        let state = ModelState::from([load, load, 0.0, 0.0, 0.0]);
         Self { dead_time_s, weight, state, covariance }
     }
 
-    /// Lets time pass, by what it leaves.
+    /// Predicts state and covariance over a time.
     pub fn advance(&mut self, filter: &FilterSettings, left: &Transition) {
         let toward =
             |now: f64, settled: f64| left.load_decay * now + (1.0 - left.load_decay) * settled;
@@ -124,8 +121,7 @@ impl Hypothesis {
         for index in [GAIN, LAG, DEAD_TIME] {
             state[index] *= left.model_decay;
         }
-        // The step's matrix from the left and its transpose from the right: it
-        // mixes the two loads and shrinks the rest.
+        // F·P·Fᵀ: F mixes the two loads and shrinks the rest.
         for i in 0..5 {
             covariance[(LOAD_NOW, i)] = toward(covariance[(LOAD_NOW, i)], covariance[(LOAD, i)]);
         }
@@ -145,8 +141,8 @@ impl Hypothesis {
         }
     }
 
-    /// Takes a reading \[MPa\]. `then` is the model a dead time ago; `around`
-    /// its drives at either end of the dead time's doubt.
+    /// Updates with a reading \[MPa\]. `then` is the model a dead time ago; `around` its drives
+    /// at either end of the uncertainty of the dead time.
     pub fn update(
         &mut self,
         filter: &FilterSettings,
@@ -167,22 +163,22 @@ impl Hypothesis {
         let gain = along * (1.0 / variance);
         self.state += gain * difference;
         self.covariance -= gain * along.transpose();
-        // Rounding must not turn the covariances about.
+        // Keeps the covariance symmetric in spite of rounding.
         self.covariance = (self.covariance + self.covariance.transpose()) * 0.5;
         Innovation { difference, variance }
     }
 
-    /// Adds a step of the load that began a while ago: `settled` \[MPa\] of
-    /// which the share `grown` shows, known with a variance.
+    /// Adds a step of the load that began a while ago: `settled` \[MPa\], of which the fraction
+    /// `grown` shows, with a variance.
     pub fn add_load_step(&mut self, settled: f64, grown: f64, variance: f64) {
-        let mut way = ModelState::zeros();
-        way[LOAD_NOW] = grown;
-        way[LOAD] = 1.0;
-        self.state += way * settled;
-        self.covariance += way * way.transpose() * variance;
+        let mut direction = ModelState::zeros();
+        direction[LOAD_NOW] = grown;
+        direction[LOAD] = 1.0;
+        self.state += direction * settled;
+        self.covariance += direction * direction.transpose() * variance;
     }
 
-    /// Whether rounding or wild readings have left nothing to go on from.
+    /// Whether state or covariance is no longer valid.
     pub fn has_diverged(&self) -> bool {
         let sound = |index| {
             let variance: f64 = self.covariance[(index, index)];
@@ -191,45 +187,39 @@ impl Hypothesis {
         !(self.state.iter().all(|value| value.is_finite()) && (0..5).all(sound))
     }
 
-    /// Standard deviation of the dead time about this belief's own \[s\].
+    /// Standard deviation of the dead time about the hypothesis' own \[s\].
     pub fn dead_time_sigma_s(&self, filter: &FilterSettings) -> f64 {
         self.covariance[(DEAD_TIME, DEAD_TIME)].max(0.0).sqrt() * filter.dead_time_s
     }
 
-    /// Gain's error.
-    pub fn gain_error(&self) -> f64 {
-        self.state[GAIN].clamp(MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR)
+    /// Relative error of the gain, the lag or the dead time, within its bounds.
+    pub fn relative_error(&self, index: usize) -> f64 {
+        self.state[index].clamp(MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR)
     }
 
-    /// Lag's error.
-    pub fn lag_error(&self) -> f64 {
-        self.state[LAG].clamp(MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR)
-    }
-
-    /// The load's part of the pressure once settled \[MPa\].
+    /// Steady-state part of the pressure by the load \[MPa\].
     pub fn load(&self) -> f64 {
         self.state[LOAD]
     }
 
-    /// Dead time with its error \[s\].
+    /// Dead time corrected by its estimated error \[s\].
     pub fn corrected_dead_time_s(&self, filter: &FilterSettings) -> f64 {
-        let fraction = self.state[DEAD_TIME].clamp(MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR);
-        (self.dead_time_s + fraction * filter.dead_time_s).max(0.0)
+        (self.dead_time_s + self.relative_error(DEAD_TIME) * filter.dead_time_s).max(0.0)
     }
 
-    /// The pressure a dead time from now \[MPa\], where the commands until now
-    /// will have brought it, and the row that it is of the state.
+    /// The pressure a dead time from now \[MPa\] by the commands until now, and its row of
+    /// sensitivities to the state.
     pub fn predict(&self, filter: &FilterSettings, now: &LagStates) -> (f64, ModelState) {
         let kept = libm::exp(-self.dead_time_s / filter.lag_s);
         let bent = now.second - now.first;
-        let pressure = now.first * (1.0 + self.gain_error())
-            + bent * self.lag_error()
+        let pressure = now.first * (1.0 + self.relative_error(GAIN))
+            + bent * self.relative_error(LAG)
             + kept * self.state[LOAD_NOW]
             + (1.0 - kept) * self.state[LOAD];
         (pressure, ModelState::from([kept, 1.0 - kept, now.first, bent, 0.0]))
     }
 
-    /// Covariances of the state with a row of it.
+    /// Covariances of the state with a linear combination of it.
     pub fn covariance_with(&self, row: &ModelState) -> ModelState {
         self.covariance * row
     }

@@ -1,14 +1,14 @@
-//! Whether the load has just stepped: the likelihood ratio of the last
-//! innovations with a step that began at any of them to none (Willsky and
-//! Jones 1976), with a prior for the step's size.
+//! Detection of steps of the load: the generalised likelihood ratio of the last innovations with
+//! a step that began at any of them to none (Willsky and Jones 1976), with a prior for the size
+//! of the step.
 
 use super::hypothesis::Innovation;
 
-/// Innovations that are looked back over.
+/// Innovations in the window. A longer one finds smaller steps later and costs more time.
 const WINDOW: usize = 16;
 
-/// Nothing is told apart from a step that has grown to all but this; powers of
-/// it over the window stay within the numbers.
+/// Smallest decay over one interval: a step with less of its transient left counts as settled.
+/// Products of it over the window do not underflow.
 const MIN_DECAY: f64 = 1e-6;
 
 /// A step of the load.
@@ -16,7 +16,7 @@ const MIN_DECAY: f64 = 1e-6;
 pub struct LoadStep {
     /// Its size once settled \[MPa\].
     pub settled: f64,
-    /// Share of it that shows by now.
+    /// Fraction of it that shows by now.
     pub shown_fraction: f64,
     /// Variance of its size \[MPa²\].
     pub variance: f64,
@@ -36,7 +36,7 @@ pub struct LoadStepDetector {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct TimedInnovation {
     innovation: Innovation,
-    /// Share that is left of the time since the one before, in lags.
+    /// Decay of a transient since the one before.
     decay: f64,
 }
 
@@ -44,20 +44,14 @@ const NO_INNOVATION: TimedInnovation =
     TimedInnovation { innovation: Innovation { difference: 0.0, variance: 1.0 }, decay: 1.0 };
 
 impl LoadStepDetector {
-    /// For a lag \[s\], steps of this standard deviation \[MPa\], and the
-    /// logarithm of the ratio from which on one is taken for real.
-    pub fn new(lag_s: f64, load: f64, evidence: f64) -> Self {
-        Self {
-            lag_s,
-            step_sigma: load,
-            threshold: evidence,
-            innovations: [NO_INNOVATION; WINDOW],
-            count: 0,
-        }
+    /// For a lag \[s\], steps of this standard deviation \[MPa\], and a threshold of the log
+    /// likelihood ratio.
+    pub fn new(lag_s: f64, step_sigma: f64, threshold: f64) -> Self {
+        Self { lag_s, step_sigma, threshold, innovations: [NO_INNOVATION; WINDOW], count: 0 }
     }
 
-    /// Takes an innovation, `dt_s` after the last, and tells of a step. After
-    /// one it begins anew.
+    /// Adds an innovation, `dt_s` after the last. Returns a step that it detects; the window is
+    /// empty after that.
     pub fn update(&mut self, innovation: Innovation, dt_s: f64) -> Option<LoadStep> {
         self.innovations.rotate_right(1);
         let kept = libm::exp(-dt_s / self.lag_s).max(MIN_DECAY);
@@ -70,9 +64,8 @@ impl LoadStepDetector {
         jump
     }
 
-    /// Goes back through the innovations. What a step had grown to at each of
-    /// them is 1 − left/passed, `passed` being what the time between it and
-    /// the newest leaves, so that sums over `passed` serve every beginning.
+    /// The most likely step. At each innovation a step has grown to 1 − left/passed, with
+    /// `passed` the decay from there to the newest, so that the same sums serve every onset.
     fn likeliest(&self) -> Option<LoadStep> {
         let mut best = (self.threshold, None);
         let (mut passed, mut sums) = (1.0, Sums::default());
@@ -89,8 +82,8 @@ impl LoadStepDetector {
         best.1
     }
 
-    /// A step that began half an interval before the last innovation of the
-    /// sums and of which the share `left` is still to come.
+    /// A step that began half an interval before the last innovation of the sums and of which
+    /// the fraction `left` is still to come.
     fn fit_step(&self, sums: &Sums, left: f64) -> (f64, LoadStep) {
         let with = sums.difference[0] - left * sums.difference[1];
         let power = sums.weight[0] - 2.0 * left * sums.weight[1] + left * left * sums.weight[2];
@@ -106,8 +99,7 @@ impl LoadStepDetector {
     }
 }
 
-/// Sums over innovations, by their variances and over powers of what the time
-/// since each has left.
+/// Sums over innovations, weighted by their inverse variances and by powers of their decay.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     difference: [f64; 2],
@@ -133,15 +125,15 @@ mod tests {
 
     const SIGMA: f64 = 0.007;
 
-    fn watch(load: f64, seed: u64, count: u64) -> (u32, Option<(u64, LoadStep)>) {
-        let mut watch = LoadStepDetector::new(0.84, 0.06, 3.65);
+    fn detections(load: f64, seed: u64, count: u64) -> (u32, Option<(u64, LoadStep)>) {
+        let mut detector = LoadStepDetector::new(0.84, 0.06, 3.65);
         let (mut found, mut first) = (0, None);
         for i in 0..count {
             let [a, _] = normal_pair(mix(&[seed, i]));
             let t = (0.02 * (f64::from(u32::try_from(i).unwrap()) - 99.5)).max(0.0);
             let difference = SIGMA * a + load * (1.0 - f64::exp(-t / 0.84));
             let variance = SIGMA * SIGMA;
-            if let Some(jump) = watch.update(Innovation { difference, variance }, 0.02) {
+            if let Some(jump) = detector.update(Innovation { difference, variance }, 0.02) {
                 found += 1;
                 if i >= 100 && first.is_none() {
                     first = Some((i, jump));
@@ -152,55 +144,55 @@ mod tests {
     }
 
     #[test]
-    fn a_step_of_the_load_is_seen_within_a_fifth_of_a_second() {
-        let mut late = 0;
+    fn a_step_of_the_load_is_detected_within_a_fifth_of_a_second() {
+        let mut delayed = 0;
         for seed in 0..50 {
-            let (_, first) = watch(0.1, seed, 120);
+            let (_, first) = detections(0.1, seed, 120);
             let seen = first.is_some_and(|(at, jump)| at <= 110 && jump.settled > 0.02);
-            late += u32::from(!seen);
+            delayed += u32::from(!seen);
         }
-        assert!(late <= 8, "{late} of 50 later");
+        assert!(delayed <= 8, "{delayed} of 50 later");
     }
 
     #[test]
-    fn noise_alone_is_seldom_taken_for_a_step() {
-        let found: u32 = (0..20).map(|seed| watch(0.0, 100 + seed, 3000).0).sum();
+    fn false_alarms_in_noise_are_rare() {
+        let found: u32 = (0..20).map(|seed| detections(0.0, 100 + seed, 3000).0).sum();
         // 20 minutes.
         assert!(found < 80, "{found}");
     }
 
-    /// The ratio written out: a step that began half an interval before the
-    /// innovation at `first` would show as `grown` at each one since.
-    fn written_out(watch: &LoadStepDetector, first: usize) -> f64 {
+    /// The ratio by its definition: a step that began half an interval before the innovation at
+    /// `first` shows as `grown` at each one since.
+    fn by_definition(detector: &LoadStepDetector, first: usize) -> f64 {
         let (mut with, mut power, mut left) = (0.0, 0.0, 1.0);
-        for (index, seen) in watch.innovations.iter().take(first + 1).rev().enumerate() {
+        for (index, seen) in detector.innovations.iter().take(first + 1).rev().enumerate() {
             left *= if index == 0 { seen.decay.sqrt() } else { seen.decay };
             let grown = 1.0 - left;
             with += grown * seen.innovation.difference / seen.innovation.variance;
             power += grown * grown / seen.innovation.variance;
         }
-        let prior = watch.step_sigma * watch.step_sigma;
+        let prior = detector.step_sigma * detector.step_sigma;
         0.5 * with * with / power * prior / (prior + 1.0 / power)
             - 0.5 * f64::ln(1.0 + prior * power)
     }
 
     #[test]
-    fn the_sums_come_to_the_ratio_written_out() {
+    fn the_sums_give_the_ratio_of_its_definition() {
         for gap in [1e-3, 0.02, 0.3, 40.0, 1e4] {
-            // Never taken for real, so that nothing begins anew.
-            let mut watch = LoadStepDetector::new(0.84, 0.06, f64::INFINITY);
+            // Never detected, so that the window stays.
+            let mut detector = LoadStepDetector::new(0.84, 0.06, f64::INFINITY);
             for i in 0..40 {
                 let [a, b] = normal_pair(mix(&[7, i]));
                 let variance = SIGMA * SIGMA * (1.0 + b.abs());
                 let dt = if i == 30 { gap } else { 0.02 };
-                watch.update(Innovation { difference: SIGMA * a, variance }, dt);
+                detector.update(Innovation { difference: SIGMA * a, variance }, dt);
             }
-            let expected = (1..WINDOW).map(|first| written_out(&watch, first));
+            let expected = (1..WINDOW).map(|first| by_definition(&detector, first));
             let best = expected.fold(f64::NEG_INFINITY, f64::max);
-            watch.threshold = best - 1e-9;
-            assert!(watch.likeliest().is_some(), "{gap}");
-            watch.threshold = best + 1e-9;
-            assert!(watch.likeliest().is_none(), "{gap}");
+            detector.threshold = best - 1e-9;
+            assert!(detector.likeliest().is_some(), "{gap}");
+            detector.threshold = best + 1e-9;
+            assert!(detector.likeliest().is_none(), "{gap}");
         }
     }
 }

@@ -1,6 +1,6 @@
-//! Hypotheses for several dead times in parallel, each as probable as its readings make it: a
-//! dead time that is off bends the response where no straight line through one hypothesis
-//! would follow it (multiple-model estimation, Magill 1965).
+//! Hypotheses for several dead times in parallel, weighted by their likelihoods: the response
+//! is not linear in the dead time, so that one linearised filter does not follow an error of it
+//! (multiple-model estimation, Magill 1965).
 
 use super::Fopdt;
 use super::command_history::{CommandHistory, LagStates};
@@ -8,18 +8,17 @@ use super::hypothesis::{FilterSettings, GAIN, Hypothesis, LAG, LOAD, ModelState,
 use super::load_step::LoadStepDetector;
 use super::tuning::Tuning;
 
-/// Dead times beside each other, out to two standard deviations.
+/// Number of hypotheses, at −2 … 2 standard deviations of the dead time.
 const HYPOTHESES: usize = 5;
-/// Share of probability that is spread over all with every reading, so that
-/// none is lost for good.
+/// Probability that is spread over all hypotheses with every reading, so that each can recover.
 const PROBABILITY_FLOOR: f64 = 1e-4;
-/// Squares of innovations beyond this are told no further apart.
+/// Normalised innovations squared are clipped here, so that likelihoods do not underflow.
 const MAX_SQUARED_INNOVATION: f64 = 50.0;
-/// Standard deviations of a reading by which the pressure has yet to go where
-/// it counts as moving.
+/// Distance of the pressure from its steady state, in standard deviations of a reading, from
+/// which it counts as moving.
 const MOVING_SIGMAS: f64 = 6.0;
 
-/// The beliefs and their common watch for steps of the load.
+/// The hypotheses and their common detector of load steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MultipleModelFilter {
     filter: FilterSettings,
@@ -27,8 +26,8 @@ pub struct MultipleModelFilter {
     detector: LoadStepDetector,
 }
 
-/// What the beliefs come to, a dead time ahead.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The combined prediction, a dead time ahead.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PressurePrediction {
     /// Pressure \[MPa\].
     pub pressure: f64,
@@ -38,16 +37,16 @@ pub struct PressurePrediction {
     pub gain: f64,
     /// Lag over that of the model.
     pub lag: f64,
-    /// The load's part of the pressure once settled \[MPa\].
+    /// Steady-state part of the pressure by the load \[MPa\].
     pub load: f64,
-    /// Slopes of gain, lag and load with the pressure, by the standard
-    /// deviation of the pressure.
+    /// Regression of gain, lag and load on the pressure, per standard deviation of the
+    /// pressure.
     slopes: [f64; 3],
 }
 
 impl PressurePrediction {
-    /// The same with the pressure some standard deviations higher, and all
-    /// else as is then likeliest.
+    /// The same with a pressure that is higher by some standard deviations, and gain, lag and
+    /// load as expected then.
     pub fn higher(&self, deviations: f64) -> Self {
         let [gain, lag, load] = self.slopes;
         Self {
@@ -61,36 +60,30 @@ impl PressurePrediction {
 }
 
 impl MultipleModelFilter {
-    /// Before the first reading, under a load that is known \[MPa\].
+    /// Before the first reading, under a known load \[MPa\].
     pub fn new(model: &Fopdt, tuning: Tuning, load: f64) -> Self {
         let dead_time_s = model.dead_time_s();
-        let step = tuning.model_sigma;
-        let filter = FilterSettings {
-            lag_s: model.lag_s(),
-            dead_time_s,
-            dead_time_sigma: 0.5 * step,
-            tuning,
-        };
-        // Normal about the model's, at −2 … 2 standard deviations.
+        let (lag_s, step) = (model.lag_s(), tuning.model_sigma);
+        let filter = FilterSettings { lag_s, dead_time_s, dead_time_sigma: 0.5 * step, tuning };
+        // Normal density at −2 … 2 standard deviations, normalised to a sum of 1.
         let weights = [0.054_49, 0.244_20, 0.402_62, 0.244_20, 0.054_49];
         let mut deviations = -2.0;
-        let beliefs = weights.map(|weight| {
-            let hypothesis =
-                Hypothesis::new(&filter, dead_time_s * (1.0 + deviations * step), weight, load);
+        let hypotheses = weights.map(|weight| {
+            let own_s = dead_time_s * (1.0 + deviations * step);
             deviations += 1.0;
-            hypothesis
+            Hypothesis::new(&filter, own_s, weight, load)
         });
-        let watch =
-            LoadStepDetector::new(filter.lag_s, tuning.load_step_sigma, tuning.load_step_threshold);
-        Self { filter, hypotheses: beliefs, detector: watch }
+        let Tuning { load_step_sigma, load_step_threshold, .. } = tuning;
+        let detector = LoadStepDetector::new(lag_s, load_step_sigma, load_step_threshold);
+        Self { filter, hypotheses, detector }
     }
 
-    /// The longest time that is looked back by \[s\].
+    /// The longest time that the filter looks back \[s\].
     pub fn lookback_s(model: &Fopdt, tuning: &Tuning) -> f64 {
         model.dead_time_s() * (1.0 + 3.0 * tuning.model_sigma)
     }
 
-    /// Takes a reading \[MPa\], `dt_s` after the last.
+    /// Updates with a reading \[MPa\], `dt_s` after the last.
     pub fn update(&mut self, history: &CommandHistory, at_s: f64, dt_s: f64, reading: f64) {
         let filter = self.filter;
         let moving = MOVING_SIGMAS * filter.tuning.sigma();
@@ -131,7 +124,7 @@ impl MultipleModelFilter {
         }
     }
 
-    /// The dead time \[s\].
+    /// Estimated dead time \[s\].
     pub fn dead_time_s(&self) -> f64 {
         self.hypotheses
             .iter()
@@ -139,22 +132,14 @@ impl MultipleModelFilter {
             .sum()
     }
 
-    /// Where the commands until now will have brought the pressure a dead time
-    /// from now.
+    /// Predicts the pressure a dead time from now, from the commands until now.
     pub fn predict(&self, now: &LagStates) -> PressurePrediction {
-        let mut mean = PressurePrediction {
-            pressure: 0.0,
-            sigma: 0.0,
-            gain: 1.0,
-            lag: 1.0,
-            load: 0.0,
-            slopes: [0.0; 3],
-        };
+        let mut mean = PressurePrediction { gain: 1.0, lag: 1.0, ..PressurePrediction::default() };
         for hypothesis in &self.hypotheses {
             let (pressure, _) = hypothesis.predict(&self.filter, now);
             mean.pressure += hypothesis.weight * pressure;
-            mean.gain += hypothesis.weight * hypothesis.gain_error();
-            mean.lag += hypothesis.weight * hypothesis.lag_error();
+            mean.gain += hypothesis.weight * hypothesis.relative_error(GAIN);
+            mean.lag += hypothesis.weight * hypothesis.relative_error(LAG);
             mean.load += hypothesis.weight * hypothesis.load();
         }
         let (mut variance, mut along) = (0.0, ModelState::zeros());

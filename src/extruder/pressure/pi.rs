@@ -1,6 +1,5 @@
-//! Proportional-integral law with back-calculation: what a limit takes from a
-//! command is led back into the integral (Åström and Hägglund 2006, 3.5). What
-//! Ma et al. 2026 compare their law with.
+//! PI control with back-calculation: the difference of applied and demanded command is fed back
+//! into the integrator (Åström and Hägglund 2006, 3.5). The baseline of Ma et al. 2026.
 
 use super::call_times::{CallTimes, InitialState, bounded};
 use super::kalman::{Kalman, PressureNoise};
@@ -9,7 +8,7 @@ use crate::core::time::Stamp;
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
 
-/// Gains of the law.
+/// Gains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PressurePiGains {
     kp: f64,
@@ -18,12 +17,12 @@ pub struct PressurePiGains {
 }
 
 impl PressurePiGains {
-    /// The setting that gives the published overshoot and rise (fitted; the
-    /// paper names none), for a gain of the process of 1 MPa/rpm.
+    /// Gains that reproduce the published overshoot and rise time (fitted; the paper gives
+    /// none), for a static gain of 1 MPa/rpm.
     pub const MA2026: Self = Self { kp: 1.5, ki: 1.5, tracking_s: 1.0 };
 
-    /// From the proportional gain \[rpm/MPa\], the integral time \[s\] and the
-    /// time in which what a limit took is forgotten \[s\].
+    /// From the proportional gain \[rpm/MPa\], the integral time \[s\] and the tracking time of
+    /// the back-calculation \[s\].
     pub fn new(kp: f64, integral_s: f64, tracking_s: f64) -> Result<Self, PressureError> {
         let wanted = "above 1e-3 and at most 1e6";
         within("the proportional gain [rpm/MPa]", kp, 0.0..=1e9, "between 0 and 1e9")?;
@@ -33,25 +32,24 @@ impl PressurePiGains {
     }
 }
 
-/// What a proportional-integral law remembers.
+/// The state of PI control.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PiState {
     gains: PressurePiGains,
     integral: f64,
-    /// The last error \[MPa\] and what the law would have liked for it \[rpm\].
+    /// The last error \[MPa\] and the demand for it \[rpm\].
     error: f64,
     demand: f64,
 }
 
 impl PiState {
-    /// With an integral \[rpm\], where a speed runs.
+    /// With an integral \[rpm\], at a running speed.
     pub const fn new(gains: PressurePiGains, integral: f64, running: Rpm) -> Self {
         Self { gains, integral, error: 0.0, demand: running.get() }
     }
 
-    /// What the law would like \[rpm\] for an error \[MPa\], `dt_s` after the
-    /// last one, of which `applied` became of the demand; beside a part that is
-    /// known beforehand \[rpm\].
+    /// The demand \[rpm\] for an error \[MPa\] with a feedforward \[rpm\], `dt_s` after the last
+    /// one, whose demand was applied as `applied`.
     pub fn step(&mut self, error: f64, feedforward: f64, applied: Rpm, dt_s: f64) -> f64 {
         let lost = applied.get() - self.demand;
         let increment = self.gains.ki * self.error + lost / self.gains.tracking_s;
@@ -62,7 +60,7 @@ impl PiState {
     }
 }
 
-/// The law with its memory.
+/// PI control of the filtered pressure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressurePi {
     limits: CommandLimits,
@@ -72,7 +70,7 @@ pub struct PressurePi {
 }
 
 impl PressurePi {
-    /// Takes over from what runs, without a bump.
+    /// Takes over bumplessly.
     pub fn new(
         gains: PressurePiGains,
         noise: PressureNoise,

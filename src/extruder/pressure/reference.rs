@@ -1,40 +1,38 @@
-//! The way that the pressure is to take to its target: a first-order lag, whose
-//! inverse through the model is known exactly from command to command.
+//! The reference trajectory of the pressure: a first-order lag behind the target, whose inverse
+//! through the model is exact from command to command.
 
 use super::call_times::InitialState;
 
-/// What is taken for the time between commands before the first two are known
-/// \[s\]: the paper's 20 Hz.
+/// Time between commands before the first two are known \[s\]: the 20 Hz of Ma et al. 2026.
 pub const FIRST_PERIOD_S: f64 = 0.05;
 
-/// The reference with its memory.
+/// The reference with its state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reference {
     lag_s: f64,
     takeover_s: f64,
     pressure: f64,
-    /// How far the target was from the pressure when the law took over; it is
-    /// let go slowly, so that taking over is no step.
+    /// Distance of the target from the pressure at takeover; it decays, so that the takeover is
+    /// bumpless.
     takeover_offset: f64,
     period_s: f64,
 }
 
-/// One command's stretch of the reference \[MPa\].
+/// The reference over one command \[MPa\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReferenceSegment {
-    /// Where it begins.
+    /// Its beginning.
     pub from: f64,
-    /// Where it ends, at the next command.
+    /// Its end, at the next command.
     pub to: f64,
-    /// The target that it goes to.
+    /// The target.
     pub target: f64,
-    /// How long it is meant to take \[s\].
+    /// Expected duration \[s\].
     pub period_s: f64,
 }
 
 impl ReferenceSegment {
-    /// The steady drive \[MPa\] that takes a lag from the stretch's beginning
-    /// to its end.
+    /// The constant drive \[MPa\] that takes a lag from its beginning to its end.
     pub fn drive(&self, lag_s: f64) -> f64 {
         let kept = libm::exp(-self.period_s / lag_s);
         (self.to - kept * self.from) / (1.0 - kept)
@@ -42,27 +40,20 @@ impl ReferenceSegment {
 }
 
 impl Reference {
-    /// Begins at the pressure that there is. What is between it and the target
-    /// is let go over `eased_s`.
-    pub fn new(lag_s: f64, eased_s: f64, running: InitialState) -> Self {
+    /// Begins at the present pressure. The distance to the target decays over `takeover_s`.
+    pub fn new(lag_s: f64, takeover_s: f64, running: InitialState) -> Self {
         let at = running.pressure.get();
-        Self {
-            lag_s,
-            takeover_s: eased_s,
-            pressure: at,
-            takeover_offset: running.target.get() - at,
-            period_s: FIRST_PERIOD_S,
-        }
+        let takeover_offset = running.target.get() - at;
+        Self { lag_s, takeover_s, pressure: at, takeover_offset, period_s: FIRST_PERIOD_S }
     }
 
-    /// How far a stretch's end is behind a target that moves steadily, in time
-    /// from the stretch's beginning \[s\].
+    /// Lag of the end of a segment behind a target that moves at a constant rate, from the
+    /// segment's beginning \[s\].
     pub fn lead_s(&self) -> f64 {
         self.period_s / (1.0 - libm::exp(-self.period_s / self.lag_s))
     }
 
-    /// The stretch until the next command, which is taken to come as soon as
-    /// this one came.
+    /// The segment until the next command, which is expected after the same time as this one.
     pub fn step(&mut self, target: f64, dt_s: f64) -> ReferenceSegment {
         if dt_s > 0.0 {
             self.period_s = dt_s.clamp(1e-4, 1.0);

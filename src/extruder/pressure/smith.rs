@@ -1,6 +1,5 @@
-//! Smith's predictor (1957), and a proportional-integral law on what it
-//! foretells: the pressure that is read, less what the commands under way have
-//! not yet done to it. Ma et al. 2026, eq. (8).
+//! Smith predictor (Smith 1957), and PI control on its prediction: the measured pressure plus
+//! the effect of the commands within the dead time. Ma et al. 2026, eq. (8).
 
 use super::call_times::{CallTimes, InitialState};
 use super::command_history::CommandHistory;
@@ -12,7 +11,7 @@ use crate::core::time::Stamp;
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
 
-/// What the commands under way are about to do, from the model.
+/// Predicts the effect of the commands within the dead time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SmithPredictor {
     history: CommandHistory,
@@ -20,29 +19,27 @@ pub struct SmithPredictor {
 }
 
 impl SmithPredictor {
-    /// As if the speed had been commanded for ever.
+    /// As if the speed had always been commanded.
     pub fn new(model: &Fopdt, speed_rpm: f64) -> Self {
         let dead_time_s = model.dead_time_s();
         Self { history: CommandHistory::new(model, dead_time_s, speed_rpm), dead_time_s }
     }
 
-    /// By how much the pressure will have changed a dead time from now
-    /// \[MPa\].
+    /// Predicted change of the pressure over the dead time from now \[MPa\].
     pub fn pending_change(&self, now: Stamp) -> f64 {
         let at_s = now.secs();
         let then = self.history.at(at_s - self.dead_time_s).lags.first;
         self.history.at(at_s).lags.first - then
     }
 
-    /// Takes note of a command from now on.
+    /// Records a command from now on.
     pub fn commanded(&mut self, now: Stamp, speed: Rpm) {
         self.history.push(now.secs(), speed.get());
     }
 }
 
-/// Two degrees of freedom: the inverse of the model's lag along a reference
-/// that lags behind the target, and a proportional-integral law on how far the
-/// predicted pressure is from that reference.
+/// Control with two degrees of freedom: the inverse of the model's lag along a reference that
+/// lags behind the target, and PI control of the predicted pressure about that reference.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SmithPi {
     model: Fopdt,
@@ -55,8 +52,7 @@ pub struct SmithPi {
 }
 
 impl SmithPi {
-    /// Takes over from what runs, without a bump. The reference lags behind
-    /// the target by `reference_s`.
+    /// Takes over bumplessly. The reference lags behind the target by `reference_s`.
     pub fn new(
         model: Fopdt,
         gains: PressurePiGains,
@@ -85,9 +81,9 @@ impl PressureController for SmithPi {
 
     fn step(&mut self, now: Stamp, target: MPa) -> ScrewCommand {
         let Some(dt_s) = self.calls.begin(now) else { return self.calls.last_command() };
-        let way = self.reference.step(target.get(), dt_s);
-        let error = way.from - (self.kalman.pressure() + self.smith.pending_change(now));
-        let feedforward = way.drive(self.model.lag_s()) / self.model.gain();
+        let segment = self.reference.step(target.get(), dt_s);
+        let error = segment.from - (self.kalman.pressure() + self.smith.pending_change(now));
+        let feedforward = segment.drive(self.model.lag_s()) / self.model.gain();
         let demand = self.state.step(error, feedforward, self.calls.last_command().speed, dt_s);
         let command = self.calls.command(&self.limits, demand, dt_s);
         self.smith.commanded(now, command.speed);

@@ -1,4 +1,4 @@
-//! What every law of the loop must keep, and what ours learns.
+//! Properties of every controller of the loop, and estimates of the predictive one.
 
 use proptest::prelude::*;
 
@@ -24,12 +24,12 @@ fn noise() -> PressureNoise {
     PressureNoise::new(2e-5, 4.98e-5).unwrap()
 }
 
-fn ours(limits: CommandLimits, running: InitialState) -> PredictiveController {
+fn predictive(limits: CommandLimits, running: InitialState) -> PredictiveController {
     let tuning = Tuning::of(&model(), &noise(), 0.1).unwrap();
     PredictiveController::new(model(), tuning, limits, running)
 }
 
-fn laws(
+fn controllers(
     limits: CommandLimits,
     running: InitialState,
 ) -> [(&'static str, Box<dyn PressureController>); 4] {
@@ -39,7 +39,7 @@ fn laws(
         ("pi", Box::new(PressurePi::new(PressurePiGains::MA2026, noise(), limits, running))),
         ("vsfc", Box::new(Vsfc::new(model(), vsfc, noise(), limits, running))),
         ("smith", Box::new(SmithPi::new(model(), smith, 0.23, noise(), limits, running))),
-        ("ours", Box::new(ours(limits, running))),
+        ("ours", Box::new(predictive(limits, running))),
     ]
 }
 
@@ -52,7 +52,7 @@ fn running(pressure: f64, target: f64, speed: f64) -> InitialState {
     InitialState { pressure, target, speed: Rpm::constant(speed) }
 }
 
-/// Runs a law on a plant from `from_s` on, with readings at 50 Hz and commands
+/// Runs a controller on a plant from `from_s` on, with readings at 50 Hz and commands
 /// at 20 Hz, and gives pressure and speed of every tick.
 fn drive(
     controller: &mut dyn PressureController,
@@ -60,7 +60,7 @@ fn drive(
     until_s: f64,
     target: impl Fn(f64) -> f64,
 ) -> Vec<(f64, f64)> {
-    let mut course = Vec::new();
+    let mut trajectory = Vec::new();
     let mut tick = 0_u64;
     while plant.now_s() < until_s {
         let now = Stamp::from_secs(plant.now_s());
@@ -70,18 +70,18 @@ fn drive(
         if tick.is_multiple_of(10) {
             plant.command(controller.step(now, MPa::constant(target(plant.now_s()))).speed);
         }
-        course.push((plant.pressure(), plant.speed_rpm()));
+        trajectory.push((plant.pressure(), plant.speed_rpm()));
         plant.advance();
         tick += 1;
     }
-    course
+    trajectory
 }
 
 #[test]
-fn a_law_that_takes_over_begins_with_the_speed_that_runs() {
+fn a_takeover_begins_with_the_running_speed() {
     // At rest, off the model by a load, and far from the target.
     for running in [running(0.6, 0.6, 0.6), running(0.58, 0.6, 0.65), running(0.2, 0.9, 0.4)] {
-        for (name, mut controller) in laws(free(), running) {
+        for (name, mut controller) in controllers(free(), running) {
             let now = Stamp::from_secs(7.3);
             controller.measured(now, running.pressure).unwrap();
             let first = controller.step(now, running.target).speed.get();
@@ -91,18 +91,18 @@ fn a_law_that_takes_over_begins_with_the_speed_that_runs() {
 }
 
 #[test]
-fn switching_to_any_law_in_the_middle_of_a_step_is_no_jump() {
+fn switching_to_any_controller_during_a_step_is_bumpless() {
     for which in 0..4 {
         let start = running(0.0, 0.0, 0.0);
         let mut plant = SimPressure::new(model(), Disturbances::default(), FASTEST, start);
-        let mut before = ours(free(), start);
+        let mut before = predictive(free(), start);
         drive(&mut before, &mut plant, 1.0, |_| 0.6);
         let now = running(plant.pressure(), 0.6, plant.speed_rpm());
-        let (name, mut controller) = laws(free(), now).into_iter().nth(which).unwrap();
-        let course = drive(controller.as_mut(), &mut plant, 30.0, |_| 0.6);
-        let (_, first) = course[0];
+        let (name, mut controller) = controllers(free(), now).into_iter().nth(which).unwrap();
+        let trajectory = drive(controller.as_mut(), &mut plant, 30.0, |_| 0.6);
+        let (_, first) = trajectory[0];
         assert!((first - now.speed.get()).abs() < 1e-9, "{name}: {first} after {now:?}");
-        let (last, _) = course[course.len() - 1];
+        let (last, _) = trajectory[trajectory.len() - 1];
         assert!((last - 0.6).abs() < 0.025, "{name}: {last}");
     }
 }
@@ -111,24 +111,24 @@ fn switching_to_any_law_in_the_middle_of_a_step_is_no_jump() {
 fn nothing_winds_up_while_the_target_is_out_of_reach() {
     for which in 0..4 {
         let start = running(0.6, 0.6, 0.6);
-        let (name, mut controller) = laws(free(), start).into_iter().nth(which).unwrap();
+        let (name, mut controller) = controllers(free(), start).into_iter().nth(which).unwrap();
         let mut plant = SimPressure::new(model(), Disturbances::default(), FASTEST, start);
         drive(controller.as_mut(), &mut plant, 60.0, |_| 5.0);
         assert!(plant.speed_rpm() > 2.99, "{name}");
-        let course = drive(controller.as_mut(), &mut plant, 90.0, |_| 0.6);
-        let slows = course.iter().position(|(_, speed)| *speed < 1.0).unwrap();
+        let trajectory = drive(controller.as_mut(), &mut plant, 90.0, |_| 0.6);
+        let slows = trajectory.iter().position(|(_, speed)| *speed < 1.0).unwrap();
         assert!(slows <= 200, "{name}: only after {slows} ticks");
-        let (last, _) = course[course.len() - 1];
+        let (last, _) = trajectory[trajectory.len() - 1];
         assert!((last - 0.6).abs() < 0.025, "{name}: {last}");
     }
 }
 
 #[test]
-fn a_limit_beyond_its_own_that_a_law_is_told_of_winds_nothing_up() {
+fn another_limit_that_is_settled_causes_no_windup() {
     const CAP: f64 = 0.9;
     for which in 0..4 {
         let start = running(0.6, 0.6, 0.6);
-        let (name, mut controller) = laws(free(), start).into_iter().nth(which).unwrap();
+        let (name, mut controller) = controllers(free(), start).into_iter().nth(which).unwrap();
         let mut plant = SimPressure::new(model(), Disturbances::default(), FASTEST, start);
         let mut falls_s = None;
         for tick in 0..12_000_u64 {
@@ -154,43 +154,43 @@ fn a_limit_beyond_its_own_that_a_law_is_told_of_winds_nothing_up() {
 }
 
 #[test]
-fn commands_keep_the_rate_and_ours_keeps_its_foresight_under_it() {
+fn commands_keep_the_rate_and_prediction_accounts_for_it() {
     let limits = CommandLimits::new(0.1, 2.0, 1.5).unwrap();
     let start = running(0.1, 0.1, 0.1);
-    for (name, mut controller) in laws(limits, start) {
+    for (name, mut controller) in controllers(limits, start) {
         let mut plant = SimPressure::new(model(), Disturbances::default(), FASTEST, start);
-        let course = drive(controller.as_mut(), &mut plant, 10.0, |_| 1.2);
-        for pair in course.windows(2) {
+        let trajectory = drive(controller.as_mut(), &mut plant, 10.0, |_| 1.2);
+        for pair in trajectory.windows(2) {
             let step = (pair[1].1 - pair[0].1).abs();
             assert!(step <= 1.5 * PERIOD.secs() + 1e-12, "{name}: {step}");
         }
-        assert!(course.iter().all(|(_, speed)| (0.1..=2.0).contains(speed)), "{name}");
+        assert!(trajectory.iter().all(|(_, speed)| (0.1..=2.0).contains(speed)), "{name}");
         if name == "ours" {
-            let highest = course.iter().map(|(pressure, _)| *pressure).fold(0.0, f64::max);
+            let highest = trajectory.iter().map(|(pressure, _)| *pressure).fold(0.0, f64::max);
             assert!(highest < 1.2 * 1.03, "{highest}");
         }
     }
 }
 
 #[test]
-fn readings_that_cannot_be_are_refused_and_change_nothing() {
-    for (name, mut controller) in laws(free(), running(0.6, 0.6, 0.6)) {
+fn implausible_readings_are_rejected_and_change_nothing() {
+    for (name, mut controller) in controllers(free(), running(0.6, 0.6, 0.6)) {
         let at = Stamp::from_secs;
         controller.measured(at(1.0), MPa::constant(0.6)).unwrap();
         let late = controller.measured(at(0.5), MPa::constant(9.0)).unwrap_err();
-        assert_eq!(late, ReadingRefused::OutOfOrder { late_s: 0.5 }, "{name}");
+        assert_eq!(late, ReadingRefused::OutOfOrder(0.5), "{name}");
         let wild = controller.measured(at(1.1), MPa::constant(2e6)).unwrap_err();
         assert!(wild.to_string().contains("check the sensor"), "{name}: {wild}");
         let speed = controller.step(at(1.2), MPa::constant(0.6)).speed.get();
         assert!((speed - 0.6).abs() < 1e-9, "{name}: {speed}");
     }
-    // What is no number cannot even be asked.
+    // A pressure that is not finite cannot be constructed.
     assert!(MPa::new(f64::NAN).is_err());
 }
 
 #[test]
 fn a_second_call_at_the_same_moment_gives_the_same_command() {
-    for (name, mut controller) in laws(free(), running(0.0, 0.0, 0.0)) {
+    for (name, mut controller) in controllers(free(), running(0.0, 0.0, 0.0)) {
         let now = Stamp::from_secs(1.0);
         let once = controller.step(now, MPa::constant(0.6));
         assert_eq!(controller.step(now, MPa::constant(0.1)), once, "{name}");
@@ -199,7 +199,7 @@ fn a_second_call_at_the_same_moment_gives_the_same_command() {
 }
 
 #[test]
-fn a_model_that_cannot_be_is_refused_with_what_was_found() {
+fn a_model_out_of_range_is_refused_with_its_value() {
     assert!(Fopdt::new(0.0, 0.84, 0.41).is_err());
     assert!(Fopdt::new(1.0, f64::NAN, 0.41).is_err());
     let error = Fopdt::new(1.0, 0.84, -0.1).unwrap_err().to_string();
@@ -210,20 +210,20 @@ fn a_model_that_cannot_be_is_refused_with_what_was_found() {
 }
 
 #[test]
-fn a_step_tells_ours_by_how_much_its_model_is_off() {
+fn a_step_identifies_the_error_of_the_model() {
     let cases = [(1.2, 0.84, 0.41), (0.8, 0.84, 0.41), (1.0, 0.84, 0.492), (1.0, 0.84, 0.328)];
     for (gain, lag, dead) in cases {
         let start = running(0.0, 0.0, 0.0);
         let process = Fopdt::new(gain, lag, dead).unwrap();
         let disturbed = Disturbances { noise_mpa2: 4.98e-5, seed: 3, ..Disturbances::default() };
         let mut plant = SimPressure::new(process, disturbed, FASTEST, start);
-        let mut controller = ours(free(), start);
+        let mut controller = predictive(free(), start);
         drive(&mut controller, &mut plant, 4.0, |_| 0.6);
-        // The plant takes a command over a tick late.
+        // The plant applies a command one tick later.
         let dead_found = controller.dead_time_s();
         assert!((dead_found - dead - 0.005).abs() < 0.025, "{gain} {dead}: {dead_found}");
         let found = controller.prediction(Stamp::from_secs(4.0));
-        // Gain and load share what a single level can tell.
+        // Gain and load are not separable at a single level.
         let settled = found.gain * plant.speed_rpm() + found.load;
         assert!((settled - gain * plant.speed_rpm()).abs() < 0.01, "{gain} {dead}: {found:?}");
         assert!((found.gain - gain).abs() < 0.07, "{gain} {dead}: {found:?}");
@@ -239,8 +239,8 @@ fn a_process_without_dead_time_is_held_as_well() {
     let start = running(1.0, 1.0, 50.0);
     let mut controller = PredictiveController::new(process, tuning, limits, start);
     let mut plant = SimPressure::new(process, Disturbances::default(), Rpm::constant(300.0), start);
-    let course = drive(&mut controller, &mut plant, 20.0, |_| 2.0);
-    let highest = course.iter().map(|(pressure, _)| *pressure).fold(0.0, f64::max);
+    let trajectory = drive(&mut controller, &mut plant, 20.0, |_| 2.0);
+    let highest = trajectory.iter().map(|(pressure, _)| *pressure).fold(0.0, f64::max);
     assert!(highest < 2.01, "{highest}");
     assert!((plant.pressure() - 2.0).abs() < 1e-3, "{}", plant.pressure());
 }
@@ -255,7 +255,7 @@ proptest! {
         ),
     ) {
         let limits = CommandLimits::new(-1.0, FASTEST.get(), 5.0).unwrap();
-        for (name, mut law) in laws(limits, running(0.3, 0.4, 0.5)) {
+        for (name, mut law) in controllers(limits, running(0.3, 0.4, 0.5)) {
             let mut now = Stamp::START;
             for (ns, reading, target, step) in &calls {
                 now = now + Span::from_ns(i64::try_from(*ns).unwrap());

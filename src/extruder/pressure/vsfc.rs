@@ -1,6 +1,6 @@
-//! Variable-structure feedback on Smith's predictor around an inverse-model
-//! feedforward, as Ma et al. 2026, eqs. (6) to (10): the integral rests while
-//! the error is within the noise, creeps in a zone around it, and works beyond.
+//! Variable-structure feedback on a Smith predictor around an inverse-model feedforward, as Ma
+//! et al. 2026, eqs. (6) to (10): the integral gain is zero while the error is within the noise,
+//! reduced in a zone around it, and full beyond.
 
 use super::call_times::{CallTimes, InitialState, bounded};
 use super::kalman::{Kalman, PressureNoise};
@@ -11,7 +11,7 @@ use crate::core::time::Stamp;
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
 
-/// Gains and zones of the law.
+/// Gains and zones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VsfcGains {
     kp: f64,
@@ -23,10 +23,10 @@ pub struct VsfcGains {
 }
 
 impl VsfcGains {
-    /// From the gains \[rpm/MPa, rpm/(MPa·s)\], the integral's share in the
-    /// weak zone, and the standard deviation of the noise: the dead zone is
-    /// three of it, the weak zone six. Within the dead zone the integral goes
-    /// back to the feedforward over 5 s.
+    /// From the gains \[rpm/MPa, rpm/(MPa·s)\], the fraction of the integral gain in the weak
+    /// zone, and the standard deviation of the noise: the dead zone is three of it, the weak
+    /// zone six. Within the dead zone the integral decays with 5 s (fitted; the
+    /// paper gives none).
     pub fn new(kp: f64, ki: f64, creep: f64, sigma: MPa) -> Result<Self, PressureError> {
         within("the proportional gain [rpm/MPa]", kp, 0.0..=1e9, "between 0 and 1e9")?;
         within("the integral gain [rpm/(MPa·s)]", ki, 0.0..=1e9, "between 0 and 1e9")?;
@@ -37,8 +37,8 @@ impl VsfcGains {
         Ok(Self { kp, ki, creep, dead_zone, weak_zone, return_s: 5.0 })
     }
 
-    /// The setting that gives the published overshoot and rise (fitted; the
-    /// paper names none), for a process of 1 MPa/rpm with this noise.
+    /// Gains that reproduce the published overshoot and rise time (fitted; the paper gives
+    /// none), for a static gain of 1 MPa/rpm and this noise.
     pub fn ma2026(noise: PressureNoise) -> Result<Self, PressureError> {
         Self::new(0.816, 1.19, 0.3, noise.sigma())
     }
@@ -56,7 +56,7 @@ impl VsfcGains {
     }
 }
 
-/// The law with its memory.
+/// The controller with its state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vsfc {
     gains: VsfcGains,
@@ -70,7 +70,7 @@ pub struct Vsfc {
 }
 
 impl Vsfc {
-    /// Takes over from what runs, without a bump.
+    /// Takes over bumplessly.
     pub fn new(
         model: Fopdt,
         gains: VsfcGains,
@@ -80,7 +80,7 @@ impl Vsfc {
     ) -> Self {
         let error = running.target.get() - running.pressure.get();
         let feedforward = running.target.get() / model.gain();
-        // The first command gathers over its own period at once.
+        // The first command integrates over its own period at once.
         let proportional = gains.kp * error + gains.ki_at(error) * error * FIRST_PERIOD_S;
         Self {
             gains,
@@ -94,15 +94,14 @@ impl Vsfc {
         }
     }
 
-    /// The integral over the time since the last command; the first command
-    /// gathers over its own period.
+    /// Integrates over the time since the last command; the first command over its own period.
     fn integrate(&mut self, error: f64, dt_s: f64) {
         if error.abs() < self.gains.dead_zone {
             self.integral *= libm::exp(-dt_s / self.gains.return_s);
         }
         let dt_s = if dt_s > 0.0 { dt_s } else { FIRST_PERIOD_S };
         let increment = self.gains.ki_at(error) * error * dt_s;
-        // Nothing is gathered into a limit.
+        // The integrator is frozen against a limit.
         let against = self.demand - self.calls.last_command().speed.get();
         if increment * against <= 0.0 {
             self.integral = bounded(self.integral + increment);

@@ -1,5 +1,5 @@
-//! What to feed now: the plug is measured, foretold to when the feed arrives,
-//! and the law is asked there, eq. (74) of Diagne et al. 2015.
+//! Predictor feedback of the screw: the plug is measured, predicted to when the feed arrives, and
+//! fed back from there (Diagne et al. 2015, eq. (74)).
 
 use super::error::{ScrewError, positive};
 use super::euler::{EulerPredictor, whole};
@@ -10,36 +10,36 @@ use super::model::{Conveying, MM_PER_M, Screw};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
 
-/// Most changes of the feed that are remembered.
+/// Largest number of changes of the feed that are kept, as a bound on memory.
 const MAX_STEPS: usize = 1 << 16;
 
 /// How the prediction is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scheme {
-    /// Over the exact delay interval, to high order, at any moments.
+    /// Over the exact delay interval, of high order, at any times.
     Exact,
-    /// The paper's Euler steps on a fixed grid.
+    /// Euler steps on a fixed grid, as in the paper.
     Paper,
 }
 
-/// What a control of the screw is made of.
+/// Settings of the control of a screw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScrewSettings {
-    /// The screw as it is known. [`Screw::steady`] of it makes the predictor
-    /// that knows of no pulsation, eqs. (105) to (112).
+    /// The model. [`Screw::steady`] of it gives the predictor without pulsation, eqs. (105) to
+    /// (112).
     pub screw: Screw,
-    /// The law.
+    /// The feedback.
     pub feedback: FillFeedback,
     /// How the prediction is computed.
     pub scheme: Scheme,
-    /// Time between steps. The exact scheme takes steps at half that distance
-    /// and more, the paper's only whole multiples of it.
+    /// Time between steps. The exact scheme accepts steps from half of it, the paper's only
+    /// whole multiples.
     pub period: Span,
-    /// Share of full that has been fed up to the first step, from 0 to below 1.
+    /// Fill ratio of the feed up to the first step, from 0 to below 1.
     pub initial_fill: f64,
 }
 
-/// The control with its memory of the feed.
+/// The control with its history of the feed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScrewControl {
     feedback: FillFeedback,
@@ -58,28 +58,28 @@ enum Predictor {
 /// A decision.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScrewStep {
-    /// Share of full to feed from now on, U.
+    /// Fill ratio of the feed from now on, U.
     pub fill: f64,
-    /// Length of the plug when that arrives, P.
+    /// Predicted length of the plug when that arrives, P.
     pub plug: Mm,
     /// When it arrives, σ.
     pub arrival: Stamp,
-    /// Delay of what arrives now, D.
+    /// Delay of the feed that arrives now, D.
     pub delay: Span,
 }
 
-/// Why there is no decision. What was fed last stays in force, and the control
-/// counts on that unless it is told with [`ScrewControl::applied`].
+/// Why there is no decision. The last feed stays in force unless [`ScrewControl::applied`] sets
+/// another.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ScrewFault {
-    /// A plug that no screw has.
+    /// A plug outside the screw.
     #[error(
         "a plug of {} was measured in a screw of {}; check the sensor's zero and unit",
         plug,
         length
     )]
     PlugOutsideScrew {
-        /// What was measured.
+        /// The measured length.
         plug: Mm,
         /// The screw's length.
         length: Mm,
@@ -92,33 +92,29 @@ pub enum ScrewFault {
     TooSoon {
         /// Time since the last step.
         since: Span,
-        /// What was set.
+        /// The period.
         period: Span,
     },
-    /// A step that is not on the paper's grid.
+    /// A step off the grid of the paper's scheme.
     #[error("{} s after the last step is not on the grid of {} s that the paper's scheme steps on", since.secs(), period.secs())]
     OffGrid {
         /// Time since the last step.
         since: Span,
-        /// What was set.
+        /// The period.
         period: Span,
     },
-    /// A share that cannot have been fed.
-    #[error("a fill ratio of {fill} cannot have been fed; it must be from 0 to below 1")]
-    FillOutOfRange {
-        /// What was told.
-        fill: f64,
-    },
+    /// A fill ratio out of range.
+    #[error("a fill ratio of {0} cannot have been fed; it must be from 0 to below 1")]
+    FillOutOfRange(f64),
 }
 
 impl ScrewControl {
-    /// A control before its first step. Whether the screw is feasible at all is
-    /// a question for [`super::feasible::Feasibility::judge`].
+    /// Before the first step. [`super::feasible::Feasibility::judge`] checks feasibility.
     pub fn new(settings: &ScrewSettings) -> Result<Self, ScrewError> {
         let screw = Screw::new(settings.screw)?;
         let period_s = positive("period", settings.period.secs())?;
         if !(0.0..1.0).contains(&settings.initial_fill) {
-            return Err(ScrewError::InitialFill { fill: settings.initial_fill });
+            return Err(ScrewError::InitialFill(settings.initial_fill));
         }
         let delay_s = screw.longest_delay();
         // Steps may come at half the period.
@@ -148,7 +144,7 @@ impl ScrewControl {
         })
     }
 
-    /// Decides what to feed from now on, from the plug measured now.
+    /// The feed from now on, for the plug measured now.
     pub fn step(&mut self, now: Stamp, plug: Mm) -> Result<ScrewStep, ScrewFault> {
         self.advance(now)?;
         self.last = Some(now);
@@ -158,11 +154,11 @@ impl ScrewControl {
         decided
     }
 
-    /// Tells what is fed from a moment on, where that is not what the last step
-    /// decided: a limit acted, or an operator.
+    /// The feed from a moment on, where it differs from the last decision (a limit or an operator
+    /// acted).
     pub fn applied(&mut self, from: Stamp, fill: f64) -> Result<(), ScrewFault> {
         if !(0.0..1.0).contains(&fill) {
-            return Err(ScrewFault::FillOutOfRange { fill });
+            return Err(ScrewFault::FillOutOfRange(fill));
         }
         match &mut self.predictor {
             Predictor::Exact { exact, history } => {
@@ -173,7 +169,7 @@ impl ScrewControl {
         Ok(())
     }
 
-    /// The share that is fed now, as far as is known.
+    /// The known fill ratio of the feed now.
     pub fn fed(&self) -> f64 {
         match &self.predictor {
             Predictor::Exact { history, .. } => history.last(),
@@ -194,7 +190,7 @@ impl ScrewControl {
         })
     }
 
-    /// Lets the time pass since the last step, if a step may be made now.
+    /// Advances by the time since the last step, if a step is due.
     fn advance(&mut self, now: Stamp) -> Result<(), ScrewFault> {
         let Some(last) = self.last else { return Ok(()) };
         let (since, period) = (now - last, self.period);

@@ -1,5 +1,4 @@
-//! A screw as its maker describes it. Diagne et al. 2015, eqs. (14), (15) and
-//! (101).
+//! Parameters of a screw from its design. Diagne et al. 2015, eqs. (14), (15) and (101).
 
 use std::f64::consts::TAU;
 
@@ -7,25 +6,25 @@ use super::error::{ScrewError, positive};
 use super::model::{Conveying, MM_PER_M, Screw, SpeedPulsation};
 use crate::core::units::{Mm, Rpm};
 
-/// What the screw's speed is multiplied with the pitch in.
+/// The unit in which the screw's speed is multiplied with the pitch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TurnUnit {
-    /// Radians a second; with it the paper's two cases are feasible.
+    /// Radians per second; with it the paper's two cases are feasible.
     RadPerS,
-    /// Turns a second, which is how far a screw thread conveys without slip.
+    /// Turns per second: the conveying speed of a screw without slip.
     RevPerS,
 }
 
-/// A screw as it is drawn, and what it conveys.
+/// The design of a screw and its melt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScrewDesign {
-    /// From the nozzle to the feed, L.
+    /// Distance from the nozzle to the feed, L.
     pub length: Mm,
     /// The screw's pitch ξ.
     pub pitch: Mm,
     /// The screw's constant speed N0.
     pub speed: Rpm,
-    /// How speed and pitch make the conveying speed.
+    /// Unit of the speed in the conveying speed.
     pub unit: TurnUnit,
     /// Conductance of the nozzle, `K_d` \[m³\].
     pub nozzle_m3: f64,
@@ -52,8 +51,7 @@ impl ScrewDesign {
         width.get() * depth.get().powi(3) / 12.0 / MM_PER_M.powi(4)
     }
 
-    /// θ1 and θ2 of the design, eqs. (14) and (15), with the conveying speed
-    /// as it pulsates.
+    /// θ1 and θ2 of the design, eqs. (14) and (15), with a pulsation of the conveying speed.
     pub fn screw(&self, pulsation: SpeedPulsation) -> Result<Screw, ScrewError> {
         let turns = match self.unit {
             TurnUnit::RadPerS => self.speed.get() * TAU / 60.0,

@@ -1,7 +1,8 @@
-//! The predictor as Diagne et al. 2015 compute it, eqs. (50) and (51): a grid
-//! of time steps, the delay cut to whole steps, left endpoints. It is kept to
-//! reproduce the paper and to show what it leaves out; [`super::exact`] is the
-//! one to use.
+//! The predictor as Diagne et al. 2015 compute it, eqs. (50) and (51): a grid of time steps, the
+//! delay truncated to whole steps, left endpoints. It reproduces the paper; [`super::exact`] is
+//! more accurate.
+
+use std::collections::VecDeque;
 
 use super::exact::{FeedOvertaken, MAX_DELAY_GROWTH, PlugPrediction};
 use super::model::Screw;
@@ -11,70 +12,56 @@ use super::model::Screw;
 pub struct EulerPredictor {
     screw: Screw,
     step_s: f64,
-    /// Shares fed, a ring; `newest` is the place of the last.
-    fed: Box<[f64]>,
-    newest: usize,
+    /// Fill ratios of the last steps, the newest last.
+    fed: VecDeque<f64>,
 }
 
 impl EulerPredictor {
-    /// Steps of a fixed length, after a feed that has been held for longer than
-    /// the delay. `steps` is how many the longest delay may have.
+    /// Steps of a fixed length, after a feed that has been constant for longer than the delay.
+    /// `steps` is the number of steps in the longest delay.
     pub fn new(screw: Screw, step_s: f64, steps: usize, before: f64) -> Self {
-        Self { screw, step_s, fed: vec![before; steps.max(1)].into_boxed_slice(), newest: 0 }
+        Self { screw, step_s, fed: vec![before; steps.max(1)].into() }
     }
 
-    /// The screw that it knows.
-    pub fn screw(&self) -> &Screw {
-        &self.screw
-    }
-
-    /// What is fed over the step that begins now.
+    /// The fill ratio over the step that begins now.
     pub fn push(&mut self, fill: f64) {
-        self.newest = if self.newest + 1 == self.fed.len() { 0 } else { self.newest + 1 };
-        self.amend(fill);
+        self.fed.pop_front();
+        self.fed.push_back(fill);
     }
 
-    /// What was applied instead of the share that was pushed last.
+    /// The fill ratio that was applied instead of the last one.
     pub fn amend(&mut self, fill: f64) {
-        if let Some(slot) = self.fed.get_mut(self.newest) {
-            *slot = fill;
-        }
+        self.fed.pop_back();
+        self.fed.push_back(fill);
     }
 
-    /// The share that is fed now.
+    /// The fill ratio now.
     pub fn last(&self) -> f64 {
-        self.fill_before(0)
+        self.fed.back().copied().unwrap_or_default()
     }
 
-    /// What was fed a number of steps before the last.
-    fn fill_before(&self, steps: usize) -> f64 {
-        let index = (self.newest + self.fed.len() - steps) % self.fed.len();
-        self.fed.get(index).copied().unwrap_or_default()
-    }
-
-    /// Foretells from a plug that was measured now, before anything is pushed
-    /// for the step that begins.
+    /// Predicts from a plug that is measured now, before the feed of the step that begins is
+    /// pushed.
     pub fn predict(&self, now_s: f64, plug_m: f64) -> Result<PlugPrediction, FeedOvertaken> {
         let screw = &self.screw;
         let delay_s = screw.delay(now_s, plug_m);
         let (mut plug, mut arrival) = (plug_m, now_s);
-        for steps in (0..whole(delay_s / self.step_s).min(self.fed.len())).rev() {
-            let fill = self.fill_before(steps);
+        let steps = whole(delay_s / self.step_s).min(self.fed.len());
+        for &fill in self.fed.range(self.fed.len() - steps..) {
             let (speed, slowing) = speed_and_delay_rate(screw, arrival);
             let growth = slowing * (screw.length_m - plug) - screw.growth(plug, fill);
             if growth.is_nan() || growth >= MAX_DELAY_GROWTH {
                 return Err(FeedOvertaken { growth, plug_m: plug });
             }
-            let stretch = self.step_s / (1.0 - growth);
-            plug = (plug + stretch * speed * screw.growth(plug, fill)).clamp(0.0, screw.length_m);
-            arrival += stretch;
+            let scaled_s = self.step_s / (1.0 - growth);
+            plug = (plug + scaled_s * speed * screw.growth(plug, fill)).clamp(0.0, screw.length_m);
+            arrival += scaled_s;
         }
         Ok(PlugPrediction { plug_m: plug, arrival_s: arrival, delay_s })
     }
 }
 
-/// Conveying speed \[m/s\], and ∂D/∂t for each metre of way, θ1·ε·ω·sin(ωt)/c²,
-/// eq. (82).
+/// Conveying speed \[m/s\], and ∂D/∂t per metre conveyed, θ1·ε·ω·sin(ωt)/c², eq. (82).
 fn speed_and_delay_rate(screw: &Screw, at_s: f64) -> (f64, f64) {
     let pulsation = screw.pulsation;
     let (sin, cos) = libm::sincos(pulsation.rad_per_s * at_s + pulsation.phase_rad);
@@ -83,7 +70,7 @@ fn speed_and_delay_rate(screw: &Screw, at_s: f64) -> (f64, f64) {
     (speed, turns / (speed * speed))
 }
 
-/// Whole steps in a delay, as (50) cuts it.
+/// Whole steps in a delay, truncated as in eq. (50).
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
 pub(super) fn whole(steps: f64) -> usize {
     steps.floor() as usize
@@ -97,7 +84,7 @@ mod tests {
     use crate::extruder::screw::{ScrewDesign, SpeedPulsation};
 
     #[test]
-    fn finer_steps_lead_to_the_exact_prediction() {
+    fn finer_steps_converge_to_the_exact_prediction() {
         let pulsation = SpeedPulsation { relative_amplitude: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
         let screw = ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap();
         let feed = |at_s: f64| if at_s < 0.7 { 0.2 } else { 0.6 };

@@ -1,29 +1,27 @@
-//! Where the plug will be when what is fed now arrives, and when: the predictor
-//! (47), (48) with (74) to (77) of Diagne et al. 2015, over the exact delay
-//! interval and the feed as it was held.
+//! Predicts the length of the plug when the present feed arrives, and when: the predictor (47),
+//! (48) with (74) to (77) of Diagne et al. 2015, over the exact delay interval and the piecewise
+//! constant feed.
 //!
-//! Where the conveying speed is steady, or the delay adds up on the way, metres
-//! conveyed in place of seconds make the predictor linear: what was fed as dq
-//! becomes plug as dP = (U − θ2·(1 − U)·P)·dq, which has a closed form while U is
-//! held. Otherwise it is integrated by Runge–Kutta steps that end where the feed
-//! changes: of fourth order, or of second where the feed changes so often that
-//! the steps are shorter than that needs.
+//! Where the conveying speed is constant, or the delay integrates it, the predictor is linear in
+//! metres conveyed: dP = (U − θ2·(1 − U)·P)·dq, in closed form for constant U. Otherwise it is
+//! integrated by Runge–Kutta steps that end where the feed changes: of fourth order, or of second
+//! where the feed changes so often that the steps are short enough.
 
 use super::feed_history::{FeedHistory, FeedSegment};
 use super::model::{Conveying, Screw};
 
-/// What is foretold.
+/// A prediction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlugPrediction {
-    /// Length of the plug when what is fed now arrives, P \[m\].
+    /// Length of the plug when the present feed arrives, P \[m\].
     pub plug_m: f64,
     /// When it arrives, σ \[s\].
     pub arrival_s: f64,
-    /// Delay of what arrives now, D \[s\].
+    /// Delay of the feed that arrives now, D \[s\].
     pub delay_s: f64,
 }
 
-/// The delay grows as fast as time passes: what was fed does not arrive.
+/// The delay grows as fast as time passes: the feed does not arrive.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "the feed does not reach the plug: at a plug of {:.1} mm the delay grows by {growth:.3} s a \
@@ -33,41 +31,37 @@ pub struct PlugPrediction {
 pub struct FeedOvertaken {
     /// Growth of the delay F, eq. (77).
     pub growth: f64,
-    /// Foretold length of the plug where it grows so \[m\].
+    /// Predicted length of the plug there \[m\].
     pub plug_m: f64,
 }
 
-/// Largest growth of the delay that a prediction goes through: beyond, a second
-/// of feed is stretched a hundredfold.
+/// Largest growth of the delay in a prediction. Derived: at a growth F a second of feed arrives
+/// over 1/(1 − F) seconds, a hundred for 0.99.
 pub(super) const MAX_DELAY_GROWTH: f64 = 0.99;
-/// Largest turn of the pulsation in one Runge–Kutta step \[rad\].
+/// Largest phase of the pulsation in one Runge–Kutta step \[rad\]. A larger one is faster and less
+/// accurate; a test bounds the error.
 const MAX_STEP_RAD: f64 = 0.2;
-/// Longest Runge–Kutta step \[s\].
+/// Longest Runge–Kutta step \[s\], for the growth of the plug.
 const MAX_STEP_S: f64 = 0.1;
-/// Up to this turn and length second order leaves less than a micrometre over
-/// the delay.
+/// Up to this phase of the pulsation in a step \[rad\] second order leaves less than a micrometre
+/// over the delay, as a test shows.
 const SECOND_ORDER_RAD: f64 = 0.05;
+/// The same for the length of the step \[s\].
 const SECOND_ORDER_S: f64 = 0.006;
 
-/// The predictor with the model that it knows.
+/// The predictor with its model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExactPredictor {
     screw: Screw,
 }
 
 impl ExactPredictor {
-    /// A predictor that knows this screw.
+    /// For a model of the screw.
     pub fn new(screw: Screw) -> Self {
         Self { screw }
     }
 
-    /// The screw that it knows.
-    pub fn screw(&self) -> &Screw {
-        &self.screw
-    }
-
-    /// Where a moment lies in the history's coordinate: seconds, or metres
-    /// conveyed where the closed form holds.
+    /// The history's coordinate of a moment: seconds, or metres conveyed for the closed form.
     pub fn coordinate(&self, now_s: f64) -> f64 {
         if self.is_linear() { self.screw.conveyed_m(now_s) } else { now_s }
     }
@@ -76,7 +70,7 @@ impl ExactPredictor {
         !self.screw.pulsates() || self.screw.conveying == Conveying::AtSpeedOnTheWay
     }
 
-    /// Foretells from a plug that was measured now.
+    /// Predicts from a plug that is measured now.
     pub fn predict(
         &self,
         history: &FeedHistory,
@@ -100,7 +94,7 @@ impl ExactPredictor {
         Ok(PlugPrediction { plug_m: ahead.plug, arrival_s: now_s + ahead.elapsed_s, delay_s })
     }
 
-    /// The plug after a stretch of feed has joined it.
+    /// The plug after a segment of feed has joined it.
     fn grow(&self, plug: f64, piece: FeedSegment) -> f64 {
         let fade = self.screw.theta2_per_m * (1.0 - piece.fill);
         let joined = -libm::expm1(-fade * piece.length);
@@ -108,8 +102,7 @@ impl ExactPredictor {
     }
 }
 
-/// A prediction under way: the plug, the time since now and the pulsation's
-/// phase then.
+/// State of a prediction: the plug, the time since now and the pulsation's phase.
 struct PredictionState<'a> {
     screw: &'a Screw,
     plug: f64,
@@ -124,7 +117,7 @@ struct Phase {
     cos: f64,
 }
 
-/// Rates of the plug and of the time of arrival for each second of feeding.
+/// Rates of the plug and of the time of arrival per second of feed.
 #[derive(Clone, Copy)]
 struct Rates {
     plug: f64,
@@ -138,14 +131,14 @@ impl<'a> PredictionState<'a> {
         Self { screw, plug, elapsed_s: 0.0, phase: Phase { sin, cos } }
     }
 
-    /// Over a stretch of held feed.
+    /// Integrates over a segment of constant feed.
     fn follow(&mut self, piece: FeedSegment) -> Result<(), FeedOvertaken> {
         let mut left = piece.length;
         while left > 0.0 {
             let first = self.rates(piece.fill, self.phase, self.plug)?;
             let turn = self.screw.pulsation.rad_per_s * first.time;
             let step = left.min(MAX_STEP_S).min(MAX_STEP_RAD / turn);
-            // What would be left by rounding is taken along.
+            // A remainder by rounding is included.
             let step = if left - step < 1e-12 { left } else { step };
             let mean = if step <= SECOND_ORDER_S && step * turn <= SECOND_ORDER_RAD {
                 self.after(piece.fill, first, 0.5 * step)?
@@ -161,7 +154,7 @@ impl<'a> PredictionState<'a> {
         Ok(())
     }
 
-    /// Mean rates of a step, to fourth order.
+    /// Mean rates of a step, of fourth order.
     fn fourth_order(&self, fill: f64, first: Rates, step: f64) -> Result<Rates, FeedOvertaken> {
         let second = self.after(fill, first, 0.5 * step)?;
         let third = self.after(fill, second, 0.5 * step)?;
@@ -172,15 +165,14 @@ impl<'a> PredictionState<'a> {
         Ok(Rates { plug: mean(|rates| rates.plug), time: mean(|rates| rates.time) })
     }
 
-    /// Rates where others lead within a part of a step.
+    /// Rates after a part of a step at given rates.
     #[inline]
     fn after(&self, fill: f64, rates: Rates, part: f64) -> Result<Rates, FeedOvertaken> {
         self.rates(fill, self.rotated(rates.time * part), self.plug + rates.plug * part)
     }
 
-    /// f/(1 − F) and 1/(1 − F) of (47), (48), with F at the time of arrival
-    /// (77), from sine and cosine of the phase then. Both sides of the fractions
-    /// are multiplied with (1 + θ2·P)(1 − U), which is 1/(1 − Γ), and with
+    /// f/(1 − F) and 1/(1 − F) of (47), (48), with F at the time of arrival (77), from sine and
+    /// cosine of the phase then. Numerators and denominators are multiplied by (1 + θ2·P)(1 − U), which is 1/(1 − Γ), and by
     /// θ1·(1 + ε·cos)².
     #[inline]
     fn rates(&self, fill: f64, phase: Phase, plug: f64) -> Result<Rates, FeedOvertaken> {
@@ -189,21 +181,21 @@ impl<'a> PredictionState<'a> {
         let amplitude = screw.pulsation.relative_amplitude;
         let scale = 1.0 + amplitude * cos;
         let lead = screw.theta2_per_m * plug;
-        let stretch = (1.0 + lead) * (1.0 - fill);
+        let dilation = (1.0 + lead) * (1.0 - fill);
         let square = screw.theta1_m_per_s * scale * scale;
         let slows = amplitude * screw.pulsation.rad_per_s * sin * (screw.length_m - plug);
-        let over = square / (square - stretch * slows);
-        let time = stretch * over;
+        let over = square / (square - dilation * slows);
+        let time = dilation * over;
         if !(time > 0.0 && time * (1.0 - MAX_DELAY_GROWTH) < 1.0) {
-            let growth = slows / square + 1.0 - 1.0 / stretch;
+            let growth = slows / square + 1.0 - 1.0 / dilation;
             return Err(FeedOvertaken { growth, plug_m: plug });
         }
         let joins = fill - lead * (1.0 - fill);
         Ok(Rates { plug: screw.theta1_m_per_s * scale * joins * over, time })
     }
 
-    /// Sine and cosine of the pulsation's phase a while later, turned on from
-    /// those that are known: by a series, exact to 10⁻¹³, where it is short.
+    /// Sine and cosine of the pulsation's phase after a time, rotated from the present ones: by a
+    /// series, exact to 10⁻¹³, for a small phase.
     #[inline]
     fn rotated(&self, past_s: f64) -> Phase {
         let a = self.screw.pulsation.rad_per_s * past_s;
@@ -242,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn the_closed_form_is_where_the_steps_lead_as_the_pulsation_fades() {
+    fn the_closed_form_is_the_limit_of_a_vanishing_pulsation() {
         let steady = ExactPredictor::new(screw(SpeedPulsation::default()));
         let faint = ExactPredictor::new(screw(SpeedPulsation { relative_amplitude: 1e-11, ..A }));
         let closed = steady.predict(&fed(&steady, 0.0), 1.5, 0.12).unwrap();
@@ -253,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_fed_arrives_when_its_delay_is_over() {
+    fn the_feed_arrives_after_its_delay() {
         // Eq. (53): σ = t + D(σ, P), with either kind of conveying.
         for conveying in [Conveying::AtPresentSpeed, Conveying::AtSpeedOnTheWay] {
             let screw = Screw { conveying, ..screw(A) };
@@ -265,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_phase_that_is_turned_on_is_that_of_the_moment() {
+    fn a_rotated_phase_is_that_of_the_moment() {
         for turn in [SECOND_ORDER_RAD, 0.4] {
             let ahead = PredictionState::new(&screw(A), 7.0, 0.1).rotated(turn / 3.5);
             let (sin, cos) = libm::sincos(3.5 * 7.0 + turn);
@@ -274,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn a_feed_that_changes_often_costs_less_than_a_micrometre() {
+    fn a_feed_that_changes_often_leaves_less_than_a_micrometre() {
         for pulsation in
             [A, SpeedPulsation { relative_amplitude: 0.4, rad_per_s: 0.4, phase_rad: 2.0 }]
         {
@@ -298,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_feed_that_does_not_arrive_is_said_to_be_overtaken() {
+    fn a_feed_that_does_not_arrive_is_an_error() {
         let fast = ExactPredictor::new(screw(SpeedPulsation {
             relative_amplitude: 0.5,
             rad_per_s: 6.0,

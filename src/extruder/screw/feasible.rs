@@ -1,39 +1,39 @@
-//! Whether what is fed can always reach the plug: the delay must never grow as
-//! fast as time passes. Diagne et al. 2015, eqs. (56), (79) to (81) and (88).
+//! Feasibility: whether every feed reaches the plug. The delay must never grow as fast as time
+//! passes. Diagne et al. 2015, eqs. (56), (79) to (81) and (88).
 
 use std::fmt;
 
 use super::model::{Conveying, Screw};
 
-/// What the delay's growth was bounded with.
+/// A bound of the delay's growth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GrowthBound {
-    /// Largest sin/(1 + ε·cos)² over a turn, or 1/(1 − ε)² in its place.
+    /// Largest sin/(1 + ε·cos)² over a period, or 1/(1 − ε)² in its place.
     pub factor: f64,
-    /// ε·ω times that factor \[rad/s\].
+    /// ε·ω times the factor \[rad/s\].
     pub pulsation_rad_per_s: f64,
-    /// Largest growth of the delay for each second that passes, over all
-    /// lengths of the plug and shares fed: the most that Λ reaches, eq. (88).
+    /// Largest growth of the delay per second, over all lengths of the plug and fill ratios: the
+    /// maximum of Λ, eq. (88).
     pub growth: f64,
     /// Length of the plug at which it grows fastest \[m\].
     pub worst_plug_m: f64,
-    /// The paper's condition that is met, if any.
+    /// The condition of the paper that is met, if any.
     pub condition: Option<Condition>,
 }
 
-/// The three ways to be feasible.
+/// The three sufficient conditions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Condition {
     /// Eq. (79): the growth increases with the plug, to less than 1 at the feed.
-    Increasing,
+    Increasing = 79,
     /// Eq. (80): the screw is short for its nozzle, θ2·L < 1.
-    Short,
+    Short = 80,
     /// Eq. (81): the screw is long for its nozzle, θ2·L > 1.
-    Long,
+    Long = 81,
 }
 
-/// Thresholds of the paper's conditions, all in rad/s beside
-/// [`Bound::pulsation_rad_per_s`].
+/// Thresholds of the paper's conditions, in rad/s, for
+/// [`GrowthBound::pulsation_rad_per_s`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Thresholds {
     /// θ1·θ2/(1 + θ2·L)², below which (79) holds.
@@ -45,21 +45,21 @@ pub struct Thresholds {
     pub lead: f64,
 }
 
-/// The verdict, with all that led to it.
+/// The result with its bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Feasibility {
-    /// With the exact bound of the speed's part of the growth.
+    /// With the exact factor.
     pub exact: GrowthBound,
-    /// With the paper's looser one, eq. (84).
+    /// With the looser factor of the paper, eq. (84).
     pub paper: GrowthBound,
-    /// What the paper's conditions compare with.
+    /// Thresholds of the paper's conditions.
     pub thresholds: Thresholds,
-    /// Where the delay adds up on the way nothing overtakes: always feasible.
+    /// An integrated delay is always feasible.
     pub conveying: Conveying,
 }
 
 impl Feasibility {
-    /// Judges a screw over its whole length and every share from 0 to below 1.
+    /// Checks a screw over its whole length and every fill ratio from 0 to below 1.
     pub fn judge(screw: &Screw) -> Self {
         let lead = screw.theta2_per_m * screw.length_m;
         let spread = screw.theta1_m_per_s * screw.theta2_per_m / (1.0 + lead).powi(2);
@@ -80,13 +80,13 @@ impl Feasibility {
     }
 }
 
-/// The largest sin φ/(1 + ε·cos φ)² over a turn: its derivative is zero where
+/// The largest sin φ/(1 + ε·cos φ)² over a period: its derivative is zero where
 /// ε·cos² φ − cos φ − 2ε = 0.
 fn max_pulsation_factor(amplitude: f64) -> f64 {
     if amplitude == 0.0 {
         return 1.0;
     }
-    // The smaller root, written so that a small share loses no digits.
+    // The smaller root, without cancellation for a small amplitude.
     let cos = -4.0 * amplitude / (1.0 + (1.0 + 8.0 * amplitude * amplitude).sqrt());
     (1.0 - cos * cos).max(0.0).sqrt() / (1.0 + amplitude * cos).powi(2)
 }
@@ -96,7 +96,7 @@ impl GrowthBound {
         let pulsation = screw.pulsation.relative_amplitude * screw.pulsation.rad_per_s * factor;
         let (theta2, length) = (screw.theta2_per_m, screw.length_m);
         let fall = pulsation / screw.theta1_m_per_s;
-        // Between a growing and a falling course lies one highest point (95).
+        // The growth has one maximum over the plug, eq. (95).
         let worst = if fall <= 0.0 { length } else { ((theta2 / fall).sqrt() - 1.0) / theta2 };
         let worst_plug_m = worst.clamp(0.0, length);
         Self {
@@ -110,8 +110,8 @@ impl GrowthBound {
 }
 
 impl Thresholds {
-    /// The condition that a pulsation meets. What lies on a threshold belongs
-    /// to the side that is feasible in (87).
+    /// The condition that a pulsation meets. A threshold itself belongs to the feasible side, as
+    /// in eq. (87).
     fn met(&self, pulsation: f64) -> Option<Condition> {
         if pulsation <= self.increasing {
             Some(Condition::Increasing)
@@ -127,11 +127,7 @@ impl Thresholds {
 
 impl fmt::Display for Condition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Increasing => "condition (79)",
-            Self::Short => "condition (80)",
-            Self::Long => "condition (81)",
-        })
+        write!(f, "condition ({})", *self as u8)
     }
 }
 
@@ -187,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn the_exact_factor_is_the_largest_of_a_turn() {
+    fn the_exact_factor_is_the_maximum_over_a_period() {
         for (amplitude, known) in [(0.1, 1.0202), (0.4, 1.3881)] {
             assert!((max_pulsation_factor(amplitude) - known).abs() < 5e-5);
             let seen = (0..100_000)
@@ -223,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn the_verdict_is_said_in_words_with_its_numbers() {
+    fn the_result_is_printed_with_its_numbers() {
         let said = judge(TurnUnit::RadPerS, A).to_string();
         assert_eq!(
             said,
@@ -236,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_belt_that_keeps_its_order_is_always_feasible() {
+    fn an_integrated_delay_is_always_feasible() {
         let screw = ScrewDesign::DIAGNE_2015.screw(A).unwrap();
         let fast = SpeedPulsation { relative_amplitude: 0.9, rad_per_s: 50.0, phase_rad: 0.0 };
         let fast = Screw { pulsation: fast, ..screw };
@@ -247,7 +243,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_largest_growth_is_that_of_a_search_and_the_conditions_agree_with_it(
+        fn the_largest_growth_is_that_of_a_search_and_agrees_with_the_conditions(
             relative_amplitude in 0.0..0.8_f64,
             rad_per_s in 0.0..6.0_f64,
             theta2_per_m in 0.2..40.0_f64,

@@ -1,121 +1,97 @@
-//! What was fed, as long as it is on its way. Between two commands the feed is
-//! held, so that a row of the moments at which it changed is all of it.
+//! The feed on its way to the plug. Between two commands the feed is constant, so that its changes
+//! describe all of it.
 
-/// Changes of the feed over a coordinate that only grows: seconds, or metres
-/// that were conveyed. It holds a fixed number and forgets the oldest.
+use std::collections::VecDeque;
+
+/// Changes of the feed over a coordinate that only grows: seconds, or metres conveyed. It keeps a
+/// fixed number of changes and discards the oldest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FeedHistory {
-    changes: Box<[Change]>,
-    /// Place of the oldest, and how many there are.
-    first: usize,
-    count: usize,
-    /// What was fed before the oldest change.
+    changes: VecDeque<Change>,
+    capacity: usize,
+    /// Fill ratio of the feed before the oldest change.
     initial_fill: f64,
 }
 
-/// From here on this share is fed.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// The fill ratio of the feed from a coordinate on.
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Change {
     from: f64,
     fill: f64,
 }
 
-/// A stretch over which the feed was held.
+/// A segment of constant feed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeedSegment {
     /// Its length, in the coordinate's unit.
     pub length: f64,
-    /// Share that was fed.
+    /// Fill ratio.
     pub fill: f64,
 }
 
 impl FeedHistory {
-    /// Room for a number of changes, at least one, after a feed that has been
-    /// held for as long as matters.
-    pub fn new(capacity: usize, before: f64) -> Self {
-        let changes = vec![Change::default(); capacity.max(1)].into_boxed_slice();
-        Self { changes, first: 0, count: 0, initial_fill: before }
+    /// For a number of changes, at least one, after a feed that has long been constant.
+    pub fn new(capacity: usize, initial_fill: f64) -> Self {
+        let capacity = capacity.max(1);
+        Self { changes: VecDeque::with_capacity(capacity), capacity, initial_fill }
     }
 
-    /// From `from` on `fill` is fed. A second share at the same place takes the
-    /// place of the first.
+    /// From `from` on `fill` is fed. A second change at the same coordinate replaces the first.
     pub fn push(&mut self, from: f64, fill: f64) {
-        let last = self.count.checked_sub(1).map(|last| self.get(last));
-        if last.is_some_and(|last| last.from >= from) {
-            self.count -= 1;
-        } else if last.map_or(self.initial_fill, |last| last.fill) == fill {
+        if self.changes.back().is_some_and(|last| last.from >= from) {
+            self.changes.pop_back();
+        } else if self.last() == fill {
             return;
         }
-        if self.count == self.changes.len() {
-            self.initial_fill = self.get(0).fill;
-            self.first = self.slot(1);
-            self.count -= 1;
+        if self.changes.len() == self.capacity
+            && let Some(oldest) = self.changes.pop_front()
+        {
+            self.initial_fill = oldest.fill;
         }
-        let slot = self.slot(self.count);
-        if let Some(change) = self.changes.get_mut(slot) {
-            *change = Change { from, fill };
-            self.count += 1;
-        }
+        self.changes.push_back(Change { from, fill });
     }
 
-    /// The share that is fed now.
+    /// The fill ratio now.
     pub fn last(&self) -> f64 {
-        self.count.checked_sub(1).map_or(self.initial_fill, |last| self.get(last).fill)
+        self.changes.back().map_or(self.initial_fill, |last| last.fill)
     }
 
-    /// The share that was fed at a place.
+    /// The fill ratio at a coordinate.
     pub fn at(&self, coordinate: f64) -> f64 {
-        self.first_after(coordinate)
-            .checked_sub(1)
-            .map_or(self.initial_fill, |found| self.get(found).fill)
+        self.fill_before(self.first_after(coordinate))
     }
 
-    /// Where the feed changes next after a place.
+    /// The coordinate of the next change.
     pub fn next_change(&self, coordinate: f64) -> Option<f64> {
-        let found = self.first_after(coordinate);
-        (found < self.count).then(|| self.get(found).from)
+        self.changes.get(self.first_after(coordinate)).map(|change| change.from)
     }
 
-    /// The held stretches between two places, in order.
+    /// The segments of constant feed between two coordinates, in order.
     pub fn segments(&self, from: f64, to: f64) -> impl Iterator<Item = FeedSegment> + '_ {
         let mut at = from;
         let mut next = self.first_after(from);
-        let mut fill = next.checked_sub(1).map_or(self.initial_fill, |found| self.get(found).fill);
         std::iter::from_fn(move || {
             if at >= to {
                 return None;
             }
-            let change = (next < self.count).then(|| self.get(next));
-            let end = change.map_or(to, |change| change.from.min(to));
+            let fill = self.fill_before(next);
+            let end = self.changes.get(next).map_or(to, |change| change.from.min(to));
             let piece = FeedSegment { length: end - at, fill };
             at = end;
             next += 1;
-            fill = change.map_or(fill, |change| change.fill);
             Some(piece)
         })
     }
 
-    /// Number of the first change that lies beyond a place.
+    /// Number of the first change after a coordinate.
     fn first_after(&self, coordinate: f64) -> usize {
-        let (mut low, mut high) = (0, self.count);
-        while low < high {
-            let middle = low.midpoint(high);
-            if self.get(middle).from <= coordinate {
-                low = middle + 1;
-            } else {
-                high = middle;
-            }
-        }
-        low
+        self.changes.partition_point(|change| change.from <= coordinate)
     }
 
-    fn slot(&self, number: usize) -> usize {
-        let slot = self.first + number;
-        if slot >= self.changes.len() { slot - self.changes.len() } else { slot }
-    }
-
-    fn get(&self, number: usize) -> Change {
-        self.changes.get(self.slot(number)).copied().unwrap_or_default()
+    /// The fill ratio before a change.
+    fn fill_before(&self, number: usize) -> f64 {
+        let change = number.checked_sub(1).and_then(|before| self.changes.get(before));
+        change.map_or(self.initial_fill, |change| change.fill)
     }
 }
 
@@ -129,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_held_before_the_first_change_lasts_until_it() {
+    fn the_initial_feed_lasts_until_the_first_change() {
         let mut history = FeedHistory::new(4, 0.2);
         assert_eq!(pieces(&history, -1.0, 1.0), [(2.0, 0.2)]);
         history.push(0.5, 0.7);
@@ -144,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_applied_takes_the_place_of_what_was_decided() {
+    fn a_second_change_at_the_same_coordinate_replaces_the_first() {
         let mut history = FeedHistory::new(4, 0.2);
         history.push(1.0, 0.9);
         history.push(1.0, 0.6);
@@ -156,7 +132,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_full_history_still_tells_the_latest(
+        fn a_full_history_keeps_the_latest(
             fills in prop::collection::vec(0.0..0.9_f64, 1..40),
             from in 0.0..5.0_f64,
         ) {

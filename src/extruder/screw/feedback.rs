@@ -1,26 +1,26 @@
-//! What to feed at a length of the plug. Both laws give a share of full from 0
-//! to a largest one, and the share that holds the setpoint at the setpoint.
+//! The feed for a length of the plug. Both characteristics give a fill ratio from 0 to a largest
+//! one, and at the setpoint the ratio that holds it.
 
 use super::error::{ScrewError, positive};
 use super::model::{MM_PER_M, Screw};
 use crate::core::units::Mm;
 
-/// What is asked of a law.
+/// Setpoint and limit of the feed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlugSetpoint {
-    /// Wanted length of the plug x*.
+    /// Target length of the plug x*.
     pub plug: Mm,
-    /// Largest share that can be fed, `v_max`, below 1.
+    /// Largest fill ratio of the feed, `v_max`, below 1.
     pub max_fill: f64,
 }
 
-/// A setpoint that has been checked against a screw, in metres.
+/// A setpoint that is valid for a screw, in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct CheckedSetpoint {
     plug_m: f64,
     length_m: f64,
     max_fill: f64,
-    /// Share that holds the setpoint.
+    /// Fill ratio that holds the setpoint.
     holding_fill: f64,
 }
 
@@ -38,8 +38,7 @@ impl PlugSetpoint {
         Ok(CheckedSetpoint { plug_m, length_m, max_fill: self.max_fill, holding_fill: hold })
     }
 
-    /// Flattest slope at the setpoint for which the exponentials bend towards
-    /// it from both sides, `S_min` \[1/m\]: eq. (31) without its leading x*.
+    /// Smallest slope at the setpoint, `S_min` \[1/m\]: eq. (31) without its leading x*, a misprint.
     pub fn min_slope(&self, screw: &Screw) -> Result<f64, ScrewError> {
         self.check(screw).map(|held| held.min_slope())
     }
@@ -54,8 +53,8 @@ impl CheckedSetpoint {
 
 /// The positive solution a of a·height = slope·(1 − e^(−a·width)), eqs. (32)
 /// and (33), for a slope above height/width. The difference of both sides is
-/// convex and positive at slope/height, so that Newton's method falls on the
-/// solution from there without a detour.
+/// convex and positive at slope/height, so that Newton's method converges monotonically from
+/// there.
 fn gain(slope: f64, height: f64, width: f64) -> f64 {
     let mut a = slope / height;
     for _ in 0..60 {
@@ -70,7 +69,7 @@ fn gain(slope: f64, height: f64, width: f64) -> f64 {
     a
 }
 
-/// The paper's law: two exponentials that meet at the setpoint with one slope,
+/// The paper's characteristic: two exponentials that meet at the setpoint with one slope,
 /// eqs. (20) to (22).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PiecewiseExponential {
@@ -83,14 +82,10 @@ pub struct PiecewiseExponential {
 }
 
 impl PiecewiseExponential {
-    /// Solves the gains for a slope at the setpoint S \[1/m\], which must be
-    /// above [`Setpoint::least_slope`].
-    pub fn new(
-        screw: &Screw,
-        setpoint: PlugSetpoint,
-        slope_per_m: f64,
-    ) -> Result<Self, ScrewError> {
-        let held = setpoint.check(screw)?;
+    /// Solves the gains for a slope at the setpoint S \[1/m\], which must be above
+    /// [`PlugSetpoint::min_slope`].
+    pub fn new(screw: &Screw, target: PlugSetpoint, slope_per_m: f64) -> Result<Self, ScrewError> {
+        let held = target.check(screw)?;
         let least_per_m = held.min_slope();
         if !(slope_per_m > least_per_m && slope_per_m.is_finite()) {
             return Err(ScrewError::Slope { slope_per_m, least_per_m });
@@ -109,8 +104,7 @@ impl PiecewiseExponential {
         })
     }
 
-    /// Gains to the left and to the right of the setpoint, `a_l` and `a_r`
-    /// \[1/m\].
+    /// Gains below and above the setpoint, `a_l` and `a_r` \[1/m\].
     pub fn gains_per_m(&self) -> (f64, f64) {
         (self.left_per_m, self.right_per_m)
     }
@@ -131,9 +125,8 @@ impl PiecewiseExponential {
     }
 }
 
-/// As much as can be fed until shortly before the setpoint, then straight
-/// through the share that holds it. It brings the plug there as soon as the
-/// limit allows; how steep it may be is a matter of how well the model is known.
+/// A linear characteristic through the ratio that holds the setpoint, saturated at the limits. It
+/// settles as fast as the limits allow; a steeper one is more sensitive to errors of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SaturatedLinear {
     setpoint: CheckedSetpoint,
@@ -141,31 +134,26 @@ pub struct SaturatedLinear {
 }
 
 impl SaturatedLinear {
-    /// A law with a slope at the setpoint \[1/m\].
-    pub fn new(
-        screw: &Screw,
-        setpoint: PlugSetpoint,
-        slope_per_m: f64,
-    ) -> Result<Self, ScrewError> {
-        let held = setpoint.check(screw)?;
+    /// With a slope at the setpoint \[1/m\].
+    pub fn new(screw: &Screw, target: PlugSetpoint, slope_per_m: f64) -> Result<Self, ScrewError> {
+        let held = target.check(screw)?;
         positive("slope_per_m", slope_per_m)?;
         Ok(Self { setpoint: held, slope_per_m })
     }
 }
 
-/// A law.
+/// A characteristic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FillFeedback {
-    /// The paper's.
+    /// Piecewise exponential, as in the paper.
     Exponential(PiecewiseExponential),
-    /// The straight one between limits.
+    /// Saturated linear.
     Saturated(SaturatedLinear),
 }
 
 impl FillFeedback {
-    /// Share of full to feed at a length of the plug \[m\], from 0 to the
-    /// largest that can be fed. A length outside the screw counts as its nearer
-    /// end.
+    /// Fill ratio of the feed at a length of the plug \[m\], from 0 to the largest. A length
+    /// outside the screw counts as its nearer end.
     pub fn fill(&self, plug_m: f64) -> f64 {
         let held = self.setpoint();
         let plug_m = plug_m.clamp(0.0, held.length_m);
@@ -178,7 +166,7 @@ impl FillFeedback {
         fill.clamp(0.0, held.max_fill)
     }
 
-    /// Share that holds the setpoint.
+    /// Fill ratio that holds the setpoint.
     pub fn holding_fill(&self) -> f64 {
         self.setpoint().holding_fill
     }
@@ -218,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn the_law_feeds_all_when_empty_nothing_when_full_and_has_one_slope_between() {
+    fn the_feed_is_largest_when_empty_zero_when_full_and_has_one_slope_at_the_setpoint() {
         let screw = screw();
         let feedback = PiecewiseExponential::new(&screw, SETPOINT, 36.3194).unwrap();
         let feedback = FillFeedback::Exponential(feedback);
@@ -233,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_solved_is_said_with_what_is_needed() {
+    fn settings_without_a_solution_are_refused() {
         let screw = screw();
         let flat = PiecewiseExponential::new(&screw, SETPOINT, 6.3).unwrap_err();
         let said = flat.to_string();
@@ -252,7 +240,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn both_laws_fall_and_keep_their_limits(
+        fn both_characteristics_are_monotonic_within_their_limits(
             setpoint in 1.0..199.0_f64,
             spare in 0.01..0.99_f64,
             steeper in 1.001..200.0_f64,
@@ -267,8 +255,8 @@ mod tests {
             let (left, right) = exponential.gains_per_m();
             prop_assert!(left > 0.0 && right > 0.0);
             let saturated = SaturatedLinear::new(&screw, setpoint, slope).unwrap();
-            for law in [FillFeedback::Exponential(exponential), FillFeedback::Saturated(saturated)] {
-                let (before, after) = (law.fill(one), law.fill(one + more));
+            for feedback in [FillFeedback::Exponential(exponential), FillFeedback::Saturated(saturated)] {
+                let (before, after) = (feedback.fill(one), feedback.fill(one + more));
                 prop_assert!((0.0..=setpoint.max_fill).contains(&before));
                 prop_assert!(after <= before);
             }

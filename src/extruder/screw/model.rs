@@ -1,17 +1,16 @@
-//! The screw as a plug that grows and shrinks: Diagne et al. 2015, eqs. (13)
-//! to (17). Behind the nozzle the channel is full over the length x; from there
-//! to the feed at L it is filled to a share U that was fed a while ago.
+//! Model of the screw as a plug that grows and shrinks (Diagne et al. 2015, eqs. (13) to (17)).
+//! From the nozzle the channel is full over the length x; from there to the feed at L it is
+//! filled to the ratio U of the feed a delay ago.
 
 use super::error::{ScrewError, positive};
 
-/// Millimetres in a metre.
+/// Millimetres in a metre. By definition.
 pub(super) const MM_PER_M: f64 = 1000.0;
 
-/// How the conveying speed pulsates about its mean: c = θ1·(1 + ε·cos(ωt + φ)),
-/// eq. (17).
+/// Pulsation of the conveying speed about its mean: c = θ1·(1 + ε·cos(ωt + φ)), eq. (17).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpeedPulsation {
-    /// Share of the mean ε, from 0 up to but not 1.
+    /// Relative amplitude ε, from 0 to below 1.
     pub relative_amplitude: f64,
     /// Angular frequency ω \[rad/s\].
     pub rad_per_s: f64,
@@ -19,14 +18,13 @@ pub struct SpeedPulsation {
     pub phase_rad: f64,
 }
 
-/// What the delay is made of.
+/// How the delay follows from the conveying speed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Conveying {
-    /// (L − x)/c(t): all of the way at the speed of the moment of arrival, as
-    /// the paper has it, eq. (16).
+    /// (L − x)/c(t): all of the distance at the speed of the moment of arrival, as in eq. (16).
     AtPresentSpeed,
-    /// The time since which the speed has added up to the way: what a belt
-    /// does. The same where the speed is constant.
+    /// The time over which the speed integrates to the distance, as on a belt. The same where
+    /// the speed is constant.
     AtSpeedOnTheWay,
 }
 
@@ -35,19 +33,18 @@ pub enum Conveying {
 pub struct Screw {
     /// Mean conveying speed θ1 \[m/s\].
     pub theta1_m_per_s: f64,
-    /// How much easier melt leaves through the nozzle than it flows back, θ2
-    /// \[1/m\].
+    /// Conductance of the nozzle over that of the back flow in the channel, θ2 \[1/m\].
     pub theta2_per_m: f64,
-    /// From the nozzle to the feed, L \[m\].
+    /// Distance from the nozzle to the feed, L \[m\].
     pub length_m: f64,
-    /// How the conveying speed changes.
+    /// Pulsation of the conveying speed.
     pub pulsation: SpeedPulsation,
-    /// What the delay is made of.
+    /// How the delay follows from the conveying speed.
     pub conveying: Conveying,
 }
 
 impl Screw {
-    /// The parameters, if a screw can have them.
+    /// The parameters, if they are valid.
     pub fn new(screw: Self) -> Result<Self, ScrewError> {
         positive("theta1_m_per_s", screw.theta1_m_per_s)?;
         positive("theta2_per_m", screw.theta2_per_m)?;
@@ -55,7 +52,7 @@ impl Screw {
         let SpeedPulsation { relative_amplitude: amplitude, rad_per_s, phase_rad } =
             screw.pulsation;
         if !(0.0..1.0).contains(&amplitude) {
-            return Err(ScrewError::PulsationAmplitude { share: amplitude });
+            return Err(ScrewError::PulsationAmplitude(amplitude));
         }
         if !(rad_per_s.is_finite() && rad_per_s >= 0.0 && phase_rad.is_finite()) {
             return Err(ScrewError::Frequency { rad_per_s, phase_rad });
@@ -63,13 +60,12 @@ impl Screw {
         Ok(screw)
     }
 
-    /// The same screw as one who does not know of the pulsation sees it,
-    /// eqs. (102) to (104).
+    /// The same screw without its pulsation, eqs. (102) to (104).
     pub fn steady(self) -> Self {
         Self { pulsation: SpeedPulsation::default(), ..self }
     }
 
-    /// Whether the conveying speed changes at all.
+    /// Whether the conveying speed pulsates.
     pub fn pulsates(&self) -> bool {
         self.pulsation.relative_amplitude > 0.0 && self.pulsation.rad_per_s > 0.0
     }
@@ -85,7 +81,7 @@ impl Screw {
         self.theta1_m_per_s * (1.0 - self.pulsation.relative_amplitude)
     }
 
-    /// Way that is conveyed from the start of the run to a moment, ∫c \[m\].
+    /// Distance conveyed from the start of the run to a moment, ∫c \[m\].
     pub fn conveyed_m(&self, at_s: f64) -> f64 {
         let SpeedPulsation { relative_amplitude: amplitude, rad_per_s, phase_rad } = self.pulsation;
         let oscillation = if rad_per_s > 0.0 {
@@ -96,18 +92,18 @@ impl Screw {
         self.theta1_m_per_s * (at_s + amplitude * oscillation)
     }
 
-    /// Share of full that holds the plug at a length \[m\], v(x), eq. (19).
+    /// Fill ratio that holds the plug at a length \[m\], v(x), eq. (19).
     pub fn holding_fill(&self, plug_m: f64) -> f64 {
         let lead = self.theta2_per_m * plug_m;
         lead / (1.0 + lead)
     }
 
-    /// Growth of the plug for each metre that is conveyed, −Γ(x, U), eq. (73).
+    /// Growth of the plug per metre conveyed, −Γ(x, U), eq. (73).
     pub fn growth(&self, plug_m: f64, fill: f64) -> f64 {
         (fill - self.holding_fill(plug_m)) / (1.0 - fill)
     }
 
-    /// Delay of what arrives at a moment (16) \[s\].
+    /// Delay of the feed that arrives at a moment, eq. (16) \[s\].
     pub fn delay(&self, at_s: f64, plug_m: f64) -> f64 {
         let way = self.length_m - plug_m;
         match self.conveying {
@@ -116,14 +112,13 @@ impl Screw {
         }
     }
 
-    /// Longest delay that the screw can have \[s\].
+    /// Longest delay \[s\].
     pub fn longest_delay(&self) -> f64 {
         self.length_m / self.slowest()
     }
 
-    /// When the way conveyed since the start came to `way_m` \[s\], by Newton's
-    /// method within the two moments between which it must lie. `near_s` is a
-    /// moment to start from.
+    /// When the distance conveyed since the start reaches `way_m` \[s\], by Newton's method within
+    /// bounds. `near_s` is the initial guess.
     pub fn moment_of(&self, way_m: f64, near_s: f64) -> f64 {
         let time_s = (way_m - self.conveyed_m(near_s)) / self.theta1_m_per_s;
         let SpeedPulsation { relative_amplitude: amplitude, .. } = self.pulsation;
@@ -149,26 +144,26 @@ impl Screw {
         at
     }
 
-    /// When what is fed at a moment first reaches a plug that stays as it is
-    /// \[s\]: σ0, the first effect of a control that begins then, eq. (53).
+    /// When the feed of a moment reaches a plug of constant length \[s\]: σ0, the first effect of
+    /// a control that begins then, eq. (53).
     pub fn arrival(&self, fed_s: f64, plug_m: f64) -> f64 {
         let way = self.length_m - plug_m;
         if self.conveying == Conveying::AtSpeedOnTheWay || !self.pulsates() {
             return self.moment_of(self.conveyed_m(fed_s) + way, fed_s);
         }
-        let late = |at: f64| at - self.delay(at, plug_m) - fed_s;
+        let excess = |at: f64| at - self.delay(at, plug_m) - fed_s;
         let (from, to) = (way / (2.0 * self.theta1_m_per_s), way / self.slowest());
         let step = (to - from) / (8.0 + 16.0 * self.pulsation.rad_per_s * (to - from)).ceil();
         let (mut low, mut high) = (fed_s + from, fed_s + to);
         let mut at = low;
-        while at < high && late(at) < 0.0 {
+        while at < high && excess(at) < 0.0 {
             low = at;
             at += step;
         }
         high = high.min(at);
         for _ in 0..80 {
             let middle = f64::midpoint(low, high);
-            if late(middle) < 0.0 {
+            if excess(middle) < 0.0 {
                 low = middle;
             } else {
                 high = middle;
@@ -192,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn both_readings_of_the_screw_speed_and_the_nozzles_ratio_come_out() {
+    fn both_units_of_the_screw_speed_give_the_published_parameters() {
         let screw = screw(SpeedPulsation::default());
         assert!((screw.theta1_m_per_s - 0.094_247_779_6).abs() < 1e-10);
         assert!((screw.theta2_per_m - 2.114_292_6).abs() < 1e-7);
@@ -207,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn the_holding_share_holds_and_more_makes_the_plug_grow() {
+    fn the_holding_ratio_holds_the_plug_and_more_makes_it_grow() {
         let screw = screw(B);
         let hold = screw.holding_fill(0.16);
         assert!((hold - 0.252_78).abs() < 1e-5);
@@ -221,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn the_way_is_the_integral_of_the_speed_and_its_moment_leads_back() {
+    fn the_distance_is_the_integral_of_the_speed_and_is_invertible() {
         let screw = screw(SpeedPulsation { phase_rad: 0.7, ..B });
         let mut sum = 0.0;
         for k in 0..40_000 {
@@ -234,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_effect_of_a_control_comes_when_published_numbers_say() {
+    fn the_first_effect_of_a_control_is_as_published() {
         let none = screw(SpeedPulsation::default()).arrival(0.0, 0.1);
         assert!((none - 0.1 / 0.094_247_779_6).abs() < 1e-9);
         let a = SpeedPulsation { relative_amplitude: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
@@ -243,19 +238,21 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_that_adds_up_on_the_way_is_the_paper_s_where_the_speed_is_steady() {
+    fn an_integrated_delay_is_that_of_the_paper_where_the_speed_is_constant() {
         let belt = Conveying::AtSpeedOnTheWay;
         let steady = Screw { conveying: belt, ..screw(SpeedPulsation::default()) };
         assert!((steady.delay(5.0, 0.1) - 0.1 / 0.094_247_779_6).abs() < 1e-9);
-        let waving = Screw { conveying: belt, ..screw(B) };
-        let delay = waving.delay(5.0, 0.1);
-        assert!((waving.conveyed_m(5.0) - waving.conveyed_m(5.0 - delay) - 0.1).abs() < 1e-12);
-        let arrival = waving.arrival(5.0 - delay, 0.1);
+        let pulsating = Screw { conveying: belt, ..screw(B) };
+        let delay = pulsating.delay(5.0, 0.1);
+        assert!(
+            (pulsating.conveyed_m(5.0) - pulsating.conveyed_m(5.0 - delay) - 0.1).abs() < 1e-12
+        );
+        let arrival = pulsating.arrival(5.0 - delay, 0.1);
         assert!((arrival - 5.0).abs() < 1e-9);
     }
 
     #[test]
-    fn parameters_that_no_screw_has_are_named() {
+    fn parameters_out_of_range_are_named() {
         let design = ScrewDesign::DIAGNE_2015;
         let empty = ScrewDesign { density_kg_per_m3: 0.0, ..design };
         let said = empty.screw(B).unwrap_err().to_string();
@@ -270,7 +267,7 @@ mod tests {
         for amplitude in [1.0, -0.1, f64::NAN] {
             let pulsation = SpeedPulsation { relative_amplitude: amplitude, ..B };
             assert!(
-                matches!(design.screw(pulsation), Err(ScrewError::PulsationAmplitude { .. })),
+                matches!(design.screw(pulsation), Err(ScrewError::PulsationAmplitude(_))),
                 "{amplitude}"
             );
         }

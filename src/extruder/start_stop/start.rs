@@ -5,16 +5,16 @@ use crate::core::time::Span;
 use crate::core::units::Mm3PerS;
 use crate::identify::start_stop::parameters::StartStop;
 
-/// What came before a start.
+/// The pause before a start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pause {
-    /// From the command to stop until the command to run.
+    /// Time from the command to stop to the command to run.
     pub idle: Span,
-    /// Flow before the stop; what still drools of it comes with the new flow.
+    /// Flow before the stop; its remaining drool adds to the new flow.
     pub flow_before: Mm3PerS,
 }
 
-/// A start, from the moment when the pump is told to run.
+/// A start, from the command to run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Start {
     parameters: StartStop,
@@ -23,8 +23,7 @@ pub struct Start {
     min_speed_ratio: f64,
     robot_lag: Span,
     first_flow_s: f64,
-    /// What still comes of the flow before as the first flow comes, as a share
-    /// of the flow that is wanted.
+    /// Remaining flow of before at the first flow, over the demanded flow.
     remaining_flow_ratio: f64,
     robot_s: f64,
 }
@@ -32,41 +31,41 @@ pub struct Start {
 impl Start {
     pub(super) fn after(parameters: &StartStop, laid: &BeadConditions, pause: &Pause) -> Self {
         let idle_s = pause.idle.secs().max(0.0);
-        let before_share = (pause.flow_before / laid.flow).max(0.0);
+        let previous_flow_ratio = (pause.flow_before / laid.flow).max(0.0);
         let first_flow_s = parameters.delay_s(idle_s, laid.flow.get());
-        let left_share = before_share * parameters.remaining_flow(idle_s + first_flow_s);
+        let remaining_flow_ratio =
+            previous_flow_ratio * parameters.remaining_flow(idle_s + first_flow_s);
         let goes_at = 0.5 * laid.min_speed_ratio;
-        let moves_s = if left_share >= goes_at {
+        let moves_s = if remaining_flow_ratio >= goes_at {
             0.0
         } else {
-            first_flow_s + parameters.rise_s * libm::log((1.0 - left_share) / (1.0 - goes_at))
+            first_flow_s
+                + parameters.rise_s * libm::log((1.0 - remaining_flow_ratio) / (1.0 - goes_at))
         };
         Self {
             parameters: *parameters,
-            previous_flow_ratio: before_share,
+            previous_flow_ratio,
             idle_s,
             min_speed_ratio: laid.min_speed_ratio,
             robot_lag: laid.robot_lag,
             first_flow_s,
-            remaining_flow_ratio: left_share,
+            remaining_flow_ratio,
             robot_s: (moves_s - laid.robot_lag.secs()).max(0.0),
         }
     }
 
-    /// From the command until the first flow comes.
+    /// Time from the command to the first flow.
     pub fn first_flow(&self) -> Span {
         Span::from_secs(self.first_flow_s)
     }
 
-    /// From the command until the robot is told to go: how long it waits where
-    /// it is at its place already, and how much earlier the pump is told where
-    /// it is still on its way.
+    /// Time from the command to the robot's first setpoint: how long it waits at its position, or how
+    /// much earlier the pump has to be commanded.
     pub fn robot_start(&self) -> Span {
         Span::from_secs(self.robot_s)
     }
 
-    /// The flow so long after the command, as a share of the flow that is
-    /// wanted.
+    /// Flow over the demanded flow, a time after the command.
     pub fn flow_ratio(&self, since: Span) -> f64 {
         let since_s = since.secs();
         let past_s = since_s - self.first_flow_s;
@@ -77,8 +76,8 @@ impl Start {
         1.0 - (1.0 - self.remaining_flow_ratio) * libm::exp(-past_s / self.parameters.rise_s)
     }
 
-    /// Speed that the robot is told so long after the command, as a share of its
-    /// start speed; by its lag ahead of the flow.
+    /// Setpoint of the robot over its start speed, a time after the command; ahead of the flow by its
+    /// lag.
     pub fn speed_ratio(&self, since: Span) -> f64 {
         if since.secs() < self.robot_s {
             0.0

@@ -5,15 +5,13 @@ use crate::core::time::Span;
 use crate::core::units::Mm;
 use crate::identify::start_stop::parameters::StartStop;
 
-/// A stop, from the moment when the pump is told to stop.
+/// A stop, from the command to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stop {
     parameters: StartStop,
     min_speed_ratio: f64,
     robot_lag: Span,
     distance: Mm,
-    duration_s: f64,
-    drool_mm3: f64,
 }
 
 impl Stop {
@@ -23,40 +21,23 @@ impl Stop {
         let lasts_s = parameters.falls_to_s(0.5 * min_speed_ratio);
         let full_speed_s =
             parameters.delivered_s(follows_s) + min_speed_ratio * (lasts_s - follows_s);
-        let left_s = parameters.total_after_stop_s() - parameters.delivered_s(lasts_s);
-        Self {
-            parameters: *parameters,
-            min_speed_ratio,
-            robot_lag: laid.robot_lag,
-            distance: laid.speed * Span::from_secs(full_speed_s),
-            duration_s: lasts_s,
-            drool_mm3: laid.flow.get() * left_s,
-        }
+        let distance = laid.speed * Span::from_secs(full_speed_s);
+        Self { parameters: *parameters, min_speed_ratio, robot_lag: laid.robot_lag, distance }
     }
 
-    /// How far from the end of the bead the pump is told to stop. A bead that is
-    /// shorter than this has no room for an even flow.
+    /// Distance from the end of the bead at which the pump is commanded to stop. A shorter bead never
+    /// has a steady flow.
     pub const fn distance(&self) -> Mm {
         self.distance
     }
 
-    /// From the command to stop until the robot is at the end of the bead.
-    pub fn duration(&self) -> Span {
-        Span::from_secs(self.duration_s)
-    }
-
-    /// What drools out after the end of the bead \[mm³\].
-    pub const fn drool_mm3(&self) -> f64 {
-        self.drool_mm3
-    }
-
-    /// The flow so long after the command, as a share of the flow before.
+    /// Flow over the flow before, a time after the command.
     pub fn flow_ratio(&self, since: Span) -> f64 {
         self.parameters.remaining_flow(since.secs())
     }
 
-    /// Speed that the robot is told so long after the command, as a share of its
-    /// start speed, until it is at the end; by its lag ahead of the flow.
+    /// Setpoint of the robot over its start speed, a time after the command; ahead of the flow by its
+    /// lag.
     pub fn speed_ratio(&self, since: Span) -> f64 {
         self.flow_ratio(since + self.robot_lag).clamp(self.min_speed_ratio, 1.0)
     }

@@ -28,7 +28,7 @@ fn pause(idle_s: f64) -> Pause {
     Pause { idle: Span::from_secs(idle_s), flow_before: Mm3PerS::constant(400.0) }
 }
 
-/// Sum of a function over equal steps of a second [s].
+/// Integral of a function over a time [s].
 fn integral(to_s: f64, f: impl Fn(f64) -> f64) -> f64 {
     let steps = 20_000_u32;
     let dt = to_s / f64::from(steps);
@@ -36,17 +36,17 @@ fn integral(to_s: f64, f: impl Fn(f64) -> f64) -> f64 {
 }
 
 #[test]
-fn the_first_flow_comes_later_the_longer_the_pump_stood_and_no_later_than_for_all_the_void() {
+fn the_delay_of_the_first_flow_grows_with_the_pause_up_to_the_whole_void() {
     assert_eq!(MACHINE.delay_s(0.0, 400.0), 0.2);
     let one = MACHINE.delay_s(20.0, 400.0);
     assert!((one - 0.2 - 1.5 * (1.0 - (-1.0_f64).exp())).abs() < 1e-12);
     assert!((MACHINE.delay_s(1e5, 400.0) - 1.7).abs() < 1e-12);
-    // Twice the flow fills it in half the time.
+    // Twice the flow fills the void in half the time.
     assert!((MACHINE.delay_s(1e5, 800.0) - 0.95).abs() < 1e-12);
 }
 
 #[test]
-fn the_closed_form_of_what_comes_after_a_stop_is_its_integral() {
+fn the_volume_after_a_stop_is_the_integral_of_the_flow() {
     for t in [0.1, 0.4, 2.0, 9.0] {
         let summed = integral(t, |at| MACHINE.remaining_flow(at));
         assert!((MACHINE.delivered_s(t) - summed).abs() < 1e-7, "{t}");
@@ -57,7 +57,7 @@ fn the_closed_form_of_what_comes_after_a_stop_is_its_integral() {
     }
 }
 
-/// Void and surplus of a start at which the robot goes at a moment [s of flow].
+/// Void plus surplus of a start at which the robot goes at a moment [s of flow].
 fn lost_at_start(start: &Start, goes_s: f64, fraction: impl Fn(f64) -> f64) -> f64 {
     integral(6.0, |t| {
         let wanted = if t < goes_s { 0.0 } else { fraction(t) };
@@ -66,7 +66,7 @@ fn lost_at_start(start: &Start, goes_s: f64, fraction: impl Fn(f64) -> f64) -> f
 }
 
 #[test]
-fn no_other_moment_to_go_leaves_less_void_and_surplus() {
+fn the_start_time_minimises_void_plus_surplus() {
     for idle in [0.0, 2.0, 40.0, 300.0] {
         let start = timing(1.0).start(&pause(idle));
         let best = lost_at_start(&start, start.robot_start().secs(), |_| 1.0);
@@ -88,27 +88,28 @@ fn a_robot_that_follows_the_flow_leaves_a_tenth() {
 }
 
 #[test]
-fn what_still_comes_after_a_stop_is_what_the_rest_of_the_bead_needs() {
+fn the_flow_after_a_stop_fills_the_rest_of_the_bead() {
     for min_speed_ratio in [1.0, 0.3, 0.05] {
         let stop = timing(min_speed_ratio).stop();
-        let lasts = stop.duration().secs();
+        let lasts = MACHINE.falls_to_s(0.5 * min_speed_ratio);
         let way = integral(lasts, |t| 40.0 * stop.speed_ratio(Span::from_secs(t)));
         assert!((way - stop.distance().get()).abs() < 1e-3, "{way} {}", stop.distance());
-        let end = stop.flow_ratio(stop.duration());
+        let end = stop.flow_ratio(Span::from_secs(lasts));
         assert!((end - 0.5 * min_speed_ratio).abs() < 1e-6);
-        // The way's volume, less the void before its end, and what is left come to all.
+        // The volume of the distance, less the void before its end, plus the drool is all.
         let void = integral(lasts, |t| {
             let since = Span::from_secs(t);
             400.0 * (stop.speed_ratio(since) - stop.flow_ratio(since))
         });
         let laid = 10.0 * stop.distance().get() - void;
         let all = 400.0 * MACHINE.total_after_stop_s();
-        assert!((laid + stop.drool_mm3() - all).abs() < 0.05, "{laid} {all}");
+        let drool = all - 400.0 * MACHINE.delivered_s(lasts);
+        assert!((laid + drool - all).abs() < 0.05, "{laid} {all}");
     }
 }
 
 #[test]
-fn a_robot_that_lags_is_told_earlier_by_its_lag() {
+fn setpoints_lead_by_the_lag_of_the_robot() {
     let lag = Span::from_millis(80);
     let prompt = timing(0.2);
     let late =
@@ -126,7 +127,7 @@ fn a_robot_that_lags_is_told_earlier_by_its_lag() {
 }
 
 #[test]
-fn a_pump_that_hardly_stood_needs_no_waiting() {
+fn after_a_short_pause_the_robot_does_not_wait() {
     let start = timing(0.1).start(&pause(0.0));
     assert_eq!(start.robot_start(), Span::ZERO);
     assert_eq!(start.flow_ratio(Span::ZERO), 1.0);
@@ -134,7 +135,7 @@ fn a_pump_that_hardly_stood_needs_no_waiting() {
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn parameters_out_of_range_are_refused() {
     let laid = *timing(1.0).conditions();
     let said = |parameters: StartStop, laid: BeadConditions| {
         StartStopTiming::new(parameters, laid).unwrap_err()

@@ -1,12 +1,11 @@
-//! What every strategy of the extruder side can do: what is wanted of the nozzle and what
-//! the extruder reports go in, a command comes out.
+//! The trait of a strategy of the extruder side: demanded flow and reports in, command out.
 
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm3PerS;
 use crate::extruder::limits::CommandLimit;
 use crate::extruder::report::ExtruderReport;
 
-/// A reading that a law cannot do without.
+/// A reading that a strategy needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RequiredReading {
     /// The pressure at the nozzle.
@@ -31,96 +30,88 @@ impl RequiredReading {
     }
 }
 
-/// A command with the parts that it is made of, in the unit of the command.
+/// A demanded command and its parts, in the unit of the command.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CommandDemand {
-    /// What the law would like.
+    /// The demand.
     pub value: f64,
-    /// Part that is known beforehand from what is wanted.
+    /// Feedforward part.
     pub feedforward: f64,
-    /// Part that answers what was measured.
+    /// Feedback part.
     pub feedback: f64,
 }
 
 impl CommandDemand {
-    /// A command that answers nothing.
+    /// A demand without feedback.
     pub const fn feedforward_only(value: f64) -> Self {
         Self { value, feedforward: value, feedback: 0.0 }
     }
 }
 
-/// A reading that cannot be true, such as a screw filled beyond its length.
+/// An implausible reading, such as a screw filled beyond its length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct UnusableReading;
+pub struct BadReading;
 
-/// What every law can do. None of it allocates, but where a bead begins or a hold
-/// ends.
+/// A strategy of the extruder side. None of it allocates, except at the beginning of a bead and
+/// at the end of a hold.
 pub trait ExtruderController {
-    /// The readings that it needs.
-    fn required_readings(&self) -> &'static [RequiredReading] {
-        &[]
+    /// The reading that it needs, if any.
+    fn required_reading(&self) -> Option<RequiredReading> {
+        None
     }
 
-    /// Begins a bead at a wanted flow, in the steady state that belongs to it.
+    /// Begins a bead at a demanded flow, in the steady state that belongs to it.
     fn begin(&mut self, now: Stamp, flow: Mm3PerS) -> CommandDemand;
 
-    /// Hears a report as it comes. Fails where it cannot be true.
-    fn reported(&mut self, _now: Stamp, _report: &ExtruderReport) -> Result<(), UnusableReading> {
+    /// A report arrived. Fails where it is implausible.
+    fn reported(&mut self, _: Stamp, _: &ExtruderReport) -> Result<(), BadReading> {
         Ok(())
     }
 
-    /// The part that runs at the rate of the feedforward, `dt` after the last
-    /// time.
-    fn feedforward(&mut self, dt: Span, flow: Mm3PerS);
+    /// A step at the rate of the feedforward, `dt` after the last one.
+    fn feedforward(&mut self, _dt: Span, _flow: Mm3PerS) {}
 
-    /// The part that runs at the rate of the control, `dt` after the last time
-    /// (zero at the first). The report is not older than the supervisor allows
-    /// and has what [`Self::needs`] names. Fails where it cannot be true; then
-    /// the wish stays as it is.
-    fn control(
-        &mut self,
-        now: Stamp,
-        dt: Span,
-        report: &ExtruderReport,
-    ) -> Result<(), UnusableReading>;
+    /// A step at the rate of the feedback, `dt` after the last one (zero at the first). The
+    /// report is not older than the supervisor allows and has what
+    /// [`Self::required_reading`] names. Fails where it is implausible; the demand is
+    /// unchanged then.
+    fn control(&mut self, _: Stamp, _dt: Span, _: &ExtruderReport) -> Result<(), BadReading> {
+        Ok(())
+    }
 
     /// Time passes while the last command is kept.
     fn hold(&mut self, _dt: Span) {}
 
-    /// Goes on from a command that was kept for a while. Nothing is gathered of
-    /// that time.
-    fn resume(&mut self, now: Stamp, applied: f64);
+    /// Resumes from a command that was kept for a while. That time is not integrated.
+    fn resume(&mut self, _now: Stamp, _applied: f64) {}
 
-    /// A start is over, through which one command was kept: the flow that belongs to it
-    /// has come.
+    /// A start, during which one command was kept, is over: its flow is established.
     fn flow_established(&mut self, now: Stamp, applied: f64) {
         self.settle(now, applied);
     }
 
-    /// The command that was planned beforehand for this moment of the job; none without
-    /// a plan. Laws that have no model leave it alone.
+    /// Sets the planned command for this moment of the job; none without a plan. Strategies
+    /// without a model ignore it.
     fn plan(&mut self, _command: Option<f64>) {}
 
-    /// Whether the flow has come and the plan is followed.
+    /// Whether the flow is established and the plan is followed.
     fn is_on_plan(&self) -> bool {
         false
     }
 
-    /// The flow that will leave the nozzle, for a robot that goes by it; none
-    /// where the law knows none.
+    /// Predicted flow at the nozzle, for a robot that follows it; none without a model.
     fn predicted_flow(&self) -> Option<Mm3PerS> {
         None
     }
 
-    /// The limit that shaped the wish already.
+    /// The limit that acted on the demand already.
     fn limit(&self) -> CommandLimit {
         CommandLimit::None
     }
 
-    /// What it would like now.
+    /// The demand now.
     fn demand(&self) -> CommandDemand;
 
-    /// Learns what became of its wish, so that nothing winds up against a
-    /// limit.
-    fn settle(&mut self, now: Stamp, applied: f64);
+    /// The command that was applied in place of the demand (anti-windup).
+    fn settle(&mut self, _now: Stamp, _applied: f64) {}
 }

@@ -1,19 +1,20 @@
-//! The inverse of a model behind the face of a strategy: the wanted flow
-//! becomes the command that gives it. bcs-thesis, chapter 4.
+//! The inverse of a model as a strategy: the command that gives the demanded flow. bcs-thesis,
+//! chapter 4.
 
-use super::interface::{CommandDemand, ExtruderController, RequiredReading, UnusableReading};
+use super::interface::{BadReading, CommandDemand, ExtruderController, RequiredReading};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm3PerS, Rpm};
 use crate::extruder::feedforward::{FlowForecast, ScrewSpeed, Tracker};
 use crate::extruder::report::ExtruderReport;
 
-/// How near to the flow that is wanted, as a share, the foretold one is when a plan is
-/// taken up.
+/// Relative error of the predicted flow within which a plan takes over. A smaller value delays
+/// the plan, a larger one leaves a step of the flow at the change.
 const SETTLED_RATIO: f64 = 0.03;
-/// Longest time without a tick that is made up for \[s\].
+/// Longest time without a tick that the model is advanced by \[s\]; it bounds the work of one
+/// tick.
 const MAX_BACKLOG_S: f64 = 2.0;
 
-/// Input and output about which a model is linear.
+/// The operating point of a linear model.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OperatingPoint {
     /// In the unit of the command.
@@ -23,7 +24,7 @@ pub struct OperatingPoint {
 }
 
 impl ScrewSpeed {
-    /// The reading that a forecast with it takes.
+    /// The reading that a forecast with it needs.
     pub const fn required_reading(self) -> Option<RequiredReading> {
         match self {
             Self::Modelled => None,
@@ -32,24 +33,23 @@ impl ScrewSpeed {
     }
 }
 
-/// The inverse about its operating point. It runs on the grid of the
-/// feedforward, for which it was made.
+/// The inverse about its operating point, on the grid of the feedforward.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InverseFeedforward {
     tracker: Tracker,
     about: OperatingPoint,
     predictor: Option<FlowPredictor>,
-    /// The command that was planned for now.
+    /// The planned command for now.
     planned: Option<f64>,
     is_on_plan: bool,
     applied: f64,
     command: f64,
-    /// Time that has passed and that the model has not \[s\].
+    /// Time by which the model lags behind \[s\].
     backlog_s: f64,
 }
 
-/// The flow that is to come. It alone may go by an encoder; the inverse goes by
-/// the command, for a drive that is late would make a loop of it.
+/// Prediction of the flow. It may use the encoder; the inverse uses the command only, since a
+/// drive with a lag would close a feedback loop.
 #[derive(Debug, Clone, PartialEq)]
 struct FlowPredictor {
     forecast: FlowForecast,
@@ -59,33 +59,24 @@ struct FlowPredictor {
 }
 
 impl InverseFeedforward {
-    /// Before its first bead. The tracker takes and gives differences from the
-    /// operating point.
+    /// Before the first bead. The tracker works in deviations from the operating point.
     pub const fn new(tracker: Tracker, about: OperatingPoint) -> Self {
-        Self {
-            tracker,
-            about,
-            predictor: None,
-            planned: None,
-            is_on_plan: false,
-            applied: 0.0,
-            command: 0.0,
-            backlog_s: 0.0,
-        }
+        let (planned, is_on_plan) = (None, false);
+        let (applied, command, backlog_s) = (0.0, 0.0, 0.0);
+        Self { tracker, about, predictor: None, planned, is_on_plan, applied, command, backlog_s }
     }
 
-    /// The same, which also says what will flow. The forecast takes the command
-    /// and the screw's speed, and gives flow, as differences from the operating
-    /// point.
+    /// The same with a prediction of the flow. The forecast works in deviations from the
+    /// operating point.
     pub fn with_forecast(mut self, forecast: FlowForecast) -> Self {
         self.predictor = Some(FlowPredictor { forecast, screw_speed: None, flow: Mm3PerS::ZERO });
         self
     }
 
-    fn aim(&mut self, flow: Mm3PerS) {
+    fn track(&mut self, flow: Mm3PerS) {
         let off = flow.get() - self.about.flow_mm3_per_s;
         self.command = self.about.command + self.tracker.command(off);
-        let predicted = self.predictor.as_ref().map_or(flow, |outlook| outlook.flow);
+        let predicted = self.predictor.as_ref().map_or(flow, |predictor| predictor.flow);
         self.is_on_plan |= (predicted - flow).get().abs() <= SETTLED_RATIO * flow.get();
         if let Some(planned) = self.planned.filter(|_| self.is_on_plan) {
             self.command = planned;
@@ -94,16 +85,15 @@ impl InverseFeedforward {
 }
 
 impl FlowPredictor {
-    /// The pump stands, and nothing flows.
+    /// The pump stands and nothing flows.
     fn begin(&mut self, about: &OperatingPoint) {
         self.settle(0.0, about);
         (self.screw_speed, self.flow) = (None, Mm3PerS::ZERO);
     }
 
-    /// What belongs to a command flows.
+    /// The steady flow of a command.
     fn settle(&mut self, applied: f64, about: &OperatingPoint) {
-        // Only a model without a steady state has none to begin from, and such a
-        // one was refused.
+        // Fails only for a model without a steady state, which was refused.
         let _ = self.forecast.start(applied - about.command);
     }
 
@@ -116,62 +106,46 @@ impl FlowPredictor {
 }
 
 impl ExtruderController for InverseFeedforward {
-    fn required_readings(&self) -> &'static [RequiredReading] {
-        match self
-            .predictor
-            .as_ref()
-            .and_then(|outlook| outlook.forecast.screw().required_reading())
-        {
-            Some(RequiredReading::Screw) => &[RequiredReading::Screw],
-            _ => &[],
-        }
+    fn required_reading(&self) -> Option<RequiredReading> {
+        self.predictor.as_ref()?.forecast.screw().required_reading()
     }
 
     fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> CommandDemand {
         (self.applied, self.backlog_s, self.is_on_plan) = (0.0, 0.0, false);
         self.tracker.start(-self.about.command);
-        if let Some(outlook) = &mut self.predictor {
-            outlook.begin(&self.about);
+        if let Some(predictor) = &mut self.predictor {
+            predictor.begin(&self.about);
         }
-        // Until the pump runs it is told what a steady flow takes: the model does
-        // not know what it does meanwhile.
+        // Until the pump runs the command is that of a steady flow: the model does not
+        // describe a start.
         let off = flow.get() - self.about.flow_mm3_per_s;
         self.command = self.about.command + off / self.tracker.gain();
         self.demand()
     }
 
-    fn reported(&mut self, _now: Stamp, report: &ExtruderReport) -> Result<(), UnusableReading> {
-        if let Some(outlook) = &mut self.predictor {
-            outlook.screw_speed = report.screw_rpm;
+    fn reported(&mut self, _now: Stamp, report: &ExtruderReport) -> Result<(), BadReading> {
+        if let Some(predictor) = &mut self.predictor {
+            predictor.screw_speed = report.screw_rpm;
         }
         Ok(())
     }
 
     fn feedforward(&mut self, dt: Span, flow: Mm3PerS) {
         self.hold(dt);
-        self.aim(flow);
+        self.track(flow);
     }
 
-    // A tick that came late is made up for, for the model goes by real time.
+    // Ticks that were missed are made up for, so that the model follows real time.
     fn hold(&mut self, dt: Span) {
         let period_s = self.tracker.period().secs();
         self.backlog_s = (self.backlog_s + dt.secs()).min(MAX_BACKLOG_S);
         while self.backlog_s >= 0.5 * period_s {
             self.backlog_s -= period_s;
             self.tracker.advance(self.applied - self.about.command);
-            if let Some(outlook) = &mut self.predictor {
-                outlook.advance(self.applied, &self.about);
+            if let Some(predictor) = &mut self.predictor {
+                predictor.advance(self.applied, &self.about);
             }
         }
-    }
-
-    fn control(
-        &mut self,
-        _now: Stamp,
-        _dt: Span,
-        _report: &ExtruderReport,
-    ) -> Result<(), UnusableReading> {
-        Ok(())
     }
 
     fn demand(&self) -> CommandDemand {
@@ -187,19 +161,16 @@ impl ExtruderController for InverseFeedforward {
     }
 
     fn predicted_flow(&self) -> Option<Mm3PerS> {
-        self.predictor.as_ref().map(|outlook| outlook.flow)
+        self.predictor.as_ref().map(|predictor| predictor.flow)
     }
 
     fn flow_established(&mut self, now: Stamp, applied: f64) {
         self.tracker.start(applied - self.about.command);
-        if let Some(outlook) = &mut self.predictor {
-            outlook.settle(applied, &self.about);
+        if let Some(predictor) = &mut self.predictor {
+            predictor.settle(applied, &self.about);
         }
         self.settle(now, applied);
     }
-
-    // The tracker knows the way from where a command that was kept has led.
-    fn resume(&mut self, _now: Stamp, _applied: f64) {}
 
     fn settle(&mut self, _now: Stamp, applied: f64) {
         self.applied = applied;

@@ -1,28 +1,26 @@
-//! The adaptive law of the nozzle behind the face of a strategy: the wanted
-//! flow becomes a speed in the nozzle, the mass flow that is fed is commanded.
-//! Mohammadi Looey et al. 2026, eq. (8); the strand's sub-system commands the
-//! plate, which is the robot's side.
+//! Adaptive control of the speed in the nozzle, as a strategy: the demanded flow gives a speed,
+//! the mass flow of the feed is commanded. Mohammadi Looey et al. 2026, eq. (8). The strand's
+//! sub-system commands the plate, which is the robot's side.
 
-use super::interface::{CommandDemand, ExtruderController, RequiredReading, UnusableReading};
+use super::interface::{BadReading, CommandDemand, ExtruderController, RequiredReading};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm2, Mm3PerS};
 use crate::extruder::adaptive::{MracController, ScalarPlant};
 use crate::extruder::report::ExtruderReport;
 
-/// Metres in a millimetre.
+/// Metres in a millimetre. By definition.
 const M_PER_MM: f64 = 1e-3;
 
-/// What the law has to know beside its gains.
+/// The nozzle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NozzleModel {
-    /// Section of the nozzle, by which a flow is a speed.
+    /// Section, which converts flow to speed.
     pub section: Mm2,
-    /// (β1/β3)·p of a constant pressure gradient, as a part of the feed
-    /// \[kg/s\].
+    /// (β1/β3)·p of a constant pressure gradient, as a part of the feed \[kg/s\].
     pub pressure_kg_per_s: f64,
 }
 
-/// The law with its nozzle. The flow at the nozzle must be reported.
+/// The controller with its nozzle. Needs the reported flow at the nozzle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdaptiveNozzle {
     controller: MracController,
@@ -30,12 +28,12 @@ pub struct AdaptiveNozzle {
     reference: f64,
     demand: CommandDemand,
     begun: bool,
-    /// What was applied since the last answer.
+    /// Applied commands since the last step of the feedback.
     applied: AppliedMean,
 }
 
-/// The mean of what was applied, which is all that the law's model of a held
-/// command can be told of.
+/// The time mean of the applied commands, in place of the constant command that the controller's
+/// model assumes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct AppliedMean {
     last: Option<(Stamp, f64)>,
@@ -44,7 +42,7 @@ struct AppliedMean {
 }
 
 impl AppliedMean {
-    /// The last one held until now.
+    /// The last command was held until now.
     fn hold(&mut self, now: Stamp) {
         if let Some((since, value)) = &mut self.last {
             let secs = (now - *since).secs().max(0.0);
@@ -54,13 +52,13 @@ impl AppliedMean {
         }
     }
 
-    /// Another one from now on.
+    /// Another command from now on.
     fn set(&mut self, now: Stamp, value: f64) {
         self.hold(now);
         self.last = Some((now, value));
     }
 
-    /// The mean until now; a new one begins. None where no time has passed.
+    /// The mean until now, and restarts. None where no time has passed.
     fn take(&mut self, now: Stamp) -> Option<f64> {
         self.hold(now);
         let mean = (self.secs > 0.0).then_some(self.sum / self.secs);
@@ -70,16 +68,10 @@ impl AppliedMean {
 }
 
 impl AdaptiveNozzle {
-    /// Before its first bead.
+    /// Before the first bead.
     pub fn new(controller: MracController, nozzle: NozzleModel) -> Self {
-        Self {
-            controller,
-            nozzle,
-            reference: 0.0,
-            demand: CommandDemand::default(),
-            begun: false,
-            applied: AppliedMean::default(),
-        }
+        let (demand, applied) = (CommandDemand::default(), AppliedMean::default());
+        Self { controller, nozzle, reference: 0.0, demand, begun: false, applied }
     }
 
     /// Speed in the nozzle \[m/s\].
@@ -87,8 +79,7 @@ impl AdaptiveNozzle {
         flow.get() / self.nozzle.section.get() * M_PER_MM
     }
 
-    /// The feed that holds a speed in the nozzle if nothing is unknown
-    /// \[kg/s\].
+    /// The feed that holds a speed in the nozzle without uncertainty \[kg/s\].
     fn holding(&self, speed: f64) -> f64 {
         let ScalarPlant { state_gain_per_s, input_gain } = self.controller.plant();
         -state_gain_per_s / input_gain * speed - self.nozzle.pressure_kg_per_s
@@ -96,14 +87,14 @@ impl AdaptiveNozzle {
 }
 
 impl ExtruderController for AdaptiveNozzle {
-    fn required_readings(&self) -> &'static [RequiredReading] {
-        &[RequiredReading::Flow]
+    fn required_reading(&self) -> Option<RequiredReading> {
+        Some(RequiredReading::Flow)
     }
 
     fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> CommandDemand {
         let speed = self.speed(flow);
         self.reference = self.controller.reference_for(speed);
-        // What was learnt on the last bead still holds.
+        // The estimate of the last bead is still valid.
         self.demand =
             CommandDemand::feedforward_only(self.holding(speed) - self.controller.estimate());
         self.begun = false;
@@ -115,31 +106,23 @@ impl ExtruderController for AdaptiveNozzle {
         self.reference = self.controller.reference_for(self.speed(flow));
     }
 
-    fn control(
-        &mut self,
-        now: Stamp,
-        dt: Span,
-        report: &ExtruderReport,
-    ) -> Result<(), UnusableReading> {
-        let flow = report.flow_mm3_per_s.ok_or(UnusableReading)?;
+    fn control(&mut self, now: Stamp, dt: Span, report: &ExtruderReport) -> Result<(), BadReading> {
+        let flow = report.flow_mm3_per_s.ok_or(BadReading)?;
         let (measured, known) = (self.speed(flow), self.nozzle.pressure_kg_per_s);
         if let Some(mean) = self.applied.take(now) {
             self.controller.settle(mean);
         }
         if !self.begun {
             self.begun = true;
-            // The flow is no steady one yet; what was learnt before still holds.
-            let learnt = self.controller.estimate();
+            // The flow is not steady yet, so the last estimate is kept.
+            let estimate = self.controller.estimate();
             self.controller.start(measured, self.demand.value, known);
-            self.controller.set_estimate(learnt);
+            self.controller.set_estimate(estimate);
         }
         let action = self.controller.step(measured, self.reference, known, dt);
         let feedforward = self.holding(action.model);
-        self.demand = CommandDemand {
-            value: action.command,
-            feedforward,
-            feedback: action.command - feedforward,
-        };
+        let value = action.command;
+        self.demand = CommandDemand { value, feedforward, feedback: value - feedforward };
         Ok(())
     }
 
@@ -164,7 +147,7 @@ mod tests {
     use crate::core::units::Mm2;
     use crate::extruder::adaptive::{Adaptation, AdaptiveGains, EstimateBounds};
 
-    fn law() -> AdaptiveNozzle {
+    fn controller() -> AdaptiveNozzle {
         let plant = ScalarPlant { state_gain_per_s: -1.0, input_gain: 1.0 };
         let adaptation = Adaptation::Constant { learning_rate: 4.0, weight: 1.0 };
         let gains = AdaptiveGains {
@@ -189,15 +172,15 @@ mod tests {
         }
     }
 
-    /// Runs the law against its plant with a part that it does not know; gives
-    /// the law and the flow at the end.
+    /// Runs the controller against its plant with an unknown part; returns it and the flow at
+    /// the end.
     fn run(secs: f64, unknown: f64) -> (AdaptiveNozzle, f64) {
-        let (mut controller, wanted) = (law(), Mm3PerS::constant(1000.0));
+        let (mut controller, demanded) = (controller(), Mm3PerS::constant(1000.0));
         let (mut speed, mut now) = (0.01, Stamp::START);
-        let mut command = controller.begin(now, wanted).value;
+        let mut command = controller.begin(now, demanded).value;
         let mut dt = Span::ZERO;
         while now.secs() < secs {
-            controller.feedforward(dt, wanted);
+            controller.feedforward(dt, demanded);
             controller.control(now, dt, &report(speed * 100.0 / M_PER_MM)).unwrap();
             command = controller.demand().value;
             controller.settle(now, command);
@@ -215,22 +198,22 @@ mod tests {
     }
 
     #[test]
-    fn what_was_learnt_on_one_bead_holds_at_the_beginning_of_the_next() {
-        let wanted = Mm3PerS::constant(1000.0);
-        let first = law().begin(Stamp::START, wanted).value;
+    fn the_estimate_of_one_bead_is_used_at_the_beginning_of_the_next() {
+        let demanded = Mm3PerS::constant(1000.0);
+        let first = controller().begin(Stamp::START, demanded).value;
         assert!((first - 0.010).abs() < 1e-9, "{first}");
         let (mut controller, _) = run(40.0, -0.004);
-        let next = controller.begin(Stamp::from_secs(60.0), wanted).value;
+        let next = controller.begin(Stamp::from_secs(60.0), demanded).value;
         assert!((next - 0.014).abs() < 2e-5, "{next}");
     }
 
     #[test]
-    fn a_command_that_climbs_within_a_hold_counts_by_its_mean() {
-        let (mut stepwise, mut at_once) = (law(), law());
-        let wanted = Mm3PerS::constant(1000.0);
+    fn a_command_that_rises_within_a_hold_counts_by_its_mean() {
+        let (mut stepwise, mut at_once) = (controller(), controller());
+        let demanded = Mm3PerS::constant(1000.0);
         let ms = Span::from_millis;
         for controller in [&mut stepwise, &mut at_once] {
-            let _ = controller.begin(Stamp::START, wanted);
+            let _ = controller.begin(Stamp::START, demanded);
             controller.settle(Stamp::START, 0.004);
             controller.control(Stamp::START, Span::ZERO, &report(500.0)).unwrap();
         }
@@ -247,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn a_feed_that_slips_is_learnt_until_the_flow_is_the_wanted_one() {
+    fn a_feed_that_slips_is_estimated_until_the_flow_is_the_demanded_one() {
         assert!((after(20.0, 0.0) - 1000.0).abs() < 0.1);
         assert!((after(40.0, -0.004) - 1000.0).abs() < 1.0);
         // ë + a·ė + 4e = 0 leaves 94.6 mm³/s less at half a second.

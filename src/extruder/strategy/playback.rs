@@ -1,10 +1,8 @@
-//! Commands that answer nothing: one for all of a bead, or a profile that was
-//! written down beforehand.
+//! Commands without feedback: a constant one, or a profile from a table.
 
-use super::interface::{CommandDemand, ExtruderController, UnusableReading};
+use super::interface::{CommandDemand, ExtruderController};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm3PerS;
-use crate::extruder::report::ExtruderReport;
 use crate::identify::command_profile::CommandProfile;
 
 /// One command for as long as bead is laid, in the unit of the command.
@@ -16,27 +14,12 @@ impl ExtruderController for ConstantCommand {
         self.demand()
     }
 
-    fn feedforward(&mut self, _dt: Span, _flow: Mm3PerS) {}
-
-    fn control(
-        &mut self,
-        _now: Stamp,
-        _dt: Span,
-        _report: &ExtruderReport,
-    ) -> Result<(), UnusableReading> {
-        Ok(())
-    }
-
     fn demand(&self) -> CommandDemand {
         CommandDemand::feedforward_only(self.0)
     }
-
-    fn resume(&mut self, _now: Stamp, _applied: f64) {}
-
-    fn settle(&mut self, _now: Stamp, _applied: f64) {}
 }
 
-/// A profile that is played from the moment on which the pump runs; it stands in a hold.
+/// A profile that is played from when the pump runs; it stands in a hold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Playback {
     profile: CommandProfile,
@@ -49,12 +32,12 @@ impl Playback {
         Self { profile, at_s: 0.0 }
     }
 
-    /// What is played.
+    /// The profile.
     pub const fn profile(&self) -> &CommandProfile {
         &self.profile
     }
 
-    /// How long the profile is; its last command is kept after that.
+    /// Duration of the profile; its last command is kept after that.
     pub fn lasts(&self) -> Span {
         Span::from_secs(self.profile.end_s())
     }
@@ -70,20 +53,7 @@ impl ExtruderController for Playback {
         self.at_s += dt.max(Span::ZERO).secs();
     }
 
-    fn control(
-        &mut self,
-        _now: Stamp,
-        _dt: Span,
-        _report: &ExtruderReport,
-    ) -> Result<(), UnusableReading> {
-        Ok(())
-    }
-
     fn demand(&self) -> CommandDemand {
         CommandDemand::feedforward_only(self.profile.at(self.at_s))
     }
-
-    fn resume(&mut self, _now: Stamp, _applied: f64) {}
-
-    fn settle(&mut self, _now: Stamp, _applied: f64) {}
 }

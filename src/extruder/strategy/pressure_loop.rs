@@ -1,8 +1,7 @@
-//! The pressure loop behind the face of a strategy: the wanted flow becomes a
-//! pressure by the nozzle's power law, and the screw is told the speed that
-//! holds it. Ma et al. 2026.
+//! The pressure loop as a strategy: the demanded flow gives a pressure by the nozzle's power
+//! law, and the screw's speed controls that pressure. Ma et al. 2026.
 
-use super::interface::{CommandDemand, ExtruderController, RequiredReading, UnusableReading};
+use super::interface::{BadReading, CommandDemand, ExtruderController, RequiredReading};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{MPa, Mm3PerS, Rpm};
 use crate::extruder::limits::{CommandLimit, CommandLimits};
@@ -15,46 +14,45 @@ use crate::extruder::pressure::{Fopdt, InitialState, PressureController};
 use crate::extruder::report::ExtruderReport;
 use crate::extruder::rheology::PowerLaw;
 
-/// Which law holds the pressure.
+/// Which controller holds the pressure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PressureChoice {
-    /// This program's own.
+    /// Predictive control ([`PredictiveController`]).
     Predictive(Tuning),
-    /// The paper's: Smith's predictor with an integral that rests within the
-    /// noise.
+    /// Variable-structure feedback on a Smith predictor, as in the paper.
     Vsfc(VsfcGains),
-    /// The paper's baseline.
+    /// PI control, the paper's baseline.
     Pi(PressurePiGains),
 }
 
-/// What the loop has to know.
+/// Settings of the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PressureSettings {
-    /// Which law.
+    /// Which controller.
     pub choice: PressureChoice,
-    /// From the screw's speed to the pressure.
+    /// Plant from the screw's speed to the pressure.
     pub model: Fopdt,
-    /// The sensor's noise and the pressure's own wandering.
+    /// Noise of the sensor and drift of the pressure.
     pub noise: PressureNoise,
-    /// From pressure to flow.
+    /// Nozzle, from pressure to flow.
     pub nozzle: PowerLaw,
-    /// What the screw may be told.
+    /// Range and rate of the screw's speed.
     pub limits: CommandLimits,
 }
 
-/// The loop with its memory.
+/// The loop with its state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressureLoop {
     settings: PressureSettings,
     active: Option<ActiveController>,
     target: MPa,
-    /// Speed of the screw that a hold has kept \[rpm\].
+    /// Screw speed that was kept in a hold \[rpm\].
     held_rpm: Option<f64>,
     command_rpm: f64,
     limit: CommandLimit,
 }
 
-/// The law that holds the pressure of a bead.
+/// The controller of one bead.
 #[derive(Debug, Clone, PartialEq)]
 enum ActiveController {
     Predictive(Box<PredictiveController>),
@@ -86,20 +84,14 @@ impl ActiveController {
 }
 
 impl PressureLoop {
-    /// Before its first bead.
+    /// Before the first bead.
     pub const fn new(settings: PressureSettings) -> Self {
-        Self {
-            settings,
-            active: None,
-            target: MPa::ZERO,
-            held_rpm: None,
-            command_rpm: 0.0,
-            limit: CommandLimit::None,
-        }
+        let (target, limit) = (MPa::ZERO, CommandLimit::None);
+        Self { settings, active: None, target, held_rpm: None, command_rpm: 0.0, limit }
     }
 
-    /// The pressure for a flow; the last one where the power law has none.
-    fn aim(&mut self, flow: Mm3PerS) {
+    /// Sets the target pressure for a flow; unchanged where the power law has none.
+    fn set_target(&mut self, flow: Mm3PerS) {
         if let Ok(target) = self.settings.nozzle.pressure(flow) {
             self.target = target;
         }
@@ -107,44 +99,37 @@ impl PressureLoop {
 }
 
 impl ExtruderController for PressureLoop {
-    fn required_readings(&self) -> &'static [RequiredReading] {
-        &[RequiredReading::Pressure]
+    fn required_reading(&self) -> Option<RequiredReading> {
+        Some(RequiredReading::Pressure)
     }
 
     fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> CommandDemand {
-        self.aim(flow);
-        // The screw stands until the pump runs; the law takes over from there,
-        // for it knows how a pressure rises.
+        self.set_target(flow);
+        // The screw stands until the pump runs; the controller takes over from there.
         (self.active, self.held_rpm, self.command_rpm) = (None, None, 0.0);
         self.demand()
     }
 
-    fn reported(&mut self, now: Stamp, report: &ExtruderReport) -> Result<(), UnusableReading> {
-        let pressure = report.pressure_mpa.ok_or(UnusableReading)?;
+    fn reported(&mut self, now: Stamp, report: &ExtruderReport) -> Result<(), BadReading> {
+        let pressure = report.pressure_mpa.ok_or(BadReading)?;
         let settings = &self.settings;
-        // What presses while the screw stood was left by the last bead: as if the
-        // screw had turned for it until now, for it falls as that would.
+        // A pressure while the screw stands is left from the last bead. It falls as if the
+        // screw had turned at the matching speed until now.
         let before = self.held_rpm.unwrap_or(pressure.get().max(0.0) / settings.model.gain());
-        let speed = Rpm::new(before).map_err(|_| UnusableReading)?;
-        let holder = self.active.get_or_insert_with(|| {
+        let speed = Rpm::new(before).map_err(|_| BadReading)?;
+        let active = self.active.get_or_insert_with(|| {
             ActiveController::new(settings, InitialState { pressure, target: pressure, speed })
         });
-        holder.controller().measured(now, pressure).map_err(|_| UnusableReading)
+        active.controller().measured(now, pressure).map_err(|_| BadReading)
     }
 
     fn feedforward(&mut self, _dt: Span, flow: Mm3PerS) {
-        self.aim(flow);
+        self.set_target(flow);
     }
 
-    fn control(
-        &mut self,
-        now: Stamp,
-        _dt: Span,
-        _report: &ExtruderReport,
-    ) -> Result<(), UnusableReading> {
-        // Before the first report there is nothing to answer.
-        if let Some(holder) = &mut self.active {
-            let command = holder.controller().step(now, self.target);
+    fn control(&mut self, now: Stamp, _: Span, _: &ExtruderReport) -> Result<(), BadReading> {
+        if let Some(active) = &mut self.active {
+            let command = active.controller().step(now, self.target);
             (self.command_rpm, self.limit) = (command.speed.get(), command.limit);
         }
         Ok(())
@@ -152,16 +137,12 @@ impl ExtruderController for PressureLoop {
 
     fn demand(&self) -> CommandDemand {
         let feedforward = self.target.get() / self.settings.model.gain();
-        CommandDemand {
-            value: self.command_rpm,
-            feedforward,
-            feedback: self.command_rpm - feedforward,
-        }
+        let value = self.command_rpm;
+        CommandDemand { value, feedforward, feedback: value - feedforward }
     }
 
     fn resume(&mut self, _now: Stamp, applied: f64) {
-        // The laws keep the time of their calls; one that is made anew gathers
-        // nothing of the time between.
+        // Controllers keep the times of their calls; a new one does not integrate the hold.
         (self.active, self.held_rpm, self.command_rpm) = (None, Some(applied), applied);
     }
 
@@ -170,8 +151,8 @@ impl ExtruderController for PressureLoop {
     }
 
     fn settle(&mut self, now: Stamp, applied: f64) {
-        if let (Some(holder), Ok(applied)) = (&mut self.active, Rpm::new(applied)) {
-            holder.controller().settle(now, applied);
+        if let (Some(active), Ok(applied)) = (&mut self.active, Rpm::new(applied)) {
+            active.controller().settle(now, applied);
         }
     }
 }

@@ -1,28 +1,26 @@
-//! The predictor of the screw behind the face of a strategy: the filled length
-//! is brought to its setpoint and held there by what is fed. Diagne et al.
-//! 2015, eq. (74).
+//! Control of the filled length of a screw by its feed, as a strategy. Diagne et al. 2015,
+//! eq. (74).
 
-use super::interface::{CommandDemand, ExtruderController, RequiredReading, UnusableReading};
+use super::interface::{BadReading, CommandDemand, ExtruderController, RequiredReading};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm3PerS;
 use crate::extruder::report::ExtruderReport;
 use crate::extruder::screw::control::ScrewSettings;
 use crate::extruder::screw::{ScrewControl, ScrewError, ScrewFault};
 
-/// The control of the screw. What flows hangs on the filled length alone, whose
-/// setpoint stands in the cell.
+/// Control of the screw. The flow depends on the filled length alone, whose setpoint is in the
+/// cell file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScrewFill {
     control: ScrewControl,
-    /// How long the screw has turned: its own clock, for what is on its way
-    /// stands while it stands.
+    /// How long the screw has turned: material on the screw stands while the screw stands.
     screw_time: Stamp,
     holding_fill: f64,
     fill: f64,
 }
 
 impl ScrewFill {
-    /// Before its first bead. Fails for parameters that no screw has.
+    /// Before the first bead. Fails for parameters out of range.
     pub fn new(settings: &ScrewSettings) -> Result<Self, ScrewError> {
         let control = ScrewControl::new(settings)?;
         let hold = settings.feedback.holding_fill();
@@ -31,8 +29,8 @@ impl ScrewFill {
 }
 
 impl ExtruderController for ScrewFill {
-    fn required_readings(&self) -> &'static [RequiredReading] {
-        &[RequiredReading::Filled]
+    fn required_reading(&self) -> Option<RequiredReading> {
+        Some(RequiredReading::Filled)
     }
 
     fn begin(&mut self, _now: Stamp, _flow: Mm3PerS) -> CommandDemand {
@@ -48,28 +46,20 @@ impl ExtruderController for ScrewFill {
         self.screw_time = self.screw_time + dt.max(Span::ZERO);
     }
 
-    fn control(
-        &mut self,
-        _now: Stamp,
-        _dt: Span,
-        report: &ExtruderReport,
-    ) -> Result<(), UnusableReading> {
-        let plug = report.filled_mm.ok_or(UnusableReading)?;
+    fn control(&mut self, _: Stamp, _: Span, report: &ExtruderReport) -> Result<(), BadReading> {
+        let plug = report.filled_mm.ok_or(BadReading)?;
         match self.control.step(self.screw_time, plug) {
             Ok(step) => self.fill = step.fill,
-            // The screw has hardly turned since the last step.
+            // The screw has turned less than half a period since the last step.
             Err(ScrewFault::TooSoon { .. }) => {}
-            Err(_) => return Err(UnusableReading),
+            Err(_) => return Err(BadReading),
         }
         Ok(())
     }
 
     fn demand(&self) -> CommandDemand {
-        CommandDemand {
-            value: self.fill,
-            feedforward: self.holding_fill,
-            feedback: self.fill - self.holding_fill,
-        }
+        let (value, feedforward) = (self.fill, self.holding_fill);
+        CommandDemand { value, feedforward, feedback: value - feedforward }
     }
 
     fn resume(&mut self, now: Stamp, applied: f64) {
@@ -77,7 +67,7 @@ impl ExtruderController for ScrewFill {
     }
 
     fn settle(&mut self, _now: Stamp, applied: f64) {
-        // What is on its way is what was fed, not what was wished for.
+        // The material on the screw is what was fed, not what was demanded.
         if (applied - self.control.fed()).abs() > f64::EPSILON {
             let _ = self.control.applied(self.screw_time, applied);
         }

@@ -1,4 +1,4 @@
-//! Laws under the supervisor, against plants.
+//! Strategies under the supervisor, against plants.
 
 use super::*;
 use crate::core::time::{Span, Stamp};
@@ -60,14 +60,13 @@ fn supervisor(
     })
 }
 
-/// Something that is told a command every 5 ms, none while the pump stands,
-/// and reports every 20 ms.
+/// A plant with a command every 5 ms, none while the pump stands, and a report every 20 ms.
 trait Machine {
     fn advance(&mut self, command: Option<f64>);
     fn report(&self) -> ExtruderReport;
 }
 
-/// A plant that answers at once or with a lag, and reports its flow.
+/// A plant with or without a lag that reports its flow.
 struct Lagging {
     simulator: Simulator,
     flow: f64,
@@ -163,7 +162,7 @@ fn predictive(process: &Fopdt, noise: PressureNoise) -> PressureChoice {
 #[test]
 fn the_pressure_of_a_flow_is_reached_on_every_bead_from_a_standing_screw() {
     let flow = PowerLaw::PP_GF28.flow(MPa::constant(0.6)).unwrap();
-    // The second bead begins while the first one's pressure has not gone yet.
+    // The second bead begins before the pressure of the first has fallen.
     for pause in [200, 3000] {
         let (mut side, mut machine) = pressed(predictive);
         for bead in 0..2 {
@@ -177,9 +176,8 @@ fn the_pressure_of_a_flow_is_reached_on_every_bead_from_a_standing_screw() {
     }
 }
 
-/// Reports stay out for half a second from several moments on, then come
-/// again: the command must go on from where it was, and another bead must come
-/// to the same command.
+/// Reports are missing for half a second from several moments on: the command must resume from
+/// where it was, and the next bead must reach the same command.
 fn goes_on(name: &str, make: &dyn Fn() -> (Supervisor, Box<dyn Machine>), flow: f64) {
     let bead = Laying::Bead(Mm3PerS::constant(flow));
     for phase in 0..11 {
@@ -215,7 +213,7 @@ impl Machine for Boxed<'_> {
 }
 
 #[test]
-fn no_law_jumps_after_a_hold_and_every_law_finds_its_command_on_the_next_bead() {
+fn no_strategy_jumps_after_a_hold_and_each_reaches_its_command_on_the_next_bead() {
     let flow = PowerLaw::PP_GF28.flow(MPa::constant(0.6)).unwrap().get();
     let of = |iterate: fn(&Fopdt, PressureNoise) -> PressureChoice| {
         move || {
@@ -235,11 +233,11 @@ fn no_law_jumps_after_a_hold_and_every_law_finds_its_command_on_the_next_bead() 
         (side, Box::new(machine) as Box<dyn Machine>)
     };
     goes_on("screw", &filled, 1.0);
-    goes_on("feedforward", &foreseen, 460.0);
+    goes_on("feedforward", &inverse, 460.0);
     goes_on("adaptive", &adaptive, 460.0);
 }
 
-fn foreseen() -> (Supervisor, Box<dyn Machine>) {
+fn inverse() -> (Supervisor, Box<dyn Machine>) {
     let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
     let limits = CommandLimits::new(0.0, 90.0, 200.0).unwrap();
     let settings = InverseSettings {
@@ -314,7 +312,7 @@ fn screw() -> (Supervisor, Filled) {
 }
 
 #[test]
-fn what_was_on_its_way_when_the_screw_stood_still_is_known_on_the_next_bead() {
+fn material_on_a_stopped_screw_is_known_on_the_next_bead() {
     let (mut side, mut machine) = screw();
     let bead = Laying::Bead(Mm3PerS::constant(1.0));
     // The first bead ends while the feed is on its way to the plug.
@@ -326,7 +324,7 @@ fn what_was_on_its_way_when_the_screw_stood_still_is_known_on_the_next_bead() {
 }
 
 #[test]
-fn a_screw_filled_beyond_its_length_is_a_hold_until_it_reads_right() {
+fn a_screw_filled_beyond_its_length_is_a_hold_until_a_plausible_reading() {
     let (mut side, mut machine) = screw();
     let bead = Laying::Bead(Mm3PerS::constant(1.0));
     run(&mut side, &mut machine, (0, 400), bead);

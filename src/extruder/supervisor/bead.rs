@@ -1,4 +1,4 @@
-//! What begins a bead, goes on with it, and ends it.
+//! The beginning, the progress and the end of a bead.
 
 use super::{Phase, Supervisor};
 use crate::core::time::{Span, Stamp};
@@ -9,19 +9,19 @@ use crate::extruder::state::{ExtruderHold, ExtruderTrace};
 impl Supervisor {
     /// Stops the pump early.
     pub(super) fn end_early(&mut self, now: Stamp, flow: Mm3PerS) {
-        let Some(pauses) = &mut self.start_stop else { return };
+        let Some(sequencer) = &mut self.start_stop else { return };
         match self.phase {
             Phase::Off | Phase::Fault(_) => return,
             Phase::Ending => {}
             Phase::Starting { .. } | Phase::Running | Phase::Holding { .. } => {
-                pauses.end(now);
+                sequencer.end(now);
                 self.phase = Phase::Ending;
                 self.readback.reset();
             }
         }
-        self.ratios = pauses.ratios(now);
+        self.ratios = sequencer.ratios(now);
         self.trace = ExtruderTrace { flow_mm3_per_s: flow, ..ExtruderTrace::default() };
-        self.trace.predicted_mm3_per_s = self.ratios.map(|shares| flow * shares.flow);
+        self.trace.predicted_mm3_per_s = self.ratios.map(|ratios| flow * ratios.flow);
     }
 
     pub(super) fn lay(&mut self, now: Stamp, dt: Span, flow: Mm3PerS) {
@@ -49,24 +49,24 @@ impl Supervisor {
             Phase::Off | Phase::Starting { .. } | Phase::Ending | Phase::Fault(_) => {}
         }
         self.trace.predicted_mm3_per_s = match self.ratios {
-            Some(shares) => Some(flow * shares.flow),
+            Some(ratios) => Some(flow * ratios.flow),
             None => self.setup.strategy.controller().predicted_flow(),
         };
     }
 
-    /// Where the flow of a start is by now. While it comes the law stands: what is told
-    /// of starts is told of a steady command.
+    /// Updates the flow of a start. While it rises the first command is kept: the times of
+    /// starts are for a constant command.
     fn rise(&mut self, now: Stamp, flow: Mm3PerS) {
-        let Some(pauses) = &mut self.start_stop else { return };
-        pauses.set_demand(flow);
-        let rises = pauses.ratios(now);
-        // A pump that is late with its start is waited for, whatever the clock says.
+        let Some(sequencer) = &mut self.start_stop else { return };
+        sequencer.demand = flow;
+        let rises = sequencer.ratios(now);
+        // A pump that starts later than its times say is waited for.
         if rises.is_none() && matches!(self.phase, Phase::Starting { .. }) {
-            self.ratios = Some(pauses.waiting());
+            self.ratios = Some(sequencer.waiting());
             return;
         }
         if self.phase == Phase::Running && rises.is_none_or(|rises| rises.flow > 0.0) {
-            pauses.flow_established();
+            sequencer.has_flowed = true;
         }
         if rises.is_none() && self.ratios.is_some() {
             self.setup.strategy.controller_mut().flow_established(now, self.applied);
@@ -74,18 +74,17 @@ impl Supervisor {
         self.ratios = rises;
     }
 
-    /// Begins a bead. Its first command is no change of another and has no
-    /// rate.
+    /// Begins a bead. The limit on the rate does not apply to its first command.
     fn begin(&mut self, now: Stamp, flow: Mm3PerS) {
         self.phase = Phase::Starting { since: now };
         self.bead_start = now;
-        if let Some(pauses) = &mut self.start_stop {
-            pauses.begin(now);
+        if let Some(sequencer) = &mut self.start_stop {
+            sequencer.begin(now);
         }
         self.hold_initial_command(now, flow);
     }
 
-    /// Stands where the law begins.
+    /// Keeps the first command of the strategy.
     pub(super) fn hold_initial_command(&mut self, now: Stamp, flow: Mm3PerS) {
         let demand = self.setup.strategy.controller_mut().begin(now, flow);
         let (low, high) = self.setup.limits.range();
@@ -104,8 +103,8 @@ impl Supervisor {
         self.readback.reset();
         self.trace = ExtruderTrace::default();
         self.ratios = None;
-        if let Some(pauses) = &mut self.start_stop {
-            pauses.rest();
+        if let Some(sequencer) = &mut self.start_stop {
+            sequencer.rest();
         }
     }
 }

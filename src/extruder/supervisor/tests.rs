@@ -102,7 +102,7 @@ fn a_pump_that_does_not_start_is_a_fault_and_one_that_does_is_waited_for() {
 }
 
 #[test]
-fn reports_that_stay_out_are_a_hold_then_a_fault() {
+fn missing_reports_are_a_hold_then_a_fault() {
     let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.report = None;
@@ -136,12 +136,12 @@ fn a_fault_stays_until_the_robot_is_idle() {
 }
 
 #[test]
-fn a_bead_that_no_extruder_answers_to_is_a_fault_within_the_longest_gap() {
+fn a_bead_without_reports_is_a_fault_within_the_longest_gap() {
     let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.report = None;
     assert_eq!(bench.go(0.15), ExtruderState::Starting);
     assert_eq!(bench.go(0.1), ExtruderState::Fault(ExtruderFault::NoAnswer));
-    // One that answered before the bead and no more.
+    // An extruder that reported before the bead and not since.
     let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.laying = Laying::Idle;
     bench.report = Some(report(PumpMode::Off, 0.0));
@@ -153,7 +153,7 @@ fn a_bead_that_no_extruder_answers_to_is_a_fault_within_the_longest_gap() {
 }
 
 #[test]
-fn a_pump_that_runs_on_does_not_hide_why_it_was_stopped() {
+fn a_pump_that_runs_on_keeps_the_first_fault() {
     let high = |pump, mpa| {
         Some(ExtruderReport { pressure_mpa: Some(MPa::constant(mpa)), ..report(pump, 30.0) })
     };
@@ -168,24 +168,24 @@ fn a_pump_that_runs_on_does_not_hide_why_it_was_stopped() {
     assert_eq!(bench.go(0.1), stopped);
     bench.laying = Laying::Idle;
     assert_eq!(bench.go(0.1), ExtruderState::Off);
-    // One that runs on at rest presses against no shut valve.
+    // A pump that runs on at rest does not press against a closed valve.
     bench.report = high(PumpMode::On, 2.1);
     bench.go(0.1);
     assert!(bench.last().valve_open && !bench.last().pump_on);
-    // A link that comes back is no proof of anything.
+    // A link that comes back does not show that the pump stands.
     bench.side.link_went_down(Stamp::from_secs(9.0));
     assert_eq!(bench.side.state(), ExtruderState::Off);
 }
 
 #[test]
-fn a_pump_that_runs_on_is_a_fault_until_it_rests() {
+fn a_pump_that_runs_on_is_a_fault_until_it_stands() {
     let runs_on = ExtruderState::Fault(ExtruderFault::RunsOn);
     let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.laying = Laying::Idle;
     assert_eq!(bench.go(0.9), ExtruderState::Off);
     assert_eq!(bench.go(0.3), runs_on);
-    // No bead is laid with a pump that does not obey.
+    // No bead is laid with a pump that does not comply.
     bench.laying = Laying::Bead(FLOW);
     assert_eq!(bench.go(0.5), runs_on);
     assert!(!bench.last().pump_on);
@@ -209,7 +209,7 @@ fn too_high_a_pressure_stops_the_pump_and_leaves_the_valve_open() {
 }
 
 #[test]
-fn a_screw_that_does_not_turn_as_it_was_told_is_a_hold_then_a_fault() {
+fn a_screw_at_the_wrong_speed_is_a_hold_then_a_fault() {
     let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.report = Some(report(PumpMode::On, 25.0));
@@ -225,7 +225,7 @@ fn a_screw_that_does_not_turn_as_it_was_told_is_a_hold_then_a_fault() {
 }
 
 #[test]
-fn a_link_that_is_down_takes_no_command_and_is_given_up_in_time() {
+fn no_command_is_sent_while_the_link_is_down_and_a_long_loss_is_a_fault() {
     let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.side.link_went_down(Stamp::from_secs(0.5));
@@ -262,7 +262,7 @@ fn ending_a_run_stops_the_pump_at_once() {
 }
 
 #[test]
-fn a_valve_that_stays_shut_is_a_hold_then_a_fault() {
+fn a_valve_that_stays_closed_is_a_hold_then_a_fault() {
     let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.report = Some(ExtruderReport { valve_open: false, ..report(PumpMode::On, 30.0) });
@@ -275,7 +275,7 @@ fn a_valve_that_stays_shut_is_a_hold_then_a_fault() {
 }
 
 #[test]
-fn reports_of_the_time_before_the_pump_was_told_to_run_are_no_fault() {
+fn reports_from_before_the_command_to_run_are_no_fault() {
     let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.03);
     assert_eq!(bench.side.state(), ExtruderState::Running);
@@ -290,7 +290,7 @@ fn reports_of_the_time_before_the_pump_was_told_to_run_are_no_fault() {
 }
 
 #[test]
-fn a_limit_on_the_pressure_needs_its_reading_and_lets_it_out_until_it_has_fallen() {
+fn a_limit_on_the_pressure_needs_its_reading_and_relieves_until_it_has_fallen() {
     let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     bench.go(0.5);
     bench.report = Some(ExtruderReport { pressure_mpa: None, ..report(PumpMode::On, 30.0) });
@@ -309,7 +309,7 @@ fn a_limit_on_the_pressure_needs_its_reading_and_lets_it_out_until_it_has_fallen
 }
 
 #[test]
-fn a_pump_that_starts_anew_finds_a_law_that_begins_anew() {
+fn a_pump_that_restarts_restarts_the_strategy() {
     let at = |from_s, value| ProfilePoint { from_s, value };
     let profile = CommandProfile::new(vec![at(0.0, 20.0), at(0.5, 50.0)], 2.0).unwrap();
     let mut bench = Bench::new(ExtruderStrategy::Profile(Playback::new(profile)));
@@ -324,7 +324,7 @@ fn a_pump_that_starts_anew_finds_a_law_that_begins_anew() {
 }
 
 #[test]
-fn a_valve_that_lets_pressure_out_waits_for_a_report_that_it_has_fallen() {
+fn a_relieving_valve_waits_for_a_report_of_a_lower_pressure() {
     let mut bench = Bench::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
     let with = |mpa: Option<f64>| {
         let pressure_mpa = mpa.map(|mpa| MPa::new(mpa).unwrap());

@@ -1,4 +1,4 @@
-//! What reports mean for the state: starts, holds, faults, and going on.
+//! Transitions by reports: starts, holds, faults, and resuming.
 
 use super::{Phase, StopCompliance, Supervisor};
 use crate::core::readback::SpeedMatch;
@@ -8,7 +8,8 @@ use crate::extruder::report::{ExtruderReport, PumpMode};
 use crate::extruder::state::{ExtruderFault, ExtruderHold};
 use crate::extruder::strategy::RequiredReading;
 
-/// Share of the highest pressure below which it has fallen.
+/// Fraction of the highest pressure below which the valve may close again (hysteresis, so
+/// that noise at the limit does not switch the valve).
 const RELIEF_RESET_RATIO: f64 = 0.95;
 
 impl Supervisor {
@@ -37,7 +38,7 @@ impl Supervisor {
             PumpMode::Fault => self.phase = Phase::Fault(ExtruderFault::Pump),
             PumpMode::On => self.pump_runs(now, &seen),
             PumpMode::Starting => self.restart(now, now),
-            // A report may still tell of the time before the pump was told to run.
+            // A report may still be from before the command to run.
             PumpMode::Off | PumpMode::Stopping if now - self.bead_start <= self.setup.max_gap => {
                 self.restart(now, self.bead_start);
             }
@@ -49,8 +50,7 @@ impl Supervisor {
         }
     }
 
-    /// A pump that is told to stop may take its time, but no longer than the
-    /// cell is patient.
+    /// A pump that is commanded to stop may take as long as the longest hold.
     fn check_stop_compliance(&mut self, now: Stamp, pump: PumpMode) {
         let runs = matches!(pump, PumpMode::On | PumpMode::Starting);
         let commanded_off = self.last_command.is_some_and(|last| !last.pump_on);
@@ -60,18 +60,14 @@ impl Supervisor {
         }
         let since = match self.stop_compliance {
             StopCompliance::Complies => now,
-            StopCompliance::RunsOn { since } | StopCompliance::TimedOut { since } => since,
+            StopCompliance::RunsOn { since, .. } => since,
         };
-        self.stop_compliance = if now - since > self.setup.max_hold {
-            StopCompliance::TimedOut { since }
-        } else {
-            StopCompliance::RunsOn { since }
-        };
+        let timed_out = now - since > self.setup.max_hold;
+        self.stop_compliance = StopCompliance::RunsOn { since, timed_out };
     }
 
-    /// Whether the pressure is too high. A valve that was opened for it stays
-    /// open until a report says that it has fallen, whatever the state; only one
-    /// of an extruder that is at work, told or not, is opened.
+    /// Whether the pressure is too high. The valve is opened only while the extruder works,
+    /// commanded or not; then it stays open, in any state, until the pressure has fallen.
     fn relieve(&mut self, report: &ExtruderReport) -> bool {
         let Some((limit, found)) = self.setup.max_pressure.zip(report.pressure_mpa) else {
             return false;
@@ -87,21 +83,21 @@ impl Supervisor {
         too_high
     }
 
-    /// The pump says that it is starting: a law that runs would wind up against
-    /// a flow that does not come, and so it begins once more.
+    /// The pump reports that it is starting. A running strategy would wind up against a flow
+    /// that does not come, so the start begins again.
     fn restart(&mut self, now: Stamp, since: Stamp) {
         if matches!(self.phase, Phase::Running | Phase::Holding { .. }) {
             self.phase = Phase::Starting { since };
             self.readback.reset();
-            // Its flow comes up once more, unless it was still on its way.
-            if let Some(pauses) = self.start_stop.as_mut().filter(|_| self.ratios.is_none()) {
-                pauses.begin(now);
+            // The flow rises again, unless it was still rising.
+            if let Some(sequencer) = self.start_stop.as_mut().filter(|_| self.ratios.is_none()) {
+                sequencer.begin(now);
             }
             self.hold_initial_command(now, self.trace.flow_mm3_per_s);
         }
     }
 
-    /// The pump runs: a start is over, or the screw turns as it was told.
+    /// The pump runs: a start is over, or the speed of the screw is checked.
     fn pump_runs(&mut self, now: Stamp, report: &ExtruderReport) {
         if !report.valve_open {
             self.hold(now, ExtruderHold::ValveShut);
@@ -129,8 +125,7 @@ impl Supervisor {
         }
     }
 
-    /// Lets the law hear a report; one that cannot be true is a hold until one
-    /// comes that can.
+    /// Passes a report to the strategy; an implausible one holds until the next plausible one.
     fn pass_to_controller(&mut self, now: Stamp, report: &ExtruderReport) {
         self.report_usable = self.setup.strategy.controller_mut().reported(now, report).is_ok();
         if !self.report_usable {
@@ -138,13 +133,13 @@ impl Supervisor {
         }
     }
 
-    /// A limit on the pressure is no limit where the pressure is not reported.
+    /// Whether a report has what the strategy and the limit on the pressure need.
     fn has_required_readings(&self, report: &ExtruderReport) -> bool {
-        self.setup.strategy.controller().required_readings().iter().all(|need| need.met_by(report))
+        self.setup.strategy.controller().required_reading().is_none_or(|need| need.met_by(report))
             && (self.setup.max_pressure.is_none() || RequiredReading::Pressure.met_by(report))
     }
 
-    /// Holds when reports stay out, and gives up when a hold or a start lasts
+    /// Holds when no report comes in time, and changes to a fault when a hold or a start lasts
     /// too long.
     pub(super) fn check_timeouts(&mut self, now: Stamp) {
         let heard = self.report.is_some_and(|(at, report)| {
@@ -165,12 +160,12 @@ impl Supervisor {
         }
     }
 
-    /// How long nothing has been heard on this bead.
+    /// Time without a report on this bead.
     fn silent_for(&self, now: Stamp) -> Span {
         now - self.last_report_at.map_or(self.bead_start, |at| at.max(self.bead_start))
     }
 
-    /// Keeps the last command; a first reason stays.
+    /// Keeps the last command; the first reason stays.
     pub(super) fn hold(&mut self, now: Stamp, why: ExtruderHold) {
         if self.phase == Phase::Running {
             self.phase = Phase::Holding { since: now, why };
@@ -183,8 +178,8 @@ impl Supervisor {
         }
     }
 
-    /// The reason for a hold has gone. The law goes on from the command that
-    /// was kept, and gathers nothing of the time between.
+    /// The reason for a hold has gone. The strategy resumes from the command that was kept,
+    /// and does not integrate over the hold.
     pub(super) fn resume(&mut self, now: Stamp) {
         self.phase = Phase::Running;
         self.last_control = None;

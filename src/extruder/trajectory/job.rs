@@ -1,4 +1,4 @@
-//! What is planned for a job, bead after bead.
+//! The plan of a job, bead by bead.
 
 use std::sync::Arc;
 
@@ -6,10 +6,11 @@ use crate::core::quantity::Unit;
 use crate::core::time::Span;
 use crate::core::units::{Mm, Mm3PerS, MmPerS};
 
-/// Rows nearer to each other tell no rate \[s\].
+/// Rows that are closer in time are not used for rates \[s\]: the difference of rounded numbers
+/// would dominate.
 const MIN_ROW_SPACING_S: f64 = 1e-3;
 
-/// What is planned for one moment.
+/// A row of a plan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PlanRow {
     pub(super) time_s: f64,
@@ -19,24 +20,24 @@ pub(super) struct PlanRow {
     pub(super) flow_mm3_per_s: f64,
 }
 
-/// A moment of a plan.
+/// A point of a plan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlannedPoint {
     /// Time since the plan of the bead began \[s\].
     pub time_s: f64,
-    /// What the extruder is told, in the unit of the command.
+    /// Command of the extruder, in its unit.
     pub command: f64,
-    /// Flow that is foretold.
+    /// Predicted flow.
     pub flow: Mm3PerS,
 }
 
-/// The plan of one bead. The path is counted from where the bead begins.
+/// The plan of one bead, by path from where the bead begins.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedTrajectory {
     rows: Vec<PlanRow>,
 }
 
-/// The plan of a job, bead after bead.
+/// The plan of a job, bead by bead.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedJob {
     /// Unit of the commands.
@@ -44,17 +45,14 @@ pub struct PlannedJob {
     beads: Vec<Arc<PlannedTrajectory>>,
 }
 
-/// The smallest and the largest of something.
-pub type Range = (f64, f64);
-
 impl PlannedJob {
-    /// Of beads with at least two rows each, at least one of them.
+    /// From at least one bead, with at least two rows each.
     pub(super) fn new(unit: Unit, beads: Vec<Vec<PlanRow>>) -> Self {
-        let course = |rows| Arc::new(PlannedTrajectory { rows });
-        Self { unit, beads: beads.into_iter().map(course).collect() }
+        let trajectory = |rows| Arc::new(PlannedTrajectory { rows });
+        Self { unit, beads: beads.into_iter().map(trajectory).collect() }
     }
 
-    /// The plan of the bead with this number, from 0; after the last the first follows.
+    /// The plan of the bead with this number, from 0; cyclic.
     pub fn bead(&self, number: usize) -> &Arc<PlannedTrajectory> {
         &self.beads[number % self.beads.len()]
     }
@@ -64,13 +62,13 @@ impl PlannedJob {
         &self.beads
     }
 
-    /// Speeds \[mm/s\].
-    pub fn speeds(&self) -> Range {
+    /// Smallest and largest speed \[mm/s\].
+    pub fn speeds(&self) -> (f64, f64) {
         self.range(|row| row.speed_mm_per_s)
     }
 
-    /// Commands, in their unit.
-    pub fn commands(&self) -> Range {
+    /// Smallest and largest command, in its unit.
+    pub fn commands(&self) -> (f64, f64) {
         self.range(|row| row.command)
     }
 
@@ -87,12 +85,11 @@ impl PlannedJob {
     fn steepest(&self, of: impl Fn(&PlanRow) -> f64) -> f64 {
         let pairs =
             self.beads.iter().flat_map(|bead| bead.rows.iter().zip(bead.rows.iter().skip(1)));
-        // Rows that lie closer than this are even to what their digits tell.
         let apart = pairs.filter(|(a, b)| b.time_s - a.time_s >= MIN_ROW_SPACING_S);
         apart.map(|(a, b)| (of(b) - of(a)).abs() / (b.time_s - a.time_s)).fold(0.0, f64::max)
     }
 
-    fn range(&self, of: impl Fn(&PlanRow) -> f64) -> Range {
+    fn range(&self, of: impl Fn(&PlanRow) -> f64) -> (f64, f64) {
         let all = self.beads.iter().flat_map(|bead| &bead.rows).map(of);
         all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
             (low.min(value), high.max(value))
@@ -101,45 +98,39 @@ impl PlannedJob {
 }
 
 impl PlannedTrajectory {
-    /// Where the bead ends.
+    /// Length of the bead.
     pub fn end(&self) -> Mm {
         Mm::new(self.rows.last().map_or(0.0, |row| row.path_mm)).unwrap_or_default()
     }
 
-    /// Flow for each speed at the bead's beginning, which is the section that was planned
-    /// for \[mm²\].
+    /// Flow over speed at the bead's beginning: the planned section \[mm²\].
     pub fn section_mm2(&self) -> f64 {
         self.rows.first().map_or(0.0, |row| row.flow_mm3_per_s / row.speed_mm_per_s)
     }
 
-    /// What is planned for a place; before the bead that of its beginning, after it that
-    /// of its end.
+    /// The planned point at a position; before and after the bead that of its ends.
     pub fn at(&self, path: Mm) -> PlannedPoint {
         let path_mm = path.get();
         let after = self.rows.partition_point(|row| row.path_mm < path_mm);
         let here = between(&self.rows, after, |row| row.path_mm, path_mm);
-        PlannedPoint {
-            time_s: here.time_s,
-            command: here.command,
-            flow: Mm3PerS::new(here.flow_mm3_per_s).unwrap_or_default(),
-        }
+        let flow = Mm3PerS::new(here.flow_mm3_per_s).unwrap_or_default();
+        PlannedPoint { time_s: here.time_s, command: here.command, flow }
     }
 
-    /// Mean speed over the time that follows on a place.
+    /// Mean speed over a time from a position on.
     pub fn speed(&self, path: Mm, lasts: Span) -> MmPerS {
         let from = path.get().clamp(0.0, self.end().get());
         let until_s = self.at(path).time_s + lasts.secs();
         let after = self.rows.partition_point(|row| row.time_s < until_s);
         let to = between(&self.rows, after, |row| row.time_s, until_s);
-        // Beyond the plan its last speed goes on.
+        // After the end of the plan the last speed continues.
         let beyond_s = (until_s - to.time_s).max(0.0);
-        let way_mm = to.path_mm - from + to.speed_mm_per_s * beyond_s;
-        MmPerS::new((way_mm / lasts.secs().max(1e-6)).max(0.0)).unwrap_or_default()
+        let length_mm = to.path_mm - from + to.speed_mm_per_s * beyond_s;
+        MmPerS::new((length_mm / lasts.secs().max(1e-6)).max(0.0)).unwrap_or_default()
     }
 }
 
-/// The row at a value between the one before a place of the table and the one there; the
-/// first or the last beyond them.
+/// The row interpolated before an index of the table; the first or the last outside it.
 fn between(rows: &[PlanRow], after: usize, of: impl Fn(&PlanRow) -> f64, value: f64) -> PlanRow {
     let Some(to) = rows.get(after) else { return rows[rows.len() - 1] };
     let Some(from) = after.checked_sub(1).and_then(|at| rows.get(at)) else { return *to };

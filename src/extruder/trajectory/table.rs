@@ -4,52 +4,46 @@ use super::job::{PlanRow, PlannedJob};
 use crate::core::quantity::Unit;
 use crate::document::csv::{LineProblem, describe};
 
-/// How the column of the command begins; its end is the unit.
+/// Beginning of the name of the command's column; its end is the unit.
 const COMMAND: &str = "command_";
 const BEAD: &str = "bead";
 const NUMBERS: [&str; 4] = ["time_s", "path_mm", "speed_mm_per_s", "flow_mm3_per_s"];
 
-/// A table that is no plan. Lines are counted from 1, the heading included.
+/// Errors of a plan table. Lines are counted from 1, the heading included.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlanTableError {
     /// A column is missing.
-    #[error("the heading has no column {column}; a plan comes from truebead plan")]
-    Column {
-        /// Which one.
-        column: String,
-    },
-    /// Two columns of commands, or one in a unit that nobody knows.
-    #[error("the heading has {found} for the command, expected one column such as command_rpm")]
-    Command {
-        /// What was found.
-        found: String,
-    },
-    /// A row that is not as long as the heading, or no text.
+    #[error("the heading has no column {0}; a plan comes from truebead plan")]
+    Column(String),
+    /// Not exactly one command column, or an unknown unit.
+    #[error("the heading has {0} for the command, expected one column such as command_rpm")]
+    Command(String),
+    /// A row that is not as long as the heading, or not text.
     #[error("line {line}: {what}; was the file cut short? Plan the job again")]
     Row {
-        /// Where.
+        /// Line.
         line: u64,
-        /// What is wrong with it.
+        /// What is wrong.
         what: String,
     },
-    /// A field that is no number, or one that cannot be.
+    /// A field that is not a number, or out of range.
     #[error("line {line}: {column} is \"{found}\", expected {expected}")]
     Number {
-        /// Where.
+        /// Line.
         line: u64,
-        /// Which column.
+        /// Column.
         column: String,
-        /// What was found.
+        /// The field.
         found: String,
-        /// What would do.
+        /// What is expected.
         expected: &'static str,
     },
-    /// A bead of which there are fewer than two rows.
+    /// A bead with fewer than two rows.
     #[error("found a bead with fewer than two rows, expected its whole trajectory")]
     Short,
 }
 
-/// Where each column is.
+/// Indices of the columns.
 struct Columns {
     bead: usize,
     numbers: [usize; 4],
@@ -61,7 +55,7 @@ impl Columns {
     fn of(heading: &csv::StringRecord) -> Result<(Self, Unit), PlanTableError> {
         let index = |column: &str| {
             let at = heading.iter().position(|name| name == column);
-            at.ok_or_else(|| PlanTableError::Column { column: column.to_owned() })
+            at.ok_or_else(|| PlanTableError::Column(column.to_owned()))
         };
         let [time, path, speed, flow] = NUMBERS.map(index);
         let commands: Vec<(usize, &str)> =
@@ -69,31 +63,22 @@ impl Columns {
         let &[(command, name)] = commands.as_slice() else {
             let names: Vec<&str> = commands.iter().map(|(_, name)| *name).collect();
             let found = if names.is_empty() { "nothing".into() } else { names.join(", ") };
-            return Err(PlanTableError::Command { found });
+            return Err(PlanTableError::Command(found));
         };
         let unit = Unit::of_word(name.trim_start_matches(COMMAND));
-        let unit = unit.ok_or_else(|| PlanTableError::Command { found: name.to_owned() })?;
-        let columns = Self {
-            bead: index(BEAD)?,
-            numbers: [time?, path?, speed?, flow?],
-            command,
-            command_name: name.to_owned(),
-        };
+        let unit = unit.ok_or_else(|| PlanTableError::Command(name.to_owned()))?;
+        let bead = index(BEAD)?;
+        let numbers = [time?, path?, speed?, flow?];
+        let columns = Self { bead, numbers, command, command_name: name.to_owned() };
         Ok((columns, unit))
     }
 
     fn row(&self, record: &csv::StringRecord, line: u64) -> Result<PlanRow, PlanTableError> {
         let number = |at: usize, column: &str, least: f64, expected: &'static str| {
             let found = record.get(at).unwrap_or_default();
-            let value = found.parse().ok();
-            value.filter(|value: &f64| value.is_finite() && *value >= least).ok_or_else(|| {
-                PlanTableError::Number {
-                    line,
-                    column: column.to_owned(),
-                    found: found.to_owned(),
-                    expected,
-                }
-            })
+            let value =
+                found.parse().ok().filter(|value: &f64| value.is_finite() && *value >= least);
+            value.ok_or_else(|| wrong(line, column, &found, expected))
         };
         let known = |k: usize| number(self.numbers[k], NUMBERS[k], 0.0, "a number of 0 or more");
         Ok(PlanRow {
@@ -106,8 +91,8 @@ impl Columns {
     }
 }
 
-/// Reads a job's plan from the text of a `plan.csv`. Fails where a column, a number or the
-/// order of the rows is not as `truebead plan` writes it.
+/// Reads a plan from the text of a `plan.csv`. Fails where a column, a number or the order of the
+/// rows is not as `truebead plan` writes it.
 pub fn read(text: &str) -> Result<PlannedJob, PlanTableError> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let of_row = |error: csv::Error| {
@@ -138,33 +123,32 @@ pub fn read(text: &str) -> Result<PlannedJob, PlanTableError> {
     Ok(PlannedJob::new(unit, beads.into_iter().map(|(_, rows)| rows).collect()))
 }
 
-fn wrong(line: u64, column: &str, found: f64, expected: &'static str) -> PlanTableError {
+fn wrong(line: u64, column: &str, found: &impl ToString, expected: &'static str) -> PlanTableError {
     PlanTableError::Number { line, column: column.to_owned(), found: found.to_string(), expected }
 }
 
-/// What a bead in a cell begins with.
+/// What a bead in a cell has to begin with.
 const EXPECTED_START: &str = "a bead that begins at a speed above 0, for the cell starts it itself: plan \
                         G-code with --ends moving";
 
 fn check_first(row: &PlanRow, line: u64) -> Result<(), PlanTableError> {
     for (column, found) in [("time_s", row.time_s), ("path_mm", row.path_mm)] {
         if found > 0.0 {
-            return Err(wrong(line, column, found, "0 where a bead begins"));
+            return Err(wrong(line, column, &found, "0 where a bead begins"));
         }
     }
-    if row.speed_mm_per_s <= 0.0 {
-        return Err(wrong(line, "speed_mm_per_s", 0.0, EXPECTED_START));
-    }
-    Ok(())
+    let starts = row.speed_mm_per_s > 0.0;
+    if starts { Ok(()) } else { Err(wrong(line, "speed_mm_per_s", &0.0, EXPECTED_START)) }
 }
 
 fn check_order(before: Option<&PlanRow>, row: &PlanRow, line: u64) -> Result<(), PlanTableError> {
-    let Some(before) = before else { return Ok(()) };
-    if row.time_s <= before.time_s {
-        return Err(wrong(line, "time_s", row.time_s, "more than in the row before"));
+    match before {
+        Some(before) if row.time_s <= before.time_s => {
+            Err(wrong(line, "time_s", &row.time_s, "more than in the row before"))
+        }
+        Some(before) if row.path_mm < before.path_mm => {
+            Err(wrong(line, "path_mm", &row.path_mm, "no less than in the row before"))
+        }
+        _ => Ok(()),
     }
-    if row.path_mm < before.path_mm {
-        return Err(wrong(line, "path_mm", row.path_mm, "no less than in the row before"));
-    }
-    Ok(())
 }

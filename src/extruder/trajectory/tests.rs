@@ -25,7 +25,7 @@ fn text() -> String {
 }
 
 #[test]
-fn a_plan_is_read_by_place_and_goes_on_at_its_ends() {
+fn a_plan_is_read_by_position_and_constant_beyond_its_ends() {
     let job = read(&text()).unwrap();
     assert_eq!((job.unit, job.beads().len()), (Unit::Rpm, 2));
     let close = |found: f64, expected: f64| {
@@ -67,7 +67,7 @@ fn the_speed_of_a_setpoint_is_the_mean_over_its_time() {
 }
 
 #[test]
-fn what_is_no_plan_is_refused_with_its_line() {
+fn an_invalid_plan_is_refused_with_its_line() {
     let refused =
         |from: &str, to: &str| read(&text().replacen(from, to, 1)).unwrap_err().to_string();
     assert!(refused("path_mm,", "way,").contains("no column path_mm"));

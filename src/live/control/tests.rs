@@ -195,7 +195,7 @@ fn up() -> LiveInput {
 }
 
 fn report(s: f64, mode: RobotMode) -> LiveInput {
-    let moving = example_setup().start_speed.get();
+    let moving = example_setup().cell.start_speed.get();
     LiveInput::Robot(RobotEvent::State {
         at: at(s),
         state: RobotState {

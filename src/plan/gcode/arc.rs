@@ -5,62 +5,53 @@ use std::f64::consts::TAU;
 use super::error::GcodeError;
 use crate::plan::position::{Position, distance};
 
-/// Ends of an arc may differ by this much in their distance from the centre, as rounded
-/// numbers do \[mm\], and by this share of it.
+/// Tolerance of the radii at both ends of an arc, for rounded numbers: absolute \[mm\] and relative.
 const ARC_TOLERANCE: (f64, f64) = (0.02, 1e-3);
 
-/// A move from one place to another.
+/// A move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Move {
-    /// Straight.
+    /// A line.
     Line {
         /// From \[mm\].
         from: [f64; 3],
         /// To \[mm\].
         to: [f64; 3],
     },
-    /// Round a centre.
+    /// An arc about a centre.
     Arc {
         /// From \[mm\].
         from: [f64; 3],
         /// The centre in the plane \[mm\].
         centre: [f64; 2],
-        /// How far it turns \[rad\], above zero to the left.
+        /// Its angle \[rad\], positive counterclockwise.
         turn: f64,
-        /// How far it climbs \[mm\].
+        /// Its rise in Z \[mm\].
         climb: f64,
     },
 }
 
-/// Where an arc begins and ends \[mm\].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ArcEnds {
-    /// Its beginning.
-    pub from: Position,
-    /// Its end.
-    pub to: Position,
-}
-
-/// How the centre of an arc is given.
+/// Centre of an arc, as given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Centre {
-    /// Beside its start \[mm\].
+    /// Relative to its start \[mm\].
     Offset([f64; 2]),
-    /// By the radius \[mm\]; below zero for the longer of both arcs.
+    /// By the radius \[mm\]; negative for the longer arc.
     Radius(f64),
 }
 
 impl Move {
-    /// An arc to the left or to the right.
+    /// An arc between two positions \[mm\], counterclockwise (`left`) or clockwise.
     pub fn arc(
         line: usize,
-        ArcEnds { from, to }: ArcEnds,
+        from: Position,
+        to: Position,
         given: Centre,
         left: bool,
     ) -> Result<Self, GcodeError> {
         let centre = match given {
             Centre::Offset([i, j]) => [from[0] + i, from[1] + j],
-            Centre::Radius(radius) => centre_by_radius(line, ArcEnds { from, to }, radius, left)?,
+            Centre::Radius(radius) => centre_by_radius(line, from, to, radius, left)?,
         };
         let arm = |p: [f64; 3]| (p[0] - centre[0], p[1] - centre[1]);
         let ((x0, y0), (x1, y1)) = (arm(from), arm(to));
@@ -69,7 +60,7 @@ impl Move {
             return Err(GcodeError::Centre { line, from_mm, to_mm });
         }
         let angle = libm::atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1);
-        // The way round in its sense; ends that are the same are a full circle.
+        // Angle in its sense; equal ends are a full circle.
         let closed = distance([x0, y0, 0.0], [x1, y1, 0.0]) < 1e-9;
         let turn = match (closed, left) {
             (true, true) => TAU,
@@ -96,7 +87,7 @@ impl Move {
         }
     }
 
-    /// The place after a share of it \[mm\].
+    /// Position at a fraction of it \[mm\].
     pub fn at(&self, fraction: f64) -> [f64; 3] {
         match *self {
             Self::Line { from, to } => {
@@ -112,7 +103,7 @@ impl Move {
         }
     }
 
-    /// Its direction after a share of it, of length one.
+    /// Unit tangent at a fraction of it.
     pub fn direction(&self, fraction: f64) -> [f64; 3] {
         let length = self.length_mm();
         match *self {
@@ -130,14 +121,15 @@ impl Move {
 
 fn centre_by_radius(
     line: usize,
-    ArcEnds { from, to }: ArcEnds,
+    from: Position,
+    to: Position,
     radius: f64,
     left: bool,
 ) -> Result<[f64; 2], GcodeError> {
     let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
     let way_mm = dx.hypot(dy);
     let radius_mm = radius.abs();
-    // Beyond rounding, the ends are too far apart.
+    // The ends are too far apart by more than rounding.
     if way_mm <= 0.0 || 0.5 * way_mm > radius_mm + ARC_TOLERANCE.0 + ARC_TOLERANCE.1 * radius_mm {
         return Err(GcodeError::Radius { line, radius_mm, way_mm });
     }

@@ -1,18 +1,19 @@
-//! What a line means after the lines before it.
+//! The modal state of a program and the motion of a line.
 
-use super::arc::{ArcEnds, Centre, Move};
+use super::arc::{Centre, Move};
 use super::error::GcodeError;
 use super::words::Word;
 use crate::plan::position::distance;
 
-/// Codes that change nothing about the path: the plane XY, no compensation, a work
-/// offset, exact and continuous paths, no cycle, feeds a minute.
+/// Codes that do not change the path: the plane XY, no compensation, a work offset, exact stop and
+/// continuous path, no cycle, feed per minute (numbers as in ISO 6983-1 and RS274/NGC).
 const IGNORED_CODES: [f64; 9] = [17.0, 40.0, 49.0, 54.0, 61.0, 64.0, 80.0, 90.1, 94.0];
+/// Millimetres in an inch. By definition (international yard, 1959).
 const MM_PER_INCH: f64 = 25.4;
 const KNOWN_CODES: &str = "G0 to G3, G20, G21, G90 and G91 are, and what moves nothing is passed over \
                      (jobs/README.md has all words); write the move with these";
 
-/// What a line moves.
+/// Motion of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LineMotion {
     /// Nothing.
@@ -31,7 +32,7 @@ enum Mode {
     Left,
 }
 
-/// What holds from one line to the next.
+/// The state that carries over from one line to the next.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModalState {
     here: [f64; 3],
@@ -42,7 +43,7 @@ pub struct ModalState {
     ended: bool,
 }
 
-/// A line's places and centre, in the program's units.
+/// Positions and centre of a line, in the program's units.
 #[derive(Debug, Clone, Copy, Default)]
 struct LineWords {
     axes: [Option<f64>; 3],
@@ -51,7 +52,7 @@ struct LineWords {
 }
 
 impl ModalState {
-    /// At a place \[mm\], absolute and in millimetres.
+    /// At a position \[mm\], absolute and in millimetres.
     pub fn new(here: [f64; 3]) -> Self {
         Self { here, mode: None, relative: false, unit_mm: 1.0, feed: None, ended: false }
     }
@@ -61,20 +62,19 @@ impl ModalState {
         self.ended
     }
 
-    /// Takes a line's words.
+    /// Interprets the words of a line.
     pub fn interpret(&mut self, line: usize, words: &[Word]) -> Result<LineMotion, GcodeError> {
-        // Units go before the numbers that are in them.
+        // Units apply to all numbers of the line.
         for word in words.iter().filter(|word| word.letter == 'G') {
             self.apply_code(line, word.number, words)?;
         }
         let mut line_words = LineWords::default();
         for Word { letter, number } in words.iter().copied() {
             match letter {
-                'X' => line_words.axes[0] = Some(number),
-                'Y' => line_words.axes[1] = Some(number),
-                'Z' => line_words.axes[2] = Some(number),
-                'I' => line_words.centre_offset[0] = Some(number),
-                'J' => line_words.centre_offset[1] = Some(number),
+                'X'..='Z' => line_words.axes[letter as usize - 'X' as usize] = Some(number),
+                'I' | 'J' => {
+                    line_words.centre_offset[letter as usize - 'I' as usize] = Some(number)
+                }
                 'R' => line_words.radius = Some(number),
                 'F' if number > 0.0 => self.feed = Some(number * self.unit_mm / 60.0),
                 'F' => return Err(GcodeError::Feed { line, found: number }),
@@ -96,7 +96,7 @@ impl ModalState {
             21.0 => self.unit_mm = 1.0,
             90.0 => self.relative = false,
             91.0 => self.relative = true,
-            // Setting the feeder's own count moves nothing.
+            // Setting the extruder's position moves nothing.
             92.0 if words.iter().all(|word| matches!(word.letter, 'G' | 'E'))
                 && words.iter().any(|word| word.letter == 'E') => {}
             _ if IGNORED_CODES.contains(&number) => {}
@@ -116,28 +116,28 @@ impl ModalState {
         let mode = self.mode.ok_or_else(|| GcodeError::Code { line, found: found(), wanted })?;
         let from = self.here;
         let mut to = from;
-        for (to, line_words) in to.iter_mut().zip(line_words.axes) {
-            let Some(line_words) = line_words else { continue };
-            *to = line_words * self.unit_mm + if self.relative { *to } else { 0.0 };
+        for (to, number) in to.iter_mut().zip(line_words.axes) {
+            let Some(number) = number else { continue };
+            *to = number * self.unit_mm + if self.relative { *to } else { 0.0 };
         }
         self.here = to;
         let moved = match mode {
             Mode::Rapid => return Ok(LineMotion::Rapid),
-            // A line to where the nozzle is lays nothing.
+            // A line of length zero lays no bead.
             Mode::Line if distance(from, to) <= 0.0 => return Ok(LineMotion::None),
             Mode::Line => Move::Line { from, to },
             Mode::Left | Mode::Right => {
                 let centre = self.centre(line, line_words)?;
-                Move::arc(line, ArcEnds { from, to }, centre, mode == Mode::Left)?
+                Move::arc(line, from, to, centre, mode == Mode::Left)?
             }
         };
-        Ok(LineMotion::Laid(moved, self.feed.ok_or(GcodeError::NoFeed { line })?))
+        Ok(LineMotion::Laid(moved, self.feed.ok_or(GcodeError::NoFeed(line))?))
     }
 
     fn centre(&self, line: usize, line_words: &LineWords) -> Result<Centre, GcodeError> {
         match (line_words.centre_offset, line_words.radius) {
             ([None, None], Some(radius)) => Ok(Centre::Radius(radius * self.unit_mm)),
-            ([None, None], None) => Err(GcodeError::NoCentre { line }),
+            ([None, None], None) => Err(GcodeError::NoCentre(line)),
             (beside, _) => Ok(Centre::Offset(beside.map(|c| c.unwrap_or(0.0) * self.unit_mm))),
         }
     }

@@ -1,4 +1,4 @@
-//! A line of G-code as words.
+//! Splits a line of G-code into words.
 
 use super::error::GcodeError;
 
@@ -11,8 +11,8 @@ pub struct Word {
     pub number: f64,
 }
 
-/// The words of a line without its comments. What stands after `%` or `/` at its start, a
-/// checksum and line numbers are left out.
+/// The words of a line without comments. Lines that begin with `%` or `/`, checksums and line numbers
+/// are ignored.
 pub fn words(line: usize, text: &str) -> Result<Vec<Word>, GcodeError> {
     let plain = uncomment(line, text)?;
     let plain = plain.trim();
@@ -47,7 +47,7 @@ fn uncomment(line: usize, text: &str) -> Result<String, GcodeError> {
     let mut rest = text.split(';').next().unwrap_or_default();
     while let Some((before, after)) = rest.split_once('(') {
         plain.push_str(before);
-        let (_, after) = after.split_once(')').ok_or(GcodeError::Comment { line })?;
+        let (_, after) = after.split_once(')').ok_or(GcodeError::Comment(line))?;
         rest = after;
     }
     plain.push_str(rest);
@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_need_no_spaces_and_comments_are_none() {
+    fn words_need_no_spaces_and_comments_are_ignored() {
         let found = words(1, "n10 g1x-1.5 Y+2(over (there)F.5 ; X9").unwrap();
         let expected = [('G', 1.0), ('X', -1.5), ('Y', 2.0), ('F', 0.5)];
         assert_eq!(found, expected.map(|(letter, number)| Word { letter, number }));
@@ -68,10 +68,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_word_is_told() {
+    fn what_is_not_a_word_is_an_error() {
         let error = words(7, "G1 X").unwrap_err();
         assert_eq!(error, GcodeError::Word { line: 7, found: "X".to_owned() });
-        assert_eq!(words(3, "G1 (open").unwrap_err(), GcodeError::Comment { line: 3 });
+        assert_eq!(words(3, "G1 (open").unwrap_err(), GcodeError::Comment(3));
         assert!(words(1, "G1 X1.2.3").is_err());
     }
 }

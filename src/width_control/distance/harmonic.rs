@@ -3,17 +3,17 @@
 
 use std::f64::consts::TAU;
 
-/// Standard deviation of either part before anything is seen.
-const AMPLITUDE_SIGMA: f64 = 0.03;
-/// How far either part wanders in a radian, as a standard deviation.
-const DRIFT_PER_ROOT_RAD: f64 = 2e-4;
-/// Standard deviation of the level before anything is seen.
-const LEVEL_SIGMA: f64 = 0.1;
-/// Most of a squared surprise that counts, for an outlier is no evidence.
-const MAX_SQUARED_INNOVATION: f64 = 9.0;
+use super::width_model::MAX_SQUARED_INNOVATION;
 
-/// Level, the part that is now at its largest, and the part a quarter of a
-/// period ahead of it.
+/// Initial standard deviation of either component, as a fraction of the width: pulsations of
+/// a pump or a screw are a few percent.
+const AMPLITUDE_SIGMA: f64 = 0.03;
+/// Random walk of either component: standard deviation over a radian. A larger value follows
+/// a pulsation that changes and takes more noise for one.
+const DRIFT_PER_ROOT_RAD: f64 = 2e-4;
+/// Initial standard deviation of the level.
+const LEVEL_SIGMA: f64 = 0.1;
+/// State: the level, the in-phase component and the component a quarter of a period ahead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Harmonic {
     rad_per_s: f64,
@@ -24,7 +24,7 @@ pub struct Harmonic {
 }
 
 impl Harmonic {
-    /// Of a period \[s\]; infinite for a level alone.
+    /// For a period \[s\]; infinite for a level alone.
     pub fn new(period_s: f64) -> Self {
         let rad_per_s = TAU / period_s;
         let part = if rad_per_s > 0.0 { AMPLITUDE_SIGMA * AMPLITUDE_SIGMA } else { 0.0 };
@@ -37,8 +37,8 @@ impl Harmonic {
         TAU / self.rad_per_s
     }
 
-    /// Takes a value `dt_s` after the last one, and says how well it was
-    /// foretold: the logarithm of its likelihood.
+    /// Adds a value `dt_s` after the last one. Returns its log likelihood, without the
+    /// constant.
     pub fn update(&mut self, dt_s: f64, value: f64, variance: f64, drift: f64) -> f64 {
         if !self.known {
             self.known = true;
@@ -51,8 +51,8 @@ impl Harmonic {
         let total = (h0 + h1).max(0.0) + variance;
         let by = value - self.parts[0] - self.parts[1];
         let squared = (by * by / total).min(MAX_SQUARED_INNOVATION);
-        let most = (MAX_SQUARED_INNOVATION * total).sqrt();
-        let by = by.clamp(-most, most) / total;
+        let limit = (MAX_SQUARED_INNOVATION * total).sqrt();
+        let by = by.clamp(-limit, limit) / total;
         self.parts = [self.parts[0] + h0 * by, self.parts[1] + h1 * by, self.parts[2] + h2 * by];
         self.covariance = [
             p00 - h0 * h0 / total,
@@ -87,7 +87,7 @@ impl Harmonic {
         ];
     }
 
-    /// The level has changed, and it is known to a variance by how much.
+    /// The level has changed by a size that is known to a variance.
     pub fn shift(&mut self, by: f64, variance: f64) {
         self.parts[0] += by;
         self.covariance[0] += variance;
@@ -99,7 +99,7 @@ impl Harmonic {
         cos * self.parts[1] + sin * self.parts[2]
     }
 
-    /// Its mean between two such moments.
+    /// Its mean between two such times.
     pub fn mean(&self, from_s: f64, to_s: f64) -> f64 {
         let half = 0.5 * self.rad_per_s * (to_s - from_s);
         let kept = if half.abs() < 1e-9 { 1.0 } else { libm::sin(half) / half };
@@ -112,28 +112,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_pulsation_of_its_period_is_foretold() {
+    fn a_pulsation_of_its_period_is_predicted() {
         let period = 2.3;
         let truth = |at: f64| 3.7 + 0.02 * (TAU * at / period + 0.4).sin();
-        let mut tone = Harmonic::new(period);
+        let mut harmonic = Harmonic::new(period);
         for k in 0..600 {
-            let _ = tone.update(0.02, truth(0.02 * f64::from(k)), 1e-6, 1e-9);
+            let _ = harmonic.update(0.02, truth(0.02 * f64::from(k)), 1e-6, 1e-9);
         }
         let last = 0.02 * 599.0;
         for ahead in [0.0, 0.5, 1.3] {
-            let found = tone.at(ahead) - (truth(last + ahead) - 3.7);
+            let found = harmonic.at(ahead) - (truth(last + ahead) - 3.7);
             assert!(found.abs() < 1e-4, "{ahead}: {found}");
         }
-        let mean = tone.mean(0.2, 0.2 + period);
+        let mean = harmonic.mean(0.2, 0.2 + period);
         assert!(mean.abs() < 1e-9, "a whole period has no mean: {mean}");
     }
 
     #[test]
     fn a_level_alone_has_no_pulsation() {
-        let mut tone = Harmonic::new(f64::INFINITY);
+        let mut harmonic = Harmonic::new(f64::INFINITY);
         for k in 0..100 {
-            let _ = tone.update(0.1, 3.7 + 0.01 * f64::from(k % 2), 1e-4, 1e-8);
+            let _ = harmonic.update(0.1, 3.7 + 0.01 * f64::from(k % 2), 1e-4, 1e-8);
         }
-        assert_eq!(tone.at(0.3), 0.0);
+        assert_eq!(harmonic.at(0.3), 0.0);
     }
 }

@@ -1,135 +1,136 @@
-//! Where the camera really looks: several offsets about the stated one, each weighted by how
+//! The camera's true offset: several offsets about the stated one, each weighted by how
 //! well it predicts the widths when the speed changes (a multiple-model estimate).
 
 use super::speed_history::SpeedHistory;
+use super::width_model::MAX_SQUARED_INNOVATION;
 
-/// Offsets that are believed in beside each other.
+/// Number of hypotheses; with the step they reach 24 % to either side of the stated offset.
 const HYPOTHESES: usize = 9;
-/// Steps between them, as a share of the offset.
+/// Step between neighbouring hypotheses, as a fraction of the stated offset.
 const FACTOR_STEP: f64 = 0.06;
-/// Standard deviation that is always left, as a share: offsets are told to no
-/// better than a part of a step.
+/// Smallest standard deviation of the estimate, as a fraction: a third of a step, below which
+/// the grid does not resolve offsets.
 const MIN_SIGMA: f64 = 0.02;
-/// Relative standard deviation of the flow that no model tells.
+/// Relative standard deviation of the flow that no model predicts, added to the noise of each
+/// width. A smaller value trusts one change of speed more.
 const UNMODELLED_SIGMA: f64 = 0.01;
-/// How much faster than it is said to the level may drift here, as variances:
-/// an exponent that is not known yet is taken up by it.
+/// Factor on the variance of the flow's drift. The level of a hypothesis has no exponent of
+/// its own, so an error of the exponent has to be taken up by the level.
 const DRIFT_FACTOR: f64 = 16.0;
-/// Most that one width may speak against an offset, as a squared surprise.
-const MAX_SQUARED_INNOVATION: f64 = 9.0;
-/// Share of a surprise that is taken into the unrest.
+/// Gain of the moving average of the normalised innovation squared.
 const NIS_GAIN: f64 = 0.05;
-/// Least evidence that an offset keeps, so that it can come back.
-const MIN_EVIDENCE: f64 = -12.0;
+/// Smallest log likelihood of a hypothesis relative to the best one, so that it can recover.
+const MIN_LOG_LIKELIHOOD: f64 = -12.0;
 
-/// Offsets with the evidence for each, as shares of the one that was told.
+/// Hypotheses of the offset, as factors on the stated offset, with their likelihoods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OffsetEstimator {
     hypotheses: [OffsetHypothesis; HYPOTHESES],
     factor: f64,
     sigma: f64,
-    /// Squared surprise of the best guess: where even it is off, something else
-    /// moves the flow, and nothing is learnt.
+    /// Moving average of the normalised innovation squared of the best hypothesis. Where it
+    /// exceeds 1, something other than the offset moves the width, and likelihoods count less.
     nis: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct OffsetHypothesis {
     factor: f64,
-    evidence: f64,
-    /// ln A and its variance, if a width has been seen.
+    log_likelihood: f64,
+    /// ln A and its variance, after the first width.
     level: Option<(f64, f64)>,
 }
 
-/// A width before it has a place.
+/// A width, before it is attributed to a position of the bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OffsetObservation {
-    /// The nozzle's path at the capture \[mm\].
+    /// Path of the nozzle at the capture \[mm\].
     pub nozzle_path: f64,
-    /// The offset that was told \[mm\].
+    /// The stated offset \[mm\].
     pub offset: f64,
     /// Length of the gauge \[mm\].
     pub gauge: f64,
-    /// Logarithm of the width, freed of the pulsation.
+    /// Logarithm of the width, less the pulsation.
     pub ln_width: f64,
-    /// Exponent that is believed.
+    /// Exponent b.
     pub exponent: f64,
     /// Variance of `ln_width`.
     pub variance: f64,
-    /// Variance by which ln A has drifted since the last width.
+    /// Variance of the drift of ln A since the last width.
     pub drift: f64,
 }
 
 impl OffsetEstimator {
-    /// The offset that was told, to within a share of it (standard deviation).
+    /// Around the stated offset, with a relative standard deviation.
     pub fn new(sigma: f64) -> Self {
         let mut number = 0.0;
-        let guesses = [(); HYPOTHESES].map(|()| {
+        let hypotheses = [(); HYPOTHESES].map(|()| {
             #[expect(clippy::cast_precision_loss, reason = "a handful")]
             let away = (number - (HYPOTHESES / 2) as f64) * FACTOR_STEP;
             number += 1.0;
-            let evidence = -0.5 * (away / sigma.max(1e-3)).powi(2);
-            OffsetHypothesis { factor: 1.0 + away, evidence, level: None }
+            let log_likelihood = -0.5 * (away / sigma.max(1e-3)).powi(2);
+            OffsetHypothesis { factor: 1.0 + away, log_likelihood, level: None }
         });
-        let mut hypothesis = Self { hypotheses: guesses, factor: 1.0, sigma, nis: 1.0 };
-        hypothesis.summarise();
-        hypothesis
+        let mut estimator = Self { hypotheses, factor: 1.0, sigma, nis: 1.0 };
+        estimator.summarise();
+        estimator
     }
 
-    /// A new bead: the levels are new, the evidence stays.
+    /// A new bead: the levels are new, the likelihoods stay.
     pub fn begin_bead(&mut self) {
-        for guess in &mut self.hypotheses {
-            guess.level = None;
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.level = None;
         }
     }
 
-    /// The offset as a share of the one that was told.
+    /// The offset over the stated one.
     pub fn factor(&self) -> f64 {
         self.factor
     }
 
-    /// Standard deviation of that share.
+    /// Standard deviation of the factor.
     pub fn sigma(&self) -> f64 {
         self.sigma
     }
 
-    /// Takes a width, if the trail reaches to where every offset has it.
-    pub fn update(&mut self, history: &SpeedHistory, sight: &OffsetObservation) {
-        let half = 0.5 * sight.gauge;
+    /// Adds a width, if the speed is known at the position of every hypothesis.
+    pub fn update(&mut self, history: &SpeedHistory, observation: &OffsetObservation) {
+        let half = 0.5 * observation.gauge;
         let mut plain = [0.0; HYPOTHESES];
-        for (guess, plain) in self.hypotheses.iter().zip(&mut plain) {
-            let position = sight.nozzle_path - sight.offset * guess.factor;
+        for (hypothesis, plain) in self.hypotheses.iter().zip(&mut plain) {
+            let position = observation.nozzle_path - observation.offset * hypothesis.factor;
             let Some(speed) = history.mean_over(position - half, position + half) else { return };
-            *plain = sight.ln_width + sight.exponent * speed.mean;
+            *plain = observation.ln_width + observation.exponent * speed.mean;
         }
-        let noise = sight.variance + UNMODELLED_SIGMA * UNMODELLED_SIGMA;
+        let noise = observation.variance + UNMODELLED_SIGMA * UNMODELLED_SIGMA;
         let (scale, best) = (self.nis.max(1.0), self.best());
-        let mut left = self.nis;
-        for (guess, plain) in self.hypotheses.iter_mut().zip(plain) {
-            let innovation = guess.update(plain, noise, DRIFT_FACTOR * sight.drift);
-            if guess.evidence >= best {
-                left = innovation;
+        let mut best_nis = self.nis;
+        for (hypothesis, plain) in self.hypotheses.iter_mut().zip(plain) {
+            let innovation = hypothesis.update(plain, noise, DRIFT_FACTOR * observation.drift);
+            if hypothesis.log_likelihood >= best {
+                best_nis = innovation;
             }
-            guess.evidence -= 0.5 * (innovation / scale).min(MAX_SQUARED_INNOVATION);
+            hypothesis.log_likelihood -= 0.5 * (innovation / scale).min(MAX_SQUARED_INNOVATION);
         }
-        self.nis += NIS_GAIN * (left.min(25.0) - self.nis);
+        self.nis += NIS_GAIN * (best_nis.min(25.0) - self.nis);
         self.summarise();
     }
 
     fn best(&self) -> f64 {
-        self.hypotheses.iter().map(|guess| guess.evidence).fold(f64::NEG_INFINITY, f64::max)
+        let all = self.hypotheses.iter().map(|hypothesis| hypothesis.log_likelihood);
+        all.fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Mean and standard deviation over all offsets.
+    /// Mean and standard deviation over all hypotheses.
     fn summarise(&mut self) {
         let best = self.best();
         let (mut total, mut mean, mut square) = (0.0, 0.0, 0.0);
-        for guess in &mut self.hypotheses {
-            guess.evidence = (guess.evidence - best).max(MIN_EVIDENCE);
-            let weight = libm::exp(guess.evidence);
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.log_likelihood = (hypothesis.log_likelihood - best).max(MIN_LOG_LIKELIHOOD);
+            let weight = libm::exp(hypothesis.log_likelihood);
             total += weight;
-            mean += weight * guess.factor;
-            square += weight * guess.factor * guess.factor;
+            mean += weight * hypothesis.factor;
+            square += weight * hypothesis.factor * hypothesis.factor;
         }
         self.factor = mean / total;
         let variance = (square / total - self.factor * self.factor).max(0.0);
@@ -138,7 +139,7 @@ impl OffsetEstimator {
 }
 
 impl OffsetHypothesis {
-    /// The surprise, squared and in variances; 0 for the first.
+    /// The normalised innovation squared; 0 for the first width.
     fn update(&mut self, plain: f64, noise: f64, drift: f64) -> f64 {
         let Some((level, variance)) = self.level else {
             self.level = Some((plain, noise));
@@ -148,8 +149,8 @@ impl OffsetHypothesis {
         let total = variance + noise;
         let by = plain - level;
         let gain = variance / total;
-        let most = 4.0 * total.sqrt();
-        self.level = Some((level + gain * by.clamp(-most, most), variance * (1.0 - gain)));
+        let limit = 4.0 * total.sqrt();
+        self.level = Some((level + gain * by.clamp(-limit, limit), variance * (1.0 - gain)));
         by * by / total
     }
 }
@@ -158,11 +159,11 @@ impl OffsetHypothesis {
 mod tests {
     use super::*;
 
-    /// A bead of exponent 0.25 whose speed steps once, seen `offset` behind the
-    /// nozzle by a law that was told 88.4 mm.
-    fn seen(offset: f64) -> OffsetEstimator {
+    /// A bead of exponent 0.25 whose speed steps once, measured `offset` behind the nozzle
+    /// where 88.4 mm is stated.
+    fn estimated(offset: f64) -> OffsetEstimator {
         let mut history = SpeedHistory::new(100.0, 1e3);
-        let mut hypothesis = OffsetEstimator::new(0.1);
+        let mut estimator = OffsetEstimator::new(0.1);
         for k in 0..400 {
             let at = 0.02 * f64::from(k);
             let (first, second) = (at.min(3.0), (at - 3.0).max(0.0));
@@ -171,7 +172,7 @@ mod tests {
             history.report(at, path, speed, 1.0);
             let position = path - offset;
             let Some(truth) = history.mean_over(position - 6.35, position + 6.35) else { continue };
-            hypothesis.update(
+            estimator.update(
                 &history,
                 &OffsetObservation {
                     nozzle_path: path,
@@ -184,26 +185,26 @@ mod tests {
                 },
             );
         }
-        hypothesis
+        estimator
     }
 
     #[test]
-    fn a_step_of_the_speed_tells_the_offset() {
+    fn a_step_of_the_speed_identifies_the_offset() {
         for fraction in [0.8, 0.88, 1.0, 1.12, 1.2] {
-            let hypothesis = seen(88.4 * fraction);
+            let estimator = estimated(88.4 * fraction);
             assert!(
-                (hypothesis.factor() - fraction).abs() < 0.04,
+                (estimator.factor() - fraction).abs() < 0.04,
                 "{fraction}: {}",
-                hypothesis.factor()
+                estimator.factor()
             );
-            assert!(hypothesis.sigma() < 0.06, "{fraction}: {}", hypothesis.sigma());
+            assert!(estimator.sigma() < 0.06, "{fraction}: {}", estimator.sigma());
         }
     }
 
     #[test]
-    fn without_a_change_of_speed_what_was_told_holds() {
-        let hypothesis = OffsetEstimator::new(0.1);
-        assert!((hypothesis.factor() - 1.0).abs() < 1e-12);
-        assert!(hypothesis.sigma() > 0.08);
+    fn without_a_change_of_speed_the_stated_offset_holds() {
+        let estimator = OffsetEstimator::new(0.1);
+        assert!((estimator.factor() - 1.0).abs() < 1e-12);
+        assert!(estimator.sigma() > 0.08);
     }
 }

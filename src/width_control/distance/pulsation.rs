@@ -1,26 +1,28 @@
-//! A steady pulsation of pump or screw: pulsations of many periods are believed
-//! in beside each other, and beside none, each as far as the widths bear it out.
+//! A steady pulsation of the flow by pump or screw: a multiple-model filter with one
+//! hypothesis for each period and one without a pulsation, weighted by their likelihoods.
 
 use super::harmonic::Harmonic;
 
-/// Shortest and longest period \[s\].
+/// Shortest and longest period \[s\]. Shorter ones are blurred by the gauge; longer ones are
+/// followed as drift.
 const PERIODS_S: (f64, f64) = (0.55, 10.0);
-/// Step from one period to the next.
+/// Ratio of one period to the next. Over the memory of 10 periods a harmonic that is off by
+/// half a step, 1 %, loses a tenth of a period.
 const PERIOD_RATIO: f64 = 1.02;
-/// Evidence that a pulsation has against it at first, as the logarithm of
-/// odds: a step that was not recognised looks like one for a while.
+/// Prior log odds against a pulsation. A flow change that is not yet detected looks like one
+/// for a while; a smaller value accepts it, a larger one finds a pulsation later.
 const PRIOR_LOG_ODDS: f64 = 14.0;
-/// Periods over which evidence is forgotten.
+/// Time constant of the log likelihood ratios, in periods.
 const MEMORY_PERIODS: f64 = 10.0;
-/// A pulsation that counts for less than this is left out.
+/// Hypotheses of smaller weight are left out of sums, for speed.
 const MIN_WEIGHT: f64 = 1e-3;
-/// Longest time between two widths over which a phase is kept \[s\].
+/// Longest time between two widths over which phases are kept \[s\].
 const LONGEST_GAP_S: f64 = 3.0;
 
-/// Pulsations of all periods.
+/// Hypotheses of all periods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlowPulsation {
-    /// A level that does not pulsate, against which all others are held.
+    /// The hypothesis without a pulsation.
     level_only: Harmonic,
     harmonics: Vec<HarmonicHypothesis>,
     last_s: Option<f64>,
@@ -30,28 +32,26 @@ pub struct FlowPulsation {
 struct HarmonicHypothesis {
     harmonic: Harmonic,
     /// Logarithm of its likelihood over that of no pulsation.
-    evidence: f64,
+    log_ratio: f64,
     weight: f64,
 }
 
 impl FlowPulsation {
-    /// Nothing has been seen.
+    /// Before the first width.
     pub fn new() -> Self {
         let (shortest, longest) = PERIODS_S;
         let periods = std::iter::successors(Some(shortest), |period| Some(period * PERIOD_RATIO));
-        let tones = periods
-            .take_while(|period| *period < longest)
-            .map(|period| HarmonicHypothesis {
-                harmonic: Harmonic::new(period),
-                evidence: 0.0,
-                weight: 0.0,
-            })
-            .collect();
-        Self { level_only: Harmonic::new(f64::INFINITY), harmonics: tones, last_s: None }
+        let hypothesis = |period| HarmonicHypothesis {
+            harmonic: Harmonic::new(period),
+            log_ratio: 0.0,
+            weight: 0.0,
+        };
+        let harmonics = periods.take_while(|period| *period < longest).map(hypothesis).collect();
+        Self { level_only: Harmonic::new(f64::INFINITY), harmonics, last_s: None }
     }
 
-    /// Takes ln A as a width shows it, of bead laid at a time \[s\], with its
-    /// variance, and the variance by which it has drifted since the last one.
+    /// Adds ln A of one width, of bead laid at a time \[s\], with its variance, and the
+    /// variance of the drift since the last one.
     pub fn update(&mut self, laid_s: f64, value: f64, variance: f64, drift: f64) {
         let passed = self.last_s.map_or(0.0, |last| laid_s - last);
         if passed < 0.0 {
@@ -62,58 +62,57 @@ impl FlowPulsation {
         }
         self.last_s = Some(laid_s);
         let plain = self.level_only.update(passed, value, variance, drift);
-        let mut most = PRIOR_LOG_ODDS;
-        for believed in &mut self.harmonics {
-            let likely = believed.harmonic.update(passed, value, variance, drift);
-            let kept = 1.0 - (passed / (MEMORY_PERIODS * believed.harmonic.period_s())).min(1.0);
-            believed.evidence = (believed.evidence * kept + likely - plain).max(-PRIOR_LOG_ODDS);
-            most = most.max(believed.evidence);
+        let mut largest = PRIOR_LOG_ODDS;
+        for hypothesis in &mut self.harmonics {
+            let likely = hypothesis.harmonic.update(passed, value, variance, drift);
+            let kept = 1.0 - (passed / (MEMORY_PERIODS * hypothesis.harmonic.period_s())).min(1.0);
+            hypothesis.log_ratio =
+                (hypothesis.log_ratio * kept + likely - plain).max(-PRIOR_LOG_ODDS);
+            largest = largest.max(hypothesis.log_ratio);
         }
-        self.update_weights(most);
-    }
-
-    fn update_weights(&mut self, most: f64) {
-        let mut total = libm::exp(PRIOR_LOG_ODDS - most);
-        for believed in &mut self.harmonics {
-            let less = believed.evidence - most;
-            believed.weight = if less > -PRIOR_LOG_ODDS { libm::exp(less) } else { 0.0 };
-            total += believed.weight;
+        let mut total = libm::exp(PRIOR_LOG_ODDS - largest);
+        for hypothesis in &mut self.harmonics {
+            let less = hypothesis.log_ratio - largest;
+            hypothesis.weight = if less > -PRIOR_LOG_ODDS { libm::exp(less) } else { 0.0 };
+            total += hypothesis.weight;
         }
-        for believed in &mut self.harmonics {
-            believed.weight /= total;
+        for hypothesis in &mut self.harmonics {
+            hypothesis.weight /= total;
         }
     }
 
-    /// The flow has changed by a share that is known to a variance.
+    /// The flow has changed: ln A by `by`, known to a variance.
     pub fn shift(&mut self, by: f64, variance: f64) {
         self.level_only.shift(by, variance);
-        for believed in &mut self.harmonics {
-            believed.harmonic.shift(by, variance);
+        for hypothesis in &mut self.harmonics {
+            hypothesis.harmonic.shift(by, variance);
         }
     }
 
-    /// Its share in the width of bead laid at a time \[s\].
+    /// The pulsation of ln w of bead laid at a time \[s\].
     pub fn at(&self, at_s: f64) -> f64 {
         let Some(last) = self.last_s else { return 0.0 };
-        self.likely().map(|believed| believed.weight * believed.harmonic.at(at_s - last)).sum()
+        self.likely()
+            .map(|hypothesis| hypothesis.weight * hypothesis.harmonic.at(at_s - last))
+            .sum()
     }
 
-    /// The mean of that over some time \[s\].
+    /// Its mean over a time \[s\].
     pub fn mean(&self, from_s: f64, to_s: f64) -> f64 {
         let Some(last) = self.last_s else { return 0.0 };
-        let mean = |tone: &Harmonic| tone.mean(from_s - last, to_s - last);
-        self.likely().map(|believed| believed.weight * mean(&believed.harmonic)).sum()
+        let mean = |harmonic: &Harmonic| harmonic.mean(from_s - last, to_s - last);
+        self.likely().map(|hypothesis| hypothesis.weight * mean(&hypothesis.harmonic)).sum()
     }
 
-    /// Its period \[s\], where there is likely one.
+    /// Period of the most probable pulsation \[s\]; none where no pulsation is more probable.
     pub fn period_s(&self) -> Option<f64> {
-        let all: f64 = self.likely().map(|believed| believed.weight).sum();
+        let all: f64 = self.likely().map(|hypothesis| hypothesis.weight).sum();
         let best = self.likely().max_by(|a, b| a.weight.total_cmp(&b.weight))?;
         (all > 0.5).then(|| best.harmonic.period_s())
     }
 
     fn likely(&self) -> impl Iterator<Item = &HarmonicHypothesis> {
-        self.harmonics.iter().filter(|believed| believed.weight > MIN_WEIGHT)
+        self.harmonics.iter().filter(|hypothesis| hypothesis.weight > MIN_WEIGHT)
     }
 }
 
@@ -136,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pulsation_is_found_within_five_periods_and_foretold() {
+    fn a_pulsation_is_found_within_five_periods_and_predicted() {
         for (period, seconds) in [(1.0, 5), (2.6, 13), (6.0, 30)] {
             let wave = |at: f64| 0.03 * (TAU * at / period + 1.1).sin();
             let (pulsation, last) = watch(seconds, 50, wave);

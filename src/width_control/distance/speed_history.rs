@@ -2,34 +2,32 @@
 
 use std::collections::VecDeque;
 
-/// Most nodes that are kept, whatever the reach: at the fastest reports and a speed that
-/// never stands still more than ten minutes.
+/// Largest number of nodes, whatever the length: more than ten minutes at 50 reports a second
+/// with two nodes each.
 const MAX_NODES: usize = 1 << 16;
-/// Speed below which a bead has no width that the model could tell \[mm/s\].
+/// Speed below which the width model says nothing \[mm/s\]; it keeps ln v finite.
 const SLOWEST_MM_PER_S: f64 = 0.5;
-/// Share of the speed within which two reports tell the same speed.
+/// Relative difference within which two reports count as the same speed.
 const SAME_SPEED_RATIO: f64 = 1e-3;
-/// How far the arrival of reports may lie beside what path and speeds tell \[s\]: within
-/// it the speeds are believed, for a report that is a millisecond late makes several
-/// percent of a speed by the path.
+/// Largest jitter of the reports' arrival \[s\]. Within it the reported speeds are used: a
+/// report that is a millisecond late changes a speed from the path by several percent.
 const MAX_REPORT_DELAY_S: f64 = 0.03;
-/// Time within which such a difference is forgotten \[s\].
+/// Time constant in which an arrival's delay decays \[s\].
 const DELAY_TIME_CONSTANT_S: f64 = 1.0;
-/// Shortest time that a piece can have taken, as a share of that between its reports.
+/// Shortest duration of a piece, as a fraction of the time between its reports.
 const MIN_TIME_RATIO: f64 = 0.1;
-/// Share of the flow below which there is no bead to speak of.
+/// Flow ratio below which there is no bead to speak of; it keeps ln finite.
 const MIN_FLOW_RATIO: f64 = 0.01;
-/// A piece shorter than this is none \[mm\].
+/// Pieces that are shorter are left out \[mm\], against division by zero.
 const MIN_PIECE_MM: f64 = 1e-9;
-/// Share of the time between reports below which a piece is none.
+/// Pieces of a smaller fraction of the time between reports are left out.
 const MIN_PIECE_RATIO: f64 = 1e-6;
-/// Time within which a flow that stays other than the start speed's becomes the usual one
-/// \[s\].
+/// Time constant in which a flow other than at the start speed becomes the usual one \[s\].
 const FLOW_TIME_CONSTANT_S: f64 = 3.0;
 
-/// Speeds over path. Between two reports the speed is taken to have gone from
-/// one to the other at once, at the place that the way between them tells. Where speeds and
-/// path do not belong together, beyond what late reports explain, the path tells.
+/// Speed over path. Between two reports the speed is taken to change once, at the position
+/// that the path between them implies. Where speeds and path contradict each other by more than
+/// jitter of the reports explains, the path is used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpeedHistory {
     reference_mm_per_s: f64,
@@ -38,30 +36,27 @@ pub struct SpeedHistory {
     nodes: VecDeque<Node>,
     /// Speed of the newest report \[mm/s\].
     speed: f64,
-    /// Time by which reports have come early, by path and speeds \[s\].
+    /// How early reports have arrived, judged by path and speeds \[s\].
     early_s: f64,
     flow_ratio: f64,
-    /// Logarithm of the flow's share as it has been of late.
+    /// Slow average of the logarithm of the flow ratio.
     usual_ln_flow: Option<f64>,
-    /// How far the flow has been from that of late.
+    /// Decaying maximum of the distance from that average.
     flow_excursion: f64,
 }
 
-/// The end of a piece laid at one speed, with sums from the trail's start:
-/// means over any stretch are differences of them.
+/// The end of a piece laid at one speed, with integrals from the history's start: means over
+/// any segment are differences of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Node {
     path_mm: f64,
     at_s: f64,
-    /// Integral of ln(v/v₀) over the path \[mm\].
-    sum: f64,
-    /// Integral of its square \[mm\].
-    square: f64,
-    /// Integral of how far the flow had been changed \[mm\].
-    flow_change: f64,
+    /// Integrals over the path of ln(v/v₀), of its square, and of the change of the flow
+    /// \[mm\].
+    sums: [f64; 3],
 }
 
-/// ln(v/v₀) over a stretch.
+/// ln(v/v₀) over a segment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LnSpeed {
     /// Mean.
@@ -71,13 +66,12 @@ pub struct LnSpeed {
 }
 
 impl SpeedHistory {
-    /// An empty one, for a reference speed v₀ \[mm/s\], that knows the last piece of bead as
-    /// long as its reach \[mm\].
-    pub fn new(reference_mm_per_s: f64, reach_mm: f64) -> Self {
+    /// An empty history, for a reference speed v₀ \[mm/s\], of a length \[mm\].
+    pub fn new(reference_mm_per_s: f64, length_mm: f64) -> Self {
         let reference_mm_per_s = reference_mm_per_s.max(SLOWEST_MM_PER_S);
         Self {
             reference_mm_per_s,
-            kept_mm: reach_mm,
+            kept_mm: length_mm,
             nodes: VecDeque::new(),
             speed: 0.0,
             early_s: 0.0,
@@ -87,23 +81,22 @@ impl SpeedHistory {
         }
     }
 
-    /// Forgets all.
+    /// Discards all reports.
     pub fn clear(&mut self) {
         self.nodes.clear();
         self.early_s = 0.0;
     }
 
-    /// Whether there is no stretch yet.
+    /// Whether there is no segment yet.
     pub fn is_empty(&self) -> bool {
         self.nodes.len() < 2
     }
 
-    /// Takes a report: time \[s\], path \[mm\], speed \[mm/s\] and the share of
-    /// the flow that came meanwhile. A path that falls, or a time that does not
-    /// grow, begins a new trail.
-    pub fn report(&mut self, at_s: f64, path_mm: f64, speed: f64, flow_share: f64) {
+    /// Adds a report: time \[s\], path \[mm\], speed \[mm/s\] and the flow over the one at the
+    /// start speed. A path that falls, or a time that does not grow, clears the history.
+    pub fn report(&mut self, at_s: f64, path_mm: f64, speed: f64, flow_ratio: f64) {
         let last = self.nodes.back().copied();
-        self.flow(flow_share, last.map_or(0.0, |last| at_s - last.at_s));
+        self.flow(flow_ratio, last.map_or(0.0, |last| at_s - last.at_s));
         let before = std::mem::replace(&mut self.speed, speed.max(SLOWEST_MM_PER_S));
         match last {
             Some(last) if path_mm >= last.path_mm && at_s > last.at_s => {
@@ -111,19 +104,13 @@ impl SpeedHistory {
             }
             _ => {
                 self.clear();
-                self.nodes.push_back(Node {
-                    path_mm,
-                    at_s,
-                    sum: 0.0,
-                    square: 0.0,
-                    flow_change: 0.0,
-                });
+                self.nodes.push_back(Node { path_mm, at_s, sums: [0.0; 3] });
             }
         }
     }
 
-    fn flow(&mut self, fraction: f64, passed_s: f64) {
-        self.flow_ratio = fraction.max(MIN_FLOW_RATIO);
+    fn flow(&mut self, ratio: f64, passed_s: f64) {
+        self.flow_ratio = ratio.max(MIN_FLOW_RATIO);
         let ln = libm::log(self.flow_ratio);
         let usual = self.usual_ln_flow.unwrap_or(ln);
         let kept = libm::exp(-passed_s.max(0.0) / FLOW_TIME_CONSTANT_S);
@@ -131,35 +118,35 @@ impl SpeedHistory {
         self.usual_ln_flow = Some(ln + kept * (usual - ln));
     }
 
-    /// How far the flow is from the start speed's, unless it has long been so, as a
-    /// logarithm.
+    /// Distance of the flow from the one at the start speed, as a logarithm; 0 where it has
+    /// been constant for long.
     fn flow_change(&self) -> f64 {
         libm::log(self.flow_ratio).abs().min(self.flow_excursion)
     }
 
-    /// Adds the way from the last report to this one as a piece at each speed.
+    /// Adds the path from the last report to this one as a piece at each speed.
     fn extend(&mut self, last: &Node, at_s: f64, path_mm: f64, before: f64) {
-        let (way, time) = (path_mm - last.path_mm, at_s - last.at_s);
+        let (length, time) = (path_mm - last.path_mm, at_s - last.at_s);
         let changed = (self.speed - before).abs() > SAME_SPEED_RATIO * before;
-        // Share of the time that was driven at the speed before.
+        // Fraction of the time at the speed before.
         let fraction =
-            if changed { (way / time - self.speed) / (before - self.speed) } else { 0.0 };
+            if changed { (length / time - self.speed) / (before - self.speed) } else { 0.0 };
         let fraction = fraction.clamp(0.0, 1.0);
         let driven = before * fraction + self.speed * (1.0 - fraction);
-        let first = way * before * fraction / driven.max(MIN_PIECE_MM);
-        let took = self.duration(time, way / driven.max(MIN_PIECE_MM));
+        let first = length * before * fraction / driven.max(MIN_PIECE_MM);
+        let took = self.duration(time, length / driven.max(MIN_PIECE_MM));
         if first > MIN_PIECE_MM && fraction > MIN_PIECE_RATIO {
             self.push(last.path_mm + first, last.at_s + fraction * time, first / (fraction * took));
         }
-        if way - first > MIN_PIECE_MM && fraction < 1.0 - MIN_PIECE_RATIO {
-            self.push(path_mm, at_s, (way - first) / ((1.0 - fraction) * took));
+        if length - first > MIN_PIECE_MM && fraction < 1.0 - MIN_PIECE_RATIO {
+            self.push(path_mm, at_s, (length - first) / ((1.0 - fraction) * took));
         } else if let Some(node) = self.nodes.back_mut() {
             node.at_s = at_s;
         }
     }
 
-    /// Time that a way took \[s\], from that between its reports and that by the speeds: the
-    /// latter, as far as reports that came early or late explain the difference.
+    /// Duration of a piece of path \[s\]: that by the speeds, as far as jitter of the reports
+    /// explains the difference to the time between them.
     fn duration(&mut self, time: f64, by_speed: f64) -> f64 {
         let early = self.early_s * libm::exp(-time / DELAY_TIME_CONSTANT_S);
         self.early_s = (early + by_speed - time).clamp(-MAX_REPORT_DELAY_S, MAX_REPORT_DELAY_S);
@@ -170,60 +157,58 @@ impl SpeedHistory {
         let Some(last) = self.nodes.back().copied() else { return };
         let speed = speed.max(SLOWEST_MM_PER_S) / self.flow_ratio;
         let ln = libm::log(speed / self.reference_mm_per_s);
-        let way = path_mm - last.path_mm;
+        let length = path_mm - last.path_mm;
         let needless = |node: &Node| node.path_mm < path_mm - self.kept_mm;
         while self.nodes.len() >= MAX_NODES || self.nodes.get(1).is_some_and(needless) {
             self.nodes.pop_front();
         }
-        let (sum, square) = (last.sum + ln * way, last.square + ln * ln * way);
-        let changed = last.flow_change + self.flow_change() * way;
-        self.nodes.push_back(Node { path_mm, at_s, sum, square, flow_change: changed });
+        let [sum, square, change] = last.sums;
+        let change = change + self.flow_change() * length;
+        let sums = [sum + ln * length, square + ln * ln * length, change];
+        self.nodes.push_back(Node { path_mm, at_s, sums });
     }
 
-    /// When the nozzle was at a place \[s\]; `None` beyond what is known.
+    /// When the nozzle was at a position \[s\]; `None` outside the history.
     pub fn time_at(&self, path_mm: f64) -> Option<f64> {
         let (before, after, fraction) = self.bracket(path_mm)?;
         Some(before.at_s + (after.at_s - before.at_s) * fraction)
     }
 
-    /// Speed over a stretch of path \[mm\]; `None` unless all of it is known.
+    /// Speed over a segment of path \[mm\]; `None` unless all of it is known.
     pub fn mean_over(&self, from_mm: f64, to_mm: f64) -> Option<LnSpeed> {
         let (from, to) = (self.sums(from_mm)?, self.sums(to_mm)?);
         let length = to_mm - from_mm;
         if length <= MIN_PIECE_MM {
             let (before, after, _) = self.bracket(from_mm)?;
-            let mean = (after.sum - before.sum) / (after.path_mm - before.path_mm);
+            let mean = (after.sums[0] - before.sums[0]) / (after.path_mm - before.path_mm);
             return Some(LnSpeed { mean, variance: 0.0 });
         }
-        let mean = (to.0 - from.0) / length;
-        let variance = ((to.1 - from.1) / length - mean * mean).max(0.0);
+        let mean = (to[0] - from[0]) / length;
+        let variance = ((to[1] - from[1]) / length - mean * mean).max(0.0);
         Some(LnSpeed { mean, variance })
     }
 
-    /// How far the flow had been changed over a stretch of path \[mm\], as a logarithm;
-    /// `None` unless all of it is known.
+    /// Mean change of the flow over a segment of path \[mm\], as a logarithm; `None` unless all
+    /// of it is known.
     pub fn flow_change_over(&self, from_mm: f64, to_mm: f64) -> Option<f64> {
-        let at = |path_mm: f64| {
-            let (before, after, fraction) = self.bracket(path_mm)?;
-            Some(before.flow_change + (after.flow_change - before.flow_change) * fraction)
-        };
-        Some((at(to_mm)? - at(from_mm)?) / (to_mm - from_mm).max(MIN_PIECE_MM))
+        let change = self.sums(to_mm)?[2] - self.sums(from_mm)?[2];
+        Some(change / (to_mm - from_mm).max(MIN_PIECE_MM))
     }
 
-    /// Speed over a stretch that is moved until it lies within what is known.
+    /// Speed over a segment that is shifted into the history.
     pub fn mean_near(&self, from_mm: f64, to_mm: f64) -> Option<LnSpeed> {
         let (first, last) = (self.nodes.front()?, self.nodes.back()?);
         let shift = (first.path_mm - from_mm).max(0.0) - (to_mm - last.path_mm).max(0.0);
         self.mean_over(from_mm + shift, to_mm + shift)
     }
 
-    fn sums(&self, path_mm: f64) -> Option<(f64, f64)> {
+    fn sums(&self, path_mm: f64) -> Option<[f64; 3]> {
         let (before, after, fraction) = self.bracket(path_mm)?;
-        let between = |a: f64, b: f64| a + (b - a) * fraction;
-        Some((between(before.sum, after.sum), between(before.square, after.square)))
+        let (a, b) = (before.sums, after.sums);
+        Some([0, 1, 2].map(|i| a[i] + (b[i] - a[i]) * fraction))
     }
 
-    /// The nodes on either side of a place, and the share of the way between.
+    /// The nodes on either side of a position, and the fraction of the path between.
     fn bracket(&self, path_mm: f64) -> Option<(&Node, &Node, f64)> {
         let after = self.nodes.partition_point(|node| node.path_mm <= path_mm);
         let after = after.min(self.nodes.len().saturating_sub(1));
@@ -237,8 +222,7 @@ impl SpeedHistory {
 mod tests {
     use super::*;
 
-    /// A robot that drives at one speed and changes to another at once, after
-    /// 1.03 s, with reports every 0.1 s.
+    /// A robot whose speed steps after 1.03 s, with reports every 0.1 s.
     fn stepped(first: f64, second: f64) -> SpeedHistory {
         let mut history = SpeedHistory::new(100.0, 1e3);
         for k in 0..40 {
@@ -251,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_between_two_reports_lies_where_the_way_tells() {
+    fn a_change_between_two_reports_lies_where_the_path_implies() {
         let history = stepped(100.0, 50.0);
         let before = history.mean_over(80.0, 103.0).unwrap();
         let after = history.mean_over(103.0, 120.0).unwrap();
@@ -265,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn reports_that_come_early_or_late_change_no_speed() {
+    fn jitter_of_the_reports_changes_no_speed() {
         let mut history = SpeedHistory::new(100.0, 1e3);
         for k in 0..400_u32 {
             // Up to 3 ms late, of 20.
@@ -281,20 +265,20 @@ mod tests {
     }
 
     #[test]
-    fn a_speed_that_the_path_belies_is_not_believed() {
-        // It reports what it was told, and moves at three quarters of it.
+    fn a_speed_that_contradicts_the_path_is_not_used() {
+        // It reports its setpoint, and moves at three quarters of it.
         let mut history = SpeedHistory::new(100.0, 1e3);
         for k in 0..400_u32 {
             let at_s = 0.02 * f64::from(k);
             history.report(at_s, 75.0 * at_s, 100.0, 1.0);
         }
         let seen = history.mean_over(400.0, 420.0).unwrap();
-        // To the 3 % that reports which came later and later would explain.
+        // To the 3 % that a growing delay of the reports would explain.
         assert!((seen.mean - 0.75_f64.ln()).abs() < 0.035, "{seen:?}");
     }
 
     #[test]
-    fn beyond_what_is_known_there_is_nothing() {
+    fn outside_the_history_there_is_no_speed() {
         let history = stepped(100.0, 50.0);
         assert_eq!(history.mean_over(-1.0, 10.0), None);
         assert_eq!(history.mean_over(200.0, 900.0), None);
@@ -304,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_robot_is_known_as_far_back_as_the_camera_looks() {
+    fn the_history_of_a_slow_robot_reaches_its_length() {
         // 5 mm/s, never the same, reported every 20 ms: 300 mm are a minute.
         let mut history = SpeedHistory::new(100.0, 300.0);
         let (mut path, mut most) = (0.0, 0);
@@ -321,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_that_falls_begins_a_new_trail() {
+    fn a_path_that_falls_clears_the_history() {
         let mut history = stepped(100.0, 50.0);
         history.report(10.0, 0.0, 80.0, 1.0);
         assert!(history.is_empty());
@@ -330,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_that_stands_leaves_no_trace() {
+    fn a_robot_that_stands_adds_nothing() {
         let mut history = stepped(100.0, 50.0);
         let end = 103.0 + 50.0 * (3.9 - 1.03);
         for k in 1..20 {

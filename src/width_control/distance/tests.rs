@@ -1,13 +1,12 @@
-//! The law on a bead whose truth is known.
+//! Control by distance on a simulated bead.
 
 use super::*;
 use crate::sim::hash;
 
-/// A robot that does at once what it is told, and a bead of a power of its
-/// speed times a flow.
+/// A robot without lag, and a bead whose width is a power of its speed times a flow.
 struct Line {
-    law: DistanceController,
-    /// What the frames between two places show in place of the bead.
+    controller: DistanceController,
+    /// Glare: the width that frames between two paths show in place of the bead.
     glare: Option<(f64, f64, f64)>,
     now_s: f64,
     path: f64,
@@ -38,10 +37,10 @@ impl Line {
     fn new(settings: DistanceSettings) -> Self {
         let controller = DistanceController::new(settings);
         let (now_s, path, speed, frame) = (0.0, 0.0, 112.5, 0);
-        Self { law: controller, glare: None, now_s, path, speed, laid: Vec::new(), frame }
+        Self { controller, glare: None, now_s, path, speed, laid: Vec::new(), frame }
     }
 
-    /// One frame's time: lay, report, see, and command from 200 mm on.
+    /// One frame: lay, report, measure, and command from 200 mm on.
     fn step(
         &mut self,
         exponent: f64,
@@ -53,7 +52,7 @@ impl Line {
         self.path += self.speed * STEP_S;
         self.now_s += STEP_S;
         let (path, speed) = (Mm::new(self.path).unwrap(), MmPerS::new(self.speed).unwrap());
-        self.law.reported(Stamp::from_secs(self.now_s), path, speed, 1.0);
+        self.controller.reported(Stamp::from_secs(self.now_s), path, speed, 1.0);
         let seen = self.seen();
         let trace = seen.map(|seen| {
             self.frame += 1;
@@ -61,15 +60,15 @@ impl Line {
             let glares = self.glare.filter(|(from, to, _)| (*from..*to).contains(&self.path));
             let seen = glares.map_or(seen, |(_, _, width)| width);
             let (width, sigma) = (Mm::new(seen + noise * random), Mm::new(noise));
-            let measured = MeasuredWidth { width: width.unwrap(), sigma: sigma.unwrap() };
-            self.law.measured(path, measured, Mm::constant(TARGET))
+            let measured = WidthReading { width: width.unwrap(), sigma: sigma.unwrap() };
+            self.controller.measured(path, measured, Mm::constant(TARGET))
         });
         let (now, target) = (Stamp::from_secs(self.now_s), Mm::constant(TARGET));
         if self.path >= 200.0
-            && let Some(speed) = self.law.speed(target, now, Span::from_secs(STEP_S))
+            && let Some(speed) = self.controller.speed(target, now, Span::from_secs(STEP_S))
         {
             self.speed = speed.get().clamp(60.0, 150.0);
-            self.law.engaged(path);
+            self.controller.engaged(path);
         }
         trace
     }
@@ -96,7 +95,7 @@ impl Line {
 }
 
 #[test]
-fn the_first_speed_is_right_to_the_exponent_and_what_is_left_goes_when_it_is_seen() {
+fn the_first_speed_is_right_to_the_exponent_and_the_rest_is_corrected_when_measured() {
     let mut line = Line::new(settings());
     while line.path < 230.0 {
         let _ = line.step(0.22, |_| 1.0, 0.0);
@@ -109,7 +108,7 @@ fn the_first_speed_is_right_to_the_exponent_and_what_is_left_goes_when_it_is_see
 }
 
 #[test]
-fn a_step_of_the_flow_is_told_from_an_outlier_and_answered() {
+fn a_step_of_the_flow_is_distinguished_from_an_outlier_and_corrected() {
     let mut line = Line::new(settings());
     let flow = |at: f64| if at > 900.0 { 1.08 } else { 1.0 };
     let mut seen = Vec::new();
@@ -121,52 +120,52 @@ fn a_step_of_the_flow_is_told_from_an_outlier_and_answered() {
 }
 
 #[test]
-fn a_bead_that_does_not_answer_the_speed_contradicts_the_model() {
+fn a_bead_that_does_not_follow_the_speed_contradicts_the_model() {
     let mut line = Line::new(settings());
     let flow = |at: f64| if at > 600.0 { 1.05 } else { 1.0 };
     let mut found = None;
     while line.path < 2500.0 {
         let _ = line.step(0.0, flow, 0.36);
-        found = found.or(line.law.fallback_reason());
+        found = found.or(line.controller.fallback_reason());
     }
     assert_eq!(found, Some(FallbackReason::ModelContradicted));
 }
 
 #[test]
-fn a_model_that_holds_is_never_contradicted() {
+fn a_correct_model_is_never_contradicted() {
     for exponent in [0.2, 0.25, 0.35] {
         let mut line = Line::new(settings());
         let flow = |at: f64| if (700.0..1400.0).contains(&at) { 0.95 } else { 1.0 };
         while line.path < 3000.0 {
             let _ = line.step(exponent, flow, 0.36);
-            assert_eq!(line.law.fallback_reason(), None, "at {} mm", line.path);
+            assert_eq!(line.controller.fallback_reason(), None, "at {} mm", line.path);
         }
     }
 }
 
 #[test]
-fn another_bead_begins_with_what_was_learnt() {
+fn the_next_bead_begins_with_the_estimates_of_the_last() {
     let mut line = Line::new(settings());
     while line.path < 900.0 {
         let _ = line.step(0.22, |_| 1.0, 0.36);
     }
     let mut next = Line::new(settings());
-    next.law = line.law.clone();
-    next.law.begin_bead();
+    next.controller = line.controller.clone();
+    next.controller.begin_bead();
     let now = Stamp::from_secs(20.0);
-    let speed = next.law.speed(Mm::constant(TARGET), now, Span::from_secs(0.2)).unwrap();
+    let speed = next.controller.speed(Mm::constant(TARGET), now, Span::from_secs(0.2)).unwrap();
     let width = 38.61 * (speed.get() / 112.5).powf(-0.22);
     assert!((width - TARGET).abs() < 0.3, "{width}");
 }
 
 #[test]
-fn nothing_seen_is_no_speed_and_a_width_without_a_path_is_no_reason() {
+fn without_a_width_there_is_no_speed_and_without_a_path_no_match() {
     let mut controller = DistanceController::new(settings());
     let (now, span) = (Stamp::START, Span::from_secs(0.2));
     assert_eq!(controller.speed(Mm::constant(TARGET), now, span), None);
     let trace = controller.measured(
         Mm::constant(100.0),
-        MeasuredWidth { width: Mm::constant(40.0), sigma: Mm::constant(0.3) },
+        WidthReading { width: Mm::constant(40.0), sigma: Mm::constant(0.3) },
         Mm::constant(42.0),
     );
     assert_eq!(trace.use_of_width, WidthUse::NotMatched);
@@ -174,7 +173,7 @@ fn nothing_seen_is_no_speed_and_a_width_without_a_path_is_no_reason() {
 }
 
 #[test]
-fn a_change_that_was_a_glare_is_undone_by_the_first_widths_after_it() {
+fn a_change_by_glare_is_reverted_by_the_first_widths_after_it() {
     let mut line = Line::new(settings());
     line.glare = Some((900.0, 912.0, 47.0));
     let mut seen = Vec::new();
@@ -184,35 +183,35 @@ fn a_change_that_was_a_glare_is_undone_by_the_first_widths_after_it() {
     }
     assert!(seen.contains(&WidthUse::Change), "{seen:?}");
     assert!(line.error().abs() < 0.4, "{}", line.error());
-    // What was laid while it was believed is little.
+    // Little bead was laid meanwhile.
     let off = |(at, width): &&(f64, f64)| *at > 600.0 && (width - TARGET).abs() > 0.6;
     let off = line.laid.iter().filter(off).count();
     assert!(off < 12, "{off} frames");
 }
 
 #[test]
-fn a_width_that_was_laid_while_the_flow_was_changed_far_says_nothing() {
+fn a_width_of_a_large_flow_transient_is_not_matched() {
     let mut controller = DistanceController::new(settings());
     let mut uses = Vec::new();
     for k in 0..200_u32 {
         let at = f64::from(k) * STEP_S;
-        // A flow that comes up within a second, and no plan that knows it exactly.
+        // A flow that rises within two seconds.
         let fraction = (at / 2.0).clamp(0.1, 1.0);
         let path = Mm::new(100.0 * at).unwrap();
         controller.reported(Stamp::from_secs(at), path, MmPerS::constant(100.0), fraction);
-        let width = MeasuredWidth { width: Mm::constant(30.0), sigma: Mm::constant(0.3) };
+        let width = WidthReading { width: Mm::constant(30.0), sigma: Mm::constant(0.3) };
         uses.push(controller.measured(path, width, Mm::constant(TARGET)).use_of_width);
     }
     let bead_at = |path: f64| (path + OFFSET) / (100.0 * STEP_S);
-    let (early, late) = (bead_at(100.0), bead_at(260.0));
+    let (rising, steady) = (bead_at(100.0), bead_at(260.0));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "frames")]
     let at = |frame: f64| uses[frame as usize];
-    assert_eq!(at(early), WidthUse::NotMatched);
-    assert_ne!(at(late), WidthUse::NotMatched);
+    assert_eq!(at(rising), WidthUse::NotMatched);
+    assert_ne!(at(steady), WidthUse::NotMatched);
 }
 
 #[test]
-fn the_law_is_the_same_for_a_bead_of_any_width() {
+fn control_does_not_depend_on_the_width_of_the_bead() {
     let driven = |at: f64| if at.rem_euclid(400.0) < 200.0 { 100.0 } else { 110.0 };
     for times in [0.05, 1.0, 6.0] {
         let mut controller = DistanceController::new(DistanceSettings {
@@ -222,14 +221,14 @@ fn the_law_is_the_same_for_a_bead_of_any_width() {
         let mut seen = Vec::new();
         let mut path = 0.0;
         for k in 0..600_u32 {
-            // Told apart by 10 % of the speed every 200 mm.
+            // The speed changes by 10 % every 200 mm.
             let speed = driven(path);
             path += speed * STEP_S;
             let now = Stamp::from_secs(STEP_S * f64::from(k + 1));
             controller.reported(now, Mm::constant(path), MmPerS::constant(speed), 1.0);
             let position = path - OFFSET;
             let laid = driven(position);
-            // Widths of bead laid at two speeds are not what this is about.
+            // Gauges with both speeds are left out.
             let near = (position - GAUGE).div_euclid(200.0) != (position + GAUGE).div_euclid(200.0);
             if position < GAUGE || near {
                 continue;
@@ -238,7 +237,7 @@ fn the_law_is_the_same_for_a_bead_of_any_width() {
             let width = times * 40.0 * (f64::powf(laid / 112.5, -0.25) + 0.009 * random);
             let (width, sigma) = (Mm::constant(width), Mm::constant(times * 40.0 * 0.009));
             let trace =
-                controller.measured(Mm::constant(path), MeasuredWidth { width, sigma }, width);
+                controller.measured(Mm::constant(path), WidthReading { width, sigma }, width);
             assert!(controller.is_ready());
             seen.push((trace.use_of_width, trace.level_mm.get() / times));
         }
@@ -249,36 +248,35 @@ fn the_law_is_the_same_for_a_bead_of_any_width() {
 }
 
 #[test]
-fn a_bead_that_is_never_paired_with_a_speed_is_told() {
+fn a_bead_that_is_never_matched_to_a_speed_falls_back() {
     // The gauge reaches beyond the nozzle.
     let near = DistanceSettings { offset: Mm::constant(5.0), ..settings() };
     let mut line = Line::new(near);
     while line.path < OFFSET + 60.0 {
         let _ = line.step(0.25, |_| 1.0, 0.36);
     }
-    assert_eq!(line.law.fallback_reason(), None);
+    assert_eq!(line.controller.fallback_reason(), None);
     while line.path < OFFSET + 120.0 {
         let _ = line.step(0.25, |_| 1.0, 0.36);
     }
-    assert_eq!(line.law.fallback_reason(), Some(FallbackReason::Unmatched));
-    line.law.begin_bead();
-    assert_eq!(line.law.fallback_reason(), None);
+    assert_eq!(line.controller.fallback_reason(), Some(FallbackReason::Unmatched));
+    line.controller.begin_bead();
+    assert_eq!(line.controller.fallback_reason(), None);
 }
 
 #[test]
-fn a_speed_that_is_not_reported_exactly_teaches_no_exponent() {
+fn noise_of_the_reported_speed_does_not_change_the_exponent() {
     let mut controller = DistanceController::new(settings());
     let mut path = 0.0;
     for k in 0..800_u32 {
-        // Half a percent of noise on the reports, milliseconds on their arrival, and widths
-        // that are exact.
-        let [speed, late] = hash::normal_pair(hash::mix(&[7, u64::from(k)]));
+        // 0.5 % of noise on the reported speeds, milliseconds on their arrival, exact widths.
+        let [speed, delay] = hash::normal_pair(hash::mix(&[7, u64::from(k)]));
         path += 112.5 * STEP_S;
-        let at = Stamp::from_secs(STEP_S * f64::from(k + 1) + 1e-3 * late.abs().min(5.0));
+        let at = Stamp::from_secs(STEP_S * f64::from(k + 1) + 1e-3 * delay.abs().min(5.0));
         let reported = MmPerS::constant(112.5 * (1.0 + 0.005 * speed));
         controller.reported(at, Mm::constant(path), reported, 1.0);
         if path > OFFSET + GAUGE {
-            let exact = MeasuredWidth { width: Mm::constant(38.61), sigma: Mm::constant(0.002) };
+            let exact = WidthReading { width: Mm::constant(38.61), sigma: Mm::constant(0.002) };
             let trace = controller.measured(Mm::constant(path), exact, exact.width);
             assert!((trace.exponent - 0.25).abs() < 0.01, "{k}: {trace:?}");
             assert!((trace.offset_mm.get() - OFFSET).abs() < 0.05 * OFFSET, "{k}: {trace:?}");

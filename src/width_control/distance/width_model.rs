@@ -3,48 +3,52 @@
 
 use nalgebra::{Matrix2, RowVector2, Vector2};
 
-/// Standard deviation of b before anything is known, as a share of it.
+/// Initial standard deviation of b, as a fraction of it. Exponents of beads range from 0.2 to
+/// 1, so a stated one may be far off.
 const EXPONENT_SIGMA: f64 = 0.4;
-/// How far b may move from what it was begun with, as factors.
+/// Range of b, as factors on its initial value. Too small an exponent makes control too
+/// aggressive, so the lower end is nearer.
 const EXPONENT_RANGE: (f64, f64) = (0.7, 2.2);
-/// Standard deviation of b above which it is hardly known, as a share of what it was begun
-/// with.
+/// Standard deviation of b above which it counts as poorly known, as a fraction of its initial
+/// value.
 const POORLY_KNOWN_SIGMA: f64 = 0.1;
-/// Difference of ln v to what is known best from which a width tells of b: a robot's
-/// reports are not that exact, and what they scatter would pull b towards 0.
+/// Smallest difference of ln v to the best known speed at which a width updates b: noise of
+/// reported speeds below it would bias b towards 0 (errors in variables).
 const MIN_LN_SPEED_DIFFERENCE: f64 = 0.015;
-/// Standard deviation that b keeps at an end of its range, as a share of it.
+/// Largest standard deviation of b at an end of its range, as a fraction of its initial value.
 const SIGMA_AT_RANGE_END: f64 = 0.3;
-/// Standard deviation that the first width leaves in ln A: it may be an
-/// outlier itself.
+/// Standard deviation of ln A after the first width, which may be an outlier.
 const FIRST_SIGMA: f64 = 0.1;
-/// Standard deviation by which ln A may have changed from one bead to the next.
+/// Standard deviation of the change of ln A from one bead to the next.
 const BETWEEN_BEADS_SIGMA: f64 = 0.02;
-/// Squared distance, in variances, from which a width is far from what was
-/// foretold.
+/// Normalised innovation squared from which a width is an outlier: 3.5 standard deviations,
+/// once in 2150 widths by chance.
 const OUTLIER_SQUARED: f64 = 12.25;
+/// Normalised innovations squared are clipped at three standard deviations in likelihoods and
+/// slow averages, so that one outlier decides nothing.
+pub const MAX_SQUARED_INNOVATION: f64 = 9.0;
 
 /// ln A and b with their covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WidthModel {
     ln_width: f64,
     exponent: f64,
-    /// Variance of ln A, covariance, variance of b.
+    /// Variance of ln A, covariance of ln A and b, variance of b.
     covariance: [f64; 3],
     prior_exponent: f64,
     learns_exponent: bool,
     known: bool,
-    place_mm: Option<f64>,
+    position_mm: Option<f64>,
 }
 
-/// A width beside the speed that it was laid at.
+/// A width with the speed at which it was laid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WidthObservation {
-    /// ln w, freed of the pulsation and of the speed's spread within the gauge.
+    /// ln w, less the pulsation, corrected for changes of speed within the gauge.
     pub ln_width: f64,
     /// ln(v/v₀).
     pub ln_speed: f64,
-    /// Share of the gauge that lies beyond the last change of the flow.
+    /// Fraction of the gauge that lies after the last change of the flow.
     pub covered_fraction: f64,
     /// ln A before that change.
     pub old_ln_width: f64,
@@ -52,29 +56,29 @@ pub struct WidthObservation {
     pub variance: f64,
 }
 
-/// A width against what was foretold.
+/// Innovation: measured less predicted ln w.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WidthInnovation {
-    /// Difference of the logarithms.
+    /// The difference.
     pub by: f64,
-    /// Variance that it should have.
+    /// Its predicted variance.
     pub variance: f64,
 }
 
 impl WidthInnovation {
-    /// The difference squared, in variances.
+    /// Normalised innovation squared.
     pub fn normalised_squared(&self) -> f64 {
         self.by * self.by / self.variance
     }
 
-    /// Whether it is hardly ever that large.
+    /// Whether the width is an outlier.
     pub fn is_outlier(&self) -> bool {
         self.normalised_squared() > OUTLIER_SQUARED
     }
 }
 
 impl WidthModel {
-    /// Nothing is known but b, which is held where it does not learn.
+    /// Before the first width. b is constant where `learns` is false.
     pub fn new(exponent: f64, learns: bool) -> Self {
         let sigma = if learns { EXPONENT_SIGMA * exponent } else { 0.0 };
         Self {
@@ -84,17 +88,17 @@ impl WidthModel {
             prior_exponent: exponent,
             learns_exponent: learns,
             known: false,
-            place_mm: None,
+            position_mm: None,
         }
     }
 
-    /// A new bead, whose flow may be another.
+    /// A new bead, whose flow may differ.
     pub fn begin_bead(&mut self) {
-        self.place_mm = None;
+        self.position_mm = None;
         self.covariance[0] += BETWEEN_BEADS_SIGMA * BETWEEN_BEADS_SIGMA;
     }
 
-    /// Whether a width has been seen.
+    /// Whether there was a first width.
     pub fn is_known(&self) -> bool {
         self.known
     }
@@ -109,77 +113,76 @@ impl WidthModel {
         self.exponent
     }
 
-    /// Whether little is known yet of b but what it was begun with.
+    /// Whether b is still poorly known.
     pub fn exponent_is_uncertain(&self) -> bool {
         self.covariance[2] > (POORLY_KNOWN_SIGMA * self.prior_exponent).powi(2)
     }
 
-    /// Whether a width of bead laid at ln(v/v₀) tells of b: its speed lies clearly off the
-    /// one of which the width is known best.
+    /// Whether a width of bead laid at ln(v/v₀) informs b: its speed differs clearly from the
+    /// speed at which the width is known best.
     pub fn informs_exponent(&self, ln_speed: f64) -> bool {
         let [_, both, exponent] = self.covariance;
         exponent > 0.0 && (ln_speed - both / exponent).abs() > MIN_LN_SPEED_DIFFERENCE
     }
 
-    /// Standard deviation of ln A for the exponent that is believed.
+    /// Standard deviation of ln A, given b.
     pub fn sigma(&self) -> f64 {
         let [level, both, exponent] = self.covariance;
         let known = if exponent > 0.0 { both * both / exponent } else { 0.0 };
         (level - known).max(0.0).sqrt()
     }
 
-    /// Variance of ln w that is foretold at ln(v/v₀).
+    /// Variance of the predicted ln w at ln(v/v₀).
     pub fn predicted_variance(&self, ln_speed: f64) -> f64 {
         let [level, both, exponent] = self.covariance;
         (level - 2.0 * ln_speed * both + ln_speed * ln_speed * exponent).max(0.0)
     }
 
-    /// ln w that is foretold at ln(v/v₀).
+    /// Predicted ln w at ln(v/v₀).
     pub fn predicted(&self, ln_speed: f64) -> f64 {
         self.ln_width - self.exponent * ln_speed
     }
 
-    /// Way from the newest place to another \[mm\].
+    /// Path from the newest position to another \[mm\]; 0 backwards.
     pub fn distance_to(&self, position_mm: f64) -> f64 {
-        self.place_mm.map_or(0.0, |last| (position_mm - last).max(0.0))
+        self.position_mm.map_or(0.0, |last| (position_mm - last).max(0.0))
     }
 
-    /// Goes on to a place, over which ln A has drifted by a variance.
+    /// Advances to a position; ln A has drifted by a variance.
     pub fn advance_to(&mut self, position_mm: f64, drift: f64) {
-        self.place_mm = Some(self.place_mm.map_or(position_mm, |last| last.max(position_mm)));
+        self.position_mm = Some(self.position_mm.map_or(position_mm, |last| last.max(position_mm)));
         self.covariance[0] += drift;
     }
 
-    /// What was seen against what was foretold.
-    pub fn innovation(&self, sight: &WidthObservation) -> WidthInnovation {
+    /// The innovation of an observation.
+    pub fn innovation(&self, observation: &WidthObservation) -> WidthInnovation {
         let [level, both, exponent] = self.covariance;
-        let [by_level, by_exponent] = sight.slopes();
-        let predicted = self.ln_width * sight.covered_fraction
-            + sight.old_ln_width * (1.0 - sight.covered_fraction)
-            - self.exponent * sight.ln_speed;
+        let [by_level, by_exponent] = observation.slopes();
+        let predicted = self.ln_width * observation.covered_fraction
+            + observation.old_ln_width * (1.0 - observation.covered_fraction)
+            - self.exponent * observation.ln_speed;
         let spread = by_level * by_level * level
             + 2.0 * by_level * by_exponent * both
             + by_exponent * by_exponent * exponent;
         WidthInnovation {
-            by: sight.ln_width - predicted,
-            variance: spread.max(0.0) + sight.variance,
+            by: observation.ln_width - predicted,
+            variance: spread.max(0.0) + observation.variance,
         }
     }
 
-    /// Takes a width. Where b is not to learn it stays, and what it leaves open
-    /// is kept in mind (Schmidt 1966).
-    pub fn update(&mut self, sight: &WidthObservation, learns: bool) {
+    /// Updates the model with a width. Where `learns` is false b stays and its uncertainty is
+    /// considered (Schmidt 1966).
+    pub fn update(&mut self, observation: &WidthObservation, learns: bool) {
         if !self.known {
-            self.begin(sight);
+            self.begin(observation);
             return;
         }
-        let innovation = self.innovation(sight);
-        // No single width moves what is hardly known by more than half: it may
-        // be an outlier.
-        let spread = innovation.variance - sight.variance;
-        let noise = sight.variance.max(spread);
+        let innovation = self.innovation(observation);
+        // The gain is at most one half: a single width may be an outlier.
+        let spread = innovation.variance - observation.variance;
+        let noise = observation.variance.max(spread);
         let total = spread + noise;
-        let [a, b] = sight.slopes();
+        let [a, b] = observation.slopes();
         let [level, both, exponent] = self.covariance;
         let by_level = (level * a + both * b) / total;
         let by_exponent =
@@ -191,18 +194,18 @@ impl WidthModel {
         self.keep_exponent_in_range();
     }
 
-    fn begin(&mut self, sight: &WidthObservation) {
-        let u = sight.ln_speed;
-        self.ln_width = sight.ln_width + self.exponent * u;
+    fn begin(&mut self, observation: &WidthObservation) {
+        let u = observation.ln_speed;
+        self.ln_width = observation.ln_width + self.exponent * u;
         let exponent = self.covariance[2];
         self.covariance = [FIRST_SIGMA * FIRST_SIGMA + u * u * exponent, u * exponent, exponent];
         self.known = true;
     }
 
-    /// At an end of its range b is what it is, and A what goes with it.
+    /// Clamps b to its range, and moves ln A along the correlation.
     fn keep_exponent_in_range(&mut self) {
-        let (least, most) = EXPONENT_RANGE;
-        let within = self.exponent.clamp(least * self.prior_exponent, most * self.prior_exponent);
+        let (min, max) = EXPONENT_RANGE;
+        let within = self.exponent.clamp(min * self.prior_exponent, max * self.prior_exponent);
         let [level, both, exponent] = self.covariance;
         if within == self.exponent || exponent <= 0.0 {
             return;
@@ -214,7 +217,7 @@ impl WidthModel {
         self.covariance = [(level - slope * both).max(0.0), 0.0, kept];
     }
 
-    /// The same after the flow has changed by a share.
+    /// The same after ln A has changed by a size that is known to a variance.
     pub fn after_change(mut self, size: f64, variance: f64) -> Self {
         self.ln_width += size;
         self.covariance[0] += variance;
@@ -223,13 +226,13 @@ impl WidthModel {
 }
 
 impl WidthObservation {
-    /// By how much what is foretold grows with ln A and with b.
+    /// Derivatives of the predicted ln w with respect to ln A and b.
     fn slopes(&self) -> [f64; 2] {
         [self.covered_fraction, -self.ln_speed]
     }
 }
 
-/// Covariance after an update with any gain (Joseph's form).
+/// Covariance after an update with any gain (Joseph form).
 fn updated_covariance(spread: [f64; 3], gain: [f64; 2], slopes: [f64; 2], noise: f64) -> [f64; 3] {
     let [level, both, exponent] = spread;
     let before = Matrix2::new(level, both, both, exponent);
@@ -243,7 +246,7 @@ fn updated_covariance(spread: [f64; 3], gain: [f64; 2], slopes: [f64; 2], noise:
 mod tests {
     use super::*;
 
-    fn sight(ln_width: f64, ln_speed: f64) -> WidthObservation {
+    fn observed(ln_width: f64, ln_speed: f64) -> WidthObservation {
         WidthObservation {
             ln_width,
             ln_speed,
@@ -254,62 +257,68 @@ mod tests {
     }
 
     #[test]
-    fn two_speeds_tell_both_numbers() {
-        let mut level = WidthModel::new(0.25, true);
+    fn two_speeds_identify_level_and_exponent() {
+        let mut model = WidthModel::new(0.25, true);
         for k in 0..40 {
-            level.advance_to(f64::from(k), 1e-12);
+            model.advance_to(f64::from(k), 1e-12);
             let u = if k < 20 { 0.0 } else { -0.4 };
-            level.update(&sight(3.7 - 0.31 * u, u), true);
+            model.update(&observed(3.7 - 0.31 * u, u), true);
         }
-        assert!((level.exponent() - 0.31).abs() < 1e-3, "{level:?}");
-        assert!((level.ln_width() - 3.7).abs() < 1e-3);
-        assert!((level.predicted(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 1e-4);
+        assert!((model.exponent() - 0.31).abs() < 1e-3, "{model:?}");
+        assert!((model.ln_width() - 3.7).abs() < 1e-3);
+        assert!((model.predicted(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 1e-4);
     }
 
     #[test]
-    fn an_exponent_that_does_not_learn_stays_and_a_takes_it_up() {
-        let mut level = WidthModel::new(0.25, false);
+    fn a_constant_exponent_stays_and_the_level_follows() {
+        let mut model = WidthModel::new(0.25, false);
         for k in 0..60 {
             let u = if k < 20 { 0.0 } else { -0.4 };
-            level.advance_to(f64::from(k), 1e-6);
-            level.update(&sight(3.7 - 0.31 * u, u), true);
+            model.advance_to(f64::from(k), 1e-6);
+            model.update(&observed(3.7 - 0.31 * u, u), true);
         }
-        assert_eq!(level.exponent(), 0.25);
-        assert!((level.predicted(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 1e-3);
+        assert_eq!(model.exponent(), 0.25);
+        assert!((model.predicted(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 1e-3);
     }
 
     #[test]
-    fn at_the_end_of_its_range_the_exponent_holds_and_the_width_is_still_foretold() {
-        let mut level = WidthModel::new(0.25, true);
+    fn at_the_end_of_its_range_the_exponent_stays_and_the_width_is_still_predicted() {
+        let mut model = WidthModel::new(0.25, true);
         for k in 0..60 {
             let u = if k < 20 { 0.0 } else { -0.4 };
-            level.advance_to(f64::from(k), 1e-7);
-            level.update(&sight(3.7 - 0.05 * u, u), true);
+            model.advance_to(f64::from(k), 1e-7);
+            model.update(&observed(3.7 - 0.05 * u, u), true);
         }
-        assert!((level.exponent() - 0.7 * 0.25).abs() < 1e-12);
-        assert!((level.predicted(-0.4) - (3.7 + 0.05 * 0.4)).abs() < 2e-3, "{level:?}");
+        assert!((model.exponent() - 0.7 * 0.25).abs() < 1e-12);
+        assert!((model.predicted(-0.4) - (3.7 + 0.05 * 0.4)).abs() < 2e-3, "{model:?}");
     }
 
     #[test]
-    fn one_first_width_that_is_far_off_is_forgotten() {
-        let mut level = WidthModel::new(0.25, true);
-        level.update(&sight(3.9, 0.0), true);
+    fn an_outlier_as_first_width_is_corrected() {
+        let mut model = WidthModel::new(0.25, true);
+        model.update(&observed(3.9, 0.0), true);
         for k in 1..12 {
-            level.advance_to(f64::from(k), 1e-9);
-            level.update(&sight(3.7, 0.0), true);
+            model.advance_to(f64::from(k), 1e-9);
+            model.update(&observed(3.7, 0.0), true);
         }
-        assert!((level.ln_width() - 3.7).abs() < 1e-3, "{level:?}");
+        assert!((model.ln_width() - 3.7).abs() < 1e-3, "{model:?}");
     }
 
     #[test]
-    fn the_spread_stays_that_of_a_covariance() {
-        let mut level = WidthModel::new(0.25, true);
+    fn an_outlier_by_chance_is_once_in_2150_widths() {
+        let widths = 1.0 / libm::erfc((0.5 * OUTLIER_SQUARED).sqrt());
+        assert!((2140.0..2160.0).contains(&widths), "{widths}");
+    }
+
+    #[test]
+    fn the_covariance_stays_positive_definite() {
+        let mut model = WidthModel::new(0.25, true);
         for k in 0..500 {
             let u = 0.3 * f64::from(k).sin();
-            level.advance_to(f64::from(k), 1e-8);
-            level.update(&sight(3.7 - 0.22 * u, u), k % 3 != 0);
-            let [p, q, r] = level.covariance;
-            assert!(p > 0.0 && r > 0.0 && q * q <= p * r * (1.0 + 1e-9), "{level:?}");
+            model.advance_to(f64::from(k), 1e-8);
+            model.update(&observed(3.7 - 0.22 * u, u), k % 3 != 0);
+            let [p, q, r] = model.covariance;
+            assert!(p > 0.0 && r > 0.0 && q * q <= p * r * (1.0 + 1e-9), "{model:?}");
         }
     }
 }

@@ -1,34 +1,34 @@
-//! `strategy = "constant"`: the robot keeps one speed, whatever is measured. What a bead does
-//! without width control, to compare with.
+//! `strategy = "constant"`: the robot keeps one speed, whatever is measured: the bead without
+//! width control, for comparison.
 
 use std::sync::Arc;
 
-use super::kind::{CellFacts, Registration, Strategy};
+use super::kind::{CellParameters, Registration, WidthControlSettings, WidthStrategy};
 use crate::core::units::MmPerS;
 use crate::document::Table;
 use crate::width_control::controller::{
-    SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
+    BoxedController, SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
 };
 use crate::width_control::limiter::SpeedLimits;
 
 /// A constant speed in a cell.
 pub const REGISTRATION: Registration = Registration { name: "constant", needs_gains: false, read };
 
-/// One speed for the whole bead behind its first part.
+/// One speed for the whole bead after its first part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConstantStrategy {
     /// The speed.
     pub speed: MmPerS,
 }
 
-fn read(control: &Table<'_>) -> Option<Arc<dyn Strategy>> {
+fn read(control: &Table<'_>) -> Option<Arc<dyn WidthStrategy>> {
     let speed = control.number("constant_speed_mm_per_s", 0.0..=10_000.0)?;
     Some(Arc::new(ConstantStrategy { speed: MmPerS::new(speed).ok()? }))
 }
 
-impl Strategy for ConstantStrategy {
-    fn controller(&self, _: &CellFacts) -> Box<dyn WidthController> {
-        Box::new(ConstantControl { speed: self.speed })
+impl WidthStrategy for ConstantStrategy {
+    fn controller(&self, _: &CellParameters, _: &WidthControlSettings) -> BoxedController {
+        Box::new(*self)
     }
 
     fn check(&self, control: &Table<'_>, _: MmPerS, limits: SpeedLimits) {
@@ -41,12 +41,7 @@ impl Strategy for ConstantStrategy {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct ConstantControl {
-    speed: MmPerS,
-}
-
-impl WidthController for ConstantControl {
+impl WidthController for ConstantStrategy {
     fn measured(&mut self, sample: &WidthSample, _: &mut WidthTrace) -> Option<Tracking> {
         let goes_on = sample.tracked.is_some() || sample.may_begin;
         goes_on.then(|| Tracking::on(sample.captured_at))

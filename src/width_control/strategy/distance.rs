@@ -1,39 +1,38 @@
-//! `strategy = "distance"`: the width is held by where along the path bead was laid, with PI
-//! control to fall back to.
+//! `strategy = "distance"`: control by distance, with PI control as the fallback.
 
 use std::sync::Arc;
 
-use super::kind::{CellFacts, Registration, Strategy};
+use super::kind::{CellParameters, Registration, WidthControlSettings, WidthStrategy};
 use super::pi::{PiControl, cautious_gains};
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS};
 use crate::document::Table;
 use crate::width_control::controller::{
-    BeadReport, Outlook, SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
+    BeadReport, BoxedController, Outlook, SpeedRequest, Tracking, WidthController, WidthSample,
+    WidthTrace,
 };
-use crate::width_control::distance::{
-    DistanceController, DistanceSettings, FallbackReason, MeasuredWidth,
-};
+use crate::width_control::distance::{DistanceController, DistanceSettings, FallbackReason};
 
 /// Control by distance in a cell.
 pub const REGISTRATION: Registration = Registration { name: "distance", needs_gains: false, read };
 
-/// How far the flow drifts along a metre of path unless the file says so, as a
-/// fraction.
+/// Standard deviation of the flow's drift over a metre of path where the cell gives none, as
+/// a fraction. A larger value follows the flow faster and passes more noise of the width to
+/// the speed.
 const DRIFT_PER_ROOT_M: f64 = 0.0055;
 
-/// Control by distance, and what it knows of the bead beforehand.
+/// Control by distance with its model of the bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DistanceStrategy {
     /// b in w = A·(v/v₀)^−b.
     pub exponent: f64,
-    /// Whether it is learnt from the data.
+    /// Whether b is estimated from the widths.
     pub learns_exponent: bool,
-    /// How far the flow drifts along a metre, as a fraction.
+    /// Standard deviation of the flow's drift over a metre of path, as a fraction.
     pub drift_per_root_m: f64,
 }
 
-fn read(control: &Table<'_>) -> Option<Arc<dyn Strategy>> {
+fn read(control: &Table<'_>) -> Option<Arc<dyn WidthStrategy>> {
     let exponent = control.number("exponent", 0.02..=2.0);
     let learns = control.choice("exponent_learns", &[("yes", true), ("no", false)]);
     let drift = control.number_or("drift_per_root_m", 1e-5..=1.0, DRIFT_PER_ROOT_M);
@@ -44,8 +43,8 @@ fn read(control: &Table<'_>) -> Option<Arc<dyn Strategy>> {
     }))
 }
 
-impl Strategy for DistanceStrategy {
-    fn controller(&self, cell: &CellFacts) -> Box<dyn WidthController> {
+impl WidthStrategy for DistanceStrategy {
+    fn controller(&self, cell: &CellParameters, control: &WidthControlSettings) -> BoxedController {
         let settings = DistanceSettings {
             offset: cell.camera_offset,
             offset_sigma: cell.camera_offset_sigma,
@@ -55,10 +54,11 @@ impl Strategy for DistanceStrategy {
             learns_exponent: self.learns_exponent,
             drift_per_root_m: self.drift_per_root_m,
         };
-        let gains = cell.gains.unwrap_or_else(|| cautious_gains(cell, self.exponent));
+        let target = control.target.nominal();
+        let gains = control.gains.unwrap_or_else(|| cautious_gains(cell, target, self.exponent));
         Box::new(DistanceControl {
             by_distance: DistanceController::new(settings),
-            pi: PiControl::new(gains, cell.max_gap),
+            pi: PiControl::new(gains, control.max_gap),
             fallback: None,
             start_length: cell.start_length,
             camera_offset: cell.camera_offset,
@@ -82,24 +82,18 @@ struct DistanceControl {
 }
 
 impl DistanceControl {
-    /// A first reason to fall back stays for the bead.
-    fn look_for_fallback(&mut self, is_path_known: bool) {
-        let why = if is_path_known {
-            self.by_distance.fallback_reason()
-        } else {
-            Some(FallbackReason::NoPath)
-        };
-        self.fallback = self.fallback.or(why);
+    /// The first reason to fall back stays for the bead.
+    fn look_for_fallback(&mut self) {
+        self.fallback = self.fallback.or(self.by_distance.fallback_reason());
     }
 
     fn learn(&mut self, sample: &WidthSample, trace: &mut WidthTrace) {
         if let Some(path) = sample.nozzle_path
             && sample.is_own_bead
         {
-            let wanted = sample.width - sample.error;
-            let width = MeasuredWidth { width: sample.width, sigma: sample.sigma };
-            trace.distance = Some(self.by_distance.measured(path, width, wanted));
-            self.look_for_fallback(sample.is_path_known);
+            let target = sample.reading.width - sample.error;
+            trace.distance = Some(self.by_distance.measured(path, sample.reading, target));
+            self.look_for_fallback();
         }
     }
 
@@ -115,13 +109,17 @@ impl WidthController for DistanceControl {
         self.by_distance.begin_bead();
     }
 
-    fn robot_reported(&mut self, report: &BeadReport) {
-        self.by_distance.reported(report.at, report.path, report.speed, report.flow_ratio);
-        self.look_for_fallback(report.is_path_known);
+    fn path_is_estimated(&mut self) {
+        self.fallback = self.fallback.or(Some(FallbackReason::NoPath));
     }
 
-    /// Learns from every width, whoever sets the speed. Where the first whole gauge of
-    /// bead has not been seen yet, that is waited for.
+    fn robot_reported(&mut self, report: &BeadReport) {
+        self.by_distance.reported(report.at, report.path, report.speed, report.flow_ratio);
+        self.look_for_fallback();
+    }
+
+    /// Updates the model with every width, also while PI control sets the speed. Tracking
+    /// begins once a whole gauge of bead has been measured.
     fn measured(&mut self, sample: &WidthSample, trace: &mut WidthTrace) -> Option<Tracking> {
         self.learn(sample, trace);
         let is_ready = self.is_ready();
@@ -140,22 +138,24 @@ impl WidthController for DistanceControl {
         }
     }
 
-    /// Begins to track as soon as the first part of the bead is laid and the bead is
-    /// known, be it from the bead before: there is nothing to wait for.
+    /// Begins to track as soon as the first part of the bead is laid and the model is
+    /// known, also from the bead before: no width has to be waited for.
     fn before_setpoint(&mut self, outlook: &Outlook) -> Option<Stamp> {
         if self.fallback.is_some() {
             return None;
         }
         let primed = outlook.laid.is_some_and(|laid| laid >= self.start_length);
-        let seen_at = if outlook.is_priming && primed && self.by_distance.is_ready() {
-            self.pi.reset();
-            outlook.now
-        } else {
-            outlook.tracked.filter(|_| !self.pi.is_running())?
+        let seen_at = match outlook.tracked {
+            Some(seen_at) if !self.pi.is_running() => seen_at,
+            None if primed && self.by_distance.is_ready() => {
+                self.pi.reset();
+                outlook.now
+            }
+            _ => return None,
         };
         let Some((path, laid)) = outlook.path.zip(outlook.laid) else { return Some(seen_at) };
         self.by_distance.engaged(path);
-        // Where no bead can be seen yet, none is missing.
+        // Until the bead reaches the camera, no width is missing.
         Some(if laid < self.camera_offset { outlook.now } else { seen_at })
     }
 

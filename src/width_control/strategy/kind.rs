@@ -1,5 +1,5 @@
-//! What a cell chooses a width controller by: its registration, its settings, and what
-//! of the cell it is made for.
+//! How a cell chooses a width controller: its registration, its settings, and the parameters
+//! of the cell that it is made for.
 
 use std::any::Any;
 use std::fmt::Debug;
@@ -8,62 +8,73 @@ use std::sync::Arc;
 use crate::core::time::Span;
 use crate::core::units::{Mm, MmPerS, WidthRange};
 use crate::document::Table;
-use crate::width_control::controller::WidthController;
+use crate::width_control::controller::BoxedController;
 use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::pi::PiGains;
+use crate::width_control::target::WidthTarget;
 
-/// A width controller as a cell chooses it.
+/// A width controller that a cell may choose.
 #[derive(Debug)]
 pub struct Registration {
-    /// Its name in `law` of `[control]`.
+    /// Its name in `strategy` of `[control]`.
     pub name: &'static str,
     /// Whether it needs the gains of PI control.
     pub needs_gains: bool,
     /// Reads its own keys of `[control]`; none where they are wrong.
-    pub read: fn(&Table<'_>) -> Option<Arc<dyn Strategy>>,
+    pub read: fn(&Table<'_>) -> Option<Arc<dyn WidthStrategy>>,
 }
 
 /// A width controller with its settings.
-pub trait Strategy: Any + Debug + Send + Sync {
+pub trait WidthStrategy: Any + Debug + Send + Sync {
     /// The controller for a cell.
-    fn controller(&self, cell: &CellFacts) -> Box<dyn WidthController>;
+    fn controller(&self, cell: &CellParameters, control: &WidthControlSettings) -> BoxedController;
 
-    /// Refuses settings that leave what the robot may do. `control` is the table that
-    /// they were read from.
+    /// Reports settings that leave the robot's limits. `control` is the table that they
+    /// were read from.
     fn check(&self, _control: &Table<'_>, _start: MmPerS, _limits: SpeedLimits) {}
 
-    /// Whether the bead within the whole gauge must have been laid before it is seen.
+    /// Whether the whole gauge must lie on bead that is laid, not beside the nozzle.
     fn sees_only_laid_bead(&self) -> bool {
         false
     }
 }
 
-impl dyn Strategy {
-    /// The settings, where the strategy is of a kind.
-    pub fn as_kind<T: Strategy>(&self) -> Option<&T> {
+impl dyn WidthStrategy {
+    /// The settings, where the strategy is of this type.
+    pub fn as_kind<T: WidthStrategy>(&self) -> Option<&T> {
         let any: &dyn Any = self;
         any.downcast_ref()
     }
 }
 
-/// What a width controller is made for.
+/// The settings of `[control]`.
+#[derive(Debug, Clone)]
+pub struct WidthControlSettings {
+    /// Target width.
+    pub target: WidthTarget,
+    /// The width controller with its settings.
+    pub strategy: Arc<dyn WidthStrategy>,
+    /// Gains of PI control; none where it is only the fallback and the cell gives none.
+    pub gains: Option<PiGains>,
+    /// Longest time between two widths over which PI control integrates; after a longer
+    /// one the controller holds.
+    pub max_gap: Span,
+    /// Longest hold before the controller stops the robot.
+    pub max_hold: Span,
+}
+
+/// The parameters of a cell that a width controller is made for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CellFacts {
-    /// Width that is wanted most of the time.
-    pub target: Mm,
+pub struct CellParameters {
     /// Narrowest and widest width that is accepted.
     pub width_range: WidthRange,
-    /// Gains of PI control, where the cell gives them.
-    pub gains: Option<PiGains>,
-    /// Longest time between two widths over which is integrated.
-    pub max_gap: Span,
     /// Speed of the first part of a bead.
     pub start_speed: MmPerS,
-    /// Its length.
+    /// Length of the first part.
     pub start_length: Mm,
     /// Path length from the nozzle back to the middle of the gauge.
     pub camera_offset: Mm,
-    /// Its standard deviation.
+    /// Standard deviation of the camera offset.
     pub camera_offset_sigma: Mm,
     /// Length of bead within the gauge.
     pub gauge_length: Mm,

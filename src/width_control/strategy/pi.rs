@@ -1,13 +1,13 @@
-//! `strategy = "pi"`: proportional-integral control on the widths as they are seen, as in
+//! `strategy = "pi"`: proportional-integral control on the measured widths, as in
 //! Shojaei Barjuei et al. 2022.
 
 use std::sync::Arc;
 
-use super::kind::{CellFacts, Registration, Strategy};
+use super::kind::{CellParameters, Registration, WidthControlSettings, WidthStrategy};
 use crate::core::time::{Span, Stamp};
-use crate::core::units::MmPerS;
+use crate::core::units::{Mm, MmPerS};
 use crate::width_control::controller::{
-    SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
+    BoxedController, SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
 };
 use crate::width_control::pi::{Demand, Pi, PiGains, Saturation};
 
@@ -19,50 +19,52 @@ pub const REGISTRATION: Registration =
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PiStrategy;
 
-impl Strategy for PiStrategy {
-    fn controller(&self, cell: &CellFacts) -> Box<dyn WidthController> {
-        let gains = cell.gains.unwrap_or_else(|| cautious_gains(cell, 1.0));
-        Box::new(PiControl::new(gains, cell.max_gap))
+impl WidthStrategy for PiStrategy {
+    fn controller(&self, cell: &CellParameters, control: &WidthControlSettings) -> BoxedController {
+        let target = control.target.nominal();
+        let gains = control.gains.unwrap_or_else(|| cautious_gains(cell, target, 1.0));
+        Box::new(PiControl::new(gains, control.max_gap))
     }
 }
 
-/// Gains where a cell gives none: an integral that the dead time from nozzle to camera
-/// allows for a bead with w = A·(v/v₀)^−`exponent` (internal model control with twice the
-/// dead time as the lag).
-pub fn cautious_gains(cell: &CellFacts, exponent: f64) -> PiGains {
+/// Gains where a cell gives none, for a bead with w = A·(v/v₀)^−`exponent`. The plant is the
+/// slope |dw/dv| behind the dead time from nozzle to camera; internal model control of it
+/// with a closed-loop time constant of twice the dead time θ is the integral gain
+/// 1/(slope·(2θ + θ)), without a proportional part.
+pub fn cautious_gains(cell: &CellParameters, target: Mm, exponent: f64) -> PiGains {
     let speed = cell.start_speed.max(MmPerS::constant(1.0));
-    let slope = exponent * cell.target.get() / speed.get();
+    let slope = exponent * target.get() / speed.get();
     let dead_s = cell.camera_offset / (speed * Span::from_secs(1.0));
     let dead_s = dead_s + cell.setpoint_period.secs();
     PiGains { kp_per_s: 0.0, ki_per_s2: 1.0 / (3.0 * dead_s * slope.max(1e-6)) }
 }
 
-/// PI control that starts without a bump, and starts anew after a gap.
+/// PI control that starts without a bump, and starts again after a gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PiControl {
     gains: PiGains,
     max_gap: Span,
-    /// The integral and the last demand, once it has begun.
+    /// The integrator and the last demand, once started.
     running: Option<(Pi, MmPerS)>,
 }
 
 impl PiControl {
-    /// Control that has not begun.
+    /// Control before its start.
     pub fn new(gains: PiGains, max_gap: Span) -> Self {
         Self { gains, max_gap, running: None }
     }
 
-    /// Forgets the integral.
+    /// Stops control and discards the integral.
     pub fn reset(&mut self) {
         self.running = None;
     }
 
-    /// Whether it has begun.
+    /// Whether it is started.
     pub fn is_running(&self) -> bool {
         self.running.is_some()
     }
 
-    /// Begins at a width, from the speed that is driven.
+    /// Starts at a width, from the robot's speed.
     pub fn start(&mut self, sample: &WidthSample, trace: &mut WidthTrace) -> Tracking {
         let mut pi = Pi::start_bumpless(self.gains, sample.driven, sample.error);
         let demand = pi.step(sample.error, Span::ZERO, Saturation::None);
@@ -71,7 +73,7 @@ impl PiControl {
         Tracking { seen_at: sample.captured_at, is_new: true }
     }
 
-    /// Goes on with a width, after those until `seen_at`; none where it is no newer.
+    /// Continues with a width that is newer than `seen_at`; none where it is not.
     pub fn go_on(
         &mut self,
         seen_at: Stamp,
@@ -84,9 +86,9 @@ impl PiControl {
         }
         match &mut self.running {
             Some((pi, demand)) if dt <= self.max_gap => {
-                let wanted = pi.step(sample.error, dt, sample.saturation);
-                trace.note(&wanted);
-                *demand = wanted.speed;
+                let next = pi.step(sample.error, dt, sample.saturation);
+                trace.note(&next);
+                *demand = next.speed;
                 Some(Tracking::on(sample.captured_at))
             }
             _ => Some(self.start(sample, trace)),

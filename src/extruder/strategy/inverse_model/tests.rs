@@ -9,7 +9,7 @@ use crate::numeric::lti::{Between, Simulator, TransferFunction};
 
 const PERIOD: Span = Span::from_millis(5);
 
-fn law(
+fn strategy(
     model: &TransferFunction,
     limits: CommandLimits,
     about: OperatingPoint,
@@ -26,8 +26,8 @@ fn law(
     InverseFeedforward::new(Tracker::new(model, &settings).unwrap(), about)
 }
 
-/// Shares of a wanted flow over time, and the commands.
-fn course(
+/// Flow over its demand over time, and the commands.
+fn response(
     controller: &mut InverseFeedforward,
     plant: &mut Simulator,
     flow: f64,
@@ -36,18 +36,18 @@ fn course(
     let wanted = Mm3PerS::constant(flow);
     let mut last = limits.apply(controller.begin(Stamp::START, wanted).value, 0.0, PERIOD).0;
     controller.settle(Stamp::START, last);
-    let mut course = vec![plant.step(last) / flow];
+    let mut response_of = vec![plant.step(last) / flow];
     for _ in 0..1000 {
         controller.feedforward(PERIOD, wanted);
         last = limits.apply(controller.demand().value, last, PERIOD).0;
         controller.settle(Stamp::START, last);
-        course.push(plant.step(last) / flow);
+        response_of.push(plant.step(last) / flow);
     }
-    course
+    response_of
 }
 
 #[test]
-fn without_limits_the_flow_comes_with_the_placed_poles() {
+fn without_limits_the_flow_follows_the_placed_poles() {
     for (num, den, poles) in [
         (vec![12.0], vec![0.84, 1.0], 1),
         (vec![18.0], vec![0.656, 0.975, 1.0], 2),
@@ -56,10 +56,10 @@ fn without_limits_the_flow_comes_with_the_placed_poles() {
     ] {
         let model = TransferFunction::new(&num, &den, 0.0).unwrap();
         let limits = CommandLimits::new(-1e6, 1e6, 1e12).unwrap();
-        let mut controller = law(&model, limits, OperatingPoint::default(), 0.1);
+        let mut controller = strategy(&model, limits, OperatingPoint::default(), 0.1);
         let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
-        let course = course(&mut controller, &mut plant, 500.0, limits);
-        for (k, fraction) in (0_u32..).zip(&course).skip(20) {
+        let response_of = response(&mut controller, &mut plant, 500.0, limits);
+        for (k, fraction) in (0_u32..).zip(&response_of).skip(20) {
             let x = f64::from(k) * 0.005 / 0.1;
             let expected = match poles {
                 0 => 1.0,
@@ -68,24 +68,25 @@ fn without_limits_the_flow_comes_with_the_placed_poles() {
             };
             assert!((fraction - expected).abs() < 0.04, "{num:?} {k}: {fraction} {expected}");
         }
-        assert!((course[1000] - 1.0).abs() < 1e-6, "{num:?}");
+        assert!((response_of[1000] - 1.0).abs() < 1e-6, "{num:?}");
     }
 }
 
 #[test]
-fn an_extruder_that_stood_is_brought_to_its_flow_within_its_limits() {
+fn an_extruder_at_rest_reaches_its_flow_within_its_limits() {
     let model = TransferFunction::new(&[18.0], &[0.656, 0.975, 1.0], 0.0).unwrap();
     let limits = CommandLimits::new(0.0, 60.0, 400.0).unwrap();
-    let mut controller = law(&model, limits, OperatingPoint::default(), 0.25);
+    let mut controller = strategy(&model, limits, OperatingPoint::default(), 0.25);
     let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
-    let course = course(&mut controller, &mut plant, 540.0, limits);
-    let settled =
-        |course: &[f64]| course.iter().rposition(|fraction| (fraction - 1.0).abs() > 0.05).unwrap();
+    let response_of = response(&mut controller, &mut plant, 540.0, limits);
+    let settled = |response_of: &[f64]| {
+        response_of.iter().rposition(|fraction| (fraction - 1.0).abs() > 0.05).unwrap()
+    };
     let mut steady = Simulator::new(&model, 0.005, Between::Held).unwrap();
     let alone: Vec<f64> = (0..2000).map(|_| steady.step(30.0) / 540.0).collect();
-    let (with, without) = (settled(&course), settled(&alone));
+    let (with, without) = (settled(&response_of), settled(&alone));
     assert!(2 * with < without, "{with} {without}");
-    let most = course.iter().fold(0.0_f64, |most, fraction| most.max(*fraction));
+    let most = response_of.iter().fold(0.0_f64, |most, fraction| most.max(*fraction));
     assert!(most < 1.03, "{most}");
 }
 
@@ -96,12 +97,12 @@ fn forecast(model: &TransferFunction, screw: ScrewSpeed, ahead: Span) -> FlowFor
 }
 
 #[test]
-fn an_encoder_tells_of_a_drive_that_no_model_knows() {
-    // The screw turns a quarter less than it is told.
+fn an_encoder_shows_a_drive_that_differs_from_its_model() {
+    // The screw turns at three quarters of its command.
     let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
     let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
-    let told_of = |screw| {
-        let mut controller = law(&model, limits, OperatingPoint::default(), 0.1)
+    let predicted_with = |screw| {
+        let mut controller = strategy(&model, limits, OperatingPoint::default(), 0.1)
             .with_forecast(forecast(&model, screw, Span::ZERO));
         let mut last = controller.begin(Stamp::START, Mm3PerS::constant(480.0)).value;
         for _ in 0..2000 {
@@ -111,21 +112,21 @@ fn an_encoder_tells_of_a_drive_that_no_model_knows() {
             controller.feedforward(PERIOD, Mm3PerS::constant(480.0));
             last = controller.demand().value;
         }
-        (controller.required_readings().len(), controller.predicted_flow().unwrap().get())
+        (controller.required_reading().is_some(), controller.predicted_flow().unwrap().get())
     };
-    let (needs, flow) = told_of(ScrewSpeed::Measured);
-    assert!(needs == 1 && (flow - 360.0).abs() < 0.1, "{needs} {flow}");
-    let (needs, flow) = told_of(ScrewSpeed::Modelled);
-    assert!(needs == 0 && (flow - 480.0).abs() < 0.1, "{needs} {flow}");
+    let (needs, flow) = predicted_with(ScrewSpeed::Measured);
+    assert!(needs && (flow - 360.0).abs() < 0.1, "{needs} {flow}");
+    let (needs, flow) = predicted_with(ScrewSpeed::Modelled);
+    assert!(!needs && (flow - 480.0).abs() < 0.1, "{needs} {flow}");
 }
 
 #[test]
-fn what_will_flow_is_told_from_what_was_applied() {
+fn the_flow_is_predicted_from_the_applied_command() {
     let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.2).unwrap();
     let limits = CommandLimits::new(0.0, 60.0, 1e6).unwrap();
     let about = OperatingPoint { command: 30.0, flow_mm3_per_s: 360.0 };
     let ahead = Span::from_millis(100);
-    let mut controller = law(&model, limits, about, 0.25).with_forecast(forecast(
+    let mut controller = strategy(&model, limits, about, 0.25).with_forecast(forecast(
         &model,
         ScrewSpeed::Modelled,
         ahead,
@@ -149,11 +150,11 @@ fn what_will_flow_is_told_from_what_was_applied() {
 }
 
 #[test]
-fn ticks_that_are_missed_are_made_up_for() {
+fn missed_ticks_are_made_up_for() {
     let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
     let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
     let ended = |ticks: i64, count: usize| {
-        let mut controller = law(&model, limits, OperatingPoint::default(), 0.25)
+        let mut controller = strategy(&model, limits, OperatingPoint::default(), 0.25)
             .with_forecast(forecast(&model, ScrewSpeed::Modelled, Span::ZERO));
         let _ = controller.begin(Stamp::START, Mm3PerS::constant(480.0));
         controller.settle(Stamp::START, 40.0);
@@ -167,10 +168,10 @@ fn ticks_that_are_missed_are_made_up_for() {
 }
 
 #[test]
-fn until_the_pump_runs_it_is_told_what_a_steady_flow_takes() {
+fn until_the_pump_runs_the_command_is_that_of_a_steady_flow() {
     let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
     let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
-    let mut controller = law(&model, limits, OperatingPoint::default(), 0.1);
+    let mut controller = strategy(&model, limits, OperatingPoint::default(), 0.1);
     assert!((controller.begin(Stamp::START, Mm3PerS::constant(480.0)).value - 40.0).abs() < 1e-9);
     controller.settle(Stamp::START, 40.0);
     controller.feedforward(PERIOD, Mm3PerS::constant(480.0));
@@ -178,7 +179,7 @@ fn until_the_pump_runs_it_is_told_what_a_steady_flow_takes() {
 }
 
 #[test]
-fn poles_that_are_quicker_than_the_commands_are_refused() {
+fn poles_faster_than_the_commands_are_refused() {
     let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
     let with = |time_constant_s| {
         Tracker::new(
@@ -203,7 +204,7 @@ fn a_model_about_another_point_is_followed_from_there() {
     let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
     let about = OperatingPoint { command: 30.0, flow_mm3_per_s: 400.0 };
     let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
-    let mut controller = law(&model, limits, about, 0.1);
+    let mut controller = strategy(&model, limits, about, 0.1);
     let mut last = controller.begin(Stamp::START, Mm3PerS::constant(460.0)).value;
     for _ in 0..2000 {
         controller.settle(Stamp::START, last.clamp(0.0, 90.0));

@@ -1,4 +1,4 @@
-//! Starts and stops of an extruder that is known to start and to stop late.
+//! Starts and stops of an extruder with known delays.
 
 use super::*;
 use crate::extruder::start_stop::BeadConditions;
@@ -36,7 +36,7 @@ fn bench() -> Bench {
 #[test]
 fn the_robot_waits_for_the_first_flow_and_then_follows_it() {
     let mut bench = bench();
-    // The void of a pause that nobody knows the length of is filled in one second.
+    // The void of a pause of unknown length is filled in one second.
     assert_eq!(bench.go(1.1), ExtruderState::Running);
     assert_eq!(bench.side.robot_speed_ratio(), LEAST_SHARE);
     assert!(bench.side.flow_ratio() < 1e-6);
@@ -52,7 +52,7 @@ fn the_robot_waits_for_the_first_flow_and_then_follows_it() {
 }
 
 #[test]
-fn a_pump_that_hardly_stood_is_waited_for_hardly_at_all() {
+fn after_a_short_pause_the_robot_hardly_waits() {
     let mut bench = bench();
     bench.go(3.0);
     bench.laying = Laying::Idle;
@@ -68,7 +68,7 @@ fn a_pump_that_hardly_stood_is_waited_for_hardly_at_all() {
 }
 
 #[test]
-fn the_pump_stops_before_the_bead_ends_and_the_valve_stays_open_for_what_comes() {
+fn the_pump_stops_before_the_bead_ends_and_the_valve_stays_open() {
     let mut bench = bench();
     bench.go(3.0);
     let way = bench.side.stop_distance(SPEED).unwrap();
@@ -108,7 +108,7 @@ fn the_next_bead_begins_though_the_robot_was_not_seen_idle() {
 }
 
 #[test]
-fn what_is_a_fault_is_one_while_a_bead_ends() {
+fn faults_are_detected_while_a_bead_ends() {
     let mut bench = bench();
     bench.go(3.0);
     bench.laying = Laying::Ending(FLOW);

@@ -5,24 +5,25 @@ use std::sync::Arc;
 use crate::extruder::trajectory::{PlannedJob, PlannedPoint};
 use crate::extruder::{ExtruderFault, ExtruderSetup, ExtruderState, FlowDemand, Supervisor};
 
-/// The speed override of a robot that goes by nothing but the width.
+/// The speed override where neither a plan nor the extruder changes the robot's speed.
+/// By definition 1.
 pub const NO_OVERRIDE: f64 = 1.0;
 
 /// The extruder side of a controller.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ExtruderSide {
+pub struct ExtruderControl {
     /// Decides when the extruder runs and what it is commanded.
     pub supervisor: Supervisor,
-    /// The flow that is wanted.
+    /// The demanded flow.
     pub demand: FlowDemand,
-    /// The job that was planned, if there is one.
+    /// The planned job, if there is one.
     pub plan: Option<Arc<PlannedJob>>,
-    /// What was planned for the last position on this bead that was known.
+    /// The planned point at the last known position on this bead.
     pub planned: Option<PlannedPoint>,
 }
 
-impl ExtruderSide {
-    /// An extruder that has not been heard.
+impl ExtruderControl {
+    /// An extruder before its first report.
     pub fn new(setup: ExtruderSetup, demand: FlowDemand) -> Self {
         let plan = setup.plan.clone();
         Self { supervisor: Supervisor::new(setup), demand, plan, planned: None }
@@ -30,9 +31,6 @@ impl ExtruderSide {
 
     /// Its fault, if it has one.
     pub fn fault(&self) -> Option<ExtruderFault> {
-        match self.supervisor.state() {
-            ExtruderState::Fault(why) => Some(why),
-            _ => None,
-        }
+        if let ExtruderState::Fault(why) = self.supervisor.state() { Some(why) } else { None }
     }
 }
