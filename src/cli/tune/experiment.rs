@@ -66,7 +66,7 @@ pub fn run(
 /// recording, so that a replay runs what ran.
 fn derived(args: &TuneArgs, loaded: &LoadedCell) -> anyhow::Result<LoadedCell> {
     let mut document: DocumentMut = loaded.text.parse().context("the cell file")?;
-    document["control"]["controller"] = value("steps");
+    document["control"]["strategy"] = value("steps");
     if let Some(control) = document["control"].as_table_like_mut() {
         for key in DISTANCE_KEYS {
             control.remove(key);

@@ -91,7 +91,7 @@ fn text(loaded: &LoadedCell, tuned: &Tuned, controller: ControllerArg) -> anyhow
         set(&mut document, table, key, value(number));
     }
     let name = if controller == ControllerArg::Distance { "distance" } else { "pi" };
-    set(&mut document, "control", "controller", value(name));
+    set(&mut document, "control", "strategy", value(name));
     let control = document["control"].as_table_like_mut().context("[control] is no table")?;
     control.remove("step_fraction");
     if controller == ControllerArg::Pi {
