@@ -1,4 +1,4 @@
-//! The calibration file as text. Version 1; see `calib/README.md` for every
+//! The calibration file as text. Version 1; see `docs/src/reference/calibration-file.md` for every
 //! key.
 
 use std::fmt::Write;

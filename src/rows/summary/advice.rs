@@ -2,7 +2,7 @@
 //! good the pictures of a run were.
 //!
 //! The scale is the bound: the scatter of widths grows with noise over contrast
-//! and with the root of the blur (ACCURACY.md, "The two bounds"). A picture is
+//! and with the root of the blur (docs/src/explanation/uncertainty.md). A picture is
 //! held against one with 80 grey levels of contrast, 4 of noise and a blur of
 //! 1.5 px, for which the table of accuracy holds.
 
