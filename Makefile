@@ -1,4 +1,4 @@
-# What a person types. Everything is built in release, so that one set of
+# Targets for people. Everything is built in release, so that one set of
 # dependencies is compiled once and serves the program, its tests and its lints.
 #
 #   make demo SECONDS=60 OUT=my-demo
@@ -13,8 +13,8 @@ export PATH := $(PATH):$(HOME)/.cargo/bin
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test lint doc docs bench clean
 
-help: ## say what can be made
-	@echo "truebead: keeps an extruded bead at the width that was asked for"
+help: ## list the targets
+	@echo "truebead: keeps an extruded bead at its target width"
 	@echo
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1 | \2/p' $(MAKEFILE_LIST) | \
 		while IFS='|' read -r what does; do printf '%-14s%s\n' "$$what" "$$does"; done
@@ -51,5 +51,5 @@ docs: $(MDBOOK) ## the book as pages: docs/book/index.html
 bench: setup ## how fast measurement, control and rendering are on this machine
 	$(CARGO) bench --locked --benches
 
-clean: ## throw away what was built
+clean: ## delete what was built
 	$(CARGO) clean
