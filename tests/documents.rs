@@ -104,7 +104,9 @@ fn plain(path: &Path) -> PathBuf {
     let mut parts = PathBuf::new();
     for part in path.components() {
         match part {
-            Component::ParentDir => drop(parts.pop()),
+            Component::ParentDir => {
+                parts.pop();
+            }
             Component::CurDir => {}
             other => parts.push(other),
         }
@@ -249,14 +251,12 @@ fn boards_are_rendered_anew() {
         Pose::from_parts(rotation, at - rotation * middle)
     });
     // Z of the bed points at the camera, that of a board away from it.
-    let on_bed =
-        Rotation3::new(bed.rotation_rad()) * Rotation3::new(Vector3::x() * std::f64::consts::PI);
-    let flat = Pose::from_parts(on_bed, Vector3::new(0.0, 0.0, 395.0) - on_bed * middle);
-    let plane = bed.apply_inverse(nalgebra::Point3::origin()).z;
-    let height = (bed.apply_inverse(flat.apply(nalgebra::Point3::origin()))).z;
-    let flat =
-        Pose::from_parts(on_bed, flat.translation_mm() + on_bed * Vector3::new(0.0, 0.0, height));
-    assert!(plane > 0.0);
+    let half_turn = Rotation3::new(Vector3::x() * std::f64::consts::PI);
+    let on_bed = Rotation3::new(bed.rotation_rad()) * half_turn;
+    let before_camera = Vector3::new(0.0, 0.0, 395.0) - on_bed * middle;
+    let above_bed = bed.apply_inverse(before_camera.into()).z;
+    let down = on_bed * Vector3::z() * above_bed;
+    let flat = Pose::from_parts(on_bed, before_camera + down);
     let folder = root().join("test_images/boards");
     fs::create_dir_all(&folder).unwrap();
     let studio = BoardStudio::new(&camera, image_size_px);
