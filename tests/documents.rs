@@ -214,6 +214,7 @@ fn the_reference_names_every_key_that_a_file_may_have() {
     let mut sources = files_below(&root().join("src/cell"), "rs");
     sources.extend(files_below(&root().join("src/scenario"), "rs"));
     sources.extend(files_below(&root().join("src/width_control/strategy"), "rs"));
+    sources.extend(files_below(&root().join("src/drivers"), "rs"));
     sources.push(root().join("src/calibration/file.rs"));
     let keys: BTreeSet<String> =
         sources.iter().flat_map(|file| keys_of(&fs::read_to_string(file).unwrap())).collect();
