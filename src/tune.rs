@@ -42,7 +42,7 @@ pub enum TuneError {
     /// The widths hardly tell how the bead answers the speed.
     #[error(
         "the exponent is {exponent:.2} ± {sigma:.2}, known no better than to a third of itself: \
-         lay a longer bead, or one with larger steps (--step-share)"
+         lay a longer bead, or one with larger steps (--step-fraction)"
     )]
     LooseExponent {
         /// Exponent b.

@@ -32,27 +32,27 @@ fn clear_pictures_are_measured_to_their_bound_and_others_not_far_off() {
         let set = figures["set"].as_str().unwrap();
         let clear = ["blur", "slant", "faint", "tilted", "horizontal", "dark-bead"];
         if clear.iter().any(|name| set.starts_with(name)) {
-            assert_eq!((number("frames"), number("measured_share")), (60.0, 1.0), "{set}");
-            assert_eq!(number("silent_share"), 0.0, "{set}");
+            assert_eq!((number("frames"), number("measured_fraction")), (60.0, 1.0), "{set}");
+            assert_eq!(number("silent_fraction"), 0.0, "{set}");
             // Sixty frames tell a scatter to nine percent.
             assert!(number("rmse_over_free_bound") < 1.4, "{figures}");
             assert!((0.7..1.35).contains(&number("rms_over_sigma")), "{figures}");
             assert!(number("bias_px").abs() < 0.5 * number("rmse_px"), "{figures}");
         } else if set == "rough" || set.starts_with("curve") {
-            assert_eq!((number("frames"), number("measured_share")), (60.0, 1.0), "{set}");
+            assert_eq!((number("frames"), number("measured_fraction")), (60.0, 1.0), "{set}");
             assert!(number("rmse_px") < 0.04, "{figures}");
             assert!((0.7..1.4).contains(&number("rms_over_sigma")), "{figures}");
-            assert_eq!(number("silent_share"), 0.0, "{set}");
+            assert_eq!(number("silent_fraction"), 0.0, "{set}");
         } else {
-            assert_eq!((number("frames"), number("silent_share")), (30.0, 0.0), "{set}");
+            assert_eq!((number("frames"), number("silent_fraction")), (30.0, 0.0), "{set}");
             if set.starts_with("corner") {
-                assert_eq!(number("measured_share"), 0.0, "{set}");
+                assert_eq!(number("measured_fraction"), 0.0, "{set}");
             } else if set.starts_with("rough") {
-                assert_eq!(number("measured_share"), 1.0, "{figures}");
+                assert_eq!(number("measured_fraction"), 1.0, "{figures}");
                 assert!(number("rmse_px") < 0.08, "{figures}");
                 assert!((0.4..1.5).contains(&number("rms_over_sigma")), "{figures}");
             } else {
-                assert!(number("measured_share") > 0.9, "{figures}");
+                assert!(number("measured_fraction") > 0.9, "{figures}");
                 assert!(number("rmse_px") < 0.15, "{figures}");
             }
         }
@@ -88,10 +88,10 @@ fn drawn_sets_are_counted_and_judged_and_frames_kept() {
     let whole: Vec<&Value> = figures.iter().filter(|figures| figures["part"] == "all").collect();
     assert_eq!(whole.len(), 18);
     for figures in &whole {
-        let refused = figures["refused"].as_object().unwrap().values();
-        let refused: u64 = refused.map(|count| count.as_u64().unwrap()).sum();
-        let measured = 300.0 * figures["measured_share"].as_f64().unwrap();
-        assert!((measured + f64::from(u32::try_from(refused).unwrap()) - 300.0).abs() < 1e-6);
+        let rejected = figures["rejected"].as_object().unwrap().values();
+        let rejected: u64 = rejected.map(|count| count.as_u64().unwrap()).sum();
+        let measured = 300.0 * figures["measured_fraction"].as_f64().unwrap();
+        assert!((measured + f64::from(u32::try_from(rejected).unwrap()) - 300.0).abs() < 1e-6);
     }
     let missed = figures.iter().any(|figures| !figures["missed"].as_array().unwrap().is_empty());
     assert_eq!(status, Some(i32::from(missed)));
@@ -132,7 +132,7 @@ fn successive_frames_tell_roughness() {
     assert_eq!(all.len(), 2, "apart and overlapping");
     for figures in all {
         let number = |key: &str| figures[key].as_f64().unwrap();
-        assert!(number("determined_share") > 0.9, "{figures}");
+        assert!(number("determined_fraction") > 0.9, "{figures}");
         assert!(number("roughness_error") <= 0.20, "{figures}");
         assert!(number("length_error") <= 0.30, "{figures}");
         assert!((0.85..=1.15).contains(&number("width_z")), "{figures}");

@@ -90,7 +90,7 @@ fn what_cannot_be_verified_is_said() {
         String::from_utf8_lossy(&run.get_output().stderr).into_owned()
     };
     let none = said(&mut verify(&calibration, Path::new("no.png"), &[]), 2);
-    assert!(none.contains("no.png: no such picture"), "{none}");
+    assert!(none.contains("no.png: no such image"), "{none}");
     let missing = said(&mut verify(Path::new("no.toml"), &picture, &[]), 2);
     assert!(missing.contains("no.toml"), "{missing}");
     let zero = said(&mut verify(&calibration, &picture, &["--max-error-percent", "0"]), 2);

@@ -80,7 +80,7 @@ fn the_squares_have_their_size_at_any_height_of_the_board() {
     let picture =
         image_file::read(&folder.join("left04.jpg"), Channel::Grey, 0, Stamp::START).unwrap();
     let board = Board::new(9, 6, Mm::constant(25.0)).unwrap();
-    let corners = sighting::observe(&board, "left04.jpg", &picture).unwrap().corners;
+    let corners = board_observation::observe(&board, "left04.jpg", &picture).unwrap().corners;
     let corners: Vec<_> = corners.iter().map(|corner| corner.px).collect();
     for row in corners.chunks(9) {
         for pair in row.windows(2) {

@@ -233,14 +233,14 @@ fn check_says_what_a_cell_suffices_for_and_what_is_missing() {
         String::from_utf8(output.stdout).unwrap()
     };
     let both = checked(&[]);
-    assert!(both.contains("suffices for run\n") && both.contains("suffices for simulate\n"));
+    assert!(both.contains("ready for run\n") && both.contains("ready for simulate\n"));
     let link = "driver = \"line\"                 # driver, address: for a live run only\n\
                 address = \"127.0.0.1:5654\"\n";
     let simulates = checked(&[(link, "")]);
-    assert!(simulates.contains("suffices for simulate\n"), "{simulates}");
+    assert!(simulates.contains("ready for simulate\n"), "{simulates}");
     assert!(simulates.contains("not for run;") && simulates.contains("extruder.driver"));
     let runs = checked(&[(plant(), "")]);
-    assert!(runs.contains("suffices for run\n"), "{runs}");
+    assert!(runs.contains("ready for run\n"), "{runs}");
     assert!(runs.contains("not for simulate;") && runs.contains("extruder_plant"), "{runs}");
 }
 
@@ -388,7 +388,7 @@ fn a_profile_tells_how_far_it_was_played() {
     let share = |changes: &[(&str, &str)]| {
         let summary = runs_through(cell, changes, 0.4);
         let profile = &summary["extruder"]["profile"];
-        (number(profile, "played_share"), number(profile, "outlasted_s"))
+        (number(profile, "played_fraction"), number(profile, "after_end_s"))
     };
     let path = cell.lines().find(|line| line.starts_with("path_mm")).unwrap();
     let (cut_off, none) = share(&[(path, "path_mm = 4000.0")]);

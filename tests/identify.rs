@@ -211,7 +211,7 @@ fn columns_that_tell_nothing() {
     assert!(said.contains("the same from sample to sample"), "{said}");
     let said = refused(|lines| lines.truncate(40), &[]);
     assert!(said.contains("39 samples: a model takes 50 or more"), "{said}");
-    let said = refused(|_| {}, &["--validate-share", "0.005"]);
+    let said = refused(|_| {}, &["--validate-fraction", "0.005"]);
     assert!(said.contains("25 samples are left to validate with"), "{said}");
 }
 
@@ -259,7 +259,7 @@ fn arguments_that_are_wrong() {
         (["--smooth", "10,3"], "odd number from 5"),
         (["--unit", "screw_rpm=turns"], "expected one of rpm"),
         (["--unit", "screw=rpm"], "--unit screw: no such column"),
-        (["--validate-share", "0.95"], "expected 0 to 0.9"),
+        (["--validate-fraction", "0.95"], "expected 0 to 0.9"),
         (["--validate", "none.csv"], "none.csv"),
         (["--nozzle-mm", "0"], "0.01 to 1000"),
         (["--nozzle-mm", "-1"], "0.01 to 1000"),
@@ -403,7 +403,7 @@ fn a_flow_that_was_measured_on_the_bead_is_the_flow_at_the_nozzle() {
         }
     }
     // Without the way, area and speed are of different moments, and no model tells their product.
-    let told = ask("--area area_mm2 --speed wheel_mm_per_s --validate-share 0", 1);
+    let told = ask("--area area_mm2 --speed wheel_mm_per_s --validate-fraction 0", 1);
     assert!(told.contains("no model can be trusted"), "{told}");
     for (args, code, expected) in [
         ("--area area_mm2", 2, "--speed"),

@@ -120,7 +120,7 @@ fn a_board_under_the_nozzle_tells_the_offset() {
     assert!(missing.contains("needs --board") && missing.contains("--nozzle-at"), "{missing}");
     let of_recording = with(&["--nozzle-at", "4,-1", "--max-mm", "300"]);
     let wrong = said(&mut offset(&picture, &of_recording), 2);
-    assert!(wrong.contains("--max-mm means nothing for a picture"), "{wrong}");
+    assert!(wrong.contains("--max-mm means nothing for an image"), "{wrong}");
     // A single number does not say where the bed is.
     let text = fs::read_to_string(cell).unwrap();
     fs::write(cell, text.replace("file = \"calib.toml\"", "mm_per_px = 0.4")).unwrap();

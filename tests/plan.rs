@@ -82,7 +82,7 @@ fn a_table_is_planned_within_the_limits_of_its_cell() {
     assert!(width_rms(&answer) < 0.5 * width_rms(&none), "{answer}{none}");
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     for part in
-        ["width [mm]", "width error [mm]", "command [rpm]", "The width is foretold to stray"]
+        ["width [mm]", "width error [mm]", "command [rpm]", "The width is predicted to stray"]
     {
         assert!(page.contains(part), "{part}");
     }

@@ -196,7 +196,7 @@ fn what_a_live_calibration_cannot_do_is_told() {
         (&["--camera", "x", "--plane", "y.png"], 2, "cannot be used with"),
         (&["--camera", "x", "--rate-hz", "0"], 2, "expected 0.1 to 1000"),
         (&["--camera", "x", "--dictionary", "5x5"], 2, "--marker-mm"),
-        (&["film", "--pictures", "x"], 2, "--pictures x: only with --camera"),
+        (&["film", "--images", "x"], 2, "--images x: only with --camera"),
         (&["--camera", "x", "--marker-mm", "15"], 2, "40 to 90 %"),
         (&["--camera", "x", "--marker-mm", "9", "--dictionary", "apriltag"], 2, "4x4, 5x5, 6x6"),
     ] {
@@ -210,6 +210,6 @@ fn what_a_live_calibration_cannot_do_is_told() {
     let (status, said) = calibrate(&["--camera", text(&film)]);
     assert!(status == 1 && said.contains("has not shown the board lying still"), "{said}");
     assert!(!folder.join("calib-pictures").exists() && !out.exists());
-    let (status, said) = calibrate(&["--camera", text(&film), "--pictures", text(&film)]);
+    let (status, said) = calibrate(&["--camera", text(&film), "--images", text(&film)]);
     assert!(status == 2 && said.contains("expected an empty folder"), "{status} {said}");
 }

@@ -115,7 +115,7 @@ fn steps_that_leave_the_limits_are_refused_with_their_line() {
     let out = path(folder.path(), "out");
     let try_share = |share: &str, code| {
         said(
-            &mut truebead(&["tune", &cell, "--out", &out, "--simulated", "--step-share", share]),
+            &mut truebead(&["tune", &cell, "--out", &out, "--simulated", "--step-fraction", share]),
             code,
         )
     };

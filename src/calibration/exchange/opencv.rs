@@ -164,12 +164,12 @@ extrinsic_parameters: !!opencv-matrix
             .replace("1.9512345678901234e-01", "-1");
         let said = said(&text);
         for words in [
-            "line 5: found 640.5, expected a whole number from 1 to 65536",
-            "line 12: found 1, expected 0; fisheye lenses are not known here",
+            "line 5: image_width: found 640.5, expected a whole number from 1 to 65536",
+            "line 12: fisheye_model: found 1, expected 0; fisheye lenses are not known here",
             "line 18: camera_matrix.data[4]: found .Inf, expected a finite number",
             "line 18: camera_matrix.data[5]: found \"233.86\", expected a finite number",
             "line 23: distortion_coefficients.data: found 5 numbers, expected rows x cols = 4",
-            "line 24: found -1, expected a number from 0 to 1000",
+            "line 24: avg_reprojection_error: found -1, expected a number from 0 to 1000",
         ] {
             assert!(said.contains(words), "no \"{words}\" in\n{said}");
         }

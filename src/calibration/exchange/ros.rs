@@ -217,7 +217,7 @@ roi:
         };
         // The projection is that of rectified pictures.
         let [note] = import.notes.as_slice() else { panic!("{:?}", import.notes) };
-        assert!(note.starts_with("projection_matrix is for rectified pictures"), "{note}");
+        assert!(note.starts_with("projection_matrix is for rectified images"), "{note}");
         assert_eq!((import.format, import.intrinsics), (Format::Ros, intrinsics));
         let four = FILE.replace("cols: 5", "cols: 4").replace(", 0.16]", "]");
         let four = parse("info.yaml", &four).unwrap().intrinsics.camera;
@@ -242,7 +242,7 @@ roi:
     #[test]
     fn a_part_of_the_picture_and_pixels_put_together_are_refused() {
         for (from, to, words) in [
-            ("binning_x: 0", "binning_x: 2", "line 30: found 2, expected 0 or 1"),
+            ("binning_x: 0", "binning_x: 2", "line 30: binning_x: found 2, expected 0 or 1"),
             ("x_offset: 0", "x_offset: 8", "roi.x_offset: found 8, expected 0 or the whole"),
             ("  width: 0", "  width: 320", "roi.width: found 320, expected 0 or the whole"),
         ] {
@@ -257,7 +257,7 @@ roi:
     #[test]
     fn lenses_that_are_not_known_are_refused() {
         let fish = said(&FILE.replace("plumb_bob", "equidistant"));
-        let words = "line 10: found equidistant, expected plumb_bob or rational";
+        let words = "line 10: distortion_model: found equidistant, expected plumb_bob or rational";
         assert!(fish.contains(words), "{fish}");
         let eight = said(&FILE.replace("plumb_bob", "rational_polynomial"));
         assert!(eight.contains("distortion_coefficients: found 5 numbers, expected 8"), "{eight}");
@@ -276,7 +276,7 @@ roi:
         let said = said(&text);
         for words in [
             "image_width: found nothing, expected a whole number from 1 to 65536",
-            "line 1: found -480, expected a whole number",
+            "line 1: image_height: found -480, expected a whole number",
             "camera_matrix: found a focal length fx of -3, expected 1 to 10000000",
             "camera_matrix: found a skew of 0.5, expected 0",
             "line 13: distortion_coefficients.data[1]: found .Nan, expected a finite number",

@@ -18,7 +18,7 @@ Examples:
   truebead tune my-cell.toml --out again --recording tuned/recording.mcap --write new-cell.toml
 
 Runs the cell with steps of the robot's speed in place of its controller: after the first
-stretch eleven pieces of bead, each at the start speed or --step-share more or less,
+stretch eleven pieces of bead, each at the start speed or --step-fraction more or less,
 within [limits]. It says beforehand how much bead that takes. A width near an end of
 gauge.width_range_mm ends the steps; whatever else fails, the cell holds and stops as
 in any run. With --simulated nothing is moved: the cell's own simulated bead is laid.

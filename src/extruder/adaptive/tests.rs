@@ -253,5 +253,5 @@ fn both_laws_hold_a_strand_without_a_trace_of_the_coupling() {
     assert!((reading.strand_m_per_s - 0.05).abs() < 1e-5);
     let refused =
         Adaptive::new(model, gains(LEARN), AdaptiveGains { feedback: -9.0, ..strand }, HOLD);
-    assert!(refused.unwrap_err().to_string().starts_with("adaptive law of the strand: "));
+    assert!(refused.unwrap_err().to_string().starts_with("adaptive controller of the strand: "));
 }

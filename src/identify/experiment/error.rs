@@ -92,7 +92,7 @@ pub enum ExperimentError {
     /// A column that does not move in one of the parts that a log is cut into.
     #[error(
         "the {side} is {} all the time from {from_s:.1} s to {to_s:.1} s, the part that is {}: \
-         cut the log elsewhere (--validate-share, --to-s), or name another one to validate with \
+         cut the log elsewhere (--validate-fraction, --to-s), or name another one to validate with \
          (--validate)", six_digits(*.value),
         if *.validates { "kept to validate with" } else { "fitted to" }
     )]

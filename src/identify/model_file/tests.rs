@@ -57,8 +57,8 @@ fn everything_that_is_wrong_is_told_at_once() {
     let said = parse("model.toml", &text).unwrap_err().to_string();
     for part in [
         "model.toml: 7 problems",
-        "line 1: found 2",
-        "line 2: found an unknown key, expected \"material\"?",
+        "line 1: version: found 2",
+        "line 2: matrial: found an unknown key, expected \"material\"?",
         "input.unit: found \"turns\", expected \"rpm\" or \"mpa\"",
         "input.range: found [40, 20]",
         "transfer.denominator: found [-0.84, 1.0], which is unstable, expected poles",

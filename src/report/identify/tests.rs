@@ -85,7 +85,7 @@ fn another_machine_is_not_foretold() {
     let data = logs(experiment(&flow_log::binary().unwrap()), Some(experiment(&other)));
     let refusal = study(data, &[settings(Structure::SecondOrderOscillating { zero: false })]);
     let said = refusal.unwrap_err().to_string();
-    assert!(said.contains("does not foretell") && said.contains("same machine"), "{said}");
+    assert!(said.contains("does not predict") && said.contains("same machine"), "{said}");
 }
 
 #[test]

@@ -34,7 +34,7 @@ impl ModelStudy {
         match self.validation {
             None => warnings.push(
                 "nothing was validated with: a fit to its own data says little; give --validate or \
-                 --validate-share"
+                 --validate-fraction"
                     .to_owned(),
             ),
             Some(other) if other.rmse > OVERFIT * self.fit.quality.rmse => warnings.push(format!(

@@ -188,7 +188,7 @@ impl Tuned {
             }
             for (_, key, value) in settings.iter().filter(|(of, ..)| *of == table) {
                 let comment = match *key {
-                    "kp_per_s" => "  # fallen back to, or with controller = \"pi\"",
+                    "kp_per_s" => "  # fallen back to, or with strategy = \"pi\"",
                     _ => "",
                 };
                 let _ = writeln!(text, "{key} = {value}{comment}");

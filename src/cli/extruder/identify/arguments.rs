@@ -146,7 +146,7 @@ impl IdentifyArgs {
         let source = path.display().to_string();
         let share = self.validate_fraction.unwrap_or(VALIDATE_FRACTION);
         if !(0.0..=0.9).contains(&share) {
-            let what = format!("--validate-share {share}: expected 0 to 0.9");
+            let what = format!("--validate-fraction {share}: expected 0 to 0.9");
             return Err(WrongArguments::new(what).into());
         }
         let (estimation, validation) = match &self.validate {

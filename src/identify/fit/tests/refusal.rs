@@ -101,7 +101,7 @@ fn too_many_poles_are_told_by_name() {
             matches!(error, FitError::Undetermined(Undetermined::Pole { poles: 3, .. })),
             "{error}"
         );
-        assert!(error.to_string().contains("do not tell 3 poles from 2"), "{error}");
+        assert!(error.to_string().contains("do not distinguish 3 poles from 2"), "{error}");
         let accepted = FitSettings { accept_undetermined: true, ..settings };
         let found = fit(&samples, &accepted).unwrap();
         assert!(!found.is_determined());

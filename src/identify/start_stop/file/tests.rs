@@ -37,12 +37,12 @@ fn everything_that_is_wrong_is_told_at_once() {
     let said = parse("starts.toml", &text).unwrap_err().to_string();
     for part in [
         "starts.toml: 6 problems",
-        "line 1: found 2",
+        "line 1: version: found 2",
         "start.void_mm3: found -640.0, expected a number from 0 to",
         "start.rise_sigma_s: found nothing",
         "stop.fall_s: found 0.0, expected a number from 0.000001",
         "stop.fell_s: found an unknown key, expected \"fall_s\"?",
-        "seen.stops: found 1.5, expected a whole number",
+        "data.stops: found 1.5, expected a whole number",
     ] {
         assert!(said.contains(part), "{part} in {said}");
     }
