@@ -14,7 +14,7 @@
 //! live run, [`cli`] what a person types.
 //!
 //! Conventions (pixel centres, frames of reference, signs) are in
-//! `CONVENTIONS.md`; how the modules depend on each other is in
+//! `docs/src/reference/conventions.md`; how the modules depend on each other is in
 //! `ARCHITECTURE.md`.
 
 pub mod assembly;

@@ -177,7 +177,7 @@ fn said(run: &assert_cmd::assert::Assert) -> String {
     String::from_utf8_lossy(&run.get_output().stdout).into_owned()
 }
 
-/// Every line of the table of bad images in `calib/README.md`.
+/// Every line of the table of bad images in `docs/src/reference/board-images.md`.
 #[test]
 fn images_that_are_no_good_are_left_out_and_say_why() {
     let scratch = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! The calibration file. Version 1; see `calib/README.md` for every key.
+//! The calibration file as text. Version 1; see `docs/src/reference/calibration-file.md` for every
+//! key.
 
 use std::fmt::Write;
 

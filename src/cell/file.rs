@@ -1,5 +1,5 @@
 //! The cell file: calibration, gauge, control, camera, limits, robot and
-//! recording, and for a simulated bead what it is made of. See the README for
+//! recording, and for a simulated bead what it is made of. See `docs/src/reference/cell` for
 //! every key.
 
 mod calibration;

@@ -1,4 +1,4 @@
-//! The file of a model. Version 1; see `models/README.md` for every key.
+//! The file of a model. Version 1; see `docs/src/reference/model-file.md` for every key.
 
 mod write;
 

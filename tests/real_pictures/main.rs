@@ -1,7 +1,7 @@
 //! `truebead process` on real clips, whose true widths nobody knows: what must
 //! be refused, what must be measured, and how well widths agree with each
 //! other. `cargo test --test real_pictures -- --nocapture` prints the figures
-//! of ACCURACY.md.
+//! of docs/src/reference/accuracy.md.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 

@@ -16,7 +16,7 @@ Example:
 
 Take 10 to 20 sharp images of a flat board, tilted to several sides and in
 all parts of the image. Take the last one with the board flat on the bed, or
-name that image with --plane. calib/README.md has more.
+name that image with --plane. docs/src/how-to/calibrate-a-camera.md has more.
 
 Besides the calibration file a report.html is written: the uncertainty of a
 width over the image, and what one more image would bring.

@@ -16,7 +16,7 @@ Example:
   truebead camera board --board 9x6 --square-mm 20 --out board.pdf
 
 Print it at 100 %, without \"fit to page\", and measure the bar below it. Glue it
-to something flat and stiff. calib/README.md says how to take the images.")]
+to something flat and stiff. docs/src/how-to/calibrate-a-camera.md says how to take the images.")]
 pub struct SheetArgs {
     #[command(flatten)]
     board: BoardArgs,

@@ -16,7 +16,7 @@ Examples:
   truebead plan jobs/corner.gcode --cell cells/corner.toml --out plan --ends moving
 
 The job is a table (.csv) of path, position and nominal speed, or G-code (.gcode, .nc,
-.g); jobs/README.md has both. The cell's [extruder] needs a strategy with a model,
+.g); docs/src/reference/job-files.md has both. The cell's [extruder] needs a strategy with a model,
 \"feedforward\"; its limits and those of [limits] are kept.
 
 A robot slows down at corners within hundredths of a second, and an extruder follows

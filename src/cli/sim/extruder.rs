@@ -31,7 +31,7 @@ the operator's key that acknowledges a fault. The rendered camera of such a run
 shows a bead that follows the robot only, not the flow.
 
 To be the PC by hand: nc 127.0.0.1 5654, and HELLO 1 me as the first line.
-robot/EXTRUDER.md has the rest.")]
+docs/src/reference/extruder-link.md has the rest.")]
 pub struct ExtruderSimArgs {
     /// Cell file that describes the extruder
     cell: PathBuf,

@@ -23,7 +23,7 @@ first. A new connection stands for the operator's key: it begins the job again
 once it was finished, and acknowledges a STOP or FAULT that it finds.
 
 To be the PC by hand: nc 127.0.0.1 5653, and HELLO 1 me as the first line.
-robot/PROTOCOL.md has the rest.")]
+docs/src/reference/robot-link.md has the rest.")]
 pub struct RobotSimArgs {
     /// Address and port on which the robot listens
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:5653")]

@@ -11,7 +11,7 @@ const IGNORED_CODES: [f64; 9] = [17.0, 40.0, 49.0, 54.0, 61.0, 64.0, 80.0, 90.1,
 /// Millimetres in an inch. By definition (international yard, 1959).
 const MM_PER_INCH: f64 = 25.4;
 const KNOWN_CODES: &str = "G0 to G3, G20, G21, G90 and G91 are, and what moves nothing is passed over \
-                     (jobs/README.md has all words); write the move with these";
+                     (docs/src/reference/job-files.md has all words); write the move with these";
 
 /// Motion of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]

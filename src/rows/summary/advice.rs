@@ -1,8 +1,8 @@
 //! Advice about light and lens, from the quality of a run's images.
 //!
 //! The scale is the bound: the standard deviation of widths is proportional to noise over contrast
-//! and to the root of the blur (ACCURACY.md, "The two bounds"). An image is compared with one of 80
-//! grey levels of contrast, 4 of noise and a blur of 1.5 px, for which the table of accuracy holds.
+//! and to the root of the blur (docs/src/explanation/uncertainty.md). An image is compared with one
+//! of 80 grey levels of contrast, 4 of noise and a blur of 1.5 px, for which the table of accuracy holds.
 
 use super::image_quality::ImageQuality;
 

@@ -40,7 +40,7 @@ Examples:
 Names end with their units (time_s, _rpm, _mm3_per_s …), or --unit gives them.
 Forms: fopdt K (Tz s + 1) / (T s + 1) e^(-L s) without Tz, fopdt-zero with it; sopdt
 K / (T^2 s^2 + 2 D T s + 1); sopdt-real K / ((T1 s + 1) (T2 s + 1)); 3,2 poles and zeros.
-models/README.md has more about data and forms.
+docs/src/reference/model-file.md has more about data and forms.
 
 Exit status: 0 a model was found, 1 none that can be trusted, 2 wrong arguments.")]
 pub struct IdentifyArgs {

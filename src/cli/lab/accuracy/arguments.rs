@@ -15,7 +15,7 @@ Silent: widths that are more than half a pixel off, as a fraction of all frames.
 Bound: the smallest standard deviation that the width of a straight bead can
 have in an image that nothing disturbs; free bound: the same where its
 direction is not known. The last column names the limits that are missed; the
-status is 1 where there are any. ACCURACY.md says what every set is.
+status is 1 where there are any. docs/src/reference/accuracy.md says what every set is.
 
   truebead lab accuracy --calibration
 

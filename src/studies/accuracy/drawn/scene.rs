@@ -92,7 +92,7 @@ pub struct Rib {
 }
 
 impl Default for DrawnScene {
-    /// The bead of `ACCURACY.md`: 332 px, 150 on 70, σ = 4, s = 1.5.
+    /// The bead of `docs/src/reference/accuracy.md`: 332 px, 150 on 70, σ = 4, s = 1.5.
     fn default() -> Self {
         let none = Patches { size_grey: 0.0, length_px: 1.0 };
         Self {
