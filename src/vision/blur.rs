@@ -1,6 +1,7 @@
 //! Blur of an edge, from all calipers together: the profiles are laid over
 //! each other at half-pixel steps and a step of free blur is fitted.
 
+use crate::numeric::number::{floor_to_count, to_f64};
 use nalgebra::{Matrix5, Vector5};
 
 use super::fit::ShadedStep;
@@ -30,24 +31,13 @@ impl Default for BinnedProfile {
 }
 
 impl BinnedProfile {
-    /// Forgets everything.
-    pub fn clear(&mut self) {
-        *self = Self::default();
-    }
-
     /// Lays a sample at a distance from its edge \[px\]; what is too far is
     /// left out.
     pub fn add(&mut self, distance_px: f64, grey: f64) {
-        #[expect(clippy::cast_precision_loss, reason = "there are few bins")]
-        let (place, bins) = ((2.0 * distance_px).round() + CENTRE_BIN as f64, BINS as f64);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "within the bins"
-        )]
-        if place >= 0.0 && place < bins {
-            self.sums[place as usize] += grey;
-            self.counts[place as usize] += 1.0;
+        let bin = (2.0 * distance_px).round() + to_f64(CENTRE_BIN);
+        if bin >= 0.0 && bin < to_f64(BINS) {
+            self.sums[floor_to_count(bin)] += grey;
+            self.counts[floor_to_count(bin)] += 1.0;
         }
     }
 
@@ -87,9 +77,8 @@ impl BinnedProfile {
     }
 
     fn samples(&self) -> impl Iterator<Item = (f64, f64, f64)> {
-        #[expect(clippy::cast_precision_loss, reason = "there are few bins")]
         (0..BINS).filter(|&k| self.counts[k] > 0.0).map(|k| {
-            let distance = (k as f64 - CENTRE_BIN as f64) / 2.0;
+            let distance = (to_f64(k) - to_f64(CENTRE_BIN)) / 2.0;
             (distance, self.sums[k] / self.counts[k], self.counts[k])
         })
     }

@@ -10,6 +10,7 @@ use super::edge_windows::{EdgeWindow, EdgeWindows};
 use super::overlay::{MeanProfilePart, Overlay};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::NormalEquations;
+use crate::numeric::number::to_f64;
 use crate::numeric::rank;
 
 /// Parts along the bead that are told apart, because light may change.
@@ -56,8 +57,10 @@ pub struct ClippedStep {
 }
 
 /// What is known of the picture.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ClippedScene {
+#[derive(Debug, Clone, Copy)]
+pub struct ClippedScene<'a> {
+    /// The blurred step.
+    pub table: &'a StepTable,
     /// Whether the hidden level lies after the edge.
     pub clipped_after: bool,
     /// Noise of a pixel \[grey levels\].
@@ -136,7 +139,7 @@ struct ExpectedPixel {
     by: [f64; 4],
 }
 
-impl ClippedScene {
+impl ClippedScene<'_> {
     fn sign(&self) -> f64 {
         if self.clipped_after { 1.0 } else { -1.0 }
     }
@@ -171,20 +174,19 @@ impl ClippedScene {
     #[inline]
     fn expect(
         &self,
-        table: &StepTable,
         step: &ClippedStep,
         levels: &ClippedLevels,
         (distance, spread): (f64, f64),
     ) -> ExpectedPixel {
         let blur = (step.blur * step.blur + spread).sqrt();
         let z = self.sign() * (distance - step.at) / blur;
-        let (share, density) = table.at(z);
+        let (share, density) = self.table.at(z);
         let height = levels.clipped - levels.visible;
         let depth = blur * (density - z * (1.0 - share));
         let level = levels.visible + height * share + self.shading * depth;
         let slope = height * density / blur;
         let noise = (self.noise * self.noise + slope * slope * spread).sqrt();
-        let seen = censor::censored_pixel(table, level, noise, self.white);
+        let seen = censor::censored_pixel(self.table, level, noise, self.white);
         let by = [-self.sign() * slope, -slope * z, 1.0 - share, levels.light * share];
         ExpectedPixel { seen, by: by.map(|by| by * seen.sensitivity) }
     }
@@ -195,8 +197,7 @@ impl ClippedEdge {
     /// known of the blur. `None` where no step can be fitted.
     pub fn fit(
         &mut self,
-        table: &StepTable,
-        scene: &ClippedScene,
+        scene: &ClippedScene<'_>,
         overlay: &Overlay,
         start: ClippedStep,
         blur: Option<BlurEstimate>,
@@ -209,7 +210,7 @@ impl ClippedEdge {
             if k < WINDOW_STEPS {
                 window = scene.window(&step);
             }
-            let (mut normal, misfit) = self.linearise(table, scene, window, &step, mean_visible);
+            let (mut normal, misfit) = self.linearise(scene, window, &step, mean_visible);
             let seen = (scene.white - step.visible).max(scene.noise);
             normal.add_prior(3, (HIDDEN_LEVEL_SIGMA * seen).powi(-2), scene.white - step.clipped);
             if let Some(BlurEstimate { px, sd_px }) = blur {
@@ -259,8 +260,7 @@ impl ClippedEdge {
     /// units of the noise.
     fn linearise(
         &self,
-        table: &StepTable,
-        scene: &ClippedScene,
+        scene: &ClippedScene<'_>,
         (from, to): (f64, f64),
         step: &ClippedStep,
         mean_visible: f64,
@@ -271,7 +271,7 @@ impl ClippedEdge {
             let levels = scene.levels(step, mean_visible, profile.levels);
             for (distance, value) in profile.samples(from, to) {
                 let place = (distance, profile.spread);
-                let ExpectedPixel { seen, by } = scene.expect(table, step, &levels, place);
+                let ExpectedPixel { seen, by } = scene.expect(step, &levels, place);
                 let (miss, weight) = (value - seen.level, profile.rows / seen.variance);
                 normal.add(by, miss, weight);
                 square += weight * miss * miss;
@@ -286,21 +286,20 @@ impl ClippedEdge {
     /// the median leaves, in standard deviations of its noise.
     pub fn locate(
         &mut self,
-        table: &StepTable,
-        scene: &ClippedScene,
+        scene: &ClippedScene<'_>,
         sheet: &EdgeWindows,
         lines: usize,
         found: &ClippedStepFit,
         mut take: impl FnMut(usize, Option<ClippedLine>),
     ) -> f64 {
         self.rows.clear();
-        for (number, window) in sheet.windows().iter().enumerate() {
+        for (number, window) in sheet.windows.iter().enumerate() {
             let [at, before, step] = window.expected;
             let levels = [f64::from(before), f64::from(before + step)];
             let levels = scene.levels(&found.step, found.mean_visible, levels);
             let step = ClippedStep { at: f64::from(at), ..found.step };
             let pixels = (sheet.pixels(number).as_slice(), window);
-            self.rows.push(ClippedRow::read(table, scene, pixels, &step, &levels));
+            self.rows.push(ClippedRow::read(scene, pixels, &step, &levels));
         }
         let (limit, misfit) = self.limit();
         let mut first = 0;
@@ -328,23 +327,19 @@ impl ClippedEdge {
 
 impl ClippedStepFit {
     fn of(
-        scene: &ClippedScene,
+        scene: &ClippedScene<'_>,
         step: ClippedStep,
         covariance: &nalgebra::Matrix4<f64>,
         mean_visible: f64,
     ) -> Option<Self> {
         // What of the place's variance comes with blur and hidden level.
         let of_place = Vector2::new(covariance[(0, 1)], covariance[(0, 3)]);
-        let of_others = Matrix2::new(
-            covariance[(1, 1)],
-            covariance[(1, 3)],
-            covariance[(1, 3)],
-            covariance[(3, 3)],
-        );
+        let [blur, both, hidden] = [(1, 1), (1, 3), (3, 3)].map(|of| covariance[of]);
+        let of_others = Matrix2::new(blur, both, both, hidden);
         let variance = (of_place.transpose() * of_others.try_inverse()? * of_place)[0];
-        let visible_share = (scene.white - step.visible) / (step.clipped - step.visible);
-        let blur_sd = covariance[(1, 1)].sqrt();
-        let found = Self { step, variance, blur_sd, visible_fraction: visible_share, mean_visible };
+        let visible_fraction = (scene.white - step.visible) / (step.clipped - step.visible);
+        let blur_sd = blur.sqrt();
+        let found = Self { step, variance, blur_sd, visible_fraction, mean_visible };
         (variance.is_finite() && blur_sd.is_finite() && step.blur > 0.0).then_some(found)
     }
 }
@@ -353,8 +348,7 @@ impl ClippedRow {
     /// Reads a window: what it misses, times its derivatives by place and
     /// visible level.
     fn read(
-        table: &StepTable,
-        scene: &ClippedScene,
+        scene: &ClippedScene<'_>,
         (pixels, window): (&[f32], &EdgeWindow),
         step: &ClippedStep,
         levels: &ClippedLevels,
@@ -369,7 +363,7 @@ impl ClippedRow {
             if place < from || place > to {
                 continue;
             }
-            let ExpectedPixel { seen, by } = scene.expect(table, step, levels, (place, 0.0));
+            let ExpectedPixel { seen, by } = scene.expect(step, levels, (place, 0.0));
             let miss = f64::from(pixel) - seen.level;
             if miss.abs() > NOISE_SIGMAS * noise + SLACK_PX * by[0].abs() {
                 row.wild += 1;
@@ -404,17 +398,12 @@ fn solve(rows: &[ClippedRow], limit: f64) -> Option<ClippedLine> {
         vector += row.vector;
         n += 1.0;
     }
-    #[expect(clippy::cast_precision_loss, reason = "a line has few rows")]
-    let share = n / rows.len() as f64;
-    if share < 0.5 {
+    let row_fraction = n / to_f64(rows.len());
+    if row_fraction < 0.5 {
         return None;
     }
     let inverse = matrix.try_inverse()?;
-    Some(ClippedLine {
-        moved: (inverse * vector)[0],
-        variance: inverse[(0, 0)],
-        row_fraction: share,
-    })
+    Some(ClippedLine { moved: (inverse * vector)[0], variance: inverse[(0, 0)], row_fraction })
 }
 
 #[cfg(test)]
@@ -445,8 +434,9 @@ mod tests {
         }
     }
 
-    fn scene(hidden_after: bool) -> ClippedScene {
+    fn scene(table: &StepTable, hidden_after: bool) -> ClippedScene<'_> {
         ClippedScene {
+            table,
             clipped_after: hidden_after,
             noise: 4.0,
             white: 255.0,
@@ -456,8 +446,7 @@ mod tests {
     }
 
     /// The mean of what a camera with noise shows of a step, in fine levels.
-    fn sheet(scene: &ClippedScene, step: &ClippedStep, path: &Straight) -> EdgeWindows {
-        let table = StepTable::default();
+    fn sheet(scene: &ClippedScene<'_>, step: &ClippedStep, path: &Straight) -> EdgeWindows {
         let levels = ClippedLevels { visible: step.visible, clipped: step.clipped, light: 1.0 };
         #[expect(
             clippy::cast_possible_truncation,
@@ -465,7 +454,7 @@ mod tests {
             reason = "within 16 bits"
         )]
         let shown = |x: u16| {
-            let level = scene.expect(&table, step, &levels, (f64::from(x), 0.0)).seen.level;
+            let level = scene.expect(step, &levels, (f64::from(x), 0.0)).seen.level;
             (level * 257.0).round() as u16
         };
         let values = (0..40).flat_map(|_| (0..120u16).map(shown)).collect();
@@ -486,7 +475,7 @@ mod tests {
     fn the_flank_tells_place_blur_and_the_hidden_level() {
         let table = StepTable::default();
         for hidden_after in [true, false] {
-            let scene = scene(hidden_after);
+            let scene = scene(&table, hidden_after);
             let truth = ClippedStep { at: 60.3, blur: 1.6, visible: 175.0, clipped: 300.0 };
             let levels = if hidden_after { [175.0, 255.0] } else { [255.0, 175.0] };
             let path = Straight { at: 59.8, levels };
@@ -495,7 +484,7 @@ mod tests {
             overlay.lay(&sheet);
             let start = ClippedStep { at: 0.0, blur: 1.2, visible: 175.0, clipped: 280.0 };
             let mut cut_off = ClippedEdge::default();
-            let found = cut_off.fit(&table, &scene, &overlay, start, None).unwrap();
+            let found = cut_off.fit(&scene, &overlay, start, None).unwrap();
             assert!((found.step.at - 0.5).abs() < 0.005, "{found:?}");
             assert!((found.step.blur - 1.6).abs() < 0.005, "{found:?}");
             assert!((found.step.clipped - 300.0).abs() < 0.5, "{found:?}");
@@ -505,7 +494,7 @@ mod tests {
             let mut lines = Vec::new();
             sheet.correct(EdgeCorrection { aside: 60.25 - path.at, before: 0.0, after: 1.0 });
             let take = |_, line: Option<ClippedLine>| lines.push(line.unwrap());
-            cut_off.locate(&table, &scene, &sheet, LINES.len(), &found, take);
+            cut_off.locate(&scene, &sheet, LINES.len(), &found, take);
             assert_eq!(lines.len(), 4);
             assert!(lines.iter().all(|line| (line.moved - 0.05).abs() < 0.006), "{lines:?}");
         }

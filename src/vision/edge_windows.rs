@@ -4,7 +4,7 @@
 use super::path::EdgeCorrection;
 use super::row_range::RowRange;
 use super::strip::{GaugeRows, GreyPixel};
-use crate::numeric::number::{floor_to_index, to_f32};
+use crate::numeric::number::{floor_to_count, floor_to_index, to_f32};
 
 /// Pixels of a window.
 pub const WINDOW_PX: usize = 112;
@@ -44,16 +44,12 @@ pub struct Grouping {
 /// Windows along an edge; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct EdgeWindows {
-    windows: Vec<EdgeWindow>,
+    /// What the windows are of.
+    pub windows: Vec<EdgeWindow>,
     pixels: Vec<[f32; WINDOW_PX]>,
 }
 
 impl EdgeWindows {
-    /// What the windows are of.
-    pub fn windows(&self) -> &[EdgeWindow] {
-        &self.windows
-    }
-
     /// The pixels of a window \[grey levels of 256\].
     #[inline(always)]
     pub fn pixels(&self, window: usize) -> &[f32; WINDOW_PX] {
@@ -96,7 +92,7 @@ impl EdgeWindows {
         self.pixels.resize(self.windows.len(), [0.0; WINDOW_PX]);
         let mut v = 0;
         for (window, pixels) in self.windows.iter().zip(&mut self.pixels) {
-            let end = v + count(window.rows);
+            let end = v + floor_to_count(window.rows.into());
             average(strip, v..end, window.first, pixels);
             v = end;
         }
@@ -108,7 +104,7 @@ fn rows_together(along: usize, lines: usize, steepest: f32) -> usize {
     if along <= MAX_SINGLE_ROWS {
         return 1;
     }
-    let straight = count(MAX_ASIDE_PX / steepest.max(1e-3));
+    let straight = floor_to_count((MAX_ASIDE_PX / steepest.max(1e-3)).into());
     along.div_ceil(lines.max(1)).min(straight).max(1)
 }
 
@@ -161,13 +157,4 @@ fn add<T: GreyPixel, const N: usize>(rows: [&[T; WINDOW_PX]; N], sums: &mut [T::
             sums[k] = row[k].add_to(sums[k]);
         }
     }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "positive; what is large is cut to a few"
-)]
-fn count(number: f32) -> usize {
-    number as usize
 }

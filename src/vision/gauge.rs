@@ -1,8 +1,10 @@
 //! Where in the image the bead is measured, and what it looks like there.
 
 use crate::calibration::SurfaceMap;
-use crate::core::geometry::{ImagePoint, Roi};
+use crate::core::geometry::Roi;
 use crate::core::units::{Mm, WidthRange};
+use crate::numeric::number::to_f64;
+use crate::vision::strip::GaugeView;
 
 /// How the bead runs in the image, to within 20 degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,19 +114,10 @@ impl Gauge {
     /// Its length along the bead on a surface; `None` where an end does not see
     /// the surface.
     pub fn length_on(&self, map: &SurfaceMap) -> Option<Mm> {
-        let roi = self.roi;
-        #[expect(clippy::cast_precision_loss, reason = "pixel numbers stay far below 2^53")]
-        let [x, y, width, height] = [roi.x, roi.y, roi.width, roi.height].map(|px| px as f64);
-        let (across, along) = (x + 0.5 * (width - 1.0), y + 0.5 * (height - 1.0));
-        // From border to border of its pixels, the first of which has its centre at 0.
-        let ends = match self.axis {
-            BeadAxis::Vertical => {
-                [ImagePoint::new(across, y - 0.5), ImagePoint::new(across, y + height - 0.5)]
-            }
-            BeadAxis::Horizontal => {
-                [ImagePoint::new(x - 0.5, along), ImagePoint::new(x + width - 0.5, along)]
-            }
-        };
+        let view = GaugeView::new(self.roi, self.axis);
+        let middle = 0.5 * to_f64(view.across - 1);
+        // From boundary to boundary of its pixels, the first of which has its centre at 0.
+        let ends = [-0.5, to_f64(view.along) - 0.5].map(|along| view.to_image(middle, along));
         Mm::new((map.to_mm(ends[1])? - map.to_mm(ends[0])?).norm()).ok()
     }
 }

@@ -63,7 +63,8 @@ const COLUMN_PX: usize = 2;
 pub struct MeanEdge {
     course: ParabolicCourse,
     half: usize,
-    lines: Vec<Option<CaliperEdge>>,
+    /// Positions in the last frame, one a caliper line.
+    pub lines: Vec<Option<CaliperEdge>>,
     columns: Vec<ColumnSums>,
     spreads: Vec<f32>,
 }
@@ -102,11 +103,6 @@ impl MeanFit {
 }
 
 impl MeanEdge {
-    /// Positions of the last frame, one a caliper line.
-    pub fn lines(&self) -> &[Option<CaliperEdge>] {
-        &self.lines
-    }
-
     /// Standard deviation of the ground's pattern along a line, with the noise of the
     /// pixels \[grey levels\]: the median of its columns'. `None` where too little
     /// ground lies within the gauge.

@@ -21,11 +21,11 @@ use crate::core::geometry::ImagePoint;
 use checks::{MAX_BLUR_PX, MAX_MOTION_BLUR_PX};
 use pattern_limits::MAX_PATTERN_BESIDE_COMPLETE;
 use rough_edges::may_be_rough;
-use work::{EdgeModel, MeasureState};
+use work::{EdgeModel, GaugeFrame, MeasureState, Measured};
 
 use super::axis;
 use super::edge_lines;
-use super::gauge::{Gauge, MeasureMethod, WidthRangePx};
+use super::gauge::{Gauge, MeasureMethod};
 use super::pixel_noise::PixelNoise;
 use super::pool;
 use super::reject::Reject;
@@ -69,7 +69,7 @@ impl Measurer {
         let Edges { left, right } = self.edges();
         let (mut left, mut right) = (left.iter().copied(), right.iter().copied());
         let lines = match self.gauge.method {
-            MeasureMethod::Caliper => self.work.lines.len(),
+            MeasureMethod::Caliper => self.work.rows.lines.len(),
             MeasureMethod::EdgeLines => left.len(),
         };
         (0..lines).filter_map(move |number| {
@@ -87,18 +87,13 @@ impl Measurer {
         measured: &WidthMeasurement,
         surface: &SurfaceMap,
     ) -> Option<LocalWidths> {
-        let lines = self.work.lines.len();
+        let lines = self.work.rows.lines.len();
         let along = GaugeView::new(self.gauge.roi, self.gauge.axis).along;
+        let [left, right] = [&self.work.left, &self.work.right].map(|edge| edge.uncertainty);
         let filter = CaliperFilter {
-            filter_px: self
-                .work
-                .left
-                .uncertainty
-                .along_px
-                .max(self.work.right.uncertainty.along_px),
+            filter_px: left.along_px.max(right.along_px),
             blur_px: measured.hints.blur_px,
-            noise_fractions: [&self.work.left, &self.work.right]
-                .map(|edge| edge.uncertainty.lines_fraction),
+            noise_fractions: [left.lines_fraction, right.lines_fraction],
             line_px: to_f64(along) / to_f64(lines.max(1)),
         };
         LocalWidths::read(self.calipers(), lines, filter, surface)
@@ -121,7 +116,7 @@ impl Measurer {
         if self.gauge.method == MeasureMethod::EdgeLines {
             return Some(CaliperPoint { at: points.next()?, sigma_px: None });
         }
-        let located = tracer.edges().get(number).copied().flatten()?;
+        let located = tracer.edges.get(number).copied().flatten()?;
         Some(CaliperPoint { at: points.next()?, sigma_px: Some(located.variance.sqrt()) })
     }
 
@@ -139,11 +134,7 @@ impl Measurer {
     }
 
     /// The same with no more in sigma than the picture itself leaves open.
-    fn measure_image(
-        &mut self,
-        frame: &Frame,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+    fn measure_image(&mut self, frame: &Frame, surface: &SurfaceMap) -> Measured {
         let work = &mut self.work;
         work.left_px.clear();
         work.right_px.clear();
@@ -192,22 +183,23 @@ impl MeasureState {
         strip: &GaugeRows<'_, T>,
         view: &GaugeView,
         surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+    ) -> Measured {
         let range = self.search_range(view, surface)?;
-        self.noise = PixelNoise::read(strip, 0..strip.across);
-        self.bands.pool(strip, self.gauge.calipers);
-        pool::cut_into_ranges(strip.along, self.gauge.calipers, &mut self.lines);
+        let frame = &GaugeFrame { strip, view, surface, range };
+        self.rows.noise = PixelNoise::read(strip, 0..strip.across);
+        self.rows.bands.pool(strip, self.gauge.calipers);
+        pool::cut_into_ranges(strip.along, self.gauge.calipers, &mut self.rows.lines);
         self.find_candidates();
         if self.is_busy()
-            && let Some(textured) = self.measure_busy(strip, range, view, surface)
+            && let Some(textured) = self.measure_busy(frame)
         {
             return textured;
         }
-        match self.measure_steps(strip, range, view, surface) {
-            Ok(found) => self.refine_measurement(found, strip, range, view, surface),
-            Err(reject) if may_be_rough(&reject) => self
-                .measure_rough(&reject, strip, range, view, surface)
-                .map_err(|rough| rough.or(reject)),
+        match self.measure_steps(frame) {
+            Ok(found) => self.refine_measurement(found, frame),
+            Err(reject) if may_be_rough(&reject) => {
+                self.measure_rough(&reject, frame).map_err(|rough| rough.or(reject))
+            }
             Err(reject) => Err(reject),
         }
     }
@@ -217,24 +209,20 @@ impl MeasureState {
     fn refine_measurement<T: GreyPixel>(
         &mut self,
         found: WidthMeasurement,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+        frame: &GaugeFrame<'_, T>,
+    ) -> Measured {
         let knows_texture = self.left.is_textured() && self.right.is_textured();
         let is_bearable =
-            self.pattern_ratio > 0.0 && self.pattern_ratio < MAX_PATTERN_BESIDE_COMPLETE;
+            self.both.pattern_ratio > 0.0 && self.both.pattern_ratio < MAX_PATTERN_BESIDE_COMPLETE;
         let is_on_texture = knows_texture && is_bearable;
-        if !is_on_texture && let Some(textured) = self.measure_textured(strip, range, view, surface)
-        {
+        if !is_on_texture && let Some(textured) = self.measure_textured(frame) {
             return textured;
         }
         let found = if self.may_not_be_steps()
-            && let Ok(fits) = self.find_rough(strip, range)
+            && let Ok(fits) = self.find_rough(frame)
         {
             if self.explains_more(&fits, &found) {
-                return self.width_of_rough(&fits, strip, view, surface);
+                return self.width_of_rough(&fits, frame);
             }
             self.check_flanks(&fits)?;
             self.with_row_uncertainty(&fits, found)
@@ -247,45 +235,34 @@ impl MeasureState {
 
     /// Measures edges that are blurred steps.
     #[inline(always)]
-    fn measure_steps<T: GreyPixel>(
-        &mut self,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+    fn measure_steps<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Measured {
         self.find_contours();
-        let pair = self.find_pair(range)?;
-        self.trace(strip, pair)?;
+        let pair = self.find_pair(frame.range)?;
+        self.trace(frame.strip, pair)?;
         self.reject_outliers(pair.bright)?;
         self.check_contrast()?;
-        let is_motion = self.blur_shapes.is_motion() && self.edge_model != EdgeModel::LineByLine;
+        let is_motion = self.both.blur_shape > 0 && self.both.model != EdgeModel::LineByLine;
         self.check_blur(if is_motion { MAX_MOTION_BLUR_PX } else { MAX_BLUR_PX })?;
-        self.check_ground(strip, f64::max)?;
-        self.check_boundary(strip.across)?;
-        self.width_on_surface(view, surface)
+        self.check_ground(frame.strip, f64::max)?;
+        self.check_boundary(frame.strip.across)?;
+        self.width_on_surface(frame.view, frame.surface)
     }
 
-    fn width_on_surface(
-        &mut self,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+    fn width_on_surface(&mut self, view: &GaugeView, surface: &SurfaceMap) -> Measured {
         let hints = Hints {
-            contrast_grey: f64::midpoint(self.contrasts[0], self.contrasts[1]),
+            contrast_grey: f64::midpoint(self.both.contrasts[0], self.both.contrasts[1]),
             blur_px: f64::midpoint(self.left.blur_px, self.right.blur_px),
-            noise_grey: self.noise.grey.into(),
-            saturated_fraction: self.bands.saturated_fraction(),
+            noise_grey: self.rows.noise.grey.into(),
+            saturated_fraction: self.rows.bands.saturated_fraction(),
             used_fraction: f64::midpoint(self.left.used_fraction(), self.right.used_fraction()),
             skew: None,
         };
-        self.middles.clear();
-        self.middles.extend(self.lines.iter().map(|&line| line.middle()));
-        for (tracer, points) in [(&self.left, &mut self.left_px), (&self.right, &mut self.right_px)]
-        {
-            let places = tracer.edges().iter().zip(&self.middles);
-            points
-                .extend(places.filter_map(|(edge, &v)| Some(view.to_image(edge.as_ref()?.at, v))));
+        self.rows.middles.clear();
+        self.rows.middles.extend(self.rows.lines.iter().map(|&line| line.middle()));
+        let middles = self.rows.middles.as_slice();
+        for (tracer, out) in [(&self.left, &mut self.left_px), (&self.right, &mut self.right_px)] {
+            let edges = tracer.edges.iter().zip(middles);
+            out.extend(edges.filter_map(|(edge, &v)| Some(view.to_image(edge.as_ref()?.at, v))));
         }
         let width_px = self.right.middle() - self.left.middle();
         let skew_variance = self.skew_variance();
@@ -296,7 +273,7 @@ impl MeasureState {
                 tracer.uncertainty.mean_variance.map(|known| known.max(of_compression));
             let of_steps = if mean_variance.is_none() { of_compression } else { 0.0 };
             axis::LocatedEdge {
-                positions: tracer.edges(),
+                positions: &tracer.edges,
                 common_variance: tracer.uncertainty.common_variance
                     + tracer.uncertainty.ground_variance
                     + 0.5 * skew_variance
@@ -306,9 +283,9 @@ impl MeasureState {
                 mean_variance,
             }
         });
-        let (gauge, middles) = (&self.gauge, self.middles.as_slice());
+        let gauge = &self.gauge;
         let scene = axis::WidthInput { view, surface, gauge, middles, sides };
-        let found = axis::width(&scene, hints, &mut self.axis)?;
+        let found = axis::width(&scene, hints, &mut self.scratch.axis)?;
         self.check_occlusion(&found)?;
         Ok(found)
     }

@@ -6,7 +6,6 @@ use super::edge::{StepCandidate, StepCandidates};
 use super::parallel::ParallelEdges;
 use super::strip::GreyPixel;
 use super::trace::{EdgeTracer, TraceInput};
-use crate::numeric::blurred_step::StepTable;
 
 /// By how much the distance of two steps may differ from that of the rough
 /// edges \[px\].
@@ -33,7 +32,6 @@ impl<T: GreyPixel> OccludedBead<'_, T> {
     pub fn locate_from_clear_rows(
         &self,
         [left, right]: [&mut EdgeTracer; 2],
-        table: &StepTable,
         blur: BlurEstimate,
         parallel: &mut ParallelEdges,
     ) {
@@ -48,10 +46,10 @@ impl<T: GreyPixel> OccludedBead<'_, T> {
             return;
         }
         if left.is_lost() {
-            left.locate_occluded_along(table, left_scene, blur, parallel.lefts());
+            left.locate_occluded_along(left_scene, blur, parallel.lefts());
         }
         if right.is_lost() {
-            right.locate_occluded_along(table, right_scene, blur, parallel.rights());
+            right.locate_occluded_along(right_scene, blur, parallel.rights());
         }
     }
 

@@ -7,9 +7,11 @@ use std::ops::Range;
 
 use super::edge_windows::EdgeWindows;
 use super::phase::split;
+use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f32, to_f64};
 use crate::numeric::rank;
 
 mod curved;
+mod fitter;
 mod flank;
 mod flank_skew;
 mod groove_check;
@@ -20,6 +22,7 @@ mod slopes;
 mod step;
 mod step_fit;
 
+pub use fitter::StepFitter;
 pub use flank_skew::EdgeSkew;
 pub use look::{SideRange, StepFit};
 pub use shape::{SideShading, StepShape};
@@ -113,8 +116,7 @@ impl MeanProfilePart {
     /// Sums become means.
     fn finish(&mut self) {
         let share = 1.0 / self.rows;
-        #[expect(clippy::cast_possible_truncation, reason = "a share")]
-        self.mean.iter_mut().for_each(|value| *value *= share as f32);
+        self.mean.iter_mut().for_each(|value| *value *= narrow_to_f32(share));
         self.shift *= share;
         self.spread = (share * self.spread - self.shift * self.shift).max(0.0);
         self.levels = self.levels.map(|level| share * level);
@@ -182,7 +184,7 @@ impl Overlay {
 
     #[inline(always)]
     fn lay_down(&mut self, sheet: &EdgeWindows) {
-        let windows = sheet.windows();
+        let windows = &sheet.windows;
         let count = windows.len().min(MAX_ROWS);
         self.rows.clear();
         self.laid.clear();
@@ -196,7 +198,7 @@ impl Overlay {
                 sheet.pixels(number).get(start..start + SPAN)?.first_chunk::<SPAN>()
             });
             let Some(pixels) = pixels else { continue };
-            #[expect(clippy::cast_precision_loss, reason = "a place near the gauge")]
+            #[expect(clippy::cast_precision_loss, reason = "a position near the gauge")]
             let ahead = at - place as f32;
             let (scale, shift) = (1.0 / step, before / step);
             let mut row = [0.0; SPAN];
@@ -286,17 +288,13 @@ impl Overlay {
 
     /// Rows that were laid down, and windows.
     pub fn laid(&self) -> (f64, f64) {
-        #[expect(clippy::cast_precision_loss, reason = "there are few windows")]
-        let windows = self.rows.len() as f64;
-        (self.laid.iter().map(|laid| f64::from(laid.rows)).sum(), windows)
+        (self.laid.iter().map(|laid| f64::from(laid.rows)).sum(), to_f64(self.rows.len()))
     }
 
     /// Variance of a window's samples about the mean near the edge, of the window
     /// in the median, in squared shares of the step.
     pub fn row_variance(&self) -> f64 {
-        #[expect(clippy::cast_precision_loss, reason = "a small number")]
-        let samples = (2 * CORE_HALF) as f64;
-        f64::from(self.median_misfit) / samples
+        f64::from(self.median_misfit) / to_f64(2 * CORE_HALF)
     }
 
     /// The windows that differ by no more than so many medians of what rows do,
@@ -352,30 +350,17 @@ fn samples(
 }
 
 /// Number of the value that a share of all do not exceed.
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a share of a small number"
-)]
 fn rank_of(count: usize, share: f32) -> usize {
-    ((share * count as f32) as usize).min(count.saturating_sub(1))
+    floor_to_count((share * to_f32(count)).into()).min(count.saturating_sub(1))
 }
 
-#[expect(clippy::cast_precision_loss, reason = "the window is short")]
 fn place(index: usize) -> f64 {
-    index as f64 - HALF_SPAN as f64
+    to_f64(index) - to_f64(HALF_SPAN)
 }
 
 /// Number of the sample at a whole distance, within the window.
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to the window"
-)]
 fn index(distance: f64) -> usize {
-    (distance + HALF_SPAN as f64).clamp(0.0, SPAN as f64) as usize
+    floor_to_count((distance + to_f64(HALF_SPAN)).clamp(0.0, to_f64(SPAN)))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use super::pool::Bands;
 use super::row_range::RowRange;
-use crate::numeric::number::{narrow_to_f32, to_f32};
+use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f32};
 use crate::numeric::rank;
 
 /// Bands on either side that a smoothed value is taken from.
@@ -257,7 +257,7 @@ impl EdgeTrajectory {
     #[inline(always)]
     pub fn at(&self, v: f32) -> [f32; 3] {
         let Some(last) = self.segments.len().checked_sub(1) else { return self.values[0] };
-        let mut band = floor((v - self.middles[0]) * self.per_px).min(last);
+        let mut band = floor_to_count(((v - self.middles[0]) * self.per_px).into()).min(last);
         // Bands differ by a row in height.
         if v < self.middles[band] && band > 0 {
             band -= 1;
@@ -278,15 +278,6 @@ impl EdgeTrajectory {
     pub fn steepest(&self) -> f32 {
         self.segments.iter().fold(0.0, |most, segment| segment.slopes[0].abs().max(most))
     }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "saturates at 0; pixel coordinates are small"
-)]
-fn floor(value: f32) -> usize {
-    value as usize
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 
 use super::row_range::RowRange;
 use super::strip::{GaugeRows, GreyPixel};
+use crate::numeric::number::{to_f32, to_f64};
 
 /// Rows that a profile is the mean of: fewer are too noisy to tell a step
 /// from its surroundings when the contrast is low, more would smear slanted
@@ -28,8 +29,10 @@ pub struct Bands {
     profiles: Vec<u16>,
     across: usize,
     shift: u32,
-    unit: f32,
-    bounds: Vec<RowRange>,
+    /// Grey levels of 256 for each unit of a profile.
+    pub unit: f32,
+    /// Rows of each band, along the bead.
+    pub bounds: Vec<RowRange>,
     full: usize,
     pixels: usize,
 }
@@ -46,20 +49,9 @@ impl Bands {
         &self.profiles[band * self.across..(band + 1) * self.across]
     }
 
-    /// Grey levels of 256 for each unit of a profile.
-    pub fn unit(&self) -> f32 {
-        self.unit
-    }
-
-    /// Rows of a band, along the bead.
-    pub fn rows(&self, band: usize) -> RowRange {
-        self.bounds[band]
-    }
-
     /// The band of a row.
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     pub fn band_of(&self, row: f32) -> usize {
-        self.bounds.partition_point(|rows| rows.end as f32 <= row).min(self.count() - 1)
+        self.bounds.partition_point(|rows| to_f32(rows.end) <= row).min(self.count() - 1)
     }
 
     /// Middle of a band along the bead \[px\].
@@ -68,9 +60,8 @@ impl Bands {
     }
 
     /// Share of the pixels at the upper end of the scale, from one row a band.
-    #[expect(clippy::cast_precision_loss, reason = "a share needs no more")]
     pub fn saturated_fraction(&self) -> f64 {
-        self.full as f64 / self.pixels.max(1) as f64
+        to_f64(self.full) / to_f64(self.pixels.max(1))
     }
 
     /// Cuts the strip into bands, of which there are at most as many as caliper
@@ -83,9 +74,7 @@ impl Bands {
         self.profiles.resize(count * strip.across, 0);
         let most = 4 * strip.white.level().max(1);
         self.shift = (most.ilog2() + 1).saturating_sub(PROFILE_BITS);
-        #[expect(clippy::cast_precision_loss, reason = "a power of two")]
-        let coarse = (1u32 << self.shift) as f32;
-        self.unit = 0.25 * strip.scale * coarse;
+        self.unit = 0.25 * strip.scale * to_f32(1 << self.shift);
         self.full = 0;
         self.pixels = 0;
         for (profile, rows) in self.profiles.chunks_exact_mut(strip.across).zip(&self.bounds) {
@@ -160,9 +149,9 @@ mod tests {
         let mut bands = Bands::default();
         bands.pool(&strip, 64);
         assert_eq!(bands.count(), 2);
-        assert_eq!(bands.rows(1), RowRange::new(5, 10));
+        assert_eq!(bands.bounds[1], RowRange::new(5, 10));
         assert_eq!(bands.middle(1), 7.0);
-        assert_eq!(bands.unit(), 0.25);
+        assert_eq!(bands.unit, 0.25);
         assert_eq!(bands.profile(1)[3], 4 * (8 * 4 + 11));
         bands.pool(&strip, 1);
         assert_eq!(bands.profile(0)[0], 4 * (5 * 4 + 4) + 18);
@@ -179,7 +168,7 @@ mod tests {
         };
         let mut bands = Bands::default();
         bands.pool(&strip, 5);
-        assert!((f32::from(bands.profile(0)[0]) * bands.unit() - 255.0).abs() < 0.1);
+        assert!((f32::from(bands.profile(0)[0]) * bands.unit - 255.0).abs() < 0.1);
         assert!((bands.saturated_fraction() - 0.6).abs() < 1e-12);
     }
 }

@@ -90,7 +90,8 @@ pub struct RoughEdge {
     route: EdgeRoute,
     levels: EdgeLevels,
     crossings: Crossings,
-    lines: Vec<Option<CaliperEdge>>,
+    /// Positions in the last frame, one a caliper line.
+    pub lines: Vec<Option<CaliperEdge>>,
     /// Variance of the mean profile \[grey levels²\].
     variance: f64,
     /// Shape of the mean profile.
@@ -136,11 +137,6 @@ impl RoughFit {
 }
 
 impl RoughEdge {
-    /// Positions of the last frame, one a caliper line.
-    pub fn lines(&self) -> &[Option<CaliperEdge>] {
-        &self.lines
-    }
-
     /// Mean of the positions across the bead \[px\].
     pub fn middle(&self) -> f64 {
         located::mean_position(&self.lines)

@@ -5,7 +5,7 @@ use super::pixel_noise;
 use super::reject::Reject;
 use super::strip::{GaugeRows, GreyPixel};
 use super::trace::{EdgeTracer, TraceInput};
-use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::floor_to_count;
 
 /// Share of a step that must lie below the end of the scale.
 const MIN_VISIBLE_FRACTION: f64 = 0.4;
@@ -34,7 +34,6 @@ impl<T: GreyPixel> SaturatedBead<'_, T> {
     pub fn trace(
         &self,
         tracers: [&mut EdgeTracer; 2],
-        table: &StepTable,
         cut_off: [[bool; 2]; 2],
     ) -> Result<f32, Reject> {
         let [[_, left_inside], [right_inside, _]] = cut_off;
@@ -43,8 +42,8 @@ impl<T: GreyPixel> SaturatedBead<'_, T> {
             let scene = TraceInput { noise, ..scene };
             match cut_off {
                 [true, true] => return Err(too_much_clipped(0.0)),
-                [false, false] => trace_plainly(tracer, table, &scene)?,
-                [_, hidden_after] => trace_clipped(tracer, table, &scene, hidden_after)?,
+                [false, false] => trace_plainly(tracer, &scene)?,
+                [_, hidden_after] => trace_clipped(tracer, &scene, hidden_after)?,
             }
         }
         Ok(noise)
@@ -77,11 +76,10 @@ impl<T: GreyPixel> SaturatedBead<'_, T> {
 
 fn trace_clipped<T: GreyPixel>(
     tracer: &mut EdgeTracer,
-    table: &StepTable,
     scene: &TraceInput<'_, T>,
     hidden_after: bool,
 ) -> Result<(), Reject> {
-    let found = tracer.trace_clipped(table, scene, hidden_after).ok_or(too_much_clipped(0.0))?;
+    let found = tracer.trace_clipped(scene, hidden_after).ok_or(too_much_clipped(0.0))?;
     if found.visible_fraction < MIN_VISIBLE_FRACTION || found.variance.sqrt() > MAX_CLIPPED_SIGMA_PX
     {
         return Err(too_much_clipped(found.visible_fraction));
@@ -92,11 +90,10 @@ fn trace_clipped<T: GreyPixel>(
 /// An edge both sides of which can be seen.
 fn trace_plainly<T: GreyPixel>(
     tracer: &mut EdgeTracer,
-    table: &StepTable,
     scene: &TraceInput<'_, T>,
 ) -> Result<(), Reject> {
-    if let Some(blur) = tracer.blur() {
-        tracer.trace(table, scene, blur);
+    if let Some(fit) = tracer.step_fit {
+        tracer.trace(scene, fit.blur());
     }
     if tracer.is_located() { Ok(()) } else { Err(Reject::NoPair { got: 0.0, need: 1.0 }) }
 }
@@ -111,14 +108,9 @@ fn span(places: &[Option<f32>]) -> (f32, f32) {
     places.iter().flatten().fold(none, |(low, high), &at| (low.min(at), f32::max(high, at)))
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "saturates at 0 and is cut to the gauge"
-)]
 fn columns<T: GreyPixel>(
     strip: &GaugeRows<'_, T>,
     (from, to): (f32, f32),
 ) -> std::ops::Range<usize> {
-    from as usize..(to as usize).min(strip.across)
+    floor_to_count(from.into())..floor_to_count(to.into()).min(strip.across)
 }

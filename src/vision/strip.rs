@@ -9,6 +9,7 @@ use crate::core::geometry::{ImagePoint, Roi};
 
 use super::gamma::LightTable;
 use super::gauge::BeadAxis;
+use crate::numeric::number::to_f64;
 
 /// Side of the squares in which a region is turned: a row of one fits a register,
 /// and reading and writing stay in the cache.
@@ -36,12 +37,20 @@ impl GaugeView {
     }
 
     /// The image point of gauge coordinates.
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     pub fn to_image(self, u: f64, v: f64) -> ImagePoint {
-        let (x, y) = (self.roi.x as f64, self.roi.y as f64);
+        let (x, y) = (to_f64(self.roi.x), to_f64(self.roi.y));
         match self.axis {
             BeadAxis::Vertical => ImagePoint::new(x + u, y + v),
             BeadAxis::Horizontal => ImagePoint::new(x + v, y + u),
+        }
+    }
+
+    /// Gauge coordinates of an image point: across the bead, along it.
+    pub fn from_image(self, at: ImagePoint) -> (f64, f64) {
+        let (x, y) = (at.x - to_f64(self.roi.x), at.y - to_f64(self.roi.y));
+        match self.axis {
+            BeadAxis::Vertical => (x, y),
+            BeadAxis::Horizontal => (y, x),
         }
     }
 }

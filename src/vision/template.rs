@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 use super::overlay::StepShape;
 use super::phase::{offset, split};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{floor_to_count, to_f64};
 
 pub mod textured;
 
@@ -46,16 +46,8 @@ struct TemplateChunk {
 pub struct Products {
     /// slope · slope.
     pub slope_slope: f64,
-    /// slope · before.
-    pub slope_before: f64,
-    /// slope · after.
-    pub slope_after: f64,
-    /// before · before.
-    pub before_before: f64,
-    /// before · after.
-    pub before_after: f64,
-    /// after · after.
-    pub after_after: f64,
+    /// slope · before, slope · after, before · before, before · after, after · after.
+    pub others: [f64; 5],
     /// Pixels that count.
     pub pixels: f64,
 }
@@ -357,65 +349,34 @@ impl Products {
         for k in 0..LANES {
             let (mask, after, slope) = (part.mask[k], part.after[k], part.slope[k]);
             let before = mask - after;
-            let products = [
-                slope * slope,
-                slope * before,
-                slope * after,
-                before * before,
-                before * after,
-                after * after,
-                mask,
-            ];
-            for (lane, product) in lanes.iter_mut().zip(products) {
-                lane[k] = product;
-            }
+            (lanes[0][k], lanes[1][k]) = (slope * slope, slope * before);
+            (lanes[2][k], lanes[3][k]) = (slope * after, before * before);
+            (lanes[4][k], lanes[5][k]) = (before * after, after * after);
+            lanes[6][k] = mask;
         }
-        let sums = lanes.map(|lane| f64::from(total(&lane)));
-        self.slope_slope += sums[0];
-        self.slope_before += sums[1];
-        self.slope_after += sums[2];
-        self.before_before += sums[3];
-        self.before_after += sums[4];
-        self.after_after += sums[5];
-        self.pixels += sums[6];
+        let [slope_slope, others @ .., pixels] = lanes.map(|lane| f64::from(total(&lane)));
+        self.slope_slope += slope_slope;
+        self.pixels += pixels;
+        for (sum, other) in self.others.iter_mut().zip::<[f64; 5]>(others) {
+            *sum += other;
+        }
     }
 
     /// Normal equations of one row for the step times its shift, the level
     /// before it and the level after it.
     pub fn matrix(&self) -> Matrix3<f64> {
-        Matrix3::new(
-            self.slope_slope,
-            -self.slope_before,
-            -self.slope_after,
-            -self.slope_before,
-            self.before_before,
-            self.before_after,
-            -self.slope_after,
-            self.before_after,
-            self.after_after,
-        )
+        let [sb, sa, bb, ba, aa] = self.others;
+        Matrix3::new(self.slope_slope, -sb, -sa, -sb, bb, ba, -sa, ba, aa)
     }
 
     fn mean(self) -> Self {
         let share = 1.0 / to_f64(SUBPIXEL_PHASES);
-        Self {
-            slope_slope: share * self.slope_slope,
-            slope_before: share * self.slope_before,
-            slope_after: share * self.slope_after,
-            before_before: share * self.before_before,
-            before_after: share * self.before_after,
-            after_after: share * self.after_after,
-            pixels: share * self.pixels,
-        }
+        let others = self.others.map(|other| share * other);
+        Self { slope_slope: share * self.slope_slope, others, pixels: share * self.pixels }
     }
 }
 
 /// Chunks that hold so many pixels.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "not negative, and a window is short"
-)]
 fn chunks(pixels: f64) -> usize {
-    (pixels.max(0.0) / to_f64(LANES)).ceil() as usize
+    floor_to_count((pixels.max(0.0) / to_f64(LANES)).ceil())
 }

@@ -5,7 +5,7 @@
 use std::sync::LazyLock;
 
 use super::overlay::{Overlay, SideRange};
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f64};
 
 /// Variance of the rows about an edge, in that of their noise, from which on
 /// they are looked at for texture: noise alone, in 100 rows, has less in all but one of
@@ -191,8 +191,7 @@ fn covariances(overlay: &Overlay, beside: [SideRange; 2], limit: f64) -> Option<
     let mut sums = [0.0; LAGS + 1];
     let mut counts = [0.0; LAGS + 1];
     let mut sides = [None; 2];
-    #[expect(clippy::cast_possible_truncation, reason = "a share of a step")]
-    let limit = limit as f32;
+    let limit = narrow_to_f32(limit);
     for (side, SideRange { near, far }) in beside.into_iter().enumerate() {
         let (sum_before, count_before) = (sums[0], counts[0]);
         let length = far.saturating_sub(near).min(MAX_SIDE_PX);
@@ -308,12 +307,7 @@ impl TextureTables {
     /// along the edge.
     fn along(&self, power: usize, distance: f64) -> f64 {
         let place = distance * to_f64(PER_LENGTH);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a distance is positive, and what is too large is beyond the table"
-        )]
-        let below = place as usize;
+        let below = floor_to_count(place);
         let values = &self.integrals[power];
         let (Some(here), Some(next)) = (values.get(below), values.get(below + 1)) else {
             return 0.0;

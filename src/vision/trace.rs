@@ -27,7 +27,7 @@ use super::row_range::RowRange;
 use super::strip::{GaugeRows, GreyPixel};
 use super::texture::SurfaceTexture;
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::{narrow_to_f32, to_f64};
+use crate::numeric::number::{narrow_to_f32, to_f32, to_f64};
 use parts::{
     BandValues, EdgeState, EdgeUncertainty, Occlusion, RowFit, TexturedFit, TraceScratch,
     WindingState,
@@ -57,6 +57,8 @@ const MAX_CLEAR_MISFIT: f64 = 1.25;
 pub struct TraceInput<'a, T> {
     /// The gauge's pixels.
     pub strip: &'a GaugeRows<'a, T>,
+    /// The blurred step.
+    pub table: &'a StepTable,
     /// Its bands.
     pub bands: &'a Bands,
     /// Rows of its caliper lines.
@@ -79,7 +81,8 @@ pub struct EdgeTracer {
     winding: WindingState,
     sheet: EdgeWindows,
     overlay: Overlay,
-    step_fit: Option<StepFit>,
+    /// The fit of a blurred step to the mean profile.
+    pub step_fit: Option<StepFit>,
     /// What was read of the edge, and how far aside of the course it was \[px\].
     shape: Option<StepShape>,
     aside_px: f64,
@@ -89,10 +92,11 @@ pub struct EdgeTracer {
     refiner: LineRefiner,
     cut_off: ClippedEdge,
     scratch: TraceScratch,
-    edges: Vec<Option<CaliperEdge>>,
+    /// Positions in the last frame, one a caliper line.
+    pub edges: Vec<Option<CaliperEdge>>,
     state: EdgeState,
-    /// Share of the rows that did not fit.
-    unfit_fraction: f64,
+    /// Fraction of the rows that certainly show something other than the edge.
+    pub unfit_fraction: f64,
     /// What a row in the median leaves of the step that it is held against, in
     /// standard deviations of its noise; about 1 where the edge is one.
     pub misfit: f64,
@@ -121,30 +125,15 @@ impl EdgeTracer {
         self.is_on_ground = fit.is_on_ground && !fit.is_groove;
     }
 
-    /// The edges of the last frame, band by band.
-    pub fn edges(&self) -> &[Option<CaliperEdge>] {
-        &self.edges
-    }
-
     /// Share of all rows that the edges come from.
     pub fn used_fraction(&self) -> f64 {
         let used: f64 = self.edges.iter().flatten().map(|edge| edge.row_fraction).sum();
         used / to_f64(self.edges.len().max(1))
     }
 
-    /// Share of the rows that surely show something else than the edge.
-    pub fn unfit_fraction(&self) -> f64 {
-        self.unfit_fraction
-    }
-
     /// Mean of the edges' places across the bead \[px\].
     pub fn middle(&self) -> f64 {
         located::mean_position(&self.edges)
-    }
-
-    /// The edges, for those who sort out outliers.
-    pub fn edges_mut(&mut self) -> &mut [Option<CaliperEdge>] {
-        &mut self.edges
     }
 
     /// Whether the edge's places are known.
@@ -186,7 +175,6 @@ impl EdgeTracer {
     #[inline(always)]
     pub fn fit_first<T: GreyPixel>(
         &mut self,
-        table: &StepTable,
         scene: &TraceInput<'_, T>,
         rough: impl Iterator<Item = Option<f32>>,
     ) -> Option<BlurEstimate> {
@@ -210,20 +198,16 @@ impl EdgeTracer {
             return None;
         }
         self.follow_windings(scene);
-        self.lay_over(table, scene)
+        self.lay_over(scene)
     }
 
     /// Lays the rows over each other along the course and looks at what they show.
     #[inline(always)]
-    fn lay_over<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-    ) -> Option<BlurEstimate> {
+    fn lay_over<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> Option<BlurEstimate> {
         self.read(scene);
         self.overlay.lay(&self.sheet);
         let noise = f64::from(scene.noise) / f64::from(typical(&self.values.step).abs());
-        self.step_fit = self.overlay.first_fit(table, noise, self.room(scene));
+        self.step_fit = self.overlay.with(scene.table).first_fit(noise, self.room(scene));
         self.look_for_texture(scene, noise);
         self.step_fit.as_ref().map(StepFit::blur)
     }
@@ -231,11 +215,6 @@ impl EdgeTracer {
     /// Whether the edge was located with weights that know the texture beside it.
     pub fn is_textured(&self) -> bool {
         self.textured.texture.is_some()
-    }
-
-    /// What was seen of the edge.
-    pub fn step_fit(&self) -> Option<&StepFit> {
-        self.step_fit.as_ref()
     }
 
     /// Whether a narrow groove may lie beside the edge, after it or before it. `noise` is the
@@ -248,7 +227,7 @@ impl EdgeTracer {
     /// that nothing covers.
     pub fn skew(&self, table: &StepTable) -> Option<EdgeSkew> {
         let is_step = self.state == EdgeState::Clear && self.misfit.is_finite();
-        self.overlay.skew(table, self.step_fit.as_ref().filter(|_| is_step)?)
+        self.overlay.with(table).skew(self.step_fit.as_ref().filter(|_| is_step)?)
     }
 
     /// Looks at the same rows once more, with another shape of the blur, from a look at
@@ -260,16 +239,11 @@ impl EdgeTracer {
         scene: &TraceInput<'_, T>,
         before: Option<&StepFit>,
     ) -> Option<StepFit> {
+        let fitter = self.overlay.with(table);
         if let Some(before) = before {
-            return self.overlay.refit(table, before);
+            return fitter.refit(before);
         }
-        let seen = self.step_fit?;
-        self.overlay.first_fit(table, seen.pixel_noise(), self.room(scene))
-    }
-
-    /// Takes a look with another shape of the blur for what was seen.
-    pub fn take_fit(&mut self, look: StepFit) {
-        self.step_fit = Some(look);
+        fitter.first_fit(self.step_fit?.pixel_noise, self.room(scene))
     }
 
     /// Draws the path through the picked places, as far as they are not wild, with
@@ -298,7 +272,7 @@ impl EdgeTracer {
     pub fn take_shape(&mut self, table: &StepTable, blur: BlurEstimate) {
         self.shape = None;
         let Some(seen) = &self.step_fit else { return };
-        let Some(shape) = self.overlay.shape(table, seen, blur) else { return };
+        let Some(shape) = self.overlay.with(table).shape(seen, blur) else { return };
         self.aside_px = shape.step.at;
         self.shape = Some(self.apply_shape(shape));
     }
@@ -319,33 +293,28 @@ impl EdgeTracer {
 
     /// Locates the edge whose shape was read; `blur` as there.
     #[inline(always)]
-    pub fn trace<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-        blur: BlurEstimate,
-    ) {
-        let found = self.trace_open(table, scene);
+    pub fn trace<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: BlurEstimate) {
+        let found = self.trace_open(scene);
         let is_open = found && self.unfit_fraction <= MAX_UNFIT_FRACTION && !self.lost_rows(scene);
-        if is_open || self.trace_winding(table, scene) {
+        if is_open || self.trace_winding(scene) {
             self.state = EdgeState::Clear;
-        } else if self.locate_occluded(table, scene) {
+        } else if self.locate_occluded(scene) {
             self.state = EdgeState::Occluded;
         } else {
-            self.trace_again(table, scene, blur);
+            self.trace_again(scene, blur);
         }
     }
 
     /// Locates the edge as if nothing covered it.
     #[inline(always)]
-    fn trace_open<T: GreyPixel>(&mut self, table: &StepTable, scene: &TraceInput<'_, T>) -> bool {
+    fn trace_open<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         let Some(shape) = self.shape else { return false };
         if self.aside_px.abs() > MAX_PATH_OFFSET_PX {
             self.read(scene);
         }
         self.blur_px = shape.step.blur;
         self.uncertainty.common_variance = shape.variance;
-        self.tabulate(table, &shape);
+        self.tabulate(scene.table, &shape);
         for _ in 0..MAX_PASSES {
             self.compare_rows(scene);
             self.sum_bands(scene);
@@ -359,19 +328,14 @@ impl EdgeTracer {
     /// Traces once more as if nothing covered the edge.
     #[cold]
     #[inline(never)]
-    fn trace_again<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-        blur: BlurEstimate,
-    ) {
+    fn trace_again<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: BlurEstimate) {
         self.occlusion.clear.clear();
         let picked = std::mem::take(&mut self.values.picked);
         let rough = picked.iter().map(|at| at.is_finite().then_some(*at));
-        let seen = self.fit_first(table, scene, rough);
+        let seen = self.fit_first(scene, rough);
         self.values.picked = picked;
-        self.take_shape(table, blur);
-        let found = seen.is_some() && self.trace_open(table, scene);
+        self.take_shape(scene.table, blur);
+        let found = seen.is_some() && self.trace_open(scene);
         self.state = if found { EdgeState::Unresolved } else { EdgeState::NotFound };
     }
 
@@ -411,9 +375,10 @@ impl EdgeTracer {
     /// Locates the edge anew, line by line, where it is not a blurred step.
     /// Returns whether there is one.
     #[cold]
-    pub fn refine<T: GreyPixel>(&mut self, table: &StepTable, scene: &TraceInput<'_, T>) -> bool {
+    pub fn refine<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         let width_px = f64::from(scene.width_px);
-        let task = RefinerInput { strip: scene.strip, lines: scene.lines, width_px };
+        let task =
+            RefinerInput { strip: scene.strip, table: scene.table, lines: scene.lines, width_px };
         // A blurred step that does not fit says nothing of the place either.
         if !self.take_picked(scene) {
             return false;
@@ -423,7 +388,7 @@ impl EdgeTracer {
         let course = &self.course;
         let rough =
             scene.lines.iter().map(|&line| f64::from(course.at(narrow_to_f32(line.middle()))[0]));
-        let found = self.refiner.refine(table, &task, scene.bead_after, &mut self.edges, rough);
+        let found = self.refiner.refine(&task, scene.bead_after, &mut self.edges, rough);
         self.blur_px = self.refiner.blur_px;
         self.uncertainty.common_variance = 0.0;
         self.misfit = f64::INFINITY;
@@ -438,8 +403,7 @@ impl EdgeTracer {
             self.values.path.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &at| {
                 (low.min(at), high.max(at))
             });
-        #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-        let (across, reach) = (scene.strip.across as f32, HALF_SPAN as f32 - 1.0);
+        let (across, reach) = (to_f32(scene.strip.across), to_f32(HALF_SPAN - 1));
         let inside = 0.5 * scene.width_px;
         let mut before = low.clamp(2.0, reach);
         let mut after = (across - 1.0 - high).clamp(2.0, reach);
@@ -500,8 +464,5 @@ impl EdgeTracer {
 }
 
 fn typical(values: &[f32]) -> f32 {
-    let sum: f32 = values.iter().sum();
-    #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
-    let count = values.len().max(1) as f32;
-    sum / count
+    values.iter().sum::<f32>() / to_f32(values.len().max(1))
 }

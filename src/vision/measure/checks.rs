@@ -77,25 +77,20 @@ impl MeasureState {
         let mut worst: f64 = 0.0;
         for side in [&mut self.left, &mut self.right] {
             if side.is_occluded() {
-                side.drop_strays(self.min_outlier_px);
+                side.drop_strays(self.both.min_outlier_px);
             }
-            let edges = side.edges_mut();
-            worst = worst.max(outlier::remove_outliers(
-                edges,
-                self.min_outlier_px,
-                &mut self.scratch_f64,
-            ));
+            let (least_px, scratch) = (self.both.min_outlier_px, &mut self.scratch.wide);
+            worst = worst.max(outlier::remove_outliers(&mut side.edges, least_px, scratch));
         }
         let got = self.left.used_fraction().min(self.right.used_fraction());
-        let enough = [&self.left, &self.right]
-            .iter()
-            .all(|side| side.used_fraction() >= min_row_fraction(side));
+        let sides = [&self.left, &self.right];
+        let enough = sides.iter().all(|side| side.used_fraction() >= min_row_fraction(side));
         let limit = self.scatter_limit();
         if worst > limit {
             return Err(Reject::Scattered { got_px: worst, limit_px: limit });
         }
         if !enough {
-            let need = f64::max(min_row_fraction(&self.left), min_row_fraction(&self.right));
+            let need = f64::max(min_row_fraction(sides[0]), min_row_fraction(sides[1]));
             return Err(Reject::NoPair { got, need });
         }
         Ok(())
@@ -106,11 +101,11 @@ impl MeasureState {
     fn drop_inconsistent(&mut self, bright: bool) {
         let sides = [(&mut self.left, bright), (&mut self.right, !bright)];
         for (side, steps_up) in sides {
-            for edge in side.edges_mut() {
+            for edge in &mut side.edges {
                 *edge = edge.take_if(|edge| (edge.height > 0.0) == steps_up);
             }
         }
-        let (left, right) = (self.left.edges_mut(), self.right.edges_mut());
+        let (left, right) = (&mut self.left.edges, &mut self.right.edges);
         for (left, right) in left.iter_mut().zip(right) {
             if let (Some(one), Some(other)) = (&left, &right)
                 && one.at >= other.at
@@ -134,25 +129,26 @@ impl MeasureState {
         strip: &GaugeRows<'_, T>,
         of_both: fn(f64, f64) -> f64,
     ) -> Result<(), Reject> {
-        let noise = f64::from(self.noise.grey);
-        self.is_beside_groove = self.gauge.edge == EdgeKind::Groove;
+        let noise = f64::from(self.rows.noise.grey);
+        self.both.is_beside_groove = self.gauge.edge == EdgeKind::Groove;
         let mut strengths = [0.0_f64; 2];
         let sides = [(&mut self.left, -1.0), (&mut self.right, 1.0)];
         for (((tracer, outwards), contrast), strength) in
-            sides.into_iter().zip(self.contrasts).zip(&mut strengths)
+            sides.into_iter().zip(self.both.contrasts).zip(&mut strengths)
         {
             tracer.uncertainty.ground_variance = 0.0;
             if !tracer.is_on_ground {
                 continue;
             }
-            edge_positions(tracer, &self.lines, &mut self.positions);
+            edge_positions(tracer, &self.rows.lines, &mut self.scratch.positions);
             let blur_px = tracer.blur_px;
-            let side =
-                EdgeSide { positions: &self.positions, outwards, blur_px, room_px: f64::INFINITY };
+            let (positions, room_px) = (&self.scratch.positions, f64::INFINITY);
+            let side = EdgeSide { positions, outwards, blur_px, room_px };
             if self.gauge.edge == EdgeKind::Auto {
-                self.is_beside_groove |= tracer.is_beside_groove(outwards > 0.0, noise / contrast);
+                self.both.is_beside_groove |=
+                    tracer.is_beside_groove(outwards > 0.0, noise / contrast);
             }
-            let Some(pattern) = self.ground.pattern(strip, &side, noise) else { continue };
+            let Some(pattern) = self.scratch.ground.pattern(strip, &side, noise) else { continue };
             *strength = pattern.size_grey / contrast;
             // Rough edges know what the ground beside them leaves open, weights that know a
             // texture what a faint one does.
@@ -163,7 +159,7 @@ impl MeasureState {
                     pattern.mean_variance * px_per_grey * px_per_grey;
             }
         }
-        self.pattern_ratio = strengths[0].min(strengths[1]);
+        self.both.pattern_ratio = strengths[0].min(strengths[1]);
         let (got, limit) = (of_both(strengths[0], strengths[1]), MAX_PATTERN);
         if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
@@ -171,8 +167,8 @@ impl MeasureState {
     /// Refuses edges in a pattern that were located line by line: parts of it were taken for
     /// them.
     pub(super) fn check_lines_in_pattern(&self) -> Result<(), Reject> {
-        let (got, limit) = (self.pattern_ratio, MAX_PATTERN_LINE_BY_LINE);
-        let is_among = self.edge_model == EdgeModel::LineByLine && got > limit;
+        let (got, limit) = (self.both.pattern_ratio, MAX_PATTERN_LINE_BY_LINE);
+        let is_among = self.both.model == EdgeModel::LineByLine && got > limit;
         if is_among { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
@@ -181,7 +177,7 @@ impl MeasureState {
         let sides = [&self.left, &self.right];
         let whole =
             |side: &&EdgeTracer| side.is_clear() && side.used_fraction() > COMPLETE_FRACTION;
-        if self.is_lost {
+        if self.both.is_lost {
             MAX_LOST_SCATTER_PX
         } else if sides.iter().all(whole) {
             MAX_COMPLETE_SCATTER_PX
@@ -192,8 +188,8 @@ impl MeasureState {
 
     pub(super) fn check_contrast(&mut self) -> Result<(), Reject> {
         let need = self.gauge.min_contrast_grey;
-        self.contrasts = [self.contrast(true), self.contrast(false)];
-        let got = self.contrasts[0].min(self.contrasts[1]);
+        self.both.contrasts = [self.contrast(true), self.contrast(false)];
+        let got = self.both.contrasts[0].min(self.both.contrasts[1]);
         if got < need {
             return Err(self.saturation().unwrap_or(Reject::LowContrast { got, need }));
         }
@@ -203,9 +199,9 @@ impl MeasureState {
     /// Median height of an edge's steps \[grey levels\].
     fn contrast(&mut self, left: bool) -> f64 {
         let side = if left { &self.left } else { &self.right };
-        self.scratch_f64.clear();
-        self.scratch_f64.extend(side.edges().iter().flatten().map(|edge| edge.height.abs()));
-        rank::median(&mut self.scratch_f64).unwrap_or(0.0)
+        self.scratch.wide.clear();
+        self.scratch.wide.extend(side.edges.iter().flatten().map(|edge| edge.height.abs()));
+        rank::median(&mut self.scratch.wide).unwrap_or(0.0)
     }
 
     /// Refuses a bead of whose edges too little is uncovered to tell where they
@@ -233,7 +229,7 @@ impl MeasureState {
         let last = to_f64(across.saturating_sub(1));
         for side in [&self.left, &self.right] {
             let need_px = f64::max(MIN_BOUNDARY_PX, BOUNDARY_BLURS * side.blur_px);
-            let places = side.edges().iter().flatten();
+            let places = side.edges.iter().flatten();
             let distances = places.map(|edge| edge.at.min(last - edge.at));
             let (mut near, mut all, mut got_px) = (0.0, 0.0, f64::INFINITY);
             for distance in distances {
@@ -257,7 +253,7 @@ pub(super) fn edge_positions(
     lines: &[RowRange],
     places: &mut Vec<EdgePosition>,
 ) {
-    let edges = tracer.edges().iter().zip(lines);
+    let edges = tracer.edges.iter().zip(lines);
     places.clear();
     places.extend(
         edges.filter_map(|(edge, &rows)| Some(EdgePosition { rows, at: edge.as_ref()?.at })),

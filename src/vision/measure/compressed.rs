@@ -16,7 +16,7 @@ impl MeasureState {
     /// rows share \[px²\]: the Cramér–Rao bound for a profile with so much noise. 0 where the
     /// pixels' noise is there.
     pub(super) fn variance_of_compression(&self, edge: &EdgeTracer, contrast_grey: f64) -> f64 {
-        if !self.noise.is_suppressed || self.bands.saturated_fraction() >= FEW_SATURATED {
+        if !self.rows.noise.is_suppressed || self.rows.bands.saturated_fraction() >= FEW_SATURATED {
             return 0.0;
         }
         let noise = COMPRESSION_GREY / contrast_grey;

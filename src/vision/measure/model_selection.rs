@@ -71,22 +71,22 @@ impl MeasureState {
     /// Whether edges that were measured as blurred steps may be something else. Where they
     /// pass the end of the scale, rows do not tell: half of their height is not seen.
     pub(super) fn may_not_be_steps(&self) -> bool {
-        if self.edge_model == EdgeModel::Clipped {
+        if self.both.model == EdgeModel::Clipped {
             return false;
         }
-        let is_other = self.is_refined() || self.is_beside_groove || self.is_wide();
+        let is_other = self.is_refined() || self.both.is_beside_groove || self.is_wide();
         is_other || self.has_gaps() || self.has_two_grounds() || self.has_low_step()
     }
 
     /// Whether a step is much lower than the levels on either side of it differ: it may lie
     /// within a ramp, most of which was taken for shading, or beside a rib.
     fn has_low_step(&self) -> bool {
-        is_part(&self.left, self.contrasts[0]) || is_part(&self.right, self.contrasts[1])
+        is_part(&self.left, self.both.contrasts[0]) || is_part(&self.right, self.both.contrasts[1])
     }
 
     /// Whether edges were located line by line.
     fn is_refined(&self) -> bool {
-        self.edge_model == EdgeModel::LineByLine
+        self.both.model == EdgeModel::LineByLine
     }
 
     /// Whether the flanks are so wide that rows alone do not tell bays in them.
@@ -104,14 +104,16 @@ impl MeasureState {
     pub(super) fn has_gaps(&self) -> bool {
         let used = self.left.used_fraction().min(self.right.used_fraction());
         used < 1.0 - MAX_GAP_FRACTION
-            || self.left.unfit_fraction().max(self.right.unfit_fraction()) > MAX_UNFIT_FRACTION
+            || self.left.unfit_fraction.max(self.right.unfit_fraction) > MAX_UNFIT_FRACTION
     }
 
     /// Whether rough edges are not higher than the blurred steps: then what was sorted
     /// out shows ground. Dark grains beside an edge, sparks within and shading make rough
     /// edges higher; holes within make them lower.
     fn is_no_higher(&self, fits: &[RoughFit; 2]) -> bool {
-        fits.iter().zip(self.contrasts).all(|(fit, step)| fit.contrast < MAX_CONTRAST_RATIO * step)
+        fits.iter()
+            .zip(self.both.contrasts)
+            .all(|(fit, step)| fit.contrast < MAX_CONTRAST_RATIO * step)
     }
 
     /// Whether grains may be what covers the edges of a frame whose blurred steps were
@@ -123,12 +125,14 @@ impl MeasureState {
 
     /// Whether a rough edge is so much fainter than the blurred step that it is another.
     fn is_fainter(&self, fits: &[RoughFit; 2]) -> bool {
-        fits.iter().zip(self.contrasts).any(|(fit, step)| fit.contrast < MIN_CONTRAST_RATIO * step)
+        fits.iter()
+            .zip(self.both.contrasts)
+            .any(|(fit, step)| fit.contrast < MIN_CONTRAST_RATIO * step)
     }
 
     /// Whether the blurred steps are parts of flanks that are wider than any blur.
     fn are_parts_of_flanks(&self, fits: &[RoughFit; 2]) -> bool {
-        let mut sides = fits.iter().zip(self.contrasts);
+        let mut sides = fits.iter().zip(self.both.contrasts);
         let is_wide = self.is_refined() && fits.iter().any(|fit| fit.blur_px > MAX_ROUGH_BLUR_PX)
             || fits.iter().all(|fit| fit.blur_px > MAX_BLUR_PX);
         let may_be_part = self.left.blur_px.max(self.right.blur_px) > MIN_PARTIAL_BLUR_PX;
@@ -138,7 +142,7 @@ impl MeasureState {
 
     /// Refuses wide steps of which one is a part of its flank, or more.
     pub(super) fn check_flanks(&self, fits: &[RoughFit; 2]) -> Result<(), Reject> {
-        let mut sides = fits.iter().zip(self.contrasts);
+        let mut sides = fits.iter().zip(self.both.contrasts);
         let is_whole =
             sides.all(|(fit, step)| FULL_FLANK_CONTRAST.contains(&(step / fit.contrast)));
         let (got_px, limit_px) = (fits[0].blur_px.max(fits[1].blur_px), MAX_MOTION_BLUR_PX);
@@ -150,14 +154,14 @@ impl MeasureState {
 
     /// Whether one edge has much less contrast than the other.
     fn have_unequal_contrast(&self) -> bool {
-        let [left, right] = self.contrasts;
+        let [left, right] = self.both.contrasts;
         left.min(right) < MIN_SIDES_CONTRAST_RATIO * left.max(right)
     }
 
     /// Whether something else lies outside the one edge than outside the other.
     fn has_two_grounds(&self) -> bool {
         let ([left, _], [_, right]) = (self.left.levels(), self.right.levels());
-        let [one, other] = self.contrasts;
+        let [one, other] = self.both.contrasts;
         (left - right).abs() > MIN_GROUND_DIFFERENCE * one.max(other)
     }
 
@@ -198,8 +202,8 @@ impl MeasureState {
         let may_be_grooved = fits.iter().any(|fit| fit.is_narrow_groove);
         let is_uncertain = are_clean(fits, GRAIN_ODD_FRACTION)
             && (self.has_gaps() || may_be_grooved && self.has_two_grounds());
-        let is_in_pattern = self.pattern_ratio > MIN_PATTERN;
-        let sigma_factor = match self.edge_model {
+        let is_in_pattern = self.both.pattern_ratio > MIN_PATTERN;
+        let sigma_factor = match self.both.model {
             EdgeModel::Steps if is_uncertain || is_in_pattern => {
                 self.sigma_ratio(fits, &found).max(1.0)
             }
@@ -223,10 +227,10 @@ impl MeasureState {
         let off = [0, 1].map(|k| {
             let (found, rough) = sides[k];
             let is_fit =
-                self.edge_model == EdgeModel::Steps && found.misfit_of_a_row() < MAX_STEP_MISFIT;
+                self.both.model == EdgeModel::Steps && found.misfit_of_a_row() < MAX_STEP_MISFIT;
             let is_step = is_fit && !shows_two_grounds;
             let off = (rough.middle() - found.middle()).abs();
-            let is_part = is_part(found, self.contrasts[k]) && off < MAX_OUTWARD_PX;
+            let is_part = is_part(found, self.both.contrasts[k]) && off < MAX_OUTWARD_PX;
             if is_part || !is_step && fits[k].is_narrow_groove { off } else { 0.0 }
         });
         off[0] + off[1]
@@ -261,7 +265,7 @@ impl MeasureState {
             let grooved = hidden || fits.iter().any(|fit| fit.is_groove);
             let is_rough =
                 two_levels && self.apart_px() < SAME_EDGE_PX && self.sigma_ratio(fits, found) < 1.0;
-            !has_grains && (is_rough || grooved && (two_levels || !self.is_lost))
+            !has_grains && (is_rough || grooved && (two_levels || !self.both.is_lost))
         } else {
             // Grains here and there look like a groove in the mean over the gauge.
             let is_covered = self.left.is_occluded() || self.right.is_occluded();

@@ -6,18 +6,15 @@ use super::pattern_limits::{
     MAX_PATTERN, MAX_PATTERN_BESIDE_COMPLETE, blur_inflation, check_pattern, with_texture_variance,
 };
 use super::uniformity;
-use super::work::{MIN_LINE_FRACTION, MeasureState};
-use crate::calibration::SurfaceMap;
+use super::work::{GaugeFrame, MIN_LINE_FRACTION, MeasureState, Measured};
 use crate::numeric::number::to_f64;
 use crate::vision::coarse::{LinePair, StepLine};
-use crate::vision::gauge::WidthRangePx;
 use crate::vision::ground::{EdgePosition, EdgeSide, MIN_EXCESS_VARIANCE};
 use crate::vision::mean_edge::{BLURS_PX, MeanEdgeInput};
 use crate::vision::reject::Reject;
 use crate::vision::row_range::RowRange;
-use crate::vision::strip::{GaugeRows, GaugeView, GreyPixel};
+use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::trace::EdgeTracer;
-use crate::vision::width::WidthMeasurement;
 
 /// Weakest pattern, as a fraction of the contrast, beside which blurred steps are not
 /// good enough: one of less draws them outwards by hardly 0.02 px.
@@ -39,11 +36,11 @@ impl MeasureState {
         strip: &GaugeRows<'_, T>,
         pair: &LinePair,
     ) -> f64 {
-        let noise = f64::from(self.noise.grey);
+        let noise = f64::from(self.rows.noise.grey);
         let mut least = f64::INFINITY;
         let sides = self.mean_edges.iter_mut().zip(&pair.sides);
         for ((edge, line), bead_after) in sides.zip([true, false]) {
-            let scene = scene(strip, &self.lines, pair, bead_after);
+            let scene = scene(strip, &self.rows.lines, pair, bead_after);
             least = least.min(edge.pattern(&scene, line).unwrap_or(0.0));
         }
         let variance = least * least;
@@ -59,25 +56,22 @@ impl MeasureState {
     #[inline(never)]
     pub(super) fn measure_busy<T: GreyPixel>(
         &mut self,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Option<Result<WidthMeasurement, Reject>> {
-        let pair = self.find_lines(strip, range).ok()?;
-        if !self.is_textured_between_lines(strip, &pair) {
+        frame: &GaugeFrame<'_, T>,
+    ) -> Option<Measured> {
+        let pair = self.find_lines(frame).ok()?;
+        if !self.is_textured_between_lines(frame.strip, &pair) {
             return None;
         }
-        let pattern = self.ground_pattern(strip, &pair);
-        if let Some(found) = self.measure_patterned((&pair, pattern), strip, view, surface) {
+        let pattern = self.ground_pattern(frame.strip, &pair);
+        if let Some(found) = self.measure_patterned((&pair, pattern), frame) {
             return (pattern == 0.0).then_some(found);
         }
-        let fits = self.fit_rough(strip, &pair).ok()?;
+        let fits = self.fit_rough(frame.strip, &pair).ok()?;
         if fits.iter().any(has_grains) {
             return None;
         }
         let fits = with_texture_variance(&pair, fits);
-        Some(self.width_of_rough_beside(pattern, true, &fits, strip, view, surface))
+        Some(self.width_of_rough_beside(pattern, true, &fits, frame))
     }
 
     /// Measures a bead that was measured already, where it or the ground has a pattern.
@@ -86,25 +80,22 @@ impl MeasureState {
     #[inline(never)]
     pub(super) fn measure_textured<T: GreyPixel>(
         &mut self,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Option<Result<WidthMeasurement, Reject>> {
-        let shares = self.texture_between_steps(strip);
+        frame: &GaugeFrame<'_, T>,
+    ) -> Option<Measured> {
+        let shares = self.texture_between_steps(frame.strip);
         let is_textured = rms(shares) > MIN_TEXTURE;
-        if !is_textured && self.pattern_ratio == 0.0 {
+        if !is_textured && self.both.pattern_ratio == 0.0 {
             return None;
         }
-        let Ok(pair) = self.find_lines(strip, range) else {
+        let Ok(pair) = self.find_lines(frame) else {
             return self.check_complete(is_textured && are_alike(shares)).err().map(Err);
         };
-        let pattern = self.ground_pattern(strip, &pair);
-        let contrast = self.contrasts[0].min(self.contrasts[1]);
+        let pattern = self.ground_pattern(frame.strip, &pair);
+        let contrast = self.both.contrasts[0].min(self.both.contrasts[1]);
         if !is_textured && pattern < MIN_PATTERN * contrast {
             return None;
         }
-        let found = self.measure_patterned((&pair, pattern), strip, view, surface);
+        let found = self.measure_patterned((&pair, pattern), frame);
         if found.is_some() {
             return found;
         }
@@ -121,7 +112,7 @@ impl MeasureState {
     /// Refuses blurred steps of a plain bead all along which they show, beside a strong
     /// pattern on both sides.
     fn check_complete(&self, is_textured: bool) -> Result<(), Reject> {
-        let (got, limit) = (self.pattern_ratio, MAX_PATTERN_BESIDE_COMPLETE);
+        let (got, limit) = (self.both.pattern_ratio, MAX_PATTERN_BESIDE_COMPLETE);
         if !is_textured && got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
@@ -132,12 +123,13 @@ impl MeasureState {
         let room_px = self.right.middle() - self.left.middle();
         let mut shares = [0.0; 2];
         for (((tracer, inwards), contrast), share) in
-            sides.into_iter().zip(self.contrasts).zip(&mut shares)
+            sides.into_iter().zip(self.both.contrasts).zip(&mut shares)
         {
-            all_edge_positions(tracer, &self.lines, &mut self.positions);
+            all_edge_positions(tracer, &self.rows.lines, &mut self.scratch.positions);
             let blur_px = tracer.blur_px;
-            let side = EdgeSide { positions: &self.positions, outwards: inwards, blur_px, room_px };
-            let texture = self.ground.texture(strip, &side, self.noise.grey.into());
+            let positions = &self.scratch.positions;
+            let side = EdgeSide { positions, outwards: inwards, blur_px, room_px };
+            let texture = self.scratch.ground.texture(strip, &side, self.rows.noise.grey.into());
             *share = texture.unwrap_or(0.0) / contrast;
         }
         shares
@@ -171,18 +163,18 @@ impl MeasureState {
         width_px: f32,
     ) -> bool {
         let middle = 0.5 * (to_f64(strip.along) - 1.0);
-        self.positions.clear();
-        self.positions.extend(self.lines.iter().map(|&rows| {
+        self.scratch.positions.clear();
+        self.scratch.positions.extend(self.rows.lines.iter().map(|&rows| {
             let off = rows.middle() - middle;
             EdgePosition { rows, at: f64::from(line.at) + off * f64::from(line.slope) }
         }));
         let side = EdgeSide {
-            positions: &self.positions,
+            positions: &self.scratch.positions,
             outwards: inwards,
             blur_px: ASSUMED_BLUR_PX,
             room_px: width_px.into(),
         };
-        let texture = self.ground.texture(strip, &side, self.noise.grey.into());
+        let texture = self.scratch.ground.texture(strip, &side, self.rows.noise.grey.into());
         texture.is_some_and(|texture| texture > MIN_TEXTURE * f64::from(line.step))
     }
 
@@ -191,36 +183,33 @@ impl MeasureState {
     pub(super) fn measure_patterned<T: GreyPixel>(
         &mut self,
         lines: (&LinePair, f64),
-        strip: &GaugeRows<'_, T>,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Option<Result<WidthMeasurement, Reject>> {
+        frame: &GaugeFrame<'_, T>,
+    ) -> Option<Measured> {
         if lines.0.has_groove() {
             return None;
         }
-        let found = self.measure_mean_profile(lines, strip, view, surface);
+        let found = self.measure_mean_profile(lines, frame);
         (!matches!(found, Err(Reject::NoPair { .. }))).then_some(found)
     }
 
     fn measure_mean_profile<T: GreyPixel>(
         &mut self,
         (pair, pattern): (&LinePair, f64),
-        strip: &GaugeRows<'_, T>,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+        frame: &GaugeFrame<'_, T>,
+    ) -> Measured {
         let failed = Reject::NoPair { got: 0.0, need: MIN_LINE_FRACTION };
-        let scenes = [true, false].map(|after| scene(strip, &self.lines, pair, after));
+        let scenes = [true, false].map(|after| scene(frame.strip, &self.rows.lines, pair, after));
         let [left, right] = &mut self.mean_edges;
-        let of_left = left.fit_blurs(&scenes[0], &pair.sides[0], self.blur_shapes.lens());
-        let of_right = right.fit_blurs(&scenes[1], &pair.sides[1], self.blur_shapes.lens());
+        let lens = self.blur_shapes.lens();
+        let of_left = left.fit_blurs(&scenes[0], &pair.sides[0], lens);
+        let of_right = right.fit_blurs(&scenes[1], &pair.sides[1], lens);
         // Both edges are seen through one lens.
         let left_over = |k: &usize| of_left[*k] + of_right[*k];
         let best = (0..BLURS_PX.len()).min_by(|a, b| left_over(a).total_cmp(&left_over(b)));
         let blur_px = best.filter(|k| left_over(k).is_finite()).map(|k| BLURS_PX[k]);
         let blur_px = blur_px.ok_or(failed)?;
-        let one = left.locate(&scenes[0], self.blur_shapes.lens(), blur_px).ok_or(failed)?;
-        let other = right.locate(&scenes[1], self.blur_shapes.lens(), blur_px).ok_or(failed)?;
+        let one = left.locate(&scenes[0], lens, blur_px).ok_or(failed)?;
+        let other = right.locate(&scenes[1], lens, blur_px).ok_or(failed)?;
         let got = pattern / one.contrast.min(other.contrast);
         if got > MAX_PATTERN {
             return Err(Reject::Patterned { got, limit: MAX_PATTERN });
@@ -236,15 +225,15 @@ impl MeasureState {
         let inflation = blur_inflation(blur_px);
         let variance = beside * if pattern > 0.0 { inflation } else { inflation * inflation };
         let fits = [one, other].map(|fit| fit.as_rough(blur_px, variance));
-        uniformity::check_uniformity(&fits, uniformity::middle_grey(strip, pair))?;
+        uniformity::check_uniformity(&fits, uniformity::middle_grey(frame.strip, pair))?;
         self.left_px.clear();
         self.right_px.clear();
         let [left, right] = &self.mean_edges;
-        self.left.take_rough(left.lines(), &fits[0]);
-        self.right.take_rough(right.lines(), &fits[1]);
+        self.left.take_rough(&left.lines, &fits[0]);
+        self.right.take_rough(&right.lines, &fits[1]);
         self.check_contrast()?;
-        self.check_boundary(strip.across)?;
-        self.width_on_surface(view, surface)
+        self.check_boundary(frame.strip.across)?;
+        self.width_on_surface(frame.view, frame.surface)
     }
 }
 

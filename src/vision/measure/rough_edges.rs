@@ -2,17 +2,15 @@
 
 use super::pattern_limits::{check_pattern, with_texture_variance};
 use super::uniformity;
-use super::work::{MIN_LINE_FRACTION, MeasureState};
-use crate::calibration::SurfaceMap;
+use super::work::{GaugeFrame, MIN_LINE_FRACTION, MeasureState, Measured};
 use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::vision::coarse::{LinePair, StepLine};
 use crate::vision::gauge::{EdgeKind, Polarity, WidthRangePx};
 use crate::vision::line::LineSums;
 use crate::vision::reject::Reject;
 use crate::vision::rough::{RoughFit, RoughInput};
-use crate::vision::strip::{GaugeRows, GaugeView, GreyPixel};
+use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::vectors;
-use crate::vision::width::WidthMeasurement;
 
 /// The search range allows 1.5 times too wide and too narrow single places; lines
 /// are means over the gauge, and stay nearer.
@@ -40,16 +38,13 @@ impl MeasureState {
     pub(super) fn measure_rough<T: GreyPixel>(
         &mut self,
         refused: &Reject,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
-        let pair = self.find_lines(strip, range)?;
-        let pattern = self.ground_pattern(strip, &pair);
-        let is_textured = self.is_textured_between_lines(strip, &pair);
+        frame: &GaugeFrame<'_, T>,
+    ) -> Measured {
+        let pair = self.find_lines(frame)?;
+        let pattern = self.ground_pattern(frame.strip, &pair);
+        let is_textured = self.is_textured_between_lines(frame.strip, &pair);
         if (pattern > 0.0 || is_textured)
-            && let Some(found) = self.measure_patterned((&pair, pattern), strip, view, surface)
+            && let Some(found) = self.measure_patterned((&pair, pattern), frame)
         {
             return found;
         }
@@ -57,12 +52,12 @@ impl MeasureState {
         if !is_textured && matches!(refused, Reject::Ambiguous { .. }) {
             return Err(*refused);
         }
-        let fits = self.fit_rough(strip, &pair)?;
+        let fits = self.fit_rough(frame.strip, &pair)?;
         if may_be_occluded(refused) && self.may_be_grains(refused, &fits) {
             return Err(*refused);
         }
         let fits = if is_textured { with_texture_variance(&pair, fits) } else { fits };
-        self.width_of_rough_beside(pattern, is_textured, &fits, strip, view, surface)
+        self.width_of_rough_beside(pattern, is_textured, &fits, frame)
     }
 
     /// Looks for a bead with rough edges.
@@ -70,19 +65,18 @@ impl MeasureState {
     #[inline(never)]
     pub(super) fn find_rough<T: GreyPixel>(
         &mut self,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
+        frame: &GaugeFrame<'_, T>,
     ) -> Result<[RoughFit; 2], Reject> {
-        let pair = match self.find_lines(strip, range) {
+        let pair = match self.find_lines(frame) {
             // Holes within the bead that lie one behind the other look like ribs and texture.
             Err(Reject::Ambiguous { .. } | Reject::Vague { .. })
-                if self.has_gaps() && self.pattern_ratio == 0.0 =>
+                if self.has_gaps() && self.both.pattern_ratio == 0.0 =>
             {
-                self.pair_of_steps(strip)
+                self.pair_of_steps(frame.strip)
             }
             pair => pair?,
         };
-        self.fit_rough(strip, &pair)
+        self.fit_rough(frame.strip, &pair)
     }
 
     /// The lines along two blurred steps.
@@ -90,7 +84,7 @@ impl MeasureState {
         let middle = 0.5 * (to_f64(strip.along) - 1.0);
         let sides = [&self.left, &self.right].map(|tracer| {
             let mut line = LineSums::default();
-            for (edge, &rows) in tracer.edges().iter().zip(&self.lines) {
+            for (edge, &rows) in tracer.edges.iter().zip(&self.rows.lines) {
                 if let Some(edge) = edge {
                     line.add(rows.middle() - middle, edge.at, edge.row_fraction);
                 }
@@ -98,10 +92,10 @@ impl MeasureState {
             let [at, next] = [0.0, 1.0].map(|row| line.at(row).0);
             (narrow_to_f32(at), narrow_to_f32(next - at))
         });
-        let steps = self.contrasts.map(narrow_to_f32);
+        let steps = self.both.contrasts.map(narrow_to_f32);
         let [left, right] =
             [0, 1].map(|k| StepLine { at: sides[k].0, slope: sides[k].1, step: steps[k] });
-        let bright = self.left.edges().iter().flatten().any(|edge| edge.height > 0.0);
+        let bright = self.left.edges.iter().flatten().any(|edge| edge.height > 0.0);
         let bare = (left.step * right.step).sqrt();
         LinePair {
             sides: [left, right],
@@ -115,22 +109,21 @@ impl MeasureState {
     /// Looks for the bead's edges as lines.
     pub(super) fn find_lines<T: GreyPixel>(
         &mut self,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
+        frame: &GaugeFrame<'_, T>,
     ) -> Result<LinePair, Reject> {
         let failed = Reject::NoPair { got: 0.0, need: MIN_LINE_FRACTION };
-        let range =
-            WidthRangePx { min: LINE_RANGE_FACTOR * range.min, max: range.max / LINE_RANGE_FACTOR };
+        let WidthRangePx { min, max } = frame.range;
+        let range = WidthRangePx { min: LINE_RANGE_FACTOR * min, max: max / LINE_RANGE_FACTOR };
         let usual_px = (range.min * range.max).sqrt();
         vectors::widest(
             #[inline(always)]
-            || self.coarse.look(strip, usual_px),
+            || self.search.coarse.look(frame.strip, usual_px),
         );
         let polarities =
             [self.gauge.polarity != Polarity::Dark, self.gauge.polarity != Polarity::Bright];
         let may_be_groove = self.gauge.edge != EdgeKind::Step;
-        self.coarse.pairs(range, polarities, may_be_groove, &mut self.pairs);
-        let pair = *self.pairs.first().ok_or(failed)?;
+        self.search.coarse.pairs(range, polarities, may_be_groove, &mut self.search.pairs);
+        let pair = *self.search.pairs.first().ok_or(failed)?;
         self.check_prominence(&pair)?;
         self.check_rivals(&pair)?;
         Ok(pair)
@@ -145,8 +138,8 @@ impl MeasureState {
         let failed = Reject::NoPair { got: 0.0, need: MIN_LINE_FRACTION };
         let scene = RoughInput {
             strip,
-            lines: &self.lines,
-            noise: self.noise.grey,
+            lines: &self.rows.lines,
+            noise: self.rows.noise.grey,
             width_px: pair.width_px(),
             bead_after: true,
             bright: pair.bright,
@@ -181,32 +174,28 @@ impl MeasureState {
         pattern: f64,
         is_textured: bool,
         fits: &[RoughFit; 2],
-        strip: &GaugeRows<'_, T>,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+        frame: &GaugeFrame<'_, T>,
+    ) -> Measured {
         check_pattern(pattern / fits[0].contrast.min(fits[1].contrast), is_textured)?;
-        self.width_of_rough(fits, strip, view, surface)
+        self.width_of_rough(fits, frame)
     }
 
     /// The width of the bead whose rough edges were found.
     pub(super) fn width_of_rough<T: GreyPixel>(
         &mut self,
         fits: &[RoughFit; 2],
-        strip: &GaugeRows<'_, T>,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+        frame: &GaugeFrame<'_, T>,
+    ) -> Measured {
         self.left_px.clear();
         self.right_px.clear();
         let [left, right] = fits.map(with_flank_variance);
-        self.left.take_rough(self.rough[0].lines(), &left);
-        self.right.take_rough(self.rough[1].lines(), &right);
+        self.left.take_rough(&self.rough[0].lines, &left);
+        self.right.take_rough(&self.rough[1].lines, &right);
         self.check_contrast()?;
         self.check_blur(MAX_ROUGH_BLUR_PX)?;
-        self.check_ground(strip, f64::min)?;
-        self.check_boundary(strip.across)?;
-        self.width_on_surface(view, surface)
+        self.check_ground(frame.strip, f64::min)?;
+        self.check_boundary(frame.strip.across)?;
+        self.width_on_surface(frame.view, frame.surface)
     }
 }
 
@@ -215,7 +204,7 @@ impl MeasureState {
     fn check_prominence(&self, pair: &LinePair) -> Result<(), Reject> {
         let [left, right] = pair.sides;
         let margin = TEXTURE_MARGIN_FRACTION * pair.width_px();
-        let texture = self.coarse.texture_between(left.at + margin, right.at - margin);
+        let texture = self.search.coarse.texture_between(left.at + margin, right.at - margin);
         let got = f64::from(pair.strengths[0].min(pair.strengths[1]) / texture.max(f32::EPSILON));
         if got < MIN_TEXTURE_RATIO {
             Err(Reject::Vague { got, need: MIN_TEXTURE_RATIO })
@@ -227,7 +216,8 @@ impl MeasureState {
     /// Refuses a pair beside which another one fits as well that ends at a seam or a
     /// rib.
     fn check_rivals(&self, pair: &LinePair) -> Result<(), Reject> {
-        let rival = self.pairs.iter().skip(1).find(|other| self.coarse.are_rivals(pair, other));
+        let mut others = self.search.pairs.iter().skip(1);
+        let rival = others.find(|other| self.search.coarse.are_rivals(pair, other));
         rival.map_or(Ok(()), |rival| Err(self.ambiguous(pair.width_px(), rival.width_px())))
     }
 }

@@ -4,6 +4,7 @@
 use super::work::{MIN_LINE_FRACTION, MeasureState};
 use crate::calibration::SurfaceMap;
 use crate::core::units::WidthRange;
+use crate::numeric::number::{narrow_to_f32, to_f32, to_f64};
 use crate::vision::contour::EdgeContours;
 use crate::vision::edge::{STEP_HALF_WIDTH, StepCandidates, respond};
 use crate::vision::gauge::{Polarity, WidthRangePx};
@@ -50,36 +51,34 @@ impl ContourPair {
 impl MeasureState {
     #[inline(always)]
     pub(super) fn find_candidates(&mut self) {
-        // A step is the difference of two means of REACH pooled pixels.
-        #[expect(clippy::cast_precision_loss, reason = "REACH is small")]
-        let noise = self.noise.grey * (2.0 / (4.0 * STEP_HALF_WIDTH as f32)).sqrt();
-        #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
-        let least = (0.4 * self.gauge.min_contrast_grey) as f32;
+        // A step is the difference of two means of so many pooled pixels.
+        let pixels = to_f32(STEP_HALF_WIDTH);
+        let noise = self.rows.noise.grey * (2.0 / (4.0 * pixels)).sqrt();
+        let least = narrow_to_f32(0.4 * self.gauge.min_contrast_grey);
         let floor = least.max(NOISE_FLOOR_SIGMAS * noise);
-        #[expect(clippy::cast_precision_loss, reason = "REACH is small")]
-        let unit = self.bands.unit() / STEP_HALF_WIDTH as f32;
-        self.candidates.resize(self.bands.count(), StepCandidates::default());
-        for (band, candidates) in self.candidates.iter_mut().enumerate() {
-            let profile = self.bands.profile(band);
-            self.response.resize(profile.len(), 0);
-            respond(profile, &mut self.response);
-            candidates.find(&self.response, floor, unit);
+        let unit = self.rows.bands.unit / pixels;
+        self.search.candidates.resize(self.rows.bands.count(), StepCandidates::default());
+        for (band, candidates) in self.search.candidates.iter_mut().enumerate() {
+            let profile = self.rows.bands.profile(band);
+            self.search.response.resize(profile.len(), 0);
+            respond(profile, &mut self.search.response);
+            candidates.find(&self.search.response, floor, unit);
         }
     }
 
     /// Lines of candidates along the bead.
     #[inline(always)]
     pub(super) fn find_contours(&mut self) {
-        #[expect(clippy::cast_precision_loss, reason = "a band has few rows")]
-        let band_px = strip_rows(&self.bands) as f32 / self.bands.count().max(1) as f32;
-        self.ups.search(&self.candidates, true, band_px, MIN_BAND_FRACTION);
-        self.downs.search(&self.candidates, false, band_px, MIN_BAND_FRACTION);
+        let band_px = to_f32(strip_rows(&self.rows.bands)) / to_f32(self.rows.bands.count().max(1));
+        self.search.ups.search(&self.search.candidates, true, band_px, MIN_BAND_FRACTION);
+        self.search.downs.search(&self.search.candidates, false, band_px, MIN_BAND_FRACTION);
     }
 
     /// Whether so many steps show that texture or a pattern is likely.
     pub(super) fn is_busy(&self) -> bool {
         let steps = |of: &StepCandidates| of.up().len() + of.down().len();
-        self.candidates.iter().map(steps).sum::<usize>() > MIN_BUSY_STEPS * self.candidates.len()
+        self.search.candidates.iter().map(steps).sum::<usize>()
+            > MIN_BUSY_STEPS * self.search.candidates.len()
     }
 
     /// The believed widths in pixels across the gauge's middle.
@@ -88,19 +87,16 @@ impl MeasureState {
         view: &GaugeView,
         surface: &SurfaceMap,
     ) -> Result<WidthRangePx, Reject> {
-        #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-        let (u, v) = (view.across as f64 / 2.0, view.along as f64 / 2.0);
+        let (u, v) = (to_f64(view.across) / 2.0, to_f64(view.along) / 2.0);
         let middle = surface.to_mm(view.to_image(u, v)).ok_or(Reject::OffSurface)?;
         let beside = surface.to_mm(view.to_image(u + 1.0, v)).ok_or(Reject::OffSurface)?;
         let mm_per_px = (beside - middle).norm();
         self.mm_per_px = mm_per_px;
         let WidthRange { min, max } = self.gauge.width_range;
-        #[expect(clippy::cast_possible_truncation, reason = "widths in pixels")]
-        let range = WidthRangePx {
-            min: (min.get() / mm_per_px / RANGE_FACTOR) as f32,
-            max: (max.get() / mm_per_px * RANGE_FACTOR) as f32,
-        };
-        Ok(range)
+        Ok(WidthRangePx {
+            min: narrow_to_f32(min.get() / mm_per_px / RANGE_FACTOR),
+            max: narrow_to_f32(max.get() / mm_per_px * RANGE_FACTOR),
+        })
     }
 
     /// The bead's two edges among the contours.
@@ -139,9 +135,12 @@ impl MeasureState {
             if self.gauge.polarity == unwanted {
                 continue;
             }
-            let (lefts, rights) =
-                if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
-            let pair = pair::find(lefts, rights, range, &mut self.scratch);
+            let (lefts, rights) = if bright {
+                (&self.search.ups, &self.search.downs)
+            } else {
+                (&self.search.downs, &self.search.ups)
+            };
+            let pair = pair::find(lefts, rights, range, &mut self.scratch.narrow);
             best = match (best, pair) {
                 (Some(best), Some(pair)) if best.pair.score >= pair.score => Some(best),
                 (best, None) => best,
@@ -152,12 +151,12 @@ impl MeasureState {
     }
 
     pub(super) fn saturation(&self) -> Option<Reject> {
-        let got = self.bands.saturated_fraction();
+        let got = self.rows.bands.saturated_fraction();
         (got > MIN_SATURATED_FRACTION)
             .then_some(Reject::Saturated { got, limit: MIN_SATURATED_FRACTION })
     }
 }
 
 fn strip_rows(bands: &Bands) -> usize {
-    bands.count().checked_sub(1).map_or(0, |last| bands.rows(last).end)
+    bands.bounds.last().map_or(0, |rows| rows.end)
 }

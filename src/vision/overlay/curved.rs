@@ -2,10 +2,9 @@
 //! that falls off away from the edge, as under a lamp close by or in the hollow
 //! beside a bead.
 
-use super::Overlay;
+use super::StepFitter;
 use super::shape::{SideShading, SideShape};
-use super::step::StepWithNeighbours;
-use crate::numeric::blurred_step::StepTable;
+use super::step::SideInput;
 use crate::numeric::normal_equations::NormalEquations;
 
 /// Farthest that a parabola follows the surroundings \[px\].
@@ -22,26 +21,20 @@ const MAX_REVERSED_SLOPE: f64 = 0.3;
 /// Unit of distances, so that the equations are well scaled \[px\].
 const UNIT_PX: f64 = 10.0;
 
-impl Overlay {
+impl StepFitter<'_> {
     /// How far from the edge a side follows a parabola, and that; `None` where no
     /// bend shows.
     #[cold]
     #[inline(never)]
-    pub(super) fn parabolic_side(
-        &self,
-        table: &StepTable,
-        edge: StepWithNeighbours<'_>,
-        noise: f64,
-        sign: f64,
-        room: f64,
-    ) -> Option<SideShape> {
-        let height = edge.step.after - edge.step.before;
-        let first = 3.0 * edge.step.blur;
+    pub(super) fn parabolic_side(&self, side: &SideInput<'_>) -> Option<SideShape> {
+        let SideInput { noise, room, .. } = *side;
+        let height = side.step.after - side.step.before;
+        let first = 3.0 * side.step.blur;
         let mut normal = NormalEquations::<3>::default();
         let (mut end, mut rows) = (first, 0.0);
         while end + 2.0 <= room.min(MAX_EXTENT_PX) {
             let (mut place, mut miss, mut weight) = (0.0, 0.0, 0.0);
-            self.each_beside(table, edge, sign, end, |away, off, rows| {
+            self.each_beside(side, end, |away, off, rows| {
                 place += rows * away;
                 miss += rows * off;
                 weight += rows;
@@ -62,7 +55,7 @@ impl Overlay {
                     break;
                 }
             }
-            self.each_beside(table, edge, sign, end, |away, off, rows| {
+            self.each_beside(side, end, |away, off, rows| {
                 normal.add(terms(away), off, rows);
             });
             rows += weight;

@@ -3,10 +3,9 @@
 
 use nalgebra::SVector;
 
-use super::Overlay;
+use super::StepFitter;
 use super::look::{MAX_ITERATIONS, SHADING_SIGMA, StepFit, max_sample_px};
 use super::step::{BlurredStep, Extent, MIN_BLUR_PX, NeighbourStep, NeighbourSteps};
-use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::NormalEquations;
 use crate::vision::blur_estimate::BlurEstimate;
 
@@ -27,20 +26,19 @@ const MAX_MISFIT_INCREASE: f64 = 0.01;
 /// Weight that holds an unknown.
 const FIXED_WEIGHT: f64 = 1e12;
 
-impl Overlay {
+impl StepFitter<'_> {
     /// Fits an edge and the steps beside it. `start` has rough ones, and the
     /// edge as it was fitted without them. `None` where that is no better.
     #[cold]
     #[inline(never)]
     pub(super) fn fit_flanks(
         &self,
-        table: &StepTable,
         start: &StepFit,
         known: Option<BlurEstimate>,
     ) -> Option<StepFit> {
         let mut look = *start;
         for _ in 0..MAX_ITERATIONS {
-            let (mut normal, _) = self.linearise_flanks(table, &look);
+            let (mut normal, _) = self.linearise_flanks(&look);
             hold(&mut normal, &look, known);
             let solved = normal.solve()?;
             let moved = take_step(&mut look, &solved.unknowns);
@@ -48,7 +46,7 @@ impl Overlay {
                 break;
             }
         }
-        let (mut normal, misfit) = self.linearise_flanks(table, &look);
+        let (mut normal, misfit) = self.linearise_flanks(&look);
         hold(&mut normal, &look, known);
         look.noise = look.pixel_noise.max(misfit.sqrt());
         look.residual = look.noise;
@@ -63,27 +61,23 @@ impl Overlay {
 
     /// Normal equations about an edge and its flanks, and the mean square of
     /// what they leave.
-    fn linearise_flanks(
-        &self,
-        table: &StepTable,
-        look: &StepFit,
-    ) -> (NormalEquations<UNKNOWNS>, f64) {
+    fn linearise_flanks(&self, look: &StepFit) -> (NormalEquations<UNKNOWNS>, f64) {
         let flanks = &look.flanks;
         let Extent { before: from, after: to } = reach(look);
         let mut normal = NormalEquations::default();
         let many = 3.0 * flanks.0.iter().flatten().map(|_| 1.0).sum::<f64>();
         let (mut square, mut n) = (0.0, -6.0 - many);
-        for mean in self.means() {
+        for mean in self.overlay.means() {
             for (at, value) in mean.samples(-from, to) {
                 let mut row = [0.0; UNKNOWNS];
-                let (own, level) = look.linear_at(table, at);
+                let (own, level) = look.linear_at(self.table, at);
                 row[..6].copy_from_slice(&own);
                 let mut miss = value - level;
                 for ((flank, sign), first) in
                     flanks.0.iter().zip([-1.0, 1.0]).zip(FIRST_FLANK_UNKNOWN)
                 {
                     let Some(flank) = flank else { continue };
-                    let (adds, slopes) = flank.reaches(table, at, sign);
+                    let (adds, slopes) = flank.reaches(self.table, at, sign);
                     miss -= adds;
                     row[first..first + 3].copy_from_slice(&slopes);
                 }

@@ -2,9 +2,8 @@
 //! level, such as a camera's gamma, bends the flank by a bump that is even about the edge,
 //! share · (1 − share). A blurred step that is fitted to it lies aside of the edge.
 
-use super::Overlay;
+use super::StepFitter;
 use super::look::{SHADING_SIGMA, StepFit};
-use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::NormalEquations;
 use crate::numeric::number::to_f64;
 
@@ -21,26 +20,22 @@ pub struct EdgeSkew {
     pub variance: f64,
 }
 
-impl Overlay {
+impl StepFitter<'_> {
     /// The skew of the flank of an edge that was looked at. `None` where steps beside it
     /// reach into its pixels, or it cannot be told.
-    pub fn skew(&self, table: &StepTable, look: &StepFit) -> Option<EdgeSkew> {
+    pub fn skew(&self, look: &StepFit) -> Option<EdgeSkew> {
         if look.flanks.any() {
             return None;
         }
         let edge = look.step;
-        let (from, to) = look.fitted();
         let mut normal = NormalEquations::<UNKNOWNS>::default();
-        for mean in self.means() {
-            for (at, value) in mean.samples(from, to) {
-                let (of_step, level) = look.linear_at(table, at);
-                let mut row = [0.0; UNKNOWNS];
-                row[..BUMP_UNKNOWN].copy_from_slice(&of_step);
-                let (share, _) = table.at((at - edge.at) / edge.blur);
-                row[BUMP_UNKNOWN] = share * (1.0 - share) * (edge.after - edge.before);
-                normal.add(row, value - level, mean.weight);
-            }
-        }
+        self.each_sample(look, |_, sample| {
+            let mut row = [0.0; UNKNOWNS];
+            row[..BUMP_UNKNOWN].copy_from_slice(&sample.row);
+            let (step, _) = self.table.at((sample.at - edge.at) / edge.blur);
+            row[BUMP_UNKNOWN] = step * (1.0 - step) * (edge.after - edge.before);
+            normal.add(row, sample.miss, sample.weight);
+        });
         for (side, shading) in look.shading.iter().enumerate() {
             normal.add_prior(4 + side, (look.pixel_noise / SHADING_SIGMA).powi(2), -shading);
         }

@@ -4,8 +4,7 @@
 use nalgebra::SVector;
 
 use super::look::StepFit;
-use super::{Overlay, PHASES};
-use crate::numeric::blurred_step::StepTable;
+use super::{PHASES, StepFitter};
 use crate::numeric::normal_equations::NormalEquations;
 use crate::numeric::number::to_f64;
 
@@ -55,23 +54,40 @@ impl LinearisedStep {
     }
 }
 
-impl Overlay {
+impl StepFitter<'_> {
     /// The equations about the step of a look, without flanks.
     #[inline(always)]
-    pub(super) fn linearise(&self, table: &StepTable, look: &StepFit) -> LinearisedStep {
-        let (from, to) = look.fitted();
+    pub(super) fn linearise(&self, look: &StepFit) -> LinearisedStep {
         let phases = std::array::from_fn(|_| NormalEquations::default());
         let mut linear = LinearisedStep { phases, sum_of_squares: 0.0, samples: 0.0, used: 0.0 };
-        for (normal, mean) in linear.phases.iter_mut().zip(self.means()) {
-            for (at, value) in mean.samples(from, to) {
-                let (row, level) = look.linear_at(table, at);
-                let miss = value - level;
-                linear.sum_of_squares += mean.weight * miss * miss;
-                linear.samples += 1.0;
-                normal.add(row, miss, mean.weight);
-            }
-            linear.used += 1.0;
-        }
+        self.each_sample(look, |phase, sample| {
+            let weighted = sample.weight * sample.miss * sample.miss;
+            linear.sum_of_squares += weighted;
+            linear.samples += 1.0;
+            linear.phases[phase].add(sample.row, sample.miss, sample.weight);
+        });
+        linear.used = to_f64(self.overlay.means().count());
         linear
     }
+
+    /// Every sample about the step of a look, with the number of its phase among those that
+    /// have rows.
+    #[inline(always)]
+    pub(super) fn each_sample(&self, look: &StepFit, mut add: impl FnMut(usize, LinearSample)) {
+        let (from, to) = look.fitted();
+        for (phase, mean) in self.overlay.means().enumerate() {
+            for (at, value) in mean.samples(from, to) {
+                let (row, level) = look.linear_at(self.table, at);
+                add(phase, LinearSample { at, row, miss: value - level, weight: mean.weight });
+            }
+        }
+    }
+}
+
+/// A sample about a step: its distance from the path, its derivatives, its residual, its weight.
+pub(super) struct LinearSample {
+    pub at: f64,
+    pub row: [f64; UNKNOWNS],
+    pub miss: f64,
+    pub weight: f64,
 }

@@ -4,6 +4,7 @@
 use super::HALF_SPAN;
 use super::step::{BlurredStep, Extent, NeighbourStep, NeighbourSteps};
 use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::{floor_to_count, to_f64};
 use crate::vision::blur_estimate::BlurEstimate;
 
 /// How far from the edge samples are fitted, in blurs and pixels beside.
@@ -26,7 +27,7 @@ pub struct StepFit {
     /// Change of the level before and after it \[1/px away from it\].
     pub(super) shading: [f64; 2],
     /// Standard deviation of a pixel, in shares of the step.
-    pub(super) pixel_noise: f64,
+    pub pixel_noise: f64,
     /// Standard deviation of a row's samples about the step before the fit's last move, in
     /// shares of it.
     pub(super) noise: f64,
@@ -55,23 +56,12 @@ pub struct SideRange {
 impl StepFit {
     /// Samples beside the edge on either side.
     pub fn beside(&self) -> [SideRange; 2] {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "within the window"
-        )]
-        let whole = |distance: f64| distance.max(0.0) as usize;
         let near = 3.0 * self.step.blur + 1.0;
-        let to = |room: f64| whole(room).min(HALF_SPAN);
-        [
-            SideRange { near: whole((near - self.step.at).ceil()), far: to(self.room.before) },
-            SideRange { near: whole((near + self.step.at).ceil()), far: to(self.room.after) },
-        ]
-    }
-
-    /// Standard deviation of a sample, in shares of the step.
-    pub fn pixel_noise(&self) -> f64 {
-        self.pixel_noise
+        let Extent { before, after } = self.room;
+        [(near - self.step.at, before), (near + self.step.at, after)].map(|(near, room)| {
+            let far = floor_to_count(room).min(HALF_SPAN);
+            SideRange { near: floor_to_count(near.ceil()), far }
+        })
     }
 
     /// Its blur.
@@ -156,7 +146,6 @@ impl StepFit {
 }
 
 /// Farthest place of a sample from the path \[px\].
-#[expect(clippy::cast_precision_loss, reason = "the window is short")]
 pub fn max_sample_px() -> f64 {
-    HALF_SPAN as f64 - 1.0
+    to_f64(HALF_SPAN - 1)
 }

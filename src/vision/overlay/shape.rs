@@ -2,9 +2,8 @@
 //! and how they are shaded.
 
 use super::look::StepFit;
-use super::step::{BlurredStep, Extent, MIN_BLUR_PX, NeighbourSteps, StepWithNeighbours};
-use super::{Overlay, ROUNDING_VARIANCE_PX2};
-use crate::numeric::blurred_step::StepTable;
+use super::step::{BlurredStep, Extent, MIN_BLUR_PX, NeighbourSteps, SideInput};
+use super::{ROUNDING_VARIANCE_PX2, StepFitter};
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::line::LineSums;
 
@@ -59,45 +58,29 @@ impl StepShape {
     }
 }
 
-impl Overlay {
+impl StepFitter<'_> {
     /// How far the surroundings on one side of a known step are plain \[px\],
     /// after it or before it, their slope in shares of the step that was given
     /// \[1/px away from it\], and the variance that its doubt leaves to the
     /// level at the edge.
-    pub fn side_slope(
-        &self,
-        table: &StepTable,
-        look: &StepFit,
-        step: &BlurredStep,
-        after: bool,
-    ) -> (f64, (f64, f64)) {
+    pub fn side_slope(&self, look: &StepFit, step: &BlurredStep, after: bool) -> (f64, (f64, f64)) {
         let (sign, room) = if after { (1.0, look.room.after) } else { (-1.0, look.room.before) };
-        let (extent, line) = self.plain_extent(
-            table,
-            StepWithNeighbours { step, flanks: &look.flanks },
-            look.pixel_noise,
-            sign,
-            room,
-        );
-        (extent, line.shrunk_slope(look.pixel_noise))
+        let (flanks, noise) = (&look.flanks, look.pixel_noise);
+        let (extent, line) = self.plain_extent(&SideInput { step, flanks, sign, room, noise });
+        (extent, line.shrunk_slope(noise))
     }
 
     /// Reads the edge's shape from a look at it and what is known of its blur.
     #[inline(always)]
-    pub fn shape(
-        &self,
-        table: &StepTable,
-        look: &StepFit,
-        blur: BlurEstimate,
-    ) -> Option<StepShape> {
-        let look = self.fit_known(table, look, blur)?;
+    pub fn shape(&self, look: &StepFit, blur: BlurEstimate) -> Option<StepShape> {
+        let look = self.fit_known(look, blur)?;
         let StepFit { step, noise, room, flanks, added_variance, .. } = look;
         let sharp = step.blur * step.blur - ROUNDING_VARIANCE_PX2;
         let step = BlurredStep { blur: sharp.max(MIN_BLUR_PX.powi(2)).sqrt(), ..step };
-        let edge = StepWithNeighbours { step: &step, flanks: &flanks };
-        let pixel_noise = look.pixel_noise;
-        let before = self.side_shape(table, edge, noise, pixel_noise, -1.0, room.before);
-        let after = self.side_shape(table, edge, noise, pixel_noise, 1.0, room.after);
+        let before =
+            SideInput { step: &step, flanks: &flanks, sign: -1.0, room: room.before, noise };
+        let after = SideInput { sign: 1.0, room: room.after, ..before };
+        let [before, after] = [before, after].map(|side| self.side_shape(&side, look.pixel_noise));
         // A level that is off by a share moves the edge by √π blurs times it.
         let per_level = std::f64::consts::PI * step.blur * step.blur;
         Some(StepShape {
@@ -110,20 +93,12 @@ impl Overlay {
     }
 
     /// One side of the edge: along a straight line, or along a parabola where
-    /// that ends early. `noise` is that of a row's samples and that of a pixel.
+    /// that ends early. `pixel_noise` is that of a pixel, in place of a row's samples.
     #[inline(always)]
-    fn side_shape(
-        &self,
-        table: &StepTable,
-        edge: StepWithNeighbours<'_>,
-        noise: f64,
-        pixel_noise: f64,
-        sign: f64,
-        room: f64,
-    ) -> SideShape {
-        let (extent, line) = self.plain_extent(table, edge, noise, sign, room);
-        if extent + 2.0 <= room
-            && let Some(curved) = self.parabolic_side(table, edge, noise, sign, room)
+    fn side_shape(&self, side: &SideInput<'_>, pixel_noise: f64) -> SideShape {
+        let (extent, line) = self.plain_extent(side);
+        if extent + 2.0 <= side.room
+            && let Some(curved) = self.parabolic_side(side)
         {
             return curved;
         }
@@ -136,18 +111,16 @@ impl Overlay {
     #[inline(always)]
     pub(super) fn each_beside(
         &self,
-        table: &StepTable,
-        StepWithNeighbours { step, flanks }: StepWithNeighbours<'_>,
-        sign: f64,
+        &SideInput { step, flanks, sign, .. }: &SideInput<'_>,
         from: f64,
         mut add: impl FnMut(f64, f64, f64),
     ) {
         let height = step.after - step.before;
         let (near, far) = (step.at + sign * from, step.at + sign * (from + 2.0));
-        for mean in self.means() {
+        for mean in self.overlay.means() {
             for (at, value) in mean.samples(near.min(far), near.max(far) - 1e-9) {
-                let (share, _) = table.at((at - step.at) / step.blur);
-                let beside = if flanks.any() { flanks.at(table, at) } else { 0.0 };
+                let (share, _) = self.table.at((at - step.at) / step.blur);
+                let beside = if flanks.any() { flanks.at(self.table, at) } else { 0.0 };
                 let off = value - beside - step.before - height * share;
                 add(sign * (at - step.at), off, mean.weight);
             }
@@ -157,21 +130,15 @@ impl Overlay {
     /// How far from the edge a side is plain, that is a straight line within
     /// what noise explains, and that line.
     #[inline(always)]
-    fn plain_extent(
-        &self,
-        table: &StepTable,
-        edge: StepWithNeighbours<'_>,
-        noise: f64,
-        sign: f64,
-        room: f64,
-    ) -> (f64, LineSums) {
-        let height = edge.step.after - edge.step.before;
-        let first = 3.0 * edge.step.blur;
+    fn plain_extent(&self, side: &SideInput<'_>) -> (f64, LineSums) {
+        let SideInput { noise, room, .. } = *side;
+        let height = side.step.after - side.step.before;
+        let first = 3.0 * side.step.blur;
         let mut line = LineSums::default();
         let mut end = first.min(room);
         while end + 2.0 <= room {
             let mut block = LineSums::default();
-            self.each_beside(table, edge, sign, end, |away, off, weight| {
+            self.each_beside(side, end, |away, off, weight| {
                 block.add(away, off, weight);
             });
             if block.weight <= 0.0 {

@@ -92,11 +92,17 @@ impl NeighbourSteps {
     }
 }
 
-/// A step and the steps beside it.
+/// One side of a step with steps beside it.
 #[derive(Debug, Clone, Copy)]
-pub struct StepWithNeighbours<'a> {
+pub struct SideInput<'a> {
     /// The step.
     pub step: &'a BlurredStep,
-    /// Those beside it.
+    /// The steps beside it.
     pub flanks: &'a NeighbourSteps,
+    /// Direction away from the step: 1 after it, −1 before it.
+    pub sign: f64,
+    /// How far there is nothing else \[px\].
+    pub room: f64,
+    /// Standard deviation of a sample, as a fraction of the step.
+    pub noise: f64,
 }

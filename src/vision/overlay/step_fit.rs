@@ -1,10 +1,9 @@
 //! The fit of a blurred step to an overlay: a first look, and others from it on.
 
-use super::Overlay;
+use super::StepFitter;
 use super::look::{MAX_ITERATIONS, SHADING_SIGMA, StepFit};
 use super::slopes::{ProfileSlopes, SlopeLimits};
 use super::step::{BlurredStep, Extent, MIN_BLUR_PX, NeighbourSteps};
-use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::to_f64;
 use crate::vision::blur_estimate::BlurEstimate;
 
@@ -19,13 +18,13 @@ const CONVERGED_STEP: f64 = 8e-3;
 const MIN_NEIGHBOUR_SLOPE: f64 = 0.032;
 const WEAK_SLOPE_RATIO: f64 = 0.5;
 
-impl Overlay {
+impl StepFitter<'_> {
     /// Looks at the edge. `noise` is the standard deviation of a pixel as a
     /// share of the step, `room` how far to look. `None` where no step can be
     /// fitted.
     #[inline(always)]
-    pub fn first_fit(&self, table: &StepTable, noise: f64, room: Extent) -> Option<StepFit> {
-        let slopes = ProfileSlopes::of(self);
+    pub fn first_fit(&self, noise: f64, room: Extent) -> Option<StepFit> {
+        let slopes = ProfileSlopes::of(self.overlay);
         let (slope, at) = slopes.steepest(room)?;
         let blur = (0.2 / slope).clamp(0.5, MAX_BLUR_PX);
         let step = BlurredStep { at, blur, before: 0.0, after: 1.0 };
@@ -38,16 +37,16 @@ impl Overlay {
             pixel_noise: noise,
             noise,
             residual: noise,
-            phases: to_f64(self.means().count()),
+            phases: to_f64(self.overlay.means().count()),
             room,
             flanks: NeighbourSteps::default(),
             added_variance: 0.0,
         };
-        let look = self.fit(table, look, None)?;
+        let look = self.fit(look, None)?;
         let flanks = flanks.near(&look.step);
         if flanks.any() {
             let start = StepFit { flanks, ..look };
-            return Some(self.fit_flanks(table, &start, None).unwrap_or(look));
+            return Some(self.fit_flanks(&start, None).unwrap_or(look));
         }
         if !look.is_not_step() {
             return Some(look);
@@ -56,42 +55,32 @@ impl Overlay {
         let weaker = WEAK_SLOPE_RATIO * MIN_NEIGHBOUR_SLOPE;
         let (_, flanks) = self.up_to_neighbours(&slopes, step, noise, weaker, whole_room);
         let start = StepFit { flanks: flanks.near(&look.step), ..look };
-        let found = start.flanks.any().then(|| self.fit_flanks(table, &start, None)).flatten();
+        let found = start.flanks.any().then(|| self.fit_flanks(&start, None)).flatten();
         Some(found.filter(|found| !found.is_not_step()).unwrap_or(look))
     }
 
     /// Fits the edge of a look with another shape of the blur.
-    pub fn refit(&self, table: &StepTable, look: &StepFit) -> Option<StepFit> {
-        self.fit_from(table, look, None)
+    pub fn refit(&self, look: &StepFit) -> Option<StepFit> {
+        self.fit_from(look, None)
     }
 
     /// Fits the edge again with what is known of its blur.
     #[inline(always)]
-    pub(super) fn fit_known(
-        &self,
-        table: &StepTable,
-        look: &StepFit,
-        blur: BlurEstimate,
-    ) -> Option<StepFit> {
-        let fitted = self.fit_from(table, look, Some(blur));
+    pub(super) fn fit_known(&self, look: &StepFit, blur: BlurEstimate) -> Option<StepFit> {
+        let fitted = self.fit_from(look, Some(blur));
         if fitted.is_some() || !look.flanks.any() {
             return fitted;
         }
-        self.fit(table, look.without_flanks(), Some(blur))
+        self.fit(look.without_flanks(), Some(blur))
     }
 
     /// Fits the edge of a look and the steps beside it.
     #[inline(always)]
-    fn fit_from(
-        &self,
-        table: &StepTable,
-        look: &StepFit,
-        known: Option<BlurEstimate>,
-    ) -> Option<StepFit> {
+    fn fit_from(&self, look: &StepFit, known: Option<BlurEstimate>) -> Option<StepFit> {
         if look.flanks.any() {
-            return self.fit_flanks(table, look, known);
+            return self.fit_flanks(look, known);
         }
-        self.fit(table, *look, known)
+        self.fit(*look, known)
     }
 
     /// Cuts the room off half-way to a neighbouring step: where the slope has
@@ -106,7 +95,8 @@ impl Overlay {
         notable: f64,
         room: Extent,
     ) -> (Extent, NeighbourSteps) {
-        let limits = SlopeLimits { noise: noise / (2.0 * self.used().max(1.0)).sqrt(), notable };
+        let limits =
+            SlopeLimits { noise: noise / (2.0 * self.overlay.used().max(1.0)).sqrt(), notable };
         let (before, flank_before) = slopes.up_to_neighbour(start, limits, -1, room.before);
         let (after, flank_after) = slopes.up_to_neighbour(start, limits, 1, room.after);
         (Extent { before, after }, NeighbourSteps([flank_before, flank_after]))
@@ -114,12 +104,7 @@ impl Overlay {
 
     /// Fits place, blur, levels and a little shading about the edge.
     #[inline(always)]
-    fn fit(
-        &self,
-        table: &StepTable,
-        start: StepFit,
-        known: Option<BlurEstimate>,
-    ) -> Option<StepFit> {
+    fn fit(&self, start: StepFit, known: Option<BlurEstimate>) -> Option<StepFit> {
         let mut look = start;
         let mut last = None;
         let hold = |sd: f64| (start.noise / sd).powi(2);
@@ -128,7 +113,7 @@ impl Overlay {
         let of_shading = (start.pixel_noise / SHADING_SIGMA).powi(2);
         for _ in 0..MAX_ITERATIONS {
             let step = look.step;
-            let linear = self.linearise(table, &look);
+            let linear = self.linearise(&look);
             let mut normal = linear.normal();
             normal.add_prior(4, of_shading, -look.shading[0]);
             normal.add_prior(5, of_shading, -look.shading[1]);

@@ -47,9 +47,10 @@ fn overlay(beside: impl Fn(f64) -> f64) -> Overlay {
 fn shape(overlay: &Overlay) -> StepShape {
     let table = StepTable::default();
     let room = Extent { before: 45.0, after: 45.0 };
-    let look = overlay.first_fit(&table, NOISE, room).unwrap();
+    let look = overlay.with(&table).first_fit(NOISE, room).unwrap();
     overlay
-        .shape(&table, &look, BlurEstimate { px: look.step.blur, sd_px: 0.04 * BLUR_PX })
+        .with(&table)
+        .shape(&look, BlurEstimate { px: look.step.blur, sd_px: 0.04 * BLUR_PX })
         .unwrap()
 }
 

@@ -71,7 +71,7 @@ impl RowWindows {
 
     /// Rows of the gauge that a row is the mean of.
     pub fn rows(&self, number: usize) -> f64 {
-        self.sheet.windows()[number].rows.into()
+        self.sheet.windows[number].rows.into()
     }
 
     /// Position across the gauge of a position in a row's window \[px\]; `None`
@@ -95,7 +95,7 @@ impl RowWindows {
 
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     fn first(&self, number: usize) -> f32 {
-        self.sheet.windows()[number].first as f32
+        self.sheet.windows[number].first as f32
     }
 
     /// Reads the rows along a line.
@@ -115,7 +115,7 @@ impl RowWindows {
         self.sheet.read(strip, &[RowRange::new(0, strip.along)], grouping, at);
         self.lines.clear();
         let mut line = 0;
-        for window in self.sheet.windows() {
+        for window in &self.sheet.windows {
             let is_beyond = |end: usize| narrow_to_f32(to_f64(end)) <= window.middle + 0.5;
             while scene.lines.get(line).is_some_and(|line| is_beyond(line.end)) {
                 line += 1;
@@ -125,7 +125,7 @@ impl RowWindows {
         self.bead_after = scene.bead_after;
         self.width = narrow_to_f32(to_f64(strip.across));
         let sign = if scene.bright { 1.0 } else { -1.0 };
-        let count = self.sheet.windows().len();
+        let count = self.sheet.windows.len();
         self.across.resize(count, [0.0; WINDOW_PX]);
         self.rows.resize(count, [0.0; WINDOW_PX]);
         for (number, row) in self.across.iter_mut().enumerate() {

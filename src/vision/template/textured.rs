@@ -2,7 +2,7 @@
 //! weighted so that the texture disturbs it least.
 
 use super::{LANES, MAX_CHUNKS, SUBPIXEL_PHASES, StepTemplate};
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::vision::texture::SurfaceTexture;
 use crate::vision::whiten::{MAX_PIXELS, NoiseWhitener};
 
@@ -51,9 +51,7 @@ impl StepTemplate {
             for (k, weight) in slope[..count].iter().enumerate() {
                 let (part, lane) = (&mut parts[(first + k) / LANES], (first + k) % LANES);
                 part.mask[lane] = 1.0;
-                #[expect(clippy::cast_possible_truncation, reason = "a weight")]
-                let weight = *weight as f32;
-                part.slope[lane] = weight;
+                part.slope[lane] = narrow_to_f32(*weight);
             }
             if phase == 0 {
                 let within = |distance| texture.within_window(to_f64(distance));
@@ -61,8 +59,7 @@ impl StepTemplate {
             }
         }
         self.products.slope_slope = 1.0;
-        self.products.slope_before = 0.0;
-        self.products.slope_after = 0.0;
+        self.products.others[..2].fill(0.0);
         Some(scatter)
     }
 

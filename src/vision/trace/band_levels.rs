@@ -59,7 +59,7 @@ impl EdgeTracer {
         self.values.before.clear();
         self.values.step.clear();
         let (left, right) = (picked(-1.0, room[0]), picked(1.0, room[1]));
-        let unit = scene.bands.unit();
+        let unit = scene.bands.unit;
         for (band, &at) in self.values.path.iter().enumerate() {
             let profile = scene.bands.profile(band);
             #[expect(clippy::cast_possible_truncation, reason = "a place in the gauge")]

@@ -2,9 +2,7 @@
 //! else. All that is known of it is taken from those rows alone.
 
 use super::{EdgeState, EdgeTracer, MAX_CLEAR_MISFIT, NOISE_SIGMAS, typical};
-use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::narrow_to_f32;
-use crate::numeric::number::to_f32;
+use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f32};
 use crate::numeric::rank;
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::consensus::keep_consensus;
@@ -60,17 +58,13 @@ impl EdgeTracer {
     /// whether there are enough of them.
     #[cold]
     #[inline(never)]
-    pub(super) fn locate_occluded<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-    ) -> bool {
+    pub(super) fn locate_occluded<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         self.look_row_by_row();
         self.occlusion.free.clear();
         self.occlusion.free.extend_from_slice(&self.values.picked);
         let mut best = (NONE_CLEAR, 0);
         for attempt in 0..MAX_ATTEMPTS {
-            let clear = self.try_course(table, scene).unwrap_or(NONE_CLEAR);
+            let clear = self.try_course(scene).unwrap_or(NONE_CLEAR);
             if clear >= ENOUGH_CLEAR_FRACTION {
                 best = (clear, attempt);
                 break;
@@ -90,11 +84,11 @@ impl EdgeTracer {
         }
         if best.0 < ENOUGH_CLEAR_FRACTION {
             std::mem::swap(&mut self.occlusion.free, &mut self.occlusion.best_free);
-            if self.try_course(table, scene).is_none() {
+            if self.try_course(scene).is_none() {
                 return false;
             }
         }
-        self.locate_from_clear_rows(table, scene)
+        self.locate_from_clear_rows(scene)
     }
 
     /// Rows are judged one by one, each against noise alone: what covers some of
@@ -114,7 +108,6 @@ impl EdgeTracer {
     #[inline(never)]
     pub fn locate_occluded_along<T: GreyPixel>(
         &mut self,
-        table: &StepTable,
         scene: &TraceInput<'_, T>,
         blur: BlurEstimate,
         places: &[f32],
@@ -122,10 +115,10 @@ impl EdgeTracer {
         self.look_row_by_row();
         self.occlusion.free.clear();
         self.occlusion.free.extend_from_slice(places);
-        if self.try_course(table, scene).is_some() && self.locate_from_clear_rows(table, scene) {
+        if self.try_course(scene).is_some() && self.locate_from_clear_rows(scene) {
             self.state = EdgeState::Occluded;
         } else {
-            self.trace_again(table, scene, blur);
+            self.trace_again(scene, blur);
         }
     }
 
@@ -161,13 +154,9 @@ impl EdgeTracer {
 
     /// Locates the edge from its clear rows. Returns whether they show one.
     #[inline(never)]
-    fn locate_from_clear_rows<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-    ) -> bool {
-        let Some(shape) = self.read_shape(table, scene) else { return false };
-        self.row_fit.template.tabulate(table, &shape, false);
+    fn locate_from_clear_rows<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
+        let Some(shape) = self.read_shape(scene) else { return false };
+        self.row_fit.template.tabulate(scene.table, &shape, false);
         self.blur_px = shape.step.blur;
         self.uncertainty.common_variance = shape.variance;
         self.compare_rows(scene);
@@ -179,22 +168,18 @@ impl EdgeTracer {
     /// Tells the clear rows along the course that most of the free bands agree
     /// on, and their share. `None` where there are too few.
     #[inline(never)]
-    fn try_course<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-    ) -> Option<f32> {
+    fn try_course<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> Option<f32> {
         self.occlusion.clear.clear();
         if !self.take_course(scene) {
             return None;
         }
         self.read(scene);
-        let (windows, trusted) = (self.sheet.windows(), &self.occlusion.trusted);
+        let (windows, trusted) = (&self.sheet.windows, &self.occlusion.trusted);
         let clear = |number: usize| trusted[scene.bands.band_of(windows[number].middle)];
         self.overlay.lay_robustly(&self.sheet, clear);
         for _ in 0..MAX_PASSES {
-            let shape = self.read_shape(table, scene)?;
-            self.row_fit.template.tabulate(table, &shape, false);
+            let shape = self.read_shape(scene)?;
+            self.row_fit.template.tabulate(scene.table, &shape, false);
             self.occlusion.clear.clear();
             self.compare_rows(scene);
             if !self.judge_rows(scene, shape.step.blur) {
@@ -261,22 +246,16 @@ impl EdgeTracer {
     /// Reads the edge's shape from the overlay and takes it over. Rows are
     /// known to be clear about the edge only: beside it spots may lie anywhere,
     /// and would pass for shading.
-    fn read_shape<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-    ) -> Option<StepShape> {
+    fn read_shape<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> Option<StepShape> {
         let noise = f64::from(scene.noise) / f64::from(typical(&self.values.step).abs());
         let room = self.room(scene);
-        let look = self.overlay.first_fit(table, noise, room)?;
+        let fitter = self.overlay.with(scene.table);
+        let look = fitter.first_fit(noise, room)?;
         let core = StepTemplate::core_half(look.step.blur);
         let room = Extent { before: room.before.min(core), after: room.after.min(core) };
-        let look = self.overlay.first_fit(table, noise, room)?;
-        let shape = self.overlay.shape(
-            table,
-            &look,
-            BlurEstimate { px: look.step.blur, sd_px: f64::INFINITY },
-        )?;
+        let look = fitter.first_fit(noise, room)?;
+        let shape =
+            fitter.shape(&look, BlurEstimate { px: look.step.blur, sd_px: f64::INFINITY })?;
         let other = f64::max(shape.step.before.abs(), (shape.step.after - 1.0).abs());
         if other > MAX_LEVEL_DIFFERENCE {
             return None;
@@ -292,12 +271,7 @@ impl EdgeTracer {
         let weight = self.row_fit.groups.first().map_or(1.0, |group| group.weight);
         let rows = to_f32(scene.strip.along);
         for blurs in MARGIN_BLURS {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a few rows"
-            )]
-            let reach = (blurs * blur / f64::from(weight)).ceil() as usize;
+            let reach = floor_to_count((blurs * blur / f64::from(weight)).ceil());
             self.occlusion.clear.clear();
             for (k, group) in self.row_fit.groups.iter().enumerate() {
                 let near = k.saturating_sub(reach)..(k + reach + 1).min(self.row_fit.groups.len());
@@ -348,7 +322,7 @@ impl EdgeTracer {
     #[inline(never)]
     fn elsewhere<T: GreyPixel>(&self, scene: &TraceInput<'_, T>, limit: f32) -> f32 {
         let (mut longest, mut run) = (0.0f32, 0.0);
-        let windows = self.sheet.windows();
+        let windows = &self.sheet.windows;
         for (number, (group, clear)) in
             self.row_fit.groups.iter().zip(&self.occlusion.clear).enumerate()
         {

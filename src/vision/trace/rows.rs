@@ -31,7 +31,7 @@ impl EdgeTracer {
         self.row_fit.plain.resize(scene.lines.len(), PlainSums::default());
         // Noise of a pixel in the mean of so many rows.
         let (mut rows, mut noise) = (0.0, 0.0);
-        for (number, window) in self.sheet.windows().iter().enumerate() {
+        for (number, window) in self.sheet.windows.iter().enumerate() {
             let (band, weight) = (window.line, window.rows);
             if self.occlusion.clear.get(number) == Some(&false) {
                 self.row_fit.groups.push(RowGroup::hidden(band, weight));

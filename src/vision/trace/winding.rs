@@ -2,9 +2,7 @@
 //! a rough bead does in a tall gauge: it is picked anew, caliper line by caliper line.
 
 use super::{EdgeTracer, MAX_UNFIT_FRACTION, StepFit, TraceInput, typical};
-use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::narrow_to_f32;
-use crate::numeric::number::to_f32;
+use crate::numeric::number::{narrow_to_f32, to_f32};
 use crate::numeric::rank;
 use crate::vision::edge_windows::{EdgeWindow, Grouping, MAX_SINGLE_ROWS, MIDDLE_PX, WINDOW_PX};
 use crate::vision::path;
@@ -67,21 +65,17 @@ impl EdgeTracer {
     /// few rows show it: then it winds, and nothing covers it.
     #[cold]
     #[inline(never)]
-    pub(super) fn trace_winding<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-    ) -> bool {
+    pub(super) fn trace_winding<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         if !could_wind(scene) || self.step_fit.is_none() || !self.pick_lines(scene) {
             return false;
         }
         for _ in 0..MAX_PASSES {
-            self.lay_over(table, scene);
+            self.lay_over(scene);
             let Some(StepFit { room, .. }) = self.step_fit else { return false };
             self.pick_levels_within(scene, room);
-            let Some(blur) = self.lay_over(table, scene) else { return false };
-            self.take_shape(table, blur);
-            if !self.trace_open(table, scene) {
+            let Some(blur) = self.lay_over(scene) else { return false };
+            self.take_shape(scene.table, blur);
+            if !self.trace_open(scene) {
                 return false;
             }
             if self.unfit_fraction <= MAX_UNFIT_FRACTION && !self.lost_rows(scene) {
@@ -125,7 +119,7 @@ impl EdgeTracer {
             Grouping { steepest: 0.0, max_rows: tall },
             |v| course.at(v),
         );
-        let windows = self.sheet.windows().iter().enumerate();
+        let windows = self.sheet.windows.iter().enumerate();
         let picks = windows.map(|(number, window)| pick(window, self.sheet.pixels(number)));
         if !path::fill(picks, &mut self.scratch.rough) {
             return false;
@@ -167,6 +161,7 @@ fn place(at: isize) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numeric::blurred_step::StepTable;
 
     fn window(at: f64, heights: [f64; 2]) -> (EdgeWindow, [f32; WINDOW_PX]) {
         let table = StepTable::default();
