@@ -14,7 +14,7 @@ use super::reject::Reject;
 use super::width::{Hints, WidthMeasurement};
 use crate::numeric::gauss_legendre::GAUSS_LEGENDRE_5;
 use sections::Sections;
-use spread::WidthUncertainty;
+use spread::{CutBead, WidthUncertainty};
 pub use width_input::{LocatedEdge, WidthInput, WidthScratch};
 
 /// Largest angle between the bead and the gauge's axis that is measured: the
@@ -46,7 +46,8 @@ pub fn width(
     for (side, (curve, off)) in curves.iter().zip(&mut memory.off).enumerate() {
         scene.residuals_into(side, curve, off);
     }
-    let spread = WidthUncertainty::of(scene, &curves, &sections, memory);
+    let spread =
+        WidthUncertainty::of(&CutBead { scene, curves: &curves, sections: &sections }, memory);
     let edge = |side: usize| {
         let at = curves[side].at(0.0) + scene.residual_at_middle(&memory.off[side]);
         scene.view.to_image(at, scene.centre())

@@ -116,6 +116,11 @@ impl LineSearch {
         self.find_strongest(reach);
     }
 
+    /// Lines into a bright or a dark bead, and out of it.
+    fn sides(&self, bright: bool) -> (&Vec<StepLine>, &Vec<StepLine>) {
+        if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) }
+    }
+
     /// Pairs of lines at a distance within a range, the strongest first.
     /// `polarities` are whether bright and dark beads are looked for; where a groove may lie
     /// beside a bright one, its far side adds to the edge.
@@ -131,8 +136,7 @@ impl LineSearch {
             if !wanted {
                 continue;
             }
-            let (lefts, rights) =
-                if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
+            let (lefts, rights) = self.sides(bright);
             let has_far_sides = bright && may_be_groove;
             let far_sides = (has_far_sides.then_some(rights), has_far_sides.then_some(lefts));
             for &left in lefts {
@@ -148,14 +152,9 @@ impl LineSearch {
                     ];
                     let parallel = (-apart * apart).exp();
                     let score = (strengths[0] * strengths[1]).sqrt() * parallel;
-                    let bare = (left.step * right.step).sqrt() * parallel;
-                    out.push(LinePair {
-                        sides: [left, right],
-                        bright,
-                        score,
-                        score_without_grooves: bare,
-                        strengths,
-                    });
+                    let (sides, bare) = ([left, right], (left.step * right.step).sqrt() * parallel);
+                    let score_without_grooves = bare;
+                    out.push(LinePair { sides, bright, score, score_without_grooves, strengths });
                 }
             }
         }
@@ -175,8 +174,7 @@ impl LineSearch {
             return false;
         }
         let gap = self.gap(outer) / left.step.min(right.step);
-        let (ins, outs) =
-            if outer.bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
+        let (ins, outs) = self.sides(outer.bright);
         // The narrower pair, where it is the stronger one, owes that to its rib.
         let (seam, rival) =
             if inner == pair { INNER_PAIR_RATIOS } else { (MAX_SEAM_RATIO, MIN_RIVAL_RATIO) };
@@ -200,8 +198,7 @@ impl LineSearch {
     /// of the bead, followed by one back in.
     fn gap(&self, pair: &LinePair) -> f32 {
         let [left, right] = pair.sides;
-        let (outs, backs) =
-            if pair.bright { (&self.downs, &self.ups) } else { (&self.ups, &self.downs) };
+        let (backs, outs) = self.sides(pair.bright);
         let is_within = |line: &&StepLine| line.at > left.at && line.at < right.at;
         let mut deepest: f32 = 0.0;
         for out in outs.iter().filter(is_within) {

@@ -51,6 +51,19 @@ pub struct EdgeContours {
     count: usize,
 }
 
+/// The steps of one sign.
+#[derive(Clone, Copy)]
+struct SignedSteps<'a> {
+    bands: &'a [StepCandidates],
+    up: bool,
+}
+
+impl<'a> SignedSteps<'a> {
+    fn of(self, band: usize) -> &'a [StepCandidate] {
+        if self.up { self.bands[band].up() } else { self.bands[band].down() }
+    }
+}
+
 impl EdgeContours {
     /// What was found, the strongest first.
     pub fn all(&self) -> &[EdgeContour] {
@@ -59,30 +72,24 @@ impl EdgeContours {
 
     /// Looks for contours of steps up or down that reach `least_share` of the
     /// bands. `band_px` is the height of a band.
-    pub fn search(
-        &mut self,
-        bands: &[StepCandidates],
-        up: bool,
-        band_px: f32,
-        min_band_fraction: f64,
-    ) {
+    pub fn search(&mut self, bands: &[StepCandidates], up: bool, band_px: f32, min_fraction: f64) {
         self.used.clear();
         self.used.resize(bands.len(), 0);
         self.scores.resize(bands.len(), [0.0; MAX_STEPS_KEPT]);
         self.predecessors.resize(bands.len(), [NO_PREDECESSOR; MAX_STEPS_KEPT]);
         self.contours.resize_with(MAX_CONTOURS, EdgeContour::default);
         self.count = 0;
-        let steps = |band: usize| if up { bands[band].up() } else { bands[band].down() };
+        let steps = SignedSteps { bands, up };
         while self.count < MAX_CONTOURS {
-            let typical = self.typical_step(bands.len(), &steps);
+            let typical = self.typical_step(steps);
             if typical <= 0.0 {
                 return;
             }
-            let Some(last) = self.link(bands.len(), &steps, band_px, typical) else { return };
-            self.follow(last, &steps);
+            let Some(last) = self.link(steps, band_px, typical) else { return };
+            self.follow(last, steps);
             let found = &mut self.contours[self.count];
             found.waviness_px *= (REFERENCE_BAND_PX / band_px).min(1.0);
-            if found.band_fraction < min_band_fraction {
+            if found.band_fraction < min_fraction {
                 return;
             }
             self.count += 1;
@@ -94,14 +101,10 @@ impl EdgeContours {
     }
 
     /// A strong but not extreme step: the 70th percentile of each band's best.
-    fn typical_step<'a>(
-        &mut self,
-        bands: usize,
-        steps: &impl Fn(usize) -> &'a [StepCandidate],
-    ) -> f32 {
+    fn typical_step(&mut self, steps: SignedSteps<'_>) -> f32 {
         self.steps.clear();
-        for band in 0..bands {
-            let free = steps(band).iter().enumerate();
+        for band in 0..steps.bands.len() {
+            let free = steps.of(band).iter().enumerate();
             let best = free
                 .filter(|&(index, _)| !self.is_used(band, index))
                 .map(|(_, step)| step.step)
@@ -115,17 +118,17 @@ impl EdgeContours {
     }
 
     /// Fills in scores and returns the last step of the best contour.
-    fn link<'a>(
+    fn link(
         &mut self,
-        bands: usize,
-        steps: &impl Fn(usize) -> &'a [StepCandidate],
+        steps: SignedSteps<'_>,
         band_px: f32,
         typical: f32,
     ) -> Option<(usize, usize)> {
+        let bands = steps.bands.len();
         let mut best = None;
         let mut best_total = 0.0;
         for band in 0..bands {
-            for (index, step) in steps(band).iter().enumerate() {
+            for (index, step) in steps.of(band).iter().enumerate() {
                 if self.is_used(band, index) {
                     continue;
                 }
@@ -143,11 +146,11 @@ impl EdgeContours {
         best
     }
 
-    fn best_before<'a>(
+    fn best_before(
         &self,
         band: usize,
         at: f32,
-        steps: &impl Fn(usize) -> &'a [StepCandidate],
+        steps: SignedSteps<'_>,
         band_px: f32,
     ) -> (f32, u16) {
         let mut best = (-SKIP_COST * to_f32(band), NO_PREDECESSOR);
@@ -155,7 +158,7 @@ impl EdgeContours {
             let before = band - gap;
             let skipped = SKIP_COST * to_f32(gap - 1);
             let free = MAX_FREE_SLOPE * band_px * to_f32(gap) + 1.0;
-            for (index, step) in steps(before).iter().enumerate() {
+            for (index, step) in steps.of(before).iter().enumerate() {
                 if self.is_used(before, index) {
                     continue;
                 }
@@ -172,14 +175,14 @@ impl EdgeContours {
     }
 
     /// Follows a contour back from its last step and takes its steps out.
-    fn follow<'a>(&mut self, last: (usize, usize), steps: &impl Fn(usize) -> &'a [StepCandidate]) {
+    fn follow(&mut self, last: (usize, usize), steps: SignedSteps<'_>) {
         let contour = &mut self.contours[self.count];
         contour.at.clear();
         contour.at.resize(self.used.len(), None);
         let (mut sum, mut n) = (0.0, 0.0);
         let (mut band, mut index) = last;
         loop {
-            let step = steps(band)[index];
+            let step = steps.of(band)[index];
             contour.at[band] = Some(step.at);
             self.used[band] |= 1 << index;
             sum += step.step;

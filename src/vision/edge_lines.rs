@@ -138,7 +138,7 @@ fn best_pair(
             let width = (m2 - m1).norm();
             let WidthRange { min, max } = gauge.width_range;
             if !(min.get()..=max.get()).contains(&width)
-                || !polarity_fits(gauge, frame, &grey, *left, *right)
+                || !polarity_fits(gauge, frame, &grey, [*left, *right])
             {
                 continue;
             }
@@ -153,13 +153,7 @@ fn best_pair(
 
 /// Whether the gauge's middle row is brighter between the lines than beside
 /// them, or darker, as the bead is.
-fn polarity_fits(
-    gauge: &Gauge,
-    frame: &Frame,
-    grey: &[u8],
-    left: EdgeLine,
-    right: EdgeLine,
-) -> bool {
+fn polarity_fits(gauge: &Gauge, frame: &Frame, grey: &[u8], [left, right]: [EdgeLine; 2]) -> bool {
     const BESIDE_PX: f64 = 6.0;
     let (roi, view) = (gauge.roi, GaugeView::new(gauge.roi, gauge.axis));
     let middle = ((to_f64(view.along) - 1.0) / 2.0).round();

@@ -1,6 +1,8 @@
 //! The gauge straightened along an edge: the pixels around it, one window a few
 //! rows, read once and held against the edge as often as it takes.
 
+use std::ops::Range;
+
 use super::path::EdgeCorrection;
 use super::row_range::RowRange;
 use super::strip::{GaugeRows, GreyPixel};
@@ -112,7 +114,7 @@ fn rows_together(along: usize, lines: usize, steepest: f32) -> usize {
 #[inline(always)]
 fn average<T: GreyPixel>(
     strip: &GaugeRows<'_, T>,
-    rows: std::ops::Range<usize>,
+    rows: Range<usize>,
     first: isize,
     out: &mut [f32; WINDOW_PX],
 ) {

@@ -32,8 +32,12 @@ pub struct EdgePosition {
 }
 
 /// Where to look for a pattern.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EdgeSide<'a> {
+#[derive(Debug, Clone, Copy)]
+pub struct EdgeSide<'a, T> {
+    /// The gauge's pixels.
+    pub strip: &'a GaugeRows<'a, T>,
+    /// Standard deviation of a pixel's noise \[grey levels\].
+    pub noise: f64,
     /// The edge, row by row.
     pub positions: &'a [EdgePosition],
     /// Direction in which to look, away from the edge: 1 or -1.
@@ -44,7 +48,7 @@ pub struct EdgeSide<'a> {
     pub room_px: f64,
 }
 
-impl EdgeSide<'_> {
+impl<T> EdgeSide<'_, T> {
     /// Whether it lies at higher positions than the edge.
     fn is_after(&self) -> bool {
         self.outwards > 0.0
@@ -80,13 +84,9 @@ impl PatternSearch {
     /// \[grey levels\]. `None` where none is told from noise, or too little is in the
     /// gauge.
     #[inline(always)]
-    pub fn pattern<T: GreyPixel>(
-        &mut self,
-        strip: &GaugeRows<'_, T>,
-        side: &EdgeSide<'_>,
-        noise: f64,
-    ) -> Option<Pattern> {
-        let mut variances = self.look(strip, side, noise)?;
+    pub fn pattern<T: GreyPixel>(&mut self, side: &EdgeSide<'_, T>) -> Option<Pattern> {
+        let noise = side.noise;
+        let mut variances = self.look(side)?;
         let size_grey = self.without_noise(&mut variances, noise)?;
         Some(Pattern { size_grey, mean_variance: self.variance_of_mean(noise) })
     }
@@ -95,13 +95,8 @@ impl PatternSearch {
     /// \[grey levels\], from the median of how far pixels are off their median: sparks or
     /// holes, which move a mean, are none. `None` as for a pattern.
     #[inline(always)]
-    pub fn texture<T: GreyPixel>(
-        &mut self,
-        strip: &GaugeRows<'_, T>,
-        side: &EdgeSide<'_>,
-        noise: f64,
-    ) -> Option<f64> {
-        let mut variances = self.look(strip, side, noise)?;
+    pub fn texture<T: GreyPixel>(&mut self, side: &EdgeSide<'_, T>) -> Option<f64> {
+        let mut variances = self.look(side)?;
         for (column, variance) in variances.iter_mut().enumerate().take(self.columns) {
             self.column.clear();
             self.column.extend(self.lines.iter().map(|line| line[column]));
@@ -109,29 +104,24 @@ impl PatternSearch {
             let deviation = f64::from(rank::median_deviation(&mut self.column, median)?);
             *variance = narrow_to_f32((rank::SIGMA_PER_MEDIAN * deviation).powi(2));
         }
-        self.without_noise(&mut variances, noise)
+        self.without_noise(&mut variances, side.noise)
     }
 
     /// Reads what lies beside an edge: the variance of each column; `None` where all
     /// together are surely noise.
     #[inline(always)]
-    fn look<T: GreyPixel>(
-        &mut self,
-        strip: &GaugeRows<'_, T>,
-        side: &EdgeSide<'_>,
-        noise: f64,
-    ) -> Option<[f32; MAX_COLUMNS]> {
+    fn look<T: GreyPixel>(&mut self, side: &EdgeSide<'_, T>) -> Option<ColumnValues> {
         let count = side.positions.len();
         if count < MIN_LINES {
             return None;
         }
-        self.read(strip, side);
+        self.read(side);
         detrend(&mut self.lines);
         let freedom = 1.0 / narrow_to_f32(to_f64(count - 2));
         let variances = sum(self.lines.iter().map(|line| line.map(|grey| freedom * grey * grey)));
         let mean =
             variances[..self.columns].iter().sum::<f32>() / narrow_to_f32(to_f64(self.columns));
-        (f64::from(mean) > MAX_NOISE_RATIO * noise * noise).then_some(variances)
+        (f64::from(mean) > MAX_NOISE_RATIO * side.noise * side.noise).then_some(variances)
     }
 
     /// Standard deviation without the pixels' noise, from the median of the columns'
@@ -143,7 +133,8 @@ impl PatternSearch {
 
     /// Reads columns of pixels beside an edge, as far as they lie within the gauge.
     #[inline(always)]
-    fn read<T: GreyPixel>(&mut self, strip: &GaugeRows<'_, T>, side: &EdgeSide<'_>) {
+    fn read<T: GreyPixel>(&mut self, side: &EdgeSide<'_, T>) {
+        let strip = side.strip;
         let first = MIN_FIRST_PX.max(FLANK_BLURS * side.blur_px);
         let last = to_f64(strip.across - 1);
         let border =

@@ -30,7 +30,7 @@ use course::{ParabolicCourse, bend_at};
 use descent::{
     CONVERGED, DescentResult, MAX_ITERATIONS, MAX_STEP_PX, ROUGHLY_CONVERGED, StopCriterion,
 };
-pub use mean_edge_input::MeanEdgeInput;
+pub use mean_edge_input::MeanInput;
 use weights::{EdgeWeights, HALF_PX, ShiftSamples, WINDOW, product};
 
 /// Half of the window about an edge at most, as a fraction of the bead's width.
@@ -108,7 +108,7 @@ impl MeanEdge {
     /// ground lies within the gauge.
     pub fn pattern<T: GreyPixel>(
         &mut self,
-        scene: &MeanEdgeInput<'_, T>,
+        scene: &MeanInput<'_, T>,
         line: &StepLine,
     ) -> Option<f64> {
         self.start_from(scene, line);
@@ -147,7 +147,7 @@ impl MeanEdge {
         Some(f64::from(scene.strip.scale * variance.sqrt()))
     }
 
-    fn start_from<T: GreyPixel>(&mut self, scene: &MeanEdgeInput<'_, T>, line: &StepLine) {
+    fn start_from<T: GreyPixel>(&mut self, scene: &MeanInput<'_, T>, line: &StepLine) {
         let half = 0.5 * to_f64(scene.strip.along);
         self.course =
             ParabolicCourse { at: line.at.into(), tilt: half * f64::from(line.slope), bend: 0.0 };
@@ -158,7 +158,7 @@ impl MeanEdge {
     /// [`BLURS_PX`] leaves of its profile; infinite where there is no edge.
     pub fn fit_blurs<T: GreyPixel>(
         &mut self,
-        scene: &MeanEdgeInput<'_, T>,
+        scene: &MeanInput<'_, T>,
         line: &StepLine,
         table: &StepTable,
     ) -> [f64; BLURS_PX.len()] {
@@ -179,7 +179,7 @@ impl MeanEdge {
     /// Locates the edge that was approached, with a blur; `None` where there is none.
     pub fn locate<T: GreyPixel>(
         &mut self,
-        scene: &MeanEdgeInput<'_, T>,
+        scene: &MeanInput<'_, T>,
         table: &StepTable,
         blur_px: f64,
     ) -> Option<MeanFit> {
@@ -212,7 +212,7 @@ impl MeanEdge {
     /// Moves the course until the mean profile about it shows the edge in its middle.
     fn descend<T: GreyPixel>(
         &mut self,
-        scene: &MeanEdgeInput<'_, T>,
+        scene: &MeanInput<'_, T>,
         weights: &EdgeWeights,
         goal: StopCriterion,
     ) -> Option<DescentResult> {
@@ -241,18 +241,13 @@ impl MeanEdge {
 
     /// Mean over the rows of so many pixels at distances from the course, from one inwards
     /// on, and how it changes with the course's tilt and bend.
-    fn means<T: GreyPixel>(
-        &self,
-        scene: &MeanEdgeInput<'_, T>,
-        first: f64,
-        pixels: usize,
-    ) -> Profiles {
+    fn means<T: GreyPixel>(&self, scene: &MeanInput<'_, T>, first: f64, count: usize) -> Profiles {
         // The lowest position of the profile, which inwards of a right edge is its last.
-        let reach = if scene.bead_after { 0.0 } else { to_f64(pixels.saturating_sub(1)) };
+        let reach = if scene.bead_after { 0.0 } else { to_f64(count.saturating_sub(1)) };
         let lowest = scene.inwards() * first - reach;
-        let mut sums: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; pixels]);
+        let mut sums: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; count]);
         let mut squares = [0.0; 3];
-        let mut greys = vec![0.0; pixels + 1];
+        let mut greys = vec![0.0; count + 1];
         vectors::widest(
             #[inline(always)]
             || {
@@ -281,11 +276,7 @@ impl MeanEdge {
     }
 
     /// The same of ground and bead, free of the flank, as far as they lie in the gauge.
-    fn side_profiles<T: GreyPixel>(
-        &self,
-        scene: &MeanEdgeInput<'_, T>,
-        free: usize,
-    ) -> SideProfiles {
+    fn side_profiles<T: GreyPixel>(&self, scene: &MeanInput<'_, T>, free: usize) -> SideProfiles {
         let ends = [-1.0, 0.0, 1.0].map(|place| self.course.at(place));
         let nearest = ends.into_iter().fold(f64::INFINITY, f64::min);
         let farthest = ends.into_iter().fold(f64::NEG_INFINITY, f64::max);
@@ -302,7 +293,7 @@ impl MeanEdge {
     /// Positions of the caliper lines, less what all are shifted inwards by.
     fn locate_lines<T: GreyPixel>(
         &mut self,
-        scene: &MeanEdgeInput<'_, T>,
+        scene: &MeanInput<'_, T>,
         weights: &EdgeWeights,
         found: &DescentResult,
         contrast: f64,

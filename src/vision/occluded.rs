@@ -46,10 +46,10 @@ impl<T: GreyPixel> OccludedBead<'_, T> {
             return;
         }
         if left.is_lost() {
-            left.locate_occluded_along(left_scene, blur, parallel.lefts());
+            left.locate_occluded_along(left_scene, blur, &parallel.lefts);
         }
         if right.is_lost() {
-            right.locate_occluded_along(right_scene, blur, parallel.rights());
+            right.locate_occluded_along(right_scene, blur, &parallel.rights);
         }
     }
 

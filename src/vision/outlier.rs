@@ -9,18 +9,14 @@ const NEIGHBOUR_DISTANCES: [usize; 3] = [1, 2, 3];
 const OUTLIER_SIGMAS: f64 = 5.0;
 
 /// Removes edges that lie far from the line between their neighbours, and
-/// returns the robust standard deviation of the deviations \[px\]. `memory` is
-/// scratch; `least_px` is the least deviation that makes an outlier.
-pub fn remove_outliers(
-    edges: &mut [Option<CaliperEdge>],
-    least_px: f64,
-    memory: &mut Vec<f64>,
-) -> f64 {
+/// returns the robust standard deviation of the deviations \[px\]. `buf` is
+/// scratch; `min_px` is the least deviation that makes an outlier.
+pub fn remove_outliers(edges: &mut [Option<CaliperEdge>], min_px: f64, buf: &mut Vec<f64>) -> f64 {
     let count = edges.len();
-    memory.clear();
-    memory.extend(edges.iter().map(|edge| edge.map_or(f64::NAN, |edge| edge.at)));
-    memory.extend_from_within(..);
-    let (places, deviations) = memory.split_at_mut(count);
+    buf.clear();
+    buf.extend(edges.iter().map(|edge| edge.map_or(f64::NAN, |edge| edge.at)));
+    buf.extend_from_within(..);
+    let (places, deviations) = buf.split_at_mut(count);
     for (k, deviation) in deviations.iter_mut().enumerate() {
         *deviation = self::deviation(places, k).unwrap_or(f64::NAN);
     }
@@ -33,7 +29,7 @@ pub fn remove_outliers(
     let sizes = &mut places[..sizes];
     let Some(median) = rank::median(sizes) else { return 0.0 };
     let sigma = rank::SIGMA_PER_MEDIAN * median;
-    let limit = least_px.max(OUTLIER_SIGMAS * sigma);
+    let limit = min_px.max(OUTLIER_SIGMAS * sigma);
     for (edge, deviation) in edges.iter_mut().zip(deviations) {
         if deviation.abs() > limit {
             *edge = None;

@@ -2,6 +2,8 @@
 //! distance from each other in more bands than any others belong to it, however
 //! the bead runs, and what covers an edge here and there does not.
 
+use std::ops::Range;
+
 /// Difference of the distances within which edges run side by side \[px\].
 const SAME_DISTANCE_PX: f32 = 1.2;
 /// Bands that must agree.
@@ -27,8 +29,11 @@ pub struct ParallelEdges {
     spans: Vec<StepPair>,
     /// Spans of each band within the distances that are being looked at.
     within: Vec<u16>,
-    lefts: Vec<f32>,
-    rights: Vec<f32>,
+    /// Positions of the left edge, one a band \[px\]; NaN in bands that do not show
+    /// both edges at the distance.
+    pub lefts: Vec<f32>,
+    /// Those of the right edge.
+    pub rights: Vec<f32>,
 }
 
 impl ParallelEdges {
@@ -40,7 +45,7 @@ impl ParallelEdges {
         bands: usize,
         lefts: impl Fn(usize) -> L,
         rights: impl Fn(usize) -> R,
-        range: std::ops::Range<f32>,
+        range: Range<f32>,
     ) -> bool
     where
         L: Iterator<Item = f32>,
@@ -57,17 +62,6 @@ impl ParallelEdges {
         let (most, width) = self.most_alike(bands);
         self.pick(bands, width);
         most >= MIN_BANDS
-    }
-
-    /// Places of the left edge, one a band \[px\]; NaN in bands that do not show
-    /// both at the distance.
-    pub fn lefts(&self) -> &[f32] {
-        &self.lefts
-    }
-
-    /// Those of the right edge.
-    pub fn rights(&self) -> &[f32] {
-        &self.rights
     }
 
     /// Most bands that agree on a distance, and the middle of what they agree
@@ -143,7 +137,7 @@ mod tests {
         let mut parallel = ParallelEdges::default();
         assert!(parallel.find(24, left, right, 80.0..140.0));
         for band in 0..24 {
-            let (left, right) = (parallel.lefts()[band], parallel.rights()[band]);
+            let (left, right) = (parallel.lefts[band], parallel.rights[band]);
             if band % 2 == 0 {
                 assert!((left - 40.0 - bend(band)).abs() < 1e-4, "{left} in band {band}");
                 assert!((right - 140.5 - bend(band)).abs() < 1e-4, "{right} in band {band}");

@@ -62,7 +62,7 @@ pub fn of<T: GreyPixel>(strip: &GaugeRows<'_, T>, columns: Range<usize>) -> f32 
     if rows * run == 0 {
         least
     } else {
-        (strip.scale * spread(&differences, rows * run, strip.white.level())).max(least)
+        (strip.scale * spread(&differences, rows * run, strip.white.into())).max(least)
     }
 }
 

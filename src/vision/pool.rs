@@ -72,7 +72,7 @@ impl Bands {
         cut_into_ranges(strip.along, calipers.min(MAX_PROFILES), &mut self.bounds);
         let count = self.bounds.len();
         self.profiles.resize(count * strip.across, 0);
-        let most = 4 * strip.white.level().max(1);
+        let most = 4 * strip.white.into().max(1);
         self.shift = (most.ilog2() + 1).saturating_sub(PROFILE_BITS);
         self.unit = 0.25 * strip.scale * to_f32(1 << self.shift);
         self.full = 0;

@@ -122,19 +122,22 @@ impl LineRefiner {
         if under > 0.0 { (over / under).clamp(-2.0, 2.0) } else { 0.0 }
     }
 
-    fn window(&self, band: usize, noise: f64) -> Option<ProfileWindow<'_>> {
-        let first = self.firsts[band];
-        if first.is_nan() {
-            return None;
-        }
+    fn window<'a>(
+        &'a self,
+        table: &'a StepTable,
+        band: usize,
+        noise: f64,
+    ) -> Option<ProfileWindow<'a>> {
+        let (first, blur, bead_after) = (self.firsts[band], self.blur_px, self.bead_after);
         let length = 2 * self.half + 1;
         let samples = &self.samples[band * length..(band + 1) * length];
-        Some(ProfileWindow {
+        (!first.is_nan()).then_some(ProfileWindow {
+            table,
             first,
             samples,
             noise,
-            blur: self.blur_px,
-            bead_after: self.bead_after,
+            blur,
+            bead_after,
         })
     }
 
@@ -165,8 +168,8 @@ impl LineRefiner {
         let (mut residual, mut freedom) = (0.0, 0.0);
         for band in 0..self.rough.len() {
             let fit = self.rough[band].and_then(|at| {
-                let window = self.window(band, 1.0)?;
-                window.fit(task.table, start_levels(&window, at), None)
+                let window = self.window(task.table, band, 1.0)?;
+                window.fit(start_levels(&window, at), None)
             });
             if let Some(fit) = fit {
                 let RowRange { first: from, end: to } = task.lines[band];
@@ -207,10 +210,10 @@ impl LineRefiner {
                 mean: [0, 1, 2].map(|which| self.mean_near(band, which)),
                 variance: excess.map(|variance| variance.max(1e-3 * noise)),
             };
-            let Some(window) = self.window(band, noise) else { continue };
+            let Some(window) = self.window(task.table, band, noise) else { continue };
             let [ground, height, shading] = prior.mean;
             let start = FittedEdge { at: alone.edge.at, ground, height, shading };
-            *edge = window.fit(task.table, start, Some(&prior)).map(|fit| CaliperEdge {
+            *edge = window.fit(start, Some(&prior)).map(|fit| CaliperEdge {
                 at: fit.edge.at,
                 // Levels that neighbours share are wrong for all of them
                 // together, so that the mean of many edges is no surer than

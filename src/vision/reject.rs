@@ -180,6 +180,9 @@ pub enum Reject {
     Unreadable,
 }
 
+/// Nothing, or why a frame is refused.
+pub type Checked = Result<(), Reject>;
+
 impl Reject {
     /// The more informative of two reasons: why a frame has no rough edges, which is this
     /// one, and why it has no smooth ones.

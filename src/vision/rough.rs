@@ -180,7 +180,7 @@ impl RoughEdge {
         scene: &RoughInput<'_, T>,
         other: Option<MeanBlur>,
     ) -> Option<RoughFit> {
-        let mean = self.levels.mean()?;
+        let mean = self.levels.mean.as_ref()?;
         let (is_groove, on_ground) = (mean.is_groove(), mean.on_ground);
         let (bead_grey, hides_depth) = (mean.bead(), mean.filled > 0.0);
         let known = other.filter(|blur| blur.variance < PRIOR_BLUR.variance);
@@ -266,7 +266,7 @@ impl RoughEdge {
             roughness: position_noise::roughness(&self.crossings),
             before,
         };
-        groove::fit(self.levels.mean()?, &known)
+        groove::fit(self.levels.mean.as_ref()?, &known)
     }
 
     /// Positions of the caliper lines from those of their rows.
@@ -277,8 +277,8 @@ impl RoughEdge {
         let mut next = 0;
         for line in 0..scene.lines.len() {
             let (mut sum, mut seen, mut rows) = (0.0, 0.0, 0.0);
-            while next < windows.count() && windows.line(next) == line {
-                let weight = windows.rows(next);
+            while next < windows.rows.len() && windows.lines[next] == line {
+                let weight = windows.rows_of(next);
                 rows += weight;
                 if let Some(at) = windows.position(next, crossings[next]) {
                     // Rows that are missing on one side of the line's middle

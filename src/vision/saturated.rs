@@ -2,8 +2,8 @@
 //! scale.
 
 use super::pixel_noise;
-use super::reject::Reject;
-use super::strip::{GaugeRows, GreyPixel};
+use super::reject::{Checked, Reject};
+use super::strip::GreyPixel;
 use super::trace::{EdgeTracer, TraceInput};
 use crate::numeric::number::floor_to_count;
 
@@ -57,14 +57,15 @@ impl<T: GreyPixel> SaturatedBead<'_, T> {
         let beside = NOISE_MARGIN_PX + NOISE_COLUMNS_PX;
         let ranges = if bead_is_hidden {
             [
-                (left - beside, left - NOISE_MARGIN_PX),
-                (right_end + NOISE_MARGIN_PX, right_end + beside),
+                [left - beside, left - NOISE_MARGIN_PX],
+                [right_end + NOISE_MARGIN_PX, right_end + beside],
             ]
         } else {
-            [(left_end + NOISE_MARGIN_PX, right - NOISE_MARGIN_PX); 2]
+            [[left_end + NOISE_MARGIN_PX, right - NOISE_MARGIN_PX]; 2]
         };
         let (mut square, mut n) = (0.0, 0.0);
-        for columns in ranges.map(|range| columns(strip, range)) {
+        for columns in ranges.map(|range| range.map(|at: f32| floor_to_count(at.into()))) {
+            let columns = columns[0]..columns[1].min(strip.across);
             if !columns.is_empty() {
                 square += pixel_noise::of(strip, columns).powi(2);
                 n += 1.0;
@@ -78,7 +79,7 @@ fn trace_clipped<T: GreyPixel>(
     tracer: &mut EdgeTracer,
     scene: &TraceInput<'_, T>,
     hidden_after: bool,
-) -> Result<(), Reject> {
+) -> Checked {
     let found = tracer.trace_clipped(scene, hidden_after).ok_or(too_much_clipped(0.0))?;
     if found.visible_fraction < MIN_VISIBLE_FRACTION || found.variance.sqrt() > MAX_CLIPPED_SIGMA_PX
     {
@@ -88,10 +89,7 @@ fn trace_clipped<T: GreyPixel>(
 }
 
 /// An edge both sides of which can be seen.
-fn trace_plainly<T: GreyPixel>(
-    tracer: &mut EdgeTracer,
-    scene: &TraceInput<'_, T>,
-) -> Result<(), Reject> {
+fn trace_plainly<T: GreyPixel>(tracer: &mut EdgeTracer, scene: &TraceInput<'_, T>) -> Checked {
     if let Some(fit) = tracer.step_fit {
         tracer.trace(scene, fit.blur());
     }
@@ -106,11 +104,4 @@ fn too_much_clipped(visible: f64) -> Reject {
 fn span(places: &[Option<f32>]) -> (f32, f32) {
     let none = (f32::INFINITY, 0.0);
     places.iter().flatten().fold(none, |(low, high), &at| (low.min(at), f32::max(high, at)))
-}
-
-fn columns<T: GreyPixel>(
-    strip: &GaugeRows<'_, T>,
-    (from, to): (f32, f32),
-) -> std::ops::Range<usize> {
-    floor_to_count(from.into())..floor_to_count(to.into()).min(strip.across)
 }

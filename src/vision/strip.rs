@@ -56,11 +56,9 @@ impl GaugeView {
 }
 
 /// Grey values as the measurement takes them.
-pub trait GreyPixel: Copy + Default + PartialOrd {
+pub trait GreyPixel: Copy + Default + PartialOrd + Into<u32> {
     /// What the sum of up to 128 values fits.
     type Sum: Copy + Default;
-    /// The value as a whole number.
-    fn level(self) -> u32;
     /// The sum of four, without its lowest `shift` bits, which must fit 16.
     fn sum_of_four(values: [Self; 4], shift: u32) -> u16;
     /// Distance from another value.
@@ -73,11 +71,6 @@ pub trait GreyPixel: Copy + Default + PartialOrd {
 
 impl GreyPixel for u8 {
     type Sum = u16;
-
-    #[inline(always)]
-    fn level(self) -> u32 {
-        u32::from(self)
-    }
 
     #[inline(always)]
     fn sum_of_four([a, b, c, d]: [Self; 4], _: u32) -> u16 {
@@ -102,11 +95,6 @@ impl GreyPixel for u8 {
 
 impl GreyPixel for u16 {
     type Sum = u32;
-
-    #[inline(always)]
-    fn level(self) -> u32 {
-        u32::from(self)
-    }
 
     #[inline(always)]
     fn sum_of_four([a, b, c, d]: [Self; 4], shift: u32) -> u16 {
@@ -269,8 +257,7 @@ fn lay<'a, T: GreyPixel>(
             (memory.as_slice(), view.across)
         }
     };
-    #[expect(clippy::cast_precision_loss, reason = "16 bits fit a float")]
-    let scale = 255.0 / white.level().max(1) as f32;
+    let scale = 255.0 / T::sum_to_f32(white.add_to(T::Sum::default())).max(1.0);
     let (across, along) = (view.across, view.along);
     GaugeRows { values, stride, across, along, white, scale, level_step: scale }
 }

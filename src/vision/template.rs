@@ -1,6 +1,8 @@
 //! What a blurred edge is in the pixels of a row, tabulated for places between
 //! two pixels, and with it what a row says of the edge.
 
+use std::ops::Range;
+
 use nalgebra::Matrix3;
 
 use super::overlay::StepShape;
@@ -57,7 +59,7 @@ pub struct Products {
 pub struct StepTemplate {
     parts: Vec<TemplateChunk>,
     chunks: usize,
-    core: std::ops::Range<usize>,
+    core: Range<usize>,
     /// Sums over the core.
     pub products: Products,
 }
@@ -93,14 +95,9 @@ pub struct PlainSums {
 }
 
 impl PlainSums {
-    /// Number of pixels before the edge and the sum of their residuals.
-    pub fn before(&self) -> (f32, f32) {
-        (total(&self.before[0]), total(&self.before[1]))
-    }
-
-    /// The same after it.
-    pub fn after(&self) -> (f32, f32) {
-        (total(&self.after[0]), total(&self.after[1]))
+    /// Number of pixels and sum of their residuals, before the edge and after it.
+    pub fn totals(&self) -> [[f64; 2]; 2] {
+        [&self.before, &self.after].map(|sums| sums.map(|lanes| total(&lanes).into()))
     }
 }
 
@@ -214,17 +211,6 @@ impl StepTemplate {
         let start = usize::try_from(place - reach - first).ok()?;
         let pixels = pixels.get(start..start + self.chunks * LANES)?;
         let parts = &self.parts[phase * MAX_CHUNKS..][..self.chunks];
-        Some(self.sum(parts, pixels, expected, plain))
-    }
-
-    #[inline(always)]
-    fn sum(
-        &self,
-        parts: &[TemplateChunk],
-        pixels: &[f32],
-        expected: &ExpectedStep,
-        plain: &mut PlainSums,
-    ) -> RowSums {
         let (before, rest) = parts.split_at(self.core.start);
         let (core, after) = rest.split_at(self.core.len());
         let (pixels_before, rest) = pixels.split_at(before.len() * LANES);
@@ -245,7 +231,7 @@ impl StepTemplate {
         add_plain(before, pixels_before, expected, &mut plain.before);
         add_plain(after, pixels_after, expected, &mut plain.after);
         let [slope, squares, all, after, wild] = lanes.map(|lanes| total(&lanes));
-        RowSums { slope, sum_of_squares: squares, before: all - after, after, wild }
+        Some(RowSums { slope, sum_of_squares: squares, before: all - after, after, wild })
     }
 }
 

@@ -116,10 +116,9 @@ impl EdgeTracer {
         self.edges.clear();
         self.edges.extend_from_slice(places);
         self.blur_px = fit.blur_px;
-        (self.uncertainty.common_variance, self.uncertainty.mean_variance) =
-            (0.0, Some(fit.variance));
-        (self.uncertainty.along_px, self.uncertainty.lines_fraction) =
-            (fit.along_px, fit.lines_fraction);
+        let uncertainty = &mut self.uncertainty;
+        (uncertainty.common_variance, uncertainty.mean_variance) = (0.0, Some(fit.variance));
+        (uncertainty.along_px, uncertainty.lines_fraction) = (fit.along_px, fit.lines_fraction);
         self.misfit = f64::INFINITY;
         self.state = EdgeState::Clear;
         self.is_on_ground = fit.is_on_ground && !fit.is_groove;
@@ -179,11 +178,8 @@ impl EdgeTracer {
         rough: impl Iterator<Item = Option<f32>>,
     ) -> Option<BlurEstimate> {
         self.edges.clear();
-        (
-            self.uncertainty.mean_variance,
-            self.uncertainty.along_px,
-            self.uncertainty.lines_fraction,
-        ) = (None, 0.0, 1.0);
+        let places = &mut self.uncertainty;
+        (places.mean_variance, places.along_px, places.lines_fraction) = (None, 0.0, 1.0);
         self.is_on_ground = true;
         self.step_fit = None;
         self.values.path.clear();

@@ -18,6 +18,17 @@ const INFLATION_PER_MISFIT: f64 = 15.0;
 /// Squared slopes of an axis, in variances of what waves make, that are none.
 const MIN_OBLIQUE_RATIO: f64 = 3.0;
 
+/// A bead that was cut along the curves of its two edges.
+#[derive(Clone, Copy)]
+pub struct CutBead<'a> {
+    /// What the width is taken from.
+    pub scene: &'a WidthInput<'a>,
+    /// Left and right edge.
+    pub curves: &'a [Curve; 2],
+    /// Its widths.
+    pub sections: &'a Sections,
+}
+
 /// How sure the width is, and how rough the bead.
 pub struct WidthUncertainty {
     /// Standard deviation of the width \[mm\], without the calibration's share.
@@ -29,12 +40,8 @@ pub struct WidthUncertainty {
 
 impl WidthUncertainty {
     /// Of a width that was cut along these curves of the two edges.
-    pub fn of(
-        scene: &WidthInput<'_>,
-        curves: &[Curve; 2],
-        sections: &Sections,
-        memory: &mut WidthScratch,
-    ) -> Self {
+    pub fn of(cut: &CutBead<'_>, scratch: &mut WidthScratch) -> Self {
+        let &CutBead { scene, curves, sections } = cut;
         let (mut variance, mut noise) = (0.0, 0.0);
         for (side, curve) in curves.iter().enumerate() {
             let scale = sections.scales[side] * sections.scales[side];
@@ -44,31 +51,27 @@ impl WidthUncertainty {
                 noise += scale * per_place;
                 continue;
             }
-            let off = &memory.off[side];
-            let inflation = scatter::variance_inflation(off, per_place, &mut memory.values)
+            let off = &scratch.off[side];
+            let inflation = scatter::variance_inflation(off, per_place, &mut scratch.values)
                 .unwrap_or_else(|| scene.sides[side].inflation_with_gaps(off, curve, per_place))
                 .min(scene.sides[side].max_inflation());
             let of_mean = per_place * inflation * curve.mean_variance;
             variance += scale * (of_mean + scene.sides[side].common_variance);
             noise += scale * per_place * inflation;
         }
-        let roughness = Self::roughness(scene, sections, memory, noise);
-        variance += Self::variance_of_gaps(scene, sections, roughness, memory);
-        let (shortened, of_tilt) = Self::tilt_bias_and_variance(scene, curves, sections, memory);
+        let roughness = Self::roughness(cut, scratch, noise);
+        variance += Self::variance_of_gaps(cut, roughness, scratch);
+        let (shortened, of_tilt) = Self::tilt_bias_and_variance(cut, scratch);
         Self { sigma: (variance + of_tilt).sqrt(), shortened }
     }
 
     /// By how much the doubt about the axis' direction makes the width too
     /// short, and the variance that it leaves.
-    fn tilt_bias_and_variance(
-        scene: &WidthInput<'_>,
-        curves: &[Curve; 2],
-        sections: &Sections,
-        memory: &mut WidthScratch,
-    ) -> (f64, f64) {
+    fn tilt_bias_and_variance(cut: &CutBead<'_>, scratch: &mut WidthScratch) -> (f64, f64) {
+        let &CutBead { scene, curves, sections } = cut;
         let oblique = sections.oblique * sections.oblique;
-        let Some(waves) = scene.waves(curves, sections, memory) else {
-            let [tilt, bend] = Self::tilt_variances(scene, curves, memory);
+        let Some(waves) = scene.waves(cut, scratch) else {
+            let [tilt, bend] = Self::tilt_variances(cut, scratch);
             let shortened = 0.5 * sections.mean * tilt;
             let of_bend = sections.oblique_by_bend * sections.oblique_by_bend * bend;
             return (shortened, oblique * tilt + of_bend + 2.0 * shortened * shortened);
@@ -94,14 +97,10 @@ impl WidthUncertainty {
 
     /// Standard deviation of the width along the gauge, without the noise of
     /// its places.
-    fn roughness(
-        scene: &WidthInput<'_>,
-        sections: &Sections,
-        memory: &WidthScratch,
-        noise: f64,
-    ) -> f64 {
+    fn roughness(cut: &CutBead<'_>, scratch: &WidthScratch, noise: f64) -> f64 {
+        let &CutBead { scene, sections, .. } = cut;
         let (mut square, mut n) = (0.0, 0.0);
-        for (band, (left, right)) in memory.off[0].iter().zip(&memory.off[1]).enumerate() {
+        for (band, (left, right)) in scratch.off[0].iter().zip(&scratch.off[1]).enumerate() {
             let (Some(left), Some(right)) = (left, right) else { continue };
             let off = sections.scales[1] * right - sections.scales[0] * left;
             let width = sections.at(scene.normalised_position(band)) + off - sections.mean;
@@ -113,21 +112,17 @@ impl WidthUncertainty {
 
     /// The bands that are missing hide bead that counts; its waviness is an error then,
     /// which hangs together over neighbouring bands. Each edge has half of it.
-    fn variance_of_gaps(
-        scene: &WidthInput<'_>,
-        sections: &Sections,
-        roughness: f64,
-        memory: &mut WidthScratch,
-    ) -> f64 {
+    fn variance_of_gaps(cut: &CutBead<'_>, roughness: f64, scratch: &mut WidthScratch) -> f64 {
+        let &CutBead { scene, sections, .. } = cut;
         let mut variance = 0.0;
         for (number, side) in scene.sides.iter().enumerate() {
             let seen: f64 =
                 side.positions.iter().flatten().map(|located| located.row_fraction).sum();
             let missing = 1.0 - seen / to_f64(side.positions.len());
             if missing > 0.0 {
-                memory.values.clear();
-                memory.values.extend(memory.off[number].iter().flatten());
-                let waves = scatter::correlated_variance(&memory.values);
+                scratch.values.clear();
+                scratch.values.extend(scratch.off[number].iter().flatten());
+                let waves = scatter::correlated_variance(&scratch.values);
                 let waves = (waves - mean_variance(side.positions)).max(0.0);
                 let waves = waves * sections.scales[number] * sections.scales[number];
                 variance += waves.max(0.5 * roughness * roughness) * missing / seen.max(1.0);
@@ -140,12 +135,9 @@ impl WidthUncertainty {
     /// halves of the gauge: where lines across the gauge run obliquely to the bead,
     /// an axis that is off takes them for longer or shorter. From how far the
     /// middles lie off their course, and over how many bands that hangs together.
-    fn tilt_variances(
-        scene: &WidthInput<'_>,
-        curves: &[Curve; 2],
-        memory: &mut WidthScratch,
-    ) -> [f64; 2] {
-        let WidthScratch { off: [left, right], values } = memory;
+    fn tilt_variances(cut: &CutBead<'_>, scratch: &mut WidthScratch) -> [f64; 2] {
+        let &CutBead { scene, curves, .. } = cut;
+        let WidthScratch { off: [left, right], values } = scratch;
         values.clear();
         let both = left.iter().zip(right.iter());
         values.extend(both.filter_map(|(left, right)| Some(f64::midpoint((*left)?, (*right)?))));
@@ -192,15 +184,11 @@ impl WidthInput<'_> {
     /// waviness of the two edges \[px²\]; `None` where there is none to speak
     /// of. The width's course tells, and of the midline what is no straight or
     /// evenly bent axis.
-    fn waves(
-        &self,
-        curves: &[Curve; 2],
-        sections: &Sections,
-        memory: &WidthScratch,
-    ) -> Option<[f64; CURVE_ORDERS]> {
+    fn waves(&self, cut: &CutBead<'_>, scratch: &WidthScratch) -> Option<[f64; CURVE_ORDERS]> {
+        let &CutBead { curves, sections, .. } = cut;
         let mut off = [[0.0; ORDERS]; 2];
         let mut bands = [0.0f64; 2];
-        for (band, places) in memory.off[0].iter().zip(&memory.off[1]).enumerate() {
+        for (band, places) in scratch.off[0].iter().zip(&scratch.off[1]).enumerate() {
             let values = legendre(self.normalised_position(band));
             for (side, place) in [places.0, places.1].into_iter().enumerate() {
                 let Some(place) = place else { continue };

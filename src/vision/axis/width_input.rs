@@ -46,21 +46,21 @@ pub struct WidthScratch {
 
 impl WidthInput<'_> {
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    pub(super) fn centre(&self) -> f64 {
+    pub fn centre(&self) -> f64 {
         (self.view.along - 1) as f64 / 2.0
     }
 
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    pub(super) fn half_length(&self) -> f64 {
+    pub fn half_length(&self) -> f64 {
         self.view.along as f64 / 2.0
     }
 
     /// Place of a band along the gauge, −1 to 1.
-    pub(super) fn normalised_position(&self, band: usize) -> f64 {
+    pub fn normalised_position(&self, band: usize) -> f64 {
         (self.middles[band] - self.centre()) / self.half_length()
     }
 
-    pub(super) fn points(&self, side: usize) -> impl Iterator<Item = EdgePoint> + Clone {
+    pub fn points(&self, side: usize) -> impl Iterator<Item = EdgePoint> + Clone {
         let places = self.sides[side].positions.iter().enumerate();
         places.filter_map(|(band, located)| {
             let located = (*located)?;
@@ -73,13 +73,13 @@ impl WidthInput<'_> {
     }
 
     /// Square of the cosine between the bead and the gauge's axis at a place.
-    pub(super) fn cosine_squared(&self, curves: &[Curve; 2], t: f64) -> f64 {
+    pub fn cosine_squared(&self, curves: &[Curve; 2], t: f64) -> f64 {
         let slope = f64::midpoint(curves[0].slope(t), curves[1].slope(t)) / self.half_length();
         1.0 / (1.0 + slope * slope)
     }
 
     /// The point of an edge on the surface.
-    pub(super) fn on_surface(&self, curve: &Curve, t: f64) -> Option<SurfacePoint> {
+    pub fn on_surface(&self, curve: &Curve, t: f64) -> Option<SurfacePoint> {
         let v = self.centre() + t * self.half_length();
         self.surface.to_mm(self.view.to_image(curve.at(t), v))
     }

@@ -36,7 +36,7 @@ pub(super) struct EdgeWeights {
 
 impl EdgeWeights {
     /// `None` where the window is too short.
-    pub(super) fn new(table: &StepTable, blur_px: f64, half: usize) -> Option<Self> {
+    pub fn new(table: &StepTable, blur_px: f64, half: usize) -> Option<Self> {
         if half < MIN_HALF_PX || 3.0 * blur_px > to_f64(half) {
             return None;
         }
@@ -68,14 +68,14 @@ impl EdgeWeights {
     }
 
     /// Step from ground to bead in a window's mean profile \[grey levels\].
-    pub(super) fn step(&self, profile: &[f64]) -> f64 {
+    pub fn step(&self, profile: &[f64]) -> f64 {
         product(&self.levels[1], profile) - product(&self.levels[0], profile)
     }
 
     /// Descends from the middle of a profile to where the window shows the edge in its own.
     /// Returns the sum of the squares that a step leaves of it, in that of its height;
     /// `None` where none lies within the profile.
-    pub(super) fn residual_at_edge(&self, profile: &[f64]) -> Option<f64> {
+    pub fn residual_at_edge(&self, profile: &[f64]) -> Option<f64> {
         let room = to_f64(profile.len() - self.pixels);
         let mut at = 0.5 * room;
         let mut window = [0.0; WINDOW];
@@ -114,18 +114,18 @@ impl EdgeWeights {
     }
 
     /// What the ground makes of an edge's position, as far as the bead does not hide it.
-    pub(super) fn on_ground(&self, ground: &[f64]) -> ShiftSamples {
+    pub fn on_ground(&self, ground: &[f64]) -> ShiftSamples {
         self.samples(ground, |share| 1.0 - share)
     }
 
     /// The same of the bead.
-    pub(super) fn on_bead(&self, bead: &[f64]) -> ShiftSamples {
+    pub fn on_bead(&self, bead: &[f64]) -> ShiftSamples {
         self.samples(bead, |share| share)
     }
 
     /// Whether the level beside an edge is one that places of the ground farther away
     /// have: of a groove it is not, or where a neighbouring bead lies beyond.
-    pub(super) fn is_ground_level(&self, ground: &[f64], level: f64, step: f64) -> bool {
+    pub fn is_ground_level(&self, ground: &[f64], level: f64, step: f64) -> bool {
         let share = self.bead.iter().map(|bead| 1.0 - bead);
         let sum: f64 = share.clone().take(self.pixels).sum();
         let share: Vec<f64> = share.take(self.pixels).collect();
@@ -164,7 +164,7 @@ impl EdgeWeights {
     }
 }
 
-pub(super) fn product(weights: &[f64], values: &[f64]) -> f64 {
+pub fn product(weights: &[f64], values: &[f64]) -> f64 {
     weights.iter().zip(values).map(|(weight, value)| weight * value).sum()
 }
 
@@ -190,7 +190,7 @@ impl ShiftSamples {
     }
 
     /// The same of a step of such a height.
-    pub(super) fn over(self, step: f64) -> Self {
+    pub fn over(self, step: f64) -> Self {
         let square = step * step;
         Self { sum_of_squares: self.sum_of_squares / square, drifts: self.drifts / square, ..self }
     }

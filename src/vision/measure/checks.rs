@@ -9,7 +9,7 @@ use crate::numeric::rank;
 use crate::vision::gauge::EdgeKind;
 use crate::vision::ground::{EdgePosition, EdgeSide};
 use crate::vision::outlier;
-use crate::vision::reject::Reject;
+use crate::vision::reject::{Checked, Reject};
 use crate::vision::row_range::RowRange;
 use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::trace::EdgeTracer;
@@ -66,13 +66,13 @@ pub(super) const MAX_MOTION_BLUR_PX: f64 = 4.8;
 impl MeasureState {
     /// Whether one edge alone is hidden: then it is covered, not of another kind
     /// than the other one.
-    pub(super) fn one_is_lost(&self) -> bool {
+    pub fn one_is_lost(&self) -> bool {
         let lost = |side: &EdgeTracer| side.is_lost() && side.misfit_of_a_row() > MAX_STEP_MISFIT;
         lost(&self.left) != lost(&self.right)
     }
 
     /// Takes out calipers that disagree with their neighbours, on either edge.
-    pub(super) fn reject_outliers(&mut self, bright: bool) -> Result<(), Reject> {
+    pub fn reject_outliers(&mut self, bright: bool) -> Checked {
         self.drop_inconsistent(bright);
         let mut worst: f64 = 0.0;
         for side in [&mut self.left, &mut self.right] {
@@ -117,18 +117,18 @@ impl MeasureState {
 
     /// Refuses edges whose flanks are wider than a lens's blur: a shutter that is open
     /// while the bead moves leaves another shape, and with it another width.
-    pub(super) fn check_blur(&self, limit_px: f64) -> Result<(), Reject> {
+    pub fn check_blur(&self, limit_px: f64) -> Checked {
         let got_px = self.left.blur_px.max(self.right.blur_px);
         if got_px > limit_px { Err(Reject::Blurred { got_px, limit_px }) } else { Ok(()) }
     }
 
     /// Looks at the pattern beside the bead: adds to the edges' variance what it may
     /// move them by, and refuses one that is as strong as an edge.
-    pub(super) fn check_ground<T: GreyPixel>(
+    pub fn check_ground<T: GreyPixel>(
         &mut self,
         strip: &GaugeRows<'_, T>,
         of_both: fn(f64, f64) -> f64,
-    ) -> Result<(), Reject> {
+    ) -> Checked {
         let noise = f64::from(self.rows.noise.grey);
         self.both.is_beside_groove = self.gauge.edge == EdgeKind::Groove;
         let mut strengths = [0.0_f64; 2];
@@ -143,12 +143,12 @@ impl MeasureState {
             edge_positions(tracer, &self.rows.lines, &mut self.scratch.positions);
             let blur_px = tracer.blur_px;
             let (positions, room_px) = (&self.scratch.positions, f64::INFINITY);
-            let side = EdgeSide { positions, outwards, blur_px, room_px };
+            let side = EdgeSide { strip, noise, positions, outwards, blur_px, room_px };
             if self.gauge.edge == EdgeKind::Auto {
                 self.both.is_beside_groove |=
                     tracer.is_beside_groove(outwards > 0.0, noise / contrast);
             }
-            let Some(pattern) = self.scratch.ground.pattern(strip, &side, noise) else { continue };
+            let Some(pattern) = self.scratch.ground.pattern(&side) else { continue };
             *strength = pattern.size_grey / contrast;
             // Rough edges know what the ground beside them leaves open, weights that know a
             // texture what a faint one does.
@@ -166,7 +166,7 @@ impl MeasureState {
 
     /// Refuses edges in a pattern that were located line by line: parts of it were taken for
     /// them.
-    pub(super) fn check_lines_in_pattern(&self) -> Result<(), Reject> {
+    pub fn check_lines_in_pattern(&self) -> Checked {
         let (got, limit) = (self.both.pattern_ratio, MAX_PATTERN_LINE_BY_LINE);
         let is_among = self.both.model == EdgeModel::LineByLine && got > limit;
         if is_among { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
@@ -186,7 +186,7 @@ impl MeasureState {
         }
     }
 
-    pub(super) fn check_contrast(&mut self) -> Result<(), Reject> {
+    pub fn check_contrast(&mut self) -> Checked {
         let need = self.gauge.min_contrast_grey;
         self.both.contrasts = [self.contrast(true), self.contrast(false)];
         let got = self.both.contrasts[0].min(self.both.contrasts[1]);
@@ -206,7 +206,7 @@ impl MeasureState {
 
     /// Refuses a bead of whose edges too little is uncovered to tell where they
     /// run.
-    pub(super) fn check_occlusion(&self, found: &WidthMeasurement) -> Result<(), Reject> {
+    pub fn check_occlusion(&self, found: &WidthMeasurement) -> Checked {
         let got_px = found.sigma.get() / found.width.get() * f64::from(self.width_px);
         let sides = [&self.left, &self.right];
         let sparse = |side: &&EdgeTracer| {
@@ -225,7 +225,7 @@ impl MeasureState {
     }
 
     /// Refuses a bead whose edges the border of the gauge cuts short.
-    pub(super) fn check_boundary(&self, across: usize) -> Result<(), Reject> {
+    pub fn check_boundary(&self, across: usize) -> Checked {
         let last = to_f64(across.saturating_sub(1));
         for side in [&self.left, &self.right] {
             let need_px = f64::max(MIN_BOUNDARY_PX, BOUNDARY_BLURS * side.blur_px);
@@ -248,11 +248,7 @@ impl MeasureState {
 }
 
 /// Where an edge lies on the caliper lines that show it.
-pub(super) fn edge_positions(
-    tracer: &EdgeTracer,
-    lines: &[RowRange],
-    places: &mut Vec<EdgePosition>,
-) {
+pub fn edge_positions(tracer: &EdgeTracer, lines: &[RowRange], places: &mut Vec<EdgePosition>) {
     let edges = tracer.edges.iter().zip(lines);
     places.clear();
     places.extend(

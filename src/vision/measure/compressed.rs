@@ -15,7 +15,7 @@ impl MeasureState {
     /// Variance of an edge's place from what a compression leaves of its profile, which all
     /// rows share \[px²\]: the Cramér–Rao bound for a profile with so much noise. 0 where the
     /// pixels' noise is there.
-    pub(super) fn variance_of_compression(&self, edge: &EdgeTracer, contrast_grey: f64) -> f64 {
+    pub fn variance_of_compression(&self, edge: &EdgeTracer, contrast_grey: f64) -> f64 {
         if !self.rows.noise.is_suppressed || self.rows.bands.saturated_fraction() >= FEW_SATURATED {
             return 0.0;
         }

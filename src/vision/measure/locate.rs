@@ -1,6 +1,8 @@
 //! The bead's two edges, from their contours to sub-pixel places: each in the
 //! way that suits it.
 
+use std::ops::Range;
+
 use super::checks::are_not_steps;
 use super::search::ContourPair;
 use super::work::{EdgeModel, MIN_LINE_FRACTION, MIN_OUTLIER_PX, MeasureState};
@@ -13,7 +15,7 @@ use crate::vision::motion::BlurShapes;
 use crate::vision::occluded;
 use crate::vision::overlay::StepFit;
 use crate::vision::pixel_noise::PixelNoise;
-use crate::vision::reject::Reject;
+use crate::vision::reject::{Checked, Reject};
 use crate::vision::saturated;
 use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::trace::{EdgeTracer, TraceInput};
@@ -31,13 +33,8 @@ const BLUR_DIFFERENCE: f64 = 0.04;
 
 impl MeasureState {
     #[inline(always)]
-    pub(super) fn trace<T: GreyPixel>(
-        &mut self,
-        strip: &GaugeRows<'_, T>,
-        pair: ContourPair,
-    ) -> Result<(), Reject> {
-        let (lefts, rights) = pair.sides(&self.search.ups, &self.search.downs);
-        let (lefts, rights) = (&lefts.all()[pair.pair.left].at, &rights.all()[pair.pair.right].at);
+    pub fn trace<T: GreyPixel>(&mut self, strip: &GaugeRows<'_, T>, pair: ContourPair) -> Checked {
+        let [lefts, rights] = self.search.sides(pair.bright).of(&pair.pair).map(|edge| &edge.at);
         let about = columns_about(lefts, rights, strip.across);
         self.rows.noise = PixelNoise::read(strip, about);
         self.width_px = narrow_distance(lefts, rights, &mut self.scratch.narrow);
@@ -94,7 +91,7 @@ impl MeasureState {
                 let candidates = &self.search.candidates;
                 let bead = occluded::OccludedBead { scenes, candidates, bright: pair.bright };
                 let tracers = [&mut self.left, &mut self.right];
-                bead.locate_from_clear_rows(tracers, blur, &mut self.search.parallel);
+                bead.locate_from_clear_rows(tracers, blur, &mut self.scratch.parallel);
                 let contours = [(&self.left, lefts.as_slice()), (&self.right, rights)];
                 if let Some([one, other]) = widths_apart(contours, &mut self.scratch.narrow) {
                     return Err(self.ambiguous(one, other));
@@ -165,11 +162,7 @@ fn widths_apart(
 }
 
 /// Columns of the bead and a little beside it.
-fn columns_about(
-    left: &[Option<f32>],
-    right: &[Option<f32>],
-    across: usize,
-) -> std::ops::Range<usize> {
+fn columns_about(left: &[Option<f32>], right: &[Option<f32>], across: usize) -> Range<usize> {
     let low = left.iter().flatten().fold(f32::INFINITY, |low, &at| low.min(at));
     let high = right.iter().flatten().fold(0.0, |high: f32, &at| high.max(at));
     let [from, to] =

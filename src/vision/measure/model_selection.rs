@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use super::checks::{MAX_BLUR_PX, MAX_MOTION_BLUR_PX, MAX_STEP_MISFIT};
 use super::rough_edges::MAX_ROUGH_BLUR_PX;
 use super::work::{EdgeModel, MeasureState};
-use crate::vision::reject::Reject;
+use crate::vision::reject::{Checked, Reject};
 use crate::vision::rough::RoughFit;
 use crate::vision::trace::EdgeTracer;
 use crate::vision::width::WidthMeasurement;
@@ -70,7 +70,7 @@ const GRAIN_ODD_FRACTION: f64 = 0.024;
 impl MeasureState {
     /// Whether edges that were measured as blurred steps may be something else. Where they
     /// pass the end of the scale, rows do not tell: half of their height is not seen.
-    pub(super) fn may_not_be_steps(&self) -> bool {
+    pub fn may_not_be_steps(&self) -> bool {
         if self.both.model == EdgeModel::Clipped {
             return false;
         }
@@ -101,7 +101,7 @@ impl MeasureState {
 
     /// Whether more than a few places of an edge were sorted out, or some that surely show
     /// something else.
-    pub(super) fn has_gaps(&self) -> bool {
+    pub fn has_gaps(&self) -> bool {
         let used = self.left.used_fraction().min(self.right.used_fraction());
         used < 1.0 - MAX_GAP_FRACTION
             || self.left.unfit_fraction.max(self.right.unfit_fraction) > MAX_UNFIT_FRACTION
@@ -118,7 +118,7 @@ impl MeasureState {
 
     /// Whether grains may be what covers the edges of a frame whose blurred steps were
     /// refused. Occluded ones are known, and grains taken for ground make rough ones higher.
-    pub(super) fn may_be_grains(&self, refused: &Reject, fits: &[RoughFit; 2]) -> bool {
+    pub fn may_be_grains(&self, refused: &Reject, fits: &[RoughFit; 2]) -> bool {
         let is_higher = matches!(refused, Reject::Occluded { .. }) && !self.is_no_higher(fits);
         is_higher || fits.iter().any(|fit| fit.exceeds_texture(MAX_ODD_FRACTION))
     }
@@ -141,7 +141,7 @@ impl MeasureState {
     }
 
     /// Refuses wide steps of which one is a part of its flank, or more.
-    pub(super) fn check_flanks(&self, fits: &[RoughFit; 2]) -> Result<(), Reject> {
+    pub fn check_flanks(&self, fits: &[RoughFit; 2]) -> Checked {
         let mut sides = fits.iter().zip(self.both.contrasts);
         let is_whole =
             sides.all(|(fit, step)| FULL_FLANK_CONTRAST.contains(&(step / fit.contrast)));
@@ -191,7 +191,7 @@ impl MeasureState {
     /// of the levels' difference, or none fits and rows tell a narrow groove, sigma contains how
     /// far the rows' edges lie elsewhere. Nothing is added on narrow beads, whose level rows do
     /// not read free of the flanks.
-    pub(super) fn with_row_uncertainty(
+    pub fn with_row_uncertainty(
         &self,
         fits: &[RoughFit; 2],
         found: WidthMeasurement,
@@ -249,7 +249,7 @@ impl MeasureState {
     /// Whether rough edges explain more than blurred steps do: a groove that no step
     /// is, bays in an edge that were sorted out as grains, or edges that no blurred step fits and
     /// whose rows show their course better than lines do.
-    pub(super) fn explains_more(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> bool {
+    pub fn explains_more(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> bool {
         if self.have_unequal_contrast() && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
             return true;
         }

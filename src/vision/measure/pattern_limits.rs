@@ -2,7 +2,7 @@
 //! and how much less sure texture makes them.
 
 use crate::vision::coarse::LinePair;
-use crate::vision::reject::Reject;
+use crate::vision::reject::{Checked, Reject};
 use crate::vision::rough::RoughFit;
 
 /// Strongest pattern beside the bead, as a share of the contrast: a pattern of a third
@@ -27,19 +27,19 @@ const REFERENCE_BLUR_PX: f64 = 1.5;
 
 /// Refuses a bead whose ground has a pattern, a fraction of the contrast, and whose mean
 /// profile tells no edges: parts of the pattern look like bead, and like grooves.
-pub(super) fn check_pattern(got: f64, is_textured: bool) -> Result<(), Reject> {
+pub fn check_pattern(got: f64, is_textured: bool) -> Checked {
     let limit = if is_textured { MAX_PATTERN_BESIDE_TEXTURED } else { MAX_PATTERN_BESIDE_PLAIN };
     if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
 }
 
 /// By how much the variance of an edge of a textured bead grows with its blur.
-pub(super) fn blur_inflation(blur_px: f64) -> f64 {
+pub fn blur_inflation(blur_px: f64) -> f64 {
     (blur_px / REFERENCE_BLUR_PX).max(1.0)
 }
 
 /// Edges of a textured bead whose mean profile shows none: without a groove beside it, dark
 /// places of the bead pass for a part of a flank that is too wide.
-pub(super) fn with_texture_variance(pair: &LinePair, fits: [RoughFit; 2]) -> [RoughFit; 2] {
+pub fn with_texture_variance(pair: &LinePair, fits: [RoughFit; 2]) -> [RoughFit; 2] {
     if pair.has_groove() {
         return fits;
     }

@@ -10,8 +10,8 @@ use super::work::{GaugeFrame, MIN_LINE_FRACTION, MeasureState, Measured};
 use crate::numeric::number::to_f64;
 use crate::vision::coarse::{LinePair, StepLine};
 use crate::vision::ground::{EdgePosition, EdgeSide, MIN_EXCESS_VARIANCE};
-use crate::vision::mean_edge::{BLURS_PX, MeanEdgeInput};
-use crate::vision::reject::Reject;
+use crate::vision::mean_edge::{BLURS_PX, MeanInput};
+use crate::vision::reject::{Checked, Reject};
 use crate::vision::row_range::RowRange;
 use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::trace::EdgeTracer;
@@ -31,7 +31,7 @@ impl MeasureState {
     /// Standard deviation of the pattern that the ground has on both sides of a pair of
     /// lines \[grey levels\]; 0 where one side has none: what is on one side alone is a
     /// groove or a neighbour.
-    pub(super) fn ground_pattern<T: GreyPixel>(
+    pub fn ground_pattern<T: GreyPixel>(
         &mut self,
         strip: &GaugeRows<'_, T>,
         pair: &LinePair,
@@ -54,10 +54,7 @@ impl MeasureState {
     /// Measures a bead whose texture shows before any edge is located. `None` where none
     /// does, where it lies on ground of the same kind, and where grains may lie on its edges.
     #[inline(never)]
-    pub(super) fn measure_busy<T: GreyPixel>(
-        &mut self,
-        frame: &GaugeFrame<'_, T>,
-    ) -> Option<Measured> {
+    pub fn measure_busy<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Option<Measured> {
         let pair = self.find_lines(frame).ok()?;
         if !self.is_textured_between_lines(frame.strip, &pair) {
             return None;
@@ -78,7 +75,7 @@ impl MeasureState {
     /// `None` where neither has, or a weak one, and where the mean profile tells no edges and
     /// the pattern is bearable beside blurred steps.
     #[inline(never)]
-    pub(super) fn measure_textured<T: GreyPixel>(
+    pub fn measure_textured<T: GreyPixel>(
         &mut self,
         frame: &GaugeFrame<'_, T>,
     ) -> Option<Measured> {
@@ -111,7 +108,7 @@ impl MeasureState {
 
     /// Refuses blurred steps of a plain bead all along which they show, beside a strong
     /// pattern on both sides.
-    fn check_complete(&self, is_textured: bool) -> Result<(), Reject> {
+    fn check_complete(&self, is_textured: bool) -> Checked {
         let (got, limit) = (self.both.pattern_ratio, MAX_PATTERN_BESIDE_COMPLETE);
         if !is_textured && got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
@@ -121,6 +118,7 @@ impl MeasureState {
     fn texture_between_steps<T: GreyPixel>(&mut self, strip: &GaugeRows<'_, T>) -> [f64; 2] {
         let sides = [(&self.left, 1.0), (&self.right, -1.0)];
         let room_px = self.right.middle() - self.left.middle();
+        let noise = self.rows.noise.grey.into();
         let mut shares = [0.0; 2];
         for (((tracer, inwards), contrast), share) in
             sides.into_iter().zip(self.both.contrasts).zip(&mut shares)
@@ -128,8 +126,8 @@ impl MeasureState {
             all_edge_positions(tracer, &self.rows.lines, &mut self.scratch.positions);
             let blur_px = tracer.blur_px;
             let positions = &self.scratch.positions;
-            let side = EdgeSide { positions, outwards: inwards, blur_px, room_px };
-            let texture = self.scratch.ground.texture(strip, &side, self.rows.noise.grey.into());
+            let side = EdgeSide { strip, noise, positions, outwards: inwards, blur_px, room_px };
+            let texture = self.scratch.ground.texture(&side);
             *share = texture.unwrap_or(0.0) / contrast;
         }
         shares
@@ -137,7 +135,7 @@ impl MeasureState {
 
     /// Whether it has one beside both of two lines, and half-way between them: lines in the
     /// ground's pattern have that beside them, and a plain bead between.
-    pub(super) fn is_textured_between_lines<T: GreyPixel>(
+    pub fn is_textured_between_lines<T: GreyPixel>(
         &mut self,
         strip: &GaugeRows<'_, T>,
         pair: &LinePair,
@@ -169,18 +167,20 @@ impl MeasureState {
             EdgePosition { rows, at: f64::from(line.at) + off * f64::from(line.slope) }
         }));
         let side = EdgeSide {
+            strip,
+            noise: self.rows.noise.grey.into(),
             positions: &self.scratch.positions,
             outwards: inwards,
             blur_px: ASSUMED_BLUR_PX,
             room_px: width_px.into(),
         };
-        let texture = self.scratch.ground.texture(strip, &side, self.rows.noise.grey.into());
+        let texture = self.scratch.ground.texture(&side);
         texture.is_some_and(|texture| texture > MIN_TEXTURE * f64::from(line.step))
     }
 
     /// Measures a bead whose ground has a pattern of such a standard deviation
     /// \[grey levels\]; `None` where the mean profile tells no edges, as beside a groove.
-    pub(super) fn measure_patterned<T: GreyPixel>(
+    pub fn measure_patterned<T: GreyPixel>(
         &mut self,
         lines: (&LinePair, f64),
         frame: &GaugeFrame<'_, T>,
@@ -274,6 +274,6 @@ fn scene<'a, T: GreyPixel>(
     lines: &'a [RowRange],
     pair: &LinePair,
     bead_after: bool,
-) -> MeanEdgeInput<'a, T> {
-    MeanEdgeInput { strip, lines, width_px: pair.width_px(), bead_after, bright: pair.bright }
+) -> MeanInput<'a, T> {
+    MeanInput { strip, lines, width_px: pair.width_px(), bead_after, bright: pair.bright }
 }

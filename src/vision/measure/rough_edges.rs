@@ -7,7 +7,7 @@ use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::vision::coarse::{LinePair, StepLine};
 use crate::vision::gauge::{EdgeKind, Polarity, WidthRangePx};
 use crate::vision::line::LineSums;
-use crate::vision::reject::Reject;
+use crate::vision::reject::{Checked, Reject};
 use crate::vision::rough::{RoughFit, RoughInput};
 use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::vectors;
@@ -35,7 +35,7 @@ const MIN_TEXTURE_RATIO: f64 = 5.0;
 impl MeasureState {
     /// Measures a bead by where its rows pass half height. `refused` is why it was not
     /// measured by blurred steps.
-    pub(super) fn measure_rough<T: GreyPixel>(
+    pub fn measure_rough<T: GreyPixel>(
         &mut self,
         refused: &Reject,
         frame: &GaugeFrame<'_, T>,
@@ -63,7 +63,7 @@ impl MeasureState {
     /// Looks for a bead with rough edges.
     #[cold]
     #[inline(never)]
-    pub(super) fn find_rough<T: GreyPixel>(
+    pub fn find_rough<T: GreyPixel>(
         &mut self,
         frame: &GaugeFrame<'_, T>,
     ) -> Result<[RoughFit; 2], Reject> {
@@ -97,17 +97,12 @@ impl MeasureState {
             [0, 1].map(|k| StepLine { at: sides[k].0, slope: sides[k].1, step: steps[k] });
         let bright = self.left.edges.iter().flatten().any(|edge| edge.height > 0.0);
         let bare = (left.step * right.step).sqrt();
-        LinePair {
-            sides: [left, right],
-            bright,
-            score: bare,
-            score_without_grooves: bare,
-            strengths: steps,
-        }
+        let (sides, score_without_grooves, strengths) = ([left, right], bare, steps);
+        LinePair { sides, bright, score: bare, score_without_grooves, strengths }
     }
 
     /// Looks for the bead's edges as lines.
-    pub(super) fn find_lines<T: GreyPixel>(
+    pub fn find_lines<T: GreyPixel>(
         &mut self,
         frame: &GaugeFrame<'_, T>,
     ) -> Result<LinePair, Reject> {
@@ -130,7 +125,7 @@ impl MeasureState {
     }
 
     /// Follows rough edges near two lines.
-    pub(super) fn fit_rough<T: GreyPixel>(
+    pub fn fit_rough<T: GreyPixel>(
         &mut self,
         strip: &GaugeRows<'_, T>,
         pair: &LinePair,
@@ -169,7 +164,7 @@ impl MeasureState {
 
     /// The same as [`Self::take_rough`] beside a pattern of such a standard deviation
     /// \[grey levels\], where that is bearable.
-    pub(super) fn width_of_rough_beside<T: GreyPixel>(
+    pub fn width_of_rough_beside<T: GreyPixel>(
         &mut self,
         pattern: f64,
         is_textured: bool,
@@ -181,7 +176,7 @@ impl MeasureState {
     }
 
     /// The width of the bead whose rough edges were found.
-    pub(super) fn width_of_rough<T: GreyPixel>(
+    pub fn width_of_rough<T: GreyPixel>(
         &mut self,
         fits: &[RoughFit; 2],
         frame: &GaugeFrame<'_, T>,
@@ -201,21 +196,18 @@ impl MeasureState {
 
 impl MeasureState {
     /// Refuses a pair that the bead's texture may have made.
-    fn check_prominence(&self, pair: &LinePair) -> Result<(), Reject> {
+    fn check_prominence(&self, pair: &LinePair) -> Checked {
         let [left, right] = pair.sides;
         let margin = TEXTURE_MARGIN_FRACTION * pair.width_px();
         let texture = self.search.coarse.texture_between(left.at + margin, right.at - margin);
         let got = f64::from(pair.strengths[0].min(pair.strengths[1]) / texture.max(f32::EPSILON));
-        if got < MIN_TEXTURE_RATIO {
-            Err(Reject::Vague { got, need: MIN_TEXTURE_RATIO })
-        } else {
-            Ok(())
-        }
+        let need = MIN_TEXTURE_RATIO;
+        if got < need { Err(Reject::Vague { got, need }) } else { Ok(()) }
     }
 
     /// Refuses a pair beside which another one fits as well that ends at a seam or a
     /// rib.
-    fn check_rivals(&self, pair: &LinePair) -> Result<(), Reject> {
+    fn check_rivals(&self, pair: &LinePair) -> Checked {
         let mut others = self.search.pairs.iter().skip(1);
         let rival = others.find(|other| self.search.coarse.are_rivals(pair, other));
         rival.map_or(Ok(()), |rival| Err(self.ambiguous(pair.width_px(), rival.width_px())))

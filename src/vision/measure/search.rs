@@ -1,14 +1,13 @@
 //! The search for the bead: candidates, contours, and the pair of them that is
 //! the bead's two edges.
 
-use super::work::{MIN_LINE_FRACTION, MeasureState};
+use super::work::{BeadSearch, MIN_LINE_FRACTION, MeasureState};
 use crate::calibration::SurfaceMap;
 use crate::core::units::WidthRange;
 use crate::numeric::number::{narrow_to_f32, to_f32, to_f64};
-use crate::vision::contour::EdgeContours;
 use crate::vision::edge::{STEP_HALF_WIDTH, StepCandidates, respond};
 use crate::vision::gauge::{Polarity, WidthRangePx};
-use crate::vision::pair::{self, EdgePair};
+use crate::vision::pair::{self, EdgePair, Sides};
 use crate::vision::pool::Bands;
 use crate::vision::reject::Reject;
 use crate::vision::strip::GaugeView;
@@ -37,20 +36,18 @@ pub struct ContourPair {
     pub bright: bool,
 }
 
-impl ContourPair {
-    /// Contours of left and right edges.
-    pub fn sides<'a>(
-        &self,
-        ups: &'a EdgeContours,
-        downs: &'a EdgeContours,
-    ) -> (&'a EdgeContours, &'a EdgeContours) {
-        if self.bright { (ups, downs) } else { (downs, ups) }
+impl BeadSearch {
+    /// Contours that may be left and right edges of a bright or of a dark bead.
+    pub fn sides(&self, bright: bool) -> Sides<'_> {
+        let (lefts, rights) =
+            if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
+        Sides { lefts, rights }
     }
 }
 
 impl MeasureState {
     #[inline(always)]
-    pub(super) fn find_candidates(&mut self) {
+    pub fn find_candidates(&mut self) {
         // A step is the difference of two means of so many pooled pixels.
         let pixels = to_f32(STEP_HALF_WIDTH);
         let noise = self.rows.noise.grey * (2.0 / (4.0 * pixels)).sqrt();
@@ -68,21 +65,21 @@ impl MeasureState {
 
     /// Lines of candidates along the bead.
     #[inline(always)]
-    pub(super) fn find_contours(&mut self) {
+    pub fn find_contours(&mut self) {
         let band_px = to_f32(strip_rows(&self.rows.bands)) / to_f32(self.rows.bands.count().max(1));
         self.search.ups.search(&self.search.candidates, true, band_px, MIN_BAND_FRACTION);
         self.search.downs.search(&self.search.candidates, false, band_px, MIN_BAND_FRACTION);
     }
 
     /// Whether so many steps show that texture or a pattern is likely.
-    pub(super) fn is_busy(&self) -> bool {
+    pub fn is_busy(&self) -> bool {
         let steps = |of: &StepCandidates| of.up().len() + of.down().len();
         self.search.candidates.iter().map(steps).sum::<usize>()
             > MIN_BUSY_STEPS * self.search.candidates.len()
     }
 
     /// The believed widths in pixels across the gauge's middle.
-    pub(super) fn search_range(
+    pub fn search_range(
         &mut self,
         view: &GaugeView,
         surface: &SurfaceMap,
@@ -100,7 +97,7 @@ impl MeasureState {
     }
 
     /// The bead's two edges among the contours.
-    pub(super) fn find_pair(&mut self, range: WidthRangePx) -> Result<ContourPair, Reject> {
+    pub fn find_pair(&mut self, range: WidthRangePx) -> Result<ContourPair, Reject> {
         let found = self.search(range);
         if let Some(found) = found.filter(|found| found.pair.band_fraction >= MIN_LINE_FRACTION) {
             return match found.pair.rival_px {
@@ -123,7 +120,7 @@ impl MeasureState {
     }
 
     /// The refusal of a frame in which two pairs fit.
-    pub(super) fn ambiguous(&self, first_px: f32, second_px: f32) -> Reject {
+    pub fn ambiguous(&self, first_px: f32, second_px: f32) -> Reject {
         let mm = |px: f32| f64::from(px) * self.mm_per_px;
         Reject::Ambiguous { first_mm: mm(first_px), second_mm: mm(second_px) }
     }
@@ -135,22 +132,15 @@ impl MeasureState {
             if self.gauge.polarity == unwanted {
                 continue;
             }
-            let (lefts, rights) = if bright {
-                (&self.search.ups, &self.search.downs)
-            } else {
-                (&self.search.downs, &self.search.ups)
-            };
-            let pair = pair::find(lefts, rights, range, &mut self.scratch.narrow);
-            best = match (best, pair) {
-                (Some(best), Some(pair)) if best.pair.score >= pair.score => Some(best),
-                (best, None) => best,
-                (_, Some(pair)) => Some(ContourPair { pair, bright }),
-            };
+            let pair = pair::find(self.search.sides(bright), range, &mut self.scratch.narrow);
+            let is_better = |pair: &EdgePair| best.is_none_or(|best| pair.score > best.pair.score);
+            let better = pair.filter(is_better).map(|pair| ContourPair { pair, bright });
+            best = better.or(best);
         }
         best
     }
 
-    pub(super) fn saturation(&self) -> Option<Reject> {
+    pub fn saturation(&self) -> Option<Reject> {
         let got = self.rows.bands.saturated_fraction();
         (got > MIN_SATURATED_FRACTION)
             .then_some(Reject::Saturated { got, limit: MIN_SATURATED_FRACTION })

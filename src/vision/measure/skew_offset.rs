@@ -11,7 +11,7 @@ const MIN_SKEW_SIGMAS: f64 = 4.0;
 impl MeasureState {
     /// How far the skew of both flanks moves the width; `None` where the edges are not
     /// located as blurred steps.
-    pub(super) fn skew(&self) -> Option<WidthSkew> {
+    pub fn skew(&self) -> Option<WidthSkew> {
         if self.both.model != EdgeModel::Steps {
             return None;
         }
@@ -24,7 +24,7 @@ impl MeasureState {
     }
 
     /// Variance that a skew adds to the width where the frame shows it \[px²\].
-    pub(super) fn skew_variance(&self) -> f64 {
+    pub fn skew_variance(&self) -> f64 {
         let is_strange = |edge: &EdgeTracer| edge.step_fit.is_some_and(|fit| fit.is_not_step());
         if !is_strange(&self.left) && !is_strange(&self.right) {
             return 0.0;

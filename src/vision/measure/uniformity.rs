@@ -4,7 +4,7 @@
 use crate::numeric::number::round_to_count;
 use crate::numeric::number::to_f32;
 use crate::vision::coarse::LinePair;
-use crate::vision::reject::Reject;
+use crate::vision::reject::{Checked, Reject};
 use crate::vision::rough::RoughFit;
 use crate::vision::strip::{GaugeRows, GreyPixel};
 
@@ -38,7 +38,7 @@ pub fn middle_grey<T: GreyPixel>(strip: &GaugeRows<'_, T>, pair: &LinePair) -> f
 }
 
 /// Refuses a bead that is brighter in its middle or beside one edge than beside the other.
-pub fn check_uniformity([left, right]: &[RoughFit; 2], middle_grey: f64) -> Result<(), Reject> {
+pub fn check_uniformity([left, right]: &[RoughFit; 2], middle_grey: f64) -> Checked {
     let brightest = left.bead_grey.max(right.bead_grey).max(middle_grey);
     let darkest = left.bead_grey.min(right.bead_grey);
     let got = (brightest - darkest) / left.contrast.min(right.contrast);

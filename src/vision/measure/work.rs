@@ -67,7 +67,6 @@ pub(super) struct BeadSearch {
     pub(super) candidates: Vec<StepCandidates>,
     pub(super) ups: EdgeContours,
     pub(super) downs: EdgeContours,
-    pub(super) parallel: ParallelEdges,
     pub(super) coarse: LineSearch,
     pub(super) pairs: Vec<LinePair>,
 }
@@ -95,6 +94,7 @@ pub(super) struct MeasureScratch {
     pub(super) wide: Vec<f64>,
     pub(super) positions: Vec<EdgePosition>,
     pub(super) ground: PatternSearch,
+    pub(super) parallel: ParallelEdges,
     pub(super) axis: axis::WidthScratch,
 }
 
@@ -120,7 +120,7 @@ pub(super) struct MeasureState {
 
 impl MeasureState {
     /// For a gauge.
-    pub(super) fn new(gauge: Gauge) -> Self {
+    pub fn new(gauge: Gauge) -> Self {
         Self {
             gauge,
             blur_shapes: BlurShapes::default(),

@@ -26,7 +26,7 @@ impl StepFitter<'_> {
     /// bend shows.
     #[cold]
     #[inline(never)]
-    pub(super) fn parabolic_side(&self, side: &SideInput<'_>) -> Option<SideShape> {
+    pub fn parabolic_side(&self, side: &SideInput<'_>) -> Option<SideShape> {
         let SideInput { noise, room, .. } = *side;
         let height = side.step.after - side.step.before;
         let first = 3.0 * side.step.blur;

@@ -31,11 +31,7 @@ impl StepFitter<'_> {
     /// edge as it was fitted without them. `None` where that is no better.
     #[cold]
     #[inline(never)]
-    pub(super) fn fit_flanks(
-        &self,
-        start: &StepFit,
-        known: Option<BlurEstimate>,
-    ) -> Option<StepFit> {
+    pub fn fit_flanks(&self, start: &StepFit, known: Option<BlurEstimate>) -> Option<StepFit> {
         let mut look = *start;
         for _ in 0..MAX_ITERATIONS {
             let (mut normal, _) = self.linearise_flanks(&look);

@@ -57,7 +57,7 @@ impl LinearisedStep {
 impl StepFitter<'_> {
     /// The equations about the step of a look, without flanks.
     #[inline(always)]
-    pub(super) fn linearise(&self, look: &StepFit) -> LinearisedStep {
+    pub fn linearise(&self, look: &StepFit) -> LinearisedStep {
         let phases = std::array::from_fn(|_| NormalEquations::default());
         let mut linear = LinearisedStep { phases, sum_of_squares: 0.0, samples: 0.0, used: 0.0 };
         self.each_sample(look, |phase, sample| {
@@ -73,7 +73,7 @@ impl StepFitter<'_> {
     /// Every sample about the step of a look, with the number of its phase among those that
     /// have rows.
     #[inline(always)]
-    pub(super) fn each_sample(&self, look: &StepFit, mut add: impl FnMut(usize, LinearSample)) {
+    pub fn each_sample(&self, look: &StepFit, mut add: impl FnMut(usize, LinearSample)) {
         let (from, to) = look.fitted();
         for (phase, mean) in self.overlay.means().enumerate() {
             for (at, value) in mean.samples(from, to) {

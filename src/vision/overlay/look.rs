@@ -95,7 +95,7 @@ impl StepFit {
 
     /// Ends of the samples about the edge that are fitted \[px from the path\].
     #[inline(always)]
-    pub(super) fn fitted(&self) -> (f64, f64) {
+    pub fn fitted(&self) -> (f64, f64) {
         let reach = FIT_BLURS * self.step.blur + FIT_MARGIN_PX;
         let from = (self.step.at - reach.min(self.room.before)).max(-max_sample_px());
         let to = (self.step.at + reach.min(self.room.after)).min(max_sample_px());
@@ -106,7 +106,7 @@ impl StepFit {
     /// and blur, its two levels and the two shadings, and the level itself,
     /// without flanks.
     #[inline(always)]
-    pub(super) fn linear_at(&self, table: &StepTable, at: f64) -> ([f64; 6], f64) {
+    pub fn linear_at(&self, table: &StepTable, at: f64) -> ([f64; 6], f64) {
         let Self { step: edge, shading, .. } = self;
         let per_blur = 1.0 / edge.blur;
         let z = (at - edge.at) * per_blur;
@@ -121,7 +121,7 @@ impl StepFit {
     }
 
     /// The same look up to half-way to the steps beside the edge.
-    pub(super) fn without_flanks(&self) -> Self {
+    pub fn without_flanks(&self) -> Self {
         let half = |flank: &Option<NeighbourStep>, room: f64| {
             flank.as_ref().map_or(room, |flank| 0.5 * (flank.at - self.step.at).abs())
         };

@@ -109,7 +109,7 @@ impl StepFitter<'_> {
     /// Samples of two pixels beside the edge, from a distance on: how far each
     /// lies away from it, what it is beyond the level there, and its weight.
     #[inline(always)]
-    pub(super) fn each_beside(
+    pub fn each_beside(
         &self,
         &SideInput { step, flanks, sign, .. }: &SideInput<'_>,
         from: f64,

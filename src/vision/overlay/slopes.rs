@@ -1,6 +1,8 @@
 //! How steeply the overlay runs, place by place: where the edge is steepest,
 //! and whether another step lies beside it.
 
+use std::ops::Range;
+
 use super::step::{BlurredStep, Extent, NeighbourStep};
 use super::{HALF_SPAN, Overlay, PHASES, SPAN};
 
@@ -95,13 +97,7 @@ impl ProfileSlopes {
 
     /// The step whose slope rises from a place on, in half pixels.
     #[cold]
-    fn flank(
-        &self,
-        blur: f64,
-        from: i16,
-        sign: i16,
-        steps: std::ops::Range<i16>,
-    ) -> Option<NeighbourStep> {
+    fn flank(&self, blur: f64, from: i16, sign: i16, steps: Range<i16>) -> Option<NeighbourStep> {
         let mut best = (0.0f32, 0, 0.0f32);
         for step in steps {
             let half = from + sign * step;

@@ -66,7 +66,7 @@ impl StepFitter<'_> {
 
     /// Fits the edge again with what is known of its blur.
     #[inline(always)]
-    pub(super) fn fit_known(&self, look: &StepFit, blur: BlurEstimate) -> Option<StepFit> {
+    pub fn fit_known(&self, look: &StepFit, blur: BlurEstimate) -> Option<StepFit> {
         let fitted = self.fit_from(look, Some(blur));
         if fitted.is_some() || !look.flanks.any() {
             return fitted;

@@ -265,16 +265,8 @@ pub fn fit(mean: &MeanProfile, known: &GroovePrior<'_>) -> Option<GrooveShape> {
     let groove = GrooveProblem { table, mean, places, weight, prior: narrow, sigmas };
     if mean.on_ground {
         let step = GrooveModel { width: WIDTH_RANGE_PX.1, grey: narrow.beyond, ..narrow };
-        let sigmas = [
-            sigmas[0],
-            FAR_SIDE_SIGMA_PX2,
-            sigmas[2],
-            sigmas[3],
-            bead,
-            sigmas[5],
-            FAR_SIDE_SIGMA_PX2,
-            sigmas[7],
-        ];
+        let (mut sigmas, far_side) = (sigmas, FAR_SIDE_SIGMA_PX2);
+        (sigmas[1], sigmas[4], sigmas[6]) = (far_side, bead, far_side);
         let problem = GrooveProblem { prior: step, sigmas, ..groove };
         let step = problem.descend(problem.solve(&step)?)?;
         let before = known.before.map(|shape| shape.model).filter(GrooveModel::is_dip);
@@ -306,10 +298,8 @@ pub fn fit(mean: &MeanProfile, known: &GroovePrior<'_>) -> Option<GrooveShape> {
 fn wide(mean: &MeanProfile, narrow: GrooveModel, last: usize) -> GrooveModel {
     let GrooveModel { bead, grey, .. } = narrow;
     let missing: f64 = (mean.darkest()..last).map(|k| bead - f64::from(mean.grey[k])).sum();
-    GrooveModel {
-        width: (2.0 * missing / (bead - grey)).clamp(START_WIDTH_PX, 0.5 * WIDTH_RANGE_PX.1),
-        ..narrow
-    }
+    let width = (2.0 * missing / (bead - grey)).clamp(START_WIDTH_PX, 0.5 * WIDTH_RANGE_PX.1);
+    GrooveModel { width, ..narrow }
 }
 
 /// Brightest level from a place on up to the darkest one \[grey levels\].
@@ -379,7 +369,7 @@ impl GrooveProblem<'_> {
     }
 
     /// What a fit says, if it fits.
-    fn shape_of(&self, fitted: &GrooveFit, groove_share: f64) -> Option<GrooveShape> {
+    fn shape_of(&self, fitted: &GrooveFit, groove_probability: f64) -> Option<GrooveShape> {
         let (model, solved) = (&fitted.model, &fitted.solved);
         let freedom = to_f64((self.places.1 - self.places.0).saturating_sub(UNKNOWNS).max(1));
         let misfit = fitted.squares / freedom;
@@ -387,15 +377,8 @@ impl GrooveProblem<'_> {
         let blur = MeanBlur { px: model.blur, variance: solved.variance(2) * inflation };
         let variance = solved.variance(0) * inflation;
         let level_off = (model.bead - self.prior.bead).abs() / self.sigmas[5];
-        let model = *model;
-        let shape = GrooveShape {
-            at: model.at,
-            variance,
-            groove_probability: groove_share,
-            blur,
-            level_off,
-            model,
-        };
+        let (at, model) = (model.at, *model);
+        let shape = GrooveShape { at, variance, groove_probability, blur, level_off, model };
         (misfit < MAX_MISFIT).then_some(shape)
     }
 }

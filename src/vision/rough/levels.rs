@@ -74,12 +74,14 @@ pub type BlockProfile = [f32; PROFILE_PX];
 /// Levels along an edge; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct EdgeLevels {
-    blocks: Vec<BlockProfile>,
+    /// Profiles of the blocks, aligned along the course.
+    pub blocks: Vec<BlockProfile>,
     /// Rows of a block.
     block: usize,
     smooth: Vec<[f32; AROUND_PX]>,
     beside: Vec<BlockLevels>,
-    mean: Option<MeanProfile>,
+    /// The profile of the whole edge.
+    pub mean: Option<MeanProfile>,
     /// Kernels of the smoothing for the levels inside and outside.
     kernels: [Vec<f32>; 2],
 }
@@ -169,16 +171,6 @@ impl EdgeLevels {
         f64::from(sum) / to_f64(self.beside.len().max(1))
     }
 
-    /// The profile of the whole edge.
-    pub fn mean(&self) -> Option<&MeanProfile> {
-        self.mean.as_ref()
-    }
-
-    /// Profiles of the blocks, aligned along the course.
-    pub fn blocks(&self) -> &[BlockProfile] {
-        &self.blocks
-    }
-
     /// Level inside at a block \[grey levels\].
     pub fn inside(&self, block: usize) -> f32 {
         self.beside[block].inside
@@ -226,7 +218,7 @@ impl EdgeLevels {
     #[inline(always)]
     fn align(&mut self, windows: &RowWindows, course: &[f32]) {
         self.blocks.clear();
-        for (rows, course) in windows.all().chunks(self.block).zip(course.chunks(self.block)) {
+        for (rows, course) in windows.rows.chunks(self.block).zip(course.chunks(self.block)) {
             let mut sums = [0.0; PROFILE_PX];
             for (row, &at) in rows.iter().zip(course) {
                 let start = round_to_count(at.max(0.0)).cast_signed() - OUTSIDE_PX.cast_signed();
@@ -253,7 +245,7 @@ impl EdgeLevels {
     /// not, and between them.
     #[inline(always)]
     pub fn cross(&self, windows: &RowWindows, course: &[f32], every: usize, out: &mut Crossings) {
-        let rows = windows.all();
+        let rows = &windows.rows;
         out.found.clear();
         out.found.resize(rows.len(), None);
         out.at.clear();
@@ -277,7 +269,7 @@ impl EdgeLevels {
         for (look, row) in (0..found.len()).step_by(STRAIGHT_ROWS).enumerate() {
             let Some(found) = found[row] else { continue };
             let levels = self.flank(row, course[row]);
-            let shown = crossing::features(&windows.all()[row], &levels, found);
+            let shown = crossing::features(&windows.rows[row], &levels, found);
             flank[look] = shown.flank;
             gap[look] = found.at - levels.start;
             odd[look] = shown.odd;

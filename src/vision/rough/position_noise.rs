@@ -40,12 +40,12 @@ pub fn of_mean<T: GreyPixel>(
     crossings: &Crossings,
     scene: &RoughInput<'_, T>,
 ) -> Option<PositionNoise> {
-    let mean = levels.mean()?;
+    let mean = levels.mean.as_ref()?;
     let slope = slope(&mean.grey);
     if slope <= 0.0 {
         return None;
     }
-    let rows: f64 = (0..windows.count()).map(|row| windows.rows(row)).sum();
+    let rows: f64 = (0..windows.rows.len()).map(|row| windows.rows_of(row)).sum();
     let contrast = levels.contrast();
     let half = 0.5 * mean_of(&crossings.flank);
     // Texture that is summed on either side of the edge stands for bead that is not
@@ -81,7 +81,7 @@ pub fn of_mean<T: GreyPixel>(
 /// Variance of the mean profile for each pixel across \[grey levels²\]: noise and
 /// texture of the bead, and of the ground where it is more, their correlation included.
 pub fn of_profile(levels: &EdgeLevels) -> Option<f64> {
-    let mean = levels.mean()?;
+    let mean = levels.mean.as_ref()?;
     let summed = f64::from(SUMMED_INSIDE_PX);
     let inside = SideSegment { places: mean.inside, summed };
     let bead = texture(levels, &inside, |block| levels.inside(block));
@@ -142,7 +142,7 @@ struct SideSegment {
 /// noise \[grey levels²\], the correlation along the bead included: from as many
 /// sums as there is room for beside each other.
 fn texture(levels: &EdgeLevels, stretch: &SideSegment, level: impl Fn(usize) -> f32) -> f64 {
-    let blocks = levels.blocks();
+    let blocks = &levels.blocks;
     let count = blocks.len();
     let (from, to) = (stretch.places.0, stretch.places.1.min(PROFILE_PX));
     let size = round_to_count(narrow_to_f32(stretch.summed)).clamp(1, to - from);

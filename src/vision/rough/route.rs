@@ -1,6 +1,8 @@
 //! The course of an edge through its windows: the strongest step from dark to
 //! bright that runs along the bead, by dynamic programming over blocks of rows.
 
+use std::ops::Range;
+
 use super::window::{RowWindows, WindowRow};
 use crate::numeric::number::round_to_count;
 use crate::numeric::number::to_f32;
@@ -84,10 +86,10 @@ impl EdgeRoute {
     /// those before it, over three blocks with weights 1, 2, 1.
     #[inline(always)]
     fn respond(&mut self, windows: &RowWindows, reach: usize) {
-        let count = windows.count().div_ceil(windows.block());
+        let count = windows.rows.len().div_ceil(windows.block());
         self.scores.resize(count, [0.0; WINDOW_PX]);
         self.steps.resize(count, [0.0; WINDOW_PX]);
-        for (rows, sums) in windows.all().chunks(windows.block()).zip(&mut self.scores) {
+        for (rows, sums) in windows.rows.chunks(windows.block()).zip(&mut self.scores) {
             sums.fill(0.0);
             for row in rows {
                 for k in 0..WINDOW_PX {
@@ -118,7 +120,7 @@ impl EdgeRoute {
 
     /// The course with the largest sum of steps less the cost of running aside.
     #[inline(always)]
-    fn link(&mut self, inside: std::ops::Range<usize>) -> Option<()> {
+    fn link(&mut self, inside: Range<usize>) -> Option<()> {
         let most =
             |steps: &WindowRow| steps[inside.clone()].iter().fold(0.0, |a: f32, &b| a.max(b));
         self.strongest.clear();
@@ -167,7 +169,7 @@ impl EdgeRoute {
 
 /// Best score of the block before from which each place can be reached.
 #[inline(always)]
-fn best_before(scores: &WindowRow, inside: &std::ops::Range<usize>, best: &mut WindowRow) {
+fn best_before(scores: &WindowRow, inside: &Range<usize>, best: &mut WindowRow) {
     let mut padded = [f32::NEG_INFINITY; WINDOW_PX + 2 * MAX_ASIDE];
     padded[MAX_ASIDE..][inside.clone()].copy_from_slice(&scores[inside.clone()]);
     best.fill(f32::NEG_INFINITY);
@@ -181,7 +183,7 @@ fn best_before(scores: &WindowRow, inside: &std::ops::Range<usize>, best: &mut W
 }
 
 /// Place in the block before from which the course comes to a place.
-fn came_from(scores: &WindowRow, inside: &std::ops::Range<usize>, at: usize) -> usize {
+fn came_from(scores: &WindowRow, inside: &Range<usize>, at: usize) -> usize {
     let near = at.saturating_sub(MAX_ASIDE).max(inside.start)..(at + MAX_ASIDE + 1).min(inside.end);
     let score = |from: usize| scores[from] - aside_cost(from, at);
     // Of equal scores the first.

@@ -33,8 +33,9 @@ const MIN_PAIRED_ROWS: usize = 400;
 pub struct RowWindows {
     sheet: EdgeWindows,
     /// Caliper line of each row.
-    lines: Vec<usize>,
-    rows: Vec<WindowRow>,
+    pub lines: Vec<usize>,
+    /// The smoothed pixels of all rows \[grey levels\], dark beads negated.
+    pub rows: Vec<WindowRow>,
     across: Vec<WindowRow>,
     bead_after: bool,
     /// Columns of the gauge.
@@ -54,23 +55,8 @@ impl RowWindows {
         FINE_ROWS / self.together
     }
 
-    /// Number of rows.
-    pub fn count(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// The smoothed pixels of all rows \[grey levels\], dark beads negated.
-    pub fn all(&self) -> &[WindowRow] {
-        &self.rows
-    }
-
-    /// Caliper line of a row.
-    pub fn line(&self, number: usize) -> usize {
-        self.lines[number]
-    }
-
     /// Rows of the gauge that a row is the mean of.
-    pub fn rows(&self, number: usize) -> f64 {
+    pub fn rows_of(&self, number: usize) -> f64 {
         self.sheet.windows[number].rows.into()
     }
 
@@ -80,7 +66,8 @@ impl RowWindows {
         if !at.is_finite() {
             return None;
         }
-        let first = self.first(number);
+        #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+        let first = self.sheet.windows[number].first as f32;
         let last = narrow_to_f32(to_f64(WINDOW_PX - 1));
         let at = if self.bead_after { first + at } else { first + last - at };
         (0.0..=self.width - 1.0).contains(&at).then(|| at.into())
@@ -91,11 +78,6 @@ impl RowWindows {
         let kernel = &self.kernels[0];
         let square = |weight: &f32| f64::from(*weight).powi(2);
         2.0 * kernel.iter().map(square).sum::<f64>() - square(&kernel[0])
-    }
-
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    fn first(&self, number: usize) -> f32 {
-        self.sheet.windows[number].first as f32
     }
 
     /// Reads the rows along a line.
@@ -142,22 +124,14 @@ impl RowWindows {
 /// Convolves a row, multiplied by a sign and in reverse where its bead lies before, with a
 /// symmetric kernel; beyond the ends the last pixel goes on.
 #[inline(always)]
-fn smooth_row(
-    row: &WindowRow,
-    (sign, bead_after): (f32, bool),
-    kernel: &[f32],
-    out: &mut WindowRow,
-) {
+fn smooth_row(row: &WindowRow, (sign, after): (f32, bool), kernel: &[f32], out: &mut WindowRow) {
     const PAD: usize = 4;
     let mut padded = [0.0; WINDOW_PX + 2 * PAD];
-    if bead_after {
-        for k in 0..WINDOW_PX {
-            padded[PAD + k] = sign * row[k];
-        }
-    } else {
-        for k in 0..WINDOW_PX {
-            padded[PAD + k] = sign * row[WINDOW_PX - 1 - k];
-        }
+    for k in 0..WINDOW_PX {
+        padded[PAD + k] = sign * row[k];
+    }
+    if !after {
+        padded[PAD..PAD + WINDOW_PX].reverse();
     }
     let (first, last) = (padded[PAD], padded[PAD + WINDOW_PX - 1]);
     padded[..PAD].fill(first);

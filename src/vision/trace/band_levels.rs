@@ -13,18 +13,14 @@ impl EdgeTracer {
     /// Levels on either side of the edge in every band, as the median of a few
     /// places in its profile and of its neighbours.
     #[inline(always)]
-    pub(super) fn pick_levels<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
+    pub fn pick_levels<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         self.pick_raw_levels(scene);
         self.smooth_levels();
     }
 
     /// Picks levels anew along the course, where it was drawn through better places
     /// and it is known how far there is nothing but the edge \[px\].
-    pub(super) fn pick_levels_within<T: GreyPixel>(
-        &mut self,
-        scene: &TraceInput<'_, T>,
-        room: Extent,
-    ) {
+    pub fn pick_levels_within<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, room: Extent) {
         let (path, course) = (&mut self.values.path, &self.course);
         path.clear();
         let middles = (0..scene.bands.count()).map(|band| narrow_to_f32(scene.bands.middle(band)));
@@ -47,7 +43,7 @@ impl EdgeTracer {
     }
 
     /// Picks levels on either side of the edge, each band for itself.
-    pub(super) fn pick_raw_levels<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
+    pub fn pick_raw_levels<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let inside = 0.45 * scene.width_px;
         let room = if scene.bead_after { [f32::INFINITY, inside] } else { [inside, f32::INFINITY] };
         self.pick_levels_in(scene, room);
@@ -71,7 +67,7 @@ impl EdgeTracer {
     }
 
     /// Steps that are small or turned over against the others are not believed.
-    pub(super) fn steady_steps(&mut self) {
+    pub fn steady_steps(&mut self) {
         self.scratch.sorted.clear();
         self.scratch.sorted.extend_from_slice(&self.values.step);
         let Some(typical) = rank::median(&mut self.scratch.sorted) else { return };

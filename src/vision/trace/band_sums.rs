@@ -20,10 +20,8 @@ pub struct BandSums {
     pub step: f64,
     /// Right-hand side of the equations for place and levels.
     pub vector: [f64; 3],
-    /// Plain pixels before the edge and the sum of what they miss.
-    pub before: (f64, f64),
-    /// The same after it.
-    pub after: (f64, f64),
+    /// Plain pixels and the sum of their residuals, before the edge and after it.
+    pub plain: [[f64; 2]; 2],
 }
 
 impl BandSums {
@@ -54,7 +52,7 @@ impl BandSums {
         }
         let mut matrix = core * self.rows;
         let mut vector = Vector3::from(self.vector);
-        for (side, (count, sum)) in [self.before, self.after].into_iter().enumerate() {
+        for (side, [count, sum]) in self.plain.into_iter().enumerate() {
             if count >= MIN_PLAIN_FRACTION * plain[side] * self.held_rows {
                 let weight = 1.0 / (1.0 / count + extra[side] / variance);
                 matrix[(side + 1, side + 1)] += weight;

@@ -19,7 +19,7 @@ const MIN_EXCESS_SIGMAS: f64 = 2.5;
 impl EdgeTracer {
     /// Solves every band; returns whether the path was near enough for that.
     #[inline(always)]
-    pub(super) fn locate<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: f64) -> bool {
+    pub fn locate<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: f64) -> bool {
         let variance = match self.textured.scatter {
             Some(scatter) => scatter.of_mean * self.texture_variance_ratio(),
             None => f64::from(scene.noise).powi(2),
@@ -68,7 +68,7 @@ impl EdgeTracer {
         self.scratch.scatter.clear();
         let mut explained = 0.0;
         for sums in &self.row_fit.solved {
-            let (count, sum) = if side == 0 { sums.before } else { sums.after };
+            let [count, sum] = sums.plain[side];
             if sums.rows < 1.0 || count < 1.0 {
                 continue;
             }

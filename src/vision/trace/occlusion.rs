@@ -58,7 +58,7 @@ impl EdgeTracer {
     /// whether there are enough of them.
     #[cold]
     #[inline(never)]
-    pub(super) fn locate_occluded<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
+    pub fn locate_occluded<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         self.look_row_by_row();
         self.occlusion.free.clear();
         self.occlusion.free.extend_from_slice(&self.values.picked);

@@ -1,6 +1,8 @@
 //! The rows of an edge, each held against it: where it shows the edge, and
 //! whether it shows anything else.
 
+use std::ops::Range;
+
 use nalgebra::Matrix3;
 
 use super::band_sums::BandSums;
@@ -24,7 +26,7 @@ const UNFIT_MISFIT_RATIO: f32 = 1.5;
 impl EdgeTracer {
     /// Holds every window against the edge.
     #[inline(always)]
-    pub(super) fn compare_rows<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
+    pub fn compare_rows<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let softness = 1.0 / narrow_to_f32(self.row_fit.template.products.slope_slope);
         self.row_fit.groups.clear();
         self.row_fit.plain.clear();
@@ -55,7 +57,7 @@ impl EdgeTracer {
 
     /// What the mean of some rows is held against, whose pixels have a noise.
     #[inline(always)]
-    pub(super) fn expected(edge: [f32; 3], noise: f32) -> ExpectedStep {
+    pub fn expected(edge: [f32; 3], noise: f32) -> ExpectedStep {
         let (noise, step) = (NOISE_SIGMAS * noise, edge[2].abs());
         ExpectedStep::new(edge, [noise + 0.05 * step, noise + 0.15 * step])
     }
@@ -63,7 +65,7 @@ impl EdgeTracer {
     /// Sum of the squares of what does not fit, as if of a single row, so that
     /// groups of all sizes compare \[grey levels²\].
     #[inline(always)]
-    pub(super) fn misfit(&self, sums: &RowSums, weight: f32) -> f32 {
+    pub fn misfit(&self, sums: &RowSums, weight: f32) -> f32 {
         if sums.wild > MAX_WILD_PIXELS {
             return f32::INFINITY;
         }
@@ -78,7 +80,7 @@ impl EdgeTracer {
     /// Sums up the rows of each band, without those on which a grain or a
     /// spark lies.
     #[inline(always)]
-    pub(super) fn sum_bands<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
+    pub fn sum_bands<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let products = self.row_fit.template.products;
         self.scratch.sorted.clear();
         self.scratch.sorted.extend(self.row_fit.groups.iter().map(|group| group.misfit));
@@ -137,7 +139,7 @@ impl EdgeTracer {
     fn sum_band<T: GreyPixel>(
         &mut self,
         scene: &TraceInput<'_, T>,
-        (band, groups): (usize, std::ops::Range<usize>),
+        (band, groups): (usize, Range<usize>),
         limit: f32,
         core: &Matrix3<f64>,
     ) -> BandSums {
@@ -152,13 +154,7 @@ impl EdgeTracer {
         let of_window = |weight: f32| {
             in_texture.unwrap_or(scene.noise * scene.noise / (weight * stiffness)).sqrt()
         };
-        let widen = |(count, sum): (f32, f32)| (f64::from(count), f64::from(sum));
-        let mut sums = BandSums {
-            step: step.into(),
-            before: widen(self.row_fit.plain[band].before()),
-            after: widen(self.row_fit.plain[band].after()),
-            ..BandSums::default()
-        };
+        let mut sums = BandSums { step: step.into(), ..BandSums::default() };
         for group in groups {
             let far = NOISE_SIGMAS * of_window(group.weight) / step.abs() + ROW_WAVINESS_PX;
             let counts = group.misfit <= limit && (group.moved - typical).abs() <= far;
@@ -172,8 +168,7 @@ impl EdgeTracer {
         }
         // Plain pixels are those of a group's mean.
         let weight = f64::from(groups.first().map_or(1.0, |group| group.weight));
-        sums.before = (sums.before.0 * weight, sums.before.1 * weight);
-        sums.after = (sums.after.0 * weight, sums.after.1 * weight);
+        sums.plain = self.row_fit.plain[band].totals().map(|side| side.map(|sum| sum * weight));
         sums
     }
 }

@@ -31,7 +31,7 @@ impl EdgeTracer {
     /// Draws the path of a winding edge from line to line, where there are more lines
     /// than bands.
     #[inline(always)]
-    pub(super) fn follow_windings<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
+    pub fn follow_windings<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         self.winding.excess = if could_wind(scene) { self.winding(scene.noise) } else { 0.0 };
         if self.seems_winding() {
             self.pick_lines(scene);
@@ -39,7 +39,7 @@ impl EdgeTracer {
     }
 
     /// Whether an edge that could wind has lost more rows than sparks explain.
-    pub(super) fn lost_rows<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> bool {
+    pub fn lost_rows<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> bool {
         could_wind(scene) && self.used_fraction() < 1.0 - MAX_LOST_FRACTION
     }
 
@@ -65,7 +65,7 @@ impl EdgeTracer {
     /// few rows show it: then it winds, and nothing covers it.
     #[cold]
     #[inline(never)]
-    pub(super) fn trace_winding<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
+    pub fn trace_winding<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         if !could_wind(scene) || self.step_fit.is_none() || !self.pick_lines(scene) {
             return false;
         }
@@ -88,7 +88,7 @@ impl EdgeTracer {
 
     /// Fills the rough places with the edges that were found; where none was, a
     /// winding edge stays on its course, and another one runs straight on.
-    pub(super) fn fill_from_edges<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
+    pub fn fill_from_edges<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let (course, winds) = (&self.course, self.winding.is_followed);
         let places = self.edges.iter().zip(scene.lines).map(|(edge, &line)| match edge {
             Some(edge) => Some(narrow_to_f32(edge.at)),
