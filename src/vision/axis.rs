@@ -28,14 +28,14 @@ const MAX_END_SLANT_RAD: f64 = 0.44;
 const MIN_RADIUS_WIDTHS: f64 = 1.5;
 /// Angle over half the gauge below which a bend is a bead's waviness.
 const MIN_TURN_RAD: f64 = 0.25;
-/// Share of the gauge on either side of its middle from which the edge points
+/// Fraction of the gauge on either side of its middle from which the edge points
 /// there are taken.
 const MIDDLE_FRACTION: f64 = 0.125;
 /// Width of the bead.
 pub fn width(
     scene: &WidthInput<'_>,
     hints: Hints,
-    memory: &mut WidthScratch,
+    scratch: &mut WidthScratch,
 ) -> Result<WidthMeasurement, Reject> {
     let failed = Reject::NoPair { got: 0.0, need: 0.0 };
     let curve = |side: usize| Curve::fit(scene.points(side), scene.half_length()).ok_or(failed);
@@ -43,13 +43,13 @@ pub fn width(
     let slant_rad = scene.slant(&curves)?;
     let sections = Sections::cut(scene, &curves).ok_or(Reject::OffSurface)?;
     scene.check_width(sections.mean)?;
-    for (side, (curve, off)) in curves.iter().zip(&mut memory.off).enumerate() {
+    for (side, (curve, off)) in curves.iter().zip(&mut scratch.off).enumerate() {
         scene.residuals_into(side, curve, off);
     }
     let spread =
-        WidthUncertainty::of(&CutBead { scene, curves: &curves, sections: &sections }, memory);
+        WidthUncertainty::of(&CutBead { scene, curves: &curves, sections: &sections }, scratch);
     let edge = |side: usize| {
-        let at = curves[side].at(0.0) + scene.residual_at_middle(&memory.off[side]);
+        let at = curves[side].at(0.0) + scene.residual_at_middle(&scratch.off[side]);
         scene.view.to_image(at, scene.centre())
     };
     let finite = |value: f64| Mm::new(value).map_err(|_| Reject::OffSurface);
@@ -123,11 +123,11 @@ impl WidthInput<'_> {
         }
     }
 
-    /// How far each place lies off the course of its edge \[px\].
+    /// How far each position lies off the course of its edge \[px\].
     fn residuals_into(&self, side: usize, curve: &Curve, off: &mut Vec<Option<f64>>) {
         off.clear();
-        let places = self.sides[side].positions.iter().enumerate();
-        off.extend(places.map(|(band, located)| {
+        let positions = self.sides[side].positions.iter().enumerate();
+        off.extend(positions.map(|(band, located)| {
             located.as_ref().map(|located| located.at - curve.at(self.normalised_position(band)))
         }));
     }

@@ -7,17 +7,22 @@ use nalgebra::{Matrix5, Vector5};
 use super::fit::ShadedStep;
 use crate::numeric::blurred_step::StepTable;
 
+/// Bins of half a pixel. Derived: 2 · 2 · 40 + 1 for ±40 px, more than the longest half window.
 const BINS: usize = 161;
 const CENTRE_BIN: usize = BINS / 2;
+/// Gauss–Newton steps at most: convergence takes a few, and a fit that needs more does not
+/// converge.
 const MAX_STEPS: usize = 30;
-/// Blur of a perfectly sharp edge that is integrated over pixels and half-pixel
-/// bins.
+/// Smallest blur that is fitted. Derived: a sharp edge that is integrated over pixels and
+/// half-pixel bins has √(1/12 + 1/48) = 0.32 px; a little more keeps the fit away from it.
 const MIN_BLUR_PX: f64 = 0.35;
+/// Largest blur that is fitted \[px\]: a wider flank fills the window.
 const MAX_BLUR_PX: f64 = 15.0;
-/// Farthest that the common edge may lie from the rough ones \[px\].
+/// Largest distance of the common edge from the rough ones \[px\]: one that lies farther is another
+/// edge.
 const MAX_OFFSET_PX: f64 = 8.0;
 
-/// Profiles laid over each other about their edges.
+/// Profiles superimposed about their edges.
 #[derive(Debug, Clone)]
 pub struct BinnedProfile {
     sums: [f64; BINS],

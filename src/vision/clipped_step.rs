@@ -1,6 +1,6 @@
 //! An edge one side of which passes the end of the camera's scale. The part of
-//! its flank that can be seen tells place, blur and the level that cannot be
-//! seen together; rows are then held against that step, cut off as they are.
+//! its flank that can be seen tells position, blur and the level that cannot be
+//! seen together; rows are then compared with that step, clipped as they are.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -8,12 +8,13 @@ use super::blur_estimate::BlurEstimate;
 use super::censor::{self, CensoredPixel};
 use super::edge_windows::{EdgeWindow, EdgeWindows};
 use super::overlay::{MeanProfilePart, Overlay};
+use super::pixel_noise;
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::NormalEquations;
 use crate::numeric::number::to_f64;
 use crate::numeric::rank;
 
-/// Parts along the bead that are told apart, because light may change.
+/// Parts along the bead that are distinguished, because light may change.
 const PARTS_ALONG: usize = 3;
 const MAX_STEPS: usize = 30;
 /// Steps after which the window stays where it is: a pixel that comes and goes
@@ -27,7 +28,7 @@ const BESIDE_PX: f64 = 12.0;
 /// The hidden level is not expected farther above the end of the scale than so
 /// many times what can be seen, as a standard deviation.
 const HIDDEN_LEVEL_SIGMA: f64 = 2.0;
-/// Share by which blur may change from frame to frame, as a standard deviation.
+/// Fraction by which blur may change from frame to frame, as a standard deviation.
 const BLUR_DRIFT: f64 = 0.002;
 /// A blur that differs from that of the frames before by more standard
 /// deviations is another one.
@@ -36,11 +37,11 @@ const BLUR_CHANGE_SIGMAS: f64 = 4.0;
 const MIN_LIGHT_GREY: f64 = 25.0;
 /// Rows that fit worse than the median by so many times do not count.
 const MAX_MISFIT_RATIO: f64 = 2.5;
-/// Standard deviations beyond which a pixel or a row is not noise.
-const NOISE_SIGMAS: f64 = 4.5;
+/// The same as for all pixels and rows.
+const NOISE_SIGMAS: f64 = pixel_noise::NOISE_SIGMAS as f64;
 /// How far a row may run beside the path \[px\].
 const SLACK_PX: f64 = 0.5;
-/// Wild pixels that a row may have.
+/// Outlying pixels that a row may have.
 const MAX_WILD_PIXELS: usize = 2;
 
 /// A step of which one level is hidden \[px, grey levels\].
@@ -56,7 +57,7 @@ pub struct ClippedStep {
     pub clipped: f64,
 }
 
-/// What is known of the picture.
+/// What is known of the image.
 #[derive(Debug, Clone, Copy)]
 pub struct ClippedScene<'a> {
     /// The blurred step.
@@ -80,12 +81,12 @@ pub struct ClippedScene<'a> {
 pub struct ClippedStepFit {
     /// The step.
     pub step: ClippedStep,
-    /// Variance of its place that doubt about blur and hidden level leaves
+    /// Variance of its position that uncertainty about blur and hidden level leaves
     /// \[px²\].
     pub variance: f64,
     /// Standard deviation of the blur \[px\].
     pub blur_sd: f64,
-    /// Share of the step that is not hidden.
+    /// Fraction of the step that is not hidden.
     pub visible_fraction: f64,
     /// Mean visible level of the path \[grey levels\].
     mean_visible: f64,
@@ -98,11 +99,11 @@ pub struct ClippedLine {
     pub moved: f64,
     /// Variance of it \[px²\].
     pub variance: f64,
-    /// Share of its rows that count.
+    /// Fraction of its rows that count.
     pub row_fraction: f64,
 }
 
-/// Locates edges that are cut off; keeps its memory from frame to frame.
+/// Locates edges that are clipped; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct ClippedEdge {
     profiles: Vec<MeanProfilePart>,
@@ -132,7 +133,7 @@ struct ClippedLevels {
     light: f64,
 }
 
-/// A pixel as it is expected, and its derivatives by place, blur, visible and
+/// A pixel as it is expected, and its derivatives by position, blur, visible and
 /// hidden level.
 struct ExpectedPixel {
     seen: CensoredPixel,
@@ -169,7 +170,7 @@ impl ClippedScene<'_> {
         ClippedLevels { visible, clipped: step.clipped * light, light }
     }
 
-    /// The pixel at a distance from the path, seen in rows whose places differ
+    /// The pixel at a distance from the path, seen in rows whose positions differ
     /// with a variance.
     #[inline]
     fn expect(
@@ -180,14 +181,14 @@ impl ClippedScene<'_> {
     ) -> ExpectedPixel {
         let blur = (step.blur * step.blur + spread).sqrt();
         let z = self.sign() * (distance - step.at) / blur;
-        let (share, density) = self.table.at(z);
+        let (fraction, density) = self.table.at(z);
         let height = levels.clipped - levels.visible;
-        let depth = blur * (density - z * (1.0 - share));
-        let level = levels.visible + height * share + self.shading * depth;
+        let depth = blur * (density - z * (1.0 - fraction));
+        let level = levels.visible + height * fraction + self.shading * depth;
         let slope = height * density / blur;
         let noise = (self.noise * self.noise + slope * slope * spread).sqrt();
         let seen = censor::censored_pixel(self.table, level, noise, self.white);
-        let by = [-self.sign() * slope, -slope * z, 1.0 - share, levels.light * share];
+        let by = [-self.sign() * slope, -slope * z, 1.0 - fraction, levels.light * fraction];
         ExpectedPixel { seen, by: by.map(|by| by * seen.sensitivity) }
     }
 }
@@ -270,8 +271,8 @@ impl ClippedEdge {
         for profile in &self.profiles {
             let levels = scene.levels(step, mean_visible, profile.levels);
             for (distance, value) in profile.samples(from, to) {
-                let place = (distance, profile.spread);
-                let ExpectedPixel { seen, by } = scene.expect(step, &levels, place);
+                let position = (distance, profile.spread);
+                let ExpectedPixel { seen, by } = scene.expect(step, &levels, position);
                 let (miss, weight) = (value - seen.level, profile.rows / seen.variance);
                 normal.add(by, miss, weight);
                 square += weight * miss * miss;
@@ -281,7 +282,7 @@ impl ClippedEdge {
         (normal, square / f64::max(n, 1.0))
     }
 
-    /// Holds the windows of a sheet against a step where it is expected, and says
+    /// Compares the windows of a sheet with a step where it is expected, and says
     /// how far each of so many caliper lines is from it. Returns what a window in
     /// the median leaves, in standard deviations of its noise.
     pub fn locate(
@@ -332,7 +333,7 @@ impl ClippedStepFit {
         covariance: &nalgebra::Matrix4<f64>,
         mean_visible: f64,
     ) -> Option<Self> {
-        // What of the place's variance comes with blur and hidden level.
+        // What of the position's variance comes with blur and hidden level.
         let of_place = Vector2::new(covariance[(0, 1)], covariance[(0, 3)]);
         let [blur, both, hidden] = [(1, 1), (1, 3), (3, 3)].map(|of| covariance[of]);
         let of_others = Matrix2::new(blur, both, both, hidden);
@@ -345,7 +346,7 @@ impl ClippedStepFit {
 }
 
 impl ClippedRow {
-    /// Reads a window: what it misses, times its derivatives by place and
+    /// Reads a window: what it misses, times its derivatives by position and
     /// visible level.
     fn read(
         scene: &ClippedScene<'_>,
@@ -357,13 +358,13 @@ impl ClippedRow {
         let mut row = Self { line: window.line, ..Self::default() };
         let count = f64::from(window.rows);
         let noise = scene.noise / count.sqrt();
-        for (&pixel, place) in pixels.iter().zip(window.first..) {
-            #[expect(clippy::cast_precision_loss, reason = "a place near the gauge")]
-            let place = place as f64;
-            if place < from || place > to {
+        for (&pixel, position) in pixels.iter().zip(window.first..) {
+            #[expect(clippy::cast_precision_loss, reason = "a position near the gauge")]
+            let position = position as f64;
+            if position < from || position > to {
                 continue;
             }
-            let ExpectedPixel { seen, by } = scene.expect(step, levels, (place, 0.0));
+            let ExpectedPixel { seen, by } = scene.expect(step, levels, (position, 0.0));
             let miss = f64::from(pixel) - seen.level;
             if miss.abs() > NOISE_SIGMAS * noise + SLACK_PX * by[0].abs() {
                 row.wild += 1;
@@ -389,7 +390,7 @@ impl ClippedRow {
     }
 }
 
-/// Place of a line from its rows.
+/// Position of a line from its rows.
 fn solve(rows: &[ClippedRow], limit: f64) -> Option<ClippedLine> {
     let counts = |row: &&ClippedRow| row.misfit() <= limit;
     let (mut matrix, mut vector, mut n) = (Matrix2::zeros(), Vector2::zeros(), 0.0);

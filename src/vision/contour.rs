@@ -6,6 +6,7 @@
 use super::edge::{MAX_STEPS_KEPT, StepCandidate, StepCandidates};
 use crate::numeric::number::to_f32;
 use crate::numeric::rank;
+use crate::vision::buffer::reset;
 
 /// Contours of one sign that are looked for.
 const MAX_CONTOURS: usize = 6;
@@ -17,12 +18,12 @@ const SKIP_COST: f32 = 0.35;
 const ASIDE_COST: f32 = 0.25;
 /// Cost beyond which two steps are not neighbours.
 const BREAK_COST: f32 = 1.0;
-/// Slope against the gauge's axis up to which edges run freely; a bead that
-/// slants 20 degrees and bulges by another 15 stays below.
+/// Slope against the gauge's axis up to which edges run at little cost. Derived: tan(20° + 15°),
+/// for a bead that slants 20 degrees (contract, bead_axis) and bulges by another 15.
 const MAX_FREE_SLOPE: f32 = 0.7;
 /// Height of a band within which no bead's edge runs far \[px\].
 const REFERENCE_BAND_PX: f32 = 4.0;
-/// Marks the first step of a contour.
+/// Marks the first step of a contour. By definition no packed gap and index.
 const NO_PREDECESSOR: u16 = u16::MAX;
 
 /// An edge that runs along the bead.
@@ -32,7 +33,7 @@ pub struct EdgeContour {
     pub at: Vec<Option<f32>>,
     /// Mean height of its steps \[grey levels\].
     pub step: f32,
-    /// Share of the bands in which it has a step.
+    /// Fraction of the bands in which it has a step.
     pub band_fraction: f64,
     /// How far a step lies off the line between its neighbours, median \[px\], as if
     /// of bands of no more than [`LOW_BAND_PX`]: little for an edge, also for a rough
@@ -40,7 +41,7 @@ pub struct EdgeContour {
     pub waviness_px: f32,
 }
 
-/// Contours of one sign; keeps its memory from frame to frame.
+/// Contours of one sign; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct EdgeContours {
     scores: Vec<[f32; MAX_STEPS_KEPT]>,
@@ -73,8 +74,7 @@ impl EdgeContours {
     /// Looks for contours of steps up or down that reach `least_share` of the
     /// bands. `band_px` is the height of a band.
     pub fn search(&mut self, bands: &[StepCandidates], up: bool, band_px: f32, min_fraction: f64) {
-        self.used.clear();
-        self.used.resize(bands.len(), 0);
+        reset(&mut self.used, bands.len(), 0);
         self.scores.resize(bands.len(), [0.0; MAX_STEPS_KEPT]);
         self.predecessors.resize(bands.len(), [NO_PREDECESSOR; MAX_STEPS_KEPT]);
         self.contours.resize_with(MAX_CONTOURS, EdgeContour::default);
@@ -177,8 +177,7 @@ impl EdgeContours {
     /// Follows a contour back from its last step and takes its steps out.
     fn follow(&mut self, last: (usize, usize), steps: SignedSteps<'_>) {
         let contour = &mut self.contours[self.count];
-        contour.at.clear();
-        contour.at.resize(self.used.len(), None);
+        reset(&mut contour.at, self.used.len(), None);
         let (mut sum, mut n) = (0.0, 0.0);
         let (mut band, mut index) = last;
         loop {
@@ -200,12 +199,12 @@ impl EdgeContours {
     }
 }
 
-fn median_waviness(at: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
-    memory.clear();
-    memory.extend(
+fn median_waviness(at: &[Option<f32>], scratch: &mut Vec<f32>) -> f32 {
+    scratch.clear();
+    scratch.extend(
         at.windows(3).filter_map(|three| Some((three[1]? - 0.5 * (three[0]? + three[2]?)).abs())),
     );
-    rank::median(memory).unwrap_or(f32::INFINITY)
+    rank::median(scratch).unwrap_or(f32::INFINITY)
 }
 
 fn pack(gap: usize, index: usize) -> u16 {
@@ -216,8 +215,8 @@ fn pack(gap: usize, index: usize) -> u16 {
 mod tests {
     use super::*;
 
-    fn band(places: &[(f32, f32)]) -> StepCandidates {
-        StepCandidates::of(places.iter().map(|&(at, step)| StepCandidate { at, step }))
+    fn band(positions: &[(f32, f32)]) -> StepCandidates {
+        StepCandidates::of(positions.iter().map(|&(at, step)| StepCandidate { at, step }))
     }
 
     fn search(bands: &[StepCandidates]) -> EdgeContours {
@@ -273,5 +272,10 @@ mod tests {
         let found = search(&bands);
         assert_eq!(found.all().len(), 2);
         assert_eq!((found.all()[0].step, found.all()[1].step), (80.0, 50.0));
+    }
+
+    #[test]
+    fn the_free_slope_is_that_of_a_slant_and_a_bulge() {
+        assert!((MAX_FREE_SLOPE - 35f32.to_radians().tan()).abs() < 5e-4);
     }
 }

@@ -4,21 +4,23 @@
 use crate::numeric::number::to_f64;
 use nalgebra::{SMatrix, SVector};
 
-/// Terms that a curve has at most: up to t⁴.
+/// Terms of a curve at most. By definition those up to t⁴.
 const MAX_TERMS: usize = 5;
-/// Terms of a straight bead, and of one that is evenly bent.
+/// Terms of a straight bead. By definition those up to t.
 const LINE_TERMS: usize = 2;
+/// Terms of a bead that is evenly bent. By definition those up to t².
 const PARABOLA_TERMS: usize = 3;
-/// A bend is believed from so many standard deviations on.
-const MIN_BEND_SIGMAS: f64 = 4.0;
-/// Scatter about a parabola that is looked at for more \[px\].
+/// A bend is accepted from so many standard deviations on. Derived: noise alone exceeds 4 in 6 of
+/// 100,000 frames, and a false bend turns the normals of the whole gauge.
+pub const MIN_BEND_SIGMAS: f64 = 4.0;
+/// Spread about a parabola that is looked at for more \[px\].
 pub const NOTABLE_SCATTER_PX: f64 = 0.25;
-/// Part of the scatter's square that more terms must explain.
+/// Part of the spread's square that more terms must explain.
 const MIN_EXPLAINED: f64 = 0.8;
 /// Part of it that they leave at most where they follow a bead that bends evenly: a
 /// torn edge's waves leave more.
 const MAX_UNEXPLAINED: f64 = 0.02;
-/// Largest correlation from point to point that is believed.
+/// Largest correlation from point to point that is accepted.
 const MAX_CORRELATION: f64 = 0.95;
 /// Rounds in which slope and bend in the middle settle beside the higher orders.
 const ARC_PASSES: usize = 3;
@@ -26,11 +28,11 @@ const ARC_PASSES: usize = 3;
 /// A point of an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgePoint {
-    /// Place along the gauge: −1 at its first row, 1 at its last.
+    /// Position along the gauge: −1 at its first row, 1 at its last.
     pub t: f64,
     /// Position across it \[px\].
     pub u: f64,
-    /// Rows that it comes from, as a share of its band.
+    /// Rows that it comes from, as a fraction of its band.
     pub weight: f64,
 }
 
@@ -60,7 +62,7 @@ impl Curve {
         let (straight, _) = sums.curve::<LINE_TERMS>()?;
         let Some((few, off)) = sums.curve::<PARABOLA_TERMS>() else { return Some(straight) };
         let with_scatter = |curve: Self| Some(Self { about_parabola: off, ..curve });
-        // An unsure bend would tell wrong places beyond the gauge's ends,
+        // An unsure bend would tell wrong positions beyond the gauge's ends,
         // where the normals of a slanted bead may cross it.
         let notable = off > NOTABLE_SCATTER_PX * NOTABLE_SCATTER_PX;
         let more = (notable && sums.weight >= 4.0 * to_f64(MAX_TERMS))
@@ -124,13 +126,13 @@ impl Curve {
         self.terms.get(order).copied().unwrap_or(0.0)
     }
 
-    /// Position at a place \[px\].
+    /// Position across the bead at a position along it \[px\].
     pub fn at(&self, t: f64) -> f64 {
         let values = legendre(t);
         (0..MAX_TERMS).map(|k| self.terms[k] * values[k]).sum()
     }
 
-    /// Change of the position at a place, for a step of 1 in t \[px\].
+    /// Slope there: the change of the position for a step of 1 in t \[px\].
     pub fn slope(&self, t: f64) -> f64 {
         let terms = &self.terms;
         let square = t * t;
@@ -140,7 +142,7 @@ impl Curve {
             + 2.5 * terms[4] * t * (7.0 * square - 3.0)
     }
 
-    /// Second derivative at a place \[px\].
+    /// Second derivative there \[px\].
     pub fn bend(&self, t: f64) -> f64 {
         let [_, _, c, d, e] = self.terms;
         3.0 * c + 15.0 * d * t + 7.5 * e * (7.0 * t * t - 1.0)

@@ -18,14 +18,15 @@ use super::reject::Reject;
 use super::strip::GaugeView;
 use super::width::{Hints, WidthMeasurement};
 
-/// What rounding to whole pixels leaves in the distance of two lines \[px\].
+/// Standard deviation of the distance of two lines of whole pixels \[px\]. Derived: rounding leaves
+/// √(2/12) = 0.41 px; the lines are pieced together, which leaves a little more.
 const SIGMA_PX: f64 = 0.5;
 /// Steepest edge line against the gauge's axis, in pixels across for each
 /// along.
 const MAX_SLOPE: f64 = 0.45;
 /// Lines that this near to each other at the gauge's middle are one edge \[px\].
 const SAME_EDGE_PX: f64 = 4.0;
-/// Share of the gauge that an edge line must cover.
+/// Fraction of the gauge that an edge line must cover.
 const MIN_COVERAGE: f64 = 0.3;
 
 /// An edge line across the gauge: its ends on the gauge's first and last row.
@@ -43,7 +44,7 @@ impl EdgeLine {
 }
 
 /// Measures a frame with the paper's method. Appends the edge points to the
-/// lists, for pictures of them.
+/// lists, for images of them.
 pub fn measure(
     gauge: &Gauge,
     frame: &Frame,

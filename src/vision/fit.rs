@@ -62,12 +62,12 @@ pub struct ProfileWindow<'a> {
     pub bead_after: bool,
 }
 
-/// What a blurred step with shading is at a place, and its derivatives.
+/// What a blurred step with shading is at a position, and its derivatives.
 #[derive(Debug, Clone, Copy)]
 pub struct ShadedStep {
-    /// Φ: share of the step that is reached.
+    /// Φ: fraction of the step that is reached.
     pub step: f64,
-    /// Slope of the share \[1/px\].
+    /// Slope of the fraction \[1/px\].
     pub density: f64,
     /// Blurred distance into the bead \[px\].
     pub depth: f64,
@@ -119,8 +119,8 @@ impl ProfileWindow<'_> {
 
     /// Each sample's model and how far the sample is from it.
     fn residuals(&self, edge: FittedEdge) -> impl Iterator<Item = (ShadedStep, f64)> {
-        (0u32..).zip(self.samples).map(move |(place, &sample)| {
-            let distance = self.first + f64::from(place) - edge.at;
+        (0u32..).zip(self.samples).map(move |(position, &sample)| {
+            let distance = self.first + f64::from(position) - edge.at;
             let model = ShadedStep::at(self.table, distance, self.blur, self.bead_after);
             let grey = edge.ground + edge.height * model.step + edge.shading * model.depth;
             (model, f64::from(sample) - grey)

@@ -48,13 +48,14 @@ pub enum EdgeKind {
     Groove,
 }
 
-/// Caliper lines along a gauge whose cell names no number.
+/// Caliper lines along a gauge whose cell names no number: ACCURACY.md, What is measured, is for
+/// this number. More lines are shorter and noisier, fewer follow a bead less well.
 pub const DEFAULT_CALIPERS: usize = 64;
 /// Smallest contrast where the cell names none: about three times the noise of an
 /// industrial camera at full scale \[grey levels of 256\].
 pub const DEFAULT_MIN_CONTRAST_GREY: f64 = 6.0;
-/// Largest standard deviation of a width where the cell names none, as a fraction
-/// of the width: tolerances of printed beads are 5 % and more.
+/// Largest standard deviation of a width where the cell names none, as a fraction of the width
+/// (contract, `max_sigma` of the cell file).
 pub const DEFAULT_MAX_SIGMA: f64 = 0.02;
 
 /// Widths of a bead in pixels across the gauge's middle.

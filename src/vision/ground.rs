@@ -66,7 +66,7 @@ pub struct Pattern {
     pub mean_variance: f64,
 }
 
-/// Looks for patterns; keeps its memory from frame to frame.
+/// Looks for patterns; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct PatternSearch {
     /// Grey levels beside the edge, line by line, each column less its straight line.
@@ -81,7 +81,7 @@ type ColumnValues = [f32; MAX_COLUMNS];
 
 impl PatternSearch {
     /// The pattern along an edge. `noise` is the standard deviation of a pixel's
-    /// \[grey levels\]. `None` where none is told from noise, or too little is in the
+    /// \[grey levels\]. `None` where none is distinguished from noise, or too little is in the
     /// gauge.
     #[inline(always)]
     pub fn pattern<T: GreyPixel>(&mut self, side: &EdgeSide<'_, T>) -> Option<Pattern> {
@@ -108,7 +108,7 @@ impl PatternSearch {
     }
 
     /// Reads what lies beside an edge: the variance of each column; `None` where all
-    /// together are surely noise.
+    /// together are certainly noise.
     #[inline(always)]
     fn look<T: GreyPixel>(&mut self, side: &EdgeSide<'_, T>) -> Option<ColumnValues> {
         let count = side.positions.len();
@@ -125,7 +125,7 @@ impl PatternSearch {
     }
 
     /// Standard deviation without the pixels' noise, from the median of the columns'
-    /// variances \[grey levels\]; `None` where it is not told from noise.
+    /// variances \[grey levels\]; `None` where it is not distinguished from noise.
     fn without_noise(&self, variances: &mut [f32; MAX_COLUMNS], noise: f64) -> Option<f64> {
         let variance = f64::from(rank::median(&mut variances[..self.columns])?) - noise * noise;
         (variance > MIN_EXCESS_VARIANCE * noise * noise).then(|| variance.sqrt())
@@ -137,15 +137,16 @@ impl PatternSearch {
         let strip = side.strip;
         let first = MIN_FIRST_PX.max(FLANK_BLURS * side.blur_px);
         let last = to_f64(strip.across - 1);
-        let border =
-            |place: &EdgePosition| if side.is_after() { last - place.at } else { place.at };
+        let border = |position: &EdgePosition| {
+            if side.is_after() { last - position.at } else { position.at }
+        };
         let room = side.positions.iter().map(border).fold(side.room_px - first, f64::min);
         let fits = |column: &usize| first + to_f64(COLUMN_STEP_PX * column) <= room;
         self.columns = (0..MAX_COLUMNS).take_while(fits).count();
         self.lines.clear();
-        self.lines.extend(side.positions.iter().map(|place| {
-            let pixels = strip.row(usize::midpoint(place.rows.first, place.rows.end - 1));
-            let nearest = round_to_count(narrow_to_f32(place.at + side.outwards * first));
+        self.lines.extend(side.positions.iter().map(|position| {
+            let pixels = strip.row(usize::midpoint(position.rows.first, position.rows.end - 1));
+            let nearest = round_to_count(narrow_to_f32(position.at + side.outwards * first));
             std::array::from_fn(|column| {
                 let off = COLUMN_STEP_PX * column;
                 let at = if side.is_after() { nearest + off } else { nearest.saturating_sub(off) };
@@ -178,12 +179,12 @@ fn detrend(lines: &mut [ColumnValues]) {
     let middle = (count - 1.0) / 2.0;
     let means = sum(lines.iter().copied()).map(|sum| sum / count);
     let places = || (0..).map(move |k| narrow_to_f32(to_f64(k)) - middle);
-    let across = sum(lines.iter().zip(places()).map(|(line, place)| line.map(|v| place * v)));
+    let across = sum(lines.iter().zip(places()).map(|(line, position)| line.map(|v| position * v)));
     let along = count * (count * count - 1.0) / 12.0;
     let slopes = across.map(|across| across / along);
-    for (line, place) in lines.iter_mut().zip(places()) {
+    for (line, position) in lines.iter_mut().zip(places()) {
         for (value, (mean, slope)) in line.iter_mut().zip(means.iter().zip(&slopes)) {
-            *value -= mean + slope * place;
+            *value -= mean + slope * position;
         }
     }
 }

@@ -7,7 +7,7 @@
 //! inwards, and what remains to the second order is taken off. The course has as few
 //! degrees of freedom as the gauge supports: a line, and a bend where it is certain. How
 //! far a pattern moves the edge is read from the ground and the bead themselves: the same
-//! weights, held against places where there is no edge.
+//! weights, compared with positions where there is no edge.
 
 mod column;
 mod course;
@@ -16,6 +16,7 @@ mod mean_edge_input;
 mod weights;
 
 use super::coarse::StepLine;
+use super::curve::MIN_BEND_SIGMAS;
 use super::edge_windows::MAX_SINGLE_ROWS;
 use super::located::CaliperEdge;
 use super::rough::RoughFit;
@@ -44,9 +45,6 @@ const USUAL_BLUR: usize = 3;
 const BLUR_SHIFT_PX: usize = 4;
 /// How far an edge may lie from its line \[px\].
 const MAX_OFFSET_PX: f64 = 10.0;
-/// How many standard deviations of what the pattern bends an edge by are a bend of the
-/// edge.
-const MIN_BEND_SIGMAS: f64 = 4.0;
 /// Ground that is looked at \[px\], and bead: other things lie farther away.
 const MAX_GROUND_PX: usize = 100;
 const MAX_BEAD_PX: usize = 120;
@@ -58,7 +56,7 @@ const LEVEL_PX: usize = 24;
 const MIN_COLUMNS: usize = 6;
 const COLUMN_PX: usize = 2;
 
-/// An edge along a course; keeps its memory from frame to frame.
+/// An edge along a course; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct MeanEdge {
     course: ParabolicCourse,
@@ -75,7 +73,7 @@ pub struct MeanFit {
     /// What the ground makes of the edge's position, and the bead.
     pub samples: [ShiftSamples; 2],
     /// Step from the ground to the bead \[grey levels\]: the smaller of that in the window
-    /// and that of all places that are looked at.
+    /// and that of all positions that are looked at.
     pub contrast: f64,
     /// Level of the bead beside the edge \[grey levels\], dark beads inverted.
     pub bead_grey: f64,
@@ -126,7 +124,7 @@ impl MeanEdge {
         let every = if rows > MAX_SINGLE_ROWS { 2 } else { 1 };
         let seen = rows.div_ceil(every);
         for (number, row) in (0..rows).step_by(every).enumerate() {
-            let place = to_f64(number) - 0.5 * to_f64(seen - 1);
+            let position = to_f64(number) - 0.5 * to_f64(seen - 1);
             let at =
                 self.course.at(scene.normalised_position(row)) - scene.inwards() * to_f64(HALF_PX);
             let nearest = round_to_count(narrow_to_f32(at)).min(last);
@@ -137,7 +135,8 @@ impl MeanEdge {
                 } else {
                     (nearest + off).min(last)
                 };
-                column.add(place, f64::from(T::sum_to_f32(pixels[at].add_to(T::Sum::default()))));
+                column
+                    .add(position, f64::from(T::sum_to_f32(pixels[at].add_to(T::Sum::default()))));
             }
         }
         self.spreads.clear();
@@ -167,7 +166,7 @@ impl MeanEdge {
         let usual = weights.iter().flatten().take(USUAL_BLUR + 1).last();
         let is_found =
             usual.is_some_and(|usual| self.descend(scene, usual, ROUGHLY_CONVERGED).is_some());
-        // What other blurs change is the place within the profile, and hardly its direction.
+        // What other blurs change is the position within the profile, and hardly its direction.
         let reach = self.half + BLUR_SHIFT_PX;
         let [profile, ..] = self.means(scene, -to_f64(reach), 2 * reach + 1);
         weights.map(|weights| {
@@ -252,13 +251,13 @@ impl MeanEdge {
             #[inline(always)]
             || {
                 for row in 0..scene.strip.along {
-                    let place = scene.normalised_position(row);
-                    let shares = [1.0, place, bend_at(place)];
-                    for (square, share) in squares.iter_mut().zip(shares) {
-                        *square += share * share;
+                    let position = scene.normalised_position(row);
+                    let fractions = [1.0, position, bend_at(position)];
+                    for (square, fraction) in squares.iter_mut().zip(fractions) {
+                        *square += fraction * fraction;
                     }
-                    let between = scene.fetch(row, self.course.at(place) + lowest, &mut greys);
-                    add_row(&mut sums, &greys, between, shares.map(narrow_to_f32));
+                    let between = scene.fetch(row, self.course.at(position) + lowest, &mut greys);
+                    add_row(&mut sums, &greys, between, fractions.map(narrow_to_f32));
                 }
             },
         );
@@ -277,7 +276,7 @@ impl MeanEdge {
 
     /// The same of ground and bead, free of the flank, as far as they lie in the gauge.
     fn side_profiles<T: GreyPixel>(&self, scene: &MeanInput<'_, T>, free: usize) -> SideProfiles {
-        let ends = [-1.0, 0.0, 1.0].map(|place| self.course.at(place));
+        let ends = [-1.0, 0.0, 1.0].map(|position| self.course.at(position));
         let nearest = ends.into_iter().fold(f64::INFINITY, f64::min);
         let farthest = ends.into_iter().fold(f64::NEG_INFINITY, f64::max);
         let room = if scene.bead_after { nearest } else { scene.last() - farthest };
@@ -304,9 +303,9 @@ impl MeanEdge {
         let mut greys = [0.0; WINDOW + 1];
         let greys = &mut greys[..=weights.pixels];
         // In the order of the pixels of a row.
-        let mut place = weights.position;
+        let mut position = weights.position;
         if !scene.bead_after {
-            place[..weights.pixels].reverse();
+            position[..weights.pixels].reverse();
         }
         let per_grey = scene.sign() * f64::from(scene.strip.scale) / found.step;
         for &RowRange { first: from, end: to } in scene.lines {
@@ -315,7 +314,7 @@ impl MeanEdge {
                 let at = self.course.at(scene.normalised_position(row));
                 middle += at / to_f64(to - from);
                 let between = scene.fetch(row, at - to_f64(self.half), greys);
-                for (weight, pixels) in place.iter().zip(greys.windows(2)) {
+                for (weight, pixels) in position.iter().zip(greys.windows(2)) {
                     aside += weight * f64::from(pixels[0] + between * (pixels[1] - pixels[0]));
                 }
             }
@@ -341,16 +340,16 @@ struct SideProfiles {
     bead: Profiles,
 }
 
-/// Adds the values between the pixels of a row to sums, with the row's shares of them.
+/// Adds the values between the pixels of a row to sums, with the row's fractions of them.
 #[inline(always)]
-fn add_row(sums: &mut [Vec<f32>; 3], pixels: &[f32], between: f32, shares: [f32; 3]) {
+fn add_row(sums: &mut [Vec<f32>; 3], pixels: &[f32], between: f32, fractions: [f32; 3]) {
     let [mean, tilt, bend] = sums;
     let pairs = pixels.iter().zip(&pixels[1..]);
     for (((mean, tilt), bend), (one, other)) in mean.iter_mut().zip(tilt).zip(bend).zip(pairs) {
         let grey = one + between * (other - one);
-        *mean += shares[0] * grey;
-        *tilt += shares[1] * grey;
-        *bend += shares[2] * grey;
+        *mean += fractions[0] * grey;
+        *tilt += fractions[1] * grey;
+        *bend += fractions[2] * grey;
     }
 }
 

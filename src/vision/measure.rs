@@ -42,7 +42,7 @@ const OVERLAP_SIGMA: f64 = 0.045;
 const OVERLAP_REFERENCE_BLURS: f64 = 4.0;
 const OVERLAP_DECAY_BLURS: f64 = 3.0;
 
-/// Measures frames of one cell; keeps its memory from frame to frame.
+/// Measures frames of one cell; keeps its buffers from frame to frame.
 #[derive(Debug, Clone)]
 pub struct Measurer {
     gauge: Gauge,
@@ -58,12 +58,12 @@ impl Measurer {
         Self { gauge, white, turner: RowLayout::new(gauge.gamma), work: MeasureState::new(gauge) }
     }
 
-    /// The edges behind the last width, for pictures of them.
+    /// The edges behind the last width, for images of them.
     pub fn edges(&self) -> Edges<'_> {
         Edges { left: &self.work.left_px, right: &self.work.right_px }
     }
 
-    /// The same line by line, with how sure each place is. A refused frame has
+    /// The same line by line, with how sure each position is. A refused frame has
     /// the edges that were found before it was refused.
     pub fn calipers(&self) -> impl Iterator<Item = Caliper> {
         let Edges { left, right } = self.edges();
@@ -133,7 +133,7 @@ impl Measurer {
         Ok(found)
     }
 
-    /// The same with no more in sigma than the picture itself leaves open.
+    /// The same with no more in sigma than the image itself leaves open.
     fn measure_image(&mut self, frame: &Frame, surface: &SurfaceMap) -> Measured {
         let work = &mut self.work;
         work.left_px.clear();
@@ -158,7 +158,7 @@ impl Measurer {
     }
 }
 
-/// What the other edge's flank adds to the variance of an edge's place \[px²\], for both at
+/// What the other edge's flank adds to the variance of an edge's position \[px²\], for both at
 /// so many pixels from each other and so blurred. Measured on 2,000 drawn beads of 5 to
 /// 600 px with a blur of 1.5 px.
 fn overlap_variance(width_px: f64, blur_px: f64) -> f64 {

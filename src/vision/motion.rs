@@ -7,8 +7,9 @@ use crate::numeric::blurred_step::StepTable;
 /// Fractions of the blur's variance that a box makes: neighbours differ by what a
 /// hundred rows with a contrast of twenty times the noise just tell apart.
 const BOX_FRACTIONS: [f64; 8] = [0.0, 0.3, 0.5, 0.65, 0.78, 0.87, 0.93, 0.97];
-/// By how much a box must lower the sum of squared residuals, in variances of their
-/// noise: a parameter that is not there lowers it by 16 once in 15,000 frames.
+/// By how much a box must lower the sum of squared residuals, in variances of their noise. Derived:
+/// a parameter that is not there lowers it by 16 with the probability P(χ²₁ > 16) = 6·10⁻⁵, once in
+/// 15,000 frames.
 const MIN_GAIN: f64 = 16.0;
 /// The same beyond that of noise, and the blur \[px\], up to which the lens's blur fits well
 /// enough for other shapes to go on from: up to the box that is there each then fits better
@@ -49,11 +50,11 @@ impl BlurShapes {
         again: impl Fn(&StepTable, Option<[&StepFit; 2]>) -> [Option<StepFit>; 2],
     ) -> Option<(usize, [StepFit; 2])> {
         // Where the lens's blur fits so well, no other can be clearly better.
-        let excess: f64 = looks.iter().map(|look| (look.misfit() - 1.0) * look.samples()).sum();
+        let excess: f64 = looks.iter().map(|fit| (fit.misfit() - 1.0) * fit.samples()).sum();
         if excess < MIN_GAIN {
             return None;
         }
-        let is_narrow = looks.iter().all(|look| look.step.blur < MAX_NARROW_BLUR_PX);
+        let is_narrow = looks.iter().all(|fit| fit.step.blur < MAX_NARROW_BLUR_PX);
         let is_near = is_narrow && excess < MAX_NEAR_EXCESS;
         let mut best: Option<(usize, [StepFit; 2])> = None;
         let mut gain = if is_near { MIN_PROMISING_GAIN } else { MIN_GAIN };
@@ -74,5 +75,17 @@ impl BlurShapes {
             }
         }
         best.filter(|_| gain > MIN_GAIN)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// P(χ²₁ > g) = erfc(√(g/2)).
+    #[test]
+    fn a_box_that_is_not_there_gains_as_much_once_in_15_000_frames() {
+        let chance = libm::erfc((0.5 * MIN_GAIN).sqrt());
+        assert!((1.0 / chance / 15_000.0 - 1.0).abs() < 0.1, "{chance}");
     }
 }

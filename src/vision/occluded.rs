@@ -11,7 +11,7 @@ use super::trace::{EdgeTracer, TraceInput};
 /// edges \[px\].
 const WIDTH_TOLERANCE_PX: f32 = 40.0;
 
-/// Least distance of two steps, as a share of that of the rough edges.
+/// Smallest distance of two steps, as a fraction of that of the rough edges.
 const MIN_WIDTH_RATIO: f32 = 0.3;
 
 /// A bead that was looked at.

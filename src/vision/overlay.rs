@@ -1,8 +1,9 @@
-//! The profile of an edge, from rows all along it laid over each other: its
+//! The profile of an edge, from rows all along it superimposed: its
 //! blur, how far its surroundings on either side are plain, and how they are
 //! shaded. Rows that differ from most, because a grain or a spark lies on
 //! them, are left out.
 
+use crate::vision::buffer::{refill, reset};
 use std::ops::Range;
 
 use super::edge_windows::EdgeWindows;
@@ -26,14 +27,16 @@ pub use fitter::StepFitter;
 pub use flank_skew::EdgeSkew;
 pub use look::{SideRange, StepFit};
 pub use shape::{SideShading, StepShape};
+#[cfg(test)]
+pub use step::NeighbourSteps;
 pub use step::{BlurredStep, Extent};
 
-/// Rows that are laid over each other at most.
+/// Rows that are superimposed at most.
 const MAX_ROWS: usize = 100;
 /// Farthest sample from the edge on either side \[px\].
 pub const HALF_SPAN: usize = 48;
 const SPAN: usize = 2 * HALF_SPAN;
-/// Rows are laid down at the nearest of so many places between pixels.
+/// Rows are placed at the nearest of so many positions between pixels.
 const PHASES: usize = 2;
 /// Samples this near the edge tell whether a row is like the others \[px\].
 const CORE_HALF: usize = 12;
@@ -41,17 +44,18 @@ const JUDGED_SAMPLES: Range<usize> = HALF_SPAN - CORE_HALF..HALF_SPAN + CORE_HAL
 /// A row that differs from the mean by so many times what rows do in the
 /// median is left out; the second time, when the mean is a better one.
 const MAX_ROW_MISFIT: [f32; 2] = [2.0, 1.7];
-/// Share of the rows that are most alike, from which a mean is made where many
+/// Fraction of the rows that are most alike, from which a mean is made where many
 /// may be covered, and how often anew.
 const BEST_FRACTION: f32 = 0.3;
 const MAX_SETTLE_ROUNDS: usize = 5;
-/// What makes a row that is cut off at the end of the scale unlike the others, in
+/// What makes a row that is clipped at the end of the scale unlike the others, in
 /// such medians.
 const MAX_CLIPPED_MISFIT: f32 = 3.5;
-/// Blur that the place's rounding to half a pixel adds \[px²\].
+/// Variance that rounding to phases adds to the blur \[px²\]. Derived: (1/PHASES)²/12, the variance
+/// of a uniform error of half a pixel.
 const ROUNDING_VARIANCE_PX2: f64 = 1.0 / 48.0;
 
-/// How a window was laid down: at which phase, how far the path lies ahead of
+/// How a window was placed: at which phase, how far the path lies ahead of
 /// its pixel \[px\], of how many rows it is, and the level before the edge and
 /// the step that were expected \[grey levels\].
 #[derive(Debug, Clone, Copy)]
@@ -64,7 +68,7 @@ struct LaidRow {
     step: f32,
 }
 
-/// Lays rows over each other; keeps its memory from frame to frame.
+/// Superimposes rows; keeps its buffers from frame to frame.
 #[derive(Debug, Clone)]
 pub struct Overlay {
     rows: Vec<[f32; SPAN]>,
@@ -73,13 +77,13 @@ pub struct Overlay {
     sorted: Vec<f32>,
     mean: [[f32; SPAN]; PHASES],
     counts: [f32; PHASES],
-    /// Mean distance of the path from the pixels' places in each phase \[px\].
+    /// Mean distance of the path from the pixels' positions in each phase \[px\].
     shifts: [f32; PHASES],
     /// How unlike the mean a row is in the median.
     median_misfit: f32,
 }
 
-/// Mean of rows of one part along the bead, all at nearly the same place
+/// Mean of rows of one part along the bead, all at nearly the same position
 /// between pixels.
 #[derive(Debug, Clone)]
 pub struct MeanProfilePart {
@@ -115,11 +119,11 @@ impl MeanProfilePart {
 
     /// Sums become means.
     fn finish(&mut self) {
-        let share = 1.0 / self.rows;
-        self.mean.iter_mut().for_each(|value| *value *= narrow_to_f32(share));
-        self.shift *= share;
-        self.spread = (share * self.spread - self.shift * self.shift).max(0.0);
-        self.levels = self.levels.map(|level| share * level);
+        let fraction = 1.0 / self.rows;
+        self.mean.iter_mut().for_each(|value| *value *= narrow_to_f32(fraction));
+        self.shift *= fraction;
+        self.spread = (fraction * self.spread - self.shift * self.shift).max(0.0);
+        self.levels = self.levels.map(|level| fraction * level);
     }
 
     /// Each sample's distance from the path and its value, from a distance to
@@ -145,7 +149,7 @@ impl Default for Overlay {
 }
 
 impl Overlay {
-    /// Lays down windows where the edge is expected.
+    /// Places windows where the edge is expected.
     #[inline(always)]
     pub fn lay(&mut self, sheet: &EdgeWindows) {
         self.lay_down(sheet);
@@ -160,7 +164,7 @@ impl Overlay {
         self.average(last * self.median_misfit, 0..SPAN);
     }
 
-    /// Lays down windows of which many may be covered: starts from
+    /// Places windows of which many may be covered: starts from
     /// those that are said to be clear and goes on with those that are most
     /// like the mean, over and over.
     #[inline(always)]
@@ -172,7 +176,7 @@ impl Overlay {
         }
     }
 
-    /// Lays down the windows that are clear, and no others.
+    /// Places the windows that are clear, and no others.
     #[inline(always)]
     pub fn lay_clear(&mut self, sheet: &EdgeWindows, clear: impl Fn(usize) -> bool) {
         self.lay_down(sheet);
@@ -208,8 +212,7 @@ impl Overlay {
             self.rows.push(row);
             self.laid.push(LaidRow { number, phase, ahead, rows: window.rows, before, step });
         }
-        self.row_misfits.clear();
-        self.row_misfits.resize(self.rows.len(), 0.0);
+        reset(&mut self.row_misfits, self.rows.len(), 0.0);
     }
 
     /// Means of the rows that are not unlike the others, in some columns.
@@ -231,18 +234,18 @@ impl Overlay {
             }
         }
         for ((mean, shift), count) in self.mean.iter_mut().zip(&mut self.shifts).zip(self.counts) {
-            let share = 1.0 / f32::max(count, 1.0);
-            *shift *= share;
+            let fraction = 1.0 / f32::max(count, 1.0);
+            *shift *= fraction;
             for value in mean {
-                *value *= share;
+                *value *= fraction;
             }
         }
     }
 
     /// How far each row lies from the mean about the edge; returns how far a
-    /// share of them does at most.
+    /// fraction of them does at most.
     #[inline(always)]
-    fn compute_row_misfits(&mut self, share: f32) -> f32 {
+    fn compute_row_misfits(&mut self, fraction: f32) -> f32 {
         for ((row, laid), unlike) in self.rows.iter().zip(&self.laid).zip(&mut self.row_misfits) {
             let mean = &self.mean[laid.phase];
             let mut lanes = [0.0f32; 8];
@@ -256,9 +259,8 @@ impl Overlay {
             }
             *unlike = lanes.iter().sum();
         }
-        self.sorted.clear();
-        self.sorted.extend_from_slice(&self.row_misfits);
-        let rank = rank_of(self.sorted.len(), share);
+        refill(&mut self.sorted, self.row_misfits.iter().copied());
+        let rank = rank_of(self.sorted.len(), fraction);
         rank::at(&mut self.sorted, rank).unwrap_or(f32::INFINITY)
     }
 
@@ -267,8 +269,7 @@ impl Overlay {
     /// off above, more lie far below their mean than above it, and leaving them
     /// out would lift it.
     pub fn profiles(&self, parts: usize, profiles: &mut Vec<MeanProfilePart>) {
-        profiles.clear();
-        profiles.resize(parts * PHASES, MeanProfilePart::EMPTY);
+        reset(profiles, parts * PHASES, MeanProfilePart::EMPTY);
         let count = self.rows.len();
         for (k, (row, laid)) in self.rows.iter().zip(&self.laid).enumerate() {
             if self.row_misfits[k] <= MAX_CLIPPED_MISFIT * self.median_misfit {
@@ -286,13 +287,13 @@ impl Overlay {
         f64::from(self.counts.iter().sum::<f32>())
     }
 
-    /// Rows that were laid down, and windows.
+    /// Rows that were placed, and windows.
     pub fn laid(&self) -> (f64, f64) {
         (self.laid.iter().map(|laid| f64::from(laid.rows)).sum(), to_f64(self.rows.len()))
     }
 
     /// Variance of a window's samples about the mean near the edge, of the window
-    /// in the median, in squared shares of the step.
+    /// in the median, as squared fractions of the step.
     pub fn row_variance(&self) -> f64 {
         f64::from(self.median_misfit) / to_f64(2 * CORE_HALF)
     }
@@ -349,9 +350,9 @@ fn samples(
     samples.map(move |(k, value)| (place(k) - shift, f64::from(*value)))
 }
 
-/// Number of the value that a share of all do not exceed.
-fn rank_of(count: usize, share: f32) -> usize {
-    floor_to_count((share * to_f32(count)).into()).min(count.saturating_sub(1))
+/// Number of the value that a fraction of all do not exceed.
+fn rank_of(count: usize, fraction: f32) -> usize {
+    floor_to_count((fraction * to_f32(count)).into()).min(count.saturating_sub(1))
 }
 
 fn place(index: usize) -> f64 {

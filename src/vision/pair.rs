@@ -8,19 +8,19 @@ use super::gauge::WidthRangePx;
 use crate::numeric::number::narrow_to_f32;
 use crate::numeric::rank;
 
-/// Depth of a gap between two edges, as a share of the weaker one, that shows them
+/// Depth of a gap between two edges, as a fraction of the weaker one, that shows them
 /// to belong to two beads: it is deeper than the bead is high over the ground.
 const MIN_GAP_RATIO: f32 = 1.1;
-/// The same up to which it is a seam within one bead. A seam of 60 % is no edge, and
-/// a little is left to noise.
+/// Depth of a gap up to which it is a seam within one bead. Measured: ACCURACY.md, Drawn frames:
+/// lines of up to 60 % of the contrast (`ribs-weak`) are no edges; a little is left to noise.
 pub const MAX_SEAM_RATIO: f32 = 0.64;
-/// Strength of a pair within another one, as a share of the other's, from which on it
+/// Strength of a pair within another one, as a fraction of the other's, from which on it
 /// fits as well: a rib of 81 % of the edges.
 pub const MIN_RIVAL_RATIO: f32 = 0.9;
-/// Share of the width by which two pairs differ at least, and how many pixels are enough.
+/// Fraction of the width by which two pairs differ at least, and how many pixels are enough.
 const SAME_WIDTH_FRACTION: f32 = 0.03;
 const SAME_WIDTH_PX: f32 = 5.0;
-/// Share of the bands in which a gap is seen, in that of the bead's edges.
+/// Fraction of the bands in which a gap is seen, in that of the bead's edges.
 const MIN_GAP_BAND_RATIO: f64 = 0.85;
 
 /// The two edges of the bead among the contours, by their numbers.
@@ -32,7 +32,7 @@ pub struct EdgePair {
     pub right: usize,
     /// Geometric mean of the two steps \[grey levels\].
     pub step: f32,
-    /// Smaller of the shares of bands in which they are seen.
+    /// Smaller of the fractions of bands in which they are seen.
     pub band_fraction: f64,
     /// Step of the weaker edge, less where it is not seen all along \[grey levels\].
     pub strength: f32,
@@ -40,7 +40,7 @@ pub struct EdgePair {
     pub score: f32,
     /// Its width \[px\].
     pub width_px: f32,
-    /// Depth of the deepest gap between its edges, as a share of the weaker one.
+    /// Depth of the deepest gap between its edges, as a fraction of the weaker one.
     pub gap: f32,
     /// Width of another pair within this one that fits as well \[px\].
     pub rival_px: Option<f32>,
@@ -63,9 +63,9 @@ impl<'a> Sides<'a> {
 }
 
 /// The best pair of contours, or none.
-pub fn find(sides: Sides<'_>, range: WidthRangePx, memory: &mut Vec<f32>) -> Option<EdgePair> {
+pub fn find(sides: Sides<'_>, range: WidthRangePx, scratch: &mut Vec<f32>) -> Option<EdgePair> {
     let mut best: Option<EdgePair> = None;
-    each(sides, range, memory, |pair| {
+    each(sides, range, scratch, |pair| {
         if best.is_none_or(|best| best.score < pair.score) {
             let gap = gap(sides, &pair) / weaker(sides.of(&pair));
             if gap < MIN_GAP_RATIO {
@@ -75,7 +75,7 @@ pub fn find(sides: Sides<'_>, range: WidthRangePx, memory: &mut Vec<f32>) -> Opt
     });
     let best = best?;
     let mut rival: Option<EdgePair> = None;
-    each(sides, range, memory, |pair| {
+    each(sides, range, scratch, |pair| {
         let (inner, outer) =
             if pair.width_px < best.width_px { (pair, best) } else { (best, pair) };
         let fits = pair.strength >= MIN_RIVAL_RATIO * best.strength
@@ -123,12 +123,12 @@ fn is_within(sides: Sides<'_>, inner: &EdgePair, outer: &EdgePair) -> bool {
 fn each(
     sides: Sides<'_>,
     range: WidthRangePx,
-    memory: &mut Vec<f32>,
+    scratch: &mut Vec<f32>,
     mut visit: impl FnMut(EdgePair),
 ) {
     for (left, edge) in sides.lefts.all().iter().enumerate() {
         for (right, other) in sides.rights.all().iter().enumerate() {
-            let Some(width_px) = distance(edge, other, memory) else { continue };
+            let Some(width_px) = distance(edge, other, scratch) else { continue };
             if width_px < range.min || width_px > range.max {
                 continue;
             }
@@ -153,14 +153,14 @@ fn each(
 
 /// Median distance from one contour to another to its right \[px\]; `None`
 /// where they do not run side by side or cross.
-fn distance(left: &EdgeContour, right: &EdgeContour, memory: &mut Vec<f32>) -> Option<f32> {
-    memory.clear();
+fn distance(left: &EdgeContour, right: &EdgeContour, scratch: &mut Vec<f32>) -> Option<f32> {
+    scratch.clear();
     let both = left.at.iter().zip(&right.at);
-    memory.extend(both.filter_map(|(left, right)| Some((*right)? - (*left)?)));
-    if memory.len() * 5 < left.at.len() {
+    scratch.extend(both.filter_map(|(left, right)| Some((*right)? - (*left)?)));
+    if scratch.len() * 5 < left.at.len() {
         return None;
     }
-    rank::median(memory).filter(|&median| median > 0.0)
+    rank::median(scratch).filter(|&median| median > 0.0)
 }
 
 /// Depth of the deepest gap between two edges: a contour out of the bead,
@@ -226,15 +226,15 @@ mod tests {
     fn found(
         bars: &(EdgeContours, EdgeContours),
         range: WidthRangePx,
-        memory: &mut Vec<f32>,
+        scratch: &mut Vec<f32>,
     ) -> Option<EdgePair> {
-        find(Sides { lefts: &bars.0, rights: &bars.1 }, range, memory)
+        find(Sides { lefts: &bars.0, rights: &bars.1 }, range, scratch)
     }
 
     fn width(bars: &(EdgeContours, EdgeContours), range: WidthRangePx) -> Option<f32> {
-        let mut memory = Vec::new();
-        let pair = found(bars, range, &mut memory)?;
-        distance(&bars.0.all()[pair.left], &bars.1.all()[pair.right], &mut memory)
+        let mut scratch = Vec::new();
+        let pair = found(bars, range, &mut scratch)?;
+        distance(&bars.0.all()[pair.left], &bars.1.all()[pair.right], &mut scratch)
     }
 
     const WIDE: WidthRangePx = WidthRangePx { min: 10.0, max: 80.0 };
@@ -242,10 +242,10 @@ mod tests {
     #[test]
     fn two_beads_with_a_gap_are_as_likely_as_one_with_a_seam() {
         let bars = bars(&[(50, 75, 80), (85, 110, 80)]);
-        let mut memory = Vec::new();
-        let both = found(&bars, WIDE, &mut memory).unwrap();
+        let mut scratch = Vec::new();
+        let both = found(&bars, WIDE, &mut scratch).unwrap();
         assert!(both.rival_px.is_some(), "{both:?}");
-        let one = found(&bars, WidthRangePx { min: 10.0, max: 40.0 }, &mut memory).unwrap();
+        let one = found(&bars, WidthRangePx { min: 10.0, max: 40.0 }, &mut scratch).unwrap();
         assert!((one.width_px - 25.0).abs() < 0.5 && one.rival_px.is_none(), "{one:?}");
     }
 
@@ -263,10 +263,10 @@ mod tests {
     #[test]
     fn a_seam_is_no_edge_while_it_is_weak_and_leaves_two_widths_where_it_is_not() {
         let seamed = |level: u16| bars(&[(50, 70, 80), (70, 78, level), (78, 110, 80)]);
-        let mut memory = Vec::new();
+        let mut scratch = Vec::new();
         let mut pair = |level: u16| {
             let bars = seamed(level);
-            found(&bars, WIDE, &mut memory).unwrap()
+            found(&bars, WIDE, &mut scratch).unwrap()
         };
         let weak = pair(40);
         assert!((weak.width_px - 60.0).abs() < 0.5 && weak.rival_px.is_none(), "{weak:?}");
@@ -276,7 +276,7 @@ mod tests {
         assert!([20.0, 32.0].iter().any(|one: &f32| (rival - one).abs() < 0.5), "{strong:?}");
         let range = WidthRangePx { min: 45.0, max: 80.0 };
         let bars = seamed(16);
-        let alone = found(&bars, range, &mut memory).unwrap();
+        let alone = found(&bars, range, &mut scratch).unwrap();
         assert!((alone.width_px - 60.0).abs() < 0.5 && alone.rival_px.is_none(), "{alone:?}");
     }
 

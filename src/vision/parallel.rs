@@ -2,6 +2,7 @@
 //! distance from each other in more bands than any others belong to it, however
 //! the bead runs, and what covers an edge here and there does not.
 
+use crate::vision::buffer::reset;
 use std::ops::Range;
 
 /// Difference of the distances within which edges run side by side \[px\].
@@ -23,7 +24,7 @@ impl StepPair {
     }
 }
 
-/// Places of two edges side by side; keeps its memory from frame to frame.
+/// Positions of two edges side by side; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct ParallelEdges {
     spans: Vec<StepPair>,
@@ -67,8 +68,7 @@ impl ParallelEdges {
     /// Most bands that agree on a distance, and the middle of what they agree
     /// on \[px\].
     fn most_alike(&mut self, bands: usize) -> (usize, f32) {
-        self.within.clear();
-        self.within.resize(bands, 0);
+        reset(&mut self.within, bands, 0);
         let (mut first, mut count) = (0, 0);
         let mut best = (0, f32::NAN);
         for last in 0..self.spans.len() {
@@ -91,9 +91,8 @@ impl ParallelEdges {
 
     /// Takes the span of each band that comes nearest to a distance.
     fn pick(&mut self, bands: usize, width: f32) {
-        for places in [&mut self.lefts, &mut self.rights] {
-            places.clear();
-            places.resize(bands, f32::NAN);
+        for positions in [&mut self.lefts, &mut self.rights] {
+            reset(positions, bands, f32::NAN);
         }
         let mut nearest = f32::INFINITY;
         let mut band = usize::MAX;

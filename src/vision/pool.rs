@@ -7,9 +7,9 @@ use super::row_range::RowRange;
 use super::strip::{GaugeRows, GreyPixel};
 use crate::numeric::number::{to_f32, to_f64};
 
-/// Rows that a profile is the mean of: fewer are too noisy to tell a step
-/// from its surroundings when the contrast is low, more would smear slanted
-/// edges.
+/// Rows that a profile is the mean of: fewer are too noisy to distinguish a step from its
+/// surroundings when the contrast is low, more would smear slanted edges. By definition the four of
+/// [`GreyPixel::sum_of_four`].
 const ROWS_PER_PROFILE: usize = 4;
 
 /// Distance of such rows at most \[px\].
@@ -19,7 +19,8 @@ const MAX_ROW_DISTANCE: usize = 2;
 /// takes its time.
 const MAX_PROFILES: usize = 25;
 
-/// Bits that a profile's sums are cut to, so that four of them fit 15.
+/// Bits of a profile's sums. Derived: the sum of four such numbers fits the 15 bits of a positive
+/// `i16`: 4 · (2¹² − 1) < 2¹⁵.
 const PROFILE_BITS: u32 = 12;
 
 /// Pooled profiles, one a band, in whole numbers of a unit that is fine enough
@@ -59,7 +60,7 @@ impl Bands {
         self.bounds[band].middle()
     }
 
-    /// Share of the pixels at the upper end of the scale, from one row a band.
+    /// Fraction of the pixels at the upper end of the scale, from one row a band.
     pub fn saturated_fraction(&self) -> f64 {
         to_f64(self.full) / to_f64(self.pixels.max(1))
     }

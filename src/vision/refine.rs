@@ -11,6 +11,7 @@ use super::strip::{GaugeRows, GreyPixel};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::{floor_to_count, to_f32, to_f64};
 use crate::numeric::rank;
+use crate::vision::buffer::{refill, reset};
 
 /// Neighbours on either side that tell the local slope and levels.
 const NEIGHBOURS: usize = 4;
@@ -37,7 +38,7 @@ fn levels(fit: &EdgeFit) -> [f64; 3] {
     [fit.edge.ground, fit.edge.height, fit.edge.shading]
 }
 
-/// Refines one edge of the bead; keeps its memory from frame to frame.
+/// Refines one edge of the bead; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct LineRefiner {
     rough: Vec<Option<f64>>,
@@ -65,8 +66,7 @@ impl LineRefiner {
         rough: impl Iterator<Item = f64>,
     ) -> bool {
         self.bead_after = bead_after;
-        self.rough.clear();
-        self.rough.extend(rough.map(Some));
+        refill(&mut self.rough, rough.map(Some));
         self.half = half_window(3.0, task.width_px).max(8.min(widest_half(task.width_px)));
         self.read(task);
         let Some(blur) = self.fit_blur(task.table) else { return false };
@@ -88,10 +88,8 @@ impl LineRefiner {
     /// Reads the window of every band, along the local slope of the edge.
     fn read<T: GreyPixel>(&mut self, task: &RefinerInput<'_, T>) {
         let length = 2 * self.half + 1;
-        self.samples.clear();
-        self.samples.resize(length * self.rough.len(), 0.0);
-        self.firsts.clear();
-        self.firsts.resize(self.rough.len(), f64::NAN);
+        reset(&mut self.samples, length * self.rough.len(), 0.0);
+        reset(&mut self.firsts, self.rough.len(), f64::NAN);
         for band in 0..self.rough.len() {
             let Some(at) = self.rough[band] else { continue };
             let slope = self.slope(band, task.lines);
@@ -157,8 +155,8 @@ impl LineRefiner {
         }
         let length = 2 * self.half + 1;
         let window = &self.samples[band * length..(band + 1) * length];
-        for (place, &sample) in (0u32..).zip(window) {
-            self.profile.add(first + f64::from(place) - at, f64::from(sample));
+        for (position, &sample) in (0u32..).zip(window) {
+            self.profile.add(first + f64::from(position) - at, f64::from(sample));
         }
     }
 

@@ -1,7 +1,7 @@
 //! One edge of a bead whose edges are torn, or lie beside a groove or in
 //! texture: where it runs, row by row, without a model of its flank.
 //!
-//! The mean over the rows is the width's share of this edge. The profile along
+//! The mean over the rows is the width's fraction of this edge. The profile along
 //! the bead is signal (the bead's roughness); only pixel noise and texture are
 //! errors of the mean.
 //!
@@ -17,6 +17,7 @@ mod crossing;
 mod groove;
 mod kernel;
 mod levels;
+mod mean_profile;
 mod position_noise;
 mod rough_input;
 mod route;
@@ -29,7 +30,8 @@ use crate::numeric::number::{narrow_to_f32, to_f64};
 use crossing::SUMMED_INSIDE_PX;
 use groove::GrooveShape;
 pub use groove::MeanBlur;
-use levels::{Crossings, EdgeLevels, OUTSIDE_PX};
+use levels::{Crossings, EdgeLevels};
+use mean_profile::OUTSIDE_PX;
 pub use rough_input::RoughInput;
 use route::EdgeRoute;
 use window::{ALONG_PX, RowWindows, STRAIGHT_ROWS};
@@ -49,7 +51,7 @@ const BLUR_DIFFERENCE: f64 = 0.02;
 const FINE_ROUGHNESS_FRACTION: f64 = 0.2;
 
 /// How likely a groove that does not show its depth must be to be looked at, for it to be
-/// doubted that there is none, and for the shape of the whole flank to be doubted as well where
+/// uncertain that there is none, and for the shape of the whole flank to be uncertain as well where
 /// it lies so far from where rows pass half height \[px\]: of drawn edges beside weak narrow
 /// grooves, some that were taken for sloping ground lay 0.7 px off.
 const MIN_LIKELY_GROOVE: f64 = 0.18;
@@ -67,11 +69,11 @@ const MAX_GROOVE_WAVINESS_PX: f64 = 0.15;
 const NARROW_GROOVE_WAVINESS_FRACTION: f64 = 0.06;
 const MAX_NARROW_GROOVE_PX: f64 = 7.5;
 
-/// Standard deviation, beside that of noise, of where rows pass half height as the edge beside
-/// a groove \[px\]: its floor may be hidden, and torn edges have no Gaussian flank. Averaged
-/// with the groove's shape by their variances, the same piece of real concrete differs from
-/// frame to frame by 0.33 px in the median, with the shape alone by 0.36; beside rendered
-/// grooves the shape weighs nearly all.
+/// Standard deviation, beside that of noise, of where rows pass half height as the edge beside a
+/// groove \[px\]: its floor may be hidden, and torn edges have no Gaussian flank. Measured:
+/// ACCURACY.md, What the parts bring: averaged with the groove's shape by their variances, the same
+/// piece of real concrete differs from frame to frame by 0.33 px in the median, with the shape
+/// alone by 0.36.
 const GROOVE_CROSSING_SIGMA_PX: f64 = 0.5;
 
 /// Difference of the bead's level beside the edge from that farther inside, in standard
@@ -83,7 +85,7 @@ const SHIFT_FRACTION: f64 = 0.2;
 /// summed within the edge: a flank that is no blurred step lies farther.
 const MAX_LEVEL_SHIFT: f64 = 2.0;
 
-/// Finds one edge; keeps its memory from frame to frame.
+/// Finds one edge; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct RoughEdge {
     windows: RowWindows,
@@ -117,7 +119,7 @@ pub struct RoughFit {
     pub is_narrow_groove: bool,
     /// Whether what lies outside is as wide as ground.
     pub is_on_ground: bool,
-    /// Share of the pixels about the edge that show neither the bead nor what lies
+    /// Fraction of the pixels about the edge that show neither the bead nor what lies
     /// outside.
     pub odd_fraction: f64,
     /// The same of the bead farther inside: its texture's.
@@ -130,7 +132,7 @@ pub struct RoughFit {
 
 impl RoughFit {
     /// Whether the odd pixels about the edge exceed those of the bead's texture by such a
-    /// share.
+    /// fraction.
     pub fn exceeds_texture(&self, by: f64) -> bool {
         self.odd_fraction > self.odd_fraction_within + by
     }

@@ -30,10 +30,10 @@ use spectrum::{BLUR_FACTORS, FrameKind, Spectrum, lengths_mm};
 /// they are reported: what twenty to thirty correlation lengths of bead leave.
 const MAX_LOG_SIGMA: f64 = 0.3;
 const MAX_LENGTH_LOG_SIGMA: f64 = 0.65;
-/// By how much roughness must be more likely than noise alone, in the logarithm: three
-/// standard deviations.
+/// By how much roughness must be more likely than noise alone, in the logarithm. Derived: 3²/2,
+/// three standard deviations (likelihood ratio, Wilks 1938).
 const MIN_LOG_EVIDENCE: f64 = 4.5;
-/// Kinds of frames that are told apart at most; a run has one or two.
+/// Kinds of frames that are distinguished at most; a run has one or two.
 const MAX_KINDS: usize = 8;
 /// Part by which a smaller blur must be smaller to be taken over.
 const MIN_BLUR_DECREASE: f64 = 0.95;

@@ -7,9 +7,9 @@ use super::strip::GreyPixel;
 use super::trace::{EdgeTracer, TraceInput};
 use crate::numeric::number::floor_to_count;
 
-/// Share of a step that must lie below the end of the scale.
+/// Fraction of a step that must lie below the end of the scale.
 const MIN_VISIBLE_FRACTION: f64 = 0.4;
-/// Largest doubt about an edge's place that a hidden level may leave \[px\].
+/// Largest uncertainty about an edge's position that a hidden level may leave \[px\].
 const MAX_CLIPPED_SIGMA_PX: f64 = 0.2;
 /// Ground on either side of the bead that its noise is taken from, and its
 /// distance from the edges \[px\].
@@ -21,14 +21,14 @@ const NOISE_MARGIN_PX: f32 = 6.0;
 pub struct SaturatedBead<'a, T> {
     /// What is looked at, left and right.
     pub scenes: [TraceInput<'a, T>; 2],
-    /// Rough places of the left edge, band by band \[px\].
+    /// Rough positions of the left edge, band by band \[px\].
     pub lefts: &'a [Option<f32>],
     /// Those of the right edge.
     pub rights: &'a [Option<f32>],
 }
 
 impl<T: GreyPixel> SaturatedBead<'_, T> {
-    /// Traces edges that were looked at, of which these are cut off before or
+    /// Traces edges that were looked at, of which these are clipped before or
     /// after them. Returns the noise of a pixel \[grey levels\].
     #[cold]
     pub fn trace(
@@ -50,7 +50,7 @@ impl<T: GreyPixel> SaturatedBead<'_, T> {
     }
 
     /// Noise of the side that can be seen: of the bead, or of the ground beside
-    /// it. What is cut off has less.
+    /// it. What is clipped has less.
     fn visible_noise(&self, bead_is_hidden: bool) -> f32 {
         let strip = self.scenes[0].strip;
         let ((left, left_end), (right, right_end)) = (span(self.lefts), span(self.rights));
@@ -100,8 +100,8 @@ fn too_much_clipped(visible: f64) -> Reject {
     Reject::Blinded { visible, need: MIN_VISIBLE_FRACTION }
 }
 
-/// Lowest and highest of an edge's places.
-fn span(places: &[Option<f32>]) -> (f32, f32) {
+/// Lowest and highest of an edge's positions.
+fn span(positions: &[Option<f32>]) -> (f32, f32) {
     let none = (f32::INFINITY, 0.0);
-    places.iter().flatten().fold(none, |(low, high), &at| (low.min(at), f32::max(high, at)))
+    positions.iter().flatten().fold(none, |(low, high), &at| (low.min(at), f32::max(high, at)))
 }

@@ -11,11 +11,11 @@ use super::gamma::LightTable;
 use super::gauge::BeadAxis;
 use crate::numeric::number::to_f64;
 
-/// Side of the squares in which a region is turned: a row of one fits a register,
+/// Side of the squares in which a region is turned. Derived: 16 bytes fill a vector of 128 bits,
 /// and reading and writing stay in the cache.
 const TILE: usize = 16;
 
-/// The gauge laid over an image.
+/// The gauge placed over an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaugeView {
     roi: Roi,
@@ -156,10 +156,10 @@ impl<'a, T: GreyPixel> GaugeRows<'a, T> {
         after.fill(self.nearest(v, self.across.cast_signed()));
     }
 
-    /// The pixel of a row at a place, or the nearest one in the gauge.
+    /// The pixel of a row at a position, or the nearest one in the gauge.
     #[inline(always)]
-    pub fn nearest(&self, v: usize, place: isize) -> T {
-        self.row(v)[usize::try_from(place).unwrap_or(0).min(self.across - 1)]
+    pub fn nearest(&self, v: usize, position: isize) -> T {
+        self.row(v)[usize::try_from(position).unwrap_or(0).min(self.across - 1)]
     }
 }
 
@@ -222,17 +222,17 @@ fn to_light<'a, T: GreyPixel + Into<u16>>(
     strip: &GaugeRows<'_, T>,
     gamma: f64,
     linear: &mut Option<LightTable>,
-    memory: &'a mut Vec<u16>,
+    scratch: &'a mut Vec<u16>,
 ) -> GaugeRows<'a, u16> {
     let white = strip.white.into();
     let known = linear.take().filter(|linear| linear.is_for(gamma, white));
     let linear = linear.insert(known.unwrap_or_else(|| LightTable::new(gamma, white)));
-    memory.clear();
+    scratch.clear();
     for v in 0..strip.along {
-        memory.extend(strip.row(v).iter().map(|&level| linear.light(level.into())));
+        scratch.extend(strip.row(v).iter().map(|&level| linear.light(level.into())));
     }
     GaugeRows {
-        values: memory,
+        values: scratch,
         stride: strip.across,
         across: strip.across,
         along: strip.along,
@@ -247,14 +247,14 @@ fn lay<'a, T: GreyPixel>(
     image_width: usize,
     view: &GaugeView,
     white: T,
-    memory: &'a mut Vec<T>,
+    scratch: &'a mut Vec<T>,
 ) -> GaugeRows<'a, T> {
     let first = view.roi.y * image_width + view.roi.x;
     let (values, stride) = match view.axis {
         BeadAxis::Vertical => (&values[first..], image_width),
         BeadAxis::Horizontal => {
-            turn(&values[first..], image_width, view, memory);
-            (memory.as_slice(), view.across)
+            turn(&values[first..], image_width, view, scratch);
+            (scratch.as_slice(), view.across)
         }
     };
     let scale = 255.0 / T::sum_to_f32(white.add_to(T::Sum::default())).max(1.0);
@@ -264,8 +264,8 @@ fn lay<'a, T: GreyPixel>(
 
 /// Writes columns of the region as rows, tile by tile; what is left at the ends
 /// pixel by pixel.
-fn turn<T: GreyPixel>(values: &[T], image_width: usize, view: &GaugeView, memory: &mut Vec<T>) {
-    memory.resize(view.across * view.along, T::default());
+fn turn<T: GreyPixel>(values: &[T], image_width: usize, view: &GaugeView, scratch: &mut Vec<T>) {
+    scratch.resize(view.across * view.along, T::default());
     let whole = |side: usize| side - side % TILE;
     for u in (0..whole(view.across)).step_by(TILE) {
         for v in (0..whole(view.along)).step_by(TILE) {
@@ -275,14 +275,14 @@ fn turn<T: GreyPixel>(values: &[T], image_width: usize, view: &GaugeView, memory
             }
             let tile = transposed(tile);
             for (k, row) in tile.iter().enumerate() {
-                memory[(v + k) * view.across + u..][..TILE].copy_from_slice(row);
+                scratch[(v + k) * view.across + u..][..TILE].copy_from_slice(row);
             }
         }
     }
     for v in 0..view.along {
         let from = if v < whole(view.along) { whole(view.across) } else { 0 };
         for u in from..view.across {
-            memory[v * view.across + u] = values[u * image_width + v];
+            scratch[v * view.across + u] = values[u * image_width + v];
         }
     }
 }

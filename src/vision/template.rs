@@ -1,4 +1,4 @@
-//! What a blurred edge is in the pixels of a row, tabulated for places between
+//! What a blurred edge is in the pixels of a row, tabulated for positions between
 //! two pixels, and with it what a row says of the edge.
 
 use std::ops::Range;
@@ -12,15 +12,15 @@ use crate::numeric::number::{floor_to_count, to_f64};
 
 pub mod textured;
 
-/// Pixels that are taken together.
+/// Pixels that are taken together. Derived: 16 floats fill a vector of 512 bits.
 const LANES: usize = 16;
-/// Places between two pixels for which the edge is tabulated.
+/// Positions between two pixels for which the edge is tabulated.
 const SUBPIXEL_PHASES: usize = 8;
-/// Chunks of the core at most: a blur of 12 px and more is cut short.
-const MAX_CORE_CHUNKS: usize = 6;
+/// Chunks of the core at most: a blur of 13 px and more is cut short. By definition all.
+const MAX_CORE_CHUNKS: usize = MAX_CHUNKS;
 /// Chunks of the surroundings on either side at most.
 const MAX_PLAIN_CHUNKS: usize = 2;
-/// Chunks at most: what the overlay reaches, rounded up.
+/// Chunks at most. Derived: 96/16, what an overlay reaches.
 const MAX_CHUNKS: usize = 6;
 /// Half the core, in blurs and pixels beside.
 const CORE_BLURS: f64 = 3.5;
@@ -33,11 +33,11 @@ type Chunk = [f32; LANES];
 /// One chunk of pixels of the template.
 #[derive(Debug, Clone, Copy, Default)]
 struct TemplateChunk {
-    /// Share of the step that is reached, with shading.
+    /// Fraction of the step that is reached, with shading.
     step: Chunk,
     /// 1 where the pixel counts.
     mask: Chunk,
-    /// The pure step's share, where the pixel counts.
+    /// The pure step's fraction, where the pixel counts.
     after: Chunk,
     /// Slope of the step \[1/px\], where the pixel counts.
     slope: Chunk,
@@ -64,7 +64,7 @@ pub struct StepTemplate {
     pub products: Products,
 }
 
-/// What a row says: how far it is from the levels and the place it was
+/// What a row says: how far it is from the levels and the position it was
 /// expected to have.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RowSums {
@@ -72,9 +72,9 @@ pub struct RowSums {
     pub slope: f32,
     /// Sum of the squared residuals.
     pub sum_of_squares: f32,
-    /// Residual times the share before the edge.
+    /// Residual times the fraction before the edge.
     pub before: f32,
-    /// Residual times the share after it.
+    /// Residual times the fraction after it.
     pub after: f32,
     /// Pixels that lie too far off to be noise; they count as fitting.
     pub wild: f32,
@@ -101,13 +101,13 @@ impl PlainSums {
     }
 }
 
-/// Place and levels that a row is held against.
+/// Position and levels that a row is compared with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExpectedStep {
     /// Position of the edge \[px\], within a sixteenth of a pixel of the one that
     /// was asked for: a pixel and a phase.
     pub at: f32,
-    place: isize,
+    position: isize,
     phase: usize,
     /// Level before it \[grey levels\].
     pub before: f32,
@@ -116,21 +116,21 @@ pub struct ExpectedStep {
     /// Plain pixels farther from their level are grains or sparks
     /// \[grey levels\].
     pub tolerance: f32,
-    /// The same for pixels of the step, where the place may be off a little
+    /// The same for pixels of the step, where the position may be off a little
     /// \[grey levels\].
     pub tolerance_at_step: f32,
 }
 
 impl ExpectedStep {
-    /// A place, the level before it and the step to the level after it, and how
+    /// A position, the level before it and the step to the level after it, and how
     /// far pixels may be off beside the step and on it.
     #[inline(always)]
     pub fn new([at, before, step]: [f32; 3], tolerances: [f32; 2]) -> Self {
-        let (place, phase) = split(at, SUBPIXEL_PHASES);
-        #[expect(clippy::cast_precision_loss, reason = "a place near the gauge, few phases")]
-        let at = place as f32 + phase as f32 / SUBPIXEL_PHASES as f32;
+        let (position, phase) = split(at, SUBPIXEL_PHASES);
+        #[expect(clippy::cast_precision_loss, reason = "a position near the gauge, few phases")]
+        let at = position as f32 + phase as f32 / SUBPIXEL_PHASES as f32;
         let [tolerance, tolerance_at_step] = tolerances;
-        Self { at, place, phase, before, step, tolerance, tolerance_at_step }
+        Self { at, position, phase, before, step, tolerance, tolerance_at_step }
     }
 }
 
@@ -197,7 +197,7 @@ impl StepTemplate {
         [count(&parts[..self.core.start]), count(&parts[self.core.end..])]
     }
 
-    /// Holds a window against the edge; `None` where the edge lies too near its
+    /// Compares a window with the edge; `None` where the edge lies too near its
     /// end.
     #[inline(always)]
     pub fn compare(
@@ -206,9 +206,9 @@ impl StepTemplate {
         expected: &ExpectedStep,
         plain: &mut PlainSums,
     ) -> Option<RowSums> {
-        let ExpectedStep { place, phase, .. } = *expected;
+        let ExpectedStep { position, phase, .. } = *expected;
         let reach = (self.core.start * LANES + self.core.len() * LANES / 2).cast_signed();
-        let start = usize::try_from(place - reach - first).ok()?;
+        let start = usize::try_from(position - reach - first).ok()?;
         let pixels = pixels.get(start..start + self.chunks * LANES)?;
         let parts = &self.parts[phase * MAX_CHUNKS..][..self.chunks];
         let (before, rest) = parts.split_at(self.core.start);
@@ -356,13 +356,50 @@ impl Products {
     }
 
     fn mean(self) -> Self {
-        let share = 1.0 / to_f64(SUBPIXEL_PHASES);
-        let others = self.others.map(|other| share * other);
-        Self { slope_slope: share * self.slope_slope, others, pixels: share * self.pixels }
+        let fraction = 1.0 / to_f64(SUBPIXEL_PHASES);
+        let others = self.others.map(|other| fraction * other);
+        Self { slope_slope: fraction * self.slope_slope, others, pixels: fraction * self.pixels }
     }
 }
 
 /// Chunks that hold so many pixels.
 fn chunks(pixels: f64) -> usize {
     floor_to_count((pixels.max(0.0) / to_f64(LANES)).ceil())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vision::overlay::{BlurredStep, Extent, NeighbourSteps, SideShading};
+
+    /// A parabola that begins at the edge is, blurred, (x² + s²)Φ(x/s) + xsφ(x/s).
+    #[test]
+    fn the_table_is_the_blurred_step_with_its_shading_and_bend() {
+        let (blur, slope, bend) = (1.6f64, 0.01, -0.0004);
+        let shape = StepShape {
+            step: BlurredStep { at: 0.0, blur, before: 0.0, after: 1.0 },
+            extent: Extent { before: 20.0, after: 20.0 },
+            shading: [SideShading::default(), SideShading { slope, bend }],
+            flanks: NeighbourSteps::default(),
+            variance: 0.0,
+        };
+        let mut template = StepTemplate::default();
+        template.tabulate(&StepTable::default(), &shape, false);
+        let middle =
+            to_f64(template.core.start * LANES) + to_f64(template.core.len() * LANES) / 2.0;
+        for phase in [0, 3] {
+            for k in template.core.start * LANES..template.core.end * LANES {
+                let x = to_f64(k) - middle - offset(phase, SUBPIXEL_PHASES);
+                let z = x / blur;
+                let step = 0.5 * libm::erfc(-z / 2f64.sqrt());
+                let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
+                let line = x * step + blur * density;
+                let parabola = (x * x + blur * blur) * step + x * blur * density;
+                let expected = step + slope * line + bend * parabola;
+                let part = &template.parts[phase * MAX_CHUNKS + k / LANES];
+                let found = f64::from(part.step[k % LANES]);
+                assert!((found - expected).abs() < 1e-3, "{x}: {found} {expected}");
+            }
+        }
+    }
 }

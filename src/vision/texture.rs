@@ -1,5 +1,5 @@
-//! Texture of bead and ground, a random pattern that hangs together over a few
-//! pixels: whether there is one in the rows laid over each other, how strong it
+//! Texture of bead and ground, a random pattern that is correlated over a few
+//! pixels: whether there is one in the superimposed rows, how strong it
 //! is and how far it reaches.
 
 use std::sync::LazyLock;
@@ -15,14 +15,15 @@ const MIN_VARIANCE_RATIO: f64 = 1.12;
 /// step or does not lie where it is thought; by more than so many times, and it
 /// is not texture that makes them differ.
 const MAX_EDGE_RATIO: f64 = 1.6;
-/// Least variance of a texture, in that of the noise.
+/// Smallest variance of a texture, in that of the noise.
 const MIN_TEXTURE_RATIO: f64 = 0.1;
 /// Longest texture \[px\]: what changes more slowly is light, or the bead's
 /// shape, which the levels of the caliper lines follow.
 const MAX_LENGTH_PX: f64 = 11.0;
 /// Variance of the texture on one side over that on the other below which they differ.
 const MAX_SIDE_RATIO: f64 = 0.25;
-/// Samples beyond so many standard deviations are grains and sparks.
+/// Samples beyond so many standard deviations are grains and sparks. Derived: noise alone exceeds 4
+/// in 6 of 100,000 samples.
 const OUTLIER_SIGMAS: f64 = 4.0;
 /// Rows that differ by so many medians of what rows do have one on them.
 const MAX_ROW_MISFIT: f32 = 4.0;
@@ -30,7 +31,7 @@ const MAX_ROW_MISFIT: f32 = 4.0;
 const LAGS: usize = 8;
 /// Samples of a side that are needed for that.
 const MIN_SIDE_PX: usize = 2 * LAGS;
-/// Longest stretch of a row on one side of the edge \[px\].
+/// Longest segment of a row on one side of the edge \[px\].
 const MAX_SIDE_PX: usize = 40;
 
 /// Autocorrelations exp(−(r/length)^power) that are tried, up to 19 px.
@@ -40,7 +41,7 @@ const FIRST_LENGTH_PX: f64 = 0.7;
 const LENGTH_RATIO: f64 = 1.12;
 /// Rows of a window at most; more are taken for so many.
 const MAX_ROWS: usize = 8;
-/// Table of their integrals along the edge: places for a length, lengths.
+/// Table of their integrals along the edge: positions for a length, lengths.
 const PER_LENGTH: usize = 8;
 const TABLE_LENGTHS: usize = 12;
 
@@ -51,11 +52,11 @@ pub struct SurfaceTexture {
     pub noise: f64,
     /// Variance of the texture.
     variance: f64,
-    /// Distance over which it hangs together \[px\].
+    /// Distance over which it is correlated \[px\].
     length: f64,
     /// Which of [`POWERS`] its autocorrelation has.
     power: usize,
-    /// Rows of a window, and the share of the texture that is left of it in
+    /// Rows of a window, and the fraction of the texture that is left of it in
     /// their mean.
     rows: f64,
     kept_fraction: f64,
@@ -64,9 +65,9 @@ pub struct SurfaceTexture {
 }
 
 impl SurfaceTexture {
-    /// Reads it from windows laid over each other, `None` where there is no
+    /// Reads it from windows superimposed, `None` where there is no
     /// texture to speak of. `noise` is the variance of a pixel, all variances
-    /// are in squared shares of the step; `beside` are the pixels that are free of
+    /// are as squared fractions of the step; `beside` are the pixels that are free of
     /// the edge, before it and after it.
     #[inline(always)]
     pub fn read(overlay: &Overlay, noise: f64, beside: [SideRange; 2]) -> Option<Self> {
@@ -113,7 +114,7 @@ impl SurfaceTexture {
         (rows * kept * variance > MIN_TEXTURE_RATIO * noise).then_some(texture)
     }
 
-    /// With grey levels instead of shares of a step.
+    /// With grey levels instead of fractions of a step.
     pub fn in_grey(self, step: f64) -> Self {
         let square = step * step;
         Self { noise: square * self.noise, variance: square * self.variance, ..self }
@@ -129,7 +130,7 @@ impl SurfaceTexture {
         self.noise / self.rows
     }
 
-    /// Standard deviation where a share of the edge's step is reached, over the root of its
+    /// Standard deviation where a fraction of the edge's step is reached, over the root of its
     /// mean square before and after the edge.
     pub fn level_at(&self, step: f64) -> f64 {
         let [before, after] = self.sides;
@@ -218,11 +219,11 @@ fn covariances(overlay: &Overlay, beside: [SideRange; 2], limit: f64) -> Option<
     }
     // The mean that is taken off has some of every window in it.
     let (_, windows) = overlay.laid();
-    let share = windows / (windows - 1.0).max(1.0);
+    let fraction = windows / (windows - 1.0).max(1.0);
     for (sum, count) in sums.iter_mut().zip(counts) {
-        *sum *= share / count;
+        *sum *= fraction / count;
     }
-    Some(Covariances { all: sums, sides: sides.map(|side| side.map(|sum: f64| share * sum)) })
+    Some(Covariances { all: sums, sides: sides.map(|side| side.map(|sum: f64| fraction * sum)) })
 }
 
 #[inline(always)]
@@ -278,14 +279,14 @@ impl TextureTables {
     fn fit(&self, covariances: &[f64; LAGS + 1], rows: f64) -> AutocorrelationFit {
         let rows = rows.clamp(1.0, to_f64(MAX_ROWS));
         let fewer = (1..MAX_ROWS).rfind(|&few| to_f64(few) <= rows).unwrap_or(1);
-        let share = rows - to_f64(fewer);
+        let fraction = rows - to_f64(fewer);
         let (fewer, more) = (&self.windows[fewer - 1], &self.windows[fewer.min(MAX_ROWS - 1)]);
         let mut best = 0.0;
         let mut fit =
             AutocorrelationFit { power: 0, length: FIRST_LENGTH_PX, variance: 0.0, kept: 1.0 };
         for (power, (fewer, more)) in fewer.iter().zip(more).enumerate() {
             for (number, (fewer, more)) in fewer.iter().zip(more).enumerate() {
-                let model = |lag: usize| fewer[lag] + share * (more[lag] - fewer[lag]);
+                let model = |lag: usize| fewer[lag] + fraction * (more[lag] - fewer[lag]);
                 let (mut product, mut square) = (0.0, 0.0);
                 for (lag, found) in covariances.iter().enumerate().skip(1) {
                     let model = model(lag);
@@ -306,13 +307,13 @@ impl TextureTables {
     /// Autocorrelation of a texture of length 1 at a distance across, summed up
     /// along the edge.
     fn along(&self, power: usize, distance: f64) -> f64 {
-        let place = distance * to_f64(PER_LENGTH);
-        let below = floor_to_count(place);
+        let position = distance * to_f64(PER_LENGTH);
+        let below = floor_to_count(position);
         let values = &self.integrals[power];
         let (Some(here), Some(next)) = (values.get(below), values.get(below + 1)) else {
             return 0.0;
         };
-        here + (place - to_f64(below)) * (next - here)
+        here + (position - to_f64(below)) * (next - here)
     }
 }
 
@@ -333,8 +334,8 @@ fn of_windows(rows: usize) -> OfWindows {
 /// distances across.
 fn sums_along(power: f64) -> [f64; TABLE_LENGTHS * PER_LENGTH + 1] {
     let step = 1.0 / to_f64(PER_LENGTH);
-    std::array::from_fn(|place| {
-        let across = step * to_f64(place);
+    std::array::from_fn(|position| {
+        let across = step * to_f64(position);
         let at = |k: usize| correlation(across.hypot(step * to_f64(k)), power);
         step * (1..TABLE_LENGTHS * PER_LENGTH).fold(at(0), |sum, k| sum + 2.0 * at(k))
     })

@@ -1,6 +1,6 @@
-//! One edge of the bead, from rough places to sub-pixel ones with their
-//! variances: its profile is read from rows laid over each other, every row is
-//! held against it, and the rows of a band are solved for place and levels
+//! One edge of the bead, from rough positions to sub-pixel ones with their
+//! variances: its profile is read from superimposed rows, every row is
+//! compared with it, and the rows of a band are solved for position and levels
 //! together.
 
 mod band_levels;
@@ -28,6 +28,7 @@ use super::strip::{GaugeRows, GreyPixel};
 use super::texture::SurfaceTexture;
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::{narrow_to_f32, to_f32, to_f64};
+use crate::vision::buffer::{refill, reset};
 use parts::{
     BandValues, EdgeState, EdgeUncertainty, Occlusion, RowFit, TexturedFit, TraceScratch,
     WindingState,
@@ -38,15 +39,13 @@ use parts::{
 const MAX_PASSES: usize = 3;
 /// Distance of the path from the edge from which on pixels are read anew \[px\].
 const MAX_PATH_OFFSET_PX: f64 = 4.0;
-/// Share of the blur by which a path may be off.
+/// Fraction of the blur by which a path may be off.
 const MAX_PATH_ERROR_BLURS: f64 = 0.2;
-/// Standard deviations beyond which a pixel or a row is not noise.
-const NOISE_SIGMAS: f32 = 4.5;
 /// Rows that are taken together at most.
 const MAX_GROUP_ROWS: usize = 8;
-/// Misfit up to which an edge is a blurred step for certain.
+/// Misfit up to which an edge is a blurred step certainly.
 const MAX_STEP_MISFIT: f64 = 1.5;
-/// Share of the rows from which on an edge is taken to be covered in part.
+/// Fraction of the rows from which on an edge is taken to be covered in part.
 const MAX_UNFIT_FRACTION: f64 = 0.03;
 /// Misfit of the clear rows from which on the edge is not covered, but no blurred
 /// step at all.
@@ -71,7 +70,7 @@ pub struct TraceInput<'a, T> {
     pub bead_after: bool,
 }
 
-/// Traces one edge of the bead; keeps its memory from frame to frame.
+/// Traces one edge of the bead; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct EdgeTracer {
     values: BandValues,
@@ -97,7 +96,7 @@ pub struct EdgeTracer {
     state: EdgeState,
     /// Fraction of the rows that certainly show something other than the edge.
     pub unfit_fraction: f64,
-    /// What a row in the median leaves of the step that it is held against, in
+    /// What a row in the median leaves of the step that it is compared with, in
     /// standard deviations of its noise; about 1 where the edge is one.
     pub misfit: f64,
     /// Rows that were held together at most.
@@ -106,15 +105,14 @@ pub struct EdgeTracer {
     pub blur_px: f64,
     /// Whether ground lies beside it, no groove.
     pub is_on_ground: bool,
-    /// How sure its places are, beside what each says.
+    /// How sure its positions are, beside what each says.
     pub uncertainty: EdgeUncertainty,
 }
 
 impl EdgeTracer {
-    /// Takes over places that were found without a model of the flank.
-    pub fn take_rough(&mut self, places: &[Option<CaliperEdge>], fit: &RoughFit) {
-        self.edges.clear();
-        self.edges.extend_from_slice(places);
+    /// Takes over positions that were found without a model of the flank.
+    pub fn take_rough(&mut self, positions: &[Option<CaliperEdge>], fit: &RoughFit) {
+        refill(&mut self.edges, positions.iter().copied());
         self.blur_px = fit.blur_px;
         let uncertainty = &mut self.uncertainty;
         (uncertainty.common_variance, uncertainty.mean_variance) = (0.0, Some(fit.variance));
@@ -124,18 +122,18 @@ impl EdgeTracer {
         self.is_on_ground = fit.is_on_ground && !fit.is_groove;
     }
 
-    /// Share of all rows that the edges come from.
+    /// Fraction of all rows that the edges come from.
     pub fn used_fraction(&self) -> f64 {
         let used: f64 = self.edges.iter().flatten().map(|edge| edge.row_fraction).sum();
         used / to_f64(self.edges.len().max(1))
     }
 
-    /// Mean of the edges' places across the bead \[px\].
+    /// Mean of the edges' positions across the bead \[px\].
     pub fn middle(&self) -> f64 {
         located::mean_position(&self.edges)
     }
 
-    /// Whether the edge's places are known.
+    /// Whether the edge's positions are known.
     pub fn is_located(&self) -> bool {
         self.state != EdgeState::NotFound
     }
@@ -165,12 +163,13 @@ impl EdgeTracer {
             && self.misfit < MAX_STEP_MISFIT
     }
 
-    /// Where the edge is expected at a place along it \[px\].
+    /// Where the edge is expected at a position along it \[px\].
     pub fn expected_at(&self, v: f64) -> f32 {
         self.course.at(narrow_to_f32(v))[0]
     }
 
-    /// Looks at the edge along rough places, one a band: its blur. `None` where there is no edge.
+    /// Looks at the edge along rough positions, one a band: its blur. `None` where there is no
+    /// edge.
     #[inline(always)]
     pub fn fit_first<T: GreyPixel>(
         &mut self,
@@ -178,8 +177,8 @@ impl EdgeTracer {
         rough: impl Iterator<Item = Option<f32>>,
     ) -> Option<BlurEstimate> {
         self.edges.clear();
-        let places = &mut self.uncertainty;
-        (places.mean_variance, places.along_px, places.lines_fraction) = (None, 0.0, 1.0);
+        let positions = &mut self.uncertainty;
+        (positions.mean_variance, positions.along_px, positions.lines_fraction) = (None, 0.0, 1.0);
         self.is_on_ground = true;
         self.step_fit = None;
         self.values.path.clear();
@@ -188,8 +187,7 @@ impl EdgeTracer {
         (self.occlusion.sort_rows, self.unfit_fraction) = (false, 0.0);
         (self.winding.is_followed, self.winding.excess) = (false, 0.0);
         self.occlusion.clear.clear();
-        self.values.picked.clear();
-        self.values.picked.extend(rough.map(|at| at.unwrap_or(f32::NAN)));
+        refill(&mut self.values.picked, rough.map(|at| at.unwrap_or(f32::NAN)));
         if !self.take_picked(scene) {
             return None;
         }
@@ -214,7 +212,7 @@ impl EdgeTracer {
     }
 
     /// Whether a narrow groove may lie beside the edge, after it or before it. `noise` is the
-    /// standard deviation of a pixel in shares of the step.
+    /// standard deviation of a pixel as fractions of the step.
     pub fn is_beside_groove(&self, after: bool, noise: f64) -> bool {
         self.misfit.is_finite() && self.overlay.rises_beside(after, noise)
     }
@@ -226,7 +224,7 @@ impl EdgeTracer {
         self.overlay.with(table).skew(self.step_fit.as_ref().filter(|_| is_step)?)
     }
 
-    /// Looks at the same rows once more, with another shape of the blur, from a look at
+    /// Looks at the same rows once more, with another shape of the blur, from a fit to
     /// them on or from nothing. What is known of a texture stays.
     #[inline(always)]
     pub fn refit<T: GreyPixel>(
@@ -242,7 +240,7 @@ impl EdgeTracer {
         fitter.first_fit(self.step_fit?.pixel_noise, self.room(scene))
     }
 
-    /// Draws the path through the picked places, as far as they are not wild, with
+    /// Draws the path through the picked positions, as far as they are no outliers, with
     /// the levels beside it. Returns whether there is any.
     #[inline(always)]
     fn take_picked<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
@@ -375,12 +373,11 @@ impl EdgeTracer {
         let width_px = f64::from(scene.width_px);
         let task =
             RefinerInput { strip: scene.strip, table: scene.table, lines: scene.lines, width_px };
-        // A blurred step that does not fit says nothing of the place either.
+        // A blurred step that does not fit says nothing of the position either.
         if !self.take_picked(scene) {
             return false;
         }
-        self.edges.clear();
-        self.edges.resize(scene.lines.len(), None);
+        reset(&mut self.edges, scene.lines.len(), None);
         let course = &self.course;
         let rough =
             scene.lines.iter().map(|&line| f64::from(course.at(narrow_to_f32(line.middle()))[0]));
@@ -392,8 +389,8 @@ impl EdgeTracer {
         found
     }
 
-    /// How far there is nothing but this edge for certain: up to the gauge's
-    /// border and to the middle of the bead.
+    /// How far there is nothing but this edge certainly: up to the gauge's
+    /// boundary and to the middle of the bead.
     fn room<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> Extent {
         let (low, high) =
             self.values.path.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &at| {
@@ -428,7 +425,7 @@ impl EdgeTracer {
     }
 
     /// Moves what is expected aside and takes other levels: those before and after
-    /// the edge as shares of the step.
+    /// the edge as fractions of the step.
     fn shift_course(&mut self, aside: f64, before: f64, after: f64) {
         let [aside, before, after] = [aside, before, after].map(narrow_to_f32);
         self.course.correct(EdgeCorrection { aside, before, after });
@@ -450,7 +447,7 @@ impl EdgeTracer {
         self.fill_from_edges(scene);
         path::median_of_three(&mut self.scratch.rough);
         if self.textured.texture.is_some() && !self.winding.is_followed {
-            // What the texture makes of a place is no path.
+            // What the texture makes of a position is no path.
             path::smooth(&self.scratch.rough, &mut self.scratch.sorted);
             std::mem::swap(&mut self.scratch.rough, &mut self.scratch.sorted);
         }
@@ -462,3 +459,6 @@ impl EdgeTracer {
 fn typical(values: &[f32]) -> f32 {
     values.iter().sum::<f32>() / to_f32(values.len().max(1))
 }
+
+#[cfg(test)]
+mod tests;

@@ -8,11 +8,11 @@ use crate::core::geometry::SurfacePoint;
 use crate::numeric::gauss_legendre::GAUSS_LEGENDRE_5;
 use crate::vision::curve::Curve;
 
-/// Distance of the places from which an edge's direction and bend on the
+/// Distance of the positions from which an edge's direction and bend on the
 /// surface are taken.
 const DIFFERENCE_STEP: f64 = 0.15;
 
-/// An edge about a place, on the surface.
+/// An edge about a position, on the surface.
 struct LocalEdge {
     at: SurfacePoint,
     slope: Vector2<f64>,
@@ -76,12 +76,12 @@ impl Sections {
             let middle = nalgebra::center(&left.at, &right.at);
             let across = right.crossing(middle, axis) - left.crossing(middle, axis);
             let width = across.norm();
-            let share = 0.5 * weight;
-            sections.mean += share * width;
-            sections.terms[0] += share * width;
-            sections.terms[1] += 3.0 * share * width * t;
-            sections.terms[2] += 5.0 * share * width * (1.5 * t * t - 0.5);
-            let oblique = share * (right.at - left.at).dot(&axis);
+            let fraction = 0.5 * weight;
+            sections.mean += fraction * width;
+            sections.terms[0] += fraction * width;
+            sections.terms[1] += 3.0 * fraction * width * t;
+            sections.terms[2] += 5.0 * fraction * width * (1.5 * t * t - 0.5);
+            let oblique = fraction * (right.at - left.at).dot(&axis);
             sections.oblique += oblique;
             sections.oblique_by_bend += 3.0 * t * scene.cosine_squared(curves, t) * oblique;
         }
@@ -109,7 +109,7 @@ impl Sections {
         Some(())
     }
 
-    /// Width at a place along the gauge \[mm\].
+    /// Width at a position along the gauge \[mm\].
     pub fn at(&self, t: f64) -> f64 {
         self.terms[0] + self.terms[1] * t + self.terms[2] * (1.5 * t * t - 0.5)
     }

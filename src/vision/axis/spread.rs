@@ -8,10 +8,10 @@ use crate::vision::located::CaliperEdge;
 use crate::vision::scatter::{self, EdgeResidual};
 use crate::vision::waviness::{CURVE_ORDERS, Evidence, Midline, ORDERS, WaveKind, legendre, norm};
 
-/// Share of the rows from which on nothing but the bead itself is seen.
+/// Fraction of the rows from which on nothing but the bead itself is seen.
 const MIN_COMPLETE_FRACTION: f64 = 0.98;
 /// Inflation of a variance that an edge's misfit may hide, and by how much more
-/// for what it shows: a texture's shift of an edge hangs together over so many
+/// for what it shows: a texture's shift of an edge is correlated over so many
 /// rows.
 const MIN_INFLATION_LIMIT: f64 = 1.2;
 const INFLATION_PER_MISFIT: f64 = 15.0;
@@ -31,9 +31,9 @@ pub struct CutBead<'a> {
 
 /// How sure the width is, and how rough the bead.
 pub struct WidthUncertainty {
-    /// Standard deviation of the width \[mm\], without the calibration's share.
+    /// Standard deviation of the width \[mm\], without the calibration's fraction.
     pub sigma: f64,
-    /// What the doubt about the axis' direction takes from the width in the
+    /// What the uncertainty about the axis' direction takes from the width in the
     /// mean: an axis that is off by an angle shows 1 − angle²/2 of it \[mm\].
     pub shortened: f64,
 }
@@ -65,7 +65,7 @@ impl WidthUncertainty {
         Self { sigma: (variance + of_tilt).sqrt(), shortened }
     }
 
-    /// By how much the doubt about the axis' direction makes the width too
+    /// By how much the uncertainty about the axis' direction makes the width too
     /// short, and the variance that it leaves.
     fn tilt_bias_and_variance(cut: &CutBead<'_>, scratch: &mut WidthScratch) -> (f64, f64) {
         let &CutBead { scene, curves, sections } = cut;
@@ -96,7 +96,7 @@ impl WidthUncertainty {
     }
 
     /// Standard deviation of the width along the gauge, without the noise of
-    /// its places.
+    /// its positions.
     fn roughness(cut: &CutBead<'_>, scratch: &WidthScratch, noise: f64) -> f64 {
         let &CutBead { scene, sections, .. } = cut;
         let (mut square, mut n) = (0.0, 0.0);
@@ -111,7 +111,7 @@ impl WidthUncertainty {
     }
 
     /// The bands that are missing hide bead that counts; its waviness is an error then,
-    /// which hangs together over neighbouring bands. Each edge has half of it.
+    /// which is correlated over neighbouring bands. Each edge has half of it.
     fn variance_of_gaps(cut: &CutBead<'_>, roughness: f64, scratch: &mut WidthScratch) -> f64 {
         let &CutBead { scene, sections, .. } = cut;
         let mut variance = 0.0;
@@ -134,7 +134,7 @@ impl WidthUncertainty {
     /// Variances of the axis' direction in the middle \[rad²\] and of its bend in
     /// halves of the gauge: where lines across the gauge run obliquely to the bead,
     /// an axis that is off takes them for longer or shorter. From how far the
-    /// middles lie off their course, and over how many bands that hangs together.
+    /// middles lie off their course, and over how many bands that is correlated.
     fn tilt_variances(cut: &CutBead<'_>, scratch: &mut WidthScratch) -> [f64; 2] {
         let &CutBead { scene, curves, .. } = cut;
         let WidthScratch { off: [left, right], values } = scratch;
@@ -151,17 +151,17 @@ impl WidthUncertainty {
 }
 
 impl LocatedEdge<'_> {
-    /// By how much places with gaps between them scatter more than noise
+    /// By how much positions with gaps between them scatter more than noise
     /// explains.
     fn inflation_with_gaps(&self, off: &[Option<f64>], curve: &Curve, per_place: f64) -> f64 {
-        let places = off.iter().zip(self.positions);
-        let places = places.filter_map(|(off, located)| {
+        let positions = off.iter().zip(self.positions);
+        let positions = positions.filter_map(|(off, located)| {
             Some(EdgeResidual { px: (*off)?, row_fraction: located.as_ref()?.row_fraction })
         });
-        scatter::inflation_with_gaps(places, per_place, curve.count)
+        scatter::inflation_with_gaps(positions, per_place, curve.count)
     }
 
-    /// Most that neighbouring places can hang together: what moves an edge,
+    /// Most that neighbouring positions can are correlated: what moves an edge,
     /// unless it is the bead itself, leaves a misfit. Edges that are covered
     /// here and there may hide anything.
     fn max_inflation(&self) -> f64 {
@@ -188,13 +188,13 @@ impl WidthInput<'_> {
         let &CutBead { curves, sections, .. } = cut;
         let mut off = [[0.0; ORDERS]; 2];
         let mut bands = [0.0f64; 2];
-        for (band, places) in scratch.off[0].iter().zip(&scratch.off[1]).enumerate() {
+        for (band, positions) in scratch.off[0].iter().zip(&scratch.off[1]).enumerate() {
             let values = legendre(self.normalised_position(band));
-            for (side, place) in [places.0, places.1].into_iter().enumerate() {
-                let Some(place) = place else { continue };
+            for (side, position) in [positions.0, positions.1].into_iter().enumerate() {
+                let Some(position) = position else { continue };
                 bands[side] += 1.0;
                 for (sum, value) in off[side].iter_mut().zip(values) {
-                    *sum += place * value;
+                    *sum += position * value;
                 }
             }
         }
@@ -219,10 +219,10 @@ impl WidthInput<'_> {
     }
 }
 
-/// Mean variance of an edge's places, for a place of all of a band's rows.
-fn mean_variance(places: &[Option<CaliperEdge>]) -> f64 {
+/// Mean variance of an edge's positions, for a place of all of a band's rows.
+fn mean_variance(positions: &[Option<CaliperEdge>]) -> f64 {
     let (mut sum, mut n) = (0.0, 0.0);
-    for located in places.iter().flatten() {
+    for located in positions.iter().flatten() {
         sum += located.variance * located.row_fraction;
         n += 1.0;
     }

@@ -10,15 +10,15 @@ use crate::vision::strip::GaugeView;
 /// One edge as it was found.
 #[derive(Debug, Clone, Copy)]
 pub struct LocatedEdge<'a> {
-    /// Its places, band by band.
+    /// Its positions, band by band.
     pub positions: &'a [Option<CaliperEdge>],
-    /// Variance of the whole edge's position that all places share \[px²\].
+    /// Variance of the whole edge's position that all positions share \[px²\].
     pub common_variance: f64,
-    /// What a row leaves of the step that it is held against, in standard
-    /// deviations of its noise; infinite where it was not held against one.
+    /// What a row leaves of the step that it is compared with, in standard
+    /// deviations of its noise; infinite where it was not compared with one.
     pub misfit: f64,
     /// Variance of the mean position over the gauge \[px²\], where it is known
-    /// without looking at how far the places lie off their course.
+    /// without looking at how far the positions lie off their course.
     pub mean_variance: Option<f64>,
 }
 
@@ -37,7 +37,7 @@ pub struct WidthInput<'a> {
     pub sides: [LocatedEdge<'a>; 2],
 }
 
-/// Memory that is kept from frame to frame.
+/// Buffers that are kept from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct WidthScratch {
     pub(super) off: [Vec<Option<f64>>; 2],
@@ -55,7 +55,7 @@ impl WidthInput<'_> {
         self.view.along as f64 / 2.0
     }
 
-    /// Place of a band along the gauge, −1 to 1.
+    /// Position of a band along the gauge, −1 to 1.
     pub fn normalised_position(&self, band: usize) -> f64 {
         (self.middles[band] - self.centre()) / self.half_length()
     }
@@ -72,7 +72,7 @@ impl WidthInput<'_> {
         })
     }
 
-    /// Square of the cosine between the bead and the gauge's axis at a place.
+    /// Square of the cosine between the bead and the gauge's axis at a position.
     pub fn cosine_squared(&self, curves: &[Curve; 2], t: f64) -> f64 {
         let slope = f64::midpoint(curves[0].slope(t), curves[1].slope(t)) / self.half_length();
         1.0 / (1.0 + slope * slope)

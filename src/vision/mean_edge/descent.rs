@@ -16,7 +16,7 @@ pub struct StopCriterion {
 }
 
 pub const CONVERGED: StopCriterion = StopCriterion { last_px: CONVERGED_PX, bends: false };
-/// Where the edge is told from none, and the rest is left to another blur.
+/// Where the edge is distinguished from none, and the rest is left to another blur.
 pub const ROUGHLY_CONVERGED: StopCriterion =
     StopCriterion { last_px: 20.0 * CONVERGED_PX, bends: false };
 

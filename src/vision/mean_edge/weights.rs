@@ -1,4 +1,4 @@
-//! Weights of the pixels across an edge, and what they make of places without one.
+//! Weights of the pixels across an edge, and what they make of positions without one.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -20,15 +20,15 @@ pub(super) const WINDOW: usize = 2 * HALF_PX + 1;
 const MAX_LEVEL_SIGMAS: f64 = 5.0;
 /// The same as a fraction of the step: a flank is no blurred step to the last grey level.
 const LEVEL_TOLERANCE: f64 = 0.05;
-/// Places of a window that tell how far a pattern moves it.
+/// Positions of a window that tell how far a pattern moves it.
 const MIN_SAMPLES: f64 = 10.0;
 
-/// Weights of a window's pixels for place and levels, of least squares.
+/// Weights of a window's pixels for position and levels, of least squares.
 #[derive(Debug, Clone)]
 pub(super) struct EdgeWeights {
     pub(super) position: [f64; WINDOW],
     pub(super) levels: [[f64; WINDOW]; 2],
-    /// Share of the bead.
+    /// Fraction of the bead.
     pub(super) bead: [f64; WINDOW],
     /// Pixels of the window.
     pub(super) pixels: usize,
@@ -85,10 +85,10 @@ impl EdgeWeights {
                 return None;
             }
             let first = round_to_count(narrow_to_f32(at.floor())).min(profile.len() - self.pixels);
-            let share = at - to_f64(first);
+            let fraction = at - to_f64(first);
             let after = profile[first + 1..].iter().chain(profile.last());
             for ((value, one), other) in window.iter_mut().zip(&profile[first..]).zip(after) {
-                *value = one + share * (other - one);
+                *value = one + fraction * (other - one);
             }
             let step = self.step(window);
             if step <= 0.0 {
@@ -106,8 +106,8 @@ impl EdgeWeights {
     /// Sum of the squares that a step leaves of a window, in that of its height.
     fn residual(&self, window: &[f64]) -> f64 {
         let [ground, bead] = self.levels.map(|weights| product(&weights, window));
-        let left = window.iter().zip(&self.bead).map(|(value, share)| {
-            let expected = ground + share * (bead - ground);
+        let left = window.iter().zip(&self.bead).map(|(value, fraction)| {
+            let expected = ground + fraction * (bead - ground);
             (value - expected).powi(2)
         });
         left.sum::<f64>() / (bead - ground).powi(2)
@@ -115,21 +115,21 @@ impl EdgeWeights {
 
     /// What the ground makes of an edge's position, as far as the bead does not hide it.
     pub fn on_ground(&self, ground: &[f64]) -> ShiftSamples {
-        self.samples(ground, |share| 1.0 - share)
+        self.samples(ground, |fraction| 1.0 - fraction)
     }
 
     /// The same of the bead.
     pub fn on_bead(&self, bead: &[f64]) -> ShiftSamples {
-        self.samples(bead, |share| share)
+        self.samples(bead, |fraction| fraction)
     }
 
-    /// Whether the level beside an edge is one that places of the ground farther away
+    /// Whether the level beside an edge is one that positions of the ground farther away
     /// have: of a groove it is not, or where a neighbouring bead lies beyond.
     pub fn is_ground_level(&self, ground: &[f64], level: f64, step: f64) -> bool {
-        let share = self.bead.iter().map(|bead| 1.0 - bead);
-        let sum: f64 = share.clone().take(self.pixels).sum();
-        let share: Vec<f64> = share.take(self.pixels).collect();
-        let levels = ground.windows(self.pixels).map(|window| product(&share, window) / sum);
+        let fraction = self.bead.iter().map(|bead| 1.0 - bead);
+        let sum: f64 = fraction.clone().take(self.pixels).sum();
+        let fraction: Vec<f64> = fraction.take(self.pixels).collect();
+        let levels = ground.windows(self.pixels).map(|window| product(&fraction, window) / sum);
         let mut levels: Vec<f32> = levels.map(narrow_to_f32).collect();
         let Some(middle) = rank::median(&mut levels) else { return true };
         let deviation = rank::median_deviation(&mut levels, middle).map_or(0.0, f64::from);
@@ -138,9 +138,10 @@ impl EdgeWeights {
     }
 
     /// The step's height times positions [grey levels·px].
-    fn samples(&self, profile: &[f64], share: impl Fn(f64) -> f64) -> ShiftSamples {
+    fn samples(&self, profile: &[f64], fraction: impl Fn(f64) -> f64) -> ShiftSamples {
         let seen = |weights: [f64; WINDOW]| -> Vec<f64> {
-            let seen = weights.iter().zip(&self.bead).map(|(weight, bead)| weight * share(*bead));
+            let seen =
+                weights.iter().zip(&self.bead).map(|(weight, bead)| weight * fraction(*bead));
             seen.take(self.pixels).collect()
         };
         let (place, change) = (seen(self.position), seen(self.place_gradient()));
@@ -154,7 +155,7 @@ impl EdgeWeights {
         samples
     }
 
-    /// How the weights for the place change where the window moves inwards, for each pixel.
+    /// How the weights for the position change where the window moves inwards, for each pixel.
     fn place_gradient(&self) -> [f64; WINDOW] {
         std::array::from_fn(|k| {
             let at = |k: usize| if k < self.pixels { self.position[k] } else { 0.0 };
@@ -168,7 +169,7 @@ pub fn product(weights: &[f64], values: &[f64]) -> f64 {
     weights.iter().zip(values).map(|(weight, value)| weight * value).sum()
 }
 
-/// What places without an edge make of an edge's position.
+/// What positions without an edge make of an edge's position.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ShiftSamples {
     /// Sum of the squares of what they make of it.

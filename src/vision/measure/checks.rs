@@ -1,4 +1,4 @@
-//! What is not believed: edges that disagree with themselves or with each other,
+//! What is not accepted: edges that disagree with themselves or with each other,
 //! and steps that are too low.
 
 use super::pattern_limits::{MAX_PATTERN, MAX_PATTERN_LINE_BY_LINE};
@@ -15,7 +15,7 @@ use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::trace::EdgeTracer;
 use crate::vision::width::WidthMeasurement;
 
-/// Share of the rows from which each edge must come.
+/// Fraction of the rows from which each edge must come.
 const MIN_ROW_FRACTION: f64 = 0.4;
 /// The same where each row is known to be clear.
 const MIN_CLEAR_ROW_FRACTION: f64 = 0.16;
@@ -30,26 +30,26 @@ const MAX_OCCLUDED_SIGMA_PX: f64 = 0.185;
 /// The same where a covered edge seems to wind: what winds aside looks covered as
 /// well, so that too little is left of such an edge.
 const MAX_WINDING_SIGMA_PX: f64 = 0.08;
-/// Share of clear rows from which on an edge's course is sure enough.
+/// Fraction of clear rows from which on an edge's course is sure enough.
 const MIN_SURE_CLEAR_FRACTION: f64 = 0.6;
-/// Distance from the border of the gauge that an edge needs, in its blurs and at
+/// Distance from the boundary of the gauge that an edge needs, in its blurs and at
 /// least \[px\]: a step that is cut short there seems to lie farther inside.
 const BOUNDARY_BLURS: f64 = 3.0;
 const MIN_BOUNDARY_PX: f64 = 3.0;
-/// Share of an edge's places that may be nearer.
+/// Fraction of an edge's positions that may be nearer.
 const MAX_NEAR_BOUNDARY_FRACTION: f64 = 0.05;
-/// Largest scatter of neighbouring edges about each other \[px\] that still is
+/// Largest spread of neighbouring edges about each other \[px\] that still is
 /// an edge, not noise.
 const MAX_SCATTER_PX: f64 = 1.5;
 /// The same where both edges show in all rows but for a few sparks: then they are
 /// as rough as they look, and what scatters more is no bead.
 const MAX_COMPLETE_SCATTER_PX: f64 = 4.0;
-/// Share of the rows that counts as all.
+/// Fraction of the rows that counts as all.
 pub(super) const COMPLETE_FRACTION: f64 = 0.95;
 /// The same where one edge was hidden and had to be located line by line.
 const MAX_LOST_SCATTER_PX: f64 = 0.5;
 
-/// Share of a pattern beside an edge that counts for its place: at the edge it is half
+/// Fraction of a pattern beside an edge that counts for its position: at the edge it is half
 /// covered by the bead, and the widths of drawn beads tell a little less.
 const PATTERN_WEIGHT: f64 = 0.46;
 /// Pattern as a fraction of the contrast below which weights that know the texture leave
@@ -59,8 +59,9 @@ const MAX_FAINT_PATTERN: f64 = 0.1;
 /// is measured without fault up to 7.4 px of blur, and was off by some pixels from
 /// 7.5 px on.
 pub(super) const MAX_BLUR_PX: f64 = 7.4;
-/// The same of a box of even motion with a lens's blur: motion of 15.8 px. Flanks of longer
-/// ones were taken for shading once in some hundred frames, and the width was 1 px off.
+/// The same of a box of even motion with a lens's blur. Derived: √(15.8²/12 + 1.5²) px, for a
+/// motion of 15.8 px with a blur of 1.5 px. Flanks of longer motions were taken for shading once in
+/// some hundred frames, and the width was 1 px off.
 pub(super) const MAX_MOTION_BLUR_PX: f64 = 4.8;
 
 impl MeasureState {
@@ -96,7 +97,7 @@ impl MeasureState {
         Ok(())
     }
 
-    /// Takes out places that step the wrong way for the bead's polarity, and lines
+    /// Takes out positions that step the wrong way for the bead's polarity, and lines
     /// whose two edges cross.
     fn drop_inconsistent(&mut self, bright: bool) {
         let sides = [(&mut self.left, bright), (&mut self.right, !bright)];
@@ -172,7 +173,7 @@ impl MeasureState {
         if is_among { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
-    /// Scatter of an edge from which on it is noise \[px\].
+    /// Spread of an edge from which on it is noise \[px\].
     fn scatter_limit(&self) -> f64 {
         let sides = [&self.left, &self.right];
         let whole =
@@ -224,7 +225,7 @@ impl MeasureState {
         Ok(())
     }
 
-    /// Refuses a bead whose edges the border of the gauge cuts short.
+    /// Refuses a bead whose edges the boundary of the gauge cuts short.
     pub fn check_boundary(&self, across: usize) -> Checked {
         let last = to_f64(across.saturating_sub(1));
         for side in [&self.left, &self.right] {
@@ -256,7 +257,7 @@ pub fn edge_positions(tracer: &EdgeTracer, lines: &[RowRange], places: &mut Vec<
     );
 }
 
-/// Share of the rows from which an edge must come.
+/// Fraction of the rows from which an edge must come.
 fn min_row_fraction(side: &EdgeTracer) -> f64 {
     if side.is_occluded() { MIN_CLEAR_ROW_FRACTION } else { MIN_ROW_FRACTION }
 }
@@ -265,4 +266,15 @@ fn min_row_fraction(side: &EdgeTracer) -> f64 {
 pub fn are_not_steps(misfits: [f64; 2]) -> bool {
     misfits.iter().all(|&misfit| misfit > MAX_STEP_MISFIT)
         || misfits.iter().any(|&misfit| misfit > MAX_SINGLE_MISFIT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_widest_motion_is_a_box_with_the_default_blur() {
+        let blur = (15.8f64.powi(2) / 12.0 + 1.5 * 1.5).sqrt();
+        assert!((MAX_MOTION_BLUR_PX - blur).abs() < 0.005, "{blur}");
+    }
 }

@@ -1,4 +1,4 @@
-//! What a compression of the picture leaves open of a width.
+//! What a compression of the image leaves open of a width.
 
 use super::work::MeasureState;
 use crate::vision::trace::EdgeTracer;
@@ -12,7 +12,7 @@ const COMPRESSION_GREY: f64 = 1.7;
 const FEW_SATURATED: f64 = 0.01;
 
 impl MeasureState {
-    /// Variance of an edge's place from what a compression leaves of its profile, which all
+    /// Variance of an edge's position from what a compression leaves of its profile, which all
     /// rows share \[px²\]: the Cramér–Rao bound for a profile with so much noise. 0 where the
     /// pixels' noise is there.
     pub fn variance_of_compression(&self, edge: &EdgeTracer, contrast_grey: f64) -> f64 {

@@ -1,6 +1,7 @@
-//! The bead's two edges, from their contours to sub-pixel places: each in the
+//! The bead's two edges, from their contours to sub-pixel positions: each in the
 //! way that suits it.
 
+use crate::vision::buffer::refill;
 use std::ops::Range;
 
 use super::checks::are_not_steps;
@@ -20,7 +21,7 @@ use crate::vision::saturated;
 use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::trace::{EdgeTracer, TraceInput};
 
-/// Least deviation that makes an outlier of a caliper line that was fitted for
+/// Smallest deviation that makes an outlier of a caliper line that was fitted for
 /// itself \[px\].
 const MIN_LINE_OUTLIER_PX: f64 = 0.75;
 /// Ground on either side of the bead that its noise is taken from \[px\].
@@ -28,7 +29,7 @@ const NOISE_MARGIN_PX: f32 = 12.0;
 /// Distance of an edge's median from its contour's that makes it another \[px\]: grains of
 /// 12 px beside an edge draw its contour along by less.
 const OTHER_EDGE_PX: f32 = 14.0;
-/// Share by which the blur of one edge differs from the other's.
+/// Fraction by which the blur of one edge differs from the other's.
 const BLUR_DIFFERENCE: f64 = 0.04;
 
 impl MeasureState {
@@ -147,12 +148,11 @@ fn common_blur(seen: [Option<BlurEstimate>; 2]) -> Option<BlurEstimate> {
 /// where both run along their contours.
 fn widths_apart(
     sides: [(&EdgeTracer, &[Option<f32>]); 2],
-    memory: &mut Vec<f32>,
+    scratch: &mut Vec<f32>,
 ) -> Option<[f32; 2]> {
     let [left, right] = sides.map(|(tracer, contour)| {
-        memory.clear();
-        memory.extend(contour.iter().flatten());
-        let contour = rank::median(memory).unwrap_or(f32::NAN);
+        refill(scratch, contour.iter().flatten().copied());
+        let contour = rank::median(scratch).unwrap_or(f32::NAN);
         let found = narrow_to_f32(tracer.middle());
         let is_elsewhere = tracer.is_occluded() && (found - contour).abs() > OTHER_EDGE_PX;
         [if is_elsewhere { found } else { contour }, contour]
@@ -171,9 +171,8 @@ fn columns_about(left: &[Option<f32>], right: &[Option<f32>], across: usize) -> 
 }
 
 /// A narrow distance between two contours \[px\], for the size of windows.
-fn narrow_distance(left: &[Option<f32>], right: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
-    memory.clear();
-    memory.extend(left.iter().zip(right).filter_map(|(left, right)| Some((*right)? - (*left)?)));
-    let rank = memory.len() / 10;
-    rank::at(memory, rank).unwrap_or(0.0)
+fn narrow_distance(left: &[Option<f32>], right: &[Option<f32>], scratch: &mut Vec<f32>) -> f32 {
+    refill(scratch, left.iter().zip(right).filter_map(|(left, right)| Some((*right)? - (*left)?)));
+    let rank = scratch.len() / 10;
+    rank::at(scratch, rank).unwrap_or(0.0)
 }

@@ -11,7 +11,7 @@ use crate::vision::rough::RoughFit;
 use crate::vision::trace::EdgeTracer;
 use crate::vision::width::WidthMeasurement;
 
-/// Share of an edge's rows that may be sorted out: more are bays, or grains.
+/// Fraction of an edge's rows that may be sorted out: more are bays, or grains.
 const MAX_GAP_FRACTION: f64 = 0.06;
 /// The same of rows that noise does not explain: a single bay of 2 px in 200 rows.
 const MAX_UNFIT_FRACTION: f64 = 0.01;
@@ -27,7 +27,7 @@ const OTHER_EDGE_PX: f64 = 3.0;
 /// The distance of a rough edge from what was located line by line up to which both are the
 /// same \[px\].
 const SAME_EDGE_PX: f64 = 0.25;
-/// By how much the levels outside the two edges differ, as a share of the higher contrast,
+/// By how much the levels outside the two edges differ, as a fraction of the higher contrast,
 /// where something else lies beside one than beside the other, so that a narrow groove may: one
 /// of 2 to 2.5 px that is a little darker than the ground moves a blurred step by a third of a
 /// pixel and shows in nothing else.
@@ -58,11 +58,11 @@ const MAX_OUTWARD_PX: f64 = 1.0;
 /// Contrast of a rough edge over that of the blurred step from which on it is higher: by
 /// sparks on 5 % of the bead it is 1.05 to 1.1.
 const MAX_CONTRAST_RATIO: f64 = 1.04;
-/// Share of odd pixels about an edge up to which it is bead and ground alone: drawn torn
+/// Fraction of odd pixels about an edge up to which it is bead and ground alone: drawn torn
 /// beads, ones with holes and ones in low light have up to 0.003, of 522 with grooves that
 /// were refused as covered 11 have more, and grains that passed for bays from 0.005 on.
 const MAX_ODD_FRACTION: f64 = 0.004;
-/// By how much the share of odd pixels about an edge exceeds that within the bead where
+/// By how much the fraction of odd pixels about an edge exceeds that within the bead where
 /// grains lie on it: concrete beads have up to 0.022, grains of 6 and 12 px on a third of
 /// the rows 0.027 to 0.14.
 const GRAIN_ODD_FRACTION: f64 = 0.024;
@@ -99,7 +99,7 @@ impl MeasureState {
         self.width_px <= MAX_NARROW_WIDTH_PX
     }
 
-    /// Whether more than a few places of an edge were sorted out, or some that surely show
+    /// Whether more than a few positions of an edge were sorted out, or some that certainly show
     /// something else.
     pub fn has_gaps(&self) -> bool {
         let used = self.left.used_fraction().min(self.right.used_fraction());
@@ -282,7 +282,7 @@ fn is_part(tracer: &EdgeTracer, step: f64) -> bool {
     step < MIN_LEVEL_RATIO * (after - before).abs()
 }
 
-/// Whether less than such a share of the pixels about either edge shows neither bead nor ground.
+/// Whether less than such a fraction of the pixels about either edge shows neither bead nor ground.
 fn are_clean(fits: &[RoughFit; 2], max_odd_share: f64) -> bool {
     fits.iter().all(|fit| fit.odd_fraction < max_odd_share)
 }

@@ -5,8 +5,9 @@ use crate::vision::coarse::LinePair;
 use crate::vision::reject::{Checked, Reject};
 use crate::vision::rough::RoughFit;
 
-/// Strongest pattern beside the bead, as a share of the contrast: a pattern of a third
-/// is measured, of a stronger one parts are taken for the bead.
+/// Strongest pattern beside the bead, as a fraction of the contrast. Measured: ACCURACY.md, Drawn
+/// frames: patterns of up to a third (`ground-texture-weak`) are measured, of stronger ones
+/// (`ground-texture-strong`) parts are taken for the bead.
 pub(super) const MAX_PATTERN: f64 = 0.37;
 /// The same where edges were located line by line: drawn widths beside a pattern of 0.25 and
 /// 0.31 were 53 and 22 px off. A real strand has up to 0.2, real printed lines up to 0.24.
@@ -22,7 +23,7 @@ pub(super) const MAX_PATTERN_BESIDE_COMPLETE: f64 = 0.25;
 /// Blur of a mean profile up to which its variance is what texture and pattern leave open
 /// \[px\]. Drawn beads with a blur of 1.5 px and texture on them had more in one of three frames,
 /// and the more, the more they were off: a z of 1.15, 1.3 and 1.4 where 2, 2.5 and 3 px fitted
-/// best, for places where the bead is dark pass for a flank.
+/// best, for positions where the bead is dark pass for a flank.
 const REFERENCE_BLUR_PX: f64 = 1.5;
 
 /// Refuses a bead whose ground has a pattern, a fraction of the contrast, and whose mean
@@ -38,7 +39,7 @@ pub fn blur_inflation(blur_px: f64) -> f64 {
 }
 
 /// Edges of a textured bead whose mean profile shows none: without a groove beside it, dark
-/// places of the bead pass for a part of a flank that is too wide.
+/// positions of the bead pass for a part of a flank that is too wide.
 pub fn with_texture_variance(pair: &LinePair, fits: [RoughFit; 2]) -> [RoughFit; 2] {
     if pair.has_groove() {
         return fits;

@@ -23,7 +23,7 @@ const MIN_PATTERN: f64 = 0.06;
 const MIN_TEXTURE: f64 = 0.13;
 /// The least of both edges' as a fraction of the other's where it is the same texture.
 const MIN_TEXTURE_RATIO: f64 = 0.4;
-/// The same half-way between two lines, as a share of it.
+/// The same half-way between two lines, as a fraction of it.
 const MIDDLE_TEXTURE_RATIO: f32 = 0.5;
 /// Blur beyond which a bead's texture is free of a flank that is not known yet \[px\].
 const ASSUMED_BLUR_PX: f64 = 3.0;
@@ -73,19 +73,19 @@ impl MeasureState {
 
     /// Measures a bead that was measured already, where it or the ground has a pattern.
     /// `None` where neither has, or a weak one, and where the mean profile tells no edges and
-    /// the pattern is bearable beside blurred steps.
+    /// the pattern is accepted beside blurred steps.
     #[inline(never)]
     pub fn measure_textured<T: GreyPixel>(
         &mut self,
         frame: &GaugeFrame<'_, T>,
     ) -> Option<Measured> {
-        let shares = self.texture_between_steps(frame.strip);
-        let is_textured = rms(shares) > MIN_TEXTURE;
+        let fractions = self.texture_between_steps(frame.strip);
+        let is_textured = rms(fractions) > MIN_TEXTURE;
         if !is_textured && self.both.pattern_ratio == 0.0 {
             return None;
         }
         let Ok(pair) = self.find_lines(frame) else {
-            return self.check_complete(is_textured && are_alike(shares)).err().map(Err);
+            return self.check_complete(is_textured && are_alike(fractions)).err().map(Err);
         };
         let pattern = self.ground_pattern(frame.strip, &pair);
         let contrast = self.both.contrasts[0].min(self.both.contrasts[1]);
@@ -119,18 +119,18 @@ impl MeasureState {
         let sides = [(&self.left, 1.0), (&self.right, -1.0)];
         let room_px = self.right.middle() - self.left.middle();
         let noise = self.rows.noise.grey.into();
-        let mut shares = [0.0; 2];
-        for (((tracer, inwards), contrast), share) in
-            sides.into_iter().zip(self.both.contrasts).zip(&mut shares)
+        let mut fractions = [0.0; 2];
+        for (((tracer, inwards), contrast), fraction) in
+            sides.into_iter().zip(self.both.contrasts).zip(&mut fractions)
         {
             all_edge_positions(tracer, &self.rows.lines, &mut self.scratch.positions);
             let blur_px = tracer.blur_px;
             let positions = &self.scratch.positions;
             let side = EdgeSide { strip, noise, positions, outwards: inwards, blur_px, room_px };
             let texture = self.scratch.ground.texture(&side);
-            *share = texture.unwrap_or(0.0) / contrast;
+            *fraction = texture.unwrap_or(0.0) / contrast;
         }
-        shares
+        fractions
     }
 
     /// Whether it has one beside both of two lines, and half-way between them: lines in the
@@ -219,7 +219,7 @@ impl MeasureState {
         if !(ground + bead).is_finite() {
             return Err(failed);
         }
-        // An edge beside a strong pattern is drawn to its bright places.
+        // An edge beside a strong pattern is drawn to its bright positions.
         let beside = ground * (1.0 + (got / MAX_PATTERN).powi(4)) + bead;
         // A flank's slope falls with its blur, and what a texture moves an edge by grows with it.
         let inflation = blur_inflation(blur_px);
@@ -237,7 +237,7 @@ impl MeasureState {
     }
 }
 
-/// Root of the mean square of the shares of both sides.
+/// Root of the mean square of the fractions of both sides.
 fn rms([left, right]: [f64; 2]) -> f64 {
     f64::midpoint(left * left, right * right).sqrt()
 }
@@ -255,16 +255,16 @@ fn all_edge_positions(tracer: &EdgeTracer, lines: &[RowRange], places: &mut Vec<
         return;
     }
     let located: Vec<(f64, f64)> =
-        places.iter().map(|place| (place.rows.middle(), place.at)).collect();
+        places.iter().map(|position| (position.rows.middle(), position.at)).collect();
     let (Some(first), Some(last)) = (located.first(), located.last()) else { return };
     places.clear();
     places.extend(lines.iter().map(|&rows| {
         let row = rows.middle();
-        let after = located.partition_point(|place| place.0 < row);
+        let after = located.partition_point(|position| position.0 < row);
         let (one, other) =
             (located[..after].last().unwrap_or(first), located[after..].first().unwrap_or(last));
-        let share = if other.0 > one.0 { (row - one.0) / (other.0 - one.0) } else { 0.0 };
-        EdgePosition { rows, at: one.1 + share * (other.1 - one.1) }
+        let fraction = if other.0 > one.0 { (row - one.0) / (other.0 - one.0) } else { 0.0 };
+        EdgePosition { rows, at: one.1 + fraction * (other.1 - one.1) }
     }));
 }
 

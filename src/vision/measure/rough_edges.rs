@@ -12,7 +12,7 @@ use crate::vision::rough::{RoughFit, RoughInput};
 use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::vectors;
 
-/// The search range allows 1.5 times too wide and too narrow single places; lines
+/// The search range allows 1.5 times too wide and too narrow single positions; lines
 /// are means over the gauge, and stay nearer.
 const LINE_RANGE_FACTOR: f32 = 1.4;
 
@@ -163,7 +163,7 @@ impl MeasureState {
     }
 
     /// The same as [`Self::take_rough`] beside a pattern of such a standard deviation
-    /// \[grey levels\], where that is bearable.
+    /// \[grey levels\], where that is acceptable.
     pub fn width_of_rough_beside<T: GreyPixel>(
         &mut self,
         pattern: f64,
@@ -214,7 +214,7 @@ impl MeasureState {
     }
 }
 
-/// An edge with the doubt that a flank leaves which is not seen whole.
+/// An edge with the uncertainty that a flank leaves which is not seen whole.
 fn with_flank_variance(fit: RoughFit) -> RoughFit {
     let off_px = OFFSET_PER_BLUR * (fit.blur_px - MAX_CLEAR_BLUR_PX).max(0.0);
     RoughFit { variance: fit.variance + off_px * off_px, ..fit }

@@ -12,9 +12,9 @@ use crate::vision::pool::Bands;
 use crate::vision::reject::Reject;
 use crate::vision::strip::GaugeView;
 
-/// Share from which a contour is looked at.
+/// Fraction from which a contour is looked at.
 const MIN_BAND_FRACTION: f64 = 0.4;
-/// Share of saturated pixels from which missing contrast is laid to light.
+/// Fraction of saturated pixels from which missing contrast is laid to light.
 const MIN_SATURATED_FRACTION: f64 = 0.3;
 /// Room that a search allows beyond the range of widths, for the difference
 /// between one caliper and the mean of all.
@@ -78,7 +78,7 @@ impl MeasureState {
             > MIN_BUSY_STEPS * self.search.candidates.len()
     }
 
-    /// The believed widths in pixels across the gauge's middle.
+    /// The accepted widths in pixels across the gauge's middle.
     pub fn search_range(
         &mut self,
         view: &GaugeView,

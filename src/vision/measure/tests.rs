@@ -70,7 +70,7 @@ fn frame_with_grooves(seed: u64) -> Frame {
 }
 
 /// Half of the height above a groove that blur fills lies inside the bead; who says that
-/// there is none gets that place.
+/// there is none gets that position.
 #[test]
 fn a_given_edge_says_whether_a_dark_line_is_a_groove() {
     let scale = SurfaceMap::from_scale(1.0);

@@ -2,7 +2,7 @@
 
 use super::{HALF_SPAN, Overlay, PHASES};
 
-/// Places beside the edge within which a narrow groove lies \[px\].
+/// Positions beside the edge within which a narrow groove lies \[px\].
 const MAX_GROOVE_PX: usize = 9;
 /// By how much what lies beyond a groove is nearer to the bead's level at least: a fraction
 /// of the step, and standard deviations of noise.
@@ -12,7 +12,7 @@ const MIN_RISE_SIGMAS: f64 = 5.0;
 impl Overlay {
     /// Whether the level beside the edge, after it or before it, comes nearer to that on its
     /// other side again farther out, as beyond a narrow groove. `noise` is the standard
-    /// deviation of a pixel in shares of the step.
+    /// deviation of a pixel as fractions of the step.
     pub fn rises_beside(&self, after: bool, noise: f64) -> bool {
         let rows = self.used();
         if rows <= 0.0 {

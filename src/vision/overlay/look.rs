@@ -1,4 +1,4 @@
-//! What a first look at an edge tells: the step, how sure its blur is, what it leaves, and how far
+//! What a first fit to an edge shows: the step, how sure its blur is, what it leaves, and how far
 //! there is nothing else.
 
 use super::HALF_SPAN;
@@ -17,7 +17,7 @@ pub const SHADING_SIGMA: f64 = 0.02;
 /// Steps of a fit at most.
 pub const MAX_ITERATIONS: usize = 16;
 
-/// A first look at an edge.
+/// A first fit to an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepFit {
     /// The step.
@@ -26,12 +26,12 @@ pub struct StepFit {
     pub blur_sd: f64,
     /// Change of the level before and after it \[1/px away from it\].
     pub(super) shading: [f64; 2],
-    /// Standard deviation of a pixel, in shares of the step.
+    /// Standard deviation of a pixel, as fractions of the step.
     pub pixel_noise: f64,
     /// Standard deviation of a row's samples about the step before the fit's last move, in
-    /// shares of it.
+    /// fractions of it.
     pub(super) noise: f64,
-    /// The same after it, where each phase has a place and levels of its own.
+    /// The same after it, where each phase has a position and levels of its own.
     pub(super) residual: f64,
     /// Number of the phases that have rows.
     pub(super) phases: f64,
@@ -39,7 +39,7 @@ pub struct StepFit {
     pub room: Extent,
     /// Steps beside it that reach into its pixels.
     pub(super) flanks: NeighbourSteps,
-    /// What they and the blur add to the variance of its place \[px²\]; 0 where
+    /// What they and the blur add to the variance of its position \[px²\]; 0 where
     /// there are none.
     pub(super) added_variance: f64,
 }
@@ -70,7 +70,7 @@ impl StepFit {
     }
 
     /// Mean square of the residuals about the edge, in variances of their noise: at
-    /// least 1. Each phase has a place and levels of its own, so that they are those of the
+    /// least 1. Each phase has a position and levels of its own, so that they are those of the
     /// step's shape.
     pub fn misfit(&self) -> f64 {
         (self.residual / self.pixel_noise).powi(2)
@@ -81,7 +81,7 @@ impl StepFit {
         self.misfit() >= MIN_NOTABLE_MISFIT
     }
 
-    /// The misfit of one place and levels for all phases.
+    /// The misfit of one position and levels for all phases.
     pub fn misfit_of_all(&self) -> f64 {
         (self.noise / self.pixel_noise).powi(2)
     }
@@ -102,7 +102,7 @@ impl StepFit {
         (from, to)
     }
 
-    /// Derivatives of the level at a distance from the path for the step's place
+    /// Derivatives of the level at a distance from the path for the step's position
     /// and blur, its two levels and the two shadings, and the level itself,
     /// without flanks.
     #[inline(always)]
@@ -120,7 +120,7 @@ impl StepFit {
         ([-slope, -slope * z, 1.0 - step, step, depth[0], depth[1]], level)
     }
 
-    /// The same look up to half-way to the steps beside the edge.
+    /// The same fit up to half-way to the steps beside the edge.
     pub fn without_flanks(&self) -> Self {
         let half = |flank: &Option<NeighbourStep>, room: f64| {
             flank.as_ref().map_or(room, |flank| 0.5 * (flank.at - self.step.at).abs())
@@ -131,7 +131,7 @@ impl StepFit {
         Self { room, flanks: NeighbourSteps::default(), added_variance: 0.0, ..*self }
     }
 
-    /// The same look where texture makes samples less sure than noise does:
+    /// The same fit where texture makes samples less sure than noise does:
     /// `noise` is what independent ones as unsure would have.
     pub fn with_texture(self, noise: f64) -> Self {
         let blur_sd = self.blur_sd * (noise / self.noise).max(1.0);
@@ -148,4 +148,43 @@ impl StepFit {
 /// Farthest place of a sample from the path \[px\].
 pub fn max_sample_px() -> f64 {
     to_f64(HALF_SPAN - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Derivatives of the level about a step, against differences of it.
+    #[test]
+    fn derivatives_of_an_edge_are_those_of_its_level() {
+        let table = StepTable::default();
+        let fit = StepFit {
+            step: BlurredStep { at: 0.3, blur: 1.6, before: 0.1, after: 1.2 },
+            blur_sd: 0.1,
+            shading: [0.02, -0.03],
+            pixel_noise: 0.05,
+            noise: 0.05,
+            residual: 0.05,
+            phases: 2.0,
+            room: Extent { before: 20.0, after: 20.0 },
+            flanks: NeighbourSteps::default(),
+            added_variance: 0.0,
+        };
+        let d = 0.02;
+        let moved = |unknown: usize, by: f64| {
+            let mut moved = fit;
+            let BlurredStep { at, blur, before, after } = &mut moved.step;
+            let [outer, inner] = &mut moved.shading;
+            *[at, blur, before, after, outer, inner][unknown] += by;
+            moved
+        };
+        for at in [-3.0, -0.6, 0.9, 2.8] {
+            let (derivatives, _) = fit.linear_at(&table, at);
+            for (unknown, expected) in derivatives.iter().enumerate() {
+                let level = |by: f64| moved(unknown, by).linear_at(&table, at).1;
+                let found = (level(d) - level(-d)) / (2.0 * d);
+                assert!((found - expected).abs() < 5e-3, "{unknown} at {at}: {found} {expected}");
+            }
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! The shape of an edge, from a look at it: how far its surroundings on either side are plain,
+//! The shape of an edge, from a fit to it: how far its surroundings on either side are plain,
 //! and how they are shaded.
 
 use super::look::StepFit;
@@ -17,20 +17,20 @@ pub struct SideShading {
 }
 
 impl SideShading {
-    /// The same in shares of a step of which the given one is a share.
-    pub fn of(self, share: f64) -> Self {
-        Self { slope: self.slope / share, bend: self.bend / share }
+    /// The same as fractions of a step of which the given one is a fraction.
+    pub fn of(self, fraction: f64) -> Self {
+        Self { slope: self.slope / fraction, bend: self.bend / fraction }
     }
 }
 
 /// One side of an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct SideShape {
+pub struct SideShape {
     /// How far there is nothing else \[px\].
     pub extent: f64,
-    /// How its level changes, in shares of the step that was given.
+    /// How its level changes, as fractions of the step that was given.
     pub shading: SideShading,
-    /// Variance that the doubt about it leaves to the level at the edge.
+    /// Variance that the uncertainty about it leaves to the level at the edge.
     pub level_variance: f64,
 }
 
@@ -42,11 +42,11 @@ pub struct StepShape {
     /// How far the surroundings are plain, and what is used of them.
     pub extent: Extent,
     /// How the level changes away from the edge, before it and after it, in
-    /// shares of the step.
+    /// fractions of the step.
     pub shading: [SideShading; 2],
-    /// Steps beside the edge that reach into its pixels, in shares of its own.
+    /// Steps beside the edge that reach into its pixels, as fractions of its own.
     pub flanks: NeighbourSteps,
-    /// Variance of the edge's position that doubt about the shading and about
+    /// Variance of the edge's position that uncertainty about the shading and about
     /// flanks leaves \[px²\].
     pub variance: f64,
 }
@@ -60,28 +60,28 @@ impl StepShape {
 
 impl StepFitter<'_> {
     /// How far the surroundings on one side of a known step are plain \[px\],
-    /// after it or before it, their slope in shares of the step that was given
-    /// \[1/px away from it\], and the variance that its doubt leaves to the
+    /// after it or before it, their slope as fractions of the step that was given
+    /// \[1/px away from it\], and the variance that its uncertainty leaves to the
     /// level at the edge.
-    pub fn side_slope(&self, look: &StepFit, step: &BlurredStep, after: bool) -> (f64, (f64, f64)) {
-        let (sign, room) = if after { (1.0, look.room.after) } else { (-1.0, look.room.before) };
-        let (flanks, noise) = (&look.flanks, look.pixel_noise);
+    pub fn side_slope(&self, fit: &StepFit, step: &BlurredStep, after: bool) -> (f64, (f64, f64)) {
+        let (sign, room) = if after { (1.0, fit.room.after) } else { (-1.0, fit.room.before) };
+        let (flanks, noise) = (&fit.flanks, fit.pixel_noise);
         let (extent, line) = self.plain_extent(&SideInput { step, flanks, sign, room, noise });
         (extent, line.shrunk_slope(noise))
     }
 
-    /// Reads the edge's shape from a look at it and what is known of its blur.
+    /// Reads the edge's shape from a fit to it and what is known of its blur.
     #[inline(always)]
-    pub fn shape(&self, look: &StepFit, blur: BlurEstimate) -> Option<StepShape> {
-        let look = self.fit_known(look, blur)?;
-        let StepFit { step, noise, room, flanks, added_variance, .. } = look;
+    pub fn shape(&self, fit: &StepFit, blur: BlurEstimate) -> Option<StepShape> {
+        let fit = self.fit_known(fit, blur)?;
+        let StepFit { step, noise, room, flanks, added_variance, .. } = fit;
         let sharp = step.blur * step.blur - ROUNDING_VARIANCE_PX2;
         let step = BlurredStep { blur: sharp.max(MIN_BLUR_PX.powi(2)).sqrt(), ..step };
         let before =
             SideInput { step: &step, flanks: &flanks, sign: -1.0, room: room.before, noise };
         let after = SideInput { sign: 1.0, room: room.after, ..before };
-        let [before, after] = [before, after].map(|side| self.side_shape(&side, look.pixel_noise));
-        // A level that is off by a share moves the edge by √π blurs times it.
+        let [before, after] = [before, after].map(|side| self.side_shape(&side, fit.pixel_noise));
+        // A level that is off by a fraction moves the edge by √π blurs times it.
         let per_level = std::f64::consts::PI * step.blur * step.blur;
         Some(StepShape {
             step,
@@ -119,9 +119,9 @@ impl StepFitter<'_> {
         let (near, far) = (step.at + sign * from, step.at + sign * (from + 2.0));
         for mean in self.overlay.means() {
             for (at, value) in mean.samples(near.min(far), near.max(far) - 1e-9) {
-                let (share, _) = self.table.at((at - step.at) / step.blur);
+                let (fraction, _) = self.table.at((at - step.at) / step.blur);
                 let beside = if flanks.any() { flanks.at(self.table, at) } else { 0.0 };
-                let off = value - beside - step.before - height * share;
+                let off = value - beside - step.before - height * fraction;
                 add(sign * (at - step.at), off, mean.weight);
             }
         }

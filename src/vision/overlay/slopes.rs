@@ -1,4 +1,4 @@
-//! How steeply the overlay runs, place by place: where the edge is steepest,
+//! How steeply the overlay runs, position by position: where the edge is steepest,
 //! and whether another step lies beside it.
 
 use std::ops::Range;
@@ -18,7 +18,7 @@ pub struct SlopeLimits {
     pub notable: f64,
 }
 
-/// Mean slopes over two pixels \[1/px\], each phase's share of the mean of both.
+/// Mean slopes over two pixels \[1/px\], each phase's fraction of the mean of both.
 pub struct ProfileSlopes([[f32; SPAN]; PHASES]);
 
 impl ProfileSlopes {
@@ -28,9 +28,9 @@ impl ProfileSlopes {
         let mut slopes = [[0.0; SPAN]; PHASES];
         let all = overlay.counts.iter().sum::<f32>().max(1.0);
         for ((slopes, mean), count) in slopes.iter_mut().zip(&overlay.mean).zip(overlay.counts) {
-            let share = 0.5 * count / all;
+            let fraction = 0.5 * count / all;
             for k in 1..SPAN - 1 {
-                slopes[k] = share * (mean[k + 1] - mean[k - 1]);
+                slopes[k] = fraction * (mean[k + 1] - mean[k - 1]);
             }
             (slopes[0], slopes[SPAN - 1]) = (slopes[1], slopes[SPAN - 2]);
         }
@@ -95,7 +95,7 @@ impl ProfileSlopes {
         (room, None)
     }
 
-    /// The step whose slope rises from a place on, in half pixels.
+    /// The step whose slope rises from a position on, in half pixels.
     #[cold]
     fn flank(&self, blur: f64, from: i16, sign: i16, steps: Range<i16>) -> Option<NeighbourStep> {
         let mut best = (0.0f32, 0, 0.0f32);

@@ -16,14 +16,14 @@ pub type WindowRow = [f32; WINDOW_PX];
 /// that it hardly widens the flank.
 const ACROSS_PX: f64 = 0.7;
 /// The same along the bead \[px\]: what is shorter than that is texture, and the
-/// mean over the rows keeps its place.
+/// mean over the rows keeps its position.
 pub const ALONG_PX: f64 = 2.5;
 /// Rows between which a course is straight: the smoothing along the bead leaves no more.
 pub const STRAIGHT_ROWS: usize = 2;
 /// Rows of the gauge in a block.
 pub const BLOCK_ROWS: usize = 4;
-/// Rows of the gauge over which the smoothing along the bead follows no changes: two
-/// standard deviations.
+/// Rows of the gauge over which the smoothing along the bead follows no changes. Derived: 2 · 2.5,
+/// two of its standard deviations.
 const FINE_ROWS: usize = 5;
 /// Rows of a gauge from which on two are taken together: there are plenty.
 const MIN_PAIRED_ROWS: usize = 400;
@@ -146,9 +146,10 @@ fn smooth_row(row: &WindowRow, (sign, after): (f32, bool), kernel: &[f32], out: 
     }
 }
 
-/// Pixels that are convolved together: what the processor holds in its vectors.
+/// Pixels that are convolved together. Derived: 16 floats fill a vector of 512 bits.
 const VECTOR_PIXELS: usize = 16;
-/// Samples of a kernel beside its middle at most.
+/// Samples of a kernel beside its middle at most. Derived: 3 · 2.5 px, three standard deviations of
+/// the smoothing along the bead, rounded up.
 const MAX_KERNEL_HALF: usize = 8;
 
 /// Convolves along the bead. Beyond the ends the rows come again in reverse, so
@@ -182,5 +183,16 @@ fn smooth_along(rows: &[WindowRow], kernel: &[f32; MAX_KERNEL_HALF + 1], out: &m
             }
             *out = sums;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_kernel_fits_and_fine_rows_are_two_of_its_deviations() {
+        assert_eq!(kernel::gaussian(ALONG_PX).len(), MAX_KERNEL_HALF + 1);
+        assert_eq!(to_f64(FINE_ROWS), 2.0 * ALONG_PX);
     }
 }

@@ -29,7 +29,7 @@ pub struct LocalWidths {
     pub blur_mm: f64,
 }
 
-/// What the calipers' places have passed along the bead \[px\]; see [`LocalWidths`].
+/// What the calipers' positions have passed along the bead \[px\]; see [`LocalWidths`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CaliperFilter {
     /// That of the measurement.
@@ -147,11 +147,11 @@ mod tests {
 
     /// A bead of 40 px that slants, whose lines 3 and 4 are missing.
     fn slanted(slope: f64) -> Vec<Caliper> {
-        let place =
+        let position =
             |x: f64, y: f64| Some(CaliperPoint { at: ImagePoint::new(x, y), sigma_px: Some(0.1) });
         let caliper = |number: usize| {
             let y = 4.0 * to_f64(number);
-            Caliper { number, left: place(slope * y, y), right: place(40.0 + slope * y, y) }
+            Caliper { number, left: position(slope * y, y), right: position(40.0 + slope * y, y) }
         };
         (0..20).filter(|number| !(3..5).contains(number)).map(caliper).collect()
     }

@@ -1,4 +1,4 @@
-//! Places of an edge, band by band, from the rows that count.
+//! Positions of an edge, band by band, from the rows that count.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -6,15 +6,13 @@ use super::{EdgeTracer, MAX_PATH_ERROR_BLURS, TraceInput};
 use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::numeric::rank;
 use crate::vision::located::CaliperEdge;
+use crate::vision::scatter::MIN_EXCESS_SIGMAS;
 use crate::vision::strip::GreyPixel;
 
-/// Share of its rows that a band must have left to count.
+/// Fraction of its rows that a band must have left to count.
 const MIN_ROW_FRACTION: f64 = 0.5;
 /// The same where rows are known to be clear, one by one.
 const MIN_CLEAR_ROW_FRACTION: f64 = 0.2;
-/// Extra deviation of levels that is believed, in standard deviations of its
-/// own doubt.
-const MIN_EXCESS_SIGMAS: f64 = 2.5;
 
 impl EdgeTracer {
     /// Solves every band; returns whether the path was near enough for that.

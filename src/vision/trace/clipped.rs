@@ -11,16 +11,17 @@ use crate::vision::located::CaliperEdge;
 use crate::vision::path;
 use crate::vision::strip::GreyPixel;
 
-/// Upper end of the camera's scale \[grey levels of 256\].
+/// Upper end of the camera's scale \[grey levels of 256\]. By definition of the scale
+/// (CONVENTIONS.md, Grey levels).
 const SCALE_END_GREY: f64 = 255.0;
-/// Levels that come so near it are cut off by noise, in standard deviations.
+/// Levels that come so near it are clipped by noise, in standard deviations.
 const NEAR_END_SIGMAS: f64 = 1.5;
 
-/// Times that a path is smoothed at most before an edge that is cut off is read
+/// Times that a path is smoothed at most before an edge that is clipped is read
 /// along it.
 const MAX_SMOOTHINGS: usize = 4;
-/// A path that runs farther off the places than noise puts them no longer follows its
-/// edge, which is rough: in the mean square, so many times the variance of a place,
+/// A path that runs farther off the positions than noise puts them no longer follows its
+/// edge, which is rough: in the mean square, so many times the variance of a position,
 const MAX_SMOOTHING_RATIO: f32 = 4.0;
 /// and this much of the blur, which softens the flank too little to matter.
 const MAX_SMOOTHING_BLURS: f32 = 0.1;
@@ -40,7 +41,7 @@ impl EdgeTracer {
         (typical(&self.values.before).into(), typical(&self.values.step).into())
     }
 
-    /// Locates an edge that is cut off at the end of the scale on one side.
+    /// Locates an edge that is clipped at the end of the scale on one side.
     /// Returns what is known of it, `None` where that is nothing.
     pub fn trace_clipped<T: GreyPixel>(
         &mut self,
@@ -81,8 +82,8 @@ impl EdgeTracer {
         let start = ClippedStep { at: 0.0, ..rough.step };
         let first = self.cut_off.fit(&task, &self.overlay, start, None)?;
         // The surroundings that can be seen, beside the step as it really is.
-        let share = |level: f64| (level - before) / height;
-        let (visible, hidden) = (share(first.step.visible), share(first.step.clipped));
+        let fraction = |level: f64| (level - before) / height;
+        let (visible, hidden) = (fraction(first.step.visible), fraction(first.step.clipped));
         let (before, after) = if hidden_after { (visible, hidden) } else { (hidden, visible) };
         let step = BlurredStep { at: first.step.at, blur: first.step.blur, before, after };
         let (extent, (slope, level_variance)) =
@@ -104,8 +105,8 @@ impl EdgeTracer {
 
     /// Draws a path through the edges that were found, as smooth as the edge is.
     fn straighten<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: f64) {
-        let places = self.edges.iter().map(|edge| edge.map(|edge| narrow_to_f32(edge.at)));
-        if !path::fill(places, &mut self.scratch.rough) {
+        let positions = self.edges.iter().map(|edge| edge.map(|edge| narrow_to_f32(edge.at)));
+        if !path::fill(positions, &mut self.scratch.rough) {
             return;
         }
         path::median_of_three(&mut self.scratch.rough);
@@ -127,8 +128,8 @@ impl EdgeTracer {
         self.read(scene);
     }
 
-    /// Mean square of how far the path lies off the places that it was drawn through,
-    /// from the median, so that a few wild ones do not count \[px²\].
+    /// Mean square of how far the path lies off the positions that it was drawn through,
+    /// from the median, so that a few outliers do not count \[px²\].
     fn smoothing_error(&mut self) -> f32 {
         self.scratch.sorted.clear();
         let offs =

@@ -1,20 +1,22 @@
 //! An edge that grains or spots cover in part: which rows show it and nothing
 //! else. All that is known of it is taken from those rows alone.
 
-use super::{EdgeState, EdgeTracer, MAX_CLEAR_MISFIT, NOISE_SIGMAS, typical};
+use super::{EdgeState, EdgeTracer, MAX_CLEAR_MISFIT, typical};
 use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f32};
 use crate::numeric::rank;
 use crate::vision::blur_estimate::BlurEstimate;
+use crate::vision::buffer::refill;
 use crate::vision::consensus::keep_consensus;
 use crate::vision::overlay::{Extent, StepShape};
 use crate::vision::path;
+use crate::vision::pixel_noise::NOISE_SIGMAS;
 use crate::vision::strip::GreyPixel;
 use crate::vision::template::{PlainSums, StepTemplate};
 use crate::vision::trace::TraceInput;
 
 /// Distance from the course of most bands from which a band is off \[px\].
 const MAX_OFFSET_PX: f32 = 0.8;
-/// The same for a level, as a share of the step, and in standard deviations of
+/// The same for a level, as a fraction of the step, and in standard deviations of
 /// a pixel beside.
 const MAX_LEVEL_OFFSET: f32 = 0.08;
 const MAX_LEVEL_OFFSET_SIGMAS: f32 = 1.0;
@@ -29,9 +31,9 @@ const MAX_MISFIT_RATIO: f32 = 3.2;
 /// The same at most, as a multiple of what noise leaves.
 const MAX_NOISE_RATIO: f32 = 3.0;
 /// Farthest that the levels beside an edge may be from those a little away, as
-/// a share of the step: grains have levels of their own.
+/// a fraction of the step: grains have levels of their own.
 const MAX_LEVEL_DIFFERENCE: f64 = 0.25;
-/// Courses that are tried, and the share of clear rows along one that is enough
+/// Courses that are tried, and the fraction of clear rows along one that is enough
 /// to look for no other.
 const MAX_ATTEMPTS: usize = 3;
 const ENOUGH_CLEAR_FRACTION: f32 = 0.4;
@@ -42,15 +44,15 @@ const MAX_OFFSET_SIGMAS: f32 = 3.5;
 /// What covers a row shades those beside it through the blur: so many blurs of
 /// distance are kept from it, fewer where little else is left.
 const MARGIN_BLURS: [f64; 4] = [2.0, 1.5, 1.0, 0.5];
-/// Share of the rows, and number of them, that are wanted and needed.
+/// Fraction of the rows, and number of them, that are wanted and needed.
 const WANTED_CLEAR_ROWS: (f32, f32) = (0.25, 20.0);
 const MIN_CLEAR_ROWS: (f32, f32) = (0.12, 12.0);
-/// Share of the rows that may show the same edge elsewhere, one after the
+/// Fraction of the rows that may show the same edge elsewhere, one after the
 /// other: more are not covered, but a bead of another shape.
 const MAX_ELSEWHERE_FRACTION: f32 = 0.08;
 /// Distance from which on a row's edge is elsewhere \[px\].
 const MIN_ELSEWHERE_PX: f32 = 1.0;
-/// Share of an edge's places that may be strays.
+/// Fraction of an edge's positions that may be strays.
 const MAX_STRAY_FRACTION: f32 = 0.25;
 
 impl EdgeTracer {
@@ -60,8 +62,7 @@ impl EdgeTracer {
     #[inline(never)]
     pub fn locate_occluded<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         self.look_row_by_row();
-        self.occlusion.free.clear();
-        self.occlusion.free.extend_from_slice(&self.values.picked);
+        refill(&mut self.occlusion.free, self.values.picked.iter().copied());
         let mut best = (NONE_CLEAR, 0);
         for attempt in 0..MAX_ATTEMPTS {
             let clear = self.try_course(scene).unwrap_or(NONE_CLEAR);
@@ -72,8 +73,7 @@ impl EdgeTracer {
             if clear > best.0 {
                 best = (clear, attempt);
                 std::mem::swap(&mut self.occlusion.free, &mut self.occlusion.best_free);
-                self.occlusion.free.clear();
-                self.occlusion.free.extend_from_slice(&self.occlusion.best_free);
+                refill(&mut self.occlusion.free, self.occlusion.best_free.iter().copied());
             }
             if attempt + 1 < MAX_ATTEMPTS {
                 self.exclude_course();
@@ -100,21 +100,19 @@ impl EdgeTracer {
         self.textured.scatter = None;
     }
 
-    /// Locates an edge from its clear rows where the bead's other edge shows how this one runs: where most
-    /// of it is covered, what covers it may agree better than what is left.
-    /// `places` are those that run beside the other edge, one a band, NaN in
-    /// bands without.
+    /// Locates an edge from its clear rows where the bead's other edge shows how this one runs:
+    /// where most of it is covered, what covers it may agree better than what is left. `positions`
+    /// are those that run beside the other edge, one a band, NaN in bands without.
     #[cold]
     #[inline(never)]
     pub fn locate_occluded_along<T: GreyPixel>(
         &mut self,
         scene: &TraceInput<'_, T>,
         blur: BlurEstimate,
-        places: &[f32],
+        positions: &[f32],
     ) {
         self.look_row_by_row();
-        self.occlusion.free.clear();
-        self.occlusion.free.extend_from_slice(places);
+        refill(&mut self.occlusion.free, positions.iter().copied());
         if self.try_course(scene).is_some() && self.locate_from_clear_rows(scene) {
             self.state = EdgeState::Occluded;
         } else {
@@ -122,16 +120,16 @@ impl EdgeTracer {
         }
     }
 
-    /// Takes out the few places that lie far from the course on which the others
+    /// Takes out the few positions that lie far from the course on which the others
     /// agree: between gaps they have no neighbours that could tell. `least_px`
     /// is the least distance that makes a stray. Where there are many, they stay,
     /// and tell that the edge is unsure.
     pub fn drop_strays(&mut self, least_px: f64) {
         self.scratch.rough.clear();
-        let places = self.edges.iter();
+        let positions = self.edges.iter();
         self.scratch
             .rough
-            .extend(places.map(|edge| edge.map_or(f32::NAN, |edge| narrow_to_f32(edge.at))));
+            .extend(positions.map(|edge| edge.map_or(f32::NAN, |edge| narrow_to_f32(edge.at))));
         self.scratch.sorted.clear();
         self.scratch
             .sorted
@@ -166,7 +164,7 @@ impl EdgeTracer {
     }
 
     /// Tells the clear rows along the course that most of the free bands agree
-    /// on, and their share. `None` where there are too few.
+    /// on, and their fraction. `None` where there are too few.
     #[inline(never)]
     fn try_course<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> Option<f32> {
         self.occlusion.clear.clear();
@@ -204,13 +202,11 @@ impl EdgeTracer {
 
     /// The course that most bands agree on, in place and levels.
     fn take_course<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
-        self.scratch.rough.clear();
-        self.scratch.rough.extend_from_slice(&self.occlusion.free);
+        refill(&mut self.scratch.rough, self.occlusion.free.iter().copied());
         if keep_consensus(&mut self.scratch.rough, MAX_OFFSET_PX) < 4 {
             return false;
         }
-        self.occlusion.trusted.clear();
-        self.occlusion.trusted.extend(self.scratch.rough.iter().map(|at| at.is_finite()));
+        refill(&mut self.occlusion.trusted, self.scratch.rough.iter().map(|at| at.is_finite()));
         self.fill_rough();
         std::mem::swap(&mut self.scratch.rough, &mut self.values.path);
         self.pick_raw_levels(scene);
@@ -290,8 +286,7 @@ impl EdgeTracer {
 
     /// Squares that a clear row leaves at most.
     fn max_row_misfit(&mut self, noise: f32) -> f32 {
-        self.scratch.sorted.clear();
-        self.scratch.sorted.extend(self.row_fit.groups.iter().map(|group| group.misfit));
+        refill(&mut self.scratch.sorted, self.row_fit.groups.iter().map(|group| group.misfit));
         let rank = self.scratch.sorted.len() * CLEAR_PERCENTILE / 100;
         let sure = rank::at(&mut self.scratch.sorted, rank).unwrap_or(f32::INFINITY);
         let pixels = narrow_to_f32(self.row_fit.template.products.pixels);

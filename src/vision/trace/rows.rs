@@ -1,15 +1,17 @@
-//! The rows of an edge, each held against it: where it shows the edge, and
+//! The rows of an edge, each compared with it: where it shows the edge, and
 //! whether it shows anything else.
 
+use crate::vision::buffer::{refill, reset};
 use std::ops::Range;
 
 use nalgebra::Matrix3;
 
 use super::band_sums::BandSums;
 use super::group::RowGroup;
-use super::{EdgeTracer, NOISE_SIGMAS, TraceInput};
+use super::{EdgeTracer, TraceInput};
 use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::numeric::rank;
+use crate::vision::pixel_noise::NOISE_SIGMAS;
 use crate::vision::strip::GreyPixel;
 use crate::vision::template::{ExpectedStep, PlainSums, RowSums};
 
@@ -17,20 +19,19 @@ use crate::vision::template::{ExpectedStep, PlainSums, RowSums};
 const MAX_MISFIT_RATIO: f32 = 2.5;
 /// Rows of a band may differ by this much beside their noise \[px\].
 const ROW_WAVINESS_PX: f32 = 0.5;
-/// Wild pixels that a row may have; more are a grain.
+/// Outlying pixels that a row may have; more are a grain.
 const MAX_WILD_PIXELS: f32 = 2.0;
 /// By how much the squares that a row leaves exceed what may be noise, where it
-/// is covered for certain.
+/// is covered certainly.
 const UNFIT_MISFIT_RATIO: f32 = 1.5;
 
 impl EdgeTracer {
-    /// Holds every window against the edge.
+    /// Compares every window with the edge.
     #[inline(always)]
     pub fn compare_rows<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let softness = 1.0 / narrow_to_f32(self.row_fit.template.products.slope_slope);
         self.row_fit.groups.clear();
-        self.row_fit.plain.clear();
-        self.row_fit.plain.resize(scene.lines.len(), PlainSums::default());
+        reset(&mut self.row_fit.plain, scene.lines.len(), PlainSums::default());
         // Noise of a pixel in the mean of so many rows.
         let (mut rows, mut noise) = (0.0, 0.0);
         for (number, window) in self.sheet.windows.iter().enumerate() {
@@ -55,7 +56,7 @@ impl EdgeTracer {
         }
     }
 
-    /// What the mean of some rows is held against, whose pixels have a noise.
+    /// What the mean of some rows is compared with, whose pixels have a noise.
     #[inline(always)]
     pub fn expected(edge: [f32; 3], noise: f32) -> ExpectedStep {
         let (noise, step) = (NOISE_SIGMAS * noise, edge[2].abs());
@@ -82,8 +83,7 @@ impl EdgeTracer {
     #[inline(always)]
     pub fn sum_bands<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let products = self.row_fit.template.products;
-        self.scratch.sorted.clear();
-        self.scratch.sorted.extend(self.row_fit.groups.iter().map(|group| group.misfit));
+        refill(&mut self.scratch.sorted, self.row_fit.groups.iter().map(|group| group.misfit));
         if !self.occlusion.clear.is_empty() {
             // What is hidden says nothing.
             self.scratch.sorted.retain(|misfit| misfit.is_finite());
@@ -98,7 +98,7 @@ impl EdgeTracer {
         let limit = variance * (pixels + NOISE_SIGMAS * (2.0 * pixels * alike).sqrt());
         let limit = limit.max(MAX_MISFIT_RATIO * median);
         self.misfit = f64::from(median / (variance * pixels)).sqrt();
-        // The variance of a window in texture has the texture's share of it already.
+        // The variance of a window in texture has the texture's fraction of it already.
         self.max_group_rows = if self.textured.texture.is_some() { 1.0 } else { together.into() };
         let covered = |group: &&RowGroup| {
             group.misfit > UNFIT_MISFIT_RATIO * limit || group.misfit == f32::INFINITY
@@ -121,7 +121,7 @@ impl EdgeTracer {
         }
     }
 
-    /// Rows next to one that fits badly share its grain or spark.
+    /// Rows next to one that fits badly fraction its grain or spark.
     fn spread_misfits(&mut self, limit: f32) {
         let mut before = 0.0;
         for k in 0..self.row_fit.groups.len() {

@@ -12,10 +12,10 @@ use crate::vision::strip::GreyPixel;
 /// \[px\]: three of four bands do. Grains on a tenth of the rows do not make an edge
 /// wind; those on a third do.
 const MIN_WINDING_PX: f32 = 0.12;
-/// The same for each share of the step that the noise of a pixel is \[px\]: picks
+/// The same for each fraction of the step that the noise of a pixel is \[px\]: picks
 /// scatter by it.
 const WINDING_PER_NOISE_PX: f32 = 2.5;
-/// Share of its rows that an edge may lose to a spark or two; one that loses more
+/// Fraction of its rows that an edge may lose to a spark or two; one that loses more
 /// may wind.
 const MAX_LOST_FRACTION: f64 = 0.12;
 /// Times that a winding edge is followed.
@@ -24,7 +24,7 @@ const MAX_PASSES: usize = 3;
 const SEARCH_HALF_PX: usize = 8;
 /// Pixels on either side of a step that tell its height.
 const STEP_HALF_WIDTH: usize = 4;
-/// Share of the expected step that a line must show.
+/// Fraction of the expected step that a line must show.
 const MIN_STEP_FRACTION: f32 = 0.25;
 
 impl EdgeTracer {
@@ -61,7 +61,7 @@ impl EdgeTracer {
         rank::at(&mut self.scratch.sorted, quarter).unwrap_or(0.0) / least
     }
 
-    /// Locates the edge along places picked from line to line. Returns whether all but a
+    /// Locates the edge along positions picked from line to line. Returns whether all but a
     /// few rows show it: then it winds, and nothing covers it.
     #[cold]
     #[inline(never)]
@@ -86,18 +86,18 @@ impl EdgeTracer {
         false
     }
 
-    /// Fills the rough places with the edges that were found; where none was, a
+    /// Fills the rough positions with the edges that were found; where none was, a
     /// winding edge stays on its course, and another one runs straight on.
     pub fn fill_from_edges<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let (course, winds) = (&self.course, self.winding.is_followed);
-        let places = self.edges.iter().zip(scene.lines).map(|(edge, &line)| match edge {
+        let positions = self.edges.iter().zip(scene.lines).map(|(edge, &line)| match edge {
             Some(edge) => Some(narrow_to_f32(edge.at)),
             None => winds.then(|| course.at(narrow_to_f32(line.middle()))[0]),
         });
-        path::fill(places, &mut self.scratch.rough);
+        path::fill(positions, &mut self.scratch.rough);
     }
 
-    /// Draws the course through the places where each line has its highest step.
+    /// Draws the course through the positions where each line has its highest step.
     /// Returns whether there is any.
     #[cold]
     #[inline(never)]
@@ -137,7 +137,7 @@ fn could_wind<T: GreyPixel>(scene: &TraceInput<'_, T>) -> bool {
     scene.lines.len() > scene.bands.count() && scene.strip.along > MAX_SINGLE_ROWS
 }
 
-/// Place of the highest step of the expected kind in a window \[px\].
+/// Position of the highest step of the expected kind in a window \[px\].
 fn pick(window: &EdgeWindow, pixels: &[f32; WINDOW_PX]) -> Option<f32> {
     let [_, _, step] = window.expected;
     let height = |k: usize| {
@@ -150,11 +150,11 @@ fn pick(window: &EdgeWindow, pixels: &[f32; WINDOW_PX]) -> Option<f32> {
     let bend = before + after - 2.0 * here;
     let enough = here >= MIN_STEP_FRACTION * to_f32(STEP_HALF_WIDTH) && bend < 0.0;
     let ahead = (0.5 * (before - after) / bend).clamp(-1.0, 1.0);
-    enough.then(|| place(window.first) + to_f32(best) - 0.5 + ahead)
+    enough.then(|| position(window.first) + to_f32(best) - 0.5 + ahead)
 }
 
-#[expect(clippy::cast_precision_loss, reason = "a place near the gauge")]
-fn place(at: isize) -> f32 {
+#[expect(clippy::cast_precision_loss, reason = "a position near the gauge")]
+fn position(at: isize) -> f32 {
     at as f32
 }
 
