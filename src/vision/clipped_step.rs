@@ -16,22 +16,28 @@ use crate::numeric::rank;
 
 /// Parts along the bead that are distinguished, because light may change.
 const PARTS_ALONG: usize = 3;
+/// Gauss–Newton steps at most; a fit that needs more does not converge.
 const MAX_STEPS: usize = 30;
 /// Steps after which the window stays where it is: a pixel that comes and goes
 /// at its ends keeps a fit from settling.
 const WINDOW_STEPS: usize = 4;
+/// Smallest blur that is fitted \[px\]: a pixel alone has 1/√12 = 0.29.
 const MIN_BLUR_PX: f64 = 0.3;
-/// How far either side is looked at, in blurs and pixels beside.
+/// How far the hidden side is read, in blurs. Derived: beyond 3.5 blurs 2·10⁻⁴ of a step is left, 1
+/// − Φ(3.5).
 const CLIPPED_SIDE_BLURS: f64 = 3.5;
+/// How far the visible side is read, in blurs. Derived: beyond 3 blurs 1.3·10⁻³ of a step is left,
+/// 1 − Φ(3).
 const VISIBLE_SIDE_BLURS: f64 = 3.0;
+/// And beyond that \[px\]: enough to tell the level, little enough to leave its slope out.
 const BESIDE_PX: f64 = 12.0;
 /// The hidden level is not expected farther above the end of the scale than so
 /// many times what can be seen, as a standard deviation.
 const HIDDEN_LEVEL_SIGMA: f64 = 2.0;
 /// Fraction by which blur may change from frame to frame, as a standard deviation.
 const BLUR_DRIFT: f64 = 0.002;
-/// A blur that differs from that of the frames before by more standard
-/// deviations is another one.
+/// A blur that differs from that of the frames before by more standard deviations is another one.
+/// Derived: noise alone exceeds 4 in 6 of 100,000 frames.
 const BLUR_CHANGE_SIGMAS: f64 = 4.0;
 /// Levels below which ground says nothing of the light \[grey levels\].
 const MIN_LIGHT_GREY: f64 = 25.0;
@@ -414,10 +420,10 @@ mod tests {
     use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
     use crate::vision::edge_windows::Grouping;
-    use crate::vision::gauge::BeadAxis;
+    use crate::vision::gauge::{BeadAxis, GaugeView};
     use crate::vision::path::EdgeCorrection;
     use crate::vision::row_range::RowRange;
-    use crate::vision::strip::{GaugeRowsOfDepth, GaugeView, RowLayout};
+    use crate::vision::strip::{GaugeRowsOfDepth, RowLayout};
 
     const SIZE: (usize, usize) = (120, 40);
     const LINES: [RowRange; 4] =

@@ -1,7 +1,8 @@
 //! Candidates for an edge: the strongest steps of a profile, up and down.
 
-/// Pixels on either side of a position that are compared for a step there. Wide
-/// enough to gather a blurred edge, narrow enough to keep two apart.
+/// Pixels on either side of a position that are compared for a step there. Wide enough to hold a
+/// blurred edge, narrow enough to keep two apart. By definition of [`respond`], which adds four and
+/// four.
 pub const STEP_HALF_WIDTH: usize = 4;
 
 /// Positions that are passed over together where nothing reaches the floor. Derived: 32 numbers of

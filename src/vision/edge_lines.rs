@@ -13,9 +13,8 @@ use crate::core::geometry::ImagePoint;
 use crate::core::units::{Mm, WidthRange};
 use crate::numeric::number::{floor_to_count, to_f64};
 
-use super::gauge::{Gauge, Polarity};
+use super::gauge::{Gauge, GaugeView, Polarity};
 use super::reject::Reject;
-use super::strip::GaugeView;
 use super::width::{Hints, WidthMeasurement};
 
 /// Standard deviation of the distance of two lines of whole pixels \[px\]. Derived: rounding leaves

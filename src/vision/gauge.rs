@@ -1,10 +1,9 @@
 //! Where in the image the bead is measured, and what it looks like there.
 
 use crate::calibration::SurfaceMap;
-use crate::core::geometry::Roi;
+use crate::core::geometry::{ImagePoint, Roi};
 use crate::core::units::{Mm, WidthRange};
 use crate::numeric::number::to_f64;
-use crate::vision::strip::GaugeView;
 
 /// How the bead runs in the image, to within 20 degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,6 +119,48 @@ impl Gauge {
         // From boundary to boundary of its pixels, the first of which has its centre at 0.
         let ends = [-0.5, to_f64(view.along) - 0.5].map(|along| view.to_image(middle, along));
         Mm::new((map.to_mm(ends[1])? - map.to_mm(ends[0])?).norm()).ok()
+    }
+}
+
+/// The gauge placed over an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GaugeView {
+    /// The region.
+    pub roi: Roi,
+    /// How the bead runs in it.
+    pub axis: BeadAxis,
+    /// Number of pixels across the bead.
+    pub across: usize,
+    /// Number of pixels along the bead.
+    pub along: usize,
+}
+
+impl GaugeView {
+    /// Lays a region over an image.
+    pub fn new(roi: Roi, axis: BeadAxis) -> Self {
+        let (across, along) = match axis {
+            BeadAxis::Vertical => (roi.width, roi.height),
+            BeadAxis::Horizontal => (roi.height, roi.width),
+        };
+        Self { roi, axis, across, along }
+    }
+
+    /// The image point of gauge coordinates.
+    pub fn to_image(self, u: f64, v: f64) -> ImagePoint {
+        let (x, y) = (to_f64(self.roi.x), to_f64(self.roi.y));
+        match self.axis {
+            BeadAxis::Vertical => ImagePoint::new(x + u, y + v),
+            BeadAxis::Horizontal => ImagePoint::new(x + v, y + u),
+        }
+    }
+
+    /// Gauge coordinates of an image point: across the bead, along it.
+    pub fn from_image(self, at: ImagePoint) -> (f64, f64) {
+        let (x, y) = (at.x - to_f64(self.roi.x), at.y - to_f64(self.roi.y));
+        match self.axis {
+            BeadAxis::Vertical => (x, y),
+            BeadAxis::Horizontal => (y, x),
+        }
     }
 }
 

@@ -302,7 +302,7 @@ mod tests {
         let frame = frame.unwrap();
         let roi = crate::core::geometry::Roi { x: 0, y: 0, width: 20, height: 43 };
         let view =
-            crate::vision::strip::GaugeView::new(roi, crate::vision::gauge::BeadAxis::Vertical);
+            crate::vision::gauge::GaugeView::new(roi, crate::vision::gauge::BeadAxis::Vertical);
         let mut turner = crate::vision::strip::RowLayout::default();
         let crate::vision::strip::GaugeRowsOfDepth::Bytes(strip) =
             turner.strips(&frame, &view, None)

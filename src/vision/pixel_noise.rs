@@ -114,8 +114,8 @@ mod tests {
     use crate::core::frame::{Frame, Pixels};
     use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
-    use crate::vision::gauge::BeadAxis;
-    use crate::vision::strip::{GaugeRowsOfDepth, GaugeView, RowLayout};
+    use crate::vision::gauge::{BeadAxis, GaugeView};
+    use crate::vision::strip::{GaugeRowsOfDepth, RowLayout};
     use rand::SeedableRng;
     use rand_distr::{Distribution, Normal};
 

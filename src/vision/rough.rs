@@ -64,9 +64,10 @@ const MAX_SHAPE_OFFSET_PX: f64 = 0.5;
 /// flank. Measured on 12,000 rendered beads.
 const GROOVE_WAVINESS_FRACTION: f64 = 0.15;
 const MAX_GROOVE_WAVINESS_PX: f64 = 0.15;
-/// The same beside one that shows it and is not wider than that \[px\]: without it, 3.5 of 30,000
-/// drawn widths were more than 5 sigma off, with it 2.5.
+/// The same beside a groove that shows its depth and is narrow. Measured: ACCURACY.md, Drawn frames
+/// (`grooves`): without it 3.5 of 30,000 widths were more than 5 sigma off, with it 2.5.
 const NARROW_GROOVE_WAVINESS_FRACTION: f64 = 0.06;
+/// Widest groove that is narrow in this sense \[px\].
 const MAX_NARROW_GROOVE_PX: f64 = 7.5;
 
 /// Standard deviation, beside that of noise, of where rows pass half height as the edge beside a

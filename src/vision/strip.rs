@@ -5,55 +5,13 @@
 //! `u` runs along y, so that its upper edge is the left one.
 
 use crate::core::frame::{Frame, Pixels};
-use crate::core::geometry::{ImagePoint, Roi};
 
 use super::gamma::LightTable;
-use super::gauge::BeadAxis;
-use crate::numeric::number::to_f64;
+use super::gauge::{BeadAxis, GaugeView};
 
 /// Side of the squares in which a region is turned. Derived: 16 bytes fill a vector of 128 bits,
 /// and reading and writing stay in the cache.
 const TILE: usize = 16;
-
-/// The gauge placed over an image.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GaugeView {
-    roi: Roi,
-    axis: BeadAxis,
-    /// Number of pixels across the bead.
-    pub across: usize,
-    /// Number of pixels along the bead.
-    pub along: usize,
-}
-
-impl GaugeView {
-    /// Lays a region over an image.
-    pub fn new(roi: Roi, axis: BeadAxis) -> Self {
-        let (across, along) = match axis {
-            BeadAxis::Vertical => (roi.width, roi.height),
-            BeadAxis::Horizontal => (roi.height, roi.width),
-        };
-        Self { roi, axis, across, along }
-    }
-
-    /// The image point of gauge coordinates.
-    pub fn to_image(self, u: f64, v: f64) -> ImagePoint {
-        let (x, y) = (to_f64(self.roi.x), to_f64(self.roi.y));
-        match self.axis {
-            BeadAxis::Vertical => ImagePoint::new(x + u, y + v),
-            BeadAxis::Horizontal => ImagePoint::new(x + v, y + u),
-        }
-    }
-
-    /// Gauge coordinates of an image point: across the bead, along it.
-    pub fn from_image(self, at: ImagePoint) -> (f64, f64) {
-        let (x, y) = (at.x - to_f64(self.roi.x), at.y - to_f64(self.roi.y));
-        match self.axis {
-            BeadAxis::Vertical => (x, y),
-            BeadAxis::Horizontal => (y, x),
-        }
-    }
-}
 
 /// Grey values as the measurement takes them.
 pub trait GreyPixel: Copy + Default + PartialOrd + Into<u32> {
@@ -311,7 +269,7 @@ fn transposed<T: GreyPixel>(mut tile: [[T; TILE]; TILE]) -> [[T; TILE]; TILE] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::geometry::Size;
+    use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
 
     fn ramp() -> Frame {

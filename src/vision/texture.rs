@@ -36,8 +36,12 @@ const MAX_SIDE_PX: usize = 40;
 
 /// Autocorrelations exp(−(r/length)^power) that are tried, up to 19 px.
 const POWERS: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
+/// Number of the lengths that are tried. Derived: 0.7 · 1.12²⁹ = 19 px, beyond the longest texture
+/// that is accepted.
 const LENGTHS: usize = 30;
+/// The shortest of them \[px\]: a shorter texture is noise.
 const FIRST_LENGTH_PX: f64 = 0.7;
+/// Ratio of one to the next.
 const LENGTH_RATIO: f64 = 1.12;
 /// Rows of a window at most; more are taken for so many.
 const MAX_ROWS: usize = 8;

@@ -3,9 +3,8 @@
 use crate::calibration::SurfaceMap;
 use crate::core::geometry::SurfacePoint;
 use crate::vision::curve::{Curve, EdgePoint};
-use crate::vision::gauge::Gauge;
+use crate::vision::gauge::{Gauge, GaugeView};
 use crate::vision::located::CaliperEdge;
-use crate::vision::strip::GaugeView;
 
 /// One edge as it was found.
 #[derive(Debug, Clone, Copy)]

@@ -9,8 +9,9 @@ use crate::vision::rough::RoughFit;
 /// frames: patterns of up to a third (`ground-texture-weak`) are measured, of stronger ones
 /// (`ground-texture-strong`) parts are taken for the bead.
 pub(super) const MAX_PATTERN: f64 = 0.37;
-/// The same where edges were located line by line: drawn widths beside a pattern of 0.25 and
-/// 0.31 were 53 and 22 px off. A real strand has up to 0.2, real printed lines up to 0.24.
+/// The same where edges were located line by line. Measured: ACCURACY.md, Drawn frames
+/// (`ground-texture-weak`): widths beside a pattern of 0.25 and 0.31 were 53 and 22 px off. A real
+/// strand has up to 0.2, real printed lines up to 0.24.
 pub(super) const MAX_PATTERN_LINE_BY_LINE: f64 = 0.25;
 /// The same where no mean profile tells the edges. Beside beads of real concrete, which
 /// have a texture themselves, other beads and grooves have up to 0.464; a pattern beside a

@@ -19,7 +19,8 @@ use crate::vision::trace::EdgeTracer;
 /// Weakest pattern, as a fraction of the contrast, beside which blurred steps are not
 /// good enough: one of less draws them outwards by hardly 0.02 px.
 const MIN_PATTERN: f64 = 0.06;
-/// The same of the bead's texture: sparks over 5 % of a smooth bead look like up to 0.12.
+/// Weakest texture of the bead that is looked at, as a fraction of the contrast. Measured:
+/// ACCURACY.md, The sets: sparks over 5 % of a smooth bead (`spots`) look like up to 0.12.
 const MIN_TEXTURE: f64 = 0.13;
 /// The least of both edges' as a fraction of the other's where it is the same texture.
 const MIN_TEXTURE_RATIO: f64 = 0.4;

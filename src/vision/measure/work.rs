@@ -6,7 +6,7 @@ use crate::vision::axis;
 use crate::vision::coarse::{LinePair, LineSearch};
 use crate::vision::contour::EdgeContours;
 use crate::vision::edge::StepCandidates;
-use crate::vision::gauge::{Gauge, WidthRangePx};
+use crate::vision::gauge::{Gauge, GaugeView, WidthRangePx};
 use crate::vision::ground::{EdgePosition, PatternSearch};
 use crate::vision::mean_edge::MeanEdge;
 use crate::vision::motion::BlurShapes;
@@ -16,7 +16,7 @@ use crate::vision::pool::Bands;
 use crate::vision::reject::Reject;
 use crate::vision::rough::RoughEdge;
 use crate::vision::row_range::RowRange;
-use crate::vision::strip::{GaugeRows, GaugeView};
+use crate::vision::strip::GaugeRows;
 use crate::vision::trace::EdgeTracer;
 use crate::vision::width::WidthMeasurement;
 

@@ -7,6 +7,8 @@ const MAX_GROOVE_PX: usize = 9;
 /// By how much what lies beyond a groove is nearer to the bead's level at least: a fraction
 /// of the step, and standard deviations of noise.
 const MIN_RISE: f64 = 0.015;
+/// The same in standard deviations of noise. Derived: noise alone exceeds 5 in 6 of ten million
+/// positions.
 const MIN_RISE_SIGMAS: f64 = 5.0;
 
 impl Overlay {

@@ -4,7 +4,8 @@ use crate::numeric::blurred_step::StepTable;
 
 /// Smallest blur of a step \[px\].
 pub const MIN_BLUR_PX: f64 = 0.3;
-/// Farthest that a flank is fitted, in blurs: from there on its tail is nothing.
+/// Farthest that a step beside the edge is fitted, in blurs. Derived: beyond 7 blurs 10⁻¹² of a
+/// step is left, 1 − Φ(7).
 const MAX_NEIGHBOUR_BLURS: f64 = 7.0;
 
 /// Samples that are free of anything but this edge, on either side \[px\].

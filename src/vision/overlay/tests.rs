@@ -5,9 +5,9 @@ use crate::core::time::Stamp;
 use crate::numeric::blurred_step::StepTable;
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::edge_windows::Grouping;
-use crate::vision::gauge::BeadAxis;
+use crate::vision::gauge::{BeadAxis, GaugeView};
 use crate::vision::row_range::RowRange;
-use crate::vision::strip::{GaugeRowsOfDepth, GaugeView, RowLayout};
+use crate::vision::strip::{GaugeRowsOfDepth, RowLayout};
 
 const ROWS: usize = 100;
 const COLUMNS: usize = 160;

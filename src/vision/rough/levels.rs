@@ -4,8 +4,7 @@
 use super::crossing::{self, Crossing, RowLevels};
 use super::kernel;
 use super::mean_profile::{
-    BlockProfile, MIN_GROUND_PX, MeanProfile, OUTSIDE_PX, PROFILE_PX, darkest_of, mean_of,
-    mean_profile,
+    BlockProfile, MIN_GROUND_PX, MeanProfile, OUTSIDE_PX, PROFILE_PX, darkest_of, mean_profile,
 };
 use super::rough_input::RoughInput;
 use super::window::{BLOCK_ROWS, RowWindows, STRAIGHT_ROWS};
@@ -238,7 +237,7 @@ impl BlockLevels {
     fn read_outside(&mut self, profile: &[f32; AROUND_PX], mean: &MeanProfile) {
         self.darkest = darkest_of(profile, mean.outside.0.saturating_sub(3));
         self.outside =
-            if mean.on_ground { mean_of(profile, mean.ground()) } else { profile[self.darkest] };
+            if mean.on_ground { mean.ground_level(profile) } else { profile[self.darkest] };
     }
 }
 

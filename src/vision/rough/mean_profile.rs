@@ -87,6 +87,11 @@ impl MeanProfile {
         f64::from(squares / to_f32(positions.len())).sqrt()
     }
 
+    /// Level of the ground in a profile of its rows \[grey levels\].
+    pub fn ground_level(&self, profile: &[f32]) -> f32 {
+        mean_of(profile, self.ground())
+    }
+
     /// Positions whose mean is the level of the ground: without those where the flank
     /// begins.
     pub fn ground(&self) -> (usize, usize) {
@@ -196,7 +201,6 @@ pub fn darkest_of(profile: &[f32], from: usize) -> usize {
     darkest
 }
 
-/// Mean of a profile from a position up to before another.
-pub fn mean_of(profile: &[f32], (from, to): (usize, usize)) -> f32 {
+fn mean_of(profile: &[f32], (from, to): (usize, usize)) -> f32 {
     profile[from..to].iter().sum::<f32>() / to_f32(to - from)
 }

@@ -6,9 +6,9 @@ use super::*;
 use crate::core::frame::{Frame, Pixels};
 use crate::core::geometry::{Roi, Size};
 use crate::core::time::Stamp;
-use crate::vision::gauge::BeadAxis;
+use crate::vision::gauge::{BeadAxis, GaugeView};
 use crate::vision::pool;
-use crate::vision::strip::{GaugeRowsOfDepth, GaugeView, RowLayout};
+use crate::vision::strip::{GaugeRowsOfDepth, RowLayout};
 
 const COLUMNS: usize = 160;
 const CALIPERS: usize = 64;

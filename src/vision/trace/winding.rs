@@ -4,6 +4,7 @@
 use super::{EdgeTracer, MAX_UNFIT_FRACTION, StepFit, TraceInput, typical};
 use crate::numeric::number::{narrow_to_f32, to_f32};
 use crate::numeric::rank;
+use crate::vision::edge::STEP_HALF_WIDTH;
 use crate::vision::edge_windows::{EdgeWindow, Grouping, MAX_SINGLE_ROWS, MIDDLE_PX, WINDOW_PX};
 use crate::vision::path;
 use crate::vision::strip::GreyPixel;
@@ -22,8 +23,6 @@ const MAX_LOST_FRACTION: f64 = 0.12;
 const MAX_PASSES: usize = 3;
 /// How far beside the line between two bands the edge is looked for \[px\].
 const SEARCH_HALF_PX: usize = 8;
-/// Pixels on either side of a step that tell its height.
-const STEP_HALF_WIDTH: usize = 4;
 /// Fraction of the expected step that a line must show.
 const MIN_STEP_FRACTION: f32 = 0.25;
 
