@@ -1,4 +1,4 @@
-//! Blur of an edge, from all calipers together: the profiles are laid over
+//! Blur of an edge, from all calipers together: the profiles are superimposed on
 //! each other at half-pixel steps and a step of free blur is fitted.
 
 use crate::numeric::number::{floor_to_count, to_f64};

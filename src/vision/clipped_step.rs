@@ -1,5 +1,5 @@
 //! An edge one side of which passes the end of the camera's scale. The part of
-//! its flank that can be seen tells position, blur and the level that cannot be
+//! its flank that can be seen shows position, blur and the level that cannot be
 //! seen together; rows are then compared with that step, clipped as they are.
 
 use nalgebra::{Matrix2, Vector2};
@@ -29,7 +29,7 @@ const CLIPPED_SIDE_BLURS: f64 = 3.5;
 /// How far the visible side is read, in blurs. Derived: beyond 3 blurs 1.3·10⁻³ of a step is left,
 /// 1 − Φ(3).
 const VISIBLE_SIDE_BLURS: f64 = 3.0;
-/// And beyond that \[px\]: enough to tell the level, little enough to leave its slope out.
+/// And beyond that \[px\]: enough to show the level, little enough to leave its slope out.
 const BESIDE_PX: f64 = 12.0;
 /// The hidden level is not expected farther above the end of the scale than so
 /// many times what can be seen, as a standard deviation.
@@ -39,7 +39,7 @@ const BLUR_DRIFT: f64 = 0.002;
 /// A blur that differs from that of the frames before by more standard deviations is another one.
 /// Derived: noise alone exceeds 4 in 6 of 100,000 frames.
 const BLUR_CHANGE_SIGMAS: f64 = 4.0;
-/// Levels below which ground says nothing of the light \[grey levels\].
+/// Levels below which ground shows nothing of the light \[grey levels\].
 const MIN_LIGHT_GREY: f64 = 25.0;
 /// Rows that fit worse than the median by so many times do not count.
 const MAX_MISFIT_RATIO: f64 = 2.5;
@@ -82,7 +82,7 @@ pub struct ClippedScene<'a> {
     pub shading: f64,
 }
 
-/// What a flank tells.
+/// What a flank shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClippedStepFit {
     /// The step.
@@ -98,7 +98,7 @@ pub struct ClippedStepFit {
     mean_visible: f64,
 }
 
-/// What a caliper line tells of the edge.
+/// What a caliper line shows of the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClippedLine {
     /// Distance from the path \[px\].
@@ -119,7 +119,7 @@ pub struct ClippedEdge {
     blur: Option<BlurEstimate>,
 }
 
-/// What a row tells.
+/// What a row shows.
 #[derive(Debug, Clone, Copy, Default)]
 struct ClippedRow {
     line: usize,
@@ -241,7 +241,7 @@ impl ClippedEdge {
         None
     }
 
-    /// The blur that is expected where a frame alone says so much: that of the
+    /// The blur that is expected where a frame alone determines it so well: that of the
     /// frames before, as far as the lens is still the same.
     pub fn expected_blur(&self, alone: &ClippedStepFit) -> Option<BlurEstimate> {
         let BlurEstimate { px, sd_px } = self.blur?;
@@ -288,7 +288,7 @@ impl ClippedEdge {
         (normal, square / f64::max(n, 1.0))
     }
 
-    /// Compares the windows of a sheet with a step where it is expected, and says
+    /// Compares the windows of a sheet with a step where it is expected, and shows
     /// how far each of so many caliper lines is from it. Returns what a window in
     /// the median leaves, in standard deviations of its noise.
     pub fn locate(

@@ -62,7 +62,7 @@ impl Curve {
         let (straight, _) = sums.curve::<LINE_TERMS>()?;
         let Some((few, off)) = sums.curve::<PARABOLA_TERMS>() else { return Some(straight) };
         let with_scatter = |curve: Self| Some(Self { about_parabola: off, ..curve });
-        // An unsure bend would tell wrong positions beyond the gauge's ends,
+        // An unsure bend would give wrong positions beyond the gauge's ends,
         // where the normals of a slanted bead may cross it.
         let notable = off > NOTABLE_SCATTER_PX * NOTABLE_SCATTER_PX;
         let more = (notable && sums.weight >= 4.0 * to_f64(MAX_TERMS))

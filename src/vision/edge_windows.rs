@@ -67,7 +67,7 @@ impl EdgeWindows {
         }
     }
 
-    /// Reads the windows about an edge of which `expected` is told for a position
+    /// Reads the windows about an edge of which `expected` is given for a position
     /// along it. Rows are taken together within caliper lines: one where there are
     /// few, more where a tall gauge has plenty.
     #[inline(always)]
@@ -136,7 +136,7 @@ fn average<T: GreyPixel>(
     }
 }
 
-/// The pixels of a row from a position on; `memory` is for those beyond its ends.
+/// The pixels of a row from a position on; `scratch` is for those beyond its ends.
 #[inline(always)]
 fn pixels<'a, T: GreyPixel>(
     strip: &GaugeRows<'a, T>,

@@ -24,7 +24,7 @@ pub struct FittedEdge {
     pub shading: f64,
 }
 
-/// What neighbours say of ground, height and shading, each with its variance.
+/// What neighbours show of ground, height and shading, each with its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// Ground, height, shading.

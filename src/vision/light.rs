@@ -1,5 +1,5 @@
 //! Light that falls off over the gauge, as a lens's does towards its corners: it bends the
-//! levels beside an edge by less than their noise shows there, and tells by how much by its
+//! levels beside an edge by less than their noise shows there, and shows by how much by its
 //! slopes at both edges.
 
 use super::overlay::{HALF_SPAN, SideShading, StepShape};
@@ -37,7 +37,7 @@ impl Surroundings<'_> {
     }
 
     /// Relative change of the light at the edge \[1/px\]; `None` where the two sides do not
-    /// tell the same of it.
+    /// show the same of it.
     fn light(&self) -> Option<f64> {
         let [before, after] = self.levels();
         let [outwards, onwards] = self.shape.shading.map(|shading| shading.slope);

@@ -53,7 +53,7 @@ const MAX_BEAD_PX: usize = 120;
 const FLANK_BLURS: f64 = 4.0;
 /// Bead beside the flank whose mean is its level \[px\].
 const LEVEL_PX: usize = 24;
-/// Columns of the ground that tell its pattern, and their distance \[px\].
+/// Columns of the ground that show its pattern, and their distance \[px\].
 const MIN_COLUMNS: usize = 6;
 const COLUMN_PX: usize = 2;
 
@@ -90,13 +90,9 @@ impl MeanFit {
             contrast: self.contrast,
             blur_px,
             bead_grey: self.bead_grey,
-            is_groove: false,
-            is_narrow_groove: false,
             is_on_ground: true,
-            odd_fraction: 0.0,
-            odd_fraction_within: 0.0,
-            along_px: 0.0,
             lines_fraction: 1.0,
+            ..RoughFit::default()
         }
     }
 }

@@ -102,7 +102,7 @@ impl Measurer {
     }
 
     /// Adds to the hints of the width that was measured last how skewed its flanks are: not
-    /// needed for a width, and told well only by many frames.
+    /// needed for a width, and determined well only by many frames.
     #[must_use]
     pub fn with_skew(&self, found: WidthMeasurement) -> WidthMeasurement {
         WidthMeasurement { hints: Hints { skew: self.work.skew(), ..found.hints }, ..found }
@@ -206,7 +206,7 @@ impl MeasureState {
         }
     }
 
-    /// Measures edges that were measured as blurred steps in another way, where that tells
+    /// Measures edges that were measured as blurred steps in another way, where that shows
     /// more; otherwise gives what was found.
     fn refine_measurement<T: GreyPixel>(
         &mut self,
@@ -214,10 +214,10 @@ impl MeasureState {
         frame: &GaugeFrame<'_, T>,
     ) -> Measured {
         let knows_texture = self.left.is_textured() && self.right.is_textured();
-        let is_bearable =
+        let is_weak =
             self.both.pattern_ratio > 0.0 && self.both.pattern_ratio < MAX_PATTERN_BESIDE_COMPLETE;
-        let is_on_texture = knows_texture && is_bearable;
-        if !is_on_texture && let Some(textured) = self.measure_textured(frame) {
+        let is_on_texture = knows_texture && is_weak;
+        if !is_on_texture && let Some(textured) = self.measure_texture(frame) {
             return textured;
         }
         let found = if self.may_not_be_steps()

@@ -5,7 +5,7 @@ use super::overlay::StepFit;
 use crate::numeric::blurred_step::StepTable;
 
 /// Fractions of the blur's variance that a box makes: neighbours differ by what a
-/// hundred rows with a contrast of twenty times the noise just tell apart.
+/// hundred rows with a contrast of twenty times the noise just distinguish.
 const BOX_FRACTIONS: [f64; 8] = [0.0, 0.3, 0.5, 0.65, 0.78, 0.87, 0.93, 0.97];
 /// By how much a box must lower the sum of squared residuals, in variances of their noise. Derived:
 /// a parameter that is not there lowers it by 16 with the probability P(χ²₁ > 16) = 6·10⁻⁵, once in

@@ -1,4 +1,4 @@
-//! A bead of whose edges so much is covered that one alone does not tell which
+//! A bead of whose edges so much is covered that one alone does not show which
 //! of its rows are clear.
 
 use super::blur_estimate::BlurEstimate;

@@ -38,7 +38,7 @@ pub const HALF_SPAN: usize = 48;
 const SPAN: usize = 2 * HALF_SPAN;
 /// Rows are placed at the nearest of so many positions between pixels.
 const PHASES: usize = 2;
-/// Samples this near the edge tell whether a row is like the others \[px\].
+/// Samples this near the edge show whether a row is like the others \[px\].
 const CORE_HALF: usize = 12;
 const JUDGED_SAMPLES: Range<usize> = HALF_SPAN - CORE_HALF..HALF_SPAN + CORE_HALF;
 /// A row that differs from the mean by so many times what rows do in the
@@ -59,7 +59,7 @@ const ROUNDING_VARIANCE_PX2: f64 = 1.0 / 48.0;
 /// its pixel \[px\], of how many rows it is, and the level before the edge and
 /// the step that were expected \[grey levels\].
 #[derive(Debug, Clone, Copy)]
-struct LaidRow {
+struct PlacedRow {
     number: usize,
     phase: usize,
     ahead: f32,
@@ -72,7 +72,7 @@ struct LaidRow {
 #[derive(Debug, Clone)]
 pub struct Overlay {
     rows: Vec<[f32; SPAN]>,
-    laid: Vec<LaidRow>,
+    placed: Vec<PlacedRow>,
     row_misfits: Vec<f32>,
     sorted: Vec<f32>,
     mean: [[f32; SPAN]; PHASES],
@@ -104,8 +104,8 @@ impl MeanProfilePart {
     const EMPTY: Self =
         Self { mean: [0.0; SPAN], rows: 0.0, shift: 0.0, spread: 0.0, levels: [0.0; 2] };
 
-    fn add(&mut self, row: &[f32; SPAN], laid: &LaidRow) {
-        let LaidRow { ahead, rows, before, step, .. } = *laid;
+    fn add(&mut self, row: &[f32; SPAN], placed: &PlacedRow) {
+        let PlacedRow { ahead, rows, before, step, .. } = *placed;
         for (sum, sample) in self.mean.iter_mut().zip(row) {
             *sum += rows * (before + step * sample);
         }
@@ -137,7 +137,7 @@ impl Default for Overlay {
     fn default() -> Self {
         Self {
             rows: Vec::new(),
-            laid: Vec::new(),
+            placed: Vec::new(),
             row_misfits: Vec::new(),
             sorted: Vec::new(),
             mean: [[0.0; SPAN]; PHASES],
@@ -180,8 +180,8 @@ impl Overlay {
     #[inline(always)]
     pub fn lay_clear(&mut self, sheet: &EdgeWindows, clear: impl Fn(usize) -> bool) {
         self.lay_down(sheet);
-        for (laid, unlike) in self.laid.iter().zip(&mut self.row_misfits) {
-            *unlike = if clear(laid.number) { 0.0 } else { f32::INFINITY };
+        for (placed, unlike) in self.placed.iter().zip(&mut self.row_misfits) {
+            *unlike = if clear(placed.number) { 0.0 } else { f32::INFINITY };
         }
         self.average(f32::MAX, 0..SPAN);
     }
@@ -191,7 +191,7 @@ impl Overlay {
         let windows = &sheet.windows;
         let count = windows.len().min(MAX_ROWS);
         self.rows.clear();
-        self.laid.clear();
+        self.placed.clear();
         for k in 0..count {
             let number = (2 * k + 1) * windows.len() / (2 * count);
             let window = &windows[number];
@@ -210,7 +210,7 @@ impl Overlay {
                 *sample = pixel * scale - shift;
             }
             self.rows.push(row);
-            self.laid.push(LaidRow { number, phase, ahead, rows: window.rows, before, step });
+            self.placed.push(PlacedRow { number, phase, ahead, rows: window.rows, before, step });
         }
         reset(&mut self.row_misfits, self.rows.len(), 0.0);
     }
@@ -221,11 +221,11 @@ impl Overlay {
         self.mean = [[0.0; SPAN]; PHASES];
         self.counts = [0.0; PHASES];
         self.shifts = [0.0; PHASES];
-        for ((row, laid), &unlike) in self.rows.iter().zip(&self.laid).zip(&self.row_misfits) {
+        for ((row, placed), &unlike) in self.rows.iter().zip(&self.placed).zip(&self.row_misfits) {
             if unlike > limit {
                 continue;
             }
-            let LaidRow { phase, ahead, rows, .. } = *laid;
+            let PlacedRow { phase, ahead, rows, .. } = *placed;
             self.counts[phase] += rows;
             self.shifts[phase] += rows * ahead;
             let sums = self.mean[phase][columns.clone()].iter_mut();
@@ -246,8 +246,9 @@ impl Overlay {
     /// fraction of them does at most.
     #[inline(always)]
     fn compute_row_misfits(&mut self, fraction: f32) -> f32 {
-        for ((row, laid), unlike) in self.rows.iter().zip(&self.laid).zip(&mut self.row_misfits) {
-            let mean = &self.mean[laid.phase];
+        for ((row, placed), unlike) in self.rows.iter().zip(&self.placed).zip(&mut self.row_misfits)
+        {
+            let mean = &self.mean[placed.phase];
             let mut lanes = [0.0f32; 8];
             for (a, b) in
                 row[JUDGED_SAMPLES].chunks_exact(8).zip(mean[JUDGED_SAMPLES].chunks_exact(8))
@@ -271,9 +272,9 @@ impl Overlay {
     pub fn profiles(&self, parts: usize, profiles: &mut Vec<MeanProfilePart>) {
         reset(profiles, parts * PHASES, MeanProfilePart::EMPTY);
         let count = self.rows.len();
-        for (k, (row, laid)) in self.rows.iter().zip(&self.laid).enumerate() {
+        for (k, (row, placed)) in self.rows.iter().zip(&self.placed).enumerate() {
             if self.row_misfits[k] <= MAX_CLIPPED_MISFIT * self.median_misfit {
-                profiles[k * parts / count * PHASES + laid.phase].add(row, laid);
+                profiles[k * parts / count * PHASES + placed.phase].add(row, placed);
             }
         }
         profiles.retain(|profile| profile.rows > 0.0);
@@ -288,8 +289,8 @@ impl Overlay {
     }
 
     /// Rows that were placed, and windows.
-    pub fn laid(&self) -> (f64, f64) {
-        (self.laid.iter().map(|laid| f64::from(laid.rows)).sum(), to_f64(self.rows.len()))
+    pub fn placed(&self) -> (f64, f64) {
+        (self.placed.iter().map(|placed| f64::from(placed.rows)).sum(), to_f64(self.rows.len()))
     }
 
     /// Variance of a window's samples about the mean near the edge, of the window
@@ -301,9 +302,9 @@ impl Overlay {
     /// The windows that differ by no more than so many medians of what rows do,
     /// each with the mean that it is compared with.
     pub fn typical_rows(&self, many: f32) -> impl Iterator<Item = (&[f32], &[f32])> {
-        let rows = self.rows.iter().zip(&self.laid).zip(&self.row_misfits);
+        let rows = self.rows.iter().zip(&self.placed).zip(&self.row_misfits);
         rows.filter(move |(_, unlike)| **unlike <= many * self.median_misfit)
-            .map(|((row, laid), _)| (row.as_slice(), self.mean[laid.phase].as_slice()))
+            .map(|((row, placed), _)| (row.as_slice(), self.mean[placed.phase].as_slice()))
     }
 
     /// The means of the phases that have rows.

@@ -13,9 +13,9 @@ const NEIGHBOURS: usize = 3;
 /// By how much a bend must move the line through the neighbours to be one \[px\].
 const MIN_BEND_PX: f32 = 0.1;
 
-/// Neighbours by whose median outliers are told.
+/// Neighbours by whose median outliers are recognised.
 const OUTLIER_WINDOW: usize = 9;
-/// Distance from it that makes a value wild \[px\], and in typical distances
+/// Distance from it that makes a value an outlier \[px\], and in typical distances
 /// beside.
 const MIN_OUTLIER_PX: f32 = 1.2;
 const OUTLIER_RATIO: f32 = 4.0;
@@ -45,7 +45,7 @@ pub fn fill(rough: impl Iterator<Item = Option<f32>>, out: &mut Vec<f32>) -> boo
 
 /// Takes out values that lie far off the median of their neighbours: where a
 /// grain covers the edge for a few bands, its contour is not the edge's.
-/// `memory` is scratch.
+/// `scratch` is a buffer.
 pub fn remove_outliers(values: &mut [f32], scratch: &mut Vec<f32>) {
     let count = values.len();
     if count < OUTLIER_WINDOW || runs_smoothly(values) {
@@ -217,7 +217,7 @@ impl EdgeTrajectory {
         self.link();
     }
 
-    /// Draws the line anew through better positions; levels stay. `memory` is
+    /// Draws the line anew through better positions; levels stay. `scratch` is
     /// scratch.
     pub fn redraw(&mut self, lines: &[RowRange], at: &[f32], scratch: &mut Vec<[f32; 3]>) {
         scratch.clear();

@@ -13,7 +13,7 @@ use crate::numeric::number::{floor_to_count, to_f32, to_f64};
 use crate::numeric::rank;
 use crate::vision::buffer::{refill, reset};
 
-/// Neighbours on either side that tell the local slope and levels.
+/// Neighbours on either side that show the local slope and levels.
 const NEIGHBOURS: usize = 4;
 /// Longest half window \[px\].
 const MAX_HALF: usize = 30;
@@ -160,7 +160,7 @@ impl LineRefiner {
         }
     }
 
-    /// First pass: every caliper for itself, which also tells the noise.
+    /// First pass: every caliper for itself, which also shows the noise.
     fn locate_alone<T: GreyPixel>(&mut self, task: &RefinerInput<'_, T>) {
         self.first_fits.clear();
         let (mut residual, mut freedom) = (0.0, 0.0);

@@ -102,7 +102,7 @@ pub struct RoughEdge {
 }
 
 /// What was found of an edge.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RoughFit {
     /// Variance of the mean position over the gauge \[px²\].
     pub variance: f64,

@@ -11,7 +11,7 @@ const SMOOTHER_HALF: usize = SMOOTHER.len() / 2;
 /// Excess of a variance that is accepted, in standard deviations of its own uncertainty. Derived:
 /// noise alone exceeds 2.5 in 0.6 % of the frames.
 pub const MIN_EXCESS_SIGMAS: f64 = 2.5;
-/// Positions beyond the terms of their course that tell their spread. Derived: the mean of 1/χ²
+/// Positions beyond the terms of their course that show their spread. Derived: the mean of 1/χ²
 /// with f degrees of freedom is 1/(f − 2), which exists from 3 on.
 const MIN_FREEDOM: f64 = 3.0;
 
@@ -88,7 +88,7 @@ pub fn inflation_with_gaps(
     if ratio < 1.0 + MIN_EXCESS_SIGMAS * (2.0 / free).sqrt() {
         return 1.0;
     }
-    // So few do not tell their own spread well: mean of its inverse.
+    // So few do not show their own spread well: mean of its inverse.
     ratio * free / (free - 2.0)
 }
 

@@ -90,7 +90,7 @@ pub struct GaugeRows<'a, T> {
     pub white: T,
     /// Grey levels of 256 for one step of the camera's scale.
     pub scale: f32,
-    /// Distance of the grey levels that the camera can tell apart, of 256.
+    /// Distance of the grey levels that the camera can distinguish, of 256.
     pub level_step: f32,
 }
 
@@ -121,7 +121,7 @@ impl<'a, T: GreyPixel> GaugeRows<'a, T> {
     }
 }
 
-/// Frames laid out in rows across the bead; keeps the length of the history for those of
+/// Frames laid out in rows across the bead; keeps its buffers for those of
 /// horizontal beads, which have to be turned, and for light where the camera has
 /// a gamma.
 #[derive(Debug, Clone, Default)]

@@ -1,5 +1,5 @@
 //! What a blurred edge is in the pixels of a row, tabulated for positions between
-//! two pixels, and with it what a row says of the edge.
+//! two pixels, and with it what a row shows of the edge.
 
 use std::ops::Range;
 
@@ -65,7 +65,7 @@ pub struct StepTemplate {
     pub products: Products,
 }
 
-/// What a row says: how far it is from the levels and the position it was
+/// What a row shows: how far it is from the levels and the position it was
 /// expected to have.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RowSums {

@@ -75,7 +75,7 @@ impl SurfaceTexture {
     /// the edge, before it and after it.
     #[inline(always)]
     pub fn read(overlay: &Overlay, noise: f64, beside: [SideRange; 2]) -> Option<Self> {
-        let (rows, windows) = overlay.laid();
+        let (rows, windows) = overlay.placed();
         let rows = rows / windows.max(1.0);
         let about_edge = rows * overlay.row_variance();
         if about_edge < MIN_VARIANCE_RATIO * noise {
@@ -162,7 +162,7 @@ impl SurfaceTexture {
     }
 
     /// Squared correlation of pixels, summed up over a window: so many of them
-    /// say of its strength what one alone does.
+    /// show of its strength what one alone does.
     pub fn effective_pixels(&self) -> f64 {
         let all = self.of_window() + self.noise_of_window();
         let shared = |lag: usize| (self.within_window(to_f64(lag)) / all).powi(2);
@@ -179,8 +179,8 @@ struct Covariances {
 }
 
 /// Standard deviations before and after the edge, over the root of their mean square, from
-/// variances: weights for the same texture on both sides believe that what they see on the one
-/// tells them of the other.
+/// variances: weights for the same texture on both sides assume that what they see on the one
+/// shows them the other.
 fn side_levels(sides: [Option<f64>; 2]) -> [f64; 2] {
     match sides {
         [Some(before), Some(after)] if before.min(after) < MAX_SIDE_RATIO * before.max(after) => {
@@ -222,7 +222,7 @@ fn covariances(overlay: &Overlay, beside: [SideRange; 2], limit: f64) -> Option<
         return None;
     }
     // The mean that is taken off has some of every window in it.
-    let (_, windows) = overlay.laid();
+    let (_, windows) = overlay.placed();
     let fraction = windows / (windows - 1.0).max(1.0);
     for (sum, count) in sums.iter_mut().zip(counts) {
         *sum *= fraction / count;

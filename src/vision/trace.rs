@@ -105,7 +105,7 @@ pub struct EdgeTracer {
     pub blur_px: f64,
     /// Whether ground lies beside it, no groove.
     pub is_on_ground: bool,
-    /// How sure its positions are, beside what each says.
+    /// How sure its positions are, beside what each shows.
     pub uncertainty: EdgeUncertainty,
 }
 
@@ -340,7 +340,7 @@ impl EdgeTracer {
         else {
             return;
         };
-        let pitch = to_f64(scene.strip.along) / self.overlay.laid().0;
+        let pitch = to_f64(scene.strip.along) / self.overlay.placed().0;
         self.step_fit = Some(seen.with_texture(texture.over_area(pitch).sqrt()));
         self.textured.texture = Some(texture.in_grey(typical(&self.values.step).into()));
     }

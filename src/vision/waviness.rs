@@ -3,7 +3,7 @@
 //! Each edge of a bead waves for itself. What both do together, the midline,
 //! is taken for the bead's axis; what they do against each other changes the
 //! width along the gauge. Both are of one size, so that the width's course, and
-//! what the midline does more often than a bead's axis would, tell how much of
+//! what the midline does more often than a bead's axis would, show how much of
 //! the midline's slope is no slope of the axis.
 
 use std::sync::LazyLock;
@@ -79,7 +79,7 @@ impl WaveKind {
     }
 }
 
-/// Coefficients that tell of waves, by their order.
+/// Coefficients that show waves, by their order.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Evidence {
     squares: [f64; ORDERS],

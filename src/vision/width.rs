@@ -12,7 +12,7 @@ pub struct WidthMeasurement {
     /// bead's axis, averaged over the gauge.
     pub width: Mm,
     /// Standard deviation of `width` against the true mean width within the
-    /// gauge, as the measurement believes it: the image's fraction and, where it
+    /// gauge, as the measurement estimates it: that of the image and, where it
     /// is known, the calibration's.
     pub sigma: Mm,
     /// Where the left (of a horizontal bead the upper) edge crosses the middle

@@ -182,7 +182,7 @@ impl WidthInput<'_> {
 
     /// How much of the midline's coefficients of the orders 1 to 4 is the
     /// waviness of the two edges \[px²\]; `None` where there is none to speak
-    /// of. The width's course tells, and of the midline what is no straight or
+    /// of. The width's course shows, and of the midline what is no straight or
     /// evenly bent axis.
     fn waves(&self, cut: &CutBead<'_>, scratch: &WidthScratch) -> Option<[f64; CURVE_ORDERS]> {
         let &CutBead { curves, sections, .. } = cut;

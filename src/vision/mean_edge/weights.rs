@@ -20,7 +20,7 @@ pub(super) const WINDOW: usize = 2 * HALF_PX + 1;
 const MAX_LEVEL_SIGMAS: f64 = 5.0;
 /// The same as a fraction of the step: a flank is no blurred step to the last grey level.
 const LEVEL_TOLERANCE: f64 = 0.05;
-/// Positions of a window that tell how far a pattern moves it.
+/// Positions of a window that show how far a pattern moves it.
 const MIN_SAMPLES: f64 = 10.0;
 
 /// Weights of a window's pixels for position and levels, of least squares.
@@ -256,16 +256,16 @@ mod tests {
         let table = StepTable::default();
         let weights = EdgeWeights::new(&table, BLUR_PX, HALF).unwrap();
         let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
-        let (mut mean, mut told) = (0.0, 0.0);
+        let (mut mean, mut predicted) = (0.0, 0.0);
         let trials = 4000;
         for _ in 0..trials {
             let texture = texture(&mut random);
             mean += found(&weights, &table, &texture) / to_f64(trials);
             let bead = &texture[SIDE + 6..2 * SIDE];
-            told += weights.on_bead(bead).over(STEP).shift() / to_f64(trials);
+            predicted += weights.on_bead(bead).over(STEP).shift() / to_f64(trials);
         }
         // The mean of 4,000 is known to 0.007 px.
-        assert!(told > 0.03, "{told}");
-        assert!((mean - told).abs() < 0.25 * told + 0.015, "{mean} {told}");
+        assert!(predicted > 0.03, "{predicted}");
+        assert!((mean - predicted).abs() < 0.25 * predicted + 0.015, "{mean} {predicted}");
     }
 }

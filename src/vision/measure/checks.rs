@@ -25,7 +25,7 @@ pub(super) const MAX_STEP_MISFIT: f64 = 2.0;
 /// The same for one edge alone.
 const MAX_SINGLE_MISFIT: f64 = 8.0;
 /// Largest standard deviation of a width whose edges are covered in part
-/// \[px\]: beyond it, what is left of an edge does not tell its course.
+/// \[px\]: beyond it, what is left of an edge does not show its course.
 const MAX_OCCLUDED_SIGMA_PX: f64 = 0.185;
 /// The same where a covered edge seems to wind: what winds aside looks covered as
 /// well, so that too little is left of such an edge.
@@ -52,7 +52,7 @@ pub(super) const COMPLETE_FRACTION: f64 = 0.95;
 const MAX_LOST_SCATTER_PX: f64 = 0.5;
 
 /// Fraction of a pattern beside an edge that counts for its position: at the edge it is half
-/// covered by the bead, and the widths of drawn beads tell a little less.
+/// covered by the bead, and the widths of drawn beads show a little less.
 const PATTERN_WEIGHT: f64 = 0.46;
 /// Pattern as a fraction of the contrast below which weights that know the texture leave
 /// nothing else of it: with both, z of compressed images of a quality above 65 is 0.86.
@@ -207,7 +207,7 @@ impl MeasureState {
         rank::median(&mut self.scratch.wide).unwrap_or(0.0)
     }
 
-    /// Refuses a bead of whose edges too little is uncovered to tell where they
+    /// Refuses a bead of whose edges too little is visible to show where they
     /// run.
     pub fn check_occlusion(&self, found: &WidthMeasurement) -> Checked {
         let got_px = found.sigma.get() / found.width.get() * f64::from(self.width_px);

@@ -107,7 +107,7 @@ impl MeasureState {
             }
         }
         (self.both.min_outlier_px, self.both.model) = (MIN_LINE_OUTLIER_PX, EdgeModel::LineByLine);
-        // What is no blurred step does not tell how a motion blurs it.
+        // What is no blurred step does not show how a motion blurs it.
         let left = self.left.refine(&scene);
         let right = self.right.refine(&right_scene);
         if left && right { Ok(()) } else { Err(failed) }
@@ -143,7 +143,7 @@ fn common_blur(seen: [Option<BlurEstimate>; 2]) -> Option<BlurEstimate> {
     (weights > 0.0).then_some(BlurEstimate { px: blur, sd_px: BLUR_DIFFERENCE * blur })
 }
 
-/// Width between edges of which one was uncovered elsewhere than where its contour runs, and
+/// Width between edges of which one was located elsewhere than where its contour runs, and
 /// between the contours \[px\]: a seam or a rib may have been taken for the edge. `None`
 /// where both run along their contours.
 fn widths_apart(
@@ -157,8 +157,8 @@ fn widths_apart(
         let is_elsewhere = tracer.is_occluded() && (found - contour).abs() > OTHER_EDGE_PX;
         [if is_elsewhere { found } else { contour }, contour]
     });
-    let [uncovered, contours] = [0, 1].map(|of| right[of] - left[of]);
-    (uncovered != contours).then_some([uncovered, contours])
+    let [located, contours] = [0, 1].map(|of| right[of] - left[of]);
+    (located != contours).then_some([located, contours])
 }
 
 /// Columns of the bead and a little beside it.

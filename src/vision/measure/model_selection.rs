@@ -1,4 +1,4 @@
-//! Whether edges that were measured as blurred steps are better told by rough ones:
+//! Whether edges that were measured as blurred steps are better described by rough ones:
 //! a groove that no step is, bays, or a flank that is wider than any blur.
 
 use std::ops::RangeInclusive;
@@ -33,10 +33,10 @@ const SAME_EDGE_PX: f64 = 0.25;
 /// pixel and shows in nothing else.
 const MIN_GROUND_DIFFERENCE: f64 = 0.1;
 /// Pattern beside both edges, as a fraction of the contrast, from which on a blurred step
-/// may have parts of it in its flank: widths were up to 3 px off by seven times what steps say.
+/// may have parts of it in its flank: widths were up to 3 px off by seven times the sigma of steps.
 const MIN_PATTERN: f64 = 0.2;
 /// Factor of sigma where edges in such a pattern were located line by line: of 30,000 drawn
-/// widths some were off by up to seven of the sigmas that lines say.
+/// widths some were off by up to seven of the sigmas of lines.
 const PATTERN_SIGMA_FACTOR: f64 = 2.0;
 /// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
 /// wide flank, and its blur from which on it is: steps within the ramps of motions of 15 px and
@@ -70,7 +70,7 @@ const GRAIN_ODD_FRACTION: f64 = 0.024;
 
 impl MeasureState {
     /// Whether edges that were measured as blurred steps may be something else. Where they
-    /// pass the end of the scale, rows do not tell: half of their height is not seen.
+    /// pass the end of the scale, rows do not show it: half of their height is not seen.
     pub fn may_not_be_steps(&self) -> bool {
         if self.both.model == EdgeModel::Clipped {
             return false;
@@ -90,7 +90,7 @@ impl MeasureState {
         self.both.model == EdgeModel::LineByLine
     }
 
-    /// Whether the flanks are so wide that rows alone do not tell bays in them.
+    /// Whether the flanks are so wide that rows alone do not show bays in them.
     fn is_wide(&self) -> bool {
         self.left.blur_px.max(self.right.blur_px) > WIDE_BLUR_PX
     }
@@ -185,11 +185,11 @@ impl MeasureState {
         rough_px * self.mm_per_px / found.sigma.get()
     }
 
-    /// A width between blurred steps, as unsure as all rows say it is where rows are better
+    /// A width between blurred steps, as uncertain as all rows show where rows are better
     /// trusted: where some were sorted out and neither grains nor sparks are seen, for those
-    /// that are left were chosen, as from a texture that was not told; beside what may be a
+    /// that are left were chosen, as from a texture that was not recognised; beside what may be a
     /// narrow groove, where the grounds differ; and in a pattern. Where a step is but a part
-    /// of the levels' difference, or none fits and rows tell a narrow groove, sigma contains how
+    /// of the levels' difference, or none fits and rows show a narrow groove, sigma contains how
     /// far the rows' edges lie elsewhere. Nothing is added on narrow beads, whose level rows do
     /// not read free of the flanks.
     pub fn with_row_uncertainty(
@@ -219,7 +219,7 @@ impl MeasureState {
     }
 
     /// How far edges lie from the rows' \[px\] where a step is but a part of the levels'
-    /// difference, or the rows tell a narrow groove and no step fits, or not on all rows beside
+    /// difference, or the rows show a narrow groove and no step fits, or not on all rows beside
     /// grounds that differ.
     fn row_offset_px(&self, fits: &[RoughFit; 2]) -> f64 {
         let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];

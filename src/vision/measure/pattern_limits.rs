@@ -13,7 +13,7 @@ pub(super) const MAX_PATTERN: f64 = 0.37;
 /// (`ground-texture-weak`): widths beside a pattern of 0.25 and 0.31 were 53 and 22 px off. A real
 /// strand has up to 0.2, real printed lines up to 0.24.
 pub(super) const MAX_PATTERN_LINE_BY_LINE: f64 = 0.25;
-/// The same where no mean profile tells the edges. Beside beads of real concrete, which
+/// The same where no mean profile shows the edges. Beside beads of real concrete, which
 /// have a texture themselves, other beads and grooves have up to 0.464; a pattern beside a
 /// plain bead is none of those.
 const MAX_PATTERN_BESIDE_TEXTURED: f64 = 0.48;
@@ -28,7 +28,7 @@ pub(super) const MAX_PATTERN_BESIDE_COMPLETE: f64 = 0.25;
 const REFERENCE_BLUR_PX: f64 = 1.5;
 
 /// Refuses a bead whose ground has a pattern, a fraction of the contrast, and whose mean
-/// profile tells no edges: parts of the pattern look like bead, and like grooves.
+/// profile shows no edges: parts of the pattern look like bead, and like grooves.
 pub fn check_pattern(got: f64, is_textured: bool) -> Checked {
     let limit = if is_textured { MAX_PATTERN_BESIDE_TEXTURED } else { MAX_PATTERN_BESIDE_PLAIN };
     if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }

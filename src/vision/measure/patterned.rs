@@ -73,13 +73,10 @@ impl MeasureState {
     }
 
     /// Measures a bead that was measured already, where it or the ground has a pattern.
-    /// `None` where neither has, or a weak one, and where the mean profile tells no edges and
+    /// `None` where neither has, or a weak one, and where the mean profile shows no edges and
     /// the pattern is accepted beside blurred steps.
     #[inline(never)]
-    pub fn measure_textured<T: GreyPixel>(
-        &mut self,
-        frame: &GaugeFrame<'_, T>,
-    ) -> Option<Measured> {
+    pub fn measure_texture<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Option<Measured> {
         let fractions = self.texture_between_steps(frame.strip);
         let is_textured = rms(fractions) > MIN_TEXTURE;
         if !is_textured && self.both.pattern_ratio == 0.0 {
@@ -180,7 +177,7 @@ impl MeasureState {
     }
 
     /// Measures a bead whose ground has a pattern of such a standard deviation
-    /// \[grey levels\]; `None` where the mean profile tells no edges, as beside a groove.
+    /// \[grey levels\]; `None` where the mean profile shows no edges, as beside a groove.
     pub fn measure_patterned<T: GreyPixel>(
         &mut self,
         lines: (&LinePair, f64),

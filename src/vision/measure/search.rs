@@ -13,7 +13,7 @@ use crate::vision::reject::Reject;
 
 /// Fraction from which a contour is looked at.
 const MIN_BAND_FRACTION: f64 = 0.4;
-/// Fraction of saturated pixels from which missing contrast is laid to light.
+/// Fraction of saturated pixels from which missing contrast is attributed to light.
 const MIN_SATURATED_FRACTION: f64 = 0.3;
 /// Room that a search allows beyond the range of widths, for the difference
 /// between one caliper and the mean of all.

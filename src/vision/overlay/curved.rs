@@ -10,7 +10,7 @@ use crate::vision::curve::MIN_BEND_SIGMAS;
 
 /// Farthest that a parabola follows the surroundings \[px\].
 const MAX_EXTENT_PX: f64 = 32.0;
-/// Pixels that tell a parabola, before others are compared with it.
+/// Pixels that show a parabola, before others are compared with it.
 const MIN_START_PX: f64 = 8.0;
 /// Pixels that it must hold for.
 const MIN_EXTENT_PX: f64 = 12.0;

@@ -15,7 +15,7 @@ const UNKNOWNS: usize = 12;
 /// Number of the first unknown of a flank on either side. By definition after the six of the edge,
 /// and three later.
 const FIRST_FLANK_UNKNOWN: [usize; 2] = [6, 9];
-/// Samples beyond a flank that tell its course, in blurs.
+/// Samples beyond a flank that show its course, in blurs.
 const BEYOND_BLURS: f64 = 2.0;
 /// Fraction of the edge's blur by which a flank's usually differs.
 const FLANK_BLUR_SIGMA: f64 = 0.5;

@@ -23,7 +23,7 @@ pub struct EdgeSkew {
 
 impl StepFitter<'_> {
     /// The skew of the flank of an edge that was looked at. `None` where steps beside it
-    /// reach into its pixels, or it cannot be told.
+    /// reach into its pixels, or it cannot be determined.
     pub fn skew(&self, fit: &StepFit) -> Option<EdgeSkew> {
         if fit.flanks.any() {
             return None;

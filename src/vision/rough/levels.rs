@@ -249,7 +249,7 @@ struct BeadLevel {
 }
 
 /// Levels of the bead itself: positions that show a hole in it are passed over. Every fourth
-/// position of every second block tells what a hole is.
+/// position of every second block shows what a hole is.
 #[inline(always)]
 fn bead_levels(blocks: &[BlockProfile], mean: &MeanProfile) -> Vec<BeadLevel> {
     let (from, to) = mean.inside;

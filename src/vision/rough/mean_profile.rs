@@ -24,7 +24,7 @@ const SAMPLE_BLOCKS: usize = 4;
 const DARKER_SIGMAS: (f32, f32) = (4.0, 2.5);
 /// Difference that makes it deep, as a fraction of the step to the bead.
 const MIN_DEEP_FRACTION: f32 = 0.4;
-/// Distance from the darkest position from which on what lies beyond is told \[px\].
+/// Distance from the darkest position from which on what lies beyond is read \[px\].
 const BEYOND_GROOVE_PX: usize = 6;
 /// Ground beside the edge whose mean is its level, where it has a pattern \[px\].
 const NEAR_GROUND_PX: usize = 16;

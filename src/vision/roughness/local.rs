@@ -9,7 +9,7 @@ use crate::vision::width::Caliper;
 
 /// Largest fraction of the lines that may be missing: the others stand in for them.
 const MAX_MISSING: f64 = 0.2;
-/// Fewest lines that tell of roughness.
+/// Fewest lines that show roughness.
 const MIN_LINES: usize = 8;
 
 /// Local widths of one frame, evenly spaced along the bead. Each is the mean over its

@@ -1,4 +1,4 @@
-//! How much of a frame's bead is new, where nothing says how far the bead has moved on:
+//! How much of a frame's bead is new, where nothing shows how far the bead has moved on:
 //! two frames that show the same piece have the same widths there.
 
 use super::local::LocalWidths;

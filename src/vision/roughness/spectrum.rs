@@ -21,7 +21,7 @@ const LENGTH_COUNT: usize = 28;
 /// bead blurs nothing along it.
 pub const BLUR_FACTORS: [f64; 4] = [0.4, 0.6, 0.8, 1.0];
 /// Waves that smoothing leaves less than this part of their square are left out: what is
-/// left of them says more about the smoothing than about the bead.
+/// left of them shows more about the smoothing than about the bead.
 const MIN_TRANSMITTED: f64 = 0.2;
 /// Steps of a doubling of the smoothing that is taken for the same.
 const SMOOTHING_STEPS_PER_OCTAVE: f64 = 4.0;

@@ -1,4 +1,4 @@
-//! A template for textured surroundings: what a row says of the position is
+//! A template for textured surroundings: what a row shows of the position is
 //! weighted so that the texture disturbs it least.
 
 use super::{LANES, MAX_CHUNKS, SUBPIXEL_PHASES, StepTemplate};

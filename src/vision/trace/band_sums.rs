@@ -1,4 +1,4 @@
-//! What the rows of a band say together of position and levels of an edge.
+//! What the rows of a band show together of position and levels of an edge.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -58,7 +58,7 @@ impl EdgeTracer {
 
     /// How much the level at the edge differs from that of the surroundings
     /// from band to band beyond what noise explains: texture does that, and
-    /// then the surroundings say less. Robust, from the median.
+    /// then the surroundings show less. Robust, from the median.
     #[inline(always)]
     fn extra_variance(&mut self, core: Matrix3<f64>, variance: f64, side: usize) -> f64 {
         let Some(inverse) = core.try_inverse() else { return 0.0 };

@@ -11,7 +11,7 @@ pub struct RowGroup {
     pub weight: f32,
     /// How far the rows were sampled beyond the path \[px\].
     pub ahead: f32,
-    /// What they say.
+    /// What they show.
     pub sums: RowSums,
     /// Position of the edge beside the path \[px\].
     pub moved: f32,

@@ -25,7 +25,7 @@ const MAX_LEVEL_OFFSET_SIGMAS: f32 = 1.0;
 /// which passed before.
 const MAX_PASSES: usize = 3;
 /// Percentage of the rows that is taken to be clear whatever happens: the one
-/// that fits worst of them tells what fits.
+/// that fits worst of them shows what fits.
 const CLEAR_PERCENTILE: usize = 30;
 /// By how much the squares that a row leaves may exceed that one's.
 const MAX_MISFIT_RATIO: f32 = 3.2;
@@ -123,9 +123,9 @@ impl EdgeTracer {
     }
 
     /// Takes out the few positions that lie far from the course on which the others
-    /// agree: between gaps they have no neighbours that could tell. `least_px`
+    /// agree: between gaps they have no neighbours that could show it. `least_px`
     /// is the least distance that makes a stray. Where there are many, they stay,
-    /// and tell that the edge is unsure.
+    /// and show that the edge is unsure.
     pub fn drop_strays(&mut self, least_px: f64) {
         self.scratch.rough.clear();
         let positions = self.edges.iter();

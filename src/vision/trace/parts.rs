@@ -81,7 +81,7 @@ pub(super) struct Occlusion {
     pub(super) sort_rows: bool,
 }
 
-/// Scratch memory.
+/// Buffers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct TraceScratch {
     /// Rough values, one a band or a line.
@@ -92,7 +92,7 @@ pub(super) struct TraceScratch {
     pub(super) scatter: Vec<f64>,
 }
 
-/// How sure the positions of an edge are, beside what each of them says.
+/// How sure the positions of an edge are, beside what each of them shows.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct EdgeUncertainty {
     /// Variance of the whole edge's position that all positions share, from

@@ -85,7 +85,7 @@ impl EdgeTracer {
         let products = self.row_fit.template.products;
         refill(&mut self.scratch.sorted, self.row_fit.groups.iter().map(|group| group.misfit));
         if !self.occlusion.clear.is_empty() {
-            // What is hidden says nothing.
+            // What is hidden shows nothing.
             self.scratch.sorted.retain(|misfit| misfit.is_finite());
         }
         let median = rank::median(&mut self.scratch.sorted).unwrap_or(f32::INFINITY);

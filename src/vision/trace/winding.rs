@@ -42,7 +42,7 @@ impl EdgeTracer {
         could_wind(scene) && self.used_fraction() < 1.0 - MAX_LOST_FRACTION
     }
 
-    /// Whether the edge winds more quickly than bands show it, as far as they tell.
+    /// Whether the edge winds more quickly than bands show it, as far as they show.
     pub fn seems_winding(&self) -> bool {
         self.winding.excess > 1.0
     }
