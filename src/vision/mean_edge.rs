@@ -26,6 +26,7 @@ use super::vectors;
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::{narrow_to_f32, round_to_count, to_f64};
 use crate::numeric::rank;
+use crate::vision::buffer::refill;
 use column::ColumnSums;
 use course::{ParabolicCourse, bend_at};
 use descent::{
@@ -136,9 +137,8 @@ impl MeanEdge {
                     .add(position, f64::from(T::sum_to_f32(pixels[at].add_to(T::Sum::default()))));
             }
         }
-        self.spreads.clear();
-        self.spreads
-            .extend(self.columns.iter().map(|of| narrow_to_f32(of.variance_about_line(seen))));
+        let variances = self.columns.iter().map(|of| narrow_to_f32(of.variance_about_line(seen)));
+        refill(&mut self.spreads, variances);
         let variance = rank::median(&mut self.spreads)?;
         Some(f64::from(scene.strip.scale * variance.sqrt()))
     }

@@ -75,10 +75,7 @@ pub struct Overlay {
     placed: Vec<PlacedRow>,
     row_misfits: Vec<f32>,
     sorted: Vec<f32>,
-    mean: [[f32; SPAN]; PHASES],
-    counts: [f32; PHASES],
-    /// Mean distance of the path from the pixels' positions in each phase \[px\].
-    shifts: [f32; PHASES],
+    phases: [PhaseMean; PHASES],
     /// How unlike the mean a row is in the median.
     median_misfit: f32,
 }
@@ -140,9 +137,7 @@ impl Default for Overlay {
             placed: Vec::new(),
             row_misfits: Vec::new(),
             sorted: Vec::new(),
-            mean: [[0.0; SPAN]; PHASES],
-            counts: [0.0; PHASES],
-            shifts: [0.0; PHASES],
+            phases: [PhaseMean::EMPTY; PHASES],
             median_misfit: f32::INFINITY,
         }
     }
@@ -218,26 +213,25 @@ impl Overlay {
     /// Means of the rows that are not unlike the others, in some columns.
     #[inline(always)]
     fn average(&mut self, limit: f32, columns: Range<usize>) {
-        self.mean = [[0.0; SPAN]; PHASES];
-        self.counts = [0.0; PHASES];
-        self.shifts = [0.0; PHASES];
+        self.phases = [PhaseMean::EMPTY; PHASES];
         for ((row, placed), &unlike) in self.rows.iter().zip(&self.placed).zip(&self.row_misfits) {
             if unlike > limit {
                 continue;
             }
             let PlacedRow { phase, ahead, rows, .. } = *placed;
-            self.counts[phase] += rows;
-            self.shifts[phase] += rows * ahead;
-            let sums = self.mean[phase][columns.clone()].iter_mut();
+            let phase = &mut self.phases[phase];
+            phase.rows += rows;
+            phase.shift += rows * ahead;
+            let sums = phase.samples[columns.clone()].iter_mut();
             for (sum, sample) in sums.zip(&row[columns.clone()]) {
                 *sum += rows * sample;
             }
         }
-        for ((mean, shift), count) in self.mean.iter_mut().zip(&mut self.shifts).zip(self.counts) {
-            let fraction = 1.0 / f32::max(count, 1.0);
-            *shift *= fraction;
-            for value in mean {
-                *value *= fraction;
+        for PhaseMean { samples, shift, rows } in &mut self.phases {
+            let scale = 1.0 / f32::max(*rows, 1.0);
+            *shift *= scale;
+            for value in samples {
+                *value *= scale;
             }
         }
     }
@@ -248,7 +242,7 @@ impl Overlay {
     fn compute_row_misfits(&mut self, fraction: f32) -> f32 {
         for ((row, placed), unlike) in self.rows.iter().zip(&self.placed).zip(&mut self.row_misfits)
         {
-            let mean = &self.mean[placed.phase];
+            let mean = &self.phases[placed.phase].samples;
             let mut lanes = [0.0f32; 8];
             for (a, b) in
                 row[JUDGED_SAMPLES].chunks_exact(8).zip(mean[JUDGED_SAMPLES].chunks_exact(8))
@@ -285,7 +279,7 @@ impl Overlay {
 
     /// Rows that the means are of.
     pub fn used(&self) -> f64 {
-        f64::from(self.counts.iter().sum::<f32>())
+        f64::from(self.phases.iter().map(|phase| phase.rows).sum::<f32>())
     }
 
     /// Rows that were placed, and windows.
@@ -303,37 +297,36 @@ impl Overlay {
     /// each with the mean that it is compared with.
     pub fn typical_rows(&self, many: f32) -> impl Iterator<Item = (&[f32], &[f32])> {
         let rows = self.rows.iter().zip(&self.placed).zip(&self.row_misfits);
-        rows.filter(move |(_, unlike)| **unlike <= many * self.median_misfit)
-            .map(|((row, placed), _)| (row.as_slice(), self.mean[placed.phase].as_slice()))
+        rows.filter(move |(_, unlike)| **unlike <= many * self.median_misfit).map(
+            |((row, placed), _)| (row.as_slice(), self.phases[placed.phase].samples.as_slice()),
+        )
     }
 
     /// The means of the phases that have rows.
     #[inline(always)]
-    fn means(&self) -> impl Iterator<Item = PhaseMean<'_>> {
-        let means = self.mean.iter().zip(self.shifts).zip(self.counts);
-        means.filter(|(_, count)| *count > 0.0).map(|((samples, shift), count)| PhaseMean {
-            samples,
-            shift: shift.into(),
-            weight: count.into(),
-        })
+    fn means(&self) -> impl Iterator<Item = &PhaseMean> {
+        self.phases.iter().filter(|phase| phase.rows > 0.0)
     }
 }
 
 /// Mean of the rows of a phase.
-struct PhaseMean<'a> {
-    samples: &'a [f32; SPAN],
+#[derive(Debug, Clone, Copy)]
+struct PhaseMean {
+    samples: [f32; SPAN],
     /// Mean distance of the path from the middle sample \[px\].
-    shift: f64,
+    shift: f32,
     /// Number of rows.
-    weight: f64,
+    rows: f32,
 }
 
-impl PhaseMean<'_> {
+impl PhaseMean {
+    const EMPTY: Self = Self { samples: [0.0; SPAN], shift: 0.0, rows: 0.0 };
+
     /// Each sample's distance from the path and its value, from a distance to
     /// another \[px\].
     #[inline(always)]
     fn samples(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
-        samples(self.samples, self.shift, (from, to))
+        samples(&self.samples, self.shift.into(), (from, to))
     }
 }
 

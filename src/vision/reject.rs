@@ -12,9 +12,7 @@ pub enum Reject {
         need: f64,
     },
     /// The bead hardly differs from its surroundings.
-    #[error(
-        "contrast of {got:.1} grey levels, {need:.1} are needed; more light, or light from one side, raises it"
-    )]
+    #[error("contrast of {:.1} grey levels, {:.1} are needed; more light, or light from one side, raises it", .got, .need)]
     LowContrast {
         /// Grey levels between ground and bead, of 256.
         got: f64,
@@ -38,9 +36,7 @@ pub enum Reject {
         need: f64,
     },
     /// A pair was found, but no bead of this cell is that wide.
-    #[error(
-        "width of {got_mm:.2} mm, plausible are {min_mm} to {max_mm} mm; if that is the bead, width_range_mm has to contain it"
-    )]
+    #[error("width of {:.2} mm, plausible are {} to {} mm; if that is the bead, width_range_mm has to contain it", .got_mm, .min_mm, .max_mm)]
     WidthOutOfRange {
         /// Width that was found \[mm\].
         got_mm: f64,
@@ -67,9 +63,7 @@ pub enum Reject {
         least_widths: f64,
     },
     /// The positions of an edge vary too much from line to line.
-    #[error(
-        "the positions of an edge scatter by {got_px:.2} px about each other, {limit_px:.2} are bearable: something lies on it, or it is the edge of no bead; a gauge that holds one bead and plain ground beside it helps"
-    )]
+    #[error("the positions of an edge scatter by {:.2} px about each other, {:.2} are bearable: something lies on it, or it is the edge of no bead; a gauge that holds one bead and plain ground beside it helps", .got_px, .limit_px)]
     Scattered {
         /// Robust standard deviation of the positions \[px\].
         got_px: f64,
@@ -77,9 +71,7 @@ pub enum Reject {
         limit_px: f64,
     },
     /// The bead's edges are too uncertain: too much of them is occluded.
-    #[error(
-        "so much of the edges is occluded that the standard deviation of the width is {got_px:.2} px, the limit is {limit_px:.2}; the occluded rows have to be made visible"
-    )]
+    #[error("so much of the edges is occluded that the standard deviation of the width is {:.2} px, the limit is {:.2}; the occluded rows have to be made visible", .got_px, .limit_px)]
     Occluded {
         /// Standard deviation of the width \[px\].
         got_px: f64,
@@ -101,9 +93,7 @@ pub enum Reject {
         max_sigma: f64,
     },
     /// Edges that are blurred over so wide a flank that its shape matters.
-    #[error(
-        "an edge is blurred by {got_px:.1} px, measured are up to {limit_px:.1}; the lens may be out of focus, or the bead moves sideways while the shutter is open: a shorter exposure helps"
-    )]
+    #[error("an edge is blurred by {:.1} px, measured are up to {:.1}; the lens may be out of focus, or the bead moves sideways while the shutter is open: a shorter exposure helps", .got_px, .limit_px)]
     Blurred {
         /// Standard deviation of the blur \[px\].
         got_px: f64,
@@ -127,9 +117,7 @@ pub enum Reject {
         limit: f64,
     },
     /// Edges that hardly stand out from the bead's texture.
-    #[error(
-        "no bead that stands out from the texture of the image: the likeliest edge is {got:.1} times as strong as lines of texture, {need:.1} are needed; check that a bead lies in roi_px along bead_axis, with this polarity and width_range_mm; if it does, light that makes both edges clear or a longer gauge helps"
-    )]
+    #[error("no bead that stands out from the texture of the image: the likeliest edge is {:.1} times as strong as lines of texture, {:.1} are needed; check that a bead lies in roi_px along bead_axis, with this polarity and width_range_mm; if it does, light that makes both edges clear or a longer gauge helps", .got, .need)]
     Vague {
         /// Strength of the weaker edge, in typical steps of the texture.
         got: f64,
@@ -137,9 +125,7 @@ pub enum Reject {
         need: f64,
     },
     /// Two pairs of edges fit equally well.
-    #[error(
-        "two pairs of edges fit equally well, one {first_mm:.2} mm wide, the other {second_mm:.2} mm; a narrower width_range_mm, or a given polarity or edge, decides between them"
-    )]
+    #[error("two pairs of edges fit equally well, one {:.2} mm wide, the other {:.2} mm; a narrower width_range_mm, or a given polarity or edge, decides between them", .first_mm, .second_mm)]
     Ambiguous {
         /// Width of the one pair \[mm\].
         first_mm: f64,
@@ -147,9 +133,7 @@ pub enum Reject {
         second_mm: f64,
     },
     /// An edge lies so near the boundary of the gauge that it is cut short.
-    #[error(
-        "an edge lies {got_px:.1} px from the boundary of the gauge, {need_px:.1} are needed; a gauge that is wider across the bead helps"
-    )]
+    #[error("an edge lies {:.1} px from the boundary of the gauge, {:.1} are needed; a gauge that is wider across the bead helps", .got_px, .need_px)]
     Clipped {
         /// Distance of the edge from the boundary \[px\].
         got_px: f64,

@@ -43,6 +43,7 @@ impl LocalEdge {
 }
 
 /// Widths of the bead along the gauge, normal to its local axis.
+#[derive(Default)]
 pub struct Sections {
     /// Mean over the gauge \[mm\].
     pub mean: f64,
@@ -62,13 +63,7 @@ pub struct Sections {
 impl Sections {
     /// Cuts the bead along the gauge; `None` where an edge has no point on the surface.
     pub fn cut(scene: &WidthInput<'_>, curves: &[Curve; 2]) -> Option<Self> {
-        let mut sections = Self {
-            mean: 0.0,
-            terms: [0.0; 3],
-            oblique: 0.0,
-            oblique_by_bend: 0.0,
-            scales: [0.0; 2],
-        };
+        let mut sections = Self::default();
         for (t, weight) in GAUSS_LEGENDRE_5 {
             let left = LocalEdge::of(scene, &curves[0], t)?;
             let right = LocalEdge::of(scene, &curves[1], t)?;

@@ -66,6 +66,7 @@ impl StepFitter<'_> {
         let many = 3.0 * flanks.0.iter().flatten().map(|_| 1.0).sum::<f64>();
         let (mut square, mut n) = (0.0, -6.0 - many);
         for mean in self.overlay.means() {
+            let weight = f64::from(mean.rows);
             for (at, value) in mean.samples(-from, to) {
                 let mut row = [0.0; UNKNOWNS];
                 let (own, level) = fit.linear_at(self.table, at);
@@ -79,9 +80,9 @@ impl StepFitter<'_> {
                     miss -= adds;
                     row[first..first + 3].copy_from_slice(&slopes);
                 }
-                square += mean.weight * miss * miss;
+                square += weight * miss * miss;
                 n += 1.0;
-                normal.add(row, miss, mean.weight);
+                normal.add(row, miss, weight);
             }
         }
         (normal, square / f64::max(n, 1.0))

@@ -1,6 +1,6 @@
 //! Whether a narrow groove may lie beside an edge.
 
-use super::{HALF_SPAN, Overlay, PHASES};
+use super::{HALF_SPAN, Overlay};
 
 /// Positions beside the edge within which a narrow groove lies \[px\].
 const MAX_GROOVE_PX: usize = 9;
@@ -23,9 +23,8 @@ impl Overlay {
         let (mut lowest, mut rise) = (f64::INFINITY, 0.0_f64);
         for away in 1..=MAX_GROOVE_PX {
             let at = if after { HALF_SPAN + away } else { HALF_SPAN - away };
-            let sum: f64 = (0..PHASES)
-                .map(|phase| f64::from(self.counts[phase]) * f64::from(self.mean[phase][at]))
-                .sum();
+            let phases = self.phases.iter();
+            let sum: f64 = phases.map(|of| f64::from(of.rows) * f64::from(of.samples[at])).sum();
             let level = if after { 1.0 - sum / rows } else { sum / rows };
             lowest = lowest.min(level);
             rise = rise.max(level - lowest);

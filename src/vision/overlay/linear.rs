@@ -79,7 +79,7 @@ impl StepFitter<'_> {
         for (phase, mean) in self.overlay.means().enumerate() {
             for (at, value) in mean.samples(from, to) {
                 let (row, level) = fit.linear_at(self.table, at);
-                add(phase, LinearSample { at, row, miss: value - level, weight: mean.weight });
+                add(phase, LinearSample { at, row, miss: value - level, weight: mean.rows.into() });
             }
         }
     }

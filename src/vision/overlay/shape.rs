@@ -122,7 +122,7 @@ impl StepFitter<'_> {
                 let (fraction, _) = self.table.at((at - step.at) / step.blur);
                 let beside = if flanks.any() { flanks.at(self.table, at) } else { 0.0 };
                 let off = value - beside - step.before - height * fraction;
-                add(sign * (at - step.at), off, mean.weight);
+                add(sign * (at - step.at), off, mean.rows.into());
             }
         }
     }

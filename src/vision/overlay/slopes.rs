@@ -26,9 +26,9 @@ impl ProfileSlopes {
     #[inline(always)]
     pub fn of(overlay: &Overlay) -> Self {
         let mut slopes = [[0.0; SPAN]; PHASES];
-        let all = overlay.counts.iter().sum::<f32>().max(1.0);
-        for ((slopes, mean), count) in slopes.iter_mut().zip(&overlay.mean).zip(overlay.counts) {
-            let fraction = 0.5 * count / all;
+        let all = overlay.phases.iter().map(|phase| phase.rows).sum::<f32>().max(1.0);
+        for (slopes, phase) in slopes.iter_mut().zip(&overlay.phases) {
+            let (mean, fraction) = (&phase.samples, 0.5 * phase.rows / all);
             for k in 1..SPAN - 1 {
                 slopes[k] = fraction * (mean[k + 1] - mean[k - 1]);
             }

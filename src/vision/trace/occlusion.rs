@@ -7,8 +7,8 @@ use crate::numeric::rank;
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::buffer::refill;
 use crate::vision::consensus::keep_consensus;
+use crate::vision::located::CaliperEdge;
 use crate::vision::overlay::{Extent, StepShape};
-use crate::vision::path;
 use crate::vision::pixel_noise::NOISE_SIGMAS;
 use crate::vision::strip::GreyPixel;
 use crate::vision::template::{PlainSums, StepTemplate};
@@ -16,8 +16,7 @@ use crate::vision::trace::TraceInput;
 
 /// Distance from the course of most bands from which a band is off \[px\].
 const MAX_OFFSET_PX: f32 = 0.8;
-/// The same for a level, as a fraction of the step, and in standard deviations of
-/// a pixel beside.
+/// The same for a level, as a fraction of the step.
 const MAX_LEVEL_OFFSET: f32 = 0.08;
 /// And in standard deviations of a pixel beside.
 const MAX_LEVEL_OFFSET_SIGMAS: f32 = 1.0;
@@ -34,9 +33,9 @@ const MAX_NOISE_RATIO: f32 = 3.0;
 /// Farthest that the levels beside an edge may be from those a little away, as
 /// a fraction of the step: grains have levels of their own.
 const MAX_LEVEL_DIFFERENCE: f64 = 0.25;
-/// Courses that are tried, and the fraction of clear rows along one that is enough
-/// to look for no other.
+/// Courses that are tried.
 const MAX_ATTEMPTS: usize = 3;
+/// Fraction of clear rows along a course that is enough to look for no other.
 const ENOUGH_CLEAR_FRACTION: f32 = 0.4;
 /// Fraction of clear rows where there is none. By definition.
 const NONE_CLEAR: f32 = 0.0;
@@ -65,15 +64,15 @@ impl EdgeTracer {
     pub fn locate_occluded<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         self.look_row_by_row();
         refill(&mut self.occlusion.free, self.values.picked.iter().copied());
-        let mut best = (NONE_CLEAR, 0);
+        let mut best = NONE_CLEAR;
         for attempt in 0..MAX_ATTEMPTS {
             let clear = self.try_course(scene).unwrap_or(NONE_CLEAR);
             if clear >= ENOUGH_CLEAR_FRACTION {
-                best = (clear, attempt);
+                best = clear;
                 break;
             }
-            if clear > best.0 {
-                best = (clear, attempt);
+            if clear > best {
+                best = clear;
                 std::mem::swap(&mut self.occlusion.free, &mut self.occlusion.best_free);
                 refill(&mut self.occlusion.free, self.occlusion.best_free.iter().copied());
             }
@@ -81,10 +80,10 @@ impl EdgeTracer {
                 self.exclude_course();
             }
         }
-        if best.0 == NONE_CLEAR {
+        if best == NONE_CLEAR {
             return false;
         }
-        if best.0 < ENOUGH_CLEAR_FRACTION {
+        if best < ENOUGH_CLEAR_FRACTION {
             std::mem::swap(&mut self.occlusion.free, &mut self.occlusion.best_free);
             if self.try_course(scene).is_none() {
                 return false;
@@ -127,21 +126,14 @@ impl EdgeTracer {
     /// is the least distance that makes a stray. Where there are many, they stay,
     /// and show that the edge is unsure.
     pub fn drop_strays(&mut self, least_px: f64) {
-        self.scratch.rough.clear();
-        let positions = self.edges.iter();
-        self.scratch
-            .rough
-            .extend(positions.map(|edge| edge.map_or(f32::NAN, |edge| narrow_to_f32(edge.at))));
-        self.scratch.sorted.clear();
-        self.scratch
-            .sorted
-            .extend(self.edges.iter().flatten().map(|edge| narrow_to_f32(edge.variance.sqrt())));
+        let at = |edge: &Option<CaliperEdge>| edge.map_or(f32::NAN, |edge| narrow_to_f32(edge.at));
+        refill(&mut self.scratch.rough, self.edges.iter().map(at));
+        let sigmas = self.edges.iter().flatten().map(|edge| narrow_to_f32(edge.variance.sqrt()));
+        refill(&mut self.scratch.sorted, sigmas);
         let count = self.scratch.sorted.len();
         let Some(sigma) = rank::median(&mut self.scratch.sorted) else { return };
-        let left = keep_consensus(
-            &mut self.scratch.rough,
-            narrow_to_f32(least_px).max(NOISE_SIGMAS * sigma),
-        );
+        let tolerance = narrow_to_f32(least_px).max(NOISE_SIGMAS * sigma);
+        let left = keep_consensus(&mut self.scratch.rough, tolerance);
         if to_f32(count - left) > MAX_STRAY_FRACTION * to_f32(count) {
             return;
         }
@@ -209,7 +201,7 @@ impl EdgeTracer {
             return false;
         }
         refill(&mut self.occlusion.trusted, self.scratch.rough.iter().map(|at| at.is_finite()));
-        self.fill_rough();
+        self.scratch.fill_rough();
         std::mem::swap(&mut self.scratch.rough, &mut self.values.path);
         self.pick_raw_levels(scene);
         let step = typical(&self.values.step).abs();
@@ -218,27 +210,18 @@ impl EdgeTracer {
         for (step, before) in self.values.step.iter_mut().zip(&self.values.before) {
             *step += before;
         }
-        std::mem::swap(&mut self.values.before, &mut self.scratch.rough);
-        keep_consensus(&mut self.scratch.rough, off);
-        self.fill_rough();
-        std::mem::swap(&mut self.values.before, &mut self.scratch.rough);
-        std::mem::swap(&mut self.values.step, &mut self.scratch.rough);
-        keep_consensus(&mut self.scratch.rough, off);
-        self.fill_rough();
-        std::mem::swap(&mut self.values.step, &mut self.scratch.rough);
+        for values in [&mut self.values.before, &mut self.values.step] {
+            std::mem::swap(values, &mut self.scratch.rough);
+            keep_consensus(&mut self.scratch.rough, off);
+            self.scratch.fill_rough();
+            std::mem::swap(values, &mut self.scratch.rough);
+        }
         for (step, before) in self.values.step.iter_mut().zip(&self.values.before) {
             *step -= before;
         }
         self.steady_steps();
         self.course.draw(scene.bands, &self.values.path, &self.values.before, &self.values.step);
         true
-    }
-
-    /// Fills the gaps of rough values and smooths them.
-    fn fill_rough(&mut self) {
-        let values = self.scratch.rough.iter().map(|value| value.is_finite().then_some(*value));
-        path::fill(values, &mut self.scratch.sorted);
-        path::smooth(&self.scratch.sorted, &mut self.scratch.rough);
     }
 
     /// Reads the edge's shape from the overlay and takes it over. Rows are
@@ -361,7 +344,7 @@ impl EdgeTracer {
             }
             self.scratch.rough.push(if n > 0.0 { sum / n } else { f32::NAN });
         }
-        self.fill_rough();
+        self.scratch.fill_rough();
         for (at, &line) in self.scratch.rough.iter_mut().zip(scene.lines) {
             *at += self.course.at(narrow_to_f32(line.middle()))[0];
         }

@@ -2,6 +2,7 @@
 
 use super::band_sums::BandSums;
 use super::group::RowGroup;
+use crate::vision::path;
 use crate::vision::template::textured::TexturePositionVariance;
 use crate::vision::template::{PlainSums, StepTemplate};
 use crate::vision::texture::SurfaceTexture;
@@ -90,6 +91,15 @@ pub(super) struct TraceScratch {
     /// For a course that is drawn anew.
     pub(super) course: Vec<[f32; 3]>,
     pub(super) scatter: Vec<f64>,
+}
+
+impl TraceScratch {
+    /// Fills the gaps of rough values and smooths them.
+    pub(super) fn fill_rough(&mut self) {
+        let values = self.rough.iter().map(|value| value.is_finite().then_some(*value));
+        path::fill(values, &mut self.sorted);
+        path::smooth(&self.sorted, &mut self.rough);
+    }
 }
 
 /// How sure the positions of an edge are, beside what each of them shows.
