@@ -1,5 +1,5 @@
-//! Blur of an edge, from all calipers together: the profiles are superimposed on
-//! each other at half-pixel steps and a step of free blur is fitted.
+//! Blur of an edge from all calipers together. The profiles are superimposed in bins of half a
+//! pixel, and a step of free blur is fitted.
 
 use crate::numeric::number::{floor_to_count, to_f64};
 use nalgebra::{Matrix5, Vector5};

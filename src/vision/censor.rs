@@ -1,6 +1,5 @@
-//! What is left of a grey level at the upper end of the camera's scale: with
-//! noise, a pixel near the end is clipped now and then, and one far above it
-//! nearly always.
+//! Statistics of a grey level at the upper end of the camera's scale: mean and variance of a
+//! clipped normal number.
 
 use crate::numeric::blurred_step::StepTable;
 

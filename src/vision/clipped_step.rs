@@ -1,6 +1,6 @@
-//! An edge one side of which passes the end of the camera's scale. The part of
-//! its flank that can be seen shows position, blur and the level that cannot be
-//! seen together; rows are then compared with that step, clipped as they are.
+//! An edge one side of which is saturated. Position, blur and the hidden level are fitted together
+//! to the part of the flank below the end of the scale. Rows are then compared with that step,
+//! clipped likewise.
 
 use nalgebra::{Matrix2, Vector2};
 

@@ -1,7 +1,6 @@
-//! The search for the bead where texture and torn edges hide it from a search
-//! step by step: straight lines along which the grey steps, in the mean over the
-//! whole gauge (a Radon transform of the step response). Texture averages out;
-//! an edge does not.
+//! Search for the bead as straight lines along which the grey level steps, in the mean over the
+//! whole gauge (a Radon transform of the step response). It finds edges that texture and tears
+//! hide from a search step by step: texture averages out, an edge does not.
 
 use super::gauge::WidthRangePx;
 use super::pair::{MAX_SEAM_RATIO, MIN_RIVAL_RATIO, is_narrower};

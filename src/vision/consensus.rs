@@ -1,6 +1,5 @@
-//! Values along the bead of which many may be wrong: the line or the parabola
-//! that most of them agree on. What covers an edge pulls to one side, so that
-//! means and medians of all of them are biased.
+//! Line or parabola through values many of which may be wrong (RANSAC, Fischler and Bolles 1981).
+//! What covers an edge pulls to one side, so that means and medians of all values are biased.
 
 use crate::numeric::normal_equations::NormalEquations;
 use crate::numeric::number::to_f32;

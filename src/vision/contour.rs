@@ -1,7 +1,6 @@
-//! Edges that run along the bead: chains of steps, one a band, found by
-//! dynamic programming. Neighbours agree, bands without a fitting step are
-//! skipped; sparks and grains are no chains. The strongest chain is found
-//! first, then the strongest of what it leaves.
+//! Edges that run along the bead: chains of steps, one a band, found by dynamic programming. Bands
+//! without a fitting step are skipped. Sparks and grains form no chains. The strongest chain is
+//! found first, then the strongest of the rest.
 
 use super::edge::{MAX_STEPS_KEPT, StepCandidate, StepCandidates};
 use crate::numeric::number::to_f32;

@@ -1,5 +1,4 @@
-//! The course of an edge along the gauge as a short polynomial: where it runs
-//! in the mean, in which direction, and how it bends.
+//! The trajectory of an edge along the gauge as a short polynomial: its mean, direction and bend.
 
 use crate::numeric::number::to_f64;
 use nalgebra::{SMatrix, SVector};

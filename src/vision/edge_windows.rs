@@ -1,5 +1,5 @@
-//! The gauge straightened along an edge: the pixels around it, one window a few
-//! rows, read once and compared with the edge as often as it takes.
+//! The gauge straightened along an edge: windows of pixels about it, each the mean of a few rows.
+//! They are read once and compared with the edge as often as needed.
 
 use std::ops::Range;
 

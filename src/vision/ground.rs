@@ -1,5 +1,5 @@
-//! The pattern of what lies beside an edge, ground or bead: how strong it is, and how far
-//! it may move the mean of the edge.
+//! Pattern of the ground or of the bead beside an edge: its standard deviation, and that of its
+//! mean over the gauge.
 
 use super::row_range::RowRange;
 use super::strip::{GaugeRows, GreyPixel};

@@ -1,6 +1,6 @@
-//! Light that falls off over the gauge, as a lens's does towards its corners: it bends the
-//! levels beside an edge by less than their noise shows there, and shows by how much by its
-//! slopes at both edges.
+//! Light that falls off over the gauge, as towards the corners of a lens. It bends the levels
+//! beside an edge by less than their noise. How much it bends them follows from its slopes at both
+//! edges.
 
 use super::overlay::{HALF_SPAN, SideShading, StepShape};
 use crate::numeric::number::to_f64;

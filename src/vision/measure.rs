@@ -1,5 +1,4 @@
-//! One frame after the other: bands, candidates, contours, sub-pixel edges,
-//! width.
+//! Measurement of one frame: bands, candidates, contours, sub-pixel edges, width.
 
 mod checks;
 mod compressed;

@@ -1,5 +1,5 @@
-//! Which blur both edges have: a lens's Gaussian, or with it the box of even motion
-//! across the bead while the shutter is open.
+//! Choice of the blur's shape for both edges: a lens's Gaussian, or with it the box of even motion
+//! across the bead during the exposure.
 
 use super::overlay::StepFit;
 use crate::numeric::blurred_step::StepTable;

@@ -1,5 +1,5 @@
-//! A bead of whose edges so much is covered that one alone does not show which
-//! of its rows are clear.
+//! A bead whose edges are occluded so far that one edge alone does not show which of its rows are
+//! clear.
 
 use super::blur_estimate::BlurEstimate;
 use super::edge::{StepCandidate, StepCandidates};

@@ -1,7 +1,6 @@
-//! The profile of an edge, from rows all along it superimposed: its
-//! blur, how far its surroundings on either side are plain, and how they are
-//! shaded. Rows that differ from most, because a grain or a spark lies on
-//! them, are left out.
+//! The mean profile of an edge, from superimposed rows all along it: its blur, how far the
+//! surroundings on either side are plain, and their shading. Rows that differ from most, because a
+//! grain or a spark lies on them, are left out.
 
 use crate::vision::buffer::{refill, reset};
 use std::ops::Range;

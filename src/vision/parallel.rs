@@ -1,6 +1,5 @@
-//! The two edges of one bead run side by side: steps that lie at the same
-//! distance from each other in more bands than any others belong to it, however
-//! the bead runs, and what covers an edge here and there does not.
+//! Steps that run side by side. The two edges of a bead lie at the same distance in more bands
+//! than any other steps do, however the bead runs.
 
 use crate::vision::buffer::reset;
 use std::ops::Range;

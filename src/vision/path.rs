@@ -1,5 +1,4 @@
-//! Rough positions and levels, one a band, made into smooth ones that every row
-//! can be compared with.
+//! Smooth trajectories of position and levels along an edge, from rough values, one a band.
 
 use super::pool::Bands;
 use super::row_range::RowRange;
@@ -190,12 +189,7 @@ impl TrajectorySegment {
     fn between(middles: [f32; 2], values: [[f32; 3]; 2]) -> Self {
         let length = middles[1] - middles[0];
         let slope = |k: usize| (values[1][k] - values[0][k]) / length;
-        Self {
-            middle: middles[0],
-            length,
-            values: values[0],
-            slopes: [slope(0), slope(1), slope(2)],
-        }
+        Self { middle: middles[0], length, values: values[0], slopes: [0, 1, 2].map(slope) }
     }
 }
 

@@ -1,5 +1,5 @@
-//! Noise of a pixel, from the differences of neighbours along the bead: light,
-//! texture and the bead itself change little from one row to the next.
+//! Noise of a pixel, from the differences of neighbours along the bead: light, texture and the
+//! bead change little from one row to the next.
 
 use std::ops::Range;
 

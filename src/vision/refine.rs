@@ -1,7 +1,6 @@
-//! Edges that are not the blurred step between plain surroundings that a
-//! template can be made of, as on a shiny or strongly shaded strand: every
-//! caliper line is fitted for itself in a short window, with the shading of the
-//! bead free and the levels of its neighbours as prior.
+//! Edges that are no blurred step between plain surroundings, as on a shiny or strongly shaded
+//! strand. Every caliper line is fitted for itself in a short window, with free shading of the
+//! bead and the levels of its neighbours as prior.
 
 use super::blur::BinnedProfile;
 use super::fit::{EdgeFit, FittedEdge, Prior, ProfileWindow};

@@ -1,13 +1,14 @@
 //! One edge of a bead whose edges are torn, or lie beside a groove or in
 //! texture: where it runs, row by row, without a model of its flank.
 //!
-//! The mean over the rows is the width's fraction of this edge. The profile along
+//! The mean over the rows is what this edge adds to the width. The profile along
 //! the bead is signal (the bead's roughness); only pixel noise and texture are
 //! errors of the mean.
 //!
 //! ```text
 //! window          rows about the edge, turned so that the bead lies after it and is bright
 //! route           the course with the strongest step, by dynamic programming
+//! mean_profile    mean profile across the edge: bead, ground or groove
 //! levels          grey of the bead and of what lies outside, along the route
 //! crossing        where each row passes from the one to the other
 //! position_noise  standard deviation of the mean position

@@ -1,5 +1,4 @@
-//! How far the positions of an edge scatter about its course, and over how many
-//! bands that is correlated.
+//! Variance of the positions of an edge about its trajectory, and their correlation over bands.
 
 use crate::numeric::number::to_f64;
 

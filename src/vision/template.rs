@@ -1,5 +1,5 @@
-//! What a blurred edge is in the pixels of a row, tabulated for positions between
-//! two pixels, and with it what a row shows of the edge.
+//! A blurred edge in the pixels of a row, tabulated for positions between two pixels, and the
+//! comparison of a row with it.
 
 use std::ops::Range;
 

@@ -1,6 +1,5 @@
-//! Texture of bead and ground, a random pattern that is correlated over a few
-//! pixels: whether there is one in the superimposed rows, how strong it
-//! is and how far it reaches.
+//! Texture of bead and ground, a random pattern that is correlated over a few pixels: whether the
+//! superimposed rows show one, its strength and its length.
 
 use std::sync::LazyLock;
 
@@ -98,24 +97,16 @@ impl SurfaceTexture {
         {
             return None;
         }
-        let AutocorrelationFit { power, length, variance, kept } = TABLES.fit(&all, rows);
+        let AutocorrelationFit { power, length, variance, kept_fraction } = TABLES.fit(&all, rows);
         if length > MAX_LENGTH_PX {
             return None;
         }
         // What neighbouring rows differ by, as noise is found, has a little of
         // the texture in it.
-        let noise = (rows * (all[0] - kept * variance)).clamp(0.25 * noise, 1.1 * noise);
-        let sides = sides.map(|side| side.map(|all| (rows * all - noise).max(0.0)));
-        let texture = Self {
-            noise,
-            variance,
-            length,
-            power,
-            rows,
-            kept_fraction: kept,
-            sides: side_levels(sides),
-        };
-        (rows * kept * variance > MIN_TEXTURE_RATIO * noise).then_some(texture)
+        let noise = (rows * (all[0] - kept_fraction * variance)).clamp(0.25 * noise, 1.1 * noise);
+        let sides = side_levels(sides.map(|side| side.map(|all| (rows * all - noise).max(0.0))));
+        let texture = Self { noise, variance, length, power, rows, kept_fraction, sides };
+        (rows * kept_fraction * variance > MIN_TEXTURE_RATIO * noise).then_some(texture)
     }
 
     /// With grey levels instead of fractions of a step.
@@ -254,7 +245,7 @@ struct AutocorrelationFit {
     power: usize,
     length: f64,
     variance: f64,
-    kept: f64,
+    kept_fraction: f64,
 }
 
 /// Covariances of windows at distances of 0 to [`LAGS`], for each power and
@@ -286,8 +277,12 @@ impl TextureTables {
         let fraction = rows - to_f64(fewer);
         let (fewer, more) = (&self.windows[fewer - 1], &self.windows[fewer.min(MAX_ROWS - 1)]);
         let mut best = 0.0;
-        let mut fit =
-            AutocorrelationFit { power: 0, length: FIRST_LENGTH_PX, variance: 0.0, kept: 1.0 };
+        let mut fit = AutocorrelationFit {
+            power: 0,
+            length: FIRST_LENGTH_PX,
+            variance: 0.0,
+            kept_fraction: 1.0,
+        };
         for (power, (fewer, more)) in fewer.iter().zip(more).enumerate() {
             for (number, (fewer, more)) in fewer.iter().zip(more).enumerate() {
                 let model = |lag: usize| fewer[lag] + fraction * (more[lag] - fewer[lag]);
@@ -301,7 +296,7 @@ impl TextureTables {
                 if explained > best {
                     best = explained;
                     let (length, variance) = (length(number), product / square);
-                    fit = AutocorrelationFit { power, length, variance, kept: model(0) };
+                    fit = AutocorrelationFit { power, length, variance, kept_fraction: model(0) };
                 }
             }
         }

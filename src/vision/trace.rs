@@ -1,7 +1,6 @@
-//! One edge of the bead, from rough positions to sub-pixel ones with their
-//! variances: its profile is read from superimposed rows, every row is
-//! compared with it, and the rows of a band are solved for position and levels
-//! together.
+//! One edge of the bead, from rough positions to sub-pixel ones with their variances. Its profile
+//! is read from superimposed rows, every row is compared with it, and the rows of a band are
+//! solved for position and levels together.
 
 mod band_levels;
 mod band_sums;

@@ -1,6 +1,5 @@
-//! Weights of the pixels of a row for the place of an edge in noise that hangs
-//! together over neighbours: those of generalised least squares, blind to the
-//! levels on either side.
+//! Weights of the pixels of a row for the position of an edge in correlated noise: generalised
+//! least squares, insensitive to the levels on either side.
 
 /// Pixels at most. Derived: 4 · 16, the chunks of a core in textured surroundings.
 pub const MAX_PIXELS: usize = 64;

@@ -1,4 +1,4 @@
-//! How sure a width is, and how rough the bead.
+//! Uncertainty of a width, and roughness of the bead.
 
 use super::sections::Sections;
 use super::width_input::{LocatedEdge, WidthInput, WidthScratch};

@@ -1,4 +1,4 @@
-//! What a width is taken from: two edges, and where they lie on the surface.
+//! Input of the width: two edges, and the map to the surface.
 
 use crate::calibration::SurfaceMap;
 use crate::core::geometry::SurfacePoint;
@@ -62,12 +62,8 @@ impl WidthInput<'_> {
     pub fn points(&self, side: usize) -> impl Iterator<Item = EdgePoint> + Clone {
         let places = self.sides[side].positions.iter().enumerate();
         places.filter_map(|(band, located)| {
-            let located = (*located)?;
-            Some(EdgePoint {
-                t: self.normalised_position(band),
-                u: located.at,
-                weight: located.row_fraction,
-            })
+            let CaliperEdge { at: u, row_fraction: weight, .. } = (*located)?;
+            Some(EdgePoint { t: self.normalised_position(band), u, weight })
         })
     }
 

@@ -1,4 +1,4 @@
-//! The course of an edge with as few degrees of freedom as a gauge supports.
+//! A line or a parabola along the gauge.
 
 /// A course along the gauge: its mean position, and half of what it moves by from end to
 /// end \[px\]; the bend is a parabola's with a mean of zero.

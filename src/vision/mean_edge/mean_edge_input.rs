@@ -1,4 +1,4 @@
-//! What is looked at for an edge on the mean over its rows.
+//! Input of the mean edge: pixels, caliper lines, and the side of the bead.
 
 use crate::numeric::number::{floor_to_index, narrow_to_f32, to_f64};
 use crate::vision::row_range::RowRange;

@@ -1,4 +1,4 @@
-//! Weights of the pixels across an edge, and what they make of positions without one.
+//! Least-squares weights of the pixels across an edge, and what they give where there is no edge.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -58,13 +58,8 @@ impl EdgeWeights {
                 *weight = (0..3).map(|j| inverse[(number, j)] * design[j][k]).sum();
             }
         }
-        let [place, ground, level] = weights;
-        Some(Self {
-            position: place,
-            levels: [ground, level],
-            bead: design[2],
-            pixels: 2 * half + 1,
-        })
+        let [position, ground, level] = weights;
+        Some(Self { position, levels: [ground, level], bead: design[2], pixels: 2 * half + 1 })
     }
 
     /// Step from ground to bead in a window's mean profile \[grey levels\].

@@ -1,5 +1,4 @@
-//! What is not accepted: edges that disagree with themselves or with each other,
-//! and steps that are too low.
+//! Checks of two located edges: consistency, contrast, blur, pattern, occlusion, boundary.
 
 use super::pattern_limits::{MAX_PATTERN, MAX_PATTERN_LINE_BY_LINE};
 use super::work::{EdgeModel, MeasureState};

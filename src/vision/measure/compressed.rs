@@ -1,4 +1,4 @@
-//! What a compression of the image leaves open of a width.
+//! Uncertainty of a width from the compression of the image.
 
 use super::work::MeasureState;
 use crate::vision::trace::EdgeTracer;

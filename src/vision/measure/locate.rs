@@ -1,5 +1,5 @@
-//! The bead's two edges, from their contours to sub-pixel positions: each in the
-//! way that suits it.
+//! The bead's two edges, from their contours to sub-pixel positions. Each edge is located by the
+//! model that fits it.
 
 use crate::vision::buffer::refill;
 use std::ops::Range;

@@ -212,10 +212,8 @@ impl MeasureState {
             _ => 1.0,
         };
         let off = self.mm_per_px * self.row_offset_px(fits) / found.sigma.get();
-        WidthMeasurement {
-            sigma: found.sigma * (sigma_factor * sigma_factor + off * off).sqrt(),
-            ..found
-        }
+        let sigma = found.sigma * (sigma_factor * sigma_factor + off * off).sqrt();
+        WidthMeasurement { sigma, ..found }
     }
 
     /// How far edges lie from the rows' \[px\] where a step is but a part of the levels'

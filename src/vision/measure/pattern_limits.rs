@@ -1,5 +1,5 @@
-//! Up to which pattern of the ground, and beside which texture of the bead, edges are measured,
-//! and how much less sure texture makes them.
+//! Limits of the pattern of the ground beside which edges are measured, and the variance that
+//! texture adds.
 
 use crate::vision::coarse::LinePair;
 use crate::vision::reject::{Checked, Reject};

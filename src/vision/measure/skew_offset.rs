@@ -1,4 +1,4 @@
-//! What the skew of both edges' flanks makes of a width.
+//! Offset of a width by the skew of both edges' flanks.
 
 use super::work::{EdgeModel, MeasureState};
 use crate::vision::trace::EdgeTracer;

@@ -1,6 +1,6 @@
-//! How skewed an edge's flank is: what light passes through between the bead and a grey
-//! level, such as a camera's gamma, bends the flank by a bump that is even about the edge,
-//! fraction · (1 − fraction). A blurred step that is fitted to it lies aside of the edge.
+//! Skew of an edge's flank. A nonlinear camera, such as one with a gamma, adds a bump to the flank
+//! that is even about the edge, f · (1 − f) for a step f. A blurred step that is fitted to it
+//! without the bump lies beside the edge.
 
 use super::StepFitter;
 use super::look::{SHADING_SIGMA, StepFit};

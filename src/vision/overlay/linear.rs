@@ -1,5 +1,5 @@
-//! What a blurred step leaves of an overlay's means, linear about the step: the normal
-//! equations of its position, blur, levels and shading, and the misfit after a step of the fit.
+//! Linearisation of a blurred step about an estimate: normal equations of its position, blur,
+//! levels and shading, and the misfit after a step of the fit.
 
 use nalgebra::SVector;
 

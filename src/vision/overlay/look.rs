@@ -1,5 +1,5 @@
-//! What a first fit to an edge shows: the step, how sure its blur is, what it leaves, and how far
-//! there is nothing else.
+//! A fit of a blurred step to an overlay: the step, the uncertainty of its blur, the residual, and
+//! how far there is nothing else.
 
 use super::HALF_SPAN;
 use super::step::{BlurredStep, Extent, NeighbourStep, NeighbourSteps};
@@ -137,13 +137,8 @@ impl StepFit {
     /// `noise` is what independent ones as unsure would have.
     pub fn with_texture(self, noise: f64) -> Self {
         let blur_sd = self.blur_sd * (noise / self.noise).max(1.0);
-        Self {
-            blur_sd,
-            pixel_noise: noise,
-            noise: noise.max(self.noise),
-            residual: noise.max(self.residual),
-            ..self
-        }
+        let [of_rows, residual] = [self.noise, self.residual].map(|own| noise.max(own));
+        Self { blur_sd, pixel_noise: noise, noise: of_rows, residual, ..self }
     }
 }
 

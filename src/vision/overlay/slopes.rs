@@ -54,10 +54,8 @@ impl ProfileSlopes {
     /// Steepest slope of the overlay near the path \[1/px\], and where.
     #[inline(always)]
     pub fn steepest(&self, room: Extent) -> Option<(f64, f64)> {
-        let (from, to) = (
-            halves(-room.before.min(MAX_EDGE_OFFSET_PX)),
-            halves(room.after.min(MAX_EDGE_OFFSET_PX)),
-        );
+        let most = MAX_EDGE_OFFSET_PX;
+        let (from, to) = (halves(-room.before.min(most)), halves(room.after.min(most)));
         let mut best = (0.0, 0);
         for half in from..=to {
             let slope = self.at(half);

@@ -1,4 +1,4 @@
-//! The fit of a blurred step to an overlay: a first look, and others from it on.
+//! Least-squares fits of a blurred step to an overlay.
 
 use super::StepFitter;
 use super::look::{MAX_ITERATIONS, SHADING_SIGMA, StepFit};

@@ -1,6 +1,6 @@
-//! A groove beside the bead: where the bead begins, from the shape of the whole dark line.
-//! A groove that is not much wider than the blur does not show how dark it is; what is
-//! known of other grooves then shows how wide it is.
+//! A groove beside the bead. Where the bead begins is fitted from the shape of the whole dark
+//! line. A groove that is not much wider than the blur does not show how dark it is; a prior from
+//! real grooves then determines its width.
 
 use super::mean_profile::{MeanProfile, OUTSIDE_PX, PROFILE_PX};
 use crate::numeric::blurred_step::StepTable;

@@ -1,4 +1,4 @@
-//! How far pixel noise and texture move the mean position of an edge.
+//! Standard deviation of the mean position of an edge, from pixel noise and texture.
 
 use super::crossing::SUMMED_INSIDE_PX;
 use super::levels::{Crossings, DEPTH_SIGMA, EdgeLevels};

@@ -99,12 +99,7 @@ impl Section {
         let noise_px2 = fractions[0] * sigmas.0.powi(2) + fractions[1] * sigmas.1.powi(2);
         let noise_mm2 = noise_px2 * mm_per_px * mm_per_px;
         let middle = nalgebra::center(&from, &to);
-        (noise_mm2.is_finite()).then_some(Self {
-            number: caliper.number,
-            middle,
-            across,
-            noise_mm2,
-        })
+        noise_mm2.is_finite().then_some(Self { number: caliper.number, middle, across, noise_mm2 })
     }
 }
 

@@ -1,5 +1,5 @@
-//! How much of a frame's bead is new, where nothing shows how far the bead has moved on:
-//! two frames that show the same piece have the same widths there.
+//! The new fraction of a frame's bead where the path is not known: two frames that show the same
+//! piece have the same widths there.
 
 use super::local::LocalWidths;
 use crate::core::units::Mm;

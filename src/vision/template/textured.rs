@@ -1,5 +1,5 @@
-//! A template for textured surroundings: what a row shows of the position is
-//! weighted so that the texture disturbs it least.
+//! A template for textured surroundings: residuals are weighted so that the texture affects the
+//! position least.
 
 use super::{LANES, MAX_CHUNKS, SUBPIXEL_PHASES, StepTemplate};
 use crate::numeric::number::{narrow_to_f32, to_f64};

@@ -1,4 +1,4 @@
-//! What the rows of a band show together of position and levels of an edge.
+//! Normal equations of the rows of a band for position and levels of an edge.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -66,12 +66,8 @@ impl EdgeTracer {
             shading: 0.0,
         };
         let BlurredStep { at, blur, .. } = seen.step;
-        let start = ClippedStep {
-            at,
-            blur,
-            visible,
-            clipped: SCALE_END_GREY + 0.3 * (SCALE_END_GREY - visible),
-        };
+        let clipped = SCALE_END_GREY + 0.3 * (SCALE_END_GREY - visible);
+        let start = ClippedStep { at, blur, visible, clipped };
         let rough = self.cut_off.fit(&task, &self.overlay, start, None)?;
         self.shift_course(rough.step.at, 0.0, 1.0);
         self.locate_clipped(scene, &task, &rough);

@@ -1,5 +1,5 @@
-//! An edge that grains or spots cover in part: which rows show it and nothing
-//! else. All that is known of it is taken from those rows alone.
+//! An edge that grains or spots occlude in part: which rows show it and nothing else. All that is
+//! known of it is taken from those rows alone.
 
 use super::{EdgeState, EdgeTracer, MAX_CLEAR_MISFIT, typical};
 use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f32};

@@ -1,4 +1,4 @@
-//! What a tracer keeps of an edge, by what it is for.
+//! The parts of a tracer's state.
 
 use super::band_sums::BandSums;
 use super::group::RowGroup;

@@ -1,5 +1,5 @@
-//! The rows of an edge, each compared with it: where it shows the edge, and
-//! whether it shows anything else.
+//! Comparison of every row with the edge: where the row shows it, and whether it shows anything
+//! else.
 
 use crate::vision::buffer::{refill, reset};
 use std::ops::Range;

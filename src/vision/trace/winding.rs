@@ -1,5 +1,5 @@
-//! An edge that winds more quickly than the bands of the first pick show it, as that of
-//! a rough bead does in a tall gauge: it is picked anew, caliper line by caliper line.
+//! An edge that winds more quickly than the bands resolve, as that of a rough bead in a tall
+//! gauge. It is picked anew on every caliper line.
 
 use super::{EdgeTracer, MAX_UNFIT_FRACTION, StepFit, TraceInput, typical};
 use crate::numeric::number::{narrow_to_f32, to_f32};
@@ -112,12 +112,8 @@ impl EdgeTracer {
         self.course.draw(scene.bands, &self.values.path, &self.values.before, &self.values.step);
         let course = &self.course;
         let tall = scene.strip.along.div_ceil(scene.lines.len());
-        self.sheet.read(
-            scene.strip,
-            scene.lines,
-            Grouping { steepest: 0.0, max_rows: tall },
-            |v| course.at(v),
-        );
+        let grouping = Grouping { steepest: 0.0, max_rows: tall };
+        self.sheet.read(scene.strip, scene.lines, grouping, |v| course.at(v));
         let windows = self.sheet.windows.iter().enumerate();
         let picks = windows.map(|(number, window)| pick(window, self.sheet.pixels(number)));
         if !path::fill(picks, &mut self.scratch.rough) {
