@@ -10,8 +10,7 @@ use crate::numeric::blurred_step::StepTable;
 /// Bins of half a pixel. Derived: 2 · 2 · 40 + 1 for ±40 px, more than the longest half window.
 const BINS: usize = 161;
 const CENTRE_BIN: usize = BINS / 2;
-/// Gauss–Newton steps at most: convergence takes a few, and a fit that needs more does not
-/// converge.
+/// Gauss–Newton steps at most: more cost time on profiles that show no edge.
 const MAX_STEPS: usize = 30;
 /// Smallest blur that is fitted. Derived: a sharp edge that is integrated over pixels and
 /// half-pixel bins has √(1/12 + 1/48) = 0.32 px; a little more keeps the fit away from it.

@@ -9,8 +9,9 @@ use crate::numeric::number::{round_to_count, to_f32};
 use crate::numeric::rank;
 use crate::vision::buffer::{refill, reset};
 
-/// Rows of a band at least, and bands at most.
+/// Rows of a band at least: fewer are noisy, more smear a slanted edge.
 const BAND_ROWS: usize = 8;
+/// Bands at most: the time of the search grows with them.
 const MAX_BANDS: usize = 24;
 /// Pixels on either side that are compared for a step, as a fraction of the
 /// bead's width, and their limits: about the depth of tears, and no more than a

@@ -154,6 +154,7 @@ fn best_pair(
 /// Whether the gauge's middle row is brighter between the lines than beside
 /// them, or darker, as the bead is.
 fn polarity_fits(gauge: &Gauge, frame: &Frame, grey: &[u8], [left, right]: [EdgeLine; 2]) -> bool {
+    /// Distance from an edge line at which the level is read \[px\]: beyond the blur.
     const BESIDE_PX: f64 = 6.0;
     let (roi, view) = (gauge.roi, GaugeView::new(gauge.roi, gauge.axis));
     let middle = ((to_f64(view.along) - 1.0) / 2.0).round();

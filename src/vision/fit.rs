@@ -7,7 +7,9 @@ use nalgebra::{Matrix4, Vector4};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::to_f64;
 
+/// Gauss–Newton steps at most: more cost time on lines that show no edge.
 const MAX_STEPS: usize = 8;
+/// Step at which the fit has converged \[px\]: far below any noise of a line.
 const CONVERGED_PX: f64 = 1e-4;
 
 /// Position and levels of an edge.

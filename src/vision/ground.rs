@@ -15,7 +15,7 @@ const MIN_FIRST_PX: f64 = 4.0;
 const COLUMN_STEP_PX: usize = 2;
 /// Columns at most: more reach into what lies farther away.
 const MAX_COLUMNS: usize = 10;
-/// Fewest lines that show a pattern.
+/// Fewest lines that show a pattern: fewer leave its variance too uncertain.
 const MIN_LINES: usize = 8;
 /// Part of the noise's variance by which a pattern's must exceed it: less is not distinguished
 /// from noise.

@@ -46,16 +46,18 @@ const USUAL_BLUR: usize = 3;
 const BLUR_SHIFT_PX: usize = 4;
 /// How far an edge may lie from its line \[px\].
 const MAX_OFFSET_PX: f64 = 10.0;
-/// Ground that is looked at \[px\], and bead: other things lie farther away.
+/// Ground that is read \[px\]: other things lie farther away.
 const MAX_GROUND_PX: usize = 100;
+/// Bead that is read \[px\].
 const MAX_BEAD_PX: usize = 120;
 /// Distance from the edge at which ground and bead are free of the flank, in blurs. Derived: beyond
 /// 4 blurs 3·10⁻⁵ of a step is left, 1 − Φ(4).
 const FLANK_BLURS: f64 = 4.0;
 /// Bead beside the flank whose mean is its level \[px\].
 const LEVEL_PX: usize = 24;
-/// Columns of the ground that show its pattern, and their distance \[px\].
+/// Fewest columns of the ground that show its pattern: the median of fewer is uncertain.
 const MIN_COLUMNS: usize = 6;
+/// Distance of these columns \[px\]: neighbours of a pattern are alike.
 const COLUMN_PX: usize = 2;
 
 /// An edge along a course; keeps its buffers from frame to frame.

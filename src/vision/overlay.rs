@@ -43,9 +43,9 @@ const JUDGED_SAMPLES: Range<usize> = HALF_SPAN - CORE_HALF..HALF_SPAN + CORE_HAL
 /// A row that differs from the mean by so many times what rows do in the
 /// median is left out; the second time, when the mean is a better one.
 const MAX_ROW_MISFIT: [f32; 2] = [2.0, 1.7];
-/// Fraction of the rows that are most alike, from which a mean is made where many
-/// may be covered, and how often anew.
+/// Fraction of the rows that are most alike, from which a mean is made where many may be occluded.
 const BEST_FRACTION: f32 = 0.3;
+/// How often that mean is made anew: more cost time, fewer leave occluded rows in it.
 const MAX_SETTLE_ROUNDS: usize = 5;
 /// What makes a row that is clipped at the end of the scale unlike the others, in
 /// such medians.

@@ -137,16 +137,8 @@ fn each(
             let strength =
                 edge.step.min(other.step) * narrow_to_f32(edge.band_fraction * other.band_fraction);
             let score = strength / ((1.0 + edge.waviness_px) * (1.0 + other.waviness_px)).sqrt();
-            let pair = EdgePair {
-                left,
-                right,
-                step,
-                band_fraction,
-                strength,
-                score,
-                ..EdgePair::default()
-            };
-            visit(EdgePair { width_px, ..pair });
+            let pair = EdgePair { left, right, width_px, ..EdgePair::default() };
+            visit(EdgePair { step, band_fraction, strength, score, ..pair });
         }
     }
 }

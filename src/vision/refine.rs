@@ -16,6 +16,7 @@ use crate::vision::buffer::{refill, reset};
 const NEIGHBOURS: usize = 4;
 /// Longest half window \[px\].
 const MAX_HALF: usize = 30;
+/// Shortest half window \[px\]: the levels on either side need some pixels.
 const MIN_HALF: usize = 4;
 
 /// Where to look and how.

@@ -46,24 +46,26 @@ const MIN_ROWS_FRACTION: f64 = 0.5;
 /// Blur of an edge of which nothing is known: lenses that are nearly in focus, and what is
 /// too fine to be followed.
 const PRIOR_BLUR: MeanBlur = MeanBlur { px: 1.8, variance: 1.0 };
-/// Standard deviation of the blurs of two edges about each other, as a fraction, and the
-/// same of what is too fine to be followed.
+/// Standard deviation of the blurs of two edges about each other, as a fraction.
 const BLUR_DIFFERENCE: f64 = 0.02;
+/// The same of what is too fine to be followed, as a fraction of it.
 const FINE_ROUGHNESS_FRACTION: f64 = 0.2;
 
-/// How likely a groove that does not show its depth must be to be looked at, for it to be
-/// uncertain that there is none, and for the shape of the whole flank to be uncertain as well where
-/// it lies so far from where rows pass half height \[px\]: of drawn edges beside weak narrow
-/// grooves, some that were taken for sloping ground lay 0.7 px off.
+/// How likely a groove that does not show its depth must be to be located as one.
 const MIN_LIKELY_GROOVE: f64 = 0.18;
+/// How likely it must be for the uncertainty of its shape to count.
 const MIN_POSSIBLE_GROOVE: f64 = 0.085;
+/// How likely it must be for the shape of the whole flank to count as well, where it lies far from
+/// where rows pass half height: of drawn edges beside weak narrow grooves, some that were taken for
+/// sloping ground lay 0.7 px off.
 const MIN_CONCEIVABLE_GROOVE: f64 = 0.03;
+/// That distance \[px\].
 const MAX_SHAPE_OFFSET_PX: f64 = 0.5;
 
-/// Standard deviation of the place of an edge beside a groove that hides its depth that its
-/// waves leave open, as a fraction of theirs and at most \[px\]: the mean over them is no Gaussian
-/// flank. Measured on 12,000 rendered beads.
+/// Standard deviation that the waves of an edge leave open beside a groove that hides its depth, as
+/// a fraction of theirs: the mean over them is no Gaussian flank. Found on 12,000 rendered beads.
 const GROOVE_WAVINESS_FRACTION: f64 = 0.15;
+/// The same at most \[px\].
 const MAX_GROOVE_WAVINESS_PX: f64 = 0.15;
 /// The same beside a groove that shows its depth and is narrow. Measured: ACCURACY.md, Drawn frames
 /// (`grooves`): without it 3.5 of 30,000 widths were more than 5 sigma off, with it 2.5.
@@ -78,10 +80,10 @@ const MAX_NARROW_GROOVE_PX: f64 = 7.5;
 /// alone by 0.36.
 const GROOVE_CROSSING_SIGMA_PX: f64 = 0.5;
 
-/// Difference of the bead's level beside the edge from that farther inside, in standard
-/// deviations of what light does, from which on the former is taken, and the standard
-/// deviation of the shift that this makes, as a fraction of it.
+/// Difference of the bead's level beside the edge from that farther inside, in standard deviations
+/// of what light does, from which on the former is taken.
 const MIN_LEVEL_SIGMAS: f64 = 0.5;
+/// Standard deviation of the shift that this makes, as a fraction of it.
 const SHIFT_FRACTION: f64 = 0.2;
 /// How far off the shape may lie then, in what such a difference makes of the pixels that are
 /// summed within the edge: a flank that is no blurred step lies farther.

@@ -26,9 +26,10 @@ use crate::core::units::Mm;
 use overlap::Overlap;
 use spectrum::{BLUR_FACTORS, FrameKind, Spectrum, lengths_mm};
 
-/// Largest standard deviation of the logarithm of roughness, and of length, with which
-/// they are reported: what twenty to thirty correlation lengths of bead leave.
+/// Largest standard deviation of the logarithm of roughness with which it is reported: what twenty
+/// to thirty correlation lengths of bead leave.
 const MAX_LOG_SIGMA: f64 = 0.3;
+/// The same of the correlation length.
 const MAX_LENGTH_LOG_SIGMA: f64 = 0.65;
 /// By how much roughness must be more likely than noise alone, in the logarithm. Derived: 3²/2,
 /// three standard deviations (likelihood ratio, Wilks 1938).

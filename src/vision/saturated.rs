@@ -11,9 +11,9 @@ use crate::numeric::number::floor_to_count;
 const MIN_VISIBLE_FRACTION: f64 = 0.4;
 /// Largest uncertainty about an edge's position that a hidden level may leave \[px\].
 const MAX_CLIPPED_SIGMA_PX: f64 = 0.2;
-/// Ground on either side of the bead that its noise is taken from, and its
-/// distance from the edges \[px\].
+/// Ground on either side of the bead that its noise is taken from \[px\].
 const NOISE_COLUMNS_PX: f32 = 24.0;
+/// Its distance from the edges \[px\].
 const NOISE_MARGIN_PX: f32 = 6.0;
 
 /// A bead that was looked at.

@@ -44,8 +44,9 @@ const FIRST_LENGTH_PX: f64 = 0.7;
 const LENGTH_RATIO: f64 = 1.12;
 /// Rows of a window at most; more are taken for so many.
 const MAX_ROWS: usize = 8;
-/// Table of their integrals along the edge: positions for a length, lengths.
+/// Table of the integrals along the edge: positions for each correlation length.
 const PER_LENGTH: usize = 8;
+/// Correlation lengths that it reaches: beyond, nothing is left.
 const TABLE_LENGTHS: usize = 12;
 
 /// Texture and noise about an edge.

@@ -10,12 +10,14 @@ use crate::vision::waviness::{CURVE_ORDERS, Evidence, Midline, ORDERS, WaveKind,
 
 /// Fraction of the rows from which on nothing but the bead itself is seen.
 const MIN_COMPLETE_FRACTION: f64 = 0.98;
-/// Inflation of a variance that an edge's misfit may hide, and by how much more
-/// for what it shows: a texture's shift of an edge is correlated over so many
-/// rows.
+/// Inflation of a variance that an edge's misfit may hide: less would refuse edges whose misfit
+/// noise explains.
 const MIN_INFLATION_LIMIT: f64 = 1.2;
+/// By how much more for the misfit that an edge shows: a texture's shift of an edge is correlated
+/// over so many rows.
 const INFLATION_PER_MISFIT: f64 = 15.0;
-/// Squared slopes of an axis, in variances of what waves make, that are none.
+/// Squared slope of an axis, in variances of what waves make, below which it is none: more takes
+/// waves for a slope, less a slope for waves.
 const MIN_OBLIQUE_RATIO: f64 = 3.0;
 
 /// A bead that was cut along the curves of its two edges.

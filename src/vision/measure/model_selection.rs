@@ -20,9 +20,10 @@ const MAX_NARROW_WIDTH_PX: f32 = 40.0;
 /// Contrast of a rough edge over that of the blurred step below which it is another edge:
 /// holes within the bead leave 0.8.
 const MIN_CONTRAST_RATIO: f64 = 0.7;
-/// Contrast of an edge as a fraction of the other's below which it may be a rib's, and
-/// the distance at which another edge is not the same \[px\].
+/// Contrast of an edge as a fraction of the other's below which it may be a rib's.
 const MIN_SIDES_CONTRAST_RATIO: f64 = 0.6;
+/// Distance from which on another edge is not the same \[px\]: more than a groove that blur fills
+/// moves it.
 const OTHER_EDGE_PX: f64 = 3.0;
 /// The distance of a rough edge from what was located line by line up to which both are the
 /// same \[px\].
@@ -38,10 +39,10 @@ const MIN_PATTERN: f64 = 0.2;
 /// Factor of sigma where edges in such a pattern were located line by line: of 30,000 drawn
 /// widths some were off by up to seven of the sigmas of lines.
 const PATTERN_SIGMA_FACTOR: f64 = 2.0;
-/// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
-/// wide flank, and its blur from which on it is: steps within the ramps of motions of 15 px and
-/// more have 2.9 px, those beside a shadow the lens's.
+/// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a wide flank.
 const MAX_PARTIAL_CONTRAST: f64 = 0.55;
+/// Blur of a step from which on it is such a part \[px\]: steps within the ramps of motions of 15
+/// px and more have 2.9 px, those beside a shadow the lens's.
 const MIN_PARTIAL_BLUR_PX: f64 = 2.5;
 /// The same as a fraction of the levels' difference a few pixels before and after it, below
 /// which a ramp, a rib or a shadow may lie there.

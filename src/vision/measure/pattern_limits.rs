@@ -13,10 +13,10 @@ pub(super) const MAX_PATTERN: f64 = 0.37;
 /// (`ground-texture-weak`): widths beside a pattern of 0.25 and 0.31 were 53 and 22 px off. A real
 /// strand has up to 0.2, real printed lines up to 0.24.
 pub(super) const MAX_PATTERN_LINE_BY_LINE: f64 = 0.25;
-/// The same where no mean profile shows the edges. Beside beads of real concrete, which
-/// have a texture themselves, other beads and grooves have up to 0.464; a pattern beside a
-/// plain bead is none of those.
+/// The same where no mean profile shows the edges of a textured bead. Beside beads of real concrete
+/// other beads and grooves have up to 0.464.
 const MAX_PATTERN_BESIDE_TEXTURED: f64 = 0.48;
+/// The same of a plain bead, whose pattern is neither.
 const MAX_PATTERN_BESIDE_PLAIN: f64 = 0.2;
 /// The same where the blurred steps of a plain bead show all along it: beside drawn patterns
 /// of more, one in fifty was off by five standard deviations. A real strand has up to 0.2.

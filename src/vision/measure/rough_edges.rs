@@ -19,10 +19,10 @@ const LINE_RANGE_FACTOR: f32 = 1.4;
 /// Widest blur of a rough edge \[px\]: what lies outside is looked for within 20 px, and
 /// a flank of three blurs must end before.
 pub const MAX_ROUGH_BLUR_PX: f64 = 6.3;
-/// Blur up to which the level outside is read free of the flank \[px\], and by how much an edge
-/// may be off for each pixel that it exceeds it: drawn edges of 5.7 to 6 px, by motion, lay 0.45 px
-/// too far out.
+/// Blur up to which the level outside is read free of the flank \[px\].
 const MAX_CLEAR_BLUR_PX: f64 = 5.0;
+/// By how much an edge may be off for each pixel that its blur exceeds that: drawn edges of 5.7 to
+/// 6 px, by motion, lay 0.45 px too far out.
 const OFFSET_PER_BLUR: f64 = 0.5;
 /// Part of the width beside either edge where its flank may be \[of the width\]: the
 /// bead's texture is taken from between.

@@ -77,10 +77,10 @@ impl NeighbourSteps {
     /// The same flanks about an edge that lies at a position beside the path and
     /// has another step, of which the given one is a fraction.
     pub fn about(&self, at: f64, fraction: f64) -> Self {
-        let moved = |flank: NeighbourStep| NeighbourStep {
-            at: flank.at - at,
-            height: flank.height / fraction,
-            ..flank
+        let moved = |NeighbourStep { at: of_flank, height, blur }: NeighbourStep| NeighbourStep {
+            at: of_flank - at,
+            height: height / fraction,
+            blur,
         };
         Self(self.0.map(|flank| flank.map(moved)))
     }

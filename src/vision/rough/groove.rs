@@ -17,16 +17,19 @@ const GROOVE_GREY: f64 = 0.13;
 const GROOVE_GREY_SIGMA: f64 = 0.12;
 /// The same of the bead beside the edge about its level farther inside: light.
 pub(super) const BEAD_SIGMA: f64 = 0.03;
-/// Positions beyond the groove, and within the bead, that are fitted \[px\].
+/// Positions beyond the groove that are fitted \[px\]: enough for its level, too few for its slope
+/// to bend.
 const BEYOND_PX: usize = 9;
+/// Positions within the bead that are fitted \[px\].
 const WITHIN_PX: usize = 7;
 /// Standard deviation of a mean profile about the model, as a fraction of the bead's
 /// level, beside noise and texture: a lens's blur is no Gaussian, a camera not linear.
 const MODEL_MISFIT_SIGMA: f64 = 0.004;
-/// Rounds of the fit, and the change of position of the groove's
-/// width at which it ends \[px\].
+/// Rounds of the fit at most.
 const MAX_ITERATIONS: usize = 40;
+/// Change of position at which the fit has converged \[px\].
 const CONVERGED_PX: f64 = 3e-3;
+/// The same of the groove's width \[px\], which is known less well.
 const CONVERGED_WIDTH_PX: f64 = 0.03;
 /// Largest change of position, width and blur in a round \[px\].
 const MAX_STEP_PX: f64 = 0.7;
@@ -34,20 +37,22 @@ const MAX_STEP_PX: f64 = 0.7;
 const MAX_MISFIT: f64 = 30.0;
 /// Width of a narrow groove, from which the fit starts \[px\].
 const START_WIDTH_PX: f64 = 2.0;
-/// Smallest standard deviation and largest value of the variance of the far side about the
-/// near one \[px²\].
+/// Smallest standard deviation of the variance of the far side about the near one \[px²\].
 const FAR_SIDE_SIGMA_PX2: f64 = 0.02;
+/// Its largest value \[px²\].
 const MAX_FAR_SIDE_PX2: f64 = 30.0;
 /// Ranges of width and blur \[px\].
 const WIDTH_RANGE_PX: (f64, f64) = (0.5, 30.0);
 const BLUR_RANGE_PX: (f64, f64) = (0.6, 6.0);
-/// Weight that holds an unknown.
+/// Weight that fixes an unknown. Derived: many orders of magnitude more than the sums over a
+/// profile, and far from the limits of a float.
 const FIXED_WEIGHT: f64 = 1e9;
 /// Positions at the far end of ground that may be those of a groove's far side \[px\].
 const FAR_END_PX: usize = 4;
-/// By how much the sum of squares must fall until a dark line beside an edge on ground is
-/// as likely as none. A wider one than that is ground.
+/// By how much the sum of squares must fall until a dark line beside an edge on ground is as likely
+/// as none.
 const DIP_COST: f64 = 6.0;
+/// Widest such line \[px\]; a wider one is ground.
 const MAX_DIP_PX: f64 = 9.0;
 /// Unknowns of the fit. By definition those of [`GrooveModel::unknowns`].
 const UNKNOWNS: usize = 8;

@@ -125,6 +125,7 @@ impl RowWindows {
 /// symmetric kernel; beyond the ends the last pixel goes on.
 #[inline(always)]
 fn smooth_row(row: &WindowRow, (sign, after): (f32, bool), kernel: &[f32], out: &mut WindowRow) {
+    /// Pixels beyond either end of a row: more than the kernel reaches.
     const PAD: usize = 4;
     let mut padded = [0.0; WINDOW_PX + 2 * PAD];
     for k in 0..WINDOW_PX {

@@ -14,7 +14,7 @@ use crate::numeric::number::to_f64;
 /// Correlation lengths are looked for from this fraction of the lines' distance, or of
 /// the smoothing, up to one gauge.
 const MIN_LENGTH_FACTOR: f64 = 0.5;
-/// Their number.
+/// Number of correlation lengths that are tried: more cost time, fewer leave gaps between them.
 const LENGTH_COUNT: usize = 28;
 /// Blurs along the bead that are tried, as fractions of the smallest one that flanks have
 /// shown: torn flanks look more blurred than the lens makes them, and motion across the

@@ -20,10 +20,10 @@ const NEAR_END_SIGMAS: f64 = 1.5;
 /// Times that a path is smoothed at most before an edge that is clipped is read
 /// along it.
 const MAX_SMOOTHINGS: usize = 4;
-/// A path that runs farther off the positions than noise puts them no longer follows its
-/// edge, which is rough: in the mean square, so many times the variance of a position,
+/// A path that runs farther off the positions than noise puts them no longer follows its edge,
+/// which is rough: in the mean square, so many times the variance of a position.
 const MAX_SMOOTHING_RATIO: f32 = 4.0;
-/// and this much of the blur, which softens the flank too little to matter.
+/// And this fraction of the blur, which softens the flank too little to matter.
 const MAX_SMOOTHING_BLURS: f32 = 0.1;
 
 impl EdgeTracer {

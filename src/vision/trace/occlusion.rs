@@ -33,9 +33,9 @@ const MAX_NOISE_RATIO: f32 = 3.0;
 /// Farthest that the levels beside an edge may be from those a little away, as
 /// a fraction of the step: grains have levels of their own.
 const MAX_LEVEL_DIFFERENCE: f64 = 0.25;
-/// Courses that are tried.
+/// Trajectories that are tried.
 const MAX_ATTEMPTS: usize = 3;
-/// Fraction of clear rows along a course that is enough to look for no other.
+/// Fraction of clear rows along one that is enough to try no other.
 const ENOUGH_CLEAR_FRACTION: f32 = 0.4;
 /// Fraction of clear rows where there is none. By definition.
 const NONE_CLEAR: f32 = 0.0;
