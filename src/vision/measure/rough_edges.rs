@@ -192,9 +192,7 @@ impl MeasureState {
         self.check_boundary(frame.strip.across)?;
         self.width_on_surface(frame.view, frame.surface)
     }
-}
 
-impl MeasureState {
     /// Refuses a pair that the bead's texture may have made.
     fn check_prominence(&self, pair: &LinePair) -> Checked {
         let [left, right] = pair.sides;
