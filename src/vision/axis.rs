@@ -9,7 +9,7 @@ mod width_input;
 use crate::core::units::Mm;
 
 use super::corner;
-use super::curve::{Curve, NOTABLE_SCATTER_PX};
+use super::curve::{EdgeCurve, NOTABLE_SCATTER_PX};
 use super::reject::Reject;
 use super::width::{Hints, WidthMeasurement};
 use crate::numeric::gauss_legendre::GAUSS_LEGENDRE_5;
@@ -38,7 +38,7 @@ pub fn width(
     scratch: &mut WidthScratch,
 ) -> Result<WidthMeasurement, Reject> {
     let failed = Reject::NoPair { got: 0.0, need: 0.0 };
-    let curve = |side: usize| Curve::fit(scene.points(side), scene.half_length()).ok_or(failed);
+    let curve = |side: usize| EdgeCurve::fit(scene.points(side), scene.half_length()).ok_or(failed);
     let curves = [curve(0)?, curve(1)?];
     let slant_rad = scene.slant(&curves)?;
     let sections = Sections::cut(scene, &curves).ok_or(Reject::OffSurface)?;
@@ -66,7 +66,7 @@ pub fn width(
 impl WidthInput<'_> {
     /// Angle of the bead in the middle of the gauge \[rad\]; refuses beads that
     /// run too far off the gauge's axis there or at its ends.
-    fn slant(&self, [left, right]: &[Curve; 2]) -> Result<f64, Reject> {
+    fn slant(&self, [left, right]: &[EdgeCurve; 2]) -> Result<f64, Reject> {
         let at =
             |t: f64| (f64::midpoint(left.slope(t), right.slope(t)) / self.half_length()).atan();
         let crooked = |got_rad: f64, limit_rad: f64| Reject::Crooked { got_rad, limit_rad };
@@ -84,8 +84,8 @@ impl WidthInput<'_> {
     }
 
     /// Refuses corners.
-    fn check_bend(&self, left: &Curve, right: &Curve) -> Result<(), Reject> {
-        let turn = |side: usize, curve: &Curve| {
+    fn check_bend(&self, left: &EdgeCurve, right: &EdgeCurve) -> Result<(), Reject> {
+        let turn = |side: usize, curve: &EdgeCurve| {
             let off = curve.about_parabola;
             let notable = off > NOTABLE_SCATTER_PX * NOTABLE_SCATTER_PX;
             if notable { corner::turn(&self.points(side), off, self.half_length()) } else { 0.0 }
@@ -124,7 +124,7 @@ impl WidthInput<'_> {
     }
 
     /// How far each position lies off the course of its edge \[px\].
-    fn residuals_into(&self, side: usize, curve: &Curve, off: &mut Vec<Option<f64>>) {
+    fn residuals_into(&self, side: usize, curve: &EdgeCurve, off: &mut Vec<Option<f64>>) {
         off.clear();
         let positions = self.sides[side].positions.iter().enumerate();
         off.extend(positions.map(|(band, located)| {

@@ -53,12 +53,12 @@ pub struct EdgeContours {
 
 /// The steps of one sign.
 #[derive(Clone, Copy)]
-struct Steps<'a> {
+struct SignSteps<'a> {
     bands: &'a [StepCandidates],
     up: bool,
 }
 
-impl<'a> Steps<'a> {
+impl<'a> SignSteps<'a> {
     fn of(self, band: usize) -> &'a [StepCandidate] {
         if self.up { self.bands[band].up() } else { self.bands[band].down() }
     }
@@ -78,7 +78,7 @@ impl EdgeContours {
         self.predecessors.resize(bands.len(), [NO_PREDECESSOR; MAX_STEPS_KEPT]);
         self.contours.resize_with(MAX_CONTOURS, EdgeContour::default);
         self.count = 0;
-        let steps = Steps { bands, up };
+        let steps = SignSteps { bands, up };
         while self.count < MAX_CONTOURS {
             let typical = self.typical_step(steps);
             if typical <= 0.0 {
@@ -100,7 +100,7 @@ impl EdgeContours {
     }
 
     /// A strong but not extreme step: the 70th percentile of each band's best.
-    fn typical_step(&mut self, steps: Steps<'_>) -> f32 {
+    fn typical_step(&mut self, steps: SignSteps<'_>) -> f32 {
         self.steps.clear();
         for band in 0..steps.bands.len() {
             let free = steps.of(band).iter().enumerate();
@@ -117,7 +117,7 @@ impl EdgeContours {
     }
 
     /// Fills in scores and returns the last step of the best contour.
-    fn link(&mut self, steps: Steps<'_>, band_px: f32, typical: f32) -> Option<(usize, usize)> {
+    fn link(&mut self, steps: SignSteps<'_>, band_px: f32, typical: f32) -> Option<(usize, usize)> {
         let bands = steps.bands.len();
         let mut best = None;
         let mut best_total = 0.0;
@@ -140,7 +140,7 @@ impl EdgeContours {
         best
     }
 
-    fn best_before(&self, band: usize, at: f32, steps: Steps<'_>, band_px: f32) -> (f32, u16) {
+    fn best_before(&self, band: usize, at: f32, steps: SignSteps<'_>, band_px: f32) -> (f32, u16) {
         let mut best = (-SKIP_COST * to_f32(band), NO_PREDECESSOR);
         for gap in 1..=(MAX_SKIP + 1).min(band) {
             let before = band - gap;
@@ -163,7 +163,7 @@ impl EdgeContours {
     }
 
     /// Follows a contour back from its last step and takes its steps out.
-    fn follow(&mut self, last: (usize, usize), steps: Steps<'_>) {
+    fn follow(&mut self, last: (usize, usize), steps: SignSteps<'_>) {
         let contour = &mut self.contours[self.count];
         reset(&mut contour.at, self.used.len(), None);
         let (mut sum, mut n) = (0.0, 0.0);

@@ -82,7 +82,7 @@ impl BrokenLine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vision::curve::Curve;
+    use crate::vision::curve::EdgeCurve;
 
     const REACH: f64 = 50.0;
 
@@ -90,7 +90,7 @@ mod tests {
         let positions = (0..25u8).map(|k| (f64::from(k) + 0.5) / 12.5 - 1.0);
         let points: Vec<EdgePoint> =
             positions.map(|t| EdgePoint { t, u: of(t), weight: 1.0 }).collect();
-        let curve = Curve::fit(points.iter().copied(), REACH).unwrap();
+        let curve = EdgeCurve::fit(points.iter().copied(), REACH).unwrap();
         turn(&points.iter().copied(), curve.about_parabola, REACH)
     }
 

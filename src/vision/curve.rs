@@ -38,7 +38,7 @@ pub struct EdgePoint {
 /// A sum of Legendre polynomials, so that the first coefficient is the mean
 /// over the whole gauge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Curve {
+pub struct EdgeCurve {
     terms: [f64; MAX_TERMS],
     /// Number of its terms.
     pub count: usize,
@@ -53,7 +53,7 @@ pub struct Curve {
     pub about_parabola: f64,
 }
 
-impl Curve {
+impl EdgeCurve {
     /// Fits points of a gauge of which half is so long \[px\]; `None` where there
     /// are too few or where they lie too close together.
     pub fn fit(points: impl Iterator<Item = EdgePoint> + Clone, reach_px: f64) -> Option<Self> {
@@ -182,7 +182,7 @@ impl<const N: usize> CurveSums<N> {
 
     /// The curve of the first `M` terms and the mean square of the points'
     /// distances from it \[px²\].
-    fn curve<const M: usize>(&self) -> Option<(Curve, f64)> {
+    fn curve<const M: usize>(&self) -> Option<(EdgeCurve, f64)> {
         let matrix = self.matrix.fixed_view::<M, M>(0, 0).into_owned();
         let vector = self.vector.fixed_rows::<M>(0).into_owned();
         let inverse = matrix.cholesky()?.inverse();
@@ -194,7 +194,7 @@ impl<const N: usize> CurveSums<N> {
             return None;
         }
         let variance = |k: usize| if k < M { inverse[(k, k)] } else { 0.0 };
-        let curve = Curve {
+        let curve = EdgeCurve {
             terms,
             count: M,
             mean_variance: variance(0),
@@ -228,7 +228,7 @@ mod tests {
         let of = |t: f64| 100.0 + 8.0 * t - 3.0 * t * t;
         let mut points = points(of);
         points.drain(10..22);
-        let curve = Curve::fit(points.iter().copied(), 1e9).unwrap();
+        let curve = EdgeCurve::fit(points.iter().copied(), 1e9).unwrap();
         for t in [-1.0, -0.3, 0.0, 0.9] {
             assert!((curve.at(t) - of(t)).abs() < 1e-9);
             assert!((curve.slope(t) - (8.0 - 6.0 * t)).abs() < 1e-8);
@@ -239,7 +239,7 @@ mod tests {
     #[test]
     fn what_bends_more_is_followed_when_that_explains_it() {
         let of = |t: f64| 100.0 + 6.0 * (t * t * t - t) + 4.0 * t.powi(4);
-        let curve = Curve::fit(points(of).into_iter(), 1e9).unwrap();
+        let curve = EdgeCurve::fit(points(of).into_iter(), 1e9).unwrap();
         assert!((curve.at(0.4) - of(0.4)).abs() < 1e-9);
         let slope = (curve.at(0.4 + 1e-5) - curve.at(0.4 - 1e-5)) / 2e-5;
         assert!((curve.slope(0.4) - slope).abs() < 1e-6);
@@ -253,9 +253,9 @@ mod tests {
             let of = |t: f64| {
                 radius * cosine - (radius * radius - (radius * sine + t * reach).powi(2)).sqrt()
             };
-            let curve = Curve::fit(points(of).into_iter(), reach).unwrap();
-            let parabola = Curve::fit(points(of).into_iter(), 1e9).unwrap();
-            let off = |curve: &Curve| {
+            let curve = EdgeCurve::fit(points(of).into_iter(), reach).unwrap();
+            let parabola = EdgeCurve::fit(points(of).into_iter(), 1e9).unwrap();
+            let off = |curve: &EdgeCurve| {
                 let off = |t: f64| (curve.at(t) - of(t)).abs();
                 points(off).iter().fold(0.0, |most: f64, point| most.max(point.u))
             };
@@ -265,6 +265,6 @@ mod tests {
 
     #[test]
     fn one_point_is_no_curve() {
-        assert_eq!(Curve::fit(points(|t| t).into_iter().take(1), 1e9), None);
+        assert_eq!(EdgeCurve::fit(points(|t| t).into_iter().take(1), 1e9), None);
     }
 }

@@ -20,7 +20,7 @@ use crate::core::geometry::ImagePoint;
 use checks::{MAX_BLUR_PX, MAX_MOTION_BLUR_PX};
 use pattern_limits::MAX_PATTERN_BESIDE_COMPLETE;
 use rough_edges::may_be_rough;
-use work::{EdgeModel, GaugeFrame, MeasureState, Measured};
+use work::{EdgeModel, GaugeFrame, MeasureState, Outcome};
 
 use super::axis;
 use super::edge_lines;
@@ -135,7 +135,7 @@ impl Measurer {
     }
 
     /// The same with no more in sigma than the image itself leaves open.
-    fn measure_image(&mut self, frame: &Frame, surface: &SurfaceMap) -> Measured {
+    fn measure_image(&mut self, frame: &Frame, surface: &SurfaceMap) -> Outcome {
         let work = &mut self.work;
         work.left_px.clear();
         work.right_px.clear();
@@ -184,7 +184,7 @@ impl MeasureState {
         strip: &GaugeRows<'_, T>,
         view: &GaugeView,
         surface: &SurfaceMap,
-    ) -> Measured {
+    ) -> Outcome {
         let range = self.search_range(view, surface)?;
         let frame = &GaugeFrame { strip, view, surface, range };
         self.rows.noise = PixelNoise::read(strip, 0..strip.across);
@@ -211,7 +211,7 @@ impl MeasureState {
         &mut self,
         found: WidthMeasurement,
         frame: &GaugeFrame<'_, T>,
-    ) -> Measured {
+    ) -> Outcome {
         let knows_texture = self.left.is_textured() && self.right.is_textured();
         let is_weak =
             self.both.pattern_ratio > 0.0 && self.both.pattern_ratio < MAX_PATTERN_BESIDE_COMPLETE;
@@ -236,7 +236,7 @@ impl MeasureState {
 
     /// Measures edges that are blurred steps.
     #[inline(always)]
-    fn measure_steps<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Measured {
+    fn measure_steps<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Outcome {
         self.find_contours();
         let pair = self.find_pair(frame.range)?;
         self.trace(frame.strip, pair)?;
@@ -249,7 +249,7 @@ impl MeasureState {
         self.width_on_surface(frame.view, frame.surface)
     }
 
-    fn width_on_surface(&mut self, view: &GaugeView, surface: &SurfaceMap) -> Measured {
+    fn width_on_surface(&mut self, view: &GaugeView, surface: &SurfaceMap) -> Outcome {
         let hints = Hints {
             contrast_grey: f64::midpoint(self.both.contrasts[0], self.both.contrasts[1]),
             blur_px: f64::midpoint(self.left.blur_px, self.right.blur_px),

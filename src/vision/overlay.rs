@@ -28,7 +28,7 @@ pub use look::{SideRange, StepFit};
 pub use shape::{SideShading, StepShape};
 #[cfg(test)]
 pub use step::NeighbourSteps;
-pub use step::{BlurredStep, Extent};
+pub use step::{BlurredStep, Clearance};
 
 /// Rows that are superimposed at most.
 const MAX_ROWS: usize = 100;

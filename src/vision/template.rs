@@ -371,7 +371,7 @@ fn chunks(pixels: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vision::overlay::{BlurredStep, Extent, NeighbourSteps, SideShading};
+    use crate::vision::overlay::{BlurredStep, Clearance, NeighbourSteps, SideShading};
 
     /// A parabola that begins at the edge is, blurred, (x² + s²)Φ(x/s) + xsφ(x/s).
     #[test]
@@ -379,7 +379,7 @@ mod tests {
         let (blur, slope, bend) = (1.6f64, 0.01, -0.0004);
         let shape = StepShape {
             step: BlurredStep { at: 0.0, blur, before: 0.0, after: 1.0 },
-            extent: Extent { before: 20.0, after: 20.0 },
+            extent: Clearance { before: 20.0, after: 20.0 },
             shading: [SideShading::default(), SideShading { slope, bend }],
             flanks: NeighbourSteps::default(),
             variance: 0.0,

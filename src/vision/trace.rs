@@ -17,7 +17,7 @@ use super::clipped_step::ClippedEdge;
 use super::edge_windows::{EdgeWindows, Grouping};
 use super::light::Surroundings;
 use super::located::{self, CaliperEdge};
-use super::overlay::{BlurredStep, EdgeSkew, Extent, HALF_SPAN, Overlay, StepFit, StepShape};
+use super::overlay::{BlurredStep, Clearance, EdgeSkew, HALF_SPAN, Overlay, StepFit, StepShape};
 use super::path::{self, EdgeCorrection, EdgeTrajectory};
 use super::pool::Bands;
 use super::refine::{LineRefiner, RefinerInput};
@@ -390,7 +390,7 @@ impl EdgeTracer {
 
     /// How far there is nothing but this edge certainly: up to the gauge's
     /// boundary and to the middle of the bead.
-    fn room<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> Extent {
+    fn room<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> Clearance {
         let (low, high) =
             self.values.path.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &at| {
                 (low.min(at), high.max(at))
@@ -404,7 +404,7 @@ impl EdgeTracer {
         } else {
             before = before.min(inside);
         }
-        Extent { before: before.into(), after: after.into() }
+        Clearance { before: before.into(), after: after.into() }
     }
 
     /// Takes over what the overlay shows: the path is moved, and levels and

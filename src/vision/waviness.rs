@@ -8,7 +8,7 @@
 
 use std::sync::LazyLock;
 
-use super::curve::Curve;
+use super::curve::EdgeCurve;
 use crate::numeric::number::to_f64;
 
 /// Legendre coefficients that are looked at: of the orders 1 to 8.
@@ -162,7 +162,7 @@ pub struct Bends {
 
 impl Midline {
     /// Of a left and a right edge.
-    pub fn of([left, right]: &[Curve; 2]) -> Self {
+    pub fn of([left, right]: &[EdgeCurve; 2]) -> Self {
         Self(std::array::from_fn(|k| {
             f64::midpoint(left.coefficient(k + 1), right.coefficient(k + 1))
         }))

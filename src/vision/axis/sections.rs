@@ -6,7 +6,7 @@ use nalgebra::Vector2;
 use super::width_input::WidthInput;
 use crate::core::geometry::SurfacePoint;
 use crate::numeric::gauss_legendre::GAUSS_LEGENDRE_5;
-use crate::vision::curve::Curve;
+use crate::vision::curve::EdgeCurve;
 
 /// Distance of the positions from which an edge's direction and bend on the
 /// surface are taken.
@@ -20,7 +20,7 @@ struct LocalEdge {
 }
 
 impl LocalEdge {
-    fn of(scene: &WidthInput<'_>, curve: &Curve, t: f64) -> Option<Self> {
+    fn of(scene: &WidthInput<'_>, curve: &EdgeCurve, t: f64) -> Option<Self> {
         let at = scene.on_surface(curve, t)?;
         let before = scene.on_surface(curve, t - DIFFERENCE_STEP)? - at;
         let after = scene.on_surface(curve, t + DIFFERENCE_STEP)? - at;
@@ -62,7 +62,7 @@ pub struct Sections {
 
 impl Sections {
     /// Cuts the bead along the gauge; `None` where an edge has no point on the surface.
-    pub fn cut(scene: &WidthInput<'_>, curves: &[Curve; 2]) -> Option<Self> {
+    pub fn cut(scene: &WidthInput<'_>, curves: &[EdgeCurve; 2]) -> Option<Self> {
         let mut sections = Self::default();
         for (t, weight) in GAUSS_LEGENDRE_5 {
             let left = LocalEdge::of(scene, &curves[0], t)?;
@@ -84,7 +84,7 @@ impl Sections {
         sections.mean.is_finite().then_some(sections)
     }
 
-    fn measure_scales(&mut self, scene: &WidthInput<'_>, curves: &[Curve; 2]) -> Option<()> {
+    fn measure_scales(&mut self, scene: &WidthInput<'_>, curves: &[EdgeCurve; 2]) -> Option<()> {
         let middles = [scene.on_surface(&curves[0], 0.0)?, scene.on_surface(&curves[1], 0.0)?];
         let across = (middles[1] - middles[0]).try_normalize(1e-12)?;
         let slope = |side: usize| -> Option<Vector2<f64>> {

@@ -3,7 +3,7 @@
 use super::sections::Sections;
 use super::width_input::{LocatedEdge, WidthInput, WidthScratch};
 use crate::numeric::number::to_f64;
-use crate::vision::curve::Curve;
+use crate::vision::curve::EdgeCurve;
 use crate::vision::located::CaliperEdge;
 use crate::vision::scatter::{self, EdgeResidual};
 use crate::vision::waviness::{CURVE_ORDERS, Evidence, Midline, ORDERS, WaveKind, legendre, norm};
@@ -26,7 +26,7 @@ pub struct CutBead<'a> {
     /// What the width is taken from.
     pub scene: &'a WidthInput<'a>,
     /// Left and right edge.
-    pub curves: &'a [Curve; 2],
+    pub curves: &'a [EdgeCurve; 2],
     /// Its widths.
     pub sections: &'a Sections,
 }
@@ -155,7 +155,7 @@ impl WidthUncertainty {
 impl LocatedEdge<'_> {
     /// By how much positions with gaps between them scatter more than noise
     /// explains.
-    fn inflation_with_gaps(&self, off: &[Option<f64>], curve: &Curve, per_place: f64) -> f64 {
+    fn inflation_with_gaps(&self, off: &[Option<f64>], curve: &EdgeCurve, per_place: f64) -> f64 {
         let positions = off.iter().zip(self.positions);
         let positions = positions.filter_map(|(off, located)| {
             Some(EdgeResidual { px: (*off)?, row_fraction: located.as_ref()?.row_fraction })

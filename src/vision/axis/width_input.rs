@@ -2,7 +2,7 @@
 
 use crate::calibration::SurfaceMap;
 use crate::core::geometry::SurfacePoint;
-use crate::vision::curve::{Curve, EdgePoint};
+use crate::vision::curve::{EdgeCurve, EdgePoint};
 use crate::vision::gauge::{Gauge, GaugeView};
 use crate::vision::located::CaliperEdge;
 
@@ -68,13 +68,13 @@ impl WidthInput<'_> {
     }
 
     /// Square of the cosine between the bead and the gauge's axis at a position.
-    pub fn cosine_squared(&self, curves: &[Curve; 2], t: f64) -> f64 {
+    pub fn cosine_squared(&self, curves: &[EdgeCurve; 2], t: f64) -> f64 {
         let slope = f64::midpoint(curves[0].slope(t), curves[1].slope(t)) / self.half_length();
         1.0 / (1.0 + slope * slope)
     }
 
     /// The point of an edge on the surface.
-    pub fn on_surface(&self, curve: &Curve, t: f64) -> Option<SurfacePoint> {
+    pub fn on_surface(&self, curve: &EdgeCurve, t: f64) -> Option<SurfacePoint> {
         let v = self.centre() + t * self.half_length();
         self.surface.to_mm(self.view.to_image(curve.at(t), v))
     }

@@ -6,7 +6,7 @@ use super::pattern_limits::{
     MAX_PATTERN, MAX_PATTERN_BESIDE_COMPLETE, blur_inflation, check_pattern, with_texture_variance,
 };
 use super::uniformity;
-use super::work::{GaugeFrame, MIN_LINE_FRACTION, MeasureState, Measured};
+use super::work::{GaugeFrame, MIN_LINE_FRACTION, MeasureState, Outcome};
 use crate::numeric::number::to_f64;
 use crate::vision::coarse::{LinePair, StepLine};
 use crate::vision::ground::{EdgePosition, EdgeSide, MIN_EXCESS_VARIANCE};
@@ -55,7 +55,7 @@ impl MeasureState {
     /// Measures a bead whose texture shows before any edge is located. `None` where none
     /// does, where it lies on ground of the same kind, and where grains may lie on its edges.
     #[inline(never)]
-    pub fn measure_busy<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Option<Measured> {
+    pub fn measure_busy<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Option<Outcome> {
         let pair = self.find_lines(frame).ok()?;
         if !self.is_textured_between_lines(frame.strip, &pair) {
             return None;
@@ -76,7 +76,7 @@ impl MeasureState {
     /// `None` where neither has, or a weak one, and where the mean profile shows no edges and
     /// the pattern is accepted beside blurred steps.
     #[inline(never)]
-    pub fn measure_texture<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Option<Measured> {
+    pub fn measure_texture<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Option<Outcome> {
         let fractions = self.texture_between_steps(frame.strip);
         let is_textured = rms(fractions) > MIN_TEXTURE;
         if !is_textured && self.both.pattern_ratio == 0.0 {
@@ -182,7 +182,7 @@ impl MeasureState {
         &mut self,
         lines: (&LinePair, f64),
         frame: &GaugeFrame<'_, T>,
-    ) -> Option<Measured> {
+    ) -> Option<Outcome> {
         if lines.0.has_groove() {
             return None;
         }
@@ -194,7 +194,7 @@ impl MeasureState {
         &mut self,
         (pair, pattern): (&LinePair, f64),
         frame: &GaugeFrame<'_, T>,
-    ) -> Measured {
+    ) -> Outcome {
         let failed = Reject::NoPair { got: 0.0, need: MIN_LINE_FRACTION };
         let scenes = [true, false].map(|after| scene(frame.strip, &self.rows.lines, pair, after));
         let [left, right] = &mut self.mean_edges;

@@ -2,7 +2,7 @@
 
 use super::pattern_limits::{check_pattern, with_texture_variance};
 use super::uniformity;
-use super::work::{GaugeFrame, MIN_LINE_FRACTION, MeasureState, Measured};
+use super::work::{GaugeFrame, MIN_LINE_FRACTION, MeasureState, Outcome};
 use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::vision::coarse::{LinePair, StepLine};
 use crate::vision::gauge::{EdgeKind, Polarity, WidthRangePx};
@@ -39,7 +39,7 @@ impl MeasureState {
         &mut self,
         refused: &Reject,
         frame: &GaugeFrame<'_, T>,
-    ) -> Measured {
+    ) -> Outcome {
         let pair = self.find_lines(frame)?;
         let pattern = self.ground_pattern(frame.strip, &pair);
         let is_textured = self.is_textured_between_lines(frame.strip, &pair);
@@ -170,7 +170,7 @@ impl MeasureState {
         is_textured: bool,
         fits: &[RoughFit; 2],
         frame: &GaugeFrame<'_, T>,
-    ) -> Measured {
+    ) -> Outcome {
         check_pattern(pattern / fits[0].contrast.min(fits[1].contrast), is_textured)?;
         self.width_of_rough(fits, frame)
     }
@@ -180,7 +180,7 @@ impl MeasureState {
         &mut self,
         fits: &[RoughFit; 2],
         frame: &GaugeFrame<'_, T>,
-    ) -> Measured {
+    ) -> Outcome {
         self.left_px.clear();
         self.right_px.clear();
         let [left, right] = fits.map(with_flank_variance);

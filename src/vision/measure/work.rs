@@ -26,7 +26,7 @@ pub(super) const MIN_LINE_FRACTION: f64 = 0.6;
 pub(super) const MIN_OUTLIER_PX: f64 = 0.3;
 
 /// A width, or why there is none.
-pub(super) type Measured = Result<WidthMeasurement, Reject>;
+pub(super) type Outcome = Result<WidthMeasurement, Reject>;
 
 /// The gauge in one frame.
 #[derive(Debug, Clone, Copy)]

@@ -5,7 +5,7 @@ use nalgebra::SVector;
 
 use super::StepFitter;
 use super::look::{MAX_ITERATIONS, SHADING_SIGMA, StepFit, max_sample_px};
-use super::step::{BlurredStep, Extent, MIN_BLUR_PX, NeighbourStep, NeighbourSteps};
+use super::step::{BlurredStep, Clearance, MIN_BLUR_PX, NeighbourStep, NeighbourSteps};
 use crate::numeric::normal_equations::NormalEquations;
 use crate::vision::blur_estimate::BlurEstimate;
 
@@ -61,7 +61,7 @@ impl StepFitter<'_> {
     /// what they leave.
     fn linearise_flanks(&self, fit: &StepFit) -> (NormalEquations<UNKNOWNS>, f64) {
         let flanks = &fit.flanks;
-        let Extent { before: from, after: to } = reach(fit);
+        let Clearance { before: from, after: to } = reach(fit);
         let mut normal = NormalEquations::default();
         let many = 3.0 * flanks.0.iter().flatten().map(|_| 1.0).sum::<f64>();
         let (mut square, mut n) = (0.0, -6.0 - many);
@@ -90,14 +90,14 @@ impl StepFitter<'_> {
 }
 
 /// Farthest samples on either side \[px\].
-fn reach(fit: &StepFit) -> Extent {
+fn reach(fit: &StepFit) -> Clearance {
     let StepFit { step, room, flanks, .. } = fit;
     let plain = 4.5 * step.blur + 2.0;
     let of = |flank: &Option<NeighbourStep>, room: f64| match flank {
         Some(flank) => (flank.at.abs() + BEYOND_BLURS * flank.blur).min(max_sample_px()),
         None => plain.min(room).min(max_sample_px()),
     };
-    Extent { before: of(&flanks.0[0], room.before), after: of(&flanks.0[1], room.after) }
+    Clearance { before: of(&flanks.0[0], room.before), after: of(&flanks.0[1], room.after) }
 }
 
 /// Holds what is known, and unknowns that there are not.
@@ -156,14 +156,14 @@ fn added_variance(normal: &mut NormalEquations<UNKNOWNS>) -> Option<f64> {
 }
 
 /// The samples that the edge is located from.
-fn samples_of_edge(fit: &StepFit) -> Extent {
+fn samples_of_edge(fit: &StepFit) -> Clearance {
     let of = |flank: &Option<NeighbourStep>, room: f64| {
         flank.as_ref().map_or(room, |flank| {
             ((flank.at - fit.step.at).abs() - FLANK_MARGIN_BLURS * flank.blur).max(fit.step.blur)
         })
     };
     let NeighbourSteps([before, after]) = &fit.flanks;
-    Extent { before: of(before, fit.room.before), after: of(after, fit.room.after) }
+    Clearance { before: of(before, fit.room.before), after: of(after, fit.room.after) }
 }
 
 /// What a fit leaves, as fractions of its own step.

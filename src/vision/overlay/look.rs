@@ -2,7 +2,7 @@
 //! how far there is nothing else.
 
 use super::HALF_SPAN;
-use super::step::{BlurredStep, Extent, NeighbourStep, NeighbourSteps};
+use super::step::{BlurredStep, Clearance, NeighbourStep, NeighbourSteps};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::{floor_to_count, to_f64};
 use crate::vision::blur_estimate::BlurEstimate;
@@ -38,7 +38,7 @@ pub struct StepFit {
     /// Number of the phases that have rows.
     pub(super) phases: f64,
     /// How far there is nothing but this edge.
-    pub room: Extent,
+    pub room: Clearance,
     /// Steps beside it that reach into its pixels.
     pub(super) flanks: NeighbourSteps,
     /// What they and the blur add to the variance of its position \[px²\]; 0 where
@@ -59,7 +59,7 @@ impl StepFit {
     /// Samples beside the edge on either side.
     pub fn beside(&self) -> [SideRange; 2] {
         let near = 3.0 * self.step.blur + 1.0;
-        let Extent { before, after } = self.room;
+        let Clearance { before, after } = self.room;
         [(near - self.step.at, before), (near + self.step.at, after)].map(|(near, room)| {
             let far = floor_to_count(room).min(HALF_SPAN);
             SideRange { near: floor_to_count(near.ceil()), far }
@@ -91,7 +91,7 @@ impl StepFit {
     /// Number of samples about the edge that the misfit is the mean of.
     pub fn samples(&self) -> f64 {
         let reach = FIT_BLURS * self.step.blur + FIT_MARGIN_PX;
-        let Extent { before, after } = self.room;
+        let Clearance { before, after } = self.room;
         self.phases * (reach.min(before) + reach.min(after))
     }
 
@@ -128,8 +128,10 @@ impl StepFit {
             flank.as_ref().map_or(room, |flank| 0.5 * (flank.at - self.step.at).abs())
         };
         let NeighbourSteps([before, after]) = &self.flanks;
-        let room =
-            Extent { before: half(before, self.room.before), after: half(after, self.room.after) };
+        let room = Clearance {
+            before: half(before, self.room.before),
+            after: half(after, self.room.after),
+        };
         Self { room, flanks: NeighbourSteps::default(), added_variance: 0.0, ..*self }
     }
 
@@ -163,7 +165,7 @@ mod tests {
             noise: 0.05,
             residual: 0.05,
             phases: 2.0,
-            room: Extent { before: 20.0, after: 20.0 },
+            room: Clearance { before: 20.0, after: 20.0 },
             flanks: NeighbourSteps::default(),
             added_variance: 0.0,
         };

@@ -2,7 +2,7 @@
 //! and how they are shaded.
 
 use super::look::StepFit;
-use super::step::{BlurredStep, Extent, MIN_BLUR_PX, NeighbourSteps, SideInput};
+use super::step::{BlurredStep, Clearance, MIN_BLUR_PX, NeighbourSteps, SideInput};
 use super::{ROUNDING_VARIANCE_PX2, StepFitter};
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::line::LineSums;
@@ -40,7 +40,7 @@ pub struct StepShape {
     /// The step.
     pub step: BlurredStep,
     /// How far the surroundings are plain, and what is used of them.
-    pub extent: Extent,
+    pub extent: Clearance,
     /// How the level changes away from the edge, before it and after it, in
     /// fractions of the step.
     pub shading: [SideShading; 2],
@@ -85,7 +85,7 @@ impl StepFitter<'_> {
         let per_level = std::f64::consts::PI * step.blur * step.blur;
         Some(StepShape {
             step,
-            extent: Extent { before: before.extent, after: after.extent },
+            extent: Clearance { before: before.extent, after: after.extent },
             shading: [before.shading, after.shading],
             flanks,
             variance: per_level * (before.level_variance + after.level_variance) + added_variance,

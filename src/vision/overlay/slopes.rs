@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::step::{BlurredStep, Extent, NeighbourStep};
+use super::step::{BlurredStep, Clearance, NeighbourStep};
 use super::{HALF_SPAN, Overlay, PHASES, SPAN};
 
 /// Distance from the path within which the edge lies \[px\].
@@ -53,7 +53,7 @@ impl ProfileSlopes {
 
     /// Steepest slope of the overlay near the path \[1/px\], and where.
     #[inline(always)]
-    pub fn steepest(&self, room: Extent) -> Option<(f64, f64)> {
+    pub fn steepest(&self, room: Clearance) -> Option<(f64, f64)> {
         let most = MAX_EDGE_OFFSET_PX;
         let (from, to) = (halves(-room.before.min(most)), halves(room.after.min(most)));
         let mut best = (0.0, 0);

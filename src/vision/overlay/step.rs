@@ -10,7 +10,7 @@ const MAX_NEIGHBOUR_BLURS: f64 = 7.0;
 
 /// Samples that are free of anything but this edge, on either side \[px\].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Extent {
+pub struct Clearance {
     /// Towards smaller positions.
     pub before: f64,
     /// Towards larger ones.

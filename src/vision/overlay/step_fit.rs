@@ -3,7 +3,7 @@
 use super::StepFitter;
 use super::look::{MAX_ITERATIONS, SHADING_SIGMA, StepFit};
 use super::slopes::{ProfileSlopes, SlopeLimits};
-use super::step::{BlurredStep, Extent, MIN_BLUR_PX, NeighbourSteps};
+use super::step::{BlurredStep, Clearance, MIN_BLUR_PX, NeighbourSteps};
 use crate::numeric::number::to_f64;
 use crate::vision::blur_estimate::BlurEstimate;
 
@@ -22,7 +22,7 @@ impl StepFitter<'_> {
     /// fraction of the step, `room` how far to look. `None` where no step can be
     /// fitted.
     #[inline(always)]
-    pub fn first_fit(&self, noise: f64, room: Extent) -> Option<StepFit> {
+    pub fn first_fit(&self, noise: f64, room: Clearance) -> Option<StepFit> {
         let slopes = ProfileSlopes::of(self.overlay);
         let (slope, at) = slopes.steepest(room)?;
         let blur = (0.2 / slope).clamp(0.5, MAX_BLUR_PX);
@@ -92,13 +92,13 @@ impl StepFitter<'_> {
         start: BlurredStep,
         noise: f64,
         notable: f64,
-        room: Extent,
-    ) -> (Extent, NeighbourSteps) {
+        room: Clearance,
+    ) -> (Clearance, NeighbourSteps) {
         let limits =
             SlopeLimits { noise: noise / (2.0 * self.overlay.used().max(1.0)).sqrt(), notable };
         let (before, flank_before) = slopes.up_to_neighbour(start, limits, -1, room.before);
         let (after, flank_after) = slopes.up_to_neighbour(start, limits, 1, room.after);
-        (Extent { before, after }, NeighbourSteps([flank_before, flank_after]))
+        (Clearance { before, after }, NeighbourSteps([flank_before, flank_after]))
     }
 
     /// Fits position, blur, levels and a little shading about the edge.

@@ -46,7 +46,7 @@ fn overlay(beside: impl Fn(f64) -> f64) -> Overlay {
 /// The shape of the edge with its blur known to four percent.
 fn shape(overlay: &Overlay) -> StepShape {
     let table = StepTable::default();
-    let room = Extent { before: 45.0, after: 45.0 };
+    let room = Clearance { before: 45.0, after: 45.0 };
     let fit = overlay.with(&table).first_fit(NOISE, room).unwrap();
     overlay
         .with(&table)
@@ -97,7 +97,7 @@ fn shading_that_falls_off_is_followed_by_a_parabola() {
 /// The mean slope over two pixels is (Φ((x + 1)/s) − Φ((x − 1)/s))/2.
 #[test]
 fn the_steepest_slope_is_that_of_a_gaussian_flank() {
-    let room = Extent { before: 45.0, after: 45.0 };
+    let room = Clearance { before: 45.0, after: 45.0 };
     let (slope, at) = slopes::ProfileSlopes::of(&overlay(|_| 0.0)).steepest(room).unwrap();
     let fraction = |x: f64| 0.5 * (1.0 + libm::erf(x / (BLUR_PX * 2f64.sqrt())));
     // The pixel at 80 is nearest to the edge at 80.3.

@@ -1,6 +1,6 @@
 //! Levels on either side of an edge, band by band.
 
-use super::{EdgeTracer, Extent, TraceInput};
+use super::{Clearance, EdgeTracer, TraceInput};
 use crate::numeric::number::narrow_to_f32;
 use crate::numeric::rank;
 use crate::vision::path;
@@ -20,7 +20,7 @@ impl EdgeTracer {
 
     /// Picks levels anew along the course, where it was drawn through better positions
     /// and it is known how far there is nothing but the edge \[px\].
-    pub fn pick_levels_within<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, room: Extent) {
+    pub fn pick_levels_within<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, room: Clearance) {
         let (path, course) = (&mut self.values.path, &self.course);
         path.clear();
         let middles = (0..scene.bands.count()).map(|band| narrow_to_f32(scene.bands.middle(band)));

@@ -1,7 +1,7 @@
 //! An edge one side of which passes the end of the camera's scale.
 
 use super::{
-    BlurredStep, EdgeState, EdgeTracer, Extent, MAX_PASSES, MAX_PATH_ERROR_BLURS, TraceInput,
+    BlurredStep, Clearance, EdgeState, EdgeTracer, MAX_PASSES, MAX_PATH_ERROR_BLURS, TraceInput,
     typical,
 };
 use crate::numeric::number::{narrow_to_f32, to_f64};
@@ -50,7 +50,7 @@ impl EdgeTracer {
     ) -> Option<ClippedStepFit> {
         let seen = self.step_fit?;
         let (before, height) = self.mean_levels();
-        let Extent { before: room_before, after: room_after } = seen.room;
+        let Clearance { before: room_before, after: room_after } = seen.room;
         let (visible, room) = if hidden_after {
             (seen.step.before, [room_before, room_after])
         } else {

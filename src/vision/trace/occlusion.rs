@@ -8,7 +8,7 @@ use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::buffer::refill;
 use crate::vision::consensus::keep_consensus;
 use crate::vision::located::CaliperEdge;
-use crate::vision::overlay::{Extent, StepShape};
+use crate::vision::overlay::{Clearance, StepShape};
 use crate::vision::pixel_noise::NOISE_SIGMAS;
 use crate::vision::strip::GreyPixel;
 use crate::vision::template::{PlainSums, StepTemplate};
@@ -233,7 +233,7 @@ impl EdgeTracer {
         let fitter = self.overlay.with(scene.table);
         let look = fitter.first_fit(noise, room)?;
         let core = StepTemplate::core_half(look.step.blur);
-        let room = Extent { before: room.before.min(core), after: room.after.min(core) };
+        let room = Clearance { before: room.before.min(core), after: room.after.min(core) };
         let look = fitter.first_fit(noise, room)?;
         let shape =
             fitter.shape(&look, BlurEstimate { px: look.step.blur, sd_px: f64::INFINITY })?;
