@@ -140,10 +140,8 @@ impl PatternSearch {
         let strip = side.strip;
         let first = MIN_FIRST_PX.max(FLANK_BLURS * side.blur_px);
         let last = to_f64(strip.across - 1);
-        let border = |position: &EdgePosition| {
-            if side.is_after() { last - position.at } else { position.at }
-        };
-        let room = side.positions.iter().map(border).fold(side.room_px - first, f64::min);
+        let boundary = |of: &EdgePosition| if side.is_after() { last - of.at } else { of.at };
+        let room = side.positions.iter().map(boundary).fold(side.room_px - first, f64::min);
         let fits = |column: &usize| first + to_f64(COLUMN_STEP_PX * column) <= room;
         self.columns = (0..MAX_COLUMNS).take_while(fits).count();
         self.lines.clear();

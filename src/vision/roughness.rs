@@ -124,11 +124,8 @@ impl RoughnessEstimator {
     /// The estimate so far; `None` while too little bead has been seen, or noise explains
     /// what was seen.
     pub fn estimate(&self) -> Option<Roughness> {
-        let smooth: f64 = self
-            .spectra
-            .iter()
-            .map(|spectrum| log_likelihood(spectrum, &spectrum.expected[0][0], 0.0))
-            .sum();
+        let smooth = |of: &Spectrum| log_likelihood(of, &of.expected[0][0], 0.0);
+        let smooth: f64 = self.spectra.iter().map(smooth).sum();
         let cases = (0..BLUR_FACTORS.len()).flat_map(|blur| {
             (0..self.lengths_mm.len()).map(move |length| GridPoint { blur, length })
         });
@@ -186,11 +183,8 @@ impl RoughnessEstimator {
             }
             square *= step.clamp(-1.0, 1.0).exp();
         }
-        let log_likelihood = self
-            .spectra
-            .iter()
-            .map(|spectrum| log_likelihood(spectrum, case.of(spectrum), square))
-            .sum();
+        let of_spectrum = |of: &Spectrum| log_likelihood(of, case.of(of), square);
+        let log_likelihood = self.spectra.iter().map(of_spectrum).sum();
         Some(GridFit { square_mm2: square, log_variance: 1.0 / information, log_likelihood })
     }
 

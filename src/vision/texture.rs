@@ -278,12 +278,9 @@ impl TextureTables {
         let fraction = rows - to_f64(fewer);
         let (fewer, more) = (&self.windows[fewer - 1], &self.windows[fewer.min(MAX_ROWS - 1)]);
         let mut best = 0.0;
-        let mut fit = AutocorrelationFit {
-            power: 0,
-            length: FIRST_LENGTH_PX,
-            variance: 0.0,
-            kept_fraction: 1.0,
-        };
+        let (power, variance, kept_fraction) = (0, 0.0, 1.0);
+        let mut fit =
+            AutocorrelationFit { power, length: FIRST_LENGTH_PX, variance, kept_fraction };
         for (power, (fewer, more)) in fewer.iter().zip(more).enumerate() {
             for (number, (fewer, more)) in fewer.iter().zip(more).enumerate() {
                 let model = |lag: usize| fewer[lag] + fraction * (more[lag] - fewer[lag]);

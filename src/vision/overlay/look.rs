@@ -115,10 +115,8 @@ impl StepFit {
         let (step, density, slopes) = table.with_slopes(z);
         let depth = slopes.map(|level| level * edge.blur);
         let slope = (edge.after - edge.before) * density * per_blur;
-        let level = edge.before * (1.0 - step)
-            + edge.after * step
-            + shading[0] * depth[0]
-            + shading[1] * depth[1];
+        let levels = edge.before * (1.0 - step) + edge.after * step;
+        let level = levels + shading[0] * depth[0] + shading[1] * depth[1];
         ([-slope, -slope * z, 1.0 - step, step, depth[0], depth[1]], level)
     }
 

@@ -151,9 +151,8 @@ impl EdgeTracer {
         self.scratch.sorted.extend(fitting.map(|group| group.moved));
         let typical = median_of_few(&mut self.scratch.sorted);
         let in_texture = self.textured.scatter.map(|scatter| narrow_to_f32(scatter.of_window));
-        let of_window = |weight: f32| {
-            in_texture.unwrap_or(scene.noise * scene.noise / (weight * stiffness)).sqrt()
-        };
+        let square = scene.noise * scene.noise;
+        let of_window = |rows: f32| in_texture.unwrap_or(square / (rows * stiffness)).sqrt();
         let mut sums = BandSums { step: step.into(), ..BandSums::default() };
         for group in groups {
             let far = NOISE_SIGMAS * of_window(group.weight) / step.abs() + ROW_WAVINESS_PX;
