@@ -124,7 +124,7 @@ fn grains_on_a_third_of_the_rows_move_nothing() {
 /// The mean of a sine over n rows about m is sin(ωm)·sin(ωn/2)/(n·sin(ω/2)).
 #[test]
 fn a_winding_edge_is_followed_between_bands() {
-    let (size, turn) = (1.5, std::f64::consts::TAU / 40.0);
+    let (size, turn) = (1.5, std::f64::consts::TAU / 57.0);
     let edge = |row: f64| 80.0 + size * (turn * row).sin();
     let traced = trace(500, edge, |_, _| None, |_| 0.0);
     assert!(traced.tracer.seems_winding());
