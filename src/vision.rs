@@ -10,25 +10,23 @@
 //! edge          profile → the strongest steps
 //! contour       steps → edges that run along the bead
 //! pair          contours → the two edges of the bead
-//! trace         contour → sub-pixel places, one a caliper line, from all rows:
+//! trace         contour → sub-pixel positions, one a caliper line, from all rows:
 //!               path, overlay (blur, surroundings), template, bands; texture and
 //!               whiten where the surroundings are not plain
-//! occluded      the same for edges that only the other one shows where to look for
-//!               (parallel)
-//! clipped_step  the same for edges one side of which passes the end of the
-//!               camera's scale (censor)
+//! occluded      the same for edges that are found from the other edge (parallel)
+//! clipped_step  the same for edges with a saturated side (censor)
 //! refine        the same for edges that are no blurred steps (fit, blur)
-//! outlier       places that disagree with their neighbours
-//! axis          places → width normal to the bead, on the surface (curve, scatter,
+//! outlier       positions that disagree with their neighbours
+//! axis          positions → width normal to the bead, on the surface (curve, scatter,
 //!               waviness)
 //! roughness     local widths of successive frames → roughness of the bead
 //! ```
 //!
-//! The loops over pixels are compiled once for each width of vectors that
-//! processors have, and the widest that there is runs.
+//! The loops over pixels are compiled for each vector width of the processor. The widest
+//! that it has runs.
 //!
-//! [`Method::EdgeLines`] is the method of the 2022 paper instead, as a
-//! baseline.
+//! [`MeasureMethod::EdgeLines`] is the method of Shojaei Barjuei et al. 2022 instead, as
+//! a baseline.
 
 #![expect(
     clippy::inline_always,
@@ -38,6 +36,7 @@
 mod axis;
 mod blur;
 mod blur_estimate;
+mod buffer;
 mod censor;
 mod clipped_step;
 mod coarse;

@@ -9,12 +9,12 @@ mod width_input;
 use crate::core::units::Mm;
 
 use super::corner;
-use super::curve::{Curve, NOTABLE_SCATTER_PX};
+use super::curve::{EdgeCurve, NOTABLE_SCATTER_PX};
 use super::reject::Reject;
 use super::width::{Hints, WidthMeasurement};
 use crate::numeric::gauss_legendre::GAUSS_LEGENDRE_5;
 use sections::Sections;
-use spread::WidthUncertainty;
+use spread::{CutBead, WidthUncertainty};
 pub use width_input::{LocatedEdge, WidthInput, WidthScratch};
 
 /// Largest angle between the bead and the gauge's axis that is measured: the
@@ -28,27 +28,28 @@ const MAX_END_SLANT_RAD: f64 = 0.44;
 const MIN_RADIUS_WIDTHS: f64 = 1.5;
 /// Angle over half the gauge below which a bend is a bead's waviness.
 const MIN_TURN_RAD: f64 = 0.25;
-/// Share of the gauge on either side of its middle from which the edge points
+/// Fraction of the gauge on either side of its middle from which the edge points
 /// there are taken.
 const MIDDLE_FRACTION: f64 = 0.125;
 /// Width of the bead.
 pub fn width(
     scene: &WidthInput<'_>,
     hints: Hints,
-    memory: &mut WidthScratch,
+    scratch: &mut WidthScratch,
 ) -> Result<WidthMeasurement, Reject> {
     let failed = Reject::NoPair { got: 0.0, need: 0.0 };
-    let curve = |side: usize| Curve::fit(scene.points(side), scene.half_length()).ok_or(failed);
+    let curve = |side: usize| EdgeCurve::fit(scene.points(side), scene.half_length()).ok_or(failed);
     let curves = [curve(0)?, curve(1)?];
     let slant_rad = scene.slant(&curves)?;
     let sections = Sections::cut(scene, &curves).ok_or(Reject::OffSurface)?;
     scene.check_width(sections.mean)?;
-    for (side, (curve, off)) in curves.iter().zip(&mut memory.off).enumerate() {
+    for (side, (curve, off)) in curves.iter().zip(&mut scratch.off).enumerate() {
         scene.residuals_into(side, curve, off);
     }
-    let spread = WidthUncertainty::of(scene, &curves, &sections, memory);
+    let spread =
+        WidthUncertainty::of(&CutBead { scene, curves: &curves, sections: &sections }, scratch);
     let edge = |side: usize| {
-        let at = curves[side].at(0.0) + scene.residual_at_middle(&memory.off[side]);
+        let at = curves[side].at(0.0) + scene.residual_at_middle(&scratch.off[side]);
         scene.view.to_image(at, scene.centre())
     };
     let finite = |value: f64| Mm::new(value).map_err(|_| Reject::OffSurface);
@@ -65,7 +66,7 @@ pub fn width(
 impl WidthInput<'_> {
     /// Angle of the bead in the middle of the gauge \[rad\]; refuses beads that
     /// run too far off the gauge's axis there or at its ends.
-    fn slant(&self, [left, right]: &[Curve; 2]) -> Result<f64, Reject> {
+    fn slant(&self, [left, right]: &[EdgeCurve; 2]) -> Result<f64, Reject> {
         let at =
             |t: f64| (f64::midpoint(left.slope(t), right.slope(t)) / self.half_length()).atan();
         let crooked = |got_rad: f64, limit_rad: f64| Reject::Crooked { got_rad, limit_rad };
@@ -83,8 +84,8 @@ impl WidthInput<'_> {
     }
 
     /// Refuses corners.
-    fn check_bend(&self, left: &Curve, right: &Curve) -> Result<(), Reject> {
-        let turn = |side: usize, curve: &Curve| {
+    fn check_bend(&self, left: &EdgeCurve, right: &EdgeCurve) -> Result<(), Reject> {
+        let turn = |side: usize, curve: &EdgeCurve| {
             let off = curve.about_parabola;
             let notable = off > NOTABLE_SCATTER_PX * NOTABLE_SCATTER_PX;
             if notable { corner::turn(&self.points(side), off, self.half_length()) } else { 0.0 }
@@ -122,11 +123,11 @@ impl WidthInput<'_> {
         }
     }
 
-    /// How far each place lies off the course of its edge \[px\].
-    fn residuals_into(&self, side: usize, curve: &Curve, off: &mut Vec<Option<f64>>) {
+    /// How far each position lies off the course of its edge \[px\].
+    fn residuals_into(&self, side: usize, curve: &EdgeCurve, off: &mut Vec<Option<f64>>) {
         off.clear();
-        let places = self.sides[side].positions.iter().enumerate();
-        off.extend(places.map(|(band, located)| {
+        let positions = self.sides[side].positions.iter().enumerate();
+        off.extend(positions.map(|(band, located)| {
             located.as_ref().map(|located| located.at - curve.at(self.normalised_position(band)))
         }));
     }

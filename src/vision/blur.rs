@@ -1,22 +1,27 @@
-//! Blur of an edge, from all calipers together: the profiles are laid over
-//! each other at half-pixel steps and a step of free blur is fitted.
+//! Blur of an edge from all calipers together. The profiles are superimposed in bins of half a
+//! pixel, and a step of free blur is fitted.
 
+use crate::numeric::number::{floor_to_count, to_f64};
 use nalgebra::{Matrix5, Vector5};
 
 use super::fit::ShadedStep;
 use crate::numeric::blurred_step::StepTable;
 
+/// Bins of half a pixel. Derived: 2 · 2 · 40 + 1 for ±40 px, more than the longest half window.
 const BINS: usize = 161;
 const CENTRE_BIN: usize = BINS / 2;
+/// Gauss–Newton steps at most: more cost time on profiles that show no edge.
 const MAX_STEPS: usize = 30;
-/// Blur of a perfectly sharp edge that is integrated over pixels and half-pixel
-/// bins.
+/// Smallest blur that is fitted. Derived: a sharp edge that is integrated over pixels and
+/// half-pixel bins has √(1/12 + 1/48) = 0.32 px; a little more keeps the fit away from it.
 const MIN_BLUR_PX: f64 = 0.35;
+/// Largest blur that is fitted \[px\]: a wider flank fills the window.
 const MAX_BLUR_PX: f64 = 15.0;
-/// Farthest that the common edge may lie from the rough ones \[px\].
+/// Largest distance of the common edge from the rough ones \[px\]: one that lies farther is another
+/// edge.
 const MAX_OFFSET_PX: f64 = 8.0;
 
-/// Profiles laid over each other about their edges.
+/// Profiles superimposed about their edges.
 #[derive(Debug, Clone)]
 pub struct BinnedProfile {
     sums: [f64; BINS],
@@ -30,24 +35,13 @@ impl Default for BinnedProfile {
 }
 
 impl BinnedProfile {
-    /// Forgets everything.
-    pub fn clear(&mut self) {
-        *self = Self::default();
-    }
-
     /// Lays a sample at a distance from its edge \[px\]; what is too far is
     /// left out.
     pub fn add(&mut self, distance_px: f64, grey: f64) {
-        #[expect(clippy::cast_precision_loss, reason = "there are few bins")]
-        let (place, bins) = ((2.0 * distance_px).round() + CENTRE_BIN as f64, BINS as f64);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "within the bins"
-        )]
-        if place >= 0.0 && place < bins {
-            self.sums[place as usize] += grey;
-            self.counts[place as usize] += 1.0;
+        let bin = (2.0 * distance_px).round() + to_f64(CENTRE_BIN);
+        if bin >= 0.0 && bin < to_f64(BINS) {
+            self.sums[floor_to_count(bin)] += grey;
+            self.counts[floor_to_count(bin)] += 1.0;
         }
     }
 
@@ -87,9 +81,8 @@ impl BinnedProfile {
     }
 
     fn samples(&self) -> impl Iterator<Item = (f64, f64, f64)> {
-        #[expect(clippy::cast_precision_loss, reason = "there are few bins")]
         (0..BINS).filter(|&k| self.counts[k] > 0.0).map(|k| {
-            let distance = (k as f64 - CENTRE_BIN as f64) / 2.0;
+            let distance = (to_f64(k) - to_f64(CENTRE_BIN)) / 2.0;
             (distance, self.sums[k] / self.counts[k], self.counts[k])
         })
     }

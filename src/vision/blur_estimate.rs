@@ -1,4 +1,4 @@
-//! What is known of the blur of an edge.
+//! The blur of an edge and its uncertainty.
 
 /// Blur as the standard deviation of a Gaussian, and how sure that is.
 #[derive(Debug, Clone, Copy, PartialEq)]

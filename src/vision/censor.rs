@@ -1,24 +1,23 @@
-//! What is left of a grey level at the upper end of the camera's scale: with
-//! noise, a pixel near the end is cut off now and then, and one far above it
-//! nearly always.
+//! Statistics of a grey level at the upper end of the camera's scale: mean and variance of a
+//! clipped normal number.
 
 use crate::numeric::blurred_step::StepTable;
 
-/// Rounding to whole levels is noise too \[grey levels²\].
+/// Variance of rounding to whole levels \[grey levels²\]. Derived: ∫x² dx from −½ to ½.
 const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;
 
-/// A pixel that is cut off at the end of the scale.
+/// A pixel that is clipped at the end of the scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CensoredPixel {
     /// Its mean \[grey levels\].
     pub level: f64,
-    /// Share of a small change of the true level that it shows.
+    /// Fraction of a small change of the true level that it shows.
     pub sensitivity: f64,
     /// Its variance \[grey levels²\].
     pub variance: f64,
 }
 
-/// A pixel of a true level in Gaussian noise of a standard deviation, cut off
+/// A pixel of a true level in Gaussian noise of a standard deviation, clipped
 /// at `white`: mean and variance of min(level + noise, white).
 #[inline]
 pub fn censored_pixel(table: &StepTable, level: f64, noise: f64, white: f64) -> CensoredPixel {

@@ -1,6 +1,6 @@
-//! An edge one side of which passes the end of the camera's scale. The part of
-//! its flank that can be seen tells place, blur and the level that cannot be
-//! seen together; rows are then held against that step, cut off as they are.
+//! An edge one side of which is saturated. Position, blur and the hidden level are fitted together
+//! to the part of the flank below the end of the scale. Rows are then compared with that step,
+//! clipped likewise.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -8,38 +8,46 @@ use super::blur_estimate::BlurEstimate;
 use super::censor::{self, CensoredPixel};
 use super::edge_windows::{EdgeWindow, EdgeWindows};
 use super::overlay::{MeanProfilePart, Overlay};
+use super::pixel_noise;
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::NormalEquations;
+use crate::numeric::number::to_f64;
 use crate::numeric::rank;
 
-/// Parts along the bead that are told apart, because light may change.
+/// Parts along the bead that are distinguished, because light may change.
 const PARTS_ALONG: usize = 3;
+/// Gauss–Newton steps at most; a fit that needs more does not converge.
 const MAX_STEPS: usize = 30;
 /// Steps after which the window stays where it is: a pixel that comes and goes
 /// at its ends keeps a fit from settling.
 const WINDOW_STEPS: usize = 4;
+/// Smallest blur that is fitted \[px\]: a pixel alone has 1/√12 = 0.29.
 const MIN_BLUR_PX: f64 = 0.3;
-/// How far either side is looked at, in blurs and pixels beside.
+/// How far the hidden side is read, in blurs. Derived: beyond 3.5 blurs 2·10⁻⁴ of a step is left, 1
+/// − Φ(3.5).
 const CLIPPED_SIDE_BLURS: f64 = 3.5;
+/// How far the visible side is read, in blurs. Derived: beyond 3 blurs 1.3·10⁻³ of a step is left,
+/// 1 − Φ(3).
 const VISIBLE_SIDE_BLURS: f64 = 3.0;
+/// And beyond that \[px\]: enough to show the level, little enough to leave its slope out.
 const BESIDE_PX: f64 = 12.0;
 /// The hidden level is not expected farther above the end of the scale than so
 /// many times what can be seen, as a standard deviation.
 const HIDDEN_LEVEL_SIGMA: f64 = 2.0;
-/// Share by which blur may change from frame to frame, as a standard deviation.
+/// Fraction by which blur may change from frame to frame, as a standard deviation.
 const BLUR_DRIFT: f64 = 0.002;
-/// A blur that differs from that of the frames before by more standard
-/// deviations is another one.
+/// A blur that differs from that of the frames before by more standard deviations is another one.
+/// Derived: noise alone exceeds 4 in 6 of 100,000 frames.
 const BLUR_CHANGE_SIGMAS: f64 = 4.0;
-/// Levels below which ground says nothing of the light \[grey levels\].
+/// Levels below which ground shows nothing of the light \[grey levels\].
 const MIN_LIGHT_GREY: f64 = 25.0;
 /// Rows that fit worse than the median by so many times do not count.
 const MAX_MISFIT_RATIO: f64 = 2.5;
-/// Standard deviations beyond which a pixel or a row is not noise.
-const NOISE_SIGMAS: f64 = 4.5;
+/// The same as for all pixels and rows.
+const NOISE_SIGMAS: f64 = pixel_noise::NOISE_SIGMAS as f64;
 /// How far a row may run beside the path \[px\].
 const SLACK_PX: f64 = 0.5;
-/// Wild pixels that a row may have.
+/// Outlying pixels that a row may have.
 const MAX_WILD_PIXELS: usize = 2;
 
 /// A step of which one level is hidden \[px, grey levels\].
@@ -55,9 +63,11 @@ pub struct ClippedStep {
     pub clipped: f64,
 }
 
-/// What is known of the picture.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ClippedScene {
+/// What is known of the image.
+#[derive(Debug, Clone, Copy)]
+pub struct ClippedScene<'a> {
+    /// The blurred step.
+    pub table: &'a StepTable,
     /// Whether the hidden level lies after the edge.
     pub clipped_after: bool,
     /// Noise of a pixel \[grey levels\].
@@ -72,34 +82,34 @@ pub struct ClippedScene {
     pub shading: f64,
 }
 
-/// What a flank tells.
+/// What a flank shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClippedStepFit {
     /// The step.
     pub step: ClippedStep,
-    /// Variance of its place that doubt about blur and hidden level leaves
+    /// Variance of its position that uncertainty about blur and hidden level leaves
     /// \[px²\].
     pub variance: f64,
     /// Standard deviation of the blur \[px\].
     pub blur_sd: f64,
-    /// Share of the step that is not hidden.
+    /// Fraction of the step that is not hidden.
     pub visible_fraction: f64,
     /// Mean visible level of the path \[grey levels\].
     mean_visible: f64,
 }
 
-/// What a caliper line tells of the edge.
+/// What a caliper line shows of the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClippedLine {
     /// Distance from the path \[px\].
     pub moved: f64,
     /// Variance of it \[px²\].
     pub variance: f64,
-    /// Share of its rows that count.
+    /// Fraction of its rows that count.
     pub row_fraction: f64,
 }
 
-/// Locates edges that are cut off; keeps its memory from frame to frame.
+/// Locates edges that are clipped; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct ClippedEdge {
     profiles: Vec<MeanProfilePart>,
@@ -109,7 +119,7 @@ pub struct ClippedEdge {
     blur: Option<BlurEstimate>,
 }
 
-/// What a row tells.
+/// What a row shows.
 #[derive(Debug, Clone, Copy, Default)]
 struct ClippedRow {
     line: usize,
@@ -129,14 +139,14 @@ struct ClippedLevels {
     light: f64,
 }
 
-/// A pixel as it is expected, and its derivatives by place, blur, visible and
+/// A pixel as it is expected, and its derivatives by position, blur, visible and
 /// hidden level.
 struct ExpectedPixel {
     seen: CensoredPixel,
     by: [f64; 4],
 }
 
-impl ClippedScene {
+impl ClippedScene<'_> {
     fn sign(&self) -> f64 {
         if self.clipped_after { 1.0 } else { -1.0 }
     }
@@ -166,26 +176,25 @@ impl ClippedScene {
         ClippedLevels { visible, clipped: step.clipped * light, light }
     }
 
-    /// The pixel at a distance from the path, seen in rows whose places differ
+    /// The pixel at a distance from the path, seen in rows whose positions differ
     /// with a variance.
     #[inline]
     fn expect(
         &self,
-        table: &StepTable,
         step: &ClippedStep,
         levels: &ClippedLevels,
         (distance, spread): (f64, f64),
     ) -> ExpectedPixel {
         let blur = (step.blur * step.blur + spread).sqrt();
         let z = self.sign() * (distance - step.at) / blur;
-        let (share, density) = table.at(z);
+        let (fraction, density) = self.table.at(z);
         let height = levels.clipped - levels.visible;
-        let depth = blur * (density - z * (1.0 - share));
-        let level = levels.visible + height * share + self.shading * depth;
+        let depth = blur * (density - z * (1.0 - fraction));
+        let level = levels.visible + height * fraction + self.shading * depth;
         let slope = height * density / blur;
         let noise = (self.noise * self.noise + slope * slope * spread).sqrt();
-        let seen = censor::censored_pixel(table, level, noise, self.white);
-        let by = [-self.sign() * slope, -slope * z, 1.0 - share, levels.light * share];
+        let seen = censor::censored_pixel(self.table, level, noise, self.white);
+        let by = [-self.sign() * slope, -slope * z, 1.0 - fraction, levels.light * fraction];
         ExpectedPixel { seen, by: by.map(|by| by * seen.sensitivity) }
     }
 }
@@ -195,8 +204,7 @@ impl ClippedEdge {
     /// known of the blur. `None` where no step can be fitted.
     pub fn fit(
         &mut self,
-        table: &StepTable,
-        scene: &ClippedScene,
+        scene: &ClippedScene<'_>,
         overlay: &Overlay,
         start: ClippedStep,
         blur: Option<BlurEstimate>,
@@ -209,7 +217,7 @@ impl ClippedEdge {
             if k < WINDOW_STEPS {
                 window = scene.window(&step);
             }
-            let (mut normal, misfit) = self.linearise(table, scene, window, &step, mean_visible);
+            let (mut normal, misfit) = self.linearise(scene, window, &step, mean_visible);
             let seen = (scene.white - step.visible).max(scene.noise);
             normal.add_prior(3, (HIDDEN_LEVEL_SIGMA * seen).powi(-2), scene.white - step.clipped);
             if let Some(BlurEstimate { px, sd_px }) = blur {
@@ -233,7 +241,7 @@ impl ClippedEdge {
         None
     }
 
-    /// The blur that is expected where a frame alone says so much: that of the
+    /// The blur that is expected where a frame alone determines it so well: that of the
     /// frames before, as far as the lens is still the same.
     pub fn expected_blur(&self, alone: &ClippedStepFit) -> Option<BlurEstimate> {
         let BlurEstimate { px, sd_px } = self.blur?;
@@ -259,8 +267,7 @@ impl ClippedEdge {
     /// units of the noise.
     fn linearise(
         &self,
-        table: &StepTable,
-        scene: &ClippedScene,
+        scene: &ClippedScene<'_>,
         (from, to): (f64, f64),
         step: &ClippedStep,
         mean_visible: f64,
@@ -270,8 +277,8 @@ impl ClippedEdge {
         for profile in &self.profiles {
             let levels = scene.levels(step, mean_visible, profile.levels);
             for (distance, value) in profile.samples(from, to) {
-                let place = (distance, profile.spread);
-                let ExpectedPixel { seen, by } = scene.expect(table, step, &levels, place);
+                let position = (distance, profile.spread);
+                let ExpectedPixel { seen, by } = scene.expect(step, &levels, position);
                 let (miss, weight) = (value - seen.level, profile.rows / seen.variance);
                 normal.add(by, miss, weight);
                 square += weight * miss * miss;
@@ -281,26 +288,25 @@ impl ClippedEdge {
         (normal, square / f64::max(n, 1.0))
     }
 
-    /// Holds the windows of a sheet against a step where it is expected, and says
+    /// Compares the windows of a sheet with a step where it is expected, and shows
     /// how far each of so many caliper lines is from it. Returns what a window in
     /// the median leaves, in standard deviations of its noise.
     pub fn locate(
         &mut self,
-        table: &StepTable,
-        scene: &ClippedScene,
+        scene: &ClippedScene<'_>,
         sheet: &EdgeWindows,
         lines: usize,
         found: &ClippedStepFit,
         mut take: impl FnMut(usize, Option<ClippedLine>),
     ) -> f64 {
         self.rows.clear();
-        for (number, window) in sheet.windows().iter().enumerate() {
+        for (number, window) in sheet.windows.iter().enumerate() {
             let [at, before, step] = window.expected;
             let levels = [f64::from(before), f64::from(before + step)];
             let levels = scene.levels(&found.step, found.mean_visible, levels);
             let step = ClippedStep { at: f64::from(at), ..found.step };
             let pixels = (sheet.pixels(number).as_slice(), window);
-            self.rows.push(ClippedRow::read(table, scene, pixels, &step, &levels));
+            self.rows.push(ClippedRow::read(scene, pixels, &step, &levels));
         }
         let (limit, misfit) = self.limit();
         let mut first = 0;
@@ -328,33 +334,28 @@ impl ClippedEdge {
 
 impl ClippedStepFit {
     fn of(
-        scene: &ClippedScene,
+        scene: &ClippedScene<'_>,
         step: ClippedStep,
         covariance: &nalgebra::Matrix4<f64>,
         mean_visible: f64,
     ) -> Option<Self> {
-        // What of the place's variance comes with blur and hidden level.
+        // What of the position's variance comes with blur and hidden level.
         let of_place = Vector2::new(covariance[(0, 1)], covariance[(0, 3)]);
-        let of_others = Matrix2::new(
-            covariance[(1, 1)],
-            covariance[(1, 3)],
-            covariance[(1, 3)],
-            covariance[(3, 3)],
-        );
+        let [blur, both, hidden] = [(1, 1), (1, 3), (3, 3)].map(|of| covariance[of]);
+        let of_others = Matrix2::new(blur, both, both, hidden);
         let variance = (of_place.transpose() * of_others.try_inverse()? * of_place)[0];
-        let visible_share = (scene.white - step.visible) / (step.clipped - step.visible);
-        let blur_sd = covariance[(1, 1)].sqrt();
-        let found = Self { step, variance, blur_sd, visible_fraction: visible_share, mean_visible };
+        let visible_fraction = (scene.white - step.visible) / (step.clipped - step.visible);
+        let blur_sd = blur.sqrt();
+        let found = Self { step, variance, blur_sd, visible_fraction, mean_visible };
         (variance.is_finite() && blur_sd.is_finite() && step.blur > 0.0).then_some(found)
     }
 }
 
 impl ClippedRow {
-    /// Reads a window: what it misses, times its derivatives by place and
+    /// Reads a window: what it misses, times its derivatives by position and
     /// visible level.
     fn read(
-        table: &StepTable,
-        scene: &ClippedScene,
+        scene: &ClippedScene<'_>,
         (pixels, window): (&[f32], &EdgeWindow),
         step: &ClippedStep,
         levels: &ClippedLevels,
@@ -363,13 +364,13 @@ impl ClippedRow {
         let mut row = Self { line: window.line, ..Self::default() };
         let count = f64::from(window.rows);
         let noise = scene.noise / count.sqrt();
-        for (&pixel, place) in pixels.iter().zip(window.first..) {
-            #[expect(clippy::cast_precision_loss, reason = "a place near the gauge")]
-            let place = place as f64;
-            if place < from || place > to {
+        for (&pixel, position) in pixels.iter().zip(window.first..) {
+            #[expect(clippy::cast_precision_loss, reason = "a position near the gauge")]
+            let position = position as f64;
+            if position < from || position > to {
                 continue;
             }
-            let ExpectedPixel { seen, by } = scene.expect(table, step, levels, (place, 0.0));
+            let ExpectedPixel { seen, by } = scene.expect(step, levels, (position, 0.0));
             let miss = f64::from(pixel) - seen.level;
             if miss.abs() > NOISE_SIGMAS * noise + SLACK_PX * by[0].abs() {
                 row.wild += 1;
@@ -395,7 +396,7 @@ impl ClippedRow {
     }
 }
 
-/// Place of a line from its rows.
+/// Position of a line from its rows.
 fn solve(rows: &[ClippedRow], limit: f64) -> Option<ClippedLine> {
     let counts = |row: &&ClippedRow| row.misfit() <= limit;
     let (mut matrix, mut vector, mut n) = (Matrix2::zeros(), Vector2::zeros(), 0.0);
@@ -404,17 +405,12 @@ fn solve(rows: &[ClippedRow], limit: f64) -> Option<ClippedLine> {
         vector += row.vector;
         n += 1.0;
     }
-    #[expect(clippy::cast_precision_loss, reason = "a line has few rows")]
-    let share = n / rows.len() as f64;
-    if share < 0.5 {
+    let row_fraction = n / to_f64(rows.len());
+    if row_fraction < 0.5 {
         return None;
     }
     let inverse = matrix.try_inverse()?;
-    Some(ClippedLine {
-        moved: (inverse * vector)[0],
-        variance: inverse[(0, 0)],
-        row_fraction: share,
-    })
+    Some(ClippedLine { moved: (inverse * vector)[0], variance: inverse[(0, 0)], row_fraction })
 }
 
 #[cfg(test)]
@@ -424,10 +420,10 @@ mod tests {
     use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
     use crate::vision::edge_windows::Grouping;
-    use crate::vision::gauge::BeadAxis;
+    use crate::vision::gauge::{BeadAxis, GaugeView};
     use crate::vision::path::EdgeCorrection;
     use crate::vision::row_range::RowRange;
-    use crate::vision::strip::{GaugeRowsOfDepth, GaugeView, RowLayout};
+    use crate::vision::strip::{GaugeRowsOfDepth, RowLayout};
 
     const SIZE: (usize, usize) = (120, 40);
     const LINES: [RowRange; 4] =
@@ -445,8 +441,9 @@ mod tests {
         }
     }
 
-    fn scene(hidden_after: bool) -> ClippedScene {
+    fn scene(table: &StepTable, hidden_after: bool) -> ClippedScene<'_> {
         ClippedScene {
+            table,
             clipped_after: hidden_after,
             noise: 4.0,
             white: 255.0,
@@ -456,8 +453,7 @@ mod tests {
     }
 
     /// The mean of what a camera with noise shows of a step, in fine levels.
-    fn sheet(scene: &ClippedScene, step: &ClippedStep, path: &Straight) -> EdgeWindows {
-        let table = StepTable::default();
+    fn sheet(scene: &ClippedScene<'_>, step: &ClippedStep, path: &Straight) -> EdgeWindows {
         let levels = ClippedLevels { visible: step.visible, clipped: step.clipped, light: 1.0 };
         #[expect(
             clippy::cast_possible_truncation,
@@ -465,7 +461,7 @@ mod tests {
             reason = "within 16 bits"
         )]
         let shown = |x: u16| {
-            let level = scene.expect(&table, step, &levels, (f64::from(x), 0.0)).seen.level;
+            let level = scene.expect(step, &levels, (f64::from(x), 0.0)).seen.level;
             (level * 257.0).round() as u16
         };
         let values = (0..40).flat_map(|_| (0..120u16).map(shown)).collect();
@@ -486,7 +482,7 @@ mod tests {
     fn the_flank_tells_place_blur_and_the_hidden_level() {
         let table = StepTable::default();
         for hidden_after in [true, false] {
-            let scene = scene(hidden_after);
+            let scene = scene(&table, hidden_after);
             let truth = ClippedStep { at: 60.3, blur: 1.6, visible: 175.0, clipped: 300.0 };
             let levels = if hidden_after { [175.0, 255.0] } else { [255.0, 175.0] };
             let path = Straight { at: 59.8, levels };
@@ -495,7 +491,7 @@ mod tests {
             overlay.lay(&sheet);
             let start = ClippedStep { at: 0.0, blur: 1.2, visible: 175.0, clipped: 280.0 };
             let mut cut_off = ClippedEdge::default();
-            let found = cut_off.fit(&table, &scene, &overlay, start, None).unwrap();
+            let found = cut_off.fit(&scene, &overlay, start, None).unwrap();
             assert!((found.step.at - 0.5).abs() < 0.005, "{found:?}");
             assert!((found.step.blur - 1.6).abs() < 0.005, "{found:?}");
             assert!((found.step.clipped - 300.0).abs() < 0.5, "{found:?}");
@@ -505,7 +501,7 @@ mod tests {
             let mut lines = Vec::new();
             sheet.correct(EdgeCorrection { aside: 60.25 - path.at, before: 0.0, after: 1.0 });
             let take = |_, line: Option<ClippedLine>| lines.push(line.unwrap());
-            cut_off.locate(&table, &scene, &sheet, LINES.len(), &found, take);
+            cut_off.locate(&scene, &sheet, LINES.len(), &found, take);
             assert_eq!(lines.len(), 4);
             assert!(lines.iter().all(|line| (line.moved - 0.05).abs() < 0.006), "{lines:?}");
         }

@@ -1,23 +1,25 @@
-//! The search for the bead where texture and torn edges hide it from a search
-//! step by step: straight lines along which the grey steps, in the mean over the
-//! whole gauge (a Radon transform of the step response). Texture averages out;
-//! an edge does not.
+//! Search for the bead as straight lines along which the grey level steps, in the mean over the
+//! whole gauge (a Radon transform of the step response). It finds edges that texture and tears
+//! hide from a search step by step: texture averages out, an edge does not.
 
 use super::gauge::WidthRangePx;
 use super::pair::{MAX_SEAM_RATIO, MIN_RIVAL_RATIO, is_narrower};
 use super::strip::{GaugeRows, GreyPixel};
 use crate::numeric::number::{round_to_count, to_f32};
 use crate::numeric::rank;
+use crate::vision::buffer::{refill, reset};
 
-/// Rows of a band at least, and bands at most.
+/// Rows of a band at least: fewer are noisy, more smear a slanted edge.
 const BAND_ROWS: usize = 8;
+/// Bands at most: the time of the search grows with them.
 const MAX_BANDS: usize = 24;
 /// Pixels on either side that are compared for a step, as a fraction of the
 /// bead's width, and their limits: about the depth of tears, and no more than a
 /// groove and its flank.
 const REACH_FRACTION: f32 = 0.04;
 const REACH_PX: (f32, f32) = (2.0, 6.0);
-/// Largest slope of an edge against the gauge's axis: 20 degrees.
+/// Largest slope of an edge against the gauge's axis. Derived: tan 20°, the largest slant of a bead
+/// (contract, bead_axis).
 const MAX_SLOPE: f32 = 0.364;
 /// Distance of neighbouring slopes, as a shift between the ends of the gauge
 /// \[px\].
@@ -25,17 +27,19 @@ const SLOPE_STEP_PX: f32 = 3.0;
 /// Rank of the bands' strongest steps above which a step counts for no more: a
 /// spark is no edge.
 const CAP_RANK: f32 = 0.7;
-/// Widest groove beside a bead \[px\]: beyond it begins another thing.
+/// Widest groove beside a bead \[px\]; beyond it begins another thing. Measured: ACCURACY.md, Drawn
+/// frames: `grooves` are 2 to 40 px wide.
 const MAX_GROOVE_PX: f32 = 40.0;
 /// Distance within a groove in which what its far side adds to an edge falls to
 /// 1/e \[px\]: of two lines before a groove the nearer one is the edge.
 const GROOVE_DECAY_PX: f32 = 20.0;
-/// Share of a groove's far side that counts for the edge.
+/// Fraction of a groove's far side that counts for the edge.
 const FAR_SIDE_WEIGHT: f32 = 0.5;
 /// What a groove's far side adds to an edge that certainly lies beside one, as a fraction
 /// of the edge's step: a pattern of the ground adds up to 0.37.
 const MIN_CERTAIN_GROOVE: f32 = 0.4;
-/// Distance of a seam from an edge \[px\]: nearer lines belong to the edge's flank.
+/// Distance of a seam from an edge \[px\]: nearer lines belong to the edge's flank. Measured:
+/// ACCURACY.md, Drawn frames: the lines of `ribs-weak` lie at least 6 px from the edges.
 const MIN_SEAM_DISTANCE_PX: f32 = 6.0;
 /// [`SEAM_SHARE`] and [`RIVAL_SHARE`] where the stronger pair lies within the other one:
 /// rough edges are some tenths fainter in the mean along a line than ribs are.
@@ -84,7 +88,7 @@ impl LinePair {
     }
 }
 
-/// The search; keeps its memory from frame to frame.
+/// The search; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct LineSearch {
     /// Steps of each band, and its middle row about the gauge's.
@@ -116,6 +120,11 @@ impl LineSearch {
         self.find_strongest(reach);
     }
 
+    /// Lines into a bright or a dark bead, and out of it.
+    fn sides(&self, bright: bool) -> (&Vec<StepLine>, &Vec<StepLine>) {
+        if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) }
+    }
+
     /// Pairs of lines at a distance within a range, the strongest first.
     /// `polarities` are whether bright and dark beads are looked for; where a groove may lie
     /// beside a bright one, its far side adds to the edge.
@@ -131,8 +140,7 @@ impl LineSearch {
             if !wanted {
                 continue;
             }
-            let (lefts, rights) =
-                if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
+            let (lefts, rights) = self.sides(bright);
             let has_far_sides = bright && may_be_groove;
             let far_sides = (has_far_sides.then_some(rights), has_far_sides.then_some(lefts));
             for &left in lefts {
@@ -148,14 +156,9 @@ impl LineSearch {
                     ];
                     let parallel = (-apart * apart).exp();
                     let score = (strengths[0] * strengths[1]).sqrt() * parallel;
-                    let bare = (left.step * right.step).sqrt() * parallel;
-                    out.push(LinePair {
-                        sides: [left, right],
-                        bright,
-                        score,
-                        score_without_grooves: bare,
-                        strengths,
-                    });
+                    let (sides, bare) = ([left, right], (left.step * right.step).sqrt() * parallel);
+                    let score_without_grooves = bare;
+                    out.push(LinePair { sides, bright, score, score_without_grooves, strengths });
                 }
             }
         }
@@ -175,8 +178,7 @@ impl LineSearch {
             return false;
         }
         let gap = self.gap(outer) / left.step.min(right.step);
-        let (ins, outs) =
-            if outer.bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
+        let (ins, outs) = self.sides(outer.bright);
         // The narrower pair, where it is the stronger one, owes that to its rib.
         let (seam, rival) =
             if inner == pair { INNER_PAIR_RATIOS } else { (MAX_SEAM_RATIO, MIN_RIVAL_RATIO) };
@@ -200,8 +202,7 @@ impl LineSearch {
     /// of the bead, followed by one back in.
     fn gap(&self, pair: &LinePair) -> f32 {
         let [left, right] = pair.sides;
-        let (outs, backs) =
-            if pair.bright { (&self.downs, &self.ups) } else { (&self.ups, &self.downs) };
+        let (backs, outs) = self.sides(pair.bright);
         let is_within = |line: &&StepLine| line.at > left.at && line.at < right.at;
         let mut deepest: f32 = 0.0;
         for out in outs.iter().filter(is_within) {
@@ -231,8 +232,7 @@ impl LineSearch {
     fn respond<T: GreyPixel>(&mut self, strip: &GaugeRows<'_, T>, reach: usize) {
         let count = (strip.along / BAND_ROWS).clamp(1, MAX_BANDS);
         self.across = strip.across;
-        self.steps.clear();
-        self.steps.resize(count * strip.across, 0.0);
+        reset(&mut self.steps, count * strip.across, 0.0);
         self.middles.clear();
         for band in 0..count {
             let (from, to) = (band * strip.along / count, (band + 1) * strip.along / count);
@@ -262,8 +262,7 @@ impl LineSearch {
     /// Caps steps at what most bands have.
     fn clip_steps(&mut self) {
         let most = |steps: &[f32]| steps.iter().fold(0.0, |most: f32, step| most.max(step.abs()));
-        self.strongest.clear();
-        self.strongest.extend(self.steps.chunks(self.across).map(most));
+        refill(&mut self.strongest, self.steps.chunks(self.across).map(most));
         let rank = round_to_count(CAP_RANK * to_f32(self.strongest.len() - 1));
         let cap = rank::at(&mut self.strongest, rank).unwrap_or(f32::INFINITY);
         for step in &mut self.steps {
@@ -277,8 +276,7 @@ impl LineSearch {
         // The highest and the lowest step of every position, of all slopes.
         let (highest, lowest) = (&mut self.highest, &mut self.lowest);
         for best in [&mut *highest, lowest] {
-            best.clear();
-            best.resize(self.across, 0.0);
+            reset(best, self.across, 0.0);
         }
         for means in self.means.chunks(self.across) {
             for ((high, low), &mean) in highest.iter_mut().zip(lowest.iter_mut()).zip(means) {
@@ -303,8 +301,7 @@ impl LineSearch {
         let count = 2 * round_to_count(most) + 1;
         self.slopes.clear();
         self.slopes.extend((0..count).map(|k| (to_f32(k) - most) * SLOPE_STEP_PX / to_f32(along)));
-        self.means.clear();
-        self.means.resize(count * across, 0.0);
+        reset(&mut self.means, count * across, 0.0);
         self.pair.resize(across, 0.0);
         let scale = 1.0 / to_f32(self.middles.len());
         for (bands, middles) in self.steps.chunks(2 * across).zip(self.middles.chunks(2)) {
@@ -324,7 +321,7 @@ impl LineSearch {
     }
 }
 
-/// Adds values, shifted to lower places by so many, times a scale.
+/// Adds values, shifted to lower positions by so many, times a scale.
 #[inline(always)]
 fn add_shifted(sums: &mut [f32], values: &[f32], aside: isize, scale: f32) {
     let most = sums.len().min(values.len()).saturating_sub(aside.unsigned_abs());
@@ -379,4 +376,14 @@ fn groove(edge: &StepLine, far_sides: Option<&Vec<StepLine>>, outwards: f32) -> 
 fn shift(aside: f32) -> isize {
     let size = round_to_count(aside.abs()).cast_signed();
     if aside < 0.0 { -size } else { size }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_slope_is_that_of_20_degrees() {
+        assert!((MAX_SLOPE - 20f32.to_radians().tan()).abs() < 5e-4);
+    }
 }

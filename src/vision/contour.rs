@@ -1,11 +1,11 @@
-//! Edges that run along the bead: chains of steps, one a band, found by
-//! dynamic programming. Neighbours agree, bands without a fitting step are
-//! skipped; sparks and grains are no chains. The strongest chain is found
-//! first, then the strongest of what it leaves.
+//! Edges that run along the bead: chains of steps, one a band, found by dynamic programming. Bands
+//! without a fitting step are skipped. Sparks and grains form no chains. The strongest chain is
+//! found first, then the strongest of the rest.
 
 use super::edge::{MAX_STEPS_KEPT, StepCandidate, StepCandidates};
 use crate::numeric::number::to_f32;
 use crate::numeric::rank;
+use crate::vision::buffer::reset;
 
 /// Contours of one sign that are looked for.
 const MAX_CONTOURS: usize = 6;
@@ -17,12 +17,12 @@ const SKIP_COST: f32 = 0.35;
 const ASIDE_COST: f32 = 0.25;
 /// Cost beyond which two steps are not neighbours.
 const BREAK_COST: f32 = 1.0;
-/// Slope against the gauge's axis up to which edges run freely; a bead that
-/// slants 20 degrees and bulges by another 15 stays below.
+/// Slope against the gauge's axis up to which edges run at little cost. Derived: tan(20° + 15°),
+/// for a bead that slants 20 degrees (contract, bead_axis) and bulges by another 15.
 const MAX_FREE_SLOPE: f32 = 0.7;
 /// Height of a band within which no bead's edge runs far \[px\].
 const REFERENCE_BAND_PX: f32 = 4.0;
-/// Marks the first step of a contour.
+/// Marks the first step of a contour. By definition no packed gap and index.
 const NO_PREDECESSOR: u16 = u16::MAX;
 
 /// An edge that runs along the bead.
@@ -32,7 +32,7 @@ pub struct EdgeContour {
     pub at: Vec<Option<f32>>,
     /// Mean height of its steps \[grey levels\].
     pub step: f32,
-    /// Share of the bands in which it has a step.
+    /// Fraction of the bands in which it has a step.
     pub band_fraction: f64,
     /// How far a step lies off the line between its neighbours, median \[px\], as if
     /// of bands of no more than [`LOW_BAND_PX`]: little for an edge, also for a rough
@@ -40,7 +40,7 @@ pub struct EdgeContour {
     pub waviness_px: f32,
 }
 
-/// Contours of one sign; keeps its memory from frame to frame.
+/// Contours of one sign; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct EdgeContours {
     scores: Vec<[f32; MAX_STEPS_KEPT]>,
@@ -51,6 +51,19 @@ pub struct EdgeContours {
     count: usize,
 }
 
+/// The steps of one sign.
+#[derive(Clone, Copy)]
+struct SignSteps<'a> {
+    bands: &'a [StepCandidates],
+    up: bool,
+}
+
+impl<'a> SignSteps<'a> {
+    fn of(self, band: usize) -> &'a [StepCandidate] {
+        if self.up { self.bands[band].up() } else { self.bands[band].down() }
+    }
+}
+
 impl EdgeContours {
     /// What was found, the strongest first.
     pub fn all(&self) -> &[EdgeContour] {
@@ -59,30 +72,23 @@ impl EdgeContours {
 
     /// Looks for contours of steps up or down that reach `least_share` of the
     /// bands. `band_px` is the height of a band.
-    pub fn search(
-        &mut self,
-        bands: &[StepCandidates],
-        up: bool,
-        band_px: f32,
-        min_band_fraction: f64,
-    ) {
-        self.used.clear();
-        self.used.resize(bands.len(), 0);
+    pub fn search(&mut self, bands: &[StepCandidates], up: bool, band_px: f32, min_fraction: f64) {
+        reset(&mut self.used, bands.len(), 0);
         self.scores.resize(bands.len(), [0.0; MAX_STEPS_KEPT]);
         self.predecessors.resize(bands.len(), [NO_PREDECESSOR; MAX_STEPS_KEPT]);
         self.contours.resize_with(MAX_CONTOURS, EdgeContour::default);
         self.count = 0;
-        let steps = |band: usize| if up { bands[band].up() } else { bands[band].down() };
+        let steps = SignSteps { bands, up };
         while self.count < MAX_CONTOURS {
-            let typical = self.typical_step(bands.len(), &steps);
+            let typical = self.typical_step(steps);
             if typical <= 0.0 {
                 return;
             }
-            let Some(last) = self.link(bands.len(), &steps, band_px, typical) else { return };
-            self.follow(last, &steps);
+            let Some(last) = self.link(steps, band_px, typical) else { return };
+            self.follow(last, steps);
             let found = &mut self.contours[self.count];
             found.waviness_px *= (REFERENCE_BAND_PX / band_px).min(1.0);
-            if found.band_fraction < min_band_fraction {
+            if found.band_fraction < min_fraction {
                 return;
             }
             self.count += 1;
@@ -94,14 +100,10 @@ impl EdgeContours {
     }
 
     /// A strong but not extreme step: the 70th percentile of each band's best.
-    fn typical_step<'a>(
-        &mut self,
-        bands: usize,
-        steps: &impl Fn(usize) -> &'a [StepCandidate],
-    ) -> f32 {
+    fn typical_step(&mut self, steps: SignSteps<'_>) -> f32 {
         self.steps.clear();
-        for band in 0..bands {
-            let free = steps(band).iter().enumerate();
+        for band in 0..steps.bands.len() {
+            let free = steps.of(band).iter().enumerate();
             let best = free
                 .filter(|&(index, _)| !self.is_used(band, index))
                 .map(|(_, step)| step.step)
@@ -115,17 +117,12 @@ impl EdgeContours {
     }
 
     /// Fills in scores and returns the last step of the best contour.
-    fn link<'a>(
-        &mut self,
-        bands: usize,
-        steps: &impl Fn(usize) -> &'a [StepCandidate],
-        band_px: f32,
-        typical: f32,
-    ) -> Option<(usize, usize)> {
+    fn link(&mut self, steps: SignSteps<'_>, band_px: f32, typical: f32) -> Option<(usize, usize)> {
+        let bands = steps.bands.len();
         let mut best = None;
         let mut best_total = 0.0;
         for band in 0..bands {
-            for (index, step) in steps(band).iter().enumerate() {
+            for (index, step) in steps.of(band).iter().enumerate() {
                 if self.is_used(band, index) {
                     continue;
                 }
@@ -143,19 +140,13 @@ impl EdgeContours {
         best
     }
 
-    fn best_before<'a>(
-        &self,
-        band: usize,
-        at: f32,
-        steps: &impl Fn(usize) -> &'a [StepCandidate],
-        band_px: f32,
-    ) -> (f32, u16) {
+    fn best_before(&self, band: usize, at: f32, steps: SignSteps<'_>, band_px: f32) -> (f32, u16) {
         let mut best = (-SKIP_COST * to_f32(band), NO_PREDECESSOR);
         for gap in 1..=(MAX_SKIP + 1).min(band) {
             let before = band - gap;
             let skipped = SKIP_COST * to_f32(gap - 1);
             let free = MAX_FREE_SLOPE * band_px * to_f32(gap) + 1.0;
-            for (index, step) in steps(before).iter().enumerate() {
+            for (index, step) in steps.of(before).iter().enumerate() {
                 if self.is_used(before, index) {
                     continue;
                 }
@@ -172,14 +163,13 @@ impl EdgeContours {
     }
 
     /// Follows a contour back from its last step and takes its steps out.
-    fn follow<'a>(&mut self, last: (usize, usize), steps: &impl Fn(usize) -> &'a [StepCandidate]) {
+    fn follow(&mut self, last: (usize, usize), steps: SignSteps<'_>) {
         let contour = &mut self.contours[self.count];
-        contour.at.clear();
-        contour.at.resize(self.used.len(), None);
+        reset(&mut contour.at, self.used.len(), None);
         let (mut sum, mut n) = (0.0, 0.0);
         let (mut band, mut index) = last;
         loop {
-            let step = steps(band)[index];
+            let step = steps.of(band)[index];
             contour.at[band] = Some(step.at);
             self.used[band] |= 1 << index;
             sum += step.step;
@@ -197,12 +187,12 @@ impl EdgeContours {
     }
 }
 
-fn median_waviness(at: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
-    memory.clear();
-    memory.extend(
+fn median_waviness(at: &[Option<f32>], scratch: &mut Vec<f32>) -> f32 {
+    scratch.clear();
+    scratch.extend(
         at.windows(3).filter_map(|three| Some((three[1]? - 0.5 * (three[0]? + three[2]?)).abs())),
     );
-    rank::median(memory).unwrap_or(f32::INFINITY)
+    rank::median(scratch).unwrap_or(f32::INFINITY)
 }
 
 fn pack(gap: usize, index: usize) -> u16 {
@@ -213,8 +203,8 @@ fn pack(gap: usize, index: usize) -> u16 {
 mod tests {
     use super::*;
 
-    fn band(places: &[(f32, f32)]) -> StepCandidates {
-        StepCandidates::of(places.iter().map(|&(at, step)| StepCandidate { at, step }))
+    fn band(positions: &[(f32, f32)]) -> StepCandidates {
+        StepCandidates::of(positions.iter().map(|&(at, step)| StepCandidate { at, step }))
     }
 
     fn search(bands: &[StepCandidates]) -> EdgeContours {
@@ -270,5 +260,10 @@ mod tests {
         let found = search(&bands);
         assert_eq!(found.all().len(), 2);
         assert_eq!((found.all()[0].step, found.all()[1].step), (80.0, 50.0));
+    }
+
+    #[test]
+    fn the_free_slope_is_that_of_a_slant_and_a_bulge() {
+        assert!((MAX_FREE_SLOPE - 35f32.to_radians().tan()).abs() < 5e-4);
     }
 }

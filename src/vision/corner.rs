@@ -5,9 +5,11 @@ use nalgebra::Vector3;
 use super::curve::EdgePoint;
 use crate::numeric::normal_equations::NormalEquations;
 
-/// Places along the gauge at which an edge may turn, −1 to 1: so many, this far
-/// from its middle at most.
+/// Positions along the gauge at which an edge may turn, evenly spaced: more cost time, fewer miss
+/// the corner.
 const CORNER_POSITIONS: u8 = 18;
+/// Farthest of them from the middle of the gauge, in halves of it: beyond, one of the two lines has
+/// too few points.
 const MAX_CORNER_POSITION: f64 = 0.85;
 /// Part of the squared distances from a parabola that two lines may leave.
 const MAX_RESIDUAL_RATIO: f64 = 0.5;
@@ -40,7 +42,7 @@ pub fn is_corner([one, other]: [f64; 2]) -> bool {
     one * other > 0.0 && one.abs().min(other.abs()) > MIN_TURN_RAD
 }
 
-/// Two lines that meet at a place along the gauge.
+/// Two lines that meet at a position along the gauge.
 struct BrokenLine {
     at: f64,
     /// Position where they meet \[px\], slope before and its change \[px\].
@@ -80,15 +82,15 @@ impl BrokenLine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vision::curve::Curve;
+    use crate::vision::curve::EdgeCurve;
 
     const REACH: f64 = 50.0;
 
     fn turn_of(of: impl Fn(f64) -> f64) -> f64 {
-        let places = (0..25u8).map(|k| (f64::from(k) + 0.5) / 12.5 - 1.0);
+        let positions = (0..25u8).map(|k| (f64::from(k) + 0.5) / 12.5 - 1.0);
         let points: Vec<EdgePoint> =
-            places.map(|t| EdgePoint { t, u: of(t), weight: 1.0 }).collect();
-        let curve = Curve::fit(points.iter().copied(), REACH).unwrap();
+            positions.map(|t| EdgePoint { t, u: of(t), weight: 1.0 }).collect();
+        let curve = EdgeCurve::fit(points.iter().copied(), REACH).unwrap();
         turn(&points.iter().copied(), curve.about_parabola, REACH)
     }
 

@@ -1,16 +1,18 @@
 //! Candidates for an edge: the strongest steps of a profile, up and down.
 
-/// Pixels on either side of a place that are compared for a step there. Wide
-/// enough to gather a blurred edge, narrow enough to keep two apart.
+/// Pixels on either side of a position that are compared for a step there. Wide enough to hold a
+/// blurred edge, narrow enough to keep two apart. By definition of [`respond`], which adds four and
+/// four.
 pub const STEP_HALF_WIDTH: usize = 4;
 
-/// Places that are passed over together where nothing reaches the floor.
+/// Positions that are passed over together where nothing reaches the floor. Derived: 32 numbers of
+/// 16 bits fill a vector of 512 bits.
 const BLOCK_PIXELS: usize = 32;
 
 /// Steps of each sign that are kept a profile.
 pub const MAX_STEPS_KEPT: usize = 16;
 
-/// A place where a profile steps.
+/// A position where a profile steps.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StepCandidate {
     /// Position in the profile \[px\].
@@ -87,8 +89,8 @@ fn reaches(block: &[i16], floor: i16) -> bool {
     any != 0
 }
 
-/// Sum of the REACH pixels after each place less the sum of those before it:
-/// REACH times the height of a sharp step there. Places too near the ends have
+/// Sum of the REACH pixels after each position less the sum of those before it:
+/// REACH times the height of a sharp step there. Positions too near the ends have
 /// none.
 #[inline(always)]
 pub fn respond(profile: &[u16], response: &mut [i16]) {

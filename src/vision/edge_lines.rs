@@ -10,21 +10,22 @@ use crate::bridge::{EdgeSegment, EdgeSettings, canny_hough};
 use crate::calibration::SurfaceMap;
 use crate::core::frame::Frame;
 use crate::core::geometry::ImagePoint;
-use crate::core::units::Mm;
+use crate::core::units::{Mm, WidthRange};
+use crate::numeric::number::{floor_to_count, to_f64};
 
-use super::gauge::{BeadAxis, Gauge, Polarity};
+use super::gauge::{Gauge, GaugeView, Polarity};
 use super::reject::Reject;
 use super::width::{Hints, WidthMeasurement};
-use crate::core::units::WidthRange;
 
-/// What rounding to whole pixels leaves in the distance of two lines \[px\].
+/// Standard deviation of the distance of two lines of whole pixels \[px\]. Derived: rounding leaves
+/// √(2/12) = 0.41 px; the lines are pieced together, which leaves a little more.
 const SIGMA_PX: f64 = 0.5;
 /// Steepest edge line against the gauge's axis, in pixels across for each
 /// along.
 const MAX_SLOPE: f64 = 0.45;
 /// Lines that this near to each other at the gauge's middle are one edge \[px\].
 const SAME_EDGE_PX: f64 = 4.0;
-/// Share of the gauge that an edge line must cover.
+/// Fraction of the gauge that an edge line must cover.
 const MIN_COVERAGE: f64 = 0.3;
 
 /// An edge line across the gauge: its ends on the gauge's first and last row.
@@ -42,7 +43,7 @@ impl EdgeLine {
 }
 
 /// Measures a frame with the paper's method. Appends the edge points to the
-/// lists, for pictures of them.
+/// lists, for images of them.
 pub fn measure(
     gauge: &Gauge,
     frame: &Frame,
@@ -50,26 +51,28 @@ pub fn measure(
     (left_px, right_px): (&mut Vec<ImagePoint>, &mut Vec<ImagePoint>),
 ) -> Result<WidthMeasurement, Reject> {
     let refused = |got| Reject::NoPair { got, need: MIN_COVERAGE };
+    let view = GaugeView::new(gauge.roi, gauge.axis);
+    let length = to_f64(view.along);
     let settings = EdgeSettings {
         blur_sigma_px: 1.5,
         thresholds: [4.0 * gauge.min_contrast_grey, 10.0 * gauge.min_contrast_grey],
         votes: 30,
-        shortest_px: along(gauge) * 0.1,
-        longest_gap_px: along(gauge) * 0.1,
+        shortest_px: length * 0.1,
+        longest_gap_px: length * 0.1,
     };
     let segments = canny_hough(frame, gauge.roi, &settings).map_err(|_| refused(0.0))?;
-    let lines = edge_lines(gauge, &segments);
+    let lines = edge_lines(view, &segments);
     let (left, right) = best_pair(gauge, surface, frame, &lines).ok_or(refused(0.0))?;
-    left_px.extend([point(gauge, left.first, 0.0), point(gauge, left.last, along(gauge) - 1.0)]);
-    right_px.extend([point(gauge, right.first, 0.0), point(gauge, right.last, along(gauge) - 1.0)]);
+    for (line, points) in [(left, left_px), (right, right_px)] {
+        points.extend([view.to_image(line.first, 0.0), view.to_image(line.last, length - 1.0)]);
+    }
     // Eq. (1), (2): the midpoints of the two lines. Eq. (3): their distance.
-    let middle = (along(gauge) - 1.0) / 2.0;
-    let (m1, m2) = (point(gauge, left.middle(), middle), point(gauge, right.middle(), middle));
+    let [m1, m2] = [left, right].map(|line| view.to_image(line.middle(), (length - 1.0) / 2.0));
     let on_surface = |px| surface.to_mm(px).ok_or(Reject::OffSurface);
     let distance = (on_surface(m2)? - on_surface(m1)?).norm();
     let width = Mm::new(distance).map_err(|_| Reject::OffSurface)?;
     let per_px = distance / (m2 - m1).norm().max(1e-9);
-    let slope = ((left.last - left.first) + (right.last - right.first)) / (2.0 * along(gauge));
+    let slope = ((left.last - left.first) + (right.last - right.first)) / (2.0 * length);
     Ok(WidthMeasurement {
         width,
         sigma: Mm::new(SIGMA_PX * per_px).map_err(|_| Reject::OffSurface)?,
@@ -80,52 +83,21 @@ pub fn measure(
     })
 }
 
-#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-fn along(gauge: &Gauge) -> f64 {
-    match gauge.axis {
-        BeadAxis::Vertical => gauge.roi.height as f64,
-        BeadAxis::Horizontal => gauge.roi.width as f64,
-    }
-}
-
-/// Gauge coordinates of an image point: across the bead, along it.
-#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-fn gauge_coordinates(gauge: &Gauge, at: ImagePoint) -> (f64, f64) {
-    let (x, y) = (at.x - gauge.roi.x as f64, at.y - gauge.roi.y as f64);
-    match gauge.axis {
-        BeadAxis::Vertical => (x, y),
-        BeadAxis::Horizontal => (y, x),
-    }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-fn point(gauge: &Gauge, across: f64, along: f64) -> ImagePoint {
-    let (x, y) = (gauge.roi.x as f64, gauge.roi.y as f64);
-    match gauge.axis {
-        BeadAxis::Vertical => ImagePoint::new(x + across, y + along),
-        BeadAxis::Horizontal => ImagePoint::new(x + along, y + across),
-    }
-}
-
 /// Lines along the bead, carried on to the gauge's ends; pieces of the same
 /// edge are one line with their mean position.
-fn edge_lines(gauge: &Gauge, segments: &[EdgeSegment]) -> Vec<EdgeLine> {
-    let length = along(gauge);
+fn edge_lines(view: GaugeView, segments: &[EdgeSegment]) -> Vec<EdgeLine> {
+    let length = to_f64(view.along);
     let mut lines: Vec<EdgeLine> = Vec::new();
     for segment in segments {
-        let (u0, v0) = gauge_coordinates(gauge, segment.from);
-        let (u1, v1) = gauge_coordinates(gauge, segment.to);
+        let [(u0, v0), (u1, v1)] = [segment.from, segment.to].map(|at| view.from_image(at));
         let run = v1 - v0;
         let slope = (u1 - u0) / run;
         if run.abs() < 2.0 || slope.abs() > MAX_SLOPE {
             continue;
         }
+        let (first, last) = (u0 - slope * v0, u0 + slope * (length - 1.0 - v0));
         let covered = run.abs() / length;
-        let new = EdgeLine {
-            first: u0 - slope * v0,
-            last: u0 + slope * (length - 1.0 - v0),
-            coverage: covered,
-        };
+        let new = EdgeLine { first, last, coverage: covered };
         let same =
             lines.iter_mut().find(|line| (line.middle() - new.middle()).abs() < SAME_EDGE_PX);
         match same {
@@ -152,7 +124,8 @@ fn best_pair(
     frame: &Frame,
     lines: &[EdgeLine],
 ) -> Option<(EdgeLine, EdgeLine)> {
-    let middle = (along(gauge) - 1.0) / 2.0;
+    let view = GaugeView::new(gauge.roi, gauge.axis);
+    let middle = (to_f64(view.along) - 1.0) / 2.0;
     let grey = frame.to_grey8();
     let mut best: Option<(f64, EdgeLine, EdgeLine)> = None;
     for left in lines.iter().filter(|line| line.coverage >= MIN_COVERAGE) {
@@ -160,12 +133,12 @@ fn best_pair(
             if right.middle() <= left.middle() {
                 continue;
             }
-            let m1 = surface.to_mm(point(gauge, left.middle(), middle))?;
-            let m2 = surface.to_mm(point(gauge, right.middle(), middle))?;
+            let m1 = surface.to_mm(view.to_image(left.middle(), middle))?;
+            let m2 = surface.to_mm(view.to_image(right.middle(), middle))?;
             let width = (m2 - m1).norm();
             let WidthRange { min, max } = gauge.width_range;
             if !(min.get()..=max.get()).contains(&width)
-                || !polarity_fits(gauge, frame, &grey, *left, *right)
+                || !polarity_fits(gauge, frame, &grey, [*left, *right])
             {
                 continue;
             }
@@ -180,24 +153,14 @@ fn best_pair(
 
 /// Whether the gauge's middle row is brighter between the lines than beside
 /// them, or darker, as the bead is.
-fn polarity_fits(
-    gauge: &Gauge,
-    frame: &Frame,
-    grey: &[u8],
-    left: EdgeLine,
-    right: EdgeLine,
-) -> bool {
+fn polarity_fits(gauge: &Gauge, frame: &Frame, grey: &[u8], [left, right]: [EdgeLine; 2]) -> bool {
+    /// Distance from an edge line at which the level is read \[px\]: beyond the blur.
     const BESIDE_PX: f64 = 6.0;
-    let middle = ((along(gauge) - 1.0) / 2.0).round();
+    let (roi, view) = (gauge.roi, GaugeView::new(gauge.roi, gauge.axis));
+    let middle = ((to_f64(view.along) - 1.0) / 2.0).round();
     let level = |across: f64| -> Option<f64> {
-        let at = point(gauge, across.round(), middle);
-        let roi = gauge.roi;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a pixel of the gauge; what is negative saturates and is refused"
-        )]
-        let (x, y) = (at.x as usize, at.y as usize);
+        let at = view.to_image(across.round(), middle);
+        let (x, y) = (floor_to_count(at.x), floor_to_count(at.y));
         let inside =
             (roi.x..roi.x + roi.width).contains(&x) && (roi.y..roi.y + roi.height).contains(&y);
         inside.then(|| f64::from(grey[y * frame.width() + x]))
@@ -219,6 +182,7 @@ mod tests {
     use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
     use crate::vision::MeasureMethod;
+    use crate::vision::gauge::BeadAxis;
 
     fn bar(from: usize, to: usize) -> Frame {
         let values = (0..100usize)

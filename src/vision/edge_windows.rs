@@ -1,12 +1,15 @@
-//! The gauge straightened along an edge: the pixels around it, one window a few
-//! rows, read once and held against the edge as often as it takes.
+//! The gauge straightened along an edge: windows of pixels about it, each the mean of a few rows.
+//! They are read once and compared with the edge as often as needed.
+
+use std::ops::Range;
 
 use super::path::EdgeCorrection;
 use super::row_range::RowRange;
 use super::strip::{GaugeRows, GreyPixel};
-use crate::numeric::number::{floor_to_index, to_f32};
+use crate::numeric::number::{floor_to_count, floor_to_index, to_f32};
 
-/// Pixels of a window.
+/// Pixels of a window. Derived: the 96 px of an overlay, and 8 px on either side for a path that is
+/// off.
 pub const WINDOW_PX: usize = 112;
 /// Pixel of a window at which the edge is expected.
 pub const MIDDLE_PX: usize = WINDOW_PX / 2;
@@ -25,7 +28,7 @@ pub struct EdgeWindow {
     pub rows: f32,
     /// Their middle along the bead \[px\].
     pub middle: f32,
-    /// Place across the bead of the first pixel \[px\].
+    /// Position across the bead of the first pixel \[px\].
     pub first: isize,
     /// Position of the edge there \[px\], level before it and step to the level
     /// after it \[grey levels\], as they are expected.
@@ -41,19 +44,15 @@ pub struct Grouping {
     pub max_rows: usize,
 }
 
-/// Windows along an edge; keeps its memory from frame to frame.
+/// Windows along an edge; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct EdgeWindows {
-    windows: Vec<EdgeWindow>,
+    /// What the windows are of.
+    pub windows: Vec<EdgeWindow>,
     pixels: Vec<[f32; WINDOW_PX]>,
 }
 
 impl EdgeWindows {
-    /// What the windows are of.
-    pub fn windows(&self) -> &[EdgeWindow] {
-        &self.windows
-    }
-
     /// The pixels of a window \[grey levels of 256\].
     #[inline(always)]
     pub fn pixels(&self, window: usize) -> &[f32; WINDOW_PX] {
@@ -68,7 +67,7 @@ impl EdgeWindows {
         }
     }
 
-    /// Reads the windows about an edge of which `expected` is told for a place
+    /// Reads the windows about an edge of which `expected` is given for a position
     /// along it. Rows are taken together within caliper lines: one where there are
     /// few, more where a tall gauge has plenty.
     #[inline(always)]
@@ -96,7 +95,7 @@ impl EdgeWindows {
         self.pixels.resize(self.windows.len(), [0.0; WINDOW_PX]);
         let mut v = 0;
         for (window, pixels) in self.windows.iter().zip(&mut self.pixels) {
-            let end = v + count(window.rows);
+            let end = v + floor_to_count(window.rows.into());
             average(strip, v..end, window.first, pixels);
             v = end;
         }
@@ -108,50 +107,50 @@ fn rows_together(along: usize, lines: usize, steepest: f32) -> usize {
     if along <= MAX_SINGLE_ROWS {
         return 1;
     }
-    let straight = count(MAX_ASIDE_PX / steepest.max(1e-3));
+    let straight = floor_to_count((MAX_ASIDE_PX / steepest.max(1e-3)).into());
     along.div_ceil(lines.max(1)).min(straight).max(1)
 }
 
-/// Mean of some rows from a place on.
+/// Mean of some rows from a position on.
 #[inline(always)]
 fn average<T: GreyPixel>(
     strip: &GaugeRows<'_, T>,
-    rows: std::ops::Range<usize>,
+    rows: Range<usize>,
     first: isize,
     out: &mut [f32; WINDOW_PX],
 ) {
     let scale = strip.scale / to_f32(rows.len());
     let mut sums = [T::Sum::default(); WINDOW_PX];
     let mut v = rows.start;
-    let mut memory = [[T::default(); WINDOW_PX]; 2];
+    let mut scratch = [[T::default(); WINDOW_PX]; 2];
     while v + 1 < rows.end {
-        let [one, two] = &mut memory;
+        let [one, two] = &mut scratch;
         add([pixels(strip, v, first, one), pixels(strip, v + 1, first, two)], &mut sums);
         v += 2;
     }
     if v < rows.end {
-        add([pixels(strip, v, first, &mut memory[0])], &mut sums);
+        add([pixels(strip, v, first, &mut scratch[0])], &mut sums);
     }
     for (out, sum) in out.iter_mut().zip(sums) {
         *out = scale * T::sum_to_f32(sum);
     }
 }
 
-/// The pixels of a row from a place on; `memory` is for those beyond its ends.
+/// The pixels of a row from a position on; `scratch` is for those beyond its ends.
 #[inline(always)]
 fn pixels<'a, T: GreyPixel>(
     strip: &GaugeRows<'a, T>,
     v: usize,
     first: isize,
-    memory: &'a mut [T; WINDOW_PX],
+    scratch: &'a mut [T; WINDOW_PX],
 ) -> &'a [T; WINDOW_PX] {
     let row = strip.row(v);
     let within = usize::try_from(first).ok().and_then(|from| row.get(from..from + WINDOW_PX));
     if let Some(pixels) = within.and_then(<[T]>::first_chunk) {
         return pixels;
     }
-    strip.fetch(v, first, memory);
-    memory
+    strip.fetch(v, first, scratch);
+    scratch
 }
 
 #[inline(always)]
@@ -161,13 +160,4 @@ fn add<T: GreyPixel, const N: usize>(rows: [&[T; WINDOW_PX]; N], sums: &mut [T::
             sums[k] = row[k].add_to(sums[k]);
         }
     }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "positive; what is large is cut to a few"
-)]
-fn count(number: f32) -> usize {
-    number as usize
 }

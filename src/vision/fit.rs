@@ -5,8 +5,11 @@
 use nalgebra::{Matrix4, Vector4};
 
 use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::to_f64;
 
+/// Gauss–Newton steps at most: more cost time on lines that show no edge.
 const MAX_STEPS: usize = 8;
+/// Step at which the fit has converged \[px\]: far below any noise of a line.
 const CONVERGED_PX: f64 = 1e-4;
 
 /// Position and levels of an edge.
@@ -23,7 +26,7 @@ pub struct FittedEdge {
     pub shading: f64,
 }
 
-/// What neighbours say of ground, height and shading, each with its variance.
+/// What neighbours show of ground, height and shading, each with its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// Ground, height, shading.
@@ -47,6 +50,8 @@ pub struct EdgeFit {
 /// A profile around an edge: samples a pixel apart.
 #[derive(Debug, Clone, Copy)]
 pub struct ProfileWindow<'a> {
+    /// The blurred step.
+    pub table: &'a StepTable,
     /// Position of the first sample \[px\].
     pub first: f64,
     /// The grey levels.
@@ -59,12 +64,12 @@ pub struct ProfileWindow<'a> {
     pub bead_after: bool,
 }
 
-/// What a blurred step with shading is at a place, and its derivatives.
+/// What a blurred step with shading is at a position, and its derivatives.
 #[derive(Debug, Clone, Copy)]
 pub struct ShadedStep {
-    /// Φ: share of the step that is reached.
+    /// Φ: fraction of the step that is reached.
     pub step: f64,
-    /// Slope of the share \[1/px\].
+    /// Slope of the fraction \[1/px\].
     pub density: f64,
     /// Blurred distance into the bead \[px\].
     pub depth: f64,
@@ -87,16 +92,11 @@ impl ShadedStep {
 impl ProfileWindow<'_> {
     /// Fits from a start; `None` where the fit leaves the window or there is
     /// nothing to hold it.
-    pub fn fit(
-        &self,
-        table: &StepTable,
-        start: FittedEdge,
-        prior: Option<&Prior>,
-    ) -> Option<EdgeFit> {
+    pub fn fit(&self, start: FittedEdge, prior: Option<&Prior>) -> Option<EdgeFit> {
         let mut edge = start;
         let mut normal = Matrix4::zeros();
         for _ in 0..MAX_STEPS {
-            let (matrix, slope) = self.linearise(table, edge, prior);
+            let (matrix, slope) = self.linearise(edge, prior);
             normal = matrix;
             let step = matrix.cholesky()?.solve(&slope);
             edge.at += step.x.clamp(-self.blur, self.blur);
@@ -107,8 +107,7 @@ impl ProfileWindow<'_> {
                 break;
             }
         }
-        #[expect(clippy::cast_precision_loss, reason = "a window is short")]
-        let last = self.first + self.samples.len() as f64 - 1.0;
+        let last = self.first + to_f64(self.samples.len()) - 1.0;
         if !(edge.at > self.first + 1.0 && edge.at < last - 1.0) {
             return None;
         }
@@ -116,34 +115,25 @@ impl ProfileWindow<'_> {
         Some(EdgeFit {
             edge,
             variance: [inverse.m11, inverse.m22, inverse.m33, inverse.m44],
-            residual: self.residual(table, edge),
+            residual: self.residuals(edge).map(|(_, miss)| miss * miss).sum(),
         })
     }
 
     /// Each sample's model and how far the sample is from it.
-    fn residuals(
-        &self,
-        table: &StepTable,
-        edge: FittedEdge,
-    ) -> impl Iterator<Item = (ShadedStep, f64)> {
-        (0u32..).zip(self.samples).map(move |(place, &sample)| {
-            let distance = self.first + f64::from(place) - edge.at;
-            let model = ShadedStep::at(table, distance, self.blur, self.bead_after);
+    fn residuals(&self, edge: FittedEdge) -> impl Iterator<Item = (ShadedStep, f64)> {
+        (0u32..).zip(self.samples).map(move |(position, &sample)| {
+            let distance = self.first + f64::from(position) - edge.at;
+            let model = ShadedStep::at(self.table, distance, self.blur, self.bead_after);
             let grey = edge.ground + edge.height * model.step + edge.shading * model.depth;
             (model, f64::from(sample) - grey)
         })
     }
 
     /// Normal equations at an estimate, in units of the noise.
-    fn linearise(
-        &self,
-        table: &StepTable,
-        edge: FittedEdge,
-        prior: Option<&Prior>,
-    ) -> (Matrix4<f64>, Vector4<f64>) {
+    fn linearise(&self, edge: FittedEdge, prior: Option<&Prior>) -> (Matrix4<f64>, Vector4<f64>) {
         let mut matrix = Matrix4::zeros();
         let mut slope = Vector4::zeros();
-        for (model, miss) in self.residuals(table, edge) {
+        for (model, miss) in self.residuals(edge) {
             let by_position = -edge.height * model.density - edge.shading * model.depth_slope;
             let row = Vector4::new(by_position, 1.0, model.step, model.depth);
             matrix.ger(1.0, &row, &row, 1.0);
@@ -158,10 +148,6 @@ impl ProfileWindow<'_> {
             }
         }
         (matrix, slope)
-    }
-
-    fn residual(&self, table: &StepTable, edge: FittedEdge) -> f64 {
-        self.residuals(table, edge).map(|(_, miss)| miss * miss).sum()
     }
 }
 
@@ -185,10 +171,16 @@ mod tests {
         for (height, bead_after) in [(80.0, true), (-80.0, false)] {
             let truth = FittedEdge { at: 12.34, ground: 40.0, height, shading: 1.5 };
             let samples = profile(truth, 1.7, bead_after);
-            let window =
-                ProfileWindow { first: 0.0, samples: &samples, noise: 1.0, blur: 1.7, bead_after };
+            let window = ProfileWindow {
+                table: &table,
+                first: 0.0,
+                samples: &samples,
+                noise: 1.0,
+                blur: 1.7,
+                bead_after,
+            };
             let start = FittedEdge { at: 11.0, ground: 50.0, height: 0.7 * height, shading: 0.0 };
-            let fit = window.fit(&table, start, None).unwrap();
+            let fit = window.fit(start, None).unwrap();
             assert!((fit.edge.at - 12.34).abs() < 1e-3, "{fit:?}");
             assert!((fit.edge.shading - 1.5).abs() < 1e-2);
         }
@@ -200,6 +192,7 @@ mod tests {
         let edge = FittedEdge { at: 12.0, ground: 40.0, height: 80.0, shading: 0.0 };
         let samples = profile(edge, 1.5, true);
         let window = ProfileWindow {
+            table: &table,
             first: 0.0,
             samples: &samples,
             noise: 16.0,
@@ -207,7 +200,7 @@ mod tests {
             bead_after: true,
         };
         let prior = Prior { mean: [40.0, 80.0, 0.0], variance: [1e-9; 3] };
-        let fit = window.fit(&table, edge, Some(&prior)).unwrap();
+        let fit = window.fit(edge, Some(&prior)).unwrap();
         // Cramér–Rao bound of one row: 1.883 (σ/A) √s.
         let bound = 1.883 * 4.0 / 80.0 * 1.5f64.sqrt();
         assert!((fit.variance[0].sqrt() / bound - 1.0).abs() < 0.01);
@@ -218,6 +211,7 @@ mod tests {
         let table = StepTable::default();
         let samples = [50.0; 25];
         let window = ProfileWindow {
+            table: &table,
             first: 0.0,
             samples: &samples,
             noise: 1.0,
@@ -225,6 +219,6 @@ mod tests {
             bead_after: true,
         };
         let start = FittedEdge { at: 12.0, ground: 50.0, height: 0.0, shading: 0.0 };
-        assert_eq!(window.fit(&table, start, None), None);
+        assert_eq!(window.fit(start, None), None);
     }
 }

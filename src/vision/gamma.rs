@@ -32,7 +32,7 @@ impl LightTable {
 }
 
 /// Light of one level. Only white itself gives white, so that saturated pixels
-/// are still told from bright ones.
+/// are still distinguished from bright ones.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

@@ -3,6 +3,7 @@
 use crate::calibration::SurfaceMap;
 use crate::core::geometry::{ImagePoint, Roi};
 use crate::core::units::{Mm, WidthRange};
+use crate::numeric::number::to_f64;
 
 /// How the bead runs in the image, to within 20 degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,13 +47,14 @@ pub enum EdgeKind {
     Groove,
 }
 
-/// Caliper lines along a gauge whose cell names no number.
+/// Caliper lines along a gauge whose cell names no number: ACCURACY.md, What is measured, is for
+/// this number. More lines are shorter and noisier, fewer follow a bead less well.
 pub const DEFAULT_CALIPERS: usize = 64;
 /// Smallest contrast where the cell names none: about three times the noise of an
 /// industrial camera at full scale \[grey levels of 256\].
 pub const DEFAULT_MIN_CONTRAST_GREY: f64 = 6.0;
-/// Largest standard deviation of a width where the cell names none, as a fraction
-/// of the width: tolerances of printed beads are 5 % and more.
+/// Largest standard deviation of a width where the cell names none, as a fraction of the width
+/// (contract, `max_sigma` of the cell file).
 pub const DEFAULT_MAX_SIGMA: f64 = 0.02;
 
 /// Widths of a bead in pixels across the gauge's middle.
@@ -112,20 +114,53 @@ impl Gauge {
     /// Its length along the bead on a surface; `None` where an end does not see
     /// the surface.
     pub fn length_on(&self, map: &SurfaceMap) -> Option<Mm> {
-        let roi = self.roi;
-        #[expect(clippy::cast_precision_loss, reason = "pixel numbers stay far below 2^53")]
-        let [x, y, width, height] = [roi.x, roi.y, roi.width, roi.height].map(|px| px as f64);
-        let (across, along) = (x + 0.5 * (width - 1.0), y + 0.5 * (height - 1.0));
-        // From border to border of its pixels, the first of which has its centre at 0.
-        let ends = match self.axis {
-            BeadAxis::Vertical => {
-                [ImagePoint::new(across, y - 0.5), ImagePoint::new(across, y + height - 0.5)]
-            }
-            BeadAxis::Horizontal => {
-                [ImagePoint::new(x - 0.5, along), ImagePoint::new(x + width - 0.5, along)]
-            }
-        };
+        let view = GaugeView::new(self.roi, self.axis);
+        let middle = 0.5 * to_f64(view.across - 1);
+        // From boundary to boundary of its pixels, the first of which has its centre at 0.
+        let ends = [-0.5, to_f64(view.along) - 0.5].map(|along| view.to_image(middle, along));
         Mm::new((map.to_mm(ends[1])? - map.to_mm(ends[0])?).norm()).ok()
+    }
+}
+
+/// The gauge placed over an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GaugeView {
+    /// The region.
+    pub roi: Roi,
+    /// How the bead runs in it.
+    pub axis: BeadAxis,
+    /// Number of pixels across the bead.
+    pub across: usize,
+    /// Number of pixels along the bead.
+    pub along: usize,
+}
+
+impl GaugeView {
+    /// Lays a region over an image.
+    pub fn new(roi: Roi, axis: BeadAxis) -> Self {
+        let (across, along) = match axis {
+            BeadAxis::Vertical => (roi.width, roi.height),
+            BeadAxis::Horizontal => (roi.height, roi.width),
+        };
+        Self { roi, axis, across, along }
+    }
+
+    /// The image point of gauge coordinates.
+    pub fn to_image(self, u: f64, v: f64) -> ImagePoint {
+        let (x, y) = (to_f64(self.roi.x), to_f64(self.roi.y));
+        match self.axis {
+            BeadAxis::Vertical => ImagePoint::new(x + u, y + v),
+            BeadAxis::Horizontal => ImagePoint::new(x + v, y + u),
+        }
+    }
+
+    /// Gauge coordinates of an image point: across the bead, along it.
+    pub fn from_image(self, at: ImagePoint) -> (f64, f64) {
+        let (x, y) = (at.x - to_f64(self.roi.x), at.y - to_f64(self.roi.y));
+        match self.axis {
+            BeadAxis::Vertical => (x, y),
+            BeadAxis::Horizontal => (y, x),
+        }
     }
 }
 

@@ -1,20 +1,23 @@
-//! The pattern of what lies beside an edge, ground or bead: how strong it is, and how far
-//! it may move the mean of the edge.
+//! Pattern of the ground or of the bead beside an edge: its standard deviation, and that of its
+//! mean over the gauge.
 
 use super::row_range::RowRange;
 use super::strip::{GaugeRows, GreyPixel};
 use crate::numeric::number::{narrow_to_f32, round_to_count, to_f64};
 use crate::numeric::rank;
 
-/// Distances from the edge at which the pattern is looked at \[px\]: the first one
-/// beyond the flank, in blurs and at least, and those after it.
+/// Distance from the edge from which on the pattern is read, in blurs. Derived: beyond 3 blurs
+/// 1.3·10⁻³ of a step is left, 1 − Φ(3).
 const FLANK_BLURS: f64 = 3.0;
+/// The same at least \[px\]: a pattern is looked for beyond what rounds the foot of a sharp edge.
 const MIN_FIRST_PX: f64 = 4.0;
+/// Distance of the columns that are read \[px\]: neighbours of a pattern are alike.
 const COLUMN_STEP_PX: usize = 2;
+/// Columns at most: more reach into what lies farther away.
 const MAX_COLUMNS: usize = 10;
-/// Fewest lines that tell a pattern.
+/// Fewest lines that show a pattern: fewer leave its variance too uncertain.
 const MIN_LINES: usize = 8;
-/// Part of the noise's variance by which a pattern's must exceed it: less is not told
+/// Part of the noise's variance by which a pattern's must exceed it: less is not distinguished
 /// from noise.
 pub const MIN_EXCESS_VARIANCE: f64 = 0.25;
 
@@ -32,8 +35,12 @@ pub struct EdgePosition {
 }
 
 /// Where to look for a pattern.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EdgeSide<'a> {
+#[derive(Debug, Clone, Copy)]
+pub struct EdgeSide<'a, T> {
+    /// The gauge's pixels.
+    pub strip: &'a GaugeRows<'a, T>,
+    /// Standard deviation of a pixel's noise \[grey levels\].
+    pub noise: f64,
     /// The edge, row by row.
     pub positions: &'a [EdgePosition],
     /// Direction in which to look, away from the edge: 1 or -1.
@@ -44,7 +51,7 @@ pub struct EdgeSide<'a> {
     pub room_px: f64,
 }
 
-impl EdgeSide<'_> {
+impl<T> EdgeSide<'_, T> {
     /// Whether it lies at higher positions than the edge.
     fn is_after(&self) -> bool {
         self.outwards > 0.0
@@ -62,7 +69,7 @@ pub struct Pattern {
     pub mean_variance: f64,
 }
 
-/// Looks for patterns; keeps its memory from frame to frame.
+/// Looks for patterns; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct PatternSearch {
     /// Grey levels beside the edge, line by line, each column less its straight line.
@@ -77,16 +84,12 @@ type ColumnValues = [f32; MAX_COLUMNS];
 
 impl PatternSearch {
     /// The pattern along an edge. `noise` is the standard deviation of a pixel's
-    /// \[grey levels\]. `None` where none is told from noise, or too little is in the
+    /// \[grey levels\]. `None` where none is distinguished from noise, or too little is in the
     /// gauge.
     #[inline(always)]
-    pub fn pattern<T: GreyPixel>(
-        &mut self,
-        strip: &GaugeRows<'_, T>,
-        side: &EdgeSide<'_>,
-        noise: f64,
-    ) -> Option<Pattern> {
-        let mut variances = self.look(strip, side, noise)?;
+    pub fn pattern<T: GreyPixel>(&mut self, side: &EdgeSide<'_, T>) -> Option<Pattern> {
+        let noise = side.noise;
+        let mut variances = self.look(side)?;
         let size_grey = self.without_noise(&mut variances, noise)?;
         Some(Pattern { size_grey, mean_variance: self.variance_of_mean(noise) })
     }
@@ -95,13 +98,8 @@ impl PatternSearch {
     /// \[grey levels\], from the median of how far pixels are off their median: sparks or
     /// holes, which move a mean, are none. `None` as for a pattern.
     #[inline(always)]
-    pub fn texture<T: GreyPixel>(
-        &mut self,
-        strip: &GaugeRows<'_, T>,
-        side: &EdgeSide<'_>,
-        noise: f64,
-    ) -> Option<f64> {
-        let mut variances = self.look(strip, side, noise)?;
+    pub fn texture<T: GreyPixel>(&mut self, side: &EdgeSide<'_, T>) -> Option<f64> {
+        let mut variances = self.look(side)?;
         for (column, variance) in variances.iter_mut().enumerate().take(self.columns) {
             self.column.clear();
             self.column.extend(self.lines.iter().map(|line| line[column]));
@@ -109,33 +107,28 @@ impl PatternSearch {
             let deviation = f64::from(rank::median_deviation(&mut self.column, median)?);
             *variance = narrow_to_f32((rank::SIGMA_PER_MEDIAN * deviation).powi(2));
         }
-        self.without_noise(&mut variances, noise)
+        self.without_noise(&mut variances, side.noise)
     }
 
     /// Reads what lies beside an edge: the variance of each column; `None` where all
-    /// together are surely noise.
+    /// together are certainly noise.
     #[inline(always)]
-    fn look<T: GreyPixel>(
-        &mut self,
-        strip: &GaugeRows<'_, T>,
-        side: &EdgeSide<'_>,
-        noise: f64,
-    ) -> Option<[f32; MAX_COLUMNS]> {
+    fn look<T: GreyPixel>(&mut self, side: &EdgeSide<'_, T>) -> Option<ColumnValues> {
         let count = side.positions.len();
         if count < MIN_LINES {
             return None;
         }
-        self.read(strip, side);
+        self.read(side);
         detrend(&mut self.lines);
         let freedom = 1.0 / narrow_to_f32(to_f64(count - 2));
         let variances = sum(self.lines.iter().map(|line| line.map(|grey| freedom * grey * grey)));
         let mean =
             variances[..self.columns].iter().sum::<f32>() / narrow_to_f32(to_f64(self.columns));
-        (f64::from(mean) > MAX_NOISE_RATIO * noise * noise).then_some(variances)
+        (f64::from(mean) > MAX_NOISE_RATIO * side.noise * side.noise).then_some(variances)
     }
 
     /// Standard deviation without the pixels' noise, from the median of the columns'
-    /// variances \[grey levels\]; `None` where it is not told from noise.
+    /// variances \[grey levels\]; `None` where it is not distinguished from noise.
     fn without_noise(&self, variances: &mut [f32; MAX_COLUMNS], noise: f64) -> Option<f64> {
         let variance = f64::from(rank::median(&mut variances[..self.columns])?) - noise * noise;
         (variance > MIN_EXCESS_VARIANCE * noise * noise).then(|| variance.sqrt())
@@ -143,18 +136,18 @@ impl PatternSearch {
 
     /// Reads columns of pixels beside an edge, as far as they lie within the gauge.
     #[inline(always)]
-    fn read<T: GreyPixel>(&mut self, strip: &GaugeRows<'_, T>, side: &EdgeSide<'_>) {
+    fn read<T: GreyPixel>(&mut self, side: &EdgeSide<'_, T>) {
+        let strip = side.strip;
         let first = MIN_FIRST_PX.max(FLANK_BLURS * side.blur_px);
         let last = to_f64(strip.across - 1);
-        let border =
-            |place: &EdgePosition| if side.is_after() { last - place.at } else { place.at };
-        let room = side.positions.iter().map(border).fold(side.room_px - first, f64::min);
+        let boundary = |of: &EdgePosition| if side.is_after() { last - of.at } else { of.at };
+        let room = side.positions.iter().map(boundary).fold(side.room_px - first, f64::min);
         let fits = |column: &usize| first + to_f64(COLUMN_STEP_PX * column) <= room;
         self.columns = (0..MAX_COLUMNS).take_while(fits).count();
         self.lines.clear();
-        self.lines.extend(side.positions.iter().map(|place| {
-            let pixels = strip.row(usize::midpoint(place.rows.first, place.rows.end - 1));
-            let nearest = round_to_count(narrow_to_f32(place.at + side.outwards * first));
+        self.lines.extend(side.positions.iter().map(|position| {
+            let pixels = strip.row(usize::midpoint(position.rows.first, position.rows.end - 1));
+            let nearest = round_to_count(narrow_to_f32(position.at + side.outwards * first));
             std::array::from_fn(|column| {
                 let off = COLUMN_STEP_PX * column;
                 let at = if side.is_after() { nearest + off } else { nearest.saturating_sub(off) };
@@ -187,12 +180,12 @@ fn detrend(lines: &mut [ColumnValues]) {
     let middle = (count - 1.0) / 2.0;
     let means = sum(lines.iter().copied()).map(|sum| sum / count);
     let places = || (0_usize..).map(move |k| narrow_to_f32(to_f64(k)) - middle);
-    let across = sum(lines.iter().zip(places()).map(|(line, place)| line.map(|v| place * v)));
+    let across = sum(lines.iter().zip(places()).map(|(line, position)| line.map(|v| position * v)));
     let along = count * (count * count - 1.0) / 12.0;
     let slopes = across.map(|across| across / along);
-    for (line, place) in lines.iter_mut().zip(places()) {
+    for (line, position) in lines.iter_mut().zip(places()) {
         for (value, (mean, slope)) in line.iter_mut().zip(means.iter().zip(&slopes)) {
-            *value -= mean + slope * place;
+            *value -= mean + slope * position;
         }
     }
 }

@@ -1,6 +1,6 @@
-//! Light that falls off over the gauge, as a lens's does towards its corners: it bends the
-//! levels beside an edge by less than their noise shows there, and tells by how much by its
-//! slopes at both edges.
+//! Light that falls off over the gauge, as towards the corners of a lens. It bends the levels
+//! beside an edge by less than their noise. How much it bends them follows from its slopes at both
+//! edges.
 
 use super::overlay::{HALF_SPAN, SideShading, StepShape};
 use crate::numeric::number::to_f64;
@@ -9,9 +9,9 @@ use crate::numeric::number::to_f64;
 /// their mean: those of a bead or of ground that is shaded itself are its alone.
 const MAX_SLOPE_DIFFERENCE: f64 = 0.5;
 
-/// How much less the light's relative slope grows at the edges than between them where it
-/// falls off on both sides, in squares of that slope: 2/3 for a lamp, 1/(1 + r²)^1.5 of whose
-/// light arrives, 1/2 for a lens, with 1/(1 + r²)².
+/// How much less the light's relative slope grows at the edges than between them where it falls off
+/// on both sides, in squares of that slope. Derived: 2/3 for a lamp with the falloff (1 + r²)^−1.5,
+/// 1/2 for a lens with (1 + r²)^−2 (cos⁴ law); the value lies between.
 const FALLOFF_CURVATURE: f64 = 0.6;
 
 /// Bend of the light at the farthest sample up to which it is left out: it moves an edge by
@@ -21,7 +21,7 @@ const MIN_BEND: f64 = 2e-3;
 /// What lies beside an edge.
 #[derive(Debug)]
 pub struct Surroundings<'a> {
-    /// The edge, at its place and its levels.
+    /// The edge, at its position and its levels.
     pub shape: &'a mut StepShape,
     /// Level before it \[grey levels\].
     pub before: f64,
@@ -30,14 +30,14 @@ pub struct Surroundings<'a> {
 }
 
 impl Surroundings<'_> {
-    /// Levels before and after the edge, in shares of the step.
+    /// Levels before and after the edge, as fractions of the step.
     fn levels(&self) -> [f64; 2] {
         let before = self.before / self.step;
         [before, before + 1.0]
     }
 
     /// Relative change of the light at the edge \[1/px\]; `None` where the two sides do not
-    /// tell the same of it.
+    /// show the same of it.
     fn light(&self) -> Option<f64> {
         let [before, after] = self.levels();
         let [outwards, onwards] = self.shape.shading.map(|shading| shading.slope);
@@ -88,7 +88,7 @@ fn falloff_bends([left, right]: [f64; 2], width_px: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Bends of a light about edges at two places, and what they are in truth.
+    /// Bends of a light about edges at two positions, and what they are in truth.
     fn bends_of(light: impl Fn(f64) -> f64, edges: [f64; 2]) -> [[f64; 2]; 2] {
         let slopes = edges.map(|x| (light(x + 0.5) - light(x - 0.5)) / light(x));
         let truth =

@@ -1,9 +1,9 @@
 //! A straight line through samples, summed up block by block.
 
-/// Slopes of the surroundings are believed from so many standard deviations
-/// on.
+/// Slopes of the surroundings are accepted from so many standard deviations on. Derived: noise
+/// alone exceeds 2.5 in 1.2 % of the sides, and a slope that is shrunk to none costs little.
 const MIN_SLOPE_SIGMAS: f64 = 2.5;
-/// Mean square distance of places from their middle from which on they show a
+/// Mean square distance of positions from their middle from which on they show a
 /// slope \[px²\].
 const MIN_SPREAD_PX2: f64 = 3.0;
 
@@ -38,7 +38,7 @@ impl LineSums {
         self.xy += other.xy;
     }
 
-    /// Mean place of the samples.
+    /// Mean position of the samples.
     pub fn middle(&self) -> f64 {
         self.x / self.weight
     }
@@ -61,7 +61,7 @@ impl LineSums {
         self.weight > 0.0 && self.spread() >= MIN_SPREAD_PX2 * self.weight
     }
 
-    /// What the line is at a place, and its variance in units of a sample's;
+    /// What the line is at a position, and its variance in units of a sample's;
     /// a slope that has not been seen over a few pixels is taken for none,
     /// with room for a little.
     pub fn at(&self, x: f64) -> (f64, f64) {
@@ -77,7 +77,7 @@ impl LineSums {
 
     /// The slope less what noise may have made of it – nothing below 2.5
     /// standard deviations, nearly all far above –, and the variance that its
-    /// doubt leaves to the line at the edge.
+    /// uncertainty leaves to the line at the edge.
     pub fn shrunk_slope(&self, noise: f64) -> (f64, f64) {
         if !self.shows_slope() {
             return (0.0, 0.0);

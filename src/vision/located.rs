@@ -11,12 +11,12 @@ pub struct CaliperEdge {
     pub variance: f64,
     /// Signed height of the step \[grey levels\].
     pub height: f64,
-    /// Share of the band's rows that it comes from.
+    /// Fraction of the band's rows that it comes from.
     pub row_fraction: f64,
 }
 
-/// Mean of places across the bead \[px\].
-pub fn mean_position(places: &[Option<CaliperEdge>]) -> f64 {
-    let sum: f64 = places.iter().flatten().map(|place| place.at).sum();
-    sum / to_f64(places.iter().flatten().count().max(1))
+/// Mean of positions across the bead \[px\].
+pub fn mean_position(positions: &[Option<CaliperEdge>]) -> f64 {
+    let sum: f64 = positions.iter().flatten().map(|position| position.at).sum();
+    sum / to_f64(positions.iter().flatten().count().max(1))
 }

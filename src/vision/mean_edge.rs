@@ -7,7 +7,7 @@
 //! inwards, and what remains to the second order is taken off. The course has as few
 //! degrees of freedom as the gauge supports: a line, and a bend where it is certain. How
 //! far a pattern moves the edge is read from the ground and the bead themselves: the same
-//! weights, held against places where there is no edge.
+//! weights, compared with positions where there is no edge.
 
 mod column;
 mod course;
@@ -16,6 +16,7 @@ mod mean_edge_input;
 mod weights;
 
 use super::coarse::StepLine;
+use super::curve::MIN_BEND_SIGMAS;
 use super::edge_windows::MAX_SINGLE_ROWS;
 use super::located::CaliperEdge;
 use super::rough::RoughFit;
@@ -25,12 +26,13 @@ use super::vectors;
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::{narrow_to_f32, round_to_count, to_f64};
 use crate::numeric::rank;
+use crate::vision::buffer::refill;
 use column::ColumnSums;
 use course::{ParabolicCourse, bend_at};
 use descent::{
     CONVERGED, DescentResult, MAX_ITERATIONS, MAX_STEP_PX, ROUGHLY_CONVERGED, StopCriterion,
 };
-pub use mean_edge_input::MeanEdgeInput;
+pub use mean_edge_input::MeanInput;
 use weights::{EdgeWeights, HALF_PX, ShiftSamples, WINDOW, product};
 
 /// Half of the window about an edge at most, as a fraction of the bead's width.
@@ -44,26 +46,27 @@ const USUAL_BLUR: usize = 3;
 const BLUR_SHIFT_PX: usize = 4;
 /// How far an edge may lie from its line \[px\].
 const MAX_OFFSET_PX: f64 = 10.0;
-/// How many standard deviations of what the pattern bends an edge by are a bend of the
-/// edge.
-const MIN_BEND_SIGMAS: f64 = 4.0;
-/// Ground that is looked at \[px\], and bead: other things lie farther away.
+/// Ground that is read \[px\]: other things lie farther away.
 const MAX_GROUND_PX: usize = 100;
+/// Bead that is read \[px\].
 const MAX_BEAD_PX: usize = 120;
-/// Distance from the edge at which ground and bead are free of the flank, in blurs.
+/// Distance from the edge at which ground and bead are free of the flank, in blurs. Derived: beyond
+/// 4 blurs 3·10⁻⁵ of a step is left, 1 − Φ(4).
 const FLANK_BLURS: f64 = 4.0;
 /// Bead beside the flank whose mean is its level \[px\].
 const LEVEL_PX: usize = 24;
-/// Columns of the ground that tell its pattern, and their distance \[px\].
+/// Fewest columns of the ground that show its pattern: the median of fewer is uncertain.
 const MIN_COLUMNS: usize = 6;
+/// Distance of these columns \[px\]: neighbours of a pattern are alike.
 const COLUMN_PX: usize = 2;
 
-/// An edge along a course; keeps its memory from frame to frame.
+/// An edge along a course; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct MeanEdge {
     course: ParabolicCourse,
     half: usize,
-    lines: Vec<Option<CaliperEdge>>,
+    /// Positions in the last frame, one a caliper line.
+    pub lines: Vec<Option<CaliperEdge>>,
     columns: Vec<ColumnSums>,
     spreads: Vec<f32>,
 }
@@ -74,7 +77,7 @@ pub struct MeanFit {
     /// What the ground makes of the edge's position, and the bead.
     pub samples: [ShiftSamples; 2],
     /// Step from the ground to the bead \[grey levels\]: the smaller of that in the window
-    /// and that of all places that are looked at.
+    /// and that of all positions that are looked at.
     pub contrast: f64,
     /// Level of the bead beside the edge \[grey levels\], dark beads inverted.
     pub bead_grey: f64,
@@ -90,29 +93,20 @@ impl MeanFit {
             contrast: self.contrast,
             blur_px,
             bead_grey: self.bead_grey,
-            is_groove: false,
-            is_narrow_groove: false,
             is_on_ground: true,
-            odd_fraction: 0.0,
-            odd_fraction_within: 0.0,
-            along_px: 0.0,
             lines_fraction: 1.0,
+            ..RoughFit::default()
         }
     }
 }
 
 impl MeanEdge {
-    /// Positions of the last frame, one a caliper line.
-    pub fn lines(&self) -> &[Option<CaliperEdge>] {
-        &self.lines
-    }
-
     /// Standard deviation of the ground's pattern along a line, with the noise of the
     /// pixels \[grey levels\]: the median of its columns'. `None` where too little
     /// ground lies within the gauge.
     pub fn pattern<T: GreyPixel>(
         &mut self,
-        scene: &MeanEdgeInput<'_, T>,
+        scene: &MeanInput<'_, T>,
         line: &StepLine,
     ) -> Option<f64> {
         self.start_from(scene, line);
@@ -130,7 +124,7 @@ impl MeanEdge {
         let every = if rows > MAX_SINGLE_ROWS { 2 } else { 1 };
         let seen = rows.div_ceil(every);
         for (number, row) in (0..rows).step_by(every).enumerate() {
-            let place = to_f64(number) - 0.5 * to_f64(seen - 1);
+            let position = to_f64(number) - 0.5 * to_f64(seen - 1);
             let at =
                 self.course.at(scene.normalised_position(row)) - scene.inwards() * to_f64(HALF_PX);
             let nearest = round_to_count(narrow_to_f32(at)).min(last);
@@ -141,17 +135,17 @@ impl MeanEdge {
                 } else {
                     (nearest + off).min(last)
                 };
-                column.add(place, f64::from(T::sum_to_f32(pixels[at].add_to(T::Sum::default()))));
+                column
+                    .add(position, f64::from(T::sum_to_f32(pixels[at].add_to(T::Sum::default()))));
             }
         }
-        self.spreads.clear();
-        self.spreads
-            .extend(self.columns.iter().map(|of| narrow_to_f32(of.variance_about_line(seen))));
+        let variances = self.columns.iter().map(|of| narrow_to_f32(of.variance_about_line(seen)));
+        refill(&mut self.spreads, variances);
         let variance = rank::median(&mut self.spreads)?;
         Some(f64::from(scene.strip.scale * variance.sqrt()))
     }
 
-    fn start_from<T: GreyPixel>(&mut self, scene: &MeanEdgeInput<'_, T>, line: &StepLine) {
+    fn start_from<T: GreyPixel>(&mut self, scene: &MeanInput<'_, T>, line: &StepLine) {
         let half = 0.5 * to_f64(scene.strip.along);
         self.course =
             ParabolicCourse { at: line.at.into(), tilt: half * f64::from(line.slope), bend: 0.0 };
@@ -162,7 +156,7 @@ impl MeanEdge {
     /// [`BLURS_PX`] leaves of its profile; infinite where there is no edge.
     pub fn fit_blurs<T: GreyPixel>(
         &mut self,
-        scene: &MeanEdgeInput<'_, T>,
+        scene: &MeanInput<'_, T>,
         line: &StepLine,
         table: &StepTable,
     ) -> [f64; BLURS_PX.len()] {
@@ -171,7 +165,7 @@ impl MeanEdge {
         let usual = weights.iter().flatten().take(USUAL_BLUR + 1).last();
         let is_found =
             usual.is_some_and(|usual| self.descend(scene, usual, ROUGHLY_CONVERGED).is_some());
-        // What other blurs change is the place within the profile, and hardly its direction.
+        // What other blurs change is the position within the profile, and hardly its direction.
         let reach = self.half + BLUR_SHIFT_PX;
         let [profile, ..] = self.means(scene, -to_f64(reach), 2 * reach + 1);
         weights.map(|weights| {
@@ -183,7 +177,7 @@ impl MeanEdge {
     /// Locates the edge that was approached, with a blur; `None` where there is none.
     pub fn locate<T: GreyPixel>(
         &mut self,
-        scene: &MeanEdgeInput<'_, T>,
+        scene: &MeanInput<'_, T>,
         table: &StepTable,
         blur_px: f64,
     ) -> Option<MeanFit> {
@@ -216,7 +210,7 @@ impl MeanEdge {
     /// Moves the course until the mean profile about it shows the edge in its middle.
     fn descend<T: GreyPixel>(
         &mut self,
-        scene: &MeanEdgeInput<'_, T>,
+        scene: &MeanInput<'_, T>,
         weights: &EdgeWeights,
         goal: StopCriterion,
     ) -> Option<DescentResult> {
@@ -245,29 +239,24 @@ impl MeanEdge {
 
     /// Mean over the rows of so many pixels at distances from the course, from one inwards
     /// on, and how it changes with the course's tilt and bend.
-    fn means<T: GreyPixel>(
-        &self,
-        scene: &MeanEdgeInput<'_, T>,
-        first: f64,
-        pixels: usize,
-    ) -> Profiles {
+    fn means<T: GreyPixel>(&self, scene: &MeanInput<'_, T>, first: f64, count: usize) -> Profiles {
         // The lowest position of the profile, which inwards of a right edge is its last.
-        let reach = if scene.bead_after { 0.0 } else { to_f64(pixels.saturating_sub(1)) };
+        let reach = if scene.bead_after { 0.0 } else { to_f64(count.saturating_sub(1)) };
         let lowest = scene.inwards() * first - reach;
-        let mut sums: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; pixels]);
+        let mut sums: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; count]);
         let mut squares = [0.0; 3];
-        let mut greys = vec![0.0; pixels + 1];
+        let mut greys = vec![0.0; count + 1];
         vectors::widest(
             #[inline(always)]
             || {
                 for row in 0..scene.strip.along {
-                    let place = scene.normalised_position(row);
-                    let shares = [1.0, place, bend_at(place)];
-                    for (square, share) in squares.iter_mut().zip(shares) {
-                        *square += share * share;
+                    let position = scene.normalised_position(row);
+                    let fractions = [1.0, position, bend_at(position)];
+                    for (square, fraction) in squares.iter_mut().zip(fractions) {
+                        *square += fraction * fraction;
                     }
-                    let between = scene.fetch(row, self.course.at(place) + lowest, &mut greys);
-                    add_row(&mut sums, &greys, between, shares.map(narrow_to_f32));
+                    let between = scene.fetch(row, self.course.at(position) + lowest, &mut greys);
+                    add_row(&mut sums, &greys, between, fractions.map(narrow_to_f32));
                 }
             },
         );
@@ -285,12 +274,8 @@ impl MeanEdge {
     }
 
     /// The same of ground and bead, free of the flank, as far as they lie in the gauge.
-    fn side_profiles<T: GreyPixel>(
-        &self,
-        scene: &MeanEdgeInput<'_, T>,
-        free: usize,
-    ) -> SideProfiles {
-        let ends = [-1.0, 0.0, 1.0].map(|place| self.course.at(place));
+    fn side_profiles<T: GreyPixel>(&self, scene: &MeanInput<'_, T>, free: usize) -> SideProfiles {
+        let ends = [-1.0, 0.0, 1.0].map(|position| self.course.at(position));
         let nearest = ends.into_iter().fold(f64::INFINITY, f64::min);
         let farthest = ends.into_iter().fold(f64::NEG_INFINITY, f64::max);
         let room = if scene.bead_after { nearest } else { scene.last() - farthest };
@@ -306,7 +291,7 @@ impl MeanEdge {
     /// Positions of the caliper lines, less what all are shifted inwards by.
     fn locate_lines<T: GreyPixel>(
         &mut self,
-        scene: &MeanEdgeInput<'_, T>,
+        scene: &MeanInput<'_, T>,
         weights: &EdgeWeights,
         found: &DescentResult,
         contrast: f64,
@@ -317,9 +302,9 @@ impl MeanEdge {
         let mut greys = [0.0; WINDOW + 1];
         let greys = &mut greys[..=weights.pixels];
         // In the order of the pixels of a row.
-        let mut place = weights.position;
+        let mut position = weights.position;
         if !scene.bead_after {
-            place[..weights.pixels].reverse();
+            position[..weights.pixels].reverse();
         }
         let per_grey = scene.sign() * f64::from(scene.strip.scale) / found.step;
         for &RowRange { first: from, end: to } in scene.lines {
@@ -328,7 +313,7 @@ impl MeanEdge {
                 let at = self.course.at(scene.normalised_position(row));
                 middle += at / to_f64(to - from);
                 let between = scene.fetch(row, at - to_f64(self.half), greys);
-                for (weight, pixels) in place.iter().zip(greys.windows(2)) {
+                for (weight, pixels) in position.iter().zip(greys.windows(2)) {
                     aside += weight * f64::from(pixels[0] + between * (pixels[1] - pixels[0]));
                 }
             }
@@ -354,16 +339,16 @@ struct SideProfiles {
     bead: Profiles,
 }
 
-/// Adds the values between the pixels of a row to sums, with the row's shares of them.
+/// Adds the values between the pixels of a row to sums, with the row's fractions of them.
 #[inline(always)]
-fn add_row(sums: &mut [Vec<f32>; 3], pixels: &[f32], between: f32, shares: [f32; 3]) {
+fn add_row(sums: &mut [Vec<f32>; 3], pixels: &[f32], between: f32, fractions: [f32; 3]) {
     let [mean, tilt, bend] = sums;
     let pairs = pixels.iter().zip(&pixels[1..]);
     for (((mean, tilt), bend), (one, other)) in mean.iter_mut().zip(tilt).zip(bend).zip(pairs) {
         let grey = one + between * (other - one);
-        *mean += shares[0] * grey;
-        *tilt += shares[1] * grey;
-        *bend += shares[2] * grey;
+        *mean += fractions[0] * grey;
+        *tilt += fractions[1] * grey;
+        *bend += fractions[2] * grey;
     }
 }
 

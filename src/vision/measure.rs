@@ -1,5 +1,4 @@
-//! One frame after the other: bands, candidates, contours, sub-pixel edges,
-//! width.
+//! Measurement of one frame: bands, candidates, contours, sub-pixel edges, width.
 
 mod checks;
 mod compressed;
@@ -21,28 +20,30 @@ use crate::core::geometry::ImagePoint;
 use checks::{MAX_BLUR_PX, MAX_MOTION_BLUR_PX};
 use pattern_limits::MAX_PATTERN_BESIDE_COMPLETE;
 use rough_edges::may_be_rough;
-use work::{EdgeModel, MeasureState};
+use work::{EdgeModel, GaugeFrame, MeasureState, Outcome};
 
 use super::axis;
 use super::edge_lines;
-use super::gauge::{Gauge, MeasureMethod, WidthRangePx};
+use super::gauge::{Gauge, GaugeView, MeasureMethod};
 use super::pixel_noise::PixelNoise;
 use super::pool;
 use super::reject::Reject;
 use super::roughness::{CaliperFilter, LocalWidths};
-use super::strip::{GaugeRows, GaugeRowsOfDepth, GaugeView, GreyPixel, RowLayout};
+use super::strip::{GaugeRows, GaugeRowsOfDepth, GreyPixel, RowLayout};
 use super::trace::EdgeTracer;
 use super::vectors;
 use super::width::{Caliper, CaliperPoint, Edges, Hints, WidthMeasurement};
 use crate::numeric::number::to_f64;
 
-/// Standard deviation of a width of [`NARROWEST_BLURS`] blurs from the flanks' overlap, in
-/// blurs, and the blurs by which a width must be larger for 1/e of it.
+/// Standard deviation of a width of 4 blurs from the flanks' overlap, in blurs. Measured:
+/// ACCURACY.md, Drawn frames: 2,000 beads of 5 to 600 px (`narrow`) with a blur of 1.5 px.
 const OVERLAP_SIGMA: f64 = 0.045;
+/// The width for which that is \[blurs\]. By definition.
 const OVERLAP_REFERENCE_BLURS: f64 = 4.0;
+/// Blurs by which a width must be larger for 1/e of it. Measured: as [`OVERLAP_SIGMA`].
 const OVERLAP_DECAY_BLURS: f64 = 3.0;
 
-/// Measures frames of one cell; keeps its memory from frame to frame.
+/// Measures frames of one cell; keeps its buffers from frame to frame.
 #[derive(Debug, Clone)]
 pub struct Measurer {
     gauge: Gauge,
@@ -58,18 +59,18 @@ impl Measurer {
         Self { gauge, white, turner: RowLayout::new(gauge.gamma), work: MeasureState::new(gauge) }
     }
 
-    /// The edges behind the last width, for pictures of them.
+    /// The edges behind the last width, for images of them.
     pub fn edges(&self) -> Edges<'_> {
         Edges { left: &self.work.left_px, right: &self.work.right_px }
     }
 
-    /// The same line by line, with how sure each place is. A refused frame has
+    /// The same line by line, with how sure each position is. A refused frame has
     /// the edges that were found before it was refused.
     pub fn calipers(&self) -> impl Iterator<Item = Caliper> {
         let Edges { left, right } = self.edges();
         let (mut left, mut right) = (left.iter().copied(), right.iter().copied());
         let lines = match self.gauge.method {
-            MeasureMethod::Caliper => self.work.lines.len(),
+            MeasureMethod::Caliper => self.work.rows.lines.len(),
             MeasureMethod::EdgeLines => left.len(),
         };
         (0..lines).filter_map(move |number| {
@@ -87,25 +88,20 @@ impl Measurer {
         measured: &WidthMeasurement,
         surface: &SurfaceMap,
     ) -> Option<LocalWidths> {
-        let lines = self.work.lines.len();
+        let lines = self.work.rows.lines.len();
         let along = GaugeView::new(self.gauge.roi, self.gauge.axis).along;
+        let [left, right] = [&self.work.left, &self.work.right].map(|edge| edge.uncertainty);
         let filter = CaliperFilter {
-            filter_px: self
-                .work
-                .left
-                .uncertainty
-                .along_px
-                .max(self.work.right.uncertainty.along_px),
+            filter_px: left.along_px.max(right.along_px),
             blur_px: measured.hints.blur_px,
-            noise_fractions: [&self.work.left, &self.work.right]
-                .map(|edge| edge.uncertainty.lines_fraction),
+            noise_fractions: [left.lines_fraction, right.lines_fraction],
             line_px: to_f64(along) / to_f64(lines.max(1)),
         };
         LocalWidths::read(self.calipers(), lines, filter, surface)
     }
 
     /// Adds to the hints of the width that was measured last how skewed its flanks are: not
-    /// needed for a width, and told well only by many frames.
+    /// needed for a width, and determined well only by many frames.
     #[must_use]
     pub fn with_skew(&self, found: WidthMeasurement) -> WidthMeasurement {
         WidthMeasurement { hints: Hints { skew: self.work.skew(), ..found.hints }, ..found }
@@ -121,7 +117,7 @@ impl Measurer {
         if self.gauge.method == MeasureMethod::EdgeLines {
             return Some(CaliperPoint { at: points.next()?, sigma_px: None });
         }
-        let located = tracer.edges().get(number).copied().flatten()?;
+        let located = tracer.edges.get(number).copied().flatten()?;
         Some(CaliperPoint { at: points.next()?, sigma_px: Some(located.variance.sqrt()) })
     }
 
@@ -138,12 +134,8 @@ impl Measurer {
         Ok(found)
     }
 
-    /// The same with no more in sigma than the picture itself leaves open.
-    fn measure_image(
-        &mut self,
-        frame: &Frame,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+    /// The same with no more in sigma than the image itself leaves open.
+    fn measure_image(&mut self, frame: &Frame, surface: &SurfaceMap) -> Outcome {
         let work = &mut self.work;
         work.left_px.clear();
         work.right_px.clear();
@@ -167,7 +159,7 @@ impl Measurer {
     }
 }
 
-/// What the other edge's flank adds to the variance of an edge's place \[px²\], for both at
+/// What the other edge's flank adds to the variance of an edge's position \[px²\], for both at
 /// so many pixels from each other and so blurred. Measured on 2,000 drawn beads of 5 to
 /// 600 px with a blur of 1.5 px.
 fn overlap_variance(width_px: f64, blur_px: f64) -> f64 {
@@ -192,49 +184,46 @@ impl MeasureState {
         strip: &GaugeRows<'_, T>,
         view: &GaugeView,
         surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+    ) -> Outcome {
         let range = self.search_range(view, surface)?;
-        self.noise = PixelNoise::read(strip, 0..strip.across);
-        self.bands.pool(strip, self.gauge.calipers);
-        pool::cut_into_ranges(strip.along, self.gauge.calipers, &mut self.lines);
+        let frame = &GaugeFrame { strip, view, surface, range };
+        self.rows.noise = PixelNoise::read(strip, 0..strip.across);
+        self.rows.bands.pool(strip, self.gauge.calipers);
+        pool::cut_into_ranges(strip.along, self.gauge.calipers, &mut self.rows.lines);
         self.find_candidates();
         if self.is_busy()
-            && let Some(textured) = self.measure_busy(strip, range, view, surface)
+            && let Some(textured) = self.measure_busy(frame)
         {
             return textured;
         }
-        match self.measure_steps(strip, range, view, surface) {
-            Ok(found) => self.refine_measurement(found, strip, range, view, surface),
-            Err(reject) if may_be_rough(&reject) => self
-                .measure_rough(&reject, strip, range, view, surface)
-                .map_err(|rough| rough.or(reject)),
+        match self.measure_steps(frame) {
+            Ok(found) => self.refine_measurement(found, frame),
+            Err(reject) if may_be_rough(&reject) => {
+                self.measure_rough(&reject, frame).map_err(|rough| rough.or(reject))
+            }
             Err(reject) => Err(reject),
         }
     }
 
-    /// Measures edges that were measured as blurred steps in another way, where that tells
+    /// Measures edges that were measured as blurred steps in another way, where that shows
     /// more; otherwise gives what was found.
     fn refine_measurement<T: GreyPixel>(
         &mut self,
         found: WidthMeasurement,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+        frame: &GaugeFrame<'_, T>,
+    ) -> Outcome {
         let knows_texture = self.left.is_textured() && self.right.is_textured();
-        let is_bearable =
-            self.pattern_ratio > 0.0 && self.pattern_ratio < MAX_PATTERN_BESIDE_COMPLETE;
-        let is_on_texture = knows_texture && is_bearable;
-        if !is_on_texture && let Some(textured) = self.measure_textured(strip, range, view, surface)
-        {
+        let is_weak =
+            self.both.pattern_ratio > 0.0 && self.both.pattern_ratio < MAX_PATTERN_BESIDE_COMPLETE;
+        let is_on_texture = knows_texture && is_weak;
+        if !is_on_texture && let Some(textured) = self.measure_texture(frame) {
             return textured;
         }
         let found = if self.may_not_be_steps()
-            && let Ok(fits) = self.find_rough(strip, range)
+            && let Ok(fits) = self.find_rough(frame)
         {
             if self.explains_more(&fits, &found) {
-                return self.width_of_rough(&fits, strip, view, surface);
+                return self.width_of_rough(&fits, frame);
             }
             self.check_flanks(&fits)?;
             self.with_row_uncertainty(&fits, found)
@@ -247,45 +236,34 @@ impl MeasureState {
 
     /// Measures edges that are blurred steps.
     #[inline(always)]
-    fn measure_steps<T: GreyPixel>(
-        &mut self,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+    fn measure_steps<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Outcome {
         self.find_contours();
-        let pair = self.find_pair(range)?;
-        self.trace(strip, pair)?;
+        let pair = self.find_pair(frame.range)?;
+        self.trace(frame.strip, pair)?;
         self.reject_outliers(pair.bright)?;
         self.check_contrast()?;
-        let is_motion = self.blur_shapes.is_motion() && self.edge_model != EdgeModel::LineByLine;
+        let is_motion = self.both.blur_shape > 0 && self.both.model != EdgeModel::LineByLine;
         self.check_blur(if is_motion { MAX_MOTION_BLUR_PX } else { MAX_BLUR_PX })?;
-        self.check_ground(strip, f64::max)?;
-        self.check_boundary(strip.across)?;
-        self.width_on_surface(view, surface)
+        self.check_ground(frame.strip, f64::max)?;
+        self.check_boundary(frame.strip.across)?;
+        self.width_on_surface(frame.view, frame.surface)
     }
 
-    fn width_on_surface(
-        &mut self,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+    fn width_on_surface(&mut self, view: &GaugeView, surface: &SurfaceMap) -> Outcome {
         let hints = Hints {
-            contrast_grey: f64::midpoint(self.contrasts[0], self.contrasts[1]),
+            contrast_grey: f64::midpoint(self.both.contrasts[0], self.both.contrasts[1]),
             blur_px: f64::midpoint(self.left.blur_px, self.right.blur_px),
-            noise_grey: self.noise.grey.into(),
-            saturated_fraction: self.bands.saturated_fraction(),
+            noise_grey: self.rows.noise.grey.into(),
+            saturated_fraction: self.rows.bands.saturated_fraction(),
             used_fraction: f64::midpoint(self.left.used_fraction(), self.right.used_fraction()),
             skew: None,
         };
-        self.middles.clear();
-        self.middles.extend(self.lines.iter().map(|&line| line.middle()));
-        for (tracer, points) in [(&self.left, &mut self.left_px), (&self.right, &mut self.right_px)]
-        {
-            let places = tracer.edges().iter().zip(&self.middles);
-            points
-                .extend(places.filter_map(|(edge, &v)| Some(view.to_image(edge.as_ref()?.at, v))));
+        self.rows.middles.clear();
+        self.rows.middles.extend(self.rows.lines.iter().map(|&line| line.middle()));
+        let middles = self.rows.middles.as_slice();
+        for (tracer, out) in [(&self.left, &mut self.left_px), (&self.right, &mut self.right_px)] {
+            let edges = tracer.edges.iter().zip(middles);
+            out.extend(edges.filter_map(|(edge, &v)| Some(view.to_image(edge.as_ref()?.at, v))));
         }
         let width_px = self.right.middle() - self.left.middle();
         let skew_variance = self.skew_variance();
@@ -296,7 +274,7 @@ impl MeasureState {
                 tracer.uncertainty.mean_variance.map(|known| known.max(of_compression));
             let of_steps = if mean_variance.is_none() { of_compression } else { 0.0 };
             axis::LocatedEdge {
-                positions: tracer.edges(),
+                positions: &tracer.edges,
                 common_variance: tracer.uncertainty.common_variance
                     + tracer.uncertainty.ground_variance
                     + 0.5 * skew_variance
@@ -306,9 +284,9 @@ impl MeasureState {
                 mean_variance,
             }
         });
-        let (gauge, middles) = (&self.gauge, self.middles.as_slice());
+        let gauge = &self.gauge;
         let scene = axis::WidthInput { view, surface, gauge, middles, sides };
-        let found = axis::width(&scene, hints, &mut self.axis)?;
+        let found = axis::width(&scene, hints, &mut self.scratch.axis)?;
         self.check_occlusion(&found)?;
         Ok(found)
     }

@@ -1,18 +1,17 @@
-//! A bead of whose edges so much is covered that one alone does not tell which
-//! of its rows are clear.
+//! A bead whose edges are occluded so far that one edge alone does not show which of its rows are
+//! clear.
 
 use super::blur_estimate::BlurEstimate;
 use super::edge::{StepCandidate, StepCandidates};
 use super::parallel::ParallelEdges;
 use super::strip::GreyPixel;
 use super::trace::{EdgeTracer, TraceInput};
-use crate::numeric::blurred_step::StepTable;
 
 /// By how much the distance of two steps may differ from that of the rough
 /// edges \[px\].
 const WIDTH_TOLERANCE_PX: f32 = 40.0;
 
-/// Least distance of two steps, as a share of that of the rough edges.
+/// Smallest distance of two steps, as a fraction of that of the rough edges.
 const MIN_WIDTH_RATIO: f32 = 0.3;
 
 /// A bead that was looked at.
@@ -33,7 +32,6 @@ impl<T: GreyPixel> OccludedBead<'_, T> {
     pub fn locate_from_clear_rows(
         &self,
         [left, right]: [&mut EdgeTracer; 2],
-        table: &StepTable,
         blur: BlurEstimate,
         parallel: &mut ParallelEdges,
     ) {
@@ -48,10 +46,10 @@ impl<T: GreyPixel> OccludedBead<'_, T> {
             return;
         }
         if left.is_lost() {
-            left.locate_occluded_along(table, left_scene, blur, parallel.lefts());
+            left.locate_occluded_along(left_scene, blur, &parallel.lefts);
         }
         if right.is_lost() {
-            right.locate_occluded_along(table, right_scene, blur, parallel.rights());
+            right.locate_occluded_along(right_scene, blur, &parallel.rights);
         }
     }
 

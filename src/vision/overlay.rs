@@ -1,15 +1,17 @@
-//! The profile of an edge, from rows all along it laid over each other: its
-//! blur, how far its surroundings on either side are plain, and how they are
-//! shaded. Rows that differ from most, because a grain or a spark lies on
-//! them, are left out.
+//! The mean profile of an edge, from superimposed rows all along it: its blur, how far the
+//! surroundings on either side are plain, and their shading. Rows that differ from most, because a
+//! grain or a spark lies on them, are left out.
 
+use crate::vision::buffer::{refill, reset};
 use std::ops::Range;
 
 use super::edge_windows::EdgeWindows;
 use super::phase::split;
+use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f32, to_f64};
 use crate::numeric::rank;
 
 mod curved;
+mod fitter;
 mod flank;
 mod flank_skew;
 mod groove_check;
@@ -20,39 +22,43 @@ mod slopes;
 mod step;
 mod step_fit;
 
+pub use fitter::StepFitter;
 pub use flank_skew::EdgeSkew;
 pub use look::{SideRange, StepFit};
 pub use shape::{SideShading, StepShape};
-pub use step::{BlurredStep, Extent};
+#[cfg(test)]
+pub use step::NeighbourSteps;
+pub use step::{BlurredStep, Clearance};
 
-/// Rows that are laid over each other at most.
+/// Rows that are superimposed at most.
 const MAX_ROWS: usize = 100;
 /// Farthest sample from the edge on either side \[px\].
 pub const HALF_SPAN: usize = 48;
 const SPAN: usize = 2 * HALF_SPAN;
-/// Rows are laid down at the nearest of so many places between pixels.
+/// Rows are placed at the nearest of so many positions between pixels.
 const PHASES: usize = 2;
-/// Samples this near the edge tell whether a row is like the others \[px\].
+/// Samples this near the edge show whether a row is like the others \[px\].
 const CORE_HALF: usize = 12;
 const JUDGED_SAMPLES: Range<usize> = HALF_SPAN - CORE_HALF..HALF_SPAN + CORE_HALF;
 /// A row that differs from the mean by so many times what rows do in the
 /// median is left out; the second time, when the mean is a better one.
 const MAX_ROW_MISFIT: [f32; 2] = [2.0, 1.7];
-/// Share of the rows that are most alike, from which a mean is made where many
-/// may be covered, and how often anew.
+/// Fraction of the rows that are most alike, from which a mean is made where many may be occluded.
 const BEST_FRACTION: f32 = 0.3;
+/// How often that mean is made anew: more cost time, fewer leave occluded rows in it.
 const MAX_SETTLE_ROUNDS: usize = 5;
-/// What makes a row that is cut off at the end of the scale unlike the others, in
+/// What makes a row that is clipped at the end of the scale unlike the others, in
 /// such medians.
 const MAX_CLIPPED_MISFIT: f32 = 3.5;
-/// Blur that the place's rounding to half a pixel adds \[px²\].
+/// Variance that rounding to phases adds to the blur \[px²\]. Derived: (1/PHASES)²/12, the variance
+/// of a uniform error of half a pixel.
 const ROUNDING_VARIANCE_PX2: f64 = 1.0 / 48.0;
 
-/// How a window was laid down: at which phase, how far the path lies ahead of
+/// How a window was placed: at which phase, how far the path lies ahead of
 /// its pixel \[px\], of how many rows it is, and the level before the edge and
 /// the step that were expected \[grey levels\].
 #[derive(Debug, Clone, Copy)]
-struct LaidRow {
+struct PlacedRow {
     number: usize,
     phase: usize,
     ahead: f32,
@@ -61,22 +67,19 @@ struct LaidRow {
     step: f32,
 }
 
-/// Lays rows over each other; keeps its memory from frame to frame.
+/// Superimposes rows; keeps its buffers from frame to frame.
 #[derive(Debug, Clone)]
 pub struct Overlay {
     rows: Vec<[f32; SPAN]>,
-    laid: Vec<LaidRow>,
+    placed: Vec<PlacedRow>,
     row_misfits: Vec<f32>,
     sorted: Vec<f32>,
-    mean: [[f32; SPAN]; PHASES],
-    counts: [f32; PHASES],
-    /// Mean distance of the path from the pixels' places in each phase \[px\].
-    shifts: [f32; PHASES],
+    phases: [PhaseMean; PHASES],
     /// How unlike the mean a row is in the median.
     median_misfit: f32,
 }
 
-/// Mean of rows of one part along the bead, all at nearly the same place
+/// Mean of rows of one part along the bead, all at nearly the same position
 /// between pixels.
 #[derive(Debug, Clone)]
 pub struct MeanProfilePart {
@@ -97,8 +100,8 @@ impl MeanProfilePart {
     const EMPTY: Self =
         Self { mean: [0.0; SPAN], rows: 0.0, shift: 0.0, spread: 0.0, levels: [0.0; 2] };
 
-    fn add(&mut self, row: &[f32; SPAN], laid: &LaidRow) {
-        let LaidRow { ahead, rows, before, step, .. } = *laid;
+    fn add(&mut self, row: &[f32; SPAN], placed: &PlacedRow) {
+        let PlacedRow { ahead, rows, before, step, .. } = *placed;
         for (sum, sample) in self.mean.iter_mut().zip(row) {
             *sum += rows * (before + step * sample);
         }
@@ -112,12 +115,11 @@ impl MeanProfilePart {
 
     /// Sums become means.
     fn finish(&mut self) {
-        let share = 1.0 / self.rows;
-        #[expect(clippy::cast_possible_truncation, reason = "a share")]
-        self.mean.iter_mut().for_each(|value| *value *= share as f32);
-        self.shift *= share;
-        self.spread = (share * self.spread - self.shift * self.shift).max(0.0);
-        self.levels = self.levels.map(|level| share * level);
+        let fraction = 1.0 / self.rows;
+        self.mean.iter_mut().for_each(|value| *value *= narrow_to_f32(fraction));
+        self.shift *= fraction;
+        self.spread = (fraction * self.spread - self.shift * self.shift).max(0.0);
+        self.levels = self.levels.map(|level| fraction * level);
     }
 
     /// Each sample's distance from the path and its value, from a distance to
@@ -131,19 +133,17 @@ impl Default for Overlay {
     fn default() -> Self {
         Self {
             rows: Vec::new(),
-            laid: Vec::new(),
+            placed: Vec::new(),
             row_misfits: Vec::new(),
             sorted: Vec::new(),
-            mean: [[0.0; SPAN]; PHASES],
-            counts: [0.0; PHASES],
-            shifts: [0.0; PHASES],
+            phases: [PhaseMean::EMPTY; PHASES],
             median_misfit: f32::INFINITY,
         }
     }
 }
 
 impl Overlay {
-    /// Lays down windows where the edge is expected.
+    /// Places windows where the edge is expected.
     #[inline(always)]
     pub fn lay(&mut self, sheet: &EdgeWindows) {
         self.lay_down(sheet);
@@ -158,7 +158,7 @@ impl Overlay {
         self.average(last * self.median_misfit, 0..SPAN);
     }
 
-    /// Lays down windows of which many may be covered: starts from
+    /// Places windows of which many may be covered: starts from
     /// those that are said to be clear and goes on with those that are most
     /// like the mean, over and over.
     #[inline(always)]
@@ -170,22 +170,22 @@ impl Overlay {
         }
     }
 
-    /// Lays down the windows that are clear, and no others.
+    /// Places the windows that are clear, and no others.
     #[inline(always)]
     pub fn lay_clear(&mut self, sheet: &EdgeWindows, clear: impl Fn(usize) -> bool) {
         self.lay_down(sheet);
-        for (laid, unlike) in self.laid.iter().zip(&mut self.row_misfits) {
-            *unlike = if clear(laid.number) { 0.0 } else { f32::INFINITY };
+        for (placed, unlike) in self.placed.iter().zip(&mut self.row_misfits) {
+            *unlike = if clear(placed.number) { 0.0 } else { f32::INFINITY };
         }
         self.average(f32::MAX, 0..SPAN);
     }
 
     #[inline(always)]
     fn lay_down(&mut self, sheet: &EdgeWindows) {
-        let windows = sheet.windows();
+        let windows = &sheet.windows;
         let count = windows.len().min(MAX_ROWS);
         self.rows.clear();
-        self.laid.clear();
+        self.placed.clear();
         for k in 0..count {
             let number = (2 * k + 1) * windows.len() / (2 * count);
             let window = &windows[number];
@@ -196,7 +196,7 @@ impl Overlay {
                 sheet.pixels(number).get(start..start + SPAN)?.first_chunk::<SPAN>()
             });
             let Some(pixels) = pixels else { continue };
-            #[expect(clippy::cast_precision_loss, reason = "a place near the gauge")]
+            #[expect(clippy::cast_precision_loss, reason = "a position near the gauge")]
             let ahead = at - place as f32;
             let (scale, shift) = (1.0 / step, before / step);
             let mut row = [0.0; SPAN];
@@ -204,45 +204,44 @@ impl Overlay {
                 *sample = pixel * scale - shift;
             }
             self.rows.push(row);
-            self.laid.push(LaidRow { number, phase, ahead, rows: window.rows, before, step });
+            self.placed.push(PlacedRow { number, phase, ahead, rows: window.rows, before, step });
         }
-        self.row_misfits.clear();
-        self.row_misfits.resize(self.rows.len(), 0.0);
+        reset(&mut self.row_misfits, self.rows.len(), 0.0);
     }
 
     /// Means of the rows that are not unlike the others, in some columns.
     #[inline(always)]
     fn average(&mut self, limit: f32, columns: Range<usize>) {
-        self.mean = [[0.0; SPAN]; PHASES];
-        self.counts = [0.0; PHASES];
-        self.shifts = [0.0; PHASES];
-        for ((row, laid), &unlike) in self.rows.iter().zip(&self.laid).zip(&self.row_misfits) {
+        self.phases = [PhaseMean::EMPTY; PHASES];
+        for ((row, placed), &unlike) in self.rows.iter().zip(&self.placed).zip(&self.row_misfits) {
             if unlike > limit {
                 continue;
             }
-            let LaidRow { phase, ahead, rows, .. } = *laid;
-            self.counts[phase] += rows;
-            self.shifts[phase] += rows * ahead;
-            let sums = self.mean[phase][columns.clone()].iter_mut();
+            let PlacedRow { phase, ahead, rows, .. } = *placed;
+            let phase = &mut self.phases[phase];
+            phase.rows += rows;
+            phase.shift += rows * ahead;
+            let sums = phase.samples[columns.clone()].iter_mut();
             for (sum, sample) in sums.zip(&row[columns.clone()]) {
                 *sum += rows * sample;
             }
         }
-        for ((mean, shift), count) in self.mean.iter_mut().zip(&mut self.shifts).zip(self.counts) {
-            let share = 1.0 / f32::max(count, 1.0);
-            *shift *= share;
-            for value in mean {
-                *value *= share;
+        for PhaseMean { samples, shift, rows } in &mut self.phases {
+            let scale = 1.0 / f32::max(*rows, 1.0);
+            *shift *= scale;
+            for value in samples {
+                *value *= scale;
             }
         }
     }
 
     /// How far each row lies from the mean about the edge; returns how far a
-    /// share of them does at most.
+    /// fraction of them does at most.
     #[inline(always)]
-    fn compute_row_misfits(&mut self, share: f32) -> f32 {
-        for ((row, laid), unlike) in self.rows.iter().zip(&self.laid).zip(&mut self.row_misfits) {
-            let mean = &self.mean[laid.phase];
+    fn compute_row_misfits(&mut self, fraction: f32) -> f32 {
+        for ((row, placed), unlike) in self.rows.iter().zip(&self.placed).zip(&mut self.row_misfits)
+        {
+            let mean = &self.phases[placed.phase].samples;
             let mut lanes = [0.0f32; 8];
             for (a, b) in
                 row[JUDGED_SAMPLES].chunks_exact(8).zip(mean[JUDGED_SAMPLES].chunks_exact(8))
@@ -254,9 +253,8 @@ impl Overlay {
             }
             *unlike = lanes.iter().sum();
         }
-        self.sorted.clear();
-        self.sorted.extend_from_slice(&self.row_misfits);
-        let rank = rank_of(self.sorted.len(), share);
+        refill(&mut self.sorted, self.row_misfits.iter().copied());
+        let rank = rank_of(self.sorted.len(), fraction);
         rank::at(&mut self.sorted, rank).unwrap_or(f32::INFINITY)
     }
 
@@ -265,12 +263,11 @@ impl Overlay {
     /// off above, more lie far below their mean than above it, and leaving them
     /// out would lift it.
     pub fn profiles(&self, parts: usize, profiles: &mut Vec<MeanProfilePart>) {
-        profiles.clear();
-        profiles.resize(parts * PHASES, MeanProfilePart::EMPTY);
+        reset(profiles, parts * PHASES, MeanProfilePart::EMPTY);
         let count = self.rows.len();
-        for (k, (row, laid)) in self.rows.iter().zip(&self.laid).enumerate() {
+        for (k, (row, placed)) in self.rows.iter().zip(&self.placed).enumerate() {
             if self.row_misfits[k] <= MAX_CLIPPED_MISFIT * self.median_misfit {
-                profiles[k * parts / count * PHASES + laid.phase].add(row, laid);
+                profiles[k * parts / count * PHASES + placed.phase].add(row, placed);
             }
         }
         profiles.retain(|profile| profile.rows > 0.0);
@@ -281,59 +278,54 @@ impl Overlay {
 
     /// Rows that the means are of.
     pub fn used(&self) -> f64 {
-        f64::from(self.counts.iter().sum::<f32>())
+        f64::from(self.phases.iter().map(|phase| phase.rows).sum::<f32>())
     }
 
-    /// Rows that were laid down, and windows.
-    pub fn laid(&self) -> (f64, f64) {
-        #[expect(clippy::cast_precision_loss, reason = "there are few windows")]
-        let windows = self.rows.len() as f64;
-        (self.laid.iter().map(|laid| f64::from(laid.rows)).sum(), windows)
+    /// Rows that were placed, and windows.
+    pub fn placed(&self) -> (f64, f64) {
+        (self.placed.iter().map(|placed| f64::from(placed.rows)).sum(), to_f64(self.rows.len()))
     }
 
     /// Variance of a window's samples about the mean near the edge, of the window
-    /// in the median, in squared shares of the step.
+    /// in the median, as squared fractions of the step.
     pub fn row_variance(&self) -> f64 {
-        #[expect(clippy::cast_precision_loss, reason = "a small number")]
-        let samples = (2 * CORE_HALF) as f64;
-        f64::from(self.median_misfit) / samples
+        f64::from(self.median_misfit) / to_f64(2 * CORE_HALF)
     }
 
     /// The windows that differ by no more than so many medians of what rows do,
     /// each with the mean that it is compared with.
     pub fn typical_rows(&self, many: f32) -> impl Iterator<Item = (&[f32], &[f32])> {
-        let rows = self.rows.iter().zip(&self.laid).zip(&self.row_misfits);
-        rows.filter(move |(_, unlike)| **unlike <= many * self.median_misfit)
-            .map(|((row, laid), _)| (row.as_slice(), self.mean[laid.phase].as_slice()))
+        let rows = self.rows.iter().zip(&self.placed).zip(&self.row_misfits);
+        rows.filter(move |(_, unlike)| **unlike <= many * self.median_misfit).map(
+            |((row, placed), _)| (row.as_slice(), self.phases[placed.phase].samples.as_slice()),
+        )
     }
 
     /// The means of the phases that have rows.
     #[inline(always)]
-    fn means(&self) -> impl Iterator<Item = PhaseMean<'_>> {
-        let means = self.mean.iter().zip(self.shifts).zip(self.counts);
-        means.filter(|(_, count)| *count > 0.0).map(|((samples, shift), count)| PhaseMean {
-            samples,
-            shift: shift.into(),
-            weight: count.into(),
-        })
+    fn means(&self) -> impl Iterator<Item = &PhaseMean> {
+        self.phases.iter().filter(|phase| phase.rows > 0.0)
     }
 }
 
 /// Mean of the rows of a phase.
-struct PhaseMean<'a> {
-    samples: &'a [f32; SPAN],
+#[derive(Debug, Clone, Copy)]
+struct PhaseMean {
+    samples: [f32; SPAN],
     /// Mean distance of the path from the middle sample \[px\].
-    shift: f64,
+    shift: f32,
     /// Number of rows.
-    weight: f64,
+    rows: f32,
 }
 
-impl PhaseMean<'_> {
+impl PhaseMean {
+    const EMPTY: Self = Self { samples: [0.0; SPAN], shift: 0.0, rows: 0.0 };
+
     /// Each sample's distance from the path and its value, from a distance to
     /// another \[px\].
     #[inline(always)]
     fn samples(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
-        samples(self.samples, self.shift, (from, to))
+        samples(&self.samples, self.shift.into(), (from, to))
     }
 }
 
@@ -351,31 +343,18 @@ fn samples(
     samples.map(move |(k, value)| (place(k) - shift, f64::from(*value)))
 }
 
-/// Number of the value that a share of all do not exceed.
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a share of a small number"
-)]
-fn rank_of(count: usize, share: f32) -> usize {
-    ((share * count as f32) as usize).min(count.saturating_sub(1))
+/// Number of the value that a fraction of all do not exceed.
+fn rank_of(count: usize, fraction: f32) -> usize {
+    floor_to_count((fraction * to_f32(count)).into()).min(count.saturating_sub(1))
 }
 
-#[expect(clippy::cast_precision_loss, reason = "the window is short")]
 fn place(index: usize) -> f64 {
-    index as f64 - HALF_SPAN as f64
+    to_f64(index) - to_f64(HALF_SPAN)
 }
 
 /// Number of the sample at a whole distance, within the window.
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to the window"
-)]
 fn index(distance: f64) -> usize {
-    (distance + HALF_SPAN as f64).clamp(0.0, SPAN as f64) as usize
+    floor_to_count((distance + to_f64(HALF_SPAN)).clamp(0.0, to_f64(SPAN)))
 }
 
 #[cfg(test)]

@@ -5,25 +5,26 @@
 
 use super::contour::{EdgeContour, EdgeContours};
 use super::gauge::WidthRangePx;
+use crate::numeric::number::narrow_to_f32;
 use crate::numeric::rank;
 
-/// Depth of a gap between two edges, as a share of the weaker one, that shows them
+/// Depth of a gap between two edges, as a fraction of the weaker one, that shows them
 /// to belong to two beads: it is deeper than the bead is high over the ground.
 const MIN_GAP_RATIO: f32 = 1.1;
-/// The same up to which it is a seam within one bead. A seam of 60 % is no edge, and
-/// a little is left to noise.
+/// Depth of a gap up to which it is a seam within one bead. Measured: ACCURACY.md, Drawn frames:
+/// lines of up to 60 % of the contrast (`ribs-weak`) are no edges; a little is left to noise.
 pub const MAX_SEAM_RATIO: f32 = 0.64;
-/// Strength of a pair within another one, as a share of the other's, from which on it
+/// Strength of a pair within another one, as a fraction of the other's, from which on it
 /// fits as well: a rib of 81 % of the edges.
 pub const MIN_RIVAL_RATIO: f32 = 0.9;
-/// Share of the width by which two pairs differ at least, and how many pixels are enough.
+/// Fraction of the width by which two pairs differ at least, and how many pixels are enough.
 const SAME_WIDTH_FRACTION: f32 = 0.03;
 const SAME_WIDTH_PX: f32 = 5.0;
-/// Share of the bands in which a gap is seen, in that of the bead's edges.
+/// Fraction of the bands in which a gap is seen, in that of the bead's edges.
 const MIN_GAP_BAND_RATIO: f64 = 0.85;
 
 /// The two edges of the bead among the contours, by their numbers.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct EdgePair {
     /// Number of the left contour.
     pub left: usize,
@@ -31,7 +32,7 @@ pub struct EdgePair {
     pub right: usize,
     /// Geometric mean of the two steps \[grey levels\].
     pub step: f32,
-    /// Smaller of the shares of bands in which they are seen.
+    /// Smaller of the fractions of bands in which they are seen.
     pub band_fraction: f64,
     /// Step of the weaker edge, less where it is not seen all along \[grey levels\].
     pub strength: f32,
@@ -39,24 +40,34 @@ pub struct EdgePair {
     pub score: f32,
     /// Its width \[px\].
     pub width_px: f32,
-    /// Depth of the deepest gap between its edges, as a share of the weaker one.
+    /// Depth of the deepest gap between its edges, as a fraction of the weaker one.
     pub gap: f32,
     /// Width of another pair within this one that fits as well \[px\].
     pub rival_px: Option<f32>,
 }
 
+/// Contours of left and right edges.
+#[derive(Debug, Clone, Copy)]
+pub struct Sides<'a> {
+    /// Contours that may be left edges.
+    pub lefts: &'a EdgeContours,
+    /// Contours that may be right edges.
+    pub rights: &'a EdgeContours,
+}
+
+impl<'a> Sides<'a> {
+    /// The left and the right edge of a pair.
+    pub fn of(self, pair: &EdgePair) -> [&'a EdgeContour; 2] {
+        [&self.lefts.all()[pair.left], &self.rights.all()[pair.right]]
+    }
+}
+
 /// The best pair of contours, or none.
-pub fn find(
-    lefts: &EdgeContours,
-    rights: &EdgeContours,
-    range: WidthRangePx,
-    memory: &mut Vec<f32>,
-) -> Option<EdgePair> {
+pub fn find(sides: Sides<'_>, range: WidthRangePx, scratch: &mut Vec<f32>) -> Option<EdgePair> {
     let mut best: Option<EdgePair> = None;
-    each(lefts, rights, range, memory, |pair| {
+    each(sides, range, scratch, |pair| {
         if best.is_none_or(|best| best.score < pair.score) {
-            let sides = (&lefts.all()[pair.left], &rights.all()[pair.right]);
-            let gap = gap(lefts, rights, sides) / weaker(sides);
+            let gap = gap(sides, &pair) / weaker(sides.of(&pair));
             if gap < MIN_GAP_RATIO {
                 best = Some(EdgePair { gap, ..pair });
             }
@@ -64,17 +75,18 @@ pub fn find(
     });
     let best = best?;
     let mut rival: Option<EdgePair> = None;
-    each(lefts, rights, range, memory, |pair| {
+    each(sides, range, scratch, |pair| {
         let (inner, outer) =
             if pair.width_px < best.width_px { (pair, best) } else { (best, pair) };
         let fits = pair.strength >= MIN_RIVAL_RATIO * best.strength
             || outer == best && best.gap > MAX_SEAM_RATIO;
         let better = rival.is_none_or(|rival| rival.score < pair.score);
-        if fits && better && is_within(&inner, &outer, (lefts, rights)) {
-            let sides = (&lefts.all()[outer.left], &rights.all()[outer.right]);
-            if outer == best || gap(lefts, rights, sides) < MIN_GAP_RATIO * weaker(sides) {
-                rival = Some(pair);
-            }
+        if fits
+            && better
+            && is_within(sides, &inner, &outer)
+            && (outer == best || gap(sides, &outer) < MIN_GAP_RATIO * weaker(sides.of(&outer)))
+        {
+            rival = Some(pair);
         }
     });
     Some(EdgePair { rival_px: rival.map(|rival| rival.width_px), ..best })
@@ -86,93 +98,74 @@ pub fn is_narrower(inner_px: f32, outer_px: f32) -> bool {
 }
 
 /// Step of the weaker one of two edges \[grey levels\].
-fn weaker((left, right): (&EdgeContour, &EdgeContour)) -> f32 {
+fn weaker([left, right]: [&EdgeContour; 2]) -> f32 {
     left.step.min(right.step)
 }
 
 /// Whether a pair has one edge in common with another pair, and ends within it at a
 /// seam or a rib, which has two lines of its own.
-fn is_within(
-    inner: &EdgePair,
-    outer: &EdgePair,
-    (lefts, rights): (&EdgeContours, &EdgeContours),
-) -> bool {
-    let (left, right) = (&lefts.all()[outer.left], &rights.all()[outer.right]);
+fn is_within(sides: Sides<'_>, inner: &EdgePair, outer: &EdgePair) -> bool {
+    let ([left, right], [inner_left, inner_right]) = (sides.of(outer), sides.of(inner));
     let least = MAX_SEAM_RATIO * outer.step;
     let within =
         |line: &&EdgeContour| line.step >= least && in_order(left, line) && in_order(line, right);
     let narrower = is_narrower(inner.width_px, outer.width_px);
     let ends_within = inner.left == outer.left
-        && within(&&rights.all()[inner.right])
-        && lefts.all().iter().any(|line| within(&line));
+        && within(&inner_right)
+        && sides.lefts.all().iter().any(|line| within(&line));
     let begins_within = inner.right == outer.right
-        && within(&&lefts.all()[inner.left])
-        && rights.all().iter().any(|line| within(&line));
+        && within(&inner_left)
+        && sides.rights.all().iter().any(|line| within(&line));
     narrower && (ends_within || begins_within)
 }
 
 /// All pairs whose width is within the range.
 fn each(
-    lefts: &EdgeContours,
-    rights: &EdgeContours,
+    sides: Sides<'_>,
     range: WidthRangePx,
-    memory: &mut Vec<f32>,
+    scratch: &mut Vec<f32>,
     mut visit: impl FnMut(EdgePair),
 ) {
-    for (left, edge) in lefts.all().iter().enumerate() {
-        for (right, other) in rights.all().iter().enumerate() {
-            let Some(width_px) = distance(edge, other, memory) else { continue };
+    for (left, edge) in sides.lefts.all().iter().enumerate() {
+        for (right, other) in sides.rights.all().iter().enumerate() {
+            let Some(width_px) = distance(edge, other, scratch) else { continue };
             if width_px < range.min || width_px > range.max {
                 continue;
             }
             let step = (edge.step * other.step).sqrt();
-            let share = edge.band_fraction.min(other.band_fraction);
-            #[expect(clippy::cast_possible_truncation, reason = "a share")]
-            let shares = (edge.band_fraction * other.band_fraction) as f32;
-            let strength = edge.step.min(other.step) * shares;
+            let band_fraction = edge.band_fraction.min(other.band_fraction);
+            let strength =
+                edge.step.min(other.step) * narrow_to_f32(edge.band_fraction * other.band_fraction);
             let score = strength / ((1.0 + edge.waviness_px) * (1.0 + other.waviness_px)).sqrt();
-            let (gap, rival_px) = (0.0, None);
-            visit(EdgePair {
-                left,
-                right,
-                step,
-                band_fraction: share,
-                strength,
-                score,
-                width_px,
-                gap,
-                rival_px,
-            });
+            let pair = EdgePair { left, right, width_px, ..EdgePair::default() };
+            visit(EdgePair { step, band_fraction, strength, score, ..pair });
         }
     }
 }
 
 /// Median distance from one contour to another to its right \[px\]; `None`
 /// where they do not run side by side or cross.
-fn distance(left: &EdgeContour, right: &EdgeContour, memory: &mut Vec<f32>) -> Option<f32> {
-    memory.clear();
+fn distance(left: &EdgeContour, right: &EdgeContour, scratch: &mut Vec<f32>) -> Option<f32> {
+    scratch.clear();
     let both = left.at.iter().zip(&right.at);
-    memory.extend(both.filter_map(|(left, right)| Some((*right)? - (*left)?)));
-    if memory.len() * 5 < left.at.len() {
+    scratch.extend(both.filter_map(|(left, right)| Some((*right)? - (*left)?)));
+    if scratch.len() * 5 < left.at.len() {
         return None;
     }
-    rank::median(memory).filter(|&median| median > 0.0)
+    rank::median(scratch).filter(|&median| median > 0.0)
 }
 
 /// Depth of the deepest gap between two edges: a contour out of the bead,
 /// followed by one back in, both about as whole as the edges are.
-fn gap(
-    lefts: &EdgeContours,
-    rights: &EdgeContours,
-    (left, right): (&EdgeContour, &EdgeContour),
-) -> f32 {
+fn gap(sides: Sides<'_>, pair: &EdgePair) -> f32 {
+    let [left, right] = sides.of(pair);
     let whole = MIN_GAP_BAND_RATIO * left.band_fraction.min(right.band_fraction);
     let mut deepest: f32 = 0.0;
-    for out in rights.all().iter().filter(|out| out.band_fraction >= whole) {
+    for out in sides.rights.all().iter().filter(|out| out.band_fraction >= whole) {
         if !in_order(left, out) || !in_order(out, right) {
             continue;
         }
-        for back in lefts.all().iter().filter(|back| back.band_fraction >= whole) {
+        for back in sides.lefts.all().iter().filter(|back| back.band_fraction >= whole) {
             if in_order(out, back) && in_order(back, right) {
                 deepest = deepest.max(out.step.min(back.step));
             }
@@ -222,10 +215,18 @@ mod tests {
         (up, down)
     }
 
+    fn found(
+        bars: &(EdgeContours, EdgeContours),
+        range: WidthRangePx,
+        scratch: &mut Vec<f32>,
+    ) -> Option<EdgePair> {
+        find(Sides { lefts: &bars.0, rights: &bars.1 }, range, scratch)
+    }
+
     fn width(bars: &(EdgeContours, EdgeContours), range: WidthRangePx) -> Option<f32> {
-        let mut memory = Vec::new();
-        let pair = find(&bars.0, &bars.1, range, &mut memory)?;
-        distance(&bars.0.all()[pair.left], &bars.1.all()[pair.right], &mut memory)
+        let mut scratch = Vec::new();
+        let pair = found(bars, range, &mut scratch)?;
+        distance(&bars.0.all()[pair.left], &bars.1.all()[pair.right], &mut scratch)
     }
 
     const WIDE: WidthRangePx = WidthRangePx { min: 10.0, max: 80.0 };
@@ -233,11 +234,10 @@ mod tests {
     #[test]
     fn two_beads_with_a_gap_are_as_likely_as_one_with_a_seam() {
         let bars = bars(&[(50, 75, 80), (85, 110, 80)]);
-        let mut memory = Vec::new();
-        let both = find(&bars.0, &bars.1, WIDE, &mut memory).unwrap();
+        let mut scratch = Vec::new();
+        let both = found(&bars, WIDE, &mut scratch).unwrap();
         assert!(both.rival_px.is_some(), "{both:?}");
-        let one =
-            find(&bars.0, &bars.1, WidthRangePx { min: 10.0, max: 40.0 }, &mut memory).unwrap();
+        let one = found(&bars, WidthRangePx { min: 10.0, max: 40.0 }, &mut scratch).unwrap();
         assert!((one.width_px - 25.0).abs() < 0.5 && one.rival_px.is_none(), "{one:?}");
     }
 
@@ -255,10 +255,10 @@ mod tests {
     #[test]
     fn a_seam_is_no_edge_while_it_is_weak_and_leaves_two_widths_where_it_is_not() {
         let seamed = |level: u16| bars(&[(50, 70, 80), (70, 78, level), (78, 110, 80)]);
-        let mut memory = Vec::new();
+        let mut scratch = Vec::new();
         let mut pair = |level: u16| {
             let bars = seamed(level);
-            find(&bars.0, &bars.1, WIDE, &mut memory).unwrap()
+            found(&bars, WIDE, &mut scratch).unwrap()
         };
         let weak = pair(40);
         assert!((weak.width_px - 60.0).abs() < 0.5 && weak.rival_px.is_none(), "{weak:?}");
@@ -268,7 +268,7 @@ mod tests {
         assert!([20.0, 32.0].iter().any(|one: &f32| (rival - one).abs() < 0.5), "{strong:?}");
         let range = WidthRangePx { min: 45.0, max: 80.0 };
         let bars = seamed(16);
-        let alone = find(&bars.0, &bars.1, range, &mut memory).unwrap();
+        let alone = found(&bars, range, &mut scratch).unwrap();
         assert!((alone.width_px - 60.0).abs() < 0.5 && alone.rival_px.is_none(), "{alone:?}");
     }
 

@@ -1,6 +1,8 @@
-//! The two edges of one bead run side by side: steps that lie at the same
-//! distance from each other in more bands than any others belong to it, however
-//! the bead runs, and what covers an edge here and there does not.
+//! Steps that run side by side. The two edges of a bead lie at the same distance in more bands
+//! than any other steps do, however the bead runs.
+
+use crate::vision::buffer::reset;
+use std::ops::Range;
 
 /// Difference of the distances within which edges run side by side \[px\].
 const SAME_DISTANCE_PX: f32 = 1.2;
@@ -21,14 +23,17 @@ impl StepPair {
     }
 }
 
-/// Places of two edges side by side; keeps its memory from frame to frame.
+/// Positions of two edges side by side; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct ParallelEdges {
     spans: Vec<StepPair>,
     /// Spans of each band within the distances that are being looked at.
     within: Vec<u16>,
-    lefts: Vec<f32>,
-    rights: Vec<f32>,
+    /// Positions of the left edge, one a band \[px\]; NaN in bands that do not show
+    /// both edges at the distance.
+    pub lefts: Vec<f32>,
+    /// Those of the right edge.
+    pub rights: Vec<f32>,
 }
 
 impl ParallelEdges {
@@ -40,7 +45,7 @@ impl ParallelEdges {
         bands: usize,
         lefts: impl Fn(usize) -> L,
         rights: impl Fn(usize) -> R,
-        range: std::ops::Range<f32>,
+        range: Range<f32>,
     ) -> bool
     where
         L: Iterator<Item = f32>,
@@ -59,22 +64,10 @@ impl ParallelEdges {
         most >= MIN_BANDS
     }
 
-    /// Places of the left edge, one a band \[px\]; NaN in bands that do not show
-    /// both at the distance.
-    pub fn lefts(&self) -> &[f32] {
-        &self.lefts
-    }
-
-    /// Those of the right edge.
-    pub fn rights(&self) -> &[f32] {
-        &self.rights
-    }
-
     /// Most bands that agree on a distance, and the middle of what they agree
     /// on \[px\].
     fn most_alike(&mut self, bands: usize) -> (usize, f32) {
-        self.within.clear();
-        self.within.resize(bands, 0);
+        reset(&mut self.within, bands, 0);
         let (mut first, mut count) = (0, 0);
         let mut best = (0, f32::NAN);
         for last in 0..self.spans.len() {
@@ -97,9 +90,8 @@ impl ParallelEdges {
 
     /// Takes the span of each band that comes nearest to a distance.
     fn pick(&mut self, bands: usize, width: f32) {
-        for places in [&mut self.lefts, &mut self.rights] {
-            places.clear();
-            places.resize(bands, f32::NAN);
+        for positions in [&mut self.lefts, &mut self.rights] {
+            reset(positions, bands, f32::NAN);
         }
         let mut nearest = f32::INFINITY;
         let mut band = usize::MAX;
@@ -143,7 +135,7 @@ mod tests {
         let mut parallel = ParallelEdges::default();
         assert!(parallel.find(24, left, right, 80.0..140.0));
         for band in 0..24 {
-            let (left, right) = (parallel.lefts()[band], parallel.rights()[band]);
+            let (left, right) = (parallel.lefts[band], parallel.rights[band]);
             if band % 2 == 0 {
                 assert!((left - 40.0 - bend(band)).abs() < 1e-4, "{left} in band {band}");
                 assert!((right - 140.5 - bend(band)).abs() < 1e-4, "{right} in band {band}");

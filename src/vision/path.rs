@@ -1,10 +1,10 @@
-//! Rough places and levels, one a band, made into smooth ones that every row
-//! can be held against.
+//! Smooth trajectories of position and levels along an edge, from rough values, one a band.
 
 use super::pool::Bands;
 use super::row_range::RowRange;
-use crate::numeric::number::{narrow_to_f32, to_f32};
+use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f32};
 use crate::numeric::rank;
+use crate::vision::buffer::refill;
 
 /// Bands on either side that a smoothed value is taken from.
 const NEIGHBOURS: usize = 3;
@@ -12,9 +12,9 @@ const NEIGHBOURS: usize = 3;
 /// By how much a bend must move the line through the neighbours to be one \[px\].
 const MIN_BEND_PX: f32 = 0.1;
 
-/// Neighbours by whose median wild values are told.
+/// Neighbours by whose median outliers are recognised.
 const OUTLIER_WINDOW: usize = 9;
-/// Distance from it that makes a value wild \[px\], and in typical distances
+/// Distance from it that makes a value an outlier \[px\], and in typical distances
 /// beside.
 const MIN_OUTLIER_PX: f32 = 1.2;
 const OUTLIER_RATIO: f32 = 4.0;
@@ -30,9 +30,9 @@ pub fn fill(rough: impl Iterator<Item = Option<f32>>, out: &mut Vec<f32>) -> boo
         let from = last.map_or(value, |last| out[last]);
         let first = last.map_or(0, |last| last + 1);
         let gap = to_f32((band - last.unwrap_or(0)).max(1));
-        for (between, place) in (first..band).enumerate() {
-            let share = if last.is_some() { to_f32(between + 1) / gap } else { 0.0 };
-            out[place] = from + share * (value - from);
+        for (between, position) in (first..band).enumerate() {
+            let fraction = if last.is_some() { to_f32(between + 1) / gap } else { 0.0 };
+            out[position] = from + fraction * (value - from);
         }
         last = Some(band);
     }
@@ -44,13 +44,13 @@ pub fn fill(rough: impl Iterator<Item = Option<f32>>, out: &mut Vec<f32>) -> boo
 
 /// Takes out values that lie far off the median of their neighbours: where a
 /// grain covers the edge for a few bands, its contour is not the edge's.
-/// `memory` is scratch.
-pub fn remove_outliers(values: &mut [f32], memory: &mut Vec<f32>) {
+/// `scratch` is a buffer.
+pub fn remove_outliers(values: &mut [f32], scratch: &mut Vec<f32>) {
     let count = values.len();
     if count < OUTLIER_WINDOW || runs_smoothly(values) {
         return;
     }
-    memory.clear();
+    scratch.clear();
     for band in 0..count {
         let from = band.saturating_sub(OUTLIER_WINDOW / 2).min(count - OUTLIER_WINDOW);
         let mut window = [0.0; OUTLIER_WINDOW];
@@ -63,15 +63,15 @@ pub fn remove_outliers(values: &mut [f32], memory: &mut Vec<f32>) {
         }
         let here = window[band - from];
         window.sort_unstable_by(f32::total_cmp);
-        memory.push(here - window[OUTLIER_WINDOW / 2]);
+        scratch.push(here - window[OUTLIER_WINDOW / 2]);
     }
-    let offs = memory.len();
-    memory.extend_from_within(..);
-    for off in &mut memory[offs..] {
+    let offs = scratch.len();
+    scratch.extend_from_within(..);
+    for off in &mut scratch[offs..] {
         *off = off.abs();
     }
-    let Some(typical) = rank::median(&mut memory[offs..]) else { return };
-    for (value, off) in values.iter_mut().zip(&memory[..offs]) {
+    let Some(typical) = rank::median(&mut scratch[offs..]) else { return };
+    for (value, off) in values.iter_mut().zip(&scratch[..offs]) {
         if off.abs() > MIN_OUTLIER_PX + OUTLIER_RATIO * typical {
             *value = f32::NAN;
         }
@@ -90,7 +90,7 @@ fn middle_of(values: &[f32]) -> f32 {
     a.max(b.min(c)).min(b.max(c))
 }
 
-/// Median of three, so that a single wild value leads nothing astray.
+/// Median of three, so that a single outlier leads nothing astray.
 pub fn median_of_three(values: &mut [f32]) {
     let Some(mut before) = values.first().copied() else { return };
     for k in 1..values.len().saturating_sub(1) {
@@ -150,7 +150,7 @@ pub fn smooth_bent(values: &mut [f32], out: &mut Vec<f32>) {
     }
 }
 
-/// What is expected of an edge along the gauge: place, level before it and
+/// What is expected of an edge along the gauge: position, level before it and
 /// step, on lines between the middles of the bands.
 #[derive(Debug, Clone, Default)]
 pub struct EdgeTrajectory {
@@ -179,7 +179,7 @@ struct TrajectorySegment {
     /// Where it begins and how long it is \[px\].
     middle: f32,
     length: f32,
-    /// Place, level before and step where it begins, and their changes for a
+    /// Position, level before and step where it begins, and their changes for a
     /// pixel.
     values: [f32; 3],
     slopes: [f32; 3],
@@ -189,22 +189,15 @@ impl TrajectorySegment {
     fn between(middles: [f32; 2], values: [[f32; 3]; 2]) -> Self {
         let length = middles[1] - middles[0];
         let slope = |k: usize| (values[1][k] - values[0][k]) / length;
-        Self {
-            middle: middles[0],
-            length,
-            values: values[0],
-            slopes: [slope(0), slope(1), slope(2)],
-        }
+        Self { middle: middles[0], length, values: values[0], slopes: [0, 1, 2].map(slope) }
     }
 }
 
 impl EdgeTrajectory {
     /// Draws the lines between the bands.
     pub fn draw(&mut self, bands: &Bands, at: &[f32], before: &[f32], step: &[f32]) {
-        self.middles.clear();
-        self.middles.extend((0..bands.count()).map(|band| narrow_to_f32(bands.middle(band))));
-        self.values.clear();
-        self.values.extend((0..at.len()).map(|band| [at[band], before[band], step[band]]));
+        refill(&mut self.middles, (0..bands.count()).map(|band| narrow_to_f32(bands.middle(band))));
+        refill(&mut self.values, (0..at.len()).map(|band| [at[band], before[band], step[band]]));
         self.link();
     }
 
@@ -218,17 +211,16 @@ impl EdgeTrajectory {
         self.link();
     }
 
-    /// Draws the line anew through better places; levels stay. `memory` is
+    /// Draws the line anew through better positions; levels stay. `scratch` is
     /// scratch.
-    pub fn redraw(&mut self, lines: &[RowRange], at: &[f32], memory: &mut Vec<[f32; 3]>) {
-        memory.clear();
-        memory.extend(lines.iter().zip(at).map(|(&line, &at)| {
+    pub fn redraw(&mut self, lines: &[RowRange], at: &[f32], scratch: &mut Vec<[f32; 3]>) {
+        scratch.clear();
+        scratch.extend(lines.iter().zip(at).map(|(&line, &at)| {
             let [_, before, step] = self.at(narrow_to_f32(line.middle()));
             [at, before, step]
         }));
-        std::mem::swap(&mut self.values, memory);
-        self.middles.clear();
-        self.middles.extend(lines.iter().map(|&line| narrow_to_f32(line.middle())));
+        std::mem::swap(&mut self.values, scratch);
+        refill(&mut self.middles, lines.iter().map(|&line| narrow_to_f32(line.middle())));
         self.link();
     }
 
@@ -252,12 +244,12 @@ impl EdgeTrajectory {
         }));
     }
 
-    /// Place, level before and step at a row, or between two. Beyond the first
+    /// Position, level before and step at a row, or between two. Beyond the first
     /// and the last band the edge runs on, but levels do not change.
     #[inline(always)]
     pub fn at(&self, v: f32) -> [f32; 3] {
         let Some(last) = self.segments.len().checked_sub(1) else { return self.values[0] };
-        let mut band = floor((v - self.middles[0]) * self.per_px).min(last);
+        let mut band = floor_to_count(((v - self.middles[0]) * self.per_px).into()).min(last);
         // Bands differ by a row in height.
         if v < self.middles[band] && band > 0 {
             band -= 1;
@@ -278,15 +270,6 @@ impl EdgeTrajectory {
     pub fn steepest(&self) -> f32 {
         self.segments.iter().fold(0.0, |most, segment| segment.slopes[0].abs().max(most))
     }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "saturates at 0; pixel coordinates are small"
-)]
-fn floor(value: f32) -> usize {
-    value as usize
 }
 
 #[cfg(test)]
@@ -313,7 +296,7 @@ mod tests {
         let frame = frame.unwrap();
         let roi = crate::core::geometry::Roi { x: 0, y: 0, width: 20, height: 43 };
         let view =
-            crate::vision::strip::GaugeView::new(roi, crate::vision::gauge::BeadAxis::Vertical);
+            crate::vision::gauge::GaugeView::new(roi, crate::vision::gauge::BeadAxis::Vertical);
         let mut turner = crate::vision::strip::RowLayout::default();
         let crate::vision::strip::GaugeRowsOfDepth::Bytes(strip) =
             turner.strips(&frame, &view, None)
@@ -327,8 +310,8 @@ mod tests {
         let mut course = EdgeTrajectory::default();
         course.draw(&bands, &at, &[40.0; 8], &[80.0; 8]);
         for v in 0..43u8 {
-            let [place, before, step] = course.at(f32::from(v));
-            assert!((place - 3.0 - 0.5 * f32::from(v)).abs() < 1e-4);
+            let [position, before, step] = course.at(f32::from(v));
+            assert!((position - 3.0 - 0.5 * f32::from(v)).abs() < 1e-4);
             assert_eq!((before, step), (40.0, 80.0));
         }
         assert!((course.steepest() - 0.5).abs() < 1e-5);

@@ -1,12 +1,12 @@
-//! Places between two pixels, rounded to a few phases.
+//! Positions between two pixels, rounded to a few phases.
 
-/// Splits a place into the pixel at or before it and the nearest of `phases`
-/// places between that and the next.
+/// Splits a position into the pixel at or before it and the nearest of `phases`
+/// positions between that and the next.
 #[inline(always)]
 pub fn split(at: f32, phases: usize) -> (isize, usize) {
     #[expect(clippy::cast_precision_loss, reason = "there are few phases")]
     let fine = at * phases as f32 + 0.5;
-    #[expect(clippy::cast_possible_truncation, reason = "a place near the gauge")]
+    #[expect(clippy::cast_possible_truncation, reason = "a position near the gauge")]
     let whole = fine as isize;
     // Truncation is a floor but for what is left of the gauge.
     let fine = whole - isize::from(fine < 0.0);

@@ -5,10 +5,11 @@
 
 use super::row_range::RowRange;
 use super::strip::{GaugeRows, GreyPixel};
+use crate::numeric::number::{to_f32, to_f64};
 
-/// Rows that a profile is the mean of: fewer are too noisy to tell a step
-/// from its surroundings when the contrast is low, more would smear slanted
-/// edges.
+/// Rows that a profile is the mean of: fewer are too noisy to distinguish a step from its
+/// surroundings when the contrast is low, more would smear slanted edges. By definition the four of
+/// [`GreyPixel::sum_of_four`].
 const ROWS_PER_PROFILE: usize = 4;
 
 /// Distance of such rows at most \[px\].
@@ -18,7 +19,8 @@ const MAX_ROW_DISTANCE: usize = 2;
 /// takes its time.
 const MAX_PROFILES: usize = 25;
 
-/// Bits that a profile's sums are cut to, so that four of them fit 15.
+/// Bits of a profile's sums. Derived: the sum of four such numbers fits the 15 bits of a positive
+/// `i16`: 4 · (2¹² − 1) < 2¹⁵.
 const PROFILE_BITS: u32 = 12;
 
 /// Pooled profiles, one a band, in whole numbers of a unit that is fine enough
@@ -28,8 +30,10 @@ pub struct Bands {
     profiles: Vec<u16>,
     across: usize,
     shift: u32,
-    unit: f32,
-    bounds: Vec<RowRange>,
+    /// Grey levels of 256 for each unit of a profile.
+    pub unit: f32,
+    /// Rows of each band, along the bead.
+    pub bounds: Vec<RowRange>,
     full: usize,
     pixels: usize,
 }
@@ -46,20 +50,9 @@ impl Bands {
         &self.profiles[band * self.across..(band + 1) * self.across]
     }
 
-    /// Grey levels of 256 for each unit of a profile.
-    pub fn unit(&self) -> f32 {
-        self.unit
-    }
-
-    /// Rows of a band, along the bead.
-    pub fn rows(&self, band: usize) -> RowRange {
-        self.bounds[band]
-    }
-
     /// The band of a row.
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     pub fn band_of(&self, row: f32) -> usize {
-        self.bounds.partition_point(|rows| rows.end as f32 <= row).min(self.count() - 1)
+        self.bounds.partition_point(|rows| to_f32(rows.end) <= row).min(self.count() - 1)
     }
 
     /// Middle of a band along the bead \[px\].
@@ -67,10 +60,9 @@ impl Bands {
         self.bounds[band].middle()
     }
 
-    /// Share of the pixels at the upper end of the scale, from one row a band.
-    #[expect(clippy::cast_precision_loss, reason = "a share needs no more")]
+    /// Fraction of the pixels at the upper end of the scale, from one row a band.
     pub fn saturated_fraction(&self) -> f64 {
-        self.full as f64 / self.pixels.max(1) as f64
+        to_f64(self.full) / to_f64(self.pixels.max(1))
     }
 
     /// Cuts the strip into bands, of which there are at most as many as caliper
@@ -81,11 +73,9 @@ impl Bands {
         cut_into_ranges(strip.along, calipers.min(MAX_PROFILES), &mut self.bounds);
         let count = self.bounds.len();
         self.profiles.resize(count * strip.across, 0);
-        let most = 4 * strip.white.level().max(1);
+        let most = 4 * strip.white.into().max(1);
         self.shift = (most.ilog2() + 1).saturating_sub(PROFILE_BITS);
-        #[expect(clippy::cast_precision_loss, reason = "a power of two")]
-        let coarse = (1u32 << self.shift) as f32;
-        self.unit = 0.25 * strip.scale * coarse;
+        self.unit = 0.25 * strip.scale * to_f32(1 << self.shift);
         self.full = 0;
         self.pixels = 0;
         for (profile, rows) in self.profiles.chunks_exact_mut(strip.across).zip(&self.bounds) {
@@ -143,8 +133,8 @@ mod tests {
     use crate::core::frame::{Frame, Pixels};
     use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
-    use crate::vision::gauge::BeadAxis;
-    use crate::vision::strip::{GaugeRowsOfDepth, GaugeView, RowLayout};
+    use crate::vision::gauge::{BeadAxis, GaugeView};
+    use crate::vision::strip::{GaugeRowsOfDepth, RowLayout};
 
     const ROI: Roi = Roi { x: 5, y: 4, width: 12, height: 10 };
 
@@ -160,9 +150,9 @@ mod tests {
         let mut bands = Bands::default();
         bands.pool(&strip, 64);
         assert_eq!(bands.count(), 2);
-        assert_eq!(bands.rows(1), RowRange::new(5, 10));
+        assert_eq!(bands.bounds[1], RowRange::new(5, 10));
         assert_eq!(bands.middle(1), 7.0);
-        assert_eq!(bands.unit(), 0.25);
+        assert_eq!(bands.unit, 0.25);
         assert_eq!(bands.profile(1)[3], 4 * (8 * 4 + 11));
         bands.pool(&strip, 1);
         assert_eq!(bands.profile(0)[0], 4 * (5 * 4 + 4) + 18);
@@ -179,7 +169,7 @@ mod tests {
         };
         let mut bands = Bands::default();
         bands.pool(&strip, 5);
-        assert!((f32::from(bands.profile(0)[0]) * bands.unit() - 255.0).abs() < 0.1);
+        assert!((f32::from(bands.profile(0)[0]) * bands.unit - 255.0).abs() < 0.1);
         assert!((bands.saturated_fraction() - 0.6).abs() < 1e-12);
     }
 }

@@ -1,7 +1,6 @@
-//! Edges that are not the blurred step between plain surroundings that a
-//! template can be made of, as on a shiny or strongly shaded strand: every
-//! caliper line is fitted for itself in a short window, with the shading of the
-//! bead free and the levels of its neighbours as prior.
+//! Edges that are no blurred step between plain surroundings, as on a shiny or strongly shaded
+//! strand. Every caliper line is fitted for itself in a short window, with free shading of the
+//! bead and the levels of its neighbours as prior.
 
 use super::blur::BinnedProfile;
 use super::fit::{EdgeFit, FittedEdge, Prior, ProfileWindow};
@@ -9,12 +8,15 @@ use super::located::CaliperEdge;
 use super::row_range::RowRange;
 use super::strip::{GaugeRows, GreyPixel};
 use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::{floor_to_count, to_f32, to_f64};
 use crate::numeric::rank;
+use crate::vision::buffer::{refill, reset};
 
-/// Neighbours on either side that tell the local slope and levels.
+/// Neighbours on either side that show the local slope and levels.
 const NEIGHBOURS: usize = 4;
 /// Longest half window \[px\].
 const MAX_HALF: usize = 30;
+/// Shortest half window \[px\]: the levels on either side need some pixels.
 const MIN_HALF: usize = 4;
 
 /// Where to look and how.
@@ -22,6 +24,8 @@ const MIN_HALF: usize = 4;
 pub struct RefinerInput<'a, T> {
     /// The gauge's pixels.
     pub strip: &'a GaugeRows<'a, T>,
+    /// The blurred step.
+    pub table: &'a StepTable,
     /// Rows of its caliper lines.
     pub lines: &'a [RowRange],
     /// Room between the two edges of the bead \[px\], typical.
@@ -34,7 +38,7 @@ fn levels(fit: &EdgeFit) -> [f64; 3] {
     [fit.edge.ground, fit.edge.height, fit.edge.shading]
 }
 
-/// Refines one edge of the bead; keeps its memory from frame to frame.
+/// Refines one edge of the bead; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct LineRefiner {
     rough: Vec<Option<f64>>,
@@ -56,40 +60,36 @@ impl LineRefiner {
     /// bead's side. Returns whether any edge could be located.
     pub fn refine<T: GreyPixel>(
         &mut self,
-        table: &StepTable,
         task: &RefinerInput<'_, T>,
         bead_after: bool,
         edges: &mut [Option<CaliperEdge>],
         rough: impl Iterator<Item = f64>,
     ) -> bool {
         self.bead_after = bead_after;
-        self.rough.clear();
-        self.rough.extend(rough.map(Some));
+        refill(&mut self.rough, rough.map(Some));
         self.half = half_window(3.0, task.width_px).max(8.min(widest_half(task.width_px)));
         self.read(task);
-        let Some(blur) = self.fit_blur(table) else { return false };
+        let Some(blur) = self.fit_blur(task.table) else { return false };
         let half = half_window(blur, task.width_px);
         if half != self.half {
             self.half = half;
             self.read(task);
         }
         self.blur_px = blur;
-        self.locate_alone(table, task);
+        self.locate_alone(task);
         if !self.first_fits.iter().any(Option::is_some) {
             return false;
         }
-        self.sharpen_blur(table);
-        self.locate_with_neighbours(table, task, edges);
+        self.sharpen_blur(task.table);
+        self.locate_with_neighbours(task, edges);
         true
     }
 
     /// Reads the window of every band, along the local slope of the edge.
     fn read<T: GreyPixel>(&mut self, task: &RefinerInput<'_, T>) {
         let length = 2 * self.half + 1;
-        self.samples.clear();
-        self.samples.resize(length * self.rough.len(), 0.0);
-        self.firsts.clear();
-        self.firsts.resize(self.rough.len(), f64::NAN);
+        reset(&mut self.samples, length * self.rough.len(), 0.0);
+        reset(&mut self.firsts, self.rough.len(), f64::NAN);
         for band in 0..self.rough.len() {
             let Some(at) = self.rough[band] else { continue };
             let slope = self.slope(band, task.lines);
@@ -120,24 +120,27 @@ impl LineRefiner {
         if under > 0.0 { (over / under).clamp(-2.0, 2.0) } else { 0.0 }
     }
 
-    fn window(&self, band: usize, noise: f64) -> Option<ProfileWindow<'_>> {
-        let first = self.firsts[band];
-        if first.is_nan() {
-            return None;
-        }
+    fn window<'a>(
+        &'a self,
+        table: &'a StepTable,
+        band: usize,
+        noise: f64,
+    ) -> Option<ProfileWindow<'a>> {
+        let (first, blur, bead_after) = (self.firsts[band], self.blur_px, self.bead_after);
         let length = 2 * self.half + 1;
         let samples = &self.samples[band * length..(band + 1) * length];
-        Some(ProfileWindow {
+        (!first.is_nan()).then_some(ProfileWindow {
+            table,
             first,
             samples,
             noise,
-            blur: self.blur_px,
-            bead_after: self.bead_after,
+            blur,
+            bead_after,
         })
     }
 
     fn fit_blur(&mut self, table: &StepTable) -> Option<f64> {
-        self.profile.clear();
+        self.profile = BinnedProfile::default();
         for band in 0..self.rough.len() {
             let Some(at) = self.rough[band] else { continue };
             self.add_to_profile(band, at);
@@ -152,27 +155,24 @@ impl LineRefiner {
         }
         let length = 2 * self.half + 1;
         let window = &self.samples[band * length..(band + 1) * length];
-        for (place, &sample) in (0u32..).zip(window) {
-            self.profile.add(first + f64::from(place) - at, f64::from(sample));
+        for (position, &sample) in (0u32..).zip(window) {
+            self.profile.add(first + f64::from(position) - at, f64::from(sample));
         }
     }
 
-    /// First pass: every caliper for itself, which also tells the noise.
-    fn locate_alone<T: GreyPixel>(&mut self, table: &StepTable, task: &RefinerInput<'_, T>) {
+    /// First pass: every caliper for itself, which also shows the noise.
+    fn locate_alone<T: GreyPixel>(&mut self, task: &RefinerInput<'_, T>) {
         self.first_fits.clear();
         let (mut residual, mut freedom) = (0.0, 0.0);
         for band in 0..self.rough.len() {
             let fit = self.rough[band].and_then(|at| {
-                let window = self.window(band, 1.0)?;
-                window.fit(table, start_levels(&window, at), None)
+                let window = self.window(task.table, band, 1.0)?;
+                window.fit(start_levels(&window, at), None)
             });
             if let Some(fit) = fit {
                 let RowRange { first: from, end: to } = task.lines[band];
-                #[expect(clippy::cast_precision_loss, reason = "windows are small")]
-                {
-                    residual += fit.residual * (to - from) as f64;
-                    freedom += (2 * self.half + 1) as f64 - 4.0;
-                }
+                residual += fit.residual * to_f64(to - from);
+                freedom += to_f64(2 * self.half + 1) - 4.0;
             }
             self.first_fits.push(fit);
         }
@@ -181,7 +181,7 @@ impl LineRefiner {
 
     /// The rough positions smear the overlay; the located ones do not.
     fn sharpen_blur(&mut self, table: &StepTable) {
-        self.profile.clear();
+        self.profile = BinnedProfile::default();
         for band in 0..self.rough.len() {
             if let Some(fit) = self.first_fits[band] {
                 self.add_to_profile(band, fit.edge.at);
@@ -195,7 +195,6 @@ impl LineRefiner {
     /// Second pass: with the levels of the neighbours as prior.
     fn locate_with_neighbours<T: GreyPixel>(
         &mut self,
-        table: &StepTable,
         task: &RefinerInput<'_, T>,
         edges: &mut [Option<CaliperEdge>],
     ) {
@@ -204,16 +203,15 @@ impl LineRefiner {
             *edge = None;
             let Some(alone) = self.first_fits[band] else { continue };
             let RowRange { first: from, end: to } = task.lines[band];
-            #[expect(clippy::cast_precision_loss, reason = "a band has few rows")]
-            let noise = self.noise_grey * self.noise_grey / (to - from) as f64;
+            let noise = self.noise_grey * self.noise_grey / to_f64(to - from);
             let prior = Prior {
                 mean: [0, 1, 2].map(|which| self.mean_near(band, which)),
                 variance: excess.map(|variance| variance.max(1e-3 * noise)),
             };
-            let Some(window) = self.window(band, noise) else { continue };
+            let Some(window) = self.window(task.table, band, noise) else { continue };
             let [ground, height, shading] = prior.mean;
             let start = FittedEdge { at: alone.edge.at, ground, height, shading };
-            *edge = window.fit(table, start, Some(&prior)).map(|fit| CaliperEdge {
+            *edge = window.fit(start, Some(&prior)).map(|fit| CaliperEdge {
                 at: fit.edge.at,
                 // Levels that neighbours share are wrong for all of them
                 // together, so that the mean of many edges is no surer than
@@ -260,12 +258,6 @@ impl LineRefiner {
 /// Reads a band's window: the rows are shifted by whole pixels along the
 /// slope, and what rounding leaves is moved into the position of the first
 /// sample, which is returned. `None` where the window leaves the gauge.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "positions lie within the gauge, which is checked"
-)]
 fn read_window<T: GreyPixel>(
     task: &RefinerInput<'_, T>,
     band: usize,
@@ -274,34 +266,31 @@ fn read_window<T: GreyPixel>(
 ) -> Option<f64> {
     let RowRange { first: from, end: to } = task.lines[band];
     let middle = task.lines[band].middle();
-    let half = (window.len() / 2) as f64;
+    let half = to_f64(window.len() / 2);
     let mut left_over = 0.0;
     for v in from..to {
-        let drift = slope * (v as f64 - middle);
+        let drift = slope * (to_f64(v) - middle);
         let first = at.round() - half + drift.round();
         left_over += drift.round() - drift;
-        if first < 0.0 || first + window.len() as f64 > task.strip.across as f64 {
+        if first < 0.0 || first + to_f64(window.len()) > to_f64(task.strip.across) {
             return None;
         }
-        let pixels = &task.strip.row(v)[first as usize..];
-        for (sum, pixel) in window.iter_mut().zip(pixels) {
-            *sum += pixel.level() as f32;
+        for (sum, pixel) in window.iter_mut().zip(&task.strip.row(v)[floor_to_count(first)..]) {
+            *sum += T::sum_to_f32(pixel.add_to(T::Sum::default()));
         }
     }
-    let rows = (to - from) as f64;
-    let scale = task.strip.scale / rows as f32;
+    let scale = task.strip.scale / to_f32(to - from);
     for sum in window {
         *sum *= scale;
     }
-    Some(at.round() - half + left_over / rows)
+    Some(at.round() - half + left_over / to_f64(to - from))
 }
 
 /// Levels to start from: the window's two ends.
 fn start_levels(window: &ProfileWindow<'_>, at: f64) -> FittedEdge {
     let samples = window.samples;
     let end = samples.len().min(3);
-    #[expect(clippy::cast_precision_loss, reason = "three at most")]
-    let mean = |part: &[f32]| f64::from(part.iter().sum::<f32>()) / part.len() as f64;
+    let mean = |part: &[f32]| f64::from(part.iter().sum::<f32>()) / to_f64(part.len());
     let ground = mean(&samples[..end]);
     let height = mean(&samples[samples.len() - end..]) - ground;
     FittedEdge { at, ground, height, shading: 0.0 }
@@ -310,21 +299,9 @@ fn start_levels(window: &ProfileWindow<'_>, at: f64) -> FittedEdge {
 /// Half window for a blur \[px\]: to where the step is over, but not across
 /// the bead's other edge.
 fn half_window(blur_px: f64, width_px: f64) -> usize {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a blur is a few pixels"
-    )]
-    let wanted = (4.0 * blur_px + 2.0).ceil() as usize;
-    wanted.clamp(MIN_HALF, widest_half(width_px))
+    floor_to_count((4.0 * blur_px + 2.0).ceil()).clamp(MIN_HALF, widest_half(width_px))
 }
 
 fn widest_half(width_px: f64) -> usize {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a width in the gauge"
-    )]
-    let room = (0.45 * width_px) as usize;
-    room.clamp(MIN_HALF, MAX_HALF)
+    floor_to_count(0.45 * width_px).clamp(MIN_HALF, MAX_HALF)
 }

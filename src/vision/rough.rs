@@ -1,13 +1,14 @@
 //! One edge of a bead whose edges are torn, or lie beside a groove or in
 //! texture: where it runs, row by row, without a model of its flank.
 //!
-//! The mean over the rows is the width's share of this edge. The profile along
+//! The mean over the rows is what this edge adds to the width. The profile along
 //! the bead is signal (the bead's roughness); only pixel noise and texture are
 //! errors of the mean.
 //!
 //! ```text
 //! window          rows about the edge, turned so that the bead lies after it and is bright
 //! route           the course with the strongest step, by dynamic programming
+//! mean_profile    mean profile across the edge: bead, ground or groove
 //! levels          grey of the bead and of what lies outside, along the route
 //! crossing        where each row passes from the one to the other
 //! position_noise  standard deviation of the mean position
@@ -17,6 +18,7 @@ mod crossing;
 mod groove;
 mod kernel;
 mod levels;
+mod mean_profile;
 mod position_noise;
 mod rough_input;
 mod route;
@@ -29,7 +31,8 @@ use crate::numeric::number::{narrow_to_f32, to_f64};
 use crossing::SUMMED_INSIDE_PX;
 use groove::GrooveShape;
 pub use groove::MeanBlur;
-use levels::{Crossings, EdgeLevels, OUTSIDE_PX};
+use levels::{Crossings, EdgeLevels};
+use mean_profile::OUTSIDE_PX;
 pub use rough_input::RoughInput;
 use route::EdgeRoute;
 use window::{ALONG_PX, RowWindows, STRAIGHT_ROWS};
@@ -43,54 +46,58 @@ const MIN_ROWS_FRACTION: f64 = 0.5;
 /// Blur of an edge of which nothing is known: lenses that are nearly in focus, and what is
 /// too fine to be followed.
 const PRIOR_BLUR: MeanBlur = MeanBlur { px: 1.8, variance: 1.0 };
-/// Standard deviation of the blurs of two edges about each other, as a fraction, and the
-/// same of what is too fine to be followed.
+/// Standard deviation of the blurs of two edges about each other, as a fraction.
 const BLUR_DIFFERENCE: f64 = 0.02;
+/// The same of what is too fine to be followed, as a fraction of it.
 const FINE_ROUGHNESS_FRACTION: f64 = 0.2;
 
-/// How likely a groove that does not show its depth must be to be looked at, for it to be
-/// doubted that there is none, and for the shape of the whole flank to be doubted as well where
-/// it lies so far from where rows pass half height \[px\]: of drawn edges beside weak narrow
-/// grooves, some that were taken for sloping ground lay 0.7 px off.
+/// How likely a groove that does not show its depth must be to be located as one.
 const MIN_LIKELY_GROOVE: f64 = 0.18;
+/// How likely it must be for the uncertainty of its shape to count.
 const MIN_POSSIBLE_GROOVE: f64 = 0.085;
+/// How likely it must be for the shape of the whole flank to count as well, where it lies far from
+/// where rows pass half height: of drawn edges beside weak narrow grooves, some that were taken for
+/// sloping ground lay 0.7 px off.
 const MIN_CONCEIVABLE_GROOVE: f64 = 0.03;
+/// That distance \[px\].
 const MAX_SHAPE_OFFSET_PX: f64 = 0.5;
 
-/// Standard deviation of the place of an edge beside a groove that hides its depth that its
-/// waves leave open, as a fraction of theirs and at most \[px\]: the mean over them is no Gaussian
-/// flank. Measured on 12,000 rendered beads.
+/// Standard deviation that the waves of an edge leave open beside a groove that hides its depth, as
+/// a fraction of theirs: the mean over them is no Gaussian flank. Found on 12,000 rendered beads.
 const GROOVE_WAVINESS_FRACTION: f64 = 0.15;
+/// The same at most \[px\].
 const MAX_GROOVE_WAVINESS_PX: f64 = 0.15;
-/// The same beside one that shows it and is not wider than that \[px\]: without it, 3.5 of 30,000
-/// drawn widths were more than 5 sigma off, with it 2.5.
+/// The same beside a groove that shows its depth and is narrow. Measured: ACCURACY.md, Drawn frames
+/// (`grooves`): without it 3.5 of 30,000 widths were more than 5 sigma off, with it 2.5.
 const NARROW_GROOVE_WAVINESS_FRACTION: f64 = 0.06;
+/// Widest groove that is narrow in this sense \[px\].
 const MAX_NARROW_GROOVE_PX: f64 = 7.5;
 
-/// Standard deviation, beside that of noise, of where rows pass half height as the edge beside
-/// a groove \[px\]: its floor may be hidden, and torn edges have no Gaussian flank. Averaged
-/// with the groove's shape by their variances, the same piece of real concrete differs from
-/// frame to frame by 0.33 px in the median, with the shape alone by 0.36; beside rendered
-/// grooves the shape weighs nearly all.
+/// Standard deviation, beside that of noise, of where rows pass half height as the edge beside a
+/// groove \[px\]: its floor may be hidden, and torn edges have no Gaussian flank. Measured:
+/// ACCURACY.md, What the parts bring: averaged with the groove's shape by their variances, the same
+/// piece of real concrete differs from frame to frame by 0.33 px in the median, with the shape
+/// alone by 0.36.
 const GROOVE_CROSSING_SIGMA_PX: f64 = 0.5;
 
-/// Difference of the bead's level beside the edge from that farther inside, in standard
-/// deviations of what light does, from which on the former is taken, and the standard
-/// deviation of the shift that this makes, as a fraction of it.
+/// Difference of the bead's level beside the edge from that farther inside, in standard deviations
+/// of what light does, from which on the former is taken.
 const MIN_LEVEL_SIGMAS: f64 = 0.5;
+/// Standard deviation of the shift that this makes, as a fraction of it.
 const SHIFT_FRACTION: f64 = 0.2;
 /// How far off the shape may lie then, in what such a difference makes of the pixels that are
 /// summed within the edge: a flank that is no blurred step lies farther.
 const MAX_LEVEL_SHIFT: f64 = 2.0;
 
-/// Finds one edge; keeps its memory from frame to frame.
+/// Finds one edge; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct RoughEdge {
     windows: RowWindows,
     route: EdgeRoute,
     levels: EdgeLevels,
     crossings: Crossings,
-    lines: Vec<Option<CaliperEdge>>,
+    /// Positions in the last frame, one a caliper line.
+    pub lines: Vec<Option<CaliperEdge>>,
     /// Variance of the mean profile \[grey levels²\].
     variance: f64,
     /// Shape of the mean profile.
@@ -98,7 +105,7 @@ pub struct RoughEdge {
 }
 
 /// What was found of an edge.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RoughFit {
     /// Variance of the mean position over the gauge \[px²\].
     pub variance: f64,
@@ -116,7 +123,7 @@ pub struct RoughFit {
     pub is_narrow_groove: bool,
     /// Whether what lies outside is as wide as ground.
     pub is_on_ground: bool,
-    /// Share of the pixels about the edge that show neither the bead nor what lies
+    /// Fraction of the pixels about the edge that show neither the bead nor what lies
     /// outside.
     pub odd_fraction: f64,
     /// The same of the bead farther inside: its texture's.
@@ -129,18 +136,13 @@ pub struct RoughFit {
 
 impl RoughFit {
     /// Whether the odd pixels about the edge exceed those of the bead's texture by such a
-    /// share.
+    /// fraction.
     pub fn exceeds_texture(&self, by: f64) -> bool {
         self.odd_fraction > self.odd_fraction_within + by
     }
 }
 
 impl RoughEdge {
-    /// Positions of the last frame, one a caliper line.
-    pub fn lines(&self) -> &[Option<CaliperEdge>] {
-        &self.lines
-    }
-
     /// Mean of the positions across the bead \[px\].
     pub fn middle(&self) -> f64 {
         located::mean_position(&self.lines)
@@ -184,7 +186,7 @@ impl RoughEdge {
         scene: &RoughInput<'_, T>,
         other: Option<MeanBlur>,
     ) -> Option<RoughFit> {
-        let mean = self.levels.mean()?;
+        let mean = self.levels.mean.as_ref()?;
         let (is_groove, on_ground) = (mean.is_groove(), mean.on_ground);
         let (bead_grey, hides_depth) = (mean.bead(), mean.filled > 0.0);
         let known = other.filter(|blur| blur.variance < PRIOR_BLUR.variance);
@@ -270,7 +272,7 @@ impl RoughEdge {
             roughness: position_noise::roughness(&self.crossings),
             before,
         };
-        groove::fit(self.levels.mean()?, &known)
+        groove::fit(self.levels.mean.as_ref()?, &known)
     }
 
     /// Positions of the caliper lines from those of their rows.
@@ -281,8 +283,8 @@ impl RoughEdge {
         let mut next = 0;
         for line in 0..scene.lines.len() {
             let (mut sum, mut seen, mut rows) = (0.0, 0.0, 0.0);
-            while next < windows.count() && windows.line(next) == line {
-                let weight = windows.rows(next);
+            while next < windows.rows.len() && windows.lines[next] == line {
+                let weight = windows.rows_of(next);
                 rows += weight;
                 if let Some(at) = windows.position(next, crossings[next]) {
                     // Rows that are missing on one side of the line's middle

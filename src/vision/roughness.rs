@@ -26,14 +26,15 @@ use crate::core::units::Mm;
 use overlap::Overlap;
 use spectrum::{BLUR_FACTORS, FrameKind, Spectrum, lengths_mm};
 
-/// Largest standard deviation of the logarithm of roughness, and of length, with which
-/// they are reported: what twenty to thirty correlation lengths of bead leave.
+/// Largest standard deviation of the logarithm of roughness with which it is reported: what twenty
+/// to thirty correlation lengths of bead leave.
 const MAX_LOG_SIGMA: f64 = 0.3;
+/// The same of the correlation length.
 const MAX_LENGTH_LOG_SIGMA: f64 = 0.65;
-/// By how much roughness must be more likely than noise alone, in the logarithm: three
-/// standard deviations.
+/// By how much roughness must be more likely than noise alone, in the logarithm. Derived: 3²/2,
+/// three standard deviations (likelihood ratio, Wilks 1938).
 const MIN_LOG_EVIDENCE: f64 = 4.5;
-/// Kinds of frames that are told apart at most; a run has one or two.
+/// Kinds of frames that are distinguished at most; a run has one or two.
 const MAX_KINDS: usize = 8;
 /// Part by which a smaller blur must be smaller to be taken over.
 const MIN_BLUR_DECREASE: f64 = 0.95;
@@ -123,11 +124,8 @@ impl RoughnessEstimator {
     /// The estimate so far; `None` while too little bead has been seen, or noise explains
     /// what was seen.
     pub fn estimate(&self) -> Option<Roughness> {
-        let smooth: f64 = self
-            .spectra
-            .iter()
-            .map(|spectrum| log_likelihood(spectrum, &spectrum.expected[0][0], 0.0))
-            .sum();
+        let smooth = |of: &Spectrum| log_likelihood(of, &of.expected[0][0], 0.0);
+        let smooth: f64 = self.spectra.iter().map(smooth).sum();
         let cases = (0..BLUR_FACTORS.len()).flat_map(|blur| {
             (0..self.lengths_mm.len()).map(move |length| GridPoint { blur, length })
         });
@@ -185,11 +183,8 @@ impl RoughnessEstimator {
             }
             square *= step.clamp(-1.0, 1.0).exp();
         }
-        let log_likelihood = self
-            .spectra
-            .iter()
-            .map(|spectrum| log_likelihood(spectrum, case.of(spectrum), square))
-            .sum();
+        let of_spectrum = |of: &Spectrum| log_likelihood(of, case.of(of), square);
+        let log_likelihood = self.spectra.iter().map(of_spectrum).sum();
         Some(GridFit { square_mm2: square, log_variance: 1.0 / information, log_likelihood })
     }
 

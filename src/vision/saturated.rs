@@ -2,18 +2,18 @@
 //! scale.
 
 use super::pixel_noise;
-use super::reject::Reject;
-use super::strip::{GaugeRows, GreyPixel};
+use super::reject::{Checked, Reject};
+use super::strip::GreyPixel;
 use super::trace::{EdgeTracer, TraceInput};
-use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::floor_to_count;
 
-/// Share of a step that must lie below the end of the scale.
+/// Fraction of a step that must lie below the end of the scale.
 const MIN_VISIBLE_FRACTION: f64 = 0.4;
-/// Largest doubt about an edge's place that a hidden level may leave \[px\].
+/// Largest uncertainty about an edge's position that a hidden level may leave \[px\].
 const MAX_CLIPPED_SIGMA_PX: f64 = 0.2;
-/// Ground on either side of the bead that its noise is taken from, and its
-/// distance from the edges \[px\].
+/// Ground on either side of the bead that its noise is taken from \[px\].
 const NOISE_COLUMNS_PX: f32 = 24.0;
+/// Its distance from the edges \[px\].
 const NOISE_MARGIN_PX: f32 = 6.0;
 
 /// A bead that was looked at.
@@ -21,20 +21,19 @@ const NOISE_MARGIN_PX: f32 = 6.0;
 pub struct SaturatedBead<'a, T> {
     /// What is looked at, left and right.
     pub scenes: [TraceInput<'a, T>; 2],
-    /// Rough places of the left edge, band by band \[px\].
+    /// Rough positions of the left edge, band by band \[px\].
     pub lefts: &'a [Option<f32>],
     /// Those of the right edge.
     pub rights: &'a [Option<f32>],
 }
 
 impl<T: GreyPixel> SaturatedBead<'_, T> {
-    /// Traces edges that were looked at, of which these are cut off before or
+    /// Traces edges that were looked at, of which these are clipped before or
     /// after them. Returns the noise of a pixel \[grey levels\].
     #[cold]
     pub fn trace(
         &self,
         tracers: [&mut EdgeTracer; 2],
-        table: &StepTable,
         cut_off: [[bool; 2]; 2],
     ) -> Result<f32, Reject> {
         let [[_, left_inside], [right_inside, _]] = cut_off;
@@ -43,29 +42,30 @@ impl<T: GreyPixel> SaturatedBead<'_, T> {
             let scene = TraceInput { noise, ..scene };
             match cut_off {
                 [true, true] => return Err(too_much_clipped(0.0)),
-                [false, false] => trace_plainly(tracer, table, &scene)?,
-                [_, hidden_after] => trace_clipped(tracer, table, &scene, hidden_after)?,
+                [false, false] => trace_plainly(tracer, &scene)?,
+                [_, hidden_after] => trace_clipped(tracer, &scene, hidden_after)?,
             }
         }
         Ok(noise)
     }
 
     /// Noise of the side that can be seen: of the bead, or of the ground beside
-    /// it. What is cut off has less.
+    /// it. What is clipped has less.
     fn visible_noise(&self, bead_is_hidden: bool) -> f32 {
         let strip = self.scenes[0].strip;
         let ((left, left_end), (right, right_end)) = (span(self.lefts), span(self.rights));
         let beside = NOISE_MARGIN_PX + NOISE_COLUMNS_PX;
         let ranges = if bead_is_hidden {
             [
-                (left - beside, left - NOISE_MARGIN_PX),
-                (right_end + NOISE_MARGIN_PX, right_end + beside),
+                [left - beside, left - NOISE_MARGIN_PX],
+                [right_end + NOISE_MARGIN_PX, right_end + beside],
             ]
         } else {
-            [(left_end + NOISE_MARGIN_PX, right - NOISE_MARGIN_PX); 2]
+            [[left_end + NOISE_MARGIN_PX, right - NOISE_MARGIN_PX]; 2]
         };
         let (mut square, mut n) = (0.0, 0.0);
-        for columns in ranges.map(|range| columns(strip, range)) {
+        for columns in ranges.map(|range| range.map(|at: f32| floor_to_count(at.into()))) {
+            let columns = columns[0]..columns[1].min(strip.across);
             if !columns.is_empty() {
                 square += pixel_noise::of(strip, columns).powi(2);
                 n += 1.0;
@@ -77,11 +77,10 @@ impl<T: GreyPixel> SaturatedBead<'_, T> {
 
 fn trace_clipped<T: GreyPixel>(
     tracer: &mut EdgeTracer,
-    table: &StepTable,
     scene: &TraceInput<'_, T>,
     hidden_after: bool,
-) -> Result<(), Reject> {
-    let found = tracer.trace_clipped(table, scene, hidden_after).ok_or(too_much_clipped(0.0))?;
+) -> Checked {
+    let found = tracer.trace_clipped(scene, hidden_after).ok_or(too_much_clipped(0.0))?;
     if found.visible_fraction < MIN_VISIBLE_FRACTION || found.variance.sqrt() > MAX_CLIPPED_SIGMA_PX
     {
         return Err(too_much_clipped(found.visible_fraction));
@@ -90,13 +89,9 @@ fn trace_clipped<T: GreyPixel>(
 }
 
 /// An edge both sides of which can be seen.
-fn trace_plainly<T: GreyPixel>(
-    tracer: &mut EdgeTracer,
-    table: &StepTable,
-    scene: &TraceInput<'_, T>,
-) -> Result<(), Reject> {
-    if let Some(blur) = tracer.blur() {
-        tracer.trace(table, scene, blur);
+fn trace_plainly<T: GreyPixel>(tracer: &mut EdgeTracer, scene: &TraceInput<'_, T>) -> Checked {
+    if let Some(fit) = tracer.step_fit {
+        tracer.trace(scene, fit.blur());
     }
     if tracer.is_located() { Ok(()) } else { Err(Reject::NoPair { got: 0.0, need: 1.0 }) }
 }
@@ -105,20 +100,8 @@ fn too_much_clipped(visible: f64) -> Reject {
     Reject::Blinded { visible, need: MIN_VISIBLE_FRACTION }
 }
 
-/// Lowest and highest of an edge's places.
-fn span(places: &[Option<f32>]) -> (f32, f32) {
+/// Lowest and highest of an edge's positions.
+fn span(positions: &[Option<f32>]) -> (f32, f32) {
     let none = (f32::INFINITY, 0.0);
-    places.iter().flatten().fold(none, |(low, high), &at| (low.min(at), f32::max(high, at)))
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "saturates at 0 and is cut to the gauge"
-)]
-fn columns<T: GreyPixel>(
-    strip: &GaugeRows<'_, T>,
-    (from, to): (f32, f32),
-) -> std::ops::Range<usize> {
-    from as usize..(to as usize).min(strip.across)
+    positions.iter().flatten().fold(none, |(low, high), &at| (low.min(at), f32::max(high, at)))
 }

@@ -1,60 +1,63 @@
-//! How far the places of an edge scatter about its course, and over how many
-//! bands that hangs together.
+//! Variance of the positions of an edge about its trajectory, and their correlation over bands.
 
 use crate::numeric::number::to_f64;
 
-/// Weights of a parabola through nine neighbours at the middle one, over 231.
+/// Weights of a parabola through nine neighbours at the middle one, over 231 (Savitzky and Golay
+/// 1964, table I).
 const SMOOTHER: [f64; 9] = [-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0];
-const SMOOTHER_HALF: usize = 4;
-/// Excess that is believed, in standard deviations of its own doubt.
-const MIN_EXCESS_SIGMAS: f64 = 2.5;
-/// Places beyond the terms of their course that tell their scatter.
+/// Neighbours on either side. By definition half of the smoother.
+const SMOOTHER_HALF: usize = SMOOTHER.len() / 2;
+/// Excess of a variance that is accepted, in standard deviations of its own uncertainty. Derived:
+/// noise alone exceeds 2.5 in 0.6 % of the frames.
+pub const MIN_EXCESS_SIGMAS: f64 = 2.5;
+/// Positions beyond the terms of their course that show their spread. Derived: the mean of 1/χ²
+/// with f degrees of freedom is 1/(f − 2), which exists from 3 on.
 const MIN_FREEDOM: f64 = 3.0;
 
-/// A place off the course of its edge.
+/// A position off the course of its edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeResidual {
     /// Distance from the course \[px\].
     pub px: f64,
-    /// Fraction of a band's rows that the place comes from.
+    /// Fraction of a band's rows that the position comes from.
     pub row_fraction: f64,
 }
 
-/// By how much the variance of the mean of an edge's places is larger than
+/// By how much the variance of the mean of an edge's positions is larger than
 /// that of independent ones: from what is left of them when a parabola through
 /// nine neighbours, the bead's own shape, is taken off, and from its
-/// correlation over neighbours. `variance` is what noise explains of a place;
+/// correlation over neighbours. `variance` is what noise explains of a position;
 /// at least 1.
 ///
 /// `None` where gaps leave too few neighbours; see [`inflation_with_gaps`].
 pub fn variance_inflation(
-    places: &[Option<f64>],
+    positions: &[Option<f64>],
     variance: f64,
-    memory: &mut Vec<f64>,
+    scratch: &mut Vec<f64>,
 ) -> Option<f64> {
-    memory.clear();
-    memory.extend(places.windows(2 * SMOOTHER_HALF + 1).filter_map(residual));
-    let n = to_f64(memory.len());
-    if memory.len() < 2 * SMOOTHER_HALF {
+    scratch.clear();
+    scratch.extend(positions.windows(2 * SMOOTHER_HALF + 1).filter_map(residual));
+    let n = to_f64(scratch.len());
+    if scratch.len() < 2 * SMOOTHER_HALF {
         return None;
     }
     if variance <= 0.0 {
         return Some(1.0);
     }
     let product = |lag: usize| -> f64 {
-        let pairs = memory.iter().zip(&memory[lag..]);
+        let pairs = scratch.iter().zip(&scratch[lag..]);
         pairs.map(|(a, b)| a * b).sum::<f64>() / (n - to_f64(lag))
     };
     let passed = [residual_covariance(0), residual_covariance(1), residual_covariance(2)];
     let (same, next) = (product(0), product(1));
     let ratio = same / (passed[0] * variance);
-    // The products of what is left hang together over a few neighbours, so
+    // The products of what is left are correlated over a few neighbours, so
     // that there are fewer of them than it seems.
     let ratio_sigma = (2.0 * 1.43 / n).sqrt();
     if ratio < 1.0 + MIN_EXCESS_SIGMAS * ratio_sigma {
         return Some(1.0);
     }
-    // Covariance of a place with itself and with the next, before the
+    // Covariance of a position with itself and with the next, before the
     // parabola was taken off: same = p₀c₀ + 2p₁c₁, next = p₁c₀ + (p₀ + p₂)c₁.
     let both = passed[0] + passed[2];
     let under = passed[0] * both - 2.0 * passed[1] * passed[1];
@@ -63,17 +66,17 @@ pub fn variance_inflation(
     Some(((itself + 2.0 * with_next.max(0.0)) / variance).max(ratio))
 }
 
-/// The same of places with gaps between them, from their distances to the
-/// course that was fitted to them with so many terms. What the bead's own shape leaves counts as an error too:
-/// the gaps hide as much of it.
+/// The same of positions with gaps between them, from their distances to the course that was fitted
+/// to them with so many terms. What the bead's own shape leaves counts as an error too: the gaps
+/// hide as much of it.
 pub fn inflation_with_gaps(
-    places: impl Iterator<Item = EdgeResidual>,
+    positions: impl Iterator<Item = EdgeResidual>,
     variance: f64,
     terms: usize,
 ) -> f64 {
     let (mut square, mut n) = (0.0, 0.0);
-    for EdgeResidual { px, row_fraction: share } in places {
-        square += share * px * px;
+    for EdgeResidual { px, row_fraction: fraction } in positions {
+        square += fraction * px * px;
         n += 1.0;
     }
     let free = n - to_f64(terms);
@@ -84,21 +87,21 @@ pub fn inflation_with_gaps(
     if ratio < 1.0 + MIN_EXCESS_SIGMAS * (2.0 / free).sqrt() {
         return 1.0;
     }
-    // So few do not tell their own scatter well: mean of its inverse.
+    // So few do not show their own spread well: mean of its inverse.
     ratio * free / (free - 2.0)
 }
 
-/// What the parabola leaves of the middle place; `None` where one is missing.
-fn residual(places: &[Option<f64>]) -> Option<f64> {
+/// What the parabola leaves of the middle position; `None` where one is missing.
+fn residual(positions: &[Option<f64>]) -> Option<f64> {
     let mut smooth = 0.0;
-    for (place, weight) in places.iter().zip(SMOOTHER) {
-        smooth += weight / 231.0 * (*place)?;
+    for (position, weight) in positions.iter().zip(SMOOTHER) {
+        smooth += weight / 231.0 * (*position)?;
     }
-    Some(places[SMOOTHER_HALF]? - smooth)
+    Some(positions[SMOOTHER_HALF]? - smooth)
 }
 
-/// What is left of independent places of variance 1, times itself or what is
-/// left so many places on.
+/// What is left of independent positions of variance 1, times itself or what is
+/// left so many positions on.
 fn residual_covariance(lag: usize) -> f64 {
     let left = |k: usize| f64::from(u8::from(k == SMOOTHER_HALF)) - SMOOTHER[k] / 231.0;
     (0..SMOOTHER.len() - lag).map(|k| left(k) * left(k + lag)).sum()
@@ -135,8 +138,8 @@ mod tests {
     }
 
     fn found(values: &[f64]) -> f64 {
-        let places: Vec<Option<f64>> = values.iter().copied().map(Some).collect();
-        variance_inflation(&places, 1.0, &mut Vec::new()).unwrap()
+        let positions: Vec<Option<f64>> = values.iter().copied().map(Some).collect();
+        variance_inflation(&positions, 1.0, &mut Vec::new()).unwrap()
     }
 
     #[test]
@@ -154,22 +157,22 @@ mod tests {
 
     #[test]
     fn gaps_that_leave_no_neighbours_are_told_and_the_course_shows_the_scatter() {
-        let places = |seed: u64| -> Vec<Option<f64>> {
+        let positions = |seed: u64| -> Vec<Option<f64>> {
             let all = white(seed, 64).into_iter().enumerate();
             all.map(|(k, at)| (k % 5 < 2).then_some(at)).collect()
         };
-        assert_eq!(variance_inflation(&places(0), 1.0, &mut Vec::new()), None);
+        assert_eq!(variance_inflation(&positions(0), 1.0, &mut Vec::new()), None);
         let of = |seed, variance| {
-            let places = places(seed);
+            let positions = positions(seed);
             inflation_with_gaps(
-                places.iter().flatten().map(|&px| EdgeResidual { px, row_fraction: 1.0 }),
+                positions.iter().flatten().map(|&px| EdgeResidual { px, row_fraction: 1.0 }),
                 variance,
                 2,
             )
         };
         let inflated = (0..200).filter(|&seed| of(seed, 1.0) > 1.0).count();
         assert!(inflated <= 8, "{inflated}");
-        // Of 24 degrees of freedom the inverse of the scatter is 12/11 too large.
+        // Of 24 degrees of freedom the inverse of the spread is 12/11 too large.
         let mean = (0..200).map(|seed| of(seed, 0.1)).sum::<f64>() / 200.0;
         assert!((mean / 10.0 - 12.0 / 11.0).abs() < 0.12, "{mean}");
     }
@@ -184,5 +187,15 @@ mod tests {
         };
         let mean = (0..20).map(of).sum::<f64>() / 20.0;
         assert!((mean / 4.0 - 1.0).abs() < 0.25, "{mean}");
+    }
+
+    /// Savitzky and Golay 1964: the smoother leaves a parabola as it is.
+    #[test]
+    fn the_smoother_keeps_parabolas() {
+        for (power, expected) in [(0, 231.0), (1, 0.0), (2, 0.0)] {
+            let terms = SMOOTHER.iter().enumerate();
+            let sum: f64 = terms.map(|(k, weight)| weight * (to_f64(k) - 4.0).powi(power)).sum();
+            assert!((sum - expected).abs() < 1e-9, "{power}: {sum}");
+        }
     }
 }

@@ -5,53 +5,18 @@
 //! `u` runs along y, so that its upper edge is the left one.
 
 use crate::core::frame::{Frame, Pixels};
-use crate::core::geometry::{ImagePoint, Roi};
 
 use super::gamma::LightTable;
-use super::gauge::BeadAxis;
+use super::gauge::{BeadAxis, GaugeView};
 
-/// Side of the squares in which a region is turned: a row of one fits a register,
+/// Side of the squares in which a region is turned. Derived: 16 bytes fill a vector of 128 bits,
 /// and reading and writing stay in the cache.
 const TILE: usize = 16;
 
-/// The gauge laid over an image.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GaugeView {
-    roi: Roi,
-    axis: BeadAxis,
-    /// Number of pixels across the bead.
-    pub across: usize,
-    /// Number of pixels along the bead.
-    pub along: usize,
-}
-
-impl GaugeView {
-    /// Lays a region over an image.
-    pub fn new(roi: Roi, axis: BeadAxis) -> Self {
-        let (across, along) = match axis {
-            BeadAxis::Vertical => (roi.width, roi.height),
-            BeadAxis::Horizontal => (roi.height, roi.width),
-        };
-        Self { roi, axis, across, along }
-    }
-
-    /// The image point of gauge coordinates.
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    pub fn to_image(self, u: f64, v: f64) -> ImagePoint {
-        let (x, y) = (self.roi.x as f64, self.roi.y as f64);
-        match self.axis {
-            BeadAxis::Vertical => ImagePoint::new(x + u, y + v),
-            BeadAxis::Horizontal => ImagePoint::new(x + v, y + u),
-        }
-    }
-}
-
 /// Grey values as the measurement takes them.
-pub trait GreyPixel: Copy + Default + PartialOrd {
+pub trait GreyPixel: Copy + Default + PartialOrd + Into<u32> {
     /// What the sum of up to 128 values fits.
     type Sum: Copy + Default;
-    /// The value as a whole number.
-    fn level(self) -> u32;
     /// The sum of four, without its lowest `shift` bits, which must fit 16.
     fn sum_of_four(values: [Self; 4], shift: u32) -> u16;
     /// Distance from another value.
@@ -64,11 +29,6 @@ pub trait GreyPixel: Copy + Default + PartialOrd {
 
 impl GreyPixel for u8 {
     type Sum = u16;
-
-    #[inline(always)]
-    fn level(self) -> u32 {
-        u32::from(self)
-    }
 
     #[inline(always)]
     fn sum_of_four([a, b, c, d]: [Self; 4], _: u32) -> u16 {
@@ -93,11 +53,6 @@ impl GreyPixel for u8 {
 
 impl GreyPixel for u16 {
     type Sum = u32;
-
-    #[inline(always)]
-    fn level(self) -> u32 {
-        u32::from(self)
-    }
 
     #[inline(always)]
     fn sum_of_four([a, b, c, d]: [Self; 4], shift: u32) -> u16 {
@@ -135,7 +90,7 @@ pub struct GaugeRows<'a, T> {
     pub white: T,
     /// Grey levels of 256 for one step of the camera's scale.
     pub scale: f32,
-    /// Distance of the grey levels that the camera can tell apart, of 256.
+    /// Distance of the grey levels that the camera can distinguish, of 256.
     pub level_step: f32,
 }
 
@@ -159,14 +114,14 @@ impl<'a, T: GreyPixel> GaugeRows<'a, T> {
         after.fill(self.nearest(v, self.across.cast_signed()));
     }
 
-    /// The pixel of a row at a place, or the nearest one in the gauge.
+    /// The pixel of a row at a position, or the nearest one in the gauge.
     #[inline(always)]
-    pub fn nearest(&self, v: usize, place: isize) -> T {
-        self.row(v)[usize::try_from(place).unwrap_or(0).min(self.across - 1)]
+    pub fn nearest(&self, v: usize, position: isize) -> T {
+        self.row(v)[usize::try_from(position).unwrap_or(0).min(self.across - 1)]
     }
 }
 
-/// Frames laid out in rows across the bead; keeps the length of the history for those of
+/// Frames laid out in rows across the bead; keeps its buffers for those of
 /// horizontal beads, which have to be turned, and for light where the camera has
 /// a gamma.
 #[derive(Debug, Clone, Default)]
@@ -225,17 +180,17 @@ fn to_light<'a, T: GreyPixel + Into<u16>>(
     strip: &GaugeRows<'_, T>,
     gamma: f64,
     linear: &mut Option<LightTable>,
-    memory: &'a mut Vec<u16>,
+    scratch: &'a mut Vec<u16>,
 ) -> GaugeRows<'a, u16> {
     let white = strip.white.into();
     let known = linear.take().filter(|linear| linear.is_for(gamma, white));
     let linear = linear.insert(known.unwrap_or_else(|| LightTable::new(gamma, white)));
-    memory.clear();
+    scratch.clear();
     for v in 0..strip.along {
-        memory.extend(strip.row(v).iter().map(|&level| linear.light(level.into())));
+        scratch.extend(strip.row(v).iter().map(|&level| linear.light(level.into())));
     }
     GaugeRows {
-        values: memory,
+        values: scratch,
         stride: strip.across,
         across: strip.across,
         along: strip.along,
@@ -250,26 +205,25 @@ fn lay<'a, T: GreyPixel>(
     image_width: usize,
     view: &GaugeView,
     white: T,
-    memory: &'a mut Vec<T>,
+    scratch: &'a mut Vec<T>,
 ) -> GaugeRows<'a, T> {
     let first = view.roi.y * image_width + view.roi.x;
     let (values, stride) = match view.axis {
         BeadAxis::Vertical => (&values[first..], image_width),
         BeadAxis::Horizontal => {
-            turn(&values[first..], image_width, view, memory);
-            (memory.as_slice(), view.across)
+            turn(&values[first..], image_width, view, scratch);
+            (scratch.as_slice(), view.across)
         }
     };
-    #[expect(clippy::cast_precision_loss, reason = "16 bits fit a float")]
-    let scale = 255.0 / white.level().max(1) as f32;
+    let scale = 255.0 / T::sum_to_f32(white.add_to(T::Sum::default())).max(1.0);
     let (across, along) = (view.across, view.along);
     GaugeRows { values, stride, across, along, white, scale, level_step: scale }
 }
 
 /// Writes columns of the region as rows, tile by tile; what is left at the ends
 /// pixel by pixel.
-fn turn<T: GreyPixel>(values: &[T], image_width: usize, view: &GaugeView, memory: &mut Vec<T>) {
-    memory.resize(view.across * view.along, T::default());
+fn turn<T: GreyPixel>(values: &[T], image_width: usize, view: &GaugeView, scratch: &mut Vec<T>) {
+    scratch.resize(view.across * view.along, T::default());
     let whole = |side: usize| side - side % TILE;
     for u in (0..whole(view.across)).step_by(TILE) {
         for v in (0..whole(view.along)).step_by(TILE) {
@@ -279,14 +233,14 @@ fn turn<T: GreyPixel>(values: &[T], image_width: usize, view: &GaugeView, memory
             }
             let tile = transposed(tile);
             for (k, row) in tile.iter().enumerate() {
-                memory[(v + k) * view.across + u..][..TILE].copy_from_slice(row);
+                scratch[(v + k) * view.across + u..][..TILE].copy_from_slice(row);
             }
         }
     }
     for v in 0..view.along {
         let from = if v < whole(view.along) { whole(view.across) } else { 0 };
         for u in from..view.across {
-            memory[v * view.across + u] = values[u * image_width + v];
+            scratch[v * view.across + u] = values[u * image_width + v];
         }
     }
 }
@@ -315,7 +269,7 @@ fn transposed<T: GreyPixel>(mut tile: [[T; TILE]; TILE]) -> [[T; TILE]; TILE] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::geometry::Size;
+    use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
 
     fn ramp() -> Frame {

@@ -1,27 +1,30 @@
-//! What a blurred edge is in the pixels of a row, tabulated for places between
-//! two pixels, and with it what a row says of the edge.
+//! A blurred edge in the pixels of a row, tabulated for positions between two pixels, and the
+//! comparison of a row with it.
+
+use std::ops::Range;
 
 use nalgebra::Matrix3;
 
 use super::overlay::StepShape;
 use super::phase::{offset, split};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{floor_to_count, to_f64};
 
 pub mod textured;
 
-/// Pixels that are taken together.
+/// Pixels that are taken together. Derived: 16 floats fill a vector of 512 bits.
 const LANES: usize = 16;
-/// Places between two pixels for which the edge is tabulated.
+/// Positions between two pixels for which the edge is tabulated.
 const SUBPIXEL_PHASES: usize = 8;
-/// Chunks of the core at most: a blur of 12 px and more is cut short.
-const MAX_CORE_CHUNKS: usize = 6;
+/// Chunks of the core at most: a blur of 13 px and more is cut short. By definition all.
+const MAX_CORE_CHUNKS: usize = MAX_CHUNKS;
 /// Chunks of the surroundings on either side at most.
 const MAX_PLAIN_CHUNKS: usize = 2;
-/// Chunks at most: what the overlay reaches, rounded up.
+/// Chunks at most. Derived: 96/16, what an overlay reaches.
 const MAX_CHUNKS: usize = 6;
-/// Half the core, in blurs and pixels beside.
+/// Half the core, in blurs. Derived: beyond 3.5 blurs 2·10⁻⁴ of a step is left, 1 − Φ(3.5).
 const CORE_BLURS: f64 = 3.5;
+/// And beyond that \[px\], for an edge between two pixels.
 const CORE_MARGIN_PX: f64 = 1.0;
 /// Chunks of the core in textured surroundings, of which nothing is plain.
 const TEXTURED_CORE_CHUNKS: usize = 4;
@@ -31,11 +34,11 @@ type Chunk = [f32; LANES];
 /// One chunk of pixels of the template.
 #[derive(Debug, Clone, Copy, Default)]
 struct TemplateChunk {
-    /// Share of the step that is reached, with shading.
+    /// Fraction of the step that is reached, with shading.
     step: Chunk,
     /// 1 where the pixel counts.
     mask: Chunk,
-    /// The pure step's share, where the pixel counts.
+    /// The pure step's fraction, where the pixel counts.
     after: Chunk,
     /// Slope of the step \[1/px\], where the pixel counts.
     slope: Chunk,
@@ -46,16 +49,8 @@ struct TemplateChunk {
 pub struct Products {
     /// slope · slope.
     pub slope_slope: f64,
-    /// slope · before.
-    pub slope_before: f64,
-    /// slope · after.
-    pub slope_after: f64,
-    /// before · before.
-    pub before_before: f64,
-    /// before · after.
-    pub before_after: f64,
-    /// after · after.
-    pub after_after: f64,
+    /// slope · before, slope · after, before · before, before · after, after · after.
+    pub others: [f64; 5],
     /// Pixels that count.
     pub pixels: f64,
 }
@@ -65,12 +60,12 @@ pub struct Products {
 pub struct StepTemplate {
     parts: Vec<TemplateChunk>,
     chunks: usize,
-    core: std::ops::Range<usize>,
+    core: Range<usize>,
     /// Sums over the core.
     pub products: Products,
 }
 
-/// What a row says: how far it is from the levels and the place it was
+/// What a row shows: how far it is from the levels and the position it was
 /// expected to have.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RowSums {
@@ -78,9 +73,9 @@ pub struct RowSums {
     pub slope: f32,
     /// Sum of the squared residuals.
     pub sum_of_squares: f32,
-    /// Residual times the share before the edge.
+    /// Residual times the fraction before the edge.
     pub before: f32,
-    /// Residual times the share after it.
+    /// Residual times the fraction after it.
     pub after: f32,
     /// Pixels that lie too far off to be noise; they count as fitting.
     pub wild: f32,
@@ -101,24 +96,19 @@ pub struct PlainSums {
 }
 
 impl PlainSums {
-    /// Number of pixels before the edge and the sum of their residuals.
-    pub fn before(&self) -> (f32, f32) {
-        (total(&self.before[0]), total(&self.before[1]))
-    }
-
-    /// The same after it.
-    pub fn after(&self) -> (f32, f32) {
-        (total(&self.after[0]), total(&self.after[1]))
+    /// Number of pixels and sum of their residuals, before the edge and after it.
+    pub fn totals(&self) -> [[f64; 2]; 2] {
+        [&self.before, &self.after].map(|sums| sums.map(|lanes| total(&lanes).into()))
     }
 }
 
-/// Place and levels that a row is held against.
+/// Position and levels that a row is compared with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExpectedStep {
     /// Position of the edge \[px\], within a sixteenth of a pixel of the one that
     /// was asked for: a pixel and a phase.
     pub at: f32,
-    place: isize,
+    position: isize,
     phase: usize,
     /// Level before it \[grey levels\].
     pub before: f32,
@@ -127,21 +117,21 @@ pub struct ExpectedStep {
     /// Plain pixels farther from their level are grains or sparks
     /// \[grey levels\].
     pub tolerance: f32,
-    /// The same for pixels of the step, where the place may be off a little
+    /// The same for pixels of the step, where the position may be off a little
     /// \[grey levels\].
     pub tolerance_at_step: f32,
 }
 
 impl ExpectedStep {
-    /// A place, the level before it and the step to the level after it, and how
+    /// A position, the level before it and the step to the level after it, and how
     /// far pixels may be off beside the step and on it.
     #[inline(always)]
     pub fn new([at, before, step]: [f32; 3], tolerances: [f32; 2]) -> Self {
-        let (place, phase) = split(at, SUBPIXEL_PHASES);
-        #[expect(clippy::cast_precision_loss, reason = "a place near the gauge, few phases")]
-        let at = place as f32 + phase as f32 / SUBPIXEL_PHASES as f32;
+        let (position, phase) = split(at, SUBPIXEL_PHASES);
+        #[expect(clippy::cast_precision_loss, reason = "a position near the gauge, few phases")]
+        let at = position as f32 + phase as f32 / SUBPIXEL_PHASES as f32;
         let [tolerance, tolerance_at_step] = tolerances;
-        Self { at, place, phase, before, step, tolerance, tolerance_at_step }
+        Self { at, position, phase, before, step, tolerance, tolerance_at_step }
     }
 }
 
@@ -208,7 +198,7 @@ impl StepTemplate {
         [count(&parts[..self.core.start]), count(&parts[self.core.end..])]
     }
 
-    /// Holds a window against the edge; `None` where the edge lies too near its
+    /// Compares a window with the edge; `None` where the edge lies too near its
     /// end.
     #[inline(always)]
     pub fn compare(
@@ -217,22 +207,11 @@ impl StepTemplate {
         expected: &ExpectedStep,
         plain: &mut PlainSums,
     ) -> Option<RowSums> {
-        let ExpectedStep { place, phase, .. } = *expected;
+        let ExpectedStep { position, phase, .. } = *expected;
         let reach = (self.core.start * LANES + self.core.len() * LANES / 2).cast_signed();
-        let start = usize::try_from(place - reach - first).ok()?;
+        let start = usize::try_from(position - reach - first).ok()?;
         let pixels = pixels.get(start..start + self.chunks * LANES)?;
         let parts = &self.parts[phase * MAX_CHUNKS..][..self.chunks];
-        Some(self.sum(parts, pixels, expected, plain))
-    }
-
-    #[inline(always)]
-    fn sum(
-        &self,
-        parts: &[TemplateChunk],
-        pixels: &[f32],
-        expected: &ExpectedStep,
-        plain: &mut PlainSums,
-    ) -> RowSums {
         let (before, rest) = parts.split_at(self.core.start);
         let (core, after) = rest.split_at(self.core.len());
         let (pixels_before, rest) = pixels.split_at(before.len() * LANES);
@@ -253,7 +232,7 @@ impl StepTemplate {
         add_plain(before, pixels_before, expected, &mut plain.before);
         add_plain(after, pixels_after, expected, &mut plain.after);
         let [slope, squares, all, after, wild] = lanes.map(|lanes| total(&lanes));
-        RowSums { slope, sum_of_squares: squares, before: all - after, after, wild }
+        Some(RowSums { slope, sum_of_squares: squares, before: all - after, after, wild })
     }
 }
 
@@ -357,65 +336,71 @@ impl Products {
         for k in 0..LANES {
             let (mask, after, slope) = (part.mask[k], part.after[k], part.slope[k]);
             let before = mask - after;
-            let products = [
-                slope * slope,
-                slope * before,
-                slope * after,
-                before * before,
-                before * after,
-                after * after,
-                mask,
-            ];
-            for (lane, product) in lanes.iter_mut().zip(products) {
-                lane[k] = product;
-            }
+            (lanes[0][k], lanes[1][k]) = (slope * slope, slope * before);
+            (lanes[2][k], lanes[3][k]) = (slope * after, before * before);
+            (lanes[4][k], lanes[5][k]) = (before * after, after * after);
+            lanes[6][k] = mask;
         }
-        let sums = lanes.map(|lane| f64::from(total(&lane)));
-        self.slope_slope += sums[0];
-        self.slope_before += sums[1];
-        self.slope_after += sums[2];
-        self.before_before += sums[3];
-        self.before_after += sums[4];
-        self.after_after += sums[5];
-        self.pixels += sums[6];
+        let [slope_slope, others @ .., pixels] = lanes.map(|lane| f64::from(total(&lane)));
+        self.slope_slope += slope_slope;
+        self.pixels += pixels;
+        for (sum, other) in self.others.iter_mut().zip::<[f64; 5]>(others) {
+            *sum += other;
+        }
     }
 
     /// Normal equations of one row for the step times its shift, the level
     /// before it and the level after it.
     pub fn matrix(&self) -> Matrix3<f64> {
-        Matrix3::new(
-            self.slope_slope,
-            -self.slope_before,
-            -self.slope_after,
-            -self.slope_before,
-            self.before_before,
-            self.before_after,
-            -self.slope_after,
-            self.before_after,
-            self.after_after,
-        )
+        let [sb, sa, bb, ba, aa] = self.others;
+        Matrix3::new(self.slope_slope, -sb, -sa, -sb, bb, ba, -sa, ba, aa)
     }
 
     fn mean(self) -> Self {
-        let share = 1.0 / to_f64(SUBPIXEL_PHASES);
-        Self {
-            slope_slope: share * self.slope_slope,
-            slope_before: share * self.slope_before,
-            slope_after: share * self.slope_after,
-            before_before: share * self.before_before,
-            before_after: share * self.before_after,
-            after_after: share * self.after_after,
-            pixels: share * self.pixels,
-        }
+        let fraction = 1.0 / to_f64(SUBPIXEL_PHASES);
+        let others = self.others.map(|other| fraction * other);
+        Self { slope_slope: fraction * self.slope_slope, others, pixels: fraction * self.pixels }
     }
 }
 
 /// Chunks that hold so many pixels.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "not negative, and a window is short"
-)]
 fn chunks(pixels: f64) -> usize {
-    (pixels.max(0.0) / to_f64(LANES)).ceil() as usize
+    floor_to_count((pixels.max(0.0) / to_f64(LANES)).ceil())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vision::overlay::{BlurredStep, Clearance, NeighbourSteps, SideShading};
+
+    /// A parabola that begins at the edge is, blurred, (x² + s²)Φ(x/s) + xsφ(x/s).
+    #[test]
+    fn the_table_is_the_blurred_step_with_its_shading_and_bend() {
+        let (blur, slope, bend) = (1.6f64, 0.01, -0.0004);
+        let shape = StepShape {
+            step: BlurredStep { at: 0.0, blur, before: 0.0, after: 1.0 },
+            extent: Clearance { before: 20.0, after: 20.0 },
+            shading: [SideShading::default(), SideShading { slope, bend }],
+            flanks: NeighbourSteps::default(),
+            variance: 0.0,
+        };
+        let mut template = StepTemplate::default();
+        template.tabulate(&StepTable::default(), &shape, false);
+        let middle =
+            to_f64(template.core.start * LANES) + to_f64(template.core.len() * LANES) / 2.0;
+        for phase in [0, 3] {
+            for k in template.core.start * LANES..template.core.end * LANES {
+                let x = to_f64(k) - middle - offset(phase, SUBPIXEL_PHASES);
+                let z = x / blur;
+                let step = 0.5 * libm::erfc(-z / 2f64.sqrt());
+                let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
+                let line = x * step + blur * density;
+                let parabola = (x * x + blur * blur) * step + x * blur * density;
+                let expected = step + slope * line + bend * parabola;
+                let part = &template.parts[phase * MAX_CHUNKS + k / LANES];
+                let found = f64::from(part.step[k % LANES]);
+                assert!((found - expected).abs() < 1e-3, "{x}: {found} {expected}");
+            }
+        }
+    }
 }

@@ -1,11 +1,10 @@
-//! Texture of bead and ground, a random pattern that hangs together over a few
-//! pixels: whether there is one in the rows laid over each other, how strong it
-//! is and how far it reaches.
+//! Texture of bead and ground, a random pattern that is correlated over a few pixels: whether the
+//! superimposed rows show one, its strength and its length.
 
 use std::sync::LazyLock;
 
 use super::overlay::{Overlay, SideRange};
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f64};
 
 /// Variance of the rows about an edge, in that of their noise, from which on
 /// they are looked at for texture: noise alone, in 100 rows, has less in all but one of
@@ -15,14 +14,15 @@ const MIN_VARIANCE_RATIO: f64 = 1.12;
 /// step or does not lie where it is thought; by more than so many times, and it
 /// is not texture that makes them differ.
 const MAX_EDGE_RATIO: f64 = 1.6;
-/// Least variance of a texture, in that of the noise.
+/// Smallest variance of a texture, in that of the noise.
 const MIN_TEXTURE_RATIO: f64 = 0.1;
 /// Longest texture \[px\]: what changes more slowly is light, or the bead's
 /// shape, which the levels of the caliper lines follow.
 const MAX_LENGTH_PX: f64 = 11.0;
 /// Variance of the texture on one side over that on the other below which they differ.
 const MAX_SIDE_RATIO: f64 = 0.25;
-/// Samples beyond so many standard deviations are grains and sparks.
+/// Samples beyond so many standard deviations are grains and sparks. Derived: noise alone exceeds 4
+/// in 6 of 100,000 samples.
 const OUTLIER_SIGMAS: f64 = 4.0;
 /// Rows that differ by so many medians of what rows do have one on them.
 const MAX_ROW_MISFIT: f32 = 4.0;
@@ -30,18 +30,23 @@ const MAX_ROW_MISFIT: f32 = 4.0;
 const LAGS: usize = 8;
 /// Samples of a side that are needed for that.
 const MIN_SIDE_PX: usize = 2 * LAGS;
-/// Longest stretch of a row on one side of the edge \[px\].
+/// Longest segment of a row on one side of the edge \[px\].
 const MAX_SIDE_PX: usize = 40;
 
 /// Autocorrelations exp(−(r/length)^power) that are tried, up to 19 px.
 const POWERS: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
+/// Number of the lengths that are tried. Derived: 0.7 · 1.12²⁹ = 19 px, beyond the longest texture
+/// that is accepted.
 const LENGTHS: usize = 30;
+/// The shortest of them \[px\]: a shorter texture is noise.
 const FIRST_LENGTH_PX: f64 = 0.7;
+/// Ratio of one to the next.
 const LENGTH_RATIO: f64 = 1.12;
 /// Rows of a window at most; more are taken for so many.
 const MAX_ROWS: usize = 8;
-/// Table of their integrals along the edge: places for a length, lengths.
+/// Table of the integrals along the edge: positions for each correlation length.
 const PER_LENGTH: usize = 8;
+/// Correlation lengths that it reaches: beyond, nothing is left.
 const TABLE_LENGTHS: usize = 12;
 
 /// Texture and noise about an edge.
@@ -51,11 +56,11 @@ pub struct SurfaceTexture {
     pub noise: f64,
     /// Variance of the texture.
     variance: f64,
-    /// Distance over which it hangs together \[px\].
+    /// Distance over which it is correlated \[px\].
     length: f64,
     /// Which of [`POWERS`] its autocorrelation has.
     power: usize,
-    /// Rows of a window, and the share of the texture that is left of it in
+    /// Rows of a window, and the fraction of the texture that is left of it in
     /// their mean.
     rows: f64,
     kept_fraction: f64,
@@ -64,13 +69,13 @@ pub struct SurfaceTexture {
 }
 
 impl SurfaceTexture {
-    /// Reads it from windows laid over each other, `None` where there is no
+    /// Reads it from windows superimposed, `None` where there is no
     /// texture to speak of. `noise` is the variance of a pixel, all variances
-    /// are in squared shares of the step; `beside` are the pixels that are free of
+    /// are as squared fractions of the step; `beside` are the pixels that are free of
     /// the edge, before it and after it.
     #[inline(always)]
     pub fn read(overlay: &Overlay, noise: f64, beside: [SideRange; 2]) -> Option<Self> {
-        let (rows, windows) = overlay.laid();
+        let (rows, windows) = overlay.placed();
         let rows = rows / windows.max(1.0);
         let about_edge = rows * overlay.row_variance();
         if about_edge < MIN_VARIANCE_RATIO * noise {
@@ -93,27 +98,19 @@ impl SurfaceTexture {
         {
             return None;
         }
-        let AutocorrelationFit { power, length, variance, kept } = TABLES.fit(&all, rows);
+        let AutocorrelationFit { power, length, variance, kept_fraction } = TABLES.fit(&all, rows);
         if length > MAX_LENGTH_PX {
             return None;
         }
         // What neighbouring rows differ by, as noise is found, has a little of
         // the texture in it.
-        let noise = (rows * (all[0] - kept * variance)).clamp(0.25 * noise, 1.1 * noise);
-        let sides = sides.map(|side| side.map(|all| (rows * all - noise).max(0.0)));
-        let texture = Self {
-            noise,
-            variance,
-            length,
-            power,
-            rows,
-            kept_fraction: kept,
-            sides: side_levels(sides),
-        };
-        (rows * kept * variance > MIN_TEXTURE_RATIO * noise).then_some(texture)
+        let noise = (rows * (all[0] - kept_fraction * variance)).clamp(0.25 * noise, 1.1 * noise);
+        let sides = side_levels(sides.map(|side| side.map(|all| (rows * all - noise).max(0.0))));
+        let texture = Self { noise, variance, length, power, rows, kept_fraction, sides };
+        (rows * kept_fraction * variance > MIN_TEXTURE_RATIO * noise).then_some(texture)
     }
 
-    /// With grey levels instead of shares of a step.
+    /// With grey levels instead of fractions of a step.
     pub fn in_grey(self, step: f64) -> Self {
         let square = step * step;
         Self { noise: square * self.noise, variance: square * self.variance, ..self }
@@ -129,7 +126,7 @@ impl SurfaceTexture {
         self.noise / self.rows
     }
 
-    /// Standard deviation where a share of the edge's step is reached, over the root of its
+    /// Standard deviation where a fraction of the edge's step is reached, over the root of its
     /// mean square before and after the edge.
     pub fn level_at(&self, step: f64) -> f64 {
         let [before, after] = self.sides;
@@ -157,7 +154,7 @@ impl SurfaceTexture {
     }
 
     /// Squared correlation of pixels, summed up over a window: so many of them
-    /// say of its strength what one alone does.
+    /// show of its strength what one alone does.
     pub fn effective_pixels(&self) -> f64 {
         let all = self.of_window() + self.noise_of_window();
         let shared = |lag: usize| (self.within_window(to_f64(lag)) / all).powi(2);
@@ -174,8 +171,8 @@ struct Covariances {
 }
 
 /// Standard deviations before and after the edge, over the root of their mean square, from
-/// variances: weights for the same texture on both sides believe that what they see on the one
-/// tells them of the other.
+/// variances: weights for the same texture on both sides assume that what they see on the one
+/// shows them the other.
 fn side_levels(sides: [Option<f64>; 2]) -> [f64; 2] {
     match sides {
         [Some(before), Some(after)] if before.min(after) < MAX_SIDE_RATIO * before.max(after) => {
@@ -191,8 +188,7 @@ fn covariances(overlay: &Overlay, beside: [SideRange; 2], limit: f64) -> Option<
     let mut sums = [0.0; LAGS + 1];
     let mut counts = [0.0; LAGS + 1];
     let mut sides = [None; 2];
-    #[expect(clippy::cast_possible_truncation, reason = "a share of a step")]
-    let limit = limit as f32;
+    let limit = narrow_to_f32(limit);
     for (side, SideRange { near, far }) in beside.into_iter().enumerate() {
         let (sum_before, count_before) = (sums[0], counts[0]);
         let length = far.saturating_sub(near).min(MAX_SIDE_PX);
@@ -218,12 +214,12 @@ fn covariances(overlay: &Overlay, beside: [SideRange; 2], limit: f64) -> Option<
         return None;
     }
     // The mean that is taken off has some of every window in it.
-    let (_, windows) = overlay.laid();
-    let share = windows / (windows - 1.0).max(1.0);
+    let (_, windows) = overlay.placed();
+    let fraction = windows / (windows - 1.0).max(1.0);
     for (sum, count) in sums.iter_mut().zip(counts) {
-        *sum *= share / count;
+        *sum *= fraction / count;
     }
-    Some(Covariances { all: sums, sides: sides.map(|side| side.map(|sum: f64| share * sum)) })
+    Some(Covariances { all: sums, sides: sides.map(|side| side.map(|sum: f64| fraction * sum)) })
 }
 
 #[inline(always)]
@@ -250,7 +246,7 @@ struct AutocorrelationFit {
     power: usize,
     length: f64,
     variance: f64,
-    kept: f64,
+    kept_fraction: f64,
 }
 
 /// Covariances of windows at distances of 0 to [`LAGS`], for each power and
@@ -279,14 +275,15 @@ impl TextureTables {
     fn fit(&self, covariances: &[f64; LAGS + 1], rows: f64) -> AutocorrelationFit {
         let rows = rows.clamp(1.0, to_f64(MAX_ROWS));
         let fewer = (1..MAX_ROWS).rfind(|&few| to_f64(few) <= rows).unwrap_or(1);
-        let share = rows - to_f64(fewer);
+        let fraction = rows - to_f64(fewer);
         let (fewer, more) = (&self.windows[fewer - 1], &self.windows[fewer.min(MAX_ROWS - 1)]);
         let mut best = 0.0;
+        let (power, variance, kept_fraction) = (0, 0.0, 1.0);
         let mut fit =
-            AutocorrelationFit { power: 0, length: FIRST_LENGTH_PX, variance: 0.0, kept: 1.0 };
+            AutocorrelationFit { power, length: FIRST_LENGTH_PX, variance, kept_fraction };
         for (power, (fewer, more)) in fewer.iter().zip(more).enumerate() {
             for (number, (fewer, more)) in fewer.iter().zip(more).enumerate() {
-                let model = |lag: usize| fewer[lag] + share * (more[lag] - fewer[lag]);
+                let model = |lag: usize| fewer[lag] + fraction * (more[lag] - fewer[lag]);
                 let (mut product, mut square) = (0.0, 0.0);
                 for (lag, found) in covariances.iter().enumerate().skip(1) {
                     let model = model(lag);
@@ -297,7 +294,7 @@ impl TextureTables {
                 if explained > best {
                     best = explained;
                     let (length, variance) = (length(number), product / square);
-                    fit = AutocorrelationFit { power, length, variance, kept: model(0) };
+                    fit = AutocorrelationFit { power, length, variance, kept_fraction: model(0) };
                 }
             }
         }
@@ -307,18 +304,13 @@ impl TextureTables {
     /// Autocorrelation of a texture of length 1 at a distance across, summed up
     /// along the edge.
     fn along(&self, power: usize, distance: f64) -> f64 {
-        let place = distance * to_f64(PER_LENGTH);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a distance is positive, and what is too large is beyond the table"
-        )]
-        let below = place as usize;
+        let position = distance * to_f64(PER_LENGTH);
+        let below = floor_to_count(position);
         let values = &self.integrals[power];
         let (Some(here), Some(next)) = (values.get(below), values.get(below + 1)) else {
             return 0.0;
         };
-        here + (place - to_f64(below)) * (next - here)
+        here + (position - to_f64(below)) * (next - here)
     }
 }
 
@@ -339,8 +331,8 @@ fn of_windows(rows: usize) -> OfWindows {
 /// distances across.
 fn sums_along(power: f64) -> [f64; TABLE_LENGTHS * PER_LENGTH + 1] {
     let step = 1.0 / to_f64(PER_LENGTH);
-    std::array::from_fn(|place| {
-        let across = step * to_f64(place);
+    std::array::from_fn(|position| {
+        let across = step * to_f64(position);
         let at = |k: usize| correlation(across.hypot(step * to_f64(k)), power);
         step * (1..TABLE_LENGTHS * PER_LENGTH).fold(at(0), |sum, k| sum + 2.0 * at(k))
     })

@@ -1,7 +1,6 @@
-//! One edge of the bead, from rough places to sub-pixel ones with their
-//! variances: its profile is read from rows laid over each other, every row is
-//! held against it, and the rows of a band are solved for place and levels
-//! together.
+//! One edge of the bead, from rough positions to sub-pixel ones with their variances. Its profile
+//! is read from superimposed rows, every row is compared with it, and the rows of a band are
+//! solved for position and levels together.
 
 mod band_levels;
 mod band_sums;
@@ -18,7 +17,7 @@ use super::clipped_step::ClippedEdge;
 use super::edge_windows::{EdgeWindows, Grouping};
 use super::light::Surroundings;
 use super::located::{self, CaliperEdge};
-use super::overlay::{BlurredStep, EdgeSkew, Extent, HALF_SPAN, Overlay, StepFit, StepShape};
+use super::overlay::{BlurredStep, Clearance, EdgeSkew, HALF_SPAN, Overlay, StepFit, StepShape};
 use super::path::{self, EdgeCorrection, EdgeTrajectory};
 use super::pool::Bands;
 use super::refine::{LineRefiner, RefinerInput};
@@ -27,7 +26,8 @@ use super::row_range::RowRange;
 use super::strip::{GaugeRows, GreyPixel};
 use super::texture::SurfaceTexture;
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::{narrow_to_f32, to_f64};
+use crate::numeric::number::{narrow_to_f32, to_f32, to_f64};
+use crate::vision::buffer::{refill, reset};
 use parts::{
     BandValues, EdgeState, EdgeUncertainty, Occlusion, RowFit, TexturedFit, TraceScratch,
     WindingState,
@@ -38,15 +38,13 @@ use parts::{
 const MAX_PASSES: usize = 3;
 /// Distance of the path from the edge from which on pixels are read anew \[px\].
 const MAX_PATH_OFFSET_PX: f64 = 4.0;
-/// Share of the blur by which a path may be off.
+/// Fraction of the blur by which a path may be off.
 const MAX_PATH_ERROR_BLURS: f64 = 0.2;
-/// Standard deviations beyond which a pixel or a row is not noise.
-const NOISE_SIGMAS: f32 = 4.5;
 /// Rows that are taken together at most.
 const MAX_GROUP_ROWS: usize = 8;
-/// Misfit up to which an edge is a blurred step for certain.
+/// Misfit up to which an edge is a blurred step certainly.
 const MAX_STEP_MISFIT: f64 = 1.5;
-/// Share of the rows from which on an edge is taken to be covered in part.
+/// Fraction of the rows from which on an edge is taken to be covered in part.
 const MAX_UNFIT_FRACTION: f64 = 0.03;
 /// Misfit of the clear rows from which on the edge is not covered, but no blurred
 /// step at all.
@@ -57,6 +55,8 @@ const MAX_CLEAR_MISFIT: f64 = 1.25;
 pub struct TraceInput<'a, T> {
     /// The gauge's pixels.
     pub strip: &'a GaugeRows<'a, T>,
+    /// The blurred step.
+    pub table: &'a StepTable,
     /// Its bands.
     pub bands: &'a Bands,
     /// Rows of its caliper lines.
@@ -69,7 +69,7 @@ pub struct TraceInput<'a, T> {
     pub bead_after: bool,
 }
 
-/// Traces one edge of the bead; keeps its memory from frame to frame.
+/// Traces one edge of the bead; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct EdgeTracer {
     values: BandValues,
@@ -79,7 +79,8 @@ pub struct EdgeTracer {
     winding: WindingState,
     sheet: EdgeWindows,
     overlay: Overlay,
-    step_fit: Option<StepFit>,
+    /// The fit of a blurred step to the mean profile.
+    pub step_fit: Option<StepFit>,
     /// What was read of the edge, and how far aside of the course it was \[px\].
     shape: Option<StepShape>,
     aside_px: f64,
@@ -89,11 +90,12 @@ pub struct EdgeTracer {
     refiner: LineRefiner,
     cut_off: ClippedEdge,
     scratch: TraceScratch,
-    edges: Vec<Option<CaliperEdge>>,
+    /// Positions in the last frame, one a caliper line.
+    pub edges: Vec<Option<CaliperEdge>>,
     state: EdgeState,
-    /// Share of the rows that did not fit.
-    unfit_fraction: f64,
-    /// What a row in the median leaves of the step that it is held against, in
+    /// Fraction of the rows that certainly show something other than the edge.
+    pub unfit_fraction: f64,
+    /// What a row in the median leaves of the step that it is compared with, in
     /// standard deviations of its noise; about 1 where the edge is one.
     pub misfit: f64,
     /// Rows that were held together at most.
@@ -102,52 +104,35 @@ pub struct EdgeTracer {
     pub blur_px: f64,
     /// Whether ground lies beside it, no groove.
     pub is_on_ground: bool,
-    /// How sure its places are, beside what each says.
+    /// How sure its positions are, beside what each shows.
     pub uncertainty: EdgeUncertainty,
 }
 
 impl EdgeTracer {
-    /// Takes over places that were found without a model of the flank.
-    pub fn take_rough(&mut self, places: &[Option<CaliperEdge>], fit: &RoughFit) {
-        self.edges.clear();
-        self.edges.extend_from_slice(places);
+    /// Takes over positions that were found without a model of the flank.
+    pub fn take_rough(&mut self, positions: &[Option<CaliperEdge>], fit: &RoughFit) {
+        refill(&mut self.edges, positions.iter().copied());
         self.blur_px = fit.blur_px;
-        (self.uncertainty.common_variance, self.uncertainty.mean_variance) =
-            (0.0, Some(fit.variance));
-        (self.uncertainty.along_px, self.uncertainty.lines_fraction) =
-            (fit.along_px, fit.lines_fraction);
+        let uncertainty = &mut self.uncertainty;
+        (uncertainty.common_variance, uncertainty.mean_variance) = (0.0, Some(fit.variance));
+        (uncertainty.along_px, uncertainty.lines_fraction) = (fit.along_px, fit.lines_fraction);
         self.misfit = f64::INFINITY;
         self.state = EdgeState::Clear;
         self.is_on_ground = fit.is_on_ground && !fit.is_groove;
     }
 
-    /// The edges of the last frame, band by band.
-    pub fn edges(&self) -> &[Option<CaliperEdge>] {
-        &self.edges
-    }
-
-    /// Share of all rows that the edges come from.
+    /// Fraction of all rows that the edges come from.
     pub fn used_fraction(&self) -> f64 {
         let used: f64 = self.edges.iter().flatten().map(|edge| edge.row_fraction).sum();
         used / to_f64(self.edges.len().max(1))
     }
 
-    /// Share of the rows that surely show something else than the edge.
-    pub fn unfit_fraction(&self) -> f64 {
-        self.unfit_fraction
-    }
-
-    /// Mean of the edges' places across the bead \[px\].
+    /// Mean of the edges' positions across the bead \[px\].
     pub fn middle(&self) -> f64 {
         located::mean_position(&self.edges)
     }
 
-    /// The edges, for those who sort out outliers.
-    pub fn edges_mut(&mut self) -> &mut [Option<CaliperEdge>] {
-        &mut self.edges
-    }
-
-    /// Whether the edge's places are known.
+    /// Whether the edge's positions are known.
     pub fn is_located(&self) -> bool {
         self.state != EdgeState::NotFound
     }
@@ -177,25 +162,22 @@ impl EdgeTracer {
             && self.misfit < MAX_STEP_MISFIT
     }
 
-    /// Where the edge is expected at a place along it \[px\].
+    /// Where the edge is expected at a position along it \[px\].
     pub fn expected_at(&self, v: f64) -> f32 {
         self.course.at(narrow_to_f32(v))[0]
     }
 
-    /// Looks at the edge along rough places, one a band: its blur. `None` where there is no edge.
+    /// Looks at the edge along rough positions, one a band: its blur. `None` where there is no
+    /// edge.
     #[inline(always)]
     pub fn fit_first<T: GreyPixel>(
         &mut self,
-        table: &StepTable,
         scene: &TraceInput<'_, T>,
         rough: impl Iterator<Item = Option<f32>>,
     ) -> Option<BlurEstimate> {
         self.edges.clear();
-        (
-            self.uncertainty.mean_variance,
-            self.uncertainty.along_px,
-            self.uncertainty.lines_fraction,
-        ) = (None, 0.0, 1.0);
+        let positions = &mut self.uncertainty;
+        (positions.mean_variance, positions.along_px, positions.lines_fraction) = (None, 0.0, 1.0);
         self.is_on_ground = true;
         self.step_fit = None;
         self.values.path.clear();
@@ -204,26 +186,21 @@ impl EdgeTracer {
         (self.occlusion.sort_rows, self.unfit_fraction) = (false, 0.0);
         (self.winding.is_followed, self.winding.excess) = (false, 0.0);
         self.occlusion.clear.clear();
-        self.values.picked.clear();
-        self.values.picked.extend(rough.map(|at| at.unwrap_or(f32::NAN)));
+        refill(&mut self.values.picked, rough.map(|at| at.unwrap_or(f32::NAN)));
         if !self.take_picked(scene) {
             return None;
         }
         self.follow_windings(scene);
-        self.lay_over(table, scene)
+        self.lay_over(scene)
     }
 
     /// Lays the rows over each other along the course and looks at what they show.
     #[inline(always)]
-    fn lay_over<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-    ) -> Option<BlurEstimate> {
+    fn lay_over<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> Option<BlurEstimate> {
         self.read(scene);
         self.overlay.lay(&self.sheet);
         let noise = f64::from(scene.noise) / f64::from(typical(&self.values.step).abs());
-        self.step_fit = self.overlay.first_fit(table, noise, self.room(scene));
+        self.step_fit = self.overlay.with(scene.table).first_fit(noise, self.room(scene));
         self.look_for_texture(scene, noise);
         self.step_fit.as_ref().map(StepFit::blur)
     }
@@ -233,13 +210,8 @@ impl EdgeTracer {
         self.textured.texture.is_some()
     }
 
-    /// What was seen of the edge.
-    pub fn step_fit(&self) -> Option<&StepFit> {
-        self.step_fit.as_ref()
-    }
-
     /// Whether a narrow groove may lie beside the edge, after it or before it. `noise` is the
-    /// standard deviation of a pixel in shares of the step.
+    /// standard deviation of a pixel as fractions of the step.
     pub fn is_beside_groove(&self, after: bool, noise: f64) -> bool {
         self.misfit.is_finite() && self.overlay.rises_beside(after, noise)
     }
@@ -248,10 +220,10 @@ impl EdgeTracer {
     /// that nothing covers.
     pub fn skew(&self, table: &StepTable) -> Option<EdgeSkew> {
         let is_step = self.state == EdgeState::Clear && self.misfit.is_finite();
-        self.overlay.skew(table, self.step_fit.as_ref().filter(|_| is_step)?)
+        self.overlay.with(table).skew(self.step_fit.as_ref().filter(|_| is_step)?)
     }
 
-    /// Looks at the same rows once more, with another shape of the blur, from a look at
+    /// Looks at the same rows once more, with another shape of the blur, from a fit to
     /// them on or from nothing. What is known of a texture stays.
     #[inline(always)]
     pub fn refit<T: GreyPixel>(
@@ -260,19 +232,14 @@ impl EdgeTracer {
         scene: &TraceInput<'_, T>,
         before: Option<&StepFit>,
     ) -> Option<StepFit> {
+        let fitter = self.overlay.with(table);
         if let Some(before) = before {
-            return self.overlay.refit(table, before);
+            return fitter.refit(before);
         }
-        let seen = self.step_fit?;
-        self.overlay.first_fit(table, seen.pixel_noise(), self.room(scene))
+        fitter.first_fit(self.step_fit?.pixel_noise, self.room(scene))
     }
 
-    /// Takes a look with another shape of the blur for what was seen.
-    pub fn take_fit(&mut self, look: StepFit) {
-        self.step_fit = Some(look);
-    }
-
-    /// Draws the path through the picked places, as far as they are not wild, with
+    /// Draws the path through the picked positions, as far as they are no outliers, with
     /// the levels beside it. Returns whether there is any.
     #[inline(always)]
     fn take_picked<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
@@ -298,7 +265,7 @@ impl EdgeTracer {
     pub fn take_shape(&mut self, table: &StepTable, blur: BlurEstimate) {
         self.shape = None;
         let Some(seen) = &self.step_fit else { return };
-        let Some(shape) = self.overlay.shape(table, seen, blur) else { return };
+        let Some(shape) = self.overlay.with(table).shape(seen, blur) else { return };
         self.aside_px = shape.step.at;
         self.shape = Some(self.apply_shape(shape));
     }
@@ -319,33 +286,28 @@ impl EdgeTracer {
 
     /// Locates the edge whose shape was read; `blur` as there.
     #[inline(always)]
-    pub fn trace<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-        blur: BlurEstimate,
-    ) {
-        let found = self.trace_open(table, scene);
+    pub fn trace<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: BlurEstimate) {
+        let found = self.trace_open(scene);
         let is_open = found && self.unfit_fraction <= MAX_UNFIT_FRACTION && !self.lost_rows(scene);
-        if is_open || self.trace_winding(table, scene) {
+        if is_open || self.trace_winding(scene) {
             self.state = EdgeState::Clear;
-        } else if self.locate_occluded(table, scene) {
+        } else if self.locate_occluded(scene) {
             self.state = EdgeState::Occluded;
         } else {
-            self.trace_again(table, scene, blur);
+            self.trace_again(scene, blur);
         }
     }
 
     /// Locates the edge as if nothing covered it.
     #[inline(always)]
-    fn trace_open<T: GreyPixel>(&mut self, table: &StepTable, scene: &TraceInput<'_, T>) -> bool {
+    fn trace_open<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         let Some(shape) = self.shape else { return false };
         if self.aside_px.abs() > MAX_PATH_OFFSET_PX {
             self.read(scene);
         }
         self.blur_px = shape.step.blur;
         self.uncertainty.common_variance = shape.variance;
-        self.tabulate(table, &shape);
+        self.tabulate(scene.table, &shape);
         for _ in 0..MAX_PASSES {
             self.compare_rows(scene);
             self.sum_bands(scene);
@@ -359,19 +321,14 @@ impl EdgeTracer {
     /// Traces once more as if nothing covered the edge.
     #[cold]
     #[inline(never)]
-    fn trace_again<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-        blur: BlurEstimate,
-    ) {
+    fn trace_again<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: BlurEstimate) {
         self.occlusion.clear.clear();
         let picked = std::mem::take(&mut self.values.picked);
         let rough = picked.iter().map(|at| at.is_finite().then_some(*at));
-        let seen = self.fit_first(table, scene, rough);
+        let seen = self.fit_first(scene, rough);
         self.values.picked = picked;
-        self.take_shape(table, blur);
-        let found = seen.is_some() && self.trace_open(table, scene);
+        self.take_shape(scene.table, blur);
+        let found = seen.is_some() && self.trace_open(scene);
         self.state = if found { EdgeState::Unresolved } else { EdgeState::NotFound };
     }
 
@@ -382,7 +339,7 @@ impl EdgeTracer {
         else {
             return;
         };
-        let pitch = to_f64(scene.strip.along) / self.overlay.laid().0;
+        let pitch = to_f64(scene.strip.along) / self.overlay.placed().0;
         self.step_fit = Some(seen.with_texture(texture.over_area(pitch).sqrt()));
         self.textured.texture = Some(texture.in_grey(typical(&self.values.step).into()));
     }
@@ -411,19 +368,19 @@ impl EdgeTracer {
     /// Locates the edge anew, line by line, where it is not a blurred step.
     /// Returns whether there is one.
     #[cold]
-    pub fn refine<T: GreyPixel>(&mut self, table: &StepTable, scene: &TraceInput<'_, T>) -> bool {
+    pub fn refine<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         let width_px = f64::from(scene.width_px);
-        let task = RefinerInput { strip: scene.strip, lines: scene.lines, width_px };
-        // A blurred step that does not fit says nothing of the place either.
+        let task =
+            RefinerInput { strip: scene.strip, table: scene.table, lines: scene.lines, width_px };
+        // A blurred step that does not fit says nothing of the position either.
         if !self.take_picked(scene) {
             return false;
         }
-        self.edges.clear();
-        self.edges.resize(scene.lines.len(), None);
+        reset(&mut self.edges, scene.lines.len(), None);
         let course = &self.course;
         let rough =
             scene.lines.iter().map(|&line| f64::from(course.at(narrow_to_f32(line.middle()))[0]));
-        let found = self.refiner.refine(table, &task, scene.bead_after, &mut self.edges, rough);
+        let found = self.refiner.refine(&task, scene.bead_after, &mut self.edges, rough);
         self.blur_px = self.refiner.blur_px;
         self.uncertainty.common_variance = 0.0;
         self.misfit = f64::INFINITY;
@@ -431,15 +388,14 @@ impl EdgeTracer {
         found
     }
 
-    /// How far there is nothing but this edge for certain: up to the gauge's
-    /// border and to the middle of the bead.
-    fn room<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> Extent {
+    /// How far there is nothing but this edge certainly: up to the gauge's
+    /// boundary and to the middle of the bead.
+    fn room<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> Clearance {
         let (low, high) =
             self.values.path.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &at| {
                 (low.min(at), high.max(at))
             });
-        #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-        let (across, reach) = (scene.strip.across as f32, HALF_SPAN as f32 - 1.0);
+        let (across, reach) = (to_f32(scene.strip.across), to_f32(HALF_SPAN - 1));
         let inside = 0.5 * scene.width_px;
         let mut before = low.clamp(2.0, reach);
         let mut after = (across - 1.0 - high).clamp(2.0, reach);
@@ -448,7 +404,7 @@ impl EdgeTracer {
         } else {
             before = before.min(inside);
         }
-        Extent { before: before.into(), after: after.into() }
+        Clearance { before: before.into(), after: after.into() }
     }
 
     /// Takes over what the overlay shows: the path is moved, and levels and
@@ -468,7 +424,7 @@ impl EdgeTracer {
     }
 
     /// Moves what is expected aside and takes other levels: those before and after
-    /// the edge as shares of the step.
+    /// the edge as fractions of the step.
     fn shift_course(&mut self, aside: f64, before: f64, after: f64) {
         let [aside, before, after] = [aside, before, after].map(narrow_to_f32);
         self.course.correct(EdgeCorrection { aside, before, after });
@@ -490,7 +446,7 @@ impl EdgeTracer {
         self.fill_from_edges(scene);
         path::median_of_three(&mut self.scratch.rough);
         if self.textured.texture.is_some() && !self.winding.is_followed {
-            // What the texture makes of a place is no path.
+            // What the texture makes of a position is no path.
             path::smooth(&self.scratch.rough, &mut self.scratch.sorted);
             std::mem::swap(&mut self.scratch.rough, &mut self.scratch.sorted);
         }
@@ -500,8 +456,8 @@ impl EdgeTracer {
 }
 
 fn typical(values: &[f32]) -> f32 {
-    let sum: f32 = values.iter().sum();
-    #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
-    let count = values.len().max(1) as f32;
-    sum / count
+    values.iter().sum::<f32>() / to_f32(values.len().max(1))
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,4 @@
-//! Code for the processor's vectors: compiled for each width of them, of which the widest
-//! that there is runs.
+//! Loops compiled for each vector width of the processor, of which the widest runs.
 
 use pulp::{Arch, Simd, WithSimd};
 

@@ -3,28 +3,30 @@
 //! Each edge of a bead waves for itself. What both do together, the midline,
 //! is taken for the bead's axis; what they do against each other changes the
 //! width along the gauge. Both are of one size, so that the width's course, and
-//! what the midline does more often than a bead's axis would, tell how much of
+//! what the midline does more often than a bead's axis would, show how much of
 //! the midline's slope is no slope of the axis.
 
 use std::sync::LazyLock;
 
-use super::curve::Curve;
+use super::curve::EdgeCurve;
 use crate::numeric::number::to_f64;
 
 /// Legendre coefficients that are looked at: of the orders 1 to 8.
 pub const ORDERS: usize = 8;
-/// Orders that a curve has.
+/// Orders that a curve has. By definition those up to t⁴ without the mean.
 pub const CURVE_ORDERS: usize = 4;
-/// Distances over which waves hang together, in halves of the gauge.
+/// Distances over which waves are correlated, in halves of the gauge.
 const CORRELATION_LENGTHS: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4];
-/// Variances of a midline's waves: the first, the ratio of one to the next and
-/// their number \[px²\].
+/// Smallest variance of a midline's waves that is tried \[px²\]: smaller ones are below the noise.
 const MIN_VARIANCE_PX2: f64 = 2e-4;
+/// Ratio of one to the next: likelihoods change little within a factor of two.
 const VARIANCE_RATIO: f64 = 2.0;
+/// Their number. Derived: 2·10⁻⁴ · 2¹⁷ = 26 px², more than a bead that is measured has.
 const VARIANCE_COUNT: usize = 18;
 /// Points of the gauge for the integrals over it.
 const INTEGRAL_POINTS: usize = 40;
-/// Evidence that is believed, in standard deviations of what noise makes.
+/// Evidence that is accepted, in standard deviations of what noise makes. Derived: noise alone
+/// exceeds 4 in 6 of 100,000 frames.
 const MIN_EVIDENCE_SIGMAS: f64 = 4.0;
 /// Degrees of freedom of the waves' variance.
 const DEGREES_OF_FREEDOM: f64 = 10.0;
@@ -77,7 +79,7 @@ impl WaveKind {
     }
 }
 
-/// Coefficients that tell of waves, by their order.
+/// Coefficients that show waves, by their order.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Evidence {
     squares: [f64; ORDERS],
@@ -108,10 +110,10 @@ impl Evidence {
         let mut sum = 0.0;
         let mut waves = [0.0; CURVE_ORDERS];
         let mut best = f64::NEG_INFINITY;
-        for shares in kind.order_variances() {
+        for fractions in kind.order_variances() {
             let mut variance = MIN_VARIANCE_PX2;
             for _ in 0..VARIANCE_COUNT {
-                let likelihood = self.log_likelihood(shares, variance)
+                let likelihood = self.log_likelihood(fractions, variance)
                     - kind.variance_prior_power() * variance.ln();
                 if likelihood > best {
                     let fade = (best - likelihood).exp();
@@ -121,8 +123,8 @@ impl Evidence {
                 }
                 let weight = (likelihood - best).exp();
                 sum += weight;
-                for (wave, share) in waves.iter_mut().zip(shares) {
-                    *wave += weight * variance * share;
+                for (wave, fraction) in waves.iter_mut().zip(fractions) {
+                    *wave += weight * variance * fraction;
                 }
                 variance *= VARIANCE_RATIO;
             }
@@ -131,10 +133,10 @@ impl Evidence {
     }
 
     /// Logarithm of how likely the coefficients are with waves of some variance.
-    fn log_likelihood(&self, shares: &[f64; ORDERS], variance: f64) -> f64 {
+    fn log_likelihood(&self, fractions: &[f64; ORDERS], variance: f64) -> f64 {
         let (mut product, mut sum) = (1.0, 0.0);
-        for (order, share) in shares.iter().enumerate() {
-            let expected = variance * share + self.noise[order];
+        for (order, fraction) in fractions.iter().enumerate() {
+            let expected = variance * fraction + self.noise[order];
             sum += self.squares[order] / expected;
             product *= if self.counts[order] > 1.0 { expected * expected } else { expected };
         }
@@ -160,7 +162,7 @@ pub struct Bends {
 
 impl Midline {
     /// Of a left and a right edge.
-    pub fn of([left, right]: &[Curve; 2]) -> Self {
+    pub fn of([left, right]: &[EdgeCurve; 2]) -> Self {
         Self(std::array::from_fn(|k| {
             f64::midpoint(left.coefficient(k + 1), right.coefficient(k + 1))
         }))
@@ -173,7 +175,7 @@ impl Midline {
     }
 
     /// Mean square of the slope that comes from bends, as far as waves of these
-    /// variances explain them, and the doubt that leaves where a bead that is
+    /// variances explain them, and the uncertainty that leaves where a bead that is
     /// bent could explain them as well.
     pub fn bends_of(&self, waves: &[f64; CURVE_ORDERS]) -> Bends {
         let mut axis = *self;
@@ -209,25 +211,25 @@ static TORN: LazyLock<OrderVariances> = LazyLock::new(|| order_variances(WaveKin
 
 fn order_variances(kind: WaveKind) -> OrderVariances {
     CORRELATION_LENGTHS.map(|length| {
-        let mut shares = [0.0; ORDERS];
+        let mut fractions = [0.0; ORDERS];
         for i in 0..INTEGRAL_POINTS {
             for j in 0..INTEGRAL_POINTS {
-                let alike = kind.correlation((place(i) - place(j)).abs() / length);
-                let (a, b) = (legendre(place(i)), legendre(place(j)));
-                for (order, share) in shares.iter_mut().enumerate() {
-                    *share += alike * a[order] * b[order];
+                let alike = kind.correlation((position(i) - position(j)).abs() / length);
+                let (a, b) = (legendre(position(i)), legendre(position(j)));
+                for (order, fraction) in fractions.iter_mut().enumerate() {
+                    *fraction += alike * a[order] * b[order];
                 }
             }
         }
-        for (order, share) in shares.iter_mut().enumerate() {
-            *share *= (norm(order + 1) / to_f64(INTEGRAL_POINTS)).powi(2);
+        for (order, fraction) in fractions.iter_mut().enumerate() {
+            *fraction *= (norm(order + 1) / to_f64(INTEGRAL_POINTS)).powi(2);
         }
-        shares
+        fractions
     })
 }
 
 /// Middle of a piece of the gauge, −1 to 1.
-fn place(piece: usize) -> f64 {
+fn position(piece: usize) -> f64 {
     (to_f64(2 * piece) + 1.0) / to_f64(INTEGRAL_POINTS) - 1.0
 }
 
@@ -285,9 +287,9 @@ mod tests {
         let (mut found, mut wrong) = (0.0, 0);
         for _ in 0..400 {
             let (mut with, mut without) = (Evidence::default(), Evidence::default());
-            for (k, share) in SMOOTH[5].iter().enumerate() {
+            for (k, fraction) in SMOOTH[5].iter().enumerate() {
                 for _ in 0..2 {
-                    with.add(k + 1, normal(0.25 * share + noise), noise);
+                    with.add(k + 1, normal(0.25 * fraction + noise), noise);
                     without.add(k + 1, normal(noise), noise);
                 }
             }

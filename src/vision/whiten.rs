@@ -1,11 +1,10 @@
-//! Weights of the pixels of a row for the place of an edge in noise that hangs
-//! together over neighbours: those of generalised least squares, blind to the
-//! levels on either side.
+//! Weights of the pixels of a row for the position of an edge in correlated noise: generalised
+//! least squares, insensitive to the levels on either side.
 
-/// Pixels at most.
+/// Pixels at most. Derived: 4 · 16, the chunks of a core in textured surroundings.
 pub const MAX_PIXELS: usize = 64;
 
-/// Finds weights; keeps its memory from frame to frame.
+/// Finds weights; keeps its buffers from frame to frame.
 #[derive(Debug, Clone)]
 pub struct NoiseWhitener {
     /// Lower triangle L of the covariances' Cholesky factors, row by row, with
@@ -49,9 +48,9 @@ impl NoiseWhitener {
         true
     }
 
-    /// Replaces the slope of a step by the weights of its place, so that their
-    /// product with the slope is 1 and those with the shares after and before
-    /// the step are 0; returns the variance that they leave to the place.
+    /// Replaces the slope of a step by the weights of its position, so that their
+    /// product with the slope is 1 and those with the fractions after and before
+    /// the step are 0; returns the variance that they leave to the position.
     pub fn weights(&self, slope: &mut [f64; MAX_PIXELS], after: &[f64; MAX_PIXELS]) -> Option<f64> {
         let n = self.count;
         let mut after = *after;
@@ -94,9 +93,9 @@ impl NoiseWhitener {
 
 /// Makes values orthogonal to others.
 fn take_off(values: &mut [f64], others: &[f64]) {
-    let share = product(values, others) / product(others, others).max(f64::MIN_POSITIVE);
+    let fraction = product(values, others) / product(others, others).max(f64::MIN_POSITIVE);
     for (value, other) in values.iter_mut().zip(others) {
-        *value -= share * other;
+        *value -= fraction * other;
     }
 }
 

@@ -12,7 +12,7 @@ pub struct WidthMeasurement {
     /// bead's axis, averaged over the gauge.
     pub width: Mm,
     /// Standard deviation of `width` against the true mean width within the
-    /// gauge, as the measurement believes it: the picture's share and, where it
+    /// gauge, as the measurement estimates it: that of the image and, where it
     /// is known, the calibration's.
     pub sigma: Mm,
     /// Where the left (of a horizontal bead the upper) edge crosses the middle
@@ -27,12 +27,12 @@ pub struct WidthMeasurement {
 }
 
 impl WidthMeasurement {
-    /// Adds what the calibration leaves open to the picture's own sigma.
+    /// Adds what the calibration leaves open to the image's own sigma.
     pub(super) fn with_calibration(self, surface: &SurfaceMap) -> Result<Self, Reject> {
-        let Some(share) = surface.width_relative_sigma_of([self.left, self.right]) else {
+        let Some(fraction) = surface.width_relative_sigma_of([self.left, self.right]) else {
             return Ok(self);
         };
-        let variance = self.sigma.get().powi(2) + (share * self.width.get()).powi(2);
+        let variance = self.sigma.get().powi(2) + (fraction * self.width.get()).powi(2);
         let sigma = Mm::new(variance.sqrt()).map_err(|_| Reject::OffSurface)?;
         Ok(Self { sigma, ..self })
     }
@@ -49,7 +49,7 @@ impl WidthMeasurement {
     }
 }
 
-/// How good the picture is.
+/// How good the image is.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Hints {
     /// Step from ground to bead \[grey levels of 256\].
@@ -58,16 +58,16 @@ pub struct Hints {
     pub blur_px: f64,
     /// Noise of a pixel \[grey levels of 256\].
     pub noise_grey: f64,
-    /// Share of the gauge's pixels that are at the end of the scale.
+    /// Fraction of the gauge's pixels that are at the end of the scale.
     pub saturated_fraction: f64,
-    /// Share of the caliper lines that the width comes from.
+    /// Fraction of the caliper lines that the width comes from.
     pub used_fraction: f64,
     /// How far the skew of the flanks moves the width; none where it was not asked for, or
     /// the edges are no blurred steps.
     pub skew: Option<WidthSkew>,
 }
 
-/// How far the skew of the edges' flanks moves a width in the picture: by a camera's gamma
+/// How far the skew of the edges' flanks moves a width in the image: by a camera's gamma
 /// that is not given, rounded shoulders of a bead, or a penumbra.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WidthSkew {

@@ -6,13 +6,13 @@ use nalgebra::Vector2;
 use super::width_input::WidthInput;
 use crate::core::geometry::SurfacePoint;
 use crate::numeric::gauss_legendre::GAUSS_LEGENDRE_5;
-use crate::vision::curve::Curve;
+use crate::vision::curve::EdgeCurve;
 
-/// Distance of the places from which an edge's direction and bend on the
+/// Distance of the positions from which an edge's direction and bend on the
 /// surface are taken.
 const DIFFERENCE_STEP: f64 = 0.15;
 
-/// An edge about a place, on the surface.
+/// An edge about a position, on the surface.
 struct LocalEdge {
     at: SurfacePoint,
     slope: Vector2<f64>,
@@ -20,7 +20,7 @@ struct LocalEdge {
 }
 
 impl LocalEdge {
-    fn of(scene: &WidthInput<'_>, curve: &Curve, t: f64) -> Option<Self> {
+    fn of(scene: &WidthInput<'_>, curve: &EdgeCurve, t: f64) -> Option<Self> {
         let at = scene.on_surface(curve, t)?;
         let before = scene.on_surface(curve, t - DIFFERENCE_STEP)? - at;
         let after = scene.on_surface(curve, t + DIFFERENCE_STEP)? - at;
@@ -43,6 +43,7 @@ impl LocalEdge {
 }
 
 /// Widths of the bead along the gauge, normal to its local axis.
+#[derive(Default)]
 pub struct Sections {
     /// Mean over the gauge \[mm\].
     pub mean: f64,
@@ -61,14 +62,8 @@ pub struct Sections {
 
 impl Sections {
     /// Cuts the bead along the gauge; `None` where an edge has no point on the surface.
-    pub fn cut(scene: &WidthInput<'_>, curves: &[Curve; 2]) -> Option<Self> {
-        let mut sections = Self {
-            mean: 0.0,
-            terms: [0.0; 3],
-            oblique: 0.0,
-            oblique_by_bend: 0.0,
-            scales: [0.0; 2],
-        };
+    pub fn cut(scene: &WidthInput<'_>, curves: &[EdgeCurve; 2]) -> Option<Self> {
+        let mut sections = Self::default();
         for (t, weight) in GAUSS_LEGENDRE_5 {
             let left = LocalEdge::of(scene, &curves[0], t)?;
             let right = LocalEdge::of(scene, &curves[1], t)?;
@@ -76,12 +71,12 @@ impl Sections {
             let middle = nalgebra::center(&left.at, &right.at);
             let across = right.crossing(middle, axis) - left.crossing(middle, axis);
             let width = across.norm();
-            let share = 0.5 * weight;
-            sections.mean += share * width;
-            sections.terms[0] += share * width;
-            sections.terms[1] += 3.0 * share * width * t;
-            sections.terms[2] += 5.0 * share * width * (1.5 * t * t - 0.5);
-            let oblique = share * (right.at - left.at).dot(&axis);
+            let fraction = 0.5 * weight;
+            sections.mean += fraction * width;
+            sections.terms[0] += fraction * width;
+            sections.terms[1] += 3.0 * fraction * width * t;
+            sections.terms[2] += 5.0 * fraction * width * (1.5 * t * t - 0.5);
+            let oblique = fraction * (right.at - left.at).dot(&axis);
             sections.oblique += oblique;
             sections.oblique_by_bend += 3.0 * t * scene.cosine_squared(curves, t) * oblique;
         }
@@ -89,7 +84,7 @@ impl Sections {
         sections.mean.is_finite().then_some(sections)
     }
 
-    fn measure_scales(&mut self, scene: &WidthInput<'_>, curves: &[Curve; 2]) -> Option<()> {
+    fn measure_scales(&mut self, scene: &WidthInput<'_>, curves: &[EdgeCurve; 2]) -> Option<()> {
         let middles = [scene.on_surface(&curves[0], 0.0)?, scene.on_surface(&curves[1], 0.0)?];
         let across = (middles[1] - middles[0]).try_normalize(1e-12)?;
         let slope = |side: usize| -> Option<Vector2<f64>> {
@@ -109,7 +104,7 @@ impl Sections {
         Some(())
     }
 
-    /// Width at a place along the gauge \[mm\].
+    /// Width at a position along the gauge \[mm\].
     pub fn at(&self, t: f64) -> f64 {
         self.terms[0] + self.terms[1] * t + self.terms[2] * (1.5 * t * t - 0.5)
     }

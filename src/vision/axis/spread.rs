@@ -1,40 +1,49 @@
-//! How sure a width is, and how rough the bead.
+//! Uncertainty of a width, and roughness of the bead.
 
 use super::sections::Sections;
 use super::width_input::{LocatedEdge, WidthInput, WidthScratch};
 use crate::numeric::number::to_f64;
-use crate::vision::curve::Curve;
+use crate::vision::curve::EdgeCurve;
 use crate::vision::located::CaliperEdge;
 use crate::vision::scatter::{self, EdgeResidual};
 use crate::vision::waviness::{CURVE_ORDERS, Evidence, Midline, ORDERS, WaveKind, legendre, norm};
 
-/// Share of the rows from which on nothing but the bead itself is seen.
+/// Fraction of the rows from which on nothing but the bead itself is seen.
 const MIN_COMPLETE_FRACTION: f64 = 0.98;
-/// Inflation of a variance that an edge's misfit may hide, and by how much more
-/// for what it shows: a texture's shift of an edge hangs together over so many
-/// rows.
+/// Inflation of a variance that an edge's misfit may hide: less would refuse edges whose misfit
+/// noise explains.
 const MIN_INFLATION_LIMIT: f64 = 1.2;
+/// By how much more for the misfit that an edge shows: a texture's shift of an edge is correlated
+/// over so many rows.
 const INFLATION_PER_MISFIT: f64 = 15.0;
-/// Squared slopes of an axis, in variances of what waves make, that are none.
+/// Squared slope of an axis, in variances of what waves make, below which it is none: more takes
+/// waves for a slope, less a slope for waves.
 const MIN_OBLIQUE_RATIO: f64 = 3.0;
+
+/// A bead that was cut along the curves of its two edges.
+#[derive(Clone, Copy)]
+pub struct CutBead<'a> {
+    /// What the width is taken from.
+    pub scene: &'a WidthInput<'a>,
+    /// Left and right edge.
+    pub curves: &'a [EdgeCurve; 2],
+    /// Its widths.
+    pub sections: &'a Sections,
+}
 
 /// How sure the width is, and how rough the bead.
 pub struct WidthUncertainty {
-    /// Standard deviation of the width \[mm\], without the calibration's share.
+    /// Standard deviation of the width \[mm\], without the calibration's fraction.
     pub sigma: f64,
-    /// What the doubt about the axis' direction takes from the width in the
+    /// What the uncertainty about the axis' direction takes from the width in the
     /// mean: an axis that is off by an angle shows 1 − angle²/2 of it \[mm\].
     pub shortened: f64,
 }
 
 impl WidthUncertainty {
     /// Of a width that was cut along these curves of the two edges.
-    pub fn of(
-        scene: &WidthInput<'_>,
-        curves: &[Curve; 2],
-        sections: &Sections,
-        memory: &mut WidthScratch,
-    ) -> Self {
+    pub fn of(cut: &CutBead<'_>, scratch: &mut WidthScratch) -> Self {
+        let &CutBead { scene, curves, sections } = cut;
         let (mut variance, mut noise) = (0.0, 0.0);
         for (side, curve) in curves.iter().enumerate() {
             let scale = sections.scales[side] * sections.scales[side];
@@ -44,31 +53,27 @@ impl WidthUncertainty {
                 noise += scale * per_place;
                 continue;
             }
-            let off = &memory.off[side];
-            let inflation = scatter::variance_inflation(off, per_place, &mut memory.values)
+            let off = &scratch.off[side];
+            let inflation = scatter::variance_inflation(off, per_place, &mut scratch.values)
                 .unwrap_or_else(|| scene.sides[side].inflation_with_gaps(off, curve, per_place))
                 .min(scene.sides[side].max_inflation());
             let of_mean = per_place * inflation * curve.mean_variance;
             variance += scale * (of_mean + scene.sides[side].common_variance);
             noise += scale * per_place * inflation;
         }
-        let roughness = Self::roughness(scene, sections, memory, noise);
-        variance += Self::variance_of_gaps(scene, sections, roughness, memory);
-        let (shortened, of_tilt) = Self::tilt_bias_and_variance(scene, curves, sections, memory);
+        let roughness = Self::roughness(cut, scratch, noise);
+        variance += Self::variance_of_gaps(cut, roughness, scratch);
+        let (shortened, of_tilt) = Self::tilt_bias_and_variance(cut, scratch);
         Self { sigma: (variance + of_tilt).sqrt(), shortened }
     }
 
-    /// By how much the doubt about the axis' direction makes the width too
+    /// By how much the uncertainty about the axis' direction makes the width too
     /// short, and the variance that it leaves.
-    fn tilt_bias_and_variance(
-        scene: &WidthInput<'_>,
-        curves: &[Curve; 2],
-        sections: &Sections,
-        memory: &mut WidthScratch,
-    ) -> (f64, f64) {
+    fn tilt_bias_and_variance(cut: &CutBead<'_>, scratch: &mut WidthScratch) -> (f64, f64) {
+        let &CutBead { scene, curves, sections } = cut;
         let oblique = sections.oblique * sections.oblique;
-        let Some(waves) = scene.waves(curves, sections, memory) else {
-            let [tilt, bend] = Self::tilt_variances(scene, curves, memory);
+        let Some(waves) = scene.waves(cut, scratch) else {
+            let [tilt, bend] = Self::tilt_variances(cut, scratch);
             let shortened = 0.5 * sections.mean * tilt;
             let of_bend = sections.oblique_by_bend * sections.oblique_by_bend * bend;
             return (shortened, oblique * tilt + of_bend + 2.0 * shortened * shortened);
@@ -93,15 +98,11 @@ impl WidthUncertainty {
     }
 
     /// Standard deviation of the width along the gauge, without the noise of
-    /// its places.
-    fn roughness(
-        scene: &WidthInput<'_>,
-        sections: &Sections,
-        memory: &WidthScratch,
-        noise: f64,
-    ) -> f64 {
+    /// its positions.
+    fn roughness(cut: &CutBead<'_>, scratch: &WidthScratch, noise: f64) -> f64 {
+        let &CutBead { scene, sections, .. } = cut;
         let (mut square, mut n) = (0.0, 0.0);
-        for (band, (left, right)) in memory.off[0].iter().zip(&memory.off[1]).enumerate() {
+        for (band, (left, right)) in scratch.off[0].iter().zip(&scratch.off[1]).enumerate() {
             let (Some(left), Some(right)) = (left, right) else { continue };
             let off = sections.scales[1] * right - sections.scales[0] * left;
             let width = sections.at(scene.normalised_position(band)) + off - sections.mean;
@@ -112,22 +113,18 @@ impl WidthUncertainty {
     }
 
     /// The bands that are missing hide bead that counts; its waviness is an error then,
-    /// which hangs together over neighbouring bands. Each edge has half of it.
-    fn variance_of_gaps(
-        scene: &WidthInput<'_>,
-        sections: &Sections,
-        roughness: f64,
-        memory: &mut WidthScratch,
-    ) -> f64 {
+    /// which is correlated over neighbouring bands. Each edge has half of it.
+    fn variance_of_gaps(cut: &CutBead<'_>, roughness: f64, scratch: &mut WidthScratch) -> f64 {
+        let &CutBead { scene, sections, .. } = cut;
         let mut variance = 0.0;
         for (number, side) in scene.sides.iter().enumerate() {
             let seen: f64 =
                 side.positions.iter().flatten().map(|located| located.row_fraction).sum();
             let missing = 1.0 - seen / to_f64(side.positions.len());
             if missing > 0.0 {
-                memory.values.clear();
-                memory.values.extend(memory.off[number].iter().flatten());
-                let waves = scatter::correlated_variance(&memory.values);
+                scratch.values.clear();
+                scratch.values.extend(scratch.off[number].iter().flatten());
+                let waves = scatter::correlated_variance(&scratch.values);
                 let waves = (waves - mean_variance(side.positions)).max(0.0);
                 let waves = waves * sections.scales[number] * sections.scales[number];
                 variance += waves.max(0.5 * roughness * roughness) * missing / seen.max(1.0);
@@ -139,13 +136,10 @@ impl WidthUncertainty {
     /// Variances of the axis' direction in the middle \[rad²\] and of its bend in
     /// halves of the gauge: where lines across the gauge run obliquely to the bead,
     /// an axis that is off takes them for longer or shorter. From how far the
-    /// middles lie off their course, and over how many bands that hangs together.
-    fn tilt_variances(
-        scene: &WidthInput<'_>,
-        curves: &[Curve; 2],
-        memory: &mut WidthScratch,
-    ) -> [f64; 2] {
-        let WidthScratch { off: [left, right], values } = memory;
+    /// middles lie off their course, and over how many bands that is correlated.
+    fn tilt_variances(cut: &CutBead<'_>, scratch: &mut WidthScratch) -> [f64; 2] {
+        let &CutBead { scene, curves, .. } = cut;
+        let WidthScratch { off: [left, right], values } = scratch;
         values.clear();
         let both = left.iter().zip(right.iter());
         values.extend(both.filter_map(|(left, right)| Some(f64::midpoint((*left)?, (*right)?))));
@@ -159,17 +153,17 @@ impl WidthUncertainty {
 }
 
 impl LocatedEdge<'_> {
-    /// By how much places with gaps between them scatter more than noise
+    /// By how much positions with gaps between them scatter more than noise
     /// explains.
-    fn inflation_with_gaps(&self, off: &[Option<f64>], curve: &Curve, per_place: f64) -> f64 {
-        let places = off.iter().zip(self.positions);
-        let places = places.filter_map(|(off, located)| {
+    fn inflation_with_gaps(&self, off: &[Option<f64>], curve: &EdgeCurve, per_place: f64) -> f64 {
+        let positions = off.iter().zip(self.positions);
+        let positions = positions.filter_map(|(off, located)| {
             Some(EdgeResidual { px: (*off)?, row_fraction: located.as_ref()?.row_fraction })
         });
-        scatter::inflation_with_gaps(places, per_place, curve.count)
+        scatter::inflation_with_gaps(positions, per_place, curve.count)
     }
 
-    /// Most that neighbouring places can hang together: what moves an edge,
+    /// Most that neighbouring positions can are correlated: what moves an edge,
     /// unless it is the bead itself, leaves a misfit. Edges that are covered
     /// here and there may hide anything.
     fn max_inflation(&self) -> f64 {
@@ -190,23 +184,19 @@ impl WidthInput<'_> {
 
     /// How much of the midline's coefficients of the orders 1 to 4 is the
     /// waviness of the two edges \[px²\]; `None` where there is none to speak
-    /// of. The width's course tells, and of the midline what is no straight or
+    /// of. The width's course shows, and of the midline what is no straight or
     /// evenly bent axis.
-    fn waves(
-        &self,
-        curves: &[Curve; 2],
-        sections: &Sections,
-        memory: &WidthScratch,
-    ) -> Option<[f64; CURVE_ORDERS]> {
+    fn waves(&self, cut: &CutBead<'_>, scratch: &WidthScratch) -> Option<[f64; CURVE_ORDERS]> {
+        let &CutBead { curves, sections, .. } = cut;
         let mut off = [[0.0; ORDERS]; 2];
         let mut bands = [0.0f64; 2];
-        for (band, places) in memory.off[0].iter().zip(&memory.off[1]).enumerate() {
+        for (band, positions) in scratch.off[0].iter().zip(&scratch.off[1]).enumerate() {
             let values = legendre(self.normalised_position(band));
-            for (side, place) in [places.0, places.1].into_iter().enumerate() {
-                let Some(place) = place else { continue };
+            for (side, position) in [positions.0, positions.1].into_iter().enumerate() {
+                let Some(position) = position else { continue };
                 bands[side] += 1.0;
                 for (sum, value) in off[side].iter_mut().zip(values) {
-                    *sum += place * value;
+                    *sum += position * value;
                 }
             }
         }
@@ -231,10 +221,10 @@ impl WidthInput<'_> {
     }
 }
 
-/// Mean variance of an edge's places, for a place of all of a band's rows.
-fn mean_variance(places: &[Option<CaliperEdge>]) -> f64 {
+/// Mean variance of an edge's positions, for a place of all of a band's rows.
+fn mean_variance(positions: &[Option<CaliperEdge>]) -> f64 {
     let (mut sum, mut n) = (0.0, 0.0);
-    for located in places.iter().flatten() {
+    for located in positions.iter().flatten() {
         sum += located.variance * located.row_fraction;
         n += 1.0;
     }

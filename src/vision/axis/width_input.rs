@@ -1,24 +1,23 @@
-//! What a width is taken from: two edges, and where they lie on the surface.
+//! Input of the width: two edges, and the map to the surface.
 
 use crate::calibration::SurfaceMap;
 use crate::core::geometry::SurfacePoint;
-use crate::vision::curve::{Curve, EdgePoint};
-use crate::vision::gauge::Gauge;
+use crate::vision::curve::{EdgeCurve, EdgePoint};
+use crate::vision::gauge::{Gauge, GaugeView};
 use crate::vision::located::CaliperEdge;
-use crate::vision::strip::GaugeView;
 
 /// One edge as it was found.
 #[derive(Debug, Clone, Copy)]
 pub struct LocatedEdge<'a> {
-    /// Its places, band by band.
+    /// Its positions, band by band.
     pub positions: &'a [Option<CaliperEdge>],
-    /// Variance of the whole edge's position that all places share \[px²\].
+    /// Variance of the whole edge's position that all positions share \[px²\].
     pub common_variance: f64,
-    /// What a row leaves of the step that it is held against, in standard
-    /// deviations of its noise; infinite where it was not held against one.
+    /// What a row leaves of the step that it is compared with, in standard
+    /// deviations of its noise; infinite where it was not compared with one.
     pub misfit: f64,
     /// Variance of the mean position over the gauge \[px²\], where it is known
-    /// without looking at how far the places lie off their course.
+    /// without looking at how far the positions lie off their course.
     pub mean_variance: Option<f64>,
 }
 
@@ -37,7 +36,7 @@ pub struct WidthInput<'a> {
     pub sides: [LocatedEdge<'a>; 2],
 }
 
-/// Memory that is kept from frame to frame.
+/// Buffers that are kept from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct WidthScratch {
     pub(super) off: [Vec<Option<f64>>; 2],
@@ -46,40 +45,36 @@ pub struct WidthScratch {
 
 impl WidthInput<'_> {
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    pub(super) fn centre(&self) -> f64 {
+    pub fn centre(&self) -> f64 {
         (self.view.along - 1) as f64 / 2.0
     }
 
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    pub(super) fn half_length(&self) -> f64 {
+    pub fn half_length(&self) -> f64 {
         self.view.along as f64 / 2.0
     }
 
-    /// Place of a band along the gauge, −1 to 1.
-    pub(super) fn normalised_position(&self, band: usize) -> f64 {
+    /// Position of a band along the gauge, −1 to 1.
+    pub fn normalised_position(&self, band: usize) -> f64 {
         (self.middles[band] - self.centre()) / self.half_length()
     }
 
-    pub(super) fn points(&self, side: usize) -> impl Iterator<Item = EdgePoint> + Clone {
+    pub fn points(&self, side: usize) -> impl Iterator<Item = EdgePoint> + Clone {
         let places = self.sides[side].positions.iter().enumerate();
         places.filter_map(|(band, located)| {
-            let located = (*located)?;
-            Some(EdgePoint {
-                t: self.normalised_position(band),
-                u: located.at,
-                weight: located.row_fraction,
-            })
+            let CaliperEdge { at: u, row_fraction: weight, .. } = (*located)?;
+            Some(EdgePoint { t: self.normalised_position(band), u, weight })
         })
     }
 
-    /// Square of the cosine between the bead and the gauge's axis at a place.
-    pub(super) fn cosine_squared(&self, curves: &[Curve; 2], t: f64) -> f64 {
+    /// Square of the cosine between the bead and the gauge's axis at a position.
+    pub fn cosine_squared(&self, curves: &[EdgeCurve; 2], t: f64) -> f64 {
         let slope = f64::midpoint(curves[0].slope(t), curves[1].slope(t)) / self.half_length();
         1.0 / (1.0 + slope * slope)
     }
 
     /// The point of an edge on the surface.
-    pub(super) fn on_surface(&self, curve: &Curve, t: f64) -> Option<SurfacePoint> {
+    pub fn on_surface(&self, curve: &EdgeCurve, t: f64) -> Option<SurfacePoint> {
         let v = self.centre() + t * self.half_length();
         self.surface.to_mm(self.view.to_image(curve.at(t), v))
     }

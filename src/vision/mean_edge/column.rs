@@ -7,16 +7,16 @@ use crate::numeric::number::to_f64;
 pub struct ColumnSums {
     sum: f64,
     squares: f64,
-    /// Of values times their places about the middle row.
+    /// Of values times their positions about the middle row.
     across: f64,
 }
 
 impl ColumnSums {
     /// Adds a value.
-    pub fn add(&mut self, place: f64, value: f64) {
+    pub fn add(&mut self, position: f64, value: f64) {
         self.sum += value;
         self.squares += value * value;
-        self.across += place * value;
+        self.across += position * value;
     }
 
     /// Variance of the values of so many rows about the straight line through them.

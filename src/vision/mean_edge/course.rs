@@ -1,4 +1,4 @@
-//! The course of an edge with as few degrees of freedom as a gauge supports.
+//! A line or a parabola along the gauge.
 
 /// A course along the gauge: its mean position, and half of what it moves by from end to
 /// end \[px\]; the bend is a parabola's with a mean of zero.
@@ -10,13 +10,13 @@ pub struct ParabolicCourse {
 }
 
 impl ParabolicCourse {
-    /// Position at a place along the gauge, −1 to 1 \[px\].
-    pub fn at(&self, place: f64) -> f64 {
-        self.at + self.tilt * place + self.bend * bend_at(place)
+    /// Position at a position along the gauge, −1 to 1 \[px\].
+    pub fn at(&self, position: f64) -> f64 {
+        self.at + self.tilt * position + self.bend * bend_at(position)
     }
 }
 
 /// A parabola from −1 to 1 whose mean is zero.
-pub fn bend_at(place: f64) -> f64 {
-    place * place - 1.0 / 3.0
+pub fn bend_at(position: f64) -> f64 {
+    position * position - 1.0 / 3.0
 }

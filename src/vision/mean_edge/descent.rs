@@ -1,9 +1,11 @@
 //! How far a course is moved until the mean profile along it shows the edge in its
 //! middle.
 
-/// Steps of the descent, the longest of them and the last \[px\].
+/// Steps of the descent at most.
 pub const MAX_ITERATIONS: usize = 12;
+/// Longest step \[px\]: within the flank, where the response is linear.
 pub const MAX_STEP_PX: f64 = 1.5;
+/// Step at which the descent has converged \[px\]: far below the noise of a gauge.
 pub const CONVERGED_PX: f64 = 1e-3;
 
 /// Where a descent ends.
@@ -16,7 +18,7 @@ pub struct StopCriterion {
 }
 
 pub const CONVERGED: StopCriterion = StopCriterion { last_px: CONVERGED_PX, bends: false };
-/// Where the edge is told from none, and the rest is left to another blur.
+/// Where the edge is distinguished from none, and the rest is left to another blur.
 pub const ROUGHLY_CONVERGED: StopCriterion =
     StopCriterion { last_px: 20.0 * CONVERGED_PX, bends: false };
 

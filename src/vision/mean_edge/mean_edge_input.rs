@@ -1,4 +1,4 @@
-//! What is looked at for an edge on the mean over its rows.
+//! Input of the mean edge: pixels, caliper lines, and the side of the bead.
 
 use crate::numeric::number::{floor_to_index, narrow_to_f32, to_f64};
 use crate::vision::row_range::RowRange;
@@ -6,7 +6,7 @@ use crate::vision::strip::{GaugeRows, GreyPixel};
 
 /// What is looked at.
 #[derive(Debug, Clone, Copy)]
-pub struct MeanEdgeInput<'a, T> {
+pub struct MeanInput<'a, T> {
     /// The gauge's pixels.
     pub strip: &'a GaugeRows<'a, T>,
     /// Rows of its caliper lines.
@@ -19,14 +19,14 @@ pub struct MeanEdgeInput<'a, T> {
     pub bright: bool,
 }
 
-impl<T: GreyPixel> MeanEdgeInput<'_, T> {
+impl<T: GreyPixel> MeanInput<'_, T> {
     /// Last column.
-    pub(super) fn last(&self) -> f64 {
+    pub fn last(&self) -> f64 {
         to_f64(self.strip.across - 1)
     }
 
     /// Where a row lies along the gauge: from −1 to 1.
-    pub(super) fn normalised_position(&self, row: usize) -> f64 {
+    pub fn normalised_position(&self, row: usize) -> f64 {
         let half = 0.5 * to_f64(self.strip.along);
         (to_f64(row) + 0.5 - half) / half
     }
@@ -34,7 +34,7 @@ impl<T: GreyPixel> MeanEdgeInput<'_, T> {
     /// Reads pixels of a row from the one at or before a position on; returns how far the
     /// position lies from that towards the next one. Beyond the gauge its last pixel goes on.
     #[inline(always)]
-    pub(super) fn fetch(&self, row: usize, from: f64, out: &mut [f32]) -> f32 {
+    pub fn fetch(&self, row: usize, from: f64, out: &mut [f32]) -> f32 {
         let pixels = self.strip.row(row);
         let of = |pixel: T| T::sum_to_f32(pixel.add_to(T::Sum::default()));
         let first = floor_to_index(from);
@@ -50,12 +50,12 @@ impl<T: GreyPixel> MeanEdgeInput<'_, T> {
     }
 
     /// Sign by which a bright bead's grey levels and a dark one's are higher than the ground's.
-    pub(super) fn sign(&self) -> f64 {
+    pub fn sign(&self) -> f64 {
         if self.bright { 1.0 } else { -1.0 }
     }
 
     /// Direction from the edge into the bead.
-    pub(super) fn inwards(&self) -> f64 {
+    pub fn inwards(&self) -> f64 {
         if self.bead_after { 1.0 } else { -1.0 }
     }
 }

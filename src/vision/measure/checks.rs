@@ -1,5 +1,4 @@
-//! What is not believed: edges that disagree with themselves or with each other,
-//! and steps that are too low.
+//! Checks of two located edges: consistency, contrast, blur, pattern, occlusion, boundary.
 
 use super::pattern_limits::{MAX_PATTERN, MAX_PATTERN_LINE_BY_LINE};
 use super::work::{EdgeModel, MeasureState};
@@ -9,13 +8,13 @@ use crate::numeric::rank;
 use crate::vision::gauge::EdgeKind;
 use crate::vision::ground::{EdgePosition, EdgeSide};
 use crate::vision::outlier;
-use crate::vision::reject::Reject;
+use crate::vision::reject::{Checked, Reject};
 use crate::vision::row_range::RowRange;
 use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::trace::EdgeTracer;
 use crate::vision::width::WidthMeasurement;
 
-/// Share of the rows from which each edge must come.
+/// Fraction of the rows from which each edge must come.
 const MIN_ROW_FRACTION: f64 = 0.4;
 /// The same where each row is known to be clear.
 const MIN_CLEAR_ROW_FRACTION: f64 = 0.16;
@@ -25,32 +24,34 @@ pub(super) const MAX_STEP_MISFIT: f64 = 2.0;
 /// The same for one edge alone.
 const MAX_SINGLE_MISFIT: f64 = 8.0;
 /// Largest standard deviation of a width whose edges are covered in part
-/// \[px\]: beyond it, what is left of an edge does not tell its course.
+/// \[px\]: beyond it, what is left of an edge does not show its course.
 const MAX_OCCLUDED_SIGMA_PX: f64 = 0.185;
 /// The same where a covered edge seems to wind: what winds aside looks covered as
 /// well, so that too little is left of such an edge.
 const MAX_WINDING_SIGMA_PX: f64 = 0.08;
-/// Share of clear rows from which on an edge's course is sure enough.
+/// Fraction of clear rows from which on an edge's course is sure enough.
 const MIN_SURE_CLEAR_FRACTION: f64 = 0.6;
-/// Distance from the border of the gauge that an edge needs, in its blurs and at
-/// least \[px\]: a step that is cut short there seems to lie farther inside.
+/// Distance from the boundary of the gauge that an edge needs, in its blurs: a step that is cut
+/// short there seems to lie farther inside. Derived: beyond 3 blurs 1.3·10⁻³ of a step is left, 1 −
+/// Φ(3).
 const BOUNDARY_BLURS: f64 = 3.0;
+/// The same at least \[px\].
 const MIN_BOUNDARY_PX: f64 = 3.0;
-/// Share of an edge's places that may be nearer.
+/// Fraction of an edge's positions that may be nearer.
 const MAX_NEAR_BOUNDARY_FRACTION: f64 = 0.05;
-/// Largest scatter of neighbouring edges about each other \[px\] that still is
+/// Largest spread of neighbouring edges about each other \[px\] that still is
 /// an edge, not noise.
 const MAX_SCATTER_PX: f64 = 1.5;
 /// The same where both edges show in all rows but for a few sparks: then they are
 /// as rough as they look, and what scatters more is no bead.
 const MAX_COMPLETE_SCATTER_PX: f64 = 4.0;
-/// Share of the rows that counts as all.
+/// Fraction of the rows that counts as all.
 pub(super) const COMPLETE_FRACTION: f64 = 0.95;
 /// The same where one edge was hidden and had to be located line by line.
 const MAX_LOST_SCATTER_PX: f64 = 0.5;
 
-/// Share of a pattern beside an edge that counts for its place: at the edge it is half
-/// covered by the bead, and the widths of drawn beads tell a little less.
+/// Fraction of a pattern beside an edge that counts for its position: at the edge it is half
+/// covered by the bead, and the widths of drawn beads show a little less.
 const PATTERN_WEIGHT: f64 = 0.46;
 /// Pattern as a fraction of the contrast below which weights that know the texture leave
 /// nothing else of it: with both, z of compressed images of a quality above 65 is 0.86.
@@ -59,58 +60,54 @@ const MAX_FAINT_PATTERN: f64 = 0.1;
 /// is measured without fault up to 7.4 px of blur, and was off by some pixels from
 /// 7.5 px on.
 pub(super) const MAX_BLUR_PX: f64 = 7.4;
-/// The same of a box of even motion with a lens's blur: motion of 15.8 px. Flanks of longer
-/// ones were taken for shading once in some hundred frames, and the width was 1 px off.
+/// The same of a box of even motion with a lens's blur. Derived: √(15.8²/12 + 1.5²) px, for a
+/// motion of 15.8 px with a blur of 1.5 px. Flanks of longer motions were taken for shading once in
+/// some hundred frames, and the width was 1 px off.
 pub(super) const MAX_MOTION_BLUR_PX: f64 = 4.8;
 
 impl MeasureState {
     /// Whether one edge alone is hidden: then it is covered, not of another kind
     /// than the other one.
-    pub(super) fn one_is_lost(&self) -> bool {
+    pub fn one_is_lost(&self) -> bool {
         let lost = |side: &EdgeTracer| side.is_lost() && side.misfit_of_a_row() > MAX_STEP_MISFIT;
         lost(&self.left) != lost(&self.right)
     }
 
     /// Takes out calipers that disagree with their neighbours, on either edge.
-    pub(super) fn reject_outliers(&mut self, bright: bool) -> Result<(), Reject> {
+    pub fn reject_outliers(&mut self, bright: bool) -> Checked {
         self.drop_inconsistent(bright);
         let mut worst: f64 = 0.0;
         for side in [&mut self.left, &mut self.right] {
             if side.is_occluded() {
-                side.drop_strays(self.min_outlier_px);
+                side.drop_strays(self.both.min_outlier_px);
             }
-            let edges = side.edges_mut();
-            worst = worst.max(outlier::remove_outliers(
-                edges,
-                self.min_outlier_px,
-                &mut self.scratch_f64,
-            ));
+            let (least_px, scratch) = (self.both.min_outlier_px, &mut self.scratch.wide);
+            worst = worst.max(outlier::remove_outliers(&mut side.edges, least_px, scratch));
         }
         let got = self.left.used_fraction().min(self.right.used_fraction());
-        let enough = [&self.left, &self.right]
-            .iter()
-            .all(|side| side.used_fraction() >= min_row_fraction(side));
+        let sides = [&self.left, &self.right];
+        let enough = sides.iter().all(|side| side.used_fraction() >= min_row_fraction(side));
         let limit = self.scatter_limit();
         if worst > limit {
             return Err(Reject::Scattered { got_px: worst, limit_px: limit });
         }
         if !enough {
-            let need = f64::max(min_row_fraction(&self.left), min_row_fraction(&self.right));
+            let need = f64::max(min_row_fraction(sides[0]), min_row_fraction(sides[1]));
             return Err(Reject::NoPair { got, need });
         }
         Ok(())
     }
 
-    /// Takes out places that step the wrong way for the bead's polarity, and lines
+    /// Takes out positions that step the wrong way for the bead's polarity, and lines
     /// whose two edges cross.
     fn drop_inconsistent(&mut self, bright: bool) {
         let sides = [(&mut self.left, bright), (&mut self.right, !bright)];
         for (side, steps_up) in sides {
-            for edge in side.edges_mut() {
+            for edge in &mut side.edges {
                 *edge = edge.take_if(|edge| (edge.height > 0.0) == steps_up);
             }
         }
-        let (left, right) = (self.left.edges_mut(), self.right.edges_mut());
+        let (left, right) = (&mut self.left.edges, &mut self.right.edges);
         for (left, right) in left.iter_mut().zip(right) {
             if let (Some(one), Some(other)) = (&left, &right)
                 && one.at >= other.at
@@ -122,37 +119,38 @@ impl MeasureState {
 
     /// Refuses edges whose flanks are wider than a lens's blur: a shutter that is open
     /// while the bead moves leaves another shape, and with it another width.
-    pub(super) fn check_blur(&self, limit_px: f64) -> Result<(), Reject> {
+    pub fn check_blur(&self, limit_px: f64) -> Checked {
         let got_px = self.left.blur_px.max(self.right.blur_px);
         if got_px > limit_px { Err(Reject::Blurred { got_px, limit_px }) } else { Ok(()) }
     }
 
     /// Looks at the pattern beside the bead: adds to the edges' variance what it may
     /// move them by, and refuses one that is as strong as an edge.
-    pub(super) fn check_ground<T: GreyPixel>(
+    pub fn check_ground<T: GreyPixel>(
         &mut self,
         strip: &GaugeRows<'_, T>,
         of_both: fn(f64, f64) -> f64,
-    ) -> Result<(), Reject> {
-        let noise = f64::from(self.noise.grey);
-        self.is_beside_groove = self.gauge.edge == EdgeKind::Groove;
+    ) -> Checked {
+        let noise = f64::from(self.rows.noise.grey);
+        self.both.is_beside_groove = self.gauge.edge == EdgeKind::Groove;
         let mut strengths = [0.0_f64; 2];
         let sides = [(&mut self.left, -1.0), (&mut self.right, 1.0)];
         for (((tracer, outwards), contrast), strength) in
-            sides.into_iter().zip(self.contrasts).zip(&mut strengths)
+            sides.into_iter().zip(self.both.contrasts).zip(&mut strengths)
         {
             tracer.uncertainty.ground_variance = 0.0;
             if !tracer.is_on_ground {
                 continue;
             }
-            edge_positions(tracer, &self.lines, &mut self.positions);
+            edge_positions(tracer, &self.rows.lines, &mut self.scratch.positions);
             let blur_px = tracer.blur_px;
-            let side =
-                EdgeSide { positions: &self.positions, outwards, blur_px, room_px: f64::INFINITY };
+            let (positions, room_px) = (&self.scratch.positions, f64::INFINITY);
+            let side = EdgeSide { strip, noise, positions, outwards, blur_px, room_px };
             if self.gauge.edge == EdgeKind::Auto {
-                self.is_beside_groove |= tracer.is_beside_groove(outwards > 0.0, noise / contrast);
+                self.both.is_beside_groove |=
+                    tracer.is_beside_groove(outwards > 0.0, noise / contrast);
             }
-            let Some(pattern) = self.ground.pattern(strip, &side, noise) else { continue };
+            let Some(pattern) = self.scratch.ground.pattern(&side) else { continue };
             *strength = pattern.size_grey / contrast;
             // Rough edges know what the ground beside them leaves open, weights that know a
             // texture what a faint one does.
@@ -163,25 +161,25 @@ impl MeasureState {
                     pattern.mean_variance * px_per_grey * px_per_grey;
             }
         }
-        self.pattern_ratio = strengths[0].min(strengths[1]);
+        self.both.pattern_ratio = strengths[0].min(strengths[1]);
         let (got, limit) = (of_both(strengths[0], strengths[1]), MAX_PATTERN);
         if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
     /// Refuses edges in a pattern that were located line by line: parts of it were taken for
     /// them.
-    pub(super) fn check_lines_in_pattern(&self) -> Result<(), Reject> {
-        let (got, limit) = (self.pattern_ratio, MAX_PATTERN_LINE_BY_LINE);
-        let is_among = self.edge_model == EdgeModel::LineByLine && got > limit;
+    pub fn check_lines_in_pattern(&self) -> Checked {
+        let (got, limit) = (self.both.pattern_ratio, MAX_PATTERN_LINE_BY_LINE);
+        let is_among = self.both.model == EdgeModel::LineByLine && got > limit;
         if is_among { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
-    /// Scatter of an edge from which on it is noise \[px\].
+    /// Spread of an edge from which on it is noise \[px\].
     fn scatter_limit(&self) -> f64 {
         let sides = [&self.left, &self.right];
         let whole =
             |side: &&EdgeTracer| side.is_clear() && side.used_fraction() > COMPLETE_FRACTION;
-        if self.is_lost {
+        if self.both.is_lost {
             MAX_LOST_SCATTER_PX
         } else if sides.iter().all(whole) {
             MAX_COMPLETE_SCATTER_PX
@@ -190,10 +188,10 @@ impl MeasureState {
         }
     }
 
-    pub(super) fn check_contrast(&mut self) -> Result<(), Reject> {
+    pub fn check_contrast(&mut self) -> Checked {
         let need = self.gauge.min_contrast_grey;
-        self.contrasts = [self.contrast(true), self.contrast(false)];
-        let got = self.contrasts[0].min(self.contrasts[1]);
+        self.both.contrasts = [self.contrast(true), self.contrast(false)];
+        let got = self.both.contrasts[0].min(self.both.contrasts[1]);
         if got < need {
             return Err(self.saturation().unwrap_or(Reject::LowContrast { got, need }));
         }
@@ -203,14 +201,14 @@ impl MeasureState {
     /// Median height of an edge's steps \[grey levels\].
     fn contrast(&mut self, left: bool) -> f64 {
         let side = if left { &self.left } else { &self.right };
-        self.scratch_f64.clear();
-        self.scratch_f64.extend(side.edges().iter().flatten().map(|edge| edge.height.abs()));
-        rank::median(&mut self.scratch_f64).unwrap_or(0.0)
+        self.scratch.wide.clear();
+        self.scratch.wide.extend(side.edges.iter().flatten().map(|edge| edge.height.abs()));
+        rank::median(&mut self.scratch.wide).unwrap_or(0.0)
     }
 
-    /// Refuses a bead of whose edges too little is uncovered to tell where they
+    /// Refuses a bead of whose edges too little is visible to show where they
     /// run.
-    pub(super) fn check_occlusion(&self, found: &WidthMeasurement) -> Result<(), Reject> {
+    pub fn check_occlusion(&self, found: &WidthMeasurement) -> Checked {
         let got_px = found.sigma.get() / found.width.get() * f64::from(self.width_px);
         let sides = [&self.left, &self.right];
         let sparse = |side: &&EdgeTracer| {
@@ -228,12 +226,12 @@ impl MeasureState {
         Ok(())
     }
 
-    /// Refuses a bead whose edges the border of the gauge cuts short.
-    pub(super) fn check_boundary(&self, across: usize) -> Result<(), Reject> {
+    /// Refuses a bead whose edges the boundary of the gauge cuts short.
+    pub fn check_boundary(&self, across: usize) -> Checked {
         let last = to_f64(across.saturating_sub(1));
         for side in [&self.left, &self.right] {
             let need_px = f64::max(MIN_BOUNDARY_PX, BOUNDARY_BLURS * side.blur_px);
-            let places = side.edges().iter().flatten();
+            let places = side.edges.iter().flatten();
             let distances = places.map(|edge| edge.at.min(last - edge.at));
             let (mut near, mut all, mut got_px) = (0.0, 0.0, f64::INFINITY);
             for distance in distances {
@@ -252,19 +250,15 @@ impl MeasureState {
 }
 
 /// Where an edge lies on the caliper lines that show it.
-pub(super) fn edge_positions(
-    tracer: &EdgeTracer,
-    lines: &[RowRange],
-    places: &mut Vec<EdgePosition>,
-) {
-    let edges = tracer.edges().iter().zip(lines);
+pub fn edge_positions(tracer: &EdgeTracer, lines: &[RowRange], places: &mut Vec<EdgePosition>) {
+    let edges = tracer.edges.iter().zip(lines);
     places.clear();
     places.extend(
         edges.filter_map(|(edge, &rows)| Some(EdgePosition { rows, at: edge.as_ref()?.at })),
     );
 }
 
-/// Share of the rows from which an edge must come.
+/// Fraction of the rows from which an edge must come.
 fn min_row_fraction(side: &EdgeTracer) -> f64 {
     if side.is_occluded() { MIN_CLEAR_ROW_FRACTION } else { MIN_ROW_FRACTION }
 }
@@ -273,4 +267,15 @@ fn min_row_fraction(side: &EdgeTracer) -> f64 {
 pub fn are_not_steps(misfits: [f64; 2]) -> bool {
     misfits.iter().all(|&misfit| misfit > MAX_STEP_MISFIT)
         || misfits.iter().any(|&misfit| misfit > MAX_SINGLE_MISFIT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_widest_motion_is_a_box_with_the_default_blur() {
+        let blur = (15.8f64.powi(2) / 12.0 + 1.5 * 1.5).sqrt();
+        assert!((MAX_MOTION_BLUR_PX - blur).abs() < 0.005, "{blur}");
+    }
 }

@@ -1,11 +1,14 @@
-//! The bead's two edges, from their contours to sub-pixel places: each in the
-//! way that suits it.
+//! The bead's two edges, from their contours to sub-pixel positions. Each edge is located by the
+//! model that fits it.
+
+use crate::vision::buffer::refill;
+use std::ops::Range;
 
 use super::checks::are_not_steps;
 use super::search::ContourPair;
 use super::work::{EdgeModel, MIN_LINE_FRACTION, MIN_OUTLIER_PX, MeasureState};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::narrow_to_f32;
+use crate::numeric::number::{floor_to_count, narrow_to_f32};
 use crate::numeric::rank;
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::light;
@@ -13,12 +16,12 @@ use crate::vision::motion::BlurShapes;
 use crate::vision::occluded;
 use crate::vision::overlay::StepFit;
 use crate::vision::pixel_noise::PixelNoise;
-use crate::vision::reject::Reject;
+use crate::vision::reject::{Checked, Reject};
 use crate::vision::saturated;
 use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::trace::{EdgeTracer, TraceInput};
 
-/// Least deviation that makes an outlier of a caliper line that was fitted for
+/// Smallest deviation that makes an outlier of a caliper line that was fitted for
 /// itself \[px\].
 const MIN_LINE_OUTLIER_PX: f64 = 0.75;
 /// Ground on either side of the bead that its noise is taken from \[px\].
@@ -26,54 +29,54 @@ const NOISE_MARGIN_PX: f32 = 12.0;
 /// Distance of an edge's median from its contour's that makes it another \[px\]: grains of
 /// 12 px beside an edge draw its contour along by less.
 const OTHER_EDGE_PX: f32 = 14.0;
-/// Share by which the blur of one edge differs from the other's.
+/// Fraction by which the blur of one edge differs from the other's.
 const BLUR_DIFFERENCE: f64 = 0.04;
 
 impl MeasureState {
     #[inline(always)]
-    pub(super) fn trace<T: GreyPixel>(
-        &mut self,
-        strip: &GaugeRows<'_, T>,
-        pair: ContourPair,
-    ) -> Result<(), Reject> {
-        let (lefts, rights) = pair.sides(&self.ups, &self.downs);
-        let (lefts, rights) = (&lefts.all()[pair.pair.left].at, &rights.all()[pair.pair.right].at);
+    pub fn trace<T: GreyPixel>(&mut self, strip: &GaugeRows<'_, T>, pair: ContourPair) -> Checked {
+        let [lefts, rights] = self.search.sides(pair.bright).of(&pair.pair).map(|edge| &edge.at);
         let about = columns_about(lefts, rights, strip.across);
-        self.noise = PixelNoise::read(strip, about);
-        self.width_px = narrow_distance(lefts, rights, &mut self.scratch);
+        self.rows.noise = PixelNoise::read(strip, about);
+        self.width_px = narrow_distance(lefts, rights, &mut self.scratch.narrow);
         let scene = TraceInput {
             strip,
-            bands: &self.bands,
-            lines: &self.lines,
-            noise: self.noise.grey,
+            table: self.blur_shapes.lens(),
+            bands: &self.rows.bands,
+            lines: &self.rows.lines,
+            noise: self.rows.noise.grey,
             width_px: self.width_px,
             bead_after: true,
         };
         let right_scene = TraceInput { bead_after: false, ..scene };
         let scenes = [scene, right_scene];
         let mut seen = [None; 2];
-        self.blur_shapes.reset();
-        (self.is_lost, self.edge_model) = (false, EdgeModel::Steps);
+        (self.both.is_lost, self.both.model, self.both.blur_shape) = (false, EdgeModel::Steps, 0);
         // A loop, so that what is inlined into it is compiled once for both.
         let sides = [(&mut self.left, lefts), (&mut self.right, rights)];
-        for ((tracer, rough), (scene, seen)) in sides.into_iter().zip(scenes.iter().zip(&mut seen))
-        {
-            *seen = tracer.fit_first(self.blur_shapes.table(), scene, rough.iter().copied());
+        for (((tracer, rough), scene), seen) in sides.into_iter().zip(&scenes).zip(&mut seen) {
+            *seen = tracer.fit_first(scene, rough.iter().copied());
         }
         let failed = Reject::NoPair { got: 0.0, need: MIN_LINE_FRACTION };
         if let [Some(_), Some(_)] = seen {
             let cut_off = [self.left.clipped_sides(&scene), self.right.clipped_sides(&right_scene)];
             if cut_off != [[false; 2]; 2] {
-                (self.min_outlier_px, self.edge_model) = (MIN_OUTLIER_PX, EdgeModel::Clipped);
+                (self.both.min_outlier_px, self.both.model) = (MIN_OUTLIER_PX, EdgeModel::Clipped);
                 let tracers = [&mut self.left, &mut self.right];
                 let bead = saturated::SaturatedBead { scenes, lefts, rights };
-                self.noise.grey = bead.trace(tracers, self.blur_shapes.table(), cut_off)?;
+                self.rows.noise.grey = bead.trace(tracers, cut_off)?;
                 return Ok(());
             }
-            let tracers = [&mut self.left, &mut self.right];
-            seen = choose_blur(&mut self.blur_shapes, tracers, &scenes).unwrap_or(seen);
+            if let Some((shape, looks)) =
+                choose_blur(&self.blur_shapes, [&self.left, &self.right], &scenes)
+            {
+                self.both.blur_shape = shape;
+                seen = looks.map(|look| Some(look.blur()));
+                (self.left.step_fit, self.right.step_fit) = (Some(looks[0]), Some(looks[1]));
+            }
         }
-        let table = self.blur_shapes.table();
+        let table = self.blur_shapes.table(self.both.blur_shape);
+        let scenes = scenes.map(|scene| TraceInput { table, ..scene });
         if let Some(blur) = common_blur(seen) {
             for tracer in [&mut self.left, &mut self.right] {
                 tracer.take_shape(table, blur);
@@ -83,51 +86,47 @@ impl MeasureState {
                 light::apply_falloff([left, right], self.width_px.into());
             }
             for (tracer, scene) in [&mut self.left, &mut self.right].into_iter().zip(&scenes) {
-                tracer.trace(table, scene, blur);
+                tracer.trace(scene, blur);
             }
             if self.left.is_lost() || self.right.is_lost() {
-                let candidates = &self.candidates;
+                let candidates = &self.search.candidates;
                 let bead = occluded::OccludedBead { scenes, candidates, bright: pair.bright };
                 let tracers = [&mut self.left, &mut self.right];
-                bead.locate_from_clear_rows(tracers, table, blur, &mut self.parallel);
+                bead.locate_from_clear_rows(tracers, blur, &mut self.scratch.parallel);
                 let contours = [(&self.left, lefts.as_slice()), (&self.right, rights)];
-                if let Some([one, other]) = widths_apart(contours, &mut self.scratch) {
+                if let Some([one, other]) = widths_apart(contours, &mut self.scratch.narrow) {
                     return Err(self.ambiguous(one, other));
                 }
             }
-            self.is_lost = self.one_is_lost();
+            self.both.is_lost = self.one_is_lost();
             let found = self.left.is_located() && self.right.is_located();
             let misfits = [&self.left, &self.right].map(EdgeTracer::misfit_of_a_row);
-            if found && !self.is_lost && !are_not_steps(misfits) {
-                self.min_outlier_px = MIN_OUTLIER_PX;
+            if found && !self.both.is_lost && !are_not_steps(misfits) {
+                self.both.min_outlier_px = MIN_OUTLIER_PX;
                 return Ok(());
             }
         }
-        (self.min_outlier_px, self.edge_model) = (MIN_LINE_OUTLIER_PX, EdgeModel::LineByLine);
-        // What is no blurred step does not tell how a motion blurs it.
-        let lens = self.blur_shapes.lens();
-        let left = self.left.refine(lens, &scene);
-        let right = self.right.refine(lens, &right_scene);
+        (self.both.min_outlier_px, self.both.model) = (MIN_LINE_OUTLIER_PX, EdgeModel::LineByLine);
+        // What is no blurred step does not show how a motion blurs it.
+        let left = self.left.refine(&scene);
+        let right = self.right.refine(&right_scene);
         if left && right { Ok(()) } else { Err(failed) }
     }
 }
 
-/// Looks at both edges again with the blur's shape that fits best, where it is not a
-/// lens's alone; the blur of each with that shape.
+/// Fits both edges again with the blur's shape that fits best, where it is not a lens's alone:
+/// the number of the shape, and the fits with it.
 #[inline(always)]
 fn choose_blur<T: GreyPixel>(
-    shapes: &mut BlurShapes,
-    [left, right]: [&mut EdgeTracer; 2],
+    shapes: &BlurShapes,
+    [left, right]: [&EdgeTracer; 2],
     scenes: &[TraceInput<'_, T>; 2],
-) -> Option<[Option<BlurEstimate>; 2]> {
+) -> Option<(usize, [StepFit; 2])> {
     let again = |table: &StepTable, before: Option<[&StepFit; 2]>| {
-        [(&left, 0), (&right, 1)]
+        [(left, 0), (right, 1)]
             .map(|(edge, k)| edge.refit(table, &scenes[k], before.map(|looks| looks[k])))
     };
-    let looks = shapes.choose([left.step_fit()?, right.step_fit()?], again)?;
-    left.take_fit(looks[0]);
-    right.take_fit(looks[1]);
-    Some(looks.map(|look| Some(look.blur())))
+    shapes.choose([left.step_fit.as_ref()?, right.step_fit.as_ref()?], again)
 }
 
 /// Blur that both edges have, seen through one lens, and how far one may differ
@@ -144,46 +143,36 @@ fn common_blur(seen: [Option<BlurEstimate>; 2]) -> Option<BlurEstimate> {
     (weights > 0.0).then_some(BlurEstimate { px: blur, sd_px: BLUR_DIFFERENCE * blur })
 }
 
-/// Width between edges of which one was uncovered elsewhere than where its contour runs, and
+/// Width between edges of which one was located elsewhere than where its contour runs, and
 /// between the contours \[px\]: a seam or a rib may have been taken for the edge. `None`
 /// where both run along their contours.
 fn widths_apart(
     sides: [(&EdgeTracer, &[Option<f32>]); 2],
-    memory: &mut Vec<f32>,
+    scratch: &mut Vec<f32>,
 ) -> Option<[f32; 2]> {
     let [left, right] = sides.map(|(tracer, contour)| {
-        memory.clear();
-        memory.extend(contour.iter().flatten());
-        let contour = rank::median(memory).unwrap_or(f32::NAN);
+        refill(scratch, contour.iter().flatten().copied());
+        let contour = rank::median(scratch).unwrap_or(f32::NAN);
         let found = narrow_to_f32(tracer.middle());
         let is_elsewhere = tracer.is_occluded() && (found - contour).abs() > OTHER_EDGE_PX;
         [if is_elsewhere { found } else { contour }, contour]
     });
-    let [uncovered, contours] = [0, 1].map(|of| right[of] - left[of]);
-    (uncovered != contours).then_some([uncovered, contours])
+    let [located, contours] = [0, 1].map(|of| right[of] - left[of]);
+    (located != contours).then_some([located, contours])
 }
 
 /// Columns of the bead and a little beside it.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "saturates at 0 and is cut to the gauge"
-)]
-fn columns_about(
-    left: &[Option<f32>],
-    right: &[Option<f32>],
-    across: usize,
-) -> std::ops::Range<usize> {
+fn columns_about(left: &[Option<f32>], right: &[Option<f32>], across: usize) -> Range<usize> {
     let low = left.iter().flatten().fold(f32::INFINITY, |low, &at| low.min(at));
     let high = right.iter().flatten().fold(0.0, |high: f32, &at| high.max(at));
-    let (from, to) = ((low - NOISE_MARGIN_PX) as usize, (high + NOISE_MARGIN_PX) as usize);
+    let [from, to] =
+        [low - NOISE_MARGIN_PX, high + NOISE_MARGIN_PX].map(|at| floor_to_count(at.into()));
     from.min(across - 1)..to.clamp(from + 1, across)
 }
 
 /// A narrow distance between two contours \[px\], for the size of windows.
-fn narrow_distance(left: &[Option<f32>], right: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
-    memory.clear();
-    memory.extend(left.iter().zip(right).filter_map(|(left, right)| Some((*right)? - (*left)?)));
-    let rank = memory.len() / 10;
-    rank::at(memory, rank).unwrap_or(0.0)
+fn narrow_distance(left: &[Option<f32>], right: &[Option<f32>], scratch: &mut Vec<f32>) -> f32 {
+    refill(scratch, left.iter().zip(right).filter_map(|(left, right)| Some((*right)? - (*left)?)));
+    let rank = scratch.len() / 10;
+    rank::at(scratch, rank).unwrap_or(0.0)
 }

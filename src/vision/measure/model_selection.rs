@@ -1,4 +1,4 @@
-//! Whether edges that were measured as blurred steps are better told by rough ones:
+//! Whether edges that were measured as blurred steps are better described by rough ones:
 //! a groove that no step is, bays, or a flank that is wider than any blur.
 
 use std::ops::RangeInclusive;
@@ -6,12 +6,12 @@ use std::ops::RangeInclusive;
 use super::checks::{MAX_BLUR_PX, MAX_MOTION_BLUR_PX, MAX_STEP_MISFIT};
 use super::rough_edges::MAX_ROUGH_BLUR_PX;
 use super::work::{EdgeModel, MeasureState};
-use crate::vision::reject::Reject;
+use crate::vision::reject::{Checked, Reject};
 use crate::vision::rough::RoughFit;
 use crate::vision::trace::EdgeTracer;
 use crate::vision::width::WidthMeasurement;
 
-/// Share of an edge's rows that may be sorted out: more are bays, or grains.
+/// Fraction of an edge's rows that may be sorted out: more are bays, or grains.
 const MAX_GAP_FRACTION: f64 = 0.06;
 /// The same of rows that noise does not explain: a single bay of 2 px in 200 rows.
 const MAX_UNFIT_FRACTION: f64 = 0.01;
@@ -20,28 +20,29 @@ const MAX_NARROW_WIDTH_PX: f32 = 40.0;
 /// Contrast of a rough edge over that of the blurred step below which it is another edge:
 /// holes within the bead leave 0.8.
 const MIN_CONTRAST_RATIO: f64 = 0.7;
-/// Contrast of an edge as a fraction of the other's below which it may be a rib's, and
-/// the distance at which another edge is not the same \[px\].
+/// Contrast of an edge as a fraction of the other's below which it may be a rib's.
 const MIN_SIDES_CONTRAST_RATIO: f64 = 0.6;
+/// Distance from which on another edge is not the same \[px\]: more than a groove that blur fills
+/// moves it.
 const OTHER_EDGE_PX: f64 = 3.0;
 /// The distance of a rough edge from what was located line by line up to which both are the
 /// same \[px\].
 const SAME_EDGE_PX: f64 = 0.25;
-/// By how much the levels outside the two edges differ, as a share of the higher contrast,
+/// By how much the levels outside the two edges differ, as a fraction of the higher contrast,
 /// where something else lies beside one than beside the other, so that a narrow groove may: one
 /// of 2 to 2.5 px that is a little darker than the ground moves a blurred step by a third of a
 /// pixel and shows in nothing else.
 const MIN_GROUND_DIFFERENCE: f64 = 0.1;
 /// Pattern beside both edges, as a fraction of the contrast, from which on a blurred step
-/// may have parts of it in its flank: widths were up to 3 px off by seven times what steps say.
+/// may have parts of it in its flank: widths were up to 3 px off by seven times the sigma of steps.
 const MIN_PATTERN: f64 = 0.2;
 /// Factor of sigma where edges in such a pattern were located line by line: of 30,000 drawn
-/// widths some were off by up to seven of the sigmas that lines say.
+/// widths some were off by up to seven of the sigmas of lines.
 const PATTERN_SIGMA_FACTOR: f64 = 2.0;
-/// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
-/// wide flank, and its blur from which on it is: steps within the ramps of motions of 15 px and
-/// more have 2.9 px, those beside a shadow the lens's.
+/// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a wide flank.
 const MAX_PARTIAL_CONTRAST: f64 = 0.55;
+/// Blur of a step from which on it is such a part \[px\]: steps within the ramps of motions of 15
+/// px and more have 2.9 px, those beside a shadow the lens's.
 const MIN_PARTIAL_BLUR_PX: f64 = 2.5;
 /// The same as a fraction of the levels' difference a few pixels before and after it, below
 /// which a ramp, a rib or a shadow may lie there.
@@ -55,41 +56,42 @@ const FULL_FLANK_CONTRAST: RangeInclusive<f64> = 0.97..=1.08;
 const WIDE_BLUR_PX: f64 = 3.5;
 /// How much farther out than a blurred step a rough edge may lie \[px\].
 const MAX_OUTWARD_PX: f64 = 1.0;
-/// Contrast of a rough edge over that of the blurred step from which on it is higher: by
-/// sparks on 5 % of the bead it is 1.05 to 1.1.
+/// Contrast of a rough edge over that of the blurred step from which on it is higher. Measured:
+/// ACCURACY.md, The sets: with sparks on 5 % of the bead (`spots`) it is 1.05 to 1.1.
 const MAX_CONTRAST_RATIO: f64 = 1.04;
-/// Share of odd pixels about an edge up to which it is bead and ground alone: drawn torn
-/// beads, ones with holes and ones in low light have up to 0.003, of 522 with grooves that
-/// were refused as covered 11 have more, and grains that passed for bays from 0.005 on.
+/// Fraction of odd pixels about an edge up to which it is bead and ground alone. Measured:
+/// ACCURACY.md, Drawn frames: `torn`, `holes` and `low-light` have up to 0.003; of 522 frames of
+/// `grooves` that were refused as occluded 11 have more, and grains that passed for bays from 0.005
+/// on.
 const MAX_ODD_FRACTION: f64 = 0.004;
-/// By how much the share of odd pixels about an edge exceeds that within the bead where
-/// grains lie on it: concrete beads have up to 0.022, grains of 6 and 12 px on a third of
-/// the rows 0.027 to 0.14.
+/// By how much the fraction of odd pixels about an edge exceeds that within the bead where grains
+/// lie on it. Measured: ACCURACY.md, The sets: concrete beads have up to 0.022, grains of 6 and 12
+/// px on a third of the rows (`grains-6-…`, `grains-12-…`) 0.027 to 0.14.
 const GRAIN_ODD_FRACTION: f64 = 0.024;
 
 impl MeasureState {
     /// Whether edges that were measured as blurred steps may be something else. Where they
-    /// pass the end of the scale, rows do not tell: half of their height is not seen.
-    pub(super) fn may_not_be_steps(&self) -> bool {
-        if self.edge_model == EdgeModel::Clipped {
+    /// pass the end of the scale, rows do not show it: half of their height is not seen.
+    pub fn may_not_be_steps(&self) -> bool {
+        if self.both.model == EdgeModel::Clipped {
             return false;
         }
-        let is_other = self.is_refined() || self.is_beside_groove || self.is_wide();
+        let is_other = self.is_refined() || self.both.is_beside_groove || self.is_wide();
         is_other || self.has_gaps() || self.has_two_grounds() || self.has_low_step()
     }
 
     /// Whether a step is much lower than the levels on either side of it differ: it may lie
     /// within a ramp, most of which was taken for shading, or beside a rib.
     fn has_low_step(&self) -> bool {
-        is_part(&self.left, self.contrasts[0]) || is_part(&self.right, self.contrasts[1])
+        is_part(&self.left, self.both.contrasts[0]) || is_part(&self.right, self.both.contrasts[1])
     }
 
     /// Whether edges were located line by line.
     fn is_refined(&self) -> bool {
-        self.edge_model == EdgeModel::LineByLine
+        self.both.model == EdgeModel::LineByLine
     }
 
-    /// Whether the flanks are so wide that rows alone do not tell bays in them.
+    /// Whether the flanks are so wide that rows alone do not show bays in them.
     fn is_wide(&self) -> bool {
         self.left.blur_px.max(self.right.blur_px) > WIDE_BLUR_PX
     }
@@ -99,36 +101,40 @@ impl MeasureState {
         self.width_px <= MAX_NARROW_WIDTH_PX
     }
 
-    /// Whether more than a few places of an edge were sorted out, or some that surely show
+    /// Whether more than a few positions of an edge were sorted out, or some that certainly show
     /// something else.
-    pub(super) fn has_gaps(&self) -> bool {
+    pub fn has_gaps(&self) -> bool {
         let used = self.left.used_fraction().min(self.right.used_fraction());
         used < 1.0 - MAX_GAP_FRACTION
-            || self.left.unfit_fraction().max(self.right.unfit_fraction()) > MAX_UNFIT_FRACTION
+            || self.left.unfit_fraction.max(self.right.unfit_fraction) > MAX_UNFIT_FRACTION
     }
 
     /// Whether rough edges are not higher than the blurred steps: then what was sorted
     /// out shows ground. Dark grains beside an edge, sparks within and shading make rough
     /// edges higher; holes within make them lower.
     fn is_no_higher(&self, fits: &[RoughFit; 2]) -> bool {
-        fits.iter().zip(self.contrasts).all(|(fit, step)| fit.contrast < MAX_CONTRAST_RATIO * step)
+        fits.iter()
+            .zip(self.both.contrasts)
+            .all(|(fit, step)| fit.contrast < MAX_CONTRAST_RATIO * step)
     }
 
     /// Whether grains may be what covers the edges of a frame whose blurred steps were
     /// refused. Occluded ones are known, and grains taken for ground make rough ones higher.
-    pub(super) fn may_be_grains(&self, refused: &Reject, fits: &[RoughFit; 2]) -> bool {
+    pub fn may_be_grains(&self, refused: &Reject, fits: &[RoughFit; 2]) -> bool {
         let is_higher = matches!(refused, Reject::Occluded { .. }) && !self.is_no_higher(fits);
         is_higher || fits.iter().any(|fit| fit.exceeds_texture(MAX_ODD_FRACTION))
     }
 
     /// Whether a rough edge is so much fainter than the blurred step that it is another.
     fn is_fainter(&self, fits: &[RoughFit; 2]) -> bool {
-        fits.iter().zip(self.contrasts).any(|(fit, step)| fit.contrast < MIN_CONTRAST_RATIO * step)
+        fits.iter()
+            .zip(self.both.contrasts)
+            .any(|(fit, step)| fit.contrast < MIN_CONTRAST_RATIO * step)
     }
 
     /// Whether the blurred steps are parts of flanks that are wider than any blur.
     fn are_parts_of_flanks(&self, fits: &[RoughFit; 2]) -> bool {
-        let mut sides = fits.iter().zip(self.contrasts);
+        let mut sides = fits.iter().zip(self.both.contrasts);
         let is_wide = self.is_refined() && fits.iter().any(|fit| fit.blur_px > MAX_ROUGH_BLUR_PX)
             || fits.iter().all(|fit| fit.blur_px > MAX_BLUR_PX);
         let may_be_part = self.left.blur_px.max(self.right.blur_px) > MIN_PARTIAL_BLUR_PX;
@@ -137,8 +143,8 @@ impl MeasureState {
     }
 
     /// Refuses wide steps of which one is a part of its flank, or more.
-    pub(super) fn check_flanks(&self, fits: &[RoughFit; 2]) -> Result<(), Reject> {
-        let mut sides = fits.iter().zip(self.contrasts);
+    pub fn check_flanks(&self, fits: &[RoughFit; 2]) -> Checked {
+        let mut sides = fits.iter().zip(self.both.contrasts);
         let is_whole =
             sides.all(|(fit, step)| FULL_FLANK_CONTRAST.contains(&(step / fit.contrast)));
         let (got_px, limit_px) = (fits[0].blur_px.max(fits[1].blur_px), MAX_MOTION_BLUR_PX);
@@ -150,14 +156,14 @@ impl MeasureState {
 
     /// Whether one edge has much less contrast than the other.
     fn have_unequal_contrast(&self) -> bool {
-        let [left, right] = self.contrasts;
+        let [left, right] = self.both.contrasts;
         left.min(right) < MIN_SIDES_CONTRAST_RATIO * left.max(right)
     }
 
     /// Whether something else lies outside the one edge than outside the other.
     fn has_two_grounds(&self) -> bool {
         let ([left, _], [_, right]) = (self.left.levels(), self.right.levels());
-        let [one, other] = self.contrasts;
+        let [one, other] = self.both.contrasts;
         (left - right).abs() > MIN_GROUND_DIFFERENCE * one.max(other)
     }
 
@@ -180,14 +186,14 @@ impl MeasureState {
         rough_px * self.mm_per_px / found.sigma.get()
     }
 
-    /// A width between blurred steps, as unsure as all rows say it is where rows are better
+    /// A width between blurred steps, as uncertain as all rows show where rows are better
     /// trusted: where some were sorted out and neither grains nor sparks are seen, for those
-    /// that are left were chosen, as from a texture that was not told; beside what may be a
+    /// that are left were chosen, as from a texture that was not recognised; beside what may be a
     /// narrow groove, where the grounds differ; and in a pattern. Where a step is but a part
-    /// of the levels' difference, or none fits and rows tell a narrow groove, sigma contains how
+    /// of the levels' difference, or none fits and rows show a narrow groove, sigma contains how
     /// far the rows' edges lie elsewhere. Nothing is added on narrow beads, whose level rows do
     /// not read free of the flanks.
-    pub(super) fn with_row_uncertainty(
+    pub fn with_row_uncertainty(
         &self,
         fits: &[RoughFit; 2],
         found: WidthMeasurement,
@@ -198,8 +204,8 @@ impl MeasureState {
         let may_be_grooved = fits.iter().any(|fit| fit.is_narrow_groove);
         let is_uncertain = are_clean(fits, GRAIN_ODD_FRACTION)
             && (self.has_gaps() || may_be_grooved && self.has_two_grounds());
-        let is_in_pattern = self.pattern_ratio > MIN_PATTERN;
-        let sigma_factor = match self.edge_model {
+        let is_in_pattern = self.both.pattern_ratio > MIN_PATTERN;
+        let sigma_factor = match self.both.model {
             EdgeModel::Steps if is_uncertain || is_in_pattern => {
                 self.sigma_ratio(fits, &found).max(1.0)
             }
@@ -207,14 +213,12 @@ impl MeasureState {
             _ => 1.0,
         };
         let off = self.mm_per_px * self.row_offset_px(fits) / found.sigma.get();
-        WidthMeasurement {
-            sigma: found.sigma * (sigma_factor * sigma_factor + off * off).sqrt(),
-            ..found
-        }
+        let sigma = found.sigma * (sigma_factor * sigma_factor + off * off).sqrt();
+        WidthMeasurement { sigma, ..found }
     }
 
     /// How far edges lie from the rows' \[px\] where a step is but a part of the levels'
-    /// difference, or the rows tell a narrow groove and no step fits, or not on all rows beside
+    /// difference, or the rows show a narrow groove and no step fits, or not on all rows beside
     /// grounds that differ.
     fn row_offset_px(&self, fits: &[RoughFit; 2]) -> f64 {
         let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
@@ -223,10 +227,10 @@ impl MeasureState {
         let off = [0, 1].map(|k| {
             let (found, rough) = sides[k];
             let is_fit =
-                self.edge_model == EdgeModel::Steps && found.misfit_of_a_row() < MAX_STEP_MISFIT;
+                self.both.model == EdgeModel::Steps && found.misfit_of_a_row() < MAX_STEP_MISFIT;
             let is_step = is_fit && !shows_two_grounds;
             let off = (rough.middle() - found.middle()).abs();
-            let is_part = is_part(found, self.contrasts[k]) && off < MAX_OUTWARD_PX;
+            let is_part = is_part(found, self.both.contrasts[k]) && off < MAX_OUTWARD_PX;
             if is_part || !is_step && fits[k].is_narrow_groove { off } else { 0.0 }
         });
         off[0] + off[1]
@@ -245,7 +249,7 @@ impl MeasureState {
     /// Whether rough edges explain more than blurred steps do: a groove that no step
     /// is, bays in an edge that were sorted out as grains, or edges that no blurred step fits and
     /// whose rows show their course better than lines do.
-    pub(super) fn explains_more(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> bool {
+    pub fn explains_more(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> bool {
         if self.have_unequal_contrast() && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
             return true;
         }
@@ -261,7 +265,7 @@ impl MeasureState {
             let grooved = hidden || fits.iter().any(|fit| fit.is_groove);
             let is_rough =
                 two_levels && self.apart_px() < SAME_EDGE_PX && self.sigma_ratio(fits, found) < 1.0;
-            !has_grains && (is_rough || grooved && (two_levels || !self.is_lost))
+            !has_grains && (is_rough || grooved && (two_levels || !self.both.is_lost))
         } else {
             // Grains here and there look like a groove in the mean over the gauge.
             let is_covered = self.left.is_occluded() || self.right.is_occluded();
@@ -278,7 +282,7 @@ fn is_part(tracer: &EdgeTracer, step: f64) -> bool {
     step < MIN_LEVEL_RATIO * (after - before).abs()
 }
 
-/// Whether less than such a share of the pixels about either edge shows neither bead nor ground.
+/// Whether less than such a fraction of the pixels about either edge shows neither bead nor ground.
 fn are_clean(fits: &[RoughFit; 2], max_odd_share: f64) -> bool {
     fits.iter().all(|fit| fit.odd_fraction < max_odd_share)
 }

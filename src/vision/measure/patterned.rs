@@ -6,27 +6,25 @@ use super::pattern_limits::{
     MAX_PATTERN, MAX_PATTERN_BESIDE_COMPLETE, blur_inflation, check_pattern, with_texture_variance,
 };
 use super::uniformity;
-use super::work::{MIN_LINE_FRACTION, MeasureState};
-use crate::calibration::SurfaceMap;
+use super::work::{GaugeFrame, MIN_LINE_FRACTION, MeasureState, Outcome};
 use crate::numeric::number::to_f64;
 use crate::vision::coarse::{LinePair, StepLine};
-use crate::vision::gauge::WidthRangePx;
 use crate::vision::ground::{EdgePosition, EdgeSide, MIN_EXCESS_VARIANCE};
-use crate::vision::mean_edge::{BLURS_PX, MeanEdgeInput};
-use crate::vision::reject::Reject;
+use crate::vision::mean_edge::{BLURS_PX, MeanInput};
+use crate::vision::reject::{Checked, Reject};
 use crate::vision::row_range::RowRange;
-use crate::vision::strip::{GaugeRows, GaugeView, GreyPixel};
+use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::trace::EdgeTracer;
-use crate::vision::width::WidthMeasurement;
 
 /// Weakest pattern, as a fraction of the contrast, beside which blurred steps are not
 /// good enough: one of less draws them outwards by hardly 0.02 px.
 const MIN_PATTERN: f64 = 0.06;
-/// The same of the bead's texture: sparks over 5 % of a smooth bead look like up to 0.12.
+/// Weakest texture of the bead that is looked at, as a fraction of the contrast. Measured:
+/// ACCURACY.md, The sets: sparks over 5 % of a smooth bead (`spots`) look like up to 0.12.
 const MIN_TEXTURE: f64 = 0.13;
 /// The least of both edges' as a fraction of the other's where it is the same texture.
 const MIN_TEXTURE_RATIO: f64 = 0.4;
-/// The same half-way between two lines, as a share of it.
+/// The same half-way between two lines, as a fraction of it.
 const MIDDLE_TEXTURE_RATIO: f32 = 0.5;
 /// Blur beyond which a bead's texture is free of a flank that is not known yet \[px\].
 const ASSUMED_BLUR_PX: f64 = 3.0;
@@ -34,16 +32,16 @@ impl MeasureState {
     /// Standard deviation of the pattern that the ground has on both sides of a pair of
     /// lines \[grey levels\]; 0 where one side has none: what is on one side alone is a
     /// groove or a neighbour.
-    pub(super) fn ground_pattern<T: GreyPixel>(
+    pub fn ground_pattern<T: GreyPixel>(
         &mut self,
         strip: &GaugeRows<'_, T>,
         pair: &LinePair,
     ) -> f64 {
-        let noise = f64::from(self.noise.grey);
+        let noise = f64::from(self.rows.noise.grey);
         let mut least = f64::INFINITY;
         let sides = self.mean_edges.iter_mut().zip(&pair.sides);
         for ((edge, line), bead_after) in sides.zip([true, false]) {
-            let scene = scene(strip, &self.lines, pair, bead_after);
+            let scene = scene(strip, &self.rows.lines, pair, bead_after);
             least = least.min(edge.pattern(&scene, line).unwrap_or(0.0));
         }
         let variance = least * least;
@@ -57,54 +55,42 @@ impl MeasureState {
     /// Measures a bead whose texture shows before any edge is located. `None` where none
     /// does, where it lies on ground of the same kind, and where grains may lie on its edges.
     #[inline(never)]
-    pub(super) fn measure_busy<T: GreyPixel>(
-        &mut self,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Option<Result<WidthMeasurement, Reject>> {
-        let pair = self.find_lines(strip, range).ok()?;
-        if !self.is_textured_between_lines(strip, &pair) {
+    pub fn measure_busy<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Option<Outcome> {
+        let pair = self.find_lines(frame).ok()?;
+        if !self.is_textured_between_lines(frame.strip, &pair) {
             return None;
         }
-        let pattern = self.ground_pattern(strip, &pair);
-        if let Some(found) = self.measure_patterned((&pair, pattern), strip, view, surface) {
+        let pattern = self.ground_pattern(frame.strip, &pair);
+        if let Some(found) = self.measure_patterned((&pair, pattern), frame) {
             return (pattern == 0.0).then_some(found);
         }
-        let fits = self.fit_rough(strip, &pair).ok()?;
+        let fits = self.fit_rough(frame.strip, &pair).ok()?;
         if fits.iter().any(has_grains) {
             return None;
         }
         let fits = with_texture_variance(&pair, fits);
-        Some(self.width_of_rough_beside(pattern, true, &fits, strip, view, surface))
+        Some(self.width_of_rough_beside(pattern, true, &fits, frame))
     }
 
     /// Measures a bead that was measured already, where it or the ground has a pattern.
-    /// `None` where neither has, or a weak one, and where the mean profile tells no edges and
-    /// the pattern is bearable beside blurred steps.
+    /// `None` where neither has, or a weak one, and where the mean profile shows no edges and
+    /// the pattern is accepted beside blurred steps.
     #[inline(never)]
-    pub(super) fn measure_textured<T: GreyPixel>(
-        &mut self,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Option<Result<WidthMeasurement, Reject>> {
-        let shares = self.texture_between_steps(strip);
-        let is_textured = rms(shares) > MIN_TEXTURE;
-        if !is_textured && self.pattern_ratio == 0.0 {
+    pub fn measure_texture<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Option<Outcome> {
+        let fractions = self.texture_between_steps(frame.strip);
+        let is_textured = rms(fractions) > MIN_TEXTURE;
+        if !is_textured && self.both.pattern_ratio == 0.0 {
             return None;
         }
-        let Ok(pair) = self.find_lines(strip, range) else {
-            return self.check_complete(is_textured && are_alike(shares)).err().map(Err);
+        let Ok(pair) = self.find_lines(frame) else {
+            return self.check_complete(is_textured && are_alike(fractions)).err().map(Err);
         };
-        let pattern = self.ground_pattern(strip, &pair);
-        let contrast = self.contrasts[0].min(self.contrasts[1]);
+        let pattern = self.ground_pattern(frame.strip, &pair);
+        let contrast = self.both.contrasts[0].min(self.both.contrasts[1]);
         if !is_textured && pattern < MIN_PATTERN * contrast {
             return None;
         }
-        let found = self.measure_patterned((&pair, pattern), strip, view, surface);
+        let found = self.measure_patterned((&pair, pattern), frame);
         if found.is_some() {
             return found;
         }
@@ -120,8 +106,8 @@ impl MeasureState {
 
     /// Refuses blurred steps of a plain bead all along which they show, beside a strong
     /// pattern on both sides.
-    fn check_complete(&self, is_textured: bool) -> Result<(), Reject> {
-        let (got, limit) = (self.pattern_ratio, MAX_PATTERN_BESIDE_COMPLETE);
+    fn check_complete(&self, is_textured: bool) -> Checked {
+        let (got, limit) = (self.both.pattern_ratio, MAX_PATTERN_BESIDE_COMPLETE);
         if !is_textured && got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
@@ -130,22 +116,24 @@ impl MeasureState {
     fn texture_between_steps<T: GreyPixel>(&mut self, strip: &GaugeRows<'_, T>) -> [f64; 2] {
         let sides = [(&self.left, 1.0), (&self.right, -1.0)];
         let room_px = self.right.middle() - self.left.middle();
-        let mut shares = [0.0; 2];
-        for (((tracer, inwards), contrast), share) in
-            sides.into_iter().zip(self.contrasts).zip(&mut shares)
+        let noise = self.rows.noise.grey.into();
+        let mut fractions = [0.0; 2];
+        for (((tracer, inwards), contrast), fraction) in
+            sides.into_iter().zip(self.both.contrasts).zip(&mut fractions)
         {
-            all_edge_positions(tracer, &self.lines, &mut self.positions);
+            all_edge_positions(tracer, &self.rows.lines, &mut self.scratch.positions);
             let blur_px = tracer.blur_px;
-            let side = EdgeSide { positions: &self.positions, outwards: inwards, blur_px, room_px };
-            let texture = self.ground.texture(strip, &side, self.noise.grey.into());
-            *share = texture.unwrap_or(0.0) / contrast;
+            let positions = &self.scratch.positions;
+            let side = EdgeSide { strip, noise, positions, outwards: inwards, blur_px, room_px };
+            let texture = self.scratch.ground.texture(&side);
+            *fraction = texture.unwrap_or(0.0) / contrast;
         }
-        shares
+        fractions
     }
 
     /// Whether it has one beside both of two lines, and half-way between them: lines in the
     /// ground's pattern have that beside them, and a plain bead between.
-    pub(super) fn is_textured_between_lines<T: GreyPixel>(
+    pub fn is_textured_between_lines<T: GreyPixel>(
         &mut self,
         strip: &GaugeRows<'_, T>,
         pair: &LinePair,
@@ -171,56 +159,55 @@ impl MeasureState {
         width_px: f32,
     ) -> bool {
         let middle = 0.5 * (to_f64(strip.along) - 1.0);
-        self.positions.clear();
-        self.positions.extend(self.lines.iter().map(|&rows| {
+        self.scratch.positions.clear();
+        self.scratch.positions.extend(self.rows.lines.iter().map(|&rows| {
             let off = rows.middle() - middle;
             EdgePosition { rows, at: f64::from(line.at) + off * f64::from(line.slope) }
         }));
         let side = EdgeSide {
-            positions: &self.positions,
+            strip,
+            noise: self.rows.noise.grey.into(),
+            positions: &self.scratch.positions,
             outwards: inwards,
             blur_px: ASSUMED_BLUR_PX,
             room_px: width_px.into(),
         };
-        let texture = self.ground.texture(strip, &side, self.noise.grey.into());
+        let texture = self.scratch.ground.texture(&side);
         texture.is_some_and(|texture| texture > MIN_TEXTURE * f64::from(line.step))
     }
 
     /// Measures a bead whose ground has a pattern of such a standard deviation
-    /// \[grey levels\]; `None` where the mean profile tells no edges, as beside a groove.
-    pub(super) fn measure_patterned<T: GreyPixel>(
+    /// \[grey levels\]; `None` where the mean profile shows no edges, as beside a groove.
+    pub fn measure_patterned<T: GreyPixel>(
         &mut self,
         lines: (&LinePair, f64),
-        strip: &GaugeRows<'_, T>,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Option<Result<WidthMeasurement, Reject>> {
+        frame: &GaugeFrame<'_, T>,
+    ) -> Option<Outcome> {
         if lines.0.has_groove() {
             return None;
         }
-        let found = self.measure_mean_profile(lines, strip, view, surface);
+        let found = self.measure_mean_profile(lines, frame);
         (!matches!(found, Err(Reject::NoPair { .. }))).then_some(found)
     }
 
     fn measure_mean_profile<T: GreyPixel>(
         &mut self,
         (pair, pattern): (&LinePair, f64),
-        strip: &GaugeRows<'_, T>,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+        frame: &GaugeFrame<'_, T>,
+    ) -> Outcome {
         let failed = Reject::NoPair { got: 0.0, need: MIN_LINE_FRACTION };
-        let scenes = [true, false].map(|after| scene(strip, &self.lines, pair, after));
+        let scenes = [true, false].map(|after| scene(frame.strip, &self.rows.lines, pair, after));
         let [left, right] = &mut self.mean_edges;
-        let of_left = left.fit_blurs(&scenes[0], &pair.sides[0], self.blur_shapes.lens());
-        let of_right = right.fit_blurs(&scenes[1], &pair.sides[1], self.blur_shapes.lens());
+        let lens = self.blur_shapes.lens();
+        let of_left = left.fit_blurs(&scenes[0], &pair.sides[0], lens);
+        let of_right = right.fit_blurs(&scenes[1], &pair.sides[1], lens);
         // Both edges are seen through one lens.
         let left_over = |k: &usize| of_left[*k] + of_right[*k];
         let best = (0..BLURS_PX.len()).min_by(|a, b| left_over(a).total_cmp(&left_over(b)));
         let blur_px = best.filter(|k| left_over(k).is_finite()).map(|k| BLURS_PX[k]);
         let blur_px = blur_px.ok_or(failed)?;
-        let one = left.locate(&scenes[0], self.blur_shapes.lens(), blur_px).ok_or(failed)?;
-        let other = right.locate(&scenes[1], self.blur_shapes.lens(), blur_px).ok_or(failed)?;
+        let one = left.locate(&scenes[0], lens, blur_px).ok_or(failed)?;
+        let other = right.locate(&scenes[1], lens, blur_px).ok_or(failed)?;
         let got = pattern / one.contrast.min(other.contrast);
         if got > MAX_PATTERN {
             return Err(Reject::Patterned { got, limit: MAX_PATTERN });
@@ -230,25 +217,25 @@ impl MeasureState {
         if !(ground + bead).is_finite() {
             return Err(failed);
         }
-        // An edge beside a strong pattern is drawn to its bright places.
+        // An edge beside a strong pattern is drawn to its bright positions.
         let beside = ground * (1.0 + (got / MAX_PATTERN).powi(4)) + bead;
         // A flank's slope falls with its blur, and what a texture moves an edge by grows with it.
         let inflation = blur_inflation(blur_px);
         let variance = beside * if pattern > 0.0 { inflation } else { inflation * inflation };
         let fits = [one, other].map(|fit| fit.as_rough(blur_px, variance));
-        uniformity::check_uniformity(&fits, uniformity::middle_grey(strip, pair))?;
+        uniformity::check_uniformity(&fits, uniformity::middle_grey(frame.strip, pair))?;
         self.left_px.clear();
         self.right_px.clear();
         let [left, right] = &self.mean_edges;
-        self.left.take_rough(left.lines(), &fits[0]);
-        self.right.take_rough(right.lines(), &fits[1]);
+        self.left.take_rough(&left.lines, &fits[0]);
+        self.right.take_rough(&right.lines, &fits[1]);
         self.check_contrast()?;
-        self.check_boundary(strip.across)?;
-        self.width_on_surface(view, surface)
+        self.check_boundary(frame.strip.across)?;
+        self.width_on_surface(frame.view, frame.surface)
     }
 }
 
-/// Root of the mean square of the shares of both sides.
+/// Root of the mean square of the fractions of both sides.
 fn rms([left, right]: [f64; 2]) -> f64 {
     f64::midpoint(left * left, right * right).sqrt()
 }
@@ -266,16 +253,16 @@ fn all_edge_positions(tracer: &EdgeTracer, lines: &[RowRange], places: &mut Vec<
         return;
     }
     let located: Vec<(f64, f64)> =
-        places.iter().map(|place| (place.rows.middle(), place.at)).collect();
+        places.iter().map(|position| (position.rows.middle(), position.at)).collect();
     let (Some(first), Some(last)) = (located.first(), located.last()) else { return };
     places.clear();
     places.extend(lines.iter().map(|&rows| {
         let row = rows.middle();
-        let after = located.partition_point(|place| place.0 < row);
+        let after = located.partition_point(|position| position.0 < row);
         let (one, other) =
             (located[..after].last().unwrap_or(first), located[after..].first().unwrap_or(last));
-        let share = if other.0 > one.0 { (row - one.0) / (other.0 - one.0) } else { 0.0 };
-        EdgePosition { rows, at: one.1 + share * (other.1 - one.1) }
+        let fraction = if other.0 > one.0 { (row - one.0) / (other.0 - one.0) } else { 0.0 };
+        EdgePosition { rows, at: one.1 + fraction * (other.1 - one.1) }
     }));
 }
 
@@ -285,6 +272,6 @@ fn scene<'a, T: GreyPixel>(
     lines: &'a [RowRange],
     pair: &LinePair,
     bead_after: bool,
-) -> MeanEdgeInput<'a, T> {
-    MeanEdgeInput { strip, lines, width_px: pair.width_px(), bead_after, bright: pair.bright }
+) -> MeanInput<'a, T> {
+    MeanInput { strip, lines, width_px: pair.width_px(), bead_after, bright: pair.bright }
 }

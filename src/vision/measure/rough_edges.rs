@@ -2,29 +2,27 @@
 
 use super::pattern_limits::{check_pattern, with_texture_variance};
 use super::uniformity;
-use super::work::{MIN_LINE_FRACTION, MeasureState};
-use crate::calibration::SurfaceMap;
+use super::work::{GaugeFrame, MIN_LINE_FRACTION, MeasureState, Outcome};
 use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::vision::coarse::{LinePair, StepLine};
 use crate::vision::gauge::{EdgeKind, Polarity, WidthRangePx};
 use crate::vision::line::LineSums;
-use crate::vision::reject::Reject;
+use crate::vision::reject::{Checked, Reject};
 use crate::vision::rough::{RoughFit, RoughInput};
-use crate::vision::strip::{GaugeRows, GaugeView, GreyPixel};
+use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::vectors;
-use crate::vision::width::WidthMeasurement;
 
-/// The search range allows 1.5 times too wide and too narrow single places; lines
+/// The search range allows 1.5 times too wide and too narrow single positions; lines
 /// are means over the gauge, and stay nearer.
 const LINE_RANGE_FACTOR: f32 = 1.4;
 
 /// Widest blur of a rough edge \[px\]: what lies outside is looked for within 20 px, and
 /// a flank of three blurs must end before.
 pub const MAX_ROUGH_BLUR_PX: f64 = 6.3;
-/// Blur up to which the level outside is read free of the flank \[px\], and by how much an edge
-/// may be off for each pixel that it exceeds it: drawn edges of 5.7 to 6 px, by motion, lay 0.45 px
-/// too far out.
+/// Blur up to which the level outside is read free of the flank \[px\].
 const MAX_CLEAR_BLUR_PX: f64 = 5.0;
+/// By how much an edge may be off for each pixel that its blur exceeds that: drawn edges of 5.7 to
+/// 6 px, by motion, lay 0.45 px too far out.
 const OFFSET_PER_BLUR: f64 = 0.5;
 /// Part of the width beside either edge where its flank may be \[of the width\]: the
 /// bead's texture is taken from between.
@@ -37,19 +35,16 @@ const MIN_TEXTURE_RATIO: f64 = 5.0;
 impl MeasureState {
     /// Measures a bead by where its rows pass half height. `refused` is why it was not
     /// measured by blurred steps.
-    pub(super) fn measure_rough<T: GreyPixel>(
+    pub fn measure_rough<T: GreyPixel>(
         &mut self,
         refused: &Reject,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
-        let pair = self.find_lines(strip, range)?;
-        let pattern = self.ground_pattern(strip, &pair);
-        let is_textured = self.is_textured_between_lines(strip, &pair);
+        frame: &GaugeFrame<'_, T>,
+    ) -> Outcome {
+        let pair = self.find_lines(frame)?;
+        let pattern = self.ground_pattern(frame.strip, &pair);
+        let is_textured = self.is_textured_between_lines(frame.strip, &pair);
         if (pattern > 0.0 || is_textured)
-            && let Some(found) = self.measure_patterned((&pair, pattern), strip, view, surface)
+            && let Some(found) = self.measure_patterned((&pair, pattern), frame)
         {
             return found;
         }
@@ -57,32 +52,31 @@ impl MeasureState {
         if !is_textured && matches!(refused, Reject::Ambiguous { .. }) {
             return Err(*refused);
         }
-        let fits = self.fit_rough(strip, &pair)?;
+        let fits = self.fit_rough(frame.strip, &pair)?;
         if may_be_occluded(refused) && self.may_be_grains(refused, &fits) {
             return Err(*refused);
         }
         let fits = if is_textured { with_texture_variance(&pair, fits) } else { fits };
-        self.width_of_rough_beside(pattern, is_textured, &fits, strip, view, surface)
+        self.width_of_rough_beside(pattern, is_textured, &fits, frame)
     }
 
     /// Looks for a bead with rough edges.
     #[cold]
     #[inline(never)]
-    pub(super) fn find_rough<T: GreyPixel>(
+    pub fn find_rough<T: GreyPixel>(
         &mut self,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
+        frame: &GaugeFrame<'_, T>,
     ) -> Result<[RoughFit; 2], Reject> {
-        let pair = match self.find_lines(strip, range) {
+        let pair = match self.find_lines(frame) {
             // Holes within the bead that lie one behind the other look like ribs and texture.
             Err(Reject::Ambiguous { .. } | Reject::Vague { .. })
-                if self.has_gaps() && self.pattern_ratio == 0.0 =>
+                if self.has_gaps() && self.both.pattern_ratio == 0.0 =>
             {
-                self.pair_of_steps(strip)
+                self.pair_of_steps(frame.strip)
             }
             pair => pair?,
         };
-        self.fit_rough(strip, &pair)
+        self.fit_rough(frame.strip, &pair)
     }
 
     /// The lines along two blurred steps.
@@ -90,7 +84,7 @@ impl MeasureState {
         let middle = 0.5 * (to_f64(strip.along) - 1.0);
         let sides = [&self.left, &self.right].map(|tracer| {
             let mut line = LineSums::default();
-            for (edge, &rows) in tracer.edges().iter().zip(&self.lines) {
+            for (edge, &rows) in tracer.edges.iter().zip(&self.rows.lines) {
                 if let Some(edge) = edge {
                     line.add(rows.middle() - middle, edge.at, edge.row_fraction);
                 }
@@ -98,46 +92,40 @@ impl MeasureState {
             let [at, next] = [0.0, 1.0].map(|row| line.at(row).0);
             (narrow_to_f32(at), narrow_to_f32(next - at))
         });
-        let steps = self.contrasts.map(narrow_to_f32);
+        let steps = self.both.contrasts.map(narrow_to_f32);
         let [left, right] =
             [0, 1].map(|k| StepLine { at: sides[k].0, slope: sides[k].1, step: steps[k] });
-        let bright = self.left.edges().iter().flatten().any(|edge| edge.height > 0.0);
+        let bright = self.left.edges.iter().flatten().any(|edge| edge.height > 0.0);
         let bare = (left.step * right.step).sqrt();
-        LinePair {
-            sides: [left, right],
-            bright,
-            score: bare,
-            score_without_grooves: bare,
-            strengths: steps,
-        }
+        let (sides, score_without_grooves, strengths) = ([left, right], bare, steps);
+        LinePair { sides, bright, score: bare, score_without_grooves, strengths }
     }
 
     /// Looks for the bead's edges as lines.
-    pub(super) fn find_lines<T: GreyPixel>(
+    pub fn find_lines<T: GreyPixel>(
         &mut self,
-        strip: &GaugeRows<'_, T>,
-        range: WidthRangePx,
+        frame: &GaugeFrame<'_, T>,
     ) -> Result<LinePair, Reject> {
         let failed = Reject::NoPair { got: 0.0, need: MIN_LINE_FRACTION };
-        let range =
-            WidthRangePx { min: LINE_RANGE_FACTOR * range.min, max: range.max / LINE_RANGE_FACTOR };
+        let WidthRangePx { min, max } = frame.range;
+        let range = WidthRangePx { min: LINE_RANGE_FACTOR * min, max: max / LINE_RANGE_FACTOR };
         let usual_px = (range.min * range.max).sqrt();
         vectors::widest(
             #[inline(always)]
-            || self.coarse.look(strip, usual_px),
+            || self.search.coarse.look(frame.strip, usual_px),
         );
         let polarities =
             [self.gauge.polarity != Polarity::Dark, self.gauge.polarity != Polarity::Bright];
         let may_be_groove = self.gauge.edge != EdgeKind::Step;
-        self.coarse.pairs(range, polarities, may_be_groove, &mut self.pairs);
-        let pair = *self.pairs.first().ok_or(failed)?;
+        self.search.coarse.pairs(range, polarities, may_be_groove, &mut self.search.pairs);
+        let pair = *self.search.pairs.first().ok_or(failed)?;
         self.check_prominence(&pair)?;
         self.check_rivals(&pair)?;
         Ok(pair)
     }
 
     /// Follows rough edges near two lines.
-    pub(super) fn fit_rough<T: GreyPixel>(
+    pub fn fit_rough<T: GreyPixel>(
         &mut self,
         strip: &GaugeRows<'_, T>,
         pair: &LinePair,
@@ -145,8 +133,8 @@ impl MeasureState {
         let failed = Reject::NoPair { got: 0.0, need: MIN_LINE_FRACTION };
         let scene = RoughInput {
             strip,
-            lines: &self.lines,
-            noise: self.noise.grey,
+            lines: &self.rows.lines,
+            noise: self.rows.noise.grey,
             width_px: pair.width_px(),
             bead_after: true,
             bright: pair.bright,
@@ -175,64 +163,56 @@ impl MeasureState {
     }
 
     /// The same as [`Self::take_rough`] beside a pattern of such a standard deviation
-    /// \[grey levels\], where that is bearable.
-    pub(super) fn width_of_rough_beside<T: GreyPixel>(
+    /// \[grey levels\], where that is acceptable.
+    pub fn width_of_rough_beside<T: GreyPixel>(
         &mut self,
         pattern: f64,
         is_textured: bool,
         fits: &[RoughFit; 2],
-        strip: &GaugeRows<'_, T>,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+        frame: &GaugeFrame<'_, T>,
+    ) -> Outcome {
         check_pattern(pattern / fits[0].contrast.min(fits[1].contrast), is_textured)?;
-        self.width_of_rough(fits, strip, view, surface)
+        self.width_of_rough(fits, frame)
     }
 
     /// The width of the bead whose rough edges were found.
-    pub(super) fn width_of_rough<T: GreyPixel>(
+    pub fn width_of_rough<T: GreyPixel>(
         &mut self,
         fits: &[RoughFit; 2],
-        strip: &GaugeRows<'_, T>,
-        view: &GaugeView,
-        surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, Reject> {
+        frame: &GaugeFrame<'_, T>,
+    ) -> Outcome {
         self.left_px.clear();
         self.right_px.clear();
         let [left, right] = fits.map(with_flank_variance);
-        self.left.take_rough(self.rough[0].lines(), &left);
-        self.right.take_rough(self.rough[1].lines(), &right);
+        self.left.take_rough(&self.rough[0].lines, &left);
+        self.right.take_rough(&self.rough[1].lines, &right);
         self.check_contrast()?;
         self.check_blur(MAX_ROUGH_BLUR_PX)?;
-        self.check_ground(strip, f64::min)?;
-        self.check_boundary(strip.across)?;
-        self.width_on_surface(view, surface)
+        self.check_ground(frame.strip, f64::min)?;
+        self.check_boundary(frame.strip.across)?;
+        self.width_on_surface(frame.view, frame.surface)
     }
-}
 
-impl MeasureState {
     /// Refuses a pair that the bead's texture may have made.
-    fn check_prominence(&self, pair: &LinePair) -> Result<(), Reject> {
+    fn check_prominence(&self, pair: &LinePair) -> Checked {
         let [left, right] = pair.sides;
         let margin = TEXTURE_MARGIN_FRACTION * pair.width_px();
-        let texture = self.coarse.texture_between(left.at + margin, right.at - margin);
+        let texture = self.search.coarse.texture_between(left.at + margin, right.at - margin);
         let got = f64::from(pair.strengths[0].min(pair.strengths[1]) / texture.max(f32::EPSILON));
-        if got < MIN_TEXTURE_RATIO {
-            Err(Reject::Vague { got, need: MIN_TEXTURE_RATIO })
-        } else {
-            Ok(())
-        }
+        let need = MIN_TEXTURE_RATIO;
+        if got < need { Err(Reject::Vague { got, need }) } else { Ok(()) }
     }
 
     /// Refuses a pair beside which another one fits as well that ends at a seam or a
     /// rib.
-    fn check_rivals(&self, pair: &LinePair) -> Result<(), Reject> {
-        let rival = self.pairs.iter().skip(1).find(|other| self.coarse.are_rivals(pair, other));
+    fn check_rivals(&self, pair: &LinePair) -> Checked {
+        let mut others = self.search.pairs.iter().skip(1);
+        let rival = others.find(|other| self.search.coarse.are_rivals(pair, other));
         rival.map_or(Ok(()), |rival| Err(self.ambiguous(pair.width_px(), rival.width_px())))
     }
 }
 
-/// An edge with the doubt that a flank leaves which is not seen whole.
+/// An edge with the uncertainty that a flank leaves which is not seen whole.
 fn with_flank_variance(fit: RoughFit) -> RoughFit {
     let off_px = OFFSET_PER_BLUR * (fit.blur_px - MAX_CLEAR_BLUR_PX).max(0.0);
     RoughFit { variance: fit.variance + off_px * off_px, ..fit }

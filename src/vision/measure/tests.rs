@@ -70,7 +70,7 @@ fn frame_with_grooves(seed: u64) -> Frame {
 }
 
 /// Half of the height above a groove that blur fills lies inside the bead; who says that
-/// there is none gets that place.
+/// there is none gets that position.
 #[test]
 fn a_given_edge_says_whether_a_dark_line_is_a_groove() {
     let scale = SurfaceMap::from_scale(1.0);
@@ -132,28 +132,28 @@ fn a_given_gamma_is_taken_out_before_edges_are_found() {
     assert!(uncorrected - linear > 0.1, "{uncorrected} for {linear}");
 }
 
-/// Frames of a camera whose gamma is not given tell together how far off their widths are.
+/// Frames of a camera whose gamma is not given show together how far off their widths are.
 #[test]
 fn skewed_flanks_tell_how_far_widths_are_off() {
     let scale = SurfaceMap::from_scale(1.0);
-    let told = |gamma| {
+    let estimated = |gamma| {
         let (mut sum, mut weight, mut error) = (0.0, 0.0, 0.0);
         for seed in 1..=100 {
             let mut measurer = Measurer::new(gauge(0, 400), None);
             let found = measurer.measure(&frame_of_gamma(gamma, seed), &scale).unwrap();
             error += 0.01 * (found.width.get() - 240.0);
-            // None where another way of measuring tells more.
+            // None where another way of measuring shows more.
             let Some(skew) = measurer.with_skew(found).hints.skew else { continue };
             sum += skew.offset_px / skew.variance;
             weight += 1.0 / skew.variance;
         }
         (sum / weight, 1.0 / f64::sqrt(weight), error)
     };
-    let (offset, sigma, error) = told(1.0);
+    let (offset, sigma, error) = estimated(1.0);
     assert!(offset.abs() < 3.5 * sigma && sigma < 0.05, "{offset} ± {sigma}");
     assert!(error.abs() < 0.02, "{error}");
     for gamma in [0.45, 1.5] {
-        let (offset, sigma, error) = told(gamma);
+        let (offset, sigma, error) = estimated(gamma);
         assert!((offset - error).abs() < 3.5 * sigma, "{gamma}: {offset} ± {sigma} for {error}");
         assert!(offset.abs() > 4.0 * sigma, "{gamma}: {offset} ± {sigma}");
     }

@@ -1,14 +1,13 @@
 //! Whether what lies between two rough edges is one bead: as bright beside either edge
 //! as in its middle.
 
-use crate::numeric::number::round_to_count;
-use crate::numeric::number::to_f32;
+use crate::numeric::number::{round_to_count, to_f32};
 use crate::vision::coarse::LinePair;
-use crate::vision::reject::Reject;
+use crate::vision::reject::{Checked, Reject};
 use crate::vision::rough::RoughFit;
 use crate::vision::strip::{GaugeRows, GreyPixel};
 
-/// Largest difference of brightness, as a share of the fainter edge's contrast: beads of
+/// Largest difference of brightness, as a fraction of the fainter edge's contrast: beads of
 /// real concrete in the light of a room have up to 0.4, and an edge of the ground's
 /// pattern that was taken for the bead's has 1.
 const MAX_DIFFERENCE: f64 = 0.5;
@@ -27,8 +26,8 @@ pub fn middle_grey<T: GreyPixel>(strip: &GaugeRows<'_, T>, pair: &LinePair) -> f
         let (from, to) = (left.at + off * left.slope, right.at + off * right.slope);
         let margin = MARGIN_FRACTION * (to - from);
         let row = strip.row(v);
-        let places = round_to_count(from + margin)..round_to_count(to - margin).min(row.len());
-        for pixel in row.get(places).unwrap_or_default() {
+        let positions = round_to_count(from + margin)..round_to_count(to - margin).min(row.len());
+        for pixel in row.get(positions).unwrap_or_default() {
             sum += f64::from(T::sum_to_f32(pixel.add_to(T::Sum::default())));
             count += 1.0;
         }
@@ -38,7 +37,7 @@ pub fn middle_grey<T: GreyPixel>(strip: &GaugeRows<'_, T>, pair: &LinePair) -> f
 }
 
 /// Refuses a bead that is brighter in its middle or beside one edge than beside the other.
-pub fn check_uniformity([left, right]: &[RoughFit; 2], middle_grey: f64) -> Result<(), Reject> {
+pub fn check_uniformity([left, right]: &[RoughFit; 2], middle_grey: f64) -> Checked {
     let brightest = left.bead_grey.max(right.bead_grey).max(middle_grey);
     let darkest = left.bead_grey.min(right.bead_grey);
     let got = (brightest - darkest) / left.contrast.min(right.contrast);

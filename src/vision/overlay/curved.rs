@@ -2,57 +2,49 @@
 //! that falls off away from the edge, as under a lamp close by or in the hollow
 //! beside a bead.
 
-use super::Overlay;
+use super::StepFitter;
 use super::shape::{SideShading, SideShape};
-use super::step::StepWithNeighbours;
-use crate::numeric::blurred_step::StepTable;
+use super::step::SideInput;
 use crate::numeric::normal_equations::NormalEquations;
+use crate::vision::curve::MIN_BEND_SIGMAS;
 
 /// Farthest that a parabola follows the surroundings \[px\].
 const MAX_EXTENT_PX: f64 = 32.0;
-/// Pixels that tell a parabola, before others are held against it.
+/// Pixels that show a parabola, before others are compared with it.
 const MIN_START_PX: f64 = 8.0;
 /// Pixels that it must hold for.
 const MIN_EXTENT_PX: f64 = 12.0;
-/// A bend is believed from so many standard deviations on.
-const MIN_BEND_SIGMAS: f64 = 4.0;
 /// Slope at the far end of a parabola, as a fraction of that at the edge, from which on it
 /// turns back: light that falls off does not, a rib beside the edge does.
 const MAX_REVERSED_SLOPE: f64 = 0.3;
 /// Unit of distances, so that the equations are well scaled \[px\].
 const UNIT_PX: f64 = 10.0;
 
-impl Overlay {
+impl StepFitter<'_> {
     /// How far from the edge a side follows a parabola, and that; `None` where no
     /// bend shows.
     #[cold]
     #[inline(never)]
-    pub(super) fn parabolic_side(
-        &self,
-        table: &StepTable,
-        edge: StepWithNeighbours<'_>,
-        noise: f64,
-        sign: f64,
-        room: f64,
-    ) -> Option<SideShape> {
-        let height = edge.step.after - edge.step.before;
-        let first = 3.0 * edge.step.blur;
+    pub fn parabolic_side(&self, side: &SideInput<'_>) -> Option<SideShape> {
+        let SideInput { noise, room, .. } = *side;
+        let height = side.step.after - side.step.before;
+        let first = 3.0 * side.step.blur;
         let mut normal = NormalEquations::<3>::default();
         let (mut end, mut rows) = (first, 0.0);
         while end + 2.0 <= room.min(MAX_EXTENT_PX) {
-            let (mut place, mut miss, mut weight) = (0.0, 0.0, 0.0);
-            self.each_beside(table, edge, sign, end, |away, off, rows| {
-                place += rows * away;
+            let (mut position, mut miss, mut weight) = (0.0, 0.0, 0.0);
+            self.each_beside(side, end, |away, off, rows| {
+                position += rows * away;
                 miss += rows * off;
                 weight += rows;
             });
             if weight <= 0.0 {
                 break;
             }
-            let (place, miss) = (place / weight, miss / weight);
+            let (position, miss) = (position / weight, miss / weight);
             if end >= first + MIN_START_PX {
                 let solved = normal.solve()?;
-                let row = terms(place);
+                let row = terms(position);
                 let expected: f64 =
                     row.iter().zip(solved.unknowns.iter()).map(|(a, b)| a * b).sum();
                 let row = nalgebra::SVector::from(row);
@@ -62,7 +54,7 @@ impl Overlay {
                     break;
                 }
             }
-            self.each_beside(table, edge, sign, end, |away, off, rows| {
+            self.each_beside(side, end, |away, off, rows| {
                 normal.add(terms(away), off, rows);
             });
             rows += weight;

@@ -1,48 +1,44 @@
-//! How skewed an edge's flank is: what light passes through between the bead and a grey
-//! level, such as a camera's gamma, bends the flank by a bump that is even about the edge,
-//! share · (1 − share). A blurred step that is fitted to it lies aside of the edge.
+//! Skew of an edge's flank. A nonlinear camera, such as one with a gamma, adds a bump to the flank
+//! that is even about the edge, f · (1 − f) for a step f. A blurred step that is fitted to it
+//! without the bump lies beside the edge.
 
-use super::Overlay;
+use super::StepFitter;
 use super::look::{SHADING_SIGMA, StepFit};
-use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::NormalEquations;
 use crate::numeric::number::to_f64;
 
-/// Unknowns of a blurred step with its shading, and the bump.
+/// Unknowns. By definition the six of a blurred step with its shading, and the bump.
 const UNKNOWNS: usize = 7;
+/// Number of the bump among them. By definition the last.
 const BUMP_UNKNOWN: usize = 6;
 
 /// How far an edge lies from where a blurred step without a bump puts it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeSkew {
-    /// Towards larger places \[px\].
+    /// Towards larger positions \[px\].
     pub aside_px: f64,
     /// Variance of that \[px²\].
     pub variance: f64,
 }
 
-impl Overlay {
+impl StepFitter<'_> {
     /// The skew of the flank of an edge that was looked at. `None` where steps beside it
-    /// reach into its pixels, or it cannot be told.
-    pub fn skew(&self, table: &StepTable, look: &StepFit) -> Option<EdgeSkew> {
-        if look.flanks.any() {
+    /// reach into its pixels, or it cannot be determined.
+    pub fn skew(&self, fit: &StepFit) -> Option<EdgeSkew> {
+        if fit.flanks.any() {
             return None;
         }
-        let edge = look.step;
-        let (from, to) = look.fitted();
+        let edge = fit.step;
         let mut normal = NormalEquations::<UNKNOWNS>::default();
-        for mean in self.means() {
-            for (at, value) in mean.samples(from, to) {
-                let (of_step, level) = look.linear_at(table, at);
-                let mut row = [0.0; UNKNOWNS];
-                row[..BUMP_UNKNOWN].copy_from_slice(&of_step);
-                let (share, _) = table.at((at - edge.at) / edge.blur);
-                row[BUMP_UNKNOWN] = share * (1.0 - share) * (edge.after - edge.before);
-                normal.add(row, value - level, mean.weight);
-            }
-        }
-        for (side, shading) in look.shading.iter().enumerate() {
-            normal.add_prior(4 + side, (look.pixel_noise / SHADING_SIGMA).powi(2), -shading);
+        self.each_sample(fit, |_, sample| {
+            let mut row = [0.0; UNKNOWNS];
+            row[..BUMP_UNKNOWN].copy_from_slice(&sample.row);
+            let (step, _) = self.table.at((sample.at - edge.at) / edge.blur);
+            row[BUMP_UNKNOWN] = step * (1.0 - step) * (edge.after - edge.before);
+            normal.add(row, sample.miss, sample.weight);
+        });
+        for (side, shading) in fit.shading.iter().enumerate() {
+            normal.add_prior(4 + side, (fit.pixel_noise / SHADING_SIGMA).powi(2), -shading);
         }
         let solved = normal.solve()?;
         let covariance = solved.covariance();
@@ -50,9 +46,9 @@ impl Overlay {
             (solved.unknowns[BUMP_UNKNOWN], covariance[(BUMP_UNKNOWN, BUMP_UNKNOWN)]);
         let per_bump = covariance[(0, BUMP_UNKNOWN)] / of_bump;
         // What the bump explains is no noise.
-        let others = (look.samples() - to_f64(UNKNOWNS)).max(1.0);
+        let others = (fit.samples() - to_f64(UNKNOWNS)).max(1.0);
         let explained = bump * bump / (of_bump * others);
-        let noise = (look.residual.powi(2) - explained).max(look.pixel_noise.powi(2));
+        let noise = (fit.residual.powi(2) - explained).max(fit.pixel_noise.powi(2));
         let variance = noise * of_bump * per_bump * per_bump;
         Some(EdgeSkew { aside_px: per_bump * bump, variance })
     }

@@ -1,18 +1,20 @@
 //! Whether a narrow groove may lie beside an edge.
 
-use super::{HALF_SPAN, Overlay, PHASES};
+use super::{HALF_SPAN, Overlay};
 
-/// Places beside the edge within which a narrow groove lies \[px\].
+/// Positions beside the edge within which a narrow groove lies \[px\].
 const MAX_GROOVE_PX: usize = 9;
 /// By how much what lies beyond a groove is nearer to the bead's level at least: a fraction
 /// of the step, and standard deviations of noise.
 const MIN_RISE: f64 = 0.015;
+/// The same in standard deviations of noise. Derived: noise alone exceeds 5 in 6 of ten million
+/// positions.
 const MIN_RISE_SIGMAS: f64 = 5.0;
 
 impl Overlay {
     /// Whether the level beside the edge, after it or before it, comes nearer to that on its
     /// other side again farther out, as beyond a narrow groove. `noise` is the standard
-    /// deviation of a pixel in shares of the step.
+    /// deviation of a pixel as fractions of the step.
     pub fn rises_beside(&self, after: bool, noise: f64) -> bool {
         let rows = self.used();
         if rows <= 0.0 {
@@ -21,9 +23,8 @@ impl Overlay {
         let (mut lowest, mut rise) = (f64::INFINITY, 0.0_f64);
         for away in 1..=MAX_GROOVE_PX {
             let at = if after { HALF_SPAN + away } else { HALF_SPAN - away };
-            let sum: f64 = (0..PHASES)
-                .map(|phase| f64::from(self.counts[phase]) * f64::from(self.mean[phase][at]))
-                .sum();
+            let phases = self.phases.iter();
+            let sum: f64 = phases.map(|of| f64::from(of.rows) * f64::from(of.samples[at])).sum();
             let level = if after { 1.0 - sum / rows } else { sum / rows };
             lowest = lowest.min(level);
             rise = rise.max(level - lowest);

@@ -1,18 +1,18 @@
-//! What a blurred step leaves of an overlay's means, linear about the step: the normal
-//! equations of its place, blur, levels and shading, and the misfit after a step of the fit.
+//! Linearisation of a blurred step about an estimate: normal equations of its position, blur,
+//! levels and shading, and the misfit after a step of the fit.
 
 use nalgebra::SVector;
 
 use super::look::StepFit;
-use super::{Overlay, PHASES};
-use crate::numeric::blurred_step::StepTable;
+use super::{PHASES, StepFitter};
 use crate::numeric::normal_equations::NormalEquations;
 use crate::numeric::number::to_f64;
 
-/// Place and blur of the step, its two levels, and the shading before and after it.
+/// Unknowns. By definition position and blur of the step, its two levels, and the shading before
+/// and after it.
 const UNKNOWNS: usize = 6;
-/// Unknowns that each phase has of its own: place and levels. Rows were laid down by a path
-/// and levels with a noise of their own, and which phase a row is in comes from the path.
+/// Unknowns that each phase has of its own. By definition position and levels: rows were placed by
+/// a path and levels with a noise of their own, and which phase a row is in comes from the path.
 const PHASE_UNKNOWNS: [usize; 3] = [0, 2, 3];
 
 /// The equations about a step.
@@ -39,7 +39,7 @@ impl LinearisedStep {
         self.sum_of_squares / (self.samples - to_f64(UNKNOWNS)).max(1.0)
     }
 
-    /// The same after a step of the fit, where each phase has a place and levels of its own.
+    /// The same after a step of the fit, where each phase has a position and levels of its own.
     #[inline(always)]
     pub fn within_phases_after(&self, step: &SVector<f64, UNKNOWNS>) -> f64 {
         let lowered: f64 = self.phases.iter().map(|phase| phase.decrease_after(step)).sum();
@@ -55,23 +55,44 @@ impl LinearisedStep {
     }
 }
 
-impl Overlay {
-    /// The equations about the step of a look, without flanks.
+impl StepFitter<'_> {
+    /// The equations about the step of a fit, without flanks.
     #[inline(always)]
-    pub(super) fn linearise(&self, table: &StepTable, look: &StepFit) -> LinearisedStep {
-        let (from, to) = look.fitted();
+    pub fn linearise(&self, fit: &StepFit) -> LinearisedStep {
         let phases = std::array::from_fn(|_| NormalEquations::default());
         let mut linear = LinearisedStep { phases, sum_of_squares: 0.0, samples: 0.0, used: 0.0 };
-        for (normal, mean) in linear.phases.iter_mut().zip(self.means()) {
-            for (at, value) in mean.samples(from, to) {
-                let (row, level) = look.linear_at(table, at);
-                let miss = value - level;
-                linear.sum_of_squares += mean.weight * miss * miss;
-                linear.samples += 1.0;
-                normal.add(row, miss, mean.weight);
-            }
-            linear.used += 1.0;
-        }
+        self.each_sample(fit, |phase, sample| {
+            let weighted = sample.weight * sample.miss * sample.miss;
+            linear.sum_of_squares += weighted;
+            linear.samples += 1.0;
+            linear.phases[phase].add(sample.row, sample.miss, sample.weight);
+        });
+        linear.used = to_f64(self.overlay.means().count());
         linear
     }
+
+    /// Every sample about the step of a fit, with the number of its phase among those that
+    /// have rows.
+    #[inline(always)]
+    pub fn each_sample(&self, fit: &StepFit, mut add: impl FnMut(usize, LinearSample)) {
+        let (from, to) = fit.fitted();
+        for (phase, mean) in self.overlay.means().enumerate() {
+            for (at, value) in mean.samples(from, to) {
+                let (row, level) = fit.linear_at(self.table, at);
+                add(phase, LinearSample { at, row, miss: value - level, weight: mean.rows.into() });
+            }
+        }
+    }
+}
+
+/// A sample about a step.
+pub struct LinearSample {
+    /// Its distance from the path \[px\].
+    pub at: f64,
+    /// Its derivatives by the unknowns.
+    pub row: [f64; UNKNOWNS],
+    /// Its residual.
+    pub miss: f64,
+    /// Its weight.
+    pub weight: f64,
 }

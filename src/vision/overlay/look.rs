@@ -1,13 +1,16 @@
-//! What a first look at an edge tells: the step, how sure its blur is, what it leaves, and how far
-//! there is nothing else.
+//! A fit of a blurred step to an overlay: the step, the uncertainty of its blur, the residual, and
+//! how far there is nothing else.
 
 use super::HALF_SPAN;
-use super::step::{BlurredStep, Extent, NeighbourStep, NeighbourSteps};
+use super::step::{BlurredStep, Clearance, NeighbourStep, NeighbourSteps};
 use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::{floor_to_count, to_f64};
 use crate::vision::blur_estimate::BlurEstimate;
 
-/// How far from the edge samples are fitted, in blurs and pixels beside.
+/// How far from the edge samples are fitted, in blurs. Derived: beyond 4.5 blurs 3·10⁻⁶ of a step
+/// is left, 1 − Φ(4.5).
 const FIT_BLURS: f64 = 4.5;
+/// And beyond that \[px\]: the levels of a sharp edge need some pixels.
 const FIT_MARGIN_PX: f64 = 2.0;
 /// Misfit from which on the edge alone leaves more than noise does.
 const MIN_NOTABLE_MISFIT: f64 = 1.3;
@@ -16,7 +19,7 @@ pub const SHADING_SIGMA: f64 = 0.02;
 /// Steps of a fit at most.
 pub const MAX_ITERATIONS: usize = 16;
 
-/// A first look at an edge.
+/// A first fit to an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepFit {
     /// The step.
@@ -25,20 +28,20 @@ pub struct StepFit {
     pub blur_sd: f64,
     /// Change of the level before and after it \[1/px away from it\].
     pub(super) shading: [f64; 2],
-    /// Standard deviation of a pixel, in shares of the step.
-    pub(super) pixel_noise: f64,
+    /// Standard deviation of a pixel, as fractions of the step.
+    pub pixel_noise: f64,
     /// Standard deviation of a row's samples about the step before the fit's last move, in
-    /// shares of it.
+    /// fractions of it.
     pub(super) noise: f64,
-    /// The same after it, where each phase has a place and levels of its own.
+    /// The same after it, where each phase has a position and levels of its own.
     pub(super) residual: f64,
     /// Number of the phases that have rows.
     pub(super) phases: f64,
     /// How far there is nothing but this edge.
-    pub room: Extent,
+    pub room: Clearance,
     /// Steps beside it that reach into its pixels.
     pub(super) flanks: NeighbourSteps,
-    /// What they and the blur add to the variance of its place \[px²\]; 0 where
+    /// What they and the blur add to the variance of its position \[px²\]; 0 where
     /// there are none.
     pub(super) added_variance: f64,
 }
@@ -55,23 +58,12 @@ pub struct SideRange {
 impl StepFit {
     /// Samples beside the edge on either side.
     pub fn beside(&self) -> [SideRange; 2] {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "within the window"
-        )]
-        let whole = |distance: f64| distance.max(0.0) as usize;
         let near = 3.0 * self.step.blur + 1.0;
-        let to = |room: f64| whole(room).min(HALF_SPAN);
-        [
-            SideRange { near: whole((near - self.step.at).ceil()), far: to(self.room.before) },
-            SideRange { near: whole((near + self.step.at).ceil()), far: to(self.room.after) },
-        ]
-    }
-
-    /// Standard deviation of a sample, in shares of the step.
-    pub fn pixel_noise(&self) -> f64 {
-        self.pixel_noise
+        let Clearance { before, after } = self.room;
+        [(near - self.step.at, before), (near + self.step.at, after)].map(|(near, room)| {
+            let far = floor_to_count(room).min(HALF_SPAN);
+            SideRange { near: floor_to_count(near.ceil()), far }
+        })
     }
 
     /// Its blur.
@@ -80,7 +72,7 @@ impl StepFit {
     }
 
     /// Mean square of the residuals about the edge, in variances of their noise: at
-    /// least 1. Each phase has a place and levels of its own, so that they are those of the
+    /// least 1. Each phase has a position and levels of its own, so that they are those of the
     /// step's shape.
     pub fn misfit(&self) -> f64 {
         (self.residual / self.pixel_noise).powi(2)
@@ -91,7 +83,7 @@ impl StepFit {
         self.misfit() >= MIN_NOTABLE_MISFIT
     }
 
-    /// The misfit of one place and levels for all phases.
+    /// The misfit of one position and levels for all phases.
     pub fn misfit_of_all(&self) -> f64 {
         (self.noise / self.pixel_noise).powi(2)
     }
@@ -99,64 +91,98 @@ impl StepFit {
     /// Number of samples about the edge that the misfit is the mean of.
     pub fn samples(&self) -> f64 {
         let reach = FIT_BLURS * self.step.blur + FIT_MARGIN_PX;
-        let Extent { before, after } = self.room;
+        let Clearance { before, after } = self.room;
         self.phases * (reach.min(before) + reach.min(after))
     }
 
     /// Ends of the samples about the edge that are fitted \[px from the path\].
     #[inline(always)]
-    pub(super) fn fitted(&self) -> (f64, f64) {
+    pub fn fitted(&self) -> (f64, f64) {
         let reach = FIT_BLURS * self.step.blur + FIT_MARGIN_PX;
         let from = (self.step.at - reach.min(self.room.before)).max(-max_sample_px());
         let to = (self.step.at + reach.min(self.room.after)).min(max_sample_px());
         (from, to)
     }
 
-    /// Derivatives of the level at a distance from the path for the step's place
+    /// Derivatives of the level at a distance from the path for the step's position
     /// and blur, its two levels and the two shadings, and the level itself,
     /// without flanks.
     #[inline(always)]
-    pub(super) fn linear_at(&self, table: &StepTable, at: f64) -> ([f64; 6], f64) {
+    pub fn linear_at(&self, table: &StepTable, at: f64) -> ([f64; 6], f64) {
         let Self { step: edge, shading, .. } = self;
         let per_blur = 1.0 / edge.blur;
         let z = (at - edge.at) * per_blur;
         let (step, density, slopes) = table.with_slopes(z);
         let depth = slopes.map(|level| level * edge.blur);
         let slope = (edge.after - edge.before) * density * per_blur;
-        let level = edge.before * (1.0 - step)
-            + edge.after * step
-            + shading[0] * depth[0]
-            + shading[1] * depth[1];
+        let levels = edge.before * (1.0 - step) + edge.after * step;
+        let level = levels + shading[0] * depth[0] + shading[1] * depth[1];
         ([-slope, -slope * z, 1.0 - step, step, depth[0], depth[1]], level)
     }
 
-    /// The same look up to half-way to the steps beside the edge.
-    pub(super) fn without_flanks(&self) -> Self {
+    /// The same fit up to half-way to the steps beside the edge.
+    pub fn without_flanks(&self) -> Self {
         let half = |flank: &Option<NeighbourStep>, room: f64| {
             flank.as_ref().map_or(room, |flank| 0.5 * (flank.at - self.step.at).abs())
         };
         let NeighbourSteps([before, after]) = &self.flanks;
-        let room =
-            Extent { before: half(before, self.room.before), after: half(after, self.room.after) };
+        let room = Clearance {
+            before: half(before, self.room.before),
+            after: half(after, self.room.after),
+        };
         Self { room, flanks: NeighbourSteps::default(), added_variance: 0.0, ..*self }
     }
 
-    /// The same look where texture makes samples less sure than noise does:
+    /// The same fit where texture makes samples less sure than noise does:
     /// `noise` is what independent ones as unsure would have.
     pub fn with_texture(self, noise: f64) -> Self {
         let blur_sd = self.blur_sd * (noise / self.noise).max(1.0);
-        Self {
-            blur_sd,
-            pixel_noise: noise,
-            noise: noise.max(self.noise),
-            residual: noise.max(self.residual),
-            ..self
-        }
+        let [of_rows, residual] = [self.noise, self.residual].map(|own| noise.max(own));
+        Self { blur_sd, pixel_noise: noise, noise: of_rows, residual, ..self }
     }
 }
 
 /// Farthest place of a sample from the path \[px\].
-#[expect(clippy::cast_precision_loss, reason = "the window is short")]
 pub fn max_sample_px() -> f64 {
-    HALF_SPAN as f64 - 1.0
+    to_f64(HALF_SPAN - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Derivatives of the level about a step without shading, against differences of it: those
+    /// by position and blur leave the shading out.
+    #[test]
+    fn derivatives_of_an_edge_are_those_of_its_level() {
+        let table = StepTable::default();
+        let fit = StepFit {
+            step: BlurredStep { at: 0.3, blur: 1.6, before: 0.1, after: 1.2 },
+            blur_sd: 0.1,
+            shading: [0.0; 2],
+            pixel_noise: 0.05,
+            noise: 0.05,
+            residual: 0.05,
+            phases: 2.0,
+            room: Clearance { before: 20.0, after: 20.0 },
+            flanks: NeighbourSteps::default(),
+            added_variance: 0.0,
+        };
+        let d = 0.02;
+        let moved = |unknown: usize, by: f64| {
+            let mut moved = fit;
+            let BlurredStep { at, blur, before, after } = &mut moved.step;
+            let [outer, inner] = &mut moved.shading;
+            *[at, blur, before, after, outer, inner][unknown] += by;
+            moved
+        };
+        for at in [-3.0, -0.6, 0.9, 2.8] {
+            let (derivatives, _) = fit.linear_at(&table, at);
+            for (unknown, expected) in derivatives.iter().enumerate() {
+                let level = |by: f64| moved(unknown, by).linear_at(&table, at).1;
+                let found = (level(d) - level(-d)) / (2.0 * d);
+                assert!((found - expected).abs() < 5e-3, "{unknown} at {at}: {found} {expected}");
+            }
+        }
+    }
 }

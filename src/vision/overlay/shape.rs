@@ -1,10 +1,9 @@
-//! The shape of an edge, from a look at it: how far its surroundings on either side are plain,
+//! The shape of an edge, from a fit to it: how far its surroundings on either side are plain,
 //! and how they are shaded.
 
 use super::look::StepFit;
-use super::step::{BlurredStep, Extent, MIN_BLUR_PX, NeighbourSteps, StepWithNeighbours};
-use super::{Overlay, ROUNDING_VARIANCE_PX2};
-use crate::numeric::blurred_step::StepTable;
+use super::step::{BlurredStep, Clearance, MIN_BLUR_PX, NeighbourSteps, SideInput};
+use super::{ROUNDING_VARIANCE_PX2, StepFitter};
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::line::LineSums;
 
@@ -18,20 +17,20 @@ pub struct SideShading {
 }
 
 impl SideShading {
-    /// The same in shares of a step of which the given one is a share.
-    pub fn of(self, share: f64) -> Self {
-        Self { slope: self.slope / share, bend: self.bend / share }
+    /// The same as fractions of a step of which the given one is a fraction.
+    pub fn of(self, fraction: f64) -> Self {
+        Self { slope: self.slope / fraction, bend: self.bend / fraction }
     }
 }
 
 /// One side of an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct SideShape {
+pub struct SideShape {
     /// How far there is nothing else \[px\].
     pub extent: f64,
-    /// How its level changes, in shares of the step that was given.
+    /// How its level changes, as fractions of the step that was given.
     pub shading: SideShading,
-    /// Variance that the doubt about it leaves to the level at the edge.
+    /// Variance that the uncertainty about it leaves to the level at the edge.
     pub level_variance: f64,
 }
 
@@ -41,13 +40,13 @@ pub struct StepShape {
     /// The step.
     pub step: BlurredStep,
     /// How far the surroundings are plain, and what is used of them.
-    pub extent: Extent,
+    pub extent: Clearance,
     /// How the level changes away from the edge, before it and after it, in
-    /// shares of the step.
+    /// fractions of the step.
     pub shading: [SideShading; 2],
-    /// Steps beside the edge that reach into its pixels, in shares of its own.
+    /// Steps beside the edge that reach into its pixels, as fractions of its own.
     pub flanks: NeighbourSteps,
-    /// Variance of the edge's position that doubt about the shading and about
+    /// Variance of the edge's position that uncertainty about the shading and about
     /// flanks leaves \[px²\].
     pub variance: f64,
 }
@@ -59,50 +58,34 @@ impl StepShape {
     }
 }
 
-impl Overlay {
+impl StepFitter<'_> {
     /// How far the surroundings on one side of a known step are plain \[px\],
-    /// after it or before it, their slope in shares of the step that was given
-    /// \[1/px away from it\], and the variance that its doubt leaves to the
+    /// after it or before it, their slope as fractions of the step that was given
+    /// \[1/px away from it\], and the variance that its uncertainty leaves to the
     /// level at the edge.
-    pub fn side_slope(
-        &self,
-        table: &StepTable,
-        look: &StepFit,
-        step: &BlurredStep,
-        after: bool,
-    ) -> (f64, (f64, f64)) {
-        let (sign, room) = if after { (1.0, look.room.after) } else { (-1.0, look.room.before) };
-        let (extent, line) = self.plain_extent(
-            table,
-            StepWithNeighbours { step, flanks: &look.flanks },
-            look.pixel_noise,
-            sign,
-            room,
-        );
-        (extent, line.shrunk_slope(look.pixel_noise))
+    pub fn side_slope(&self, fit: &StepFit, step: &BlurredStep, after: bool) -> (f64, (f64, f64)) {
+        let (sign, room) = if after { (1.0, fit.room.after) } else { (-1.0, fit.room.before) };
+        let (flanks, noise) = (&fit.flanks, fit.pixel_noise);
+        let (extent, line) = self.plain_extent(&SideInput { step, flanks, sign, room, noise });
+        (extent, line.shrunk_slope(noise))
     }
 
-    /// Reads the edge's shape from a look at it and what is known of its blur.
+    /// Reads the edge's shape from a fit to it and what is known of its blur.
     #[inline(always)]
-    pub fn shape(
-        &self,
-        table: &StepTable,
-        look: &StepFit,
-        blur: BlurEstimate,
-    ) -> Option<StepShape> {
-        let look = self.fit_known(table, look, blur)?;
-        let StepFit { step, noise, room, flanks, added_variance, .. } = look;
+    pub fn shape(&self, fit: &StepFit, blur: BlurEstimate) -> Option<StepShape> {
+        let fit = self.fit_known(fit, blur)?;
+        let StepFit { step, noise, room, flanks, added_variance, .. } = fit;
         let sharp = step.blur * step.blur - ROUNDING_VARIANCE_PX2;
         let step = BlurredStep { blur: sharp.max(MIN_BLUR_PX.powi(2)).sqrt(), ..step };
-        let edge = StepWithNeighbours { step: &step, flanks: &flanks };
-        let pixel_noise = look.pixel_noise;
-        let before = self.side_shape(table, edge, noise, pixel_noise, -1.0, room.before);
-        let after = self.side_shape(table, edge, noise, pixel_noise, 1.0, room.after);
-        // A level that is off by a share moves the edge by √π blurs times it.
+        let before =
+            SideInput { step: &step, flanks: &flanks, sign: -1.0, room: room.before, noise };
+        let after = SideInput { sign: 1.0, room: room.after, ..before };
+        let [before, after] = [before, after].map(|side| self.side_shape(&side, fit.pixel_noise));
+        // A level that is off by a fraction moves the edge by √π blurs times it.
         let per_level = std::f64::consts::PI * step.blur * step.blur;
         Some(StepShape {
             step,
-            extent: Extent { before: before.extent, after: after.extent },
+            extent: Clearance { before: before.extent, after: after.extent },
             shading: [before.shading, after.shading],
             flanks,
             variance: per_level * (before.level_variance + after.level_variance) + added_variance,
@@ -110,20 +93,12 @@ impl Overlay {
     }
 
     /// One side of the edge: along a straight line, or along a parabola where
-    /// that ends early. `noise` is that of a row's samples and that of a pixel.
+    /// that ends early. `pixel_noise` is that of a pixel, in place of a row's samples.
     #[inline(always)]
-    fn side_shape(
-        &self,
-        table: &StepTable,
-        edge: StepWithNeighbours<'_>,
-        noise: f64,
-        pixel_noise: f64,
-        sign: f64,
-        room: f64,
-    ) -> SideShape {
-        let (extent, line) = self.plain_extent(table, edge, noise, sign, room);
-        if extent + 2.0 <= room
-            && let Some(curved) = self.parabolic_side(table, edge, noise, sign, room)
+    fn side_shape(&self, side: &SideInput<'_>, pixel_noise: f64) -> SideShape {
+        let (extent, line) = self.plain_extent(side);
+        if extent + 2.0 <= side.room
+            && let Some(curved) = self.parabolic_side(side)
         {
             return curved;
         }
@@ -134,22 +109,20 @@ impl Overlay {
     /// Samples of two pixels beside the edge, from a distance on: how far each
     /// lies away from it, what it is beyond the level there, and its weight.
     #[inline(always)]
-    pub(super) fn each_beside(
+    pub fn each_beside(
         &self,
-        table: &StepTable,
-        StepWithNeighbours { step, flanks }: StepWithNeighbours<'_>,
-        sign: f64,
+        &SideInput { step, flanks, sign, .. }: &SideInput<'_>,
         from: f64,
         mut add: impl FnMut(f64, f64, f64),
     ) {
         let height = step.after - step.before;
         let (near, far) = (step.at + sign * from, step.at + sign * (from + 2.0));
-        for mean in self.means() {
+        for mean in self.overlay.means() {
             for (at, value) in mean.samples(near.min(far), near.max(far) - 1e-9) {
-                let (share, _) = table.at((at - step.at) / step.blur);
-                let beside = if flanks.any() { flanks.at(table, at) } else { 0.0 };
-                let off = value - beside - step.before - height * share;
-                add(sign * (at - step.at), off, mean.weight);
+                let (fraction, _) = self.table.at((at - step.at) / step.blur);
+                let beside = if flanks.any() { flanks.at(self.table, at) } else { 0.0 };
+                let off = value - beside - step.before - height * fraction;
+                add(sign * (at - step.at), off, mean.rows.into());
             }
         }
     }
@@ -157,21 +130,15 @@ impl Overlay {
     /// How far from the edge a side is plain, that is a straight line within
     /// what noise explains, and that line.
     #[inline(always)]
-    fn plain_extent(
-        &self,
-        table: &StepTable,
-        edge: StepWithNeighbours<'_>,
-        noise: f64,
-        sign: f64,
-        room: f64,
-    ) -> (f64, LineSums) {
-        let height = edge.step.after - edge.step.before;
-        let first = 3.0 * edge.step.blur;
+    fn plain_extent(&self, side: &SideInput<'_>) -> (f64, LineSums) {
+        let SideInput { noise, room, .. } = *side;
+        let height = side.step.after - side.step.before;
+        let first = 3.0 * side.step.blur;
         let mut line = LineSums::default();
         let mut end = first.min(room);
         while end + 2.0 <= room {
             let mut block = LineSums::default();
-            self.each_beside(table, edge, sign, end, |away, off, weight| {
+            self.each_beside(side, end, |away, off, weight| {
                 block.add(away, off, weight);
             });
             if block.weight <= 0.0 {

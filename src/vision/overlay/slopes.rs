@@ -1,7 +1,9 @@
-//! How steeply the overlay runs, place by place: where the edge is steepest,
+//! How steeply the overlay runs, position by position: where the edge is steepest,
 //! and whether another step lies beside it.
 
-use super::step::{BlurredStep, Extent, NeighbourStep};
+use std::ops::Range;
+
+use super::step::{BlurredStep, Clearance, NeighbourStep};
 use super::{HALF_SPAN, Overlay, PHASES, SPAN};
 
 /// Distance from the path within which the edge lies \[px\].
@@ -16,7 +18,7 @@ pub struct SlopeLimits {
     pub notable: f64,
 }
 
-/// Mean slopes over two pixels \[1/px\], each phase's share of the mean of both.
+/// Mean slopes over two pixels \[1/px\], each phase's fraction of the mean of both.
 pub struct ProfileSlopes([[f32; SPAN]; PHASES]);
 
 impl ProfileSlopes {
@@ -24,11 +26,11 @@ impl ProfileSlopes {
     #[inline(always)]
     pub fn of(overlay: &Overlay) -> Self {
         let mut slopes = [[0.0; SPAN]; PHASES];
-        let all = overlay.counts.iter().sum::<f32>().max(1.0);
-        for ((slopes, mean), count) in slopes.iter_mut().zip(&overlay.mean).zip(overlay.counts) {
-            let share = 0.5 * count / all;
+        let all = overlay.phases.iter().map(|phase| phase.rows).sum::<f32>().max(1.0);
+        for (slopes, phase) in slopes.iter_mut().zip(&overlay.phases) {
+            let (mean, fraction) = (&phase.samples, 0.5 * phase.rows / all);
             for k in 1..SPAN - 1 {
-                slopes[k] = share * (mean[k + 1] - mean[k - 1]);
+                slopes[k] = fraction * (mean[k + 1] - mean[k - 1]);
             }
             (slopes[0], slopes[SPAN - 1]) = (slopes[1], slopes[SPAN - 2]);
         }
@@ -51,11 +53,9 @@ impl ProfileSlopes {
 
     /// Steepest slope of the overlay near the path \[1/px\], and where.
     #[inline(always)]
-    pub fn steepest(&self, room: Extent) -> Option<(f64, f64)> {
-        let (from, to) = (
-            halves(-room.before.min(MAX_EDGE_OFFSET_PX)),
-            halves(room.after.min(MAX_EDGE_OFFSET_PX)),
-        );
+    pub fn steepest(&self, room: Clearance) -> Option<(f64, f64)> {
+        let most = MAX_EDGE_OFFSET_PX;
+        let (from, to) = (halves(-room.before.min(most)), halves(room.after.min(most)));
         let mut best = (0.0, 0);
         for half in from..=to {
             let slope = self.at(half);
@@ -93,15 +93,9 @@ impl ProfileSlopes {
         (room, None)
     }
 
-    /// The step whose slope rises from a place on, in half pixels.
+    /// The step whose slope rises from a position on, in half pixels.
     #[cold]
-    fn flank(
-        &self,
-        blur: f64,
-        from: i16,
-        sign: i16,
-        steps: std::ops::Range<i16>,
-    ) -> Option<NeighbourStep> {
+    fn flank(&self, blur: f64, from: i16, sign: i16, steps: Range<i16>) -> Option<NeighbourStep> {
         let mut best = (0.0f32, 0, 0.0f32);
         for step in steps {
             let half = from + sign * step;

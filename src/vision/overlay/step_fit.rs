@@ -1,10 +1,9 @@
-//! The fit of a blurred step to an overlay: a first look, and others from it on.
+//! Least-squares fits of a blurred step to an overlay.
 
-use super::Overlay;
+use super::StepFitter;
 use super::look::{MAX_ITERATIONS, SHADING_SIGMA, StepFit};
 use super::slopes::{ProfileSlopes, SlopeLimits};
-use super::step::{BlurredStep, Extent, MIN_BLUR_PX, NeighbourSteps};
-use crate::numeric::blurred_step::StepTable;
+use super::step::{BlurredStep, Clearance, MIN_BLUR_PX, NeighbourSteps};
 use crate::numeric::number::to_f64;
 use crate::vision::blur_estimate::BlurEstimate;
 
@@ -13,85 +12,74 @@ const MAX_BLUR_PX: f64 = 15.0;
 /// A step \[px, or blurs\] after which another would change next to nothing: each
 /// squares what is left.
 const CONVERGED_STEP: f64 = 8e-3;
-/// Slope that shows another step beside the edge, times the blur: a twelfth of what the
-/// edge itself has. The fraction of it that is enough where the edge alone leaves more than
-/// noise does and such a step explains it, as beside a rib of a tenth of the contrast.
+/// Slope that shows another step beside the edge, times the blur. Derived: 0.08/√(2π), a twelfth of
+/// the slope of the edge itself.
 const MIN_NEIGHBOUR_SLOPE: f64 = 0.032;
 const WEAK_SLOPE_RATIO: f64 = 0.5;
 
-impl Overlay {
+impl StepFitter<'_> {
     /// Looks at the edge. `noise` is the standard deviation of a pixel as a
-    /// share of the step, `room` how far to look. `None` where no step can be
+    /// fraction of the step, `room` how far to look. `None` where no step can be
     /// fitted.
     #[inline(always)]
-    pub fn first_fit(&self, table: &StepTable, noise: f64, room: Extent) -> Option<StepFit> {
-        let slopes = ProfileSlopes::of(self);
+    pub fn first_fit(&self, noise: f64, room: Clearance) -> Option<StepFit> {
+        let slopes = ProfileSlopes::of(self.overlay);
         let (slope, at) = slopes.steepest(room)?;
         let blur = (0.2 / slope).clamp(0.5, MAX_BLUR_PX);
         let step = BlurredStep { at, blur, before: 0.0, after: 1.0 };
         let whole_room = room;
         let (room, flanks) = self.up_to_neighbours(&slopes, step, noise, MIN_NEIGHBOUR_SLOPE, room);
-        let look = StepFit {
+        let fit = StepFit {
             step,
             blur_sd: f64::INFINITY,
             shading: [0.0; 2],
             pixel_noise: noise,
             noise,
             residual: noise,
-            phases: to_f64(self.means().count()),
+            phases: to_f64(self.overlay.means().count()),
             room,
             flanks: NeighbourSteps::default(),
             added_variance: 0.0,
         };
-        let look = self.fit(table, look, None)?;
-        let flanks = flanks.near(&look.step);
+        let fit = self.fit(fit, None)?;
+        let flanks = flanks.near(&fit.step);
         if flanks.any() {
-            let start = StepFit { flanks, ..look };
-            return Some(self.fit_flanks(table, &start, None).unwrap_or(look));
+            let start = StepFit { flanks, ..fit };
+            return Some(self.fit_flanks(&start, None).unwrap_or(fit));
         }
-        if !look.is_not_step() {
-            return Some(look);
+        if !fit.is_not_step() {
+            return Some(fit);
         }
         // A weaker step beside it, if that explains what is left.
         let weaker = WEAK_SLOPE_RATIO * MIN_NEIGHBOUR_SLOPE;
         let (_, flanks) = self.up_to_neighbours(&slopes, step, noise, weaker, whole_room);
-        let start = StepFit { flanks: flanks.near(&look.step), ..look };
-        let found = start.flanks.any().then(|| self.fit_flanks(table, &start, None)).flatten();
-        Some(found.filter(|found| !found.is_not_step()).unwrap_or(look))
+        let start = StepFit { flanks: flanks.near(&fit.step), ..fit };
+        let found = start.flanks.any().then(|| self.fit_flanks(&start, None)).flatten();
+        Some(found.filter(|found| !found.is_not_step()).unwrap_or(fit))
     }
 
-    /// Fits the edge of a look with another shape of the blur.
-    pub fn refit(&self, table: &StepTable, look: &StepFit) -> Option<StepFit> {
-        self.fit_from(table, look, None)
+    /// Fits the edge of a fit with another shape of the blur.
+    pub fn refit(&self, fit: &StepFit) -> Option<StepFit> {
+        self.fit_from(fit, None)
     }
 
     /// Fits the edge again with what is known of its blur.
     #[inline(always)]
-    pub(super) fn fit_known(
-        &self,
-        table: &StepTable,
-        look: &StepFit,
-        blur: BlurEstimate,
-    ) -> Option<StepFit> {
-        let fitted = self.fit_from(table, look, Some(blur));
-        if fitted.is_some() || !look.flanks.any() {
+    pub fn fit_known(&self, fit: &StepFit, blur: BlurEstimate) -> Option<StepFit> {
+        let fitted = self.fit_from(fit, Some(blur));
+        if fitted.is_some() || !fit.flanks.any() {
             return fitted;
         }
-        self.fit(table, look.without_flanks(), Some(blur))
+        self.fit(fit.without_flanks(), Some(blur))
     }
 
-    /// Fits the edge of a look and the steps beside it.
+    /// Fits the edge of a fit and the steps beside it.
     #[inline(always)]
-    fn fit_from(
-        &self,
-        table: &StepTable,
-        look: &StepFit,
-        known: Option<BlurEstimate>,
-    ) -> Option<StepFit> {
-        if look.flanks.any() {
-            return self.fit_flanks(table, look, known);
+    fn fit_from(&self, fit: &StepFit, known: Option<BlurEstimate>) -> Option<StepFit> {
+        if fit.flanks.any() {
+            return self.fit_flanks(fit, known);
         }
-        self.fit(table, *look, known)
+        self.fit(*fit, known)
     }
 
     /// Cuts the room off half-way to a neighbouring step: where the slope has
@@ -104,48 +92,44 @@ impl Overlay {
         start: BlurredStep,
         noise: f64,
         notable: f64,
-        room: Extent,
-    ) -> (Extent, NeighbourSteps) {
-        let limits = SlopeLimits { noise: noise / (2.0 * self.used().max(1.0)).sqrt(), notable };
+        room: Clearance,
+    ) -> (Clearance, NeighbourSteps) {
+        let limits =
+            SlopeLimits { noise: noise / (2.0 * self.overlay.used().max(1.0)).sqrt(), notable };
         let (before, flank_before) = slopes.up_to_neighbour(start, limits, -1, room.before);
         let (after, flank_after) = slopes.up_to_neighbour(start, limits, 1, room.after);
-        (Extent { before, after }, NeighbourSteps([flank_before, flank_after]))
+        (Clearance { before, after }, NeighbourSteps([flank_before, flank_after]))
     }
 
-    /// Fits place, blur, levels and a little shading about the edge.
+    /// Fits position, blur, levels and a little shading about the edge.
     #[inline(always)]
-    fn fit(
-        &self,
-        table: &StepTable,
-        start: StepFit,
-        known: Option<BlurEstimate>,
-    ) -> Option<StepFit> {
-        let mut look = start;
+    fn fit(&self, start: StepFit, known: Option<BlurEstimate>) -> Option<StepFit> {
+        let mut fit = start;
         let mut last = None;
         let hold = |sd: f64| (start.noise / sd).powi(2);
         // Shading is held near none, because over a short way it could pass
         // for a shift of the edge.
         let of_shading = (start.pixel_noise / SHADING_SIGMA).powi(2);
         for _ in 0..MAX_ITERATIONS {
-            let step = look.step;
-            let linear = self.linearise(table, &look);
+            let step = fit.step;
+            let linear = self.linearise(&fit);
             let mut normal = linear.normal();
-            normal.add_prior(4, of_shading, -look.shading[0]);
-            normal.add_prior(5, of_shading, -look.shading[1]);
+            normal.add_prior(4, of_shading, -fit.shading[0]);
+            normal.add_prior(5, of_shading, -fit.shading[1]);
             if let Some(BlurEstimate { px, sd_px }) = known {
                 normal.add_prior(1, hold(sd_px), px - step.blur);
             }
             let solved = normal.solve()?;
             let moved = solved.unknowns;
-            look.step = BlurredStep {
+            fit.step = BlurredStep {
                 at: step.at + moved[0].clamp(-step.blur, step.blur),
                 blur: (step.blur + moved[1].clamp(-0.5 * step.blur, 0.5 * step.blur))
                     .clamp(MIN_BLUR_PX, MAX_BLUR_PX),
                 before: step.before + moved[2],
                 after: step.after + moved[3],
             };
-            look.shading[0] += moved[4];
-            look.shading[1] += moved[5];
+            fit.shading[0] += moved[4];
+            fit.shading[1] += moved[5];
             last = Some((linear, solved));
             if moved[0].abs() < CONVERGED_STEP && moved[1].abs() < CONVERGED_STEP * step.blur {
                 break;
@@ -153,14 +137,25 @@ impl Overlay {
         }
         let (linear, solved) = last?;
         // What the model leaves is noise, if not of the pixels.
-        look.noise = start.pixel_noise.max(linear.mean_square().sqrt());
-        look.residual = start.pixel_noise;
-        if look.noise > start.pixel_noise {
+        fit.noise = start.pixel_noise.max(linear.mean_square().sqrt());
+        fit.residual = start.pixel_noise;
+        if fit.noise > start.pixel_noise {
             let within_phases = linear.within_phases_after(&solved.unknowns);
-            look.residual = start.pixel_noise.max(within_phases.sqrt());
+            fit.residual = start.pixel_noise.max(within_phases.sqrt());
         }
-        look.blur_sd = look.noise * solved.variance(1).max(0.0).sqrt();
-        let inside = look.step.at > -look.room.before && look.step.at < look.room.after;
-        (inside && look.step.after - look.step.before > 0.1).then_some(look)
+        fit.blur_sd = fit.noise * solved.variance(1).max(0.0).sqrt();
+        let inside = fit.step.at > -fit.room.before && fit.step.at < fit.room.after;
+        (inside && fit.step.after - fit.step.before > 0.1).then_some(fit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_notable_slope_is_a_twelfth_of_the_edges_own() {
+        let own = 1.0 / std::f64::consts::TAU.sqrt();
+        assert!((MIN_NEIGHBOUR_SLOPE - 0.08 * own).abs() < 2e-4);
     }
 }

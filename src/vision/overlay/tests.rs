@@ -5,19 +5,19 @@ use crate::core::time::Stamp;
 use crate::numeric::blurred_step::StepTable;
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::edge_windows::Grouping;
-use crate::vision::gauge::BeadAxis;
+use crate::vision::gauge::{BeadAxis, GaugeView};
 use crate::vision::row_range::RowRange;
-use crate::vision::strip::{GaugeRowsOfDepth, GaugeView, RowLayout};
+use crate::vision::strip::{GaugeRowsOfDepth, RowLayout};
 
 const ROWS: usize = 100;
 const COLUMNS: usize = 160;
 const LINES: [RowRange; 4] =
     [RowRange::new(0, 25), RowRange::new(25, 50), RowRange::new(50, 75), RowRange::new(75, 100)];
 const BLUR_PX: f64 = 1.6;
-/// Standard deviation of a pixel of 8 bits in shares of a step of 80 levels.
+/// Standard deviation of a pixel of 8 bits as fractions of a step of 80 levels.
 const NOISE: f64 = 0.05;
 
-/// What is expected: a place a little off the edge, and levels.
+/// What is expected: a position a little off the edge, and levels.
 const EXPECTED: [f32; 3] = [79.8, 70.0, 80.0];
 
 /// A step from 70 to 150 at 80.3 px and what lies beside it, without noise.
@@ -46,10 +46,11 @@ fn overlay(beside: impl Fn(f64) -> f64) -> Overlay {
 /// The shape of the edge with its blur known to four percent.
 fn shape(overlay: &Overlay) -> StepShape {
     let table = StepTable::default();
-    let room = Extent { before: 45.0, after: 45.0 };
-    let look = overlay.first_fit(&table, NOISE, room).unwrap();
+    let room = Clearance { before: 45.0, after: 45.0 };
+    let fit = overlay.with(&table).first_fit(NOISE, room).unwrap();
     overlay
-        .shape(&table, &look, BlurEstimate { px: look.step.blur, sd_px: 0.04 * BLUR_PX })
+        .with(&table)
+        .shape(&fit, BlurEstimate { px: fit.step.blur, sd_px: 0.04 * BLUR_PX })
         .unwrap()
 }
 
@@ -91,4 +92,26 @@ fn shading_that_falls_off_is_followed_by_a_parabola() {
     assert!((after.slope * 80.0 - 1.0).abs() < 0.15, "{after:?}");
     assert!(after.bend < 0.0);
     assert!(before.slope.abs() < 1e-3 && before.bend == 0.0);
+}
+
+/// The mean slope over two pixels is (Φ((x + 1)/s) − Φ((x − 1)/s))/2.
+#[test]
+fn the_steepest_slope_is_that_of_a_gaussian_flank() {
+    let room = Clearance { before: 45.0, after: 45.0 };
+    let (slope, at) = slopes::ProfileSlopes::of(&overlay(|_| 0.0)).steepest(room).unwrap();
+    let fraction = |x: f64| 0.5 * (1.0 + libm::erf(x / (BLUR_PX * 2f64.sqrt())));
+    // The pixel at 80 is nearest to the edge at 80.3.
+    let expected = 0.5 * (fraction(1.0 - 0.3) - fraction(-1.0 - 0.3));
+    assert!((slope - expected).abs() < 5e-4, "{slope} {expected}");
+    assert!(at.abs() < 1e-9, "{at}");
+}
+
+/// Beyond three blurs nothing but the slope of the surroundings is left of a straight shade.
+#[test]
+fn an_even_shade_comes_back_as_its_slope() {
+    let shade = |at: f64| if at > 0.0 { 0.8 * at } else { 0.0 };
+    let shape = shape(&overlay(shade));
+    assert!((shape.shading[1].slope - 0.01).abs() < 1e-3, "{shape:?}");
+    assert!(shape.shading[0].slope.abs() < 1e-3 && !shape.is_bent(), "{shape:?}");
+    assert!((shape.step.at - 0.5).abs() < 0.04, "{shape:?}");
 }

@@ -1,8 +1,8 @@
-//! A groove beside the bead: where the bead begins, from the shape of the whole dark line.
-//! A groove that is not much wider than the blur does not show how dark it is; what is
-//! known of other grooves then says how wide it is.
+//! A groove beside the bead. Where the bead begins is fitted from the shape of the whole dark
+//! line. A groove that is not much wider than the blur does not show how dark it is; a prior from
+//! real grooves then determines its width.
 
-use super::levels::{MeanProfile, OUTSIDE_PX, PROFILE_PX};
+use super::mean_profile::{MeanProfile, OUTSIDE_PX, PROFILE_PX};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::{NormalEquations, NormalSolution};
 use crate::numeric::number::to_f64;
@@ -10,22 +10,26 @@ use crate::vision::gauge::EdgeKind;
 use crate::vision::vectors;
 use nalgebra::SVector;
 
-/// Grey of a groove as a fraction of the bead's, and its standard deviation: grooves of
-/// real concrete that are wide enough to show it have 1 to 74 beside beads of 131.
+/// Grey of a groove as a fraction of the bead's. Measured: ACCURACY.md, Real and rendered: real
+/// grooves that are wide enough to show it have 1 to 74 beside beads of 131, 14.7 in the median.
 const GROOVE_GREY: f64 = 0.13;
+/// Its standard deviation. Measured: as [`GROOVE_GREY`], of which the range is.
 const GROOVE_GREY_SIGMA: f64 = 0.12;
 /// The same of the bead beside the edge about its level farther inside: light.
 pub(super) const BEAD_SIGMA: f64 = 0.03;
-/// Places beyond the groove, and within the bead, that are fitted \[px\].
+/// Positions beyond the groove that are fitted \[px\]: enough for its level, too few for its slope
+/// to bend.
 const BEYOND_PX: usize = 9;
+/// Positions within the bead that are fitted \[px\].
 const WITHIN_PX: usize = 7;
 /// Standard deviation of a mean profile about the model, as a fraction of the bead's
 /// level, beside noise and texture: a lens's blur is no Gaussian, a camera not linear.
 const MODEL_MISFIT_SIGMA: f64 = 0.004;
-/// Rounds of the fit, and the change of position of the groove's
-/// width at which it ends \[px\].
+/// Rounds of the fit at most.
 const MAX_ITERATIONS: usize = 40;
+/// Change of position at which the fit has converged \[px\].
 const CONVERGED_PX: f64 = 3e-3;
+/// The same of the groove's width \[px\], which is known less well.
 const CONVERGED_WIDTH_PX: f64 = 0.03;
 /// Largest change of position, width and blur in a round \[px\].
 const MAX_STEP_PX: f64 = 0.7;
@@ -33,24 +37,26 @@ const MAX_STEP_PX: f64 = 0.7;
 const MAX_MISFIT: f64 = 30.0;
 /// Width of a narrow groove, from which the fit starts \[px\].
 const START_WIDTH_PX: f64 = 2.0;
-/// Least standard deviation and largest value of the variance of the far side about the
-/// near one \[px²\].
+/// Smallest standard deviation of the variance of the far side about the near one \[px²\].
 const FAR_SIDE_SIGMA_PX2: f64 = 0.02;
+/// Its largest value \[px²\].
 const MAX_FAR_SIDE_PX2: f64 = 30.0;
 /// Ranges of width and blur \[px\].
 const WIDTH_RANGE_PX: (f64, f64) = (0.5, 30.0);
 const BLUR_RANGE_PX: (f64, f64) = (0.6, 6.0);
-/// Weight that holds an unknown.
+/// Weight that fixes an unknown. Derived: many orders of magnitude more than the sums over a
+/// profile, and far from the limits of a float.
 const FIXED_WEIGHT: f64 = 1e9;
-/// Places at the far end of ground that may be those of a groove's far side \[px\].
+/// Positions at the far end of ground that may be those of a groove's far side \[px\].
 const FAR_END_PX: usize = 4;
-/// By how much the sum of squares must fall until a dark line beside an edge on ground is
-/// as likely as none. A wider one than that is ground.
+/// By how much the sum of squares must fall until a dark line beside an edge on ground is as likely
+/// as none.
 const DIP_COST: f64 = 6.0;
+/// Widest such line \[px\]; a wider one is ground.
 const MAX_DIP_PX: f64 = 9.0;
-/// Unknowns of the fit.
+/// Unknowns of the fit. By definition those of [`GrooveModel::unknowns`].
 const UNKNOWNS: usize = 8;
-/// Standard deviation of the slope of what lies beyond, from place to place, as a fraction
+/// Standard deviation of the slope of what lies beyond, from position to position, as a fraction
 /// of the bead's level: light, a film of water, an older layer.
 const BEYOND_SLOPE: f64 = 0.01;
 
@@ -163,15 +169,15 @@ impl GrooveModel {
         }
     }
 
-    /// Value at a place, and its derivatives by position, width, blur, level beyond,
+    /// Value at a position, and its derivatives by position, width, blur, level beyond,
     /// level in the groove, level of the bead, the far side's variance, and slope.
     #[inline(always)]
-    fn value(&self, place: f64, table: &StepTable) -> (f64, [f64; UNKNOWNS]) {
+    fn value(&self, position: f64, table: &StepTable) -> (f64, [f64; UNKNOWNS]) {
         let far_blur = (self.blur * self.blur + self.apart).sqrt();
-        let near = StepValue::of(place - self.at, self.blur, table);
-        let far = StepValue::of(place - self.at + self.width, far_blur, table);
+        let near = StepValue::of(position - self.at, self.blur, table);
+        let far = StepValue::of(position - self.at + self.width, far_blur, table);
         let (up, down) = (self.bead - self.grey, self.beyond - self.grey);
-        let (outside, away) = (1.0 - near.fraction, self.at - place);
+        let (outside, away) = (1.0 - near.fraction, self.at - position);
         let shade = self.slope * away;
         let value = self.beyond - down * far.fraction + up * near.fraction + shade * outside;
         let of_near = up - shade;
@@ -211,8 +217,8 @@ impl StepValue {
 struct GrooveProblem<'a> {
     table: &'a StepTable,
     mean: &'a MeanProfile,
-    /// First place and the one after the last.
-    places: (usize, usize),
+    /// First position and the one after the last.
+    positions: (usize, usize),
     weight: f64,
     /// What is known of the unknowns, and their standard deviations.
     prior: GrooveModel,
@@ -261,20 +267,12 @@ pub fn fit(mean: &MeanProfile, known: &GroovePrior<'_>) -> Option<GrooveShape> {
         if mean.on_ground { BEYOND_SLOPE * bead } else { BEYOND_SLOPE * FAR_SIDE_SIGMA_PX2 },
     ];
     let weight = 1.0 / (known.variance + (MODEL_MISFIT_SIGMA * bead).powi(2));
-    let (table, places) = (known.table, (first, last));
-    let groove = GrooveProblem { table, mean, places, weight, prior: narrow, sigmas };
+    let (table, positions) = (known.table, (first, last));
+    let groove = GrooveProblem { table, mean, positions, weight, prior: narrow, sigmas };
     if mean.on_ground {
         let step = GrooveModel { width: WIDTH_RANGE_PX.1, grey: narrow.beyond, ..narrow };
-        let sigmas = [
-            sigmas[0],
-            FAR_SIDE_SIGMA_PX2,
-            sigmas[2],
-            sigmas[3],
-            bead,
-            sigmas[5],
-            FAR_SIDE_SIGMA_PX2,
-            sigmas[7],
-        ];
+        let (mut sigmas, far_side) = (sigmas, FAR_SIDE_SIGMA_PX2);
+        (sigmas[1], sigmas[4], sigmas[6]) = (far_side, bead, far_side);
         let problem = GrooveProblem { prior: step, sigmas, ..groove };
         let step = problem.descend(problem.solve(&step)?)?;
         let before = known.before.map(|shape| shape.model).filter(GrooveModel::is_dip);
@@ -302,20 +300,18 @@ pub fn fit(mean: &MeanProfile, known: &GroovePrior<'_>) -> Option<GrooveShape> {
     groove.shape_of(&groove.descend_from(starts)?, 1.0)
 }
 
-/// The same groove as wide as the grey that is missing up to a place.
+/// The same groove as wide as the grey that is missing up to a position.
 fn wide(mean: &MeanProfile, narrow: GrooveModel, last: usize) -> GrooveModel {
     let GrooveModel { bead, grey, .. } = narrow;
     let missing: f64 = (mean.darkest()..last).map(|k| bead - f64::from(mean.grey[k])).sum();
-    GrooveModel {
-        width: (2.0 * missing / (bead - grey)).clamp(START_WIDTH_PX, 0.5 * WIDTH_RANGE_PX.1),
-        ..narrow
-    }
+    let width = (2.0 * missing / (bead - grey)).clamp(START_WIDTH_PX, 0.5 * WIDTH_RANGE_PX.1);
+    GrooveModel { width, ..narrow }
 }
 
-/// Brightest level from a place on up to the darkest one \[grey levels\].
+/// Brightest level from a position on up to the darkest one \[grey levels\].
 fn brightest(mean: &MeanProfile, from: usize) -> f64 {
-    let places = &mean.grey[from..=mean.darkest()];
-    f64::from(places.iter().fold(f32::NEG_INFINITY, |most, &grey| most.max(grey)))
+    let positions = &mean.grey[from..=mean.darkest()];
+    f64::from(positions.iter().fold(f32::NEG_INFINITY, |most, &grey| most.max(grey)))
 }
 
 impl GrooveProblem<'_> {
@@ -326,7 +322,7 @@ impl GrooveProblem<'_> {
         vectors::widest(
             #[inline(always)]
             || {
-                for k in self.places.0..self.places.1 {
+                for k in self.positions.0..self.positions.1 {
                     let (value, row) = model.value(to_f64(k), self.table);
                     let miss = f64::from(self.mean.grey[k]) - value;
                     squares += self.weight * miss * miss;
@@ -379,23 +375,16 @@ impl GrooveProblem<'_> {
     }
 
     /// What a fit says, if it fits.
-    fn shape_of(&self, fitted: &GrooveFit, groove_share: f64) -> Option<GrooveShape> {
+    fn shape_of(&self, fitted: &GrooveFit, groove_probability: f64) -> Option<GrooveShape> {
         let (model, solved) = (&fitted.model, &fitted.solved);
-        let freedom = to_f64((self.places.1 - self.places.0).saturating_sub(UNKNOWNS).max(1));
+        let freedom = to_f64((self.positions.1 - self.positions.0).saturating_sub(UNKNOWNS).max(1));
         let misfit = fitted.squares / freedom;
         let inflation = misfit.max(1.0);
         let blur = MeanBlur { px: model.blur, variance: solved.variance(2) * inflation };
         let variance = solved.variance(0) * inflation;
         let level_off = (model.bead - self.prior.bead).abs() / self.sigmas[5];
-        let model = *model;
-        let shape = GrooveShape {
-            at: model.at,
-            variance,
-            groove_probability: groove_share,
-            blur,
-            level_off,
-            model,
-        };
+        let (at, model) = (model.at, *model);
+        let shape = GrooveShape { at, variance, groove_probability, blur, level_off, model };
         (misfit < MAX_MISFIT).then_some(shape)
     }
 }

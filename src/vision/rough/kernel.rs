@@ -1,4 +1,4 @@
-//! Weights of a smoothing.
+//! Gaussian kernels.
 
 use crate::numeric::number::{narrow_to_f32, round_to_count, to_f64};
 

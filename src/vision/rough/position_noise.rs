@@ -1,12 +1,12 @@
-//! How far pixel noise and texture move the mean position of an edge.
+//! Standard deviation of the mean position of an edge, from pixel noise and texture.
 
 use super::crossing::SUMMED_INSIDE_PX;
-use super::levels::{BlockProfile, Crossings, DEPTH_SIGMA, EdgeLevels, OUTSIDE_PX, PROFILE_PX};
+use super::levels::{Crossings, DEPTH_SIGMA, EdgeLevels};
+use super::mean_profile::{BlockProfile, OUTSIDE_PX, PROFILE_PX};
 use super::rough_input::RoughInput;
 use super::window::RowWindows;
 use crate::numeric::normal_distribution::ROOT_TWO_PI;
-use crate::numeric::number::round_to_count;
-use crate::numeric::number::{narrow_to_f32, to_f64};
+use crate::numeric::number::{narrow_to_f32, round_to_count, to_f64};
 use crate::vision::strip::GreyPixel;
 
 /// Blocks over which texture is taken to be correlated at most.
@@ -16,8 +16,8 @@ const MAX_LAG: usize = 6;
 /// deviation that a quarter predicts, it is less.
 const FLANK_SIGMA_FRACTION: f64 = 0.2;
 /// How far the ground's pattern between its level and the edge may be off, in standard
-/// deviations of the level from place to place: an edge that is drawn outwards by bright
-/// places finds more of them.
+/// deviations of the level from position to position: an edge that is drawn outwards by bright
+/// positions finds more of them.
 const PATTERN_LEVEL_SIGMAS: f64 = 1.2;
 
 /// What noise leaves open.
@@ -40,21 +40,21 @@ pub fn of_mean<T: GreyPixel>(
     crossings: &Crossings,
     scene: &RoughInput<'_, T>,
 ) -> Option<PositionNoise> {
-    let mean = levels.mean()?;
+    let mean = levels.mean.as_ref()?;
     let slope = slope(&mean.grey);
     if slope <= 0.0 {
         return None;
     }
-    let rows: f64 = (0..windows.count()).map(|row| windows.rows(row)).sum();
+    let rows: f64 = (0..windows.rows.len()).map(|row| windows.rows_of(row)).sum();
     let contrast = levels.contrast();
     let half = 0.5 * mean_of(&crossings.flank);
     // Texture that is summed on either side of the edge stands for bead that is not
     // there, or the other way round.
-    let inside = SideSegment { places: mean.inside, summed: f64::from(SUMMED_INSIDE_PX) + half };
+    let inside = SideSegment { positions: mean.inside, summed: f64::from(SUMMED_INSIDE_PX) + half };
     let mut grey = texture(levels, &inside, |block| levels.inside(block));
     if mean.on_ground {
         let outside =
-            SideSegment { places: mean.ground(), summed: mean_of(&crossings.gap).max(1.0) };
+            SideSegment { positions: mean.ground(), summed: mean_of(&crossings.gap).max(1.0) };
         grey += texture(levels, &outside, |block| levels.outside(block));
     } else {
         let pixel = f64::from(scene.noise).powi(2) * windows.noise_gain() / rows;
@@ -81,11 +81,11 @@ pub fn of_mean<T: GreyPixel>(
 /// Variance of the mean profile for each pixel across \[grey levels²\]: noise and
 /// texture of the bead, and of the ground where it is more, their correlation included.
 pub fn of_profile(levels: &EdgeLevels) -> Option<f64> {
-    let mean = levels.mean()?;
+    let mean = levels.mean.as_ref()?;
     let summed = f64::from(SUMMED_INSIDE_PX);
-    let inside = SideSegment { places: mean.inside, summed };
+    let inside = SideSegment { positions: mean.inside, summed };
     let bead = texture(levels, &inside, |block| levels.inside(block));
-    let outside = SideSegment { places: mean.ground(), summed };
+    let outside = SideSegment { positions: mean.ground(), summed };
     let ground = mean.on_ground.then(|| texture(levels, &outside, |block| levels.outside(block)));
     Some(bead.max(ground.unwrap_or(0.0)) / summed)
 }
@@ -93,10 +93,10 @@ pub fn of_profile(levels: &EdgeLevels) -> Option<f64> {
 /// Variance of an edge's profile about a straight line \[px²\].
 pub fn roughness(crossings: &Crossings) -> f64 {
     let middle = 0.5 * (to_f64(crossings.at.len()) - 1.0);
-    let places = crossings.at.iter().enumerate().filter(|(_, at)| at.is_finite());
+    let positions = crossings.at.iter().enumerate().filter(|(_, at)| at.is_finite());
     let (mut count, mut line, mut squares) = (0.0, [0.0; 2], [0.0; 2]);
     let mean = mean_of(&crossings.at);
-    for (row, at) in places {
+    for (row, at) in positions {
         let (off, at) = (to_f64(row) - middle, f64::from(*at) - mean);
         count += 1.0;
         line[0] += off * at;
@@ -130,36 +130,36 @@ pub fn mean_of(values: &[f32]) -> f64 {
     seen().map(|&value| f64::from(value)).sum::<f64>() / to_f64(seen().count().max(1))
 }
 
-/// Places beside an edge.
+/// Positions beside an edge.
 struct SideSegment {
-    /// First place and the one after the last, of a profile.
-    places: (usize, usize),
-    /// How many such places are summed for the edge's position \[px\].
+    /// First position and the one after the last, of a profile.
+    positions: (usize, usize),
+    /// How many such positions are summed for the edge's position \[px\].
     summed: f64,
 }
 
-/// Variance of the mean over the rows of the sum of so many places of texture and
+/// Variance of the mean over the rows of the sum of so many positions of texture and
 /// noise \[grey levels²\], the correlation along the bead included: from as many
 /// sums as there is room for beside each other.
-fn texture(levels: &EdgeLevels, stretch: &SideSegment, level: impl Fn(usize) -> f32) -> f64 {
-    let blocks = levels.blocks();
+fn texture(levels: &EdgeLevels, segment: &SideSegment, level: impl Fn(usize) -> f32) -> f64 {
+    let blocks = &levels.blocks;
     let count = blocks.len();
-    let (from, to) = (stretch.places.0, stretch.places.1.min(PROFILE_PX));
-    let size = round_to_count(narrow_to_f32(stretch.summed)).clamp(1, to - from);
+    let (from, to) = (segment.positions.0, segment.positions.1.min(PROFILE_PX));
+    let size = round_to_count(narrow_to_f32(segment.summed)).clamp(1, to - from);
     let mut covariances = [0.0f64; MAX_LAG + 1];
     let mut sums = vec![0.0; count];
-    let mut stretches = 0.0;
+    let mut segments = 0.0;
     for start in (from..=to - size).step_by(size) {
         for (block, sum) in sums.iter_mut().enumerate() {
-            let places = &blocks[block][start..start + size];
-            *sum = places.iter().map(|&grey| f64::from(grey - level(block))).sum::<f64>();
+            let positions = &blocks[block][start..start + size];
+            *sum = positions.iter().map(|&grey| f64::from(grey - level(block))).sum::<f64>();
         }
         let mean = sums.iter().sum::<f64>() / to_f64(count);
         for (lag, covariance) in covariances.iter_mut().enumerate() {
             let pairs = sums.iter().skip(lag).zip(&sums);
             *covariance += pairs.map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>() / to_f64(count);
         }
-        stretches += 1.0;
+        segments += 1.0;
     }
     let mut sum = covariances[0];
     for covariance in &covariances[1..] {
@@ -168,7 +168,7 @@ fn texture(levels: &EdgeLevels, stretch: &SideSegment, level: impl Fn(usize) -> 
         }
         sum += 2.0 * covariance;
     }
-    sum / stretches / to_f64(count) * (stretch.summed / to_f64(size)).powi(2)
+    sum / segments / to_f64(count) * (segment.summed / to_f64(size)).powi(2)
 }
 
 /// Variance of the mean length of the flanks \[px²\], their correlation along the

@@ -1,4 +1,4 @@
-//! What is looked at for a rough edge.
+//! Input of a rough edge.
 
 use crate::numeric::blurred_step::StepTable;
 use crate::vision::gauge::EdgeKind;

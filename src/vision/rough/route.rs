@@ -1,9 +1,10 @@
 //! The course of an edge through its windows: the strongest step from dark to
 //! bright that runs along the bead, by dynamic programming over blocks of rows.
 
+use std::ops::Range;
+
 use super::window::{RowWindows, WindowRow};
-use crate::numeric::number::round_to_count;
-use crate::numeric::number::to_f32;
+use crate::numeric::number::{round_to_count, to_f32};
 use crate::numeric::rank;
 use crate::vision::edge_windows::WINDOW_PX;
 
@@ -24,7 +25,7 @@ const CORRIDOR_FRACTION: f32 = 0.4;
 /// Half of the corridor at most \[px\].
 const MAX_CORRIDOR_PX: f32 = 40.0;
 
-/// The course of an edge; keeps its memory from frame to frame.
+/// The course of an edge; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct EdgeRoute {
     steps: Vec<WindowRow>,
@@ -80,14 +81,14 @@ impl EdgeRoute {
         Some(())
     }
 
-    /// Steps of the blocks: the mean of some pixels after a place less that of
+    /// Steps of the blocks: the mean of some pixels after a position less that of
     /// those before it, over three blocks with weights 1, 2, 1.
     #[inline(always)]
     fn respond(&mut self, windows: &RowWindows, reach: usize) {
-        let count = windows.count().div_ceil(windows.block());
+        let count = windows.rows.len().div_ceil(windows.block());
         self.scores.resize(count, [0.0; WINDOW_PX]);
         self.steps.resize(count, [0.0; WINDOW_PX]);
-        for (rows, sums) in windows.all().chunks(windows.block()).zip(&mut self.scores) {
+        for (rows, sums) in windows.rows.chunks(windows.block()).zip(&mut self.scores) {
             sums.fill(0.0);
             for row in rows {
                 for k in 0..WINDOW_PX {
@@ -118,7 +119,7 @@ impl EdgeRoute {
 
     /// The course with the largest sum of steps less the cost of running aside.
     #[inline(always)]
-    fn link(&mut self, inside: std::ops::Range<usize>) -> Option<()> {
+    fn link(&mut self, inside: Range<usize>) -> Option<()> {
         let most =
             |steps: &WindowRow| steps[inside.clone()].iter().fold(0.0, |a: f32, &b| a.max(b));
         self.strongest.clear();
@@ -155,19 +156,19 @@ impl EdgeRoute {
         let blocks = &self.blocks;
         self.rows.clear();
         for number in 0..blocks.len() * block {
-            let place = (to_f32(number) + 0.5) / to_f32(block) - 0.5;
-            let place = place.clamp(0.0, to_f32(blocks.len() - 1));
-            let before = round_to_count(place.floor()).min(blocks.len() - 1);
+            let position = (to_f32(number) + 0.5) / to_f32(block) - 0.5;
+            let position = position.clamp(0.0, to_f32(blocks.len() - 1));
+            let before = round_to_count(position.floor()).min(blocks.len() - 1);
             let after = (before + 1).min(blocks.len() - 1);
-            let fraction = place - to_f32(before);
+            let fraction = position - to_f32(before);
             self.rows.push(blocks[before] + fraction * (blocks[after] - blocks[before]));
         }
     }
 }
 
-/// Best score of the block before from which each place can be reached.
+/// Best score of the block before from which each position can be reached.
 #[inline(always)]
-fn best_before(scores: &WindowRow, inside: &std::ops::Range<usize>, best: &mut WindowRow) {
+fn best_before(scores: &WindowRow, inside: &Range<usize>, best: &mut WindowRow) {
     let mut padded = [f32::NEG_INFINITY; WINDOW_PX + 2 * MAX_ASIDE];
     padded[MAX_ASIDE..][inside.clone()].copy_from_slice(&scores[inside.clone()]);
     best.fill(f32::NEG_INFINITY);
@@ -180,8 +181,8 @@ fn best_before(scores: &WindowRow, inside: &std::ops::Range<usize>, best: &mut W
     }
 }
 
-/// Place in the block before from which the course comes to a place.
-fn came_from(scores: &WindowRow, inside: &std::ops::Range<usize>, at: usize) -> usize {
+/// Position in the block before from which the course comes to a position.
+fn came_from(scores: &WindowRow, inside: &Range<usize>, at: usize) -> usize {
     let near = at.saturating_sub(MAX_ASIDE).max(inside.start)..(at + MAX_ASIDE + 1).min(inside.end);
     let score = |from: usize| scores[from] - aside_cost(from, at);
     // Of equal scores the first.

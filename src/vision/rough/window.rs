@@ -16,14 +16,14 @@ pub type WindowRow = [f32; WINDOW_PX];
 /// that it hardly widens the flank.
 const ACROSS_PX: f64 = 0.7;
 /// The same along the bead \[px\]: what is shorter than that is texture, and the
-/// mean over the rows keeps its place.
+/// mean over the rows keeps its position.
 pub const ALONG_PX: f64 = 2.5;
 /// Rows between which a course is straight: the smoothing along the bead leaves no more.
 pub const STRAIGHT_ROWS: usize = 2;
 /// Rows of the gauge in a block.
 pub const BLOCK_ROWS: usize = 4;
-/// Rows of the gauge over which the smoothing along the bead follows no changes: two
-/// standard deviations.
+/// Rows of the gauge over which the smoothing along the bead follows no changes. Derived: 2 · 2.5,
+/// two of its standard deviations.
 const FINE_ROWS: usize = 5;
 /// Rows of a gauge from which on two are taken together: there are plenty.
 const MIN_PAIRED_ROWS: usize = 400;
@@ -33,8 +33,9 @@ const MIN_PAIRED_ROWS: usize = 400;
 pub struct RowWindows {
     sheet: EdgeWindows,
     /// Caliper line of each row.
-    lines: Vec<usize>,
-    rows: Vec<WindowRow>,
+    pub lines: Vec<usize>,
+    /// The smoothed pixels of all rows \[grey levels\], dark beads negated.
+    pub rows: Vec<WindowRow>,
     across: Vec<WindowRow>,
     bead_after: bool,
     /// Columns of the gauge.
@@ -54,24 +55,9 @@ impl RowWindows {
         FINE_ROWS / self.together
     }
 
-    /// Number of rows.
-    pub fn count(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// The smoothed pixels of all rows \[grey levels\], dark beads negated.
-    pub fn all(&self) -> &[WindowRow] {
-        &self.rows
-    }
-
-    /// Caliper line of a row.
-    pub fn line(&self, number: usize) -> usize {
-        self.lines[number]
-    }
-
     /// Rows of the gauge that a row is the mean of.
-    pub fn rows(&self, number: usize) -> f64 {
-        self.sheet.windows()[number].rows.into()
+    pub fn rows_of(&self, number: usize) -> f64 {
+        self.sheet.windows[number].rows.into()
     }
 
     /// Position across the gauge of a position in a row's window \[px\]; `None`
@@ -80,7 +66,8 @@ impl RowWindows {
         if !at.is_finite() {
             return None;
         }
-        let first = self.first(number);
+        #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+        let first = self.sheet.windows[number].first as f32;
         let last = narrow_to_f32(to_f64(WINDOW_PX - 1));
         let at = if self.bead_after { first + at } else { first + last - at };
         (0.0..=self.width - 1.0).contains(&at).then(|| at.into())
@@ -91,11 +78,6 @@ impl RowWindows {
         let kernel = &self.kernels[0];
         let square = |weight: &f32| f64::from(*weight).powi(2);
         2.0 * kernel.iter().map(square).sum::<f64>() - square(&kernel[0])
-    }
-
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    fn first(&self, number: usize) -> f32 {
-        self.sheet.windows()[number].first as f32
     }
 
     /// Reads the rows along a line.
@@ -115,7 +97,7 @@ impl RowWindows {
         self.sheet.read(strip, &[RowRange::new(0, strip.along)], grouping, at);
         self.lines.clear();
         let mut line = 0;
-        for window in self.sheet.windows() {
+        for window in &self.sheet.windows {
             let is_beyond = |end: usize| narrow_to_f32(to_f64(end)) <= window.middle + 0.5;
             while scene.lines.get(line).is_some_and(|line| is_beyond(line.end)) {
                 line += 1;
@@ -125,7 +107,7 @@ impl RowWindows {
         self.bead_after = scene.bead_after;
         self.width = narrow_to_f32(to_f64(strip.across));
         let sign = if scene.bright { 1.0 } else { -1.0 };
-        let count = self.sheet.windows().len();
+        let count = self.sheet.windows.len();
         self.across.resize(count, [0.0; WINDOW_PX]);
         self.rows.resize(count, [0.0; WINDOW_PX]);
         for (number, row) in self.across.iter_mut().enumerate() {
@@ -142,22 +124,15 @@ impl RowWindows {
 /// Convolves a row, multiplied by a sign and in reverse where its bead lies before, with a
 /// symmetric kernel; beyond the ends the last pixel goes on.
 #[inline(always)]
-fn smooth_row(
-    row: &WindowRow,
-    (sign, bead_after): (f32, bool),
-    kernel: &[f32],
-    out: &mut WindowRow,
-) {
+fn smooth_row(row: &WindowRow, (sign, after): (f32, bool), kernel: &[f32], out: &mut WindowRow) {
+    /// Pixels beyond either end of a row: more than the kernel reaches.
     const PAD: usize = 4;
     let mut padded = [0.0; WINDOW_PX + 2 * PAD];
-    if bead_after {
-        for k in 0..WINDOW_PX {
-            padded[PAD + k] = sign * row[k];
-        }
-    } else {
-        for k in 0..WINDOW_PX {
-            padded[PAD + k] = sign * row[WINDOW_PX - 1 - k];
-        }
+    for k in 0..WINDOW_PX {
+        padded[PAD + k] = sign * row[k];
+    }
+    if !after {
+        padded[PAD..PAD + WINDOW_PX].reverse();
     }
     let (first, last) = (padded[PAD], padded[PAD + WINDOW_PX - 1]);
     padded[..PAD].fill(first);
@@ -172,9 +147,10 @@ fn smooth_row(
     }
 }
 
-/// Pixels that are convolved together: what the processor holds in its vectors.
+/// Pixels that are convolved together. Derived: 16 floats fill a vector of 512 bits.
 const VECTOR_PIXELS: usize = 16;
-/// Samples of a kernel beside its middle at most.
+/// Samples of a kernel beside its middle at most. Derived: 3 · 2.5 px, three standard deviations of
+/// the smoothing along the bead, rounded up.
 const MAX_KERNEL_HALF: usize = 8;
 
 /// Convolves along the bead. Beyond the ends the rows come again in reverse, so
@@ -208,5 +184,16 @@ fn smooth_along(rows: &[WindowRow], kernel: &[f32; MAX_KERNEL_HALF + 1], out: &m
             }
             *out = sums;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_kernel_fits_and_fine_rows_are_two_of_its_deviations() {
+        assert_eq!(kernel::gaussian(ALONG_PX).len(), MAX_KERNEL_HALF + 1);
+        assert_eq!(to_f64(FINE_ROWS), 2.0 * ALONG_PX);
     }
 }

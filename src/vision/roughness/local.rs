@@ -9,7 +9,7 @@ use crate::vision::width::Caliper;
 
 /// Largest fraction of the lines that may be missing: the others stand in for them.
 const MAX_MISSING: f64 = 0.2;
-/// Fewest lines that tell of roughness.
+/// Fewest lines that show roughness.
 const MIN_LINES: usize = 8;
 
 /// Local widths of one frame, evenly spaced along the bead. Each is the mean over its
@@ -29,7 +29,7 @@ pub struct LocalWidths {
     pub blur_mm: f64,
 }
 
-/// What the calipers' places have passed along the bead \[px\]; see [`LocalWidths`].
+/// What the calipers' positions have passed along the bead \[px\]; see [`LocalWidths`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CaliperFilter {
     /// That of the measurement.
@@ -99,12 +99,7 @@ impl Section {
         let noise_px2 = fractions[0] * sigmas.0.powi(2) + fractions[1] * sigmas.1.powi(2);
         let noise_mm2 = noise_px2 * mm_per_px * mm_per_px;
         let middle = nalgebra::center(&from, &to);
-        (noise_mm2.is_finite()).then_some(Self {
-            number: caliper.number,
-            middle,
-            across,
-            noise_mm2,
-        })
+        noise_mm2.is_finite().then_some(Self { number: caliper.number, middle, across, noise_mm2 })
     }
 }
 
@@ -147,11 +142,11 @@ mod tests {
 
     /// A bead of 40 px that slants, whose lines 3 and 4 are missing.
     fn slanted(slope: f64) -> Vec<Caliper> {
-        let place =
+        let position =
             |x: f64, y: f64| Some(CaliperPoint { at: ImagePoint::new(x, y), sigma_px: Some(0.1) });
         let caliper = |number: usize| {
             let y = 4.0 * to_f64(number);
-            Caliper { number, left: place(slope * y, y), right: place(40.0 + slope * y, y) }
+            Caliper { number, left: position(slope * y, y), right: position(40.0 + slope * y, y) }
         };
         (0..20).filter(|number| !(3..5).contains(number)).map(caliper).collect()
     }

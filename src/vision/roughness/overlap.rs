@@ -1,9 +1,9 @@
-//! How much of a frame's bead is new, where nothing says how far the bead has moved on:
-//! two frames that show the same piece have the same widths there.
+//! The new fraction of a frame's bead where the path is not known: two frames that show the same
+//! piece have the same widths there.
 
 use super::local::LocalWidths;
 use crate::core::units::Mm;
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{floor_to_count, to_f64};
 
 /// Smallest part of the gauge that two frames must share to be compared.
 const MIN_OVERLAP_FRACTION: f64 = 0.3;
@@ -45,7 +45,7 @@ impl Overlap {
             return ASSUMED_NEW_FRACTION;
         }
         let lines = to_f64(now.len());
-        let most = now.len() - whole(MIN_OVERLAP_FRACTION * lines);
+        let most = now.len() - floor_to_count(MIN_OVERLAP_FRACTION * lines);
         let differs = |shift: usize| {
             let ahead = difference(&before[shift..], now);
             ahead.min(difference(&now[shift..], before)) / unlike
@@ -79,9 +79,4 @@ fn variance(values: &[f64]) -> f64 {
 fn difference(one: &[f64], other: &[f64]) -> f64 {
     let shared = one.len().min(other.len());
     one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / to_f64(shared)
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few lines")]
-fn whole(lines: f64) -> usize {
-    lines.max(0.0) as usize
 }

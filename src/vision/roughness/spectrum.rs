@@ -14,18 +14,19 @@ use crate::numeric::number::to_f64;
 /// Correlation lengths are looked for from this fraction of the lines' distance, or of
 /// the smoothing, up to one gauge.
 const MIN_LENGTH_FACTOR: f64 = 0.5;
-/// Their number.
+/// Number of correlation lengths that are tried: more cost time, fewer leave gaps between them.
 const LENGTH_COUNT: usize = 28;
 /// Blurs along the bead that are tried, as fractions of the smallest one that flanks have
 /// shown: torn flanks look more blurred than the lens makes them, and motion across the
 /// bead blurs nothing along it.
 pub const BLUR_FACTORS: [f64; 4] = [0.4, 0.6, 0.8, 1.0];
 /// Waves that smoothing leaves less than this part of their square are left out: what is
-/// left of them says more about the smoothing than about the bead.
+/// left of them shows more about the smoothing than about the bead.
 const MIN_TRANSMITTED: f64 = 0.2;
 /// Steps of a doubling of the smoothing that is taken for the same.
 const SMOOTHING_STEPS_PER_OCTAVE: f64 = 4.0;
-/// A Gaussian is taken for nothing beyond so many standard deviations.
+/// Standard deviations beyond which a Gaussian is neglected. Derived: erfc(6/√2) = 2·10⁻⁹ of it
+/// lies beyond.
 const MAX_GAUSSIAN_SIGMAS: f64 = 6.0;
 
 /// What frames must share so that their coefficients may be added up.
@@ -139,7 +140,7 @@ pub fn lengths_mm(like: &LocalWidths) -> Vec<f64> {
     (0..LENGTH_COUNT).map(length).collect()
 }
 
-/// A cosine over n places of which the sum of the squares is 1.
+/// A cosine over n positions of which the sum of the squares is 1.
 fn cosine(k: usize, n: usize) -> impl Iterator<Item = f64> {
     let scale = (2.0 / to_f64(n)).sqrt();
     (0..n).map(move |i| scale * libm::cos(PI * to_f64(k) * (to_f64(i) + 0.5) / to_f64(n)))

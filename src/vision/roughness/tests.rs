@@ -8,7 +8,7 @@ use crate::numeric::number::to_f64;
 const SPACING_MM: f64 = 4.0;
 const LINES: usize = 25;
 const NOISE_MM: f64 = 0.1;
-/// Places of the process in a line.
+/// Positions of the process in a line.
 const PLACES: usize = 16;
 
 /// Widths of a long bead, line by line: means of an exponential process, with noise.
@@ -156,7 +156,7 @@ fn a_mean_over_a_gauge_scatters_as_the_closed_form_says() {
         length_sigma: mm(1.0),
     };
     let of = |gauge: f64| rough.of_gauge_mean(mm(gauge)).get();
-    // Short gauges have all of it, long ones that of G/2L independent places.
+    // Short gauges have all of it, long ones that of G/2L independent positions.
     assert!((of(1e-6) - 2.0).abs() < 1e-6 && (of(0.01) - 2.0).abs() < 1e-3);
     assert!((of(1e5) / (2.0 * (20.0_f64 / 1e5).sqrt()) - 1.0).abs() < 1e-3);
     let means: Vec<f64> = bead(2.0, 10.0, 40_000, 5)

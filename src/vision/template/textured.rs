@@ -1,24 +1,24 @@
-//! A template for textured surroundings: what a row says of the place is
-//! weighted so that the texture disturbs it least.
+//! A template for textured surroundings: residuals are weighted so that the texture affects the
+//! position least.
 
 use super::{LANES, MAX_CHUNKS, SUBPIXEL_PHASES, StepTemplate};
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::vision::texture::SurfaceTexture;
 use crate::vision::whiten::{MAX_PIXELS, NoiseWhitener};
 
-/// How far places scatter in texture.
+/// How far positions scatter in texture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TexturePositionVariance {
-    /// Variance of the mean place of many rows, times their number and the
+    /// Variance of the mean position of many rows, times their number and the
     /// squared step \[grey levels²·px²\].
     pub of_mean: f64,
-    /// Variance of one window's place, times the squared step.
+    /// Variance of one window's position, times the squared step.
     pub of_window: f64,
 }
 
 impl StepTemplate {
     /// Replaces the slope of the step, by which residuals are weighted for the
-    /// place, by weights that know the texture \[grey levels\]. `None` where
+    /// position, by weights that know the texture \[grey levels\]. `None` where
     /// that cannot be done: then the template has to be made anew.
     pub fn whiten(
         &mut self,
@@ -51,9 +51,7 @@ impl StepTemplate {
             for (k, weight) in slope[..count].iter().enumerate() {
                 let (part, lane) = (&mut parts[(first + k) / LANES], (first + k) % LANES);
                 part.mask[lane] = 1.0;
-                #[expect(clippy::cast_possible_truncation, reason = "a weight")]
-                let weight = *weight as f32;
-                part.slope[lane] = weight;
+                part.slope[lane] = narrow_to_f32(*weight);
             }
             if phase == 0 {
                 let within = |distance| texture.within_window(to_f64(distance));
@@ -61,12 +59,11 @@ impl StepTemplate {
             }
         }
         self.products.slope_slope = 1.0;
-        self.products.slope_before = 0.0;
-        self.products.slope_after = 0.0;
+        self.products.others[..2].fill(0.0);
         Some(scatter)
     }
 
-    /// Shares of the texture that the pixels have from the first one that counts on. One phase
+    /// Fractions of the texture that the pixels have from the first one that counts on. One phase
     /// stands for all: their edges lie apart by less than a texture's correlation length.
     fn texture_beside(&self, first: usize, texture: &SurfaceTexture) -> [f64; MAX_PIXELS] {
         let parts = &self.parts[SUBPIXEL_PHASES / 2 * MAX_CHUNKS..][..self.chunks];
@@ -95,7 +92,7 @@ impl StepTemplate {
 struct TextureWeights {
     /// Sum of their squares.
     square: f64,
-    /// The same weights times the texture's share at each pixel.
+    /// The same weights times the texture's fraction at each pixel.
     textured: [f64; MAX_PIXELS],
     count: usize,
 }
@@ -104,8 +101,8 @@ impl TextureWeights {
     fn of(weights: &[f64], beside: &[f64; MAX_PIXELS]) -> Self {
         let square = weights.iter().map(|weight| weight * weight).sum();
         let mut textured = [0.0; MAX_PIXELS];
-        for (product, (weight, share)) in textured.iter_mut().zip(weights.iter().zip(beside)) {
-            *product = weight * share;
+        for (product, (weight, fraction)) in textured.iter_mut().zip(weights.iter().zip(beside)) {
+            *product = weight * fraction;
         }
         Self { square, textured, count: weights.len() }
     }

@@ -1,6 +1,6 @@
 //! Levels on either side of an edge, band by band.
 
-use super::{EdgeTracer, Extent, TraceInput};
+use super::{Clearance, EdgeTracer, TraceInput};
 use crate::numeric::number::narrow_to_f32;
 use crate::numeric::rank;
 use crate::vision::path;
@@ -11,20 +11,16 @@ const PICK_PX: (f32, f32) = (5.0, 3.0);
 
 impl EdgeTracer {
     /// Levels on either side of the edge in every band, as the median of a few
-    /// places in its profile and of its neighbours.
+    /// positions in its profile and of its neighbours.
     #[inline(always)]
-    pub(super) fn pick_levels<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
+    pub fn pick_levels<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         self.pick_raw_levels(scene);
         self.smooth_levels();
     }
 
-    /// Picks levels anew along the course, where it was drawn through better places
+    /// Picks levels anew along the course, where it was drawn through better positions
     /// and it is known how far there is nothing but the edge \[px\].
-    pub(super) fn pick_levels_within<T: GreyPixel>(
-        &mut self,
-        scene: &TraceInput<'_, T>,
-        room: Extent,
-    ) {
+    pub fn pick_levels_within<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, room: Clearance) {
         let (path, course) = (&mut self.values.path, &self.course);
         path.clear();
         let middles = (0..scene.bands.count()).map(|band| narrow_to_f32(scene.bands.middle(band)));
@@ -47,7 +43,7 @@ impl EdgeTracer {
     }
 
     /// Picks levels on either side of the edge, each band for itself.
-    pub(super) fn pick_raw_levels<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
+    pub fn pick_raw_levels<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let inside = 0.45 * scene.width_px;
         let room = if scene.bead_after { [f32::INFINITY, inside] } else { [inside, f32::INFINITY] };
         self.pick_levels_in(scene, room);
@@ -59,10 +55,10 @@ impl EdgeTracer {
         self.values.before.clear();
         self.values.step.clear();
         let (left, right) = (picked(-1.0, room[0]), picked(1.0, room[1]));
-        let unit = scene.bands.unit();
+        let unit = scene.bands.unit;
         for (band, &at) in self.values.path.iter().enumerate() {
             let profile = scene.bands.profile(band);
-            #[expect(clippy::cast_possible_truncation, reason = "a place in the gauge")]
+            #[expect(clippy::cast_possible_truncation, reason = "a position in the gauge")]
             let at = (at + 0.5) as isize;
             let before = unit * level(profile, at, left);
             self.values.before.push(before);
@@ -70,8 +66,8 @@ impl EdgeTracer {
         }
     }
 
-    /// Steps that are small or turned over against the others are not believed.
-    pub(super) fn steady_steps(&mut self) {
+    /// Steps that are small or turned over against the others are not accepted.
+    pub fn steady_steps(&mut self) {
         self.scratch.sorted.clear();
         self.scratch.sorted.extend_from_slice(&self.values.step);
         let Some(typical) = rank::median(&mut self.scratch.sorted) else { return };
@@ -92,13 +88,13 @@ fn picked(sign: f32, room: f32) -> [isize; 5] {
     [0.0, 1.0, 2.0, 3.0, 4.0].map(|k| (sign * (near + k * apart)).round() as isize)
 }
 
-/// Level at such distances from an edge: the median of five places.
+/// Level at such distances from an edge: the median of five positions.
 #[inline(always)]
 fn level(profile: &[u16], at: isize, distances: [isize; 5]) -> f32 {
     let last = profile.len() - 1;
     median_of_five(distances.map(|distance| {
-        let place = usize::try_from(at + distance).unwrap_or(0).min(last);
-        f32::from(profile[place])
+        let position = usize::try_from(at + distance).unwrap_or(0).min(last);
+        f32::from(profile[position])
     }))
 }
 

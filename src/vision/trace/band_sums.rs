@@ -1,12 +1,12 @@
-//! What the rows of a band say together of place and levels of an edge.
+//! Normal equations of the rows of a band for position and levels of an edge.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::group::RowGroup;
 use crate::vision::located::CaliperEdge;
 
-/// Share of the plain pixels that must be as they are expected for their level
-/// to be believed.
+/// Fraction of the plain pixels that must be as they are expected for their level
+/// to be accepted.
 const MIN_PLAIN_FRACTION: f64 = 0.6;
 
 /// Sums over the rows of a band that count.
@@ -16,14 +16,12 @@ pub struct BandSums {
     pub rows: f64,
     pub all_rows: f64,
     pub held_rows: f64,
-    /// Step that the rows were held against \[grey levels\].
+    /// Step that the rows were compared with \[grey levels\].
     pub step: f64,
-    /// Right-hand side of the equations for place and levels.
+    /// Right-hand side of the equations for position and levels.
     pub vector: [f64; 3],
-    /// Plain pixels before the edge and the sum of what they miss.
-    pub before: (f64, f64),
-    /// The same after it.
-    pub after: (f64, f64),
+    /// Plain pixels and the sum of their residuals, before the edge and after it.
+    pub plain: [[f64; 2]; 2],
 }
 
 impl BandSums {
@@ -38,7 +36,7 @@ impl BandSums {
         self.vector[2] += weight * (core[(2, 0)] * ahead + f64::from(sums.after));
     }
 
-    /// Place relative to the path and what is known of it; `None` without a
+    /// Position relative to the path and what is known of it; `None` without a
     /// row or an edge.
     #[inline(always)]
     pub fn solve(
@@ -54,7 +52,7 @@ impl BandSums {
         }
         let mut matrix = core * self.rows;
         let mut vector = Vector3::from(self.vector);
-        for (side, (count, sum)) in [self.before, self.after].into_iter().enumerate() {
+        for (side, [count, sum]) in self.plain.into_iter().enumerate() {
             if count >= MIN_PLAIN_FRACTION * plain[side] * self.held_rows {
                 let weight = 1.0 / (1.0 / count + extra[side] / variance);
                 matrix[(side + 1, side + 1)] += weight;
@@ -69,8 +67,8 @@ impl BandSums {
     }
 }
 
-/// Solves symmetric equations for place and levels, the levels first; the
-/// variance is that of the place.
+/// Solves symmetric equations for position and levels, the levels first; the
+/// variance is that of the position.
 fn solve(matrix: &Matrix3<f64>, vector: &Vector3<f64>) -> Option<([f64; 3], f64)> {
     let (before, both, after) = (matrix[(1, 1)], matrix[(2, 1)], matrix[(2, 2)]);
     let determinant = before * after - both * both;
@@ -83,8 +81,9 @@ fn solve(matrix: &Matrix3<f64>, vector: &Vector3<f64>) -> Option<([f64; 3], f64)
     if determinant <= 0.0 || stiffness <= 0.0 {
         return None;
     }
-    let place = (vector[0] * determinant - vector[1] * shift[0] - vector[2] * shift[1]) / stiffness;
-    let levels = levels([vector[1] - with[0] * place, vector[2] - with[1] * place])
+    let position =
+        (vector[0] * determinant - vector[1] * shift[0] - vector[2] * shift[1]) / stiffness;
+    let levels = levels([vector[1] - with[0] * position, vector[2] - with[1] * position])
         .map(|level| level / determinant);
-    Some(([place, levels[0], levels[1]], determinant / stiffness))
+    Some(([position, levels[0], levels[1]], determinant / stiffness))
 }

@@ -1,4 +1,4 @@
-//! Places of an edge, band by band, from the rows that count.
+//! Positions of an edge, band by band, from the rows that count.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -6,20 +6,18 @@ use super::{EdgeTracer, MAX_PATH_ERROR_BLURS, TraceInput};
 use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::numeric::rank;
 use crate::vision::located::CaliperEdge;
+use crate::vision::scatter::MIN_EXCESS_SIGMAS;
 use crate::vision::strip::GreyPixel;
 
-/// Share of its rows that a band must have left to count.
+/// Fraction of its rows that a band must have left to count.
 const MIN_ROW_FRACTION: f64 = 0.5;
 /// The same where rows are known to be clear, one by one.
 const MIN_CLEAR_ROW_FRACTION: f64 = 0.2;
-/// Extra deviation of levels that is believed, in standard deviations of its
-/// own doubt.
-const MIN_EXCESS_SIGMAS: f64 = 2.5;
 
 impl EdgeTracer {
     /// Solves every band; returns whether the path was near enough for that.
     #[inline(always)]
-    pub(super) fn locate<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: f64) -> bool {
+    pub fn locate<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: f64) -> bool {
         let variance = match self.textured.scatter {
             Some(scatter) => scatter.of_mean * self.texture_variance_ratio(),
             None => f64::from(scene.noise).powi(2),
@@ -60,7 +58,7 @@ impl EdgeTracer {
 
     /// How much the level at the edge differs from that of the surroundings
     /// from band to band beyond what noise explains: texture does that, and
-    /// then the surroundings say less. Robust, from the median.
+    /// then the surroundings show less. Robust, from the median.
     #[inline(always)]
     fn extra_variance(&mut self, core: Matrix3<f64>, variance: f64, side: usize) -> f64 {
         let Some(inverse) = core.try_inverse() else { return 0.0 };
@@ -68,7 +66,7 @@ impl EdgeTracer {
         self.scratch.scatter.clear();
         let mut explained = 0.0;
         for sums in &self.row_fit.solved {
-            let (count, sum) = if side == 0 { sums.before } else { sums.after };
+            let [count, sum] = sums.plain[side];
             if sums.rows < 1.0 || count < 1.0 {
                 continue;
             }

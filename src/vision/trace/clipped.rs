@@ -1,38 +1,32 @@
 //! An edge one side of which passes the end of the camera's scale.
 
 use super::{
-    BlurredStep, EdgeState, EdgeTracer, Extent, MAX_PASSES, MAX_PATH_ERROR_BLURS, StepFit,
-    TraceInput, typical,
+    BlurredStep, Clearance, EdgeState, EdgeTracer, MAX_PASSES, MAX_PATH_ERROR_BLURS, TraceInput,
+    typical,
 };
-use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::narrow_to_f32;
+use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::numeric::rank;
-use crate::vision::blur_estimate::BlurEstimate;
-use crate::vision::clipped_step;
+use crate::vision::clipped_step::{ClippedLine, ClippedScene, ClippedStep, ClippedStepFit};
 use crate::vision::located::CaliperEdge;
 use crate::vision::path;
 use crate::vision::strip::GreyPixel;
 
-/// Upper end of the camera's scale \[grey levels of 256\].
+/// Upper end of the camera's scale \[grey levels of 256\]. By definition of the scale
+/// (CONVENTIONS.md, Grey levels).
 const SCALE_END_GREY: f64 = 255.0;
-/// Levels that come so near it are cut off by noise, in standard deviations.
+/// Levels that come so near it are clipped by noise, in standard deviations.
 const NEAR_END_SIGMAS: f64 = 1.5;
 
-/// Times that a path is smoothed at most before an edge that is cut off is read
+/// Times that a path is smoothed at most before an edge that is clipped is read
 /// along it.
 const MAX_SMOOTHINGS: usize = 4;
-/// A path that runs farther off the places than noise puts them no longer follows its
-/// edge, which is rough: in the mean square, so many times the variance of a place,
+/// A path that runs farther off the positions than noise puts them no longer follows its edge,
+/// which is rough: in the mean square, so many times the variance of a position.
 const MAX_SMOOTHING_RATIO: f32 = 4.0;
-/// and this much of the blur, which softens the flank too little to matter.
+/// And this fraction of the blur, which softens the flank too little to matter.
 const MAX_SMOOTHING_BLURS: f32 = 0.1;
 
 impl EdgeTracer {
-    /// Blur of the edge that was looked at.
-    pub fn blur(&self) -> Option<BlurEstimate> {
-        self.step_fit.as_ref().map(StepFit::blur)
-    }
-
     /// Whether the levels on either side of the edge that was looked at pass the
     /// end of the scale, or come so near that noise does: before it, after it.
     pub fn clipped_sides<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> [bool; 2] {
@@ -47,82 +41,74 @@ impl EdgeTracer {
         (typical(&self.values.before).into(), typical(&self.values.step).into())
     }
 
-    /// Locates an edge that is cut off at the end of the scale on one side.
+    /// Locates an edge that is clipped at the end of the scale on one side.
     /// Returns what is known of it, `None` where that is nothing.
     pub fn trace_clipped<T: GreyPixel>(
         &mut self,
-        table: &StepTable,
         scene: &TraceInput<'_, T>,
         hidden_after: bool,
-    ) -> Option<clipped_step::ClippedStepFit> {
+    ) -> Option<ClippedStepFit> {
         let seen = self.step_fit?;
         let (before, height) = self.mean_levels();
-        let Extent { before: room_before, after: room_after } = seen.room;
+        let Clearance { before: room_before, after: room_after } = seen.room;
         let (visible, room) = if hidden_after {
             (seen.step.before, [room_before, room_after])
         } else {
             (seen.step.after, [room_after, room_before])
         };
         let visible = before + height * visible;
-        let noise = f64::from(scene.noise);
-        let mut task = clipped_step::ClippedScene {
+        let mut task = ClippedScene {
+            table: scene.table,
             clipped_after: hidden_after,
-            noise,
+            noise: scene.noise.into(),
             white: SCALE_END_GREY,
             room,
             shading: 0.0,
         };
         let BlurredStep { at, blur, .. } = seen.step;
-        let start = clipped_step::ClippedStep {
-            at,
-            blur,
-            visible,
-            clipped: SCALE_END_GREY + 0.3 * (SCALE_END_GREY - visible),
-        };
-        let rough = self.cut_off.fit(table, &task, &self.overlay, start, None)?;
+        let clipped = SCALE_END_GREY + 0.3 * (SCALE_END_GREY - visible);
+        let start = ClippedStep { at, blur, visible, clipped };
+        let rough = self.cut_off.fit(&task, &self.overlay, start, None)?;
         self.shift_course(rough.step.at, 0.0, 1.0);
-        self.locate_clipped(table, scene, &task, &rough);
+        self.locate_clipped(scene, &task, &rough);
         // A path that jitters rounds off the corner at the end of the scale,
         // which looks like a higher level.
         self.straighten(scene, rough.step.blur);
         self.overlay.lay(&self.sheet);
-        let start = clipped_step::ClippedStep { at: 0.0, ..rough.step };
-        let first = self.cut_off.fit(table, &task, &self.overlay, start, None)?;
+        let start = ClippedStep { at: 0.0, ..rough.step };
+        let first = self.cut_off.fit(&task, &self.overlay, start, None)?;
         // The surroundings that can be seen, beside the step as it really is.
-        let share = |level: f64| (level - before) / height;
-        let (visible, hidden) = (share(first.step.visible), share(first.step.clipped));
+        let fraction = |level: f64| (level - before) / height;
+        let (visible, hidden) = (fraction(first.step.visible), fraction(first.step.clipped));
         let (before, after) = if hidden_after { (visible, hidden) } else { (hidden, visible) };
         let step = BlurredStep { at: first.step.at, blur: first.step.blur, before, after };
         let (extent, (slope, level_variance)) =
-            self.overlay.side_slope(table, &seen, &step, !hidden_after);
+            self.overlay.with(scene.table).side_slope(&seen, &step, !hidden_after);
         task.room[0] = extent;
         task.shading = slope * height;
         let blur = self.cut_off.expected_blur(&first);
-        let found = self.cut_off.fit(table, &task, &self.overlay, first.step, blur)?;
+        let found = self.cut_off.fit(&task, &self.overlay, first.step, blur)?;
         self.cut_off.keep_blur(&found);
         let per_level = std::f64::consts::PI * found.step.blur * found.step.blur;
         self.blur_px = found.step.blur;
         self.uncertainty.common_variance =
             found.variance + per_level * level_variance / (after - before).powi(2);
         self.shift_course(found.step.at, 0.0, 1.0);
-        self.locate_clipped(table, scene, &task, &found);
+        self.locate_clipped(scene, &task, &found);
         self.state = EdgeState::Clear;
         Some(found)
     }
 
     /// Draws a path through the edges that were found, as smooth as the edge is.
     fn straighten<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: f64) {
-        let places = self.edges.iter().map(|edge| edge.map(|edge| narrow_to_f32(edge.at)));
-        if !path::fill(places, &mut self.scratch.rough) {
+        let positions = self.edges.iter().map(|edge| edge.map(|edge| narrow_to_f32(edge.at)));
+        if !path::fill(positions, &mut self.scratch.rough) {
             return;
         }
         path::median_of_three(&mut self.scratch.rough);
-        let (sum, n) = self
-            .edges
-            .iter()
-            .flatten()
-            .fold((0.0, 0.0), |(sum, n), edge| (sum + edge.variance, n + 1.0));
-        let variance = sum / f64::max(n, 1.0);
+        let found = || self.edges.iter().flatten();
+        let sum: f64 = found().map(|edge| edge.variance).sum();
+        let variance = sum / to_f64(found().count().max(1));
         let limit = MAX_SMOOTHING_RATIO * narrow_to_f32(variance)
             + (MAX_SMOOTHING_BLURS * narrow_to_f32(blur)).powi(2);
         self.occlusion.free.clear();
@@ -138,8 +124,8 @@ impl EdgeTracer {
         self.read(scene);
     }
 
-    /// Mean square of how far the path lies off the places that it was drawn through,
-    /// from the median, so that a few wild ones do not count \[px²\].
+    /// Mean square of how far the path lies off the positions that it was drawn through,
+    /// from the median, so that a few outliers do not count \[px²\].
     fn smoothing_error(&mut self) -> f32 {
         self.scratch.sorted.clear();
         let offs =
@@ -151,10 +137,9 @@ impl EdgeTracer {
 
     fn locate_clipped<T: GreyPixel>(
         &mut self,
-        table: &StepTable,
         scene: &TraceInput<'_, T>,
-        task: &clipped_step::ClippedScene,
-        found: &clipped_step::ClippedStepFit,
+        task: &ClippedScene,
+        found: &ClippedStepFit,
     ) {
         let height = found.step.clipped - found.step.visible;
         let height = if task.clipped_after { height } else { -height };
@@ -163,18 +148,12 @@ impl EdgeTracer {
             let mut off: f64 = 0.0;
             edges.clear();
             let (sheet, lines) = (&self.sheet, scene.lines.len());
-            self.misfit = self.cut_off.locate(table, task, sheet, lines, found, |line, located| {
+            self.misfit = self.cut_off.locate(task, sheet, lines, found, |line, located| {
                 edges.push(located.map(|located| {
                     let [path, _, _] = course.at(narrow_to_f32(scene.lines[line].middle()));
-                    let clipped_step::ClippedLine { moved, variance, row_fraction: share } =
-                        located;
+                    let ClippedLine { moved, variance, row_fraction } = located;
                     off = off.max(moved.abs());
-                    CaliperEdge {
-                        at: f64::from(path) + moved,
-                        variance,
-                        height,
-                        row_fraction: share,
-                    }
+                    CaliperEdge { at: f64::from(path) + moved, variance, height, row_fraction }
                 }));
             });
             if off <= MAX_PATH_ERROR_BLURS * found.step.blur {

@@ -1,8 +1,8 @@
-//! A few rows that are held against an edge together.
+//! A few rows that are compared with an edge together.
 
 use crate::vision::template::RowSums;
 
-/// A few rows that are held against the edge together.
+/// A few rows that are compared with the edge together.
 #[derive(Debug, Clone, Copy)]
 pub struct RowGroup {
     /// The band that they belong to.
@@ -11,9 +11,9 @@ pub struct RowGroup {
     pub weight: f32,
     /// How far the rows were sampled beyond the path \[px\].
     pub ahead: f32,
-    /// What they say.
+    /// What they show.
     pub sums: RowSums,
-    /// Place of the edge beside the path \[px\].
+    /// Position of the edge beside the path \[px\].
     pub moved: f32,
     /// Sum of the squares of what does not fit, as if of a single row
     /// \[grey levels²\].

@@ -1,58 +1,59 @@
-//! An edge that grains or spots cover in part: which rows show it and nothing
-//! else. All that is known of it is taken from those rows alone.
+//! An edge that grains or spots occlude in part: which rows show it and nothing else. All that is
+//! known of it is taken from those rows alone.
 
-use super::{EdgeState, EdgeTracer, MAX_CLEAR_MISFIT, NOISE_SIGMAS, typical};
-use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::narrow_to_f32;
-use crate::numeric::number::to_f32;
+use super::{EdgeState, EdgeTracer, MAX_CLEAR_MISFIT, typical};
+use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f32};
 use crate::numeric::rank;
 use crate::vision::blur_estimate::BlurEstimate;
+use crate::vision::buffer::refill;
 use crate::vision::consensus::keep_consensus;
-use crate::vision::overlay::{Extent, StepShape};
-use crate::vision::path;
+use crate::vision::located::CaliperEdge;
+use crate::vision::overlay::{Clearance, StepShape};
+use crate::vision::pixel_noise::NOISE_SIGMAS;
 use crate::vision::strip::GreyPixel;
 use crate::vision::template::{PlainSums, StepTemplate};
 use crate::vision::trace::TraceInput;
 
 /// Distance from the course of most bands from which a band is off \[px\].
 const MAX_OFFSET_PX: f32 = 0.8;
-/// The same for a level, as a share of the step, and in standard deviations of
-/// a pixel beside.
+/// The same for a level, as a fraction of the step.
 const MAX_LEVEL_OFFSET: f32 = 0.08;
+/// And in standard deviations of a pixel beside.
 const MAX_LEVEL_OFFSET_SIGMAS: f32 = 1.0;
 /// How often rows are judged, each time by an edge that was read from those
 /// which passed before.
 const MAX_PASSES: usize = 3;
 /// Percentage of the rows that is taken to be clear whatever happens: the one
-/// that fits worst of them tells what fits.
+/// that fits worst of them shows what fits.
 const CLEAR_PERCENTILE: usize = 30;
 /// By how much the squares that a row leaves may exceed that one's.
 const MAX_MISFIT_RATIO: f32 = 3.2;
 /// The same at most, as a multiple of what noise leaves.
 const MAX_NOISE_RATIO: f32 = 3.0;
 /// Farthest that the levels beside an edge may be from those a little away, as
-/// a share of the step: grains have levels of their own.
+/// a fraction of the step: grains have levels of their own.
 const MAX_LEVEL_DIFFERENCE: f64 = 0.25;
-/// Courses that are tried, and the share of clear rows along one that is enough
-/// to look for no other.
+/// Trajectories that are tried.
 const MAX_ATTEMPTS: usize = 3;
+/// Fraction of clear rows along one that is enough to try no other.
 const ENOUGH_CLEAR_FRACTION: f32 = 0.4;
+/// Fraction of clear rows where there is none. By definition.
 const NONE_CLEAR: f32 = 0.0;
-/// Farthest that a clear row's edge lies from its neighbours', in standard
-/// deviations.
+/// Farthest that a clear row's edge lies from its neighbours', in standard deviations. Derived:
+/// noise alone exceeds 3.5 in 5 of 10,000 rows.
 const MAX_OFFSET_SIGMAS: f32 = 3.5;
 /// What covers a row shades those beside it through the blur: so many blurs of
 /// distance are kept from it, fewer where little else is left.
 const MARGIN_BLURS: [f64; 4] = [2.0, 1.5, 1.0, 0.5];
-/// Share of the rows, and number of them, that are wanted and needed.
+/// Fraction of the rows, and number of them, that are wanted and needed.
 const WANTED_CLEAR_ROWS: (f32, f32) = (0.25, 20.0);
 const MIN_CLEAR_ROWS: (f32, f32) = (0.12, 12.0);
-/// Share of the rows that may show the same edge elsewhere, one after the
+/// Fraction of the rows that may show the same edge elsewhere, one after the
 /// other: more are not covered, but a bead of another shape.
 const MAX_ELSEWHERE_FRACTION: f32 = 0.08;
 /// Distance from which on a row's edge is elsewhere \[px\].
 const MIN_ELSEWHERE_PX: f32 = 1.0;
-/// Share of an edge's places that may be strays.
+/// Fraction of an edge's positions that may be strays.
 const MAX_STRAY_FRACTION: f32 = 0.25;
 
 impl EdgeTracer {
@@ -60,41 +61,35 @@ impl EdgeTracer {
     /// whether there are enough of them.
     #[cold]
     #[inline(never)]
-    pub(super) fn locate_occluded<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-    ) -> bool {
+    pub fn locate_occluded<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         self.look_row_by_row();
-        self.occlusion.free.clear();
-        self.occlusion.free.extend_from_slice(&self.values.picked);
-        let mut best = (NONE_CLEAR, 0);
+        refill(&mut self.occlusion.free, self.values.picked.iter().copied());
+        let mut best = NONE_CLEAR;
         for attempt in 0..MAX_ATTEMPTS {
-            let clear = self.try_course(table, scene).unwrap_or(NONE_CLEAR);
+            let clear = self.try_course(scene).unwrap_or(NONE_CLEAR);
             if clear >= ENOUGH_CLEAR_FRACTION {
-                best = (clear, attempt);
+                best = clear;
                 break;
             }
-            if clear > best.0 {
-                best = (clear, attempt);
+            if clear > best {
+                best = clear;
                 std::mem::swap(&mut self.occlusion.free, &mut self.occlusion.best_free);
-                self.occlusion.free.clear();
-                self.occlusion.free.extend_from_slice(&self.occlusion.best_free);
+                refill(&mut self.occlusion.free, self.occlusion.best_free.iter().copied());
             }
             if attempt + 1 < MAX_ATTEMPTS {
                 self.exclude_course();
             }
         }
-        if best.0 == NONE_CLEAR {
+        if best == NONE_CLEAR {
             return false;
         }
-        if best.0 < ENOUGH_CLEAR_FRACTION {
+        if best < ENOUGH_CLEAR_FRACTION {
             std::mem::swap(&mut self.occlusion.free, &mut self.occlusion.best_free);
-            if self.try_course(table, scene).is_none() {
+            if self.try_course(scene).is_none() {
                 return false;
             }
         }
-        self.locate_from_clear_rows(table, scene)
+        self.locate_from_clear_rows(scene)
     }
 
     /// Rows are judged one by one, each against noise alone: what covers some of
@@ -106,49 +101,39 @@ impl EdgeTracer {
         self.textured.scatter = None;
     }
 
-    /// Locates an edge from its clear rows where the bead's other edge shows how this one runs: where most
-    /// of it is covered, what covers it may agree better than what is left.
-    /// `places` are those that run beside the other edge, one a band, NaN in
-    /// bands without.
+    /// Locates an edge from its clear rows where the bead's other edge shows how this one runs:
+    /// where most of it is covered, what covers it may agree better than what is left. `positions`
+    /// are those that run beside the other edge, one a band, NaN in bands without.
     #[cold]
     #[inline(never)]
     pub fn locate_occluded_along<T: GreyPixel>(
         &mut self,
-        table: &StepTable,
         scene: &TraceInput<'_, T>,
         blur: BlurEstimate,
-        places: &[f32],
+        positions: &[f32],
     ) {
         self.look_row_by_row();
-        self.occlusion.free.clear();
-        self.occlusion.free.extend_from_slice(places);
-        if self.try_course(table, scene).is_some() && self.locate_from_clear_rows(table, scene) {
+        refill(&mut self.occlusion.free, positions.iter().copied());
+        if self.try_course(scene).is_some() && self.locate_from_clear_rows(scene) {
             self.state = EdgeState::Occluded;
         } else {
-            self.trace_again(table, scene, blur);
+            self.trace_again(scene, blur);
         }
     }
 
-    /// Takes out the few places that lie far from the course on which the others
-    /// agree: between gaps they have no neighbours that could tell. `least_px`
+    /// Takes out the few positions that lie far from the course on which the others
+    /// agree: between gaps they have no neighbours that could show it. `least_px`
     /// is the least distance that makes a stray. Where there are many, they stay,
-    /// and tell that the edge is unsure.
+    /// and show that the edge is unsure.
     pub fn drop_strays(&mut self, least_px: f64) {
-        self.scratch.rough.clear();
-        let places = self.edges.iter();
-        self.scratch
-            .rough
-            .extend(places.map(|edge| edge.map_or(f32::NAN, |edge| narrow_to_f32(edge.at))));
-        self.scratch.sorted.clear();
-        self.scratch
-            .sorted
-            .extend(self.edges.iter().flatten().map(|edge| narrow_to_f32(edge.variance.sqrt())));
+        let at = |edge: &Option<CaliperEdge>| edge.map_or(f32::NAN, |edge| narrow_to_f32(edge.at));
+        refill(&mut self.scratch.rough, self.edges.iter().map(at));
+        let sigmas = self.edges.iter().flatten().map(|edge| narrow_to_f32(edge.variance.sqrt()));
+        refill(&mut self.scratch.sorted, sigmas);
         let count = self.scratch.sorted.len();
         let Some(sigma) = rank::median(&mut self.scratch.sorted) else { return };
-        let left = keep_consensus(
-            &mut self.scratch.rough,
-            narrow_to_f32(least_px).max(NOISE_SIGMAS * sigma),
-        );
+        let tolerance = narrow_to_f32(least_px).max(NOISE_SIGMAS * sigma);
+        let left = keep_consensus(&mut self.scratch.rough, tolerance);
         if to_f32(count - left) > MAX_STRAY_FRACTION * to_f32(count) {
             return;
         }
@@ -161,13 +146,9 @@ impl EdgeTracer {
 
     /// Locates the edge from its clear rows. Returns whether they show one.
     #[inline(never)]
-    fn locate_from_clear_rows<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-    ) -> bool {
-        let Some(shape) = self.read_shape(table, scene) else { return false };
-        self.row_fit.template.tabulate(table, &shape, false);
+    fn locate_from_clear_rows<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
+        let Some(shape) = self.read_shape(scene) else { return false };
+        self.row_fit.template.tabulate(scene.table, &shape, false);
         self.blur_px = shape.step.blur;
         self.uncertainty.common_variance = shape.variance;
         self.compare_rows(scene);
@@ -177,24 +158,20 @@ impl EdgeTracer {
     }
 
     /// Tells the clear rows along the course that most of the free bands agree
-    /// on, and their share. `None` where there are too few.
+    /// on, and their fraction. `None` where there are too few.
     #[inline(never)]
-    fn try_course<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-    ) -> Option<f32> {
+    fn try_course<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> Option<f32> {
         self.occlusion.clear.clear();
         if !self.take_course(scene) {
             return None;
         }
         self.read(scene);
-        let (windows, trusted) = (self.sheet.windows(), &self.occlusion.trusted);
+        let (windows, trusted) = (&self.sheet.windows, &self.occlusion.trusted);
         let clear = |number: usize| trusted[scene.bands.band_of(windows[number].middle)];
         self.overlay.lay_robustly(&self.sheet, clear);
         for _ in 0..MAX_PASSES {
-            let shape = self.read_shape(table, scene)?;
-            self.row_fit.template.tabulate(table, &shape, false);
+            let shape = self.read_shape(scene)?;
+            self.row_fit.template.tabulate(scene.table, &shape, false);
             self.occlusion.clear.clear();
             self.compare_rows(scene);
             if !self.judge_rows(scene, shape.step.blur) {
@@ -219,14 +196,12 @@ impl EdgeTracer {
 
     /// The course that most bands agree on, in place and levels.
     fn take_course<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
-        self.scratch.rough.clear();
-        self.scratch.rough.extend_from_slice(&self.occlusion.free);
+        refill(&mut self.scratch.rough, self.occlusion.free.iter().copied());
         if keep_consensus(&mut self.scratch.rough, MAX_OFFSET_PX) < 4 {
             return false;
         }
-        self.occlusion.trusted.clear();
-        self.occlusion.trusted.extend(self.scratch.rough.iter().map(|at| at.is_finite()));
-        self.fill_rough();
+        refill(&mut self.occlusion.trusted, self.scratch.rough.iter().map(|at| at.is_finite()));
+        self.scratch.fill_rough();
         std::mem::swap(&mut self.scratch.rough, &mut self.values.path);
         self.pick_raw_levels(scene);
         let step = typical(&self.values.step).abs();
@@ -235,14 +210,12 @@ impl EdgeTracer {
         for (step, before) in self.values.step.iter_mut().zip(&self.values.before) {
             *step += before;
         }
-        std::mem::swap(&mut self.values.before, &mut self.scratch.rough);
-        keep_consensus(&mut self.scratch.rough, off);
-        self.fill_rough();
-        std::mem::swap(&mut self.values.before, &mut self.scratch.rough);
-        std::mem::swap(&mut self.values.step, &mut self.scratch.rough);
-        keep_consensus(&mut self.scratch.rough, off);
-        self.fill_rough();
-        std::mem::swap(&mut self.values.step, &mut self.scratch.rough);
+        for values in [&mut self.values.before, &mut self.values.step] {
+            std::mem::swap(values, &mut self.scratch.rough);
+            keep_consensus(&mut self.scratch.rough, off);
+            self.scratch.fill_rough();
+            std::mem::swap(values, &mut self.scratch.rough);
+        }
         for (step, before) in self.values.step.iter_mut().zip(&self.values.before) {
             *step -= before;
         }
@@ -251,32 +224,19 @@ impl EdgeTracer {
         true
     }
 
-    /// Fills the gaps of rough values and smooths them.
-    fn fill_rough(&mut self) {
-        let values = self.scratch.rough.iter().map(|value| value.is_finite().then_some(*value));
-        path::fill(values, &mut self.scratch.sorted);
-        path::smooth(&self.scratch.sorted, &mut self.scratch.rough);
-    }
-
     /// Reads the edge's shape from the overlay and takes it over. Rows are
     /// known to be clear about the edge only: beside it spots may lie anywhere,
     /// and would pass for shading.
-    fn read_shape<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-    ) -> Option<StepShape> {
+    fn read_shape<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> Option<StepShape> {
         let noise = f64::from(scene.noise) / f64::from(typical(&self.values.step).abs());
         let room = self.room(scene);
-        let look = self.overlay.first_fit(table, noise, room)?;
+        let fitter = self.overlay.with(scene.table);
+        let look = fitter.first_fit(noise, room)?;
         let core = StepTemplate::core_half(look.step.blur);
-        let room = Extent { before: room.before.min(core), after: room.after.min(core) };
-        let look = self.overlay.first_fit(table, noise, room)?;
-        let shape = self.overlay.shape(
-            table,
-            &look,
-            BlurEstimate { px: look.step.blur, sd_px: f64::INFINITY },
-        )?;
+        let room = Clearance { before: room.before.min(core), after: room.after.min(core) };
+        let look = fitter.first_fit(noise, room)?;
+        let shape =
+            fitter.shape(&look, BlurEstimate { px: look.step.blur, sd_px: f64::INFINITY })?;
         let other = f64::max(shape.step.before.abs(), (shape.step.after - 1.0).abs());
         if other > MAX_LEVEL_DIFFERENCE {
             return None;
@@ -292,12 +252,7 @@ impl EdgeTracer {
         let weight = self.row_fit.groups.first().map_or(1.0, |group| group.weight);
         let rows = to_f32(scene.strip.along);
         for blurs in MARGIN_BLURS {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a few rows"
-            )]
-            let reach = (blurs * blur / f64::from(weight)).ceil() as usize;
+            let reach = floor_to_count((blurs * blur / f64::from(weight)).ceil());
             self.occlusion.clear.clear();
             for (k, group) in self.row_fit.groups.iter().enumerate() {
                 let near = k.saturating_sub(reach)..(k + reach + 1).min(self.row_fit.groups.len());
@@ -316,8 +271,7 @@ impl EdgeTracer {
 
     /// Squares that a clear row leaves at most.
     fn max_row_misfit(&mut self, noise: f32) -> f32 {
-        self.scratch.sorted.clear();
-        self.scratch.sorted.extend(self.row_fit.groups.iter().map(|group| group.misfit));
+        refill(&mut self.scratch.sorted, self.row_fit.groups.iter().map(|group| group.misfit));
         let rank = self.scratch.sorted.len() * CLEAR_PERCENTILE / 100;
         let sure = rank::at(&mut self.scratch.sorted, rank).unwrap_or(f32::INFINITY);
         let pixels = narrow_to_f32(self.row_fit.template.products.pixels);
@@ -348,7 +302,7 @@ impl EdgeTracer {
     #[inline(never)]
     fn elsewhere<T: GreyPixel>(&self, scene: &TraceInput<'_, T>, limit: f32) -> f32 {
         let (mut longest, mut run) = (0.0f32, 0.0);
-        let windows = self.sheet.windows();
+        let windows = &self.sheet.windows;
         for (number, (group, clear)) in
             self.row_fit.groups.iter().zip(&self.occlusion.clear).enumerate()
         {
@@ -390,7 +344,7 @@ impl EdgeTracer {
             }
             self.scratch.rough.push(if n > 0.0 { sum / n } else { f32::NAN });
         }
-        self.fill_rough();
+        self.scratch.fill_rough();
         for (at, &line) in self.scratch.rough.iter_mut().zip(scene.lines) {
             *at += self.course.at(narrow_to_f32(line.middle()))[0];
         }

@@ -1,7 +1,8 @@
-//! What a tracer keeps of an edge, by what it is for.
+//! The parts of a tracer's state.
 
 use super::band_sums::BandSums;
 use super::group::RowGroup;
+use crate::vision::path;
 use crate::vision::template::textured::TexturePositionVariance;
 use crate::vision::template::{PlainSums, StepTemplate};
 use crate::vision::texture::SurfaceTexture;
@@ -25,9 +26,9 @@ pub(super) enum EdgeState {
 /// What is known of an edge band by band.
 #[derive(Debug, Clone, Default)]
 pub(super) struct BandValues {
-    /// Places that were picked \[px\]; NaN where there is none.
+    /// Positions that were picked \[px\]; NaN where there is none.
     pub(super) picked: Vec<f32>,
-    /// Places of the path \[px\].
+    /// Positions of the path \[px\].
     pub(super) path: Vec<f32>,
     /// Level before the edge \[grey levels\].
     pub(super) before: Vec<f32>,
@@ -50,11 +51,11 @@ pub(super) struct WindingState {
 pub(super) struct TexturedFit {
     pub(super) texture: Option<SurfaceTexture>,
     pub(super) whitener: NoiseWhitener,
-    /// How far places scatter with these weights.
+    /// How far positions scatter with these weights.
     pub(super) scatter: Option<TexturePositionVariance>,
 }
 
-/// Rows held against the edge.
+/// Rows compared with the edge.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RowFit {
     pub(super) template: StepTemplate,
@@ -69,7 +70,7 @@ pub(super) struct RowFit {
 /// Which rows of an edge that is covered in part show it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Occlusion {
-    /// Rough places that are free to agree, and those of the best course yet.
+    /// Rough positions that are free to agree, and those of the best course yet.
     pub(super) free: Vec<f32>,
     pub(super) best_free: Vec<f32>,
     /// Bands that agree with most of the others.
@@ -81,7 +82,7 @@ pub(super) struct Occlusion {
     pub(super) sort_rows: bool,
 }
 
-/// Scratch memory.
+/// Buffers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct TraceScratch {
     /// Rough values, one a band or a line.
@@ -92,21 +93,30 @@ pub(super) struct TraceScratch {
     pub(super) scatter: Vec<f64>,
 }
 
-/// How sure the places of an edge are, beside what each of them says.
+impl TraceScratch {
+    /// Fills the gaps of rough values and smooths them.
+    pub(super) fn fill_rough(&mut self) {
+        let values = self.rough.iter().map(|value| value.is_finite().then_some(*value));
+        path::fill(values, &mut self.sorted);
+        path::smooth(&self.sorted, &mut self.rough);
+    }
+}
+
+/// How sure the positions of an edge are, beside what each of them shows.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct EdgeUncertainty {
-    /// Variance of the whole edge's position that all places share, from
+    /// Variance of the whole edge's position that all positions share, from
     /// shading that is not known better \[px²\].
     pub common_variance: f64,
     /// Variance of the mean position, where it is known apart from that of the
-    /// places \[px²\].
+    /// positions \[px²\].
     pub mean_variance: Option<f64>,
     /// Variance of the whole edge's position from the pattern beside the bead \[px²\].
     pub ground_variance: f64,
-    /// Standard deviation of the smoothing along the bead that places have passed,
+    /// Standard deviation of the smoothing along the bead that positions have passed,
     /// beside the mean over a line's rows \[px\].
     pub along_px: f64,
-    /// Fraction of the places' variance that differs from place to place; the rest moves
+    /// Fraction of the positions' variance that differs from position to position; the rest moves
     /// the whole edge.
     pub lines_fraction: f64,
 }

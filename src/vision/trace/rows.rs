@@ -1,13 +1,17 @@
-//! The rows of an edge, each held against it: where it shows the edge, and
-//! whether it shows anything else.
+//! Comparison of every row with the edge: where the row shows it, and whether it shows anything
+//! else.
+
+use crate::vision::buffer::{refill, reset};
+use std::ops::Range;
 
 use nalgebra::Matrix3;
 
 use super::band_sums::BandSums;
 use super::group::RowGroup;
-use super::{EdgeTracer, NOISE_SIGMAS, TraceInput};
+use super::{EdgeTracer, TraceInput};
 use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::numeric::rank;
+use crate::vision::pixel_noise::NOISE_SIGMAS;
 use crate::vision::strip::GreyPixel;
 use crate::vision::template::{ExpectedStep, PlainSums, RowSums};
 
@@ -15,23 +19,22 @@ use crate::vision::template::{ExpectedStep, PlainSums, RowSums};
 const MAX_MISFIT_RATIO: f32 = 2.5;
 /// Rows of a band may differ by this much beside their noise \[px\].
 const ROW_WAVINESS_PX: f32 = 0.5;
-/// Wild pixels that a row may have; more are a grain.
+/// Outlying pixels that a row may have; more are a grain.
 const MAX_WILD_PIXELS: f32 = 2.0;
 /// By how much the squares that a row leaves exceed what may be noise, where it
-/// is covered for certain.
+/// is covered certainly.
 const UNFIT_MISFIT_RATIO: f32 = 1.5;
 
 impl EdgeTracer {
-    /// Holds every window against the edge.
+    /// Compares every window with the edge.
     #[inline(always)]
-    pub(super) fn compare_rows<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
+    pub fn compare_rows<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let softness = 1.0 / narrow_to_f32(self.row_fit.template.products.slope_slope);
         self.row_fit.groups.clear();
-        self.row_fit.plain.clear();
-        self.row_fit.plain.resize(scene.lines.len(), PlainSums::default());
+        reset(&mut self.row_fit.plain, scene.lines.len(), PlainSums::default());
         // Noise of a pixel in the mean of so many rows.
         let (mut rows, mut noise) = (0.0, 0.0);
-        for (number, window) in self.sheet.windows().iter().enumerate() {
+        for (number, window) in self.sheet.windows.iter().enumerate() {
             let (band, weight) = (window.line, window.rows);
             if self.occlusion.clear.get(number) == Some(&false) {
                 self.row_fit.groups.push(RowGroup::hidden(band, weight));
@@ -53,9 +56,9 @@ impl EdgeTracer {
         }
     }
 
-    /// What the mean of some rows is held against, whose pixels have a noise.
+    /// What the mean of some rows is compared with, whose pixels have a noise.
     #[inline(always)]
-    pub(super) fn expected(edge: [f32; 3], noise: f32) -> ExpectedStep {
+    pub fn expected(edge: [f32; 3], noise: f32) -> ExpectedStep {
         let (noise, step) = (NOISE_SIGMAS * noise, edge[2].abs());
         ExpectedStep::new(edge, [noise + 0.05 * step, noise + 0.15 * step])
     }
@@ -63,7 +66,7 @@ impl EdgeTracer {
     /// Sum of the squares of what does not fit, as if of a single row, so that
     /// groups of all sizes compare \[grey levels²\].
     #[inline(always)]
-    pub(super) fn misfit(&self, sums: &RowSums, weight: f32) -> f32 {
+    pub fn misfit(&self, sums: &RowSums, weight: f32) -> f32 {
         if sums.wild > MAX_WILD_PIXELS {
             return f32::INFINITY;
         }
@@ -78,12 +81,11 @@ impl EdgeTracer {
     /// Sums up the rows of each band, without those on which a grain or a
     /// spark lies.
     #[inline(always)]
-    pub(super) fn sum_bands<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
+    pub fn sum_bands<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let products = self.row_fit.template.products;
-        self.scratch.sorted.clear();
-        self.scratch.sorted.extend(self.row_fit.groups.iter().map(|group| group.misfit));
+        refill(&mut self.scratch.sorted, self.row_fit.groups.iter().map(|group| group.misfit));
         if !self.occlusion.clear.is_empty() {
-            // What is hidden says nothing.
+            // What is hidden shows nothing.
             self.scratch.sorted.retain(|misfit| misfit.is_finite());
         }
         let median = rank::median(&mut self.scratch.sorted).unwrap_or(f32::INFINITY);
@@ -96,7 +98,7 @@ impl EdgeTracer {
         let limit = variance * (pixels + NOISE_SIGMAS * (2.0 * pixels * alike).sqrt());
         let limit = limit.max(MAX_MISFIT_RATIO * median);
         self.misfit = f64::from(median / (variance * pixels)).sqrt();
-        // The variance of a window in texture has the texture's share of it already.
+        // The variance of a window in texture has the texture's fraction of it already.
         self.max_group_rows = if self.textured.texture.is_some() { 1.0 } else { together.into() };
         let covered = |group: &&RowGroup| {
             group.misfit > UNFIT_MISFIT_RATIO * limit || group.misfit == f32::INFINITY
@@ -119,7 +121,7 @@ impl EdgeTracer {
         }
     }
 
-    /// Rows next to one that fits badly share its grain or spark.
+    /// Rows next to one that fits badly fraction its grain or spark.
     fn spread_misfits(&mut self, limit: f32) {
         let mut before = 0.0;
         for k in 0..self.row_fit.groups.len() {
@@ -137,7 +139,7 @@ impl EdgeTracer {
     fn sum_band<T: GreyPixel>(
         &mut self,
         scene: &TraceInput<'_, T>,
-        (band, groups): (usize, std::ops::Range<usize>),
+        (band, groups): (usize, Range<usize>),
         limit: f32,
         core: &Matrix3<f64>,
     ) -> BandSums {
@@ -149,16 +151,9 @@ impl EdgeTracer {
         self.scratch.sorted.extend(fitting.map(|group| group.moved));
         let typical = median_of_few(&mut self.scratch.sorted);
         let in_texture = self.textured.scatter.map(|scatter| narrow_to_f32(scatter.of_window));
-        let of_window = |weight: f32| {
-            in_texture.unwrap_or(scene.noise * scene.noise / (weight * stiffness)).sqrt()
-        };
-        let widen = |(count, sum): (f32, f32)| (f64::from(count), f64::from(sum));
-        let mut sums = BandSums {
-            step: step.into(),
-            before: widen(self.row_fit.plain[band].before()),
-            after: widen(self.row_fit.plain[band].after()),
-            ..BandSums::default()
-        };
+        let square = scene.noise * scene.noise;
+        let of_window = |rows: f32| in_texture.unwrap_or(square / (rows * stiffness)).sqrt();
+        let mut sums = BandSums { step: step.into(), ..BandSums::default() };
         for group in groups {
             let far = NOISE_SIGMAS * of_window(group.weight) / step.abs() + ROW_WAVINESS_PX;
             let counts = group.misfit <= limit && (group.moved - typical).abs() <= far;
@@ -172,8 +167,7 @@ impl EdgeTracer {
         }
         // Plain pixels are those of a group's mean.
         let weight = f64::from(groups.first().map_or(1.0, |group| group.weight));
-        sums.before = (sums.before.0 * weight, sums.before.1 * weight);
-        sums.after = (sums.after.0 * weight, sums.after.1 * weight);
+        sums.plain = self.row_fit.plain[band].totals().map(|side| side.map(|sum| sum * weight));
         sums
     }
 }

@@ -1,11 +1,10 @@
-//! An edge that winds more quickly than the bands of the first pick show it, as that of
-//! a rough bead does in a tall gauge: it is picked anew, caliper line by caliper line.
+//! An edge that winds more quickly than the bands resolve, as that of a rough bead in a tall
+//! gauge. It is picked anew on every caliper line.
 
 use super::{EdgeTracer, MAX_UNFIT_FRACTION, StepFit, TraceInput, typical};
-use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::narrow_to_f32;
-use crate::numeric::number::to_f32;
+use crate::numeric::number::{narrow_to_f32, to_f32};
 use crate::numeric::rank;
+use crate::vision::edge::STEP_HALF_WIDTH;
 use crate::vision::edge_windows::{EdgeWindow, Grouping, MAX_SINGLE_ROWS, MIDDLE_PX, WINDOW_PX};
 use crate::vision::path;
 use crate::vision::strip::GreyPixel;
@@ -14,26 +13,24 @@ use crate::vision::strip::GreyPixel;
 /// \[px\]: three of four bands do. Grains on a tenth of the rows do not make an edge
 /// wind; those on a third do.
 const MIN_WINDING_PX: f32 = 0.12;
-/// The same for each share of the step that the noise of a pixel is \[px\]: picks
+/// The same for each fraction of the step that the noise of a pixel is \[px\]: picks
 /// scatter by it.
 const WINDING_PER_NOISE_PX: f32 = 2.5;
-/// Share of its rows that an edge may lose to a spark or two; one that loses more
+/// Fraction of its rows that an edge may lose to a spark or two; one that loses more
 /// may wind.
 const MAX_LOST_FRACTION: f64 = 0.12;
 /// Times that a winding edge is followed.
 const MAX_PASSES: usize = 3;
 /// How far beside the line between two bands the edge is looked for \[px\].
 const SEARCH_HALF_PX: usize = 8;
-/// Pixels on either side of a step that tell its height.
-const STEP_HALF_WIDTH: usize = 4;
-/// Share of the expected step that a line must show.
+/// Fraction of the expected step that a line must show.
 const MIN_STEP_FRACTION: f32 = 0.25;
 
 impl EdgeTracer {
     /// Draws the path of a winding edge from line to line, where there are more lines
     /// than bands.
     #[inline(always)]
-    pub(super) fn follow_windings<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
+    pub fn follow_windings<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         self.winding.excess = if could_wind(scene) { self.winding(scene.noise) } else { 0.0 };
         if self.seems_winding() {
             self.pick_lines(scene);
@@ -41,11 +38,11 @@ impl EdgeTracer {
     }
 
     /// Whether an edge that could wind has lost more rows than sparks explain.
-    pub(super) fn lost_rows<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> bool {
+    pub fn lost_rows<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> bool {
         could_wind(scene) && self.used_fraction() < 1.0 - MAX_LOST_FRACTION
     }
 
-    /// Whether the edge winds more quickly than bands show it, as far as they tell.
+    /// Whether the edge winds more quickly than bands show it, as far as they show.
     pub fn seems_winding(&self) -> bool {
         self.winding.excess > 1.0
     }
@@ -63,25 +60,21 @@ impl EdgeTracer {
         rank::at(&mut self.scratch.sorted, quarter).unwrap_or(0.0) / least
     }
 
-    /// Locates the edge along places picked from line to line. Returns whether all but a
+    /// Locates the edge along positions picked from line to line. Returns whether all but a
     /// few rows show it: then it winds, and nothing covers it.
     #[cold]
     #[inline(never)]
-    pub(super) fn trace_winding<T: GreyPixel>(
-        &mut self,
-        table: &StepTable,
-        scene: &TraceInput<'_, T>,
-    ) -> bool {
+    pub fn trace_winding<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         if !could_wind(scene) || self.step_fit.is_none() || !self.pick_lines(scene) {
             return false;
         }
         for _ in 0..MAX_PASSES {
-            self.lay_over(table, scene);
+            self.lay_over(scene);
             let Some(StepFit { room, .. }) = self.step_fit else { return false };
             self.pick_levels_within(scene, room);
-            let Some(blur) = self.lay_over(table, scene) else { return false };
-            self.take_shape(table, blur);
-            if !self.trace_open(table, scene) {
+            let Some(blur) = self.lay_over(scene) else { return false };
+            self.take_shape(scene.table, blur);
+            if !self.trace_open(scene) {
                 return false;
             }
             if self.unfit_fraction <= MAX_UNFIT_FRACTION && !self.lost_rows(scene) {
@@ -92,18 +85,18 @@ impl EdgeTracer {
         false
     }
 
-    /// Fills the rough places with the edges that were found; where none was, a
+    /// Fills the rough positions with the edges that were found; where none was, a
     /// winding edge stays on its course, and another one runs straight on.
-    pub(super) fn fill_from_edges<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
+    pub fn fill_from_edges<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         let (course, winds) = (&self.course, self.winding.is_followed);
-        let places = self.edges.iter().zip(scene.lines).map(|(edge, &line)| match edge {
+        let positions = self.edges.iter().zip(scene.lines).map(|(edge, &line)| match edge {
             Some(edge) => Some(narrow_to_f32(edge.at)),
             None => winds.then(|| course.at(narrow_to_f32(line.middle()))[0]),
         });
-        path::fill(places, &mut self.scratch.rough);
+        path::fill(positions, &mut self.scratch.rough);
     }
 
-    /// Draws the course through the places where each line has its highest step.
+    /// Draws the course through the positions where each line has its highest step.
     /// Returns whether there is any.
     #[cold]
     #[inline(never)]
@@ -119,13 +112,9 @@ impl EdgeTracer {
         self.course.draw(scene.bands, &self.values.path, &self.values.before, &self.values.step);
         let course = &self.course;
         let tall = scene.strip.along.div_ceil(scene.lines.len());
-        self.sheet.read(
-            scene.strip,
-            scene.lines,
-            Grouping { steepest: 0.0, max_rows: tall },
-            |v| course.at(v),
-        );
-        let windows = self.sheet.windows().iter().enumerate();
+        let grouping = Grouping { steepest: 0.0, max_rows: tall };
+        self.sheet.read(scene.strip, scene.lines, grouping, |v| course.at(v));
+        let windows = self.sheet.windows.iter().enumerate();
         let picks = windows.map(|(number, window)| pick(window, self.sheet.pixels(number)));
         if !path::fill(picks, &mut self.scratch.rough) {
             return false;
@@ -143,7 +132,7 @@ fn could_wind<T: GreyPixel>(scene: &TraceInput<'_, T>) -> bool {
     scene.lines.len() > scene.bands.count() && scene.strip.along > MAX_SINGLE_ROWS
 }
 
-/// Place of the highest step of the expected kind in a window \[px\].
+/// Position of the highest step of the expected kind in a window \[px\].
 fn pick(window: &EdgeWindow, pixels: &[f32; WINDOW_PX]) -> Option<f32> {
     let [_, _, step] = window.expected;
     let height = |k: usize| {
@@ -156,17 +145,18 @@ fn pick(window: &EdgeWindow, pixels: &[f32; WINDOW_PX]) -> Option<f32> {
     let bend = before + after - 2.0 * here;
     let enough = here >= MIN_STEP_FRACTION * to_f32(STEP_HALF_WIDTH) && bend < 0.0;
     let ahead = (0.5 * (before - after) / bend).clamp(-1.0, 1.0);
-    enough.then(|| place(window.first) + to_f32(best) - 0.5 + ahead)
+    enough.then(|| position(window.first) + to_f32(best) - 0.5 + ahead)
 }
 
-#[expect(clippy::cast_precision_loss, reason = "a place near the gauge")]
-fn place(at: isize) -> f32 {
+#[expect(clippy::cast_precision_loss, reason = "a position near the gauge")]
+fn position(at: isize) -> f32 {
     at as f32
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numeric::blurred_step::StepTable;
 
     fn window(at: f64, heights: [f64; 2]) -> (EdgeWindow, [f32; WINDOW_PX]) {
         let table = StepTable::default();

@@ -7,12 +7,12 @@ const BLUR_PX: f64 = 1.6;
 /// and a groove.
 fn profile(slope: f64, groove_px: f64, groove_grey: f64) -> MeanProfile {
     let at = 20.3;
-    let share = |place: f64| 0.5 * libm::erfc(-place / (BLUR_PX * 2.0_f64.sqrt()));
+    let fraction = |position: f64| 0.5 * libm::erfc(-position / (BLUR_PX * 2.0_f64.sqrt()));
     let mut grey = [0.0; PROFILE_PX];
     for (k, value) in grey.iter_mut().enumerate() {
-        let place = to_f64(k) - at;
-        let ground = 70.0 - slope * place.min(0.0);
-        let (near, far) = (share(place), share(place + groove_px));
+        let position = to_f64(k) - at;
+        let ground = 70.0 - slope * position.min(0.0);
+        let (near, far) = (fraction(position), fraction(position + groove_px));
         let level = ground + (groove_grey - ground) * far + (BEAD - groove_grey) * near;
         *value = crate::numeric::number::narrow_to_f32(level);
     }
