@@ -20,8 +20,7 @@ use crate::numeric::lti::{DiscretisationMethod, TransferFunction};
 use crate::studies::bcs_thesis as plant;
 use crate::studies::error::ReproduceError;
 use crate::studies::publication::Publication;
-use crate::studies::row::TableRows;
-use crate::studies::study::{Effort, Reproduced, Section};
+use crate::studies::study::{Effort, Reproduced, Section, TableRows};
 
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 8;

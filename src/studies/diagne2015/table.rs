@@ -21,8 +21,7 @@ use crate::report::chart::range::Range;
 use crate::report::chart::series::Curve;
 use crate::studies::error::ReproduceError;
 use crate::studies::publication::Publication;
-use crate::studies::row::TableRows;
-use crate::studies::study::{Reproduced, Section};
+use crate::studies::study::{Effort, Reproduced, Section, TableRows};
 
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 4;
@@ -36,7 +35,7 @@ const ABOUT: &str = "The paper prints curves and no numbers of them, so that not
     The largest fill is 0.9; the paper does not print its own.";
 
 /// Runs the experiments.
-pub fn run(progress: &mut Progress) -> Result<Reproduced, ReproduceError> {
+pub fn run(_: Effort, progress: &mut Progress) -> Result<Reproduced, ReproduceError> {
     let mut rows = TableRows::of(Publication::Diagne2015);
     let mut sections = Vec::new();
     controller_rows(&mut rows)?;

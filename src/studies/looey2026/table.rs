@@ -16,8 +16,7 @@ use crate::studies::error::ReproduceError;
 
 use crate::studies::looey2026 as experiments;
 use crate::studies::publication::Publication;
-use crate::studies::row::TableRows;
-use crate::studies::study::{Effort, Reproduced, Section};
+use crate::studies::study::{Effort, Reproduced, Section, TableRows};
 
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 14;

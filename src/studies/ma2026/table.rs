@@ -14,8 +14,7 @@ use crate::report::chart::palette::Ink;
 use crate::report::chart::range::Range;
 use crate::studies::error::ReproduceError;
 use crate::studies::publication::Publication;
-use crate::studies::row::TableRows;
-use crate::studies::study::{Effort, Reproduced, Section};
+use crate::studies::study::{Effort, Reproduced, Section, TableRows};
 
 mod draw;
 

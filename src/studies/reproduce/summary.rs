@@ -4,8 +4,7 @@
 use maud::{Markup, html};
 
 use super::table::number;
-use crate::studies::row::TableRow;
-use crate::studies::study::Reproduced;
+use crate::studies::study::{Reproduced, TableRow};
 
 /// Shares of a published number within which it counts as met.
 const NEAR_FRACTIONS: [f64; 2] = [0.02, 0.1];

@@ -10,8 +10,7 @@ use crate::studies::bcs_thesis::corner::{
     Baseline, BudgetRow, CornerError, CornerRun, DriveMode, Errors, JUDGED_MM, Scenario, UNMODELLED,
 };
 use crate::studies::error::ReproduceError;
-use crate::studies::row::TableRows;
-use crate::studies::study::{Effort, Section};
+use crate::studies::study::{Effort, Section, TableRows};
 
 /// Seeds of the flow that no model tells.
 pub const SEEDS: u64 = 20;

@@ -8,8 +8,7 @@ use crate::sim::melt::MeltParameters;
 use crate::studies::bcs_thesis::start_stop::bench::{PAUSES_S, StartStopScore};
 use crate::studies::bcs_thesis::start_stop::experiment::{Losses, MIN_SPEED_FRACTION, run, sum};
 use crate::studies::error::ReproduceError;
-use crate::studies::row::TableRows;
-use crate::studies::study::Section;
+use crate::studies::study::{Section, TableRows};
 
 const CASES: [&str; 3] = [
     "starts and stops, robot follows",
