@@ -45,7 +45,7 @@ pub fn wheel() -> Result<TransferFunction, ModelError> {
     TransferFunction::new(&[2.517], &[0.0377, 1.0], 0.009)
 }
 
-/// GC, the wheel's inverse with a lag: (0.0377s + 1)/(2.517(0.01s + 1)). Section 4.2.1.
+/// GC, the wheel's inverse with a lag: (0.0377s + 1)/(2.517(0.01s + 1)). Section 4.1.
 pub fn wheel_inverse() -> Result<TransferFunction, ModelError> {
     wheel()?.inverse_through(&TransferFunction::new(&[1.0], &[0.01, 1.0], 0.0)?)
 }

@@ -16,7 +16,7 @@ pub const JUDGED_FROM_S: f64 = 15.0;
 /// Target section \[mm²\]: papers.md, "001, on/off".
 pub const AREA_MM2: f64 = 45.0;
 /// Speed of the wheel's surface \[mm/s per rpm\]. Derived: π·d/60 with d = 254.762 mm, bead
-/// characterisation thesis, § 2.2.
+/// characterisation thesis, § 2.1.
 pub const MM_PER_S_PER_RPM: f64 = std::f64::consts::PI * 254.762 / 60.0;
 /// Correlation time of the unmodelled flow \[s\]: papers.md, "001, on/off".
 pub const CORRELATION_S: f64 = 0.15;
