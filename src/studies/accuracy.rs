@@ -8,7 +8,7 @@ mod figures;
 pub mod roughness_table;
 pub mod sets;
 pub mod studio;
-mod table;
+pub mod table;
 mod verdict;
 
 use crate::numeric::statistics::Moments;
@@ -16,7 +16,6 @@ use figures::fraction;
 use sets::{Set, SetLimits};
 
 pub use figures::{Miss, SetFigures, WidthError};
-pub use table::{markdown, table};
 
 /// Error from which a width that was reported is silently wrong \[px\].
 const SILENT_PX: f64 = 0.5;

@@ -16,14 +16,14 @@ use crate::cli::arguments::WrongArguments;
 use crate::cli::print::Verbosity;
 use crate::io::progress::Progress;
 use crate::rows::output;
-use crate::studies::accuracy::calibration_table;
 use crate::studies::accuracy::calibration_table::CalibrationFigures;
 use crate::studies::accuracy::calibrations;
 use crate::studies::accuracy::calibrations::{CalibrationBench, CalibrationCase, CornerSource};
 use crate::studies::accuracy::sets;
 use crate::studies::accuracy::sets::Set;
 use crate::studies::accuracy::studio::SetStudio;
-use crate::studies::accuracy::{SetFigures, WidthError, markdown, table};
+use crate::studies::accuracy::table::{markdown, table};
+use crate::studies::accuracy::{SetFigures, WidthError};
 use crate::vision::Measurer;
 
 /// Frames of a set where nothing else is said.
@@ -84,13 +84,9 @@ fn judge_calibrations(args: &AccuracyArgs, voice: Verbosity) -> Result<ExitCode>
     if let Some(out) = &args.out {
         let json = serde_json::to_vec_pretty(&figures).context("calibrations.json")?;
         output::write_whole(out, "calibrations.json", &json)?;
-        output::write_whole(
-            out,
-            "calibrations.md",
-            calibration_table::markdown(&figures).as_bytes(),
-        )?;
+        output::write_whole(out, "calibrations.md", markdown(&figures).as_bytes())?;
     }
-    say!("{}", calibration_table::table(&figures).trim_end());
+    say!("{}", table(&figures).trim_end());
     let missed = figures.iter().any(|figures| !figures.missed.is_empty());
     Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::INTERVAL_SIGMAS;
 use super::calibrations::{CalibratedWidth, CalibrationCase, CornerSource};
-use super::table::{aligned, marked};
+use super::table::{FigureRow, number, verdict};
 
 /// How far scatter and forecast may be apart where trials are many.
 const MAX_RATIO_DEVIATION: f64 = 0.10;
@@ -129,46 +129,23 @@ fn of_bead(found: &[&Vec<CalibratedWidth>], bead: usize) -> BeadFigures {
     }
 }
 
-const COLUMNS: usize = 10;
-const HEADS: [&str; COLUMNS] = [
-    "camera",
-    "from",
-    "views",
-    "noise px",
-    "trials",
-    "RMS error % of width",
-    "RMS error/predicted sigma",
-    "in 95 %",
-    "bias/σ",
-    "limits",
-];
+impl FigureRow for CalibrationFigures {
+    const HEADS: &str = "camera|from|views|noise px|trials|RMS error % of width|\
+                         RMS error/predicted sigma|in 95 %|bias/σ|limits";
 
-fn cells(figures: &CalibrationFigures) -> [String; COLUMNS] {
-    let percent = figures.rms_error_fraction.map(|share| 100.0 * share);
-    [
-        figures.case.to_owned(),
-        figures.source.to_owned(),
-        figures.views.to_string(),
-        figures.noise_px.map_or_else(|| "–".to_owned(), |px| px.to_string()),
-        figures.found.to_string(),
-        format!("{:.4}–{:.4}", percent[0], percent[1]),
-        format!("{:.2}–{:.2}", figures.ratio[0], figures.ratio[1]),
-        format!("{:.1}", 100.0 * figures.within_interval),
-        format!("{:.2}", figures.bias_over_sigma),
-        if figures.missed.is_empty() {
-            "kept".to_owned()
-        } else {
-            format!("MISSED: {}", figures.missed.join("; "))
-        },
-    ]
-}
-
-/// The figures as a table for a terminal.
-pub fn table(figures: &[CalibrationFigures]) -> String {
-    aligned(&HEADS, figures.iter().map(cells))
-}
-
-/// The figures as a table in Markdown.
-pub fn markdown(figures: &[CalibrationFigures]) -> String {
-    marked(&HEADS, figures.iter().map(cells))
+    fn cells(&self) -> Vec<String> {
+        let percent = self.rms_error_fraction.map(|fraction| 100.0 * fraction);
+        vec![
+            self.case.to_owned(),
+            self.source.to_owned(),
+            self.views.to_string(),
+            self.noise_px.map_or_else(|| "–".to_owned(), |px| px.to_string()),
+            self.found.to_string(),
+            format!("{:.4}–{:.4}", percent[0], percent[1]),
+            format!("{:.2}–{:.2}", self.ratio[0], self.ratio[1]),
+            number(100.0 * self.within_interval, 1),
+            number(self.bias_over_sigma, 2),
+            verdict(&self.missed),
+        ]
+    }
 }

@@ -1,4 +1,4 @@
-//! Table 1: how soon tracking and estimate converge after a step.
+//! Table 1: convergence times of tracking and estimate after a step.
 
 use super::strand::{InputDisturbance, StrandParameters};
 use super::{
@@ -12,10 +12,10 @@ use crate::extruder::adaptive::SubSystemError;
 pub struct TableCase {
     /// Its number.
     pub number: u32,
-    /// What is disturbed.
+    /// The disturbed sub-system.
     pub of: SubSystem,
-    /// Step in ṁ \[kg/s\] or, as it is read here, in percent of the plate's
-    /// speed: the table says m/s, which no plate can be.
+    /// Step in ṁ \[kg/s\], or in the plate's speed \[%\]: the unit of the table, m/s, cannot
+    /// be right (papers.md).
     pub size: f64,
     /// Published convergence of tracking \[s\].
     pub tracking_s: f64,
@@ -23,7 +23,7 @@ pub struct TableCase {
     pub estimate_s: f64,
 }
 
-/// Which half of the plant.
+/// A sub-system of the plant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SubSystem {
     /// Sub-system 1.
@@ -32,7 +32,7 @@ pub enum SubSystem {
     Strand,
 }
 
-/// Table 1.
+/// Mohammadi Looey et al. 2026, table 1.
 pub const TABLE: [TableCase; 10] = [
     case(1, SubSystem::Nozzle, 0.0025, 4.87, 7.97),
     case(2, SubSystem::Nozzle, -0.0025, 4.77, 8.64),
@@ -56,18 +56,17 @@ const fn case(
     TableCase { number, of, size, tracking_s, estimate_s }
 }
 
-/// When tracking and estimate stay within their tolerances, after the step
-/// \[s\].
+/// Time after the step from which tracking and estimate stay within their tolerances \[s\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Convergence {
-    /// `t_cr`; none where it is outside at the end of the horizon.
+    /// `t_cr`; none where it has not converged at the end of the horizon.
     pub tracking_s: Option<f64>,
     /// `t_cp`; the same.
     pub estimate_s: Option<f64>,
 }
 
 impl TableCase {
-    /// Runs it with a law.
+    /// Runs it with a controller.
     pub fn run(&self, method: AdaptationMethod) -> Result<Convergence, SubSystemError> {
         let (from_s, to_s) = (STEP_AT_S, f64::INFINITY);
         let step = |size| InputDisturbance::Step { size, from_s, to_s };

@@ -21,8 +21,9 @@ use crate::rows::output;
 use crate::studies::accuracy::drawn;
 use crate::studies::accuracy::drawn::{DrawnFrame, DrawnSet};
 use crate::studies::accuracy::drawn_table::{
-    Deviation, DrawnOutcome, FrameRejection, figures, markdown, table,
+    Deviation, DrawnOutcome, FrameRejection, figures, markdown,
 };
+use crate::studies::accuracy::table::table;
 use crate::vision::Measurer;
 
 /// Frames of a set where nothing else is said: what its limits are made for.

@@ -14,8 +14,9 @@ use crate::io::progress::Progress;
 use crate::rows::output;
 use crate::studies::accuracy::drawn::LongBead;
 use crate::studies::accuracy::roughness_table::{
-    BeadOutcome, OwnMeanError, Ratio, RoughnessEstimate, figures, markdown, table,
+    BeadOutcome, OwnMeanError, Ratio, RoughnessEstimate, figures,
 };
+use crate::studies::accuracy::table::{markdown, table};
 use crate::vision::{Measurer, Roughness, RoughnessEstimator};
 
 /// Length of each bead in its correlation lengths.
