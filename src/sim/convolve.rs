@@ -1,7 +1,7 @@
 //! Gaussian blur of what is known by pixels.
 
 /// Weights of a Gaussian at whole distances from 0, as far as they matter; of
-/// all places on both sides they add up to 1.
+/// all positions on both sides they add up to 1.
 pub fn kernel(blur_px: f64) -> Vec<f32> {
     let mut weights = vec![1.0];
     let mut sum = 1.0;

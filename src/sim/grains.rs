@@ -10,8 +10,8 @@ use super::shade::BeadShape;
 use crate::numeric::number::to_f64;
 use crate::scenario::image::Grains;
 
-/// Discs whose centres lie within a radius of an edge, at random places, until
-/// they cover each edge on the share of the rows that was asked for.
+/// Discs whose centres lie within a radius of an edge, at random positions, until
+/// they cover each edge on the fraction of the rows that was asked for.
 pub fn grains(grains: &Grains, shape: &BeadShape, key: u64) -> Option<Mask> {
     if grains.rows_fraction <= 0.0 || grains.size_px <= 0.0 {
         return None;

@@ -1,4 +1,4 @@
-//! Random numbers that are a function of what they are for – a seed, a place –
+//! Random numbers that are a function of what they are for – a seed, a position –
 //! and not of the order in which they are asked for.
 
 use std::f64::consts::TAU;

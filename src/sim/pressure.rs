@@ -9,13 +9,13 @@ use super::hash::{mix, normal_pair};
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::pressure::{Fopdt, InitialState};
 
-/// Step of the plant \[s\].
+/// Step of the plant \[s\]: papers.md, "002", 5 ms.
 pub const TICK_S: f64 = 0.005;
 
 /// A wave of the gain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GainWave {
-    /// Amplitude, as a share of the gain.
+    /// Amplitude, relative to the gain.
     pub amplitude: f64,
     /// Period \[s\].
     pub period_s: f64,
@@ -51,7 +51,7 @@ pub struct SimPressure {
     fastest_rpm: f64,
     /// Speeds of the ticks that are under way, the newest first.
     delayed_speeds: VecDeque<f64>,
-    /// Whole ticks of the dead time, and the rest of it as a share of a tick.
+    /// Whole ticks of the dead time, and the rest of it relative to a tick.
     ticks: usize,
     fractional_tick: f64,
     speed_rpm: f64,
@@ -128,12 +128,12 @@ impl SimPressure {
         let load = load.map_or(0.0, |load| load.rpm);
         let old = |back: usize| self.delayed_speeds.get(back).copied().unwrap_or(self.speed_rpm);
         // The rest of the dead time belongs to the speed of one tick earlier.
-        for (speed, share) in [
+        for (speed, fraction) in [
             (old(self.ticks + 1), self.fractional_tick),
             (old(self.ticks), 1.0 - self.fractional_tick),
         ] {
             let settled = self.process.gain() * (1.0 + drift) * (speed + load);
-            let kept = libm::exp(-share * TICK_S / self.process.lag_s());
+            let kept = libm::exp(-fraction * TICK_S / self.process.lag_s());
             self.pressure = settled + (self.pressure - settled) * kept;
         }
         self.delayed_speeds.pop_back();

@@ -57,7 +57,7 @@ impl SimScrew {
         self.screw.delay(self.now_s(), self.plug_m)
     }
 
-    /// Feeds a share of full over one step.
+    /// Feeds a fraction of full over one step.
     pub fn advance(&mut self, fill: f64) {
         let from = self.now_s();
         self.feed.push(self.feed_position(from), fill);
@@ -74,15 +74,15 @@ impl SimScrew {
         let steps = (self.screw.delay(from, self.plug_m) / self.step_s).ceil();
         // The middle of the step that the feed is of, so that no rounding of
         // its ends matters.
-        let place = self.feed_position(from - (steps - 0.5) * self.step_s);
-        self.plug_m += self.step_s * self.rate(from, self.plug_m, self.feed.at(place));
+        let position = self.feed_position(from - (steps - 0.5) * self.step_s);
+        self.plug_m += self.step_s * self.rate(from, self.plug_m, self.feed.at(position));
     }
 
     fn runge_kutta(&mut self, from: f64, to: f64, longest: f64) {
         let mut at = from;
         while at < to {
-            let place = self.arriving_position(at, self.plug_m);
-            let (fill, change) = (self.feed.at(place), self.feed.next_change(place));
+            let position = self.arriving_position(at, self.plug_m);
+            let (fill, change) = (self.feed.at(position), self.feed.next_change(position));
             let full = longest.min(to - at);
             let mut step = full;
             if let Some(change) = change {
@@ -143,7 +143,7 @@ fn crossing(past: impl Fn(f64) -> f64, full: f64) -> f64 {
     high
 }
 
-/// The same screw without delay under a law that is held nowhere, from a plug
+/// The same screw without delay under a controller that is held nowhere, from a plug
 /// at a moment on: what a loop with a perfect predictor equals from the first
 /// effect of its control. Lengths of the plug \[m\] `step_s` apart, by
 /// Runge–Kutta steps of a tenth of that.
@@ -154,6 +154,7 @@ pub fn delay_free(
     step_s: f64,
     controller: impl Fn(f64) -> f64,
 ) -> impl Iterator<Item = f64> {
+    /// Runge–Kutta steps per sample.
     const PARTS: u32 = 10;
     let rate = move |at: f64, plug: f64| screw.speed(at) * screw.growth(plug, controller(plug));
     let step = step_s / f64::from(PARTS);

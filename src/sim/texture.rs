@@ -1,4 +1,4 @@
-//! A random pattern over the whole picture.
+//! A random pattern over the whole image.
 
 use rand::SeedableRng;
 use rand_distr::Distribution;
@@ -21,7 +21,7 @@ pub fn texture(
         return None;
     }
     let kernel = kernel(0.5 * texture.length_px);
-    // The pattern goes on beyond the picture.
+    // The pattern goes on beyond the image.
     let margin = kernel.len() - 1;
     let (wide, high) = (width + 2 * margin, height + 2 * margin);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(key);

@@ -1,10 +1,10 @@
-//! What a server serves: a machine that takes lines and says its `STATE`.
+//! The machine behind a server: it takes lines and sends its `STATE`.
 
 use crate::core::time::Stamp;
 use crate::link::LineError;
 use crate::link::frame::{DeviceLine, LineBody, LineRefusal};
 
-/// Is told what happens, in words for the person who watches.
+/// Receives messages for the operator.
 pub type Notice = Box<dyn FnMut(Stamp, &str) + Send>;
 
 /// What stands behind a server.

@@ -21,9 +21,10 @@ mod peer;
 use host::Host;
 use input::Input;
 
-/// Pieces of input that may wait; senders then wait too.
+/// Inputs that may wait; beyond it senders block.
 const MAX_WAITING_INPUTS: usize = 64;
-/// How long a call on the server's own socket may take when it is woken to end.
+/// Timeout of the connection to the server's own socket that wakes it to end: short, as it is
+/// on the same machine.
 const WAKE_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// A machine that is served in threads of its own until it is stopped.
@@ -36,7 +37,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Serves a machine on `listener`, which is told of the time by `clock`
+    /// Serves a machine on `listener`, which is given the time by `clock`
     /// and says its `STATE` once every `period`.
     pub fn spawn<M: LinkMachine>(
         listener: TcpListener,

@@ -12,26 +12,28 @@ use crate::numeric::average::{mean, median};
 use crate::sim::cell::SimCellError;
 use crate::width_control::target::WidthTarget;
 
-/// Way after control began from which errors count \[mm\].
+/// Path after control began from which errors count \[mm\]: the step to the target is not an
+/// error of control.
 pub const JUDGED_AFTER_MM: f64 = 30.0;
-/// The same from which scatter is that of control alone \[mm\].
+/// Path after control began from which the standard deviation counts \[mm\]. Derived: more than
+/// the 455 mm that the paper's loop needs to settle at 42 mm (papers.md).
 pub const SIGMA_AFTER_MM: f64 = 700.0;
-/// Length of a piece of the bead over which errors are put together \[mm\].
+/// Length of the pieces of path over which errors of all seeds are combined \[mm\].
 const PIECE_MM: f64 = 5.0;
-/// Share of means that a confidence interval holds.
+/// Confidence level of the intervals. By definition of "95 %" in the tables.
 const CONFIDENCE: f64 = 0.95;
 
-/// A controller with its cell; bead, simulated world and calibration are those
-/// of the plant that all have.
+/// A controller with its cell; bead, simulation and calibration are those of the common
+/// plant.
 #[derive(Debug, Clone)]
 pub struct Contender {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// Its cell on the common plant.
     pub cell: Cell,
-    /// What the cell's run part says.
+    /// The run part of its cell.
     pub run: RunPart,
-    /// What a pixel means.
+    /// Its calibration.
     pub calibration: Calibration,
 }
 
@@ -79,16 +81,16 @@ fn confidence_factor(count: f64) -> Option<f64> {
     Some(student.inverse_cdf(0.5 * (1.0 + CONFIDENCE)))
 }
 
-/// What a controller came to at one width.
+/// Figures of a controller at one width.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figures {
-    /// Mean size of the bead's error from 30 mm after control began \[mm\].
+    /// Mean absolute error of the bead from 30 mm after control began \[mm\].
     pub mean_error_mm: SeedStatistics,
     /// Its root mean square \[mm\].
     pub rms_error_mm: SeedStatistics,
-    /// Integral of its size over the path from where control began \[mm²\].
+    /// Integral of the absolute error over the path from where control began \[mm²\].
     pub integral_mm2: SeedStatistics,
-    /// Way after control began to within half a millimetre for good \[mm\].
+    /// Path from where control began until the error stays within half a millimetre \[mm\].
     pub settled_mm: SeedStatistics,
     /// Standard deviation of the width from 700 mm after control began \[mm\].
     pub sigma_mm: SeedStatistics,
@@ -183,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn an_estimate_tells_mean_median_and_confidence() {
+    fn statistics_are_mean_median_and_confidence() {
         let estimate = SeedStatistics::of(vec![1.0, 2.0, 3.0, 6.0]);
         assert_eq!((estimate.mean, estimate.median), (Some(3.0), Some(2.5)));
         // s² = 14/3, s/√4 = 1.0801; Student's t of 3 degrees of freedom is 3.1824.
@@ -196,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_controller_that_never_controls_or_stops_has_no_figures_to_boast_of() {
+    fn a_controller_that_never_controls_or_stops_has_no_figures() {
         let ours = contender("ours", include_str!("../../cells/distance.toml"));
         let width = Mm::constant(42.0);
         let mut late = ours.clone();
@@ -215,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn the_law_by_distance_beats_the_paper_on_every_seed() {
+    fn the_controller_by_distance_is_better_than_the_papers() {
         let paper = contender("paper", include_str!("../../cells/barjuei2022.toml"));
         let ours = contender("ours", include_str!("../../cells/distance.toml"));
         let width = Mm::constant(42.0);

@@ -57,12 +57,12 @@ impl GatedPlant {
         &mut self.plant
     }
 
-    /// What pump and valve were told last.
+    /// Last command to pump and valve.
     pub(super) fn command(&self) -> ExtruderCommand {
         self.applied
     }
 
-    /// Goes on to a moment: the plant is told what the gate lets through.
+    /// Advances to a time: the plant gets the commands that the link passes.
     pub(super) fn advance(&mut self, now: Stamp) {
         if let (Some(after), Some(since)) = (self.fails_after, self.ran_since)
             && now - since >= after
@@ -70,7 +70,7 @@ impl GatedPlant {
             self.fails_after = None;
             self.gate.fail();
         }
-        // A command ends where it runs out, however long nobody looked.
+        // A command ends when it expires, even between two calls.
         if let Some(until) = self.gate.runs_out().filter(|&until| until < now) {
             self.apply(until);
         }
@@ -80,7 +80,7 @@ impl GatedPlant {
         }
     }
 
-    /// Goes on to a moment and does what the gate lets through there.
+    /// Advances to a time and applies the command of that time.
     fn apply(&mut self, at: Stamp) {
         self.plant.advance(at);
         let command = self.gate.command(at);

@@ -8,7 +8,7 @@ use crate::core::time::Stamp;
 use crate::io::clock::RunClock;
 use crate::link::VirtualRobot;
 
-/// Samples of the truth that are kept; at 50 a second more than an hour.
+/// States that are kept. Derived: more than an hour at 50 per second.
 const MAX_HISTORY: usize = 200_000;
 
 /// Where the robot really was.

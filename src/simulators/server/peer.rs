@@ -11,7 +11,8 @@ use super::input::Input;
 use crate::link::{BadLines, LineSplitter};
 use crate::simulators::machine::LinkMachine;
 
-/// A PC that takes no bytes for this long is let go.
+/// Timeout of a write to the PC, after which it is disconnected: a PC that keeps to the link
+/// reads at once.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 
 /// The PC at the other end.

@@ -1,4 +1,4 @@
-//! Whether calibrations know how good they are: figures of rigs with their truth.
+//! Whether calibrations know how good they are: figures of cases with their truth.
 
 use serde::Serialize;
 
@@ -6,37 +6,38 @@ use super::INTERVAL_SIGMAS;
 use super::calibrations::{CalibratedWidth, CalibrationCase, CornerSource};
 use super::table::{FigureRow, number, verdict};
 
-/// How far scatter and forecast may be apart where trials are many.
+/// Largest deviation from 1 of the RMS error over the predicted standard deviation.
 const MAX_RATIO_DEVIATION: f64 = 0.10;
-/// Share of the true widths that the 95 % interval must hold.
+/// Fraction of the true widths that the 95 % interval must hold.
 const COVERAGE_RANGE: (f64, f64) = (0.93, 0.97);
-/// Standard errors of a figure that are put down to the count of the trials.
+/// Standard errors that are allowed for the number of trials. Derived: three miss one figure in
+/// 370 by chance.
 const ALLOWANCE_SIGMAS: f64 = 3.0;
 
-/// The figures of one rig.
+/// The figures of one case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CalibrationFigures {
-    /// The rig's name.
+    /// The case's name.
     pub case: &'static str,
     /// Where the corners came from.
     pub source: &'static str,
-    /// Pictures of each calibration.
+    /// Images of each calibration.
     pub views: u64,
-    /// Standard deviation of a corner's place \[px\]; none for rendered pictures.
+    /// Standard deviation of a corner's position \[px\]; none for rendered images.
     pub noise_px: Option<f64>,
     /// Calibrations.
     pub trials: usize,
     /// Those that were found.
     pub found: usize,
-    /// Root mean square error of a width over the trials, as a share of the width: the
+    /// Root mean square error of a width over the trials, relative to the width: the
     /// smallest and the largest of the beads.
     pub rms_error_fraction: [f64; 2],
-    /// The same of the error over what its own calibration foretells: the smallest and
+    /// The same of the error over what its own calibration predicts: the smallest and
     /// the largest of the beads.
     pub ratio: [f64; 2],
     /// The same over all beads together.
     pub ratio_of_all: f64,
-    /// Share of the true widths that lie in the 95 % interval.
+    /// Fraction of the true widths that lie in the 95 % interval.
     pub within_interval: f64,
     /// Mean error over the standard deviation, of the bead where it is largest.
     pub bias_over_sigma: f64,
@@ -54,7 +55,7 @@ impl CalibrationFigures {
     /// Out of the widths of each trial.
     #[expect(clippy::cast_precision_loss, reason = "counts of trials")]
     pub fn of(
-        rig: &CalibrationCase,
+        case: &CalibrationCase,
         source: CornerSource,
         trials: &[Option<Vec<CalibratedWidth>>],
     ) -> Self {
@@ -71,13 +72,13 @@ impl CalibrationFigures {
         };
         let squares: f64 = each.iter().map(|bead| bead.ratio.powi(2)).sum();
         let mut figures = Self {
-            case: rig.name,
+            case: case.name,
             source: match source {
                 CornerSource::Corners => "corners",
                 CornerSource::Images => "images",
             },
-            views: rig.views,
-            noise_px: (source == CornerSource::Corners).then_some(rig.noise_px),
+            views: case.views,
+            noise_px: (source == CornerSource::Corners).then_some(case.noise_px),
             trials: trials.len(),
             found: found.len(),
             rms_error_fraction: ends(|bead| bead.rms_error_fraction),

@@ -8,7 +8,7 @@
 //! draw     numbers of a frame, with a record of them
 //! scene    what a frame shows
 //! profile  edges that are random lines
-//! outline  where the borders lie on each line, and the area of the bead
+//! outline  where the boundaries lie on each line, and the area of the bead
 //! paint    light on the sensor: blur, motion, texture
 //! long_bead  a bead that passes through the gauge frame by frame
 //! camera   from light to grey levels: vignetting, gamma, noise, JPEG
@@ -43,9 +43,9 @@ const RANGE: (f64, f64) = (0.6, 1.3);
 /// A frame and what is true of it. A pixel is a millimetre.
 #[derive(Debug, Clone)]
 pub struct DrawnFrame {
-    /// The picture.
+    /// The image.
     pub frame: Frame,
-    /// The gauge that measures it: the whole picture.
+    /// The gauge that measures it: the whole image.
     pub gauge: Gauge,
     /// Area of the unblurred bead over the gauge's length \[px\]. What is torn open to
     /// the outside is no bead, a hole within it is.

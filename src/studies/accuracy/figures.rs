@@ -38,13 +38,13 @@ pub struct SetFigures {
     pub bias_mm: Option<f64>,
     /// Root of the mean square of the error \[mm\].
     pub rmse_mm: Option<f64>,
-    /// Share of the frames that gave a width.
+    /// Fraction of the frames that gave a width.
     pub measured_fraction: f64,
-    /// Share of the frames that gave a width more than half a pixel off.
+    /// Fraction of the frames that gave a width more than half a pixel off.
     pub silent_fraction: f64,
     /// Root of the mean square of the error over its standard deviation.
     pub rms_over_sigma: Option<f64>,
-    /// Share of the widths whose 95 % interval holds the true one.
+    /// Fraction of the widths whose 95 % interval holds the true one.
     pub within_interval: Option<f64>,
     /// Whether the set's limits are kept; none where it has none.
     pub kept: Option<bool>,

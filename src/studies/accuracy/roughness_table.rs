@@ -8,8 +8,9 @@ use super::fraction;
 use super::table::{FigureRow, number, verdict};
 use crate::numeric::statistics::Moments;
 
-/// Largest median error of roughness and of its correlation length, relative.
+/// Largest relative median error of the roughness.
 const MAX_ROUGHNESS_ERROR: f64 = 0.20;
+/// Largest relative median error of the correlation length.
 const MAX_LENGTH_ERROR: f64 = 0.30;
 /// Smallest and largest root of the mean square of a width's error against the bead's own
 /// mean, over sigma with roughness.
@@ -66,7 +67,7 @@ pub struct RoughnessFigures {
     pub part: &'static str,
     /// Their number.
     pub beads: usize,
-    /// Share whose roughness was determined.
+    /// Fraction whose roughness was determined.
     pub determined_fraction: f64,
     /// Median of found over true roughness.
     pub roughness_median: Option<f64>,

@@ -39,6 +39,7 @@ pub fn camera_above() -> Calibration {
 
 /// Renders a 42 mm bead at several heights and measures it both ways.
 pub fn stand_off(cell: &Cell) -> Result<Vec<StandOff>, RenderError> {
+    /// Shojaei Barjuei et al. 2022, figure 13.
     const WIDTH_MM: f64 = 42.0;
     let calibration = camera_above();
     let point = |step: i32| {

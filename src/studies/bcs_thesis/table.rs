@@ -235,7 +235,7 @@ fn on_the_grid(
     model: &TransferFunction,
     method: DiscretisationMethod,
 ) -> Result<[String; 3], ReproduceError> {
-    /// Bead characterisation thesis, section 4.2: 200 Hz \[s\].
+    /// Sample time \[s\]. Derived: 200 Hz, bead characterisation thesis, § 4.2.
     const DT_S: f64 = 0.005;
     let found = match model.discretise(DT_S, method) {
         Ok(found) => found,

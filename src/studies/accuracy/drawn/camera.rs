@@ -6,10 +6,10 @@ use image::{GrayImage, ImageFormat};
 use super::draw::Draw;
 use super::scene::DrawnScene;
 
-/// White of the camera \[grey levels\].
+/// White of the camera \[grey levels\]. By definition of 8 bits, 2⁸ − 1.
 const WHITE: f64 = 255.0;
 
-/// Pixels of a picture from the light on them.
+/// Pixels of an image from the light on them.
 pub fn expose(light: &[f32], scene: &DrawnScene, draw: &mut Draw) -> Vec<u8> {
     let vignetting = Vignetting::new(scene);
     let pixel = |(number, &light): (usize, &f32)| {
@@ -48,7 +48,7 @@ impl Vignetting {
         Self { columns: width, middle, growth: (scene.vignetting - 1.0) / corner }
     }
 
-    /// Share of the light that reaches a pixel.
+    /// Fraction of the light that reaches a pixel.
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     fn at(&self, number: usize) -> f64 {
         let x = (number % self.columns) as f64 - self.middle.0;
@@ -57,7 +57,7 @@ impl Vignetting {
     }
 }
 
-/// A picture after it was a JPEG; none where it cannot be encoded.
+/// An image after it was a JPEG; none where it cannot be encoded.
 fn compress(pixels: &[u8], width: usize, height: usize, quality: u8) -> Option<Vec<u8>> {
     let (width, height) = (u32::try_from(width).ok()?, u32::try_from(height).ok()?);
     let picture = GrayImage::from_raw(width, height, pixels.to_vec())?;

@@ -11,7 +11,7 @@ pub struct DrawnSet {
     pub name: &'static str,
     /// What is in it, in a line.
     pub about: &'static str,
-    /// Whether the gauge is told the camera's gamma.
+    /// Whether the gauge has the camera's gamma.
     pub knows_gamma: bool,
     /// What must be reached.
     pub requirements: Requirements,
@@ -22,13 +22,13 @@ pub struct DrawnSet {
 /// What a set must reach; what is none is not asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Requirements {
-    /// Smallest share of frames that give a width.
+    /// Smallest fraction of frames that give a width.
     pub measured: Option<f64>,
     /// Largest mean error \[px\], over all and within each third of each range.
     pub bias_px: Option<f64>,
     /// Smallest and largest root mean square of error over sigma, likewise.
     pub z: Option<(f64, f64)>,
-    /// Largest share of frames that are silently wrong.
+    /// Largest fraction of frames that are silently wrong.
     pub silent: Option<f64>,
     /// The only statuses that a refusal may have.
     pub statuses: Option<&'static [&'static str]>,

@@ -16,7 +16,7 @@ use crate::vision::Gauge;
 
 /// Name of its random numbers.
 const NAME: &str = "roughness";
-/// Edges of the bead that wave each for itself.
+/// Independent edges of a bead. By definition of a bead, two.
 const EDGE_COUNT: f64 = 2.0;
 
 /// A bead of so many correlation lengths. A pixel is a millimetre.
@@ -32,7 +32,7 @@ pub struct LongBead {
 /// What the camera sees of it at one moment.
 #[derive(Debug, Clone)]
 pub struct Passage {
-    /// The picture.
+    /// The image.
     pub frame: Frame,
     /// Area of the unblurred bead over the gauge's length \[px\].
     pub truth_px: f64,
@@ -55,7 +55,7 @@ impl LongBead {
         Self { scene, painted, rows, number }
     }
 
-    /// Its gauge: the whole picture.
+    /// Its gauge: the whole image.
     pub fn gauge(&self) -> Gauge {
         super::gauge(&self.scene, false)
     }

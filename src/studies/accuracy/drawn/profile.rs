@@ -2,13 +2,13 @@
 
 use super::draw::Draw;
 
-/// Places of a profile in a pixel.
+/// Points of a profile per pixel.
 pub const POINTS_PER_PX: usize = 4;
 
-/// Where a place of a profile lies \[px\], from the profile's end.
+/// Where a position of a profile lies \[px\], from the profile's end.
 #[expect(clippy::cast_precision_loss, reason = "a few thousand places")]
-pub fn height_of(place: usize) -> f64 {
-    (place as f64 + 0.5) / POINTS_PER_PX as f64
+pub fn height_of(position: usize) -> f64 {
+    (position as f64 + 0.5) / POINTS_PER_PX as f64
 }
 
 /// Deviations of an edge \[px\], [`PER_PX`] a pixel: of the standard deviation
@@ -38,7 +38,7 @@ mod tests {
         let line = rough(count, 2.0, 5.0, &mut Draw::new("test", 2));
         let covariance =
             |lag: usize| line.iter().zip(&line[lag..]).map(|(a, b)| a * b).sum::<f64>() / 400_000.0;
-        // 100,000 px with a correlation length of 5 px hold 10,000 independent places.
+        // 100,000 px with a correlation length of 5 px hold 10,000 independent positions.
         assert!((covariance(0) / 4.0 - 1.0).abs() < 0.06, "{}", covariance(0));
         assert!((covariance(20) / 4.0 - libm::exp(-1.0)).abs() < 0.06, "{}", covariance(20));
     }

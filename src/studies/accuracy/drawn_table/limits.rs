@@ -3,11 +3,14 @@
 use super::figures::{DrawnFigures, SetPart};
 use crate::studies::accuracy::drawn::Requirements;
 
-/// Frames that the limits are made for: figures over as many have no allowance.
+/// Frames for which the limits hold without an allowance: the default of `lab accuracy
+/// --random`.
 const FULL_SET_FRAMES: usize = 30_000;
-/// Standard errors that figures of fewer frames, or of a part of them, may be off.
+/// Standard errors that are allowed for figures of fewer frames or of a part. Derived: three
+/// miss one figure in 370 by chance.
 const ALLOWANCE_SIGMAS: f64 = 3.0;
-/// Fewest measured frames of a part that are judged.
+/// Fewest measured frames of a part that is judged. Derived: a z of 30 frames has a standard
+/// error of 1/√60, 13 %.
 const MIN_FRAMES: usize = 30;
 
 /// What is missed. Shares, and the words of refusals, are judged over all frames of a

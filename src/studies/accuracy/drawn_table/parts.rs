@@ -10,7 +10,7 @@ use crate::studies::accuracy::figures::fraction;
 
 /// Parts of a range, equal in the logarithm.
 const RANGE_PARTS: u32 = 3;
-/// Frames of the largest errors that are listed.
+/// Number of frames with the largest errors that are listed.
 const WORST_FRAMES: usize = 5;
 
 /// Figures of a set: over all frames first, then within the thirds of each range.

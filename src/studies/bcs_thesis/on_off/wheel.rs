@@ -22,7 +22,7 @@ const PRESSURE_MPA: f64 = 0.6;
 const PRESSURE_VARIANCE_MPA2: f64 = 4.98e-5;
 /// Standard deviation of a section \[mm²\], 0.4 % of it: a larger one makes the camera less useful.
 const CAMERA_SIGMA_MM2: f64 = 0.2;
-/// Latency of a section in steps of 1 ms.
+/// Latency of a section. Derived: 20 ms in steps of 1 ms.
 const CAMERA_DELAY_STEPS: usize = 20;
 
 /// Measurements at 50 Hz. The observer knows standard deviation and correlation time of the

@@ -167,7 +167,7 @@ fn a_trace_is_a_stop_and_the_start_after_it() {
     };
     assert!(flow(&trace.stop, 0.0) > 380.0 && flow(&trace.stop, 3.0) < 40.0);
     assert!(flow(&trace.start, 0.5) < 40.0 && flow(&trace.start, 3.5) > 380.0);
-    // The robot leaves its place when its dwell is over.
+    // The robot leaves its position when its dwell is over.
     let demand = |at_s| trace.start.iter().find(|m| m.since_s >= at_s).unwrap().demand_mm3_per_s;
     assert!(demand(0.95) < 1e-9 && demand(1.3) > 390.0);
 }

@@ -49,7 +49,7 @@ fn the_true_width_is_the_area_that_is_counted() {
     for scene in [torn.clone(), DrawnScene { holes, ..torn }, small] {
         for seed in 0..4 {
             let (counted, truth) = counted_width(&scene, seed);
-            // Rounding to a quarter of a pixel in 800 places: 0.072·√2/√400 = 0.005 px.
+            // Rounding to a quarter of a pixel in 800 positions: 0.072·√2/√400 = 0.005 px.
             assert!((counted - truth).abs() < 0.025, "{counted} {truth}");
         }
     }
@@ -67,7 +67,7 @@ fn the_light_of_a_picture_is_that_of_its_areas() {
     assert!((area - bare.truth_px).abs() < 1e-3, "{area} {}", bare.truth_px);
     assert!((sum(&ribbed) - sum(&bare) + 100.0 * 30.0 * 7.3).abs() < 2.0);
     assert!((ribbed.truth_px - bare.truth_px).abs() < 1e-9);
-    // A moved and blurred picture has the same light.
+    // A moved and blurred image has the same light.
     let moved = DrawnScene { blur_px: 3.0, motion_px: 20.0, ..scene.clone() };
     let moved = paint(
         &DrawnScene { edges: Tear { roughness_px: 0.0, ..TORN }, ..moved },
