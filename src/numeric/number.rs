@@ -26,6 +26,12 @@ pub fn floor_to_index(position: f64) -> isize {
     position.floor() as isize
 }
 
+/// The whole number at or below a value; 0 below zero, the largest one beyond it.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+pub fn floor_to_count(value: f64) -> usize {
+    value as usize
+}
+
 /// The nearest number of rows or pixels; 0 of less than none.
 #[expect(
     clippy::cast_possible_truncation,

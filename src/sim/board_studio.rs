@@ -9,6 +9,7 @@ use crate::core::frame::{Frame, Pixels, WrongSize};
 use crate::core::geometry::{GridSize, Pose, Size};
 use crate::core::time::Stamp;
 use crate::numeric::normal_distribution;
+use crate::numeric::number::{floor_to_count, to_f64};
 
 /// Grey level of a board's black squares.
 const BLACK: f64 = 40.0;
@@ -55,10 +56,9 @@ pub struct BoardStudio {
 
 impl BoardStudio {
     /// For images of this size.
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     pub fn new(camera: &Camera, image_size_px: [u32; 2]) -> Self {
         let [width, height] = image_size_px.map(|side| side as usize);
-        let position = |i: usize| Point2::new((i % width) as f64, (i / width) as f64);
+        let position = |i: usize| Point2::new(to_f64(i % width), to_f64(i / width));
         let rays = (0..width * height).map(|i| camera.ray(position(i))).collect();
         Self { size: (width, height), rays }
     }
@@ -89,12 +89,7 @@ impl BoardStudio {
             let pair = hash::normal_pair(hash::mix(&[seed, i as u64 / 2]));
             rounded(grey + exposure.noise_grey * pair[i % 2])
         });
-        Frame::new(
-            0,
-            Stamp::START,
-            Size::new(self.size.0, self.size.1),
-            Pixels::Grey8(values.collect()),
-        )
+        Frame::new(0, Stamp::START, Size::new(width, height), Pixels::Grey8(values.collect()))
     }
 }
 
@@ -131,7 +126,6 @@ struct MarkedBoard {
 }
 
 impl MarkedBoard {
-    #[expect(clippy::cast_precision_loss, reason = "a handful of cells")]
     fn of(board: &Board) -> Option<Self> {
         let count = board.markers()?.dictionary.side() + 2;
         let GridSize { columns, rows } = board.corners();
@@ -139,14 +133,13 @@ impl MarkedBoard {
             (0..(columns + 1) * (rows + 1)).map(|i| (i % (columns + 1), i / (columns + 1)));
         let clear = board.marker_margin();
         Some(Self {
-            cells: (count, (1.0 - 2.0 * clear) / count as f64),
+            cells: (count, (1.0 - 2.0 * clear) / to_f64(count)),
             clearance: clear,
             black: squares.map(|(column, row)| board.black_cells(column, row)).collect(),
         })
     }
 
     /// How much of a position in a square is covered by its marker's black.
-    #[expect(clippy::cast_precision_loss, reason = "a handful of cells")]
     fn black_fraction(&self, square: usize, u: Blurred, v: Blurred) -> f64 {
         let Some(black) = self.black.get(square).filter(|black| !black.is_empty()) else {
             return 0.0;
@@ -154,7 +147,7 @@ impl MarkedBoard {
         let (count, side) = self.cells;
         let along = |Blurred { at, blur }: Blurred| -> Vec<f64> {
             let passed =
-                |line: usize| edge_fraction(at - self.clearance - line as f64 * side, blur);
+                |line: usize| edge_fraction(at - self.clearance - to_f64(line) * side, blur);
             (0..count).map(|cell| passed(cell) - passed(cell + 1)).collect()
         };
         let (across, down) = (along(u), along(v));
@@ -163,7 +156,6 @@ impl MarkedBoard {
 }
 
 impl BoardScene {
-    #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
     fn of(board: &Board, pose: &Pose, exposure: Exposure) -> Self {
         let rotation = pose.rotation();
         let axes = rotation.matrix();
@@ -176,7 +168,7 @@ impl BoardScene {
         let GridSize { columns, rows } = board.corners();
         Self {
             to_board: from_board.try_inverse().unwrap_or_else(Matrix3::zeros),
-            squares: Vector2::new(columns as f64 + 1.0, rows as f64 + 1.0),
+            squares: Vector2::new(to_f64(columns) + 1.0, to_f64(rows) + 1.0),
             exposure,
             markers: MarkedBoard::of(board),
         }
@@ -226,7 +218,6 @@ impl BoardScene {
 
     /// How much of a position is covered by a marker's black: that of its own square alone,
     /// for no marker's blur reaches the next one.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the board")]
     fn marker_fraction(&self, u: Blurred, v: Blurred) -> f64 {
         let Some(marks) = &self.markers else { return 0.0 };
         let (column, row) = (u.at.floor() + 1.0, v.at.floor() + 1.0);
@@ -234,7 +225,7 @@ impl BoardScene {
         if !within(column, self.squares.x) || !within(row, self.squares.y) {
             return 0.0;
         }
-        let square = row as usize * self.squares.x as usize + column as usize;
+        let square = floor_to_count(row) * floor_to_count(self.squares.x) + floor_to_count(column);
         let within_square = |c: Blurred| Blurred { at: c.at - c.at.floor(), ..c };
         marks.black_fraction(square, within_square(u), within_square(v))
     }

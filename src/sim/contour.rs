@@ -1,7 +1,7 @@
 //! One edge of a bead as a function of the position along the gauge's axis.
 
 use super::outline::OutlineSample;
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{floor_to_count, to_f64};
 
 /// An edge, row by row of a vertical bead; all in pixels.
 #[derive(Debug, Clone)]
@@ -93,11 +93,5 @@ impl Contour {
 
 /// The whole number at or below a position, from 0 to `count`.
 pub fn clamp_index(position: f64, count: usize) -> usize {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "saturates at 0, and at the picture's side right after"
-    )]
-    let number = position as usize;
-    number.min(count)
+    floor_to_count(position).min(count)
 }

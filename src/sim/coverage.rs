@@ -7,6 +7,7 @@ use super::motion::ShutterPosition;
 use super::shade::BeadShape;
 use super::tint::{BeadLine, Tint};
 use super::view::GaugeExtent;
+use crate::numeric::number::narrow_to_f32;
 use crate::scenario::image::ImageModel;
 
 /// Pixels line after line across the bead, until they are turned.
@@ -36,8 +37,7 @@ impl BeadCoverage {
         let mut added = tint.map(|_| vec![0.0; run * cross]);
         let mut line = Vec::with_capacity(cross);
         for ShutterPosition { weight, shift_px } in positions {
-            #[expect(clippy::cast_possible_truncation, reason = "a weight")]
-            let weight = *weight as f32;
+            let weight = narrow_to_f32(*weight);
             for at in 0..run {
                 let Some(first) = shape.line(at, *shift_px, &mut line) else { continue };
                 let start = at * cross + first;

@@ -5,7 +5,7 @@ use super::convolve::{convolve, kernel};
 use super::motion::ShutterPosition;
 use super::shade::BeadShape;
 use super::view::GaugeExtent;
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{narrow_to_f32, to_f64};
 
 /// Points along the side of a pixel. Derived: 4² points fill the 16 bits of a mask.
 const POINTS_PER_SIDE: usize = 4;
@@ -104,9 +104,7 @@ impl Backdrop<'_> {
                 let [ground, bead] = self.grey;
                 let disc = (layer.grey)(at, number) - f64::from(self.tint[at * cross + number]);
                 let on_ground = if layer.bead_only { 0.0 } else { outside * (disc - ground) };
-                #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
-                let grey = (on_ground + inside * (disc - bead)) as f32;
-                change[at * cross + number] += grey;
+                change[at * cross + number] += narrow_to_f32(on_ground + inside * (disc - bead));
             }
         }
     }

@@ -1,6 +1,7 @@
 //! A flow that drifts along the path: a random walk of its logarithm.
 
 use super::hash;
+use crate::numeric::number::floor_to_count;
 
 /// Distance between the nodes of the random walk \[mm\], linear in between: less than half a
 /// gauge.
@@ -30,12 +31,7 @@ impl FlowDrift {
             return 1.0;
         }
         let position = path_mm / NODE_MM;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "not negative, and short of any path"
-        )]
-        let node = position as usize;
+        let node = floor_to_count(position);
         while self.nodes.len() < node + 2 {
             let number = self.nodes.len() as u64;
             let [step, _] = hash::normal_pair(hash::mix(&[self.seed, DRIFT_STREAM, number]));

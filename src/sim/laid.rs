@@ -2,6 +2,7 @@
 
 use super::flow_drift::FlowDrift;
 use super::waviness::Waviness;
+use crate::numeric::number::{floor_to_count, to_f64};
 use crate::scenario::bead::{BeadModel, EdgeRoughness};
 use crate::scenario::disturbance::Flow;
 
@@ -196,14 +197,8 @@ impl Strip {
     fn cell(&self, path_mm: f64, step_mm: f64) -> Option<(&Node, &Node, f64)> {
         #[expect(clippy::cast_precision_loss, reason = "node numbers stay below 2^53")]
         let position = path_mm / step_mm - self.first as f64;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "not negative within the strip"
-        )]
-        let number = (position.max(0.0) as usize).min(self.nodes.len().checked_sub(2)?);
-        #[expect(clippy::cast_precision_loss, reason = "node numbers stay below 2^53")]
-        let fraction = position - number as f64;
+        let number = floor_to_count(position).min(self.nodes.len().checked_sub(2)?);
+        let fraction = position - to_f64(number);
         Some((self.nodes.get(number)?, self.nodes.get(number + 1)?, fraction))
     }
 

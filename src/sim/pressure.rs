@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 use super::hash::{mix, normal_pair};
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::pressure::{Fopdt, InitialState};
+use crate::numeric::number::floor_to_count;
 
 /// Step of the plant \[s\]: papers.md, "002", 5 ms.
 pub const TICK_S: f64 = 0.005;
@@ -61,11 +62,6 @@ pub struct SimPressure {
 
 impl SimPressure {
     /// As it has run for ever.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "at most 60 s of ticks"
-    )]
     pub fn new(
         process: Fopdt,
         disturbed: Disturbances,
@@ -76,14 +72,13 @@ impl SimPressure {
         // A dead time of whole ticks must not lose one to rounding.
         let whole = (ticks + 1e-9).floor();
         let speed_rpm = running.speed.get();
-        let mut under_way = VecDeque::with_capacity(whole as usize + 2);
-        under_way.resize(whole as usize + 2, speed_rpm);
+        let count = floor_to_count(whole);
         Self {
             process,
             disturbances: disturbed,
             fastest_rpm: fastest.get(),
-            delayed_speeds: under_way,
-            ticks: whole as usize,
+            delayed_speeds: VecDeque::from(vec![speed_rpm; count + 2]),
+            ticks: count,
             fractional_tick: (ticks - whole).max(0.0),
             speed_rpm,
             pressure: running.pressure.get(),

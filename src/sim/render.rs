@@ -141,12 +141,8 @@ impl Renderer {
         let seen = outline.as_ref().map(|outline| self.coverage(seq, outline, &view));
         let pixels = self.expose(seq, seen.as_ref());
         let truth = outline.and_then(|outline| truth::of(&outline, &view, &self.gauge));
-        let frame = Frame::new(
-            seq,
-            captured_at,
-            Size::new(self.size.0, self.size.1),
-            Pixels::Grey8(pixels),
-        )?;
+        let size = Size::new(self.size.0, self.size.1);
+        let frame = Frame::new(seq, captured_at, size, Pixels::Grey8(pixels))?;
         Ok(Rendered { frame, truth })
     }
 

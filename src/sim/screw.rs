@@ -3,6 +3,7 @@
 
 use crate::extruder::screw::feed_history::FeedHistory;
 use crate::extruder::screw::{Conveying, Screw};
+use crate::numeric::number::floor_to_count;
 
 /// How the plant is integrated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,8 +37,7 @@ impl SimScrew {
         plug_m: f64,
         before: f64,
     ) -> Self {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-        let room = (screw.longest_delay() / step_s).ceil() as usize + 4;
+        let room = floor_to_count((screw.longest_delay() / step_s).ceil()) + 4;
         let feed = FeedHistory::new(room, before);
         Self { screw, integrator, step_s, ticks: 0, plug_m, feed }
     }

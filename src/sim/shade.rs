@@ -5,7 +5,7 @@ use super::contour::{Contour, clamp_index};
 use super::edge::coverage;
 use super::outline::{BeadOutline, LaidSegment};
 use super::view::{BeadView, GaugeExtent};
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{narrow_to_f32, to_f64};
 
 /// Distance at which a Gaussian ends, in standard deviations. Derived: Φ(−5) = 3·10⁻⁷ of a step
 /// is left.
@@ -70,8 +70,7 @@ impl BeadShape {
                 if position > solid_from { 1.0 } else { self.edge_fraction(0, at, position) };
             let from_right =
                 if position < solid_to { 1.0 } else { self.edge_fraction(1, at, position) };
-            #[expect(clippy::cast_possible_truncation, reason = "a share of one pixel")]
-            line.push((from_left + from_right - 1.0).max(0.0) as f32);
+            line.push(narrow_to_f32((from_left + from_right - 1.0).max(0.0)));
         }
         if !self.ends.is_empty() {
             for (fraction, number) in line.iter_mut().zip(first..) {
@@ -97,9 +96,8 @@ impl BeadShape {
 
     /// Fraction of a pixel that lies between the ends of any segment, blurred like
     /// the edges.
-    #[expect(clippy::cast_possible_truncation, reason = "a share of one pixel")]
     pub fn laid_fraction(&self, at: f64, position: f64) -> f32 {
-        self.laid(at, position, self.blur_px) as f32
+        narrow_to_f32(self.laid(at, position, self.blur_px))
     }
 
     /// Fraction of a pixel that lies between the ends of any segment.

@@ -4,7 +4,7 @@
 use super::contour::clamp_index;
 use super::shade::{BeadShape, GAUSSIAN_REACH_SIGMAS};
 use crate::numeric::normal_distribution::{cumulative, first_integral};
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::scenario::image::ImageModel;
 
 /// Points of a profile per pixel, linear in between.
@@ -162,9 +162,7 @@ impl Profile {
                 let u = (at - knee.at_px) / blur_px;
                 knee.step_grey * cumulative(u) + knee.grey_per_px * blur_px * first_integral(u)
             };
-            #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
-            let grey = knees.iter().map(of).sum::<f64>() as f32;
-            grey
+            narrow_to_f32(knees.iter().map(of).sum::<f64>())
         });
         Self { from_px, grey: grey.collect() }
     }
@@ -175,8 +173,7 @@ impl Profile {
         let Some(last) = self.grey.last().filter(|_| position > 0.0) else { return 0.0 };
         let number = clamp_index(position, self.grey.len());
         let Some([a, b]) = self.grey.get(number..number + 2) else { return *last };
-        #[expect(clippy::cast_possible_truncation, reason = "within 0 to 1")]
-        let fraction = (position - to_f64(number)) as f32;
+        let fraction = narrow_to_f32(position - to_f64(number));
         a + (b - a) * fraction
     }
 }

@@ -3,6 +3,7 @@
 use super::outline::{BeadOutline, OutlineSample};
 use super::view::{AxisPoint, BeadView, gauge_middle};
 use crate::core::geometry::ImagePoint;
+use crate::numeric::number::to_f64;
 use crate::vision::{BeadAxis, Gauge};
 
 /// What a perfect measurement of a rendered frame would find.
@@ -29,8 +30,7 @@ pub(super) fn of(outline: &BeadOutline, view: &BeadView, gauge: &Gauge) -> Optio
         BeadAxis::Vertical => (middle.y, gauge.roi.height),
         BeadAxis::Horizontal => (middle.x, gauge.roi.width),
     };
-    #[expect(clippy::cast_precision_loss, reason = "pixel numbers stay far below 2^53")]
-    let half = count as f64 / 2.0;
+    let half = to_f64(count) / 2.0;
     let segment = |side: usize| {
         let a = outline.along_at(side, run - half)?;
         let b = outline.along_at(side, run + half)?;

@@ -10,6 +10,7 @@ use nalgebra::Vector2;
 use super::bead_path::BeadPath;
 use crate::calibration::SurfaceMap;
 use crate::core::geometry::{ImagePoint, Roi, SurfacePoint};
+use crate::numeric::number::to_f64;
 use crate::vision::{BeadAxis, Gauge};
 
 /// Positions on the surface by their distance along the bead \[mm\], counted from
@@ -29,8 +30,7 @@ pub struct BeadView {
 
 /// The middle of the gauge \[px\].
 pub fn gauge_middle(roi: &Roi) -> ImagePoint {
-    #[expect(clippy::cast_precision_loss, reason = "pixel numbers stay far below 2^53")]
-    let middle = |first: usize, count: usize| first as f64 + (count as f64 - 1.0) / 2.0;
+    let middle = |first: usize, count: usize| to_f64(first) + (to_f64(count) - 1.0) / 2.0;
     ImagePoint::new(middle(roi.x, roi.width), middle(roi.y, roi.height))
 }
 

@@ -9,6 +9,7 @@ use crate::calibration::Calibration;
 use crate::cell::file::{Cell, RunPart};
 use crate::core::units::Mm;
 use crate::numeric::average::{mean, median};
+use crate::numeric::number::{floor_to_count, to_f64};
 use crate::sim::cell::SimCellError;
 use crate::width_control::target::WidthTarget;
 
@@ -61,8 +62,7 @@ impl SeedStatistics {
     /// Of a number of each seed.
     pub fn of(mut values: Vec<f64>) -> Self {
         let finite = values.iter().all(|value| value.is_finite());
-        #[expect(clippy::cast_precision_loss, reason = "seeds are few")]
-        let count = values.len() as f64;
+        let count = to_f64(values.len());
         let middle = mean(values.iter().copied());
         let variance = mean(values.iter().map(|value| (value - middle).powi(2)));
         let spread = (variance / (count - 1.0).max(1.0)).sqrt();
@@ -153,19 +153,14 @@ impl Figures {
 fn error_profile(trials: &[LayerTrial], target_mm: f64) -> Vec<BeadPoint> {
     let mut pieces: Vec<(f64, f64)> = Vec::new();
     for (at, width) in trials.iter().flat_map(|trial| &trial.bead) {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a path")]
-        let piece = (at / PIECE_MM).max(0.0) as usize;
+        let piece = floor_to_count(at / PIECE_MM);
         if pieces.len() <= piece {
             pieces.resize(piece + 1, (0.0, 0.0));
         }
         pieces[piece].0 += (width - target_mm).powi(2);
         pieces[piece].1 += 1.0;
     }
-    let middle = |number: usize| {
-        #[expect(clippy::cast_precision_loss, reason = "a path is not that long")]
-        let number = number as f64;
-        (number + 0.5) * PIECE_MM
-    };
+    let middle = |number: usize| (to_f64(number) + 0.5) * PIECE_MM;
     let known = pieces.iter().enumerate().filter(|(_, (_, count))| *count > 0.0);
     known.map(|(number, (sum, count))| (middle(number), (sum / count).sqrt())).collect()
 }

@@ -4,7 +4,9 @@ use serde::Serialize;
 
 use super::INTERVAL_SIGMAS;
 use super::calibrations::{CalibratedWidth, CalibrationCase, CornerSource};
+use super::figures::fraction;
 use super::table::{FigureRow, number, verdict};
+use crate::numeric::number::to_f64;
 
 /// Largest deviation from 1 of the RMS error over the predicted standard deviation.
 const MAX_RATIO_DEVIATION: f64 = 0.10;
@@ -53,7 +55,6 @@ struct BeadFigures {
 
 impl CalibrationFigures {
     /// Out of the widths of each trial.
-    #[expect(clippy::cast_precision_loss, reason = "counts of trials")]
     pub fn of(
         case: &CalibrationCase,
         source: CornerSource,
@@ -63,9 +64,8 @@ impl CalibrationFigures {
         let beads = found.first().map_or(0, |first| first.len());
         let each: Vec<BeadFigures> = (0..beads).map(|bead| of_bead(&found, bead)).collect();
         let all = || found.iter().flat_map(|outcomes| outcomes.iter());
-        let held =
-            all().filter(|o| o.error_mm.abs() <= INTERVAL_SIGMAS * o.sigma_mm).count() as f64;
-        let within_interval = held / all().count().max(1) as f64;
+        let held = all().filter(|o| o.error_mm.abs() <= INTERVAL_SIGMAS * o.sigma_mm).count();
+        let within_interval = fraction(held, all().count());
         let ends = |value: fn(&BeadFigures) -> f64| {
             let values = || each.iter().map(value);
             [values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max)]
@@ -83,7 +83,7 @@ impl CalibrationFigures {
             found: found.len(),
             rms_error_fraction: ends(|bead| bead.rms_error_fraction),
             ratio: ends(|bead| bead.ratio),
-            ratio_of_all: (squares / each.len().max(1) as f64).sqrt(),
+            ratio_of_all: (squares / to_f64(each.len().max(1))).sqrt(),
             within_interval,
             bias_over_sigma: ends(|bead| bead.bias_over_sigma.abs())[1],
             missed: Vec::new(),
@@ -93,9 +93,8 @@ impl CalibrationFigures {
     }
 
     /// Few trials leave a figure open by itself: so much is granted.
-    #[expect(clippy::cast_precision_loss, reason = "counts of trials")]
     fn misses(&self) -> Vec<String> {
-        let trials = self.found.max(1) as f64;
+        let trials = to_f64(self.found.max(1));
         let open = MAX_RATIO_DEVIATION.max(ALLOWANCE_SIGMAS / (2.0 * trials).sqrt());
         let open_share = ALLOWANCE_SIGMAS * (0.95 * 0.05 / trials).sqrt();
         let mut missed = Vec::new();
@@ -118,10 +117,9 @@ impl CalibrationFigures {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "counts of trials")]
 fn of_bead(found: &[&Vec<CalibratedWidth>], bead: usize) -> BeadFigures {
     let outcomes = || found.iter().filter_map(|outcomes| outcomes.get(bead));
-    let count = outcomes().count().max(1) as f64;
+    let count = to_f64(outcomes().count().max(1));
     let mean = |value: fn(&CalibratedWidth) -> f64| outcomes().map(value).sum::<f64>() / count;
     BeadFigures {
         rms_error_fraction: mean(|o| (o.error_mm / o.width_mm).powi(2)).sqrt(),

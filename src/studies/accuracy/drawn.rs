@@ -61,12 +61,8 @@ impl DrawnSet {
         let scene = (self.scene)(&mut draw);
         let painted = paint::paint(&scene, &mut draw);
         let pixels = camera::expose(&painted.light, &scene, &mut draw);
-        let frame = Frame::new(
-            number,
-            Stamp::START,
-            Size::new(scene.size.0, scene.size.1),
-            Pixels::Grey8(pixels),
-        )?;
+        let size = Size::new(scene.size.0, scene.size.1);
+        let frame = Frame::new(number, Stamp::START, size, Pixels::Grey8(pixels))?;
         let gauge = gauge(&scene, self.knows_gamma);
         Ok(DrawnFrame { frame, gauge, truth_px: painted.truth_px, parameters: draw.record() })
     }

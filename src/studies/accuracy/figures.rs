@@ -1,5 +1,6 @@
 //! Figures of one set, and those that miss their limit.
 
+use crate::numeric::number::to_f64;
 use std::fmt;
 
 use serde::Serialize;
@@ -85,9 +86,8 @@ fn short(value: f64) -> f64 {
     (value * scale).round() / scale
 }
 
-#[expect(clippy::cast_precision_loss, reason = "no set has 2^53 frames")]
 pub(super) fn fraction(part: usize, of: usize) -> f64 {
-    part as f64 / of.max(1) as f64
+    to_f64(part) / to_f64(of.max(1))
 }
 
 #[cfg(test)]

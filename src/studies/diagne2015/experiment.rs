@@ -7,6 +7,7 @@ use super::{
 };
 use crate::extruder::screw::control::Scheme;
 use crate::extruder::screw::{FillFeedback, Screw, TurnUnit};
+use crate::numeric::number::floor_to_count;
 use crate::sim::screw::delay_free;
 
 /// By definition.
@@ -121,9 +122,7 @@ fn oracle(
     let times = (0_u32..).map(|tick| (first + f64::from(tick)) * STEP_S);
     let points = times.zip(lengths.map(|length| length * MM_PER_M));
     let points = points.take_while(|(at_s, _)| *at_s <= SHORT_S).collect();
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-    let number = first as usize;
-    (number, points)
+    (floor_to_count(first), points)
 }
 
 fn soonest(screw: &Screw, first_effect_s: f64) -> f64 {

@@ -1,5 +1,6 @@
 //! The response of a run, and its figures.
 
+use crate::numeric::number::to_f64;
 /// One sample of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlugSample {
@@ -48,7 +49,7 @@ impl PlugResponse {
     pub fn rms_mm(&self, plug_mm: f64, after_s: f64) -> f64 {
         let samples = self.after(after_s);
         let sum: f64 = samples.iter().map(|sample| (sample.plug_mm - plug_mm).powi(2)).sum();
-        (sum / count(samples)).sqrt()
+        (sum / to_f64(samples.len().max(1))).sqrt()
     }
 
     /// Root mean square change of the feed from step to step after a time: the activity of the
@@ -56,7 +57,7 @@ impl PlugResponse {
     pub fn feed_change(&self, after_s: f64) -> f64 {
         let samples = self.after(after_s);
         let changes = samples.windows(2).map(|pair| (pair[1].fill - pair[0].fill).powi(2));
-        (changes.sum::<f64>() / count(samples)).sqrt()
+        (changes.sum::<f64>() / to_f64(samples.len().max(1))).sqrt()
     }
 
     /// The limit cycle about a length after a time; none where the plug moves by less than a
@@ -91,11 +92,6 @@ impl PlugResponse {
         let first = self.samples.partition_point(|sample| sample.at_s < after_s);
         self.samples.get(first..).unwrap_or_default()
     }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "far fewer samples than 2⁵³")]
-fn count(samples: &[PlugSample]) -> f64 {
-    samples.len().max(1) as f64
 }
 
 /// When a pair of samples crosses a level in either direction.

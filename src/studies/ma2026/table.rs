@@ -9,6 +9,7 @@ use crate::core::units::{Mm, MmPerS};
 use crate::extruder::demand;
 use crate::extruder::rheology::PowerLaw;
 use crate::io::progress::Progress;
+use crate::numeric::number::to_f64;
 use crate::report::chart::palette;
 use crate::report::chart::palette::Ink;
 use crate::report::chart::range::Range;
@@ -228,13 +229,12 @@ impl Work {
         all.map(|(tried, ink)| Ok((tried.name(), ink, experiment.run(tried)?))).collect()
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "a count of seeds")]
     fn mean(
         &self,
         figure: impl Fn(u64) -> Result<f64, ReproduceError>,
     ) -> Result<f64, ReproduceError> {
         let all = (0..self.seeds).map(figure).collect::<Result<Vec<f64>, _>>()?;
-        Ok(all.iter().sum::<f64>() / all.len().max(1) as f64)
+        Ok(all.iter().sum::<f64>() / to_f64(all.len().max(1)))
     }
 }
 

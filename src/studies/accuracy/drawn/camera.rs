@@ -5,6 +5,7 @@ use image::{GrayImage, ImageFormat};
 
 use super::draw::Draw;
 use super::scene::DrawnScene;
+use crate::numeric::number::to_f64;
 
 /// White of the camera \[grey levels\]. By definition of 8 bits, 2⁸ − 1.
 const WHITE: f64 = 255.0;
@@ -40,19 +41,17 @@ struct Vignetting {
 }
 
 impl Vignetting {
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     fn new(scene: &DrawnScene) -> Self {
         let (width, height) = scene.size;
-        let middle = (0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
+        let middle = (0.5 * (to_f64(width) - 1.0), 0.5 * (to_f64(height) - 1.0));
         let corner = middle.0.powi(2) + middle.1.powi(2);
         Self { columns: width, middle, growth: (scene.vignetting - 1.0) / corner }
     }
 
     /// Fraction of the light that reaches a pixel.
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     fn at(&self, number: usize) -> f64 {
-        let x = (number % self.columns) as f64 - self.middle.0;
-        let y = (number / self.columns) as f64 - self.middle.1;
+        let x = to_f64(number % self.columns) - self.middle.0;
+        let y = to_f64(number / self.columns) - self.middle.1;
         1.0 / (1.0 + self.growth * (x * x + y * y))
     }
 }

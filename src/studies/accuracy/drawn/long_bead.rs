@@ -11,6 +11,7 @@ use super::scene::DrawnScene;
 use crate::core::frame::{Frame, Pixels, WrongSize};
 use crate::core::geometry::Size;
 use crate::core::time::Stamp;
+use crate::numeric::number::floor_to_count;
 use crate::sim::hash;
 use crate::vision::Gauge;
 
@@ -43,13 +44,7 @@ impl LongBead {
     pub fn draw(number: u64, lengths: f64) -> Self {
         let mut draw = Draw::new(NAME, number);
         let scene = recipes::torn(&mut draw);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a few thousand rows"
-        )]
-        let rows = (lengths * scene.edges.length_px).ceil() as usize;
-        let rows = rows.max(scene.size.1);
+        let rows = floor_to_count((lengths * scene.edges.length_px).ceil()).max(scene.size.1);
         let long = DrawnScene { size: (scene.size.0, rows), ..scene.clone() };
         let painted = paint(&long, &mut draw);
         Self { scene, painted, rows, number }
@@ -98,8 +93,8 @@ impl LongBead {
         let light = &self.painted.light[first_row * size.0..last_row * size.0];
         let mut noise = Draw::new(NAME, hash::mix(&[self.number, frame]));
         let pixels = camera::expose(light, &self.scene, &mut noise);
-        let frame =
-            Frame::new(frame, Stamp::START, Size::new(size.0, size.1), Pixels::Grey8(pixels))?;
+        let size = Size::new(size.0, size.1);
+        let frame = Frame::new(frame, Stamp::START, size, Pixels::Grey8(pixels))?;
         Ok(Passage { frame, truth_px: self.painted.mean_width_px(first_row..last_row) })
     }
 }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::draw::Draw;
 use super::profile::{height_of, rough};
 use super::scene::{DrawnScene, Groove, Holes};
+use crate::numeric::number::to_f64;
 
 /// Smallest width of a groove over its mean, so that its two rough sides do not cross.
 const MIN_GROOVE: f64 = 0.2;
@@ -66,8 +67,7 @@ impl DrawnOutline {
     /// Draws the boundaries of so many lines. Position and width of the bead differ from
     /// frame to frame by up to a pixel.
     pub fn draw(scene: &DrawnScene, count: usize, draw: &mut Draw) -> Self {
-        #[expect(clippy::cast_precision_loss, reason = "pixels of a row")]
-        let middle = scene.size.0 as f64 / 2.0;
+        let middle = to_f64(scene.size.0) / 2.0;
         let bead = Straight {
             axis: middle + draw.between(-scene.position_jitter_px, scene.position_jitter_px),
             half: scene.width_px / 2.0 + draw.between(-0.5, 0.5),
@@ -106,9 +106,7 @@ impl DrawnOutline {
     pub fn mean_width(&self, lines: Range<usize>) -> f64 {
         let count = lines.len().max(1);
         let widths = self.left[lines.clone()].iter().zip(&self.right[lines]);
-        #[expect(clippy::cast_precision_loss, reason = "a few thousand lines")]
-        let mean = widths.map(|(left, right)| right - left).sum::<f64>() / count as f64;
-        mean
+        widths.map(|(left, right)| right - left).sum::<f64>() / to_f64(count)
     }
 
     /// What lies along a line, from left to right; the first begins beyond the

@@ -9,6 +9,7 @@ use super::draw::Draw;
 use super::outline::{BrightnessStep, DrawnOutline};
 use super::profile::POINTS_PER_PX;
 use super::scene::DrawnScene;
+use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f64};
 use crate::scenario::image::TexturePattern;
 use crate::sim::convolve::{convolve_lines, kernel};
 use crate::sim::edge::coverage;
@@ -93,46 +94,33 @@ impl StepTable {
     /// Of a blur and a motion across the step \[px\].
     fn new(blur_px: f64, motion_px: f64) -> Self {
         let reach_px = REACH_BLURS * blur_px + 0.5 * (1.0 + motion_px);
-        let value = |position: u32| {
-            let inside = f64::from(position) / TABLE_POINTS_PER_PX - reach_px;
+        let value = |position: usize| {
+            let inside = to_f64(position) / TABLE_POINTS_PER_PX - reach_px;
             // The mean over the pixel and over the motion: two sides of one box.
             coverage(inside, [1.0, motion_px], blur_px)
         };
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small")]
-        let last = (2.0 * reach_px * TABLE_POINTS_PER_PX).ceil() as u32;
+        let last = floor_to_count((2.0 * reach_px * TABLE_POINTS_PER_PX).ceil());
         Self { reach_px, values: (0..=last).map(value).collect() }
     }
 
     /// The step so far inside it, within the table's reach.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "a place within the table"
-    )]
     fn at(&self, inside_px: f64) -> f64 {
         let position = ((inside_px + self.reach_px) * TABLE_POINTS_PER_PX).max(0.0);
-        let below = position as usize;
+        let below = floor_to_count(position);
         match self.values.get(below..below + 2) {
-            Some(ends) => ends[0] + (position - below as f64) * (ends[1] - ends[0]),
+            Some(ends) => ends[0] + (position - to_f64(below)) * (ends[1] - ends[0]),
             None => 1.0,
         }
     }
 
     /// Fills a row of pixels with the mean of its lines.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "pixels of a row; saturating at its ends is meant"
-    )]
     fn fill(
         &self,
         row: &mut [f32],
         lines: impl Iterator<Item = Vec<BrightnessStep>>,
         value: &dyn Fn(&BrightnessStep) -> f64,
     ) {
-        let fraction = 1.0 / POINTS_PER_PX as f64;
+        let fraction = 1.0 / to_f64(POINTS_PER_PX);
         let mut flanks = vec![0.0; row.len()];
         // What is complete from a pixel on.
         let mut complete = vec![0.0; row.len() + 1];
@@ -141,11 +129,11 @@ impl StepTable {
             for pair in steps.windows(2) {
                 let height = fraction * (value(&pair[1]) - value(&pair[0]));
                 let at = pair[1].at_px - 0.5;
-                let from = ((at - self.reach_px).ceil().max(0.0) as usize).min(row.len());
-                let to = ((at + self.reach_px).floor().max(-1.0) + 1.0) as usize;
+                let from = floor_to_count((at - self.reach_px).ceil()).min(row.len());
+                let to = floor_to_count((at + self.reach_px).floor() + 1.0);
                 let to = to.clamp(from, row.len());
                 for (pixel, flank) in flanks.iter_mut().enumerate().take(to).skip(from) {
-                    *flank += height * self.at(pixel as f64 - at);
+                    *flank += height * self.at(to_f64(pixel) - at);
                 }
                 complete[to] += height;
             }
@@ -153,7 +141,7 @@ impl StepTable {
         let mut level = 0.0;
         for ((pixel, flank), step) in row.iter_mut().zip(flanks).zip(complete) {
             level += step;
-            *pixel = (level + flank) as f32;
+            *pixel = narrow_to_f32(level + flank);
         }
     }
 }

@@ -1,14 +1,14 @@
 //! An edge as a random line: a stationary Gauss–Markov process.
 
 use super::draw::Draw;
+use crate::numeric::number::to_f64;
 
 /// Points of a profile per pixel.
 pub const POINTS_PER_PX: usize = 4;
 
 /// Where a position of a profile lies \[px\], from the profile's end.
-#[expect(clippy::cast_precision_loss, reason = "a few thousand places")]
 pub fn height_of(position: usize) -> f64 {
-    (position as f64 + 0.5) / POINTS_PER_PX as f64
+    (to_f64(position) + 0.5) / to_f64(POINTS_PER_PX)
 }
 
 /// Deviations of an edge \[px\], [`PER_PX`] a pixel: of the standard deviation
@@ -17,8 +17,7 @@ pub fn rough(count: usize, roughness_px: f64, length_px: f64, draw: &mut Draw) -
     if roughness_px <= 0.0 {
         return vec![0.0; count];
     }
-    #[expect(clippy::cast_precision_loss, reason = "small")]
-    let keep = libm::exp(-1.0 / (length_px * POINTS_PER_PX as f64));
+    let keep = libm::exp(-1.0 / (length_px * to_f64(POINTS_PER_PX)));
     let fresh = (1.0 - keep * keep).sqrt();
     let mut last = draw.normal();
     let deviations = (0..count).map(|_| {

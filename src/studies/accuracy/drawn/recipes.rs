@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use super::draw::Draw;
 use super::scene::{DrawnScene, Groove, Holes, Patches, Rib, Tear};
+use crate::numeric::number::floor_to_count;
 
 /// Roughness of torn edges \[px\].
 const TORN_PX: Range<f64> = 0.5..6.0;
@@ -125,7 +126,7 @@ pub fn torn(draw: &mut Draw) -> DrawnScene {
 /// Closed holes within the bead, and bays in its edges through which the ground is seen.
 pub fn holes(draw: &mut Draw) -> DrawnScene {
     let size_px = draw.log("hole_px", HOLE_PX);
-    let count = whole(draw.log("bays", BAYS));
+    let count = floor_to_count(draw.log("bays", BAYS).round());
     let grey = draw.log("hole_grey", GROOVE_GREY);
     DrawnScene { holes: Some(Holes { count, size_px, grey }), ..usual(draw) }
 }
@@ -206,7 +207,7 @@ pub fn gamma(draw: &mut Draw, range: Range<f64>) -> DrawnScene {
 /// A frame that was a JPEG.
 pub fn jpeg(draw: &mut Draw) -> DrawnScene {
     let quality = draw.log("quality", QUALITY);
-    let jpeg = u8::try_from(whole(quality)).ok();
+    let jpeg = u8::try_from(floor_to_count(quality.round())).ok();
     DrawnScene { jpeg, position_jitter_px: 0.5 * BLOCK_PX, ..usual(draw) }
 }
 
@@ -230,10 +231,4 @@ pub fn narrow(draw: &mut Draw) -> DrawnScene {
     let roughness_px = scene.edges.roughness_px.min(NARROW_ROUGHNESS * width_px);
     let edges = Tear { roughness_px, ..scene.edges };
     DrawnScene { width_px, edges, blur_px, ..scene }
-}
-
-/// The nearest count.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small count")]
-fn whole(value: f64) -> usize {
-    value.round() as usize
 }

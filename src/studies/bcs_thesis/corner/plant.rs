@@ -3,6 +3,7 @@
 use super::scenario::{BEAD, CornerError, JUDGED_MM, Scenario, UNMODELLED};
 use crate::numeric::average::{mean, standard_deviation};
 use crate::numeric::lti::{Between, Simulator};
+use crate::numeric::number::{floor_to_count, to_f64};
 use crate::plan::SpeedProfile;
 use crate::sim::hash::{mix, normal_pair};
 use crate::studies::bcs_thesis::{drive, flow};
@@ -144,7 +145,8 @@ impl CornerRun {
     pub fn change(&self) -> f64 {
         let first = self.flow.first().copied().unwrap_or(0.0);
         let changed = |flow: &f64| (flow - first).abs() > MIN_FLOW_CHANGE * first;
-        let judged = [-JUDGED_MM, JUDGED_MM].map(|at| floor_index(self.speed.time_at(at) / STEP_S));
+        let judged =
+            [-JUDGED_MM, JUDGED_MM].map(|at| floor_to_count(self.speed.time_at(at) / STEP_S));
         let from = self.flow.iter().position(changed).unwrap_or(judged[0]).min(judged[0]);
         let to = self.flow.iter().rposition(changed).unwrap_or(judged[1]).max(judged[1]);
         deviation(&self.flow, from, to).max(deviation(&self.flow, judged[0], judged[1]))
@@ -159,11 +161,10 @@ impl CornerRun {
         let volume: Vec<f64> = std::iter::once(0.0).chain(grown).collect();
         let (full, half) = (BEAD.area_mm2 * length_mm, 0.5 * length_mm);
         let at = |time_s: f64| {
-            let step = floor_index(time_s / STEP_S).min(volume.len().saturating_sub(2));
+            let step = floor_to_count(time_s / STEP_S).min(volume.len().saturating_sub(2));
             let first = volume.get(step).copied().unwrap_or(0.0);
             let next = volume.get(step + 1).copied().unwrap_or(first);
-            #[expect(clippy::cast_precision_loss, reason = "a few seconds of milliseconds")]
-            let fraction = time_s / STEP_S - step as f64;
+            let fraction = time_s / STEP_S - to_f64(step);
             first + fraction * (next - first)
         };
         let until = |path_mm| at(self.speed.time_at(path_mm));
@@ -188,9 +189,4 @@ fn mean_square(values: &[f64]) -> f64 {
 
 fn deviation(flow: &[f64], from: usize, to: usize) -> f64 {
     standard_deviation(flow.get(from..to.min(flow.len())).unwrap_or_default())
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a short time")]
-fn floor_index(steps: f64) -> usize {
-    steps.max(0.0) as usize
 }

@@ -4,6 +4,7 @@ use crate::core::time::Stamp;
 use crate::extruder::feedforward::FeedforwardError;
 use crate::numeric::average::mean;
 use crate::numeric::lti::{Between, Simulator};
+use crate::numeric::number::floor_to_count;
 use crate::sim::hash::{mix, normal_pair};
 use crate::studies::bcs_thesis::{drive, flow};
 
@@ -76,7 +77,6 @@ pub(super) fn at(step: u64) -> Stamp {
     Stamp::from_ns(step * 1_000_000)
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a short time")]
 pub(super) fn to_steps(seconds: f64) -> usize {
-    (seconds / STEP_S).round() as usize
+    floor_to_count((seconds / STEP_S).round())
 }

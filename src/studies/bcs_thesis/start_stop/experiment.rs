@@ -9,6 +9,7 @@ use crate::core::time::Span;
 use crate::core::units::{Mm3PerS, MmPerS};
 use crate::extruder::start_stop::{BeadConditions, StartStopTiming};
 use crate::identify::start_stop::{StartStopFit, StartStopFitError, fit};
+use crate::numeric::number::to_f64;
 use crate::sim::melt::MeltParameters;
 use crate::sim::melt_log::{RecordingPlan, record};
 use crate::studies::error::ReproduceError;
@@ -92,9 +93,8 @@ pub fn run(machine: MeltParameters, seeds: u64) -> Result<StartStopResults, Repr
     Ok(StartStopResults { naive, fixed, keeps, follows, dwell, traces })
 }
 
-#[expect(clippy::cast_precision_loss, reason = "some tens of seeds")]
 fn mean(laid: &[([Losses; 4], StartStopTiming)], which: usize) -> Losses {
-    let n = laid.len().max(1) as f64;
+    let n = to_f64(laid.len().max(1));
     let after = |pause: usize| {
         let scores = laid.iter().filter_map(|(losses, _)| losses.get(which)?.get(pause));
         let sum = scores.copied().fold(StartStopScore::default(), StartStopScore::and);

@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 
+use crate::numeric::number::to_f64;
 use crate::report::chart::area::XAxis;
 use crate::report::chart::palette::{DEMAND, FLOW, LIMIT, MODEL, OURS, PAPER, TARGET};
 use crate::report::chart::range::Range;
@@ -39,8 +40,7 @@ pub fn fits(table: &FitTable) -> Markup {
     let names =
         (1..).zip(&table.rows).map(|(at, row)| format!("{at}: {},{}", row.poles, row.zeros));
     let title = format!("poles,zeros – {}", names.collect::<Vec<_>>().join("   "));
-    #[expect(clippy::cast_precision_loss, reason = "eight models")]
-    let orders = axis(title, Range::new(1.0, table.rows.len() as f64));
+    let orders = axis(title, Range::new(1.0, to_f64(table.rows.len())));
     html! {
         (plot("flow about its mean [mm³/s]", &time, &flows))
         (plot("fit [%]", &orders, &fits))
