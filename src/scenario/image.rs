@@ -24,8 +24,7 @@ pub struct ImageModel {
     /// Shift of the bead's middle from the gauge's middle, to the right in the
     /// direction of travel \[mm\].
     pub lateral_mm: f64,
-    /// Height at which the bead's top edges really are, where the cell
-    /// believes another.
+    /// True height of the bead's top edges, where it differs from that of the cell file.
     pub true_surface_height_mm: Option<f64>,
     /// Path of the bead, where it is not straight.
     pub bend: Bend,

@@ -49,7 +49,7 @@ impl BeadFollower {
         Self { recipe, beads: 0, laid: bead_of(&recipe, 0), before: None, last: None }
     }
 
-    /// Takes a report that arrived at a moment. Reports come in order.
+    /// Takes a report and its time of arrival. Reports are in order.
     pub fn observe(&mut self, at: Stamp, state: &RobotState) {
         if lays(state.mode) {
             let previous = self.last.map(|(_, last)| last);
@@ -74,7 +74,7 @@ impl BeadFollower {
         self.laid.lay(from, path, state.speed_mm_per_s.get());
     }
 
-    /// Distance of the nozzle along its path at a moment \[mm\]: between the
+    /// Distance of the nozzle along its path at a time \[mm\]: between the
     /// last two reports, and carried on at the last speed for up to half a
     /// second. `None` before the first report.
     pub fn path_at(&self, at: Stamp) -> Option<f64> {

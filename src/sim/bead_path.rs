@@ -28,7 +28,7 @@ pub enum BeadPath {
 }
 
 impl BeadPath {
-    /// As an image asks for it.
+    /// The path of an image model.
     pub fn new(settings: &image::Bend) -> Self {
         if settings.radius_mm != 0.0 {
             Self::Arc { radius_mm: settings.radius_mm }

@@ -1,8 +1,7 @@
 //! What the pixels see before light, texture and noise: fractions of bead, and
 //! the grey that disturbances add.
 
-use super::discs;
-use super::discs::{Backdrop, DiscLayer, Mask};
+use super::discs::{self, Backdrop, DiscLayer, Mask};
 use super::motion::ShutterPosition;
 use super::shade::BeadShape;
 use super::tint::{BeadLine, Tint};

@@ -99,7 +99,7 @@ impl SimExtruder {
         }
     }
 
-    /// Flow through the nozzle at the moment it was advanced to.
+    /// Flow through the nozzle at the time it was advanced to.
     pub fn flow(&self) -> Mm3PerS {
         if self.valve.on { self.plant.flow() } else { Mm3PerS::ZERO }
     }

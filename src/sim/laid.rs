@@ -19,7 +19,7 @@ const JOINT_TOLERANCE_MM: f64 = 1e-6;
 /// A bead along its path. Its width is that of the model at the speed at which
 /// a position was laid, times the flow's ratio there, plus roughness. The edges
 /// are straight between the points of a grid, so that means along the path are
-/// exact. The same pieces give the same bead, whatever was asked in between.
+/// exact. The same pieces give the same bead, independent of reads in between.
 #[derive(Debug, Clone)]
 pub struct LaidBead {
     model: BeadModel,

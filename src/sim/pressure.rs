@@ -61,7 +61,7 @@ pub struct SimPressure {
 }
 
 impl SimPressure {
-    /// As it has run for ever.
+    /// In the steady state.
     pub fn new(
         process: Fopdt,
         disturbed: Disturbances,

@@ -1,5 +1,5 @@
-//! A screw that fills and empties: the plant of Diagne et al. 2015, eqs. (13),
-//! (16) and (17), with all that is on its way from the feed to the plug.
+//! A screw that fills and empties: the plant of Diagne et al. 2015, eqs. (13), (16) and (17),
+//! with the feed in transit to the plug.
 
 use crate::extruder::screw::feed_history::FeedHistory;
 use crate::extruder::screw::{Conveying, Screw};
@@ -8,8 +8,8 @@ use crate::numeric::number::floor_to_count;
 /// How the plant is integrated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Integrator {
-    /// The paper's: one Euler step, the delay taken up to whole steps, so that
-    /// nothing arrives before its delay is over.
+    /// The paper's: one Euler step, the delay rounded up to whole steps, so that no feed arrives
+    /// before its delay is over.
     Euler,
     /// Fourth order in steps of at most this length \[s\], which end where a
     /// change of the feed reaches the plug.
@@ -100,12 +100,7 @@ impl SimScrew {
 
     /// The plug a step later under a feed that is held.
     fn grown(&self, at: f64, step: f64, fill: f64) -> f64 {
-        let (x, half) = (self.plug_m, 0.5 * step);
-        let first = self.rate(at, x, fill);
-        let second = self.rate(at + half, x + half * first, fill);
-        let third = self.rate(at + half, x + half * second, fill);
-        let fourth = self.rate(at + step, x + step * third, fill);
-        x + step / 6.0 * (first + 2.0 * (second + third) + fourth)
+        runge_kutta_step(|at, plug| self.rate(at, plug, fill), at, self.plug_m, step)
     }
 
     fn rate(&self, at: f64, plug: f64, fill: f64) -> f64 {
@@ -129,6 +124,16 @@ impl SimScrew {
     }
 }
 
+/// The fourth-order step of x′ = `rate`(t, x).
+fn runge_kutta_step(rate: impl Fn(f64, f64) -> f64, at: f64, x: f64, step: f64) -> f64 {
+    let half = 0.5 * step;
+    let first = rate(at, x);
+    let second = rate(at + half, x + half * first);
+    let third = rate(at + half, x + half * second);
+    let fourth = rate(at + step, x + step * third);
+    x + step / 6.0 * (first + 2.0 * (second + third) + fourth)
+}
+
 /// Just beyond where a growing function changes its sign within a step.
 fn crossing(past: impl Fn(f64) -> f64, full: f64) -> f64 {
     let (mut low, mut high) = (0.0, full);
@@ -143,10 +148,9 @@ fn crossing(past: impl Fn(f64) -> f64, full: f64) -> f64 {
     high
 }
 
-/// The same screw without delay under a controller that is held nowhere, from a plug
-/// at a moment on: what a loop with a perfect predictor equals from the first
-/// effect of its control. Lengths of the plug \[m\] `step_s` apart, by
-/// Runge–Kutta steps of a tenth of that.
+/// The same screw without delay under continuous feedback, from a plug at a time on: equal to a
+/// loop with a perfect predictor from the first effect of its control. Lengths of the plug
+/// \[m\] `step_s` apart, by Runge–Kutta steps of a tenth of that.
 pub fn delay_free(
     screw: &Screw,
     plug_m: f64,
@@ -158,17 +162,12 @@ pub fn delay_free(
     const PARTS: u32 = 10;
     let rate = move |at: f64, plug: f64| screw.speed(at) * screw.growth(plug, controller(plug));
     let step = step_s / f64::from(PARTS);
-    let half = 0.5 * step;
     let mut plug = plug_m;
     (0_u32..).map(move |tick| {
         let now = plug;
         for part in 0..PARTS {
             let at = from_s + step_s * f64::from(tick) + step * f64::from(part);
-            let first = rate(at, plug);
-            let second = rate(at + half, plug + half * first);
-            let third = rate(at + half, plug + half * second);
-            let fourth = rate(at + step, plug + step * third);
-            plug += step / 6.0 * (first + 2.0 * (second + third) + fourth);
+            plug = runge_kutta_step(&rate, at, plug, step);
         }
         now
     })
@@ -189,7 +188,7 @@ mod tests {
         ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap()
     }
 
-    /// A feed that neither law would give.
+    /// A feed that no controller gives.
     fn fill(tick: u32) -> f64 {
         0.35 + 0.3 * (0.011 * f64::from(tick)).sin() + if tick % 400 < 200 { 0.1 } else { 0.0 }
     }

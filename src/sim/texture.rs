@@ -22,7 +22,7 @@ pub fn texture(
         return None;
     }
     let kernel = kernel(0.5 * texture.length_px);
-    // The pattern goes on beyond the image.
+    // The pattern continues beyond the image.
     let margin = kernel.len() - 1;
     let (wide, high) = (width + 2 * margin, height + 2 * margin);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(key);

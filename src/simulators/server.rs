@@ -1,5 +1,5 @@
-//! The far side of a line link over TCP, for robots and extruders that are not
-//! there: one PC at a time, lines in, `STATE` out.
+//! The device side of a line link over TCP for simulated machines: one PC at a time, lines in,
+//! `STATE` out.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream};
@@ -15,11 +15,10 @@ use crate::core::time::Span;
 use crate::io::clock::RunClock;
 
 mod host;
-mod input;
 mod peer;
 
 use host::Host;
-use input::Input;
+use peer::Input;
 
 /// Inputs that may wait; beyond it senders block.
 const MAX_WAITING_INPUTS: usize = 64;

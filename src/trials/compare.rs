@@ -39,7 +39,7 @@ pub struct Contender {
 }
 
 impl Contender {
-    /// The same with another width that is asked for.
+    /// The same with another target width.
     fn with_width(&self, width: Mm) -> RunPart {
         let mut run = self.run.clone();
         run.control.target = WidthTarget::constant(width);
@@ -119,29 +119,24 @@ impl Figures {
         let lay = |seed| LayerTrial::lay(&who.cell, &run, &who.calibration, seed);
         let trials: Vec<LayerTrial> =
             (0..seeds).into_par_iter().map(lay).collect::<Result<_, _>>()?;
-        let of =
+        let values =
             |value: &dyn Fn(&LayerTrial) -> f64| trials.iter().map(value).collect::<Vec<f64>>();
+        let of = |value: &dyn Fn(&LayerTrial) -> f64| SeedStatistics::of(values(value));
+        let failed = |trial: &LayerTrial| !trial.complete || trial.control_start_mm.is_infinite();
         let judged = |trial: &LayerTrial| trial.control_start_mm + JUDGED_AFTER_MM;
-        let rms_by_seed = of(&|trial| trial.rms_error(judged(trial)));
+        let rms_by_seed = values(&|trial| trial.rms_error(judged(trial)));
         let firsts = first.map_or(&rms_by_seed, |first| &first.rms_by_seed);
         let ratios = rms_by_seed.iter().zip(firsts).map(|(ours, first)| ours / first).collect();
         Ok(Self {
-            mean_error_mm: SeedStatistics::of(of(&|trial| trial.mean_error(judged(trial)))),
+            mean_error_mm: of(&|trial| trial.mean_error(judged(trial))),
             rms_error_mm: SeedStatistics::of(rms_by_seed.clone()),
-            integral_mm2: SeedStatistics::of(of(&|trial| {
-                trial.error_integral(trial.control_start_mm)
-            })),
-            settled_mm: SeedStatistics::of(of(&|trial| {
-                trial.settles_within(trial.control_start_mm, 0.5)
-            })),
-            sigma_mm: SeedStatistics::of(of(&|trial| {
+            integral_mm2: of(&|trial| trial.error_integral(trial.control_start_mm)),
+            settled_mm: of(&|trial| trial.settles_within(trial.control_start_mm, 0.5)),
+            sigma_mm: of(&|trial| {
                 trial.standard_deviation(trial.control_start_mm + SIGMA_AFTER_MM)
-            })),
+            }),
             ratio: SeedStatistics::of(ratios),
-            failed_seeds: trials
-                .iter()
-                .filter(|one| !one.complete || one.control_start_mm.is_infinite())
-                .count(),
+            failed_seeds: trials.iter().filter(|trial| failed(trial)).count(),
             error_profile: error_profile(&trials, width.get()),
             example: trials.into_iter().next().map(|trial| trial.bead).unwrap_or_default(),
             rms_by_seed,

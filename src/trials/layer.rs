@@ -54,11 +54,8 @@ impl LayerTrial {
         cell.simulation.seed = seed + 1;
         let target_mm = run.control.target.nominal().get();
         let mut sim = SimCell::mismatched(&cell, run, factor, calibration.clone(), NoRecorder)?;
-        let mut watch = StartObserver {
-            score: LayerScore::new(target_mm),
-            newest: None,
-            control_start_mm: None,
-        };
+        let score = LayerScore::new(target_mm);
+        let mut watch = StartObserver { score, newest: None, control_start_mm: None };
         let end = sim.layer(Mm::ZERO, &mut watch);
         let mut bead = Vec::new();
         let mut at = 0.0;
@@ -66,14 +63,9 @@ impl LayerTrial {
             bead.extend(sim.bead().width_at(at).map(|width| (at, width)));
             at += BEAD_SPACING_MM;
         }
-        let begun_mm = watch.control_start_mm.unwrap_or(f64::INFINITY);
-        Ok(Self {
-            score: watch.score,
-            bead,
-            control_start_mm: begun_mm,
-            complete: end.complete,
-            target_mm,
-        })
+        let control_start_mm = watch.control_start_mm.unwrap_or(f64::INFINITY);
+        let (score, complete) = (watch.score, end.complete);
+        Ok(Self { score, bead, control_start_mm, complete, target_mm })
     }
 
     /// Path from a position until the bead stays within a band of the target \[mm\]; infinite

@@ -25,7 +25,7 @@ struct Clock {
     event: ClockEvent,
 }
 
-/// The clocks of a cell; at the same moment the first of them comes first.
+/// The clocks of a cell; at the same time the first of them is first.
 pub struct Ticker {
     began: Stamp,
     clocks: Vec<Clock>,

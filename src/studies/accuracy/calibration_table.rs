@@ -1,4 +1,5 @@
-//! Whether calibrations know how good they are: figures of cases with their truth.
+//! Whether the predicted uncertainty of calibrations is right: figures of cases with a known
+//! truth.
 
 use serde::Serialize;
 

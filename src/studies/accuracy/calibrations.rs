@@ -1,15 +1,13 @@
-//! Calibrations with a known truth, over and over: whether widths scatter as much as
-//! each calibration predicts of itself.
+//! Repeated calibrations with a known truth: whether the errors of widths have the standard
+//! deviation that each calibration predicts.
 
 use nalgebra::{Point3, Rotation3, Vector3};
 
 use crate::calibration::board::{Board, BoardError, observe_all};
-use crate::calibration::board_observation;
-use crate::calibration::board_observation::BoardObservation;
+use crate::calibration::board_observation::{self, BoardObservation};
 use crate::calibration::covariance::CalibrationCovariance;
 use crate::calibration::plane::{OnBed, bed_from_board};
-use crate::calibration::solve;
-use crate::calibration::solve::Solution;
+use crate::calibration::solve::{self, Solution};
 use crate::calibration::{Calibration, CalibrationQuality, Camera};
 use crate::core::geometry::{ImagePoint, Pose};
 use crate::core::units::Mm;
@@ -34,7 +32,7 @@ const BEAD_WIDTH_FRACTION: f64 = 1.0 / 5.0;
 /// A camera that is calibrated with boards.
 #[derive(Debug, Clone)]
 pub struct CalibrationCase {
-    /// What it is called in tables.
+    /// Its name in tables.
     pub name: &'static str,
     /// The true camera.
     pub camera: Camera,
@@ -48,18 +46,18 @@ pub struct CalibrationCase {
     pub views: u64,
     /// Standard deviation of a corner's position in one direction \[px\].
     pub noise_px: f64,
-    /// Whether it is tried with rendered images, too: one case a camera is.
+    /// Whether it is also tried with rendered images: one case for each camera is.
     pub rendered: bool,
 }
 
-/// One width that was calibrated for, measured at the true positions of its edges.
+/// One width by a calibration, measured at the true positions of its edges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CalibratedWidth {
-    /// Which bead.
+    /// Index of the bead.
     pub bead: usize,
-    /// How far the width is off \[mm\].
+    /// Error of the width \[mm\].
     pub error_mm: f64,
-    /// Its standard deviation as the calibration predicts it \[mm\].
+    /// Standard deviation that the calibration predicts \[mm\].
     pub sigma_mm: f64,
     /// The true width \[mm\].
     pub width_mm: f64,

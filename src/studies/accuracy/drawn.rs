@@ -27,8 +27,7 @@ mod scene;
 use crate::core::frame::{Frame, Pixels, WrongSize};
 use crate::core::geometry::{Roi, Size};
 use crate::core::time::Stamp;
-use crate::core::units::Mm;
-use crate::core::units::WidthRange;
+use crate::core::units::{Mm, WidthRange};
 use crate::vision::{BeadAxis, Gauge, Polarity};
 use draw::Draw;
 use scene::DrawnScene;
@@ -37,10 +36,10 @@ pub use draw::DrawnParameter;
 pub use list::{DrawnSet, Requirements, all, named};
 pub use long_bead::LongBead;
 
-/// Narrowest and widest bead that a gauge believes, in the bead's nominal widths.
+/// Smallest and largest width that the gauge accepts, over the bead's nominal width.
 const RANGE: (f64, f64) = (0.6, 1.3);
 
-/// A frame and what is true of it. A pixel is a millimetre.
+/// A frame and its truth. A pixel is a millimetre.
 #[derive(Debug, Clone)]
 pub struct DrawnFrame {
     /// The image.

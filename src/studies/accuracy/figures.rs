@@ -10,7 +10,7 @@ use serde::Serialize;
 pub struct WidthError {
     /// Measured less true width.
     pub error_mm: f64,
-    /// As the measurement believes it.
+    /// Standard deviation by the measurement.
     pub sigma_mm: f64,
 }
 

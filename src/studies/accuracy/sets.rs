@@ -1,12 +1,10 @@
-//! Named sets of images whose truth is known: what the measurement is judged
-//! by.
+//! Named sets of images with a known truth, on which the measurement is evaluated.
 
 mod limits;
 mod list;
 
 use crate::core::geometry::Roi;
-use crate::core::units::Mm;
-use crate::core::units::WidthRange;
+use crate::core::units::{Mm, WidthRange};
 use crate::scenario::bead::EdgeRoughness;
 use crate::scenario::image::ImageModel;
 use crate::vision::{BeadAxis, Gauge, Polarity};
@@ -22,9 +20,9 @@ const ACROSS_PX: (usize, u32) = (640, 720);
 /// Images of one kind.
 #[derive(Debug, Clone)]
 pub struct Set {
-    /// What it is called.
+    /// Its name.
     pub name: &'static str,
-    /// How the bead is imaged; the size is that of the set.
+    /// Image of the bead; its size is that of the set.
     pub image: ImageModel,
     /// Rows of the gauge; of a horizontal bead columns.
     pub rows: u32,
@@ -38,7 +36,7 @@ pub struct Set {
     pub polarity: Polarity,
     /// Seen by a tilted camera through a lens with distortion.
     pub tilted: bool,
-    /// What the measurement must reach.
+    /// Limits of the figures.
     pub limits: SetLimits,
 }
 
@@ -47,7 +45,7 @@ impl Set {
     /// \[px\] where its direction is known.
     ///
     /// A line across a step of the height A that is blurred with s, in white
-    /// noise σ, tells the step's position with a variance of at least
+    /// noise σ, gives the step's position with a variance of at least
     /// 2√π·(σ/A)²·s (Cramér–Rao), whether or not blur and height of the step are
     /// known, whose effects are odd about its position. (A level that both sides
     /// share is even like the position and costs a little more, the less the

@@ -69,14 +69,13 @@ impl TableCase {
     /// Runs it with a controller.
     pub fn run(&self, method: AdaptationMethod) -> Result<Convergence, SubSystemError> {
         let (from_s, to_s) = (STEP_AT_S, f64::INFINITY);
+        let none = InputDisturbance::None;
         let step = |size| InputDisturbance::Step { size, from_s, to_s };
         let (feed, plate, part, input_gain) = match self.of {
-            SubSystem::Nozzle => {
-                (step(self.size), InputDisturbance::None, 0, MODEL.nozzle.input_gain)
-            }
+            SubSystem::Nozzle => (step(self.size), none, 0, MODEL.nozzle.input_gain),
             SubSystem::Strand => {
                 let size = 0.01 * self.size * operating_point().plate_m_per_s;
-                (InputDisturbance::None, step(size), 1, MODEL.strand.input_gain)
+                (none, step(size), 1, MODEL.strand.input_gain)
             }
         };
         let length_s = STEP_AT_S + WATCHED_S;

@@ -89,7 +89,7 @@ mod tests {
         let scene = DrawnScene { noise_grey: 4.0, size: (200, 200), ..DrawnScene::default() };
         let pixels = expose(&vec![100.0; 40_000], &scene, &mut Draw::new("test", 2));
         let squares: f64 = pixels.iter().map(|&grey| (f64::from(grey) - 100.0).powi(2)).sum();
-        // Rounding adds 1/12 to the variance; 40,000 pixels tell it to 0.7 %.
+        // Rounding adds 1/12 to the variance; its standard error with 40,000 pixels is 0.7 %.
         assert!((squares / 40_000.0 - 16.083).abs() < 0.45, "{}", squares / 40_000.0);
     }
 

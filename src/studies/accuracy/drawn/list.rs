@@ -1,4 +1,4 @@
-//! The sets of frames, and what each must reach.
+//! The sets of frames, and their requirements.
 
 use super::draw::Draw;
 use super::recipes;
@@ -7,19 +7,19 @@ use super::scene::DrawnScene;
 /// A kind of frames.
 #[derive(Debug, Clone, Copy)]
 pub struct DrawnSet {
-    /// What it is called.
+    /// Its name.
     pub name: &'static str,
-    /// What is in it, in a line.
+    /// Its contents, in a line.
     pub about: &'static str,
     /// Whether the gauge has the camera's gamma.
     pub knows_gamma: bool,
-    /// What must be reached.
+    /// Its requirements.
     pub requirements: Requirements,
     /// Draws a frame.
     pub(super) scene: fn(&mut Draw) -> DrawnScene,
 }
 
-/// What a set must reach; what is none is not asked for.
+/// Requirements of a set; none is no requirement.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Requirements {
     /// Smallest fraction of frames that give a width.

@@ -1,13 +1,12 @@
-//! A long bead with torn edges that passes through the gauge frame by frame: what
-//! roughness over successive frames is judged by.
+//! A long bead with torn edges that passes through the gauge frame by frame, to evaluate
+//! roughness over successive frames.
 
 use std::ops::Range;
 
-use super::camera;
 use super::draw::Draw;
 use super::paint::{Painted, paint};
-use super::recipes;
 use super::scene::DrawnScene;
+use super::{camera, recipes};
 use crate::core::frame::{Frame, Pixels, WrongSize};
 use crate::core::geometry::Size;
 use crate::core::time::Stamp;
@@ -30,7 +29,7 @@ pub struct LongBead {
     number: u64,
 }
 
-/// What the camera sees of it at one moment.
+/// One frame of it.
 #[derive(Debug, Clone)]
 pub struct Passage {
     /// The image.

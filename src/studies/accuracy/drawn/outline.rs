@@ -16,7 +16,7 @@ const MAX_GROOVE_SPREAD: f64 = 1.0 / 3.0;
 /// six times the largest roughness of those edges, 2 px.
 const HOLE_CLEARANCE_PX: f64 = 14.0;
 
-/// What begins at a position of a line and goes on to the next.
+/// A brightness from a position of a line to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BrightnessStep {
     /// Where it begins \[px\].
@@ -43,7 +43,7 @@ impl Disc {
     }
 }
 
-/// Where the scene's boundaries lie on every line, [`PER_PX`](super::profile::PER_PX) lines a pixel.
+/// Where the scene's boundaries lie on every line, [`POINTS_PER_PX`](super::profile::POINTS_PER_PX) lines a pixel.
 #[derive(Debug, Clone)]
 pub struct DrawnOutline {
     left: Vec<f64>,

@@ -11,7 +11,7 @@ pub fn height_of(position: usize) -> f64 {
     (to_f64(position) + 0.5) / to_f64(POINTS_PER_PX)
 }
 
-/// Deviations of an edge \[px\], [`PER_PX`] a pixel: of the standard deviation
+/// Deviations of an edge \[px\], [`POINTS_PER_PX`] a pixel: of the standard deviation
 /// `roughness_px`, with the autocorrelation exp(−|d|/`length_px`).
 pub fn rough(count: usize, roughness_px: f64, length_px: f64, draw: &mut Draw) -> Vec<f64> {
     if roughness_px <= 0.0 {

@@ -1,6 +1,6 @@
-//! What is drawn for a frame, and from which ranges. Those of torn edges and holes, of
+//! The random parameters of a frame and their ranges. Those of torn edges and holes, of
 //! the grooves' width, ribs, motion, contrast, gamma, JPEG, vignetting, blur and width
-//! are what is asked of the measurement; the others are those of real concrete
+//! are the requirements of the measurement; the others are those of real concrete
 //! (`ACCURACY.md`, "Real and rendered").
 
 use std::ops::Range;

@@ -1,6 +1,6 @@
-//! What a set's figures must keep to.
+//! Limits of a set's figures.
 
-/// Limits of a set's figures; `None` bears any.
+/// Limits of a set's figures; `None` is no limit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SetLimits {
     /// Largest magnitude of the mean error \[px\].

@@ -105,7 +105,7 @@ enum LastCommand {
 }
 
 impl StartStopBench {
-    /// The end of a bead, a pause from the moment when the robot was at its end,
+    /// The end of a bead, a pause from when the robot was at its end,
     /// and the bead after it; a score for each pause \[s\] in its order.
     pub fn lay<S: StartStopStrategy>(
         &self,

@@ -3,8 +3,7 @@
 use maud::{Markup, html};
 
 use crate::report::chart::area::XAxis;
-use crate::report::chart::palette;
-use crate::report::chart::palette::Ink;
+use crate::report::chart::palette::{self, Ink};
 use crate::report::chart::range::Range;
 use crate::report::chart::series::CurvePoint;
 use crate::studies::ma2026::{Factors, PressureResponse};

@@ -137,6 +137,6 @@ fn a_texture_has_in_the_picture_the_size_asked_for() {
         .map(|&light| f64::from(light) - 150.0)
         .collect();
     let variance = inside.iter().map(|light| light * light).sum::<f64>() / 24_000.0;
-    // A patch of 2·4² pixels counts as one: 750 of them tell a variance to 5 %.
+    // A patch of 2·4² pixels counts as one: 750 of them give a variance to 5 %.
     assert!((variance / 144.0 - 1.0).abs() < 0.2, "{variance}");
 }
