@@ -23,7 +23,7 @@ pub const START: Mm = Mm::constant(100.0);
 /// Target x* = 0.16 m (Diagne et al. 2015, section VII), and the largest fill, which the paper
 /// does not give (papers.md, "use 0.9").
 pub const SETPOINT: PlugSetpoint = PlugSetpoint { plug: Mm::constant(160.0), max_fill: 0.9 };
-/// Slope above the smallest one, S = S_min + 30 \[1/m\]. Diagne et al. 2015, section VII.
+/// Slope above the smallest one, S = `S_min` + 30 \[1/m\]. Diagne et al. 2015, section VII.
 pub const STEEPER_PER_M: f64 = 30.0;
 /// Settled means within 2 % of the step from start to setpoint \[mm\] (papers.md, "2 % band").
 pub const SETTLING_BAND_MM: f64 = 0.02 * (160.0 - 100.0);

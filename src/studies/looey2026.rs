@@ -31,7 +31,7 @@ pub const MODEL: StrandModel = StrandModel {
 pub const FEEDBACK: [f64; 2] = [1.604, 2.0];
 /// Adaptation gains γ1 and γ3 with p = 1: γ1 is fitted (papers.md, "003"), γ3 a choice.
 pub const LEARNING_RATE: [f64; 2] = [1.786, 3.3];
-/// Pressure gradient in the nozzle p_d1, a choice: it only shifts the operating point.
+/// Pressure gradient in the nozzle `p_d1`, a choice: it only shifts the operating point.
 const PRESSURE_GRADIENT: f64 = 0.5;
 /// Magnitude of the triple pole of the error with our controller \[1/s\]: a larger one
 /// converges sooner and amplifies noise.

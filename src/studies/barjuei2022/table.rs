@@ -2,6 +2,7 @@
 
 mod ahead;
 mod draw;
+mod experiments;
 
 use std::path::Path;
 
@@ -16,6 +17,7 @@ use crate::studies::publication::Publication;
 use crate::studies::study::{Effort, Reproduced, Section, TableRows};
 use crate::vision::MeasureMethod;
 use crate::width_control::target::WidthTarget;
+use experiments::Experiments;
 
 const CELL: &str = include_str!("../../../cells/barjuei2022.toml");
 /// Lateral offset of the second of two stacked layers \[mm\], about 2 % of a width.
@@ -29,15 +31,6 @@ const TOWER_LAYERS: u32 = 20;
 const SEEDS: u64 = 40;
 /// Seeds where frames are rendered, at least the three of papers.md.
 const FRAME_SEEDS: u64 = 3;
-
-/// The experiments' cell, their seeds and the rows so far.
-struct Experiments {
-    cell: Cell,
-    run: RunPart,
-    seeds: u64,
-    frame_seeds: u64,
-    rows: TableRows,
-}
 
 /// Runs the experiments.
 pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, ReproduceError> {

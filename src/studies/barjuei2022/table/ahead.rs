@@ -3,7 +3,8 @@
 
 use maud::html;
 
-use super::{Experiments, draw};
+use super::draw;
+use super::experiments::Experiments;
 use crate::core::units::Mm;
 use crate::io::progress::Progress;
 use crate::studies::barjuei2022::{
