@@ -1,4 +1,4 @@
-//! The simulated cell: a bead, the world around it and the pictures of it.
+//! The simulated cell: a bead, the world around it and the images of it.
 
 pub mod bead_follower;
 pub mod bead_path;

@@ -7,7 +7,7 @@ pub mod diagne2015;
 pub mod error;
 pub mod looey2026;
 pub mod ma2026;
+mod plot;
 pub mod publication;
 pub mod reproduce;
-pub mod row;
 pub mod study;

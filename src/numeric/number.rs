@@ -66,14 +66,3 @@ pub fn round_to_count(length: f32) -> usize {
     // Faster than rounding: the cast truncates.
     (length + 0.5).max(0.0) as usize
 }
-
-/// The whole number of rows or pixels up to a length; 0 of less than none.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "lengths are some thousand pixels, and what is negative saturates at 0"
-)]
-#[inline(always)]
-pub fn floor_to_count(length: f64) -> usize {
-    length as usize
-}

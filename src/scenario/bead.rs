@@ -1,9 +1,9 @@
-//! How wide a bead comes out.
+//! The width of a bead by speed, and its roughness.
 
-/// Width as a power of the speed at which the bead is laid, in two pieces that
-/// meet: w = A·(v/v₀)^−b. Mass conservation (b = 1) does not describe the bead
-/// of Shojaei Barjuei et al. 2022: their table 2 gives exponents near 0.25,
-/// because the strand is stretched below the nozzle.
+/// Width as a power of the speed at which the bead is laid, continuous over two ranges:
+/// w = A·(v/v₀)^−b. Mass conservation (b = 1) does not describe the bead of Shojaei Barjuei et
+/// al. 2022: their table 2 gives exponents near 0.25, because the strand is stretched below the
+/// nozzle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeadModel {
     /// Width at the reference speed \[mm\].
@@ -28,11 +28,11 @@ pub struct EdgeRoughness {
 }
 
 impl BeadModel {
-    /// Slowest speed that the model is asked about \[mm/s\]; a bead laid at
-    /// rest would have no bound.
+    /// Smallest speed of the model \[mm/s\]: at rest the width would be infinite.
     const MIN_SPEED_MM_PER_S: f64 = 1.0;
 
-    /// The plant fitted to tables 1 and 2 of the 2022 paper.
+    /// The plant fitted to tables 1 and 2 of Shojaei Barjuei et al. 2022 (papers.md, "Fitted
+    /// plant").
     pub fn fitted_2022() -> Self {
         Self {
             width_mm: 38.61,
@@ -54,11 +54,6 @@ impl BeadModel {
             at_knee * (speed / knee).powf(-self.slow_exponent)
         }
     }
-
-    /// Exponent that holds at a speed \[mm/s\].
-    pub fn exponent_at(&self, speed_mm_per_s: f64) -> f64 {
-        if speed_mm_per_s >= self.slow_below_mm_per_s { self.exponent } else { self.slow_exponent }
-    }
 }
 
 #[cfg(test)]
@@ -66,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_pieces_of_the_fitted_bead_meet_at_42_mm() {
+    fn the_two_ranges_of_the_fitted_bead_meet_at_42_mm() {
         let bead = BeadModel::fitted_2022();
         assert!((bead.width_at(112.5) - 38.61).abs() < 1e-12);
         assert!((bead.width_at(76.90) - 42.0).abs() < 0.01);

@@ -7,17 +7,17 @@ use std::f64::consts::TAU;
 pub struct Flow {
     /// Path length at which the flow steps \[mm\].
     pub step_at_mm: f64,
-    /// Flow from there on, as a share of the nominal flow.
+    /// Flow from there on, relative to the nominal flow.
     pub step_ratio: f64,
-    /// Amplitude of a sine, as a share of the nominal flow.
+    /// Amplitude of a sine, relative to the nominal flow.
     pub wave_amplitude: f64,
     /// Its length along the path \[mm\].
     pub wavelength_mm: f64,
-    /// Amplitude of a pulsation over time, as a share of the nominal flow.
+    /// Amplitude of a pulsation over time, relative to the nominal flow.
     pub pulse_amplitude: f64,
     /// Its period \[s\].
     pub pulse_period_s: f64,
-    /// How far it wanders along a metre of path, as a share (standard deviation).
+    /// How far it drifts along a metre of path, relative (standard deviation).
     pub drift_per_root_m: f64,
 }
 
@@ -33,13 +33,13 @@ impl Flow {
         drift_per_root_m: 0.0,
     };
 
-    /// The pulsation at a time \[s\] with a phase in periods, as a share of the
+    /// The pulsation at a time \[s\] with a phase in periods, relative to the
     /// nominal flow.
     pub fn pulse_at(&self, at_s: f64, phase: f64) -> f64 {
         1.0 + self.pulse_amplitude * (TAU * (at_s / self.pulse_period_s + phase)).sin()
     }
 
-    /// Flow at a path length, as a share of the nominal flow.
+    /// Flow at a path length, relative to the nominal flow.
     pub fn ratio_at(&self, path_mm: f64) -> f64 {
         let step = if path_mm >= self.step_at_mm { self.step_ratio } else { 1.0 };
         step * (1.0 + self.wave_amplitude * (TAU * path_mm / self.wavelength_mm).sin())

@@ -1,4 +1,4 @@
-//! How a simulated bead is pictured, and what disturbs the picture.
+//! How a simulated bead is imaged, and what disturbs the image.
 
 /// Light, blur, noise and view of rendered frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,7 +13,7 @@ pub struct ImageModel {
     pub blur_px: f64,
     /// Standard deviation of the noise of a pixel \[grey levels of 256\].
     pub noise_grey: f64,
-    /// Light at the brighter end of the picture over light at the other.
+    /// Light at the brighter end of the image over light at the other.
     pub light_ratio: f64,
     /// Direction in which the light grows \[degrees\]: 0 to the right, 90
     /// downwards. `None`: evenly from the upper left to the lower right corner.
@@ -24,8 +24,7 @@ pub struct ImageModel {
     /// Shift of the bead's middle from the gauge's middle, to the right in the
     /// direction of travel \[mm\].
     pub lateral_mm: f64,
-    /// Height at which the bead's top edges really are, where the cell
-    /// believes another.
+    /// True height of the bead's top edges, where it differs from that of the cell file.
     pub true_surface_height_mm: Option<f64>,
     /// Path of the bead, where it is not straight.
     pub bend: Bend,
@@ -86,20 +85,20 @@ pub struct EdgeShading {
     pub side: BeadSide,
 }
 
-/// Saturated discs on the bead, at random places in each frame.
+/// Saturated discs on the bead, at random positions in each frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spots {
-    /// Mean share of the bead's area that they cover.
+    /// Mean fraction of the bead's area that they cover.
     pub covered_fraction: f64,
     /// Diameter \[px\].
     pub size_px: f64,
 }
 
-/// Discs on the edges, at random places in each frame: their centres lie
+/// Discs on the edges, at random positions in each frame: their centres lie
 /// within a radius of the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grains {
-    /// Share of the rows on which a grain covers the edge, on either edge.
+    /// Fraction of the rows on which a grain covers the edge, on either edge.
     pub rows_fraction: f64,
     /// Diameter \[px\].
     pub size_px: f64,
@@ -115,7 +114,7 @@ pub struct Shadow {
     /// Width \[px\].
     pub width_px: f64,
     /// How much darker than the ground it is – brighter beside a dark bead –,
-    /// as a share of the bead's contrast; negative for the opposite.
+    /// relative to the bead's contrast; negative for the opposite.
     pub contrast_fraction: f64,
     /// The edges.
     pub side: BeadSide,
@@ -128,7 +127,7 @@ pub struct Neighbour {
     pub gap_px: f64,
     /// Width \[px\].
     pub width_px: f64,
-    /// Its contrast as a share of the bead's.
+    /// Its contrast relative to the bead's.
     pub contrast_fraction: f64,
     /// The edges.
     pub side: BeadSide,
@@ -143,7 +142,7 @@ pub struct MotionBlur {
     pub direction_deg: f64,
 }
 
-/// A random pattern over the whole picture, new in each frame. Its
+/// A random pattern over the whole image, new in each frame. Its
 /// autocorrelation at the distance r is exp(−(r/L)²).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TexturePattern {
@@ -154,7 +153,7 @@ pub struct TexturePattern {
 }
 
 impl ImageModel {
-    /// A picture that nothing disturbs.
+    /// An image that nothing disturbs.
     pub const DEFAULT: Self = Self {
         size_px: [720, 540],
         bead_grey: 150.0,

@@ -8,13 +8,14 @@ use crate::core::units::Mm;
 use crate::scenario::bead::{BeadModel, EdgeRoughness};
 use crate::scenario::disturbance::Flow;
 
-/// Longest stretch between two reports that is still taken for one bead
-/// \[mm\]: a robot that was connected in the middle of its bead, or was not
-/// heard for a while.
+/// Longest path between two reports that counts as one bead \[mm\]: a robot that was connected
+/// in the middle of its bead, or lost its link for a while. A longer path is a jump.
 const MAX_SEGMENT_MM: f64 = 5000.0;
-/// Longest time over which a position is carried on from the last report.
+/// Longest time over which a position is extrapolated from the last report: a robot that is
+/// silent for longer may have stopped.
 const MAX_EXTRAPOLATION: Span = Span::from_millis(500);
-/// A path that falls back by less is the same bead \[mm\].
+/// A path that falls back by less is the same bead \[mm\]: beyond rounding of reports, below
+/// any move.
 const PATH_TOLERANCE_MM: f64 = 0.01;
 
 /// What every bead is made of.
@@ -48,7 +49,7 @@ impl BeadFollower {
         Self { recipe, beads: 0, laid: bead_of(&recipe, 0), before: None, last: None }
     }
 
-    /// Takes a report that arrived at a moment. Reports come in order.
+    /// Takes a report and its time of arrival. Reports are in order.
     pub fn observe(&mut self, at: Stamp, state: &RobotState) {
         if lays(state.mode) {
             let previous = self.last.map(|(_, last)| last);
@@ -73,7 +74,7 @@ impl BeadFollower {
         self.laid.lay(from, path, state.speed_mm_per_s.get());
     }
 
-    /// Distance of the nozzle along its path at a moment \[mm\]: between the
+    /// Distance of the nozzle along its path at a time \[mm\]: between the
     /// last two reports, and carried on at the last speed for up to half a
     /// second. `None` before the first report.
     pub fn path_at(&self, at: Stamp) -> Option<f64> {
@@ -85,8 +86,8 @@ impl BeadFollower {
             return Some(path + moves * ahead.min(MAX_EXTRAPOLATION).secs());
         }
         let (earlier, old) = self.before.filter(|(_, old)| follows(old, &state))?;
-        let share = ((at - earlier).secs() / (reported - earlier).secs()).max(0.0);
-        Some(old.path_mm.get() + (path - old.path_mm.get()) * share)
+        let fraction = ((at - earlier).secs() / (reported - earlier).secs()).max(0.0);
+        Some(old.path_mm.get() + (path - old.path_mm.get()) * fraction)
     }
 
     /// The last height of the nozzle.
@@ -115,8 +116,8 @@ fn path_speed(state: &RobotState) -> PathSpeed {
 
 /// Whether a report continues the path of another.
 fn follows(last: &RobotState, next: &RobotState) -> bool {
-    let stretch = (next.path_mm - last.path_mm).get();
-    (-PATH_TOLERANCE_MM..=MAX_SEGMENT_MM).contains(&stretch)
+    let segment = (next.path_mm - last.path_mm).get();
+    (-PATH_TOLERANCE_MM..=MAX_SEGMENT_MM).contains(&segment)
 }
 
 fn bead_of(recipe: &BeadRecipe, number: u64) -> LaidBead {

@@ -5,8 +5,8 @@ use nalgebra::Vector2;
 
 use crate::scenario::image;
 
-/// Angle from the middle of the gauge beyond which an arc is not followed
-/// \[rad\]: its edges are functions of the place along the gauge's axis.
+/// Angle from the middle of the gauge beyond which an arc is not followed \[rad\]: its edges
+/// are functions of the position along the gauge's axis only below π/2.
 const MAX_ARC_RAD: f64 = 1.2;
 
 /// From distances along and across the bead to the directions ahead and to the
@@ -28,7 +28,7 @@ pub enum BeadPath {
 }
 
 impl BeadPath {
-    /// As a picture asks for it.
+    /// The path of an image model.
     pub fn new(settings: &image::Bend) -> Self {
         if settings.radius_mm != 0.0 {
             Self::Arc { radius_mm: settings.radius_mm }
@@ -39,7 +39,7 @@ impl BeadPath {
         }
     }
 
-    /// Where a place along and across the bead lies, ahead and to the right.
+    /// Where a position along and across the bead lies, ahead and to the right.
     /// `across_mm` is normal to the bead's own axis. `None` too far around a
     /// curve.
     pub fn position(self, along_mm: f64, across_mm: f64) -> Option<Vector2<f64>> {
@@ -59,15 +59,15 @@ impl BeadPath {
         }
     }
 
-    /// How far along the bead a place ahead and to the right lies \[mm\].
-    pub fn along_mm(self, place: Vector2<f64>) -> f64 {
+    /// How far along the bead a position ahead and to the right lies \[mm\].
+    pub fn along_mm(self, position: Vector2<f64>) -> f64 {
         match self {
-            Self::Straight => place.x,
+            Self::Straight => position.x,
             Self::Arc { radius_mm } => {
                 let sign = radius_mm.signum();
-                radius_mm.abs() * libm::atan2(place.x, sign * (radius_mm - place.y))
+                radius_mm.abs() * libm::atan2(position.x, sign * (radius_mm - position.y))
             }
-            Self::Corner { half: (_, cos) } => place.x / cos,
+            Self::Corner { half: (_, cos) } => position.x / cos,
         }
     }
 }
@@ -86,12 +86,12 @@ mod tests {
             let bend = arc(radius_mm);
             let centre = Vector2::new(0.0, radius_mm);
             for (along, across) in [(0.0, 0.0), (5.0, 4.0), (-11.0, 4.0), (20.0, -6.0)] {
-                let place = bend.position(along, across).unwrap();
-                let distance = (place - centre).norm();
+                let position = bend.position(along, across).unwrap();
+                let distance = (position - centre).norm();
                 // To the right is towards the centre of a curve to the right.
                 let expected = (radius_mm - across).abs();
                 assert!((distance - expected).abs() < 1e-12);
-                assert!((bend.along_mm(place) - along).abs() < 1e-12, "{along} {across}");
+                assert!((bend.along_mm(position) - along).abs() < 1e-12, "{along} {across}");
             }
             assert!(bend.position(10.0, 0.0).unwrap().y * radius_mm > 0.0);
         }

@@ -1,4 +1,4 @@
-//! Pictures of a checkerboard, plain or with markers, before a camera.
+//! Images of a checkerboard, plain or with markers, before a camera.
 
 use nalgebra::{Matrix3, Point2, Vector2};
 
@@ -9,40 +9,45 @@ use crate::core::frame::{Frame, Pixels, WrongSize};
 use crate::core::geometry::{GridSize, Pose, Size};
 use crate::core::time::Stamp;
 use crate::numeric::normal_distribution;
+use crate::numeric::number::{to_count, to_f64};
 
-/// Grey values of a board's black and white squares and of what lies around it.
+/// Grey level of a board's black squares.
 const BLACK: f64 = 40.0;
+/// Grey level of its white squares and of its margin.
 const WHITE: f64 = 210.0;
+/// Grey level around the board, between black and white so that its edge shows no corner.
 const BACKGROUND: f64 = 120.0;
-/// White around the outer squares, in squares.
+/// White margin around the outer squares, in squares.
 const MARGIN_SQUARES: f64 = 0.8;
-/// Squares within or beyond the border of the squares from which on it has no part in a
-/// pixel.
+/// Distance from the boundary of the squares beyond which the boundary does not affect a pixel, in
+/// squares: more than margin and blur together.
 const EDGE_ZONE_SQUARES: f64 = 1.5;
-/// Standard deviations of the blur from an edge beyond which all is black or white.
+/// Distance from an edge beyond which a pixel is black or white, in standard deviations of the
+/// blur. Derived: Φ(−8) = 6·10⁻¹⁶.
 const MAX_BLUR_SIGMAS: f64 = 8.0;
-/// Variance of the mean over a pixel, which is even over its width \[px²\].
+/// Variance of the mean over a pixel \[px²\]. Derived: that of a uniform distribution of width
+/// 1, 1/12.
 const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 
-/// How pictures are taken.
+/// How images are taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exposure {
     /// Standard deviation of the lens's blur \[px\], the pixel itself left out.
     pub blur_px: f64,
     /// Standard deviation of a pixel's noise \[grey levels\].
     pub noise_grey: f64,
-    /// How far the board moves in the picture while the shutter is open \[px\].
+    /// How far the board moves in the image while the shutter is open \[px\].
     pub motion_px: Vector2<f64>,
 }
 
 impl Exposure {
-    /// A sharp picture.
+    /// A sharp image.
     pub const SHARP: Self =
         Self { blur_px: 0.7, noise_grey: 2.0, motion_px: Vector2::new(0.0, 0.0) };
 }
 
-/// A camera before which boards are held. What a pixel sees is kept from picture to
-/// picture.
+/// A camera before which boards are held. What a pixel sees is kept from image to
+/// image.
 #[derive(Debug, Clone)]
 pub struct BoardStudio {
     size: (usize, usize),
@@ -50,16 +55,15 @@ pub struct BoardStudio {
 }
 
 impl BoardStudio {
-    /// For pictures of this size.
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+    /// For images of this size.
     pub fn new(camera: &Camera, image_size_px: [u32; 2]) -> Self {
         let [width, height] = image_size_px.map(|side| side as usize);
-        let place = |i: usize| Point2::new((i % width) as f64, (i / width) as f64);
-        let rays = (0..width * height).map(|i| camera.ray(place(i))).collect();
+        let position = |i: usize| Point2::new(to_f64(i % width), to_f64(i / width));
+        let rays = (0..width * height).map(|i| camera.ray(position(i))).collect();
         Self { size: (width, height), rays }
     }
 
-    /// A picture of a board, with the noise of a seed. Fails only for a camera without
+    /// An image of a board, with the noise of a seed. Fails only for a camera without
     /// pixels.
     pub fn take(
         &self,
@@ -72,7 +76,7 @@ impl BoardStudio {
         let (width, height) = self.size;
         let values = self.rays.iter().enumerate().map(|(i, ray)| {
             let grey = ray.map_or(BACKGROUND, |at| {
-                // To the next pixel, and at the picture's end from the last one.
+                // To the next pixel, and at the image's end from the last one.
                 let to_next = |step: usize, is_last: bool| {
                     let other = if is_last { i.checked_sub(step) } else { i.checked_add(step) };
                     let other = self.rays.get(other?).copied().flatten()?;
@@ -85,12 +89,7 @@ impl BoardStudio {
             let pair = hash::normal_pair(hash::mix(&[seed, i as u64 / 2]));
             rounded(grey + exposure.noise_grey * pair[i % 2])
         });
-        Frame::new(
-            0,
-            Stamp::START,
-            Size::new(self.size.0, self.size.1),
-            Pixels::Grey8(values.collect()),
-        )
+        Frame::new(0, Stamp::START, Size::new(width, height), Pixels::Grey8(values.collect()))
     }
 }
 
@@ -127,7 +126,6 @@ struct MarkedBoard {
 }
 
 impl MarkedBoard {
-    #[expect(clippy::cast_precision_loss, reason = "a handful of cells")]
     fn of(board: &Board) -> Option<Self> {
         let count = board.markers()?.dictionary.side() + 2;
         let GridSize { columns, rows } = board.corners();
@@ -135,14 +133,13 @@ impl MarkedBoard {
             (0..(columns + 1) * (rows + 1)).map(|i| (i % (columns + 1), i / (columns + 1)));
         let clear = board.marker_margin();
         Some(Self {
-            cells: (count, (1.0 - 2.0 * clear) / count as f64),
+            cells: (count, (1.0 - 2.0 * clear) / to_f64(count)),
             clearance: clear,
             black: squares.map(|(column, row)| board.black_cells(column, row)).collect(),
         })
     }
 
-    /// How much of a place in a square is covered by its marker's black.
-    #[expect(clippy::cast_precision_loss, reason = "a handful of cells")]
+    /// How much of a position in a square is covered by its marker's black.
     fn black_fraction(&self, square: usize, u: Blurred, v: Blurred) -> f64 {
         let Some(black) = self.black.get(square).filter(|black| !black.is_empty()) else {
             return 0.0;
@@ -150,7 +147,7 @@ impl MarkedBoard {
         let (count, side) = self.cells;
         let along = |Blurred { at, blur }: Blurred| -> Vec<f64> {
             let passed =
-                |line: usize| edge_fraction(at - self.clearance - line as f64 * side, blur);
+                |line: usize| edge_fraction(at - self.clearance - to_f64(line) * side, blur);
             (0..count).map(|cell| passed(cell) - passed(cell + 1)).collect()
         };
         let (across, down) = (along(u), along(v));
@@ -159,7 +156,6 @@ impl MarkedBoard {
 }
 
 impl BoardScene {
-    #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
     fn of(board: &Board, pose: &Pose, exposure: Exposure) -> Self {
         let rotation = pose.rotation();
         let axes = rotation.matrix();
@@ -172,7 +168,7 @@ impl BoardScene {
         let GridSize { columns, rows } = board.corners();
         Self {
             to_board: from_board.try_inverse().unwrap_or_else(Matrix3::zeros),
-            squares: Vector2::new(columns as f64 + 1.0, rows as f64 + 1.0),
+            squares: Vector2::new(to_f64(columns) + 1.0, to_f64(rows) + 1.0),
             exposure,
             markers: MarkedBoard::of(board),
         }
@@ -182,7 +178,7 @@ impl BoardScene {
     /// so far off.
     fn grey(&self, ray: Point2<f64>, right: Vector2<f64>, below: Vector2<f64>) -> f64 {
         let Some(at) = self.on_board(ray) else { return BACKGROUND };
-        // Squares from the sheet's middle and from its border.
+        // Squares from the sheet's middle and from its boundary.
         let beyond = (at + Vector2::repeat(1.0) - self.squares / 2.0).abs() - self.squares / 2.0;
         if beyond.max() > EDGE_ZONE_SQUARES {
             return BACKGROUND;
@@ -220,9 +216,8 @@ impl BoardScene {
         BACKGROUND + (sheet - BACKGROUND) * on_sheet
     }
 
-    /// How much of a place is covered by a marker's black: that of its own square alone,
+    /// How much of a position is covered by a marker's black: that of its own square alone,
     /// for no marker's blur reaches the next one.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the board")]
     fn marker_fraction(&self, u: Blurred, v: Blurred) -> f64 {
         let Some(marks) = &self.markers else { return 0.0 };
         let (column, row) = (u.at.floor() + 1.0, v.at.floor() + 1.0);
@@ -230,7 +225,7 @@ impl BoardScene {
         if !within(column, self.squares.x) || !within(row, self.squares.y) {
             return 0.0;
         }
-        let square = row as usize * self.squares.x as usize + column as usize;
+        let square = to_count(row) * to_count(self.squares.x) + to_count(column);
         let within_square = |c: Blurred| Blurred { at: c.at - c.at.floor(), ..c };
         marks.black_fraction(square, within_square(u), within_square(v))
     }
@@ -242,7 +237,7 @@ impl BoardScene {
     }
 }
 
-/// Share of a blurred half plane.
+/// Fraction of a blurred half plane.
 fn edge_fraction(inside: f64, blur: f64) -> f64 {
     // The tails beyond are less than a part in 10¹⁵, and slow.
     normal_distribution::cumulative((inside / blur).clamp(-MAX_BLUR_SIGMAS, MAX_BLUR_SIGMAS))

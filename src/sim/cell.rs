@@ -1,7 +1,7 @@
-//! The simulated cell: the same controller, runner and robot as a live one, in
-//! simulated time. Events come in the order of time; at the same moment the
-//! robot reports first, then the extruder, then the camera sees, then a setpoint is
-//! sent, and last the extruder side takes its step.
+//! The simulated cell: the same controller, runner and robot as a live one, in simulated
+//! time. Events are in the order of time; at the same time the robot reports first, then the
+//! extruder, then a frame is captured, then a setpoint is sent, and last the extruder side
+//! takes its step.
 
 mod camera;
 mod clock;
@@ -36,38 +36,38 @@ use camera::{CapturedFrame, SimCamera};
 use clock::{ClockEvent, Ticker};
 use port::SimPort;
 
-/// A robot that stops for this long has finished.
+/// Longest duration of a layer \[s\]: a day; a robot that has stopped for good ends the layer
+/// by it.
 const MAX_LAYER_S: f64 = 86_400.0;
-/// Slowness of the simulated robot's own acceleration limit where the cell's
-/// setpoints are limited already \[mm/s²\].
+/// Acceleration limit of the simulated robot, where the cell's setpoints are limited already:
+/// none in effect \[mm/s²\].
 const ROBOT_ACCEL: MmPerS2 = MmPerS2::constant(1e6);
-/// Share of the start speed from which the start counts as over.
+/// Fraction of the start speed from which the start is over.
 const STARTED_FRACTION: f64 = 0.99;
 
-/// Share of the nominal flow below which nothing is laid.
+/// Fraction of the nominal flow below which nothing is laid.
 const MIN_FLOW_FRACTION: f64 = 1e-3;
 
-/// An extruder that is commanded: what the controller knows of it, and what
-/// answers.
+/// A commanded extruder: the controller's side and the plant.
 #[derive(Debug)]
 pub struct CommandedExtruder {
-    /// What the controller knows.
+    /// The side of the controller.
     pub setup: ExtruderSetup,
-    /// The flow that is wanted.
+    /// The demanded flow.
     pub demand: FlowDemand,
-    /// What answers.
+    /// The plant.
     pub plant: SimExtruder,
-    /// Flow at which the bead is as wide as its model says.
+    /// Flow at which the width is that of the bead model.
     pub nominal_flow: Mm3PerS,
 }
 
 /// A cell that cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SimCellError {
-    /// The robot that the cell describes cannot be.
+    /// Invalid parameters of the robot.
     #[error("the simulated robot cannot be: {0}")]
     Robot(#[from] ParamError),
-    /// The bead cannot be pictured.
+    /// The bead cannot be imaged.
     #[error("the simulated bead cannot be rendered: {0}")]
     Render(#[from] RenderError),
 }
@@ -77,38 +77,37 @@ pub struct SimCell<K> {
     run: RunPart,
     cell: Cell,
     runner: Runner<SimPort, K, Option<SimExtruder>>,
-    /// Flow at which the bead is as wide as its model says, where an extruder
-    /// is commanded.
+    /// Flow at which the width is that of the bead model, where an extruder is commanded.
     nominal_flow: Option<Mm3PerS>,
     camera: SimCamera,
     bead: LaidBead,
     now: Stamp,
     layers: u64,
-    /// Where in its period the pump's pulsation begins.
+    /// Phase of the pump's pulsation, in periods.
     pulse_phase: f64,
     /// Widths that have not arrived yet, the oldest first.
     pending_widths: VecDeque<Arrival>,
     /// Nozzle's path at the start of the layer \[mm\].
     bead_start: f64,
-    /// As far as bead is laid, from there.
+    /// End of the laid bead, from there.
     laid_to: PathSpeed,
     started: bool,
     speed: Option<MmPerS>,
     setpoint: Option<MmPerS>,
 }
 
-/// How a layer went.
+/// The end of a layer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LayerEnd {
-    /// Simulated time that it took.
+    /// Its duration in simulated time.
     pub duration: Span,
     /// Whether the bead was laid to its end.
     pub complete: bool,
 }
 
 impl<K: Recorder> SimCell<K> {
-    /// A cell as its file describes it, with the robot idle and connected, and
-    /// an extruder that goes its own way.
+    /// The cell of a file, with the robot idle and connected, and an extruder that is not
+    /// commanded.
     pub fn new(
         cell: &Cell,
         run: &RunPart,
@@ -118,7 +117,7 @@ impl<K: Recorder> SimCell<K> {
         Self::with_extruder(cell, run, calibration, recorder, None)
     }
 
-    /// The same with a controller that is told the camera's distance wrong by a
+    /// The same with a controller whose assumed distance of the camera is wrong by a
     /// factor.
     pub fn mismatched(
         cell: &Cell,
@@ -155,11 +154,11 @@ impl<K: Recorder> SimCell<K> {
         };
         let port = SimPort::new(VirtualRobot::new(params, Stamp::START)?, run.robot.valid_ms);
         let mut controller = Controller::new(cell.controller_setup(run, &calibration));
-        let nominal_flow = extruder.as_ref().map(|rig| rig.nominal_flow);
+        let nominal_flow = extruder.as_ref().map(|commanded| commanded.nominal_flow);
         let mut plant = None;
-        if let Some(rig) = extruder {
-            controller = controller.with_extruder(rig.setup, rig.demand);
-            plant = Some(rig.plant);
+        if let Some(commanded) = extruder {
+            controller = controller.with_extruder(commanded.setup, commanded.demand);
+            plant = Some(commanded.plant);
         }
         let mut sim = Self {
             camera: SimCamera::new(cell, calibration)?,
@@ -202,10 +201,9 @@ impl<K: Recorder> SimCell<K> {
         self.runner.into_parts().2
     }
 
-    /// Lays one bead from start to end with the nozzle at a height, and tells
-    /// a witness everything. Ends early when the robot stops, and when the
-    /// witness has seen enough.
-    pub fn layer(&mut self, z: Mm, witness: &mut impl Observer) -> LayerEnd {
+    /// Lays one bead from start to end with the nozzle at a height; the observer gets every
+    /// event. Ends early when the robot stops, and when the observer is done.
+    pub fn layer(&mut self, z: Mm, observer: &mut impl Observer) -> LayerEnd {
         self.bead = Self::fresh_bead(&self.cell, self.layers);
         self.camera.raise(self.cell.rise(Some(z)));
         self.bead_start = self.runner.robot_mut().begin(self.now, z).path_mm.get();
@@ -217,28 +215,28 @@ impl<K: Recorder> SimCell<K> {
         self.layers += 1;
         loop {
             let (at, what) = clock.next();
-            self.arrivals(at, witness);
+            self.arrivals(at, observer);
             self.now = at;
             self.lay();
             match what {
                 ClockEvent::Report => {
                     let state = self.runner.robot_mut().state(at);
                     self.speed = Some(state.speed_mm_per_s);
-                    self.tell(&Event::Robot(state), witness);
+                    self.handle(&Event::Robot(state), observer);
                     let ended = !matches!(state.mode, RobotMode::Print | RobotMode::Hold);
                     let too_long = (at - began).secs() > MAX_LAYER_S;
-                    if ended || too_long || witness.is_done() {
+                    if ended || too_long || observer.is_done() {
                         let whole = state.mode == RobotMode::Idle;
                         return LayerEnd { duration: at - began, complete: whole };
                     }
                 }
-                ClockEvent::Frame => self.take_frame(witness),
-                ClockEvent::ExtruderReport => self.extruder_reports(witness),
+                ClockEvent::Frame => self.take_frame(observer),
+                ClockEvent::ExtruderReport => self.extruder_reports(observer),
                 ClockEvent::ExtruderTick => {
-                    let _ = self.tell(&Event::ExtruderTick, witness);
+                    let _ = self.handle(&Event::ExtruderTick, observer);
                 }
                 ClockEvent::Tick => {
-                    let handled = self.tell(&Event::Tick, witness);
+                    let handled = self.handle(&Event::Tick, observer);
                     if let (Some(Ok(_)), Some(Command::Speed(speed))) =
                         (handled.robot, handled.step.command)
                     {
@@ -249,8 +247,8 @@ impl<K: Recorder> SimCell<K> {
         }
     }
 
-    /// Lets the robot stand, and with it the pump, until the next layer.
-    pub fn rest(&mut self, lasts: Span, witness: &mut impl Observer) {
+    /// Pauses robot and pump for a time.
+    pub fn rest(&mut self, lasts: Span, observer: &mut impl Observer) {
         let mut clock = Ticker::new(&self.cell, &self.run, self.now, self.layers);
         let until = self.now + lasts;
         loop {
@@ -263,31 +261,32 @@ impl<K: Recorder> SimCell<K> {
             match what {
                 ClockEvent::Report => {
                     let state = self.runner.robot_mut().state(at);
-                    self.tell(&Event::Robot(state), witness);
+                    self.handle(&Event::Robot(state), observer);
                 }
-                ClockEvent::ExtruderReport => self.extruder_reports(witness),
+                ClockEvent::ExtruderReport => self.extruder_reports(observer),
                 ClockEvent::ExtruderTick => {
-                    let _ = self.tell(&Event::ExtruderTick, witness);
+                    let _ = self.handle(&Event::ExtruderTick, observer);
                 }
                 ClockEvent::Frame | ClockEvent::Tick => {}
             }
         }
     }
 
-    fn tell(&mut self, event: &Event, witness: &mut impl Observer) -> Handled {
+    fn handle(&mut self, event: &Event, observer: &mut impl Observer) -> Handled {
         let handled = self.runner.handle(self.now, event);
-        witness.step(self.now, event, &handled.step);
+        observer.step(self.now, event, &handled.step);
         handled
     }
 
-    fn extruder_reports(&mut self, witness: &mut impl Observer) {
+    fn extruder_reports(&mut self, observer: &mut impl Observer) {
         let now = self.now;
         let Some(extruder) = self.runner.extruder_mut() else { return };
         extruder.advance(now);
         let (flow, report) = (extruder.flow(), extruder.report());
-        let side = self.tell(&Event::Extruder(report), witness).step.extruder.unwrap_or_default();
+        let side =
+            self.handle(&Event::Extruder(report), observer).step.extruder.unwrap_or_default();
         let laying = side.state == ExtruderState::Running;
-        witness.flow(now, laying.then_some(side.trace.flow_mm3_per_s), flow);
+        observer.flow(now, laying.then_some(side.trace.flow_mm3_per_s), flow);
     }
 
     /// Lays the bead up to where the nozzle is now.
@@ -308,13 +307,11 @@ impl<K: Recorder> SimCell<K> {
         }
     }
 
-    /// The speed at which the bead's model is asked: that at which the nominal
-    /// flow lays as wide a bead as the present flow at the robot's speed. None
-    /// where nothing flows.
+    /// The speed for the bead model: the speed at which the nominal flow lays the same width
+    /// as the present flow at the robot's speed. None where nothing flows.
     ///
-    /// Without an extruder that is commanded the flow is gathered with the
-    /// speed while the robot starts, so that the bead begins as wide as it is
-    /// at the start speed.
+    /// Without a commanded extruder the flow follows the speed while the robot starts, so that
+    /// the bead begins with the width of the start speed.
     fn equivalent_speed(&mut self, speed: f64) -> Option<f64> {
         let now = self.now;
         let Some(nominal) = self.nominal_flow else {
@@ -327,12 +324,12 @@ impl<K: Recorder> SimCell<K> {
         };
         let extruder = self.runner.extruder_mut().as_mut()?;
         extruder.advance(now);
-        let share = extruder.flow() / nominal;
-        (share > MIN_FLOW_FRACTION).then(|| speed / share)
+        let fraction = extruder.flow() / nominal;
+        (fraction > MIN_FLOW_FRACTION).then(|| speed / fraction)
     }
 
-    /// Takes a picture, whose width arrives after the latency.
-    fn take_frame(&mut self, witness: &mut impl Observer) {
+    /// Takes an image, whose width arrives after the latency.
+    fn take_frame(&mut self, observer: &mut impl Observer) {
         let state = self.runner.robot_mut().state(self.now);
         let under = state.path_mm.get() - self.bead_start - self.run.camera.offset.get();
         let taken = self.camera.take(self.now, under, state.z_mm, &self.bead);
@@ -340,19 +337,19 @@ impl<K: Recorder> SimCell<K> {
         let arrival =
             Arrival { at: self.now + latency, captured_at: self.now, position_mm: under, taken };
         self.pending_widths.push_back(arrival);
-        self.arrivals(self.now, witness);
+        self.arrivals(self.now, observer);
     }
 
-    /// Lets the widths arrive that are due by a moment.
-    fn arrivals(&mut self, until: Stamp, witness: &mut impl Observer) {
+    /// Handles the widths that arrive by a time.
+    fn arrivals(&mut self, until: Stamp, observer: &mut impl Observer) {
         while self.pending_widths.front().is_some_and(|arrival| arrival.at <= until) {
             let Some(arrival) = self.pending_widths.pop_front() else { return };
             self.now = arrival.at;
-            self.arrive(arrival, witness);
+            self.arrive(arrival, observer);
         }
     }
 
-    fn arrive(&mut self, arrival: Arrival, witness: &mut impl Observer) {
+    fn arrive(&mut self, arrival: Arrival, observer: &mut impl Observer) {
         let Arrival { captured_at, position_mm: under, taken, .. } = arrival;
         let event = match &taken.outcome {
             Ok(measured) => Event::Measured {
@@ -365,11 +362,11 @@ impl<K: Recorder> SimCell<K> {
                 Event::Rejected { frame: taken.seq, captured_at, reason: (*status).to_owned() }
             }
         };
-        let handled = self.tell(&event, witness);
-        // The edges are those of the last picture, which is this one unless
+        let handled = self.handle(&event, observer);
+        // The edges are those of the last image, which is this one unless
         // another has been taken meanwhile.
         let newest = self.pending_widths.is_empty();
-        witness.frame(&FrameObservation {
+        observer.frame(&FrameObservation {
             seq: taken.seq,
             captured_at,
             outcome: taken.outcome,
@@ -393,7 +390,7 @@ struct Arrival {
     taken: CapturedFrame,
 }
 
-/// Keeps the phase of the pulsation apart from other random numbers of a seed.
+/// Random stream of the phase of the pulsation. Derived: the bytes of "pulse".
 const PULSE_STREAM: u64 = 0x0070_756c_7365;
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! Gaussian blur of what is known by pixels.
 
+use crate::numeric::number::narrow_to_f32;
 /// Weights of a Gaussian at whole distances from 0, as far as they matter; of
-/// all places on both sides they add up to 1.
+/// all positions on both sides they add up to 1.
 pub fn kernel(blur_px: f64) -> Vec<f32> {
     let mut weights = vec![1.0];
     let mut sum = 1.0;
@@ -15,8 +16,7 @@ pub fn kernel(blur_px: f64) -> Vec<f32> {
         weights.push(weight);
         sum += 2.0 * weight;
     }
-    #[expect(clippy::cast_possible_truncation, reason = "weights of grey levels")]
-    weights.into_iter().map(|weight| (weight / sum) as f32).collect()
+    weights.into_iter().map(|weight| narrow_to_f32(weight / sum)).collect()
 }
 
 /// Convolves lines of `width` pixels along both directions; what lies outside

@@ -1,18 +1,18 @@
-//! What the pixels see before light, texture and noise: shares of bead, and
+//! What the pixels see before light, texture and noise: fractions of bead, and
 //! the grey that disturbances add.
 
-use super::discs;
-use super::discs::{Backdrop, DiscLayer, Mask};
+use super::discs::{self, Backdrop, DiscLayer, Mask};
 use super::motion::ShutterPosition;
 use super::shade::BeadShape;
 use super::tint::{BeadLine, Tint};
 use super::view::GaugeExtent;
+use crate::numeric::number::narrow_to_f32;
 use crate::scenario::image::ImageModel;
 
 /// Pixels line after line across the bead, until they are turned.
 #[derive(Debug, Clone)]
 pub struct BeadCoverage {
-    /// Share of bead.
+    /// Fraction of bead.
     pub fractions: Vec<f32>,
     /// Grey levels that are added to bead and ground.
     pub added_grey: Option<Vec<f32>>,
@@ -28,21 +28,20 @@ pub struct Masks {
 }
 
 impl BeadCoverage {
-    /// The bead and what follows its edges, as the mean over the places where
-    /// the picture is while the shutter is open.
+    /// The bead and what follows its edges, as the mean over the positions where
+    /// the image is while the shutter is open.
     pub fn of(shape: &BeadShape, tint: Option<&Tint>, positions: &[ShutterPosition]) -> Self {
         let GaugeExtent { run, cross } = shape.extent;
-        let mut shares = vec![0.0; run * cross];
+        let mut fractions = vec![0.0; run * cross];
         let mut added = tint.map(|_| vec![0.0; run * cross]);
         let mut line = Vec::with_capacity(cross);
         for ShutterPosition { weight, shift_px } in positions {
-            #[expect(clippy::cast_possible_truncation, reason = "a weight")]
-            let weight = *weight as f32;
+            let weight = narrow_to_f32(*weight);
             for at in 0..run {
                 let Some(first) = shape.line(at, *shift_px, &mut line) else { continue };
                 let start = at * cross + first;
-                for (share, here) in shares[start..].iter_mut().zip(&line) {
-                    *share += weight * here;
+                for (fraction, here) in fractions[start..].iter_mut().zip(&line) {
+                    *fraction += weight * here;
                 }
                 if let Some((tint, added)) = tint.zip(added.as_mut()) {
                     let greys = &mut added[at * cross..][..cross];
@@ -52,7 +51,7 @@ impl BeadCoverage {
                 }
             }
         }
-        Self { fractions: shares, added_grey: added }
+        Self { fractions, added_grey: added }
     }
 
     /// Covers bead and ground with spots and grains. `light` is that of a
@@ -60,14 +59,14 @@ impl BeadCoverage {
     pub fn cover(
         &mut self,
         shape: &BeadShape,
-        picture: &ImageModel,
+        image: &ImageModel,
         Masks { spots, grains }: Masks,
         light: &dyn Fn(usize, usize) -> f64,
         positions: &[ShutterPosition],
     ) {
         let count = self.fractions.len();
         let tint = self.added_grey.take().unwrap_or_else(|| vec![0.0; count]);
-        let grey = [picture.ground_grey, picture.bead_grey];
+        let grey = [image.ground_grey, image.bead_grey];
         let scene = Backdrop { shape, grey, tint: &tint };
         let mut change = vec![0.0; count];
         if let Some(mut mask) = spots {
@@ -76,11 +75,11 @@ impl BeadCoverage {
                 mask.subtract(grains);
             }
             // Saturated in any light.
-            let grey = |run, cross| picture.bead_grey.max(255.0 / light(run, cross));
+            let grey = |run, cross| image.bead_grey.max(255.0 / light(run, cross));
             scene.paint(&DiscLayer { mask: &mask, grey: &grey, bead_only: true }, &mut change);
         }
         if let Some(mask) = &grains {
-            let grey = |_, _| picture.grains.grey;
+            let grey = |_, _| image.grains.grey;
             scene.paint(&DiscLayer { mask, grey: &grey, bead_only: false }, &mut change);
         }
         let mut added = discs::blur(change, shape.extent.cross, shape.blur_px, positions);

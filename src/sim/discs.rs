@@ -5,9 +5,9 @@ use super::convolve::{convolve, kernel};
 use super::motion::ShutterPosition;
 use super::shade::BeadShape;
 use super::view::GaugeExtent;
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{narrow_to_f32, to_f64};
 
-/// Points along the side of a pixel.
+/// Points along the side of a pixel. Derived: 4² points fill the 16 bits of a mask.
 const POINTS_PER_SIDE: usize = 4;
 
 /// A disc in pixels along and across the gauge's axis.
@@ -86,7 +86,7 @@ impl Mask {
         }
     }
 
-    /// Share of all points that are covered.
+    /// Fraction of all points that are covered.
     #[cfg(test)]
     pub fn fraction(&self) -> f64 {
         let covered: u32 = self.bits.iter().map(|bits| bits.count_ones()).sum();
@@ -104,14 +104,12 @@ impl Backdrop<'_> {
                 let [ground, bead] = self.grey;
                 let disc = (layer.grey)(at, number) - f64::from(self.tint[at * cross + number]);
                 let on_ground = if layer.bead_only { 0.0 } else { outside * (disc - ground) };
-                #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
-                let grey = (on_ground + inside * (disc - bead)) as f32;
-                change[at * cross + number] += grey;
+                change[at * cross + number] += narrow_to_f32(on_ground + inside * (disc - bead));
             }
         }
     }
 
-    /// Share of the pixel's covered points on ground and on bead.
+    /// Fraction of the pixel's covered points on ground and on bead.
     fn split(&self, bits: u16, at: usize, number: usize) -> [f64; 2] {
         let (mut outside, mut inside) = (0_u32, 0_u32);
         let corners = [(-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)];
@@ -132,7 +130,7 @@ impl Backdrop<'_> {
 }
 
 /// Blurs what has changed as the lens does, and moves it like the rest of the
-/// picture.
+/// image.
 pub fn blur(
     mut change: Vec<f32>,
     width: usize,
@@ -153,11 +151,11 @@ pub fn blur(
             ((1, 0), v * (1.0 - u)),
             ((1, 1), v * u),
         ];
-        for ((lower, later), share) in corners {
+        for ((lower, later), fraction) in corners {
             #[expect(clippy::cast_possible_truncation, reason = "a weight, and a few pixels")]
-            let (share, by) =
-                ((weight * share) as f32, [down as isize + lower, along as isize + later]);
-            add_shifted(&mut mean, &change, width, by, share);
+            let (fraction, by) =
+                ((weight * fraction) as f32, [down as isize + lower, along as isize + later]);
+            add_shifted(&mut mean, &change, width, by, fraction);
         }
     }
     mean

@@ -1,5 +1,5 @@
-//! The simulated extruder: a pump that starts and stops with delays, a shut-off
-//! valve, and behind them a plant that turns commands into flow.
+//! The simulated extruder: a pump that starts and stops with delays, a shut-off valve, and a
+//! plant from command to flow.
 
 use crate::cell::extruder::{ExtruderPlant, PlantKind};
 use crate::core::time::{Span, Stamp};
@@ -31,7 +31,7 @@ pub struct Delays {
     pub valve: Span,
 }
 
-/// A two-way device that does what it was told after a while.
+/// A two-way device with a delay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Switch {
     on: bool,
@@ -44,7 +44,7 @@ impl Switch {
         Self { on: false, commanded: false, acts_at: Stamp::START }
     }
 
-    fn tell(&mut self, now: Stamp, on: bool, delay: Span) {
+    fn set(&mut self, now: Stamp, on: bool, delay: Span) {
         if on != self.commanded {
             (self.commanded, self.acts_at) = (on, now + delay);
         }
@@ -75,8 +75,8 @@ impl SimExtruder {
         Self { plant, delays, pump, valve, value: 0.0, now: Stamp::START }
     }
 
-    /// As a cell describes it; the seed is that of everything random, and `usual` the
-    /// flow of the cell's bead. Fails where a transfer function cannot be put on the grid of [`STEP`].
+    /// That of a cell, with the seed of its random numbers and the usual flow of its bead.
+    /// Fails where a transfer function cannot be discretised with [`STEP`].
     pub fn of(plant: &ExtruderPlant, seed: u64, usual: Mm3PerS) -> Result<Self, ModelError> {
         let delays =
             Delays { start: plant.start_delay, stop: plant.stop_delay, valve: plant.valve_delay };
@@ -89,7 +89,7 @@ impl SimExtruder {
         Ok(Self::new(kind, delays))
     }
 
-    /// Goes on to a moment.
+    /// Advances to a time.
     pub fn advance(&mut self, now: Stamp) {
         while self.now + STEP <= now {
             self.now = self.now + STEP;
@@ -99,12 +99,12 @@ impl SimExtruder {
         }
     }
 
-    /// Flow through the nozzle at the moment it was advanced to.
+    /// Flow through the nozzle at the time it was advanced to.
     pub fn flow(&self) -> Mm3PerS {
         if self.valve.on { self.plant.flow() } else { Mm3PerS::ZERO }
     }
 
-    /// What the pump does, and whether the valve is open.
+    /// Mode of the pump, and whether the valve is open.
     pub const fn state(&self) -> (PumpMode, bool) {
         let pump = match (self.pump.commanded, self.pump.on) {
             (true, true) => PumpMode::On,
@@ -115,7 +115,7 @@ impl SimExtruder {
         (pump, self.valve.on)
     }
 
-    /// What it reports.
+    /// Its report.
     pub fn report(&mut self) -> ExtruderReport {
         let (pump, valve_open) = self.state();
         let mut report = ExtruderReport {
@@ -135,13 +135,13 @@ impl ExtruderPort for SimExtruder {
     fn send(&mut self, now: Stamp, command: ExtruderCommand) -> Result<Sent, SendError> {
         self.advance(now);
         let pump_delay = if command.pump_on { self.delays.start } else { self.delays.stop };
-        self.pump.tell(now, command.pump_on, pump_delay);
-        self.valve.tell(now, command.valve_open, self.delays.valve);
-        // A pump that is told to stop runs down from where it was.
+        self.pump.set(now, command.pump_on, pump_delay);
+        self.valve.set(now, command.valve_open, self.delays.valve);
+        // A pump that stops runs down from its last command.
         if command.pump_on {
             self.value = command.value;
         }
-        // What needs no time is done at once.
+        // Devices without delay act at once.
         self.pump.advance(now);
         self.valve.advance(now);
         Ok(Sent { at: now })

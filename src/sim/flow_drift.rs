@@ -1,14 +1,16 @@
-//! A flow that wanders along the path: a random walk of its logarithm.
+//! A flow that drifts along the path: a random walk of its logarithm.
 
 use super::hash;
+use crate::numeric::number::to_count;
 
-/// Distance between the nodes of the walk; straight in between \[mm\].
+/// Distance between the nodes of the random walk \[mm\], linear in between: less than half a
+/// gauge.
 const NODE_MM: f64 = 5.0;
-/// Keeps the walk apart from other random numbers of a seed.
+/// Random stream of the walk. Derived: the bytes of "wander".
 const DRIFT_STREAM: u64 = 0x0077_616e_6465_7200;
 
-/// The walk of one bead: a function of seed and place, whose nodes are kept as far
-/// as they were asked for.
+/// The walk of one bead, a function of seed and position. Nodes are computed when needed and
+/// kept.
 #[derive(Debug, Clone)]
 pub struct FlowDrift {
     /// Standard deviation of a step from node to node.
@@ -18,23 +20,18 @@ pub struct FlowDrift {
 }
 
 impl FlowDrift {
-    /// A walk that goes this far over a metre, as a share (standard deviation).
+    /// A walk with this standard deviation over a metre, relative to the width.
     pub fn new(per_root_m: f64, seed: u64) -> Self {
         Self { step: per_root_m * (NODE_MM / 1000.0).sqrt(), seed, nodes: vec![0.0] }
     }
 
-    /// The width at a place over that without the walk; 1 before the start.
+    /// The width at a position over that without the walk; 1 before the start.
     pub fn at(&mut self, path_mm: f64) -> f64 {
         if self.step <= 0.0 || path_mm <= 0.0 {
             return 1.0;
         }
-        let place = path_mm / NODE_MM;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "not negative, and short of any path"
-        )]
-        let node = place as usize;
+        let position = path_mm / NODE_MM;
+        let node = to_count(position);
         while self.nodes.len() < node + 2 {
             let number = self.nodes.len() as u64;
             let [step, _] = hash::normal_pair(hash::mix(&[self.seed, DRIFT_STREAM, number]));
@@ -42,7 +39,7 @@ impl FlowDrift {
             self.nodes.push(last + self.step * step);
         }
         let (before, after) = (self.nodes[node], self.nodes[node + 1]);
-        libm::exp(before + (after - before) * place.fract())
+        libm::exp(before + (after - before) * position.fract())
     }
 }
 
@@ -51,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_wanders_as_far_as_it_was_told_whoever_asks_first() {
+    fn its_standard_deviation_is_the_given_one_whatever_is_asked_first() {
         let far: Vec<f64> =
             (0..400).map(|seed| FlowDrift::new(0.01, seed).at(4000.0).ln()).collect();
         let size = (far.iter().map(|x| x * x).sum::<f64>() / 400.0).sqrt();

@@ -8,13 +8,14 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::identify::excitation::{Excitation, ExcitationError, Waveform};
 use crate::numeric::lti::{Between, ModelError, SecondOrder, Simulator, TransferFunction};
 
-/// From sample to sample \[s\].
+/// Sample time \[s\]: 50 Hz.
 pub const STEP_S: f64 = 0.02;
-/// Speed of the screw about which it moves \[rpm\].
+/// Operating point of the screw \[rpm\].
 const MIDDLE_RPM: f64 = 30.0;
-/// Flow at that speed \[mm³/s\].
+/// Flow at the operating point \[mm³/s\], a choice: the model describes deviations from it.
 const MIDDLE_MM3_PER_S: f64 = 540.0;
-/// Standard deviation of the flow's noise \[mm³/s\].
+/// Standard deviation of the flow's noise \[mm³/s\]. Derived: 13 % of the excited flow, 5
+/// rpm·19.05.
 const NOISE_MM3_PER_S: f64 = 12.0;
 
 /// What a log was made of that cannot be.

@@ -1,4 +1,4 @@
-//! A series of pictures along a bead that is laid at one speed.
+//! A series of images along a bead that is laid at one speed.
 
 use super::laid::LaidBead;
 use super::render::{RenderError, Rendered, Renderer};
@@ -7,11 +7,11 @@ use crate::cell::Cell;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 
-/// Frames a second where a cell names no rate.
+/// Frames per second where a cell gives no rate: that of Shojaei Barjuei et al. 2022.
 const DEFAULT_RATE_HZ: f64 = 10.0;
 
-/// A bead that reaches beyond both ends of what is pictured, and where along
-/// it the pictures are taken.
+/// A bead that reaches beyond both ends of what is imaged, and where along
+/// it the images are taken.
 #[derive(Debug, Clone)]
 pub struct FrameSeries {
     renderer: Renderer,
@@ -22,7 +22,7 @@ pub struct FrameSeries {
 }
 
 impl FrameSeries {
-    /// The pictures of a cell: the bead is laid at the robot's start speed, or
+    /// The images of a cell: the bead is laid at the robot's start speed, or
     /// at the bead model's reference speed where the cell has no robot; the
     /// middle of the gauge goes from 0 to the length of the simulated path.
     pub fn new(cell: &Cell, calibration: Calibration) -> Result<Self, RenderError> {
@@ -49,12 +49,12 @@ impl FrameSeries {
         Ok(Self { renderer, bead, speed_mm_per_s, spacing_mm, frames })
     }
 
-    /// How many pictures there are.
+    /// How many images there are.
     pub fn frames(&self) -> u64 {
         self.frames
     }
 
-    /// Path length from one picture to the next \[mm\].
+    /// Path length from one image to the next \[mm\].
     pub fn spacing_mm(&self) -> f64 {
         self.spacing_mm
     }
@@ -64,12 +64,12 @@ impl FrameSeries {
         self.speed_mm_per_s
     }
 
-    /// When a picture is taken \[s\], from the first.
+    /// When an image is taken \[s\], from the first.
     pub fn time_s(&self, frame: u64) -> f64 {
         self.path_mm(frame) / self.speed_mm_per_s
     }
 
-    /// Takes a picture.
+    /// Takes an image.
     pub fn render(&self, frame: u64) -> Result<Rendered, RenderError> {
         let path_mm = self.path_mm(frame);
         let stamp = Stamp::from_secs(self.time_s(frame));

@@ -10,8 +10,8 @@ use super::shade::BeadShape;
 use crate::numeric::number::to_f64;
 use crate::scenario::image::Grains;
 
-/// Discs whose centres lie within a radius of an edge, at random places, until
-/// they cover each edge on the share of the rows that was asked for.
+/// Discs whose centres lie within a radius of an edge, at random positions, until
+/// they cover each edge on the given fraction of the rows.
 pub fn grains(grains: &Grains, shape: &BeadShape, key: u64) -> Option<Mask> {
     if grains.rows_fraction <= 0.0 || grains.size_px <= 0.0 {
         return None;
@@ -38,7 +38,7 @@ fn along(
     let mut uniform = || -> f64 { StandardUniform.sample(random) };
     let mut covered = vec![false; rows];
     let (mut discs, mut count) = (Vec::new(), 0.0);
-    // A row that nothing covers would be tried for ever.
+    // A row that no grain can cover must not be tried endlessly.
     for _ in 0..100 * rows {
         if count >= wanted {
             break;

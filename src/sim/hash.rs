@@ -1,5 +1,5 @@
-//! Random numbers that are a function of what they are for – a seed, a place –
-//! and not of the order in which they are asked for.
+//! Random numbers as a function of their purpose (a seed, a position), independent of the
+//! order of evaluation.
 
 use std::f64::consts::TAU;
 

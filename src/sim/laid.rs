@@ -2,21 +2,24 @@
 
 use super::flow_drift::FlowDrift;
 use super::waviness::Waviness;
+use crate::numeric::number::{to_count, to_f64};
 use crate::scenario::bead::{BeadModel, EdgeRoughness};
 use crate::scenario::disturbance::Flow;
 
-/// Coarsest grid along the path on which a bead is kept \[mm\].
+/// Coarsest grid along the path \[mm\]: a finer one costs time, a coarser one blurs steps of
+/// the flow.
 const MAX_STEP_MM: f64 = 0.5;
-/// Points of the grid within one correlation length of the roughness; between
-/// them a bead loses less than 1 % of its roughness.
+/// Grid points within one correlation length of the roughness. Derived: half-way between two
+/// points the variance is (1 + e^(−1/100))/2 = 0.995 of that at a point.
 const POINTS_PER_LENGTH: f64 = 10.0;
-/// Pieces that miss each other by less belong together \[mm\].
+/// Largest gap between pieces of one bead \[mm\]: beyond rounding of a path, below any real
+/// gap.
 const JOINT_TOLERANCE_MM: f64 = 1e-6;
 
 /// A bead along its path. Its width is that of the model at the speed at which
-/// a place was laid, times the flow's ratio there, plus roughness. The edges
+/// a position was laid, times the flow's ratio there, plus roughness. The edges
 /// are straight between the points of a grid, so that means along the path are
-/// exact. The same pieces give the same bead, whatever was asked in between.
+/// exact. The same pieces give the same bead, independent of reads in between.
 #[derive(Debug, Clone)]
 pub struct LaidBead {
     model: BeadModel,
@@ -38,12 +41,12 @@ pub struct PathSpeed {
     pub speed_mm_per_s: f64,
 }
 
-/// A stretch without a gap.
+/// A segment without a gap.
 #[derive(Debug, Clone)]
 struct Strip {
     start_mm: f64,
     end_mm: f64,
-    /// Number of the first node; a node's place is its number times the step.
+    /// Number of the first node; a node's position is its number times the step.
     first: i64,
     nodes: Vec<Node>,
 }
@@ -71,8 +74,8 @@ impl LaidBead {
             MAX_STEP_MM
         };
         let waviness = Waviness::new(roughness, seed);
-        let wander = FlowDrift::new(flow.drift_per_root_m, seed);
-        Self { model, flow, waviness, drift: wander, pulse: 1.0, step_mm, strips: Vec::new() }
+        let drift = FlowDrift::new(flow.drift_per_root_m, seed);
+        Self { model, flow, waviness, drift, pulse: 1.0, step_mm, strips: Vec::new() }
     }
 
     /// Lays a piece at one speed. Pieces come in the order of the path: what
@@ -91,20 +94,20 @@ impl LaidBead {
         }
         let last = number((to_mm / self.step_mm).ceil());
         let width = self.model.width_at(speed_mm_per_s) * self.pulse;
-        let Self { flow, waviness, drift: wander, step_mm, strips, .. } = self;
+        let Self { flow, waviness, drift, step_mm, strips, .. } = self;
         let Some(strip) = strips.last_mut() else { return };
         strip.take_back(*step_mm);
         strip.end_mm = to_mm;
         while strip.next_number() <= last {
             #[expect(clippy::cast_precision_loss, reason = "node numbers stay below 2^53")]
             let path_mm = strip.next_number() as f64 * *step_mm;
-            let half = 0.5 * width * flow.ratio_at(path_mm) * wander.at(path_mm);
+            let half = 0.5 * width * flow.ratio_at(path_mm) * drift.at(path_mm);
             let [left, right] = waviness.at(path_mm);
             strip.push(left - half, right + half, *step_mm);
         }
     }
 
-    /// What the pump does over time to what is laid from now on, as a share of
+    /// What the pump does over time to what is laid from now on, relative to
     /// the flow.
     pub fn set_pulse(&mut self, ratio: f64) {
         self.pulse = ratio;
@@ -117,7 +120,7 @@ impl LaidBead {
         let pieces = ((to_mm - from_mm) / 1.0).ceil().clamp(1.0, 1e4);
         let mut done = 0.0;
         while done < pieces {
-            let at = |share: f64| from_mm + (to_mm - from_mm) * share / pieces;
+            let at = |fraction: f64| from_mm + (to_mm - from_mm) * fraction / pieces;
             let speed = first + (last - first) * (done + 0.5) / pieces;
             self.lay(at(done), at(done + 1.0), speed);
             done += 1.0;
@@ -138,12 +141,12 @@ impl LaidBead {
     /// to the right of the direction of travel; `None` where nothing has been
     /// laid.
     pub fn edges_at(&self, path_mm: f64) -> Option<(f64, f64)> {
-        let (node, next, share) = self.strip_at(path_mm)?.cell(path_mm, self.step_mm)?;
-        let between = |a: f64, b: f64| a + (b - a) * share;
+        let (node, next, fraction) = self.strip_at(path_mm)?.cell(path_mm, self.step_mm)?;
+        let between = |a: f64, b: f64| a + (b - a) * fraction;
         Some((between(node.left_mm, next.left_mm), between(node.right_mm, next.right_mm)))
     }
 
-    /// Mean width over a stretch \[mm\], exactly; `None` unless all of it has
+    /// Mean width over a segment \[mm\], exactly; `None` unless all of it has
     /// been laid.
     pub fn mean_width(&self, from_mm: f64, to_mm: f64) -> Option<f64> {
         let strip = self.strip_at(from_mm)?;
@@ -163,8 +166,8 @@ impl LaidBead {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "saturates far beyond any path")]
-fn number(place: f64) -> i64 {
-    place as i64
+fn number(position: f64) -> i64 {
+    position as i64
 }
 
 impl Strip {
@@ -190,25 +193,19 @@ impl Strip {
         self.nodes.push(Node { left_mm, right_mm, area_mm2 });
     }
 
-    /// The nodes on either side of a place, and the share of the way between.
+    /// The nodes on either side of a position, and the fraction of the way between.
     fn cell(&self, path_mm: f64, step_mm: f64) -> Option<(&Node, &Node, f64)> {
         #[expect(clippy::cast_precision_loss, reason = "node numbers stay below 2^53")]
-        let place = path_mm / step_mm - self.first as f64;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "not negative within the strip"
-        )]
-        let number = (place.max(0.0) as usize).min(self.nodes.len().checked_sub(2)?);
-        #[expect(clippy::cast_precision_loss, reason = "node numbers stay below 2^53")]
-        let share = place - number as f64;
-        Some((self.nodes.get(number)?, self.nodes.get(number + 1)?, share))
+        let position = path_mm / step_mm - self.first as f64;
+        let number = to_count(position).min(self.nodes.len().checked_sub(2)?);
+        let fraction = position - to_f64(number);
+        Some((self.nodes.get(number)?, self.nodes.get(number + 1)?, fraction))
     }
 
     fn area_to(&self, path_mm: f64, step_mm: f64) -> Option<f64> {
-        let (node, next, share) = self.cell(path_mm, step_mm)?;
-        let mean = node.width_mm() + 0.5 * share * (next.width_mm() - node.width_mm());
-        Some(node.area_mm2 + step_mm * share * mean)
+        let (node, next, fraction) = self.cell(path_mm, step_mm)?;
+        let mean = node.width_mm() + 0.5 * fraction * (next.width_mm() - node.width_mm());
+        Some(node.area_mm2 + step_mm * fraction * mean)
     }
 }
 
@@ -228,13 +225,16 @@ mod tests {
                 bead.lay_ramp(here(at), here(at + piece_mm));
                 at += piece_mm;
             }
-            for place in [10.3, 47.77, 80.0] {
-                // 0.4 mm/s a millimetre: the place at which that width belongs.
-                let width = bead.width_at(place).unwrap();
-                let slope = model.width_at(speed(place + 1.0)) - model.width_at(speed(place));
-                let off_mm = (width - model.width_at(speed(place))) / slope;
-                assert!(off_mm.abs() < 0.55, "{piece_mm}: {off_mm} at {place}");
-                assert!(piece_mm > 1.0 || off_mm.abs() < 0.26, "{piece_mm}: {off_mm} at {place}");
+            for position in [10.3, 47.77, 80.0] {
+                // 0.4 mm/s a millimetre: the position at which that width belongs.
+                let width = bead.width_at(position).unwrap();
+                let slope = model.width_at(speed(position + 1.0)) - model.width_at(speed(position));
+                let off_mm = (width - model.width_at(speed(position))) / slope;
+                assert!(off_mm.abs() < 0.55, "{piece_mm}: {off_mm} at {position}");
+                assert!(
+                    piece_mm > 1.0 || off_mm.abs() < 0.26,
+                    "{piece_mm}: {off_mm} at {position}"
+                );
             }
         }
     }
@@ -313,9 +313,9 @@ mod tests {
         }
         let mut late = LaidBead::new(BeadModel::fitted_2022(), ROUGH, STEADY, 9);
         late.lay(150.3, 300.0, 112.5);
-        for place in [299.9, 151.0, 200.03, 160.0] {
-            assert_eq!(whole.edges_at(place), pieces.edges_at(place));
-            assert_eq!(whole.edges_at(place), late.edges_at(place));
+        for position in [299.9, 151.0, 200.03, 160.0] {
+            assert_eq!(whole.edges_at(position), pieces.edges_at(position));
+            assert_eq!(whole.edges_at(position), late.edges_at(position));
         }
         assert_ne!(whole.width_at(100.0), laid(ROUGH, 10, 300.0).width_at(100.0));
     }

@@ -1,4 +1,4 @@
-//! Light that grows evenly across the picture.
+//! Light that grows evenly across the image.
 
 use crate::numeric::number::to_f64;
 use crate::scenario::image::ImageModel;
@@ -12,18 +12,18 @@ pub struct Light {
 }
 
 impl Light {
-    /// For a picture of so many columns and rows.
-    pub fn new(picture: &ImageModel, columns: usize, rows: usize) -> Self {
-        let ratio = picture.light_ratio.max(1.0);
-        let swing = (ratio - 1.0) / (ratio + 1.0);
+    /// For an image of so many columns and rows.
+    pub fn new(image: &ImageModel, columns: usize, rows: usize) -> Self {
+        let ratio = image.light_ratio.max(1.0);
+        let amplitude = (ratio - 1.0) / (ratio + 1.0);
         let spans = [to_f64(columns) - 1.0, to_f64(rows) - 1.0];
-        let growth = match picture.light_deg {
-            None => spans.map(|span| swing / span.max(1.0)),
+        let growth = match image.light_deg {
+            None => spans.map(|span| amplitude / span.max(1.0)),
             Some(direction) => {
                 let (sin, cos) = libm::sincos(direction.to_radians());
-                // From one end of the picture to the other in this direction.
+                // From one end of the image to the other in this direction.
                 let span = (cos * spans[0]).abs() + (sin * spans[1]).abs();
-                [cos, sin].map(|part| 2.0 * swing * part / span.max(1.0))
+                [cos, sin].map(|part| 2.0 * amplitude * part / span.max(1.0))
             }
         };
         let middle = [spans[0] / 2.0, spans[1] / 2.0];
@@ -48,8 +48,8 @@ mod tests {
     use super::*;
 
     fn at(light_deg: Option<f64>, column: f64, row: usize) -> f64 {
-        let picture = ImageModel { light_ratio: 4.0, light_deg, ..ImageModel::DEFAULT };
-        let (first, growth) = Light::new(&picture, 101, 51).row(row);
+        let image = ImageModel { light_ratio: 4.0, light_deg, ..ImageModel::DEFAULT };
+        let (first, growth) = Light::new(&image, 101, 51).row(row);
         first + growth * column
     }
 

@@ -10,17 +10,19 @@ use std::collections::VecDeque;
 
 use crate::sim::hash::{mix, normal_pair};
 
-/// Step while anything moves \[s\].
+/// Step while anything moves \[s\]: a thirty-fifth of the shortest time constant.
 const STEP_S: f64 = 0.002;
 /// Step of a pump that has stood for a while \[s\].
 const IDLE_STEP_S: f64 = 0.02;
-/// What a pump stands until then moves slowly \[s\].
+/// Standing time from which the long step is used \[s\]: two and a half time constants of the
+/// leak.
 const IDLE_AFTER_S: f64 = 5.0;
-/// Keeps random numbers of the flow and of the void apart.
+/// Random stream of the flow. Derived: the bytes of "flow".
 const FLOW_STREAM: u64 = 0x666c_6f77;
+/// Random stream of the void. Derived: the bytes of "void".
 const VOID_STREAM: u64 = 0x766f_6964;
 
-/// What a simulated extruder is made of.
+/// Parameters of the simulated extruder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeltParameters {
     /// From a command until the drive acts \[s\].
@@ -40,15 +42,14 @@ pub struct MeltParameters {
     /// Volumes that recede from the nozzle while the screw stands \[mm³\], and
     /// how fast each \[s\].
     pub voids: [(f64, f64); 2],
-    /// Share of the receding melt that drips from the nozzle; the rest goes back
+    /// Fraction of the receding melt that drips from the nozzle; the rest goes back
     /// up the screw.
     pub drip_fraction: f64,
     /// A void that is closed but for this lets part of the melt pass \[mm³\].
     pub bypass_mm3: f64,
-    /// Standard deviation of the void from pause to pause, as a share.
+    /// Standard deviation of the void from pause to pause, relative.
     pub void_sigma: f64,
-    /// Standard deviation of the flow, as a share, and how long that hangs
-    /// together \[s\].
+    /// Standard deviation of the flow, relative, and its correlation time \[s\].
     pub flow_noise: (f64, f64),
 }
 
@@ -77,10 +78,10 @@ pub struct Melt {
     now_s: f64,
     /// Commands on their way: when they act \[s\], and what flow they give.
     pending_commands: VecDeque<(f64, f64)>,
-    /// What the drive is told \[mm³/s\], and what the screw conveys.
+    /// Flow that the drive demands \[mm³/s\], and flow that the screw conveys.
     commanded_mm3_per_s: f64,
     conveyed: f64,
-    /// Since the drive was told to stand \[s\].
+    /// Time since the drive was stopped \[s\].
     stopped_s: f64,
     pauses: u64,
     steps: u64,
@@ -109,7 +110,7 @@ impl Melt {
         }
     }
 
-    /// Having stood for so long that all has receded that can.
+    /// After a pause so long that all melt has receded that can.
     pub fn fully_receded(parameters: MeltParameters, seed: u64) -> Self {
         let [first, second] = parameters.voids;
         Self {
@@ -127,7 +128,7 @@ impl Melt {
         self.now_s
     }
 
-    /// Tells the drive what flow to give \[mm³/s\]; zero stops it.
+    /// Commands the drive to a flow \[mm³/s\]; zero stops it.
     pub fn command(&mut self, flow_mm3_per_s: f64) {
         self.pending_commands.push_back((self.now_s + self.parameters.dead_time_s, flow_mm3_per_s));
     }
@@ -137,8 +138,7 @@ impl Melt {
         self.voids.iter().sum()
     }
 
-    /// Goes on by one step and returns how long it was \[s\] and what came out of
-    /// the nozzle in it \[mm³\].
+    /// Advances by one step; returns its length \[s\] and the volume at the nozzle \[mm³\].
     pub fn advance(&mut self) -> (f64, f64) {
         let rests = self.stopped_s > IDLE_AFTER_S && self.pending_commands.is_empty();
         let dt_s = if rests { IDLE_STEP_S } else { STEP_S };
@@ -204,8 +204,8 @@ impl Melt {
     /// Flow through the nozzle \[mm³/s\].
     fn pressed_out(&mut self, arriving_mm3: f64, dt_s: f64) -> f64 {
         let machine = &self.parameters;
-        let share = self.pressure_fraction().max(0.0);
-        let flow = machine.flow_mm3_per_s * libm::pow(share, 1.0 / machine.shear_thinning);
+        let fraction = self.pressure_fraction().max(0.0);
+        let flow = machine.flow_mm3_per_s * libm::pow(fraction, 1.0 / machine.shear_thinning);
         let leaks =
             if self.commanded_mm3_per_s > 0.0 { 0.0 } else { self.stored_mm3 / machine.leak_s };
         self.stored_mm3 = (self.stored_mm3 + arriving_mm3 - (flow + leaks) * dt_s).max(0.0);
@@ -213,8 +213,8 @@ impl Melt {
     }
 
     fn flow_noise(&mut self, dt_s: f64) -> f64 {
-        let (size, memory_s) = self.parameters.flow_noise;
-        let kept = libm::exp(-dt_s / memory_s);
+        let (size, correlation_s) = self.parameters.flow_noise;
+        let kept = libm::exp(-dt_s / correlation_s);
         let [fresh, _] = normal_pair(mix(&[self.seed, FLOW_STREAM, self.steps]));
         self.steps += 1;
         self.flow_deviation =

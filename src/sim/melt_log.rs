@@ -6,6 +6,7 @@ use super::melt::{Melt, MeltParameters};
 use crate::identify::series::TimeSeries;
 use crate::sim::hash::{mix, normal_pair};
 
+/// Random stream of the sensor. Derived: the bytes of "sens".
 const SENSOR_STREAM: u64 = 0x7365_6e73;
 
 /// What is recorded.

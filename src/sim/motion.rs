@@ -1,11 +1,11 @@
-//! Motion while the shutter is open: the mean of the picture over its positions.
+//! Motion while the shutter is open: the mean of the image over its positions.
 
 use crate::scenario::image::MotionBlur;
 
-/// Most positions that a mean is taken over.
+/// Most nodes of the quadrature over the motion: they limit the time of a frame.
 const MAX_POSITIONS: u32 = 64;
 
-/// Where the picture is for a part of the time while the shutter is open.
+/// Where the image is for a part of the time while the shutter is open.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShutterPosition {
     /// Fraction of the time.
@@ -14,8 +14,8 @@ pub struct ShutterPosition {
     pub shift_px: [f64; 2],
 }
 
-/// Where the picture is while the shutter is open. The positions are those of
-/// Gauss–Legendre quadrature, close enough for a picture with this blur.
+/// Where the image is while the shutter is open. The positions are those of
+/// Gauss–Legendre quadrature, close enough for an image with this blur.
 pub fn positions(motion: &MotionBlur, blur_px: f64) -> Vec<ShutterPosition> {
     if motion.length_px <= 0.0 {
         return vec![ShutterPosition { weight: 1.0, shift_px: [0.0, 0.0] }];

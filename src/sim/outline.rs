@@ -1,19 +1,19 @@
-//! The outline of a bead in the picture: both edges, and where it begins and
+//! The outline of a bead in the image: both edges, and where it begins and
 //! ends.
 
 use super::view::{AxisPoint, BeadView};
 
-/// Half the change of an edge's slope that the sampling steps over is of this
-/// length \[px\].
+/// Distance between samples of an edge \[px\]: the resolution of the image.
 const SAMPLE_PX: f64 = 1.0;
-/// Halvings with which an end of the bead is looked for between two samples.
+/// Bisections for an end of the bead between two samples. Derived: 2⁻³⁰ of a pixel is beyond
+/// any resolution.
 const HALVINGS: u32 = 30;
 
 /// Signed offsets of the left and the right edge \[mm\] at a distance along
 /// the bead from the middle of the gauge \[mm\]; `None` where there is no bead.
 pub type BeadEdges<'a> = dyn Fn(f64) -> Option<(f64, f64)> + 'a;
 
-/// One place along the bead, and where its edges are seen.
+/// One position along the bead, and where its edges are seen.
 #[derive(Debug, Clone, Copy)]
 pub struct OutlineSample {
     /// Distance along the bead \[mm\].
@@ -30,11 +30,11 @@ pub struct BeadOutline {
     /// In the order in which `run` grows. Beyond the ends of the bead its
     /// edges go on straight.
     pub samples: Vec<OutlineSample>,
-    /// Stretches that have been laid \[mm\], within what is seen.
+    /// Segments that have been laid \[mm\], within what is seen.
     pub segments: Vec<LaidSegment>,
 }
 
-/// A stretch of bead between two ends.
+/// A segment of bead between two ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LaidSegment {
     /// Where it begins \[mm\]; −∞ if before what is seen.
@@ -44,9 +44,9 @@ pub struct LaidSegment {
 }
 
 impl BeadOutline {
-    /// Follows the bead through a picture that has `run` pixels along the
+    /// Follows the bead through an image that has `run` pixels along the
     /// gauge's axis, and `margin` more on either side. `None` without bead in
-    /// sight.
+    /// view.
     pub fn trace(view: &BeadView, bead: &BeadEdges<'_>, run: f64, margin: f64) -> Option<Self> {
         let step = view.pixel_mm * SAMPLE_PX;
         let most = (run + 2.0 * margin) * 16.0 / SAMPLE_PX;
@@ -54,24 +54,24 @@ impl BeadOutline {
             let mut steps = 0.0;
             while steps < most {
                 steps += 1.0;
-                let Some(place) = view.px(sign * steps * step, 0.0) else {
+                let Some(position) = view.px(sign * steps * step, 0.0) else {
                     return steps - 1.0;
                 };
-                if place.run < -margin || place.run > run + margin {
+                if position.run < -margin || position.run > run + margin {
                     break;
                 }
             }
             steps
         };
         let (back, ahead) = (walk(-1.0), walk(1.0));
-        let mut places = Vec::new();
+        let mut positions = Vec::new();
         let mut count = -back;
         while count <= ahead {
-            places.push((count * step, bead(count * step)));
+            positions.push((count * step, bead(count * step)));
             count += 1.0;
         }
-        let stretches = segments(&places, bead);
-        let mut samples: Vec<OutlineSample> = filled(&places)?
+        let segments = segments(&positions, bead);
+        let mut samples: Vec<OutlineSample> = filled(&positions)?
             .filter_map(|(along_mm, (left, right))| {
                 let seen = [view.px(along_mm, left)?, view.px(along_mm, right)?];
                 Some(OutlineSample { along_mm, offset_mm: [left, right], projected: seen })
@@ -80,20 +80,20 @@ impl BeadOutline {
         if view.run_sign() < 0.0 {
             samples.reverse();
         }
-        Some(Self { samples, segments: stretches })
+        Some(Self { samples, segments })
     }
 
     /// Where an edge (0 left, 1 right) crosses a line across the gauge \[px\].
     pub fn crossing(&self, edge: usize, run: f64) -> Option<f64> {
-        let (before, after, share) = self.around(edge, run)?;
+        let (before, after, fraction) = self.around(edge, run)?;
         let (a, b) = (before.projected[edge].cross, after.projected[edge].cross);
-        Some(a + (b - a) * share)
+        Some(a + (b - a) * fraction)
     }
 
     /// How far along the bead that is \[mm\].
     pub fn along_at(&self, edge: usize, run: f64) -> Option<f64> {
-        let (before, after, share) = self.around(edge, run)?;
-        Some(before.along_mm + (after.along_mm - before.along_mm) * share)
+        let (before, after, fraction) = self.around(edge, run)?;
+        Some(before.along_mm + (after.along_mm - before.along_mm) * fraction)
     }
 
     fn around(&self, edge: usize, run: f64) -> Option<(&OutlineSample, &OutlineSample, f64)> {
@@ -103,7 +103,7 @@ impl BeadOutline {
         Some((before, after, if b > a { (run - a) / (b - a) } else { 0.0 }))
     }
 
-    /// Whether all of a stretch has been laid.
+    /// Whether all of a segment has been laid.
     pub fn is_whole(&self, from_mm: f64, to_mm: f64) -> bool {
         self.segments.iter().any(|s| s.from_mm <= from_mm && to_mm <= s.to_mm)
     }
@@ -112,18 +112,18 @@ impl BeadOutline {
 type EdgeOffsets = Option<(f64, f64)>;
 
 /// The samples with the offsets of the nearest bead where there is none.
-fn filled(places: &[(f64, EdgeOffsets)]) -> Option<impl Iterator<Item = (f64, (f64, f64))>> {
-    let mut last = places.iter().find_map(|(_, laid)| *laid)?;
-    Some(places.iter().map(move |(along_mm, laid)| {
+fn filled(positions: &[(f64, EdgeOffsets)]) -> Option<impl Iterator<Item = (f64, (f64, f64))>> {
+    let mut last = positions.iter().find_map(|(_, laid)| *laid)?;
+    Some(positions.iter().map(move |(along_mm, laid)| {
         last = laid.unwrap_or(last);
         (*along_mm, last)
     }))
 }
 
-fn segments(places: &[(f64, EdgeOffsets)], bead: &BeadEdges<'_>) -> Vec<LaidSegment> {
+fn segments(positions: &[(f64, EdgeOffsets)], bead: &BeadEdges<'_>) -> Vec<LaidSegment> {
     let mut found = Vec::new();
-    let mut begun = places.first().and_then(|(_, laid)| laid.map(|_| f64::NEG_INFINITY));
-    for pair in places.windows(2) {
+    let mut begun = positions.first().and_then(|(_, laid)| laid.map(|_| f64::NEG_INFINITY));
+    for pair in positions.windows(2) {
         let [(before, was), (after, is)] = pair else { continue };
         match (was, is, begun) {
             (None, Some(_), _) => begun = Some(bead_end(bead, *after, *before)),
@@ -138,7 +138,7 @@ fn segments(places: &[(f64, EdgeOffsets)], bead: &BeadEdges<'_>) -> Vec<LaidSegm
     found
 }
 
-/// Where bead turns to no bead between two places.
+/// Where bead turns to no bead between two positions.
 fn bead_end(bead: &BeadEdges<'_>, mut with_mm: f64, mut without_mm: f64) -> f64 {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (with_mm + without_mm);

@@ -8,14 +8,15 @@ use std::f64::consts::TAU;
 use super::hash::{mix, normal_pair};
 use crate::core::units::{MPa, Rpm};
 use crate::extruder::pressure::{Fopdt, InitialState};
+use crate::numeric::number::to_count;
 
-/// Step of the plant \[s\].
+/// Step of the plant \[s\]: papers.md, "002", 5 ms.
 pub const TICK_S: f64 = 0.005;
 
 /// A wave of the gain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GainWave {
-    /// Amplitude, as a share of the gain.
+    /// Amplitude, relative to the gain.
     pub amplitude: f64,
     /// Period \[s\].
     pub period_s: f64,
@@ -51,7 +52,7 @@ pub struct SimPressure {
     fastest_rpm: f64,
     /// Speeds of the ticks that are under way, the newest first.
     delayed_speeds: VecDeque<f64>,
-    /// Whole ticks of the dead time, and the rest of it as a share of a tick.
+    /// Whole ticks of the dead time, and the rest of it relative to a tick.
     ticks: usize,
     fractional_tick: f64,
     speed_rpm: f64,
@@ -60,12 +61,7 @@ pub struct SimPressure {
 }
 
 impl SimPressure {
-    /// As it has run for ever.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "at most 60 s of ticks"
-    )]
+    /// In the steady state.
     pub fn new(
         process: Fopdt,
         disturbed: Disturbances,
@@ -76,14 +72,13 @@ impl SimPressure {
         // A dead time of whole ticks must not lose one to rounding.
         let whole = (ticks + 1e-9).floor();
         let speed_rpm = running.speed.get();
-        let mut under_way = VecDeque::with_capacity(whole as usize + 2);
-        under_way.resize(whole as usize + 2, speed_rpm);
+        let count = to_count(whole);
         Self {
             process,
             disturbances: disturbed,
             fastest_rpm: fastest.get(),
-            delayed_speeds: under_way,
-            ticks: whole as usize,
+            delayed_speeds: VecDeque::from(vec![speed_rpm; count + 2]),
+            ticks: count,
             fractional_tick: (ticks - whole).max(0.0),
             speed_rpm,
             pressure: running.pressure.get(),
@@ -128,12 +123,12 @@ impl SimPressure {
         let load = load.map_or(0.0, |load| load.rpm);
         let old = |back: usize| self.delayed_speeds.get(back).copied().unwrap_or(self.speed_rpm);
         // The rest of the dead time belongs to the speed of one tick earlier.
-        for (speed, share) in [
+        for (speed, fraction) in [
             (old(self.ticks + 1), self.fractional_tick),
             (old(self.ticks), 1.0 - self.fractional_tick),
         ] {
             let settled = self.process.gain() * (1.0 + drift) * (speed + load);
-            let kept = libm::exp(-share * TICK_S / self.process.lag_s());
+            let kept = libm::exp(-fraction * TICK_S / self.process.lag_s());
             self.pressure = settled + (self.pressure - settled) * kept;
         }
         self.delayed_speeds.pop_back();

@@ -1,4 +1,4 @@
-//! Pictures of a bead, with their truth.
+//! Images of a bead, with their truth.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -22,12 +22,14 @@ use crate::numeric::number::to_f64;
 use crate::scenario::image::ImageModel;
 use crate::vision::{BeadAxis, Gauge};
 
-/// What the random numbers of a frame are for; those of the noise have no word.
+/// Random stream of spots in a frame; noise has none.
 const SPOTS_STREAM: u64 = 1;
+/// Random stream of grains.
 const GRAINS_STREAM: u64 = 2;
+/// Random stream of the texture.
 const TEXTURE_STREAM: u64 = 3;
 
-/// Takes pictures of a bead that runs through the gauge of a calibrated
+/// Takes images of a bead that runs through the gauge of a calibrated
 /// camera.
 ///
 /// The bead's edges are projected through the camera and its distortion; every
@@ -58,10 +60,10 @@ pub struct Rendered {
     pub truth: Option<Truth>,
 }
 
-/// A bead that cannot be pictured.
+/// A bead that cannot be imaged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RenderError {
-    /// The gauge does not lie within the picture.
+    /// The gauge does not lie within the image.
     #[error(
         "the gauge reaches to ({}, {}) px, the image has {} x {} px; make one fit the other",
         end.0, end.1, image.0, image.1
@@ -69,7 +71,7 @@ pub enum RenderError {
     GaugeOutside {
         /// Right and lower side of the gauge \[px\].
         end: (usize, usize),
-        /// Size of the picture \[px\].
+        /// Size of the image \[px\].
         image: (usize, usize),
     },
     /// The middle of the gauge sees no surface.
@@ -81,7 +83,7 @@ pub enum RenderError {
         /// Height of the surface above the bed, as the camera is now \[mm\].
         height_mm: f64,
     },
-    /// A picture without pixels.
+    /// An image without pixels.
     #[error(transparent)]
     WrongSize(#[from] WrongSize),
 }
@@ -89,26 +91,26 @@ pub enum RenderError {
 impl Renderer {
     /// For a bead whose top edges lie at `surface_height` above the bed, or
     /// where `picture` says that they really are. A full calibration sets the
-    /// size of the picture. Fails where the gauge lies outside the picture.
+    /// size of the image. Fails where the gauge lies outside the image.
     pub fn new(
         calibration: Calibration,
         surface_height: Mm,
         gauge: Gauge,
-        picture: ImageModel,
+        image: ImageModel,
         seed: u64,
     ) -> Result<Self, RenderError> {
         let side = |px: u32| usize::try_from(px).unwrap_or(usize::MAX);
-        let size_px = calibration.image_size_px().unwrap_or(picture.size_px);
+        let size_px = calibration.image_size_px().unwrap_or(image.size_px);
         let size = (side(size_px[0]), side(size_px[1]));
         if !gauge.roi.fits(Size::new(size.0, size.1)) {
             let roi = gauge.roi;
             let reaches = (roi.x.saturating_add(roi.width), roi.y.saturating_add(roi.height));
             return Err(RenderError::GaugeOutside { end: reaches, image: size });
         }
-        let true_height = picture.true_surface_height_mm.and_then(|height| Mm::new(height).ok());
+        let true_height = image.true_surface_height_mm.and_then(|height| Mm::new(height).ok());
         let surface_height = true_height.unwrap_or(surface_height);
         let rise = Mm::ZERO;
-        Ok(Self { calibration, surface_height, rise, gauge, image: picture, size, seed })
+        Ok(Self { calibration, surface_height, rise, gauge, image, size, seed })
     }
 
     /// The bead lies higher than that of the first layer from now on.
@@ -116,12 +118,12 @@ impl Renderer {
         self.rise = rise;
     }
 
-    /// Columns and rows of the pictures \[px\].
+    /// Columns and rows of the images \[px\].
     pub fn size(&self) -> (usize, usize) {
         self.size
     }
 
-    /// Takes a picture of a bead, with the robot at `robot_z` if the camera
+    /// Takes an image of a bead, with the robot at `robot_z` if the camera
     /// rides on it.
     pub fn render(
         &self,
@@ -132,25 +134,22 @@ impl Renderer {
     ) -> Result<Rendered, RenderError> {
         let view = self.view(robot_z)?;
         let GaugeExtent { run, cross } = self.extent();
-        // Half the picture across more, for edges that run at an angle.
+        // Half the image across more, for edges that run at an angle.
         let margin = to_f64(shade::margin_px(self.image.blur_px) + cross / 2);
         let margin = margin + self.image.motion.length_px;
         let outline = BeadOutline::trace(&view, bead, to_f64(run), margin);
         let seen = outline.as_ref().map(|outline| self.coverage(seq, outline, &view));
         let pixels = self.expose(seq, seen.as_ref());
         let truth = outline.and_then(|outline| truth::of(&outline, &view, &self.gauge));
-        let frame = Frame::new(
-            seq,
-            captured_at,
-            Size::new(self.size.0, self.size.1),
-            Pixels::Grey8(pixels),
-        )?;
+        let size = Size::new(self.size.0, self.size.1);
+        let frame = Frame::new(seq, captured_at, size, Pixels::Grey8(pixels))?;
         Ok(Rendered { frame, truth })
     }
 
-    /// How far from the middle of the gauge the picture reaches along the bead
+    /// How far from the middle of the gauge the image reaches along the bead
     /// \[mm\], at most a metre.
     pub fn reach_mm(&self, robot_z: Option<Mm>) -> Result<f64, RenderError> {
+        /// Longest reach \[mm\], for cameras that see the horizon.
         const MAX_REACH_MM: f64 = 1000.0;
         let view = self.view(robot_z)?;
         let (right, below) = (to_f64(self.size.0) - 0.5, to_f64(self.size.1) - 0.5);
@@ -181,21 +180,20 @@ impl Renderer {
 
     /// What a pixel sees of bead and ground, without light, texture and noise.
     fn coverage(&self, seq: u64, outline: &BeadOutline, view: &BeadView) -> BeadCoverage {
-        let picture = &self.image;
-        let shape = BeadShape::new(outline, view, self.extent(), picture.blur_px);
-        let positions = motion::positions(&picture.motion, picture.blur_px);
-        let mut seen = BeadCoverage::of(&shape, Tint::new(picture).as_ref(), &positions);
-        let spots =
-            spots::spots(&picture.spots, &shape, hash::mix(&[self.seed, seq, SPOTS_STREAM]));
+        let image = &self.image;
+        let shape = BeadShape::new(outline, view, self.extent(), image.blur_px);
+        let positions = motion::positions(&image.motion, image.blur_px);
+        let mut seen = BeadCoverage::of(&shape, Tint::new(image).as_ref(), &positions);
+        let spots = spots::spots(&image.spots, &shape, hash::mix(&[self.seed, seq, SPOTS_STREAM]));
         let grains =
-            grains::grains(&picture.grains, &shape, hash::mix(&[self.seed, seq, GRAINS_STREAM]));
+            grains::grains(&image.grains, &shape, hash::mix(&[self.seed, seq, GRAINS_STREAM]));
         if spots.is_some() || grains.is_some() {
-            let light = Light::new(picture, self.size.0, self.size.1);
+            let light = Light::new(image, self.size.0, self.size.1);
             let at = |run: usize, cross: usize| match self.gauge.axis {
                 BeadAxis::Vertical => light.at(cross, run),
                 BeadAxis::Horizontal => light.at(run, cross),
             };
-            seen.cover(&shape, picture, Masks { spots, grains }, &at, &positions);
+            seen.cover(&shape, image, Masks { spots, grains }, &at, &positions);
         }
         match self.gauge.axis {
             BeadAxis::Vertical => seen,
@@ -217,11 +215,11 @@ impl Renderer {
             let line = |values: &'_ [f32], column: usize| f64::from(values[row * width + column]);
             let (first, growth) = light.row(row);
             for column in 0..width {
-                let share = seen.map_or(0.0, |seen| line(&seen.fractions, column));
+                let fraction = seen.map_or(0.0, |seen| line(&seen.fractions, column));
                 let added = seen.and_then(|seen| seen.added_grey.as_deref());
                 let added = added.map_or(0.0, |added| line(added, column));
                 let lit = first + growth * to_f64(column);
-                let mut grey = lit * (ground_grey + step * share + added);
+                let mut grey = lit * (ground_grey + step * fraction + added);
                 grey += texture.as_deref().map_or(0.0, |texture| line(texture, column));
                 if noise_grey > 0.0 {
                     let noise: f64 = StandardNormal.sample(&mut random);

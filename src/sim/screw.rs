@@ -1,14 +1,15 @@
-//! A screw that fills and empties: the plant of Diagne et al. 2015, eqs. (13),
-//! (16) and (17), with all that is on its way from the feed to the plug.
+//! A screw that fills and empties: the plant of Diagne et al. 2015, eqs. (13), (16) and (17),
+//! with the feed in transit to the plug.
 
 use crate::extruder::screw::feed_history::FeedHistory;
 use crate::extruder::screw::{Conveying, Screw};
+use crate::numeric::number::to_count;
 
 /// How the plant is integrated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Integrator {
-    /// The paper's: one Euler step, the delay taken up to whole steps, so that
-    /// nothing arrives before its delay is over.
+    /// The paper's: one Euler step, the delay rounded up to whole steps, so that no feed arrives
+    /// before its delay is over.
     Euler,
     /// Fourth order in steps of at most this length \[s\], which end where a
     /// change of the feed reaches the plug.
@@ -36,8 +37,7 @@ impl SimScrew {
         plug_m: f64,
         before: f64,
     ) -> Self {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-        let room = (screw.longest_delay() / step_s).ceil() as usize + 4;
+        let room = to_count((screw.longest_delay() / step_s).ceil()) + 4;
         let feed = FeedHistory::new(room, before);
         Self { screw, integrator, step_s, ticks: 0, plug_m, feed }
     }
@@ -57,7 +57,7 @@ impl SimScrew {
         self.screw.delay(self.now_s(), self.plug_m)
     }
 
-    /// Feeds a share of full over one step.
+    /// Feeds a fraction of full over one step.
     pub fn advance(&mut self, fill: f64) {
         let from = self.now_s();
         self.feed.push(self.feed_position(from), fill);
@@ -74,15 +74,15 @@ impl SimScrew {
         let steps = (self.screw.delay(from, self.plug_m) / self.step_s).ceil();
         // The middle of the step that the feed is of, so that no rounding of
         // its ends matters.
-        let place = self.feed_position(from - (steps - 0.5) * self.step_s);
-        self.plug_m += self.step_s * self.rate(from, self.plug_m, self.feed.at(place));
+        let position = self.feed_position(from - (steps - 0.5) * self.step_s);
+        self.plug_m += self.step_s * self.rate(from, self.plug_m, self.feed.at(position));
     }
 
     fn runge_kutta(&mut self, from: f64, to: f64, longest: f64) {
         let mut at = from;
         while at < to {
-            let place = self.arriving_position(at, self.plug_m);
-            let (fill, change) = (self.feed.at(place), self.feed.next_change(place));
+            let position = self.arriving_position(at, self.plug_m);
+            let (fill, change) = (self.feed.at(position), self.feed.next_change(position));
             let full = longest.min(to - at);
             let mut step = full;
             if let Some(change) = change {
@@ -100,12 +100,7 @@ impl SimScrew {
 
     /// The plug a step later under a feed that is held.
     fn grown(&self, at: f64, step: f64, fill: f64) -> f64 {
-        let (x, half) = (self.plug_m, 0.5 * step);
-        let first = self.rate(at, x, fill);
-        let second = self.rate(at + half, x + half * first, fill);
-        let third = self.rate(at + half, x + half * second, fill);
-        let fourth = self.rate(at + step, x + step * third, fill);
-        x + step / 6.0 * (first + 2.0 * (second + third) + fourth)
+        runge_kutta_step(|at, plug| self.rate(at, plug, fill), at, self.plug_m, step)
     }
 
     fn rate(&self, at: f64, plug: f64, fill: f64) -> f64 {
@@ -129,6 +124,16 @@ impl SimScrew {
     }
 }
 
+/// The fourth-order step of x′ = `rate`(t, x).
+fn runge_kutta_step(rate: impl Fn(f64, f64) -> f64, at: f64, x: f64, step: f64) -> f64 {
+    let half = 0.5 * step;
+    let first = rate(at, x);
+    let second = rate(at + half, x + half * first);
+    let third = rate(at + half, x + half * second);
+    let fourth = rate(at + step, x + step * third);
+    x + step / 6.0 * (first + 2.0 * (second + third) + fourth)
+}
+
 /// Just beyond where a growing function changes its sign within a step.
 fn crossing(past: impl Fn(f64) -> f64, full: f64) -> f64 {
     let (mut low, mut high) = (0.0, full);
@@ -143,10 +148,9 @@ fn crossing(past: impl Fn(f64) -> f64, full: f64) -> f64 {
     high
 }
 
-/// The same screw without delay under a law that is held nowhere, from a plug
-/// at a moment on: what a loop with a perfect predictor equals from the first
-/// effect of its control. Lengths of the plug \[m\] `step_s` apart, by
-/// Runge–Kutta steps of a tenth of that.
+/// The same screw without delay under continuous feedback, from a plug at a time on: equal to a
+/// loop with a perfect predictor from the first effect of its control. Lengths of the plug
+/// \[m\] `step_s` apart, by Runge–Kutta steps of a tenth of that.
 pub fn delay_free(
     screw: &Screw,
     plug_m: f64,
@@ -154,20 +158,16 @@ pub fn delay_free(
     step_s: f64,
     controller: impl Fn(f64) -> f64,
 ) -> impl Iterator<Item = f64> {
+    /// Runge–Kutta steps per sample.
     const PARTS: u32 = 10;
     let rate = move |at: f64, plug: f64| screw.speed(at) * screw.growth(plug, controller(plug));
     let step = step_s / f64::from(PARTS);
-    let half = 0.5 * step;
     let mut plug = plug_m;
     (0_u32..).map(move |tick| {
         let now = plug;
         for part in 0..PARTS {
             let at = from_s + step_s * f64::from(tick) + step * f64::from(part);
-            let first = rate(at, plug);
-            let second = rate(at + half, plug + half * first);
-            let third = rate(at + half, plug + half * second);
-            let fourth = rate(at + step, plug + step * third);
-            plug += step / 6.0 * (first + 2.0 * (second + third) + fourth);
+            plug = runge_kutta_step(&rate, at, plug, step);
         }
         now
     })
@@ -188,7 +188,7 @@ mod tests {
         ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap()
     }
 
-    /// A feed that neither law would give.
+    /// A feed that no controller gives.
     fn fill(tick: u32) -> f64 {
         0.35 + 0.3 * (0.011 * f64::from(tick)).sin() + if tick % 400 < 200 { 0.1 } else { 0.0 }
     }

@@ -5,11 +5,13 @@ use super::contour::{Contour, clamp_index};
 use super::edge::coverage;
 use super::outline::{BeadOutline, LaidSegment};
 use super::view::{BeadView, GaugeExtent};
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{narrow_to_f32, to_f64};
 
-/// A Gaussian ends here, in standard deviations: 3·10⁻⁷ of a step is left.
+/// Distance at which a Gaussian ends, in standard deviations. Derived: Φ(−5) = 3·10⁻⁷ of a step
+/// is left.
 pub const GAUSSIAN_REACH_SIGMAS: f64 = 5.0;
-/// Half the diagonal of a pixel, and a little for the bend of an edge \[px\].
+/// Margin about an edge \[px\]. Derived: half the diagonal of a pixel, √2/2, and 0.8 px for the
+/// curvature of an edge.
 const EDGE_MARGIN_PX: f64 = 1.5;
 
 /// A straight line across the bead, at one of its ends.
@@ -21,7 +23,7 @@ struct End {
     normal: [f64; 2],
 }
 
-/// A bead as it lies in the picture; all in pixels along and across the
+/// A bead as it lies in the image; all in pixels along and across the
 /// gauge's axis.
 #[derive(Debug, Clone)]
 pub struct BeadShape {
@@ -31,27 +33,27 @@ pub struct BeadShape {
     pub extent: GaugeExtent,
     /// Standard deviation of the lens' blur \[px\].
     pub blur_px: f64,
-    /// None where the bead goes through the whole picture.
+    /// None where the bead goes through the whole image.
     ends: Vec<(Option<End>, Option<End>)>,
 }
 
 impl BeadShape {
-    /// The shape of an outline in a picture with so many pixels along and
+    /// The shape of an outline in an image with so many pixels along and
     /// across the gauge's axis.
     pub fn new(outline: &BeadOutline, view: &BeadView, extent: GaugeExtent, blur_px: f64) -> Self {
         let margin = margin_px(blur_px);
         let edges = [0, 1].map(|side| Contour::new(&outline.samples, side, extent.run, margin));
         let mut ends: Vec<(Option<End>, Option<End>)> =
-            outline.segments.iter().map(|stretch| ends_of(stretch, outline, view)).collect();
+            outline.segments.iter().map(|segment| ends_of(segment, outline, view)).collect();
         if ends.iter().any(|ends| matches!(ends, (None, None))) {
             ends.clear();
         }
         Self { edges, extent, blur_px, ends }
     }
 
-    /// Fills `line` with the share of bead in the pixels of one line across
+    /// Fills `line` with the fraction of bead in the pixels of one line across
     /// the bead, and returns the first of them; the pixels beside it hold no
-    /// bead. The picture is shifted by `shift` \[px\] along and across the
+    /// bead. The image is shifted by `shift` \[px\] along and across the
     /// axis. Near an edge a pixel sees the tangent at the edge's nearest point.
     pub fn line(&self, at: usize, shift: [f64; 2], line: &mut Vec<f32>) -> Option<usize> {
         let [left, right] = &self.edges;
@@ -63,49 +65,49 @@ impl BeadShape {
         let last = clamp_index(to - shift[1] + 1.0, self.extent.cross);
         line.clear();
         for number in first..last {
-            let place = to_f64(number) + shift[1];
-            let from_left = if place > solid_from { 1.0 } else { self.edge_fraction(0, at, place) };
-            let from_right = if place < solid_to { 1.0 } else { self.edge_fraction(1, at, place) };
-            #[expect(clippy::cast_possible_truncation, reason = "a share of one pixel")]
-            line.push((from_left + from_right - 1.0).max(0.0) as f32);
+            let position = to_f64(number) + shift[1];
+            let from_left =
+                if position > solid_from { 1.0 } else { self.edge_fraction(0, at, position) };
+            let from_right =
+                if position < solid_to { 1.0 } else { self.edge_fraction(1, at, position) };
+            line.push(narrow_to_f32((from_left + from_right - 1.0).max(0.0)));
         }
         if !self.ends.is_empty() {
-            for (share, number) in line.iter_mut().zip(first..) {
-                *share *= self.laid_fraction(at, to_f64(number) + shift[1]);
+            for (fraction, number) in line.iter_mut().zip(first..) {
+                *fraction *= self.laid_fraction(at, to_f64(number) + shift[1]);
             }
         }
         (first < last).then_some(first)
     }
 
     /// Whether a point is bead.
-    pub fn holds(&self, at: f64, place: f64) -> bool {
+    pub fn holds(&self, at: f64, position: f64) -> bool {
         let [left, right] = &self.edges;
-        let between = left.crossing(at) <= place && place <= right.crossing(at);
-        between && self.laid(at, place, 0.0) > 0.5
+        let between = left.crossing(at) <= position && position <= right.crossing(at);
+        between && self.laid(at, position, 0.0) > 0.5
     }
 
-    /// Share of a pixel on the inner side of an edge.
-    fn edge_fraction(&self, side: usize, at: f64, place: f64) -> f64 {
+    /// Fraction of a pixel on the inner side of an edge.
+    fn edge_fraction(&self, side: usize, at: f64, position: f64) -> f64 {
         let sign = if side == 0 { 1.0 } else { -1.0 };
-        let tangent = self.edges[side].tangent(at, place);
+        let tangent = self.edges[side].tangent(at, position);
         coverage(sign * tangent.beyond, tangent.normal, self.blur_px)
     }
 
-    /// Share of a pixel that lies between the ends of any stretch, blurred like
+    /// Fraction of a pixel that lies between the ends of any segment, blurred like
     /// the edges.
-    #[expect(clippy::cast_possible_truncation, reason = "a share of one pixel")]
-    pub fn laid_fraction(&self, at: f64, place: f64) -> f32 {
-        self.laid(at, place, self.blur_px) as f32
+    pub fn laid_fraction(&self, at: f64, position: f64) -> f32 {
+        narrow_to_f32(self.laid(at, position, self.blur_px))
     }
 
-    /// Share of a pixel that lies between the ends of any stretch.
-    fn laid(&self, at: f64, place: f64, blur_px: f64) -> f64 {
+    /// Fraction of a pixel that lies between the ends of any segment.
+    fn laid(&self, at: f64, position: f64, blur_px: f64) -> f64 {
         if self.ends.is_empty() {
             return 1.0;
         }
         let inside = |end: &Option<End>| {
             end.map_or(1.0, |end| {
-                let (run, cross) = (at - end.run, place - end.cross);
+                let (run, cross) = (at - end.run, position - end.cross);
                 coverage(run * end.normal[0] + cross * end.normal[1], end.normal, blur_px)
             })
         };
@@ -114,14 +116,14 @@ impl BeadShape {
     }
 }
 
-/// How far beyond the picture the outline is needed \[px\].
+/// How far beyond the image the outline is needed \[px\].
 pub fn margin_px(blur_px: f64) -> usize {
     clamp_index((GAUSSIAN_REACH_SIGMAS * blur_px).ceil(), 1000) + 8
 }
 
-/// The ends of a stretch that are in sight.
+/// The ends of a segment that are in view.
 fn ends_of(
-    stretch: &LaidSegment,
+    segment: &LaidSegment,
     outline: &BeadOutline,
     view: &BeadView,
 ) -> (Option<End>, Option<End>) {
@@ -142,5 +144,5 @@ fn ends_of(
         let normal = [sign * cross / long, -sign * run / long];
         normal[0].is_finite().then_some(End { run: left.run, cross: left.cross, normal })
     };
-    (end(stretch.from_mm, 1.0), end(stretch.to_mm, -1.0))
+    (end(segment.from_mm, 1.0), end(segment.to_mm, -1.0))
 }

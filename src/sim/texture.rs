@@ -1,4 +1,4 @@
-//! A random pattern over the whole picture.
+//! A random pattern over the whole image.
 
 use rand::SeedableRng;
 use rand_distr::Distribution;
@@ -6,6 +6,7 @@ use rand_distr::StandardUniform;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::convolve::{convolve, kernel};
+use crate::numeric::number::narrow_to_f32;
 use crate::scenario::image::TexturePattern;
 
 /// Grey levels of a pattern over so many columns and rows, `None` where there
@@ -21,13 +22,12 @@ pub fn texture(
         return None;
     }
     let kernel = kernel(0.5 * texture.length_px);
-    // The pattern goes on beyond the picture.
+    // The pattern continues beyond the image.
     let margin = kernel.len() - 1;
     let (wide, high) = (width + 2 * margin, height + 2 * margin);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(key);
     let gain = kernel.iter().skip(1).fold(kernel[0].powi(2), |sum, w| sum + 2.0 * w.powi(2));
-    #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
-    let size = texture.sigma_grey as f32 / gain;
+    let size = narrow_to_f32(texture.sigma_grey) / gain;
     let mut pattern: Vec<f32> =
         (0..wide * high).map(|_| size * nearly_normal(&mut random)).collect();
     convolve(&mut pattern, wide, &kernel);

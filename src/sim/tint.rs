@@ -4,10 +4,10 @@
 use super::contour::clamp_index;
 use super::shade::{BeadShape, GAUSSIAN_REACH_SIGMAS};
 use crate::numeric::normal_distribution::{cumulative, first_integral};
-use crate::numeric::number::to_f64;
+use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::scenario::image::ImageModel;
 
-/// Places of a profile for each pixel.
+/// Points of a profile per pixel, linear in between.
 const POINTS_PER_PX: f64 = 16.0;
 
 /// Grey levels that are added at a distance from an edge; 0 on the near side.
@@ -31,11 +31,11 @@ pub struct Tint {
 pub struct BeadLine<'a> {
     /// Its number along the gauge's axis.
     pub at: usize,
-    /// Shift of the picture along and across the axis \[px\].
+    /// Shift of the image along and across the axis \[px\].
     pub shift_px: [f64; 2],
     /// First pixel that holds bead.
     pub first: usize,
-    /// Shares of bead from that pixel on.
+    /// Fractions of bead from that pixel on.
     pub fractions: &'a [f32],
     /// Weight of this line in the mean over the shutter's time.
     pub weight: f32,
@@ -50,24 +50,24 @@ struct Knee {
 }
 
 impl Tint {
-    /// `None` where a picture has nothing of the kind.
-    pub fn new(picture: &ImageModel) -> Option<Self> {
+    /// `None` where an image has nothing of the kind.
+    pub fn new(image: &ImageModel) -> Option<Self> {
         // A pixel is itself a blur.
-        let blur_px = (picture.blur_px * picture.blur_px + 1.0 / 12.0).sqrt();
-        let shading = &picture.shading;
+        let blur_px = (image.blur_px * image.blur_px + 1.0 / 12.0).sqrt();
+        let shading = &image.shading;
         let shaded = shading.side.edges();
         let bead = [0, 1].map(|edge| {
             let slope = if shaded[edge] { shading.bead_grey_per_px } else { 0.0 };
             Profile::new(&ramp(slope, shading.bead_px), blur_px)
         });
-        let ground = [0, 1].map(|edge| Profile::new(&beside(picture, edge), blur_px));
+        let ground = [0, 1].map(|edge| Profile::new(&beside(image, edge), blur_px));
         let tint = Self { bead, ground };
         tint.bead.iter().chain(&tint.ground).any(|p| !p.grey.is_empty()).then_some(tint)
     }
 
     /// Adds to the grey of one line across the bead.
     pub fn add(&self, shape: &BeadShape, line: &BeadLine<'_>, greys: &mut [f32]) {
-        let BeadLine { at, shift_px: shift, first, fractions: shares, weight } = *line;
+        let BeadLine { at, shift_px: shift, first, fractions, weight } = *line;
         let run = to_f64(at) + shift[0];
         let middle = 0.5 * (shape.edges[0].crossing(run) + shape.edges[1].crossing(run)) - shift[1];
         let middle = clamp_index(middle, greys.len());
@@ -92,8 +92,8 @@ impl Tint {
                 }
             }
             if !bead.grey.is_empty() && !both {
-                for number in other.start.max(first)..other.end.min(first + shares.len()) {
-                    greys[number] += weight * bead.at(-outside(number)) * shares[number - first];
+                for number in other.start.max(first)..other.end.min(first + fractions.len()) {
+                    greys[number] += weight * bead.at(-outside(number)) * fractions[number - first];
                 }
             }
         }
@@ -101,9 +101,9 @@ impl Tint {
 }
 
 /// What lies beside an edge.
-fn beside(picture: &ImageModel, edge: usize) -> Vec<Knee> {
-    let ImageModel { shading, shadow, neighbour, .. } = picture;
-    let contrast = picture.bead_grey - picture.ground_grey;
+fn beside(image: &ImageModel, edge: usize) -> Vec<Knee> {
+    let ImageModel { shading, shadow, neighbour, .. } = image;
+    let contrast = image.bead_grey - image.ground_grey;
     let mut knees = Vec::new();
     if shading.side.edges()[edge] {
         knees.extend(ramp(shading.ground_grey_per_px, shading.ground_px));
@@ -162,22 +162,19 @@ impl Profile {
                 let u = (at - knee.at_px) / blur_px;
                 knee.step_grey * cumulative(u) + knee.grey_per_px * blur_px * first_integral(u)
             };
-            #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
-            let grey = knees.iter().map(of).sum::<f64>() as f32;
-            grey
+            narrow_to_f32(knees.iter().map(of).sum::<f64>())
         });
         Self { from_px, grey: grey.collect() }
     }
 
-    /// Straight between the places, constant beyond the last one.
+    /// Straight between the positions, constant beyond the last one.
     fn at(&self, distance_px: f64) -> f32 {
-        let place = (distance_px - self.from_px) * POINTS_PER_PX;
-        let Some(last) = self.grey.last().filter(|_| place > 0.0) else { return 0.0 };
-        let number = clamp_index(place, self.grey.len());
+        let position = (distance_px - self.from_px) * POINTS_PER_PX;
+        let Some(last) = self.grey.last().filter(|_| position > 0.0) else { return 0.0 };
+        let number = clamp_index(position, self.grey.len());
         let Some([a, b]) = self.grey.get(number..number + 2) else { return *last };
-        #[expect(clippy::cast_possible_truncation, reason = "within 0 to 1")]
-        let share = (place - to_f64(number)) as f32;
-        a + (b - a) * share
+        let fraction = narrow_to_f32(position - to_f64(number));
+        a + (b - a) * fraction
     }
 }
 

@@ -3,6 +3,7 @@
 use super::outline::{BeadOutline, OutlineSample};
 use super::view::{AxisPoint, BeadView, gauge_middle};
 use crate::core::geometry::ImagePoint;
+use crate::numeric::number::to_f64;
 use crate::vision::{BeadAxis, Gauge};
 
 /// What a perfect measurement of a rendered frame would find.
@@ -29,18 +30,17 @@ pub(super) fn of(outline: &BeadOutline, view: &BeadView, gauge: &Gauge) -> Optio
         BeadAxis::Vertical => (middle.y, gauge.roi.height),
         BeadAxis::Horizontal => (middle.x, gauge.roi.width),
     };
-    #[expect(clippy::cast_precision_loss, reason = "pixel numbers stay far below 2^53")]
-    let half = count as f64 / 2.0;
-    let stretch = |side: usize| {
+    let half = to_f64(count) / 2.0;
+    let segment = |side: usize| {
         let a = outline.along_at(side, run - half)?;
         let b = outline.along_at(side, run + half)?;
         Some((a.min(b), a.max(b)))
     };
-    let (left, right) = (stretch(0)?, stretch(1)?);
+    let (left, right) = (segment(0)?, segment(1)?);
     if !outline.is_whole(left.0.min(right.0), left.1.max(right.1)) {
         return None;
     }
-    let offset = |side: usize, stretch| mean(outline, stretch, |s| s.offset_mm[side]);
+    let offset = |side: usize, segment| mean(outline, segment, |s| s.offset_mm[side]);
     let both = (left.0.max(right.0), left.1.min(right.1));
     let width = |s: &OutlineSample| s.offset_mm[1] - s.offset_mm[0];
     let centre = mean(outline, both, width);
@@ -57,7 +57,7 @@ pub(super) fn of(outline: &BeadOutline, view: &BeadView, gauge: &Gauge) -> Optio
     })
 }
 
-/// Mean of a quantity, straight between the samples, along a stretch of bead.
+/// Mean of a quantity, straight between the samples, along a segment of bead.
 fn mean(
     outline: &BeadOutline,
     (from_mm, to_mm): (f64, f64),

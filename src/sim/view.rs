@@ -1,18 +1,19 @@
-//! Where a bead lies in the picture: from places along and across the bead to
+//! Where a bead lies in the image: from positions along and across the bead to
 //! pixels.
 //!
-//! The nozzle is beyond the top of the picture for a vertical bead and beyond
+//! The nozzle is beyond the top of the image for a vertical bead and beyond
 //! its right side for a horizontal one, so that the left edge of the bead, seen
-//! in the direction of travel, is the left or the upper one in the picture.
+//! in the direction of travel, is the left or the upper one in the image.
 
 use nalgebra::Vector2;
 
 use super::bead_path::BeadPath;
 use crate::calibration::SurfaceMap;
 use crate::core::geometry::{ImagePoint, Roi, SurfacePoint};
+use crate::numeric::number::to_f64;
 use crate::vision::{BeadAxis, Gauge};
 
-/// Places on the surface by their distance along the bead \[mm\], counted from
+/// Positions on the surface by their distance along the bead \[mm\], counted from
 /// the middle of the gauge in the direction of travel, and across it, positive
 /// to the right.
 #[derive(Debug, Clone, Copy)]
@@ -29,16 +30,15 @@ pub struct BeadView {
 
 /// The middle of the gauge \[px\].
 pub fn gauge_middle(roi: &Roi) -> ImagePoint {
-    #[expect(clippy::cast_precision_loss, reason = "pixel numbers stay far below 2^53")]
-    let middle = |first: usize, count: usize| first as f64 + (count as f64 - 1.0) / 2.0;
+    let middle = |first: usize, count: usize| to_f64(first) + (to_f64(count) - 1.0) / 2.0;
     ImagePoint::new(middle(roi.x, roi.width), middle(roi.y, roi.height))
 }
 
 impl BeadView {
     /// The bead runs through the middle of the gauge, shifted sideways by
     /// `lateral_mm`, along the gauge's axis as it lies on the surface. A
-    /// positive `slant_deg` makes its place across the gauge grow with its
-    /// place along it, as in a measurement's slant. `None` where the middle of
+    /// positive `slant_deg` makes its position across the gauge grow with its
+    /// position along it, as in a measurement's slant. `None` where the middle of
     /// the gauge does not see the surface.
     pub fn new(map: SurfaceMap, gauge: &Gauge, slant_deg: f64, lateral_mm: f64) -> Option<Self> {
         let middle = gauge_middle(&gauge.roi);
@@ -64,18 +64,21 @@ impl BeadView {
         Self { bend, ..self }
     }
 
-    /// The pixel of a place; `None` behind the camera, and too far around a
+    /// The pixel of a position; `None` behind the camera, and too far around a
     /// curve.
     pub fn px(&self, along_mm: f64, across_mm: f64) -> Option<AxisPoint> {
-        let place = self.bend.position(along_mm, across_mm)?;
-        let px = self.map.to_px(self.origin + self.along * place.x + self.across * place.y)?;
+        let position = self.bend.position(along_mm, across_mm)?;
+        let px =
+            self.map.to_px(self.origin + self.along * position.x + self.across * position.y)?;
         (px.x.is_finite() && px.y.is_finite()).then(|| self.axis_point(px))
     }
 
-    /// Distance of a pixel's place along the bead \[mm\].
+    /// Distance of a pixel's position along the bead \[mm\].
     pub fn along_mm(&self, px: ImagePoint) -> Option<f64> {
-        let place = self.map.to_mm(px)? - self.origin;
-        Some(self.bend.along_mm(Vector2::new(place.dot(&self.along), place.dot(&self.across))))
+        let position = self.map.to_mm(px)? - self.origin;
+        Some(
+            self.bend.along_mm(Vector2::new(position.dot(&self.along), position.dot(&self.across))),
+        )
     }
 
     fn axis_point(&self, px: ImagePoint) -> AxisPoint {
@@ -86,10 +89,10 @@ impl BeadView {
     }
 
     /// The pixel of image coordinates along and across the gauge's axis.
-    pub fn image_point(&self, place: AxisPoint) -> ImagePoint {
+    pub fn image_point(&self, position: AxisPoint) -> ImagePoint {
         match self.axis {
-            BeadAxis::Vertical => ImagePoint::new(place.cross, place.run),
-            BeadAxis::Horizontal => ImagePoint::new(place.run, place.cross),
+            BeadAxis::Vertical => ImagePoint::new(position.cross, position.run),
+            BeadAxis::Horizontal => ImagePoint::new(position.run, position.cross),
         }
     }
 
@@ -140,11 +143,11 @@ mod tests {
     fn travel_is_up_or_to_the_right_with_the_left_edge_on_its_left() {
         let map = SurfaceMap::from_scale(0.5);
         let up = BeadView::new(map, &gauge(BeadAxis::Vertical), 0.0, 0.0).unwrap();
-        let place = up.px(2.0, -1.0).unwrap();
-        assert_eq!(up.image_point(place), ImagePoint::new(60.0 - 2.0, 45.0 - 4.0));
+        let position = up.px(2.0, -1.0).unwrap();
+        assert_eq!(up.image_point(position), ImagePoint::new(60.0 - 2.0, 45.0 - 4.0));
         let right = BeadView::new(map, &gauge(BeadAxis::Horizontal), 0.0, 0.0).unwrap();
-        let place = right.px(2.0, -1.0).unwrap();
-        assert_eq!(right.image_point(place), ImagePoint::new(60.0 + 4.0, 45.0 - 2.0));
+        let position = right.px(2.0, -1.0).unwrap();
+        assert_eq!(right.image_point(position), ImagePoint::new(60.0 + 4.0, 45.0 - 2.0));
     }
 
     #[test]
@@ -152,11 +155,11 @@ mod tests {
         let map = SurfaceMap::from_scale(1.0);
         let view = BeadView::new(map, &gauge(BeadAxis::Vertical), -10.0, 3.0).unwrap();
         let (sin, cos) = 10_f64.to_radians().sin_cos();
-        let place = view.px(0.0, 0.0).unwrap();
-        assert!((place.cross - (60.0 + 3.0 * cos)).abs() < 1e-12);
-        assert!((place.run - (45.0 + 3.0 * sin)).abs() < 1e-12);
+        let position = view.px(0.0, 0.0).unwrap();
+        assert!((position.cross - (60.0 + 3.0 * cos)).abs() < 1e-12);
+        assert!((position.run - (45.0 + 3.0 * sin)).abs() < 1e-12);
         let ahead = view.px(100.0, 0.0).unwrap();
-        assert!((ahead.cross - place.cross - 100.0 * sin).abs() < 1e-12);
-        assert!((ahead.run - place.run + 100.0 * cos).abs() < 1e-12);
+        assert!((ahead.cross - position.cross - 100.0 * sin).abs() < 1e-12);
+        assert!((ahead.run - position.run + 100.0 * cos).abs() < 1e-12);
     }
 }

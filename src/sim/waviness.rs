@@ -1,5 +1,5 @@
 //! The waviness of a bead's two edges: a stationary Gaussian process along the
-//! path, a function of seed and place alone.
+//! path, a function of seed and position alone.
 
 use std::collections::VecDeque;
 use std::f64::consts::PI;
@@ -7,10 +7,10 @@ use std::f64::consts::PI;
 use super::hash;
 use crate::scenario::bead::EdgeRoughness;
 
-/// Nodes of white noise within one correlation length. Three make the variance
-/// between nodes constant to 1 in 10⁹.
+/// Nodes of white noise within one correlation length L. Derived: a Gaussian kernel sampled at
+/// L/3 has a variance that is constant between nodes to 10⁻⁹.
 const NODES_PER_LENGTH: f64 = 3.0;
-/// Nodes on either side that reach a place: the kernel has fallen to 10⁻⁵.
+/// Nodes on either side that contribute. Derived: the kernel exp(−2(7/3)²) is 2·10⁻⁵.
 const KERNEL_REACH_NODES: i64 = 7;
 
 /// Deviation of both edges along the path: white noise on a grid, hashed from
@@ -44,14 +44,14 @@ impl Waviness {
         if self.size_mm == 0.0 {
             return [0.0; 2];
         }
-        let place = path_mm / self.spacing_mm;
+        let position = path_mm / self.spacing_mm;
         #[expect(clippy::cast_possible_truncation, reason = "saturates far beyond any path")]
-        let middle = place.round() as i64;
+        let middle = position.round() as i64;
         self.reach_for(middle);
         let mut sum = [0.0; 2];
         for (node, number) in self.nodes.iter().zip(self.first..) {
             #[expect(clippy::cast_precision_loss, reason = "node numbers stay below 2^53")]
-            let away = (place - number as f64) / NODES_PER_LENGTH;
+            let away = (position - number as f64) / NODES_PER_LENGTH;
             let weight = libm::exp(-2.0 * away * away);
             sum[0] += weight * node[0];
             sum[1] += weight * node[1];

@@ -1,5 +1,4 @@
-//! An extruder that is not there: [`SimExtruder`] behind a real TCP socket, in
-//! real time.
+//! A simulated extruder behind a TCP socket, in real time.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -15,17 +14,15 @@ use crate::link::extruder::{ExtruderEndpoint, ExtruderFaults};
 use crate::sim::extruder::SimExtruder;
 
 mod machine;
-mod shared;
 
-use machine::ExtruderMachine;
-use shared::{GatedPlant, SharedExtruder};
+use machine::{ExtruderMachine, GatedPlant, SharedExtruder};
 
-/// What is simulated.
+/// Parameters of the simulation.
 #[derive(Debug)]
 pub struct ExtruderOptions {
-    /// What it says of itself.
+    /// What it can do, in its `HELLO`.
     pub hello: ExtruderLimits,
-    /// What answers commands.
+    /// The plant.
     pub plant: SimExtruder,
     /// Time between two `STATE` lines, 5 to 200 ms on an extruder that keeps
     /// to the link.
@@ -80,14 +77,14 @@ impl ExtruderSim {
         self.server.local_addr()
     }
 
-    /// What the pump does now.
+    /// Present mode of the pump.
     pub fn pump(&self) -> PumpMode {
         let mut gated = self.shared.gated();
         gated.advance(self.shared.clock.now());
         gated.plant().state().0
     }
 
-    /// What pump and valve are told now.
+    /// Present command to pump and valve.
     pub fn command(&self) -> ExtruderCommand {
         let mut gated = self.shared.gated();
         gated.advance(self.shared.clock.now());

@@ -1,21 +1,20 @@
-//! What a server serves: a machine that takes lines and says its `STATE`.
+//! The machine behind a server: it takes lines and sends its `STATE`.
 
 use crate::core::time::Stamp;
 use crate::link::LineError;
 use crate::link::frame::{DeviceLine, LineBody, LineRefusal};
 
-/// Is told what happens, in words for the person who watches.
+/// Receives messages for the operator.
 pub type Notice = Box<dyn FnMut(Stamp, &str) + Send>;
 
 /// What stands behind a server.
 pub trait LinkMachine: Send + 'static {
     /// Name of its threads.
     const NAME: &'static str;
-    /// What a PC leaves behind, such as `the last setpoint`.
+    /// The command that expires after a disconnection, such as `the last setpoint`.
     const SETPOINT_WORDS: &'static str;
 
-    /// Once every period: goes on, and gives the `STATE` to send, if there is
-    /// somebody to hear it.
+    /// Advances by a period; returns the `STATE` to send, if a PC is connected.
     fn tick(&mut self, now: Stamp) -> Option<String>;
 
     /// A PC called.
@@ -30,14 +29,14 @@ pub trait LinkMachine: Send + 'static {
     /// The answer to bytes that make no line.
     fn bad_line(&mut self, why: &str) -> Answer;
 
-    /// What has changed since it was last asked, in words, if anything.
+    /// A message about changes since the last call, if there are any.
     fn changes(&mut self, now: Stamp) -> Option<String>;
 }
 
-/// What became of a line.
+/// The outcome of a line.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LineOutcome {
-    /// What to answer.
+    /// The answer.
     pub answer: Option<Answer>,
     /// Whether it was the last one.
     pub bye: bool,

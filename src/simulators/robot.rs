@@ -1,4 +1,4 @@
-//! A robot that is not there: [`RobotCell`] behind a real TCP socket.
+//! A simulated robot behind a TCP socket, in real time.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -14,18 +14,16 @@ use crate::link::RobotStatus;
 use crate::link::{ParamError, PrintJob, RobotFaults, RobotParams, VirtualRobot};
 
 mod machine;
-mod shared;
 
-use machine::RobotMachine;
-use shared::SharedRobot;
-pub use shared::TrueState;
+pub use machine::TrueState;
+use machine::{RobotMachine, SharedRobot};
 
-/// What is simulated.
+/// Parameters of the simulation.
 #[derive(Debug, Clone)]
 pub struct RobotOptions {
     /// The robot.
     pub params: RobotParams,
-    /// What it prints by itself while a PC is connected.
+    /// The job that it prints while a PC is connected.
     pub job: PrintJob,
     /// Time between two `STATE` lines, 20 to 200 ms on a robot that keeps to
     /// the link.
@@ -108,7 +106,7 @@ impl RobotSim {
         self.shared.cell().set_faults(self.shared.clock.now(), faults);
     }
 
-    /// What it does.
+    /// Its mode.
     pub fn mode(&self) -> RobotMode {
         self.state().mode
     }

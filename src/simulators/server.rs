@@ -1,5 +1,5 @@
-//! The far side of a line link over TCP, for robots and extruders that are not
-//! there: one PC at a time, lines in, `STATE` out.
+//! The device side of a line link over TCP for simulated machines: one PC at a time, lines in,
+//! `STATE` out.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream};
@@ -15,15 +15,15 @@ use crate::core::time::Span;
 use crate::io::clock::RunClock;
 
 mod host;
-mod input;
 mod peer;
 
 use host::Host;
-use input::Input;
+use peer::Input;
 
-/// Pieces of input that may wait; senders then wait too.
+/// Inputs that may wait; beyond it senders block.
 const MAX_WAITING_INPUTS: usize = 64;
-/// How long a call on the server's own socket may take when it is woken to end.
+/// Timeout of the connection to the server's own socket that wakes it to end: short, as it is
+/// on the same machine.
 const WAKE_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// A machine that is served in threads of its own until it is stopped.
@@ -36,7 +36,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Serves a machine on `listener`, which is told of the time by `clock`
+    /// Serves a machine on `listener`, which is given the time by `clock`
     /// and says its `STATE` once every `period`.
     pub fn spawn<M: LinkMachine>(
         listener: TcpListener,

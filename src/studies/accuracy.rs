@@ -1,4 +1,4 @@
-//! How well widths are measured: figures of sets of pictures with their truth.
+//! How well widths are measured: figures of sets of images with their truth.
 
 pub mod calibration_table;
 pub mod calibrations;
@@ -8,7 +8,7 @@ mod figures;
 pub mod roughness_table;
 pub mod sets;
 pub mod studio;
-mod table;
+pub mod table;
 mod verdict;
 
 use crate::numeric::statistics::Moments;
@@ -16,11 +16,11 @@ use figures::fraction;
 use sets::{Set, SetLimits};
 
 pub use figures::{Miss, SetFigures, WidthError};
-pub use table::{markdown, table};
 
-/// Error from which a width that was reported is silently wrong \[px\].
+/// Error from which a reported width is silently wrong \[px\]. By definition of the column
+/// "silent %", half a pixel.
 const SILENT_PX: f64 = 0.5;
-/// Ends of the 95 % interval, in standard deviations.
+/// Half the 95 % interval in standard deviations. Derived: Φ⁻¹(0.975) = 1.96.
 const INTERVAL_SIGMAS: f64 = 1.96;
 
 impl SetFigures {

@@ -1,5 +1,5 @@
-//! The experiments of the bead characterisation thesis: an extruder driven by a
-//! voltage lays a bead on a wheel. The plant as its chapter 3 gives it.
+//! The experiments of the bead characterisation thesis: an extruder driven by a voltage lays
+//! a bead on a wheel. The plant is that of its chapter 3.
 
 pub mod bounds;
 pub mod corner;
@@ -11,19 +11,19 @@ pub mod table;
 use crate::numeric::lti::{ModelError, TransferFunction};
 
 /// G1, drive voltage \[V\] to screw speed \[rpm\]:
-/// (439s + 35.08)/(1.523s² + 11.44s + 1)·e^(−0.054s).
+/// (439s + 35.08)/(1.523s² + 11.44s + 1)·e^(−0.054s). Section 3.3.1; 35.08 is the DC gain.
 pub fn drive() -> Result<TransferFunction, ModelError> {
     TransferFunction::new(&[439.0, 35.08], &[1.523, 11.44, 1.0], 0.054)
 }
 
-/// Poles of G2 at −0.738 ± 0.993i 1/s: real and imaginary part.
+/// Poles of G2 at −0.738 ± 0.993i 1/s: real and imaginary part. Bead characterisation thesis,
+/// § 3.3.2.
 pub const FLOW_POLES_PER_S: [f64; 2] = [0.738, 0.993];
-/// Its zeros at −3.84 ± 6.88i 1/s. The thesis prints their reciprocals
-/// (−0.0619 ± 0.1108i), with which the gain at high frequencies would be 95;
-/// with these its table 3 comes out.
+/// Its zeros at −3.84 ± 6.88i 1/s. Bead characterisation thesis, § 3.3.2, prints their
+/// reciprocals (−0.0619 ± 0.1108i), with which the gain at high frequencies would be 95;
+/// these reproduce its table 3 (papers.md).
 pub const FLOW_ZEROS_PER_S: [f64; 2] = [3.84, 6.88];
-/// Its gain for a screw that turns evenly, which the thesis leaves out
-/// \[mm³/s per rpm\].
+/// Its DC gain \[mm³/s per rpm\], which the thesis does not give: papers.md, "19.05 used".
 pub const FLOW_GAIN: f64 = 19.05;
 
 /// G2, screw speed \[rpm\] to flow at the nozzle \[mm³/s\].
@@ -40,12 +40,12 @@ pub fn flow_at_constant_speed() -> Result<TransferFunction, ModelError> {
     TransferFunction::new(&[9.175, 149.2, 905.3], &[1.0, 12.84, 47.52], 0.0)
 }
 
-/// G3, command to speed of the wheel: 2.517/(0.0377s + 1)·e^(−0.009s).
+/// G3, command to speed of the wheel: 2.517/(0.0377s + 1)·e^(−0.009s). Section 3.3.3.
 pub fn wheel() -> Result<TransferFunction, ModelError> {
     TransferFunction::new(&[2.517], &[0.0377, 1.0], 0.009)
 }
 
-/// GC, the wheel's inverse with a lag: (0.0377s + 1)/(2.517(0.01s + 1)).
+/// GC, the wheel's inverse with a lag: (0.0377s + 1)/(2.517(0.01s + 1)). Section 4.1.
 pub fn wheel_inverse() -> Result<TransferFunction, ModelError> {
     wheel()?.inverse_through(&TransferFunction::new(&[1.0], &[0.01, 1.0], 0.0)?)
 }

@@ -1,7 +1,6 @@
-//! The experiments of Diagne et al. 2015: a screw whose plug is to grow from
-//! 100 to 160 mm, with a conveying speed that is steady or pulsates (the
-//! paper's cases a and b), fed open loop, by the law without a predictor, and
-//! by the law with one.
+//! The experiments of Diagne et al. 2015: a screw whose filled length (plug) has to grow from
+//! 100 to 160 mm, with a conveying speed that is steady or pulsates (the paper's cases a and
+//! b), fed open loop, by feedback without a predictor, and by feedback with one.
 
 pub mod experiment;
 pub mod response;
@@ -19,20 +18,20 @@ use crate::extruder::screw::{
 pub use response::{Cycle, PlugResponse, PlugSample};
 pub use run::{FeedMethod, RunPlan, follow};
 
-/// Plug at the start.
+/// Plug at the start, x₀ = 0.1 m. Diagne et al. 2015, section VII.
 pub const START: Mm = Mm::constant(100.0);
-/// Where it shall be, and the most that is fed: the paper does not print the
-/// latter.
+/// Target x* = 0.16 m (Diagne et al. 2015, section VII), and the largest fill, which the paper
+/// does not give (papers.md, "use 0.9").
 pub const SETPOINT: PlugSetpoint = PlugSetpoint { plug: Mm::constant(160.0), max_fill: 0.9 };
-/// What the paper adds to the flattest slope \[1/m\].
+/// Slope above the smallest one, S = `S_min` + 30 \[1/m\]. Diagne et al. 2015, section VII.
 pub const STEEPER_PER_M: f64 = 30.0;
-/// Settled means within 2 % of the step from start to setpoint for good \[mm\].
+/// Settled means within 2 % of the step from start to setpoint \[mm\] (papers.md, "2 % band").
 pub const SETTLING_BAND_MM: f64 = 0.02 * (160.0 - 100.0);
-/// Last part of a run, over which a swing is measured \[s\]: a turn of the
-/// slower pulsation.
+/// Last part of a run, over which an oscillation is measured \[s\]. Derived: a period of the
+/// slower pulsation, 2π/0.4.
 pub const CYCLE_S: f64 = 16.0;
 
-/// A course of the conveying speed.
+/// A conveying speed over time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PulsationCase {
     /// Its name.
@@ -41,18 +40,16 @@ pub struct PulsationCase {
     pub pulsation: SpeedPulsation,
 }
 
-/// Steady, and the paper's two.
+/// Steady, and the two of Diagne et al. 2015, section VII.
 pub const CASES: [PulsationCase; 3] = [
     case("constant", 0.0, 0.0),
     case("a: ε 0.1, ω 3.5 rad/s", 0.1, 3.5),
     case("b: ε 0.4, ω 0.4 rad/s", 0.4, 0.4),
 ];
 
-const fn case(name: &'static str, share: f64, rad_per_s: f64) -> PulsationCase {
-    PulsationCase {
-        name,
-        pulsation: SpeedPulsation { relative_amplitude: share, rad_per_s, phase_rad: 0.0 },
-    }
+const fn case(name: &'static str, relative_amplitude: f64, rad_per_s: f64) -> PulsationCase {
+    let pulsation = SpeedPulsation { relative_amplitude, rad_per_s, phase_rad: 0.0 };
+    PulsationCase { name, pulsation }
 }
 
 impl PulsationCase {
@@ -62,14 +59,14 @@ impl PulsationCase {
     }
 }
 
-/// The paper's law: the exponentials with `S_min` + 30.
+/// The paper's control law, eqs. (20)–(22), with the slope `S_min` + 30.
 pub fn paper_controller(screw: &Screw) -> Result<PiecewiseExponential, ScrewError> {
     let slope = SETPOINT.min_slope(screw)? + STEEPER_PER_M;
     PiecewiseExponential::new(screw, SETPOINT, slope)
 }
 
-/// Our law: as much as can be fed, until shortly before the setpoint; how
-/// shortly is a matter of the slope \[1/m\].
+/// Our controller: the largest feed until shortly before the setpoint, there linear with a
+/// slope \[1/m\].
 pub fn saturated(screw: &Screw, slope_per_m: f64) -> Result<FillFeedback, ScrewError> {
     SaturatedLinear::new(screw, SETPOINT, slope_per_m).map(FillFeedback::Saturated)
 }

@@ -1,11 +1,14 @@
-//! Why experiments could not be run.
+//! Errors of the experiments.
 
 use super::bcs_thesis::corner::CornerError;
-use super::bcs_thesis::fit_table::FitTableError;
 use crate::document::Problems;
 use crate::extruder::adaptive::SubSystemError;
 use crate::extruder::feedforward::FeedforwardError;
 use crate::extruder::pressure::PressureError;
+use crate::identify::fit::{FitError, SamplesError};
+use crate::identify::prbs::NoSuchLength;
+use crate::identify::start_stop::StartStopFitError;
+use crate::identify::start_stop::parameters::StartStopError;
 use crate::numeric::lti::ModelError;
 use crate::sim::cell::SimCellError;
 use crate::sim::render::RenderError;
@@ -16,37 +19,49 @@ pub enum ReproduceError {
     /// The cell that ships with the program cannot be read.
     #[error("the cell of the experiments: {0}")]
     Cell(#[from] Problems),
-    /// It lacks what a run needs.
+    /// It lacks tables that a run needs.
     #[error("the cell of the experiments is not complete enough for a run")]
     NoRun,
-    /// The simulated cell cannot be.
+    /// The simulated cell cannot be set up.
     #[error(transparent)]
     Sim(#[from] SimCellError),
-    /// A picture cannot be rendered.
+    /// An image cannot be rendered.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// A screw's run cannot be made.
+    /// A run of the screw.
     #[error("the screw: {0}")]
     Screw(#[from] super::diagne2015::run::RunError),
     /// A pressure loop cannot be set up.
     #[error(transparent)]
     Pressure(#[from] PressureError),
-    /// An adaptive law cannot be set up.
+    /// An adaptive controller cannot be set up.
     #[error(transparent)]
     Adaptive(#[from] SubSystemError),
     /// A feedforward cannot be set up.
     #[error(transparent)]
     Feedforward(#[from] FeedforwardError),
-    /// A table of fits cannot be made.
+    /// A model cannot be fitted.
     #[error(transparent)]
-    FitTable(#[from] FitTableError),
-    /// Starts and stops cannot be told or timed.
+    Fit(#[from] FitError),
+    /// Simulated samples cannot be fitted to.
     #[error(transparent)]
-    StartStop(#[from] super::bcs_thesis::start_stop::experiment::StartStopExperimentError),
+    Samples(#[from] SamplesError),
+    /// An excitation of no possible length.
+    #[error(transparent)]
+    Sequence(#[from] NoSuchLength),
+    /// A table of fits without seeds.
+    #[error("a table needs at least one seed")]
+    NoSeeds,
+    /// No start-stop model can be fitted to a recording.
+    #[error("starts and stops: {0}")]
+    StartStopFit(#[from] StartStopFitError),
+    /// The parameters of a start-stop model.
+    #[error("starts and stops: {0}")]
+    StartStop(#[from] StartStopError),
     /// A corner cannot be planned or run.
     #[error(transparent)]
     Corner(#[from] CornerError),
-    /// A model cannot be.
+    /// A model of a plant.
     #[error(transparent)]
     Model(#[from] ModelError),
 }

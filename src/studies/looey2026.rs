@@ -1,9 +1,9 @@
 //! The experiments of Mohammadi Looey et al. 2026: model-reference adaptive
 //! control of the speeds in the nozzle and on the plate.
 //!
-//! The paper gives no parameter of its plant and no gain. Sub-system 1 is what
-//! fits cases 1 to 5 of its table; the parameters of sub-system 3, the
-//! operating point and everything about cases 6 to 10 are chosen here.
+//! The paper gives no parameter of its plant and no gain. Sub-system 1 is fitted to cases 1 to
+//! 5 of its table; the parameters of sub-system 3, the operating point and the conditions of
+//! cases 6 to 10 are choices of this study.
 
 mod cases;
 pub mod strand;
@@ -27,36 +27,37 @@ pub const MODEL: StrandModel = StrandModel {
     push_per_s: 0.6,
     strand: ScalarPlant { state_gain_per_s: -1.2, input_gain: 0.6 },
 };
-/// k1 (fitted) and k3.
+/// Feedback gains k1 and k3 \[1/s\]: k1 is fitted (papers.md, "003"), k3 a choice.
 pub const FEEDBACK: [f64; 2] = [1.604, 2.0];
-/// γ1 (fitted) and γ3, with p = 1.
+/// Adaptation gains γ1 and γ3 with p = 1: γ1 is fitted (papers.md, "003"), γ3 a choice.
 pub const LEARNING_RATE: [f64; 2] = [1.786, 3.3];
-/// Pressure gradient in the nozzle.
+/// Pressure gradient in the nozzle `p_d1`, a choice: it only shifts the operating point.
 const PRESSURE_GRADIENT: f64 = 0.5;
-/// Where all three poles of the error lie with our law \[1/s\].
+/// Magnitude of the triple pole of the error with our controller \[1/s\]: a larger one
+/// converges sooner and amplifies noise.
 pub const OUR_POLE_PER_S: f64 = 2.2;
-/// When the disturbances of the table begin \[s\].
+/// Time of the disturbance step \[s\]. Mohammadi Looey et al. 2026, section 4.
 pub const STEP_AT_S: f64 = 40.0;
-/// How long they are watched: 31.00 s is the table's longest \[s\].
+/// Horizon after the step \[s\]. Mohammadi Looey et al. 2026, table 1: 31.00 s is its end.
 pub const WATCHED_S: f64 = 31.0;
-/// |e|/β and |Δ̃| below which tracking and estimate count as settled (fitted
-/// to cases 1 to 5) \[unit of the input\].
+/// |e|/β and |Δ̃| within which tracking and estimate count as converged \[unit of the input\]:
+/// fitted to cases 1 to 5 (papers.md, "003").
 pub const TOLERANCES: [f64; 2] = [1.61e-5, 1.01e-7];
-/// How long a command is held in the experiments, which are about the law in
-/// continuous time.
+/// Hold time of a command: short, because the controller is in continuous time.
 const HOLD: Span = Span::from_millis(1);
+/// The same \[s\]. Derived: `HOLD`.
 const HOLD_S: f64 = 0.001;
 /// The operating point.
 const TARGETS: StrandTargets = StrandTargets { nozzle_m_per_s: 0.05, strand_m_per_s: 0.05 };
 
-/// Which law.
+/// A controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AdaptationMethod {
     /// The paper's with γ = 0.
     NotAdaptive,
     /// The paper's.
     Paper,
-    /// With the slope learnt and the error's poles placed.
+    /// With an estimate of the slope of the uncertainty, by pole placement.
     Ours,
 }
 
@@ -72,12 +73,8 @@ impl AdaptationMethod {
                 }
                 Self::Ours => return AdaptiveGains::triple_pole(plant, feedback, OUR_POLE_PER_S),
             };
-            AdaptiveGains {
-                feedback,
-                error_feedback: 0.0,
-                adaptation,
-                safety: EstimateBounds::default(),
-            }
+            let (error_feedback, safety) = (0.0, EstimateBounds::default());
+            AdaptiveGains { feedback, error_feedback, adaptation, safety }
         };
         [of(0, MODEL.nozzle), of(1, MODEL.strand)]
     }
@@ -103,34 +100,34 @@ pub fn operating_point() -> StrandInputs {
 /// An experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StrandExperiment {
-    /// The law.
+    /// The controller.
     pub method: AdaptationMethod,
-    /// How the plant's parameters go with its inputs.
+    /// Dependence of the plant's parameters on its inputs.
     pub parameters: StrandParameters,
     /// Unknown part of ṁ \[kg/s\].
     pub feed: InputDisturbance,
     /// Unknown part of the plate's speed \[m/s\].
     pub plate: InputDisturbance,
-    /// How long \[s\].
+    /// Duration \[s\].
     pub length_s: f64,
 }
 
-/// A moment of an experiment.
+/// A sample of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StrandSample {
     /// Time \[s\].
     pub t_s: f64,
     /// v̄1 and ū3 \[m/s\].
     pub speeds: [f64; 2],
-    /// What the law of either sub-system did.
+    /// The action of the controller of either sub-system.
     pub actions: [Action; 2],
     /// The true unknown parts \[kg/s, m/s\].
     pub unknown: [f64; 2],
 }
 
 impl StrandExperiment {
-    /// Runs it from the steady state and shows every millisecond.
-    pub fn run(&self, mut see: impl FnMut(&StrandSample)) -> Result<(), SubSystemError> {
+    /// Runs it from the steady state; calls `observe` every millisecond.
+    pub fn run(&self, mut observe: impl FnMut(&StrandSample)) -> Result<(), SubSystemError> {
         let mut controller = self.method.controller(HOLD)?;
         let start = operating_point();
         let mut plant = Strand::steady(MODEL, self.parameters, PRESSURE_GRADIENT, start);
@@ -144,11 +141,9 @@ impl StrandExperiment {
             let (feed, plate) = controller.step(&reading(&plant), &TARGETS, dt);
             let unknown = [self.feed.at(t_s), self.plate.at(t_s)];
             let speeds = [plant.nozzle_m_per_s, plant.strand_m_per_s];
-            see(&StrandSample { t_s, speeds, actions: [feed, plate], unknown });
-            let inputs =
-                StrandInputs { mass_flow_kg_per_s: feed.command, plate_m_per_s: plate.command };
-            // Straight up to just before the next millisecond, where a step
-            // may come.
+            observe(&StrandSample { t_s, speeds, actions: [feed, plate], unknown });
+            let inputs = commanded(&feed, &plate);
+            // Linear up to just before the next millisecond, at which a step may occur.
             let ramp = |of: &InputDisturbance| Ramp {
                 first: of.at(t_s),
                 last: of.at(t_s + HOLD_S * (1.0 - 1e-9)),
@@ -159,6 +154,10 @@ impl StrandExperiment {
     }
 }
 
+fn commanded(feed: &Action, plate: &Action) -> StrandInputs {
+    StrandInputs { mass_flow_kg_per_s: feed.command, plate_m_per_s: plate.command }
+}
+
 fn reading(plant: &Strand) -> StrandReading {
     StrandReading {
         nozzle_m_per_s: plant.nozzle_m_per_s,
@@ -167,12 +166,11 @@ fn reading(plant: &Strand) -> StrandReading {
     }
 }
 
-/// Slope of the ramps whose error constants are looked at, of either input
-/// \[kg/s², m/s²\].
+/// Slope of the disturbance ramp of either input \[kg/s², m/s²\], a choice.
 pub const RAMPS_PER_S: [f64; 2] = [-0.0005, -0.0008];
 
-/// The errors e1 and e3 that are left after a minute of a ramp in either input
-/// \[m/s\], and what the formula c/(γ·p·β) of the law says.
+/// The errors e1 and e3 after a minute of a ramp in either input \[m/s\], and their limits
+/// c/(γ·p·β) by the formula.
 pub fn ramp_errors(method: AdaptationMethod) -> Result<[(f64, f64); 2], SubSystemError> {
     let ramp =
         |slope_per_s| InputDisturbance::Ramp { slope_per_s, from_s: 0.0, to_s: f64::INFINITY };
@@ -188,8 +186,7 @@ pub fn ramp_errors(method: AdaptationMethod) -> Result<[(f64, f64); 2], SubSyste
     ])
 }
 
-/// The plate's speed drops by 40 % at 30 s and comes back at 60 s (case
-/// study 1).
+/// The plate's speed drops by 40 % at 30 s and returns at 60 s (case study 1).
 pub fn plate_step(method: AdaptationMethod, parameters: StrandParameters) -> StrandExperiment {
     let size = -0.4 * operating_point().plate_m_per_s;
     let plate = InputDisturbance::Step { size, from_s: 30.0, to_s: 60.0 };
@@ -205,7 +202,9 @@ pub fn feed_ramp(method: AdaptationMethod, parameters: StrandParameters) -> Stra
 /// Standard deviation of the feed's command for each unit of white noise on
 /// v̄1 at 100 Hz, in a steady state.
 pub fn command_noise(method: AdaptationMethod) -> Result<f64, SubSystemError> {
+    /// Their standard deviation has an error of 0.4 %. Derived: 1/√(2·40,000).
     const SAMPLES: u32 = 40_000;
+    /// Standard deviation of the noise; the result is a ratio, independent of it.
     const SIGMA_M_PER_S: f64 = 1e-3;
     let hold = Span::from_millis(10);
     let mut controller = method.controller(hold)?;
@@ -219,8 +218,7 @@ pub fn command_noise(method: AdaptationMethod) -> Result<f64, SubSystemError> {
         seen.nozzle_m_per_s += SIGMA_M_PER_S * noise;
         let (feed, plate) = controller.step(&seen, &TARGETS, dt);
         sum += (feed.command - start.mass_flow_kg_per_s).powi(2);
-        let inputs =
-            StrandInputs { mass_flow_kg_per_s: feed.command, plate_m_per_s: plate.command };
+        let inputs = commanded(&feed, &plate);
         plant.step(inputs, Ramp::default(), Ramp::default(), hold.secs());
         dt = hold;
     }
@@ -242,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn ours_converges_sooner_in_both_and_leaves_nothing_of_a_ramp() {
+    fn ours_converges_sooner_in_both_and_has_no_error_with_a_ramp() {
         for case in &TABLE[..5] {
             let (paper, ours) = (
                 case.run(AdaptationMethod::Paper).unwrap(),
@@ -266,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn without_adaptation_the_plates_step_stays_and_with_it_it_goes() {
+    fn a_step_of_the_plate_leaves_an_error_only_without_adaptation() {
         let error_at_59_s = |method, parameters| {
             let mut error: f64 = 0.0;
             plate_step(method, parameters)

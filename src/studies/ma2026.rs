@@ -1,6 +1,5 @@
-//! The experiments of Ma et al. 2026: steps, sines, steady extrusion under
-//! drift and steps of the load, with the paper's controllers and with ours, on the
-//! same plant.
+//! The experiments of Ma et al. 2026: steps, sines, steady extrusion under drift and steps of
+//! the load, with the paper's controllers and with ours, on the same plant.
 
 pub mod experiment;
 pub mod margins;

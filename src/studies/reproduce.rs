@@ -1,12 +1,13 @@
-//! The experiments of the source papers beside what was published: a table,
-//! `reproduce.json` and a page with plots. Each source has a folder of its own
-//! in `studies`.
+//! The experiments of the source papers beside the published numbers: a table,
+//! `reproduce.json` and a page with plots. Each paper has a folder of its own in
+//! `studies`.
 
 use maud::html;
 
 use super::error::ReproduceError;
 use super::publication::Publication;
 use super::study::{Effort, Reproduced};
+use super::{barjuei2022, bcs_thesis, diagne2015, looey2026, ma2026};
 use crate::io::progress::Progress;
 use crate::report::html::whole_page;
 use summary::PaperSummary;
@@ -14,35 +15,35 @@ use summary::PaperSummary;
 pub mod summary;
 pub mod table;
 
+type Run = fn(Effort, &mut Progress) -> Result<Reproduced, ReproduceError>;
+
 impl Publication {
-    /// How many experiments [`Self::run`] reports to its progress.
+    /// The number of experiments that [`Self::run`] reports to its progress.
     pub const fn experiments(self) -> u64 {
-        match self {
-            Self::Barjuei2022 => super::barjuei2022::table::EXPERIMENTS,
-            Self::BcsThesis => super::bcs_thesis::table::EXPERIMENTS,
-            Self::Diagne2015 => super::diagne2015::table::EXPERIMENTS,
-            Self::Ma2026 => super::ma2026::table::EXPERIMENTS,
-            Self::Looey2026 => super::looey2026::table::EXPERIMENTS,
-        }
+        self.study().0
     }
 
-    /// Runs the source's experiments.
+    /// Runs the paper's experiments.
     pub fn run(
         self,
         effort: Effort,
         progress: &mut Progress,
     ) -> Result<Reproduced, ReproduceError> {
+        (self.study().1)(effort, progress)
+    }
+
+    const fn study(self) -> (u64, Run) {
         match self {
-            Self::Barjuei2022 => super::barjuei2022::table::run(effort, progress),
-            Self::BcsThesis => super::bcs_thesis::table::run(effort, progress),
-            Self::Diagne2015 => super::diagne2015::table::run(progress),
-            Self::Ma2026 => super::ma2026::table::run(effort, progress),
-            Self::Looey2026 => super::looey2026::table::run(effort, progress),
+            Self::Barjuei2022 => (barjuei2022::table::EXPERIMENTS, barjuei2022::table::run),
+            Self::BcsThesis => (bcs_thesis::table::EXPERIMENTS, bcs_thesis::table::run),
+            Self::Diagne2015 => (diagne2015::table::EXPERIMENTS, diagne2015::table::run),
+            Self::Ma2026 => (ma2026::table::EXPERIMENTS, ma2026::table::run),
+            Self::Looey2026 => (looey2026::table::EXPERIMENTS, looey2026::table::run),
         }
     }
 }
 
-/// The page of one source or of several.
+/// The page of one paper or of several.
 pub fn page(sources: &[Reproduced]) -> String {
     let title = match sources {
         [only] => format!("{}, reproduced", only.title),
@@ -76,7 +77,7 @@ pub fn page(sources: &[Reproduced]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::studies::row::TableRows;
+    use crate::studies::study::TableRows;
 
     #[test]
     fn a_row_has_the_keys_that_others_rely_on() {

@@ -1,11 +1,11 @@
-//! What a paper's table is asked for, and what it comes to.
+//! What the experiments of a paper give: rows of a table and sections of a page.
 
 use maud::Markup;
+use serde::Serialize;
 
-use super::row::TableRow;
+use super::publication::Publication;
 
-/// How much is spent on an experiment with noise; none is the source's own
-/// number.
+/// Seeds of the experiments; `None` stands for the study's own number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Effort {
     /// Seeds of every experiment with noise.
@@ -14,26 +14,104 @@ pub struct Effort {
     pub frame_seeds: Option<u64>,
 }
 
-/// What a source came to.
+/// The results of a study.
 #[derive(Debug)]
 pub struct Reproduced {
-    /// Authors, year and what was reproduced.
+    /// Authors and year.
     pub title: &'static str,
-    /// How often and with what.
+    /// Plant, seeds and definitions that the table relies on.
     pub about: String,
     /// The table.
     pub rows: Vec<TableRow>,
-    /// The plots, in the order in which they are read.
+    /// Plots, in reading order.
     pub sections: Vec<Section>,
 }
 
-/// A part of the page.
+/// A section of the page.
 #[derive(Debug)]
 pub struct Section {
     /// Its heading.
     pub heading: String,
-    /// What is seen in it; may be empty.
+    /// A paragraph below the heading; may be empty.
     pub hint: String,
     /// The plots.
     pub drawing: Markup,
+}
+
+impl Section {
+    /// A section of its parts.
+    pub fn new(heading: impl Into<String>, hint: impl Into<String>, drawing: Markup) -> Self {
+        Self { heading: heading.into(), hint: hint.into(), drawing }
+    }
+}
+
+/// One quantity of one experiment. The names of the fields are the keys of
+/// `reproduce.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TableRow {
+    /// The paper, by [`Publication::name`].
+    pub seed: &'static str,
+    /// The experiment.
+    pub case: String,
+    /// The measured quantity.
+    pub quantity: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// The published number; none where the paper gives none.
+    pub published: Option<f64>,
+    /// The result of the paper's own method in our simulation; none where it is never
+    /// reached.
+    pub simulated: Option<f64>,
+    /// The result of this program's best method on the same plant; none where there is
+    /// none.
+    pub ours: Option<f64>,
+}
+
+/// The rows of one paper, collected.
+#[derive(Debug)]
+pub struct TableRows {
+    seed: &'static str,
+    rows: Vec<TableRow>,
+}
+
+/// A quantity and its unit.
+type Quantity = (&'static str, &'static str);
+
+impl TableRows {
+    /// No rows yet.
+    pub const fn of(paper: Publication) -> Self {
+        Self { seed: paper.name(), rows: Vec::new() }
+    }
+
+    /// Adds a row: the published number, the result of the paper's method, and ours.
+    pub fn push(
+        &mut self,
+        case: impl Into<String>,
+        (quantity, unit): Quantity,
+        [published, simulated, ours]: [Option<f64>; 3],
+    ) {
+        let (seed, case) = (self.seed, case.into());
+        self.rows.push(TableRow { seed, case, quantity, unit, published, simulated, ours });
+    }
+
+    /// Adds a row without a published number.
+    pub fn compare(
+        &mut self,
+        case: impl Into<String>,
+        quantity: Quantity,
+        simulated: impl Into<Option<f64>>,
+        ours: impl Into<Option<f64>>,
+    ) {
+        self.push(case, quantity, [None, simulated.into(), ours.into()]);
+    }
+
+    /// Adds a row with our result alone.
+    pub fn ours(&mut self, case: impl Into<String>, quantity: Quantity, ours: f64) {
+        self.push(case, quantity, [None, None, Some(ours)]);
+    }
+
+    /// The rows.
+    pub fn into_vec(self) -> Vec<TableRow> {
+        self.rows
+    }
 }

@@ -9,35 +9,38 @@ use crate::calibration::Calibration;
 use crate::cell::file::{Cell, RunPart};
 use crate::core::units::Mm;
 use crate::numeric::average::mean;
+use crate::numeric::number::{to_count, to_f64};
 use crate::numeric::rank::mean_median;
 use crate::sim::cell::SimCellError;
 use crate::width_control::target::WidthTarget;
 
-/// Way after control began from which errors count \[mm\].
+/// Path after control began from which errors count \[mm\]: the step to the target is not an
+/// error of control.
 pub const JUDGED_AFTER_MM: f64 = 30.0;
-/// The same from which scatter is that of control alone \[mm\].
+/// Path after control began from which the standard deviation counts \[mm\]. Derived: more than
+/// the 455 mm that the paper's loop needs to settle at 42 mm (papers.md).
 pub const SIGMA_AFTER_MM: f64 = 700.0;
-/// Length of a piece of the bead over which errors are put together \[mm\].
+/// Length of the pieces of path over which errors of all seeds are combined \[mm\].
 const PIECE_MM: f64 = 5.0;
-/// Share of means that a confidence interval holds.
+/// Confidence level of the intervals. By definition of "95 %" in the tables.
 const CONFIDENCE: f64 = 0.95;
 
-/// A controller with its cell; bead, simulated world and calibration are those
-/// of the plant that all have.
+/// A controller with its cell; bead, simulation and calibration are those of the common
+/// plant.
 #[derive(Debug, Clone)]
 pub struct Contender {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// Its cell on the common plant.
     pub cell: Cell,
-    /// What the cell's run part says.
+    /// The run part of its cell.
     pub run: RunPart,
-    /// What a pixel means.
+    /// Its calibration.
     pub calibration: Calibration,
 }
 
 impl Contender {
-    /// The same with another width that is asked for.
+    /// The same with another target width.
     fn with_width(&self, width: Mm) -> RunPart {
         let mut run = self.run.clone();
         run.control.target = WidthTarget::constant(width);
@@ -60,8 +63,7 @@ impl SeedStatistics {
     /// Of a number of each seed.
     pub fn of(mut values: Vec<f64>) -> Self {
         let finite = values.iter().all(|value| value.is_finite());
-        #[expect(clippy::cast_precision_loss, reason = "seeds are few")]
-        let count = values.len() as f64;
+        let count = to_f64(values.len());
         let middle = mean(values.iter().copied());
         let variance = mean(values.iter().map(|value| (value - middle).powi(2)));
         let spread = (variance / (count - 1.0).max(1.0)).sqrt();
@@ -80,16 +82,16 @@ fn confidence_factor(count: f64) -> Option<f64> {
     Some(student.inverse_cdf(0.5 * (1.0 + CONFIDENCE)))
 }
 
-/// What a controller came to at one width.
+/// Figures of a controller at one width.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figures {
-    /// Mean size of the bead's error from 30 mm after control began \[mm\].
+    /// Mean absolute error of the bead from 30 mm after control began \[mm\].
     pub mean_error_mm: SeedStatistics,
     /// Its root mean square \[mm\].
     pub rms_error_mm: SeedStatistics,
-    /// Integral of its size over the path from where control began \[mm²\].
+    /// Integral of the absolute error over the path from where control began \[mm²\].
     pub integral_mm2: SeedStatistics,
-    /// Way after control began to within half a millimetre for good \[mm\].
+    /// Path from where control began until the error stays within half a millimetre \[mm\].
     pub settled_mm: SeedStatistics,
     /// Standard deviation of the width from 700 mm after control began \[mm\].
     pub sigma_mm: SeedStatistics,
@@ -118,29 +120,24 @@ impl Figures {
         let lay = |seed| LayerTrial::lay(&who.cell, &run, &who.calibration, seed);
         let trials: Vec<LayerTrial> =
             (0..seeds).into_par_iter().map(lay).collect::<Result<_, _>>()?;
-        let of =
+        let values =
             |value: &dyn Fn(&LayerTrial) -> f64| trials.iter().map(value).collect::<Vec<f64>>();
+        let of = |value: &dyn Fn(&LayerTrial) -> f64| SeedStatistics::of(values(value));
+        let failed = |trial: &LayerTrial| !trial.complete || trial.control_start_mm.is_infinite();
         let judged = |trial: &LayerTrial| trial.control_start_mm + JUDGED_AFTER_MM;
-        let rms_by_seed = of(&|trial| trial.rms_error(judged(trial)));
+        let rms_by_seed = values(&|trial| trial.rms_error(judged(trial)));
         let firsts = first.map_or(&rms_by_seed, |first| &first.rms_by_seed);
         let ratios = rms_by_seed.iter().zip(firsts).map(|(ours, first)| ours / first).collect();
         Ok(Self {
-            mean_error_mm: SeedStatistics::of(of(&|trial| trial.mean_error(judged(trial)))),
+            mean_error_mm: of(&|trial| trial.mean_error(judged(trial))),
             rms_error_mm: SeedStatistics::of(rms_by_seed.clone()),
-            integral_mm2: SeedStatistics::of(of(&|trial| {
-                trial.error_integral(trial.control_start_mm)
-            })),
-            settled_mm: SeedStatistics::of(of(&|trial| {
-                trial.settles_within(trial.control_start_mm, 0.5)
-            })),
-            sigma_mm: SeedStatistics::of(of(&|trial| {
+            integral_mm2: of(&|trial| trial.error_integral(trial.control_start_mm)),
+            settled_mm: of(&|trial| trial.settles_within(trial.control_start_mm, 0.5)),
+            sigma_mm: of(&|trial| {
                 trial.standard_deviation(trial.control_start_mm + SIGMA_AFTER_MM)
-            })),
+            }),
             ratio: SeedStatistics::of(ratios),
-            failed_seeds: trials
-                .iter()
-                .filter(|one| !one.complete || one.control_start_mm.is_infinite())
-                .count(),
+            failed_seeds: trials.iter().filter(|trial| failed(trial)).count(),
             error_profile: error_profile(&trials, width.get()),
             example: trials.into_iter().next().map(|trial| trial.bead).unwrap_or_default(),
             rms_by_seed,
@@ -152,19 +149,14 @@ impl Figures {
 fn error_profile(trials: &[LayerTrial], target_mm: f64) -> Vec<BeadPoint> {
     let mut pieces: Vec<(f64, f64)> = Vec::new();
     for (at, width) in trials.iter().flat_map(|trial| &trial.bead) {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a path")]
-        let piece = (at / PIECE_MM).max(0.0) as usize;
+        let piece = to_count(at / PIECE_MM);
         if pieces.len() <= piece {
             pieces.resize(piece + 1, (0.0, 0.0));
         }
         pieces[piece].0 += (width - target_mm).powi(2);
         pieces[piece].1 += 1.0;
     }
-    let middle = |number: usize| {
-        #[expect(clippy::cast_precision_loss, reason = "a path is not that long")]
-        let number = number as f64;
-        (number + 0.5) * PIECE_MM
-    };
+    let middle = |number: usize| (to_f64(number) + 0.5) * PIECE_MM;
     let known = pieces.iter().enumerate().filter(|(_, (_, count))| *count > 0.0);
     known.map(|(number, (sum, count))| (middle(number), (sum / count).sqrt())).collect()
 }
@@ -184,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn an_estimate_tells_mean_median_and_confidence() {
+    fn statistics_are_mean_median_and_confidence() {
         let estimate = SeedStatistics::of(vec![1.0, 2.0, 3.0, 6.0]);
         assert_eq!((estimate.mean, estimate.median), (Some(3.0), Some(2.5)));
         // s² = 14/3, s/√4 = 1.0801; Student's t of 3 degrees of freedom is 3.1824.
@@ -197,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_controller_that_never_controls_or_stops_has_no_figures_to_boast_of() {
+    fn a_controller_that_never_controls_or_stops_has_no_figures() {
         let ours = contender("ours", include_str!("../../cells/distance.toml"));
         let width = Mm::constant(42.0);
         let mut late = ours.clone();
@@ -216,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn the_law_by_distance_beats_the_paper_on_every_seed() {
+    fn the_controller_by_distance_is_better_than_the_papers() {
         let paper = contender("paper", include_str!("../../cells/barjuei2022.toml"));
         let ours = contender("ours", include_str!("../../cells/distance.toml"));
         let width = Mm::constant(42.0);

@@ -1,4 +1,4 @@
-//! One simulated layer, and what became of the bead itself.
+//! One simulated layer, and the errors of the bead itself.
 
 use crate::calibration::Calibration;
 use crate::cell::file::{Cell, RunPart};
@@ -13,13 +13,13 @@ use super::score::{BeadPoint, LayerScore};
 use crate::numeric::average::{mean, rms};
 use crate::sim::cell::{FrameObservation, Observer, SimCell, SimCellError};
 
-/// Places along the bead at which it is judged \[mm\].
+/// Distance between positions at which the bead is judged \[mm\]: that of the bead's own grid.
 const BEAD_SPACING_MM: f64 = 0.5;
 
 /// A layer as it was laid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerTrial {
-    /// What was measured.
+    /// Measured widths.
     pub score: LayerScore,
     /// Width of the bead itself, every half millimetre.
     pub bead: Vec<BeadPoint>,
@@ -42,8 +42,7 @@ impl LayerTrial {
         Self::lay_mismatched(cell, run, calibration, 1.0, seed)
     }
 
-    /// The same by a controller that is told the camera's distance wrong by a
-    /// factor.
+    /// The same by a controller whose assumed distance of the camera is wrong by a factor.
     pub fn lay_mismatched(
         cell: &Cell,
         run: &RunPart,
@@ -55,11 +54,8 @@ impl LayerTrial {
         cell.simulation.seed = seed + 1;
         let target_mm = run.control.target.nominal().get();
         let mut sim = SimCell::mismatched(&cell, run, factor, calibration.clone(), NoRecorder)?;
-        let mut watch = StartObserver {
-            score: LayerScore::new(target_mm),
-            newest: None,
-            control_start_mm: None,
-        };
+        let score = LayerScore::new(target_mm);
+        let mut watch = StartObserver { score, newest: None, control_start_mm: None };
         let end = sim.layer(Mm::ZERO, &mut watch);
         let mut bead = Vec::new();
         let mut at = 0.0;
@@ -67,18 +63,13 @@ impl LayerTrial {
             bead.extend(sim.bead().width_at(at).map(|width| (at, width)));
             at += BEAD_SPACING_MM;
         }
-        let begun_mm = watch.control_start_mm.unwrap_or(f64::INFINITY);
-        Ok(Self {
-            score: watch.score,
-            bead,
-            control_start_mm: begun_mm,
-            complete: end.complete,
-            target_mm,
-        })
+        let control_start_mm = watch.control_start_mm.unwrap_or(f64::INFINITY);
+        let (score, complete) = (watch.score, end.complete);
+        Ok(Self { score, bead, control_start_mm, complete, target_mm })
     }
 
-    /// Way from a place to where the bead stays within a band of the target for
-    /// good \[mm\]; infinite if it never does, or no bead lies there.
+    /// Path from a position until the bead stays within a band of the target \[mm\]; infinite
+    /// if it never does, or no bead lies there.
     pub fn settles_within(&self, from_mm: f64, band_mm: f64) -> f64 {
         let outside =
             |(at, width): &BeadPoint| *at >= from_mm && (width - self.target_mm).abs() > band_mm;
@@ -89,8 +80,8 @@ impl LayerTrial {
         }
     }
 
-    /// Integral of the error's size over the path from a place on \[mm²\]; not a number,
-    /// as all that follows, where no bead lies there.
+    /// Integral of the absolute error over the path from a position on \[mm²\]. This and the
+    /// following are NaN where no bead lies there.
     pub fn error_integral(&self, from_mm: f64) -> f64 {
         if self.errors(from_mm).next().is_none() {
             return f64::NAN;
@@ -98,17 +89,17 @@ impl LayerTrial {
         self.errors(from_mm).map(|error| error.abs() * BEAD_SPACING_MM).sum()
     }
 
-    /// Mean size of the bead's error from a place on \[mm\].
+    /// Mean absolute error of the bead from a position on \[mm\].
     pub fn mean_error(&self, from_mm: f64) -> f64 {
         mean(self.errors(from_mm).map(f64::abs))
     }
 
-    /// Root mean square of the bead's error from a place on \[mm\].
+    /// Root mean square of the bead's error from a position on \[mm\].
     pub fn rms_error(&self, from_mm: f64) -> f64 {
         rms(self.errors(from_mm))
     }
 
-    /// Standard deviation of the bead's width from a place on \[mm\].
+    /// Standard deviation of the bead's width from a position on \[mm\].
     pub fn standard_deviation(&self, from_mm: f64) -> f64 {
         let middle = mean(self.errors(from_mm));
         mean(self.errors(from_mm).map(|error| (error - middle).powi(2))).sqrt()
@@ -120,7 +111,7 @@ impl LayerTrial {
     }
 }
 
-/// Watches for the first setpoint that is a controller's.
+/// Observes the first setpoint that the controller computes.
 struct StartObserver {
     score: LayerScore,
     /// Path at the bead's start, the newest report, and when it came.
@@ -146,7 +137,7 @@ impl Observer for StartObserver {
         }
     }
 
-    fn frame(&mut self, sight: &FrameObservation<'_>) {
-        self.score.frame(sight);
+    fn frame(&mut self, observation: &FrameObservation<'_>) {
+        self.score.frame(observation);
     }
 }

@@ -7,10 +7,10 @@ use crate::core::time::Stamp;
 use crate::numeric::average::{mean, rms};
 use crate::sim::cell::{FrameObservation, Observer};
 
-/// A place along the bead and a value there.
+/// A position along the bead and a value there.
 pub type BeadPoint = (f64, f64);
 
-/// Watches one layer and adds up what the tables of the 2022 paper report.
+/// Observes one layer and sums the figures of the 2022 paper's tables.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LayerScore {
     target: f64,
@@ -27,12 +27,12 @@ pub struct LayerScore {
 }
 
 impl LayerScore {
-    /// For a wanted width \[mm\].
+    /// For a target width \[mm\].
     pub fn new(target_mm: f64) -> Self {
         Self { target: target_mm, ..Self::default() }
     }
 
-    /// Mean size of the error over all bead that was seen \[mm\].
+    /// Mean absolute error over all measured bead \[mm\].
     pub fn mean_error(&self) -> f64 {
         mean(self.errors().map(f64::abs))
     }
@@ -52,7 +52,7 @@ impl LayerScore {
         }
     }
 
-    /// Frames that showed bead and were refused.
+    /// Rejected frames that showed bead.
     pub fn refused(&self) -> u64 {
         self.refused
     }
@@ -73,17 +73,17 @@ impl Observer for LayerScore {
         }
     }
 
-    fn frame(&mut self, sight: &FrameObservation<'_>) {
-        // The bead's end within the gauge is not a width of the layer.
-        if sight.position_mm < 0.0 {
+    fn frame(&mut self, observation: &FrameObservation<'_>) {
+        // A gauge that holds the start of the bead does not measure a width of the layer.
+        if observation.position_mm < 0.0 {
             return;
         }
-        match sight.outcome {
-            Ok(measured) => self.widths.push((sight.position_mm, measured.width.get())),
+        match observation.outcome {
+            Ok(measured) => self.widths.push((observation.position_mm, measured.width.get())),
             Err(_) => self.refused += 1,
         }
-        if let Some(truth) = sight.truth {
-            self.true_widths.push((sight.position_mm, truth.width_mm));
+        if let Some(truth) = observation.truth {
+            self.true_widths.push((observation.position_mm, truth.width_mm));
         }
     }
 }

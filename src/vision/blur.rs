@@ -1,7 +1,7 @@
 //! Blur of an edge from all calipers together. The profiles are superimposed in bins of half a
 //! pixel, and a step of free blur is fitted.
 
-use crate::numeric::number::{floor_to_count, to_f64};
+use crate::numeric::number::{to_count, to_f64};
 use nalgebra::{Matrix5, Vector5};
 
 use super::fit::ShadedStep;
@@ -40,8 +40,8 @@ impl BinnedProfile {
     pub fn add(&mut self, distance_px: f64, grey: f64) {
         let bin = (2.0 * distance_px).round() + to_f64(CENTRE_BIN);
         if bin >= 0.0 && bin < to_f64(BINS) {
-            self.sums[floor_to_count(bin)] += grey;
-            self.counts[floor_to_count(bin)] += 1.0;
+            self.sums[to_count(bin)] += grey;
+            self.counts[to_count(bin)] += 1.0;
         }
     }
 

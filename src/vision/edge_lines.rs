@@ -11,7 +11,7 @@ use crate::calibration::SurfaceMap;
 use crate::core::frame::Frame;
 use crate::core::geometry::ImagePoint;
 use crate::core::units::{Mm, WidthRange};
-use crate::numeric::number::{floor_to_count, to_f64};
+use crate::numeric::number::{to_count, to_f64};
 
 use super::gauge::{Gauge, GaugeView, Polarity};
 use super::reject::Reject;
@@ -160,7 +160,7 @@ fn polarity_fits(gauge: &Gauge, frame: &Frame, grey: &[u8], [left, right]: [Edge
     let middle = ((to_f64(view.along) - 1.0) / 2.0).round();
     let level = |across: f64| -> Option<f64> {
         let at = view.to_image(across.round(), middle);
-        let (x, y) = (floor_to_count(at.x), floor_to_count(at.y));
+        let (x, y) = (to_count(at.x), to_count(at.y));
         let inside =
             (roi.x..roi.x + roi.width).contains(&x) && (roi.y..roi.y + roi.height).contains(&y);
         inside.then(|| f64::from(grey[y * frame.width() + x]))

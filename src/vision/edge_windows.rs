@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::path::EdgeCorrection;
 use super::row_range::RowRange;
 use super::strip::{GaugeRows, GreyPixel};
-use crate::numeric::number::{floor_to_count, floor_to_index, to_f32};
+use crate::numeric::number::{floor_to_index, to_count, to_f32};
 
 /// Pixels of a window. Derived: the 96 px of an overlay, and 8 px on either side for a path that is
 /// off.
@@ -95,7 +95,7 @@ impl EdgeWindows {
         self.pixels.resize(self.windows.len(), [0.0; WINDOW_PX]);
         let mut v = 0;
         for (window, pixels) in self.windows.iter().zip(&mut self.pixels) {
-            let end = v + floor_to_count(window.rows.into());
+            let end = v + to_count(window.rows.into());
             average(strip, v..end, window.first, pixels);
             v = end;
         }
@@ -107,7 +107,7 @@ fn rows_together(along: usize, lines: usize, steepest: f32) -> usize {
     if along <= MAX_SINGLE_ROWS {
         return 1;
     }
-    let straight = floor_to_count((MAX_ASIDE_PX / steepest.max(1e-3)).into());
+    let straight = to_count((MAX_ASIDE_PX / steepest.max(1e-3)).into());
     along.div_ceil(lines.max(1)).min(straight).max(1)
 }
 

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::edge_windows::EdgeWindows;
 use super::phase::split;
-use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f32, to_f64};
+use crate::numeric::number::{narrow_to_f32, to_count, to_f32, to_f64};
 use crate::numeric::rank;
 
 mod curved;
@@ -345,7 +345,7 @@ fn samples(
 
 /// Number of the value that a fraction of all do not exceed.
 fn rank_of(count: usize, fraction: f32) -> usize {
-    floor_to_count((fraction * to_f32(count)).into()).min(count.saturating_sub(1))
+    to_count((fraction * to_f32(count)).into()).min(count.saturating_sub(1))
 }
 
 fn place(index: usize) -> f64 {
@@ -354,7 +354,7 @@ fn place(index: usize) -> f64 {
 
 /// Number of the sample at a whole distance, within the window.
 fn index(distance: f64) -> usize {
-    floor_to_count((distance + to_f64(HALF_SPAN)).clamp(0.0, to_f64(SPAN)))
+    to_count((distance + to_f64(HALF_SPAN)).clamp(0.0, to_f64(SPAN)))
 }
 
 #[cfg(test)]

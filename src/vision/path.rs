@@ -2,7 +2,7 @@
 
 use super::pool::Bands;
 use super::row_range::RowRange;
-use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f32};
+use crate::numeric::number::{narrow_to_f32, to_count, to_f32};
 use crate::numeric::rank;
 use crate::vision::buffer::refill;
 
@@ -249,7 +249,7 @@ impl EdgeTrajectory {
     #[inline(always)]
     pub fn at(&self, v: f32) -> [f32; 3] {
         let Some(last) = self.segments.len().checked_sub(1) else { return self.values[0] };
-        let mut band = floor_to_count(((v - self.middles[0]) * self.per_px).into()).min(last);
+        let mut band = to_count(((v - self.middles[0]) * self.per_px).into()).min(last);
         // Bands differ by a row in height.
         if v < self.middles[band] && band > 0 {
             band -= 1;

@@ -8,7 +8,7 @@ use super::located::CaliperEdge;
 use super::row_range::RowRange;
 use super::strip::{GaugeRows, GreyPixel};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::{floor_to_count, to_f32, to_f64};
+use crate::numeric::number::{to_count, to_f32, to_f64};
 use crate::numeric::rank;
 use crate::vision::buffer::{refill, reset};
 
@@ -275,7 +275,7 @@ fn read_window<T: GreyPixel>(
         if first < 0.0 || first + to_f64(window.len()) > to_f64(task.strip.across) {
             return None;
         }
-        for (sum, pixel) in window.iter_mut().zip(&task.strip.row(v)[floor_to_count(first)..]) {
+        for (sum, pixel) in window.iter_mut().zip(&task.strip.row(v)[to_count(first)..]) {
             *sum += T::sum_to_f32(pixel.add_to(T::Sum::default()));
         }
     }
@@ -299,9 +299,9 @@ fn start_levels(window: &ProfileWindow<'_>, at: f64) -> FittedEdge {
 /// Half window for a blur \[px\]: to where the step is over, but not across
 /// the bead's other edge.
 fn half_window(blur_px: f64, width_px: f64) -> usize {
-    floor_to_count((4.0 * blur_px + 2.0).ceil()).clamp(MIN_HALF, widest_half(width_px))
+    to_count((4.0 * blur_px + 2.0).ceil()).clamp(MIN_HALF, widest_half(width_px))
 }
 
 fn widest_half(width_px: f64) -> usize {
-    floor_to_count(0.45 * width_px).clamp(MIN_HALF, MAX_HALF)
+    to_count(0.45 * width_px).clamp(MIN_HALF, MAX_HALF)
 }

@@ -5,7 +5,7 @@ use super::pixel_noise;
 use super::reject::{Checked, Reject};
 use super::strip::GreyPixel;
 use super::trace::{EdgeTracer, TraceInput};
-use crate::numeric::number::floor_to_count;
+use crate::numeric::number::to_count;
 
 /// Fraction of a step that must lie below the end of the scale.
 const MIN_VISIBLE_FRACTION: f64 = 0.4;
@@ -64,7 +64,7 @@ impl<T: GreyPixel> SaturatedBead<'_, T> {
             [[left_end + NOISE_MARGIN_PX, right - NOISE_MARGIN_PX]; 2]
         };
         let (mut square, mut n) = (0.0, 0.0);
-        for columns in ranges.map(|range| range.map(|at: f32| floor_to_count(at.into()))) {
+        for columns in ranges.map(|range| range.map(|at: f32| to_count(at.into()))) {
             let columns = columns[0]..columns[1].min(strip.across);
             if !columns.is_empty() {
                 square += pixel_noise::of(strip, columns).powi(2);

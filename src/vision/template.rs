@@ -8,7 +8,7 @@ use nalgebra::Matrix3;
 use super::overlay::StepShape;
 use super::phase::{offset, split};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::{floor_to_count, to_f64};
+use crate::numeric::number::{to_count, to_f64};
 
 pub mod textured;
 
@@ -365,7 +365,7 @@ impl Products {
 
 /// Chunks that hold so many pixels.
 fn chunks(pixels: f64) -> usize {
-    floor_to_count((pixels.max(0.0) / to_f64(LANES)).ceil())
+    to_count((pixels.max(0.0) / to_f64(LANES)).ceil())
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 
 use super::overlay::{Overlay, SideRange};
-use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f64};
+use crate::numeric::number::{narrow_to_f32, to_count, to_f64};
 
 /// Variance of the rows about an edge, in that of their noise, from which on
 /// they are looked at for texture: noise alone, in 100 rows, has less in all but one of
@@ -305,7 +305,7 @@ impl TextureTables {
     /// along the edge.
     fn along(&self, power: usize, distance: f64) -> f64 {
         let position = distance * to_f64(PER_LENGTH);
-        let below = floor_to_count(position);
+        let below = to_count(position);
         let values = &self.integrals[power];
         let (Some(here), Some(next)) = (values.get(below), values.get(below + 1)) else {
             return 0.0;

@@ -14,13 +14,14 @@ pub use self::arguments::AccuracyArgs;
 use self::publish::{Texts, make_folder};
 use crate::cli::print::Verbosity;
 use crate::io::progress::SharedProgress;
-use crate::studies::accuracy::calibration_table::{self, CalibrationFigures};
+use crate::studies::accuracy::calibration_table::CalibrationFigures;
 use crate::studies::accuracy::calibrations::{
     self, CalibrationBench, CalibrationCase, CornerSource,
 };
 use crate::studies::accuracy::sets::{self, Set};
 use crate::studies::accuracy::studio::SetStudio;
-use crate::studies::accuracy::{SetFigures, WidthError, markdown, table};
+use crate::studies::accuracy::table::{markdown, table};
+use crate::studies::accuracy::{SetFigures, WidthError};
 use crate::vision::Measurer;
 
 /// Default number of frames of a set. Derived: a standard deviation from n frames has a relative
@@ -70,8 +71,7 @@ fn judge_calibrations(args: &AccuracyArgs, voice: Verbosity) -> Result<ExitCode>
         .map(|(case, source, trials)| judge_case(case, source, trials, &progress))
         .collect();
     progress.finish();
-    let (table, markdown) =
-        (calibration_table::table(&figures), calibration_table::markdown(&figures));
+    let (table, markdown) = (table(&figures), markdown(&figures));
     let missed = figures.iter().any(|figures| !figures.missed.is_empty());
     Texts { table, markdown }.publish(args, "calibrations", &figures, missed)
 }

@@ -13,8 +13,7 @@ use crate::rows::output;
 use crate::studies::publication::Publication;
 use crate::studies::reproduce::summary::PaperSummary;
 use crate::studies::reproduce::{page, table};
-use crate::studies::row::TableRow;
-use crate::studies::study::{Effort, Reproduced};
+use crate::studies::study::{Effort, Reproduced, TableRow};
 
 /// Runs the experiments of a source paper beside its published numbers.
 #[derive(Debug, Args)]

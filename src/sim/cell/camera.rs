@@ -10,8 +10,7 @@ use crate::control::step::Step;
 use crate::core::frame::Frame;
 use crate::core::geometry::ImagePoint;
 use crate::core::time::Stamp;
-use crate::core::units::WidthRange;
-use crate::core::units::{Mm, MmPerS};
+use crate::core::units::{Mm, MmPerS, WidthRange};
 use crate::scenario::table::WidthSource;
 use crate::sim::hash;
 use crate::sim::laid::LaidBead;
@@ -20,7 +19,7 @@ use crate::sim::truth::Truth;
 use crate::sim::view::gauge_middle;
 use crate::vision::{BeadAxis, Edges, Hints, Measurer, Reject, WidthMeasurement};
 
-/// What the camera saw, for a witness.
+/// What the camera saw, for an observer.
 #[derive(Debug)]
 pub struct FrameObservation<'a> {
     /// Number of the frame, through all layers.
@@ -45,7 +44,7 @@ pub struct FrameObservation<'a> {
     pub setpoint: Option<MmPerS>,
 }
 
-/// One picture.
+/// One image.
 pub struct CapturedFrame {
     pub seq: u64,
     pub outcome: Result<WidthMeasurement, &'static str>,
@@ -59,7 +58,7 @@ pub struct SimCamera {
     seq: u64,
     gauge_length: f64,
     noise: Mm,
-    /// Share of the widths that are outliers, and most by which they are off.
+    /// Fraction of the widths that are outliers, and most by which they are off.
     outlier_rate_and_size: (f64, f64),
     missing_fraction: f64,
     /// Widths that are believed.
@@ -188,8 +187,8 @@ impl SimCamera {
 
     /// The factor by which a width is wrong; mostly 1.
     fn outlier(&self, seq: u64) -> f64 {
-        let (share, size) = self.outlier_rate_and_size;
-        if hash::unit(hash::mix(&[self.seed, OUTLIER_STREAM, seq])) < share {
+        let (fraction, size) = self.outlier_rate_and_size;
+        if hash::unit(hash::mix(&[self.seed, OUTLIER_STREAM, seq])) < fraction {
             1.0 + size * (2.0 * hash::unit(hash::mix(&[self.seed, OUTLIER_STREAM, seq, 1])) - 1.0)
         } else {
             1.0
@@ -205,8 +204,9 @@ impl SimCamera {
     }
 }
 
-/// Keep outliers and missing widths apart from other random numbers of a seed.
+/// Random stream of outliers. Derived: the bytes of "outlier".
 const OUTLIER_STREAM: u64 = 0x6f75_746c_6965_7200;
+/// Random stream of missing widths. Derived: the bytes of "missing".
 const MISSING_STREAM: u64 = 0x006d_6973_7369_6e67;
-/// Keeps the noise of widths apart from other random numbers of a seed.
+/// Random stream of the noise of widths. Derived: the bytes of "noise".
 const NOISE_STREAM: u64 = 0x006e_6f69_7365;

@@ -25,7 +25,7 @@ struct Clock {
     event: ClockEvent,
 }
 
-/// The clocks of a cell; at the same moment the first of them comes first.
+/// The clocks of a cell; at the same time the first of them is first.
 pub struct Ticker {
     began: Stamp,
     clocks: Vec<Clock>,
@@ -43,8 +43,8 @@ impl Ticker {
             }
             let word = hash::mix(&[simulation.seed, layer, which]);
             #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
-            let share = (word >> 11) as f64 / (1_u64 << 53) as f64;
-            (share * period / step).floor() * step
+            let fraction = (word >> 11) as f64 / (1_u64 << 53) as f64;
+            (fraction * period / step).floor() * step
         };
         let clock = |period, phase, what| Clock { period, phase, count: 0, event: what };
         let mut clocks = vec![

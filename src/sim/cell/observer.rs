@@ -1,4 +1,4 @@
-//! Who is told what happens in a simulated cell.
+//! Observers of a simulated cell.
 
 use super::camera::FrameObservation;
 use crate::control::event::Event;
@@ -6,16 +6,15 @@ use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::Mm3PerS;
 
-/// Is told what happens in a simulated cell.
+/// Observes a simulated cell.
 pub trait Observer {
     /// An event and the controller's answer.
     fn step(&mut self, now: Stamp, event: &Event, step: &Step);
 
-    /// What the camera saw; comes after the step that answered it.
-    fn frame(&mut self, sight: &FrameObservation<'_>);
+    /// A frame, after the step that it caused.
+    fn frame(&mut self, observation: &FrameObservation<'_>);
 
-    /// The flow through the nozzle of an extruder that is commanded, and the
-    /// one that is wanted while bead is laid.
+    /// The flow at the nozzle of a commanded extruder, and the demand while bead is laid.
     fn flow(&mut self, _now: Stamp, _wanted: Option<Mm3PerS>, _flow: Mm3PerS) {}
 
     /// Whether the layer is to end now, with what there is of it.
@@ -24,7 +23,7 @@ pub trait Observer {
     }
 }
 
-/// A witness that hears nothing.
+/// An observer that records nothing.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NoObserver;
 

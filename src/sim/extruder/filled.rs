@@ -1,5 +1,5 @@
-//! The screw of Diagne et al. 2015 as an extruder: its flow goes by the filled
-//! length. It stands while the pump does, and so does all that is on its way.
+//! The screw of Diagne et al. 2015 as an extruder: its flow depends on the filled length. With
+//! the pump off, screw and material stand still.
 
 use super::plant::{STEP, SimPlant};
 use crate::cell::extruder::ScrewPlant as Settings;
@@ -8,8 +8,9 @@ use crate::extruder::ExtruderReport;
 use crate::sim::hash::{mix, normal_pair};
 use crate::sim::screw::{Integrator, SimScrew};
 
+/// Random stream of the sensor. Derived: the bytes of "screw".
 const SENSOR_STREAM: u64 = 0x0073_6372_6577;
-/// Largest share that can be fed: a full screw has no filled length.
+/// Largest fill that can be fed: a full screw has no filled length.
 const MAX_FILL: f64 = 0.999;
 
 /// The plant with its sensor.

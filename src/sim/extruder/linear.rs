@@ -1,5 +1,4 @@
-//! A transfer function from command to flow, with what no model tells: an
-//! unknown input, and a flow that drifts.
+//! A transfer function from command to flow, with an unknown input and a random flow.
 
 use super::plant::{STEP, SimPlant};
 use crate::cell::extruder::LinearPlant;
@@ -8,8 +7,9 @@ use crate::extruder::ExtruderReport;
 use crate::numeric::lti::{Between, ModelError, Simulator};
 use crate::sim::hash::{mix, normal_pair};
 
-/// Keeps the random numbers of flow and sensor apart from others of a seed.
+/// Random stream of the flow. Derived: the bytes of "flow".
 const FLOW_STREAM: u64 = 0x0000_666c_6f77;
+/// Random stream of the sensor. Derived: the bytes of "sens".
 const SENSOR_STREAM: u64 = 0x7365_6e73;
 
 /// The plant with its memory.
@@ -20,28 +20,19 @@ pub struct LinearPlantSim {
     seed: u64,
     steps: u64,
     reports: u64,
-    /// What the screw does, in the unit of the command.
+    /// Speed of the screw in the unit of the command.
     turning: f64,
     modelled: f64,
     noise: f64,
 }
 
 impl LinearPlantSim {
-    /// At rest. Fails where the transfer function cannot be put on the grid.
+    /// At rest. Fails where the transfer function cannot be discretised.
     pub fn new(plant: &LinearPlant, seed: u64) -> Result<Self, ModelError> {
         let simulator = Simulator::new(&plant.transfer, STEP.secs(), Between::Held)?;
         let plant = plant.clone();
-        let (turning, modelled, wandering) = (0.0, 0.0, 0.0);
-        Ok(Self {
-            simulator,
-            plant,
-            seed,
-            steps: 0,
-            reports: 0,
-            turning,
-            modelled,
-            noise: wandering,
-        })
+        let (steps, reports, turning, modelled, noise) = (0, 0, 0.0, 0.0, 0.0);
+        Ok(Self { simulator, plant, seed, steps, reports, turning, modelled, noise })
     }
 
     /// The screw after a step with a command.

@@ -11,7 +11,7 @@ use crate::sim::melt::{Melt, MeltParameters};
 pub struct Molten {
     melt: Melt,
     gain_mm3_per_s: f64,
-    /// What it was told last \[mm³/s\].
+    /// Last command \[mm³/s\].
     commanded_mm3_per_s: f64,
     now_s: f64,
     flow: Mm3PerS,

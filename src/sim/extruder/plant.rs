@@ -1,21 +1,21 @@
-//! What every simulated extruder plant does: a step with a command, its flow, its sensors.
+//! The interface of simulated extruder plants.
 
 use crate::core::time::Span;
 use crate::core::units::Mm3PerS;
 use crate::extruder::ExtruderReport;
 
-/// Step of a simulated plant.
+/// Step of a simulated plant: papers.md, "Plant at 1 ms".
 pub const STEP: Span = Span::from_millis(1);
 
-/// What turns commands into flow.
+/// A plant from command to flow.
 pub trait SimPlant: std::fmt::Debug + Send {
-    /// Goes on by [`STEP`] with a command, in the command's unit, or without
-    /// one while the pump stands.
+    /// Advances by [`STEP`] with a command, in the command's unit, or without one while the
+    /// pump is off.
     fn advance(&mut self, command: Option<f64>);
 
-    /// Flow that it would give through an open nozzle.
+    /// Flow through an open nozzle.
     fn flow(&self) -> Mm3PerS;
 
-    /// Adds what its sensors read to a report.
+    /// Adds the readings of its sensors to a report.
     fn sense(&mut self, report: &mut ExtruderReport);
 }

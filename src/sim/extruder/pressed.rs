@@ -1,5 +1,5 @@
-//! A pressure at the nozzle that follows the screw, and the flow that it
-//! presses out: the plant of Ma et al. 2026 as an extruder.
+//! The plant of Ma et al. 2026 as an extruder: from screw speed to pressure at the nozzle to
+//! flow.
 
 use super::plant::{STEP, SimPlant};
 use crate::cell::extruder::{InputLoad, PressurePlant};

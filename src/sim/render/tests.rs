@@ -41,11 +41,11 @@ fn quiet() -> ImageModel {
     ImageModel { noise_grey: 0.0, light_ratio: 1.0, ..ImageModel::default() }
 }
 
-fn renderer(calibration: Calibration, gauge: Gauge, picture: &ImageModel) -> Renderer {
-    Renderer::new(calibration, Mm::constant(20.0), gauge, *picture, 5).unwrap()
+fn renderer(calibration: Calibration, gauge: Gauge, image: &ImageModel) -> Renderer {
+    Renderer::new(calibration, Mm::constant(20.0), gauge, *image, 5).unwrap()
 }
 
-fn shares(renderer: &Renderer, bead: &BeadEdges<'_>) -> Vec<f32> {
+fn fractions(renderer: &Renderer, bead: &BeadEdges<'_>) -> Vec<f32> {
     seen(renderer, bead).fractions
 }
 
@@ -64,10 +64,10 @@ fn straight(width_mm: f64) -> impl Fn(f64) -> Option<(f64, f64)> {
     move |_| Some((-0.5 * width_mm, 0.5 * width_mm))
 }
 
-/// Where a row of a noise-free picture passes half way from ground to bead.
-fn half_way(renderer: &Renderer, shares: &[f32], row: usize, rising: bool) -> f64 {
+/// Where a row of a noise-free image passes half way from ground to bead.
+fn half_way(renderer: &Renderer, fractions: &[f32], row: usize, rising: bool) -> f64 {
     let width = renderer.size.0;
-    let line = &shares[row * width..(row + 1) * width];
+    let line = &fractions[row * width..(row + 1) * width];
     let passes = |i: usize| {
         if rising {
             line[i] < 0.5 && line[i + 1] >= 0.5
@@ -82,12 +82,13 @@ fn half_way(renderer: &Renderer, shares: &[f32], row: usize, rising: bool) -> f6
 #[test]
 fn every_row_holds_the_width_of_the_bead_in_pixels() {
     for (slant_deg, blur_px) in [(0.0, 1.5), (7.3, 1.5), (-19.0, 0.0), (12.0, 4.0), (3.0, 0.3)] {
-        let picture = ImageModel { slant_deg, blur_px, lateral_mm: 1.234, ..quiet() };
-        let renderer = renderer(scale(), upright(), &picture);
-        let shares = shares(&renderer, &straight(30.0));
+        let image = ImageModel { slant_deg, blur_px, lateral_mm: 1.234, ..quiet() };
+        let renderer = renderer(scale(), upright(), &image);
+        let fractions = fractions(&renderer, &straight(30.0));
         let expected = 30.0 / PAPER_SCALE / slant_deg.to_radians().cos();
         for row in [60, 200, 333, 480] {
-            let sum: f64 = shares[row * 720..(row + 1) * 720].iter().map(|s| f64::from(*s)).sum();
+            let sum: f64 =
+                fractions[row * 720..(row + 1) * 720].iter().map(|s| f64::from(*s)).sum();
             assert!((sum - expected).abs() < 2e-4, "slant {slant_deg} row {row}: {sum} {expected}");
         }
     }
@@ -95,8 +96,8 @@ fn every_row_holds_the_width_of_the_bead_in_pixels() {
 
 #[test]
 fn pixels_far_from_the_edges_are_bead_or_ground_in_the_light_there() {
-    let picture = ImageModel { noise_grey: 0.0, light_ratio: 1.5, ..ImageModel::default() };
-    let renderer = renderer(scale(), upright(), &picture);
+    let image = ImageModel { noise_grey: 0.0, light_ratio: 1.5, ..ImageModel::default() };
+    let renderer = renderer(scale(), upright(), &image);
     let pixels = grey(&renderer.render(0, Stamp::START, None, &straight(40.0)).unwrap().frame);
     let light = |x: f64, y: f64| 1.0 + 0.2 * ((x - 359.5) / 719.0 + (y - 269.5) / 539.0);
     for (x, y, level) in [(0, 0, 70.0), (719, 539, 70.0), (360, 10, 150.0), (300, 500, 150.0)] {
@@ -116,21 +117,21 @@ fn truth_lies_where_the_picture_passes_half_way() {
     // An odd number of rows, so that the middle of the gauge is a row.
     let odd = gauge(Roi { x: 40, y: 20, width: 640, height: 501 }, BeadAxis::Vertical);
     for (calibration, slant_deg) in [(scale(), 0.0), (tilted(), 0.0), (tilted(), 9.0)] {
-        let picture = ImageModel { slant_deg, lateral_mm: -0.7, ..quiet() };
-        let renderer = renderer(calibration, odd, &picture);
+        let image = ImageModel { slant_deg, lateral_mm: -0.7, ..quiet() };
+        let renderer = renderer(calibration, odd, &image);
         let truth = renderer.render(0, Stamp::START, None, &wavy).unwrap().truth.unwrap();
-        let shares = shares(&renderer, &wavy);
+        let fractions = fractions(&renderer, &wavy);
         assert_eq!((truth.left.y, truth.right.y), (270.0, 270.0));
-        assert!((half_way(&renderer, &shares, 270, true) - truth.left.x).abs() < 0.01);
-        assert!((half_way(&renderer, &shares, 270, false) - truth.right.x).abs() < 0.01);
+        assert!((half_way(&renderer, &fractions, 270, true) - truth.left.x).abs() < 0.01);
+        assert!((half_way(&renderer, &fractions, 270, false) - truth.right.x).abs() < 0.01);
         assert!((truth.width_mm - 39.0).abs() < 0.15);
     }
 }
 
 #[test]
 fn a_straight_bead_has_its_width_between_its_edges_on_the_surface() {
-    let picture = ImageModel { slant_deg: 11.0, lateral_mm: 2.0, ..quiet() };
-    let renderer = renderer(tilted(), upright(), &picture);
+    let image = ImageModel { slant_deg: 11.0, lateral_mm: 2.0, ..quiet() };
+    let renderer = renderer(tilted(), upright(), &image);
     let bead = straight(37.0);
     let truth = renderer.render(0, Stamp::START, None, &bead).unwrap().truth.unwrap();
     assert!((truth.width_mm - 37.0).abs() < 1e-9);
@@ -157,8 +158,8 @@ fn a_surface_nearer_the_camera_looks_wider() {
         quality: None,
     };
     let seen = |height: Option<f64>, robot_z: Option<f64>| {
-        let picture = ImageModel { true_surface_height_mm: height, ..quiet() };
-        let rendered = renderer(down.clone(), upright(), &picture)
+        let image = ImageModel { true_surface_height_mm: height, ..quiet() };
+        let rendered = renderer(down.clone(), upright(), &image)
             .render(0, Stamp::START, robot_z.map(Mm::constant), &straight(40.0))
             .unwrap();
         let truth = rendered.truth.unwrap();
@@ -176,8 +177,9 @@ fn a_horizontal_bead_is_a_vertical_one_turned() {
     let roi = Roi { x: 20, y: 20, width: 260, height: 260 };
     // To the right of the direction of travel in both.
     let leaning = |slant_deg| ImageModel { size_px, slant_deg, ..quiet() };
-    let up = shares(&renderer(scale(), gauge(roi, BeadAxis::Vertical), &leaning(-5.0)), &bead);
-    let right = shares(&renderer(scale(), gauge(roi, BeadAxis::Horizontal), &leaning(5.0)), &bead);
+    let up = fractions(&renderer(scale(), gauge(roi, BeadAxis::Vertical), &leaning(-5.0)), &bead);
+    let right =
+        fractions(&renderer(scale(), gauge(roi, BeadAxis::Horizontal), &leaning(5.0)), &bead);
     for (row, column) in (0..300).flat_map(|row| (0..300).map(move |column| (row, column))) {
         let turned = up[(299 - column) * 300 + row];
         assert!((right[row * 300 + column] - turned).abs() < 1e-6);
@@ -187,11 +189,12 @@ fn a_horizontal_bead_is_a_vertical_one_turned() {
 #[test]
 fn a_bead_that_begins_in_the_picture_covers_its_own_area() {
     let begun = |s: f64| (s < 3.3).then_some((-12.0, 13.0));
-    let picture = ImageModel { slant_deg: 6.0, size_px: [400, 300], ..quiet() };
+    let image = ImageModel { slant_deg: 6.0, size_px: [400, 300], ..quiet() };
     let roi = Roi { x: 20, y: 20, width: 360, height: 260 };
-    let renderer = renderer(scale(), gauge(roi, BeadAxis::Vertical), &picture);
-    let at =
-        |bead: &BeadEdges<'_>| shares(&renderer, bead).iter().map(|s| f64::from(*s)).sum::<f64>();
+    let renderer = renderer(scale(), gauge(roi, BeadAxis::Vertical), &image);
+    let at = |bead: &BeadEdges<'_>| {
+        fractions(&renderer, bead).iter().map(|s| f64::from(*s)).sum::<f64>()
+    };
     let later = |s: f64| (s < 5.3).then_some((-12.0, 13.0));
     let grown = (at(&later) - at(&begun)) * PAPER_SCALE * PAPER_SCALE;
     assert!((grown - 2.0 * 25.0).abs() < 1e-2, "{grown}");
@@ -209,8 +212,8 @@ fn without_a_bead_there_is_ground() {
 
 #[test]
 fn noise_is_of_the_size_that_was_asked_for_and_of_the_frame_alone() {
-    let picture = ImageModel { light_ratio: 1.0, noise_grey: 4.0, ..ImageModel::default() };
-    let renderer = renderer(scale(), upright(), &picture);
+    let image = ImageModel { light_ratio: 1.0, noise_grey: 4.0, ..ImageModel::default() };
+    let renderer = renderer(scale(), upright(), &image);
     let frame = |seq| renderer.render(seq, Stamp::START, None, &|_| None).unwrap().frame;
     let (first, second) = (frame(0), frame(1));
     assert_eq!(frame(0), first);
@@ -225,8 +228,8 @@ fn noise_is_of_the_size_that_was_asked_for_and_of_the_frame_alone() {
 
 #[test]
 fn a_gauge_outside_the_picture_is_refused_in_words() {
-    let picture = ImageModel { size_px: [320, 240], ..quiet() };
-    let refused = Renderer::new(scale(), Mm::ZERO, upright(), picture, 1).unwrap_err();
+    let image = ImageModel { size_px: [320, 240], ..quiet() };
+    let refused = Renderer::new(scale(), Mm::ZERO, upright(), image, 1).unwrap_err();
     let message = refused.to_string();
     assert!(message.contains("(680, 520)") && message.contains("320 x 240"), "{message}");
 }

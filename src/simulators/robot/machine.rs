@@ -1,13 +1,56 @@
-//! The simulated robot behind its server.
+//! The simulated robot behind its server, and the state that its thread shares with its handle.
 
-use std::sync::Arc;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::shared::SharedRobot;
 use crate::core::robot::RobotMode;
 use crate::core::time::Stamp;
+use crate::io::clock::RunClock;
 use crate::link::robot::mode_word;
-use crate::link::{LineError, PcLine, PrintJob, RobotLine};
+use crate::link::{LineError, PcLine, PrintJob, RobotLine, RobotStatus, VirtualRobot};
 use crate::simulators::machine::{Answer, LineOutcome, LinkMachine};
+
+/// States that are kept. Derived: more than an hour at 50 per second.
+const MAX_HISTORY: usize = 200_000;
+
+/// Where the robot really was.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrueState {
+    /// When.
+    pub at: Stamp,
+    /// Its state.
+    pub state: RobotStatus,
+}
+
+/// What the robot's thread shares with the handle.
+#[derive(Debug)]
+pub(super) struct SharedRobot {
+    pub(super) clock: RunClock,
+    cell: Mutex<VirtualRobot>,
+    history: Mutex<VecDeque<TrueState>>,
+}
+
+impl SharedRobot {
+    pub(super) fn new(clock: RunClock, cell: VirtualRobot) -> Self {
+        Self { clock, cell: Mutex::new(cell), history: Mutex::default() }
+    }
+
+    pub(super) fn cell(&self) -> MutexGuard<'_, VirtualRobot> {
+        self.cell.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn history(&self) -> MutexGuard<'_, VecDeque<TrueState>> {
+        self.history.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn remember(&self, at: Stamp, state: RobotStatus) {
+        let mut history = self.history();
+        if history.len() == MAX_HISTORY {
+            history.pop_front();
+        }
+        history.push_back(TrueState { at, state });
+    }
+}
 
 pub(super) struct RobotMachine {
     shared: Arc<SharedRobot>,

@@ -5,8 +5,7 @@ use std::time::Duration;
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 
-use super::input::Input;
-use super::peer::Peer;
+use super::peer::{Input, Peer};
 use crate::core::time::{Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::link::LineFault;
@@ -50,7 +49,7 @@ impl<M: LinkMachine> Host<M> {
                 if let Some(state) = self.machine.tick(now) {
                     self.say(&state);
                 }
-                // A machine that was late does not make up for it in a burst.
+                // After a delay the missed states are not sent in a burst.
                 next_state = (next_state + self.period).max(now);
             }
             self.report_changes();

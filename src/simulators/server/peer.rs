@@ -7,11 +7,24 @@ use std::time::Duration;
 
 use crossbeam_channel::Sender;
 
-use super::input::Input;
 use crate::link::{BadLines, LineSplitter};
 use crate::simulators::machine::LinkMachine;
 
-/// A PC that takes no bytes for this long is let go.
+/// What wakes the host of a machine.
+#[derive(Debug)]
+pub(super) enum Input {
+    /// A new connection.
+    Connection(TcpStream),
+    /// Bytes of the connection with this number.
+    Bytes(u64, Vec<u8>),
+    /// The connection with this number is lost.
+    Disconnected(u64),
+    /// The end.
+    Quit,
+}
+
+/// Timeout of a write to the PC, after which it is disconnected: a PC that keeps to the link
+/// reads at once.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 
 /// The PC at the other end.

@@ -1,42 +1,46 @@
-//! Whether calibrations know how good they are: figures of rigs with their truth.
+//! Whether the predicted uncertainty of calibrations is right: figures of cases with a known
+//! truth.
 
 use serde::Serialize;
 
 use super::INTERVAL_SIGMAS;
 use super::calibrations::{CalibratedWidth, CalibrationCase, CornerSource};
-use super::table::{aligned, marked};
+use super::figures::fraction;
+use super::table::{FigureRow, number, verdict};
+use crate::numeric::number::to_f64;
 
-/// How far scatter and forecast may be apart where trials are many.
+/// Largest deviation from 1 of the RMS error over the predicted standard deviation.
 const MAX_RATIO_DEVIATION: f64 = 0.10;
-/// Share of the true widths that the 95 % interval must hold.
+/// Fraction of the true widths that the 95 % interval must hold.
 const COVERAGE_RANGE: (f64, f64) = (0.93, 0.97);
-/// Standard errors of a figure that are put down to the count of the trials.
+/// Standard errors that are allowed for the number of trials. Derived: three miss one figure in
+/// 370 by chance.
 const ALLOWANCE_SIGMAS: f64 = 3.0;
 
-/// The figures of one rig.
+/// The figures of one case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CalibrationFigures {
-    /// The rig's name.
+    /// The case's name.
     pub case: &'static str,
     /// Where the corners came from.
     pub source: &'static str,
-    /// Pictures of each calibration.
+    /// Images of each calibration.
     pub views: u64,
-    /// Standard deviation of a corner's place \[px\]; none for rendered pictures.
+    /// Standard deviation of a corner's position \[px\]; none for rendered images.
     pub noise_px: Option<f64>,
     /// Calibrations.
     pub trials: usize,
     /// Those that were found.
     pub found: usize,
-    /// Root mean square error of a width over the trials, as a share of the width: the
+    /// Root mean square error of a width over the trials, relative to the width: the
     /// smallest and the largest of the beads.
     pub rms_error_fraction: [f64; 2],
-    /// The same of the error over what its own calibration foretells: the smallest and
+    /// The same of the error over what its own calibration predicts: the smallest and
     /// the largest of the beads.
     pub ratio: [f64; 2],
     /// The same over all beads together.
     pub ratio_of_all: f64,
-    /// Share of the true widths that lie in the 95 % interval.
+    /// Fraction of the true widths that lie in the 95 % interval.
     pub within_interval: f64,
     /// Mean error over the standard deviation, of the bead where it is largest.
     pub bias_over_sigma: f64,
@@ -52,9 +56,8 @@ struct BeadFigures {
 
 impl CalibrationFigures {
     /// Out of the widths of each trial.
-    #[expect(clippy::cast_precision_loss, reason = "counts of trials")]
     pub fn of(
-        rig: &CalibrationCase,
+        case: &CalibrationCase,
         source: CornerSource,
         trials: &[Option<Vec<CalibratedWidth>>],
     ) -> Self {
@@ -62,27 +65,26 @@ impl CalibrationFigures {
         let beads = found.first().map_or(0, |first| first.len());
         let each: Vec<BeadFigures> = (0..beads).map(|bead| of_bead(&found, bead)).collect();
         let all = || found.iter().flat_map(|outcomes| outcomes.iter());
-        let held =
-            all().filter(|o| o.error_mm.abs() <= INTERVAL_SIGMAS * o.sigma_mm).count() as f64;
-        let within_interval = held / all().count().max(1) as f64;
+        let held = all().filter(|o| o.error_mm.abs() <= INTERVAL_SIGMAS * o.sigma_mm).count();
+        let within_interval = fraction(held, all().count());
         let ends = |value: fn(&BeadFigures) -> f64| {
             let values = || each.iter().map(value);
             [values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max)]
         };
         let squares: f64 = each.iter().map(|bead| bead.ratio.powi(2)).sum();
         let mut figures = Self {
-            case: rig.name,
+            case: case.name,
             source: match source {
                 CornerSource::Corners => "corners",
                 CornerSource::Images => "images",
             },
-            views: rig.views,
-            noise_px: (source == CornerSource::Corners).then_some(rig.noise_px),
+            views: case.views,
+            noise_px: (source == CornerSource::Corners).then_some(case.noise_px),
             trials: trials.len(),
             found: found.len(),
             rms_error_fraction: ends(|bead| bead.rms_error_fraction),
             ratio: ends(|bead| bead.ratio),
-            ratio_of_all: (squares / each.len().max(1) as f64).sqrt(),
+            ratio_of_all: (squares / to_f64(each.len().max(1))).sqrt(),
             within_interval,
             bias_over_sigma: ends(|bead| bead.bias_over_sigma.abs())[1],
             missed: Vec::new(),
@@ -92,9 +94,8 @@ impl CalibrationFigures {
     }
 
     /// Few trials leave a figure open by itself: so much is granted.
-    #[expect(clippy::cast_precision_loss, reason = "counts of trials")]
     fn misses(&self) -> Vec<String> {
-        let trials = self.found.max(1) as f64;
+        let trials = to_f64(self.found.max(1));
         let open = MAX_RATIO_DEVIATION.max(ALLOWANCE_SIGMAS / (2.0 * trials).sqrt());
         let open_share = ALLOWANCE_SIGMAS * (0.95 * 0.05 / trials).sqrt();
         let mut missed = Vec::new();
@@ -117,10 +118,9 @@ impl CalibrationFigures {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "counts of trials")]
 fn of_bead(found: &[&Vec<CalibratedWidth>], bead: usize) -> BeadFigures {
     let outcomes = || found.iter().filter_map(|outcomes| outcomes.get(bead));
-    let count = outcomes().count().max(1) as f64;
+    let count = to_f64(outcomes().count().max(1));
     let mean = |value: fn(&CalibratedWidth) -> f64| outcomes().map(value).sum::<f64>() / count;
     BeadFigures {
         rms_error_fraction: mean(|o| (o.error_mm / o.width_mm).powi(2)).sqrt(),
@@ -129,46 +129,23 @@ fn of_bead(found: &[&Vec<CalibratedWidth>], bead: usize) -> BeadFigures {
     }
 }
 
-const COLUMNS: usize = 10;
-const HEADS: [&str; COLUMNS] = [
-    "camera",
-    "from",
-    "views",
-    "noise px",
-    "trials",
-    "RMS error % of width",
-    "RMS error/predicted sigma",
-    "in 95 %",
-    "bias/σ",
-    "limits",
-];
+impl FigureRow for CalibrationFigures {
+    const HEADS: &str = "camera|from|views|noise px|trials|RMS error % of width|\
+                         RMS error/predicted sigma|in 95 %|bias/σ|limits";
 
-fn cells(figures: &CalibrationFigures) -> [String; COLUMNS] {
-    let percent = figures.rms_error_fraction.map(|share| 100.0 * share);
-    [
-        figures.case.to_owned(),
-        figures.source.to_owned(),
-        figures.views.to_string(),
-        figures.noise_px.map_or_else(|| "–".to_owned(), |px| px.to_string()),
-        figures.found.to_string(),
-        format!("{:.4}–{:.4}", percent[0], percent[1]),
-        format!("{:.2}–{:.2}", figures.ratio[0], figures.ratio[1]),
-        format!("{:.1}", 100.0 * figures.within_interval),
-        format!("{:.2}", figures.bias_over_sigma),
-        if figures.missed.is_empty() {
-            "kept".to_owned()
-        } else {
-            format!("MISSED: {}", figures.missed.join("; "))
-        },
-    ]
-}
-
-/// The figures as a table for a terminal.
-pub fn table(figures: &[CalibrationFigures]) -> String {
-    aligned(&HEADS, figures.iter().map(cells))
-}
-
-/// The figures as a table in Markdown.
-pub fn markdown(figures: &[CalibrationFigures]) -> String {
-    marked(&HEADS, figures.iter().map(cells))
+    fn cells(&self) -> Vec<String> {
+        let percent = self.rms_error_fraction.map(|fraction| 100.0 * fraction);
+        vec![
+            self.case.to_owned(),
+            self.source.to_owned(),
+            self.views.to_string(),
+            self.noise_px.map_or_else(|| "–".to_owned(), |px| px.to_string()),
+            self.found.to_string(),
+            format!("{:.4}–{:.4}", percent[0], percent[1]),
+            format!("{:.2}–{:.2}", self.ratio[0], self.ratio[1]),
+            number(100.0 * self.within_interval, 1),
+            number(self.bias_over_sigma, 2),
+            verdict(&self.missed),
+        ]
+    }
 }

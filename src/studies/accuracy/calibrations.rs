@@ -1,15 +1,13 @@
-//! Calibrations with a known truth, over and over: whether widths scatter as much as
-//! each calibration foretells of itself.
+//! Repeated calibrations with a known truth: whether the errors of widths have the standard
+//! deviation that each calibration predicts.
 
 use nalgebra::{Point3, Rotation3, Vector3};
 
 use crate::calibration::board::{Board, BoardError, observe_all};
-use crate::calibration::board_observation;
-use crate::calibration::board_observation::BoardObservation;
+use crate::calibration::board_observation::{self, BoardObservation};
 use crate::calibration::covariance::CalibrationCovariance;
 use crate::calibration::plane::{OnBed, bed_from_board};
-use crate::calibration::solve;
-use crate::calibration::solve::Solution;
+use crate::calibration::solve::{self, Solution};
 use crate::calibration::{Calibration, CalibrationQuality, Camera};
 use crate::core::geometry::{ImagePoint, Pose};
 use crate::core::units::Mm;
@@ -18,47 +16,48 @@ use crate::sim::hash;
 
 /// Tilts of boards that are held before a camera \[degrees\].
 const TILT_DEG: std::ops::RangeInclusive<f64> = 15.0..=45.0;
-/// Tilt of the board on the bed, as the camera looks down \[degrees\].
+/// Tilt of the board on the bed against the camera \[degrees\].
 const BED_TILT_DEG: f64 = 8.0;
-/// Least distance of a corner from the border of the picture \[px\].
+/// Smallest distance of a corner from the image boundary \[px\]: the corner search needs its
+/// surroundings.
 const IMAGE_MARGIN_PX: f64 = 8.0;
+/// Random poses that are tried for one that shows the whole board.
 const MAX_TRIES: u64 = 2000;
-/// Cells along each side of the board on the bed; the middle of a bead is in the middle of
-/// each.
+/// Cells along each side of the board on the bed, a bead in the middle of each.
 const GRID_CELLS: u32 = 5;
-/// Widths of the beads as parts of the board's length: those of the outer cells end where
-/// the corners do.
+/// Width of a bead over the board's length. Derived: 1 / `GRID_CELLS`, so that the outer beads
+/// end at the outer corners.
 const BEAD_WIDTH_FRACTION: f64 = 1.0 / 5.0;
 
 /// A camera that is calibrated with boards.
 #[derive(Debug, Clone)]
 pub struct CalibrationCase {
-    /// What it is called in tables.
+    /// Its name in tables.
     pub name: &'static str,
     /// The true camera.
     pub camera: Camera,
-    /// Size of its pictures \[px\].
+    /// Size of its images \[px\].
     pub image_size_px: [u32; 2],
     /// Distance of the boards \[mm\].
     pub distance_mm: f64,
     /// The board.
     pub board: Board,
-    /// Pictures that are taken.
+    /// Images that are taken.
     pub views: u64,
-    /// Standard deviation of a corner's place in one direction \[px\].
+    /// Standard deviation of a corner's position in one direction \[px\].
     pub noise_px: f64,
-    /// Whether it is tried with rendered pictures, too: one rig a camera is.
+    /// Whether it is also tried with rendered images: one case for each camera is.
     pub rendered: bool,
 }
 
-/// One width that was calibrated for, measured at the true places of its edges.
+/// One width by a calibration, measured at the true positions of its edges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CalibratedWidth {
-    /// Which bead.
+    /// Index of the bead.
     pub bead: usize,
-    /// How far the width is off \[mm\].
+    /// Error of the width \[mm\].
     pub error_mm: f64,
-    /// Its standard deviation as the calibration foretells it \[mm\].
+    /// Standard deviation that the calibration predicts \[mm\].
     pub sigma_mm: f64,
     /// The true width \[mm\].
     pub width_mm: f64,
@@ -67,13 +66,13 @@ pub struct CalibratedWidth {
 /// Where the corners of a trial come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CornerSource {
-    /// The true places with the rig's noise.
+    /// The true positions with the case's noise.
     Corners,
-    /// Pictures that are rendered and searched.
+    /// Images that are rendered and searched.
     Images,
 }
 
-/// A rig, ready for trials.
+/// A case, ready for trials.
 #[derive(Debug, Clone)]
 pub struct CalibrationBench {
     case: CalibrationCase,
@@ -81,8 +80,8 @@ pub struct CalibrationBench {
     seed: u64,
 }
 
-/// The cameras that are tried: a long lens on a cell's usual picture, a short one
-/// with much distortion, and a larger picture; few and many views, little and much
+/// The cameras that are tried: a long lens on a cell's usual image, a short one
+/// with much distortion, and a larger image; few and many views, little and much
 /// noise.
 pub fn cases() -> Result<Vec<CalibrationCase>, BoardError> {
     let camera = |focal: f64, centre: [f64; 2], k: [f64; 4]| {
@@ -92,7 +91,7 @@ pub fn cases() -> Result<Vec<CalibrationCase>, BoardError> {
     let short = camera(533.0, [342.0, 234.0], [-0.28, 0.06, 1e-3, -2e-4]);
     let large = camera(1700.0, [650.0, 498.0], [-0.12, 0.08, -4e-4, 6e-4]);
     let board = |square: f64| Board::new(9, 6, Mm::new(square).unwrap_or(Mm::ZERO));
-    let rig = |name: &'static str, camera, image_size_px, distance_mm, board, views, noise_px| {
+    let case = |name: &'static str, camera, image_size_px, distance_mm, board, views, noise_px| {
         CalibrationCase {
             name,
             camera,
@@ -106,32 +105,32 @@ pub fn cases() -> Result<Vec<CalibrationCase>, BoardError> {
     };
     let (small, medium) = ([640, 480], [720, 540]);
     Ok(vec![
-        rig("long-20", long, medium, 400.0, board(7.0)?, 20, 0.05),
-        rig("long-40", long, medium, 400.0, board(7.0)?, 40, 0.1),
-        rig("short-8", short, small, 300.0, board(18.0)?, 8, 0.1),
-        rig("short-13", short, small, 300.0, board(18.0)?, 13, 0.15),
-        rig("short-40", short, small, 300.0, board(18.0)?, 40, 0.2),
-        rig("large-12", large, [1280, 1024], 600.0, board(25.0)?, 12, 0.05),
-        rig("large-25", large, [1280, 1024], 600.0, board(25.0)?, 25, 0.2),
+        case("long-20", long, medium, 400.0, board(7.0)?, 20, 0.05),
+        case("long-40", long, medium, 400.0, board(7.0)?, 40, 0.1),
+        case("short-8", short, small, 300.0, board(18.0)?, 8, 0.1),
+        case("short-13", short, small, 300.0, board(18.0)?, 13, 0.15),
+        case("short-40", short, small, 300.0, board(18.0)?, 40, 0.2),
+        case("large-12", large, [1280, 1024], 600.0, board(25.0)?, 12, 0.05),
+        case("large-25", large, [1280, 1024], 600.0, board(25.0)?, 25, 0.2),
     ])
 }
 
 impl CalibrationBench {
     /// For trials with corners from one source.
-    pub fn new(rig: CalibrationCase, source: CornerSource) -> Self {
-        let seed = hash::mix(&rig.name.bytes().map(u64::from).collect::<Vec<_>>());
+    pub fn new(case: CalibrationCase, source: CornerSource) -> Self {
+        let seed = hash::mix(&case.name.bytes().map(u64::from).collect::<Vec<_>>());
         let studio = (source == CornerSource::Images)
-            .then(|| BoardStudio::new(&rig.camera, rig.image_size_px));
-        Self { case: rig, studio, seed }
+            .then(|| BoardStudio::new(&case.camera, case.image_size_px));
+        Self { case, studio, seed }
     }
 
-    /// The rig.
+    /// The case.
     pub fn case(&self) -> &CalibrationCase {
         &self.case
     }
 
     /// Calibrates once, with boards held at random, and measures beads that lie where
-    /// the last board did, on the bed and 5 % of the distance above it. A picture in which
+    /// the last board did, on the bed and 5 % of the distance above it. An image in which
     /// no board is found is left out, as a user's would be. `None` where that is the one of
     /// the bed, or where no calibration was found.
     pub fn calibrate(&self, trial: u64) -> Option<Vec<CalibratedWidth>> {
@@ -192,20 +191,20 @@ impl CalibrationBench {
     }
 
     fn sighting(&self, pose: &Pose, seed: u64) -> Option<BoardObservation> {
-        let rig = &self.case;
+        let case = &self.case;
         if let Some(studio) = &self.studio {
-            let frame = studio.take(&rig.board, pose, Exposure::SHARP, seed).ok()?;
-            return board_observation::observe(&rig.board, "", &frame).ok();
+            let frame = studio.take(&case.board, pose, Exposure::SHARP, seed).ok()?;
+            return board_observation::observe(&case.board, "", &frame).ok();
         }
-        let corners = rig.board.corners_mm().into_iter().zip(0..).map(|(corner, i)| {
+        let corners = case.board.corners_mm().into_iter().zip(0..).map(|(corner, i)| {
             let [x, y] = hash::normal_pair(hash::mix(&[seed, i]));
-            let at = rig.camera.project(pose.apply(corner))?;
-            Some(ImagePoint::new(at.x + rig.noise_px * x, at.y + rig.noise_px * y))
+            let at = case.camera.project(pose.apply(corner))?;
+            Some(ImagePoint::new(at.x + case.noise_px * x, at.y + case.noise_px * y))
         });
         let corners: Vec<ImagePoint> = corners.collect::<Option<_>>()?;
         Some(BoardObservation {
             name: String::new(),
-            image_size_px: rig.image_size_px,
+            image_size_px: case.image_size_px,
             corners: observe_all(&corners),
             focus: None,
         })
@@ -214,16 +213,16 @@ impl CalibrationBench {
     /// Where the true camera sees the ends of a bead on the true bed \[px\], and how
     /// wide it is \[mm\].
     fn bead(&self, on_bed: &Pose, cell: [f64; 2], height: Mm) -> Option<([ImagePoint; 2], f64)> {
-        let rig = &self.case;
+        let case = &self.case;
         let calibration = Calibration::Full {
-            image_size_px: rig.image_size_px,
-            camera: rig.camera,
+            image_size_px: case.image_size_px,
+            camera: case.camera,
             bed: bed_from_board(on_bed, Mm::ZERO),
             robot_z: Mm::ZERO,
             quality: None,
         };
         let map = calibration.surface(height, None);
-        let sides = rig.board.corners_mm().last()?.coords;
+        let sides = case.board.corners_mm().last()?.coords;
         // Y of the bed is the board's turned over.
         let middle = [cell[0] * sides.x, -cell[1] * sides.y];
         let half = 0.5 * BEAD_WIDTH_FRACTION * sides.x;
@@ -241,10 +240,10 @@ fn cells() -> impl Iterator<Item = [f64; 2]> {
     (0..GRID_CELLS * GRID_CELLS).map(move |i| [part(i % GRID_CELLS), part(i / GRID_CELLS)])
 }
 
-/// A pose at random, with the board's middle somewhere in the picture.
-fn random_pose(rig: &CalibrationCase, key: u64, on_bed: bool) -> Pose {
+/// A pose at random, with the board's middle somewhere in the image.
+fn random_pose(case: &CalibrationCase, key: u64, on_bed: bool) -> Pose {
     let part = |what: u64| hash::unit(hash::mix(&[key, what]));
-    let [width, height] = rig.image_size_px.map(f64::from);
+    let [width, height] = case.image_size_px.map(f64::from);
     let (tilt_deg, at) = if on_bed {
         (BED_TILT_DEG, (0.5, 0.5))
     } else {
@@ -255,19 +254,19 @@ fn random_pose(rig: &CalibrationCase, key: u64, on_bed: bool) -> Pose {
     let axis = Vector3::new(towards.cos(), towards.sin(), 0.0);
     let turn = Rotation3::new(Vector3::z() * (0.4 * (part(4) - 0.5)));
     let rotation = Rotation3::new(axis * tilt_deg.to_radians()) * turn;
-    let distance = rig.distance_mm * if on_bed { 1.0 } else { 0.85 + 0.3 * part(5) };
+    let distance = case.distance_mm * if on_bed { 1.0 } else { 0.85 + 0.3 * part(5) };
     let px = ImagePoint::new(at.0 * width, at.1 * height);
-    let ray = rig.camera.ray(px).unwrap_or_default();
-    let middle = rig.board.corners_mm().last().map_or_else(Vector3::zeros, |far| far.coords / 2.0);
+    let ray = case.camera.ray(px).unwrap_or_default();
+    let middle = case.board.corners_mm().last().map_or_else(Vector3::zeros, |far| far.coords / 2.0);
     let place = Vector3::new(ray.x, ray.y, 1.0) * distance - rotation * middle;
     Pose::from_parts(rotation, place)
 }
 
-/// Whether the whole board is in the picture, with its outer squares.
-fn is_in_image(rig: &CalibrationCase, pose: &Pose) -> bool {
-    let [right, bottom] = rig.image_size_px.map(|px| f64::from(px) - 1.0);
-    let side = rig.board.square().get();
-    let far = rig.board.corners_mm().last().map_or_else(Vector3::zeros, |far| far.coords);
+/// Whether the whole board is in the image, with its outer squares.
+fn is_in_image(case: &CalibrationCase, pose: &Pose) -> bool {
+    let [right, bottom] = case.image_size_px.map(|px| f64::from(px) - 1.0);
+    let side = case.board.square().get();
+    let far = case.board.corners_mm().last().map_or_else(Vector3::zeros, |far| far.coords);
     let ends = [-1.2 * side, 1.2 * side];
     let outer = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].map(|(x, y)| {
         let beyond = |at: f64, side: f64| if at > 0.5 { side + ends[1] } else { ends[0] };
@@ -277,5 +276,5 @@ fn is_in_image(rig: &CalibrationCase, pose: &Pose) -> bool {
         (IMAGE_MARGIN_PX..=right - IMAGE_MARGIN_PX).contains(&px.x)
             && (IMAGE_MARGIN_PX..=bottom - IMAGE_MARGIN_PX).contains(&px.y)
     };
-    outer.iter().all(|&corner| rig.camera.project(pose.apply(corner)).is_some_and(inside))
+    outer.iter().all(|&corner| case.camera.project(pose.apply(corner)).is_some_and(inside))
 }

@@ -8,7 +8,7 @@
 //! draw     numbers of a frame, with a record of them
 //! scene    what a frame shows
 //! profile  edges that are random lines
-//! outline  where the borders lie on each line, and the area of the bead
+//! outline  where the boundaries lie on each line, and the area of the bead
 //! paint    light on the sensor: blur, motion, texture
 //! long_bead  a bead that passes through the gauge frame by frame
 //! camera   from light to grey levels: vignetting, gamma, noise, JPEG
@@ -27,8 +27,7 @@ mod scene;
 use crate::core::frame::{Frame, Pixels, WrongSize};
 use crate::core::geometry::{Roi, Size};
 use crate::core::time::Stamp;
-use crate::core::units::Mm;
-use crate::core::units::WidthRange;
+use crate::core::units::{Mm, WidthRange};
 use crate::vision::{BeadAxis, Gauge, Polarity};
 use draw::Draw;
 use scene::DrawnScene;
@@ -37,15 +36,15 @@ pub use draw::DrawnParameter;
 pub use list::{DrawnSet, Requirements, all, named};
 pub use long_bead::LongBead;
 
-/// Narrowest and widest bead that a gauge believes, in the bead's nominal widths.
+/// Smallest and largest width that the gauge accepts, over the bead's nominal width.
 const RANGE: (f64, f64) = (0.6, 1.3);
 
-/// A frame and what is true of it. A pixel is a millimetre.
+/// A frame and its truth. A pixel is a millimetre.
 #[derive(Debug, Clone)]
 pub struct DrawnFrame {
-    /// The picture.
+    /// The image.
     pub frame: Frame,
-    /// The gauge that measures it: the whole picture.
+    /// The gauge that measures it: the whole image.
     pub gauge: Gauge,
     /// Area of the unblurred bead over the gauge's length \[px\]. What is torn open to
     /// the outside is no bead, a hole within it is.
@@ -61,12 +60,8 @@ impl DrawnSet {
         let scene = (self.scene)(&mut draw);
         let painted = paint::paint(&scene, &mut draw);
         let pixels = camera::expose(&painted.light, &scene, &mut draw);
-        let frame = Frame::new(
-            number,
-            Stamp::START,
-            Size::new(scene.size.0, scene.size.1),
-            Pixels::Grey8(pixels),
-        )?;
+        let size = Size::new(scene.size.0, scene.size.1);
+        let frame = Frame::new(number, Stamp::START, size, Pixels::Grey8(pixels))?;
         let gauge = gauge(&scene, self.knows_gamma);
         Ok(DrawnFrame { frame, gauge, truth_px: painted.truth_px, parameters: draw.record() })
     }

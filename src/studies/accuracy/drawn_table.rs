@@ -8,7 +8,7 @@ mod tables;
 
 pub use figures::{Deviation, DrawnFigures, DrawnOutcome, FrameRejection, SetPart};
 pub use parts::figures;
-pub use tables::{markdown, table};
+pub use tables::markdown;
 
 #[cfg(test)]
 mod tests;

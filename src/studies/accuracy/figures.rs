@@ -1,5 +1,6 @@
 //! Figures of one set, and those that miss their limit.
 
+use crate::numeric::number::to_f64;
 use std::fmt;
 
 use serde::Serialize;
@@ -9,7 +10,7 @@ use serde::Serialize;
 pub struct WidthError {
     /// Measured less true width.
     pub error_mm: f64,
-    /// As the measurement believes it.
+    /// Standard deviation by the measurement.
     pub sigma_mm: f64,
 }
 
@@ -38,13 +39,13 @@ pub struct SetFigures {
     pub bias_mm: Option<f64>,
     /// Root of the mean square of the error \[mm\].
     pub rmse_mm: Option<f64>,
-    /// Share of the frames that gave a width.
+    /// Fraction of the frames that gave a width.
     pub measured_fraction: f64,
-    /// Share of the frames that gave a width more than half a pixel off.
+    /// Fraction of the frames that gave a width more than half a pixel off.
     pub silent_fraction: f64,
     /// Root of the mean square of the error over its standard deviation.
     pub rms_over_sigma: Option<f64>,
-    /// Share of the widths whose 95 % interval holds the true one.
+    /// Fraction of the widths whose 95 % interval holds the true one.
     pub within_interval: Option<f64>,
     /// Whether the set's limits are kept; none where it has none.
     pub kept: Option<bool>,
@@ -85,9 +86,8 @@ fn short(value: f64) -> f64 {
     (value * scale).round() / scale
 }
 
-#[expect(clippy::cast_precision_loss, reason = "no set has 2^53 frames")]
 pub(super) fn fraction(part: usize, of: usize) -> f64 {
-    part as f64 / of.max(1) as f64
+    to_f64(part) / to_f64(of.max(1))
 }
 
 #[cfg(test)]

@@ -5,11 +5,12 @@ use std::ops::Range;
 use serde::Serialize;
 
 use super::fraction;
-use super::table::{aligned, marked};
+use super::table::{FigureRow, number, verdict};
 use crate::numeric::statistics::Moments;
 
-/// Largest median error of roughness and of its correlation length, relative.
+/// Largest relative median error of the roughness.
 const MAX_ROUGHNESS_ERROR: f64 = 0.20;
+/// Largest relative median error of the correlation length.
 const MAX_LENGTH_ERROR: f64 = 0.30;
 /// Smallest and largest root of the mean square of a width's error against the bead's own
 /// mean, over sigma with roughness.
@@ -66,7 +67,7 @@ pub struct RoughnessFigures {
     pub part: &'static str,
     /// Their number.
     pub beads: usize,
-    /// Share whose roughness was determined.
+    /// Fraction whose roughness was determined.
     pub determined_fraction: f64,
     /// Median of found over true roughness.
     pub roughness_median: Option<f64>,
@@ -177,59 +178,31 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     values.get(values.len() / 2).copied()
 }
 
-const COLUMNS: usize = 14;
-const HEADS: [&str; COLUMNS] = [
-    "part",
-    "moves on px",
-    "beads",
-    "determined %",
-    "roughness found/true",
-    "median error %",
-    "z",
-    "length found/true",
-    "median error %",
-    "z",
-    "frames",
-    "z of widths",
-    "without roughness",
-    "limits",
-];
+impl FigureRow for RoughnessFigures {
+    const HEADS: &str = "part|moves on px|beads|determined %|roughness found/true|median error %|z|\
+                         length found/true|median error %|z|frames|z of widths|without roughness|\
+                         limits";
 
-fn cells(figures: &RoughnessFigures) -> [String; COLUMNS] {
-    let number = |value: Option<f64>, digits: usize| {
-        value.map_or("–".to_owned(), |value| format!("{value:.digits$}"))
-    };
-    let percent = |value: Option<f64>| number(value.map(|value| 100.0 * value), 1);
-    [
-        figures.part.to_owned(),
-        figures.advance_px.to_string(),
-        figures.beads.to_string(),
-        percent(Some(figures.determined_fraction)),
-        number(figures.roughness_median, 2),
-        percent(figures.roughness_error),
-        number(figures.roughness_z, 2),
-        number(figures.length_median, 2),
-        percent(figures.length_error),
-        number(figures.length_z, 2),
-        figures.frames.to_string(),
-        number(figures.width_z, 2),
-        number(figures.width_z_alone, 1),
-        match figures.missed.as_slice() {
-            [] if figures.part == "all" => "kept".to_owned(),
-            [] => "–".to_owned(),
-            missed => format!("MISSED: {}", missed.join("; ")),
-        },
-    ]
-}
-
-/// The figures as a table for a terminal.
-pub fn table(figures: &[RoughnessFigures]) -> String {
-    aligned(&HEADS, figures.iter().map(cells))
-}
-
-/// The figures as a table in Markdown.
-pub fn markdown(figures: &[RoughnessFigures]) -> String {
-    marked(&HEADS, figures.iter().map(cells))
+    fn cells(&self) -> Vec<String> {
+        let percent = |value: Option<f64>| number(value.map(|value| 100.0 * value), 1);
+        let judged = self.part == "all" || !self.missed.is_empty();
+        vec![
+            self.part.to_owned(),
+            self.advance_px.to_string(),
+            self.beads.to_string(),
+            percent(Some(self.determined_fraction)),
+            number(self.roughness_median, 2),
+            percent(self.roughness_error),
+            number(self.roughness_z, 2),
+            number(self.length_median, 2),
+            percent(self.length_error),
+            number(self.length_z, 2),
+            self.frames.to_string(),
+            number(self.width_z, 2),
+            number(self.width_z_alone, 1),
+            if judged { verdict(&self.missed) } else { "–".to_owned() },
+        ]
+    }
 }
 
 #[cfg(test)]

@@ -1,12 +1,10 @@
-//! Named sets of pictures whose truth is known: what the measurement is judged
-//! by.
+//! Named sets of images with a known truth, on which the measurement is evaluated.
 
 mod limits;
 mod list;
 
 use crate::core::geometry::Roi;
-use crate::core::units::Mm;
-use crate::core::units::WidthRange;
+use crate::core::units::{Mm, WidthRange};
 use crate::scenario::bead::EdgeRoughness;
 use crate::scenario::image::ImageModel;
 use crate::vision::{BeadAxis, Gauge, Polarity};
@@ -16,29 +14,29 @@ pub use list::all;
 
 /// Scale of all sets without a camera model, that of the 2022 paper.
 pub const MM_PER_PX: f64 = 0.126_582;
-/// The gauge's extent across the bead, and that of the picture \[px\].
+/// The gauge's extent across the bead, and that of the image \[px\].
 const ACROSS_PX: (usize, u32) = (640, 720);
 
-/// Pictures of one kind.
+/// Images of one kind.
 #[derive(Debug, Clone)]
 pub struct Set {
-    /// What it is called.
+    /// Its name.
     pub name: &'static str,
-    /// How the bead is pictured; the size is that of the set.
-    pub picture: ImageModel,
+    /// Image of the bead; its size is that of the set.
+    pub image: ImageModel,
     /// Rows of the gauge; of a horizontal bead columns.
     pub rows: u32,
     /// Width of the bead in the mean \[mm\].
     pub width_mm: f64,
     /// Roughness of its edges.
     pub roughness: EdgeRoughness,
-    /// How it runs in the picture.
+    /// How it runs in the image.
     pub axis: BeadAxis,
     /// The bead against its surroundings.
     pub polarity: Polarity,
     /// Seen by a tilted camera through a lens with distortion.
     pub tilted: bool,
-    /// What the measurement must reach.
+    /// Limits of the figures.
     pub limits: SetLimits,
 }
 
@@ -47,10 +45,10 @@ impl Set {
     /// \[px\] where its direction is known.
     ///
     /// A line across a step of the height A that is blurred with s, in white
-    /// noise σ, tells the step's place with a variance of at least
+    /// noise σ, gives the step's position with a variance of at least
     /// 2√π·(σ/A)²·s (Cramér–Rao), whether or not blur and height of the step are
-    /// known, whose effects are odd about its place. (A level that both sides
-    /// share is even like the place and costs a little more, the less the
+    /// known, whose effects are odd about its position. (A level that both sides
+    /// share is even like the position and costs a little more, the less the
     /// more pixels there are beside the edge.) Along a row that cuts
     /// the edge at the slant t the blur is s/cos t, and what is found along the
     /// row is cos t as long normal to the edge. From N rows and two edges:
@@ -59,7 +57,7 @@ impl Set {
     /// var = 2·cos² t·e²/N,   e² = 2√π·(σ/A)²·s/cos t
     /// ```
     pub fn bound_px(&self) -> f64 {
-        let cos = libm::cos(self.picture.slant_deg.to_radians());
+        let cos = libm::cos(self.image.slant_deg.to_radians());
         (2.0 * cos * cos * self.row_variance() / f64::from(self.rows)).sqrt()
     }
 
@@ -78,20 +76,19 @@ impl Set {
     /// That is 1 + 3·(w·sin t/N)² times the variance with a known direction, and
     /// the same for a bead along the gauge.
     pub fn free_bound_px(&self) -> f64 {
-        let (sin, cos) = libm::sincos(self.picture.slant_deg.to_radians());
+        let (sin, cos) = libm::sincos(self.image.slant_deg.to_radians());
         let rows = f64::from(self.rows);
         let lever = self.width_mm / MM_PER_PX * sin / cos;
         let direction = cos.powi(4) * 6.0 * self.row_variance() / rows.powi(3);
         (self.bound_px().powi(2) + lever * lever * direction).sqrt()
     }
 
-    /// Smallest variance of an edge's place along a row e² \[px²\].
+    /// Smallest variance of an edge's position along a row e² \[px²\].
     fn row_variance(&self) -> f64 {
-        let ImageModel { bead_grey, ground_grey, noise_grey, blur_px, slant_deg, .. } =
-            self.picture;
-        let share = noise_grey / (bead_grey - ground_grey);
+        let ImageModel { bead_grey, ground_grey, noise_grey, blur_px, slant_deg, .. } = self.image;
+        let fraction = noise_grey / (bead_grey - ground_grey);
         let along_row = blur_px / libm::cos(slant_deg.to_radians());
-        2.0 * std::f64::consts::PI.sqrt() * share * share * along_row
+        2.0 * std::f64::consts::PI.sqrt() * fraction * fraction * along_row
     }
 
     /// Whether silently wrong widths are limited, for which many frames are
@@ -100,7 +97,7 @@ impl Set {
         self.limits.silent_fraction.is_some()
     }
 
-    /// Size of the pictures \[px\], where no camera model sets it.
+    /// Size of the images \[px\], where no camera model sets it.
     pub fn size_px(&self) -> [u32; 2] {
         match self.axis {
             BeadAxis::Vertical => [ACROSS_PX.1, self.rows + 20],
@@ -150,7 +147,7 @@ mod tests {
         }
     }
 
-    /// Against the information matrix of both edges' places and the common
+    /// Against the information matrix of both edges' positions and the common
     /// slope, row by row.
     #[test]
     fn the_bound_for_an_unknown_direction_is_that_of_a_straight_fit() {

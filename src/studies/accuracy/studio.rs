@@ -1,4 +1,4 @@
-//! Takes the pictures of a set.
+//! Takes the images of a set.
 
 use std::cell::RefCell;
 
@@ -17,10 +17,11 @@ use crate::sim::view::gauge_middle;
 use crate::sim::waviness::Waviness;
 use crate::vision::Gauge;
 
-/// Widths and places are uniform within this distance of the middle ones \[px\].
+/// Largest deviation of width and position from their nominal values \[px\]. Derived: it covers
+/// every position within a pixel, either way.
 const JITTER_PX: f64 = 1.0;
 
-/// Makes the pictures of a set.
+/// Makes the images of a set.
 #[derive(Debug, Clone)]
 pub struct SetStudio {
     renderer: Renderer,
@@ -34,7 +35,7 @@ pub struct SetStudio {
 }
 
 impl SetStudio {
-    /// For the pictures of a set.
+    /// For the images of a set.
     pub fn new(set: &Set) -> Result<Self, RenderError> {
         let calibration = if set.tilted {
             tilted()
@@ -45,19 +46,19 @@ impl SetStudio {
         let gauge = set.gauge();
         let surface = calibration.surface(height, None);
         let seed = hash::mix(&set.name.bytes().map(u64::from).collect::<Vec<_>>());
-        let picture = ImageModel { size_px: set.size_px(), ..set.picture };
+        let image = ImageModel { size_px: set.size_px(), ..set.image };
         let mm_per_px =
             surface.mm_per_px(gauge_middle(&gauge.roi)).map_or(MM_PER_PX, |mm| mm.column(0).norm());
-        let renderer = Renderer::new(calibration, height, gauge, picture, seed)?;
+        let renderer = Renderer::new(calibration, height, gauge, image, seed)?;
         let (width_mm, roughness) = (set.width_mm, set.roughness);
         Ok(Self { renderer, surface, gauge, width_mm, roughness, seed, mm_per_px })
     }
 
-    /// A picture of a bead whose width and place differ from frame to frame.
+    /// An image of a bead whose width and position differ from frame to frame.
     pub fn take(&self, frame: u64) -> Result<Rendered, RenderError> {
         let sway = |what: u64| {
-            let share = hash::unit(hash::mix(&[self.seed, frame, what]));
-            (2.0 * share - 1.0) * JITTER_PX * self.mm_per_px
+            let fraction = hash::unit(hash::mix(&[self.seed, frame, what]));
+            (2.0 * fraction - 1.0) * JITTER_PX * self.mm_per_px
         };
         let half = 0.5 * (self.width_mm + sway(1));
         let aside = sway(2);

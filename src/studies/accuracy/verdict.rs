@@ -1,4 +1,4 @@
-//! Figures held against the limits of their set.
+//! Figures compared with the limits of their set.
 
 use super::figures::{Miss, SetFigures};
 use super::sets::SetLimits;

@@ -1,5 +1,5 @@
-//! Who lays the layers: the paper's loop, and the law by distance with the
-//! paper's camera and link or with faster ones.
+//! The controllers under comparison: the paper's loop, and the controller by distance with
+//! the paper's camera and link or with faster ones.
 
 use std::sync::Arc;
 
@@ -9,41 +9,42 @@ use crate::core::units::Mm;
 use crate::width_control::strategy::distance::DistanceStrategy;
 use crate::width_control::target::WidthTarget;
 
-/// Length of the gauge \[mm\].
+/// Length of the gauge. Derived: 100 px at 0.127 mm/px, the scale of Shojaei Barjuei et al.
+/// 2022.
 const GAUGE: Mm = Mm::constant(12.7);
-/// Time from a picture to its width's arrival by distance; the paper's loop is
-/// spared it.
+/// Latency of a width by distance, from capture to arrival; the paper's loop has none.
 const LATENCY: Span = Span::from_millis(20);
-/// Grid of the world's clocks by distance, so that phases of 50 Hz and 20 Hz
-/// are random.
+/// Time step of the simulation by distance. Derived: a quarter of the 20 ms of 50 Hz, so
+/// that the phases of camera and link are random within a period.
 const STEP: Span = Span::from_millis(5);
-/// What the law is told of the bead, whatever its width: b = 0.25.
+/// Exponent b that the controller is given for all widths: papers.md, "with b = 0.25 for all".
 const ASSUMED_EXPONENT: f64 = 0.25;
-/// How far the flow is said to wander along a metre, as a share.
+/// Random walk of the flow that the controller assumes, as a fraction over a metre: a larger
+/// one follows a drift sooner, and noise as well.
 const DRIFT: f64 = 0.0055;
 
 /// Rates of camera and robot link \[Hz\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopRates {
-    /// Frames a second.
+    /// Frames per second.
     pub vision_hz: f64,
-    /// Setpoints a second.
+    /// Setpoints per second.
     pub link_hz: f64,
 }
 
 impl LoopRates {
-    /// Those of the paper.
+    /// The paper's.
     pub const PAPER: Self = Self { vision_hz: 10.0, link_hz: 5.0 };
-    /// Those of a camera and a link of today.
+    /// Those of a present camera and link.
     pub const FAST: Self = Self { vision_hz: 50.0, link_hz: 20.0 };
 }
 
-/// Who sets the speed.
+/// A controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ControlSetup {
-    /// The paper's PI law at its rates.
+    /// The paper's PI controller at its rates.
     Paper,
-    /// The law by distance, told an exponent.
+    /// By distance, with an assumed exponent b.
     Distance(LoopRates, f64),
 }
 
@@ -53,7 +54,7 @@ impl ControlSetup {
         Self::Distance(rates, ASSUMED_EXPONENT)
     }
 
-    /// The paper's cell with a gauge of 12.7 mm and this one at its controls.
+    /// The paper's cell with a gauge of 12.7 mm, this controller and a target width.
     pub fn enter(self, cell: &Cell, run: &RunPart, target_mm: f64) -> (Cell, RunPart) {
         let (mut cell, mut run) = (cell.clone(), run.clone());
         cell.simulation.gauge_length = GAUGE;
@@ -61,15 +62,11 @@ impl ControlSetup {
             run.control.target = WidthTarget::constant(width);
         }
         if let Self::Distance(rates, exponent) = self {
-            cell.simulation.latency = LATENCY;
-            cell.simulation.step = STEP;
-            run.camera.rate_hz = rates.vision_hz;
-            run.robot.rate_hz = rates.link_hz;
-            run.control.strategy = Arc::new(DistanceStrategy {
-                exponent,
-                learns_exponent: true,
-                drift_per_root_m: DRIFT,
-            });
+            (cell.simulation.latency, cell.simulation.step) = (LATENCY, STEP);
+            (run.camera.rate_hz, run.robot.rate_hz) = (rates.vision_hz, rates.link_hz);
+            let (learns_exponent, drift_per_root_m) = (true, DRIFT);
+            run.control.strategy =
+                Arc::new(DistanceStrategy { exponent, learns_exponent, drift_per_root_m });
         }
         (cell, run)
     }

@@ -1,4 +1,4 @@
-//! Disturbances of the flow, and a controller that was told wrong.
+//! Disturbances of the flow, and a controller with a model mismatch.
 
 use rayon::prelude::*;
 
@@ -10,43 +10,44 @@ use crate::numeric::rank::mean_median;
 use crate::sim::cell::SimCellError;
 use crate::trials::layer::LayerTrial;
 
-/// Width of the disturbed layers \[mm\].
+/// Width of the disturbed layers \[mm\]: the nozzle's, Shojaei Barjuei et al. 2022, section 3.2.
 const TARGET_MM: f64 = 42.0;
-/// Camera to nozzle where a disturbance is to be answered.
+/// Distance from camera to nozzle for disturbances along the path: nearer than the paper's
+/// 88.4 mm, for it bounds the wavelengths that feedback can attenuate.
 const NEAR_OFFSET: Mm = Mm::constant(60.0);
-/// Amplitude of waves and pulsations, as a share of the flow.
+/// Amplitude of waves and pulsations, as a fraction of the flow.
 const AMPLITUDE: f64 = 0.03;
-/// Speed to reckon with \[mm/s\].
+/// Speed from which lengths of path are derived \[mm/s\]: that of a width of 42 mm, Shojaei
+/// Barjuei et al. 2022, table 2, rounded.
 const SPEED_MM_PER_S: f64 = 80.0;
-/// Where control begins, and some way to settle \[mm\].
+/// Path before errors count \[mm\]. Derived: 200 mm to where control begins (Shojaei Barjuei
+/// et al. 2022) and 20 mm for the first setpoints.
 const CONTROL_START_MM: f64 = 220.0;
 
-/// A disturbance of the flow that goes on.
+/// A periodic disturbance of the flow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FlowDisturbance {
-    /// A sine along the path, of this wavelength \[mm\].
+    /// A sine along the path of this wavelength \[mm\].
     Wave(f64),
-    /// A pulsation of pump or screw, of this period \[s\].
+    /// A pulsation of the pump of this period \[s\].
     Pulsation(f64),
 }
 
 impl FlowDisturbance {
-    /// A cell with this disturbance, long enough to judge it, and where to
-    /// begin with that \[mm\].
+    /// Applies it to a cell, with a path that is long enough. Returns the path from which
+    /// the error counts \[mm\].
     fn enter(self, cell: &mut Cell, run: &mut RunPart) -> f64 {
         let flow = &mut cell.simulation.flow;
         let (from, length) = match self {
             Self::Wave(wavelength_mm) => {
-                flow.wave_amplitude = AMPLITUDE;
-                flow.wavelength_mm = wavelength_mm;
+                (flow.wave_amplitude, flow.wavelength_mm) = (AMPLITUDE, wavelength_mm);
                 cell.simulation.random_phase = false;
                 look_near(run);
                 let from = (CONTROL_START_MM + 2.0 * wavelength_mm).max(700.0);
                 (from, (12.0 * wavelength_mm).max(3000.0) + CONTROL_START_MM)
             }
             Self::Pulsation(period_s) => {
-                flow.pulse_amplitude = AMPLITUDE;
-                flow.pulse_period_s = period_s;
+                (flow.pulse_amplitude, flow.pulse_period_s) = (AMPLITUDE, period_s);
                 let seen_s = 5.0 * period_s + 1.0;
                 (CONTROL_START_MM + SPEED_MM_PER_S * seen_s, SPEED_MM_PER_S * (seen_s + 20.0))
             }
@@ -56,15 +57,14 @@ impl FlowDisturbance {
     }
 }
 
-/// Puts the camera near the nozzle.
+/// Moves the camera near the nozzle; the relative uncertainty of its distance stays.
 fn look_near(run: &mut RunPart) {
-    let share = run.camera.offset_sigma / run.camera.offset;
+    let relative_sigma = run.camera.offset_sigma / run.camera.offset;
     run.camera.offset = NEAR_OFFSET;
-    run.camera.offset_sigma = NEAR_OFFSET * share;
+    run.camera.offset_sigma = NEAR_OFFSET * relative_sigma;
 }
 
-/// Root mean square error of the bead over that of one which nobody corrects,
-/// as the mean over seeds.
+/// Root mean square error of the bead over that of an uncontrolled bead, mean over seeds.
 pub fn error_ratio(
     cell: &Cell,
     run: &RunPart,
@@ -75,14 +75,13 @@ pub fn error_ratio(
     let (mut cell, mut run) = who.enter(cell, run, TARGET_MM);
     let from = what.enter(&mut cell, &mut run);
     let open = TARGET_MM * AMPLITUDE / std::f64::consts::SQRT_2;
-    let found = each(seeds, |seed| {
-        Ok(LayerTrial::lay(&cell, &run, &scale(), seed)?.rms_error(from) / open)
-    })?;
-    Ok(mean(found.into_iter()))
+    let lay = |seed| LayerTrial::lay(&cell, &run, &scale(), seed);
+    let ratios = each(seeds, |seed| Ok(lay(seed)?.rms_error(from) / open))?;
+    Ok(mean(ratios.into_iter()))
 }
 
-/// Way after a step of the flow by 8 % within which the bead is back within
-/// 0.5 mm for good \[mm\], as the median over seeds; infinite where it never is.
+/// Path after a flow step of 8 % until the bead stays within 0.5 mm of its target \[mm\],
+/// median over seeds; infinite where it never does.
 pub fn step_settles(
     cell: &Cell,
     run: &RunPart,
@@ -96,26 +95,25 @@ pub fn step_settles(
         let mut cell = cell.clone();
         #[expect(clippy::cast_precision_loss, reason = "a small number")]
         let at = 1000.0 + (3 * seed) as f64;
-        cell.simulation.flow.step_at_mm = at;
-        cell.simulation.flow.step_ratio = 1.08;
+        (cell.simulation.flow.step_at_mm, cell.simulation.flow.step_ratio) = (at, 1.08);
         Ok(LayerTrial::lay(&cell, &run, &scale(), seed)?.settles_within(at, 0.5))
     })?;
     Ok(mean_median(&mut found).unwrap_or(f64::NAN))
 }
 
-/// What the controller is told wrong, and what its camera does.
+/// A model mismatch of the controller, and faults of its camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mismatch {
-    /// Camera's distance as it is told, over the true one.
+    /// Camera's distance as the controller assumes it, over the true one.
     pub offset: f64,
-    /// Share of widths that are outliers.
+    /// Fraction of widths that are outliers.
     pub outliers: f64,
-    /// Share of frames without a width.
+    /// Fraction of frames without a width.
     pub missing: f64,
 }
 
 impl Mismatch {
-    /// Nothing is wrong.
+    /// No mismatch and no fault.
     pub const NONE: Self = Self { offset: 1.0, outliers: 0.0, missing: 0.0 };
 }
 
@@ -139,16 +137,15 @@ pub fn mismatched(
     let (mut cell, run) = who.enter(cell, run, TARGET_MM);
     cell.simulation.outlier_fraction = what.outliers;
     cell.simulation.missing_fraction = what.missing;
-    let offset_factor = what.offset;
     let mut found = each(seeds, |seed| {
-        let trial = LayerTrial::lay_mismatched(&cell, &run, &scale(), offset_factor, seed)?;
+        let trial = LayerTrial::lay_mismatched(&cell, &run, &scale(), what.offset, seed)?;
         Ok(trial.rms_error(trial.control_start_mm + 500.0))
     })?;
     let mean_mm = mean(found.iter().copied());
     Ok(BeadErrors { median_mm: mean_median(&mut found).unwrap_or(f64::NAN), mean_mm })
 }
 
-/// A number of every seed, in parallel.
+/// A value for each seed, computed in parallel.
 pub(super) fn each<T: Send>(
     seeds: u64,
     of: impl Fn(u64) -> Result<T, SimCellError> + Send + Sync,

@@ -12,59 +12,58 @@ use crate::trials::layer::LayerTrial;
 use crate::trials::score::LayerScore;
 use crate::vision::MeasureMethod;
 
-/// What a layer came to, as the median over seeds.
+/// Medians over the seeds of a layer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerResult {
-    /// Mean size of the error over the bead that was seen \[mm\].
+    /// Mean magnitude of the measured error, over all bead that was seen \[mm\].
     pub mean_error_mm: f64,
     /// Its root mean square \[mm\].
     pub rms_error_mm: f64,
-    /// Mean speed with the start \[mm/s\].
+    /// Mean speed, start included \[mm/s\].
     pub mean_speed_mm_per_s: f64,
-    /// Mean size of the error of the bead itself, from 30 mm after control
-    /// began \[mm\].
+    /// Mean magnitude of the error of the bead itself, from 30 mm after control began
+    /// \[mm\].
     pub bead_mean_error_mm: f64,
     /// Its root mean square \[mm\].
     pub bead_rms_error_mm: f64,
-    /// Integral of the size of its error from where control began \[mm²\].
+    /// Integral of its magnitude from where control began \[mm²\].
     pub error_integral_mm2: f64,
-    /// Scatter of the bead itself from 700 mm after control began \[mm\].
-    pub bead_scatter_mm: f64,
-    /// Way from where control began to within 0.5 mm of the target for good
-    /// \[mm\]; `None` where most seeds never get there.
+    /// Standard deviation of the bead itself, from 700 mm after control began \[mm\].
+    pub bead_sigma_mm: f64,
+    /// Path from where control began until the error stays within 0.5 mm \[mm\]; `None`
+    /// where it does not for most seeds.
     pub settled_mm: Option<f64>,
-    /// Frames that were refused, over all seeds.
+    /// Frames that were rejected, over all seeds.
     pub refused: u64,
     /// Widths and speeds over path of the first seed.
     pub example: LayerScore,
 }
 
-/// Lays a layer with several seeds, in parallel, and takes medians.
+/// Lays a layer with several seeds, in parallel.
 pub fn lay(cell: &Cell, run: &RunPart, seeds: u64) -> Result<LayerResult, SimCellError> {
     let trials = each(seeds, |seed| LayerTrial::lay(cell, run, &scale(), seed))?;
     let of = |value: &dyn Fn(&LayerTrial) -> f64| {
         mean_median(&mut trials.iter().map(value).collect::<Vec<f64>>()).unwrap_or(f64::NAN)
     };
+    let after = |trial: &LayerTrial, mm: f64| trial.control_start_mm + mm;
     let settled = of(&|trial| trial.settles_within(trial.control_start_mm, 0.5));
     Ok(LayerResult {
         mean_error_mm: of(&|trial| trial.score.mean_error()),
         rms_error_mm: of(&|trial| trial.score.rms_error()),
         mean_speed_mm_per_s: of(&|trial| trial.score.mean_speed()),
-        bead_mean_error_mm: of(&|trial| trial.mean_error(trial.control_start_mm + JUDGED_AFTER_MM)),
-        bead_rms_error_mm: of(&|trial| trial.rms_error(trial.control_start_mm + JUDGED_AFTER_MM)),
+        bead_mean_error_mm: of(&|trial| trial.mean_error(after(trial, JUDGED_AFTER_MM))),
+        bead_rms_error_mm: of(&|trial| trial.rms_error(after(trial, JUDGED_AFTER_MM))),
         error_integral_mm2: of(&|trial| trial.error_integral(trial.control_start_mm)),
-        bead_scatter_mm: of(&|trial| {
-            trial.standard_deviation(trial.control_start_mm + SIGMA_AFTER_MM)
-        }),
+        bead_sigma_mm: of(&|trial| trial.standard_deviation(after(trial, SIGMA_AFTER_MM))),
         settled_mm: settled.is_finite().then_some(settled),
         refused: trials.iter().map(|trial| trial.score.refused()).sum(),
         example: trials.into_iter().next().map(|trial| trial.score).unwrap_or_default(),
     })
 }
 
-/// Way from the beginning of a bead of which nothing was seen before control
-/// began to within 0.5 mm of the target for good \[mm\], as the median over
-/// seeds; infinite where it never gets there.
+/// Path from the start of the bead until the error stays within 0.5 mm \[mm\], where control
+/// acts from the start and nothing has been measured before; median over seeds, infinite
+/// where it never does.
 pub fn settles_unseen(
     cell: &Cell,
     run: &RunPart,
@@ -74,9 +73,8 @@ pub fn settles_unseen(
 ) -> Result<f64, SimCellError> {
     let (cell, mut run) = who.enter(cell, run, target_mm);
     run.robot.start_length = Mm::ZERO;
-    let mut found = each(seeds, |seed| {
-        Ok(LayerTrial::lay(&cell, &run, &scale(), seed)?.settles_within(0.0, 0.5))
-    })?;
+    let lay = |seed| LayerTrial::lay(&cell, &run, &scale(), seed);
+    let mut found = each(seeds, |seed| Ok(lay(seed)?.settles_within(0.0, 0.5)))?;
     Ok(mean_median(&mut found).unwrap_or(f64::NAN))
 }
 

@@ -1,4 +1,4 @@
-//! Shojaei Barjuei et al. 2022 beside its tables and its figure 13.
+//! Shojaei Barjuei et al. 2022 beside its tables 1 and 2 and its figure 13.
 
 mod ahead;
 mod draw;
@@ -6,7 +6,7 @@ mod experiments;
 
 use std::path::Path;
 
-use super::{ControlSetup, LAYERS, LayerResult, LoopRates, StandOff};
+use super::{ControlSetup, LAYERS, LayerResult, LoopRates};
 use crate::cell::Cell;
 use crate::cell::file::{Purpose, RunPart};
 use crate::core::units::Mm;
@@ -14,20 +14,22 @@ use crate::io::progress::Progress;
 use crate::studies::barjuei2022 as paper;
 use crate::studies::error::ReproduceError;
 use crate::studies::publication::Publication;
-use crate::studies::row::TableRows;
-use crate::studies::study::{Effort, Reproduced, Section};
+use crate::studies::study::{Effort, Reproduced, Section, TableRows};
 use crate::vision::MeasureMethod;
 use crate::width_control::target::WidthTarget;
 use experiments::Experiments;
 
 const CELL: &str = include_str!("../../../cells/barjuei2022.toml");
-/// Sideways error of the second of two stacked layers \[mm\].
+/// Lateral offset of the second of two stacked layers \[mm\], about 2 % of a width.
 const ASIDE_MM: f64 = 0.8;
-/// What progress is told of.
+/// Steps of the progress bar. Derived: four layers, four with rendered frames, stand-off,
+/// stack and tower, and those of [`ahead`].
 pub const EXPERIMENTS: u64 = 11 + ahead::EXPERIMENTS;
-/// Layers one upon the other.
+/// Stacked layers.
 const TOWER_LAYERS: u32 = 20;
+/// Seeds of the experiments: those of papers.md, "Noise in the loop, median of 40 seeds".
 const SEEDS: u64 = 40;
+/// Seeds where frames are rendered, at least the three of papers.md.
 const FRAME_SEEDS: u64 = 3;
 
 /// Runs the experiments.
@@ -42,11 +44,8 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
     let mut sections = Vec::new();
     for layer in &LAYERS {
         let (theirs, ours) = work.widths(layer)?;
-        sections.push(Section {
-            heading: format!("Layer of {} mm", layer.target_mm),
-            hint: String::new(),
-            drawing: draw::layer(limits, layer.target_mm, &theirs.example, &ours.example),
-        });
+        let drawing = draw::layer(limits, layer.target_mm, &theirs.example, &ours.example);
+        sections.push(Section::new(format!("Layer of {} mm", layer.target_mm), "", drawing));
         progress.advance();
     }
     sections.push(ahead::run(&mut work, progress)?);
@@ -54,14 +53,7 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
         work.frames(layer)?;
         progress.advance();
     }
-    let curve = work.stand_off()?;
-    sections.push(Section {
-        heading: "Stand-off".to_owned(),
-        hint: "A bead of 42 mm that lies nearer to the camera, or farther, than where the scale \
-               was taken."
-            .to_owned(),
-        drawing: draw::stand_off(&curve),
-    });
+    sections.push(work.stand_off()?);
     progress.advance();
     work.stack()?;
     progress.advance();
@@ -83,55 +75,50 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
 
 impl Experiments {
     /// The three figures of a layer's tables, with the paper's method and ours.
-    fn tables(
-        &mut self,
-        case: &str,
-        layer: &paper::PaperLayer,
-        theirs: &LayerResult,
-        ours: Option<&LayerResult>,
-    ) {
-        let figures = |found: &LayerResult| {
-            [found.mean_error_mm, found.rms_error_mm, found.mean_speed_mm_per_s]
-        };
+    fn tables(&mut self, case: &str, layer: &paper::PaperLayer, found: [&LayerResult; 2]) {
         let published = [layer.mean_error_mm, layer.rms_error_mm, layer.mean_speed_mm_per_s];
+        let [theirs, ours] =
+            found.map(|found| [found.mean_error_mm, found.rms_error_mm, found.mean_speed_mm_per_s]);
         let names = [("mean error", "mm"), ("RMS error", "mm"), ("mean speed", "mm/s")];
-        for (which, (quantity, unit)) in names.into_iter().enumerate() {
-            let ours = ours.map(|found| figures(found)[which]);
-            let simulated = Some(figures(theirs)[which]);
-            self.rows.push(case, (quantity, unit), [Some(published[which]), simulated, ours]);
+        for (which, quantity) in names.into_iter().enumerate() {
+            let values = [published, theirs, ours].map(|values| Some(values[which]));
+            self.rows.push(case, quantity, values);
         }
     }
 
-    /// The paper's loop on its own plant, and the law by distance with the
-    /// paper's camera and link.
+    /// The paper's loop on its own plant, and the controller by distance with the paper's
+    /// camera and link.
     fn widths(
         &mut self,
         layer: &paper::PaperLayer,
     ) -> Result<(LayerResult, LayerResult), ReproduceError> {
         let target = layer.target_mm;
         let theirs = paper::lay(&self.cell, &with_width(&self.run, target), self.seeds)?;
-        let (cell, run) =
-            ControlSetup::by_distance(LoopRates::PAPER).enter(&self.cell, &self.run, target);
+        let ours = ControlSetup::by_distance(LoopRates::PAPER);
+        let (cell, run) = ours.enter(&self.cell, &self.run, target);
         let ours = paper::lay(&cell, &run, self.seeds)?;
-        self.tables(&format!("{target} mm"), layer, &theirs, Some(&ours));
+        self.tables(&format!("{target} mm"), layer, [&theirs, &ours]);
         Ok((theirs, ours))
     }
 
+    /// The same result with every frame rendered and measured by the paper's method and ours.
+    fn by_method<T, E>(&self, lay: impl Fn(&Cell) -> Result<T, E>) -> Result<[T; 2], E> {
+        let of = |method| lay(&paper::with_frames(&self.cell, method));
+        Ok([of(MeasureMethod::EdgeLines)?, of(MeasureMethod::Caliper)?])
+    }
+
     fn frames(&mut self, layer: &paper::PaperLayer) -> Result<(), ReproduceError> {
-        let lay = |method| {
-            let cell = paper::with_frames(&self.cell, method);
-            paper::lay(&cell, &with_width(&self.run, layer.target_mm), self.frame_seeds)
-        };
-        let (theirs, ours) = (lay(MeasureMethod::EdgeLines)?, lay(MeasureMethod::Caliper)?);
+        let run = with_width(&self.run, layer.target_mm);
+        let found = self.by_method(|cell| paper::lay(cell, &run, self.frame_seeds))?;
         let case = format!("{} mm, frames rendered", layer.target_mm);
-        self.tables(&case, layer, &theirs, Some(&ours));
+        self.tables(&case, layer, found.each_ref());
         #[expect(clippy::cast_precision_loss, reason = "frames are few")]
-        let refused = [None, Some(theirs.refused as f64), Some(ours.refused as f64)];
-        self.rows.push(&case, ("frames of all seeds refused", "1"), refused);
+        let [theirs, ours] = found.map(|found| found.refused as f64);
+        self.rows.compare(&case, ("frames of all seeds refused", "1"), theirs, ours);
         Ok(())
     }
 
-    fn stand_off(&mut self) -> Result<Vec<StandOff>, ReproduceError> {
+    fn stand_off(&mut self) -> Result<Section, ReproduceError> {
         let curve = paper::stand_off(&self.cell)?;
         for point in &curve {
             let case = format!("stand-off {:+} mm", point.nearer_mm);
@@ -140,29 +127,24 @@ impl Experiments {
             let found = [published, Some(point.scale_error_mm), Some(point.full_error_mm)];
             self.rows.push(case, ("width error", "mm"), found);
         }
-        Ok(curve)
+        let hint = "A bead of 42 mm that lies nearer to the camera, or farther, than where the scale \
+                    was taken.";
+        Ok(Section::new("Stand-off", hint, draw::stand_off(&curve)))
     }
 
     fn stack(&mut self) -> Result<(), ReproduceError> {
-        let lay = |method| {
-            let cell = paper::with_frames(&self.cell, method);
-            paper::stack(&cell, &self.run, ASIDE_MM)
-        };
-        let (theirs, ours) = (lay(MeasureMethod::EdgeLines)?, lay(MeasureMethod::Caliper)?);
+        let [theirs, ours] = self.by_method(|cell| paper::stack(cell, &self.run, ASIDE_MM))?;
         let case = format!("two layers of 38 mm, truly {ASIDE_MM} mm apart");
-        let offsets = [None, Some(theirs.offset_mm), Some(ours.offset_mm)];
-        self.rows.push(&case, ("lateral offset", "mm"), offsets);
-        for (which, name) in
-            ["mean width error, layer 1", "mean width error, layer 2"].into_iter().enumerate()
-        {
-            let error =
-                |stack: &paper::Stack| Some(stack.widths_mm[which] - stack.true_widths_mm[which]);
-            self.rows.push(&case, (name, "mm"), [None, error(&theirs), error(&ours)]);
+        self.rows.compare(&case, ("lateral offset", "mm"), theirs.offset_mm, ours.offset_mm);
+        let names = ["mean width error, layer 1", "mean width error, layer 2"];
+        for (which, name) in names.into_iter().enumerate() {
+            let error = |stack: &paper::Stack| stack.widths_mm[which] - stack.true_widths_mm[which];
+            self.rows.compare(&case, (name, "mm"), error(&theirs), error(&ours));
         }
         Ok(())
     }
 
-    /// The worst of many layers, measured and laid.
+    /// The largest error over many layers, measured and laid.
     fn tower(&mut self) -> Result<(), ReproduceError> {
         let layers = paper::tower(&self.cell, &self.run, TOWER_LAYERS)?;
         let worst = |of: fn(&paper::TowerLayer) -> f64| {
@@ -170,18 +152,15 @@ impl Experiments {
         };
         let case =
             format!("{TOWER_LAYERS} layers of 20 mm and 42 mm, frames rendered, by distance");
-        let pairs = [
-            ("mean error of the measured width, worst layer", worst(|s| s.measured_error_mm)),
-            ("mean error of the bead, worst layer", worst(|s| s.laid_error_mm)),
-        ];
-        for (quantity, found) in pairs {
-            self.rows.push(&case, (quantity, "mm"), [None, None, Some(found)]);
-        }
+        let measured = ("mean error of the measured width, worst layer", "mm");
+        self.rows.ours(&case, measured, worst(|layer| layer.measured_error_mm));
+        let laid = ("mean error of the bead, worst layer", "mm");
+        self.rows.ours(&case, laid, worst(|layer| layer.laid_error_mm));
         Ok(())
     }
 }
 
-/// The same run with another width asked for.
+/// The same run with another target width.
 fn with_width(run: &RunPart, target_mm: f64) -> RunPart {
     let mut run = run.clone();
     if let Ok(width) = Mm::new(target_mm) {

@@ -1,4 +1,4 @@
-//! What the experiments must come to.
+//! Results that the experiments must give.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ fn cell() -> (Cell, RunPart) {
     (cell, run)
 }
 
-/// The same run with another width asked for.
+/// The same run with another target width.
 fn asked(run: &RunPart, target_mm: f64) -> RunPart {
     let mut run = run.clone();
     run.control.target =
@@ -87,18 +87,18 @@ fn by_distance_a_layer_settles_within_millimetres_where_the_paper_needs_hundreds
             lay(&cell, &run, SEEDS).unwrap()
         };
         let theirs = lay_by(ControlSetup::Paper);
-        for (rates, most, share) in [(RATES[0], 20.0, 8.0), (RATES[1], 15.0, 10.0)] {
+        for (rates, most, factor) in [(RATES[0], 20.0, 8.0), (RATES[1], 15.0, 10.0)] {
             let ours = lay_by(ControlSetup::by_distance(rates));
             let settled = ours.settled_mm.unwrap();
             assert!(settled <= most, "{target} {rates:?}: {settled}");
             let ratio = theirs.error_integral_mm2 / ours.error_integral_mm2;
-            assert!(ratio >= share, "{target} {rates:?}: 1/{ratio}");
+            assert!(ratio >= factor, "{target} {rates:?}: 1/{ratio}");
         }
     }
 }
 
 #[test]
-fn by_distance_it_settles_soon_after_the_first_bead_is_seen() {
+fn by_distance_it_settles_soon_after_the_first_measurement() {
     let (mut cell, run) = cell();
     cell.simulation.width_noise = Mm::ZERO;
     for target in [44.0, 42.0, 40.0, 38.0] {
@@ -111,23 +111,23 @@ fn by_distance_it_settles_soon_after_the_first_bead_is_seen() {
 }
 
 #[test]
-fn by_distance_the_bead_itself_is_true_to_a_tenth_of_a_millimetre() {
+fn by_distance_the_bead_itself_is_within_a_tenth_of_a_millimetre() {
     let (cell, run) = cell();
     for target in [44.0, 42.0, 40.0, 38.0] {
-        for (rates, mean, rms, scatter) in
+        for (rates, mean, rms, sigma) in
             [(RATES[0], 0.10, 0.14, 0.08), (RATES[1], 0.06, 0.105, 0.05)]
         {
             let (cell, run) = ControlSetup::by_distance(rates).enter(&cell, &run, target);
             let found = lay(&cell, &run, SEEDS).unwrap();
             assert!(found.bead_mean_error_mm <= mean, "{target} {rates:?}: {found:?}");
             assert!(found.bead_rms_error_mm <= rms, "{target} {rates:?}: {found:?}");
-            assert!(found.bead_scatter_mm <= scatter, "{target} {rates:?}: {found:?}");
+            assert!(found.bead_sigma_mm <= sigma, "{target} {rates:?}: {found:?}");
         }
     }
 }
 
 #[test]
-fn by_distance_a_step_of_the_flow_is_answered_once_it_is_seen() {
+fn by_distance_a_step_of_the_flow_is_corrected_once_it_is_measured() {
     let (mut cell, run) = cell();
     cell.simulation.width_noise = Mm::ZERO;
     for (rates, most) in [(RATES[0], 140.0), (RATES[1], 75.0)] {
@@ -138,7 +138,7 @@ fn by_distance_a_step_of_the_flow_is_answered_once_it_is_seen() {
 }
 
 #[test]
-fn by_distance_slow_waves_and_pulsations_are_taken_out() {
+fn by_distance_slow_waves_and_pulsations_are_attenuated() {
     let (cell, run) = cell();
     let ratio =
         |rates, what| error_ratio(&cell, &run, ControlSetup::by_distance(rates), what, 6).unwrap();
@@ -157,14 +157,14 @@ fn by_distance_slow_waves_and_pulsations_are_taken_out() {
 }
 
 #[test]
-fn by_distance_what_is_told_wrong_and_widths_that_are_wrong_are_borne() {
+fn by_distance_a_mismatch_and_outliers_raise_the_error_by_half_at_most() {
     let (cell, run) = cell();
-    let told = |rates, exponent, what| {
+    let found_with = |rates, exponent, what| {
         let who = ControlSetup::Distance(rates, exponent);
         mismatched(&cell, &run, who, what, SEEDS).unwrap()
     };
     for rates in RATES {
-        let nominal = told(rates, 0.25, Mismatch::NONE);
+        let nominal = found_with(rates, 0.25, Mismatch::NONE);
         let cases = [
             (0.25, Mismatch { offset: 1.2, ..Mismatch::NONE }),
             (0.25, Mismatch { offset: 0.8, ..Mismatch::NONE }),
@@ -174,7 +174,7 @@ fn by_distance_what_is_told_wrong_and_widths_that_are_wrong_are_borne() {
             (0.25, Mismatch { missing: 0.2, ..Mismatch::NONE }),
         ];
         for (exponent, what) in cases {
-            let found = told(rates, exponent, what);
+            let found = found_with(rates, exponent, what);
             let ratio = found.median_mm / nominal.median_mm;
             assert!(ratio <= 1.5, "{rates:?}, b {exponent}, {what:?}: {found:?} is {ratio}");
             let ratio = found.mean_mm / nominal.mean_mm;
@@ -182,7 +182,8 @@ fn by_distance_what_is_told_wrong_and_widths_that_are_wrong_are_borne() {
         }
         // All of it at once, in any direction.
         for (exponent, offset) in [(0.375, 1.2), (0.125, 1.2), (0.375, 0.8), (0.125, 0.8)] {
-            let found = told(rates, exponent, Mismatch { offset, outliers: 0.1, missing: 0.2 });
+            let found =
+                found_with(rates, exponent, Mismatch { offset, outliers: 0.1, missing: 0.2 });
             let ratio = found.median_mm / nominal.median_mm;
             assert!(ratio <= 1.8, "{rates:?}, b {exponent}, {offset}: {found:?} is {ratio}");
         }
@@ -192,15 +193,15 @@ fn by_distance_what_is_told_wrong_and_widths_that_are_wrong_are_borne() {
 #[test]
 fn twenty_layers_are_measured_alike_at_every_height() {
     let (cell, run) = cell();
-    let storeys = tower(&cell, &run, 20).unwrap();
-    assert_eq!(storeys.len(), 20);
-    for storey in &storeys {
-        assert!(storey.widths > 100, "{storey:?}");
-        assert!(storey.measured_error_mm.abs() < 0.05, "{storey:?}");
-        assert!(storey.laid_error_mm.abs() < 0.05, "{storey:?}");
+    let layers = tower(&cell, &run, 20).unwrap();
+    assert_eq!(layers.len(), 20);
+    for layer in &layers {
+        assert!(layer.widths > 100, "{layer:?}");
+        assert!(layer.measured_error_mm.abs() < 0.05, "{layer:?}");
+        assert!(layer.laid_error_mm.abs() < 0.05, "{layer:?}");
     }
-    // The first layer teaches the bead; those above begin with what it taught.
-    assert!(storeys[1..].iter().all(|storey| storey.laid_error_mm.abs() < 0.03), "{storeys:?}");
+    // The bead model is estimated on the first layer and kept for those above.
+    assert!(layers[1..].iter().all(|layer| layer.laid_error_mm.abs() < 0.03), "{layers:?}");
 }
 
 #[test]
@@ -210,15 +211,15 @@ fn by_distance_a_rough_bead_is_not_chased() {
     cell.simulation.roughness.length_mm = 8.0;
     let nobody = ControlSetup::Paper.enter(&cell, &run, 42.0);
     let (cell, mut run) = ControlSetup::by_distance(RATES[1]).enter(&nobody.0, &run, 42.0);
-    let scatter = |run: &RunPart| {
+    let sigma = |run: &RunPart| {
         let square = |seed| {
             LayerTrial::lay(&cell, run, &scale(), seed).unwrap().standard_deviation(700.0).powi(2)
         };
         ((0..SEEDS).map(square).sum::<f64>() / f64::from(u32::try_from(SEEDS).unwrap())).sqrt()
     };
-    let held = scatter(&run);
+    let controlled = sigma(&run);
     // The same bead at a steady speed.
     run.robot.start_length = Mm::constant(1e5);
-    let alone = scatter(&run);
-    assert!(held < 1.2 * alone, "{held} beside {alone}");
+    let alone = sigma(&run);
+    assert!(controlled < 1.2 * alone, "{controlled} beside {alone}");
 }

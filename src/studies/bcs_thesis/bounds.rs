@@ -1,11 +1,9 @@
-//! How well parameters can be known at all from two experiments, and how well
-//! fits know them: the Cramér–Rao bounds, from the slopes of the output over
-//! every parameter, beside the scatter of many fits.
+//! Cramér–Rao bounds of the parameters of two experiments, from the sensitivities of the
+//! output, beside the errors of many fits.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::fit_table::FitTableError;
 use super::flow;
 use crate::identify::fit::{
     DeadTime, FitSettings, InitialCondition, OutputLevel, Samples, Structure, fit,
@@ -13,7 +11,9 @@ use crate::identify::fit::{
 use crate::numeric::average::{rms, standard_deviation};
 use crate::numeric::lti::{FirstOrder, ModelError, TransferFunction, simulate};
 use crate::sim::hash::{mix, normal_pair};
+use crate::studies::error::ReproduceError;
 
+/// Sample time of both experiments \[s\]: papers.md, "001, bounds", 50 Hz and 20 ms.
 const DT_S: f64 = 0.02;
 
 /// One parameter.
@@ -23,28 +23,27 @@ pub struct ParameterBound {
     pub name: &'static str,
     /// Its true value.
     pub value: f64,
-    /// The least standard deviation of any estimate without bias, in the
-    /// parameter's own unit.
+    /// Cramér–Rao bound of its standard deviation, in the parameter's own unit.
     pub sigma: f64,
-    /// Root mean square error of the fits, in the same.
+    /// Root mean square error of the fits, in the same unit.
     pub spread: f64,
 }
 
-/// An experiment whose parameters are looked for.
+/// An experiment whose parameters are estimated.
 struct BoundExperiment<'a, const N: usize> {
     truth: [f64; N],
     names: [&'static str; N],
-    /// The names that a fit gives them.
+    /// Their names in a fit.
     fitted: [&'static str; N],
     input: Vec<f64>,
     settings: FitSettings,
     model: &'a (dyn Fn(&[f64; N]) -> Result<TransferFunction, ModelError> + Sync),
 }
 
-/// Gain, time constant \[s\] and dead time \[s\] of K = 1, τ = 0.84 s,
-/// L = 0.41 s from a step of 0.6 over 10 s at 50 Hz with white noise of
-/// variance 4.98·10⁻⁵, and of as many fits.
-pub fn first_order(trials: u64) -> Result<[ParameterBound; 3], FitTableError> {
+/// Gain, time constant \[s\] and dead time \[s\] of the plant of Ma et al. 2026 (K = 1,
+/// τ = 0.84 s, L = 0.41 s) from a step of 0.6 over 10 s at 50 Hz with white noise of variance
+/// 4.98·10⁻⁵; with `trials` fits.
+pub fn first_order(trials: u64) -> Result<[ParameterBound; 3], ReproduceError> {
     let dead_time = DeadTime::Estimated { min_s: 0.0, max_s: 2.0 };
     let experiment = BoundExperiment {
         truth: [1.0, 0.84, 0.41],
@@ -59,10 +58,11 @@ pub fn first_order(trials: u64) -> Result<[ParameterBound; 3], FitTableError> {
     experiment.bounds(4.98e-5_f64.sqrt(), trials)
 }
 
-/// Denominator a1, a0 and numerator b2, b1, b0 of G2 from 60 s of a nine-bit
-/// PRBS with bits of 1 s, sampled every 20 ms, with white noise of 17 % of the
-/// flow's standard deviation, and of as many fits.
-pub fn flow_model(trials: u64) -> Result<[ParameterBound; 5], FitTableError> {
+/// Denominator a1, a0 and numerator b2, b1, b0 of G2 from 60 s of a nine-bit PRBS with bits
+/// of 1 s, sampled every 20 ms, with white noise of 17 % of the flow's standard deviation;
+/// with `trials` fits.
+pub fn flow_model(trials: u64) -> Result<[ParameterBound; 5], ReproduceError> {
+    /// Derived: 1 s of samples of 20 ms.
     const SAMPLES_A_BIT: usize = 50;
     // Maximal-length sequence with taps at 9 and 5.
     let mut bits = vec![true; 9];
@@ -89,7 +89,7 @@ pub fn flow_model(trials: u64) -> Result<[ParameterBound; 5], FitTableError> {
     experiment.bounds(0.17 * standard_deviation(&clean), trials)
 }
 
-/// From rest, with an output whose level is known.
+/// From rest, with a known output level.
 fn at_rest(structure: Structure, dead_time: DeadTime) -> FitSettings {
     FitSettings {
         initial_state: InitialCondition::Settled { input: 0.0 },
@@ -99,25 +99,22 @@ fn at_rest(structure: Structure, dead_time: DeadTime) -> FitSettings {
 }
 
 impl<const N: usize> BoundExperiment<'_, N> {
-    fn bounds(&self, noise: f64, trials: u64) -> Result<[ParameterBound; N], FitTableError> {
+    fn bounds(&self, noise: f64, trials: u64) -> Result<[ParameterBound; N], ReproduceError> {
         let clean = self.output(&self.truth)?;
         let sigmas = self.sigmas(noise)?;
-        let errors: Result<Vec<[f64; N]>, FitTableError> = (0..trials.max(1))
-            .into_par_iter()
-            .map(|seed| self.trial(&clean, noise, seed))
-            .collect();
+        let trials = (0..trials.max(1)).into_par_iter();
+        let errors: Result<Vec<[f64; N]>, ReproduceError> =
+            trials.map(|seed| self.trial(&clean, noise, seed)).collect();
         let errors = errors?;
-        let scatter = |i: usize| rms(errors.iter().map(|error| error[i]));
-        Ok(std::array::from_fn(|i| ParameterBound {
-            name: self.names[i],
-            value: self.truth[i],
-            sigma: sigmas[i],
-            spread: scatter(i),
+        Ok(std::array::from_fn(|i| {
+            let spread = rms(errors.iter().map(|error| error[i]));
+            let (name, value, sigma) = (self.names[i], self.truth[i], sigmas[i]);
+            ParameterBound { name, value, sigma, spread }
         }))
     }
 
-    /// The errors of a fit to one noise.
-    fn trial(&self, clean: &[f64], noise: f64, seed: u64) -> Result<[f64; N], FitTableError> {
+    /// The errors of one fit.
+    fn trial(&self, clean: &[f64], noise: f64, seed: u64) -> Result<[f64; N], ReproduceError> {
         let white = |k: u64| noise * normal_pair(mix(&[seed, 4, k]))[0];
         let seen = (0_u64..).zip(clean).map(|(k, y)| y + white(k)).collect();
         let samples = Samples::new(self.input.clone(), seen, DT_S)?;
@@ -131,8 +128,7 @@ impl<const N: usize> BoundExperiment<'_, N> {
         simulate(&(self.model)(parameters)?, &self.input, DT_S)
     }
 
-    /// Square roots of the diagonal of σ²(SᵀS)⁻¹, with slopes S by central
-    /// differences.
+    /// Square roots of the diagonal of σ²(SᵀS)⁻¹, the sensitivities S by central differences.
     fn sigmas(&self, noise: f64) -> Result<[f64; N], ModelError> {
         let mut columns = Vec::with_capacity(N);
         for i in 0..N {
@@ -148,7 +144,7 @@ impl<const N: usize> BoundExperiment<'_, N> {
         }
         let slopes = DMatrix::from_columns(&columns);
         let inverse = (slopes.transpose() * &slopes).try_inverse();
-        // Parameters that the output does not tell apart have no bound.
+        // Parameters that the output does not distinguish have no bound.
         let variance = |i: usize| inverse.as_ref().map_or(f64::INFINITY, |m| m[(i, i)]);
         Ok(std::array::from_fn(|i| noise * variance(i).sqrt()))
     }
@@ -160,12 +156,12 @@ mod tests {
 
     /// Four standard errors of a standard deviation from 40 fits.
     fn near_the_bound(bound: &ParameterBound) -> bool {
-        let slack = 4.0 / f64::sqrt(80.0);
-        (bound.spread / bound.sigma - 1.0).abs() < slack
+        let allowance = 4.0 / f64::sqrt(80.0);
+        (bound.spread / bound.sigma - 1.0).abs() < allowance
     }
 
     #[test]
-    fn the_step_tells_gain_and_times_as_well_as_an_independent_tool_says() {
+    fn the_bounds_of_the_step_are_those_of_an_independent_tool() {
         for (bound, wanted) in first_order(40).unwrap().iter().zip([6.7e-4, 4.9e-3, 3.1e-3]) {
             assert!((bound.sigma / wanted - 1.0).abs() < 0.03, "{bound:?}");
             assert!(near_the_bound(bound), "{bound:?}");
@@ -173,13 +169,13 @@ mod tests {
     }
 
     #[test]
-    fn a_minute_of_prbs_tells_the_flow_model_as_an_independent_tool_says() {
+    fn the_bounds_of_a_minute_of_prbs_are_those_of_an_independent_tool() {
         let found = flow_model(40).unwrap();
         let independent = [("a0", 1.7), ("a1", 1.5), ("b0", 1.9), ("b1", 6.4), ("b2", 20.0)];
         for (name, percent) in independent {
             let bound = found.iter().find(|bound| bound.name == name).unwrap();
-            let share = 100.0 * bound.sigma / bound.value;
-            assert!((share / percent - 1.0).abs() < 0.1, "{bound:?} {share}");
+            let found = 100.0 * bound.sigma / bound.value;
+            assert!((found / percent - 1.0).abs() < 0.1, "{bound:?} {found}");
             assert!(near_the_bound(bound), "{bound:?}");
         }
     }

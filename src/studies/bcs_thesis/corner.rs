@@ -1,19 +1,18 @@
-//! A 90° corner with the extruder of the thesis: what is left of the width's error when
-//! robot and extruder are planned together, against an extruder that is driven constantly
-//! or in proportion to the robot's speed.
+//! A 90° corner with the extruder of the thesis: the error of the width when robot and
+//! extruder are planned together, against an extruder that is driven constantly or in
+//! proportion to the robot's speed.
 //!
-//! What bounds the ratio, and where it comes from:
+//! What limits the gain:
 //!
-//! - **Acceleration.** From v to the apex and back takes 2(v − 2)/a; an extruder that goes
-//!   on at v·A lays (v − 2)²/a too much: 4.8 mm of bead from 100 mm/s at 2 m/s², 24 % of a
-//!   nozzle's length. That is what both baselines show.
-//! - **Drive limits and plant.** To lower the flow by a tenth of itself takes the drive at
-//!   its stops most of a second. The less time may be added, the less the flow can be
-//!   lowered, and the less the robot can make up for the apex beside it, as it cannot go
-//!   faster than its nominal speed: [`Row::bound`] is what is left of a flow that is fully
-//!   known.
-//! - **Unmodelled flow.** It is 17 % of the change that is commanded, so that a deeper dip
-//!   brings more of it; the best plan uses less time than it might.
+//! - **Acceleration.** From v to the apex and back takes 2(v − 2)/a. An extruder that
+//!   continues at v·A lays (v − 2)²/a too much: 4.8 mm of bead from 100 mm/s at 2 m/s², 24 %
+//!   of a nozzle's length. Both baselines show that.
+//! - **Drive limits and plant.** To lower the flow by a tenth takes the drive at its limits
+//!   most of a second. With less added time the flow is lowered less, and the robot
+//!   compensates less beside the apex, as it cannot exceed its nominal speed:
+//!   [`BudgetRow::bound`] is the error that remains with a known flow.
+//! - **Unmodelled flow.** It is 17 % of the commanded change, so that a deeper dip brings more
+//!   of it; the best plan uses less time than it may.
 
 mod baseline;
 mod plant;
@@ -25,26 +24,26 @@ pub use scenario::{BEAD, CornerError, JUDGED_MM, Scenario, UNMODELLED};
 
 use crate::plan::FlowUncertainty;
 
-/// What comes of one time that may be added.
+/// The results for one time that may be added.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BudgetRow {
     /// Time that may be added \[s\].
     pub budget_s: f64,
     /// Time that the plan adds \[s\].
     pub added_s: f64,
-    /// The plan.
+    /// The plan's errors.
     pub planned: Errors,
-    /// Each baseline.
+    /// The errors of each baseline.
     pub baselines: Vec<(Baseline, Errors)>,
-    /// The plan for a flow that is fully known, in which nothing is weighed against the
-    /// noise: what plant, drive and acceleration leave of the error in this time.
+    /// Error of the plan for a known flow, without a trade-off against noise: what plant,
+    /// drive and acceleration leave in this time.
     pub bound: f64,
-    /// What the noise alone leaves of the plan's error.
+    /// The part of the plan's error that is due to noise alone.
     pub floor: f64,
 }
 
 impl BudgetRow {
-    /// How many times larger the error of the best baseline of a kind is, with noise.
+    /// Error of the best baseline of a kind over that of the plan, with noise.
     pub fn ratio(&self, drive: DriveMode) -> f64 {
         self.best_ratio(drive, |errors| errors.noisy)
     }
@@ -54,7 +53,7 @@ impl BudgetRow {
         self.best_ratio(drive, |errors| errors.quiet)
     }
 
-    /// The largest ratio that the bound lets be, without noise.
+    /// The largest possible ratio, without noise.
     pub fn bound_ratio(&self, drive: DriveMode) -> f64 {
         self.quiet_ratio(drive) * self.planned.quiet / self.bound
     }
@@ -66,8 +65,7 @@ impl BudgetRow {
 }
 
 impl Scenario {
-    /// The plan and every baseline, for a time that may be added \[s\] and a number of
-    /// seeds.
+    /// Plans for a time that may be added \[s\], and runs plan and baselines.
     pub fn row(&self, budget_s: f64, seeds: u64) -> Result<BudgetRow, CornerError> {
         let plan = self.plan(budget_s, UNMODELLED)?;
         let known = self.plan(budget_s, FlowUncertainty { ratio: 0.0, ..UNMODELLED })?;
@@ -75,17 +73,11 @@ impl Scenario {
         let bound = CornerRun::new(self, &known.speed, |time| known.command_at(time))?;
         let mut baselines = Vec::new();
         for baseline in Baseline::ALL {
-            let errors = baseline.run(self, &plan.speed)?.errors(seeds);
-            baselines.push((baseline, errors));
+            baselines.push((baseline, baseline.run(self, &plan.speed)?.errors(seeds)));
         }
-        Ok(BudgetRow {
-            budget_s,
-            added_s: plan.added_s,
-            planned: run.errors(seeds),
-            baselines,
-            bound: bound.quiet().rms(),
-            floor: run.floor(),
-        })
+        let (added_s, planned) = (plan.added_s, run.errors(seeds));
+        let (bound, floor) = (bound.quiet().rms(), run.floor());
+        Ok(BudgetRow { budget_s, added_s, planned, baselines, bound, floor })
     }
 }
 
@@ -96,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_constant_extruder_lays_what_the_closed_form_says() {
+    fn a_constant_extruder_lays_the_surplus_of_the_closed_form() {
         let scenario = Scenario::default();
         let run = CornerRun::new(&scenario, &scenario.nominal().unwrap(), |_| {
             100.0 * BEAD.area_mm2 / Scenario::extruder().unwrap().dc_gain()
@@ -107,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn a_planned_corner_is_five_times_as_even_within_a_second() {
+    fn a_plan_reduces_the_error_by_five_within_a_second() {
         let row = Scenario::default().row(1.0, 20).unwrap();
         assert!(row.added_s <= 1.0 + 1e-9, "{row:?}");
         assert!(row.ratio(DriveMode::Constant) >= 5.0, "{row:?}");
@@ -116,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn more_time_makes_it_more_even() {
+    fn more_time_reduces_the_error() {
         let scenario = Scenario::default();
         let rms = |budget| {
             let plan = scenario.plan(budget, UNMODELLED).unwrap();
@@ -128,12 +120,12 @@ mod tests {
     }
 
     #[test]
-    fn what_was_planned_is_what_comes_of_it() {
+    fn the_plan_predicts_the_width_of_the_run() {
         let scenario = Scenario::default();
         let plan = scenario.plan(0.5, UNMODELLED).unwrap();
         let run = CornerRun::new(&scenario, &plan.speed, |time| plan.command_at(time)).unwrap();
-        for (at, foretold) in plan.predicted_width.iter().filter(|(at, _)| at.abs() < JUDGED_MM) {
-            assert!((run.quiet().at(*at) - foretold).abs() < 2e-3, "{at}");
+        for (at, predicted) in plan.predicted_width.iter().filter(|(at, _)| at.abs() < JUDGED_MM) {
+            assert!((run.quiet().at(*at) - predicted).abs() < 2e-3, "{at}");
         }
     }
 }

@@ -1,31 +1,37 @@
 //! Table 3 of the thesis: how well transfer functions of one to three poles
 //! predict the flow from the screw speed.
 //!
-//! A PRBS of ten bits of ±0.4 V about the operating point, 0.7 s a bit, drives the
-//! screw for 120 s; its speed and the flow are sampled every 50 ms. What no linear
-//! model explains is white noise through a lag of 0.15 s with 19 % of the flow's
-//! standard deviation. Fitted on one run, judged on another.
+//! A PRBS of ten bits of ±0.4 V about the operating point, 0.7 s a bit, drives the screw for
+//! 120 s; its speed and the flow are sampled every 50 ms. The unmodelled part of the flow is
+//! white noise through a lag of 0.15 s, with 19 % of the flow's standard deviation. The models
+//! are fitted on one run and validated on another.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::identify::fit::{
-    DeadTime, FitError, FitSettings, InitialCondition, OutputLevel, Samples, SamplesError,
-    Structure, fit,
+    DeadTime, FitSettings, InitialCondition, OutputLevel, Samples, Structure, fit,
 };
 use crate::identify::prbs::{NoSuchLength, Prbs};
 use crate::numeric::average::{mean, standard_deviation};
-use crate::numeric::lti::{Between, ModelError, simulate};
+use crate::numeric::lti::{Between, simulate};
+use crate::studies::error::ReproduceError;
 
+/// Sample time \[s\]: papers.md, "001, table 3".
 const DT_S: f64 = 0.05;
+/// Derived: 120 s of samples (papers.md, "001, table 3").
 const SAMPLES: usize = 2400;
+/// Derived: 0.7 s of samples (papers.md, "001, table 3").
 const SAMPLES_A_BIT: usize = 14;
+/// Amplitude of the excitation \[V\]: papers.md, "001, table 3".
 const VOLTS: f64 = 0.4;
+/// Lag of the unmodelled flow \[s\]: papers.md, "001, table 3".
 const NOISE_LAG_S: f64 = 0.15;
+/// Standard deviation of the unmodelled flow over that of the flow: papers.md, "001, table 3".
 const NOISE_FRACTION: f64 = 0.19;
 
-/// Poles, zeros and the published fit \[%\].
+/// Poles, zeros and the published fit \[%\]: bead characterisation thesis, table 3.
 pub const PUBLISHED: [(usize, usize, f64); 8] = [
     (1, 0, 57.45),
     (1, 1, 63.39),
@@ -44,11 +50,11 @@ pub struct FitRow {
     pub poles: usize,
     /// Number of zeros.
     pub zeros: usize,
-    /// Fit on the other run in the thesis \[%\].
+    /// Fit on validation data in the thesis \[%\].
     pub published_percent: f64,
-    /// The same here, mean over the seeds \[%\].
+    /// Simulated fit on validation data, mean over the seeds \[%\].
     pub simulated_percent: f64,
-    /// Of each seed \[%\].
+    /// The same of each seed \[%\].
     pub each_percent: Vec<f64>,
 }
 
@@ -57,7 +63,7 @@ pub struct FitRow {
 pub struct FitTable {
     /// In the order of the thesis.
     pub rows: Vec<FitRow>,
-    /// Root mean square distance to the published column \[percentage points\].
+    /// Root mean square difference from the published column \[percentage points\].
     pub rms_points: f64,
     /// Measured and predicted flow of the first seed's second run for the model
     /// of two poles and two zeros: time \[s\], both about the operating point
@@ -65,30 +71,10 @@ pub struct FitTable {
     pub example: Vec<[f64; 3]>,
 }
 
-/// Why there is no table.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FitTableError {
-    /// A model of the plant.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// A fit.
-    #[error(transparent)]
-    Fit(#[from] FitError),
-    /// The simulated samples.
-    #[error(transparent)]
-    Data(#[from] SamplesError),
-    /// The excitation.
-    #[error(transparent)]
-    Sequence(#[from] NoSuchLength),
-    /// No seeds.
-    #[error("a table needs at least one seed")]
-    NoSeeds,
-}
-
-/// The table as a mean over this many seeds; the thesis' one run is one of them.
-pub fn fit_table(seeds: u64) -> Result<FitTable, FitTableError> {
+/// The table, its fits the mean over the seeds.
+pub fn fit_table(seeds: u64) -> Result<FitTable, ReproduceError> {
     if seeds == 0 {
-        return Err(FitTableError::NoSeeds);
+        return Err(ReproduceError::NoSeeds);
     }
     let mut rows: Vec<FitRow> = PUBLISHED.iter().map(|row| empty(*row)).collect();
     let mut example = Vec::new();
@@ -122,15 +108,15 @@ fn settings(poles: usize, zeros: usize) -> FitSettings {
         between: Between::Linear,
         level: OutputLevel::Estimated,
         initial_state: BEFORE,
-        // The third pole is not seen; the thesis shows its fits all the same.
+        // The data do not determine the third pole; the thesis shows its fits all the same.
         accept_undetermined: true,
         ..FitSettings::new(Structure::Transfer { poles, zeros }, DeadTime::Known(0.0))
     }
 }
 
-/// Screw speed and flow about the operating point, from another place in the
-/// sequence and with other noise for each number.
-fn run(number: u64) -> Result<Samples, FitTableError> {
+/// Screw speed and flow about the operating point. Each run continues the sequence and has
+/// noise of its own.
+fn run(number: u64) -> Result<Samples, ReproduceError> {
     let volts = excitation(number)?;
     let drive = super::drive()?;
     let rpm = simulate(&drive, &volts, DT_S)?;
@@ -151,18 +137,17 @@ fn noise(seed: u64, sigma: f64) -> Vec<f64> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut white = || -> f64 { StandardNormal.sample(&mut random) };
     let kept = libm::exp(-DT_S / NOISE_LAG_S);
-    let let_in = (1.0 - kept * kept).sqrt();
+    let fresh = (1.0 - kept * kept).sqrt();
     let mut state = white();
     (0..SAMPLES)
         .map(|_| {
-            state = kept * state + let_in * white();
+            state = kept * state + fresh * white();
             sigma * state
         })
         .collect()
 }
 
-/// A run's voltages about the operating point; each run goes on in the sequence
-/// with taps at 10 and 7 where the one before ended.
+/// A run's voltages about the operating point, by a sequence with taps at 10 and 7.
 fn excitation(number: u64) -> Result<Vec<f64>, NoSuchLength> {
     let bits = SAMPLES.div_ceil(SAMPLES_A_BIT);
     let sequence = Prbs::new(10)?.skip(usize::try_from(number).unwrap_or(0).wrapping_mul(bits));
@@ -177,7 +162,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_published_table_comes_out_within_two_points() {
+    fn the_published_table_is_reproduced_to_two_points() {
         let table = fit_table(6).unwrap();
         let found: Vec<f64> = table.rows.iter().map(|row| row.simulated_percent).collect();
         assert!(table.rms_points < 2.0, "{} {found:?}", table.rms_points);

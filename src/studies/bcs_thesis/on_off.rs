@@ -1,6 +1,5 @@
-//! The controller switched on and off (bcs-thesis, table 4): the extruder is
-//! driven at random, and the wheel turns at a constant speed or follows the
-//! flow.
+//! The controller on and off, table 4 of the thesis: the extruder is driven at random, and the
+//! wheel turns at a constant speed or follows the flow.
 
 mod compare;
 pub mod extruder_run;
@@ -26,24 +25,25 @@ use crate::numeric::lti::TransferFunction;
 use extruder_run::at;
 use wheel::Wheel;
 
-/// Steps between two commands: 200 Hz.
+/// Plant steps between two commands. Derived: 200 Hz (bead characterisation thesis, § 4.2) at
+/// 1 ms.
 const COMMAND_STEPS: u64 = 5;
-/// Steps between two readings of the sensors: 50 Hz.
+/// Plant steps between two readings of the sensors. Derived: 50 Hz, as Ma et al. 2026, at
+/// 1 ms.
 const SENSOR_STEPS: u64 = 20;
 
-/// What is done about the wheel.
+/// Control of the wheel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WheelControl {
     /// Constant speed for the mean flow.
     Off,
-    /// The thesis' controller: G1, G2, division by the section, GC. The models
-    /// are read after they were moved on by a period with the command of now,
-    /// as x ← Φ·x + Γ·u, y ← C·x does it.
+    /// The thesis' controller: G1, G2, division by the section, GC. The outputs of the models
+    /// are those after a period with the present command: x ← Φ·x + Γ·u, y ← C·x.
     Thesis,
-    /// The same with the wheel's dead time and lag taken up by the drive's
-    /// dead time, through which the command's effect is known ahead.
+    /// The same with the wheel's dead time and lag compensated by the drive's dead time, by
+    /// which the effect of a command is known ahead.
     Ahead,
-    /// Ahead, with measurements of what the model does not tell.
+    /// Ahead, with measurements of the unmodelled flow.
     Observed(Sensors),
 }
 
@@ -63,8 +63,8 @@ impl ExtruderRun {
             if let (Some(controller), WheelControl::Observed(sensors)) = (&mut controller, control)
                 && step.is_multiple_of(SENSOR_STEPS)
             {
-                for seen in plant.sensor_readings(self, step, &sensors).into_iter().flatten() {
-                    controller.measure(&seen);
+                for reading in plant.sensor_readings(self, step, &sensors).into_iter().flatten() {
+                    controller.measure(&reading);
                 }
             }
             if let Some(controller) = &mut controller
@@ -108,22 +108,22 @@ impl ExtruderRun {
         };
         let forecast = FlowForecast::new(&model, ScrewSpeed::Modelled, ahead, period)?;
         let observer = match control {
-            WheelControl::Observed(_) => Some(FlowObserver::new(UnmodelledFlow {
-                sigma: Mm3PerS::new(self.unmodelled).unwrap_or_default(),
-                correlation_s: CORRELATION_S,
-                drift: Mm3PerS::constant(0.1),
-            })?),
+            WheelControl::Observed(_) => {
+                let sigma = Mm3PerS::new(self.unmodelled).unwrap_or_default();
+                let (correlation_s, drift) = (CORRELATION_S, Mm3PerS::constant(0.1));
+                Some(FlowObserver::new(UnmodelledFlow { sigma, correlation_s, drift })?)
+            }
             _ => None,
         };
-        let memory = Span::from_secs(5.0);
-        SpeedFeedforward::new(forecast, observer, axis, period, memory).map(Some)
+        let history = Span::from_secs(5.0);
+        SpeedFeedforward::new(forecast, observer, axis, period, history).map(Some)
     }
 }
 
-/// How old the newest section of a camera is in the mean when the wheel acts
-/// on it: the bead's way there at the mean speed, the camera's lateness, half
-/// its period, and the wheel with its held command \[s\].
+/// Mean age of the newest section of a camera when the wheel acts on it \[s\]: path to the
+/// camera at the mean speed, latency, half of its period, and wheel with held command.
 pub fn camera_age_s(behind_mm: f64) -> f64 {
+    /// Derived: mean flow of 3 V by G1 and G2 over the section, 3·35.08·19.05/45 mm/s.
     const MEAN_MM_PER_S: f64 = 44.5;
     behind_mm / MEAN_MM_PER_S + 0.02 + 0.01 + 0.0215
 }

@@ -1,4 +1,4 @@
-//! Starts and stops beside fixed dwell times, as the thesis has them.
+//! Predicted starts and stops beside the thesis' fixed dwell times.
 
 pub mod bench;
 pub mod dwell;

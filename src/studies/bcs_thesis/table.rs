@@ -1,14 +1,13 @@
 //! The bead characterisation thesis beside its tables 3 and 4, and the corner that it
 //! leaves for later.
 
-mod around;
 mod corner;
 mod draw;
 mod start_stop;
 
 use maud::{Markup, html};
 
-use super::bounds;
+use super::bounds::{ParameterBound, first_order, flow_model};
 use super::fit_table::{FitTable, fit_table};
 use super::on_off::{
     CORRELATION_S, Compared, EXPONENT, Sensors, UNMODELLED_FRACTION, WheelControl, camera_age_s,
@@ -20,23 +19,25 @@ use crate::numeric::lti::{DiscretisationMethod, TransferFunction};
 use crate::studies::bcs_thesis as plant;
 use crate::studies::error::ReproduceError;
 use crate::studies::publication::Publication;
-use crate::studies::row::TableRows;
-use crate::studies::study::{Effort, Reproduced, Section};
+use crate::studies::study::{Effort, Reproduced, Section, TableRows};
 
-/// What progress is told of.
+/// Steps of the progress bar. Derived: the parts of [`run`].
 pub const EXPERIMENTS: u64 = 8;
+/// Seeds of the wheel's runs; papers.md asks for at least three.
 const SEEDS: u64 = 10;
-/// Seeds of the table of fits.
+/// Seeds of the table of fits, of which the thesis has one.
 const FIT_SEEDS: u64 = 6;
 /// Seeds of the starts and stops.
 const START_SEEDS: u64 = 20;
-/// Fits beside the bounds of accuracy.
+/// Fits beside the Cramér–Rao bounds: a standard deviation of 100 fits is known to 7 %.
+/// Derived: 1/√(2·100).
 const TRIALS: u64 = 100;
 /// Seeds of each distance of the camera.
 const CAMERA_SEEDS: u64 = 4;
 /// Distances of the camera behind the nozzle \[mm\].
 const CAMERAS_MM: [f64; 6] = [1.0, 2.0, 4.0, 7.0, 10.0, 20.0];
 const PRESSURE: Sensors = Sensors { camera_mm: None, pressure: true, exponent: EXPONENT };
+const RATIO: (&str, &str) = ("area RMSE, off over on", "1");
 
 /// Runs the experiments.
 pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, ReproduceError> {
@@ -45,32 +46,21 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
     let mut sections = Vec::new();
     let fits = fit_table(effort.seeds.unwrap_or(FIT_SEEDS))?;
     push_fits(&fits, &mut rows);
-    sections.push(Section {
-        heading: "Models of the flow".to_owned(),
-        hint: "Screw speed to flow: fitted to one run, judged on another. The example is the \
-               model of two poles and two zeros on the run that it was not fitted to."
-            .to_owned(),
-        drawing: draw::fits(&fits),
-    });
+    let hint = "Screw speed to flow: fitted to one run, judged on another. The example is the \
+                model of two poles and two zeros on the run that it was not fitted to.";
+    sections.push(Section::new("Models of the flow", hint, draw::fits(&fits)));
     progress.advance();
     let exact = exact(seeds, &mut rows)?;
     progress.advance();
     let (thesis, ours) = unmodelled(seeds, &mut rows)?;
     progress.advance();
-    sections.push(Section {
-        heading: "Controller on and off, 17 % of the flow unmodelled".to_owned(),
-        hint: "The extruder's voltage changes at random every 1.5 s. Off: a constant speed of \
-               the wheel. Ours reads the melt pressure as well."
-            .to_owned(),
-        drawing: draw::runs(&thesis, &ours),
-    });
-    sections.push(Section {
-        heading: "Controller on and off, exact model".to_owned(),
-        hint: "Deviation from 45 mm² with the model that the plant has. Ours turns the wheel for \
-               the flow that the drive's dead time lets it know 21.5 ms ahead."
-            .to_owned(),
-        drawing: draw::exact(&exact),
-    });
+    let hint = "The extruder's voltage changes at random every 1.5 s. Off: a constant speed of \
+                the wheel. Ours reads the melt pressure as well.";
+    let heading = "Controller on and off, 17 % of the flow unmodelled";
+    sections.push(Section::new(heading, hint, draw::runs(&thesis, &ours)));
+    let hint = "Deviation from 45 mm² with the model that the plant has. Ours turns the wheel for \
+                the flow that the drive's dead time lets it know 21.5 ms ahead.";
+    sections.push(Section::new("Controller on and off, exact model", hint, draw::exact(&exact)));
     sections.push(sensing(seeds, &mut rows)?);
     progress.advance();
     sections.push(start_stop::section(effort.seeds.unwrap_or(START_SEEDS), &mut rows)?);
@@ -79,21 +69,13 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
     progress.advance();
     accuracy_bounds(&mut rows)?;
     progress.advance();
-    sections.push(Section {
-        heading: "Models at 200 Hz".to_owned(),
-        hint: "Coefficients with the highest power of z first; dead times as whole steps and, \
-               where the hold keeps them, parts of a step in the numerator. Where a method has no \
-               place for a part of a step, the dead time is left out."
-            .to_owned(),
-        drawing: discretised()?,
-    });
+    let hint = "Coefficients with the highest power of z first; dead times as whole steps and, \
+                where the hold keeps them, parts of a step in the numerator. Where a method has no \
+                place for a part of a step, the dead time is left out.";
+    sections.push(Section::new("Models at 200 Hz", hint, discretised()?));
     progress.advance();
-    Ok(Reproduced {
-        title: "Bead characterisation thesis",
-        about: about(effort),
-        rows: rows.into_vec(),
-        sections,
-    })
+    let (title, about) = ("Bead characterisation thesis", about(effort));
+    Ok(Reproduced { title, about, rows: rows.into_vec(), sections })
 }
 
 fn about(effort: Effort) -> String {
@@ -122,133 +104,94 @@ fn push_fits(table: &FitTable, rows: &mut TableRows) {
         let found = [Some(row.published_percent), Some(row.simulated_percent), None];
         rows.push(case, ("NRMSE fit on validation data", "%"), found);
     }
-    let case = "fit, all models";
-    rows.push(case, ("RMS distance of the columns", "%"), [None, Some(table.rms_points), None]);
+    let distance = ("RMS distance of the columns", "%");
+    rows.push("fit, all models", distance, [None, Some(table.rms_points), None]);
 }
 
-/// A control beside the thesis' with an exact model.
+/// Our controller beside the thesis' with an exact model.
 fn exact(seeds: u64, rows: &mut TableRows) -> Result<[Compared; 2], ReproduceError> {
     let thesis = compare(seeds, 0.0, WheelControl::Thesis)?;
     let ours = compare(seeds, 0.0, WheelControl::Ahead)?;
     let case = "controller, exact model";
-    rows.push(case, ("area RMSE, off over on", "1"), [None, Some(thesis.ratio), Some(ours.ratio)]);
-    let on = |found: &Compared| Some(found.area_rmse_mm2[1]);
-    rows.push(case, ("area RMSE, on", "mm²"), [None, on(&thesis), on(&ours)]);
+    rows.compare(case, RATIO, thesis.ratio, ours.ratio);
+    let on = [&thesis, &ours].map(|found| found.area_rmse_mm2[1]);
+    rows.compare(case, ("area RMSE, on", "mm²"), on[0], on[1]);
     Ok([thesis, ours])
 }
 
-/// The same with 17 % of the flow's standard deviation unmodelled, as the
-/// thesis' own plant has it: table 4.
+/// The same with 17 % of the flow's standard deviation unmodelled: table 4.
 fn unmodelled(seeds: u64, rows: &mut TableRows) -> Result<(Compared, Compared), ReproduceError> {
     let thesis = compare(seeds, UNMODELLED_FRACTION, WheelControl::Thesis)?;
     let ours = compare(seeds, UNMODELLED_FRACTION, WheelControl::Observed(PRESSURE))?;
     let case = "controller, 17 % unmodelled";
-    let ratio = [Some(3.43 / 0.57), Some(thesis.ratio), Some(ours.ratio)];
-    rows.push(case, ("area RMSE, off over on", "1"), ratio);
-    let least = [None, Some(thesis.min_ratio), Some(ours.min_ratio)];
-    rows.push(case, ("the same, worst seed", "1"), least);
-    for quantity in QUANTITIES {
-        for (which, name) in quantity.names.into_iter().enumerate() {
-            let found = |compared: &Compared| Some((quantity.of)(compared)[which]);
-            // Off is off, whoever controls.
-            let ours = if which == 1 { found(&ours) } else { None };
-            let values = [Some(quantity.published[which]), found(&thesis), ours];
-            rows.push(case, (name, quantity.unit), values);
+    rows.push(case, RATIO, [3.43 / 0.57, thesis.ratio, ours.ratio].map(Some));
+    rows.compare(case, ("the same, worst seed", "1"), thesis.min_ratio, ours.min_ratio);
+    for (names, unit, published, of) in QUANTITIES {
+        for (which, name) in names.into_iter().enumerate() {
+            // Without control both columns are the same run.
+            let ours = (which == 1).then(|| of(&ours)[which]);
+            rows.push(case, (name, unit), [Some(published[which]), Some(of(&thesis)[which]), ours]);
         }
     }
     Ok((thesis, ours))
 }
 
-/// A quantity of table 4, off and on.
-struct Quantity {
-    names: [&'static str; 2],
-    unit: &'static str,
-    published: [f64; 2],
-    of: fn(&Compared) -> [f64; 2],
-}
-
+/// Names of a quantity of table 4 off and on, its unit, published values and how it is read.
+type Quantity = ([&'static str; 2], &'static str, [f64; 2], fn(&Compared) -> [f64; 2]);
 const QUANTITIES: [Quantity; 4] = [
-    Quantity {
-        names: ["area RMSE, off", "area RMSE, on"],
-        unit: "mm²",
-        published: [3.43, 0.57],
-        of: |compared| compared.area_rmse_mm2,
-    },
-    Quantity {
-        names: ["area MAE, off", "area MAE, on"],
-        unit: "mm²",
-        published: [2.72, 0.44],
-        of: |compared| compared.area_mae_mm2,
-    },
-    Quantity {
-        names: ["width RMSE, off", "width RMSE, on"],
-        unit: "mm",
-        published: [1.91, 0.49],
-        of: |compared| compared.width_rmse_mm,
-    },
-    Quantity {
-        names: ["width MAE, off", "width MAE, on"],
-        unit: "mm",
-        published: [1.53, 0.38],
-        of: |compared| compared.width_mae_mm,
-    },
+    (["area RMSE, off", "area RMSE, on"], "mm²", [3.43, 0.57], |found| found.area_rmse_mm2),
+    (["area MAE, off", "area MAE, on"], "mm²", [2.72, 0.44], |found| found.area_mae_mm2),
+    (["width RMSE, off", "width RMSE, on"], "mm", [1.91, 0.49], |found| found.width_rmse_mm),
+    (["width MAE, off", "width MAE, on"], "mm", [1.53, 0.38], |found| found.width_mae_mm),
 ];
 
-/// What other sensors would bring, beside the bound that their age sets.
+/// The gain by other sensors, beside the bound that the age of their data sets.
 fn sensing(seeds: u64, rows: &mut TableRows) -> Result<Section, ReproduceError> {
     let camera = |mm| Sensors { camera_mm: Some(mm), pressure: false, ..PRESSURE };
-    let others = [
+    let observed = |seeds, sensors| -> Result<f64, ReproduceError> {
+        Ok(compare(seeds, UNMODELLED_FRACTION, WheelControl::Observed(sensors))?.ratio)
+    };
+    for (name, sensors) in [
         ("pressure, exponent 1.50 for 1.58", Sensors { exponent: 1.5, ..PRESSURE }),
         ("pressure and camera 10 mm behind", Sensors { camera_mm: Some(10.0), ..PRESSURE }),
         ("camera 10 mm behind", camera(10.0)),
         ("camera 4 mm behind", camera(4.0)),
-    ];
-    for (name, sensors) in others {
-        let found = compare(seeds, UNMODELLED_FRACTION, WheelControl::Observed(sensors))?;
-        let case = format!("17 % unmodelled, {name}");
-        rows.push(case, ("area RMSE, off over on", "1"), [None, None, Some(found.ratio)]);
+    ] {
+        rows.ours(format!("17 % unmodelled, {name}"), RATIO, observed(seeds, sensors)?);
     }
     let mut found = Vec::new();
     for mm in CAMERAS_MM {
-        let seeds = seeds.min(CAMERA_SEEDS);
-        let compared = compare(seeds, UNMODELLED_FRACTION, WheelControl::Observed(camera(mm)))?;
-        found.push(draw::CameraGain { behind_mm: mm, ratio: compared.ratio });
+        found.push((mm, observed(seeds.min(CAMERA_SEEDS), camera(mm))?));
     }
-    let bound: Vec<draw::CameraGain> = (0..=100_u32)
-        .map(|step| {
-            let mm = 0.2 * f64::from(step);
-            let left = unpredictable_fraction(camera_age_s(mm), CORRELATION_S);
-            // The flow off varies by the unmodelled part as well.
-            let ratio = (1.0 + UNMODELLED_FRACTION.powi(2)).sqrt() / (UNMODELLED_FRACTION * left);
-            draw::CameraGain { behind_mm: mm, ratio }
-        })
-        .collect();
-    Ok(Section {
-        heading: "What a camera behind the nozzle can do".to_owned(),
-        hint: "Off over on with a camera that sees the section some way behind the nozzle, 20 ms \
-               late, and the bound for any controller that acts when it does: noise that is \
-               forgotten within 0.15 s leaves √(1 − e^(−2T/0.15 s)) of its standard deviation \
-               after a time T."
-            .to_owned(),
-        drawing: draw::sensing(&found, &bound),
-    })
+    let bound = (0..=100_u32).map(|step| {
+        let mm = 0.2 * f64::from(step);
+        let left = unpredictable_fraction(camera_age_s(mm), CORRELATION_S);
+        // The unmodelled part varies the flow without control as well.
+        (mm, (1.0 + UNMODELLED_FRACTION.powi(2)).sqrt() / (UNMODELLED_FRACTION * left))
+    });
+    let hint = "Off over on with a camera that sees the section some way behind the nozzle, 20 ms \
+                late, and the bound for any controller that acts when it does: noise that is \
+                forgotten within 0.15 s leaves √(1 − e^(−2T/0.15 s)) of its standard deviation \
+                after a time T.";
+    let drawing = draw::sensing(found, bound.collect());
+    Ok(Section::new("What a camera behind the nozzle can do", hint, drawing))
 }
 
-/// The least errors that parameters can have, and those of our fits.
+/// Cramér–Rao bounds of parameters, and the errors of our fits.
 fn accuracy_bounds(rows: &mut TableRows) -> Result<(), ReproduceError> {
     let case = "step of 0.6, 10 s at 50 Hz, least error and ours";
     let names = ["σ of K", "σ of τ", "σ of L"];
-    for (bound, quantity) in bounds::first_order(TRIALS)?.iter().zip(names) {
+    for (bound, quantity) in first_order(TRIALS)?.iter().zip(names) {
         let (unit, scale) = if bound.name == "K" { ("1", 1.0) } else { ("ms", 1000.0) };
-        let [least, ours] = [bound.sigma, bound.spread].map(|sigma| Some(sigma * scale));
-        rows.push(case, (quantity, unit), [None, least, ours]);
+        rows.compare(case, (quantity, unit), bound.sigma * scale, bound.spread * scale);
     }
     let case = "G2, 60 s of PRBS, 17 % white noise, least error and ours";
     let names = ["σ of a1", "σ of a0", "σ of b2", "σ of b1", "σ of b0"];
-    for (bound, quantity) in bounds::flow_model(TRIALS)?.iter().zip(names) {
-        let percent = |sigma: f64| Some(100.0 * sigma / bound.value.abs());
-        let values = [None, percent(bound.sigma), percent(bound.spread)];
-        rows.push(case, (quantity, "%"), values);
+    for (ParameterBound { value, sigma, spread, .. }, quantity) in
+        flow_model(TRIALS)?.into_iter().zip(names)
+    {
+        let percent = |sigma: f64| 100.0 * sigma / value.abs();
+        rows.compare(case, (quantity, "%"), percent(sigma), percent(spread));
     }
     Ok(())
 }
@@ -292,6 +235,7 @@ fn on_the_grid(
     model: &TransferFunction,
     method: DiscretisationMethod,
 ) -> Result<[String; 3], ReproduceError> {
+    /// Sample time \[s\]. Derived: 200 Hz, bead characterisation thesis, § 4.2.
     const DT_S: f64 = 0.005;
     let found = match model.discretise(DT_S, method) {
         Ok(found) => found,

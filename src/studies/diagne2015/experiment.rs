@@ -1,4 +1,4 @@
-//! Everything that is tried on one course of the conveying speed.
+//! All runs with one conveying speed.
 
 use super::response::{Cycle, PlugResponse};
 use super::run::{FeedMethod, RunError, RunPlan, follow};
@@ -7,20 +7,23 @@ use super::{
 };
 use crate::extruder::screw::control::Scheme;
 use crate::extruder::screw::{FillFeedback, Screw, TurnUnit};
+use crate::numeric::number::to_count;
 use crate::sim::screw::delay_free;
 
+/// By definition.
 const MM_PER_M: f64 = 1000.0;
-/// Length of the runs that settle late or never, and of the others \[s\].
+/// Length of the runs that settle late or never \[s\]: papers.md, "over the last part of 60 s".
 const LONG_S: f64 = 60.0;
+/// Length of the other runs \[s\]: twice the time in which they settle.
 const SHORT_S: f64 = 4.0;
-/// Step of the paper's runs \[s\].
+/// Step of the paper's runs \[s\]: papers.md, "state and control at 1 ms".
 const STEP_S: f64 = 0.001;
-/// Slopes at the setpoint at which the law between limits is tried \[1/m\]; the
-/// first is the one that is compared elsewhere.
+/// Slopes at the setpoint of the saturated controller \[1/m\]; the first one is compared
+/// elsewhere. Steeper ones settle sooner and amplify noise.
 pub const SLOPES_PER_M: [f64; 3] = [60.0, 100.0, 200.0];
 
-/// A predictor in the paper's scheme on the paper's plant, and in ours on a
-/// plant that is integrated to high order.
+/// A predictor in the paper's scheme on the paper's plant, and in ours on a plant that is
+/// integrated to high order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PredictorPair {
     /// By Euler steps.
@@ -29,30 +32,29 @@ pub struct PredictorPair {
     pub exact: PlugResponse,
 }
 
-/// What a course of the conveying speed came to.
+/// Responses with one conveying speed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Examined {
-    /// The course of the speed.
+    /// The conveying speed.
     pub case: PulsationCase,
     /// First effect of the control, σ0 \[s\].
     pub first_effect_s: f64,
-    /// The share that holds the setpoint, from the start on.
+    /// Open loop: the fill that holds the setpoint, from the start on.
     pub open: PlugResponse,
-    /// The law without a predictor.
+    /// Feedback without a predictor.
     pub uncompensated: PlugResponse,
-    /// The predictor that knows how the speed pulsates.
+    /// A predictor that knows the pulsation.
     pub informed: PredictorPair,
-    /// The predictor that takes the speed for steady.
+    /// A predictor that assumes a steady speed.
     pub uninformed: PredictorPair,
-    /// The law between limits on the informed prediction, for each of
-    /// [`SLOPES_PER_M`].
+    /// The saturated controller with the informed prediction, for each of [`SLOPES_PER_M`].
     pub straight: Vec<PlugResponse>,
     /// The delay-free loop from the first effect on: time \[s\] and plug \[mm\].
     pub oracle: Vec<(f64, f64)>,
-    /// How far the informed predictors' loops are from it at most \[mm\].
+    /// Largest deviation of the informed predictors' loops from it \[mm\].
     pub max_deviation_mm: [f64; 2],
-    /// When a feed at its limit from the start on brings the plug within the
-    /// band: no law is sooner \[s\].
+    /// When the largest feed from the start on brings the plug within the band \[s\]: no
+    /// controller is sooner.
     pub soonest_s: f64,
 }
 
@@ -77,10 +79,8 @@ impl Examined {
         }
         let first_effect_s = screw.arrival(0.0, START.get() / MM_PER_M);
         let (first, oracle) = oracle(&screw, first_effect_s, &controller);
-        let missed = |course: &PlugResponse| {
-            course.max_deviation(first, oracle.iter().map(|(_, plug)| *plug))
-        };
-        let misses_mm = [missed(&informed.paper), missed(&informed.exact)];
+        let max_deviation_mm = [&informed.paper, &informed.exact]
+            .map(|response| response.max_deviation(first, oracle.iter().map(|(_, plug)| *plug)));
         Ok(Self {
             case,
             first_effect_s,
@@ -90,24 +90,24 @@ impl Examined {
             informed,
             straight,
             oracle,
-            max_deviation_mm: misses_mm,
+            max_deviation_mm,
             soonest_s: soonest(&screw, first_effect_s),
         })
     }
 
-    /// The swing of the law without a predictor.
+    /// The limit cycle of feedback without a predictor.
     pub fn cycle(&self) -> Option<Cycle> {
         self.uncompensated.cycle(SETPOINT.plug.get(), LONG_S - CYCLE_S)
     }
 }
 
-/// When a course settled \[s\].
-pub fn settles(course: &PlugResponse) -> Option<f64> {
-    course.settles(SETPOINT.plug.get(), SETTLING_BAND_MM)
+/// Settling time of a response \[s\].
+pub fn settles(response: &PlugResponse) -> Option<f64> {
+    response.settles(SETPOINT.plug.get(), SETTLING_BAND_MM)
 }
 
-/// Number of the first sample after the first effect, and the delay-free loop
-/// at that one and those after it.
+/// Index of the first sample after the first effect, and the delay-free loop from that one
+/// on.
 fn oracle(
     screw: &Screw,
     first_effect_s: f64,
@@ -122,9 +122,7 @@ fn oracle(
     let times = (0_u32..).map(|tick| (first + f64::from(tick)) * STEP_S);
     let points = times.zip(lengths.map(|length| length * MM_PER_M));
     let points = points.take_while(|(at_s, _)| *at_s <= SHORT_S).collect();
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-    let number = first as usize;
-    (number, points)
+    (to_count(first), points)
 }
 
 fn soonest(screw: &Screw, first_effect_s: f64) -> f64 {
@@ -140,30 +138,30 @@ mod tests {
     use super::*;
     use crate::studies::diagne2015::CASES;
 
-    /// σ0, open loop, swing and its period, informed and uninformed predictor.
+    /// σ0, open loop, limit cycle and its period, informed and uninformed predictor (papers.md).
     const KNOWN: [[f64; 6]; 3] = [
         [1.061, 26.71, 8.8, 1.66, 1.706, 1.706],
         [1.137, 26.78, 9.8, 1.67, 1.763, 1.968],
         [0.768, 27.72, 10.3, 1.46, 1.237, 1.839],
     ];
 
-    fn near(found: f64, known: f64, share: f64) {
-        assert!((found / known - 1.0).abs() < share, "{found} is not {known}");
+    fn near(found: f64, known: f64, tolerance: f64) {
+        assert!((found / known - 1.0).abs() < tolerance, "{found} is not {known}");
     }
 
     #[test]
-    fn the_table_comes_out() {
+    fn the_runs_give_the_figures_of_an_independent_simulation() {
         for (case, known) in CASES.into_iter().zip(KNOWN) {
             let found = Examined::run(case).unwrap();
-            let [first, open, swing, period, informed, uninformed] = known;
+            let [first, open, peak_to_peak, period, informed, uninformed] = known;
             near(found.first_effect_s, first, 0.001);
             near(settles(&found.open).unwrap(), open, 0.001);
             let cycle = found.cycle().unwrap();
-            near(cycle.peak_to_peak_mm, swing, 0.02);
+            near(cycle.peak_to_peak_mm, peak_to_peak, 0.02);
             near(cycle.period_s, period, 0.02);
             near(settles(&found.informed.paper).unwrap(), informed, 0.001);
             near(settles(&found.uninformed.paper).unwrap(), uninformed, 0.001);
-            // Sampled at 1 ms the exact loop is a perfect predictor's.
+            // Sampled at 1 ms the exact loop is that of a perfect predictor.
             assert!(found.max_deviation_mm[1] < 0.05, "{:?}", found.max_deviation_mm);
             assert!(
                 (0.4..0.7).contains(&found.max_deviation_mm[0]),
@@ -171,10 +169,10 @@ mod tests {
                 found.max_deviation_mm
             );
             near(settles(&found.informed.exact).unwrap(), informed, 0.01);
-            // As soon as the limit allows, the steeper the sooner.
+            // Steeper slopes settle sooner, down to what the largest feed allows.
             let mut before = settles(&found.informed.exact).unwrap();
-            for course in &found.straight {
-                let settled = settles(course).unwrap();
+            for response in &found.straight {
+                let settled = settles(response).unwrap();
                 assert!(settled < before && settled > found.soonest_s);
                 before = settled;
             }

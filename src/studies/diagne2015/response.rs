@@ -1,17 +1,18 @@
-//! What a run went through, and the figures that it is judged by.
+//! The response of a run, and its figures.
 
-/// One moment of a run.
+use crate::numeric::number::to_f64;
+/// One sample of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlugSample {
-    /// Since the start \[s\].
+    /// Time since the start \[s\].
     pub at_s: f64,
     /// Length of the plug \[mm\].
     pub plug_mm: f64,
-    /// Share of full that is fed.
+    /// Fill that is fed, 0 to 1.
     pub fill: f64,
-    /// Foretold length of the plug when that arrives \[mm\], and when \[s\].
+    /// Predicted length of the plug when this feed arrives \[mm\], and when it arrives \[s\].
     pub predicted: Option<(f64, f64)>,
-    /// Delay of what arrives \[s\].
+    /// Delay of the feed that arrives \[s\].
     pub delay_s: f64,
 }
 
@@ -22,54 +23,56 @@ pub struct PlugResponse {
     pub samples: Vec<PlugSample>,
 }
 
-/// A swing that stays.
+/// A limit cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cycle {
     /// From the lowest to the highest length of the plug \[mm\].
     pub peak_to_peak_mm: f64,
-    /// Time from one pass in a direction to the next \[s\].
+    /// Period \[s\].
     pub period_s: f64,
 }
 
 impl PlugResponse {
-    /// When the plug came nearer to a length than `within_mm` for good \[s\].
+    /// Time from which the plug stays within `within_mm` of a length \[s\].
     pub fn settles(&self, plug_mm: f64, within_mm: f64) -> Option<f64> {
         let outside = |sample: &PlugSample| (sample.plug_mm - plug_mm).abs() > within_mm;
         let inside = self.samples.iter().rposition(outside).map_or(0, |last| last + 1);
         self.samples.get(inside).map(|sample| sample.at_s)
     }
 
-    /// How far the plug went beyond a length \[mm\].
+    /// Overshoot of the plug beyond a length \[mm\].
     pub fn overshoot_mm(&self, plug_mm: f64) -> f64 {
         self.samples.iter().map(|sample| sample.plug_mm - plug_mm).fold(0.0, f64::max)
     }
 
-    /// Root mean square distance from a length after a moment \[mm\].
+    /// Root mean square deviation from a length after a time \[mm\].
     pub fn rms_mm(&self, plug_mm: f64, after_s: f64) -> f64 {
-        let late = self.after(after_s);
-        let sum: f64 = late.iter().map(|sample| (sample.plug_mm - plug_mm).powi(2)).sum();
-        (sum / count(late)).sqrt()
+        let samples = self.after(after_s);
+        let sum: f64 = samples.iter().map(|sample| (sample.plug_mm - plug_mm).powi(2)).sum();
+        (sum / to_f64(samples.len().max(1))).sqrt()
     }
 
-    /// Root mean square change of the feed from step to step, after a moment:
-    /// how much the feeder is shaken.
+    /// Root mean square change of the feed from step to step after a time: the activity of the
+    /// feeder.
     pub fn feed_change(&self, after_s: f64) -> f64 {
-        let late = self.after(after_s);
-        let sum: f64 = late.windows(2).map(|pair| change(pair).powi(2)).sum();
-        (sum / count(late)).sqrt()
+        let samples = self.after(after_s);
+        let changes = samples.windows(2).map(|pair| (pair[1].fill - pair[0].fill).powi(2));
+        (changes.sum::<f64>() / to_f64(samples.len().max(1))).sqrt()
     }
 
-    /// The swing about a length after a moment; none where the plug keeps still
-    /// to a tenth of a millimetre or does not pass the length four times. The
-    /// period is twice the median time from one pass to the next, because it
-    /// changes with a conveying speed that pulsates slowly.
+    /// The limit cycle about a length after a time; none where the plug moves by less than a
+    /// tenth of a millimetre or crosses the length less than four times. The period is twice
+    /// the median time between crossings, because it changes with a conveying speed that
+    /// pulsates slowly.
     pub fn cycle(&self, plug_mm: f64, after_s: f64) -> Option<Cycle> {
-        let late = self.after(after_s);
-        let (low, high) = late.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), s| {
-            (low.min(s.plug_mm), high.max(s.plug_mm))
-        });
-        let passes: Vec<f64> = late.windows(2).filter_map(|pair| pass(pair, plug_mm)).collect();
-        let mut halves: Vec<f64> = passes.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let samples = self.after(after_s);
+        let (low, high) =
+            samples.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), s| {
+                (low.min(s.plug_mm), high.max(s.plug_mm))
+            });
+        let crossings: Vec<f64> =
+            samples.windows(2).filter_map(|pair| crossing(pair, plug_mm)).collect();
+        let mut halves: Vec<f64> = crossings.windows(2).map(|pair| pair[1] - pair[0]).collect();
         if halves.len() < 3 || high - low < 0.1 {
             return None;
         }
@@ -78,14 +81,11 @@ impl PlugResponse {
         Some(Cycle { peak_to_peak_mm: high - low, period_s: 2.0 * half })
     }
 
-    /// Largest distance from a row of lengths that are a sample apart \[mm\],
-    /// of which the first belongs to the sample number `from`.
+    /// Largest deviation from lengths at successive samples \[mm\]; the first length is that of
+    /// the sample `from`.
     pub fn max_deviation(&self, from: usize, lengths_mm: impl Iterator<Item = f64>) -> f64 {
-        let late = self.samples.get(from..).unwrap_or_default();
-        late.iter()
-            .zip(lengths_mm)
-            .map(|(s, length)| (s.plug_mm - length).abs())
-            .fold(0.0, f64::max)
+        let pairs = self.samples.get(from..).unwrap_or_default().iter().zip(lengths_mm);
+        pairs.map(|(s, length)| (s.plug_mm - length).abs()).fold(0.0, f64::max)
     }
 
     fn after(&self, after_s: f64) -> &[PlugSample] {
@@ -94,30 +94,21 @@ impl PlugResponse {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "far fewer samples than 2⁵³")]
-fn count(samples: &[PlugSample]) -> f64 {
-    samples.len().max(1) as f64
-}
-
-fn change(pair: &[PlugSample]) -> f64 {
-    if let [one, two] = pair { two.fill - one.fill } else { 0.0 }
-}
-
-/// When a pair of samples passes a level in either direction.
-fn pass(pair: &[PlugSample], level: f64) -> Option<f64> {
+/// When a pair of samples crosses a level in either direction.
+fn crossing(pair: &[PlugSample], level: f64) -> Option<f64> {
     let [one, two] = pair else { return None };
     if (one.plug_mm < level) == (two.plug_mm < level) {
         return None;
     }
-    let share = (level - one.plug_mm) / (two.plug_mm - one.plug_mm);
-    Some(one.at_s + share * (two.at_s - one.at_s))
+    let fraction = (level - one.plug_mm) / (two.plug_mm - one.plug_mm);
+    Some(one.at_s + fraction * (two.at_s - one.at_s))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn course(plug: impl Fn(f64) -> f64) -> PlugResponse {
+    fn response(plug: impl Fn(f64) -> f64) -> PlugResponse {
         let sample = |k: u32| {
             let at_s = 0.001 * f64::from(k);
             PlugSample { at_s, plug_mm: plug(at_s), fill: 0.0, predicted: None, delay_s: 0.0 }
@@ -126,17 +117,17 @@ mod tests {
     }
 
     #[test]
-    fn settling_is_for_good_and_a_swing_is_measured() {
-        let falling = course(|at| 160.0 - 60.0 * (-at).exp());
+    fn settling_is_final_and_a_limit_cycle_is_measured() {
+        let falling = response(|at| 160.0 - 60.0 * (-at).exp());
         let settled = falling.settles(160.0, 3.2).unwrap();
         assert!((settled - (60.0_f64 / 3.2).ln()).abs() < 1.1e-3);
         assert_eq!(falling.overshoot_mm(160.0), 0.0);
-        let swing = course(|at| 160.0 + 4.4 * (std::f64::consts::TAU * at / 1.6).sin());
-        assert_eq!(swing.settles(160.0, 3.2), None);
-        let cycle = swing.cycle(160.0, 2.0).unwrap();
+        let cycling = response(|at| 160.0 + 4.4 * (std::f64::consts::TAU * at / 1.6).sin());
+        assert_eq!(cycling.settles(160.0, 3.2), None);
+        let cycle = cycling.cycle(160.0, 2.0).unwrap();
         assert!((cycle.peak_to_peak_mm - 8.8).abs() < 1e-3);
         assert!((cycle.period_s - 1.6).abs() < 1e-6);
-        assert!((swing.rms_mm(160.0, 2.0) - 4.4 / 2_f64.sqrt()).abs() < 1e-2);
+        assert!((cycling.rms_mm(160.0, 2.0) - 4.4 / 2_f64.sqrt()).abs() < 1e-2);
         assert!(falling.cycle(160.0, 2.0).is_none());
     }
 }

@@ -1,4 +1,4 @@
-//! One run: a plant, what the control knows of it, and how the plug is measured.
+//! One run: a plant, the controller's model of it, and the measurement of the plug.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -12,27 +12,28 @@ use crate::extruder::screw::control::{Scheme, ScrewSettings};
 use crate::extruder::screw::{FillFeedback, Screw, ScrewControl, ScrewError, ScrewFault};
 use crate::sim::screw::{Integrator, SimScrew};
 
+/// By definition.
 const MM_PER_M: f64 = 1000.0;
 
-/// What feeds the screw.
+/// How the screw is fed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FeedMethod {
-    /// The share that holds the setpoint, from the start on.
+    /// The fill that holds the setpoint, from the start on.
     OpenLoop,
-    /// The law on the measured plug, as if there were no delay.
+    /// Feedback of the measured plug, without regard to the delay.
     Uncompensated(FillFeedback),
-    /// The law on the foretold plug.
+    /// Feedback of the predicted plug.
     Predictor {
-        /// The law.
+        /// The controller.
         controller: FillFeedback,
-        /// How the prediction is computed.
+        /// The prediction scheme.
         scheme: Scheme,
-        /// What the predictor knows of the screw.
+        /// The predictor's model of the screw.
         known: Screw,
     },
 }
 
-/// How a run is made.
+/// Plant and schedule of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RunPlan {
     /// The plant.
@@ -41,7 +42,7 @@ pub struct RunPlan {
     pub integrator: Integrator,
     /// Step of the plant \[ms\].
     pub step_ms: u32,
-    /// Steps of the plant between two of the control.
+    /// Plant steps between two control steps.
     pub hold: u32,
     /// Length of the run \[s\].
     pub until_s: f64,
@@ -52,30 +53,30 @@ pub struct RunPlan {
 }
 
 impl RunPlan {
-    /// The paper's: plant and control by Euler steps of a millisecond.
+    /// The paper's: plant and controller by Euler steps of 1 ms.
     pub fn paper(screw: Screw, until_s: f64) -> Self {
         let integrator = Integrator::Euler;
         Self { screw, integrator, step_ms: 1, hold: 1, until_s, noise_mm: 0.0, seed: 0 }
     }
 
-    /// The same with a plant that is integrated to high order.
+    /// The same with a plant that is integrated by Runge–Kutta steps.
     pub fn exact(screw: Screw, until_s: f64) -> Self {
         Self { integrator: Integrator::RungeKutta(1e-3), ..Self::paper(screw, until_s) }
     }
 
-    /// Time between two steps of the control.
+    /// Period of the controller.
     pub fn period(&self) -> Span {
         Span::from_millis(i64::from(self.step_ms) * i64::from(self.hold))
     }
 }
 
-/// Why a run could not be made.
+/// Errors of a run.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RunError {
-    /// Parameters that do not fit.
+    /// Inconsistent parameters.
     #[error(transparent)]
     Screw(#[from] ScrewError),
-    /// The control gave up.
+    /// A fault of the controller.
     #[error("at {at_s:.3} s: {fault}")]
     Fault {
         /// When \[s\].
@@ -85,7 +86,7 @@ pub enum RunError {
     },
 }
 
-/// Runs it, from a plug that has been held at the start.
+/// Runs it, from a plug in its steady state at the start.
 pub fn follow(plan: &RunPlan, method: &FeedMethod) -> Result<PlugResponse, RunError> {
     let start_m = START.get() / MM_PER_M;
     let before = plan.screw.holding_fill(start_m);
@@ -93,7 +94,7 @@ pub fn follow(plan: &RunPlan, method: &FeedMethod) -> Result<PlugResponse, RunEr
     let mut plant = SimScrew::new(plan.screw, plan.integrator, step_s, start_m, before);
     let mut feeder = Feeder::new(plan, method, before)?;
     let mut noise = Xoshiro256PlusPlus::seed_from_u64(plan.seed);
-    let mut course = PlugResponse::default();
+    let mut response = PlugResponse::default();
     let mut fed = (before, None);
     for tick in 0_u32.. {
         let at_s = plant.now_s();
@@ -107,26 +108,21 @@ pub fn follow(plan: &RunPlan, method: &FeedMethod) -> Result<PlugResponse, RunEr
             fed = feeder.feed(tick * plan.step_ms, measured)?;
         }
         let (fill, predicted) = fed;
-        course.samples.push(PlugSample {
-            at_s,
-            plug_mm,
-            fill,
-            predicted,
-            delay_s: plant.delay_s(),
-        });
+        let delay_s = plant.delay_s();
+        response.samples.push(PlugSample { at_s, plug_mm, fill, predicted, delay_s });
         plant.advance(fill);
     }
-    Ok(course)
+    Ok(response)
 }
 
-/// What feeds, with its memory.
+/// A feed method with its state.
 enum Feeder {
     Constant(f64),
     StateFeedback(FillFeedback),
     Control(ScrewControl),
 }
 
-/// A share, and the plug that was foretold \[mm\] with its moment \[s\].
+/// A fill, and the predicted plug \[mm\] with its time \[s\].
 type Fed = (f64, Option<(f64, f64)>);
 
 impl Feeder {
@@ -137,14 +133,9 @@ impl Feeder {
             }
             FeedMethod::Uncompensated(controller) => Self::StateFeedback(controller),
             FeedMethod::Predictor { controller, scheme, known } => {
-                let period = plan.period();
-                let settings = ScrewSettings {
-                    screw: known,
-                    feedback: controller,
-                    scheme,
-                    period,
-                    initial_fill: before,
-                };
+                let (screw, feedback, period) = (known, controller, plan.period());
+                let initial_fill = before;
+                let settings = ScrewSettings { screw, feedback, scheme, period, initial_fill };
                 Self::Control(ScrewControl::new(&settings)?)
             }
         })

@@ -1,4 +1,4 @@
-//! Table 1: how soon tracking and estimate converge after a step.
+//! Table 1: convergence times of tracking and estimate after a step.
 
 use super::strand::{InputDisturbance, StrandParameters};
 use super::{
@@ -12,10 +12,10 @@ use crate::extruder::adaptive::SubSystemError;
 pub struct TableCase {
     /// Its number.
     pub number: u32,
-    /// What is disturbed.
+    /// The disturbed sub-system.
     pub of: SubSystem,
-    /// Step in ṁ \[kg/s\] or, as it is read here, in percent of the plate's
-    /// speed: the table says m/s, which no plate can be.
+    /// Step in ṁ \[kg/s\], or in the plate's speed \[%\]: the unit of the table, m/s, cannot
+    /// be right (papers.md).
     pub size: f64,
     /// Published convergence of tracking \[s\].
     pub tracking_s: f64,
@@ -23,7 +23,7 @@ pub struct TableCase {
     pub estimate_s: f64,
 }
 
-/// Which half of the plant.
+/// A sub-system of the plant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SubSystem {
     /// Sub-system 1.
@@ -32,7 +32,7 @@ pub enum SubSystem {
     Strand,
 }
 
-/// Table 1.
+/// Mohammadi Looey et al. 2026, table 1.
 pub const TABLE: [TableCase; 10] = [
     case(1, SubSystem::Nozzle, 0.0025, 4.87, 7.97),
     case(2, SubSystem::Nozzle, -0.0025, 4.77, 8.64),
@@ -56,28 +56,26 @@ const fn case(
     TableCase { number, of, size, tracking_s, estimate_s }
 }
 
-/// When tracking and estimate stay within their tolerances, after the step
-/// \[s\].
+/// Time after the step from which tracking and estimate stay within their tolerances \[s\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Convergence {
-    /// `t_cr`; none where it is outside at the end of the horizon.
+    /// `t_cr`; none where it has not converged at the end of the horizon.
     pub tracking_s: Option<f64>,
     /// `t_cp`; the same.
     pub estimate_s: Option<f64>,
 }
 
 impl TableCase {
-    /// Runs it with a law.
+    /// Runs it with a controller.
     pub fn run(&self, method: AdaptationMethod) -> Result<Convergence, SubSystemError> {
         let (from_s, to_s) = (STEP_AT_S, f64::INFINITY);
+        let none = InputDisturbance::None;
         let step = |size| InputDisturbance::Step { size, from_s, to_s };
         let (feed, plate, part, input_gain) = match self.of {
-            SubSystem::Nozzle => {
-                (step(self.size), InputDisturbance::None, 0, MODEL.nozzle.input_gain)
-            }
+            SubSystem::Nozzle => (step(self.size), none, 0, MODEL.nozzle.input_gain),
             SubSystem::Strand => {
                 let size = 0.01 * self.size * operating_point().plate_m_per_s;
-                (InputDisturbance::None, step(size), 1, MODEL.strand.input_gain)
+                (none, step(size), 1, MODEL.strand.input_gain)
             }
         };
         let length_s = STEP_AT_S + WATCHED_S;

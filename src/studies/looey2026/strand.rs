@@ -7,7 +7,7 @@ use crate::extruder::adaptive::{StrandInputs, StrandModel};
 /// seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum InputDisturbance {
-    /// Nothing.
+    /// None.
     #[default]
     None,
     /// A step of a size at a time, and back at another (infinite: never).
@@ -49,7 +49,7 @@ impl InputDisturbance {
     }
 }
 
-/// A disturbance over one step: straight from its first to its last value.
+/// A disturbance over one step: linear from its first to its last value.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Ramp {
     /// At the start of the step, in the unit of its input.
@@ -58,10 +58,10 @@ pub struct Ramp {
     pub last: f64,
 }
 
-/// How the plant's parameters go with its inputs.
+/// Dependence of the plant's parameters on its inputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StrandParameters {
-    /// Constant, eqs. (6) and (7): the plant that the law is designed for.
+    /// Constant, eqs. (6) and (7): the plant that the controller is designed for.
     Constant,
     /// In proportion to the inputs, eqs. (1)–(5), and equal to the constants
     /// at these.
@@ -99,9 +99,8 @@ impl Strand {
         Self { model, parameters, pressure_gradient, nozzle_m_per_s, strand_m_per_s }
     }
 
-    /// Goes on for `dt_s` with inputs that are held and disturbances that run
-    /// straight from their first to their last value (Runge–Kutta, fourth
-    /// order).
+    /// A step of `dt_s` with inputs that are held and disturbances that are linear from their
+    /// first to their last value (fourth-order Runge–Kutta).
     pub fn step(&mut self, inputs: StrandInputs, feed: Ramp, plate: Ramp, dt_s: f64) {
         let slope = |state: [f64; 2], part: f64| {
             let at = |ramp: Ramp| ramp.first + part * (ramp.last - ramp.first);

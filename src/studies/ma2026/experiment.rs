@@ -1,4 +1,4 @@
-//! An experiment, the laws that are tried in it, and its run.
+//! An experiment, the controllers that are tried in it, and its run.
 
 use std::f64::consts::TAU;
 
@@ -18,19 +18,19 @@ use crate::extruder::pressure::vsfc::{Vsfc, VsfcGains};
 use crate::extruder::pressure::{InitialState, PressureController, PressureError};
 use crate::sim::pressure::{Disturbances, GainWave, LoadChange, SimPressure};
 
-/// Ticks of the plant from reading to reading: 50 Hz.
+/// Plant steps from reading to reading: 50 Hz, Ma et al. 2026.
 const READ_EVERY: u64 = 4;
-/// Ticks from command to command: 20 Hz.
+/// Plant steps from command to command: 20 Hz, Ma et al. 2026.
 pub const STEP_EVERY: u64 = 10;
 
-/// A law that is tried.
+/// A controller that is tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TestedController {
-    /// The paper's comparison, a proportional-integral law.
+    /// The paper's comparison, proportional-integral.
     Pi,
     /// The paper's own.
     Vsfc,
-    /// Two degrees of freedom with Smith's predictor, nothing adapted.
+    /// Two degrees of freedom with a Smith predictor, not adaptive.
     SmithPi,
     /// This program's.
     Predictive,
@@ -41,26 +41,26 @@ pub enum TestedController {
 /// An experiment.
 #[derive(Debug, Clone)]
 pub struct PressureExperiment {
-    /// The process, by how far it is from the model.
+    /// The plant relative to the model.
     pub factors: Factors,
-    /// What disturbs it.
+    /// Its disturbances.
     pub disturbed: Disturbances,
-    /// What is wanted before it begins \[MPa\].
+    /// Target before the experiment begins \[MPa\].
     pub before: f64,
-    /// What is wanted from then on.
+    /// Target from then on.
     pub target: PressureTarget,
-    /// How long it takes \[s\].
+    /// Duration \[s\].
     pub takes_s: f64,
-    /// Ticks of the plant from command to command.
+    /// Plant steps from command to command.
     pub step_every: u64,
 }
 
-/// What is wanted over time.
+/// The target over time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PressureTarget {
-    /// Always the same \[MPa\].
+    /// Constant \[MPa\].
     Steady(f64),
-    /// A wave about a mean \[MPa\] with a period \[s\].
+    /// A sine about a mean \[MPa\] with a period \[s\].
     Sine {
         /// Mean.
         mean: f64,
@@ -95,7 +95,7 @@ impl TestedController {
         }
     }
 
-    /// The law, taking over from what runs.
+    /// The controller, with a bumpless start from the present state.
     pub fn controller(
         self,
         running: InitialState,
@@ -128,67 +128,49 @@ impl std::fmt::Display for TestedController {
 }
 
 impl PressureExperiment {
+    /// Without disturbances, at the paper's rate of commands.
+    fn undisturbed(factors: Factors, before: f64, target: PressureTarget, takes_s: f64) -> Self {
+        let (disturbed, step_every) = (Disturbances::default(), STEP_EVERY);
+        Self { factors, disturbed, before, target, takes_s, step_every }
+    }
+
     /// From rest to [`STEP_MPA`].
     pub fn step(factors: Factors) -> Self {
-        Self {
-            factors,
-            disturbed: Disturbances::default(),
-            before: 0.0,
-            target: PressureTarget::Steady(STEP_MPA),
-            takes_s: 10.0,
-            step_every: STEP_EVERY,
-        }
+        Self::undisturbed(factors, 0.0, PressureTarget::Steady(STEP_MPA), 10.0)
     }
 
-    /// A sine of 0.1 MPa about 0.65 MPa, 20 s long, five times, with noise.
+    /// Five periods of a sine of 0.1 MPa about 0.65 MPa, each 20 s long, with noise.
     pub fn sine(seed: u64) -> Self {
         let target = PressureTarget::Sine { mean: 0.65, amplitude: 0.1, period_s: 20.0 };
-        let disturbed = Disturbances { noise_mpa2: NOISE_MPA2, seed, ..Disturbances::default() };
-        Self {
-            factors: Factors::NONE,
-            disturbed,
-            before: 0.65,
-            target,
-            takes_s: 100.0,
-            step_every: STEP_EVERY,
-        }
+        Self::undisturbed(Factors::NONE, 0.65, target, 100.0).noisy(seed)
     }
 
-    /// Two minutes at [`STEP_MPA`] with a gain that drifts, and noise.
+    /// Two minutes at [`STEP_MPA`] with noise and a gain that drifts (papers.md, "002").
     pub fn steady(seed: u64) -> Self {
-        let drift = vec![
+        let target = PressureTarget::Steady(STEP_MPA);
+        let mut steady = Self::undisturbed(Factors::NONE, STEP_MPA, target, 120.0).noisy(seed);
+        steady.disturbed.gain_waves = vec![
             GainWave { amplitude: 0.03, period_s: 60.0 },
             GainWave { amplitude: 0.015, period_s: 17.0 },
         ];
-        let disturbed =
-            Disturbances { gain_waves: drift, load: None, noise_mpa2: NOISE_MPA2, seed };
-        let target = PressureTarget::Steady(STEP_MPA);
-        Self {
-            factors: Factors::NONE,
-            disturbed,
-            before: STEP_MPA,
-            target,
-            takes_s: 120.0,
-            step_every: STEP_EVERY,
-        }
+        steady
     }
 
     /// A step of the load after 5 s at [`STEP_MPA`].
     pub fn load(factors: Factors) -> Self {
-        let load = Some(LoadChange { at_s: 5.0, rpm: LOAD_RPM });
-        let disturbed = Disturbances { load, ..Disturbances::default() };
         let target = PressureTarget::Steady(STEP_MPA);
-        Self { factors, disturbed, before: STEP_MPA, target, takes_s: 25.0, step_every: STEP_EVERY }
+        let mut loaded = Self::undisturbed(factors, STEP_MPA, target, 25.0);
+        loaded.disturbed.load = Some(LoadChange { at_s: 5.0, rpm: LOAD_RPM });
+        loaded
     }
 
     /// The same with the sensor's noise.
     pub fn noisy(mut self, seed: u64) -> Self {
-        self.disturbed.noise_mpa2 = NOISE_MPA2;
-        self.disturbed.seed = seed;
+        (self.disturbed.noise_mpa2, self.disturbed.seed) = (NOISE_MPA2, seed);
         self
     }
 
-    /// Runs it with a law.
+    /// Runs it with a controller.
     pub fn run(&self, tried: TestedController) -> Result<PressureResponse, PressureError> {
         let before = MPa::new(self.before).unwrap_or_default();
         let speed = Rpm::new(self.before / self.factors.gain).unwrap_or_default();
@@ -197,19 +179,19 @@ impl PressureExperiment {
         let process = self.factors.process()?;
         let fastest = Rpm::constant(3.0);
         let mut plant = SimPressure::new(process, self.disturbed.clone(), fastest, running);
-        let mut course = PressureResponse::default();
+        let mut response = PressureResponse::default();
         let mut tick = 0;
         while plant.now_s() <= self.takes_s {
             let now_s = plant.now_s();
-            course.target.push(self.target.at(now_s));
-            course.time_s.push(now_s);
-            course.pressure.push(plant.pressure());
+            response.target.push(self.target.at(now_s));
+            response.time_s.push(now_s);
+            response.pressure.push(plant.pressure());
             self.act(tick, controller.as_mut(), &mut plant, tried == TestedController::Previewed);
-            course.speed.push(plant.speed_rpm());
+            response.speed.push(plant.speed_rpm());
             plant.advance();
             tick += 1;
         }
-        Ok(course)
+        Ok(response)
     }
 
     fn act(
@@ -221,7 +203,7 @@ impl PressureExperiment {
     ) {
         let now = Stamp::from_secs(plant.now_s());
         if tick.is_multiple_of(READ_EVERY) {
-            // Simulated readings are never late and always plausible.
+            // Simulated readings are always current and plausible.
             let _ = controller.measured(now, plant.read());
         }
         if tick.is_multiple_of(self.step_every.max(1)) {

@@ -1,11 +1,11 @@
-//! How far a process may be from the model until a law swings, tried out.
+//! Gain and dead-time margins of a controller, found by simulation.
 
 use super::experiment::{PressureExperiment, TestedController};
 use super::plant::{DEAD_TIME_S, Factors, LOAD_RPM};
 use crate::extruder::pressure::PressureError;
 use crate::sim::pressure::LoadChange;
 
-/// How far a process may be from the model until a law no longer comes to rest.
+/// Largest model mismatch with which a controller comes to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MismatchMargins {
     /// Gain over that of the model.
@@ -14,8 +14,8 @@ pub struct MismatchMargins {
     pub dead_time_s: f64,
 }
 
-/// The margins of a law, tried out: 40 s after a step of the load the pressure
-/// still swings by more than 5 kPa.
+/// The margins of a controller: beyond them the pressure oscillates by more than 5 kPa 40 s
+/// after a step of the load.
 pub fn margins(tried: TestedController) -> Result<MismatchMargins, PressureError> {
     let gain = largest(1.0, 12.0, |gain| rests(tried, Factors { gain, ..Factors::NONE }))?;
     let dead_time =
@@ -32,20 +32,15 @@ fn rests(tried: TestedController, factors: Factors) -> Result<bool, PressureErro
     Ok(sigma < 0.005)
 }
 
-/// Where a property that holds at `low` ends, to a percent.
+/// The largest value at which a property holds, to 1 %, by bisection; it holds at `low`.
 fn largest(
-    low: f64,
-    high: f64,
-    mut holds: impl FnMut(f64) -> Result<bool, PressureError>,
+    mut low: f64,
+    mut high: f64,
+    holds: impl Fn(f64) -> Result<bool, PressureError>,
 ) -> Result<f64, PressureError> {
-    let (mut low, mut high) = (low, high);
     while high / low > 1.01 {
         let middle = (low * high).sqrt();
-        if holds(middle)? {
-            low = middle;
-        } else {
-            high = middle;
-        }
+        *(if holds(middle)? { &mut low } else { &mut high }) = middle;
     }
     Ok(low)
 }

@@ -1,25 +1,26 @@
-//! The process at the nozzle as the paper gives it, and how far it may be off.
+//! The process at the nozzle as the paper gives it, and its model errors.
 
 use crate::extruder::pressure::{Fopdt, PressureError};
 
-/// Variance of a reading \[MPa²\] (the exponent's sign is misprinted in the
-/// paper).
+/// Variance of a reading \[MPa²\]. Ma et al. 2026; the sign of the exponent is a misprint
+/// (papers.md).
 pub const NOISE_MPA2: f64 = 4.98e-5;
-/// Variance of the wandering that the paper's filter is set for \[MPa²\].
+/// Variance of the random walk in the Kalman filter, for each reading \[MPa²\]: papers.md,
+/// "002", "q 2·10⁻⁵".
 pub const DRIFT_MPA2: f64 = 2e-5;
-/// Lag of the process \[s\].
+/// Lag of the process \[s\]. Ma et al. 2026.
 pub const LAG_S: f64 = 0.84;
-/// Dead time of the process \[s\].
+/// Dead time of the process \[s\]. Ma et al. 2026.
 pub const DEAD_TIME_S: f64 = 0.41;
-/// Target of the step and of the steady experiment \[MPa\].
+/// Target of the step and of the steady experiment \[MPa\]. Ma et al. 2026.
 pub const STEP_MPA: f64 = 0.6;
-/// Step of the load, at the plant's input \[rpm\].
+/// Step of the load at the plant's input \[rpm\]: papers.md, "002".
 pub const LOAD_RPM: f64 = 0.1;
-/// How far the process may be from the model, as a share: two standard
-/// deviations of what our law allows for.
+/// Relative error of each parameter of the model: papers.md, "±20 % in one parameter". Our
+/// controller is tuned for half of it as one standard deviation.
 pub const MODEL_ERROR: f64 = 0.2;
 
-/// The process by the factors that gain, lag and dead time are off.
+/// Parameters of the plant over those of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Factors {
     /// Of the gain.
@@ -31,10 +32,10 @@ pub struct Factors {
 }
 
 impl Factors {
-    /// The process as the model has it.
+    /// A plant without model error.
     pub const NONE: Self = Self { gain: 1.0, lag: 1.0, dead_time: 1.0 };
 
-    /// Each alone by [`OFF`] up and down.
+    /// Each alone off by [`MODEL_ERROR`], up and down.
     pub const fn singles() -> [(&'static str, Self); 6] {
         let (more, less) = (1.0 + MODEL_ERROR, 1.0 - MODEL_ERROR);
         [
@@ -47,7 +48,7 @@ impl Factors {
         ]
     }
 
-    /// All 27 combinations of up, not and down.
+    /// All 27 combinations of up, exact and down.
     pub fn all() -> impl Iterator<Item = Self> {
         let each = [1.0 - MODEL_ERROR, 1.0, 1.0 + MODEL_ERROR];
         each.into_iter().flat_map(move |gain| {
@@ -57,13 +58,13 @@ impl Factors {
         })
     }
 
-    /// The process that is off by these factors.
+    /// The plant.
     pub fn process(self) -> Result<Fopdt, PressureError> {
         Fopdt::new(self.gain, LAG_S * self.lag, DEAD_TIME_S * self.dead_time)
     }
 }
 
-/// The model that every law is given.
+/// The model that every controller is given.
 pub fn model() -> Result<Fopdt, PressureError> {
     Factors::NONE.process()
 }

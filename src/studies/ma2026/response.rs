@@ -1,15 +1,15 @@
-//! What a run came to, and its figures as the paper has them.
+//! The response of a run, and its figures as the paper defines them.
 
 use super::plant::LOAD_RPM;
 use crate::numeric::average::{mean, rms, standard_deviation};
 use crate::sim::pressure::TICK_S;
 
-/// What a run came to.
+/// The response of a run, a sample for each step of the plant.
 #[derive(Debug, Clone, Default)]
 pub struct PressureResponse {
-    /// Time \[s\], tick by tick.
+    /// Time \[s\].
     pub time_s: Vec<f64>,
-    /// What was wanted \[MPa\].
+    /// Target \[MPa\].
     pub target: Vec<f64>,
     /// The true pressure \[MPa\].
     pub pressure: Vec<f64>,
@@ -17,24 +17,23 @@ pub struct PressureResponse {
     pub speed: Vec<f64>,
 }
 
-/// What a step response came to.
+/// Figures of a step response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepFigures {
-    /// Highest pressure beyond the target \[% of it\].
+    /// Overshoot \[% of the target\].
     pub overshoot: f64,
-    /// From the command to 90 % of the target \[s\]; none where it never gets
-    /// there.
+    /// Rise time from the command to 90 % of the target \[s\]; none where it is not reached.
     pub rise_s: Option<f64>,
-    /// Integral of the error's size \[MPa·s\].
+    /// Integral of the absolute error \[MPa·s\].
     pub iae: f64,
 }
 
-/// What a step of the load came to, for each MPa that it would come to.
+/// Figures of a step of the load, over its effect at the output without control.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadFigures {
     /// Largest error.
     pub peak: f64,
-    /// Integral of the error's size \[s\].
+    /// Integral of the absolute error \[s\].
     pub iae: f64,
 }
 
@@ -51,7 +50,7 @@ impl PressureResponse {
         }
     }
 
-    /// When the pressure first passes a value on its way up \[s\].
+    /// When the pressure first rises through a value \[s\].
     fn passes(&self, value: f64) -> Option<f64> {
         let after = self.pressure.iter().position(|pressure| *pressure >= value)?;
         let [low, high] = [self.pressure.get(after.checked_sub(1)?)?, self.pressure.get(after)?];
@@ -59,7 +58,7 @@ impl PressureResponse {
         Some(before_s + TICK_S * (value - low) / (high - low))
     }
 
-    /// The figures of a step of the load that came after `at_s`.
+    /// The figures of a step of the load at `at_s`.
     pub fn load_figures(&self, at_s: f64) -> LoadFigures {
         let since = self.errors().zip(&self.time_s).filter(|(_, t)| **t >= at_s);
         let (mut peak, mut iae) = (0.0_f64, 0.0);
@@ -70,13 +69,13 @@ impl PressureResponse {
         LoadFigures { peak, iae }
     }
 
-    /// Root mean square and largest size of the error after `from_s` \[MPa\].
+    /// Root mean square and largest magnitude of the error after `from_s` \[MPa\].
     pub fn tracking(&self, from_s: f64) -> (f64, f64) {
         let errors = self.after(from_s, self.errors());
         (rms(errors.iter().copied()), errors.iter().fold(0.0, |m, e| m.max(e.abs())))
     }
 
-    /// Standard deviation of the pressure \[MPa\] and variation of the speed
+    /// Standard deviation of the pressure \[MPa\] and coefficient of variation of the speed
     /// \[%\] after `from_s`.
     pub fn steadiness(&self, from_s: f64) -> (f64, f64) {
         let sigma = standard_deviation(&self.after(from_s, self.pressure.iter().copied()));
@@ -93,7 +92,7 @@ impl PressureResponse {
     }
 }
 
-/// To a thousandth: what is less is how the last step of an approach falls.
+/// To a thousandth: smaller differences depend on where the last sample lies.
 fn rounded(percent: f64) -> f64 {
     (percent * 1e3).round() / 1e3
 }

@@ -9,26 +9,29 @@ use crate::core::units::{Mm, MmPerS};
 use crate::extruder::demand;
 use crate::extruder::rheology::PowerLaw;
 use crate::io::progress::Progress;
-use crate::report::chart::palette;
-use crate::report::chart::palette::Ink;
+use crate::numeric::number::to_f64;
+use crate::report::chart::palette::{self, Ink};
 use crate::report::chart::range::ValueRange as Range;
 use crate::studies::error::ReproduceError;
 use crate::studies::publication::Publication;
-use crate::studies::row::TableRows;
-use crate::studies::study::{Effort, Reproduced, Section};
+use crate::studies::study::{Effort, Reproduced, Section, TableRows};
 
 mod draw;
 
-use draw::{courses, curves, singles};
+use draw::{NamedResponse, curves, pressure_and_speed, singles};
 
-/// What progress is told of.
+/// Steps of the progress bar. Derived: the parts of [`run`].
 pub const EXPERIMENTS: u64 = 6;
+/// Seeds of experiments with noise; papers.md asks for at least three.
 const SEEDS: u64 = 5;
+/// By definition, kPa in a MPa.
 const KPA: f64 = 1000.0;
-/// The paper's two laws, in its order, with their colours.
+/// The paper's two controllers, in its order, with their colours.
 const THEIRS: [(TestedController, Ink); 2] =
     [(TestedController::Pi, palette::DEMAND), (TestedController::Vsfc, palette::PAPER)];
 const OURS: (TestedController, Ink) = (TestedController::Predictive, palette::OURS);
+const OVERSHOOT: (&str, &str) = ("overshoot", "%");
+const RISE: (&str, &str) = ("rise to 90 %", "s");
 
 /// Runs the experiments.
 pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, ReproduceError> {
@@ -58,7 +61,7 @@ struct Work {
 type Part = Result<Option<Section>, ReproduceError>;
 
 impl Work {
-    /// Target pressures of the paper's print speeds, eq. (5).
+    /// Target pressures of the paper's print speeds. Ma et al. 2026, eq. (5).
     fn targets(&mut self) {
         let Ok(section) = demand::section(Mm::constant(3.0), Mm::constant(1.5)) else { return };
         for speed in [30.0, 40.0, 50.0] {
@@ -75,27 +78,23 @@ impl Work {
         let best = ours.step_figures();
         let mut drawn = Vec::new();
         for ((tried, ink), published) in THEIRS.into_iter().zip([(23.37, 0.96), (17.37, 1.06)]) {
-            let course = experiment.run(tried)?;
-            let found = course.step_figures();
+            let response = experiment.run(tried)?;
+            let found = response.step_figures();
             let case = format!("step 0 → 0.6 MPa, {}", tried.name());
-            let overshoot = [Some(published.0), Some(found.overshoot), Some(best.overshoot)];
-            self.rows.push(&case, ("overshoot", "%"), overshoot);
-            let rise = [Some(published.1), found.rise_s, best.rise_s];
-            self.rows.push(&case, ("rise to 90 %", "s"), rise);
-            self.rows.push(&case, ("IAE", "MPa·s"), [None, Some(found.iae), Some(best.iae)]);
-            drawn.push((tried.name(), ink, course));
+            let overshoot = [published.0, found.overshoot, best.overshoot].map(Some);
+            self.rows.push(&case, OVERSHOOT, overshoot);
+            self.rows.push(&case, RISE, [Some(published.1), found.rise_s, best.rise_s]);
+            self.rows.compare(&case, ("IAE", "MPa·s"), found.iae, best.iae);
+            drawn.push((tried.name(), ink, response));
         }
         let smith = experiment.run(TestedController::SmithPi)?.step_figures();
         let case = "step 0 → 0.6 MPa, Smith-PI with two degrees of freedom";
-        let (overshoot, rise) = (Some(smith.overshoot), smith.rise_s);
-        self.rows.push(case, ("overshoot", "%"), [None, overshoot, Some(best.overshoot)]);
-        self.rows.push(case, ("rise to 90 %", "s"), [None, rise, best.rise_s]);
+        self.rows.compare(case, OVERSHOOT, smith.overshoot, best.overshoot);
+        self.rows.compare(case, RISE, smith.rise_s, best.rise_s);
         drawn.push(("ours", OURS.1, ours));
-        Ok(Some(Section {
-            heading: "Step of the target".to_owned(),
-            hint: "From rest to 0.6 MPa, without noise.".to_owned(),
-            drawing: courses(&drawn, Range::new(0.0, 5.0)),
-        }))
+        let drawing = pressure_and_speed(&drawn, Range::new(0.0, 5.0));
+        let hint = "From rest to 0.6 MPa, without noise.";
+        Ok(Some(Section::new("Step of the target", hint, drawing)))
     }
 
     fn robustness(&mut self) -> Part {
@@ -107,29 +106,22 @@ impl Work {
             for (tried, _) in THEIRS {
                 let found = experiment.run(tried)?.step_figures();
                 let case = format!("{name}, {}", tried.name());
-                let overshoot = [None, Some(found.overshoot), Some(best.overshoot)];
-                self.rows.push(&case, ("overshoot", "%"), overshoot);
-                self.rows.push(&case, ("rise to 90 %", "s"), [None, found.rise_s, best.rise_s]);
+                self.rows.compare(&case, OVERSHOOT, found.overshoot, best.overshoot);
+                self.rows.compare(&case, RISE, found.rise_s, best.rise_s);
             }
             let noisy = self.mean(|seed| {
                 Ok(experiment.clone().noisy(seed).run(OURS.0)?.step_figures().overshoot)
             })?;
-            let case = format!("{name}, with noise");
-            self.rows.push(case, ("overshoot", "%"), [None, None, Some(noisy)]);
+            self.rows.ours(format!("{name}, with noise"), OVERSHOOT, noisy);
             drawn.push(ours);
         }
         for (tried, _) in THEIRS {
-            let (theirs, ours) = (worst(tried)?, worst(OURS.0)?);
             let case = format!("worst of all 27 combinations of ±20 %, {}", tried.name());
-            self.rows.push(case, ("overshoot", "%"), [None, Some(theirs), Some(ours)]);
+            self.rows.compare(case, OVERSHOOT, worst(tried)?, worst(OURS.0)?);
         }
-        Ok(Some(Section {
-            heading: "A model that is off by 20 %".to_owned(),
-            hint: "Our controller, from rest to 0.6 MPa, with gain, lag or dead time of the plant 20 % \
-                   above or below the model's, one at a time."
-                .to_owned(),
-            drawing: singles(&drawn),
-        }))
+        let hint = "Our controller, from rest to 0.6 MPa, with gain, lag or dead time of the plant 20 % \
+                    above or below the model's, one at a time.";
+        Ok(Some(Section::new("A model that is off by 20 %", hint, singles(&drawn))))
     }
 
     fn sine(&mut self) -> Part {
@@ -141,100 +133,78 @@ impl Work {
         for (((tried, _), found), published) in THEIRS.into_iter().zip(found).zip([0.0153, 0.0193])
         {
             let case = format!("sine 0.65 ± 0.1 MPa, 20 s, {}", tried.name());
-            let values = [Some(published), Some(found), Some(best)].map(|v| v.map(|v| v * KPA));
+            let values = [published, found, best].map(|value| Some(value * KPA));
             self.rows.push(case, ("RMSE, ours with preview", "kPa"), values);
         }
         let case = "sine 0.65 ± 0.1 MPa, 20 s, nothing known ahead";
-        self.rows.push(case, ("RMSE", "kPa"), [None, None, Some(unaware * KPA)]);
-        let mut drawn = Vec::new();
-        for (tried, ink) in THEIRS.into_iter().chain([(TestedController::Previewed, OURS.1)]) {
-            drawn.push((tried.name(), ink, PressureExperiment::sine(0).run(tried)?));
-        }
-        Ok(Some(Section {
-            heading: "Sine".to_owned(),
-            hint: "0.65 ± 0.1 MPa in 20 s, with noise. Ours is given the target ahead, as far as \
-                   the robot's path determines it."
-                .to_owned(),
-            drawing: html! {
-                (courses(&drawn, Range::new(20.0, 60.0)))
-                (curves(&drawn, Range::new(20.0, 60.0), "error [kPa]", |course, at| {
-                    let pressure = course.pressure.get(at)?;
-                    Some((pressure - course.target.get(at)?) * KPA)
-                }))
-            },
-        }))
+        self.rows.ours(case, ("RMSE", "kPa"), unaware * KPA);
+        let drawn =
+            self.drawn(&PressureExperiment::sine(0), (TestedController::Previewed, OURS.1))?;
+        let range = Range::new(20.0, 60.0);
+        let hint = "0.65 ± 0.1 MPa in 20 s, with noise. Ours is given the target ahead, as far as \
+                    the robot's path determines it.";
+        let drawing = html! {
+            (pressure_and_speed(&drawn, range))
+            (curves(&drawn, range, "error [kPa]", |response, at| {
+                let pressure = response.pressure.get(at)?;
+                Some((pressure - response.target.get(at)?) * KPA)
+            }))
+        };
+        Ok(Some(Section::new("Sine", hint, drawing)))
     }
 
     fn steady(&mut self) -> Part {
-        let figure = |tried, pick: fn((f64, f64)) -> f64| {
-            self.mean(|seed| {
-                Ok(pick(PressureExperiment::steady(seed).run(tried)?.steadiness(20.0)))
-            })
+        let figures = |tried| -> Result<[f64; 2], ReproduceError> {
+            let run = |seed| PressureExperiment::steady(seed).run(tried);
+            let sigma = self.mean(|seed| Ok(run(seed)?.steadiness(20.0).0 * KPA))?;
+            Ok([sigma, self.mean(|seed| Ok(run(seed)?.steadiness(20.0).1))?])
         };
-        let sigma = |pair: (f64, f64)| pair.0 * KPA;
-        let cv = |pair: (f64, f64)| pair.1;
-        let best = (figure(OURS.0, sigma)?, figure(OURS.0, cv)?);
-        let mut found = Vec::new();
-        for (tried, _) in THEIRS {
-            found.push((tried, figure(tried, sigma)?, figure(tried, cv)?));
-        }
-        for ((tried, sigma, cv), published) in found.into_iter().zip([(8.1, 6.74), (14.7, 3.37)]) {
+        let best = figures(OURS.0)?;
+        let found = [figures(THEIRS[0].0)?, figures(THEIRS[1].0)?];
+        for (((tried, _), found), published) in
+            THEIRS.into_iter().zip(found).zip([[8.1, 6.74], [14.7, 3.37]])
+        {
             let case = format!("steady at 0.6 MPa with drift, {}", tried.name());
-            let of_sigma = [Some(published.0), Some(sigma), Some(best.0)];
-            self.rows.push(&case, ("σ of the pressure", "kPa"), of_sigma);
-            let of_cv = [Some(published.1), Some(cv), Some(best.1)];
-            self.rows.push(&case, ("CV of the screw speed", "%"), of_cv);
+            let names = [("σ of the pressure", "kPa"), ("CV of the screw speed", "%")];
+            for (which, name) in names.into_iter().enumerate() {
+                let values = [published, found, best].map(|values| Some(values[which]));
+                self.rows.push(&case, name, values);
+            }
         }
-        let mut drawn = Vec::new();
-        for (tried, ink) in THEIRS.into_iter().chain([OURS]) {
-            drawn.push((tried.name(), ink, PressureExperiment::steady(0).run(tried)?));
-        }
-        Ok(Some(Section {
-            heading: "Steady extrusion with drift".to_owned(),
-            hint: "0.6 MPa; the gain drifts by 3 % in 60 s and by 1.5 % in 17 s. The published \
-                   figures are those of the paper's machine, whose drift is not given: 30 mm/s \
-                   for σ (14.7 … 21.0 kPa for VSFC-Smith), 50 mm/s for the variation, \"about \
-                   half\" of the PID's for VSFC-Smith. To follow this drift fully the screw must \
-                   vary by 2.3 %; with 1.2 % at least 7 kPa of it stay in the pressure. Ours takes \
-                   noise for a step of the load once in some 20 s, and takes it back within a \
-                   second: the price of its quick answer to a true one."
-                .to_owned(),
-            drawing: courses(&drawn, Range::new(20.0, 120.0)),
-        }))
+        let drawn = self.drawn(&PressureExperiment::steady(0), OURS)?;
+        let hint = "0.6 MPa; the gain drifts by 3 % in 60 s and by 1.5 % in 17 s. The published \
+                    figures are those of the paper's machine, whose drift is not given: 30 mm/s \
+                    for σ (14.7 … 21.0 kPa for VSFC-Smith), 50 mm/s for the variation, \"about \
+                    half\" of the PID's for VSFC-Smith. To follow this drift fully the screw must \
+                    vary by 2.3 %; with 1.2 % at least 7 kPa of it stay in the pressure. Ours takes \
+                    noise for a step of the load once in some 20 s, and takes it back within a \
+                    second: the price of its quick answer to a true one.";
+        let drawing = pressure_and_speed(&drawn, Range::new(20.0, 120.0));
+        Ok(Some(Section::new("Steady extrusion with drift", hint, drawing)))
     }
 
     fn load(&mut self) -> Part {
+        let (largest, iae) = (("largest error for each unit", "1"), ("IAE for each unit", "s"));
         let experiment = PressureExperiment::load(Factors::NONE);
         let ours = experiment.run(OURS.0)?;
         let best = ours.load_figures(5.0);
         let mut drawn = Vec::new();
         for (tried, ink) in THEIRS {
-            let course = experiment.run(tried)?;
-            let found = course.load_figures(5.0);
+            let response = experiment.run(tried)?;
+            let found = response.load_figures(5.0);
             let case = format!("step of the load, {}", tried.name());
-            let peak = [None, Some(found.peak), Some(best.peak)];
-            self.rows.push(&case, ("largest error for each unit", "1"), peak);
-            self.rows.push(
-                &case,
-                ("IAE for each unit", "s"),
-                [None, Some(found.iae), Some(best.iae)],
-            );
-            drawn.push((tried.name(), ink, course));
+            self.rows.compare(&case, largest, found.peak, best.peak);
+            self.rows.compare(&case, iae, found.iae, best.iae);
+            drawn.push((tried.name(), ink, response));
         }
-        let peak = self.mean(|seed| {
-            let course = PressureExperiment::load(Factors::NONE).noisy(seed).run(OURS.0)?;
-            Ok(course.load_figures(5.0).peak)
-        })?;
-        let case = "step of the load, with noise";
-        self.rows.push(case, ("largest error for each unit", "1"), [None, None, Some(peak)]);
+        let peak = self
+            .mean(|seed| Ok(experiment.clone().noisy(seed).run(OURS.0)?.load_figures(5.0).peak))?;
+        self.rows.ours("step of the load, with noise", largest, peak);
         drawn.push(("ours", OURS.1, ours));
-        Ok(Some(Section {
-            heading: "Step of the load".to_owned(),
-            hint: "0.1 at the plant's input after 5 s, without noise. No controller can keep the error \
-                   below 0.386 of it: the correction comes a dead time late."
-                .to_owned(),
-            drawing: courses(&drawn, Range::new(4.0, 12.0)),
-        }))
+        let hint = "0.1 at the plant's input after 5 s, without noise. No controller can keep the error \
+                    below 0.386 of it: the correction comes a dead time late.";
+        let drawing = pressure_and_speed(&drawn, Range::new(4.0, 12.0));
+        Ok(Some(Section::new("Step of the load", hint, drawing)))
     }
 
     fn margins(&mut self) -> Part {
@@ -242,25 +212,32 @@ impl Work {
         for tried in [TestedController::Pi, TestedController::Vsfc, TestedController::SmithPi] {
             let found = margins(tried)?;
             let case = format!("margins, {}", tried.name());
-            self.rows.push(&case, ("gain", "1"), [None, Some(found.gain), Some(best.gain)]);
-            let dead_time = [None, Some(found.dead_time_s), Some(best.dead_time_s)];
-            self.rows.push(&case, ("dead time", "s"), dead_time);
+            self.rows.compare(&case, ("gain", "1"), found.gain, best.gain);
+            self.rows.compare(&case, ("dead time", "s"), found.dead_time_s, best.dead_time_s);
         }
         Ok(None)
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "a count of seeds")]
+    /// The responses of the paper's controllers and of one of ours to an experiment.
+    fn drawn(
+        &self,
+        experiment: &PressureExperiment,
+        ours: (TestedController, Ink),
+    ) -> Result<Vec<NamedResponse>, ReproduceError> {
+        let all = THEIRS.into_iter().chain([ours]);
+        all.map(|(tried, ink)| Ok((tried.name(), ink, experiment.run(tried)?))).collect()
+    }
+
     fn mean(
         &self,
         figure: impl Fn(u64) -> Result<f64, ReproduceError>,
     ) -> Result<f64, ReproduceError> {
-        let all: Result<Vec<f64>, _> = (0..self.seeds).map(figure).collect();
-        let all = all?;
-        Ok(all.iter().sum::<f64>() / all.len().max(1) as f64)
+        let all = (0..self.seeds).map(figure).collect::<Result<Vec<f64>, _>>()?;
+        Ok(all.iter().sum::<f64>() / to_f64(all.len().max(1)))
     }
 }
 
-/// The largest overshoot over all combinations of errors \[%\].
+/// The largest overshoot over all combinations of model errors \[%\].
 fn worst(tried: TestedController) -> Result<f64, ReproduceError> {
     let mut worst = 0.0_f64;
     for factors in Factors::all() {
@@ -274,7 +251,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_published_figure_has_a_row_with_what_both_laws_give() {
+    fn every_published_figure_has_a_row_with_the_results_of_both_controllers() {
         let effort = Effort { seeds: Some(1), frame_seeds: None };
         let mut progress = Progress::new("reproducing", "experiments", None, true);
         let done = run(effort, &mut progress).unwrap();

@@ -77,7 +77,7 @@ fn ours_answers_a_load_at_once() {
         .unwrap()
         .load_figures(5.0);
     assert!(found.peak <= 0.50 && found.iae <= 0.40, "{found:?}");
-    // No law can be better than one that knows of the load at once.
+    // The bound of a controller that knows the load at once.
     assert!(found.peak > 1.0 - f64::exp(-DEAD_TIME_S / LAG_S), "{found:?}");
 }
 

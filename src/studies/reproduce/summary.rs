@@ -4,10 +4,9 @@
 use maud::{Markup, html};
 
 use super::table::number;
-use crate::studies::row::TableRow;
-use crate::studies::study::Reproduced;
+use crate::studies::study::{Reproduced, TableRow};
 
-/// Shares of a published number within which it counts as met.
+/// Relative deviations within which a published number counts as reproduced.
 const NEAR_FRACTIONS: [f64; 2] = [0.02, 0.1];
 
 /// Counts of rows with a published number.
@@ -17,8 +16,8 @@ pub struct PaperSummary<'a> {
     pub published: usize,
     /// Those of them that were simulated to within 2 % and 10 %.
     pub near: [usize; 2],
-    /// The one that is furthest off as a share of the published number, and that
-    /// share; none where nothing can be compared.
+    /// The one that is furthest off relative to the published number, and that
+    /// fraction; none where nothing can be compared.
     pub furthest: Option<(&'a TableRow, f64)>,
     /// Those that the simulation never gets to.
     pub absent: usize,

@@ -1,8 +1,8 @@
-//! Rows of published and simulated numbers as tables for people.
+//! Rows of published and simulated numbers as text and as HTML.
 
 use maud::{Markup, html};
 
-use crate::studies::row::TableRow;
+use crate::studies::study::TableRow;
 
 const HEADS: [&str; 6] = ["case", "quantity", "unit", "published", "simulated", "ours"];
 

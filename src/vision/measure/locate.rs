@@ -8,7 +8,7 @@ use super::checks::are_not_steps;
 use super::search::ContourPair;
 use super::work::{EdgeModel, MIN_LINE_FRACTION, MIN_OUTLIER_PX, MeasureState};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::{floor_to_count, narrow_to_f32};
+use crate::numeric::number::{narrow_to_f32, to_count};
 use crate::numeric::rank;
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::light;
@@ -165,8 +165,7 @@ fn widths_apart(
 fn columns_about(left: &[Option<f32>], right: &[Option<f32>], across: usize) -> Range<usize> {
     let low = left.iter().flatten().fold(f32::INFINITY, |low, &at| low.min(at));
     let high = right.iter().flatten().fold(0.0, |high: f32, &at| high.max(at));
-    let [from, to] =
-        [low - NOISE_MARGIN_PX, high + NOISE_MARGIN_PX].map(|at| floor_to_count(at.into()));
+    let [from, to] = [low - NOISE_MARGIN_PX, high + NOISE_MARGIN_PX].map(|at| to_count(at.into()));
     from.min(across - 1)..to.clamp(from + 1, across)
 }
 

@@ -4,7 +4,7 @@
 use super::HALF_SPAN;
 use super::step::{BlurredStep, Clearance, NeighbourStep, NeighbourSteps};
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::{floor_to_count, to_f64};
+use crate::numeric::number::{to_count, to_f64};
 use crate::vision::blur_estimate::BlurEstimate;
 
 /// How far from the edge samples are fitted, in blurs. Derived: beyond 4.5 blurs 3·10⁻⁶ of a step
@@ -61,8 +61,8 @@ impl StepFit {
         let near = 3.0 * self.step.blur + 1.0;
         let Clearance { before, after } = self.room;
         [(near - self.step.at, before), (near + self.step.at, after)].map(|(near, room)| {
-            let far = floor_to_count(room).min(HALF_SPAN);
-            SideRange { near: floor_to_count(near.ceil()), far }
+            let far = to_count(room).min(HALF_SPAN);
+            SideRange { near: to_count(near.ceil()), far }
         })
     }
 

@@ -3,7 +3,7 @@
 
 use super::local::LocalWidths;
 use crate::core::units::Mm;
-use crate::numeric::number::{floor_to_count, to_f64};
+use crate::numeric::number::{to_count, to_f64};
 
 /// Smallest part of the gauge that two frames must share to be compared.
 const MIN_OVERLAP_FRACTION: f64 = 0.3;
@@ -45,7 +45,7 @@ impl Overlap {
             return ASSUMED_NEW_FRACTION;
         }
         let lines = to_f64(now.len());
-        let most = now.len() - floor_to_count(MIN_OVERLAP_FRACTION * lines);
+        let most = now.len() - to_count(MIN_OVERLAP_FRACTION * lines);
         let differs = |shift: usize| {
             let ahead = difference(&before[shift..], now);
             ahead.min(difference(&now[shift..], before)) / unlike

@@ -2,7 +2,7 @@
 //! known of it is taken from those rows alone.
 
 use super::{EdgeState, EdgeTracer, MAX_CLEAR_MISFIT, typical};
-use crate::numeric::number::{floor_to_count, narrow_to_f32, to_f32};
+use crate::numeric::number::{narrow_to_f32, to_count, to_f32};
 use crate::numeric::rank;
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::buffer::refill;
@@ -252,7 +252,7 @@ impl EdgeTracer {
         let weight = self.row_fit.groups.first().map_or(1.0, |group| group.weight);
         let rows = to_f32(scene.strip.along);
         for blurs in MARGIN_BLURS {
-            let reach = floor_to_count((blurs * blur / f64::from(weight)).ceil());
+            let reach = to_count((blurs * blur / f64::from(weight)).ceil());
             self.occlusion.clear.clear();
             for (k, group) in self.row_fit.groups.iter().enumerate() {
                 let near = k.saturating_sub(reach)..(k + reach + 1).min(self.row_fit.groups.len());

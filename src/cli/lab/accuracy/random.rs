@@ -19,8 +19,9 @@ use crate::io::progress::SharedProgress;
 use crate::rows::output;
 use crate::studies::accuracy::drawn::{self, DrawnFrame, DrawnSet};
 use crate::studies::accuracy::drawn_table::{
-    Deviation, DrawnOutcome, FrameRejection, figures, markdown, table,
+    Deviation, DrawnOutcome, FrameRejection, figures, markdown,
 };
+use crate::studies::accuracy::table::table;
 use crate::vision::Measurer;
 
 /// Default number of frames of a set. Derived: a limit of 0.01 % of silently wrong widths is then

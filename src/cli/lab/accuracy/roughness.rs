@@ -13,8 +13,9 @@ use crate::core::units::Mm;
 use crate::io::progress::SharedProgress;
 use crate::studies::accuracy::drawn::LongBead;
 use crate::studies::accuracy::roughness_table::{
-    BeadOutcome, OwnMeanError, Ratio, RoughnessEstimate, figures, markdown, table,
+    BeadOutcome, OwnMeanError, Ratio, RoughnessEstimate, figures,
 };
+use crate::studies::accuracy::table::{markdown, table};
 use crate::vision::{Measurer, Roughness, RoughnessEstimator};
 
 /// Length of each bead in its correlation lengths.

@@ -1,4 +1,4 @@
-//! What disturbs a picture, against closed forms.
+//! What disturbs an image, against closed forms.
 
 use super::*;
 use crate::scenario::image::{
@@ -9,14 +9,14 @@ use crate::scenario::image::{
 const LEFT_PX: f64 = 359.5 - 15.0 / PAPER_SCALE;
 const RIGHT_PX: f64 = 359.5 + 15.0 / PAPER_SCALE;
 
-/// Grey of a picture without light, noise and rounding.
-fn scene(picture: &ImageModel, width_mm: f64) -> Vec<f64> {
-    let renderer = renderer(scale(), upright(), picture);
+/// Grey of an image without light, noise and rounding.
+fn scene(image: &ImageModel, width_mm: f64) -> Vec<f64> {
+    let renderer = renderer(scale(), upright(), image);
     let seen = seen(&renderer, &straight(width_mm));
-    let step = picture.bead_grey - picture.ground_grey;
+    let step = image.bead_grey - image.ground_grey;
     let added = seen.added_grey.unwrap_or_else(|| vec![0.0; seen.fractions.len()]);
-    let grey = |(share, added): (&f32, &f32)| {
-        picture.ground_grey + step * f64::from(*share) + f64::from(*added)
+    let grey = |(fraction, added): (&f32, &f32)| {
+        image.ground_grey + step * f64::from(*fraction) + f64::from(*added)
     };
     seen.fractions.iter().zip(&added).map(grey).collect()
 }
@@ -65,8 +65,8 @@ fn a_shadow_lies_parallel_to_its_edge_at_its_depth() {
     let slant_deg = 12.0;
     let cos = 12_f64.to_radians().cos();
     for (bead_grey, level) in [(150.0, 14.0), (20.0, 105.0)] {
-        let picture = ImageModel { bead_grey, slant_deg, shadow, ..quiet() };
-        let scene = scene(&picture, 30.0);
+        let image = ImageModel { bead_grey, slant_deg, shadow, ..quiet() };
+        let scene = scene(&image, 30.0);
         let without = self::scene(&ImageModel { bead_grey, slant_deg, ..quiet() }, 30.0);
         for row in [100, 400] {
             let lean = 12_f64.to_radians().tan() * (to_f64(row) - 269.5);
@@ -99,8 +99,8 @@ fn an_older_bead_lies_beside() {
 
 #[test]
 fn spots_cover_their_share_of_the_bead_and_nothing_else() {
-    let picture = ImageModel { spots: Spots { covered_fraction: 0.05, size_px: 4.0 }, ..quiet() };
-    let renderer = renderer(scale(), upright(), &picture);
+    let image = ImageModel { spots: Spots { covered_fraction: 0.05, size_px: 4.0 }, ..quiet() };
+    let renderer = renderer(scale(), upright(), &image);
     let view = renderer.view(None).unwrap();
     let bead = straight(30.0);
     let outline = BeadOutline::trace(&view, &bead, 540.0, 720.0).unwrap();
@@ -112,16 +112,16 @@ fn spots_cover_their_share_of_the_bead_and_nothing_else() {
         assert!((0..added.len()).all(|i| !beside(i % 720) || added[i] == 0.0));
     }
     let area = 20.0 * 540.0 * 30.0 / PAPER_SCALE;
-    let share = sum / area / (255.0 - 150.0);
+    let fraction = sum / area / (255.0 - 150.0);
     // Four standard errors of some 200,000 spots.
-    assert!((share - 0.05).abs() < 0.05 * 4.0 * 0.003, "{share}");
+    assert!((fraction - 0.05).abs() < 0.05 * 4.0 * 0.003, "{fraction}");
 }
 
 #[test]
 fn grains_cover_their_share_of_either_edge() {
     let grains = Grains { rows_fraction: 0.3, size_px: 12.0, grey: 230.0 };
-    let picture = ImageModel { grains, blur_px: 0.0, ..quiet() };
-    let renderer = renderer(scale(), upright(), &picture);
+    let image = ImageModel { grains, blur_px: 0.0, ..quiet() };
+    let renderer = renderer(scale(), upright(), &image);
     let view = renderer.view(None).unwrap();
     let bead = straight(30.0);
     let outline = BeadOutline::trace(&view, &bead, 540.0, 720.0).unwrap();
@@ -142,19 +142,19 @@ fn grains_cover_their_share_of_either_edge() {
 
 #[test]
 fn what_is_brighter_than_the_sensor_bears_is_saturated() {
-    let picture = ImageModel {
+    let image = ImageModel {
         bead_grey: 300.0,
         ground_grey: 175.0,
         light_ratio: 1.0,
         ..ImageModel::default()
     };
-    let renderer = renderer(scale(), upright(), &picture);
+    let renderer = renderer(scale(), upright(), &image);
     let pixels = grey(&renderer.render(0, Stamp::START, None, &straight(30.0)).unwrap().frame);
     let middle = (0..540).flat_map(|row| (260..460).map(move |x| row * 720 + x));
     assert!(middle.clone().all(|i| pixels[i] == 255.0));
     let ground: f64 = (0..540).map(|row| pixels[row * 720 + 50]).sum::<f64>() / 540.0;
     assert!((ground - 175.0).abs() < 0.7);
-    let noisy = ImageModel { bead_grey: 255.0, ..picture };
+    let noisy = ImageModel { bead_grey: 255.0, ..image };
     let renderer = super::renderer(scale(), upright(), &noisy);
     let pixels = grey(&renderer.render(0, Stamp::START, None, &straight(30.0)).unwrap().frame);
     let mean = middle.clone().map(|i| pixels[i]).sum::<f64>() / to_f64(middle.count());
@@ -183,13 +183,13 @@ fn a_moving_picture_is_the_mean_of_shifted_ones() {
     assert!(moving.iter().zip(&still).all(|(a, b)| (a - b).abs() < 1e-3));
 }
 
-/// One row of a picture of 3 rows.
-fn scene_row(picture: &ImageModel) -> Vec<f64> {
+/// One row of an image of 3 rows.
+fn scene_row(image: &ImageModel) -> Vec<f64> {
     let roi = Roi { x: 40, y: 0, width: 640, height: 3 };
-    let picture = ImageModel { size_px: [720, 3], ..*picture };
-    let renderer = renderer(scale(), gauge(roi, BeadAxis::Vertical), &picture);
-    let shares = seen(&renderer, &straight(30.0)).fractions;
-    shares[720..1440].iter().map(|share| 70.0 + 80.0 * f64::from(*share)).collect()
+    let image = ImageModel { size_px: [720, 3], ..*image };
+    let renderer = renderer(scale(), gauge(roi, BeadAxis::Vertical), &image);
+    let fractions = seen(&renderer, &straight(30.0)).fractions;
+    fractions[720..1440].iter().map(|fraction| 70.0 + 80.0 * f64::from(*fraction)).collect()
 }
 
 #[test]
@@ -213,7 +213,7 @@ fn the_edges_of_a_curve_lie_on_circles() {
         let truth = renderer.render(0, Stamp::START, None, &bead).unwrap().truth.unwrap();
         assert!((truth.width_mm - 30.0).abs() < 1e-9);
         assert!(truth.roughness_mm < 1e-9);
-        let shares = shares(&renderer, &bead);
+        let fractions = fractions(&renderer, &bead);
         let half = 15.0 / PAPER_SCALE;
         for row in [30, 150, 269, 420, 510] {
             let dy = to_f64(row) - 269.5;
@@ -221,10 +221,11 @@ fn the_edges_of_a_curve_lie_on_circles() {
                 let radius = radius_px - offset;
                 359.5 + radius_px - radius.signum() * (radius * radius - dy * dy).sqrt()
             };
-            let found = [true, false].map(|rising| half_way(&renderer, &shares, row, rising));
+            let found = [true, false].map(|rising| half_way(&renderer, &fractions, row, rising));
             assert!((found[0] - x(-half)).abs() < 0.02, "{radius_px} {row}: {found:?}");
             assert!((found[1] - x(half)).abs() < 0.02, "{radius_px} {row}: {found:?}");
-            let sum: f64 = shares[row * 720..][..720].iter().map(|share| f64::from(*share)).sum();
+            let sum: f64 =
+                fractions[row * 720..][..720].iter().map(|fraction| f64::from(*fraction)).sum();
             assert!((sum - (x(half) - x(-half))).abs() < 0.02, "{radius_px} {row}: {sum}");
         }
     }
@@ -237,13 +238,14 @@ fn a_corner_keeps_the_width_of_both_halves() {
     let bead = straight(20.0);
     let truth = renderer.render(0, Stamp::START, None, &bead).unwrap().truth.unwrap();
     assert!((truth.width_mm - 20.0).abs() < 1e-9);
-    let shares = shares(&renderer, &bead);
+    let fractions = fractions(&renderer, &bead);
     let (half, apart) = (20_f64.to_radians(), 20.0 / PAPER_SCALE / 20_f64.to_radians().cos());
     for row in [40, 150, 400, 500] {
-        let sum: f64 = shares[row * 720..][..720].iter().map(|share| f64::from(*share)).sum();
+        let sum: f64 =
+            fractions[row * 720..][..720].iter().map(|fraction| f64::from(*fraction)).sum();
         assert!((sum - apart).abs() < 1e-3, "{row}: {sum} {apart}");
         let left = 359.5 - 0.5 * apart + half.tan() * (to_f64(row) - 269.5).abs();
-        assert!((half_way(&renderer, &shares, row, true) - left).abs() < 0.02, "{row}");
+        assert!((half_way(&renderer, &fractions, row, true) - left).abs() < 0.02, "{row}");
     }
 }
 
@@ -254,9 +256,9 @@ fn a_horizontal_bead_is_disturbed_like_a_vertical_one() {
     let shadow =
         Shadow { distance_px: 6.0, width_px: 20.0, contrast_fraction: 0.7, side: BeadSide::Left };
     let bend = Bend { radius_mm: 60.0, corner_deg: 0.0 };
-    let picture = ImageModel { size_px, bend, shadow, ..shaded(BeadSide::Right) };
+    let image = ImageModel { size_px, bend, shadow, ..shaded(BeadSide::Right) };
     let added = |axis| {
-        let renderer = renderer(scale(), gauge(roi, axis), &picture);
+        let renderer = renderer(scale(), gauge(roi, axis), &image);
         seen(&renderer, &straight(18.0)).added_grey.unwrap()
     };
     let (up, right) = (added(BeadAxis::Vertical), added(BeadAxis::Horizontal));

@@ -5,11 +5,12 @@ use image::{GrayImage, ImageFormat};
 
 use super::draw::Draw;
 use super::scene::DrawnScene;
+use crate::numeric::number::to_f64;
 
-/// White of the camera \[grey levels\].
+/// White of the camera \[grey levels\]. By definition of 8 bits, 2⁸ − 1.
 const WHITE: f64 = 255.0;
 
-/// Pixels of a picture from the light on them.
+/// Pixels of an image from the light on them.
 pub fn expose(light: &[f32], scene: &DrawnScene, draw: &mut Draw) -> Vec<u8> {
     let vignetting = Vignetting::new(scene);
     let pixel = |(number, &light): (usize, &f32)| {
@@ -40,24 +41,22 @@ struct Vignetting {
 }
 
 impl Vignetting {
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     fn new(scene: &DrawnScene) -> Self {
         let (width, height) = scene.size;
-        let middle = (0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
+        let middle = (0.5 * (to_f64(width) - 1.0), 0.5 * (to_f64(height) - 1.0));
         let corner = middle.0.powi(2) + middle.1.powi(2);
         Self { columns: width, middle, growth: (scene.vignetting - 1.0) / corner }
     }
 
-    /// Share of the light that reaches a pixel.
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+    /// Fraction of the light that reaches a pixel.
     fn at(&self, number: usize) -> f64 {
-        let x = (number % self.columns) as f64 - self.middle.0;
-        let y = (number / self.columns) as f64 - self.middle.1;
+        let x = to_f64(number % self.columns) - self.middle.0;
+        let y = to_f64(number / self.columns) - self.middle.1;
         1.0 / (1.0 + self.growth * (x * x + y * y))
     }
 }
 
-/// A picture after it was a JPEG; none where it cannot be encoded.
+/// An image after it was a JPEG; none where it cannot be encoded.
 fn compress(pixels: &[u8], width: usize, height: usize, quality: u8) -> Option<Vec<u8>> {
     let (width, height) = (u32::try_from(width).ok()?, u32::try_from(height).ok()?);
     let picture = GrayImage::from_raw(width, height, pixels.to_vec())?;
@@ -90,7 +89,7 @@ mod tests {
         let scene = DrawnScene { noise_grey: 4.0, size: (200, 200), ..DrawnScene::default() };
         let pixels = expose(&vec![100.0; 40_000], &scene, &mut Draw::new("test", 2));
         let squares: f64 = pixels.iter().map(|&grey| (f64::from(grey) - 100.0).powi(2)).sum();
-        // Rounding adds 1/12 to the variance; 40,000 pixels tell it to 0.7 %.
+        // Rounding adds 1/12 to the variance; its standard error with 40,000 pixels is 0.7 %.
         assert!((squares / 40_000.0 - 16.083).abs() < 0.45, "{}", squares / 40_000.0);
     }
 

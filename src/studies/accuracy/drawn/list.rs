@@ -1,4 +1,4 @@
-//! The sets of frames, and what each must reach.
+//! The sets of frames, and their requirements.
 
 use super::draw::Draw;
 use super::recipes;
@@ -7,28 +7,28 @@ use super::scene::DrawnScene;
 /// A kind of frames.
 #[derive(Debug, Clone, Copy)]
 pub struct DrawnSet {
-    /// What it is called.
+    /// Its name.
     pub name: &'static str,
-    /// What is in it, in a line.
+    /// Its contents, in a line.
     pub about: &'static str,
-    /// Whether the gauge is told the camera's gamma.
+    /// Whether the gauge has the camera's gamma.
     pub knows_gamma: bool,
-    /// What must be reached.
+    /// Its requirements.
     pub requirements: Requirements,
     /// Draws a frame.
     pub(super) scene: fn(&mut Draw) -> DrawnScene,
 }
 
-/// What a set must reach; what is none is not asked for.
+/// Requirements of a set; none is no requirement.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Requirements {
-    /// Smallest share of frames that give a width.
+    /// Smallest fraction of frames that give a width.
     pub measured: Option<f64>,
     /// Largest mean error \[px\], over all and within each third of each range.
     pub bias_px: Option<f64>,
     /// Smallest and largest root mean square of error over sigma, likewise.
     pub z: Option<(f64, f64)>,
-    /// Largest share of frames that are silently wrong.
+    /// Largest fraction of frames that are silently wrong.
     pub silent: Option<f64>,
     /// The only statuses that a refusal may have.
     pub statuses: Option<&'static [&'static str]>,

@@ -1,22 +1,22 @@
-//! A long bead with torn edges that passes through the gauge frame by frame: what
-//! roughness over successive frames is judged by.
+//! A long bead with torn edges that passes through the gauge frame by frame, to evaluate
+//! roughness over successive frames.
 
 use std::ops::Range;
 
-use super::camera;
 use super::draw::Draw;
 use super::paint::{Painted, paint};
-use super::recipes;
 use super::scene::DrawnScene;
+use super::{camera, recipes};
 use crate::core::frame::{Frame, Pixels, WrongSize};
 use crate::core::geometry::Size;
 use crate::core::time::Stamp;
+use crate::numeric::number::to_count;
 use crate::sim::hash;
 use crate::vision::Gauge;
 
 /// Name of its random numbers.
 const NAME: &str = "roughness";
-/// Edges of the bead that wave each for itself.
+/// Independent edges of a bead. By definition of a bead, two.
 const EDGE_COUNT: f64 = 2.0;
 
 /// A bead of so many correlation lengths. A pixel is a millimetre.
@@ -29,10 +29,10 @@ pub struct LongBead {
     number: u64,
 }
 
-/// What the camera sees of it at one moment.
+/// One frame of it.
 #[derive(Debug, Clone)]
 pub struct Passage {
-    /// The picture.
+    /// The image.
     pub frame: Frame,
     /// Area of the unblurred bead over the gauge's length \[px\].
     pub truth_px: f64,
@@ -43,19 +43,13 @@ impl LongBead {
     pub fn draw(number: u64, lengths: f64) -> Self {
         let mut draw = Draw::new(NAME, number);
         let scene = recipes::torn(&mut draw);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a few thousand rows"
-        )]
-        let rows = (lengths * scene.edges.length_px).ceil() as usize;
-        let rows = rows.max(scene.size.1);
+        let rows = to_count((lengths * scene.edges.length_px).ceil()).max(scene.size.1);
         let long = DrawnScene { size: (scene.size.0, rows), ..scene.clone() };
         let painted = paint(&long, &mut draw);
         Self { scene, painted, rows, number }
     }
 
-    /// Its gauge: the whole picture.
+    /// Its gauge: the whole image.
     pub fn gauge(&self) -> Gauge {
         super::gauge(&self.scene, false)
     }
@@ -98,8 +92,8 @@ impl LongBead {
         let light = &self.painted.light[first_row * size.0..last_row * size.0];
         let mut noise = Draw::new(NAME, hash::mix(&[self.number, frame]));
         let pixels = camera::expose(light, &self.scene, &mut noise);
-        let frame =
-            Frame::new(frame, Stamp::START, Size::new(size.0, size.1), Pixels::Grey8(pixels))?;
+        let size = Size::new(size.0, size.1);
+        let frame = Frame::new(frame, Stamp::START, size, Pixels::Grey8(pixels))?;
         Ok(Passage { frame, truth_px: self.painted.mean_width_px(first_row..last_row) })
     }
 }

@@ -1,22 +1,22 @@
-//! Where the borders of a scene lie, line by line, and the area of its bead.
+//! Where the boundaries of a scene lie, line by line, and the area of its bead.
 
 use std::ops::Range;
 
 use super::draw::Draw;
 use super::profile::{height_of, rough};
 use super::scene::{DrawnScene, Groove, Holes};
+use crate::numeric::number::to_f64;
 
-/// Smallest width of a groove, as a fraction of its mean: its two rough sides do not
-/// cross.
+/// Smallest width of a groove over its mean, so that its two rough sides do not cross.
 const MIN_GROOVE: f64 = 0.2;
-/// Largest standard deviation of a groove's width, as a fraction of its mean. The sides
-/// of a narrow groove follow each other.
+/// Largest standard deviation of the width of a groove over its mean: the sides of a narrow
+/// groove are correlated.
 const MAX_GROOVE_SPREAD: f64 = 1.0 / 3.0;
-/// Distance of a hole from the deepest bay \[px\], so that no hole is open: more than
-/// six times the roughness of the edges.
+/// Distance of a hole from the deepest bay \[px\], so that no hole is open. Derived: more than
+/// six times the largest roughness of those edges, 2 px.
 const HOLE_CLEARANCE_PX: f64 = 14.0;
 
-/// What begins at a place of a line and goes on to the next.
+/// A brightness from a position of a line to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BrightnessStep {
     /// Where it begins \[px\].
@@ -27,7 +27,7 @@ pub struct BrightnessStep {
     pub concrete: bool,
 }
 
-/// A disc, from the picture's left and the first line \[px\].
+/// A disc, from the image's left and the first line \[px\].
 #[derive(Debug, Clone, Copy)]
 struct Disc {
     x: f64,
@@ -43,7 +43,7 @@ impl Disc {
     }
 }
 
-/// Where the scene's borders lie on every line, [`PER_PX`](super::profile::PER_PX) lines a pixel.
+/// Where the scene's boundaries lie on every line, [`POINTS_PER_PX`](super::profile::POINTS_PER_PX) lines a pixel.
 #[derive(Debug, Clone)]
 pub struct DrawnOutline {
     left: Vec<f64>,
@@ -64,11 +64,10 @@ struct Straight {
 }
 
 impl DrawnOutline {
-    /// Draws the borders of so many lines. Place and width of the bead differ from
+    /// Draws the boundaries of so many lines. Position and width of the bead differ from
     /// frame to frame by up to a pixel.
     pub fn draw(scene: &DrawnScene, count: usize, draw: &mut Draw) -> Self {
-        #[expect(clippy::cast_precision_loss, reason = "pixels of a row")]
-        let middle = scene.size.0 as f64 / 2.0;
+        let middle = to_f64(scene.size.0) / 2.0;
         let bead = Straight {
             axis: middle + draw.between(-scene.position_jitter_px, scene.position_jitter_px),
             half: scene.width_px / 2.0 + draw.between(-0.5, 0.5),
@@ -85,15 +84,15 @@ impl DrawnOutline {
                 near + outwards * mean.max(MIN_GROOVE * groove.width_px)
             };
             let at_px = bead.axis + outwards * bead.half;
-            Some(near.iter().zip(torn(draw)).map(gap).map(|place| at_px + place).collect())
+            Some(near.iter().zip(torn(draw)).map(gap).map(|position| at_px + position).collect())
         };
         let [before, after] = scene.grooves;
         let far = [far_side(before, -1.0, &left, draw), far_side(after, 1.0, &right, draw)];
-        let place = |at_px: f64, deviations: Vec<f64>| -> Vec<f64> {
+        let position = |at_px: f64, deviations: Vec<f64>| -> Vec<f64> {
             deviations.into_iter().map(|deviation| at_px + deviation).collect()
         };
-        let mut left = place(bead.axis - bead.half, left);
-        let mut right = place(bead.axis + bead.half, right);
+        let mut left = position(bead.axis - bead.half, left);
+        let mut right = position(bead.axis + bead.half, right);
         let mut holes = Vec::new();
         if let Some(dug) = &scene.holes {
             cut_bays(dug, &mut left, bead.axis - bead.half, 1.0, draw);
@@ -107,13 +106,11 @@ impl DrawnOutline {
     pub fn mean_width(&self, lines: Range<usize>) -> f64 {
         let count = lines.len().max(1);
         let widths = self.left[lines.clone()].iter().zip(&self.right[lines]);
-        #[expect(clippy::cast_precision_loss, reason = "a few thousand lines")]
-        let mean = widths.map(|(left, right)| right - left).sum::<f64>() / count as f64;
-        mean
+        widths.map(|(left, right)| right - left).sum::<f64>() / to_f64(count)
     }
 
     /// What lies along a line, from left to right; the first begins beyond the
-    /// picture.
+    /// image.
     pub fn steps(&self, scene: &DrawnScene, line: usize) -> Vec<BrightnessStep> {
         let (left, right) = (self.left[line], self.right[line]);
         let step = |at_px: f64, grey: f64, concrete: bool| BrightnessStep { at_px, grey, concrete };
@@ -174,7 +171,7 @@ fn common_fraction(width_px: f64, roughness_px: f64) -> f64 {
     (1.0 - 0.5 * spread * spread).max(0.0)
 }
 
-/// Cuts bays out of an edge that lies at a place, towards +1 or −1.
+/// Cuts bays out of an edge that lies at a position, towards +1 or −1.
 fn cut_bays(dug: &Holes, edge: &mut [f64], at_px: f64, inwards: f64, draw: &mut Draw) {
     let height = height_of(edge.len());
     for _ in 0..dug.count {
@@ -224,7 +221,7 @@ mod tests {
             assert!(gaps.iter().all(|gap| *gap > 0.19 * width_px));
             let middle = mean(far);
             let squares: Vec<f64> = far.iter().map(|far| (far - middle).powi(2)).collect();
-            // 20,000 px with a correlation length of 8 px hold 1,250 independent places.
+            // 20,000 px with a correlation length of 8 px hold 1,250 independent positions.
             assert!((mean(&squares) / 9.0 - 1.0).abs() < 0.15, "{}", mean(&squares));
         }
     }

@@ -1,25 +1,26 @@
-//! What is drawn for a frame, and from which ranges. Those of torn edges and holes, of
+//! The random parameters of a frame and their ranges. Those of torn edges and holes, of
 //! the grooves' width, ribs, motion, contrast, gamma, JPEG, vignetting, blur and width
-//! are what is asked of the measurement; the others are those of real concrete
+//! are the requirements of the measurement; the others are those of real concrete
 //! (`docs/src/reference/accuracy.md`, "Real and rendered").
 
 use std::ops::Range;
 
 use super::draw::Draw;
 use super::scene::{DrawnScene, Groove, Holes, Patches, Rib, Tear};
+use crate::numeric::number::to_count;
 
 /// Roughness of torn edges \[px\].
 const TORN_PX: Range<f64> = 0.5..6.0;
 /// Correlation length of rough edges \[px\].
 pub const LENGTH_PX: Range<f64> = 3.0..40.0;
-/// Largest roughness, as a fraction of the correlation length.
+/// Largest roughness over the correlation length.
 const STEEPEST: f64 = 0.5;
 /// Roughness of edges in sets about something else \[px\].
 const ROUGHNESS_PX: Range<f64> = 0.5..2.0;
 /// Roughness of edges in sets about what concrete looks like \[px\]: that of labels
 /// drawn by hand.
 const CONCRETE_PX: Range<f64> = 0.5..4.0;
-/// Largest roughness of a narrow bead, as a fraction of its width.
+/// Largest roughness of a narrow bead over its width.
 const NARROW_ROUGHNESS: f64 = 0.03;
 
 /// Diameter of holes and bays \[px\].
@@ -39,6 +40,7 @@ const TEXTURE_PX: Range<f64> = 2.0..8.0;
 /// Step and noise in low light \[grey levels\], on a ground that is nearly dark.
 const LOW_CONTRAST_GREY: Range<f64> = 8.0..30.0;
 const LOW_LIGHT_NOISE_GREY: Range<f64> = 2.0..6.0;
+/// Grey level of the nearly dark ground in low light.
 const LOW_LIGHT_GROUND_GREY: f64 = 20.0;
 
 /// Contrast of ribs, as a fraction of the edges'.
@@ -47,10 +49,12 @@ pub const WEAK_RIBS: Range<f64> = 0.1..0.6;
 pub const STRONG_RIBS: Range<f64> = 0.6..1.0;
 /// Width of a rib \[px\].
 const RIB_PX: Range<f64> = 3.0..30.0;
-/// Distance of a rib from the edges at least: in pixels, in blurs, and in roughnesses
-/// on top of these.
+/// Smallest distance of a rib from the edges \[px\].
 const RIB_CLEARANCE_PX: f64 = 6.0;
+/// The same in blurs, if that is more. Derived: Φ(−3) = 0.1 % of the step is left.
 const RIB_CLEARANCE_BLURS: f64 = 3.0;
+/// Distance on top of it in standard deviations of the edges. Derived: four are exceeded by 6
+/// of 100,000 positions.
 const RIB_CLEARANCE_ROUGHNESSES: f64 = 4.0;
 
 /// Sideways motion that is measured \[px\].
@@ -60,7 +64,7 @@ pub const LONG_MOTION_PX: Range<f64> = 15.0..40.0;
 
 /// Step of a bead on a ground with a pattern \[grey levels\].
 const CONTRAST_GREY: Range<f64> = 20.0..100.0;
-/// Weakest pattern of the ground \[grey levels\].
+/// Weakest pattern of the ground \[grey levels\]: below the noise it is not one.
 const WEAKEST_PATTERN_GREY: f64 = 3.0;
 /// Pattern of the ground, as a fraction of the contrast: one that is measured on, and
 /// one that may be refused.
@@ -74,9 +78,10 @@ const PATTERN_PX: Range<f64> = 2.0..12.0;
 pub const GAMMA: Range<f64> = 0.45..2.2;
 /// Exponent of a camera that is nearly linear.
 pub const NEAR_GAMMA: Range<f64> = 0.9..1.1;
-/// Quality of a JPEG. The picture's blocks are 8 px wide: every place within one is
+/// Quality of a JPEG. The image's blocks are 8 px wide: every position within one is
 /// drawn.
 const QUALITY: Range<f64> = 30.0..95.0;
+/// Side of a block of a JPEG \[px\]. ISO 10918-1; every position within one is drawn.
 const BLOCK_PX: f64 = 8.0;
 /// Brightness in the middle over that in the corners.
 const VIGNETTING: Range<f64> = 1.1..4.0;
@@ -84,8 +89,10 @@ const VIGNETTING: Range<f64> = 1.1..4.0;
 const BLUR_PX: Range<f64> = 0.5..6.0;
 /// Nominal width of a bead \[px\]: 5 to 600 px, less what a frame's differs from it.
 const WIDTH_PX: Range<f64> = 5.0 + WIDTH_SPREAD_PX..600.0 - WIDTH_SPREAD_PX;
+/// Largest deviation of a frame's bead from its nominal width \[px\]: half a pixel on each
+/// side.
 const WIDTH_SPREAD_PX: f64 = 1.0;
-/// Smallest width in blurs.
+/// Smallest width in blurs: narrower beads show no plateau.
 const MIN_BLURS: f64 = 4.0;
 
 /// Roughness and correlation length of a frame's edges.
@@ -119,7 +126,7 @@ pub fn torn(draw: &mut Draw) -> DrawnScene {
 /// Closed holes within the bead, and bays in its edges through which the ground is seen.
 pub fn holes(draw: &mut Draw) -> DrawnScene {
     let size_px = draw.log("hole_px", HOLE_PX);
-    let count = whole(draw.log("bays", BAYS));
+    let count = to_count(draw.log("bays", BAYS).round());
     let grey = draw.log("hole_grey", GROOVE_GREY);
     DrawnScene { holes: Some(Holes { count, size_px, grey }), ..usual(draw) }
 }
@@ -153,7 +160,7 @@ pub fn low_light(draw: &mut Draw) -> DrawnScene {
 
 /// One or two lines along the bead; two lie on either side of its axis.
 pub fn ribs(draw: &mut Draw, contrast: Range<f64>) -> DrawnScene {
-    let share = draw.log("rib_of_contrast", contrast);
+    let fraction = draw.log("rib_of_contrast", contrast);
     let width_px = draw.log("rib_px", RIB_PX);
     let scene = usual(draw);
     let clearance = RIB_CLEARANCE_PX.max(RIB_CLEARANCE_BLURS * scene.blur_px)
@@ -163,7 +170,7 @@ pub fn ribs(draw: &mut Draw, contrast: Range<f64>) -> DrawnScene {
     let rib = |nearest: f64, side: f64, draw: &mut Draw| {
         let sign = if draw.one_of(2.0) { 1.0 } else { -1.0 };
         let at_px = side * draw.between(nearest, farthest);
-        Rib { at_px, width_px, over_grey: sign * share * scene.contrast() }
+        Rib { at_px, width_px, over_grey: sign * fraction * scene.contrast() }
     };
     let ribs = if draw.one_of(2.0) {
         vec![rib(-farthest, 1.0, draw)]
@@ -183,11 +190,11 @@ pub fn motion(draw: &mut Draw, length_px: Range<f64>) -> DrawnScene {
 pub fn pattern(draw: &mut Draw, of_contrast: Range<f64>) -> DrawnScene {
     let contrast = draw.log("contrast_grey", CONTRAST_GREY);
     let weakest = of_contrast.start.max(WEAKEST_PATTERN_GREY / contrast);
-    let share = draw.log_unnamed(weakest..of_contrast.end);
-    draw.note("pattern_of_contrast", share, of_contrast);
+    let fraction = draw.log_unnamed(weakest..of_contrast.end);
+    draw.note("pattern_of_contrast", fraction, of_contrast);
     let length_px = draw.log("pattern_px", PATTERN_PX);
     let scene = usual(draw);
-    let ground_texture = Patches { size_grey: share * contrast, length_px };
+    let ground_texture = Patches { size_grey: fraction * contrast, length_px };
     DrawnScene { bead_grey: scene.ground_grey + contrast, ground_texture, ..scene }
 }
 
@@ -200,7 +207,7 @@ pub fn gamma(draw: &mut Draw, range: Range<f64>) -> DrawnScene {
 /// A frame that was a JPEG.
 pub fn jpeg(draw: &mut Draw) -> DrawnScene {
     let quality = draw.log("quality", QUALITY);
-    let jpeg = u8::try_from(whole(quality)).ok();
+    let jpeg = u8::try_from(to_count(quality.round())).ok();
     DrawnScene { jpeg, position_jitter_px: 0.5 * BLOCK_PX, ..usual(draw) }
 }
 
@@ -224,10 +231,4 @@ pub fn narrow(draw: &mut Draw) -> DrawnScene {
     let roughness_px = scene.edges.roughness_px.min(NARROW_ROUGHNESS * width_px);
     let edges = Tear { roughness_px, ..scene.edges };
     DrawnScene { width_px, edges, blur_px, ..scene }
-}
-
-/// The nearest count.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small count")]
-fn whole(value: f64) -> usize {
-    value.round() as usize
 }

@@ -12,13 +12,13 @@ pub struct DrawnScene {
     pub bead_grey: f64,
     /// Brightness of the ground.
     pub ground_grey: f64,
-    /// How far its axis lies from the picture's middle at most.
+    /// How far its axis lies from the image's middle at most.
     pub position_jitter_px: f64,
     /// How its edges are torn.
     pub edges: Tear,
-    /// Aggregate on beads, as the picture shows it.
+    /// Aggregate on beads, as the image shows it.
     pub texture: Patches,
-    /// Pattern of the ground, as the picture shows it.
+    /// Pattern of the ground, as the image shows it.
     pub ground_texture: Patches,
     /// Grooves on either side.
     pub grooves: [Option<Groove>; 2],

@@ -6,8 +6,10 @@ use serde::Serialize;
 
 use crate::studies::accuracy::drawn::DrawnParameter;
 
-/// Errors of more standard deviations than this, and of more pixels, are silent.
+/// Standard deviations that a silently wrong width is off at least. Derived: 2·Φ(−5) is one
+/// frame in 1.7 million.
 const SILENT_SIGMAS: f64 = 5.0;
+/// Pixels that a silently wrong width is off at least.
 const SILENT_PX: f64 = 0.3;
 
 /// What became of one frame.
@@ -55,7 +57,7 @@ pub struct DrawnFigures {
     pub part: SetPart,
     /// Their number.
     pub frames: usize,
-    /// Share that gave a width.
+    /// Fraction that gave a width.
     pub measured_fraction: f64,
     /// Mean error \[px\].
     pub bias_px: Option<f64>,

@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 
 use super::figures::{DrawnFigures, DrawnOutcome, SetPart};
 use super::limits;
+use crate::numeric::number::to_count;
 use crate::numeric::statistics::Moments;
 use crate::studies::accuracy::drawn::{DrawnParameter, DrawnSet};
 use crate::studies::accuracy::figures::fraction;
 
 /// Parts of a range, equal in the logarithm.
 const RANGE_PARTS: u32 = 3;
-/// Frames of the largest errors that are listed.
+/// Number of frames with the largest errors that are listed.
 const WORST_FRAMES: usize = 5;
 
 /// Figures of a set: over all frames first, then within the thirds of each range.
@@ -95,9 +96,8 @@ fn end(parameter: &DrawnParameter, number: u32) -> f64 {
 }
 
 /// In which part a value lies.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
 fn part_of(parameter: &DrawnParameter, value: f64) -> usize {
     let (from, to) = parameter.range;
     let position = f64::from(RANGE_PARTS) * libm::log(value / from) / libm::log(to / from);
-    position.clamp(0.0, f64::from(RANGE_PARTS - 1)) as usize
+    to_count(position.clamp(0.0, f64::from(RANGE_PARTS - 1)))
 }

@@ -4,47 +4,31 @@ use std::fmt::Write;
 
 use super::figures::{DrawnFigures, SetPart};
 use crate::studies::accuracy::drawn::DrawnSet;
-use crate::studies::accuracy::table::{aligned, marked};
+use crate::studies::accuracy::table::{self, FigureRow, number, verdict};
 
-const COLUMNS: usize = 11;
-const HEADS: [&str; COLUMNS] = [
-    "set",
-    "part",
-    "frames",
-    "measured %",
-    "bias px",
-    "RMSE px",
-    "z",
-    "silent",
-    "refused",
-    "worst frames",
-    "limits",
-];
+impl FigureRow for DrawnFigures {
+    const HEADS: &str = "set|part|frames|measured %|bias px|RMSE px|z|silent|refused|worst frames|\
+                         limits";
 
-fn cells(figures: &DrawnFigures) -> [String; COLUMNS] {
-    let number = |value: Option<f64>, digits: usize| {
-        value.map_or("–".to_owned(), |value| format!("{value:.digits$}"))
-    };
-    let listed = |parts: Vec<String>, apart: &str| {
-        if parts.is_empty() { "–".to_owned() } else { parts.join(apart) }
-    };
-    let refused = figures.rejected.iter().map(|(status, count)| format!("{status} {count}"));
-    [
-        figures.set.to_owned(),
-        named(&figures.part),
-        figures.frames.to_string(),
-        number(Some(100.0 * figures.measured_fraction), 2),
-        number(figures.bias_px, 3),
-        number(figures.rmse_px, 3),
-        number(figures.z, 2),
-        figures.silent.to_string(),
-        listed(refused.collect(), ", "),
-        listed(figures.worst.iter().map(u64::to_string).collect(), " "),
-        match figures.missed.as_slice() {
-            [] => "kept".to_owned(),
-            missed => format!("MISSED: {}", missed.join("; ")),
-        },
-    ]
+    fn cells(&self) -> Vec<String> {
+        let listed = |parts: Vec<String>, separator: &str| {
+            if parts.is_empty() { "–".to_owned() } else { parts.join(separator) }
+        };
+        let rejected = self.rejected.iter().map(|(status, count)| format!("{status} {count}"));
+        vec![
+            self.set.to_owned(),
+            named(&self.part),
+            self.frames.to_string(),
+            number(100.0 * self.measured_fraction, 2),
+            number(self.bias_px, 3),
+            number(self.rmse_px, 3),
+            number(self.z, 2),
+            self.silent.to_string(),
+            listed(rejected.collect(), ", "),
+            listed(self.worst.iter().map(u64::to_string).collect(), " "),
+            verdict(&self.missed),
+        ]
+    }
 }
 
 fn named(part: &SetPart) -> String {
@@ -55,22 +39,17 @@ fn named(part: &SetPart) -> String {
     }
 }
 
-/// The figures as a table for a terminal.
-pub fn table(figures: &[DrawnFigures]) -> String {
-    aligned(&HEADS, figures.iter().map(cells))
-}
-
 /// The figures in Markdown: a table of the sets, and a section of each with its ranges.
 pub fn markdown(sets: &[DrawnSet], figures: &[DrawnFigures]) -> String {
     let whole = figures.iter().filter(|figures| figures.part == SetPart::All);
-    let mut text = format!("# All sets\n\n{}", marked(&HEADS, whole.map(cells)));
+    let mut text = format!("# All sets\n\n{}", table::markdown(whole));
     for set in sets {
         let parts: Vec<&DrawnFigures> =
             figures.iter().filter(|figures| figures.set == set.name).collect();
         let ranges = ranges(&parts);
         // Writing to a string cannot fail.
         let _ = write!(text, "\n# {}\n\n{}: {ranges}.\n\n", set.name, set.about);
-        text += &marked(&HEADS, parts.into_iter().map(cells));
+        text += &table::markdown(parts);
     }
     text
 }

@@ -1,6 +1,6 @@
-//! What a set's figures must keep to.
+//! Limits of a set's figures.
 
-/// Limits of a set's figures; `None` bears any.
+/// Limits of a set's figures; `None` is no limit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SetLimits {
     /// Largest magnitude of the mean error \[px\].
@@ -13,14 +13,14 @@ pub struct SetLimits {
     pub rmse_mm: Option<f64>,
     /// The same as a multiple of the bound for an unknown direction.
     pub rmse_over_free_bound: Option<f64>,
-    /// Smallest share of the frames that give a width.
+    /// Smallest fraction of the frames that give a width.
     pub measured_fraction: Option<f64>,
-    /// Largest share of the frames that give a silently wrong width.
+    /// Largest fraction of the frames that give a silently wrong width.
     pub silent_fraction: Option<f64>,
     /// Smallest and largest root of the mean square of the error over its
     /// standard deviation.
     pub rms_over_sigma: Option<[f64; 2]>,
-    /// Smallest and largest share of the widths whose 95 % interval holds the
+    /// Smallest and largest fraction of the widths whose 95 % interval holds the
     /// true one.
     pub within_interval: Option<[f64; 2]>,
 }

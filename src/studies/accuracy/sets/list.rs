@@ -8,7 +8,9 @@ use crate::scenario::image::{
 };
 use crate::vision::{BeadAxis, Polarity};
 
+/// Width of the wide beads \[mm\]: the nozzle's of Shojaei Barjuei et al. 2022, section 3.2.
 const WIDE_MM: f64 = 42.0;
+/// Width of the narrow beads \[mm\]. Derived: 100 px of `MM_PER_PX`.
 const NARROW_MM: f64 = 12.7;
 const SMOOTH: EdgeRoughness = EdgeRoughness { sigma_mm: 0.0, length_mm: 5.0 };
 /// Contrast 80, blur 1.5 px, noise 4, even light.
@@ -22,7 +24,7 @@ pub fn all() -> Vec<Set> {
 pub(super) fn plain(name: &'static str) -> Set {
     Set {
         name,
-        picture: PLAIN,
+        image: PLAIN,
         rows: 100,
         width_mm: WIDE_MM,
         roughness: SMOOTH,
@@ -34,29 +36,29 @@ pub(super) fn plain(name: &'static str) -> Set {
 }
 
 fn slant(name: &'static str, slant_deg: f64, blur_px: f64) -> Set {
-    let picture = ImageModel { blur_px, slant_deg, ..PLAIN };
-    Set { picture, width_mm: NARROW_MM, ..plain(name) }
+    let image = ImageModel { blur_px, slant_deg, ..PLAIN };
+    Set { image, width_mm: NARROW_MM, ..plain(name) }
 }
 
 fn disturbed(name: &'static str, disturb: impl FnOnce(&mut ImageModel)) -> Set {
     let mut set = Set { limits: SetLimits::DISTURBED, ..plain(name) };
-    disturb(&mut set.picture);
+    disturb(&mut set.image);
     set
 }
 
 fn bent(name: &'static str, rows: u32, bend: Bend, limits: SetLimits) -> Set {
-    Set { rows, width_mm: NARROW_MM, limits, ..disturbed(name, |picture| picture.bend = bend) }
+    Set { rows, width_mm: NARROW_MM, limits, ..disturbed(name, |image| image.bend = bend) }
 }
 
 fn clean() -> Vec<Set> {
-    let blurred = |name, blur_px| Set { picture: ImageModel { blur_px, ..PLAIN }, ..plain(name) };
+    let blurred = |name, blur_px| Set { image: ImageModel { blur_px, ..PLAIN }, ..plain(name) };
     let dark = ImageModel { bead_grey: 70.0, ground_grey: 150.0, ..PLAIN };
     vec![
         blurred("blur-0.8", 0.8),
         blurred("blur-1.5", 1.5),
         blurred("blur-3", 3.0),
         Set { axis: BeadAxis::Horizontal, ..plain("horizontal") },
-        Set { picture: dark, polarity: Polarity::Dark, ..plain("dark-bead") },
+        Set { image: dark, polarity: Polarity::Dark, ..plain("dark-bead") },
     ]
 }
 
@@ -78,7 +80,7 @@ fn other() -> Vec<Set> {
     let tilted = Set { rows: 500, width_mm: 37.0, tilted: true, ..plain("tilted") };
     vec![
         Set { roughness, limits: SetLimits::TRUST, ..plain("rough") },
-        Set { picture: faint, limits: SetLimits::FAINT, ..plain("faint") },
+        Set { image: faint, limits: SetLimits::FAINT, ..plain("faint") },
         Set { limits: SetLimits::TILTED, ..tilted },
     ]
 }
@@ -86,22 +88,22 @@ fn other() -> Vec<Set> {
 fn lit() -> Vec<Set> {
     let shading = EdgeShading { side: BeadSide::Left, ..PLAIN.shading };
     let light = |direction: f64| {
-        move |picture: &mut ImageModel| {
-            (picture.light_ratio, picture.light_deg) = (4.0, Some(direction));
+        move |image: &mut ImageModel| {
+            (image.light_ratio, image.light_deg) = (4.0, Some(direction));
         }
     };
     let saturated = |bead_grey: f64, ground_grey: f64| {
-        move |picture: &mut ImageModel| {
-            (picture.bead_grey, picture.ground_grey) = (bead_grey, ground_grey);
+        move |image: &mut ImageModel| {
+            (image.bead_grey, image.ground_grey) = (bead_grey, ground_grey);
         }
     };
     let glaring = disturbed("saturated-ground", saturated(200.0, 280.0));
     vec![
-        disturbed("shading-bead", |picture| {
-            picture.shading = EdgeShading { bead_grey_per_px: 1.0, ..shading };
+        disturbed("shading-bead", |image| {
+            image.shading = EdgeShading { bead_grey_per_px: 1.0, ..shading };
         }),
-        disturbed("shading-ground", |picture| {
-            picture.shading = EdgeShading { ground_grey_per_px: 1.0, ..shading };
+        disturbed("shading-ground", |image| {
+            image.shading = EdgeShading { ground_grey_per_px: 1.0, ..shading };
         }),
         disturbed("light-across", light(0.0)),
         disturbed("light-along", light(90.0)),
@@ -115,12 +117,10 @@ fn lit() -> Vec<Set> {
 
 fn covered() -> Vec<Set> {
     let spots = |size_px: f64| {
-        move |picture: &mut ImageModel| picture.spots = Spots { covered_fraction: 0.05, size_px }
+        move |image: &mut ImageModel| image.spots = Spots { covered_fraction: 0.05, size_px }
     };
     let grains = |size_px: f64, grey: f64| {
-        move |picture: &mut ImageModel| {
-            picture.grains = Grains { rows_fraction: 0.3, size_px, grey }
-        }
+        move |image: &mut ImageModel| image.grains = Grains { rows_fraction: 0.3, size_px, grey }
     };
     vec![
         disturbed("spots", spots(4.0)),
@@ -133,9 +133,9 @@ fn covered() -> Vec<Set> {
 }
 
 fn beside() -> Vec<Set> {
-    let shadow = |distance_px: f64, share: f64, side: BeadSide| {
-        let shadow = Shadow { distance_px, width_px: 20.0, contrast_fraction: share, side };
-        move |picture: &mut ImageModel| picture.shadow = shadow
+    let shadow = |distance_px: f64, fraction: f64, side: BeadSide| {
+        let shadow = Shadow { distance_px, width_px: 20.0, contrast_fraction: fraction, side };
+        move |image: &mut ImageModel| image.shadow = shadow
     };
     let neighbour = Neighbour { gap_px: 20.0, contrast_fraction: 0.6, ..PLAIN.neighbour };
     vec![
@@ -143,18 +143,18 @@ fn beside() -> Vec<Set> {
         disturbed("shadow-6-both", shadow(6.0, 0.7, BeadSide::Both)),
         disturbed("shadow-10", shadow(10.0, 0.7, BeadSide::Left)),
         disturbed("bright-band", shadow(10.0, -0.5, BeadSide::Left)),
-        disturbed("older-bead", |picture| picture.neighbour = neighbour),
+        disturbed("older-bead", |image| image.neighbour = neighbour),
     ]
 }
 
 fn odd() -> Vec<Set> {
-    let layer = disturbed("layer-on-layer", |picture| {
-        (picture.bead_grey, picture.noise_grey) = (82.0, 2.0);
-        picture.texture = TexturePattern { sigma_grey: 2.0, length_px: 4.0 };
+    let layer = disturbed("layer-on-layer", |image| {
+        (image.bead_grey, image.noise_grey) = (82.0, 2.0);
+        image.texture = TexturePattern { sigma_grey: 2.0, length_px: 4.0 };
     });
     vec![
-        disturbed("motion", |picture| {
-            picture.motion = MotionBlur { length_px: 6.0, direction_deg: 15.0 };
+        disturbed("motion", |image| {
+            image.motion = MotionBlur { length_px: 6.0, direction_deg: 15.0 };
         }),
         // Weights that know the texture's autocorrelation leave 0.0985 px.
         Set { rows: 400, limits: SetLimits { rmse_px: Some(0.103), ..layer.limits }, ..layer },
@@ -170,14 +170,14 @@ fn rough() -> Vec<Set> {
     };
     let disturbed =
         |name, disturb: &dyn Fn(&mut ImageModel)| tall(disturbed(name, disturb), 0.2, 4.0);
-    let shadow = |share: f64| {
+    let shadow = |fraction: f64| {
         let shadow = Shadow {
             distance_px: 10.0,
             width_px: 20.0,
-            contrast_fraction: share,
+            contrast_fraction: fraction,
             side: BeadSide::Left,
         };
-        move |picture: &mut ImageModel| picture.shadow = shadow
+        move |image: &mut ImageModel| image.shadow = shadow
     };
     let slanted = slant("rough-tall-slant-15", 15.0, 1.5);
     vec![
@@ -185,8 +185,8 @@ fn rough() -> Vec<Set> {
         Set { limits: SetLimits::DISTURBED, ..tall(slanted, 0.2, 4.0) },
         disturbed("rough-tall-shadow", &shadow(0.7)),
         disturbed("rough-tall-band", &shadow(-0.5)),
-        disturbed("rough-tall-saturated", &|picture| {
-            (picture.bead_grey, picture.ground_grey) = (265.0, 200.0);
+        disturbed("rough-tall-saturated", &|image| {
+            (image.bead_grey, image.ground_grey) = (265.0, 200.0);
         }),
     ]
 }

@@ -1,10 +1,10 @@
-//! What all experiments of the table share.
+//! The state that all experiments of the table share.
 
 use crate::cell::Cell;
 use crate::cell::file::RunPart;
-use crate::studies::row::TableRows;
+use crate::studies::study::TableRows;
 
-/// The experiments' cell, how often they are run and what came out.
+/// The experiments' cell, their seeds and the rows so far.
 pub(super) struct Experiments {
     pub(super) cell: Cell,
     pub(super) run: RunPart,

@@ -1,16 +1,16 @@
-//! What is usual: an extruder that is driven constantly, or in proportion to the robot's
+//! The usual baselines: an extruder that is driven constantly, or in proportion to the robot's
 //! speed.
 
 use super::plant::{CornerRun, WidthProfile};
 use super::scenario::{BEAD, CornerError, Scenario};
 use crate::plan::SpeedProfile;
 
-/// How the voltage is found.
+/// How the voltage is set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DriveMode {
-    /// It stays.
+    /// It is constant.
     Constant,
-    /// In proportion to the robot's speed at that moment.
+    /// In proportion to the robot's present speed.
     Proportional,
 }
 
@@ -19,7 +19,7 @@ pub enum DriveMode {
 pub struct Baseline {
     /// Its voltage.
     pub drive: DriveMode,
-    /// Whether the robot goes as planned, and not at its nominal speed.
+    /// Whether the robot follows the planned speed, not its nominal one.
     pub planned_speed: bool,
 }
 
@@ -38,30 +38,28 @@ impl Baseline {
         scenario: &Scenario,
         planned: &SpeedProfile,
     ) -> Result<CornerRun, CornerError> {
-        let nominal = scenario.nominal()?;
-        let speed = if self.planned_speed { planned } else { &nominal };
-        self.at_level(scenario, speed, 1.0)
+        self.at_level(scenario, planned, 1.0)
     }
 
-    /// The same at the level that leaves the least error within the judged path, even though
-    /// the straight is then too thin.
+    /// The same at the level of the least error within the judged path, with which the straight
+    /// is too thin.
     pub fn run_at_best_level(
         self,
         scenario: &Scenario,
         planned: &SpeedProfile,
     ) -> Result<CornerRun, CornerError> {
-        let nominal = scenario.nominal()?;
-        let speed = if self.planned_speed { planned } else { &nominal };
-        let level = best_level(&self.at_level(scenario, speed, 1.0)?.quiet());
-        self.at_level(scenario, speed, level)
+        let level = best_level(&self.at_level(scenario, planned, 1.0)?.quiet());
+        self.at_level(scenario, planned, level)
     }
 
     fn at_level(
         self,
         scenario: &Scenario,
-        speed: &SpeedProfile,
+        planned: &SpeedProfile,
         level: f64,
     ) -> Result<CornerRun, CornerError> {
+        let nominal = scenario.nominal()?;
+        let speed = if self.planned_speed { planned } else { &nominal };
         let volts = level * BEAD.area_mm2 / Scenario::extruder()?.dc_gain();
         match self.drive {
             DriveMode::Constant => {

@@ -1,30 +1,32 @@
-//! A run through the corner: voltage to flow to what is laid along the path.
+//! A run through the corner: from voltage to flow to width along the path.
 
 use super::scenario::{BEAD, CornerError, JUDGED_MM, Scenario, UNMODELLED};
 use crate::numeric::average::{mean, standard_deviation};
 use crate::numeric::lti::{Between, Simulator};
+use crate::numeric::number::{to_count, to_f64};
 use crate::plan::SpeedProfile;
 use crate::sim::hash::{mix, normal_pair};
 use crate::studies::bcs_thesis::{drive, flow};
 
-/// Step of the plant \[s\].
+/// Step of the plant \[s\]: papers.md, "001, on/off", 1 ms.
 const STEP_S: f64 = 0.001;
-/// Distance of the places that are judged \[mm\], and how many there are on either side.
+/// Distance between positions that are judged \[mm\].
 const POSITION_SPACING_MM: f64 = 0.5;
+/// Positions on either side. Derived: `JUDGED_MM` / `POSITION_SPACING_MM`.
 const POSITIONS_PER_SIDE: i32 = 200;
-/// A flow that differs by less than this share from that before the corner is not changed.
+/// Relative change of the flow below which it counts as that before the corner.
 const MIN_FLOW_CHANGE: f64 = 0.01;
 
-/// Root mean square of the error of the width, as a share of it.
+/// Root mean square error of the width, relative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
-    /// Where the flow is as modelled.
+    /// With the modelled flow.
     pub quiet: f64,
-    /// With flow that no model tells, over all seeds.
+    /// With unmodelled flow, over all seeds.
     pub noisy: f64,
 }
 
-/// A run as the model has it.
+/// A run of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CornerRun {
     speed: SpeedProfile,
@@ -32,7 +34,7 @@ pub struct CornerRun {
     flow: Vec<f64>,
 }
 
-/// By which share the width is off along the path.
+/// Relative error of the width along the path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WidthProfile {
     errors: Vec<f64>,
@@ -44,7 +46,7 @@ impl WidthProfile {
         mean_square(&self.errors).sqrt()
     }
 
-    /// At the judged place nearest to one \[mm\].
+    /// At the judged position nearest to one \[mm\].
     pub fn at(&self, path_mm: f64) -> f64 {
         let nearest = positions()
             .zip(&self.errors)
@@ -52,15 +54,15 @@ impl WidthProfile {
         nearest.map_or(0.0, |(_, error)| *error)
     }
 
-    /// Places \[mm\] and errors.
+    /// Positions \[mm\] and errors.
     pub fn along(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         positions().zip(self.errors.iter().copied())
     }
 }
 
 impl CornerRun {
-    /// Of a speed and a voltage over time, which is held from one command to the next and
-    /// kept within the drive's limits. The extruder has settled at the first voltage.
+    /// With a speed profile, and a voltage over time that is held from one command to the next
+    /// and limited as the drive. The extruder has settled at the first voltage.
     pub fn new(
         scenario: &Scenario,
         speed: &SpeedProfile,
@@ -78,7 +80,7 @@ impl CornerRun {
         let mut flow = Vec::new();
         for now in moments(speed.duration_s()) {
             if now + 0.5 * STEP_S >= next {
-                // The middle of the time for which it is held.
+                // The command is for the middle of its hold period.
                 (command, _) = limits.apply(voltage(now + 0.5 * period), command, held);
                 next += period;
             }
@@ -87,8 +89,8 @@ impl CornerRun {
         Ok(Self { speed: speed.clone(), flow })
     }
 
-    /// Place \[mm\], speed \[mm/s\] and flow \[mm³/s\], every millisecond within ±100 mm of the
-    /// corner.
+    /// Position \[mm\], speed \[mm/s\] and flow \[mm³/s\], every millisecond within ±100 mm of
+    /// the corner.
     pub fn trajectory(&self) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
         let all = moments(self.speed.duration_s()).zip(&self.flow).map(|(now, flow)| {
             let path_mm = self.speed.path_at(now);
@@ -97,17 +99,17 @@ impl CornerRun {
         all.filter(|(path_mm, ..)| path_mm.abs() <= JUDGED_MM)
     }
 
-    /// What is laid as the model has it.
+    /// The width with the modelled flow.
     pub fn quiet(&self) -> WidthProfile {
         self.quiet_over(BEAD.nozzle_mm)
     }
 
-    /// The same as the mean over another length than the nozzle's \[mm\].
+    /// The same, averaged over another length than the nozzle's \[mm\].
     pub fn quiet_over(&self, length_mm: f64) -> WidthProfile {
         self.laid(&self.flow, length_mm)
     }
 
-    /// Error without and with flow that no model tells.
+    /// Error without and with unmodelled flow.
     pub fn errors(&self, seeds: u64) -> Errors {
         let noisy = (0..seeds).map(|seed| mean_square(&self.noisy(seed).errors)).sum::<f64>();
         #[expect(clippy::cast_precision_loss, reason = "a few seeds")]
@@ -115,8 +117,7 @@ impl CornerRun {
         Errors { quiet: self.quiet().rms(), noisy: (noisy / count).sqrt() }
     }
 
-    /// What is laid with flow that no model tells, which hangs together over its
-    /// correlation time.
+    /// The width with unmodelled flow, a first-order autoregressive process.
     pub fn noisy(&self, seed: u64) -> WidthProfile {
         let sigma = UNMODELLED.ratio * self.change();
         let kept = libm::exp(-STEP_S / UNMODELLED.correlation_s);
@@ -130,65 +131,53 @@ impl CornerRun {
         self.laid(&flow.collect::<Vec<f64>>(), BEAD.nozzle_mm)
     }
 
-    /// Root mean square that the noise alone is expected to leave.
+    /// Expected root mean square error by the noise alone.
     pub fn floor(&self) -> f64 {
         let sigma = UNMODELLED.ratio * self.change();
         let (full, half) = (BEAD.area_mm2 * BEAD.nozzle_mm, 0.5 * BEAD.nozzle_mm);
-        let spread: Vec<f64> = positions()
-            .map(|at| {
-                UNMODELLED.volume_variance(self.time(at + half) - self.time(at - half)).sqrt()
-            })
-            .collect();
-        sigma / full * mean_square(&spread).sqrt()
+        let duration = |at| self.speed.time_at(at + half) - self.speed.time_at(at - half);
+        let sigmas = positions().map(|at| UNMODELLED.volume_variance(duration(at)).sqrt());
+        sigma / full * mean_square(&sigmas.collect::<Vec<f64>>()).sqrt()
     }
 
-    /// Standard deviation of the flow's change \[mm³/s\]: over the time in which the path
-    /// that is judged is laid, or over the whole manoeuvre, from the first change of the
-    /// flow to the last; the larger of the two.
+    /// Standard deviation of the flow \[mm³/s\]: over the time of the judged path, or over the
+    /// whole manoeuvre, from the first change of the flow to the last; the larger of the two.
     pub fn change(&self) -> f64 {
         let first = self.flow.first().copied().unwrap_or(0.0);
         let changed = |flow: &f64| (flow - first).abs() > MIN_FLOW_CHANGE * first;
-        let judged = [-JUDGED_MM, JUDGED_MM].map(|at| floor_index(self.speed.time_at(at) / STEP_S));
+        let judged = [-JUDGED_MM, JUDGED_MM].map(|at| to_count(self.speed.time_at(at) / STEP_S));
         let from = self.flow.iter().position(changed).unwrap_or(judged[0]).min(judged[0]);
         let to = self.flow.iter().rposition(changed).unwrap_or(judged[1]).max(judged[1]);
         deviation(&self.flow, from, to).max(deviation(&self.flow, judged[0], judged[1]))
     }
 
-    /// When the nozzle's middle is at a place \[s\].
-    fn time(&self, path_mm: f64) -> f64 {
-        self.speed.time_at(path_mm)
-    }
-
     fn laid(&self, flow: &[f64], length_mm: f64) -> WidthProfile {
         let mut sum = 0.0;
-        let pairs = flow.iter().zip(flow.iter().skip(1));
-        let volume: Vec<f64> = std::iter::once(0.0)
-            .chain(pairs.map(|(a, b)| {
-                sum += 0.5 * STEP_S * (a + b);
-                sum
-            }))
-            .collect();
+        let grown = flow.windows(2).map(|pair| {
+            sum += 0.5 * STEP_S * (pair[0] + pair[1]);
+            sum
+        });
+        let volume: Vec<f64> = std::iter::once(0.0).chain(grown).collect();
         let (full, half) = (BEAD.area_mm2 * length_mm, 0.5 * length_mm);
         let at = |time_s: f64| {
-            let step = floor_index(time_s / STEP_S).min(volume.len().saturating_sub(2));
+            let step = to_count(time_s / STEP_S).min(volume.len().saturating_sub(2));
             let first = volume.get(step).copied().unwrap_or(0.0);
             let next = volume.get(step + 1).copied().unwrap_or(first);
-            #[expect(clippy::cast_precision_loss, reason = "a few seconds of milliseconds")]
-            let share = time_s / STEP_S - step as f64;
-            first + share * (next - first)
+            let fraction = time_s / STEP_S - to_f64(step);
+            first + fraction * (next - first)
         };
-        let errors =
-            positions().map(|s| (at(self.time(s + half)) - at(self.time(s - half))) / full - 1.0);
+        let until = |path_mm| at(self.speed.time_at(path_mm));
+        let errors = positions().map(|s| (until(s + half) - until(s - half)) / full - 1.0);
         WidthProfile { errors: errors.collect() }
     }
 }
 
-/// Places that are judged \[mm\].
+/// Positions that are judged \[mm\].
 fn positions() -> impl Iterator<Item = f64> {
     (-POSITIONS_PER_SIDE..=POSITIONS_PER_SIDE).map(|k| POSITION_SPACING_MM * f64::from(k))
 }
 
-/// Milliseconds from 0 s on \[s\].
+/// Milliseconds from 0 \[s\].
 fn moments(until_s: f64) -> impl Iterator<Item = f64> {
     (0_u32..).map(|step| STEP_S * f64::from(step)).take_while(move |now| *now <= until_s + STEP_S)
 }
@@ -199,9 +188,4 @@ fn mean_square(values: &[f64]) -> f64 {
 
 fn deviation(flow: &[f64], from: usize, to: usize) -> f64 {
     standard_deviation(flow.get(from..to.min(flow.len())).unwrap_or_default())
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a short time")]
-fn floor_index(steps: f64) -> usize {
-    steps.max(0.0) as usize
 }

@@ -8,19 +8,21 @@ use crate::plan::{
 };
 use crate::studies::bcs_thesis::{drive, flow};
 
-/// Path before and after the corner \[mm\]: more than any plan uses.
+/// Path before the corner \[mm\]: more than any plan uses.
 const BEFORE_MM: f64 = 300.0;
+/// Path after the corner \[mm\]: more than any plan uses.
 const AFTER_MM: f64 = 400.0;
-/// Path on either side of the corner over which the error is judged \[mm\].
+/// Path on either side of the corner over which the error is judged \[mm\]: beyond it a plan
+/// leaves no error.
 pub const JUDGED_MM: f64 = 100.0;
-/// Share of the change's standard deviation that no model tells, and how long it hangs
-/// together \[s\].
+/// Unmodelled flow: its standard deviation over that of the change, and its correlation time
+/// \[s\] (papers.md, "001, on/off").
 pub const UNMODELLED: FlowUncertainty = FlowUncertainty { ratio: 0.17, correlation_s: 0.15 };
-/// The bead. Its length is given; a plan that counted on it to the last percent would be of
-/// little use for any other.
+/// The bead. The plan assumes a standard deviation of the nozzle's length of 7 %, so that it
+/// holds for lengths near it as well.
 pub const BEAD: BeadGeometry = BeadGeometry { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_sigma: 0.07 };
 
-/// The corner and what may be done about it.
+/// The corner, and the limits of robot and drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scenario {
     /// Speed away from the corner \[mm/s\].
@@ -38,9 +40,9 @@ pub struct Scenario {
 }
 
 impl Default for Scenario {
-    /// 100 mm/s, 2 mm/s at the apex, 2 m/s². The drive takes the usual command of 0 V to
-    /// 10 V, of which 100 mm/s take 6.7 V, and changes by all of it in half a second, as
-    /// ramps of drives of this size do; commands at 200 Hz.
+    /// 100 mm/s, 2 mm/s at the apex, 2 m/s². The drive has the usual range of 0 V to 10 V,
+    /// of which 100 mm/s need 6.7 V, and ramps through it in half a second, as is usual for
+    /// drives of this size; commands at 200 Hz.
     fn default() -> Self {
         Self {
             speed_mm_per_s: 100.0,
@@ -53,7 +55,7 @@ impl Default for Scenario {
     }
 }
 
-/// What stands in the way of the experiment.
+/// Errors of the experiment.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CornerError {
     /// The robot's speed.
@@ -71,7 +73,7 @@ pub enum CornerError {
 }
 
 impl Scenario {
-    /// The quickest speed that the path and the acceleration allow.
+    /// The fastest speed profile that path and acceleration allow.
     pub fn nominal(&self) -> Result<SpeedProfile, SpeedProfileError> {
         let mut limits = PathLimits::new(-BEFORE_MM, self.speed_mm_per_s);
         limits.extend_to(0.0, self.speed_mm_per_s, self.apex_mm_per_s);
@@ -91,10 +93,8 @@ impl Scenario {
 
     /// A plan within a time that may be added \[s\].
     pub fn plan(&self, budget_s: f64, unmodelled: FlowUncertainty) -> Result<Plan, CornerError> {
-        let robot = RobotMotionLimits {
-            accel_mm_per_s2: self.accel_mm_per_s2,
-            slowest_mm_per_s: self.apex_mm_per_s,
-        };
+        let (accel_mm_per_s2, slowest_mm_per_s) = (self.accel_mm_per_s2, self.apex_mm_per_s);
+        let robot = RobotMotionLimits { accel_mm_per_s2, slowest_mm_per_s };
         let limits = PlanLimits { robot, drive: self.drive()?, budget_s };
         let extruder = Self::extruder()?;
         let task = PlanTask { limits, bead: BEAD, unmodelled, extruder: &extruder };

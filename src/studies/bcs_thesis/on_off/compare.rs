@@ -13,31 +13,31 @@ use crate::numeric::average::mean;
 pub struct Compared {
     /// Root mean square of the section, off over on.
     pub ratio: f64,
-    /// The same of the seed with the smallest.
+    /// The smallest of all seeds.
     pub min_ratio: f64,
     /// Root mean square of the section about its own mean, off and on \[mm²\].
     pub area_rmse_mm2: [f64; 2],
-    /// Its mean size \[mm²\].
+    /// Its mean absolute error \[mm²\].
     pub area_mae_mm2: [f64; 2],
     /// The same of the width \[mm\].
     pub width_rmse_mm: [f64; 2],
-    /// \[mm\].
+    /// Its mean absolute error \[mm\].
     pub width_mae_mm: [f64; 2],
     /// The first seed, off and on.
     pub example: [WheelRun; 2],
 }
 
-/// Runs every seed off and with a control. At least one seed.
+/// Runs every seed off and with a controller, at least one seed.
 pub fn compare(
     seeds: u64,
-    share: f64,
+    unmodelled_fraction: f64,
     control: WheelControl,
 ) -> Result<Compared, FeedforwardError> {
     let runs: Result<Vec<[WheelRun; 2]>, FeedforwardError> = (1..=seeds.max(1))
         .into_par_iter()
         .map(|seed| {
-            let course = ExtruderRun::new(seed, share)?;
-            Ok([course.run(WheelControl::Off)?, course.run(control)?])
+            let extruder = ExtruderRun::new(seed, unmodelled_fraction)?;
+            Ok([extruder.run(WheelControl::Off)?, extruder.run(control)?])
         })
         .collect();
     let runs = runs?;

@@ -2,8 +2,8 @@ use super::*;
 use crate::extruder::feedforward::unpredictable_fraction;
 
 /// Off over on, mean of five seeds and the smallest.
-fn ratio(share: f64, control: WheelControl) -> (f64, f64) {
-    let found = compare(5, share, control).unwrap();
+fn ratio(unmodelled: f64, control: WheelControl) -> (f64, f64) {
+    let found = compare(5, unmodelled, control).unwrap();
     (found.ratio, found.min_ratio)
 }
 
@@ -18,18 +18,18 @@ fn on_and_off_differ_as_in_an_independent_simulation() {
 }
 
 #[test]
-fn the_drives_dead_time_takes_up_that_of_the_wheel() {
+fn the_drives_dead_time_compensates_that_of_the_wheel() {
     let (exact, _) = ratio(0.0, WheelControl::Ahead);
     assert!(exact > 1000.0, "{exact}");
 }
 
 #[test]
-fn a_pressure_reading_beats_what_no_feedforward_can() {
-    let (mean, least) = ratio(UNMODELLED_FRACTION, WheelControl::Observed(PRESSURE));
-    assert!(mean > 7.5 && least > 7.0, "{mean} {least}");
+fn a_pressure_reading_gains_more_than_any_feedforward() {
+    let (mean, min) = ratio(UNMODELLED_FRACTION, WheelControl::Observed(PRESSURE));
+    assert!(mean > 7.5 && min > 7.0, "{mean} {min}");
     let wrong = Sensors { exponent: 1.5, ..PRESSURE };
-    let (_, least) = ratio(UNMODELLED_FRACTION, WheelControl::Observed(wrong));
-    assert!(least > 6.5, "{least}");
+    let (_, min) = ratio(UNMODELLED_FRACTION, WheelControl::Observed(wrong));
+    assert!(min > 6.5, "{min}");
 }
 
 #[test]

@@ -1,56 +1,59 @@
-//! The wheel, what is laid on it and what sensors see of that.
+//! The wheel, the bead on it and the sensors.
 
 use super::extruder_run::{
     AREA_MM2, ExtruderRun, JUDGED_FROM_S, MM_PER_S_PER_RPM, STEP_S, at, to_steps,
 };
 use crate::core::units::Mm3PerS;
-use crate::extruder::feedforward::FeedforwardError;
-use crate::extruder::feedforward::FlowMeasurement;
+use crate::extruder::feedforward::{FeedforwardError, FlowMeasurement};
 use crate::numeric::average::mean;
 use crate::numeric::lti::{Between, Simulator};
 use crate::sim::hash::{mix, normal_pair};
 use crate::studies::bcs_thesis::wheel as motor;
 
-/// Exponent of the flow over the pressure, Ma et al. 2026.
+/// Exponent of the flow over the pressure, m = 26.5·P^1.58. Ma et al. 2026.
 pub const EXPONENT: f64 = 1.58;
-/// Height at which a section of 45 mm² is as wide as the 13.1 mm that the
-/// thesis reports: A = (W − H)·H + π·H²/4 \[mm\].
+/// Height of the bead \[mm\]. Derived: A = (W − H)·H + π·H²/4 = 45 mm² with W = 13.1 mm, bead
+/// characterisation thesis, § 4.3.1.
 const HEIGHT_MM: f64 = 3.654;
+/// Pressure at the mean flow \[MPa\]: the step of Ma et al. 2026.
 const PRESSURE_MPA: f64 = 0.6;
+/// Variance of a pressure reading \[MPa²\]. Ma et al. 2026.
 const PRESSURE_VARIANCE_MPA2: f64 = 4.98e-5;
+/// Standard deviation of a section \[mm²\], 0.4 % of it: a larger one makes the camera less useful.
 const CAMERA_SIGMA_MM2: f64 = 0.2;
+/// Latency of a section. Derived: 20 ms in steps of 1 ms.
 const CAMERA_DELAY_STEPS: usize = 20;
 
-/// What is measured at 50 Hz. The plant's own noise is known to the observer
-/// by its size and its correlation time, as an identified model tells them.
+/// Measurements at 50 Hz. The observer knows standard deviation and correlation time of the
+/// unmodelled flow, as an identified model gives them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensors {
-    /// A camera or profilometer this far behind the nozzle \[mm\], whose
-    /// sections have a standard deviation of 0.2 mm² and come 20 ms late.
+    /// Distance of a camera or profilometer behind the nozzle \[mm\], whose sections have a
+    /// standard deviation of 0.2 mm² and a latency of 20 ms.
     pub camera_mm: Option<f64>,
-    /// Melt pressure at the nozzle, with the flow as a power of it and the
-    /// noise of Ma et al. 2026 (σ = 0.00706 MPa) at 0.6 MPa.
+    /// Melt pressure at the nozzle: 0.6 MPa at the mean flow, the flow a power of it, with the
+    /// noise of Ma et al. 2026 (σ = 0.00706 MPa).
     pub pressure: bool,
-    /// The exponent that the controller takes for the pressure's 1.58.
+    /// The exponent that the controller assumes; the true one is 1.58.
     pub exponent: f64,
 }
 
-/// What came of a run, over the time that is judged.
+/// Results of a run, over the judged time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WheelRun {
     /// Root mean square of the section about its own mean \[mm²\].
     pub area_rmse_mm2: f64,
-    /// Mean size of the same \[mm²\].
+    /// Its mean absolute error \[mm²\].
     pub area_mae_mm2: f64,
     /// Mean section \[mm²\].
     pub area_mean_mm2: f64,
-    /// The same of the width, at a height that stays \[mm\].
+    /// Root mean square of the width about its own mean, at a constant height \[mm\].
     pub width_rmse_mm: f64,
-    /// \[mm\].
+    /// Its mean absolute error \[mm\].
     pub width_mae_mm: f64,
     /// Time \[s\] and section \[mm²\], every 20 ms.
     pub area: Vec<(f64, f64)>,
-    /// Time \[s\] and width at a height that stays \[mm\], every 20 ms.
+    /// Time \[s\] and width at a constant height \[mm\], every 20 ms.
     pub width: Vec<(f64, f64)>,
     /// Time \[s\] and flow \[mm³/s\], every 20 ms.
     pub flow: Vec<(f64, f64)>,
@@ -58,53 +61,53 @@ pub struct WheelRun {
     pub speed: Vec<(f64, f64)>,
 }
 
-/// The wheel and what has been laid on it.
+/// The wheel and the bead on it.
 pub(super) struct Wheel {
     motor: Simulator,
-    /// Speed of the surface \[mm/s\] and what it has passed \[mm\].
+    /// Speed of the surface \[mm/s\] and its path \[mm\].
     speeds: Vec<f64>,
     path: Vec<f64>,
     areas: Vec<f64>,
 }
 
 impl Wheel {
-    pub(super) fn new(course: &ExtruderRun) -> Result<Self, FeedforwardError> {
+    pub(super) fn new(extruder: &ExtruderRun) -> Result<Self, FeedforwardError> {
         let model = motor()?;
         let mut motor = Simulator::new(&model, STEP_S, Between::Held)?;
-        motor.settle(course.mean_flow / AREA_MM2 / MM_PER_S_PER_RPM / model.dc_gain())?;
-        let list = || Vec::with_capacity(course.flow.len());
+        motor.settle(extruder.mean_flow / AREA_MM2 / MM_PER_S_PER_RPM / model.dc_gain())?;
+        let list = || Vec::with_capacity(extruder.flow.len());
         Ok(Self { motor, speeds: list(), path: list(), areas: list() })
     }
 
-    pub(super) fn step(&mut self, course: &ExtruderRun, command: f64) {
+    pub(super) fn step(&mut self, extruder: &ExtruderRun, command: f64) {
         let speed = self.motor.step(command) * MM_PER_S_PER_RPM;
-        let flow = course.flow.get(self.areas.len()).copied().unwrap_or(0.0);
+        let flow = extruder.flow.get(self.areas.len()).copied().unwrap_or(0.0);
         let before = self.path.last().copied().unwrap_or(0.0);
         self.path.push(before + speed * STEP_S);
         self.speeds.push(speed);
         self.areas.push(flow / speed.max(1.0));
     }
 
-    /// What the sensors tell before this step: of the pressure now, of the
-    /// section as it was under the camera when the picture was taken.
+    /// The readings before this step: the section under the camera at capture, and the present
+    /// pressure.
     pub(super) fn sensor_readings(
         &self,
-        course: &ExtruderRun,
+        extruder: &ExtruderRun,
         step: u64,
         sensors: &Sensors,
     ) -> [Option<FlowMeasurement>; 2] {
-        let [first, second] = normal_pair(mix(&[course.seed, 3, step]));
+        let [first, second] = normal_pair(mix(&[extruder.seed, 3, step]));
         let camera = sensors.camera_mm.and_then(|behind| self.section(step, behind, first));
-        let pressure = sensors.pressure.then(|| pressure(course, step, sensors.exponent, second));
+        let pressure = sensors.pressure.then(|| pressure(extruder, step, sensors.exponent, second));
         [camera, pressure.flatten()]
     }
 
     fn section(&self, step: u64, behind_mm: f64, noise: f64) -> Option<FlowMeasurement> {
-        let taken = usize::try_from(step).ok()?.checked_sub(CAMERA_DELAY_STEPS)?;
-        let from = *self.path.get(taken)? - behind_mm;
+        let captured = usize::try_from(step).ok()?.checked_sub(CAMERA_DELAY_STEPS)?;
+        let from = *self.path.get(captured)? - behind_mm;
         let laid = self.path.partition_point(|path| *path < from);
         let (area, speed) = (self.areas.get(laid)?, self.speeds.get(laid)?);
-        // What has been laid before the run is not known.
+        // Bead that was laid before the run is not known.
         if from < 0.0 {
             return None;
         }
@@ -115,7 +118,7 @@ impl Wheel {
         })
     }
 
-    pub(super) fn judge(&self, course: &ExtruderRun) -> WheelRun {
+    pub(super) fn judge(&self, extruder: &ExtruderRun) -> WheelRun {
         let from = to_steps(JUDGED_FROM_S);
         let areas = self.areas.get(from..).unwrap_or_default();
         let widths: Vec<f64> = areas.iter().map(|area| width_mm(*area)).collect();
@@ -132,32 +135,37 @@ impl Wheel {
             width_mae_mm,
             width: thin(&self.areas.iter().map(|area| width_mm(*area)).collect::<Vec<f64>>()),
             area: thin(&self.areas),
-            flow: thin(&course.flow),
+            flow: thin(&extruder.flow),
             speed: thin(&self.speeds),
         }
     }
 }
 
-/// The flow that the controller reads from the pressure now.
-fn pressure(course: &ExtruderRun, step: u64, exponent: f64, noise: f64) -> Option<FlowMeasurement> {
-    let flow = course.flow.get(usize::try_from(step).ok()?)?;
-    let truth = PRESSURE_MPA * libm::pow(flow / course.mean_flow, 1.0 / EXPONENT);
+/// The flow that the controller derives from the present pressure.
+fn pressure(
+    extruder: &ExtruderRun,
+    step: u64,
+    exponent: f64,
+    noise: f64,
+) -> Option<FlowMeasurement> {
+    let flow = extruder.flow.get(usize::try_from(step).ok()?)?;
+    let truth = PRESSURE_MPA * libm::pow(flow / extruder.mean_flow, 1.0 / EXPONENT);
     let sigma = PRESSURE_VARIANCE_MPA2.sqrt();
-    let seen = (truth + sigma * noise).max(0.0) / PRESSURE_MPA;
-    let slope = course.mean_flow * exponent / PRESSURE_MPA;
+    let reading = (truth + sigma * noise).max(0.0) / PRESSURE_MPA;
+    let slope = extruder.mean_flow * exponent / PRESSURE_MPA;
     Some(FlowMeasurement {
         at: at(step),
-        flow: Mm3PerS::new(course.mean_flow * libm::pow(seen, exponent)).ok()?,
+        flow: Mm3PerS::new(extruder.mean_flow * libm::pow(reading, exponent)).ok()?,
         sigma: Mm3PerS::new(slope * sigma).ok()?,
     })
 }
 
-/// Width of a section at the height that stays \[mm\].
+/// Width of a section at the constant height \[mm\].
 fn width_mm(area_mm2: f64) -> f64 {
     area_mm2 / HEIGHT_MM + HEIGHT_MM * (1.0 - std::f64::consts::FRAC_PI_4)
 }
 
-/// Root mean square and mean size about the mean.
+/// Root mean square and mean absolute deviation from the mean.
 fn rms_and_mae(values: &[f64]) -> (f64, f64) {
     let middle = mean(values.iter().copied());
     let square = mean(values.iter().map(|value| (value - middle).powi(2)));

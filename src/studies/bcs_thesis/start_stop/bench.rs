@@ -1,5 +1,4 @@
-//! Beads with pauses between them, laid by the rules of a strategy; what of them is void
-//! or came where none was wanted.
+//! Beads with pauses between them, laid by a timing strategy, and their void and drool.
 
 use crate::core::time::Span;
 use crate::extruder::start_stop::{BeadConditions, Pause, StartStopTiming};
@@ -7,13 +6,12 @@ use crate::sim::melt::{Melt, MeltParameters};
 
 /// How starts and stops are timed.
 pub trait StartStopStrategy {
-    /// A start after a pause: from the command to run until the robot goes
-    /// \[s\], and the speed of a robot that goes, so long after that command,
-    /// as a share of its start speed.
+    /// A start after a pause: time from the command to run until the robot goes \[s\], and
+    /// from then on its speed over its start speed by the time since that command.
     fn begins(&self, pause: &Pause) -> (f64, impl Fn(Span) -> f64);
 
-    /// A stop: how far from the end of the bead the pump is told \[mm\], and
-    /// the robot's speed so long after that.
+    /// A stop: distance to the end of the bead at the command to stop \[mm\], and the robot's
+    /// speed ratio by the time since that command.
     fn ends(&self) -> (f64, impl Fn(Span) -> f64);
 }
 
@@ -29,12 +27,12 @@ impl StartStopStrategy for StartStopTiming {
     }
 }
 
-/// What is missing on the path and what came where none was wanted \[mm³\].
+/// Missing and surplus volume \[mm³\].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StartStopScore {
-    /// Less than the path needed, while the robot travelled it.
+    /// What the path lacks where the robot travelled it.
     pub void_mm3: f64,
-    /// More than the path needed, and all that came while the robot stood.
+    /// The surplus on the path, and all that came while the robot stood.
     pub drool_mm3: f64,
 }
 
@@ -44,40 +42,37 @@ impl StartStopScore {
         self.void_mm3 + self.drool_mm3
     }
 
-    /// With another.
+    /// The sum with another.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
-        Self {
-            void_mm3: self.void_mm3 + other.void_mm3,
-            drool_mm3: self.drool_mm3 + other.drool_mm3,
-        }
+        let void_mm3 = self.void_mm3 + other.void_mm3;
+        Self { void_mm3, drool_mm3: self.drool_mm3 + other.drool_mm3 }
     }
 }
 
 /// A robot and the beads that it lays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StartStopBench {
-    /// Flow and speed; the share is that of a strategy.
+    /// Flow and speed; the smallest speed ratio is that of a strategy.
     pub laid: BeadConditions,
     /// Length of a bead \[mm\].
     pub bead_mm: f64,
-    /// Time constant with which the robot follows the speed that it is told
-    /// \[s\].
+    /// Time constant of the robot's speed \[s\].
     pub robot_s: f64,
 }
 
-/// A moment of a start or a stop that is watched.
+/// A sample of a start or a stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlowSample {
-    /// Since the pump was told \[s\].
+    /// Since the command to the pump \[s\].
     pub since_s: f64,
-    /// What comes out of the nozzle \[mm³/s\].
+    /// Flow at the nozzle \[mm³/s\].
     pub flow_mm3_per_s: f64,
-    /// What the robot's speed takes \[mm³/s\].
-    pub wanted_mm3_per_s: f64,
+    /// Flow that the robot's speed demands \[mm³/s\].
+    pub demand_mm3_per_s: f64,
 }
 
-/// A stop and the start after it, from when the pump was told.
+/// A stop and the start after it, each from the command to the pump.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StartStopTrace {
     /// The stop.
@@ -86,19 +81,19 @@ pub struct StartStopTrace {
     pub start: Vec<FlowSample>,
 }
 
-/// Pauses that starts are judged after \[s\].
+/// Pauses after which starts are judged \[s\].
 pub const PAUSES_S: [f64; 7] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0];
-/// A stop or a start is watched for so long \[s\].
+/// Duration of a trace \[s\].
 pub const TRACE_S: f64 = 4.0;
 
-/// Where a pause and the beads beside it have come to.
+/// A pause and the beads beside it while they are simulated.
 struct BenchRun<'a, S> {
     bench: &'a StartStopBench,
     strategy: &'a S,
     melt: Melt,
     speed_fraction: f64,
     score: StartStopScore,
-    /// What the pump was told last, and when.
+    /// Last command to the pump, and when.
     last_command: LastCommand,
     trace: StartStopTrace,
 }
@@ -110,7 +105,7 @@ enum LastCommand {
 }
 
 impl StartStopBench {
-    /// The end of a bead, a pause from the moment when the robot was at its end,
+    /// The end of a bead, a pause from when the robot was at its end,
     /// and the bead after it; a score for each pause \[s\] in its order.
     pub fn lay<S: StartStopStrategy>(
         &self,
@@ -128,8 +123,8 @@ impl StartStopBench {
         idle_s.iter().map(one).collect()
     }
 
-    /// The end of a bead, a pause \[s\] and the start after it, to be looked at.
-    pub fn watch<S: StartStopStrategy>(
+    /// The trace of the end of a bead, a pause \[s\] and the start after it.
+    pub fn trace<S: StartStopStrategy>(
         &self,
         machine: MeltParameters,
         seed: u64,
@@ -147,15 +142,10 @@ impl StartStopBench {
         seed: u64,
         strategy: &'a S,
     ) -> BenchRun<'a, S> {
-        BenchRun {
-            bench: self,
-            strategy,
-            melt: Melt::steady(machine, seed),
-            speed_fraction: 1.0,
-            score: StartStopScore::default(),
-            last_command: LastCommand::Run { at_s: f64::NEG_INFINITY },
-            trace: StartStopTrace::default(),
-        }
+        let (melt, speed_fraction) = (Melt::steady(machine, seed), 1.0);
+        let last_command = LastCommand::Run { at_s: f64::NEG_INFINITY };
+        let (bench, score, trace) = (self, StartStopScore::default(), StartStopTrace::default());
+        BenchRun { bench, strategy, melt, speed_fraction, score, last_command, trace }
     }
 }
 
@@ -168,36 +158,35 @@ impl<S: StartStopStrategy> BenchRun<'_, S> {
         self.begin(stopped_s);
     }
 
-    /// Goes on by one step with the robot told a share of its speed; returns the
-    /// way that it made \[mm\].
+    /// One step with the robot commanded to a fraction of its speed; returns the robot's path
+    /// in it \[mm\].
     fn step(&mut self, commanded_fraction: f64) -> f64 {
-        let (dt_s, came_mm3) = self.melt.advance();
+        let (dt_s, laid_mm3) = self.melt.advance();
         let kept = libm::exp(-dt_s / self.bench.robot_s);
         self.speed_fraction = if commanded_fraction > 0.0 {
             commanded_fraction + (self.speed_fraction - commanded_fraction) * kept
         } else {
             0.0
         };
-        let wanted_mm3 = self.bench.laid.flow.get() * self.speed_fraction * dt_s;
-        self.score.void_mm3 += (wanted_mm3 - came_mm3).max(0.0);
-        self.score.drool_mm3 += (came_mm3 - wanted_mm3).max(0.0);
-        self.note(came_mm3 / dt_s, wanted_mm3 / dt_s);
+        let demand_mm3 = self.bench.laid.flow.get() * self.speed_fraction * dt_s;
+        self.score.void_mm3 += (demand_mm3 - laid_mm3).max(0.0);
+        self.score.drool_mm3 += (laid_mm3 - demand_mm3).max(0.0);
+        self.record(laid_mm3 / dt_s, demand_mm3 / dt_s);
         self.bench.laid.speed.get() * self.speed_fraction * dt_s
     }
 
-    fn note(&mut self, flow_mm3_per_s: f64, wanted_mm3_per_s: f64) {
+    fn record(&mut self, flow_mm3_per_s: f64, demand_mm3_per_s: f64) {
         let (at_s, kept) = match self.last_command {
             LastCommand::Stop { at_s } => (at_s, &mut self.trace.stop),
             LastCommand::Run { at_s } => (at_s, &mut self.trace.start),
         };
         let since_s = self.melt.now_s() - at_s;
         if since_s <= TRACE_S {
-            kept.push(FlowSample { since_s, flow_mm3_per_s, wanted_mm3_per_s });
+            kept.push(FlowSample { since_s, flow_mm3_per_s, demand_mm3_per_s });
         }
     }
 
-    /// Lays the last part of a bead; returns when the pump was told to stop
-    /// \[s\].
+    /// Lays the last part of a bead; returns the time of the command to stop \[s\].
     fn finish(&mut self) -> f64 {
         let stopped_s = self.melt.now_s();
         self.melt.command(0.0);

@@ -1,4 +1,4 @@
-//! Fixed dwell times, as printers have them, and the best of them.
+//! Fixed dwell times, as usual in printers, and the best of them.
 
 use rayon::prelude::*;
 
@@ -7,7 +7,7 @@ use crate::core::time::Span;
 use crate::extruder::start_stop::Pause;
 use crate::sim::melt::MeltParameters;
 
-/// The same times at every start and every stop. bcs-thesis, section 1.3.4.
+/// The same times at every start and every stop. Bead characterisation thesis, section 1.3.4.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dwell {
     /// From the command to run until the robot goes \[s\].
@@ -30,15 +30,14 @@ impl StartStopStrategy for Dwell {
 
 /// Longest dwell times that are tried \[s\].
 const MAX_DWELL_S: [f64; 2] = [4.0, 1.5];
-/// Halvings of a range by the golden section.
+/// Steps of the golden section; each shortens the interval to 0.618 of itself.
 const GOLDEN_STEPS: u32 = 8;
-/// Steps of the coarse row.
+/// Intervals of the coarse grid.
 const COARSE_STEPS: u32 = 10;
-/// Turns between the two times.
+/// Alternations between the two times.
 const ROUNDS: u32 = 2;
 
-/// The pair of dwell times with the least void and drool over all these pauses
-/// and seeds: as well as fixed times can be tuned.
+/// The pair of dwell times with the least void and drool over all these pauses and seeds.
 pub fn tune(
     bench: &StartStopBench,
     machine: MeltParameters,
@@ -47,22 +46,22 @@ pub fn tune(
 ) -> Dwell {
     let cost = |dwell: &Dwell| -> f64 {
         let of = |seed| bench.lay(machine, seed, dwell, idle_s);
-        // Collected, so that the sum does not hang on which seed ends first.
+        // Collected, so that the order of the sum does not depend on which seed ends first.
         let scores: Vec<Vec<StartStopScore>> = seeds.clone().into_par_iter().map(of).collect();
         scores.iter().flatten().map(StartStopScore::sum_mm3).sum()
     };
     let speed_mm_per_s = bench.laid.speed.get();
     let mut best = Dwell { start_s: 1.0, stop_s: 0.3, speed_mm_per_s };
     for _ in 0..ROUNDS {
-        let [start_most, stop_most] = MAX_DWELL_S;
-        best.start_s = minimise(start_most, |start_s| cost(&Dwell { start_s, ..best }));
-        best.stop_s = minimise(stop_most, |stop_s| cost(&Dwell { stop_s, ..best }));
+        let [max_start_s, max_stop_s] = MAX_DWELL_S;
+        best.start_s = minimise(max_start_s, |start_s| cost(&Dwell { start_s, ..best }));
+        best.stop_s = minimise(max_stop_s, |stop_s| cost(&Dwell { stop_s, ..best }));
     }
     best
 }
 
-/// Where a function from zero to an end is least: the best of a coarse row,
-/// then the golden section about it.
+/// The minimum of a function from zero to `max`: the best of a coarse grid, then the golden
+/// section about it.
 fn minimise(max: f64, cost: impl Fn(f64) -> f64) -> f64 {
     let step = max / f64::from(COARSE_STEPS);
     let coarse = (0..=COARSE_STEPS).map(|k| f64::from(k) * step);

@@ -1,33 +1,30 @@
-//! The corner around which the thesis wishes robot and extruder to be coordinated: both
-//! planned together, beside an extruder that no plan tells.
+//! The 90° corner for which the thesis leaves the coordination of robot and extruder open:
+//! both planned together, beside an extruder without a plan.
 
 use rayon::prelude::*;
 
-use super::around::Around;
 use super::draw;
 use crate::plan::Plan;
 use crate::studies::bcs_thesis::corner::{
     Baseline, BudgetRow, CornerError, CornerRun, DriveMode, Errors, JUDGED_MM, Scenario, UNMODELLED,
 };
 use crate::studies::error::ReproduceError;
-use crate::studies::row::TableRows;
-use crate::studies::study::{Effort, Section};
+use crate::studies::study::{Effort, Section, TableRows};
 
-/// Seeds of the flow that no model tells.
+/// Seeds of the unmodelled flow.
 pub const SEEDS: u64 = 20;
-/// Times that may be added \[s\]; of the last one there are figures.
+/// Times that the plan may add \[s\]; the figures are those of the last one.
 const BUDGETS_S: [f64; 8] = [0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0];
-/// With fewer seeds than this the experiment is a quick one, and takes fewer times.
+/// With fewer seeds the experiment is a quick one, and plans for fewer times.
 const QUICK_SEEDS: u64 = 10;
+/// The times of a quick one \[s\].
 const QUICK_S: [f64; 4] = [0.0, 0.2, 0.5, 1.0];
 
-/// The figures' case.
 const CASE: &str = "90° corner, at most 1 s added";
 const STRAIGHT_LEVEL: &str = "90° corner, level that suits the straight";
 const BEST_LEVEL: &str = "90° corner, level of the least error within ±100 mm";
-
-/// The plan counts on the mean over the nozzle's length; this is what the same runs leave
-/// where another length is looked at.
+/// The plan is for the mean over the nozzle's length; these rows average the same runs over
+/// other lengths \[mm\].
 const OTHER_LENGTHS: &str = "90° corner, planned for 20 mm, without noise";
 const LENGTHS: [(f64, &str); 5] = [
     (10.0, "width error RMS, mean over 10 mm"),
@@ -37,7 +34,7 @@ const LENGTHS: [(f64, &str); 5] = [
     (30.0, "width error RMS, mean over 30 mm"),
 ];
 
-/// Runs the corner for every time, and tells of the longest.
+/// Plans and runs the corner for every time; the rows are those of the longest.
 pub fn corner(effort: Effort, rows: &mut TableRows) -> Result<Section, ReproduceError> {
     let seeds = effort.seeds.unwrap_or(SEEDS);
     let budgets: &[f64] = if seeds < QUICK_SEEDS { &QUICK_S } else { &BUDGETS_S };
@@ -48,23 +45,18 @@ pub fn corner(effort: Effort, rows: &mut TableRows) -> Result<Section, Reproduce
     let Some(last) = found.last() else { return Err(ReproduceError::NoRun) };
     let plan = scenario.plan(last.budget_s, UNMODELLED)?;
     push(last, rows);
-    push_best_level(&scenario, &plan, (last.planned, seeds), rows)?;
-    let [constant, proportional, planned] = runs(&scenario, &plan)?;
-    for (length_mm, quantity) in LENGTHS {
-        let [theirs, ours] =
-            [&constant, &planned].map(|run| Some(100.0 * run.quiet_over(length_mm).rms()));
-        rows.push(OTHER_LENGTHS, (quantity, "%"), [None, theirs, ours]);
+    // The stricter reading: each baseline at the level of its own least error here.
+    for baseline in Baseline::ALL {
+        let errors = baseline.run_at_best_level(&scenario, &plan.speed)?.errors(seeds);
+        push_one(BEST_LEVEL, baseline, errors, last.planned, rows);
     }
-    let drawn = [
-        Around::of("constant extruder", &constant),
-        Around::of("proportional extruder", &proportional),
-        Around::of("planned", &planned),
-    ];
-    Ok(Section {
-        heading: "A 90° corner, robot and extruder planned together".to_owned(),
-        hint: hint(last, seeds),
-        drawing: draw::corner(&found, &drawn),
-    })
+    let runs = runs(&scenario, &plan)?;
+    for (length_mm, quantity) in LENGTHS {
+        let [theirs, _, ours] = runs.each_ref().map(|run| 100.0 * run.quiet_over(length_mm).rms());
+        rows.compare(OTHER_LENGTHS, (quantity, "%"), theirs, ours);
+    }
+    let heading = "A 90° corner, robot and extruder planned together";
+    Ok(Section::new(heading, hint(last, seeds), draw::corner(&found, &runs)))
 }
 
 fn hint(last: &BudgetRow, seeds: u64) -> String {
@@ -83,45 +75,26 @@ fn hint(last: &BudgetRow, seeds: u64) -> String {
 }
 
 fn push(last: &BudgetRow, rows: &mut TableRows) {
-    let ours = Some(100.0 * last.planned.noisy);
-    let best = |drive| Some(100.0 * last.ratio(drive) * last.planned.noisy);
-    let kinds = [
+    const KINDS: [(DriveMode, [&str; 2]); 2] = [
         (DriveMode::Constant, ["width error RMS, constant extruder", "ratio to constant extruder"]),
         (
             DriveMode::Proportional,
             ["width error RMS, proportional extruder", "ratio to proportional extruder"],
         ),
     ];
-    for (drive, [error, _]) in kinds {
-        rows.push(CASE, (error, "%"), [None, best(drive), ours]);
+    for (drive, [error, _]) in KINDS {
+        let best = 100.0 * last.ratio(drive) * last.planned.noisy;
+        rows.compare(CASE, (error, "%"), best, 100.0 * last.planned.noisy);
     }
-    for (drive, [_, ratio]) in kinds {
-        rows.push(CASE, (ratio, "1"), [None, None, Some(last.ratio(drive))]);
+    for (drive, [_, ratio]) in KINDS {
+        rows.ours(CASE, (ratio, "1"), last.ratio(drive));
     }
-    let bound = last.bound_ratio(DriveMode::Constant);
-    rows.push(
-        CASE,
-        ("ratio to constant extruder, bound without noise", "1"),
-        [None, None, Some(bound)],
-    );
-    rows.push(CASE, ("time added", "s"), [None, None, Some(last.added_s)]);
+    let bound = ("ratio to constant extruder, bound without noise", "1");
+    rows.ours(CASE, bound, last.bound_ratio(DriveMode::Constant));
+    rows.ours(CASE, ("time added", "s"), last.added_s);
     for (baseline, errors) in &last.baselines {
         push_one(STRAIGHT_LEVEL, *baseline, *errors, last.planned, rows);
     }
-}
-
-/// The stricter reading: each baseline at the level that leaves its own least error here.
-fn push_best_level(
-    scenario: &Scenario,
-    plan: &Plan,
-    (planned, seeds): (Errors, u64),
-    rows: &mut TableRows,
-) -> Result<(), CornerError> {
-    for baseline in Baseline::ALL {
-        let errors = baseline.run_at_best_level(scenario, &plan.speed)?.errors(seeds);
-        push_one(BEST_LEVEL, baseline, errors, planned, rows);
-    }
-    Ok(())
 }
 
 fn push_one(case: &str, baseline: Baseline, errors: Errors, ours: Errors, rows: &mut TableRows) {
@@ -131,11 +104,10 @@ fn push_one(case: &str, baseline: Baseline, errors: Errors, ours: Errors, rows: 
         (DriveMode::Proportional, false) => "width error RMS, proportional, own speed",
         (DriveMode::Proportional, true) => "width error RMS, proportional, planned speed",
     };
-    let values = [errors, ours].map(|errors| Some(100.0 * errors.noisy));
-    rows.push(case, (quantity, "%"), [None, values[0], values[1]]);
+    rows.compare(case, (quantity, "%"), 100.0 * errors.noisy, 100.0 * ours.noisy);
 }
 
-/// The baselines as they are usual, at the robot's own speed, and the plan.
+/// Both baselines at the robot's own speed, and the plan.
 fn runs(scenario: &Scenario, plan: &Plan) -> Result<[CornerRun; 3], CornerError> {
     let own = |drive| Baseline { drive, planned_speed: false }.run(scenario, &plan.speed);
     let planned = CornerRun::new(scenario, &plan.speed, |time| plan.command_at(time))?;

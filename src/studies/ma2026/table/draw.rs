@@ -1,66 +1,49 @@
-//! The curves of Ma et al. 2026 beside ours.
+//! Responses of Ma et al. 2026's controllers beside ours.
 
 use maud::{Markup, html};
 
-use crate::report::chart::area::{Area, XAxis};
-use crate::report::chart::legend::legend;
-use crate::report::chart::palette;
-use crate::report::chart::palette::Ink;
-use crate::report::chart::plot::{Plot, PlotLayer as Drawn, y_range};
+use crate::report::chart::area::XAxis;
+use crate::report::chart::palette::{self, Ink};
 use crate::report::chart::range::ValueRange as Range;
-use crate::report::chart::series::PlotCurve as Curve;
-
+use crate::report::chart::series::CurvePoint;
 use crate::studies::ma2026::{Factors, PressureResponse};
+use crate::studies::plot::{Line, plot_with_legend};
 
-/// Ticks from point to point of a drawing.
+/// Samples of the plant from point to point of a curve: fewer make larger pages, more hide
+/// the noise.
 const DRAWN_EVERY: usize = 4;
 
-/// A law's name, its colour and what it did.
+/// A controller's name, its colour and its response.
 pub type NamedResponse = (&'static str, Ink, PressureResponse);
 
-/// Pressure and screw speed of some laws, with the target.
-pub fn courses(drawn: &[NamedResponse], range: Range) -> Markup {
+/// Pressure and screw speed, with the target.
+pub fn pressure_and_speed(drawn: &[NamedResponse], range: Range) -> Markup {
     html! {
-        (curves(drawn, range, "pressure [MPa]", |course, at| course.pressure.get(at).copied()))
-        (curves(drawn, range, "screw speed [rpm]", |course, at| course.speed.get(at).copied()))
+        (curves(drawn, range, "pressure [MPa]", |found, at| found.pressure.get(at).copied()))
+        (curves(drawn, range, "screw speed [rpm]", |found, at| found.speed.get(at).copied()))
     }
 }
 
-/// One quantity of some laws; with the pressure the target, too.
+/// One quantity; the plot of the pressure has the target, too.
 pub fn curves(
     drawn: &[NamedResponse],
     range: Range,
     y_title: &str,
     value: impl Fn(&PressureResponse, usize) -> Option<f64>,
 ) -> Markup {
-    let all: Vec<Curve> =
-        drawn.iter().map(|(_, _, course)| thinned(course, range, &value)).collect();
-    let target = drawn.first().map(|(_, _, course)| {
-        thinned(course, range, &|course: &PressureResponse, at| course.target.get(at).copied())
+    let first = drawn.first().filter(|_| y_title.starts_with("pressure"));
+    let target = first.map(|(_, _, found)| {
+        let points = thinned(found, range, |found, at| found.target.get(at).copied());
+        Line::demand("target", palette::TARGET, points)
     });
-    let target = target.filter(|_| y_title.starts_with("pressure"));
-    let axis = XAxis::time(range);
-    let mut shown: Vec<&Curve> = all.iter().collect();
-    let mut layers = Vec::new();
-    let mut names: Vec<(&str, Ink, &str)> = Vec::new();
-    if let Some(target) = &target {
-        shown.push(target);
-        layers.push(Drawn::Demand(target, palette::TARGET));
-        names.push(("target", palette::TARGET, "dash"));
-    }
-    for ((name, ink, _), series) in drawn.iter().zip(&all) {
-        layers.push(Drawn::Curve(series, *ink));
-        names.push((name, *ink, ""));
-    }
-    let y_range = y_range(&shown, &[]);
-    html! {
-        (legend(&names))
-        (Plot { area: Area::wide(220.0), x: &axis, y_title, y_range, layers }.draw())
-    }
+    let found = drawn
+        .iter()
+        .map(|(name, ink, found)| Line::curve(name, *ink, thinned(found, range, &value)));
+    let lines: Vec<Line<'_>> = target.into_iter().chain(found).collect();
+    plot_with_legend(220.0, &XAxis::time(range), y_title, &lines)
 }
 
-/// Our step responses with every single error of the model, each in a colour
-/// that stands for no method.
+/// Our step responses with each single model error, each in a colour of no method.
 pub fn singles(drawn: &[PressureResponse]) -> Markup {
     let inks = [
         palette::PRIMING,
@@ -70,26 +53,18 @@ pub fn singles(drawn: &[PressureResponse]) -> Markup {
         palette::TRACKING,
         palette::SCREW,
     ];
-    let named: Vec<NamedResponse> = Factors::singles()
-        .into_iter()
-        .zip(inks)
-        .zip(drawn)
-        .map(|(((name, _), ink), course)| (name, ink, course.clone()))
-        .collect();
-    courses(&named, Range::new(0.0, 5.0))
+    let all = Factors::singles().into_iter().zip(inks).zip(drawn);
+    let named: Vec<NamedResponse> =
+        all.map(|(((name, _), ink), found)| (name, ink, found.clone())).collect();
+    pressure_and_speed(&named, Range::new(0.0, 5.0))
 }
 
 fn thinned(
-    course: &PressureResponse,
+    found: &PressureResponse,
     range: Range,
-    value: &impl Fn(&PressureResponse, usize) -> Option<f64>,
-) -> Curve {
-    course
-        .time_s
-        .iter()
-        .enumerate()
-        .step_by(DRAWN_EVERY)
-        .filter(|(_, t)| (range.min..=range.max).contains(*t))
-        .filter_map(|(at, t)| value(course, at).map(|value| (*t, value)))
-        .collect()
+    value: impl Fn(&PressureResponse, usize) -> Option<f64>,
+) -> Vec<CurvePoint> {
+    let drawn = found.time_s.iter().enumerate().step_by(DRAWN_EVERY);
+    let within = drawn.filter(|(_, t)| (range.min..=range.max).contains(*t));
+    within.filter_map(|(at, t)| value(found, at).map(|value| (*t, value))).collect()
 }

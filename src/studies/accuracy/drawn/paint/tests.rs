@@ -49,7 +49,7 @@ fn the_true_width_is_the_area_that_is_counted() {
     for scene in [torn.clone(), DrawnScene { holes, ..torn }, small] {
         for seed in 0..4 {
             let (counted, truth) = counted_width(&scene, seed);
-            // Rounding to a quarter of a pixel in 800 places: 0.072·√2/√400 = 0.005 px.
+            // Rounding to a quarter of a pixel in 800 positions: 0.072·√2/√400 = 0.005 px.
             assert!((counted - truth).abs() < 0.025, "{counted} {truth}");
         }
     }
@@ -67,7 +67,7 @@ fn the_light_of_a_picture_is_that_of_its_areas() {
     assert!((area - bare.truth_px).abs() < 1e-3, "{area} {}", bare.truth_px);
     assert!((sum(&ribbed) - sum(&bare) + 100.0 * 30.0 * 7.3).abs() < 2.0);
     assert!((ribbed.truth_px - bare.truth_px).abs() < 1e-9);
-    // A moved and blurred picture has the same light.
+    // A moved and blurred image has the same light.
     let moved = DrawnScene { blur_px: 3.0, motion_px: 20.0, ..scene.clone() };
     let moved = paint(
         &DrawnScene { edges: Tear { roughness_px: 0.0, ..TORN }, ..moved },
@@ -137,6 +137,6 @@ fn a_texture_has_in_the_picture_the_size_asked_for() {
         .map(|&light| f64::from(light) - 150.0)
         .collect();
     let variance = inside.iter().map(|light| light * light).sum::<f64>() / 24_000.0;
-    // A patch of 2·4² pixels counts as one: 750 of them tell a variance to 5 %.
+    // A patch of 2·4² pixels counts as one: 750 of them give a variance to 5 %.
     assert!((variance / 144.0 - 1.0).abs() < 0.2, "{variance}");
 }

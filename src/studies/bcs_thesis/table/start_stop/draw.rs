@@ -2,22 +2,20 @@
 
 use maud::{Markup, html};
 
-use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::area::Area;
 use crate::report::chart::legend::legend;
 use crate::report::chart::palette::{DEMAND, FLOW, Ink, OURS, PAPER, SETPOINT, SPEED};
 use crate::report::chart::pauses::{PauseLayer, over_pauses};
-use crate::report::chart::plot::{Plot, PlotLayer, y_range};
 use crate::report::chart::range::ValueRange as Range;
-use crate::report::chart::series::PlotCurve as Curve;
+use crate::report::chart::series::CurvePoint;
 use crate::studies::bcs_thesis::start_stop::bench::{FlowSample, PAUSES_S, StartStopScore};
 use crate::studies::bcs_thesis::start_stop::experiment::{
     Losses, StartStopResults, TRACED_PAUSE_S, bench,
 };
+use crate::studies::plot::{Line, axis, plot};
 
-/// A start is over, and a stop nearly, after this \[s\].
+/// Time that is drawn \[s\]: a start is over by then, and a stop nearly.
 const SHOWN_S: f64 = 3.0;
-
-type Points = Vec<(f64, f64)>;
 
 /// Volumes over the pause, and a stop and a start over time.
 pub fn all(found: &StartStopResults) -> Markup {
@@ -46,46 +44,33 @@ pub fn all(found: &StartStopResults) -> Markup {
 }
 
 fn volumes(found: &StartStopResults, title: &str, of: fn(&StartStopScore) -> f64) -> Markup {
-    let points = |losses: &Losses| -> Points {
+    let points = |losses: &Losses| -> Vec<CurvePoint> {
         PAUSES_S.iter().copied().zip(losses.iter().map(of)).collect()
     };
-    let ways = [
-        (points(&found.naive), DEMAND),
-        (points(&found.fixed), PAPER),
-        (points(&found.keeps), SETPOINT),
-        (points(&found.follows), OURS),
-    ];
-    let drawn = ways.each_ref().map(|(points, ink)| PauseLayer::Marked(points, *ink));
+    let all = [&found.naive, &found.fixed, &found.keeps, &found.follows].map(points);
+    let [none, fixed, keeps, follows] = all.each_ref();
+    let inked = [(none, DEMAND), (fixed, PAPER), (keeps, SETPOINT), (follows, OURS)];
+    let drawn = inked.map(|(points, ink)| PauseLayer::Marked(points, ink));
     over_pauses(Area::wide(220.0), title, &drawn)
 }
 
-fn flows(moments: &[FlowSample], title: &str) -> Markup {
-    let flow = shown(moments, |moment| moment.flow_mm3_per_s);
-    let wanted = shown(moments, |moment| moment.wanted_mm3_per_s);
-    plot(title, &[(wanted, SPEED), (flow, FLOW)])
+fn flows(samples: &[FlowSample], title: &str) -> Markup {
+    let demand = line(samples, SPEED, |sample| sample.demand_mm3_per_s);
+    half(title, &[demand, line(samples, FLOW, |sample| sample.flow_mm3_per_s)])
 }
 
 fn speeds([fixed, ours]: [&[FlowSample]; 2], title: &str) -> Markup {
     let full = bench(1.0).laid.flow.get();
-    let share = |moments| shown(moments, |moment: &FlowSample| moment.wanted_mm3_per_s / full);
-    plot(title, &[(share(fixed), PAPER), (share(ours), OURS)])
+    let ratio = |samples, ink| line(samples, ink, |sample| sample.demand_mm3_per_s / full);
+    half(title, &[ratio(fixed, PAPER), ratio(ours, OURS)])
 }
 
-fn shown(moments: &[FlowSample], of: impl Fn(&FlowSample) -> f64) -> Points {
-    let near = moments.iter().filter(|moment| moment.since_s <= SHOWN_S);
-    near.map(|moment| (moment.since_s, of(moment))).collect()
+fn line(samples: &[FlowSample], ink: Ink, of: impl Fn(&FlowSample) -> f64) -> Line<'static> {
+    let shown = samples.iter().filter(|sample| sample.since_s <= SHOWN_S);
+    Line::curve("", ink, shown.map(|sample| (sample.since_s, of(sample))))
 }
 
-fn plot(title: &str, curves: &[(Points, Ink)]) -> Markup {
-    let axis = XAxis {
-        title: "time since the command [s]".to_owned(),
-        range: Range::new(0.0, SHOWN_S),
-        divisor: 1.0,
-    };
-    let drawn: Vec<(Curve, Ink)> =
-        curves.iter().map(|(points, ink)| (points.iter().copied().collect(), *ink)).collect();
-    let all: Vec<_> = drawn.iter().map(|(series, _)| series).collect();
-    let y_range = y_range(&all, &[0.0]);
-    let layers = drawn.iter().map(|(series, ink)| PlotLayer::Curve(series, *ink)).collect();
-    Plot { area: Area::half(220.0), x: &axis, y_title: title, y_range, layers }.draw()
+fn half(title: &str, lines: &[Line<'_>]) -> Markup {
+    let axis = axis("time since the command [s]", Range::new(0.0, SHOWN_S));
+    plot(Area::half(220.0), &axis, title, lines, &[0.0])
 }
