@@ -4,6 +4,7 @@
 pub mod csv;
 pub mod describe;
 mod file_text;
+mod key_spec;
 mod keys;
 mod problem;
 mod renamed;

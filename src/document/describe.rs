@@ -4,62 +4,13 @@
 //! A choice, a key that a reader looks for and an optional table lead to other keys, so the
 //! reader runs once for every answer that it has not been given yet.
 
-use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::ops::RangeInclusive;
+use std::collections::{BTreeSet, VecDeque};
 
 use super::file_text::FileText;
+use super::key_spec::{Answers, Describer};
 use super::table::Table;
 
-/// One key of a file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct KeySpec {
-    /// The table in which it stands, such as `extruder.pressure`.
-    pub table: String,
-    /// Its name.
-    pub key: &'static str,
-    /// What it holds.
-    pub kind: KeyKind,
-    /// Whether it must be there, in the tables that a purpose needs.
-    pub is_required: bool,
-    /// The value that stands for its absence, as it is written; none where there is none.
-    pub default: Option<String>,
-    /// The answers that led to it, where others do not: key, and what was chosen.
-    pub when: Vec<(String, String)>,
-}
-
-/// What a key holds.
-#[derive(Debug, Clone, PartialEq)]
-pub enum KeyKind {
-    /// A number within a range.
-    Number(RangeInclusive<f64>),
-    /// A number whose range other keys of the file give.
-    NumberWithin(&'static str),
-    /// A whole number within a range.
-    Integer(RangeInclusive<u64>),
-    /// Numbers in brackets, each within a range; the counts that are allowed, none for any.
-    Numbers(Vec<usize>, RangeInclusive<f64>),
-    /// A text.
-    Text,
-    /// Texts in brackets.
-    Texts,
-    /// One of these words.
-    Choice(Vec<String>),
-}
-
-/// A question whose answer decides which keys there are.
-type Question = (String, &'static str);
-/// Questions with the number of the answer.
-type Answers = BTreeMap<Question, usize>;
-
-/// Notes down what one run of a reader asks for.
-pub(super) struct Describer {
-    answers: Answers,
-    found: RefCell<Vec<KeySpec>>,
-    /// The questions that this run met, each with its answers in words.
-    met: RefCell<BTreeMap<Question, Vec<String>>>,
-    numbers: RefCell<u32>,
-}
+pub use super::key_spec::{KeyKind, KeySpec};
 
 /// Every key that a reader may ask for, in the order of reading.
 pub fn describe(read: impl Fn(&Table<'_>)) -> Vec<KeySpec> {
@@ -67,12 +18,7 @@ pub fn describe(read: impl Fn(&Table<'_>)) -> Vec<KeySpec> {
     let mut known = BTreeSet::new();
     let mut queue = VecDeque::from([Answers::new()]);
     while let Some(answers) = queue.pop_front() {
-        let describer = Describer {
-            answers,
-            found: RefCell::default(),
-            met: RefCell::default(),
-            numbers: RefCell::default(),
-        };
+        let describer = Describer::new(answers);
         let text = FileText::new("", "", true);
         read(&Table::described(&text, &describer));
         let Describer { answers, found, met, .. } = describer;
@@ -101,36 +47,6 @@ pub fn describe(read: impl Fn(&Table<'_>)) -> Vec<KeySpec> {
 
 fn path(table: &str, key: &str) -> String {
     if table.is_empty() { key.to_owned() } else { format!("{table}.{key}") }
-}
-
-impl Describer {
-    /// The answer of this run to a question, by its number.
-    pub(super) fn answer(&self, table: &str, key: &'static str, words: Vec<String>) -> usize {
-        let question = (table.to_owned(), key);
-        let answer = self.answers.get(&question).copied().unwrap_or(0);
-        self.met.borrow_mut().insert(question, words);
-        answer
-    }
-
-    pub(super) fn note(
-        &self,
-        table: &str,
-        key: &'static str,
-        kind: KeyKind,
-        is_required: bool,
-        default: Option<String>,
-    ) {
-        let (table, when) = (table.to_owned(), Vec::new());
-        self.found.borrow_mut().push(KeySpec { table, key, kind, is_required, default, when });
-    }
-
-    /// A number within a range, larger than the one before in the same range.
-    pub(super) fn number(&self, range: &RangeInclusive<f64>) -> f64 {
-        let mut count = self.numbers.borrow_mut();
-        *count += 1;
-        let fraction = 0.3 + 1e-4 * f64::from(*count);
-        range.start() + fraction * (range.end() - range.start())
-    }
 }
 
 #[cfg(test)]

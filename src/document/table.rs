@@ -7,8 +7,8 @@ use std::collections::BTreeSet;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::describe::Describer;
 use super::file_text::FileText;
+use super::key_spec::Describer;
 use super::keys::{resembles, shared_ends};
 use super::renamed::present_name;
 use super::scalar::as_written;

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use toml::Spanned;
 use toml::de::DeValue;
 
-use super::describe::KeyKind;
+use super::key_spec::KeyKind;
 use super::scalar::{as_integer, as_number, as_written};
 use super::table::Table;
 

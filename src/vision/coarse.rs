@@ -27,7 +27,7 @@ const SLOPE_STEP_PX: f32 = 3.0;
 /// Rank of the bands' strongest steps above which a step counts for no more: a
 /// spark is no edge.
 const CAP_RANK: f32 = 0.7;
-/// Widest groove beside a bead \[px\]; beyond it begins another thing. Measured: ACCURACY.md, Drawn
+/// Widest groove beside a bead \[px\]; beyond it begins another thing. Measured: reference/accuracy.md, Drawn
 /// frames: `grooves` are 2 to 40 px wide.
 const MAX_GROOVE_PX: f32 = 40.0;
 /// Distance within a groove in which what its far side adds to an edge falls to
@@ -39,7 +39,7 @@ const FAR_SIDE_WEIGHT: f32 = 0.5;
 /// of the edge's step: a pattern of the ground adds up to 0.37.
 const MIN_CERTAIN_GROOVE: f32 = 0.4;
 /// Distance of a seam from an edge \[px\]: nearer lines belong to the edge's flank. Measured:
-/// ACCURACY.md, Drawn frames: the lines of `ribs-weak` lie at least 6 px from the edges.
+/// reference/accuracy.md, Drawn frames: the lines of `ribs-weak` lie at least 6 px from the edges.
 const MIN_SEAM_DISTANCE_PX: f32 = 6.0;
 /// [`SEAM_SHARE`] and [`RIVAL_SHARE`] where the stronger pair lies within the other one:
 /// rough edges are some tenths fainter in the mean along a line than ribs are.

@@ -47,7 +47,7 @@ pub enum EdgeKind {
     Groove,
 }
 
-/// Caliper lines along a gauge whose cell names no number: ACCURACY.md, What is measured, is for
+/// Caliper lines along a gauge whose cell names no number: reference/accuracy.md, What is measured, is for
 /// this number. More lines are shorter and noisier, fewer follow a bead less well.
 pub const DEFAULT_CALIPERS: usize = 64;
 /// Smallest contrast where the cell names none: about three times the noise of an

@@ -36,7 +36,7 @@ use super::width::{Caliper, CaliperPoint, Edges, Hints, WidthMeasurement};
 use crate::numeric::number::to_f64;
 
 /// Standard deviation of a width of 4 blurs from the flanks' overlap, in blurs. Measured:
-/// ACCURACY.md, Drawn frames: 2,000 beads of 5 to 600 px (`narrow`) with a blur of 1.5 px.
+/// reference/accuracy.md, Drawn frames: 2,000 beads of 5 to 600 px (`narrow`) with a blur of 1.5 px.
 const OVERLAP_SIGMA: f64 = 0.045;
 /// The width for which that is \[blurs\]. By definition.
 const OVERLAP_REFERENCE_BLURS: f64 = 4.0;

@@ -11,7 +11,7 @@ use crate::numeric::rank;
 /// Depth of a gap between two edges, as a fraction of the weaker one, that shows them
 /// to belong to two beads: it is deeper than the bead is high over the ground.
 const MIN_GAP_RATIO: f32 = 1.1;
-/// Depth of a gap up to which it is a seam within one bead. Measured: ACCURACY.md, Drawn frames:
+/// Depth of a gap up to which it is a seam within one bead. Measured: reference/accuracy.md, Drawn frames:
 /// lines of up to 60 % of the contrast (`ribs-weak`) are no edges; a little is left to noise.
 pub const MAX_SEAM_RATIO: f32 = 0.64;
 /// Strength of a pair within another one, as a fraction of the other's, from which on it

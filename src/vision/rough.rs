@@ -67,7 +67,7 @@ const MAX_SHAPE_OFFSET_PX: f64 = 0.5;
 const GROOVE_WAVINESS_FRACTION: f64 = 0.15;
 /// The same at most \[px\].
 const MAX_GROOVE_WAVINESS_PX: f64 = 0.15;
-/// The same beside a groove that shows its depth and is narrow. Measured: ACCURACY.md, Drawn frames
+/// The same beside a groove that shows its depth and is narrow. Measured: reference/accuracy.md, Drawn frames
 /// (`grooves`): without it 3.5 of 30,000 widths were more than 5 sigma off, with it 2.5.
 const NARROW_GROOVE_WAVINESS_FRACTION: f64 = 0.06;
 /// Widest groove that is narrow in this sense \[px\].
@@ -75,7 +75,7 @@ const MAX_NARROW_GROOVE_PX: f64 = 7.5;
 
 /// Standard deviation, beside that of noise, of where rows pass half height as the edge beside a
 /// groove \[px\]: its floor may be hidden, and torn edges have no Gaussian flank. Measured:
-/// ACCURACY.md, What the parts bring: averaged with the groove's shape by their variances, the same
+/// reference/accuracy.md, What the parts bring: averaged with the groove's shape by their variances, the same
 /// piece of real concrete differs from frame to frame by 0.33 px in the median, with the shape
 /// alone by 0.36.
 const GROOVE_CROSSING_SIGMA_PX: f64 = 0.5;

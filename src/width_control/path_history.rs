@@ -10,7 +10,7 @@ use crate::core::units::{Mm, MmPerS};
 /// Reports that are kept: 3.2 s at 50 Hz, more than a frame takes from capture to width.
 const MAX_REPORTS: usize = 160;
 /// Longest extrapolation beyond the newest report. After this time the link counts as lost
-/// (`robot/PROTOCOL.md`, § Connections).
+/// (`docs/src/reference/robot-link.md`, § Connections).
 const MAX_EXTRAPOLATION: Span = Span::from_millis(500);
 
 /// The nozzle's path over time.

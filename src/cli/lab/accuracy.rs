@@ -25,7 +25,7 @@ use crate::studies::accuracy::{SetFigures, WidthError};
 use crate::vision::Measurer;
 
 /// Default number of frames of a set. Derived: a standard deviation from n frames has a relative
-/// error of 1/√(2n), 1.3 % here (ACCURACY.md).
+/// error of 1/√(2n), 1.3 % here (reference/accuracy.md).
 const FRAMES: u64 = 3_000;
 /// Consecutive frames of one measurer, which keeps a state from frame to frame as in a cell.
 const FRAMES_PER_MEASURER: u64 = 250;

@@ -14,7 +14,7 @@ use crate::extruder::ExtruderLimits;
 use crate::io::clock::RunClock;
 use crate::simulators::extruder::{ExtruderOptions, ExtruderSim};
 
-/// Shortest and longest time between two STATE lines \[s\] (robot/EXTRUDER.md).
+/// Shortest and longest time between two STATE lines \[s\] (docs/src/reference/extruder-link.md).
 const STATE_PERIODS_S: (f64, f64) = (0.005, 0.2);
 
 /// An extruder that answers the extruder link.

@@ -1,4 +1,4 @@
-//! `driver = "line"`: an extruder that speaks the line link over TCP (`robot/EXTRUDER.md`).
+//! `driver = "line"`: an extruder that speaks the line link over TCP (`docs/src/reference/extruder-link.md`).
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! `driver = "line"`: a robot that speaks the line link over TCP (`robot/PROTOCOL.md`).
+//! `driver = "line"`: a robot that speaks the line link over TCP (`docs/src/reference/robot-link.md`).
 
 use std::sync::Arc;
 

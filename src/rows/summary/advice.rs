@@ -6,11 +6,11 @@
 
 use super::image_quality::ImageQuality;
 
-/// Contrast of the sets where nothing else is said \[grey levels\] (ACCURACY.md, § The sets).
+/// Contrast of the sets where nothing else is said \[grey levels\] (reference/accuracy.md, § The sets).
 const REFERENCE_CONTRAST_GREY: f64 = 80.0;
-/// Noise of the same \[grey levels\] (ACCURACY.md, § The sets).
+/// Noise of the same \[grey levels\] (reference/accuracy.md, § The sets).
 const REFERENCE_NOISE_GREY: f64 = 4.0;
-/// Blur of the same \[px\] (ACCURACY.md, § The sets).
+/// Blur of the same \[px\] (reference/accuracy.md, § The sets).
 const REFERENCE_BLUR_PX: f64 = 1.5;
 /// Advice is given where it would divide the standard deviation of widths by this factor.
 const MIN_GAIN_OF_ADVICE: f64 = 1.5;

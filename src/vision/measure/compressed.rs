@@ -4,7 +4,7 @@ use super::work::MeasureState;
 use crate::vision::trace::EdgeTracer;
 
 /// Noise of a profile that moves its edges as a compression does that takes the pixels' noise away
-/// \[grey levels\]. Measured: ACCURACY.md, Drawn frames (`jpeg`): straight edges with a noise of 4
+/// \[grey levels\]. Measured: reference/accuracy.md, Drawn frames (`jpeg`): straight edges with a noise of 4
 /// were off as by 2.2 at qualities of 30 to 36, 2.0 to 44 and 1.1 to 53, however far their profiles
 /// were from steps; with 1.7 the z of all of them is 1.
 const COMPRESSION_GREY: f64 = 1.7;

@@ -57,15 +57,15 @@ const WIDE_BLUR_PX: f64 = 3.5;
 /// How much farther out than a blurred step a rough edge may lie \[px\].
 const MAX_OUTWARD_PX: f64 = 1.0;
 /// Contrast of a rough edge over that of the blurred step from which on it is higher. Measured:
-/// ACCURACY.md, The sets: with sparks on 5 % of the bead (`spots`) it is 1.05 to 1.1.
+/// reference/accuracy.md, The sets: with sparks on 5 % of the bead (`spots`) it is 1.05 to 1.1.
 const MAX_CONTRAST_RATIO: f64 = 1.04;
 /// Fraction of odd pixels about an edge up to which it is bead and ground alone. Measured:
-/// ACCURACY.md, Drawn frames: `torn`, `holes` and `low-light` have up to 0.003; of 522 frames of
+/// reference/accuracy.md, Drawn frames: `torn`, `holes` and `low-light` have up to 0.003; of 522 frames of
 /// `grooves` that were refused as occluded 11 have more, and grains that passed for bays from 0.005
 /// on.
 const MAX_ODD_FRACTION: f64 = 0.004;
 /// By how much the fraction of odd pixels about an edge exceeds that within the bead where grains
-/// lie on it. Measured: ACCURACY.md, The sets: concrete beads have up to 0.022, grains of 6 and 12
+/// lie on it. Measured: reference/accuracy.md, The sets: concrete beads have up to 0.022, grains of 6 and 12
 /// px on a third of the rows (`grains-6-…`, `grains-12-…`) 0.027 to 0.14.
 const GRAIN_ODD_FRACTION: f64 = 0.024;
 

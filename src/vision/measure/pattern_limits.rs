@@ -5,11 +5,11 @@ use crate::vision::coarse::LinePair;
 use crate::vision::reject::{Checked, Reject};
 use crate::vision::rough::RoughFit;
 
-/// Strongest pattern beside the bead, as a fraction of the contrast. Measured: ACCURACY.md, Drawn
+/// Strongest pattern beside the bead, as a fraction of the contrast. Measured: reference/accuracy.md, Drawn
 /// frames: patterns of up to a third (`ground-texture-weak`) are measured, of stronger ones
 /// (`ground-texture-strong`) parts are taken for the bead.
 pub(super) const MAX_PATTERN: f64 = 0.37;
-/// The same where edges were located line by line. Measured: ACCURACY.md, Drawn frames
+/// The same where edges were located line by line. Measured: reference/accuracy.md, Drawn frames
 /// (`ground-texture-weak`): widths beside a pattern of 0.25 and 0.31 were 53 and 22 px off. A real
 /// strand has up to 0.2, real printed lines up to 0.24.
 pub(super) const MAX_PATTERN_LINE_BY_LINE: f64 = 0.25;

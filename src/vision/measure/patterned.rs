@@ -20,7 +20,7 @@ use crate::vision::trace::EdgeTracer;
 /// good enough: one of less draws them outwards by hardly 0.02 px.
 const MIN_PATTERN: f64 = 0.06;
 /// Weakest texture of the bead that is looked at, as a fraction of the contrast. Measured:
-/// ACCURACY.md, The sets: sparks over 5 % of a smooth bead (`spots`) look like up to 0.12.
+/// reference/accuracy.md, The sets: sparks over 5 % of a smooth bead (`spots`) look like up to 0.12.
 const MIN_TEXTURE: f64 = 0.13;
 /// The least of both edges' as a fraction of the other's where it is the same texture.
 const MIN_TEXTURE_RATIO: f64 = 0.4;

@@ -5,7 +5,7 @@ use crate::numeric::number::{round_to_count, to_f32};
 use crate::vision::edge_windows::WINDOW_PX;
 
 /// How far inside the edge's course a row is summed \[px\]: beyond a usual flank. Measured:
-/// ACCURACY.md, What the parts bring: with 4 px instead of 5 real concrete repeats to within 0.03
+/// reference/accuracy.md, What the parts bring: with 4 px instead of 5 real concrete repeats to within 0.03
 /// px of the same.
 pub const SUMMED_INSIDE_PX: f32 = 5.0;
 /// How far inside its course an edge may be torn \[px\].

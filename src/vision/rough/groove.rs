@@ -10,7 +10,7 @@ use crate::vision::gauge::EdgeKind;
 use crate::vision::vectors;
 use nalgebra::SVector;
 
-/// Grey of a groove as a fraction of the bead's. Measured: ACCURACY.md, Real and rendered: real
+/// Grey of a groove as a fraction of the bead's. Measured: reference/accuracy.md, Real and rendered: real
 /// grooves that are wide enough to show it have 1 to 74 beside beads of 131, 14.7 in the median.
 const GROOVE_GREY: f64 = 0.13;
 /// Its standard deviation. Measured: as [`GROOVE_GREY`], of which the range is.

@@ -12,7 +12,7 @@ use crate::vision::path;
 use crate::vision::strip::GreyPixel;
 
 /// Upper end of the camera's scale \[grey levels of 256\]. By definition of the scale
-/// (CONVENTIONS.md, Grey levels).
+/// (reference/conventions.md, Grey levels).
 const SCALE_END_GREY: f64 = 255.0;
 /// Levels that come so near it are clipped by noise, in standard deviations.
 const NEAR_END_SIGMAS: f64 = 1.5;

@@ -25,7 +25,7 @@ use crate::studies::accuracy::table::table;
 use crate::vision::Measurer;
 
 /// Default number of frames of a set. Derived: a limit of 0.01 % of silently wrong widths is then
-/// three frames (ACCURACY.md).
+/// three frames (reference/accuracy.md).
 const FRAMES: u64 = 30_000;
 /// Names all sets.
 const ALL: &str = "all";
