@@ -7,11 +7,12 @@
 CARGO ?= cargo
 SECONDS ?= 20
 OUT ?=
+ROOM ?=
 # rustup's cargo, where the shell was opened before it was installed.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint doc docs bench clean
+.PHONY: help setup demo test quick lint release doc docs bench clean
 
 help: ## list the targets
 	@echo "truebead: keeps an extruded bead at its target width"
@@ -29,6 +30,12 @@ demo: setup ## build it and run the whole loop with nothing attached (SECONDS=20
 test: setup lint ## format, lints, every test, and the links of all documents
 	$(CARGO) test --release --locked --workspace
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps --document-private-items
+
+quick: setup ## unit tests of one room soon after a change (ROOM=vision)
+	@scripts/quick "$(ROOM)"
+
+release: setup ## the program stripped, its debug information beside it: target/dist
+	@scripts/release
 
 lint: setup
 	$(CARGO) fmt --all --check

@@ -82,7 +82,7 @@ impl LoadedCell {
         Ok(loaded)
     }
 
-    /// Refuses a law by distance whose camera looks at bead that is not laid yet.
+    /// Refuses distance control whose camera looks at bead that is not laid yet.
     pub fn check_camera_offset(&self) -> Result<(), AssemblyError> {
         let Some(run) = &self.cell.run else { return Ok(()) };
         let half = self.cell.gauge_length(&self.calibration) * 0.5;

@@ -9,7 +9,7 @@
 //!
 //! Both links share one [`frame`]: ASCII lines ended by LF, at most [`MAX_LINE`]
 //! bytes with it, fields separated by one space, counted and valid for a time.
-//! `docs/src/reference/robot-link.md` and `docs/src/reference/extruder-link.md` tell the same to the person who
+//! `docs/src/reference/robot-link.md` and `docs/src/reference/extruder-link.md` describe the same for the person who
 //! programs a controller.
 
 pub mod extruder;

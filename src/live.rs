@@ -2,11 +2,11 @@
 //! each in a thread of its own, around the one controller.
 //!
 //! ```text
-//! camera ─one slot, latest wins─▶ eye ─widths─▶ control ─lines─▶ robot, extruder
+//! camera ─one slot, latest wins─▶ capture ─widths─▶ control ─lines─▶ robot, extruder
 //!                                  │              │ ▲
 //!                                  └─frames─┐     │ └──── link readers
 //!                                           ▼     ▼
-//!                                      recorder  scribe (widths.csv, report)
+//!                                      recorder  run logger (widths.csv, report)
 //! ```
 //!
 //! The control thread waits for events, for the next setpoint's time and for
@@ -70,15 +70,15 @@ pub struct LiveRun {
     pub out: PathBuf,
     /// What is written into the recording.
     pub record: RecordConfig,
-    /// Takes down what happens.
+    /// Logs what happens.
     pub log: RunLog,
     /// How long to run; none is until something ends it.
     pub duration: Option<Span>,
-    /// Whether to end when a course of steps is over.
+    /// Whether to end when a sequence of steps is over.
     pub ends_with_steps: bool,
     /// Gives a message when the run is to end.
     pub stop: Receiver<()>,
-    /// Is told what happens, in words for the operator.
+    /// Called with what happens, in words for the operator.
     pub notice: Box<dyn FnMut(&str) + Send>,
 }
 
@@ -134,7 +134,7 @@ pub enum LiveError {
     Thread(#[from] std::io::Error),
 }
 
-/// Runs a cell until it is told to stop, its time is over or it fails.
+/// Runs a cell until it is stopped, its time is over or it fails.
 pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     let (camera_stop, camera_end) = bounded::<()>(0);
     let camera = open::CellCamera {

@@ -163,16 +163,16 @@ impl Camera {
         );
         let mut ray = seen;
         for _ in 0..UNDISTORT_STEPS {
-            let (distorted, slope) = self.distort(ray);
-            let miss = distorted - seen;
-            if miss.norm() < UNDISTORT_TOLERANCE {
+            let (distorted, jacobian) = self.distort(ray);
+            let residual = distorted - seen;
+            if residual.norm() < UNDISTORT_TOLERANCE {
                 return Some(ray);
             }
-            // The distortion is not monotonic where its determinant is not positive.
-            if slope.determinant() <= 0.0 {
+            // The distortion folds where the determinant of its Jacobian is not positive.
+            if jacobian.determinant() <= 0.0 {
                 return None;
             }
-            ray -= slope.try_inverse()? * miss;
+            ray -= jacobian.try_inverse()? * residual;
         }
         let (distorted, _) = self.distort(ray);
         ((distorted - seen).norm() < 1e-9).then_some(ray)

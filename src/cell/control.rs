@@ -13,7 +13,7 @@ use crate::width_control::target::{Knot, Layers, WidthTarget};
 /// Fastest that any robot of this kind moves, as a bound on typing errors.
 const SPEED_RANGE: std::ops::RangeInclusive<f64> = 0.0..=10_000.0;
 
-/// Keys of the PI law's gains, and what they may be.
+/// Keys of the PI controller's gains, and what they may be.
 const GAIN_KEYS: [&str; 2] = ["kp_per_s", "ki_per_s2"];
 const GAIN_RANGE: std::ops::RangeInclusive<f64> = 0.0..=1e4;
 
@@ -56,7 +56,7 @@ pub fn read_control(
     })
 }
 
-/// Gains of the PI law, where both stand in the file.
+/// Gains of the PI controller, where both stand in the file.
 fn read_gains(control: &Table<'_>) -> Option<PiGains> {
     // The 2022 paper counts the error in pixels; its gains are of that unit.
     let unit = control.number_or("error_unit_mm", 1e-4..=1e3, 1.0)?;
@@ -90,7 +90,7 @@ pub fn check_target(
     }
 }
 
-/// The width that is asked for, with its course along the path and by layer.
+/// The width that is asked for, with its profile along the path and by layer.
 pub fn read_target_profile(
     control: &Table<'_>,
     layers: Option<&Table<'_>>,
@@ -126,7 +126,11 @@ fn read_path_profile(control: &Table<'_>) -> Option<Vec<Knot>> {
         positions.iter().zip(positions.iter().skip(1)).find(|(before, after)| after < before);
     if let Some((before, after)) = falls {
         let found = format!("{after} after {before}");
-        control.report("path_mm", found, "places in the order of the path; twice one is a step");
+        control.report(
+            "path_mm",
+            found,
+            "positions in the order of the path; the same one twice is a step",
+        );
         return None;
     }
     let knot = |(path, width): (f64, f64)| {

@@ -36,7 +36,7 @@ impl Cell {
         }
     }
 
-    /// The course of steps that the cell asks for.
+    /// The sequence of steps that the cell asks for.
     pub fn steps(&self, run: &RunPart, calibration: &Calibration) -> Option<StepSettings> {
         let strategy = run.control.strategy.as_kind::<StepsStrategy>()?;
         Some(strategy.settings(&self.parameters(run, calibration)))

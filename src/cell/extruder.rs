@@ -1,5 +1,5 @@
-//! `[extruder]` and `[extruder_plant]`: what the extruder is told and what it
-//! may be told, and for a simulated cell what answers. There are no defaults
+//! `[extruder]` and `[extruder_plant]`: what the extruder is commanded and the limits
+//! of that, and for a simulated cell what answers. There are no defaults
 //! for limits.
 
 mod adaptive;
@@ -156,8 +156,8 @@ impl ExtruderSettings {
         }
     }
 
-    /// What the extruder side of a controller has to know, with the law that
-    /// the strategy came to; without what other files tell of starts and of a job.
+    /// What the extruder side of a controller has to know, with the controller
+    /// that the strategy chose; without what other files hold of starts and of a job.
     pub fn setup(&self, strategy: ExtruderStrategy) -> ExtruderSetup {
         let period = |hz: f64| Span::from_secs(1.0 / hz);
         ExtruderSetup {

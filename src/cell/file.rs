@@ -39,7 +39,7 @@ use robot::read_robot;
 /// absent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
-    /// Measuring recorded frames: calibration and gauge suffice.
+    /// Measuring recorded frames: only calibration and gauge are needed.
     Measure,
     /// Running or simulating the whole cell: every table is needed.
     Run,
@@ -66,7 +66,7 @@ pub struct Cell {
     pub frame_rate_hz: Option<f64>,
     /// How the camera rides, if the file says so.
     pub mount: Option<Mount>,
-    /// What is kept, and how many refused frames are bearable.
+    /// What is kept, and how many rejected frames are acceptable.
     pub recording: RecordingSettings,
     /// What a run needs beyond measuring; complete when read for a run.
     pub run: Option<RunPart>,
@@ -156,7 +156,7 @@ impl Cell {
         layers.zip(robot_z).map_or(Mm::ZERO, |(layers, z)| z - layers.first_z)
     }
 
-    /// Whether widths are simulated without pictures.
+    /// Whether widths are simulated without images.
     pub fn simulates_widths(&self) -> bool {
         self.run.as_ref().is_some_and(|run| run.camera.source == ImageSource::Rendered)
             && self.simulation.width_source == WidthSource::Widths

@@ -1,4 +1,4 @@
-//! One picture of the bead: grey pixels that are owned, and when they were
+//! One image of the bead: grey pixels that are owned, and when they were
 //! captured.
 
 mod channel;
@@ -32,12 +32,12 @@ impl Pixels {
     }
 }
 
-/// A grey image and its place in time.
+/// A grey image and its capture time.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frame {
     /// Counts the frames of a source from 0.
     pub seq: u64,
-    /// When the light fell on the sensor, as near as the source can tell.
+    /// When the light fell on the sensor, as far as the source knows.
     pub captured_at: Stamp,
     size: Size,
     pixels: Pixels,

@@ -1,4 +1,4 @@
-//! What a column holds: its name tells the unit by its last words.
+//! What a column holds: its name ends with the unit.
 
 use std::fmt;
 
@@ -33,7 +33,7 @@ pub enum Unit {
     Mm,
     /// Temperature.
     Celsius,
-    /// A share, or something without a unit.
+    /// A fraction, or something without a unit.
     One,
 }
 
@@ -109,7 +109,7 @@ pub struct Quantity {
 }
 
 impl Quantity {
-    /// Of a column whose name ends with its unit, or whose unit is told.
+    /// Of a column whose name ends with its unit, or whose unit is given.
     pub fn of_column(column: &str, unit: Option<Unit>) -> Option<Self> {
         let unit = unit.or_else(|| Unit::of_column(column))?;
         let lower = column.to_ascii_lowercase();
@@ -164,8 +164,8 @@ mod tests {
     fn a_quantity_is_its_name_and_unit() {
         let flow = Quantity::of_column("flow_mm3_per_s", None).unwrap();
         assert_eq!((flow.name.as_str(), flow.to_string().as_str()), ("flow", "flow [mm³/s]"));
-        let told = Quantity::of_column("nozzle", Some(Unit::Bar)).unwrap();
-        assert_eq!((told.name.as_str(), told.unit), ("nozzle", Unit::Bar));
+        let given = Quantity::of_column("nozzle", Some(Unit::Bar)).unwrap();
+        assert_eq!((given.name.as_str(), given.unit), ("nozzle", Unit::Bar));
         assert_eq!(Quantity::of_column("rpm", None).unwrap().to_string(), "rpm");
         assert_eq!(Quantity::of_column("oven", None), None);
     }

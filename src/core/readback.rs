@@ -1,4 +1,4 @@
-//! Whether the robot moves, or a screw turns, at the speed that it was told.
+//! Whether the robot moves, or a screw turns, at its setpoint.
 
 use super::time::{Span, Stamp};
 use super::units::MmPerS;
@@ -6,11 +6,11 @@ use super::units::MmPerS;
 /// Time that the speed of a robot takes to follow, unless its own is known: one over the
 /// angular frequency of a loop of 10 Hz, as the 2022 paper has it.
 pub const ROBOT_LAG: Span = Span::from_millis(16);
-/// Share of the setpoint by which the speed may differ.
+/// Fraction of the setpoint by which the speed may differ (robot link, Rules).
 const SPEED_TOLERANCE: f64 = 0.10;
-/// Share from which the robot counts as held by limits of its own.
+/// Fraction from which the robot counts as limited by itself.
 const LIMITED_FRACTION: f64 = 0.03;
-/// How long a difference may last before it is believed to be a limit.
+/// How long a difference may last before it counts as a limit.
 const LIMITED_AFTER: Span = Span::from_millis(300);
 /// How long it may last before the controller holds.
 const HOLD_AFTER: Span = Span::from_millis(500);
@@ -28,7 +28,7 @@ pub struct SpeedMonitor {
 /// What the speed read back says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SpeedMatch {
-    /// The robot does as it is told.
+    /// The robot follows its setpoint.
     #[default]
     Follows,
     /// It has moved slower for a while: a limit of its own.
@@ -68,7 +68,7 @@ impl SpeedMonitor {
         }
     }
 
-    /// Forgets what was, as when the robot has not been told anything.
+    /// Starts anew, as before the first setpoint.
     pub fn reset(&mut self) {
         *self = Self::default();
     }
@@ -84,9 +84,9 @@ mod tests {
 
     fn after(secs: f64, driven: f64) -> SpeedMatch {
         let mut follow = SpeedMonitor::default();
-        let told = MmPerS::constant(100.0);
-        let _ = follow.observe(Stamp::START, told, MmPerS::constant(driven));
-        follow.observe(Stamp::from_secs(secs), told, MmPerS::constant(driven))
+        let setpoint = MmPerS::constant(100.0);
+        let _ = follow.observe(Stamp::START, setpoint, MmPerS::constant(driven));
+        follow.observe(Stamp::from_secs(secs), setpoint, MmPerS::constant(driven))
     }
 
     #[test]
@@ -102,11 +102,11 @@ mod tests {
     #[test]
     fn a_report_in_between_that_agrees_starts_the_count_again() {
         let mut follow = SpeedMonitor::default();
-        let told = MmPerS::constant(100.0);
+        let setpoint = MmPerS::constant(100.0);
         for (secs, driven) in [(0.0, 80.0), (0.4, 100.0), (0.45, 80.0)] {
-            let _ = follow.observe(Stamp::from_secs(secs), told, MmPerS::constant(driven));
+            let _ = follow.observe(Stamp::from_secs(secs), setpoint, MmPerS::constant(driven));
         }
-        let verdict = follow.observe(Stamp::from_secs(0.6), told, MmPerS::constant(80.0));
+        let verdict = follow.observe(Stamp::from_secs(0.6), setpoint, MmPerS::constant(80.0));
         assert_eq!(verdict, SpeedMatch::Follows);
     }
 }

@@ -1,5 +1,5 @@
 //! Monotonic time as data: a [`Stamp`] counts from the start of the run, a
-//! [`Span`] is signed so that late data shows. Nothing here reads a clock.
+//! [`Span`] is signed so that delayed data shows. Nothing here reads a clock.
 
 use std::ops::{Add, Sub};
 

@@ -8,31 +8,31 @@ const NORMAL_99: f64 = 2.5758;
 /// The sample autocorrelation of a row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Autocorrelation {
-    /// Correlation by lag in samples, from 0, where it is 1.
-    pub lags: Vec<f64>,
+    /// Autocorrelation at lag 0, 1, … samples; 1 at lag 0.
+    pub coefficients: Vec<f64>,
     /// 99 % of the lags of white noise are within ± this (Bartlett 1946).
     pub bound: f64,
 }
 
 impl Autocorrelation {
-    /// Up to a lag, about the mean of the row.
-    pub fn of(row: &[f64], longest: usize) -> Self {
+    /// The coefficients up to a lag in samples, of the deviations from the mean.
+    pub fn of(row: &[f64], max_lag: usize) -> Self {
         let n = to_f64(row.len().max(1));
         let mean = row.iter().sum::<f64>() / n;
-        let off: Vec<f64> = row.iter().map(|value| value - mean).collect();
+        let deviations: Vec<f64> = row.iter().map(|value| value - mean).collect();
         let at = |lag: usize| -> f64 {
-            let later = off.get(lag..).unwrap_or_default();
-            off.iter().zip(later).map(|(a, b)| a * b).sum()
+            let later = deviations.get(lag..).unwrap_or_default();
+            deviations.iter().zip(later).map(|(a, b)| a * b).sum()
         };
-        let whole = at(0);
-        let correlation = |lag| if whole > 0.0 { at(lag) / whole } else { 0.0 };
-        let longest = longest.min(row.len().saturating_sub(1));
-        Self { lags: (0..=longest).map(correlation).collect(), bound: NORMAL_99 / n.sqrt() }
+        let energy = at(0);
+        let correlation = |lag| if energy > 0.0 { at(lag) / energy } else { 0.0 };
+        let max_lag = max_lag.min(row.len().saturating_sub(1));
+        Self { coefficients: (0..=max_lag).map(correlation).collect(), bound: NORMAL_99 / n.sqrt() }
     }
 
     /// Fraction of the lags from 1 on that exceed the bound; about 1 % for white noise.
     pub fn fraction_outside(&self) -> f64 {
-        let lags = self.lags.get(1..).unwrap_or_default();
+        let lags = self.coefficients.get(1..).unwrap_or_default();
         let outside = lags.iter().filter(|lag| lag.abs() > self.bound).count();
         to_f64(outside) / to_f64(lags.len().max(1))
     }
@@ -59,21 +59,21 @@ mod tests {
     #[test]
     fn white_noise_stays_within_its_bounds_and_autocorrelated_noise_does_not() {
         let white = Autocorrelation::of(&noise(0.0), 200);
-        assert_eq!((white.lags[0], white.lags.len()), (1.0, 201));
+        assert_eq!((white.coefficients[0], white.coefficients.len()), (1.0, 201));
         assert!(white.fraction_outside() < 0.04, "{}", white.fraction_outside());
         let autocorrelated = Autocorrelation::of(&noise(0.9), 10);
         assert!(
-            (autocorrelated.lags[5] - 0.9_f64.powi(5)).abs() < 0.05,
+            (autocorrelated.coefficients[5] - 0.9_f64.powi(5)).abs() < 0.05,
             "{:?}",
-            autocorrelated.lags
+            autocorrelated.coefficients
         );
         assert!(autocorrelated.fraction_outside() > 0.9);
     }
 
     #[test]
     fn nothing_correlates_with_nothing() {
-        assert_eq!(Autocorrelation::of(&[], 5).lags, [0.0]);
-        assert_eq!(Autocorrelation::of(&[3.0; 9], 3).lags, [0.0; 4]);
+        assert_eq!(Autocorrelation::of(&[], 5).coefficients, [0.0]);
+        assert_eq!(Autocorrelation::of(&[3.0; 9], 3).coefficients, [0.0; 4]);
     }
 
     #[test]

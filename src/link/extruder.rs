@@ -1,6 +1,6 @@
 //! The extruder link, version 1: what travels between truebead and an extruder
 //! controller, without a socket and without a clock. Framing, counting and
-//! validity are those of the robot link; `docs/src/reference/extruder-link.md` tells the rest to
+//! validity are those of the robot link; `docs/src/reference/extruder-link.md` describes the rest for
 //! the person who programs an extruder controller.
 //!
 //! ```text

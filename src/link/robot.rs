@@ -1,5 +1,5 @@
 //! The robot's dialect of the line link, and a robot that speaks it.
-//! `docs/src/reference/robot-link.md` tells the same to the person who programs a robot
+//! `docs/src/reference/robot-link.md` describes the same for the person who programs a robot
 //! controller.
 
 pub mod job;

@@ -32,7 +32,7 @@ pub struct Optics {
 /// What the capture pipeline gives control.
 #[derive(Debug)]
 pub enum CameraMessage {
-    /// A frame was looked at.
+    /// A frame was measured or rejected.
     Frame(Box<MeasuredFrame>),
     /// There was a frame, but it cannot be read.
     Unreadable {
@@ -47,7 +47,7 @@ pub enum CameraMessage {
     Ended(Option<String>),
 }
 
-/// A frame that was looked at.
+/// A frame that was measured or rejected.
 #[derive(Debug)]
 pub struct MeasuredFrame {
     /// The frame.
@@ -84,21 +84,21 @@ impl CapturePipeline {
         tap: FrameTap,
         clock: RunClock,
     ) -> std::io::Result<Self> {
-        let (tell, seen) = unbounded();
+        let (messages, seen) = unbounded();
         let mailbox = Arc::new(Mailbox::default());
-        let (filling, messages) = (Arc::clone(&mailbox), tell.clone());
+        let (filling, camera_messages) = (Arc::clone(&mailbox), messages.clone());
         let camera = Builder::new()
             .name("camera".to_owned())
-            .spawn(move || take_frames(source, &filling, &messages, clock))?;
+            .spawn(move || take_frames(source, &filling, &camera_messages, clock))?;
         let taking = Arc::clone(&mailbox);
         let measure = Builder::new()
             .name("measure".to_owned())
-            .spawn(move || measure_frames(&taking, &optics, &tap, &tell))?;
+            .spawn(move || measure_frames(&taking, &optics, &tap, &messages))?;
         Ok(Self { seen, mailbox, threads: vec![camera, measure] })
     }
 
-    /// Ends the threads, whose source must have been told to end; returns how
-    /// many frames were never looked at.
+    /// Ends the threads, whose source must be about to end; returns how
+    /// many frames were never measured.
     pub fn stop(self) -> u64 {
         self.mailbox.close();
         for thread in self.threads {
@@ -113,7 +113,7 @@ impl CapturePipeline {
 fn take_frames(
     mut source: Box<dyn FrameSource>,
     mailbox: &Mailbox<Taken>,
-    tell: &Sender<CameraMessage>,
+    messages: &Sender<CameraMessage>,
     clock: RunClock,
 ) {
     let why = loop {
@@ -131,14 +131,14 @@ fn take_frames(
     };
     mailbox.close();
     // Nobody listens any more when the run has ended first.
-    let _ = tell.send(CameraMessage::Ended(why));
+    let _ = messages.send(CameraMessage::Ended(why));
 }
 
 fn measure_frames(
     mailbox: &Mailbox<Taken>,
     optics: &Optics,
     tap: &FrameTap,
-    tell: &Sender<CameraMessage>,
+    messages: &Sender<CameraMessage>,
 ) {
     let mut measurer = Measurer::new(optics.cell.gauge, optics.cell.white);
     let mut estimator = RoughnessEstimator::default();
@@ -155,7 +155,7 @@ fn measure_frames(
                 let edges = (edges.left.to_vec(), edges.right.to_vec());
                 let look =
                     MeasuredFrame { frame: Arc::clone(&frame), had_at, outcome, roughness, edges };
-                if tell.send(CameraMessage::Frame(Box::new(look))).is_err() {
+                if messages.send(CameraMessage::Frame(Box::new(look))).is_err() {
                     return;
                 }
                 tap.frame(frame);
@@ -163,7 +163,7 @@ fn measure_frames(
             }
             Taken::Unreadable { seq, at, reason } => CameraMessage::Unreadable { seq, at, reason },
         };
-        if tell.send(seen).is_err() {
+        if messages.send(seen).is_err() {
             return;
         }
     }

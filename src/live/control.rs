@@ -92,7 +92,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     pub fn take_rest(&mut self, seen: &Receiver<CameraMessage>) {
         for seen in seen.try_iter() {
             match seen {
-                CameraMessage::Frame(look) => self.look(*look),
+                CameraMessage::Frame(measured) => self.take_measured(*measured),
                 CameraMessage::Unreadable { seq, at, reason } => self.unreadable(seq, at, &reason),
                 CameraMessage::Ended(_) => {}
             }
@@ -133,7 +133,9 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
             }
             let until = [over, extruder_due].into_iter().flatten().fold(due, Stamp::min);
             match self.inputs.next(until) {
-                Some(LiveInput::Camera(CameraMessage::Frame(look))) => self.look(*look),
+                Some(LiveInput::Camera(CameraMessage::Frame(measured))) => {
+                    self.take_measured(*measured)
+                }
                 Some(LiveInput::Camera(CameraMessage::Unreadable { seq, at, reason })) => {
                     self.unreadable(seq, at, &reason);
                 }

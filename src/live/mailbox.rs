@@ -1,4 +1,4 @@
-//! A place for one thing: the newest replaces what nobody has taken.
+//! A slot for one thing: the newest replaces what nobody has taken.
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 

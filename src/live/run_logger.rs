@@ -1,5 +1,5 @@
 //! Writes the log of a live run in a thread of its own, so that neither the
-//! disk nor the pictures for the report hold control up.
+//! disk nor the images for the report delay control.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,11 +18,11 @@ use crate::rows::output::LogError;
 use crate::rows::summary::{RunNote, Summary};
 use crate::vision::Edges;
 
-/// Pictures that may wait for the log; beyond, rows go without theirs.
-const WAITING_PICTURES: usize = 16;
+/// Images that may wait for the log; beyond, rows go without theirs.
+const MAX_WAITING_IMAGES: usize = 16;
 
 enum Fact {
-    Frame { row: FrameRow, picture: Option<FrameWithEdges> },
+    Frame { row: FrameRow, image: Option<FrameWithEdges> },
     Step { now: Stamp, event: Event, step: Step },
     Latency(Latency),
     Note(RunNote),
@@ -31,7 +31,7 @@ enum Fact {
 /// The thread that writes the log.
 pub struct RunLogger {
     facts: Sender<Fact>,
-    /// Pictures that have been told and not yet written.
+    /// Images that wait to be written.
     waiting: Arc<AtomicUsize>,
     thread: JoinHandle<Result<Summary, LogError>>,
 }
@@ -41,8 +41,8 @@ impl RunLogger {
     pub fn start(log: RunLog) -> std::io::Result<Self> {
         let (facts, written) = unbounded();
         let waiting = Arc::new(AtomicUsize::new(0));
-        let pictures = Arc::clone(&waiting);
-        let write = move || write_all(log, &written, &pictures);
+        let waiting_images = Arc::clone(&waiting);
+        let write = move || write_all(log, &written, &waiting_images);
         let thread = Builder::new().name("log".to_owned()).spawn(write)?;
         Ok(Self { facts, waiting, thread })
     }
@@ -61,12 +61,12 @@ impl RunLogger {
 
 impl Journal for RunLogger {
     fn frame(&self, row: &FrameRow, image: Option<FrameWithEdges>) {
-        let room = self.waiting.load(Ordering::Relaxed) < WAITING_PICTURES;
-        let picture = image.filter(|_| room);
-        if picture.is_some() {
+        let room = self.waiting.load(Ordering::Relaxed) < MAX_WAITING_IMAGES;
+        let image = image.filter(|_| room);
+        if image.is_some() {
             self.waiting.fetch_add(1, Ordering::Relaxed);
         }
-        self.keep(Fact::Frame { row: *row, picture });
+        self.keep(Fact::Frame { row: *row, image });
     }
 
     fn step(&self, now: Stamp, event: Event, step: Step) {
@@ -89,12 +89,12 @@ fn write_all(
 ) -> Result<Summary, LogError> {
     for fact in facts {
         match fact {
-            Fact::Frame { row, picture: Some((frame, left, right)) } => {
+            Fact::Frame { row, image: Some((frame, left, right)) } => {
                 waiting.fetch_sub(1, Ordering::Relaxed);
                 let edges = Edges { left: &left, right: &right };
                 log.frame(&row, Some(&frame), Some(edges))?;
             }
-            Fact::Frame { row, picture: None } => log.frame(&row, None, None)?,
+            Fact::Frame { row, image: None } => log.frame(&row, None, None)?,
             Fact::Step { now, event, step } => log.step(now, &event, &step),
             Fact::Latency(latency) => log.latency(latency.latency_ms, latency.send_wait_ms),
             Fact::Note(note) => log.note(&note),

@@ -25,15 +25,15 @@ pub trait FrameSource: Send {
 /// One turn of a frame source.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Grab {
-    /// A picture.
+    /// An image.
     Frame {
-        /// The picture.
+        /// The image.
         frame: Frame,
         /// Seconds since the source's first frame, or as the source's own
         /// table of times has them; `None` where it knows none.
         time_s: Option<f64>,
     },
-    /// There should be a picture, but it cannot be read.
+    /// There should be an image, but it cannot be read.
     Unreadable {
         /// Its number.
         seq: u64,

@@ -42,8 +42,8 @@ impl<R: RobotPort, K: Recorder, X: ExtruderPort> Runner<R, K, X> {
     }
 
     /// Answers an event: step, send, record, in this order, so that the disk
-    /// is never between a decision and the machine. Where both sides are told
-    /// something, as at the end of a run, the extruder is told first: a robot
+    /// is never between a decision and the machine. Where both sides get a
+    /// command, as at the end of a run, the extruder gets it first: a robot
     /// that stops under a running pump is worse than the other way round. What
     /// cannot be recorded ends control in hold.
     pub fn handle(&mut self, now: Stamp, event: &Event) -> Handled {
@@ -59,7 +59,7 @@ impl<R: RobotPort, K: Recorder, X: ExtruderPort> Runner<R, K, X> {
         Handled { step, robot, extruder }
     }
 
-    /// Tells the controller that the recording is lost.
+    /// Makes the controller hold because the recording is lost.
     pub fn lose_recording(&mut self, now: Stamp, error: RecordError) {
         if self.failure.is_none() {
             self.failure = Some(error);

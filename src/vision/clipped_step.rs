@@ -468,8 +468,8 @@ mod tests {
         let frame =
             Frame::new(0, Stamp::START, Size::new(SIZE.0, SIZE.1), Pixels::Grey16(values)).unwrap();
         let view = GaugeView::new(Roi { x: 0, y: 0, width: 120, height: 40 }, BeadAxis::Vertical);
-        let mut turner = RowLayout::default();
-        let GaugeRowsOfDepth::Words(strip) = turner.strips(&frame, &view, None) else {
+        let mut layout = RowLayout::default();
+        let GaugeRowsOfDepth::Words(strip) = layout.strips(&frame, &view, None) else {
             unreachable!()
         };
         let mut sheet = EdgeWindows::default();

@@ -48,7 +48,7 @@ const OVERLAP_DECAY_BLURS: f64 = 3.0;
 pub struct Measurer {
     gauge: Gauge,
     white: Option<u16>,
-    turner: RowLayout,
+    layout: RowLayout,
     work: MeasureState,
 }
 
@@ -56,7 +56,7 @@ impl Measurer {
     /// For a gauge. `white` is the upper end of the camera's scale where it is
     /// not that of the pixels, as with 12 bits in 16.
     pub fn new(gauge: Gauge, white: Option<u16>) -> Self {
-        Self { gauge, white, turner: RowLayout::new(gauge.gamma), work: MeasureState::new(gauge) }
+        Self { gauge, white, layout: RowLayout::new(gauge.gamma), work: MeasureState::new(gauge) }
     }
 
     /// The edges behind the last width, for images of them.
@@ -148,7 +148,7 @@ impl Measurer {
             return edge_lines::measure(&self.gauge, frame, surface, points);
         }
         let view = GaugeView::new(self.gauge.roi, self.gauge.axis);
-        let strips = self.turner.strips(frame, &view, self.white);
+        let strips = self.layout.strips(frame, &view, self.white);
         vectors::widest(
             #[inline(always)]
             || match strips {

@@ -297,9 +297,9 @@ mod tests {
         let roi = crate::core::geometry::Roi { x: 0, y: 0, width: 20, height: 43 };
         let view =
             crate::vision::gauge::GaugeView::new(roi, crate::vision::gauge::BeadAxis::Vertical);
-        let mut turner = crate::vision::strip::RowLayout::default();
+        let mut layout = crate::vision::strip::RowLayout::default();
         let crate::vision::strip::GaugeRowsOfDepth::Bytes(strip) =
-            turner.strips(&frame, &view, None)
+            layout.strips(&frame, &view, None)
         else {
             unreachable!()
         };

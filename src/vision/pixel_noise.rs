@@ -143,8 +143,8 @@ mod tests {
                 Frame::new(0, Stamp::START, Size::new(300, 200), Pixels::Grey8(values)).unwrap();
             let view =
                 GaugeView::new(Roi { x: 0, y: 0, width: 300, height: 200 }, BeadAxis::Vertical);
-            let mut turner = RowLayout::default();
-            let GaugeRowsOfDepth::Bytes(strip) = turner.strips(&frame, &view, None) else {
+            let mut layout = RowLayout::default();
+            let GaugeRowsOfDepth::Bytes(strip) = layout.strips(&frame, &view, None) else {
                 unreachable!()
             };
             let found = f64::from(of(&strip, 0..300));

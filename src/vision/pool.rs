@@ -142,9 +142,9 @@ mod tests {
     fn a_band_is_the_mean_of_rows_spread_about_its_middle() {
         let values = (0..20u8).flat_map(|y| (0..30u8).map(move |x| x * 4 + y)).collect();
         let frame = Frame::new(0, Stamp::START, Size::new(30, 20), Pixels::Grey8(values)).unwrap();
-        let mut turner = RowLayout::default();
+        let mut layout = RowLayout::default();
         let view = GaugeView::new(ROI, BeadAxis::Vertical);
-        let GaugeRowsOfDepth::Bytes(strip) = turner.strips(&frame, &view, None) else {
+        let GaugeRowsOfDepth::Bytes(strip) = layout.strips(&frame, &view, None) else {
             unreachable!()
         };
         let mut bands = Bands::default();
@@ -162,9 +162,9 @@ mod tests {
     fn sixteen_bits_pool_to_the_same_scale_and_full_pixels_are_counted() {
         let values = (0..600u16).map(|k| if k < 360 { 4095 } else { 0 }).collect();
         let frame = Frame::new(0, Stamp::START, Size::new(30, 20), Pixels::Grey16(values)).unwrap();
-        let mut turner = RowLayout::default();
+        let mut layout = RowLayout::default();
         let view = GaugeView::new(Roi { x: 0, y: 0, width: 30, height: 20 }, BeadAxis::Vertical);
-        let GaugeRowsOfDepth::Words(strip) = turner.strips(&frame, &view, Some(4095)) else {
+        let GaugeRowsOfDepth::Words(strip) = layout.strips(&frame, &view, Some(4095)) else {
             unreachable!()
         };
         let mut bands = Bands::default();

@@ -282,10 +282,10 @@ mod tests {
     #[test]
     fn a_horizontal_bead_is_a_vertical_one_on_its_side() {
         let frame = ramp();
-        let mut turner = RowLayout::default();
+        let mut layout = RowLayout::default();
         for axis in [BeadAxis::Vertical, BeadAxis::Horizontal] {
             let view = GaugeView::new(ROI, axis);
-            let GaugeRowsOfDepth::Bytes(strip) = turner.strips(&frame, &view, None) else {
+            let GaugeRowsOfDepth::Bytes(strip) = layout.strips(&frame, &view, None) else {
                 unreachable!()
             };
             for (v, u) in (0..view.along).flat_map(|v| (0..view.across).map(move |u| (v, u))) {
@@ -299,9 +299,9 @@ mod tests {
     #[test]
     fn beyond_a_row_its_last_pixel_goes_on() {
         let frame = ramp();
-        let mut turner = RowLayout::default();
+        let mut layout = RowLayout::default();
         let view = GaugeView::new(ROI, BeadAxis::Vertical);
-        let GaugeRowsOfDepth::Bytes(strip) = turner.strips(&frame, &view, None) else {
+        let GaugeRowsOfDepth::Bytes(strip) = layout.strips(&frame, &view, None) else {
             unreachable!()
         };
         let mut out = [0; 4];

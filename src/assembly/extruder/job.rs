@@ -9,7 +9,7 @@ use crate::cell::file::{ExtruderPart, RunPart};
 use crate::extruder::trajectory::{self, PlannedJob};
 use crate::io::recorder::ExtruderFile;
 
-/// How far the section of a plan may lie from the cell's, as a share.
+/// How far the section of a plan may differ from the cell's, as a fraction.
 const SECTION_TOLERANCE: f64 = 0.02;
 /// Rates may be passed by as much as a table rounds.
 const RATE_TOLERANCE: f64 = 1.02;

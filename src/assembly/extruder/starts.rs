@@ -21,7 +21,7 @@ pub fn timing(
     let conditions = BeadConditions {
         flow: part.demand.nominal(),
         speed,
-        // A robot that is told to lay bead cannot be told to stand.
+        // A robot that lays bead cannot be commanded to stand.
         min_speed_ratio: run.limits.min_speed / speed,
         robot_lag: Span::from_secs(0.5 / run.robot.rate_hz) + ROBOT_LAG,
     };

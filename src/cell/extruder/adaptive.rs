@@ -1,4 +1,4 @@
-//! `[extruder.adaptive]`: the plant that the adaptive law of the nozzle is made
+//! `[extruder.adaptive]`: the plant that the adaptive controller of the nozzle is made
 //! for, and its gains. There are no defaults for gains.
 
 use super::command::ANY_COMMAND;

@@ -1,4 +1,4 @@
-//! `[extruder]` beside `[extruder_plant]`: what is told, what flow is wanted of
+//! `[extruder]` beside `[extruder_plant]`: what is commanded, what flow is demanded of
 //! it, and in a simulated cell what answers.
 
 use std::path::Path;
@@ -14,7 +14,7 @@ use crate::scenario::table::Simulation;
 /// The extruder side of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderPart {
-    /// What it is told.
+    /// What is commanded.
     pub extruder: ExtruderSettings,
     /// The flow that is wanted.
     pub demand: FlowDemand,

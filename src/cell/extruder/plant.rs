@@ -32,7 +32,7 @@ pub struct ExtruderPlant {
 /// What turns commands into flow.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PlantKind {
-    /// A transfer function, or a number, with what no model tells.
+    /// A transfer function, or a number, with what is not modelled.
     Linear(LinearPlant),
     /// Lag and dead time to a pressure, and a power law from it to flow.
     Pressure(PressurePlant),
@@ -108,9 +108,9 @@ pub struct MeltPlant {
     pub stored_s: f64,
     /// What is empty before the nozzle after a long pause \[mm³\].
     pub void_mm3: f64,
-    /// Standard deviation of that from pause to pause, as a share.
+    /// Standard deviation of that from pause to pause, as a fraction.
     pub void_sigma: f64,
-    /// Standard deviation of the flow, as a share.
+    /// Standard deviation of the flow, as a fraction.
     pub flow_sigma: f64,
 }
 
@@ -124,7 +124,7 @@ pub struct LinearPlant {
     pub unknown_input: f64,
     /// How fast that grows \[unit of the command per second\].
     pub unknown_input_per_s: f64,
-    /// Standard deviation of a flow that no model tells \[mm³/s\].
+    /// Standard deviation of a flow that is not modelled \[mm³/s\].
     pub flow_noise: f64,
     /// How long that hangs together \[s\].
     pub flow_noise_lag_s: f64,

@@ -1,5 +1,5 @@
 //! `[extruder.pressure]`: the process from the screw's speed to the pressure at
-//! the nozzle, the nozzle's power law, and which law holds the pressure.
+//! the nozzle, the nozzle's power law, and which controller holds the pressure.
 
 use super::context::ReadContext;
 use crate::document::Table;
@@ -11,7 +11,7 @@ use crate::extruder::pressure::vsfc::VsfcGains;
 use crate::extruder::rheology::PowerLaw;
 use crate::extruder::strategy::{PressureChoice, PressureSettings};
 
-/// The laws remember as many commands a second.
+/// The controllers keep as many commands a second.
 const MAX_LOOP_HZ: f64 = 250.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +43,7 @@ pub fn read_nozzle(table: &Table<'_>) -> Option<PowerLaw> {
     or_report(table, "flow_exponent", PowerLaw::new(flow?, exponent?, density?))
 }
 
-/// The loop with its law. Gains have no defaults; the predictive law has none,
+/// The loop with its controller. Gains have no defaults; the predictive controller has none,
 /// its settings come from process and noise.
 pub(super) fn read(table: &Table<'_>, context: &ReadContext<'_>) -> Option<PressureSettings> {
     let model = read_process(table);

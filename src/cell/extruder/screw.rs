@@ -58,7 +58,7 @@ pub fn read_screw(table: &Table<'_>, default: Option<ScrewDesign>) -> Option<Scr
     }
 }
 
-/// The predictor of a screw and its law.
+/// The predictor of a screw and its feedback.
 pub(super) fn read_predictor(
     table: &Table<'_>,
     context: &ReadContext<'_>,

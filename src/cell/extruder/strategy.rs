@@ -35,7 +35,7 @@ pub enum Strategy {
     Pressure(Box<PressureSettings>),
     /// The predictor of a screw.
     Screw(Box<ScrewSettings>),
-    /// The adaptive law of the nozzle.
+    /// The adaptive controller of the nozzle.
     Adaptive(Box<AdaptiveSettings>),
 }
 
@@ -54,11 +54,11 @@ pub struct FeedforwardKeys {
     pub model: ModelSource,
     /// Time constant of the poles that are placed \[s\].
     pub time_constant_s: f64,
-    /// How late the flow may be beyond what is known ahead.
+    /// Largest delay of the flow beyond the preview.
     pub max_delay: Span,
     /// What becomes of zeros in the right half plane.
     pub right_zeros: RightHalfPlaneZeros,
-    /// What the flow is foretold from.
+    /// What the flow is predicted from.
     pub predicted_from: ScrewSpeed,
 }
 

@@ -67,7 +67,7 @@ pub struct CameraSettings {
     pub deadline: Span,
 }
 
-/// Standard deviation of an offset of which the file says none, as a share.
+/// Standard deviation of an offset of which the file says none, as a fraction.
 const OFFSET_SIGMA_FRACTION: f64 = 0.1;
 
 pub(super) fn read_mount(table: &Table<'_>) -> Option<Mount> {

@@ -9,7 +9,7 @@ use crate::width_control::limiter::SpeedLimits;
 pub struct RobotSettings {
     /// Setpoints a second.
     pub rate_hz: f64,
-    /// Speed of the first stretch.
+    /// Speed of the first part of a bead.
     pub start_speed: MmPerS,
     /// Path length at the start speed before control begins.
     pub start_length: Mm,

@@ -1,9 +1,9 @@
 //! A camera that is attached: by its number, or through a `GStreamer` pipeline.
 //!
 //! A thread of its own reads it, because a driver may block for as long as it
-//! likes. Only the newest picture waits; older ones give way. When none comes
-//! before the deadline the thread is left to itself and the camera is opened
-//! anew, with a growing delay, until it has failed too often in a row.
+//! likes. Only the newest image waits; older ones are dropped. When none comes
+//! before the deadline the thread is abandoned and the camera is opened
+//! again, with a growing delay, until it has failed too often in a row.
 
 mod worker;
 
@@ -24,13 +24,13 @@ use worker::{Capture, News, Opener, Worker};
 /// How long a camera may be silent, and how often it is opened anew.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Patience {
-    /// Longest wait for a picture.
+    /// Longest wait for an image.
     pub deadline: Span,
     /// Failures in a row after which the source ends.
     pub attempts: u32,
 }
 
-/// Opening a device and starting its stream takes longer than a picture.
+/// Opening a device and starting its stream takes longer than an image.
 const OPEN_WAIT: Duration = Duration::from_secs(10);
 const FIRST_DELAY: Duration = Duration::from_millis(100);
 const LONGEST_DELAY: Duration = Duration::from_secs(2);
@@ -57,9 +57,9 @@ impl fmt::Debug for Live {
 }
 
 impl Live {
-    /// Opens a camera and waits for its first picture; fails where none comes.
+    /// Opens a camera and waits for its first image; fails where none comes.
     /// `name` is the source as the cell file names it. A frame's `captured_at`
-    /// is the moment at which the driver handed the picture over, before it was
+    /// is the moment at which the driver handed the image over, before it was
     /// decoded.
     pub fn open(
         input: VideoInput,
@@ -85,7 +85,7 @@ impl Live {
             Ok(News::Frame(frame)) => frame,
             Ok(News::Failed(why)) => return Err(fault(name, why)),
             Err(_) => {
-                let what = format!("no picture within {} s of opening it", OPEN_WAIT.as_secs());
+                let what = format!("no image within {} s of opening it", OPEN_WAIT.as_secs());
                 return Err(fault(name, what));
             }
         };
@@ -116,7 +116,7 @@ impl Live {
         };
         let news = worker.news.recv_timeout(wait).unwrap_or_else(|error| {
             News::Failed(match error {
-                RecvTimeoutError::Timeout => format!("no picture for {:.1} s", wait.as_secs_f64()),
+                RecvTimeoutError::Timeout => format!("no image for {:.1} s", wait.as_secs_f64()),
                 RecvTimeoutError::Disconnected => "its thread has ended".to_owned(),
             })
         });
@@ -176,13 +176,13 @@ struct Device {
 impl Capture for Device {
     fn capture(&mut self) -> Result<Frame, String> {
         if !self.reader.grab().map_err(|error| error.to_string())? {
-            return Err("it gives no more pictures".to_owned());
+            return Err("it gives no more images".to_owned());
         }
         let captured_at = self.clock.now();
         let frame = self.reader.retrieve(self.channel, 0, captured_at);
         frame
             .map_err(|error| error.to_string())?
-            .ok_or_else(|| "it gave a picture that cannot be decoded".to_owned())
+            .ok_or_else(|| "it gave an image that cannot be decoded".to_owned())
     }
 }
 
@@ -204,7 +204,7 @@ mod tests {
     use crossbeam_channel::{Receiver, Sender, bounded};
     use std::sync::atomic::{AtomicU64, Ordering};
 
-    /// Gives pictures on demand of the test: one for every message.
+    /// Gives images on demand of the test: one for every message.
     struct Scripted(Receiver<Result<u64, &'static str>>);
 
     impl Capture for Scripted {
@@ -281,7 +281,7 @@ mod tests {
         assert!(matches!(live.next_frame(), Ok(Some(Grab::Frame { .. }))));
         let silent = live.next_frame().unwrap().unwrap();
         assert!(
-            matches!(silent, Grab::Unreadable { reason, .. } if reason.contains("no picture for 0.2 s"))
+            matches!(silent, Grab::Unreadable { reason, .. } if reason.contains("no image for 0.2 s"))
         );
     }
 

@@ -1,4 +1,4 @@
-//! The rendered camera: pictures of a simulated bead that follows the path and
+//! The rendered camera: images of a simulated bead that follows the path and
 //! speed that the robot reports.
 
 use std::time::Duration;
@@ -19,7 +19,7 @@ use crate::sim::render::Renderer;
 /// 20 ms.
 const WAITING_REPORTS: usize = 1024;
 
-/// Tells the camera what the robot reports. Copies feed the same camera.
+/// Gives the camera what the robot reports. Copies feed the same camera.
 #[derive(Debug, Clone)]
 pub struct RobotView(Sender<(Stamp, RobotState)>);
 
@@ -32,7 +32,7 @@ impl RobotView {
     }
 }
 
-/// Takes pictures at a fixed rate of what lies under the camera.
+/// Renders at a fixed rate what lies under the camera.
 pub struct RenderedCamera {
     renderer: Renderer,
     follower: BeadFollower,

@@ -1,4 +1,4 @@
-//! A network camera that gives a picture for each HTTP request.
+//! A network camera that gives an image for each HTTP request.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ use crate::io::clock::RunClock;
 use crate::io::image_file;
 use crate::run::ports::{FrameSource, Grab, SourceError};
 
-/// How pictures are asked for.
+/// How images are requested.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SnapshotSettings {
     /// Requests a second; a camera that answers more slowly gives fewer.
@@ -23,7 +23,7 @@ pub struct SnapshotSettings {
     pub attempts: u32,
 }
 
-/// A longer answer is no picture of a bead.
+/// A longer answer is no image of a bead.
 const LONGEST_ANSWER: u64 = 256 << 20;
 
 /// A camera behind an `http://` address.
@@ -76,7 +76,7 @@ impl Snapshot {
 
     /// Waits until the next request is due. Requests that were missed because
     /// the camera was slow are not made up for.
-    fn pace(&mut self) {
+    fn wait_until_due(&mut self) {
         let wait = self.due - self.clock.now();
         if wait > Span::ZERO {
             let wait = Duration::from_nanos(wait.ns().unsigned_abs());
@@ -97,7 +97,7 @@ impl Snapshot {
 
 impl FrameSource for Snapshot {
     fn next_frame(&mut self) -> Result<Option<Grab>, SourceError> {
-        self.pace();
+        self.wait_until_due();
         let seq = self.next;
         self.next += 1;
         let (bytes, captured_at) = match self.request() {

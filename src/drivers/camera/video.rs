@@ -48,7 +48,7 @@ impl VideoFile {
         let captured_at = offline_stamp(seq, time_s, 0.0);
         let reason = match self.reader.retrieve(self.channel, seq, captured_at) {
             Ok(Some(frame)) => return Grab::Frame { frame, time_s },
-            Ok(None) => "the decoder gives no picture".to_owned(),
+            Ok(None) => "the decoder gives no image".to_owned(),
             Err(error) => error.to_string(),
         };
         Grab::Unreadable { seq, time_s, reason: format!("{} frame {seq}: {reason}", self.name) }

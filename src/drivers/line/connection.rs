@@ -124,11 +124,11 @@ fn listen<D: Dialect>(
     up_at: Stamp,
 ) -> Result<Ended, NobodyListens> {
     let silence = out.timing.silence;
-    let (mut heard, mut was_good) = (up_at, false);
+    let (mut last_state_at, mut was_good) = (up_at, false);
     let why = loop {
-        let event = match incoming.next(heard + span(silence)) {
+        let event = match incoming.next(last_state_at + span(silence)) {
             Ok(Some((at, Heard::State(state)))) => {
-                (heard, was_good) = (at, true);
+                (last_state_at, was_good) = (at, true);
                 out.seen(state);
                 LinkEvent::State { at, state }
             }

@@ -91,7 +91,7 @@ impl<D: Dialect> Incoming<D> {
 
     /// The next line that makes sense, and when it arrived; none when there is
     /// none by the deadline. Bytes that wait in the socket at the deadline are
-    /// still read once, so that a PC that was late itself does not blame the
+    /// still read once, so that a PC that was delayed itself does not blame the
     /// other side.
     pub(super) fn next(&mut self, deadline: Stamp) -> Result<Option<(Stamp, LineOf<D>)>, Why> {
         loop {

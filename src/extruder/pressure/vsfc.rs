@@ -70,7 +70,8 @@ pub struct Vsfc {
 }
 
 impl Vsfc {
-    /// Takes over bumplessly.
+    /// Takes over without a step of the command (bumpless transfer): the integral makes the first
+    /// command the running speed.
     pub fn new(
         model: Fopdt,
         gains: VsfcGains,
@@ -80,15 +81,16 @@ impl Vsfc {
     ) -> Self {
         let error = running.target.get() - running.pressure.get();
         let feedforward = running.target.get() / model.gain();
-        // The first command integrates over its own period at once.
-        let proportional = gains.kp * error + gains.ki_at(error) * error * FIRST_PERIOD_S;
+        // The first step already integrates over FIRST_PERIOD_S; that increment is subtracted, so
+        // that the first command is the running speed.
+        let first_correction = gains.kp * error + gains.ki_at(error) * error * FIRST_PERIOD_S;
         Self {
             gains,
             gain: model.gain(),
             limits,
             kalman: Kalman::new(noise, running.pressure),
             smith: SmithPredictor::new(&model, running.speed.get()),
-            integral: running.speed.get() - feedforward - proportional,
+            integral: running.speed.get() - feedforward - first_correction,
             calls: CallTimes::new(running.speed),
             demand: running.speed.get(),
         }

@@ -112,7 +112,7 @@ impl PlannedTrajectory {
     pub fn at(&self, path: Mm) -> PlannedPoint {
         let path_mm = path.get();
         let after = self.rows.partition_point(|row| row.path_mm < path_mm);
-        let here = between(&self.rows, after, |row| row.path_mm, path_mm);
+        let here = interpolate(&self.rows, after, |row| row.path_mm, path_mm);
         let flow = Mm3PerS::new(here.flow_mm3_per_s).unwrap_or_default();
         PlannedPoint { time_s: here.time_s, command: here.command, flow }
     }
@@ -122,7 +122,7 @@ impl PlannedTrajectory {
         let from = path.get().clamp(0.0, self.end().get());
         let until_s = self.at(path).time_s + lasts.secs();
         let after = self.rows.partition_point(|row| row.time_s < until_s);
-        let to = between(&self.rows, after, |row| row.time_s, until_s);
+        let to = interpolate(&self.rows, after, |row| row.time_s, until_s);
         // After the end of the plan the last speed continues.
         let beyond_s = (until_s - to.time_s).max(0.0);
         let length_mm = to.path_mm - from + to.speed_mm_per_s * beyond_s;
@@ -130,12 +130,18 @@ impl PlannedTrajectory {
     }
 }
 
-/// The row interpolated before an index of the table; the first or the last outside it.
-fn between(rows: &[PlanRow], after: usize, of: impl Fn(&PlanRow) -> f64, value: f64) -> PlanRow {
+/// Linear interpolation to `key(row) == value` between the row with an index and the one before;
+/// outside the table its first or last row.
+fn interpolate(
+    rows: &[PlanRow],
+    after: usize,
+    key: impl Fn(&PlanRow) -> f64,
+    value: f64,
+) -> PlanRow {
     let Some(to) = rows.get(after) else { return rows[rows.len() - 1] };
     let Some(from) = after.checked_sub(1).and_then(|at| rows.get(at)) else { return *to };
-    let fraction = ((value - of(from)) / (of(to) - of(from))).clamp(0.0, 1.0);
-    let mix = |of: fn(&PlanRow) -> f64| of(from) + fraction * (of(to) - of(from));
+    let fraction = ((value - key(from)) / (key(to) - key(from))).clamp(0.0, 1.0);
+    let mix = |column: fn(&PlanRow) -> f64| column(from) + fraction * (column(to) - column(from));
     PlanRow {
         time_s: mix(|row| row.time_s),
         path_mm: mix(|row| row.path_mm),

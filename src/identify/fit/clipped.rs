@@ -8,7 +8,7 @@ use crate::numeric::number::to_f64;
 use crate::numeric::rank;
 use crate::numeric::row::min_max;
 
-/// Single levels from which a signal counts as varying.
+/// Samples that no neighbour repeats from which on a signal counts as varying. A choice.
 const MIN_LEVELS: usize = 10;
 /// Shortest run of equal samples that may be clipped.
 const MIN_RUN: usize = 3;
@@ -22,9 +22,11 @@ const MIN_REVERSAL: f64 = 0.05;
 const RATE_TOLERANCE: f64 = 0.02;
 /// Relative decrease of the rate above which a segment is no ramp.
 const RAMP_TOLERANCE: f64 = 0.003;
-/// Last step over the mean step below which a command settles and is not clipped.
+/// A command settles, and is not clipped, where the last step before a plateau is below this
+/// fraction of the mean step. A choice.
 const ABRUPT_RATE: f64 = 0.5;
-/// The same for any signal.
+/// A plateau of any signal, commands too, counts only where that fraction is above this. A
+/// choice.
 const SETTLED_RATE: f64 = 0.1;
 /// Change over the range below which there is no step.
 const MIN_STEP: f64 = 0.01;
@@ -97,7 +99,7 @@ pub(super) fn check(input: &[f64], output: &[f64], dt_s: f64) -> Result<(), Clip
             let is_cut =
                 if is_command { signal.is_clipped_command(value) } else { signal.varies() };
             if is_cut {
-                signal.check(column, end, value, dt_s)?;
+                signal.refuse_if_clipped(column, end, value, dt_s)?;
             }
         }
     }
@@ -153,7 +155,8 @@ impl<'a> Signal<'a> {
     /// slowing down, after a reversal between its ends or on a curve. A rate-limited drive
     /// arrives on a straight ramp, one that settles slows down.
     fn runs_into(&self, end: f64) -> bool {
-        let at_end = || self.plateaus().filter(|stand| stand.value == end && stand.is_inside);
+        let at_end =
+            || self.plateaus().filter(|stand| stand.value == end && stand.is_within_record);
         let abrupt =
             || at_end().filter(|stand| stand.final_rate >= ABRUPT_RATE).map(|stand| stand.before);
         let (grain, total) = (self.resolution(), at_end().count());
@@ -202,9 +205,16 @@ impl<'a> Signal<'a> {
             let before = self.row.get(free..from).unwrap_or_default();
             (run.len() >= MIN_RUN).then(|| {
                 free = begin;
-                let is_inside = from > 0 && begin < self.row.len();
+                let is_within_record = from > 0 && begin < self.row.len();
                 let final_rate = self.final_rate(before, from);
-                Plateau { value: run[0], from, len: run.len(), is_inside, before, final_rate }
+                Plateau {
+                    value: run[0],
+                    from,
+                    len: run.len(),
+                    is_within_record,
+                    before,
+                    final_rate,
+                }
             })
         })
     }
@@ -222,27 +232,28 @@ impl<'a> Signal<'a> {
         if way > 0.0 { (last - before).abs() * to_f64(segment.len() - 1) / way } else { 1.0 }
     }
 
-    /// Refuses a signal that stays at this value for long, between others, without having
-    /// settled.
-    fn check(
+    /// Refuses a signal of which more than [`MAX_CLIPPED_FRACTION`] of all samples lie on
+    /// plateaus at this value that begin and end within the record and were reached without
+    /// settling.
+    fn refuse_if_clipped(
         &self,
         column: DataColumn,
         end: Extreme,
         value: f64,
         dt_s: f64,
     ) -> Result<(), Clipped> {
-        let is_cut = |stand: &Plateau<'_>| {
-            stand.value == value && stand.is_inside && stand.final_rate > SETTLED_RATE
+        let is_clipped = |plateau: &Plateau<'_>| {
+            plateau.value == value && plateau.is_within_record && plateau.final_rate > SETTLED_RATE
         };
-        let cut: Vec<Plateau<'_>> = self.plateaus().filter(is_cut).collect();
-        let samples: usize = cut.iter().map(|stand| stand.len).sum();
-        let Some(longest) = cut.iter().max_by_key(|stand| stand.len) else { return Ok(()) };
+        let clipped: Vec<Plateau<'_>> = self.plateaus().filter(is_clipped).collect();
+        let samples: usize = clipped.iter().map(|plateau| plateau.len).sum();
+        let Some(longest) = clipped.iter().max_by_key(|plateau| plateau.len) else { return Ok(()) };
         let fraction = to_f64(samples) / to_f64(self.row.len());
         if fraction <= MAX_CLIPPED_FRACTION {
             return Ok(());
         }
         let (clipped_percent, from_s) = (100.0 * fraction, to_f64(longest.from) * dt_s);
-        let (runs, longest) = (cut.len(), longest.len);
+        let (runs, longest) = (clipped.len(), longest.len);
         Err(Clipped { column, end, value, clipped_percent, runs, longest, from_s })
     }
 }
@@ -252,7 +263,7 @@ struct Plateau<'a> {
     value: f64,
     from: usize,
     len: usize,
-    is_inside: bool,
+    is_within_record: bool,
     before: &'a [f64],
     final_rate: f64,
 }

@@ -15,7 +15,7 @@ pub enum DriveLine {
     Drive {
         /// Counts up by one from 1 on each connection.
         seq: u64,
-        /// Pump, valve and how much, in the unit of the extruder's `HELLO`.
+        /// Setpoint, pump and valve; the setpoint in the unit of the extruder's `HELLO`.
         command: ExtruderCommand,
         /// How long after `ref_t_ms` the command is void \[ms\].
         valid_ms: u64,

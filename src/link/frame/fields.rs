@@ -142,7 +142,7 @@ impl<'a> LineFields<'a> {
         }
     }
 
-    /// The next field as a number in a unit that the line itself does not tell.
+    /// The next field as a number in a unit that the line itself does not name.
     pub fn number(&mut self, field: &'static str) -> Result<f64, LineError> {
         self.quantity(field, |value| {
             if value.is_finite() { Ok(value) } else { Err(NotFinite { value, unit: "" }) }

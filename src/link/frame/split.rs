@@ -14,7 +14,7 @@ pub enum LineFault {
 }
 
 /// Cuts a stream of bytes into lines. It holds at most one line, and after a
-/// fault drops everything to the next LF. A fault is told as soon as it is
+/// fault drops everything to the next LF. A fault is reported as soon as it is
 /// seen, once a line.
 #[derive(Debug, Clone, Default)]
 pub struct LineSplitter {

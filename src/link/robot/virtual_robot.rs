@@ -50,7 +50,7 @@ pub struct RobotFaults {
     pub refuse: Option<ErrCode>,
     /// Sends no `STATE`.
     pub mute: bool,
-    /// Moves at this share of the speed that it was told; 1 is none the worse.
+    /// Moves at this fraction of its setpoint; 1 is no fault.
     pub speed_ratio: f64,
 }
 

@@ -9,7 +9,7 @@ pub enum Ending {
     TimeOver,
     /// The source had no more frames.
     LastFrame,
-    /// The course of steps was over, or the bead was before it.
+    /// The sequence of steps was over, or the bead ended before it.
     StepsOver,
     /// The camera failed, and the controller has given up.
     CameraLost(String),

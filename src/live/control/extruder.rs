@@ -1,5 +1,5 @@
 //! The extruder's part of the control thread: what its link reports, and what
-//! the operator is told of it.
+//! the operator is shown of it.
 
 use super::ending::Ending;
 use super::{ControlThread, Inputs};
@@ -11,7 +11,7 @@ use crate::run::ports::{ExtruderEvent, Recorder};
 
 impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     /// Hands the controller what the extruder reports. An extruder that does
-    /// not fit the cell is never told of, so that nothing is sent to it.
+    /// not fit the cell is never reported to the controller, so that nothing is sent to it.
     pub(super) fn take_extruder_event(&mut self, event: ExtruderEvent) {
         let Some(watch) = &mut self.extruder else { return };
         if let Some(words) = watch.note(&event) {

@@ -13,15 +13,15 @@ pub struct ExtruderWatch {
     driver: Arc<dyn ExtruderDriver>,
     range: DriveRange,
     period: Span,
-    /// The state that the operator was told last.
+    /// The state that the operator was shown last.
     pub(super) shown: ExtruderState,
-    /// Reasons of refusals that the operator was told.
+    /// Reasons of refusals that the operator was shown.
     refused: Vec<RefusalReason>,
     pump: Option<PumpMode>,
 }
 
 impl ExtruderWatch {
-    /// Of an extruder that has not been heard of, with the time from one step
+    /// Of an extruder that has not reported, with the time from one step
     /// of its side to the next.
     pub fn new(driver: Arc<dyn ExtruderDriver>, range: DriveRange, period: Span) -> Self {
         let (shown, refused) = (ExtruderState::Off, Vec::new());
@@ -43,7 +43,7 @@ impl ExtruderWatch {
         !matches!(self.pump, Some(PumpMode::On | PumpMode::Starting))
     }
 
-    /// Notes what the link reports; gives what the operator is to be told.
+    /// Notes what the link reports; gives what the operator is to be shown.
     pub(super) fn note(&mut self, event: &ExtruderEvent) -> Option<String> {
         match event {
             ExtruderEvent::State { state, .. } => {

@@ -11,9 +11,9 @@ use crate::run::ports::Recorder;
 use crate::vision::Reject;
 
 impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
-    /// A frame that was looked at: the event, its answer and the log's row.
-    pub(super) fn look(&mut self, look: MeasuredFrame) {
-        let MeasuredFrame { frame, had_at, outcome, roughness, edges } = look;
+    /// Gives a frame that was measured or rejected to the controller, and logs the result.
+    pub(super) fn take_measured(&mut self, measured: MeasuredFrame) {
+        let MeasuredFrame { frame, had_at, outcome, roughness, edges } = measured;
         let (seq, captured_at) = (frame.seq, frame.captured_at);
         let event = match &outcome {
             Ok(measured) => Event::Measured {

@@ -1,9 +1,9 @@
-//! When a run ends that is there for a course of steps.
+//! When a run for a sequence of steps ends.
 
 use crate::control::step::{State, Step};
 use crate::width_control::steps::StepsProgress;
 
-/// Watches a course of steps.
+/// Watches a sequence of steps.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct StepsWatch {
     has_begun: bool,
@@ -11,7 +11,7 @@ pub struct StepsWatch {
 }
 
 impl StepsWatch {
-    /// Looks at a step: the course is over when the camera has seen its last piece, and
+    /// Takes a step into account: the sequence is over when the camera has seen its last piece, and
     /// when the bead ends or the controller gives up after it has begun.
     pub fn see(&mut self, step: &Step) {
         let progress = step.trace.steps.map(|steps| steps.progress);

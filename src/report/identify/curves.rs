@@ -70,7 +70,7 @@ pub fn residuals(study: &ModelStudy) -> Markup {
 /// values would be drawn too small beside that.
 pub fn autocorrelation(study: &ModelStudy) -> Markup {
     let step_s = study.logs.estimation.step_s;
-    let lags = &study.residuals.lags;
+    let lags = &study.residuals.coefficients;
     let at = |k: usize| to_f64(k) * step_s;
     let curve = series((1..lags.len()).map(at), lags.iter().copied().skip(1));
     let bound = study.residuals.bound;

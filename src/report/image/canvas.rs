@@ -28,8 +28,8 @@ impl Canvas {
         self.line(centre, centre, radius, ink);
     }
 
-    /// A line of half this thickness on either side, with round ends. Every
-    /// pixel is covered by how far its centre lies within.
+    /// A line of half-width `radius` \[px\] with round ends. The coverage of a pixel falls
+    /// linearly over one pixel at the line's boundary.
     pub fn line(&mut self, from: CanvasPoint, to: CanvasPoint, radius: f64, ink: Rgb) {
         let reach = radius + 1.0;
         let columns = span(from.0.min(to.0) - reach, from.0.max(to.0) + reach, self.image.width());

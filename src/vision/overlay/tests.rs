@@ -34,8 +34,8 @@ fn overlay(beside: impl Fn(f64) -> f64) -> Overlay {
     let frame =
         Frame::new(0, Stamp::START, Size::new(COLUMNS, ROWS), Pixels::Grey16(values)).unwrap();
     let view = GaugeView::new(Roi { x: 0, y: 0, width: COLUMNS, height: ROWS }, BeadAxis::Vertical);
-    let mut turner = RowLayout::default();
-    let GaugeRowsOfDepth::Words(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
+    let mut layout = RowLayout::default();
+    let GaugeRowsOfDepth::Words(strip) = layout.strips(&frame, &view, None) else { unreachable!() };
     let mut sheet = EdgeWindows::default();
     sheet.read(&strip, &LINES, Grouping { steepest: 0.0, max_rows: 1 }, |_| EXPECTED);
     let mut overlay = Overlay::default();

@@ -13,9 +13,9 @@ use crate::run::ports::SourceError;
 /// Longest wait for the thread to end with its source.
 const MAX_SHUTDOWN: Duration = Duration::from_secs(1);
 
-/// Something that gives pictures; each call waits for the next one.
+/// Something that gives images; each call waits for the next one.
 pub(super) trait Capture {
-    /// The next picture, numbered 0, with the moment at which it was there.
+    /// The next image, numbered 0, with the time at which it was there.
     fn capture(&mut self) -> Result<Frame, String>;
 }
 
@@ -27,7 +27,7 @@ pub(super) enum News {
 }
 
 /// The thread that reads a camera. It ends when its `stay` is dropped, at the
-/// latest with the picture for which it waits.
+/// latest with the image for which it waits.
 pub(super) struct Worker {
     pub(super) news: Receiver<News>,
     stay: Sender<()>,

@@ -12,7 +12,7 @@ use crate::core::units::Mm;
 pub struct RobotZ(Arc<Mutex<Vec<(Stamp, Mm)>>>);
 
 impl RobotZ {
-    /// Notes the height where an event tells one.
+    /// Notes the height of an event that has one.
     pub fn note(&self, now: Stamp, event: &Event) {
         let Event::Robot(state) = event else { return };
         let mut heights = self.0.lock().unwrap_or_else(PoisonError::into_inner);

@@ -27,7 +27,7 @@ impl VirtualRobot {
         taken.err().map(|refusal| RobotLine::refused(seq, refusal))
     }
 
-    /// A stop is obeyed even where the count is broken; the PC hears of that
+    /// A stop is obeyed even where the count is broken; that is reported to the PC
     /// all the same.
     fn take_stop(&mut self, seq: u64) -> Result<(), LineRefusal> {
         let counted = self.sequence.check(seq);

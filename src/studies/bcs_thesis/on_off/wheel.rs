@@ -19,7 +19,7 @@ const HEIGHT_MM: f64 = 3.654;
 const PRESSURE_MPA: f64 = 0.6;
 /// Variance of a pressure reading \[MPa²\]. Ma et al. 2026.
 const PRESSURE_VARIANCE_MPA2: f64 = 4.98e-5;
-/// Standard deviation of a section \[mm²\], 0.4 % of it: a larger one makes the camera less useful.
+/// Standard deviation of a section \[mm²\], a choice: 0.4 % of the section of 45 mm².
 const CAMERA_SIGMA_MM2: f64 = 0.2;
 /// Latency of a section. Derived: 20 ms in steps of 1 ms.
 const CAMERA_DELAY_STEPS: usize = 20;

@@ -19,8 +19,8 @@ fn plot(y_title: &str, axis: &XAxis, lines: &[Line<'_>]) -> Markup {
     plot_with_legend(220.0, axis, y_title, lines)
 }
 
-/// A level without a name below some lines.
-fn above<'a, const N: usize>(level: f64, lines: [Line<'a>; N]) -> Vec<Line<'a>> {
+/// A reference level without a name behind some curves.
+fn with_reference<'a, const N: usize>(level: f64, lines: [Line<'a>; N]) -> Vec<Line<'a>> {
     std::iter::once(Line::level("", TARGET, level, "")).chain(lines).collect()
 }
 
@@ -29,7 +29,7 @@ pub fn fits(table: &FitTable) -> Markup {
     let of = |which: usize| table.example.iter().map(move |row| (row[0], row[which]));
     let time = XAxis::time(Range::new(0.0, table.example.last().map_or(1.0, |row| row[0])));
     let flows = [
-        Line::curve("simulated with what no model tells", FLOW, of(1)),
+        Line::curve("simulated, with unmodelled disturbance", FLOW, of(1)),
         Line::curve("fitted model", MODEL, of(2)),
     ];
     let orders = |of: fn(&FitRow) -> f64| (1..).map(f64::from).zip(table.rows.iter().map(of));
@@ -47,13 +47,14 @@ pub fn fits(table: &FitTable) -> Markup {
     }
 }
 
-/// The wheel without control, with the thesis' controller and with ours.
+/// Bead, speed and flow of one run at constant speed, with the thesis' controller and with
+/// ours. The deposition wheel moves under the nozzle and stands for the robot's motion.
 pub fn runs(thesis: &Compared, ours: &Compared) -> Markup {
     let [off, on] = &thesis.example;
-    let [_, best] = &ours.example;
+    let [_, ours_on] = &ours.example;
     let axis = XAxis::time(Range::new(0.0, end_s(off)));
     let lines = |of: fn(&WheelRun) -> &[CurvePoint], range: Range| {
-        [("off", DEMAND, off), ("the thesis' controller", PAPER, on), ("ours", OURS, best)].map(
+        [("off", DEMAND, off), ("the thesis' controller", PAPER, on), ("ours", OURS, ours_on)].map(
             |(name, ink, run)| {
                 let within = of(run).iter().filter(|(t, _)| (range.min..=range.max).contains(t));
                 Line::curve(name, ink, within.copied())
@@ -61,11 +62,11 @@ pub fn runs(thesis: &Compared, ours: &Compared) -> Markup {
         )
     };
     let all = |of| lines(of, axis.range);
-    let [_, theirs, best] = lines(|run| &run.area, CLOSER_S);
-    let (near, near_axis) = (above(AREA_MM2, [theirs, best]), XAxis::time(CLOSER_S));
+    let [_, theirs, ours_on] = lines(|run| &run.area, CLOSER_S);
+    let (near, near_axis) = (with_reference(AREA_MM2, [theirs, ours_on]), XAxis::time(CLOSER_S));
     let flow = [Line::curve("flow at the nozzle", FLOW, off.flow.iter().copied())];
     html! {
-        (plot("section [mm²]", &axis, &above(AREA_MM2, all(|run| &run.area))))
+        (plot("section [mm²]", &axis, &with_reference(AREA_MM2, all(|run| &run.area))))
         (plot("section, looked at more closely [mm²]", &near_axis, &near))
         (plot("width [mm]", &axis, &all(|run| &run.width)))
         (plot("wheel's surface [mm/s]", &axis, &all(|run| &run.speed)))
@@ -133,8 +134,8 @@ pub fn corner(rows: &[BudgetRow], runs: &[CornerRun; 3]) -> Markup {
     let speed = |run: &CornerRun| run.trajectory().map(|(at, speed, _)| (at, speed)).collect();
     let flow = |run: &CornerRun| run.trajectory().map(|(at, _, flow)| (at, flow)).collect();
     html! {
-        (plot("width error RMS, baseline over planned", &time, &above(1.0, ratios)))
-        (plot("width error [%]", &path, &above(0.0, over(&error))))
+        (plot("width error RMS, baseline over planned", &time, &with_reference(1.0, ratios)))
+        (plot("width error [%]", &path, &with_reference(0.0, over(&error))))
         (plot("robot's speed [mm/s]", &path, &over(&speed)))
         (plot("flow at the nozzle [mm³/s]", &path, &over(&flow)))
         p.hint { "Per cent are of a bead of " (BEAD.area_mm2) " mm², averaged over the nozzle." }
