@@ -2,7 +2,7 @@
 //! for its keys, and what it asks for is noted down.
 //!
 //! A choice, a key that a reader looks for and an optional table lead to other keys, so the
-//! reader runs once for every answer that it has not been given yet.
+//! reader runs again for every answer, and for every two together.
 
 use std::collections::{BTreeSet, VecDeque};
 
@@ -12,10 +12,13 @@ use super::table::Table;
 
 pub use super::key_spec::{KeyKind, KeySpec};
 
+/// Answers other than the first that are tried together, for keys that two other keys open.
+const MAX_JOINT_ANSWERS: usize = 2;
+
 /// Every key that a reader may ask for, in the order of reading.
 pub fn describe(read: impl Fn(&Table<'_>)) -> Vec<KeySpec> {
     let mut specs: Vec<KeySpec> = Vec::new();
-    let mut known = BTreeSet::new();
+    let (mut known, mut tried) = (BTreeSet::new(), BTreeSet::new());
     let mut queue = VecDeque::from([Answers::new()]);
     while let Some(answers) = queue.pop_front() {
         let describer = Describer::new(answers);
@@ -33,12 +36,16 @@ pub fn describe(read: impl Fn(&Table<'_>)) -> Vec<KeySpec> {
             }
         }
         for (question, words) in met {
-            if known.insert(question.clone()) {
-                queue.extend((1..words.len()).map(|answer| {
-                    let mut answers = answers.clone();
-                    answers.insert(question.clone(), answer);
-                    answers
-                }));
+            let is_new = known.insert(question.clone());
+            if answers.contains_key(&question) || !is_new && answers.len() >= MAX_JOINT_ANSWERS {
+                continue;
+            }
+            for answer in 1..words.len() {
+                let mut next = answers.clone();
+                next.insert(question.clone(), answer);
+                if tried.insert(next.clone()) {
+                    queue.push_back(next);
+                }
             }
         }
     }

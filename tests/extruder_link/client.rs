@@ -205,5 +205,5 @@ fn nothing_leaves_for_an_extruder_that_does_not_fit_the_cell() {
     pc.until_state(|_| true);
     let beyond = ExtruderCommand { value: 90.5, ..RUN };
     let refused = pc.link.send(beyond).unwrap_err();
-    assert_eq!(refused.to_string(), "90.5 is not within 0 to 90");
+    assert_eq!(refused.to_string(), "90.5 rpm is not within 0 to 90");
 }

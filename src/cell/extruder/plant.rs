@@ -208,11 +208,10 @@ fn read_transfer(table: &Table<'_>) -> Option<TransferFunction> {
             table.report_absent(key, what);
         }
     }
-    if !(table.has("numerator") && table.has("denominator")) {
-        return None;
-    }
-    let num = table.row("numerator", &COEFFICIENT_COUNTS, ANY_COEFFICIENT);
-    let den = table.row("denominator", &COEFFICIENT_COUNTS, ANY_COEFFICIENT);
+    let [num, den] = ["numerator", "denominator"].map(|key| {
+        let row = || table.row(key, &COEFFICIENT_COUNTS, ANY_COEFFICIENT);
+        table.has(key).then(row).flatten()
+    });
     let dead_time = table.number_or("dead_time_s", 0.0..=1e3, 0.0);
     let (num, den) = (num?, den?);
     let transfer = match TransferFunction::new(&num, &den, dead_time?) {

@@ -88,8 +88,12 @@ fn read_pi(table: &Table<'_>) -> Option<PressurePiGains> {
     let kp = table.number("kp_rpm_per_mpa", 0.0..=1e9);
     let integral = table.number("integral_time_s", 1e-3..=1e4);
     let integral = integral?;
-    let tracking = table.number_or("tracking_time_s", 1e-3..=1e4, integral);
-    or_report(table, "kp_rpm_per_mpa", PressurePiGains::new(kp?, integral, tracking?))
+    let tracking = table.optional_number("tracking_time_s", 1e-3..=1e4);
+    or_report(
+        table,
+        "kp_rpm_per_mpa",
+        PressurePiGains::new(kp?, integral, tracking.unwrap_or(integral)),
+    )
 }
 
 fn or_report<T, E: std::fmt::Display>(

@@ -4,6 +4,8 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use rayon::prelude::*;
+
 use super::*;
 use crate::identify::excitation::{Excitation, Waveform};
 use crate::identify::fit::InitialCondition;
@@ -68,7 +70,7 @@ fn a_machine_that_only_answers_is_never_ahead() {
         model(&[2.0], &[0.1, 0.8, 1.7, 1.0], 0.0),
         model(&[2.0], &[0.36, 0.72, 1.0], 0.4),
     ];
-    for seed in 0..24 {
+    (0..24_u64).into_par_iter().for_each(|seed| {
         let machine = &machines[usize::try_from(seed).unwrap() % machines.len()];
         let (input, output) = logged(machine, seed);
         let samples = Samples::new(input, output, DT_S).unwrap();
@@ -77,7 +79,7 @@ fn a_machine_that_only_answers_is_never_ahead() {
             let settings = FitSettings { between, ..settings() };
             assert_eq!(output_lead(&samples, &settings, None), None, "seed {seed}");
         }
-    }
+    });
 }
 
 #[test]
