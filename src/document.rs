@@ -20,7 +20,7 @@ use self::file_text::FileText;
 pub use self::problem::{Problem, Problems};
 pub use self::table::Table;
 
-/// Syntax errors that are reported: one causes many.
+/// Syntax errors that are reported: one causes many. A choice.
 const MAX_SYNTAX_ERRORS: usize = 3;
 
 /// A parsed file and what was found wrong with it so far.

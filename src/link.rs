@@ -2,8 +2,8 @@
 //! of a robot and of an extruder, without a socket and without a clock.
 //!
 //! ```text
-//! bytes → LineSplitter → text → PcLine / RobotLine     → RobotCell (the robot's side)
-//!                               DriveLine / ExtruderLine → Gate (the extruder's side)
+//! bytes → LineSplitter → text → PcLine / RobotLine     → VirtualRobot (the robot's side)
+//!                               DriveLine / ExtruderLine → ExtruderEndpoint (the extruder's side)
 //!                                                        → drivers (the PC's side)
 //! ```
 //!

@@ -228,9 +228,9 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
 }
 
 /// The extruder, where it is commanded, and what it reports.
-fn open_extruder(
-    live: &LiveRun,
-) -> Result<(Option<Box<dyn ExtruderPort>>, Receiver<ExtruderEvent>), StartError> {
+type OpenExtruder = (Option<Box<dyn ExtruderPort>>, Receiver<ExtruderEvent>);
+
+fn open_extruder(live: &LiveRun) -> Result<OpenExtruder, StartError> {
     let Some(side) = &live.extruder else { return Ok((None, never())) };
     let (events, from_extruder) = unbounded();
     let (clock, range, valid_ms) = (live.clock, side.range(), side.valid_ms);

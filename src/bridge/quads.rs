@@ -14,7 +14,7 @@ use crate::core::geometry::ImagePoint;
 /// Window sizes of the adaptive threshold \[px\], for borders of markers of different sizes. A
 /// choice: factors of two.
 const NEIGHBOURHOODS_PX: [i32; 4] = [11, 23, 47, 95];
-/// Grey levels below the mean of the window that count as dark (the default of OpenCV's ArUco
+/// Grey levels below the mean of the window that count as dark (the default of OpenCV's `ArUco`
 /// detector).
 const MIN_DARKNESS: f64 = 7.0;
 /// Smallest perimeter of a quadrilateral \[px\]: a smaller marker cannot be read.

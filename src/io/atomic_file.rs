@@ -15,7 +15,7 @@ pub struct WriteError {
     pub what: io::Error,
 }
 
-/// Permissions of a new file: read and write for all, less the umask (IEEE 1003.1, creat()).
+/// Permissions of a new file: read and write for all, less the umask (IEEE 1003.1, ``creat()``).
 const MODE: u32 = 0o666;
 
 /// Writes beside the final name and renames when everything is on the disk.

@@ -134,7 +134,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
             let until = [over, extruder_due].into_iter().flatten().fold(due, Stamp::min);
             match self.inputs.next(until) {
                 Some(LiveInput::Camera(CameraMessage::Frame(measured))) => {
-                    self.take_measured(*measured)
+                    self.take_measured(*measured);
                 }
                 Some(LiveInput::Camera(CameraMessage::Unreadable { seq, at, reason })) => {
                     self.unreadable(seq, at, &reason);

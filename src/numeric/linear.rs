@@ -24,7 +24,7 @@ pub fn norms(columns: &[Vec<f64>]) -> Vec<f64> {
     columns.iter().map(|c| dot(c, c).sqrt().max(f64::MIN_POSITIVE)).collect()
 }
 
-/// The matrix AᵀA of the columns, each divided by its norm.
+/// The matrix `AᵀA` of the columns, each divided by its norm.
 pub fn normal_matrix(columns: &[Vec<f64>], norms: &[f64]) -> DMatrix<f64> {
     let n = columns.len();
     let mut normal = DMatrix::zeros(n, n);

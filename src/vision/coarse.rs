@@ -19,7 +19,7 @@ const MAX_BANDS: usize = 24;
 const REACH_FRACTION: f32 = 0.04;
 const REACH_PX: (f32, f32) = (2.0, 6.0);
 /// Largest slope of an edge against the gauge's axis. Derived: tan 20°, the largest slant of a bead
-/// (contract, bead_axis).
+/// (contract, `bead_axis`).
 const MAX_SLOPE: f32 = 0.364;
 /// Distance of neighbouring slopes, as a shift between the ends of the gauge
 /// \[px\].
@@ -41,7 +41,7 @@ const MIN_CERTAIN_GROOVE: f32 = 0.4;
 /// Distance of a seam from an edge \[px\]: nearer lines belong to the edge's flank. Measured:
 /// reference/accuracy.md, Drawn frames: the lines of `ribs-weak` lie at least 6 px from the edges.
 const MIN_SEAM_DISTANCE_PX: f32 = 6.0;
-/// [`SEAM_SHARE`] and [`RIVAL_SHARE`] where the stronger pair lies within the other one:
+/// [`MAX_SEAM_RATIO`] and [`MIN_RIVAL_RATIO`] where the stronger pair lies within the other one:
 /// rough edges are some tenths fainter in the mean along a line than ribs are.
 const INNER_PAIR_RATIOS: (f32, f32) = (0.5, 0.8);
 /// Lines of each sign that are looked at.

@@ -18,7 +18,7 @@ const ASIDE_COST: f32 = 0.25;
 /// Cost beyond which two steps are not neighbours.
 const BREAK_COST: f32 = 1.0;
 /// Slope against the gauge's axis up to which edges run at little cost. Derived: tan(20° + 15°),
-/// for a bead that slants 20 degrees (contract, bead_axis) and bulges by another 15.
+/// for a bead that slants 20 degrees (contract, `bead_axis`) and bulges by another 15.
 const MAX_FREE_SLOPE: f32 = 0.7;
 /// Height of a band within which no bead's edge runs far \[px\].
 const REFERENCE_BAND_PX: f32 = 4.0;
@@ -35,7 +35,7 @@ pub struct EdgeContour {
     /// Fraction of the bands in which it has a step.
     pub band_fraction: f64,
     /// How far a step lies off the line between its neighbours, median \[px\], as if
-    /// of bands of no more than [`LOW_BAND_PX`]: little for an edge, also for a rough
+    /// of bands of no more than [`REFERENCE_BAND_PX`]: little for an edge, also for a rough
     /// one, much for sparks that happen to lie in a row.
     pub waviness_px: f32,
 }

@@ -330,6 +330,7 @@ fn add_bends(part: &mut TemplateChunk, table: &StepTable, shape: &StepShape, fir
 }
 
 impl Products {
+    #[expect(clippy::needless_range_loop, reason = "one loop over all lanes is vectorised")]
     #[inline(always)]
     fn add(&mut self, part: &TemplateChunk) {
         let mut lanes = [[0.0f32; LANES]; 7];

@@ -108,7 +108,7 @@ struct Taking<'a> {
     screen: Screen,
 }
 
-impl<'a> Taking<'a> {
+impl Taking<'_> {
     fn run(&mut self, camera: &mut dyn FrameSource, stop: &StopSignal) -> anyhow::Result<()> {
         self.screen
             .say("lay the board flat on the bed, in the middle of the image, and let it lie");

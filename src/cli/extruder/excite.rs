@@ -15,7 +15,7 @@ use crate::io::atomic_file::write_atomic;
 
 /// Shortest hold time that is accepted \[s\]; a shorter one has a wrong unit.
 const SHORTEST_S: f64 = 1e-3;
-/// Default period of a cell's commands \[s\]: io_rate_hz of 50 Hz.
+/// Default period of a cell's commands \[s\]: `io_rate_hz` of 50 Hz.
 const DEFAULT_PERIOD_S: f64 = 0.02;
 
 /// Writes a profile that excites an extruder, so that its model can be found.

@@ -28,8 +28,8 @@ const FIRST_STEP_S: f64 = 1e9;
 /// The times of a controller's calls, and the command in force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CallTimes {
-    last_read: Option<Stamp>,
-    last_step: Option<Stamp>,
+    read_at: Option<Stamp>,
+    step_at: Option<Stamp>,
     last_command: ScrewCommand,
 }
 
@@ -37,19 +37,19 @@ impl CallTimes {
     /// Before the first call.
     pub fn new(speed: Rpm) -> Self {
         let last = ScrewCommand { speed, limit: CommandLimit::None };
-        Self { last_read: None, last_step: None, last_command: last }
+        Self { read_at: None, step_at: None, last_command: last }
     }
 
     /// Records a reading; returns the time since the last \[s\].
     pub fn read(&mut self, now: Stamp, pressure: MPa) -> Result<f64, ReadingRefused> {
-        let since = self.last_read.map_or(0.0, |last| (now - last).secs());
+        let since = self.read_at.map_or(0.0, |last| (now - last).secs());
         if since < 0.0 {
             return Err(ReadingRefused::OutOfOrder(-since));
         }
         if pressure.abs() > MAX_READING {
             return Err(ReadingRefused::Implausible { found: pressure, most: MAX_READING });
         }
-        self.last_read = Some(now);
+        self.read_at = Some(now);
         Ok(since)
     }
 
@@ -68,10 +68,10 @@ impl CallTimes {
     /// The time since the last command \[s\]: 0 at the first call, none where
     /// the call is not after the last.
     pub fn begin(&mut self, now: Stamp) -> Option<f64> {
-        if self.last_step.is_some_and(|last| now <= last) {
+        if self.step_at.is_some_and(|last| now <= last) {
             return None;
         }
-        Some(self.last_step.replace(now).map_or(0.0, |last| (now - last).secs()))
+        Some(self.step_at.replace(now).map_or(0.0, |last| (now - last).secs()))
     }
 
     /// Records a demand; returns the command for it.

@@ -162,7 +162,7 @@ impl ScrewControl {
         }
         match &mut self.predictor {
             Predictor::Exact { exact, history } => {
-                history.push(exact.coordinate(from.secs()), fill)
+                history.push(exact.coordinate(from.secs()), fill);
             }
             Predictor::Paper(euler) => euler.amend(fill),
         }

@@ -159,7 +159,7 @@ fn runs(command: &TimeSeries, flow: &TimeSeries) -> Result<Vec<Run>, StartStopFi
     for (time_s, value) in command.time_s.iter().zip(&command.values) {
         match (&mut open, *value > RUN_FRACTION * most) {
             (None, true) => {
-                open = Some(CommandedRun { from_s: *time_s, low: *value, high: *value })
+                open = Some(CommandedRun { from_s: *time_s, low: *value, high: *value });
             }
             (Some(command), true) => {
                 (command.low, command.high) = (command.low.min(*value), command.high.max(*value));

@@ -6,7 +6,7 @@ use crate::core::robot::RobotMode;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
 
-/// Begins the beads of a [`RobotCell`]. A new connection stands for the
+/// Begins the beads of a [`VirtualRobot`]. A new connection stands for the
 /// operator's key: it begins the job again when it was finished, and
 /// acknowledges a `STOP` or `FAULT` that it finds, after the pause.
 #[derive(Debug, Clone)]

@@ -73,7 +73,7 @@ impl ModalState {
             match letter {
                 'X'..='Z' => line_words.axes[letter as usize - 'X' as usize] = Some(number),
                 'I' | 'J' => {
-                    line_words.centre_offset[letter as usize - 'I' as usize] = Some(number)
+                    line_words.centre_offset[letter as usize - 'I' as usize] = Some(number);
                 }
                 'R' => line_words.radius = Some(number),
                 'F' if number > 0.0 => self.feed = Some(number * self.unit_mm / 60.0),

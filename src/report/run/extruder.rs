@@ -73,7 +73,9 @@ impl ExtruderCharts {
             (&mut self.pressure, report.pressure_mpa.map(f64::from)),
             (&mut self.filled, report.filled_mm.map(f64::from)),
         ] {
-            value.into_iter().for_each(|value| series.push(time, value));
+            if let Some(value) = value {
+                series.push(time, value);
+            }
         }
     }
 

@@ -70,7 +70,7 @@ pub fn markdown<'a, T: FigureRow + 'a>(rows: impl IntoIterator<Item = &'a T>) ->
     let rule = "---:|".repeat(T::HEADS.split('|').count() - 2);
     let mut text = format!("| {} |\n|---|{rule}---|\n", T::HEADS.replace('|', " | "));
     for row in rows {
-        text += &format!("| {} |\n", row.cells().join(" | "));
+        text.extend(["| ", &row.cells().join(" | "), " |\n"]);
     }
     text
 }

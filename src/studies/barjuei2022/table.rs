@@ -23,7 +23,7 @@ const CELL: &str = include_str!("../../../cells/barjuei2022.toml");
 /// Lateral offset of the second of two stacked layers \[mm\], about 2 % of a width.
 const ASIDE_MM: f64 = 0.8;
 /// Steps of the progress bar. Derived: four layers, four with rendered frames, stand-off,
-/// stack and tower, and those of [`ahead`].
+/// stack and tower, and those of `ahead`.
 pub const EXPERIMENTS: u64 = 11 + ahead::EXPERIMENTS;
 /// Stacked layers.
 const TOWER_LAYERS: u32 = 20;

@@ -138,8 +138,7 @@ impl Work {
         }
         let case = "sine 0.65 ± 0.1 MPa, 20 s, nothing known ahead";
         self.rows.ours(case, ("RMSE", "kPa"), unaware * KPA);
-        let drawn =
-            self.drawn(&PressureExperiment::sine(0), (TestedController::Previewed, OURS.1))?;
+        let drawn = drawn(&PressureExperiment::sine(0), (TestedController::Previewed, OURS.1))?;
         let range = Range::new(20.0, 60.0);
         let hint = "0.65 ± 0.1 MPa in 20 s, with noise. Ours is given the target ahead, as far as \
                     the robot's path determines it.";
@@ -171,7 +170,7 @@ impl Work {
                 self.rows.push(&case, name, values);
             }
         }
-        let drawn = self.drawn(&PressureExperiment::steady(0), OURS)?;
+        let drawn = drawn(&PressureExperiment::steady(0), OURS)?;
         let hint = "0.6 MPa; the gain drifts by 3 % in 60 s and by 1.5 % in 17 s. The published \
                     figures are those of the paper's machine, whose drift is not given: 30 mm/s \
                     for σ (14.7 … 21.0 kPa for VSFC-Smith), 50 mm/s for the variation, \"about \
@@ -218,16 +217,6 @@ impl Work {
         Ok(None)
     }
 
-    /// The responses of the paper's controllers and of one of ours to an experiment.
-    fn drawn(
-        &self,
-        experiment: &PressureExperiment,
-        ours: (TestedController, Ink),
-    ) -> Result<Vec<NamedResponse>, ReproduceError> {
-        let all = THEIRS.into_iter().chain([ours]);
-        all.map(|(tried, ink)| Ok((tried.name(), ink, experiment.run(tried)?))).collect()
-    }
-
     fn mean(
         &self,
         figure: impl Fn(u64) -> Result<f64, ReproduceError>,
@@ -235,6 +224,15 @@ impl Work {
         let all = (0..self.seeds).map(figure).collect::<Result<Vec<f64>, _>>()?;
         Ok(all.iter().sum::<f64>() / to_f64(all.len().max(1)))
     }
+}
+
+/// The responses of the paper's controllers and of one of ours to an experiment.
+fn drawn(
+    experiment: &PressureExperiment,
+    ours: (TestedController, Ink),
+) -> Result<Vec<NamedResponse>, ReproduceError> {
+    let all = THEIRS.into_iter().chain([ours]);
+    all.map(|(tried, ink)| Ok((tried.name(), ink, experiment.run(tried)?))).collect()
 }
 
 /// The largest overshoot over all combinations of model errors \[%\].

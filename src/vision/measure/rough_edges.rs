@@ -162,7 +162,7 @@ impl MeasureState {
         Ok([left_fit, right_fit])
     }
 
-    /// The same as [`Self::take_rough`] beside a pattern of such a standard deviation
+    /// The same as [`Self::width_of_rough`] beside a pattern of such a standard deviation
     /// \[grey levels\], where that is acceptable.
     pub fn width_of_rough_beside<T: GreyPixel>(
         &mut self,

@@ -41,7 +41,7 @@ const FILLED_FLOOR_RATIO: (f32, f32) = (0.87, 1.0);
 /// shade, or a lens's or a compression's.
 const ENCLOSED_FAR_SIDE: (f32, f32) = (0.4, 0.6);
 
-/// The mean profile across an edge, from [`OUTSIDE`] pixels before it on.
+/// The mean profile across an edge, from [`OUTSIDE_PX`] pixels before it on.
 pub type BlockProfile = [f32; PROFILE_PX];
 
 /// The profile of the whole edge and what is read from it.

@@ -110,8 +110,9 @@ fn grains_on_a_third_of_the_rows_move_nothing() {
         let cover = |row: usize, away: f64| {
             (is_covered(row) && (-9.0..3.0).contains(&away)).then_some(grey)
         };
-        let drawn =
-            |rows: RowRange| if is_covered((rows.first + rows.end) / 2) { -3.0 } else { 0.0 };
+        let drawn = |rows: RowRange| {
+            if is_covered(usize::midpoint(rows.first, rows.end)) { -3.0 } else { 0.0 }
+        };
         let traced = trace(160, slanted, cover, drawn);
         let errors = traced.errors(|rows| slanted(rows.middle()));
         assert!(traced.tracer.is_occluded(), "{grey}: {}", traced.tracer.misfit);

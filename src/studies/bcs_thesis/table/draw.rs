@@ -20,7 +20,7 @@ fn plot(y_title: &str, axis: &XAxis, lines: &[Line<'_>]) -> Markup {
 }
 
 /// A reference level without a name behind some curves.
-fn with_reference<'a, const N: usize>(level: f64, lines: [Line<'a>; N]) -> Vec<Line<'a>> {
+fn with_reference<const N: usize>(level: f64, lines: [Line<'_>; N]) -> Vec<Line<'_>> {
     std::iter::once(Line::level("", TARGET, level, "")).chain(lines).collect()
 }
 
