@@ -14,6 +14,7 @@ use super::truth::{self, Truth};
 use super::view::{BeadView, GaugeExtent};
 use super::{grains, hash, motion, spots, texture};
 use crate::calibration::Calibration;
+use crate::cell::Cell;
 use crate::core::frame::{Frame, Pixels, WrongSize};
 use crate::core::geometry::{ImagePoint, Size};
 use crate::core::time::Stamp;
@@ -89,8 +90,14 @@ pub enum RenderError {
 }
 
 impl Renderer {
+    /// For the simulated bead of a cell. Fails as [`Self::new`].
+    pub fn of_cell(cell: &Cell, calibration: &Calibration) -> Result<Self, RenderError> {
+        let (height, simulation) = (cell.surface_height, &cell.simulation);
+        Self::new(calibration.clone(), height, cell.gauge, simulation.image, simulation.seed)
+    }
+
     /// For a bead whose top edges lie at `surface_height` above the bed, or
-    /// where `picture` says that they really are. A full calibration sets the
+    /// where `image` says that they really are. A full calibration sets the
     /// size of the image. Fails where the gauge lies outside the image.
     pub fn new(
         calibration: Calibration,

@@ -69,8 +69,8 @@ fn widths_vary_over_many_calibrations_as_each_of_them_predicts() {
             let mean = widths.iter().sum::<f64>() / SEEDS as f64;
             let squares = widths.iter().map(|width| (width - mean).powi(2)).sum::<f64>();
             let spread = (squares / (SEEDS - 1) as f64).sqrt();
-            let foretold = (sigmas.iter().map(|s| s * s).sum::<f64>() / SEEDS as f64).sqrt();
-            let ratio = spread / foretold;
+            let predicted = (sigmas.iter().map(|s| s * s).sum::<f64>() / SEEDS as f64).sqrt();
+            let ratio = spread / predicted;
             assert!((0.9..1.1).contains(&ratio), "bed {which}, {ends:?}: {ratio}");
         }
     }

@@ -170,13 +170,7 @@ impl CellCamera<'_> {
             return Ok((live(LiveOptions::of(camera, cell.channel), clock, stop)?, None));
         }
         let simulation = &cell.simulation;
-        let renderer = Renderer::new(
-            calibration.clone(),
-            cell.surface_height,
-            cell.gauge,
-            simulation.image,
-            simulation.seed,
-        )?;
+        let renderer = Renderer::of_cell(cell, calibration)?;
         let (source, view) = RenderedCamera::new(renderer, simulation, camera, clock, stop);
         Ok((Box::new(source), Some(view)))
     }

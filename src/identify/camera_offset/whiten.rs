@@ -24,13 +24,13 @@ impl WidthNoise {
 
     /// All noise models that are tried.
     pub fn all() -> impl Iterator<Item = Self> {
-        let wandering = VARIANCES.into_iter().skip(1).flat_map(|variance| {
+        let drifting = VARIANCES.into_iter().skip(1).flat_map(|variance| {
             LENGTHS_MM
                 .into_iter()
                 .map(move |length_mm| Self { variance, correlation_length_mm: length_mm })
         });
         std::iter::once(Self { variance: VARIANCES[0], correlation_length_mm: LENGTHS_MM[0] })
-            .chain(wandering)
+            .chain(drifting)
     }
 }
 

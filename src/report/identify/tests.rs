@@ -74,7 +74,7 @@ fn a_known_extruder_is_found_again_and_its_file_is_read_again() {
 }
 
 #[test]
-fn another_machine_is_not_foretold() {
+fn another_machine_is_not_predicted() {
     let mut other = flow_log::gaussian().unwrap();
     for flow in &mut other.flow_mm3_per_s {
         *flow = 1080.0 - *flow;

@@ -77,13 +77,7 @@ pub struct SimCamera {
 impl SimCamera {
     pub fn new(cell: &Cell, calibration: Calibration) -> Result<Self, RenderError> {
         let simulation = &cell.simulation;
-        let renderer = Renderer::new(
-            calibration.clone(),
-            cell.surface_height,
-            cell.gauge,
-            simulation.image,
-            simulation.seed,
-        )?;
+        let renderer = Renderer::of_cell(cell, &calibration)?;
         Ok(Self {
             level: simulation.width_source,
             seed: simulation.seed,
