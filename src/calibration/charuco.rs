@@ -267,10 +267,10 @@ fn reason(
     }
     let count = MARKERS_PER_DICTIONARY.max(MarkerGrid::count(board));
     let markers = marker::read_all(grey, quads, dictionary, count);
-    let meant = columns_of(&markers, board.marker_margin());
+    let inferred = infer_columns(&markers, board.marker_margin());
     let expected = board.corners();
-    if meant.is_some() || fit >= MIN_MARKERS {
-        let meant = meant.filter(|&columns| columns != expected.columns);
+    if inferred.is_some() || fit >= MIN_MARKERS {
+        let meant = inferred.filter(|&columns| columns != expected.columns);
         return MarkerError::Order { fit, of: of.max(markers.len()), expected, meant };
     }
     let others = Dictionary::ALL.into_iter().filter(|&other| other != dictionary);
@@ -280,24 +280,28 @@ fn reason(
     }
 }
 
+/// Margin about a marker of which nothing is known, as a fraction of its square. A choice.
+const USUAL_MARKER_MARGIN: f64 = 0.15;
+
 /// Whether markers of a dictionary are in the order of any board.
 fn is_board(grey: &GreyImage<'_>, quads: &[[ImagePoint; 4]], dictionary: Dictionary) -> bool {
     let markers = marker::read_all(grey, quads, dictionary, MARKERS_PER_DICTIONARY);
-    columns_of(&markers, 0.15).is_some()
+    infer_columns(&markers, USUAL_MARKER_MARGIN).is_some()
 }
 
-/// Number of inner corners along a row of the board that the markers fit.
-fn columns_of(markers: &[Marker], clear: f64) -> Option<usize> {
+/// The number of inner corners along a row whose layout has the most inliers; `None` where too
+/// few markers fit any layout. The margin about a marker is a fraction of its square.
+fn infer_columns(markers: &[Marker], marker_margin: f64) -> Option<usize> {
     let fits = |columns: usize| {
         let both = [false, true].map(|first_has_marker| {
             let layout = MarkerGrid { columns: columns + 1, rows: usize::MAX, first_has_marker };
-            fitting(&layout, markers, clear, MAX_PAIRS_PER_COUNT).len()
+            fitting(&layout, markers, marker_margin, MAX_PAIRS_PER_COUNT).len()
         });
         both[0].max(both[1])
     };
     // More than one row, because a single row fits boards of any number of rows.
     let is_enough = |columns: usize, fit: usize| {
-        fit > MIN_MARKERS.max(columns.div_ceil(2))
+        fit > MIN_MARKERS.max((columns + 1).div_ceil(2))
             && fraction(fit, markers.len()) >= MIN_FIT_FRACTION
     };
     COLUMN_COUNTS

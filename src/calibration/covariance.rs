@@ -16,10 +16,9 @@ use super::equations::{
 };
 use super::factor::{Elimination, Factor};
 use super::plane::{OnBed, bed_from_board};
-use super::scale;
 use super::solve::Solution;
 use super::uncertainty::{CalibrationUncertainty, JointCovariance, UNCERTAIN_PARAMETERS};
-use super::{Calibration, SurfaceMap};
+use super::{Calibration, SurfaceMap, scale};
 use crate::core::geometry::{ImagePoint, Pose};
 use crate::core::units::Mm;
 

@@ -117,7 +117,7 @@ enum Kind {
 }
 
 impl SurfaceMap {
-    /// A surface on which every pixel has the same size.
+    /// A surface on which every pixel has the same size, which counts as exact.
     pub fn from_scale(mm_per_px: f64) -> Self {
         Self {
             kind: Kind::Scale(mm_per_px),

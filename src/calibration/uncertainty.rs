@@ -25,7 +25,7 @@ const MIN_PIVOT: f64 = 1e-14;
 /// Covariance of camera and bed plane.
 pub type JointCovariance = SMatrix<f64, UNCERTAIN_PARAMETERS, UNCERTAIN_PARAMETERS>;
 
-/// Derivative of a point on a surface with the parameters of camera and bed \[mm per unit\].
+/// Jacobian of a point on a surface with respect to the parameters of camera and bed \[mm per unit\].
 pub type SurfaceSlopes = SMatrix<f64, 2, UNCERTAIN_PARAMETERS>;
 
 /// The covariance of camera and bed plane as its lower triangular factor L: the covariance is
@@ -99,13 +99,14 @@ impl CalibrationUncertainty {
 pub struct PositionSlopes {
     /// In the bed's axes \[mm\].
     pub mm: SurfacePoint,
-    /// Derivative with the parameters of camera and bed at fixed pixel and surface height.
+    /// Jacobian with respect to the parameters of camera and bed at fixed pixel and surface height.
     pub slopes: SurfaceSlopes,
 }
 
 impl PositionSlopes {
-    /// For a point in the bed's axes \[mm\]: its displacement compensates the one of its image.
-    /// `None` where the camera looks along the surface.
+    /// For a point x in the bed's axes \[mm\], by the implicit function theorem: its pixel u stays
+    /// fixed, so that ∂x/∂p = −(∂u/∂x)⁻¹ ∂u/∂p for a parameter p. `None` where ∂u/∂x is singular:
+    /// the camera looks along the surface.
     pub fn at(camera: &Camera, bed: &Pose, position: Point3<f64>) -> Option<Self> {
         let in_camera = bed.apply(position);
         let projection = camera.project_with_slopes(in_camera)?;

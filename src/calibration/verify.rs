@@ -3,13 +3,11 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::Calibration;
-use super::Camera;
 use super::board::{Board, CornerObservation};
 use super::board_fit::BoardFit;
 use super::equations::CameraModel;
 use super::plane::bed_from_board;
-use super::solve;
+use super::{Calibration, Camera, solve};
 use crate::core::geometry::Pose;
 use crate::core::units::Mm;
 use crate::numeric::number::to_f64;

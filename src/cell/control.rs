@@ -6,8 +6,7 @@ use crate::document::Table;
 use crate::vision::Gauge;
 use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::pi::PiGains;
-use crate::width_control::strategy::STRATEGIES;
-use crate::width_control::strategy::WidthControlSettings;
+use crate::width_control::strategy::{STRATEGIES, WidthControlSettings};
 use crate::width_control::target::{Knot, Layers, WidthTarget};
 
 /// Fastest that any robot of this kind moves, as a bound on typing errors.

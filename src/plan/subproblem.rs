@@ -16,7 +16,7 @@ const RIDGE: f64 = 1e-7;
 pub struct Bounds {
     /// Smallest square of the speed at each node \[mm²/s²\].
     pub floor: Vec<f64>,
-    /// Largest one, which keeps the acceleration \[mm²/s²\].
+    /// Largest one that can be reached within the acceleration \[mm²/s²\].
     pub ceiling: Vec<f64>,
     /// Acceleration \[mm/s²\].
     pub accel: f64,
@@ -40,8 +40,9 @@ struct Subproblem<'a> {
     rows: ConstraintRows,
 }
 
-/// The solution of the convex problem about an iterate, with relative changes of the squares of the
-/// speed within a trust radius.
+/// The step of sequential convex programming: the change of the iterate that solves the quadratic
+/// problem about it, with relative changes of the squares of the speed within a trust radius.
+/// `None` where the solver finds none.
 pub fn solve_subproblem(
     horizon: &Horizon<'_>,
     bounds: &Bounds,
@@ -50,10 +51,10 @@ pub fn solve_subproblem(
     trust_radius: f64,
 ) -> Option<Iterate> {
     let mut problem = Subproblem::new(horizon, bounds, iterate);
-    problem.keep_speeds(trust_radius);
-    problem.keep_acceleration();
-    problem.keep_drive();
-    problem.keep_time(evaluation);
+    problem.constrain_speeds(trust_radius);
+    problem.constrain_acceleration();
+    problem.constrain_drive();
+    problem.constrain_time(evaluation);
     problem.solve(evaluation)
 }
 
@@ -84,7 +85,7 @@ impl<'a> Subproblem<'a> {
         variables.filter(move |(_, variable)| *variable < nodes)
     }
 
-    fn keep_speeds(&mut self, trust_radius: f64) {
+    fn constrain_speeds(&mut self, trust_radius: f64) {
         for (column, node) in self.free() {
             let now = self.iterate.squares[node];
             let up = (self.bounds.ceiling[node] / now - 1.0).min(trust_radius);
@@ -94,7 +95,7 @@ impl<'a> Subproblem<'a> {
         }
     }
 
-    fn keep_acceleration(&mut self) {
+    fn constrain_acceleration(&mut self) {
         let (path, squares) = (&self.horizon.path, &self.iterate.squares);
         for node in 1..squares.len() {
             let max_rise = 2.0 * self.bounds.accel * (path[node] - path[node - 1]);
@@ -114,7 +115,7 @@ impl<'a> Subproblem<'a> {
         }
     }
 
-    fn keep_drive(&mut self) {
+    fn constrain_drive(&mut self) {
         let (min, max) = self.bounds.drive.range();
         let span = self.horizon.drive_span;
         let max_rise = self.bounds.drive.rate_per_s() * KNOT_S / span;
@@ -133,7 +134,7 @@ impl<'a> Subproblem<'a> {
         }
     }
 
-    fn keep_time(&mut self, evaluation: &Evaluation) {
+    fn constrain_time(&mut self, evaluation: &Evaluation) {
         let slope = PassingTimes::new(&evaluation.profile).to_end();
         let left = self.bounds.longest_s - evaluation.profile.duration_s();
         let value = |column: usize, node: usize| slope[node] * self.scale[column];

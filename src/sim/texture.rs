@@ -1,8 +1,7 @@
 //! A random pattern over the whole image.
 
 use rand::SeedableRng;
-use rand_distr::Distribution;
-use rand_distr::StandardUniform;
+use rand_distr::{Distribution, StandardUniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::convolve::{convolve, kernel};

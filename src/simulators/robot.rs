@@ -10,8 +10,7 @@ use crate::core::robot::RobotMode;
 use crate::core::time::Span;
 use crate::core::units::Mm;
 use crate::io::clock::RunClock;
-use crate::link::RobotStatus;
-use crate::link::{ParamError, PrintJob, RobotFaults, RobotParams, VirtualRobot};
+use crate::link::{ParamError, PrintJob, RobotFaults, RobotParams, RobotStatus, VirtualRobot};
 
 mod machine;
 

@@ -17,7 +17,7 @@ const CONVERGED_PX: f64 = 1e-4;
 pub struct FittedEdge {
     /// Position \[px\].
     pub at: f64,
-    /// Level before the edge \[grey levels\].
+    /// Level before the edge \[grey levels\]; where the bead lies before it, that of the bead.
     pub ground: f64,
     /// Signed height of the step \[grey levels\].
     pub height: f64,
@@ -40,8 +40,8 @@ pub struct Prior {
 pub struct EdgeFit {
     /// The edge.
     pub edge: FittedEdge,
-    /// Variances of position, ground, height and shading, for noise of this
-    /// variance.
+    /// Variances of position, ground, height and shading, for samples of the variance
+    /// [`ProfileWindow::noise`].
     pub variance: [f64; 4],
     /// Sum of the squared residuals.
     pub residual: f64,
@@ -90,8 +90,9 @@ impl ShadedStep {
 }
 
 impl ProfileWindow<'_> {
-    /// Fits from a start; `None` where the fit leaves the window or there is
-    /// nothing to hold it.
+    /// Gauss–Newton steps from a start, with a Gaussian prior if there is one. `None` where the
+    /// normal matrix is singular or the edge leaves the window; that the steps have converged is
+    /// not checked.
     pub fn fit(&self, start: FittedEdge, prior: Option<&Prior>) -> Option<EdgeFit> {
         let mut edge = start;
         let mut normal = Matrix4::zeros();

@@ -22,17 +22,14 @@ use pattern_limits::MAX_PATTERN_BESIDE_COMPLETE;
 use rough_edges::may_be_rough;
 use work::{EdgeModel, GaugeFrame, MeasureState, Outcome};
 
-use super::axis;
-use super::edge_lines;
 use super::gauge::{Gauge, GaugeView, MeasureMethod};
 use super::pixel_noise::PixelNoise;
-use super::pool;
 use super::reject::Reject;
 use super::roughness::{CaliperFilter, LocalWidths};
 use super::strip::{GaugeRows, GaugeRowsOfDepth, GreyPixel, RowLayout};
 use super::trace::EdgeTracer;
-use super::vectors;
 use super::width::{Caliper, CaliperPoint, Edges, Hints, WidthMeasurement};
+use super::{axis, edge_lines, pool, vectors};
 use crate::numeric::number::to_f64;
 
 /// Standard deviation of a width of 4 blurs from the flanks' overlap, in blurs. Measured:

@@ -66,9 +66,9 @@ pub fn variance_inflation(
     Some(((itself + 2.0 * with_next.max(0.0)) / variance).max(ratio))
 }
 
-/// The same of positions with gaps between them, from their distances to the course that was fitted
-/// to them with so many terms. What the bead's own shape leaves counts as an error too: the gaps
-/// hide as much of it.
+/// The same of positions with gaps between them: the reduced χ² of their residuals about a fitted
+/// polynomial with so many terms. The bead's own shape counts as an error too: the gaps hide as
+/// much of it.
 pub fn inflation_with_gaps(
     positions: impl Iterator<Item = EdgeResidual>,
     variance: f64,
@@ -79,16 +79,16 @@ pub fn inflation_with_gaps(
         square += fraction * px * px;
         n += 1.0;
     }
-    let free = n - to_f64(terms);
-    if free < MIN_FREEDOM || variance <= 0.0 {
+    let degrees_of_freedom = n - to_f64(terms);
+    if degrees_of_freedom < MIN_FREEDOM || variance <= 0.0 {
         return 1.0;
     }
-    let ratio = square / (free * variance);
-    if ratio < 1.0 + MIN_EXCESS_SIGMAS * (2.0 / free).sqrt() {
+    let ratio = square / (degrees_of_freedom * variance);
+    if ratio < 1.0 + MIN_EXCESS_SIGMAS * (2.0 / degrees_of_freedom).sqrt() {
         return 1.0;
     }
     // So few do not show their own spread well: mean of its inverse.
-    ratio * free / (free - 2.0)
+    ratio * degrees_of_freedom / (degrees_of_freedom - 2.0)
 }
 
 /// What the parabola leaves of the middle position; `None` where one is missing.
@@ -100,17 +100,18 @@ fn residual(positions: &[Option<f64>]) -> Option<f64> {
     Some(positions[SMOOTHER_HALF]? - smooth)
 }
 
-/// What is left of independent positions of variance 1, times itself or what is
-/// left so many positions on.
+/// Autocovariance of the residuals of independent positions of variance 1.
 fn residual_covariance(lag: usize) -> f64 {
     let left = |k: usize| f64::from(u8::from(k == SMOOTHER_HALF)) - SMOOTHER[k] / 231.0;
     (0..SMOOTHER.len() - lag).map(|k| left(k) * left(k + lag)).sum()
 }
 
-/// Variance of values about zero, times the number of neighbours over which
-/// they are correlated (the integrated autocorrelation up to its first zero),
-/// so that it may be used as if they were independent.
-pub fn correlated_variance(values: &[f64]) -> f64 {
+/// Coefficients of the parabola whose residuals are judged. Derived: c₀ + c₁x + c₂x².
+const PARABOLA_COEFFICIENTS: f64 = 3.0;
+
+/// Long-run variance: that of values about zero times their integrated autocorrelation time, up to
+/// the first zero of the autocorrelation. Over n it is the variance of their mean.
+pub fn long_run_variance(values: &[f64]) -> f64 {
     let square: f64 = values.iter().map(|value| value * value).sum();
     if square <= 0.0 {
         return 0.0;
@@ -123,7 +124,7 @@ pub fn correlated_variance(values: &[f64]) -> f64 {
         }
         time += 2.0 * product / square;
     }
-    square / (to_f64(values.len()) - 3.0).max(1.0) * time
+    square / (to_f64(values.len()) - PARABOLA_COEFFICIENTS).max(1.0) * time
 }
 
 #[cfg(test)]

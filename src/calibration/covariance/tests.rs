@@ -1,11 +1,9 @@
 use super::*;
 use nalgebra::Vector3;
 
-use crate::calibration::CalibrationQuality;
 use crate::calibration::lens::Lens;
-use crate::calibration::relative_sigma;
-use crate::calibration::solve;
 use crate::calibration::synthetic::{self, SIZE, TRUTH, board, poses};
+use crate::calibration::{CalibrationQuality, relative_sigma, solve};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -2,8 +2,7 @@
 
 use crate::core::frame::Channel;
 use crate::core::geometry::Roi;
-use crate::core::units::Mm;
-use crate::core::units::WidthRange;
+use crate::core::units::{Mm, WidthRange};
 use crate::document::Table;
 use crate::vision::gauge::{self, BeadAxis, EdgeKind, Gauge, MeasureMethod, Polarity};
 

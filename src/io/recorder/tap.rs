@@ -19,8 +19,8 @@ pub struct FrameTap {
 }
 
 impl FrameTap {
-    /// Takes a frame if it is one that is kept and there is room for it; never
-    /// waits.
+    /// Queues every n-th frame for the recording. It never waits; a frame that does not fit
+    /// the queue is counted as dropped.
     pub fn frame(&self, frame: Arc<Frame>) {
         let wanted = match self.keep {
             KeepFrames::None => false,

@@ -116,8 +116,8 @@ impl Tuned {
         )
     }
 
-    /// Names, gains and margins of the PI controllers, each at the worst speed and at that of the
-    /// target.
+    /// Rows of the table of margins: the present and the proposed PI gains, each at the worst speed
+    /// and at that of the target. No margins where both gains are 0.
     pub fn loops(&self) -> Vec<(String, PiGains, Option<LoopMargins>)> {
         let now = self.present_gains.iter().map(|(gains, _)| ("now", *gains));
         let settings = now.chain([("proposed", self.proposal.pi.gains)]);

@@ -124,7 +124,7 @@ impl WidthUncertainty {
             if missing > 0.0 {
                 scratch.values.clear();
                 scratch.values.extend(scratch.off[number].iter().flatten());
-                let waves = scatter::correlated_variance(&scratch.values);
+                let waves = scatter::long_run_variance(&scratch.values);
                 let waves = (waves - mean_variance(side.positions)).max(0.0);
                 let waves = waves * sections.scales[number] * sections.scales[number];
                 variance += waves.max(0.5 * roughness * roughness) * missing / seen.max(1.0);
@@ -143,7 +143,7 @@ impl WidthUncertainty {
         values.clear();
         let both = left.iter().zip(right.iter());
         values.extend(both.filter_map(|(left, right)| Some(f64::midpoint((*left)?, (*right)?))));
-        let per_place = scatter::correlated_variance(values);
+        let per_place = scatter::long_run_variance(values);
         let slope = f64::midpoint(curves[0].slope_variance, curves[1].slope_variance);
         let bend = f64::midpoint(curves[0].bend_variance, curves[1].bend_variance);
         let cosine = scene.cosine_squared(curves, 0.0);

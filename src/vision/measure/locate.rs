@@ -11,15 +11,13 @@ use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::{narrow_to_f32, to_count};
 use crate::numeric::rank;
 use crate::vision::blur_estimate::BlurEstimate;
-use crate::vision::light;
 use crate::vision::motion::BlurShapes;
-use crate::vision::occluded;
 use crate::vision::overlay::StepFit;
 use crate::vision::pixel_noise::PixelNoise;
 use crate::vision::reject::{Checked, Reject};
-use crate::vision::saturated;
 use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::trace::{EdgeTracer, TraceInput};
+use crate::vision::{light, occluded, saturated};
 
 /// Smallest deviation that makes an outlier of a caliper line that was fitted for
 /// itself \[px\].

@@ -105,9 +105,10 @@ enum LastCommand {
 }
 
 impl StartStopBench {
-    /// The end of a bead, a pause from when the robot was at its end,
-    /// and the bead after it; a score for each pause \[s\] in its order.
-    pub fn lay<S: StartStopStrategy>(
+    /// Lays one bead after another on the same machine, with these pauses \[s\] between them,
+    /// each counted from the robot's arrival at the end of a bead; the melt keeps its state. One
+    /// score for each pause: the end of the bead, the pause, and the bead after it.
+    pub fn score_pauses<S: StartStopStrategy>(
         &self,
         machine: MeltParameters,
         seed: u64,

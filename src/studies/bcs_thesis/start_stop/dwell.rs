@@ -45,7 +45,7 @@ pub fn tune(
     seeds: std::ops::Range<u64>,
 ) -> Dwell {
     let cost = |dwell: &Dwell| -> f64 {
-        let of = |seed| bench.lay(machine, seed, dwell, idle_s);
+        let of = |seed| bench.score_pauses(machine, seed, dwell, idle_s);
         // Collected, so that the order of the sum does not depend on which seed ends first.
         let scores: Vec<Vec<StartStopScore>> = seeds.clone().into_par_iter().map(of).collect();
         scores.iter().flatten().map(StartStopScore::sum_mm3).sum()

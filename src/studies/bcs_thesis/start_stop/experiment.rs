@@ -81,9 +81,12 @@ pub fn run(machine: MeltParameters, seeds: u64) -> Result<StartStopResults, Repr
         let steady = StartStopTiming::new(parameters, keeps.laid)?;
         let timing = StartStopTiming::new(parameters, follows.laid)?;
         let [naive, fixed] =
-            [naive, dwell].map(|dwell| keeps.lay(machine, seed, &dwell, &PAUSES_S));
-        let steady = keeps.lay(machine, seed, &steady, &PAUSES_S);
-        Ok(([naive, fixed, steady, follows.lay(machine, seed, &timing, &PAUSES_S)], timing))
+            [naive, dwell].map(|dwell| keeps.score_pauses(machine, seed, &dwell, &PAUSES_S));
+        let steady = keeps.score_pauses(machine, seed, &steady, &PAUSES_S);
+        Ok((
+            [naive, fixed, steady, follows.score_pauses(machine, seed, &timing, &PAUSES_S)],
+            timing,
+        ))
     };
     let laid = (0..seeds).into_par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
     let fixed = keeps.trace(machine, 0, &dwell, TRACED_PAUSE_S);

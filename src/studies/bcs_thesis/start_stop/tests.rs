@@ -29,7 +29,7 @@ fn mean<S: StartStopStrategy>(
     machine: MeltParameters,
     of: impl Fn(u64) -> S,
 ) -> StartStopScore {
-    let all = (0..SEEDS).flat_map(|seed| bench.lay(machine, seed, &of(seed), &PAUSES_S));
+    let all = (0..SEEDS).flat_map(|seed| bench.score_pauses(machine, seed, &of(seed), &PAUSES_S));
     let sum = all.fold(StartStopScore::default(), StartStopScore::and);
     let n = f64::from(u32::try_from(SEEDS).unwrap());
     StartStopScore { void_mm3: sum.void_mm3 / n, drool_mm3: sum.drool_mm3 / n }
@@ -84,8 +84,8 @@ fn a_machine_that_is_slower_to_start_and_drools_longer_gains_as_well() {
     };
     let (mut fixed, mut ours) = (0.0, 0.0);
     for seed in 0..5 {
-        fixed += sum(keeps.lay(machine, seed, &best, &PAUSES_S));
-        ours += sum(follows.lay(machine, seed, &timing(seed).unwrap(), &PAUSES_S));
+        fixed += sum(keeps.score_pauses(machine, seed, &best, &PAUSES_S));
+        ours += sum(follows.score_pauses(machine, seed, &timing(seed).unwrap(), &PAUSES_S));
     }
     assert!(fixed > 5.0 * ours, "{fixed} {ours}");
 }
@@ -153,7 +153,7 @@ fn the_standard_errors_are_those_of_repeated_recordings() {
 #[test]
 fn a_seed_gives_the_same_beads_again_and_another_gives_others() {
     let dwell = Dwell { start_s: 1.0, stop_s: 0.3, speed_mm_per_s: 40.0 };
-    let lay = |seed| bench(1.0).lay(MeltParameters::TYPICAL, seed, &dwell, &[3.0]);
+    let lay = |seed| bench(1.0).score_pauses(MeltParameters::TYPICAL, seed, &dwell, &[3.0]);
     assert_eq!(lay(4), lay(4));
     assert_ne!(lay(4), lay(5));
 }
