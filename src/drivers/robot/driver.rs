@@ -40,7 +40,7 @@ pub struct Capabilities {
     pub reports_heading: bool,
     /// They report the speed at which they move.
     pub reads_speed_back: bool,
-    /// Steps in which a setpoint is taken.
+    /// Steps in which a setpoint is taken; 0 for any value.
     pub resolution: MmPerS,
 }
 
@@ -54,10 +54,12 @@ impl fmt::Display for Capabilities {
             (self.reports_heading, "heading"),
             (self.reads_speed_back, "speed read back"),
         ];
-        for (_, words) in facts.iter().filter(|(has, _)| *has) {
-            write!(f, "{words}, ")?;
+        let has: Vec<&str> = facts.iter().filter(|fact| fact.0).map(|fact| fact.1).collect();
+        f.write_str(&has.join(", "))?;
+        if self.resolution > MmPerS::ZERO {
+            write!(f, ", steps of {}", self.resolution)?;
         }
-        write!(f, "steps of {}", self.resolution)
+        Ok(())
     }
 }
 
