@@ -9,11 +9,21 @@ use divan::Bencher;
 use truebead::calibration::Calibration;
 use truebead::cell::Cell;
 use truebead::cell::file::Purpose;
+use truebead::control::event::Event;
+use truebead::control::step::Step;
+use truebead::core::time::Stamp;
 use truebead::core::units::Mm;
 use truebead::run::runner::NoRecorder;
-use truebead::sim::cell::{NoObserver, SimCell};
+use truebead::sim::cell::{FrameObservation, Observer, SimCell};
 
 const CELL: &str = include_str!("../cells/barjuei2022.toml");
+
+struct NoObserver;
+
+impl Observer for NoObserver {
+    fn step(&mut self, _: Stamp, _: &Event, _: &Step) {}
+    fn frame(&mut self, _: &FrameObservation<'_>) {}
+}
 
 fn layer() -> f64 {
     let cell = Cell::parse(Path::new("barjuei2022.toml"), CELL, Purpose::Run).expect("sound");

@@ -136,12 +136,6 @@ impl Adaptive {
         (nozzle, strand)
     }
 
-    /// The inputs that were applied in place of the commands.
-    pub fn settle(&mut self, applied: StrandInputs) {
-        self.nozzle.settle(applied.mass_flow_kg_per_s);
-        self.strand.settle(applied.plate_m_per_s);
-    }
-
     /// The controller of the nozzle.
     pub fn nozzle(&self) -> &MracController {
         &self.nozzle

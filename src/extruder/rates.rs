@@ -15,11 +15,6 @@ impl Rate {
         Self { period, next: None }
     }
 
-    /// At a frequency \[Hz\].
-    pub fn hz(hz: f64) -> Self {
-        Self::every(Span::from_secs(1.0 / hz))
-    }
-
     /// Whether it is due at `now`; the first call is, and sets the grid.
     pub fn due(&mut self, now: Stamp) -> bool {
         let Some(next) = self.next else {
@@ -40,9 +35,13 @@ impl Rate {
 mod tests {
     use super::*;
 
+    fn hz(hz: f64) -> Rate {
+        Rate::every(Span::from_secs(1.0 / hz))
+    }
+
     #[test]
     fn rates_keep_their_own_grids() {
-        let (mut fast, mut slow) = (Rate::hz(200.0), Rate::hz(20.0));
+        let (mut fast, mut slow) = (hz(200.0), hz(20.0));
         let (mut many, mut few) = (0, 0);
         for tick in 0..1000_u32 {
             let now = Stamp::from_secs(f64::from(tick) * 0.001);
@@ -54,7 +53,7 @@ mod tests {
 
     #[test]
     fn missed_times_are_skipped() {
-        let mut rate = Rate::hz(10.0);
+        let mut rate = hz(10.0);
         assert!(rate.due(Stamp::START));
         assert!(!rate.due(Stamp::from_secs(0.09)));
         assert!(rate.due(Stamp::from_secs(0.55)));

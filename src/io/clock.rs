@@ -25,12 +25,6 @@ impl RunClock {
         Stamp::from_ns(u64::try_from(ns).unwrap_or(u64::MAX))
     }
 
-    /// Wall-clock time at the start of the run. The wall clock may be set while
-    /// a run is under way; stamps do not follow it.
-    pub fn epoch(&self) -> SystemTime {
-        self.epoch
-    }
-
     /// Wall-clock time at the start of the run \[ns since 1970-01-01 UTC\]; 0 on
     /// a machine whose clock stands before that.
     pub fn epoch_unix_ns(&self) -> u64 {

@@ -36,7 +36,6 @@ use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 
 use crate::control::event::Event;
 use crate::control::step::Step;
-use crate::core::frame::Frame;
 use crate::core::time::Stamp;
 use crate::run::ports::{RecordError, Recorder};
 use config::RecorderLimits;
@@ -174,11 +173,6 @@ impl RecorderHandle {
     pub fn waiting(mut self) -> Self {
         self.waits = true;
         self
-    }
-
-    /// As [`FrameTap::frame`].
-    pub fn frame(&self, frame: Arc<Frame>) {
-        self.tap.frame(frame);
     }
 
     /// A way to give frames from another thread.

@@ -23,9 +23,6 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Time between two values of the command \[s\].
-    pub const EVERY_S: f64 = KNOT_S;
-
     /// The command at a time; constant before the start and after the end.
     pub fn command_at(&self, time_s: f64) -> f64 {
         let last = self.command.len().saturating_sub(1);

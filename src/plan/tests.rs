@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
+use super::flow::KNOT_S;
 use super::profile::profile_of;
 use super::*;
 use crate::extruder::limits::CommandLimits;
@@ -48,12 +49,9 @@ fn keeps_its_limits(plan: &Plan, nominal: &SpeedProfile, most_s: f64) {
     }
     for pair in plan.command.windows(2) {
         assert!((0.0..=10.0).contains(&pair[1]), "{pair:?}");
-        assert!((pair[1] - pair[0]).abs() <= 20.0 * Plan::EVERY_S + 1e-9, "{pair:?}");
+        assert!((pair[1] - pair[0]).abs() <= 20.0 * KNOT_S + 1e-9, "{pair:?}");
     }
-    assert!(
-        Plan::EVERY_S * crate::numeric::number::to_f64(plan.command.len())
-            >= plan.speed.duration_s()
-    );
+    assert!(KNOT_S * crate::numeric::number::to_f64(plan.command.len()) >= plan.speed.duration_s());
     assert!(plan.added_s >= -1e-9 && plan.added_s <= most_s + 1e-9, "{}", plan.added_s);
     assert!((plan.speed.duration_s() - nominal.duration_s() - plan.added_s).abs() < 1e-9);
 }

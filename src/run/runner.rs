@@ -28,12 +28,7 @@ pub struct Handled {
     pub extruder: Option<Result<Sent, SendError>>,
 }
 
-impl<R: RobotPort, K: Recorder> Runner<R, K> {
-    /// Plugs a controller in whose extruder goes its own way.
-    pub fn new(controller: Controller, robot: R, recorder: K) -> Self {
-        Self::with_extruder(controller, robot, NoExtruder, recorder)
-    }
-}
+impl<R: RobotPort, K: Recorder> Runner<R, K> {}
 
 impl<R: RobotPort, K: Recorder, X: ExtruderPort> Runner<R, K, X> {
     /// Plugs a controller in.
@@ -125,7 +120,8 @@ mod tests {
     #[test]
     fn control_ends_in_hold_when_the_disk_is_full() {
         let controller = Controller::new(crate::control::example_setup());
-        let mut runner = Runner::new(controller, NoRobot, FullDisk { room: 2 });
+        let mut runner =
+            Runner::with_extruder(controller, NoRobot, NoExtruder, FullDisk { room: 2 });
         for _ in 0..3 {
             assert_eq!(runner.handle(Stamp::START, &Event::Tick).step.state, State::Idle);
         }

@@ -28,7 +28,7 @@ use super::laid::{LaidBead, PathSpeed};
 use super::render::RenderError;
 
 pub use camera::FrameObservation;
-pub use observer::{NoObserver, Observer};
+pub use observer::Observer;
 
 use std::collections::VecDeque;
 

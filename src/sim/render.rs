@@ -125,11 +125,6 @@ impl Renderer {
         self.rise = rise;
     }
 
-    /// Columns and rows of the images \[px\].
-    pub fn size(&self) -> (usize, usize) {
-        self.size
-    }
-
     /// Takes an image of a bead, with the robot at `robot_z` if the camera
     /// rides on it.
     pub fn render(

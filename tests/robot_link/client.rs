@@ -148,7 +148,10 @@ fn a_robot_of_another_version_is_not_taken() {
     let pc = Pc::start(LinkConfig { timing, ..config(listener.local_addr().unwrap()) });
     let _robot = Talk::answer(&listener, "HELLO 2 fake 60 130 60\n");
     assert_eq!(pc.until_down(), "the robot did not answer HELLO");
-    assert!(!pc.link.connected());
+    assert_eq!(
+        pc.link.send(Command::Stop).unwrap_err(),
+        SendError::NotConnected { device: "robot" }
+    );
 }
 
 #[test]

@@ -60,11 +60,6 @@ impl Folder {
         };
         Ok(Self { files, channel, times_s, first_s, next: 0 })
     }
-
-    /// The image files in the order in which they are given.
-    pub fn files(&self) -> &[PathBuf] {
-        &self.files
-    }
 }
 
 impl FrameSource for Folder {

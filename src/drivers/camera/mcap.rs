@@ -83,11 +83,6 @@ impl McapSource {
         self.robot_z.clone()
     }
 
-    /// The recording behind the frames, for its cell file and its integrity.
-    pub fn recording(&self) -> &Recording {
-        &self.recording
-    }
-
     fn next_image(&mut self) -> Result<Option<Message>, RecordingError> {
         if let Some(first) = self.first.take() {
             return Ok(Some(first));

@@ -112,11 +112,6 @@ impl ExtruderClient {
     pub fn send(&self, command: ExtruderCommand) -> Result<Written, SendError> {
         self.client.send(|open| self.config.line(open, command))
     }
-
-    /// Whether the extruder has answered `HELLO` on the present connection.
-    pub fn connected(&self) -> bool {
-        self.client.connected()
-    }
 }
 
 impl ExtruderConfig {

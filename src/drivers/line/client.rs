@@ -70,11 +70,6 @@ impl<D: Dialect> Client<D> {
         self.outgoing.send(line)
     }
 
-    /// Whether the other side has answered `HELLO` on the present connection.
-    pub fn connected(&self) -> bool {
-        self.outgoing.connected()
-    }
-
     /// Says `BYE` and ends the thread. What was commanded last runs out.
     pub fn close(&mut self) {
         let Some(Running { handle, quit, ended }) = self.thread.take() else { return };

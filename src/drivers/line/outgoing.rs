@@ -52,10 +52,6 @@ impl<D: Dialect> Outgoing<D> {
         self.closing.load(Ordering::Acquire)
     }
 
-    pub(super) fn connected(&self) -> bool {
-        self.lock().open.is_some()
-    }
-
     /// Lines may be written to this connection from now on, counted from 1.
     pub(super) fn opened(&self, stream: TcpStream, hello: D::Hello) {
         let open = Some(Open { stream, hello, next_seq: 1, newest: None });

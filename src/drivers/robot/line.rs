@@ -132,11 +132,6 @@ impl LinkClient {
             Ok(line.format())
         })
     }
-
-    /// Whether the robot has answered `HELLO` on the present connection.
-    pub fn connected(&self) -> bool {
-        self.client.connected()
-    }
 }
 
 impl LinkConfig {

@@ -102,11 +102,6 @@ impl SpeedFeedforward {
         let speed = MmPerS::new(flow.get() / area.get()).unwrap_or_default();
         SpeedStep { modelled, correction: added, speed, command: self.axis.step(speed.get()) }
     }
-
-    /// The command that was applied to the axis.
-    pub fn settle(&mut self, applied: f64) {
-        self.axis.settle(applied);
-    }
 }
 
 impl FlowHistory {

@@ -106,13 +106,6 @@ impl Inverse {
         self.command
     }
 
-    /// The command that was applied, from which the rate limit counts.
-    pub fn settle(&mut self, applied: f64) {
-        if applied.is_finite() {
-            self.command = applied;
-        }
-    }
-
     /// The limit that acted on the last command.
     pub fn limit(&self) -> CommandLimit {
         self.limit

@@ -46,11 +46,6 @@ impl ScrewDesign {
         density_kg_per_m3: 1240.0,
     };
 
-    /// B of a channel of a width and a depth \[m⁴\]: W·H³/12, eq. (101).
-    pub fn channel_m4(width: Mm, depth: Mm) -> f64 {
-        width.get() * depth.get().powi(3) / 12.0 / MM_PER_M.powi(4)
-    }
-
     /// θ1 and θ2 of the design, eqs. (14) and (15), with a pulsation of the conveying speed.
     pub fn screw(&self, pulsation: SpeedPulsation) -> Result<Screw, ScrewError> {
         let turns = match self.unit {

@@ -176,7 +176,7 @@ impl Screw {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::units::{Mm, Rpm};
+    use crate::core::units::Rpm;
     use crate::extruder::screw::{ScrewDesign, TurnUnit};
 
     const B: SpeedPulsation =
@@ -193,12 +193,6 @@ mod tests {
         assert!((screw.theta2_per_m - 2.114_292_6).abs() < 1e-7);
         let turns = ScrewDesign { unit: TurnUnit::RevPerS, ..ScrewDesign::DIAGNE_2015 };
         assert!((turns.screw(B).unwrap().theta1_m_per_s - 0.015).abs() < 1e-15);
-    }
-
-    #[test]
-    fn a_channels_pressure_flow_comes_from_its_width_and_depth() {
-        let b = ScrewDesign::channel_m4(Mm::constant(8.0), Mm::constant(2.0));
-        assert!((b - 8e-3 * 8e-9 / 12.0).abs() < 1e-24);
     }
 
     #[test]

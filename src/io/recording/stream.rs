@@ -33,11 +33,6 @@ pub struct Integrity {
 }
 
 impl Integrity {
-    /// Whether nothing is known to be missing from the middle or the end.
-    pub fn is_whole(&self) -> bool {
-        self.finished && self.damaged == 0
-    }
-
     /// What is wrong, in a sentence; `None` where nothing is.
     pub fn summary(&self) -> Option<String> {
         let mut parts = Vec::new();

@@ -37,7 +37,7 @@ fn record(events: u64, text: usize) -> Vec<u8> {
         if n % 40 == 0 {
             let values = (0..600).map(|at| (at * n % 251).to_le_bytes()[0]).collect();
             let frame = Frame::new(n, now, Size::new(30, 20), Pixels::Grey8(values)).unwrap();
-            recorder.frame(Arc::new(frame));
+            recorder.frames().frame(Arc::new(frame));
         }
     }
     std::fs::read(recorder.finish().unwrap().path).unwrap()
@@ -88,7 +88,7 @@ fn a_whole_recording_is_whole() {
     let read = read(&recorded());
     assert_eq!((read.events.len(), read.steps), (800, 800));
     assert!(is_beginning(&read.events));
-    assert!(read.integrity.is_whole() && read.integrity.summary().is_none());
+    assert!(read.integrity.finished && read.integrity.summary().is_none());
 }
 
 #[test]
@@ -145,7 +145,7 @@ fn a_damaged_chunk_is_skipped_and_reported() {
     let read = read(&bytes);
     assert_eq!((read.integrity.damaged, read.integrity.finished), (1, true));
     assert!(read.integrity.notes[0].contains(&format!("chunk at byte {start}")));
-    assert!(!read.integrity.is_whole());
+    assert!(!read.integrity.finished);
     assert!(!is_beginning(&read.events));
     assert_eq!(read.events.last(), Some(&(EVENTS - 1)));
 }

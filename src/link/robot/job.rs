@@ -28,11 +28,6 @@ impl PrintJob {
         Self { layers, layer_height, first_z, pause, begun, acknowledges, waiting_since }
     }
 
-    /// How many beads have been begun.
-    pub fn begun(&self) -> u32 {
-        self.begun
-    }
-
     /// A PC connected and found the robot in this mode.
     pub fn connected(&mut self, mode: RobotMode) {
         self.acknowledges = matches!(mode, RobotMode::Stop | RobotMode::Fault);
@@ -96,7 +91,7 @@ mod tests {
     fn nothing_is_printed_before_a_pc_is_there() {
         let (mut job, mut cell) = (PrintJob::new(2, Mm::ZERO, Mm::ZERO, Span::ZERO), cell());
         run(&mut job, &mut cell, 0.0, 5.0);
-        assert_eq!((job.begun(), cell.mode()), (0, RobotMode::Idle));
+        assert_eq!((job.begun, cell.mode()), (0, RobotMode::Idle));
     }
 
     #[test]
@@ -110,7 +105,7 @@ mod tests {
         run(&mut job, &mut cell, 0.0, 0.15);
         assert_eq!(cell.state(secs(0.15)).z_mm, Mm::constant(1.0));
         run(&mut job, &mut cell, 0.15, 5.0);
-        assert_eq!((job.begun(), cell.mode()), (2, RobotMode::Idle));
+        assert_eq!((job.begun, cell.mode()), (2, RobotMode::Idle));
         assert_eq!(cell.state(secs(5.0)).z_mm, Mm::constant(6.0));
     }
 

@@ -48,11 +48,6 @@ impl AxisScale {
         self.from + fraction * (self.to - self.from)
     }
 
-    /// Smallest and largest value.
-    pub fn range(&self) -> ValueRange {
-        ValueRange::new(self.low, self.high)
-    }
-
     /// Round values within the range, about `wanted` of them, with their
     /// labels.
     pub fn ticks(&self, wanted: u32) -> Vec<(f64, String)> {

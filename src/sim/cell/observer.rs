@@ -22,12 +22,3 @@ pub trait Observer {
         false
     }
 }
-
-/// An observer that records nothing.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct NoObserver;
-
-impl Observer for NoObserver {
-    fn step(&mut self, _: Stamp, _: &Event, _: &Step) {}
-    fn frame(&mut self, _: &FrameObservation<'_>) {}
-}

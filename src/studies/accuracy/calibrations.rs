@@ -124,11 +124,6 @@ impl CalibrationBench {
         Self { case, studio, seed }
     }
 
-    /// The case.
-    pub fn case(&self) -> &CalibrationCase {
-        &self.case
-    }
-
     /// Calibrates once, with boards held at random, and measures beads that lie where
     /// the last board did, on the bed and 5 % of the distance above it. An image in which
     /// no board is found is left out, as a user's would be. `None` where that is the one of

@@ -112,7 +112,7 @@ fn a_recording_gives_its_frames_back_with_their_times_and_heights() {
             z_mm: Mm::constant(z),
         };
         recorder.record(frame.captured_at, &Event::Robot(state), &Step::default()).unwrap();
-        recorder.frame(Arc::new(frame.clone()));
+        recorder.frames().frame(Arc::new(frame.clone()));
     }
     let path = recorder.finish().unwrap().path;
     let mut source = open(&path, None).unwrap();

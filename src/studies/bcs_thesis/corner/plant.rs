@@ -46,14 +46,6 @@ impl WidthProfile {
         mean_square(&self.errors).sqrt()
     }
 
-    /// At the judged position nearest to one \[mm\].
-    pub fn at(&self, path_mm: f64) -> f64 {
-        let nearest = positions()
-            .zip(&self.errors)
-            .min_by(|a, b| (a.0 - path_mm).abs().total_cmp(&(b.0 - path_mm).abs()));
-        nearest.map_or(0.0, |(_, error)| *error)
-    }
-
     /// Positions \[mm\] and errors.
     pub fn along(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         positions().zip(self.errors.iter().copied())
