@@ -32,17 +32,6 @@ pub struct ExtruderOptions {
     pub fails_after: Option<Span>,
 }
 
-/// The extruder cannot be started.
-#[derive(Debug, thiserror::Error)]
-pub enum ExtruderSimError {
-    /// The time between two `STATE` lines.
-    #[error("the time between two STATE lines must be above zero")]
-    Period,
-    /// The system gives no socket or thread.
-    #[error("the simulated extruder cannot be started: {0}")]
-    Io(#[from] io::Error),
-}
-
 /// A simulated extruder that runs in threads of its own until it is stopped.
 #[derive(Debug)]
 pub struct ExtruderSim {
@@ -53,16 +42,13 @@ pub struct ExtruderSim {
 impl ExtruderSim {
     /// Serves the link on `listener`. `clock` may be the PC's own: what the
     /// extruder says of its time is shifted by
-    /// [`ExtruderOptions::clock_start_ms`].
+    /// [`ExtruderOptions::clock_start_ms`]. Fails where the system gives no socket or thread.
     pub fn spawn(
         listener: TcpListener,
         clock: RunClock,
         options: ExtruderOptions,
         notice: Notice,
-    ) -> Result<Self, ExtruderSimError> {
-        if options.state_period <= Span::ZERO {
-            return Err(ExtruderSimError::Period);
-        }
+    ) -> io::Result<Self> {
         let gate = ExtruderEndpoint::new(options.hello, options.clock_start_ms);
         let gated = GatedPlant::new(clock.now(), gate, options.plant, options.fails_after);
         let shared = Arc::new(SharedExtruder::new(clock, gated));

@@ -35,9 +35,6 @@ pub enum RobotSimError {
     /// A robot that cannot be.
     #[error(transparent)]
     Params(#[from] ParamError),
-    /// The time between two `STATE` lines.
-    #[error("the time between two STATE lines must be above zero")]
-    Period,
     /// The system gives no socket or thread.
     #[error("the simulated robot cannot be started: {0}")]
     Io(#[from] io::Error),
@@ -60,9 +57,6 @@ impl RobotSim {
         options: RobotOptions,
         notice: Notice,
     ) -> Result<Self, RobotSimError> {
-        if options.state_period <= Span::ZERO {
-            return Err(RobotSimError::Period);
-        }
         let cell = VirtualRobot::new(options.params, clock.now())?;
         let shared = Arc::new(SharedRobot::new(clock, cell));
         let machine = RobotMachine::new(Arc::clone(&shared), options.job);

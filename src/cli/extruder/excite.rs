@@ -23,7 +23,9 @@ const DEFAULT_PERIOD_S: f64 = 0.02;
 /// A cell plays it on the extruder while everything is logged; `truebead extruder identify`
 /// finds the model in the log.
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(
+    allow_negative_numbers = true,
+    after_help = "\
 Examples:
   truebead extruder excite prbs --low 20 --high 40 --hold-s 0.7 --quantity screw_rpm --out profile.csv
   truebead extruder excite gaussian --low 2 --high 4 --hold-s 1.5 --duration-s 90 --quantity drive_v --out profile.csv
@@ -33,7 +35,8 @@ Which hold time: about a third of the time in which the extruder answers; it is 
 up to 0.44 / hold time. The whole should last ten times as long as the slowest answer.
 
 The file has the columns time_s and the quantity; each value holds until the next line,
-and the last line marks the end.")]
+and the last line marks the end."
+)]
 pub struct ExciteArgs {
     #[command(subcommand)]
     kind: Kind,
@@ -48,15 +51,18 @@ enum Kind {
 
 /// A pseudo-random binary sequence of maximal length between two levels
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(
+    allow_negative_numbers = true,
+    after_help = "\
 Example:
-  truebead extruder excite prbs --low 20 --high 40 --hold-s 0.7 --quantity screw_rpm --out profile.csv")]
+  truebead extruder excite prbs --low 20 --high 40 --hold-s 0.7 --quantity screw_rpm --out profile.csv"
+)]
 struct PrbsArgs {
     /// Level of a zero
-    #[arg(long, allow_hyphen_values = true)]
+    #[arg(long)]
     low: f64,
     /// Level of a one
-    #[arg(long, allow_hyphen_values = true)]
+    #[arg(long)]
     high: f64,
     /// Bits of its shift register, 3 to 16: it repeats itself after 2^N − 1 bits
     /// [default: 7, or what a longer --duration-s takes]
@@ -68,24 +74,27 @@ struct PrbsArgs {
 
 /// Levels that are drawn at random, normally distributed
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(
+    allow_negative_numbers = true,
+    after_help = "\
 Example:
   truebead extruder excite gaussian --low 2 --high 4 --hold-s 1.5 --duration-s 90 \\
-      --quantity drive_v --out profile.csv")]
+      --quantity drive_v --out profile.csv"
+)]
 struct GaussianArgs {
     /// Smallest level
-    #[arg(long, allow_hyphen_values = true)]
+    #[arg(long)]
     low: f64,
     /// Largest level
-    #[arg(long, allow_hyphen_values = true)]
+    #[arg(long)]
     high: f64,
     /// Mean level
     /// [default: midway]
-    #[arg(long, allow_hyphen_values = true)]
+    #[arg(long)]
     mean: Option<f64>,
     /// Standard deviation
     /// [default: a sixth of the way from the smallest to the largest level]
-    #[arg(long, allow_hyphen_values = true)]
+    #[arg(long)]
     sigma: Option<f64>,
     /// The same seed gives the same levels
     #[arg(long, default_value_t = 1)]
@@ -101,18 +110,16 @@ fn parse_level(text: &str) -> Result<f64, String> {
 
 /// Levels that are given, one after the other
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(
+    allow_negative_numbers = true,
+    after_help = "\
 Example:
-  truebead extruder excite steps --levels 20,40,30,20 --hold-s 15 --quantity screw_rpm --out profile.csv")]
+  truebead extruder excite steps --levels 20,40,30,20 --hold-s 15 --quantity screw_rpm --out profile.csv"
+)]
 struct StepsArgs {
     /// The levels, such as 20,40,30
-    #[arg(
-        long,
-        value_delimiter = ',',
-        value_parser = parse_level,
-        allow_hyphen_values = true,
-        required = true
-    )]
+    #[arg(long, value_delimiter = ',', value_parser = parse_level, required = true,
+          allow_hyphen_values = true)]
     levels: Vec<f64>,
     #[command(flatten)]
     all: CommonArgs,
@@ -121,17 +128,17 @@ struct StepsArgs {
 #[derive(Debug, Args)]
 struct CommonArgs {
     /// How long each level is held; the bit time of a sequence [s]
-    #[arg(long, alias = "bit-s", value_name = "S", allow_hyphen_values = true)]
+    #[arg(long, alias = "bit-s", value_name = "S")]
     hold_s: f64,
     /// How long it lasts, without what is before and after [s]
     /// [default: one period of a sequence, each of the steps once]
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    #[arg(long, value_name = "S")]
     duration_s: Option<f64>,
     /// Time at the middle level (steps: the first one) before it [s]
-    #[arg(long, value_name = "S", default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
     lead_in_s: f64,
     /// The same after it [s]
-    #[arg(long, value_name = "S", default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
     lead_out_s: f64,
     /// What is commanded: the column's name, which ends with its unit (see the examples)
     #[arg(long, value_name = "NAME")]

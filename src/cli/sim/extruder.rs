@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context as _;
 use clap::Args;
 
 use super::serve::{print, serve};
@@ -42,8 +43,7 @@ pub struct ExtruderSimArgs {
     #[arg(long, default_value = "truebead-sim")]
     name: String,
     /// To rehearse a fault: the pump fails so long after it was first commanded to run [s]
-    #[arg(long, value_name = "S", value_parser = parse_until,
-          allow_hyphen_values = true)]
+    #[arg(long, value_name = "S", value_parser = parse_until, allow_negative_numbers = true)]
     fail_after_s: Option<f64>,
 }
 
@@ -52,8 +52,10 @@ pub struct ExtruderSimArgs {
 pub fn run(args: &ExtruderSimArgs) -> anyhow::Result<()> {
     let loaded = LoadedCell::read(&args.cell, Purpose::Run)?;
     let options = options(args, &loaded)?;
-    let spawn =
-        |listener| Ok(ExtruderSim::spawn(listener, RunClock::start(), options, Box::new(print))?);
+    let spawn = |listener| {
+        ExtruderSim::spawn(listener, RunClock::start(), options, Box::new(print))
+            .context("the simulated extruder cannot be started")
+    };
     let what = format!("extruder `{}`", args.name);
     serve(&what, &args.listen, spawn, ExtruderSim::local_addr, ExtruderSim::stop)
 }

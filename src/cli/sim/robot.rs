@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::serve::{print, serve};
-use crate::cli::arguments::WrongArguments;
+use crate::cli::arguments::{WrongArguments, parse_within};
 use crate::core::time::Span;
 use crate::core::units::{Mm, MmPerS, MmPerS2, NotFinite};
 use crate::io::clock::RunClock;
@@ -12,7 +12,9 @@ use crate::simulators::robot::{RobotOptions, RobotSim, RobotSimError};
 
 /// A robot that answers the robot link.
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(
+    allow_negative_numbers = true,
+    after_help = "\
 Examples:
   truebead sim robot
   truebead sim robot --bead-mm 2000 --layers 4 --layer-height-mm 20
@@ -23,7 +25,8 @@ first. A new connection stands for the operator's key: it begins the job again
 once it was finished, and acknowledges a STOP or FAULT that it finds.
 
 To be the PC by hand: nc 127.0.0.1 5653, and HELLO 1 me as the first line.
-docs/src/reference/robot-link.md has the rest.")]
+docs/src/reference/robot-link.md has the rest."
+)]
 pub struct RobotSimArgs {
     /// Address and port on which the robot listens
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:5653")]
@@ -32,31 +35,25 @@ pub struct RobotSimArgs {
     #[arg(long, default_value = "truebead-sim", value_parser = parse_name)]
     name: String,
     /// Slowest setpoint that it takes [mm/s]
-    #[arg(long, value_name = "MM/S", default_value = "60", value_parser = parse_speed,
-          allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM/S", default_value = "60", value_parser = parse::<MmPerS>)]
     min: MmPerS,
     /// Fastest setpoint that it takes [mm/s]
-    #[arg(long, value_name = "MM/S", default_value = "150", value_parser = parse_speed,
-          allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM/S", default_value = "150", value_parser = parse::<MmPerS>)]
     max: MmPerS,
     /// Speed to which it goes when setpoints run out [mm/s]
-    #[arg(long, value_name = "MM/S", default_value = "60", value_parser = parse_speed,
-          allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM/S", default_value = "60", value_parser = parse::<MmPerS>)]
     hold: MmPerS,
     /// Speed at which it begins a bead [mm/s]
-    #[arg(long, value_name = "MM/S", default_value = "112.5", value_parser = parse_speed,
-          allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM/S", default_value = "112.5", value_parser = parse::<MmPerS>)]
     start: MmPerS,
     /// Bandwidth of its velocity loop [Hz]
-    #[arg(long, value_name = "HZ", default_value = "10", allow_hyphen_values = true)]
+    #[arg(long, value_name = "HZ", default_value = "10")]
     bandwidth_hz: f64,
     /// Largest acceleration along the path [mm/s²]
-    #[arg(long, value_name = "MM/S2", default_value = "2000", value_parser = parse_accel,
-          allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM/S2", default_value = "2000", value_parser = parse::<MmPerS2>)]
     accel: MmPerS2,
     /// Length of a bead, after which it is IDLE [mm]
-    #[arg(long, value_name = "MM", default_value = "2000", value_parser = parse_length,
-          allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM", default_value = "2000", value_parser = parse::<Mm>)]
     bead_mm: Mm,
     /// Lays one bead without end
     #[arg(long, conflicts_with_all = ["bead_mm", "layers"])]
@@ -65,12 +62,10 @@ pub struct RobotSimArgs {
     #[arg(long, value_name = "N", default_value = "1")]
     layers: u32,
     /// By how much each bead lies above the one before [mm]
-    #[arg(long, value_name = "MM", default_value = "20", value_parser = parse_layer,
-          allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM", default_value = "20", value_parser = parse_layer)]
     layer_height_mm: Mm,
     /// Pause before each bead [s]
-    #[arg(long, value_name = "S", default_value = "1", value_parser = parse_pause,
-          allow_hyphen_values = true)]
+    #[arg(long, value_name = "S", default_value = "1", value_parser = parse_pause)]
     pause_s: Span,
     /// Time between two STATE lines [ms]
     #[arg(long, value_name = "MS", default_value = "20",
@@ -115,33 +110,16 @@ fn parse_name(text: &str) -> Result<String, String> {
     if one_word { Ok(text.to_owned()) } else { Err("expected one word of ASCII".to_owned()) }
 }
 
-fn parse<T>(text: &str, unit: impl Fn(f64) -> Result<T, NotFinite>) -> Result<T, String> {
-    let number = text.parse().map_err(|_| "expected a number".to_owned())?;
-    unit(number).map_err(|error| error.to_string())
-}
-
-fn parse_speed(text: &str) -> Result<MmPerS, String> {
-    parse(text, MmPerS::new)
-}
-
-fn parse_accel(text: &str) -> Result<MmPerS2, String> {
-    parse(text, MmPerS2::new)
-}
-
-fn parse_length(text: &str) -> Result<Mm, String> {
-    parse(text, Mm::new)
+fn parse<T: TryFrom<f64, Error = NotFinite>>(text: &str) -> Result<T, String> {
+    let number: f64 = text.parse().map_err(|_| "expected a number".to_owned())?;
+    number.try_into().map_err(|error: NotFinite| error.to_string())
 }
 
 fn parse_layer(text: &str) -> Result<Mm, String> {
-    parse_length(text)
-        .ok()
-        .filter(|height| *height >= Mm::ZERO)
-        .ok_or_else(|| "expected 0 mm or more".to_owned())
+    let height = parse(text).ok().filter(|height| *height >= Mm::ZERO);
+    height.ok_or_else(|| "expected 0 mm or more".to_owned())
 }
 
 fn parse_pause(text: &str) -> Result<Span, String> {
-    match text.parse::<f64>() {
-        Ok(secs) if (0.0..=3600.0).contains(&secs) => Ok(Span::from_secs(secs)),
-        _ => Err("expected 0 to 3600 seconds".to_owned()),
-    }
+    parse_within(text, 0.0..=3600.0, "expected 0 to 3600 seconds").map(Span::from_secs)
 }
