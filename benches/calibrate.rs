@@ -7,18 +7,13 @@ use std::hint::black_box;
 
 use divan::Bencher;
 use nalgebra::{Rotation3, Vector3};
-use truebead::calibration::Camera;
 use truebead::calibration::board::Board;
-use truebead::calibration::board_observation;
-use truebead::calibration::board_observation::BoardObservation;
+use truebead::calibration::board_observation::{self, BoardObservation};
 use truebead::calibration::covariance::CalibrationCovariance;
 use truebead::calibration::plane::OnBed;
-use truebead::calibration::solve;
-use truebead::calibration::solve::Solution;
-use truebead::calibration::{next_view, width_map};
-use truebead::core::frame::Frame;
-use truebead::core::geometry::Pose;
-use truebead::core::units::Mm;
+use truebead::calibration::solve::{self, Solution};
+use truebead::calibration::{Camera, next_view, width_map};
+use truebead::core::{Frame, Mm, Pose};
 use truebead::sim::board_studio::{BoardStudio, Exposure};
 
 const SIZE: [u32; 2] = [640, 480];

@@ -5,8 +5,7 @@
 #![expect(clippy::expect_used, reason = "a benchmark of sound input")]
 
 use divan::Bencher;
-use truebead::core::time::{Span, Stamp};
-use truebead::core::units::{Mm, MmPerS};
+use truebead::core::{Mm, MmPerS, Span, Stamp};
 use truebead::width_control::distance::{DistanceController, DistanceSettings, WidthReading};
 
 const FRAME_S: f64 = 0.02;

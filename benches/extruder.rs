@@ -4,8 +4,7 @@
 #![expect(clippy::expect_used, reason = "a benchmark of sound input")]
 
 use divan::Bencher;
-use truebead::core::time::{Span, Stamp};
-use truebead::core::units::{MPa, Rpm};
+use truebead::core::{MPa, Rpm, Span, Stamp};
 use truebead::extruder::pressure::{InitialState, PressureController};
 use truebead::studies::ma2026::TestedController;
 

@@ -4,10 +4,7 @@
 
 use divan::Bencher;
 use truebead::calibration::Calibration;
-use truebead::core::geometry::Roi;
-use truebead::core::time::Stamp;
-use truebead::core::units::Mm;
-use truebead::core::units::WidthRange;
+use truebead::core::{Mm, Roi, Stamp, WidthRange};
 use truebead::scenario::image::{ImageModel, MotionBlur};
 use truebead::sim::render::Renderer;
 use truebead::vision::{BeadAxis, Gauge, Polarity};

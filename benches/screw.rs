@@ -5,8 +5,7 @@
 #![expect(clippy::expect_used, reason = "a benchmark of sound input")]
 
 use divan::{Bencher, black_box};
-use truebead::core::time::{Span, Stamp};
-use truebead::core::units::Mm;
+use truebead::core::{Mm, Span, Stamp};
 use truebead::extruder::screw::control::{Scheme, ScrewSettings};
 use truebead::extruder::screw::feedback::PlugSetpoint;
 use truebead::extruder::screw::{

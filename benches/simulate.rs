@@ -9,10 +9,8 @@ use divan::Bencher;
 use truebead::calibration::Calibration;
 use truebead::cell::Cell;
 use truebead::cell::file::Purpose;
-use truebead::control::event::Event;
-use truebead::control::step::Step;
-use truebead::core::time::Stamp;
-use truebead::core::units::Mm;
+use truebead::control::{Event, Step};
+use truebead::core::{Mm, Stamp};
 use truebead::run::runner::NoRecorder;
 use truebead::sim::cell::{FrameObservation, Observer, SimCell};
 

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use crate::calibration::{Calibration, SurfaceMap};
 use crate::cell::Cell;
 use crate::cell::file::{CalibrationSource, ExtruderPart, Purpose};
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::document::Problems;
 use crate::drivers::Devices;
 use crate::io::calibration_file;

@@ -14,7 +14,7 @@ use std::sync::Once;
 
 use opencv::core::{LogLevel, Mat, MatTraitConst, set_log_level, set_num_threads};
 
-use crate::core::frame::{Frame, Pixels};
+use crate::core::{Frame, Pixels};
 
 /// OpenCV failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

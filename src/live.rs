@@ -31,7 +31,7 @@ use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::cell::file::RunPart;
 use crate::control::Controller;
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::drivers::StartError;
 use crate::drivers::camera::open::{self, OpenError};
 use crate::drivers::extruder::{DriveRange, ExtruderDriver, ExtruderStart};

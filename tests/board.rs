@@ -10,9 +10,7 @@ use nalgebra::{Rotation3, Vector3};
 use truebead::calibration::board::Board;
 use truebead::calibration::plane::bed_from_board;
 use truebead::calibration::{Camera, file};
-use truebead::core::frame::Frame;
-use truebead::core::geometry::Pose;
-use truebead::core::units::Mm;
+use truebead::core::{Frame, Mm, Pose};
 use truebead::sim::board_studio::{BoardStudio, Exposure};
 
 const SIZE: [u32; 2] = [640, 480];

@@ -8,12 +8,8 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use nalgebra::{Point2, Rotation3, Vector2, Vector3};
 use truebead::calibration::board::Board;
-use truebead::calibration::board_observation;
-use truebead::calibration::{Calibration, Camera};
-use truebead::core::frame::{Channel, Frame};
-use truebead::core::geometry::Pose;
-use truebead::core::time::Stamp;
-use truebead::core::units::Mm;
+use truebead::calibration::{Calibration, Camera, board_observation};
+use truebead::core::{Channel, Frame, Mm, Pose, Stamp};
 use truebead::io::{calibration_file, image_file};
 use truebead::sim::board_studio::{BoardStudio, Exposure};
 

@@ -11,15 +11,12 @@ use rand::seq::SliceRandom;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use truebead::calibration::board::Board;
-use truebead::calibration::board_observation;
-use truebead::calibration::board_observation::BoardObservation;
+use truebead::calibration::board_observation::{self, BoardObservation};
 use truebead::calibration::covariance::CalibrationCovariance;
 use truebead::calibration::equations::Correspondence;
 use truebead::calibration::plane::OnBed;
 use truebead::calibration::{Calibration, CalibrationQuality, SurfaceMap, solve};
-use truebead::core::frame::Channel;
-use truebead::core::time::Stamp;
-use truebead::core::units::Mm;
+use truebead::core::{Channel, Mm, Stamp};
 use truebead::io::image_file;
 
 /// OpenCV's sample images by both cameras of a pair.

@@ -11,8 +11,7 @@ use std::process::Command;
 use nalgebra::{Rotation3, Vector3};
 use truebead::calibration::Calibration;
 use truebead::calibration::board::Board;
-use truebead::core::geometry::Pose;
-use truebead::core::units::Mm;
+use truebead::core::{Mm, Pose};
 use truebead::io::calibration_file;
 use truebead::sim::board_studio::{BoardStudio, Exposure};
 

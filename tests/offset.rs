@@ -11,8 +11,7 @@ use assert_cmd::Command;
 use nalgebra::{Rotation3, Vector3};
 use truebead::calibration::board::Board;
 use truebead::calibration::{Camera, file};
-use truebead::core::geometry::Pose;
-use truebead::core::units::Mm;
+use truebead::core::{Mm, Pose};
 use truebead::sim::board_studio::{BoardStudio, Exposure};
 
 use common::{said, truebead};

@@ -12,9 +12,7 @@ use truebead::calibration::board::{Board, Markers};
 use truebead::calibration::dictionary::Dictionary;
 use truebead::calibration::plane::bed_from_board;
 use truebead::calibration::{Camera, file};
-use truebead::core::frame::Frame;
-use truebead::core::geometry::Pose;
-use truebead::core::units::Mm;
+use truebead::core::{Frame, Mm, Pose};
 use truebead::sim::board_studio::{BoardStudio, Exposure};
 
 const SIZE: [u32; 2] = [720, 540];

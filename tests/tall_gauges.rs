@@ -4,8 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
 
 use truebead::scenario::bead::EdgeRoughness;
-use truebead::studies::accuracy::sets;
-use truebead::studies::accuracy::sets::Set;
+use truebead::studies::accuracy::sets::{self, Set};
 use truebead::studies::accuracy::studio::SetStudio;
 use truebead::vision::Measurer;
 

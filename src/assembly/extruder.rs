@@ -13,7 +13,7 @@ use behaviour::{WITHOUT_FILE, extruder_error, wrong_file};
 use super::error::AssemblyError;
 use crate::cell::extruder::{ExtruderSettings, FeedforwardKeys, ModelSource, Strategy};
 use crate::cell::file::{ExtruderPart, RunPart};
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::extruder::feedforward::{
     ExtruderModel, FeedforwardError, FlowForecast, InverseSettings, ScrewSpeed, Tracker,
 };

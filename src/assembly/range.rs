@@ -5,7 +5,7 @@ use super::error::AssemblyError;
 use super::side::ExtruderSide;
 use crate::cell::extruder::{ModelSource, Strategy};
 use crate::cell::file::ExtruderPart;
-use crate::core::units::MPa;
+use crate::core::MPa;
 use crate::extruder::ExtruderStrategy;
 use crate::extruder::strategy::Playback;
 use crate::identify::command_profile::ProfilePoint;

@@ -9,8 +9,7 @@ use opencv::calib3d::{
 use opencv::core::{Mat, MatTraitConst, Point2f, Size, Vector};
 
 use super::{BridgeError, during, grey8_mat, prepare};
-use crate::core::frame::Frame;
-use crate::core::geometry::{GridSize, ImagePoint};
+use crate::core::{Frame, GridSize, ImagePoint};
 
 /// Finds a number of inner corners of a checkerboard, row by row \[px\]. `None` where the board
 /// is not entirely in the image.
@@ -64,10 +63,7 @@ mod tests {
     use super::*;
     use crate::calibration::Camera;
     use crate::calibration::board::Board;
-    use crate::core::frame::Pixels;
-    use crate::core::geometry::{self, Pose};
-    use crate::core::time::Stamp;
-    use crate::core::units::Mm;
+    use crate::core::{self, Mm, Pixels, Pose, Stamp};
     use crate::sim::board_studio::{BoardStudio, Exposure};
     use nalgebra::Vector3;
 
@@ -102,7 +98,7 @@ mod tests {
         let empty = Frame::new(
             0,
             Stamp::START,
-            geometry::Size::new(400, 300),
+            core::Size::new(400, 300),
             Pixels::Grey8(vec![90; 400 * 300]),
         )
         .unwrap();

@@ -6,8 +6,7 @@ use opencv::core::{BORDER_DEFAULT, Mat, MatTraitConst, Rect, Size, ToInputArray,
 use opencv::imgproc::{canny, gaussian_blur, hough_lines_p};
 
 use super::{BridgeError, during, grey8_mat, prepare};
-use crate::core::frame::{Frame, Pixels};
-use crate::core::geometry::{ImagePoint, Roi};
+use crate::core::{Frame, ImagePoint, Pixels, Roi};
 
 /// Settings of edge detector and Hough transform.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,8 +120,7 @@ fn coordinate(px: usize) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::geometry;
-    use crate::core::time::Stamp;
+    use crate::core::{self, Stamp};
 
     const SETTINGS: EdgeSettings = EdgeSettings {
         blur_sigma_px: 1.0,
@@ -136,7 +134,7 @@ mod tests {
     fn bar() -> Frame {
         let row = (0..200).map(|x| if (60..140).contains(&x) { 200 } else { 30 });
         let pixels = row.cycle().take(200 * 120).collect();
-        Frame::new(0, Stamp::START, geometry::Size::new(200, 120), Pixels::Grey8(pixels)).unwrap()
+        Frame::new(0, Stamp::START, core::Size::new(200, 120), Pixels::Grey8(pixels)).unwrap()
     }
 
     #[test]
@@ -164,13 +162,9 @@ mod tests {
 
     #[test]
     fn a_uniform_image_has_no_edges_and_a_region_outside_is_refused() {
-        let even = Frame::new(
-            0,
-            Stamp::START,
-            geometry::Size::new(50, 50),
-            Pixels::Grey16(vec![900; 2500]),
-        )
-        .unwrap();
+        let even =
+            Frame::new(0, Stamp::START, core::Size::new(50, 50), Pixels::Grey16(vec![900; 2500]))
+                .unwrap();
         let roi = Roi { x: 0, y: 0, width: 50, height: 50 };
         assert_eq!(canny_hough(&even, roi, &SETTINGS).unwrap(), vec![]);
         let outside = Roi { x: 10, ..roi };

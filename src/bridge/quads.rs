@@ -8,8 +8,7 @@ use opencv::imgproc::{
 };
 
 use super::{BridgeError, during, grey8_mat, prepare};
-use crate::core::frame::Frame;
-use crate::core::geometry::ImagePoint;
+use crate::core::{Frame, ImagePoint};
 
 /// Window sizes of the adaptive threshold \[px\], for borders of markers of different sizes. A
 /// choice: factors of two.

@@ -10,9 +10,7 @@ use opencv::videoio::{
 };
 
 use super::{BridgeError, during, prepare};
-use crate::core::frame::{Channel, Frame, Pixels, SampleLayout};
-use crate::core::geometry::Size;
-use crate::core::time::Stamp;
+use crate::core::{Channel, Frame, Pixels, SampleLayout, Size, Stamp};
 
 /// Source of a video.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -5,8 +5,7 @@ use nalgebra::{Point2, Point3};
 
 use super::dictionary::Dictionary;
 use super::equations::Correspondence;
-use crate::core::geometry::{GridSize, ImagePoint};
-use crate::core::units::Mm;
+use crate::core::{GridSize, ImagePoint, Mm};
 use crate::numeric::number::to_f64;
 
 /// A checkerboard of `columns` by `rows` inner corners.

@@ -7,7 +7,7 @@ use nalgebra::{Point2, Vector2};
 
 use super::SurfaceMap;
 use super::board::{Board, CornerObservation};
-use crate::core::geometry::GridSize;
+use crate::core::GridSize;
 use crate::numeric::number::to_f64;
 
 /// Where a board lies on a plane: a rotation, a shift and, if it is free, a scale.
@@ -98,7 +98,7 @@ fn product(a: Vector2<f64>, b: Vector2<f64>) -> Vector2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::units::Mm;
+    use crate::core::Mm;
 
     /// Corners of a board that is 1 % too large, turned by 0.3 rad, on a plane of 0.1 mm a pixel.
     fn fits() -> [BoardFit; 2] {

@@ -10,8 +10,7 @@ use super::grey::GreyImage;
 use super::outline::{self, BoardOutline};
 use super::rejection::{BoardRejection, MIN_CORNERS, MIN_LINES};
 use crate::bridge;
-use crate::core::frame::Frame;
-use crate::core::geometry::{GridSize, ImagePoint};
+use crate::core::{Frame, GridSize, ImagePoint};
 
 /// Mean shift of the corners below which two images show the board in one position and count as
 /// one \[px\]. A choice: well above the noise of a corner.

@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix2, Matrix2x3, Point2, Point3, SMatrix, Vector2};
 
-use crate::core::geometry::ImagePoint;
+use crate::core::ImagePoint;
 
 /// Limit of Newton's steps, which converge quadratically away from a fold of the distortion.
 const UNDISTORT_STEPS: usize = 20;

@@ -107,7 +107,7 @@ impl Collector {
 mod tests {
     use super::*;
     use crate::calibration::synthetic::{self, board, poses};
-    use crate::core::geometry::Pose;
+    use crate::core::Pose;
     use nalgebra::Vector3;
 
     fn seen(collector: &mut Collector, pose: &Pose) -> Decision {
@@ -140,7 +140,7 @@ mod tests {
             let pose = moved(&poses()[0], f64::from(step));
             assert_eq!(seen(&mut collector, &pose), Decision::Moving);
         }
-        let refusal = BoardRejection::NoBoard(crate::core::geometry::GridSize::new(9, 6));
+        let refusal = BoardRejection::NoBoard(crate::core::GridSize::new(9, 6));
         for _ in 0..4 {
             assert!(!matches!(seen(&mut collector, &poses()[0]), Decision::Kept(_)));
         }

@@ -9,7 +9,7 @@ use nalgebra::Vector2;
 
 use super::board::Board;
 use super::grey::GreyImage;
-use crate::core::geometry::{GridSize, ImagePoint, Size};
+use crate::core::{GridSize, ImagePoint, Size};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::{to_count, to_f64};
 use shape::{CornerPixel, CornerShape, CornerSums, PARAMETERS};

@@ -19,8 +19,7 @@ use super::plane::{OnBed, bed_from_board};
 use super::solve::Solution;
 use super::uncertainty::{CalibrationUncertainty, JointCovariance, UNCERTAIN_PARAMETERS};
 use super::{Calibration, SurfaceMap, scale};
-use crate::core::geometry::{ImagePoint, Pose};
-use crate::core::units::Mm;
+use crate::core::{ImagePoint, Mm, Pose};
 
 /// Step of the central differences, as a fraction of a focal length, as an angle \[rad\] or as
 /// a fraction of the distance of the board: small against the curvature of the model and large

@@ -71,7 +71,7 @@ fn cells(solution: &Solution) -> [[bool; GRID_SIDE]; GRID_SIDE] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::geometry::Pose;
+    use crate::core::Pose;
     use nalgebra::Point3;
 
     fn view(tilt: Vector3<f64>) -> BoardView {

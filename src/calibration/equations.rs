@@ -12,7 +12,7 @@ pub use unknowns::{
 use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix3, Point3, SMatrix, SVector, Vector3};
 
 use super::camera::{NUMBERS, Projection};
-use crate::core::geometry::Pose;
+use crate::core::Pose;
 
 const PLACEMENT_PARAMETERS: usize = POSE + ON_PLANE;
 /// Normal equations of one placement, with the reprojection errors on the right-hand side.

@@ -9,8 +9,7 @@ use super::camera::COEFFICIENTS;
 use super::lens::Lens;
 use super::uncertainty::{self, CalibrationUncertainty};
 use super::{Calibration, CalibrationQuality, Camera};
-use crate::core::geometry::Pose;
-use crate::core::units::Mm;
+use crate::core::{Mm, Pose};
 use crate::document::{Document, Problems, Table};
 
 /// Largest accepted image side \[px\].

@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 
 use super::board::Board;
 use super::grey::GreyImage;
-use crate::core::geometry::{GridSize, ImagePoint};
+use crate::core::{GridSize, ImagePoint};
 use crate::numeric::number::{to_count, to_f64};
 use crate::numeric::rank;
 

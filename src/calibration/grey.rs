@@ -1,7 +1,6 @@
 //! Grey values at pixels and between them.
 
-use crate::core::frame::{Frame, Pixels};
-use crate::core::geometry::{ImagePoint, Size};
+use crate::core::{Frame, ImagePoint, Pixels, Size};
 use crate::numeric::number::{to_count, to_f64};
 
 /// Grey values of an image. Those of 16 bits are scaled to a maximum of 255, because cameras

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Matrix3, Point2, Rotation3, Vector3};
 
 use super::Camera;
 use super::equations::Correspondence;
-use crate::core::geometry::Pose;
+use crate::core::Pose;
 use crate::numeric::number::to_f64;
 
 /// Focal length over the longer side of the image where the boards do not determine it. A

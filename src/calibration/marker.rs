@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Point2};
 use super::dictionary::Dictionary;
 use super::grey::GreyImage;
 use super::homography;
-use crate::core::geometry::ImagePoint;
+use crate::core::ImagePoint;
 use crate::numeric::number::to_f64;
 
 /// Smallest difference between white and black cells \[grey levels\]. A choice above the noise

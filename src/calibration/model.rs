@@ -5,8 +5,7 @@ use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
 
 use super::Camera;
 use super::uncertainty::{CalibrationUncertainty, PositionSlopes};
-use crate::core::geometry::{ImagePoint, Pose, SurfacePoint};
-use crate::core::units::Mm;
+use crate::core::{ImagePoint, Mm, Pose, SurfacePoint};
 
 /// Quality of a calibration, from its images.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,8 +8,7 @@ use super::covariance::{CalibrationCovariance, DerivedValue};
 use super::equations::Correspondence;
 use super::solve::Solution;
 use super::{relative_sigma, width_map};
-use crate::core::geometry::{ImagePoint, Pose};
-use crate::core::units::Mm;
+use crate::core::{ImagePoint, Mm, Pose};
 use crate::numeric::number::to_f64;
 
 /// Tilts that are tried \[degrees\].

@@ -12,8 +12,7 @@ use nalgebra::{Point2, Vector2};
 use super::board::{Board, CornerObservation};
 use super::board_fit::BoardFit;
 use super::{Calibration, SurfaceMap};
-use crate::core::geometry::{GridSize, ImagePoint};
-use crate::core::units::Mm;
+use crate::core::{GridSize, ImagePoint, Mm};
 
 /// Step of the height for the derivative of the gauge's middle \[mm\]. A choice: small against
 /// any working distance, large against rounding.

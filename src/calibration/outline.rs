@@ -3,7 +3,7 @@
 
 use super::board::Board;
 use super::grey::GreyImage;
-use crate::core::geometry::{GridSize, ImagePoint};
+use crate::core::{GridSize, ImagePoint};
 use crate::numeric::rank;
 
 /// Smallest difference between squares of both colours in a row beyond the board that belongs

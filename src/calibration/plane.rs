@@ -5,8 +5,7 @@ use nalgebra::{Point3, Rotation3, Vector3};
 use super::bundle::{self, Guess};
 use super::equations::{BoardPlacement, CameraModel, Correspondence, FreeParameters};
 use super::solve;
-use crate::core::geometry::Pose;
-use crate::core::units::Mm;
+use crate::core::{Mm, Pose};
 use crate::numeric::number::to_f64;
 
 /// Boards on the bed, in one plane.

@@ -5,7 +5,7 @@ use super::charuco::MarkerError;
 use super::focus::FocusFault;
 use super::outline::BoardSide;
 use crate::bridge::BridgeError;
-use crate::core::geometry::GridSize;
+use crate::core::GridSize;
 
 /// Corners of a board with markers that must be visible. A choice: a pose has six parameters, a
 /// corner gives two.

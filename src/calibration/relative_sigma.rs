@@ -3,8 +3,7 @@
 use nalgebra::Vector2;
 
 use super::covariance::{CalibrationCovariance, DerivedValue};
-use crate::core::geometry::ImagePoint;
-use crate::core::units::Mm;
+use crate::core::{ImagePoint, Mm};
 
 /// Width of the bead as a fraction of the side of that part. A choice: a usual bead.
 const BEAD_FRACTION: f64 = 1.0 / 3.0;

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 
 use super::width_map::Cells;
 use super::{SurfaceMap, width_map};
-use crate::core::geometry::{ImagePoint, Roi};
+use crate::core::{ImagePoint, Roi};
 use crate::numeric::number::to_f64;
 
 /// Relative standard deviations of the width of one bead in one direction.
@@ -86,7 +86,7 @@ mod tests {
     use crate::calibration::plane::OnBed;
     use crate::calibration::synthetic::{self, SIZE, board, poses};
     use crate::calibration::{Calibration, CalibrationQuality, solve};
-    use crate::core::units::Mm;
+    use crate::core::Mm;
 
     /// A calibration from corners with an error of a kind.
     fn surface() -> SurfaceMap {

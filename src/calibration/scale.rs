@@ -3,8 +3,7 @@
 use nalgebra::Point2;
 
 use super::{Calibration, SurfaceMap};
-use crate::core::geometry::ImagePoint;
-use crate::core::units::Mm;
+use crate::core::{ImagePoint, Mm};
 
 /// One scale for all pixels, and its range over the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +54,7 @@ pub(super) fn in_the_middle(map: &SurfaceMap, image_size_px: [u32; 2]) -> Option
 mod tests {
     use super::*;
     use crate::calibration::Camera;
-    use crate::core::geometry::Pose;
+    use crate::core::Pose;
     use nalgebra::Vector3;
 
     fn camera_at(turn: Vector3<f64>) -> Calibration {

@@ -16,7 +16,7 @@ use super::homography;
 use super::lens::Lens;
 use super::lens_selection::{self, LensTrial};
 use super::view_information::{self, ViewInformation};
-use crate::core::geometry::{ImagePoint, Pose};
+use crate::core::{ImagePoint, Pose};
 use data::{CalibrationData, root_mean_square};
 use error::MAX_RMS_PX;
 

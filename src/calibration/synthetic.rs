@@ -5,8 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::Camera;
 use super::board::{Board, CornerObservation, observe_all};
 use super::board_observation::BoardObservation;
-use crate::core::geometry::{ImagePoint, Pose};
-use crate::core::units::Mm;
+use crate::core::{ImagePoint, Mm, Pose};
 
 pub const TRUTH: Camera = Camera {
     focal_px: [1210.0, 1215.0],

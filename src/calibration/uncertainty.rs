@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3, Point3, SMatrix, Vector3};
 
 use super::Camera;
 use super::camera::NUMBERS;
-use crate::core::geometry::{Pose, SurfacePoint};
+use crate::core::{Pose, SurfacePoint};
 
 /// The camera parameters, then a rotation of the bed about the camera's axes at the bed's
 /// origin \[rad\] and a shift along them \[mm\].

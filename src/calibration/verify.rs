@@ -8,8 +8,7 @@ use super::board_fit::BoardFit;
 use super::equations::CameraModel;
 use super::plane::bed_from_board;
 use super::{Calibration, Camera, solve};
-use crate::core::geometry::Pose;
-use crate::core::units::Mm;
+use crate::core::{Mm, Pose};
 use crate::numeric::number::to_f64;
 
 /// Distances are compared over at least this fraction of the board. A choice between noise and

@@ -144,7 +144,7 @@ mod tests {
     use crate::calibration::board::observe_all;
     use crate::calibration::equations::{CameraModel, FreeParameters, SHARED};
     use crate::calibration::lens::Lens;
-    use crate::core::geometry::{ImagePoint, Pose};
+    use crate::core::{ImagePoint, Pose};
     use nalgebra::Vector2;
 
     fn view(name: &str, corner: ImagePoint, tilt_rad: f64, rms_px: f64) -> BoardView {

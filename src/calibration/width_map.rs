@@ -4,8 +4,7 @@ use nalgebra::Vector2;
 
 use super::SurfaceMap;
 use super::covariance::CalibrationCovariance;
-use crate::core::geometry::ImagePoint;
-use crate::core::units::Mm;
+use crate::core::{ImagePoint, Mm};
 
 /// Numbers of cells of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,10 +138,9 @@ pub fn typical_bead_mm(covariance: &CalibrationCovariance) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::next_view;
     use crate::calibration::plane::OnBed;
-    use crate::calibration::solve;
     use crate::calibration::synthetic::{self, board, poses};
+    use crate::calibration::{next_view, solve};
 
     fn covariance() -> (solve::Solution, CalibrationCovariance) {
         let mut turn = 0.0_f64;

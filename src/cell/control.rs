@@ -1,7 +1,6 @@
 //! `[control]` and `[limits]`: what the controller is to do, and what it may.
 
-use crate::core::time::Span;
-use crate::core::units::{Mm, MmPerS, MmPerS2, WidthRange};
+use crate::core::{Mm, MmPerS, MmPerS2, Span, WidthRange};
 use crate::document::Table;
 use crate::vision::Gauge;
 use crate::width_control::limiter::SpeedLimits;

@@ -3,7 +3,7 @@
 use super::file::{Cell, RunPart};
 use crate::calibration::Calibration;
 use crate::control::Setup;
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::width_control::steps::StepSettings;
 use crate::width_control::strategy::CellParameters;
 use crate::width_control::strategy::steps::StepsStrategy;

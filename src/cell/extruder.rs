@@ -26,8 +26,7 @@ pub use strategy::{FeedforwardKeys, ModelSource, Strategy};
 use command::read_limits;
 use context::{ReadContext, read_rates};
 
-use crate::core::time::Span;
-use crate::core::units::{MPa, Mm, MmPerS};
+use crate::core::{MPa, Mm, MmPerS, Span};
 use crate::document::Table;
 use crate::extruder::demand::section;
 use crate::extruder::{

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// Largest length that is accepted \[mm\]: 100 m, beyond which a number is mistyped.
 const LONGEST_MM: f64 = 1e5;

@@ -11,7 +11,7 @@ use crate::calibration::board::{Board, CornerObservation};
 use crate::calibration::board_observation::is_same_position;
 use crate::calibration::equations::{CameraModel, Correspondence};
 use crate::calibration::plane::OnBed;
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// The bed plane and its source.
 pub struct BedPlane {

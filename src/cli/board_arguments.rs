@@ -5,7 +5,7 @@ use clap::Args;
 use super::arguments::{WrongArguments, parse_length};
 use crate::calibration::board::{Board, Markers};
 use crate::calibration::dictionary::Dictionary;
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// Sides of squares \[mm\].
 const SQUARES_MM: (f64, f64) = (0.01, 1e4);

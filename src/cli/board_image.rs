@@ -5,8 +5,7 @@ use std::path::Path;
 use crate::calibration::board::Board;
 use crate::calibration::board_observation::{self, BoardObservation};
 use crate::calibration::rejection::BoardRejection;
-use crate::core::frame::Channel;
-use crate::core::time::Stamp;
+use crate::core::{Channel, Stamp};
 use crate::io::image_file;
 
 /// Looks for the board in an image file.

@@ -17,7 +17,7 @@ use super::arguments::{WrongArguments, check_writable};
 use super::print::print;
 use crate::calibration::board::Board;
 use crate::calibration::board_observation;
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::drivers::camera::folder::list_images;
 use crate::io::atomic_file::write_atomic;
 

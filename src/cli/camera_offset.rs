@@ -3,9 +3,7 @@
 use super::arguments::WrongArguments;
 use crate::calibration::Calibration;
 use crate::cell::Cell;
-use crate::core::robot::RobotState;
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::core::{Mm, RobotState, Stamp};
 use crate::numeric::rank;
 
 /// Default of the largest offset that is tried.

@@ -9,7 +9,7 @@ use clap::Args;
 use super::print::Verbosity;
 use crate::assembly::LoadedCell;
 use crate::cell::file::{Purpose, RunPart};
-use crate::core::units::{Mm, WidthRange};
+use crate::core::{Mm, WidthRange};
 use crate::io::progress::Progress;
 use crate::report::compare::ControllerComparison;
 use crate::rows::output;

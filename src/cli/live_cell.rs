@@ -11,7 +11,7 @@ use super::outcome;
 use super::print::{Verbosity, warn};
 use crate::assembly::{LoadedCell, range_warning};
 use crate::cell::file::RunPart;
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::drivers::robot::RobotDriver;
 use crate::io::clock::RunClock;
 use crate::io::recorder::{ExtruderFile, RecordConfig};

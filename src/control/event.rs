@@ -2,10 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::core::refusal::RefusalReason;
-use crate::core::robot::{RobotLimits, RobotState};
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::core::{Mm, RefusalReason, RobotLimits, RobotState, Stamp};
 use crate::extruder::ExtruderReport;
 
 /// What the controller reacts to. Recorded as it is, so that a replay feeds the

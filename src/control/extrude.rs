@@ -5,7 +5,7 @@ use super::event::Event;
 use super::extruder_control::ExtruderControl;
 use super::phase::{BeadStage, Phase};
 use super::step::ExtruderStep;
-use crate::core::time::Stamp;
+use crate::core::Stamp;
 use crate::extruder::{Laying, RobotSpeed};
 
 impl Controller {

@@ -1,8 +1,7 @@
 //! The phase of a controller, with the data of each phase.
 
 use super::step::{Fault, Hold, State};
-use crate::core::time::Stamp;
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS, Stamp};
 use crate::width_control::limiter::SpeedLimit;
 
 /// The phase of a controller.

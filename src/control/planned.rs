@@ -2,9 +2,7 @@
 
 use super::controller::Controller;
 use super::extruder_control::{ExtruderControl, NO_OVERRIDE};
-use crate::core::readback::ROBOT_LAG;
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::core::{Mm, ROBOT_LAG, Stamp};
 use crate::extruder::trajectory::{PlannedPoint, PlannedTrajectory};
 
 /// Fraction of its planned length from which a bead counts as laid. The robot's last report

@@ -3,10 +3,7 @@
 use super::controller::Controller;
 use super::phase::{Bead, BeadStage, Mode, Phase};
 use super::step::{Fault, Hold};
-use crate::core::readback::SpeedMatch;
-use crate::core::robot::{RobotLimits, RobotMode, RobotState};
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::core::{Mm, RobotLimits, RobotMode, RobotState, SpeedMatch, Stamp};
 use crate::width_control::controller::BeadReport;
 
 /// Fraction of the setpoint at which the run-up of a robot is over. A larger value is not

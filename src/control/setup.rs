@@ -1,7 +1,6 @@
 //! Everything that a controller has to know of its cell.
 
-use crate::core::time::Span;
-use crate::core::units::Mm;
+use crate::core::{Mm, Span};
 use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::strategy::{CellParameters, WidthControlSettings};
 

@@ -3,8 +3,7 @@
 use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
-use crate::core::time::Stamp;
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS, Stamp};
 use crate::extruder::{ExtruderCommand, ExtruderFault, ExtruderState, ExtruderTrace};
 use crate::width_control::SpeedLimit;
 use crate::width_control::distance::{DistanceTrace, FallbackReason};

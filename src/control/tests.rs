@@ -4,9 +4,9 @@ mod distance;
 mod extruder;
 
 use super::*;
-use crate::core::robot::{RobotLimits, RobotMode, RobotState};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm, MmPerS, MmPerS2, WidthRange};
+use crate::core::{
+    Mm, MmPerS, MmPerS2, RobotLimits, RobotMode, RobotState, Span, Stamp, WidthRange,
+};
 use crate::width_control::limiter::{SpeedLimit, SpeedLimits};
 use crate::width_control::pi::PiGains;
 use crate::width_control::strategy::constant::ConstantStrategy;

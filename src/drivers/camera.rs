@@ -8,7 +8,7 @@ pub mod rendered;
 pub mod snapshot;
 pub mod video;
 
-use crate::core::time::Stamp;
+use crate::core::Stamp;
 use crate::run::ports::SourceError;
 
 /// Rate that stands in where an offline source knows no times \[Hz\]: frame `n`

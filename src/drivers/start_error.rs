@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::core::units::MmPerS;
+use crate::core::MmPerS;
 use crate::link::{MAX_VALID_MS, MIN_VALID_MS};
 
 /// Why a driver cannot start.

@@ -22,7 +22,7 @@ mod tests;
 pub use gains::{Adaptation, AdaptiveGains, EstimateBounds, GainError, ScalarPlant};
 pub use mrac::{Action, MracController, RampErrors};
 
-use crate::core::time::Span;
+use crate::core::Span;
 
 /// The plant of eqs. (6), (7) with constant parameters: v̄1 \[m/s\] in the
 /// nozzle, ū3 \[m/s\] of the strand, ṁ \[kg/s\], `U_s` \[m/s\].

@@ -1,6 +1,6 @@
 //! The demanded flow at the nozzle.
 
-use crate::core::units::{Mm, Mm2, Mm3PerS, MmPerS};
+use crate::core::{Mm, Mm2, Mm3PerS, MmPerS};
 
 /// Largest flow ratio for a robot that moves faster than its setpoint. It bounds the flow that
 /// a wrong report can cause.

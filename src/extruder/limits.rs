@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
-use crate::core::time::Span;
+use crate::core::Span;
 
 /// Range and rate of commands, in the unit of the extruder's command.
 #[derive(Debug, Clone, Copy, PartialEq)]

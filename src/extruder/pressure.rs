@@ -14,8 +14,7 @@
 //! its [`super::limits::CommandLimits`] \[rpm\].
 
 use super::limits::{CommandLimit, LimitError};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{MPa, Rpm};
+use crate::core::{MPa, Rpm, Span, Stamp};
 
 pub mod call_times;
 pub mod command_history;

@@ -1,6 +1,6 @@
 //! Several independent rates in one loop.
 
-use crate::core::time::{Span, Stamp};
+use crate::core::{Span, Stamp};
 
 /// A task at a fixed rate. Missed times are skipped.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,7 +3,7 @@
 //! and the check of the screw's speed use the unfiltered readings.
 
 use super::report::ExtruderReport;
-use crate::core::units::{MPa, Mm, Mm3PerS};
+use crate::core::{MPa, Mm, Mm3PerS};
 use crate::numeric::hampel::{Hampel, LiveHampel};
 use crate::numeric::savgol::{LiveSavGol, SavGol};
 
@@ -88,7 +88,7 @@ impl ReadingFilter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::units::Rpm;
+    use crate::core::Rpm;
     use crate::extruder::PumpMode;
     use crate::sim::hash::{mix, normal_pair};
 

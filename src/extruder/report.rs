@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::drive::CommandQuantity;
-use crate::core::units::{MPa, Mm, Mm3PerS, Rpm};
+use crate::core::{MPa, Mm, Mm3PerS, Rpm};
 
 /// What the pump of an extruder does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 //! ([`super::demand::section`]) gives the flow, the nozzle's power law the pressure, the
 //! screw's drag flow its speed. Each both ways. Ma et al. 2026, eqs. (1) to (5).
 
-use crate::core::units::{MPa, Mm3PerS, Rpm};
+use crate::core::{MPa, Mm3PerS, Rpm};
 
 /// A parameter or a quantity out of range.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -117,7 +117,7 @@ fn not_negative(what: &'static str, found: f64) -> Result<(), RheologyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::units::{Mm, MmPerS};
+    use crate::core::{Mm, MmPerS};
     use crate::extruder::demand;
     use proptest::prelude::*;
 

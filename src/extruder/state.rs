@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
 use super::limits::CommandLimit;
-use crate::core::units::Mm3PerS;
+use crate::core::Mm3PerS;
 
 /// Why the last command is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr)]

@@ -27,9 +27,7 @@ use super::state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
 use super::strategy::{CommandDemand, ExtruderStrategy};
 use super::trajectory::PlannedJob;
 use super::{CommandQuantity, RobotFollows};
-use crate::core::readback::SpeedMonitor;
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{MPa, Mm, Mm3PerS, MmPerS};
+use crate::core::{MPa, Mm, Mm3PerS, MmPerS, Span, SpeedMonitor, Stamp};
 use sequencer::{StartStopSequencer, TransitionRatios};
 
 /// Largest speed ratio of a robot that follows the flow. A larger one corrects a larger surplus

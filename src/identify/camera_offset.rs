@@ -35,9 +35,7 @@ use observation::BeadObservation;
 use offset_profile::{NearlyAsGood, OffsetProfile};
 use whiten::WidthNoise;
 
-use crate::core::robot::RobotState;
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::core::{Mm, RobotState, Stamp};
 
 /// Relative change of the speed below which no width responds measurably. A choice.
 const MIN_SPEED_CHANGE: f64 = 0.01;

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::model_file::ModelFile;
-use crate::core::quantity::Unit;
+use crate::core::Unit;
 
 /// Nozzles that differ by less are the same \[mm\]: rounding of a diameter in hundredths.
 const SAME_NOZZLE_MM: f64 = 0.005;
@@ -195,7 +195,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
     use super::*;
-    use crate::core::quantity::Quantity;
+    use crate::core::Quantity;
     use crate::identify::model_file::Conditions;
     use crate::numeric::lti::TransferFunction;
 

@@ -2,7 +2,7 @@
 
 mod write;
 
-use crate::core::quantity::{Quantity, Unit};
+use crate::core::{Quantity, Unit};
 use crate::document::{Document, Problems, Table};
 use crate::numeric::lti::TransferFunction;
 

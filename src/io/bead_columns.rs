@@ -1,12 +1,8 @@
 //! The columns that a recording holds of an extruder, a robot and a bead, for
 //! finding a model in them.
 
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::quantity::Unit;
-use crate::core::robot::RobotState;
-use crate::core::time::Stamp;
-use crate::core::units::{MPa, Mm, Mm3PerS, MmPerS, Rpm};
+use crate::control::{Event, Step};
+use crate::core::{MPa, Mm, Mm3PerS, MmPerS, RobotState, Rpm, Stamp, Unit};
 use crate::extruder::demand::section;
 use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
 use crate::identify::series::TimeSeries;

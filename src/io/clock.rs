@@ -2,7 +2,7 @@
 
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-use crate::core::time::Stamp;
+use crate::core::Stamp;
 
 /// Counts from the start of the run, and knows the wall-clock time of that
 /// moment. Copies agree with each other.

@@ -8,9 +8,7 @@ use std::path::{Path, PathBuf};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat, ImageReader};
 
-use crate::core::frame::{Channel, Frame, Pixels, SampleLayout, WrongSize};
-use crate::core::geometry::Size;
-use crate::core::time::Stamp;
+use crate::core::{Channel, Frame, Pixels, SampleLayout, Size, Stamp, WrongSize};
 
 /// Endings of the file names that are taken for images, without the dot and in
 /// lower case.

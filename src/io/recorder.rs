@@ -34,9 +34,8 @@ use std::thread::JoinHandle;
 
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::time::Stamp;
+use crate::control::{Event, Step};
+use crate::core::Stamp;
 use crate::run::ports::{RecordError, Recorder};
 use config::RecorderLimits;
 pub use config::{ExtruderFile, RecordConfig};

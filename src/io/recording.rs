@@ -22,9 +22,8 @@ use super::recorder::format::{
     CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, EVENT_TOPIC, EventMessage, FORMAT_VERSION,
     IMAGE_TOPIC, RUN_METADATA, RunInfo, STEP_TOPIC, StepMessage,
 };
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::time::Stamp;
+use crate::control::{Event, Step};
+use crate::core::Stamp;
 
 /// Bytes that are read ahead: some pages of the file, for fewer calls of the system.
 const BUFFER_BYTES: usize = 1 << 16;

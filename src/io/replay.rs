@@ -1,9 +1,8 @@
 //! Feeds recorded events to a controller and compares its steps with the
 //! recorded ones, bit for bit.
 
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::time::Stamp;
+use crate::control::{Event, Step};
+use crate::core::Stamp;
 use crate::io::recording::{RecordedEntry, RecordingError};
 
 /// The first step that came out differently.
@@ -105,8 +104,8 @@ fn same_bits(a: &Step, b: &Step) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::step::{State, Trace};
-    use crate::core::units::Mm;
+    use crate::control::{State, Trace};
+    use crate::core::Mm;
 
     /// A controller with memory: the error is the sum of what it has seen.
     fn controller() -> impl FnMut(Stamp, &Event) -> Step {

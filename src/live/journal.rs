@@ -3,11 +3,8 @@
 use std::sync::Arc;
 
 use super::latency::Latency;
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::frame::Frame;
-use crate::core::geometry::ImagePoint;
-use crate::core::time::Stamp;
+use crate::control::{Event, Step};
+use crate::core::{Frame, ImagePoint, Stamp};
 use crate::rows::frame_row::FrameRow;
 use crate::rows::summary::RunNote;
 

@@ -2,7 +2,7 @@
 //! has the frame to the moment the bytes of the first setpoint that uses it
 //! are written, less the fixed-rate sender's own scheduled wait.
 
-use crate::core::time::{Span, Stamp};
+use crate::core::{Span, Stamp};
 
 /// Frames that have been used by control and not yet by a setpoint.
 #[derive(Debug, Default)]

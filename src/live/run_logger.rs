@@ -9,9 +9,8 @@ use crossbeam_channel::{Receiver, Sender, unbounded};
 
 use super::journal::{FrameWithEdges, Journal};
 use super::latency::Latency;
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::time::Stamp;
+use crate::control::{Event, Step};
+use crate::core::Stamp;
 use crate::rows::frame_row::FrameRow;
 use crate::rows::log::RunLog;
 use crate::rows::output::LogError;

@@ -3,7 +3,7 @@
 use super::flow::{FlowTrajectory, TICK_S, simulate, whole};
 use super::profile::SpeedProfile;
 use super::task::{PathValue, PlanError, PlanTask};
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::numeric::lti::ModelError;
 use crate::numeric::number::to_f64;
 

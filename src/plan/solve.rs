@@ -13,7 +13,7 @@ use crate::numeric::number::to_f64;
 pub struct Plan {
     /// The robot's speed over path; time counts from its start.
     pub speed: SpeedProfile,
-    /// The command every [`Plan::EVERY_S`] from the start on; linear in between.
+    /// The command at knots that are `KNOT_S` apart, from the start on; linear in between.
     pub command: Vec<f64>,
     /// Positions \[mm\] and predicted relative error of the mean width over a nozzle's length about
     /// each.

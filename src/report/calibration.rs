@@ -14,7 +14,7 @@ use crate::calibration::rejection::BoardRejection;
 use crate::calibration::solve::Solution;
 use crate::calibration::warnings;
 use crate::calibration::width_map::{self, WidthMap};
-use crate::core::geometry::GridSize;
+use crate::core::GridSize;
 use drawing::{Drawing, residuals, width_map};
 
 /// Everything that the page is made of.

@@ -5,8 +5,7 @@ mod canvas;
 use image::imageops::FilterType;
 
 use super::chart::palette::{GAUGE, LEFT_EDGE, REJECTED, RIGHT_EDGE, Rgb};
-use crate::core::frame::Frame;
-use crate::core::geometry::{ImagePoint, Roi};
+use crate::core::{Frame, ImagePoint, Roi};
 use crate::numeric::number::to_f64;
 use crate::vision::{Edges, Gauge, WidthMeasurement};
 use canvas::Canvas;

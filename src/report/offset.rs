@@ -1,8 +1,7 @@
 //! A bead in a recording: the robot's reports and the measured widths.
 
-use crate::control::event::Event;
-use crate::core::robot::RobotState;
-use crate::core::time::Stamp;
+use crate::control::Event;
+use crate::core::{RobotState, Stamp};
 use crate::identify::camera_offset::TimedWidth;
 use crate::io::recording::{RecordedEntry, RecordingError};
 
@@ -41,7 +40,7 @@ pub fn recorded_bead(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::units::Mm;
+    use crate::core::Mm;
 
     #[test]
     fn widths_are_put_in_the_order_of_their_frames() {

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::image::GaugeCutout;
-use crate::core::frame::Frame;
+use crate::core::Frame;
 use crate::rows::output::{LogError, write_whole};
 use crate::vision::{Edges, Gauge, WidthMeasurement};
 
@@ -56,9 +56,7 @@ fn name(frame: u64, outcome: Result<WidthMeasurement, &'static str>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::frame::Pixels;
-    use crate::core::geometry::Size;
-    use crate::core::time::Stamp;
+    use crate::core::{Pixels, Size, Stamp};
     use crate::report::synthetic;
     use crate::vision::Reject;
 

@@ -2,7 +2,7 @@
 //! rejected ones, and an even spread over the run.
 
 use super::image::GaugeCutout;
-use crate::core::frame::Frame;
+use crate::core::Frame;
 use crate::rows::frame_row::FrameRow;
 use crate::rows::names::in_words;
 use crate::vision::{Edges, Gauge};
@@ -157,11 +157,7 @@ fn draw(kept: &KeptCutout) -> Option<ChosenFrame> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::frame::Pixels;
-    use crate::core::geometry::{Roi, Size};
-    use crate::core::time::Stamp;
-    use crate::core::units::Mm;
-    use crate::core::units::WidthRange;
+    use crate::core::{Mm, Pixels, Roi, Size, Stamp, WidthRange};
     use crate::rows::frame_row::sample;
     use crate::vision::{BeadAxis, Polarity};
 

@@ -7,7 +7,7 @@ mod verdict;
 pub use page::page;
 pub use table::to_csv;
 
-use crate::core::quantity::Unit;
+use crate::core::Unit;
 use crate::plan::{Plan, SpeedProfile, WidthPrediction};
 
 /// A bead of a job, planned.

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use pdf_writer::{Content, Name, Pdf, Rect, Ref, Str};
 
 use crate::calibration::board::Board;
-use crate::core::geometry::GridSize;
+use crate::core::GridSize;
 
 /// Points of a PDF in a millimetre. By definition a point is 1/72 inch (ISO 32000-1, 8.3.2.3).
 const POINTS: f64 = 72.0 / 25.4;
@@ -244,7 +244,7 @@ mod tests {
     use super::*;
     use crate::calibration::board::Markers;
     use crate::calibration::dictionary::Dictionary;
-    use crate::core::units::Mm;
+    use crate::core::Mm;
 
     fn board(square: f64) -> Board {
         Board::new(9, 6, Mm::new(square).unwrap()).unwrap()

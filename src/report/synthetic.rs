@@ -10,13 +10,11 @@
 
 use std::path::Path;
 
-use crate::control::event::Event;
-use crate::control::step::{Command, Fault, Hold, State, Step, Trace};
-use crate::core::frame::{Frame, Pixels};
-use crate::core::geometry::{ImagePoint, Roi, Size};
-use crate::core::robot::{RobotMode, RobotState};
-use crate::core::time::Stamp;
-use crate::core::units::{Mm, MmPerS, MmPerS2, WidthRange};
+use crate::control::{Command, Event, Fault, Hold, State, Step, Trace};
+use crate::core::{
+    Frame, ImagePoint, Mm, MmPerS, MmPerS2, Pixels, RobotMode, RobotState, Roi, Size, Stamp,
+    WidthRange,
+};
 use crate::report::run::RunPage;
 use crate::rows::frame_row::{ControlColumns, FrameRow, sample};
 use crate::rows::log::{ControlFacts, LogOptions};

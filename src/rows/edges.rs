@@ -60,7 +60,7 @@ fn position_fields(point: Option<CaliperPoint>) -> [String; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::geometry::ImagePoint;
+    use crate::core::ImagePoint;
 
     #[test]
     fn a_row_has_the_edges_of_its_line() {

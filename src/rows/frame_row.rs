@@ -1,7 +1,7 @@
 //! The result of one frame.
 
-use crate::control::step::Step;
-use crate::core::units::{Mm, MmPerS};
+use crate::control::Step;
+use crate::core::{Mm, MmPerS};
 use crate::vision::{Roughness, WidthMeasurement};
 use crate::width_control::limiter::SpeedLimit;
 
@@ -70,8 +70,7 @@ impl ControlColumns {
 /// Measurements for the tests of this folder.
 #[cfg(test)]
 pub mod sample {
-    use crate::core::geometry::ImagePoint;
-    use crate::core::units::Mm;
+    use crate::core::{ImagePoint, Mm};
     use crate::vision::{Hints, Roughness, WidthMeasurement};
 
     /// A roughness that is determined.

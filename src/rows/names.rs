@@ -1,6 +1,6 @@
 //! Names of reasons as they stand in files, and as people read them.
 
-use crate::control::step::Fault;
+use crate::control::Fault;
 use crate::extruder::ExtruderFault;
 
 /// Name of a limit, or of a reason without its own reason.
@@ -41,7 +41,7 @@ pub fn in_words(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::step::Hold;
+    use crate::control::Hold;
     use crate::extruder::{CommandLimit, ExtruderHold};
     use crate::width_control::limiter::SpeedLimit;
 

@@ -28,10 +28,8 @@ pub use profile::ProfileSummary;
 
 use super::frame_row::FrameRow;
 use super::output::{LogError, write_whole};
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm, Mm3PerS};
+use crate::control::{Event, Step};
+use crate::core::{Mm, Mm3PerS, Span, Stamp};
 use crate::numeric::number::to_f64;
 use crate::numeric::statistics::{Distribution, Moments, WeightedMean};
 use crate::vision::Roughness;

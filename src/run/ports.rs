@@ -1,12 +1,8 @@
 //! What the controller is plugged into. Every trait has at least a live and a
 //! simulated side.
 
-use crate::control::event::Event;
-use crate::control::step::{Command, Step};
-use crate::core::frame::Frame;
-use crate::core::refusal::RefusalReason;
-use crate::core::robot::{RobotLimits, RobotMode, RobotState};
-use crate::core::time::Stamp;
+use crate::control::{Command, Event, Step};
+use crate::core::{Frame, RefusalReason, RobotLimits, RobotMode, RobotState, Stamp};
 use crate::extruder::{ExtruderCommand, ExtruderLimits, ExtruderReport};
 
 /// Gives frames, one after the other.

@@ -2,10 +2,8 @@
 //! here, whether the cell is live or simulated.
 
 use super::ports::{ExtruderPort, NoExtruder, RecordError, Recorder, RobotPort, SendError, Sent};
-use crate::control::Controller;
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::time::Stamp;
+use crate::control::{Controller, Event, Step};
+use crate::core::Stamp;
 
 /// A controller with its robot, its recorder and its extruder.
 #[derive(Debug)]
@@ -96,7 +94,7 @@ impl Recorder for NoRecorder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::step::{Command, Hold, State};
+    use crate::control::{Command, Hold, State};
 
     struct NoRobot;
 

@@ -11,8 +11,7 @@ use super::image::{
     BeadSide, Bend, EdgeShading, Grains, ImageModel, MotionBlur, Neighbour, Shadow, Spots,
     TexturePattern,
 };
-use crate::core::time::Span;
-use crate::core::units::Mm;
+use crate::core::{Mm, Span};
 use crate::document::Table;
 
 /// How a simulated cell obtains widths.

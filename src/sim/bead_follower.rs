@@ -2,9 +2,7 @@
 
 use super::hash;
 use super::laid::{LaidBead, PathSpeed};
-use crate::core::robot::{RobotMode, RobotState};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::Mm;
+use crate::core::{Mm, RobotMode, RobotState, Span, Stamp};
 use crate::scenario::bead::{BeadModel, EdgeRoughness};
 use crate::scenario::disturbance::Flow;
 
@@ -128,7 +126,7 @@ fn bead_of(recipe: &BeadRecipe, number: u64) -> LaidBead {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::units::MmPerS;
+    use crate::core::MmPerS;
 
     fn follower() -> BeadFollower {
         BeadFollower::new(BeadRecipe {

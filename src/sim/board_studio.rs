@@ -5,9 +5,7 @@ use nalgebra::{Matrix3, Point2, Vector2};
 use super::hash;
 use crate::calibration::Camera;
 use crate::calibration::board::Board;
-use crate::core::frame::{Frame, Pixels, WrongSize};
-use crate::core::geometry::{GridSize, Pose, Size};
-use crate::core::time::Stamp;
+use crate::core::{Frame, GridSize, Pixels, Pose, Size, Stamp, WrongSize};
 use crate::numeric::normal_distribution;
 use crate::numeric::number::{to_count, to_f64};
 
@@ -254,7 +252,7 @@ fn blurred_stripes(Blurred { at, blur }: Blurred) -> f64 {
 mod tests {
     use super::*;
     use crate::calibration::board_observation;
-    use crate::core::units::Mm;
+    use crate::core::Mm;
     use nalgebra::Vector3;
 
     const CAMERA: Camera = Camera {

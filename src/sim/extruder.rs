@@ -2,8 +2,7 @@
 //! plant from command to flow.
 
 use crate::cell::extruder::{ExtruderPlant, PlantKind};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::Mm3PerS;
+use crate::core::{Mm3PerS, Span, Stamp};
 use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
 use crate::numeric::lti::ModelError;
 use crate::run::ports::{ExtruderPort, SendError, Sent};

@@ -4,8 +4,7 @@ use super::laid::LaidBead;
 use super::render::{RenderError, Rendered, Renderer};
 use crate::calibration::Calibration;
 use crate::cell::Cell;
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::core::{Mm, Stamp};
 
 /// Frames per second where a cell gives no rate: that of Shojaei Barjuei et al. 2022.
 const DEFAULT_RATE_HZ: f64 = 10.0;

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use super::hash::{mix, normal_pair};
-use crate::core::units::{MPa, Rpm};
+use crate::core::{MPa, Rpm};
 use crate::extruder::pressure::{Fopdt, InitialState};
 use crate::numeric::number::to_count;
 

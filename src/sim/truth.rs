@@ -2,7 +2,7 @@
 
 use super::outline::{BeadOutline, OutlineSample};
 use super::view::{AxisPoint, BeadView, gauge_middle};
-use crate::core::geometry::ImagePoint;
+use crate::core::ImagePoint;
 use crate::numeric::number::to_f64;
 use crate::vision::{BeadAxis, Gauge};
 

@@ -9,7 +9,7 @@ use nalgebra::Vector2;
 
 use super::bead_path::BeadPath;
 use crate::calibration::SurfaceMap;
-use crate::core::geometry::{ImagePoint, Roi, SurfacePoint};
+use crate::core::{ImagePoint, Roi, SurfacePoint};
 use crate::numeric::number::to_f64;
 use crate::vision::{BeadAxis, Gauge};
 
@@ -126,8 +126,7 @@ pub struct AxisPoint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::units::Mm;
-    use crate::core::units::WidthRange;
+    use crate::core::{Mm, WidthRange};
     use crate::vision::Polarity;
 
     fn gauge(axis: BeadAxis) -> Gauge {

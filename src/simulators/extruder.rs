@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::machine::Notice;
 use super::server::Server;
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::extruder::{ExtruderCommand, ExtruderLimits, PumpMode};
 use crate::io::clock::RunClock;
 use crate::link::extruder::{ExtruderEndpoint, ExtruderFaults};

@@ -1,6 +1,6 @@
 //! The machine behind a server: it takes lines and sends its `STATE`.
 
-use crate::core::time::Stamp;
+use crate::core::Stamp;
 use crate::link::LineError;
 use crate::link::frame::{DeviceLine, LineBody, LineRefusal};
 

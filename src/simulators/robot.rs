@@ -6,9 +6,7 @@ use std::sync::Arc;
 
 use super::machine::Notice;
 use super::server::Server;
-use crate::core::robot::RobotMode;
-use crate::core::time::Span;
-use crate::core::units::Mm;
+use crate::core::{Mm, RobotMode, Span};
 use crate::io::clock::RunClock;
 use crate::link::{ParamError, PrintJob, RobotFaults, RobotParams, RobotStatus, VirtualRobot};
 

@@ -11,7 +11,7 @@ use std::time::Duration;
 use crossbeam_channel::{Sender, after, bounded};
 
 use super::machine::{LinkMachine, Notice};
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::io::clock::RunClock;
 
 mod host;

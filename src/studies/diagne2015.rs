@@ -8,7 +8,7 @@ pub mod robustness;
 pub mod run;
 pub mod table;
 
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::extruder::screw::feedback::PlugSetpoint;
 use crate::extruder::screw::{
     FillFeedback, PiecewiseExponential, SaturatedLinear, Screw, ScrewDesign, ScrewError,

@@ -9,7 +9,7 @@ mod cases;
 pub mod strand;
 pub mod table;
 
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::extruder::adaptive::{
     Action, Adaptation, Adaptive, AdaptiveGains, EstimateBounds, ScalarPlant, StrandInputs,
     StrandModel, StrandReading, StrandTargets, SubSystemError,

@@ -7,7 +7,7 @@ use super::layer::LayerTrial;
 use super::score::BeadPoint;
 use crate::calibration::Calibration;
 use crate::cell::file::{Cell, RunPart};
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::numeric::average::mean;
 use crate::numeric::number::{to_count, to_f64};
 use crate::numeric::rank::mean_median;

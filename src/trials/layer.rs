@@ -2,11 +2,8 @@
 
 use crate::calibration::Calibration;
 use crate::cell::file::{Cell, RunPart};
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::robot::RobotState;
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::control::{Event, Step};
+use crate::core::{Mm, RobotState, Stamp};
 use crate::run::runner::NoRecorder;
 
 use super::score::{BeadPoint, LayerScore};

@@ -1,9 +1,7 @@
 //! Figures of a simulated layer.
 
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::robot::RobotMode;
-use crate::core::time::Stamp;
+use crate::control::{Event, Step};
+use crate::core::{RobotMode, Stamp};
 use crate::numeric::average::{mean, rms};
 use crate::sim::cell::{FrameObservation, Observer};
 

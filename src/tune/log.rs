@@ -1,10 +1,7 @@
 //! Data of a run: reports, widths, setpoints, and the progress of the speed steps.
 
-use crate::control::event::Event;
-use crate::control::step::{Command, Step};
-use crate::core::robot::RobotState;
-use crate::core::time::Stamp;
-use crate::core::units::MmPerS;
+use crate::control::{Command, Event, Step};
+use crate::core::{MmPerS, RobotState, Stamp};
 use crate::identify::camera_offset::TimedWidth;
 use crate::width_control::steps::{StepSettings, StepsProgress, StepsTrace};
 

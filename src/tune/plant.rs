@@ -6,8 +6,7 @@ use super::noise::{Drift, PlantNoise, width_noise};
 use super::robot::{RobotResponse, RobotResponseError, fit_response};
 use super::timing::{CellTiming, timing};
 use super::{Estimated, Log, TuneError};
-use crate::core::readback::ROBOT_LAG;
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS, ROBOT_LAG};
 use crate::identify::camera_offset::{OffsetSearch, OffsetStudy, study};
 
 /// Relative standard deviation above which an exponent is useless. A choice.

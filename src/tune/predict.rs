@@ -10,10 +10,8 @@ use super::plant::IdentifiedCell;
 use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::cell::file::{ImageSource, RunPart};
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm, MmPerS2};
+use crate::control::{Event, Step};
+use crate::core::{Mm, MmPerS2, Span, Stamp};
 use crate::numeric::rank;
 use crate::run::runner::NoRecorder;
 use crate::scenario::bead::{BeadModel, EdgeRoughness};
@@ -206,7 +204,7 @@ impl Observer for LaidRun {
             self.speed.push((state.path_mm.get(), state.speed_mm_per_s.get()));
         }
         self.stopped |= step.state.name() == "fault";
-        let Some(crate::control::step::Command::Speed(speed)) = step.command else { return };
+        let Some(crate::control::Command::Speed(speed)) = step.command else { return };
         if step.state.name() != "tracking" {
             return;
         }

@@ -4,9 +4,7 @@
 use serde::Serialize;
 
 use super::{Estimated, Log};
-use crate::core::robot::{RobotMode, RobotState};
-use crate::core::time::Stamp;
-use crate::core::units::MmPerS;
+use crate::core::{MmPerS, RobotMode, RobotState, Stamp};
 use crate::identify::camera_offset::laid_speeds::MAX_GAP;
 use crate::link::robot::motion::{PathMotion, SpeedLoop};
 use crate::numeric::number::to_f64;

@@ -12,11 +12,8 @@ use super::{IdentifiedCell, Log, TuneError, TuneFacts, robot};
 use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::cell::file::Purpose;
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::robot::{RobotMode, RobotState};
-use crate::core::time::Stamp;
-use crate::core::units::{Mm, MmPerS};
+use crate::control::{Event, Step};
+use crate::core::{Mm, MmPerS, RobotMode, RobotState, Stamp};
 use crate::identify::camera_offset::CameraOffsetError;
 use crate::numeric::lti::margins;
 use crate::run::runner::NoRecorder;
@@ -139,7 +136,7 @@ fn a_drifting_flow_is_distinguished_from_noise_and_widens_the_uncertainty() {
 fn every_setpoint_is_one_of_the_three_speeds_and_within_the_limits() {
     let mut cell = cell(0.3);
     let run = cell.run.as_mut().unwrap();
-    run.limits.max_accel = crate::core::units::MmPerS2::constant(200.0);
+    run.limits.max_accel = crate::core::MmPerS2::constant(200.0);
     let Watch { log, .. } = laid(&cell, 5);
     let (slow, fast) = (112.5 * 0.7 - 1e-9, 112.5 * 1.3 + 1e-9);
     for pair in log.setpoints.windows(2) {

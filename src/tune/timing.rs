@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::Log;
-use crate::core::time::Stamp;
+use crate::core::Stamp;
 use crate::numeric::rank;
 
 /// Rates and latencies of a cell \[s\]: medians, with the 99th percentile where a late event

@@ -6,7 +6,7 @@ mod sections;
 mod spread;
 mod width_input;
 
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 use super::corner;
 use super::curve::{EdgeCurve, NOTABLE_SCATTER_PX};

@@ -416,9 +416,7 @@ fn solve(rows: &[ClippedRow], limit: f64) -> Option<ClippedLine> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::frame::{Frame, Pixels};
-    use crate::core::geometry::{Roi, Size};
-    use crate::core::time::Stamp;
+    use crate::core::{Frame, Pixels, Roi, Size, Stamp};
     use crate::vision::edge_windows::Grouping;
     use crate::vision::gauge::{BeadAxis, GaugeView};
     use crate::vision::path::EdgeCorrection;

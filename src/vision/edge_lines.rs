@@ -8,9 +8,7 @@
 
 use crate::bridge::{EdgeSegment, EdgeSettings, canny_hough};
 use crate::calibration::SurfaceMap;
-use crate::core::frame::Frame;
-use crate::core::geometry::ImagePoint;
-use crate::core::units::{Mm, WidthRange};
+use crate::core::{Frame, ImagePoint, Mm, WidthRange};
 use crate::numeric::number::{to_count, to_f64};
 
 use super::gauge::{Gauge, GaugeView, Polarity};
@@ -178,9 +176,7 @@ fn polarity_fits(gauge: &Gauge, frame: &Frame, grey: &[u8], [left, right]: [Edge
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::frame::Pixels;
-    use crate::core::geometry::{Roi, Size};
-    use crate::core::time::Stamp;
+    use crate::core::{Pixels, Roi, Size, Stamp};
     use crate::vision::MeasureMethod;
     use crate::vision::gauge::BeadAxis;
 

@@ -1,8 +1,7 @@
 //! Where in the image the bead is measured, and what it looks like there.
 
 use crate::calibration::SurfaceMap;
-use crate::core::geometry::{ImagePoint, Roi};
-use crate::core::units::{Mm, WidthRange};
+use crate::core::{ImagePoint, Mm, Roi, WidthRange};
 use crate::numeric::number::to_f64;
 
 /// How the bead runs in the image, to within 20 degrees.

@@ -15,8 +15,7 @@ mod uniformity;
 mod work;
 
 use crate::calibration::SurfaceMap;
-use crate::core::frame::Frame;
-use crate::core::geometry::ImagePoint;
+use crate::core::{Frame, ImagePoint};
 use checks::{MAX_BLUR_PX, MAX_MOTION_BLUR_PX};
 use pattern_limits::MAX_PATTERN_BESIDE_COMPLETE;
 use rough_edges::may_be_rough;

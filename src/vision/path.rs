@@ -287,14 +287,14 @@ mod tests {
 
     #[test]
     fn the_course_runs_straight_between_bands_and_on_beyond_them() {
-        let frame = crate::core::frame::Frame::new(
+        let frame = crate::core::Frame::new(
             0,
-            crate::core::time::Stamp::START,
-            crate::core::geometry::Size::new(20, 43),
-            crate::core::frame::Pixels::Grey8(vec![0; 860]),
+            crate::core::Stamp::START,
+            crate::core::Size::new(20, 43),
+            crate::core::Pixels::Grey8(vec![0; 860]),
         );
         let frame = frame.unwrap();
-        let roi = crate::core::geometry::Roi { x: 0, y: 0, width: 20, height: 43 };
+        let roi = crate::core::Roi { x: 0, y: 0, width: 20, height: 43 };
         let view =
             crate::vision::gauge::GaugeView::new(roi, crate::vision::gauge::BeadAxis::Vertical);
         let mut layout = crate::vision::strip::RowLayout::default();

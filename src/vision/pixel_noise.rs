@@ -113,9 +113,7 @@ fn count_below(differences: &[u16; SAMPLED_ROWS * SAMPLED_COLUMNS], limit: u16) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::frame::{Frame, Pixels};
-    use crate::core::geometry::{Roi, Size};
-    use crate::core::time::Stamp;
+    use crate::core::{Frame, Pixels, Roi, Size, Stamp};
     use crate::vision::gauge::{BeadAxis, GaugeView};
     use crate::vision::strip::{GaugeRowsOfDepth, RowLayout};
     use rand::SeedableRng;

@@ -130,9 +130,7 @@ fn count_full<T: GreyPixel>(row: &[T], white: T) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::frame::{Frame, Pixels};
-    use crate::core::geometry::{Roi, Size};
-    use crate::core::time::Stamp;
+    use crate::core::{Frame, Pixels, Roi, Size, Stamp};
     use crate::vision::gauge::{BeadAxis, GaugeView};
     use crate::vision::strip::{GaugeRowsOfDepth, RowLayout};
 

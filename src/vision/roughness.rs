@@ -22,7 +22,7 @@ pub use local::{CaliperFilter, LocalWidths};
 use super::measure::Measurer;
 use super::width::WidthMeasurement;
 use crate::calibration::SurfaceMap;
-use crate::core::units::Mm;
+use crate::core::Mm;
 use overlap::Overlap;
 use spectrum::{BLUR_FACTORS, FrameKind, Spectrum, lengths_mm};
 

@@ -4,7 +4,7 @@
 //! gauge's first pixel. A vertical bead has `u` along x; for a horizontal one
 //! `u` runs along y, so that its upper edge is the left one.
 
-use crate::core::frame::{Frame, Pixels};
+use crate::core::{Frame, Pixels};
 
 use super::gamma::LightTable;
 use super::gauge::{BeadAxis, GaugeView};
@@ -269,8 +269,7 @@ fn transposed<T: GreyPixel>(mut tile: [[T; TILE]; TILE]) -> [[T; TILE]; TILE] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::geometry::{Roi, Size};
-    use crate::core::time::Stamp;
+    use crate::core::{Roi, Size, Stamp};
 
     fn ramp() -> Frame {
         let values = (0..20u8).flat_map(|y| (0..30u8).map(move |x| x * 4 + y)).collect();

@@ -2,8 +2,7 @@
 
 use super::reject::Reject;
 use crate::calibration::SurfaceMap;
-use crate::core::geometry::ImagePoint;
-use crate::core::units::Mm;
+use crate::core::{ImagePoint, Mm};
 
 /// A width that can be trusted, and how far.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,8 +9,7 @@ use std::fmt::Debug;
 use super::distance::{DistanceTrace, FallbackReason, WidthReading};
 use super::pi::Saturation;
 use super::steps::StepsTrace;
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS, Span, Stamp};
 
 /// Sets the robot's speed so that the bead has its width.
 pub trait WidthController: Debug + Send {

@@ -29,8 +29,7 @@ mod tests;
 
 use serde::{Deserialize, Serialize};
 
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS, Span, Stamp};
 
 use autocorrelation::NoiseAutocorrelation;
 use flow_change::ChangeDetector;

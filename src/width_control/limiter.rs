@@ -3,8 +3,7 @@
 use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
-use crate::core::time::Span;
-use crate::core::units::{MmPerS, MmPerS2};
+use crate::core::{MmPerS, MmPerS2, Span};
 
 /// Which limit acted on a setpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, IntoStaticStr)]

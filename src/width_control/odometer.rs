@@ -1,8 +1,6 @@
 //! The nozzle's path where a robot reports none: its speed, integrated.
 
-use crate::core::robot::RobotState;
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::core::{Mm, RobotState, Stamp};
 
 /// Integrated speed over which a constant path is accepted. A smaller value takes a robot
 /// that reports its path late for one that reports none.
@@ -59,8 +57,7 @@ impl Odometer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::robot::RobotMode;
-    use crate::core::units::MmPerS;
+    use crate::core::{MmPerS, RobotMode};
 
     fn report(path: f64, mode: RobotMode) -> RobotState {
         RobotState {

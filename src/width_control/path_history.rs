@@ -3,9 +3,7 @@
 
 use std::collections::VecDeque;
 
-use crate::core::robot::RobotState;
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS, RobotState, Span, Stamp};
 
 /// Reports that are kept: 3.2 s at 50 Hz, more than a frame takes from capture to width.
 const MAX_REPORTS: usize = 160;
@@ -64,7 +62,7 @@ impl PathHistory {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::robot::RobotMode;
+    use crate::core::RobotMode;
 
     fn report(path: f64, speed: f64) -> RobotState {
         RobotState {

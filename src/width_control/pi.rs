@@ -2,8 +2,7 @@
 //! Shojaei Barjuei et al. 2022, eq. (4), with the sign that regulates:
 //! error = measured − target, so that a bead that is too wide speeds the robot up.
 
-use crate::core::time::Span;
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS, Span};
 
 /// Gains on an error in millimetres.
 #[derive(Debug, Clone, Copy, PartialEq)]

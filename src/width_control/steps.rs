@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::core::units::{Mm, MmPerS, WidthRange};
+use crate::core::{Mm, MmPerS, WidthRange};
 
 /// The pieces: length over the camera's reach, and change of the speed in steps. Drawn at
 /// random once, with lengths of 0.7 to 2 and no two equal neighbours; of the draws the one

@@ -1,6 +1,6 @@
 //! The target width, along the path and by layer.
 
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// The target width: constant, one for each layer, or a profile along the path of every
 /// bead.

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crossbeam_channel::{Receiver, unbounded};
 use truebead::cell::extruder::LinearPlant;
-use truebead::core::time::Span;
+use truebead::core::Span;
 use truebead::drivers::extruder::DriveRange;
 use truebead::drivers::extruder::line::{ExtruderClient, ExtruderConfig, ExtruderLineEvent};
 use truebead::drivers::line::LinkTiming;

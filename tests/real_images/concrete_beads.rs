@@ -7,10 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use truebead::calibration::SurfaceMap;
-use truebead::core::frame::Frame;
-use truebead::core::geometry::Roi;
-use truebead::core::units::Mm;
-use truebead::core::units::WidthRange;
+use truebead::core::{Frame, Mm, Roi, WidthRange};
 use truebead::vision::{BeadAxis, Gauge, Measurer, Polarity};
 
 use super::concrete_labels::{COLUMNS, Sequence};

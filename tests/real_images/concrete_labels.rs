@@ -4,8 +4,7 @@
 use std::ops::{Range, RangeInclusive};
 use std::path::Path;
 
-use truebead::core::frame::Frame;
-use truebead::core::geometry::Roi;
+use truebead::core::{Frame, Roi};
 
 use super::image;
 

@@ -3,9 +3,7 @@
 //! the layer in it as they were read by hand at the gauge's middle column, to some
 //! 5 px. With three polarities and two ranges that is 90 settings.
 
-use truebead::core::geometry::Roi;
-use truebead::core::units::Mm;
-use truebead::core::units::WidthRange;
+use truebead::core::{Mm, Roi, WidthRange};
 use truebead::vision::{BeadAxis, Gauge, Polarity};
 
 use super::{data, image, measure};

@@ -14,8 +14,7 @@ mod whole_image;
 use std::path::{Path, PathBuf};
 
 use truebead::calibration::SurfaceMap;
-use truebead::core::frame::{Channel, Frame};
-use truebead::core::time::Stamp;
+use truebead::core::{Channel, Frame, Stamp};
 use truebead::drivers::camera::video::VideoFile;
 use truebead::io::image_file;
 use truebead::run::ports::{FrameSource, Grab};

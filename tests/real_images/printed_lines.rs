@@ -5,9 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use truebead::core::geometry::Roi;
-use truebead::core::units::Mm;
-use truebead::core::units::WidthRange;
+use truebead::core::{Mm, Roi, WidthRange};
 use truebead::vision::{BeadAxis, Gauge, Polarity, WidthMeasurement};
 
 use super::statistics::{median, sizes};

@@ -2,11 +2,9 @@
 //! width is `ok` with a standard deviation beyond the gauge's limit.
 
 use std::path::{Path, PathBuf};
-use truebead::core::geometry::{Roi, Size};
+use truebead::core::{Roi, Size};
 
-use truebead::core::frame::Frame;
-use truebead::core::units::Mm;
-use truebead::core::units::WidthRange;
+use truebead::core::{Frame, Mm, WidthRange};
 use truebead::io::image_file::has_image_extension;
 use truebead::vision::{BeadAxis, Gauge, Polarity};
 

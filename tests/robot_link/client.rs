@@ -2,9 +2,8 @@
 
 use std::time::Duration;
 
-use truebead::control::step::Command;
-use truebead::core::robot::RobotMode;
-use truebead::core::time::Stamp;
+use truebead::control::Command;
+use truebead::core::{RobotMode, Stamp};
 use truebead::drivers::StartError;
 use truebead::drivers::line::LinkTiming;
 use truebead::drivers::robot::line::{LinkClient, LinkConfig, RobotLineEvent};
@@ -83,7 +82,7 @@ fn a_stop_leaves_in_any_mode() {
     assert_eq!(refused, SendError::NotPrinting { mode: RobotMode::Idle });
     assert_eq!(pc.link.send(Command::Stop).unwrap().seq, 1);
     pc.until_state(|state| state.seq == 1);
-    assert!(sim.begin_bead(truebead::core::units::Mm::ZERO));
+    assert!(sim.begin_bead(truebead::core::Mm::ZERO));
     pc.until_mode(RobotMode::Print);
     assert_eq!(pc.link.send(Command::Stop).unwrap().seq, 2);
     pc.until_mode(RobotMode::Stop);

@@ -1,7 +1,6 @@
 //! What the simulated robot does, spoken to by hand.
 
-use truebead::core::robot::RobotMode;
-use truebead::core::units::Mm;
+use truebead::core::{Mm, RobotMode};
 
 use crate::support::{Talk, listener, sim, sim_on};
 

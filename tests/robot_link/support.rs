@@ -5,9 +5,7 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, unbounded};
-use truebead::core::robot::RobotMode;
-use truebead::core::time::Span;
-use truebead::core::units::{Mm, MmPerS};
+use truebead::core::{Mm, MmPerS, RobotMode, Span};
 use truebead::drivers::line::LinkTiming;
 use truebead::drivers::robot::line::{LinkClient, LinkConfig, RobotLineEvent};
 use truebead::io::clock::RunClock;

@@ -4,8 +4,7 @@
 use crate::assembly::error::AssemblyError;
 use crate::cell::extruder::{FeedforwardKeys, ModelSource};
 use crate::cell::file::ExtruderPart;
-use crate::core::quantity::Unit;
-use crate::core::units::Rpm;
+use crate::core::{Rpm, Unit};
 use crate::extruder::feedforward::ScrewSpeed;
 use crate::extruder::rheology::DragFlow;
 use crate::extruder::strategy::OperatingPoint;

@@ -2,9 +2,7 @@
 
 use crate::assembly::error::AssemblyError;
 use crate::cell::file::{ExtruderPart, RunPart};
-use crate::core::readback::ROBOT_LAG;
-use crate::core::time::Span;
-use crate::core::units::Mm;
+use crate::core::{Mm, ROBOT_LAG, Span};
 use crate::extruder::start_stop::{BeadConditions, StartStopTiming};
 use crate::extruder::trajectory::PlannedJob;
 use crate::identify::start_stop::file;

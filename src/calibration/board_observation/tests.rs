@@ -4,10 +4,7 @@ use crate::calibration::board_observation::*;
 use crate::calibration::dictionary::Dictionary;
 use crate::calibration::focus::FocusFault;
 use crate::calibration::synthetic::{self, poses};
-use crate::core::frame::Pixels;
-use crate::core::geometry::{GridSize, Pose, Size};
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::core::{GridSize, Mm, Pixels, Pose, Size, Stamp};
 use crate::sim::board_studio::{BoardStudio, Exposure};
 use nalgebra::{Vector2, Vector3};
 

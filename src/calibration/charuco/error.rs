@@ -1,7 +1,7 @@
 //! Why no board with markers is found.
 
 use crate::calibration::dictionary::Dictionary;
-use crate::core::geometry::GridSize;
+use crate::core::GridSize;
 
 /// Why no board with markers is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

@@ -3,7 +3,7 @@
 use nalgebra::Point2;
 
 use crate::calibration::board::Board;
-use crate::core::geometry::GridSize;
+use crate::core::GridSize;
 use crate::numeric::number::to_f64;
 
 /// Positions of the markers on a board.

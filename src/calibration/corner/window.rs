@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 
-use crate::core::geometry::ImagePoint;
+use crate::core::ImagePoint;
 
 /// Radius of the window over the distance to the nearest other line of the board: less than
 /// one, for the blur of that line. A choice between noise and bias.

@@ -5,7 +5,7 @@ use nalgebra::{DVector, Point2, Point3, Rotation3, SMatrix, SVector, Vector3};
 use crate::calibration::Camera;
 use crate::calibration::camera::NUMBERS;
 use crate::calibration::lens::Lens;
-use crate::core::geometry::{ImagePoint, Pose};
+use crate::core::{ImagePoint, Pose};
 
 /// Parameters that all images share: those of the camera and two of the bend.
 pub const SHARED: usize = NUMBERS + 2;

@@ -5,9 +5,7 @@ use crate::calibration::board::Markers;
 use crate::calibration::board_observation::{self, BoardObservation};
 use crate::calibration::dictionary::Dictionary;
 use crate::calibration::{CalibrationQuality, Camera};
-use crate::core::frame::{Frame, Pixels};
-use crate::core::geometry::{Pose, Size};
-use crate::core::time::Stamp;
+use crate::core::{Frame, Pixels, Pose, Size, Stamp};
 use crate::sim::board_studio::{BoardStudio, Exposure};
 use crate::sim::hash;
 

@@ -4,7 +4,7 @@ use crate::calibration::Camera;
 use crate::calibration::board::{Board, CornerObservation};
 use crate::calibration::equations::{CameraModel, Correspondence, FreeParameters, SHARED};
 use crate::calibration::lens_selection::LensTrial;
-use crate::core::geometry::{ImagePoint, Pose};
+use crate::core::{ImagePoint, Pose};
 
 /// One image in the solution.
 #[derive(Debug, Clone, PartialEq)]

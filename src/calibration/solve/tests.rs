@@ -5,7 +5,7 @@ use crate::calibration::camera::NUMBERS;
 use crate::calibration::plane::bed_from_board;
 use crate::calibration::synthetic::{self, SIZE, TRUTH, board, poses};
 use crate::calibration::uncertainty::ROWS;
-use crate::core::units::Mm;
+use crate::core::Mm;
 use nalgebra::Point3;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};

@@ -3,8 +3,7 @@
 
 use super::command::ANY_COMMAND;
 use super::context::ReadContext;
-use crate::core::time::Span;
-use crate::core::units::Mm2;
+use crate::core::{Mm2, Span};
 use crate::document::Table;
 use crate::extruder::adaptive::{
     Adaptation, AdaptiveGains, EstimateBounds, MracController, ScalarPlant,

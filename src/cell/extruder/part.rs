@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::{ExtruderPlant, ExtruderSettings, PlantKind, Strategy};
 use crate::cell::drivers::DriverTables;
-use crate::core::units::{Mm, Mm3PerS, MmPerS};
+use crate::core::{Mm, Mm3PerS, MmPerS};
 use crate::document::Table;
 use crate::extruder::strategy::RequiredReading;
 use crate::extruder::{CommandQuantity, FlowDemand};

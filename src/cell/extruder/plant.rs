@@ -3,8 +3,7 @@
 
 use super::pressure::{read_nozzle, read_process};
 use super::screw::read_screw;
-use crate::core::time::Span;
-use crate::core::units::Rpm;
+use crate::core::{Rpm, Span};
 use crate::document::Table;
 use crate::extruder::pressure::Fopdt;
 use crate::extruder::rheology::PowerLaw;

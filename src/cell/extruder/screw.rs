@@ -2,8 +2,7 @@
 //! its predictor; and the same screw in a simulated cell.
 
 use super::context::ReadContext;
-use crate::core::time::Span;
-use crate::core::units::{Mm, Rpm};
+use crate::core::{Mm, Rpm, Span};
 use crate::document::Table;
 use crate::extruder::screw::control::{Scheme, ScrewSettings};
 use crate::extruder::screw::feasible::Feasibility;

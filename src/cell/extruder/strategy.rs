@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::adaptive::AdaptiveSettings;
+use super::adaptive::{self, AdaptiveSettings};
 use super::command::{ANY_COMMAND, command_keys};
 use super::context::ReadContext;
-use super::{adaptive, pressure, screw};
-use crate::core::quantity::Unit;
-use crate::core::time::Span;
+use super::{pressure, screw};
+use crate::core::{Span, Unit};
 use crate::document::Table;
 use crate::extruder::CommandQuantity;
 use crate::extruder::feedforward::{RightHalfPlaneZeros, ScrewSpeed};

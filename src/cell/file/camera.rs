@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::core::time::Span;
-use crate::core::units::Mm;
+use crate::core::{Mm, Span};
 use crate::document::Table;
 
 /// Where frames come from.

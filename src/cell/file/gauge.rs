@@ -1,8 +1,6 @@
 //! `[gauge]`: where and how the bead is measured.
 
-use crate::core::frame::Channel;
-use crate::core::geometry::Roi;
-use crate::core::units::{Mm, WidthRange};
+use crate::core::{Channel, Mm, Roi, WidthRange};
 use crate::document::Table;
 use crate::vision::gauge::{self, BeadAxis, EdgeKind, Gauge, MeasureMethod, Polarity};
 

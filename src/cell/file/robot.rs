@@ -1,6 +1,6 @@
 //! `[robot]`: how often the robot gets setpoints, and how a bead begins.
 
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS};
 use crate::document::Table;
 use crate::width_control::limiter::SpeedLimits;
 

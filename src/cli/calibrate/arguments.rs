@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::cli::arguments::parse_length;
 use crate::cli::board_arguments::BoardArgs;
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// Finds camera, lens and bed plane from images of a board.
 #[derive(Debug, Args)]

@@ -13,8 +13,7 @@ use crate::calibration::solve::{self, Solution};
 use crate::calibration::width_map::{self, WidthMap};
 use crate::calibration::{Calibration, CalibrationQuality, file, relative_sigma, warnings};
 use crate::cli::bed_plane::BedPlane;
-use crate::core::geometry::GridSize;
-use crate::core::units::Mm;
+use crate::core::{GridSize, Mm};
 use crate::io::atomic_file::write_atomic;
 use crate::report::calibration::CalibrationPage;
 

@@ -10,7 +10,7 @@ use crate::calibration::scale::{SingleScale, single_scale};
 use crate::calibration::solve::{SHARED_NAMES, Solution};
 use crate::calibration::width_map::{self, WidthMap};
 use crate::calibration::{Calibration, warnings};
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// One line for each image: corners and errors, or why it is not used.
 pub fn images(observed: &Observations, solution: &Solution) -> String {

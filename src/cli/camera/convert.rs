@@ -11,7 +11,7 @@ use crate::calibration::exchange::{Import, Intrinsics, opencv, ros};
 use crate::calibration::{Calibration, CalibrationQuality};
 use crate::cli::arguments::{WrongArguments, check_writable};
 use crate::cli::print::Verbosity;
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::io::atomic_file::write_atomic;
 use crate::io::calibration_file;
 

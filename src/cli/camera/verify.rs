@@ -11,7 +11,7 @@ use crate::calibration::verify::{Findings, verify};
 use crate::cli::arguments::parse_length;
 use crate::cli::board_arguments::BoardArgs;
 use crate::cli::board_image::{check_size, find_board};
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::io::calibration_file;
 
 /// Default of the largest error of a width that is accepted \[%\].

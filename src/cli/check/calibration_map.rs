@@ -8,7 +8,7 @@ use crate::assembly::LoadedCell;
 use crate::calibration::Calibration;
 use crate::calibration::relative_sigma_map::{MapBead, RelativeSigmaMap, relative_sigma_at};
 use crate::calibration::width_map::{Cells, MAP_CELLS};
-use crate::core::geometry::{ImagePoint, Roi};
+use crate::core::{ImagePoint, Roi};
 use crate::io::atomic_file::write_atomic;
 use crate::report::calibration::cell::CellCalibrationPage;
 use crate::vision::gauge::BeadAxis;

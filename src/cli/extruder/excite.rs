@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 
 use super::log::columns::units;
 use crate::cli::arguments::{WrongArguments, refuse_replacing};
-use crate::core::quantity::{Quantity, Unit};
+use crate::core::{Quantity, Unit};
 use crate::identify::command_profile::{CommandProfile, file};
 use crate::identify::digits::six_digits;
 use crate::identify::excitation::{Excitation, Waveform};

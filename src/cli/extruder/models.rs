@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::log::columns::units;
 use crate::cli::arguments::WrongArguments;
-use crate::core::quantity::Unit;
+use crate::core::Unit;
 use crate::identify::library::{Library, ModelEntry, ModelQuery, TOLERANCE_C};
 use crate::identify::model_file::ModelFile;
 use crate::io::model_file::{ModelFolder, read, read_library};

@@ -11,8 +11,7 @@ use super::log::layer::LayerArgs;
 use super::log::rows::TableColumns;
 use super::log::source::{LogSource, recorded_column};
 use crate::cli::arguments::WrongArguments;
-use crate::core::quantity::Unit;
-use crate::core::units::MPa;
+use crate::core::{MPa, Unit};
 use crate::extruder::pressure::kalman::PressureNoise;
 use crate::identify::grid::usual_step;
 

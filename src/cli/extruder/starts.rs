@@ -12,7 +12,7 @@ use super::log::rows::{TableColumns, at_line, check_unit_overrides};
 use super::log::source::LogSource;
 use super::setting::SettingArgs;
 use crate::cli::arguments::{WrongArguments, free_folder};
-use crate::core::quantity::{Quantity, Unit};
+use crate::core::{Quantity, Unit};
 use crate::identify::experiment::{Rules, check_time};
 use crate::identify::series::TimeSeries;
 use crate::identify::start_stop::file::to_toml;

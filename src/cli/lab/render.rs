@@ -13,7 +13,7 @@ use crate::assembly::LoadedCell;
 use crate::cell::Cell;
 use crate::cell::file::{CalibrationSource, Purpose};
 use crate::cli::print::Verbosity;
-use crate::core::frame::Frame;
+use crate::core::Frame;
 use crate::io::progress::SharedProgress;
 use crate::sim::frame_series::FrameSeries;
 use crate::sim::truth::Truth;

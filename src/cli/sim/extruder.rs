@@ -10,7 +10,7 @@ use super::serve::{print, serve};
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::cli::arguments::parse_within;
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::extruder::ExtruderLimits;
 use crate::io::clock::RunClock;
 use crate::simulators::extruder::{ExtruderOptions, ExtruderSim};

@@ -4,8 +4,7 @@ use clap::Args;
 
 use super::serve::{print, serve};
 use crate::cli::arguments::{WrongArguments, parse_within};
-use crate::core::time::Span;
-use crate::core::units::{Mm, MmPerS, MmPerS2, NotFinite};
+use crate::core::{Mm, MmPerS, MmPerS2, NotFinite, Span};
 use crate::io::clock::RunClock;
 use crate::link::{PrintJob, RobotParams};
 use crate::simulators::robot::{RobotOptions, RobotSim, RobotSimError};
@@ -80,7 +79,7 @@ pub fn run(args: &RobotSimArgs) -> anyhow::Result<()> {
         RobotSim::spawn(listener, RunClock::start(), options(args), Box::new(print)).map_err(
             |error| match error {
                 RobotSimError::Params(error) => WrongArguments::new(error).into(),
-                error => error.into(),
+                error @ RobotSimError::Io(_) => error.into(),
             },
         )
     };

@@ -6,7 +6,7 @@ use anyhow::Context;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
-use crate::core::time::Stamp;
+use crate::core::Stamp;
 
 /// A machine that answers until SIGINT or SIGTERM: what it is called, where it listens, and how
 /// it is started and stopped.

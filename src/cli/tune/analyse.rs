@@ -8,7 +8,7 @@ use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::cli::camera_offset::gauge;
 use crate::cli::recorded::{attached_cell, open, warn_of_damage};
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::io::recording::{RecordedEntry, Recording};
 use crate::report::tuned::Tuned;
 use crate::tune::{IdentifiedCell, Log, TuneFacts};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use crate::cli::arguments::{parse_length, parse_within};
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::width_control::strategy::steps::STEP_FRACTIONS;
 
 /// Finds what a cell is like from steps of its speed, and proposes settings.

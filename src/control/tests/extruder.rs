@@ -1,7 +1,7 @@
 //! The extruder side through the controller: loss of the link, and successive beads.
 
 use super::*;
-use crate::core::units::{Mm2, Rpm};
+use crate::core::{Mm2, Rpm};
 use crate::extruder::strategy::{ConstantCommand, Playback};
 use crate::extruder::{
     CommandLimits, CommandQuantity, ExtruderCommand, ExtruderFault, ExtruderHold, ExtruderReport,

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{check_rate, fault, offline_stamp, seconds_at};
-use crate::core::frame::Channel;
+use crate::core::Channel;
 use crate::io::image_file;
 use crate::run::ports::{FrameSource, Grab, SourceError};
 
@@ -157,9 +157,7 @@ fn frame_number(text: &str, files: &[PathBuf]) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::frame::{Frame, Pixels};
-    use crate::core::geometry::Size;
-    use crate::core::time::Stamp;
+    use crate::core::{Frame, Pixels, Size, Stamp};
 
     fn folder_of(names: &[&str]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();

@@ -15,8 +15,7 @@ use crossbeam_channel::RecvTimeoutError;
 
 use super::fault;
 use crate::bridge::{VideoInput, VideoReader};
-use crate::core::frame::{Channel, Frame};
-use crate::core::time::{Span, Stamp};
+use crate::core::{Channel, Frame, Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::run::ports::{FrameSource, Grab, SourceError};
 use worker::{Capture, News, Opener, Worker};
@@ -199,8 +198,7 @@ fn delay_after(failures: u32) -> Duration {
 mod tests {
     use super::worker::put;
     use super::*;
-    use crate::core::frame::Pixels;
-    use crate::core::geometry::Size;
+    use crate::core::{Pixels, Size};
     use crossbeam_channel::{Receiver, Sender, bounded};
     use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -15,8 +15,7 @@ use prost::Message as _;
 pub use robot_z::RobotZ;
 
 use super::fault;
-use crate::core::frame::{Channel, Frame};
-use crate::core::time::Stamp;
+use crate::core::{Channel, Frame, Stamp};
 use crate::io::foxglove::{COMPRESSED_IMAGE, CompressedImage, RAW_IMAGE, RawImage, timestamp_ns};
 use crate::io::image_file;
 use crate::io::recorder::format::EVENT_TOPIC;

@@ -15,8 +15,7 @@ use crate::bridge::VideoInput;
 use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::cell::file::{CameraSettings, ImageSource};
-use crate::core::frame::Channel;
-use crate::core::time::Span;
+use crate::core::{Channel, Span};
 use crate::io::clock::RunClock;
 use crate::run::ports::{FrameSource, Grab, SourceError};
 use crate::sim::render::{RenderError, Renderer};
@@ -181,7 +180,7 @@ struct Paced {
     inner: Box<dyn FrameSource>,
     clock: RunClock,
     period: Span,
-    due: Option<crate::core::time::Stamp>,
+    due: Option<crate::core::Stamp>,
     stop: Receiver<()>,
 }
 

@@ -7,8 +7,7 @@ use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
 use super::fault;
 use crate::cell::{CameraSettings, Mount};
-use crate::core::robot::RobotState;
-use crate::core::time::{Span, Stamp};
+use crate::core::{RobotState, Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::run::ports::{FrameSource, Grab, SourceError};
 use crate::scenario::table::Simulation;

@@ -6,8 +6,7 @@ use crossbeam_channel::never;
 use ureq::Agent;
 
 use super::fault;
-use crate::core::frame::Channel;
-use crate::core::time::{Span, Stamp};
+use crate::core::{Channel, Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::io::image_file;
 use crate::run::ports::{FrameSource, Grab, SourceError};
@@ -130,8 +129,7 @@ impl FrameSource for Snapshot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::frame::{Frame, Pixels};
-    use crate::core::geometry::Size;
+    use crate::core::{Frame, Pixels, Size};
     use std::io::{Read, Write};
     use std::net::TcpListener;
     use std::thread;

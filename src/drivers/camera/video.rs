@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{check_rate, fault, offline_stamp, seconds_at};
 use crate::bridge::{VideoInput, VideoReader};
-use crate::core::frame::Channel;
+use crate::core::Channel;
 use crate::run::ports::{FrameSource, Grab, SourceError};
 
 /// The count in a file's header is an estimate for some formats; so many
@@ -97,7 +97,7 @@ impl FrameSource for VideoFile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::geometry::Size;
+    use crate::core::Size;
     use std::fs;
 
     /// Uncompressed AVI of grey pictures of 16x8 px, with as many frames as

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{DriveRange, ExtruderDriver, ExtruderRegistration, ExtruderStart};
-use crate::core::time::Stamp;
+use crate::core::Stamp;
 use crate::document::Table;
 use crate::drivers::StartError;
 use crate::drivers::line::{

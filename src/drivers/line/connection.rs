@@ -8,7 +8,7 @@ use crossbeam_channel::{Receiver, RecvTimeoutError};
 use super::dialect::{Dialect, EventOf, Heard, LinkEvent};
 use super::incoming::{Incoming, Lost, Why};
 use super::outgoing::{Outgoing, write_line};
-use crate::core::time::{Span, Stamp};
+use crate::core::{Span, Stamp};
 use crate::link::PcLine;
 
 /// Nobody listens to the events any more.

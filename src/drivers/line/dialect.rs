@@ -2,8 +2,7 @@
 
 use std::fmt::Debug;
 
-use crate::core::refusal::RefusalReason;
-use crate::core::time::Stamp;
+use crate::core::{RefusalReason, Stamp};
 use crate::link::{ErrCode, LineError};
 use crate::run::ports::DeviceEvent;
 

@@ -8,7 +8,7 @@ use std::net::TcpStream;
 use std::time::Duration;
 
 use super::dialect::{Dialect, Heard};
-use crate::core::time::{Span, Stamp};
+use crate::core::{Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::link::{BadLines, LineFault, LineSplitter, MAX_BAD_LINES};
 

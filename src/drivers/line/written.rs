@@ -1,6 +1,6 @@
 //! A line that has left the PC.
 
-use crate::core::time::Stamp;
+use crate::core::Stamp;
 
 /// A line that has left the PC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

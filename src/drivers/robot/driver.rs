@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crossbeam_channel::Sender;
 
-use crate::core::units::MmPerS;
+use crate::core::MmPerS;
 use crate::document::Table;
 use crate::drivers::StartError;
 use crate::io::clock::RunClock;

@@ -3,10 +3,8 @@
 use std::sync::Arc;
 
 use super::{Capabilities, RobotDriver, RobotRegistration, RobotStart};
-use crate::control::step::Command;
-use crate::core::robot::{RobotLimits, RobotMode};
-use crate::core::time::Stamp;
-use crate::core::units::MmPerS;
+use crate::control::Command;
+use crate::core::{MmPerS, RobotLimits, RobotMode, Stamp};
 use crate::document::Table;
 use crate::drivers::StartError;
 use crate::drivers::line::{

@@ -12,10 +12,8 @@ use std::time::Duration;
 use crossbeam_channel::{RecvTimeoutError, Sender, unbounded};
 
 use super::{Capabilities, RobotDriver, RobotRegistration, RobotStart};
-use crate::control::step::Command;
-use crate::core::robot::{RobotLimits, RobotMode, RobotState};
-use crate::core::time::Stamp;
-use crate::core::units::{Mm, MmPerS};
+use crate::control::Command;
+use crate::core::{Mm, MmPerS, RobotLimits, RobotMode, RobotState, Stamp};
 use crate::document::Table;
 use crate::drivers::StartError;
 use crate::run::ports::{RobotEvent, RobotPort, SendError, Sent};

@@ -1,6 +1,6 @@
 //! Settings of adaptive control, and their conditions of stability.
 
-use crate::core::time::Span;
+use crate::core::Span;
 
 /// A first-order plant with a matched uncertainty: ẏ = a·y + b·(u + w + Δ), with output y, input
 /// u, known part w and unknown part Δ, both in the unit of the input.

@@ -4,7 +4,7 @@ use nalgebra::Matrix4;
 
 use super::estimate::UncertaintyEstimate;
 use super::gains::{Adaptation, AdaptiveGains, EstimateBounds, GainError, ScalarPlant, check};
-use crate::core::time::Span;
+use crate::core::Span;
 
 /// Time between two samples from which they are a gap, in holds: three samples may be missing.
 /// Over a longer time the error is not the one that the estimate is updated for.

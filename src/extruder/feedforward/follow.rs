@@ -3,8 +3,7 @@
 use std::collections::VecDeque;
 
 use super::{FeedforwardError, FlowForecast, FlowObserver, FlowResidual, Inverse, positive};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm2, Mm3PerS, MmPerS, Rpm};
+use crate::core::{Mm2, Mm3PerS, MmPerS, Rpm, Span, Stamp};
 use crate::numeric::number::to_f64;
 
 /// From the extruder's command to that of the axis that moves the bed (a wheel, a feed, a robot),

@@ -1,8 +1,7 @@
 //! The flow at the nozzle from the extruder's command, or from its measured speed.
 
 use super::{FeedforwardError, positive};
-use crate::core::time::Span;
-use crate::core::units::{Mm3PerS, Rpm};
+use crate::core::{Mm3PerS, Rpm, Span};
 use crate::numeric::lti::{Between, Simulator, TransferFunction};
 
 /// Model of an extruder.

@@ -3,7 +3,7 @@
 use nalgebra::Complex;
 
 use super::FeedforwardError;
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::extruder::limits::{CommandLimit, CommandLimits};
 use crate::numeric::lti::polynomial::{from_roots, multiply};
 use crate::numeric::lti::{Between, Simulator, TransferFunction};

@@ -8,8 +8,7 @@
 use nalgebra::{Matrix2, RowVector2, Vector2};
 
 use super::{FeedforwardError, positive};
-use crate::core::time::Stamp;
-use crate::core::units::Mm3PerS;
+use crate::core::{Mm3PerS, Stamp};
 
 /// Model of the unmodelled flow.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,5 @@
 use super::*;
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm2, Mm3PerS, Rpm};
+use crate::core::{Mm2, Mm3PerS, Rpm, Span, Stamp};
 use crate::extruder::limits::{CommandLimit, CommandLimits};
 use crate::numeric::lti::{Between, FirstOrder, Simulator};
 

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::inverse::{InverseSettings, minimum_phase};
 use super::{FeedforwardError, Inverse};
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::numeric::lti::{StateSpace, TransferFunction};
 use crate::numeric::number::to_f64;
 

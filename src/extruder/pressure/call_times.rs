@@ -3,8 +3,7 @@
 
 use super::kalman::Kalman;
 use super::{ReadingRefused, ScrewCommand};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{MPa, Rpm};
+use crate::core::{MPa, Rpm, Span, Stamp};
 use crate::extruder::limits::{CommandLimit, CommandLimits};
 
 /// Pressure, target and screw speed at takeover. The first command at the same target is that

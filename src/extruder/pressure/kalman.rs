@@ -2,7 +2,7 @@
 //! its noise from readings. Ma et al. 2026, section 2.3.
 
 use super::{PressureError, within};
-use crate::core::units::MPa;
+use crate::core::MPa;
 use crate::numeric::number::to_f64;
 
 /// Smallest number of readings to identify the noise from. Derived: the relative standard error

@@ -4,8 +4,7 @@
 use super::call_times::{CallTimes, InitialState, bounded};
 use super::kalman::{Kalman, PressureNoise};
 use super::{PressureController, PressureError, ReadingRefused, ScrewCommand, within};
-use crate::core::time::Stamp;
-use crate::core::units::{MPa, Rpm};
+use crate::core::{MPa, Rpm, Stamp};
 use crate::extruder::limits::CommandLimits;
 
 /// Gains.

@@ -12,8 +12,7 @@ use super::multiple_model::{MultipleModelFilter, PressurePrediction};
 use super::reference::{Reference, ReferenceSegment};
 use super::tuning::Tuning;
 use super::{Fopdt, PressureController, ReadingRefused, ScrewCommand};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{MPa, Rpm};
+use crate::core::{MPa, Rpm, Span, Stamp};
 use crate::extruder::limits::CommandLimits;
 
 /// The controller with its state.

@@ -7,8 +7,7 @@ use super::kalman::{Kalman, PressureNoise};
 use super::pi::{PiState, PressurePiGains};
 use super::reference::Reference;
 use super::{Fopdt, PressureController, ReadingRefused, ScrewCommand};
-use crate::core::time::Stamp;
-use crate::core::units::{MPa, Rpm};
+use crate::core::{MPa, Rpm, Stamp};
 use crate::extruder::limits::CommandLimits;
 
 /// Predicts the effect of the commands within the dead time.

@@ -9,7 +9,7 @@ use super::smith::SmithPi;
 use super::tuning::Tuning;
 use super::vsfc::{Vsfc, VsfcGains};
 use super::*;
-use crate::core::units::{MPa, Rpm};
+use crate::core::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
 use crate::sim::pressure::{Disturbances, SimPressure};
 

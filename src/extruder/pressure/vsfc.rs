@@ -7,8 +7,7 @@ use super::kalman::{Kalman, PressureNoise};
 use super::reference::FIRST_PERIOD_S;
 use super::smith::SmithPredictor;
 use super::{Fopdt, PressureController, PressureError, ReadingRefused, ScrewCommand, within};
-use crate::core::time::Stamp;
-use crate::core::units::{MPa, Rpm};
+use crate::core::{MPa, Rpm, Stamp};
 use crate::extruder::limits::CommandLimits;
 
 /// Gains and zones.

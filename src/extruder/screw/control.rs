@@ -7,8 +7,7 @@ use super::exact::{ExactPredictor, FeedOvertaken, PlugPrediction};
 use super::feed_history::FeedHistory;
 use super::feedback::FillFeedback;
 use super::model::{Conveying, MM_PER_M, Screw};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::Mm;
+use crate::core::{Mm, Span, Stamp};
 
 /// Largest number of changes of the feed that are kept, as a bound on memory.
 const MAX_STEPS: usize = 1 << 16;

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::error::{ScrewError, positive};
 use super::model::{Conveying, MM_PER_M, Screw, SpeedPulsation};
-use crate::core::units::{Mm, Rpm};
+use crate::core::{Mm, Rpm};
 
 /// The unit in which the screw's speed is multiplied with the pitch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

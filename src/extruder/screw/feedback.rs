@@ -3,7 +3,7 @@
 
 use super::error::{ScrewError, positive};
 use super::model::{MM_PER_M, Screw};
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// Setpoint and limit of the feed.
 #[derive(Debug, Clone, Copy, PartialEq)]

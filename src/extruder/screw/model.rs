@@ -176,7 +176,7 @@ impl Screw {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::units::Rpm;
+    use crate::core::Rpm;
     use crate::extruder::screw::{ScrewDesign, TurnUnit};
 
     const B: SpeedPulsation =

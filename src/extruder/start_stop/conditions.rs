@@ -1,7 +1,6 @@
 //! Conditions of the bead between a start and a stop.
 
-use crate::core::time::Span;
-use crate::core::units::{Mm3PerS, MmPerS};
+use crate::core::{Mm3PerS, MmPerS, Span};
 
 /// Conditions of a bead.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,8 +1,7 @@
 //! The start of a bead.
 
 use super::conditions::BeadConditions;
-use crate::core::time::Span;
-use crate::core::units::Mm3PerS;
+use crate::core::{Mm3PerS, Span};
 use crate::identify::start_stop::parameters::StartStop;
 
 /// The pause before a start.

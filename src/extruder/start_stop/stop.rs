@@ -1,8 +1,7 @@
 //! The end of a bead.
 
 use super::conditions::BeadConditions;
-use crate::core::time::Span;
-use crate::core::units::Mm;
+use crate::core::{Mm, Span};
 use crate::identify::start_stop::parameters::StartStop;
 
 /// A stop, from the command to stop.

@@ -1,7 +1,6 @@
 //! The trait of a strategy of the extruder side: demanded flow and reports in, command out.
 
-use crate::core::time::{Span, Stamp};
-use crate::core::units::Mm3PerS;
+use crate::core::{Mm3PerS, Span, Stamp};
 use crate::extruder::limits::CommandLimit;
 use crate::extruder::report::ExtruderReport;
 

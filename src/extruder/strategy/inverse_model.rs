@@ -2,8 +2,7 @@
 //! chapter 4.
 
 use super::interface::{BadReading, CommandDemand, ExtruderController, RequiredReading};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm3PerS, Rpm};
+use crate::core::{Mm3PerS, Rpm, Span, Stamp};
 use crate::extruder::feedforward::{FlowForecast, ScrewSpeed, Tracker};
 use crate::extruder::report::ExtruderReport;
 

@@ -3,8 +3,7 @@
 //! sub-system commands the plate, which is the robot's side.
 
 use super::interface::{BadReading, CommandDemand, ExtruderController, RequiredReading};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm2, Mm3PerS};
+use crate::core::{Mm2, Mm3PerS, Span, Stamp};
 use crate::extruder::adaptive::{MracController, ScalarPlant};
 use crate::extruder::report::ExtruderReport;
 
@@ -144,7 +143,7 @@ impl ExtruderController for AdaptiveNozzle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::units::Mm2;
+    use crate::core::Mm2;
     use crate::extruder::adaptive::{Adaptation, AdaptiveGains, EstimateBounds};
 
     fn controller() -> AdaptiveNozzle {

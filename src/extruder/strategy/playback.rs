@@ -1,8 +1,7 @@
 //! Commands without feedback: a constant one, or a profile from a table.
 
 use super::interface::{CommandDemand, ExtruderController};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::Mm3PerS;
+use crate::core::{Mm3PerS, Span, Stamp};
 use crate::identify::command_profile::CommandProfile;
 
 /// One command for as long as bead is laid, in the unit of the command.

@@ -2,8 +2,7 @@
 //! law, and the screw's speed controls that pressure. Ma et al. 2026.
 
 use super::interface::{BadReading, CommandDemand, ExtruderController, RequiredReading};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{MPa, Mm3PerS, Rpm};
+use crate::core::{MPa, Mm3PerS, Rpm, Span, Stamp};
 use crate::extruder::limits::{CommandLimit, CommandLimits};
 use crate::extruder::pressure::kalman::PressureNoise;
 use crate::extruder::pressure::pi::{PressurePi, PressurePiGains};

@@ -2,8 +2,7 @@
 //! eq. (74).
 
 use super::interface::{BadReading, CommandDemand, ExtruderController, RequiredReading};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::Mm3PerS;
+use crate::core::{Mm3PerS, Span, Stamp};
 use crate::extruder::report::ExtruderReport;
 use crate::extruder::screw::control::ScrewSettings;
 use crate::extruder::screw::{ScrewControl, ScrewError, ScrewFault};

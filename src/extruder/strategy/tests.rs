@@ -1,8 +1,7 @@
 //! Strategies under the supervisor, against plants.
 
 use super::*;
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{MPa, Mm, Mm2, Mm3PerS, Rpm};
+use crate::core::{MPa, Mm, Mm2, Mm3PerS, Rpm, Span, Stamp};
 use crate::extruder::adaptive::{
     Adaptation, AdaptiveGains, EstimateBounds, MracController, ScalarPlant,
 };

@@ -1,8 +1,7 @@
 //! The beginning, the progress and the end of a bead.
 
 use super::{Phase, Supervisor};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::Mm3PerS;
+use crate::core::{Mm3PerS, Span, Stamp};
 use crate::extruder::limits::CommandLimit;
 use crate::extruder::state::{ExtruderHold, ExtruderTrace};
 

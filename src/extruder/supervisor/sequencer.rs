@@ -1,7 +1,6 @@
 //! The sequence of starts and stops, where the cell has the times of its extruder.
 
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm, Mm3PerS, MmPerS};
+use crate::core::{Mm, Mm3PerS, MmPerS, Span, Stamp};
 use crate::extruder::start_stop::{Pause, Start, StartStopTiming, Stop};
 
 /// Pause before the first bead of a run, which is not known: longer than any time constant, so

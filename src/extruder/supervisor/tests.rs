@@ -1,5 +1,5 @@
 use super::*;
-use crate::core::units::Rpm;
+use crate::core::Rpm;
 use crate::extruder::strategy::{ConstantCommand, Playback};
 use crate::extruder::{ExtruderFault, ExtruderHold, PumpMode};
 use crate::identify::command_profile::{CommandProfile, ProfilePoint};

@@ -1,8 +1,7 @@
 //! Transitions by reports: starts, holds, faults, and resuming.
 
 use super::{Phase, StopCompliance, Supervisor};
-use crate::core::readback::SpeedMatch;
-use crate::core::time::{Span, Stamp};
+use crate::core::{Span, SpeedMatch, Stamp};
 use crate::extruder::CommandQuantity;
 use crate::extruder::report::{ExtruderReport, PumpMode};
 use crate::extruder::state::{ExtruderFault, ExtruderHold};

@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::core::quantity::Unit;
-use crate::core::time::Span;
-use crate::core::units::{Mm, Mm3PerS, MmPerS};
+use crate::core::{Mm, Mm3PerS, MmPerS, Span, Unit};
 
 /// Rows that are closer in time are not used for rates \[s\]: the difference of rounded numbers
 /// would dominate.

@@ -1,7 +1,7 @@
 //! The table of a plan, `plan.csv`.
 
 use super::job::{PlanRow, PlannedJob};
-use crate::core::quantity::Unit;
+use crate::core::Unit;
 use crate::document::csv::{LineProblem, describe};
 
 /// Beginning of the name of the command's column; its end is the unit.

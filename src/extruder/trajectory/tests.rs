@@ -1,9 +1,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use super::*;
-use crate::core::quantity::Unit;
-use crate::core::time::Span;
-use crate::core::units::Mm;
+use crate::core::{Mm, Span, Unit};
 
 /// 100 mm/s for a second, down to 20 mm/s within a second, then 20 mm/s for a second.
 fn text() -> String {

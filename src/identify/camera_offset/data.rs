@@ -3,7 +3,7 @@
 use super::laid_speeds::{LaidSpeeds, PowerIntegral};
 use super::observation::BeadObservation;
 use super::whiten::PathPosition;
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::numeric::number::to_f64;
 use crate::numeric::rank;
 

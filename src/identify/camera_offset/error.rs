@@ -1,7 +1,7 @@
 //! Why a bead does not determine the offset.
 
 use super::estimate::SpeedRange;
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// Smallest number of widths. A choice.
 pub const MIN_WIDTHS: usize = 50;

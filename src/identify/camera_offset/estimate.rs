@@ -1,6 +1,6 @@
 //! An estimated offset and the fitted model of the bead.
 
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS};
 
 /// Accepted exponents b. The bead of Shojaei Barjuei et al. 2022 has 0.22 to 0.27; conservation
 /// of mass alone gives 1.

@@ -2,9 +2,7 @@
 
 use super::estimate::SpeedRange;
 use super::observation::BeadObservation;
-use crate::core::robot::RobotState;
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS, RobotState, Span, Stamp};
 use crate::numeric::number::{to_count, to_f64};
 use crate::numeric::rank;
 

@@ -6,7 +6,7 @@ use super::estimate::{EXPONENT_RANGE, WidthAtSpeed};
 use super::laid_speeds::LaidSpeeds;
 use super::observation::BeadObservation;
 use super::whiten::{PathPosition, PathWhitener, WidthNoise};
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::numeric::number::{to_count, to_f64};
 use crate::numeric::rank;
 

@@ -12,8 +12,7 @@ use rayon::prelude::*;
 
 use super::whiten::{PathPosition, PathWhitener};
 use super::*;
-use crate::core::robot::RobotMode;
-use crate::core::units::MmPerS;
+use crate::core::{MmPerS, RobotMode};
 
 const GAUGE_MM: f64 = 60.0;
 const SEARCH: OffsetSearch =

@@ -4,7 +4,7 @@
 use std::fmt::Write;
 
 use super::{CommandProfile, CommandProfileError, ProfilePoint};
-use crate::core::quantity::Quantity;
+use crate::core::Quantity;
 use crate::identify::table::{DataTable, DataTableError};
 
 /// The column of time.
@@ -77,7 +77,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
     use super::*;
-    use crate::core::quantity::Unit;
+    use crate::core::Unit;
 
     #[test]
     fn what_is_written_is_read_again() {

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use super::*;
-use crate::core::quantity::Unit;
+use crate::core::Unit;
 
 /// Ten seconds at 100 Hz of a screw that is stepped, and a flow that follows.
 fn columns() -> [Vec<f64>; 3] {

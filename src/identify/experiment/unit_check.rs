@@ -1,6 +1,6 @@
 //! Implausible values for a unit.
 
-use crate::core::quantity::Unit;
+use crate::core::Unit;
 
 /// Highest pressure of extruders \[MPa\]. A choice above the melt pressures of injection
 /// moulding.

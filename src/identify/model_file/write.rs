@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{Conditions, FitSummary, ModelFile, ParameterUncertainty};
-use crate::core::quantity::Quantity;
+use crate::core::Quantity;
 
 /// The text of a model's file; the notes become comments at its head. Numbers keep every digit.
 pub fn to_toml(model: &ModelFile, notes: &[String]) -> String {

@@ -1,8 +1,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use super::*;
-use crate::core::time::Span;
-use crate::core::units::{Mm3PerS, MmPerS};
+use crate::core::{Mm3PerS, MmPerS, Span};
 use crate::extruder::start_stop::{BeadConditions, Pause, StartStopTiming};
 
 const MACHINE: StartStop = StartStop {

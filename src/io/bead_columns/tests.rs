@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use super::*;
-use crate::control::step::ExtruderStep;
-use crate::core::robot::RobotMode;
+use crate::control::ExtruderStep;
+use crate::core::RobotMode;
 
 const OFFSET: f64 = 30.0;
 const HEIGHT: f64 = 1.5;

@@ -8,8 +8,7 @@ use crossbeam_channel::{Receiver, Sender};
 use prost::Message as _;
 
 use super::state::RecorderState;
-use crate::core::frame::Frame;
-use crate::core::time::Stamp;
+use crate::core::{Frame, Stamp};
 use crate::io::foxglove::{CompressedImage, timestamp};
 use crate::io::image_file::{EncodeError, encode_png};
 

@@ -17,7 +17,7 @@ use super::format::{
 };
 use super::report::Counts;
 use super::state::AnsweredEvent;
-use crate::core::time::Stamp;
+use crate::core::Stamp;
 use crate::io::foxglove;
 
 /// Bytes of a chunk before compression; the flush period usually ends a chunk

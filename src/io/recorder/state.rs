@@ -5,9 +5,8 @@ use std::sync::atomic::AtomicU64;
 
 use crossbeam_channel::Sender;
 
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::time::Stamp;
+use crate::control::{Event, Step};
+use crate::core::Stamp;
 use crate::run::ports::RecordError;
 
 /// An event and its answer, on the way to the writer.

@@ -8,7 +8,7 @@ use crossbeam_channel::Sender;
 use super::encode::FrameJob;
 use super::state::RecorderState;
 use crate::cell::file::KeepFrames;
-use crate::core::frame::Frame;
+use crate::core::Frame;
 
 /// Gives frames to the recorder, from any thread.
 #[derive(Clone)]

@@ -3,12 +3,10 @@ use std::time::Duration;
 
 use super::*;
 use crate::cell::file::KeepFrames;
-use crate::control::step::{State, Trace};
-use crate::core::frame::{Channel, Frame, Pixels};
-use crate::core::geometry::Size;
-use crate::core::refusal::RefusalReason;
-use crate::core::robot::{RobotLimits, RobotMode, RobotState};
-use crate::core::units::{Mm, MmPerS};
+use crate::control::{State, Trace};
+use crate::core::{
+    Channel, Frame, Mm, MmPerS, Pixels, RefusalReason, RobotLimits, RobotMode, RobotState, Size,
+};
 use crate::io::image_file;
 use crate::io::recording::{RecordedEntry, Recording};
 

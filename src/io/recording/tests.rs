@@ -3,8 +3,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::cell::file::KeepFrames;
-use crate::core::frame::{Frame, Pixels};
-use crate::core::geometry::Size;
+use crate::core::{Frame, Pixels, Size};
 use crate::io::recorder::{RecordConfig, start};
 use crate::run::ports::Recorder;
 

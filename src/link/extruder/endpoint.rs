@@ -4,7 +4,7 @@
 
 use super::drive_line::DriveLine;
 use super::extruder_line::{ExtruderLine, ExtruderStatus};
-use crate::core::time::Stamp;
+use crate::core::Stamp;
 use crate::extruder::{ExtruderCommand, ExtruderLimits, ExtruderReport, PumpMode};
 use crate::link::frame::{DeviceClock, ErrCode, LineRefusal, Sequence, Validity};
 

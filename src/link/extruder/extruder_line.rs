@@ -1,7 +1,7 @@
 //! Lines from the extruder to the PC.
 
 use super::numbers::{NUMBERS, switch};
-use crate::core::units::{MPa, Mm, Mm3PerS, Rpm};
+use crate::core::{MPa, Mm, Mm3PerS, Rpm};
 use crate::extruder::{CommandQuantity, ExtruderLimits, ExtruderReport, PumpMode};
 use crate::link::frame::{DeviceLine, LineBody, LineError, LineFields, one_word};
 

@@ -4,7 +4,7 @@
 use std::str::Split;
 
 use super::limits::VERSION;
-use crate::core::units::{MmPerS, NotFinite};
+use crate::core::{MmPerS, NotFinite};
 
 /// Longest name that still fits a line beside three numbers.
 const MAX_NAME_LEN: usize = 48;

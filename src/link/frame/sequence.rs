@@ -4,7 +4,7 @@
 
 use super::limits::{MAX_VALID_MS, MIN_VALID_MS};
 use super::refusal::{ErrCode, LineRefusal};
-use crate::core::time::Stamp;
+use crate::core::Stamp;
 
 const NS_PER_MS: u64 = 1_000_000;
 

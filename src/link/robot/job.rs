@@ -2,9 +2,7 @@
 //! connected.
 
 use super::virtual_robot::VirtualRobot;
-use crate::core::robot::RobotMode;
-use crate::core::time::{Span, Stamp};
-use crate::core::units::Mm;
+use crate::core::{Mm, RobotMode, Span, Stamp};
 
 /// Begins the beads of a [`VirtualRobot`]. A new connection stands for the
 /// operator's key: it begins the job again when it was finished, and

@@ -1,6 +1,6 @@
 //! Numbers as they cross the robot's link.
 
-use crate::core::units::MmPerS;
+use crate::core::MmPerS;
 use crate::link::frame::Decimals;
 
 /// Twelve digits before the point; three such numbers still fit a line.

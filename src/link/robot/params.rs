@@ -1,8 +1,7 @@
 //! What a robot is: its limits, how its speed follows, how long its beads are.
 
 use super::numbers::on_wire;
-use crate::core::robot::RobotLimits;
-use crate::core::units::{Mm, MmPerS, MmPerS2};
+use crate::core::{Mm, MmPerS, MmPerS2, RobotLimits};
 
 /// Description of a robot that speaks the link.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,7 @@
 //! Lines from the PC to the robot.
 
 use super::numbers::NUMBERS;
-use crate::core::units::MmPerS;
+use crate::core::MmPerS;
 use crate::link::frame::{BYE_LINE, LineError, LineFields, hello_line, read_hello};
 
 const KEYWORDS: [&str; 4] = ["HELLO", "SPEED", "STOP", "BYE"];

@@ -1,8 +1,7 @@
 //! Lines from the robot to the PC.
 
 use super::numbers::NUMBERS;
-use crate::core::robot::{RobotLimits, RobotMode, RobotState};
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS, RobotLimits, RobotMode, RobotState};
 use crate::link::frame::{DeviceLine, LineBody, LineError, LineFields, one_word};
 
 /// A line from the robot to the PC; a `STATE` comes every 20 to 200 ms.

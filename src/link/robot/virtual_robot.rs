@@ -19,9 +19,7 @@
 use super::motion::{PathMotion, SpeedLoop, seconds};
 use super::params::{ParamError, RobotParams};
 use super::robot_line::{RobotLine, RobotStatus};
-use crate::core::robot::{RobotLimits, RobotMode};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS, RobotLimits, RobotMode, Span, Stamp};
 use crate::link::frame::{DeviceClock, ErrCode, MAX_VALID_MS, Sequence};
 
 mod take;

@@ -3,8 +3,8 @@
 
 use super::ending::Ending;
 use super::{ControlThread, Inputs};
-use crate::control::step::Step;
-use crate::core::time::Stamp;
+use crate::control::Step;
+use crate::core::Stamp;
 use crate::extruder::ExtruderState;
 use crate::rows::names;
 use crate::run::ports::{ExtruderEvent, Recorder};

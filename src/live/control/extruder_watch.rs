@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::core::refusal::RefusalReason;
-use crate::core::time::Span;
+use crate::core::{RefusalReason, Span};
 use crate::drivers::extruder::{DriveRange, ExtruderDriver};
 use crate::extruder::{ExtruderLimits, ExtruderState, PumpMode};
 use crate::run::ports::ExtruderEvent;

@@ -1,10 +1,8 @@
 //! The frames' part of the control thread.
 
 use super::{ControlThread, Inputs};
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::control::{Event, Step};
+use crate::core::{Mm, Stamp};
 use crate::live::capture::MeasuredFrame;
 use crate::rows::frame_row::{ControlColumns, FrameRow};
 use crate::run::ports::Recorder;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crossbeam_channel::{Receiver, never, select};
 
-use crate::core::time::{Span, Stamp};
+use crate::core::{Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::live::capture::CameraMessage;
 use crate::run::ports::{ExtruderEvent, RecordError, RobotEvent};

@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use super::ending::Ending;
 use super::{ControlThread, Inputs};
-use crate::core::robot::RobotLimits;
+use crate::core::RobotLimits;
 use crate::run::ports::{Recorder, RobotEvent};
 use crate::width_control::limiter::SpeedLimits;
 

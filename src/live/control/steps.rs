@@ -1,6 +1,6 @@
 //! When a run for a sequence of steps ends.
 
-use crate::control::step::{State, Step};
+use crate::control::{State, Step};
 use crate::width_control::steps::StepsProgress;
 
 /// Watches a sequence of steps.

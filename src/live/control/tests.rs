@@ -4,9 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use super::*;
 use crate::control::{Controller, example_setup};
-use crate::core::refusal::RefusalReason;
-use crate::core::robot::{RobotLimits, RobotState};
-use crate::core::units::{Mm, MmPerS2};
+use crate::core::{Mm, MmPerS2, RefusalReason, RobotLimits, RobotState};
 use crate::live::journal::FrameWithEdges;
 use crate::live::latency::Latency;
 use crate::rows::frame_row::FrameRow;

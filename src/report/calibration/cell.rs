@@ -4,7 +4,7 @@ use maud::html;
 
 use super::drawing::sigma_map;
 use crate::calibration::relative_sigma_map::RelativeSigmaMap;
-use crate::core::geometry::Roi;
+use crate::core::Roi;
 use crate::report::html::titled_page;
 
 /// What the page is made of.

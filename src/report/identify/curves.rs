@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::model::ModelStudy;
-use crate::core::quantity::Unit;
+use crate::core::Unit;
 use crate::identify::band::{self, Band};
 use crate::identify::experiment::Experiment;
 use crate::numeric::number::to_f64;

@@ -1,6 +1,6 @@
 //! A model with its data, its quality and its warnings.
 
-use crate::core::quantity::Quantity;
+use crate::core::Quantity;
 use crate::identify::autocorrelation::Autocorrelation;
 use crate::identify::experiment::Experiment;
 use crate::identify::fit::{Fit, FitQuality, ModelComparison, Structure};

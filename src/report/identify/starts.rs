@@ -6,7 +6,7 @@ mod text;
 pub use page::page;
 pub use text::text;
 
-use crate::core::quantity::Quantity;
+use crate::core::Quantity;
 use crate::identify::digits::three_digits;
 use crate::identify::model_file::Conditions;
 use crate::identify::series::TimeSeries;

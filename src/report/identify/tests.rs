@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use super::*;
-use crate::core::quantity::{Quantity, Unit};
+use crate::core::{Quantity, Unit};
 use crate::identify::experiment::Rules;
 use crate::identify::fit::{DeadTime, Structure};
 use crate::identify::model_file::{self, Conditions};

@@ -1,8 +1,5 @@
 use super::*;
-use crate::core::frame::Pixels;
-use crate::core::geometry::Size;
-use crate::core::time::Stamp;
-use crate::core::units::{Mm, WidthRange};
+use crate::core::{Mm, Pixels, Size, Stamp, WidthRange};
 use crate::rows::frame_row::sample;
 use crate::vision::{BeadAxis, Polarity};
 

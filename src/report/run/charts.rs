@@ -2,10 +2,8 @@
 
 use super::distance::DistanceCharts;
 use super::extruder::ExtruderCharts;
-use crate::control::event::Event;
-use crate::control::step::{State, Step};
-use crate::core::time::Stamp;
-use crate::core::units::MmPerS;
+use crate::control::{Event, State, Step};
+use crate::core::{MmPerS, Stamp};
 use crate::numeric::number::to_f64;
 use crate::report::chart::{Mark, PlotCurve, Strip};
 use crate::rows::frame_row::FrameRow;

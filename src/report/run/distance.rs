@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::control::step::Step;
+use crate::control::Step;
 use crate::report::chart::{PlotCurve, PlotLayer, XAxis, legend, palette, wide_plot, y_range};
 use crate::rows::summary::DistanceSummary;
 

@@ -2,10 +2,8 @@
 
 use maud::{Markup, html};
 
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::time::Stamp;
-use crate::core::units::Mm3PerS;
+use crate::control::{Event, Step};
+use crate::core::{Mm3PerS, Stamp};
 use crate::extruder::{CommandQuantity, ExtruderReport, ExtruderState};
 use crate::report::chart::{
     Ink, Mark, PlotCurve, PlotLayer, Strip, StripRow, XAxis, legend, palette, strips, wide_plot,

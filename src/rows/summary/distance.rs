@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::control::step::Step;
+use crate::control::Step;
 use crate::width_control::distance::WidthUse;
 use crate::width_control::{DistanceTrace, FallbackReason};
 

@@ -6,10 +6,8 @@ use serde::Serialize;
 
 use super::profile::{ProfileSummary, ProfileTally};
 use super::times::Times;
-use crate::control::event::Event;
-use crate::control::step::{State, Step};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::Mm3PerS;
+use crate::control::{Event, State, Step};
+use crate::core::{Mm3PerS, Span, Stamp};
 use crate::extruder::{CommandLimit, ExtruderFault, ExtruderState};
 use crate::numeric::statistics::Moments;
 use crate::rows::names;

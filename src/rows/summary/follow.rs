@@ -1,10 +1,8 @@
 //! Follows a controller through its events and steps: in which state it was
 //! for how long, which limit acted, and where the nozzle is.
 
-use crate::control::event::Event;
-use crate::control::step::{Command, State, Step};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm, MmPerS};
+use crate::control::{Command, Event, State, Step};
+use crate::core::{Mm, MmPerS, Span, Stamp};
 use crate::width_control::limiter::SpeedLimit;
 
 /// The state of a run after the steps so far.

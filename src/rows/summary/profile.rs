@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::extruder::ExtruderState;
 
 /// How far a profile was played on its beads.

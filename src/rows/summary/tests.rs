@@ -1,7 +1,6 @@
 use super::*;
-use crate::control::step::{Command, Fault, Hold, State, Trace};
-use crate::core::robot::{RobotLimits, RobotMode, RobotState};
-use crate::core::units::MmPerS;
+use crate::control::{Command, Fault, Hold, State, Trace};
+use crate::core::{MmPerS, RobotLimits, RobotMode, RobotState};
 use crate::rows::frame_row::{ControlColumns, sample};
 use crate::width_control::limiter::SpeedLimit;
 

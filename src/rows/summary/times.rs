@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::core::time::Span;
+use crate::core::Span;
 
 /// Time by name, summed without rounding.
 #[derive(Debug, Clone, Default)]

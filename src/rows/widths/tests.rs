@@ -1,5 +1,5 @@
 use super::*;
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS};
 use crate::rows::frame_row::sample;
 use crate::width_control::limiter::SpeedLimit;
 

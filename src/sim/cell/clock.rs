@@ -2,7 +2,7 @@
 
 use crate::cell::Cell;
 use crate::cell::file::RunPart;
-use crate::core::time::{Span, Stamp};
+use crate::core::{Span, Stamp};
 use crate::sim::hash;
 
 /// What comes next.

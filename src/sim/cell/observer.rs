@@ -1,10 +1,8 @@
 //! Observers of a simulated cell.
 
 use super::camera::FrameObservation;
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::time::Stamp;
-use crate::core::units::Mm3PerS;
+use crate::control::{Event, Step};
+use crate::core::{Mm3PerS, Stamp};
 
 /// Observes a simulated cell.
 pub trait Observer {

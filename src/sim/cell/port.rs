@@ -1,10 +1,8 @@
 //! The simulated robot as the runner's port: the robot's own state machine,
 //! spoken to in the link's lines, without a socket between.
 
-use crate::control::step::Command;
-use crate::core::robot::{RobotLimits, RobotMode, RobotState};
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::control::Command;
+use crate::core::{Mm, RobotLimits, RobotMode, RobotState, Stamp};
 use crate::link::{PcLine, RobotLine, VirtualRobot};
 use crate::run::ports::{RobotPort, SendError, Sent};
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::*;
 use crate::calibration::Calibration;
 use crate::cell::file::Purpose;
-use crate::control::step::Step;
+use crate::control::Step;
 use crate::extruder::start_stop::{BeadConditions, StartStopTiming};
 use crate::extruder::strategy::ConstantCommand;
 use crate::extruder::{ExtruderSetup, ExtruderStrategy};

@@ -3,7 +3,7 @@
 
 use super::plant::{STEP, SimPlant};
 use crate::cell::extruder::ScrewPlant as Settings;
-use crate::core::units::{Mm, Mm3PerS};
+use crate::core::{Mm, Mm3PerS};
 use crate::extruder::ExtruderReport;
 use crate::sim::hash::{mix, normal_pair};
 use crate::sim::screw::{Integrator, SimScrew};

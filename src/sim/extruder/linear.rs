@@ -2,7 +2,7 @@
 
 use super::plant::{STEP, SimPlant};
 use crate::cell::extruder::LinearPlant;
-use crate::core::units::{Mm3PerS, Rpm};
+use crate::core::{Mm3PerS, Rpm};
 use crate::extruder::ExtruderReport;
 use crate::numeric::lti::{Between, ModelError, Simulator};
 use crate::sim::hash::{mix, normal_pair};

@@ -2,7 +2,7 @@
 
 use super::plant::{STEP, SimPlant};
 use crate::cell::extruder::MeltPlant;
-use crate::core::units::Mm3PerS;
+use crate::core::Mm3PerS;
 use crate::extruder::ExtruderReport;
 use crate::sim::melt::{Melt, MeltParameters};
 

@@ -1,7 +1,6 @@
 //! The interface of simulated extruder plants.
 
-use crate::core::time::Span;
-use crate::core::units::Mm3PerS;
+use crate::core::{Mm3PerS, Span};
 use crate::extruder::ExtruderReport;
 
 /// Step of a simulated plant: papers.md, "Plant at 1 ms".

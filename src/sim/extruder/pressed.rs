@@ -3,7 +3,7 @@
 
 use super::plant::{STEP, SimPlant};
 use crate::cell::extruder::{InputLoad, PressurePlant};
-use crate::core::units::{MPa, Mm3PerS, Rpm};
+use crate::core::{MPa, Mm3PerS, Rpm};
 use crate::extruder::ExtruderReport;
 use crate::extruder::pressure::InitialState;
 use crate::extruder::rheology::PowerLaw;

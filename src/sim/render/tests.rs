@@ -2,8 +2,7 @@ use nalgebra::Vector3;
 
 use super::*;
 use crate::calibration::Camera;
-use crate::core::geometry::{Pose, Roi};
-use crate::core::units::WidthRange;
+use crate::core::{Pose, Roi, WidthRange};
 use crate::vision::Polarity;
 
 mod disturbed;

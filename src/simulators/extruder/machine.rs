@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::core::time::{Span, Stamp};
+use crate::core::{Span, Stamp};
 use crate::extruder::{ExtruderCommand, PumpMode};
 use crate::io::clock::RunClock;
 use crate::link::LineError;

@@ -3,8 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::core::robot::RobotMode;
-use crate::core::time::Stamp;
+use crate::core::{RobotMode, Stamp};
 use crate::io::clock::RunClock;
 use crate::link::robot::mode_word;
 use crate::link::{LineError, PcLine, PrintJob, RobotLine, RobotStatus, VirtualRobot};

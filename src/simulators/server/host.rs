@@ -6,7 +6,7 @@ use std::time::Duration;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 
 use super::peer::{Input, Peer};
-use crate::core::time::{Span, Stamp};
+use crate::core::{Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::link::LineFault;
 use crate::simulators::machine::{Answer, LinkMachine, Notice, RefusedLine};

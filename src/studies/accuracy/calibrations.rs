@@ -9,8 +9,7 @@ use crate::calibration::covariance::CalibrationCovariance;
 use crate::calibration::plane::{OnBed, bed_from_board};
 use crate::calibration::solve::{self, Solution};
 use crate::calibration::{Calibration, CalibrationQuality, Camera};
-use crate::core::geometry::{ImagePoint, Pose};
-use crate::core::units::Mm;
+use crate::core::{ImagePoint, Mm, Pose};
 use crate::sim::board_studio::{BoardStudio, Exposure};
 use crate::sim::hash;
 
@@ -221,9 +220,7 @@ impl CalibrationBench {
         // Y of the bed is the board's turned over.
         let middle = [cell[0] * sides.x, -cell[1] * sides.y];
         let half = 0.5 * BEAD_WIDTH_FRACTION * sides.x;
-        let end = |by: f64| {
-            map.to_px(crate::core::geometry::SurfacePoint::new(middle[0] + by, middle[1]))
-        };
+        let end = |by: f64| map.to_px(crate::core::SurfacePoint::new(middle[0] + by, middle[1]));
         Some(([end(-half)?, end(half)?], 2.0 * half))
     }
 }

@@ -24,10 +24,7 @@ mod profile;
 mod recipes;
 mod scene;
 
-use crate::core::frame::{Frame, Pixels, WrongSize};
-use crate::core::geometry::{Roi, Size};
-use crate::core::time::Stamp;
-use crate::core::units::{Mm, WidthRange};
+use crate::core::{Frame, Mm, Pixels, Roi, Size, Stamp, WidthRange, WrongSize};
 use crate::vision::{BeadAxis, Gauge, Polarity};
 use draw::Draw;
 use scene::DrawnScene;

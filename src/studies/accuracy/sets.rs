@@ -3,8 +3,7 @@
 mod limits;
 mod list;
 
-use crate::core::geometry::Roi;
-use crate::core::units::{Mm, WidthRange};
+use crate::core::{Mm, Roi, WidthRange};
 use crate::scenario::bead::EdgeRoughness;
 use crate::scenario::image::ImageModel;
 use crate::vision::{BeadAxis, Gauge, Polarity};

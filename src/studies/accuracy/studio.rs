@@ -6,9 +6,7 @@ use nalgebra::Vector3;
 
 use super::sets::{MM_PER_PX, Set};
 use crate::calibration::{Calibration, Camera, SurfaceMap};
-use crate::core::geometry::Pose;
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::core::{Mm, Pose, Stamp};
 use crate::scenario::bead::EdgeRoughness;
 use crate::scenario::image::ImageModel;
 use crate::sim::hash;

@@ -4,8 +4,7 @@
 use std::sync::Arc;
 
 use crate::cell::file::{Cell, RunPart};
-use crate::core::time::Span;
-use crate::core::units::Mm;
+use crate::core::{Mm, Span};
 use crate::width_control::strategy::distance::DistanceStrategy;
 use crate::width_control::target::WidthTarget;
 

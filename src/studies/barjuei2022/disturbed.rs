@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{ControlSetup, scale};
 use crate::cell::file::{Cell, RunPart};
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::numeric::average::mean;
 use crate::numeric::rank::mean_median;
 use crate::sim::cell::SimCellError;

@@ -3,7 +3,7 @@
 use super::disturbed::each;
 use super::{ControlSetup, scale};
 use crate::cell::file::{Cell, RunPart};
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::numeric::rank::mean_median;
 use crate::scenario::table::WidthSource;
 use crate::sim::cell::SimCellError;

@@ -5,9 +5,7 @@ use nalgebra::Vector3;
 use super::{MM_PER_PX, STAND_OFF_MM};
 use crate::calibration::{Calibration, Camera, SurfaceMap};
 use crate::cell::file::Cell;
-use crate::core::geometry::Pose;
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::core::{Mm, Pose, Stamp};
 use crate::sim::render::{RenderError, Renderer};
 use crate::vision::Measurer;
 

@@ -9,7 +9,7 @@ use std::path::Path;
 use super::{ControlSetup, LAYERS, LayerResult, LoopRates};
 use crate::cell::Cell;
 use crate::cell::file::{Purpose, RunPart};
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::io::progress::Progress;
 use crate::studies::barjuei2022 as paper;
 use crate::studies::error::ReproduceError;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::*;
 use crate::cell::file::{Cell, Purpose, RunPart};
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::trials::layer::LayerTrial;
 use crate::vision::MeasureMethod;
 

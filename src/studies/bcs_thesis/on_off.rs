@@ -14,8 +14,7 @@ pub use extruder_run::{
 pub use wheel::{EXPONENT, Sensors, WheelRun};
 
 use super::{drive, flow, wheel as motor};
-use crate::core::time::Span;
-use crate::core::units::{Mm2, Mm3PerS};
+use crate::core::{Mm2, Mm3PerS, Span};
 use crate::extruder::feedforward::{
     ExtruderModel, FeedforwardError, FlowForecast, FlowObserver, Inverse, InverseSettings,
     RightHalfPlaneZeros, ScrewSpeed, SpeedFeedforward, UnmodelledFlow,

@@ -6,8 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::response::{PlugResponse, PlugSample};
 use super::{SETPOINT, START};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::Mm;
+use crate::core::{Mm, Span, Stamp};
 use crate::extruder::screw::control::{Scheme, ScrewSettings};
 use crate::extruder::screw::{FillFeedback, Screw, ScrewControl, ScrewError, ScrewFault};
 use crate::sim::screw::{Integrator, SimScrew};

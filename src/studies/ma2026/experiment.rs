@@ -6,8 +6,7 @@ use super::plant::{
     DRIFT_MPA2, Factors, LAG_S, LOAD_RPM, MODEL_ERROR, NOISE_MPA2, STEP_MPA, model,
 };
 use super::response::PressureResponse;
-use crate::core::time::Stamp;
-use crate::core::units::{MPa, Rpm};
+use crate::core::{MPa, Rpm, Stamp};
 use crate::extruder::CommandLimits;
 use crate::extruder::pressure::kalman::PressureNoise;
 use crate::extruder::pressure::pi::{PressurePi, PressurePiGains};

@@ -5,7 +5,7 @@ use maud::html;
 use super::experiment::{PressureExperiment, TestedController};
 use super::margins::margins;
 use super::plant::Factors;
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS};
 use crate::extruder::demand;
 use crate::extruder::rheology::PowerLaw;
 use crate::io::progress::Progress;

@@ -4,7 +4,7 @@
 use nalgebra::Vector2;
 
 use super::width_input::WidthInput;
-use crate::core::geometry::SurfacePoint;
+use crate::core::SurfacePoint;
 use crate::numeric::gauss_legendre::GAUSS_LEGENDRE_5;
 use crate::vision::curve::EdgeCurve;
 

@@ -1,7 +1,7 @@
 //! Input of the width: two edges, and the map to the surface.
 
 use crate::calibration::SurfaceMap;
-use crate::core::geometry::SurfacePoint;
+use crate::core::SurfacePoint;
 use crate::vision::curve::{EdgeCurve, EdgePoint};
 use crate::vision::gauge::{Gauge, GaugeView};
 use crate::vision::located::CaliperEdge;

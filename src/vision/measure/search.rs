@@ -3,7 +3,7 @@
 
 use super::work::{BeadSearch, MIN_LINE_FRACTION, MeasureState};
 use crate::calibration::SurfaceMap;
-use crate::core::units::WidthRange;
+use crate::core::WidthRange;
 use crate::numeric::number::{narrow_to_f32, to_f32, to_f64};
 use crate::vision::edge::{STEP_HALF_WIDTH, StepCandidates, respond};
 use crate::vision::gauge::{GaugeView, Polarity, WidthRangePx};

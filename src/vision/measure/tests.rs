@@ -1,9 +1,6 @@
 use super::*;
 use crate::calibration::{Calibration, Camera};
-use crate::core::frame::Pixels;
-use crate::core::geometry::{Pose, Roi, Size};
-use crate::core::time::Stamp;
-use crate::core::units::{Mm, WidthRange};
+use crate::core::{Mm, Pixels, Pose, Roi, Size, Stamp, WidthRange};
 use crate::vision::gauge::{BeadAxis, EdgeKind, Polarity};
 use nalgebra::Vector3;
 use rand::SeedableRng;

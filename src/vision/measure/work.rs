@@ -1,7 +1,7 @@
 //! The state of a measurement. Its buffers are kept from frame to frame.
 
 use crate::calibration::SurfaceMap;
-use crate::core::geometry::ImagePoint;
+use crate::core::ImagePoint;
 use crate::vision::axis;
 use crate::vision::coarse::{LinePair, LineSearch};
 use crate::vision::contour::EdgeContours;

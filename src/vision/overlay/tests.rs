@@ -1,7 +1,5 @@
 use super::*;
-use crate::core::frame::{Frame, Pixels};
-use crate::core::geometry::{Roi, Size};
-use crate::core::time::Stamp;
+use crate::core::{Frame, Pixels, Roi, Size, Stamp};
 use crate::numeric::blurred_step::StepTable;
 use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::edge_windows::Grouping;

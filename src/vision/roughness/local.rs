@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 
 use crate::calibration::SurfaceMap;
-use crate::core::geometry::SurfacePoint;
+use crate::core::SurfacePoint;
 use crate::numeric::number::to_f64;
 use crate::vision::width::Caliper;
 
@@ -137,7 +137,7 @@ fn fill(lines: usize, sections: &[Section], value: impl Fn(&Section) -> f64) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::geometry::ImagePoint;
+    use crate::core::ImagePoint;
     use crate::vision::width::CaliperPoint;
 
     /// A bead of 40 px that slants, whose lines 3 and 4 are missing.

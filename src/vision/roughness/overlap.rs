@@ -2,7 +2,7 @@
 //! piece have the same widths there.
 
 use super::local::LocalWidths;
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::numeric::number::{to_count, to_f64};
 
 /// Smallest part of the gauge that two frames must share to be compared.

@@ -3,9 +3,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
-use crate::core::frame::{Frame, Pixels};
-use crate::core::geometry::{Roi, Size};
-use crate::core::time::Stamp;
+use crate::core::{Frame, Pixels, Roi, Size, Stamp};
 use crate::vision::gauge::{BeadAxis, GaugeView};
 use crate::vision::pool;
 use crate::vision::strip::{GaugeRowsOfDepth, RowLayout};

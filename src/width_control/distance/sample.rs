@@ -2,7 +2,7 @@
 
 use super::speed_history::SpeedHistory;
 use super::width_model::WidthInnovation;
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// Smallest relative standard deviation of a width: between two reports the speed is not
 /// known exactly.

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use super::kind::{CellParameters, Registration, WidthControlSettings, WidthStrategy};
-use crate::core::units::MmPerS;
+use crate::core::MmPerS;
 use crate::document::Table;
 use crate::width_control::controller::{
     BoxedController, SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,

@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use super::kind::{CellParameters, Registration, WidthControlSettings, WidthStrategy};
 use super::pi::{PiControl, cautious_gains};
-use crate::core::time::Stamp;
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS, Stamp};
 use crate::document::Table;
 use crate::width_control::controller::{
     BeadReport, BoxedController, Outlook, SpeedRequest, Tracking, WidthController, WidthSample,

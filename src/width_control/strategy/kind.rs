@@ -5,8 +5,7 @@ use std::any::Any;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use crate::core::time::Span;
-use crate::core::units::{Mm, MmPerS, WidthRange};
+use crate::core::{Mm, MmPerS, Span, WidthRange};
 use crate::document::Table;
 use crate::width_control::controller::BoxedController;
 use crate::width_control::limiter::SpeedLimits;

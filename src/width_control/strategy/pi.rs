@@ -4,8 +4,7 @@
 use std::sync::Arc;
 
 use super::kind::{CellParameters, Registration, WidthControlSettings, WidthStrategy};
-use crate::core::time::{Span, Stamp};
-use crate::core::units::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS, Span, Stamp};
 use crate::width_control::controller::{
     BoxedController, SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
 };

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use crate::calibration::dictionary::Dictionary;
 use crate::cli::arguments::parse_length;
 use crate::cli::board_arguments::{InnerCorners, parse_board, parse_dictionary, parse_square};
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// Converts a calibration to ROS's `camera_info` or OpenCV's YAML, or from them.
 #[derive(Debug, Args)]

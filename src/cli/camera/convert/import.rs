@@ -10,7 +10,7 @@ use crate::calibration::{CalibrationQuality, file};
 use crate::cli::bed_plane::{BedPlane, BoardsOnBed, find_corners};
 use crate::cli::board_arguments::{InnerCorners, board_of};
 use crate::cli::print::print;
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// Largest reprojection error (RMS) of corners on the bed \[px\]; beyond it the images are not of
 /// this camera, or the boards lay on no plane.

@@ -1,6 +1,6 @@
 //! The result beside the cell's present value.
 
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// Prints the cell's present value beside the result, and the lines for its file.
 pub fn tell(offset_mm: f64, sigma_mm: f64, now: Option<Mm>) {

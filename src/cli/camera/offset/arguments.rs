@@ -6,7 +6,7 @@ use clap::{ArgMatches, Args, Command, FromArgMatches};
 
 use crate::cli::arguments::{WrongArguments, parse_length};
 use crate::cli::board_arguments::BoardArgs;
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// Finds how far the nozzle is from the middle of the gauge: a cell's `offset_mm`.
 #[derive(Debug, Args)]

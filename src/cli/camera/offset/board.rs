@@ -12,8 +12,7 @@ use crate::calibration::nozzle_offset::{
 use crate::cell::file::{Mount, Purpose};
 use crate::cli::arguments::WrongArguments;
 use crate::cli::board_image::{check_size, find_board};
-use crate::core::geometry::GridSize;
-use crate::core::units::Mm;
+use crate::core::{GridSize, Mm};
 use crate::sim::view::gauge_middle;
 use crate::vision::BeadAxis;
 

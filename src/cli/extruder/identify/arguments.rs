@@ -13,7 +13,7 @@ use crate::cli::arguments::WrongArguments;
 use crate::cli::extruder::log::bead::{BeadArgs, LAID_FLOW};
 use crate::cli::extruder::log::columns::{ColumnArgs, refuse_same};
 use crate::cli::extruder::setting::SettingArgs;
-use crate::core::quantity::Quantity;
+use crate::core::Quantity;
 use crate::identify::experiment::Experiment;
 use crate::identify::fit::{DeadTime, FitSettings, Structure};
 use crate::numeric::hampel::Hampel;

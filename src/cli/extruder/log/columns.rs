@@ -3,7 +3,7 @@
 use clap::Args;
 
 use crate::cli::arguments::WrongArguments;
-use crate::core::quantity::{Quantity, Unit};
+use crate::core::{Quantity, Unit};
 use crate::identify::series::TimeSeries;
 
 /// Time, units and part of a log.

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use crate::cli::arguments::WrongArguments;
-use crate::core::units::Mm;
+use crate::core::Mm;
 
 /// Lengths that are taken \[mm\].
 const LENGTHS_MM: std::ops::RangeInclusive<f64> = 0.0..=1e5;

@@ -4,7 +4,7 @@ use anyhow::{Context, Result, anyhow};
 
 use super::columns::ColumnArgs;
 use crate::cli::arguments::WrongArguments;
-use crate::core::quantity::Unit;
+use crate::core::Unit;
 use crate::identify::experiment::ExperimentError;
 use crate::identify::table::{DataTable, DataTableError};
 

@@ -10,7 +10,7 @@ use crate::cell::Cell;
 use crate::cell::file::Purpose;
 use crate::cli::arguments::WrongArguments;
 use crate::cli::recorded::{begins_with, open, refuse_foreign};
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::identify::series::TimeSeries;
 use crate::identify::table::DataTable;
 use crate::io::bead_columns::{BeadColumns, BeadFacts, columns};

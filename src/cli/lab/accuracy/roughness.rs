@@ -9,7 +9,7 @@ use super::arguments::AccuracyArgs;
 use super::publish::{Texts, make_folder};
 use crate::calibration::SurfaceMap;
 use crate::cli::print::Verbosity;
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::io::progress::SharedProgress;
 use crate::studies::accuracy::drawn::LongBead;
 use crate::studies::accuracy::roughness_table::{

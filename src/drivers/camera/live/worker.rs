@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TryRecvError, TrySendError, bounded};
 
-use crate::core::frame::Frame;
+use crate::core::Frame;
 use crate::drivers::camera::fault;
 use crate::run::ports::SourceError;
 

@@ -1,8 +1,6 @@
 //! `foxglove.RawImage` as a frame.
 
-use crate::core::frame::{Channel, Frame, Pixels, SampleLayout};
-use crate::core::geometry::Size;
-use crate::core::time::Stamp;
+use crate::core::{Channel, Frame, Pixels, SampleLayout, Size, Stamp};
 use crate::io::foxglove::RawImage;
 
 /// Encodings that are read.

@@ -2,9 +2,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::control::event::Event;
-use crate::core::time::Stamp;
-use crate::core::units::Mm;
+use crate::control::Event;
+use crate::core::{Mm, Stamp};
 
 /// Heights over time. Copies share what they know, so that one can be asked
 /// while another is being filled.
@@ -34,8 +33,7 @@ impl RobotZ {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::robot::{RobotMode, RobotState};
-    use crate::core::units::MmPerS;
+    use crate::core::{MmPerS, RobotMode, RobotState};
 
     #[test]
     fn the_newest_state_counts() {

@@ -4,12 +4,8 @@ use std::path::PathBuf;
 
 use super::*;
 use crate::cell::file::KeepFrames;
-use crate::control::event::Event;
-use crate::control::step::Step;
-use crate::core::frame::Pixels;
-use crate::core::geometry::Size;
-use crate::core::robot::{RobotMode, RobotState};
-use crate::core::units::{Mm, MmPerS};
+use crate::control::{Event, Step};
+use crate::core::{Mm, MmPerS, Pixels, RobotMode, RobotState, Size};
 use crate::io::foxglove::timestamp;
 use crate::io::recorder::{RecordConfig, start};
 use crate::run::ports::Recorder;

@@ -1,10 +1,7 @@
 use super::*;
 use crate::calibration::Calibration;
 use crate::cell::ImageSource;
-use crate::core::frame::Frame;
-use crate::core::geometry::Roi;
-use crate::core::robot::RobotMode;
-use crate::core::units::{Mm, MmPerS, WidthRange};
+use crate::core::{Frame, Mm, MmPerS, RobotMode, Roi, WidthRange};
 use crate::scenario::bead::{BeadModel, EdgeRoughness};
 use crate::scenario::disturbance::Flow;
 use crate::scenario::image::ImageModel;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::core::units::Rpm;
+use crate::core::Rpm;
 use crate::extruder::CommandLimits;
 use crate::extruder::feedforward::{
     ExtruderModel, InverseSettings, RightHalfPlaneZeros, ScrewSpeed,

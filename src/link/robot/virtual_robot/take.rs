@@ -1,8 +1,7 @@
 //! What the robot does with a line of the PC.
 
 use super::{Phase, VirtualRobot};
-use crate::core::time::Stamp;
-use crate::core::units::MmPerS;
+use crate::core::{MmPerS, Stamp};
 use crate::link::frame::{ErrCode, LineRefusal, Validity};
 use crate::link::robot::params::RobotParams;
 use crate::link::robot::pc_line::PcLine;

@@ -5,7 +5,7 @@ use maud::html;
 
 use super::draw;
 use super::experiments::Experiments;
-use crate::core::units::Mm;
+use crate::core::Mm;
 use crate::io::progress::Progress;
 use crate::studies::barjuei2022::{
     ControlSetup, FlowDisturbance, LAYERS, LayerResult, LoopRates, Mismatch, error_ratio, lay,

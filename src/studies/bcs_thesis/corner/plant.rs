@@ -67,7 +67,7 @@ impl CornerRun {
         let mut command = voltage(0.0);
         g1.settle(command)?;
         g2.settle(command * drive()?.dc_gain())?;
-        let held = crate::core::time::Span::from_secs(period);
+        let held = crate::core::Span::from_secs(period);
         let mut next = 0.0;
         let mut flow = Vec::new();
         for now in moments(speed.duration_s()) {

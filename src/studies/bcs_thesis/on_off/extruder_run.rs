@@ -1,6 +1,6 @@
 //! Voltage and flow of the extruder in a run, independent of the wheel.
 
-use crate::core::time::Stamp;
+use crate::core::Stamp;
 use crate::extruder::feedforward::FeedforwardError;
 use crate::numeric::average::mean;
 use crate::numeric::lti::{Between, Simulator};

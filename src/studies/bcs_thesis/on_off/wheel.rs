@@ -3,7 +3,7 @@
 use super::extruder_run::{
     AREA_MM2, ExtruderRun, JUDGED_FROM_S, MM_PER_S_PER_RPM, STEP_S, at, to_steps,
 };
-use crate::core::units::Mm3PerS;
+use crate::core::Mm3PerS;
 use crate::extruder::feedforward::{FeedforwardError, FlowMeasurement};
 use crate::numeric::average::mean;
 use crate::numeric::lti::{Between, Simulator};

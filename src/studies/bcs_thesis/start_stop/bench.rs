@@ -1,6 +1,6 @@
 //! Beads with pauses between them, laid by a timing strategy, and their void and drool.
 
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::extruder::start_stop::{BeadConditions, Pause, StartStopTiming};
 use crate::sim::melt::{Melt, MeltParameters};
 

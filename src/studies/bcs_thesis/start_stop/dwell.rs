@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::bench::{StartStopBench, StartStopScore, StartStopStrategy};
-use crate::core::time::Span;
+use crate::core::Span;
 use crate::extruder::start_stop::Pause;
 use crate::sim::melt::MeltParameters;
 

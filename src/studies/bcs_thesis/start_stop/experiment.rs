@@ -5,8 +5,7 @@ use rayon::prelude::*;
 
 use super::bench::{PAUSES_S, StartStopBench, StartStopScore, StartStopTrace};
 use super::dwell::{Dwell, tune};
-use crate::core::time::Span;
-use crate::core::units::{Mm3PerS, MmPerS};
+use crate::core::{Mm3PerS, MmPerS, Span};
 use crate::extruder::start_stop::{BeadConditions, StartStopTiming};
 use crate::identify::start_stop::{StartStopFit, StartStopFitError, fit};
 use crate::numeric::number::to_f64;
