@@ -23,8 +23,8 @@ pub trait WidthController: Debug + Send {
     /// The robot reported while it lays bead.
     fn robot_reported(&mut self, _: &BeadReport) {}
 
-    /// A width was measured. Returns whether this controller sets the speed from now on, or
-    /// continues to; none where it does not (yet).
+    /// Takes a measured width. Returns the tracking state where this controller sets the speed
+    /// after it, or still does; `None` where it does not (yet).
     fn measured(&mut self, sample: &WidthSample, trace: &mut WidthTrace) -> Option<Tracking>;
 
     /// A setpoint is due on a bead that is priming or tracking. A controller that can track
@@ -100,7 +100,7 @@ impl Tracking {
 /// The state of a bead before a setpoint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outlook {
-    /// Now.
+    /// Time of the decision.
     pub now: Stamp,
     /// Path of the nozzle.
     pub path: Option<Mm>,
@@ -117,7 +117,7 @@ pub struct SpeedRequest {
     pub path: Option<Mm>,
     /// When the robot will have that speed.
     pub from: Stamp,
-    /// For how long.
+    /// How long it will have it.
     pub lasts: Span,
     /// Mean target width of the bead that is laid in that time; none where the robot's
     /// state is not known.

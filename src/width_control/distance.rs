@@ -120,7 +120,7 @@ pub struct DistanceController {
     validation: ModelValidation,
     /// Path of the nozzle at the first of the latest widths without a known speed \[mm\].
     unmatched_since_mm: Option<f64>,
-    /// Whether such widths lasted too long on this bead.
+    /// Whether widths had no known speed over too much path on this bead.
     is_unmatched: bool,
 }
 
@@ -190,8 +190,8 @@ impl DistanceController {
         self.validation.is_contradicted().then_some(FallbackReason::ModelContradicted)
     }
 
-    /// The speed at which the bead is `width` wide in the mean over a time; `None` before the
-    /// first width.
+    /// Speed at which the mean width over a time is `width`; `None` before the first width, or if
+    /// `width` is not positive.
     pub fn speed(&self, width: Mm, from: Stamp, lasts: Span) -> Option<MmPerS> {
         if !self.is_ready() || width <= Mm::ZERO {
             return None;

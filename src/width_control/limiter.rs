@@ -10,7 +10,7 @@ use crate::core::{MmPerS, MmPerS2, Span};
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum SpeedLimit {
-    /// None.
+    /// No limit acted.
     #[default]
     None,
     /// The lowest speed of the cell.
@@ -21,9 +21,9 @@ pub enum SpeedLimit {
     Acceleration,
     /// The acceleration of the cell, while slowing down.
     Deceleration,
-    /// The robot's own: it moves slower than its setpoint.
+    /// A limit of the robot's own: it moves slower than its setpoint.
     RobotSlower,
-    /// The robot's own: it moves faster than its setpoint.
+    /// A limit of the robot's own: it moves faster than its setpoint.
     RobotFaster,
 }
 

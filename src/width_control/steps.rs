@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::core::{Mm, MmPerS, WidthRange};
 
-/// The pieces: length over the camera's reach, and change of the speed in steps. Drawn at
-/// random once, with lengths of 0.7 to 2 and no two equal neighbours; of the draws the one
-/// with the smallest autocorrelation at other distances.
+/// The pieces: length over the camera's reach, and change of the speed in steps. Drawn at random,
+/// with lengths of 0.7 to 2 and no two equal neighbours; this is the draw with the smallest
+/// autocorrelation at distances other than zero.
 const PIECES: [(f64, f64); 11] = [
     (1.3, 1.0),
     (0.8, -1.0),
@@ -25,8 +25,8 @@ const PIECES: [(f64, f64); 11] = [
     (1.2, 0.0),
     (0.85, -1.0),
 ];
-/// Shortest reach that pieces are made for, as of a camera at the nozzle. Shorter pieces
-/// would be laid before the robot has reached their speed.
+/// Shortest camera reach that the lengths of the pieces are scaled with; a camera at the nozzle has
+/// less. Shorter pieces would be laid before the robot has reached their speed.
 const SHORTEST_REACH: Mm = Mm::constant(20.0);
 /// Fraction of the accepted range of widths, at either end, in which a width ends the
 /// experiment.

@@ -65,14 +65,14 @@ impl WidthTarget {
         Self { width, along: Vec::new(), layers: None }
     }
 
-    /// The same with a profile along every bead: knots in the order of the path. Before the
-    /// first and after the last knot the width is constant.
+    /// Adds a profile along every bead: knots in the order of the path. Before the first and after
+    /// the last knot the width is constant.
     pub fn along(mut self, knots: Vec<Knot>) -> Self {
         self.along = knots;
         self
     }
 
-    /// The same with layers.
+    /// Adds layers.
     pub fn by_layer(mut self, layers: Layers) -> Self {
         self.layers = Some(layers);
         self

@@ -66,8 +66,8 @@ impl NoiseAutocorrelation {
             .clamp(0.0, MAX_INFLATION)
     }
 
-    /// The same without the excess variance of one width, which may be a pulsation that is
-    /// not yet known.
+    /// [`Self::inflation`] without the excess variance of one width, which may be a pulsation that
+    /// is not yet known.
     pub fn correlated_inflation(&self) -> f64 {
         1.0 + (self.correlated_variance - CHANCE_CORRELATION).clamp(0.0, MAX_INFLATION)
     }

@@ -17,7 +17,7 @@ const MAX_WIDTHS: usize = 32;
 const WIDTHS_AFTER_CHANGE: [usize; 8] = [3, 4, 5, 7, 10, 14, 20, 28];
 /// Squared size of a change, in variances, from which it is detected: 5 standard deviations.
 const MIN_SQUARED_SIZE: f64 = 25.0;
-/// The same without the two most influential widths: 3 standard deviations.
+/// [`MIN_SQUARED_SIZE`] without the two most influential widths: 3 standard deviations.
 const MIN_SQUARED_SIZE_WITHOUT_TWO: f64 = 9.0;
 /// Smallest fraction of the gauge after a change from which a width counts. The size that a
 /// width implies is divided by this fraction, and so is its noise.
@@ -74,7 +74,7 @@ pub struct FlowChange {
     onset_mm: f64,
     /// By how much ln A changed.
     pub size: f64,
-    /// Variance of that.
+    /// Variance of `size`.
     pub variance: f64,
     /// Squared size in variances, with the uncertainty of the model before it.
     squared_significance: f64,

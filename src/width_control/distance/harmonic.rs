@@ -87,7 +87,7 @@ impl Harmonic {
         ];
     }
 
-    /// The level has changed by a size that is known to a variance.
+    /// Shifts the level by `by`, which has this variance.
     pub fn shift(&mut self, by: f64, variance: f64) {
         self.parts[0] += by;
         self.covariance[0] += variance;
@@ -99,7 +99,7 @@ impl Harmonic {
         cos * self.parts[1] + sin * self.parts[2]
     }
 
-    /// Its mean between two such times.
+    /// Mean of the pulsation between two times after the last value \[s\].
     pub fn mean(&self, from_s: f64, to_s: f64) -> f64 {
         let half = 0.5 * self.rad_per_s * (to_s - from_s);
         let kept = if half.abs() < 1e-9 { 1.0 } else { libm::sin(half) / half };

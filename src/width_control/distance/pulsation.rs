@@ -81,7 +81,7 @@ impl FlowPulsation {
         }
     }
 
-    /// The flow has changed: ln A by `by`, known to a variance.
+    /// The flow has changed: shifts ln A of every hypothesis by `by`, which has this variance.
     pub fn shift(&mut self, by: f64, variance: f64) {
         self.level_only.shift(by, variance);
         for hypothesis in &mut self.harmonics {
@@ -97,7 +97,7 @@ impl FlowPulsation {
             .sum()
     }
 
-    /// Its mean over a time \[s\].
+    /// Mean pulsation of ln w of bead laid between two times \[s\].
     pub fn mean(&self, from_s: f64, to_s: f64) -> f64 {
         let Some(last) = self.last_s else { return 0.0 };
         let mean = |harmonic: &Harmonic| harmonic.mean(from_s - last, to_s - last);

@@ -16,7 +16,8 @@ const MAX_UNMODELLED_SIGMA: f64 = 0.03;
 /// Variance by the uncertain offset, over that of the width, from which a sample does not
 /// update the exponent.
 const MAX_EXPONENT_OFFSET_VARIANCE: f64 = 0.5;
-/// The same from which a sample says nothing about changes of the flow.
+/// Variance by the uncertain offset, over that of the width, from which a sample says nothing about
+/// changes of the flow.
 const MAX_FLOW_OFFSET_VARIANCE: f64 = 4.0;
 
 /// The piece of bead over which a width is the mean.

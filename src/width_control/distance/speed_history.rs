@@ -145,8 +145,8 @@ impl SpeedHistory {
         }
     }
 
-    /// Duration of a piece of path \[s\]: that by the speeds, as far as jitter of the reports
-    /// explains the difference to the time between them.
+    /// Duration of a piece of path \[s\]: `by_speed`, as far as jitter of the reports explains its
+    /// difference to `time` between them.
     fn duration(&mut self, time: f64, by_speed: f64) -> f64 {
         let early = self.early_s * libm::exp(-time / DELAY_TIME_CONSTANT_S);
         self.early_s = (early + by_speed - time).clamp(-MAX_REPORT_DELAY_S, MAX_REPORT_DELAY_S);
@@ -195,7 +195,7 @@ impl SpeedHistory {
         Some(change / (to_mm - from_mm).max(MIN_PIECE_MM))
     }
 
-    /// Speed over a segment that is shifted into the history.
+    /// Speed over a segment, which is shifted into the history where it is partly outside.
     pub fn mean_near(&self, from_mm: f64, to_mm: f64) -> Option<LnSpeed> {
         let (first, last) = (self.nodes.front()?, self.nodes.back()?);
         let shift = (first.path_mm - from_mm).max(0.0) - (to_mm - last.path_mm).max(0.0);

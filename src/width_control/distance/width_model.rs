@@ -217,7 +217,7 @@ impl WidthModel {
         self.covariance = [(level - slope * both).max(0.0), 0.0, kept];
     }
 
-    /// The same after ln A has changed by a size that is known to a variance.
+    /// The model after ln A has changed by `size`, which has this variance.
     pub fn after_change(mut self, size: f64, variance: f64) -> Self {
         self.ln_width += size;
         self.covariance[0] += variance;

@@ -36,7 +36,7 @@ fn read(control: &Table<'_>) -> Option<Arc<dyn WidthStrategy>> {
 }
 
 impl StepsStrategy {
-    /// The steps in a cell.
+    /// Settings of the step experiment in a cell.
     pub fn settings(&self, cell: &CellParameters) -> StepSettings {
         StepSettings {
             start_speed: cell.start_speed,
