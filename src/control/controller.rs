@@ -53,7 +53,7 @@ impl Controller {
         Self { setup, width, extruder: None, phase: Phase::Idle, bead, robot, camera_lost: false }
     }
 
-    /// The same with an extruder that is commanded.
+    /// Adds the side of an extruder that is commanded.
     pub fn with_extruder(mut self, setup: ExtruderSetup, demand: FlowDemand) -> Self {
         self.extruder = Some(ExtruderControl::new(setup, demand));
         self
@@ -73,7 +73,7 @@ impl Controller {
         step
     }
 
-    /// The robot side's answer.
+    /// Answers an event on the robot side alone.
     fn steer(&mut self, now: Stamp, event: &Event) -> Step {
         let mut trace = Trace::default();
         let mut command = None;

@@ -18,10 +18,10 @@ pub enum Event {
         captured_at: Stamp,
         /// Width of the bead at the surface.
         width_mm: Mm,
-        /// Standard deviation of that width, as the measurement believes it.
+        /// Standard deviation of that width, as the measurement estimates it.
         sigma_mm: Mm,
     },
-    /// A frame was looked at and refused, or could not be read.
+    /// A frame was rejected by the measurement, or could not be read.
     Rejected {
         /// Number of the frame.
         frame: u64,
@@ -34,7 +34,7 @@ pub enum Event {
     Robot(RobotState),
     /// The link to the robot came up, or came up again.
     LinkUp {
-        /// What the robot said of itself.
+        /// Limits that the robot reported.
         robot: RobotLimits,
     },
     /// The link to the robot was lost.

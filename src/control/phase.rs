@@ -23,9 +23,9 @@ pub enum Phase {
 /// Control of one bead.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bead {
-    /// Its mode.
+    /// Mode of control.
     pub mode: Mode,
-    /// Its stage.
+    /// Run-up, even speed or end.
     pub stage: BeadStage,
     /// The last setpoint, once there was one.
     pub setpoint: Option<Setpoint>,
@@ -113,7 +113,7 @@ impl Bead {
         matches!(why, Hold::RobotHolds | Hold::LinkDown | Hold::SpeedMismatch)
     }
 
-    /// Whether a fault has ended it.
+    /// Whether it is in fault.
     pub fn is_faulty(&self) -> bool {
         matches!(self.mode, Mode::Fault { .. })
     }
@@ -125,7 +125,7 @@ impl Phase {
         if let Self::Bead(bead) = self { Some(bead) } else { None }
     }
 
-    /// The same, mutable.
+    /// The bead, mutable, while one is controlled.
     pub fn bead_mut(&mut self) -> Option<&mut Bead> {
         if let Self::Bead(bead) = self { Some(bead) } else { None }
     }

@@ -23,7 +23,7 @@ impl Controller {
         robot.path.observe(now, state);
         robot.state = Some(*state);
         robot.silent_since = None;
-        // Also where the last bead ended while the link was down.
+        // Compared across connections: the last bead may have ended while the link was down.
         let before = robot.last_path.replace(state.path_mm);
         robot.is_another_bead |=
             before.is_some_and(|last| state.path_mm < last - SAME_BEAD_TOLERANCE);
@@ -95,7 +95,7 @@ impl Controller {
     }
 
     fn begin_bead(&mut self, state: &RobotState, before: Option<Mm>) {
-        // The bead began where the last report before it had the robot standing.
+        // The bead began at the path of the last report before it, when the robot stood.
         let stood = before.filter(|path| {
             state.path_mm - *path < MAX_LAID_BEFORE_FIRST_REPORT && state.path_mm >= *path
         });
@@ -105,7 +105,7 @@ impl Controller {
         self.width.begin_bead();
     }
 
-    /// The reason for a hold has gone: priming goes on, or a width is waited for.
+    /// Continues when the reason for a hold has gone: primes again, or waits for a width.
     fn resume(&mut self, now: Stamp, state: &RobotState) {
         let Some(bead) = self.phase.bead_mut() else { return };
         bead.mode = if self.camera_lost {

@@ -1,4 +1,4 @@
-//! What a controller decides, and why.
+//! What a controller decides, and the reasons for it.
 
 use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
@@ -26,11 +26,11 @@ pub enum Command {
 pub enum Hold {
     /// No width for longer than the cell allows.
     NoWidth,
-    /// The robot holds its own speed.
+    /// The robot moves at its own hold speed.
     RobotHolds,
     /// The link to the robot is down.
     LinkDown,
-    /// The robot does not move at the speed that it was told.
+    /// The robot does not move at its setpoint.
     SpeedMismatch,
     /// The robot's limits are narrower than the cell's.
     RobotLimits,
@@ -42,20 +42,20 @@ pub enum Hold {
     Stopping,
 }
 
-/// Why the controller gave up. Left only by a new bead.
+/// Why the controller stopped the robot. Left when the robot is idle again.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Fault {
     /// Held for longer than the cell allows, for this reason.
     HeldTooLong(Hold),
-    /// The robot did not move at the speed that it was told.
+    /// The robot did not move at its setpoint for too long.
     SpeedMismatch,
     /// The robot stopped with a fault of its own.
     Robot,
-    /// The robot stopped without having been told to.
+    /// The robot stopped without a command to stop.
     RobotStopped,
-    /// The extruder was stopped.
+    /// The extruder is in fault.
     Extruder(ExtruderFault),
 }
 
@@ -67,13 +67,13 @@ pub enum State {
     /// The robot is not printing.
     #[default]
     Idle,
-    /// First stretch of a bead, at the start speed.
+    /// The first part of a bead is laid at the start speed.
     Priming,
-    /// The width is being corrected.
+    /// The width controller sets the speed.
     Tracking,
-    /// The speed is kept as it is.
+    /// The speed is kept.
     Holding(Hold),
-    /// The robot has been told to stop.
+    /// The robot is commanded to stop.
     Fault(Fault),
 }
 
@@ -93,35 +93,35 @@ pub struct Trace {
     /// When that frame was captured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub captured_at: Option<Stamp>,
-    /// Where along the path the bead that was measured had been laid.
+    /// Path at which the measured bead was laid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bead_path_mm: Option<Mm>,
-    /// Distance of the nozzle along the path when the frame was captured.
+    /// Path of the nozzle when the frame was captured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nozzle_path_mm: Option<Mm>,
-    /// Whether bead of this run lies under the camera: false before a bead has
-    /// come so far, and while the robot is idle.
+    /// Whether bead of this run lies under the camera: false until it has come that far, and while
+    /// the robot is idle.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub bead_expected: bool,
-    /// Measured less wanted width.
+    /// Measured less target width.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error_mm: Option<Mm>,
     /// Part of the demand that is proportional to the error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub proportional_mm_per_s: Option<MmPerS>,
-    /// Part of the demand that the controller has gathered.
+    /// Integral part of the demand.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub integral_mm_per_s: Option<MmPerS>,
-    /// Speed that the controller would like.
+    /// Speed that the width controller demands, before the limits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub demand_mm_per_s: Option<MmPerS>,
-    /// What the law by distance made of the width.
+    /// Estimates of control by distance after the width.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distance: Option<DistanceTrace>,
-    /// Why the width is held by the PI law instead of the one by distance.
+    /// Why PI control has taken over from control by distance, if it has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fallback: Option<FallbackReason>,
-    /// How far the course of steps is, where the cell asks for one.
+    /// Progress of a step experiment, where the cell has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<StepsTrace>,
     /// The last limit that acted.
@@ -131,7 +131,7 @@ pub struct Trace {
 /// What the extruder side did.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ExtruderStep {
-    /// What to send to the extruder now; often nothing.
+    /// Command to send to the extruder now; often none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command: Option<ExtruderCommand>,
     /// The state after the event.
@@ -144,14 +144,14 @@ pub struct ExtruderStep {
 #[must_use = "a step says what to send to the robot"]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Step {
-    /// What to send to the robot now; mostly nothing.
+    /// Command to send to the robot now; mostly none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command: Option<Command>,
     /// The state after the event.
     pub state: State,
-    /// The numbers behind it.
+    /// The numbers behind the command.
     pub trace: Trace,
-    /// The extruder side's part, in the steps that are its own.
+    /// The extruder side's answer; `None` to events of the robot side.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub extruder: Option<ExtruderStep>,
 }
