@@ -1,4 +1,4 @@
-//! Plain types that everything speaks: units, time, geometry, frames.
+//! Plain types that all modules use: units, time, geometry, frames, robot reports.
 
 mod frame;
 mod geometry;

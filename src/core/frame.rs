@@ -43,21 +43,21 @@ pub struct Frame {
     pixels: Pixels,
 }
 
-/// Pixels that do not fill the size that was named with them.
+/// A number of grey values that does not match the size of the image.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("an image of {width}x{height} px needs {} values, found {found}", width * height)]
 pub struct WrongSize {
-    /// Width that was named \[px\].
+    /// Stated width \[px\].
     pub width: usize,
-    /// Height that was named \[px\].
+    /// Stated height \[px\].
     pub height: usize,
-    /// Values that were given.
+    /// Number of grey values.
     pub found: usize,
 }
 
 impl Frame {
-    /// Takes `width * height` values, row by row; fails on any other number,
-    /// and on an image without pixels.
+    /// Takes `width * height` grey values, row by row. Fails for any other number, and for an image
+    /// without pixels.
     pub fn new(
         seq: u64,
         captured_at: Stamp,
@@ -91,8 +91,8 @@ impl Frame {
         &self.pixels
     }
 
-    /// The grey values on a scale of 8 bits, for display and for methods that
-    /// know no other. 16-bit values lose their lower half.
+    /// The grey values on a scale of 8 bits, for display and for methods that need it. 16-bit
+    /// values lose their lower byte.
     pub fn to_grey8(&self) -> std::borrow::Cow<'_, [u8]> {
         match &self.pixels {
             Pixels::Grey8(values) => values.into(),

@@ -5,8 +5,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// The part of a colour image that is measured. Grey images are taken as they
-/// are, whichever is chosen.
+/// The part of a colour image that is measured. A grey image is used as it is, whichever channel is
+/// chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Channel {
@@ -57,7 +57,7 @@ impl SampleLayout {
 
 /// A sample of 8 or 16 bits.
 pub trait Sample: Copy + Into<u32> {
-    /// The low bits of a value that is known to fit.
+    /// The low bits of a value, which is known to fit.
     fn of(value: u32) -> Self;
 }
 
@@ -102,7 +102,7 @@ impl Channel {
         }
     }
 
-    /// As a cell file names it.
+    /// Name of the channel in a cell file.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Grey => "grey",
@@ -119,7 +119,7 @@ impl fmt::Display for Channel {
     }
 }
 
-/// A name that is not one of a channel.
+/// A name that is none of a channel.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("\"{0}\" is not a channel: use \"grey\", \"red\", \"green\" or \"blue\"")]
 pub struct UnknownChannel(pub String);
