@@ -1,4 +1,4 @@
-//! What a controller is plugged into, and what drives it.
+//! The runner that drives a controller, and the interfaces to camera, robot and recording.
 
 pub mod ports;
 pub mod runner;

@@ -1,47 +1,46 @@
-//! What the controller is plugged into. Every trait has at least a live and a
-//! simulated side.
+//! The interfaces of a controller to camera, robot, extruder and recording. Every trait has at
+//! least a live and a simulated implementation.
 
 use crate::control::{Command, Event, Step};
 use crate::core::{Frame, RefusalReason, RobotLimits, RobotMode, RobotState, Stamp};
 use crate::extruder::{ExtruderCommand, ExtruderLimits, ExtruderReport};
 
-/// Gives frames, one after the other.
+/// Gives frames one after the other.
 pub trait FrameSource: Send {
     /// Waits for the next frame. `Ok(None)` is the orderly end of the source.
     /// A frame that is there but cannot be decoded is [`Grab::Unreadable`],
     /// not an error; an error means that no further frame will come.
     fn next_frame(&mut self) -> Result<Option<Grab>, SourceError>;
 
-    /// How many frames there will be, where that is known.
+    /// Number of frames, where it is known.
     fn expected_frames(&self) -> Option<u64> {
         None
     }
 }
 
-/// One turn of a frame source.
+/// Result of one read of a frame source.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Grab {
     /// An image.
     Frame {
         /// The image.
         frame: Frame,
-        /// Seconds since the source's first frame, or as the source's own
-        /// table of times has them; `None` where it knows none.
+        /// Seconds since the source's first frame, or by the source's own table of times; `None`
+        /// where it has none.
         time_s: Option<f64>,
     },
-    /// There should be an image, but it cannot be read.
+    /// There is a frame, but it cannot be read.
     Unreadable {
         /// Its number.
         seq: u64,
-        /// Its time as above.
+        /// Its time, as that of [`Grab::Frame`].
         time_s: Option<f64>,
         /// Which file or message, and what is wrong with it.
         reason: String,
     },
 }
 
-/// A source that gives no more frames, with what was found, where, and what to
-/// do.
+/// A source that gives no more frames: what was found, where, and what to do.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("camera {source_name}: {what}")]
 pub struct SourceError {
@@ -51,14 +50,15 @@ pub struct SourceError {
     pub what: String,
 }
 
-/// What a device reports, with the time of arrival; `L` is what it can do, `S` what it does.
+/// What a device reports, with the time of arrival. `L` is the type of its limits, `S` that of its
+/// state.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DeviceEvent<L, S> {
     /// The link came up, or came up again.
     Up {
         /// When.
         at: Stamp,
-        /// What the device can do.
+        /// Limits of the device.
         limits: L,
     },
     /// The device reported its state.
@@ -77,7 +77,7 @@ pub enum DeviceEvent<L, S> {
         /// What was refused and why, in words for the operator.
         text: String,
     },
-    /// The link was lost, or could not be made. Reported again only when the reason changes.
+    /// The link was lost, or could not be established. Reported again only when the reason changes.
     Down {
         /// When.
         at: Stamp,
@@ -113,15 +113,15 @@ impl From<ExtruderEvent> for Event {
     }
 }
 
-/// A command has left the PC.
+/// A command that was sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sent {
     /// Just after its bytes were written.
     pub at: Stamp,
 }
 
-/// Why a command has not left the PC. None of these ends a run: a link reports its own
-/// loss as a [`DeviceEvent`].
+/// Why a command was not sent. None of these ends a run: a link reports its own loss as a
+/// [`DeviceEvent`].
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SendError {
     /// The link is down.
@@ -142,16 +142,16 @@ pub enum SendError {
         /// Its last mode.
         mode: RobotMode,
     },
-    /// Outside the limits of the cell or of the device.
+    /// A value outside the limits of the cell or of the device.
     #[error("{value} {unit} is not within {min} to {max}")]
     OutsideLimits {
-        /// What was to be sent.
+        /// The value.
         value: f64,
         /// Its unit.
         unit: &'static str,
-        /// Smallest that is allowed.
+        /// Smallest allowed value.
         min: f64,
-        /// Largest that is allowed.
+        /// Largest allowed value.
         max: f64,
     },
     /// The device is not the one that the cell was written for.
@@ -165,28 +165,28 @@ pub enum SendError {
         /// Why, in words for the operator.
         text: String,
     },
-    /// The bytes could not be written in time; the connection is given up.
+    /// The bytes could not be written in time; the connection is closed.
     #[error("writing to the {device} failed: {reason}")]
     Write {
         /// `robot` or `extruder`.
         device: &'static str,
-        /// What the system says.
+        /// The system's error message.
         reason: String,
     },
 }
 
-/// Takes commands to the robot.
+/// Sends commands to the robot.
 pub trait RobotPort: Send {
-    /// Sends a command, or says why it cannot leave now.
+    /// Sends a command; fails where that is not possible now.
     fn send(&mut self, now: Stamp, command: Command) -> Result<Sent, SendError>;
 
     /// Ends the link in order. The last setpoint expires at the robot.
     fn close(&mut self) {}
 }
 
-/// Takes commands to the extruder.
+/// Sends commands to the extruder.
 pub trait ExtruderPort: Send {
-    /// Sends a command, or says why it cannot leave now.
+    /// Sends a command; fails where that is not possible now.
     fn send(&mut self, now: Stamp, command: ExtruderCommand) -> Result<Sent, SendError>;
 
     /// Ends the link in order. The last command expires at the extruder.
@@ -203,7 +203,7 @@ impl ExtruderPort for NoExtruder {
     }
 }
 
-/// An extruder or none, where a cell may have one.
+/// The extruder of a cell that may have none.
 impl<X: ExtruderPort> ExtruderPort for Option<X> {
     fn send(&mut self, now: Stamp, command: ExtruderCommand) -> Result<Sent, SendError> {
         match self {
@@ -239,10 +239,10 @@ impl ExtruderPort for Box<dyn ExtruderPort> {
     }
 }
 
-/// Keeps what happened.
+/// Records events and steps.
 pub trait Recorder {
-    /// Keeps an event and the step that answered it, in this order. Fails when
-    /// they cannot be kept; control must not go on then.
+    /// Records an event and the step that answered it, in the order of the calls. After an error
+    /// control must not continue.
     fn record(&mut self, now: Stamp, event: &Event, step: &Step) -> Result<(), RecordError>;
 }
 

@@ -1,5 +1,5 @@
-//! Drives a controller and what it is plugged into: every event goes through
-//! here, whether the cell is live or simulated.
+//! Drives a controller with its robot, extruder and recorder. Every event of a live or simulated
+//! cell passes through here.
 
 use super::ports::{ExtruderPort, NoExtruder, RecordError, Recorder, RobotPort, SendError, Sent};
 use crate::control::{Controller, Event, Step};
@@ -15,30 +15,29 @@ pub struct Runner<R, K, X = NoExtruder> {
     failure: Option<RecordError>,
 }
 
-/// What became of an event.
+/// The result of an event.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Handled {
     /// The controller's answer.
     pub step: Step,
-    /// What became of the command to the robot, if there was one.
+    /// Whether the command to the robot was sent, if there was one.
     pub robot: Option<Result<Sent, SendError>>,
-    /// What became of the command to the extruder, if there was one.
+    /// Whether the command to the extruder was sent, if there was one.
     pub extruder: Option<Result<Sent, SendError>>,
 }
 
 impl<R: RobotPort, K: Recorder> Runner<R, K> {}
 
 impl<R: RobotPort, K: Recorder, X: ExtruderPort> Runner<R, K, X> {
-    /// Plugs a controller in.
+    /// A runner before the first event.
     pub fn with_extruder(controller: Controller, robot: R, extruder: X, recorder: K) -> Self {
         Self { controller, robot, extruder, recorder, failure: None }
     }
 
-    /// Answers an event: step, send, record, in this order, so that the disk
-    /// is never between a decision and the machine. Where both sides get a
-    /// command, as at the end of a run, the extruder gets it first: a robot
-    /// that stops under a running pump is worse than the other way round. What
-    /// cannot be recorded ends control in hold.
+    /// Answers an event: step, send, record, in this order, so that no command waits for the disk.
+    /// Where both sides get a command, as at the end of a run, the extruder gets it first: a robot
+    /// that stops under a running pump is worse than the other way round. After an event that could
+    /// not be recorded, control ends in a hold.
     pub fn handle(&mut self, now: Stamp, event: &Event) -> Handled {
         let step = self.controller.step(now, event);
         let command = step.extruder.and_then(|extruder| extruder.command);
@@ -65,23 +64,23 @@ impl<R: RobotPort, K: Recorder, X: ExtruderPort> Runner<R, K, X> {
         self.failure.as_ref()
     }
 
-    /// The robot's side.
+    /// The robot.
     pub fn robot_mut(&mut self) -> &mut R {
         &mut self.robot
     }
 
-    /// The extruder's side.
+    /// The extruder.
     pub fn extruder_mut(&mut self) -> &mut X {
         &mut self.extruder
     }
 
-    /// Takes everything apart at the end.
+    /// Controller, robot and recorder, at the end of a run.
     pub fn into_parts(self) -> (Controller, R, K) {
         (self.controller, self.robot, self.recorder)
     }
 }
 
-/// Keeps nothing, for cells that are not recorded.
+/// Records nothing.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NoRecorder;
 
