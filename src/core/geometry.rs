@@ -18,23 +18,23 @@ pub struct Size {
 }
 
 impl Size {
-    /// So many columns and rows.
+    /// From the numbers of columns and rows.
     pub const fn new(width: usize, height: usize) -> Self {
         Self { width, height }
     }
 }
 
-/// Columns and rows of something that lies in a grid.
+/// Columns and rows of a grid, such as the corners of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GridSize {
-    /// How many along a row.
+    /// Number of columns.
     pub columns: usize,
-    /// How many along a column.
+    /// Number of rows.
     pub rows: usize,
 }
 
 impl GridSize {
-    /// So many columns and rows.
+    /// From the numbers of columns and rows.
     pub const fn new(columns: usize, rows: usize) -> Self {
         Self { columns, rows }
     }
@@ -75,17 +75,17 @@ impl Pose {
         Self { rotation: Rotation3::new(rotation_rad), translation: translation_mm }
     }
 
-    /// Takes a point of the inner frame to the outer one \[mm\].
+    /// Transforms a point from the inner frame to the outer one \[mm\].
     pub fn apply(&self, inner: Point3<f64>) -> Point3<f64> {
         self.rotation * inner + self.translation
     }
 
-    /// Takes a point of the outer frame to the inner one \[mm\].
+    /// Transforms a point from the outer frame to the inner one \[mm\].
     pub fn apply_inverse(&self, outer: Point3<f64>) -> Point3<f64> {
         self.rotation.inverse() * (outer - self.translation)
     }
 
-    /// Takes a direction of the outer frame to the inner one.
+    /// Rotates a direction from the outer frame to the inner one.
     pub fn turn_inverse(&self, outer: Vector3<f64>) -> Vector3<f64> {
         self.rotation.inverse() * outer
     }
@@ -95,9 +95,8 @@ impl Pose {
         Self { rotation, translation: translation_mm }
     }
 
-    /// The rotation as a Rodrigues vector \[rad\]. By way of a quaternion,
-    /// because a matrix of half a turn (a camera that looks straight down)
-    /// does not show its axis in its skew part.
+    /// The rotation as a Rodrigues vector \[rad\]. Computed from a quaternion: the skew part of a
+    /// matrix of half a turn, as of a camera that looks straight down, is zero and gives no axis.
     pub fn rotation_rad(&self) -> Vector3<f64> {
         UnitQuaternion::from_rotation_matrix(&self.rotation).scaled_axis()
     }

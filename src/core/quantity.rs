@@ -1,4 +1,4 @@
-//! What a column holds: its name ends with the unit.
+//! The quantity in a column: its name ends with the unit.
 
 use std::fmt;
 
@@ -37,8 +37,8 @@ pub enum Unit {
     One,
 }
 
-/// Each with the end of a column's name and its symbol. A longer end comes
-/// before one that it ends with.
+/// Each unit with the end of a column's name and its symbol. A longer end comes before a shorter
+/// one that it ends with.
 const UNITS: [(Unit, &str, &str); 15] = [
     (Unit::Rpm, "rpm", "rpm"),
     (Unit::MPa, "mpa", "MPa"),
@@ -58,12 +58,12 @@ const UNITS: [(Unit, &str, &str); 15] = [
 ];
 
 impl Unit {
-    /// All of them.
+    /// All units.
     pub fn all() -> impl Iterator<Item = Self> {
         UNITS.iter().map(|unit| unit.0)
     }
 
-    /// By the end of a column's name, such as `screw_rpm` or `rpm`.
+    /// The unit at the end of a column's name, such as `screw_rpm` or `rpm`; `None` without one.
     pub fn of_column(name: &str) -> Option<Self> {
         let name = name.to_ascii_lowercase();
         let ends = |end: &str| {
@@ -72,23 +72,23 @@ impl Unit {
         UNITS.iter().find(|unit| ends(unit.1)).map(|unit| unit.0)
     }
 
-    /// By its own word, as [`Unit::word`] writes it.
+    /// The unit with this word, as [`Unit::word`] gives it; `None` for others.
     pub fn of_word(word: &str) -> Option<Self> {
         UNITS.iter().find(|unit| unit.1 == word).map(|unit| unit.0)
     }
 
-    /// The end of a column's name.
+    /// The unit as the end of a column's name.
     pub fn word(self) -> &'static str {
         self.entry().1
     }
 
-    /// As it is written behind a number.
+    /// The unit as it is printed after a number.
     pub fn symbol(self) -> &'static str {
         self.entry().2
     }
 
     fn entry(self) -> (Self, &'static str, &'static str) {
-        // Every unit has its line; a test sees to it.
+        // Every unit is in the table, which a test checks.
         UNITS.into_iter().find(|unit| unit.0 == self).unwrap_or((self, "1", "1"))
     }
 }
@@ -109,7 +109,8 @@ pub struct Quantity {
 }
 
 impl Quantity {
-    /// Of a column whose name ends with its unit, or whose unit is given.
+    /// The quantity of a column. The unit is `unit`, else the one that the name ends with; `None`
+    /// without either.
     pub fn of_column(column: &str, unit: Option<Unit>) -> Option<Self> {
         let unit = unit.or_else(|| Unit::of_column(column))?;
         let lower = column.to_ascii_lowercase();

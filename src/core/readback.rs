@@ -6,18 +6,18 @@ use super::units::MmPerS;
 /// Time that the speed of a robot takes to follow, unless its own is known: one over the
 /// angular frequency of a loop of 10 Hz, as the 2022 paper has it.
 pub const ROBOT_LAG: Span = Span::from_millis(16);
-/// Fraction of the setpoint by which the speed may differ (robot link, Rules).
+/// Largest difference of the speed from the setpoint, as a fraction (robot link, Rules).
 const SPEED_TOLERANCE: f64 = 0.10;
-/// Fraction from which the robot counts as limited by itself.
+/// Difference, as a fraction, above which the robot counts as limited by itself.
 const LIMITED_FRACTION: f64 = 0.03;
 /// How long a difference may last before it counts as a limit.
 const LIMITED_AFTER: Span = Span::from_millis(300);
-/// How long it may last before the controller holds.
+/// How long a difference above [`SPEED_TOLERANCE`] may last before the controller holds.
 const HOLD_AFTER: Span = Span::from_millis(500);
-/// How long before it gives up.
+/// How long it may last before the controller stops the robot.
 const FAULT_AFTER: Span = Span::from_millis(2000);
 
-/// Watches the speed that is read back.
+/// Monitors the speed that is read back.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpeedMonitor {
     slower: Option<Stamp>,
@@ -25,19 +25,19 @@ pub struct SpeedMonitor {
     outside: Option<Stamp>,
 }
 
-/// What the speed read back says.
+/// The speed that is read back, compared with the setpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SpeedMatch {
     /// The robot follows its setpoint.
     #[default]
     Follows,
-    /// It has moved slower for a while: a limit of its own.
+    /// It has been slower for a while: a limit of its own.
     Slower,
-    /// It has moved faster for a while.
+    /// It has been faster for a while.
     Faster,
-    /// It has been more than a tenth off for long enough to hold.
+    /// It has been off by more than the tolerance for long enough to hold.
     Mismatch,
-    /// It has been more than a tenth off for long enough to give up.
+    /// It has been off by more than the tolerance for long enough to stop the robot.
     Lost,
 }
 
@@ -47,8 +47,8 @@ impl SpeedMonitor {
         self.observe_relative(now, driven.get(), setpoint.get())
     }
 
-    /// The same for a speed of any unit; below 1 of it a difference counts as
-    /// if it were one of 1.
+    /// [`Self::observe`] for a speed in any unit. The difference is relative to the setpoint, or to
+    /// 1 where the setpoint is smaller.
     pub fn observe_relative(&mut self, now: Stamp, driven: f64, setpoint: f64) -> SpeedMatch {
         let error = (driven - setpoint) / setpoint.max(1.0);
         mark(&mut self.slower, now, error < -LIMITED_FRACTION);

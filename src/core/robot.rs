@@ -1,10 +1,10 @@
-//! What a robot reports of itself, whatever it is connected by.
+//! What a robot reports, whatever the link.
 
 use serde::{Deserialize, Serialize};
 
 use crate::core::units::{Mm, MmPerS};
 
-/// What the robot does.
+/// Mode of the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub enum RobotMode {
@@ -14,7 +14,7 @@ pub enum RobotMode {
     Print,
     /// Laying bead at its own hold speed, because no setpoint is valid.
     Hold,
-    /// Stopped by command or for want of setpoints.
+    /// Stopped by command, or because it got no setpoints.
     Stop,
     /// Stopped by a fault of its own.
     Fault,
@@ -35,25 +35,25 @@ pub struct RobotState {
     pub robot_time_ms: Option<u64>,
     /// Whether it has applied a setpoint on this connection.
     pub has_setpoint: bool,
-    /// What it does.
+    /// Its mode.
     pub mode: RobotMode,
     /// Speed along the path.
     pub speed_mm_per_s: MmPerS,
-    /// Distance of the nozzle along the path.
+    /// Path of the nozzle.
     pub path_mm: Mm,
     /// Height of the nozzle in the robot's frame.
     pub z_mm: Mm,
 }
 
-/// What the robot can do, as it reports when the link comes up.
+/// Name and speeds of a robot, which it reports when the link comes up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RobotLimits {
     /// Its name.
     pub name: String,
-    /// Slowest setpoint that it takes.
+    /// Slowest setpoint that it accepts.
     pub min_mm_per_s: MmPerS,
-    /// Fastest setpoint that it takes.
+    /// Fastest setpoint that it accepts.
     pub max_mm_per_s: MmPerS,
-    /// Speed to which it goes when setpoints run out.
+    /// Speed at which it moves when its setpoint has expired.
     pub hold_mm_per_s: MmPerS,
 }

@@ -30,8 +30,7 @@ impl Stamp {
         Self(ns)
     }
 
-    /// From seconds since the run began; what is negative or not a number is
-    /// the start.
+    /// From seconds since the run began; a negative value and NaN give the start.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -57,7 +56,7 @@ impl Stamp {
 }
 
 impl Span {
-    /// No time at all.
+    /// A span of zero.
     pub const ZERO: Self = Self(0);
 
     /// From signed nanoseconds.

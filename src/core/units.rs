@@ -18,8 +18,8 @@ pub struct NotFinite {
     pub unit: &'static str,
 }
 
-/// Overflow saturates. The operands of every operator are finite, so NaN can
-/// only come from a factor that is not, and is refused there as zero.
+/// Overflow saturates. The operands of every operator are finite, so NaN can only come from a
+/// factor that is not finite; it becomes zero.
 fn saturate(value: f64) -> f64 {
     if value.is_nan() { 0.0 } else { value.clamp(f64::MIN, f64::MAX) }
 }
@@ -32,7 +32,7 @@ macro_rules! unit {
         pub struct $name(f64);
 
         impl $name {
-            /// Nothing of it.
+            /// Zero.
             pub const ZERO: Self = Self(0.0);
             /// Symbol of the unit.
             pub const SYMBOL: &'static str = $symbol;
@@ -46,8 +46,7 @@ macro_rules! unit {
                 }
             }
 
-            /// A constant known to be finite; fails to compile in a constant
-            /// that is not.
+            /// A constant; fails to compile unless it is finite.
             pub const fn constant(value: f64) -> Self {
                 assert!(value.is_finite(), "a constant must be finite");
                 Self(value)
@@ -58,7 +57,7 @@ macro_rules! unit {
                 self.0
             }
 
-            /// Size without sign.
+            /// Magnitude.
             pub fn abs(self) -> Self {
                 Self(self.0.abs())
             }
