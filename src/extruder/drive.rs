@@ -23,7 +23,7 @@ pub enum CommandQuantity {
 }
 
 impl CommandQuantity {
-    /// All of them with the word of each in a cell file.
+    /// All quantities, each with its word in a cell file.
     pub const WORDS: [(&'static str, Self); 6] = [
         ("rpm", Self::Rpm),
         ("volts", Self::Volts),

@@ -94,7 +94,7 @@ pub enum FeedforwardError {
     /// A number that is not positive.
     #[error("{what} is {value}: it must be above 0")]
     NotPositive {
-        /// Which.
+        /// Name of the number.
         what: &'static str,
         /// The value.
         value: f64,

@@ -34,7 +34,7 @@ pub enum LimitError {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum CommandLimit {
-    /// None.
+    /// No limit acted.
     #[default]
     None,
     /// The smallest command.

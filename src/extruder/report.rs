@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::drive::CommandQuantity;
 use crate::core::{MPa, Mm, Mm3PerS, Rpm};
 
-/// What the pump of an extruder does.
+/// State of the pump of an extruder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub enum PumpMode {
@@ -24,7 +24,7 @@ pub enum PumpMode {
 /// One report of an extruder. Quantities without a sensor are absent.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ExtruderReport {
-    /// What the pump does.
+    /// State of the pump.
     pub pump: PumpMode,
     /// Whether the shut-off valve is open; true where there is none.
     pub valve_open: bool,
@@ -42,17 +42,16 @@ pub struct ExtruderReport {
     pub filled_mm: Option<Mm>,
 }
 
-/// What an extruder can do, as it reports when the link comes up.
+/// Command and range of an extruder, which it reports when the link comes up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderLimits {
     /// Its name.
     pub name: String,
-    /// What it is commanded in.
+    /// Quantity of its command.
     pub quantity: CommandQuantity,
-    /// Smallest command that it takes while the pump is to run, in the unit of
-    /// `quantity`.
+    /// Smallest command that it accepts while the pump runs, in the unit of `quantity`.
     pub min: f64,
-    /// Largest command that it takes, in the same unit.
+    /// Largest command that it accepts, in the same unit.
     pub max: f64,
 }
 

@@ -1,6 +1,6 @@
-//! Pressure and screw speed for a print speed: the bead's section
-//! ([`super::demand::section`]) gives the flow, the nozzle's power law the pressure, the
-//! screw's drag flow its speed. Each both ways. Ma et al. 2026, eqs. (1) to (5).
+//! Pressure and screw speed for a print speed: the bead's section ([`super::demand::section`])
+//! gives the flow, the nozzle's power law the pressure, and the screw's drag flow its speed. Both
+//! laws are also inverted. Ma et al. 2026, eqs. (1) to (5).
 
 use crate::core::{MPa, Mm3PerS, Rpm};
 

@@ -32,7 +32,7 @@ pub enum ExtruderStrategy {
 }
 
 impl ExtruderStrategy {
-    /// Its controller.
+    /// The controller of the strategy.
     pub fn controller(&self) -> &dyn ExtruderController {
         match self {
             Self::Constant(controller) => controller,
@@ -44,7 +44,7 @@ impl ExtruderStrategy {
         }
     }
 
-    /// The same, mutable.
+    /// The controller of the strategy, mutable.
     pub fn controller_mut(&mut self) -> &mut dyn ExtruderController {
         match self {
             Self::Constant(controller) => controller,

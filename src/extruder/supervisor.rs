@@ -34,7 +34,7 @@ use sequencer::{StartStopSequencer, TransitionRatios};
 /// of flow and lets an error of the model speed the robot up more.
 const MAX_SPEED_RATIO: f64 = 1.5;
 
-/// Everything that the extruder side has to know of its cell.
+/// Parameters of the cell for the extruder side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderSetup {
     /// What is commanded.

@@ -86,7 +86,7 @@ impl FlowObserver {
         Mm3PerS::new(self.predicted(after_s).sum()).unwrap_or_default()
     }
 
-    /// Its standard deviation then.
+    /// Standard deviation of that estimate.
     pub fn sigma(&self, at: Stamp) -> Mm3PerS {
         let after_s = self.at.map_or(0.0, |last| (at - last).secs().max(0.0));
         Mm3PerS::new(self.predicted_covariance(after_s).sum().max(0.0).sqrt()).unwrap_or_default()

@@ -24,7 +24,7 @@ struct Entry {
 pub struct LagStates {
     /// The pressure of a process with lag and gain and no dead time.
     pub first: f64,
-    /// The same through the lag once more, for the sensitivity to the lag.
+    /// `first` through the lag once more, for the sensitivity to the lag.
     pub second: f64,
 }
 
@@ -54,7 +54,7 @@ pub struct CommandHistory {
     lag_s: f64,
     /// The oldest first; never empty.
     entries: VecDeque<Entry>,
-    /// How many are kept.
+    /// Number of commands that are kept.
     capacity: usize,
 }
 
@@ -94,7 +94,7 @@ impl CommandHistory {
         }
     }
 
-    /// The model at a moment; before the oldest command, the oldest.
+    /// The model at a moment \[s\]; for one before the oldest command, the model at that command.
     pub fn at(&self, at_s: f64) -> ModelMoment {
         let entry = self.in_force(at_s);
         let dt_s = if entry.at_s.is_finite() { at_s - entry.at_s } else { 0.0 };

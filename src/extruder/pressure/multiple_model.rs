@@ -45,7 +45,7 @@ pub struct PressurePrediction {
 }
 
 impl PressurePrediction {
-    /// The same with a pressure that is higher by some standard deviations, and gain, lag and
+    /// The prediction for a pressure that is higher by some standard deviations, with gain, lag and
     /// load as expected then.
     pub fn higher(&self, deviations: f64) -> Self {
         let [gain, lag, load] = self.slopes;

@@ -23,8 +23,8 @@ pub struct SpeedPulsation {
 pub enum Conveying {
     /// (L − x)/c(t): all of the distance at the speed of the moment of arrival, as in eq. (16).
     AtPresentSpeed,
-    /// The time over which the speed integrates to the distance, as on a belt. The same where
-    /// the speed is constant.
+    /// The time over which the speed integrates to the distance, as on a belt. Equal to
+    /// [`Self::AtPresentSpeed`] where the speed is constant.
     AtSpeedOnTheWay,
 }
 

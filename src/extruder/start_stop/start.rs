@@ -22,7 +22,7 @@ pub struct Start {
     min_speed_ratio: f64,
     robot_lag: Span,
     first_flow_s: f64,
-    /// Remaining flow of before at the first flow, over the demanded flow.
+    /// Flow that remains from before the pause at the first flow, over the demanded flow.
     remaining_flow_ratio: f64,
     robot_s: f64,
 }

@@ -65,8 +65,7 @@ impl InverseFeedforward {
         Self { tracker, about, predictor: None, planned, is_on_plan, applied, command, backlog_s }
     }
 
-    /// The same with a prediction of the flow. The forecast works in deviations from the
-    /// operating point.
+    /// Adds a prediction of the flow. The forecast works in deviations from the operating point.
     pub fn with_forecast(mut self, forecast: FlowForecast) -> Self {
         self.predictor = Some(FlowPredictor { forecast, screw_speed: None, flow: Mm3PerS::ZERO });
         self
