@@ -10,9 +10,9 @@ pub enum AlignError {
     /// Columns of different lengths.
     #[error("{positions} positions and {measured} measured values: expected one of each a sample")]
     Length {
-        /// Positions.
+        /// Number of positions.
         positions: usize,
-        /// Measured values.
+        /// Number of measured values.
         measured: usize,
     },
     /// The position of measurement is ahead of the nozzle.
@@ -27,19 +27,19 @@ pub enum AlignError {
          grows; turn its sign, or use one bead alone"
     )]
     Falls {
-        /// Which one.
+        /// Number of the sample.
         at: usize,
         /// Position there.
         position: f64,
         /// Position before.
         before: f64,
     },
-    /// A number that is none.
+    /// A position that is not finite.
     #[error("the position of sample {at} is {position}")]
     NotFinite {
-        /// Which one.
+        /// Number of the sample.
         at: usize,
-        /// What it is.
+        /// The position.
         position: f64,
     },
 }

@@ -84,7 +84,7 @@ pub fn find(
     study(states, widths, search).map(|study| study.estimate)
 }
 
-/// The same with the fitted model of the bead.
+/// Estimates the offset, and returns the fitted model of the bead with it.
 pub fn study(
     states: &[(Stamp, RobotState)],
     widths: &[TimedWidth],

@@ -29,7 +29,7 @@ pub enum CommandProfileError {
     /// Time does not increase.
     #[error("value {at} of a profile begins at {from_s} s, the one before it at {before_s} s")]
     Order {
-        /// Which one.
+        /// Number of the value.
         at: usize,
         /// When it begins \[s\].
         from_s: f64,
@@ -39,9 +39,9 @@ pub enum CommandProfileError {
     /// A value is not finite.
     #[error("value {at} of a profile is {value}")]
     NotFinite {
-        /// Which one.
+        /// Number of the value.
         at: usize,
-        /// What it is.
+        /// The value.
         value: f64,
     },
     /// It ends before its last value begins.

@@ -5,7 +5,7 @@ pub fn six_digits(value: f64) -> String {
     rounded(value, 5)
 }
 
-/// The same to three digits, for approximate values.
+/// A value to three significant digits, for approximate values.
 pub fn three_digits(value: f64) -> String {
     rounded(value, 2)
 }

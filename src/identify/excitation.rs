@@ -72,7 +72,7 @@ pub enum ExcitationError {
         /// The level.
         value: f64,
     },
-    /// Something else that is no profile.
+    /// Another reason why the values form no profile.
     #[error(transparent)]
     Profile(#[from] CommandProfileError),
 }
@@ -84,7 +84,7 @@ pub enum Waveform {
     Prbs {
         /// Length of the register, 3 to 16.
         bits: u32,
-        /// Smallest level; a draw below is repeated.
+        /// Level of a zero.
         low: f64,
         /// Level of a one.
         high: f64,
@@ -95,7 +95,7 @@ pub enum Waveform {
         mean: f64,
         /// Their standard deviation, before the limits.
         sigma: f64,
-        /// Smallest level; what is drawn below is drawn again.
+        /// Smallest level; a draw outside the limits is repeated.
         low: f64,
         /// Largest level.
         high: f64,
@@ -248,7 +248,7 @@ mod tests {
         assert!((sigma - 0.2).abs() < 4.0 * 0.2 / 4000_f64.sqrt(), "{sigma}");
         let wide = levels(1.0);
         assert!(wide.iter().all(|level| (2.0..=4.0).contains(level)));
-        // What is drawn again does not gather at the limits.
+        // Repeated draws do not pile up at the limits.
         assert!(wide.iter().all(|level| *level != 2.0 && *level != 4.0));
         assert_eq!(levels(0.2), narrow);
     }

@@ -21,11 +21,11 @@ const MIN_RELATIVE_RANGE: f64 = 1e-9;
 pub enum DataNote {
     /// Gaps that were bridged.
     Bridged {
-        /// How many.
+        /// Number of gaps.
         count: usize,
-        /// The longest one.
+        /// The longest gap.
         longest: SampleGap,
-        /// The longest that would be \[s\].
+        /// Longest gap that may be bridged \[s\].
         limit_s: f64,
     },
     /// Uneven sampling.
@@ -70,11 +70,11 @@ pub struct Rules {
 pub struct Experiment {
     /// Moment of the first sample \[s\].
     pub start_s: f64,
-    /// From sample to sample \[s\].
+    /// Sampling interval \[s\].
     pub step_s: f64,
-    /// What goes in, in its own unit.
+    /// Input, in its own unit.
     pub input: Vec<f64>,
-    /// What comes out, in its own unit.
+    /// Output, in its own unit.
     pub output: Vec<f64>,
     /// Whether each input value holds until the next, as a command does, instead of being
     /// interpolated.
@@ -117,7 +117,7 @@ impl Experiment {
         Ok(Self { start_s, step_s, input, output, input_is_held, notes })
     }
 
-    /// Samples.
+    /// Number of samples.
     #[expect(clippy::len_without_is_empty, reason = "an experiment has fifty samples or more")]
     pub fn len(&self) -> usize {
         self.input.len().min(self.output.len())
@@ -196,7 +196,7 @@ pub(super) fn check_gaps(
     rules: &Rules,
 ) -> Result<Option<(SampleGap, f64)>, ExperimentError> {
     let limit_s = rules.max_gap_s.unwrap_or(grid.usual_limit_s());
-    // A limit of so many steps includes a gap of as many.
+    // A gap as long as the limit is bridged, in spite of rounding.
     let is_long = |gap: &&SampleGap| gap.length_s > limit_s * (1.0 + 1e-6);
     let count = grid.gaps.iter().filter(is_long).count();
     match grid.longest() {

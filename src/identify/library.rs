@@ -59,9 +59,9 @@ pub enum LibraryError {
     /// None fits.
     #[error("no model for {wanted}; {}", list(.known))]
     Absent {
-        /// What was asked for.
+        /// The requested conditions and quantities.
         wanted: String,
-        /// What is there.
+        /// The available models.
         known: Vec<String>,
     },
     /// More than one fits equally well.
@@ -70,9 +70,9 @@ pub enum LibraryError {
         .fit.join("; ")
     )]
     Ambiguous {
-        /// What was asked for.
+        /// The requested conditions and quantities.
         wanted: String,
-        /// Those that fit.
+        /// The models that fit.
         fit: Vec<String>,
     },
 }
@@ -111,13 +111,13 @@ impl fmt::Display for ModelEntry {
 }
 
 impl Library {
-    /// Of these models.
+    /// From models in any order.
     pub fn new(mut entries: Vec<ModelEntry>) -> Self {
         entries.sort_by(|a, b| a.name.cmp(&b.name));
         Self { entries }
     }
 
-    /// All of them.
+    /// All models.
     pub fn entries(&self) -> &[ModelEntry] {
         &self.entries
     }

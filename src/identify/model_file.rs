@@ -59,20 +59,20 @@ pub struct FitSummary {
     pub step_s: f64,
     /// NRMSE fit to the data that it was fitted to \[%\].
     pub estimation_percent: f64,
-    /// The same on other data.
+    /// NRMSE fit to other data \[%\]; `None` without any.
     pub validation_percent: Option<f64>,
 }
 
 /// A model of an extruder: output − its operating point = G(s)·(input − its operating point).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelFile {
-    /// What it holds for.
+    /// Conditions for which it holds.
     pub conditions: Conditions,
     /// Its form, such as `fopdt` or `2,1`.
     pub kind: String,
-    /// What goes in.
+    /// Quantity and unit of the input.
     pub input: Quantity,
-    /// What comes out.
+    /// Quantity and unit of the output.
     pub output: Quantity,
     /// Smallest and largest input in the data.
     pub input_range: (f64, f64),
@@ -80,9 +80,9 @@ pub struct ModelFile {
     pub operating_point: (f64, f64),
     /// G(s), stable.
     pub transfer: TransferFunction,
-    /// What the noise leaves open.
+    /// Standard errors and covariance of the parameters, if the file has them.
     pub uncertainty: Option<ParameterUncertainty>,
-    /// What it was fitted to.
+    /// Data and quality of the fit, if the file has them.
     pub fit: Option<FitSummary>,
 }
 

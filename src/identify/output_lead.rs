@@ -16,8 +16,8 @@ const MAX_LEAD_S: f64 = 10.0;
 const LEAD_FRACTIONS: [f64; 3] = [1.0, 0.25, 0.0625];
 /// Largest sum of squared residuals with a lead over that of the best causal model.
 const MAX_RESIDUAL_RATIO: f64 = 0.8;
-/// The same as a likelihood ratio over independent samples. A choice: far above the 3.84 of χ²
-/// at 95 %.
+/// Smallest likelihood ratio of a model with a lead to that causal model, over independent samples.
+/// A choice: far above the 3.84 of χ² at 95 %.
 const MIN_LIKELIHOOD_RATIO: f64 = 20.0;
 /// Fit below which nothing is concluded about the clocks \[%\].
 const MIN_FIT_PERCENT: f64 = 30.0;

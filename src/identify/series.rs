@@ -4,14 +4,14 @@
 use super::experiment::{Experiment, ExperimentError, MIN_SAMPLES, Rules, check_gaps};
 use super::grid::{TimeGrid, usual_step};
 
-/// One column.
+/// A column with its times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeSeries {
     /// Its name, which ends with its unit.
     pub name: String,
     /// Moments, which only grow \[s\].
     pub time_s: Vec<f64>,
-    /// A value each.
+    /// The value at each time.
     pub values: Vec<f64>,
     /// Whether each value holds until the next, as a command does.
     pub is_held: bool,
@@ -65,8 +65,8 @@ impl TimeSeries {
         Some(low + (high - low) * (time_s - from) / (to - from))
     }
 
-    /// Mean of held values between two moments. The last value is held on; the first holds
-    /// before.
+    /// Mean of held values between two moments. The first value also holds before its time, the
+    /// last one after the end.
     fn held_mean(&self, from_s: f64, to_s: f64) -> f64 {
         let first = self.time_s.partition_point(|time| *time <= from_s).saturating_sub(1);
         let value = |at: usize| self.values.get(at).or(self.values.last()).copied().unwrap_or(0.0);

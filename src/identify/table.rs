@@ -12,7 +12,7 @@ pub enum DataTableError {
     /// A line that is not one of a table.
     #[error("line {line}: {what}")]
     Line {
-        /// Which one.
+        /// Number of the line.
         line: u64,
         /// What is wrong with it.
         what: String,
@@ -26,9 +26,9 @@ pub enum DataTableError {
     /// No column of this name.
     #[error("there is no column {name}; the columns are {}", .known.join(", "))]
     NoColumn {
-        /// What was asked for.
+        /// The requested name.
         name: String,
-        /// Those that are there.
+        /// Names of the columns.
         known: Vec<String>,
     },
     /// A cell that is no finite number.
@@ -41,7 +41,7 @@ pub enum DataTableError {
         line: u64,
         /// Its column.
         column: String,
-        /// What stands there.
+        /// Content of the cell.
         found: String,
         /// Number of further such cells in the column.
         others: usize,
@@ -142,7 +142,7 @@ impl DataTable {
     }
 }
 
-/// The reader's position of a row is before the skipped lines.
+/// Line of a row in the file: the reader's position of a row is before the skipped lines.
 fn line_of(text: &str, position: &csv::Position) -> u64 {
     let at = usize::try_from(position.byte()).unwrap_or(usize::MAX);
     let rest = text.get(at..).unwrap_or_default().lines();

@@ -36,7 +36,7 @@ pub struct OffsetFit {
     mean_ln_speed: f64,
     /// Sum of the squared innovations.
     sum_of_squares: f64,
-    /// The same without an effect of the speed.
+    /// Sum of the squared innovations without an effect of the speed.
     sum_of_squares_constant: f64,
 }
 

@@ -35,7 +35,7 @@ pub enum ProfileFileError {
     /// It has too few lines.
     #[error("a profile has two lines or more: each value with its time, and the end")]
     Short,
-    /// Its values make none.
+    /// Its values form no profile.
     #[error(transparent)]
     Profile(#[from] CommandProfileError),
 }

@@ -42,7 +42,7 @@ pub enum ExperimentError {
         if .time_s == .before_s { "repeats" } else { "falls" }, .at + 1
     )]
     Order {
-        /// Sample.
+        /// Number of the sample, from 0.
         at: usize,
         /// The moment before it \[s\].
         before_s: f64,
@@ -59,7 +59,7 @@ pub enum ExperimentError {
         }
     )]
     TimeUnit {
-        /// The usual step \[s\].
+        /// Median sampling interval \[s\].
         step_s: f64,
     },
     /// A long gap.
@@ -71,7 +71,7 @@ pub enum ExperimentError {
     Gap {
         /// The longest one.
         gap: SampleGap,
-        /// Gaps that are too long.
+        /// Number of gaps that are too long.
         count: usize,
         /// The longest that is bridged \[s\].
         limit_s: f64,
@@ -124,9 +124,9 @@ pub enum ExperimentError {
         at: usize,
         /// Its value.
         value: f64,
-        /// Samples like it.
+        /// Number of such samples.
         count: usize,
-        /// Least and most of all others.
+        /// Smallest and largest of all others.
         others: [f64; 2],
     },
     /// One column twice.

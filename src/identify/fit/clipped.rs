@@ -8,7 +8,8 @@ use crate::numeric::number::to_f64;
 use crate::numeric::rank;
 use crate::numeric::row::min_max;
 
-/// Samples that no neighbour repeats from which on a signal counts as varying. A choice.
+/// Samples without an equal neighbour, or distinct levels, from which a signal counts as varying. A
+/// choice.
 const MIN_LEVELS: usize = 10;
 /// Shortest run of equal samples that may be clipped.
 const MIN_RUN: usize = 3;
@@ -16,17 +17,17 @@ const MIN_RUN: usize = 3;
 const MAX_CLIPPED_FRACTION: f64 = 0.02;
 /// Number of times that a command reaches an end of its range before it counts as clipped.
 const MIN_ARRIVALS: usize = 3;
-/// Reversal over the range from which a command has turned between its ends.
+/// Path beyond the net change, over the range, from which a command has turned between its ends.
 const MIN_REVERSAL: f64 = 0.05;
-/// Relative difference of steps of one rate.
+/// Relative difference of a step from the median step that still counts as one rate.
 const RATE_TOLERANCE: f64 = 0.02;
 /// Relative decrease of the rate above which a segment is no ramp.
 const RAMP_TOLERANCE: f64 = 0.003;
 /// A command settles, and is not clipped, where the last step before a plateau is below this
 /// fraction of the mean step. A choice.
 const ABRUPT_RATE: f64 = 0.5;
-/// A plateau of any signal, commands too, counts only where that fraction is above this. A
-/// choice.
+/// A plateau of any signal, also of a command, counts only where the last step before it is above
+/// this fraction of the mean step. A choice.
 const SETTLED_RATE: f64 = 0.1;
 /// Change over the range below which there is no step.
 const MIN_STEP: f64 = 0.01;
@@ -274,7 +275,7 @@ fn reversal(segment: &[f64]) -> f64 {
     way - net_change(segment)
 }
 
-/// From its first sample to its last.
+/// Change of a segment from its first sample to its last.
 fn net_change(segment: &[f64]) -> f64 {
     let ends = segment.first().zip(segment.last());
     ends.map_or(0.0, |(first, last)| (last - first).abs())

@@ -14,9 +14,9 @@ pub enum FitError {
     /// Unsupported numbers of poles and zeros.
     #[error("{poles} poles and {zeros} zeros; give 1 to 4 poles and at most as many zeros")]
     Order {
-        /// What was asked for.
+        /// Requested number of poles.
         poles: usize,
-        /// What was asked for.
+        /// Requested number of zeros.
         zeros: usize,
     },
     /// An invalid range of dead times.
@@ -40,7 +40,7 @@ pub enum FitError {
         found: usize,
         /// Parameters.
         parameters: usize,
-        /// Samples that would do.
+        /// Samples that are needed.
         needed: usize,
     },
     /// The best model hardly differs from a constant.
@@ -52,7 +52,7 @@ pub enum FitError {
     NoDependence {
         /// Fraction of the output's variance that the model explains \[%\].
         explained_percent: f64,
-        /// Share that a model might explain of noise alone \[%\].
+        /// Fraction that such a model might explain of noise alone \[%\].
         chance_percent: f64,
     },
     /// A pole at the edge of stability.

@@ -20,7 +20,7 @@ const MAX_TIME_CONSTANT_RECORDS: f64 = 100.0;
 /// Data and settings of a fit.
 #[derive(Debug, Clone)]
 pub(super) struct FitProblem {
-    /// Less the input level.
+    /// Input less the input level.
     pub input: Vec<f64>,
     pub input_level: f64,
     pub output: Vec<f64>,
@@ -63,8 +63,8 @@ impl FitProblem {
         }
     }
 
-    /// The same with means of so many samples: input and output that are averaged alike still
-    /// correspond.
+    /// The problem with means of `factor` samples each: input and output that are averaged alike
+    /// still correspond.
     pub fn decimated(&self, factor: usize) -> Self {
         let n = to_f64(factor);
         let means = |row: &[f64]| -> Vec<f64> {
@@ -268,7 +268,7 @@ fn free_response(
     Ok((0..samples).map(|_| model.step(0.0)).collect())
 }
 
-/// The same for c = 1, s, …: together they span all free responses.
+/// Free responses for c = 1, s, …: together they span all free responses.
 pub(super) fn free_responses(
     den: &[f64],
     dt_s: f64,

@@ -72,8 +72,8 @@ fn check_stable(problem: &FitProblem, best: &Minimum) -> Result<(), FitError> {
     Ok(())
 }
 
-/// Explained variance over that by chance, above which the output depends on the input. A
-/// choice: the mean by chance is that of as many parameters on noise with the residuals'
+/// Explained variance over that by chance, above which the output depends on the input. A choice:
+/// chance is what as many parameters explain, in the mean, of noise with the residuals'
 /// autocorrelation.
 const CHANCE_FACTOR: f64 = 5.0;
 

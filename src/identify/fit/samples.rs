@@ -23,9 +23,9 @@ pub enum SamplesError {
     /// Too few samples.
     #[error("{found} samples; it needs at least {needed}")]
     TooFew {
-        /// What was found.
+        /// Number of samples.
         found: usize,
-        /// What would do.
+        /// Number that is needed.
         needed: usize,
     },
     /// A sample that is not finite.
@@ -36,7 +36,7 @@ pub enum SamplesError {
     NotFinite {
         /// `input` or `output`.
         what: &'static str,
-        /// What was found.
+        /// Its value.
         value: f64,
         /// First such sample, from 0.
         at: usize,
@@ -44,7 +44,7 @@ pub enum SamplesError {
     /// An invalid time step.
     #[error("a time step of {dt_s} s; it must be above zero")]
     Step {
-        /// What was found \[s\].
+        /// The time step \[s\].
         dt_s: f64,
     },
     /// A constant input.
@@ -62,9 +62,9 @@ pub enum SamplesError {
          thousand; look at its unit, or excite it more"
     )]
     InputHardlyChanges {
-        /// Largest less smallest.
+        /// Largest less smallest value.
         range: f64,
-        /// Largest size.
+        /// Largest magnitude.
         level: f64,
     },
     /// A constant output.

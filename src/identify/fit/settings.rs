@@ -89,7 +89,7 @@ pub enum InitialCondition {
         /// Input level, in units of the input.
         input: f64,
     },
-    /// The same with the level of the first sample.
+    /// The input had been constant at the level of its first sample, and the output was settled.
     SettledAtFirst,
     /// Unknown: the input is taken as constant at the first sample's level for the dead time,
     /// and the free response – one parameter for each pole – is estimated.

@@ -12,12 +12,12 @@ use crate::numeric::lti::{Between, Simulator, TransferFunction, polynomial};
 use crate::numeric::number::{to_count, to_f64};
 use crate::numeric::row::dot;
 
-/// Bandwidths of the filter, evenly spaced in their logarithm. A choice between time and the
-/// risk of a local minimum, as the next four.
+/// Bandwidths of the filter, evenly spaced in their logarithm. A choice between time and the risk
+/// of a local minimum, as the next five.
 const BANDWIDTHS: u32 = 5;
 /// Largest number of dead times.
 const MAX_DEAD_TIMES: usize = 25;
-/// Initial models that are followed for a few steps, and to the end.
+/// Initial models that are followed for a few steps; the next one, to the end.
 const FOLLOWED_STARTS: usize = 5;
 const FINAL_STARTS: usize = 2;
 const FIRST_STEPS: usize = 8;
@@ -209,8 +209,8 @@ impl Filtered {
     }
 }
 
-/// The same with unstable poles mirrored, and none slower than the record or faster than a
-/// tenth of a step.
+/// A denominator with its unstable poles mirrored, and no pole slower than the record or faster
+/// than a tenth of a step.
 fn stabilised(monic: &[f64], problem: &FitProblem) -> Vec<f64> {
     let (least, most) = (1.0 / problem.duration_s(), 10.0 / problem.dt_s);
     let mend = |pole: &Complex<f64>| {

@@ -73,24 +73,24 @@ fn side(text: &mut String, quantity: &Quantity, at: f64) {
     put(text, &format!("operating_point = {}", number(at)));
 }
 
-/// A line.
+/// Adds a line to a text.
 pub(in crate::identify) fn put(text: &mut String, line: &str) {
     // Writing to a string cannot fail.
     let _ = writeln!(text, "{line}");
 }
 
-/// In brackets, with every digit.
+/// Numbers in brackets, with every digit.
 pub(in crate::identify) fn row(numbers: &[f64]) -> String {
     let numbers: Vec<String> = numbers.iter().map(|value| number(*value)).collect();
     format!("[{}]", numbers.join(", "))
 }
 
-/// With every digit, and a point where TOML would read a whole number.
+/// A number with every digit, and with a decimal point where TOML would read a whole number.
 pub(in crate::identify) fn number(value: f64) -> String {
     format!("{value:?}")
 }
 
-/// In TOML's quotes.
+/// A text in TOML's quotes.
 fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }

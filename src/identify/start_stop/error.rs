@@ -12,7 +12,7 @@ pub enum StartStopFitError {
         what: &'static str,
         /// How many there are.
         found: usize,
-        /// How many would do.
+        /// Samples that are needed.
         needed: usize,
     },
     /// The pump never runs.
@@ -40,7 +40,7 @@ pub enum StartStopFitError {
     TooFewStarts {
         /// Starts that count.
         found: usize,
-        /// Starts that would do.
+        /// Starts that are needed.
         needed: usize,
         /// Starts that do not count: the record began with them, the run after them
         /// was too short or its command changed, or too many samples are missing.
@@ -51,7 +51,7 @@ pub enum StartStopFitError {
     TooFewStops {
         /// Stops that count.
         found: usize,
-        /// Stops that would do.
+        /// Stops that are needed.
         needed: usize,
     },
     /// The pauses do not show how the delay grows.
@@ -64,7 +64,7 @@ pub enum StartStopFitError {
         shortest_s: f64,
         /// Longest pause \[s\].
         longest_s: f64,
-        /// What they must differ by.
+        /// Smallest ratio of the longest to the shortest pause.
         factor: f64,
     },
     /// The pump runs without flow.
@@ -78,7 +78,7 @@ pub enum StartStopFitError {
         at_s: f64,
         /// Duration of the run \[s\].
         lasted_s: f64,
-        /// Flow at the end of that.
+        /// Flow at the end of the run.
         flow_mm3_per_s: f64,
         /// Largest flow at the end of a run.
         max_mm3_per_s: f64,
@@ -123,7 +123,7 @@ pub enum StartStopFitError {
             "about that long, and shorter ones" }
     )]
     TimeConstantUndetermined {
-        /// What was found \[s\].
+        /// Estimated time constant \[s\].
         found_s: f64,
         /// Its standard error \[s\].
         sigma_s: f64,

@@ -13,7 +13,7 @@ pub struct ObservedStart {
     pub flow_mm3_per_s: f64,
     /// From the command to the first flow \[s\].
     pub delay_s: f64,
-    /// The same by the fitted model \[s\].
+    /// That delay by the fitted model \[s\].
     pub modelled_s: f64,
 }
 

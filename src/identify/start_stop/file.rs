@@ -14,11 +14,11 @@ pub struct ParameterKey {
     pub sigma_key: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// What it is.
+    /// Its description.
     pub about: &'static str,
     /// Whether zero is refused.
     is_positive: bool,
-    /// Its value.
+    /// Returns its value.
     pub of: fn(&StartStop) -> f64,
 }
 

@@ -144,7 +144,7 @@ impl StartStop {
             - slow * drool_s * libm::expm1(-past_s / drool_s)
     }
 
-    /// The same after the flow has ceased \[s\].
+    /// Volume from the stop command until the flow has ceased, over the flow before \[s\].
     pub fn total_after_stop_s(&self) -> f64 {
         self.stop_s + (1.0 - self.slow_fraction()) * self.fall_s + self.drool_s
     }

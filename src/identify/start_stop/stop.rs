@@ -19,7 +19,7 @@ pub(super) struct StopFit {
 
 /// Largest remaining flow at the end of the longest observation, over the flow before.
 const MAX_REMAINING: f64 = 0.1;
-/// The end of an observation is one part in this many.
+/// The last samples of an observation, one in this many, count as its end.
 const TAIL_DIVISOR: usize = 5;
 /// Ranges of L', T', a and τd. A choice around all known extruders.
 const PARAMETER_RANGES: [[f64; 2]; 4] = [[0.0, 3.0], [0.005, 5.0], [0.0, 0.9], [0.02, 30.0]];
