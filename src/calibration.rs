@@ -1,5 +1,5 @@
-//! What a pixel means in millimetres: the calibration model, its file, and how
-//! it is found from images of a checkerboard.
+//! From pixels to millimetres: the calibration model, its file, and its estimation from images of a
+//! checkerboard.
 
 pub mod board;
 mod board_fit;

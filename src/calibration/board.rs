@@ -51,7 +51,7 @@ pub enum BoardError {
         .0.columns, .0.rows
     )]
     Corners(GridSize),
-    /// No size.
+    /// A square without a size.
     #[error("the side of a square must be more than 0 mm, found {0}")]
     Square(Mm),
     /// A marker that does not fit into a square, or is too small to be read.
@@ -82,7 +82,7 @@ const MARKER: std::ops::RangeInclusive<f64> = 0.4..=0.9;
 /// Corners that are not those of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NotABoard {
-    /// Not as many as the board has.
+    /// Another number of corners than the board has.
     #[error("{found} corners instead of {expected}")]
     Count {
         /// Corners that were found.
@@ -105,7 +105,7 @@ pub enum NotABoard {
 const SMALLEST_SQUARE_PX2: f64 = 1.0;
 
 impl Board {
-    /// Fails without a grid of at least 3 by 3 corners or a size.
+    /// Fails unless each side has 3 to 100 inner corners and the square a size.
     pub fn new(columns: usize, rows: usize, square: Mm) -> Result<Self, BoardError> {
         let sound = 3..=100;
         if !sound.contains(&columns) || !sound.contains(&rows) {
@@ -117,8 +117,8 @@ impl Board {
         Ok(Self { columns, rows, square, markers: None })
     }
 
-    /// The same board with a marker in each white square. Fails where the marker does not fit a
-    /// square, or the dictionary has too few markers.
+    /// Adds a marker in each white square. Fails where the marker does not fit a square, or the
+    /// dictionary has too few markers.
     pub fn with_marks(self, marks: Markers) -> Result<Self, BoardError> {
         if !MARKER.contains(&(marks.side.get() / self.square.get())) {
             return Err(BoardError::Marker { side: marks.side, square: self.square });

@@ -83,7 +83,7 @@ impl Camera {
         Self { focal_px: [fx, fy], centre_px: [cx, cy], distortion }
     }
 
-    /// Its matrix, row by row: without skew.
+    /// Camera matrix without skew, row by row.
     pub fn matrix(&self) -> [f64; 9] {
         let ([fx, fy], [cx, cy]) = (self.focal_px, self.centre_px);
         [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]
@@ -112,7 +112,7 @@ impl Camera {
         Some(self.on_sensor(d))
     }
 
-    /// The same with the derivatives. `None` behind the camera.
+    /// [`Self::project`] with the derivatives. `None` behind the camera.
     pub fn project_with_slopes(&self, p: Point3<f64>) -> Option<Projection> {
         if p.z <= 0.0 {
             return None;
@@ -290,7 +290,7 @@ mod tests {
         let k1 = -1.0 / (3.0 * 0.36);
         let fish = Camera::pinhole([500.0; 2], [320.0, 240.0]).with_five([k1, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(fish.non_monotonic_at([640, 480]), Some(Point2::new(0.0, 0.0)));
-        // A image that is cut out of its middle is sound.
+        // An image from the middle of that one is sound.
         let centred = Camera { centre_px: [120.0, 120.0], ..fish };
         assert_eq!(centred.non_monotonic_at([241, 241]), None);
         let wider = Camera { centre_px: [150.0, 150.0], ..fish };

@@ -25,7 +25,7 @@ const MAX_CORNER_ERROR: f64 = 0.3;
 /// Pairs of markers from which a homography of the board is estimated. A choice between time
 /// and the chance that no pair is free of errors.
 const MAX_PAIRS: usize = 400;
-/// The same where many numbers of columns are tried.
+/// [`MAX_PAIRS`] for each of many numbers of columns that are tried.
 const MAX_PAIRS_PER_COUNT: usize = 60;
 /// Markers next to a position by which it is predicted: few, so that the distortion between
 /// them is small.
@@ -41,7 +41,7 @@ const MIN_MARKERS: usize = 3;
 const MIN_FIT_FRACTION: f64 = 0.7;
 /// Relative tolerance for the size of the markers.
 const SIZE_TOLERANCE: f64 = 0.12;
-/// The same \[px\]: thresholding takes up to a pixel off either side.
+/// Tolerance for their size \[px\]: thresholding takes up to a pixel off either side.
 const SIZE_TOLERANCE_PX: f64 = 3.0;
 /// Markers from which their size is checked.
 const MIN_SIZE_MARKERS: usize = 8;
@@ -279,7 +279,7 @@ fn reason(
     }
 }
 
-/// Margin about a marker of which nothing is known, as a fraction of its square. A choice.
+/// Margin about a marker of an unknown board, as a fraction of its square. A choice.
 const USUAL_MARKER_MARGIN: f64 = 0.15;
 
 /// Whether markers of a dictionary are in the order of any board.

@@ -9,7 +9,8 @@ use super::rejection::BoardRejection;
 /// between two of them \[px\]. A choice between waiting time and blur.
 const BED_FRAMES: usize = 5;
 const BED_STILL_PX: f64 = 0.5;
-/// The same for a board that is held by hand.
+/// Consecutive frames in which a board held by hand must be at rest, and its largest shift between
+/// two of them \[px\].
 const HELD_FRAMES: usize = 2;
 const HELD_STILL_PX: f64 = 2.0;
 /// Mean shift of the corners against every kept image from which a pose is new, as a fraction
@@ -43,7 +44,7 @@ pub enum Decision {
 }
 
 impl Collector {
-    /// Without a image.
+    /// A collector without an image.
     pub fn new(board: Board) -> Self {
         Self { board, kept: Vec::new(), last: None, still: 0 }
     }

@@ -52,7 +52,7 @@ pub fn refine(
     pass.run(&straight, rough, true)
 }
 
-/// Once over all corners.
+/// One pass over all corners.
 struct Pass<'a> {
     board: &'a Board,
     grey: &'a GreyImage<'a>,
@@ -61,7 +61,7 @@ struct Pass<'a> {
 }
 
 impl Pass<'_> {
-    /// From positions that are known, or else roughly known.
+    /// Refines all corners, each from its known position, or else from its rough one.
     fn run(
         &self,
         known: &[Option<ImagePoint>],

@@ -85,8 +85,8 @@ impl CalibrationCovariance {
         })
     }
 
-    /// The same with another image of a board with as much noise. `None` where the board would
-    /// not be in front of the camera.
+    /// The covariance with one more image of a board, whose corners have the same noise. `None`
+    /// where the board would not be in front of the camera.
     pub fn with_another(&self, pose: &Pose, corners: &[Correspondence]) -> Option<Self> {
         let place = BoardPlacement::of_one(*pose);
         let more = eliminate(&self.model, self.free, &place, &[corners.to_vec()])?;
@@ -94,8 +94,8 @@ impl CalibrationCovariance {
         Some(Self { of_shared: Factor::of_shared(&left)?, left, ..self.clone() })
     }
 
-    /// The same with another board on the bed, whose image takes part in both fits; `lies` is
-    /// its position on the plane of the first. `None` where it would not be in front of the
+    /// The covariance with one more board on the bed, whose image takes part in both fits; `lies`
+    /// is its position on the plane of the first. `None` where it would not be in front of the
     /// camera.
     pub fn with_another_on_bed(&self, lies: [f64; 3], corners: &[Correspondence]) -> Option<Self> {
         let mut bed = self.bed.clone();
@@ -145,7 +145,7 @@ impl CalibrationCovariance {
         Some((reading.value, self.sigma(&reading)))
     }
 
-    /// The same without the standard deviation, for reuse with other covariances.
+    /// The distance of [`Self::width_mm`] with its derivatives, for reuse with other covariances.
     pub fn width(&self, ends: [ImagePoint; 2], surface_height: Mm) -> Option<DerivedValue> {
         let width = |map: &SurfaceMap| Some((map.to_mm(ends[1])? - map.to_mm(ends[0])?).norm());
         self.read(surface_height, width)
@@ -170,13 +170,13 @@ impl CalibrationCovariance {
         self.joint(1.0)
     }
 
-    /// The same without the noise of the bed's own corners, which two cameras that see the same
-    /// board have in common.
+    /// [`Self::uncertainty`] without the noise of the bed's own corners, which two cameras that see
+    /// the same board have in common.
     pub fn uncertainty_of_camera(&self) -> CalibrationUncertainty {
         self.joint(0.0)
     }
 
-    /// With so many times the variance of the corners of the boards on the bed.
+    /// The uncertainty with `own` times the variance of the corners of the boards on the bed.
     ///
     /// The bed's pose follows the shared parameters s as b = −V⁻¹W·s, with V its own normal
     /// equations and W the mixed ones; its own corners add V⁻¹.

@@ -3,7 +3,8 @@
 
 use std::sync::OnceLock;
 
-/// Markers of one size: so many cells along each side, within a black border of one cell.
+/// Markers of one size: as many cells along a row as along a column, within a black border of one
+/// cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dictionary {
     /// 4x4 cells.
@@ -25,7 +26,7 @@ const TEXTS: [&str; 4] = [
 ];
 
 impl Dictionary {
-    /// All of them.
+    /// All dictionaries.
     pub const ALL: [Self; 4] = [Self::Four, Self::Five, Self::Six, Self::Seven];
     /// Markers of each dictionary. By definition of OpenCV's `DICT_4X4_1000` and the like.
     pub const MARKERS: usize = 1000;

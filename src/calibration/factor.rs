@@ -57,7 +57,7 @@ impl Factor {
         apart.then_some(Self { unit, lower })
     }
 
-    /// The same for shared numbers.
+    /// [`Self::of`] for a matrix of the shared parameters.
     pub fn of_shared(matrix: &SMatrix<f64, SHARED, SHARED>) -> Option<Self> {
         Self::of(&DMatrix::from_fn(SHARED, SHARED, |row, column| matrix[(row, column)]))
     }

@@ -14,8 +14,8 @@ use crate::numeric::rank;
 /// corner.
 const BLURRED_PX: f64 = 3.5;
 const BLURRED_FRACTION: f64 = 0.12;
-/// Motion during the exposure from which an image is rejected \[px\], if it blurs one direction
-/// so many times as much as the other. A choice.
+/// Motion during the exposure from which an image is rejected \[px\], if the blur of one direction
+/// exceeds that of the other by a factor. A choice.
 const MOVED_PX: f64 = 3.0;
 const MOVED_RATIO: f64 = 1.5;
 /// Half length of the profile across an edge, as a fraction of a square's side: it stays within

@@ -13,7 +13,7 @@ pub enum Lens {
     Four,
     /// k1 k2 p1 p2 k3 (Brown 1971).
     Five,
-    /// The same over 1 + k4 r² + k5 r⁴ + k6 r⁶.
+    /// [`Self::Five`] with the radial part divided by 1 + k4 r² + k5 r⁴ + k6 r⁶.
     Rational,
 }
 
@@ -31,7 +31,7 @@ impl Lens {
         NUMBERS - 8 + self.coefficients()
     }
 
-    /// In words.
+    /// Its coefficients in words.
     pub fn name(self) -> &'static str {
         let names = ["k1", "k1 k2", "k1 k2 p1 p2", "k1 k2 p1 p2 k3", "k1 k2 p1 p2 k3 k4 k5 k6"];
         names[self as usize]

@@ -25,12 +25,12 @@ pub struct CalibrationQuality {
     pub uncertainty: Option<CalibrationUncertainty>,
 }
 
-/// What a pixel means in millimetres.
+/// The calibration of a camera, from pixels to millimetres.
 #[derive(Debug, Clone, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "there is one, read once")]
 pub enum Calibration {
-    /// The single number of Shojaei Barjuei et al. 2022, section 4.3.1: it
-    /// holds at the height at which it was taken, and knows no other.
+    /// The single number of Shojaei Barjuei et al. 2022, section 4.3.1; it holds only at the height
+    /// at which it was taken.
     Scale {
         /// Millimetres a pixel at the surface.
         mm_per_px: f64,
@@ -155,9 +155,9 @@ impl SurfaceMap {
         self.with_height(self.width_relative_sigma)
     }
 
-    /// The same for the distance between two points that are seen at these pixels, anywhere in
-    /// the image and in any direction. That of every width where the calibration has only one
-    /// number. `None` also off the surface.
+    /// Relative standard deviation of the distance between two points that are seen at these
+    /// pixels, anywhere in the image and in any direction. Without a covariance it is
+    /// [`Self::width_relative_sigma`]. `None` also off the surface.
     pub fn width_relative_sigma_of(&self, ends: [ImagePoint; 2]) -> Option<f64> {
         let (Some(uncertainty), Kind::Plane { camera, bed, height_mm }) =
             (&self.uncertainty, &self.kind)

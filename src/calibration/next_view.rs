@@ -150,7 +150,7 @@ fn on_bed(
 ) -> Option<[f64; 3]> {
     let map = covariance.surface(covariance.thickness());
     let on_face = map.to_mm(position_px(covariance, at))?;
-    // The bed's axes are the board's, with y turned over if z is.
+    // The bed's axes are the board's, with y reversed if z is.
     let first = covariance.on_bed([0.0; 3]);
     let is_away = (first.rotation() * Vector3::z()).dot(&first.translation_mm()) > 0.0;
     let sign = if is_away { -1.0 } else { 1.0 };

@@ -9,7 +9,7 @@ use crate::numeric::rank;
 /// Smallest difference between squares of both colours in a row beyond the board that belongs
 /// to a board, as a fraction of that within the board. A choice for uneven light.
 const MIN_CONTRAST_RATIO: f64 = 0.3;
-/// The same over the standard deviation of squares of one colour.
+/// Smallest such difference over the standard deviation of squares of one colour.
 const MIN_SIGMAS: f64 = 2.0;
 /// Largest standard deviation of plain squares of one colour, as a fraction of the difference
 /// between both colours.

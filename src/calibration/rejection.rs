@@ -13,13 +13,13 @@ pub const MIN_CORNERS: usize = 8;
 /// Rows and columns that these corners must cover.
 pub const MIN_LINES: usize = 3;
 
-/// Why a image is not used.
+/// Why an image is not used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BoardRejection {
     /// It cannot be read.
     #[error("unreadable: {0}")]
     Unreadable(String),
-    /// The board, all of it, is not to be seen.
+    /// The image does not show the whole board.
     #[error("no board with {}x{} inner corners", .0.columns, .0.rows)]
     NoBoard(GridSize),
     /// A board with other counts.
@@ -70,7 +70,7 @@ pub enum BoardRejection {
         /// Mean shift of the corners \[px\].
         shift_px: f64,
     },
-    /// It is not of the size that most others have.
+    /// An image whose size is not that of most others.
     #[error("size {}, while most are {}", size_text(*.found), size_text(*.expected))]
     Size {
         /// Its size \[px\].
@@ -106,7 +106,7 @@ pub enum BoardRejection {
         /// Rows that they are in.
         rows: usize,
     },
-    /// OpenCV gave up on it.
+    /// OpenCV failed.
     #[error(transparent)]
     Bridge(#[from] BridgeError),
 }

@@ -88,7 +88,7 @@ mod tests {
     use crate::calibration::{Calibration, CalibrationQuality, solve};
     use crate::core::Mm;
 
-    /// A calibration from corners with an error of a kind.
+    /// A calibration from corners with a small error.
     fn surface() -> SurfaceMap {
         let mut turn = 0.0_f64;
         let mut off = || {

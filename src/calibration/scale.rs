@@ -43,8 +43,8 @@ pub fn single_scale(calibration: &Calibration, surface_height: Mm) -> Option<Sin
     Some(SingleScale { mm_per_px, uneven, smallest, largest })
 }
 
-/// Millimetres a pixel in the middle of a image of this size, mean of all
-/// directions; `None` where the middle does not see the surface.
+/// Millimetres a pixel in the middle of an image of this size, mean of all directions; `None` where
+/// the middle does not see the surface.
 pub(super) fn in_the_middle(map: &SurfaceMap, image_size_px: [u32; 2]) -> Option<f64> {
     let [x, y] = image_size_px.map(|px| (f64::from(px) - 1.0) / 2.0);
     Some(map.mm_per_px(Point2::new(x, y))?.determinant().abs().sqrt())

@@ -29,7 +29,7 @@ pub fn solve(board: &Board, sightings: &[BoardObservation]) -> Result<Solution, 
     solution(&views, sightings, &fit, free, trials)
 }
 
-/// The same with a given lens, on a flat board.
+/// Fits the camera with a given lens, on a flat board.
 #[cfg(test)]
 pub fn solve_with(
     board: &Board,

@@ -40,12 +40,12 @@ pub fn corners(pose: &Pose, mut off: impl FnMut() -> f64) -> Vec<ImagePoint> {
     board_mm.into_iter().map(seen).map(|p| ImagePoint::new(p.x + off(), p.y + off())).collect()
 }
 
-/// The same as the corners that a image shows.
+/// Those corners as observations.
 pub fn seen(pose: &Pose, off: impl FnMut() -> f64) -> Vec<CornerObservation> {
     observe_all(&corners(pose, off))
 }
 
-/// The same as a image.
+/// The observation of those corners in an image.
 pub fn sighting(name: &str, pose: &Pose, off: impl FnMut() -> f64) -> BoardObservation {
     BoardObservation {
         name: name.to_owned(),

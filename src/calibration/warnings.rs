@@ -22,7 +22,7 @@ pub enum Warning {
          the others, so bring the board into the corners too"
     )]
     Coverage {
-        /// Parts that saw a corner.
+        /// Parts with a corner.
         covered: usize,
     },
     /// No board is tilted.
@@ -62,7 +62,7 @@ pub enum Warning {
         /// Row \[px\].
         y: f64,
     },
-    /// The focal length is loose.
+    /// The focal length is uncertain.
     #[error("uncertainty of the focal length {percent:.1} % (1 sigma); more tilted images help")]
     UncertainFocal {
         /// Standard deviation over value.

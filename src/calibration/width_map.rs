@@ -9,9 +9,9 @@ use crate::core::{ImagePoint, Mm};
 /// Numbers of cells of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cells {
-    /// How many along a row.
+    /// Number of columns.
     pub columns: u32,
-    /// How many along a column.
+    /// Number of rows.
     pub rows: u32,
 }
 
@@ -144,7 +144,7 @@ mod tests {
 
     fn covariance() -> (solve::Solution, CalibrationCovariance) {
         let mut turn = 0.0_f64;
-        // No noise of a kind, but something that the fit leaves.
+        // Not noise, but a residual that the model cannot fit.
         let mut off = || {
             turn += 2.4;
             0.1 * turn.sin()

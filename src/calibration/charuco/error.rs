@@ -6,7 +6,7 @@ use crate::core::GridSize;
 /// Why no board with markers is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum MarkerError {
-    /// There are none, or too few.
+    /// No markers of the dictionary, or too few.
     #[error("no board with markers of {} cells: {found} of them show", dictionary.name())]
     None {
         /// Markers of the right dictionary.
@@ -14,7 +14,7 @@ pub enum MarkerError {
         /// The dictionary.
         dictionary: Dictionary,
     },
-    /// There are others.
+    /// Markers of another dictionary.
     #[error("markers of {} cells show, not of {}: correct --dictionary", found.name(), expected.name())]
     Other {
         /// The dictionary of those that show.
@@ -22,13 +22,13 @@ pub enum MarkerError {
         /// The specified one.
         expected: Dictionary,
     },
-    /// They can be read in the mirror.
+    /// Markers that can only be read in the mirror image.
     #[error(
         "the board is mirrored: its markers can only be read in the mirror image; let the \
          camera not flip its pictures, and look at the board itself"
     )]
     Mirrored,
-    /// They are not where they should be.
+    /// Markers that are not in the order of the board.
     #[error(
         "the markers are not in the order of a board with {}x{} inner corners: {fit} of {of} are \
          where they should be{}", expected.columns, expected.rows, meant_text(*.meant)
@@ -43,7 +43,7 @@ pub enum MarkerError {
         /// Inner corners along a row of a board that they would fit.
         meant: Option<usize>,
     },
-    /// They have another size.
+    /// Markers of another size.
     #[error(
         "the markers measure {found_percent} % of a square's side, not {expected_percent} %: correct \
          --marker-mm or --square-mm"

@@ -19,7 +19,7 @@ pub struct MarkerGrid {
 }
 
 impl MarkerGrid {
-    /// Of a board.
+    /// The layout of a board.
     pub fn of(board: &Board, first_has_marker: bool) -> Self {
         let GridSize { columns, rows } = board.corners();
         Self { columns: columns + 1, rows: rows + 1, first_has_marker }

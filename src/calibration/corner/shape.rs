@@ -20,7 +20,7 @@ pub struct CornerPixel {
 /// Parameters of the model.
 #[derive(Debug, Clone, Copy)]
 pub struct CornerShape {
-    /// From the rough corner \[px\].
+    /// Position relative to the rough corner \[px\].
     pub at: Vector2<f64>,
     /// Directions of the lines \[rad\].
     pub turns: [f64; 2],

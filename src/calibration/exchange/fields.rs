@@ -76,7 +76,7 @@ impl<'a> YamlFields<'a> {
         Some(first)
     }
 
-    /// The same for a required key; `name` is the usual one.
+    /// The value of a required key, whose absence is reported; `name` is its usual name.
     fn required(&self, names: Names, name: &str, expected: &str) -> Option<&'a (String, Node)> {
         if !self.has(names) && !self.items.is_empty() {
             self.problem(None, name, "nothing", expected);

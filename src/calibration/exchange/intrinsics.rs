@@ -12,7 +12,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// In words.
+    /// The format in words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ros => "ROS camera_info",

@@ -36,7 +36,7 @@ pub(super) fn read(fields: &YamlFields<'_>, notes: &mut Vec<String>) -> Option<I
     Some(Intrinsics { image_size_px: size?, camera: camera?, rms_px, camera_name: None })
 }
 
-/// As the text of a file that OpenCV reads. Numbers keep every digit.
+/// The text of a file that OpenCV reads. Numbers keep every digit.
 pub fn to_yaml(intrinsics: &Intrinsics) -> String {
     let [width, height] = intrinsics.image_size_px;
     let coefficients = intrinsics.camera.coefficients();

@@ -103,8 +103,8 @@ fn unmoved(camera: &[f64]) -> Vec<f64> {
     camera.chunks(3).flat_map(|line| line.iter().copied().chain([0.0])).collect()
 }
 
-/// As the text of a file that ROS reads; the rectified image keeps the matrix of the camera.
-/// Numbers keep every digit.
+/// The text of a file that ROS reads; the rectified image keeps the matrix of the camera. Numbers
+/// keep every digit.
 pub fn to_yaml(intrinsics: &Intrinsics, camera_name: &str) -> String {
     let [width, height] = intrinsics.image_size_px;
     let matrix = intrinsics.camera.matrix();

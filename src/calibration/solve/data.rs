@@ -77,7 +77,7 @@ impl CalibrationData {
     }
 }
 
-/// Root of the mean of so many squares.
+/// Root mean square of `count` numbers with a sum of squares.
 pub fn root_mean_square(squares: f64, count: usize) -> f64 {
     (squares / to_f64(count.max(1))).sqrt()
 }

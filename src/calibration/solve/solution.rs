@@ -80,7 +80,7 @@ impl Solution {
         Some([round(heights().reduce(f64::min)?), round(heights().reduce(f64::max)?)])
     }
 
-    /// The corners of a image on the board.
+    /// The corners of an image with their positions on the board.
     pub fn corners(&self, board: &Board, view: usize) -> Vec<Correspondence> {
         self.views.get(view).map_or_else(Vec::new, |view| board.correspondences(&view.corners))
     }
