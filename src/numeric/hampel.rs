@@ -11,16 +11,16 @@ const MAX_HALF_WIDTH: usize = 10_000;
 /// Invalid parameters of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum HampelError {
-    /// Half of the window.
+    /// A half width out of range.
     #[error("a half width of {half_width} samples: expected 1 to {MAX_HALF_WIDTH}")]
     HalfWidth {
-        /// What was asked for.
+        /// The half width, in samples.
         half_width: usize,
     },
-    /// The threshold.
+    /// A threshold out of range.
     #[error("a threshold of {threshold}: expected a number of standard deviations, such as 3")]
     Threshold {
-        /// What was asked for.
+        /// The threshold, in standard deviations.
         threshold: f64,
     },
 }
@@ -35,7 +35,7 @@ pub struct Hampel {
 /// Filtered samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cleaned {
-    /// As many as samples.
+    /// The filtered value of each sample.
     pub values: Vec<f64>,
     /// Indices of the replaced samples.
     pub replaced: Vec<usize>,
@@ -87,8 +87,8 @@ impl Hampel {
     }
 }
 
-/// The same for live use: the window is the newest 2K + 1 samples, and the last one is
-/// filtered. A step of the signal passes K samples late.
+/// The filter for live use: the window is the newest 2K + 1 samples, and the last one is filtered.
+/// A step of the signal passes K samples late.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveHampel {
     filter: Hampel,

@@ -77,7 +77,7 @@ pub fn first_integral(u: f64) -> f64 {
     })
 }
 
-/// ((u² + 1)·Φ(u) + u·φ(u))/2, the antiderivative of that, to 10⁻¹³.
+/// ((u² + 1)·Φ(u) + u·φ(u))/2, the antiderivative of [`first_integral`], to 10⁻¹³.
 pub fn second_integral(u: f64) -> f64 {
     near(u).map_or(if u > 0.0 { 0.5 * (u * u + 1.0) } else { 0.0 }, |(node, h)| {
         let [d0, d1, d2, d3] = node.density;

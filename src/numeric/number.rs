@@ -1,7 +1,7 @@
 //! Conversions between kinds of numbers whose loss is harmless: indices and counts are small,
 //! and seven digits are enough for a pixel.
 
-/// A count or an index as a number.
+/// A count or an index as a floating-point number.
 #[inline]
 pub fn to_f64(number: impl Count) -> f64 {
     number.to_f64()
@@ -9,7 +9,7 @@ pub fn to_f64(number: impl Count) -> f64 {
 
 /// An integer that counts something; exact as a number up to 2⁵³.
 pub trait Count {
-    /// The same as a number.
+    /// The integer as a floating-point number.
     fn to_f64(self) -> f64;
 }
 
@@ -29,13 +29,13 @@ impl Count for u64 {
     }
 }
 
-/// The same in single precision.
+/// A count or an index in single precision.
 #[expect(clippy::cast_precision_loss, reason = "counts and places are small")]
 pub fn to_f32(number: usize) -> f32 {
     number as f32
 }
 
-/// A number in single precision.
+/// A number, rounded to single precision.
 #[expect(clippy::cast_possible_truncation, reason = "the quantity needs no more")]
 pub fn narrow_to_f32(value: f64) -> f32 {
     value as f32

@@ -35,19 +35,19 @@ pub fn at<T: Ordered>(values: &mut [T], rank: usize) -> Option<T> {
     (rank < values.len()).then(|| *values.select_nth_unstable_by(rank, T::order).1)
 }
 
-/// The median; the upper one of an even number. `None` of none.
+/// The median; the upper one of an even number. `None` without values.
 #[inline(always)]
 pub fn median<T: Ordered>(values: &mut [T]) -> Option<T> {
     let middle = values.len() / 2;
     at(values, middle)
 }
 
-/// The median of numbers from an iterator; the upper one of an even number. `None` of none.
+/// The median of numbers from an iterator; the upper one of an even number. `None` without values.
 pub fn median_of(values: impl Iterator<Item = f64>) -> Option<f64> {
     median(&mut values.collect::<Vec<_>>())
 }
 
-/// The median; the mean of the middle two of an even number. `None` of none.
+/// The median; the mean of the middle two of an even number. `None` without values.
 pub fn mean_median(values: &mut [f64]) -> Option<f64> {
     let count = values.len();
     let upper = median(values)?;
@@ -57,13 +57,14 @@ pub fn mean_median(values: &mut [f64]) -> Option<f64> {
     Some(f64::midpoint(at(values, count / 2 - 1)?, upper))
 }
 
-/// The value at the rank nearest to a fraction of the way from the smallest to the largest.
-/// `None` of none.
+/// The value at the rank nearest to a fraction of the way from the smallest to the largest. `None`
+/// without values.
 pub fn quantile(values: &mut [f64], fraction: f64) -> Option<f64> {
     at(values, to_count((fraction * to_f64(values.len().saturating_sub(1))).round()))
 }
 
-/// Median absolute deviation from `median`; the deviations replace the values. `None` of none.
+/// Median absolute deviation from `median`; the deviations replace the values. `None` without
+/// values.
 #[inline(always)]
 pub fn median_deviation(values: &mut [f32], median: f32) -> Option<f32> {
     for value in &mut *values {

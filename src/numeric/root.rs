@@ -3,7 +3,7 @@
 /// Derived: 60 bisections leave 2^-60 of an interval, below double precision, 2^-53.
 pub const BISECTIONS: u32 = 60;
 
-/// Where a function changes its sign between two points, by so many bisections.
+/// Where a function changes its sign between two points, after a number of bisections.
 pub fn bisect(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64, bisections: u32) -> f64 {
     // One of the two values may be zero.
     let falls = f(low) > f(high);

@@ -14,21 +14,21 @@ const MAX_WINDOW: usize = 10_001;
 /// Invalid parameters of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SavGolError {
-    /// The window's length.
+    /// A window of a wrong length.
     #[error(
         "a window of {window} samples for a polynomial of degree {degree}: expected an odd number \
          from {} to {MAX_WINDOW}", (*degree + 1) | 1
     )]
     Window {
-        /// What was asked for.
+        /// The window's length, in samples.
         window: usize,
         /// The polynomial's degree.
         degree: usize,
     },
-    /// The polynomial's degree.
+    /// A degree out of range.
     #[error("a polynomial of degree {degree}: expected 0 to {MAX_DEGREE}")]
     Degree {
-        /// What was asked for.
+        /// The polynomial's degree.
         degree: usize,
     },
     /// Fewer samples than the window.
@@ -103,7 +103,7 @@ impl SavGol {
     }
 }
 
-/// The same for live use: the polynomial of the newest samples, at the last of them. It is
+/// The filter for live use: the polynomial of the newest samples, at the last of them. It is
 /// noisier than in the middle, and has no delay for polynomials.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveSavGol {

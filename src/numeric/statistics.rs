@@ -27,17 +27,17 @@ impl Moments {
         self.count
     }
 
-    /// Their mean; `None` of none.
+    /// Their mean; `None` without numbers.
     pub fn mean(&self) -> Option<f64> {
         (self.count > 0).then_some(self.mean)
     }
 
-    /// Their sample standard deviation (n − 1); `None` of fewer than two.
+    /// Their sample standard deviation (n − 1); `None` with fewer than two numbers.
     pub fn std(&self) -> Option<f64> {
         (self.count > 1).then(|| (self.squares / to_f64(self.count - 1)).sqrt())
     }
 
-    /// Their root mean square.
+    /// Their root mean square; `None` without numbers.
     pub fn rms(&self) -> Option<f64> {
         let mean = self.mean()?;
         Some((self.squares / to_f64(self.count) + mean * mean).sqrt())
@@ -61,12 +61,12 @@ impl WeightedMean {
         }
     }
 
-    /// The mean; none of none.
+    /// The weighted mean; `None` without numbers.
     pub fn mean(&self) -> Option<f64> {
         (self.weight > 0.0).then(|| self.sum / self.weight)
     }
 
-    /// Its standard deviation.
+    /// Standard deviation of the mean; `None` without numbers.
     pub fn sigma(&self) -> Option<f64> {
         (self.weight > 0.0).then(|| self.weight.sqrt().recip())
     }
@@ -116,7 +116,7 @@ impl Distribution {
         self.total
     }
 
-    /// The exact maximum; `None` of none.
+    /// The exact maximum; `None` without numbers.
     pub fn max(&self) -> Option<f64> {
         (self.total > 0).then_some(self.largest)
     }

@@ -7,9 +7,9 @@ use nalgebra::Complex;
 use super::transfer::TransferFunction;
 use crate::numeric::root::{BISECTIONS, bisect};
 
-/// Margins of a loop that is stable with negative feedback. They are distances from the limit
-/// of stability without its side: an unstable loop may have large ones. `None` without such a
-/// crossing, and so without a limit.
+/// Margins of a loop that is stable with negative feedback. They are distances from the limit of
+/// stability to either side: an unstable loop may have large ones. `None` without such a crossing,
+/// and so without a limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StabilityMargins {
     /// Gain crossover frequency \[rad/s\]; of several, that with the smallest phase margin.

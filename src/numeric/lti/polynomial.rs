@@ -4,7 +4,7 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::numeric::number::to_f64;
 
-/// Without leading zeros; one is kept of a zero polynomial.
+/// The coefficients without leading zeros; one is kept of a zero polynomial.
 pub fn trim(coefficients: &[f64]) -> &[f64] {
     let leading = coefficients.iter().take_while(|c| **c == 0.0).count();
     let first = leading.min(coefficients.len().saturating_sub(1));
@@ -16,7 +16,7 @@ pub fn evaluate(coefficients: &[f64], at: Complex<f64>) -> Complex<f64> {
     coefficients.iter().fold(Complex::new(0.0, 0.0), |sum, c| sum * at + c)
 }
 
-/// Product of two.
+/// Product of two polynomials.
 pub fn multiply(a: &[f64], b: &[f64]) -> Vec<f64> {
     if a.is_empty() || b.is_empty() {
         return Vec::new();
@@ -30,7 +30,7 @@ pub fn multiply(a: &[f64], b: &[f64]) -> Vec<f64> {
     product
 }
 
-/// Sum of two.
+/// Sum of two polynomials.
 pub fn add(a: &[f64], b: &[f64]) -> Vec<f64> {
     let (long, short) = if a.len() >= b.len() { (a, b) } else { (b, a) };
     let mut sum = long.to_vec();

@@ -109,13 +109,13 @@ impl Simulator {
         })
     }
 
-    /// Back to rest with an input of zero.
+    /// Sets the state to rest with an input of zero.
     pub fn rest(&mut self) {
         self.x.fill(0.0);
         self.inputs.fill(0.0);
     }
 
-    /// To the steady state of a constant input. Fails for an integrator, unless the input is
+    /// Sets the steady state of a constant input. Fails for an integrator, unless the input is
     /// zero.
     pub fn settle(&mut self, input: f64) -> Result<(), ModelError> {
         if input == 0.0 {

@@ -66,7 +66,7 @@ pub enum ModelError {
     PartOfAStep {
         /// Dead time \[s\].
         dead_time_s: f64,
-        /// The same in steps.
+        /// Dead time in steps.
         steps: f64,
         /// Step \[s\].
         dt_s: f64,
@@ -82,9 +82,9 @@ pub struct TransferFunction {
 }
 
 impl TransferFunction {
-    /// Of numerator and denominator, highest power of s \[1/s\] first, and a
-    /// dead time \[s\]. Fails where a number is not finite, the denominator is
-    /// zero, there are more zeros than poles or the dead time is negative.
+    /// From numerator and denominator, highest power of s \[1/s\] first, and a dead time \[s\].
+    /// Fails where a number is not finite, the denominator is zero, there are more zeros than poles
+    /// or the dead time is negative.
     pub fn new(num: &[f64], den: &[f64], dead_time_s: f64) -> Result<Self, ModelError> {
         let bad = |row: &[f64]| row.iter().copied().find(|c| !c.is_finite());
         if let Some(value) = bad(num) {
@@ -131,7 +131,7 @@ impl TransferFunction {
         self.dead_time_s
     }
 
-    /// The same with another dead time \[s\].
+    /// The transfer function with another dead time \[s\].
     pub fn with_dead_time(&self, dead_time_s: f64) -> Result<Self, ModelError> {
         Self::new(&self.num, &self.den, dead_time_s)
     }
