@@ -95,7 +95,7 @@ pub fn read(text: &str, settings: &GcodeSettings) -> Result<Vec<GcodeBead>, Gcod
 struct LaidMove {
     line: usize,
     moved: Move,
-    /// \[mm/s\].
+    /// Feed \[mm/s\].
     feed: f64,
 }
 

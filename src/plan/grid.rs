@@ -14,9 +14,9 @@ const MAX_NODES: usize = 220;
 /// Spacing of the nodes by distance from a quick change, both in lengths of the nozzle.
 const NODE_SPACING: [Spacing; 3] =
     [Spacing::new(0.5, 0.025), Spacing::new(2.4, 0.1), Spacing::new(f64::INFINITY, 0.4)];
-/// The same of windows of a nozzle's length.
+/// Spacing of the windows of a nozzle's length, in the same way.
 const WINDOW_SPACING: [Spacing; 2] = [Spacing::new(1.5, 0.05), Spacing::new(f64::INFINITY, 0.25)];
-/// The same of shorter windows.
+/// Spacing of shorter windows, in the same way.
 const FINE_WINDOW_SPACING: [Spacing; 2] =
     [Spacing::new(1.5, 0.05), Spacing::new(f64::INFINITY, 0.125)];
 /// Smallest distance of a shorter window from a quick change, in lengths of the nozzle. Nearer, the
@@ -55,7 +55,7 @@ impl Spacing {
 pub struct QuickChanges(Vec<PathSegment>);
 
 impl QuickChanges {
-    /// Of a profile and the robot's acceleration \[mm/s²\].
+    /// The quick changes of a profile, by the robot's acceleration \[mm/s²\].
     pub fn of(profile: &SpeedProfile, accel: f64) -> Self {
         let mut all: Vec<PathSegment> = Vec::new();
         for (from, to) in profile.pieces() {
@@ -72,7 +72,7 @@ impl QuickChanges {
         Self(all)
     }
 
-    /// Distance of a position from the nearest \[mm\]; infinite without one.
+    /// Distance of a position from the nearest quick change \[mm\]; infinite without one.
     pub fn distance(&self, position_mm: f64) -> f64 {
         let after = self.0.partition_point(|quick| quick.to_mm < position_mm);
         let before = after.checked_sub(1).and_then(|i| self.0.get(i));
@@ -81,7 +81,7 @@ impl QuickChanges {
         back.min(ahead).max(0.0)
     }
 
-    /// Those that begin within a segment \[mm\].
+    /// The quick changes that begin within a segment \[mm\].
     pub fn within(&self, segment: PathSegment) -> impl Iterator<Item = PathSegment> + '_ {
         let PathSegment { from_mm, to_mm } = segment;
         self.0

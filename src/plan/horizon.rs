@@ -43,9 +43,9 @@ impl WidthWindow {
 /// Squares of the speed at the nodes, and the command at its knots.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Iterate {
-    /// \[mm²/s²\].
+    /// Squares of the speed \[mm²/s²\].
     pub squares: Vec<f64>,
-    /// In the unit of the drive.
+    /// Command at the knots, in the unit of the drive.
     pub knots: Vec<f64>,
 }
 

@@ -16,11 +16,11 @@ const RIDGE: f64 = 1e-7;
 pub struct Bounds {
     /// Smallest square of the speed at each node \[mm²/s²\].
     pub floor: Vec<f64>,
-    /// Largest one that can be reached within the acceleration \[mm²/s²\].
+    /// Largest square that can be reached within the acceleration \[mm²/s²\].
     pub ceiling: Vec<f64>,
     /// Acceleration \[mm/s²\].
     pub accel: f64,
-    /// Of the command.
+    /// Limits of the command.
     pub drive: CommandLimits,
     /// Longest time from the first node to the last \[s\].
     pub longest_s: f64,

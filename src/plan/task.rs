@@ -16,9 +16,9 @@ pub struct RobotMotionLimits {
 /// Limits of a plan, besides the nominal speed, which it never exceeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlanLimits {
-    /// Of the robot.
+    /// Limits of the robot.
     pub robot: RobotMotionLimits,
-    /// Of the extruder's command.
+    /// Limits of the extruder's command.
     pub drive: CommandLimits,
     /// Time that may be added for each minimum of the nominal speed \[s\].
     pub budget_s: f64,
@@ -53,7 +53,7 @@ impl FlowUncertainty {
         2.0 * tau * (over_s - tau * (1.0 - libm::exp(-over_s / tau)))
     }
 
-    /// Derivative of that with respect to the time \[s\].
+    /// Derivative of [`Self::volume_variance`] with respect to the time \[s\].
     pub(super) fn volume_variance_slope(&self, over_s: f64) -> f64 {
         2.0 * self.correlation_s * (1.0 - libm::exp(-over_s / self.correlation_s))
     }
@@ -78,10 +78,10 @@ pub type PathValue = (f64, f64);
 /// Errors of planning.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlanError {
-    /// The robot's speed.
+    /// Speeds that give no profile.
     #[error("the robot's speed: {0}")]
     Profile(#[from] SpeedProfileError),
-    /// The extruder's model.
+    /// A model of the extruder that is not valid.
     #[error("the extruder's model: {0}")]
     Model(#[from] ModelError),
     /// A number out of range.
