@@ -24,8 +24,8 @@ use crate::io::calibration_file;
 use crate::sim::cell::CommandedExtruder;
 use crate::sim::extruder::SimExtruder;
 
-/// Reads a cell and the devices that it chooses from a file's text; `path` is what messages
-/// call it and where relative paths start.
+/// Reads a cell and the devices that it chooses from a file's text. `path` is its name in messages;
+/// relative paths start from its folder.
 pub fn read_cell(path: &Path, text: &str, purpose: Purpose) -> Result<(Cell, Devices), Problems> {
     let mut devices = Devices::default();
     let cell = Cell::parse_with(path, text, purpose, &mut devices)?;
@@ -39,11 +39,11 @@ pub struct LoadedCell {
     pub path: PathBuf,
     /// Its text.
     pub text: String,
-    /// What stands in it.
+    /// Its content.
     pub cell: Cell,
     /// The devices that it chooses.
     pub devices: Devices,
-    /// What a pixel means in it.
+    /// Its calibration.
     pub calibration: Calibration,
     /// The calibration file's text, where there is one.
     pub calibration_text: Option<String>,
@@ -59,8 +59,8 @@ impl LoadedCell {
         Self::from_text(path, text, purpose)
     }
 
-    /// The same, for a text that is there already; `path` is what messages
-    /// call it and where relative paths start.
+    /// [`Self::read`] for a text that was read already. `path` is its name in messages; relative
+    /// paths start from its folder.
     pub fn from_text(path: &Path, text: String, purpose: Purpose) -> Result<Self, AssemblyError> {
         let (cell, devices) = read_cell(path, &text, purpose)?;
         let (calibration, calibration_text) = match &cell.calibration {
@@ -82,7 +82,7 @@ impl LoadedCell {
         Ok(loaded)
     }
 
-    /// Refuses distance control whose camera looks at bead that is not laid yet.
+    /// Refuses control by distance with a camera that sees bead which is not laid yet.
     pub fn check_camera_offset(&self) -> Result<(), AssemblyError> {
         let Some(run) = &self.cell.run else { return Ok(()) };
         let half = self.cell.gauge_length(&self.calibration) * 0.5;
@@ -99,8 +99,8 @@ impl LoadedCell {
         )))
     }
 
-    /// The extruder side as the controller has it; none where the cell has
-    /// none. Reads the files that the cell names for it.
+    /// The extruder side of the controller; `None` where the cell has none. Reads the files that
+    /// the cell names for it.
     pub fn extruder(&self) -> Result<Option<ExtruderSide>, AssemblyError> {
         let Some(run) = &self.cell.run else { return Ok(None) };
         let Some(part) = &run.extruder else { return Ok(None) };
@@ -110,7 +110,7 @@ impl LoadedCell {
         Ok(Some(ExtruderSide { setup, files, warnings }))
     }
 
-    /// What answers the extruder's commands in a simulated cell.
+    /// The extruder's plant in a simulated cell; fails where the cell has none.
     pub fn plant(&self, part: &ExtruderPart) -> Result<SimExtruder, AssemblyError> {
         let Some(plant) = &part.plant else {
             return Err(AssemblyError::unfit(format!(
@@ -122,8 +122,7 @@ impl LoadedCell {
         Ok(SimExtruder::of(plant, self.cell.simulation.seed, part.plant_nominal)?)
     }
 
-    /// The extruder side as a simulated cell has it; none where the cell has
-    /// none.
+    /// The extruder side of a simulated cell; `None` where the cell has none.
     pub fn simulated_extruder(&self) -> Result<Option<SimulatedSide>, AssemblyError> {
         let part = self.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
         let Some(part) = part else { return Ok(None) };
@@ -136,8 +135,7 @@ impl LoadedCell {
         Ok(Some(SimulatedSide { extruder, warnings }))
     }
 
-    /// The map of the measured surface, for a camera that rides as the cell
-    /// says, at the robot's present z.
+    /// The map of the measured surface, for the cell's camera mount and the robot's current z.
     pub fn surface(&self, robot_z: Option<Mm>) -> SurfaceMap {
         self.cell.surface(&self.calibration, robot_z)
     }

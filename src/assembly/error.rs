@@ -13,8 +13,7 @@ use crate::numeric::lti::ModelError;
 /// Why a cell cannot be assembled from its file and the files that it names.
 #[derive(Debug, thiserror::Error)]
 pub enum AssemblyError {
-    /// What the cell asks for does not fit together: what was found, where, and what
-    /// was expected.
+    /// Parts of the cell that do not fit together: what was found, where, and what was expected.
     #[error("{0}")]
     Unfit(String),
     /// The cell file breaks its rules.
@@ -33,19 +32,19 @@ pub enum AssemblyError {
     Unreadable {
         /// The file.
         file: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// The extruder's model cannot be read.
     #[error(transparent)]
     Model(#[from] ModelFileError),
-    /// The model cannot be worked with.
+    /// The model is not valid for its use.
     #[error(transparent)]
     Dynamics(#[from] ModelError),
-    /// The nozzle or the screw cannot give what is asked for.
+    /// The nozzle or the screw cannot give the demanded flow.
     #[error(transparent)]
     Rheology(#[from] RheologyError),
-    /// The screw cannot be filled as asked for.
+    /// The settings of the screw are not valid.
     #[error(transparent)]
     Screw(#[from] ScrewError),
 }
@@ -56,7 +55,7 @@ impl AssemblyError {
         matches!(self, Self::Unfit(_) | Self::Cell(_) | Self::Calibration { .. } | Self::Model(_))
     }
 
-    /// What the cell asks for does not fit together.
+    /// Parts of the cell that do not fit together.
     #[expect(clippy::needless_pass_by_value, reason = "an error or a new text at every call")]
     pub fn unfit(what: impl ToString) -> Self {
         Self::Unfit(what.to_string())

@@ -29,14 +29,14 @@ use crate::io::recorder::format::{
 };
 use crate::numeric::lti::TransferFunction;
 
-/// What the files that an extruder side is made from are called in a recording.
+/// Names in a recording of the files that an extruder side is made from.
 pub fn attachments(extruder: &ExtruderSettings) -> Vec<&'static str> {
     let starts = extruder.starts.as_ref().map(|_| STARTS_ATTACHMENT);
     let plan = extruder.plan.as_ref().map(|_| PLAN_ATTACHMENT);
     [attachment(&extruder.strategy), starts, plan].into_iter().flatten().collect()
 }
 
-/// What the strategy's file is called in a recording; none where it has none.
+/// Name of the strategy's file in a recording; `None` for a strategy without a file.
 fn attachment(strategy: &Strategy) -> Option<&'static str> {
     match strategy {
         Strategy::Profile { .. } => Some(PROFILE_ATTACHMENT),
@@ -54,14 +54,13 @@ pub fn file_of_strategy(files: &[ExtruderFile]) -> Option<&ExtruderFile> {
 /// The files that a cell names for its extruder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ExtruderFiles {
-    /// Those that it is made from.
+    /// The files that the extruder side is made from.
     pub files: Vec<ExtruderFile>,
-    /// What is odd about them.
+    /// Warnings about them.
     pub warnings: Vec<String>,
 }
 
-/// Reads the files that the cell names for its extruder. `cell` is what messages call
-/// the cell.
+/// Reads the files that the cell names for its extruder. `cell` is the cell's name in messages.
 pub fn files(part: &ExtruderPart, cell: &str) -> Result<ExtruderFiles, AssemblyError> {
     let mut warnings = Vec::new();
     let file = strategy_file(part, cell, &mut warnings)?;
@@ -80,9 +79,8 @@ pub fn files(part: &ExtruderPart, cell: &str) -> Result<ExtruderFiles, AssemblyE
     Ok(ExtruderFiles { files, warnings })
 }
 
-/// Reads the file that the cell names for its extruder; of a library the model
-/// that fits. `cell` is what messages call the cell; `warnings` takes what is odd about
-/// them.
+/// Reads the file that the cell names for its strategy; from a library, the model that matches.
+/// `cell` is the cell's name in messages; `warnings` gets warnings about the file.
 pub fn strategy_file(
     part: &ExtruderPart,
     cell: &str,
@@ -93,7 +91,7 @@ pub fn strategy_file(
     let (path, what) = match strategy {
         Strategy::Profile { file } => (file.clone(), "profile"),
         Strategy::Feedforward(FeedforwardKeys { model: ModelSource::File(file), .. }) => {
-            // Says what to do where there is none.
+            // Its error says what to do where there is no file.
             model_file::read(file)?;
             (file.clone(), "model")
         }
@@ -123,8 +121,8 @@ pub fn strategy_file(
     Ok(Some(ExtruderFile { name, source, text }))
 }
 
-/// What the extruder side of a controller has to know, with the files that it is
-/// made from. `cell` is what messages call the cell.
+/// The setup of the extruder side, from the cell and the files that it names. `cell` is the cell's
+/// name in messages.
 pub fn setup(
     run: &RunPart,
     part: &ExtruderPart,
@@ -160,7 +158,7 @@ pub fn setup(
     Ok(ExtruderSetup { timing, plan, ..part.extruder.setup(strategy) })
 }
 
-/// The inverse of how the extruder behaves about its operating point.
+/// The inverse of the extruder's model about its operating point.
 fn inverse_feedforward(
     keys: &FeedforwardKeys,
     run: &RunPart,
@@ -186,8 +184,7 @@ fn inverse_feedforward(
     Ok(controller.with_forecast(forecast))
 }
 
-/// What will flow when a setpoint of the robot that is given now has stood for
-/// half of its time, as far as the dead time lets that be known.
+/// Forecast of the flow half a setpoint period of the robot ahead, at most the dead time.
 fn forecast(
     model: TransferFunction,
     screw: ScrewSpeed,

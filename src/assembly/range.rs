@@ -1,5 +1,5 @@
-//! Whether a cell uses its model where it was identified, and its profile as
-//! fast as its limits allow.
+//! Warnings: a model that is used outside the range in which it was identified, and a profile that
+//! is faster than the limits.
 
 use super::error::AssemblyError;
 use super::side::ExtruderSide;
@@ -11,16 +11,16 @@ use crate::extruder::strategy::Playback;
 use crate::identify::command_profile::ProfilePoint;
 use crate::identify::model_file as model;
 
-/// What a strategy comes to where it gives the wanted flow for long.
+/// Steady state of a strategy at the demanded flow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SteadyState {
-    /// In the unit of the command.
+    /// Command, in its unit.
     pub command: f64,
-    /// Pressure at the nozzle, for a strategy that holds it.
+    /// Pressure at the nozzle, for a strategy that controls it.
     pub pressure: Option<MPa>,
 }
 
-/// The steady command of a strategy; none where it has none of its own.
+/// Steady state at the demanded flow; `None` for a strategy that does not compute one.
 pub fn steady_state(
     part: &ExtruderPart,
     side: &ExtruderSide,
@@ -48,8 +48,7 @@ pub fn steady_state(
     }
 }
 
-/// What to say where the strategy asks for what the extruder or its model does
-/// not give; none where all is well.
+/// A warning where the strategy exceeds the limits or the range of its model; `None` otherwise.
 pub fn range_warning(
     part: &ExtruderPart,
     side: &ExtruderSide,
@@ -73,8 +72,8 @@ pub fn range_warning(
     }
 }
 
-/// Where a steady command lies outside the limits, or outside the inputs that
-/// its model was identified with.
+/// A warning where a steady command lies outside the limits, or outside the inputs with which its
+/// model was identified.
 fn steady_warning(
     part: &ExtruderPart,
     side: &ExtruderSide,
@@ -102,8 +101,8 @@ fn steady_warning(
 /// Two times that differ by less are the same \[s\].
 const TIME_TOLERANCE_S: f64 = 1e-9;
 
-/// Where a profile goes on before the fastest change has brought the command
-/// to its value. Its first value is no change.
+/// A warning where the next value of a profile begins before the command has reached a value at the
+/// rate limit. The first value is no change.
 fn profile_warning(part: &ExtruderPart, side: &ExtruderSide, played: &Playback) -> Option<String> {
     let profile = played.profile();
     let rate = part.extruder.limits.rate_per_s();

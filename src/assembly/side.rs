@@ -8,21 +8,20 @@ use crate::sim::cell::CommandedExtruder;
 /// The extruder side of a cell that is commanded.
 #[derive(Debug, Clone)]
 pub struct ExtruderSide {
-    /// What the controller knows.
+    /// Setup of the extruder side of a controller.
     pub setup: ExtruderSetup,
     /// The files that it is made from.
     pub files: Vec<ExtruderFile>,
-    /// What in them, or about them, an operator should know; nothing that keeps the
-    /// cell from running.
+    /// Warnings for the operator, none of which keeps the cell from running.
     pub warnings: Vec<String>,
 }
 
 /// The extruder side of a simulated cell.
 #[derive(Debug)]
 pub struct SimulatedSide {
-    /// What the simulation needs.
+    /// The extruder for the simulation.
     pub extruder: CommandedExtruder,
-    /// As those of [`ExtruderSide`].
+    /// Warnings, as those of [`ExtruderSide`].
     pub warnings: Vec<String>,
 }
 

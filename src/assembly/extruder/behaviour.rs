@@ -1,5 +1,5 @@
-//! How the extruder of a cell behaves: the model of a file, or a screw that carries
-//! the same volume with every turn.
+//! The model of a cell's extruder: from a file, or a screw that carries the same volume with every
+//! turn.
 
 use crate::assembly::error::AssemblyError;
 use crate::cell::extruder::{FeedforwardKeys, ModelSource};
@@ -13,20 +13,19 @@ use crate::io::bead_columns::COMMAND;
 use crate::io::recorder::ExtruderFile;
 use crate::numeric::lti::TransferFunction;
 
-/// What messages say of a strategy that was given no file.
+/// Message for a strategy without its file.
 pub(super) const WITHOUT_FILE: &str = "found a strategy without its file";
 
-/// How an extruder behaves about an operating point.
+/// A linear model of an extruder about an operating point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Behaviour {
     /// From the cell's command to mm³/s.
     pub transfer: TransferFunction,
-    /// Command and flow about which that holds.
+    /// Command and flow about which it holds.
     pub operating_point: OperatingPoint,
 }
 
-/// How the extruder of a cell behaves about its operating point, from the command to
-/// mm³/s.
+/// The model of a cell's extruder about its operating point, from the command to mm³/s.
 pub fn behaviour(
     keys: &FeedforwardKeys,
     part: &ExtruderPart,

@@ -11,12 +11,13 @@ use crate::io::recorder::ExtruderFile;
 
 /// How far the section of a plan may differ from the cell's, as a fraction.
 const SECTION_TOLERANCE: f64 = 0.02;
-/// Rates may be passed by as much as a table rounds.
+/// Factor by which rates may exceed their limits: rounding of the table.
 const RATE_TOLERANCE: f64 = 1.02;
-/// Limits may be passed by as much as a table rounds \[mm/s, or the command's unit\].
+/// Amount by which values may exceed their limits \[mm/s, or the command's unit\]: rounding of the
+/// table.
 const LIMIT_TOLERANCE: f64 = 1e-3;
 
-/// Reads the plan and holds it against the cell.
+/// Reads the plan and checks it against the cell.
 pub fn plan(
     run: &RunPart,
     part: &ExtruderPart,

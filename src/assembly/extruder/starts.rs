@@ -27,7 +27,7 @@ pub fn timing(
         .map_err(|error| AssemblyError::unfit(format!("{}: {error}", found.source)))
 }
 
-/// Refuses beads that would end before their extruder has come to flow and been stopped.
+/// Refuses beads that are no longer than the distance from their end at which the pump stops.
 pub fn check_bead_length(
     run: &RunPart,
     plan: Option<&PlannedJob>,
