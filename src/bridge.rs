@@ -20,9 +20,9 @@ use crate::core::{Frame, Pixels};
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{task} failed in OpenCV: {what}")]
 pub struct BridgeError {
-    /// What was being done.
+    /// The failed task.
     pub task: &'static str,
-    /// What OpenCV said.
+    /// OpenCV's message.
     pub what: String,
 }
 

@@ -71,7 +71,7 @@ pub struct LineFinder {
 }
 
 impl LineFinder {
-    /// With settings that stay.
+    /// With settings that apply to all frames.
     pub fn new(settings: EdgeSettings) -> Self {
         prepare();
         Self { settings, blurred: Mat::default(), edges: Mat::default(), lines: Vector::new() }
