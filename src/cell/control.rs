@@ -1,4 +1,4 @@
-//! `[control]` and `[limits]`: what the controller is to do, and what it may.
+//! `[control]` and `[limits]`: target, width controller, and limits of the setpoints.
 
 use crate::core::{Mm, MmPerS, MmPerS2, Span, WidthRange};
 use crate::document::Table;
@@ -8,20 +8,19 @@ use crate::width_control::pi::PiGains;
 use crate::width_control::strategy::{STRATEGIES, WidthControlSettings};
 use crate::width_control::target::{Knot, Layers, WidthTarget};
 
-/// Fastest that any robot of this kind moves, as a bound on typing errors.
+/// Accepted speeds \[mm/s\], as a bound on typing errors.
 const SPEED_RANGE: std::ops::RangeInclusive<f64> = 0.0..=10_000.0;
 
-/// Keys of the PI controller's gains, and what they may be.
+/// Keys of the PI controller's gains, and their accepted values.
 const GAIN_KEYS: [&str; 2] = ["kp_per_s", "ki_per_s2"];
 const GAIN_RANGE: std::ops::RangeInclusive<f64> = 0.0..=1e4;
 
-/// `target_width_mm`, which stands alone in a cell that only measures.
+/// Reads `target_width_mm`, the only key of a cell that only measures.
 pub fn read_target(control: &Table<'_>) -> Option<Mm> {
     control.number("target_width_mm", 0.1..=1000.0).and_then(|v| Mm::new(v).ok())
 }
 
-/// The rest of `[control]`. There are no defaults for gains, nor for the
-/// exponent.
+/// Reads the rest of `[control]`. There are no defaults for gains, nor for the exponent.
 pub fn read_control(
     control: &Table<'_>,
     target: Option<WidthTarget>,
@@ -29,7 +28,7 @@ pub fn read_control(
     let names = STRATEGIES.map(|strategy| (strategy.name, strategy));
     let strategy = control.required_choice("strategy", &names);
     let gains = read_gains(control);
-    // PI control that is but fallen back to, or not used, may be without gains.
+    // Where PI control is only the fallback, or not used, the gains may be absent.
     let gains_optional = strategy.is_some_and(|strategy| !strategy.needs_gains)
         && !GAIN_KEYS.iter().any(|key| control.has(key));
     if !gains_optional {
@@ -62,8 +61,8 @@ fn read_gains(control: &Table<'_>) -> Option<PiGains> {
     Some(PiGains { kp_per_s: kp? / unit, ki_per_s2: ki? / unit })
 }
 
-/// Reports a target that the gauge would refuse as no width of the bead's. `layers` is the
-/// section of the layers' widths.
+/// Reports target widths outside the gauge's accepted range. `layers` is the table with the layers'
+/// widths.
 pub fn check_target(
     control: &Table<'_>,
     layers: Option<&Table<'_>>,
@@ -88,7 +87,7 @@ pub fn check_target(
     }
 }
 
-/// The width that is asked for, with its profile along the path and by layer.
+/// Reads the target width, with its profile along the path and by layer.
 pub fn read_target_profile(
     control: &Table<'_>,
     layers: Option<&Table<'_>>,

@@ -1,4 +1,4 @@
-//! What a controller has to know, of a cell and its calibration.
+//! The setup of a controller, from a cell and its calibration.
 
 use super::file::{Cell, RunPart};
 use crate::calibration::Calibration;
@@ -12,8 +12,7 @@ use crate::width_control::strategy::steps::StepsStrategy;
 const HOLD_TIME: Span = Span::from_millis(1000);
 
 impl Cell {
-    /// What the controller has to know, with the calibration that says how long
-    /// the gauge is.
+    /// The controller's setup. The length of the gauge follows from the calibration.
     pub fn controller_setup(&self, run: &RunPart, calibration: &Calibration) -> Setup {
         Setup {
             control: run.control.clone(),
@@ -36,7 +35,7 @@ impl Cell {
         }
     }
 
-    /// The sequence of steps that the cell asks for.
+    /// Settings of the step experiment; `None` for a cell with another strategy.
     pub fn steps(&self, run: &RunPart, calibration: &Calibration) -> Option<StepSettings> {
         let strategy = run.control.strategy.as_kind::<StepsStrategy>()?;
         Some(strategy.settings(&self.parameters(run, calibration)))

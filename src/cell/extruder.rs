@@ -1,6 +1,5 @@
-//! `[extruder]` and `[extruder_plant]`: what the extruder is commanded and the limits
-//! of that, and for a simulated cell what answers. There are no defaults
-//! for limits.
+//! `[extruder]` and `[extruder_plant]`: the extruder's command with its limits, and the plant of a
+//! simulated cell. There are no defaults for limits.
 
 mod adaptive;
 mod command;
@@ -37,19 +36,19 @@ use crate::extruder::{
 /// The extruder side of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderSettings {
-    /// What is commanded.
+    /// Quantity of the command.
     pub drive: CommandQuantity,
-    /// What commands may be.
+    /// Range and rate of the command.
     pub limits: CommandLimits,
-    /// How commands are found.
+    /// Strategy that gives the commands.
     pub strategy: Strategy,
     /// Height of a layer.
     pub layer_height: Mm,
-    /// What the flow goes by.
+    /// What the flow follows.
     pub follows: FlowFollows,
-    /// What the robot's speed goes by besides the width.
+    /// What the robot's speed follows besides the width.
     pub robot_follows: RobotFollows,
-    /// How often what is done.
+    /// Rates of feedforward, feedback and link.
     pub rates: ExtruderRates,
     /// Longest time without a report over which the strategy goes on.
     pub max_gap: Span,
@@ -57,7 +56,7 @@ pub struct ExtruderSettings {
     pub max_hold: Span,
     /// Pressure at which the pump is stopped, if the file says so.
     pub max_pressure: Option<MPa>,
-    /// What readings pass before the strategy sees them.
+    /// Filters of the readings for the strategy.
     pub filters: ReadingFilters,
     /// The file of its starts and stops, if the cell names one.
     pub starts: Option<PathBuf>,
@@ -155,8 +154,8 @@ impl ExtruderSettings {
         }
     }
 
-    /// What the extruder side of a controller has to know, with the controller
-    /// that the strategy chose; without what other files hold of starts and of a job.
+    /// The setup of the extruder side with the controller of a strategy. Start and stop times and
+    /// the plan are in other files, and `None` here.
     pub fn setup(&self, strategy: ExtruderStrategy) -> ExtruderSetup {
         let period = |hz: f64| Span::from_secs(1.0 / hz);
         ExtruderSetup {
@@ -192,8 +191,8 @@ fn read_valid_ms(table: &Table<'_>, io_hz: Option<f64>) -> Option<u64> {
     Some(valid_ms)
 }
 
-/// A flow that follows the robot, and a robot that follows the flow, would lead
-/// each other to a stand.
+/// Reads what the flow follows. A flow that follows a robot which follows the flow is refused: they
+/// would slow each other down to standstill.
 fn read_follows(table: &Table<'_>, robot_follows: Option<RobotFollows>) -> Option<FlowFollows> {
     let words = [("robot", FlowFollows::Robot), ("start_speed", FlowFollows::StartSpeed)];
     if robot_follows != Some(RobotFollows::Flow) {

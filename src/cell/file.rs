@@ -43,7 +43,7 @@ pub enum Purpose {
     Run,
 }
 
-/// A cell that has been read and found sound.
+/// The content of a valid cell file.
 #[derive(Debug, Clone)]
 pub struct Cell {
     /// Where the calibration comes from.
@@ -56,15 +56,15 @@ pub struct Cell {
     pub gauge: Gauge,
     /// Channel of a colour image that is measured.
     pub channel: Channel,
-    /// Upper end of the camera's scale where it is not that of the pixels.
+    /// Grey value of white where it is not the largest of the pixels.
     pub white: Option<u16>,
-    /// Width that is asked for, if the file says so.
+    /// Target width, if the file has one.
     pub target: Option<WidthTarget>,
-    /// How often frames are wanted \[Hz\], if the file says so.
+    /// Frame rate \[Hz\], if the file has one.
     pub frame_rate_hz: Option<f64>,
-    /// How the camera rides, if the file says so.
+    /// How the camera is mounted, if the file says so.
     pub mount: Option<Mount>,
-    /// What is kept, and how many rejected frames are acceptable.
+    /// Which frames are kept, and how many rejected ones are acceptable.
     pub recording: RecordingSettings,
     /// What a run needs beyond measuring; complete when read for a run.
     pub run: Option<RunPart>,
@@ -77,7 +77,7 @@ pub struct Cell {
 pub struct RunPart {
     /// The width controller.
     pub control: WidthControlSettings,
-    /// What setpoints may be.
+    /// Range and acceleration of setpoints.
     pub limits: SpeedLimits,
     /// The camera.
     pub camera: CameraSettings,
@@ -101,19 +101,18 @@ pub enum KeepFrames {
 pub struct RecordingSettings {
     /// Which frames are kept.
     pub frames: KeepFrames,
-    /// Share of refused and unreadable frames above which a command ends with
-    /// status 3.
+    /// Fraction of rejected and unreadable frames above which a command ends with status 3.
     pub max_rejected_share: f64,
 }
 
 impl Cell {
-    /// Reads a cell from a file's text. `file` is what messages call it, and
-    /// the folder that relative paths start from. Keys of drivers are left unread.
+    /// Reads a cell from a file's text. `file` is its name in messages; relative paths start from
+    /// its folder. Keys of drivers are left unread.
     pub fn parse(file: &Path, text: &str, purpose: Purpose) -> Result<Self, Problems> {
         Self::parse_with(file, text, purpose, &mut NoDrivers)
     }
 
-    /// The same, with what reads the keys of drivers.
+    /// [`Self::parse`] with a reader of the drivers' keys.
     pub fn parse_with(
         file: &Path,
         text: &str,
@@ -136,8 +135,7 @@ impl Cell {
 }
 
 impl Cell {
-    /// The map of the measured surface, for a camera that rides as the cell says, at
-    /// the robot's present z.
+    /// The map of the measured surface, for the cell's camera mount and the robot's current z.
     pub fn surface(&self, calibration: &Calibration, robot_z: Option<Mm>) -> SurfaceMap {
         let rise = self.rise(robot_z);
         let robot_z = robot_z.filter(|_| self.mount != Some(Mount::Fixed));
@@ -147,8 +145,8 @@ impl Cell {
 }
 
 impl Cell {
-    /// How much higher than that of the first layer the surface is at a robot's
-    /// z, where the cell has layers: as much as the nozzle.
+    /// Height of the surface above that of the first layer at a robot's z: the nozzle has risen as
+    /// much. 0 for a cell without layers.
     pub fn rise(&self, robot_z: Option<Mm>) -> Mm {
         let layers = self.target.as_ref().and_then(WidthTarget::layers);
         layers.zip(robot_z).map_or(Mm::ZERO, |(layers, z)| z - layers.first_z)

@@ -13,9 +13,9 @@ use crate::extruder::strategy::NozzleModel;
 /// The adaptive controller of a nozzle, and that nozzle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdaptiveSettings {
-    /// What adapts.
+    /// The adaptive controller.
     pub controller: MracController,
-    /// What its plant's state makes flow.
+    /// The nozzle, which converts flow to speed.
     pub nozzle: NozzleModel,
 }
 

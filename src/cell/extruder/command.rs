@@ -3,7 +3,7 @@
 use crate::document::Table;
 use crate::extruder::{CommandLimits, CommandQuantity};
 
-/// Any number that a command of an extruder can be, as a bound on slips.
+/// Accepted commands in any unit, as a bound on typing errors.
 pub(super) const ANY_COMMAND: std::ops::RangeInclusive<f64> = -1e9..=1e9;
 
 /// The keys of a command's limits, which carry its unit.

@@ -1,12 +1,11 @@
-//! What the reading of a strategy depends on: where files are, what is commanded,
-//! within which limits, and how often.
+//! What the reading of a strategy depends on: folder, command quantity, limits and rates.
 
 use std::path::Path;
 
 use crate::document::Table;
 use crate::extruder::{CommandLimits, CommandQuantity};
 
-/// How often what is done \[Hz\].
+/// Rates of the extruder side \[Hz\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExtruderRates {
     /// Steps of the feedforward.
@@ -17,7 +16,7 @@ pub struct ExtruderRates {
     pub io_hz: f64,
 }
 
-/// What the reading of a strategy hangs on.
+/// What the reading of a strategy depends on.
 pub(super) struct ReadContext<'a> {
     pub(super) folder: &'a Path,
     pub(super) drive: CommandQuantity,
@@ -25,7 +24,7 @@ pub(super) struct ReadContext<'a> {
     pub(super) rates: ExtruderRates,
 }
 
-/// How often what is done; nothing is done more often than the feedforward.
+/// Reads the rates. None may be higher than that of the feedforward.
 pub(super) fn read_rates(table: &Table<'_>) -> Option<ExtruderRates> {
     let hz = 0.5..=5000.0;
     let feedforward = table.number_or("feedforward_rate_hz", hz.clone(), 200.0);

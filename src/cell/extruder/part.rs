@@ -1,5 +1,5 @@
-//! `[extruder]` beside `[extruder_plant]`: what is commanded, what flow is demanded of
-//! it, and in a simulated cell what answers.
+//! `[extruder]` with `[extruder_plant]`: the command, the demanded flow, and the plant of a
+//! simulated cell.
 
 use std::path::Path;
 
@@ -14,17 +14,17 @@ use crate::scenario::table::Simulation;
 /// The extruder side of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderPart {
-    /// What is commanded.
+    /// Command, limits and strategy.
     pub extruder: ExtruderSettings,
-    /// The flow that is wanted.
+    /// The demanded flow.
     pub demand: FlowDemand,
-    /// What answers in a simulated cell, if the file says so.
+    /// The plant of a simulated cell, if the file has one.
     pub plant: Option<ExtruderPlant>,
     /// Flow at which the simulated bead is as wide as `[bead]` says.
     pub plant_nominal: Mm3PerS,
 }
 
-/// A bead as it begins.
+/// Width and speed of a bead at its beginning.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeadStart {
     /// Its width.
@@ -33,7 +33,7 @@ pub struct BeadStart {
     pub speed: MmPerS,
 }
 
-/// What stands beside the extruder in its cell; none of what could not be read.
+/// Other parts of the cell that the extruder side needs; `None` where one could not be read.
 #[derive(Debug, Clone, Copy)]
 pub struct CellContext<'a> {
     /// The bead.
@@ -43,8 +43,7 @@ pub struct CellContext<'a> {
 }
 
 impl ExtruderPart {
-    /// Reads both tables for what stands beside them; none where the extruder
-    /// goes its own way, and where a violation was reported.
+    /// Reads both tables. `None` without `[extruder]`, and where a violation was reported.
     pub fn read(
         root: &Table<'_>,
         folder: &Path,
@@ -78,8 +77,8 @@ impl ExtruderPart {
     }
 }
 
-/// Reports a plant that takes another command than is given, or that never
-/// reports what is needed: nothing of such a cell could be simulated.
+/// Reports a plant for another command quantity, or without a reading that the strategy needs: such
+/// a cell cannot be simulated.
 fn check_plant(
     extruder: &ExtruderSettings,
     table: &Table<'_>,

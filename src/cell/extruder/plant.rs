@@ -1,5 +1,5 @@
-//! `[extruder_plant]`: what answers the extruder's commands in a simulated
-//! cell. Nothing here moves a real machine, so most keys have defaults.
+//! `[extruder_plant]`: the extruder's plant in a simulated cell. Nothing here moves a real machine,
+//! so most keys have defaults.
 
 use super::pressure::{read_nozzle, read_process};
 use super::screw::read_screw;
@@ -18,20 +18,20 @@ const COEFFICIENT_COUNTS: [usize; 6] = [1, 2, 3, 4, 5, 6];
 /// The simulated extruder of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderPlant {
-    /// What turns commands into flow.
+    /// Model from commands to flow.
     pub kind: PlantKind,
-    /// From the order to run until material moves.
+    /// Delay from the command to run until material moves.
     pub start_delay: Span,
-    /// From the order to stop until nothing moves.
+    /// Delay from the command to stop until nothing moves.
     pub stop_delay: Span,
-    /// From the order to open or shut the valve until it has done so.
+    /// Delay from the command to open or close the valve until it has done so.
     pub valve_delay: Span,
 }
 
-/// What turns commands into flow.
+/// Model from commands to flow.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PlantKind {
-    /// A transfer function, or a number, with what is not modelled.
+    /// A transfer function, or a gain, with disturbances.
     Linear(LinearPlant),
     /// Lag and dead time to a pressure, and a power law from it to flow.
     Pressure(PressurePlant),
@@ -42,7 +42,7 @@ pub enum PlantKind {
 }
 
 impl PlantKind {
-    /// Whether it has a sensor of that.
+    /// Whether it has a sensor for a reading.
     pub const fn reports(&self, reading: RequiredReading) -> bool {
         match self {
             Self::Linear(plant) => match reading {
@@ -70,13 +70,13 @@ pub struct PressurePlant {
     pub max_speed: Rpm,
     /// Noise of the sensor \[MPa\].
     pub sensor_noise_mpa: f64,
-    /// A wave of the gain.
+    /// Ripple of the gain.
     pub gain_wave: GainRipple,
     /// A load at the input of the process.
     pub load: InputLoad,
 }
 
-/// A sine by which a gain swells and falls.
+/// A sinusoidal ripple of a gain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GainRipple {
     /// Amplitude as a fraction of the gain.
@@ -85,12 +85,12 @@ pub struct GainRipple {
     pub period_s: f64,
 }
 
-/// A step at the input of a process that its controller does not know of.
+/// An unmeasured step at the input of a process.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InputLoad {
     /// Its height \[rpm\].
     pub rpm: f64,
-    /// When it comes \[s\].
+    /// When it begins \[s\].
     pub at_s: f64,
 }
 
@@ -105,9 +105,9 @@ pub struct MeltPlant {
     pub screw_lag_s: f64,
     /// Melt that is stored under pressure at the usual flow, over that flow \[s\].
     pub stored_s: f64,
-    /// What is empty before the nozzle after a long pause \[mm³\].
+    /// Volume of the void at the nozzle after a long pause \[mm³\].
     pub void_mm3: f64,
-    /// Standard deviation of that from pause to pause, as a fraction.
+    /// Standard deviation of that volume from pause to pause, as a fraction.
     pub void_sigma: f64,
     /// Standard deviation of the flow, as a fraction.
     pub flow_sigma: f64,
@@ -118,32 +118,31 @@ pub struct MeltPlant {
 pub struct LinearPlant {
     /// From command to flow \[mm³/s per unit of the command\].
     pub transfer: TransferFunction,
-    /// An input that the controller does not know of: its value at the start
-    /// of the run \[unit of the command\].
+    /// Input disturbance at the start of the run \[unit of the command\].
     pub unknown_input: f64,
-    /// How fast that grows \[unit of the command per second\].
+    /// Growth of the input disturbance \[unit of the command per second\].
     pub unknown_input_per_s: f64,
-    /// Standard deviation of a flow that is not modelled \[mm³/s\].
+    /// Standard deviation of the unmodelled flow \[mm³/s\].
     pub flow_noise: f64,
-    /// How long that hangs together \[s\].
+    /// Correlation time of the unmodelled flow \[s\].
     pub flow_noise_lag_s: f64,
-    /// Noise of a sensor of the flow \[mm³/s\]; none has no sensor.
+    /// Noise of the flow sensor \[mm³/s\]; `None` without a sensor.
     pub sensor_noise: Option<f64>,
-    /// Time constant with which the screw follows a command in rpm \[s\], as its
-    /// encoder reports; none follows at once and has no encoder.
+    /// Time constant with which the screw follows a command in rpm, as its encoder reports \[s\];
+    /// `None` for a screw that follows at once and has no encoder.
     pub screw_lag_s: Option<f64>,
 }
 
 /// A screw in a simulated cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScrewPlant {
-    /// The screw as it is.
+    /// The true parameters of the screw.
     pub screw: Screw,
     /// Flow of a screw that is filled all along, at its mean speed \[mm³/s\].
     pub full_flow_mm3_per_s: f64,
     /// Filled length at the start of the run \[m\].
     pub start_m: f64,
-    /// Share of full that was fed until then.
+    /// Fill ratio of the feed until then.
     pub initial_fill: f64,
     /// Noise of the sensor of the filled length \[mm\].
     pub sensor_noise_mm: f64,

@@ -11,7 +11,7 @@ use crate::extruder::pressure::vsfc::VsfcGains;
 use crate::extruder::rheology::PowerLaw;
 use crate::extruder::strategy::{PressureChoice, PressureSettings};
 
-/// The controllers keep as many commands a second.
+/// Largest rate of the loop \[Hz\]: the controllers keep as many commands a second.
 const MAX_LOOP_HZ: f64 = 250.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,7 +27,7 @@ const CONTROLLER_WORDS: [(&str, ControllerWord); 3] = [
     ("pi", ControllerWord::Pi),
 ];
 
-/// The process; the same keys stand in the plant of a simulated cell.
+/// Reads the process; the same keys stand in the plant of a simulated cell.
 pub fn read_process(table: &Table<'_>) -> Option<Fopdt> {
     let gain = table.number("gain_mpa_per_rpm", 1e-9..=1e9);
     let lag = table.number("lag_s", 1e-3..=60.0);
@@ -35,7 +35,7 @@ pub fn read_process(table: &Table<'_>) -> Option<Fopdt> {
     or_report(table, "gain_mpa_per_rpm", Fopdt::new(gain?, lag?, dead?))
 }
 
-/// The nozzle; the same keys stand in the plant of a simulated cell.
+/// Reads the nozzle; the same keys stand in the plant of a simulated cell.
 pub fn read_nozzle(table: &Table<'_>) -> Option<PowerLaw> {
     let flow = table.number("flow_at_1_mpa_g_per_min", 1e-9..=1e12);
     let exponent = table.number("flow_exponent", 0.1..=10.0);
@@ -43,8 +43,8 @@ pub fn read_nozzle(table: &Table<'_>) -> Option<PowerLaw> {
     or_report(table, "flow_exponent", PowerLaw::new(flow?, exponent?, density?))
 }
 
-/// The loop with its controller. Gains have no defaults; the predictive controller has none,
-/// its settings come from process and noise.
+/// Reads the loop with its controller. Gains have no defaults; the predictive controller has no
+/// gains, its settings come from process and noise.
 pub(super) fn read(table: &Table<'_>, context: &ReadContext<'_>) -> Option<PressureSettings> {
     let model = read_process(table);
     let nozzle = read_nozzle(table);

@@ -1,4 +1,4 @@
-//! `[extruder.readings]`: what readings pass before the strategy sees them.
+//! `[extruder.readings]`: filters of the readings for the strategy.
 
 use crate::document::Table;
 use crate::extruder::ReadingFilters;
@@ -28,7 +28,7 @@ pub(super) fn read(table: &Table<'_>) -> Option<ReadingFilters> {
             table.report(key, "a number without its filter", needed);
         }
     }
-    // What was asked for and cannot be was reported.
+    // An invalid filter was reported.
     if spikes == Some(None) || smoothing == Some(None) {
         return None;
     }

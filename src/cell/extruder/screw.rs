@@ -1,5 +1,5 @@
-//! `[extruder.screw]`: a screw as its maker describes it, and what is asked of
-//! its predictor; and the same screw in a simulated cell.
+//! `[extruder.screw]`: the design of a screw and the settings of its predictor, and the screw of a
+//! simulated cell.
 
 use super::context::ReadContext;
 use crate::core::{Mm, Rpm, Span};
@@ -18,8 +18,7 @@ enum FeedbackWord {
     Saturated,
 }
 
-/// A screw. Absent keys have the values of `usual`, or are reported where there
-/// is none.
+/// Reads a screw. Absent keys have the values of `default`; without a default they are reported.
 pub fn read_screw(table: &Table<'_>, default: Option<ScrewDesign>) -> Option<Screw> {
     let number = |key, range: std::ops::RangeInclusive<f64>, value: fn(&ScrewDesign) -> f64| {
         match &default {
@@ -57,7 +56,7 @@ pub fn read_screw(table: &Table<'_>, default: Option<ScrewDesign>) -> Option<Scr
     }
 }
 
-/// The predictor of a screw and its feedback.
+/// Reads the predictor of a screw and its feedback.
 pub(super) fn read_predictor(
     table: &Table<'_>,
     context: &ReadContext<'_>,
@@ -93,7 +92,7 @@ pub(super) fn read_predictor(
             screw,
             feedback,
             scheme: Scheme::Exact,
-            // What is fed may change at every tick while a limit acts.
+            // While a limit acts the feed may change at every tick.
             period: Span::from_secs(1.0 / context.rates.feedforward_hz),
             initial_fill: feedback.holding_fill(),
         }),

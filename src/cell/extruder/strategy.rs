@@ -15,7 +15,7 @@ use crate::extruder::screw::control::ScrewSettings;
 use crate::extruder::strategy::PressureSettings;
 use crate::identify::library::{ModelQuery, TOLERANCE_C};
 
-/// How commands are found.
+/// The strategy that gives the commands.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Strategy {
     /// One command.
@@ -46,16 +46,16 @@ impl Strategy {
     }
 }
 
-/// How a model is found and inverted.
+/// Source of a model and settings of its inverse.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FeedforwardKeys {
-    /// Which model.
+    /// Source of the model.
     pub model: ModelSource,
     /// Time constant of the poles that are placed \[s\].
     pub time_constant_s: f64,
     /// Largest delay of the flow beyond the preview.
     pub max_delay: Span,
-    /// What becomes of zeros in the right half plane.
+    /// How zeros in the right half plane are handled.
     pub right_zeros: RightHalfPlaneZeros,
     /// What the flow is predicted from.
     pub predicted_from: ScrewSpeed,
@@ -66,11 +66,11 @@ pub struct FeedforwardKeys {
 pub enum ModelSource {
     /// A file.
     File(PathBuf),
-    /// The one of a folder that fits.
+    /// The matching model of a folder.
     Library {
         /// The folder.
         folder: PathBuf,
-        /// What is looked for.
+        /// The requested conditions.
         wanted: ModelQuery,
     },
     /// None: a screw that carries the same volume with every turn, at once.
@@ -175,14 +175,14 @@ fn read_feedforward(table: &Table<'_>, context: &ReadContext<'_>) -> Option<Feed
     })
 }
 
-/// What a model is looked up by in a library.
+/// Keys by which a model is looked up in a library.
 const LIBRARY_KEYS: [&str; 4] =
     ["material", "nozzle_mm", "temperature_c", "temperature_tolerance_c"];
 
 const MODEL_OR_LIBRARY: &str = "the file of a model, library with material, nozzle_mm and \
                                 temperature_c, or mm3_per_turn";
 
-/// A screw or a wheel in place of a model.
+/// Reads a screw or a wheel in place of a model.
 fn read_drag_flow(table: &Table<'_>, context: &ReadContext<'_>) -> Option<DragFlow> {
     let volume = table.number("mm3_per_turn", 1e-6..=1e12);
     if table.has("model") || table.has("library") {

@@ -1,10 +1,10 @@
-//! `[calibration]`: what a pixel means.
+//! `[calibration]`: the calibration of the camera.
 
 use std::path::{Path, PathBuf};
 
 use crate::document::Table;
 
-/// Sizes of a pixel at the surface that are taken \[mm/px\].
+/// Accepted sizes of a pixel at the surface \[mm/px\].
 const SCALE_MM_PER_PX: std::ops::RangeInclusive<f64> = 1e-6..=1e3;
 
 /// Where the calibration comes from.

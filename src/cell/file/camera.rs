@@ -1,4 +1,4 @@
-//! `[camera]`: where frames come from, and how the camera rides.
+//! `[camera]`: where frames come from, and how the camera is mounted.
 
 use std::path::{Path, PathBuf};
 
@@ -38,12 +38,12 @@ impl ImageSource {
     }
 }
 
-/// How a camera rides.
+/// How a camera is mounted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mount {
-    /// With the nozzle; it rises with the layers.
+    /// On the flange: it moves with the nozzle and rises with the layers.
     Flange,
-    /// It stands still.
+    /// At a fixed position.
     Fixed,
 }
 
@@ -56,7 +56,7 @@ pub struct CameraSettings {
     pub source_name: String,
     /// Frames a second.
     pub rate_hz: f64,
-    /// How it rides.
+    /// How it is mounted.
     pub mount: Mount,
     /// Path length from the nozzle back to the middle of the gauge.
     pub offset: Mm,
@@ -66,7 +66,7 @@ pub struct CameraSettings {
     pub deadline: Span,
 }
 
-/// Standard deviation of an offset of which the file says none, as a fraction.
+/// Standard deviation of the offset where the file has none, as a fraction of the offset.
 const OFFSET_SIGMA_FRACTION: f64 = 0.1;
 
 pub(super) fn read_mount(table: &Table<'_>) -> Option<Mount> {

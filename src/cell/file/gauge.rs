@@ -4,9 +4,9 @@ use crate::core::{Channel, Mm, Roi, WidthRange};
 use crate::document::Table;
 use crate::vision::gauge::{self, BeadAxis, EdgeKind, Gauge, MeasureMethod, Polarity};
 
-/// Largest image side that is taken \[px\].
+/// Largest accepted image side \[px\].
 const MAX_SIDE_PX: f64 = 65_536.0;
-/// Largest fraction of a width that its standard deviation may be asked to be.
+/// Largest accepted `max_sigma`, as a fraction of the width.
 const LARGEST_MAX_SIGMA: f64 = 0.5;
 /// Gammas of cameras: 0.45 for television, 2.2 for its inverse, with room beyond.
 const GAMMA_RANGE: std::ops::RangeInclusive<f64> = 0.2..=5.0;
