@@ -1,5 +1,5 @@
-//! A cursor over a TOML file that takes what it is asked for and collects
-//! every violation on the way, with its line, instead of ending at the first.
+//! A TOML file read strictly, key by key: every violation is collected with its line, instead of
+//! ending at the first.
 
 pub mod csv;
 pub mod describe;

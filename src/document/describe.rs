@@ -1,7 +1,7 @@
-//! Which keys a file may have, found by reading a file that is not there: a reader asks
-//! for its keys, and what it asks for is noted down.
+//! The keys that a file may have, from a run of its reader without a file: every key that the
+//! reader requests is recorded.
 //!
-//! A choice, a key that a reader looks for and an optional table lead to other keys, so the
+//! Other keys may depend on a choice, on whether a key is present and on an optional table, so the
 //! reader runs again for every answer, and for every two together.
 
 use std::collections::{BTreeSet, VecDeque};
@@ -12,7 +12,7 @@ use super::table::Table;
 
 pub use super::key_spec::{KeyKind, KeySpec};
 
-/// Answers other than the first that are tried together, for keys that two other keys open.
+/// Answers other than the first that are tried together: a key may depend on two others.
 const MAX_JOINT_ANSWERS: usize = 2;
 
 /// Every key that a reader may ask for, in the order of reading.

@@ -49,7 +49,7 @@ impl<'a> FileText<'a> {
     /// The value that was read if nothing was wrong, else everything that was.
     pub(super) fn finish<T>(self, value: Option<T>) -> Result<T, Problems> {
         let mut list = self.problems.into_inner();
-        // What follows from a slip of syntax is no news.
+        // Violations that follow from a syntax error are dropped.
         if list.iter().any(|problem| problem.expected.is_empty()) {
             list.retain(|problem| problem.expected.is_empty());
         }

@@ -1,4 +1,4 @@
-//! What is known of a key of a file, and the notes of a reader that reads none.
+//! The description of a key of a file, and the record of a reader that runs without a file.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -15,9 +15,9 @@ pub struct KeySpec {
     pub kind: KeyKind,
     /// Whether it must be there, in the tables that a purpose needs.
     pub is_required: bool,
-    /// The value that stands for its absence, as it is written; none where there is none.
+    /// The default as it is written; `None` without one.
     pub default: Option<String>,
-    /// The answers that led to it, where others do not: key, and what was chosen.
+    /// Answers that it depends on: each with its key.
     pub when: Vec<(String, String)>,
 }
 
@@ -30,7 +30,7 @@ pub enum KeyKind {
     NumberWithin(&'static str),
     /// A whole number within a range.
     Integer(RangeInclusive<u64>),
-    /// Numbers in brackets, each within a range; the counts that are allowed, none for any.
+    /// Numbers in brackets, each within a range; the accepted counts, empty for any.
     Numbers(Vec<usize>, RangeInclusive<f64>),
     /// A text.
     Text,
@@ -45,7 +45,7 @@ pub(super) type Question = (String, &'static str);
 /// Questions with the number of the answer.
 pub(super) type Answers = BTreeMap<Question, usize>;
 
-/// Notes down what one run of a reader asks for.
+/// Records what one run of a reader requests.
 pub(super) struct Describer {
     pub(super) answers: Answers,
     pub(super) found: RefCell<Vec<KeySpec>>,
@@ -55,7 +55,7 @@ pub(super) struct Describer {
 }
 
 impl Describer {
-    /// Of a run with these answers.
+    /// For a run with these answers.
     pub(super) fn new(answers: Answers) -> Self {
         let (found, met, numbers) = Default::default();
         Self { answers, found, met, numbers }

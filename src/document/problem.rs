@@ -10,9 +10,9 @@ pub struct Problem {
     pub line: Option<usize>,
     /// Key with its tables, such as `limits.min_speed_mm_per_s`.
     pub key: String,
-    /// What stands there.
+    /// The content that was found.
     pub found: String,
-    /// What should; empty where `found` says it all.
+    /// The content that is expected; empty where `found` says it all.
     pub expected: String,
 }
 

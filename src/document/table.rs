@@ -13,8 +13,8 @@ use super::keys::{resembles, shared_ends};
 use super::renamed::present_name;
 use super::scalar::as_written;
 
-/// One table of a document. Keys that nobody asked for are violations, which
-/// are reported when the table is dropped.
+/// One table of a document. Keys that were not requested are violations, which are reported when
+/// the table is dropped.
 pub struct Table<'a> {
     text: &'a FileText<'a>,
     path: String,
@@ -23,7 +23,7 @@ pub struct Table<'a> {
     strict: bool,
     asked: RefCell<BTreeSet<&'static str>>,
     unknown_keys_allowed: Cell<bool>,
-    /// Notes down what is asked for, where no file is read.
+    /// Records the requests of a run without a file.
     describer: Option<&'a Describer>,
 }
 
@@ -42,7 +42,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The outermost table of a file that is not there.
+    /// The outermost table of a run without a file.
     pub(super) fn described(text: &'a FileText<'a>, describer: &'a Describer) -> Self {
         Table {
             text,
@@ -56,7 +56,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Whether no file is read, with what notes down the questions.
+    /// The recorder of a run without a file; `None` where a file is read.
     pub(super) const fn describer(&self) -> Option<&'a Describer> {
         self.describer
     }
@@ -65,13 +65,12 @@ impl<'a> Table<'a> {
         &self.path
     }
 
-    /// Whether the key stands in the file, which is no question of the reader's own.
+    /// Whether the key stands in the file; not recorded as a question.
     pub(super) fn stands(&self, key: &'static str) -> bool {
         self.get(key).is_some()
     }
 
-    /// Lets unknown keys of this table pass: which there may be hangs on one
-    /// that is wrong.
+    /// Accepts unknown keys of this table, as which ones are valid depends on a key that is wrong.
     pub fn allow_unknown_keys(&self) {
         self.unknown_keys_allowed.set(true);
     }
@@ -144,8 +143,8 @@ impl<'a> Table<'a> {
         if self.stands(key) { self.table(key) } else { Some(self.child(key, None, true)) }
     }
 
-    /// A table that only a run needs: there it must be and must be complete,
-    /// elsewhere it may be absent or lack keys.
+    /// A table that only a run needs: required and complete for a run; otherwise it may be absent
+    /// or lack keys.
     pub fn run_table(&self, key: &'static str) -> Option<Table<'a>> {
         if self.text.for_run() {
             return self.required_table(key);
@@ -155,8 +154,7 @@ impl<'a> Table<'a> {
         Some(table)
     }
 
-    /// A table that only a run reads, and that it may lack: complete in a run
-    /// where it stands at all.
+    /// An optional table that only a run reads: where it is present, it must be complete for a run.
     pub fn optional_run_table(&self, key: &'static str) -> Option<Table<'a>> {
         let mut table = self.table(key)?;
         table.strict = self.text.for_run();

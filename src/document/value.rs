@@ -37,7 +37,7 @@ impl<'a> Table<'a> {
         self.optional_number(key, range)
     }
 
-    /// A number with a value that stands for its absence.
+    /// A number with a default.
     pub fn number_or(
         &self,
         key: &'static str,
@@ -80,7 +80,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// A whole number with a value that stands for its absence.
+    /// A whole number with a default.
     pub fn integer_or(
         &self,
         key: &'static str,
@@ -133,7 +133,7 @@ impl<'a> Table<'a> {
         self.array(key, expected, &range, |count| count > 0)
     }
 
-    /// Numbers in brackets, as many as may be, each within the range.
+    /// Any number of numbers in brackets, each within the range.
     fn array(
         &self,
         key: &'static str,
@@ -155,7 +155,7 @@ impl<'a> Table<'a> {
         found
     }
 
-    /// The same where the key may be absent.
+    /// [`Self::numbers`] where the key may be absent.
     pub fn optional_numbers<const N: usize>(
         &self,
         key: &'static str,
@@ -241,7 +241,7 @@ impl<'a> Table<'a> {
         None
     }
 
-    /// Notes a key down where no file is read; says whether it did.
+    /// Records a key in a run without a file; returns whether it did.
     fn describe(
         &self,
         key: &'static str,
@@ -272,7 +272,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Stands for any text, and passes for an address, where no file is read.
+/// Text that a run without a file reads; it is also valid as an address.
 const DESCRIBED_TEXT: &str = "text:1";
 
 fn expected_number(range: &RangeInclusive<f64>) -> String {
