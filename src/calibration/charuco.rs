@@ -25,7 +25,7 @@ const MAX_CORNER_ERROR: f64 = 0.3;
 /// Pairs of markers from which a homography of the board is estimated. A choice between time
 /// and the chance that no pair is free of errors.
 const MAX_PAIRS: usize = 400;
-/// [`MAX_PAIRS`] for each of many numbers of columns that are tried.
+/// Pairs of markers, as [`MAX_PAIRS`], where many numbers of columns are tried.
 const MAX_PAIRS_PER_COUNT: usize = 60;
 /// Markers next to a position by which it is predicted: few, so that the distortion between
 /// them is small.

@@ -25,7 +25,7 @@ pub struct Coverage {
 pub const SIDES: [&str; 4] = ["left", "right", "upper", "lower"];
 
 impl Coverage {
-    /// Of all images of a calibration.
+    /// The coverage of all images of a calibration.
     pub fn of(solution: &Solution) -> Self {
         let mut tilts = [0; 4];
         for view in &solution.views {

@@ -13,7 +13,7 @@ pub struct GreyImage<'a> {
 }
 
 impl<'a> GreyImage<'a> {
-    /// Of a frame.
+    /// The grey values of a frame.
     pub fn of(frame: &'a Frame) -> Self {
         let scale = match frame.pixels() {
             Pixels::Grey8(_) => 1.0,

@@ -13,7 +13,7 @@ pub enum Lens {
     Four,
     /// k1 k2 p1 p2 k3 (Brown 1971).
     Five,
-    /// [`Self::Five`] with the radial part divided by 1 + k4 r² + k5 r⁴ + k6 r⁶.
+    /// [`Lens::Five`] with the radial part divided by 1 + k4 r² + k5 r⁴ + k6 r⁶.
     Rational,
 }
 

@@ -192,7 +192,7 @@ struct Shade {
 }
 
 impl Shade {
-    /// Of a square given row by row; `None` outside the image.
+    /// The shade of a square given row by row; `None` outside the image.
     fn of(grey: &GreyImage<'_>, square: [ImagePoint; 4]) -> Option<Self> {
         let [above, below] = [[square[0], square[1]], [square[2], square[3]]];
         let between = |ends: [ImagePoint; 2], part: f64| ends[0] + (ends[1] - ends[0]) * part;

@@ -15,7 +15,7 @@ const SPEED_RANGE: std::ops::RangeInclusive<f64> = 0.0..=10_000.0;
 const GAIN_KEYS: [&str; 2] = ["kp_per_s", "ki_per_s2"];
 const GAIN_RANGE: std::ops::RangeInclusive<f64> = 0.0..=1e4;
 
-/// Reads `target_width_mm`, the only key of a cell that only measures.
+/// Reads `target_width_mm`, the only key of `[control]` that measuring needs.
 pub fn read_target(control: &Table<'_>) -> Option<Mm> {
     control.number("target_width_mm", 0.1..=1000.0).and_then(|v| Mm::new(v).ok())
 }

@@ -90,7 +90,7 @@ pub struct RunPart {
 /// Which frames a recording keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum KeepFrames {
-    /// None.
+    /// No frame.
     None,
     /// Every n-th, beginning with the first; 1 is all.
     Every(u64),

@@ -1,4 +1,4 @@
-//! The extruder side's answer to events, and what it has to know of the bead.
+//! The extruder side's answer to events, and the state of the bead for it.
 
 use super::controller::Controller;
 use super::event::Event;

@@ -12,7 +12,7 @@ pub const NO_OVERRIDE: f64 = 1.0;
 /// The extruder side of a controller.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderControl {
-    /// Decides when the extruder runs and what it is commanded.
+    /// Decides when the extruder runs and which command it gets.
     pub supervisor: Supervisor,
     /// The demanded flow.
     pub demand: FlowDemand,

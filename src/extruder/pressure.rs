@@ -60,7 +60,7 @@ pub enum PressureError {
     TooFew {
         /// Number of readings.
         found: usize,
-        /// How many are needed.
+        /// Number that is needed.
         wanted: usize,
     },
     /// Readings that show no noise; variance of the change from one to the next \[MPa²\].

@@ -28,7 +28,7 @@ pub struct TimeGrid {
     pub start_s: f64,
     /// From each to the next \[s\].
     pub step_s: f64,
-    /// How many.
+    /// Number of moments.
     pub count: usize,
     /// Whether the samples are off the grid.
     pub is_uneven: bool,

@@ -19,7 +19,7 @@ pub struct Prbs {
 }
 
 impl Prbs {
-    /// Of a register of 3 to 16 bits.
+    /// The sequence of a register of 3 to 16 bits.
     pub fn new(bits: u32) -> Result<Self, NoSuchLength> {
         let taps = taps(bits).ok_or(NoSuchLength { bits })?;
         Ok(Self { register: (1 << bits) - 1, taps, bits })

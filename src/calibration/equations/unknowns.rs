@@ -112,7 +112,7 @@ impl CameraModel {
 }
 
 impl BoardPlacement {
-    /// Of a single board.
+    /// The placement of a single board.
     pub fn of_one(pose: Pose) -> Self {
         Self { pose, others: Vec::new() }
     }

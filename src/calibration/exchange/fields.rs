@@ -30,7 +30,7 @@ pub struct YamlFields<'a> {
 }
 
 impl<'a> YamlFields<'a> {
-    /// Of a document's root; reports a root that is no mapping.
+    /// The keys of a document's root; reports a root that is no mapping.
     pub fn of(root: &'a Node) -> Self {
         let items = mapping(root);
         let fields = Self { items: items.unwrap_or(&[]), problems: RefCell::default() };

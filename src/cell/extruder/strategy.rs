@@ -73,7 +73,7 @@ pub enum ModelSource {
         /// The requested conditions.
         wanted: ModelQuery,
     },
-    /// None: a screw that carries the same volume with every turn, at once.
+    /// No model: a screw that carries the same volume with every turn, at once.
     Screw(DragFlow),
 }
 

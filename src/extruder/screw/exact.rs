@@ -46,7 +46,7 @@ const MAX_STEP_S: f64 = 0.1;
 /// Up to this phase of the pulsation in a step \[rad\] second order leaves less than a micrometre
 /// over the delay, as a test shows.
 const SECOND_ORDER_RAD: f64 = 0.05;
-/// Up to this length of a step \[s\] second order leaves less than that, too.
+/// Up to this length of a step \[s\], too, second order leaves less than a micrometre.
 const SECOND_ORDER_S: f64 = 0.006;
 
 /// The predictor with its model.

@@ -24,7 +24,7 @@ pub enum Conveying {
     /// (L − x)/c(t): all of the distance at the speed of the moment of arrival, as in eq. (16).
     AtPresentSpeed,
     /// The time over which the speed integrates to the distance, as on a belt. Equal to
-    /// [`Self::AtPresentSpeed`] where the speed is constant.
+    /// [`Conveying::AtPresentSpeed`] where the speed is constant.
     AtSpeedOnTheWay,
 }
 

@@ -84,7 +84,7 @@ pub enum ExperimentError {
         }
     )]
     Constant {
-        /// Which one.
+        /// The constant column.
         side: DataColumn,
         /// Its value.
         value: f64,
@@ -97,7 +97,7 @@ pub enum ExperimentError {
         if *.validates { "kept to validate with" } else { "fitted to" }
     )]
     ConstantPart {
-        /// Which one.
+        /// The constant column.
         side: DataColumn,
         /// Its value.
         value: f64,

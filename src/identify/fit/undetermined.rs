@@ -9,7 +9,7 @@ pub enum Undetermined {
     /// fewer is enough. Parameters that are divided by that coefficient may nevertheless look
     /// well determined.
     Pole {
-        /// Poles that were asked for.
+        /// Requested number of poles.
         poles: usize,
         /// The coefficient of the highest power of s in a denominator that ends
         /// with 1.

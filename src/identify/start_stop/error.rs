@@ -10,7 +10,7 @@ pub enum StartStopFitError {
     TooFewSamples {
         /// `the command` or `the flow`.
         what: &'static str,
-        /// How many there are.
+        /// Number of samples.
         found: usize,
         /// Samples that are needed.
         needed: usize,

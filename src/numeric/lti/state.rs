@@ -31,7 +31,7 @@ pub struct Advance {
 }
 
 impl StateSpace {
-    /// Of a transfer function without its dead time.
+    /// The state space of a transfer function without its dead time.
     pub fn of(tf: &TransferFunction) -> Self {
         let order = tf.order();
         let (num, den) = (tf.num(), tf.den());

@@ -16,7 +16,7 @@ const KNOWN_CODES: &str = "G0 to G3, G20, G21, G90 and G91 are, and what moves n
 /// Motion of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LineMotion {
-    /// Nothing.
+    /// No move.
     None,
     /// A rapid move.
     Rapid,

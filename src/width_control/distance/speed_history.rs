@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 /// Largest number of nodes, whatever the length: more than ten minutes at 50 reports a second
 /// with two nodes each.
 const MAX_NODES: usize = 1 << 16;
-/// Speed below which the width model says nothing \[mm/s\]; it keeps ln v finite.
+/// Speed below which the width model does not hold \[mm/s\]; it keeps ln v finite.
 const SLOWEST_MM_PER_S: f64 = 0.5;
 /// Relative difference within which two reports count as the same speed.
 const SAME_SPEED_RATIO: f64 = 1e-3;
