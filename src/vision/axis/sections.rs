@@ -8,11 +8,12 @@ use crate::core::SurfacePoint;
 use crate::numeric::gauss_legendre::GAUSS_LEGENDRE_5;
 use crate::vision::curve::EdgeCurve;
 
-/// Distance of the positions from which an edge's direction and bend on the
-/// surface are taken.
+/// Step of the central differences for an edge's direction and bend on the surface, in halves of
+/// the gauge.
 const DIFFERENCE_STEP: f64 = 0.15;
 
-/// An edge about a position, on the surface.
+/// An edge at a position t along the gauge: its point on the surface, and the first and second
+/// derivatives by t \[mm\].
 struct LocalEdge {
     at: SurfacePoint,
     slope: Vector2<f64>,
@@ -29,7 +30,7 @@ impl LocalEdge {
         Some(Self { at, slope, bend })
     }
 
-    /// Where the normal to a direction through a point crosses the edge.
+    /// Point of the edge on the line through `from` normal to `along`, by Newton's method.
     fn crossing(&self, from: SurfacePoint, along: Vector2<f64>) -> SurfacePoint {
         let ahead = (self.at - from).dot(&along);
         let (slope, bend) = (self.slope.dot(&along), self.bend.dot(&along));
@@ -49,14 +50,12 @@ pub struct Sections {
     pub mean: f64,
     /// Widths as the first three Legendre coefficients over the gauge \[mm\].
     pub terms: [f64; 3],
-    /// Part of the lines across the gauge that runs along the bead, mean
-    /// \[mm\].
+    /// Component along the bead of the line from edge to edge across the gauge, mean \[mm\].
     pub oblique: f64,
-    /// The same times the direction that a bend of 1 px gives the axis there, for
-    /// half a gauge of 1 px.
+    /// Mean of that component times the change of the axis' direction by a bend of 1 px, for a half
+    /// gauge of 1 px.
     pub oblique_by_bend: f64,
-    /// Millimetres normal to the bead for a pixel across the gauge, left and
-    /// right.
+    /// Millimetres normal to the bead per pixel across the gauge, at the left and the right edge.
     pub scales: [f64; 2],
 }
 

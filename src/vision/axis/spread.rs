@@ -1,4 +1,4 @@
-//! Uncertainty of a width, and roughness of the bead.
+//! Uncertainty of a width, and the bias that the uncertain direction of its axis gives it.
 
 use super::sections::Sections;
 use super::width_input::{LocatedEdge, WidthInput, WidthScratch};
@@ -8,22 +8,22 @@ use crate::vision::located::CaliperEdge;
 use crate::vision::scatter::{self, EdgeResidual};
 use crate::vision::waviness::{CURVE_ORDERS, Evidence, Midline, ORDERS, WaveKind, legendre, norm};
 
-/// Fraction of the rows from which on nothing but the bead itself is seen.
+/// Fraction of rows with a position from which on an edge is not occluded.
 const MIN_COMPLETE_FRACTION: f64 = 0.98;
-/// Inflation of a variance that an edge's misfit may hide: less would refuse edges whose misfit
-/// noise explains.
+/// Limit of the variance inflation for a misfit that noise explains: a lower one would ignore
+/// correlation that such a misfit may hide.
 const MIN_INFLATION_LIMIT: f64 = 1.2;
-/// By how much more for the misfit that an edge shows: a texture's shift of an edge is correlated
-/// over so many rows.
+/// Growth of that limit for each unit by which the squared misfit exceeds 1: a texture shifts an
+/// edge alike over about as many rows.
 const INFLATION_PER_MISFIT: f64 = 15.0;
-/// Squared slope of an axis, in variances of what waves make, below which it is none: more takes
-/// waves for a slope, less a slope for waves.
+/// Squared slope of the axis, in variances of the slope that waves make, up to which it is taken
+/// for waves: a larger value takes a slope for waves, a smaller one waves for a slope.
 const MIN_OBLIQUE_RATIO: f64 = 3.0;
 
 /// A bead that was cut along the curves of its two edges.
 #[derive(Clone, Copy)]
 pub struct CutBead<'a> {
-    /// What the width is taken from.
+    /// Edge positions, and the map to the surface.
     pub scene: &'a WidthInput<'a>,
     /// Left and right edge.
     pub curves: &'a [EdgeCurve; 2],
@@ -31,17 +31,17 @@ pub struct CutBead<'a> {
     pub sections: &'a Sections,
 }
 
-/// How sure the width is, and how rough the bead.
+/// Uncertainty of the width.
 pub struct WidthUncertainty {
     /// Standard deviation of the width \[mm\], without the calibration's fraction.
     pub sigma: f64,
-    /// What the uncertainty about the axis' direction takes from the width in the
-    /// mean: an axis that is off by an angle shows 1 − angle²/2 of it \[mm\].
+    /// Mean loss of width by the uncertain direction of the axis \[mm\]: an axis that is off by an
+    /// angle shows 1 − angle²/2 of the width.
     pub shortened: f64,
 }
 
 impl WidthUncertainty {
-    /// Of a width that was cut along these curves of the two edges.
+    /// Uncertainty of the width of a bead that was cut.
     pub fn of(cut: &CutBead<'_>, scratch: &mut WidthScratch) -> Self {
         let &CutBead { scene, curves, sections } = cut;
         let (mut variance, mut noise) = (0.0, 0.0);
@@ -67,8 +67,7 @@ impl WidthUncertainty {
         Self { sigma: (variance + of_tilt).sqrt(), shortened }
     }
 
-    /// By how much the uncertainty about the axis' direction makes the width too
-    /// short, and the variance that it leaves.
+    /// Mean loss of width \[mm\] by the uncertain direction of the axis, and its variance \[mm²\].
     fn tilt_bias_and_variance(cut: &CutBead<'_>, scratch: &mut WidthScratch) -> (f64, f64) {
         let &CutBead { scene, curves, sections } = cut;
         let oblique = sections.oblique * sections.oblique;
@@ -82,11 +81,11 @@ impl WidthUncertainty {
         let per_slope =
             scene.cosine_squared(curves, 0.0) / (scene.half_length() * scene.half_length());
         let first = per_slope * scene.cosine_squared(curves, 0.0) * waves[0];
-        // Bends that waves explain are none of the axis.
+        // A bend that waves explain is not one of the axis.
         let bends = midline.bends_of(&waves);
         let per_bend = 0.5 * sections.mean * per_slope;
-        // Waves make a slope of their own; only what is beyond them is that of
-        // an axis, along which an error of the direction counts.
+        // Waves have a slope of their own. Only a slope beyond it is the axis', and only along that
+        // an error of the direction counts.
         let beyond = (oblique - MIN_OBLIQUE_RATIO * sections.mean * sections.mean * first).max(0.0);
         let of_slope = 0.5 * scene.kind_of_waves().slope_fraction() * sections.mean * first;
         let of_bends = per_bend * bends.of_waves_sigma;
@@ -97,8 +96,7 @@ impl WidthUncertainty {
         (of_slope + per_bend * bends.of_waves, variance)
     }
 
-    /// Standard deviation of the width along the gauge, without the noise of
-    /// its positions.
+    /// Standard deviation of the width along the gauge, without the noise of its positions \[mm\].
     fn roughness(cut: &CutBead<'_>, scratch: &WidthScratch, noise: f64) -> f64 {
         let &CutBead { scene, sections, .. } = cut;
         let (mut square, mut n) = (0.0, 0.0);
@@ -112,8 +110,8 @@ impl WidthUncertainty {
         (square / f64::max(n - 1.0, 1.0) - noise).max(0.0).sqrt()
     }
 
-    /// The bands that are missing hide bead that counts; its waviness is an error then,
-    /// which is correlated over neighbouring bands. Each edge has half of it.
+    /// Variance of the width from missing bands \[mm²\]: waviness of the bead that they hide, which
+    /// is correlated over neighbouring bands. Each edge has half of it.
     fn variance_of_gaps(cut: &CutBead<'_>, roughness: f64, scratch: &mut WidthScratch) -> f64 {
         let &CutBead { scene, sections, .. } = cut;
         let mut variance = 0.0;
@@ -133,10 +131,10 @@ impl WidthUncertainty {
         variance
     }
 
-    /// Variances of the axis' direction in the middle \[rad²\] and of its bend in
-    /// halves of the gauge: where lines across the gauge run obliquely to the bead,
-    /// an axis that is off takes them for longer or shorter. From how far the
-    /// middles lie off their course, and over how many bands that is correlated.
+    /// Variances of the axis' direction in the middle \[rad²\] and of its bend, relative to half
+    /// the gauge: where lines across the gauge run obliquely to the bead, an axis that is off makes
+    /// them longer or shorter. From the residuals of the midline and their correlation from band to
+    /// band.
     fn tilt_variances(cut: &CutBead<'_>, scratch: &mut WidthScratch) -> [f64; 2] {
         let &CutBead { scene, curves, .. } = cut;
         let WidthScratch { off: [left, right], values } = scratch;
@@ -153,7 +151,7 @@ impl WidthUncertainty {
 }
 
 impl LocatedEdge<'_> {
-    /// By how much positions with gaps between them scatter more than noise
+    /// Variance inflation of positions with gaps between them: their spread, relative to what noise
     /// explains.
     fn inflation_with_gaps(&self, off: &[Option<f64>], curve: &EdgeCurve, per_place: f64) -> f64 {
         let positions = off.iter().zip(self.positions);
@@ -163,9 +161,9 @@ impl LocatedEdge<'_> {
         scatter::inflation_with_gaps(positions, per_place, curve.count)
     }
 
-    /// Most that neighbouring positions can are correlated: what moves an edge,
-    /// unless it is the bead itself, leaves a misfit. Edges that are covered
-    /// here and there may hide anything.
+    /// Upper limit of the variance inflation by correlation of neighbouring positions: what moves
+    /// an edge, unless it is the bead itself, leaves a misfit. Infinite for an edge that is
+    /// occluded here and there, which may hide anything.
     fn max_inflation(&self) -> f64 {
         let seen: f64 = self.positions.iter().flatten().map(|located| located.row_fraction).sum();
         if seen < MIN_COMPLETE_FRACTION * to_f64(self.positions.len()) {
@@ -176,16 +174,16 @@ impl LocatedEdge<'_> {
 }
 
 impl WidthInput<'_> {
-    /// Edges that are known row by row are torn.
+    /// Torn where an edge has a variance of its mean: only rough edges come with one.
     fn kind_of_waves(&self) -> WaveKind {
         let is_torn = self.sides.iter().any(|side| side.mean_variance.is_some());
         if is_torn { WaveKind::Torn } else { WaveKind::Smooth }
     }
 
-    /// How much of the midline's coefficients of the orders 1 to 4 is the
-    /// waviness of the two edges \[px²\]; `None` where there is none to speak
-    /// of. The width's course shows, and of the midline what is no straight or
-    /// evenly bent axis.
+    /// Variance of the midline's Legendre coefficients of the orders 1 to 4 that waviness of the
+    /// two edges explains \[px²\]; `None` where there is no significant waviness. From the
+    /// coefficients of the width, and those of the midline that no straight or evenly bent axis
+    /// has.
     fn waves(&self, cut: &CutBead<'_>, scratch: &WidthScratch) -> Option<[f64; CURVE_ORDERS]> {
         let &CutBead { curves, sections, .. } = cut;
         let mut off = [[0.0; ORDERS]; 2];
@@ -221,7 +219,7 @@ impl WidthInput<'_> {
     }
 }
 
-/// Mean variance of an edge's positions, for a place of all of a band's rows.
+/// Mean variance of an edge's positions, scaled to bands with all of their rows \[px²\].
 fn mean_variance(positions: &[Option<CaliperEdge>]) -> f64 {
     let (mut sum, mut n) = (0.0, 0.0);
     for located in positions.iter().flatten() {

@@ -11,24 +11,24 @@ use crate::vision::located::CaliperEdge;
 pub struct LocatedEdge<'a> {
     /// Its positions, band by band.
     pub positions: &'a [Option<CaliperEdge>],
-    /// Variance of the whole edge's position that all positions share \[px²\].
+    /// Variance of the error that all positions of the edge share \[px²\].
     pub common_variance: f64,
-    /// What a row leaves of the step that it is compared with, in standard
-    /// deviations of its noise; infinite where it was not compared with one.
+    /// Residual of a row from the step that it is compared with, in standard deviations of its
+    /// noise; infinite where it was compared with none.
     pub misfit: f64,
-    /// Variance of the mean position over the gauge \[px²\], where it is known
-    /// without looking at how far the positions lie off their course.
+    /// Variance of the mean position over the gauge \[px²\], where it is known without the
+    /// residuals of the positions.
     pub mean_variance: Option<f64>,
 }
 
-/// What a width is taken from.
+/// Two edges, and the map to the surface.
 #[derive(Debug, Clone, Copy)]
 pub struct WidthInput<'a> {
     /// The gauge over the image.
     pub view: &'a GaugeView,
     /// From pixels to millimetres.
     pub surface: &'a SurfaceMap,
-    /// What is expected.
+    /// Region of interest, and the widths that are accepted.
     pub gauge: &'a Gauge,
     /// Middles of the bands along the bead \[px\].
     pub middles: &'a [f64],
@@ -73,7 +73,7 @@ impl WidthInput<'_> {
         1.0 / (1.0 + slope * slope)
     }
 
-    /// The point of an edge on the surface.
+    /// Point of an edge on the surface \[mm\]; `None` where the pixel does not see it.
     pub fn on_surface(&self, curve: &EdgeCurve, t: f64) -> Option<SurfacePoint> {
         let v = self.centre() + t * self.half_length();
         self.surface.to_mm(self.view.to_image(curve.at(t), v))
