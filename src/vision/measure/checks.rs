@@ -16,64 +16,63 @@ use crate::vision::width::WidthMeasurement;
 
 /// Fraction of the rows from which each edge must come.
 const MIN_ROW_FRACTION: f64 = 0.4;
-/// The same where each row is known to be clear.
+/// Fraction of the rows from which an occluded edge must come; each is known to be clear.
 const MIN_CLEAR_ROW_FRACTION: f64 = 0.16;
-/// Misfit of a blurred step from which on, if both have it, edges are located
-/// line by line: one alone is more likely covered than of another kind.
+/// Misfit of a blurred step above which, if both edges exceed it, they are located line by line:
+/// one alone is more likely occluded than no blurred step.
 pub(super) const MAX_STEP_MISFIT: f64 = 2.0;
-/// The same for one edge alone.
+/// Misfit of one edge alone above which both are located line by line.
 const MAX_SINGLE_MISFIT: f64 = 8.0;
-/// Largest standard deviation of a width whose edges are covered in part
-/// \[px\]: beyond it, what is left of an edge does not show its course.
+/// Largest standard deviation of a width whose edges are occluded in part \[px\]: beyond it, the
+/// clear rows do not show where an edge runs.
 const MAX_OCCLUDED_SIGMA_PX: f64 = 0.185;
-/// The same where a covered edge seems to wind: what winds aside looks covered as
-/// well, so that too little is left of such an edge.
+/// Largest standard deviation of a width where an occluded edge seems to wind \[px\]: rows that
+/// wind aside look occluded too, and too few are left.
 const MAX_WINDING_SIGMA_PX: f64 = 0.08;
-/// Fraction of clear rows from which on an edge's course is sure enough.
+/// Fraction of clear rows from which on an occluded edge is certain enough.
 const MIN_SURE_CLEAR_FRACTION: f64 = 0.6;
 /// Distance from the boundary of the gauge that an edge needs, in its blurs: a step that is cut
 /// short there seems to lie farther inside. Derived: beyond 3 blurs 1.3·10⁻³ of a step is left, 1 −
 /// Φ(3).
 const BOUNDARY_BLURS: f64 = 3.0;
-/// The same at least \[px\].
+/// Smallest distance from the boundary of the gauge that an edge needs \[px\].
 const MIN_BOUNDARY_PX: f64 = 3.0;
-/// Fraction of an edge's positions that may be nearer.
+/// Fraction of an edge's positions that may be nearer to the boundary.
 const MAX_NEAR_BOUNDARY_FRACTION: f64 = 0.05;
-/// Largest spread of neighbouring edges about each other \[px\] that still is
-/// an edge, not noise.
+/// Largest spread of an edge's positions about their neighbours \[px\]: more is noise.
 const MAX_SCATTER_PX: f64 = 1.5;
-/// The same where both edges show in all rows but for a few sparks: then they are
-/// as rough as they look, and what scatters more is no bead.
+/// Largest spread where both edges show in all rows but for a few sparks \[px\]: then they are as
+/// rough as they look, and what spreads more is no bead.
 const MAX_COMPLETE_SCATTER_PX: f64 = 4.0;
-/// Fraction of the rows that counts as all.
+/// Fraction of the rows that counts as all of them.
 pub(super) const COMPLETE_FRACTION: f64 = 0.95;
-/// The same where one edge was hidden and had to be located line by line.
+/// Largest spread where one edge was hidden and had to be located line by line \[px\].
 const MAX_LOST_SCATTER_PX: f64 = 0.5;
 
-/// Fraction of a pattern beside an edge that counts for its position: at the edge it is half
-/// covered by the bead, and the widths of drawn beads show a little less.
+/// Fraction of a pattern beside an edge that counts for its position: at the edge the bead hides
+/// half of it, and the widths of drawn beads show a little less.
 const PATTERN_WEIGHT: f64 = 0.46;
-/// Pattern as a fraction of the contrast below which weights that know the texture leave
-/// nothing else of it: with both, z of compressed images of a quality above 65 is 0.86.
+/// Pattern, as a fraction of the contrast, below which weights for the texture account for all of
+/// it: with a variance besides, z of compressed images of a quality above 65 is 0.86.
 const MAX_FAINT_PATTERN: f64 = 0.1;
 /// Widest blur of an edge that is measured \[px\]: rendered motion, a box of 20.8 px,
 /// is measured without fault up to 7.4 px of blur, and was off by some pixels from
 /// 7.5 px on.
 pub(super) const MAX_BLUR_PX: f64 = 7.4;
-/// The same of a box of even motion with a lens's blur. Derived: √(15.8²/12 + 1.5²) px, for a
-/// motion of 15.8 px with a blur of 1.5 px. Flanks of longer motions were taken for shading once in
-/// some hundred frames, and the width was 1 px off.
+/// Widest blur of a box of even motion with a lens's blur \[px\]. Derived: √(15.8²/12 + 1.5²) px,
+/// for a motion of 15.8 px with a blur of 1.5 px. Flanks of longer motions were taken for shading
+/// once in some hundred frames, and the width was 1 px off.
 pub(super) const MAX_MOTION_BLUR_PX: f64 = 4.8;
 
 impl MeasureState {
-    /// Whether one edge alone is hidden: then it is covered, not of another kind
-    /// than the other one.
+    /// Whether one edge alone is hidden: then it is occluded, rather than no blurred step.
     pub fn one_is_lost(&self) -> bool {
         let lost = |side: &EdgeTracer| side.is_lost() && side.misfit_of_a_row() > MAX_STEP_MISFIT;
         lost(&self.left) != lost(&self.right)
     }
 
-    /// Takes out calipers that disagree with their neighbours, on either edge.
+    /// Removes positions that disagree with their neighbours; refuses edges that are too rough or
+    /// show in too few rows.
     pub fn reject_outliers(&mut self, bright: bool) -> Checked {
         self.drop_inconsistent(bright);
         let mut worst: f64 = 0.0;
@@ -124,8 +123,8 @@ impl MeasureState {
         if got_px > limit_px { Err(Reject::Blurred { got_px, limit_px }) } else { Ok(()) }
     }
 
-    /// Looks at the pattern beside the bead: adds to the edges' variance what it may
-    /// move them by, and refuses one that is as strong as an edge.
+    /// Adds to the edges' variance what a pattern beside the bead may move them by, and refuses one
+    /// as strong as an edge; `of_both` combines the strengths of the two sides.
     pub fn check_ground<T: GreyPixel>(
         &mut self,
         strip: &GaugeRows<'_, T>,
@@ -152,8 +151,8 @@ impl MeasureState {
             }
             let Some(pattern) = self.scratch.ground.pattern(&side) else { continue };
             *strength = pattern.size_grey / contrast;
-            // Rough edges know what the ground beside them leaves open, weights that know a
-            // texture what a faint one does.
+            // The variance of rough edges includes the ground beside them, and weights for a
+            // texture include a faint pattern.
             let is_in_weights = tracer.is_textured() && *strength < MAX_FAINT_PATTERN;
             if tracer.uncertainty.mean_variance.is_none() && !is_in_weights {
                 let px_per_grey = PATTERN_WEIGHT * ROOT_TWO_PI * tracer.blur_px / contrast;
@@ -166,8 +165,7 @@ impl MeasureState {
         if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
-    /// Refuses edges in a pattern that were located line by line: parts of it were taken for
-    /// them.
+    /// Refuses edges in a pattern that were located line by line: they may be parts of the pattern.
     pub fn check_lines_in_pattern(&self) -> Checked {
         let (got, limit) = (self.both.pattern_ratio, MAX_PATTERN_LINE_BY_LINE);
         let is_among = self.both.model == EdgeModel::LineByLine && got > limit;
@@ -226,7 +224,7 @@ impl MeasureState {
         Ok(())
     }
 
-    /// Refuses a bead whose edges the boundary of the gauge cuts short.
+    /// Refuses a bead whose edges lie too near the boundary of the gauge.
     pub fn check_boundary(&self, across: usize) -> Checked {
         let last = to_f64(across.saturating_sub(1));
         for side in [&self.left, &self.right] {

@@ -19,15 +19,14 @@ use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::trace::{EdgeTracer, TraceInput};
 use crate::vision::{light, occluded, saturated};
 
-/// Smallest deviation that makes an outlier of a caliper line that was fitted for
-/// itself \[px\].
+/// Smallest deviation that makes a caliper line an outlier where each is fitted alone \[px\].
 const MIN_LINE_OUTLIER_PX: f64 = 0.75;
-/// Ground on either side of the bead that its noise is taken from \[px\].
+/// Ground on either side of the bead whose pixels count for the noise too \[px\].
 const NOISE_MARGIN_PX: f32 = 12.0;
-/// Distance of an edge's median from its contour's that makes it another \[px\]: grains of
-/// 12 px beside an edge draw its contour along by less.
+/// Distance of a located edge from the median of its contour from which on it is another edge
+/// \[px\]: grains of 12 px beside an edge move its contour by less.
 const OTHER_EDGE_PX: f32 = 14.0;
-/// Fraction by which the blur of one edge differs from the other's.
+/// Relative difference between the blurs of the two edges, as a standard deviation.
 const BLUR_DIFFERENCE: f64 = 0.04;
 
 impl MeasureState {
@@ -105,15 +104,15 @@ impl MeasureState {
             }
         }
         (self.both.min_outlier_px, self.both.model) = (MIN_LINE_OUTLIER_PX, EdgeModel::LineByLine);
-        // What is no blurred step does not show how a motion blurs it.
+        // An edge that is no blurred step does not show the shape of its blur.
         let left = self.left.refine(&scene);
         let right = self.right.refine(&right_scene);
         if left && right { Ok(()) } else { Err(failed) }
     }
 }
 
-/// Fits both edges again with the blur's shape that fits best, where it is not a lens's alone:
-/// the number of the shape, and the fits with it.
+/// Fits both edges with the shape of blur that fits best: its number, and the fits with it; `None`
+/// where a lens's blur is enough.
 #[inline(always)]
 fn choose_blur<T: GreyPixel>(
     shapes: &BlurShapes,
@@ -127,8 +126,8 @@ fn choose_blur<T: GreyPixel>(
     shapes.choose([left.step_fit.as_ref()?, right.step_fit.as_ref()?], again)
 }
 
-/// Blur that both edges have, seen through one lens, and how far one may differ
-/// from it, from that of each; `None` where neither has one.
+/// Common blur of two edges seen through one lens, and the standard deviation of one edge's blur
+/// about it; `None` where neither has a blur.
 fn common_blur(seen: [Option<BlurEstimate>; 2]) -> Option<BlurEstimate> {
     let weight =
         |BlurEstimate { px, sd_px }| 1.0 / (sd_px * sd_px + (BLUR_DIFFERENCE * px).powi(2));
@@ -141,9 +140,9 @@ fn common_blur(seen: [Option<BlurEstimate>; 2]) -> Option<BlurEstimate> {
     (weights > 0.0).then_some(BlurEstimate { px: blur, sd_px: BLUR_DIFFERENCE * blur })
 }
 
-/// Width between edges of which one was located elsewhere than where its contour runs, and
-/// between the contours \[px\]: a seam or a rib may have been taken for the edge. `None`
-/// where both run along their contours.
+/// Width between the located edges, and that between their contours \[px\], where an edge lies away
+/// from its contour: a seam or a rib may have been taken for the edge. `None` where both run along
+/// their contours.
 fn widths_apart(
     sides: [(&EdgeTracer, &[Option<f32>]); 2],
     scratch: &mut Vec<f32>,
@@ -167,7 +166,7 @@ fn columns_about(left: &[Option<f32>], right: &[Option<f32>], across: usize) -> 
     from.min(across - 1)..to.clamp(from + 1, across)
 }
 
-/// A narrow distance between two contours \[px\], for the size of windows.
+/// Distance between two contours that a tenth of the bands do not reach \[px\]; 0 without bands.
 fn narrow_distance(left: &[Option<f32>], right: &[Option<f32>], scratch: &mut Vec<f32>) -> f32 {
     refill(scratch, left.iter().zip(right).filter_map(|(left, right)| Some((*right)? - (*left)?)));
     let rank = scratch.len() / 10;

@@ -1,5 +1,5 @@
-//! Whether edges that were measured as blurred steps are better described by rough ones:
-//! a groove that no step is, bays, or a flank that is wider than any blur.
+//! Whether edges that were measured as blurred steps are better described as rough edges: with a
+//! groove, with bays, or with a flank that is wider than any blur.
 
 use std::ops::RangeInclusive;
 
@@ -11,67 +11,67 @@ use crate::vision::rough::RoughFit;
 use crate::vision::trace::EdgeTracer;
 use crate::vision::width::WidthMeasurement;
 
-/// Fraction of an edge's rows that may be sorted out: more are bays, or grains.
+/// Fraction of an edge's rows that may be rejected: more are bays, or grains.
 const MAX_GAP_FRACTION: f64 = 0.06;
-/// The same of rows that noise does not explain: a single bay of 2 px in 200 rows.
+/// Fraction of rejected rows that noise does not explain: a single bay of 2 px in 200 rows.
 const MAX_UNFIT_FRACTION: f64 = 0.01;
 /// Narrowest bead whose level is read free of its flanks by rough edges \[px\].
 const MAX_NARROW_WIDTH_PX: f32 = 40.0;
-/// Contrast of a rough edge over that of the blurred step below which it is another edge:
-/// holes within the bead leave 0.8.
+/// Ratio of a rough edge's contrast to that of the blurred step below which it is another edge:
+/// with holes in the bead it is 0.8.
 const MIN_CONTRAST_RATIO: f64 = 0.7;
 /// Contrast of an edge as a fraction of the other's below which it may be a rib's.
 const MIN_SIDES_CONTRAST_RATIO: f64 = 0.6;
-/// Distance from which on another edge is not the same \[px\]: more than a groove that blur fills
-/// moves it.
+/// Distance from which on a rough edge is not that of the blurred step \[px\]: a groove that blur
+/// fills moves an edge by less.
 const OTHER_EDGE_PX: f64 = 3.0;
-/// The distance of a rough edge from what was located line by line up to which both are the
-/// same \[px\].
+/// Distance of a rough edge from one located line by line up to which both are the same \[px\].
 const SAME_EDGE_PX: f64 = 0.25;
-/// By how much the levels outside the two edges differ, as a fraction of the higher contrast,
-/// where something else lies beside one than beside the other, so that a narrow groove may: one
-/// of 2 to 2.5 px that is a little darker than the ground moves a blurred step by a third of a
-/// pixel and shows in nothing else.
+/// Difference of the levels outside the two edges, as a fraction of the higher contrast, from which
+/// on the grounds differ and a narrow groove may lie beside one: a groove of 2 to 2.5 px that is a
+/// little darker than the ground moves a blurred step by a third of a pixel and shows in nothing
+/// else.
 const MIN_GROUND_DIFFERENCE: f64 = 0.1;
-/// Pattern beside both edges, as a fraction of the contrast, from which on a blurred step
-/// may have parts of it in its flank: widths were up to 3 px off by seven times the sigma of steps.
+/// Pattern beside both edges, as a fraction of the contrast, from which on a blurred step may have
+/// parts of it in its flank: widths were up to 3 px off, seven times the sigma of steps.
 const MIN_PATTERN: f64 = 0.2;
-/// Factor of sigma where edges in such a pattern were located line by line: of 30,000 drawn
-/// widths some were off by up to seven of the sigmas of lines.
+/// Factor of sigma where edges in such a pattern were located line by line: of 30,000 drawn widths
+/// some were off by up to seven sigmas.
 const PATTERN_SIGMA_FACTOR: f64 = 2.0;
 /// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a wide flank.
 const MAX_PARTIAL_CONTRAST: f64 = 0.55;
-/// Blur of a step from which on it is such a part \[px\]: steps within the ramps of motions of 15
-/// px and more have 2.9 px, those beside a shadow the lens's.
+/// Blur of a step from which on it may be such a part \[px\]: steps within the ramps of motions of
+/// 15 px and more have 2.9 px, those beside a shadow have the lens's.
 const MIN_PARTIAL_BLUR_PX: f64 = 2.5;
-/// The same as a fraction of the levels' difference a few pixels before and after it, below
-/// which a ramp, a rib or a shadow may lie there.
+/// Contrast of a step, as a fraction of the difference of the levels a few pixels before and after
+/// it, below which a ramp, a rib or a shadow may lie there.
 const MIN_LEVEL_RATIO: f64 = 0.8;
-/// Range of the same of one edge alone, where either is wide: below it the rest of its flank
-/// was taken for shading, beyond it shading for its flank. Drawn edges of up to 20 px of
-/// motion, or up to 6 px of blur, whose widths were right had 0.99 to 1.056, those that were
-/// 0.5 px and more off up to 0.944 or 1.1.
+/// Ratio of a step's contrast to the rough edge's that is a whole flank, where either is wide:
+/// below it the rest of the flank was taken for shading, above it shading for the flank. Drawn
+/// edges of up to 20 px of motion, or up to 6 px of blur, whose widths were right had 0.99 to
+/// 1.056, those that were 0.5 px and more off up to 0.944 or 1.1.
 const FULL_FLANK_CONTRAST: RangeInclusive<f64> = 0.97..=1.08;
 /// Blur of a step from which on it may be a part of a flank \[px\].
 const WIDE_BLUR_PX: f64 = 3.5;
 /// How much farther out than a blurred step a rough edge may lie \[px\].
 const MAX_OUTWARD_PX: f64 = 1.0;
-/// Contrast of a rough edge over that of the blurred step from which on it is higher. Measured:
-/// reference/accuracy.md, The sets: with sparks on 5 % of the bead (`spots`) it is 1.05 to 1.1.
+/// Ratio of a rough edge's contrast to that of the blurred step from which on it is higher.
+/// Measured: reference/accuracy.md, The sets: with sparks on 5 % of the bead (`spots`) it is 1.05
+/// to 1.1.
 const MAX_CONTRAST_RATIO: f64 = 1.04;
 /// Fraction of odd pixels about an edge up to which it is bead and ground alone. Measured:
-/// reference/accuracy.md, Drawn frames: `torn`, `holes` and `low-light` have up to 0.003; of 522 frames of
-/// `grooves` that were refused as occluded 11 have more, and grains that passed for bays from 0.005
-/// on.
+/// reference/accuracy.md, Drawn frames: `torn`, `holes` and `low-light` have up to 0.003; of 522
+/// frames of `grooves` that were refused as occluded 11 have more, and grains that passed for bays
+/// from 0.005 on.
 const MAX_ODD_FRACTION: f64 = 0.004;
 /// By how much the fraction of odd pixels about an edge exceeds that within the bead where grains
-/// lie on it. Measured: reference/accuracy.md, The sets: concrete beads have up to 0.022, grains of 6 and 12
-/// px on a third of the rows (`grains-6-…`, `grains-12-…`) 0.027 to 0.14.
+/// lie on it. Measured: reference/accuracy.md, The sets: concrete beads have up to 0.022, grains of
+/// 6 and 12 px on a third of the rows (`grains-6-…`, `grains-12-…`) 0.027 to 0.14.
 const GRAIN_ODD_FRACTION: f64 = 0.024;
 
 impl MeasureState {
-    /// Whether edges that were measured as blurred steps may be something else. Where they
-    /// pass the end of the scale, rows do not show it: half of their height is not seen.
+    /// Whether edges that were measured as blurred steps may be something else. Not for saturated
+    /// edges: rows do not show their half height.
     pub fn may_not_be_steps(&self) -> bool {
         if self.both.model == EdgeModel::Clipped {
             return false;
@@ -80,7 +80,7 @@ impl MeasureState {
         is_other || self.has_gaps() || self.has_two_grounds() || self.has_low_step()
     }
 
-    /// Whether a step is much lower than the levels on either side of it differ: it may lie
+    /// Whether a step is much lower than the difference of the levels on either side: it may lie
     /// within a ramp, most of which was taken for shading, or beside a rib.
     fn has_low_step(&self) -> bool {
         is_part(&self.left, self.both.contrasts[0]) || is_part(&self.right, self.both.contrasts[1])
@@ -101,25 +101,25 @@ impl MeasureState {
         self.width_px <= MAX_NARROW_WIDTH_PX
     }
 
-    /// Whether more than a few positions of an edge were sorted out, or some that certainly show
-    /// something else.
+    /// Whether more than a few positions of an edge were rejected, or some that noise does not
+    /// explain.
     pub fn has_gaps(&self) -> bool {
         let used = self.left.used_fraction().min(self.right.used_fraction());
         used < 1.0 - MAX_GAP_FRACTION
             || self.left.unfit_fraction.max(self.right.unfit_fraction) > MAX_UNFIT_FRACTION
     }
 
-    /// Whether rough edges are not higher than the blurred steps: then what was sorted
-    /// out shows ground. Dark grains beside an edge, sparks within and shading make rough
-    /// edges higher; holes within make them lower.
+    /// Whether rough edges have no more contrast than the blurred steps: then the rejected rows
+    /// show ground. Dark grains beside an edge, sparks within and shading raise the contrast of
+    /// rough edges; holes within lower it.
     fn is_no_higher(&self, fits: &[RoughFit; 2]) -> bool {
         fits.iter()
             .zip(self.both.contrasts)
             .all(|(fit, step)| fit.contrast < MAX_CONTRAST_RATIO * step)
     }
 
-    /// Whether grains may be what covers the edges of a frame whose blurred steps were
-    /// refused. Occluded ones are known, and grains taken for ground make rough ones higher.
+    /// Whether grains may hide the edges of a frame whose blurred steps were refused: as occluded,
+    /// with rough edges of more contrast because grains pass for ground, or with many odd pixels.
     pub fn may_be_grains(&self, refused: &Reject, fits: &[RoughFit; 2]) -> bool {
         let is_higher = matches!(refused, Reject::Occluded { .. }) && !self.is_no_higher(fits);
         is_higher || fits.iter().any(|fit| fit.exceeds_texture(MAX_ODD_FRACTION))
@@ -142,7 +142,7 @@ impl MeasureState {
             || may_be_part && sides.all(|(fit, step)| step < MAX_PARTIAL_CONTRAST * fit.contrast)
     }
 
-    /// Refuses wide steps of which one is a part of its flank, or more.
+    /// Refuses wide steps of which one is less than its flank, or more.
     pub fn check_flanks(&self, fits: &[RoughFit; 2]) -> Checked {
         let mut sides = fits.iter().zip(self.both.contrasts);
         let is_whole =
@@ -160,7 +160,7 @@ impl MeasureState {
         left.min(right) < MIN_SIDES_CONTRAST_RATIO * left.max(right)
     }
 
-    /// Whether something else lies outside the one edge than outside the other.
+    /// Whether the levels outside the two edges differ.
     fn has_two_grounds(&self) -> bool {
         let ([left, _], [_, right]) = (self.left.levels(), self.right.levels());
         let [one, other] = self.both.contrasts;
@@ -179,20 +179,19 @@ impl MeasureState {
         self.apart_px() > OTHER_EDGE_PX
     }
 
-    /// Standard deviation of the width between rough edges in that of the one that was found:
-    /// less than 1 where it is surer.
+    /// Standard deviation of the width between rough edges, relative to that of the width that was
+    /// found: below 1 where it is smaller.
     fn sigma_ratio(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> f64 {
         let rough_px = fits.iter().map(|fit| fit.variance).sum::<f64>().sqrt();
         rough_px * self.mm_per_px / found.sigma.get()
     }
 
-    /// A width between blurred steps, as uncertain as all rows show where rows are better
-    /// trusted: where some were sorted out and neither grains nor sparks are seen, for those
-    /// that are left were chosen, as from a texture that was not recognised; beside what may be a
-    /// narrow groove, where the grounds differ; and in a pattern. Where a step is but a part
-    /// of the levels' difference, or none fits and rows show a narrow groove, sigma contains how
-    /// far the rows' edges lie elsewhere. Nothing is added on narrow beads, whose level rows do
-    /// not read free of the flanks.
+    /// A width between blurred steps, with the sigma of all rows where these are more reliable:
+    /// where some were rejected and neither grains nor sparks are seen, so that the rest is a
+    /// selection, as from a texture that was not recognised; beside a possible narrow groove, where
+    /// the grounds differ; and in a pattern. Where a step is only a part of the levels' difference,
+    /// or none fits and rows show a narrow groove, sigma includes the distance from the rows'
+    /// edges. Nothing is added on narrow beads, whose level rows do not read free of the flanks.
     pub fn with_row_uncertainty(
         &self,
         fits: &[RoughFit; 2],
@@ -217,9 +216,9 @@ impl MeasureState {
         WidthMeasurement { sigma, ..found }
     }
 
-    /// How far edges lie from the rows' \[px\] where a step is but a part of the levels'
-    /// difference, or the rows show a narrow groove and no step fits, or not on all rows beside
-    /// grounds that differ.
+    /// Distance of the edges from those of the rows \[px\], where a step is only a part of the
+    /// levels' difference, or the rows show a narrow groove and no step fits, or not on all rows
+    /// beside grounds that differ.
     fn row_offset_px(&self, fits: &[RoughFit; 2]) -> f64 {
         let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
         let shows_two_grounds =
@@ -236,8 +235,8 @@ impl MeasureState {
         off[0] + off[1]
     }
 
-    /// Whether a rough edge lies farther out than its blurred step, with no narrow
-    /// groove in between: bays take bead away, and what adds some is a shadow beside it.
+    /// Whether a rough edge lies farther out than its blurred step, with no narrow groove in
+    /// between: bays only take bead away; what adds to it is a shadow beside it.
     fn is_wider(&self, fits: &[RoughFit; 2]) -> bool {
         let sides = [(&self.left, &self.rough[0], -1.0), (&self.right, &self.rough[1], 1.0)];
         sides.iter().zip(fits).any(|((steps, rough, outwards), fit)| {
@@ -246,9 +245,8 @@ impl MeasureState {
         })
     }
 
-    /// Whether rough edges explain more than blurred steps do: a groove that no step
-    /// is, bays in an edge that were sorted out as grains, or edges that no blurred step fits and
-    /// whose rows show their course better than lines do.
+    /// Whether rough edges explain more than blurred steps do: a groove, bays that were rejected as
+    /// grains, or edges that no blurred step fits and that rows locate better than lines do.
     pub fn explains_more(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> bool {
         if self.have_unequal_contrast() && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
             return true;
@@ -276,13 +274,13 @@ impl MeasureState {
     }
 }
 
-/// Whether a step is but a part of the difference of the levels on either side of it.
+/// Whether a step is only a part of the difference of the levels on either side of it.
 fn is_part(tracer: &EdgeTracer, step: f64) -> bool {
     let [before, after] = tracer.levels();
     step < MIN_LEVEL_RATIO * (after - before).abs()
 }
 
-/// Whether less than such a fraction of the pixels about either edge shows neither bead nor ground.
+/// Whether few pixels about either edge show neither bead nor ground: a fraction below a limit.
 fn are_clean(fits: &[RoughFit; 2], max_odd_share: f64) -> bool {
     fits.iter().all(|fit| fit.odd_fraction < max_odd_share)
 }

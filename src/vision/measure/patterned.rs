@@ -16,17 +16,18 @@ use crate::vision::row_range::RowRange;
 use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::trace::EdgeTracer;
 
-/// Weakest pattern, as a fraction of the contrast, beside which blurred steps are not
-/// good enough: one of less draws them outwards by hardly 0.02 px.
+/// Weakest pattern, as a fraction of the contrast, beside which blurred steps are not good enough:
+/// a weaker one draws them outwards by hardly 0.02 px.
 const MIN_PATTERN: f64 = 0.06;
-/// Weakest texture of the bead that is looked at, as a fraction of the contrast. Measured:
-/// reference/accuracy.md, The sets: sparks over 5 % of a smooth bead (`spots`) look like up to 0.12.
+/// Weakest texture of the bead that counts, as a fraction of the contrast. Measured:
+/// reference/accuracy.md, The sets: sparks over 5 % of a smooth bead (`spots`) look like up to
+/// 0.12.
 const MIN_TEXTURE: f64 = 0.13;
-/// The least of both edges' as a fraction of the other's where it is the same texture.
+/// Smallest ratio of the weaker to the stronger texture beside the two edges of one bead.
 const MIN_TEXTURE_RATIO: f64 = 0.4;
-/// The same half-way between two lines, as a fraction of it.
+/// Smallest texture half-way between two lines, as a fraction of the smallest beside them.
 const MIDDLE_TEXTURE_RATIO: f32 = 0.5;
-/// Blur beyond which a bead's texture is free of a flank that is not known yet \[px\].
+/// Blur that is assumed while a flank is not known \[px\]: texture is read beyond it.
 const ASSUMED_BLUR_PX: f64 = 3.0;
 impl MeasureState {
     /// Standard deviation of the pattern that the ground has on both sides of a pair of
@@ -52,8 +53,8 @@ impl MeasureState {
         }
     }
 
-    /// Measures a bead whose texture shows before any edge is located. `None` where none
-    /// does, where it lies on ground of the same kind, and where grains may lie on its edges.
+    /// Measures a bead whose texture shows before any edge is located. `None` where no texture
+    /// shows, where the ground has a pattern too, and where grains may lie on its edges.
     #[inline(never)]
     pub fn measure_busy<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Option<Outcome> {
         let pair = self.find_lines(frame).ok()?;
@@ -72,9 +73,9 @@ impl MeasureState {
         Some(self.width_of_rough_beside(pattern, true, &fits, frame))
     }
 
-    /// Measures a bead that was measured already, where it or the ground has a pattern.
-    /// `None` where neither has, or a weak one, and where the mean profile shows no edges and
-    /// the pattern is accepted beside blurred steps.
+    /// Measures a bead again where it or the ground has a pattern. `None` where neither has one, or
+    /// only a weak one, and where the mean profile shows no edges and the pattern is accepted
+    /// beside blurred steps.
     #[inline(never)]
     pub fn measure_texture<T: GreyPixel>(&mut self, frame: &GaugeFrame<'_, T>) -> Option<Outcome> {
         let fractions = self.texture_between_steps(frame.strip);
@@ -104,8 +105,8 @@ impl MeasureState {
         checked.err().map(Err)
     }
 
-    /// Refuses blurred steps of a plain bead all along which they show, beside a strong
-    /// pattern on both sides.
+    /// Refuses the blurred steps of a plain bead that show all along it, beside a strong pattern on
+    /// both sides.
     fn check_complete(&self, is_textured: bool) -> Checked {
         let (got, limit) = (self.both.pattern_ratio, MAX_PATTERN_BESIDE_COMPLETE);
         if !is_textured && got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
@@ -131,8 +132,8 @@ impl MeasureState {
         fractions
     }
 
-    /// Whether it has one beside both of two lines, and half-way between them: lines in the
-    /// ground's pattern have that beside them, and a plain bead between.
+    /// Whether a texture shows beside both of two lines, and half-way between them: lines in the
+    /// ground's pattern have texture beside them, and a plain bead between.
     pub fn is_textured_between_lines<T: GreyPixel>(
         &mut self,
         strip: &GaugeRows<'_, T>,
@@ -150,7 +151,7 @@ impl MeasureState {
             .all(|(line, inwards)| self.is_textured_beside(strip, line, *inwards, width_px))
     }
 
-    /// Whether a texture shows on one side of a line that is strong for its step.
+    /// Whether a texture that is strong for the step of a line shows on one side of it.
     fn is_textured_beside<T: GreyPixel>(
         &mut self,
         strip: &GaugeRows<'_, T>,
@@ -176,8 +177,9 @@ impl MeasureState {
         texture.is_some_and(|texture| texture > MIN_TEXTURE * f64::from(line.step))
     }
 
-    /// Measures a bead whose ground has a pattern of such a standard deviation
-    /// \[grey levels\]; `None` where the mean profile shows no edges, as beside a groove.
+    /// Measures a bead by its mean profile, near two lines and beside a pattern with a standard
+    /// deviation \[grey levels\]; `None` where the mean profile shows no edges, and beside a
+    /// groove.
     pub fn measure_patterned<T: GreyPixel>(
         &mut self,
         lines: (&LinePair, f64),
@@ -219,7 +221,7 @@ impl MeasureState {
         }
         // An edge beside a strong pattern is drawn to its bright positions.
         let beside = ground * (1.0 + (got / MAX_PATTERN).powi(4)) + bead;
-        // A flank's slope falls with its blur, and what a texture moves an edge by grows with it.
+        // A flank's slope falls with its blur, and so texture moves an edge by more.
         let inflation = blur_inflation(blur_px);
         let variance = beside * if pattern > 0.0 { inflation } else { inflation * inflation };
         let fits = [one, other].map(|fit| fit.as_rough(blur_px, variance));
@@ -246,7 +248,7 @@ fn are_alike([left, right]: [f64; 2]) -> bool {
     left.min(right) >= MIN_TEXTURE_RATIO * left.max(right)
 }
 
-/// Where an edge lies on all caliper lines: where it is not located, between those beside it.
+/// Positions of an edge on all caliper lines, interpolated where it is not located.
 fn all_edge_positions(tracer: &EdgeTracer, lines: &[RowRange], places: &mut Vec<EdgePosition>) {
     edge_positions(tracer, lines, places);
     if places.len() == lines.len() {
@@ -266,7 +268,7 @@ fn all_edge_positions(tracer: &EdgeTracer, lines: &[RowRange], places: &mut Vec<
     }));
 }
 
-/// What is looked at for one edge of a pair.
+/// Input of the mean profile for one edge of a pair.
 fn scene<'a, T: GreyPixel>(
     strip: &'a GaugeRows<'a, T>,
     lines: &'a [RowRange],

@@ -12,8 +12,8 @@ use crate::vision::rough::{RoughFit, RoughInput};
 use crate::vision::strip::{GaugeRows, GreyPixel};
 use crate::vision::vectors;
 
-/// The search range allows 1.5 times too wide and too narrow single positions; lines
-/// are means over the gauge, and stay nearer.
+/// Factor by which the range of widths is narrower for lines: the search range allows 1.5 times for
+/// single positions, and lines are means over the gauge that differ less.
 const LINE_RANGE_FACTOR: f32 = 1.4;
 
 /// Widest blur of a rough edge \[px\]: what lies outside is looked for within 20 px, and
@@ -21,15 +21,15 @@ const LINE_RANGE_FACTOR: f32 = 1.4;
 pub const MAX_ROUGH_BLUR_PX: f64 = 6.3;
 /// Blur up to which the level outside is read free of the flank \[px\].
 const MAX_CLEAR_BLUR_PX: f64 = 5.0;
-/// By how much an edge may be off for each pixel that its blur exceeds that: drawn edges of 5.7 to
-/// 6 px, by motion, lay 0.45 px too far out.
+/// Error of an edge for each pixel by which its blur exceeds that: drawn edges of 5.7 to 6 px, by
+/// motion, lay 0.45 px too far out.
 const OFFSET_PER_BLUR: f64 = 0.5;
-/// Part of the width beside either edge where its flank may be \[of the width\]: the
-/// bead's texture is taken from between.
+/// Fraction of the width beside either edge where its flank may be: the bead's texture is read
+/// between.
 const TEXTURE_MARGIN_FRACTION: f32 = 0.15;
-/// How much stronger than a typical line of texture an edge must be: on layers that
-/// are seen from the side, whose lower edges fade into shadow, lines of texture were
-/// taken for edges up to 4.8; the edges of concrete beads have 5 to 17.
+/// Smallest ratio of an edge's strength to that of a typical line of texture: on layers that are
+/// seen from the side, whose lower edges fade into shadow, lines of texture were taken for edges up
+/// to 4.8; the edges of concrete beads have 5 to 17.
 const MIN_TEXTURE_RATIO: f64 = 5.0;
 
 impl MeasureState {
@@ -48,7 +48,7 @@ impl MeasureState {
         {
             return found;
         }
-        // Texture looks like seams and ribs; within a plain bead they are.
+        // Texture looks like seams and ribs; in a plain bead these are real.
         if !is_textured && matches!(refused, Reject::Ambiguous { .. }) {
             return Err(*refused);
         }
@@ -162,8 +162,8 @@ impl MeasureState {
         Ok([left_fit, right_fit])
     }
 
-    /// The same as [`Self::width_of_rough`] beside a pattern of such a standard deviation
-    /// \[grey levels\], where that is acceptable.
+    /// [`Self::width_of_rough`], or a refusal where the pattern beside the bead is too strong;
+    /// `pattern` is its standard deviation \[grey levels\].
     pub fn width_of_rough_beside<T: GreyPixel>(
         &mut self,
         pattern: f64,
@@ -212,7 +212,7 @@ impl MeasureState {
     }
 }
 
-/// An edge with the uncertainty that a flank leaves which is not seen whole.
+/// Adds to an edge's variance the uncertainty of a flank too wide to be read as a whole.
 fn with_flank_variance(fit: RoughFit) -> RoughFit {
     let off_px = OFFSET_PER_BLUR * (fit.blur_px - MAX_CLEAR_BLUR_PX).max(0.0);
     RoughFit { variance: fit.variance + off_px * off_px, ..fit }

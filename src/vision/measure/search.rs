@@ -11,15 +11,15 @@ use crate::vision::pair::{self, EdgePair, Sides};
 use crate::vision::pool::Bands;
 use crate::vision::reject::Reject;
 
-/// Fraction from which a contour is looked at.
+/// Smallest fraction of the bands in which a contour must have a step.
 const MIN_BAND_FRACTION: f64 = 0.4;
 /// Fraction of saturated pixels from which missing contrast is attributed to light.
 const MIN_SATURATED_FRACTION: f64 = 0.3;
 /// Room that a search allows beyond the range of widths, for the difference
 /// between one caliper and the mean of all.
 const RANGE_FACTOR: f64 = 1.5;
-/// Steps that noise alone makes are passed over up to so many of its standard deviations. Derived:
-/// noise alone exceeds 3.5 at 5 of 10,000 positions, less than one of a row across the gauge.
+/// Step, in standard deviations of its noise, up to which it is ignored. Derived: noise alone
+/// exceeds 3.5 at 5 of 10,000 positions, less than one of a row across the gauge.
 const NOISE_FLOOR_SIGMAS: f32 = 3.5;
 
 /// Steps of a band, in the mean, from which on texture or a pattern is likely: a bead has
@@ -47,7 +47,7 @@ impl BeadSearch {
 impl MeasureState {
     #[inline(always)]
     pub fn find_candidates(&mut self) {
-        // A step is the difference of two means of so many pooled pixels.
+        // A step is the difference of two means of `pixels` pooled pixels.
         let pixels = to_f32(STEP_HALF_WIDTH);
         let noise = self.rows.noise.grey * (2.0 / (4.0 * pixels)).sqrt();
         let least = narrow_to_f32(0.4 * self.gauge.min_contrast_grey);
@@ -106,7 +106,7 @@ impl MeasureState {
         }
         let got = found.map_or(0.0, |found| found.pair.band_fraction);
         let refused = Reject::NoPair { got, need: MIN_LINE_FRACTION };
-        // A bead of another width deserves to be called that.
+        // A bead of another width is refused later, for its width.
         let least = self.gauge.min_contrast_grey;
         let strong = |found: &ContourPair| {
             found.pair.band_fraction >= MIN_LINE_FRACTION && f64::from(found.pair.step) >= least

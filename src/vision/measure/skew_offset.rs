@@ -4,8 +4,8 @@ use super::work::{EdgeModel, MeasureState};
 use crate::vision::trace::EdgeTracer;
 use crate::vision::width::WidthSkew;
 
-/// Standard deviations of a skew from which on it shows. Derived: noise alone exceeds 4 in 6 of
-/// 100,000 frames; from 3 on, one clean frame in 1,500 had as much.
+/// Skew, in its standard deviations, from which on it is significant. Derived: noise alone exceeds
+/// 4 in 6 of 100,000 frames; from 3 on, one clean frame in 1,500 had as much.
 const MIN_SKEW_SIGMAS: f64 = 4.0;
 
 impl MeasureState {

@@ -11,9 +11,9 @@ use crate::vision::strip::{GaugeRows, GreyPixel};
 /// real concrete in the light of a room have up to 0.4, and an edge of the ground's
 /// pattern that was taken for the bead's has 1.
 const MAX_DIFFERENCE: f64 = 0.5;
-/// Part of the width on either side that is no middle.
+/// Fraction of the width on either side that is not part of the middle.
 const MARGIN_FRACTION: f32 = 0.25;
-/// Rows of which one is looked at.
+/// Distance of the rows that are read \[px\].
 const ROW_STEP: usize = 4;
 
 /// Mean brightness of the middle of what lies between two lines \[grey levels\],
