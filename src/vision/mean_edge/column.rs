@@ -7,7 +7,7 @@ use crate::numeric::number::to_f64;
 pub struct ColumnSums {
     sum: f64,
     squares: f64,
-    /// Of values times their positions about the middle row.
+    /// Sum of values times their positions about the middle row.
     across: f64,
 }
 
@@ -19,7 +19,7 @@ impl ColumnSums {
         self.across += position * value;
     }
 
-    /// Variance of the values of so many rows about the straight line through them.
+    /// Variance of the values about the straight line through them; `rows` is their number.
     pub fn variance_about_line(&self, rows: usize) -> f64 {
         let count = to_f64(rows);
         let along = count * (count * count - 1.0) / 12.0;

@@ -4,7 +4,7 @@ use crate::numeric::number::{floor_to_index, narrow_to_f32, to_f64};
 use crate::vision::row_range::RowRange;
 use crate::vision::strip::{GaugeRows, GreyPixel};
 
-/// What is looked at.
+/// The gauge's pixels and what is known of the edge.
 #[derive(Debug, Clone, Copy)]
 pub struct MeanInput<'a, T> {
     /// The gauge's pixels.
@@ -31,8 +31,8 @@ impl<T: GreyPixel> MeanInput<'_, T> {
         (to_f64(row) + 0.5 - half) / half
     }
 
-    /// Reads pixels of a row from the one at or before a position on; returns how far the
-    /// position lies from that towards the next one. Beyond the gauge its last pixel goes on.
+    /// Reads pixels of a row from the one at or before `from` on; returns the distance of `from`
+    /// from that one, 0 to 1 \[px\]. Beyond the gauge its outermost pixel is repeated.
     #[inline(always)]
     pub fn fetch(&self, row: usize, from: f64, out: &mut [f32]) -> f32 {
         let pixels = self.strip.row(row);
@@ -49,12 +49,12 @@ impl<T: GreyPixel> MeanInput<'_, T> {
         narrow_to_f32(from - from.floor())
     }
 
-    /// Sign by which a bright bead's grey levels and a dark one's are higher than the ground's.
+    /// Sign of the step from the ground to the bead: 1 for a bright bead, −1 for a dark one.
     pub fn sign(&self) -> f64 {
         if self.bright { 1.0 } else { -1.0 }
     }
 
-    /// Direction from the edge into the bead.
+    /// Direction from the edge into the bead: 1 towards higher positions, −1 towards lower ones.
     pub fn inwards(&self) -> f64 {
         if self.bead_after { 1.0 } else { -1.0 }
     }

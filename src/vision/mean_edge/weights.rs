@@ -10,25 +10,25 @@ use crate::numeric::rank;
 /// Half of the window about an edge \[px\]: longer than a pattern of usual size, so that
 /// the ground's level is that beside the edge.
 pub(super) const HALF_PX: usize = 12;
-/// The same at least.
+/// Smallest half of a window \[px\].
 pub(super) const MIN_HALF_PX: usize = 5;
 /// Pixels of the longest window.
 pub(super) const WINDOW: usize = 2 * HALF_PX + 1;
 
-/// Standard deviations of the ground's level within which that beside an edge is ground's. Derived:
-/// noise alone exceeds 5 in 6 of ten million frames.
+/// Largest difference of the level beside an edge from the ground's, in standard deviations of the
+/// ground's level. Derived: noise alone exceeds 5 in 6 of ten million frames.
 const MAX_LEVEL_SIGMAS: f64 = 5.0;
-/// The same as a fraction of the step: a flank is no blurred step to the last grey level.
+/// Tolerance beyond that, as a fraction of the step: a flank is not exactly a blurred step.
 const LEVEL_TOLERANCE: f64 = 0.05;
-/// Positions of a window that show how far a pattern moves it.
+/// Fewest positions of a window from which the shift by a pattern is estimated.
 const MIN_SAMPLES: f64 = 10.0;
 
-/// Weights of a window's pixels for position and levels, of least squares.
+/// Least-squares weights of a window's pixels for position and levels.
 #[derive(Debug, Clone)]
 pub(super) struct EdgeWeights {
     pub(super) position: [f64; WINDOW],
     pub(super) levels: [[f64; WINDOW]; 2],
-    /// Fraction of the bead.
+    /// Fraction of the bead's level in each pixel: the blurred step, 0 to 1.
     pub(super) bead: [f64; WINDOW],
     /// Pixels of the window.
     pub(super) pixels: usize,
@@ -67,9 +67,9 @@ impl EdgeWeights {
         product(&self.levels[1], profile) - product(&self.levels[0], profile)
     }
 
-    /// Descends from the middle of a profile to where the window shows the edge in its own.
-    /// Returns the sum of the squares that a step leaves of it, in that of its height;
-    /// `None` where none lies within the profile.
+    /// Moves from the middle of a profile to where the window shows the edge in its own. Returns
+    /// the squared residuals of a step there, relative to its squared height; `None` where no step
+    /// lies within the profile.
     pub fn residual_at_edge(&self, profile: &[f64]) -> Option<f64> {
         let room = to_f64(profile.len() - self.pixels);
         let mut at = 0.5 * room;
@@ -98,7 +98,7 @@ impl EdgeWeights {
         None
     }
 
-    /// Sum of the squares that a step leaves of a window, in that of its height.
+    /// Sum of the squared residuals of a step in a window, relative to its squared height.
     fn residual(&self, window: &[f64]) -> f64 {
         let [ground, bead] = self.levels.map(|weights| product(&weights, window));
         let left = window.iter().zip(&self.bead).map(|(value, fraction)| {
@@ -108,18 +108,18 @@ impl EdgeWeights {
         left.sum::<f64>() / (bead - ground).powi(2)
     }
 
-    /// What the ground makes of an edge's position, as far as the bead does not hide it.
+    /// Shifts of an edge by the ground's pattern, where the bead does not hide it.
     pub fn on_ground(&self, ground: &[f64]) -> ShiftSamples {
         self.samples(ground, |fraction| 1.0 - fraction)
     }
 
-    /// The same of the bead.
+    /// Shifts of an edge by the bead's texture, where the ground does not hide it.
     pub fn on_bead(&self, bead: &[f64]) -> ShiftSamples {
         self.samples(bead, |fraction| fraction)
     }
 
-    /// Whether the level beside an edge is one that positions of the ground farther away
-    /// have: of a groove it is not, or where a neighbouring bead lies beyond.
+    /// Whether the level beside an edge occurs in the ground farther away; it does not beside a
+    /// groove, or where a neighbouring bead lies beyond.
     pub fn is_ground_level(&self, ground: &[f64], level: f64, step: f64) -> bool {
         let fraction = self.bead.iter().map(|bead| 1.0 - bead);
         let sum: f64 = fraction.clone().take(self.pixels).sum();
@@ -132,7 +132,7 @@ impl EdgeWeights {
         (level - f64::from(middle)).abs() < MAX_LEVEL_SIGMAS * spread + LEVEL_TOLERANCE * step
     }
 
-    /// The step's height times positions [grey levels·px].
+    /// Shifts at all positions of a window, times the step's height \[grey levels·px\].
     fn samples(&self, profile: &[f64], fraction: impl Fn(f64) -> f64) -> ShiftSamples {
         let seen = |weights: [f64; WINDOW]| -> Vec<f64> {
             let seen =
@@ -150,7 +150,7 @@ impl EdgeWeights {
         samples
     }
 
-    /// How the weights for the position change where the window moves inwards, for each pixel.
+    /// Derivative of the weights for the position by a move of the window inwards \[1/px\].
     fn place_gradient(&self) -> [f64; WINDOW] {
         std::array::from_fn(|k| {
             let at = |k: usize| if k < self.pixels { self.position[k] } else { 0.0 };
@@ -164,19 +164,19 @@ pub fn product(weights: &[f64], values: &[f64]) -> f64 {
     weights.iter().zip(values).map(|(weight, value)| weight * value).sum()
 }
 
-/// What positions without an edge make of an edge's position.
+/// Shifts of an edge's position by a pattern, sampled where there is no edge.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ShiftSamples {
-    /// Sum of the squares of what they make of it.
+    /// Sum of the squared shifts.
     pub(super) sum_of_squares: f64,
-    /// Sum of that times how it changes where the window moves inwards.
+    /// Sum of the shifts times their derivative by a move of the window inwards.
     pub(super) drifts: f64,
     /// Their number.
     pub(super) count: f64,
 }
 
 impl ShiftSamples {
-    /// Of both sides of a bead together: ground is ground.
+    /// Samples of two sides together.
     pub fn with(self, other: Self) -> Self {
         Self {
             sum_of_squares: self.sum_of_squares + other.sum_of_squares,
@@ -185,20 +185,20 @@ impl ShiftSamples {
         }
     }
 
-    /// The same of a step of such a height.
+    /// These samples for a step of a height \[grey levels\].
     pub fn over(self, step: f64) -> Self {
         let square = step * step;
         Self { sum_of_squares: self.sum_of_squares / square, drifts: self.drifts / square, ..self }
     }
 
-    /// Mean shift inwards \[px\]: the window rests where a pattern and the edge together
-    /// look like an edge in its middle, and of the bead's it sees more farther inside. To the
-    /// second order, position times its change; 0 of too few samples.
+    /// Mean shift inwards \[px\]: the window comes to rest where pattern and edge together look
+    /// like an edge in its middle, and farther inside it sees more of the bead's texture. To the
+    /// second order, shift times its derivative; 0 for too few samples.
     pub fn shift(self) -> f64 {
         if self.count < MIN_SAMPLES { 0.0 } else { self.drifts / self.count }
     }
 
-    /// Variance of a position \[px²\]; not a number of too few samples.
+    /// Variance of a position \[px²\]; NaN for too few samples.
     pub fn variance(self) -> f64 {
         if self.count < MIN_SAMPLES { f64::NAN } else { self.sum_of_squares / self.count }
     }
