@@ -8,7 +8,7 @@ use super::step::SideInput;
 use crate::numeric::normal_equations::NormalEquations;
 use crate::vision::curve::MIN_BEND_SIGMAS;
 
-/// Farthest that a parabola follows the surroundings \[px\].
+/// Largest extent of a parabola beside an edge \[px\].
 const MAX_EXTENT_PX: f64 = 32.0;
 /// Pixels that show a parabola, before others are compared with it.
 const MIN_START_PX: f64 = 8.0;
@@ -21,8 +21,8 @@ const MAX_REVERSED_SLOPE: f64 = 0.3;
 const UNIT_PX: f64 = 10.0;
 
 impl StepFitter<'_> {
-    /// How far from the edge a side follows a parabola, and that; `None` where no
-    /// bend shows.
+    /// Extent of a side that follows a parabola, and the parabola; `None` where no bend is
+    /// significant.
     #[cold]
     #[inline(never)]
     pub fn parabolic_side(&self, side: &SideInput<'_>) -> Option<SideShape> {

@@ -15,22 +15,21 @@ const UNKNOWNS: usize = 12;
 /// Number of the first unknown of a flank on either side. By definition after the six of the edge,
 /// and three later.
 const FIRST_FLANK_UNKNOWN: [usize; 2] = [6, 9];
-/// Samples beyond a flank that show its course, in blurs.
+/// Distance beyond a flank up to which samples are fitted, in its blurs.
 const BEYOND_BLURS: f64 = 2.0;
-/// Fraction of the edge's blur by which a flank's usually differs.
+/// Relative difference of a flank's blur from the edge's, as a standard deviation.
 const FLANK_BLUR_SIGMA: f64 = 0.5;
-/// Samples up to so many blurs before the flank are used for the edge.
+/// Distance before a flank up to which samples are used for the edge, in the flank's blurs.
 const FLANK_MARGIN_BLURS: f64 = 1.0;
-/// By how much the fit with flanks may leave more than the one without \[fractions
-/// of the step\].
+/// Largest increase of the residual by the fit with flanks \[fractions of the step\].
 const MAX_MISFIT_INCREASE: f64 = 0.01;
 /// Weight that fixes an unknown. Derived: many orders of magnitude more than the sums over a
 /// hundred rows, and far from the limits of a float.
 const FIXED_WEIGHT: f64 = 1e12;
 
 impl StepFitter<'_> {
-    /// Fits an edge and the steps beside it. `start` has rough ones, and the
-    /// edge as it was fitted without them. `None` where that is no better.
+    /// Fits an edge and the steps beside it. `start` has approximate ones, and the edge as it was
+    /// fitted without them. `None` where the fit is no better.
     #[cold]
     #[inline(never)]
     pub fn fit_flanks(&self, start: &StepFit, known: Option<BlurEstimate>) -> Option<StepFit> {
@@ -57,8 +56,7 @@ impl StepFitter<'_> {
         (is_sound(&fit, start) && fraction.0 <= fraction.1 + MAX_MISFIT_INCREASE).then_some(fit)
     }
 
-    /// Normal equations about an edge and its flanks, and the mean square of
-    /// what they leave.
+    /// Normal equations about an edge and its flanks, and the mean squared residual.
     fn linearise_flanks(&self, fit: &StepFit) -> (NormalEquations<UNKNOWNS>, f64) {
         let flanks = &fit.flanks;
         let Clearance { before: from, after: to } = reach(fit);
@@ -100,7 +98,7 @@ fn reach(fit: &StepFit) -> Clearance {
     Clearance { before: of(&flanks.0[0], room.before), after: of(&flanks.0[1], room.after) }
 }
 
-/// Holds what is known, and unknowns that there are not.
+/// Adds priors of what is known, and fixes the unknowns of flanks that do not exist.
 fn hold(normal: &mut NormalEquations<UNKNOWNS>, fit: &StepFit, known: Option<BlurEstimate>) {
     let weight = |sd: f64| (fit.noise / sd).powi(2);
     normal.add_prior(4, weight(SHADING_SIGMA), -fit.shading[0]);
@@ -141,10 +139,10 @@ fn take_step(fit: &mut StepFit, moved: &SVector<f64, UNKNOWNS>) -> f64 {
     moved[0].abs() + moved[1].abs()
 }
 
-/// What the blur and the flanks add to the variance of the edge's position, for
-/// samples of variance 1 \[px²\].
+/// Variance that the blur and the flanks add to the edge's position, for samples of variance 1
+/// \[px²\].
 fn added_variance(normal: &mut NormalEquations<UNKNOWNS>) -> Option<f64> {
-    // uncertainty about shading counts where it shows, not wherever it may be.
+    // The uncertainty of shading counts where shading shows, not wherever it may be.
     normal.add_prior(4, FIXED_WEIGHT, 0.0);
     normal.add_prior(5, FIXED_WEIGHT, 0.0);
     let all = normal.solve()?.variance(0);
@@ -166,13 +164,12 @@ fn samples_of_edge(fit: &StepFit) -> Clearance {
     Clearance { before: of(before, fit.room.before), after: of(after, fit.room.after) }
 }
 
-/// What a fit leaves, as fractions of its own step.
+/// Residual of a fit, as a fraction of its own step.
 fn relative_misfit(square: f64, fit: &StepFit) -> f64 {
     square.sqrt() / (fit.step.after - fit.step.before).abs()
 }
 
-/// Whether the edge is still the one that was looked at, and the flanks lie
-/// beside it.
+/// Whether the edge is still that of `start`, and the flanks lie beside it.
 fn is_sound(fit: &StepFit, start: &StepFit) -> bool {
     let step = fit.step;
     let beside = |(flank, sign): (&Option<NeighbourStep>, f64)| {

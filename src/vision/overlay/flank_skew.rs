@@ -22,8 +22,8 @@ pub struct EdgeSkew {
 }
 
 impl StepFitter<'_> {
-    /// The skew of the flank of an edge that was looked at. `None` where steps beside it
-    /// reach into its pixels, or it cannot be determined.
+    /// Skew of the flank of a fitted edge. `None` where steps beside it reach into its pixels, or
+    /// it cannot be determined.
     pub fn skew(&self, fit: &StepFit) -> Option<EdgeSkew> {
         if fit.flanks.any() {
             return None;

@@ -4,17 +4,16 @@ use super::{HALF_SPAN, Overlay};
 
 /// Positions beside the edge within which a narrow groove lies \[px\].
 const MAX_GROOVE_PX: usize = 9;
-/// By how much what lies beyond a groove is nearer to the bead's level at least: a fraction
-/// of the step, and standard deviations of noise.
+/// Smallest rise of the level beyond a groove towards the bead's, as a fraction of the step.
 const MIN_RISE: f64 = 0.015;
-/// The same in standard deviations of noise. Derived: noise alone exceeds 5 in 6 of ten million
-/// positions.
+/// Addition to it, in standard deviations of noise. Derived: noise alone exceeds 5 in 6 of ten
+/// million positions.
 const MIN_RISE_SIGMAS: f64 = 5.0;
 
 impl Overlay {
-    /// Whether the level beside the edge, after it or before it, comes nearer to that on its
-    /// other side again farther out, as beyond a narrow groove. `noise` is the standard
-    /// deviation of a pixel as fractions of the step.
+    /// Whether the level beside the edge, after it or before it, rises again farther out towards
+    /// that on its other side, as beyond a narrow groove. `noise` is the standard deviation of a
+    /// pixel, as a fraction of the step.
     pub fn rises_beside(&self, after: bool, noise: f64) -> bool {
         let rows = self.used();
         if rows <= 0.0 {

@@ -18,7 +18,7 @@ const PHASE_UNKNOWNS: [usize; 3] = [0, 2, 3];
 /// The equations about a step.
 pub struct LinearisedStep {
     phases: [NormalEquations<UNKNOWNS>; PHASES],
-    /// Sum of the squared misses, of samples of weight 1.
+    /// Weighted sum of the squared residuals.
     sum_of_squares: f64,
     /// Number of samples, and of the phases that have some.
     samples: f64,
@@ -26,20 +26,20 @@ pub struct LinearisedStep {
 }
 
 impl LinearisedStep {
-    /// Those of all phases together.
+    /// Normal equations of all phases together.
     #[inline(always)]
     pub fn normal(&self) -> NormalEquations<UNKNOWNS> {
         let [first, second] = &self.phases;
         first.plus(second)
     }
 
-    /// Mean square of what is left, for a sample of weight 1.
+    /// Mean squared residual, for a sample of weight 1.
     #[inline(always)]
     pub fn mean_square(&self) -> f64 {
         self.sum_of_squares / (self.samples - to_f64(UNKNOWNS)).max(1.0)
     }
 
-    /// The same after a step of the fit, where each phase has a position and levels of its own.
+    /// Mean squared residual after a step of the fit, with a position and levels for each phase.
     #[inline(always)]
     pub fn within_phases_after(&self, step: &SVector<f64, UNKNOWNS>) -> f64 {
         let lowered: f64 = self.phases.iter().map(|phase| phase.decrease_after(step)).sum();

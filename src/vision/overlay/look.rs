@@ -10,9 +10,9 @@ use crate::vision::blur_estimate::BlurEstimate;
 /// How far from the edge samples are fitted, in blurs. Derived: beyond 4.5 blurs 3·10⁻⁶ of a step
 /// is left, 1 − Φ(4.5).
 const FIT_BLURS: f64 = 4.5;
-/// And beyond that \[px\]: the levels of a sharp edge need some pixels.
+/// Margin beyond that \[px\]: the levels of a sharp edge need some pixels.
 const FIT_MARGIN_PX: f64 = 2.0;
-/// Misfit from which on the edge alone leaves more than noise does.
+/// Misfit from which on an edge is no blurred step.
 const MIN_NOTABLE_MISFIT: f64 = 1.3;
 /// Shading that is usual close to an edge, as a standard deviation \[1/px\].
 pub const SHADING_SIGMA: f64 = 0.02;
@@ -33,7 +33,7 @@ pub struct StepFit {
     /// Standard deviation of a row's samples about the step before the fit's last move, in
     /// fractions of it.
     pub(super) noise: f64,
-    /// The same after it, where each phase has a position and levels of its own.
+    /// Standard deviation after that move, where each phase has a position and levels of its own.
     pub(super) residual: f64,
     /// Number of the phases that have rows.
     pub(super) phases: f64,
@@ -41,8 +41,7 @@ pub struct StepFit {
     pub room: Clearance,
     /// Steps beside it that reach into its pixels.
     pub(super) flanks: NeighbourSteps,
-    /// What they and the blur add to the variance of its position \[px²\]; 0 where
-    /// there are none.
+    /// Variance that they and the blur add to its position \[px²\]; 0 without such steps.
     pub(super) added_variance: f64,
 }
 
@@ -78,7 +77,7 @@ impl StepFit {
         (self.residual / self.pixel_noise).powi(2)
     }
 
-    /// Whether the step leaves more than noise does.
+    /// Whether the residual is larger than noise.
     pub fn is_not_step(&self) -> bool {
         self.misfit() >= MIN_NOTABLE_MISFIT
     }
@@ -120,7 +119,7 @@ impl StepFit {
         ([-slope, -slope * z, 1.0 - step, step, depth[0], depth[1]], level)
     }
 
-    /// The same fit up to half-way to the steps beside the edge.
+    /// This fit up to half-way to the steps beside the edge.
     pub fn without_flanks(&self) -> Self {
         let half = |flank: &Option<NeighbourStep>, room: f64| {
             flank.as_ref().map_or(room, |flank| 0.5 * (flank.at - self.step.at).abs())
@@ -133,8 +132,8 @@ impl StepFit {
         Self { room, flanks: NeighbourSteps::default(), added_variance: 0.0, ..*self }
     }
 
-    /// The same fit where texture makes samples less sure than noise does:
-    /// `noise` is what independent ones as unsure would have.
+    /// This fit where texture makes samples more uncertain than noise does: `noise` is the standard
+    /// deviation of independent samples with the same effect.
     pub fn with_texture(self, noise: f64) -> Self {
         let blur_sd = self.blur_sd * (noise / self.noise).max(1.0);
         let [of_rows, residual] = [self.noise, self.residual].map(|own| noise.max(own));
@@ -142,7 +141,7 @@ impl StepFit {
     }
 }
 
-/// Farthest place of a sample from the path \[px\].
+/// Farthest position of a sample from the path \[px\].
 pub fn max_sample_px() -> f64 {
     to_f64(HALF_SPAN - 1)
 }

@@ -12,12 +12,12 @@ use crate::vision::line::LineSums;
 pub struct SideShading {
     /// Change at the edge \[1/px\].
     pub slope: f64,
-    /// Half the change of that \[1/px²\].
+    /// Half the change of the slope \[1/px²\].
     pub bend: f64,
 }
 
 impl SideShading {
-    /// The same as fractions of a step of which the given one is a fraction.
+    /// This shading in fractions of another step, whose height is `fraction` of this one's.
     pub fn of(self, fraction: f64) -> Self {
         Self { slope: self.slope / fraction, bend: self.bend / fraction }
     }
@@ -26,11 +26,11 @@ impl SideShading {
 /// One side of an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SideShape {
-    /// How far there is nothing else \[px\].
+    /// Distance from the edge up to which the side is plain \[px\].
     pub extent: f64,
     /// How its level changes, as fractions of the step that was given.
     pub shading: SideShading,
-    /// Variance that the uncertainty about it leaves to the level at the edge.
+    /// Variance of the level at the edge from the uncertainty of the shading.
     pub level_variance: f64,
 }
 
@@ -39,15 +39,14 @@ pub struct SideShape {
 pub struct StepShape {
     /// The step.
     pub step: BlurredStep,
-    /// How far the surroundings are plain, and what is used of them.
+    /// Extent of the plain surroundings, all of which is used \[px\].
     pub extent: Clearance,
     /// How the level changes away from the edge, before it and after it, in
     /// fractions of the step.
     pub shading: [SideShading; 2],
     /// Steps beside the edge that reach into its pixels, as fractions of its own.
     pub flanks: NeighbourSteps,
-    /// Variance of the edge's position that uncertainty about the shading and about
-    /// flanks leaves \[px²\].
+    /// Variance of the edge's position from the uncertainty of shading and flanks \[px²\].
     pub variance: f64,
 }
 
@@ -59,10 +58,9 @@ impl StepShape {
 }
 
 impl StepFitter<'_> {
-    /// How far the surroundings on one side of a known step are plain \[px\],
-    /// after it or before it, their slope as fractions of the step that was given
-    /// \[1/px away from it\], and the variance that its uncertainty leaves to the
-    /// level at the edge.
+    /// Extent of the plain surroundings on one side of a known step \[px\], after it or before it;
+    /// their slope in fractions of the step that was given \[1/px away from it\], and the variance
+    /// that its uncertainty gives the level at the edge.
     pub fn side_slope(&self, fit: &StepFit, step: &BlurredStep, after: bool) -> (f64, (f64, f64)) {
         let (sign, room) = if after { (1.0, fit.room.after) } else { (-1.0, fit.room.before) };
         let (flanks, noise) = (&fit.flanks, fit.pixel_noise);
@@ -92,8 +90,8 @@ impl StepFitter<'_> {
         })
     }
 
-    /// One side of the edge: along a straight line, or along a parabola where
-    /// that ends early. `pixel_noise` is that of a pixel, in place of a row's samples.
+    /// One side of the edge: a straight line, or a parabola where the line ends early.
+    /// `pixel_noise` is the standard deviation of a pixel, not of a row's samples.
     #[inline(always)]
     fn side_shape(&self, side: &SideInput<'_>, pixel_noise: f64) -> SideShape {
         let (extent, line) = self.plain_extent(side);
@@ -106,8 +104,8 @@ impl StepFitter<'_> {
         SideShape { extent, shading: SideShading { slope, bend: 0.0 }, level_variance: variance }
     }
 
-    /// Samples of two pixels beside the edge, from a distance on: how far each
-    /// lies away from it, what it is beyond the level there, and its weight.
+    /// Samples of two pixels beside the edge, from a distance on: distance from the edge \[px\],
+    /// difference from the level there, and weight.
     #[inline(always)]
     pub fn each_beside(
         &self,

@@ -9,16 +9,16 @@ use super::{HALF_SPAN, Overlay, PHASES, SPAN};
 /// Distance from the path within which the edge lies \[px\].
 const MAX_EDGE_OFFSET_PX: f64 = 8.0;
 
-/// What shows a step beside the edge.
+/// Limits from which on a slope shows a step beside the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SlopeLimits {
     /// Standard deviation of a slope by noise \[1/px\].
     pub noise: f64,
-    /// Slope that shows such a step, times the edge's blur.
+    /// Smallest slope of such a step, times the edge's blur.
     pub notable: f64,
 }
 
-/// Mean slopes over two pixels \[1/px\], each phase's fraction of the mean of both.
+/// Slopes over two pixels \[1/px\], weighted so that the sum over the phases is their mean.
 pub struct ProfileSlopes([[f32; SPAN]; PHASES]);
 
 impl ProfileSlopes {
@@ -37,7 +37,7 @@ impl ProfileSlopes {
         Self(slopes)
     }
 
-    /// About a distance in half pixels.
+    /// Mean slope at a distance in half pixels.
     #[inline(always)]
     fn at(&self, half: i16) -> f32 {
         let middle = i16::try_from(HALF_SPAN).unwrap_or(0);
@@ -93,7 +93,7 @@ impl ProfileSlopes {
         (room, None)
     }
 
-    /// The step whose slope rises from a position on, in half pixels.
+    /// Steepest step from a position on, in half pixels; `None` where there is none.
     #[cold]
     fn flank(&self, blur: f64, from: i16, sign: i16, steps: Range<i16>) -> Option<NeighbourStep> {
         let mut best = (0.0f32, 0, 0.0f32);

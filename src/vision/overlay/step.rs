@@ -74,8 +74,8 @@ impl NeighbourSteps {
         self.0.iter().zip([-1.0, 1.0]).map(one).sum()
     }
 
-    /// The same flanks about an edge that lies at a position beside the path and
-    /// has another step, of which the given one is a fraction.
+    /// These flanks relative to an edge at a position beside the path, in fractions of its step,
+    /// whose height is `fraction` of this one's.
     pub fn about(&self, at: f64, fraction: f64) -> Self {
         let moved = |NeighbourStep { at: of_flank, height, blur }: NeighbourStep| NeighbourStep {
             at: of_flank - at,

@@ -9,8 +9,7 @@ use crate::vision::blur_estimate::BlurEstimate;
 
 /// Largest blur of a step \[px\].
 const MAX_BLUR_PX: f64 = 15.0;
-/// A step \[px, or blurs\] after which another would change next to nothing: each
-/// squares what is left.
+/// Step of the fit \[px, or blurs\] from which on it has converged: each step squares the error.
 const CONVERGED_STEP: f64 = 8e-3;
 /// Slope that shows another step beside the edge, times the blur. Derived: 0.08/√(2π), a twelfth of
 /// the slope of the edge itself.
@@ -18,9 +17,8 @@ const MIN_NEIGHBOUR_SLOPE: f64 = 0.032;
 const WEAK_SLOPE_RATIO: f64 = 0.5;
 
 impl StepFitter<'_> {
-    /// Looks at the edge. `noise` is the standard deviation of a pixel as a
-    /// fraction of the step, `room` how far to look. `None` where no step can be
-    /// fitted.
+    /// First fit of the edge. `noise` is the standard deviation of a pixel as a fraction of the
+    /// step, `room` how far to look. `None` where no step can be fitted.
     #[inline(always)]
     pub fn first_fit(&self, noise: f64, room: Clearance) -> Option<StepFit> {
         let slopes = ProfileSlopes::of(self.overlay);
@@ -50,7 +48,7 @@ impl StepFitter<'_> {
         if !fit.is_not_step() {
             return Some(fit);
         }
-        // A weaker step beside it, if that explains what is left.
+        // A weaker step beside it, if that explains the residual.
         let weaker = WEAK_SLOPE_RATIO * MIN_NEIGHBOUR_SLOPE;
         let (_, flanks) = self.up_to_neighbours(&slopes, step, noise, weaker, whole_room);
         let start = StepFit { flanks: flanks.near(&fit.step), ..fit };
@@ -82,9 +80,8 @@ impl StepFitter<'_> {
         self.fit(*fit, known)
     }
 
-    /// Cuts the room off half-way to a neighbouring step: where the slope has
-    /// fallen off and rises again, in either direction. Tells the steps too,
-    /// roughly.
+    /// Room on either side up to half-way to a neighbouring step, where the slope has fallen off
+    /// and rises again, and these steps, approximately.
     #[inline(always)]
     fn up_to_neighbours(
         &self,
@@ -107,8 +104,8 @@ impl StepFitter<'_> {
         let mut fit = start;
         let mut last = None;
         let hold = |sd: f64| (start.noise / sd).powi(2);
-        // Shading is held near none, because over a short way it could pass
-        // for a shift of the edge.
+        // A prior holds shading near 0, because over a short way it could pass for a shift of the
+        // edge.
         let of_shading = (start.pixel_noise / SHADING_SIGMA).powi(2);
         for _ in 0..MAX_ITERATIONS {
             let step = fit.step;
@@ -136,7 +133,7 @@ impl StepFitter<'_> {
             }
         }
         let (linear, solved) = last?;
-        // What the model leaves is noise, if not of the pixels.
+        // The residual counts as noise, even if it is not that of the pixels.
         fit.noise = start.pixel_noise.max(linear.mean_square().sqrt());
         fit.residual = start.pixel_noise;
         if fit.noise > start.pixel_noise {
