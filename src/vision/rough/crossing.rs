@@ -5,15 +5,15 @@ use crate::numeric::number::{round_to_count, to_f32};
 use crate::vision::edge_windows::WINDOW_PX;
 
 /// How far inside the edge's course a row is summed \[px\]: beyond a usual flank. Measured:
-/// reference/accuracy.md, What the parts bring: with 4 px instead of 5 real concrete repeats to within 0.03
-/// px of the same.
+/// reference/accuracy.md, What the parts bring: with 4 px instead of 5 real concrete repeats to
+/// within 0.03 px of the same.
 pub const SUMMED_INSIDE_PX: f32 = 5.0;
 /// How far inside its course an edge may be torn \[px\].
 const MAX_TEAR_PX: f32 = 25.0;
-/// Bead in a pixel, as a fraction, beyond which it is a spark or a shadow and counts
-/// for no more. Wide, so that noise is clipped on neither side.
+/// Range of the bead's fraction in a pixel: a spark or a shadow beyond it counts for no more. Wide,
+/// so that noise is clipped on neither side.
 const FRACTION_RANGE: (f32, f32) = (-1.0, 2.0);
-/// Fractions beyond which a pixel shows something else than the two.
+/// Range of fractions beyond which a pixel shows neither bead nor what lies outside.
 const NORMAL_FRACTIONS: (f32, f32) = (-0.2, 1.2);
 /// How much farther inside a grain on the edge may reach \[px\].
 const GRAIN_PX: usize = 8;
@@ -33,7 +33,7 @@ pub struct Crossing {
     summed: (usize, usize),
 }
 
-/// What a row shows besides.
+/// Further features of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RowFeatures {
     /// Length of the flank \[px\], from a fifth to four fifths of its height.
@@ -41,14 +41,14 @@ pub struct RowFeatures {
     /// Fraction of the pixels about the edge that are clearly darker than what lies outside
     /// or brighter than the bead.
     pub odd: f32,
-    /// The same of the bead farther inside.
+    /// That fraction in the bead farther inside.
     pub odd_within: f32,
 }
 
 /// Levels about a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RowLevels {
-    /// Where what lies outside ends at the latest \[px\].
+    /// Innermost position of what lies outside \[px\].
     pub start: f32,
     /// Level outside \[grey levels\].
     pub outside: f32,
@@ -56,14 +56,13 @@ pub struct RowLevels {
     pub inside: f32,
     /// Course of the edge \[px\].
     pub course: f32,
-    /// Bead beyond the course that shows what its texture is \[px\].
+    /// Distance inside the course up to which the bead's texture is read \[px\].
     pub within_px: f32,
 }
 
-/// The edge by the area of the bead: the position from which on the row would hold as
-/// much bead as it does, were it all bead. A blur moves it nowhere, and of what is
-/// torn open as much is missing as there is of it. `None` where no bead is within
-/// reach of the course.
+/// The edge by the area of the bead: the position from which on a row of bead alone has the same
+/// area. Blur does not move it, and a tear moves it by the tear's area. `None` where no bead is
+/// within reach of the course.
 #[inline(always)]
 pub fn find(row: &WindowRow, flank: &RowLevels) -> Option<Crossing> {
     let first = round_to_count(flank.start).clamp(1, WINDOW_PX - 2);
@@ -83,7 +82,7 @@ pub fn find(row: &WindowRow, flank: &RowLevels) -> Option<Crossing> {
     Some(Crossing { at, summed: (first, last) })
 }
 
-/// What else a row shows whose crossing was found with the same levels.
+/// Further features of a row whose crossing was found with the same levels.
 #[inline(always)]
 pub fn features(
     row: &WindowRow,
@@ -110,7 +109,7 @@ pub fn features(
     }
 }
 
-/// Sum of what is made of each pixel, in as many sums as fit the processor's vectors.
+/// Sum of a term over the pixels, in as many partial sums as fit the processor's vectors.
 #[inline(always)]
 fn sum_of(pixels: &[f32], term: impl Fn(f32) -> f32) -> f32 {
     let mut sums = [0.0; 8];

@@ -10,12 +10,13 @@ use crate::vision::gauge::EdgeKind;
 use crate::vision::vectors;
 use nalgebra::SVector;
 
-/// Grey of a groove as a fraction of the bead's. Measured: reference/accuracy.md, Real and rendered: real
-/// grooves that are wide enough to show it have 1 to 74 beside beads of 131, 14.7 in the median.
+/// Grey of a groove as a fraction of the bead's. Measured: reference/accuracy.md, Real and
+/// rendered: real grooves that are wide enough to show it have 1 to 74 beside beads of 131, 14.7 in
+/// the median.
 const GROOVE_GREY: f64 = 0.13;
 /// Its standard deviation. Measured: as [`GROOVE_GREY`], of which the range is.
 const GROOVE_GREY_SIGMA: f64 = 0.12;
-/// The same of the bead beside the edge about its level farther inside: light.
+/// Standard deviation of the bead's level beside the edge about that farther inside: light.
 pub(super) const BEAD_SIGMA: f64 = 0.03;
 /// Positions beyond the groove that are fitted \[px\]: enough for its level, too few for its slope
 /// to bend.
@@ -29,7 +30,7 @@ const MODEL_MISFIT_SIGMA: f64 = 0.004;
 const MAX_ITERATIONS: usize = 40;
 /// Change of position at which the fit has converged \[px\].
 const CONVERGED_PX: f64 = 3e-3;
-/// The same of the groove's width \[px\], which is known less well.
+/// Change of the groove's width at which the fit has converged \[px\]: it is known less well.
 const CONVERGED_WIDTH_PX: f64 = 0.03;
 /// Largest change of position, width and blur in a round \[px\].
 const MAX_STEP_PX: f64 = 0.7;
@@ -37,9 +38,9 @@ const MAX_STEP_PX: f64 = 0.7;
 const MAX_MISFIT: f64 = 30.0;
 /// Width of a narrow groove, from which the fit starts \[px\].
 const START_WIDTH_PX: f64 = 2.0;
-/// Smallest standard deviation of the variance of the far side about the near one \[px²\].
+/// Smallest standard deviation of the variance by which the far side is more blurred \[px²\].
 const FAR_SIDE_SIGMA_PX2: f64 = 0.02;
-/// Its largest value \[px²\].
+/// Largest variance by which the far side is more blurred \[px²\].
 const MAX_FAR_SIDE_PX2: f64 = 30.0;
 /// Ranges of width and blur \[px\].
 const WIDTH_RANGE_PX: (f64, f64) = (0.5, 30.0);
@@ -49,8 +50,8 @@ const BLUR_RANGE_PX: (f64, f64) = (0.6, 6.0);
 const FIXED_WEIGHT: f64 = 1e9;
 /// Positions at the far end of ground that may be those of a groove's far side \[px\].
 const FAR_END_PX: usize = 4;
-/// By how much the sum of squares must fall until a dark line beside an edge on ground is as likely
-/// as none.
+/// Decrease of the sum of squares at which a dark line beside an edge on ground is as likely as
+/// none.
 const DIP_COST: f64 = 6.0;
 /// Widest such line \[px\]; a wider one is ground.
 const MAX_DIP_PX: f64 = 9.0;
@@ -67,12 +68,12 @@ pub struct GrooveShape {
     pub at: f64,
     /// Its variance \[px²\].
     pub variance: f64,
-    /// How likely it is that a groove lies beside it that does not show how dark it is.
+    /// Probability of a groove beside it that does not show how dark it is.
     pub groove_probability: f64,
     /// Blur of the bead's edge.
     pub blur: MeanBlur,
-    /// How much the bead's level beside the edge differs from that farther inside, in
-    /// standard deviations of what light does.
+    /// Difference of the bead's level beside the edge from that farther inside, in standard
+    /// deviations of the change by light.
     pub level_off: f64,
     model: GrooveModel,
 }
@@ -83,8 +84,8 @@ impl GrooveShape {
         self.model.width
     }
 
-    /// Likeliest value of one shape or another one, the latter so likely, and the
-    /// variance of both (Bayesian model averaging).
+    /// Average of two shapes and its variance (Bayesian model averaging); `share` is the
+    /// probability of the other one.
     fn average_with(&self, other: &Self, share: f64) -> Self {
         let apart = other.at - self.at;
         let mean = |one: f64, other: f64| one + share * (other - one);
@@ -99,7 +100,7 @@ impl GrooveShape {
     }
 }
 
-/// Blur of an edge in the mean over its rows, lens and what is too fine to be followed.
+/// Blur of an edge in the mean over its rows: the lens's, and roughness too fine to be followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeanBlur {
     /// Standard deviation of the Gaussian \[px\].
@@ -212,7 +213,7 @@ impl StepValue {
     }
 }
 
-/// What is fitted, and how what is known weighs in.
+/// Profile that is fitted, and the prior.
 #[derive(Clone, Copy)]
 struct GrooveProblem<'a> {
     table: &'a StepTable,
@@ -220,7 +221,7 @@ struct GrooveProblem<'a> {
     /// First position and the one after the last.
     positions: (usize, usize),
     weight: f64,
-    /// What is known of the unknowns, and their standard deviations.
+    /// Prior of the unknowns, and its standard deviations.
     prior: GrooveModel,
     sigmas: [f64; UNKNOWNS],
 }
@@ -228,7 +229,7 @@ struct GrooveProblem<'a> {
 /// A fit that has ended.
 struct GrooveFit {
     model: GrooveModel,
-    /// Sum of the squared residuals, and the same with those of what is known.
+    /// Sum of the squared residuals, and that sum with those of the prior.
     squares: f64,
     cost: f64,
     solved: NormalSolution<UNKNOWNS>,
@@ -300,7 +301,7 @@ pub fn fit(mean: &MeanProfile, known: &GroovePrior<'_>) -> Option<GrooveShape> {
     groove.shape_of(&groove.descend_from(starts)?, 1.0)
 }
 
-/// The same groove as wide as the grey that is missing up to a position.
+/// The narrow groove made as wide as the grey that is missing up to a position.
 fn wide(mean: &MeanProfile, narrow: GrooveModel, last: usize) -> GrooveModel {
     let GrooveModel { bead, grey, .. } = narrow;
     let missing: f64 = (mean.darkest()..last).map(|k| bead - f64::from(mean.grey[k])).sum();
@@ -336,7 +337,7 @@ impl GrooveProblem<'_> {
             normal.add_prior(which, sigma.powi(-2), miss);
             held += (miss / sigma).powi(2);
         }
-        // What is at the end of its range stays there.
+        // An unknown at the end of its range stays there.
         let ends = [(4, model.grey <= 0.0), (6, model.apart <= 0.0)];
         for (which, _) in ends.into_iter().filter(|(_, is_at_end)| *is_at_end) {
             if normal.vector[which] < 0.0 {
@@ -347,14 +348,14 @@ impl GrooveProblem<'_> {
         Some(GrooveFit { model: *model, squares, cost: squares + held, solved })
     }
 
-    /// The least squares from the start on that fits best.
+    /// Least-squares fit from the start that fits best.
     fn descend_from(&self, starts: [Option<GrooveModel>; 2]) -> Option<GrooveFit> {
         let solved = starts.into_iter().flatten().filter_map(|start| self.solve(&start));
         self.descend(solved.min_by(|one, other| one.cost.total_cmp(&other.cost))?)
     }
 
-    /// The least squares from a start on: Gauss–Newton, with steps that are halved until
-    /// they descend.
+    /// Least-squares fit from a start: Gauss–Newton, with steps that are halved until the cost
+    /// falls.
     fn descend(&self, start: GrooveFit) -> Option<GrooveFit> {
         let mut best = start;
         let mut share = 1.0;
@@ -374,7 +375,7 @@ impl GrooveProblem<'_> {
         Some(best)
     }
 
-    /// What a fit says, if it fits.
+    /// Shape of a fit; `None` where its residuals are too large.
     fn shape_of(&self, fitted: &GrooveFit, groove_probability: f64) -> Option<GrooveShape> {
         let (model, solved) = (&fitted.model, &fitted.solved);
         let freedom = to_f64((self.positions.1 - self.positions.0).saturating_sub(UNKNOWNS).max(1));

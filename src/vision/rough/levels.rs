@@ -17,12 +17,12 @@ use crate::vision::gauge::EdgeKind;
 /// How much darker than the bead a hole in it is, in median deviations of the bead's positions.
 /// Derived: 4 · 1.4826, four standard deviations of a Gaussian.
 const MIN_HOLE_DEVIATIONS: f32 = 6.0;
-/// The same as a fraction of the contrast: a plain bead has next to no deviation of its own.
+/// Smallest depth of a hole as a fraction of the contrast: a plain bead has hardly any deviation.
 const MIN_HOLE_DEPTH: f32 = 0.2;
 /// Rows over which the bead's level is averaged, as the standard deviation of a
 /// Gaussian: more than texture is long, less than the light changes within.
 const INSIDE_ROWS: f64 = 48.0;
-/// The same for what lies outside: a groove changes more quickly.
+/// Rows over which the level outside is averaged, likewise: a groove changes more quickly.
 const OUTSIDE_ROWS: f64 = 6.0;
 /// Depth of a groove as a fraction of the bead's level: hardly any light comes out of it. A narrow
 /// one seems less deep, because blur fills it. Derived: 1 less the groove's grey, 0.13.
@@ -52,19 +52,19 @@ pub struct EdgeLevels {
 /// What the rows show of an edge.
 #[derive(Debug, Clone, Default)]
 pub struct Crossings {
-    /// Position in each row's window \[px\]; not a number where there is none.
+    /// Position in each row's window \[px\]; NaN where there is none.
     pub at: Vec<f32>,
     /// Length of the flank of every [`STRAIGHT_ROWS`]th row \[px\], likewise.
     pub flank: Vec<f32>,
     /// Distance of the edge from where what lies outside ends, likewise.
     pub gap: Vec<f32>,
-    /// Fraction of odd pixels, likewise, and the same of the bead farther inside.
+    /// Fraction of odd pixels about the edge, likewise.
     pub odd: Vec<f32>,
-    /// See `odd`.
+    /// Fraction of odd pixels in the bead farther inside, likewise.
     pub odd_within: Vec<f32>,
     /// Mean distance of the edge from the course, rounded to pixels \[px\].
     pub off_course: f64,
-    /// What was found of a row.
+    /// Crossing of each row.
     found: Vec<Option<Crossing>>,
 }
 
@@ -154,8 +154,8 @@ impl EdgeLevels {
         }
     }
 
-    /// Where every so many rows pass from outside to the bead; not a number where they do
-    /// not, and between them.
+    /// Crossings from outside to the bead in every `every`-th row; NaN where there is none, and
+    /// between these rows.
     #[inline(always)]
     pub fn cross(&self, windows: &RowWindows, course: &[f32], every: usize, out: &mut Crossings) {
         let rows = &windows.rows;
@@ -168,7 +168,7 @@ impl EdgeLevels {
         }
     }
 
-    /// What else the rows show whose crossings were found along the same course.
+    /// Further features of the rows whose crossings were found along the same course.
     #[inline(always)]
     pub fn describe(&self, windows: &RowWindows, course: &[f32], out: &mut Crossings) {
         let Crossings { at: _, flank, gap, odd, odd_within, off_course, found } = out;
@@ -194,7 +194,7 @@ impl EdgeLevels {
         *off_course = sum / f64::max(seen, 1.0);
     }
 
-    /// Levels about a row at which the course passes such a position \[px\].
+    /// Levels about a row; `course` is the position of the edge's course there \[px\].
     #[inline(always)]
     fn flank(&self, row: usize, course: f32) -> RowLevels {
         let levels = self.between(row);
@@ -209,7 +209,7 @@ impl EdgeLevels {
         }
     }
 
-    /// How much deeper than it looks a groove is taken to be \[grey levels\].
+    /// Depth of a groove that blur hides \[grey levels\].
     #[inline(always)]
     fn hidden_depth(&self, levels: &BlockLevels) -> f32 {
         let filled = self.mean.map_or(0.0, |mean| mean.filled);
@@ -241,15 +241,15 @@ impl BlockLevels {
     }
 }
 
-/// Level of the bead in a block of rows, from so many of its positions.
+/// Level of the bead in a block of rows, and the number of positions that it is the mean of.
 #[derive(Debug, Clone, Copy)]
 struct BeadLevel {
     grey: f32,
     places: f32,
 }
 
-/// Levels of the bead itself: positions that show a hole in it are passed over. Every fourth
-/// position of every second block shows what a hole is.
+/// Levels of the bead itself, without positions in a hole. How deep a hole is follows from every
+/// fourth position of every second block.
 #[inline(always)]
 fn bead_levels(blocks: &[BlockProfile], mean: &MeanProfile) -> Vec<BeadLevel> {
     let (from, to) = mean.inside;
@@ -287,7 +287,7 @@ fn smooth_levels(levels: &[BeadLevel], kernel: &[f32]) -> Vec<f32> {
     smooth
 }
 
-/// Sums of values about each, by a kernel.
+/// Sums of the values about each, weighted by a symmetric kernel.
 #[inline(always)]
 fn smooth_values(values: &[f32], kernel: &[f32]) -> Vec<f32> {
     let mut sums: Vec<f32> = values.iter().map(|value| kernel[0] * value).collect();

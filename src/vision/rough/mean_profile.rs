@@ -2,8 +2,8 @@
 
 use crate::numeric::number::{round_to_count, to_f32};
 
-/// Pixels outside that are searched for what the bead stands against: a groove's
-/// darkest position or the ground.
+/// Pixels outside that are searched for the bead's surroundings: a groove's darkest position or the
+/// ground.
 pub const OUTSIDE_PX: usize = 20;
 /// First and last pixel inside whose mean is the bead's level: beyond the flank,
 /// and near enough to have the light of the edge.
@@ -14,12 +14,11 @@ const INSIDE_FRACTION: (f32, f32) = (0.14, 0.42);
 pub const PROFILE_PX: usize = OUTSIDE_PX + 30;
 /// Fraction of the step within which a position outside is as dark as the darkest.
 const SAME_LEVEL_FRACTION: f32 = 0.1;
-/// As many such positions in a row are ground; fewer are a groove.
+/// Fewest such positions in a row that are ground; fewer are a groove.
 pub const MIN_GROUND_PX: usize = 8;
-/// Blocks whose mean is one look at how much darker a groove is than what lies beyond
-/// it, and how many standard errors darker it must be where it is shallow and where it
-/// is deep: a pattern of the ground has some ten places, one of which is three darker by
-/// chance.
+/// Blocks whose mean is one sample of how much darker a groove is than what lies beyond it, and by
+/// how many standard errors it must be darker where it is shallow and where it is deep: a pattern
+/// of the ground has some ten positions, one of which is three darker by chance.
 const SAMPLE_BLOCKS: usize = 4;
 const DARKER_SIGMAS: (f32, f32) = (4.0, 2.5);
 /// Difference that makes it deep, as a fraction of the step to the bead.
@@ -30,15 +29,15 @@ const BEYOND_GROOVE_PX: usize = 6;
 const NEAR_GROUND_PX: usize = 16;
 /// Positions of the ground that the flank may reach into.
 const FLANK_FOOT_PX: usize = 3;
-/// Height of a groove's far side, as a fraction of the near one.
+/// Smallest height of a groove's far side, as a fraction of the near one.
 const MIN_FAR_SIDE: f32 = 0.3;
 /// Length of a groove's floor, in distances from its darkest position to the bead, at
 /// which it certainly is filled by blur, and from which on it certainly is not: a
 /// box of four and five times the blur's standard deviation (0.87 and 1.01).
 const FILLED_FLOOR_RATIO: (f32, f32) = (0.87, 1.0);
-/// Height of a groove's far side, as a fraction of the near one, from which on its depth
-/// may be hidden, and at which it certainly may: beside plain ground a darker line is
-/// shade, or a lens's or a compression's.
+/// Height of a groove's far side, as a fraction of the near one, from which on its depth may be
+/// hidden, and at which it certainly may: a darker line beside plain ground is a shadow, or comes
+/// from the lens or a compression.
 const ENCLOSED_FAR_SIDE: (f32, f32) = (0.4, 0.6);
 
 /// The mean profile across an edge, from [`OUTSIDE_PX`] pixels before it on.

@@ -11,16 +11,16 @@ use crate::vision::strip::GreyPixel;
 
 /// Blocks over which texture is taken to be correlated at most.
 const MAX_LAG: usize = 6;
-/// Fraction of the irregular length of a flank by which an edge may lie elsewhere in it: half,
-/// were the flank an even ramp. Of drawn bays, whose widths have 0.75 times the standard
-/// deviation that a quarter predicts, it is less.
+/// Standard deviation of an edge within its flank, as a fraction of the flank's irregular length:
+/// half for an even ramp. For drawn bays it is less: their widths have 0.75 times the standard
+/// deviation that a quarter predicts.
 const FLANK_SIGMA_FRACTION: f64 = 0.2;
-/// How far the ground's pattern between its level and the edge may be off, in standard
-/// deviations of the level from position to position: an edge that is drawn outwards by bright
-/// positions finds more of them.
+/// Difference of the ground beside the edge from its level, by its pattern, in standard deviations
+/// of the level from position to position: an edge that is drawn outwards by bright positions finds
+/// more of them.
 const PATTERN_LEVEL_SIGMAS: f64 = 1.2;
 
-/// What noise leaves open.
+/// Uncertainty of an edge's position by noise and texture.
 #[derive(Debug, Clone, Copy)]
 pub struct PositionNoise {
     /// Variance of the mean over all rows \[px²\].
@@ -61,7 +61,7 @@ pub fn of_mean<T: GreyPixel>(
         grey += pixel * 2.0 * half;
     }
     let of_flank = FLANK_SIGMA_FRACTION * FLANK_SIGMA_FRACTION * irregularity(&crossings.flank);
-    // What a groove's depth leaves open is the same for both edges.
+    // The error by a groove's unknown depth is the same for both edges.
     let of_depth = DEPTH_SIGMA * f64::from(mean.filled) * mean_of(&crossings.gap);
     let of_pattern = if mean.on_ground {
         PATTERN_LEVEL_SIGMAS * mean.ground_spread() * mean_of(&crossings.gap) / contrast
@@ -107,7 +107,7 @@ pub fn roughness(crossings: &Crossings) -> f64 {
     (squares[0] - squares[1]).max(0.0) / f64::max(count, 1.0)
 }
 
-/// Mean square by which an edge's profile changes over so many rows \[px²\].
+/// Mean squared change of an edge's profile over a number of rows \[px²\].
 pub fn fine_roughness(crossings: &Crossings, rows: usize) -> f64 {
     let pairs = crossings.at.iter().zip(crossings.at.iter().skip(rows));
     let (mut sum, mut count) = (0.0, 0.0);
@@ -138,9 +138,9 @@ struct SideSegment {
     summed: f64,
 }
 
-/// Variance of the mean over the rows of the sum of so many positions of texture and
-/// noise \[grey levels²\], the correlation along the bead included: from as many
-/// sums as there is room for beside each other.
+/// Variance of the mean over the rows of a sum of positions with texture and noise \[grey
+/// levels²\], with the correlation along the bead: from as many sums beside each other as there is
+/// room for.
 fn texture(levels: &EdgeLevels, segment: &SideSegment, level: impl Fn(usize) -> f32) -> f64 {
     let blocks = &levels.blocks;
     let count = blocks.len();

@@ -5,7 +5,7 @@ use crate::vision::gauge::EdgeKind;
 use crate::vision::row_range::RowRange;
 use crate::vision::strip::GaugeRows;
 
-/// What is looked at.
+/// The gauge's pixels and what is known of the edge.
 #[derive(Debug, Clone, Copy)]
 pub struct RoughInput<'a, T> {
     /// The gauge's pixels.
@@ -22,6 +22,6 @@ pub struct RoughInput<'a, T> {
     pub bright: bool,
     /// What the edge looks like.
     pub edge: EdgeKind,
-    /// A step that the lens blurs.
+    /// Step blurred by the lens.
     pub table: &'a StepTable,
 }

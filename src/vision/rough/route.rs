@@ -15,8 +15,8 @@ const REACH_FRACTION: f32 = 0.06;
 const REACH_PX: (f32, f32) = (3.0, 6.0);
 /// How far a course may run aside from one block to the next \[px\].
 const MAX_ASIDE: usize = 8;
-/// Cost of running aside, in typical steps a pixel: into a tear that is as deep as a
-/// block is long, and out again, for one and a half blocks' own step.
+/// Cost of running aside by a pixel, in typical steps: into a tear as deep as a block is long, and
+/// out again, costs the steps of one and a half blocks.
 const ASIDE_COST: f32 = 0.2;
 /// Rank of the typical step among the blocks' strongest.
 const TYPICAL_RANK: f32 = 0.7;
@@ -151,7 +151,7 @@ impl EdgeRoute {
         Some(())
     }
 
-    /// Straight lines between the middles of blocks of so many rows.
+    /// Straight lines between the middles of blocks of `block` rows.
     fn draw(&mut self, block: usize) {
         let blocks = &self.blocks;
         self.rows.clear();

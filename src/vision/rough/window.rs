@@ -15,10 +15,10 @@ pub type WindowRow = [f32; WINDOW_PX];
 /// Standard deviation of the smoothing across \[px\]: a third of a usual blur, so
 /// that it hardly widens the flank.
 const ACROSS_PX: f64 = 0.7;
-/// The same along the bead \[px\]: what is shorter than that is texture, and the
+/// Standard deviation of the smoothing along the bead \[px\]: what is shorter is texture, and the
 /// mean over the rows keeps its position.
 pub const ALONG_PX: f64 = 2.5;
-/// Rows between which a course is straight: the smoothing along the bead leaves no more.
+/// Rows over which a course is straight: the smoothing along the bead leaves nothing finer.
 pub const STRAIGHT_ROWS: usize = 2;
 /// Rows of the gauge in a block.
 pub const BLOCK_ROWS: usize = 4;
@@ -60,8 +60,8 @@ impl RowWindows {
         self.sheet.windows[number].rows.into()
     }
 
-    /// Position across the gauge of a position in a row's window \[px\]; `None`
-    /// where it is not a number or beyond the gauge.
+    /// Position across the gauge of a position in a row's window \[px\]; `None` where it is NaN or
+    /// beyond the gauge.
     pub fn position(&self, number: usize, at: f32) -> Option<f64> {
         if !at.is_finite() {
             return None;
@@ -92,7 +92,7 @@ impl RowWindows {
                 [kernel::gaussian(ACROSS_PX), kernel::gaussian(ALONG_PX / to_f64(together))];
         }
         let at = |v: f32| [line.at + line.slope * (v - middle), 0.0, 1.0];
-        // Caliper lines of an odd number of rows would leave single ones over.
+        // Not by caliper lines: those with an odd number of rows would leave single rows.
         let grouping = Grouping { steepest: 0.3, max_rows: self.together };
         self.sheet.read(strip, &[RowRange::new(0, strip.along)], grouping, at);
         self.lines.clear();
@@ -153,8 +153,8 @@ const VECTOR_PIXELS: usize = 16;
 /// the smoothing along the bead, rounded up.
 const MAX_KERNEL_HALF: usize = 8;
 
-/// Convolves along the bead. Beyond the ends the rows come again in reverse, so
-/// that each row weighs as much as any other in the mean of all.
+/// Convolves along the bead. Beyond the ends the rows are mirrored, so that each row has the same
+/// weight in the mean of all.
 #[inline(always)]
 fn smooth_along(rows: &[WindowRow], kernel: &[f32; MAX_KERNEL_HALF + 1], out: &mut [WindowRow]) {
     let count = rows.len().cast_signed();
