@@ -7,7 +7,7 @@ use crate::core::SurfacePoint;
 use crate::numeric::number::to_f64;
 use crate::vision::width::Caliper;
 
-/// Largest fraction of the lines that may be missing: the others stand in for them.
+/// Largest fraction of the lines that may be missing: they are interpolated.
 const MAX_MISSING: f64 = 0.2;
 /// Fewest lines that show roughness.
 const MIN_LINES: usize = 8;
@@ -29,15 +29,15 @@ pub struct LocalWidths {
     pub blur_mm: f64,
 }
 
-/// What the calipers' positions have passed along the bead \[px\]; see [`LocalWidths`].
+/// Smoothing that the calipers' positions have passed along the bead \[px\]; see [`LocalWidths`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CaliperFilter {
-    /// That of the measurement.
+    /// Smoothing of the measurement.
     pub filter_px: f64,
-    /// That of the lens.
+    /// Smoothing of the lens.
     pub blur_px: f64,
-    /// Fraction of each edge's variance that differs from line to line; the rest moves the
-    /// whole edge, and is none of a local width's noise.
+    /// Fraction of each edge's variance that differs from line to line; the rest moves the whole
+    /// edge, and is not noise of a local width.
     pub noise_fractions: [f64; 2],
     /// Distance of caliper lines.
     pub line_px: f64,
@@ -52,8 +52,8 @@ struct Section {
 }
 
 impl LocalWidths {
-    /// Those of the caliper lines of a frame, of `lines` in all. `None` where too many
-    /// are missing, or their noise is not known.
+    /// Local widths of a frame from its caliper lines, of `lines` in all. `None` where too many are
+    /// missing, or their noise is not known.
     pub fn read(
         calipers: impl Iterator<Item = Caliper>,
         lines: usize,
@@ -113,8 +113,7 @@ fn axis(sections: &[Section]) -> Option<Vector2<f64>> {
     (middle(after) - middle(before)).try_normalize(f64::MIN_POSITIVE)
 }
 
-/// A value for each line; of lines that are missing, on a straight line between their
-/// neighbours.
+/// A value for each line; those of missing lines are interpolated between their neighbours.
 fn fill(lines: usize, sections: &[Section], value: impl Fn(&Section) -> f64) -> Vec<f64> {
     let mut next = 0;
     let at = |line: usize| {

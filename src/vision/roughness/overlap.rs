@@ -7,21 +7,21 @@ use crate::numeric::number::{to_count, to_f64};
 
 /// Smallest part of the gauge that two frames must share to be compared.
 const MIN_OVERLAP_FRACTION: f64 = 0.3;
-/// Mean square of the difference of two pieces, in that of unlike ones, below which they
-/// are taken for the same. Unlike ones are taken for the same now and then, which makes
-/// the estimate look less sure than it is.
+/// Mean squared difference of two pieces, relative to that of different ones, below which they are
+/// the same. Different ones pass for the same now and then, which makes the estimate look less
+/// certain than it is.
 const MAX_SAME_DIFFERENCE: f64 = 0.35;
 /// New part of a frame whose widths are too noisy to be compared: as little as of a
 /// camera that takes twenty frames of each piece.
 const ASSUMED_NEW_FRACTION: f64 = 0.05;
-/// Noise in the widths' variance from which on they are.
+/// Fraction of noise in the widths' variance from which on they are too noisy.
 const MAX_NOISE_FRACTION: f64 = 0.3;
 
 /// Compares each frame with an earlier one, as long as both show enough of the same bead.
 #[derive(Debug, Clone, Default)]
 pub struct Overlap {
     reference: Vec<f64>,
-    /// Lines by which the bead has moved on since.
+    /// Lines by which the bead has moved on since the reference.
     moved: usize,
 }
 
@@ -75,7 +75,7 @@ fn variance(values: &[f64]) -> f64 {
     values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / to_f64(values.len())
 }
 
-/// Mean square of the difference, as far as both go.
+/// Mean squared difference over the part that both cover.
 fn difference(one: &[f64], other: &[f64]) -> f64 {
     let shared = one.len().min(other.len());
     one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / to_f64(shared)

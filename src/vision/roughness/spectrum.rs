@@ -1,5 +1,4 @@
-//! How strong the waves of a width are along a gauge, by their length, and what an
-//! exponential process makes of them.
+//! Power spectrum of the width along a gauge, and its expectation for an exponential process.
 //!
 //! The cosines of a gauge are nearly the principal components of an exponential process,
 //! so that their coefficients are nearly independent. The first, the mean, is left out:
@@ -20,10 +19,10 @@ const LENGTH_COUNT: usize = 28;
 /// shown: torn flanks look more blurred than the lens makes them, and motion across the
 /// bead blurs nothing along it.
 pub const BLUR_FACTORS: [f64; 4] = [0.4, 0.6, 0.8, 1.0];
-/// Waves that smoothing leaves less than this part of their square are left out: what is
-/// left of them shows more about the smoothing than about the bead.
+/// Waves of whose square smoothing leaves less than this fraction are left out: they show more
+/// about the smoothing than about the bead.
 const MIN_TRANSMITTED: f64 = 0.2;
-/// Steps of a doubling of the smoothing that is taken for the same.
+/// Steps per octave of the smoothing within which frames are of the same kind.
 const SMOOTHING_STEPS_PER_OCTAVE: f64 = 4.0;
 /// Standard deviations beyond which a Gaussian is neglected. Derived: erfc(6/√2) = 2·10⁻⁹ of it
 /// lies beyond.
@@ -37,7 +36,7 @@ pub struct FrameKind {
 }
 
 impl FrameKind {
-    /// That of a frame.
+    /// Kind of a frame.
     pub fn of(widths: &LocalWidths) -> Self {
         let ratio = (widths.filter_mm / widths.spacing_mm).max(0.1);
         #[expect(clippy::cast_possible_truncation, reason = "within some tens")]
@@ -55,11 +54,11 @@ pub struct Spectrum {
     basis: Vec<f64>,
     /// Squares of the coefficients but the first, added up over frames \[mm²\].
     pub squares: Vec<f64>,
-    /// Frames, as they count: what was seen before does not count again.
+    /// Effective number of frames: bead that was seen before does not count again.
     pub frames: f64,
     /// Variance of noise, added up likewise \[mm²\].
     pub noise: f64,
-    /// What noise has passed, by coefficient.
+    /// Fraction of the noise's square that smoothing leaves, by coefficient.
     pub passed: Vec<f64>,
     /// Expected squares for a roughness of 1, by blur, correlation length and coefficient,
     /// as far as the smoothing leaves enough of them.
@@ -67,7 +66,7 @@ pub struct Spectrum {
 }
 
 impl Spectrum {
-    /// For frames like this one.
+    /// An empty spectrum for frames like this one.
     pub fn new(like: &LocalWidths) -> Self {
         let n = like.widths_mm.len();
         let mut spectrum = Self {
@@ -124,7 +123,7 @@ impl Spectrum {
         (line + self.filter_mm.powi(2) + blur_mm.powi(2)).sqrt()
     }
 
-    /// What a Gaussian leaves of the square of a wave.
+    /// Fraction of the square of wave `k` that a Gaussian leaves.
     fn left(&self, k: usize, smoothing_mm: f64) -> f64 {
         let angle = PI * to_f64(k) * smoothing_mm / (to_f64(self.kind.lines) * self.spacing_mm);
         libm::exp(-angle * angle)
@@ -140,7 +139,7 @@ pub fn lengths_mm(like: &LocalWidths) -> Vec<f64> {
     (0..LENGTH_COUNT).map(length).collect()
 }
 
-/// A cosine over n positions of which the sum of the squares is 1.
+/// A cosine over `n` positions, normalised to a sum of squares of 1.
 fn cosine(k: usize, n: usize) -> impl Iterator<Item = f64> {
     let scale = (2.0 / to_f64(n)).sqrt();
     (0..n).map(move |i| scale * libm::cos(PI * to_f64(k) * (to_f64(i) + 0.5) / to_f64(n)))
