@@ -6,7 +6,7 @@ use crate::numeric::rank;
 use crate::vision::path;
 use crate::vision::strip::GreyPixel;
 
-/// Where levels are picked first: distance from the edge, and apart \[px\].
+/// Distance from the edge of the first pixel whose level is picked, and between such pixels \[px\].
 const PICK_PX: (f32, f32) = (5.0, 3.0);
 
 impl EdgeTracer {
@@ -18,8 +18,8 @@ impl EdgeTracer {
         self.smooth_levels();
     }
 
-    /// Picks levels anew along the course, where it was drawn through better positions
-    /// and it is known how far there is nothing but the edge \[px\].
+    /// Picks levels again along the course, where it was drawn through better positions; `room` is
+    /// the distance on either side that holds only the edge \[px\].
     pub fn pick_levels_within<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, room: Clearance) {
         let (path, course) = (&mut self.values.path, &self.course);
         path.clear();
@@ -49,8 +49,7 @@ impl EdgeTracer {
         self.pick_levels_in(scene, room);
     }
 
-    /// The same no farther from the edge than there is room before it and after it
-    /// \[px\].
+    /// Picks levels on either side of the edge within the room before it and after it \[px\].
     fn pick_levels_in<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, room: [f32; 2]) {
         self.values.before.clear();
         self.values.step.clear();
@@ -66,7 +65,7 @@ impl EdgeTracer {
         }
     }
 
-    /// Steps that are small or turned over against the others are not accepted.
+    /// Raises steps that are small or reversed, compared with the median, to 0.3 of it.
     pub fn steady_steps(&mut self) {
         self.scratch.sorted.clear();
         self.scratch.sorted.extend_from_slice(&self.values.step);
@@ -88,7 +87,7 @@ fn picked(sign: f32, room: f32) -> [isize; 5] {
     [0.0, 1.0, 2.0, 3.0, 4.0].map(|k| (sign * (near + k * apart)).round() as isize)
 }
 
-/// Level at such distances from an edge: the median of five positions.
+/// Level at some distances from an edge: the median of five pixels.
 #[inline(always)]
 fn level(profile: &[u16], at: isize, distances: [isize; 5]) -> f32 {
     let last = profile.len() - 1;

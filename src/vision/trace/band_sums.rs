@@ -12,7 +12,7 @@ const MIN_PLAIN_FRACTION: f64 = 0.6;
 /// Sums over the rows of a band that count.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct BandSums {
-    /// Rows that count, rows of the band, and rows that were held.
+    /// Rows that count, rows of the band, and rows that were compared.
     pub rows: f64,
     pub all_rows: f64,
     pub held_rows: f64,
@@ -36,8 +36,8 @@ impl BandSums {
         self.vector[2] += weight * (core[(2, 0)] * ahead + f64::from(sums.after));
     }
 
-    /// Position relative to the path and what is known of it; `None` without a
-    /// row or an edge.
+    /// Position relative to the path \[px\], and the edge with its variance; `None` where too few
+    /// rows count or there is no edge.
     #[inline(always)]
     pub fn solve(
         &self,
@@ -73,7 +73,7 @@ fn solve(matrix: &Matrix3<f64>, vector: &Vector3<f64>) -> Option<([f64; 3], f64)
     let (before, both, after) = (matrix[(1, 1)], matrix[(2, 1)], matrix[(2, 2)]);
     let determinant = before * after - both * both;
     let with = [matrix[(1, 0)], matrix[(2, 0)]];
-    // What two sums do to the levels, times the determinant.
+    // Levels for two right-hand sides, times the determinant.
     let levels =
         |sums: [f64; 2]| [after * sums[0] - both * sums[1], before * sums[1] - both * sums[0]];
     let shift = levels(with);

@@ -9,9 +9,9 @@ use crate::vision::located::CaliperEdge;
 use crate::vision::scatter::MIN_EXCESS_SIGMAS;
 use crate::vision::strip::GreyPixel;
 
-/// Fraction of its rows that a band must have left to count.
+/// Smallest fraction of its rows with which a band counts.
 const MIN_ROW_FRACTION: f64 = 0.5;
-/// The same where rows are known to be clear, one by one.
+/// Smallest fraction of its rows with which a band counts where rows are known to be clear.
 const MIN_CLEAR_ROW_FRACTION: f64 = 0.2;
 
 impl EdgeTracer {
@@ -48,17 +48,17 @@ impl EdgeTracer {
         false
     }
 
-    /// How much of the texture's variance there is, in that of the texture that was fitted: a
-    /// compression's correlations change sign and no texture has them, so that rows differ less
-    /// than it says. The mean over the rows does by half as much: rendered JPEGs of qualities of
-    /// 65 to 90 have a z of 0.9 to 1.0 then.
+    /// Ratio of the texture's variance to that of the texture that was fitted: a compression's
+    /// correlations change sign, unlike those of any texture, so that rows differ less than the fit
+    /// predicts. The mean over the rows does by half as much: rendered JPEGs of qualities of 65 to
+    /// 90 have a z of 0.9 to 1.0 then.
     fn texture_variance_ratio(&self) -> f64 {
         f64::midpoint(1.0, self.misfit.powi(2).min(1.0))
     }
 
-    /// How much the level at the edge differs from that of the surroundings
-    /// from band to band beyond what noise explains: texture does that, and
-    /// then the surroundings show less. Robust, from the median.
+    /// Variance of the level at the edge about that of the surroundings, from band to band, beyond
+    /// what noise explains: texture adds it, and then the surroundings show less of the level at
+    /// the edge. Robust, from the median.
     #[inline(always)]
     fn extra_variance(&mut self, core: Matrix3<f64>, variance: f64, side: usize) -> f64 {
         let Some(inverse) = core.try_inverse() else { return 0.0 };

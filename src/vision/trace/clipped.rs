@@ -14,21 +14,20 @@ use crate::vision::strip::GreyPixel;
 /// Upper end of the camera's scale \[grey levels of 256\]. By definition of the scale
 /// (reference/conventions.md, Grey levels).
 const SCALE_END_GREY: f64 = 255.0;
-/// Levels that come so near it are clipped by noise, in standard deviations.
+/// Distance from that end, in standard deviations, within which noise clips a level.
 const NEAR_END_SIGMAS: f64 = 1.5;
 
-/// Times that a path is smoothed at most before an edge that is clipped is read
-/// along it.
+/// Smoothings of a path at most, before an edge that is clipped is read along it.
 const MAX_SMOOTHINGS: usize = 4;
-/// A path that runs farther off the positions than noise puts them no longer follows its edge,
-/// which is rough: in the mean square, so many times the variance of a position.
+/// Largest mean squared distance of a smoothed path from the positions, in variances of a position:
+/// a path farther off no longer follows a rough edge.
 const MAX_SMOOTHING_RATIO: f32 = 4.0;
-/// And this fraction of the blur, which softens the flank too little to matter.
+/// Addition to that distance, as a fraction of the blur: it softens the flank too little to matter.
 const MAX_SMOOTHING_BLURS: f32 = 0.1;
 
 impl EdgeTracer {
-    /// Whether the levels on either side of the edge that was looked at pass the
-    /// end of the scale, or come so near that noise does: before it, after it.
+    /// Whether the levels before and after the edge pass the end of the scale, or come so near that
+    /// noise does.
     pub fn clipped_sides<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> [bool; 2] {
         let Some(seen) = &self.step_fit else { return [false; 2] };
         let (before, step) = self.mean_levels();
@@ -41,8 +40,8 @@ impl EdgeTracer {
         (typical(&self.values.before).into(), typical(&self.values.step).into())
     }
 
-    /// Locates an edge that is clipped at the end of the scale on one side.
-    /// Returns what is known of it, `None` where that is nothing.
+    /// Locates an edge that is clipped at the end of the scale on one side. Returns the step that
+    /// was fitted; `None` where none can be.
     pub fn trace_clipped<T: GreyPixel>(
         &mut self,
         scene: &TraceInput<'_, T>,
@@ -77,7 +76,7 @@ impl EdgeTracer {
         self.overlay.lay(&self.sheet);
         let start = ClippedStep { at: 0.0, ..rough.step };
         let first = self.cut_off.fit(&task, &self.overlay, start, None)?;
-        // The surroundings that can be seen, beside the step as it really is.
+        // The visible surroundings, beside the step as it really is.
         let fraction = |level: f64| (level - before) / height;
         let (visible, hidden) = (fraction(first.step.visible), fraction(first.step.clipped));
         let (before, after) = if hidden_after { (visible, hidden) } else { (hidden, visible) };
@@ -124,8 +123,8 @@ impl EdgeTracer {
         self.read(scene);
     }
 
-    /// Mean square of how far the path lies off the positions that it was drawn through,
-    /// from the median, so that a few outliers do not count \[px²\].
+    /// Mean squared distance of the path from the positions that it was drawn through, from the
+    /// median, so that a few outliers do not count \[px²\].
     fn smoothing_error(&mut self) -> f32 {
         self.scratch.sorted.clear();
         let offs =

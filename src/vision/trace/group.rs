@@ -11,17 +11,16 @@ pub struct RowGroup {
     pub weight: f32,
     /// How far the rows were sampled beyond the path \[px\].
     pub ahead: f32,
-    /// What they show.
+    /// Sums of their residuals.
     pub sums: RowSums,
     /// Position of the edge beside the path \[px\].
     pub moved: f32,
-    /// Sum of the squares of what does not fit, as if of a single row
-    /// \[grey levels²\].
+    /// Sum of the squared residuals, scaled to a single row \[grey levels²\].
     pub misfit: f32,
 }
 
 impl RowGroup {
-    /// Rows that are not to be held.
+    /// Rows that are hidden and not compared.
     pub fn hidden(band: usize, weight: f32) -> Self {
         let (ahead, moved, misfit) = (0.0, 0.0, f32::INFINITY);
         Self { band, weight, ahead, sums: RowSums::default(), moved, misfit }

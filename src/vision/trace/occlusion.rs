@@ -14,42 +14,43 @@ use crate::vision::strip::GreyPixel;
 use crate::vision::template::{PlainSums, StepTemplate};
 use crate::vision::trace::TraceInput;
 
-/// Distance from the course of most bands from which a band is off \[px\].
+/// Largest distance of a band from the consensus course \[px\].
 const MAX_OFFSET_PX: f32 = 0.8;
-/// The same for a level, as a fraction of the step.
+/// Largest distance of a level from the consensus, as a fraction of the step.
 const MAX_LEVEL_OFFSET: f32 = 0.08;
-/// And in standard deviations of a pixel beside.
+/// Addition to that distance, in standard deviations of a pixel.
 const MAX_LEVEL_OFFSET_SIGMAS: f32 = 1.0;
 /// How often rows are judged, each time by an edge that was read from those
 /// which passed before.
 const MAX_PASSES: usize = 3;
-/// Percentage of the rows that is taken to be clear whatever happens: the one
-/// that fits worst of them shows what fits.
+/// Percentage of the rows that are assumed to be clear in any case: the worst fit of them shows
+/// what fits.
 const CLEAR_PERCENTILE: usize = 30;
-/// By how much the squares that a row leaves may exceed that one's.
+/// Largest sum of squared residuals of a clear row, relative to that of the worst fit.
 const MAX_MISFIT_RATIO: f32 = 3.2;
-/// The same at most, as a multiple of what noise leaves.
+/// Largest sum of squared residuals of a clear row, as a multiple of what noise explains.
 const MAX_NOISE_RATIO: f32 = 3.0;
-/// Farthest that the levels beside an edge may be from those a little away, as
-/// a fraction of the step: grains have levels of their own.
+/// Largest difference of the levels beside an edge from those a little away, as a fraction of the
+/// step: grains have levels of their own.
 const MAX_LEVEL_DIFFERENCE: f64 = 0.25;
 /// Trajectories that are tried.
 const MAX_ATTEMPTS: usize = 3;
-/// Fraction of clear rows along one that is enough to try no other.
+/// Fraction of clear rows along a trajectory from which on no other is tried.
 const ENOUGH_CLEAR_FRACTION: f32 = 0.4;
 /// Fraction of clear rows where there is none. By definition.
 const NONE_CLEAR: f32 = 0.0;
 /// Farthest that a clear row's edge lies from its neighbours', in standard deviations. Derived:
 /// noise alone exceeds 3.5 in 5 of 10,000 rows.
 const MAX_OFFSET_SIGMAS: f32 = 3.5;
-/// What covers a row shades those beside it through the blur: so many blurs of
-/// distance are kept from it, fewer where little else is left.
+/// Distances that are kept from an occluded row, in blurs, because blur shades the rows beside it;
+/// the smaller ones where few rows would be left.
 const MARGIN_BLURS: [f64; 4] = [2.0, 1.5, 1.0, 0.5];
-/// Fraction of the rows, and number of them, that are wanted and needed.
+/// Fraction and number of clear rows from which on no smaller distance is tried, and that are
+/// needed.
 const WANTED_CLEAR_ROWS: (f32, f32) = (0.25, 20.0);
 const MIN_CLEAR_ROWS: (f32, f32) = (0.12, 12.0);
-/// Fraction of the rows that may show the same edge elsewhere, one after the
-/// other: more are not covered, but a bead of another shape.
+/// Longest run of rows that may show the same edge elsewhere, as a fraction of the rows: more are
+/// not occluded, but a bead of another shape.
 const MAX_ELSEWHERE_FRACTION: f32 = 0.08;
 /// Distance from which on a row's edge is elsewhere \[px\].
 const MIN_ELSEWHERE_PX: f32 = 1.0;
@@ -92,8 +93,8 @@ impl EdgeTracer {
         self.locate_from_clear_rows(scene)
     }
 
-    /// Rows are judged one by one, each against noise alone: what covers some of
-    /// them would pass for texture.
+    /// Judges rows one by one, each against noise alone: what occludes some of them would pass for
+    /// texture.
     fn look_row_by_row(&mut self) {
         self.occlusion.sort_rows = true;
         self.winding.is_followed = false;
@@ -102,7 +103,7 @@ impl EdgeTracer {
     }
 
     /// Locates an edge from its clear rows where the bead's other edge shows how this one runs:
-    /// where most of it is covered, what covers it may agree better than what is left. `positions`
+    /// where most of it is occluded, what occludes it may have the larger consensus. `positions`
     /// are those that run beside the other edge, one a band, NaN in bands without.
     #[cold]
     #[inline(never)]
@@ -121,10 +122,9 @@ impl EdgeTracer {
         }
     }
 
-    /// Takes out the few positions that lie far from the course on which the others
-    /// agree: between gaps they have no neighbours that could show it. `least_px`
-    /// is the least distance that makes a stray. Where there are many, they stay,
-    /// and show that the edge is unsure.
+    /// Removes the few positions that lie far from the consensus course of the others: between gaps
+    /// they have no neighbours that could show it. `least_px` is the smallest distance that makes a
+    /// stray. Many strays stay, and show that the edge is uncertain.
     pub fn drop_strays(&mut self, least_px: f64) {
         let at = |edge: &Option<CaliperEdge>| edge.map_or(f32::NAN, |edge| narrow_to_f32(edge.at));
         refill(&mut self.scratch.rough, self.edges.iter().map(at));
@@ -157,8 +157,8 @@ impl EdgeTracer {
         self.misfit < MAX_CLEAR_MISFIT
     }
 
-    /// Tells the clear rows along the course that most of the free bands agree
-    /// on, and their fraction. `None` where there are too few.
+    /// Finds the clear rows along the consensus course of the free bands. Returns their fraction;
+    /// `None` where there are too few.
     #[inline(never)]
     fn try_course<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> Option<f32> {
         self.occlusion.clear.clear();
@@ -185,7 +185,7 @@ impl EdgeTracer {
         Some(self.clear_fraction())
     }
 
-    /// Takes the bands that agreed out of those that are free to.
+    /// Removes the bands of the last consensus from the free ones.
     fn exclude_course(&mut self) {
         for (free, trusted) in self.occlusion.free.iter_mut().zip(&self.occlusion.trusted) {
             if *trusted {
@@ -194,7 +194,7 @@ impl EdgeTracer {
         }
     }
 
-    /// The course that most bands agree on, in place and levels.
+    /// Takes the consensus course of the bands, in position and levels; `false` with too few bands.
     fn take_course<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         refill(&mut self.scratch.rough, self.occlusion.free.iter().copied());
         if keep_consensus(&mut self.scratch.rough, MAX_OFFSET_PX) < 4 {
@@ -224,9 +224,8 @@ impl EdgeTracer {
         true
     }
 
-    /// Reads the edge's shape from the overlay and takes it over. Rows are
-    /// known to be clear about the edge only: beside it spots may lie anywhere,
-    /// and would pass for shading.
+    /// Reads the edge's shape from the overlay and applies it. Rows are known to be clear about the
+    /// edge only: beside it spots may lie anywhere, and would pass for shading.
     fn read_shape<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> Option<StepShape> {
         let noise = f64::from(scene.noise) / f64::from(typical(&self.values.step).abs());
         let room = self.room(scene);
@@ -244,7 +243,7 @@ impl EdgeTracer {
         Some(self.apply_shape(shape))
     }
 
-    /// Tells which rows are clear; returns whether there are enough.
+    /// Finds which rows are clear; returns whether there are enough.
     #[inline(never)]
     fn judge_rows<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: f64) -> bool {
         let limit = self.max_row_misfit(scene.noise);
@@ -269,7 +268,7 @@ impl EdgeTracer {
             && self.elsewhere(scene, limit) <= MAX_ELSEWHERE_FRACTION * rows
     }
 
-    /// Squares that a clear row leaves at most.
+    /// Largest sum of squared residuals of a clear row \[grey levels²\].
     fn max_row_misfit(&mut self, noise: f32) -> f32 {
         refill(&mut self.scratch.sorted, self.row_fit.groups.iter().map(|group| group.misfit));
         let rank = self.scratch.sorted.len() * CLEAR_PERCENTILE / 100;
@@ -279,7 +278,7 @@ impl EdgeTracer {
         noise.max(f32::min(MAX_MISFIT_RATIO * sure, MAX_NOISE_RATIO * noise))
     }
 
-    /// How far the edge of a clear row lies from the course at most \[px\].
+    /// Largest distance of a clear row's edge from the course \[px\].
     fn max_row_offset<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, limit: f32) -> f32 {
         let stiffness = narrow_to_f32(self.row_fit.template.products.slope_slope);
         let step = typical(&self.values.step).abs();
@@ -297,8 +296,8 @@ impl EdgeTracer {
         to_f32(clear) / to_f32(self.occlusion.clear.len().max(1))
     }
 
-    /// Longest run of rows that do not fit, but show the same edge where their
-    /// band has one.
+    /// Longest run of rows that do not fit, but show the same edge where their band has one
+    /// \[rows\].
     #[inline(never)]
     fn elsewhere<T: GreyPixel>(&self, scene: &TraceInput<'_, T>, limit: f32) -> f32 {
         let (mut longest, mut run) = (0.0f32, 0.0);
@@ -329,7 +328,7 @@ impl EdgeTracer {
         longest
     }
 
-    /// Leads the course through the clear rows.
+    /// Draws the course through the clear rows.
     fn follow<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         self.scratch.rough.clear();
         let mut first = 0;

@@ -14,12 +14,12 @@ pub(super) enum EdgeState {
     /// Nothing yet.
     #[default]
     NotFound,
-    /// Nothing covers it, as far as it shows.
+    /// Nothing occludes it, as far as it shows.
     Clear,
-    /// It is covered in part, and located from its clear rows alone.
+    /// It is occluded in part, and located from its clear rows alone.
     Occluded,
-    /// It seems to be covered, but no clear rows were found: it is located as if
-    /// it were open.
+    /// It seems to be occluded, but no clear rows were found: it is located as if nothing occluded
+    /// it.
     Unresolved,
 }
 
@@ -41,17 +41,17 @@ pub(super) struct BandValues {
 pub(super) struct WindingState {
     /// Whether the course was picked from line to line.
     pub(super) is_followed: bool,
-    /// How far bands lie off the line between their neighbours; more than 1 where the
-    /// edge winds between them.
+    /// Distance of bands from the line between their neighbours, relative to that from which on an
+    /// edge winds; more than 1 where it does.
     pub(super) excess: f32,
 }
 
-/// The texture beside an edge, and weights that know it.
+/// The texture beside an edge, and weights for it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct TexturedFit {
     pub(super) texture: Option<SurfaceTexture>,
     pub(super) whitener: NoiseWhitener,
-    /// How far positions scatter with these weights.
+    /// Variance of positions with these weights.
     pub(super) scatter: Option<TexturePositionVariance>,
 }
 
@@ -59,7 +59,7 @@ pub(super) struct TexturedFit {
 #[derive(Debug, Clone, Default)]
 pub(super) struct RowFit {
     pub(super) template: StepTemplate,
-    /// Rows that were held together.
+    /// Rows that were compared together.
     pub(super) groups: Vec<RowGroup>,
     /// Plain pixels of each band.
     pub(super) plain: Vec<PlainSums>,
@@ -67,18 +67,17 @@ pub(super) struct RowFit {
     pub(super) solved: Vec<BandSums>,
 }
 
-/// Which rows of an edge that is covered in part show it.
+/// Which rows of an edge that is occluded in part show it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Occlusion {
-    /// Rough positions that are free to agree, and those of the best course yet.
+    /// Rough positions that may still join a consensus, and those of the best course so far.
     pub(super) free: Vec<f32>,
     pub(super) best_free: Vec<f32>,
-    /// Bands that agree with most of the others.
+    /// Bands of the consensus.
     pub(super) trusted: Vec<bool>,
-    /// Groups that show the edge and nothing else; none where that is not
-    /// asked.
+    /// For each group, whether it shows the edge and nothing else; empty where rows are not judged.
     pub(super) clear: Vec<bool>,
-    /// Whether rows are sorted by that, each for itself.
+    /// Whether rows are judged in this way, each by itself.
     pub(super) sort_rows: bool,
 }
 
@@ -88,7 +87,7 @@ pub(super) struct TraceScratch {
     /// Rough values, one a band or a line.
     pub(super) rough: Vec<f32>,
     pub(super) sorted: Vec<f32>,
-    /// For a course that is drawn anew.
+    /// For a course that is drawn again.
     pub(super) course: Vec<[f32; 3]>,
     pub(super) scatter: Vec<f64>,
 }
@@ -102,11 +101,11 @@ impl TraceScratch {
     }
 }
 
-/// How sure the positions of an edge are, beside what each of them shows.
+/// Uncertainty of an edge's positions beyond the variance of each.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct EdgeUncertainty {
-    /// Variance of the whole edge's position that all positions share, from
-    /// shading that is not known better \[px²\].
+    /// Variance of the error that all positions share, from shading that is not known better
+    /// \[px²\].
     pub common_variance: f64,
     /// Variance of the mean position, where it is known apart from that of the
     /// positions \[px²\].

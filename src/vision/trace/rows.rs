@@ -15,14 +15,14 @@ use crate::vision::pixel_noise::NOISE_SIGMAS;
 use crate::vision::strip::GreyPixel;
 use crate::vision::template::{ExpectedStep, PlainSums, RowSums};
 
-/// A row that fits worse than the median by so many times does not count.
+/// Misfit of a row, relative to the median, above which it does not count.
 const MAX_MISFIT_RATIO: f32 = 2.5;
-/// Rows of a band may differ by this much beside their noise \[px\].
+/// Difference between the rows of a band that is accepted beyond their noise \[px\].
 const ROW_WAVINESS_PX: f32 = 0.5;
 /// Outlying pixels that a row may have; more are a grain.
 const MAX_WILD_PIXELS: f32 = 2.0;
-/// By how much the squares that a row leaves exceed what may be noise, where it
-/// is covered certainly.
+/// Misfit of a row, relative to the limit of what may be noise, above which it is certainly
+/// occluded.
 const UNFIT_MISFIT_RATIO: f32 = 1.5;
 
 impl EdgeTracer {
@@ -32,7 +32,7 @@ impl EdgeTracer {
         let softness = 1.0 / narrow_to_f32(self.row_fit.template.products.slope_slope);
         self.row_fit.groups.clear();
         reset(&mut self.row_fit.plain, scene.lines.len(), PlainSums::default());
-        // Noise of a pixel in the mean of so many rows.
+        // Noise of a pixel in the mean of a window's rows.
         let (mut rows, mut noise) = (0.0, 0.0);
         for (number, window) in self.sheet.windows.iter().enumerate() {
             let (band, weight) = (window.line, window.rows);
@@ -56,21 +56,21 @@ impl EdgeTracer {
         }
     }
 
-    /// What the mean of some rows is compared with, whose pixels have a noise.
+    /// Expected step of a mean of rows, with tolerances; `noise` is that mean's standard deviation.
     #[inline(always)]
     pub fn expected(edge: [f32; 3], noise: f32) -> ExpectedStep {
         let (noise, step) = (NOISE_SIGMAS * noise, edge[2].abs());
         ExpectedStep::new(edge, [noise + 0.05 * step, noise + 0.15 * step])
     }
 
-    /// Sum of the squares of what does not fit, as if of a single row, so that
-    /// groups of all sizes compare \[grey levels²\].
+    /// Sum of the squared residuals, scaled to a single row, so that groups of all sizes compare
+    /// \[grey levels²\].
     #[inline(always)]
     pub fn misfit(&self, sums: &RowSums, weight: f32) -> f32 {
         if sums.wild > MAX_WILD_PIXELS {
             return f32::INFINITY;
         }
-        // Weights that know a texture are not the slope of the step.
+        // Weights for a texture are not the slope of the step.
         if self.textured.texture.is_some() {
             return weight * sums.sum_of_squares;
         }
@@ -98,7 +98,7 @@ impl EdgeTracer {
         let limit = variance * (pixels + NOISE_SIGMAS * (2.0 * pixels * alike).sqrt());
         let limit = limit.max(MAX_MISFIT_RATIO * median);
         self.misfit = f64::from(median / (variance * pixels)).sqrt();
-        // The variance of a window in texture has the texture's fraction of it already.
+        // The variance of a window in texture includes the texture already.
         self.max_group_rows = if self.textured.texture.is_some() { 1.0 } else { together.into() };
         let covered = |group: &&RowGroup| {
             group.misfit > UNFIT_MISFIT_RATIO * limit || group.misfit == f32::INFINITY
@@ -121,7 +121,7 @@ impl EdgeTracer {
         }
     }
 
-    /// Rows next to one that fits badly fraction its grain or spark.
+    /// Rows next to one that fits badly have its grain or spark on them too.
     fn spread_misfits(&mut self, limit: f32) {
         let mut before = 0.0;
         for k in 0..self.row_fit.groups.len() {
@@ -165,7 +165,7 @@ impl EdgeTracer {
                 sums.add(group, core);
             }
         }
-        // Plain pixels are those of a group's mean.
+        // Plain pixels were summed once for each group.
         let weight = f64::from(groups.first().map_or(1.0, |group| group.weight));
         sums.plain = self.row_fit.plain[band].totals().map(|side| side.map(|sum| sum * weight));
         sums

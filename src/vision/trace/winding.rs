@@ -1,5 +1,5 @@
-//! An edge that winds more quickly than the bands resolve, as that of a rough bead in a tall
-//! gauge. It is picked anew on every caliper line.
+//! An edge that winds more quickly than the bands resolve, as that of a rough bead in a tall gauge.
+//! It is picked again on every caliper line.
 
 use super::{EdgeTracer, MAX_UNFIT_FRACTION, StepFit, TraceInput, typical};
 use crate::numeric::number::{narrow_to_f32, to_f32};
@@ -9,17 +9,17 @@ use crate::vision::edge_windows::{EdgeWindow, Grouping, MAX_SINGLE_ROWS, MIDDLE_
 use crate::vision::path;
 use crate::vision::strip::GreyPixel;
 
-/// How far a band lies off the line between its neighbours from which on an edge winds
-/// \[px\]: three of four bands do. Grains on a tenth of the rows do not make an edge
-/// wind; those on a third do.
+/// Distance of a band from the line between its neighbours from which on an edge winds \[px\]:
+/// three of four bands exceed it. Grains on a tenth of the rows do not make an edge wind; those on
+/// a third do.
 const MIN_WINDING_PX: f32 = 0.12;
-/// The same for each fraction of the step that the noise of a pixel is \[px\]: picks
-/// scatter by it.
+/// That distance for each unit of a pixel's noise, as a fraction of the step \[px\]: picks spread
+/// with the noise.
 const WINDING_PER_NOISE_PX: f32 = 2.5;
 /// Fraction of its rows that an edge may lose to a spark or two; one that loses more
 /// may wind.
 const MAX_LOST_FRACTION: f64 = 0.12;
-/// Times that a winding edge is followed.
+/// Passes along a winding edge at most.
 const MAX_PASSES: usize = 3;
 /// How far beside the line between two bands the edge is looked for \[px\].
 const SEARCH_HALF_PX: usize = 8;
@@ -47,8 +47,8 @@ impl EdgeTracer {
         self.winding.excess > 1.0
     }
 
-    /// How far most bands lie off the line between their neighbours, 1 where that is
-    /// more than picks scatter.
+    /// Distance from the line between their neighbours that three of four bands exceed, relative to
+    /// that from which on an edge winds.
     fn winding(&mut self, noise: f32) -> f32 {
         let least =
             MIN_WINDING_PX.max(WINDING_PER_NOISE_PX * noise / typical(&self.values.step).abs());
@@ -60,8 +60,8 @@ impl EdgeTracer {
         rank::at(&mut self.scratch.sorted, quarter).unwrap_or(0.0) / least
     }
 
-    /// Locates the edge along positions picked from line to line. Returns whether all but a
-    /// few rows show it: then it winds, and nothing covers it.
+    /// Locates the edge along positions picked from line to line. Returns whether all but a few
+    /// rows show it: then it winds, and nothing occludes it.
     #[cold]
     #[inline(never)]
     pub fn trace_winding<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
