@@ -6,7 +6,7 @@ use crate::numeric::number::{narrow_to_f32, to_f64};
 use crate::vision::texture::SurfaceTexture;
 use crate::vision::whiten::{MAX_PIXELS, NoiseWhitener};
 
-/// How far positions scatter in texture.
+/// Variance of positions in texture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TexturePositionVariance {
     /// Variance of the mean position of many rows, times their number and the
@@ -17,9 +17,9 @@ pub struct TexturePositionVariance {
 }
 
 impl StepTemplate {
-    /// Replaces the slope of the step, by which residuals are weighted for the
-    /// position, by weights that know the texture \[grey levels\]. `None` where
-    /// that cannot be done: then the template has to be made anew.
+    /// Replaces the slope of the step, by which residuals are weighted for the position, by weights
+    /// for the texture \[grey levels\]. `None` where that cannot be done: then the template has to
+    /// be tabulated again.
     pub fn whiten(
         &mut self,
         whitener: &mut NoiseWhitener,
@@ -63,8 +63,8 @@ impl StepTemplate {
         Some(scatter)
     }
 
-    /// Fractions of the texture that the pixels have from the first one that counts on. One phase
-    /// stands for all: their edges lie apart by less than a texture's correlation length.
+    /// Fraction of the texture at each pixel, from the first one that counts on. One phase stands
+    /// for all: their edges lie apart by less than a texture's correlation length.
     fn texture_beside(&self, first: usize, texture: &SurfaceTexture) -> [f64; MAX_PIXELS] {
         let parts = &self.parts[SUBPIXEL_PHASES / 2 * MAX_CHUNKS..][..self.chunks];
         std::array::from_fn(|k| {
@@ -73,8 +73,8 @@ impl StepTemplate {
         })
     }
 
-    /// Number of the first pixel that counts in every phase, and of how many
-    /// after it that is so.
+    /// Index of the first pixel that counts in every phase, and the number of such pixels from
+    /// there on; `None` where the template has plain chunks, or their number does not fit.
     fn counting(&self) -> Option<(usize, usize)> {
         let counts = |k: usize| {
             let part = |phase: usize| &self.parts[phase * MAX_CHUNKS + k / LANES];
@@ -88,11 +88,11 @@ impl StepTemplate {
     }
 }
 
-/// Weights of pixels.
+/// Weights of pixels for the position.
 struct TextureWeights {
     /// Sum of their squares.
     square: f64,
-    /// The same weights times the texture's fraction at each pixel.
+    /// These weights times the texture's fraction at each pixel.
     textured: [f64; MAX_PIXELS],
     count: usize,
 }
@@ -107,8 +107,8 @@ impl TextureWeights {
         Self { square, textured, count: weights.len() }
     }
 
-    /// Variance of what they make of pixels with a noise of such a variance and a texture with
-    /// such covariances by distance \[px\].
+    /// Variance of the weighted sum of pixels that have a noise of a variance and a texture with
+    /// covariances by distance \[px\].
     fn variance(&self, noise: f64, covariance: impl Fn(usize) -> f64) -> f64 {
         let textured = &self.textured[..self.count];
         (0..self.count).fold(noise * self.square, |sum, distance| {
