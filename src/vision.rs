@@ -5,7 +5,7 @@
 //! ```text
 //! gamma         grey levels of a camera with a gamma → light
 //! strip         frame → rows across the bead
-//! pixel_noise   rows → what a pixel's noise is
+//! pixel_noise   rows → noise of a pixel
 //! pool          rows → bands, a profile of a few rows each
 //! edge          profile → the strongest steps
 //! contour       steps → edges that run along the bead

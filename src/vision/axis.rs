@@ -1,6 +1,6 @@
-//! From edges in pixels to a width on the surface: the course of each edge
-//! along the gauge is taken to the surface, and widths are taken there normal
-//! to the line midway between the two, which is the bead's local axis.
+//! From edges in pixels to a width on the surface: the curve of each edge along the gauge is mapped
+//! to the surface, and widths are taken there normal to the line midway between the two, the bead's
+//! local axis.
 
 mod sections;
 mod spread;
@@ -17,21 +17,20 @@ use sections::Sections;
 use spread::{CutBead, WidthUncertainty};
 pub use width_input::{LocatedEdge, WidthInput, WidthScratch};
 
-/// Largest angle between the bead and the gauge's axis that is measured: the
-/// 20 degrees of the contract and a little for the measurement's own noise.
+/// Largest angle between the bead and the gauge's axis that is measured: the 20 degrees of the
+/// contract and a margin for noise.
 const MAX_SLANT_RAD: f64 = 0.38;
-/// The same at the ends of the gauge, where a bent bead is steeper and a
-/// corner shows as one that is steeper still.
+/// Largest such angle at the ends of the gauge, where a bent bead is steeper; at a corner it is
+/// steeper still.
 const MAX_END_SLANT_RAD: f64 = 0.44;
-/// Smallest radius of a bead's axis in its widths: what bends more sharply is
-/// a corner.
+/// Smallest radius of a bead's axis, in widths of the bead: a sharper bend is a corner.
 const MIN_RADIUS_WIDTHS: f64 = 1.5;
 /// Angle over half the gauge below which a bend is a bead's waviness.
 const MIN_TURN_RAD: f64 = 0.25;
 /// Fraction of the gauge on either side of its middle from which the edge points
 /// there are taken.
 const MIDDLE_FRACTION: f64 = 0.125;
-/// Width of the bead.
+/// Width of the bead on the surface, normal to its axis, or the reason for refusing.
 pub fn width(
     scene: &WidthInput<'_>,
     hints: Hints,
@@ -95,13 +94,13 @@ impl WidthInput<'_> {
             return Err(Reject::Corner { got_widths: 0.0, least_widths: MIN_RADIUS_WIDTHS });
         }
         let square = self.half_length() * self.half_length();
-        // Towards the ends a short polynomial follows waviness too eagerly.
+        // Near the ends a polynomial of low order follows waviness too closely.
         for (t, _) in &GAUSS_LEGENDRE_5[1..4] {
             let t = *t;
             let slope = f64::midpoint(left.slope(t), right.slope(t)) / self.half_length();
             let bend = f64::midpoint(left.bend(t), right.bend(t)).abs() / square;
             let length = 1.0 + slope * slope;
-            // Radius and width normal to the axis, of which there are so many.
+            // Radius of the axis and width normal to it [px].
             let radius = length * length.sqrt() / bend;
             let width = (right.at(t) - left.at(t)) / length.sqrt();
             let got_widths = radius / width;
@@ -123,7 +122,7 @@ impl WidthInput<'_> {
         }
     }
 
-    /// How far each position lies off the course of its edge \[px\].
+    /// Residual of each position from the curve of its edge \[px\].
     fn residuals_into(&self, side: usize, curve: &EdgeCurve, off: &mut Vec<Option<f64>>) {
         off.clear();
         let positions = self.sides[side].positions.iter().enumerate();
@@ -132,7 +131,7 @@ impl WidthInput<'_> {
         }));
     }
 
-    /// Mean distance from the course near the middle of the gauge \[px\].
+    /// Mean residual near the middle of the gauge \[px\]; 0 where no position is there.
     fn residual_at_middle(&self, off: &[Option<f64>]) -> f64 {
         let near = |band: &usize| self.normalised_position(*band).abs() <= MIDDLE_FRACTION;
         let (mut sum, mut n) = (0.0, 0.0);

@@ -17,8 +17,8 @@ const MAX_STEPS: usize = 30;
 const MIN_BLUR_PX: f64 = 0.35;
 /// Largest blur that is fitted \[px\]: a wider flank fills the window.
 const MAX_BLUR_PX: f64 = 15.0;
-/// Largest distance of the common edge from the rough ones \[px\]: one that lies farther is another
-/// edge.
+/// Largest distance of the common edge from the approximate positions \[px\]: farther away lies
+/// another edge.
 const MAX_OFFSET_PX: f64 = 8.0;
 
 /// Profiles superimposed about their edges.
@@ -35,8 +35,7 @@ impl Default for BinnedProfile {
 }
 
 impl BinnedProfile {
-    /// Lays a sample at a distance from its edge \[px\]; what is too far is
-    /// left out.
+    /// Adds a sample at a distance from its edge \[px\]; one beyond the bins is left out.
     pub fn add(&mut self, distance_px: f64, grey: f64) {
         let bin = (2.0 * distance_px).round() + to_f64(CENTRE_BIN);
         if bin >= 0.0 && bin < to_f64(BINS) {

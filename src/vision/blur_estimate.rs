@@ -1,6 +1,6 @@
 //! The blur of an edge and its uncertainty.
 
-/// Blur as the standard deviation of a Gaussian, and how sure that is.
+/// Blur as the standard deviation of a Gaussian, and its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlurEstimate {
     /// The blur \[px\].

@@ -1,4 +1,4 @@
-//! Buffers that are filled anew for each frame.
+//! Buffers that are filled again for each frame.
 
 /// Replaces what a buffer holds.
 #[inline(always)]
@@ -7,7 +7,7 @@ pub fn refill<T>(buffer: &mut Vec<T>, values: impl IntoIterator<Item = T>) {
     buffer.extend(values);
 }
 
-/// Replaces what a buffer holds by a value, so many times.
+/// Fills a buffer with `count` copies of a value.
 #[inline(always)]
 pub fn reset<T: Clone>(buffer: &mut Vec<T>, count: usize, value: T) {
     buffer.clear();

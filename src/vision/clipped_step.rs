@@ -14,12 +14,12 @@ use crate::numeric::normal_equations::NormalEquations;
 use crate::numeric::number::to_f64;
 use crate::numeric::rank;
 
-/// Parts along the bead that are distinguished, because light may change.
+/// Parts along the bead, each with levels of its own, because the light may change along it.
 const PARTS_ALONG: usize = 3;
 /// Gauss–Newton steps at most; a fit that needs more does not converge.
 const MAX_STEPS: usize = 30;
-/// Steps after which the window stays where it is: a pixel that comes and goes
-/// at its ends keeps a fit from settling.
+/// Steps after which the window is fixed: a pixel that enters and leaves at its ends keeps a fit
+/// from converging.
 const WINDOW_STEPS: usize = 4;
 /// Smallest blur that is fitted \[px\]: a pixel alone has 1/√12 = 0.29.
 const MIN_BLUR_PX: f64 = 0.3;
@@ -29,23 +29,24 @@ const CLIPPED_SIDE_BLURS: f64 = 3.5;
 /// How far the visible side is read, in blurs. Derived: beyond 3 blurs 1.3·10⁻³ of a step is left,
 /// 1 − Φ(3).
 const VISIBLE_SIDE_BLURS: f64 = 3.0;
-/// And beyond that \[px\]: enough to show the level, little enough to leave its slope out.
+/// Pixels that are read beyond that on the visible side: enough to show the level, few enough for
+/// its slope not to matter.
 const BESIDE_PX: f64 = 12.0;
-/// The hidden level is not expected farther above the end of the scale than so
-/// many times what can be seen, as a standard deviation.
+/// Standard deviation of the prior of the hidden level, about the end of the scale, in heights of
+/// the visible part of the step.
 const HIDDEN_LEVEL_SIGMA: f64 = 2.0;
-/// Fraction by which blur may change from frame to frame, as a standard deviation.
+/// Relative change of the blur from frame to frame, as a standard deviation.
 const BLUR_DRIFT: f64 = 0.002;
-/// A blur that differs from that of the frames before by more standard deviations is another one.
-/// Derived: noise alone exceeds 4 in 6 of 100,000 frames.
+/// Difference from the blur of earlier frames, in standard deviations, from which on the blur has
+/// changed. Derived: noise alone exceeds 4 in 6 of 100,000 frames.
 const BLUR_CHANGE_SIGMAS: f64 = 4.0;
-/// Levels below which ground shows nothing of the light \[grey levels\].
+/// Level of the visible side below which it does not show how the light varies \[grey levels\].
 const MIN_LIGHT_GREY: f64 = 25.0;
-/// Rows that fit worse than the median by so many times do not count.
+/// Misfit of a row, relative to the median, above which the row does not count.
 const MAX_MISFIT_RATIO: f64 = 2.5;
-/// The same as for all pixels and rows.
+/// Residual of a pixel, in standard deviations of the noise, above which it is an outlier.
 const NOISE_SIGMAS: f64 = pixel_noise::NOISE_SIGMAS as f64;
-/// How far a row may run beside the path \[px\].
+/// Distance of a row's edge from the path that makes no pixel an outlier \[px\].
 const SLACK_PX: f64 = 0.5;
 /// Outlying pixels that a row may have.
 const MAX_WILD_PIXELS: usize = 2;
@@ -74,21 +75,19 @@ pub struct ClippedScene<'a> {
     pub noise: f64,
     /// End of the scale \[grey levels\].
     pub white: f64,
-    /// How far there is nothing but this edge on the visible and on the hidden
-    /// side \[px\].
+    /// Distance without another edge on the visible and on the hidden side \[px\].
     pub room: [f64; 2],
     /// Change of the visible level for each pixel away from the edge
     /// \[grey levels/px\].
     pub shading: f64,
 }
 
-/// What a flank shows.
+/// A step that was fitted to a flank.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClippedStepFit {
     /// The step.
     pub step: ClippedStep,
-    /// Variance of its position that uncertainty about blur and hidden level leaves
-    /// \[px²\].
+    /// Variance of its position from the uncertainty of blur and hidden level \[px²\].
     pub variance: f64,
     /// Standard deviation of the blur \[px\].
     pub blur_sd: f64,
@@ -98,12 +97,12 @@ pub struct ClippedStepFit {
     mean_visible: f64,
 }
 
-/// What a caliper line shows of the edge.
+/// Edge on a caliper line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClippedLine {
     /// Distance from the path \[px\].
     pub moved: f64,
-    /// Variance of it \[px²\].
+    /// Its variance \[px²\].
     pub variance: f64,
     /// Fraction of its rows that count.
     pub row_fraction: f64,
@@ -115,11 +114,11 @@ pub struct ClippedEdge {
     profiles: Vec<MeanProfilePart>,
     rows: Vec<ClippedRow>,
     sorted: Vec<f64>,
-    /// Blur of the frames before.
+    /// Blur of earlier frames; `None` until one is kept.
     blur: Option<BlurEstimate>,
 }
 
-/// What a row shows.
+/// Normal equations of a row for position and visible level.
 #[derive(Debug, Clone, Copy, Default)]
 struct ClippedRow {
     line: usize,
@@ -135,7 +134,7 @@ struct ClippedRow {
 struct ClippedLevels {
     visible: f64,
     clipped: f64,
-    /// Light, 1 in the mean.
+    /// Relative light, 1 on average.
     light: f64,
 }
 
@@ -151,7 +150,7 @@ impl ClippedScene<'_> {
         if self.clipped_after { 1.0 } else { -1.0 }
     }
 
-    /// Ends of what is looked at, as distances from the path \[px\].
+    /// Ends of the window, as distances from the path \[px\].
     fn window(&self, step: &ClippedStep) -> (f64, f64) {
         let visible = (VISIBLE_SIDE_BLURS * step.blur + BESIDE_PX).min(self.room[0]);
         let hidden = (CLIPPED_SIDE_BLURS * step.blur).min(self.room[1]);
@@ -162,7 +161,7 @@ impl ClippedScene<'_> {
         }
     }
 
-    /// Levels where the path has these before and after the edge.
+    /// Levels at a row, or a mean of rows, from those of the path before and after the edge.
     fn levels(
         &self,
         step: &ClippedStep,
@@ -176,8 +175,8 @@ impl ClippedScene<'_> {
         ClippedLevels { visible, clipped: step.clipped * light, light }
     }
 
-    /// The pixel at a distance from the path, seen in rows whose positions differ
-    /// with a variance.
+    /// Pixel at a distance from the path \[px\], expected of the mean of rows whose positions
+    /// spread with a variance \[px²\].
     #[inline]
     fn expect(
         &self,
@@ -200,8 +199,8 @@ impl ClippedScene<'_> {
 }
 
 impl ClippedEdge {
-    /// Fits the step to the rows of an overlay along a path. `blur` is what is
-    /// known of the blur. `None` where no step can be fitted.
+    /// Fits the step to the rows of an overlay along a path. `blur` is a prior of the blur. `None`
+    /// where no step can be fitted.
     pub fn fit(
         &mut self,
         scene: &ClippedScene<'_>,
@@ -241,8 +240,9 @@ impl ClippedEdge {
         None
     }
 
-    /// The blur that is expected where a frame alone determines it so well: that of the
-    /// frames before, as far as the lens is still the same.
+    /// Prior of the blur from earlier frames; `None` where there are none. Where the fit to this
+    /// frame alone differs significantly, the difference is its standard deviation: the lens may
+    /// have changed.
     pub fn expected_blur(&self, alone: &ClippedStepFit) -> Option<BlurEstimate> {
         let BlurEstimate { px, sd_px } = self.blur?;
         let (sd, off) = (sd_px.hypot(BLUR_DRIFT * px), (px - alone.step.blur).abs());
@@ -263,8 +263,7 @@ impl ClippedEdge {
         sum / rows
     }
 
-    /// Normal equations about a step, and the mean square of what it leaves in
-    /// units of the noise.
+    /// Normal equations about a step, and the mean squared residual in variances of the noise.
     fn linearise(
         &self,
         scene: &ClippedScene<'_>,
@@ -288,9 +287,9 @@ impl ClippedEdge {
         (normal, square / f64::max(n, 1.0))
     }
 
-    /// Compares the windows of a sheet with a step where it is expected, and shows
-    /// how far each of so many caliper lines is from it. Returns what a window in
-    /// the median leaves, in standard deviations of its noise.
+    /// Compares windows with the step where it is expected. `take` receives the number of each
+    /// caliper line and its edge. Returns the median residual of a window in standard deviations of
+    /// its noise.
     pub fn locate(
         &mut self,
         scene: &ClippedScene<'_>,
@@ -319,8 +318,8 @@ impl ClippedEdge {
         misfit
     }
 
-    /// Largest misfit of a row that counts, and the median one in units of the
-    /// noise.
+    /// Largest misfit of a row that counts, as a mean square, and the median misfit, both in units
+    /// of the noise.
     fn limit(&mut self) -> (f64, f64) {
         self.sorted.clear();
         self.sorted.extend(self.rows.iter().map(ClippedRow::misfit));
@@ -339,7 +338,7 @@ impl ClippedStepFit {
         covariance: &nalgebra::Matrix4<f64>,
         mean_visible: f64,
     ) -> Option<Self> {
-        // What of the position's variance comes with blur and hidden level.
+        // Part of the position's variance that comes from blur and hidden level.
         let of_place = Vector2::new(covariance[(0, 1)], covariance[(0, 3)]);
         let [blur, both, hidden] = [(1, 1), (1, 3), (3, 3)].map(|of| covariance[of]);
         let of_others = Matrix2::new(blur, both, both, hidden);
@@ -352,8 +351,7 @@ impl ClippedStepFit {
 }
 
 impl ClippedRow {
-    /// Reads a window: what it misses, times its derivatives by position and
-    /// visible level.
+    /// Normal equations of a window's residuals for position and visible level.
     fn read(
         scene: &ClippedScene<'_>,
         (pixels, window): (&[f32], &EdgeWindow),
@@ -386,8 +384,8 @@ impl ClippedRow {
         row
     }
 
-    /// Mean square of what the row leaves once it is moved, in units of the
-    /// noise.
+    /// Mean squared residual of the row after its best shift, in variances of the noise; infinite
+    /// for a row with too many outliers.
     fn misfit(&self) -> f64 {
         if self.wild > MAX_WILD_PIXELS || self.matrix[(0, 0)] <= 0.0 {
             return f64::INFINITY;
@@ -396,7 +394,7 @@ impl ClippedRow {
     }
 }
 
-/// Position of a line from its rows.
+/// Position of a line from its rows; `None` where less than half of them count.
 fn solve(rows: &[ClippedRow], limit: f64) -> Option<ClippedLine> {
     let counts = |row: &&ClippedRow| row.misfit() <= limit;
     let (mut matrix, mut vector, mut n) = (Matrix2::zeros(), Vector2::zeros(), 0.0);

@@ -24,14 +24,13 @@ const MAX_SLOPE: f32 = 0.364;
 /// Distance of neighbouring slopes, as a shift between the ends of the gauge
 /// \[px\].
 const SLOPE_STEP_PX: f32 = 3.0;
-/// Rank of the bands' strongest steps above which a step counts for no more: a
-/// spark is no edge.
+/// Rank among the strongest steps of the bands at which all steps are capped: a spark is no edge.
 const CAP_RANK: f32 = 0.7;
-/// Widest groove beside a bead \[px\]; beyond it begins another thing. Measured: reference/accuracy.md, Drawn
-/// frames: `grooves` are 2 to 40 px wide.
+/// Widest groove beside a bead \[px\]; what lies beyond is something else. Measured:
+/// reference/accuracy.md, Drawn frames: `grooves` are 2 to 40 px wide.
 const MAX_GROOVE_PX: f32 = 40.0;
-/// Distance within a groove in which what its far side adds to an edge falls to
-/// 1/e \[px\]: of two lines before a groove the nearer one is the edge.
+/// Width of a groove over which the weight of its far side falls to 1/e \[px\]: of two lines before
+/// a groove the nearer one is the edge.
 const GROOVE_DECAY_PX: f32 = 20.0;
 /// Fraction of a groove's far side that counts for the edge.
 const FAR_SIDE_WEIGHT: f32 = 0.5;
@@ -44,9 +43,9 @@ const MIN_SEAM_DISTANCE_PX: f32 = 6.0;
 /// [`MAX_SEAM_RATIO`] and [`MIN_RIVAL_RATIO`] where the stronger pair lies within the other one:
 /// rough edges are some tenths fainter in the mean along a line than ribs are.
 const INNER_PAIR_RATIOS: (f32, f32) = (0.5, 0.8);
-/// Lines of each sign that are looked at.
+/// Lines of each sign that are kept.
 const MAX_LINES: usize = 8;
-/// Difference of slope at which a pair of lines counts for 1/e.
+/// Difference of slope at which the score of a pair falls to 1/e.
 const SLOPE_DIFFERENCE_SCALE: f32 = 0.3;
 
 /// A line along which the grey steps.
@@ -67,11 +66,11 @@ pub struct LinePair {
     pub sides: [StepLine; 2],
     /// Whether the bead is brighter than what lies outside.
     pub bright: bool,
-    /// How strong the pair is \[grey levels\].
+    /// Geometric mean of the strengths, lower for lines that are not parallel \[grey levels\].
     pub score: f32,
-    /// The same without what grooves beside it add \[grey levels\].
+    /// Score without the far sides of grooves \[grey levels\].
     pub score_without_grooves: f32,
-    /// How strong each edge is, a groove beside it included \[grey levels\].
+    /// Step of each edge, with the weighted far side of a groove beside it \[grey levels\].
     pub strengths: [f32; 2],
 }
 
@@ -91,7 +90,7 @@ impl LinePair {
 /// The search; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct LineSearch {
-    /// Steps of each band, and its middle row about the gauge's.
+    /// Steps of each band, position by position; `middles` has its middle row about the gauge's.
     steps: Vec<f32>,
     middles: Vec<f32>,
     across: usize,
@@ -102,7 +101,7 @@ pub struct LineSearch {
     /// Mean step of every line: positions by slopes.
     means: Vec<f32>,
     slopes: Vec<f32>,
-    /// Highest and lowest of them at each position.
+    /// Highest and lowest of these means at each position.
     highest: Vec<f32>,
     lowest: Vec<f32>,
     ups: Vec<StepLine>,
@@ -165,9 +164,8 @@ impl LineSearch {
         out.sort_by(|a, b| b.score.total_cmp(&a.score));
     }
 
-    /// Whether one of two pairs lies within the other, each of its edges that is not also
-    /// the other's is that of a seam or a rib within the wider one, and either may be the
-    /// bead.
+    /// Whether either of two pairs may be the bead: one lies within the other, and each of its
+    /// edges that the two do not share is that of a seam or a rib of the wider one.
     pub fn are_rivals(&self, pair: &LinePair, other: &LinePair) -> bool {
         let (inner, outer) =
             if pair.width_px() < other.width_px() { (pair, other) } else { (other, pair) };
@@ -321,7 +319,7 @@ impl LineSearch {
     }
 }
 
-/// Adds values, shifted to lower positions by so many, times a scale.
+/// Adds values times a scale, shifted to lower positions by `aside`.
 #[inline(always)]
 fn add_shifted(sums: &mut [f32], values: &[f32], aside: isize, scale: f32) {
     let most = sums.len().min(values.len()).saturating_sub(aside.unsigned_abs());
@@ -336,7 +334,8 @@ fn add_shifted(sums: &mut [f32], values: &[f32], aside: isize, scale: f32) {
     }
 }
 
-/// Mean steps of all lines, and the least distance of two that are taken \[px\].
+/// Mean steps of all lines, their slopes, and the smallest distance of two lines that are kept
+/// \[px\].
 struct ProjectedLines<'a> {
     means: &'a [f32],
     slopes: &'a [f32],
@@ -344,7 +343,7 @@ struct ProjectedLines<'a> {
 }
 
 impl ProjectedLines<'_> {
-    /// Takes the strongest lines of a sign out of the strongest step of each position.
+    /// Takes the strongest lines of a sign from `best`, the strongest step of each position.
     fn take_strongest(&self, best: &mut [f32], sign: f32, out: &mut Vec<StepLine>) {
         out.clear();
         let across = best.len();
@@ -372,7 +371,7 @@ fn groove(edge: &StepLine, far_sides: Option<&Vec<StepLine>>, outwards: f32) -> 
     added.fold(0.0, f32::max)
 }
 
-/// A shift by whole pixels.
+/// A shift rounded to whole pixels.
 fn shift(aside: f32) -> isize {
     let size = round_to_count(aside.abs()).cast_signed();
     if aside < 0.0 { -size } else { size }

@@ -1,5 +1,5 @@
 //! Line or parabola through values many of which may be wrong (RANSAC, Fischler and Bolles 1981).
-//! What covers an edge pulls to one side, so that means and medians of all values are biased.
+//! What occludes an edge pulls positions to one side, so that the mean and the median are biased.
 
 use crate::numeric::normal_equations::NormalEquations;
 use crate::numeric::number::to_f32;
@@ -8,21 +8,21 @@ use crate::numeric::number::to_f32;
 /// samples hold a wrong one with the probability (1 − w³)^160 = 3·10⁻⁵ (RANSAC, Fischler and Bolles
 /// 1981).
 const TRIALS: usize = 160;
-/// A parabola is accepted where its score exceeds the line's by so many values: fewer may fit it by
-/// chance, because it has one term more.
+/// Margin by which the score of a parabola must exceed the line's: a smaller gain may be chance,
+/// because it has one term more.
 const PARABOLA_SCORE_MARGIN: f32 = 3.0;
 /// Least-squares fits through the consensus set; the second one changes hardly anything.
 const REFITS: usize = 2;
 
-/// A parabola over the numbers of the values.
+/// A parabola over the indices of the values.
 #[derive(Debug, Clone, Copy)]
 struct Parabola {
     middle: f32,
     terms: [f32; 3],
 }
 
-/// Turns values that lie farther than a tolerance from what most agree on into
-/// gaps, which are NaN. Returns how many are left.
+/// Sets values farther than a tolerance from the curve of the consensus set to NaN. Returns how
+/// many are left.
 pub fn keep_consensus(values: &mut [f32], tolerance: f32) -> usize {
     let Some(mut found) = search(values, tolerance) else { return count(values) };
     for _ in 0..REFITS {
@@ -41,8 +41,8 @@ fn count(values: &[f32]) -> usize {
     values.iter().filter(|value| value.is_finite()).count()
 }
 
-/// The best of the curves through values that are picked at random, though the
-/// same ones every time.
+/// The best curve through values picked by a pseudo-random sequence, the same every time; `None`
+/// for fewer than four values.
 fn search(values: &[f32], tolerance: f32) -> Option<Parabola> {
     let mut state = 0x2545_f491_u32;
     let mut pick = || {
@@ -84,8 +84,7 @@ impl Parabola {
         Self { middle, terms: [level, slope, 0.0] }
     }
 
-    /// The parabola that leaves a line's two positions where they are and goes
-    /// through a third.
+    /// Parabola through the line's two values and a third one.
     fn bent_to(self, values: &[f32], at: usize, first: usize, third: usize) -> Self {
         let bend = (values[at] - self.at(at)) / (to_f32(at - first) * -to_f32(third - at));
         // bend · (x − first) · (x − third), about the middle.
@@ -100,7 +99,7 @@ impl Parabola {
         level + x * (slope + x * bend)
     }
 
-    /// Number of the values that it holds, of those half-way out a part.
+    /// Sum over the values of 1 − (residual / tolerance)², 0 beyond the tolerance.
     fn score(&self, values: &[f32], tolerance: f32) -> f32 {
         let one = |(k, value): (usize, &f32)| {
             let off = (value - self.at(k)) / tolerance;
@@ -110,7 +109,7 @@ impl Parabola {
         values.iter().enumerate().map(one).sum()
     }
 
-    /// The best one of the same order through the values that agree.
+    /// Least-squares fit of the same order through the values within the tolerance.
     fn fitted(&self, values: &[f32], tolerance: f32) -> Option<Self> {
         let mut normal = NormalEquations::<3>::default();
         for (k, &value) in values.iter().enumerate() {

@@ -7,20 +7,20 @@ use crate::numeric::number::to_f32;
 use crate::numeric::rank;
 use crate::vision::buffer::reset;
 
-/// Contours of one sign that are looked for.
+/// Contours of one sign at most.
 const MAX_CONTOURS: usize = 6;
 /// Bands that a contour may jump over at once.
 const MAX_SKIP: usize = 4;
 /// Cost of a band without a step, in typical steps.
 const SKIP_COST: f32 = 0.35;
-/// Cost of running aside as steeply as an edge may.
+/// Cost of running aside at [`MAX_FREE_SLOPE`]; proportional to the slope below it.
 const ASIDE_COST: f32 = 0.25;
 /// Cost beyond which two steps are not neighbours.
 const BREAK_COST: f32 = 1.0;
 /// Slope against the gauge's axis up to which edges run at little cost. Derived: tan(20° + 15°),
 /// for a bead that slants 20 degrees (contract, `bead_axis`) and bulges by another 15.
 const MAX_FREE_SLOPE: f32 = 0.7;
-/// Height of a band within which no bead's edge runs far \[px\].
+/// Height of a band up to which waviness is not scaled \[px\]: an edge moves little within it.
 const REFERENCE_BAND_PX: f32 = 4.0;
 /// Marks the first step of a contour. By definition no packed gap and index.
 const NO_PREDECESSOR: u16 = u16::MAX;
@@ -28,15 +28,15 @@ const NO_PREDECESSOR: u16 = u16::MAX;
 /// An edge that runs along the bead.
 #[derive(Debug, Clone, Default)]
 pub struct EdgeContour {
-    /// Its step in every band \[px\], or none where it is hidden.
+    /// Position of its step in each band \[px\]; `None` where it is hidden.
     pub at: Vec<Option<f32>>,
     /// Mean height of its steps \[grey levels\].
     pub step: f32,
     /// Fraction of the bands in which it has a step.
     pub band_fraction: f64,
-    /// How far a step lies off the line between its neighbours, median \[px\], as if
-    /// of bands of no more than [`REFERENCE_BAND_PX`]: little for an edge, also for a rough
-    /// one, much for sparks that happen to lie in a row.
+    /// Median distance of a step from the line between its neighbours \[px\], scaled down for bands
+    /// taller than [`REFERENCE_BAND_PX`]: small for an edge, even a rough one, large for sparks
+    /// that happen to lie in a row.
     pub waviness_px: f32,
 }
 
@@ -70,7 +70,7 @@ impl EdgeContours {
         &self.contours[..self.count]
     }
 
-    /// Looks for contours of steps up or down that reach `least_share` of the
+    /// Searches contours of steps up or down that have a step in at least `min_fraction` of the
     /// bands. `band_px` is the height of a band.
     pub fn search(&mut self, bands: &[StepCandidates], up: bool, band_px: f32, min_fraction: f64) {
         reset(&mut self.used, bands.len(), 0);

@@ -1,4 +1,4 @@
-//! Whether an edge turns at once: two straight lines that meet.
+//! Whether an edge has a corner: two straight lines that meet.
 
 use nalgebra::Vector3;
 
@@ -11,14 +11,14 @@ const CORNER_POSITIONS: u8 = 18;
 /// Farthest of them from the middle of the gauge, in halves of it: beyond, one of the two lines has
 /// too few points.
 const MAX_CORNER_POSITION: f64 = 0.85;
-/// Part of the squared distances from a parabola that two lines may leave.
+/// Largest squared residual of two lines that meet, as a fraction of that of a parabola.
 const MAX_RESIDUAL_RATIO: f64 = 0.5;
 /// Smallest turn \[rad\]; what turns less is a bead's waviness.
 const MIN_TURN_RAD: f64 = 0.14;
 
-/// By how much an edge turns \[rad\], where two lines that meet follow its points
-/// much better than a parabola, which leaves them so far off in the mean square
-/// \[px²\]; 0 where they do not. Half the gauge is so long \[px\].
+/// Angle by which an edge turns \[rad\], where two lines that meet fit its points much better than
+/// a parabola; 0 where they do not. `about_parabola` is the parabola's mean squared residual
+/// \[px²\], `reach_px` half the length of the gauge.
 #[cold]
 pub fn turn(
     points: &(impl Iterator<Item = EdgePoint> + Clone),
@@ -36,8 +36,8 @@ pub fn turn(
     })
 }
 
-/// Whether two edges that turn so much \[rad\] are those of a corner: both turn,
-/// and the same way. One alone has a bump or a notch.
+/// Whether the turns of two edges \[rad\] are those of a corner: both turn, and the same way. An
+/// edge that turns alone has a bump or a notch.
 pub fn is_corner([one, other]: [f64; 2]) -> bool {
     one * other > 0.0 && one.abs().min(other.abs()) > MIN_TURN_RAD
 }

@@ -1,4 +1,4 @@
-//! The trajectory of an edge along the gauge as a short polynomial: its mean, direction and bend.
+//! Position of an edge along the gauge as a polynomial of low order: its mean, direction and bend.
 
 use crate::numeric::number::to_f64;
 use nalgebra::{SMatrix, SVector};
@@ -9,19 +9,19 @@ const MAX_TERMS: usize = 5;
 const LINE_TERMS: usize = 2;
 /// Terms of a bead that is evenly bent. By definition those up to t².
 const PARABOLA_TERMS: usize = 3;
-/// A bend is accepted from so many standard deviations on. Derived: noise alone exceeds 4 in 6 of
-/// 100,000 frames, and a false bend turns the normals of the whole gauge.
+/// Bend, in its standard deviations, from which on it is accepted. Derived: noise alone exceeds 4
+/// in 6 of 100,000 frames, and a false bend turns the normals of the whole gauge.
 pub const MIN_BEND_SIGMAS: f64 = 4.0;
-/// Spread about a parabola that is looked at for more \[px\].
+/// Spread about a parabola from which on more terms are tried \[px\].
 pub const NOTABLE_SCATTER_PX: f64 = 0.25;
-/// Part of the spread's square that more terms must explain.
+/// Fraction of the squared spread that more terms must explain to be used.
 const MIN_EXPLAINED: f64 = 0.8;
-/// Part of it that they leave at most where they follow a bead that bends evenly: a
-/// torn edge's waves leave more.
+/// Largest fraction of it that more terms leave on an evenly bent bead: a torn edge's waves leave
+/// more.
 const MAX_UNEXPLAINED: f64 = 0.02;
 /// Largest correlation from point to point that is accepted.
 const MAX_CORRELATION: f64 = 0.95;
-/// Rounds in which slope and bend in the middle settle beside the higher orders.
+/// Iterations in which slope and bend in the middle converge beside the higher orders.
 const ARC_PASSES: usize = 3;
 
 /// A point of an edge.
@@ -54,21 +54,22 @@ pub struct EdgeCurve {
 }
 
 impl EdgeCurve {
-    /// Fits points of a gauge of which half is so long \[px\]; `None` where there
-    /// are too few or where they lie too close together.
+    /// Fits points; `reach_px` is half the length of the gauge. `None` where there are too few
+    /// points or they lie too close together.
     pub fn fit(points: impl Iterator<Item = EdgePoint> + Clone, reach_px: f64) -> Option<Self> {
         let sums = CurveSums::<PARABOLA_TERMS>::of(points.clone());
         let (straight, _) = sums.curve::<LINE_TERMS>()?;
         let Some((few, off)) = sums.curve::<PARABOLA_TERMS>() else { return Some(straight) };
         let with_scatter = |curve: Self| Some(Self { about_parabola: off, ..curve });
-        // An unsure bend would give wrong positions beyond the gauge's ends,
-        // where the normals of a slanted bead may cross it.
+        // An uncertain bend would give wrong positions beyond the gauge's ends, where the normals
+        // of a slanted bead may cross it.
         let notable = off > NOTABLE_SCATTER_PX * NOTABLE_SCATTER_PX;
         let more = (notable && sums.weight >= 4.0 * to_f64(MAX_TERMS))
             .then(|| CurveSums::<MAX_TERMS>::of(points.clone()).curve::<MAX_TERMS>())
             .flatten();
         let left = more.map_or(1.0, |(_, rest)| rest / off);
-        // What more terms follow is the bead's course; waves of its edge are not.
+        // What more terms fit nearly exactly is the shape of the bead; else it is waves of its
+        // edge.
         let waves = notable && left > MAX_UNEXPLAINED;
         let apart = if waves { few.design_effect(points) } else { 1.0 };
         if few.terms[2] * few.terms[2]
@@ -99,10 +100,9 @@ impl EdgeCurve {
         (1.0 + correlation) / (1.0 - correlation)
     }
 
-    /// A parabola, and what the arc with its slope and bend in the middle has of
-    /// the third and fourth order: u‴ = 3u′u″²/(1 + u′²) and
-    /// u⁗ = 3u″³(1 + 5u′²)/(1 + u′²)². A bead that is evenly bent runs along an
-    /// arc, and where its axis is off by these, widths are taken obliquely.
+    /// Adds the third and fourth order of the arc with the parabola's slope and bend in the middle:
+    /// u‴ = 3u′u″²/(1 + u′²) and u⁗ = 3u″³(1 + 5u′²)/(1 + u′²)². An evenly bent bead is an arc;
+    /// without these orders its axis is off and widths are taken obliquely.
     fn as_arc(mut self, reach_px: f64) -> Self {
         for _ in 0..ARC_PASSES {
             let (slope, bend) = (self.slope(0.0), self.bend(0.0));
@@ -119,8 +119,7 @@ impl EdgeCurve {
         self
     }
 
-    /// Its Legendre coefficient of an order \[px\]; 0 of those that it does not
-    /// have.
+    /// Legendre coefficient of an order \[px\]; 0 beyond its terms.
     pub fn coefficient(&self, order: usize) -> f64 {
         self.terms.get(order).copied().unwrap_or(0.0)
     }
@@ -131,7 +130,7 @@ impl EdgeCurve {
         (0..MAX_TERMS).map(|k| self.terms[k] * values[k]).sum()
     }
 
-    /// Slope there: the change of the position for a step of 1 in t \[px\].
+    /// Slope at a position: the change of the position across for a step of 1 in t \[px\].
     pub fn slope(&self, t: f64) -> f64 {
         let terms = &self.terms;
         let square = t * t;
@@ -141,14 +140,14 @@ impl EdgeCurve {
             + 2.5 * terms[4] * t * (7.0 * square - 3.0)
     }
 
-    /// Second derivative there \[px\].
+    /// Second derivative by t at a position \[px\].
     pub fn bend(&self, t: f64) -> f64 {
         let [_, _, c, d, e] = self.terms;
         3.0 * c + 15.0 * d * t + 7.5 * e * (7.0 * t * t - 1.0)
     }
 }
 
-/// Sums over points for curves of up to so many terms.
+/// Sums over points for curves of up to `N` terms.
 struct CurveSums<const N: usize> {
     matrix: SMatrix<f64, N, N>,
     vector: SVector<f64, N>,

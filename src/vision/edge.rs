@@ -9,7 +9,7 @@ pub const STEP_HALF_WIDTH: usize = 4;
 /// 16 bits fill a vector of 512 bits.
 const BLOCK_PIXELS: usize = 32;
 
-/// Steps of each sign that are kept a profile.
+/// Steps of each sign that are kept per profile.
 pub const MAX_STEPS_KEPT: usize = 16;
 
 /// A position where a profile steps.
@@ -41,7 +41,7 @@ impl StepCandidates {
         &self.down[..self.downs]
     }
 
-    /// Of given steps up.
+    /// Candidates of given steps up.
     #[cfg(test)]
     pub fn of(up: impl Iterator<Item = StepCandidate>) -> Self {
         let mut found = Self::default();
@@ -89,9 +89,8 @@ fn reaches(block: &[i16], floor: i16) -> bool {
     any != 0
 }
 
-/// Sum of the REACH pixels after each position less the sum of those before it:
-/// REACH times the height of a sharp step there. Positions too near the ends have
-/// none.
+/// Sum of the [`STEP_HALF_WIDTH`] pixels after each position less the sum of those before it: the
+/// height of a sharp step there times their number. 0 too near the ends.
 #[inline(always)]
 pub fn respond(profile: &[u16], response: &mut [i16]) {
     let length = profile.len();
@@ -149,7 +148,7 @@ mod tests {
         (0..80).map(|u| if (20..50).contains(&u) { 480 } else { 160 }).collect()
     }
 
-    /// A profile in quarters of a grey level, summed over REACH.
+    /// A profile in quarters of a grey level, summed over `STEP_HALF_WIDTH`.
     const UNIT: f32 = 0.0625;
 
     #[test]

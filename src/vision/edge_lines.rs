@@ -21,7 +21,7 @@ const SIGMA_PX: f64 = 0.5;
 /// Steepest edge line against the gauge's axis, in pixels across for each
 /// along.
 const MAX_SLOPE: f64 = 0.45;
-/// Lines that this near to each other at the gauge's middle are one edge \[px\].
+/// Distance at the gauge's middle below which two lines are one edge \[px\].
 const SAME_EDGE_PX: f64 = 4.0;
 /// Fraction of the gauge that an edge line must cover.
 const MIN_COVERAGE: f64 = 0.3;

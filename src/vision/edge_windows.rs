@@ -14,7 +14,7 @@ pub const WINDOW_PX: usize = 112;
 /// Pixel of a window at which the edge is expected.
 pub const MIDDLE_PX: usize = WINDOW_PX / 2;
 
-/// A gauge of more rows has plenty: those of a caliper line are taken together.
+/// Rows of a gauge up to which a window is one row; of a taller gauge it is the mean of several.
 pub const MAX_SINGLE_ROWS: usize = 160;
 /// How far an edge may run aside within rows that are taken together \[px\].
 const MAX_ASIDE_PX: f32 = 0.6;
@@ -47,7 +47,7 @@ pub struct Grouping {
 /// Windows along an edge; keeps its buffers from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct EdgeWindows {
-    /// What the windows are of.
+    /// Position, rows and expected edge of each window.
     pub windows: Vec<EdgeWindow>,
     pixels: Vec<[f32; WINDOW_PX]>,
 }
@@ -59,7 +59,7 @@ impl EdgeWindows {
         &self.pixels[window]
     }
 
-    /// Expects the edge a little aside, and other levels.
+    /// Corrects the expected position and levels of the edge.
     pub fn correct(&mut self, EdgeCorrection { aside, before, after }: EdgeCorrection) {
         for window in &mut self.windows {
             let [at, level, step] = window.expected;
@@ -67,9 +67,9 @@ impl EdgeWindows {
         }
     }
 
-    /// Reads the windows about an edge of which `expected` is given for a position
-    /// along it. Rows are taken together within caliper lines: one where there are
-    /// few, more where a tall gauge has plenty.
+    /// Reads the windows about an edge; `expected` gives its position and levels for a position
+    /// along the bead \[px\]. A window averages rows of one caliper line: one row of a short gauge,
+    /// more of a tall one.
     #[inline(always)]
     pub fn read<T: GreyPixel>(
         &mut self,
@@ -102,7 +102,7 @@ impl EdgeWindows {
     }
 }
 
-/// Rows that are taken together.
+/// Number of rows that a window averages.
 fn rows_together(along: usize, lines: usize, steepest: f32) -> usize {
     if along <= MAX_SINGLE_ROWS {
         return 1;
@@ -111,7 +111,7 @@ fn rows_together(along: usize, lines: usize, steepest: f32) -> usize {
     along.div_ceil(lines.max(1)).min(straight).max(1)
 }
 
-/// Mean of some rows from a position on.
+/// Mean of some rows from position `first` on \[grey levels of 256\].
 #[inline(always)]
 fn average<T: GreyPixel>(
     strip: &GaugeRows<'_, T>,

@@ -26,12 +26,12 @@ pub struct FittedEdge {
     pub shading: f64,
 }
 
-/// What neighbours show of ground, height and shading, each with its variance.
+/// Prior of ground, height and shading, from neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// Ground, height, shading.
     pub mean: [f64; 3],
-    /// The variances that they leave.
+    /// Their variances.
     pub variance: [f64; 3],
 }
 
@@ -64,7 +64,7 @@ pub struct ProfileWindow<'a> {
     pub bead_after: bool,
 }
 
-/// What a blurred step with shading is at a position, and its derivatives.
+/// Value of a blurred step with shading at a position, and its derivatives.
 #[derive(Debug, Clone, Copy)]
 pub struct ShadedStep {
     /// Φ: fraction of the step that is reached.

@@ -1,6 +1,6 @@
-//! Cameras whose grey levels are no straight function of light: with
-//! grey = 255 · (light / white)^gamma the blurred flank of an edge is skewed, and
-//! its half level lies beside the edge. A table takes grey back to light.
+//! Cameras whose grey levels are not linear in light: with grey = 255 · (light / white)^gamma the
+//! blurred flank of an edge is skewed, and its half level lies beside the edge. A table converts
+//! grey back to light.
 
 /// Light from grey levels, by a table over all levels of a camera.
 #[derive(Debug, Clone, PartialEq)]

@@ -46,8 +46,8 @@ pub enum EdgeKind {
     Groove,
 }
 
-/// Caliper lines along a gauge whose cell names no number: reference/accuracy.md, What is measured, is for
-/// this number. More lines are shorter and noisier, fewer follow a bead less well.
+/// Caliper lines along a gauge whose cell names no number: reference/accuracy.md, What is measured,
+/// is for this number. More lines are shorter and noisier, fewer follow a bead less well.
 pub const DEFAULT_CALIPERS: usize = 64;
 /// Smallest contrast where the cell names none: about three times the noise of an
 /// industrial camera at full scale \[grey levels of 256\].

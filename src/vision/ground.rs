@@ -9,20 +9,20 @@ use crate::numeric::rank;
 /// Distance from the edge from which on the pattern is read, in blurs. Derived: beyond 3 blurs
 /// 1.3·10⁻³ of a step is left, 1 − Φ(3).
 const FLANK_BLURS: f64 = 3.0;
-/// The same at least \[px\]: a pattern is looked for beyond what rounds the foot of a sharp edge.
+/// Smallest distance from the edge at which it is read \[px\]: beyond a sharp edge's rounded foot.
 const MIN_FIRST_PX: f64 = 4.0;
-/// Distance of the columns that are read \[px\]: neighbours of a pattern are alike.
+/// Distance of the columns that are read \[px\]: closer ones are correlated.
 const COLUMN_STEP_PX: usize = 2;
 /// Columns at most: more reach into what lies farther away.
 const MAX_COLUMNS: usize = 10;
 /// Fewest lines that show a pattern: fewer leave its variance too uncertain.
 const MIN_LINES: usize = 8;
-/// Part of the noise's variance by which a pattern's must exceed it: less is not distinguished
-/// from noise.
+/// Smallest variance of a pattern, beyond the noise's, as a fraction of the noise's: less is not
+/// distinguished from noise.
 pub const MIN_EXCESS_VARIANCE: f64 = 0.25;
 
-/// Variance of all pixels in that of the noise up to which they show nothing but noise:
-/// there is no need of medians.
+/// Variance of all pixels, relative to the noise's, up to which they show only noise: then no
+/// medians are computed.
 const MAX_NOISE_RATIO: f64 = 1.1;
 
 /// Where an edge lies on some rows.
@@ -30,7 +30,7 @@ const MAX_NOISE_RATIO: f64 = 1.1;
 pub struct EdgePosition {
     /// The rows.
     pub rows: RowRange,
-    /// Position across it \[px\].
+    /// Position of the edge across the bead \[px\].
     pub at: f64,
 }
 
@@ -83,9 +83,8 @@ pub struct PatternSearch {
 type ColumnValues = [f32; MAX_COLUMNS];
 
 impl PatternSearch {
-    /// The pattern along an edge. `noise` is the standard deviation of a pixel's
-    /// \[grey levels\]. `None` where none is distinguished from noise, or too little is in the
-    /// gauge.
+    /// Pattern along an edge; `None` where it is not distinguished from noise, or too little of the
+    /// side lies in the gauge.
     #[inline(always)]
     pub fn pattern<T: GreyPixel>(&mut self, side: &EdgeSide<'_, T>) -> Option<Pattern> {
         let noise = side.noise;
@@ -94,9 +93,8 @@ impl PatternSearch {
         Some(Pattern { size_grey, mean_variance: self.variance_of_mean(noise) })
     }
 
-    /// Standard deviation of the texture along a side, without the pixels' noise
-    /// \[grey levels\], from the median of how far pixels are off their median: sparks or
-    /// holes, which move a mean, are none. `None` as for a pattern.
+    /// Standard deviation of the texture along a side, without the pixels' noise \[grey levels\].
+    /// From medians, so that sparks or holes do not count. `None` as for a pattern.
     #[inline(always)]
     pub fn texture<T: GreyPixel>(&mut self, side: &EdgeSide<'_, T>) -> Option<f64> {
         let mut variances = self.look(side)?;
@@ -110,8 +108,8 @@ impl PatternSearch {
         self.without_noise(&mut variances, side.noise)
     }
 
-    /// Reads what lies beside an edge: the variance of each column; `None` where all
-    /// together are certainly noise.
+    /// Reads the pixels beside an edge: variance of each column \[grey levels²\]; `None` where they
+    /// are certainly only noise, or too few lines.
     #[inline(always)]
     fn look<T: GreyPixel>(&mut self, side: &EdgeSide<'_, T>) -> Option<ColumnValues> {
         let count = side.positions.len();
@@ -173,7 +171,7 @@ impl PatternSearch {
     }
 }
 
-/// Takes the straight line through each column out of it.
+/// Subtracts from each column the straight line through it.
 #[inline(always)]
 fn detrend(lines: &mut [ColumnValues]) {
     let count = narrow_to_f32(to_f64(lines.len()));

@@ -5,8 +5,8 @@
 use super::overlay::{HALF_SPAN, SideShading, StepShape};
 use crate::numeric::number::to_f64;
 
-/// How far the slopes of the light on the two sides of an edge may differ, as a fraction of
-/// their mean: those of a bead or of ground that is shaded itself are its alone.
+/// Largest difference of the light's slopes on the two sides of an edge, as a fraction of their
+/// mean: where they differ more, the bead or the ground itself is shaded.
 const MAX_SLOPE_DIFFERENCE: f64 = 0.5;
 
 /// How much less the light's relative slope grows at the edges than between them where it falls off
@@ -36,8 +36,8 @@ impl Surroundings<'_> {
         [before, before + 1.0]
     }
 
-    /// Relative change of the light at the edge \[1/px\]; `None` where the two sides do not
-    /// show the same of it.
+    /// Relative change of the light at the edge \[1/px\]; `None` where the two sides do not agree
+    /// on it.
     fn light(&self) -> Option<f64> {
         let [before, after] = self.levels();
         let [outwards, onwards] = self.shape.shading.map(|shading| shading.slope);
@@ -48,8 +48,7 @@ impl Surroundings<'_> {
         is_light.then_some(mean)
     }
 
-    /// Bends what follows a straight line on either side by half of the light's relative
-    /// second derivative \[1/px²\].
+    /// Gives each side without a bend one of half the light's relative second derivative \[1/px²\].
     fn bend(&mut self, relative: f64) {
         let levels = self.levels();
         let StepShape { step, extent, shading, .. } = &mut *self.shape;
@@ -57,7 +56,7 @@ impl Surroundings<'_> {
         for ((shading, level), end) in shading.iter_mut().zip(levels).zip(ends) {
             if shading.bend == 0.0 {
                 let bend = level * relative;
-                // A parabola's straight line runs as it does in the middle of its samples.
+                // The slope in the middle of the samples stays as it is.
                 let middle = 0.5 * (3.0 * step.blur + end);
                 *shading = SideShading { slope: shading.slope - 2.0 * bend * middle, bend };
             }
@@ -65,8 +64,8 @@ impl Surroundings<'_> {
     }
 }
 
-/// Bends the levels beside both edges of a bead of such a width as the light does whose
-/// slopes show on all four sides.
+/// Bends the levels beside both edges as light does that falls off, where all four sides show its
+/// slope. `width_px` is the distance of the edges.
 pub fn apply_falloff(mut edges: [Surroundings<'_>; 2], width_px: f64) {
     let [Some(left), Some(right)] = [edges[0].light(), edges[1].light()] else { return };
     let bends = falloff_bends([left, right], width_px);

@@ -1,7 +1,7 @@
 //! A straight line through samples, summed up block by block.
 
-/// Slopes of the surroundings are accepted from so many standard deviations on. Derived: noise
-/// alone exceeds 2.5 in 1.2 % of the sides, and a slope that is shrunk to none costs little.
+/// Slope of the surroundings, in its standard deviations, from which on it is accepted. Derived:
+/// noise alone exceeds 2.5 in 1.2 % of the sides, and a slope that is shrunk to none costs little.
 const MIN_SLOPE_SIGMAS: f64 = 2.5;
 /// Mean square distance of positions from their middle from which on they show a
 /// slope \[px²\].
@@ -61,9 +61,8 @@ impl LineSums {
         self.weight > 0.0 && self.spread() >= MIN_SPREAD_PX2 * self.weight
     }
 
-    /// What the line is at a position, and its variance in units of a sample's;
-    /// a slope that has not been seen over a few pixels is taken for none,
-    /// with room for a little.
+    /// Value of the line at a position, and its variance in units of a sample's. Samples over too
+    /// few pixels give their mean, without a slope; no samples give (0, 0).
     pub fn at(&self, x: f64) -> (f64, f64) {
         if self.weight <= 0.0 {
             return (0.0, 0.0);
@@ -75,9 +74,8 @@ impl LineSums {
         (self.mean() + self.slope() * away, 1.0 / self.weight + away * away / self.spread())
     }
 
-    /// The slope less what noise may have made of it – nothing below 2.5
-    /// standard deviations, nearly all far above –, and the variance that its
-    /// uncertainty leaves to the line at the edge.
+    /// The slope, shrunk towards 0 for noise: 0 below 2.5 standard deviations, nearly unchanged far
+    /// above. And the variance that its uncertainty gives the line at position 0, the edge.
     pub fn shrunk_slope(&self, noise: f64) -> (f64, f64) {
         if !self.shows_slope() {
             return (0.0, 0.0);

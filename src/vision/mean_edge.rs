@@ -5,9 +5,9 @@
 //! patches of the ground, and inwards by dark ones of the bead. Here the position is
 //! linear in the pixels: a pattern with a mean of zero moves it as often outwards as
 //! inwards, and what remains to the second order is taken off. The course has as few
-//! degrees of freedom as the gauge supports: a line, and a bend where it is certain. How
-//! far a pattern moves the edge is read from the ground and the bead themselves: the same
-//! weights, compared with positions where there is no edge.
+//! degrees of freedom as the gauge supports: a line, and a bend where it is certain. How far a
+//! pattern moves the edge is estimated from the ground and the bead themselves: the same weights,
+//! applied where there is no edge.
 
 mod column;
 mod course;
@@ -40,11 +40,11 @@ const HALF_FRACTION: f32 = 0.4;
 /// Blurs that are tried \[px\]: a lens's, up to the roughness of a torn edge. A wrong one
 /// does not move an edge in the middle of its window; it only lets in more noise.
 pub const BLURS_PX: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0];
-/// The one of them with which an edge is approached.
+/// Index of the blur with which an edge is first located.
 const USUAL_BLUR: usize = 3;
-/// How far from each other edges of different blurs rest in a profile \[px\].
+/// Largest distance between edges of different blurs in one profile \[px\].
 const BLUR_SHIFT_PX: usize = 4;
-/// How far an edge may lie from its line \[px\].
+/// Largest distance of an edge from the line at which its search starts \[px\].
 const MAX_OFFSET_PX: f64 = 10.0;
 /// Ground that is read \[px\]: other things lie farther away.
 const MAX_GROUND_PX: usize = 100;
@@ -57,7 +57,7 @@ const FLANK_BLURS: f64 = 4.0;
 const LEVEL_PX: usize = 24;
 /// Fewest columns of the ground that show its pattern: the median of fewer is uncertain.
 const MIN_COLUMNS: usize = 6;
-/// Distance of these columns \[px\]: neighbours of a pattern are alike.
+/// Distance of these columns \[px\]: closer ones are correlated.
 const COLUMN_PX: usize = 2;
 
 /// An edge along a course; keeps its buffers from frame to frame.
@@ -71,21 +71,21 @@ pub struct MeanEdge {
     spreads: Vec<f32>,
 }
 
-/// What was found of an edge on a ground with a pattern.
+/// Fit of an edge on a ground with a pattern.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeanFit {
-    /// What the ground makes of the edge's position, and the bead.
+    /// How the patterns of the ground and of the bead shift the edge.
     pub samples: [ShiftSamples; 2],
-    /// Step from the ground to the bead \[grey levels\]: the smaller of that in the window
-    /// and that of all positions that are looked at.
+    /// Step from the ground to the bead \[grey levels\]: the smaller of the fitted step and the
+    /// difference of their mean levels beside the flank.
     pub contrast: f64,
     /// Level of the bead beside the edge \[grey levels\], dark beads inverted.
     pub bead_grey: f64,
 }
 
 impl MeanFit {
-    /// The same as it is of an edge without a model of its flank, with the variance of
-    /// its mean position \[px²\].
+    /// This fit as that of a rough edge, with its blur \[px\] and the variance of its mean position
+    /// \[px²\].
     pub fn as_rough(&self, blur_px: f64, variance: f64) -> RoughFit {
         RoughFit {
             variance,
@@ -152,8 +152,8 @@ impl MeanEdge {
         self.half = HALF_PX.min(round_to_count((HALF_FRACTION * scene.width_px).floor()));
     }
 
-    /// Descends from a line to the edge beside it. Returns what a step of each of
-    /// [`BLURS_PX`] leaves of its profile; infinite where there is no edge.
+    /// Moves the course from a line to the edge beside it. Returns the residual of its profile for
+    /// a step of each of [`BLURS_PX`]; infinite where there is no edge.
     pub fn fit_blurs<T: GreyPixel>(
         &mut self,
         scene: &MeanInput<'_, T>,
@@ -165,7 +165,7 @@ impl MeanEdge {
         let usual = weights.iter().flatten().take(USUAL_BLUR + 1).last();
         let is_found =
             usual.is_some_and(|usual| self.descend(scene, usual, ROUGHLY_CONVERGED).is_some());
-        // What other blurs change is the position within the profile, and hardly its direction.
+        // Another blur changes the position within the profile, and hardly its direction.
         let reach = self.half + BLUR_SHIFT_PX;
         let [profile, ..] = self.means(scene, -to_f64(reach), 2 * reach + 1);
         weights.map(|weights| {
@@ -174,7 +174,7 @@ impl MeanEdge {
         })
     }
 
-    /// Locates the edge that was approached, with a blur; `None` where there is none.
+    /// Locates the edge near the course with a blur \[px\]; `None` where there is none.
     pub fn locate<T: GreyPixel>(
         &mut self,
         scene: &MeanInput<'_, T>,
@@ -237,7 +237,7 @@ impl MeanEdge {
         None
     }
 
-    /// Mean over the rows of so many pixels at distances from the course, from one inwards
+    /// Mean profile over the rows, `count` pixels from the distance `first` inwards of the course
     /// on, and how it changes with the course's tilt and bend.
     fn means<T: GreyPixel>(&self, scene: &MeanInput<'_, T>, first: f64, count: usize) -> Profiles {
         // The lowest position of the profile, which inwards of a right edge is its last.
@@ -273,7 +273,7 @@ impl MeanEdge {
         })
     }
 
-    /// The same of ground and bead, free of the flank, as far as they lie in the gauge.
+    /// Mean profiles of ground and bead, from `free` pixels beside the edge on, within the gauge.
     fn side_profiles<T: GreyPixel>(&self, scene: &MeanInput<'_, T>, free: usize) -> SideProfiles {
         let ends = [-1.0, 0.0, 1.0].map(|position| self.course.at(position));
         let nearest = ends.into_iter().fold(f64::INFINITY, f64::min);
@@ -288,7 +288,7 @@ impl MeanEdge {
         }
     }
 
-    /// Positions of the caliper lines, less what all are shifted inwards by.
+    /// Positions of the caliper lines, corrected by `shift`, the common shift inwards \[px\].
     fn locate_lines<T: GreyPixel>(
         &mut self,
         scene: &MeanInput<'_, T>,
@@ -332,14 +332,14 @@ impl MeanEdge {
 /// course's tilt and bend \[grey levels\].
 type Profiles = [Vec<f64>; 3];
 
-/// The same of what lies beside an edge.
+/// Mean profiles of ground and bead beside an edge.
 #[derive(Debug)]
 struct SideProfiles {
     ground: Profiles,
     bead: Profiles,
 }
 
-/// Adds the values between the pixels of a row to sums, with the row's fractions of them.
+/// Adds a row, interpolated between its pixels, to the sums, times the row's fractions.
 #[inline(always)]
 fn add_row(sums: &mut [Vec<f32>; 3], pixels: &[f32], between: f32, fractions: [f32; 3]) {
     let [mean, tilt, bend] = sums;

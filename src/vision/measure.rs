@@ -32,11 +32,12 @@ use super::{axis, edge_lines, pool, vectors};
 use crate::numeric::number::to_f64;
 
 /// Standard deviation of a width of 4 blurs from the flanks' overlap, in blurs. Measured:
-/// reference/accuracy.md, Drawn frames: 2,000 beads of 5 to 600 px (`narrow`) with a blur of 1.5 px.
+/// reference/accuracy.md, Drawn frames: 2,000 beads of 5 to 600 px (`narrow`) with a blur of 1.5
+/// px.
 const OVERLAP_SIGMA: f64 = 0.045;
-/// The width for which that is \[blurs\]. By definition.
+/// Width for which [`OVERLAP_SIGMA`] holds \[blurs\]. By definition.
 const OVERLAP_REFERENCE_BLURS: f64 = 4.0;
-/// Blurs by which a width must be larger for 1/e of it. Measured: as [`OVERLAP_SIGMA`].
+/// Difference of width over which it falls to 1/e \[blurs\]. Measured: as [`OVERLAP_SIGMA`].
 const OVERLAP_DECAY_BLURS: f64 = 3.0;
 
 /// Measures frames of one cell; keeps its buffers from frame to frame.
@@ -60,7 +61,7 @@ impl Measurer {
         Edges { left: &self.work.left_px, right: &self.work.right_px }
     }
 
-    /// The same line by line, with how sure each position is. A refused frame has
+    /// The edges line by line, with the standard deviation of each position. A refused frame has
     /// the edges that were found before it was refused.
     pub fn calipers(&self) -> impl Iterator<Item = Caliper> {
         let Edges { left, right } = self.edges();
@@ -77,8 +78,8 @@ impl Measurer {
         })
     }
 
-    /// Local widths of the frame that was measured last, as far as its caliper lines
-    /// show them and the method knows their noise.
+    /// Local widths of the frame that was measured last; `None` where too few caliper lines show
+    /// them, or their noise is not known.
     pub fn local_widths(
         &self,
         measured: &WidthMeasurement,
@@ -96,8 +97,8 @@ impl Measurer {
         LocalWidths::read(self.calipers(), lines, filter, surface)
     }
 
-    /// Adds to the hints of the width that was measured last how skewed its flanks are: not
-    /// needed for a width, and determined well only by many frames.
+    /// Adds the skew of the flanks to the hints of the last measured width: a width does not need
+    /// it, and only many frames determine it well.
     #[must_use]
     pub fn with_skew(&self, found: WidthMeasurement) -> WidthMeasurement {
         WidthMeasurement { hints: Hints { skew: self.work.skew(), ..found.hints }, ..found }
@@ -130,7 +131,7 @@ impl Measurer {
         Ok(found)
     }
 
-    /// The same with no more in sigma than the image itself leaves open.
+    /// Measures with a sigma from the image alone, without the calibration's uncertainty.
     fn measure_image(&mut self, frame: &Frame, surface: &SurfaceMap) -> Outcome {
         let work = &mut self.work;
         work.left_px.clear();
@@ -155,9 +156,9 @@ impl Measurer {
     }
 }
 
-/// What the other edge's flank adds to the variance of an edge's position \[px²\], for both at
-/// so many pixels from each other and so blurred. Measured on 2,000 drawn beads of 5 to
-/// 600 px with a blur of 1.5 px.
+/// Variance that the other edge's flank adds to an edge's position \[px²\], for edges at a distance
+/// from each other \[px\] and with a blur \[px\]. Measured on 2,000 drawn beads of 5 to 600 px with
+/// a blur of 1.5 px.
 fn overlap_variance(width_px: f64, blur_px: f64) -> f64 {
     let blurs = width_px / blur_px;
     0.5 * (OVERLAP_SIGMA
@@ -201,8 +202,8 @@ impl MeasureState {
         }
     }
 
-    /// Measures edges that were measured as blurred steps in another way, where that shows
-    /// more; otherwise gives what was found.
+    /// Measures edges that were found as blurred steps by another model, where that explains more;
+    /// otherwise returns what was found.
     fn refine_measurement<T: GreyPixel>(
         &mut self,
         found: WidthMeasurement,
@@ -265,7 +266,7 @@ impl MeasureState {
         let skew_variance = self.skew_variance();
         let sides = [&self.left, &self.right].map(|tracer| {
             let of_compression = self.variance_of_compression(tracer, hints.contrast_grey);
-            // What rows vary by, where that is known, has some of the compression in it.
+            // The variance that rows show, where it is known, includes some of the compression's.
             let mean_variance =
                 tracer.uncertainty.mean_variance.map(|known| known.max(of_compression));
             let of_steps = if mean_variance.is_none() { of_compression } else { 0.0 };

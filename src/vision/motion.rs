@@ -11,10 +11,9 @@ const BOX_FRACTIONS: [f64; 8] = [0.0, 0.3, 0.5, 0.65, 0.78, 0.87, 0.93, 0.97];
 /// a parameter that is not there lowers it by 16 with the probability P(χ²₁ > 16) = 6·10⁻⁵, once in
 /// 15,000 frames.
 const MIN_GAIN: f64 = 16.0;
-/// The same beyond that of noise, and the blur \[px\], up to which the lens's blur fits well
-/// enough for other shapes to go on from: up to the box that is there each then fits better
-/// than the one before, and the shortest lowers the sum by a third and more of what the best
-/// does.
+/// Sum of squared residuals beyond that of noise, in variances of it, and blur \[px\] up to which
+/// the lens's fit is near enough for other shapes to start from: longer boxes then fit better and
+/// better up to the true one, and the shortest gains a third and more of what the best does.
 const MAX_NEAR_EXCESS: f64 = 250.0;
 const MAX_NARROW_BLUR_PX: f64 = 2.5;
 const MIN_PROMISING_GAIN: f64 = 5.0;
@@ -40,10 +39,10 @@ impl BlurShapes {
         self.table(0)
     }
 
-    /// Chooses the shape with the smallest sum of squared residuals of both edges. `looks` are
-    /// the fits with a lens's blur; `again` fits both with another shape, from such fits on or
-    /// from nothing. Returns the number of the chosen shape and the fits with it; `None` where
-    /// a lens's blur is enough.
+    /// Chooses the shape with the smallest sum of squared residuals of both edges. `looks` are the
+    /// fits with a lens's blur; `again` fits both with another shape, starting from given fits or
+    /// from none. Returns the number of the chosen shape and the fits with it; `None` where a
+    /// lens's blur is enough.
     pub fn choose(
         &self,
         looks: [&StepFit; 2],

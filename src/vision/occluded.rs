@@ -14,12 +14,12 @@ const WIDTH_TOLERANCE_PX: f32 = 40.0;
 /// Smallest distance of two steps, as a fraction of that of the rough edges.
 const MIN_WIDTH_RATIO: f32 = 0.3;
 
-/// A bead that was looked at.
+/// A bead of which an edge is hidden.
 #[derive(Debug, Clone, Copy)]
 pub struct OccludedBead<'a, T> {
-    /// What is looked at, left and right.
+    /// Input for the left and the right edge.
     pub scenes: [TraceInput<'a, T>; 2],
-    /// All steps of the bands.
+    /// Candidates of each band.
     pub candidates: &'a [StepCandidates],
     /// Whether the bead is brighter than what lies beside it.
     pub bright: bool,
@@ -53,8 +53,8 @@ impl<T: GreyPixel> OccludedBead<'_, T> {
         }
     }
 
-    /// Where an edge may be in a band: where it was located, or at any step of
-    /// its kind.
+    /// Positions where an edge may lie in a band \[px\]: where it was located, or any step of its
+    /// sign.
     fn candidate_positions(
         &self,
         band: usize,

@@ -3,7 +3,7 @@
 use super::located::CaliperEdge;
 use crate::numeric::rank;
 
-/// Distances at which neighbours are asked.
+/// Distances of the neighbours on either side that a position is compared with, in calipers.
 const NEIGHBOUR_DISTANCES: [usize; 3] = [1, 2, 3];
 /// Deviation that makes an outlier, in robust standard deviations. Derived: noise alone exceeds 5
 /// in 6 of ten million.
@@ -21,7 +21,7 @@ pub fn remove_outliers(edges: &mut [Option<CaliperEdge>], min_px: f64, buf: &mut
     for (k, deviation) in deviations.iter_mut().enumerate() {
         *deviation = self::deviation(positions, k).unwrap_or(f64::NAN);
     }
-    // The median is found where the positions were.
+    // The buffer of the positions is reused for the median.
     let mut sizes = 0;
     for deviation in deviations.iter().filter(|deviation| !deviation.is_nan()) {
         positions[sizes] = deviation.abs();
@@ -39,9 +39,9 @@ pub fn remove_outliers(edges: &mut [Option<CaliperEdge>], min_px: f64, buf: &mut
     sigma
 }
 
-/// How far a position lies from the line between neighbours at equal distance on
-/// either side: the median over several distances. `None` where there are no
-/// such neighbours; positions that are none are not a number.
+/// Distance of a position from the line between neighbours at equal distance on either side: the
+/// median over several distances. `None` where there are no such neighbours; missing positions are
+/// NaN.
 fn deviation(positions: &[f64], at: usize) -> Option<f64> {
     let here = positions[at];
     let mut found = [0.0; NEIGHBOUR_DISTANCES.len()];

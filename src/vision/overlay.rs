@@ -35,20 +35,20 @@ const MAX_ROWS: usize = 100;
 /// Farthest sample from the edge on either side \[px\].
 pub const HALF_SPAN: usize = 48;
 const SPAN: usize = 2 * HALF_SPAN;
-/// Rows are placed at the nearest of so many positions between pixels.
+/// Positions between pixels to which rows are rounded.
 const PHASES: usize = 2;
 /// Samples this near the edge show whether a row is like the others \[px\].
 const CORE_HALF: usize = 12;
 const JUDGED_SAMPLES: Range<usize> = HALF_SPAN - CORE_HALF..HALF_SPAN + CORE_HALF;
-/// A row that differs from the mean by so many times what rows do in the
-/// median is left out; the second time, when the mean is a better one.
+/// Squared difference of a row from the mean, relative to the rows' median, above which it is left
+/// out: at first, and in the second pass, when the mean is a better one.
 const MAX_ROW_MISFIT: [f32; 2] = [2.0, 1.7];
 /// Fraction of the rows that are most alike, from which a mean is made where many may be occluded.
 const BEST_FRACTION: f32 = 0.3;
-/// How often that mean is made anew: more cost time, fewer leave occluded rows in it.
+/// Rounds in which that mean is updated: more cost time, fewer leave occluded rows in it.
 const MAX_SETTLE_ROUNDS: usize = 5;
-/// What makes a row that is clipped at the end of the scale unlike the others, in
-/// such medians.
+/// Squared difference, relative to the median, above which a row that is clipped at the end of the
+/// scale is left out.
 const MAX_CLIPPED_MISFIT: f32 = 3.5;
 /// Variance that rounding to phases adds to the blur \[px²\]. Derived: (1/PHASES)²/12, the variance
 /// of a uniform error of half a pixel.
@@ -143,7 +143,7 @@ impl Default for Overlay {
 }
 
 impl Overlay {
-    /// Places windows where the edge is expected.
+    /// Superimposes windows at the expected edge, without rows that differ from the mean.
     #[inline(always)]
     pub fn lay(&mut self, sheet: &EdgeWindows) {
         self.lay_down(sheet);
@@ -158,9 +158,8 @@ impl Overlay {
         self.average(last * self.median_misfit, 0..SPAN);
     }
 
-    /// Places windows of which many may be covered: starts from
-    /// those that are said to be clear and goes on with those that are most
-    /// like the mean, over and over.
+    /// Superimposes windows of which many may be occluded: starts from those that are clear and
+    /// repeats with those most like the mean.
     #[inline(always)]
     pub fn lay_robustly(&mut self, sheet: &EdgeWindows, clear: impl Fn(usize) -> bool) {
         self.lay_clear(sheet, clear);
@@ -209,7 +208,7 @@ impl Overlay {
         reset(&mut self.row_misfits, self.rows.len(), 0.0);
     }
 
-    /// Means of the rows that are not unlike the others, in some columns.
+    /// Means of the rows whose misfit is at most `limit`, in some columns.
     #[inline(always)]
     fn average(&mut self, limit: f32, columns: Range<usize>) {
         self.phases = [PhaseMean::EMPTY; PHASES];
@@ -235,8 +234,8 @@ impl Overlay {
         }
     }
 
-    /// How far each row lies from the mean about the edge; returns how far a
-    /// fraction of them does at most.
+    /// Computes the misfit of each row: its squared difference from the mean about the edge.
+    /// Returns the quantile of the misfits at a fraction.
     #[inline(always)]
     fn compute_row_misfits(&mut self, fraction: f32) -> f32 {
         for ((row, placed), unlike) in self.rows.iter().zip(&self.placed).zip(&mut self.row_misfits)
@@ -258,10 +257,9 @@ impl Overlay {
         rank::at(&mut self.sorted, rank).unwrap_or(f32::INFINITY)
     }
 
-    /// Means of the rows in several parts along the bead, as grey levels. Only
-    /// rows that are very unlike the others are left out: of pixels that are cut
-    /// off above, more lie far below their mean than above it, and leaving them
-    /// out would lift it.
+    /// Means of the rows in several parts along the bead, as grey levels. Only rows that are very
+    /// unlike the others are left out: clipped pixels lie farther below their mean than above it,
+    /// and leaving them out would raise it.
     pub fn profiles(&self, parts: usize, profiles: &mut Vec<MeanProfilePart>) {
         reset(profiles, parts * PHASES, MeanProfilePart::EMPTY);
         let count = self.rows.len();
@@ -276,24 +274,24 @@ impl Overlay {
         }
     }
 
-    /// Rows that the means are of.
+    /// Number of rows in the means.
     pub fn used(&self) -> f64 {
         f64::from(self.phases.iter().map(|phase| phase.rows).sum::<f32>())
     }
 
-    /// Rows that were placed, and windows.
+    /// Number of rows that were placed, and of their windows.
     pub fn placed(&self) -> (f64, f64) {
         (self.placed.iter().map(|placed| f64::from(placed.rows)).sum(), to_f64(self.rows.len()))
     }
 
-    /// Variance of a window's samples about the mean near the edge, of the window
-    /// in the median, as squared fractions of the step.
+    /// Variance of the median window's samples about the mean near the edge, in squared fractions
+    /// of the step.
     pub fn row_variance(&self) -> f64 {
         f64::from(self.median_misfit) / to_f64(2 * CORE_HALF)
     }
 
-    /// The windows that differ by no more than so many medians of what rows do,
-    /// each with the mean that it is compared with.
+    /// Windows whose misfit is at most `many` times the median, each with the mean that it is
+    /// compared with.
     pub fn typical_rows(&self, many: f32) -> impl Iterator<Item = (&[f32], &[f32])> {
         let rows = self.rows.iter().zip(&self.placed).zip(&self.row_misfits);
         rows.filter(move |(_, unlike)| **unlike <= many * self.median_misfit).map(
@@ -329,8 +327,8 @@ impl PhaseMean {
     }
 }
 
-/// Each sample's distance from the path and its value, from a distance to another
-/// \[px\], where the path lies so far from the middle sample.
+/// Each sample's distance from the path and its value, from a distance to another \[px\]; `shift`
+/// is the distance of the path from the middle sample.
 #[inline(always)]
 fn samples(
     values: &[f32; SPAN],
@@ -343,7 +341,7 @@ fn samples(
     samples.map(move |(k, value)| (place(k) - shift, f64::from(*value)))
 }
 
-/// Number of the value that a fraction of all do not exceed.
+/// Rank of the value that a fraction of all values do not exceed.
 fn rank_of(count: usize, fraction: f32) -> usize {
     to_count((fraction * to_f32(count)).into()).min(count.saturating_sub(1))
 }

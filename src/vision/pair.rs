@@ -11,16 +11,17 @@ use crate::numeric::rank;
 /// Depth of a gap between two edges, as a fraction of the weaker one, that shows them
 /// to belong to two beads: it is deeper than the bead is high over the ground.
 const MIN_GAP_RATIO: f32 = 1.1;
-/// Depth of a gap up to which it is a seam within one bead. Measured: reference/accuracy.md, Drawn frames:
-/// lines of up to 60 % of the contrast (`ribs-weak`) are no edges; a little is left to noise.
+/// Depth of a gap up to which it is a seam within one bead. Measured: reference/accuracy.md, Drawn
+/// frames: lines of up to 60 % of the contrast (`ribs-weak`) are no edges; a little is left to
+/// noise.
 pub const MAX_SEAM_RATIO: f32 = 0.64;
 /// Strength of a pair within another one, as a fraction of the other's, from which on it
 /// fits as well: a rib of 81 % of the edges.
 pub const MIN_RIVAL_RATIO: f32 = 0.9;
-/// Fraction of the width by which two pairs differ at least, and how many pixels are enough.
+/// Smallest difference in width of two pairs: as a fraction of the width, or in pixels if less.
 const SAME_WIDTH_FRACTION: f32 = 0.03;
 const SAME_WIDTH_PX: f32 = 5.0;
-/// Fraction of the bands in which a gap is seen, in that of the bead's edges.
+/// Smallest fraction of the bands in which a gap is seen, relative to that of the bead's edges.
 const MIN_GAP_BAND_RATIO: f64 = 0.85;
 
 /// The two edges of the bead among the contours, by their numbers.

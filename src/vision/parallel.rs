@@ -27,7 +27,7 @@ impl StepPair {
 #[derive(Debug, Clone, Default)]
 pub struct ParallelEdges {
     spans: Vec<StepPair>,
-    /// Spans of each band within the distances that are being looked at.
+    /// Number of each band's pairs within the range of distances that is examined.
     within: Vec<u16>,
     /// Positions of the left edge, one a band \[px\]; NaN in bands that do not show
     /// both edges at the distance.
@@ -64,8 +64,7 @@ impl ParallelEdges {
         most >= MIN_BANDS
     }
 
-    /// Most bands that agree on a distance, and the middle of what they agree
-    /// on \[px\].
+    /// Largest number of bands with the same distance, and that distance \[px\].
     fn most_alike(&mut self, bands: usize) -> (usize, f32) {
         reset(&mut self.within, bands, 0);
         let (mut first, mut count) = (0, 0);

@@ -9,13 +9,13 @@ use crate::vision::buffer::refill;
 /// Bands on either side that a smoothed value is taken from.
 const NEIGHBOURS: usize = 3;
 
-/// By how much a bend must move the line through the neighbours to be one \[px\].
+/// Smallest shift by a bend, of the line through the neighbours, that is corrected \[px\].
 const MIN_BEND_PX: f32 = 0.1;
 
 /// Neighbours by whose median outliers are recognised.
 const OUTLIER_WINDOW: usize = 9;
-/// Distance from it that makes a value an outlier \[px\], and in typical distances
-/// beside.
+/// Distance from the median that makes a value an outlier: in pixels, and in typical distances in
+/// addition to that.
 const MIN_OUTLIER_PX: f32 = 1.2;
 const OUTLIER_RATIO: f32 = 4.0;
 
@@ -42,9 +42,8 @@ pub fn fill(rough: impl Iterator<Item = Option<f32>>, out: &mut Vec<f32>) -> boo
     true
 }
 
-/// Takes out values that lie far off the median of their neighbours: where a
-/// grain covers the edge for a few bands, its contour is not the edge's.
-/// `scratch` is a buffer.
+/// Sets values that lie far off the median of their neighbours to NaN: where a grain hides the edge
+/// for a few bands, its contour is not the edge's. `scratch` is a buffer.
 pub fn remove_outliers(values: &mut [f32], scratch: &mut Vec<f32>) {
     let count = values.len();
     if count < OUTLIER_WINDOW || runs_smoothly(values) {
@@ -78,8 +77,7 @@ pub fn remove_outliers(values: &mut [f32], scratch: &mut Vec<f32>) {
     }
 }
 
-/// Whether no value lies off the line between its neighbours far enough for a
-/// wild one.
+/// Whether no value lies far enough off the line between its neighbours to be an outlier.
 fn runs_smoothly(values: &[f32]) -> bool {
     values.windows(3).all(|near| (near[1] - 0.5 * (near[0] + near[2])).abs() < 0.5 * MIN_OUTLIER_PX)
 }
@@ -122,9 +120,8 @@ pub fn smooth(values: &[f32], out: &mut Vec<f32>) {
     }
 }
 
-/// The same for values that follow a parabola, which is left as it is where it is
-/// notable: the line through the neighbours of a bent edge runs inside it. The values
-/// are scratch afterwards.
+/// Smooths values that may follow a parabola. A notable one is left as it is, because the line
+/// through the neighbours of a bent edge runs inside it. `values` is overwritten.
 pub fn smooth_bent(values: &mut [f32], out: &mut Vec<f32>) {
     let middle = 0.5 * (to_f32(values.len()) - 1.0);
     let square = |band: usize| (to_f32(band) - middle) * (to_f32(band) - middle);
@@ -136,7 +133,7 @@ pub fn smooth_bent(values: &mut [f32], out: &mut Vec<f32>) {
         norm += bent * bent;
     }
     let bend = if norm > 0.0 { sum / norm } else { 0.0 };
-    // The bend times the mean square of the distances is what the line is off.
+    // The line is off by the bend times the mean square of the distances.
     let off = bend * to_f32(NEIGHBOURS * (NEIGHBOURS + 1)) / 3.0;
     if off.abs() < MIN_BEND_PX {
         return smooth(values, out);
@@ -150,8 +147,8 @@ pub fn smooth_bent(values: &mut [f32], out: &mut Vec<f32>) {
     }
 }
 
-/// What is expected of an edge along the gauge: position, level before it and
-/// step, on lines between the middles of the bands.
+/// Expected edge along the gauge: position, level before it and step, on lines between the middles
+/// of the bands.
 #[derive(Debug, Clone, Default)]
 pub struct EdgeTrajectory {
     middles: Vec<f32>,
@@ -161,19 +158,18 @@ pub struct EdgeTrajectory {
     per_px: f32,
 }
 
-/// By how much an edge is other than it was expected.
+/// Correction of an expected edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeCorrection {
     /// How far it lies aside \[px\].
     pub aside: f32,
-    /// Its level before the step, beyond the one that was expected, as a fraction of the
-    /// step.
+    /// Its level before the step, relative to the expected one, as a fraction of the step.
     pub before: f32,
-    /// The same of the level after it, beyond the one before that was expected.
+    /// Its level after the step, relative to the expected one before it, likewise.
     pub after: f32,
 }
 
-/// The course from the middle of a band to that of the next.
+/// The trajectory from the middle of a band to that of the next.
 #[derive(Debug, Clone, Copy)]
 struct TrajectorySegment {
     /// Where it begins and how long it is \[px\].
@@ -201,7 +197,7 @@ impl EdgeTrajectory {
         self.link();
     }
 
-    /// Moves all of it aside and takes other levels.
+    /// Shifts the whole trajectory and corrects its levels.
     pub fn correct(&mut self, EdgeCorrection { aside, before, after }: EdgeCorrection) {
         for [at, level, step] in &mut self.values {
             *at += aside;
@@ -211,8 +207,7 @@ impl EdgeTrajectory {
         self.link();
     }
 
-    /// Draws the line anew through better positions; levels stay. `scratch` is
-    /// scratch.
+    /// Draws the line again through better positions; levels stay. `scratch` is a buffer.
     pub fn redraw(&mut self, lines: &[RowRange], at: &[f32], scratch: &mut Vec<[f32; 3]>) {
         scratch.clear();
         scratch.extend(lines.iter().zip(at).map(|(&line, &at)| {
@@ -224,7 +219,7 @@ impl EdgeTrajectory {
         self.link();
     }
 
-    /// Takes over the levels of another course.
+    /// Takes the levels of another trajectory.
     pub fn take_levels(&mut self, other: &Self) {
         for (middle, value) in self.middles.iter().zip(&mut self.values) {
             let [_, before, step] = other.at(*middle);

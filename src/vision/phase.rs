@@ -8,7 +8,7 @@ pub fn split(at: f32, phases: usize) -> (isize, usize) {
     let fine = at * phases as f32 + 0.5;
     #[expect(clippy::cast_possible_truncation, reason = "a position near the gauge")]
     let whole = fine as isize;
-    // Truncation is a floor but for what is left of the gauge.
+    // Truncation is a floor except for negative positions, left of the gauge.
     let fine = whole - isize::from(fine < 0.0);
     let phases = phases.cast_signed();
     (fine.div_euclid(phases), fine.rem_euclid(phases).cast_unsigned())

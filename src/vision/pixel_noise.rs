@@ -16,7 +16,7 @@ const SAMPLED_COLUMNS: usize = 32;
 /// Distance of the neighbours along the bead \[px\]. By definition the next row: farther ones
 /// differ by more than noise.
 const ROW_DISTANCE: usize = 1;
-/// Differences beyond so many medians are edges and grains.
+/// Difference, in medians, beyond which it is that of an edge or a grain.
 const MAX_MEDIANS: f32 = 4.5;
 /// Fraction of the variance of a normal number that is left below that limit. Derived: 1 −
 /// 2cφ(c)/(2Φ(c) − 1) with c = 4.5 · 0.6745.
@@ -24,7 +24,7 @@ const KEPT_VARIANCE_FRACTION: f32 = 0.976;
 /// Standard deviation of rounding to whole levels. Derived: 1/√12.
 const MIN_NOISE_STEPS: f32 = 0.2887;
 
-/// Noise up to which it is not distinguished from rounding, as a multiple of that.
+/// Ratio to the noise of rounding up to which noise is not distinguished from it.
 const MAX_ROUNDING_RATIO: f32 = 1.2;
 
 /// Noise of pixels.
@@ -32,13 +32,13 @@ const MAX_ROUNDING_RATIO: f32 = 1.2;
 pub struct PixelNoise {
     /// Standard deviation \[grey levels of 256\].
     pub grey: f32,
-    /// Whether it is hardly more than rounding: a compression or the camera took it away,
-    /// and what it left in its place is not that of neighbours.
+    /// Whether it is hardly more than rounding: a compression or the camera removed it, and
+    /// differences of neighbours do not show what remains.
     pub is_suppressed: bool,
 }
 
 impl PixelNoise {
-    /// That of the pixels in some columns.
+    /// Noise of the pixels in some columns.
     #[inline(always)]
     pub fn read<T: GreyPixel>(strip: &GaugeRows<'_, T>, columns: Range<usize>) -> Self {
         let grey = of(strip, columns);
@@ -55,7 +55,7 @@ pub fn of<T: GreyPixel>(strip: &GaugeRows<'_, T>, columns: Range<usize>) -> f32 
     let mut differences = [u16::MAX; SAMPLED_ROWS * SAMPLED_COLUMNS];
     for k in 0..rows {
         let v = (2 * k + 1) * room / (2 * rows);
-        // Another position in each row: 13 has no divisor in common with ROWS.
+        // Another position in each row: 13 has no divisor in common with `SAMPLED_ROWS`.
         let first = columns.start + 13 * k % SAMPLED_ROWS * slots / SAMPLED_ROWS;
         let (row, other) = (strip.row(v), strip.row(v + ROW_DISTANCE));
         let pixels = row[first..first + run].iter().zip(&other[first..first + run]);
@@ -72,9 +72,8 @@ pub fn of<T: GreyPixel>(strip: &GaugeRows<'_, T>, columns: Range<usize>) -> f32 
     }
 }
 
-/// Standard deviation behind `total` differences, of which those that are
-/// noise's count; the rest of the list is larger than any. The scale ends at
-/// `white`.
+/// Standard deviation of a pixel from `total` differences, without those of edges and grains; the
+/// rest of the list is larger than any. The scale ends at `white`.
 #[inline(always)]
 fn spread(differences: &[u16; SAMPLED_ROWS * SAMPLED_COLUMNS], total: usize, white: u32) -> f32 {
     let mut median = 0;

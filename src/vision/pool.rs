@@ -12,7 +12,7 @@ use crate::numeric::number::{to_f32, to_f64};
 /// [`GreyPixel::sum_of_four`].
 const ROWS_PER_PROFILE: usize = 4;
 
-/// Distance of such rows at most \[px\].
+/// Largest distance between these rows \[px\].
 const MAX_ROW_DISTANCE: usize = 2;
 
 /// Profiles at most: the pick needs no more, and reading whole rows is what
@@ -79,7 +79,7 @@ impl Bands {
         self.full = 0;
         self.pixels = 0;
         for (profile, rows) in self.profiles.chunks_exact_mut(strip.across).zip(&self.bounds) {
-            // Where there are fewer, some are taken twice.
+            // Of a band with fewer rows, some are taken twice.
             let row = |k| strip.row(sampled_row(k, rows.first, rows.end));
             let rows = [row(0), row(1), row(2), row(3)];
             add_up(rows, self.shift, profile);

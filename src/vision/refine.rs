@@ -19,7 +19,7 @@ const MAX_HALF: usize = 30;
 /// Shortest half window \[px\]: the levels on either side need some pixels.
 const MIN_HALF: usize = 4;
 
-/// Where to look and how.
+/// Input of the refinement.
 #[derive(Debug, Clone, Copy)]
 pub struct RefinerInput<'a, T> {
     /// The gauge's pixels.
@@ -179,7 +179,7 @@ impl LineRefiner {
         self.noise_grey = if freedom > 0.0 { (residual / freedom).sqrt().max(0.05) } else { 0.05 };
     }
 
-    /// The rough positions smear the overlay; the located ones do not.
+    /// Fits the blur again at the located positions: approximate ones smear the overlay.
     fn sharpen_blur(&mut self, table: &StepTable) {
         self.profile = BinnedProfile::default();
         for band in 0..self.rough.len() {
@@ -213,9 +213,8 @@ impl LineRefiner {
             let start = FittedEdge { at: alone.edge.at, ground, height, shading };
             *edge = window.fit(start, Some(&prior)).map(|fit| CaliperEdge {
                 at: fit.edge.at,
-                // Levels that neighbours share are wrong for all of them
-                // together, so that the mean of many edges is no surer than
-                // if each had found its own.
+                // Levels that neighbours share are wrong for all of them together, so that the mean
+                // of many edges is no more certain than if each had its own.
                 variance: alone.variance[0] * noise,
                 height: fit.edge.height,
                 row_fraction: 1.0,

@@ -86,7 +86,7 @@ pub enum Reject {
         width_mm: f64,
         /// Its standard deviation \[mm\].
         sigma_mm: f64,
-        /// The same without the calibration's uncertainty \[mm\].
+        /// Standard deviation without the calibration's uncertainty \[mm\].
         edges_sigma_mm: f64,
         /// Largest standard deviation, as a fraction of the width: the gauge's
         /// `max_sigma`.
@@ -121,7 +121,7 @@ pub enum Reject {
     Vague {
         /// Strength of the weaker edge, in typical steps of the texture.
         got: f64,
-        /// The same that is needed.
+        /// Strength that is needed.
         need: f64,
     },
     /// Two pairs of edges fit equally well.

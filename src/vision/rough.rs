@@ -43,50 +43,50 @@ const ROUNDS: usize = 3;
 /// Fraction of the rows of a caliper line that must show the edge.
 const MIN_ROWS_FRACTION: f64 = 0.5;
 
-/// Blur of an edge of which nothing is known: lenses that are nearly in focus, and what is
-/// too fine to be followed.
+/// Prior of an edge's blur: lenses that are nearly in focus, and roughness too fine to be followed.
 const PRIOR_BLUR: MeanBlur = MeanBlur { px: 1.8, variance: 1.0 };
-/// Standard deviation of the blurs of two edges about each other, as a fraction.
+/// Relative difference between the blurs of two edges, as a standard deviation.
 const BLUR_DIFFERENCE: f64 = 0.02;
-/// The same of what is too fine to be followed, as a fraction of it.
+/// Uncertainty of the roughness too fine to be followed, as a fraction of it.
 const FINE_ROUGHNESS_FRACTION: f64 = 0.2;
 
-/// How likely a groove that does not show its depth must be to be located as one.
+/// Probability of a groove that hides its depth from which on the edge is located beside it.
 const MIN_LIKELY_GROOVE: f64 = 0.18;
-/// How likely it must be for the uncertainty of its shape to count.
+/// Probability of such a groove from which on the uncertainty of its shape counts.
 const MIN_POSSIBLE_GROOVE: f64 = 0.085;
-/// How likely it must be for the shape of the whole flank to count as well, where it lies far from
-/// where rows pass half height: of drawn edges beside weak narrow grooves, some that were taken for
-/// sloping ground lay 0.7 px off.
+/// Probability of such a groove from which on the shape of the whole flank counts as well, where
+/// that lies far from where rows pass half height: of drawn edges beside weak narrow grooves, some
+/// that were taken for sloping ground lay 0.7 px off.
 const MIN_CONCEIVABLE_GROOVE: f64 = 0.03;
 /// That distance \[px\].
 const MAX_SHAPE_OFFSET_PX: f64 = 0.5;
 
-/// Standard deviation that the waves of an edge leave open beside a groove that hides its depth, as
-/// a fraction of theirs: the mean over them is no Gaussian flank. Found on 12,000 rendered beads.
+/// Standard deviation of an edge beside a groove that hides its depth, as a fraction of that of the
+/// edge's waves: the mean over waves is no Gaussian flank. Found on 12,000 rendered beads.
 const GROOVE_WAVINESS_FRACTION: f64 = 0.15;
-/// The same at most \[px\].
+/// Largest value of that standard deviation \[px\].
 const MAX_GROOVE_WAVINESS_PX: f64 = 0.15;
-/// The same beside a groove that shows its depth and is narrow. Measured: reference/accuracy.md, Drawn frames
-/// (`grooves`): without it 3.5 of 30,000 widths were more than 5 sigma off, with it 2.5.
+/// That fraction beside a groove that shows its depth and is narrow. Measured:
+/// reference/accuracy.md, Drawn frames (`grooves`): without it 3.5 of 30,000 widths were more than
+/// 5 sigma off, with it 2.5.
 const NARROW_GROOVE_WAVINESS_FRACTION: f64 = 0.06;
 /// Widest groove that is narrow in this sense \[px\].
 const MAX_NARROW_GROOVE_PX: f64 = 7.5;
 
-/// Standard deviation, beside that of noise, of where rows pass half height as the edge beside a
-/// groove \[px\]: its floor may be hidden, and torn edges have no Gaussian flank. Measured:
-/// reference/accuracy.md, What the parts bring: averaged with the groove's shape by their variances, the same
-/// piece of real concrete differs from frame to frame by 0.33 px in the median, with the shape
-/// alone by 0.36.
+/// Standard deviation, beside that of noise, of the crossing of half height as the edge beside a
+/// groove \[px\]: the groove's floor may be hidden, and torn edges have no Gaussian flank.
+/// Measured: reference/accuracy.md, What the parts bring: averaged with the groove's shape by their
+/// variances, the same piece of real concrete differs from frame to frame by 0.33 px in the median,
+/// with the shape alone by 0.36.
 const GROOVE_CROSSING_SIGMA_PX: f64 = 0.5;
 
 /// Difference of the bead's level beside the edge from that farther inside, in standard deviations
-/// of what light does, from which on the former is taken.
+/// of the change by light, from which on the level beside the edge is used.
 const MIN_LEVEL_SIGMAS: f64 = 0.5;
-/// Standard deviation of the shift that this makes, as a fraction of it.
+/// Standard deviation of the shift by that level, as a fraction of it.
 const SHIFT_FRACTION: f64 = 0.2;
-/// How far off the shape may lie then, in what such a difference makes of the pixels that are
-/// summed within the edge: a flank that is no blurred step lies farther.
+/// Largest distance of the shape then, in shifts that such a difference makes over the pixels
+/// summed inside the edge: a flank that is no blurred step lies farther.
 const MAX_LEVEL_SHIFT: f64 = 2.0;
 
 /// Finds one edge; keeps its buffers from frame to frame.
@@ -104,7 +104,7 @@ pub struct RoughEdge {
     shape: Option<GrooveShape>,
 }
 
-/// What was found of an edge.
+/// Fit of a rough edge.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RoughFit {
     /// Variance of the mean position over the gauge \[px²\].
@@ -126,7 +126,7 @@ pub struct RoughFit {
     /// Fraction of the pixels about the edge that show neither the bead nor what lies
     /// outside.
     pub odd_fraction: f64,
-    /// The same of the bead farther inside: its texture's.
+    /// That fraction in the bead farther inside, by its texture.
     pub odd_fraction_within: f64,
     /// Standard deviation of the smoothing along the bead \[px\].
     pub along_px: f64,
@@ -135,8 +135,8 @@ pub struct RoughFit {
 }
 
 impl RoughFit {
-    /// Whether the odd pixels about the edge exceed those of the bead's texture by such a
-    /// fraction.
+    /// Whether the fraction of odd pixels about the edge exceeds that of the bead's texture by more
+    /// than `by`.
     pub fn exceeds_texture(&self, by: f64) -> bool {
         self.odd_fraction > self.odd_fraction_within + by
     }
@@ -194,7 +194,7 @@ impl RoughEdge {
         let is_groove_likely =
             shape.is_some_and(|shape| shape.groove_probability > MIN_LIKELY_GROOVE);
         let noise = position_noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
-        // Where a rib or a shade lies within, only the level beside the edge is the bead's.
+        // Where a rib or a shadow lies within, only the level beside the edge is the bead's.
         let off = |shape: &GrooveShape| shape.at - to_f64(OUTSIDE_PX) - self.crossings.off_course;
         let contrast = self.levels.contrast();
         let of_level = |shape: &GrooveShape| {
@@ -225,7 +225,8 @@ impl RoughEdge {
             if is_groove_likely {
                 let (weight, of_groove) = (weight_of(shape), shape.variance + of_waves);
                 let rest = 1.0 - weight;
-                // Both are of the same pixels and read them differently: a correlation of a half.
+                // Both come from the same pixels and read them differently: a correlation of a
+                // half.
                 let common = weight * rest * (of_groove * of_crossing).sqrt();
                 return weight * weight * of_groove + rest * rest * of_crossing + common;
             }

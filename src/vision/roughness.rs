@@ -29,14 +29,14 @@ use spectrum::{BLUR_FACTORS, FrameKind, Spectrum, lengths_mm};
 /// Largest standard deviation of the logarithm of roughness with which it is reported: what twenty
 /// to thirty correlation lengths of bead leave.
 const MAX_LOG_SIGMA: f64 = 0.3;
-/// The same of the correlation length.
+/// Largest standard deviation of the logarithm of the correlation length, likewise.
 const MAX_LENGTH_LOG_SIGMA: f64 = 0.65;
 /// By how much roughness must be more likely than noise alone, in the logarithm. Derived: 3²/2,
 /// three standard deviations (likelihood ratio, Wilks 1938).
 const MIN_LOG_EVIDENCE: f64 = 4.5;
 /// Kinds of frames that are distinguished at most; a run has one or two.
 const MAX_KINDS: usize = 8;
-/// Part by which a smaller blur must be smaller to be taken over.
+/// Ratio to the known blur below which a smaller one replaces it.
 const MIN_BLUR_DECREASE: f64 = 0.95;
 /// Steps in which the most likely roughness is looked for.
 const SCORING_STEPS: usize = 12;
@@ -68,7 +68,7 @@ impl Roughness {
     }
 }
 
-/// Gathers local widths over frames. Memory does not grow with their number.
+/// Accumulates local widths over frames. Memory does not grow with their number.
 #[derive(Debug, Clone, Default)]
 pub struct RoughnessEstimator {
     lengths_mm: Vec<f64>,
@@ -136,7 +136,7 @@ impl RoughnessEstimator {
         }
         let (mut sum, mut roughness, mut length) = (0.0, LogMean::default(), LogMean::default());
         for (fit, length_mm) in fits.iter().zip(self.lengths_mm.iter().cycle()) {
-            // Beforehand 1/length is taken for uniform: uniform in the logarithm of the
+            // The prior is uniform in 1/length: with one that is uniform in the logarithm of the
             // length, estimates from little bead would be a fifth too long.
             let weight = (fit.log_likelihood - best).exp() * fit.log_variance.sqrt() / length_mm;
             sum += weight;
@@ -176,7 +176,7 @@ impl RoughnessEstimator {
                     information += 0.5 * part * part * spectrum.frames;
                 }
             }
-            // Of the logarithm, by a factor of e at most.
+            // A step of the logarithm, limited to a factor of e.
             let step = slope / information;
             if !step.is_finite() {
                 return None;
@@ -188,7 +188,7 @@ impl RoughnessEstimator {
         Some(GridFit { square_mm2: square, log_variance: 1.0 / information, log_likelihood })
     }
 
-    /// A square to begin with: all that was seen.
+    /// Squared roughness to start from \[mm²\]: as if all of the spectrum were roughness.
     fn first_square(&self, case: GridPoint) -> Option<f64> {
         let seen = |spectrum: &Spectrum| -> f64 {
             spectrum.squares.iter().take(case.of(spectrum).len()).sum()
@@ -224,7 +224,7 @@ struct GridFit {
     log_likelihood: f64,
 }
 
-/// How likely what was seen is for the square of a roughness.
+/// Logarithm of a spectrum's likelihood for a squared roughness.
 fn log_likelihood(spectrum: &Spectrum, expected: &[f64], square_mm2: f64) -> f64 {
     let noise = spectrum.noise / spectrum.frames;
     let terms = expected.iter().zip(&spectrum.passed).zip(&spectrum.squares);
@@ -235,14 +235,14 @@ fn log_likelihood(spectrum: &Spectrum, expected: &[f64], square_mm2: f64) -> f64
     terms.map(term).sum()
 }
 
-/// Mean and standard deviation of a logarithm.
+/// Weighted sums for the mean and standard deviation of a logarithm.
 #[derive(Debug, Clone, Copy, Default)]
 struct LogMean {
     sum: f64,
     squares: f64,
 }
 
-/// See [`LogMean`].
+/// Mean and standard deviation of a logarithm.
 #[derive(Debug, Clone, Copy)]
 struct LogEstimate {
     mean: f64,

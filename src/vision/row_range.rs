@@ -10,7 +10,7 @@ pub struct RowRange {
 }
 
 impl RowRange {
-    /// From a row up to before another.
+    /// Rows from `first` to the one before `end`.
     pub const fn new(first: usize, end: usize) -> Self {
         Self { first, end }
     }

@@ -11,15 +11,15 @@ use crate::numeric::number::to_count;
 const MIN_VISIBLE_FRACTION: f64 = 0.4;
 /// Largest uncertainty about an edge's position that a hidden level may leave \[px\].
 const MAX_CLIPPED_SIGMA_PX: f64 = 0.2;
-/// Ground on either side of the bead that its noise is taken from \[px\].
+/// Ground on either side of the bead from which the noise is estimated \[px\].
 const NOISE_COLUMNS_PX: f32 = 24.0;
 /// Its distance from the edges \[px\].
 const NOISE_MARGIN_PX: f32 = 6.0;
 
-/// A bead that was looked at.
+/// A bead of which an edge is clipped.
 #[derive(Debug, Clone, Copy)]
 pub struct SaturatedBead<'a, T> {
-    /// What is looked at, left and right.
+    /// Input for the left and the right edge.
     pub scenes: [TraceInput<'a, T>; 2],
     /// Rough positions of the left edge, band by band \[px\].
     pub lefts: &'a [Option<f32>],
@@ -28,8 +28,8 @@ pub struct SaturatedBead<'a, T> {
 }
 
 impl<T: GreyPixel> SaturatedBead<'_, T> {
-    /// Traces edges that were looked at, of which these are clipped before or
-    /// after them. Returns the noise of a pixel \[grey levels\].
+    /// Traces both edges; `cut_off` says for each whether the levels before and after it are
+    /// clipped. Returns the noise of a pixel \[grey levels\].
     #[cold]
     pub fn trace(
         &self,

@@ -10,24 +10,23 @@ const SMOOTHER_HALF: usize = SMOOTHER.len() / 2;
 /// Excess of a variance that is accepted, in standard deviations of its own uncertainty. Derived:
 /// noise alone exceeds 2.5 in 0.6 % of the frames.
 pub const MIN_EXCESS_SIGMAS: f64 = 2.5;
-/// Positions beyond the terms of their course that show their spread. Derived: the mean of 1/χ²
-/// with f degrees of freedom is 1/(f − 2), which exists from 3 on.
+/// Fewest degrees of freedom that show a spread. Derived: the mean of 1/χ² with f degrees of
+/// freedom is 1/(f − 2), which exists from 3 on.
 const MIN_FREEDOM: f64 = 3.0;
 
-/// A position off the course of its edge.
+/// Residual of a position about the curve of its edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeResidual {
-    /// Distance from the course \[px\].
+    /// Distance from the curve \[px\].
     pub px: f64,
     /// Fraction of a band's rows that the position comes from.
     pub row_fraction: f64,
 }
 
-/// By how much the variance of the mean of an edge's positions is larger than
-/// that of independent ones: from what is left of them when a parabola through
-/// nine neighbours, the bead's own shape, is taken off, and from its
-/// correlation over neighbours. `variance` is what noise explains of a position;
-/// at least 1.
+/// Factor by which the variance of the mean of an edge's positions exceeds that of independent
+/// ones: from the residuals about a parabola through nine neighbours, which follows the bead's own
+/// shape, and from their correlation over neighbours. `variance` is what noise explains of a
+/// position; at least 1.
 ///
 /// `None` where gaps leave too few neighbours; see [`inflation_with_gaps`].
 pub fn variance_inflation(
@@ -51,8 +50,8 @@ pub fn variance_inflation(
     let passed = [residual_covariance(0), residual_covariance(1), residual_covariance(2)];
     let (same, next) = (product(0), product(1));
     let ratio = same / (passed[0] * variance);
-    // The products of what is left are correlated over a few neighbours, so
-    // that there are fewer of them than it seems.
+    // Products of residuals are correlated over a few neighbours, so that fewer of them are
+    // independent.
     let ratio_sigma = (2.0 * 1.43 / n).sqrt();
     if ratio < 1.0 + MIN_EXCESS_SIGMAS * ratio_sigma {
         return Some(1.0);
@@ -66,9 +65,9 @@ pub fn variance_inflation(
     Some(((itself + 2.0 * with_next.max(0.0)) / variance).max(ratio))
 }
 
-/// The same of positions with gaps between them: the reduced χ² of their residuals about a fitted
-/// polynomial with so many terms. The bead's own shape counts as an error too: the gaps hide as
-/// much of it.
+/// Variance inflation of positions with gaps between them: the reduced χ² of their residuals about
+/// a fitted polynomial with `terms` terms. The bead's own shape counts as an error too: the gaps
+/// hide as much of it.
 pub fn inflation_with_gaps(
     positions: impl Iterator<Item = EdgeResidual>,
     variance: f64,
@@ -87,11 +86,11 @@ pub fn inflation_with_gaps(
     if ratio < 1.0 + MIN_EXCESS_SIGMAS * (2.0 / degrees_of_freedom).sqrt() {
         return 1.0;
     }
-    // So few do not show their own spread well: mean of its inverse.
+    // Few residuals give an uncertain spread: corrected by the mean of 1/χ².
     ratio * degrees_of_freedom / (degrees_of_freedom - 2.0)
 }
 
-/// What the parabola leaves of the middle position; `None` where one is missing.
+/// Residual of the middle position about the parabola; `None` where a position is missing.
 fn residual(positions: &[Option<f64>]) -> Option<f64> {
     let mut smooth = 0.0;
     for (position, weight) in positions.iter().zip(SMOOTHER) {

@@ -15,7 +15,7 @@ const TILE: usize = 16;
 
 /// Grey values as the measurement takes them.
 pub trait GreyPixel: Copy + Default + PartialOrd + Into<u32> {
-    /// What the sum of up to 128 values fits.
+    /// Type that holds the sum of up to 128 values.
     type Sum: Copy + Default;
     /// The sum of four, without its lowest `shift` bits, which must fit 16.
     fn sum_of_four(values: [Self; 4], shift: u32) -> u16;

@@ -24,9 +24,9 @@ const MAX_PLAIN_CHUNKS: usize = 2;
 const MAX_CHUNKS: usize = 6;
 /// Half the core, in blurs. Derived: beyond 3.5 blurs 2·10⁻⁴ of a step is left, 1 − Φ(3.5).
 const CORE_BLURS: f64 = 3.5;
-/// And beyond that \[px\], for an edge between two pixels.
+/// Margin beyond that \[px\], for an edge between two pixels.
 const CORE_MARGIN_PX: f64 = 1.0;
-/// Chunks of the core in textured surroundings, of which nothing is plain.
+/// Fewest chunks of the core in textured surroundings, of which nothing is plain.
 const TEXTURED_CORE_CHUNKS: usize = 4;
 
 type Chunk = [f32; LANES];
@@ -65,8 +65,7 @@ pub struct StepTemplate {
     pub products: Products,
 }
 
-/// What a row shows: how far it is from the levels and the position it was
-/// expected to have.
+/// Sums of a row's residuals from the levels and the position that were expected.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RowSums {
     /// Residual times the slope of the step.
@@ -77,12 +76,12 @@ pub struct RowSums {
     pub before: f32,
     /// Residual times the fraction after it.
     pub after: f32,
-    /// Pixels that lie too far off to be noise; they count as fitting.
+    /// Pixels that lie too far off to be noise; their residual counts as 0.
     pub wild: f32,
 }
 
 impl RowSums {
-    /// Of a row whose edge lies beyond what was read of it.
+    /// Sums of a row whose edge lies outside the pixels that were read.
     pub const OUT_OF_SIGHT: Self =
         Self { slope: 0.0, sum_of_squares: 0.0, before: 0.0, after: 0.0, wild: f32::INFINITY };
 }
@@ -105,8 +104,8 @@ impl PlainSums {
 /// Position and levels that a row is compared with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExpectedStep {
-    /// Position of the edge \[px\], within a sixteenth of a pixel of the one that
-    /// was asked for: a pixel and a phase.
+    /// Position of the edge, rounded to a pixel and a phase: within a sixteenth of a pixel of the
+    /// one that was requested \[px\].
     pub at: f32,
     position: isize,
     phase: usize,
@@ -114,11 +113,10 @@ pub struct ExpectedStep {
     pub before: f32,
     /// Step to the level after it \[grey levels\].
     pub step: f32,
-    /// Plain pixels farther from their level are grains or sparks
-    /// \[grey levels\].
+    /// Residual from which on a plain pixel shows a grain or a spark \[grey levels\].
     pub tolerance: f32,
-    /// The same for pixels of the step, where the position may be off a little
-    /// \[grey levels\].
+    /// That residual for pixels of the step, where the position may be off a little \[grey
+    /// levels\].
     pub tolerance_at_step: f32,
 }
 
@@ -188,8 +186,7 @@ impl StepTemplate {
         self.products = products.mean();
     }
 
-    /// Plain pixels of a row before the edge and after it; half a one where
-    /// there are none.
+    /// Number of plain pixels of a row before the edge and after it; 0.5 where there are none.
     pub fn plain_pixels(&self) -> [f64; 2] {
         let parts = &self.parts[..self.chunks];
         let count = |parts: &[TemplateChunk]| -> f64 {
@@ -290,7 +287,7 @@ fn fill_core(part: &mut TemplateChunk, table: &StepTable, shape: &StepShape, fir
     }
 }
 
-/// The same of the surroundings, on one side of the edge.
+/// Fills a chunk of the surroundings, on one side of the edge.
 #[expect(clippy::cast_possible_truncation, reason = "distances and slopes")]
 #[inline(always)]
 fn fill_plain(part: &mut TemplateChunk, shape: &StepShape, first: f64) {
@@ -364,7 +361,7 @@ impl Products {
     }
 }
 
-/// Chunks that hold so many pixels.
+/// Number of chunks that hold a number of pixels.
 fn chunks(pixels: f64) -> usize {
     to_count((pixels.max(0.0) / to_f64(LANES)).ceil())
 }

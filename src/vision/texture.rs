@@ -6,29 +6,27 @@ use std::sync::LazyLock;
 use super::overlay::{Overlay, SideRange};
 use crate::numeric::number::{narrow_to_f32, to_count, to_f64};
 
-/// Variance of the rows about an edge, in that of their noise, from which on
-/// they are looked at for texture: noise alone, in 100 rows, has less in all but one of
-/// a hundred.
+/// Variance of the rows about an edge, relative to that of their noise, from which on texture is
+/// looked for: noise alone, in 100 rows, has less in all but one of a hundred.
 const MIN_VARIANCE_RATIO: f64 = 1.12;
-/// Rows differ more about the edge than beside it where the edge is no blurred
-/// step or does not lie where it is thought; by more than so many times, and it
-/// is not texture that makes them differ.
+/// Largest ratio of the rows' variance about the edge to that beside it: more is not texture, but
+/// an edge that is no blurred step or does not lie where it is expected.
 const MAX_EDGE_RATIO: f64 = 1.6;
-/// Smallest variance of a texture, in that of the noise.
+/// Smallest variance of a texture, relative to that of the noise.
 const MIN_TEXTURE_RATIO: f64 = 0.1;
 /// Longest texture \[px\]: what changes more slowly is light, or the bead's
 /// shape, which the levels of the caliper lines follow.
 const MAX_LENGTH_PX: f64 = 11.0;
 /// Variance of the texture on one side over that on the other below which they differ.
 const MAX_SIDE_RATIO: f64 = 0.25;
-/// Samples beyond so many standard deviations are grains and sparks. Derived: noise alone exceeds 4
-/// in 6 of 100,000 samples.
+/// Residual of a sample, in standard deviations, at which it is clipped as that of a grain or a
+/// spark. Derived: noise alone exceeds 4 in 6 of 100,000 samples.
 const OUTLIER_SIGMAS: f64 = 4.0;
-/// Rows that differ by so many medians of what rows do have one on them.
+/// Misfit of a row, relative to the median, beyond which a grain or a spark lies on it.
 const MAX_ROW_MISFIT: f32 = 4.0;
-/// Distances at which samples are compared \[px\], up to.
+/// Largest distance at which samples are compared \[px\].
 const LAGS: usize = 8;
-/// Samples of a side that are needed for that.
+/// Fewest samples of a side for that comparison.
 const MIN_SIDE_PX: usize = 2 * LAGS;
 /// Longest segment of a row on one side of the edge \[px\].
 const MAX_SIDE_PX: usize = 40;
@@ -42,26 +40,25 @@ const LENGTHS: usize = 30;
 const FIRST_LENGTH_PX: f64 = 0.7;
 /// Ratio of one to the next.
 const LENGTH_RATIO: f64 = 1.12;
-/// Rows of a window at most; more are taken for so many.
+/// Rows of a window at most; larger windows are treated like one of this many.
 const MAX_ROWS: usize = 8;
 /// Table of the integrals along the edge: positions for each correlation length.
 const PER_LENGTH: usize = 8;
-/// Correlation lengths that it reaches: beyond, nothing is left.
+/// Correlation lengths that the table covers: beyond, the autocorrelation is negligible.
 const TABLE_LENGTHS: usize = 12;
 
 /// Texture and noise about an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceTexture {
-    /// Variance of the noise, which every pixel has for itself.
+    /// Variance of the noise, which is independent from pixel to pixel.
     pub noise: f64,
     /// Variance of the texture.
     variance: f64,
     /// Distance over which it is correlated \[px\].
     length: f64,
-    /// Which of [`POWERS`] its autocorrelation has.
+    /// Index in [`POWERS`] of its autocorrelation's power.
     power: usize,
-    /// Rows of a window, and the fraction of the texture that is left of it in
-    /// their mean.
+    /// Rows of a window, and the fraction of the texture's variance that remains in their mean.
     rows: f64,
     kept_fraction: f64,
     /// Standard deviations before and after the edge, over the root of their mean square.
@@ -69,10 +66,9 @@ pub struct SurfaceTexture {
 }
 
 impl SurfaceTexture {
-    /// Reads it from windows superimposed, `None` where there is no
-    /// texture to speak of. `noise` is the variance of a pixel, all variances
-    /// are as squared fractions of the step; `beside` are the pixels that are free of
-    /// the edge, before it and after it.
+    /// Reads the texture from superimposed windows; `None` where there is no significant one.
+    /// `noise` is the variance of a pixel, all variances are squared fractions of the step;
+    /// `beside` are the pixels that are free of the edge, before it and after it.
     #[inline(always)]
     pub fn read(overlay: &Overlay, noise: f64, beside: [SideRange; 2]) -> Option<Self> {
         let (rows, windows) = overlay.placed();
@@ -102,15 +98,14 @@ impl SurfaceTexture {
         if length > MAX_LENGTH_PX {
             return None;
         }
-        // What neighbouring rows differ by, as noise is found, has a little of
-        // the texture in it.
+        // Noise from the differences of neighbouring rows includes a little of the texture.
         let noise = (rows * (all[0] - kept_fraction * variance)).clamp(0.25 * noise, 1.1 * noise);
         let sides = side_levels(sides.map(|side| side.map(|all| (rows * all - noise).max(0.0))));
         let texture = Self { noise, variance, length, power, rows, kept_fraction, sides };
         (rows * kept_fraction * variance > MIN_TEXTURE_RATIO * noise).then_some(texture)
     }
 
-    /// With grey levels instead of fractions of a step.
+    /// This texture in grey levels instead of fractions of a step.
     pub fn in_grey(self, step: f64) -> Self {
         let square = step * step;
         Self { noise: square * self.noise, variance: square * self.variance, ..self }
@@ -121,7 +116,7 @@ impl SurfaceTexture {
         self.kept_fraction * self.variance
     }
 
-    /// Variance of the noise in it.
+    /// Variance of the noise in that mean.
     pub fn noise_of_window(&self) -> f64 {
         self.noise / self.rows
     }
@@ -145,16 +140,16 @@ impl SurfaceTexture {
         self.variance * self.length * TABLES.along(self.power, distance / self.length)
     }
 
-    /// Variance of the mean over a large area, times the number of its pixels,
-    /// where of the rows only every so many-th is seen.
+    /// Variance of the mean over a large area, times the number of its pixels, where only one of
+    /// `pitch` rows is seen.
     pub fn over_area(&self, pitch: f64) -> f64 {
         // The integral of a texture over an area, for the powers from 1 to 2.
         let area = std::f64::consts::PI * self.length * self.length * 2.0 / POWERS[self.power];
         self.noise + self.variance * (area / pitch.max(1.0)).max(self.length)
     }
 
-    /// Squared correlation of pixels, summed up over a window: so many of them
-    /// show of its strength what one alone does.
+    /// Squared correlation of pixels, summed up over a window: the number of pixels that show as
+    /// much of the texture's strength as one independent pixel.
     pub fn effective_pixels(&self) -> f64 {
         let all = self.of_window() + self.noise_of_window();
         let shared = |lag: usize| (self.within_window(to_f64(lag)) / all).powi(2);
@@ -171,8 +166,8 @@ struct Covariances {
 }
 
 /// Standard deviations before and after the edge, over the root of their mean square, from
-/// variances: weights for the same texture on both sides assume that what they see on the one
-/// shows them the other.
+/// variances; 1 where they do not differ much. Weights for one texture on both sides assume that
+/// each side shows that of the other.
 fn side_levels(sides: [Option<f64>; 2]) -> [f64; 2] {
     match sides {
         [Some(before), Some(after)] if before.min(after) < MAX_SIDE_RATIO * before.max(after) => {
@@ -213,7 +208,7 @@ fn covariances(overlay: &Overlay, beside: [SideRange; 2], limit: f64) -> Option<
     if counts[0] == 0.0 {
         return None;
     }
-    // The mean that is taken off has some of every window in it.
+    // Every window is a part of the mean that was subtracted from it.
     let (_, windows) = overlay.placed();
     let fraction = windows / (windows - 1.0).max(1.0);
     for (sum, count) in sums.iter_mut().zip(counts) {
@@ -241,7 +236,7 @@ fn correlation(distance: f64, power: f64) -> f64 {
     (-distance.powf(power)).exp()
 }
 
-/// What a texture is like.
+/// Autocorrelation that was fitted.
 struct AutocorrelationFit {
     power: usize,
     length: f64,
@@ -270,8 +265,8 @@ impl TextureTables {
         }
     }
 
-    /// What texture explains the covariances of windows of so many rows best.
-    /// Those of pixels with themselves have noise in them and are passed over.
+    /// Texture that explains the covariances of windows of `rows` rows best. Their variances
+    /// include noise and are left out.
     fn fit(&self, covariances: &[f64; LAGS + 1], rows: f64) -> AutocorrelationFit {
         let rows = rows.clamp(1.0, to_f64(MAX_ROWS));
         let fewer = (1..MAX_ROWS).rfind(|&few| to_f64(few) <= rows).unwrap_or(1);
@@ -338,7 +333,7 @@ fn sums_along(power: f64) -> [f64; TABLE_LENGTHS * PER_LENGTH + 1] {
     })
 }
 
-/// Mean over all pairs of neighbouring rows of what depends on their distance.
+/// Mean over all pairs of a window's rows of a value that depends on their distance.
 fn mean_of_pairs(by_distance: &[f64]) -> f64 {
     let rows = by_distance.len();
     let pairs = by_distance.iter().enumerate().map(|(apart, value)| {

@@ -36,28 +36,27 @@ use parts::{
 /// Passes over the rows at most; a second one is made only where the first
 /// path was off by a good part of the blur.
 const MAX_PASSES: usize = 3;
-/// Distance of the path from the edge from which on pixels are read anew \[px\].
+/// Distance of the path from the edge from which on pixels are read again \[px\].
 const MAX_PATH_OFFSET_PX: f64 = 4.0;
 /// Fraction of the blur by which a path may be off.
 const MAX_PATH_ERROR_BLURS: f64 = 0.2;
 /// Rows that are taken together at most.
 const MAX_GROUP_ROWS: usize = 8;
-/// Misfit up to which an edge is a blurred step certainly.
+/// Misfit up to which an edge is certainly a blurred step.
 const MAX_STEP_MISFIT: f64 = 1.5;
-/// Fraction of the rows from which on an edge is taken to be covered in part.
+/// Fraction of rows that do not fit above which an edge is occluded in part.
 const MAX_UNFIT_FRACTION: f64 = 0.03;
-/// Misfit of the clear rows from which on the edge is not covered, but no blurred
-/// step at all.
+/// Misfit of the clear rows from which on the edge is not occluded, but no blurred step at all.
 const MAX_CLEAR_MISFIT: f64 = 1.25;
 
-/// What is looked at.
+/// Input for one edge.
 #[derive(Debug, Clone, Copy)]
 pub struct TraceInput<'a, T> {
     /// The gauge's pixels.
     pub strip: &'a GaugeRows<'a, T>,
     /// The blurred step.
     pub table: &'a StepTable,
-    /// Its bands.
+    /// The gauge's bands.
     pub bands: &'a Bands,
     /// Rows of its caliper lines.
     pub lines: &'a [RowRange],
@@ -74,14 +73,14 @@ pub struct TraceInput<'a, T> {
 pub struct EdgeTracer {
     values: BandValues,
     course: EdgeTrajectory,
-    /// A course along bands with levels that were picked anew.
+    /// Trajectory along the bands with levels that were picked again.
     levels: EdgeTrajectory,
     winding: WindingState,
     sheet: EdgeWindows,
     overlay: Overlay,
     /// The fit of a blurred step to the mean profile.
     pub step_fit: Option<StepFit>,
-    /// What was read of the edge, and how far aside of the course it was \[px\].
+    /// Shape of the edge, and its distance from the course when it was read \[px\].
     shape: Option<StepShape>,
     aside_px: f64,
     textured: TexturedFit,
@@ -95,16 +94,16 @@ pub struct EdgeTracer {
     state: EdgeState,
     /// Fraction of the rows that certainly show something other than the edge.
     pub unfit_fraction: f64,
-    /// What a row in the median leaves of the step that it is compared with, in
-    /// standard deviations of its noise; about 1 where the edge is one.
+    /// Median residual of a row from the step that it is compared with, in standard deviations of
+    /// its noise; about 1 for a blurred step.
     pub misfit: f64,
-    /// Rows that were held together at most.
+    /// Largest number of rows that were compared together.
     max_group_rows: f64,
     /// Blur of the edge \[px\].
     pub blur_px: f64,
-    /// Whether ground lies beside it, no groove.
+    /// Whether ground lies beside it, and not a groove.
     pub is_on_ground: bool,
-    /// How sure its positions are, beside what each shows.
+    /// Uncertainty of its positions beyond the variance of each.
     pub uncertainty: EdgeUncertainty,
 }
 
@@ -137,26 +136,24 @@ impl EdgeTracer {
         self.state != EdgeState::NotFound
     }
 
-    /// Whether the edge was found to be covered in part, and is located from
-    /// its clear rows alone.
+    /// Whether the edge was found to be occluded in part, and is located from its clear rows alone.
     pub fn is_occluded(&self) -> bool {
         self.state == EdgeState::Occluded
     }
 
-    /// Whether the edge was not found, or seems to be covered and no clear rows
-    /// were found.
+    /// Whether the edge was not found, or seems to be occluded and no clear rows were found.
     pub fn is_lost(&self) -> bool {
         matches!(self.state, EdgeState::NotFound | EdgeState::Unresolved)
     }
 
-    /// The misfit as if rows had been held one by one: what is no blurred step shows
-    /// the more, the more rows are taken together.
+    /// The misfit as if rows had been compared one by one: the misfit of an edge that is no blurred
+    /// step grows with the number of rows that are averaged.
     pub fn misfit_of_a_row(&self) -> f64 {
         let beyond = (self.misfit * self.misfit - 1.0) / self.max_group_rows.max(1.0);
         (1.0 + beyond.max(0.0)).sqrt()
     }
 
-    /// Whether nothing covers the edge, or its clear rows are known.
+    /// Whether nothing occludes the edge, or its clear rows are known, and it is a blurred step.
     pub fn is_clear(&self) -> bool {
         matches!(self.state, EdgeState::Clear | EdgeState::Occluded)
             && self.misfit < MAX_STEP_MISFIT
@@ -167,8 +164,8 @@ impl EdgeTracer {
         self.course.at(narrow_to_f32(v))[0]
     }
 
-    /// Looks at the edge along rough positions, one a band: its blur. `None` where there is no
-    /// edge.
+    /// First fit of the edge along rough positions, one a band. Returns its blur; `None` where
+    /// there is no edge.
     #[inline(always)]
     pub fn fit_first<T: GreyPixel>(
         &mut self,
@@ -194,7 +191,7 @@ impl EdgeTracer {
         self.lay_over(scene)
     }
 
-    /// Lays the rows over each other along the course and looks at what they show.
+    /// Superimposes the rows along the course and fits a step to them; returns its blur.
     #[inline(always)]
     fn lay_over<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> Option<BlurEstimate> {
         self.read(scene);
@@ -205,7 +202,7 @@ impl EdgeTracer {
         self.step_fit.as_ref().map(StepFit::blur)
     }
 
-    /// Whether the edge was located with weights that know the texture beside it.
+    /// Whether the edge was located with weights for the texture beside it.
     pub fn is_textured(&self) -> bool {
         self.textured.texture.is_some()
     }
@@ -216,15 +213,15 @@ impl EdgeTracer {
         self.misfit.is_finite() && self.overlay.rises_beside(after, noise)
     }
 
-    /// How skewed the edge's flank is; `None` where it is not located as a blurred step
-    /// that nothing covers.
+    /// Skew of the edge's flank; `None` where it is not located as a blurred step that nothing
+    /// occludes.
     pub fn skew(&self, table: &StepTable) -> Option<EdgeSkew> {
         let is_step = self.state == EdgeState::Clear && self.misfit.is_finite();
         self.overlay.with(table).skew(self.step_fit.as_ref().filter(|_| is_step)?)
     }
 
-    /// Looks at the same rows once more, with another shape of the blur, from a fit to
-    /// them on or from nothing. What is known of a texture stays.
+    /// Fits the same rows with another shape of the blur, starting from a fit to them or from none.
+    /// The noise by a texture that was found stays.
     #[inline(always)]
     pub fn refit<T: GreyPixel>(
         &self,
@@ -239,8 +236,8 @@ impl EdgeTracer {
         fitter.first_fit(self.step_fit?.pixel_noise, self.room(scene))
     }
 
-    /// Draws the path through the picked positions, as far as they are no outliers, with
-    /// the levels beside it. Returns whether there is any.
+    /// Draws the path through the picked positions without outliers, with the levels beside it.
+    /// Returns whether there is any.
     #[inline(always)]
     fn take_picked<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         let rough = self.values.picked.iter().map(|at| at.is_finite().then_some(*at));
@@ -260,7 +257,7 @@ impl EdgeTracer {
         true
     }
 
-    /// Reads the shape of the edge that was looked at, with what is known of its blur.
+    /// Reads the shape of the edge from its first fit, with a prior of its blur.
     #[inline(always)]
     pub fn take_shape(&mut self, table: &StepTable, blur: BlurEstimate) {
         self.shape = None;
@@ -278,13 +275,13 @@ impl EdgeTracer {
         [before, before + step]
     }
 
-    /// What lies beside the edge whose shape was read.
+    /// Levels and shape of the edge whose shape was read; `None` where it was not.
     pub fn surroundings(&mut self) -> Option<Surroundings<'_>> {
         let [before, after] = self.levels();
         Some(Surroundings { shape: self.shape.as_mut()?, before, step: after - before })
     }
 
-    /// Locates the edge whose shape was read; `blur` as there.
+    /// Locates the edge whose shape was read; `blur` as in [`Self::take_shape`].
     #[inline(always)]
     pub fn trace<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: BlurEstimate) {
         let found = self.trace_open(scene);
@@ -298,7 +295,7 @@ impl EdgeTracer {
         }
     }
 
-    /// Locates the edge as if nothing covered it.
+    /// Locates the edge as if nothing occluded it; `false` without a shape.
     #[inline(always)]
     fn trace_open<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         let Some(shape) = self.shape else { return false };
@@ -318,7 +315,7 @@ impl EdgeTracer {
         true
     }
 
-    /// Traces once more as if nothing covered the edge.
+    /// Traces once more as if nothing occluded the edge.
     #[cold]
     #[inline(never)]
     fn trace_again<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>, blur: BlurEstimate) {
@@ -344,7 +341,7 @@ impl EdgeTracer {
         self.textured.texture = Some(texture.in_grey(typical(&self.values.step).into()));
     }
 
-    /// Makes the template; one that knows the texture where there is some.
+    /// Tabulates the template, with weights for the texture where there is one.
     fn tabulate(&mut self, table: &StepTable, shape: &StepShape) {
         self.textured.scatter = None;
         if let Some(texture) = &self.textured.texture {
@@ -358,15 +355,15 @@ impl EdgeTracer {
         }
     }
 
-    /// Variance of a pixel of the mean of so many rows \[grey levels²\].
+    /// Variance of a pixel in the mean of `rows` rows \[grey levels²\].
     fn pixel_variance<T: GreyPixel>(&self, scene: &TraceInput<'_, T>, rows: f32) -> f32 {
         let texture =
             self.textured.texture.map_or(0.0, |texture| narrow_to_f32(texture.of_window()));
         scene.noise * scene.noise / rows + texture
     }
 
-    /// Locates the edge anew, line by line, where it is not a blurred step.
-    /// Returns whether there is one.
+    /// Locates the edge again, line by line, where it is not a blurred step. Returns whether there
+    /// is one.
     #[cold]
     pub fn refine<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) -> bool {
         let width_px = f64::from(scene.width_px);
@@ -388,8 +385,8 @@ impl EdgeTracer {
         found
     }
 
-    /// How far there is nothing but this edge certainly: up to the gauge's
-    /// boundary and to the middle of the bead.
+    /// Distance on either side that certainly holds only this edge: up to the gauge's boundary and
+    /// to the middle of the bead.
     fn room<T: GreyPixel>(&self, scene: &TraceInput<'_, T>) -> Clearance {
         let (low, high) =
             self.values.path.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &at| {
@@ -407,8 +404,8 @@ impl EdgeTracer {
         Clearance { before: before.into(), after: after.into() }
     }
 
-    /// Takes over what the overlay shows: the path is moved, and levels and
-    /// shading are those at the edge.
+    /// Applies the shape of the overlay: the path is moved, and levels and shading become those at
+    /// the edge.
     fn apply_shape(&mut self, shape: StepShape) -> StepShape {
         let BlurredStep { at, before, after, .. } = shape.step;
         let height = after - before;
@@ -423,8 +420,8 @@ impl EdgeTracer {
         }
     }
 
-    /// Moves what is expected aside and takes other levels: those before and after
-    /// the edge as fractions of the step.
+    /// Shifts the expected edge and corrects its levels: those before and after the edge, as
+    /// fractions of the step.
     fn shift_course(&mut self, aside: f64, before: f64, after: f64) {
         let [aside, before, after] = [aside, before, after].map(narrow_to_f32);
         self.course.correct(EdgeCorrection { aside, before, after });
@@ -440,13 +437,13 @@ impl EdgeTracer {
         self.sheet.read(scene.strip, scene.lines, grouping, |v| course.at(v));
     }
 
-    /// Draws the path anew through the edges that were found.
+    /// Draws the path again through the edges that were found.
     #[inline(always)]
     fn redraw<T: GreyPixel>(&mut self, scene: &TraceInput<'_, T>) {
         self.fill_from_edges(scene);
         path::median_of_three(&mut self.scratch.rough);
         if self.textured.texture.is_some() && !self.winding.is_followed {
-            // What the texture makes of a position is no path.
+            // The noise of positions by texture is not part of the path.
             path::smooth(&self.scratch.rough, &mut self.scratch.sorted);
             std::mem::swap(&mut self.scratch.rough, &mut self.scratch.sorted);
         }

@@ -1,17 +1,16 @@
 //! How much of a midline's direction and bend is the waviness of its two edges.
 //!
-//! Each edge of a bead waves for itself. What both do together, the midline,
-//! is taken for the bead's axis; what they do against each other changes the
-//! width along the gauge. Both are of one size, so that the width's course, and
-//! what the midline does more often than a bead's axis would, show how much of
-//! the midline's slope is no slope of the axis.
+//! Each edge of a bead waves independently. What both do together, the midline, is taken for the
+//! bead's axis; what they do against each other changes the width along the gauge. Both have the
+//! same variance, so that the width along the gauge, and waves of the midline that are shorter than
+//! a bend of the axis, show how much of the midline's slope is no slope of the axis.
 
 use std::sync::LazyLock;
 
 use super::curve::EdgeCurve;
 use crate::numeric::number::to_f64;
 
-/// Legendre coefficients that are looked at: of the orders 1 to 8.
+/// Legendre coefficients that are used: those of the orders 1 to 8.
 pub const ORDERS: usize = 8;
 /// Orders that a curve has. By definition those up to t⁴ without the mean.
 pub const CURVE_ORDERS: usize = 4;
@@ -25,12 +24,12 @@ const VARIANCE_RATIO: f64 = 2.0;
 const VARIANCE_COUNT: usize = 18;
 /// Points of the gauge for the integrals over it.
 const INTEGRAL_POINTS: usize = 40;
-/// Evidence that is accepted, in standard deviations of what noise makes. Derived: noise alone
-/// exceeds 4 in 6 of 100,000 frames.
+/// Evidence for waves, in its standard deviations by noise, from which on it is accepted. Derived:
+/// noise alone exceeds 4 in 6 of 100,000 frames.
 const MIN_EVIDENCE_SIGMAS: f64 = 4.0;
 /// Degrees of freedom of the waves' variance.
 const DEGREES_OF_FREEDOM: f64 = 10.0;
-/// How likely a bent bead is to show a coefficient, in the density of waves at none.
+/// Probability density of a bent bead's coefficient, relative to that of waves at zero.
 const BENT_DENSITY: f64 = 0.02;
 
 /// What kind of waves an edge has.
@@ -44,9 +43,9 @@ pub enum WaveKind {
 }
 
 impl WaveKind {
-    /// Small waves are likelier than large ones beforehand, by this power of their
-    /// variance: with 1, the mean variance of waves whose length is known is without bias.
-    /// Waves as long as the gauge leave a slope unsure, and less scatter with less.
+    /// Power of the prior of the waves' variance, by which small waves are likelier than large
+    /// ones: with 1, the mean variance of waves whose length is known is without bias. Waves as
+    /// long as the gauge leave a slope uncertain, and estimates spread less with a smaller power.
     fn variance_prior_power(self) -> f64 {
         match self {
             Self::Smooth => 0.7,
@@ -54,9 +53,9 @@ impl WaveKind {
         }
     }
 
-    /// Part of the waves' first order that an axis along the edges is off by, in the mean of
-    /// squares: widths of drawn rough beads are without bias up to a third with it. That of
-    /// torn ones, with grooves and texture beside them, is larger.
+    /// Mean squared error of an axis along the edges, as a fraction of the waves' first order:
+    /// widths of drawn rough beads are without bias up to a third with it. That of torn ones, with
+    /// grooves and texture beside them, is larger.
     pub fn slope_fraction(self) -> f64 {
         match self {
             Self::Smooth => 0.6,
@@ -132,7 +131,7 @@ impl Evidence {
         (sum > 0.0).then(|| waves.map(|value| value / sum))
     }
 
-    /// Logarithm of how likely the coefficients are with waves of some variance.
+    /// Logarithm of the likelihood of the coefficients for waves of a variance.
     fn log_likelihood(&self, fractions: &[f64; ORDERS], variance: f64) -> f64 {
         let (mut product, mut sum) = (1.0, 0.0);
         for (order, fraction) in fractions.iter().enumerate() {
@@ -149,19 +148,19 @@ impl Evidence {
 #[derive(Debug, Clone, Copy)]
 pub struct Midline([f64; CURVE_ORDERS]);
 
-/// What of a midline's bends is waves.
+/// Part of a midline's bends that waves explain.
 #[derive(Debug, Clone, Copy)]
 pub struct Bends {
     /// Mean square of the slope that waves make \[px²\].
     pub of_waves: f64,
     /// Standard deviation of that \[px²\].
     pub of_waves_sigma: f64,
-    /// How likely the bead itself is evenly bent.
+    /// Probability that the bead itself is evenly bent.
     pub bent_probability: f64,
 }
 
 impl Midline {
-    /// Of a left and a right edge.
+    /// Midline of a left and a right edge.
     pub fn of([left, right]: &[EdgeCurve; 2]) -> Self {
         Self(std::array::from_fn(|k| {
             f64::midpoint(left.coefficient(k + 1), right.coefficient(k + 1))
@@ -174,9 +173,8 @@ impl Midline {
         a * a + 3.0 * b * b + 6.0 * c * c + 10.0 * d * d + 2.0 * a * c + 6.0 * b * d
     }
 
-    /// Mean square of the slope that comes from bends, as far as waves of these
-    /// variances explain them, and the uncertainty that leaves where a bead that is
-    /// bent could explain them as well.
+    /// Mean square of the slope by bends, as far as waves of these variances explain them, and its
+    /// uncertainty where a bent bead could explain them as well.
     pub fn bends_of(&self, waves: &[f64; CURVE_ORDERS]) -> Bends {
         let mut axis = *self;
         let (mut explained_by_waves, mut variance) = (0.0, 0.0);
@@ -195,9 +193,9 @@ impl Midline {
     }
 }
 
-/// How likely it is that waves alone make a coefficient, by its square in their
-/// variance, which is estimated from a dozen coefficients: Student's density, beside
-/// that of a bead that is bent by any amount.
+/// Probability that waves alone make a coefficient, from its square relative to their variance,
+/// which is estimated from a dozen coefficients: Student's density, beside that of a bead that is
+/// bent by any amount.
 fn posterior_of_waves(square: f64) -> f64 {
     let waves = (1.0 + square / DEGREES_OF_FREEDOM).powf(-0.5 * (DEGREES_OF_FREEDOM + 1.0));
     waves / (waves + BENT_DENSITY)

@@ -21,8 +21,8 @@ impl Default for NoiseWhitener {
 }
 
 impl NoiseWhitener {
-    /// Takes the covariances of pixels at distances of 0, 1, … Returns whether
-    /// they can be ones.
+    /// Factorises the covariances of pixels at distances of 0, 1, … Returns whether they are
+    /// positive definite.
     pub fn prepare(&mut self, count: usize, covariance: impl Fn(usize) -> f64) -> bool {
         self.count = count.min(MAX_PIXELS);
         let mut by_distance = [0.0; MAX_PIXELS];
@@ -48,9 +48,9 @@ impl NoiseWhitener {
         true
     }
 
-    /// Replaces the slope of a step by the weights of its position, so that their
-    /// product with the slope is 1 and those with the fractions after and before
-    /// the step are 0; returns the variance that they leave to the position.
+    /// Replaces the slope of a step by the weights of its position, so that their product with the
+    /// slope is 1 and those with the fractions after and before the step are 0. Returns the
+    /// variance of the position; `None` where the levels explain the whole slope.
     pub fn weights(&self, slope: &mut [f64; MAX_PIXELS], after: &[f64; MAX_PIXELS]) -> Option<f64> {
         let n = self.count;
         let mut after = *after;

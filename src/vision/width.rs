@@ -4,7 +4,7 @@ use super::reject::Reject;
 use crate::calibration::SurfaceMap;
 use crate::core::{ImagePoint, Mm};
 
-/// A width that can be trusted, and how far.
+/// A measured width and its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WidthMeasurement {
     /// Distance between the bead's two edges at the surface, normal to the
@@ -21,12 +21,12 @@ pub struct WidthMeasurement {
     pub right: ImagePoint,
     /// Angle of the bead's axis to the gauge's, in the image \[rad\].
     pub slant_rad: f64,
-    /// What the person who sets up light and lens wants to know.
+    /// Quality of the image, for setting up light and lens.
     pub hints: Hints,
 }
 
 impl WidthMeasurement {
-    /// Adds what the calibration leaves open to the image's own sigma.
+    /// Adds the calibration's uncertainty to the image's own sigma.
     pub(super) fn with_calibration(self, surface: &SurfaceMap) -> Result<Self, Reject> {
         let Some(fraction) = surface.width_relative_sigma_of([self.left, self.right]) else {
             return Ok(self);
@@ -61,8 +61,8 @@ pub struct Hints {
     pub saturated_fraction: f64,
     /// Fraction of the caliper lines that the width comes from.
     pub used_fraction: f64,
-    /// How far the skew of the flanks moves the width; none where it was not asked for, or
-    /// the edges are no blurred steps.
+    /// How far the skew of the flanks moves the width; `None` where it was not requested, or the
+    /// edges are no blurred steps.
     pub skew: Option<WidthSkew>,
 }
 
@@ -101,7 +101,7 @@ pub struct Caliper {
 pub struct CaliperPoint {
     /// In raw image pixels.
     pub at: ImagePoint,
-    /// Standard deviation across the bead \[px\], as the pixels' noise explains
-    /// it; none where the method knows none.
+    /// Standard deviation across the bead \[px\], as the pixels' noise explains it; `None` where
+    /// the method has none.
     pub sigma_px: Option<f64>,
 }
