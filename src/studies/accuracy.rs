@@ -24,8 +24,8 @@ const SILENT_PX: f64 = 0.5;
 const INTERVAL_SIGMAS: f64 = 1.96;
 
 impl SetFigures {
-    /// Of a set with a pixel of `mm_per_px`; `None` stands for a frame that was
-    /// refused.
+    /// Figures of a set whose pixels have a size of `mm_per_px` \[mm/px\]; `None` is a rejected
+    /// frame.
     pub fn of(set: &Set, mm_per_px: f64, outcomes: &[Option<WidthError>]) -> Self {
         let mut figures = Self::without_verdict(set, mm_per_px, outcomes);
         figures.missed = verdict::misses(&set.limits, &figures);

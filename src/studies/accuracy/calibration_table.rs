@@ -13,8 +13,8 @@ use crate::numeric::number::to_f64;
 const MAX_RATIO_DEVIATION: f64 = 0.10;
 /// Fraction of the true widths that the 95 % interval must hold.
 const COVERAGE_RANGE: (f64, f64) = (0.93, 0.97);
-/// Standard errors that are allowed for the number of trials. Derived: three miss one figure in
-/// 370 by chance.
+/// Standard errors by which a figure may miss its limit. Derived: three miss one figure in 370 by
+/// chance.
 const ALLOWANCE_SIGMAS: f64 = 3.0;
 
 /// The figures of one case.
@@ -30,21 +30,21 @@ pub struct CalibrationFigures {
     pub noise_px: Option<f64>,
     /// Calibrations.
     pub trials: usize,
-    /// Those that were found.
+    /// Trials that gave a calibration.
     pub found: usize,
-    /// Root mean square error of a width over the trials, relative to the width: the
-    /// smallest and the largest of the beads.
+    /// Root mean square error of a width over the trials, relative to the width: the smallest and
+    /// the largest value over the beads.
     pub rms_error_fraction: [f64; 2],
-    /// The same of the error over what its own calibration predicts: the smallest and
-    /// the largest of the beads.
+    /// Root mean square of the error over the standard deviation that its own calibration
+    /// predicts: the smallest and the largest value over the beads.
     pub ratio: [f64; 2],
-    /// The same over all beads together.
+    /// Root mean square of [`Self::ratio`] over all beads.
     pub ratio_of_all: f64,
     /// Fraction of the true widths that lie in the 95 % interval.
     pub within_interval: f64,
-    /// Mean error over the standard deviation, of the bead where it is largest.
+    /// Largest magnitude over the beads of the mean error over the standard deviation.
     pub bias_over_sigma: f64,
-    /// Limits that are missed.
+    /// The limits that are missed.
     pub missed: Vec<String>,
 }
 
@@ -55,7 +55,7 @@ struct BeadFigures {
 }
 
 impl CalibrationFigures {
-    /// Out of the widths of each trial.
+    /// Figures of one case from the widths of each trial; `None` is a trial without a calibration.
     pub fn of(
         case: &CalibrationCase,
         source: CornerSource,
@@ -93,7 +93,7 @@ impl CalibrationFigures {
         figures
     }
 
-    /// Few trials leave a figure open by itself: so much is granted.
+    /// Compares with the limits, widened by the standard error that few trials leave.
     fn misses(&self) -> Vec<String> {
         let trials = to_f64(self.found.max(1));
         let open = MAX_RATIO_DEVIATION.max(ALLOWANCE_SIGMAS / (2.0 * trials).sqrt());

@@ -24,8 +24,8 @@ const IMAGE_MARGIN_PX: f64 = 8.0;
 const MAX_TRIES: u64 = 2000;
 /// Cells along each side of the board on the bed, a bead in the middle of each.
 const GRID_CELLS: u32 = 5;
-/// Width of a bead over the board's length. Derived: 1 / `GRID_CELLS`, so that the outer beads
-/// end at the outer corners.
+/// Width of a bead over the board's length. Derived: 1 / `GRID_CELLS`, so that the outer beads end
+/// at the outer corners.
 const BEAD_WIDTH_FRACTION: f64 = 1.0 / 5.0;
 
 /// A camera that is calibrated with boards.
@@ -37,15 +37,15 @@ pub struct CalibrationCase {
     pub camera: Camera,
     /// Size of its images \[px\].
     pub image_size_px: [u32; 2],
-    /// Distance of the boards \[mm\].
+    /// Distance of the boards from the camera \[mm\].
     pub distance_mm: f64,
     /// The board.
     pub board: Board,
-    /// Images that are taken.
+    /// Number of images for one calibration.
     pub views: u64,
     /// Standard deviation of a corner's position in one direction \[px\].
     pub noise_px: f64,
-    /// Whether it is also tried with rendered images: one case for each camera is.
+    /// Whether there are also trials with rendered images: for one case of each camera.
     pub rendered: bool,
 }
 
@@ -67,7 +67,7 @@ pub struct CalibratedWidth {
 pub enum CornerSource {
     /// The true positions with the case's noise.
     Corners,
-    /// Images that are rendered and searched.
+    /// Corners that are detected in rendered images.
     Images,
 }
 
@@ -79,9 +79,8 @@ pub struct CalibrationBench {
     seed: u64,
 }
 
-/// The cameras that are tried: a long lens on a cell's usual image, a short one
-/// with much distortion, and a larger image; few and many views, little and much
-/// noise.
+/// The cameras of the trials: a long focal length with the usual image size of a cell, a short one
+/// with strong distortion, and a larger image; with few and many views, low and high noise.
 pub fn cases() -> Result<Vec<CalibrationCase>, BoardError> {
     let camera = |focal: f64, centre: [f64; 2], k: [f64; 4]| {
         Camera::pinhole([focal, focal * 1.001], centre).with_five([k[0], k[1], k[2], k[3], 0.0])
@@ -115,7 +114,7 @@ pub fn cases() -> Result<Vec<CalibrationCase>, BoardError> {
 }
 
 impl CalibrationBench {
-    /// For trials with corners from one source.
+    /// Prepares trials whose corners come from one source.
     pub fn new(case: CalibrationCase, source: CornerSource) -> Self {
         let seed = hash::mix(&case.name.bytes().map(u64::from).collect::<Vec<_>>());
         let studio = (source == CornerSource::Images)
@@ -123,10 +122,10 @@ impl CalibrationBench {
         Self { case, studio, seed }
     }
 
-    /// Calibrates once, with boards held at random, and measures beads that lie where
-    /// the last board did, on the bed and 5 % of the distance above it. An image in which
-    /// no board is found is left out, as a user's would be. `None` where that is the one of
-    /// the bed, or where no calibration was found.
+    /// Calibrates once with boards in random poses. Then measures beads at the position of the
+    /// last board, on the bed and at a height of 5 % of the distance. An image without a detected
+    /// board is left out. `None` if that is the image of the bed, or if the calibration cannot be
+    /// solved.
     pub fn calibrate(&self, trial: u64) -> Option<Vec<CalibratedWidth>> {
         let key = hash::mix(&[self.seed, trial]);
         let poses: Vec<Pose> = (0..self.case.views)
@@ -156,7 +155,7 @@ impl CalibrationBench {
             .collect()
     }
 
-    /// As a file would hold it.
+    /// The result in the form that a calibration file has.
     fn calibration(
         &self,
         solution: &Solution,
@@ -178,7 +177,7 @@ impl CalibrationBench {
         }
     }
 
-    /// One at random that shows the whole board.
+    /// A random pose that shows the whole board; `None` after `MAX_TRIES`.
     fn pose(&self, key: u64, on_bed: bool) -> Option<Pose> {
         let draw = |again| random_pose(&self.case, hash::mix(&[key, again]), on_bed);
         (0..MAX_TRIES).map(draw).find(|pose| is_in_image(&self.case, pose))
@@ -204,8 +203,7 @@ impl CalibrationBench {
         })
     }
 
-    /// Where the true camera sees the ends of a bead on the true bed \[px\], and how
-    /// wide it is \[mm\].
+    /// The ends of a bead on the true bed in the true camera's image \[px\], and its width \[mm\].
     fn bead(&self, on_bed: &Pose, cell: [f64; 2], height: Mm) -> Option<([ImagePoint; 2], f64)> {
         let case = &self.case;
         let calibration = Calibration::Full {
@@ -217,7 +215,7 @@ impl CalibrationBench {
         };
         let map = calibration.surface(height, None);
         let sides = case.board.corners_mm().last()?.coords;
-        // Y of the bed is the board's turned over.
+        // The bed's y axis is opposite to the board's.
         let middle = [cell[0] * sides.x, -cell[1] * sides.y];
         let half = 0.5 * BEAD_WIDTH_FRACTION * sides.x;
         let end = |by: f64| map.to_px(crate::core::SurfacePoint::new(middle[0] + by, middle[1]));
@@ -225,14 +223,13 @@ impl CalibrationBench {
     }
 }
 
-/// Middles of the cells along the rows and columns of the board on the bed, as parts of its
-/// sides.
+/// Centres of the grid's cells on the board, as fractions of the board's sides.
 fn cells() -> impl Iterator<Item = [f64; 2]> {
     let part = |i: u32| (f64::from(i) + 0.5) / f64::from(GRID_CELLS);
     (0..GRID_CELLS * GRID_CELLS).map(move |i| [part(i % GRID_CELLS), part(i / GRID_CELLS)])
 }
 
-/// A pose at random, with the board's middle somewhere in the image.
+/// A random pose; the board's centre is in the image.
 fn random_pose(case: &CalibrationCase, key: u64, on_bed: bool) -> Pose {
     let part = |what: u64| hash::unit(hash::mix(&[key, what]));
     let [width, height] = case.image_size_px.map(f64::from);
@@ -254,7 +251,7 @@ fn random_pose(case: &CalibrationCase, key: u64, on_bed: bool) -> Pose {
     Pose::from_parts(rotation, place)
 }
 
-/// Whether the whole board is in the image, with its outer squares.
+/// Whether the whole board with its outer squares is in the image.
 fn is_in_image(case: &CalibrationCase, pose: &Pose) -> bool {
     let [right, bottom] = case.image_size_px.map(|px| f64::from(px) - 1.0);
     let side = case.board.square().get();

@@ -1,13 +1,13 @@
-//! Frames whose every parameter is drawn at random, uniformly in its logarithm, from
-//! a range that is named: torn edges, holes, grooves, texture, ribs, motion, cameras
-//! with their faults. What the measurement was not tuned on.
+//! Frames with random parameters, each uniform in its logarithm over a named range: torn edges,
+//! holes, grooves, texture, ribs, motion, and camera faults. The measurement was not tuned on
+//! them.
 //!
 //! ```text
-//! list     the sets and what each must reach
-//! recipes  what is drawn from where
-//! draw     numbers of a frame, with a record of them
+//! list     the sets and their requirements
+//! recipes  the random parameters of each set and their ranges
+//! draw     random numbers of a frame, with a record of them
 //! scene    what a frame shows
-//! profile  edges that are random lines
+//! profile  edges as random lines
 //! outline  where the boundaries lie on each line, and the area of the bead
 //! paint    light on the sensor: blur, motion, texture
 //! long_bead  a bead that passes through the gauge frame by frame
@@ -36,22 +36,22 @@ pub use long_bead::LongBead;
 /// Smallest and largest width that the gauge accepts, over the bead's nominal width.
 const RANGE: (f64, f64) = (0.6, 1.3);
 
-/// A frame and its truth. A pixel is a millimetre.
+/// A frame and its true width. A pixel is a millimetre.
 #[derive(Debug, Clone)]
 pub struct DrawnFrame {
     /// The image.
     pub frame: Frame,
     /// The gauge that measures it: the whole image.
     pub gauge: Gauge,
-    /// Area of the unblurred bead over the gauge's length \[px\]. What is torn open to
-    /// the outside is no bead, a hole within it is.
+    /// True width: area of the unblurred bead over the gauge's length \[px\]. A bay that is open
+    /// to the outside does not count as bead, a closed hole does.
     pub truth_px: f64,
-    /// What was drawn.
+    /// The random parameters of the frame.
     pub parameters: Vec<DrawnParameter>,
 }
 
 impl DrawnSet {
-    /// A frame of the set: the same for the same number.
+    /// The frame with this number; the same number gives the same frame.
     pub fn take(&self, number: u64) -> Result<DrawnFrame, WrongSize> {
         let mut draw = Draw::new(self.name, number);
         let scene = (self.scene)(&mut draw);

@@ -1,5 +1,5 @@
-//! Figures of frames whose parameters are drawn: over all of a set, and within each
-//! third of each range.
+//! Figures of frames with random parameters: over a whole set, and within each third of each
+//! range.
 
 mod figures;
 mod limits;

@@ -1,4 +1,4 @@
-//! Figures of one set, and those that miss their limit.
+//! Figures of one set, and figures that miss their limit.
 
 use crate::numeric::number::to_f64;
 use std::fmt;
@@ -10,11 +10,11 @@ use serde::Serialize;
 pub struct WidthError {
     /// Measured less true width.
     pub error_mm: f64,
-    /// Standard deviation by the measurement.
+    /// Standard deviation that the measurement reports.
     pub sigma_mm: f64,
 }
 
-/// The figures of one set. Without a measured frame most of them are none.
+/// The figures of one set. Figures of widths are `None` if no frame was measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SetFigures {
     /// The set's name.
@@ -25,15 +25,13 @@ pub struct SetFigures {
     pub bias_px: Option<f64>,
     /// Root of the mean square of the error \[px\].
     pub rmse_px: Option<f64>,
-    /// Smallest standard deviation that is possible where the direction is
-    /// known \[px\].
+    /// Cramér–Rao bound of the standard deviation with a known direction \[px\], `Set::bound_px`.
     pub bound_px: f64,
-    /// RMSE over that.
+    /// RMSE over [`Self::bound_px`].
     pub rmse_over_bound: Option<f64>,
-    /// Smallest standard deviation that is possible where the direction is
-    /// found from the same edges \[px\].
+    /// Cramér–Rao bound with the direction from the same edges \[px\], `Set::free_bound_px`.
     pub free_bound_px: f64,
-    /// RMSE over that.
+    /// RMSE over [`Self::free_bound_px`].
     pub rmse_over_free_bound: Option<f64>,
     /// Mean error \[mm\].
     pub bias_mm: Option<f64>,
@@ -47,21 +45,20 @@ pub struct SetFigures {
     pub rms_over_sigma: Option<f64>,
     /// Fraction of the widths whose 95 % interval holds the true one.
     pub within_interval: Option<f64>,
-    /// Whether the set's limits are kept; none where it has none.
+    /// Whether all limits are kept; `None` if the set has no limit.
     pub kept: Option<bool>,
-    /// What does not keep its limit.
+    /// The figures that miss their limit.
     pub missed: Vec<Miss>,
 }
 
-/// A figure that does not keep its limit, as the table shows it: shares are in
-/// percent.
+/// A figure that misses its limit, as the table shows it: fractions are in percent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Miss {
     /// Which figure.
     pub figure: &'static str,
-    /// What it is; none where nothing was measured.
+    /// Its value; `None` if nothing was measured.
     pub value: Option<f64>,
-    /// What it was to be, at least or at most.
+    /// The smallest or largest value that is allowed.
     pub limit: f64,
 }
 
@@ -77,7 +74,7 @@ impl fmt::Display for Miss {
     }
 }
 
-/// With four digits that count.
+/// Rounds to four significant digits.
 fn short(value: f64) -> f64 {
     if value == 0.0 {
         return value;

@@ -12,88 +12,88 @@ use crate::numeric::statistics::Moments;
 const MAX_ROUGHNESS_ERROR: f64 = 0.20;
 /// Largest relative median error of the correlation length.
 const MAX_LENGTH_ERROR: f64 = 0.30;
-/// Smallest and largest root of the mean square of a width's error against the bead's own
-/// mean, over sigma with roughness.
+/// Limits of the root mean square of a width's error against the bead's own mean width, over sigma
+/// with roughness.
 const Z_RANGE: (f64, f64) = (0.85, 1.15);
 /// Parts of the range of correlation lengths.
 const LENGTH_PARTS: [&str; 3] = ["short waves", "middle waves", "long waves"];
 
-/// What came of one bead.
+/// The outcome of one bead.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BeadOutcome {
     /// True correlation length \[px\].
     pub length_px: f64,
-    /// What frames found; none where they left it open.
+    /// The estimate from its frames; `None` if they do not determine it.
     pub estimate: Option<RoughnessEstimate>,
-    /// Each measured frame's error against the bead's own mean \[px\].
+    /// Error of each measured frame against the bead's own mean width \[px\].
     pub widths: Vec<OwnMeanError>,
 }
 
-/// What successive frames found, over what is true.
+/// Estimate from successive frames over the true value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RoughnessEstimate {
     /// Roughness.
     pub roughness: Ratio,
     /// Correlation length.
     pub length: Ratio,
-    /// Standard deviation of a gauge's mean about the bead's own mean \[px\].
+    /// Standard deviation of the mean width over a gauge about the bead's own mean \[px\].
     pub gauge_mean_sigma_px: f64,
 }
 
-/// An estimate over its truth.
+/// An estimate over its true value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ratio {
-    /// Found over true.
+    /// Estimated over true.
     pub value: f64,
-    /// Its standard deviation over the found value.
+    /// Standard deviation of the estimate over the estimate.
     pub sigma: f64,
 }
 
-/// How far a frame's width is off the bead's own mean \[px\].
+/// Error of a frame's width against the bead's own mean width \[px\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OwnMeanError {
     /// Measured less own mean.
     pub error_px: f64,
-    /// As the measurement reports it, without roughness.
+    /// Standard deviation that the measurement reports, without roughness.
     pub sigma_px: f64,
 }
 
 /// Figures of some beads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RoughnessFigures {
-    /// How far the bead moves on from frame to frame \[px\].
+    /// Motion of the bead from frame to frame \[px\].
     pub advance_px: usize,
-    /// Which of the beads.
+    /// Name of the part of the beads, by correlation length.
     pub part: &'static str,
-    /// Their number.
+    /// Number of beads.
     pub beads: usize,
     /// Fraction whose roughness was determined.
     pub determined_fraction: f64,
-    /// Median of found over true roughness.
+    /// Median of estimated over true roughness.
     pub roughness_median: Option<f64>,
-    /// Median of |found/true − 1|; a bead without an estimate counts as 1.
+    /// Median of |estimated/true − 1|; a bead without an estimate counts as 1.
     pub roughness_error: Option<f64>,
-    /// Root of the mean square of the error of its logarithm over its sigma.
+    /// Root mean square of the error of the roughness' logarithm over its sigma.
     pub roughness_z: Option<f64>,
-    /// The same of the correlation length.
+    /// Median of estimated over true correlation length.
     pub length_median: Option<f64>,
-    /// See [`Self::roughness_error`].
+    /// As [`Self::roughness_error`], for the correlation length.
     pub length_error: Option<f64>,
-    /// See [`Self::roughness_z`].
+    /// As [`Self::roughness_z`], for the correlation length.
     pub length_z: Option<f64>,
-    /// Measured frames of the determined beads.
+    /// Measured frames of the beads with an estimate.
     pub frames: u64,
-    /// Root of the mean square of a width's error against the bead's own mean over sigma
-    /// with roughness.
+    /// Root mean square of a width's error against the bead's own mean width, over sigma with
+    /// roughness.
     pub width_z: Option<f64>,
-    /// The same over sigma alone.
+    /// As [`Self::width_z`], over sigma without roughness.
     pub width_z_alone: Option<f64>,
-    /// What is missed.
+    /// The limits that are missed.
     pub missed: Vec<String>,
 }
 
-/// Figures over all beads and within each third, in the logarithm, of the range of
-/// correlation lengths \[px\]; limits are those of all.
+/// Figures over all beads and within each third of the range of correlation lengths \[px\], equal
+/// in the logarithm. The limits apply to all beads.
 pub fn figures(
     advance_px: usize,
     outcomes: &[BeadOutcome],

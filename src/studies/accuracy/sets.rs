@@ -13,7 +13,7 @@ pub use list::all;
 
 /// Scale of all sets without a camera model, that of the 2022 paper.
 pub const MM_PER_PX: f64 = 0.126_582;
-/// The gauge's extent across the bead, and that of the image \[px\].
+/// Extent across the bead of the gauge and of the image \[px\].
 const ACROSS_PX: (usize, u32) = (640, 720);
 
 /// Images of one kind.
@@ -23,34 +23,33 @@ pub struct Set {
     pub name: &'static str,
     /// Image of the bead; its size is that of the set.
     pub image: ImageModel,
-    /// Rows of the gauge; of a horizontal bead columns.
+    /// Rows of the gauge; columns for a horizontal bead.
     pub rows: u32,
-    /// Width of the bead in the mean \[mm\].
+    /// Mean width of the bead \[mm\].
     pub width_mm: f64,
     /// Roughness of its edges.
     pub roughness: EdgeRoughness,
-    /// How it runs in the image.
+    /// Direction of the bead in the image.
     pub axis: BeadAxis,
-    /// The bead against its surroundings.
+    /// Whether the bead is brighter or darker than its surroundings.
     pub polarity: Polarity,
-    /// Seen by a tilted camera through a lens with distortion.
+    /// Whether a tilted camera with lens distortion sees it.
     pub tilted: bool,
     /// Limits of the figures.
     pub limits: SetLimits,
 }
 
 impl Set {
-    /// Smallest standard deviation that the width of a straight bead can have
-    /// \[px\] where its direction is known.
+    /// Cramér–Rao bound of the standard deviation of a straight bead's width \[px\] with a known
+    /// direction.
     ///
-    /// A line across a step of the height A that is blurred with s, in white
-    /// noise σ, gives the step's position with a variance of at least
-    /// 2√π·(σ/A)²·s (Cramér–Rao), whether or not blur and height of the step are
-    /// known, whose effects are odd about its position. (A level that both sides
-    /// share is even like the position and costs a little more, the less the
-    /// more pixels there are beside the edge.) Along a row that cuts
-    /// the edge at the slant t the blur is s/cos t, and what is found along the
-    /// row is cos t as long normal to the edge. From N rows and two edges:
+    /// On a line across a step of height A that is blurred with s, in white noise σ, the variance
+    /// of the step's position is at least 2√π·(σ/A)²·s (Cramér–Rao). That holds whether or not
+    /// blur and height are known: their effect on the profile is odd about the position, that of
+    /// the position is even. (An unknown level common to both sides is even, too, and costs a
+    /// little more; less with more pixels beside the edge.) Along a row that cuts the edge at the
+    /// slant t the blur is s/cos t, and a distance normal to the edge is cos t times that along
+    /// the row. From N rows and two edges:
     ///
     /// ```text
     /// var = 2·cos² t·e²/N,   e² = 2√π·(σ/A)²·s/cos t
@@ -60,7 +59,7 @@ impl Set {
         (2.0 * cos * cos * self.row_variance() / f64::from(self.rows)).sqrt()
     }
 
-    /// The same where the direction has to be found from the same edges.
+    /// Cramér–Rao bound \[px\] where the direction has to be estimated from the same edges.
     ///
     /// The width is w = c·cos t with the chord c along a row. Two parallel
     /// edges x = a + m·v, m = tan t, over the same N rows v give a, and with it
@@ -82,7 +81,7 @@ impl Set {
         (self.bound_px().powi(2) + lever * lever * direction).sqrt()
     }
 
-    /// Smallest variance of an edge's position along a row e² \[px²\].
+    /// Smallest variance e² of an edge's position along a row \[px²\].
     fn row_variance(&self) -> f64 {
         let ImageModel { bead_grey, ground_grey, noise_grey, blur_px, slant_deg, .. } = self.image;
         let fraction = noise_grey / (bead_grey - ground_grey);
@@ -90,13 +89,12 @@ impl Set {
         2.0 * std::f64::consts::PI.sqrt() * fraction * fraction * along_row
     }
 
-    /// Whether silently wrong widths are limited, for which many frames are
-    /// needed.
+    /// Whether the fraction of silently wrong widths has a limit; that needs many frames.
     pub fn limits_silent(&self) -> bool {
         self.limits.silent_fraction.is_some()
     }
 
-    /// Size of the images \[px\], where no camera model sets it.
+    /// Size of the images \[px\].
     pub fn size_px(&self) -> [u32; 2] {
         match self.axis {
             BeadAxis::Vertical => [ACROSS_PX.1, self.rows + 20],
@@ -104,7 +102,7 @@ impl Set {
         }
     }
 
-    /// The gauge of a cell with defaults.
+    /// The gauge of a cell with default settings.
     pub fn gauge(&self) -> Gauge {
         let rows = usize::try_from(self.rows).unwrap_or(usize::MAX);
         let first = if self.tilted { 20 } else { 10 };
@@ -146,8 +144,8 @@ mod tests {
         }
     }
 
-    /// Against the information matrix of both edges' positions and the common
-    /// slope, row by row.
+    /// Compares with the information matrix of both edges' positions and the common slope, row by
+    /// row.
     #[test]
     fn the_bound_for_an_unknown_direction_is_that_of_a_straight_fit() {
         let set = set("slant-15-blur-1.5");
@@ -161,7 +159,7 @@ mod tests {
             }
         }
         let chord = set.width_mm / MM_PER_PX / cos;
-        // Of (right − left)·cos(atan m) by left, right and m.
+        // Derivatives of (right − left)·cos(atan m) with respect to left, right and m.
         let by = nalgebra::Vector3::new(-cos, cos, -chord * sin * cos * cos);
         let bound = (by.transpose() * information.try_inverse().unwrap() * by)[0].sqrt();
         assert!((set.free_bound_px() / bound - 1.0).abs() < 1e-3, "{bound}");

@@ -1,4 +1,4 @@
-//! Takes the images of a set.
+//! Renders the images of a set.
 
 use std::cell::RefCell;
 
@@ -19,7 +19,7 @@ use crate::vision::Gauge;
 /// every position within a pixel, either way.
 const JITTER_PX: f64 = 1.0;
 
-/// Makes the images of a set.
+/// Renders the images of a set.
 #[derive(Debug, Clone)]
 pub struct SetStudio {
     renderer: Renderer,
@@ -28,12 +28,12 @@ pub struct SetStudio {
     width_mm: f64,
     roughness: EdgeRoughness,
     seed: u64,
-    /// Of the middle of the gauge.
+    /// Size of a pixel in the middle of the gauge \[mm\].
     mm_per_px: f64,
 }
 
 impl SetStudio {
-    /// For the images of a set.
+    /// Prepares the renderer for a set.
     pub fn new(set: &Set) -> Result<Self, RenderError> {
         let calibration = if set.tilted {
             tilted()
@@ -73,7 +73,7 @@ impl SetStudio {
         self.gauge
     }
 
-    /// What the measurement knows of the surface.
+    /// The surface that the measurement is given.
     pub fn surface(&self) -> &SurfaceMap {
         &self.surface
     }

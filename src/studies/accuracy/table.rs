@@ -35,12 +35,12 @@ impl FigureRow for SetFigures {
     }
 }
 
-/// A number with so many decimals, a dash for none.
+/// A number with `digits` decimals; a dash for `None`.
 pub fn number(value: impl Into<Option<f64>>, digits: usize) -> String {
     value.into().map_or("–".to_owned(), |value| format!("{value:.digits$}"))
 }
 
-/// Whether limits are kept, and which are missed.
+/// Whether limits are kept, and the ones that are missed.
 pub fn verdict(missed: &[String]) -> String {
     if missed.is_empty() { "kept".to_owned() } else { format!("MISSED: {}", missed.join("; ")) }
 }
@@ -65,7 +65,7 @@ pub fn table<T: FigureRow>(rows: &[T]) -> String {
     lines.iter().map(text).collect()
 }
 
-/// The same in Markdown.
+/// The table in Markdown.
 pub fn markdown<'a, T: FigureRow + 'a>(rows: impl IntoIterator<Item = &'a T>) -> String {
     let rule = "---:|".repeat(T::HEADS.split('|').count() - 2);
     let mut text = format!("| {} |\n|---|{rule}---|\n", T::HEADS.replace('|', " | "));

@@ -3,11 +3,11 @@
 use super::figures::{Miss, SetFigures};
 use super::sets::SetLimits;
 
-/// A figure and what it must keep to.
+/// A figure and its limits.
 #[derive(Clone, Copy)]
 struct Check {
     figure: &'static str,
-    /// 100 for shares that are shown in percent.
+    /// 100 for fractions that are shown in percent.
     scale: f64,
     value: Option<f64>,
     min: Option<f64>,
@@ -39,7 +39,7 @@ fn percent(check: Check) -> Check {
     Check { scale: 100.0, ..check }
 }
 
-/// What misses its limit; a limit that nothing was measured against is missed.
+/// The figures that miss their limit; a figure without a value misses every limit that it has.
 pub fn misses(limits: &SetLimits, figures: &SetFigures) -> Vec<Miss> {
     let (measured, silent) = (Some(figures.measured_fraction), Some(figures.silent_fraction));
     let enough = limits.measured_fraction.map(|least| [least, 1.0]);

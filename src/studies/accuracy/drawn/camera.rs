@@ -32,11 +32,11 @@ pub fn expose(light: &[f32], scene: &DrawnScene, draw: &mut Draw) -> Vec<u8> {
     }
 }
 
-/// Light that falls from the middle to the corners.
+/// Vignetting: light that decreases from the centre to the corners.
 struct Vignetting {
     columns: usize,
     middle: (f64, f64),
-    /// Fall of light over the square of the distance.
+    /// Growth of 1/fraction of the light per squared distance from the centre \[1/px²\].
     growth: f64,
 }
 
@@ -56,7 +56,7 @@ impl Vignetting {
     }
 }
 
-/// An image after it was a JPEG; none where it cannot be encoded.
+/// The image after JPEG compression and decompression; `None` if it cannot be encoded.
 fn compress(pixels: &[u8], width: usize, height: usize, quality: u8) -> Option<Vec<u8>> {
     let (width, height) = (u32::try_from(width).ok()?, u32::try_from(height).ok()?);
     let picture = GrayImage::from_raw(width, height, pixels.to_vec())?;
@@ -103,7 +103,8 @@ mod tests {
             let squares = pixels.iter().zip(&after).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
             (squares.sum::<f64>() / 6400.0).sqrt()
         };
-        // At quality 95 the steps of the table are 2 to 12 levels, evenly spread: 12/√12.
+        // At quality 95 the quantisation steps are 2 to 12 grey levels, with a uniform error:
+        // 12/√12.
         assert!((0.3..3.5).contains(&rms(95)), "{}", rms(95));
         assert!((10.0..29.0).contains(&rms(30)), "{}", rms(30));
     }

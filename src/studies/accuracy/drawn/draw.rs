@@ -1,4 +1,4 @@
-//! Numbers of a frame, with a record of those that a figure is split by.
+//! Random numbers of a frame, with a record of those by which figures are split.
 
 use std::ops::Range;
 
@@ -9,14 +9,14 @@ use serde::Serialize;
 
 use crate::sim::hash;
 
-/// A number that was drawn.
+/// A recorded random parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DrawnParameter {
-    /// What it is, with its unit.
+    /// Its name, with its unit.
     pub name: &'static str,
     /// Its value.
     pub value: f64,
-    /// Ends of the range it was drawn from.
+    /// Ends of the range from which it was drawn.
     pub range: (f64, f64),
 }
 
@@ -28,7 +28,7 @@ pub struct Draw {
 }
 
 impl Draw {
-    /// Those of a set's frame.
+    /// The generator for one frame of a set; the same frame gives the same numbers.
     pub fn new(set: &str, frame: u64) -> Self {
         let mut words: Vec<u64> = set.bytes().map(u64::from).collect();
         words.push(frame);
@@ -36,19 +36,19 @@ impl Draw {
         Self { random, record: Vec::new() }
     }
 
-    /// Uniform in the logarithm, and kept in the record.
+    /// A number that is uniform in its logarithm; it is recorded.
     pub fn log(&mut self, name: &'static str, range: Range<f64>) -> f64 {
         let value = self.log_unnamed(range.clone());
         self.note(name, value, range);
         value
     }
 
-    /// The same without record.
+    /// As [`Self::log`], but not recorded.
     pub fn log_unnamed(&mut self, range: Range<f64>) -> f64 {
         range.start * libm::exp(self.unit() * libm::log(range.end / range.start))
     }
 
-    /// Keeps a number that follows from others in the record.
+    /// Records a number that was not drawn by [`Self::log`].
     pub fn note(&mut self, name: &'static str, value: f64, range: Range<f64>) {
         self.record.push(DrawnParameter { name, value, range: (range.start, range.end) });
     }
@@ -58,7 +58,7 @@ impl Draw {
         from + (to - from) * self.unit()
     }
 
-    /// True for one of so many frames.
+    /// True with the probability 1/`frames`.
     pub fn one_of(&mut self, frames: f64) -> bool {
         self.unit() * frames < 1.0
     }
@@ -68,12 +68,12 @@ impl Draw {
         StandardNormal.sample(&mut self.random)
     }
 
-    /// A key for numbers that are drawn elsewhere.
+    /// A random seed for another generator.
     pub fn key(&mut self) -> u64 {
         StandardUniform.sample(&mut self.random)
     }
 
-    /// What was drawn by name.
+    /// The recorded parameters.
     pub fn record(self) -> Vec<DrawnParameter> {
         self.record
     }

@@ -4,35 +4,36 @@ use super::draw::Draw;
 use super::recipes;
 use super::scene::DrawnScene;
 
-/// A kind of frames.
+/// A set of frames of one kind.
 #[derive(Debug, Clone, Copy)]
 pub struct DrawnSet {
     /// Its name.
     pub name: &'static str,
-    /// Its contents, in a line.
+    /// Its contents, in one line.
     pub about: &'static str,
-    /// Whether the gauge has the camera's gamma.
+    /// Whether the measurement is given the camera's gamma.
     pub knows_gamma: bool,
     /// Its requirements.
     pub requirements: Requirements,
-    /// Draws a frame.
+    /// Draws the parameters of a frame.
     pub(super) scene: fn(&mut Draw) -> DrawnScene,
 }
 
-/// Requirements of a set; none is no requirement.
+/// Requirements of a set; `None` is no requirement.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Requirements {
     /// Smallest fraction of frames that give a width.
     pub measured: Option<f64>,
     /// Largest mean error \[px\], over all and within each third of each range.
     pub bias_px: Option<f64>,
-    /// Smallest and largest root mean square of error over sigma, likewise.
+    /// Smallest and largest root mean square of error over sigma, also over all and within each
+    /// third.
     pub z: Option<(f64, f64)>,
     /// Largest fraction of frames that are silently wrong.
     pub silent: Option<f64>,
     /// The only statuses that a refusal may have.
     pub statuses: Option<&'static [&'static str]>,
-    /// Whether the words of every refusal must name gamma.
+    /// Whether the message of every rejection must name gamma.
     pub names_gamma: bool,
 }
 
@@ -44,7 +45,7 @@ const NO_REQUIREMENTS: Requirements = Requirements {
     statuses: None,
     names_gamma: false,
 };
-/// Three of 30,000.
+/// At most three silently wrong frames of 30,000.
 const SILENT: Option<f64> = Some(1e-4);
 const NOT_SILENT: Requirements = Requirements { silent: SILENT, ..NO_REQUIREMENTS };
 const ROUGH: Requirements =
@@ -115,7 +116,8 @@ pub fn all() -> Vec<DrawnSet> {
     ]
 }
 
-/// The sets of a name, or of a family: `ribs` names `ribs-weak` and `ribs-strong`.
+/// The set with this name, or the sets of a family: `ribs` stands for `ribs-weak` and
+/// `ribs-strong`.
 pub fn named(name: &str) -> Vec<DrawnSet> {
     let exact: Vec<DrawnSet> = all().into_iter().filter(|set| set.name == name).collect();
     if !exact.is_empty() {

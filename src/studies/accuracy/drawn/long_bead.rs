@@ -12,22 +12,22 @@ use crate::numeric::number::to_count;
 use crate::sim::hash;
 use crate::vision::Gauge;
 
-/// Name of its random numbers.
+/// Name that seeds its random numbers.
 const NAME: &str = "roughness";
 /// Independent edges of a bead. By definition of a bead, two.
 const EDGE_COUNT: f64 = 2.0;
 
-/// A bead of so many correlation lengths. A pixel is a millimetre.
+/// A torn bead many correlation lengths long. A pixel is a millimetre.
 #[derive(Debug, Clone)]
 pub struct LongBead {
-    /// Of one frame.
+    /// Scene of one frame.
     scene: DrawnScene,
     painted: Painted,
     rows: usize,
     number: u64,
 }
 
-/// One frame of it.
+/// One frame of the bead.
 #[derive(Debug, Clone)]
 pub struct Passage {
     /// The image.
@@ -37,7 +37,8 @@ pub struct Passage {
 }
 
 impl LongBead {
-    /// Draws roughness and length as the set `torn` does, and paints the bead.
+    /// Draws roughness and correlation length \[px\] as the set `torn` does, and paints a bead
+    /// that is `lengths` correlation lengths long.
     pub fn draw(number: u64, lengths: f64) -> Self {
         let mut draw = Draw::new(NAME, number);
         let scene = recipes::torn(&mut draw);
@@ -47,7 +48,7 @@ impl LongBead {
         Self { scene, painted, rows, number }
     }
 
-    /// Its gauge: the whole image.
+    /// The gauge of every frame: the whole image.
     pub fn gauge(&self) -> Gauge {
         super::gauge(&self.scene, false)
     }
@@ -62,7 +63,8 @@ impl LongBead {
         self.rows
     }
 
-    /// The bead's own mean width \[px\]: of no gauge, but of an endless bead.
+    /// Mean width of an endless bead with these edges \[px\]; the mean over a gauge varies about
+    /// it.
     pub fn own_width_px(&self) -> f64 {
         self.painted.own_width_px()
     }
@@ -72,17 +74,17 @@ impl LongBead {
         EDGE_COUNT.sqrt() * self.scene.edges.roughness_px
     }
 
-    /// Correlation length of that \[px\].
+    /// Correlation length of its local width \[px\].
     pub fn length_px(&self) -> f64 {
         self.scene.edges.length_px
     }
 
-    /// Range that the correlation length was drawn from \[px\].
+    /// Range of the correlation lengths \[px\].
     pub fn lengths_px() -> Range<f64> {
         recipes::LENGTH_PX
     }
 
-    /// The frame whose gauge begins at a row; its noise is its own.
+    /// The frame whose gauge begins at `first_row`; each frame has noise of its own.
     pub fn take(&self, frame: u64, first_row: usize) -> Result<Passage, WrongSize> {
         let size = self.scene.size;
         let first_row = first_row.min(self.rows - size.1);

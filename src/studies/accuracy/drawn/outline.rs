@@ -7,27 +7,27 @@ use super::profile::{height_of, rough};
 use super::scene::{DrawnScene, Groove, Holes};
 use crate::numeric::number::to_f64;
 
-/// Smallest width of a groove over its mean, so that its two rough sides do not cross.
+/// Smallest width of a groove over its mean width, so that its two rough sides do not cross.
 const MIN_GROOVE: f64 = 0.2;
-/// Largest standard deviation of the width of a groove over its mean: the sides of a narrow
-/// groove are correlated.
+/// Largest standard deviation of a groove's width over its mean: the sides of a narrow groove are
+/// correlated.
 const MAX_GROOVE_SPREAD: f64 = 1.0 / 3.0;
-/// Distance of a hole from the deepest bay \[px\], so that no hole is open. Derived: more than
-/// six times the largest roughness of those edges, 2 px.
+/// Smallest distance of a hole from the deepest bay \[px\], so that every hole is closed. Derived:
+/// more than six times the largest roughness of those edges, 2 px.
 const HOLE_CLEARANCE_PX: f64 = 14.0;
 
-/// A brightness from a position of a line to the next.
+/// Brightness on a line from a position up to the next step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BrightnessStep {
-    /// Where it begins \[px\].
+    /// Position where it begins \[px\].
     pub at_px: f64,
     /// Its brightness \[grey levels\].
     pub grey: f64,
-    /// Whether it is concrete, which carries the bead's texture.
+    /// Whether it is concrete; concrete has the bead's texture.
     pub concrete: bool,
 }
 
-/// A disc, from the image's left and the first line \[px\].
+/// A disc; coordinates from the image's left and the first line \[px\].
 #[derive(Debug, Clone, Copy)]
 struct Disc {
     x: f64,
@@ -36,7 +36,7 @@ struct Disc {
 }
 
 impl Disc {
-    /// Half of its chord at a height; none where it does not reach.
+    /// Half the chord at a height \[px\]; `None` if the disc does not reach it.
     fn half_chord(&self, y_px: f64) -> Option<f64> {
         let square = self.radius.powi(2) - (y_px - self.y).powi(2);
         (square > 0.0).then(|| square.sqrt())
@@ -48,7 +48,7 @@ impl Disc {
 pub struct DrawnOutline {
     left: Vec<f64>,
     right: Vec<f64>,
-    /// Far sides of the grooves.
+    /// Outer sides of the grooves, left and right.
     far: [Option<Vec<f64>>; 2],
     holes: Vec<Disc>,
     axis_px: f64,
@@ -64,8 +64,8 @@ struct Straight {
 }
 
 impl DrawnOutline {
-    /// Draws the boundaries of so many lines. Position and width of the bead differ from
-    /// frame to frame by up to a pixel.
+    /// Draws the boundaries of `count` lines. Position and width of the bead vary at random from
+    /// frame to frame.
     pub fn draw(scene: &DrawnScene, count: usize, draw: &mut Draw) -> Self {
         let middle = to_f64(scene.size.0) / 2.0;
         let bead = Straight {
@@ -102,15 +102,14 @@ impl DrawnOutline {
         Self { left, right, far, holes, axis_px: bead.axis, width_px: 2.0 * bead.half }
     }
 
-    /// Area of the bead within some lines over their length \[px\].
+    /// Area of the bead within a range of lines over their length \[px\].
     pub fn mean_width(&self, lines: Range<usize>) -> f64 {
         let count = lines.len().max(1);
         let widths = self.left[lines.clone()].iter().zip(&self.right[lines]);
         widths.map(|(left, right)| right - left).sum::<f64>() / to_f64(count)
     }
 
-    /// What lies along a line, from left to right; the first begins beyond the
-    /// image.
+    /// Brightness along a line, from left to right; the first step begins at −∞.
     pub fn steps(&self, scene: &DrawnScene, line: usize) -> Vec<BrightnessStep> {
         let (left, right) = (self.left[line], self.right[line]);
         let step = |at_px: f64, grey: f64, concrete: bool| BrightnessStep { at_px, grey, concrete };
@@ -144,7 +143,8 @@ impl DrawnOutline {
         steps
     }
 
-    /// From where to where a line runs through holes, from left to right.
+    /// Start and end of each hole on a line \[px\], from left to right; overlapping holes are
+    /// merged.
     fn chords(&self, y_px: f64) -> Vec<(f64, f64)> {
         let chord = |hole: &Disc| {
             let half = hole.half_chord(y_px)?;
@@ -163,15 +163,15 @@ impl DrawnOutline {
     }
 }
 
-/// How much of a groove's far side repeats its near side, so that its width spreads as
-/// much as it may: two sides of the roughness r with the correlation c differ by
-/// r·√(2 − 2c).
+/// Correlation of a groove's outer side with its inner side for the largest permitted spread of
+/// its width: the difference of two sides with roughness r and correlation c has the standard
+/// deviation r·√(2 − 2c).
 fn common_fraction(width_px: f64, roughness_px: f64) -> f64 {
     let spread = MAX_GROOVE_SPREAD * width_px / roughness_px.max(f64::MIN_POSITIVE);
     (1.0 - 0.5 * spread * spread).max(0.0)
 }
 
-/// Cuts bays out of an edge that lies at a position, towards +1 or −1.
+/// Cuts bays into an edge at `at_px`, in the direction +1 or −1.
 fn cut_bays(dug: &Holes, edge: &mut [f64], at_px: f64, inwards: f64, draw: &mut Draw) {
     let height = height_of(edge.len());
     for _ in 0..dug.count {
@@ -185,7 +185,7 @@ fn cut_bays(dug: &Holes, edge: &mut [f64], at_px: f64, inwards: f64, draw: &mut 
     }
 }
 
-/// Twice as many closed holes as an edge has bays.
+/// Random closed holes, twice as many as an edge has bays.
 fn dig(dug: &Holes, bead: Straight, lines: usize, draw: &mut Draw) -> Vec<Disc> {
     let height = height_of(lines);
     let room = bead.half - dug.size_px - HOLE_CLEARANCE_PX;

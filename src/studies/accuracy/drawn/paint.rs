@@ -1,7 +1,6 @@
-//! The light of a scene on the sensor. Across the bead each boundary is the exact
-//! integral of its blurred, moved step over the pixel. Sampling what pixels cover and
-//! blurring that would move an edge by 0.02 px with its position within a pixel at a blur
-//! of 0.5 px, more than noise does.
+//! The light of a scene on the sensor. Across the bead each boundary is the exact integral of its
+//! blurred, moved step over the pixel. Blurring a sampled image instead would move an edge by 0.02
+//! px with its position within a pixel at a blur of 0.5 px, more than noise does.
 
 use std::ops::Range;
 
@@ -15,7 +14,7 @@ use crate::sim::convolve::{convolve_lines, kernel};
 use crate::sim::edge::coverage;
 use crate::sim::texture::texture;
 
-/// Blurs beyond which a step counts as complete. Derived: Φ(−5) = 3·10⁻⁷.
+/// Distance in blurs beyond which a step counts as complete. Derived: Φ(−5) = 3·10⁻⁷.
 const REACH_BLURS: f64 = 5.0;
 /// Points per pixel of the table of a step. Derived: linear interpolation over h = 1/64 px has
 /// an error of h²/8·φ′/s² < 10⁻⁴ for blurs from 0.5 px.
@@ -24,18 +23,17 @@ const TABLE_POINTS_PER_PX: f64 = 64.0;
 /// A painted scene.
 #[derive(Debug, Clone)]
 pub struct Painted {
-    /// Light of the image's pixels, row by row \[grey levels of a camera with gamma
-    /// 1\].
+    /// Light on the image's pixels, row by row \[grey levels of a camera with gamma 1\].
     pub light: Vec<f32>,
     /// Area of the unblurred bead over the image's height \[px\].
     pub truth_px: f64,
-    /// Where its boundaries lie, and the image's first line of it.
+    /// Boundaries of the scene. Their lines begin above the image, at `first_line` of the image.
     outline: DrawnOutline,
     first_line: usize,
 }
 
 impl Painted {
-    /// Area of the unblurred bead within some rows over their height \[px\].
+    /// Area of the unblurred bead within a range of rows over their height \[px\].
     pub fn mean_width_px(&self, rows: Range<usize>) -> f64 {
         let line = |row: usize| self.first_line + row * POINTS_PER_PX;
         self.outline.mean_width(line(rows.start)..line(rows.end))
@@ -47,7 +45,7 @@ impl Painted {
     }
 }
 
-/// Paints a scene. A texture is that of the image: the blur does not weaken it.
+/// Paints a scene. A texture is given as the image shows it: the blur does not weaken it.
 pub fn paint(scene: &DrawnScene, draw: &mut Draw) -> Painted {
     let (width, height) = scene.size;
     let blur = kernel(scene.blur_px);
@@ -84,26 +82,26 @@ pub fn paint(scene: &DrawnScene, draw: &mut Draw) -> Painted {
     Painted { light, truth_px, outline, first_line }
 }
 
-/// A unit step as pixels see it, by the distance of their centres from it.
+/// Table of a blurred unit step: value of a pixel by the distance of its centre from the step.
 struct StepTable {
     reach_px: f64,
     values: Vec<f64>,
 }
 
 impl StepTable {
-    /// Of a blur and a motion across the step \[px\].
+    /// For a blur (standard deviation) and a motion across the step \[px\].
     fn new(blur_px: f64, motion_px: f64) -> Self {
         let reach_px = REACH_BLURS * blur_px + 0.5 * (1.0 + motion_px);
         let value = |position: usize| {
             let inside = to_f64(position) / TABLE_POINTS_PER_PX - reach_px;
-            // The mean over the pixel and over the motion: two sides of one box.
+            // The mean over the pixel and over the motion: a convolution with two boxes.
             coverage(inside, [1.0, motion_px], blur_px)
         };
         let last = to_count((2.0 * reach_px * TABLE_POINTS_PER_PX).ceil());
         Self { reach_px, values: (0..=last).map(value).collect() }
     }
 
-    /// The step so far inside it, within the table's reach.
+    /// Value of a pixel this far inside the step; 1 beyond the table.
     fn at(&self, inside_px: f64) -> f64 {
         let position = ((inside_px + self.reach_px) * TABLE_POINTS_PER_PX).max(0.0);
         let below = to_count(position);
@@ -113,7 +111,7 @@ impl StepTable {
         }
     }
 
-    /// Fills a row of pixels with the mean of its lines.
+    /// Sets each pixel of a row to the mean over the row's lines.
     fn fill(
         &self,
         row: &mut [f32],
@@ -122,7 +120,7 @@ impl StepTable {
     ) {
         let fraction = 1.0 / to_f64(POINTS_PER_PX);
         let mut flanks = vec![0.0; row.len()];
-        // What is complete from a pixel on.
+        // Sum of the steps that are complete from each pixel on.
         let mut complete = vec![0.0; row.len() + 1];
         for steps in lines {
             complete[0] += fraction * steps.first().map_or(0.0, value);

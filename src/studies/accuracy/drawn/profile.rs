@@ -6,13 +6,13 @@ use crate::numeric::number::to_f64;
 /// Points of a profile per pixel.
 pub const POINTS_PER_PX: usize = 4;
 
-/// Where a position of a profile lies \[px\], from the profile's end.
+/// Distance of a point of a profile from the profile's start \[px\].
 pub fn height_of(position: usize) -> f64 {
     (to_f64(position) + 0.5) / to_f64(POINTS_PER_PX)
 }
 
-/// Deviations of an edge \[px\], [`POINTS_PER_PX`] a pixel: of the standard deviation
-/// `roughness_px`, with the autocorrelation exp(−|d|/`length_px`).
+/// Deviations of an edge \[px\], [`POINTS_PER_PX`] per pixel, with standard deviation
+/// `roughness_px` and autocorrelation exp(−|d|/`length_px`).
 pub fn rough(count: usize, roughness_px: f64, length_px: f64, draw: &mut Draw) -> Vec<f64> {
     if roughness_px <= 0.0 {
         return vec![0.0; count];

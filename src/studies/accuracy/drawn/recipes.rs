@@ -1,6 +1,6 @@
-//! The random parameters of a frame and their ranges. Those of torn edges and holes, of
-//! the grooves' width, ribs, motion, contrast, gamma, JPEG, vignetting, blur and width
-//! are the requirements of the measurement; the others are those of real concrete
+//! The random parameters of a frame and their ranges. The ranges of torn edges and holes, of the
+//! grooves' width, ribs, motion, contrast, gamma, JPEG, vignetting, blur and width are
+//! requirements of the measurement; the others are those of real concrete
 //! (`docs/src/reference/accuracy.md`, "Real and rendered").
 
 use std::ops::Range;
@@ -15,10 +15,10 @@ const TORN_PX: Range<f64> = 0.5..6.0;
 pub const LENGTH_PX: Range<f64> = 3.0..40.0;
 /// Largest roughness over the correlation length.
 const STEEPEST: f64 = 0.5;
-/// Roughness of edges in sets about something else \[px\].
+/// Roughness of edges in sets that test something else \[px\].
 const ROUGHNESS_PX: Range<f64> = 0.5..2.0;
-/// Roughness of edges in sets about what concrete looks like \[px\]: that of labels
-/// drawn by hand.
+/// Roughness of edges in sets with real features of concrete \[px\]: as in labels that were drawn
+/// by hand.
 const CONCRETE_PX: Range<f64> = 0.5..4.0;
 /// Largest roughness of a narrow bead over its width.
 const NARROW_ROUGHNESS: f64 = 0.03;
@@ -29,73 +29,73 @@ const HOLE_PX: Range<f64> = 2.0..15.0;
 const BAYS: Range<f64> = 1.0..6.0;
 /// Width of a groove \[px\].
 const GROOVE_PX: Range<f64> = 2.0..40.0;
-/// Brightness of grooves and holes \[grey levels\]: of real grooves that are wide enough
-/// to show it, as far as they are darker than the ground.
+/// Brightness of grooves and holes \[grey levels\]: of real grooves that are darker than the
+/// ground and wide enough to show it.
 const GROOVE_GREY: Range<f64> = 2.0..60.0;
-/// Texture of the bead \[grey levels\] and its correlation length \[px\]: up to the
-/// fraction of the contrast that real beads have, 0.38.
+/// Texture of the bead \[grey levels\] and its correlation length \[px\]: up to 0.38 of the
+/// contrast, as on real beads.
 const TEXTURE_GREY: Range<f64> = 5.0..30.0;
 const TEXTURE_PX: Range<f64> = 2.0..8.0;
 
-/// Step and noise in low light \[grey levels\], on a ground that is nearly dark.
+/// Contrast and noise in low light \[grey levels\], on a ground that is nearly dark.
 const LOW_CONTRAST_GREY: Range<f64> = 8.0..30.0;
 const LOW_LIGHT_NOISE_GREY: Range<f64> = 2.0..6.0;
 /// Grey level of the nearly dark ground in low light.
 const LOW_LIGHT_GROUND_GREY: f64 = 20.0;
 
-/// Contrast of ribs, as a fraction of the edges'.
+/// Contrast of ribs over the contrast of the bead's edges.
 pub const WEAK_RIBS: Range<f64> = 0.1..0.6;
-/// Contrast of ribs that may be taken for edges.
+/// The same for ribs that may be detected as edges.
 pub const STRONG_RIBS: Range<f64> = 0.6..1.0;
 /// Width of a rib \[px\].
 const RIB_PX: Range<f64> = 3.0..30.0;
 /// Smallest distance of a rib from the edges \[px\].
 const RIB_CLEARANCE_PX: f64 = 6.0;
-/// The same in blurs, if that is more. Derived: Φ(−3) = 0.1 % of the step is left.
+/// Smallest distance of a rib from the edges in blurs; the larger of the two applies. Derived:
+/// Φ(−3) = 0.1 % of the step is left.
 const RIB_CLEARANCE_BLURS: f64 = 3.0;
-/// Distance on top of it in standard deviations of the edges. Derived: four are exceeded by 6
-/// of 100,000 positions.
+/// Additional distance in standard deviations of the edges. Derived: four are exceeded by 6 of
+/// 100,000 positions.
 const RIB_CLEARANCE_ROUGHNESSES: f64 = 4.0;
 
-/// Sideways motion that is measured \[px\].
+/// Sideways motion during exposure that must be measured \[px\].
 pub const SHORT_MOTION_PX: Range<f64> = 5.0..15.0;
-/// Sideways motion that may be refused \[px\].
+/// Sideways motion during exposure that may be rejected \[px\].
 pub const LONG_MOTION_PX: Range<f64> = 15.0..40.0;
 
-/// Step of a bead on a ground with a pattern \[grey levels\].
+/// Contrast of a bead on a ground with a pattern \[grey levels\].
 const CONTRAST_GREY: Range<f64> = 20.0..100.0;
-/// Weakest pattern of the ground \[grey levels\]: below the noise it is not one.
+/// Weakest pattern of the ground \[grey levels\]; a weaker one is below the noise.
 const WEAKEST_PATTERN_GREY: f64 = 3.0;
-/// Pattern of the ground, as a fraction of the contrast: one that is measured on, and
-/// one that may be refused.
+/// Pattern of the ground over the contrast: a pattern that must be measured on, and one that may
+/// be rejected.
 pub const WEAK_PATTERN: Range<f64> = 0.03..1.0 / 3.0;
 /// See [`WEAK_PATTERN`].
 pub const STRONG_PATTERN: Range<f64> = 1.0 / 3.0..1.0;
 /// Correlation length of the ground's pattern \[px\].
 const PATTERN_PX: Range<f64> = 2.0..12.0;
 
-/// Exponent of a camera.
+/// Gamma of a camera.
 pub const GAMMA: Range<f64> = 0.45..2.2;
-/// Exponent of a camera that is nearly linear.
+/// Gamma of a camera that is nearly linear.
 pub const NEAR_GAMMA: Range<f64> = 0.9..1.1;
-/// Quality of a JPEG. The image's blocks are 8 px wide: every position within one is
-/// drawn.
+/// Quality of a JPEG. The image's blocks are 8 px wide: every position within one is drawn.
 const QUALITY: Range<f64> = 30.0..95.0;
 /// Side of a block of a JPEG \[px\]. ISO 10918-1; every position within one is drawn.
 const BLOCK_PX: f64 = 8.0;
-/// Brightness in the middle over that in the corners.
+/// Brightness in the centre over that in the corners.
 const VIGNETTING: Range<f64> = 1.1..4.0;
 /// Blur of the lens \[px\].
 const BLUR_PX: Range<f64> = 0.5..6.0;
-/// Nominal width of a bead \[px\]: 5 to 600 px, less what a frame's differs from it.
+/// Nominal width of a bead \[px\]: 5 to 600 px, less the deviation of a frame's bead.
 const WIDTH_PX: Range<f64> = 5.0 + WIDTH_SPREAD_PX..600.0 - WIDTH_SPREAD_PX;
 /// Largest deviation of a frame's bead from its nominal width \[px\]: half a pixel on each
 /// side.
 const WIDTH_SPREAD_PX: f64 = 1.0;
-/// Smallest width in blurs: narrower beads show no plateau.
+/// Smallest width in blurs; a narrower bead has no plateau in the image.
 const MIN_BLURS: f64 = 4.0;
 
-/// Roughness and correlation length of a frame's edges.
+/// Random roughness and correlation length of a frame's edges.
 fn rough(draw: &mut Draw, roughness_px: Range<f64>) -> Tear {
     let length_px = draw.log("length_px", LENGTH_PX);
     let most = roughness_px.end.min(STEEPEST * length_px);
@@ -104,7 +104,7 @@ fn rough(draw: &mut Draw, roughness_px: Range<f64>) -> Tear {
     Tear { roughness_px: drawn, length_px }
 }
 
-/// The default scene; every other one has rough edges.
+/// The default scene; half of the frames have rough edges.
 fn usual(draw: &mut Draw) -> DrawnScene {
     half_rough(draw, ROUGHNESS_PX)
 }
@@ -131,7 +131,7 @@ pub fn holes(draw: &mut Draw) -> DrawnScene {
     DrawnScene { holes: Some(Holes { count, size_px, grey }), ..usual(draw) }
 }
 
-/// A groove on either side, and beyond it ground or another bead.
+/// A groove on both sides; beyond it is ground or another bead.
 pub fn grooves(draw: &mut Draw) -> DrawnScene {
     let mut groove = |width, grey| Groove {
         width_px: draw.log(width, GROOVE_PX),
@@ -143,14 +143,14 @@ pub fn grooves(draw: &mut Draw) -> DrawnScene {
     DrawnScene { grooves: [Some(left), Some(right)], ..half_rough(draw, CONCRETE_PX) }
 }
 
-/// Aggregate of the bead.
+/// Texture of the bead's aggregate.
 pub fn texture(draw: &mut Draw) -> DrawnScene {
     let size_grey = draw.log("texture_grey", TEXTURE_GREY);
     let length_px = draw.log("texture_px", TEXTURE_PX);
     DrawnScene { texture: Patches { size_grey, length_px }, ..half_rough(draw, CONCRETE_PX) }
 }
 
-/// A faint bead in much noise.
+/// Low contrast and much noise.
 pub fn low_light(draw: &mut Draw) -> DrawnScene {
     let contrast = draw.log("contrast_grey", LOW_CONTRAST_GREY);
     let noise_grey = draw.log("noise_grey", LOW_LIGHT_NOISE_GREY);
@@ -158,14 +158,14 @@ pub fn low_light(draw: &mut Draw) -> DrawnScene {
     DrawnScene { bead_grey: ground_grey + contrast, ground_grey, noise_grey, ..usual(draw) }
 }
 
-/// One or two lines along the bead; two lie on either side of its axis.
+/// One or two ribs along the bead; of two, one is on each side of the axis.
 pub fn ribs(draw: &mut Draw, contrast: Range<f64>) -> DrawnScene {
     let fraction = draw.log("rib_of_contrast", contrast);
     let width_px = draw.log("rib_px", RIB_PX);
     let scene = usual(draw);
     let clearance = RIB_CLEARANCE_PX.max(RIB_CLEARANCE_BLURS * scene.blur_px)
         + RIB_CLEARANCE_ROUGHNESSES * scene.edges.roughness_px;
-    // The bead itself may be half a pixel narrower on each side.
+    // A frame's bead may be half a pixel narrower on each side.
     let farthest = scene.width_px / 2.0 - 0.5 - clearance - width_px / 2.0;
     let rib = |nearest: f64, side: f64, draw: &mut Draw| {
         let sign = if draw.one_of(2.0) { 1.0 } else { -1.0 };
@@ -211,7 +211,7 @@ pub fn jpeg(draw: &mut Draw) -> DrawnScene {
     DrawnScene { jpeg, position_jitter_px: 0.5 * BLOCK_PX, ..usual(draw) }
 }
 
-/// Light that falls towards the corners.
+/// Vignetting.
 pub fn vignetting(draw: &mut Draw) -> DrawnScene {
     let vignetting = draw.log("vignetting", VIGNETTING);
     DrawnScene { vignetting, ..usual(draw) }
@@ -223,7 +223,7 @@ pub fn blur(draw: &mut Draw) -> DrawnScene {
     DrawnScene { blur_px, ..usual(draw) }
 }
 
-/// Beads of all widths; a narrow one is seen sharply, and torn less.
+/// Beads of all widths; a narrow bead has less blur and less roughness.
 pub fn narrow(draw: &mut Draw) -> DrawnScene {
     let width_px = draw.log("width_px", WIDTH_PX);
     let scene = usual(draw);

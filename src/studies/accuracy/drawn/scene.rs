@@ -4,7 +4,7 @@
 /// camera with gamma 1.
 #[derive(Debug, Clone)]
 pub struct DrawnScene {
-    /// Columns and rows; the bead runs along the rows' normal.
+    /// Columns and rows \[px\]; the bead runs along the columns.
     pub size: (usize, usize),
     /// Width of the bead before its edges are torn.
     pub width_px: f64,
@@ -12,17 +12,17 @@ pub struct DrawnScene {
     pub bead_grey: f64,
     /// Brightness of the ground.
     pub ground_grey: f64,
-    /// How far its axis lies from the image's middle at most.
+    /// Largest distance of its axis from the image's centre.
     pub position_jitter_px: f64,
-    /// How its edges are torn.
+    /// Roughness of its edges.
     pub edges: Tear,
-    /// Aggregate on beads, as the image shows it.
+    /// Texture of beads, as the image shows it.
     pub texture: Patches,
     /// Pattern of the ground, as the image shows it.
     pub ground_texture: Patches,
     /// Grooves on either side.
     pub grooves: [Option<Groove>; 2],
-    /// Number of holes within the bead, and of bays in its edges, and their size.
+    /// Holes within the bead, and bays in its edges.
     pub holes: Option<Holes>,
     /// Seams (dark), ribs and highlights (bright) within the bead.
     pub ribs: Vec<Rib>,
@@ -43,9 +43,9 @@ pub struct DrawnScene {
 /// Roughness of an edge and its correlation length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tear {
-    /// Standard deviation of the local position.
+    /// Standard deviation of the edge about its mean position.
     pub roughness_px: f64,
-    /// Of the autocorrelation exp(−|d|/length).
+    /// Correlation length: the autocorrelation is exp(−|d|/length).
     pub length_px: f64,
 }
 
@@ -65,14 +65,14 @@ pub struct Groove {
     pub width_px: f64,
     /// Brightness.
     pub grey: f64,
-    /// Whether another bead lies beyond it, and not ground.
+    /// Whether another bead, instead of the ground, lies beyond it.
     pub neighbour: bool,
 }
 
 /// Holes of one size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Holes {
-    /// How many within the bead and as bays in either edge.
+    /// Number of bays in each edge; the bead has twice as many holes.
     pub count: usize,
     /// Diameter.
     pub size_px: f64,
@@ -83,11 +83,11 @@ pub struct Holes {
 /// A line along the bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rib {
-    /// Its middle, from the bead's axis.
+    /// Position of its centre, from the bead's axis.
     pub at_px: f64,
     /// Width.
     pub width_px: f64,
-    /// Brightness over the bead's; a seam's is negative.
+    /// Brightness relative to the bead's; negative for a seam.
     pub over_grey: f64,
 }
 

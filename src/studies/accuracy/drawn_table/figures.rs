@@ -1,4 +1,4 @@
-//! What became of a frame, and figures of some frames of a set.
+//! The outcome of a frame, and figures of some frames of a set.
 
 use std::collections::BTreeMap;
 
@@ -6,34 +6,35 @@ use serde::Serialize;
 
 use crate::studies::accuracy::drawn::DrawnParameter;
 
-/// Standard deviations that a silently wrong width is off at least. Derived: 2·Φ(−5) is one
-/// frame in 1.7 million.
+/// Smallest error of a silently wrong width in standard deviations. Derived: 2·Φ(−5) is one frame
+/// in 1.7 million.
 const SILENT_SIGMAS: f64 = 5.0;
-/// Pixels that a silently wrong width is off at least.
+/// Smallest error of a silently wrong width \[px\].
 const SILENT_PX: f64 = 0.3;
 
-/// What became of one frame.
+/// The outcome of one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DrawnOutcome {
     /// Its number within the set.
     pub frame: u64,
-    /// What was drawn for it.
+    /// The random parameters of the frame.
     pub parameters: Vec<DrawnParameter>,
     /// Error and standard deviation, or why it was refused.
     pub width: Result<Deviation, FrameRejection>,
 }
 
-/// How far off a width is \[px\].
+/// Error of a measured width \[px\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
     /// Measured less true width.
     pub error_px: f64,
-    /// As the measurement reports it.
+    /// Standard deviation that the measurement reports.
     pub sigma_px: f64,
 }
 
 impl Deviation {
-    /// Whether it is off by more than its standard deviation excuses.
+    /// Whether the width is silently wrong: off by more than `SILENT_PX` and by more than
+    /// `SILENT_SIGMAS` standard deviations.
     pub fn is_silent(&self) -> bool {
         self.error_px.abs() > SILENT_PX && self.error_px.abs() > SILENT_SIGMAS * self.sigma_px
     }
@@ -44,7 +45,7 @@ impl Deviation {
 pub struct FrameRejection {
     /// The status in `widths.csv`.
     pub status: &'static str,
-    /// Whether its words name the camera's gamma.
+    /// Whether its message names the camera's gamma.
     pub names_gamma: bool,
 }
 
@@ -53,7 +54,7 @@ pub struct FrameRejection {
 pub struct DrawnFigures {
     /// The set's name.
     pub set: &'static str,
-    /// Which of its frames.
+    /// The part of the set that these frames are.
     pub part: SetPart,
     /// Their number.
     pub frames: usize,
@@ -73,7 +74,7 @@ pub struct DrawnFigures {
     pub without_gamma: usize,
     /// Frames with the largest errors over sigma.
     pub worst: Vec<u64>,
-    /// What is missed.
+    /// The requirements that are missed.
     pub missed: Vec<String>,
 }
 
@@ -83,16 +84,17 @@ pub struct DrawnFigures {
 pub enum SetPart {
     /// Every frame.
     All,
-    /// Those whose value lies within a third, in the logarithm, of its range.
+    /// Frames whose value lies within a third of the parameter's range; the thirds are equal in
+    /// the logarithm.
     Third {
         /// The parameter's name, with its unit.
         parameter: &'static str,
-        /// From which value on.
+        /// Lower end of the third.
         from: f64,
-        /// Up to which value.
+        /// Upper end of the third.
         to: f64,
     },
-    /// Those of which it is 0.
+    /// Frames in which the parameter is 0.
     Zero {
         /// The parameter's name, with its unit.
         parameter: &'static str,

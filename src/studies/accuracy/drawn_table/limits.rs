@@ -1,4 +1,4 @@
-//! Which requirements of a set some of its frames miss.
+//! Requirements of a set that some of its frames miss.
 
 use super::figures::{DrawnFigures, SetPart};
 use crate::numeric::number::to_f64;
@@ -7,15 +7,15 @@ use crate::studies::accuracy::drawn::Requirements;
 /// Frames for which the limits hold without an allowance: the default of `lab accuracy
 /// --random`.
 const FULL_SET_FRAMES: usize = 30_000;
-/// Standard errors that are allowed for figures of fewer frames or of a part. Derived: three
-/// miss one figure in 370 by chance.
+/// Standard errors by which a figure of fewer frames or of a part may miss its limit. Derived:
+/// three miss one figure in 370 by chance.
 const ALLOWANCE_SIGMAS: f64 = 3.0;
-/// Fewest measured frames of a part that is judged. Derived: a z of 30 frames has a standard
-/// error of 1/√60, 13 %.
+/// Smallest number of measured frames of a part that is judged. Derived: a z of 30 frames has a
+/// standard error of 1/√60, 13 %.
 const MIN_FRAMES: usize = 30;
 
-/// What is missed. Shares, and the words of refusals, are judged over all frames of a
-/// set, bias and z within each part.
+/// The requirements that are missed. Fractions and messages of rejections are judged over all
+/// frames of a set, bias and z also within each part.
 pub fn misses(figures: &DrawnFigures, required: &Requirements, measured: usize) -> Vec<String> {
     let whole = figures.part == SetPart::All;
     if !whole && measured < MIN_FRAMES {

@@ -9,7 +9,7 @@ use crate::numeric::statistics::Moments;
 use crate::studies::accuracy::drawn::{DrawnParameter, DrawnSet};
 use crate::studies::accuracy::figures::fraction;
 
-/// Parts of a range, equal in the logarithm.
+/// Number of parts of a range, equal in the logarithm.
 const RANGE_PARTS: u32 = 3;
 /// Number of frames with the largest errors that are listed.
 const WORST_FRAMES: usize = 5;
@@ -89,13 +89,13 @@ fn figures_of(set: &DrawnSet, part: SetPart, outcomes: &[&DrawnOutcome]) -> Draw
     figures
 }
 
-/// Where a part begins.
+/// Lower end of a part; part `RANGE_PARTS` gives the range's upper end.
 fn end(parameter: &DrawnParameter, number: u32) -> f64 {
     let (from, to) = parameter.range;
     from * libm::exp(f64::from(number) / f64::from(RANGE_PARTS) * libm::log(to / from))
 }
 
-/// In which part a value lies.
+/// Index of the part in which a value lies.
 fn part_of(parameter: &DrawnParameter, value: f64) -> usize {
     let (from, to) = parameter.range;
     let position = f64::from(RANGE_PARTS) * libm::log(value / from) / libm::log(to / from);

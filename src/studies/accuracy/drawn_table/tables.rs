@@ -54,7 +54,7 @@ pub fn markdown(sets: &[DrawnSet], figures: &[DrawnFigures]) -> String {
     text
 }
 
-/// What was drawn from where.
+/// The random parameters and their ranges.
 fn ranges(parts: &[&DrawnFigures]) -> String {
     let mut ranges: Vec<(&str, f64, f64)> = Vec::new();
     for part in parts {

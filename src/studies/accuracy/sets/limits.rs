@@ -11,7 +11,7 @@ pub struct SetLimits {
     pub rmse_px: Option<f64>,
     /// Largest root of the mean square of the error \[mm\].
     pub rmse_mm: Option<f64>,
-    /// The same as a multiple of the bound for an unknown direction.
+    /// Largest root mean square of the error over the bound for an unknown direction.
     pub rmse_over_free_bound: Option<f64>,
     /// Smallest fraction of the frames that give a width.
     pub measured_fraction: Option<f64>,
@@ -38,38 +38,38 @@ const NO_LIMITS: SetLimits = SetLimits {
 };
 
 impl SetLimits {
-    /// A standard deviation that can be trusted.
+    /// For a reported standard deviation that is right.
     pub const TRUST: Self =
         Self { rms_over_sigma: Some([0.9, 1.1]), within_interval: Some([0.93, 0.97]), ..NO_LIMITS };
-    /// A straight bead that nothing disturbs.
+    /// For a straight bead without disturbances.
     pub const CLEAN: Self = Self {
         bias_px: Some(0.005),
         rmse_over_free_bound: Some(1.10),
         measured_fraction: Some(1.0),
         ..Self::TRUST
     };
-    /// One whose contrast is little more than three times the noise.
+    /// For a straight bead whose contrast is little more than three times the noise.
     pub const FAINT: Self = Self {
         bias_px: Some(0.02),
         rmse_over_free_bound: Some(1.25),
         measured_fraction: Some(0.995),
         ..Self::TRUST
     };
-    /// One that is seen by a tilted camera through a lens with distortion.
+    /// For a bead seen by a tilted camera through a lens with distortion.
     pub const TILTED: Self = Self {
         bias_mm: Some(0.005),
         rmse_mm: Some(0.01),
         measured_fraction: Some(1.0),
         ..Self::TRUST
     };
-    /// A bead in poor light, with dirt on it, or with something beside it.
+    /// For a bead in poor light, with dirt on it, or with an object beside it.
     pub const DISTURBED: Self = Self {
         bias_px: Some(0.05),
         rmse_px: Some(0.10),
         measured_fraction: Some(0.99),
         ..Self::CORNER
     };
-    /// A rough bead, every row of which shows.
+    /// For a rough bead that is visible in every row.
     pub const ROUGH: Self = Self {
         bias_px: Some(0.02),
         rmse_px: Some(0.05),
@@ -77,9 +77,9 @@ impl SetLimits {
         silent_fraction: Some(1e-4),
         ..Self::TRUST
     };
-    /// A curve of three widths or more.
+    /// For a curve with a radius of three widths or more.
     pub const CURVE: Self =
         Self { bias_px: Some(0.02), measured_fraction: Some(0.99), ..NO_LIMITS };
-    /// A corner: it may be refused, and may be uncertain, but not be wrong.
+    /// For a corner: a width may be rejected or uncertain, but not silently wrong.
     pub const CORNER: Self = Self { silent_fraction: Some(1e-4), ..NO_LIMITS };
 }

@@ -73,7 +73,7 @@ fn slanted() -> Vec<Set> {
     ]
 }
 
-/// Nothing disturbs these either.
+/// More sets without disturbances: rough, faint and tilted.
 fn other() -> Vec<Set> {
     let faint = ImageModel { bead_grey: 90.0, blur_px: 2.0, noise_grey: 6.0, ..PLAIN };
     let roughness = EdgeRoughness { sigma_mm: 0.1, length_mm: 5.0 };
@@ -156,12 +156,12 @@ fn odd() -> Vec<Set> {
         disturbed("motion", |image| {
             image.motion = MotionBlur { length_px: 6.0, direction_deg: 15.0 };
         }),
-        // Weights that know the texture's autocorrelation leave 0.0985 px.
+        // Weights that use the texture's autocorrelation would give 0.0985 px.
         Set { rows: 400, limits: SetLimits { rmse_px: Some(0.103), ..layer.limits }, ..layer },
     ]
 }
 
-/// Rough beads in tall gauges, alone and with what disturbs.
+/// Rough beads in tall gauges, without and with disturbances.
 fn rough() -> Vec<Set> {
     let tall = |set: Set, size_mm: f64, length_mm: f64| Set {
         rows: 500,
