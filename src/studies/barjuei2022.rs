@@ -1,6 +1,6 @@
-//! The experiments of Shojaei Barjuei et al. 2022 on a plant fitted to their tables, with
-//! the paper's loop and with the controller by distance: four layers, disturbances of the
-//! flow, the stand-off curve, stacked layers.
+//! The experiments of Shojaei Barjuei et al. 2022 on a plant fitted to their tables, with the
+//! paper's controller and with the distance controller: four layers, disturbances of the flow, the
+//! stand-off curve, stacked layers.
 
 mod contender;
 mod disturbed;
@@ -48,7 +48,7 @@ const fn layer(target_mm: f64, mean_error_mm: f64, rms_error_mm: f64, speed: f64
     PaperLayer { target_mm, mean_error_mm, rms_error_mm, mean_speed_mm_per_s: speed }
 }
 
-/// The paper's camera: one scale, which no height changes.
+/// The paper's camera: one scale for all heights.
 pub fn scale() -> crate::calibration::Calibration {
     crate::calibration::Calibration::Scale { mm_per_px: MM_PER_PX, sigma: None }
 }

@@ -19,11 +19,11 @@ pub fn drive() -> Result<TransferFunction, ModelError> {
 /// Poles of G2 at −0.738 ± 0.993i 1/s: real and imaginary part. Bead characterisation thesis,
 /// § 3.3.2.
 pub const FLOW_POLES_PER_S: [f64; 2] = [0.738, 0.993];
-/// Its zeros at −3.84 ± 6.88i 1/s. Bead characterisation thesis, § 3.3.2, prints their
-/// reciprocals (−0.0619 ± 0.1108i), with which the gain at high frequencies would be 95;
-/// these reproduce its table 3 (papers.md).
+/// Zeros of G2 at −3.84 ± 6.88i 1/s. Bead characterisation thesis, § 3.3.2, prints their
+/// reciprocals (−0.0619 ± 0.1108i), which would give a high-frequency gain of 95; these values
+/// reproduce its table 3 (papers.md).
 pub const FLOW_ZEROS_PER_S: [f64; 2] = [3.84, 6.88];
-/// Its DC gain \[mm³/s per rpm\], which the thesis does not give: papers.md, "19.05 used".
+/// DC gain of G2 \[mm³/s per rpm\], which the thesis does not give: papers.md, "19.05 used".
 pub const FLOW_GAIN: f64 = 19.05;
 
 /// G2, screw speed \[rpm\] to flow at the nozzle \[mm³/s\].
@@ -40,7 +40,7 @@ pub fn flow_at_constant_speed() -> Result<TransferFunction, ModelError> {
     TransferFunction::new(&[9.175, 149.2, 905.3], &[1.0, 12.84, 47.52], 0.0)
 }
 
-/// G3, command to speed of the wheel: 2.517/(0.0377s + 1)·e^(−0.009s). Section 3.3.3.
+/// G3, command to wheel speed: 2.517/(0.0377s + 1)·e^(−0.009s). Section 3.3.3.
 pub fn wheel() -> Result<TransferFunction, ModelError> {
     TransferFunction::new(&[2.517], &[0.0377, 1.0], 0.009)
 }

@@ -34,13 +34,13 @@ pub const CYCLE_S: f64 = 16.0;
 /// A conveying speed over time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PulsationCase {
-    /// Its name.
+    /// Its name in tables.
     pub name: &'static str,
     /// How the speed pulsates.
     pub pulsation: SpeedPulsation,
 }
 
-/// Steady, and the two of Diagne et al. 2015, section VII.
+/// A steady speed, and the two pulsations of Diagne et al. 2015, section VII.
 pub const CASES: [PulsationCase; 3] = [
     case("constant", 0.0, 0.0),
     case("a: ε 0.1, ω 3.5 rad/s", 0.1, 3.5),
@@ -65,8 +65,8 @@ pub fn paper_controller(screw: &Screw) -> Result<PiecewiseExponential, ScrewErro
     PiecewiseExponential::new(screw, SETPOINT, slope)
 }
 
-/// Our controller: the largest feed until shortly before the setpoint, there linear with a
-/// slope \[1/m\].
+/// Our controller: the largest feed until shortly before the setpoint, then linear with a slope
+/// \[1/m\].
 pub fn saturated(screw: &Screw, slope_per_m: f64) -> Result<FillFeedback, ScrewError> {
     SaturatedLinear::new(screw, SETPOINT, slope_per_m).map(FillFeedback::Saturated)
 }

@@ -16,10 +16,10 @@ use crate::sim::render::RenderError;
 /// An experiment that could not be run.
 #[derive(Debug, thiserror::Error)]
 pub enum ReproduceError {
-    /// The cell that ships with the program cannot be read.
+    /// The cell file that ships with the program cannot be read.
     #[error("the cell of the experiments: {0}")]
     Cell(#[from] Problems),
-    /// It lacks tables that a run needs.
+    /// That cell file lacks tables that a run needs.
     #[error("the cell of the experiments is not complete enough for a run")]
     NoRun,
     /// The simulated cell cannot be set up.
@@ -28,7 +28,7 @@ pub enum ReproduceError {
     /// An image cannot be rendered.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// A run of the screw.
+    /// A run of the screw has failed.
     #[error("the screw: {0}")]
     Screw(#[from] super::diagne2015::run::RunError),
     /// A pressure loop cannot be set up.
@@ -43,25 +43,25 @@ pub enum ReproduceError {
     /// A model cannot be fitted.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// Simulated samples cannot be fitted to.
+    /// Simulated samples do not permit a fit.
     #[error(transparent)]
     Samples(#[from] SamplesError),
-    /// An excitation of no possible length.
+    /// The length of an excitation is not possible.
     #[error(transparent)]
     Sequence(#[from] NoSuchLength),
-    /// A table of fits without seeds.
+    /// A table of fits needs at least one seed.
     #[error("a table needs at least one seed")]
     NoSeeds,
     /// No start-stop model can be fitted to a recording.
     #[error("starts and stops: {0}")]
     StartStopFit(#[from] StartStopFitError),
-    /// The parameters of a start-stop model.
+    /// The parameters of a start-stop model are not valid.
     #[error("starts and stops: {0}")]
     StartStop(#[from] StartStopError),
     /// A corner cannot be planned or run.
     #[error(transparent)]
     Corner(#[from] CornerError),
-    /// A model of a plant.
+    /// The model of a plant is not valid.
     #[error(transparent)]
     Model(#[from] ModelError),
 }

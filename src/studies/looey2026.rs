@@ -45,7 +45,7 @@ pub const WATCHED_S: f64 = 31.0;
 pub const TOLERANCES: [f64; 2] = [1.61e-5, 1.01e-7];
 /// Hold time of a command: short, because the controller is in continuous time.
 const HOLD: Span = Span::from_millis(1);
-/// The same \[s\]. Derived: `HOLD`.
+/// [`HOLD`] in seconds. Derived: `HOLD`.
 const HOLD_S: f64 = 0.001;
 /// The operating point.
 const TARGETS: StrandTargets = StrandTargets { nozzle_m_per_s: 0.05, strand_m_per_s: 0.05 };
@@ -53,16 +53,16 @@ const TARGETS: StrandTargets = StrandTargets { nozzle_m_per_s: 0.05, strand_m_pe
 /// A controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AdaptationMethod {
-    /// The paper's with γ = 0.
+    /// The paper's controller with γ = 0.
     NotAdaptive,
-    /// The paper's.
+    /// The paper's controller.
     Paper,
-    /// With an estimate of the slope of the uncertainty, by pole placement.
+    /// Our controller: it also estimates the slope of the uncertainty; gains by pole placement.
     Ours,
 }
 
 impl AdaptationMethod {
-    /// Its gains for either sub-system.
+    /// Gains for both sub-systems.
     pub fn gains(self) -> [AdaptiveGains; 2] {
         let of = |part: usize, plant: ScalarPlant| {
             let feedback = FEEDBACK[part];
@@ -104,7 +104,7 @@ pub struct StrandExperiment {
     pub method: AdaptationMethod,
     /// Dependence of the plant's parameters on its inputs.
     pub parameters: StrandParameters,
-    /// Unknown part of ṁ \[kg/s\].
+    /// Unknown part of the feed ṁ \[kg/s\].
     pub feed: InputDisturbance,
     /// Unknown part of the plate's speed \[m/s\].
     pub plate: InputDisturbance,
@@ -119,14 +119,14 @@ pub struct StrandSample {
     pub t_s: f64,
     /// v̄1 and ū3 \[m/s\].
     pub speeds: [f64; 2],
-    /// The action of the controller of either sub-system.
+    /// Action of each sub-system's controller.
     pub actions: [Action; 2],
     /// The true unknown parts \[kg/s, m/s\].
     pub unknown: [f64; 2],
 }
 
 impl StrandExperiment {
-    /// Runs it from the steady state; calls `observe` every millisecond.
+    /// Runs the experiment from the steady state; calls `observe` every millisecond.
     pub fn run(&self, mut observe: impl FnMut(&StrandSample)) -> Result<(), SubSystemError> {
         let mut controller = self.method.controller(HOLD)?;
         let start = operating_point();
@@ -199,10 +199,10 @@ pub fn feed_ramp(method: AdaptationMethod, parameters: StrandParameters) -> Stra
     StrandExperiment { method, parameters, feed, plate: InputDisturbance::None, length_s: 90.0 }
 }
 
-/// Standard deviation of the feed's command for each unit of white noise on
-/// v̄1 at 100 Hz, in a steady state.
+/// Standard deviation of the feed command over that of white noise on v̄1 at 100 Hz, in the steady
+/// state.
 pub fn command_noise(method: AdaptationMethod) -> Result<f64, SubSystemError> {
-    /// Their standard deviation has an error of 0.4 %. Derived: 1/√(2·40,000).
+    /// The standard error of their standard deviation is 0.4 %. Derived: 1/√(2·40,000).
     const SAMPLES: u32 = 40_000;
     /// Standard deviation of the noise; the result is a ratio, independent of it.
     const SIGMA_M_PER_S: f64 = 1e-3;

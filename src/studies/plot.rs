@@ -73,7 +73,8 @@ pub fn legend_of(lines: &[Line<'_>]) -> Markup {
     legend(&named.map(|line| (line.name, line.ink, kind(line))).collect::<Vec<_>>())
 }
 
-/// The lines, the first lowest. The y axis shows all of them and the values of `include`.
+/// The lines in order; the first is drawn first. The y axis includes all points and the values of
+/// `include`.
 pub fn plot(area: Area, x: &XAxis, y_title: &str, lines: &[Line<'_>], include: &[f64]) -> Markup {
     let curves: Vec<&Curve> = lines.iter().filter_map(Line::points).collect();
     let levels = lines.iter().filter_map(|line| match line.shape {

@@ -5,7 +5,7 @@
 pub enum Publication {
     /// Shojaei Barjuei et al. 2022: width by robot speed.
     Barjuei2022,
-    /// Bead characterisation thesis: models of the extruder, and speed by flow.
+    /// Bead characterisation thesis: models of the extruder, and speed from flow.
     BcsThesis,
     /// Diagne et al. 2015: a screw with a delay that depends on time and state.
     Diagne2015,
@@ -31,7 +31,7 @@ impl Publication {
         }
     }
 
-    /// What it is about, in one line.
+    /// Its subject, in one line.
     pub const fn about(self) -> &'static str {
         match self {
             Self::Barjuei2022 => "Shojaei Barjuei et al. 2022: width by robot speed",

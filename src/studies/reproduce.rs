@@ -1,6 +1,5 @@
-//! The experiments of the source papers beside the published numbers: a table,
-//! `reproduce.json` and a page with plots. Each paper has a folder of its own in
-//! `studies`.
+//! The experiments of the source papers compared with the published numbers: a table,
+//! `reproduce.json` and a page with plots. Each paper has its own folder in `studies`.
 
 use maud::html;
 

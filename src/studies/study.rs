@@ -1,4 +1,4 @@
-//! What the experiments of a paper give: rows of a table and sections of a page.
+//! Results of a paper's experiments: rows of a table and sections of a page.
 
 use maud::Markup;
 use serde::Serialize;
@@ -39,7 +39,7 @@ pub struct Section {
 }
 
 impl Section {
-    /// A section of its parts.
+    /// A section from its heading, hint and plots.
     pub fn new(heading: impl Into<String>, hint: impl Into<String>, drawing: Markup) -> Self {
         Self { heading: heading.into(), hint: hint.into(), drawing }
     }
@@ -49,7 +49,7 @@ impl Section {
 /// `reproduce.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TableRow {
-    /// The paper, by [`Publication::name`].
+    /// The paper, as [`Publication::name`].
     pub seed: &'static str,
     /// The experiment.
     pub case: String,
@@ -57,13 +57,12 @@ pub struct TableRow {
     pub quantity: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// The published number; none where the paper gives none.
+    /// The published number; `None` if the paper gives none.
     pub published: Option<f64>,
-    /// The result of the paper's own method in our simulation; none where it is never
-    /// reached.
+    /// The result of the paper's own method in our simulation; `None` if it does not reach the
+    /// quantity.
     pub simulated: Option<f64>,
-    /// The result of this program's best method on the same plant; none where there is
-    /// none.
+    /// The result of this program's best method on the same plant; `None` if there is none.
     pub ours: Option<f64>,
 }
 
@@ -78,7 +77,7 @@ pub struct TableRows {
 type Quantity = (&'static str, &'static str);
 
 impl TableRows {
-    /// No rows yet.
+    /// An empty table.
     pub const fn of(paper: Publication) -> Self {
         Self { seed: paper.name(), rows: Vec::new() }
     }

@@ -12,30 +12,30 @@ use crate::trials::layer::LayerTrial;
 
 /// Width of the disturbed layers \[mm\]: the nozzle's, Shojaei Barjuei et al. 2022, section 3.2.
 const TARGET_MM: f64 = 42.0;
-/// Distance from camera to nozzle for disturbances along the path: nearer than the paper's
-/// 88.4 mm, for it bounds the wavelengths that feedback can attenuate.
+/// Distance from camera to nozzle for disturbances along the path: less than the paper's 88.4 mm,
+/// because this distance limits the wavelengths that feedback can attenuate.
 const NEAR_OFFSET: Mm = Mm::constant(60.0);
 /// Amplitude of waves and pulsations, as a fraction of the flow.
 const AMPLITUDE: f64 = 0.03;
 /// Speed from which lengths of path are derived \[mm/s\]: that of a width of 42 mm, Shojaei
 /// Barjuei et al. 2022, table 2, rounded.
 const SPEED_MM_PER_S: f64 = 80.0;
-/// Path before errors count \[mm\]. Derived: 200 mm to where control begins (Shojaei Barjuei
-/// et al. 2022) and 20 mm for the first setpoints.
+/// Path before errors count \[mm\]. Derived: 200 mm to where control begins (Shojaei Barjuei et
+/// al. 2022) and 20 mm for the first setpoints.
 const CONTROL_START_MM: f64 = 220.0;
 
 /// A periodic disturbance of the flow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FlowDisturbance {
-    /// A sine along the path of this wavelength \[mm\].
+    /// A sine along the path with this wavelength \[mm\].
     Wave(f64),
-    /// A pulsation of the pump of this period \[s\].
+    /// A pulsation of the pump with this period \[s\].
     Pulsation(f64),
 }
 
 impl FlowDisturbance {
-    /// Applies it to a cell, with a path that is long enough. Returns the path from which
-    /// the error counts \[mm\].
+    /// Applies the disturbance to a cell and makes its path long enough. Returns the path from
+    /// which the error counts \[mm\].
     fn enter(self, cell: &mut Cell, run: &mut RunPart) -> f64 {
         let flow = &mut cell.simulation.flow;
         let (from, length) = match self {
@@ -57,14 +57,14 @@ impl FlowDisturbance {
     }
 }
 
-/// Moves the camera near the nozzle; the relative uncertainty of its distance stays.
+/// Moves the camera near the nozzle; the relative uncertainty of its distance stays the same.
 fn look_near(run: &mut RunPart) {
     let relative_sigma = run.camera.offset_sigma / run.camera.offset;
     run.camera.offset = NEAR_OFFSET;
     run.camera.offset_sigma = NEAR_OFFSET * relative_sigma;
 }
 
-/// Root mean square error of the bead over that of an uncontrolled bead, mean over seeds.
+/// Root mean square error of the bead over that of an uncontrolled bead; mean over the seeds.
 pub fn error_ratio(
     cell: &Cell,
     run: &RunPart,
@@ -80,8 +80,8 @@ pub fn error_ratio(
     Ok(mean(ratios.into_iter()))
 }
 
-/// Path after a flow step of 8 % until the bead stays within 0.5 mm of its target \[mm\],
-/// median over seeds; infinite where it never does.
+/// Path from a flow step of 8 % until the bead stays within 0.5 mm of its target \[mm\]; median
+/// over the seeds, infinite if it never does.
 pub fn step_settles(
     cell: &Cell,
     run: &RunPart,
@@ -104,7 +104,7 @@ pub fn step_settles(
 /// A model mismatch of the controller, and faults of its camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mismatch {
-    /// Camera's distance as the controller assumes it, over the true one.
+    /// Distance from camera to nozzle that the controller assumes, over the true one.
     pub offset: f64,
     /// Fraction of widths that are outliers.
     pub outliers: f64,
@@ -120,13 +120,13 @@ impl Mismatch {
 /// Root mean square errors of many beads \[mm\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeadErrors {
-    /// Their median.
+    /// Median over the seeds.
     pub median_mm: f64,
-    /// Their mean, in which one bead that goes astray shows.
+    /// Mean over the seeds; a single diverging bead shows in it.
     pub mean_mm: f64,
 }
 
-/// Root mean square error of the bead from 500 mm after control began, over seeds.
+/// Root mean square error of the bead from 500 mm after control began, over the seeds.
 pub fn mismatched(
     cell: &Cell,
     run: &RunPart,

@@ -15,31 +15,30 @@ use crate::vision::MeasureMethod;
 /// Medians over the seeds of a layer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerResult {
-    /// Mean magnitude of the measured error, over all bead that was seen \[mm\].
+    /// Mean magnitude of the measured error over all of the bead that the camera saw \[mm\].
     pub mean_error_mm: f64,
-    /// Its root mean square \[mm\].
+    /// Root mean square of the measured error \[mm\].
     pub rms_error_mm: f64,
-    /// Mean speed, start included \[mm/s\].
+    /// Mean speed, including the start \[mm/s\].
     pub mean_speed_mm_per_s: f64,
-    /// Mean magnitude of the error of the bead itself, from 30 mm after control began
-    /// \[mm\].
+    /// Mean magnitude of the bead's true error, from 30 mm after control began \[mm\].
     pub bead_mean_error_mm: f64,
-    /// Its root mean square \[mm\].
+    /// Root mean square of the bead's true error, from there on \[mm\].
     pub bead_rms_error_mm: f64,
-    /// Integral of its magnitude from where control began \[mm²\].
+    /// Integral of the true error's magnitude from where control began \[mm²\].
     pub error_integral_mm2: f64,
-    /// Standard deviation of the bead itself, from 700 mm after control began \[mm\].
+    /// Standard deviation of the bead's true width, from 700 mm after control began \[mm\].
     pub bead_sigma_mm: f64,
-    /// Path from where control began until the error stays within 0.5 mm \[mm\]; `None`
-    /// where it does not for most seeds.
+    /// Path from where control began until the error stays within 0.5 mm \[mm\]; `None` if for
+    /// most seeds it does not.
     pub settled_mm: Option<f64>,
-    /// Frames that were rejected, over all seeds.
+    /// Rejected frames, over all seeds.
     pub refused: u64,
     /// Widths and speeds over path of the first seed.
     pub example: LayerScore,
 }
 
-/// Lays a layer with several seeds, in parallel.
+/// Lays a layer with each seed, in parallel.
 pub fn lay(cell: &Cell, run: &RunPart, seeds: u64) -> Result<LayerResult, SimCellError> {
     let trials = each(seeds, |seed| LayerTrial::lay(cell, run, &scale(), seed))?;
     let of = |value: &dyn Fn(&LayerTrial) -> f64| {
@@ -61,9 +60,8 @@ pub fn lay(cell: &Cell, run: &RunPart, seeds: u64) -> Result<LayerResult, SimCel
     })
 }
 
-/// Path from the start of the bead until the error stays within 0.5 mm \[mm\], where control
-/// acts from the start and nothing has been measured before; median over seeds, infinite
-/// where it never does.
+/// Path from the start of the bead until the error stays within 0.5 mm \[mm\], with control from
+/// the start and without an earlier measurement; median over the seeds, infinite if it never does.
 pub fn settles_unseen(
     cell: &Cell,
     run: &RunPart,
@@ -78,7 +76,7 @@ pub fn settles_unseen(
     Ok(mean_median(&mut found).unwrap_or(f64::NAN))
 }
 
-/// The paper's cell with every frame rendered and measured by a method.
+/// The paper's cell, with every frame rendered and measured by `method`.
 pub fn with_frames(cell: &Cell, method: MeasureMethod) -> Cell {
     let mut cell = cell.clone();
     cell.simulation.width_source = WidthSource::Frames;

@@ -17,14 +17,14 @@ use crate::width_control::target::{Layers, WidthTarget};
 
 /// Height of a layer: the nozzle's 20 mm, Shojaei Barjuei et al. 2022, section 3.2.
 const LAYER: Mm = Mm::constant(20.0);
-/// Length of a layer of many; 1.5 m are enough to settle.
+/// Length of each layer of the tower; 1.5 m are enough to settle.
 const PATH: Mm = Mm::constant(1500.0);
 /// Length of its start, the first 20 cm, Shojaei Barjuei et al. 2022, section 4.2.
 const START: Mm = Mm::constant(200.0);
-/// Target width of many layers: the nozzle's, Shojaei Barjuei et al. 2022, section 3.2.
+/// Target width of the tower: the nozzle's, Shojaei Barjuei et al. 2022, section 3.2.
 const WIDTH: Mm = Mm::constant(42.0);
 
-/// Two layers, one upon the other.
+/// Results of two layers, one upon the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stack {
     /// Measured lateral offset of the second layer \[mm\].
@@ -67,7 +67,7 @@ fn raised_camera() -> Calibration {
     calibration
 }
 
-/// Observes where the middle of the bead lies across the bed \[mm\].
+/// Records the lateral position of the bead's centre on the bed \[mm\].
 struct Middles {
     surface: SurfaceMap,
     score: LayerScore,
@@ -90,18 +90,18 @@ impl Observer for Middles {
     }
 }
 
-/// One layer of many.
+/// Results of one layer of the tower.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TowerLayer {
     /// Mean of measured less true widths \[mm\].
     pub measured_error_mm: f64,
-    /// Mean of true width less target, of bead laid after control began \[mm\].
+    /// Mean of true width less target, of bead that was laid under control \[mm\].
     pub laid_error_mm: f64,
     /// Number of measured widths.
     pub widths: usize,
 }
 
-/// Lays layers one upon the other with every frame rendered, by one controller.
+/// Lays layers one upon the other with one controller and every frame rendered.
 pub fn tower(
     cell: &Cell,
     run: &RunPart,
@@ -131,7 +131,7 @@ pub fn tower(
     Ok((0..layer_count).map(lay_layer).collect())
 }
 
-/// Observes measured less true widths, and true widths less target under control \[mm\].
+/// Records measured less true widths, and true widths less target under control \[mm\].
 #[derive(Debug, Default)]
 struct ErrorObserver {
     measured: Vec<f64>,
@@ -144,7 +144,7 @@ impl Observer for ErrorObserver {
     fn frame(&mut self, observation: &FrameObservation<'_>) {
         let (Ok(measured), Some(truth)) = (&observation.outcome, observation.truth) else { return };
         self.measured.push(measured.width.get() - truth.width_mm);
-        // The first 30 mm under control are those of the step to the target.
+        // The first 30 mm under control belong to the step to the target.
         if observation.position_mm > START.get() + 30.0 {
             self.laid.push(truth.width_mm - WIDTH.get());
         }

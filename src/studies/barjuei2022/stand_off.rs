@@ -12,15 +12,15 @@ use crate::vision::Measurer;
 /// A point of the stand-off curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StandOff {
-    /// Height of the bead above the calibrated surface \[mm\].
+    /// Height of the bead above the calibrated surface, towards the camera \[mm\].
     pub nearer_mm: f64,
     /// Error of a 42 mm width with the paper's single scale \[mm\].
     pub scale_error_mm: f64,
-    /// Error with the full calibration and the height given \[mm\].
+    /// Error with the full calibration and the known height \[mm\].
     pub full_error_mm: f64,
 }
 
-/// A camera that looks straight down from the stand-off, with the paper's image size, and
+/// A camera that looks straight down from the stand-off distance, with the paper's image size, and
 /// its scale at height 0.
 pub fn camera_above() -> Calibration {
     let focal = STAND_OFF_MM / MM_PER_PX;
@@ -35,7 +35,7 @@ pub fn camera_above() -> Calibration {
     }
 }
 
-/// Renders a 42 mm bead at several heights and measures it both ways.
+/// Renders a 42 mm bead at several heights and measures it with both calibrations.
 pub fn stand_off(cell: &Cell) -> Result<Vec<StandOff>, RenderError> {
     /// Shojaei Barjuei et al. 2022, figure 13.
     const WIDTH_MM: f64 = 42.0;

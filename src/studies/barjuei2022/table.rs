@@ -25,11 +25,11 @@ const ASIDE_MM: f64 = 0.8;
 /// Steps of the progress bar. Derived: four layers, four with rendered frames, stand-off,
 /// stack and tower, and those of `ahead`.
 pub const EXPERIMENTS: u64 = 11 + ahead::EXPERIMENTS;
-/// Stacked layers.
+/// Number of stacked layers of the tower.
 const TOWER_LAYERS: u32 = 20;
 /// Seeds of the experiments: those of papers.md, "Noise in the loop, median of 40 seeds".
 const SEEDS: u64 = 40;
-/// Seeds where frames are rendered, at least the three of papers.md.
+/// Seeds of experiments with rendered frames, at least the three of papers.md.
 const FRAME_SEEDS: u64 = 3;
 
 /// Runs the experiments.
@@ -86,7 +86,7 @@ impl Experiments {
         }
     }
 
-    /// The paper's loop on its own plant, and the controller by distance with the paper's
+    /// The paper's controller on its own plant, and the distance controller with the paper's
     /// camera and link.
     fn widths(
         &mut self,
@@ -101,7 +101,7 @@ impl Experiments {
         Ok((theirs, ours))
     }
 
-    /// The same result with every frame rendered and measured by the paper's method and ours.
+    /// One result with every frame rendered, measured by the paper's method and by ours.
     fn by_method<T, E>(&self, lay: impl Fn(&Cell) -> Result<T, E>) -> Result<[T; 2], E> {
         let of = |method| lay(&paper::with_frames(&self.cell, method));
         Ok([of(MeasureMethod::EdgeLines)?, of(MeasureMethod::Caliper)?])
@@ -144,7 +144,7 @@ impl Experiments {
         Ok(())
     }
 
-    /// The largest error over many layers, measured and laid.
+    /// The largest error over the layers of the tower, measured and laid.
     fn tower(&mut self) -> Result<(), ReproduceError> {
         let layers = paper::tower(&self.cell, &self.run, TOWER_LAYERS)?;
         let worst = |of: fn(&paper::TowerLayer) -> f64| {

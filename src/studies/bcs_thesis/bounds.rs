@@ -1,5 +1,5 @@
-//! Cramér–Rao bounds of the parameters of two experiments, from the sensitivities of the
-//! output, beside the errors of many fits.
+//! Cramér–Rao bounds of the parameters of two experiments, from the sensitivities of the output,
+//! compared with the errors of many fits.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -33,7 +33,7 @@ pub struct ParameterBound {
 struct BoundExperiment<'a, const N: usize> {
     truth: [f64; N],
     names: [&'static str; N],
-    /// Their names in a fit.
+    /// Their names in the result of a fit.
     fitted: [&'static str; N],
     input: Vec<f64>,
     settings: FitSettings,
@@ -89,7 +89,7 @@ pub fn flow_model(trials: u64) -> Result<[ParameterBound; 5], ReproduceError> {
     experiment.bounds(0.17 * standard_deviation(&clean), trials)
 }
 
-/// From rest, with a known output level.
+/// Settings of a fit that begins at rest, with a known output level.
 fn at_rest(structure: Structure, dead_time: DeadTime) -> FitSettings {
     FitSettings {
         initial_state: InitialCondition::Settled { input: 0.0 },
@@ -144,7 +144,7 @@ impl<const N: usize> BoundExperiment<'_, N> {
         }
         let slopes = DMatrix::from_columns(&columns);
         let inverse = (slopes.transpose() * &slopes).try_inverse();
-        // Parameters that the output does not distinguish have no bound.
+        // Parameters that the output cannot distinguish have an infinite bound.
         let variance = |i: usize| inverse.as_ref().map_or(f64::INFINITY, |m| m[(i, i)]);
         Ok(std::array::from_fn(|i| noise * variance(i).sqrt()))
     }

@@ -1,6 +1,6 @@
-//! A 90° corner with the extruder of the thesis: the error of the width when robot and
-//! extruder are planned together, against an extruder that is driven constantly or in
-//! proportion to the robot's speed.
+//! A 90° corner with the extruder of the thesis: width error with robot and extruder planned
+//! together, compared with an extruder driven at a constant voltage or in proportion to the
+//! robot's speed.
 //!
 //! What limits the gain:
 //!
@@ -24,10 +24,10 @@ pub use scenario::{BEAD, CornerError, JUDGED_MM, Scenario, UNMODELLED};
 
 use crate::plan::FlowUncertainty;
 
-/// The results for one time that may be added.
+/// The results for one limit of the added time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BudgetRow {
-    /// Time that may be added \[s\].
+    /// Largest time that may be added \[s\].
     pub budget_s: f64,
     /// Time that the plan adds \[s\].
     pub added_s: f64,
@@ -35,25 +35,25 @@ pub struct BudgetRow {
     pub planned: Errors,
     /// The errors of each baseline.
     pub baselines: Vec<(Baseline, Errors)>,
-    /// Error of the plan for a known flow, without a trade-off against noise: what plant,
-    /// drive and acceleration leave in this time.
+    /// Error of a plan for a known flow, without a trade-off against noise: plant, drive and
+    /// acceleration allow no less in this time.
     pub bound: f64,
-    /// The part of the plan's error that is due to noise alone.
+    /// The part of the plan's error that is due to the unmodelled flow alone.
     pub floor: f64,
 }
 
 impl BudgetRow {
-    /// Error of the best baseline of a kind over that of the plan, with noise.
+    /// Error of the best baseline with this drive over that of the plan, with unmodelled flow.
     pub fn ratio(&self, drive: DriveMode) -> f64 {
         self.best_ratio(drive, |errors| errors.noisy)
     }
 
-    /// The same without noise.
+    /// The same ratio without unmodelled flow.
     pub fn quiet_ratio(&self, drive: DriveMode) -> f64 {
         self.best_ratio(drive, |errors| errors.quiet)
     }
 
-    /// The largest possible ratio, without noise.
+    /// Largest possible ratio without unmodelled flow: the best baseline over the bound.
     pub fn bound_ratio(&self, drive: DriveMode) -> f64 {
         self.quiet_ratio(drive) * self.planned.quiet / self.bound
     }
@@ -65,7 +65,7 @@ impl BudgetRow {
 }
 
 impl Scenario {
-    /// Plans for a time that may be added \[s\], and runs plan and baselines.
+    /// Makes the plan for a largest added time \[s\], and runs the plan and the baselines.
     pub fn row(&self, budget_s: f64, seeds: u64) -> Result<BudgetRow, CornerError> {
         let plan = self.plan(budget_s, UNMODELLED)?;
         let known = self.plan(budget_s, FlowUncertainty { ratio: 0.0, ..UNMODELLED })?;
@@ -87,7 +87,7 @@ mod tests {
 
     use super::*;
 
-    /// The error at the judged position nearest to one.
+    /// The error at the position nearest to `path_mm`.
     fn error_at(profile: &WidthProfile, path_mm: f64) -> f64 {
         let distance = |at: f64| (at - path_mm).abs();
         profile.along().min_by(|a, b| distance(a.0).total_cmp(&distance(b.0))).unwrap().1
@@ -99,7 +99,7 @@ mod tests {
         let run = CornerRun::new(&scenario, &scenario.nominal().unwrap(), |_| {
             100.0 * BEAD.area_mm2 / Scenario::extruder().unwrap().dc_gain()
         });
-        // (v − v₀)²/a over a nozzle's length.
+        // Surplus of an extruder at constant flow: (v − v₀)²/a over a nozzle's length.
         let wanted = 98.0_f64.powi(2) / 2000.0 / BEAD.nozzle_mm;
         assert!((error_at(&run.unwrap().quiet(), 0.0) - wanted).abs() < 1e-6);
     }

@@ -1,10 +1,10 @@
-//! Table 3 of the thesis: how well transfer functions of one to three poles
-//! predict the flow from the screw speed.
+//! Table 3 of the thesis: how well transfer functions with one to three poles predict the flow
+//! from the screw speed.
 //!
-//! A PRBS of ten bits of ±0.4 V about the operating point, 0.7 s a bit, drives the screw for
-//! 120 s; its speed and the flow are sampled every 50 ms. The unmodelled part of the flow is
-//! white noise through a lag of 0.15 s, with 19 % of the flow's standard deviation. The models
-//! are fitted on one run and validated on another.
+//! A PRBS of ten bits of ±0.4 V about the operating point, 0.7 s per bit, drives the screw for 120
+//! s; its speed and the flow are sampled every 50 ms. The unmodelled part of the flow is white
+//! noise through a lag of 0.15 s, with 19 % of the flow's standard deviation. The models are
+//! fitted on one run and validated on another.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -54,7 +54,7 @@ pub struct FitRow {
     pub published_percent: f64,
     /// Simulated fit on validation data, mean over the seeds \[%\].
     pub simulated_percent: f64,
-    /// The same of each seed \[%\].
+    /// Simulated fit of each seed \[%\].
     pub each_percent: Vec<f64>,
 }
 
@@ -65,13 +65,12 @@ pub struct FitTable {
     pub rows: Vec<FitRow>,
     /// Root mean square difference from the published column \[percentage points\].
     pub rms_points: f64,
-    /// Measured and predicted flow of the first seed's second run for the model
-    /// of two poles and two zeros: time \[s\], both about the operating point
-    /// \[mm³/s\].
+    /// Measured and predicted flow of the first seed's second run, for the model with two poles
+    /// and two zeros: time \[s\], and both flows about the operating point \[mm³/s\].
     pub example: Vec<[f64; 3]>,
 }
 
-/// The table, its fits the mean over the seeds.
+/// The table, with the mean fit over the seeds.
 pub fn fit_table(seeds: u64) -> Result<FitTable, ReproduceError> {
     if seeds == 0 {
         return Err(ReproduceError::NoSeeds);
@@ -108,14 +107,14 @@ fn settings(poles: usize, zeros: usize) -> FitSettings {
         between: Between::Linear,
         level: OutputLevel::Estimated,
         initial_state: BEFORE,
-        // The data do not determine the third pole; the thesis shows its fits all the same.
+        // The data do not determine the third pole; the thesis shows the fits nevertheless.
         accept_undetermined: true,
         ..FitSettings::new(Structure::Transfer { poles, zeros }, DeadTime::Known(0.0))
     }
 }
 
-/// Screw speed and flow about the operating point. Each run continues the sequence and has
-/// noise of its own.
+/// Screw speed and flow about the operating point. Each run continues the sequence and has its own
+/// noise.
 fn run(number: u64) -> Result<Samples, ReproduceError> {
     let volts = excitation(number)?;
     let drive = super::drive()?;
@@ -132,7 +131,7 @@ fn beside(samples: &Samples, predicted: &[f64]) -> Vec<[f64; 3]> {
     pairs.map(|((time, measured), predicted)| [time, *measured, *predicted]).collect()
 }
 
-/// White noise through a lag, in its steady state from the first sample on.
+/// White noise through a lag, in the steady state from the first sample on.
 fn noise(seed: u64, sigma: f64) -> Vec<f64> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut white = || -> f64 { StandardNormal.sample(&mut random) };
@@ -147,7 +146,7 @@ fn noise(seed: u64, sigma: f64) -> Vec<f64> {
         .collect()
 }
 
-/// A run's voltages about the operating point, by a sequence with taps at 10 and 7.
+/// Voltages of a run about the operating point, from a sequence with taps at 10 and 7.
 fn excitation(number: u64) -> Result<Vec<f64>, NoSuchLength> {
     let bits = SAMPLES.div_ceil(SAMPLES_A_BIT);
     let sequence = Prbs::new(10)?.skip(usize::try_from(number).unwrap_or(0).wrapping_mul(bits));
@@ -170,7 +169,7 @@ mod tests {
             let row = table.rows.iter().find(|row| (row.poles, row.zeros) == (poles, zeros));
             row.unwrap().simulated_percent
         };
-        // What the thesis concludes: two poles are needed, a third brings nothing.
+        // The conclusion of the thesis: two poles are needed, a third brings nothing.
         assert!(of(2, 0) > of(1, 1) + 10.0 && of(2, 2) > of(2, 0) + 1.0, "{found:?}");
         assert!(of(3, 2) < of(2, 2) + 0.1, "{found:?}");
         assert_eq!(table.example.len(), SAMPLES);

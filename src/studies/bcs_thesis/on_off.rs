@@ -1,4 +1,4 @@
-//! The controller on and off, table 4 of the thesis: the extruder is driven at random, and the
+//! The controller on and off, table 4 of the thesis: a random voltage drives the extruder, and the
 //! wheel turns at a constant speed or follows the flow.
 
 mod compare;
@@ -39,10 +39,10 @@ pub enum WheelControl {
     /// The thesis' controller: G1, G2, division by the section, GC. The outputs of the models
     /// are those after a period with the present command: x ← Φ·x + Γ·u, y ← C·x.
     Thesis,
-    /// The same with the wheel's dead time and lag compensated by the drive's dead time, by
-    /// which the effect of a command is known ahead.
+    /// As `Thesis`, with the wheel's dead time and lag compensated. The drive's dead time allows
+    /// that: the effect of a command is known in advance.
     Ahead,
-    /// Ahead, with measurements of the unmodelled flow.
+    /// As `Ahead`, with measurements of the unmodelled flow.
     Observed(Sensors),
 }
 
@@ -119,8 +119,8 @@ impl ExtruderRun {
     }
 }
 
-/// Mean age of the newest section of a camera when the wheel acts on it \[s\]: path to the
-/// camera at the mean speed, latency, half of its period, and wheel with held command.
+/// Mean age of the newest camera section when the wheel acts on it \[s\]: path to the camera at
+/// the mean speed, latency, half the camera's period, and the wheel with its held command.
 pub fn camera_age_s(behind_mm: f64) -> f64 {
     /// Derived: mean flow of 3 V by G1 and G2 over the section, 3·35.08·19.05/45 mm/s.
     const MEAN_MM_PER_S: f64 = 44.5;

@@ -1,4 +1,4 @@
-//! Predicted starts and stops beside the thesis' fixed dwell times.
+//! Predicted starts and stops compared with the thesis' fixed dwell times.
 
 pub mod bench;
 pub mod dwell;

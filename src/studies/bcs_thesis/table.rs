@@ -1,5 +1,5 @@
-//! The bead characterisation thesis beside its tables 3 and 4, and the corner that it
-//! leaves for later.
+//! The bead characterisation thesis compared with its tables 3 and 4, and the corner that it
+//! leaves for future work.
 
 mod corner;
 mod draw;
@@ -29,8 +29,8 @@ const SEEDS: u64 = 10;
 const FIT_SEEDS: u64 = 6;
 /// Seeds of the starts and stops.
 const START_SEEDS: u64 = 20;
-/// Fits beside the Cramér–Rao bounds: a standard deviation of 100 fits is known to 7 %.
-/// Derived: 1/√(2·100).
+/// Fits that are compared with the Cramér–Rao bounds: the relative standard error of a standard
+/// deviation from 100 fits is 7 %. Derived: 1/√(2·100).
 const TRIALS: u64 = 100;
 /// Seeds of each distance of the camera.
 const CAMERA_SEEDS: u64 = 4;
@@ -108,7 +108,7 @@ fn push_fits(table: &FitTable, rows: &mut TableRows) {
     rows.push("fit, all models", distance, [None, Some(table.rms_points), None]);
 }
 
-/// Our controller beside the thesis' with an exact model.
+/// Our controller and the thesis' with an exact model.
 fn exact(seeds: u64, rows: &mut TableRows) -> Result<[Compared; 2], ReproduceError> {
     let thesis = compare(seeds, 0.0, WheelControl::Thesis)?;
     let ours = compare(seeds, 0.0, WheelControl::Ahead)?;
@@ -119,7 +119,7 @@ fn exact(seeds: u64, rows: &mut TableRows) -> Result<[Compared; 2], ReproduceErr
     Ok([thesis, ours])
 }
 
-/// The same with 17 % of the flow's standard deviation unmodelled: table 4.
+/// Both controllers with 17 % of the flow's standard deviation unmodelled: table 4.
 fn unmodelled(seeds: u64, rows: &mut TableRows) -> Result<(Compared, Compared), ReproduceError> {
     let thesis = compare(seeds, UNMODELLED_FRACTION, WheelControl::Thesis)?;
     let ours = compare(seeds, UNMODELLED_FRACTION, WheelControl::Observed(PRESSURE))?;
@@ -128,7 +128,7 @@ fn unmodelled(seeds: u64, rows: &mut TableRows) -> Result<(Compared, Compared), 
     rows.compare(case, ("the same, worst seed", "1"), thesis.min_ratio, ours.min_ratio);
     for (names, unit, published, of) in QUANTITIES {
         for (which, name) in names.into_iter().enumerate() {
-            // Without control both columns are the same run.
+            // Without control our result would be the same run.
             let ours = (which == 1).then(|| of(&ours)[which]);
             rows.push(case, (name, unit), [Some(published[which]), Some(of(&thesis)[which]), ours]);
         }
@@ -136,7 +136,8 @@ fn unmodelled(seeds: u64, rows: &mut TableRows) -> Result<(Compared, Compared), 
     Ok((thesis, ours))
 }
 
-/// Names of a quantity of table 4 off and on, its unit, published values and how it is read.
+/// Names of a quantity of table 4 off and on, its unit, its published values and its values in a
+/// comparison.
 type Quantity = ([&'static str; 2], &'static str, [f64; 2], fn(&Compared) -> [f64; 2]);
 const QUANTITIES: [Quantity; 4] = [
     (["area RMSE, off", "area RMSE, on"], "mm²", [3.43, 0.57], |found| found.area_rmse_mm2),
@@ -145,7 +146,7 @@ const QUANTITIES: [Quantity; 4] = [
     (["width MAE, off", "width MAE, on"], "mm", [1.53, 0.38], |found| found.width_mae_mm),
 ];
 
-/// The gain by other sensors, beside the bound that the age of their data sets.
+/// Ratio off over on with other sensors, and the bound from the age of their data.
 fn sensing(seeds: u64, rows: &mut TableRows) -> Result<Section, ReproduceError> {
     let camera = |mm| Sensors { camera_mm: Some(mm), pressure: false, ..PRESSURE };
     let observed = |seeds, sensors| -> Result<f64, ReproduceError> {
@@ -166,7 +167,7 @@ fn sensing(seeds: u64, rows: &mut TableRows) -> Result<Section, ReproduceError> 
     let bound = (0..=100_u32).map(|step| {
         let mm = 0.2 * f64::from(step);
         let left = unpredictable_fraction(camera_age_s(mm), CORRELATION_S);
-        // The unmodelled part varies the flow without control as well.
+        // Without control the unmodelled part varies the flow, too.
         (mm, (1.0 + UNMODELLED_FRACTION.powi(2)).sqrt() / (UNMODELLED_FRACTION * left))
     });
     let hint = "Off over on with a camera that sees the section some way behind the nozzle, 20 ms \
@@ -196,7 +197,7 @@ fn accuracy_bounds(rows: &mut TableRows) -> Result<(), ReproduceError> {
     Ok(())
 }
 
-/// The thesis' models on its controller's grid.
+/// The thesis' models discretised with the controller's sample time.
 fn discretised() -> Result<Markup, ReproduceError> {
     const METHODS: [(&str, DiscretisationMethod); 5] = [
         ("zero-order hold", DiscretisationMethod::ZeroOrderHold),

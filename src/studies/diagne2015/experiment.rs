@@ -1,4 +1,4 @@
-//! All runs with one conveying speed.
+//! All runs at one conveying speed.
 
 use super::response::{Cycle, PlugResponse};
 use super::run::{FeedMethod, RunError, RunPlan, follow};
@@ -10,7 +10,7 @@ use crate::extruder::screw::{FillFeedback, Screw, TurnUnit};
 use crate::numeric::number::to_count;
 use crate::sim::screw::delay_free;
 
-/// By definition.
+/// Millimetres in a metre. By definition.
 const MM_PER_M: f64 = 1000.0;
 /// Length of the runs that settle late or never \[s\]: papers.md, "over the last part of 60 s".
 const LONG_S: f64 = 60.0;
@@ -18,48 +18,49 @@ const LONG_S: f64 = 60.0;
 const SHORT_S: f64 = 4.0;
 /// Step of the paper's runs \[s\]: papers.md, "state and control at 1 ms".
 const STEP_S: f64 = 0.001;
-/// Slopes at the setpoint of the saturated controller \[1/m\]; the first one is compared
-/// elsewhere. Steeper ones settle sooner and amplify noise.
+/// Slopes at the setpoint of the saturated controller \[1/m\]; other tables use the first one.
+/// Steeper ones settle sooner but amplify noise.
 pub const SLOPES_PER_M: [f64; 3] = [60.0, 100.0, 200.0];
 
-/// A predictor in the paper's scheme on the paper's plant, and in ours on a plant that is
-/// integrated to high order.
+/// Responses with a predictor: the paper's scheme on the paper's plant, and our scheme on a plant
+/// that is integrated to high order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PredictorPair {
-    /// By Euler steps.
+    /// Integrated by Euler steps.
     pub paper: PlugResponse,
-    /// To high order.
+    /// Integrated to high order.
     pub exact: PlugResponse,
 }
 
-/// Responses with one conveying speed.
+/// Responses at one conveying speed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Examined {
     /// The conveying speed.
     pub case: PulsationCase,
-    /// First effect of the control, σ0 \[s\].
+    /// Time of the control's first effect on the plug, σ0 \[s\].
     pub first_effect_s: f64,
-    /// Open loop: the fill that holds the setpoint, from the start on.
+    /// Open loop: constantly the fill that holds the setpoint.
     pub open: PlugResponse,
     /// Feedback without a predictor.
     pub uncompensated: PlugResponse,
-    /// A predictor that knows the pulsation.
+    /// A predictor that knows how the speed pulsates.
     pub informed: PredictorPair,
     /// A predictor that assumes a steady speed.
     pub uninformed: PredictorPair,
-    /// The saturated controller with the informed prediction, for each of [`SLOPES_PER_M`].
+    /// The saturated controller with the predictor that knows the pulsation, for each of
+    /// [`SLOPES_PER_M`].
     pub straight: Vec<PlugResponse>,
-    /// The delay-free loop from the first effect on: time \[s\] and plug \[mm\].
+    /// The delay-free loop, from the first effect on: time \[s\] and plug \[mm\].
     pub oracle: Vec<(f64, f64)>,
-    /// Largest deviation of the informed predictors' loops from it \[mm\].
+    /// Largest deviation of the two informed loops from the delay-free one \[mm\].
     pub max_deviation_mm: [f64; 2],
-    /// When the largest feed from the start on brings the plug within the band \[s\]: no
-    /// controller is sooner.
+    /// Time at which the largest feed, given from the start, brings the plug into the settling
+    /// band \[s\]: no controller settles sooner.
     pub soonest_s: f64,
 }
 
 impl Examined {
-    /// Runs all of it.
+    /// Runs all experiments at one conveying speed.
     pub fn run(case: PulsationCase) -> Result<Self, RunError> {
         let screw = case.screw(TurnUnit::RadPerS)?;
         let controller = FillFeedback::Exponential(paper_controller(&screw)?);
@@ -101,13 +102,12 @@ impl Examined {
     }
 }
 
-/// Settling time of a response \[s\].
+/// Settling time of a response \[s\]; `None` if it does not settle.
 pub fn settles(response: &PlugResponse) -> Option<f64> {
     response.settles(SETPOINT.plug.get(), SETTLING_BAND_MM)
 }
 
-/// Index of the first sample after the first effect, and the delay-free loop from that one
-/// on.
+/// Index of the first sample after the first effect, and the delay-free loop from that sample on.
 fn oracle(
     screw: &Screw,
     first_effect_s: f64,
@@ -161,7 +161,7 @@ mod tests {
             near(cycle.period_s, period, 0.02);
             near(settles(&found.informed.paper).unwrap(), informed, 0.001);
             near(settles(&found.uninformed.paper).unwrap(), uninformed, 0.001);
-            // Sampled at 1 ms the exact loop is that of a perfect predictor.
+            // With samples every 1 ms the exact loop is that of a perfect predictor.
             assert!(found.max_deviation_mm[1] < 0.05, "{:?}", found.max_deviation_mm);
             assert!(
                 (0.4..0.7).contains(&found.max_deviation_mm[0]),

@@ -1,4 +1,4 @@
-//! The response of a run, and its figures.
+//! The response of a run, and its performance figures.
 
 use crate::numeric::number::to_f64;
 /// One sample of a run.
@@ -8,18 +8,19 @@ pub struct PlugSample {
     pub at_s: f64,
     /// Length of the plug \[mm\].
     pub plug_mm: f64,
-    /// Fill that is fed, 0 to 1.
+    /// Fill of the feed, 0 to 1.
     pub fill: f64,
-    /// Predicted length of the plug when this feed arrives \[mm\], and when it arrives \[s\].
+    /// Prediction: length of the plug when this feed arrives \[mm\], and that time \[s\]. `None`
+    /// without a predictor.
     pub predicted: Option<(f64, f64)>,
-    /// Delay of the feed that arrives \[s\].
+    /// Delay of the feed that arrives now \[s\].
     pub delay_s: f64,
 }
 
 /// A run, sample by sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlugResponse {
-    /// In order of time, a step apart.
+    /// In the order of time, one per step.
     pub samples: Vec<PlugSample>,
 }
 
@@ -33,26 +34,27 @@ pub struct Cycle {
 }
 
 impl PlugResponse {
-    /// Time from which the plug stays within `within_mm` of a length \[s\].
+    /// Time from which the plug stays within `within_mm` of `plug_mm` \[s\]; `None` if it does
+    /// not.
     pub fn settles(&self, plug_mm: f64, within_mm: f64) -> Option<f64> {
         let outside = |sample: &PlugSample| (sample.plug_mm - plug_mm).abs() > within_mm;
         let inside = self.samples.iter().rposition(outside).map_or(0, |last| last + 1);
         self.samples.get(inside).map(|sample| sample.at_s)
     }
 
-    /// Overshoot of the plug beyond a length \[mm\].
+    /// Overshoot of the plug beyond `plug_mm` \[mm\].
     pub fn overshoot_mm(&self, plug_mm: f64) -> f64 {
         self.samples.iter().map(|sample| sample.plug_mm - plug_mm).fold(0.0, f64::max)
     }
 
-    /// Root mean square deviation from a length after a time \[mm\].
+    /// Root mean square deviation from `plug_mm` after `after_s` \[mm\].
     pub fn rms_mm(&self, plug_mm: f64, after_s: f64) -> f64 {
         let samples = self.after(after_s);
         let sum: f64 = samples.iter().map(|sample| (sample.plug_mm - plug_mm).powi(2)).sum();
         (sum / to_f64(samples.len().max(1))).sqrt()
     }
 
-    /// Root mean square change of the feed from step to step after a time: the activity of the
+    /// Root mean square change of the feed from step to step after `after_s`: the activity of the
     /// feeder.
     pub fn feed_change(&self, after_s: f64) -> f64 {
         let samples = self.after(after_s);
@@ -60,10 +62,9 @@ impl PlugResponse {
         (changes.sum::<f64>() / to_f64(samples.len().max(1))).sqrt()
     }
 
-    /// The limit cycle about a length after a time; none where the plug moves by less than a
-    /// tenth of a millimetre or crosses the length less than four times. The period is twice
-    /// the median time between crossings, because it changes with a conveying speed that
-    /// pulsates slowly.
+    /// The limit cycle about `plug_mm` after `after_s`; `None` if the plug moves by less than a
+    /// tenth of a millimetre or crosses that length less than four times. The period is twice the
+    /// median time between crossings: with a slowly pulsating conveying speed it is not constant.
     pub fn cycle(&self, plug_mm: f64, after_s: f64) -> Option<Cycle> {
         let samples = self.after(after_s);
         let (low, high) =
@@ -81,8 +82,8 @@ impl PlugResponse {
         Some(Cycle { peak_to_peak_mm: high - low, period_s: 2.0 * half })
     }
 
-    /// Largest deviation from lengths at successive samples \[mm\]; the first length is that of
-    /// the sample `from`.
+    /// Largest deviation from `lengths_mm` at successive samples \[mm\]; the first length belongs
+    /// to the sample `from`.
     pub fn max_deviation(&self, from: usize, lengths_mm: impl Iterator<Item = f64>) -> f64 {
         let pairs = self.samples.get(from..).unwrap_or_default().iter().zip(lengths_mm);
         pairs.map(|(s, length)| (s.plug_mm - length).abs()).fold(0.0, f64::max)
@@ -94,7 +95,8 @@ impl PlugResponse {
     }
 }
 
-/// When a pair of samples crosses a level in either direction.
+/// Time at which a pair of samples crosses a level in either direction \[s\]; `None` if it does
+/// not.
 fn crossing(pair: &[PlugSample], level: f64) -> Option<f64> {
     let [one, two] = pair else { return None };
     if (one.plug_mm < level) == (two.plug_mm < level) {

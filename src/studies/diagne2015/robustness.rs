@@ -8,7 +8,7 @@ use crate::extruder::screw::{Conveying, FillFeedback, TurnUnit};
 
 /// Length of the runs \[s\].
 const RUN_S: f64 = 12.0;
-/// Time by which every loop that settles has settled \[s\].
+/// Time by which a stable loop has settled \[s\].
 const STEADY_AFTER_S: f64 = 6.0;
 /// Plant steps of 1 ms between two control steps. Derived: 200 Hz.
 const HOLD_STEPS: u32 = 5;
@@ -16,19 +16,19 @@ const HOLD_STEPS: u32 = 5;
 /// A difference between the screw and the predictor's model, or a fault of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ScrewMismatch {
-    /// None.
+    /// No mismatch.
     None,
-    /// The known conveying speed θ1 is the true one times this.
+    /// The model's conveying speed θ1 is the true one times this.
     Speed(f64),
-    /// The known θ2 is the true one times this.
+    /// The model's θ2 is the true one times this.
     Nozzle(f64),
-    /// The known relative amplitude ε of the pulsation is the true one times this.
+    /// The model's relative amplitude ε of the pulsation is the true one times this.
     Amplitude(f64),
-    /// The known phase of the pulsation is ahead by this \[rad\].
+    /// The model's phase of the pulsation leads the true one by this \[rad\].
     Phase(f64),
     /// The plug is measured with this standard deviation \[mm\].
     Noise(f64),
-    /// The true delay adds up along the screw.
+    /// The plant conveys the feed at the speed of every moment on the way, so the delay accumulates.
     Belt,
 }
 
@@ -45,7 +45,7 @@ pub const MISMATCHES: [(&str, ScrewMismatch); 9] = [
     ("delay adds up on the way", ScrewMismatch::Belt),
 ];
 
-/// Figures of a run.
+/// Performance figures of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobustnessOutcome {
     /// Settling time \[s\]; none where it does not settle.
@@ -54,7 +54,7 @@ pub struct RobustnessOutcome {
     pub overshoot_mm: f64,
     /// Root mean square error in the steady state \[mm\].
     pub steady_error_mm: f64,
-    /// Root mean square change of the feed from one plant step to the next, likewise.
+    /// Root mean square change of the feed from one plant step to the next, in the steady state.
     pub feed_change: f64,
 }
 

@@ -11,13 +11,13 @@ use crate::extruder::screw::control::{Scheme, ScrewSettings};
 use crate::extruder::screw::{FillFeedback, Screw, ScrewControl, ScrewError, ScrewFault};
 use crate::sim::screw::{Integrator, SimScrew};
 
-/// By definition.
+/// Millimetres in a metre. By definition.
 const MM_PER_M: f64 = 1000.0;
 
 /// How the screw is fed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FeedMethod {
-    /// The fill that holds the setpoint, from the start on.
+    /// Constantly the fill that holds the setpoint.
     OpenLoop,
     /// Feedback of the measured plug, without regard to the delay.
     Uncompensated(FillFeedback),
@@ -52,13 +52,13 @@ pub struct RunPlan {
 }
 
 impl RunPlan {
-    /// The paper's: plant and controller by Euler steps of 1 ms.
+    /// As in the paper: plant and controller in Euler steps of 1 ms.
     pub fn paper(screw: Screw, until_s: f64) -> Self {
         let integrator = Integrator::Euler;
         Self { screw, integrator, step_ms: 1, hold: 1, until_s, noise_mm: 0.0, seed: 0 }
     }
 
-    /// The same with a plant that is integrated by Runge–Kutta steps.
+    /// As [`Self::paper`], but the plant is integrated by Runge–Kutta steps.
     pub fn exact(screw: Screw, until_s: f64) -> Self {
         Self { integrator: Integrator::RungeKutta(1e-3), ..Self::paper(screw, until_s) }
     }
@@ -72,20 +72,20 @@ impl RunPlan {
 /// Errors of a run.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RunError {
-    /// Inconsistent parameters.
+    /// Inconsistent parameters of screw or controller.
     #[error(transparent)]
     Screw(#[from] ScrewError),
-    /// A fault of the controller.
+    /// A fault in the controller.
     #[error("at {at_s:.3} s: {fault}")]
     Fault {
-        /// When \[s\].
+        /// Time of the fault \[s\].
         at_s: f64,
-        /// Why.
+        /// The fault.
         fault: ScrewFault,
     },
 }
 
-/// Runs it, from a plug in its steady state at the start.
+/// Simulates a run that starts with the plug in its steady state.
 pub fn follow(plan: &RunPlan, method: &FeedMethod) -> Result<PlugResponse, RunError> {
     let start_m = START.get() / MM_PER_M;
     let before = plan.screw.holding_fill(start_m);
@@ -121,7 +121,7 @@ enum Feeder {
     Control(ScrewControl),
 }
 
-/// A fill, and the predicted plug \[mm\] with its time \[s\].
+/// The fill, and the predicted plug \[mm\] with the time of the prediction \[s\].
 type Fed = (f64, Option<(f64, f64)>);
 
 impl Feeder {

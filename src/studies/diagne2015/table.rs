@@ -21,9 +21,9 @@ use crate::studies::study::{Effort, Reproduced, Section, TableRows};
 
 /// Steps of the progress bar. Derived: the three [`CASES`] and the mismatches.
 pub const EXPERIMENTS: u64 = 4;
-/// The time that is drawn: until all predictors have settled \[s\].
+/// Time range of most plots: until all predictors have settled \[s\].
 const BEGINNING: Range = Range::new(0.0, 3.0);
-/// The whole run \[s\].
+/// Time range of the whole run \[s\].
 const ALL: Range = Range::new(0.0, 60.0);
 const ABOUT: &str = "The paper prints curves and no numbers of them, so that nothing stands under \
     published. Simulated: plant, delay and predictor in the paper's scheme, Euler steps of 1 ms. \
@@ -159,7 +159,7 @@ fn robustness_rows(rows: &mut TableRows) -> Result<(), RunError> {
     Ok(())
 }
 
-/// A name, a colour and a run.
+/// Name, colour and response of a curve.
 type Drawn<'a> = (&'a str, Ink, &'a PlugResponse);
 
 fn case_section(found: &Examined) -> Section {
@@ -212,12 +212,12 @@ fn during(response: &PlugResponse, range: Range, of: Of) -> Vec<CurvePoint> {
     points.filter(|(at_s, _)| (range.min..=range.max).contains(at_s)).collect()
 }
 
-/// Points of the beginning of a run.
+/// Points of a curve within [`BEGINNING`].
 fn beginning(points: impl Iterator<Item = CurvePoint>) -> impl Iterator<Item = CurvePoint> {
     points.filter(|(at_s, _)| *at_s <= BEGINNING.max)
 }
 
-/// The prediction at the time that it is for, beside the plug at that time.
+/// The prediction, drawn at the time for which it is made, and the plug at that time.
 fn draw_prediction(found: &Examined) -> Markup {
     let response = &found.informed.exact;
     let predicted = response.samples.iter().filter_map(|s| s.predicted);
@@ -235,7 +235,7 @@ fn draw_prediction(found: &Examined) -> Markup {
     plot_with_legend(200.0, &XAxis::time(BEGINNING), "filled length x [mm]", &lines)
 }
 
-/// The deviation of either scheme's loop from the delay-free one.
+/// Deviation of both schemes' loops from the delay-free loop.
 fn draw_deviations(found: &Examined) -> Markup {
     let deviation = |response: &PlugResponse| -> Vec<CurvePoint> {
         let first = response.samples.partition_point(|sample| sample.at_s < found.first_effect_s);

@@ -10,7 +10,7 @@ use crate::extruder::adaptive::SubSystemError;
 /// A case of table 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TableCase {
-    /// Its number.
+    /// Its number in the table.
     pub number: u32,
     /// The disturbed sub-system.
     pub of: SubSystem,
@@ -61,12 +61,12 @@ const fn case(
 pub struct Convergence {
     /// `t_cr`; none where it has not converged at the end of the horizon.
     pub tracking_s: Option<f64>,
-    /// `t_cp`; the same.
+    /// `t_cp`; `None` likewise.
     pub estimate_s: Option<f64>,
 }
 
 impl TableCase {
-    /// Runs it with a controller.
+    /// Runs the case with a controller.
     pub fn run(&self, method: AdaptationMethod) -> Result<Convergence, SubSystemError> {
         let (from_s, to_s) = (STEP_AT_S, f64::INFINITY);
         let none = InputDisturbance::None;

@@ -1,5 +1,5 @@
-//! The plant of Mohammadi Looey et al. 2026: speed in the nozzle and speed of
-//! the strand on the moving plate.
+//! The plant of Mohammadi Looey et al. 2026: speed in the nozzle and speed of the strand on the
+//! moving plate.
 
 use crate::extruder::adaptive::{StrandInputs, StrandModel};
 
@@ -10,28 +10,28 @@ pub enum InputDisturbance {
     /// None.
     #[default]
     None,
-    /// A step of a size at a time, and back at another (infinite: never).
+    /// A step, and back at a later time (infinite: never).
     Step {
-        /// How large.
+        /// Its size.
         size: f64,
-        /// When \[s\].
+        /// Start \[s\].
         from_s: f64,
-        /// Until when \[s\].
+        /// End \[s\].
         to_s: f64,
     },
-    /// A ramp from a time on.
+    /// A ramp that starts at a time and then stays at its last value.
     Ramp {
-        /// How much a second.
+        /// Slope \[unit of the input per s\].
         slope_per_s: f64,
-        /// When \[s\].
+        /// Start of the ramp \[s\].
         from_s: f64,
-        /// Where it ends and stays \[s\].
+        /// End of the ramp, from which the value is constant \[s\].
         to_s: f64,
     },
 }
 
 impl InputDisturbance {
-    /// Its value at a time, as it is from that time on.
+    /// Its value at a time; at a step the value after it.
     pub fn at(&self, t_s: f64) -> f64 {
         match *self {
             Self::None => 0.0,
@@ -61,10 +61,9 @@ pub struct Ramp {
 /// Dependence of the plant's parameters on its inputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StrandParameters {
-    /// Constant, eqs. (6) and (7): the plant that the controller is designed for.
+    /// Constant, eqs. (6) and (7): the plant for which the controller is designed.
     Constant,
-    /// In proportion to the inputs, eqs. (1)–(5), and equal to the constants
-    /// at these.
+    /// In proportion to the inputs, eqs. (1)–(5); at these inputs equal to the constants.
     WithInputs(StrandInputs),
 }
 

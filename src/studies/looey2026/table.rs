@@ -1,4 +1,4 @@
-//! Mohammadi Looey et al. 2026 beside its table 1 and its case studies.
+//! Mohammadi Looey et al. 2026 compared with its table 1 and its case studies.
 
 use maud::{Markup, html};
 
@@ -21,14 +21,14 @@ use crate::studies::study::{Effort, Reproduced, Section, TableRows};
 pub const EXPERIMENTS: u64 = 14;
 const METHODS: [AdaptationMethod; 3] =
     [AdaptationMethod::NotAdaptive, AdaptationMethod::Paper, AdaptationMethod::Ours];
-/// Samples of 1 ms from point to point of a curve.
+/// Number of 1 ms samples per point of a curve.
 const DRAWN_EVERY: u64 = 20;
 /// End of the disturbances of the case studies \[s\]. Mohammadi Looey et al. 2026, section 4.
 const END_S: f64 = 60.0;
 /// By definition, mm in a m and g in a kg.
 const MM: f64 = 1000.0;
 
-/// Runs the experiments; none has noise that needs more than one seed.
+/// Runs the experiments; none needs more than one seed.
 pub fn run(_: Effort, progress: &mut Progress) -> Result<Reproduced, ReproduceError> {
     let mut rows = TableRows::of(Publication::Looey2026);
     for case in &TABLE {

@@ -1,4 +1,4 @@
-//! An experiment, the controllers that are tried in it, and its run.
+//! An experiment, the controllers under test, and a run.
 
 use std::f64::consts::TAU;
 
@@ -22,25 +22,25 @@ const READ_EVERY: u64 = 4;
 /// Plant steps from command to command: 20 Hz, Ma et al. 2026.
 pub const STEP_EVERY: u64 = 10;
 
-/// A controller that is tried.
+/// A controller under test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TestedController {
-    /// The paper's comparison, proportional-integral.
+    /// The paper's proportional-integral controller, for comparison.
     Pi,
-    /// The paper's own.
+    /// The paper's own controller.
     Vsfc,
     /// Two degrees of freedom with a Smith predictor, not adaptive.
     SmithPi,
-    /// This program's.
+    /// This program's controller.
     Predictive,
-    /// The same with the target known ahead.
+    /// This program's controller with the future target known.
     Previewed,
 }
 
 /// An experiment.
 #[derive(Debug, Clone)]
 pub struct PressureExperiment {
-    /// The plant relative to the model.
+    /// Parameters of the plant over those of the model.
     pub factors: Factors,
     /// Its disturbances.
     pub disturbed: Disturbances,
@@ -71,7 +71,7 @@ pub enum PressureTarget {
 }
 
 impl PressureTarget {
-    /// At a time \[s\].
+    /// Target at a time \[s\] of the experiment \[MPa\].
     pub fn at(&self, at_s: f64) -> f64 {
         match *self {
             Self::Steady(mpa) => mpa,
@@ -94,7 +94,7 @@ impl TestedController {
         }
     }
 
-    /// The controller, with a bumpless start from the present state.
+    /// Creates the controller, with a bumpless start from the current state.
     pub fn controller(
         self,
         running: InitialState,
@@ -163,13 +163,13 @@ impl PressureExperiment {
         loaded
     }
 
-    /// The same with the sensor's noise.
+    /// The same experiment with the sensor's noise.
     pub fn noisy(mut self, seed: u64) -> Self {
         (self.disturbed.noise_mpa2, self.disturbed.seed) = (NOISE_MPA2, seed);
         self
     }
 
-    /// Runs it with a controller.
+    /// Runs the experiment with a controller.
     pub fn run(&self, tried: TestedController) -> Result<PressureResponse, PressureError> {
         let before = MPa::new(self.before).unwrap_or_default();
         let speed = Rpm::new(self.before / self.factors.gain).unwrap_or_default();

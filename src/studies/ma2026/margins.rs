@@ -5,17 +5,17 @@ use super::plant::{DEAD_TIME_S, Factors, LOAD_RPM};
 use crate::extruder::pressure::PressureError;
 use crate::sim::pressure::LoadChange;
 
-/// Largest model mismatch with which a controller comes to rest.
+/// Largest model mismatch with which the pressure settles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MismatchMargins {
-    /// Gain over that of the model.
+    /// Gain over the model's gain.
     pub gain: f64,
-    /// Dead time beyond that of the model \[s\].
+    /// Dead time in addition to the model's \[s\].
     pub dead_time_s: f64,
 }
 
-/// The margins of a controller: beyond them the pressure oscillates by more than 5 kPa 40 s
-/// after a step of the load.
+/// The margins of a controller. Beyond them the standard deviation of the pressure, from 40 s
+/// after a step of the load on, is more than 5 kPa.
 pub fn margins(tried: TestedController) -> Result<MismatchMargins, PressureError> {
     let gain = largest(1.0, 12.0, |gain| rests(tried, Factors { gain, ..Factors::NONE }))?;
     let dead_time =
@@ -32,7 +32,7 @@ fn rests(tried: TestedController, factors: Factors) -> Result<bool, PressureErro
     Ok(sigma < 0.005)
 }
 
-/// The largest value at which a property holds, to 1 %, by bisection; it holds at `low`.
+/// The largest value at which a property holds, to 1 %, by bisection. It must hold at `low`.
 fn largest(
     mut low: f64,
     mut high: f64,

@@ -1,12 +1,12 @@
-//! The process at the nozzle as the paper gives it, and its model errors.
+//! The paper's process at the nozzle, and the errors of its model.
 
 use crate::extruder::pressure::{Fopdt, PressureError};
 
 /// Variance of a reading \[MPa²\]. Ma et al. 2026; the sign of the exponent is a misprint
 /// (papers.md).
 pub const NOISE_MPA2: f64 = 4.98e-5;
-/// Variance of the random walk in the Kalman filter, for each reading \[MPa²\]: papers.md,
-/// "002", "q 2·10⁻⁵".
+/// Variance of the random walk in the Kalman filter, for each reading \[MPa²\]: papers.md, "002",
+/// "q 2·10⁻⁵".
 pub const DRIFT_MPA2: f64 = 2e-5;
 /// Lag of the process \[s\]. Ma et al. 2026.
 pub const LAG_S: f64 = 0.84;
@@ -35,7 +35,7 @@ impl Factors {
     /// A plant without model error.
     pub const NONE: Self = Self { gain: 1.0, lag: 1.0, dead_time: 1.0 };
 
-    /// Each alone off by [`MODEL_ERROR`], up and down.
+    /// Plants with one parameter off by [`MODEL_ERROR`], up or down.
     pub const fn singles() -> [(&'static str, Self); 6] {
         let (more, less) = (1.0 + MODEL_ERROR, 1.0 - MODEL_ERROR);
         [
@@ -48,7 +48,7 @@ impl Factors {
         ]
     }
 
-    /// All 27 combinations of up, exact and down.
+    /// Plants with all 27 combinations of too small, exact and too large parameters.
     pub fn all() -> impl Iterator<Item = Self> {
         let each = [1.0 - MODEL_ERROR, 1.0, 1.0 + MODEL_ERROR];
         each.into_iter().flat_map(move |gain| {

@@ -28,7 +28,7 @@ pub struct StepFigures {
     pub iae: f64,
 }
 
-/// Figures of a step of the load, over its effect at the output without control.
+/// Figures of a step of the load, over the pressure change that it causes without control.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadFigures {
     /// Largest error.
@@ -50,7 +50,7 @@ impl PressureResponse {
         }
     }
 
-    /// When the pressure first rises through a value \[s\].
+    /// Time at which the pressure first reaches a value \[s\]; `None` if it does not.
     fn passes(&self, value: f64) -> Option<f64> {
         let after = self.pressure.iter().position(|pressure| *pressure >= value)?;
         let [low, high] = [self.pressure.get(after.checked_sub(1)?)?, self.pressure.get(after)?];
@@ -92,7 +92,7 @@ impl PressureResponse {
     }
 }
 
-/// To a thousandth: smaller differences depend on where the last sample lies.
+/// Rounds to a thousandth: smaller differences depend on the position of the last sample.
 fn rounded(percent: f64) -> f64 {
     (percent * 1e3).round() / 1e3
 }

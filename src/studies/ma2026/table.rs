@@ -1,4 +1,4 @@
-//! Ma et al. 2026 beside its published step, sine and steady figures.
+//! Ma et al. 2026 compared with its published step, sine and steady figures.
 
 use maud::html;
 

@@ -1,5 +1,5 @@
-//! What a source's table comes to, in a line: how many of the published numbers
-//! the paper's own method meets in our simulation, and which one it misses most.
+//! Summary of a paper's table in a line: how many published numbers the paper's own method
+//! reproduces in our simulation, and the one with the largest deviation.
 
 use maud::{Markup, html};
 
@@ -12,25 +12,26 @@ const NEAR_FRACTIONS: [f64; 2] = [0.02, 0.1];
 /// Counts of rows with a published number.
 #[derive(Debug)]
 pub struct PaperSummary<'a> {
-    /// Rows that have one.
+    /// Number of rows with a published number.
     pub published: usize,
-    /// Those of them that were simulated to within 2 % and 10 %.
+    /// Number of those that were simulated to within 2 % and to within 10 %.
     pub near: [usize; 2],
-    /// The one that is furthest off relative to the published number, and that
-    /// fraction; none where nothing can be compared.
+    /// The row with the largest deviation relative to the published number, and that fraction;
+    /// `None` if nothing can be compared.
     pub furthest: Option<(&'a TableRow, f64)>,
-    /// Those that the simulation never gets to.
+    /// Number of published numbers that the simulation does not reach at all.
     pub absent: usize,
 }
 
 impl<'a> PaperSummary<'a> {
-    /// Of a source's rows.
+    /// Summary of a paper's rows.
     pub fn of(rows: &'a [TableRow]) -> Self {
         let published = || rows.iter().filter_map(|row| Some((row, row.published?)));
         let off: Vec<(&TableRow, f64)> = published()
             .filter_map(|(row, published_value)| {
                 let by = (row.simulated? - published_value).abs();
-                // Nothing is met by nothing alone.
+                // A published zero has no relative deviation, except that an equal value deviates
+                // by 0.
                 Some((row, if by == 0.0 { 0.0 } else { by / published_value.abs() }))
             })
             .collect();
@@ -42,7 +43,7 @@ impl<'a> PaperSummary<'a> {
         }
     }
 
-    /// The row that is furthest off, in words.
+    /// The row with the largest deviation, in words.
     fn furthest(&self) -> String {
         self.furthest.map_or_else(
             || "–".to_owned(),
@@ -57,7 +58,7 @@ impl<'a> PaperSummary<'a> {
         )
     }
 
-    /// In a sentence.
+    /// The summary as a sentence.
     pub fn text(&self) -> String {
         let Self { published, near: [close, near], absent, .. } = self;
         if *published == 0 {
@@ -75,7 +76,7 @@ impl<'a> PaperSummary<'a> {
     }
 }
 
-/// The sources one below the other, at the head of the page.
+/// The summaries of all papers, for the top of the page.
 pub fn markup(sources: &[Reproduced]) -> Markup {
     html! {
         section {

@@ -29,7 +29,7 @@ pub fn plain(rows: &[TableRow]) -> String {
     text
 }
 
-/// The rows on a page.
+/// The rows as HTML.
 pub fn markup(rows: &[TableRow]) -> Markup {
     html! {
         table {
@@ -49,8 +49,8 @@ pub fn markup(rows: &[TableRow]) -> Markup {
     }
 }
 
-/// Digits that a reader compares: one after the point from 20 on, two below,
-/// three significant ones where two would leave little.
+/// A number with one digit after the point from 20 on, with two from 0.2 on, with four from 0.002
+/// on, and below that with two digits and a power of ten; a dash for `None`.
 pub fn number(value: Option<f64>) -> String {
     value.map_or("–".to_owned(), |value| {
         let size = value.abs();

@@ -1,5 +1,5 @@
-//! Results that the paper does not give: settling, the error that noise and disturbances of
-//! the flow leave, and the effect of a model mismatch.
+//! Results that the paper does not give: settling, the error that remains under noise and flow
+//! disturbances, and the effect of a model mismatch.
 
 use maud::html;
 
@@ -16,10 +16,10 @@ use crate::studies::study::Section;
 
 /// Steps of the progress bar. Derived: one for each experiment of [`run`].
 pub const EXPERIMENTS: u64 = 5;
-/// Both sets of rates of the controller by distance, with their names.
+/// The rates of the distance controller, with their names.
 const COLUMNS: [(LoopRates, &str); 2] =
     [(LoopRates::PAPER, "10 Hz vision, 5 Hz link"), (LoopRates::FAST, "50 Hz vision, 20 Hz link")];
-/// Wavelengths that have rows of their own \[mm\].
+/// Wavelengths with their own rows in the table \[mm\].
 const WAVES_MM: [f64; 2] = [2400.0, 1200.0];
 /// Wavelengths of the curve \[mm\], about equidistant in the logarithm.
 const CURVE_MM: [f64; 16] = [
@@ -29,11 +29,11 @@ const CURVE_MM: [f64; 16] = [
 /// Periods of a pulsation \[s\].
 const PERIODS_S: [f64; 7] = [1.0, 1.5, 2.0, 2.6, 3.5, 4.5, 6.0];
 
-/// Points of a curve over wavelength or period: the error ratio of the paper's loop and of
-/// the controller by distance at both rates.
+/// Points of a curve over wavelength or period: the error ratio of the paper's controller and of
+/// the distance controller at both rates.
 type Ratios = Vec<(f64, [f64; 3])>;
 
-/// Seeds of flow sines and pulsations, whose beads are long.
+/// Seeds for experiments with flow disturbances; few, because their beads are long.
 pub fn disturbed_seeds(seeds: u64) -> u64 {
     seeds.min(10)
 }
@@ -62,7 +62,7 @@ pub fn run(work: &mut Experiments, progress: &mut Progress) -> Result<Section, R
 }
 
 impl Experiments {
-    /// One layer by a controller.
+    /// Lays one layer with a controller.
     fn lay_by(
         &self,
         cell: &crate::cell::Cell,
@@ -73,7 +73,7 @@ impl Experiments {
         Ok(lay(&cell, &run, self.seeds)?)
     }
 
-    /// The bead itself, with noise on the widths.
+    /// Errors of the bead's true width, with noise on the measured widths.
     fn noise(&mut self) -> Result<(), ReproduceError> {
         for target in LAYERS.map(|layer| layer.target_mm) {
             let theirs = self.lay_by(&self.cell, ControlSetup::Paper, target)?;
@@ -91,7 +91,7 @@ impl Experiments {
         Ok(())
     }
 
-    /// Settling without noise.
+    /// Settling without measurement noise.
     fn without_noise(&mut self) -> Result<(), ReproduceError> {
         let mut quiet = self.cell.clone();
         quiet.simulation.width_noise = Mm::ZERO;
@@ -151,7 +151,7 @@ impl Experiments {
         Ok(())
     }
 
-    /// Sines along the path.
+    /// Sinusoidal flow along the path.
     fn waves(&mut self) -> Result<Ratios, ReproduceError> {
         let mut curve = Vec::new();
         for wavelength in CURVE_MM {
@@ -178,7 +178,7 @@ impl Experiments {
         Ok(curve)
     }
 
-    /// Of the paper's loop, and by distance at both rates.
+    /// Error ratios of the paper's controller, and of the distance controller at both rates.
     fn error_ratios(&self, what: FlowDisturbance) -> Result<[f64; 3], ReproduceError> {
         let seeds = disturbed_seeds(self.seeds);
         let by = |who| error_ratio(&self.cell, &self.run, who, what, seeds);

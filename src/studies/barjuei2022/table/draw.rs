@@ -9,7 +9,7 @@ use crate::studies::plot::{Line, axis, legend_of, plot, plot_with_legend};
 use crate::trials::score::LayerScore;
 use crate::width_control::limiter::SpeedLimits;
 
-/// A layer laid by the paper's loop and by distance: widths and speeds over path.
+/// Widths and speeds over path of a layer, by the paper's controller and the distance controller.
 pub fn layer(limits: SpeedLimits, target: f64, theirs: &LayerScore, ours: &LayerScore) -> Markup {
     let paper = Line::curve("the paper's loop, measured width", PAPER, theirs.widths.clone());
     let label = format!("{target} mm");
@@ -48,8 +48,8 @@ pub fn stand_off(curve: &[StandOff]) -> Markup {
     plot_with_legend(260.0, &axis, "error of the width [mm]", &lines)
 }
 
-/// Error of the bead over that of an uncontrolled bead, over the length of a wave or the
-/// period of a pulsation. At 1 control gains nothing.
+/// Error of the bead over that of an uncontrolled bead, over wavelength or period. A ratio of 1
+/// means that control gains nothing.
 pub fn ratios(title: &str, points: &[(f64, [f64; 3])]) -> Markup {
     let of = |which: usize| points.iter().map(move |(x, ratios)| (*x, ratios[which]));
     let lines = [

@@ -1,30 +1,30 @@
-//! The usual baselines: an extruder that is driven constantly, or in proportion to the robot's
+//! The usual baselines: an extruder driven at a constant voltage, or in proportion to the robot's
 //! speed.
 
 use super::plant::{CornerRun, WidthProfile};
 use super::scenario::{BEAD, CornerError, Scenario};
 use crate::plan::SpeedProfile;
 
-/// How the voltage is set.
+/// How the drive voltage is set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DriveMode {
-    /// It is constant.
+    /// Constant.
     Constant,
     /// In proportion to the robot's present speed.
     Proportional,
 }
 
-/// An extruder without a plan.
+/// An extruder without a plan of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Baseline {
     /// Its voltage.
     pub drive: DriveMode,
-    /// Whether the robot follows the planned speed, not its nominal one.
+    /// Whether the robot follows the planned speed instead of its nominal one.
     pub planned_speed: bool,
 }
 
 impl Baseline {
-    /// Each voltage with its own and with the planned speed.
+    /// Each drive mode with the nominal and with the planned speed.
     pub const ALL: [Self; 4] = [
         Self { drive: DriveMode::Constant, planned_speed: false },
         Self { drive: DriveMode::Constant, planned_speed: true },
@@ -32,7 +32,7 @@ impl Baseline {
         Self { drive: DriveMode::Proportional, planned_speed: true },
     ];
 
-    /// A run at the level of the voltage that holds the width on a straight.
+    /// A run at the voltage level that gives the target width on a straight.
     pub fn run(
         self,
         scenario: &Scenario,
@@ -41,8 +41,8 @@ impl Baseline {
         self.at_level(scenario, planned, 1.0)
     }
 
-    /// The same at the level of the least error within the judged path, with which the straight
-    /// is too thin.
+    /// A run at the level with the least error over the judged path; the straight is then too
+    /// thin.
     pub fn run_at_best_level(
         self,
         scenario: &Scenario,
@@ -72,7 +72,7 @@ impl Baseline {
     }
 }
 
-/// Least squares of level·(1 + error) − 1.
+/// Level that minimises the sum of squares of level·(1 + error) − 1.
 fn best_level(laid: &WidthProfile) -> f64 {
     let (mut first, mut second) = (0.0, 0.0);
     for (_, error) in laid.along() {

@@ -10,27 +10,27 @@ use crate::studies::bcs_thesis::{drive, flow};
 
 /// Step of the plant \[s\]: papers.md, "001, on/off", 1 ms.
 const STEP_S: f64 = 0.001;
-/// Distance between positions that are judged \[mm\].
+/// Distance between positions at which the error is judged \[mm\].
 const POSITION_SPACING_MM: f64 = 0.5;
 /// Positions on either side. Derived: `JUDGED_MM` / `POSITION_SPACING_MM`.
 const POSITIONS_PER_SIDE: i32 = 200;
-/// Relative change of the flow below which it counts as that before the corner.
+/// Relative change of the flow below which it counts as unchanged.
 const MIN_FLOW_CHANGE: f64 = 0.01;
 
 /// Root mean square error of the width, relative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
-    /// With the modelled flow.
+    /// With the modelled flow alone.
     pub quiet: f64,
-    /// With unmodelled flow, over all seeds.
+    /// With the unmodelled flow added, over all seeds.
     pub noisy: f64,
 }
 
-/// A run of the model.
+/// A simulated run through the corner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CornerRun {
     speed: SpeedProfile,
-    /// Every millisecond \[mm³/s\].
+    /// Flow every millisecond \[mm³/s\].
     flow: Vec<f64>,
 }
 
@@ -46,15 +46,16 @@ impl WidthProfile {
         mean_square(&self.errors).sqrt()
     }
 
-    /// Positions \[mm\] and errors.
+    /// Positions \[mm\] and relative errors.
     pub fn along(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         positions().zip(self.errors.iter().copied())
     }
 }
 
 impl CornerRun {
-    /// With a speed profile, and a voltage over time that is held from one command to the next
-    /// and limited as the drive. The extruder has settled at the first voltage.
+    /// Simulates a run with a speed profile and a voltage over time \[s\]. The voltage is held
+    /// from one command to the next and limited like the drive's. At the start the extruder is
+    /// settled at the first voltage.
     pub fn new(
         scenario: &Scenario,
         speed: &SpeedProfile,
@@ -72,7 +73,7 @@ impl CornerRun {
         let mut flow = Vec::new();
         for now in moments(speed.duration_s()) {
             if now + 0.5 * STEP_S >= next {
-                // The command is for the middle of its hold period.
+                // The voltage of a command is that of the middle of its hold period.
                 (command, _) = limits.apply(voltage(now + 0.5 * period), command, held);
                 next += period;
             }
@@ -91,17 +92,18 @@ impl CornerRun {
         all.filter(|(path_mm, ..)| path_mm.abs() <= JUDGED_MM)
     }
 
-    /// The width with the modelled flow.
+    /// Width error with the modelled flow.
     pub fn quiet(&self) -> WidthProfile {
         self.quiet_over(BEAD.nozzle_mm)
     }
 
-    /// The same, averaged over another length than the nozzle's \[mm\].
+    /// Width error with the modelled flow, averaged over `length_mm` instead of the nozzle's
+    /// length.
     pub fn quiet_over(&self, length_mm: f64) -> WidthProfile {
         self.laid(&self.flow, length_mm)
     }
 
-    /// Error without and with unmodelled flow.
+    /// Errors without and with unmodelled flow.
     pub fn errors(&self, seeds: u64) -> Errors {
         let noisy = (0..seeds).map(|seed| mean_square(&self.noisy(seed).errors)).sum::<f64>();
         #[expect(clippy::cast_precision_loss, reason = "a few seeds")]
@@ -109,7 +111,7 @@ impl CornerRun {
         Errors { quiet: self.quiet().rms(), noisy: (noisy / count).sqrt() }
     }
 
-    /// The width with unmodelled flow, a first-order autoregressive process.
+    /// Width error with unmodelled flow, a first-order autoregressive process.
     pub fn noisy(&self, seed: u64) -> WidthProfile {
         let sigma = UNMODELLED.ratio * self.change();
         let kept = libm::exp(-STEP_S / UNMODELLED.correlation_s);
@@ -123,7 +125,7 @@ impl CornerRun {
         self.laid(&flow.collect::<Vec<f64>>(), BEAD.nozzle_mm)
     }
 
-    /// Expected root mean square error by the noise alone.
+    /// Expected root mean square error due to the unmodelled flow alone.
     pub fn floor(&self) -> f64 {
         let sigma = UNMODELLED.ratio * self.change();
         let (full, half) = (BEAD.area_mm2 * BEAD.nozzle_mm, 0.5 * BEAD.nozzle_mm);
@@ -132,8 +134,9 @@ impl CornerRun {
         sigma / full * mean_square(&sigmas.collect::<Vec<f64>>()).sqrt()
     }
 
-    /// Standard deviation of the flow \[mm³/s\]: over the time of the judged path, or over the
-    /// whole manoeuvre, from the first change of the flow to the last; the larger of the two.
+    /// Standard deviation of the modelled flow \[mm³/s\]: over the time of the judged path, or
+    /// over the whole manoeuvre from the first change of the flow to the last; the larger of the
+    /// two.
     pub fn change(&self) -> f64 {
         let first = self.flow.first().copied().unwrap_or(0.0);
         let changed = |flow: &f64| (flow - first).abs() > MIN_FLOW_CHANGE * first;
@@ -164,12 +167,12 @@ impl CornerRun {
     }
 }
 
-/// Positions that are judged \[mm\].
+/// Positions at which the error is judged \[mm\].
 fn positions() -> impl Iterator<Item = f64> {
     (-POSITIONS_PER_SIDE..=POSITIONS_PER_SIDE).map(|k| POSITION_SPACING_MM * f64::from(k))
 }
 
-/// Milliseconds from 0 \[s\].
+/// Times from 0 to `until_s` in steps of a millisecond \[s\].
 fn moments(until_s: f64) -> impl Iterator<Item = f64> {
     (0_u32..).map(|step| STEP_S * f64::from(step)).take_while(move |now| *now <= until_s + STEP_S)
 }

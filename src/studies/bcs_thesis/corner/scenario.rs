@@ -12,14 +12,14 @@ use crate::studies::bcs_thesis::{drive, flow};
 const BEFORE_MM: f64 = 300.0;
 /// Path after the corner \[mm\]: more than any plan uses.
 const AFTER_MM: f64 = 400.0;
-/// Path on either side of the corner over which the error is judged \[mm\]: beyond it a plan
-/// leaves no error.
+/// Path on either side of the corner over which the error is judged \[mm\]; a plan leaves no error
+/// beyond it.
 pub const JUDGED_MM: f64 = 100.0;
-/// Unmodelled flow: its standard deviation over that of the change, and its correlation time
-/// \[s\] (papers.md, "001, on/off").
+/// Unmodelled flow: its standard deviation over that of the modelled flow, and its correlation
+/// time \[s\] (papers.md, "001, on/off").
 pub const UNMODELLED: FlowUncertainty = FlowUncertainty { ratio: 0.17, correlation_s: 0.15 };
-/// The bead. The plan assumes a standard deviation of the nozzle's length of 7 %, so that it
-/// holds for lengths near it as well.
+/// The bead. The plan assumes a standard deviation of 7 % for the nozzle's length, so that it also
+/// works for slightly different lengths.
 pub const BEAD: BeadGeometry = BeadGeometry { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_sigma: 0.07 };
 
 /// The corner, and the limits of robot and drive.
@@ -33,9 +33,9 @@ pub struct Scenario {
     pub accel_mm_per_s2: f64,
     /// Smallest and largest drive voltage \[V\].
     pub voltage: (f64, f64),
-    /// Its fastest change \[V/s\].
+    /// Fastest change of the voltage \[V/s\].
     pub voltage_per_s: f64,
-    /// Commands a second.
+    /// Rate of the commands \[Hz\].
     pub rate_hz: u16,
 }
 
@@ -55,19 +55,19 @@ impl Default for Scenario {
     }
 }
 
-/// Errors of the experiment.
+/// An error of the experiment.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CornerError {
-    /// The robot's speed.
+    /// The robot's speed profile is not possible.
     #[error("the corner's speed: {0}")]
     Profile(#[from] SpeedProfileError),
-    /// The plant.
+    /// The model of the plant is not valid.
     #[error("the corner's extruder: {0}")]
     Model(#[from] ModelError),
-    /// The drive.
+    /// The limits of the drive are not valid.
     #[error("the corner's drive: {0}")]
     Limits(#[from] LimitError),
-    /// The plan.
+    /// The corner cannot be planned.
     #[error("the corner's plan: {0}")]
     Plan(#[from] PlanError),
 }
@@ -91,7 +91,7 @@ impl Scenario {
         drive()?.series(&flow()?)
     }
 
-    /// A plan within a time that may be added \[s\].
+    /// A plan that adds at most `budget_s` \[s\].
     pub fn plan(&self, budget_s: f64, unmodelled: FlowUncertainty) -> Result<Plan, CornerError> {
         let (accel_mm_per_s2, slowest_mm_per_s) = (self.accel_mm_per_s2, self.apex_mm_per_s);
         let robot = RobotMotionLimits { accel_mm_per_s2, slowest_mm_per_s };

@@ -11,23 +11,23 @@ use crate::numeric::average::mean;
 /// Means over the seeds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compared {
-    /// Root mean square of the section, off over on.
+    /// Root mean square error of the section, off over on.
     pub ratio: f64,
-    /// The smallest of all seeds.
+    /// The smallest of that ratio over the seeds.
     pub min_ratio: f64,
-    /// Root mean square of the section about its own mean, off and on \[mm²\].
+    /// Root mean square deviation of the section from its own mean, off and on \[mm²\].
     pub area_rmse_mm2: [f64; 2],
-    /// Its mean absolute error \[mm²\].
+    /// Mean absolute deviation of the section, off and on \[mm²\].
     pub area_mae_mm2: [f64; 2],
-    /// The same of the width \[mm\].
+    /// Root mean square deviation of the width from its own mean, off and on \[mm\].
     pub width_rmse_mm: [f64; 2],
-    /// Its mean absolute error \[mm\].
+    /// Mean absolute deviation of the width, off and on \[mm\].
     pub width_mae_mm: [f64; 2],
-    /// The first seed, off and on.
+    /// Runs of the first seed, off and on.
     pub example: [WheelRun; 2],
 }
 
-/// Runs every seed off and with a controller, at least one seed.
+/// Runs each seed without control and with a controller; at least one seed.
 pub fn compare(
     seeds: u64,
     unmodelled_fraction: f64,

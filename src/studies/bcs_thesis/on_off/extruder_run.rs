@@ -33,14 +33,14 @@ pub struct ExtruderRun {
     pub(super) voltage: Vec<f64>,
     /// Flow at the nozzle, unmodelled part included \[mm³/s\].
     pub(super) flow: Vec<f64>,
-    /// Its mean over the judged time \[mm³/s\].
+    /// Mean flow over the judged time \[mm³/s\].
     pub(super) mean_flow: f64,
-    /// Standard deviation of the unmodelled part \[mm³/s\].
+    /// Standard deviation of the unmodelled part of the flow \[mm³/s\].
     pub(super) unmodelled: f64,
 }
 
 impl ExtruderRun {
-    /// With a seed, and the standard deviation of the unmodelled flow over that of the flow.
+    /// A run with a seed, and the standard deviation of the unmodelled flow over that of the flow.
     pub fn new(seed: u64, unmodelled_fraction: f64) -> Result<Self, FeedforwardError> {
         let steps = to_steps(LENGTH_S);
         let voltage: Vec<f64> = (0_u64..).take(steps).map(|step| voltage(seed, step)).collect();

@@ -19,9 +19,9 @@ const HEIGHT_MM: f64 = 3.654;
 const PRESSURE_MPA: f64 = 0.6;
 /// Variance of a pressure reading \[MPa²\]. Ma et al. 2026.
 const PRESSURE_VARIANCE_MPA2: f64 = 4.98e-5;
-/// Standard deviation of a section \[mm²\], a choice: 0.4 % of the section of 45 mm².
+/// Standard deviation of a measured section \[mm²\], a choice: 0.4 % of the section of 45 mm².
 const CAMERA_SIGMA_MM2: f64 = 0.2;
-/// Latency of a section. Derived: 20 ms in steps of 1 ms.
+/// Latency of a measured section. Derived: 20 ms in steps of 1 ms.
 const CAMERA_DELAY_STEPS: usize = 20;
 
 /// Measurements at 50 Hz. The observer knows standard deviation and correlation time of the
@@ -41,15 +41,15 @@ pub struct Sensors {
 /// Results of a run, over the judged time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WheelRun {
-    /// Root mean square of the section about its own mean \[mm²\].
+    /// Root mean square deviation of the section from its own mean \[mm²\].
     pub area_rmse_mm2: f64,
-    /// Its mean absolute error \[mm²\].
+    /// Mean absolute deviation of the section from its own mean \[mm²\].
     pub area_mae_mm2: f64,
     /// Mean section \[mm²\].
     pub area_mean_mm2: f64,
-    /// Root mean square of the width about its own mean, at a constant height \[mm\].
+    /// Root mean square deviation of the width from its own mean, at a constant height \[mm\].
     pub width_rmse_mm: f64,
-    /// Its mean absolute error \[mm\].
+    /// Mean absolute deviation of the width from its own mean \[mm\].
     pub width_mae_mm: f64,
     /// Time \[s\] and section \[mm²\], every 20 ms.
     pub area: Vec<(f64, f64)>,
@@ -88,7 +88,7 @@ impl Wheel {
         self.areas.push(flow / speed.max(1.0));
     }
 
-    /// The readings before this step: the section under the camera at capture, and the present
+    /// The readings before this step: the section under the camera at capture, and the current
     /// pressure.
     pub(super) fn sensor_readings(
         &self,
@@ -107,7 +107,7 @@ impl Wheel {
         let from = *self.path.get(captured)? - behind_mm;
         let laid = self.path.partition_point(|path| *path < from);
         let (area, speed) = (self.areas.get(laid)?, self.speeds.get(laid)?);
-        // Bead that was laid before the run is not known.
+        // Bead that was laid before the run is unknown.
         if from < 0.0 {
             return None;
         }
@@ -141,7 +141,7 @@ impl Wheel {
     }
 }
 
-/// The flow that the controller derives from the present pressure.
+/// The flow that the controller derives from the current pressure.
 fn pressure(
     extruder: &ExtruderRun,
     step: u64,
@@ -160,7 +160,7 @@ fn pressure(
     })
 }
 
-/// Width of a section at the constant height \[mm\].
+/// Width of a bead with this section at the constant height \[mm\].
 fn width_mm(area_mm2: f64) -> f64 {
     area_mm2 / HEIGHT_MM + HEIGHT_MM * (1.0 - std::f64::consts::FRAC_PI_4)
 }

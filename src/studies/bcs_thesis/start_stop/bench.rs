@@ -1,4 +1,4 @@
-//! Beads with pauses between them, laid by a timing strategy, and their void and drool.
+//! Beads with pauses between them, laid by a start-stop strategy, and their void and drool.
 
 use crate::core::Span;
 use crate::extruder::start_stop::{BeadConditions, Pause, StartStopTiming};
@@ -6,12 +6,12 @@ use crate::sim::melt::{Melt, MeltParameters};
 
 /// How starts and stops are timed.
 pub trait StartStopStrategy {
-    /// A start after a pause: time from the command to run until the robot goes \[s\], and
-    /// from then on its speed over its start speed by the time since that command.
+    /// A start after a pause: time from the run command until the robot moves \[s\], and its speed
+    /// from then on as a fraction of the bead's speed, by the time since the run command.
     fn begins(&self, pause: &Pause) -> (f64, impl Fn(Span) -> f64);
 
-    /// A stop: distance to the end of the bead at the command to stop \[mm\], and the robot's
-    /// speed ratio by the time since that command.
+    /// A stop: distance to the end of the bead at the stop command \[mm\], and the robot's speed
+    /// as a fraction of the bead's speed, by the time since that command.
     fn ends(&self) -> (f64, impl Fn(Span) -> f64);
 }
 
@@ -30,19 +30,19 @@ impl StartStopStrategy for StartStopTiming {
 /// Missing and surplus volume \[mm³\].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StartStopScore {
-    /// What the path lacks where the robot travelled it.
+    /// Volume that is missing on the path that the robot travelled.
     pub void_mm3: f64,
-    /// The surplus on the path, and all that came while the robot stood.
+    /// Surplus on the path, and all volume that left the nozzle while the robot stood.
     pub drool_mm3: f64,
 }
 
 impl StartStopScore {
-    /// Both together \[mm³\].
+    /// Void and drool together \[mm³\].
     pub fn sum_mm3(&self) -> f64 {
         self.void_mm3 + self.drool_mm3
     }
 
-    /// The sum with another.
+    /// The sum of two scores.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         let void_mm3 = self.void_mm3 + other.void_mm3;
@@ -53,7 +53,7 @@ impl StartStopScore {
 /// A robot and the beads that it lays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StartStopBench {
-    /// Flow and speed; the smallest speed ratio is that of a strategy.
+    /// Flow and speed; the smallest speed ratio is the one that a strategy uses.
     pub laid: BeadConditions,
     /// Length of a bead \[mm\].
     pub bead_mm: f64,
@@ -64,7 +64,7 @@ pub struct StartStopBench {
 /// A sample of a start or a stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlowSample {
-    /// Since the command to the pump \[s\].
+    /// Time since the command to the pump \[s\].
     pub since_s: f64,
     /// Flow at the nozzle \[mm³/s\].
     pub flow_mm3_per_s: f64,
@@ -93,7 +93,7 @@ struct BenchRun<'a, S> {
     melt: Melt,
     speed_fraction: f64,
     score: StartStopScore,
-    /// Last command to the pump, and when.
+    /// Last command to the pump, and its time.
     last_command: LastCommand,
     trace: StartStopTrace,
 }
@@ -105,9 +105,9 @@ enum LastCommand {
 }
 
 impl StartStopBench {
-    /// Lays one bead after another on the same machine, with these pauses \[s\] between them,
+    /// Lays beads one after another on the same machine, with these pauses \[s\] between them,
     /// each counted from the robot's arrival at the end of a bead; the melt keeps its state. One
-    /// score for each pause: the end of the bead, the pause, and the bead after it.
+    /// score for each pause: it covers the end of the bead, the pause, and the bead after it.
     pub fn score_pauses<S: StartStopStrategy>(
         &self,
         machine: MeltParameters,
@@ -151,7 +151,7 @@ impl StartStopBench {
 }
 
 impl<S: StartStopStrategy> BenchRun<'_, S> {
-    /// The end of a bead, a pause from then on, and the bead after it.
+    /// Lays the end of a bead, waits, and lays the next bead.
     fn pause(&mut self, idle_s: f64) {
         self.trace = StartStopTrace::default();
         let stopped_s = self.finish();
@@ -159,8 +159,8 @@ impl<S: StartStopStrategy> BenchRun<'_, S> {
         self.begin(stopped_s);
     }
 
-    /// One step with the robot commanded to a fraction of its speed; returns the robot's path
-    /// in it \[mm\].
+    /// One step with the robot commanded to a fraction of its speed; returns the path in this step
+    /// \[mm\].
     fn step(&mut self, commanded_fraction: f64) -> f64 {
         let (dt_s, laid_mm3) = self.melt.advance();
         let kept = libm::exp(-dt_s / self.bench.robot_s);
@@ -187,7 +187,7 @@ impl<S: StartStopStrategy> BenchRun<'_, S> {
         }
     }
 
-    /// Lays the last part of a bead; returns the time of the command to stop \[s\].
+    /// Lays the last part of a bead; returns the time of the stop command \[s\].
     fn finish(&mut self) -> f64 {
         let stopped_s = self.melt.now_s();
         self.melt.command(0.0);

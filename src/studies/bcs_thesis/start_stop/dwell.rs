@@ -1,4 +1,4 @@
-//! Fixed dwell times, as usual in printers, and the best of them.
+//! Fixed dwell times, as printers use them, and the best of them.
 
 use rayon::prelude::*;
 
@@ -7,12 +7,13 @@ use crate::core::Span;
 use crate::extruder::start_stop::Pause;
 use crate::sim::melt::MeltParameters;
 
-/// The same times at every start and every stop. Bead characterisation thesis, section 1.3.4.
+/// The same dwell times at every start and every stop. Bead characterisation thesis, section
+/// 1.3.4.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dwell {
-    /// From the command to run until the robot goes \[s\].
+    /// Time from the run command until the robot moves \[s\].
     pub start_s: f64,
-    /// From the command to stop until the end of the bead \[s\].
+    /// Time from the stop command until the end of the bead \[s\].
     pub stop_s: f64,
     /// Speed of the robot \[mm/s\].
     pub speed_mm_per_s: f64,
@@ -28,16 +29,16 @@ impl StartStopStrategy for Dwell {
     }
 }
 
-/// Longest dwell times that are tried \[s\].
+/// Longest dwell times in the search \[s\].
 const MAX_DWELL_S: [f64; 2] = [4.0, 1.5];
-/// Steps of the golden section; each shortens the interval to 0.618 of itself.
+/// Steps of the golden-section search; each shortens the interval to 0.618 of itself.
 const GOLDEN_STEPS: u32 = 8;
 /// Intervals of the coarse grid.
 const COARSE_STEPS: u32 = 10;
-/// Alternations between the two times.
+/// Alternations between searching the start time and the stop time.
 const ROUNDS: u32 = 2;
 
-/// The pair of dwell times with the least void and drool over all these pauses and seeds.
+/// The pair of dwell times with the least void and drool over all given pauses and seeds.
 pub fn tune(
     bench: &StartStopBench,
     machine: MeltParameters,
@@ -46,7 +47,7 @@ pub fn tune(
 ) -> Dwell {
     let cost = |dwell: &Dwell| -> f64 {
         let of = |seed| bench.score_pauses(machine, seed, dwell, idle_s);
-        // Collected, so that the order of the sum does not depend on which seed ends first.
+        // Collected first: the order of the sum must not depend on which seed ends first.
         let scores: Vec<Vec<StartStopScore>> = seeds.clone().into_par_iter().map(of).collect();
         scores.iter().flatten().map(StartStopScore::sum_mm3).sum()
     };
@@ -60,8 +61,8 @@ pub fn tune(
     best
 }
 
-/// The minimum of a function from zero to `max`: the best of a coarse grid, then the golden
-/// section about it.
+/// The minimum of a function from zero to `max`: the best point of a coarse grid, then a
+/// golden-section search about it.
 fn minimise(max: f64, cost: impl Fn(f64) -> f64) -> f64 {
     let step = max / f64::from(COARSE_STEPS);
     let coarse = (0..=COARSE_STEPS).map(|k| f64::from(k) * step);

@@ -1,5 +1,5 @@
-//! Void and drool of starts and stops, by their timing: a machine is recorded, a model is
-//! fitted, and beads are laid with it after other pauses than those of the recording.
+//! Void and drool at starts and stops with different timings: a machine is recorded, a model is
+//! fitted, and beads are laid with it, with other pauses than in the recording.
 
 use rayon::prelude::*;
 
@@ -13,34 +13,35 @@ use crate::sim::melt::MeltParameters;
 use crate::sim::melt_log::{RecordingPlan, record};
 use crate::studies::error::ReproduceError;
 
-/// Fraction of its speed down to which a robot follows the flow: a slower one saves little
-/// more void.
+/// Fraction of the bead's speed down to which a robot follows the flow; slower than that saves
+/// little more void.
 pub const MIN_SPEED_FRACTION: f64 = 0.05;
 /// Pause whose stop and start are plotted \[s\].
 pub const TRACED_PAUSE_S: f64 = 30.0;
-/// First seed of the recordings, beyond those of the beads.
+/// First seed of the recordings; beads have smaller seeds.
 const RECORDING_SEED: u64 = 1000;
-/// Seeds that fixed dwell times are tuned on. They are judged on these as well, which favours
-/// them.
+/// Seeds on which the fixed dwell times are tuned. They are judged on the same seeds, too, which
+/// favours them.
 const TUNED_SEEDS: u64 = 3;
 
 /// Void and drool after each pause of [`PAUSES_S`], mean over the seeds.
 pub type Losses = Vec<StartStopScore>;
 
-/// All timings on the same machine.
+/// Results of all timings on the same machine.
 #[derive(Debug, Clone)]
 pub struct StartStopResults {
     /// Fixed times: the drive's dead time at the start, nothing at the stop.
     pub naive: Losses,
     /// The best fixed times.
     pub fixed: Losses,
-    /// Predicted starts and stops of a robot that keeps its speed.
+    /// Predicted starts and stops of a robot at constant speed.
     pub keeps: Losses,
-    /// Predicted starts and stops of a robot that follows the flow.
+    /// Predicted starts and stops of a robot whose speed follows the flow.
     pub follows: Losses,
-    /// The best fixed times themselves.
+    /// The best fixed times.
     pub dwell: Dwell,
-    /// One pause with the best fixed times, and one with a robot that follows.
+    /// Traces of one pause: with the best fixed times, and with a robot whose speed follows the
+    /// flow.
     pub traces: [StartStopTrace; 2],
 }
 
@@ -49,7 +50,7 @@ pub fn sum(losses: &[StartStopScore]) -> StartStopScore {
     losses.iter().copied().fold(StartStopScore::default(), StartStopScore::and)
 }
 
-/// A bead of 10 mm² at 40 mm/s, and a robot that may slow down to a fraction of its speed.
+/// A bead of 10 mm² at 40 mm/s, and a robot that may slow down to `min_fraction` of its speed.
 pub fn bench(min_fraction: f64) -> StartStopBench {
     let (flow, speed) = (Mm3PerS::constant(400.0), MmPerS::constant(40.0));
     let (min_speed_ratio, robot_lag) = (min_fraction, Span::from_millis(30));
@@ -69,7 +70,7 @@ pub fn fitted(machine: MeltParameters, seed: u64) -> Result<StartStopFit, StartS
     fit(&command, &flow)
 }
 
-/// Lays beads after all pauses, as often as there are seeds.
+/// Lays beads with all pauses, once for each seed.
 pub fn run(machine: MeltParameters, seeds: u64) -> Result<StartStopResults, ReproduceError> {
     let seeds = seeds.max(1);
     let [keeps, follows] = [1.0, MIN_SPEED_FRACTION].map(bench);

@@ -1,5 +1,5 @@
-//! The 90° corner for which the thesis leaves the coordination of robot and extruder open:
-//! both planned together, beside an extruder without a plan.
+//! The 90° corner, for which the thesis leaves the coordination of robot and extruder open: both
+//! planned together, compared with an extruder without a plan.
 
 use rayon::prelude::*;
 
@@ -13,18 +13,18 @@ use crate::studies::study::{Effort, Section, TableRows};
 
 /// Seeds of the unmodelled flow.
 pub const SEEDS: u64 = 20;
-/// Times that the plan may add \[s\]; the figures are those of the last one.
+/// Largest times that the plan may add \[s\]; the table has the results of the last one.
 const BUDGETS_S: [f64; 8] = [0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0];
-/// With fewer seeds the experiment is a quick one, and plans for fewer times.
+/// With fewer seeds than this the corner is planned for [`QUICK_S`] only.
 const QUICK_SEEDS: u64 = 10;
-/// The times of a quick one \[s\].
+/// Largest added times with few seeds \[s\].
 const QUICK_S: [f64; 4] = [0.0, 0.2, 0.5, 1.0];
 
 const CASE: &str = "90° corner, at most 1 s added";
 const STRAIGHT_LEVEL: &str = "90° corner, level that suits the straight";
 const BEST_LEVEL: &str = "90° corner, level of the least error within ±100 mm";
-/// The plan is for the mean over the nozzle's length; these rows average the same runs over
-/// other lengths \[mm\].
+/// The plan is for the mean over the nozzle's length; these rows average the same runs over other
+/// lengths \[mm\].
 const OTHER_LENGTHS: &str = "90° corner, planned for 20 mm, without noise";
 const LENGTHS: [(f64, &str); 5] = [
     (10.0, "width error RMS, mean over 10 mm"),
@@ -34,7 +34,7 @@ const LENGTHS: [(f64, &str); 5] = [
     (30.0, "width error RMS, mean over 30 mm"),
 ];
 
-/// Plans and runs the corner for every time; the rows are those of the longest.
+/// Plans and runs the corner for every added time; the rows are those of the longest.
 pub fn corner(effort: Effort, rows: &mut TableRows) -> Result<Section, ReproduceError> {
     let seeds = effort.seeds.unwrap_or(SEEDS);
     let budgets: &[f64] = if seeds < QUICK_SEEDS { &QUICK_S } else { &BUDGETS_S };
@@ -45,7 +45,7 @@ pub fn corner(effort: Effort, rows: &mut TableRows) -> Result<Section, Reproduce
     let Some(last) = found.last() else { return Err(ReproduceError::NoRun) };
     let plan = scenario.plan(last.budget_s, UNMODELLED)?;
     push(last, rows);
-    // The stricter reading: each baseline at the level of its own least error here.
+    // A harder comparison: each baseline at the voltage level of its own least error here.
     for baseline in Baseline::ALL {
         let errors = baseline.run_at_best_level(&scenario, &plan.speed)?.errors(seeds);
         push_one(BEST_LEVEL, baseline, errors, last.planned, rows);

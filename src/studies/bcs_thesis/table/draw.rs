@@ -12,19 +12,19 @@ use crate::studies::bcs_thesis::fit_table::{FitRow, FitTable};
 use crate::studies::bcs_thesis::on_off::{AREA_MM2, Compared, JUDGED_FROM_S, WheelRun};
 use crate::studies::plot::{Line, axis, plot_with_legend};
 
-/// The period that is drawn once more, enlarged \[s\].
+/// The period of the enlarged plot \[s\].
 const CLOSER_S: Range = Range::new(40.0, 60.0);
 
 fn plot(y_title: &str, axis: &XAxis, lines: &[Line<'_>]) -> Markup {
     plot_with_legend(220.0, axis, y_title, lines)
 }
 
-/// A reference level without a name behind some curves.
+/// A line without a name at a reference level, behind some curves.
 fn with_reference<const N: usize>(level: f64, lines: [Line<'_>; N]) -> Vec<Line<'_>> {
     std::iter::once(Line::level("", TARGET, level, "")).chain(lines).collect()
 }
 
-/// A run beside its model, and the table of fits.
+/// A measured and a predicted run, and the table of fits.
 pub fn fits(table: &FitTable) -> Markup {
     let of = |which: usize| table.example.iter().map(move |row| (row[0], row[which]));
     let time = XAxis::time(Range::new(0.0, table.example.last().map_or(1.0, |row| row[0])));
@@ -47,8 +47,8 @@ pub fn fits(table: &FitTable) -> Markup {
     }
 }
 
-/// Bead, speed and flow of one run at constant speed, with the thesis' controller and with
-/// ours. The deposition wheel moves under the nozzle and stands for the robot's motion.
+/// Bead, speed and flow of one run at constant speed, with the thesis' controller and with ours.
+/// The deposition wheel moves under the nozzle in place of the robot.
 pub fn runs(thesis: &Compared, ours: &Compared) -> Markup {
     let [off, on] = &thesis.example;
     let [_, ours_on] = &ours.example;
@@ -74,7 +74,7 @@ pub fn runs(thesis: &Compared, ours: &Compared) -> Markup {
     }
 }
 
-/// The deviation of the section that either controller leaves with an exact model.
+/// The section's deviation that remains with each controller and an exact model.
 pub fn exact([thesis, ours]: &[Compared; 2]) -> Markup {
     let of = |found: &Compared| -> Vec<CurvePoint> {
         let [_, on] = &found.example;
@@ -93,8 +93,8 @@ fn end_s(run: &WheelRun) -> f64 {
     run.area.last().map_or(1.0, |(t, _)| *t)
 }
 
-/// Area RMSE off over on, by the camera's distance behind the nozzle \[mm\], beside the
-/// bound.
+/// Ratio of the section's RMSE off over on by the camera's distance behind the nozzle \[mm\], and
+/// its bound.
 pub fn sensing(found: Vec<CurvePoint>, bound: Vec<CurvePoint>) -> Markup {
     let range = Range::new(0.0, bound.last().map_or(1.0, |(behind_mm, _)| *behind_mm));
     let axis = axis("camera behind the nozzle [mm]", range);
@@ -102,8 +102,8 @@ pub fn sensing(found: Vec<CurvePoint>, bound: Vec<CurvePoint>) -> Markup {
     plot("area RMSE, off over on", &axis, &lines)
 }
 
-/// The gain over the time that is added, and runs around the corner: with a constant, a
-/// proportional and a planned extruder.
+/// Error ratio over the added time, and runs around the corner with a constant, a proportional and
+/// a planned extruder.
 pub fn corner(rows: &[BudgetRow], runs: &[CornerRun; 3]) -> Markup {
     let line = |name, ink, value: &dyn Fn(&BudgetRow) -> f64| {
         Line::curve(name, ink, rows.iter().map(|row| (row.budget_s, value(row))))

@@ -1,6 +1,5 @@
-//! Starts, stops and drool, which the thesis leaves open (sections 1.3.3 and 1.3.4): fixed
-//! dwell times beside times that are predicted by a model of the extruder, fitted to a
-//! recording.
+//! Starts, stops and drool, which the thesis leaves open (sections 1.3.3 and 1.3.4): fixed dwell
+//! times compared with times from a model of the extruder that is fitted to a recording.
 
 mod draw;
 
@@ -10,7 +9,7 @@ use crate::studies::bcs_thesis::start_stop::experiment::{MIN_SPEED_FRACTION, run
 use crate::studies::error::ReproduceError;
 use crate::studies::study::{Section, TableRows};
 
-/// Runs the experiment. "Simulated" in the table are the best fixed dwell times.
+/// Runs the experiment. The table's column "simulated" has the best fixed dwell times.
 pub fn section(seeds: u64, rows: &mut TableRows) -> Result<Section, ReproduceError> {
     let found = run(MeltParameters::TYPICAL, seeds)?;
     for (case, theirs, ours) in [

@@ -1,4 +1,4 @@
-//! Responses of Ma et al. 2026's controllers beside ours.
+//! Responses of Ma et al. 2026's controllers and of ours.
 
 use maud::{Markup, html};
 
@@ -9,8 +9,8 @@ use crate::report::chart::series::CurvePoint;
 use crate::studies::ma2026::{Factors, PressureResponse};
 use crate::studies::plot::{Line, plot_with_legend};
 
-/// Samples of the plant from point to point of a curve: fewer make larger pages, more hide
-/// the noise.
+/// Number of plant samples per point of a curve: a smaller one gives larger pages, a larger one
+/// hides the noise.
 const DRAWN_EVERY: usize = 4;
 
 /// A controller's name, its colour and its response.
@@ -24,7 +24,7 @@ pub fn pressure_and_speed(drawn: &[NamedResponse], range: Range) -> Markup {
     }
 }
 
-/// One quantity; the plot of the pressure has the target, too.
+/// Curves of one quantity; the plot of the pressure has the target, too.
 pub fn curves(
     drawn: &[NamedResponse],
     range: Range,
@@ -43,7 +43,7 @@ pub fn curves(
     plot_with_legend(220.0, &XAxis::time(range), y_title, &lines)
 }
 
-/// Our step responses with each single model error, each in a colour of no method.
+/// Our step responses with each single model error, in colours that stand for no method.
 pub fn singles(drawn: &[PressureResponse]) -> Markup {
     let inks = [
         palette::PRIMING,

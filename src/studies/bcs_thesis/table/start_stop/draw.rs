@@ -14,10 +14,10 @@ use crate::studies::bcs_thesis::start_stop::experiment::{
 };
 use crate::studies::plot::{Line, axis, plot};
 
-/// Time that is drawn \[s\]: a start is over by then, and a stop nearly.
+/// Duration that is drawn \[s\]: a start is over by then, a stop nearly.
 const SHOWN_S: f64 = 3.0;
 
-/// Volumes over the pause, and a stop and a start over time.
+/// Void and drool over the pause, and a stop and a start over time.
 pub fn all(found: &StartStopResults) -> Markup {
     let [fixed, ours] = &found.traces;
     html! {
