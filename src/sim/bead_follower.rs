@@ -1,4 +1,4 @@
-//! Lays a simulated bead behind a robot that reports where it is.
+//! Lays a simulated bead behind a robot, from the position that the robot reports.
 
 use super::hash;
 use super::laid::{LaidBead, PathSpeed};
@@ -6,32 +6,32 @@ use crate::core::{Mm, RobotMode, RobotState, Span, Stamp};
 use crate::scenario::bead::{BeadModel, EdgeRoughness};
 use crate::scenario::disturbance::Flow;
 
-/// Longest path between two reports that counts as one bead \[mm\]: a robot that was connected
-/// in the middle of its bead, or lost its link for a while. A longer path is a jump.
+/// Longest path between two reports that counts as one bead \[mm\]: a robot that connects in the
+/// middle of its bead, or loses its link for a while. A longer path is a jump.
 const MAX_SEGMENT_MM: f64 = 5000.0;
 /// Longest time over which a position is extrapolated from the last report: a robot that is
 /// silent for longer may have stopped.
 const MAX_EXTRAPOLATION: Span = Span::from_millis(500);
-/// A path that falls back by less is the same bead \[mm\]: beyond rounding of reports, below
-/// any move.
+/// Largest decrease of the path within one bead \[mm\]: above the rounding of reports, below any
+/// move.
 const PATH_TOLERANCE_MM: f64 = 0.01;
 
-/// What every bead is made of.
+/// Parameters of every bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeadRecipe {
-    /// How wide a bead comes out at a speed.
+    /// Width at a speed.
     pub model: BeadModel,
-    /// How rough its edges are.
+    /// Roughness of its edges.
     pub roughness: EdgeRoughness,
-    /// What the pump does to its flow.
+    /// Disturbances of the pump's flow.
     pub flow: Flow,
-    /// Seed of everything random; every bead has its own roughness.
+    /// Seed of all random numbers; every bead has its own roughness.
     pub seed: u64,
 }
 
-/// Follows a robot and lays what it prints. A bead begins when the robot goes
-/// to `PRINT`, and when its path falls back or jumps; it grows in `PRINT` and
-/// `HOLD`. Between two reports speed changes evenly along the path.
+/// Follows a robot and lays its bead. A bead begins when the robot's mode becomes `PRINT`, and
+/// when its path decreases or jumps; it grows in `PRINT` and `HOLD`. Between two reports the speed
+/// changes linearly with the path.
 #[derive(Debug, Clone)]
 pub struct BeadFollower {
     recipe: BeadRecipe,
@@ -42,7 +42,7 @@ pub struct BeadFollower {
 }
 
 impl BeadFollower {
-    /// Of a robot that has not been heard yet.
+    /// For a robot from which no report has arrived yet.
     pub fn new(recipe: BeadRecipe) -> Self {
         Self { recipe, beads: 0, laid: bead_of(&recipe, 0), before: None, last: None }
     }
@@ -61,7 +61,7 @@ impl BeadFollower {
         self.before = self.last.replace((at, *state));
     }
 
-    /// A new bead, from where the robot stood before it printed.
+    /// Begins a new bead where the robot stood before it printed; at path 0 if that is unknown.
     fn begin(&mut self, previous: Option<RobotState>, state: &RobotState) {
         self.laid = bead_of(&self.recipe, self.beads);
         self.beads += 1;
@@ -72,9 +72,8 @@ impl BeadFollower {
         self.laid.lay(from, path, state.speed_mm_per_s.get());
     }
 
-    /// Distance of the nozzle along its path at a time \[mm\]: between the
-    /// last two reports, and carried on at the last speed for up to half a
-    /// second. `None` before the first report.
+    /// Path of the nozzle at a time \[mm\]: interpolated between the last two reports, and
+    /// extrapolated at the last speed for up to half a second. `None` before the first report.
     pub fn path_at(&self, at: Stamp) -> Option<f64> {
         let (reported, state) = self.last?;
         let path = state.path_mm.get();
@@ -88,17 +87,17 @@ impl BeadFollower {
         Some(old.path_mm.get() + (path - old.path_mm.get()) * fraction)
     }
 
-    /// The last height of the nozzle.
+    /// Last reported height of the nozzle; `None` before the first report.
     pub fn z(&self) -> Option<Mm> {
         self.last.map(|(_, state)| state.z_mm)
     }
 
-    /// The bead that was begun last.
+    /// The current or last bead.
     pub fn bead(&self) -> &LaidBead {
         &self.laid
     }
 
-    /// How many beads have been begun.
+    /// Number of beads that have begun.
     pub fn beads(&self) -> u64 {
         self.beads
     }

@@ -5,22 +5,22 @@ use nalgebra::Vector2;
 
 use crate::scenario::image;
 
-/// Angle from the middle of the gauge beyond which an arc is not followed \[rad\]: its edges
-/// are functions of the position along the gauge's axis only below π/2.
+/// Largest angle of an arc from the middle of the gauge \[rad\]: its edges are functions of the
+/// position along the gauge's axis only below π/2.
 const MAX_ARC_RAD: f64 = 1.2;
 
-/// From distances along and across the bead to the directions ahead and to the
-/// right at the middle of the gauge, all in mm.
+/// Converts distances along and across the bead to distances ahead and to the right of the middle
+/// of the gauge \[mm\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum BeadPath {
-    /// No bend.
+    /// A straight bead.
     Straight,
     /// An arc of a signed radius \[mm\], to the right if positive.
     Arc {
-        /// Radius of the middle line \[mm\].
+        /// Radius of the centre line \[mm\].
         radius_mm: f64,
     },
-    /// A corner whose halves lie like mirror images about the line across.
+    /// A corner, symmetric about the line across the gauge's middle.
     Corner {
         /// Sine and cosine of half the angle.
         half: (f64, f64),
@@ -39,9 +39,8 @@ impl BeadPath {
         }
     }
 
-    /// Where a position along and across the bead lies, ahead and to the right.
-    /// `across_mm` is normal to the bead's own axis. `None` too far around a
-    /// curve.
+    /// Position ahead and to the right \[mm\] of a point along and across the bead. `across_mm` is
+    /// normal to the bead's own axis. `None` too far around a curve.
     pub fn position(self, along_mm: f64, across_mm: f64) -> Option<Vector2<f64>> {
         match self {
             Self::Straight => Some(Vector2::new(along_mm, across_mm)),
@@ -51,15 +50,15 @@ impl BeadPath {
                 let near = (along_mm / radius_mm).abs() < MAX_ARC_RAD;
                 near.then(|| Vector2::new(to_centre * sin, radius_mm - to_centre * cos))
             }
-            // Edges parallel to the two halves meet on the line across, where
-            // they are 1/cos as far apart as normal to a half.
+            // Edges parallel to the two halves meet on the symmetry line. Along it their distance
+            // is 1/cos times the distance normal to a half.
             Self::Corner { half: (sin, cos) } => {
                 Some(Vector2::new(along_mm * cos, along_mm.abs() * sin + across_mm / cos))
             }
         }
     }
 
-    /// How far along the bead a position ahead and to the right lies \[mm\].
+    /// Distance along the bead of a point ahead and to the right \[mm\].
     pub fn along_mm(self, position: Vector2<f64>) -> f64 {
         match self {
             Self::Straight => position.x,
@@ -88,7 +87,7 @@ mod tests {
             for (along, across) in [(0.0, 0.0), (5.0, 4.0), (-11.0, 4.0), (20.0, -6.0)] {
                 let position = bend.position(along, across).unwrap();
                 let distance = (position - centre).norm();
-                // To the right is towards the centre of a curve to the right.
+                // The right is towards the centre of a curve to the right.
                 let expected = (radius_mm - across).abs();
                 assert!((distance - expected).abs() < 1e-12);
                 assert!((bend.along_mm(position) - along).abs() < 1e-12, "{along} {across}");

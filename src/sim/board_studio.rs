@@ -1,4 +1,4 @@
-//! Images of a checkerboard, plain or with markers, before a camera.
+//! Images of a checkerboard, with or without markers, in front of a camera.
 
 use nalgebra::{Matrix3, Point2, Vector2};
 
@@ -27,14 +27,14 @@ const MAX_BLUR_SIGMAS: f64 = 8.0;
 /// 1, 1/12.
 const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 
-/// How images are taken.
+/// Blur, noise and motion of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exposure {
-    /// Standard deviation of the lens's blur \[px\], the pixel itself left out.
+    /// Standard deviation of the lens's blur without that of the pixel \[px\].
     pub blur_px: f64,
     /// Standard deviation of a pixel's noise \[grey levels\].
     pub noise_grey: f64,
-    /// How far the board moves in the image while the shutter is open \[px\].
+    /// Motion of the board in the image during exposure \[px\].
     pub motion_px: Vector2<f64>,
 }
 
@@ -44,8 +44,7 @@ impl Exposure {
         Self { blur_px: 0.7, noise_grey: 2.0, motion_px: Vector2::new(0.0, 0.0) };
 }
 
-/// A camera before which boards are held. What a pixel sees is kept from image to
-/// image.
+/// A camera in front of which boards are held. The rays of its pixels are computed once.
 #[derive(Debug, Clone)]
 pub struct BoardStudio {
     size: (usize, usize),
@@ -61,8 +60,7 @@ impl BoardStudio {
         Self { size: (width, height), rays }
     }
 
-    /// An image of a board, with the noise of a seed. Fails only for a camera without
-    /// pixels.
+    /// An image of a board, with noise from a seed. Fails only for an image size of zero.
     pub fn take(
         &self,
         board: &Board,
@@ -74,7 +72,7 @@ impl BoardStudio {
         let (width, height) = self.size;
         let values = self.rays.iter().enumerate().map(|(i, ray)| {
             let grey = ray.map_or(BACKGROUND, |at| {
-                // To the next pixel, and at the image's end from the last one.
+                // Difference to the next pixel; at the image's end, from the previous one.
                 let to_next = |step: usize, is_last: bool| {
                     let other = if is_last { i.checked_sub(step) } else { i.checked_add(step) };
                     let other = self.rays.get(other?).copied().flatten()?;
@@ -98,15 +96,15 @@ fn rounded(grey: f64) -> u8 {
 
 /// The board as the camera sees it.
 struct BoardScene {
-    /// From rays to the board, in squares; homogeneous.
+    /// Homography from rays to the board, in squares.
     to_board: Matrix3<f64>,
-    /// Squares along its sides.
+    /// Number of squares along its sides.
     squares: Vector2<f64>,
     exposure: Exposure,
     markers: Option<MarkedBoard>,
 }
 
-/// A coordinate on the board and how far it is blurred, both in squares.
+/// A coordinate on the board and the standard deviation of its blur, both in squares.
 #[derive(Debug, Clone, Copy)]
 struct Blurred {
     at: f64,
@@ -115,9 +113,9 @@ struct Blurred {
 
 /// The markers in the white squares.
 struct MarkedBoard {
-    /// Cells along a marker's side, and the side of one in squares.
+    /// Number of cells along a marker's side, and the side of a cell in squares.
     cells: (usize, f64),
-    /// Border about a marker, in squares.
+    /// White space around a marker, in squares.
     clearance: f64,
     /// The black cells of every square, row by row.
     black: Vec<Vec<(usize, usize)>>,
@@ -137,7 +135,7 @@ impl MarkedBoard {
         })
     }
 
-    /// How much of a position in a square is covered by its marker's black.
+    /// Fraction of black at a position in a marker's square.
     fn black_fraction(&self, square: usize, u: Blurred, v: Blurred) -> f64 {
         let Some(black) = self.black.get(square).filter(|black| !black.is_empty()) else {
             return 0.0;
@@ -172,11 +170,11 @@ impl BoardScene {
         }
     }
 
-    /// Mean grey value of a pixel whose ray is this, and whose neighbours' rays are
-    /// so far off.
+    /// Mean grey level of a pixel from its ray and the differences to the rays of the pixels to
+    /// the right and below.
     fn grey(&self, ray: Point2<f64>, right: Vector2<f64>, below: Vector2<f64>) -> f64 {
         let Some(at) = self.on_board(ray) else { return BACKGROUND };
-        // Squares from the sheet's middle and from its boundary.
+        // Distance from the sheet's centre and beyond the boundary of the squares, in squares.
         let beyond = (at + Vector2::repeat(1.0) - self.squares / 2.0).abs() - self.squares / 2.0;
         if beyond.max() > EDGE_ZONE_SQUARES {
             return BACKGROUND;
@@ -185,8 +183,8 @@ impl BoardScene {
             return BACKGROUND;
         };
         let (by_x, by_y) = (a - at, b - at);
-        // Blur across the lines of one direction, in squares: that of the lens and of
-        // the pixel is the same all round, that of the motion has a direction.
+        // Standard deviation of the blur across the board's lines in one direction, in squares:
+        // lens and pixel blur equally in all directions, motion in one.
         let blur = |axis: usize| {
             let slope = Vector2::new(by_x[axis], by_y[axis]);
             let still = self.exposure.blur_px.powi(2) + PIXEL_VARIANCE_PX2;
@@ -214,8 +212,8 @@ impl BoardScene {
         BACKGROUND + (sheet - BACKGROUND) * on_sheet
     }
 
-    /// How much of a position is covered by a marker's black: that of its own square alone,
-    /// for no marker's blur reaches the next one.
+    /// Fraction of black from a marker at a position. Only the marker of its own square counts:
+    /// the blur of a marker does not reach the next square.
     fn marker_fraction(&self, u: Blurred, v: Blurred) -> f64 {
         let Some(marks) = &self.markers else { return 0.0 };
         let (column, row) = (u.at.floor() + 1.0, v.at.floor() + 1.0);
@@ -230,18 +228,18 @@ impl BoardScene {
 
     fn on_board(&self, ray: Point2<f64>) -> Option<Vector2<f64>> {
         let at = self.to_board * ray.to_homogeneous();
-        // Behind the camera the third number, the inverse of the depth, is negative.
+        // Behind the camera the third coordinate, the inverse of the depth, is negative.
         (at.z > 0.0).then(|| Vector2::new(at.x / at.z, at.y / at.z))
     }
 }
 
-/// Fraction of a blurred half plane.
+/// Value of a blurred step at a distance inside it, 0 to 1.
 fn edge_fraction(inside: f64, blur: f64) -> f64 {
-    // The tails beyond are less than a part in 10¹⁵, and slow.
+    // The tails beyond are below 10⁻¹⁵, and slow to compute.
     normal_distribution::cumulative((inside / blur).clamp(-MAX_BLUR_SIGMAS, MAX_BLUR_SIGMAS))
 }
 
-/// Stripes of width 1 and values 1 and -1, 1 from 0 to 1, blurred.
+/// Blurred stripes of width 1 with the values 1 and −1; 1 from 0 to 1.
 fn blurred_stripes(Blurred { at, blur }: Blurred) -> f64 {
     let line = at.round();
     let sign = if line.rem_euclid(2.0) < 0.5 { 1.0 } else { -1.0 };

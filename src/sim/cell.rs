@@ -1,7 +1,6 @@
-//! The simulated cell: the same controller, runner and robot as a live one, in simulated
-//! time. Events are in the order of time; at the same time the robot reports first, then the
-//! extruder, then a frame is captured, then a setpoint is sent, and last the extruder side
-//! takes its step.
+//! The simulated cell: the same controller, runner and robot as in a live one, in simulated time.
+//! Events come in the order of time. At the same time the order is: the robot's report, the
+//! extruder's report, the capture of a frame, a setpoint, a step of the extruder side.
 
 mod camera;
 mod clock;
@@ -32,35 +31,34 @@ use camera::{CapturedFrame, SimCamera};
 use clock::{ClockEvent, Ticker};
 use port::SimPort;
 
-/// Longest duration of a layer \[s\]: a day; a robot that has stopped for good ends the layer
-/// by it.
+/// Longest duration of a layer \[s\]: a day. It ends a layer whose robot has stopped for good.
 const MAX_LAYER_S: f64 = 86_400.0;
-/// Acceleration limit of the simulated robot, where the cell's setpoints are limited already:
-/// none in effect \[mm/s²\].
+/// Acceleration limit of the simulated robot \[mm/s²\]: in effect none, because the cell already
+/// limits its setpoints.
 const ROBOT_ACCEL: MmPerS2 = MmPerS2::constant(1e6);
-/// Fraction of the start speed from which the start is over.
+/// Fraction of the start speed at which the start is over.
 const STARTED_FRACTION: f64 = 0.99;
 
-/// Fraction of the nominal flow below which nothing is laid.
+/// Fraction of the nominal flow below which no bead is laid.
 const MIN_FLOW_FRACTION: f64 = 1e-3;
 
 /// A commanded extruder: the controller's side and the plant.
 #[derive(Debug)]
 pub struct CommandedExtruder {
-    /// The side of the controller.
+    /// Setup of the controller's side.
     pub setup: ExtruderSetup,
     /// The demanded flow.
     pub demand: FlowDemand,
     /// The plant.
     pub plant: SimExtruder,
-    /// Flow at which the width is that of the bead model.
+    /// Flow at which the bead model gives the width.
     pub nominal_flow: Mm3PerS,
 }
 
-/// A cell that cannot be simulated.
+/// Why a cell cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SimCellError {
-    /// Invalid parameters of the robot.
+    /// The robot's parameters are not valid.
     #[error("the simulated robot cannot be: {0}")]
     Robot(#[from] ParamError),
     /// The bead cannot be imaged.
@@ -73,7 +71,7 @@ pub struct SimCell<K> {
     run: RunPart,
     cell: Cell,
     runner: Runner<SimPort, K, Option<SimExtruder>>,
-    /// Flow at which the width is that of the bead model, where an extruder is commanded.
+    /// Flow at which the bead model gives the width; `None` if no extruder is commanded.
     nominal_flow: Option<Mm3PerS>,
     camera: SimCamera,
     bead: LaidBead,
@@ -81,11 +79,11 @@ pub struct SimCell<K> {
     layers: u64,
     /// Phase of the pump's pulsation, in periods.
     pulse_phase: f64,
-    /// Widths that have not arrived yet, the oldest first.
+    /// Widths that have not arrived yet, oldest first.
     pending_widths: VecDeque<Arrival>,
-    /// Nozzle's path at the start of the layer \[mm\].
+    /// Path of the nozzle at the start of the layer \[mm\].
     bead_start: f64,
-    /// End of the laid bead, from there.
+    /// End of the laid bead, with its path counted from `bead_start`.
     laid_to: PathSpeed,
     started: bool,
     speed: Option<MmPerS>,
@@ -102,8 +100,7 @@ pub struct LayerEnd {
 }
 
 impl<K: Recorder> SimCell<K> {
-    /// The cell of a file, with the robot idle and connected, and an extruder that is not
-    /// commanded.
+    /// The cell of a file. The robot is idle and connected; the extruder is not commanded.
     pub fn new(
         cell: &Cell,
         run: &RunPart,
@@ -113,8 +110,7 @@ impl<K: Recorder> SimCell<K> {
         Self::with_extruder(cell, run, calibration, recorder, None)
     }
 
-    /// The same with a controller whose assumed distance of the camera is wrong by a
-    /// factor.
+    /// As [`Self::new`], with a controller that assumes the camera's distance wrong by a factor.
     pub fn mismatched(
         cell: &Cell,
         run: &RunPart,
@@ -129,7 +125,7 @@ impl<K: Recorder> SimCell<K> {
         Ok(sim)
     }
 
-    /// The same with an extruder that is commanded.
+    /// As [`Self::new`], with a commanded extruder.
     pub fn with_extruder(
         cell: &Cell,
         run: &RunPart,
@@ -187,18 +183,18 @@ impl<K: Recorder> SimCell<K> {
         LaidBead::new(simulation.bead, simulation.roughness, simulation.flow, seed)
     }
 
-    /// The bead of the present layer, along the path since the layer's start.
+    /// The bead of the current layer, by the path since the layer's start.
     pub fn bead(&self) -> &LaidBead {
         &self.bead
     }
 
-    /// Takes the recorder back at the end.
+    /// Returns the recorder at the end of the simulation.
     pub fn into_recorder(self) -> K {
         self.runner.into_parts().2
     }
 
-    /// Lays one bead from start to end with the nozzle at a height; the observer gets every
-    /// event. Ends early when the robot stops, and when the observer is done.
+    /// Lays one bead with the nozzle at height `z`; the observer gets every event. Ends early if
+    /// the robot stops or the observer is done.
     pub fn layer(&mut self, z: Mm, observer: &mut impl Observer) -> LayerEnd {
         self.bead = Self::fresh_bead(&self.cell, self.layers);
         self.camera.raise(self.cell.rise(Some(z)));
@@ -243,7 +239,7 @@ impl<K: Recorder> SimCell<K> {
         }
     }
 
-    /// Pauses robot and pump for a time.
+    /// Lets time pass with robot and pump at rest.
     pub fn rest(&mut self, lasts: Span, observer: &mut impl Observer) {
         let mut clock = Ticker::new(&self.cell, &self.run, self.now, self.layers);
         let until = self.now + lasts;
@@ -285,7 +281,7 @@ impl<K: Recorder> SimCell<K> {
         observer.flow(now, laying.then_some(side.trace.flow_mm3_per_s), flow);
     }
 
-    /// Lays the bead up to where the nozzle is now.
+    /// Lays the bead up to the nozzle's current position.
     fn lay(&mut self) {
         let state = self.runner.robot_mut().state(self.now);
         let path = state.path_mm.get() - self.bead_start;
@@ -294,7 +290,7 @@ impl<K: Recorder> SimCell<K> {
         let pulse = self.cell.simulation.flow.pulse_at(self.now.secs(), self.pulse_phase);
         self.bead.set_pulse(pulse);
         if path > last.path_mm && matches!(state.mode, RobotMode::Print | RobotMode::Hold) {
-            // A piece that is not laid is a gap.
+            // A piece without a bead is a gap.
             if let Some(speed) = speed {
                 self.bead.lay_ramp(last, PathSpeed { path_mm: path, speed_mm_per_s: speed });
             }
@@ -303,10 +299,11 @@ impl<K: Recorder> SimCell<K> {
         }
     }
 
-    /// The speed for the bead model: the speed at which the nominal flow lays the same width
-    /// as the present flow at the robot's speed. None where nothing flows.
+    /// Speed for the bead model: at this speed the nominal flow lays the same width as the current
+    /// flow at the robot's speed. `None` if nothing flows.
     ///
-    /// Without a commanded extruder the flow follows the speed while the robot starts, so that
+    /// Without a commanded extruder the flow follows the speed while the robot starts: the bead
+    /// begins with the width of the start speed.
     /// the bead begins with the width of the start speed.
     fn equivalent_speed(&mut self, speed: f64) -> Option<f64> {
         let now = self.now;
@@ -324,7 +321,7 @@ impl<K: Recorder> SimCell<K> {
         (fraction > MIN_FLOW_FRACTION).then(|| speed / fraction)
     }
 
-    /// Takes an image, whose width arrives after the latency.
+    /// Takes an image; its width arrives after the latency.
     fn take_frame(&mut self, observer: &mut impl Observer) {
         let state = self.runner.robot_mut().state(self.now);
         let under = state.path_mm.get() - self.bead_start - self.run.camera.offset.get();
@@ -336,7 +333,7 @@ impl<K: Recorder> SimCell<K> {
         self.arrivals(self.now, observer);
     }
 
-    /// Handles the widths that arrive by a time.
+    /// Passes the widths that arrive by `until` to the controller.
     fn arrivals(&mut self, until: Stamp, observer: &mut impl Observer) {
         while self.pending_widths.front().is_some_and(|arrival| arrival.at <= until) {
             let Some(arrival) = self.pending_widths.pop_front() else { return };
@@ -359,8 +356,8 @@ impl<K: Recorder> SimCell<K> {
             }
         };
         let handled = self.handle(&event, observer);
-        // The edges are those of the last image, which is this one unless
-        // another has been taken meanwhile.
+        // The edges are those of the last image: they belong to this width only if no later image
+        // has been taken.
         let newest = self.pending_widths.is_empty();
         observer.frame(&FrameObservation {
             seq: taken.seq,
@@ -377,11 +374,11 @@ impl<K: Recorder> SimCell<K> {
     }
 }
 
-/// A width on its way to the controller.
+/// A width that has not yet arrived at the controller.
 struct Arrival {
     at: Stamp,
     captured_at: Stamp,
-    /// Where along the bead the middle of the gauge was \[mm\].
+    /// Position of the middle of the gauge along the bead \[mm\].
     position_mm: f64,
     taken: CapturedFrame,
 }

@@ -3,32 +3,30 @@
 use super::outline::OutlineSample;
 use crate::numeric::number::{to_count, to_f64};
 
-/// An edge, row by row of a vertical bead; all in pixels.
+/// An edge, sampled at each pixel along the gauge's axis; all in pixels.
 #[derive(Debug, Clone)]
 pub struct Contour {
-    /// Position along the axis of the first crossing.
+    /// Position along the axis of the first sample.
     first: f64,
     cross: Vec<f64>,
-    /// Growth of the crossing along the axis, and the length of the edge, both
-    /// for one pixel along the axis.
+    /// Slope of the position across the axis, and length of the edge, per pixel along the axis.
     slope: Vec<f64>,
     long: Vec<f64>,
 }
 
-/// The edge's tangent where a point is nearest to it.
+/// The edge's tangent at the point of the edge that is nearest to a given point.
 #[derive(Debug, Clone, Copy)]
 pub struct Tangent {
-    /// How far the point lies beyond the tangent, on the side of growing position
-    /// across the axis \[px\].
+    /// Distance of the given point from the tangent \[px\], positive towards growing positions
+    /// across the axis.
     pub beyond: f64,
-    /// Unit normal to that side: across the axis, along it.
+    /// Unit normal towards that side: component across the axis, component along it.
     pub normal: [f64; 2],
 }
 
 impl Contour {
-    /// Where the polyline through the samples crosses each whole position along
-    /// the axis, from `margin` before the image to `margin` after it; NaN
-    /// where it does not.
+    /// Positions across the axis of the polyline through the samples, at each whole position along
+    /// the axis, from `margin` before the image to `margin` after it; NaN if it does not cross.
     pub fn new(samples: &[OutlineSample], side: usize, run: usize, margin: usize) -> Self {
         let first = -to_f64(margin);
         let mut cross = vec![f64::NAN; run + 2 * margin];
@@ -57,13 +55,14 @@ impl Contour {
         clamp_index(at - self.first + 0.5, self.cross.len() - 1)
     }
 
-    /// Position across the axis at a position along it; NaN where it is not seen.
+    /// Position across the axis at a position along it; NaN if the edge is not seen there.
     pub fn crossing(&self, at: f64) -> f64 {
         let near = self.index(at);
         self.cross[near] + self.slope[near] * (at - self.first - to_f64(near))
     }
 
-    /// First and last position across the axis within a distance of the edge.
+    /// First and last position across the axis within a distance of the edge; `None` if the edge
+    /// is not seen there.
     pub fn span(&self, at: f64, distance: f64) -> Option<(f64, f64)> {
         let near = self.index(at);
         let reach = distance * self.long[near];
@@ -72,8 +71,7 @@ impl Contour {
         (from.is_finite() && to.is_finite()).then_some((from, to))
     }
 
-    /// The tangent at the edge's nearest point, for a point along and across
-    /// the axis.
+    /// The tangent at the edge's point nearest to a point along and across the axis.
     pub fn tangent(&self, at: f64, position: f64) -> Tangent {
         let here = self.index(at);
         let slope = self.slope[here];
@@ -91,7 +89,7 @@ impl Contour {
     }
 }
 
-/// The whole number at or below a position, from 0 to `count`.
+/// The whole number at or below a position, limited to 0..=`count`.
 pub fn clamp_index(position: f64, count: usize) -> usize {
     to_count(position).min(count)
 }

@@ -1,14 +1,14 @@
-//! Gaussian blur of what is known by pixels.
+//! Gaussian blur of pixel values.
 
 use crate::numeric::number::narrow_to_f32;
-/// Weights of a Gaussian at whole distances from 0, as far as they matter; of
-/// all positions on both sides they add up to 1.
+/// Weights of a Gaussian at the distances 0, 1, 2, … px, down to negligible ones; summed over both
+/// sides they are 1.
 pub fn kernel(blur_px: f64) -> Vec<f32> {
     let mut weights = vec![1.0];
     let mut sum = 1.0;
     for distance in 1..200 {
         let z = f64::from(distance) / blur_px;
-        // Of a blur of 0 the quotient is infinite, and this the end.
+        // For a blur of 0 the quotient is infinite: only the centre's weight is left.
         if z > 4.5 {
             break;
         }
@@ -19,8 +19,7 @@ pub fn kernel(blur_px: f64) -> Vec<f32> {
     weights.into_iter().map(|weight| narrow_to_f32(weight / sum)).collect()
 }
 
-/// Convolves lines of `width` pixels along both directions; what lies outside
-/// is 0.
+/// Convolves lines of `width` pixels in both directions; outside the values are 0.
 pub fn convolve(values: &mut [f32], width: usize, kernel: &[f32]) {
     let mut across = vec![0.0; values.len()];
     for (line, sum) in values.chunks_exact(width).zip(across.chunks_exact_mut(width)) {
@@ -34,7 +33,7 @@ pub fn convolve(values: &mut [f32], width: usize, kernel: &[f32]) {
     add_lines(&across, values, width, kernel);
 }
 
-/// Convolves along the direction from line to line only.
+/// Convolves only from line to line.
 pub fn convolve_lines(values: &mut [f32], width: usize, kernel: &[f32]) {
     let before = values.to_vec();
     add_lines(&before, values, width, kernel);

@@ -1,5 +1,5 @@
-//! What the pixels see before light, texture and noise: fractions of bead, and
-//! the grey that disturbances add.
+//! Bead and disturbances on the pixels before light, texture and noise: fractions of bead, and
+//! added grey levels.
 
 use super::discs::{self, Backdrop, DiscLayer, Mask};
 use super::motion::ShutterPosition;
@@ -9,27 +9,26 @@ use super::view::GaugeExtent;
 use crate::numeric::number::narrow_to_f32;
 use crate::scenario::image::ImageModel;
 
-/// Pixels line after line across the bead, until they are turned.
+/// Coverage of the pixels by bead, line by line across the bead.
 #[derive(Debug, Clone)]
 pub struct BeadCoverage {
-    /// Fraction of bead.
+    /// Fraction of each pixel that is bead.
     pub fractions: Vec<f32>,
-    /// Grey levels that are added to bead and ground.
+    /// Grey levels that disturbances add.
     pub added_grey: Option<Vec<f32>>,
 }
 
-/// What lies on bead and ground; `None` where there is nothing of the kind.
+/// Objects on bead and ground; `None` if the image has none of the kind.
 #[derive(Debug)]
 pub struct Masks {
-    /// Specular spots, on bead alone.
+    /// Specular spots, only on the bead.
     pub spots: Option<Mask>,
-    /// Grains, on top of them.
+    /// Grains, on top of the spots.
     pub grains: Option<Mask>,
 }
 
 impl BeadCoverage {
-    /// The bead and what follows its edges, as the mean over the positions where
-    /// the image is while the shutter is open.
+    /// The bead and the tint at its edges: the mean over the image's positions during exposure.
     pub fn of(shape: &BeadShape, tint: Option<&Tint>, positions: &[ShutterPosition]) -> Self {
         let GaugeExtent { run, cross } = shape.extent;
         let mut fractions = vec![0.0; run * cross];
@@ -54,8 +53,8 @@ impl BeadCoverage {
         Self { fractions, added_grey: added }
     }
 
-    /// Covers bead and ground with spots and grains. `light` is that of a
-    /// pixel along and across the axis.
+    /// Covers bead and ground with spots and grains. `light` gives the light of a pixel by its
+    /// position along and across the axis.
     pub fn cover(
         &mut self,
         shape: &BeadShape,
@@ -74,7 +73,7 @@ impl BeadCoverage {
             if let Some(grains) = &grains {
                 mask.subtract(grains);
             }
-            // Saturated in any light.
+            // Saturated at any light.
             let grey = |run, cross| image.bead_grey.max(255.0 / light(run, cross));
             scene.paint(&DiscLayer { mask: &mask, grey: &grey, bead_only: true }, &mut change);
         }
@@ -89,7 +88,7 @@ impl BeadCoverage {
         self.added_grey = Some(added);
     }
 
-    /// Lines of `cross` pixels become columns.
+    /// Transposes: lines of `cross` pixels become columns.
     pub fn turned(self, cross: usize) -> Self {
         let turn = |values: Vec<f32>| -> Vec<f32> {
             (0..cross).flat_map(|at| values.iter().skip(at).step_by(cross)).copied().collect()

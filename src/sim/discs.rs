@@ -1,4 +1,4 @@
-//! Discs that hide what is below them, on a grid of 4 × 4 points a pixel.
+//! Discs that occlude bead and ground, on a grid of 4 × 4 points per pixel.
 
 use super::contour::clamp_index;
 use super::convolve::{convolve, kernel};
@@ -21,47 +21,46 @@ pub struct Disc {
     pub radius: f64,
 }
 
-/// The points that any disc covers; a bit each, line after line of pixels.
+/// The points that discs cover, one bit each, line by line of pixels.
 #[derive(Debug, Clone)]
 pub struct Mask {
     extent: GaugeExtent,
     bits: Vec<u16>,
 }
 
-/// What the discs hide, and how bright they are.
+/// What the discs occlude, and its brightness.
 #[derive(Debug)]
 pub struct Backdrop<'a> {
     /// The bead.
     pub shape: &'a BeadShape,
-    /// Grey of ground and bead, of 256.
+    /// Grey levels of ground and bead.
     pub grey: [f64; 2],
-    /// What shading adds to it, line after line.
+    /// Grey levels that the tint adds, line by line.
     pub tint: &'a [f32],
 }
 
-/// The discs of one grey level for each pixel, and whether only bead can have
-/// them.
+/// The discs of one kind.
 pub struct DiscLayer<'a> {
-    /// Where.
+    /// Points that they cover.
     pub mask: &'a Mask,
-    /// Grey of a disc in a pixel along and across the axis.
+    /// Grey level of a disc at a pixel along and across the axis.
     pub grey: &'a dyn Fn(usize, usize) -> f64,
-    /// Discs end where the bead ends.
+    /// Whether discs end at the bead's edges.
     pub bead_only: bool,
 }
 
-/// Where along a pixel a point lies, from the pixel's centre \[px\].
+/// Position of a grid point from the pixel's centre \[px\].
 fn point(number: usize) -> f64 {
     (to_f64(number) + 0.5) / to_f64(POINTS_PER_SIDE) - 0.5
 }
 
 impl Mask {
-    /// Without a disc.
+    /// A mask without discs.
     pub fn new(extent: GaugeExtent) -> Self {
         Self { extent, bits: vec![0; extent.run * extent.cross] }
     }
 
-    /// Covers a disc.
+    /// Covers the points of a disc.
     pub fn add_disc(&mut self, disc: Disc) {
         let Disc { run, cross, radius } = disc;
         let range = |middle: f64, count: usize| {
@@ -79,7 +78,7 @@ impl Mask {
         }
     }
 
-    /// Uncovers what the other mask covers.
+    /// Removes the points of the other mask.
     pub fn subtract(&mut self, other: &Self) {
         for (bits, taken) in self.bits.iter_mut().zip(&other.bits) {
             *bits &= !taken;
@@ -95,7 +94,7 @@ impl Mask {
 }
 
 impl Backdrop<'_> {
-    /// Adds what a layer changes, before the blur, averaged over each pixel.
+    /// Adds the change of grey level by a layer, before the blur, averaged over each pixel.
     pub fn paint(&self, layer: &DiscLayer<'_>, change: &mut [f32]) {
         let cross = self.shape.extent.cross;
         for (at, line) in layer.mask.bits.chunks_exact(cross).enumerate() {
@@ -109,7 +108,7 @@ impl Backdrop<'_> {
         }
     }
 
-    /// Fraction of the pixel's covered points on ground and on bead.
+    /// Fractions of the pixel's covered points on ground and on bead.
     fn split(&self, bits: u16, at: usize, number: usize) -> [f64; 2] {
         let (mut outside, mut inside) = (0_u32, 0_u32);
         let corners = [(-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)];
@@ -129,8 +128,8 @@ impl Backdrop<'_> {
     }
 }
 
-/// Blurs what has changed as the lens does, and moves it like the rest of the
-/// image.
+/// Blurs the changes as the lens does, and averages them over the image's positions during
+/// exposure.
 pub fn blur(
     mut change: Vec<f32>,
     width: usize,
@@ -161,7 +160,7 @@ pub fn blur(
     mean
 }
 
-/// Adds the values at `by` lines down and pixels to the right of each pixel.
+/// Adds values shifted by `by`: lines down and pixels to the right.
 fn add_shifted(sum: &mut [f32], values: &[f32], width: usize, by: [isize; 2], weight: f32) {
     let height = values.len() / width;
     let (skip, drop) =
@@ -205,7 +204,7 @@ mod tests {
             (0..600).map(|i| f64::from(moved[i]) * of(to_f64(i / 30), to_f64(i % 30))).sum::<f64>()
         };
         assert!((moment(&|_, _| 1.0) - 6.0).abs() < 1e-5);
-        // What a pixel sees through the shifted camera lies the other way.
+        // A shift of the image by one pixel moves its content the other way.
         assert!((moment(&|v, _| v) / 6.0 - (10.0 - 1.75)).abs() < 1e-5);
         assert!((moment(&|_, u| u) / 6.0 - (15.0 + 2.5)).abs() < 1e-5);
     }

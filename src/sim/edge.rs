@@ -1,33 +1,31 @@
 //! The fraction of a pixel's light that comes from one side of a blurred straight
 //! edge, in closed form.
 //!
-//! A step that is blurred with a Gaussian of standard deviation s is Φ(d/s) at
-//! the distance d. Its mean over the pixel's unit square, with the edge's
-//! normal (a, b)·s, is a mixed second difference of the second antiderivative
-//! G of Φ, divided by a·b. Where a or b is small the difference cancels, and a
-//! series in that one goes before it.
+//! A step that is blurred by a Gaussian with standard deviation s has the value Φ(d/s) at the
+//! distance d. Its mean over the pixel's unit square, with the edge's normal (a, b)·s, is a mixed
+//! second difference of the second antiderivative G of Φ, divided by a·b. If a or b is small, the
+//! difference cancels, and a series in that variable is used instead.
 
 use crate::numeric::normal_distribution::{cumulative, density, first_integral, second_integral};
 
 /// Blur below which an edge counts as sharp \[px\]: it moves less than a millionth of a pixel's
 /// light.
 const SHARP_PX: f64 = 1e-6;
-/// Distance beyond which a Gaussian has ended, in standard deviations. Derived: Φ(−9) = 10⁻¹⁹,
-/// below the resolution of a double.
+/// Distance beyond which a Gaussian is zero, in standard deviations. Derived: Φ(−9) = 10⁻¹⁹, below
+/// the resolution of a double.
 const GAUSSIAN_END_SIGMAS: f64 = 9.0;
 /// Extent of the pixel along one direction, in units of blur, below which the fourth-order
 /// series is used. Derived: its next term is of the order b⁶/7!/2⁶ and 3·10⁻¹² at 0.1.
 const SERIES_BELOW_BLURS: f64 = 0.1;
 
-/// Fraction of a unit pixel that an edge leaves on the inner side, 0 to 1.
-/// `inside_px` is how far the pixel's centre lies on the inner side of the
-/// edge \[px\], `normal` the unit normal of the edge, `blur_px` the standard
-/// deviation of the blur \[px\].
+/// Fraction of a unit pixel on the inner side of an edge, 0 to 1. `inside_px` is the distance of
+/// the pixel's centre from the edge, positive on the inner side \[px\], `normal` the unit normal
+/// of the edge, `blur_px` the standard deviation of the blur \[px\].
 pub fn coverage(inside_px: f64, normal: [f64; 2], blur_px: f64) -> f64 {
     let (x, y) = (normal[0].abs(), normal[1].abs());
     let (long, short) = if x >= y { (x, y) } else { (y, x) };
-    // What lies inside one edge is what lies outside the opposite one; on the
-    // outer side all terms are small, and cancel less.
+    // The fraction inside an edge is one minus the fraction inside the opposite edge. On the outer
+    // side all terms are small and cancel less.
     let outer = |inside: f64| {
         if blur_px < SHARP_PX {
             sharp(inside, long, short)
@@ -75,7 +73,7 @@ fn blurred(d: f64, a: f64, b: f64) -> f64 {
     (near - far) / (a * b)
 }
 
-/// The same for small b: exact in a, a series in b.
+/// The mean of [`blurred`] for small b: exact in a, a series in b.
 fn one_way(d: f64, a: f64, b: f64) -> f64 {
     let (upper, lower) = (d + 0.5 * a, d - 0.5 * a);
     let (at_upper, at_lower) = (density(upper), density(lower));
@@ -154,7 +152,7 @@ mod tests {
         ) {
             let blur = 10_f64.powf(log_blur);
             let sharp = coverage(inside, direction(angle), 0.0);
-            // A blur moves the light of a strip of its own size.
+            // A blur changes the light only in a strip of its own size.
             prop_assert!((coverage(inside, direction(angle), blur) - sharp).abs() < 0.5 * blur + 1e-9);
         }
 
@@ -162,8 +160,8 @@ mod tests {
         fn a_row_of_pixels_holds_the_length_of_the_bead_in_it(
             left in -0.5..0.5_f64, width in 1.0..20.0_f64, slope in -0.4..0.4_f64, log_blur in -8.0..0.5_f64,
         ) {
-            // Along a row the covered fractions of an infinite bead add up to its
-            // length along the row, whatever the blur.
+            // Along a row the covered fractions of an infinite bead sum to its length along the
+            // row, for any blur.
             let blur = 10_f64.powf(log_blur);
             let long = f64::hypot(1.0, slope);
             let normal = [1.0 / long, -slope / long];

@@ -22,15 +22,15 @@ pub use pressed::Pressed;
 /// Delays of pump and valve.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Delays {
-    /// From the order to run until material moves.
+    /// From the run command until material moves.
     pub start: Span,
-    /// From the order to stop until nothing moves.
+    /// From the stop command until nothing moves.
     pub stop: Span,
-    /// From the order to open or shut the valve until it has done so.
+    /// From the command to the valve until it is open or shut.
     pub valve: Span,
 }
 
-/// A two-way device with a delay.
+/// A two-state device with a delay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Switch {
     on: bool,
@@ -68,14 +68,14 @@ pub struct SimExtruder {
 }
 
 impl SimExtruder {
-    /// At rest.
+    /// An extruder at rest.
     pub fn new(plant: Box<dyn SimPlant>, delays: Delays) -> Self {
         let (pump, valve) = (Switch::new(), Switch::new());
         Self { plant, delays, pump, valve, value: 0.0, now: Stamp::START }
     }
 
-    /// That of a cell, with the seed of its random numbers and the usual flow of its bead.
-    /// Fails where a transfer function cannot be discretised with [`STEP`].
+    /// The extruder of a cell, with a seed for its noise and the bead's nominal flow. Fails if a
+    /// transfer function cannot be discretised with [`STEP`].
     pub fn of(plant: &ExtruderPlant, seed: u64, usual: Mm3PerS) -> Result<Self, ModelError> {
         let delays =
             Delays { start: plant.start_delay, stop: plant.stop_delay, valve: plant.valve_delay };
@@ -98,7 +98,7 @@ impl SimExtruder {
         }
     }
 
-    /// Flow through the nozzle at the time it was advanced to.
+    /// Flow through the nozzle at the time of the last [`Self::advance`].
     pub fn flow(&self) -> Mm3PerS {
         if self.valve.on { self.plant.flow() } else { Mm3PerS::ZERO }
     }
@@ -114,7 +114,7 @@ impl SimExtruder {
         (pump, self.valve.on)
     }
 
-    /// Its report.
+    /// The report of the extruder.
     pub fn report(&mut self) -> ExtruderReport {
         let (pump, valve_open) = self.state();
         let mut report = ExtruderReport {
@@ -136,11 +136,11 @@ impl ExtruderPort for SimExtruder {
         let pump_delay = if command.pump_on { self.delays.start } else { self.delays.stop };
         self.pump.set(now, command.pump_on, pump_delay);
         self.valve.set(now, command.valve_open, self.delays.valve);
-        // A pump that stops runs down from its last command.
+        // A stopping pump keeps its last command until its stop delay is over.
         if command.pump_on {
             self.value = command.value;
         }
-        // Devices without delay act at once.
+        // Devices without a delay act immediately.
         self.pump.advance(now);
         self.valve.advance(now);
         Ok(Sent { at: now })

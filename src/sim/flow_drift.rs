@@ -9,8 +9,8 @@ const NODE_MM: f64 = 5.0;
 /// Random stream of the walk. Derived: the bytes of "wander".
 const DRIFT_STREAM: u64 = 0x0077_616e_6465_7200;
 
-/// The walk of one bead, a function of seed and position. Nodes are computed when needed and
-/// kept.
+/// The random walk of one bead, a function of seed and position. Nodes are computed when needed
+/// and cached.
 #[derive(Debug, Clone)]
 pub struct FlowDrift {
     /// Standard deviation of a step from node to node.
@@ -20,12 +20,12 @@ pub struct FlowDrift {
 }
 
 impl FlowDrift {
-    /// A walk with this standard deviation over a metre, relative to the width.
+    /// A walk whose standard deviation over a metre is `per_root_m`, relative to the width.
     pub fn new(per_root_m: f64, seed: u64) -> Self {
         Self { step: per_root_m * (NODE_MM / 1000.0).sqrt(), seed, nodes: vec![0.0] }
     }
 
-    /// The width at a position over that without the walk; 1 before the start.
+    /// Ratio of the width at a position to the width without the walk; 1 before the start.
     pub fn at(&mut self, path_mm: f64) -> f64 {
         if self.step <= 0.0 || path_mm <= 0.0 {
             return 1.0;
@@ -52,7 +52,7 @@ mod tests {
         let far: Vec<f64> =
             (0..400).map(|seed| FlowDrift::new(0.01, seed).at(4000.0).ln()).collect();
         let size = (far.iter().map(|x| x * x).sum::<f64>() / 400.0).sqrt();
-        // A standard deviation of 400 numbers is known to 3.5 %.
+        // The relative standard error of a standard deviation from 400 numbers is 3.5 %.
         assert!((size / 0.02 - 1.0).abs() < 0.14, "{size}");
         let mut walk = FlowDrift::new(0.01, 3);
         let first = walk.at(300.0);

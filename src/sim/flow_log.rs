@@ -1,5 +1,4 @@
-//! A log of an extruder whose truth is known, to try `extruder identify` with nothing
-//! attached.
+//! A log of an extruder whose model is known, to try `extruder identify` without a machine.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -18,25 +17,25 @@ const MIDDLE_MM3_PER_S: f64 = 540.0;
 /// rpm·19.05.
 const NOISE_MM3_PER_S: f64 = 12.0;
 
-/// What a log was made of that cannot be.
+/// Why a log cannot be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FlowLogError {
-    /// The excitation.
+    /// The excitation is not valid.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),
-    /// The model.
+    /// The model is not valid.
     #[error(transparent)]
     Model(#[from] ModelError),
 }
 
-/// What was logged.
+/// A log: samples of command and flow.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlowLog {
-    /// Moments \[s\].
+    /// Sample times \[s\].
     pub time_s: Vec<f64>,
-    /// Speed of the screw that was commanded \[rpm\].
+    /// Commanded speed of the screw \[rpm\].
     pub screw_rpm: Vec<f64>,
-    /// Flow that was measured \[mm³/s\].
+    /// Measured flow \[mm³/s\].
     pub flow_mm3_per_s: Vec<f64>,
 }
 
@@ -60,7 +59,7 @@ pub fn binary() -> Result<FlowLog, FlowLogError> {
     record(&Excitation { shape, hold_s: 0.7, duration_s: None }, 1)
 }
 
-/// A log to validate with: levels drawn at random for 60 s.
+/// A log for validation: random levels for 60 s.
 pub fn gaussian() -> Result<FlowLog, FlowLogError> {
     let shape = Waveform::Gaussian { mean: MIDDLE_RPM, sigma: 4.0, low: 20.0, high: 40.0, seed: 2 };
     record(&Excitation { shape, hold_s: 1.5, duration_s: Some(60.0) }, 3)
@@ -88,7 +87,7 @@ fn record(excitation: &Excitation, seed: u64) -> Result<FlowLog, FlowLogError> {
 }
 
 impl FlowLog {
-    /// As the text of a file.
+    /// The log as CSV text.
     pub fn to_csv(&self) -> String {
         let rows = self.time_s.iter().zip(&self.screw_rpm).zip(&self.flow_mm3_per_s);
         let rows = rows.map(|((t, rpm), flow)| format!("{t:.2},{rpm:.3},{flow:.2}\n"));

@@ -6,11 +6,11 @@ use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::core::{Mm, Stamp};
 
-/// Frames per second where a cell gives no rate: that of Shojaei Barjuei et al. 2022.
+/// Frame rate of a cell that gives none \[Hz\]: that of Shojaei Barjuei et al. 2022.
 const DEFAULT_RATE_HZ: f64 = 10.0;
 
-/// A bead that reaches beyond both ends of what is imaged, and where along
-/// it the images are taken.
+/// A bead that extends beyond both ends of the images, and the positions along it at which images
+/// are taken.
 #[derive(Debug, Clone)]
 pub struct FrameSeries {
     renderer: Renderer,
@@ -21,9 +21,9 @@ pub struct FrameSeries {
 }
 
 impl FrameSeries {
-    /// The images of a cell: the bead is laid at the robot's start speed, or
-    /// at the bead model's reference speed where the cell has no robot; the
-    /// middle of the gauge goes from 0 to the length of the simulated path.
+    /// The images of a cell. The bead is laid at the robot's start speed, or at the bead model's
+    /// reference speed if the cell has no robot. The middle of the gauge moves from 0 to the
+    /// length of the simulated path.
     pub fn new(cell: &Cell, calibration: Calibration) -> Result<Self, RenderError> {
         let simulation = &cell.simulation;
         let seed = simulation.seed;
@@ -48,7 +48,7 @@ impl FrameSeries {
         Ok(Self { renderer, bead, speed_mm_per_s, spacing_mm, frames })
     }
 
-    /// How many images there are.
+    /// Number of images.
     pub fn frames(&self) -> u64 {
         self.frames
     }
@@ -63,12 +63,12 @@ impl FrameSeries {
         self.speed_mm_per_s
     }
 
-    /// When an image is taken \[s\], from the first.
+    /// Time of an image since the first one \[s\].
     pub fn time_s(&self, frame: u64) -> f64 {
         self.path_mm(frame) / self.speed_mm_per_s
     }
 
-    /// Takes an image.
+    /// Renders an image.
     pub fn render(&self, frame: u64) -> Result<Rendered, RenderError> {
         let path_mm = self.path_mm(frame);
         let stamp = Stamp::from_secs(self.time_s(frame));

@@ -10,8 +10,8 @@ use super::shade::BeadShape;
 use crate::numeric::number::to_f64;
 use crate::scenario::image::Grains;
 
-/// Discs whose centres lie within a radius of an edge, at random positions, until
-/// they cover each edge on the given fraction of the rows.
+/// Discs whose centres lie within one radius of an edge, at random positions, until they cover
+/// each edge on the given fraction of the rows.
 pub fn grains(grains: &Grains, shape: &BeadShape, key: u64) -> Option<Mask> {
     if grains.rows_fraction <= 0.0 || grains.size_px <= 0.0 {
         return None;
@@ -38,7 +38,7 @@ fn along(
     let mut uniform = || -> f64 { StandardUniform.sample(random) };
     let mut covered = vec![false; rows];
     let (mut discs, mut count) = (Vec::new(), 0.0);
-    // A row that no grain can cover must not be tried endlessly.
+    // The number of trials is limited: a row that no grain can cover would be tried forever.
     for _ in 0..100 * rows {
         if count >= wanted {
             break;
@@ -50,7 +50,7 @@ fn along(
         let near = clamp_index(run - radius, rows)..clamp_index(run + radius + 1.0, rows);
         let new: Vec<usize> = near.filter(under).filter(|at| !covered[*at]).collect();
         let more = to_f64(new.len());
-        // The last one may cover too much; in the mean it does not.
+        // The last grain may cover too much. It is added at random so that the mean is right.
         if count + more > wanted && uniform() * more > wanted - count {
             break;
         }

@@ -3,8 +3,8 @@
 
 use std::f64::consts::TAU;
 
-/// Mixes a row of words to one, so that rows that differ in one bit share
-/// nothing (the finalizer of `SplitMix64`, Steele et al. 2014, after each word).
+/// Mixes words to one hash; rows that differ in one bit give unrelated hashes (the finalizer of
+/// `SplitMix64`, Steele et al. 2014, after each word).
 pub fn mix(words: &[u64]) -> u64 {
     words.iter().fold(0x9e37_79b9_7f4a_7c15, |state, word| finish(state ^ finish(*word)))
 }
@@ -23,12 +23,12 @@ pub fn normal_pair(key: u64) -> [f64; 2] {
     [radius * cos, radius * sin]
 }
 
-/// A uniform number of a key, within 0..1, neither end included.
+/// A uniform random number between 0 and 1 for a key; neither end is included.
 pub fn unit(key: u64) -> f64 {
     open_unit(finish(key))
 }
 
-/// Uniform within 0..1, neither end included.
+/// A uniform number between 0 and 1 from a word; neither end is included.
 #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
 fn open_unit(word: u64) -> f64 {
     ((word >> 11) as f64 + 0.5) * (1.0 / (1_u64 << 53) as f64)

@@ -1,4 +1,4 @@
-//! The bead as it has been laid: where its edges lie, along the path.
+//! The bead as it was laid: positions of its edges along the path.
 
 use super::flow_drift::FlowDrift;
 use super::waviness::Waviness;
@@ -12,27 +12,26 @@ const MAX_STEP_MM: f64 = 0.5;
 /// Grid points within one correlation length of the roughness. Derived: half-way between two
 /// points the variance is (1 + e^(−1/100))/2 = 0.995 of that at a point.
 const POINTS_PER_LENGTH: f64 = 10.0;
-/// Largest gap between pieces of one bead \[mm\]: beyond rounding of a path, below any real
-/// gap.
+/// Largest gap within one bead \[mm\]: above rounding errors of a path, below any real gap.
 const JOINT_TOLERANCE_MM: f64 = 1e-6;
 
-/// A bead along its path. Its width is that of the model at the speed at which
-/// a position was laid, times the flow's ratio there, plus roughness. The edges
-/// are straight between the points of a grid, so that means along the path are
-/// exact. The same pieces give the same bead, independent of reads in between.
+/// A bead along its path. Its width is the model's width at the speed at which a position was
+/// laid, times the flow ratio there, plus roughness. The edges are straight between the nodes of a
+/// grid, so that means along the path are exact. The same pieces give the same bead, whatever is
+/// read in between.
 #[derive(Debug, Clone)]
 pub struct LaidBead {
     model: BeadModel,
     flow: Flow,
     waviness: Waviness,
     drift: FlowDrift,
-    /// What the pump does over time.
+    /// Current ratio of the pump's flow to its mean flow.
     pulse: f64,
     step_mm: f64,
     strips: Vec<Strip>,
 }
 
-/// Where the nozzle is and how fast it goes.
+/// Position and speed of the nozzle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathSpeed {
     /// Distance along the path \[mm\].
@@ -41,7 +40,7 @@ pub struct PathSpeed {
     pub speed_mm_per_s: f64,
 }
 
-/// A segment without a gap.
+/// A piece of bead without a gap.
 #[derive(Debug, Clone)]
 struct Strip {
     start_mm: f64,
@@ -66,7 +65,7 @@ impl Node {
 }
 
 impl LaidBead {
-    /// A bead of which nothing has been laid.
+    /// A bead of which nothing has been laid yet.
     pub fn new(model: BeadModel, roughness: EdgeRoughness, flow: Flow, seed: u64) -> Self {
         let step_mm = if roughness.sigma_mm > 0.0 {
             MAX_STEP_MM.min(roughness.length_mm.max(0.01) / POINTS_PER_LENGTH)
@@ -78,9 +77,9 @@ impl LaidBead {
         Self { model, flow, waviness, drift, pulse: 1.0, step_mm, strips: Vec::new() }
     }
 
-    /// Lays a piece at one speed. Pieces come in the order of the path: what
-    /// was laid before stays as it is, a piece that does not follow the last
-    /// one leaves a gap, and a path that stands still adds nothing.
+    /// Lays a piece at one speed. Pieces come in the order of the path and do not change earlier
+    /// ones. A piece that does not continue the last one leaves a gap; a path that stands still
+    /// adds nothing.
     pub fn lay(&mut self, from_mm: f64, to_mm: f64, speed_mm_per_s: f64) {
         let sound = from_mm.is_finite() && to_mm.is_finite() && speed_mm_per_s.is_finite();
         let from_mm = self.end_mm().map_or(from_mm, |end| from_mm.max(end));
@@ -107,13 +106,12 @@ impl LaidBead {
         }
     }
 
-    /// What the pump does over time to what is laid from now on, relative to
-    /// the flow.
+    /// Sets the ratio of the pump's flow to its mean flow, for all bead that is laid from now on.
     pub fn set_pulse(&mut self, ratio: f64) {
         self.pulse = ratio;
     }
 
-    /// Lays a piece over which the speed goes evenly from one to another.
+    /// Lays a piece over which the speed changes linearly.
     pub fn lay_ramp(&mut self, from: PathSpeed, to: PathSpeed) {
         let (from_mm, to_mm) = (from.path_mm, to.path_mm);
         let (first, last) = (from.speed_mm_per_s, to.speed_mm_per_s);
@@ -127,7 +125,7 @@ impl LaidBead {
         }
     }
 
-    /// How far it has been laid \[mm\]; `None` before the first piece.
+    /// Path up to which it has been laid \[mm\]; `None` before the first piece.
     pub fn end_mm(&self) -> Option<f64> {
         self.strips.last().map(|strip| strip.end_mm)
     }
@@ -146,8 +144,7 @@ impl LaidBead {
         Some((between(node.left_mm, next.left_mm), between(node.right_mm, next.right_mm)))
     }
 
-    /// Mean width over a segment \[mm\], exactly; `None` unless all of it has
-    /// been laid.
+    /// Exact mean width over a segment \[mm\]; `None` unless all of it has been laid.
     pub fn mean_width(&self, from_mm: f64, to_mm: f64) -> Option<f64> {
         let strip = self.strip_at(from_mm)?;
         if to_mm - from_mm < 1e-6 {
@@ -175,7 +172,7 @@ impl Strip {
         self.first + i64::try_from(self.nodes.len()).unwrap_or(i64::MAX - self.first.max(0))
     }
 
-    /// Takes back a node beyond the end, which stood for bead that is laid only now.
+    /// Removes a node beyond the end: the bead there is laid only now.
     fn take_back(&mut self, step_mm: f64) {
         #[expect(clippy::cast_precision_loss, reason = "node numbers stay below 2^53")]
         let last_mm = (self.next_number() - 1) as f64 * step_mm;
@@ -184,7 +181,7 @@ impl Strip {
         }
     }
 
-    /// Adds a node; a bead is never narrower than nothing.
+    /// Adds a node; the width is never negative.
     fn push(&mut self, left_mm: f64, right_mm: f64, step_mm: f64) {
         let right_mm = right_mm.max(left_mm);
         let area_mm2 = self.nodes.last().map_or(0.0, |before| {
@@ -193,7 +190,7 @@ impl Strip {
         self.nodes.push(Node { left_mm, right_mm, area_mm2 });
     }
 
-    /// The nodes on either side of a position, and the fraction of the way between.
+    /// The nodes before and after a position, and the fraction of the way between them.
     fn cell(&self, path_mm: f64, step_mm: f64) -> Option<(&Node, &Node, f64)> {
         #[expect(clippy::cast_precision_loss, reason = "node numbers stay below 2^53")]
         let position = path_mm / step_mm - self.first as f64;
@@ -226,7 +223,8 @@ mod tests {
                 at += piece_mm;
             }
             for position in [10.3, 47.77, 80.0] {
-                // 0.4 mm/s a millimetre: the position at which that width belongs.
+                // The speed changes by 0.4 mm/s per millimetre: the position at which that width
+                // belongs.
                 let width = bead.width_at(position).unwrap();
                 let slope = model.width_at(speed(position + 1.0)) - model.width_at(speed(position));
                 let off_mm = (width - model.width_at(speed(position))) / slope;

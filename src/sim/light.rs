@@ -1,18 +1,18 @@
-//! Light that grows evenly across the image.
+//! Light that changes linearly across the image.
 
 use crate::numeric::number::to_f64;
 use crate::scenario::image::ImageModel;
 
-/// Light of every pixel; 1 in the middle of the image.
+/// Relative light of every pixel; 1 in the middle of the image.
 #[derive(Debug, Clone, Copy)]
 pub struct Light {
     first: f64,
-    /// Growth from one pixel to the next, to the right and downwards.
+    /// Change per pixel, to the right and downwards.
     growth: [f64; 2],
 }
 
 impl Light {
-    /// For an image of so many columns and rows.
+    /// For an image with this number of columns and rows.
     pub fn new(image: &ImageModel, columns: usize, rows: usize) -> Self {
         let ratio = image.light_ratio.max(1.0);
         let amplitude = (ratio - 1.0) / (ratio + 1.0);
@@ -21,7 +21,7 @@ impl Light {
             None => spans.map(|span| amplitude / span.max(1.0)),
             Some(direction) => {
                 let (sin, cos) = libm::sincos(direction.to_radians());
-                // From one end of the image to the other in this direction.
+                // Extent of the image in the direction of the light \[px\].
                 let span = (cos * spans[0]).abs() + (sin * spans[1]).abs();
                 [cos, sin].map(|part| 2.0 * amplitude * part / span.max(1.0))
             }
@@ -31,13 +31,13 @@ impl Light {
         Self { first, growth }
     }
 
-    /// At a pixel.
+    /// Light at a pixel.
     pub fn at(&self, column: usize, row: usize) -> f64 {
         let (first, growth) = self.row(row);
         first + growth * to_f64(column)
     }
 
-    /// At the first pixel of a row, and its growth along the row.
+    /// Light at the first pixel of a row, and its change per pixel along the row.
     pub fn row(&self, row: usize) -> (f64, f64) {
         (self.first + self.growth[1] * to_f64(row), self.growth[0])
     }

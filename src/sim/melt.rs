@@ -1,5 +1,5 @@
-//! The melt between screw and nozzle of an extruder that is started after pauses and
-//! stopped again: more than the model of [`crate::extruder::start_stop`] knows.
+//! The melt between screw and nozzle of an extruder that starts after pauses and stops again. It
+//! has effects that the model of [`crate::extruder::start_stop`] does not know.
 //!
 //! ```text
 //! command ─dead time─▶ screw ─▶ void (opens in two parts while it stands) ─▶ melt under
@@ -10,11 +10,11 @@ use std::collections::VecDeque;
 
 use crate::sim::hash::{mix, normal_pair};
 
-/// Step while anything moves \[s\]: a thirty-fifth of the shortest time constant.
+/// Step while pump or melt move \[s\]: a thirty-fifth of the shortest time constant.
 const STEP_S: f64 = 0.002;
-/// Step of a pump that has stood for a while \[s\].
+/// Step while the pump is at rest \[s\].
 const IDLE_STEP_S: f64 = 0.02;
-/// Standing time from which the long step is used \[s\]: two and a half time constants of the
+/// Time after a stop from which the long step is used \[s\]: two and a half time constants of the
 /// leak.
 const IDLE_AFTER_S: f64 = 5.0;
 /// Random stream of the flow. Derived: the bytes of "flow".
@@ -25,27 +25,26 @@ const VOID_STREAM: u64 = 0x766f_6964;
 /// Parameters of the simulated extruder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeltParameters {
-    /// From a command until the drive acts \[s\].
+    /// Delay from a command until the drive acts \[s\].
     pub dead_time_s: f64,
     /// Time constant of the screw \[s\].
     pub screw_s: f64,
-    /// Melt that is stored under pressure at the reference flow, over that flow
-    /// \[s\].
+    /// Volume that is stored under pressure at the reference flow, over that flow \[s\].
     pub stored_s: f64,
     /// Reference flow \[mm³/s\].
     pub flow_mm3_per_s: f64,
-    /// n of the power law: pressure goes with flowⁿ, so that little pressure
-    /// drools for long.
+    /// Exponent n of the power law: pressure is proportional to flowⁿ, so that a low pressure
+    /// drools for a long time.
     pub shear_thinning: f64,
-    /// Time constant with which pressure is lost up the screw \[s\].
+    /// Time constant of the pressure loss backwards through the screw \[s\].
     pub leak_s: f64,
-    /// Volumes that recede from the nozzle while the screw stands \[mm³\], and
-    /// how fast each \[s\].
+    /// Volumes that recede from the nozzle while the screw stands \[mm³\], and the time constant
+    /// of each \[s\].
     pub voids: [(f64, f64); 2],
-    /// Fraction of the receding melt that drips from the nozzle; the rest goes back
-    /// up the screw.
+    /// Fraction of the receding melt that drips from the nozzle; the rest flows back into the
+    /// screw.
     pub drip_fraction: f64,
-    /// A void that is closed but for this lets part of the melt pass \[mm³\].
+    /// Size of the void below which part of the melt passes it \[mm³\].
     pub bypass_mm3: f64,
     /// Standard deviation of the void from pause to pause, relative.
     pub void_sigma: f64,
@@ -54,7 +53,7 @@ pub struct MeltParameters {
 }
 
 impl MeltParameters {
-    /// Of a bead of 10 mm² at 40 mm/s.
+    /// Typical values for a bead of 10 mm² at 40 mm/s.
     pub const TYPICAL: Self = Self {
         dead_time_s: 0.12,
         screw_s: 0.07,
@@ -76,9 +75,9 @@ pub struct Melt {
     parameters: MeltParameters,
     seed: u64,
     now_s: f64,
-    /// Commands on their way: when they act \[s\], and what flow they give.
+    /// Commands that do not act yet: time of action \[s\] and flow \[mm³/s\].
     pending_commands: VecDeque<(f64, f64)>,
-    /// Flow that the drive demands \[mm³/s\], and flow that the screw conveys.
+    /// Flow that the drive demands, and flow that the screw conveys \[mm³/s\].
     commanded_mm3_per_s: f64,
     conveyed: f64,
     /// Time since the drive was stopped \[s\].
@@ -91,7 +90,7 @@ pub struct Melt {
 }
 
 impl Melt {
-    /// Flowing evenly at its reference flow.
+    /// An extruder in the steady state at its reference flow.
     pub fn steady(parameters: MeltParameters, seed: u64) -> Self {
         let flow = parameters.flow_mm3_per_s;
         Self {
@@ -110,7 +109,7 @@ impl Melt {
         }
     }
 
-    /// After a pause so long that all melt has receded that can.
+    /// An extruder after a pause so long that all melt that can recede has receded.
     pub fn fully_receded(parameters: MeltParameters, seed: u64) -> Self {
         let [first, second] = parameters.voids;
         Self {
@@ -123,17 +122,17 @@ impl Melt {
         }
     }
 
-    /// Time since it began \[s\].
+    /// Time since the start \[s\].
     pub const fn now_s(&self) -> f64 {
         self.now_s
     }
 
-    /// Commands the drive to a flow \[mm³/s\]; zero stops it.
+    /// Commands a flow \[mm³/s\] to the drive; zero stops it.
     pub fn command(&mut self, flow_mm3_per_s: f64) {
         self.pending_commands.push_back((self.now_s + self.parameters.dead_time_s, flow_mm3_per_s));
     }
 
-    /// What is empty before the nozzle \[mm³\].
+    /// Volume of the void before the nozzle \[mm³\].
     pub fn void_mm3(&self) -> f64 {
         self.voids.iter().sum()
     }
@@ -166,7 +165,8 @@ impl Melt {
         self.stopped_s = if self.commanded_mm3_per_s > 0.0 { 0.0 } else { self.stopped_s + dt_s };
     }
 
-    /// The void opens as far as pressure has gone, to another size each time.
+    /// Opens the void as the pressure falls; its final size is random for each pause. Returns the
+    /// volume that drips \[mm³\].
     fn recede(&mut self, dt_s: f64) -> f64 {
         if self.commanded_mm3_per_s > 0.0 {
             return 0.0;
@@ -183,7 +183,7 @@ impl Melt {
         receded * self.parameters.drip_fraction
     }
 
-    /// Fills the void and returns what passes it \[mm³\].
+    /// Fills the void and returns the volume that passes it \[mm³\].
     fn fill(&mut self, conveyed_mm3: f64) -> f64 {
         let void = self.void_mm3();
         if void <= 0.0 {
@@ -196,12 +196,12 @@ impl Melt {
         conveyed_mm3 - filled
     }
 
-    /// Stored melt over that at the reference flow.
+    /// Stored volume over that at the reference flow.
     fn pressure_fraction(&self) -> f64 {
         self.stored_mm3 / (self.parameters.flow_mm3_per_s * self.parameters.stored_s)
     }
 
-    /// Flow through the nozzle \[mm³/s\].
+    /// Advances the stored volume; returns the flow through the nozzle \[mm³/s\].
     fn pressed_out(&mut self, arriving_mm3: f64, dt_s: f64) -> f64 {
         let machine = &self.parameters;
         let fraction = self.pressure_fraction().max(0.0);

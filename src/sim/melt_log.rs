@@ -1,4 +1,4 @@
-//! Recordings of starts and stops, as `extruder identify` is given them.
+//! Recordings of starts and stops, as input of `extruder identify`.
 
 use std::fmt::Write as _;
 
@@ -9,23 +9,22 @@ use crate::sim::hash::{mix, normal_pair};
 /// Random stream of the sensor. Derived: the bytes of "sens".
 const SENSOR_STREAM: u64 = 0x7365_6e73;
 
-/// What is recorded.
+/// The commands and the sensor of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingPlan {
-    /// Pauses of the pump, in their order \[s\].
+    /// Pauses of the pump, in order \[s\].
     pub idle_s: Vec<f64>,
-    /// How long the pump runs between them \[s\].
+    /// Time for which the pump runs between pauses \[s\].
     pub runs_s: f64,
     /// Flow for each unit of the command \[mm³/s per rpm\].
     pub mm3_per_s_per_rpm: f64,
-    /// From one sample of the flow to the next \[s\].
+    /// Sample time of the flow \[s\].
     pub step_s: f64,
-    /// Standard deviation of the sensor \[mm³/s\].
+    /// Standard deviation of the sensor's noise \[mm³/s\].
     pub sensor_mm3_per_s: f64,
 }
 
-/// Command \[rpm\] and flow \[mm³/s\] of a machine that runs, pauses and runs
-/// again.
+/// Command \[rpm\] and flow \[mm³/s\] of a machine that runs, pauses and runs again.
 pub fn record(machine: MeltParameters, seed: u64, plan: &RecordingPlan) -> [TimeSeries; 2] {
     let mut melt = Melt::steady(machine, seed);
     let mut command = TimeSeries::new("command_rpm", true);
@@ -66,8 +65,7 @@ pub fn example() -> RecordingPlan {
     }
 }
 
-/// Command \[rpm\] and flow \[mm³/s\] as the text of a table, a line for each
-/// sample of the flow.
+/// Command \[rpm\] and flow \[mm³/s\] as CSV text, a line for each sample of the flow.
 pub fn to_csv([command, flow]: &[TimeSeries; 2]) -> String {
     let mut text = "time_s,screw_rpm,flow_mm3_per_s\n".to_owned();
     for (time_s, flow) in flow.time_s.iter().zip(&flow.values) {

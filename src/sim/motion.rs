@@ -1,27 +1,27 @@
-//! Motion while the shutter is open: the mean of the image over its positions.
+//! Motion during exposure: the mean of the image over its positions.
 
 use crate::scenario::image::MotionBlur;
 
-/// Most nodes of the quadrature over the motion: they limit the time of a frame.
+/// Largest number of quadrature nodes over the motion: it limits the time for a frame.
 const MAX_POSITIONS: u32 = 64;
 
-/// Where the image is for a part of the time while the shutter is open.
+/// Position of the image during a part of the exposure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShutterPosition {
-    /// Fraction of the time.
+    /// Fraction of the exposure time.
     pub weight: f64,
     /// Shift along and across the gauge's axis \[px\].
     pub shift_px: [f64; 2],
 }
 
-/// Where the image is while the shutter is open. The positions are those of
-/// Gauss–Legendre quadrature, close enough for an image with this blur.
+/// Positions of the image during exposure: nodes of a Gauss–Legendre quadrature, close enough for
+/// an image with this blur.
 pub fn positions(motion: &MotionBlur, blur_px: f64) -> Vec<ShutterPosition> {
     if motion.length_px <= 0.0 {
         return vec![ShutterPosition { weight: 1.0, shift_px: [0.0, 0.0] }];
     }
     let (sin, cos) = libm::sincos(motion.direction_deg.to_radians());
-    // A pixel is itself a blur.
+    // A pixel blurs, too: its variance is 1/12 px².
     let blur = (blur_px * blur_px + 1.0 / 12.0).sqrt();
     let half = 0.5 * motion.length_px;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
@@ -34,8 +34,8 @@ pub fn positions(motion: &MotionBlur, blur_px: f64) -> Vec<ShutterPosition> {
     nodes.map(position).collect()
 }
 
-/// A root of Legendre's polynomial of a degree, by Newton's method from
-/// Tricomi's estimate, and its weight.
+/// A root of the Legendre polynomial of this degree, by Newton's method from Tricomi's estimate,
+/// and its weight.
 fn node(number: u32, degree: u32) -> (f64, f64) {
     let n = f64::from(degree);
     let mut at = libm::cos(std::f64::consts::PI * (f64::from(number) - 0.25) / (n + 0.5));

@@ -1,5 +1,4 @@
-//! The outline of a bead in the image: both edges, and where it begins and
-//! ends.
+//! The outline of a bead in the image: both edges, and the ends of the bead.
 
 use super::view::{AxisPoint, BeadView};
 
@@ -9,44 +8,42 @@ const SAMPLE_PX: f64 = 1.0;
 /// any resolution.
 const HALVINGS: u32 = 30;
 
-/// Signed offsets of the left and the right edge \[mm\] at a distance along
-/// the bead from the middle of the gauge \[mm\]; `None` where there is no bead.
+/// Signed offsets of the left and the right edge \[mm\] at a distance along the bead from the
+/// middle of the gauge \[mm\]; `None` where there is no bead.
 pub type BeadEdges<'a> = dyn Fn(f64) -> Option<(f64, f64)> + 'a;
 
-/// One position along the bead, and where its edges are seen.
+/// One position along the bead, and the image points of its edges.
 #[derive(Debug, Clone, Copy)]
 pub struct OutlineSample {
     /// Distance along the bead \[mm\].
     pub along_mm: f64,
     /// Offsets of the left and the right edge \[mm\].
     pub offset_mm: [f64; 2],
-    /// Where they are seen.
+    /// Image points of both edges.
     pub projected: [AxisPoint; 2],
 }
 
-/// Everything that is seen of a bead.
+/// The visible part of a bead.
 #[derive(Debug, Clone)]
 pub struct BeadOutline {
-    /// In the order in which `run` grows. Beyond the ends of the bead its
-    /// edges go on straight.
+    /// In the order of growing `run`. Beyond the bead's ends its edges continue straight.
     pub samples: Vec<OutlineSample>,
-    /// Segments that have been laid \[mm\], within what is seen.
+    /// Laid segments within the visible part \[mm\].
     pub segments: Vec<LaidSegment>,
 }
 
 /// A segment of bead between two ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LaidSegment {
-    /// Where it begins \[mm\]; −∞ if before what is seen.
+    /// Start \[mm\]; −∞ if it is before the visible part.
     pub from_mm: f64,
-    /// Where it ends \[mm\]; +∞ if after what is seen.
+    /// End \[mm\]; +∞ if it is after the visible part.
     pub to_mm: f64,
 }
 
 impl BeadOutline {
-    /// Follows the bead through an image that has `run` pixels along the
-    /// gauge's axis, and `margin` more on either side. `None` without bead in
-    /// view.
+    /// Traces the bead through an image with `run` pixels along the gauge's axis, and `margin`
+    /// more on both sides. `None` without bead in view.
     pub fn trace(view: &BeadView, bead: &BeadEdges<'_>, run: f64, margin: f64) -> Option<Self> {
         let step = view.pixel_mm * SAMPLE_PX;
         let most = (run + 2.0 * margin) * 16.0 / SAMPLE_PX;
@@ -83,14 +80,14 @@ impl BeadOutline {
         Some(Self { samples, segments })
     }
 
-    /// Where an edge (0 left, 1 right) crosses a line across the gauge \[px\].
+    /// Position across the gauge of an edge (0 left, 1 right) on a line across it \[px\].
     pub fn crossing(&self, edge: usize, run: f64) -> Option<f64> {
         let (before, after, fraction) = self.around(edge, run)?;
         let (a, b) = (before.projected[edge].cross, after.projected[edge].cross);
         Some(a + (b - a) * fraction)
     }
 
-    /// How far along the bead that is \[mm\].
+    /// Distance along the bead of that crossing \[mm\].
     pub fn along_at(&self, edge: usize, run: f64) -> Option<f64> {
         let (before, after, fraction) = self.around(edge, run)?;
         Some(before.along_mm + (after.along_mm - before.along_mm) * fraction)
@@ -111,7 +108,8 @@ impl BeadOutline {
 
 type EdgeOffsets = Option<(f64, f64)>;
 
-/// The samples with the offsets of the nearest bead where there is none.
+/// The samples; where there is no bead, with the offsets of the nearest bead. `None` without any
+/// bead.
 fn filled(positions: &[(f64, EdgeOffsets)]) -> Option<impl Iterator<Item = (f64, (f64, f64))>> {
     let mut last = positions.iter().find_map(|(_, laid)| *laid)?;
     Some(positions.iter().map(move |(along_mm, laid)| {
@@ -138,7 +136,7 @@ fn segments(positions: &[(f64, EdgeOffsets)], bead: &BeadEdges<'_>) -> Vec<LaidS
     found
 }
 
-/// Where bead turns to no bead between two positions.
+/// Position of an end of the bead, between one with and one without bead \[mm\].
 fn bead_end(bead: &BeadEdges<'_>, mut with_mm: f64, mut without_mm: f64) -> f64 {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (with_mm + without_mm);

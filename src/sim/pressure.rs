@@ -1,6 +1,5 @@
-//! A simulated extruder from the screw's speed to the pressure at the nozzle:
-//! lag and dead time, a gain that drifts, a load at its input, a screw that
-//! turns no slower and no faster than it can, and a sensor with noise.
+//! A simulated extruder from the speed of the screw to the pressure at the nozzle: lag and dead
+//! time, a drifting gain, a load at the input, a limited speed, and a sensor with noise.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
@@ -13,7 +12,7 @@ use crate::numeric::number::to_count;
 /// Step of the plant \[s\]: papers.md, "002", 5 ms.
 pub const TICK_S: f64 = 0.005;
 
-/// A wave of the gain.
+/// A sinusoidal variation of the gain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GainWave {
     /// Amplitude, relative to the gain.
@@ -25,20 +24,20 @@ pub struct GainWave {
 /// A step of the load.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadChange {
-    /// When it comes \[s\].
+    /// Time of the step \[s\].
     pub at_s: f64,
-    /// How large it is, at the input of the lag \[rpm\].
+    /// Size of the step, at the input of the lag \[rpm\].
     pub rpm: f64,
 }
 
-/// What disturbs the process.
+/// Disturbances of the process.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Disturbances {
-    /// Waves of the gain.
+    /// Variations of the gain.
     pub gain_waves: Vec<GainWave>,
     /// A step of the load.
     pub load: Option<LoadChange>,
-    /// Variance of a reading \[MPa²\].
+    /// Variance of the sensor's noise \[MPa²\].
     pub noise_mpa2: f64,
     /// Seed of the noise.
     pub seed: u64,
@@ -50,9 +49,9 @@ pub struct SimPressure {
     process: Fopdt,
     disturbances: Disturbances,
     fastest_rpm: f64,
-    /// Speeds of the ticks that are under way, the newest first.
+    /// Speeds within the dead time, newest first.
     delayed_speeds: VecDeque<f64>,
-    /// Whole ticks of the dead time, and the rest of it relative to a tick.
+    /// Dead time in whole ticks, and its remaining fraction of a tick.
     ticks: usize,
     fractional_tick: f64,
     speed_rpm: f64,
@@ -61,7 +60,7 @@ pub struct SimPressure {
 }
 
 impl SimPressure {
-    /// In the steady state.
+    /// A plant in its steady state.
     pub fn new(
         process: Fopdt,
         disturbed: Disturbances,
@@ -69,7 +68,7 @@ impl SimPressure {
         running: InitialState,
     ) -> Self {
         let ticks = process.dead_time_s() / TICK_S;
-        // A dead time of whole ticks must not lose one to rounding.
+        // Rounding must not shorten a dead time of whole ticks by one.
         let whole = (ticks + 1e-9).floor();
         let speed_rpm = running.speed.get();
         let count = to_count(whole);
@@ -86,7 +85,7 @@ impl SimPressure {
         }
     }
 
-    /// The time \[s\].
+    /// Simulated time \[s\].
     #[expect(clippy::cast_precision_loss, reason = "ticks of some minutes")]
     pub fn now_s(&self) -> f64 {
         self.tick as f64 * TICK_S
@@ -97,32 +96,32 @@ impl SimPressure {
         self.pressure
     }
 
-    /// The speed that the screw turns at \[rpm\].
+    /// Speed of the screw \[rpm\].
     pub const fn speed_rpm(&self) -> f64 {
         self.speed_rpm
     }
 
-    /// What the sensor reads.
+    /// Reading of the sensor.
     pub fn read(&self) -> MPa {
         let [normal, _] = normal_pair(mix(&[0x7072_6573, self.disturbances.seed, self.tick]));
         let noise = self.disturbances.noise_mpa2.sqrt() * normal;
         MPa::new(self.pressure + noise).unwrap_or_default()
     }
 
-    /// A command to the screw. It takes it over with the next tick.
+    /// Commands a speed; the screw has it from the next tick on.
     pub fn command(&mut self, speed: Rpm) {
         self.speed_rpm = speed.get().clamp(0.0, self.fastest_rpm);
     }
 
-    /// Lets a tick pass. The speed that is commanded now begins to work a dead
-    /// time after the end of this tick.
+    /// Advances by one tick. The speed that is commanded now acts on the pressure one dead time
+    /// after the end of this tick.
     pub fn advance(&mut self) {
         let at_s = self.now_s();
         let drift: f64 = self.disturbances.gain_waves.iter().map(|wave| wave.at(at_s)).sum();
         let load = self.disturbances.load.filter(|load| at_s >= load.at_s - 1e-9);
         let load = load.map_or(0.0, |load| load.rpm);
         let old = |back: usize| self.delayed_speeds.get(back).copied().unwrap_or(self.speed_rpm);
-        // The rest of the dead time belongs to the speed of one tick earlier.
+        // The remaining fraction belongs to the speed of one tick earlier.
         for (speed, fraction) in [
             (old(self.ticks + 1), self.fractional_tick),
             (old(self.ticks), 1.0 - self.fractional_tick),
@@ -204,7 +203,7 @@ mod tests {
         for _ in 0..499_600 {
             plant.advance();
         }
-        // A quarter of the drift's period.
+        // After a quarter of the drift's period.
         assert!((plant.pressure() - 0.77).abs() < 1e-3, "{}", plant.pressure());
     }
 }

@@ -1,4 +1,4 @@
-//! Images of a bead, with their truth.
+//! Images of a bead, with their true widths.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -27,21 +27,19 @@ const GRAINS_STREAM: u64 = 2;
 /// Random stream of the texture.
 const TEXTURE_STREAM: u64 = 3;
 
-/// Takes images of a bead that runs through the gauge of a calibrated
-/// camera.
+/// Renders images of a bead that runs through the gauge of a calibrated camera.
 ///
-/// The bead's edges are projected through the camera and its distortion; every
-/// pixel is the exact integral of the blurred edge's tangent over its area.
-/// Shading, shadows, spots and grains are added to that, blurred and moved like
-/// the edges. Light, which is 1 in the middle of the image, multiplies the
-/// result; texture and noise are added before rounding, and what is above 255
-/// is saturated. A frame depends on the seed and its number, not on
-/// the frames before it. For the direction of travel see [`super::view`].
+/// The bead's edges are projected through the camera with its distortion; every pixel is the exact
+/// integral of the blurred edge's tangent over its area. Shading, shadows, spots and grains are
+/// added, with the same blur and motion as the edges. The light, 1 in the middle of the image,
+/// multiplies the result; texture and noise are added before rounding, and values above 255 are
+/// saturated. A frame depends on the seed and its number, not on earlier frames. For the direction
+/// of travel see [`super::view`].
 #[derive(Debug, Clone)]
 pub struct Renderer {
     calibration: Calibration,
     surface_height: Mm,
-    /// How much higher the bead lies than that of the first layer.
+    /// Height of the bead above that of the first layer.
     rise: Mm,
     gauge: Gauge,
     image: ImageModel,
@@ -49,16 +47,16 @@ pub struct Renderer {
     seed: u64,
 }
 
-/// A frame and what is true of it.
+/// A frame and its true width.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rendered {
-    /// The frame, 8 bits a pixel.
+    /// The frame, 8 bits per pixel.
     pub frame: Frame,
-    /// `None` unless the bead runs through the whole gauge.
+    /// The true width; `None` unless the bead runs through the whole gauge.
     pub truth: Option<Truth>,
 }
 
-/// A bead that cannot be imaged.
+/// Why a bead cannot be rendered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RenderError {
     /// The gauge does not lie within the image.
@@ -78,7 +76,7 @@ pub enum RenderError {
          check the calibration and the surface's height"
     )]
     OffSurface {
-        /// Height of the surface above the bed, as the camera is now \[mm\].
+        /// Height of the surface above the bed at the camera's current height \[mm\].
         height_mm: f64,
     },
     /// An image without pixels.
@@ -87,15 +85,15 @@ pub enum RenderError {
 }
 
 impl Renderer {
-    /// For the simulated bead of a cell. Fails as [`Self::new`].
+    /// For the simulated bead of a cell. Fails like [`Self::new`].
     pub fn of_cell(cell: &Cell, calibration: &Calibration) -> Result<Self, RenderError> {
         let (height, simulation) = (cell.surface_height, &cell.simulation);
         Self::new(calibration.clone(), height, cell.gauge, simulation.image, simulation.seed)
     }
 
-    /// For a bead whose top edges lie at `surface_height` above the bed, or
-    /// where `image` says that they really are. A full calibration sets the
-    /// size of the image. Fails where the gauge lies outside the image.
+    /// For a bead with top edges at `surface_height` above the bed, or at the true height in
+    /// `image`. The size of the image is that of a full calibration. Fails if the gauge is not
+    /// within the image.
     pub fn new(
         calibration: Calibration,
         surface_height: Mm,
@@ -117,13 +115,13 @@ impl Renderer {
         Ok(Self { calibration, surface_height, rise, gauge, image, size, seed })
     }
 
-    /// The bead lies higher than that of the first layer from now on.
+    /// Sets the height of the bead above that of the first layer.
     pub fn raise(&mut self, rise: Mm) {
         self.rise = rise;
     }
 
-    /// Takes an image of a bead, with the robot at `robot_z` if the camera
-    /// rides on it.
+    /// Renders an image of a bead; `robot_z` is the robot's height, for a camera that is mounted
+    /// on it.
     pub fn render(
         &self,
         seq: u64,
@@ -133,7 +131,7 @@ impl Renderer {
     ) -> Result<Rendered, RenderError> {
         let view = self.view(robot_z)?;
         let GaugeExtent { run, cross } = self.extent();
-        // Half the image across more, for edges that run at an angle.
+        // An additional margin of half the image across, for slanted edges.
         let margin = to_f64(shade::margin_px(self.image.blur_px) + cross / 2);
         let margin = margin + self.image.motion.length_px;
         let outline = BeadOutline::trace(&view, bead, to_f64(run), margin);
@@ -145,10 +143,10 @@ impl Renderer {
         Ok(Rendered { frame, truth })
     }
 
-    /// How far from the middle of the gauge the image reaches along the bead
-    /// \[mm\], at most a metre.
+    /// Distance from the middle of the gauge to the image's farthest point, along the bead \[mm\];
+    /// at most a metre.
     pub fn reach_mm(&self, robot_z: Option<Mm>) -> Result<f64, RenderError> {
-        /// Longest reach \[mm\], for cameras that see the horizon.
+        /// Limit of that distance \[mm\], for cameras that see the horizon.
         const MAX_REACH_MM: f64 = 1000.0;
         let view = self.view(robot_z)?;
         let (right, below) = (to_f64(self.size.0) - 0.5, to_f64(self.size.1) - 0.5);
@@ -177,7 +175,7 @@ impl Renderer {
         }
     }
 
-    /// What a pixel sees of bead and ground, without light, texture and noise.
+    /// Bead and ground on each pixel, without light, texture and noise.
     fn coverage(&self, seq: u64, outline: &BeadOutline, view: &BeadView) -> BeadCoverage {
         let image = &self.image;
         let shape = BeadShape::new(outline, view, self.extent(), image.blur_px);
@@ -200,7 +198,7 @@ impl Renderer {
         }
     }
 
-    /// Grey levels from what is seen, light, texture and noise.
+    /// Grey levels from coverage, light, texture and noise.
     fn expose(&self, seq: u64, seen: Option<&BeadCoverage>) -> Vec<u8> {
         let ImageModel { bead_grey, ground_grey, noise_grey, .. } = self.image;
         let step = bead_grey - ground_grey;
@@ -231,7 +229,7 @@ impl Renderer {
     }
 }
 
-/// The nearest level of 8 bits.
+/// The nearest 8-bit level.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

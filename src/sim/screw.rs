@@ -1,18 +1,18 @@
 //! A screw that fills and empties: the plant of Diagne et al. 2015, eqs. (13), (16) and (17),
-//! with the feed in transit to the plug.
+//! including the feed on its way to the plug.
 
 use crate::extruder::screw::feed_history::FeedHistory;
 use crate::extruder::screw::{Conveying, Screw};
 use crate::numeric::number::to_count;
 
-/// How the plant is integrated.
+/// Integration method of the plant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Integrator {
-    /// The paper's: one Euler step, the delay rounded up to whole steps, so that no feed arrives
-    /// before its delay is over.
+    /// The paper's: one Euler step. The delay is rounded up to whole steps, so that no feed
+    /// arrives too early.
     Euler,
-    /// Fourth order in steps of at most this length \[s\], which end where a
-    /// change of the feed reaches the plug.
+    /// Fourth order in steps of at most this length \[s\]; a step ends when a change of the feed
+    /// reaches the plug.
     RungeKutta(f64),
 }
 
@@ -28,8 +28,8 @@ pub struct SimScrew {
 }
 
 impl SimScrew {
-    /// A plant that has been fed `before` until now, with feed and plug on a
-    /// grid of `step_s`.
+    /// A plant with the constant feed `before` until now; feed and plug are on a time grid of
+    /// `step_s`.
     pub fn new(
         screw: Screw,
         integrator: Integrator,
@@ -52,12 +52,12 @@ impl SimScrew {
         self.plug_m
     }
 
-    /// Delay of what reaches the plug now \[s\].
+    /// Delay of the feed that reaches the plug now \[s\].
     pub fn delay_s(&self) -> f64 {
         self.screw.delay(self.now_s(), self.plug_m)
     }
 
-    /// Feeds a fraction of full over one step.
+    /// Advances by one step with this fill of the feed, 0 to 1.
     pub fn advance(&mut self, fill: f64) {
         let from = self.now_s();
         self.feed.push(self.feed_position(from), fill);
@@ -72,8 +72,7 @@ impl SimScrew {
 
     fn euler(&mut self, from: f64) {
         let steps = (self.screw.delay(from, self.plug_m) / self.step_s).ceil();
-        // The middle of the step that the feed is of, so that no rounding of
-        // its ends matters.
+        // The centre of the feed's step, so that rounding of its ends has no effect.
         let position = self.feed_position(from - (steps - 0.5) * self.step_s);
         self.plug_m += self.step_s * self.rate(from, self.plug_m, self.feed.at(position));
     }
@@ -98,7 +97,7 @@ impl SimScrew {
         }
     }
 
-    /// The plug a step later under a feed that is held.
+    /// Length of the plug after a step with a constant feed \[m\].
     fn grown(&self, at: f64, step: f64, fill: f64) -> f64 {
         runge_kutta_step(|at, plug| self.rate(at, plug, fill), at, self.plug_m, step)
     }
@@ -107,7 +106,7 @@ impl SimScrew {
         self.screw.speed(at) * self.screw.growth(plug, fill)
     }
 
-    /// Where in the feed's row that is what reaches the plug now.
+    /// Position in the feed history of the feed that reaches the plug now.
     fn arriving_position(&self, at: f64, plug: f64) -> f64 {
         match self.screw.conveying {
             Conveying::AtPresentSpeed => at - (self.screw.length_m - plug) / self.screw.speed(at),
@@ -115,7 +114,7 @@ impl SimScrew {
         }
     }
 
-    /// Where in the feed's row that is what is fed now.
+    /// Position in the feed history of the feed that enters now.
     fn feed_position(&self, at: f64) -> f64 {
         match self.screw.conveying {
             Conveying::AtPresentSpeed => at,
@@ -134,7 +133,7 @@ fn runge_kutta_step(rate: impl Fn(f64, f64) -> f64, at: f64, x: f64, step: f64) 
     x + step / 6.0 * (first + 2.0 * (second + third) + fourth)
 }
 
-/// Just beyond where a growing function changes its sign within a step.
+/// A point just after the sign change of a growing function within a step.
 fn crossing(past: impl Fn(f64) -> f64, full: f64) -> f64 {
     let (mut low, mut high) = (0.0, full);
     for _ in 0..40 {
@@ -148,9 +147,9 @@ fn crossing(past: impl Fn(f64) -> f64, full: f64) -> f64 {
     high
 }
 
-/// The same screw without delay under continuous feedback, from a plug at a time on: equal to a
-/// loop with a perfect predictor from the first effect of its control. Lengths of the plug
-/// \[m\] `step_s` apart, by Runge–Kutta steps of a tenth of that.
+/// The same screw without delay under continuous feedback, from a given plug and time on. From the
+/// first effect of the control it equals a loop with a perfect predictor. Lengths of the plug
+/// \[m\] every `step_s`, by Runge–Kutta steps of a tenth of that.
 pub fn delay_free(
     screw: &Screw,
     plug_m: f64,
@@ -188,7 +187,7 @@ mod tests {
         ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap()
     }
 
-    /// A feed that no controller gives.
+    /// A feed that no controller would give.
     fn fill(tick: u32) -> f64 {
         0.35 + 0.3 * (0.011 * f64::from(tick)).sin() + if tick % 400 < 200 { 0.1 } else { 0.0 }
     }
@@ -220,8 +219,8 @@ mod tests {
 
     #[test]
     fn material_is_conserved_on_a_belt() {
-        // What was fed is in the channel or has left through the nozzle: with
-        // q for the way conveyed, d(plug + ∫fill ahead of it) = U − θ2·x/(1 + θ2·x) a metre.
+        // All feed is in the channel or has left through the nozzle: with the conveyed distance q,
+        // d(plug + ∫fill ahead of it) = U − θ2·x/(1 + θ2·x) per metre.
         let screw = Screw { conveying: Conveying::AtSpeedOnTheWay, ..screw(A) };
         let before = screw.holding_fill(0.1);
         let mut plant = SimScrew::new(screw, Integrator::RungeKutta(2e-4), 1e-3, 0.1, before);

@@ -1,5 +1,5 @@
-//! How much of each pixel is bead: the outline, blurred by the lens and
-//! integrated over the pixels.
+//! Fraction of bead in each pixel: the outline, blurred by the lens and integrated over the
+//! pixels.
 
 use super::contour::{Contour, clamp_index};
 use super::edge::coverage;
@@ -14,17 +14,16 @@ pub const GAUSSIAN_REACH_SIGMAS: f64 = 5.0;
 /// curvature of an edge.
 const EDGE_MARGIN_PX: f64 = 1.5;
 
-/// A straight line across the bead, at one of its ends.
+/// A straight end of the bead, across it.
 #[derive(Debug, Clone, Copy)]
 struct End {
     run: f64,
     cross: f64,
-    /// Unit normal that points into the bead: along the axis, across it.
+    /// Unit normal into the bead: component along the axis, component across it.
     normal: [f64; 2],
 }
 
-/// A bead as it lies in the image; all in pixels along and across the
-/// gauge's axis.
+/// The shape of a bead in the image; all in pixels along and across the gauge's axis.
 #[derive(Debug, Clone)]
 pub struct BeadShape {
     /// The left and the right edge.
@@ -33,13 +32,12 @@ pub struct BeadShape {
     pub extent: GaugeExtent,
     /// Standard deviation of the lens' blur \[px\].
     pub blur_px: f64,
-    /// None where the bead goes through the whole image.
+    /// Ends of each segment; empty if the bead runs through the whole image.
     ends: Vec<(Option<End>, Option<End>)>,
 }
 
 impl BeadShape {
-    /// The shape of an outline in an image with so many pixels along and
-    /// across the gauge's axis.
+    /// The shape of an outline in an image with `extent` pixels along and across the gauge's axis.
     pub fn new(outline: &BeadOutline, view: &BeadView, extent: GaugeExtent, blur_px: f64) -> Self {
         let margin = margin_px(blur_px);
         let edges = [0, 1].map(|side| Contour::new(&outline.samples, side, extent.run, margin));
@@ -51,10 +49,10 @@ impl BeadShape {
         Self { edges, extent, blur_px, ends }
     }
 
-    /// Fills `line` with the fraction of bead in the pixels of one line across
-    /// the bead, and returns the first of them; the pixels beside it hold no
-    /// bead. The image is shifted by `shift` \[px\] along and across the
-    /// axis. Near an edge a pixel sees the tangent at the edge's nearest point.
+    /// Fills `line` with the fractions of bead in the pixels of one line across the bead, and
+    /// returns the index of the first of them; all other pixels have no bead. The image is shifted
+    /// by `shift` \[px\] along and across the axis. Near an edge a pixel uses the tangent at the
+    /// edge's nearest point. `None` if no pixel has bead.
     pub fn line(&self, at: usize, shift: [f64; 2], line: &mut Vec<f32>) -> Option<usize> {
         let [left, right] = &self.edges;
         let (at, reach) =
@@ -80,27 +78,26 @@ impl BeadShape {
         (first < last).then_some(first)
     }
 
-    /// Whether a point is bead.
+    /// Whether a point is within the bead.
     pub fn holds(&self, at: f64, position: f64) -> bool {
         let [left, right] = &self.edges;
         let between = left.crossing(at) <= position && position <= right.crossing(at);
         between && self.laid(at, position, 0.0) > 0.5
     }
 
-    /// Fraction of a pixel on the inner side of an edge.
+    /// Fraction of a pixel on the inner side of an edge, 0 to 1.
     fn edge_fraction(&self, side: usize, at: f64, position: f64) -> f64 {
         let sign = if side == 0 { 1.0 } else { -1.0 };
         let tangent = self.edges[side].tangent(at, position);
         coverage(sign * tangent.beyond, tangent.normal, self.blur_px)
     }
 
-    /// Fraction of a pixel that lies between the ends of any segment, blurred like
-    /// the edges.
+    /// Fraction of a pixel between the two ends of any segment, with the blur of the edges.
     pub fn laid_fraction(&self, at: f64, position: f64) -> f32 {
         narrow_to_f32(self.laid(at, position, self.blur_px))
     }
 
-    /// Fraction of a pixel that lies between the ends of any segment.
+    /// Fraction of a pixel between the two ends of any segment, with this blur.
     fn laid(&self, at: f64, position: f64, blur_px: f64) -> f64 {
         if self.ends.is_empty() {
             return 1.0;
@@ -116,7 +113,7 @@ impl BeadShape {
     }
 }
 
-/// How far beyond the image the outline is needed \[px\].
+/// Distance beyond the image for which the outline is needed \[px\].
 pub fn margin_px(blur_px: f64) -> usize {
     clamp_index((GAUSSIAN_REACH_SIGMAS * blur_px).ceil(), 1000) + 8
 }
@@ -138,8 +135,8 @@ fn ends_of(
         let right = view.px(along_mm, near.offset_mm[1])?;
         let (run, cross) = (right.run - left.run, right.cross - left.cross);
         let long = f64::hypot(run, cross);
-        // Across the bead is to the growing side, so this normal points along
-        // growing `run`; travel may go the other way.
+        // The direction across the bead is that of growing `cross`, so this normal points to
+        // growing `run`; the direction of travel may be opposite.
         let sign = sign * view.run_sign();
         let normal = [sign * cross / long, -sign * run / long];
         normal[0].is_finite().then_some(End { run: left.run, cross: left.cross, normal })

@@ -11,8 +11,8 @@ use super::shade::BeadShape;
 use crate::numeric::number::to_f64;
 use crate::scenario::image::Spots;
 
-/// Discs at random positions over the bead. They may cover each other: of the
-/// area a, N discs leave the fraction exp(−N·πr²/a).
+/// Discs at random positions on the bead; they may overlap. N discs leave the fraction
+/// exp(−N·πr²/a) of the area a free.
 pub fn spots(spots: &Spots, shape: &BeadShape, key: u64) -> Option<Mask> {
     let radius = 0.5 * spots.size_px;
     if spots.covered_fraction <= 0.0 || radius <= 0.0 {
@@ -38,7 +38,7 @@ pub fn spots(spots: &Spots, shape: &BeadShape, key: u64) -> Option<Mask> {
     Some(mask)
 }
 
-/// First and last position across the axis that a spot on the bead can have.
+/// Smallest and largest position across the axis of a spot on the bead.
 fn across(shape: &BeadShape, radius: f64) -> (f64, f64) {
     let crossings =
         |edge: usize| (0..shape.extent.run).map(move |at| shape.edges[edge].crossing(to_f64(at)));

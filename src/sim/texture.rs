@@ -8,9 +8,9 @@ use super::convolve::{convolve, kernel};
 use crate::numeric::number::narrow_to_f32;
 use crate::scenario::image::TexturePattern;
 
-/// Grey levels of a pattern over so many columns and rows, `None` where there
-/// is none. White noise, blurred with half the correlation length, has the
-/// autocorrelation exp(−(r/L)²).
+/// Grey levels of a pattern in `width` columns and `height` rows; `None` if the image has no
+/// pattern. White noise, blurred with half the correlation length, has the autocorrelation
+/// exp(−(r/L)²).
 pub fn texture(
     texture: &TexturePattern,
     width: usize,
@@ -21,7 +21,7 @@ pub fn texture(
         return None;
     }
     let kernel = kernel(0.5 * texture.length_px);
-    // The pattern continues beyond the image.
+    // The pattern extends beyond the image.
     let margin = kernel.len() - 1;
     let (wide, high) = (width + 2 * margin, height + 2 * margin);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(key);
@@ -34,14 +34,14 @@ pub fn texture(
     Some(rows.flat_map(|row| &row[margin..margin + width]).copied().collect())
 }
 
-/// The sum of four uniform numbers with the variance 1: normal enough where
-/// many are added.
+/// The sum of four uniform numbers, with variance 1: close enough to normal, because the blur
+/// averages many.
 fn nearly_normal(random: &mut Xoshiro256PlusPlus) -> f32 {
     let word: u64 = StandardUniform.sample(random);
     let parts = [word, word >> 16, word >> 32, word >> 48].map(|part| part & 0xffff);
     #[expect(clippy::cast_precision_loss, reason = "18 bits fit")]
     let sum = parts.iter().sum::<u64>() as f32 + 2.0;
-    // Four uniform numbers over 65536 levels have the variance 4·65536²/12.
+    // The sum of four uniform numbers over 65536 levels has the variance 4·65536²/12.
     (sum - 131_072.0) / 37_837.22
 }
 
@@ -64,8 +64,7 @@ mod tests {
             }
             sum / f64::from(u32::try_from((height - y) * (width - x)).unwrap())
         };
-        // A patch of 2·L² pixels counts as one: 4 standard errors are 0.05 of
-        // the variance.
+        // 2·L² pixels count as one independent sample: 4 standard errors are 0.05 of the variance.
         for (x, y, r2) in [(0, 0, 0.0), (4, 0, 16.0), (0, 4, 16.0), (3, 2, 13.0), (9, 0, 81.0)] {
             let expected = 9.0 * f64::exp(-r2 / 16.0);
             assert!((product(x, y) - expected).abs() < 0.45, "{x} {y}: {}", product(x, y));

@@ -1,5 +1,5 @@
-//! Grey that follows an edge of the bead: light from one side, a shadow, an
-//! older bead beside it.
+//! Grey levels that are added along an edge of the bead: light from one side, a shadow, an older
+//! bead beside it.
 
 use super::contour::clamp_index;
 use super::shade::{BeadShape, GAUSSIAN_REACH_SIGMAS};
@@ -10,7 +10,7 @@ use crate::scenario::image::ImageModel;
 /// Points of a profile per pixel, linear in between.
 const POINTS_PER_PX: f64 = 16.0;
 
-/// Grey levels that are added at a distance from an edge; 0 on the near side.
+/// Grey levels that are added, by the distance from an edge; 0 before the first point.
 #[derive(Debug, Clone, Default)]
 struct Profile {
     from_px: f64,
@@ -20,24 +20,24 @@ struct Profile {
 /// The grey that is added to bead and ground.
 #[derive(Debug, Clone)]
 pub struct Tint {
-    /// By the depth inside the edge; of the left and the right edge.
+    /// By the depth inside the left and the right edge.
     bead: [Profile; 2],
-    /// By the distance outside it.
+    /// By the distance outside the left and the right edge.
     ground: [Profile; 2],
 }
 
 /// One line across the bead.
 #[derive(Debug, Clone, Copy)]
 pub struct BeadLine<'a> {
-    /// Its number along the gauge's axis.
+    /// Its position along the gauge's axis.
     pub at: usize,
     /// Shift of the image along and across the axis \[px\].
     pub shift_px: [f64; 2],
-    /// First pixel that holds bead.
+    /// Index of the first pixel that has bead.
     pub first: usize,
-    /// Fractions of bead from that pixel on.
+    /// Fractions of bead from pixel `first` on.
     pub fractions: &'a [f32],
-    /// Weight of this line in the mean over the shutter's time.
+    /// Weight of this line in the mean over the exposure time.
     pub weight: f32,
 }
 
@@ -50,9 +50,9 @@ struct Knee {
 }
 
 impl Tint {
-    /// `None` where an image has nothing of the kind.
+    /// `None` if the image has no such disturbance.
     pub fn new(image: &ImageModel) -> Option<Self> {
-        // A pixel is itself a blur.
+        // A pixel blurs, too: its variance is 1/12 px².
         let blur_px = (image.blur_px * image.blur_px + 1.0 / 12.0).sqrt();
         let shading = &image.shading;
         let shaded = shading.side.edges();
@@ -65,7 +65,7 @@ impl Tint {
         tint.bead.iter().chain(&tint.ground).any(|p| !p.grey.is_empty()).then_some(tint)
     }
 
-    /// Adds to the grey of one line across the bead.
+    /// Adds the tint to the grey levels of one line across the bead.
     pub fn add(&self, shape: &BeadShape, line: &BeadLine<'_>, greys: &mut [f32]) {
         let BeadLine { at, shift_px: shift, first, fractions, weight } = *line;
         let run = to_f64(at) + shift[0];
@@ -73,7 +73,7 @@ impl Tint {
         let middle = clamp_index(middle, greys.len());
         let both = self.bead.iter().all(|profile| !profile.grey.is_empty());
         for (edge, sign) in [(0, -1.0), (1, 1.0)] {
-            // The own half of the bead, and the other one up to its edge.
+            // The half of the bead at this edge, and the other half up to the opposite edge.
             let (own, other) = if edge == 0 {
                 (0..middle, middle..greys.len())
             } else {
@@ -100,7 +100,7 @@ impl Tint {
     }
 }
 
-/// What lies beside an edge.
+/// Corners of the profile outside an edge.
 fn beside(image: &ImageModel, edge: usize) -> Vec<Knee> {
     let ImageModel { shading, shadow, neighbour, .. } = image;
     let contrast = image.bead_grey - image.ground_grey;
@@ -142,7 +142,7 @@ fn band(from_px: f64, width_px: f64, grey: f64) -> [Knee; 2] {
 }
 
 impl Profile {
-    /// Of a straight edge, blurred; empty where nothing is added.
+    /// The profile at a straight edge, blurred; empty if nothing is added.
     fn new(knees: &[Knee], blur_px: f64) -> Self {
         let real = |knee: &&Knee| knee.step_grey != 0.0 || knee.grey_per_px != 0.0;
         let knees: Vec<&Knee> = knees.iter().filter(real).collect();
@@ -167,7 +167,7 @@ impl Profile {
         Self { from_px, grey: grey.collect() }
     }
 
-    /// Straight between the positions, constant beyond the last one.
+    /// Grey level at a distance, linear between points and constant beyond the last one.
     fn at(&self, distance_px: f64) -> f32 {
         let position = (distance_px - self.from_px) * POINTS_PER_PX;
         let Some(last) = self.grey.last().filter(|_| position > 0.0) else { return 0.0 };

@@ -1,4 +1,4 @@
-//! What is true of a rendered frame.
+//! The true values of a rendered frame.
 
 use super::outline::{BeadOutline, OutlineSample};
 use super::view::{AxisPoint, BeadView, gauge_middle};
@@ -6,20 +6,19 @@ use crate::core::ImagePoint;
 use crate::numeric::number::to_f64;
 use crate::vision::{BeadAxis, Gauge};
 
-/// What a perfect measurement of a rendered frame would find.
+/// The result of a perfect measurement of a rendered frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
-    /// Mean distance of the edges at the surface, normal to the bead's axis:
-    /// each edge is averaged over the part of it that lies within the gauge
-    /// \[mm\].
+    /// Mean distance of the edges on the surface, normal to the bead's axis \[mm\]. Each edge is
+    /// averaged over its part within the gauge.
     pub width_mm: f64,
-    /// Where the left (of a horizontal bead the upper) edge crosses the middle
-    /// of the gauge, in raw image pixels.
+    /// Crossing of the left edge (upper edge of a horizontal bead) with the middle of the gauge,
+    /// in raw image pixels.
     pub left: ImagePoint,
-    /// Where the right (or lower) edge crosses it.
+    /// The same crossing of the right (or lower) edge.
     pub right: ImagePoint,
-    /// Standard deviation of the width about its mean, along the part of the
-    /// bead of which both edges lie within the gauge \[mm\].
+    /// Standard deviation of the width about its mean, along the part of the bead whose two edges
+    /// are within the gauge \[mm\].
     pub roughness_mm: f64,
 }
 
@@ -57,7 +56,7 @@ pub(super) fn of(outline: &BeadOutline, view: &BeadView, gauge: &Gauge) -> Optio
     })
 }
 
-/// Mean of a quantity, straight between the samples, along a segment of bead.
+/// Mean of a quantity along a segment of bead, linear between the samples.
 fn mean(
     outline: &BeadOutline,
     (from_mm, to_mm): (f64, f64),

@@ -1,5 +1,4 @@
-//! Where a bead lies in the image: from positions along and across the bead to
-//! pixels.
+//! Position of a bead in the image: from positions along and across the bead to pixels.
 //!
 //! The nozzle is beyond the top of the image for a vertical bead and beyond
 //! its right side for a horizontal one, so that the left edge of the bead, seen
@@ -35,11 +34,10 @@ pub fn gauge_middle(roi: &Roi) -> ImagePoint {
 }
 
 impl BeadView {
-    /// The bead runs through the middle of the gauge, shifted sideways by
-    /// `lateral_mm`, along the gauge's axis as it lies on the surface. A
-    /// positive `slant_deg` makes its position across the gauge grow with its
-    /// position along it, as in a measurement's slant. `None` where the middle of
-    /// the gauge does not see the surface.
+    /// The bead runs through the middle of the gauge, shifted sideways by `lateral_mm`, in the
+    /// direction of the gauge's axis on the surface. With a positive `slant_deg` its position
+    /// across the gauge grows with its position along it, as in a measurement's slant. `None` if
+    /// the middle of the gauge does not see the surface.
     pub fn new(map: SurfaceMap, gauge: &Gauge, slant_deg: f64, lateral_mm: f64) -> Option<Self> {
         let middle = gauge_middle(&gauge.roi);
         let mm_per_px = map.mm_per_px(middle)?;
@@ -59,13 +57,12 @@ impl BeadView {
         Some(Self { map, origin, along, across, axis, bend: BeadPath::Straight, pixel_mm })
     }
 
-    /// The same where the bead's path bends about the middle of the gauge.
+    /// The view of a bead whose path bends at the middle of the gauge.
     pub fn bent(self, bend: BeadPath) -> Self {
         Self { bend, ..self }
     }
 
-    /// The pixel of a position; `None` behind the camera, and too far around a
-    /// curve.
+    /// The pixel of a position; `None` behind the camera, and too far around a curve.
     pub fn px(&self, along_mm: f64, across_mm: f64) -> Option<AxisPoint> {
         let position = self.bend.position(along_mm, across_mm)?;
         let px =
@@ -73,7 +70,8 @@ impl BeadView {
         (px.x.is_finite() && px.y.is_finite()).then(|| self.axis_point(px))
     }
 
-    /// Distance of a pixel's position along the bead \[mm\].
+    /// Distance along the bead of the surface point at a pixel \[mm\]; `None` if it sees no
+    /// surface.
     pub fn along_mm(&self, px: ImagePoint) -> Option<f64> {
         let position = self.map.to_mm(px)? - self.origin;
         Some(
@@ -88,7 +86,7 @@ impl BeadView {
         }
     }
 
-    /// The pixel of image coordinates along and across the gauge's axis.
+    /// Image coordinates of a point given along and across the gauge's axis.
     pub fn image_point(&self, position: AxisPoint) -> ImagePoint {
         match self.axis {
             BeadAxis::Vertical => ImagePoint::new(position.cross, position.run),
@@ -96,7 +94,7 @@ impl BeadView {
         }
     }
 
-    /// 1 where `run` grows in the direction of travel, else −1.
+    /// 1 if `run` grows in the direction of travel, else −1.
     pub fn run_sign(&self) -> f64 {
         match self.axis {
             BeadAxis::Vertical => -1.0,

@@ -13,21 +13,20 @@ const NODES_PER_LENGTH: f64 = 3.0;
 /// Nodes on either side that contribute. Derived: the kernel exp(−2(7/3)²) is 2·10⁻⁵.
 const KERNEL_REACH_NODES: i64 = 7;
 
-/// Deviation of both edges along the path: white noise on a grid, hashed from
-/// the seed and the node's number, and smoothed with a Gaussian. The
-/// autocorrelation is exp(−(distance/length)²).
+/// Deviations of both edges along the path: white noise on a grid, hashed from the seed and the
+/// node's number, and smoothed by a Gaussian. The autocorrelation is exp(−(distance/length)²).
 #[derive(Debug, Clone)]
 pub struct Waviness {
     size_mm: f64,
     spacing_mm: f64,
     seed: u64,
-    /// The nodes that were used last; a cache, which changes no result.
+    /// The last used nodes; a cache that changes no result.
     nodes: VecDeque<[f64; 2]>,
     first: i64,
 }
 
 impl Waviness {
-    /// Each edge carries its own half of the variance of the width.
+    /// Each edge has half the variance of the width.
     pub fn new(roughness: EdgeRoughness, seed: u64) -> Self {
         let sum_of_squares = PI.sqrt() / 2.0 * NODES_PER_LENGTH;
         Self {
@@ -59,7 +58,7 @@ impl Waviness {
         sum.map(|deviation| deviation * self.size_mm)
     }
 
-    /// Makes `nodes` the ones around a node.
+    /// Fills the cache with the nodes around `middle`.
     fn reach_for(&mut self, middle: i64) {
         let wanted = middle.saturating_sub(KERNEL_REACH_NODES);
         let count = 2 * KERNEL_REACH_NODES + 1;

@@ -1,5 +1,5 @@
-//! The camera of a simulated cell: rendered frames that are measured like any
-//! other, or the true width with noise.
+//! The camera of a simulated cell: it measures rendered frames, or gives the true width with
+//! noise.
 
 use nalgebra::Vector2;
 
@@ -16,32 +16,32 @@ use crate::sim::truth::Truth;
 use crate::sim::view::gauge_middle;
 use crate::vision::{BeadAxis, Edges, Hints, Measurer, Reject, WidthMeasurement};
 
-/// What the camera saw, for an observer.
+/// The result of one frame, for an observer.
 #[derive(Debug)]
 pub struct FrameObservation<'a> {
-    /// Number of the frame, through all layers.
+    /// Number of the frame, counted over all layers.
     pub seq: u64,
-    /// When.
+    /// Time of capture.
     pub captured_at: Stamp,
-    /// The width, or the status of a frame that was refused.
+    /// The width, or the status of a rejected frame.
     pub outcome: Result<WidthMeasurement, &'static str>,
-    /// The frame, where one was rendered.
+    /// The frame, if one was rendered.
     pub frame: Option<&'a Frame>,
-    /// The edges behind the width, where a frame was measured.
+    /// The edges from which the width was measured, if a frame was measured.
     pub edges: Option<Edges<'a>>,
-    /// What a perfect measurement would have found.
+    /// The result of a perfect measurement; `None` unless the bead runs through the whole gauge.
     pub truth: Option<Truth>,
-    /// Where along the bead the middle of the gauge was \[mm\].
+    /// Position of the middle of the gauge along the bead \[mm\].
     pub position_mm: f64,
-    /// The controller's answer.
+    /// Step of the controller in response.
     pub step: &'a Step,
-    /// Speed that the robot last reported.
+    /// Last speed that the robot reported.
     pub speed: Option<MmPerS>,
     /// Last setpoint.
     pub setpoint: Option<MmPerS>,
 }
 
-/// One image.
+/// One image and its width.
 pub struct CapturedFrame {
     pub seq: u64,
     pub outcome: Result<WidthMeasurement, &'static str>,
@@ -55,15 +55,15 @@ pub struct SimCamera {
     seq: u64,
     gauge_length: f64,
     noise: Mm,
-    /// Fraction of the widths that are outliers, and most by which they are off.
+    /// Fraction of the widths that are outliers, and the largest relative error of an outlier.
     outlier_rate_and_size: (f64, f64),
     missing_fraction: f64,
-    /// Widths that are believed.
+    /// Widths that are plausible.
     width_range: WidthRange,
     rides_on_robot: bool,
     calibration: Calibration,
     surface_height: Mm,
-    /// How much higher the bead lies than that of the first layer.
+    /// Height of the bead above that of the first layer.
     rise: Mm,
     middle: ImagePoint,
     across: Vector2<f64>,
@@ -98,7 +98,7 @@ impl SimCamera {
         })
     }
 
-    /// The bead lies higher than that of the first layer from now on.
+    /// Sets the height of the bead above that of the first layer.
     pub fn raise(&mut self, rise: Mm) {
         self.rise = rise;
         self.renderer.raise(rise);
@@ -109,7 +109,7 @@ impl SimCamera {
         self.measurer.edges()
     }
 
-    /// Looks at the bead with the middle of the gauge at `under_mm` along it.
+    /// Takes an image with the middle of the gauge at `position_mm` along the bead.
     pub fn take(&mut self, now: Stamp, position_mm: f64, z: Mm, bead: &LaidBead) -> CapturedFrame {
         let seq = self.seq;
         self.seq += 1;
@@ -176,7 +176,7 @@ impl SimCamera {
         })
     }
 
-    /// The factor by which a width is wrong; mostly 1.
+    /// Factor on a measured width; 1 unless it is an outlier.
     fn outlier(&self, seq: u64) -> f64 {
         let (fraction, size) = self.outlier_rate_and_size;
         if hash::unit(hash::mix(&[self.seed, OUTLIER_STREAM, seq])) < fraction {
@@ -186,7 +186,7 @@ impl SimCamera {
         }
     }
 
-    /// Where the edges of a bead in the middle of the gauge would be seen.
+    /// Image points of the edges of a bead in the middle of the gauge.
     fn edge_points(&self, width: Mm, surface: &SurfaceMap) -> Option<(ImagePoint, ImagePoint)> {
         let middle = surface.to_mm(self.middle)?;
         let beside = surface.to_mm(self.middle + self.across)?;

@@ -1,11 +1,11 @@
-//! The clocks of a simulated cell, and which of them strikes next.
+//! The clocks of a simulated cell, and the next event.
 
 use crate::cell::Cell;
 use crate::cell::file::RunPart;
 use crate::core::{Span, Stamp};
 use crate::sim::hash;
 
-/// What comes next.
+/// The next event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ClockEvent {
     Report,
@@ -15,8 +15,7 @@ pub enum ClockEvent {
     ExtruderTick,
 }
 
-/// One clock of a cell: period and phase \[s\], how often it has struck, and
-/// what for.
+/// One clock of a cell: period and phase \[s\], number of past events, and their kind.
 #[derive(Debug, Clone, Copy)]
 struct Clock {
     period: f64,
@@ -25,7 +24,7 @@ struct Clock {
     event: ClockEvent,
 }
 
-/// The clocks of a cell; at the same time the first of them is first.
+/// The clocks of a cell; for events at the same time their order counts.
 pub struct Ticker {
     began: Stamp,
     clocks: Vec<Clock>,
@@ -36,7 +35,8 @@ impl Ticker {
         let simulation = &cell.simulation;
         let (frame, tick) = (1.0 / run.camera.rate_hz, 1.0 / run.robot.rate_hz);
         let step = simulation.step.secs();
-        // On the grid of the world, as a real cell's clocks are not.
+        // Phases on the time grid of the simulation; the phases of a real cell's clocks are
+        // arbitrary.
         let phase = |which: u64, period: f64| {
             if !simulation.random_phase {
                 return 0.0;

@@ -6,16 +6,17 @@ use crate::core::{Mm3PerS, Stamp};
 
 /// Observes a simulated cell.
 pub trait Observer {
-    /// An event and the controller's answer.
+    /// Called with an event and the step that the controller made in response.
     fn step(&mut self, now: Stamp, event: &Event, step: &Step);
 
-    /// A frame, after the step that it caused.
+    /// Called with a frame, after the step that it caused.
     fn frame(&mut self, observation: &FrameObservation<'_>);
 
-    /// The flow at the nozzle of a commanded extruder, and the demand while bead is laid.
+    /// Called with the flow at a commanded extruder's nozzle, and with the demand while bead is
+    /// laid.
     fn flow(&mut self, _now: Stamp, _wanted: Option<Mm3PerS>, _flow: Mm3PerS) {}
 
-    /// Whether the layer is to end now, with what there is of it.
+    /// Whether the layer should end now, although it is not complete.
     fn is_done(&self) -> bool {
         false
     }

@@ -1,12 +1,12 @@
-//! The simulated robot as the runner's port: the robot's own state machine,
-//! spoken to in the link's lines, without a socket between.
+//! The simulated robot as a port of the runner: the robot's state machine in the same process. It
+//! gets the lines of the link without a socket.
 
 use crate::control::Command;
 use crate::core::{Mm, RobotLimits, RobotMode, RobotState, Stamp};
 use crate::link::{PcLine, RobotLine, VirtualRobot};
 use crate::run::ports::{RobotPort, SendError, Sent};
 
-/// A robot within the process.
+/// A robot in the same process.
 #[derive(Debug)]
 pub struct SimPort {
     cell: VirtualRobot,
@@ -15,12 +15,12 @@ pub struct SimPort {
 }
 
 impl SimPort {
-    /// A robot that takes setpoints valid for `valid_ms`.
+    /// A robot whose setpoints are valid for `valid_ms`.
     pub fn new(cell: VirtualRobot, valid_ms: u32) -> Self {
         Self { cell, seq: 0, valid_ms: u64::from(valid_ms) }
     }
 
-    /// Connects and greets.
+    /// Connects and completes the handshake; returns the robot's limits.
     pub fn connect(&mut self, now: Stamp) -> RobotLimits {
         self.cell.connect(now);
         let _ = self.cell.take(now, PcLine::Hello);

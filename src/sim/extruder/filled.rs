@@ -24,7 +24,7 @@ pub struct Filled {
 }
 
 impl Filled {
-    /// At the filled length that the cell starts with.
+    /// The plant at the cell's initial filled length.
     pub fn new(settings: &Settings, seed: u64) -> Self {
         let scheme = Integrator::RungeKutta(STEP.secs());
         let Settings { screw, start_m, initial_fill: before, .. } = *settings;

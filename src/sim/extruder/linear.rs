@@ -12,7 +12,7 @@ const FLOW_STREAM: u64 = 0x0000_666c_6f77;
 /// Random stream of the sensor. Derived: the bytes of "sens".
 const SENSOR_STREAM: u64 = 0x7365_6e73;
 
-/// The plant with its memory.
+/// The plant with its state.
 #[derive(Debug)]
 pub struct LinearPlantSim {
     simulator: Simulator,
@@ -20,14 +20,14 @@ pub struct LinearPlantSim {
     seed: u64,
     steps: u64,
     reports: u64,
-    /// Speed of the screw in the unit of the command.
+    /// Speed of the screw \[unit of the command\].
     turning: f64,
     modelled: f64,
     noise: f64,
 }
 
 impl LinearPlantSim {
-    /// At rest. Fails where the transfer function cannot be discretised.
+    /// The plant at rest. Fails if the transfer function cannot be discretised.
     pub fn new(plant: &LinearPlant, seed: u64) -> Result<Self, ModelError> {
         let simulator = Simulator::new(&plant.transfer, STEP.secs(), Between::Held)?;
         let plant = plant.clone();
@@ -35,7 +35,7 @@ impl LinearPlantSim {
         Ok(Self { simulator, plant, seed, steps, reports, turning, modelled, noise })
     }
 
-    /// The screw after a step with a command.
+    /// Speed of the screw after a step with a command.
     fn screw_after(&self, command: f64) -> f64 {
         match self.plant.screw_lag_s {
             Some(lag_s) if lag_s > 0.0 => {

@@ -6,7 +6,7 @@ use crate::core::Mm3PerS;
 use crate::extruder::ExtruderReport;
 use crate::sim::melt::{Melt, MeltParameters};
 
-/// The plant with its memory.
+/// The plant with its state.
 #[derive(Debug)]
 pub struct Molten {
     melt: Melt,
@@ -18,7 +18,7 @@ pub struct Molten {
 }
 
 impl Molten {
-    /// An extruder that has stood for long, for a bead of the usual flow.
+    /// An extruder after a long rest, for a bead of the flow `usual`.
     pub fn new(plant: &MeltPlant, seed: u64, usual: Mm3PerS) -> Self {
         let usual_void: f64 = MeltParameters::TYPICAL.voids.iter().map(|(most, _)| most).sum();
         let size = plant.void_mm3 / usual_void;

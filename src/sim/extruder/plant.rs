@@ -8,8 +8,7 @@ pub const STEP: Span = Span::from_millis(1);
 
 /// A plant from command to flow.
 pub trait SimPlant: std::fmt::Debug + Send {
-    /// Advances by [`STEP`] with a command, in the command's unit, or without one while the
-    /// pump is off.
+    /// Advances by [`STEP`]. The command is in the plant's own unit; `None` while the pump is off.
     fn advance(&mut self, command: Option<f64>);
 
     /// Flow through an open nozzle.

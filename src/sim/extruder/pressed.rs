@@ -14,12 +14,12 @@ use crate::sim::pressure::{Disturbances, GainWave, LoadChange, SimPressure, TICK
 pub struct Pressed {
     process: SimPressure,
     nozzle: PowerLaw,
-    /// Time since the process was advanced last \[s\].
+    /// Time since the process was last advanced \[s\].
     elapsed_s: f64,
 }
 
 impl Pressed {
-    /// At rest.
+    /// The plant at rest.
     pub fn new(plant: &PressurePlant, seed: u64) -> Self {
         let wave = &plant.gain_wave;
         let InputLoad { rpm, at_s } = plant.load;
