@@ -1,5 +1,4 @@
-//! Beads of the simulated cell that are laid and judged, and several controllers held
-//! against each other on the same seeds.
+//! Simulated beads and their errors, and comparisons of several controllers with the same seeds.
 
 pub mod compare;
 pub mod layer;

@@ -14,19 +14,18 @@ use crate::numeric::rank::mean_median;
 use crate::sim::cell::SimCellError;
 use crate::width_control::target::WidthTarget;
 
-/// Path after control began from which errors count \[mm\]: the step to the target is not an
-/// error of control.
+/// Path after control began from which errors count \[mm\]; before it the bead follows the step to
+/// the target.
 pub const JUDGED_AFTER_MM: f64 = 30.0;
 /// Path after control began from which the standard deviation counts \[mm\]. Derived: more than
 /// the 455 mm that the paper's loop needs to settle at 42 mm (papers.md).
 pub const SIGMA_AFTER_MM: f64 = 700.0;
-/// Length of the pieces of path over which errors of all seeds are combined \[mm\].
+/// Length of the segments over which errors of all seeds are combined \[mm\].
 const PIECE_MM: f64 = 5.0;
 /// Confidence level of the intervals. By definition of "95 %" in the tables.
 const CONFIDENCE: f64 = 0.95;
 
-/// A controller with its cell; bead, simulation and calibration are those of the common
-/// plant.
+/// A controller with its cell; bead, simulation and calibration are those of the common plant.
 #[derive(Debug, Clone)]
 pub struct Contender {
     /// Its name.
@@ -40,7 +39,7 @@ pub struct Contender {
 }
 
 impl Contender {
-    /// The same with another target width.
+    /// The run part with another target width.
     fn with_width(&self, width: Mm) -> RunPart {
         let mut run = self.run.clone();
         run.control.target = WidthTarget::constant(width);
@@ -48,19 +47,19 @@ impl Contender {
     }
 }
 
-/// A number over seeds.
+/// Statistics of a number over the seeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeedStatistics {
-    /// Its mean; none where a seed has none.
+    /// Mean; `None` if a seed has no number.
     pub mean: Option<f64>,
     /// Half the interval that holds the mean with 95 % confidence, by Student's t.
     pub confidence: Option<f64>,
-    /// Its median; none where most seeds have none.
+    /// Median; `None` if most seeds have no number.
     pub median: Option<f64>,
 }
 
 impl SeedStatistics {
-    /// Of a number of each seed.
+    /// Statistics of one number per seed; infinity or NaN stands for no number.
     pub fn of(mut values: Vec<f64>) -> Self {
         let finite = values.iter().all(|value| value.is_finite());
         let count = to_f64(values.len());
@@ -76,7 +75,7 @@ impl SeedStatistics {
     }
 }
 
-/// Half the confidence interval of a mean of so many values, in its standard deviations.
+/// Half the confidence interval of a mean of `count` values, in standard errors of the mean.
 fn confidence_factor(count: f64) -> Option<f64> {
     let student = StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
     Some(student.inverse_cdf(0.5 * (1.0 + CONFIDENCE)))
@@ -87,7 +86,7 @@ fn confidence_factor(count: f64) -> Option<f64> {
 pub struct Figures {
     /// Mean absolute error of the bead from 30 mm after control began \[mm\].
     pub mean_error_mm: SeedStatistics,
-    /// Its root mean square \[mm\].
+    /// Root mean square error, from there on \[mm\].
     pub rms_error_mm: SeedStatistics,
     /// Integral of the absolute error over the path from where control began \[mm²\].
     pub integral_mm2: SeedStatistics,
@@ -98,18 +97,18 @@ pub struct Figures {
     /// Root mean square error over that of the first controller with the same
     /// seed.
     pub ratio: SeedStatistics,
-    /// Seeds whose bead it never controlled, or did not lay to its end.
+    /// Number of seeds whose bead was not controlled at all, or not laid to its end.
     pub failed_seeds: usize,
-    /// Root mean square error over all seeds, along the path.
+    /// Root mean square error over all seeds, by the path \[mm\].
     pub error_profile: Vec<BeadPoint>,
-    /// Width of the bead of the first seed.
+    /// Width by the path of the first seed's bead \[mm\].
     pub example: Vec<BeadPoint>,
     /// Root mean square error of each seed \[mm\].
     rms_by_seed: Vec<f64>,
 }
 
 impl Figures {
-    /// Lays a width with seeds from 0 on, in parallel.
+    /// Lays a bead of a width with each seed from 0 on, in parallel.
     pub fn lay(
         who: &Contender,
         width: Mm,
@@ -145,7 +144,7 @@ impl Figures {
     }
 }
 
-/// Root mean square error of all seeds, piece by piece of the path.
+/// Root mean square error over all seeds, for each segment of the path.
 fn error_profile(trials: &[LayerTrial], target_mm: f64) -> Vec<BeadPoint> {
     let mut pieces: Vec<(f64, f64)> = Vec::new();
     for (at, width) in trials.iter().flat_map(|trial| &trial.bead) {

@@ -1,4 +1,4 @@
-//! One simulated layer, and the errors of the bead itself.
+//! One simulated layer, and the errors of the bead's true width.
 
 use crate::calibration::Calibration;
 use crate::cell::file::{Cell, RunPart};
@@ -13,17 +13,17 @@ use crate::sim::cell::{FrameObservation, Observer, SimCell, SimCellError};
 /// Distance between positions at which the bead is judged \[mm\]: that of the bead's own grid.
 const BEAD_SPACING_MM: f64 = 0.5;
 
-/// A layer as it was laid.
+/// A simulated layer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerTrial {
     /// Measured widths.
     pub score: LayerScore,
-    /// Width of the bead itself, every half millimetre.
+    /// True width of the bead, every half millimetre.
     pub bead: Vec<BeadPoint>,
-    /// Where the nozzle was when the first controlled setpoint was sent
-    /// \[mm\]; infinite where there was none.
+    /// Path of the nozzle when the first controlled setpoint was sent \[mm\]; infinite if none was
+    /// sent.
     pub control_start_mm: f64,
-    /// Whether it was laid to its end; the controller stopped it otherwise.
+    /// Whether it was laid to its end; otherwise the controller stopped it.
     pub complete: bool,
     target_mm: f64,
 }
@@ -39,7 +39,7 @@ impl LayerTrial {
         Self::lay_mismatched(cell, run, calibration, 1.0, seed)
     }
 
-    /// The same by a controller whose assumed distance of the camera is wrong by a factor.
+    /// As [`Self::lay`], with a controller that assumes the camera's distance wrong by a factor.
     pub fn lay_mismatched(
         cell: &Cell,
         run: &RunPart,
@@ -65,8 +65,8 @@ impl LayerTrial {
         Ok(Self { score, bead, control_start_mm, complete, target_mm })
     }
 
-    /// Path from a position until the bead stays within a band of the target \[mm\]; infinite
-    /// if it never does, or no bead lies there.
+    /// Path from a position until the bead stays within a band about the target \[mm\]; infinite
+    /// if it never does, or if there is no bead.
     pub fn settles_within(&self, from_mm: f64, band_mm: f64) -> f64 {
         let outside =
             |(at, width): &BeadPoint| *at >= from_mm && (width - self.target_mm).abs() > band_mm;
@@ -78,7 +78,7 @@ impl LayerTrial {
     }
 
     /// Integral of the absolute error over the path from a position on \[mm²\]. This and the
-    /// following are NaN where no bead lies there.
+    /// following figures are NaN if there is no bead.
     pub fn error_integral(&self, from_mm: f64) -> f64 {
         if self.errors(from_mm).next().is_none() {
             return f64::NAN;
@@ -111,7 +111,7 @@ impl LayerTrial {
 /// Observes the first setpoint that the controller computes.
 struct StartObserver {
     score: LayerScore,
-    /// Path at the bead's start, the newest report, and when it came.
+    /// Path at the bead's start, the newest report, and its time of arrival.
     newest: Option<(f64, RobotState, Stamp)>,
     control_start_mm: Option<f64>,
 }

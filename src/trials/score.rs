@@ -8,7 +8,7 @@ use crate::sim::cell::{FrameObservation, Observer};
 /// A position along the bead and a value there.
 pub type BeadPoint = (f64, f64);
 
-/// Observes one layer and sums the figures of the 2022 paper's tables.
+/// Observes one layer and computes the figures of the 2022 paper's tables.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LayerScore {
     target: f64,
@@ -17,30 +17,29 @@ pub struct LayerScore {
     refused: u64,
     /// Measured width over path.
     pub widths: Vec<BeadPoint>,
-    /// The same, as a perfect measurement would have it, where frames are
-    /// rendered.
+    /// Widths of a perfect measurement over path, if frames are rendered.
     pub true_widths: Vec<BeadPoint>,
     /// Robot's speed over path.
     pub speeds: Vec<BeadPoint>,
 }
 
 impl LayerScore {
-    /// For a target width \[mm\].
+    /// A score against a target width \[mm\].
     pub fn new(target_mm: f64) -> Self {
         Self { target: target_mm, ..Self::default() }
     }
 
-    /// Mean absolute error over all measured bead \[mm\].
+    /// Mean absolute error over all measured widths \[mm\].
     pub fn mean_error(&self) -> f64 {
         mean(self.errors().map(f64::abs))
     }
 
-    /// Its root mean square \[mm\].
+    /// Root mean square error over all measured widths \[mm\].
     pub fn rms_error(&self) -> f64 {
         rms(self.errors())
     }
 
-    /// Mean of the speed over time, the start included \[mm/s\].
+    /// Mean speed over time, start included \[mm/s\].
     pub fn mean_speed(&self) -> f64 {
         match (self.started, self.ended) {
             (Some((from, first)), Some((to, last))) if to > from => {
@@ -50,7 +49,7 @@ impl LayerScore {
         }
     }
 
-    /// Rejected frames that showed bead.
+    /// Number of rejected frames that showed bead.
     pub fn refused(&self) -> u64 {
         self.refused
     }
@@ -72,7 +71,7 @@ impl Observer for LayerScore {
     }
 
     fn frame(&mut self, observation: &FrameObservation<'_>) {
-        // A gauge that holds the start of the bead does not measure a width of the layer.
+        // A gauge that contains the start of the bead does not measure the layer's width.
         if observation.position_mm < 0.0 {
             return;
         }
