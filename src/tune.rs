@@ -1,6 +1,6 @@
-//! Identification of a cell from a bead with speed steps, and settings that follow: model of
-//! the bead, noise, timing and response of the robot; gains with their stability margins; and
-//! the predicted response of each controller.
+//! Identification of a cell from a bead with speed steps: model of the bead, noise, timing and
+//! response of the robot. From it follow proposed settings, gains with their stability margins,
+//! and the predicted response of each controller.
 //!
 //! ```text
 //! recorded events and steps ─▶ log ─▶ plant (bead, noise, robot, timing)
@@ -24,22 +24,22 @@ mod tests;
 pub use log::Log;
 pub use plant::{IdentifiedCell, TuneFacts};
 
-/// A number and its standard deviation.
+/// An estimate and its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Estimated {
-    /// The number.
+    /// The estimate.
     pub value: f64,
     /// Its standard deviation.
     pub sigma: f64,
 }
 
-/// Why a recording does not identify its cell.
+/// Why a cell cannot be identified from a recording.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TuneError {
-    /// The offset is undetermined.
+    /// The camera's offset cannot be determined.
     #[error(transparent)]
     Bead(#[from] crate::identify::camera_offset::CameraOffsetError),
-    /// The exponent is uncertain.
+    /// The exponent is too uncertain.
     #[error(
         "the exponent is {exponent:.2} ± {sigma:.2}, known no better than to a third of itself: \
          lay a longer bead, or one with larger steps (--step-fraction)"
@@ -50,7 +50,7 @@ pub enum TuneError {
         /// Its standard deviation.
         sigma: f64,
     },
-    /// The exponent is at an end of its range.
+    /// The estimated exponent is at an end of its range.
     #[error(
         "the exponent is at the end of what is tried, {exponent:.2}: the widths do not answer the \
          speed as a bead does; see that the camera looks at this robot's bead"

@@ -1,4 +1,4 @@
-//! Controllers that are tried on an identified cell.
+//! Controllers that are compared on an identified cell.
 
 use std::sync::Arc;
 
@@ -9,23 +9,23 @@ use crate::width_control::strategy::WidthStrategy;
 use crate::width_control::strategy::distance::DistanceStrategy;
 use crate::width_control::strategy::pi::PiStrategy;
 
-/// A controller that is tried.
+/// A controller that is compared.
 #[derive(Debug, Clone)]
 pub struct ControllerCandidate {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// Its width controller.
     pub strategy: Arc<dyn WidthStrategy>,
     /// Gains of the PI controller.
     pub gains: Option<PiGains>,
-    /// The camera's distance in its settings \[mm\].
+    /// Distance of the camera that it assumes \[mm\].
     pub offset_mm: f64,
-    /// Its standard deviation \[mm\].
+    /// Standard deviation of that distance \[mm\].
     pub offset_sigma_mm: f64,
 }
 
 impl ControllerCandidate {
-    /// As configured in the cell; `None` where the strategy does not control the width.
+    /// The controller of the cell file; `None` if its strategy does not control the width.
     pub fn now(run: &RunPart) -> Option<Self> {
         let strategy = &run.control.strategy;
         let name = if strategy.as_kind::<PiStrategy>().is_some() {

@@ -5,7 +5,7 @@ use crate::core::{MmPerS, RobotState, Stamp};
 use crate::identify::camera_offset::TimedWidth;
 use crate::width_control::steps::{StepSettings, StepsProgress, StepsTrace};
 
-/// A run as it was recorded, in order.
+/// A recorded run, in the order of time.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Log {
     /// The robot's reports with their arrival times.
@@ -17,14 +17,14 @@ pub struct Log {
     pub latencies_s: Vec<f64>,
     /// Speed setpoints with the times at which they were sent.
     pub setpoints: Vec<(Stamp, MmPerS)>,
-    /// Frames without a width.
+    /// Number of rejected frames.
     pub refused: u64,
     /// Latest progress of the speed steps.
     pub steps: Option<StepsTrace>,
 }
 
 impl Log {
-    /// Takes an event.
+    /// Adds an event.
     pub fn event(&mut self, now: Stamp, event: &Event) {
         match event {
             Event::Robot(state) => self.states.push((now, *state)),
@@ -38,7 +38,7 @@ impl Log {
         }
     }
 
-    /// Takes a step of the controller.
+    /// Adds a step of the controller.
     pub fn step(&mut self, now: Stamp, step: &Step) {
         if let Some(Command::Speed(speed)) = step.command {
             self.setpoints.push((now, speed));

@@ -7,18 +7,18 @@ use crate::identify::camera_offset::{OffsetStudy, WidthAtSpeed};
 use crate::numeric::number::to_f64;
 use crate::numeric::rank;
 
-/// Relative standard error of the noise times the root of the number of differences: 1.17 for
-/// independent ones (the median deviation), more for differences with common widths. A choice.
+/// Relative standard error of the noise times the square root of the number of differences: 1.17
+/// for independent ones (the median deviation), more for differences with common widths. A choice.
 const MEDIAN_ERROR_FACTOR: f64 = 1.5;
-/// Standard deviation of averaged widths over that expected from their noise, above which the
-/// bead is rough. A choice.
+/// Ratio of the standard deviation of averaged widths to that expected from their noise; above it
+/// the bead is rough. A choice.
 const MIN_ROUGHNESS_RATIO: f64 = 1.3;
-/// Variances of the random walk per millimetre that are tried, over that of an averaged width:
-/// a geometric sequence.
+/// Tried variances of the random walk per millimetre, over that of an averaged width: a geometric
+/// sequence.
 const MIN_VARIANCE_RATIO: f64 = 1e-7;
 const VARIANCE_RATIO_STEP: f64 = 1.25;
 const VARIANCE_RATIOS: u32 = 100;
-/// A variance in such units that is practically infinite: the state before the first width.
+/// A practically infinite variance in these units: that of the state before the first width.
 const UNKNOWN_VARIANCE: f64 = 1e9;
 /// Derived: half the χ² quantile of one degree of freedom at 68.3 %, 1.00/2 (Wilks 1938).
 const LN_LIKELIHOOD_DROP_1_SIGMA: f64 = 0.5;
@@ -28,10 +28,10 @@ const LN_LIKELIHOOD_DROP_95: f64 = 1.92;
 /// Components of the noise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PlantNoise {
-    /// From width to width, relative to the width.
+    /// Standard deviation of a single width, relative; independent from width to width.
     pub per_width: Estimated,
-    /// Standard deviation of widths averaged over a gauge beyond that, relative: the bead is
-    /// rough, and widths with overlapping gauges have it in common.
+    /// Standard deviation of widths averaged over a gauge in excess of `per_width`, relative: the
+    /// bead's roughness, which is common to widths with overlapping gauges.
     pub roughness: f64,
     /// Random walk along the path.
     pub drift: Drift,
@@ -50,24 +50,24 @@ pub enum Drift {
         /// Upper end of the interval.
         high: f64,
     },
-    /// None is significant; the upper limit at 95 %.
+    /// No significant random walk; the upper limit at 95 %.
     AtMost(f64),
 }
 
-/// Components of the residuals of the widths.
+/// Components of the noise, from the residuals of the widths.
 pub fn width_noise(study: &OffsetStudy) -> PlantNoise {
     let each = neighbour_noise(study, &study.widths);
     let pieces = neighbour_noise(study, &study.pieces).value;
     let widths: usize = study.pieces.iter().map(|piece| piece.count).sum();
     let per_piece = to_f64(widths) / to_f64(study.pieces.len()).max(1.0);
     let rough = (pieces.powi(2) - each.value.powi(2) / per_piece.max(1.0)).max(0.0).sqrt();
-    // Widths without a common part of a gauge differ by their noise only.
+    // Widths whose gauges do not overlap differ only by their noise.
     let is_rough = pieces > each.value / per_piece.max(1.0).sqrt() * MIN_ROUGHNESS_RATIO;
     let roughness = if is_rough { rough } else { 0.0 };
     PlantNoise { per_width: each, roughness, drift: drift(&study.pieces) }
 }
 
-/// From the differences of neighbours, in which a drift cancels.
+/// Noise of a width from the differences of successive widths, in which a drift cancels.
 fn neighbour_noise(study: &OffsetStudy, samples: &[WidthAtSpeed]) -> Estimated {
     let pairs = samples.iter().zip(samples.iter().skip(1));
     let same = pairs.filter(|(before, after)| before.bead == after.bead);
@@ -79,7 +79,7 @@ fn neighbour_noise(study: &OffsetStudy, samples: &[WidthAtSpeed]) -> Estimated {
     Estimated { value, sigma: value * MEDIAN_ERROR_FACTOR / count.sqrt() }
 }
 
-/// Random walk of maximum likelihood beside independent noise, with level and exponent
+/// Maximum-likelihood random walk in addition to independent noise, with level and exponent
 /// eliminated (restricted likelihood, Patterson and Thompson 1971). The averaged widths are a
 /// gauge apart, so that roughness within a gauge counts as noise.
 fn drift(pieces: &[WidthAtSpeed]) -> Drift {
@@ -96,7 +96,7 @@ fn drift(pieces: &[WidthAtSpeed]) -> Drift {
     Drift::Estimated { per_root_m, low: low.min(per_root_m), high: high.max(per_root_m) }
 }
 
-/// Interval in which the likelihood exceeds a limit, by linear interpolation.
+/// Interval in which the log-likelihood exceeds a limit, by linear interpolation.
 fn likelihood_interval(each: &[WalkLikelihood], limit: f64) -> (f64, f64) {
     let is_within = |one: &WalkLikelihood| one.ln > limit;
     let cross = |inside: &WalkLikelihood, outside: Option<&WalkLikelihood>| match outside {
@@ -123,8 +123,8 @@ struct WalkLikelihood {
 }
 
 impl WalkLikelihood {
-    /// With the variance of the walk per millimetre over that of an averaged width. The Kalman
-    /// filter (1960) gives the innovations, to which the exponent is fitted.
+    /// Log-likelihood for a ratio of the walk's variance per millimetre to that of an averaged
+    /// width. A Kalman filter (1960) gives the innovations, to which the exponent is fitted.
     fn of(pieces: &[WidthAtSpeed], ratio: f64) -> Self {
         let mut before: Option<&WidthAtSpeed> = None;
         let (mut variance, mut width, mut speed) = (UNKNOWN_VARIANCE, 0.0, 0.0);
@@ -136,7 +136,7 @@ impl WalkLikelihood {
             }
             let total = variance + 1.0;
             let (y, x) = (piece.ln_width - width, piece.ln_speed - speed);
-            // The first of a bead determines its level only.
+            // The first width of a bead determines only its level.
             if variance < UNKNOWN_VARIANCE {
                 n += 1.0;
                 xx += x * x / total;

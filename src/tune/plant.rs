@@ -9,17 +9,17 @@ use super::{Estimated, Log, TuneError};
 use crate::core::{Mm, MmPerS, ROBOT_LAG};
 use crate::identify::camera_offset::{OffsetSearch, OffsetStudy, study};
 
-/// Relative standard deviation above which an exponent is useless. A choice.
+/// Relative standard deviation of the exponent above which it cannot be used. A choice.
 const MAX_RELATIVE_SIGMA: f64 = 1.0 / 3.0;
 
-/// Known facts about the cell.
+/// Facts about the cell that need no identification.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TuneFacts {
     /// Length of the gauge along the bead.
     pub gauge: Mm,
-    /// Largest distance of the camera that is tried.
+    /// Largest distance of the camera in the search.
     pub max_offset: Mm,
-    /// Speed at which the level of the bead is given.
+    /// Speed v₀ at which the width A is given.
     pub start_speed: MmPerS,
 }
 
@@ -42,7 +42,7 @@ pub struct IdentifiedCell {
     pub timing: CellTiming,
     /// Length of the gauge \[mm\].
     pub gauge_mm: f64,
-    /// Widths and the speeds that laid them.
+    /// Widths and the speeds at which their bead was laid.
     pub study: OffsetStudy,
 }
 
@@ -56,7 +56,7 @@ pub struct RobotDynamics {
 }
 
 impl IdentifiedCell {
-    /// From a log.
+    /// Identifies a cell from a log.
     pub fn of(log: &Log, facts: &TuneFacts) -> Result<Self, TuneError> {
         let search = OffsetSearch { gauge: facts.gauge, max_offset: facts.max_offset };
         let study = study(&log.states, &log.widths, search)?;
@@ -83,13 +83,13 @@ impl IdentifiedCell {
         })
     }
 
-    /// Speed at which bead of a width is laid \[mm/s\].
+    /// Speed at which a bead of this width is laid \[mm/s\].
     pub fn speed_for(&self, width_mm: f64) -> f64 {
         let ratio = self.width_mm.value / width_mm;
         self.at_speed_mm_per_s * libm::pow(ratio, 1.0 / self.exponent.value)
     }
 
-    /// The robot's response; that of a typical robot if it was not identified.
+    /// The robot's response; a typical one if it was not identified.
     pub fn robot_dynamics(&self) -> RobotDynamics {
         let usual = RobotDynamics { dead_time_s: 0.0, lag_s: ROBOT_LAG.secs() };
         self.robot.map_or(usual, |robot| RobotDynamics {
@@ -98,13 +98,13 @@ impl IdentifiedCell {
         })
     }
 
-    /// Standard deviation of a width that is measured \[mm\].
+    /// Standard deviation of a measured width \[mm\].
     pub fn noise_mm(&self) -> f64 {
         self.width_noise.per_width.value * self.width_mm.value
     }
 
-    /// Random walk of the flow per root metre for simulated beads: the estimate, or zero if it
-    /// is not significant.
+    /// Random walk of the flow per root metre for simulated beads: the estimate, or zero if it is
+    /// not significant.
     pub fn drift_per_root_m(&self) -> f64 {
         match self.width_noise.drift {
             Drift::Estimated { per_root_m, .. } => per_root_m,

@@ -24,10 +24,10 @@ use crate::width_control::target::WidthTarget;
 pub const FLOW_STEP: f64 = 0.08;
 /// Simulated beads per controller. A choice between time and the standard error.
 pub const SEEDS: u64 = 24;
-/// Smallest band about the target in which a bead is settled \[mm\].
+/// Smallest band about the target within which a bead counts as settled \[mm\].
 const MIN_BAND_MM: f64 = 0.5;
-/// Path from the first segment to the flow step, and from there to the end: at least this
-/// \[mm\], and so many camera distances.
+/// Path from the first segment to the flow step, and from there to the end: at least this \[mm\],
+/// and this many camera distances.
 const MIN_SEGMENT_MM: f64 = 1200.0;
 const SEGMENT_OFFSETS: f64 = 15.0;
 /// Fraction of the path before the flow step that counts as steady.
@@ -36,7 +36,7 @@ const STEADY_FRACTION: f64 = 1.0 / 3.0;
 const ROUGHNESS_LENGTH_FRACTION: f64 = 0.1;
 /// Spacing of the widths along the bead \[mm\].
 const SAMPLE_SPACING_MM: f64 = 1.0;
-/// A placeholder where widths are not rendered.
+/// A placeholder: widths are not rendered.
 const UNUSED_SCALE: Calibration = Calibration::Scale { mm_per_px: 0.1, sigma: None };
 /// Bandwidths of a simulated robot \[Hz\].
 const BANDWIDTHS_HZ: (f64, f64) = (0.01, 1000.0);
@@ -46,16 +46,17 @@ const BANDWIDTHS_HZ: (f64, f64) = (0.01, 1000.0);
 pub struct BeadPrediction {
     /// The controller.
     pub name: String,
-    /// Path from the beginning of control until the bead is settled, median of all beads;
-    /// `None` where most are not before the flow step \[mm\].
+    /// Path from the start of control until the bead is settled, median over the beads \[mm\];
+    /// `None` if most have not settled before the flow step.
     pub start_settles_mm: Option<f64>,
-    /// The same from the flow's step to the end.
+    /// Path from the flow step until the bead is settled, median over the beads \[mm\]; `None`
+    /// likewise.
     pub step_settles_mm: Option<f64>,
     /// Root mean square error in the steady part before the flow step \[mm\].
     pub steady_rms_mm: f64,
-    /// Root mean square error from the beginning of control to the end \[mm\].
+    /// Root mean square error from the start of control to the end \[mm\].
     pub whole_rms_mm: f64,
-    /// Beads with a fault.
+    /// Number of beads that ended with a fault.
     pub stopped: usize,
     /// Fastest and slowest setpoint after control began \[mm/s\].
     pub speeds_mm_per_s: (f64, f64),
@@ -75,16 +76,16 @@ pub struct TestCell {
     target_mm: f64,
     /// Band about the target within which a bead counts as settled \[mm\].
     pub band_mm: f64,
-    /// Where the flow steps \[mm\].
+    /// Path at which the flow steps \[mm\].
     pub step_at_mm: f64,
     end_mm: f64,
 }
 
 impl TestCell {
-    /// Of a cell and its identification. Rates, limits and first segment are those of the cell;
-    /// bead, noise, drift, delays and robot are the identified ones. A dead time of the robot
-    /// is added to the camera's, which is equivalent in a loop; its largest acceleration limits
-    /// the setpoints.
+    /// A cell with its identification. Rates, limits and first segment are those of the cell;
+    /// bead, noise, drift, delays and robot are the identified ones. The robot's dead time is
+    /// added to the camera's, which is equivalent in a loop; its largest acceleration limits the
+    /// setpoints.
     pub fn new(cell: &Cell, run: &RunPart, plant: &IdentifiedCell) -> Self {
         let (mut cell, mut run) = (cell.clone(), run.clone());
         let target_mm = run.control.target.nominal().get();
@@ -126,7 +127,7 @@ impl TestCell {
         let median = |way: &dyn Fn(&LaidRun) -> f64| {
             rank::median_of(laid.iter().map(way)).filter(|way| way.is_finite())
         };
-        // A mean over the gauge contains the step from half a gauge before it.
+        // A mean over the gauge includes the flow step from half a gauge before it.
         let steady_end_mm = self.step_at_mm - 0.5 * self.cell.simulation.gauge_length.get();
         let steady = |one: &LaidRun| {
             one.control_start_mm + (1.0 - STEADY_FRACTION) * (steady_end_mm - one.control_start_mm)
@@ -146,8 +147,8 @@ impl TestCell {
         })
     }
 
-    /// Path from a point to where the bead stays within the band; infinite if it does not
-    /// before the end.
+    /// Path from `from_mm` until the bead stays within the band up to `to_mm` \[mm\]; infinite if
+    /// it does not.
     fn settles(&self, one: &LaidRun, from_mm: f64, to_mm: f64) -> f64 {
         let within: Vec<_> =
             one.bead.iter().filter(|(at, _)| (from_mm..to_mm).contains(at)).collect();
@@ -218,7 +219,7 @@ impl Observer for LaidRun {
     fn frame(&mut self, _: &FrameObservation<'_>) {}
 }
 
-/// Applies bead, noise, delays and robot.
+/// Applies the identified bead, noise, delays and robot.
 fn apply_identified(simulation: &mut Simulation, plant: &IdentifiedCell) {
     let robot = plant.robot_dynamics();
     simulation.width_source = WidthSource::Widths;
@@ -249,14 +250,13 @@ fn apply_identified(simulation: &mut Simulation, plant: &IdentifiedCell) {
 /// Shortest correlation length of a simulated roughness \[mm\].
 const MIN_ROUGHNESS_LENGTH_MM: f64 = 0.1;
 
-/// A roughness with the identified standard deviation of means over the gauge: with the
-/// autocorrelation exp(−(distance/l)²), a mean over a long gauge G keeps √π·l/G of the
-/// variance.
+/// A roughness whose means over the gauge have the identified standard deviation: with the
+/// autocorrelation exp(−(distance/l)²), a mean over a long gauge G keeps √π·l/G of the variance.
 fn roughness(plant: &IdentifiedCell) -> EdgeRoughness {
     let measured_mm = plant.width_noise.roughness * plant.width_mm.value;
     let length_mm = ROUGHNESS_LENGTH_FRACTION * plant.gauge_mm;
     if length_mm < MIN_ROUGHNESS_LENGTH_MM {
-        // Widths at points have the roughness of the bead.
+        // A mean over a very short gauge has the full roughness.
         return EdgeRoughness { sigma_mm: measured_mm, length_mm: MIN_ROUGHNESS_LENGTH_MM };
     }
     let kept_fraction = std::f64::consts::PI.sqrt() * ROUGHNESS_LENGTH_FRACTION;

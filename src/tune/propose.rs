@@ -11,37 +11,36 @@ use crate::width_control::pi::PiGains;
 use crate::width_control::strategy::WidthStrategy;
 use crate::width_control::strategy::distance::DistanceStrategy;
 
-/// Random walk of the flow per root metre if less is not known; the default of the distance
-/// controller.
+/// Random walk of the flow per root metre if its estimate is not significant; the default of the
+/// distance controller.
 const DEFAULT_DRIFT: f64 = 0.0055;
-/// Accepted random walks.
+/// Random walks that are accepted as an estimate.
 const DRIFT_RANGE: (f64, f64) = (1e-4, 0.2);
 /// Smallest standard deviation of the camera's distance \[mm\]: nozzles drip, and paths round
 /// their corners. A choice.
 const MIN_OFFSET_SIGMA_MM: f64 = 0.5;
 
-/// Settings of both controllers.
+/// Proposed settings of both controllers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Proposal {
-    /// Of the distance controller.
+    /// Settings of the distance controller.
     pub distance: DistanceProposal,
-    /// Of the PI controller.
+    /// Settings of the PI controller.
     pub pi: PiProposal,
 }
 
 /// Settings of the distance controller.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DistanceProposal {
-    /// b.
+    /// Exponent b.
     pub exponent: f64,
-    /// From the nozzle to the middle of the gauge \[mm\].
+    /// Distance from the nozzle to the middle of the gauge \[mm\].
     pub offset_mm: f64,
-    /// Its standard deviation \[mm\].
+    /// Standard deviation of that distance \[mm\].
     pub offset_sigma_mm: f64,
     /// Random walk of the flow per root metre, relative.
     pub drift_per_root_m: f64,
-    /// Whether b is estimated online: as in the cell, and yes where its strategy is another
-    /// one.
+    /// Whether b is estimated online: as in the cell; `true` if the cell has another strategy.
     pub learns: bool,
 }
 
@@ -52,11 +51,11 @@ pub struct PiProposal {
     pub gains: PiGains,
     /// The loop at the worst speed of the limits.
     pub at: LoopPlant,
-    /// Margins there.
+    /// Stability margins of that loop; `None` if both gains are 0.
     pub margins: Option<LoopMargins>,
 }
 
-/// Settings for the width and the limits of a cell.
+/// Settings for a cell's target width and limits.
 pub fn propose(plant: &IdentifiedCell, run: &RunPart) -> Proposal {
     let at = slowest_loop(plant, run.control.target.nominal().get(), &run.limits);
     let gains = gains(&at);

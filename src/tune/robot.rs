@@ -1,5 +1,5 @@
-//! Response of the robot to setpoints: a dead time and a time constant, from sending a setpoint
-//! to the report of the speed, and a largest acceleration if there is one.
+//! Response of the robot to setpoints, from sending a setpoint to the report of the speed: a dead
+//! time, a time constant, and a largest acceleration if there is one.
 
 use serde::Serialize;
 
@@ -13,18 +13,18 @@ use crate::numeric::row::dot;
 /// Largest dead time and time constant \[s\]. A choice: a slower robot cannot be controlled.
 const MAX_DEAD_TIME_S: f64 = 0.8;
 const MAX_LAG_S: f64 = 1.0;
-/// Grid of the dead time \[s\], and of the time constant.
+/// Grid of the dead time and of the time constant \[s\].
 const DEAD_STEP_S: f64 = 0.02;
 const LAGS_S: [f64; 9] = [0.0, 0.01, 0.02, 0.04, 0.08, 0.16, 0.3, 0.5, 0.9];
 /// Time constant below which it is zero \[s\].
 const MIN_LAG_S: f64 = 1e-6;
-/// Accelerations that are tried, and one that is no limit \[mm/s²\].
+/// Tried accelerations, and a value that stands for no limit \[mm/s²\].
 const SLOPES: [f64; 9] = [15.0, 30.0, 60.0, 120.0, 240.0, 480.0, 960.0, 1900.0, 3800.0];
 const NO_SLOPE: f64 = 1e9;
 /// Change of the logarithm of the acceleration for a search step of one second.
 const LN_SLOPE_PER_STEP: f64 = 20.0;
-/// Sum of squares with an acceleration limit over that without, below which there is one. A
-/// choice.
+/// Ratio of the sums of squares with and without an acceleration limit, below which there is a
+/// limit. A choice.
 const MAX_RESIDUAL_RATIO: f64 = 0.5;
 /// Smallest step of the search \[s\].
 const MIN_SEARCH_STEP_S: f64 = 1e-5;
@@ -34,19 +34,19 @@ const MIN_SETPOINT_CHANGE: f64 = 0.01;
 const MIN_STEPS: usize = 3;
 /// Smallest number of reports.
 const MIN_REPORTS: usize = 20;
-/// Step of the difference quotients \[s\].
+/// Step of the finite differences \[s\].
 const DERIVATIVE_STEP_S: f64 = 1e-3;
 
 /// Response of the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RobotResponse {
-    /// From sending a setpoint until the reported speed changes \[s\].
+    /// Time from sending a setpoint until the reported speed changes \[s\].
     pub dead_time_s: Estimated,
-    /// Time constant of the change \[s\].
+    /// Time constant of the speed \[s\].
     pub lag_s: Estimated,
-    /// Largest acceleration, if there is one \[mm/s²\].
+    /// Largest acceleration \[mm/s²\]; `None` if there is no limit.
     pub slope_mm_per_s2: Option<f64>,
-    /// Residual of the reported speeds \[mm/s\], root mean square.
+    /// Root mean square residual of the reported speeds \[mm/s\].
     pub residual_mm_per_s: f64,
     /// Number of setpoint steps.
     pub steps: usize,
@@ -55,22 +55,22 @@ pub struct RobotResponse {
 /// Why the response is not identified.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RobotResponseError {
-    /// The setpoints hardly changed.
+    /// Too few setpoints changed.
     #[error(
         "only {found} setpoints differ by 1 % or more from the one before, and {MIN_STEPS} are \
          needed to see how the robot answers them"
     )]
     TooFewSteps {
-        /// Steps that were sent.
+        /// Number of setpoint steps.
         found: usize,
     },
-    /// Too few reports under setpoints.
+    /// Too few reports while the robot follows setpoints.
     #[error(
         "only {found} reports are of a robot that prints by setpoints, and {MIN_REPORTS} are \
          needed to see how it answers them"
     )]
     TooFewReports {
-        /// Reports that were.
+        /// Number of those reports.
         found: usize,
     },
     /// The reported speed does not follow the setpoints.
@@ -79,26 +79,26 @@ pub enum RobotResponseError {
          (root mean square)"
     )]
     DoesNotFollow {
-        /// Residual of the reported speeds \[mm/s\].
+        /// Root mean square residual of the reported speeds \[mm/s\].
         left: f64,
         /// Standard deviation of the reported speeds \[mm/s\].
         moved: f64,
     },
 }
 
-/// A setpoint.
+/// A setpoint that was sent.
 #[derive(Debug, Clone, Copy)]
 struct Setpoint {
     at_s: f64,
     speed: f64,
 }
 
-/// A report.
+/// A report of the speed.
 #[derive(Debug, Clone, Copy)]
 struct Report {
     at_s: f64,
     speed: f64,
-    /// Whether it begins a segment.
+    /// Whether it is the first of a bead.
     is_first: bool,
 }
 
@@ -141,8 +141,8 @@ fn count_steps(setpoints: &[Setpoint]) -> usize {
     pairs.filter(|(a, b)| (b.speed - a.speed).abs() > MIN_SETPOINT_CHANGE * a.speed.abs()).count()
 }
 
-/// Reports while the robot follows setpoints. The run-up of a bead, before the first setpoint,
-/// is no response.
+/// Reports while the robot follows setpoints; the start of a bead, before the first setpoint, is
+/// left out.
 fn reports_under_setpoints(states: &[(Stamp, RobotState)], from_s: f64) -> Vec<Report> {
     let mut reports: Vec<Report> = Vec::new();
     let mut before: Option<(Stamp, f64)> = None;
@@ -164,7 +164,7 @@ fn reports_under_setpoints(states: &[(Stamp, RobotState)], from_s: f64) -> Vec<R
 /// Dead time \[s\], time constant \[s\] and logarithm of the largest acceleration in mm/s².
 type ResponseParameters = [f64; 3];
 
-/// Reported speeds less those of the model.
+/// Reported speeds less the speeds of the model.
 fn residuals(setpoints: &[Setpoint], reports: &[Report], answer: ResponseParameters) -> Vec<f64> {
     let [dead_s, lag_s, ln_slope] = answer;
     let accel = libm::exp(ln_slope);
@@ -193,7 +193,7 @@ fn residuals(setpoints: &[Setpoint], reports: &[Report], answer: ResponseParamet
     differences
 }
 
-/// The best response without an acceleration limit, or with one where that is much better.
+/// The best response without an acceleration limit, or with one if that fits much better.
 fn search(squares: &impl Fn(ResponseParameters) -> f64) -> ResponseParameters {
     let free = pattern_search(squares, grid_search(squares, &[NO_SLOPE.ln()]), false);
     let slopes: Vec<f64> = SLOPES.iter().map(|slope| slope.ln()).collect();
@@ -201,7 +201,7 @@ fn search(squares: &impl Fn(ResponseParameters) -> f64) -> ResponseParameters {
     if squares(bound) < MAX_RESIDUAL_RATIO * squares(free) { bound } else { free }
 }
 
-/// The best on a grid.
+/// The best parameters on a grid.
 fn grid_search(
     squares: &impl Fn(ResponseParameters) -> f64,
     ln_slopes: &[f64],

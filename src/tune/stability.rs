@@ -8,9 +8,9 @@
 //! T = d/v + latency + robot's dead time + half a frame's and half a setpoint's period
 //! ```
 //!
-//! The halves are the mean delays of sampling and holding. The gain of this loop falls with the
-//! frequency throughout, so that it has one crossover, and it is stable if and only if its gain
-//! is below 1 where its phase first is −180° (Nyquist 1932).
+//! The halves are the mean delays of sampling and holding. The gain of this loop falls
+//! monotonically with the frequency. So it has one crossover, and it is stable if and only if its
+//! gain is below 1 at the frequency where its phase first is −180° (Nyquist 1932).
 
 use std::f64::consts::PI;
 
@@ -62,7 +62,7 @@ impl LoopMargins {
 }
 
 impl LoopPlant {
-    /// At a speed at which bead of the target width is laid.
+    /// The loop at a speed at which bead of the target width is laid.
     pub fn at(plant: &IdentifiedCell, target_mm: f64, speed_mm_per_s: f64) -> Self {
         let timing = &plant.timing;
         let robot = plant.robot_dynamics();
@@ -83,24 +83,24 @@ impl LoopPlant {
         self.gain_s * controller / (self.lag_s * w).hypot(1.0)
     }
 
-    /// Its continuous phase \[rad\].
+    /// Continuous phase of the loop at a frequency \[rad/s\].
     fn phase(&self, gains: PiGains, w: f64) -> f64 {
         let controller = -libm::atan2(gains.ki_per_s2, gains.kp_per_s * w);
         controller - libm::atan(self.lag_s * w) - self.dead_time_s * w
     }
 
-    /// Margins with gains for the error in mm; `None` where both are 0.
+    /// Margins with gains for the error in mm; `None` if both gains are 0.
     pub fn margins(&self, gains: PiGains) -> Option<LoopMargins> {
         if gains.kp_per_s <= 0.0 && gains.ki_per_s2 <= 0.0 {
             return None;
         }
-        // Beyond this frequency the dead time alone turns the phase by more than 180°.
+        // Above this frequency the dead time alone shifts the phase by more than 180°.
         let max_frequency = 2.0 * PI / self.dead_time_s.max(1e-6);
         let turned = first_sign_change(max_frequency, |w| self.phase(gains, w) + PI)?;
         let gain = 1.0 / self.magnitude(gains, turned);
         let is_stable = gain > 1.0;
         let crossover = falling_root(|w| self.magnitude(gains, w) - 1.0);
-        // A gain below 1 throughout has any phase margin, one above it none.
+        // Without a crossover the phase margin is infinite, positive if the loop is stable.
         let none = if is_stable { f64::INFINITY } else { f64::NEG_INFINITY };
         let phase = crossover.map_or(none, |w| PI + self.phase(gains, w));
         let delay_s = crossover.map_or(none, |w| (PI + self.phase(gains, w)) / w);

@@ -6,25 +6,24 @@ use super::Log;
 use crate::core::Stamp;
 use crate::numeric::rank;
 
-/// Rates and latencies of a cell \[s\]: medians, with the 99th percentile where a late event
-/// matters.
+/// Rates and latencies of a cell \[s\]: medians, and 99th percentiles where late events matter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CellTiming {
     /// From a frame's capture to its width's arrival at the controller.
     pub latency_s: f64,
-    /// Its 99th percentile.
+    /// 99th percentile of that latency.
     pub latency_p99_s: f64,
-    /// Time from one measured frame to the next.
+    /// Period of the measured frames.
     pub frame_s: f64,
-    /// Time from report to report.
+    /// Period of the reports.
     pub report_s: f64,
-    /// Its 99th percentile.
+    /// 99th percentile of that period.
     pub report_p99_s: f64,
-    /// Time from setpoint to setpoint.
+    /// Period of the setpoints.
     pub setpoint_s: f64,
 }
 
-/// Of a run; 0 where something did not happen twice.
+/// Rates and latencies of a run; 0 for a period without two events.
 pub fn timing(log: &Log) -> CellTiming {
     let frames: Vec<Stamp> = log.widths.iter().map(|width| width.at).collect();
     let reports: Vec<Stamp> = log.states.iter().map(|(at, _)| *at).collect();
