@@ -1,4 +1,4 @@
-//! What a simulated bead, its image and its world are made of: plain parameters, read strictly from a cell file.
+//! Parameters of a simulated bead, its image and its world, read strictly from a cell file.
 
 pub mod bead;
 pub mod disturbance;

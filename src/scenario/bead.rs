@@ -1,8 +1,8 @@
-//! The width of a bead by speed, and its roughness.
+//! The width of a bead as a function of speed, and its roughness.
 
-/// Width as a power of the speed at which the bead is laid, continuous over two ranges:
-/// w = A·(v/v₀)^−b. Mass conservation (b = 1) does not describe the bead of Shojaei Barjuei et
-/// al. 2022: their table 2 gives exponents near 0.25, because the strand is stretched below the
+/// Width as a power of the speed at which the bead is laid, with two exponents and no jump between
+/// them: w = A·(v/v₀)^−b. Mass conservation (b = 1) does not describe the bead of Shojaei Barjuei
+/// et al. 2022: their table 2 gives exponents near 0.25, because the strand is stretched below the
 /// nozzle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeadModel {
@@ -12,7 +12,7 @@ pub struct BeadModel {
     pub at_speed_mm_per_s: f64,
     /// Exponent b.
     pub exponent: f64,
-    /// Speed below which the other exponent holds \[mm/s\]; 0 for never.
+    /// Speed below which `slow_exponent` applies \[mm/s\]; 0 for never.
     pub slow_below_mm_per_s: f64,
     /// Exponent b below that speed.
     pub slow_exponent: f64,
@@ -23,7 +23,7 @@ pub struct BeadModel {
 pub struct EdgeRoughness {
     /// Standard deviation of the width along the bead \[mm\].
     pub sigma_mm: f64,
-    /// Length over which it is correlated \[mm\].
+    /// Correlation length of the width along the bead \[mm\].
     pub length_mm: f64,
 }
 
@@ -43,7 +43,7 @@ impl BeadModel {
         }
     }
 
-    /// Width of a bead laid at a speed \[mm/s\], at the nominal flow \[mm\].
+    /// Width of a bead that is laid at this speed \[mm/s\] and the nominal flow \[mm\].
     pub fn width_at(&self, speed_mm_per_s: f64) -> f64 {
         let speed = speed_mm_per_s.max(Self::MIN_SPEED_MM_PER_S);
         let knee = self.slow_below_mm_per_s;

@@ -1,4 +1,4 @@
-//! What the pump does to the flow, along the path and over time.
+//! Disturbances of the pump's flow, along the path and over time.
 
 use std::f64::consts::TAU;
 
@@ -7,22 +7,22 @@ use std::f64::consts::TAU;
 pub struct Flow {
     /// Path length at which the flow steps \[mm\].
     pub step_at_mm: f64,
-    /// Flow from there on, relative to the nominal flow.
+    /// Flow after the step, relative to the nominal flow.
     pub step_ratio: f64,
-    /// Amplitude of a sine, relative to the nominal flow.
+    /// Amplitude of a sine along the path, relative to the nominal flow.
     pub wave_amplitude: f64,
-    /// Its length along the path \[mm\].
+    /// Wavelength of the sine \[mm\].
     pub wavelength_mm: f64,
     /// Amplitude of a pulsation over time, relative to the nominal flow.
     pub pulse_amplitude: f64,
-    /// Its period \[s\].
+    /// Period of the pulsation \[s\].
     pub pulse_period_s: f64,
-    /// How far it drifts along a metre of path, relative (standard deviation).
+    /// Random walk of the flow: standard deviation over a metre of path, relative.
     pub drift_per_root_m: f64,
 }
 
 impl Flow {
-    /// A pump that does nothing to the flow.
+    /// A flow without disturbances.
     pub const STEADY: Self = Self {
         step_at_mm: 0.0,
         step_ratio: 1.0,
@@ -33,13 +33,12 @@ impl Flow {
         drift_per_root_m: 0.0,
     };
 
-    /// The pulsation at a time \[s\] with a phase in periods, relative to the
-    /// nominal flow.
+    /// Flow ratio of the pulsation at a time \[s\], with a phase in periods.
     pub fn pulse_at(&self, at_s: f64, phase: f64) -> f64 {
         1.0 + self.pulse_amplitude * (TAU * (at_s / self.pulse_period_s + phase)).sin()
     }
 
-    /// Flow at a path length, relative to the nominal flow.
+    /// Flow at a path length without the pulsation, relative to the nominal flow.
     pub fn ratio_at(&self, path_mm: f64) -> f64 {
         let step = if path_mm >= self.step_at_mm { self.step_ratio } else { 1.0 };
         step * (1.0 + self.wave_amplitude * (TAU * path_mm / self.wavelength_mm).sin())

@@ -19,20 +19,20 @@ use crate::document::Table;
 pub enum WidthSource {
     /// The true width over the gauge, with noise.
     Widths,
-    /// Rendered frames, measured like any other.
+    /// Rendered frames, which are measured.
     Frames,
 }
 
 /// The simulated bead and the world around it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulation {
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Where widths come from.
+    /// How widths are obtained.
     pub width_source: WidthSource,
     /// Length of the bead.
     pub path: Mm,
-    /// Path from one image to the next where no robot sets it, if the file gives it.
+    /// Path from one image to the next if no robot sets it; `None` if the file does not give it.
     pub frame_spacing: Option<Mm>,
     /// Step of the simulation.
     pub step: Span,
@@ -44,28 +44,28 @@ pub struct Simulation {
     pub robot_bandwidth_hz: f64,
     /// Whether the phases of camera and robot link are random, as in a real cell, or zero.
     pub random_phase: bool,
-    /// Length of bead over which a width is averaged, where no frame is rendered.
+    /// Length of bead over which a width is averaged, if no frame is rendered.
     pub gauge_length: Mm,
-    /// Standard deviation of a measured width, where no frame is rendered.
+    /// Standard deviation of a measured width, if no frame is rendered.
     pub width_noise: Mm,
-    /// Fraction of the widths that are outliers, where no frame is rendered.
+    /// Fraction of the widths that are outliers, if no frame is rendered.
     pub outlier_fraction: f64,
-    /// Their largest error, relative to the width.
+    /// Largest relative error of an outlier.
     pub outlier_size: f64,
-    /// Fraction of the frames without a width, where none is rendered.
+    /// Fraction of the frames without a width, if no frame is rendered.
     pub missing_fraction: f64,
-    /// Width of the bead by speed.
+    /// Width of the bead as a function of speed.
     pub bead: BeadModel,
-    /// Roughness of its edges.
+    /// Roughness of the bead's edges.
     pub roughness: EdgeRoughness,
-    /// Disturbances of its flow.
+    /// Disturbances of the flow.
     pub flow: Flow,
-    /// Its image.
+    /// The image of the bead and its disturbances.
     pub image: ImageModel,
 }
 
-/// Reads the three tables; absent keys have their defaults. Every key is read, so that all
-/// violations are reported; `None` if there is one.
+/// Reads the three tables; absent keys have their defaults. Reading goes on after an error, so
+/// that all violations are reported; `None` if there is one.
 pub fn read(root: &Table<'_>) -> Option<Simulation> {
     let keys = |name| Some(Keys { table: root.table_or_empty(name)?, failed: Cell::new(false) });
     let (bead, render, world) = (keys("bead")?, keys("render")?, keys("simulation")?);
@@ -103,7 +103,7 @@ pub fn read(root: &Table<'_>) -> Option<Simulation> {
 /// The keys of a table with their defaults.
 struct Keys<'a> {
     table: Table<'a>,
-    /// Whether a key is wrong.
+    /// Whether any key has been wrong.
     failed: Cell<bool>,
 }
 
