@@ -1,4 +1,5 @@
-//! The far side of both line links: a robot and an extruder behind a socket.
+//! The machine's side of both line links: a simulated robot and a simulated extruder behind a
+//! socket.
 
 pub mod extruder;
 pub mod machine;

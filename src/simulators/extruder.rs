@@ -19,16 +19,15 @@ use machine::{ExtruderMachine, GatedPlant, SharedExtruder};
 /// Parameters of the simulation.
 #[derive(Debug)]
 pub struct ExtruderOptions {
-    /// What it can do, in its `HELLO`.
+    /// Limits that it sends in its `HELLO`.
     pub hello: ExtruderLimits,
     /// The plant.
     pub plant: SimExtruder,
-    /// Time between two `STATE` lines, 5 to 200 ms on an extruder that keeps
-    /// to the link.
+    /// Time between two `STATE` lines; the link permits 5 to 200 ms.
     pub state_period: Span,
-    /// What its own clock shows at stamp 0 \[ms\].
+    /// Reading of its own clock at stamp 0 \[ms\].
     pub clock_start_ms: u64,
-    /// How long after the pump first ran it fails, for rehearsals.
+    /// Time from the pump's first run to its failure, for rehearsals; `None` for no failure.
     pub fails_after: Option<Span>,
 }
 
@@ -40,9 +39,9 @@ pub struct ExtruderSim {
 }
 
 impl ExtruderSim {
-    /// Serves the link on `listener`. `clock` may be the PC's own: what the
-    /// extruder says of its time is shifted by
-    /// [`ExtruderOptions::clock_start_ms`]. Fails where the system gives no socket or thread.
+    /// Serves the link on `listener`. `clock` may be the PC's own: the extruder's own time is
+    /// shifted by [`ExtruderOptions::clock_start_ms`]. Fails if the system gives no socket or
+    /// thread.
     pub fn spawn(
         listener: TcpListener,
         clock: RunClock,
@@ -57,31 +56,31 @@ impl ExtruderSim {
         Ok(Self { shared, server })
     }
 
-    /// Where it listens.
+    /// Address on which it listens.
     pub const fn local_addr(&self) -> SocketAddr {
         self.server.local_addr()
     }
 
-    /// Present mode of the pump.
+    /// Current mode of the pump.
     pub fn pump(&self) -> PumpMode {
         let mut gated = self.shared.gated();
         gated.advance(self.shared.clock.now());
         gated.plant().state().0
     }
 
-    /// Present command to pump and valve.
+    /// Current command to pump and valve.
     pub fn command(&self) -> ExtruderCommand {
         let mut gated = self.shared.gated();
         gated.advance(self.shared.clock.now());
         gated.command()
     }
 
-    /// The pump fails.
+    /// Lets the pump fail.
     pub fn fail(&self) {
         self.shared.gated().gate().fail();
     }
 
-    /// Misbehaves from now on.
+    /// Sets faults that apply from now on.
     pub fn set_faults(&self, faults: ExtruderFaults) {
         self.shared.gated().gate().set_faults(faults);
     }

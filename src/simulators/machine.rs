@@ -1,4 +1,4 @@
-//! The machine behind a server: it takes lines and sends its `STATE`.
+//! The interface of a machine behind a server: it takes lines and gives its `STATE`.
 
 use crate::core::Stamp;
 use crate::link::LineError;
@@ -7,38 +7,39 @@ use crate::link::frame::{DeviceLine, LineBody, LineRefusal};
 /// Receives messages for the operator.
 pub type Notice = Box<dyn FnMut(Stamp, &str) + Send>;
 
-/// What stands behind a server.
+/// A machine behind a server.
 pub trait LinkMachine: Send + 'static {
     /// Name of its threads.
     const NAME: &'static str;
-    /// The command that expires after a disconnection, such as `the last setpoint`.
+    /// Name of the command that expires after a disconnection, such as `the last setpoint`.
     const SETPOINT_WORDS: &'static str;
 
-    /// Advances by a period; returns the `STATE` to send, if a PC is connected.
+    /// Advances to `now`, once per period; returns the `STATE` to send, `None` if no PC is
+    /// connected.
     fn tick(&mut self, now: Stamp) -> Option<String>;
 
-    /// A PC called.
+    /// Called when a PC has connected.
     fn connected(&mut self, now: Stamp);
 
-    /// The PC is gone.
+    /// Called when the PC has disconnected.
     fn disconnected(&mut self, now: Stamp);
 
-    /// Takes a line without LF; fails where it makes no sense.
+    /// Takes a line without its LF; fails if the line is malformed.
     fn take(&mut self, now: Stamp, text: &str) -> Result<LineOutcome, LineError>;
 
-    /// The answer to bytes that make no line.
+    /// The answer to bytes that are not a line.
     fn bad_line(&mut self, why: &str) -> Answer;
 
-    /// A message about changes since the last call, if there are any.
+    /// A message about changes since the last call; `None` if nothing changed.
     fn changes(&mut self, now: Stamp) -> Option<String>;
 }
 
 /// The outcome of a line.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LineOutcome {
-    /// The answer.
+    /// The answer; `None` if the line needs none.
     pub answer: Option<Answer>,
-    /// Whether it was the last one.
+    /// Whether this line ends the connection.
     pub bye: bool,
 }
 
@@ -47,16 +48,16 @@ pub struct LineOutcome {
 pub struct Answer {
     /// The line with its LF.
     pub line: String,
-    /// The line that it refuses, where it does.
+    /// The line that this answer refuses; `None` if it refuses none.
     pub refused: Option<RefusedLine>,
 }
 
-/// A line of the PC that is refused.
+/// A line from the PC that was refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RefusedLine {
-    /// Its number; 0 where it had none that could be read.
+    /// Its number; 0 if it has no readable number.
     pub seq: u64,
-    /// Why.
+    /// Reason of the refusal.
     pub why: LineRefusal,
 }
 

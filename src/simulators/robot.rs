@@ -22,15 +22,14 @@ pub struct RobotOptions {
     pub params: RobotParams,
     /// The job that it prints while a PC is connected.
     pub job: PrintJob,
-    /// Time between two `STATE` lines, 20 to 200 ms on a robot that keeps to
-    /// the link.
+    /// Time between two `STATE` lines; the link permits 20 to 200 ms.
     pub state_period: Span,
 }
 
-/// The robot cannot be started.
+/// Why the robot cannot be started.
 #[derive(Debug, thiserror::Error)]
 pub enum RobotSimError {
-    /// A robot that cannot be.
+    /// The parameters are not valid.
     #[error(transparent)]
     Params(#[from] ParamError),
     /// The system gives no socket or thread.
@@ -46,9 +45,8 @@ pub struct RobotSim {
 }
 
 impl RobotSim {
-    /// Serves the link on `listener`. `clock` may be the PC's own: what the
-    /// robot says of its time is shifted by
-    /// [`RobotParams::clock_start_ms`].
+    /// Serves the link on `listener`. `clock` may be the PC's own: the robot's own time is shifted
+    /// by [`RobotParams::clock_start_ms`].
     pub fn spawn(
         listener: TcpListener,
         clock: RunClock,
@@ -62,42 +60,42 @@ impl RobotSim {
         Ok(Self { shared, server })
     }
 
-    /// Where it listens.
+    /// Address on which it listens.
     pub fn local_addr(&self) -> SocketAddr {
         self.server.local_addr()
     }
 
-    /// Its true state now.
+    /// Its current true state.
     pub fn state(&self) -> RobotStatus {
         self.shared.cell().state(self.shared.clock.now())
     }
 
-    /// Its true states so far, one for every `STATE` period, the oldest first.
+    /// Its true states so far, one for every `STATE` period, oldest first.
     pub fn history(&self) -> Vec<TrueState> {
         self.shared.history().iter().copied().collect()
     }
 
-    /// Begins a bead at a height, as an operator would; says whether it did.
+    /// Begins a bead at a height, as an operator does; returns whether it began.
     pub fn begin_bead(&self, z: Mm) -> bool {
         self.shared.cell().begin_bead(self.shared.clock.now(), z)
     }
 
-    /// Leaves `STOP` or `FAULT`, as an operator would.
+    /// Leaves `STOP` or `FAULT`, as an operator does.
     pub fn acknowledge(&self) {
         self.shared.cell().acknowledge(self.shared.clock.now());
     }
 
-    /// Stops with a fault of its own.
+    /// Stops the robot with a fault.
     pub fn fail(&self) {
         self.shared.cell().fail(self.shared.clock.now());
     }
 
-    /// Misbehaves from now on.
+    /// Sets faults that apply from now on.
     pub fn set_faults(&self, faults: RobotFaults) {
         self.shared.cell().set_faults(self.shared.clock.now(), faults);
     }
 
-    /// Its mode.
+    /// Its current mode.
     pub fn mode(&self) -> RobotMode {
         self.state().mode
     }

@@ -20,10 +20,10 @@ mod peer;
 use host::Host;
 use peer::Input;
 
-/// Inputs that may wait; beyond it senders block.
+/// Inputs that may wait in the queue; senders block when it is full.
 const MAX_WAITING_INPUTS: usize = 64;
-/// Timeout of the connection to the server's own socket that wakes it to end: short, as it is
-/// on the same machine.
+/// Timeout of the connection to the server's own socket that wakes it at the end: short, because
+/// both are on the same machine.
 const WAKE_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// A machine that is served in threads of its own until it is stopped.
@@ -36,8 +36,8 @@ pub struct Server {
 }
 
 impl Server {
-    /// Serves a machine on `listener`, which is given the time by `clock`
-    /// and says its `STATE` once every `period`.
+    /// Serves a machine on `listener`; `clock` gives the time, and the machine sends its `STATE`
+    /// every `period`.
     pub fn spawn<M: LinkMachine>(
         listener: TcpListener,
         clock: RunClock,
@@ -57,7 +57,7 @@ impl Server {
         Ok(Self { quitting, inputs, address, threads })
     }
 
-    /// Where it listens.
+    /// Address on which it listens.
     pub const fn local_addr(&self) -> SocketAddr {
         self.address
     }
@@ -72,7 +72,7 @@ impl Server {
             return;
         }
         self.quitting.store(true, Ordering::Release);
-        // Fails only where the thread has ended already.
+        // Fails only if the thread has already ended.
         let _ = self.inputs.send(Input::Quit);
         let _ = TcpStream::connect_timeout(&reachable(self.address), WAKE_TIMEOUT);
         for thread in self.threads.drain(..) {
@@ -102,14 +102,15 @@ fn accept_all(listener: &TcpListener, quitting: &AtomicBool, inputs: &Sender<Inp
             }
             Err(error) => {
                 tracing::warn!(%error, "a connection could not be accepted");
-                // What is short, such as file handles, needs time to return.
+                // A resource such as file handles may be exhausted; wait until some are free
+                // again.
                 let _ = after(WAKE_TIMEOUT).recv();
             }
         }
     }
 }
 
-/// An address that listens everywhere is called on this machine.
+/// An address by which this machine reaches a listener on all interfaces.
 fn reachable(mut address: SocketAddr) -> SocketAddr {
     if address.ip().is_unspecified() {
         address.set_ip(match address.ip() {

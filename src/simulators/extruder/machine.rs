@@ -1,5 +1,4 @@
-//! The simulated extruder behind its server, and the state that its thread shares with its
-//! handle.
+//! The simulated extruder behind its server, and the state that its thread and its handle share.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -12,14 +11,14 @@ use crate::run::ports::ExtruderPort;
 use crate::sim::extruder::SimExtruder;
 use crate::simulators::machine::{Answer, LineOutcome, LinkMachine};
 
-/// What the extruder's thread shares with the handle.
+/// State that the extruder's thread and the handle share.
 #[derive(Debug)]
 pub(super) struct SharedExtruder {
     pub(super) clock: RunClock,
     gated: Mutex<GatedPlant>,
 }
 
-/// The link's gate and what stands behind it.
+/// The endpoint of the link and the plant.
 #[derive(Debug)]
 pub(super) struct GatedPlant {
     gate: ExtruderEndpoint,
@@ -50,12 +49,12 @@ impl GatedPlant {
         Self { gate, plant, applied, fails_after, ran_since: None }
     }
 
-    /// The end of the link.
+    /// The extruder's endpoint of the link.
     pub(super) fn gate(&mut self) -> &mut ExtruderEndpoint {
         &mut self.gate
     }
 
-    /// What stands behind it.
+    /// The simulated plant.
     pub(super) fn plant(&mut self) -> &mut SimExtruder {
         &mut self.plant
     }
@@ -65,7 +64,7 @@ impl GatedPlant {
         self.applied
     }
 
-    /// Advances to a time: the plant gets the commands that the link passes.
+    /// Advances to a time; the plant gets the valid commands from the link.
     pub(super) fn advance(&mut self, now: Stamp) {
         if let (Some(after), Some(since)) = (self.fails_after, self.ran_since)
             && now - since >= after
@@ -73,7 +72,7 @@ impl GatedPlant {
             self.fails_after = None;
             self.gate.fail();
         }
-        // A command ends when it expires, even between two calls.
+        // A command expires at its own time, even between two calls.
         if let Some(until) = self.gate.runs_out().filter(|&until| until < now) {
             self.apply(until);
         }
@@ -96,7 +95,7 @@ impl GatedPlant {
 
 pub(super) struct ExtruderMachine {
     shared: Arc<SharedExtruder>,
-    /// Pump and valve in the last message.
+    /// Pump mode and valve position in the last message.
     reported: (PumpMode, bool),
 }
 
@@ -117,7 +116,7 @@ impl LinkMachine for ExtruderMachine {
         gated.gate().state(now, report).map(|state| state.format())
     }
 
-    /// A new connection stands for the operator's key as well.
+    /// A new connection also acknowledges a fault, as the operator's key does.
     fn connected(&mut self, now: Stamp) {
         let mut gated = self.shared.gated();
         gated.advance(now);

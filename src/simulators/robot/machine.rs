@@ -1,4 +1,4 @@
-//! The simulated robot behind its server, and the state that its thread shares with its handle.
+//! The simulated robot behind its server, and the state that its thread and its handle share.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -9,19 +9,19 @@ use crate::link::robot::mode_word;
 use crate::link::{LineError, PcLine, PrintJob, RobotLine, RobotStatus, VirtualRobot};
 use crate::simulators::machine::{Answer, LineOutcome, LinkMachine};
 
-/// States that are kept. Derived: more than an hour at 50 per second.
+/// Number of states that are kept. Derived: more than an hour at 50 per second.
 const MAX_HISTORY: usize = 200_000;
 
-/// Where the robot really was.
+/// True state of the robot at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrueState {
-    /// When.
+    /// Time of the state.
     pub at: Stamp,
     /// Its state.
     pub state: RobotStatus,
 }
 
-/// What the robot's thread shares with the handle.
+/// State that the robot's thread and the handle share.
 #[derive(Debug)]
 pub(super) struct SharedRobot {
     pub(super) clock: RunClock,

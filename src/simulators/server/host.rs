@@ -49,7 +49,7 @@ impl<M: LinkMachine> Host<M> {
                 if let Some(state) = self.machine.tick(now) {
                     self.say(&state);
                 }
-                // After a delay the missed states are not sent in a burst.
+                // After a delay, missed states are not sent in a burst.
                 next_state = (next_state + self.period).max(now);
             }
             self.report_changes();
@@ -97,7 +97,7 @@ impl<M: LinkMachine> Host<M> {
         }
     }
 
-    /// A line, unless it was sent after the one that ended the connection.
+    /// Handles a line; lines after the one that ended the connection are ignored.
     fn line(&mut self, piece: Result<String, LineFault>) {
         let Some(peer) = self.peer.as_mut() else { return };
         let taken = match piece {

@@ -10,7 +10,7 @@ use crossbeam_channel::Sender;
 use crate::link::{BadLines, LineSplitter};
 use crate::simulators::machine::LinkMachine;
 
-/// What wakes the host of a machine.
+/// Events for the thread of a machine.
 #[derive(Debug)]
 pub(super) enum Input {
     /// A new connection.
@@ -19,12 +19,12 @@ pub(super) enum Input {
     Bytes(u64, Vec<u8>),
     /// The connection with this number is lost.
     Disconnected(u64),
-    /// The end.
+    /// The server is stopped.
     Quit,
 }
 
-/// Timeout of a write to the PC, after which it is disconnected: a PC that keeps to the link
-/// reads at once.
+/// Timeout of a write to the PC, after which it is disconnected: a PC that follows the link reads
+/// without delay.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 
 /// The PC at the other end.
@@ -37,7 +37,7 @@ pub(super) struct Peer {
 }
 
 impl Peer {
-    /// Starts to read; bytes and the end arrive among `inputs` under `id`.
+    /// Starts to read; bytes and the disconnection arrive in `inputs` under `id`.
     pub(super) fn new<M: LinkMachine>(
         stream: TcpStream,
         id: u64,
@@ -53,7 +53,7 @@ impl Peer {
         Ok(Self { id, address, splitter, bad, stream })
     }
 
-    /// Writes a line whole; an error means that the PC must be let go.
+    /// Writes a whole line; after an error the PC must be disconnected.
     pub(super) fn say(&mut self, line: &str) -> std::io::Result<()> {
         self.stream.write_all(line.as_bytes())
     }
@@ -61,7 +61,7 @@ impl Peer {
 
 impl Drop for Peer {
     fn drop(&mut self) {
-        // Ends the reading thread; a connection that is gone cannot be shut.
+        // Ends the reading thread; shutting down a lost connection fails.
         let _ = self.stream.shutdown(Shutdown::Both);
     }
 }
