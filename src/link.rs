@@ -1,5 +1,5 @@
-//! The line links, version 1: what travels between truebead and the controllers
-//! of a robot and of an extruder, without a socket and without a clock.
+//! The line links, version 1: messages between truebead and the controllers of a robot and of an
+//! extruder, without a socket and without a clock.
 //!
 //! ```text
 //! bytes → LineSplitter → text → PcLine / RobotLine     → VirtualRobot (the robot's side)
@@ -7,9 +7,10 @@
 //!                                                        → drivers (the PC's side)
 //! ```
 //!
-//! Both links share one [`frame`]: ASCII lines ended by LF, at most [`MAX_LINE`]
-//! bytes with it, fields separated by one space, counted and valid for a time.
-//! `docs/src/reference/robot-link.md` and `docs/src/reference/extruder-link.md` describe the same for the person who
+//! Both links share one [`frame`]: ASCII lines ended by LF, at most [`MAX_LINE`] bytes including
+//! it, with fields separated by one space, a sequence number and a validity.
+//! `docs/src/reference/robot-link.md` and `docs/src/reference/extruder-link.md` describe the same
+//! for the programmer of a controller.
 //! programs a controller.
 
 pub mod extruder;

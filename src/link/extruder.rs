@@ -1,10 +1,9 @@
-//! The extruder link, version 1: what travels between truebead and an extruder
-//! controller, without a socket and without a clock. Framing, counting and
-//! validity are those of the robot link; `docs/src/reference/extruder-link.md` describes the rest for
-//! the person who programs an extruder controller.
+//! The extruder link, version 1: messages between truebead and an extruder controller, without a
+//! socket and without a clock. Framing, sequence numbers and validity are those of the robot link;
+//! `docs/src/reference/extruder-link.md` describes the rest for the programmer of a controller.
 //!
 //! ```text
-//! bytes → LineSplitter → text → DriveLine / ExtruderLine → Gate (the extruder's side)
+//! bytes → LineSplitter → text → DriveLine / ExtruderLine → ExtruderEndpoint (the extruder's side)
 //!                                                        → drivers::extruder (the PC's side)
 //! ```
 

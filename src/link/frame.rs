@@ -1,5 +1,5 @@
-//! What both links have in common: how bytes become lines and lines fields, what
-//! is counted, how long a line is valid, and how one is refused.
+//! Common parts of both links: splitting bytes into lines and lines into fields, sequence numbers,
+//! validity, and refusals.
 
 mod device_line;
 mod fields;

@@ -1,6 +1,5 @@
-//! The robot's dialect of the line link, and a robot that speaks it.
-//! `docs/src/reference/robot-link.md` describes the same for the person who programs a robot
-//! controller.
+//! The lines of the robot link, and a virtual robot that uses them.
+//! `docs/src/reference/robot-link.md` describes the same for the programmer of a robot controller.
 
 pub mod job;
 pub mod motion;

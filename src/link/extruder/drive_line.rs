@@ -17,9 +17,9 @@ pub enum DriveLine {
         seq: u64,
         /// Setpoint, pump and valve; the setpoint in the unit of the extruder's `HELLO`.
         command: ExtruderCommand,
-        /// How long after `ref_t_ms` the command is void \[ms\].
+        /// Time after `ref_t_ms` at which the command expires \[ms\].
         valid_ms: u64,
-        /// `t_ms` of the newest `STATE` that the PC has seen.
+        /// `t_ms` of the newest `STATE` that the PC has received.
         ref_t_ms: u64,
     },
     /// Orderly end of the connection.

@@ -1,6 +1,5 @@
-//! The extruder's side of the link as a state machine: which commands are
-//! taken, and for how long. Time is an argument; what turns the pump stands
-//! behind it.
+//! The extruder's side of the link as a state machine: which commands it accepts, and for how
+//! long. Time is an argument; the caller drives pump and valve.
 
 use super::drive_line::DriveLine;
 use super::extruder_line::{ExtruderLine, ExtruderStatus};
@@ -8,13 +7,13 @@ use crate::core::Stamp;
 use crate::extruder::{ExtruderCommand, ExtruderLimits, ExtruderReport, PumpMode};
 use crate::link::frame::{DeviceClock, ErrCode, LineRefusal, Sequence, Validity};
 
-/// What stands without a command.
+/// The command that applies without a valid one.
 const AT_REST: ExtruderCommand = ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 };
 
-/// Ways in which an extruder can misbehave, for tests and rehearsals.
+/// Misbehaviour of an extruder, for tests and rehearsals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ExtruderFaults {
-    /// Refuses every command with this.
+    /// Refuses every command with this code.
     pub refuse: Option<ErrCode>,
     /// Sends no `STATE`.
     pub mute: bool,
@@ -26,15 +25,14 @@ pub struct ExtruderEndpoint {
     limits: ExtruderLimits,
     clock: DeviceClock,
     sequence: Sequence,
-    /// The running command and when it is void.
+    /// The current command and the time at which it expires.
     command: Option<(ExtruderCommand, Stamp)>,
     failed: bool,
     faults: ExtruderFaults,
 }
 
 impl ExtruderEndpoint {
-    /// Of an extruder whose pump stands and whose clock shows `clock_start_ms`
-    /// at stamp 0.
+    /// An extruder at rest whose clock shows `clock_start_ms` at stamp 0.
     pub const fn new(limits: ExtruderLimits, clock_start_ms: u64) -> Self {
         Self {
             limits,
@@ -46,18 +44,18 @@ impl ExtruderEndpoint {
         }
     }
 
-    /// A connection, which replaces an older one. The count begins again; the
-    /// last command keeps running.
+    /// A new connection, which replaces an older one. Sequence numbers start again; the last
+    /// command stays valid.
     pub const fn connect(&mut self) {
         self.sequence = Sequence::new();
     }
 
-    /// The connection is gone. The last command runs out.
+    /// The connection has ended. The last command stays valid until it expires.
     pub const fn disconnect(&mut self) {
         self.sequence.disconnect();
     }
 
-    /// The pump fails: it stops, and no command makes it run.
+    /// The pump fails: it stops, and no command starts it.
     pub const fn fail(&mut self) {
         self.failed = true;
         self.command = None;
@@ -68,30 +66,30 @@ impl ExtruderEndpoint {
         self.failed
     }
 
-    /// What an operator does at the extruder: leaves the fault.
+    /// Leaves the fault, as an operator does at the extruder.
     pub const fn acknowledge(&mut self) {
         self.failed = false;
     }
 
-    /// Misbehaves from now on.
+    /// Sets faults that apply from now on.
     pub const fn set_faults(&mut self, faults: ExtruderFaults) {
         self.faults = faults;
     }
 
-    /// When the running command is void, where there is one.
+    /// Time at which the current command expires; `None` without one.
     pub fn runs_out(&self) -> Option<Stamp> {
         self.command.map(|(_, until)| until)
     }
 
-    /// What pump and valve are to do now: the last command while it is valid,
-    /// and nothing otherwise.
+    /// Current command to pump and valve: the last command while it is valid, otherwise the rest
+    /// state.
     pub fn command(&mut self, now: Stamp) -> ExtruderCommand {
         self.command = self.command.filter(|&(_, until)| now < until);
         self.command.map_or(AT_REST, |(command, _)| command)
     }
 
-    /// The `STATE` to send, with what pump, valve and sensors say; none before
-    /// `HELLO`, and while it is mute.
+    /// The `STATE` to send, with a report from pump, valve and sensors; `None` before `HELLO`, and
+    /// while it is mute.
     pub fn state(&self, now: Stamp, report: ExtruderReport) -> Option<ExtruderLine> {
         let pump = if self.failed { PumpMode::Fault } else { report.pump };
         let (t_ms, seq) = (self.clock.ms(now), self.sequence.applied());
@@ -100,8 +98,7 @@ impl ExtruderEndpoint {
         (self.sequence.greeted() && !self.faults.mute).then_some(line)
     }
 
-    /// Takes a line of the PC; the answer is `HELLO`, or `ERR` where the line
-    /// is refused.
+    /// Takes a line from the PC; the answer is `HELLO`, or `ERR` if the line is refused.
     pub fn take(&mut self, now: Stamp, line: DriveLine) -> Option<ExtruderLine> {
         match line {
             DriveLine::Hello => {
@@ -209,7 +206,7 @@ mod tests {
             assert_eq!(code(gate.take(at(30), line).as_ref()), Some(why), "{line:?}");
         }
         assert_eq!(gate.command(at(999)), RUN);
-        // At rest no command is too small.
+        // At rest the command is not compared with the smallest one.
         assert_eq!(gate.take(at(40), drive(8, AT_REST, 300, 7010)), None);
     }
 

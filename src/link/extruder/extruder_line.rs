@@ -8,12 +8,12 @@ use crate::link::frame::{DeviceLine, LineBody, LineError, LineFields, one_word};
 /// A line from the extruder to the PC; a `STATE` comes every 5 to 200 ms.
 pub type ExtruderLine = DeviceLine<ExtruderLimits, ExtruderStatus>;
 
-/// What an extruder does.
+/// State of an extruder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExtruderStatus {
-    /// Its own clock \[ms\].
+    /// Reading of its own clock \[ms\].
     pub t_ms: u64,
-    /// The last line that it applied on this connection.
+    /// Number of the last line that it applied on this connection.
     pub seq: u64,
     /// Pump, valve and readings.
     pub report: ExtruderReport,
@@ -76,12 +76,12 @@ impl LineBody for ExtruderStatus {
     }
 }
 
-/// A reading as it stands on a line; `-` where there is no sensor.
+/// A reading in its form on a line; `-` without a sensor.
 fn reading(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), |value| NUMBERS.write(value))
 }
 
-/// The word of a pump's mode on the link.
+/// The word for a pump's mode on the link.
 pub const fn pump_word(pump: PumpMode) -> &'static str {
     match pump {
         PumpMode::Off => "OFF",

@@ -1,5 +1,5 @@
-//! Lines from a device, a robot or an extruder, to the PC. Every device says what
-//! it is, what it does and what it refuses; only the bodies differ.
+//! Lines from a device, a robot or an extruder, to the PC. Every device sends its limits, its
+//! state and its refusals; only the fields differ.
 
 use super::fields::{LineError, LineFields, printing};
 use super::limits::{MAX_LINE, VERSION};
@@ -7,30 +7,29 @@ use super::refusal::{ErrCode, LineRefusal};
 
 const KEYWORDS: [&str; 3] = ["HELLO", "STATE", "ERR"];
 
-/// What stands on a line of a device behind its keyword, and for `HELLO` behind
-/// the version.
+/// The fields on a device's line after its keyword, or after the version for `HELLO`.
 pub trait LineBody: Sized {
-    /// Reads its fields.
+    /// Reads the fields.
     fn read(fields: &mut LineFields<'_>) -> Result<Self, LineError>;
 
-    /// Its fields, separated by one space.
+    /// The fields as text, separated by one space.
     fn write(&self) -> String;
 }
 
-/// A line from a device that says `H` of itself and `S` of what it does.
+/// A line from a device: `H` are the fields of `HELLO`, `S` those of `STATE`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DeviceLine<H, S> {
     /// Answer to the PC's `HELLO`.
     Hello(H),
-    /// What the device does, at regular times.
+    /// State of the device, sent periodically.
     State(S),
     /// A refused line.
     Err {
-        /// Number of the refused line; 0 where it had none that could be read.
+        /// Number of the refused line; 0 if it has no readable number.
         seq: u64,
-        /// Why.
+        /// Reason as a code.
         code: ErrCode,
-        /// Why, for the operator.
+        /// Reason in words, for the operator.
         text: String,
     },
 }
@@ -53,8 +52,8 @@ impl<H: LineBody, S: LineBody> DeviceLine<H, S> {
         }
     }
 
-    /// The line with its LF, at most [`MAX_LINE`] bytes. Numbers keep six
-    /// decimals, a name becomes one word, a text is cut where it is too long.
+    /// The line with its LF, at most [`MAX_LINE`] bytes. Numbers keep six decimals, a name becomes
+    /// one word, a text that is too long is cut.
     pub fn format(&self) -> String {
         match self {
             Self::Hello(hello) => format!("HELLO {VERSION} {}\n", hello.write()),
@@ -63,13 +62,13 @@ impl<H: LineBody, S: LineBody> DeviceLine<H, S> {
         }
     }
 
-    /// The answer to the line with this number, which is refused.
+    /// The answer to a refused line with this number.
     pub fn refused(seq: u64, refusal: LineRefusal) -> Self {
         let LineRefusal { code, text } = refusal;
         Self::Err { seq, code, text }
     }
 
-    /// The answer to bytes that make no line.
+    /// The answer to bytes that are not a line.
     pub fn bad_line(why: &str) -> Self {
         Self::refused(0, LineRefusal::new(ErrCode::Form, why))
     }
@@ -85,7 +84,7 @@ fn parse_err(mut fields: LineFields<'_>) -> Result<(u64, LineRefusal), LineError
     Ok((seq, LineRefusal { code, text: fields.text() }))
 }
 
-/// An `ERR` line with its LF; its text is cut where it is too long.
+/// An `ERR` line with its LF; a text that is too long is cut.
 fn format_err(seq: u64, code: ErrCode, text: &str) -> String {
     let head = format!("ERR {seq} {code} ");
     let text = printing(text, MAX_LINE - 1 - head.len());

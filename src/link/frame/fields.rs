@@ -1,5 +1,5 @@
-//! Fields of a line: numbers and words, read strictly and written so that any
-//! robot controller can read them.
+//! Fields of a line: numbers and words, read strictly, and written so that any robot controller
+//! can read them.
 
 use std::str::Split;
 
@@ -8,13 +8,13 @@ use crate::core::{MmPerS, NotFinite};
 
 /// Longest name that still fits a line beside three numbers.
 const MAX_NAME_LEN: usize = 48;
-/// Decimals that are written: a nanometre, or a nanometre a second.
+/// Number of decimals that are written: a nanometre, or a nanometre per second.
 const DECIMALS: usize = 6;
 
-/// What is wrong with the text of a line.
+/// Error in the text of a line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LineError {
-    /// Nothing stands on the line.
+    /// The line is empty.
     #[error("the line is empty")]
     Empty,
     /// The first word is not one of this direction of the link.
@@ -22,7 +22,7 @@ pub enum LineError {
     Keyword {
         /// First word of the line.
         found: String,
-        /// The words that are known.
+        /// The words that are allowed.
         expected: &'static str,
     },
     /// A field is missing.
@@ -30,36 +30,36 @@ pub enum LineError {
     Missing {
         /// First word of the line.
         keyword: &'static str,
-        /// Which field.
+        /// Name of the field.
         field: &'static str,
     },
-    /// More stands on the line than belongs there.
+    /// The line has too many fields.
     #[error("{keyword}: nothing may follow the last field, found `{found}`")]
     Surplus {
         /// First word of the line.
         keyword: &'static str,
-        /// The first field too many.
+        /// The first surplus field.
         found: String,
     },
-    /// A field is not of its form.
+    /// A field has the wrong form.
     #[error("{keyword}: `{field}` must be {expected}, found `{found}`")]
     Field {
         /// First word of the line.
         keyword: &'static str,
-        /// Which field.
+        /// Name of the field.
         field: &'static str,
-        /// What was expected.
+        /// The expected form.
         expected: &'static str,
-        /// What was found.
+        /// Text of the field.
         found: String,
     },
-    /// The other side speaks another version.
+    /// The other side uses another version of the link.
     #[error("the other side speaks version {found} of the link, this is version 1")]
     Version {
         /// Its version.
         found: u64,
     },
-    /// The extruder's smallest command lies above its largest.
+    /// The extruder's smallest command is above its largest.
     #[error("HELLO: the smallest command {min} lies above the largest {max}")]
     Range {
         /// Smallest.
@@ -67,7 +67,7 @@ pub enum LineError {
         /// Largest.
         max: f64,
     },
-    /// The robot's slowest speed lies above its fastest.
+    /// The robot's slowest speed is above its fastest.
     #[error("HELLO: the slowest speed {min} lies above the fastest {max}")]
     Limits {
         /// Slowest.
@@ -85,8 +85,8 @@ pub struct LineFields<'a> {
 }
 
 impl<'a> LineFields<'a> {
-    /// Begins a line, which must start with one of `keywords`; `expected` are
-    /// these in words.
+    /// Begins a line, which must start with one of `keywords`; `expected` is their list for a
+    /// message.
     pub fn open(
         text: &'a str,
         keywords: &[&'static str],
@@ -103,12 +103,12 @@ impl<'a> LineFields<'a> {
         }
     }
 
-    /// The word that the line begins with.
+    /// The keyword at the start of the line.
     pub fn keyword(&self) -> &'static str {
         self.keyword
     }
 
-    /// The next field as it stands; an empty one is missing.
+    /// The next field as text; an empty field counts as missing.
     pub fn word(&mut self, field: &'static str) -> Result<&'a str, LineError> {
         match self.rest.next() {
             Some(word) if !word.is_empty() => Ok(word),
@@ -116,7 +116,7 @@ impl<'a> LineFields<'a> {
         }
     }
 
-    /// The next field as a whole number without sign.
+    /// The next field as an unsigned integer.
     pub fn whole(&mut self, field: &'static str) -> Result<u64, LineError> {
         let word = self.word(field)?;
         let digits = word.bytes().all(|byte| byte.is_ascii_digit());
@@ -126,7 +126,7 @@ impl<'a> LineFields<'a> {
         }
     }
 
-    /// The next field as a decimal number: sign, digits and a point only.
+    /// The next field as a decimal number: only sign, digits and a point.
     pub fn quantity<T>(
         &mut self,
         field: &'static str,
@@ -142,14 +142,14 @@ impl<'a> LineFields<'a> {
         }
     }
 
-    /// The next field as a number in a unit that the line itself does not name.
+    /// The next field as a number whose unit is known from elsewhere.
     pub fn number(&mut self, field: &'static str) -> Result<f64, LineError> {
         self.quantity(field, |value| {
             if value.is_finite() { Ok(value) } else { Err(NotFinite { value, unit: "" }) }
         })
     }
 
-    /// The next field as a reading, which is `-` where there is no sensor.
+    /// The next field as a reading; `None` for `-`, which stands for no sensor.
     pub fn reading<T>(
         &mut self,
         field: &'static str,
@@ -162,7 +162,7 @@ impl<'a> LineFields<'a> {
         self.quantity(field, unit).map(Some)
     }
 
-    /// The next field as a switch.
+    /// The next field as a switch, 0 or 1.
     pub fn switch(&mut self, field: &'static str) -> Result<bool, LineError> {
         match self.word(field)? {
             "0" => Ok(false),
@@ -171,7 +171,7 @@ impl<'a> LineFields<'a> {
         }
     }
 
-    /// The version of the other side, which must be ours.
+    /// Reads the version of the other side, which must be ours.
     pub fn version(&mut self) -> Result<(), LineError> {
         match self.whole("version")? {
             VERSION => Ok(()),
@@ -179,12 +179,12 @@ impl<'a> LineFields<'a> {
         }
     }
 
-    /// Everything that is left, as it stands.
+    /// The rest of the line as text.
     pub fn text(&mut self) -> String {
         self.rest.by_ref().collect::<Vec<_>>().join(" ")
     }
 
-    /// Makes sure that nothing is left, and gives `line`.
+    /// Checks that no field is left, and returns `line`.
     pub fn end<T>(mut self, line: T) -> Result<T, LineError> {
         match self.rest.next() {
             None => Ok(line),
@@ -194,7 +194,7 @@ impl<'a> LineFields<'a> {
         }
     }
 
-    /// A field that is not of its form.
+    /// The error for a field with the wrong form.
     pub fn field_error(
         &self,
         field: &'static str,
@@ -205,8 +205,8 @@ impl<'a> LineFields<'a> {
     }
 }
 
-/// How numbers are written: as many decimals as they need, at most six, without
-/// exponent, and cut to a magnitude with which a line is long enough.
+/// Format of numbers: as many decimals as needed, at most six, without exponent, and limited to a
+/// magnitude that fits a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decimals {
     /// Largest magnitude that is written.
@@ -214,26 +214,26 @@ pub struct Decimals {
 }
 
 impl Decimals {
-    /// A number as it stands on a line.
+    /// A number in its form on a line.
     pub fn write(self, value: f64) -> String {
         let text = format!("{:.DECIMALS$}", value.clamp(-self.max_magnitude, self.max_magnitude));
         let text = text.trim_end_matches('0').trim_end_matches('.');
         if text == "-0" { "0".to_owned() } else { text.to_owned() }
     }
 
-    /// The number as it arrives at the other side.
+    /// The number as the other side receives it.
     pub fn on_wire(self, value: f64) -> f64 {
         self.write(value).parse().unwrap_or(value)
     }
 }
 
-/// Text as it may stand on a line: printing ASCII, at most `longest` bytes.
+/// Text in its form on a line: printable ASCII, at most `longest` bytes.
 pub fn printing(text: &str, longest: usize) -> String {
     let plain = |c: char| if c == ' ' || c.is_ascii_graphic() { c } else { '?' };
     text.chars().take(longest).map(plain).collect()
 }
 
-/// A name as one word of at most `LONGEST_NAME` characters.
+/// A name as one word of at most `MAX_NAME_LEN` characters; `instead` if it is empty.
 pub fn one_word(name: &str, instead: &str) -> String {
     let word = printing(name, MAX_NAME_LEN).replace(' ', "-");
     if word.is_empty() { instead.to_owned() } else { word }

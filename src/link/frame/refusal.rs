@@ -1,27 +1,27 @@
-//! Why a line is refused.
+//! Reasons why a line is refused.
 
 use std::fmt;
 
 /// Why a device refused a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrCode {
-    /// The line was void on arrival.
+    /// The line had expired on arrival.
     Stale,
-    /// A value lies outside its limits.
+    /// A value is outside its limits.
     Range,
-    /// The count was broken.
+    /// The sequence number is not the next one.
     Sequence,
-    /// Not in this mode.
+    /// The line is not allowed in the device's mode.
     Mode,
-    /// The line makes no sense.
+    /// The line is malformed.
     Form,
 }
 
 impl ErrCode {
-    /// All of them.
+    /// All codes.
     pub const ALL: [Self; 5] = [Self::Stale, Self::Range, Self::Sequence, Self::Mode, Self::Form];
 
-    /// The word on the line.
+    /// The word for it on a line.
     pub fn word(self) -> &'static str {
         match self {
             Self::Stale => "STALE",
@@ -39,22 +39,22 @@ impl fmt::Display for ErrCode {
     }
 }
 
-/// A line is refused.
+/// The refusal of a line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LineRefusal {
-    /// Why.
+    /// Reason as a code.
     pub code: ErrCode,
-    /// Why, for the operator.
+    /// Reason in words, for the operator.
     pub text: String,
 }
 
 impl LineRefusal {
-    /// With its code and its text.
+    /// A refusal with its code and its text.
     pub fn new(code: ErrCode, text: impl Into<String>) -> Self {
         Self { code, text: text.into() }
     }
 
-    /// By a device that was made to misbehave.
+    /// A refusal by a device with a simulated fault.
     pub fn on_purpose(code: ErrCode) -> Self {
         Self::new(code, "refused on purpose")
     }

@@ -1,6 +1,5 @@
-//! What every controller at the other end of a link checks of a line before it
-//! looks at what it says: that the connection was greeted, that no line was
-//! lost, and that the line is not void.
+//! Checks that a controller makes before it uses a line: that `HELLO` came before it, that no line
+//! was lost, and that the line has not expired.
 
 use super::limits::{MAX_VALID_MS, MIN_VALID_MS};
 use super::refusal::{ErrCode, LineRefusal};
@@ -8,7 +7,7 @@ use crate::core::Stamp;
 
 const NS_PER_MS: u64 = 1_000_000;
 
-/// The lines of a connection.
+/// Sequence numbers of the lines on a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sequence {
     greeted: bool,
@@ -23,38 +22,38 @@ impl Default for Sequence {
 }
 
 impl Sequence {
-    /// Of a connection that nothing has come over.
+    /// A new connection without a line.
     pub const fn new() -> Self {
         Self { greeted: false, expected: 1, applied: 0 }
     }
 
-    /// `HELLO` came.
+    /// `HELLO` has arrived.
     pub const fn greet(&mut self) {
         self.greeted = true;
     }
 
-    /// The connection is gone.
+    /// The connection has ended.
     pub const fn disconnect(&mut self) {
         self.greeted = false;
     }
 
-    /// Whether `HELLO` came.
+    /// Whether `HELLO` has arrived.
     pub const fn greeted(&self) -> bool {
         self.greeted
     }
 
-    /// A line was applied.
+    /// The line with this number was applied.
     pub const fn apply(&mut self, seq: u64) {
         self.applied = seq;
     }
 
-    /// Number of the last line that was applied; 0 where there is none.
+    /// Number of the last applied line; 0 for none.
     pub const fn applied(&self) -> u64 {
         self.applied
     }
 
-    /// Takes a line's number. After a gap the count goes on from what came, so
-    /// that one lost line costs one refusal and not the connection.
+    /// Checks a line's number. After a gap the count continues from the received number, so that
+    /// one lost line costs one refusal and not the connection.
     pub fn check(&mut self, seq: u64) -> Result<(), LineRefusal> {
         if !self.greeted {
             return Err(LineRefusal::new(ErrCode::Form, "HELLO must come first"));
@@ -68,31 +67,32 @@ impl Sequence {
     }
 }
 
-/// For how long a line holds.
+/// Time for which a line is valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Validity {
-    /// How long after `ref_t_ms` the line is void \[ms\].
+    /// Time after `ref_t_ms` at which the line expires \[ms\].
     pub valid_ms: u64,
-    /// `t_ms` of the newest `STATE` that the PC has seen.
+    /// `t_ms` of the newest `STATE` that the PC has received.
     pub ref_t_ms: u64,
 }
 
-/// A device's own clock, which has nothing to do with the PC's.
+/// A device's own clock; it is independent of the PC's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DeviceClock {
-    /// What messages call the device: `robot` or `extruder`.
+    /// Name of the device in messages: `robot` or `extruder`.
     pub device: &'static str,
-    /// What it shows at stamp 0 \[ms\].
+    /// Its reading at stamp 0 \[ms\].
     pub start_ms: u64,
 }
 
 impl DeviceClock {
-    /// What it shows \[ms\].
+    /// Its reading at a stamp \[ms\].
     pub const fn ms(self, at: Stamp) -> u64 {
         self.start_ms.saturating_add(at.ns() / NS_PER_MS)
     }
 
-    /// When a line is void that arrives now, if it is not already.
+    /// Time at which a line that arrives now expires; fails if it already has, or if its times are
+    /// not valid.
     pub fn void_at(self, now: Stamp, validity: Validity) -> Result<Stamp, LineRefusal> {
         let Self { device: of, start_ms } = self;
         let Validity { valid_ms, ref_t_ms } = validity;

@@ -1,4 +1,4 @@
-//! From bytes, however they were cut, to lines.
+//! Splits a stream of bytes into lines.
 
 use super::limits::{MAX_BAD_LINES, MAX_LINE};
 
@@ -13,9 +13,8 @@ pub enum LineFault {
     NotAscii,
 }
 
-/// Cuts a stream of bytes into lines. It holds at most one line, and after a
-/// fault drops everything to the next LF. A fault is reported as soon as it is
-/// seen, once a line.
+/// Splits a stream of bytes into lines. It buffers at most one line, and after a fault drops
+/// everything up to the next LF. A fault is reported immediately, once per line.
 #[derive(Debug, Clone, Default)]
 pub struct LineSplitter {
     line: String,
@@ -23,13 +22,13 @@ pub struct LineSplitter {
 }
 
 impl LineSplitter {
-    /// An empty one.
+    /// A splitter with an empty buffer.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes bytes and gives what became whole, in order. Lines come without
-    /// LF, and without a CR before it.
+    /// Takes bytes and returns the lines that they complete, in order. Lines come without LF, and
+    /// without a CR before it.
     pub fn push(&mut self, bytes: &[u8]) -> Vec<Result<String, LineFault>> {
         bytes.iter().filter_map(|&byte| self.byte(byte)).collect()
     }
@@ -51,7 +50,7 @@ impl LineSplitter {
         if !byte.is_ascii() {
             return Some(Err(self.skip(LineFault::NotAscii)));
         }
-        // One byte more than a line holds may still be the CR before its LF.
+        // One byte beyond the longest line may still be the CR before its LF.
         let full = self.line.len() + 1 >= MAX_LINE;
         if full && (byte != b'\r' || self.line.ends_with('\r')) {
             return Some(Err(self.skip(LineFault::TooLong)));
@@ -67,19 +66,19 @@ impl LineSplitter {
     }
 }
 
-/// Counts lines in a row that make no sense.
+/// Counts malformed lines in a row.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct BadLines {
     in_a_row: u32,
 }
 
 impl BadLines {
-    /// A line was understood, even if it is then refused.
+    /// A line had the right form, even if it is then refused.
     pub fn good(&mut self) {
         self.in_a_row = 0;
     }
 
-    /// A line made no sense. `true` when the connection must be ended.
+    /// A line was malformed. Returns `true` if the connection must be ended.
     #[must_use]
     pub fn bad(&mut self) -> bool {
         self.in_a_row = self.in_a_row.saturating_add(1);

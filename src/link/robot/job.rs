@@ -1,12 +1,10 @@
-//! What a robot without an operator prints: layer upon layer, while a PC is
-//! connected.
+//! The job of a robot without an operator: layer upon layer, while a PC is connected.
 
 use super::virtual_robot::VirtualRobot;
 use crate::core::{Mm, RobotMode, Span, Stamp};
 
-/// Begins the beads of a [`VirtualRobot`]. A new connection stands for the
-/// operator's key: it begins the job again when it was finished, and
-/// acknowledges a `STOP` or `FAULT` that it finds, after the pause.
+/// Begins the beads of a [`VirtualRobot`]. A new connection replaces the operator's key: it
+/// restarts a finished job, and acknowledges a `STOP` or `FAULT` that it finds, after the pause.
 #[derive(Debug, Clone)]
 pub struct PrintJob {
     layers: u32,
@@ -19,14 +17,13 @@ pub struct PrintJob {
 }
 
 impl PrintJob {
-    /// `layers` beads, each `layer_height` above the one before, with a pause
-    /// before each.
+    /// `layers` beads, each `layer_height` above the previous one, with a pause before each.
     pub fn new(layers: u32, layer_height: Mm, first_z: Mm, pause: Span) -> Self {
         let (begun, acknowledges, waiting_since) = (0, false, None);
         Self { layers, layer_height, first_z, pause, begun, acknowledges, waiting_since }
     }
 
-    /// A PC connected and found the robot in this mode.
+    /// A PC has connected while the robot is in this mode.
     pub fn connected(&mut self, mode: RobotMode) {
         self.acknowledges = matches!(mode, RobotMode::Stop | RobotMode::Fault);
         self.waiting_since = None;
@@ -35,7 +32,7 @@ impl PrintJob {
         }
     }
 
-    /// Moves the cell on to `now` and begins a bead when it is time for one.
+    /// Advances the robot to `now` and begins a bead when it is due.
     pub fn advance(&mut self, now: Stamp, cell: &mut VirtualRobot) {
         cell.advance(now);
         let waits = match cell.mode() {

@@ -1,11 +1,10 @@
-//! How a robot's speed follows its target: a first-order lag whose slope is
-//! limited, solved in closed form, so that it does not matter how often the
-//! motion is looked at.
+//! How a robot's speed follows its target: a first-order lag with limited slope, solved in closed
+//! form, so that the result does not depend on the time steps.
 
-/// What drives the motion.
+/// Target and dynamics of the speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedLoop {
-    /// Speed to go to \[mm/s\].
+    /// Target speed \[mm/s\].
     pub target: f64,
     /// Time constant of the velocity loop, 1/(2π·bandwidth) \[s\].
     pub lag_s: f64,
@@ -23,9 +22,8 @@ pub struct PathMotion {
 }
 
 impl PathMotion {
-    /// The motion `dt_s` seconds later under a constant drive: with
-    /// e = target − v, dv/dt = clamp(e/τ, ±a). A ramp while |e| > a·τ, then
-    /// v = target − e·exp(−t/τ).
+    /// The motion `dt_s` seconds later under a constant target: with e = target − v, dv/dt =
+    /// clamp(e/τ, ±a). A ramp while |e| > a·τ, then v = target − e·exp(−t/τ).
     #[must_use]
     pub fn after(self, drive: SpeedLoop, dt_s: f64) -> Self {
         let SpeedLoop { target, lag_s, accel } = drive;
@@ -45,8 +43,8 @@ impl PathMotion {
         }
     }
 
-    /// How many nanoseconds of `within_ns` pass until the path has reached
-    /// `path_mm`, rounded up; none if it is not reached by then.
+    /// Nanoseconds, of at most `within_ns`, until the path has reached `path_mm`, rounded up;
+    /// `None` if it is not reached by then.
     pub fn ns_until(self, drive: SpeedLoop, path_mm: f64, within_ns: u64) -> Option<u64> {
         let there = |ns: u64| self.after(drive, seconds(ns)).path >= path_mm;
         if !there(within_ns) {
@@ -65,12 +63,12 @@ impl PathMotion {
     }
 }
 
-/// Rounding must not let a path fall.
+/// Rounding must not decrease a path.
 fn non_negative(step_mm: f64) -> f64 {
     step_mm.max(0.0)
 }
 
-/// Nanoseconds as seconds.
+/// Converts nanoseconds to seconds.
 #[expect(clippy::cast_precision_loss, reason = "exact for spans under 104 days")]
 pub(super) fn seconds(ns: u64) -> f64 {
     ns as f64 / 1e9

@@ -1,4 +1,4 @@
-//! Numbers as they cross the robot's link.
+//! Numbers in their form on the robot's link.
 
 use crate::core::MmPerS;
 use crate::link::frame::Decimals;
@@ -6,8 +6,7 @@ use crate::link::frame::Decimals;
 /// Twelve digits before the point; three such numbers still fit a line.
 pub(super) const NUMBERS: Decimals = Decimals { max_magnitude: 999_999_999_999.0 };
 
-/// The speed as it arrives at the other side: six decimals, at most twelve
-/// digits before the point.
+/// The speed as the other side receives it: six decimals, at most twelve digits before the point.
 pub fn on_wire(speed: MmPerS) -> MmPerS {
     MmPerS::new(NUMBERS.on_wire(speed.get())).unwrap_or(speed)
 }

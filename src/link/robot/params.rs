@@ -1,31 +1,31 @@
-//! What a robot is: its limits, how its speed follows, how long its beads are.
+//! Parameters of a robot: its limits, the dynamics of its speed, the length of its beads.
 
 use super::numbers::on_wire;
 use crate::core::{Mm, MmPerS, MmPerS2, RobotLimits};
 
-/// Description of a robot that speaks the link.
+/// Parameters of a robot on the link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotParams {
     /// Its name, one word.
     pub name: String,
-    /// Slowest setpoint that it takes.
+    /// Slowest setpoint that it accepts.
     pub min: MmPerS,
-    /// Fastest setpoint that it takes.
+    /// Fastest setpoint that it accepts.
     pub max: MmPerS,
-    /// Speed to which it goes when setpoints run out.
+    /// Speed in `HOLD`, after the last setpoint has expired.
     pub hold: MmPerS,
-    /// Speed at which it begins a bead.
+    /// Speed at the start of a bead.
     pub start: MmPerS,
-    /// Bandwidth of its velocity loop, a first-order lag \[Hz\].
+    /// Bandwidth of its speed loop, a first-order lag \[Hz\].
     pub bandwidth_hz: f64,
     /// Largest acceleration along the path.
     pub accel: MmPerS2,
-    /// Length of a bead, after which it goes to `IDLE`; none is endless.
+    /// Length of a bead, after which the mode is `IDLE`; `None` for an endless bead.
     pub bead: Option<Mm>,
     /// Height of the nozzle before the first bead.
     pub z: Mm,
-    /// Its own clock at the start of the run \[ms\]. A robot's clock has
-    /// nothing to do with the PC's.
+    /// Reading of its own clock at the start of the run \[ms\]. It is independent of the PC's
+    /// clock.
     pub clock_start_ms: u64,
 }
 
@@ -46,20 +46,20 @@ impl Default for RobotParams {
     }
 }
 
-/// A robot that cannot be.
+/// A parameter of a robot is not valid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{what} must be {must}, found {found}")]
 pub struct ParamError {
-    /// Which value.
+    /// Name of the parameter.
     pub what: &'static str,
-    /// What was expected.
+    /// What it must be.
     pub must: String,
-    /// What was found.
+    /// Its value.
     pub found: String,
 }
 
 impl RobotParams {
-    /// The speeds as they cross the link, after a check of all values.
+    /// The parameters after a check, with speeds rounded as on the link.
     pub(super) fn checked(mut self) -> Result<Self, ParamError> {
         let speeds = [&mut self.min, &mut self.max, &mut self.hold, &mut self.start];
         for speed in speeds {
@@ -95,7 +95,7 @@ impl RobotParams {
         }
     }
 
-    /// What it says of itself.
+    /// The limits that it sends in its `HELLO`.
     pub(super) fn limits(&self) -> RobotLimits {
         RobotLimits {
             name: self.name.clone(),

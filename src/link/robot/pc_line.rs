@@ -17,14 +17,14 @@ pub enum PcLine {
         seq: u64,
         /// Speed along the path.
         speed: MmPerS,
-        /// How long after `ref_t_ms` the setpoint is void \[ms\].
+        /// Time after `ref_t_ms` at which the setpoint expires \[ms\].
         valid_ms: u64,
-        /// `t_ms` of the newest `STATE` that the PC has seen.
+        /// `t_ms` of the newest `STATE` that the PC has received.
         ref_t_ms: u64,
     },
     /// Controlled stop.
     Stop {
-        /// Shares the count of the setpoints.
+        /// Number of the line; setpoints and stops share one count.
         seq: u64,
     },
     /// Orderly end of the connection.

@@ -10,11 +10,11 @@ pub type RobotLine = DeviceLine<RobotLimits, RobotStatus>;
 /// A `STATE` of the robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobotStatus {
-    /// The robot's own clock \[ms\].
+    /// Reading of the robot's own clock \[ms\].
     pub t_ms: u64,
-    /// Last setpoint that it applied on this connection; 0 is none.
+    /// Number of the last setpoint that it applied on this connection; 0 for none.
     pub seq: u64,
-    /// What it does.
+    /// Mode of the robot.
     pub mode: RobotMode,
     /// Speed along the path.
     pub speed_mm_per_s: MmPerS,
@@ -72,7 +72,7 @@ impl LineBody for RobotStatus {
     }
 }
 
-/// The word of a mode on the link.
+/// The word for a mode on the link.
 pub fn mode_word(mode: RobotMode) -> &'static str {
     match mode {
         RobotMode::Idle => "IDLE",

@@ -1,5 +1,5 @@
-//! The robot's side of the link as a state machine. Time is an argument; one
-//! machine serves `sim robot`, the simulated cell and the tests.
+//! The robot's side of the link as a state machine. Time is an argument; the same machine serves
+//! `sim robot`, the simulated cell and the tests.
 //!
 //! ```text
 //!            begin_bead             setpoint runs out           1 s more
@@ -10,11 +10,10 @@
 //!    └─────────────────────── acknowledge, from STOP or FAULT
 //! ```
 //!
-//! The link says that a bead begins at the robot's start speed until the first
-//! setpoint, but not what happens if none ever comes. Here the start of a bead
-//! counts as a setpoint at the start speed, valid for the longest time that a
-//! setpoint may be ([`MAX_VALID_MS`]): a PC that is dead, or connected and
-//! mute, then leads to `HOLD` and `STOP` like one that falls silent later.
+//! The link says that a bead begins at the robot's start speed until the first setpoint, but not
+//! what happens without any setpoint. Here the start of a bead counts as a setpoint at the start
+//! speed, with the longest validity of a setpoint ([`MAX_VALID_MS`]). So a PC that is connected
+//! but silent leads to `HOLD` and `STOP`, like one that falls silent later.
 
 use super::motion::{PathMotion, SpeedLoop, seconds};
 use super::params::{ParamError, RobotParams};
@@ -26,12 +25,12 @@ mod take;
 #[cfg(test)]
 mod tests;
 
-/// How long it holds before it stops.
+/// Time in `HOLD` before it stops.
 const HOLD_TO_STOP: Span = Span::from_millis(1000);
-/// How long the start speed is valid without a setpoint.
+/// Validity of the start speed without a setpoint.
 const START_VALID: Span = Span::from_millis(MAX_VALID_MS.cast_signed());
 
-/// What the robot does, with what belongs to it.
+/// State of the robot, with the data of each state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
     Idle,
@@ -41,14 +40,14 @@ enum Phase {
     Fault,
 }
 
-/// Ways in which a robot can misbehave, for tests and rehearsals.
+/// Misbehaviour of a robot, for tests and rehearsals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobotFaults {
-    /// Refuses every setpoint with this.
+    /// Refuses every setpoint with this code.
     pub refuse: Option<ErrCode>,
     /// Sends no `STATE`.
     pub mute: bool,
-    /// Moves at this fraction of its setpoint; 1 is no fault.
+    /// Moves at this fraction of its target speed; 1 for no fault.
     pub speed_ratio: f64,
 }
 
@@ -58,7 +57,7 @@ impl Default for RobotFaults {
     }
 }
 
-/// A robot that speaks the link.
+/// A simulated robot on the link.
 #[derive(Debug, Clone)]
 pub struct VirtualRobot {
     params: RobotParams,
@@ -72,7 +71,7 @@ pub struct VirtualRobot {
 }
 
 impl VirtualRobot {
-    /// A robot that stands idle at `now`; fails on parameters that cannot be.
+    /// A robot in `IDLE` at `now`; fails if the parameters are not valid.
     pub fn new(params: RobotParams, now: Stamp) -> Result<Self, ParamError> {
         let params = params.checked()?;
         Ok(Self {
@@ -87,25 +86,25 @@ impl VirtualRobot {
         })
     }
 
-    /// A connection, which replaces an older one. The count begins again; the
-    /// last setpoint keeps running.
+    /// A new connection, which replaces an older one. Sequence numbers start again; the last
+    /// setpoint stays valid.
     pub fn connect(&mut self, now: Stamp) {
         self.disconnect(now);
         self.sequence = Sequence::new();
     }
 
-    /// The connection is gone. The last setpoint runs out.
+    /// The connection has ended. The last setpoint stays valid until it expires.
     pub fn disconnect(&mut self, now: Stamp) {
         self.advance(now);
         self.sequence.disconnect();
     }
 
-    /// Whether a PC is connected and has said `HELLO`.
+    /// Whether a PC is connected and has sent `HELLO`.
     pub fn greeted(&self) -> bool {
         self.sequence.greeted()
     }
 
-    /// What it does.
+    /// Its current mode.
     pub fn mode(&self) -> RobotMode {
         match self.phase {
             Phase::Idle => RobotMode::Idle,
@@ -116,12 +115,12 @@ impl VirtualRobot {
         }
     }
 
-    /// What it says of itself.
+    /// The limits that it sends in its `HELLO`.
     pub fn limits(&self) -> RobotLimits {
         self.params.limits()
     }
 
-    /// Begins a bead at a height, out of `IDLE` only; says whether it did.
+    /// Begins a bead at a height, only from `IDLE`; returns whether it began.
     pub fn begin_bead(&mut self, now: Stamp, z: Mm) -> bool {
         self.advance(now);
         if self.phase != Phase::Idle {
@@ -133,7 +132,7 @@ impl VirtualRobot {
         true
     }
 
-    /// What an operator does at the robot: leaves `STOP` or `FAULT` for `IDLE`.
+    /// Leaves `STOP` or `FAULT` for `IDLE`, as an operator does at the robot.
     pub fn acknowledge(&mut self, now: Stamp) {
         self.advance(now);
         if matches!(self.phase, Phase::Stop | Phase::Fault) {
@@ -141,19 +140,19 @@ impl VirtualRobot {
         }
     }
 
-    /// Makes it stop with a fault of its own.
+    /// Stops the robot with a fault.
     pub fn fail(&mut self, now: Stamp) {
         self.advance(now);
         self.phase = Phase::Fault;
     }
 
-    /// Makes it misbehave from now on.
+    /// Sets faults that apply from now on.
     pub fn set_faults(&mut self, now: Stamp, faults: RobotFaults) {
         self.advance(now);
         self.faults = faults;
     }
 
-    /// Moves on to `now`; a time that has passed already changes nothing.
+    /// Advances to `now`; an earlier time changes nothing.
     pub fn advance(&mut self, now: Stamp) {
         while self.at < now || self.due() {
             let to = self.deadline().map_or(now, |deadline| deadline.min(now)).max(self.at);
@@ -182,14 +181,14 @@ impl VirtualRobot {
         }
     }
 
-    /// The `STATE` to send; none while it is mute.
+    /// The `STATE` to send; `None` while it is mute.
     pub fn report(&mut self, now: Stamp) -> Option<RobotLine> {
         let state = self.state(now);
         (!self.faults.mute).then_some(RobotLine::State(state))
     }
 
-    /// Runs the motion to `to`, or to the end of the bead if that comes first;
-    /// says whether it did.
+    /// Runs the motion to `to`, or to the end of the bead if that comes first; returns whether the
+    /// bead ended.
     fn move_until(&mut self, to: Stamp) -> bool {
         let speed_loop = self.speed_loop();
         let within_ns = to.ns().saturating_sub(self.at.ns());

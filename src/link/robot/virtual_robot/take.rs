@@ -1,4 +1,4 @@
-//! What the robot does with a line of the PC.
+//! Reaction of the robot to a line from the PC.
 
 use super::{Phase, VirtualRobot};
 use crate::core::{MmPerS, Stamp};
@@ -8,8 +8,7 @@ use crate::link::robot::pc_line::PcLine;
 use crate::link::robot::robot_line::{RobotLine, mode_word};
 
 impl VirtualRobot {
-    /// Takes a line of the PC; the answer is `HELLO`, or `ERR` where the line
-    /// is refused.
+    /// Takes a line from the PC; the answer is `HELLO`, or `ERR` if the line is refused.
     pub fn take(&mut self, now: Stamp, line: PcLine) -> Option<RobotLine> {
         self.advance(now);
         let (seq, taken) = match line {
@@ -26,14 +25,13 @@ impl VirtualRobot {
         taken.err().map(|refusal| RobotLine::refused(seq, refusal))
     }
 
-    /// A stop is obeyed even where the count is broken; that is reported to the PC
-    /// all the same.
+    /// A stop is obeyed even if its sequence number is wrong; the refusal is still sent to the PC.
     fn take_stop(&mut self, seq: u64) -> Result<(), LineRefusal> {
         let counted = self.sequence.check(seq);
         if counted.is_ok() {
             self.sequence.apply(seq);
         }
-        // Out of motion there is nothing to stop, and STOP is left by hand only.
+        // Without motion there is nothing to stop; `STOP` is left only by an operator.
         if matches!(self.phase, Phase::Print { .. } | Phase::Hold { .. }) {
             self.phase = Phase::Stop;
         }
