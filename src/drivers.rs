@@ -1,4 +1,4 @@
-//! Cameras, robots and extruders on the other side of a device, a file or a socket.
+//! Drivers of cameras, robots and extruders: devices, files and sockets.
 
 pub mod camera;
 pub mod extruder;

@@ -11,9 +11,8 @@ pub mod video;
 use crate::core::Stamp;
 use crate::run::ports::SourceError;
 
-/// Rate that stands in where an offline source knows no times \[Hz\]: frame `n`
-/// then counts as captured `n / 30` s after the start, so that order is kept,
-/// and its `time_s` stays unknown.
+/// Rate of an offline source without times \[Hz\]: frame `n` then counts as captured `n / 30` s
+/// after the start. That keeps the order of the frames; their `time_s` stays unknown.
 const RATE_WITHOUT_TIMES_HZ: f64 = 30.0;
 
 fn fault(source_name: &str, what: impl Into<String>) -> SourceError {
@@ -25,14 +24,14 @@ fn seconds_at(seq: u64, rate_hz: f64) -> f64 {
     seq as f64 / rate_hz
 }
 
-/// When an offline frame counts as captured: its time after that of the first
-/// frame, else its number at a stand-in rate.
+/// Capture time of an offline frame: its time since the first frame's, otherwise its number at the
+/// rate without times.
 fn offline_stamp(seq: u64, time_s: Option<f64>, first_s: f64) -> Stamp {
     let seconds = time_s.map(|time| time - first_s);
     Stamp::from_secs(seconds.unwrap_or_else(|| seconds_at(seq, RATE_WITHOUT_TIMES_HZ)))
 }
 
-/// Refuses a rate that no frames can have.
+/// Rejects a frame rate that is not positive and finite.
 fn check_rate(source_name: &str, rate_hz: Option<f64>) -> Result<(), SourceError> {
     match rate_hz {
         Some(rate) if !(rate.is_finite() && rate > 0.0) => {

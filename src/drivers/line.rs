@@ -1,10 +1,8 @@
-//! The PC's side of a line link over TCP, whoever is at the other end: a robot
-//! or an extruder.
+//! The PC's side of a line link over TCP, for a robot or an extruder.
 //!
-//! A thread owns the connection and reads; it connects, says `HELLO`, and
-//! reports what the other side says. Lines are written by the caller's own
-//! thread ([`Client::send`]), so that no queue stands between a decision and
-//! the socket.
+//! A thread owns the connection: it connects, sends `HELLO`, reads, and reports the other side's
+//! lines. The caller's own thread writes lines ([`Client::send`]), so that there is no queue
+//! between a decision and the socket.
 
 mod address;
 mod client;

@@ -8,12 +8,12 @@ use super::robot::{self, ROBOTS, RobotDriver};
 use crate::cell::drivers::DriverTables;
 use crate::document::Table;
 
-/// The devices of a cell, with their drivers' settings.
+/// The devices of a cell, with their drivers' settings; `None` if the cell has no such device.
 #[derive(Debug, Clone, Default)]
 pub struct Devices {
-    /// The robot, and what it can do.
+    /// The robot.
     pub robot: Option<Device<dyn RobotDriver, robot::RobotRegistration>>,
-    /// The extruder, where the cell says how to reach it.
+    /// The extruder.
     pub extruder: Option<Device<dyn ExtruderDriver, extruder::ExtruderRegistration>>,
 }
 
@@ -22,7 +22,7 @@ pub struct Devices {
 pub struct Device<D: ?Sized, R: 'static> {
     /// The driver with its settings.
     pub driver: Arc<D>,
-    /// What the driver is.
+    /// The driver's registration.
     pub registration: &'static R,
 }
 

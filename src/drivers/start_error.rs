@@ -8,13 +8,13 @@ use crate::link::{MAX_VALID_MS, MIN_VALID_MS};
 /// Why a driver cannot start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StartError {
-    /// No command could be valid for so long.
+    /// The validity of commands is outside the limits of the link.
     #[error("a command must be valid for {MIN_VALID_MS} to {MAX_VALID_MS} ms, found {found}")]
     Valid {
-        /// What was found \[ms\].
+        /// Validity in the cell \[ms\].
         found: u64,
     },
-    /// The limits leave nothing.
+    /// The limits of the speed leave no range.
     #[error("the slowest setpoint {min} lies above the fastest {max}")]
     Limits {
         /// Slowest.
@@ -27,7 +27,7 @@ pub enum StartError {
     Thread {
         /// `robot` or `extruder`.
         device: &'static str,
-        /// What the system says.
+        /// Message of the system.
         reason: String,
     },
     /// A file cannot be written.
@@ -35,7 +35,7 @@ pub enum StartError {
     File {
         /// The file.
         file: PathBuf,
-        /// What the system says.
+        /// Message of the system.
         reason: String,
     },
 }

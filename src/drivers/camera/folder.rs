@@ -40,10 +40,9 @@ impl Times {
 }
 
 impl Folder {
-    /// Opens a folder. Times come from its `times.csv` (`frame,time_s`; frames
-    /// by number from 0, or by file name) as they stand there, else from `fps`,
-    /// else there are none. Fails on a folder that is missing or without
-    /// images, and on times that cannot be understood.
+    /// Opens a folder. Times are those in its `times.csv` (`frame,time_s`; frames by number from
+    /// 0, or by file name), otherwise they follow from `fps`; without both there are none. Fails
+    /// if the folder is missing or has no images, or if `times.csv` cannot be read.
     pub fn open(path: &Path, channel: Channel, fps: Option<f64>) -> Result<Self, SourceError> {
         let name = path.display().to_string();
         check_rate(&name, fps)?;
@@ -80,8 +79,8 @@ impl FrameSource for Folder {
     }
 }
 
-/// The image files of a folder in natural order, other files and folders left
-/// out. Fails where the folder cannot be read or holds none.
+/// The image files of a folder in natural order; other files and folders are ignored. Fails if the
+/// folder cannot be read or has no image.
 pub fn list_images(folder: &Path) -> Result<Vec<PathBuf>, SourceError> {
     let name = folder.display().to_string();
     let entries = fs::read_dir(folder).map_err(|error| fault(&name, error.to_string()))?;

@@ -1,9 +1,8 @@
-//! A camera that is attached: by its number, or through a `GStreamer` pipeline.
+//! An attached camera, by its number or through a `GStreamer` pipeline.
 //!
-//! A thread of its own reads it, because a driver may block for as long as it
-//! likes. Only the newest image waits; older ones are dropped. When none comes
-//! before the deadline the thread is abandoned and the camera is opened
-//! again, with a growing delay, until it has failed too often in a row.
+//! A separate thread reads it, because a driver may block for any time. Only the newest image is
+//! kept; older ones are dropped. If no image comes before the deadline, the thread is abandoned
+//! and the camera is opened again, with a growing delay, until it has failed too often in a row.
 
 mod worker;
 
@@ -20,7 +19,7 @@ use crate::io::clock::RunClock;
 use crate::run::ports::{FrameSource, Grab, SourceError};
 use worker::{Capture, News, Opener, Worker};
 
-/// How long a camera may be silent, and how often it is opened anew.
+/// Timeout of a camera, and how often it is opened again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Patience {
     /// Longest wait for an image.
@@ -29,7 +28,7 @@ pub struct Patience {
     pub attempts: u32,
 }
 
-/// Opening a device and starting its stream takes longer than an image.
+/// Longest wait while a device opens and starts its stream: longer than for an image.
 const OPEN_WAIT: Duration = Duration::from_secs(10);
 const FIRST_DELAY: Duration = Duration::from_millis(100);
 const LONGEST_DELAY: Duration = Duration::from_secs(2);
@@ -56,10 +55,9 @@ impl fmt::Debug for Live {
 }
 
 impl Live {
-    /// Opens a camera and waits for its first image; fails where none comes.
-    /// `name` is the source as the cell file names it. A frame's `captured_at`
-    /// is the moment at which the driver handed the image over, before it was
-    /// decoded.
+    /// Opens a camera and waits for its first image; fails if none comes. `name` is the source in
+    /// the cell file. A frame's `captured_at` is the time at which the driver delivered the image,
+    /// before it was decoded.
     pub fn open(
         input: VideoInput,
         name: &str,
@@ -100,7 +98,7 @@ impl Live {
         })
     }
 
-    /// Waits for news of the camera, which is opened anew if it was lost.
+    /// Waits for the next frame or error of the camera, and opens it again if it was lost.
     fn news(&mut self) -> Result<News, SourceError> {
         if let Some(frame) = self.first.take() {
             return Ok(News::Frame(frame));
@@ -202,7 +200,7 @@ mod tests {
     use crossbeam_channel::{Receiver, Sender, bounded};
     use std::sync::atomic::{AtomicU64, Ordering};
 
-    /// Gives images on demand of the test: one for every message.
+    /// Gives images when the test asks: one for each message.
     struct Scripted(Receiver<Result<u64, &'static str>>);
 
     impl Capture for Scripted {

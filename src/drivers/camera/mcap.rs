@@ -1,5 +1,5 @@
-//! Frames from an MCAP: the first topic of `foxglove.CompressedImage` or
-//! `foxglove.RawImage`, or the one that is named.
+//! Frames from an MCAP file: the first topic of `foxglove.CompressedImage` or `foxglove.RawImage`,
+//! or a topic given by name.
 
 mod raw;
 mod robot_z;
@@ -25,10 +25,9 @@ use crate::run::ports::{FrameSource, Grab, SourceError};
 
 /// Frames of one topic of an MCAP.
 ///
-/// Times are those of the frames' own timestamps, else those of the messages;
-/// `time_s` counts from the first frame. In a recording of this program
-/// `captured_at` is the stamp of the run, else it counts from the first frame
-/// too.
+/// Times are the frames' own timestamps, otherwise those of the messages; `time_s` counts from the
+/// first frame. `captured_at` is the stamp of the run in a recording of this program; otherwise it
+/// counts from the first frame, too.
 pub struct McapSource {
     recording: Recording,
     topic: Arc<Topic>,
@@ -42,8 +41,8 @@ pub struct McapSource {
 }
 
 impl McapSource {
-    /// Opens an MCAP and finds its frames. Fails where there are none that can
-    /// be read, and says what there is instead.
+    /// Opens an MCAP file and finds its frames. Fails if it has no readable frames; the error
+    /// lists the topics that it has.
     pub fn open(path: &Path, topic: Option<&str>, channel: Channel) -> Result<Self, SourceError> {
         let name = path.display().to_string();
         let mut recording = Recording::open(path).map_err(|error| read_fault(&name, &error))?;
@@ -76,8 +75,8 @@ impl McapSource {
         })
     }
 
-    /// Heights of the robot, as far as the recording has been read. At any
-    /// frame that has been given out they reach up to its capture.
+    /// Heights of the robot, as far as the recording has been read: up to the capture of every
+    /// frame that has been returned.
     pub fn robot_z(&self) -> RobotZ {
         self.robot_z.clone()
     }
@@ -100,7 +99,7 @@ impl McapSource {
         Stamp::from_ns(ns.saturating_sub(start))
     }
 
-    /// Says once what is missing from the recording.
+    /// Warns once about missing parts of the recording.
     fn tell_end(&mut self) {
         if !std::mem::replace(&mut self.ended, true)
             && let Some(what) = self.recording.integrity().summary()

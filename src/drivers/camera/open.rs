@@ -1,4 +1,4 @@
-//! Finds out what a source is and opens it.
+//! Finds the kind of a source and opens it.
 
 use std::path::Path;
 
@@ -23,18 +23,18 @@ use crate::sim::render::{RenderError, Renderer};
 /// Failures in a row after which a live source counts as lost.
 const ATTEMPTS: u32 = 5;
 
-/// What recorded frames are read with.
+/// How recorded frames are read.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OfflineOptions<'a> {
-    /// Frames a second, where the source does not know.
+    /// Frame rate \[Hz\], if the source has none of its own.
     pub fps: Option<f64>,
     /// Topic of the frames in an MCAP.
     pub topic: Option<&'a str>,
-    /// Which part of a colour image.
+    /// Channel of a colour image that is used.
     pub channel: Channel,
 }
 
-/// A source of recorded frames, and the robot's heights where it knows them.
+/// A source of recorded frames, with the robot's heights if it has them.
 pub struct Recorded {
     /// The frames.
     pub source: Box<dyn FrameSource>,
@@ -63,7 +63,7 @@ pub fn recorded(path: &Path, options: OfflineOptions<'_>) -> Result<Recorded, So
     Ok(plain(Box::new(VideoFile::open(path, options.channel, options.fps)?)))
 }
 
-/// Whether a name is that of an MCAP, finished or cut short.
+/// Whether a file name is that of an MCAP file, finished or unfinished.
 pub fn is_mcap(path: &Path) -> bool {
     let ends = |path: &Path, ending: &str| {
         path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
@@ -71,23 +71,23 @@ pub fn is_mcap(path: &Path) -> bool {
     ends(path, "mcap") || (ends(path, "partial") && ends(&path.with_extension(""), "mcap"))
 }
 
-/// A source that is to give frames as they come.
+/// A source that gives frames in real time.
 #[derive(Debug, Clone, Copy)]
 pub struct LiveOptions<'a> {
     /// Where frames come from.
     pub source: &'a ImageSource,
-    /// The source as the user names it.
+    /// The source as the user wrote it.
     pub name: &'a str,
-    /// Frames a second of sources that do not set their own pace.
+    /// Frame rate of sources that have none of their own \[Hz\].
     pub rate_hz: f64,
     /// Longest wait for a frame before the camera counts as lost.
     pub deadline: Span,
-    /// Which part of a colour image.
+    /// Channel of a colour image that is used.
     pub channel: Channel,
 }
 
 impl<'a> LiveOptions<'a> {
-    /// Of a cell's camera.
+    /// Options for a cell's camera.
     pub fn of(camera: &'a CameraSettings, channel: Channel) -> Self {
         Self {
             source: &camera.source,
@@ -99,8 +99,8 @@ impl<'a> LiveOptions<'a> {
     }
 }
 
-/// Opens a camera, but for the rendered one. Recorded frames are given out at the
-/// camera's rate, as if they were live; `stop` ends them.
+/// Opens a camera, except the rendered one. Recorded frames come at the camera's rate, as if they
+/// were live; `stop` ends them.
 pub fn live(
     camera: LiveOptions<'_>,
     clock: RunClock,
@@ -134,10 +134,10 @@ pub fn live(
     }
 }
 
-/// A camera that cannot be opened.
+/// Why a camera cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// The source gives nothing.
+    /// The source gives no frames.
     #[error(transparent)]
     Source(#[from] SourceError),
     /// The bead cannot be rendered with this cell.
@@ -145,20 +145,20 @@ pub enum OpenError {
     Render(#[from] RenderError),
 }
 
-/// The camera of a cell that runs, of whatever kind.
+/// The camera of a running cell, of any kind.
 #[derive(Debug, Clone, Copy)]
 pub struct CellCamera<'a> {
     /// The cell.
     pub cell: &'a Cell,
     /// Its camera.
     pub camera: &'a CameraSettings,
-    /// What a pixel means in it.
+    /// The calibration of its images.
     pub calibration: &'a Calibration,
 }
 
 impl CellCamera<'_> {
-    /// Opens it; `stop` ends it. The rendered camera is also to be given what the robot
-    /// reports.
+    /// Opens the camera; `stop` ends it. Also returns the input for the robot's reports if the
+    /// camera is rendered.
     pub fn open(
         self,
         clock: RunClock,
@@ -175,7 +175,7 @@ impl CellCamera<'_> {
     }
 }
 
-/// Gives recorded frames out at a rate, as if they were captured now.
+/// Gives recorded frames at a fixed rate, with the current time as capture time.
 struct Paced {
     inner: Box<dyn FrameSource>,
     clock: RunClock,
@@ -191,7 +191,7 @@ impl FrameSource for Paced {
         self.due = Some(due + self.period);
         let wait = (due - self.clock.now()).max(Span::ZERO);
         let wait = std::time::Duration::from_nanos(u64::try_from(wait.ns()).unwrap_or(0));
-        // Either a word on the channel or its end means to stop.
+        // A message on the channel or its end means to stop.
         if self.stop.recv_timeout(wait) != Err(crossbeam_channel::RecvTimeoutError::Timeout) {
             return Ok(None);
         }

@@ -1,5 +1,5 @@
-//! The rendered camera: images of a simulated bead that follows the path and
-//! speed that the robot reports.
+//! The rendered camera: images of a simulated bead that follows the path and speed of the robot's
+//! reports.
 
 use std::time::Duration;
 
@@ -14,24 +14,22 @@ use crate::scenario::table::Simulation;
 use crate::sim::bead_follower::{BeadFollower, BeadRecipe};
 use crate::sim::render::Renderer;
 
-/// Reports that wait for the camera: some 20 s of a robot that reports every
-/// 20 ms.
+/// Reports that may wait for the camera: about 20 s of a robot that reports every 20 ms.
 const WAITING_REPORTS: usize = 1024;
 
-/// Gives the camera what the robot reports. Copies feed the same camera.
+/// Passes the robot's reports to the camera. Copies pass them to the same camera.
 #[derive(Debug, Clone)]
 pub struct RobotView(Sender<(Stamp, RobotState)>);
 
 impl RobotView {
-    /// Passes on a report that arrived at a moment; never waits. What a camera
-    /// that takes no frames leaves lying is lost, and the next report stands
-    /// for it.
+    /// Passes on a report with its time of arrival; never waits. If the queue is full because no
+    /// frames are taken, the report is lost; the next one replaces it.
     pub fn observe(&self, at: Stamp, state: &RobotState) {
         let _ = self.0.try_send((at, *state));
     }
 }
 
-/// Renders at a fixed rate what lies under the camera.
+/// Renders the bead under the camera at a fixed rate.
 pub struct RenderedCamera {
     renderer: Renderer,
     follower: BeadFollower,
@@ -47,8 +45,8 @@ pub struct RenderedCamera {
 }
 
 impl RenderedCamera {
-    /// A camera as the cell describes it. It ends, within a frame's period,
-    /// when `stop` is sent to or its sender is dropped.
+    /// A camera as the cell describes it. It ends, within a frame's period, on a message to `stop`
+    /// or when its sender is dropped.
     pub fn new(
         renderer: Renderer,
         simulation: &Simulation,
@@ -79,8 +77,8 @@ impl RenderedCamera {
         (source, RobotView(robot_states))
     }
 
-    /// Waits until the next frame is due; false when the camera was stopped.
-    /// Frames that are overdue are left out, not crowded.
+    /// Waits until the next frame is due; returns false when the camera was stopped. Missed frames
+    /// are skipped.
     fn wait(&mut self) -> bool {
         let now = self.clock.now();
         let due = self.due.map_or(now, |due| (due + self.period).max(now));

@@ -14,15 +14,15 @@ use crate::run::ports::{FrameSource, Grab, SourceError};
 /// How images are requested.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SnapshotSettings {
-    /// Requests a second; a camera that answers more slowly gives fewer.
+    /// Rate of the requests \[Hz\]; a camera that answers more slowly gives fewer images.
     pub rate_hz: f64,
-    /// Longest wait for a whole answer.
+    /// Longest wait for a complete answer.
     pub timeout: Span,
     /// Failed requests in a row after which the source ends.
     pub attempts: u32,
 }
 
-/// A longer answer is no image of a bead.
+/// Longest answer that is read \[bytes\]; no image is longer.
 const LONGEST_ANSWER: u64 = 256 << 20;
 
 /// A camera behind an `http://` address.
@@ -40,10 +40,9 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Prepares the requests; the first is made with the first frame. Fails on
-    /// an address that is not `http://`, a rate or a timeout that is not above
-    /// 0. A frame's `captured_at` lies half way between the request and the
-    /// beginning of the answer.
+    /// Prepares the requests; the first one is made with the first frame. Fails if the address is
+    /// not `http://`, or if rate or timeout are not positive. A frame's `captured_at` is halfway
+    /// between the request and the beginning of the answer.
     pub fn open(
         url: &str,
         channel: Channel,
@@ -58,7 +57,7 @@ impl Snapshot {
             return Err(fault(url, "the longest wait for an answer must be above 0"));
         }
         let timeout = Duration::from_nanos(settings.timeout.ns().unsigned_abs());
-        // A camera stands in the cell's own network, not behind a proxy.
+        // A camera is in the cell's own network, not behind a proxy.
         let config = Agent::config_builder().timeout_global(Some(timeout)).proxy(None).build();
         Ok(Self {
             agent: config.new_agent(),
@@ -73,8 +72,8 @@ impl Snapshot {
         })
     }
 
-    /// Waits until the next request is due. Requests that were missed because
-    /// the camera was slow are not made up for.
+    /// Waits until the next request is due. Requests that were missed because of a slow camera are
+    /// skipped.
     fn wait_until_due(&mut self) {
         let wait = self.due - self.clock.now();
         if wait > Span::ZERO {
@@ -137,7 +136,7 @@ mod tests {
     const SETTINGS: SnapshotSettings =
         SnapshotSettings { rate_hz: 1000.0, timeout: Span::from_millis(2000), attempts: 2 };
 
-    /// Answers each connection with the next of these, then is gone.
+    /// A server that gives one of these answers per connection, then closes.
     fn camera(answers: Vec<Vec<u8>>) -> String {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let url = format!("http://{}/snapshot.png", listener.local_addr().unwrap());

@@ -7,11 +7,11 @@ use crate::bridge::{VideoInput, VideoReader};
 use crate::core::Channel;
 use crate::run::ports::{FrameSource, Grab, SourceError};
 
-/// The count in a file's header is an estimate for some formats; so many
-/// frames fewer are no loss.
+/// Number of frames that may be missing without a warning: in some formats the count in the file's
+/// header is an estimate.
 const COUNT_SLACK: u64 = 2;
-/// A broken header can promise any number; more missing frames than this are
-/// not listed one by one.
+/// Largest number of missing frames that are listed one by one: a damaged header can give any
+/// count.
 const MOST_MISSING: u64 = 100_000;
 
 /// The frames of a video file.
@@ -27,8 +27,8 @@ pub struct VideoFile {
 }
 
 impl VideoFile {
-    /// Opens a video. Frame `n` has the time `n / fps`; `fps` overrides what
-    /// the file says about itself. Fails on what is no video.
+    /// Opens a video. Frame `n` has the time `n / fps`; `fps` overrides the file's own rate. Fails
+    /// if the file is not a video.
     pub fn open(path: &Path, channel: Channel, fps: Option<f64>) -> Result<Self, SourceError> {
         let name = path.display().to_string();
         check_rate(&name, fps)?;
@@ -54,8 +54,8 @@ impl VideoFile {
         Grab::Unreadable { seq, time_s, reason: format!("{} frame {seq}: {reason}", self.name) }
     }
 
-    /// A frame that the header promised after the last one that could be
-    /// decoded.
+    /// A frame that the header counts but that comes after the last decodable one; `None` if there
+    /// is none.
     fn missing(&self) -> Option<Grab> {
         let promised = self.promised.filter(|promised| self.next < *promised)?;
         let reason = format!(
@@ -100,8 +100,8 @@ mod tests {
     use crate::core::Size;
     use std::fs;
 
-    /// Uncompressed AVI of grey pictures of 16x8 px, with as many frames as
-    /// `promised` in its headers.
+    /// Uncompressed AVI of grey images of 16x8 px, with a frame count of `promised` in its
+    /// headers.
     fn avi(frames: u32, promised: u32) -> Vec<u8> {
         let (width, height, fps) = (16_u32, 8_u32, 25_u32);
         let picture = width * height * 3;

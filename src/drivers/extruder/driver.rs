@@ -1,4 +1,4 @@
-//! What an extruder driver is: its registration, its settings, and how it starts.
+//! The interface of an extruder driver: its registration, its settings, and its start.
 
 use std::fmt::Debug;
 use std::path::Path;
@@ -17,42 +17,42 @@ use crate::run::ports::{ExtruderEvent, ExtruderPort};
 pub struct ExtruderRegistration {
     /// Its name in `driver` of `[extruder]`.
     pub name: &'static str,
-    /// Reads its own keys of `[extruder]`; none where they are wrong. Relative paths start
-    /// from the folder.
+    /// Reads its own keys of `[extruder]`; `None` if they are wrong. Relative paths start from the
+    /// folder.
     pub read: fn(&Table<'_>, &Path) -> Option<Arc<dyn ExtruderDriver>>,
 }
 
 /// An extruder with its driver's settings.
 pub trait ExtruderDriver: Debug + Send + Sync {
-    /// Where the extruder is, for messages and reports, such as `host:port`.
+    /// Address of the extruder in messages and reports, such as `host:port`.
     fn address(&self) -> String;
 
-    /// A command as the extruder receives it, in steps of the link.
+    /// A command rounded to the steps of the link, as the extruder receives it.
     fn as_received(&self, command: f64) -> f64 {
         command
     }
 
-    /// Starts to connect. The extruder reports on `start.events` from then on.
+    /// Starts to connect. From then on the extruder's reports arrive on `start.events`.
     fn start(&self, start: ExtruderStart) -> Result<Box<dyn ExtruderPort>, StartError>;
 }
 
-/// What every extruder driver starts with.
+/// What an extruder driver is given at its start.
 #[derive(Debug)]
 pub struct ExtruderStart {
-    /// The clock that the run counts by.
+    /// The clock of the run.
     pub clock: RunClock,
-    /// What the cell commands.
+    /// The commands of the cell.
     pub range: DriveRange,
-    /// How long a command is valid after the report that it refers to \[ms\].
+    /// Time for which a command is valid after the report that it refers to \[ms\].
     pub valid_ms: u64,
-    /// Takes what the extruder reports. Unbounded: a driver never waits for it.
+    /// Receives the extruder's reports. Unbounded: a driver never waits for it.
     pub events: Sender<ExtruderEvent>,
 }
 
-/// The commands of a cell.
+/// Quantity and range of a cell's commands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriveRange {
-    /// What is commanded.
+    /// The commanded quantity.
     pub quantity: CommandQuantity,
     /// Smallest command, in the unit of `quantity`.
     pub min: f64,
@@ -61,8 +61,8 @@ pub struct DriveRange {
 }
 
 impl DriveRange {
-    /// Why an extruder cannot be commanded by this cell, if it cannot. `as_received` is a
-    /// command as the extruder receives it.
+    /// Why this cell cannot command an extruder; `None` if it can. `as_received` rounds a command
+    /// as the extruder receives it.
     pub fn unfit(
         &self,
         extruder: &ExtruderLimits,

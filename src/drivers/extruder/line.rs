@@ -15,7 +15,7 @@ use crate::link::extruder::{DriveLine, ExtruderLine, ExtruderStatus, on_wire};
 use crate::link::{LineError, MAX_VALID_MS, MIN_VALID_MS};
 use crate::run::ports::{ExtruderPort, SendError, Sent};
 
-/// The driver in the list of all.
+/// The registration of this driver.
 pub const REGISTRATION: ExtruderRegistration =
     ExtruderRegistration { name: "line", read: |table, _| read(table) };
 
@@ -48,21 +48,21 @@ impl ExtruderDriver for LineExtruder {
     }
 }
 
-/// How to reach an extruder, and what may be sent to it.
+/// Address of an extruder, and the commands that may be sent to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderConfig {
     /// `host:port`.
     pub address: String,
-    /// What the cell commands.
+    /// The commands of the cell.
     pub range: DriveRange,
-    /// How long a command is valid after the `STATE` that it refers to \[ms\],
-    /// 100 to 1000. It should cover a few periods of the commands.
+    /// Time for which a command is valid after the `STATE` that it refers to \[ms\], 100 to 1000.
+    /// It should cover a few periods of the commands.
     pub valid_ms: u64,
     /// Timeouts and delays.
     pub timing: LinkTiming,
 }
 
-/// An extruder at the other end.
+/// The extruder's lines.
 #[derive(Debug, Clone, Copy)]
 pub struct ExtruderDialect;
 
@@ -80,10 +80,10 @@ impl Dialect for ExtruderDialect {
     }
 }
 
-/// What the link to an extruder reports, with the time of arrival.
+/// A report of the link to an extruder, with the time of arrival.
 pub type ExtruderLineEvent = LinkEvent<ExtruderLimits, ExtruderStatus>;
 
-/// An extruder at the other end of a TCP connection that is kept up.
+/// An extruder at the other end of a TCP connection that reconnects after a loss.
 #[derive(Debug)]
 pub struct ExtruderClient {
     config: ExtruderConfig,
@@ -91,8 +91,8 @@ pub struct ExtruderClient {
 }
 
 impl ExtruderClient {
-    /// Starts to connect. `report` is called in the link's thread with what the extruder
-    /// reports; where it returns false, the thread ends.
+    /// Starts to connect. `report` is called in the link's thread with each report; if it returns
+    /// false, the thread ends.
     pub fn start(
         config: ExtruderConfig,
         clock: RunClock,
@@ -105,10 +105,9 @@ impl ExtruderClient {
         Ok(Self { config, client })
     }
 
-    /// Writes a command, once there was a `STATE`, within the limits of the
-    /// cell, and only to an extruder that takes all of them. Blocks for
-    /// [`LinkTiming::write`] at most; a write that takes longer closes the
-    /// connection.
+    /// Writes a command; fails before the first `STATE`, outside the limits of the cell, and for
+    /// an extruder that does not accept the cell's whole range. Blocks for [`LinkTiming::write`]
+    /// at most; a write that takes longer closes the connection.
     pub fn send(&self, command: ExtruderCommand) -> Result<Written, SendError> {
         self.client.send(|open| self.config.line(open, command))
     }

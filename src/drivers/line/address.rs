@@ -1,8 +1,8 @@
-//! The address of a device that speaks a line link.
+//! The address of a device on a line link.
 
 use crate::document::Table;
 
-/// Reads `address`, `host:port`; none where it is missing or has no port.
+/// Reads `address`, `host:port`; `None` if it is missing or has no port.
 pub fn read_address(table: &Table<'_>) -> Option<String> {
     let address = table.text("address")?;
     if !address.contains(':') {

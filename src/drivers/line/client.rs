@@ -1,4 +1,4 @@
-//! The other end of a TCP connection that is kept up.
+//! The PC's end of a TCP connection that reconnects after a loss.
 
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -15,11 +15,11 @@ use crate::drivers::StartError;
 use crate::io::clock::RunClock;
 use crate::run::ports::SendError;
 
-/// Longest wait for the connection's thread when closing. Only a name server
-/// or a host that does not answer takes that long.
+/// Longest wait for the connection's thread when closing. Only a name server or a host that does
+/// not answer takes that long.
 const LONGEST_JOIN: Duration = Duration::from_secs(2);
 
-/// The other end of a TCP connection that is kept up.
+/// The PC's end of a TCP connection that reconnects after a loss.
 #[derive(Debug)]
 pub struct Client<D: Dialect> {
     outgoing: Arc<Outgoing<D>>,
@@ -29,16 +29,16 @@ pub struct Client<D: Dialect> {
 #[derive(Debug)]
 struct Running {
     handle: JoinHandle<()>,
-    /// Dropped to end the wait between two connections.
+    /// Dropped to end the wait before the next attempt to connect.
     quit: Sender<()>,
     /// Closed by the thread when it ends.
     ended: Receiver<()>,
 }
 
 impl<D: Dialect> Client<D> {
-    /// Starts to connect to `address`, `host:port`. `report` is called in the link's
-    /// thread with what the other side reports; where it returns false, nobody listens
-    /// any more and the thread ends. Fails where the system gives no thread.
+    /// Starts to connect to `address`, `host:port`. `report` is called in the link's thread with
+    /// each report of the other side; if it returns false, the thread ends. Fails if the system
+    /// gives no thread.
     pub fn start(
         address: String,
         timing: LinkTiming,
@@ -60,9 +60,8 @@ impl<D: Dialect> Client<D> {
         Ok(Self { outgoing, thread: Some(Running { handle, quit, ended }) })
     }
 
-    /// Writes the line that `line` makes of what is known of the present
-    /// connection, and counts it. Blocks for [`LinkTiming::write`] at most; a
-    /// write that takes longer closes the connection.
+    /// Writes the line that `line` makes from the state of the current connection, and numbers it.
+    /// Blocks for [`LinkTiming::write`] at most; a write that takes longer closes the connection.
     pub fn send(
         &self,
         line: impl FnOnce(&Open<D>) -> Result<String, SendError>,
@@ -70,12 +69,13 @@ impl<D: Dialect> Client<D> {
         self.outgoing.send(line)
     }
 
-    /// Says `BYE` and ends the thread. What was commanded last runs out.
+    /// Sends `BYE` and ends the thread. The last command stays valid at the device until it
+    /// expires.
     pub fn close(&mut self) {
         let Some(Running { handle, quit, ended }) = self.thread.take() else { return };
         self.outgoing.close();
         drop(quit);
-        // Nothing is ever sent on it: it either times out or is closed.
+        // No message is ever sent on it: the wait times out or the channel is closed.
         if ended.recv_timeout(LONGEST_JOIN) == Err(RecvTimeoutError::Timeout) {
             tracing::warn!("the {} link is still trying to connect; left to itself", D::NAME);
         } else if handle.join().is_err() {

@@ -1,4 +1,4 @@
-//! Keeps a connection: connect, `HELLO`, listen, and again.
+//! Keeps a connection: connect, `HELLO`, listen, reconnect.
 
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
@@ -11,7 +11,7 @@ use super::outgoing::{Outgoing, write_line};
 use crate::core::{Span, Stamp};
 use crate::link::PcLine;
 
-/// Nobody listens to the events any more.
+/// The receiver of the events is gone.
 struct NobodyListens;
 
 fn listens(listens: bool) -> Result<(), NobodyListens> {
@@ -21,13 +21,13 @@ fn listens(listens: bool) -> Result<(), NobodyListens> {
 /// How a session ended.
 struct Ended {
     why: Lost,
-    /// The other side had answered `HELLO`.
+    /// Whether the other side had answered `HELLO`.
     was_up: bool,
-    /// It had also sent a `STATE`.
+    /// Whether it had also sent a `STATE`.
     was_good: bool,
 }
 
-/// Connects again and again until the link is closed or nobody listens.
+/// Connects again and again until the link is closed or the receiver of the events is gone.
 pub(super) fn keep_up<D: Dialect>(
     out: &Outgoing<D>,
     report: &dyn Fn(EventOf<D>) -> bool,
@@ -75,8 +75,8 @@ fn session<D: Dialect>(
     };
     out.opened(stream, hello.clone());
     listens(report(LinkEvent::Up { at, hello }))?;
-    // A close that came while the other side was being greeted found nothing
-    // to shut.
+    // If the link was closed before `HELLO` was answered, there was no connection to shut down
+    // yet.
     if out.closing() {
         out.close();
     }

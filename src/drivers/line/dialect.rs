@@ -1,4 +1,4 @@
-//! What a line link says, whoever is at the other end.
+//! The lines of a device on a line link, robot or extruder.
 
 use std::fmt::Debug;
 
@@ -6,76 +6,75 @@ use crate::core::{RefusalReason, Stamp};
 use crate::link::{ErrCode, LineError};
 use crate::run::ports::DeviceEvent;
 
-/// A line of the other side.
+/// A line from the device.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Heard<H, S> {
     /// Its answer to `HELLO`.
     Hello(H),
-    /// What it does.
+    /// Its state.
     State(S),
     /// A refused line.
     Err {
-        /// Number of the refused line; 0 where it had none that could be read.
+        /// Number of the refused line; 0 if it has no readable number.
         seq: u64,
-        /// Why.
+        /// Reason as a code.
         code: ErrCode,
-        /// Why, for the operator.
+        /// Reason in words, for the operator.
         text: String,
     },
 }
 
-/// What is at the other end of a link.
+/// The kind of device at the other end of a link.
 pub trait Dialect: Debug + Send + Sync + 'static {
-    /// What it says of itself.
+    /// Fields of its `HELLO`.
     type Hello: Debug + Clone + Send + 'static;
-    /// What it says that it does.
+    /// Fields of its `STATE`.
     type State: Debug + Copy + Send + 'static;
-    /// What it is called in messages, such as `robot`.
+    /// Its name in messages, such as `robot`.
     const NAME: &'static str;
 
-    /// Reads one of its lines, without LF.
+    /// Reads one of its lines, without the LF.
     fn understand(text: &str) -> Result<Heard<Self::Hello, Self::State>, LineError>;
 }
 
-/// What a link reports, with the time of arrival.
+/// A report of a link, with the time of arrival.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LinkEvent<H, S> {
     /// The other side answered `HELLO`.
     Up {
-        /// When.
+        /// Time of arrival.
         at: Stamp,
-        /// What it says of itself.
+        /// Fields of its `HELLO`.
         hello: H,
     },
     /// The other side reported its state.
     State {
-        /// When it arrived.
+        /// Time of arrival.
         at: Stamp,
         /// The state.
         state: S,
     },
     /// The other side refused a line.
     Refused {
-        /// When the refusal arrived.
+        /// Time of arrival.
         at: Stamp,
-        /// Number of the refused line; 0 where it had none.
+        /// Number of the refused line; 0 if it has no readable number.
         seq: u64,
-        /// Why.
+        /// Reason as a code.
         code: ErrCode,
-        /// Why, for the operator.
+        /// Reason in words, for the operator.
         text: String,
     },
-    /// The connection was lost, or could not be made. Told again only when the
-    /// reason changes.
+    /// The connection was lost, or could not be made. Reported again only if the reason changes.
     Down {
-        /// When.
+        /// Time of the loss.
         at: Stamp,
-        /// Why, in words for the operator.
+        /// Reason in words, for the operator.
         reason: String,
     },
 }
 
-/// What the link to a dialect reports.
+/// A report of the link to a device of a dialect.
 pub type EventOf<D> = LinkEvent<<D as Dialect>::Hello, <D as Dialect>::State>;
 
 impl<H, W, S: From<W>> From<LinkEvent<H, W>> for DeviceEvent<H, S> {

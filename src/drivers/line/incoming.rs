@@ -1,4 +1,4 @@
-//! What the other side says, line by line, with a deadline.
+//! Reads the other side's lines, with a deadline.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -29,7 +29,7 @@ impl From<std::io::Error> for Why {
     }
 }
 
-/// Why a connection ended and to whom, in words for the operator.
+/// Why a connection ended and with which device, in words for the operator.
 #[derive(Debug)]
 pub(super) struct Lost {
     who: &'static str,
@@ -37,7 +37,7 @@ pub(super) struct Lost {
 }
 
 impl Lost {
-    /// Of a connection to this kind of other side.
+    /// For a connection to this kind of device.
     pub(super) const fn of<D: Dialect>(why: Why) -> Self {
         Self { who: D::NAME, why }
     }
@@ -89,10 +89,9 @@ impl<D: Dialect> Incoming<D> {
         }
     }
 
-    /// The next line that makes sense, and when it arrived; none when there is
-    /// none by the deadline. Bytes that wait in the socket at the deadline are
-    /// still read once, so that a PC that was delayed itself does not blame the
-    /// other side.
+    /// The next well-formed line with its time of arrival; `None` if there is none by the
+    /// deadline. Bytes that wait in the socket at the deadline are still read once: after a delay
+    /// of the PC itself the other side is not at fault.
     pub(super) fn next(&mut self, deadline: Stamp) -> Result<Option<(Stamp, LineOf<D>)>, Why> {
         loop {
             if let Some(piece) = self.pending.pop_front() {

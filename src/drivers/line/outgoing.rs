@@ -1,4 +1,4 @@
-//! What leaves the PC: numbered and written by the caller's thread.
+//! Lines to the device: numbered and written by the caller's thread.
 
 use std::io::{ErrorKind, Write};
 use std::net::{Shutdown, TcpStream};
@@ -12,7 +12,7 @@ use crate::io::clock::RunClock;
 use crate::link::PcLine;
 use crate::run::ports::SendError;
 
-/// The writing half of the link, shared with the thread that reads.
+/// The writing half of the link, shared with the reading thread.
 #[derive(Debug)]
 pub(super) struct Outgoing<D: Dialect> {
     pub(super) address: String,
@@ -25,18 +25,18 @@ pub(super) struct Outgoing<D: Dialect> {
 #[derive(Debug)]
 struct State<D: Dialect> {
     open: Option<Open<D>>,
-    /// Why writing ended the connection.
+    /// Why a write ended the connection; `None` if none did.
     broken: Option<String>,
 }
 
 /// A connection on which the other side has answered `HELLO`.
 #[derive(Debug)]
 pub struct Open<D: Dialect> {
-    /// What the other side says of itself.
+    /// Fields of the other side's `HELLO`.
     pub hello: D::Hello,
     /// Number of the next line.
     pub next_seq: u64,
-    /// Its newest `STATE`, once there was one.
+    /// Its newest `STATE`; `None` before the first one.
     pub newest: Option<D::State>,
     stream: TcpStream,
 }
@@ -47,32 +47,31 @@ impl<D: Dialect> Outgoing<D> {
         Self { address, timing, clock, closing: AtomicBool::new(false), state }
     }
 
-    /// Whether the link is being closed in order.
+    /// Whether the link is being closed.
     pub(super) fn closing(&self) -> bool {
         self.closing.load(Ordering::Acquire)
     }
 
-    /// Lines may be written to this connection from now on, counted from 1.
+    /// Lines may be written to this connection from now on, numbered from 1.
     pub(super) fn opened(&self, stream: TcpStream, hello: D::Hello) {
         let open = Some(Open { stream, hello, next_seq: 1, newest: None });
         *self.lock() = State { open, broken: None };
     }
 
-    /// The newest `STATE`.
+    /// Stores the newest `STATE`.
     pub(super) fn seen(&self, state: D::State) {
         if let Some(open) = self.lock().open.as_mut() {
             open.newest = Some(state);
         }
     }
 
-    /// The connection is of no use any more; says why, where it was writing
-    /// that failed.
+    /// The connection is lost. Returns the reason if a failed write was the cause.
     pub(super) fn lost(&self) -> Option<String> {
         let state = std::mem::replace(&mut *self.lock(), State { open: None, broken: None });
         state.broken
     }
 
-    /// Says `BYE` and makes the reading thread wake up.
+    /// Sends `BYE` and wakes the reading thread.
     pub(super) fn close(&self) {
         self.closing.store(true, Ordering::Release);
         if let Some(mut open) = self.lock().open.take() {
@@ -113,12 +112,12 @@ impl<D: Dialect> Outgoing<D> {
 
 impl<D: Dialect> Open<D> {
     fn shut(&self) {
-        // A connection that is gone already cannot be shut; that is as good.
+        // Shutting down a connection that is already gone fails, which does no harm.
         let _ = self.stream.shutdown(Shutdown::Both);
     }
 }
 
-/// Writes a line whole, in one go: half a line would be worse than none.
+/// Writes a whole line in one call; fails if only a part was written.
 pub(super) fn write_line(stream: &mut TcpStream, line: &str) -> std::io::Result<()> {
     let written = stream.write(line.as_bytes())?;
     if written < line.len() {

@@ -2,20 +2,20 @@
 
 use std::time::Duration;
 
-/// Timeouts and delays of the link.
+/// Timeouts and delays of a link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LinkTiming {
-    /// Until a connection must stand.
+    /// Timeout of an attempt to connect.
     pub connect: Duration,
-    /// Until the other side must have answered `HELLO`.
+    /// Timeout of the answer to `HELLO`.
     pub hello: Duration,
-    /// Without a `STATE` for this long the connection is given up.
+    /// Time without a `STATE` after which the connection is closed.
     pub silence: Duration,
-    /// Longest time for which a write may block.
+    /// Timeout of a write.
     pub write: Duration,
-    /// Delay before the first attempt to connect again; doubles.
+    /// Delay before the first attempt to connect again; it doubles with each attempt.
     pub first_delay: Duration,
-    /// Where the delay stops doubling.
+    /// Largest delay.
     pub longest_delay: Duration,
 }
 

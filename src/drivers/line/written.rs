@@ -1,12 +1,12 @@
-//! A line that has left the PC.
+//! A line that was sent.
 
 use crate::core::Stamp;
 
-/// A line that has left the PC.
+/// A line that was sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Written {
-    /// Its number on this connection.
+    /// Its number on the connection.
     pub seq: u64,
-    /// Just after its bytes were written.
+    /// Time just after its bytes were written.
     pub at: Stamp,
 }

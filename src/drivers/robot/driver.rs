@@ -1,4 +1,4 @@
-//! What a robot driver is: its registration, what it can do, and how it starts.
+//! The interface of a robot driver: its registration, its capabilities, and its start.
 
 use std::fmt;
 use std::path::Path;
@@ -17,30 +17,30 @@ use crate::run::ports::{RobotEvent, RobotPort};
 pub struct RobotRegistration {
     /// Its name in `driver` of `[robot]`.
     pub name: &'static str,
-    /// What its robots can do.
+    /// Capabilities of its robots.
     pub capabilities: Capabilities,
-    /// Reads its own keys of `[robot]`; none where they are wrong. Relative paths start
-    /// from the folder.
+    /// Reads its own keys of `[robot]`; `None` if they are wrong. Relative paths start from the
+    /// folder.
     pub read: fn(&Table<'_>, &Path) -> Option<Arc<dyn RobotDriver>>,
 }
 
-/// What the robots of a driver can do.
+/// Capabilities of a driver's robots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub struct Capabilities {
-    /// They report the slowest and the fastest setpoint that they take.
+    /// They report the slowest and the fastest setpoint that they accept.
     pub reports_limits: bool,
-    /// A setpoint expires at the robot, so that one that loses the PC stops by itself.
+    /// A setpoint expires at the robot, so that the robot stops by itself when it loses the PC.
     pub setpoints_expire: bool,
-    /// They report the length of the path.
+    /// They report the distance along the path.
     pub reports_path: bool,
     /// They report the nozzle's position in space, beyond its height.
     pub reports_position: bool,
     /// They report the direction in which the nozzle moves.
     pub reports_heading: bool,
-    /// They report the speed at which they move.
+    /// They report their actual speed.
     pub reads_speed_back: bool,
-    /// Steps in which a setpoint is taken; 0 for any value.
+    /// Resolution of setpoints; 0 for any value.
     pub resolution: MmPerS,
 }
 
@@ -65,26 +65,26 @@ impl fmt::Display for Capabilities {
 
 /// A robot with its driver's settings.
 pub trait RobotDriver: fmt::Debug + Send + Sync {
-    /// Where the robot is, for messages and reports, such as `host:port`.
+    /// Address of the robot in messages and reports, such as `host:port`.
     fn address(&self) -> String;
 
-    /// Starts to connect. The robot reports on `start.events` from then on.
+    /// Starts to connect. From then on the robot's reports arrive on `start.events`.
     fn start(&self, start: RobotStart) -> Result<Box<dyn RobotPort>, StartError>;
 }
 
-/// What every robot driver starts with.
+/// What a robot driver is given at its start.
 #[derive(Debug)]
 pub struct RobotStart {
-    /// The clock that the run counts by.
+    /// The clock of the run.
     pub clock: RunClock,
     /// Slowest setpoint of the cell.
     pub min: MmPerS,
     /// Fastest setpoint of the cell.
     pub max: MmPerS,
-    /// Speed at which a bead begins.
+    /// Speed at the start of a bead.
     pub start_speed: MmPerS,
-    /// How long a setpoint is valid after the report that it refers to \[ms\].
+    /// Time for which a setpoint is valid after the report that it refers to \[ms\].
     pub valid_ms: u64,
-    /// Takes what the robot reports. Unbounded: a driver never waits for it.
+    /// Receives the robot's reports. Unbounded: a driver never waits for it.
     pub events: Sender<RobotEvent>,
 }

@@ -14,7 +14,7 @@ use crate::io::clock::RunClock;
 use crate::link::{LineError, MAX_VALID_MS, MIN_VALID_MS, PcLine, RobotLine, RobotStatus, on_wire};
 use crate::run::ports::{RobotPort, SendError, Sent};
 
-/// The driver in the list of all.
+/// The registration of this driver.
 pub const REGISTRATION: RobotRegistration = RobotRegistration {
     name: "line",
     capabilities: Capabilities {
@@ -24,7 +24,7 @@ pub const REGISTRATION: RobotRegistration = RobotRegistration {
         reports_position: false,
         reports_heading: false,
         reads_speed_back: true,
-        // Six decimals on the line.
+        // A line has six decimals.
         resolution: MmPerS::constant(1e-6),
     },
     read: |table, _| read(table),
@@ -55,7 +55,7 @@ impl RobotDriver for LineRobot {
     }
 }
 
-/// How to reach a robot, and what may be sent to it.
+/// Address of a robot, and the setpoints that may be sent to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkConfig {
     /// `host:port`.
@@ -64,14 +64,14 @@ pub struct LinkConfig {
     pub min: MmPerS,
     /// Fastest setpoint of the cell.
     pub max: MmPerS,
-    /// How long a setpoint is valid after the `STATE` that it refers to \[ms\],
-    /// 100 to 1000. It should cover a few periods of the setpoints.
+    /// Time for which a setpoint is valid after the `STATE` that it refers to \[ms\], 100 to 1000.
+    /// It should cover a few periods of the setpoints.
     pub valid_ms: u64,
     /// Timeouts and delays.
     pub timing: LinkTiming,
 }
 
-/// A robot at the other end.
+/// The robot's lines.
 #[derive(Debug, Clone, Copy)]
 pub struct RobotDialect;
 
@@ -89,10 +89,10 @@ impl Dialect for RobotDialect {
     }
 }
 
-/// What the link to a robot reports, with the time of arrival.
+/// A report of the link to a robot, with the time of arrival.
 pub type RobotLineEvent = LinkEvent<RobotLimits, RobotStatus>;
 
-/// A robot at the other end of a TCP connection that is kept up.
+/// A robot at the other end of a TCP connection that reconnects after a loss.
 #[derive(Debug)]
 pub struct LinkClient {
     config: LinkConfig,
@@ -100,8 +100,8 @@ pub struct LinkClient {
 }
 
 impl LinkClient {
-    /// Starts to connect. `report` is called in the link's thread with what the robot
-    /// reports; where it returns false, the thread ends.
+    /// Starts to connect. `report` is called in the link's thread with each report; if it returns
+    /// false, the thread ends.
     pub fn start(
         config: LinkConfig,
         clock: RunClock,
@@ -117,10 +117,9 @@ impl LinkClient {
         Ok(Self { config, client })
     }
 
-    /// Writes a command. Speeds leave only while the newest `STATE` says
-    /// `PRINT` or `HOLD`, and only within the limits of the cell and of the
-    /// robot; a stop leaves in any mode. Blocks for [`LinkTiming::write`] at
-    /// most; a write that takes longer closes the connection.
+    /// Writes a command. A speed is sent only if the newest `STATE` has the mode `PRINT` or
+    /// `HOLD`, and only within the limits of cell and robot; a stop is sent in any mode. Blocks
+    /// for [`LinkTiming::write`] at most; a write that takes longer closes the connection.
     pub fn send(&self, command: Command) -> Result<Written, SendError> {
         self.client.send(|open| {
             let line = match command {

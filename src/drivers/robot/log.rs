@@ -1,5 +1,5 @@
-//! `driver = "log"`: no robot at all. Every command goes into a table, and the reports are
-//! those of a robot that prints without end and follows at once. It shows what a cell would
+//! `driver = "log"`: no robot. Every command is written to a table, and the reports are those of a
+//! robot that prints without end and follows each setpoint immediately. It shows what a cell would
 //! send, and is the shortest robot driver.
 
 use std::fs::File;
@@ -18,7 +18,7 @@ use crate::document::Table;
 use crate::drivers::StartError;
 use crate::run::ports::{RobotEvent, RobotPort, SendError, Sent};
 
-/// The driver in the list of all.
+/// The registration of this driver.
 pub const REGISTRATION: RobotRegistration = RobotRegistration {
     name: "log",
     capabilities: Capabilities {
@@ -36,7 +36,7 @@ pub const REGISTRATION: RobotRegistration = RobotRegistration {
 /// Time between two reports.
 const REPORT_PERIOD: Duration = Duration::from_millis(20);
 
-/// A table in place of a robot.
+/// A table instead of a robot.
 #[derive(Debug)]
 struct LogRobot {
     file: PathBuf,
@@ -78,7 +78,7 @@ impl RobotDriver for LogRobot {
     }
 }
 
-/// The table, and the thread that reports.
+/// The table, and the thread that sends reports.
 struct LogPort {
     table: File,
     clock: crate::io::clock::RunClock,
@@ -109,7 +109,7 @@ impl RobotPort for LogPort {
     }
 }
 
-/// A robot that moves at the speed that it was last commanded.
+/// A robot that moves at the last commanded speed.
 struct Follower {
     state: RobotState,
     at: Stamp,
@@ -124,7 +124,7 @@ impl Follower {
             hold_mm_per_s: start.start_speed,
         };
         let at = start.clock.now();
-        // A run that has ended already needs no report.
+        // If the run has already ended, nobody needs the report.
         let _ = start.events.send(RobotEvent::Up { at, limits: robot });
         let state = RobotState {
             robot_time_ms: None,
@@ -151,7 +151,7 @@ impl Follower {
         self.state = RobotState { mode, speed_mm_per_s: speed, has_setpoint: true, ..self.state };
     }
 
-    /// Reports its state; false where nobody listens any more.
+    /// Reports its state; returns false if the receiver is gone.
     fn report(&mut self, start: &RobotStart) -> bool {
         let now = start.clock.now();
         self.advance(now);

@@ -13,9 +13,9 @@ use crate::run::ports::SourceError;
 /// Longest wait for the thread to end with its source.
 const MAX_SHUTDOWN: Duration = Duration::from_secs(1);
 
-/// Something that gives images; each call waits for the next one.
+/// A source of images; each call waits for the next one.
 pub(super) trait Capture {
-    /// The next image, numbered 0, with the time at which it was there.
+    /// The next image, with number 0 and its time of arrival.
     fn capture(&mut self) -> Result<Frame, String>;
 }
 
@@ -26,8 +26,8 @@ pub(super) enum News {
     Failed(String),
 }
 
-/// The thread that reads a camera. It ends when its `stay` is dropped, at the
-/// latest with the image for which it waits.
+/// The thread that reads a camera. It ends when its `stay` is dropped, at the latest after the
+/// next image.
 pub(super) struct Worker {
     pub(super) news: Receiver<News>,
     stay: Sender<()>,
@@ -54,7 +54,7 @@ impl Worker {
         Ok(Self { news, stay, thread })
     }
 
-    /// Leaves a thread to itself that may be stuck in a driver.
+    /// Leaves the thread running; it may be blocked in a driver.
     pub(super) fn abandon(self) {
         drop(self.stay);
     }
@@ -68,7 +68,7 @@ impl Worker {
                 Err(RecvTimeoutError::Disconnected) => break,
             }
         }
-        // A panic there has been reported as a lost camera.
+        // A panic of the thread has already been reported as a lost camera.
         drop(self.thread.join());
     }
 }
@@ -91,7 +91,7 @@ fn read_until_stopped(
     }
 }
 
-/// Puts news into the slot; what waits there and is older gives way.
+/// Puts news into the slot; older news in the slot is dropped.
 pub(super) fn put(slot: &Sender<News>, old: &Receiver<News>, news: News) {
     let mut news = news;
     while let Err(TrySendError::Full(back)) = slot.try_send(news) {

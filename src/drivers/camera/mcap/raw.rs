@@ -1,9 +1,9 @@
-//! `foxglove.RawImage` as a frame.
+//! Converts a `foxglove.RawImage` to a frame.
 
 use crate::core::{Channel, Frame, Pixels, SampleLayout, Size, Stamp};
 use crate::io::foxglove::RawImage;
 
-/// Encodings that are read.
+/// The encodings that can be decoded.
 const KNOWN: &str = "mono8, mono16, 8UC1, 16UC1, rgb8, bgr8, rgba8, bgra8 and 8UC3";
 
 enum Depth {
@@ -11,9 +11,8 @@ enum Depth {
     Sixteen,
 }
 
-/// Decodes the encodings of [`KNOWN`]; 16-bit values are little-endian, as the
-/// schema has it. An `8UC3` image counts as `bgr8`. Fails with what is wrong,
-/// in words.
+/// Decodes the encodings of [`KNOWN`]; 16-bit values are little-endian, as in the schema. `8UC3`
+/// is decoded as `bgr8`. Fails with a message.
 pub fn decode(
     image: &RawImage,
     channel: Channel,
@@ -45,7 +44,7 @@ pub fn decode(
         .map_err(|error| error.to_string())
 }
 
-/// The rows without what pads them.
+/// The rows without their padding.
 fn rows(image: &RawImage, pixel_bytes: usize) -> Result<Vec<u8>, String> {
     let (step, height) = (image.step as usize, image.height as usize);
     let row = (image.width as usize).saturating_mul(pixel_bytes);

@@ -1,17 +1,16 @@
-//! How high the nozzle was, from the robot states in a recording.
+//! Height of the nozzle over time, from the robot states in a recording.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::control::Event;
 use crate::core::{Mm, Stamp};
 
-/// Heights over time. Copies share what they know, so that one can be asked
-/// while another is being filled.
+/// Heights over time. Copies share their data, so that one can be read while another is filled.
 #[derive(Debug, Clone, Default)]
 pub struct RobotZ(Arc<Mutex<Vec<(Stamp, Mm)>>>);
 
 impl RobotZ {
-    /// Notes the height of an event that has one.
+    /// Records the height of an event that has one.
     pub fn note(&self, now: Stamp, event: &Event) {
         let Event::Robot(state) = event else { return };
         let mut heights = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -20,9 +19,8 @@ impl RobotZ {
         }
     }
 
-    /// Height of the nozzle in the robot's frame as the newest state at that
-    /// moment had it, which is what the run itself knew; `None` before the
-    /// first state.
+    /// Height of the nozzle in the robot's frame, from the newest state at that time, as the run
+    /// itself had it; `None` before the first state.
     pub fn z_at(&self, at: Stamp) -> Option<Mm> {
         let heights = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let later = heights.partition_point(|&(since, _)| since <= at);
