@@ -1,5 +1,5 @@
-//! A live run: camera, measurement, control, robot link, recording and log,
-//! each in a thread of its own, around the one controller.
+//! A live run: camera, measurement, control, robot link, recording and log, each in a thread of
+//! its own, around one controller.
 //!
 //! ```text
 //! camera ─one slot, latest wins─▶ capture ─widths─▶ control ─lines─▶ robot, extruder
@@ -9,10 +9,9 @@
 //!                                      recorder  run logger (widths.csv, report)
 //! ```
 //!
-//! The control thread waits for events, for the next setpoint's time and for
-//! the next step of the extruder side, and for nothing else. Any end, wanted or
-//! not, is the same: hold, extruder off, stop the robot, finish the recording,
-//! join.
+//! The control thread waits only for events, for the next setpoint's time and for the next step of
+//! the extruder side. Every end of a run is the same, intended or not: hold, extruder off, robot
+//! stop, recording finished, threads joined.
 
 pub mod capture;
 mod control;
@@ -51,7 +50,7 @@ use control::{ControlThread, ExtruderWatch, LiveInputs, StepsWatch};
 use journal::Journal;
 use run_logger::RunLogger;
 
-/// What a live run needs.
+/// Settings of a live run.
 pub struct LiveRun {
     /// The cell, read for a run.
     pub cell: Cell,
@@ -59,38 +58,38 @@ pub struct LiveRun {
     pub run: RunPart,
     /// Its robot.
     pub robot: Arc<dyn RobotDriver>,
-    /// Its extruder, where it is commanded.
+    /// Its extruder; `None` if it is not commanded.
     pub extruder: Option<LiveExtruder>,
-    /// What a pixel means in it.
+    /// The calibration of its images.
     pub calibration: Calibration,
-    /// The clock that the run counts by.
+    /// The clock of the run.
     pub clock: RunClock,
-    /// Where the recording goes; the log has its own folder.
+    /// Folder of the recording; the log has its own folder.
     pub out: PathBuf,
-    /// What is written into the recording.
+    /// Settings of the recording.
     pub record: RecordConfig,
-    /// Logs what happens.
+    /// The run log.
     pub log: RunLog,
-    /// How long to run; none is until something ends it.
+    /// Duration of the run; `None` for a run without a time limit.
     pub duration: Option<Span>,
-    /// Whether to end when a sequence of steps is over.
+    /// Whether to end when a sequence of speed steps is over.
     pub ends_with_steps: bool,
-    /// Gives a message when the run is to end.
+    /// Receives a message when the run is to end.
     pub stop: Receiver<()>,
-    /// Called with what happens, in words for the operator.
+    /// Called with messages for the operator.
     pub notice: Box<dyn FnMut(&str) + Send>,
 }
 
 /// The extruder of a live run.
 #[derive(Debug, Clone)]
 pub struct LiveExtruder {
-    /// What the controller knows of it.
+    /// Setup of the extruder in the controller.
     pub setup: ExtruderSetup,
-    /// The flow that is wanted.
+    /// The flow demand.
     pub demand: FlowDemand,
-    /// How it is reached.
+    /// Its driver.
     pub driver: Arc<dyn ExtruderDriver>,
-    /// How long a command holds at the extruder \[ms\].
+    /// Time for which a command is valid at the extruder \[ms\].
     pub valid_ms: u64,
 }
 
@@ -101,22 +100,22 @@ impl LiveExtruder {
     }
 }
 
-/// How a live run went.
+/// Result of a live run.
 pub struct LiveReport {
-    /// The figures.
+    /// Figures of the run.
     pub summary: Summary,
     /// Why it ended.
     pub ending: Ending,
-    /// Whether the pump said until the end that it runs.
+    /// Whether the last report of the pump was that it runs.
     pub pump_runs: bool,
-    /// The recording, whole or cut short.
+    /// The recording; the error says how far it is complete.
     pub recording: Result<RecordReport, Box<Incomplete>>,
 }
 
-/// A live run that could not begin, or whose results could not be written.
+/// Why a live run could not begin, or its results could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
-    /// The camera gives nothing.
+    /// The camera gives no frames.
     #[error(transparent)]
     Camera(#[from] OpenError),
     /// The recording cannot begin.
@@ -133,7 +132,7 @@ pub enum LiveError {
     Thread(#[from] std::io::Error),
 }
 
-/// Runs a cell until it is stopped, its time is over or it fails.
+/// Runs a cell until it is stopped, its duration is over or it fails.
 pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     let (camera_stop, camera_end) = bounded::<()>(0);
     let camera = open::CellCamera {
@@ -226,7 +225,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     Ok(LiveReport { summary: logger.finish()?, ending, pump_runs, recording })
 }
 
-/// The extruder, where it is commanded, and what it reports.
+/// The extruder's port if it is commanded, and its reports.
 type OpenExtruder = (Option<Box<dyn ExtruderPort>>, Receiver<ExtruderEvent>);
 
 fn open_extruder(live: &LiveRun) -> Result<OpenExtruder, StartError> {

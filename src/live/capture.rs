@@ -1,5 +1,4 @@
-//! Camera and measurement: one thread takes frames, another measures the
-//! newest of them.
+//! Camera and measurement: one thread takes frames, another measures the newest one.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,31 +15,31 @@ use crate::io::recorder::FrameTap;
 use crate::run::ports::{FrameSource, Grab};
 use crate::vision::{Measurer, Reject, Roughness, RoughnessEstimator, WidthMeasurement};
 
-/// What the measurement needs to know of the cell.
+/// Data of the cell for the measurement.
 pub struct Optics {
     /// The cell.
     pub cell: Cell,
-    /// What a pixel means in it.
+    /// The calibration of its images.
     pub calibration: Calibration,
-    /// The robot's newest z \[mm\], as bits; NaN where it has reported none.
+    /// The robot's newest z \[mm\], as bits; NaN before its first report.
     pub robot_z: Arc<AtomicU64>,
 }
 
-/// What the capture pipeline gives control.
+/// A message from the capture pipeline to control.
 #[derive(Debug)]
 pub enum CameraMessage {
     /// A frame was measured or rejected.
     Frame(Box<MeasuredFrame>),
-    /// There was a frame, but it cannot be read.
+    /// A frame cannot be read.
     Unreadable {
         /// Its number.
         seq: u64,
-        /// When that was known.
+        /// Time at which that was known.
         at: Stamp,
-        /// What is wrong with it.
+        /// Why it cannot be read.
         reason: String,
     },
-    /// No more frames: the orderly end, or why the camera failed.
+    /// No more frames: `None` is the regular end of the source, otherwise the reason.
     Ended(Option<String>),
 }
 
@@ -49,14 +48,13 @@ pub enum CameraMessage {
 pub struct MeasuredFrame {
     /// The frame.
     pub frame: Arc<Frame>,
-    /// When the program had it.
+    /// Time at which the program received it.
     pub had_at: Stamp,
-    /// The width, or why there is none.
+    /// The width, or why the frame was rejected.
     pub outcome: Result<WidthMeasurement, Reject>,
-    /// Roughness of the bead from all frames up to this one; none while it is not
-    /// determined.
+    /// Roughness of the bead from all frames up to this one; `None` while it is not determined.
     pub roughness: Option<Roughness>,
-    /// The edges behind the width.
+    /// Points of the left and the right edge.
     pub edges: (Vec<ImagePoint>, Vec<ImagePoint>),
 }
 
@@ -67,14 +65,14 @@ enum Taken {
 
 /// The running threads.
 pub struct CapturePipeline {
-    /// What they see.
+    /// Messages of the pipeline.
     pub seen: Receiver<CameraMessage>,
     mailbox: Arc<Mailbox<Taken>>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl CapturePipeline {
-    /// Starts to look.
+    /// Starts the threads.
     pub fn start(
         source: Box<dyn FrameSource>,
         optics: Optics,
@@ -94,8 +92,8 @@ impl CapturePipeline {
         Ok(Self { seen, mailbox, threads: vec![camera, measure] })
     }
 
-    /// Ends the threads, whose source must be about to end; returns how
-    /// many frames were never measured.
+    /// Ends the threads; the source must be about to end. Returns the number of frames that were
+    /// never measured.
     pub fn stop(self) -> u64 {
         self.mailbox.close();
         for thread in self.threads {
@@ -127,7 +125,7 @@ fn take_frames(
         }
     };
     mailbox.close();
-    // Nobody listens any more when the run has ended first.
+    // If the run has ended first, nobody receives the message.
     let _ = messages.send(CameraMessage::Ended(why));
 }
 

@@ -1,5 +1,5 @@
-//! The control thread: waits for what happens, for the next setpoint's time and
-//! for the next step of the extruder side, and lets the runner answer.
+//! The control thread: waits for events, for the next setpoint's time and for the next step of the
+//! extruder side, and lets the runner respond.
 
 mod ending;
 mod extruder;
@@ -31,13 +31,13 @@ pub use extruder_watch::ExtruderWatch;
 pub use inputs::{Inputs, LiveInput, LiveInputs};
 pub use steps::StepsWatch;
 
-/// Longest wait for the robot to say that it has stopped.
+/// Longest wait for the robot's report that it has stopped.
 const SHUTDOWN_TIMEOUT: Span = Span::from_millis(600);
 
 /// The runner of a live run.
 pub type LiveRunner<K> = Runner<Box<dyn RobotPort>, K, Option<Box<dyn ExtruderPort>>>;
 
-/// The control thread's own.
+/// State of the control thread.
 pub struct ControlThread<'a, I, K> {
     pub inputs: I,
     pub runner: LiveRunner<K>,
@@ -58,7 +58,7 @@ pub struct ControlThread<'a, I, K> {
 }
 
 impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
-    /// Runs until something ends it, and then ends it in order.
+    /// Runs until an ending occurs, then shuts down.
     pub fn run(&mut self) -> Ending {
         let ending = self.until_ended();
         self.give(Event::Stop);
@@ -67,7 +67,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
         ending
     }
 
-    /// Waits a little for robot and extruder to say that they rest.
+    /// Waits until robot and extruder report that they are at rest, at most [`SHUTDOWN_TIMEOUT`].
     fn shut_down(&mut self) {
         let until = self.inputs.now() + SHUTDOWN_TIMEOUT;
         let mut stopped = false;
@@ -84,8 +84,8 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
         }
     }
 
-    /// Takes down what was seen until the camera ended, so that every frame in
-    /// the recording has its event.
+    /// Handles the remaining messages of the camera, so that every frame in the recording has its
+    /// event.
     pub fn take_rest(&mut self, seen: &Receiver<CameraMessage>) {
         for seen in seen.try_iter() {
             match seen {
@@ -163,7 +163,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
         }
     }
 
-    /// Hands an event to the runner and its answer to the log.
+    /// Passes an event to the runner and its response to the log.
     fn give(&mut self, event: Event) -> Handled {
         let now = self.inputs.now();
         let handled = self.runner.handle(now, &event);
@@ -185,7 +185,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
         handled
     }
 
-    /// Tells the operator of a new state.
+    /// Shows the operator a new state.
     fn show(&mut self, now: Stamp, step: &Step) {
         if self.shown.as_ref() == Some(&step.state) {
             return;
@@ -212,13 +212,13 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     }
 }
 
-/// Whether the robot says that it lays nothing any more.
+/// Whether a report says that the robot lays no more bead.
 fn has_stopped(event: &RobotEvent) -> bool {
     let RobotEvent::State { state, .. } = event else { return false };
     matches!(state.mode, RobotMode::Stop | RobotMode::Idle | RobotMode::Fault)
 }
 
-/// The next time on the fixed grid; what was overslept is left out.
+/// The next time on a fixed grid; missed times are skipped.
 fn next_due(due: Stamp, period: Span, now: Stamp) -> Stamp {
     let mut next = due + period;
     while next <= now {

@@ -1,4 +1,4 @@
-//! Where a live run's log goes, behind a port.
+//! The log of a live run, behind a trait.
 
 use std::sync::Arc;
 
@@ -11,17 +11,17 @@ use crate::rows::summary::RunNote;
 /// A frame and the edges that were found in it, left and right.
 pub type FrameWithEdges = (Arc<Frame>, Vec<ImagePoint>, Vec<ImagePoint>);
 
-/// Takes down what happens in a live run.
+/// Logs a live run.
 pub trait Journal {
     /// A frame that was measured or rejected, with its image.
     fn frame(&self, row: &FrameRow, image: Option<FrameWithEdges>);
 
-    /// An event and the step that answered it.
+    /// An event and the controller's step in response.
     fn step(&self, now: Stamp, event: Event, step: Step);
 
-    /// The time from a frame to its setpoint.
+    /// The latency from a frame to its setpoint.
     fn latency(&self, latency: Latency);
 
-    /// Another fact.
+    /// Another note.
     fn note(&self, note: RunNote);
 }

@@ -1,31 +1,31 @@
-//! How long a frame takes to become a setpoint: from the moment the program
-//! has the frame to the moment the bytes of the first setpoint that uses it
-//! are written, less the fixed-rate sender's own scheduled wait.
+//! Latency from a frame to its setpoint: from the time at which the program has the frame until
+//! the bytes of the first setpoint that uses it are written, less the scheduled wait for the
+//! fixed-rate setpoint.
 
 use crate::core::{Span, Stamp};
 
-/// Frames that have been used by control and not yet by a setpoint.
+/// Frames that control has used since the last setpoint.
 #[derive(Debug, Default)]
 pub struct Latencies {
     waiting: Vec<(Stamp, Stamp)>,
 }
 
-/// One frame's way \[ms\].
+/// Latency of one frame \[ms\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Latency {
-    /// Without the scheduled wait.
+    /// Latency without the scheduled wait.
     pub latency_ms: f64,
     /// The scheduled wait.
     pub send_wait_ms: f64,
 }
 
 impl Latencies {
-    /// Control has used a frame that the program had at `had_at`.
+    /// Control has used a frame at `used_at` that the program received at `had_at`.
     pub fn used(&mut self, had_at: Stamp, used_at: Stamp) {
         self.waiting.push((had_at, used_at));
     }
 
-    /// A setpoint that was due at `due` had been written at `written`.
+    /// A setpoint was due at `due` and written at `written`; returns the latencies of its frames.
     pub fn sent(&mut self, due: Stamp, written: Stamp) -> impl Iterator<Item = Latency> {
         self.waiting.drain(..).map(move |(had_at, used_at)| {
             let wait = (due - used_at).max(Span::ZERO);
@@ -34,7 +34,7 @@ impl Latencies {
         })
     }
 
-    /// No setpoint will use what is waiting.
+    /// Drops the frames that wait: no setpoint will use them.
     pub fn forget(&mut self) {
         self.waiting.clear();
     }

@@ -1,8 +1,8 @@
-//! A slot for one thing: the newest replaces what nobody has taken.
+//! A slot for one item: a newer item replaces one that nobody has taken.
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// One slot, latest wins.
+/// A slot for one item; the newest replaces older ones.
 #[derive(Debug)]
 pub struct Mailbox<T> {
     state: Mutex<State<T>>,
@@ -24,8 +24,8 @@ impl<T> Default for Mailbox<T> {
 }
 
 impl<T> Mailbox<T> {
-    /// Puts something in; what was still there is counted and dropped. Returns
-    /// whether anyone may still take it.
+    /// Puts an item into the slot; an item that is still there is dropped and counted. Returns
+    /// whether anyone can still take it.
     pub fn put(&self, thing: T) -> bool {
         let mut state = self.lock();
         if state.closed {
@@ -38,7 +38,7 @@ impl<T> Mailbox<T> {
         true
     }
 
-    /// Waits for something; `None` once the box is closed and empty.
+    /// Waits for an item; `None` once the slot is closed and empty.
     pub fn take(&self) -> Option<T> {
         let mut state = self.lock();
         loop {
@@ -52,13 +52,13 @@ impl<T> Mailbox<T> {
         }
     }
 
-    /// Nothing more goes in.
+    /// Closes the slot: no more items go in.
     pub fn close(&self) {
         self.lock().closed = true;
         self.filled.notify_all();
     }
 
-    /// How many were dropped because something newer came.
+    /// Number of items that were dropped for newer ones.
     pub fn superseded(&self) -> u64 {
         self.lock().superseded
     }

@@ -17,7 +17,7 @@ use crate::rows::output::LogError;
 use crate::rows::summary::{RunNote, Summary};
 use crate::vision::Edges;
 
-/// Images that may wait for the log; beyond, rows go without theirs.
+/// Images that may wait for the log; beyond this, rows are written without images.
 const MAX_WAITING_IMAGES: usize = 16;
 
 enum Fact {
@@ -30,13 +30,13 @@ enum Fact {
 /// The thread that writes the log.
 pub struct RunLogger {
     facts: Sender<Fact>,
-    /// Images that wait to be written.
+    /// Number of images that wait to be written.
     waiting: Arc<AtomicUsize>,
     thread: JoinHandle<Result<Summary, LogError>>,
 }
 
 impl RunLogger {
-    /// Starts to write.
+    /// Starts the thread.
     pub fn start(log: RunLog) -> std::io::Result<Self> {
         let (facts, written) = unbounded();
         let waiting = Arc::new(AtomicUsize::new(0));
@@ -46,12 +46,12 @@ impl RunLogger {
         Ok(Self { facts, waiting, thread })
     }
 
-    /// A log that has failed keeps its error for the end.
+    /// Sends a fact to the thread. If the thread has failed, [`Self::finish`] returns its error.
     fn keep(&self, fact: Fact) {
         let _ = self.facts.send(fact);
     }
 
-    /// Finishes the files.
+    /// Finishes the files; returns the summary of the run.
     pub fn finish(self) -> Result<Summary, LogError> {
         drop(self.facts);
         self.thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))

@@ -1,5 +1,4 @@
-//! The extruder's part of the control thread: what its link reports, and what
-//! the operator is shown of it.
+//! The extruder's part of the control thread: reports of its link, and messages to the operator.
 
 use super::ending::Ending;
 use super::{ControlThread, Inputs};
@@ -10,8 +9,8 @@ use crate::rows::names;
 use crate::run::ports::{ExtruderEvent, Recorder};
 
 impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
-    /// Hands the controller what the extruder reports. An extruder that does
-    /// not fit the cell is never reported to the controller, so that nothing is sent to it.
+    /// Passes the extruder's reports to the controller. The connection of an extruder that does
+    /// not fit the cell is not passed on, so that nothing is sent to it.
     pub(super) fn take_extruder_event(&mut self, event: ExtruderEvent) {
         let Some(watch) = &mut self.extruder else { return };
         if let Some(words) = watch.note(&event) {
@@ -26,7 +25,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
         self.give(event.into());
     }
 
-    /// Tells the operator of a new state of the extruder side.
+    /// Shows the operator a new state of the extruder side.
     pub(super) fn show_extruder(&mut self, now: Stamp, step: &Step) {
         let (Some(watch), Some(side)) = (&mut self.extruder, &step.extruder) else { return };
         if watch.shown == side.state {

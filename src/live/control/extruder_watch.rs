@@ -1,4 +1,4 @@
-//! What the control thread keeps of its extruder.
+//! The control thread's state of its extruder.
 
 use std::sync::Arc;
 
@@ -7,42 +7,41 @@ use crate::drivers::extruder::{DriveRange, ExtruderDriver};
 use crate::extruder::{ExtruderLimits, ExtruderState, PumpMode};
 use crate::run::ports::ExtruderEvent;
 
-/// What the control thread keeps of its extruder.
+/// The control thread's state of its extruder.
 pub struct ExtruderWatch {
     driver: Arc<dyn ExtruderDriver>,
     range: DriveRange,
     period: Span,
-    /// The state that the operator was shown last.
+    /// Last state that was shown to the operator.
     pub(super) shown: ExtruderState,
-    /// Reasons of refusals that the operator was shown.
+    /// Reasons of refusals that were shown to the operator.
     refused: Vec<RefusalReason>,
     pump: Option<PumpMode>,
 }
 
 impl ExtruderWatch {
-    /// Of an extruder that has not reported, with the time from one step
-    /// of its side to the next.
+    /// For an extruder without a report yet; `period` is the time between steps of its side.
     pub fn new(driver: Arc<dyn ExtruderDriver>, range: DriveRange, period: Span) -> Self {
         let (shown, refused) = (ExtruderState::Off, Vec::new());
         Self { driver, range, period, shown, refused, pump: None }
     }
 
-    /// Why an extruder cannot be commanded by the cell, if it cannot.
+    /// Why the cell cannot command an extruder; `None` if it can.
     pub(super) fn unfit(&self, extruder: &ExtruderLimits) -> Option<String> {
         self.range.unfit(extruder, |command| self.driver.as_received(command))
     }
 
-    /// The time from one step to the next.
+    /// Time between steps of the extruder side.
     pub const fn period(&self) -> Span {
         self.period
     }
 
-    /// Whether its pump neither runs nor starts, or nothing is known of it.
+    /// Whether its pump neither runs nor starts, or its state is unknown.
     pub const fn rests(&self) -> bool {
         !matches!(self.pump, Some(PumpMode::On | PumpMode::Starting))
     }
 
-    /// Notes what the link reports; gives what the operator is to be shown.
+    /// Stores a report of the link; returns a message for the operator, if any.
     pub(super) fn note(&mut self, event: &ExtruderEvent) -> Option<String> {
         match event {
             ExtruderEvent::State { state, .. } => {
@@ -57,8 +56,7 @@ impl ExtruderWatch {
                 self.pump = None;
                 Some(format!("extruder: {reason}"))
             }
-            // Commands go on at their rate, and so do refusals: one of a kind is
-            // enough.
+            // Each command may be refused; one message for each reason is enough.
             ExtruderEvent::Refused { reason, .. } if self.refused.contains(reason) => None,
             ExtruderEvent::Refused { reason, text, .. } => {
                 self.refused.push(*reason);

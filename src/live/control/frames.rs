@@ -9,7 +9,7 @@ use crate::run::ports::Recorder;
 use crate::vision::Reject;
 
 impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
-    /// Gives a frame that was measured or rejected to the controller, and logs the result.
+    /// Passes a measured or rejected frame to the controller, and logs the result.
     pub(super) fn take_measured(&mut self, measured: MeasuredFrame) {
         let MeasuredFrame { frame, had_at, outcome, roughness, edges } = measured;
         let (seq, captured_at) = (frame.seq, frame.captured_at);
@@ -38,7 +38,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
         self.journal.frame(&row, Some((frame, edges.0, edges.1)));
     }
 
-    /// A frame that cannot be read.
+    /// Handles a frame that cannot be read.
     pub(super) fn unreadable(&mut self, seq: u64, at: Stamp, reason: &str) {
         tracing::warn!("frame {seq} is unreadable: {reason}");
         let status = Reject::Unreadable.status();

@@ -1,5 +1,5 @@
-//! What the control thread waits for, behind a port: a live run has channels and a clock,
-//! a test has a list.
+//! The inputs of the control thread, behind a trait: channels and a clock in a live run, a list in
+//! a test.
 
 use std::time::Duration;
 
@@ -10,34 +10,34 @@ use crate::io::clock::RunClock;
 use crate::live::capture::CameraMessage;
 use crate::run::ports::{ExtruderEvent, RecordError, RobotEvent};
 
-/// One thing that happened.
+/// One input of the control thread.
 #[derive(Debug)]
 pub enum LiveInput {
-    /// The capture pipeline has something.
+    /// A message from the capture pipeline.
     Camera(CameraMessage),
-    /// The capture pipeline has ended without a word.
+    /// The capture pipeline has ended without a message.
     CameraGone,
-    /// The robot reported.
+    /// A report of the robot.
     Robot(RobotEvent),
-    /// The extruder reported.
+    /// A report of the extruder.
     Extruder(ExtruderEvent),
     /// The link of a robot or an extruder has ended for good.
     DeviceGone,
     /// The recording cannot be continued.
     RecordingLost(RecordError),
-    /// The run is to end.
+    /// The run should end.
     StopRequested,
 }
 
-/// Gives what happens, and the time.
+/// A source of inputs and of the time.
 pub trait Inputs {
     /// Time since the run began.
     fn now(&self) -> Stamp;
 
-    /// Waits for what happens next, at most until a time; none at that time.
+    /// Waits for the next input, at most until a time; `None` at that time.
     fn next(&mut self, until: Stamp) -> Option<LiveInput>;
 
-    /// Nothing of the camera is wanted any more.
+    /// Ignores the camera from now on.
     fn ignore_camera(&mut self);
 }
 
@@ -45,15 +45,15 @@ pub trait Inputs {
 pub struct LiveInputs {
     /// The clock of the run.
     pub clock: RunClock,
-    /// From the capture pipeline.
+    /// Messages from the capture pipeline.
     pub camera: Receiver<CameraMessage>,
-    /// From the robot's driver.
+    /// Reports from the robot's driver.
     pub robot: Receiver<RobotEvent>,
-    /// From the extruder's driver.
+    /// Reports from the extruder's driver.
     pub extruder: Receiver<ExtruderEvent>,
-    /// From the recorder.
+    /// Errors from the recorder.
     pub alarm: Receiver<RecordError>,
-    /// From whoever ends the run.
+    /// A message ends the run.
     pub stop: Receiver<()>,
 }
 
@@ -89,7 +89,7 @@ impl Inputs for LiveInputs {
                     LiveInput::Extruder,
                 )),
                 recv(self.alarm) -> message => {
-                    // A recorder whose sender is gone has nothing to complain about.
+                    // A recorder whose sender is gone has no error to report.
                     self.alarm = never();
                     if let Ok(error) = message {
                         return Some(LiveInput::RecordingLost(error));

@@ -1,4 +1,4 @@
-//! The robot's part of the control thread: what it reports.
+//! The robot's part of the control thread: reports of its link.
 
 use std::sync::atomic::Ordering;
 
@@ -9,7 +9,7 @@ use crate::run::ports::{Recorder, RobotEvent};
 use crate::width_control::limiter::SpeedLimits;
 
 impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
-    /// Hands the controller what the robot reports.
+    /// Passes the robot's reports to the controller.
     pub(super) fn take_robot_event(&mut self, event: RobotEvent) {
         match &event {
             RobotEvent::State { at, state } => {
@@ -30,7 +30,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     }
 }
 
-/// Why a robot cannot be driven with a cell's limits, if it cannot.
+/// Why a robot cannot follow a cell's speed limits; `None` if it can.
 fn unfit(limits: &SpeedLimits, robot: &RobotLimits) -> Option<String> {
     let fits = robot.min_mm_per_s <= limits.min_speed && limits.max_speed <= robot.max_mm_per_s;
     (!fits).then(|| {

@@ -11,8 +11,9 @@ pub struct StepsWatch {
 }
 
 impl StepsWatch {
-    /// Takes a step into account: the sequence is over when the camera has seen its last piece, and
-    /// when the bead ends or the controller gives up after it has begun.
+    /// Updates with a step of the controller. The sequence is over when the camera has seen its
+    /// last segment, or when the bead ends or the controller gives up after the sequence has
+    /// begun.
     pub fn see(&mut self, step: &Step) {
         let progress = step.trace.steps.map(|steps| steps.progress);
         self.has_begun |= progress.is_some();
@@ -20,7 +21,7 @@ impl StepsWatch {
         self.is_over |= progress == Some(StepsProgress::Over) || self.has_begun && ends;
     }
 
-    /// Whether it is over.
+    /// Whether the sequence is over.
     pub fn is_over(self) -> bool {
         self.is_over
     }
