@@ -1,5 +1,5 @@
-//! `edges.csv`: the two edge points of each caliper line, which show the bead's course along
-//! the gauge and the data behind a width.
+//! `edges.csv`: the two edge points of each caliper line. They show the bead's path along the
+//! gauge, and are the data from which a width was measured.
 
 use std::path::{Path, PathBuf};
 
@@ -24,12 +24,12 @@ pub const EDGE_COLUMNS: [&str; 8] = [
 pub struct EdgesWriter(PartialTable);
 
 impl EdgesWriter {
-    /// Begins the file in a folder that is there.
+    /// Begins the file in an existing folder.
     pub fn create(folder: &Path) -> Result<Self, LogError> {
         PartialTable::create(folder, "edges.csv", EDGE_COLUMNS).map(Self)
     }
 
-    /// Adds the lines of a frame on which an edge was found.
+    /// Adds the caliper lines of a frame on which an edge was found.
     pub fn frame(
         &mut self,
         frame: u64,
@@ -43,13 +43,13 @@ impl EdgesWriter {
         Ok(())
     }
 
-    /// Gives the file its final name, which it returns.
+    /// Gives the file its final name; returns its path.
     pub fn finish(self) -> Result<PathBuf, LogError> {
         self.0.finish()
     }
 }
 
-/// Position and standard deviation of an edge \[px\]; empty where there is none.
+/// Position and standard deviation of an edge \[px\]; empty without an edge.
 fn position_fields(point: Option<CaliperPoint>) -> [String; 3] {
     let x = point.map(|point| point.at.x);
     let y = point.map(|point| point.at.y);

@@ -10,43 +10,41 @@ use crate::width_control::limiter::SpeedLimit;
 pub struct FrameRow {
     /// Number of the frame, from 0.
     pub frame: u64,
-    /// Time of the frame \[s\]; none where it is unknown. In a run it is the capture stamp, on the
+    /// Time of the frame \[s\]; `None` if it is unknown. In a run it is the capture stamp, on the
     /// same clock as the steps.
     pub time_s: Option<f64>,
-    /// The width, or the status of a frame that was refused.
+    /// The width, or the status of a rejected frame.
     pub outcome: Result<WidthMeasurement, &'static str>,
-    /// Roughness of the bead from all frames up to this one; none while it is not
-    /// determined.
+    /// Roughness of the bead from all frames up to this one; `None` while it is not determined.
     pub roughness: Option<Roughness>,
-    /// State of the controller at that frame; none without a controller.
+    /// Data of the controller at that frame; `None` without a controller.
     pub control: Option<ControlColumns>,
 }
 
-/// Columns that only a run with a controller has.
+/// Columns that exist only in a run with a controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlColumns {
-    /// Where along the path the bead in the gauge had been laid.
+    /// Path of the robot at which the bead in the gauge was laid.
     pub measured_path: Option<Mm>,
-    /// Whether bead of this run was under the camera; a frame without it is no
-    /// loss when it is refused.
+    /// Whether bead of this run was under the camera; without it a rejected frame is not a loss.
     pub bead_expected: bool,
-    /// Distance of the nozzle along the path when the frame was captured.
+    /// Path of the nozzle at the time of capture.
     pub nozzle_path: Option<Mm>,
-    /// Speed that the robot reported.
+    /// Last reported speed of the robot.
     pub speed: Option<MmPerS>,
-    /// Last setpoint that was sent.
+    /// Last setpoint.
     pub setpoint: Option<MmPerS>,
     /// Name of the controller's state.
     pub state: &'static str,
     /// The limit that acted on the last setpoint.
     pub limit: SpeedLimit,
-    /// Target width where that bead was laid.
+    /// Target width at the path where that bead was laid.
     pub target: Option<Mm>,
 }
 
 impl ControlColumns {
-    /// From the answer to a frame, with the width that it showed, the speed
-    /// that the robot last reported and the last setpoint.
+    /// From the controller's step for a frame, with the measured width, the last reported speed
+    /// and the last setpoint.
     pub fn of(
         step: &Step,
         width: Option<Mm>,
@@ -73,7 +71,7 @@ pub mod sample {
     use crate::core::{ImagePoint, Mm};
     use crate::vision::{Hints, Roughness, WidthMeasurement};
 
-    /// A roughness that is determined.
+    /// A determined roughness.
     pub fn roughness() -> Roughness {
         Roughness {
             roughness: Mm::constant(0.1),

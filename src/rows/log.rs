@@ -1,4 +1,4 @@
-//! Logs a run, one fact at a time, into `widths.csv`, `summary.json` and a page.
+//! Logs a run event by event into `widths.csv`, `summary.json` and a page.
 
 use std::path::PathBuf;
 
@@ -17,22 +17,22 @@ use crate::width_control::limiter::SpeedLimits;
 /// Largest number of remarks in a report.
 const MAX_REMARKS: usize = 40;
 
-/// Facts before the first frame.
+/// Facts that are known before the first frame.
 #[derive(Debug, Clone)]
 pub struct LogOptions {
-    /// The output folder; made if it is not there.
+    /// The output folder; created if it does not exist.
     pub folder: PathBuf,
     /// Title of the report.
     pub title: String,
     /// Names and values under the title: input, cell, calibration and so on.
     pub header: Vec<(String, String)>,
-    /// Where the bead is measured.
+    /// Region in which the bead is measured.
     pub gauge: Gauge,
     /// Target width, if known.
     pub target: Option<Mm>,
-    /// Limit of rejected frames, as a fraction.
+    /// Largest fraction of rejected frames that is acceptable.
     pub max_rejected_fraction: f64,
-    /// What only a run with a controller has.
+    /// Facts of a run with a controller; `None` without one.
     pub control: Option<ControlFacts>,
 }
 
@@ -41,9 +41,9 @@ pub struct LogOptions {
 pub struct ControlFacts {
     /// Limits of setpoints.
     pub limits: SpeedLimits,
-    /// Quantity of the extruder's command, where it is commanded.
+    /// Quantity of the extruder's command; `None` if it is not commanded.
     pub extruder: Option<CommandQuantity>,
-    /// How long the profile is that it plays, where it plays one.
+    /// Duration of the extruder's profile; `None` without a profile.
     pub profile: Option<Span>,
 }
 
@@ -59,15 +59,15 @@ impl ControlFacts {
     }
 }
 
-/// The page of a run, made from the same facts as the rows.
+/// The page of a run, made from the same data as the rows.
 pub trait RunObserver: std::fmt::Debug + Send {
-    /// A frame that was looked at, with its image and edges where they are at hand.
+    /// A measured or rejected frame, with its image and edges if they are available.
     fn frame(&mut self, row: &FrameRow, image: Option<(&Frame, Option<Edges<'_>>)>);
 
-    /// An event and the step that answered it.
+    /// An event and the controller's step in response.
     fn step(&mut self, now: Stamp, event: &Event, step: &Step);
 
-    /// The true flow through the nozzle, where a simulation knows it.
+    /// The true flow through the nozzle, if a simulation knows it.
     fn flow(&mut self, now: Stamp, flow: Mm3PerS);
 
     /// Writes the page of a run that has ended.
@@ -77,17 +77,17 @@ pub trait RunObserver: std::fmt::Debug + Send {
 /// The results of a run.
 #[derive(Debug, Clone, Copy)]
 pub struct FinishedRun<'a> {
-    /// What was known before its first frame.
+    /// Facts that were known before the first frame.
     pub options: &'a LogOptions,
-    /// What it came to.
+    /// Figures of the run.
     pub summary: &'a Summary,
-    /// Latencies \[ms\]; none without a controller.
+    /// Latencies \[ms\]; `None` without a controller.
     pub latencies: Option<&'a Distribution>,
-    /// What else the reader should know.
+    /// Remarks for the reader of the report.
     pub remarks: &'a [String],
 }
 
-/// The log of a run. Memory does not grow with its length.
+/// The log of a run. Its memory use does not grow with the run's length.
 #[derive(Debug)]
 pub struct RunLog {
     options: LogOptions,
@@ -95,12 +95,12 @@ pub struct RunLog {
     summary: SummaryBuilder,
     page: Box<dyn RunObserver>,
     remarks: Vec<String>,
-    /// Reasons for which the extruder refused lines.
+    /// Reasons of refusals by the extruder that were already noted.
     refused: Vec<RefusalReason>,
 }
 
 impl RunLog {
-    /// Makes the folder and begins `widths.csv`.
+    /// Creates the folder and begins `widths.csv`.
     pub fn create(options: LogOptions, page: Box<dyn RunObserver>) -> Result<Self, LogError> {
         make_folder(&options.folder)?;
         let with_control = options.control.is_some();
@@ -115,7 +115,7 @@ impl RunLog {
         })
     }
 
-    /// A frame that was measured or rejected. The image and the edges are for the report and may
+    /// Logs a measured or rejected frame. Image and edges are for the report and may be left out.
     /// be left out.
     pub fn frame(
         &mut self,
@@ -129,8 +129,8 @@ impl RunLog {
         Ok(())
     }
 
-    /// An event and the step that answered it. `now` has the same start as the
-    /// rows' `time_s`.
+    /// Logs an event and the controller's step in response. `now` counts from the same start as
+    /// the rows' `time_s`.
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         self.summary.step(now, event, step);
         self.page.step(now, event, step);
@@ -147,7 +147,8 @@ impl RunLog {
             Event::ExtruderDown { reason } => {
                 self.remark(now, "the link to the extruder was lost", reason);
             }
-            // They come at the rate of the commands; the recording has them all.
+            // One remark per reason: refusals come at the rate of the commands, and the recording
+            // has all of them.
             Event::ExtruderRefused { reason, text } if !self.refused.contains(reason) => {
                 self.refused.push(*reason);
                 self.remark(now, "the extruder refused a line, the first of its kind", text);
@@ -156,19 +157,18 @@ impl RunLog {
         }
     }
 
-    /// The true flow through the nozzle, where a simulation knows it.
+    /// Logs the true flow through the nozzle, if a simulation knows it, and the demanded flow.
     pub fn flow(&mut self, now: Stamp, wanted: Option<Mm3PerS>, flow: Mm3PerS) {
         self.page.flow(now, flow);
         self.summary.flow(wanted, flow);
     }
 
-    /// The latency of a setpoint and what its sender waited by its own
-    /// schedule \[ms\].
+    /// Logs the latency of a setpoint and the wait for its scheduled time \[ms\].
     pub fn latency(&mut self, latency_ms: f64, send_wait_ms: f64) {
         self.summary.latency(latency_ms, send_wait_ms);
     }
 
-    /// Another fact.
+    /// Logs another note.
     pub fn note(&mut self, note: &RunNote) {
         self.summary.note(note);
         if let RunNote::Remark(text) = note {
@@ -176,8 +176,8 @@ impl RunLog {
         }
     }
 
-    /// Gives every file its final name. `widths.csv` comes first, so that a
-    /// failure of the others does not cost the rows.
+    /// Gives every file its final name. `widths.csv` comes first, so that a failure with the
+    /// others does not lose the rows.
     pub fn finish(self) -> Result<Summary, LogError> {
         self.widths.finish()?;
         let summary = self.summary.finish();

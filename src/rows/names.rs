@@ -1,14 +1,14 @@
-//! Names of reasons as they stand in files, and as people read them.
+//! Names of reasons, in the form for files and in the form for people.
 
 use crate::control::Fault;
 use crate::extruder::ExtruderFault;
 
-/// Name of a limit, or of a reason without its own reason.
+/// Name of a limit, or of a reason without details.
 pub fn of(value: impl Into<&'static str>) -> &'static str {
     value.into()
 }
 
-/// Name of a fault, with its reason.
+/// Name of a fault, with its cause.
 pub fn fault(fault: &Fault) -> String {
     let name = of(fault);
     match fault {
@@ -18,7 +18,7 @@ pub fn fault(fault: &Fault) -> String {
     }
 }
 
-/// Name of a fault of the extruder side, with its reason.
+/// Name of a fault of the extruder side, with its cause.
 pub fn extruder_fault(fault: ExtruderFault) -> String {
     let name = of(fault);
     match fault {
@@ -27,7 +27,7 @@ pub fn extruder_fault(fault: ExtruderFault) -> String {
     }
 }
 
-/// A name as it is shown to people.
+/// A name in the form for people.
 pub fn in_words(name: &str) -> String {
     if let Some(why) = name.strip_prefix("extruder_") {
         format!("extruder: {}", in_words(why))

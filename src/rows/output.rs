@@ -1,4 +1,4 @@
-//! Files in the output folder: whole under their final name, or not there.
+//! Files in the output folder: complete under their final name, or absent.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -6,21 +6,21 @@ use std::path::{Path, PathBuf};
 
 use crate::io::atomic_file;
 
-/// An output that could not be written, where, and what to do.
+/// Why an output cannot be written, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
-    /// The output folder's name belongs to a file.
+    /// A file has the output folder's name.
     #[error("{}: this is a file, but a folder is needed here; name another with --out", path.display())]
     NotAFolder {
-        /// The folder that was asked for.
+        /// The requested folder.
         path: PathBuf,
     },
-    /// The output folder cannot be made.
+    /// The output folder cannot be created.
     #[error("{}: cannot make this folder ({})", path.display(), advice(source))]
     Folder {
-        /// The folder that was asked for.
+        /// The requested folder.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         #[source]
         source: io::Error,
     },
@@ -29,7 +29,7 @@ pub enum LogError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         #[source]
         source: io::Error,
     },
@@ -49,7 +49,7 @@ fn advice(error: &io::Error) -> &'static str {
     }
 }
 
-/// Makes the output folder if it is not there.
+/// Creates the output folder if it does not exist.
 pub fn make_folder(folder: &Path) -> Result<(), LogError> {
     if folder.exists() && !folder.is_dir() {
         return Err(LogError::NotAFolder { path: folder.to_path_buf() });
@@ -58,7 +58,7 @@ pub fn make_folder(folder: &Path) -> Result<(), LogError> {
         .map_err(|source| LogError::Folder { path: folder.to_path_buf(), source })
 }
 
-/// A file that grows as `NAME.partial` and gets its name when it is whole.
+/// A file that is written as `NAME.partial` and gets its name when it is complete.
 #[derive(Debug)]
 pub struct Partial {
     file: File,
@@ -67,7 +67,7 @@ pub struct Partial {
 }
 
 impl Partial {
-    /// Begins a file in a folder; a rest of the same name is overwritten.
+    /// Begins a file in a folder; an old partial file of the same name is overwritten.
     pub fn create(folder: &Path, name: &str) -> Result<Self, LogError> {
         let growing = folder.join(format!("{name}.partial"));
         let file = File::create(&growing)
@@ -96,7 +96,7 @@ impl Write for Partial {
     }
 }
 
-/// A table that grows as `NAME.partial` and gets its name when it is whole.
+/// A table that is written as `NAME.partial` and gets its name when it is complete.
 #[derive(Debug)]
 pub struct PartialTable {
     csv: csv::Writer<Partial>,
@@ -104,7 +104,7 @@ pub struct PartialTable {
 }
 
 impl PartialTable {
-    /// Begins the table in a folder that is there, with its head.
+    /// Begins the table in an existing folder, with its header.
     pub fn create(
         folder: &Path,
         name: &str,
@@ -122,12 +122,12 @@ impl PartialTable {
         self.csv.write_record(row).map_err(|error| self.error(error.into()))
     }
 
-    /// Hands all rows to the operating system.
+    /// Passes all rows to the operating system.
     pub fn flush(&mut self) -> Result<(), LogError> {
         self.csv.flush().map_err(|error| self.error(error))
     }
 
-    /// Gives the file its final name, which it returns.
+    /// Gives the file its final name; returns its path.
     pub fn finish(mut self) -> Result<PathBuf, LogError> {
         self.flush()?;
         let path = self.path;
@@ -143,7 +143,7 @@ impl PartialTable {
     }
 }
 
-/// Writes a file whose content is at hand. A failure leaves nothing behind.
+/// Writes a file whose content is complete. After a failure no partial file is left.
 pub fn write_whole(folder: &Path, name: &str, content: &[u8]) -> Result<PathBuf, LogError> {
     let path = folder.join(name);
     atomic_file::write_atomic(&path, content)

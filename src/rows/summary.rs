@@ -34,58 +34,58 @@ use crate::numeric::number::to_f64;
 use crate::numeric::statistics::{Distribution, Moments, WeightedMean};
 use crate::vision::Roughness;
 
-/// The figures of a run. An unknown figure is null.
+/// The figures of a run. An unknown figure is null in the file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// Number of frames.
     pub frames: u64,
     /// Frames whose width was measured.
     pub measured: u64,
-    /// The others: status in `widths.csv` and number.
+    /// Rejected frames: status in `widths.csv` and number.
     pub rejected: BTreeMap<&'static str, u64>,
-    /// Rejected frames while no bead of the run was under the camera; they are no loss.
+    /// Rejected frames without bead of the run under the camera; these are not a loss.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected_without_bead: Option<u64>,
     /// Mean of the measured widths.
     pub width_mean_mm: Option<f64>,
-    /// Their sample standard deviation.
+    /// Sample standard deviation of the measured widths.
     pub width_std_mm: Option<f64>,
-    /// Mean of the standard deviations that the measurements claim.
+    /// Mean of the standard deviations that the measurements report.
     pub sigma_mean_mm: Option<f64>,
-    /// Roughness of the bead from all frames, where they determine it; its keys stand
-    /// beside the others.
+    /// Roughness of the bead from all frames, if it is determined; its keys are on the same level
+    /// as the others.
     #[serde(flatten)]
     pub roughness: RoughnessSummary,
     /// Quality of the images.
     pub image_quality: ImageQuality,
     /// Advice about light and lens.
     pub advice: Vec<String>,
-    /// Time from the first to the last known moment.
+    /// Time from the first to the last known event \[s\].
     pub duration_s: Option<f64>,
     /// Target width.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_width_mm: Option<f64>,
-    /// Figures of a run with a controller; its keys stand beside the others.
+    /// Figures of a run with a controller; its keys are on the same level as the others.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub control: Option<ControlSummary>,
     /// Figures of a run with the distance controller.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance: Option<DistanceSummary>,
-    /// Figures of a run whose extruder is commanded.
+    /// Figures of a run with a commanded extruder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub extruder: Option<ExtruderSummary>,
 }
 
-/// Roughness of the bead, which no standard deviation of a width contains.
+/// Roughness of the bead; the standard deviation of a width does not include it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct RoughnessSummary {
     /// Standard deviation of the local width along the bead.
     pub roughness_mm: Option<f64>,
-    /// Its own standard deviation.
+    /// Standard deviation of the roughness.
     pub roughness_sigma_mm: Option<f64>,
-    /// Correlation length: that of exp(−|d|/length).
+    /// Correlation length: the autocorrelation is exp(−|d|/length).
     pub roughness_length_mm: Option<f64>,
-    /// Its own standard deviation.
+    /// Standard deviation of the correlation length.
     pub roughness_length_sigma_mm: Option<f64>,
 }
 
@@ -99,7 +99,7 @@ impl RoughnessSummary {
         }
     }
 
-    /// In words; none where it is not determined.
+    /// A sentence about the roughness; `None` if it is not determined.
     pub fn words(&self) -> Option<String> {
         Some(format!(
             "roughness {:.3} ± {:.3} mm, correlation length {:.3} ± {:.3} mm",
@@ -112,14 +112,14 @@ impl RoughnessSummary {
 }
 
 impl Summary {
-    /// Rejected or unreadable frames as a fraction of those that could show bead; 0 if there
-    /// are none.
+    /// Rejected or unreadable frames as a fraction of those that could show bead; 0 without such
+    /// frames.
     pub fn rejected_fraction(&self) -> f64 {
         let frames = self.frames_with_bead();
         if frames == 0 { 0.0 } else { to_f64(frames - self.measured.min(frames)) / to_f64(frames) }
     }
 
-    /// Frames less those that were refused where no bead of the run could be.
+    /// Frames except those that were rejected without bead of the run under the camera.
     pub fn frames_with_bead(&self) -> u64 {
         self.frames.saturating_sub(self.rejected_without_bead.unwrap_or(0))
     }
@@ -134,7 +134,7 @@ impl Summary {
     }
 }
 
-/// Takes facts one at a time, in constant memory, and adds them up.
+/// Computes the summary event by event, in constant memory.
 #[derive(Debug, Default)]
 pub struct SummaryBuilder {
     target: Option<Mm>,
@@ -158,19 +158,19 @@ pub struct SummaryBuilder {
 }
 
 impl SummaryBuilder {
-    /// `with_control` for runs with a controller.
+    /// `with_control` is for runs with a controller.
     pub fn new(target: Option<Mm>, with_control: bool) -> Self {
         Self { target, control: with_control.then(ControlTally::default), ..Self::default() }
     }
 
-    /// The same for a run whose extruder plays a profile of this length.
+    /// Sets the duration of the profile that the extruder plays.
     #[must_use]
     pub fn with_profile(mut self, lasts: Option<Span>) -> Self {
         self.extruder.set_profile(lasts);
         self
     }
 
-    /// A frame that was measured or rejected.
+    /// Adds a measured or rejected frame.
     pub fn frame(&mut self, row: &FrameRow) {
         self.frames += 1;
         self.cover_time(row.time_s);
@@ -200,7 +200,7 @@ impl SummaryBuilder {
         }
     }
 
-    /// A step of the controller.
+    /// Adds a step of the controller.
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         self.cover_time(Some(now.secs()));
         self.extruder.step(now, event, step);
@@ -210,31 +210,31 @@ impl SummaryBuilder {
         }
     }
 
-    /// The true flow, and the wanted one while bead is laid.
+    /// Adds the true flow, and the demanded one while bead is laid.
     pub fn flow(&mut self, wanted: Option<Mm3PerS>, flow: Mm3PerS) {
         self.extruder.flow(wanted, flow);
     }
 
-    /// The latency of a setpoint and the wait for its sender's schedule \[ms\].
+    /// Adds the latency of a setpoint and the wait for its scheduled time \[ms\].
     pub fn latency(&mut self, latency_ms: f64, send_wait_ms: f64) {
         if let Some(control) = &mut self.control {
             control.latency(latency_ms, send_wait_ms);
         }
     }
 
-    /// Another fact.
+    /// Adds another note.
     pub fn note(&mut self, note: &RunNote) {
         if let Some(control) = &mut self.control {
             control.note(note);
         }
     }
 
-    /// How latencies are distributed \[ms\]; none without a controller.
+    /// Distribution of the latencies \[ms\]; `None` without a controller.
     pub fn latencies(&self) -> Option<&Distribution> {
         self.control.as_ref().map(ControlTally::latencies)
     }
 
-    /// The sum of it all.
+    /// The summary of all events so far.
     pub fn finish(&self) -> Summary {
         let measured = self.frames - self.rejected.values().sum::<u64>();
         let hints = self.image_quality();

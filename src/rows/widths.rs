@@ -1,4 +1,4 @@
-//! `widths.csv`: one row for every frame, written as the frames come.
+//! `widths.csv`: one row per frame, written as the frames come.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use super::names;
 use super::output::{LogError, PartialTable};
 use crate::vision::{Roughness, WidthMeasurement};
 
-/// Columns of every file; the first nine are promised to other programs.
+/// Columns of every file; other programs may rely on the first nine.
 pub const WIDTH_COLUMNS: [&str; 17] = [
     "frame",
     "time_s",
@@ -28,7 +28,7 @@ pub const WIDTH_COLUMNS: [&str; 17] = [
     "used_share",
 ];
 
-/// Further columns of a run with a controller.
+/// Additional columns of a run with a controller.
 pub const CONTROL_COLUMNS: [&str; 7] = [
     "bead_path_mm",
     "nozzle_path_mm",
@@ -39,13 +39,13 @@ pub const CONTROL_COLUMNS: [&str; 7] = [
     "target_mm",
 ];
 
-/// Rows after which the file is flushed where frames have no time.
+/// Number of rows after which the file is flushed if frames have no time.
 const FLUSH_ROWS: u32 = 50;
-/// Time after which the file is flushed \[s\]: what a killed run loses at most.
+/// Time after which the file is flushed \[s\]: a killed run loses at most this much.
 const FLUSH_AFTER_S: f64 = 1.0;
 
-/// Writes `widths.csv.partial`, which a killed run leaves with all but its
-/// last second, and renames it at the end.
+/// Writes `widths.csv.partial` and renames it at the end. A killed run leaves the partial file
+/// without its last second.
 #[derive(Debug)]
 pub struct WidthsWriter {
     table: PartialTable,
@@ -55,8 +55,8 @@ pub struct WidthsWriter {
 }
 
 impl WidthsWriter {
-    /// Begins the file in a folder that is there. `with_control` adds the
-    /// columns of a run.
+    /// Begins the file in an existing folder. `with_control` adds the columns of a run with a
+    /// controller.
     pub fn create(folder: &Path, with_control: bool) -> Result<Self, LogError> {
         let control: &[&str] = if with_control { &CONTROL_COLUMNS } else { &[] };
         let head = WIDTH_COLUMNS.iter().chain(control);
@@ -80,7 +80,7 @@ impl WidthsWriter {
         Ok(())
     }
 
-    /// Gives the file its final name, which it returns.
+    /// Gives the file its final name; returns its path.
     pub fn finish(self) -> Result<PathBuf, LogError> {
         self.table.finish()
     }

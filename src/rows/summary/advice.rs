@@ -1,42 +1,45 @@
 //! Advice about light and lens, from the quality of a run's images.
 //!
-//! The scale is the bound: the standard deviation of widths is proportional to noise over contrast
-//! and to the root of the blur (docs/src/explanation/uncertainty.md). An image is compared with one
-//! of 80 grey levels of contrast, 4 of noise and a blur of 1.5 px, for which the table of accuracy holds.
+//! The measure is the bound: the standard deviation of widths is proportional to noise over
+//! contrast and to the root of the blur (docs/src/explanation/uncertainty.md). An image is
+//! compared with one of 80 grey levels of contrast, 4 of noise and a blur of 1.5 px, for which the
+//! accuracy tables are valid.
 
 use super::image_quality::ImageQuality;
 
-/// Contrast of the sets where nothing else is said \[grey levels\] (reference/accuracy.md, § The sets).
+/// Contrast of the sets where nothing else is said \[grey levels\] (reference/accuracy.md, § The
+/// sets).
 const REFERENCE_CONTRAST_GREY: f64 = 80.0;
-/// Noise of the same \[grey levels\] (reference/accuracy.md, § The sets).
+/// Noise of these sets \[grey levels\] (reference/accuracy.md, § The sets).
 const REFERENCE_NOISE_GREY: f64 = 4.0;
-/// Blur of the same \[px\] (reference/accuracy.md, § The sets).
+/// Blur of these sets \[px\] (reference/accuracy.md, § The sets).
 const REFERENCE_BLUR_PX: f64 = 1.5;
-/// Advice is given where it would divide the standard deviation of widths by this factor.
+/// Smallest factor by which an advice must reduce the standard deviation of widths.
 const MIN_GAIN_OF_ADVICE: f64 = 1.5;
 /// Contrast \[grey levels\] below which shadows, stains and texture of a few grey levels shift an
-/// edge, whatever the noise.
+/// edge, even without noise.
 const MIN_CONTRAST_GREY: f64 = 25.0;
-/// Blur up to which the limits of accuracy are held.
+/// Largest blur with which the limits of accuracy are met \[px\].
 const MAX_BLUR_PX: f64 = 3.2;
-/// Blur, the pixels' own included, below which an edge falls between pixels.
+/// Blur including that of the pixels \[px\]; below it the position of an edge within a pixel is
+/// lost.
 const MIN_BLUR_PX: f64 = 0.55;
-/// Distance from which two steps are resolved \[blurs\].
+/// Distance at which two steps are resolved \[blurs\].
 const RESOLVED_AT_BLURS: f64 = 4.0;
 /// Saturated fraction of the gauge from which the bead itself is clipped. Derived: where half of
 /// the gauge is bead, two standard deviations of the noise below the end of the scale, noise alone
 /// saturates 0.5·(1 − Φ(2)) = 1.1 %.
 const CLIPPED_FRACTION: f64 = 0.01;
-/// Fraction of the rows below which the edges are occluded.
+/// Fraction of the rows in use, below which the edges count as occluded.
 const MIN_USED_FRACTION: f64 = 0.9;
-/// Offset of widths by skewed flanks that is reported \[px\].
+/// Smallest offset of widths by skewed flanks that is reported \[px\].
 const MIN_SKEW_PX: f64 = 0.05;
-/// The same in its standard deviations. Derived: a run without a skew has as much with
-/// P(|z| > 4) = 6e-5.
+/// Smallest reported offset in its standard deviations. Derived: a run without a skew has as much
+/// with P(|z| > 4) = 6e-5.
 const SKEW_SIGMAS: f64 = 4.0;
 
-/// One sentence for each thing to improve, the worst for the width first; none
-/// where nothing is known.
+/// One sentence for each possible improvement, the one with the largest effect first; empty if
+/// nothing is known.
 pub fn advice(hints: &ImageQuality) -> Vec<String> {
     let mut advice = Vec::new();
     advice.extend(hints.saturated_fraction_mean.and_then(on_saturation));
@@ -53,7 +56,7 @@ pub fn advice(hints: &ImageQuality) -> Vec<String> {
     advice
 }
 
-/// Smallest possible standard deviation of an edge in one row \[px\].
+/// Cramér–Rao bound of an edge's position in one row \[px\]: standard deviation.
 pub fn row_bound_px(hints: &ImageQuality) -> Option<f64> {
     let (contrast, noise) = (hints.contrast_median_grey?, hints.noise_median_grey?);
     let blur = hints.blur_median_px?;
@@ -174,7 +177,7 @@ mod tests {
         begins(&hints(80.0, 4.0, 1.5, 0.0, 1.0), &[]);
         begins(&hints(80.0, 4.0, 3.02, 0.0, 1.0), &[]);
         begins(&hints(80.0, 4.0, 0.85, 0.0, 1.0), &[]);
-        // Little contrast, but even less noise.
+        // Low contrast, but even lower noise.
         begins(&hints(40.0, 0.5, 1.5, 0.0, 1.0), &[]);
     }
 
@@ -222,7 +225,7 @@ mod tests {
         };
         begins(&nothing, &[]);
         assert_eq!(row_bound_px(&nothing), None);
-        // The 2022 paper's method knows neither.
+        // The 2022 paper's method reports neither contrast nor noise.
         begins(&hints(0.0, 0.0, 0.0, 0.0, 1.0), &[]);
     }
 
@@ -235,7 +238,7 @@ mod tests {
     #[test]
     fn thresholds_are_those_of_a_normal_deviate() {
         let beyond = |sigmas: f64| libm::erfc(sigmas / std::f64::consts::SQRT_2);
-        // Half of the gauge, and of a normal deviate only the upper end.
+        // Half of the gauge is bead, and only the upper end of the normal distribution is clipped.
         let clipped = 0.5 * 0.5 * beyond(2.0);
         assert!((CLIPPED_FRACTION / clipped - 1.0).abs() < 0.15, "{clipped}");
         assert!((beyond(SKEW_SIGMAS) / 6e-5 - 1.0).abs() < 0.1);

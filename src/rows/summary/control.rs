@@ -23,62 +23,61 @@ const SETTLED_AFTER: Mm = Mm::constant(500.0);
 pub struct ControlSummary {
     /// Mean of |measured − target| over the bead laid after control began.
     pub width_error_mean_mm: Option<f64>,
-    /// Root mean square of the same.
+    /// Root mean square of the error over the same bead.
     pub width_error_rms_mm: Option<f64>,
-    /// Root mean square over bead laid more than 500 mm after that.
+    /// Root mean square of the error over bead laid more than 500 mm after control began.
     pub width_error_rms_settled_mm: Option<f64>,
-    /// The largest error of the bead laid after control began, with its sign, and where on
-    /// the robot's path that bead lies.
+    /// The largest error of the bead laid after control began, with its sign, and the robot's path
+    /// at which that bead was laid.
     pub width_error_worst: Option<LargestError>,
     /// Setpoints that were written to the robot.
     pub setpoints_sent: u64,
     /// Time during which a limit acted on the speed.
     pub limited_s: f64,
-    /// The same for each limit.
+    /// Time for each limit.
     pub limited_by_s: BTreeMap<&'static str, f64>,
     /// Time during which the controller held.
     pub held_s: f64,
-    /// The same for each reason.
+    /// Time for each reason of a hold.
     pub held_for_s: BTreeMap<&'static str, f64>,
     /// Number of faults.
     pub faults: u64,
-    /// The same for each reason.
+    /// Number of faults for each reason.
     pub fault_reasons: BTreeMap<String, u64>,
     /// Time in each state.
     pub states_s: BTreeMap<&'static str, f64>,
-    /// From having the frame to having written the first setpoint that uses
-    /// it, less the wait below. Quantiles are within 0.14 %, the maximum is
-    /// exact.
+    /// Latency: time from receiving a frame until the first setpoint that uses it is written, less
+    /// the wait below. Quantiles have an error of 0.14 %, the maximum is exact.
     pub latency_ms: Quantiles,
-    /// Wait for the fixed-rate sender's turn.
+    /// Wait for the scheduled time of the setpoint.
     pub send_wait_ms: Quantiles,
     /// Frames that were not measured, because a newer one was there.
     pub frames_superseded: u64,
-    /// Frames that the recorder could not keep up with.
+    /// Frames that were not recorded because the recorder was too slow.
     pub frames_dropped_by_recorder: u64,
     /// Events or steps that could not be recorded.
     pub records_lost: u64,
     /// Whether the link to the robot was ever up.
     pub was_connected: bool,
-    /// How often the link came up again after it had been up.
+    /// Number of times the link came up again.
     pub link_reconnects: u64,
 }
 
-/// A width that is further off than all others.
+/// The largest error of a width.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LargestError {
     /// Measured width less target \[mm\].
     pub error_mm: f64,
-    /// Robot's path of the bead that it shows \[mm\].
+    /// Robot's path at which the measured bead was laid \[mm\].
     pub bead_path_mm: f64,
 }
 
-/// Median, 99 % quantile and maximum; null of nothing.
+/// Median, 99 % quantile and maximum; null without values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Quantiles {
     /// Median.
     pub p50: Option<f64>,
-    /// What 99 % do not exceed.
+    /// Quantile of 99 %.
     pub p99: Option<f64>,
     /// Largest.
     pub max: Option<f64>,
@@ -94,7 +93,7 @@ impl Quantiles {
     }
 }
 
-/// Adds up times, errors and counts of the controller.
+/// Accumulates times, errors and counts of the controller.
 #[derive(Debug, Default)]
 pub struct ControlTally {
     follower: StateFollower,
@@ -116,14 +115,13 @@ pub struct ControlTally {
     links: u64,
 }
 
-/// Where on the path of the present bead control began.
+/// Path of the current bead at which control began.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 enum ControlBegan {
     #[default]
     NotYet,
     At(Mm),
-    /// The bead has ended; widths of it may still be seen, and the next one
-    /// begins anew.
+    /// The bead has ended; its last part may still be measured, and the next bead starts again.
     Over(Mm),
 }
 
@@ -133,8 +131,7 @@ impl ControlTally {
         let Some(target) = control.target else { return };
         let (ControlBegan::At(began) | ControlBegan::Over(began)) = self.began else { return };
         let Some(bead) = control.measured_path.filter(|bead| *bead >= began) else { return };
-        // A robot that is not printing shows the camera the same bead again
-        // and again.
+        // While the robot does not print, the camera sees the same bead again and again.
         if control.state == State::Idle.name() {
             return;
         }

@@ -6,33 +6,33 @@ use crate::control::Step;
 use crate::width_control::distance::WidthUse;
 use crate::width_control::{DistanceTrace, FallbackReason};
 
-/// Widths by their use, and the last estimates.
+/// Number of widths by their use, and the last estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DistanceSummary {
-    /// Widths that were taken.
+    /// Widths that were used.
     pub samples_used: u64,
-    /// Widths that were left as outliers.
+    /// Widths that were rejected as outliers.
     pub outliers: u64,
-    /// Changes of the flow that were found.
+    /// Detected changes of the flow.
     pub changes: u64,
-    /// Widths of bead without a known speed.
+    /// Widths without a known speed at which their bead was laid.
     pub without_speed_history: u64,
     /// Width at the start speed \[mm\].
     pub level_mm: f64,
-    /// Its standard deviation \[mm\].
+    /// Standard deviation of that width \[mm\].
     pub level_sigma_mm: f64,
     /// Exponent b.
     pub exponent: f64,
     /// Estimated distance of the camera behind the nozzle \[mm\].
     pub offset_mm: f64,
-    /// Period of a pulsation, where one was seen \[s\].
+    /// Period of a detected pulsation \[s\]; `None` if there is none.
     pub pulsation_s: Option<f64>,
-    /// Why the PI controller took over, if it did.
+    /// Why the PI controller took over; `None` if it did not.
     pub fallback_reason: Option<FallbackReason>,
 }
 
 impl DistanceSummary {
-    /// In a sentence or two.
+    /// The figures in a sentence or two.
     pub fn words(&self) -> String {
         let Self { samples_used, outliers, changes, level_mm, exponent, offset_mm, .. } = self;
         let pulsation = self.pulsation_s.map_or(String::new(), |period| {
@@ -65,7 +65,7 @@ pub struct DistanceTally {
 }
 
 impl DistanceTally {
-    /// A step of the controller.
+    /// Adds a step of the controller.
     pub fn step(&mut self, step: &Step) {
         self.fallback = self.fallback.or(step.trace.fallback);
         let Some(trace) = step.trace.distance else { return };
@@ -79,7 +79,7 @@ impl DistanceTally {
         self.last = Some(trace);
     }
 
-    /// The sum; none without a distance controller.
+    /// The summary; `None` without a distance controller.
     pub fn finish(&self) -> Option<DistanceSummary> {
         let last = self.last?;
         let [taken, outliers, changes, not_paired] = self.counts;

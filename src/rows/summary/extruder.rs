@@ -1,4 +1,4 @@
-//! The summary of a run whose extruder is commanded.
+//! The summary of a run with a commanded extruder.
 
 use std::collections::BTreeMap;
 
@@ -15,36 +15,36 @@ use crate::rows::names;
 /// The figures of the extruder side.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ExtruderSummary {
-    /// Commands that were given.
+    /// Number of commands.
     pub commands: u64,
     /// Time in each state.
     pub states_s: BTreeMap<&'static str, f64>,
-    /// Time for which the last command was kept, for each reason.
+    /// Time for which the last command was held, for each reason.
     pub held_for_s: BTreeMap<&'static str, f64>,
-    /// Time during which a limit shaped the command, for each limit.
+    /// Time during which a limit acted on the command, for each limit.
     pub limited_by_s: BTreeMap<&'static str, f64>,
-    /// Why the extruder was stopped, and how often.
+    /// Reasons for which the extruder was stopped, with their number.
     pub fault_reasons: BTreeMap<String, u64>,
-    /// Root mean square of flow less wanted flow while bead was laid, where a simulation or a
+    /// Root mean square of flow less demanded flow while bead was laid, if a simulation or a
     /// sensor gives the flow.
     pub flow_error_rms_mm3_per_s: Option<f64>,
-    /// Mean of flow less wanted flow.
+    /// Mean of flow less demanded flow.
     pub flow_error_mean_mm3_per_s: Option<f64>,
-    /// Mean of that flow.
+    /// Mean flow while bead was laid.
     pub flow_mean_mm3_per_s: Option<f64>,
-    /// The same three over bead laid after the width's control began: without
-    /// the extruder's start.
+    /// Flow over bead that was laid after control of the width began: without the extruder's
+    /// start.
     pub flow_controlled: FlowSummary,
-    /// How far its profile was played, where it plays one.
+    /// Played part of the extruder's profile; `None` without a profile.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub profile: Option<ProfileSummary>,
 }
 
-/// How the flow was kept.
+/// Errors of the flow.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[expect(clippy::struct_field_names, reason = "the unit ends every name")]
 pub struct FlowSummary {
-    /// Root mean square of flow less wanted flow.
+    /// Root mean square of flow less demanded flow.
     pub error_rms_mm3_per_s: Option<f64>,
     /// Mean of that difference.
     pub error_mean_mm3_per_s: Option<f64>,
@@ -52,7 +52,7 @@ pub struct FlowSummary {
     pub mean_mm3_per_s: Option<f64>,
 }
 
-/// Adds up flows.
+/// Accumulates flows.
 #[derive(Debug, Default)]
 struct FlowTally {
     error: Moments,
@@ -74,7 +74,7 @@ impl FlowTally {
     }
 }
 
-/// Adds up times, flows and counts of the extruder side.
+/// Accumulates times, flows and counts of the extruder side.
 #[derive(Debug, Default)]
 pub struct ExtruderTally {
     commands: u64,
@@ -85,13 +85,13 @@ pub struct ExtruderTally {
     fault_reasons: BTreeMap<String, u64>,
     all: FlowTally,
     controlled: FlowTally,
-    /// Whether the width's control has begun on this bead.
+    /// Whether control of the width has begun on this bead.
     control_began: bool,
     profile: Option<ProfileTally>,
 }
 
 impl ExtruderTally {
-    /// A profile of this length is played.
+    /// Sets the duration of the profile; `None` without a profile.
     pub fn set_profile(&mut self, lasts: Option<Span>) {
         self.profile = lasts.map(ProfileTally::new);
     }
@@ -129,7 +129,7 @@ impl ExtruderTally {
         }
     }
 
-    /// None where no extruder was commanded.
+    /// The summary; `None` if no extruder was commanded.
     pub fn finish(&self) -> Option<ExtruderSummary> {
         self.last?;
         let all = self.all.finish();

@@ -1,5 +1,5 @@
-//! Follows a controller through its events and steps: in which state it was
-//! for how long, which limit acted, and where the nozzle is.
+//! Follows a controller through its events and steps: time in each state, the acting limit, and
+//! the position of the nozzle.
 
 use crate::control::{Command, Event, State, Step};
 use crate::core::{Mm, MmPerS, Span, Stamp};
@@ -15,10 +15,10 @@ pub struct StateFollower {
     setpoint: Option<MmPerS>,
 }
 
-/// The time between two steps, and how it was spent.
+/// The time between two steps, with the state during it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interval {
-    /// How long it lasted.
+    /// Duration.
     pub span: Span,
     /// The state during it.
     pub state: State,
@@ -27,8 +27,8 @@ pub struct Interval {
 }
 
 impl StateFollower {
-    /// Takes the next step and returns the interval before it; there is none before the first. A
-    /// limit acts from the step that names it to the next setpoint without it.
+    /// Takes the next step and returns the interval before it; `None` for the first step. A limit
+    /// acts from the step that names it to the next setpoint without it.
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) -> Option<Interval> {
         let lapse = self.now.map(|then| Interval {
             span: (now - then).max(Span::ZERO),
@@ -60,17 +60,17 @@ impl StateFollower {
         &self.state
     }
 
-    /// The limit that acts after the last step.
+    /// The limit that acts since the last step.
     pub fn limit(&self) -> SpeedLimit {
         self.limit
     }
 
-    /// The nozzle's distance along the path, as the robot last reported it.
+    /// Last reported path of the nozzle.
     pub fn path(&self) -> Option<Mm> {
         self.path
     }
 
-    /// The last setpoint that was commanded.
+    /// The last commanded setpoint.
     pub fn setpoint(&self) -> Option<MmPerS> {
         self.setpoint
     }

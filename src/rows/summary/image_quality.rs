@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-/// Medians over the measured frames, within 0.14 %, for setting up light and lens.
+/// Medians over the measured frames, with an error of 0.14 %, for setting up light and lens.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ImageQuality {
-    /// Step from ground to bead \[grey levels of 256\].
+    /// Contrast of bead and ground \[grey levels of 256\].
     pub contrast_median_grey: Option<f64>,
     /// Blur of the edges \[px\].
     pub blur_median_px: Option<f64>,
@@ -15,9 +15,9 @@ pub struct ImageQuality {
     pub saturated_fraction_mean: Option<f64>,
     /// Mean fraction of caliper lines in use.
     pub used_fraction_mean: Option<f64>,
-    /// How far the skew of the edges' flanks moves widths: measured less true width in the
-    /// image, the mean weighted by the inverse variances of the frames \[px\].
+    /// Offset of widths by skewed flanks: measured less true width in the image, mean over the
+    /// frames weighted by their inverse variances \[px\].
     pub skew_offset_px: Option<f64>,
-    /// Its standard deviation \[px\].
+    /// Standard deviation of that offset \[px\].
     pub skew_offset_sigma_px: Option<f64>,
 }

@@ -1,27 +1,27 @@
-//! How far a profile of commands was played: a bead that ends first cuts it
-//! off, one that goes on keeps its last command.
+//! Played part of a profile of commands: a bead that ends earlier cuts it off, a longer bead
+//! continues with its last command.
 
 use serde::Serialize;
 
 use crate::core::Span;
 use crate::extruder::ExtruderState;
 
-/// How far a profile was played on its beads.
+/// Played part of a profile, over its beads.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ProfileSummary {
-    /// How long the profile is.
+    /// Duration of the profile.
     pub duration_s: f64,
-    /// Fraction of it that was played, on the bead with the smallest one.
+    /// Smallest fraction of the profile that was played on a bead.
     pub played_fraction: f64,
-    /// Time for which bead was laid after its end.
+    /// Time for which bead was laid after the profile's end.
     pub after_end_s: f64,
 }
 
-/// Adds up how long the profile was played on each bead.
+/// Accumulates the time for which the profile was played on each bead.
 #[derive(Debug, Clone, Copy)]
 pub struct ProfileTally {
     duration: Span,
-    /// On the present bead.
+    /// Played time on the current bead.
     played: Option<Span>,
     min_played: Option<Span>,
     after_end: Span,
@@ -32,8 +32,8 @@ impl ProfileTally {
         Self { duration: lasts, played: None, min_played: None, after_end: Span::ZERO }
     }
 
-    /// The extruder side was in a state for a while. A profile waits while the
-    /// last command is kept.
+    /// Adds a time in a state of the extruder side. The profile is paused while the last command
+    /// is held.
     pub fn add_time(&mut self, span: Span, state: ExtruderState) {
         match state {
             ExtruderState::Off | ExtruderState::Ending | ExtruderState::Fault(_) => {
@@ -57,7 +57,7 @@ impl ProfileTally {
         }
     }
 
-    /// None where no bead was laid.
+    /// The summary; `None` if no bead was laid.
     pub fn finish(mut self) -> Option<ProfileSummary> {
         self.end_bead();
         let duration_s = self.duration.secs();

@@ -4,23 +4,23 @@ use std::collections::BTreeMap;
 
 use crate::core::Span;
 
-/// Time by name, summed without rounding.
+/// Times by name, summed exactly.
 #[derive(Debug, Clone, Default)]
 pub struct Times(BTreeMap<&'static str, Span>);
 
 impl Times {
-    /// Adds time to a name.
+    /// Adds a time to a name.
     pub fn add(&mut self, name: &'static str, span: Span) {
         let sum = self.0.entry(name).or_default();
         *sum = *sum + span;
     }
 
-    /// Each time \[s\].
+    /// All times \[s\].
     pub fn seconds(&self) -> BTreeMap<&'static str, f64> {
         self.0.iter().map(|(name, span)| (*name, span.secs())).collect()
     }
 
-    /// The sum of all \[s\].
+    /// The sum of all times \[s\].
     pub fn total_s(&self) -> f64 {
         self.0.values().fold(Span::ZERO, |sum, span| sum + *span).secs()
     }
