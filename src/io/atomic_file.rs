@@ -1,31 +1,31 @@
-//! Files that appear under their name only when they are whole.
+//! Files that appear under their name only when they are complete.
 
 use std::fs::Permissions;
 use std::io::{self, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-/// A file that could not be written; nothing has changed under its name.
+/// A file that could not be written; a file of its name has not changed.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}: {what}", path.display())]
 pub struct WriteError {
-    /// Where it should have gone.
+    /// Its intended path.
     pub path: PathBuf,
-    /// The system's error; part of the message, and not once more its source.
+    /// Error of the system. It is part of the message, and therefore not a source.
     pub what: io::Error,
 }
 
 /// Permissions of a new file: read and write for all, less the umask (IEEE 1003.1, ``creat()``).
 const MODE: u32 = 0o666;
 
-/// Writes beside the final name and renames when everything is on the disk.
-/// An older file of this name is replaced.
+/// Writes a temporary file beside the final name and renames it when all bytes are on the disk. An
+/// older file of this name is replaced.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     write_and_rename(path, bytes)
         .map_err(|error| WriteError { path: path.to_owned(), what: without_temporary_name(error) })
 }
 
-/// Without the name of the file beside, which the user has not asked for.
+/// Removes the name of the temporary file from the error: the user does not know it.
 fn without_temporary_name(error: io::Error) -> io::Error {
     let text = error.to_string();
     match text.split_once(" at path ") {
@@ -35,7 +35,7 @@ fn without_temporary_name(error: io::Error) -> io::Error {
 }
 
 fn write_and_rename(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    // What a link points to is replaced, not the link; a device never is.
+    // The target of a link is replaced, not the link; a device is never replaced.
     let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     if target.exists() && !target.is_file() {
         return Err(io::Error::other("there is something of this name that is no file"));

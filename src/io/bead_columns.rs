@@ -1,5 +1,4 @@
-//! The columns that a recording holds of an extruder, a robot and a bead, for
-//! finding a model in them.
+//! Columns of a recording about extruder, robot and bead, for the identification of a model.
 
 use crate::control::{Event, Step};
 use crate::core::{MPa, Mm, Mm3PerS, MmPerS, RobotState, Rpm, Stamp, Unit};
@@ -14,26 +13,25 @@ pub const COMMAND: &str = "command";
 /// Facts of the cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeadFacts {
-    /// Unit of the extruder's command, where it is commanded.
+    /// Unit of the extruder's command; `None` if it is not commanded.
     pub command: Option<Unit>,
-    /// Height of a layer, if it is known.
+    /// Height of a layer; `None` if it is unknown.
     pub layer_height: Option<Mm>,
-    /// Path length from the nozzle back to where the width is measured.
+    /// Path length from the nozzle back to the measured part of the bead.
     pub offset: Mm,
 }
 
-/// The contents of a recording.
+/// The columns of a bead.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BeadColumns {
-    /// Columns, on the clock of the run; those without a sample are left out.
+    /// Columns, on the clock of the run; those without a sample are omitted.
     pub columns: Vec<TimeSeries>,
-    /// Remarks about them.
+    /// Remarks about the columns.
     pub notes: Vec<String>,
 }
 
-/// The columns of one bead: the longest interval over which the robot lays bead and the pump,
-/// where it reports, runs. Fails where the recording cannot be
-/// read on.
+/// The columns of one bead: the longest interval in which the robot lays bead, and the pump runs
+/// if it sends reports. Fails if the recording becomes unreadable.
 pub fn columns(
     entries: impl IntoIterator<Item = Result<RecordedEntry, RecordingError>>,
     facts: &BeadFacts,
@@ -88,7 +86,7 @@ struct ColumnCollector {
     width: TimeSeries,
     laying: Intervals,
     pumping: Intervals,
-    /// Whether anything was reported by an extruder.
+    /// Whether there are reports of an extruder.
     has_pump: bool,
 }
 
@@ -150,7 +148,7 @@ impl ColumnCollector {
         }
     }
 
-    /// The longest interval of a bead with a running pump, and the number of all.
+    /// The longest interval with bead and a running pump, and the number of such intervals.
     fn longest_interval(&self) -> (Option<BeadInterval>, usize) {
         let both = |bead: &BeadInterval| -> Vec<BeadInterval> {
             if !self.has_pump {
@@ -193,7 +191,7 @@ impl ColumnCollector {
     }
 }
 
-/// One bead in the reports of robot and camera.
+/// Reports of robot and camera during one bead.
 struct BeadSeries {
     path: TimeSeries,
     speed: TimeSeries,
@@ -201,9 +199,8 @@ struct BeadSeries {
 }
 
 impl BeadSeries {
-    /// The width and the flow of the bead at the moments when it was laid: what
-    /// the camera sees left the nozzle when that was the offset further back
-    /// along the path.
+    /// Width and flow of the bead at the times when it was laid: the camera sees bead that left
+    /// the nozzle when the path was shorter by the offset.
     fn laid(&self, facts: &BeadFacts) -> ([TimeSeries; 2], Option<String>) {
         let mut width = TimeSeries::new("laid_width_mm", false);
         let mut flow = TimeSeries::new("laid_flow_mm3_per_s", false);
@@ -236,7 +233,7 @@ impl BeadSeries {
         ([width, flow], note)
     }
 
-    /// When the nozzle first was at a position on the path \[s\].
+    /// Time at which the nozzle first reached a position on the path \[s\].
     fn time_at(&self, position: f64) -> Option<f64> {
         let after = self.path.values.partition_point(|path| *path < position);
         let before = after.checked_sub(1)?;

@@ -7,50 +7,48 @@ use crate::calibration::exchange::{self, Import};
 use crate::calibration::{Calibration, file};
 use crate::document::Problems;
 
-/// Largest size of a camera in YAML \[bytes\]: hundreds of times a usual file.
+/// Largest size of a camera's YAML file \[bytes\]: hundreds of times a usual file.
 const MAX_YAML_BYTES: u64 = 1_000_000;
 
-/// A calibration file that cannot be used.
+/// Why a calibration file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationFileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("calibration file {}: {what}; `truebead calibrate` makes one", path.display())]
     Read {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         what: io::Error,
     },
-    /// A YAML file of others cannot be read.
+    /// A YAML file of another program cannot be read.
     #[error("{}: cannot be read", path.display())]
     ReadYaml {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: io::Error,
     },
-    /// What stands in it is wrong.
+    /// The content is not valid.
     #[error(transparent)]
     Content(#[from] Problems),
 }
 
-/// Reads a calibration file; everything that is wrong with it is reported at
-/// once.
+/// Reads a calibration file; all violations are reported at once.
 pub fn read(path: &Path) -> Result<Calibration, CalibrationFileError> {
     let text = fs::read_to_string(path)
         .map_err(|what| CalibrationFileError::Read { path: path.to_owned(), what })?;
     Ok(file::parse(&path.display().to_string(), &text)?)
 }
 
-/// Reads a camera from the YAML of ROS or OpenCV; everything that is wrong with it is
-/// reported at once.
+/// Reads a camera from the YAML of ROS or OpenCV; all violations are reported at once.
 pub fn read_yaml(path: &Path) -> Result<Import, CalibrationFileError> {
     let text = read_text(path)
         .map_err(|source| CalibrationFileError::ReadYaml { path: path.to_owned(), source })?;
     Ok(exchange::parse(&path.display().to_string(), &text)?)
 }
 
-/// A camera is a page of text; whatever is much longer is something else.
+/// Reads a text file; a file that is much longer than a page cannot be a camera and is refused.
 fn read_text(path: &Path) -> io::Result<String> {
     let length = fs::metadata(path)?.len();
     if length > MAX_YAML_BYTES {

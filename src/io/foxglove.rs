@@ -1,5 +1,5 @@
-//! The two image messages of the Foxglove schemas, as protobuf, with the
-//! description of themselves that goes into a recording.
+//! The two image messages of the Foxglove schemas as protobuf, with the schema description for a
+//! recording.
 
 use prost::Message as _;
 use prost_types::field_descriptor_proto::{Label, Type};
@@ -7,9 +7,9 @@ use prost_types::{
     DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet, Timestamp,
 };
 
-/// Schema name of [`CompressedImage`].
+/// Name of the schema of [`CompressedImage`].
 pub const COMPRESSED_IMAGE: &str = "foxglove.CompressedImage";
-/// Schema name of [`RawImage`].
+/// Name of the schema of [`RawImage`].
 pub const RAW_IMAGE: &str = "foxglove.RawImage";
 
 const TIMESTAMP: &str = ".google.protobuf.Timestamp";
@@ -20,16 +20,16 @@ const NS_PER_S: u64 = 1_000_000_000;
 /// `foxglove.CompressedImage`.
 #[derive(Clone, PartialEq, prost::Message)]
 pub struct CompressedImage {
-    /// When the image was captured.
+    /// Time of capture.
     #[prost(message, optional, tag = "1")]
     pub timestamp: Option<Timestamp>,
     /// Frame of reference of the camera.
     #[prost(string, tag = "4")]
     pub frame_id: String,
-    /// An image file.
+    /// Bytes of an image file.
     #[prost(bytes = "vec", tag = "2")]
     pub data: Vec<u8>,
-    /// Its format, such as `png`.
+    /// Format of the image file, such as `png`.
     #[prost(string, tag = "3")]
     pub format: String,
 }
@@ -37,7 +37,7 @@ pub struct CompressedImage {
 /// `foxglove.RawImage`.
 #[derive(Clone, PartialEq, prost::Message)]
 pub struct RawImage {
-    /// When the image was captured.
+    /// Time of capture.
     #[prost(message, optional, tag = "1")]
     pub timestamp: Option<Timestamp>,
     /// Frame of reference of the camera.
@@ -49,13 +49,13 @@ pub struct RawImage {
     /// Height \[px\].
     #[prost(fixed32, tag = "3")]
     pub height: u32,
-    /// What the pixels are, such as `mono8`.
+    /// Encoding of the pixels, such as `mono8`.
     #[prost(string, tag = "4")]
     pub encoding: String,
     /// Bytes from one row to the next.
     #[prost(fixed32, tag = "5")]
     pub step: u32,
-    /// The rows.
+    /// Bytes of the rows.
     #[prost(bytes = "vec", tag = "6")]
     pub data: Vec<u8>,
 }
@@ -68,8 +68,8 @@ pub fn timestamp(ns: u64) -> Timestamp {
     }
 }
 
-/// Nanoseconds since 1970; `None` for an unset or impossible timestamp. The
-/// zero that many writers leave there counts as unset.
+/// Nanoseconds since 1970; `None` for an unset or invalid timestamp. Zero counts as unset: many
+/// writers leave it.
 pub fn timestamp_ns(stamp: Option<&Timestamp>) -> Option<u64> {
     let stamp = stamp?;
     let seconds = u64::try_from(stamp.seconds).ok()?;
@@ -78,8 +78,8 @@ pub fn timestamp_ns(stamp: Option<&Timestamp>) -> Option<u64> {
     (ns > 0).then_some(ns)
 }
 
-/// The schema record of [`CompressedImage`]: a `FileDescriptorSet` that holds
-/// all that it refers to.
+/// The schema record of [`CompressedImage`]: a `FileDescriptorSet` with all descriptions that it
+/// refers to.
 pub fn compressed_image_schema() -> Vec<u8> {
     let fields = vec![
         field("timestamp", 1, Type::Message, Some(TIMESTAMP)),
@@ -94,7 +94,7 @@ pub fn compressed_image_schema() -> Vec<u8> {
     FileDescriptorSet { file: vec![timestamp, image] }.encode_to_vec()
 }
 
-/// A file with one message.
+/// A file descriptor with one message.
 fn file(
     name: &str,
     package: &str,

@@ -10,8 +10,7 @@ use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat, ImageReader};
 
 use crate::core::{Channel, Frame, Pixels, SampleLayout, Size, Stamp, WrongSize};
 
-/// Endings of the file names that are taken for images, without the dot and in
-/// lower case.
+/// Extensions of image files, without the dot and in lower case.
 pub const EXTENSIONS: [&str; 12] =
     ["png", "jpg", "jpeg", "tif", "tiff", "bmp", "pgm", "ppm", "pbm", "pnm", "pam", "webp"];
 
@@ -20,49 +19,49 @@ const START_OF_SCAN: [u8; 2] = [0xff, 0xda];
 /// Marker EOI of a JPEG (ISO 10918-1, table B.1).
 const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
 
-/// Bytes that are no image that can be measured.
+/// Why bytes cannot be decoded to an image.
 #[derive(Debug, thiserror::Error)]
 pub enum DecodeError {
-    /// No bytes at all, as left by a writer that was stopped.
+    /// No bytes, as after an interrupted write.
     #[error("it is empty")]
     Empty,
-    /// The bytes do not begin as any of the formats that are known.
+    /// The first bytes are not those of a known format.
     #[error("it is not a PNG, JPEG, TIFF, BMP, PNM or WebP image")]
     UnknownFormat,
-    /// A JPEG without its end, whose missing part would be decoded as grey.
+    /// A JPEG without its end; the missing part would be decoded as grey.
     #[error("it is truncated")]
     Truncated,
-    /// The format is known, the content is broken or not supported.
+    /// The content is damaged or not supported.
     #[error("it cannot be decoded: {0}")]
     Broken(#[source] ImageError),
-    /// A kind of sample that has no grey values of 8 or 16 bits.
+    /// The samples are not grey values of 8 or 16 bits.
     #[error("its samples are {found}; only 8 and 16 bits are measured, so convert it first")]
     SampleKind {
-        /// The kind, as the decoder calls it.
+        /// Name of the sample type in the decoder.
         found: String,
     },
-    /// The decoder gave too few or too many values.
+    /// The decoder gave a wrong number of values.
     #[error(transparent)]
     Size(#[from] WrongSize),
 }
 
-/// A file that gives no frame.
+/// Why a file gives no frame.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageFileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("{}: {what}", path.display())]
     Read {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         what: io::Error,
     },
-    /// It cannot be understood.
+    /// The content cannot be decoded.
     #[error("{}: {what}", path.display())]
     Decode {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Error of the decoder.
         what: DecodeError,
     },
 }
@@ -76,16 +75,15 @@ pub struct EncodeError {
     what: String,
 }
 
-/// Whether a file's name ends like an image's, in either case.
+/// Whether a file name has an image's extension, in upper or lower case.
 pub fn has_image_extension(path: &Path) -> bool {
     let extension = path.extension().and_then(|ending| ending.to_str());
     extension
         .is_some_and(|ending| EXTENSIONS.iter().any(|known| known.eq_ignore_ascii_case(ending)))
 }
 
-/// Reads an image file. Values stay as they are stored: 10 or 12 bits in a
-/// 16-bit file are not stretched. (Only a PNM whose header names another
-/// maximum than 255 or 65535 is scaled, to that maximum.)
+/// Reads an image file. Values stay as stored: 10 or 12 bits in a 16-bit file are not stretched.
+/// (Only a PNM with a maximum other than 255 or 65535 is scaled to that maximum.)
 pub fn read(
     path: &Path,
     channel: Channel,
@@ -98,9 +96,8 @@ pub fn read(
         .map_err(|what| ImageFileError::Decode { path: path.to_owned(), what })
 }
 
-/// Decodes the bytes of an image file; the format is recognised by the first
-/// bytes, not by a name. An orientation in the metadata is not applied:
-/// pixels are where the sensor had them.
+/// Decodes the bytes of an image file; the format is recognised by the first bytes, not by a file
+/// name. An orientation in the metadata is not applied: pixels stay where the sensor had them.
 pub fn decode(
     bytes: &[u8],
     channel: Channel,
@@ -123,8 +120,8 @@ pub fn decode(
     Ok(Frame::new(seq, captured_at, Size::new(size.0, size.1), grey_values(image, channel)?)?)
 }
 
-/// Whether a JPEG has no end after the beginning of its last scan. Its decoder
-/// fills what is missing and says nothing; the others fail.
+/// Whether a JPEG has no end after the start of its last scan. Its decoder fills the missing part
+/// without an error; the other decoders fail.
 fn is_truncated(jpeg: &[u8]) -> bool {
     let last = |marker: [u8; 2]| jpeg.windows(2).rposition(|pair| pair == marker);
     last(END_OF_IMAGE) < last(START_OF_SCAN)
@@ -149,8 +146,7 @@ fn grey_values(image: DynamicImage, channel: Channel) -> Result<Pixels, DecodeEr
     })
 }
 
-/// A frame as the bytes of a PNG of its own depth, compressed fast rather than
-/// small.
+/// Encodes a frame as PNG with its own bit depth; fast compression, not small files.
 pub fn encode_png(frame: &Frame) -> Result<Vec<u8>, EncodeError> {
     let Size { width, height } = frame.size();
     let failed = |what: String| EncodeError { width, height, what };

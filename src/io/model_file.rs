@@ -7,32 +7,31 @@ use crate::document::Problems;
 use crate::identify::library::{Library, ModelEntry};
 use crate::identify::model_file::{self, ModelFile};
 
-/// A model that cannot be used.
+/// Why a model cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelFileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("model {}: {what}; `truebead extruder identify` makes one", path.display())]
     Read {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         what: io::Error,
     },
     /// The folder of models cannot be read.
     #[error("folder of models {}: {what}", path.display())]
     Folder {
-        /// Which folder.
+        /// The folder.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         what: io::Error,
     },
-    /// What stands in it is wrong.
+    /// The content is not valid.
     #[error(transparent)]
     Content(#[from] Problems),
 }
 
-/// Reads the file of a model; everything that is wrong with it is reported at
-/// once.
+/// Reads the file of a model; all violations are reported at once.
 pub fn read(path: &Path) -> Result<ModelFile, ModelFileError> {
     let text = fs::read_to_string(path)
         .map_err(|what| ModelFileError::Read { path: path.to_owned(), what })?;
@@ -42,15 +41,14 @@ pub fn read(path: &Path) -> Result<ModelFile, ModelFileError> {
 /// The models of a folder, and why others cannot be used.
 #[derive(Debug)]
 pub struct ModelFolder {
-    /// Those that are sound.
+    /// Valid models.
     pub library: Library,
-    /// What is wrong with each of the others, in the order of their names.
+    /// Errors of the other files, sorted by file name.
     pub broken: Vec<ModelFileError>,
 }
 
-/// Reads every `.toml` of a folder, not of those within it. A file that is wrong
-/// does not hide the others; the caller reports it, because a model that a cell needs may be
-/// missing.
+/// Reads every `.toml` of a folder without its subfolders. An invalid file does not hide the
+/// others. The caller reports it, because it may be the model that a cell needs.
 pub fn read_library(folder: &Path) -> Result<ModelFolder, ModelFileError> {
     let failed = |what| ModelFileError::Folder { path: folder.to_owned(), what };
     let mut paths = Vec::new();

@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Time before the first plain line: short work prints none.
+/// Time before the first plain line; shorter work prints none.
 const FIRST_LINE: Duration = Duration::from_secs(2);
-/// Time between plain lines, which trades the length of a log against news.
+/// Time between plain lines: a longer one gives shorter logs, a shorter one more information.
 const NEXT_LINE: Duration = Duration::from_secs(5);
 
 /// Progress of a task.
@@ -23,7 +23,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Begins; `what` is the work ("measuring"), `unit` what is counted ("frames"). Prints
+    /// Starts; `what` is the work ("measuring"), `unit` the counted items ("frames"). Prints
     /// nothing if `quiet`.
     pub fn new(what: &'static str, unit: &'static str, total: Option<u64>, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
@@ -46,7 +46,7 @@ impl Progress {
         Self { bar, what, unit, plain: !terminal && !quiet, next_line: FIRST_LINE, printed: false }
     }
 
-    /// So many are done.
+    /// Sets the number of completed items.
     pub fn set(&mut self, done: u64) {
         self.bar.set_position(done);
         if self.plain && self.bar.elapsed() >= self.next_line {
@@ -55,7 +55,7 @@ impl Progress {
         }
     }
 
-    /// One more is done.
+    /// Counts one completed item.
     pub fn advance(&mut self) {
         self.set(self.bar.position() + 1);
     }
@@ -63,12 +63,12 @@ impl Progress {
     /// Writes a line above the bar.
     pub fn note(&self, line: &str) {
         self.bar.suspend(|| {
-            // A closed standard error is no reason to stop.
+            // A closed standard error does not stop the work.
             let _ = writeln!(std::io::stderr(), "{line}");
         });
     }
 
-    /// Ends; the bar goes away, plain lines get a last one.
+    /// Ends; the bar disappears, plain lines get a last one.
     pub fn finish(mut self) {
         let done = self.bar.position();
         self.bar.finish_and_clear();
@@ -84,7 +84,7 @@ impl Progress {
     }
 }
 
-/// Progress of work that several threads do.
+/// Progress of work in several threads.
 #[derive(Debug)]
 pub struct SharedProgress(Mutex<Progress>);
 
@@ -94,7 +94,7 @@ impl SharedProgress {
         Self(Mutex::new(Progress::new(what, unit, Some(total), quiet)))
     }
 
-    /// One more is done.
+    /// Counts one completed item.
     pub fn advance(&self) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).advance();
     }

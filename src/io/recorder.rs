@@ -1,5 +1,5 @@
-//! Records a run to MCAP: every event with the step that answered it, and
-//! frames as far as the disk keeps up.
+//! Records a run to MCAP: every event with the controller's step in response, and as many frames
+//! as the disk can take.
 //!
 //! ```text
 //! control thread ── events+steps ──────────────▶ writer ──▶ recording.mcap.partial
@@ -7,11 +7,10 @@
 //!                                                  └─ finished: recording.mcap
 //! ```
 //!
-//! Neither the control nor the camera thread ever waits. Frames that do not fit
-//! their queue are dropped and counted. An event that does not fit its queue,
-//! or cannot be written, ends the recording there: [`Recorder::record`] fails
-//! from then on and nothing later is taken, so that a recording is always an
-//! unbroken beginning of its run. What has been taken reaches the operating
+//! Neither the control nor the camera thread ever waits. Frames that do not fit their queue are
+//! dropped and counted. An event that does not fit its queue, or cannot be written, ends the
+//! recording at that point: from then on [`Recorder::record`] fails and nothing is recorded. So a
+//! recording is always the uninterrupted beginning of its run. Recorded data reach the operating
 //! system within half a second.
 
 mod config;
@@ -49,11 +48,11 @@ use state::{AnsweredEvent, RecorderState};
 pub use tap::FrameTap;
 use writer::{WriterInputs, WriterThread};
 
-/// The recorder as the control thread holds it. Dropping it finishes the
-/// recording as [`Self::finish`] does, without a report.
+/// The control thread's handle of the recorder. Dropping it finishes the recording like
+/// [`Self::finish`], but without a report.
 pub struct RecorderHandle {
     next: u64,
-    /// Whether a full queue is waited for.
+    /// Whether to wait for room in a full queue.
     waits: bool,
     answered: Option<Sender<AnsweredEvent>>,
     tap: FrameTap,
@@ -61,10 +60,9 @@ pub struct RecorderHandle {
     writer: Option<JoinHandle<RecordReport>>,
 }
 
-/// Begins `recording.mcap.partial` in `folder`, which becomes
-/// `recording.mcap` when it is finished; a recording that is already there is
-/// an error. The channel gives the first failure, so that control hears of it
-/// even when it has nothing to record.
+/// Begins `recording.mcap.partial` in `folder`, which is renamed to `recording.mcap` at the end;
+/// an existing recording is an error. The channel gives the first failure, so that control learns
+/// of it even without an event to record.
 pub fn start(
     config: &RecordConfig,
     folder: &Path,
@@ -166,26 +164,25 @@ impl Recorder for RecorderHandle {
 }
 
 impl RecorderHandle {
-    /// Waits from now on where the disk does not keep up, in place of ending the
-    /// recording: for a simulation, whose clock can wait.
+    /// From now on waits for a slow disk instead of ending the recording: for a simulation, whose
+    /// time can wait.
     #[must_use]
     pub fn waiting(mut self) -> Self {
         self.waits = true;
         self
     }
 
-    /// A way to give frames from another thread.
+    /// An input for frames from another thread.
     pub fn frames(&self) -> FrameTap {
         self.tap.clone()
     }
 
-    /// Frames that have been dropped so far.
+    /// Number of frames that have been dropped so far.
     pub fn frames_dropped(&self) -> u64 {
         self.tap.shared.frames_dropped.load(Ordering::Relaxed)
     }
 
-    /// Writes what has been taken, ends the file and gives it its final name.
-    /// Waits for the disk.
+    /// Writes all queued data, ends the file and gives it its final name. Waits for the disk.
     pub fn finish(mut self) -> Result<RecordReport, Box<Incomplete>> {
         let report = self.close().unwrap_or_else(|| {
             self.tap.shared.fail(RecordError("the recorder broke off".to_string()));
@@ -204,11 +201,11 @@ impl RecorderHandle {
         }
     }
 
-    /// Frames first, so that those under way are still written; then events,
-    /// whose end is the writer's.
+    /// Closes the input of frames first, so that queued ones are still written; then that of
+    /// events, whose end ends the writer.
     fn close(&mut self) -> Option<RecordReport> {
         let writer = self.writer.take()?;
-        // The encoder may have ended already.
+        // The encoder may already have ended.
         self.tap.jobs.send(FrameJob::Close).unwrap_or_default();
         self.answered = None;
         writer.join().ok()

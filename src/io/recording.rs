@@ -1,6 +1,5 @@
-//! Reads recordings: finished or cut short, of this program or another.
-//! A recording is read from its beginning to its end, a chunk at a time, so
-//! that one of many gigabytes needs no more memory than a short one.
+//! Reads recordings: finished or interrupted, of this program or another. A recording is read from
+//! beginning to end, one chunk at a time, so that large files need no more memory than small ones.
 
 mod chunk;
 pub mod index;
@@ -25,10 +24,10 @@ use super::recorder::format::{
 use crate::control::{Event, Step};
 use crate::core::Stamp;
 
-/// Bytes that are read ahead: some pages of the file, for fewer calls of the system.
+/// Size of the read buffer \[bytes\]: several pages, for fewer system calls.
 const BUFFER_BYTES: usize = 1 << 16;
 
-/// Why a recording cannot be read, or not on.
+/// Why a recording cannot be read, or cannot be read further.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     /// It cannot be opened or read.
@@ -36,10 +35,10 @@ pub enum RecordingError {
     Io {
         /// The file.
         file: String,
-        /// Why.
+        /// Error of the system.
         what: io::Error,
     },
-    /// It is something else.
+    /// The file is not an MCAP file.
     #[error(
         "{file}: not an MCAP file (it does not begin with the MCAP magic bytes); expected a \
          recording such as recording.mcap"
@@ -48,7 +47,7 @@ pub enum RecordingError {
         /// The file.
         file: String,
     },
-    /// It was written by a later version.
+    /// A later version of the program wrote it.
     #[error(
         "{file}: written by truebead {program} in format {found}; this version reads up to format \
          {known}, use truebead {program} or later"
@@ -58,12 +57,12 @@ pub enum RecordingError {
         file: String,
         /// Version of the program that wrote it.
         program: String,
-        /// Format that was found.
+        /// Format of the file.
         found: u32,
-        /// Latest format that is known.
+        /// Latest known format.
         known: u32,
     },
-    /// What it says of its run is incomplete.
+    /// The metadata about its run is incomplete.
     #[error("{file}: the metadata record \"run\" has no valid {key}")]
     BadRun {
         /// The file.
@@ -71,7 +70,7 @@ pub enum RecordingError {
         /// The key that is missing or wrong.
         key: &'static str,
     },
-    /// A message is not what its topic promises.
+    /// A message has not the form of its topic.
     #[error("{file}: message {sequence} of {topic}: {what}")]
     BadMessage {
         /// The file.
@@ -80,28 +79,28 @@ pub enum RecordingError {
         topic: String,
         /// Number of the message.
         sequence: u32,
-        /// What is wrong.
+        /// Error in the message.
         what: String,
     },
 }
 
-/// Something that was recorded.
+/// An entry of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RecordedEntry {
     /// An event.
     Event {
-        /// Counts the events of the run from 0.
+        /// Number of the event in the run, from 0.
         n: u64,
-        /// Time at which the controller takes it.
+        /// Time at which the controller handled it.
         now: Stamp,
         /// The event.
         event: Event,
     },
-    /// The step that answers an event.
+    /// The controller's step in response to an event.
     Step {
         /// Number of the event.
         n: u64,
-        /// Time at which the controller takes it.
+        /// Time at which the controller handled the event.
         now: Stamp,
         /// The step.
         step: Box<Step>,
@@ -113,8 +112,7 @@ pub enum RecordedEntry {
 trait ReadSeek: Read + Seek + Send {}
 impl<T: Read + Seek + Send> ReadSeek for T {}
 
-/// A recording that is being read: an iterator over its entries. Messages of
-/// other programs are passed over.
+/// An open recording: an iterator over its entries. Messages of other programs are skipped.
 pub struct Recording {
     file: String,
     messages: Messages<Box<dyn ReadSeek>>,
@@ -124,8 +122,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Opens a file and reads what stands before its first message: the run
-    /// and the attachments.
+    /// Opens a file and reads up to its first message: the run and the attachments.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let file = path.display().to_string();
         let opened = File::open(path).and_then(|opened| {
@@ -140,7 +137,7 @@ impl Recording {
         }
     }
 
-    /// As [`Self::open`], from anywhere; `file` is what messages call it.
+    /// As [`Self::open`], from any source; `file` is its name in messages.
     pub fn read(
         source: impl Read + Seek + Send + 'static,
         file: String,
@@ -157,8 +154,7 @@ impl Recording {
         Ok(recording)
     }
 
-    /// What the recording says of its run; `None` where another program wrote
-    /// it.
+    /// Metadata about the run; `None` if another program wrote the recording.
     pub fn run(&self) -> Option<&RunInfo> {
         self.run.as_ref()
     }
@@ -173,23 +169,23 @@ impl Recording {
         self.attachment(CALIBRATION_ATTACHMENT)
     }
 
-    /// The text that is attached under a name, if there is one.
+    /// The text of the attachment with this name; `None` if there is none.
     pub fn attachment(&self, name: &str) -> Option<&str> {
         self.attachments.get(name).and_then(|data| std::str::from_utf8(data).ok())
     }
 
-    /// The file as messages call it.
+    /// Name of the file in messages.
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// The topics that have been met so far, by name.
+    /// The topics of the messages read so far, by name.
     pub fn topics(&self) -> Vec<std::sync::Arc<Topic>> {
         self.messages.topics()
     }
 
-    /// What is missing or damaged, as far as the file has been read; complete
-    /// once the entries have come to their end.
+    /// Missing or damaged parts of the file, as far as it has been read; complete after the last
+    /// entry.
     pub fn integrity(&self) -> &Integrity {
         self.messages.integrity()
     }
@@ -230,8 +226,7 @@ impl Recording {
         Ok(())
     }
 
-    /// What a message says in the terms of this program; `None` for a message
-    /// of another topic.
+    /// Decodes a message; `None` for a message of another topic.
     pub fn entry(&self, message: Message) -> Result<Option<RecordedEntry>, RecordingError> {
         let bad = |error: serde_json::Error| RecordingError::BadMessage {
             file: self.file.clone(),

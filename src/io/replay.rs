@@ -5,12 +5,12 @@ use crate::control::{Event, Step};
 use crate::core::Stamp;
 use crate::io::recording::{RecordedEntry, RecordingError};
 
-/// The first step that came out differently.
+/// The first step that differs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Difference {
     /// Number of the event.
     pub n: u64,
-    /// Time at which the controller takes it.
+    /// Time at which the controller handled it.
     pub now: Stamp,
     /// The event.
     pub event: Event,
@@ -20,31 +20,30 @@ pub struct Difference {
     pub replayed: Step,
 }
 
-/// Events that are missing from the middle of a recording. What comes after
-/// cannot be compared, because the controller has not seen them.
+/// Events that are missing in the middle of a recording. Later steps cannot be compared, because
+/// the controller has not handled the missing events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MissingEvents {
-    /// First event that is missing, with its step or without.
+    /// Number of the first event that is missing or has no step.
     pub expected: u64,
-    /// Event or step that comes instead.
+    /// Number of the event or step that was read instead.
     pub found: u64,
 }
 
-/// How a replay went.
+/// Result of a replay.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReplayReport {
-    /// Steps that were compared; all the same, but for the last where there
-    /// is a difference.
+    /// Number of compared steps. All are equal, except the last one if there is a difference.
     pub compared: u64,
-    /// Where the replay left the recording. It ends there.
+    /// The first difference; the replay ends there.
     pub difference: Option<Difference>,
-    /// Where events are missing. The replay ends there.
+    /// Missing events; the replay ends there.
     pub gap: Option<MissingEvents>,
-    /// An event at the end whose step was not recorded any more.
+    /// A last event whose step was not recorded.
     pub unanswered: Option<u64>,
 }
 
-/// An event that was given to the controller and whose recorded step is to come.
+/// An event that was given to the controller; its recorded step comes next.
 struct Pending {
     n: u64,
     now: Stamp,
@@ -52,8 +51,8 @@ struct Pending {
     replayed: Step,
 }
 
-/// Replays a recording. `step` is the controller, fresh from its
-/// configuration. Fails where the recording cannot be read on.
+/// Replays a recording. `step` is a controller in its initial state. Fails if the recording
+/// becomes unreadable.
 pub fn replay(
     entries: impl IntoIterator<Item = Result<RecordedEntry, RecordingError>>,
     mut step: impl FnMut(Stamp, &Event) -> Step,
@@ -92,8 +91,8 @@ pub fn replay(
     Ok(report)
 }
 
-/// Equal down to the sign of a zero: the shortest decimal of a float stands
-/// for one bit pattern only.
+/// Whether two steps are equal, including the sign of zeros: the shortest decimal of a float
+/// identifies its bits.
 fn same_bits(a: &Step, b: &Step) -> bool {
     match (serde_json::to_string(a), serde_json::to_string(b)) {
         (Ok(a), Ok(b)) => a == b,
@@ -107,7 +106,7 @@ mod tests {
     use crate::control::{State, Trace};
     use crate::core::Mm;
 
-    /// A controller with memory: the error is the sum of what it has seen.
+    /// A controller with memory: the error is the sum of all widths.
     fn controller() -> impl FnMut(Stamp, &Event) -> Step {
         let mut sum = 0.0;
         move |_, event| {

@@ -1,5 +1,5 @@
-//! How a person or a system ends a command: the first SIGINT or SIGTERM asks
-//! for an orderly end, a second one ends it at once.
+//! Ends a command by signals: the first SIGINT or SIGTERM asks for an orderly end, a second one
+//! ends it immediately.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -17,7 +17,7 @@ pub struct StopSignal {
 }
 
 impl StopSignal {
-    /// Begins to listen for signals.
+    /// Starts to listen for signals.
     pub fn install() -> io::Result<Self> {
         let (sender, receiver) = unbounded();
         let requested = Arc::new(AtomicBool::new(false));
@@ -29,12 +29,12 @@ impl StopSignal {
         Ok(Self { requested, signals: receiver })
     }
 
-    /// Whether a signal has come.
+    /// Whether a signal has arrived.
     pub fn requested(&self) -> bool {
         self.requested.load(Ordering::Relaxed)
     }
 
-    /// Gives a message when a signal comes.
+    /// Receives a message when a signal arrives.
     pub fn signals(&self) -> &Receiver<()> {
         &self.signals
     }
@@ -43,7 +43,7 @@ impl StopSignal {
 fn wait(signals: &mut Signals, requested: &AtomicBool, sender: &Sender<()>) {
     for signal in signals.forever() {
         if requested.swap(true, Ordering::Relaxed) {
-            // The person insists; 128 + the signal is what a shell would say.
+            // The user insists; a shell would report 128 + the signal.
             std::process::exit(128 + signal);
         }
         // A closed standard error is no reason to fail.

@@ -4,35 +4,35 @@ use std::time::Duration;
 
 use crate::cell::file::KeepFrames;
 
-/// What is recorded about the run itself, and which frames.
+/// Data about the run that is recorded, and which frames are kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordConfig {
     /// Which frames are kept.
     pub frames: KeepFrames,
-    /// Wall clock at stamp 0 \[ns since 1970\].
+    /// Wall-clock time at stamp 0 \[ns since 1970\].
     pub epoch_ns: u64,
-    /// The cell file as the command named it.
+    /// Path of the cell file in the command.
     pub cell_name: String,
     /// The cell file's text.
     pub cell_text: String,
-    /// The calibration file's text, where the cell has one.
+    /// The calibration file's text, if the cell has one.
     pub calibration_text: Option<String>,
-    /// The files that the cell names for its extruder.
+    /// The files to which the cell refers for its extruder.
     pub extruder_files: Vec<ExtruderFile>,
 }
 
-/// A file that the extruder side of a controller is made from.
+/// A file for the extruder side of a controller.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ExtruderFile {
-    /// What it is called in a recording, such as [`super::format::MODEL_ATTACHMENT`].
+    /// Its name in a recording, such as [`super::format::MODEL_ATTACHMENT`].
     pub name: &'static str,
-    /// What messages call it.
+    /// Its name in messages.
     pub source: String,
     /// Its text.
     pub text: String,
 }
 
-/// Sizes and times, which tests make small.
+/// Sizes and times; smaller in tests.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RecorderLimits {
     pub(super) flush_every: Duration,

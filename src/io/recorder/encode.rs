@@ -1,5 +1,5 @@
-//! Turns frames into PNG within `foxglove.CompressedImage`, in a thread of its
-//! own, so that an event never waits for an image.
+//! Encodes frames as PNG within `foxglove.CompressedImage`, in a separate thread, so that an event
+//! never waits for an image.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -12,11 +12,11 @@ use crate::core::{Frame, Stamp};
 use crate::io::foxglove::{CompressedImage, timestamp};
 use crate::io::image_file::{EncodeError, encode_png};
 
-/// What the encoder is given.
+/// A job for the encoder.
 pub enum FrameJob {
-    /// Encode this.
+    /// Encode this frame.
     Encode(Arc<Frame>),
-    /// No more will come.
+    /// No more frames will come.
     Close,
 }
 
@@ -24,13 +24,13 @@ pub enum FrameJob {
 pub struct EncodedFrame {
     /// Number of the frame.
     pub seq: u64,
-    /// When it was captured.
+    /// Time of capture.
     pub captured_at: Stamp,
     /// The protobuf message.
     pub message: Vec<u8>,
 }
 
-/// Encodes until it is closed or its receiver is gone.
+/// Encodes until it is closed or the receiver of encoded frames is gone.
 pub fn run(
     jobs: &Receiver<FrameJob>,
     out: &Sender<EncodedFrame>,

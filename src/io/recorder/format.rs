@@ -1,4 +1,4 @@
-//! The layout of a recording, for the recorder and the reader: topics, schemas, metadata and
+//! The layout of a recording, common to the recorder and the reader: topics, schemas, metadata and
 //! attachments.
 
 use std::collections::BTreeMap;
@@ -20,17 +20,17 @@ pub const RUN_METADATA: &str = "run";
 pub const CELL_ATTACHMENT: &str = "cell.toml";
 /// Attachment that holds the calibration file.
 pub const CALIBRATION_ATTACHMENT: &str = "calibration.toml";
-/// Attachment that holds the model of the extruder that the cell names.
+/// Attachment with the extruder's model of the cell.
 pub const MODEL_ATTACHMENT: &str = "extruder-model.toml";
-/// Attachment that holds the profile of commands that the cell names.
+/// Attachment with the profile of commands of the cell.
 pub const PROFILE_ATTACHMENT: &str = "extruder-profile.csv";
-/// Attachment that holds the starts and stops of the extruder that the cell names.
+/// Attachment with the start-stop model of the cell's extruder.
 pub const STARTS_ATTACHMENT: &str = "extruder-starts.toml";
-/// Attachment that holds the plan of the job that the cell names.
+/// Attachment with the planned job of the cell.
 pub const PLAN_ATTACHMENT: &str = "plan.csv";
-/// Name of a recording that is finished.
+/// Name of a finished recording.
 pub const FILE_NAME: &str = "recording.mcap";
-/// Name of a recording that is being written, or was cut short.
+/// Name of a recording that is being written or was interrupted.
 pub const PARTIAL_NAME: &str = "recording.mcap.partial";
 
 /// JSON schema of [`EVENT_TOPIC`].
@@ -41,9 +41,9 @@ pub const STEP_SCHEMA: &str = include_str!("step.schema.json");
 /// A message on [`EVENT_TOPIC`]: written with `&Event`, read with [`Event`](crate::control::Event).
 #[derive(Debug, Serialize, Deserialize)]
 pub struct EventMessage<E> {
-    /// Counts the events of the run from 0.
+    /// Number of the event in the run, from 0.
     pub n: u64,
-    /// Time at which the controller takes it \[ns since the start of the run\].
+    /// Time at which the controller handled the event \[ns since the start of the run\].
     pub now_ns: u64,
     /// The event.
     pub event: E,
@@ -52,9 +52,9 @@ pub struct EventMessage<E> {
 /// A message on [`STEP_TOPIC`]: written with `&Step`, read with [`Step`](crate::control::Step).
 #[derive(Debug, Serialize, Deserialize)]
 pub struct StepMessage<S> {
-    /// Number of the event that this step answers.
+    /// Number of the event to which this step responds.
     pub n: u64,
-    /// Time at which the controller takes the event \[ns since the start of the run\].
+    /// Time at which the controller handled the event \[ns since the start of the run\].
     pub now_ns: u64,
     /// Name of the state after the step, for viewers; not read back.
     #[serde(skip_deserializing)]
@@ -63,21 +63,21 @@ pub struct StepMessage<S> {
     pub step: S,
 }
 
-/// What a recording says of its run.
+/// Metadata of a recording about its run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunInfo {
-    /// Layout of the recording.
+    /// Version of the recording's layout.
     pub format_version: u32,
-    /// Version of the program that wrote it.
+    /// Version of the program that recorded it.
     pub program_version: String,
-    /// Wall clock at stamp 0 \[ns since 1970\].
+    /// Wall-clock time at stamp 0 \[ns since 1970\].
     pub epoch_ns: u64,
-    /// The cell file as the command named it.
+    /// Path of the cell file in the command.
     pub cell_name: String,
 }
 
 impl RunInfo {
-    /// As the metadata record [`RUN_METADATA`].
+    /// The metadata record [`RUN_METADATA`].
     pub fn to_metadata(&self) -> BTreeMap<String, String> {
         [
             ("format_version", self.format_version.to_string()),
@@ -91,8 +91,8 @@ impl RunInfo {
         .collect()
     }
 
-    /// From the metadata record; `Ok(None)` where another program wrote it.
-    /// Fails on what is missing, with the key's name.
+    /// Reads the metadata record; `Ok(None)` if another program wrote it. Fails with the name of a
+    /// missing or invalid key.
     pub fn from_metadata(map: &BTreeMap<String, String>) -> Result<Option<Self>, &'static str> {
         if map.get("program").map(String::as_str) != Some("truebead") {
             return Ok(None);

@@ -1,5 +1,5 @@
-//! Puts events, steps and frames into MCAP, in memory: what comes out is bytes
-//! that end with a whole record, for an outlet that may fail and try again.
+//! Writes events, steps and frames as MCAP into memory. The output always ends with a complete
+//! record, so that a failed write can be repeated.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -20,12 +20,10 @@ use super::state::AnsweredEvent;
 use crate::core::Stamp;
 use crate::io::foxglove;
 
-/// Bytes of a chunk before compression; the flush period usually ends a chunk
-/// sooner.
+/// Size of a chunk before compression \[bytes\]; the flush period usually ends a chunk earlier.
 const CHUNK_BYTES: u64 = 1 << 20;
 
-/// Why a record could not be made. Memory does not fail; a value may have
-/// no JSON form.
+/// Why a record could not be made. Memory does not fail; a value may have no JSON form.
 #[derive(Debug, thiserror::Error)]
 pub enum MuxError {
     /// The MCAP writer refused.
@@ -36,7 +34,7 @@ pub enum MuxError {
     Json(#[from] serde_json::Error),
 }
 
-/// Bytes that the MCAP writer has given out.
+/// Bytes that the MCAP writer has written.
 #[derive(Debug, Clone, Default)]
 struct SharedBuffer(Arc<Mutex<Vec<u8>>>);
 
@@ -79,10 +77,9 @@ pub struct Mux {
 }
 
 impl Mux {
-    /// Writes the head of a recording: run, attached texts by their names (cell,
-    /// calibration, what the extruder needs), channels. The
-    /// channels are in a small chunk of their own, so that damage further on
-    /// does not make later messages unreadable.
+    /// Writes the beginning of a recording: run, attached texts by name (cell, calibration, files
+    /// of the extruder), channels. The channels have a small chunk of their own, so that later
+    /// damage does not make messages unreadable.
     pub fn new(run: &RunInfo, attachments: &[(&str, &str)]) -> Result<Self, MuxError> {
         let buffer = SharedBuffer::default();
         let mut writer = WriteOptions::new()
@@ -119,7 +116,7 @@ impl Mux {
         })
     }
 
-    /// Adds an event and the step that answered it.
+    /// Adds an event and the controller's step in response.
     pub fn answered(&mut self, item: &AnsweredEvent) -> Result<(), MuxError> {
         let (n, now_ns) = (item.n, item.now.ns());
         let event = serde_json::to_vec(&EventMessage { n, now_ns, event: &item.event })?;
@@ -139,7 +136,7 @@ impl Mux {
         Ok(())
     }
 
-    /// Ends the chunk, so that everything so far comes out of [`Self::take`].
+    /// Ends the chunk, so that [`Self::take`] returns all data so far.
     pub fn flush(&mut self) -> Result<(), MuxError> {
         self.writer.flush()?;
         self.complete = self.counts;
@@ -153,13 +150,12 @@ impl Mux {
         Ok(())
     }
 
-    /// Moves what has been written to the end of `bytes`; it ends with a whole
-    /// record.
+    /// Appends the written bytes to `bytes`; they end with a complete record.
     pub fn take(&mut self, bytes: &mut Vec<u8>) {
         bytes.append(&mut self.buffer.bytes());
     }
 
-    /// What is in the chunks that are complete.
+    /// Numbers of events, steps and frames in the completed chunks.
     pub fn complete(&self) -> Counts {
         self.complete
     }

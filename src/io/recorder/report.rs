@@ -4,35 +4,35 @@ use std::path::PathBuf;
 
 use crate::run::ports::RecordError;
 
-/// What a finished recording holds.
+/// Contents of a finished recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordReport {
-    /// Events.
+    /// Number of events.
     pub events: u64,
-    /// Steps.
+    /// Number of steps.
     pub steps: u64,
-    /// Frames.
+    /// Number of frames.
     pub frames_kept: u64,
-    /// Frames that should have been kept, but for which there was no time.
+    /// Frames that were dropped because the recorder was too slow.
     pub frames_dropped: u64,
-    /// Size of the file.
+    /// Size of the file \[bytes\].
     pub bytes: u64,
-    /// Where it is.
+    /// Path of the file.
     pub path: PathBuf,
 }
 
-/// A recording that misses the end of its run. It is readable up to there, and
-/// keeps the name of a partial one.
+/// A recording without the end of its run. It is readable up to that point, and keeps the name of
+/// a partial recording.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{why}; {} holds the first {} events", report.path.display(), report.events)]
 pub struct Incomplete {
-    /// Why.
+    /// Why it is incomplete.
     pub why: RecordError,
-    /// What there is.
+    /// Its contents.
     pub report: RecordReport,
 }
 
-/// How many of each are in a recording.
+/// Numbers of events, steps and frames in a recording.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Counts {
     pub(super) events: u64,

@@ -1,4 +1,4 @@
-//! Where a recording's bytes go, and how it gets its final name.
+//! The output of a recording's bytes, and its final name.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
@@ -9,14 +9,13 @@ use crate::run::ports::RecordError;
 
 /// A file that grows at its end.
 pub trait Sink: Write + Send {
-    /// Takes away what lies beyond `len` bytes, after a write that failed
-    /// half-way.
+    /// Removes the bytes beyond `len`, after a write that failed halfway.
     fn cut(&mut self, len: u64) -> io::Result<()>;
 
-    /// Makes the file safe on the disk and gives it its final name.
+    /// Syncs the file to the disk and gives it its final name.
     fn publish(&mut self) -> io::Result<()>;
 
-    /// Where the recording is now.
+    /// Current path of the recording.
     fn path(&self) -> &Path;
 }
 
@@ -30,9 +29,8 @@ pub struct FileSink {
 }
 
 impl FileSink {
-    /// Begins a recording in `folder`, which is made if it is missing. A
-    /// recording that is there already is never touched, be it finished or cut
-    /// short: that is an error.
+    /// Begins a recording in `folder`, which is created if it does not exist. Fails if there
+    /// already is a recording, finished or partial; it is not changed.
     pub fn create(folder: &Path) -> Result<Self, RecordError> {
         fs::create_dir_all(folder).map_err(|error| {
             RecordError(format!("cannot make the folder {}: {error}", folder.display()))
@@ -86,8 +84,8 @@ impl Sink for FileSink {
         }
         fs::rename(&self.partial, &self.finished)?;
         self.published = true;
-        // The name itself is safe once the folder is; not every file system
-        // can say so, and the recording is whole either way.
+        // The new name is safe on the disk after the folder is synced. Not every file system can
+        // do that; the recording is complete in any case.
         if let Some(folder) = self.finished.parent().and_then(|folder| File::open(folder).ok()) {
             folder.sync_all().unwrap_or_default();
         }
@@ -99,8 +97,8 @@ impl Sink for FileSink {
     }
 }
 
-/// Hands bytes to a sink so that after a failure the sink still ends with a
-/// whole record, and the same bytes can be tried again.
+/// Writes bytes to a sink. After a failure the sink still ends with a complete record, and the
+/// same bytes can be written again.
 pub struct RetryingWriter<S> {
     sink: S,
     waiting: Vec<u8>,
@@ -109,18 +107,17 @@ pub struct RetryingWriter<S> {
 }
 
 impl<S: Sink> RetryingWriter<S> {
-    /// Over an empty sink.
+    /// A writer for an empty sink.
     pub fn new(sink: S) -> Self {
         Self { sink, waiting: Vec::new(), written: 0, cut_pending: false }
     }
 
-    /// Bytes that are still to be written. Whoever adds to them ends with a
-    /// whole record.
+    /// Bytes that are still to be written. Additions to them must end with a complete record.
     pub fn waiting(&mut self) -> &mut Vec<u8> {
         &mut self.waiting
     }
 
-    /// Writes all that waits, or nothing of it.
+    /// Writes all waiting bytes, or none of them.
     pub fn push(&mut self) -> io::Result<()> {
         if self.waiting.is_empty() {
             return Ok(());
@@ -128,7 +125,7 @@ impl<S: Sink> RetryingWriter<S> {
         self.cut_partial()?;
         if let Err(error) = self.sink.write_all(&self.waiting).and_then(|()| self.sink.flush()) {
             self.cut_pending = true;
-            // A cut that fails too is tried again at the next push.
+            // If removing the partial bytes fails, too, it is tried again at the next push.
             self.cut_partial().unwrap_or_default();
             return Err(error);
         }
@@ -145,7 +142,7 @@ impl<S: Sink> RetryingWriter<S> {
         Ok(())
     }
 
-    /// Bytes in the sink that count.
+    /// Number of bytes that were completely written.
     pub fn written(&self) -> u64 {
         self.written
     }

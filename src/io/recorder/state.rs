@@ -1,4 +1,4 @@
-//! Data that the threads of a recorder have in common.
+//! Data that the recorder's threads share.
 
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicU64;
@@ -9,7 +9,7 @@ use crate::control::{Event, Step};
 use crate::core::Stamp;
 use crate::run::ports::RecordError;
 
-/// An event and its answer, on the way to the writer.
+/// An event and the step in response, on the way to the writer.
 pub(super) struct AnsweredEvent {
     pub(super) n: u64,
     pub(super) now: Stamp,
@@ -17,7 +17,7 @@ pub(super) struct AnsweredEvent {
     pub(super) step: Step,
 }
 
-/// What the threads know in common.
+/// State that the recorder's threads share.
 pub(super) struct RecorderState {
     failure: OnceLock<RecordError>,
     alarm: Sender<RecordError>,
@@ -25,22 +25,22 @@ pub(super) struct RecorderState {
 }
 
 impl RecorderState {
-    /// Nothing has failed yet; the first failure goes to `alarm`.
+    /// A state without failure; the first failure is sent to `alarm`.
     pub(super) fn new(alarm: Sender<RecordError>) -> Self {
         Self { failure: OnceLock::new(), alarm, frames_dropped: AtomicU64::new(0) }
     }
 
-    /// Only the first failure counts; it is reported once and returned.
+    /// Stores the first failure and reports it once; returns the first failure.
     pub(super) fn fail(&self, why: RecordError) -> RecordError {
         if self.failure.set(why.clone()).is_ok() {
             tracing::error!("recording ends here: {}", why.0);
-            // The channel holds one, and there is only one.
+            // The channel has room for one message, and only one is sent.
             self.alarm.try_send(why.clone()).unwrap_or_default();
         }
         self.failure().cloned().unwrap_or(why)
     }
 
-    /// The first failure, if there was one.
+    /// The first failure; `None` without a failure.
     pub(super) fn failure(&self) -> Option<&RecordError> {
         self.failure.get()
     }

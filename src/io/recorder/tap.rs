@@ -10,7 +10,7 @@ use super::state::RecorderState;
 use crate::cell::file::KeepFrames;
 use crate::core::Frame;
 
-/// Gives frames to the recorder, from any thread.
+/// Passes frames to the recorder, from any thread.
 #[derive(Clone)]
 pub struct FrameTap {
     pub(super) keep: KeepFrames,

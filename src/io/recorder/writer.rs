@@ -15,21 +15,21 @@ use super::sink::{RetryingWriter, Sink};
 use super::state::{AnsweredEvent, RecorderState};
 use crate::run::ports::RecordError;
 
-/// What the writer listens to.
+/// Inputs of the writer.
 pub struct WriterInputs {
-    /// Events with their steps; the end of them is the end of the recording.
+    /// Events with their steps; the recording ends when their sender is dropped.
     pub answered: Receiver<AnsweredEvent>,
-    /// Frames that have been encoded.
+    /// Encoded frames.
     pub frames: Receiver<EncodedFrame>,
 }
 
-/// Everything that the writing thread owns.
+/// State of the writing thread.
 pub struct WriterThread<S> {
     pub mux: Mux,
     pub output: RetryingWriter<S>,
     pub shared: Arc<RecorderState>,
     pub tuning: RecorderLimits,
-    /// What is in the sink for certain.
+    /// Numbers that are certainly in the sink.
     pub written: Counts,
 }
 
@@ -77,8 +77,8 @@ impl<S: Sink> WriterThread<S> {
         self.push_ready();
     }
 
-    /// After a failure frames are not worth the length of the history that they would wait
-    /// in.
+    /// After a failure frames are dropped: they would only make the queue of unwritten data
+    /// longer.
     fn frame(&mut self, frame: &EncodedFrame) {
         if self.shared.failure().is_some() {
             self.shared.frames_dropped.fetch_add(1, Ordering::Relaxed);
@@ -89,8 +89,8 @@ impl<S: Sink> WriterThread<S> {
         self.push_ready();
     }
 
-    /// Frames that were encoded but not written when the events ended; the
-    /// encoder is closed.
+    /// Writes frames that were encoded but not written when the events ended; the encoder is
+    /// closed.
     fn late_frames(&mut self, frames: &Receiver<EncodedFrame>) {
         loop {
             match frames.recv_timeout(self.tuning.flush_every) {
@@ -107,8 +107,7 @@ impl<S: Sink> WriterThread<S> {
         self.push();
     }
 
-    /// Writes the chunks that are complete. After a failure the flush period
-    /// sets the rate of further tries.
+    /// Writes the completed chunks. After a failure, tries again once per flush period.
     fn push_ready(&mut self) {
         self.mux.take(self.output.waiting());
         if self.shared.failure().is_none() && !self.output.waiting().is_empty() {
@@ -135,9 +134,8 @@ impl<S: Sink> WriterThread<S> {
         }
     }
 
-    /// A recording that misses nothing gets its final name; one that does
-    /// keeps the name of a partial one, with as proper an end as the disk
-    /// allows.
+    /// A complete recording gets its final name; an incomplete one keeps the name of a partial
+    /// recording, and is ended as properly as the disk allows.
     fn finish(mut self) -> RecordReport {
         let finished = self.mux.finish();
         self.check(finished);
@@ -158,7 +156,7 @@ impl<S: Sink> WriterThread<S> {
     }
 }
 
-/// Events go first, so that frames cannot hold them up.
+/// Events come first, so that frames cannot delay them.
 fn next_input(
     answered: &Receiver<AnsweredEvent>,
     frames: &Receiver<EncodedFrame>,

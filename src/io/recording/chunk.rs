@@ -1,20 +1,20 @@
-//! The records within one chunk: all of them, or a reason for none.
+//! The records of one chunk: all of them, or the reason why it is damaged.
 
 use std::collections::VecDeque;
 
 use ::mcap::records::{Record, op};
 use ::mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-/// Largest chunk that is unpacked; a larger one is a damaged length.
+/// Largest size of a chunk \[bytes\]; a larger value is a damaged length.
 const MAX_CHUNK_BYTES: usize = 1 << 28;
 /// Shortest attachment (MCAP specification, § Attachment): two times, two empty strings, a length
 /// and a CRC: 8 + 8 + 4 + 4 + 8 + 4.
 const MIN_ATTACHMENT_BYTES: usize = 36;
 
-/// A record with its data owned.
+/// A record that owns its data.
 pub type OwnedRecord = Record<'static>;
 
-/// Unpacks a chunk, checks its CRC, and only then gives out its records.
+/// Decompresses a chunk and checks its CRC; only then returns its records.
 pub fn records(body: &[u8], out: &mut VecDeque<OwnedRecord>) -> Result<(), String> {
     let options = LinearReaderOptions::default()
         .with_skip_start_magic(true)
@@ -44,7 +44,7 @@ pub fn records(body: &[u8], out: &mut VecDeque<OwnedRecord>) -> Result<(), Strin
     Ok(())
 }
 
-/// Reads one record and copies what it borrows.
+/// Reads one record and copies its data.
 pub fn parse(opcode: u8, body: &[u8]) -> Result<OwnedRecord, String> {
     if opcode == op::ATTACHMENT && !attachment_fits(body) {
         return Err(format!("an attachment that does not fit its {} bytes", body.len()));
@@ -53,8 +53,7 @@ pub fn parse(opcode: u8, body: &[u8]) -> Result<OwnedRecord, String> {
     Ok(record.into_owned())
 }
 
-/// Whether an attachment's head leaves room for its CRC, which the parser
-/// takes for granted.
+/// Whether an attachment's lengths leave room for its CRC; the parser does not check it.
 fn attachment_fits(body: &[u8]) -> bool {
     let text_len = |at: usize| {
         let bytes = body.get(at..at.checked_add(4)?)?.try_into().ok()?;

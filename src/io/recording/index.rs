@@ -6,10 +6,10 @@ use std::path::Path;
 
 use ::mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 
-/// Longest record of an index that is taken \[bytes\].
+/// Largest size of a record in an index \[bytes\].
 const MAX_INDEX_RECORD_BYTES: usize = 1 << 26;
 
-/// How many messages a topic has, where the file says so.
+/// Number of messages of a topic; `None` if the file has no statistics of it.
 pub fn messages_of(path: &Path, topic: &str) -> Option<u64> {
     let mut file = File::open(path).ok()?;
     let options = SummaryReaderOptions::default()

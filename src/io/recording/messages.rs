@@ -1,4 +1,4 @@
-//! Messages with the topic that each belongs to.
+//! Messages with their topics.
 
 use std::collections::HashMap;
 use std::io::{self, Read, Seek};
@@ -8,12 +8,12 @@ use ::mcap::records::{Metadata, Record};
 
 use super::stream::{Integrity, RecordStream};
 
-/// What an MCAP says of a topic.
+/// Description of a topic in an MCAP file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Topic {
     /// Its name.
     pub name: String,
-    /// How messages are encoded, such as `protobuf`.
+    /// Encoding of the messages, such as `protobuf`.
     pub encoding: String,
     /// Name of their schema; empty for none.
     pub schema: String,
@@ -24,20 +24,20 @@ pub struct Topic {
 pub struct Message {
     /// Its topic.
     pub topic: Arc<Topic>,
-    /// Number that the writer gave it.
+    /// Sequence number of the writer.
     pub sequence: u32,
-    /// When it was recorded \[ns since 1970, as a rule\].
+    /// Time of recording \[usually ns since 1970\].
     pub log_time_ns: u64,
     /// Its content.
     pub data: Vec<u8>,
 }
 
-/// What a data section holds.
+/// An item of the data section.
 #[derive(Debug)]
 pub enum Item {
     /// A message.
     Message(Message),
-    /// A file that is attached.
+    /// An attached file.
     Attachment {
         /// Its name.
         name: String,
@@ -56,7 +56,7 @@ pub struct Messages<R> {
 }
 
 impl<R: Read + Seek> Messages<R> {
-    /// Begins a file; `Ok(None)` where it does not begin as MCAP does.
+    /// Begins a file; `Ok(None)` if it does not begin with the MCAP magic bytes.
     pub fn new(source: R) -> io::Result<Option<Self>> {
         let stream = RecordStream::new(source)?;
         Ok(stream.map(|stream| Self { stream, schemas: HashMap::new(), topics: HashMap::new() }))
@@ -101,14 +101,14 @@ impl<R: Read + Seek> Messages<R> {
         Ok(None)
     }
 
-    /// The topics that have been described so far, by name.
+    /// The topics that were described so far, by name.
     pub fn topics(&self) -> Vec<Arc<Topic>> {
         let mut topics: Vec<_> = self.topics.values().map(Arc::clone).collect();
         topics.sort_by(|a, b| a.name.cmp(&b.name));
         topics
     }
 
-    /// What was wrong as far as the file has been read.
+    /// Missing or damaged parts, as far as the file has been read.
     pub fn integrity(&self) -> &Integrity {
         self.stream.integrity()
     }

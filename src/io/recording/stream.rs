@@ -1,5 +1,5 @@
-//! Reads MCAP records one after the other from a file that may be cut off or
-//! damaged anywhere. What can be read is given out, what cannot is noted.
+//! Reads MCAP records from a file that may be truncated or damaged anywhere. Readable records are
+//! returned, other parts are noted.
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -9,31 +9,30 @@ use ::mcap::records::op;
 
 use super::chunk::{self, OwnedRecord};
 
-/// Largest record that is taken; a longer one is a damaged length.
+/// Largest size of a record \[bytes\]; a larger value is a damaged length.
 const MAX_RECORD_BYTES: u64 = 1 << 30;
 /// Bytes of opcode (1) and length (8) in front of every record (MCAP specification, § Records).
 const HEAD_BYTES: u64 = 9;
-/// Notes that are kept in words; further ones are only counted.
+/// Number of notes that are kept as text; further ones are only counted.
 const MAX_NOTES: usize = 8;
 
-/// What a reader found wrong with a file.
+/// Missing and damaged parts of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Integrity {
-    /// The file has its proper end.
+    /// Whether the file has its regular end.
     pub finished: bool,
-    /// Where a file without it breaks off \[bytes\].
+    /// Position at which a file without its end breaks off \[bytes\].
     pub truncated_at: Option<u64>,
-    /// Bytes beyond that point that belong to no whole record.
+    /// Bytes after that position that are no complete record.
     pub lost_bytes: u64,
-    /// Records and chunks in the middle that could not be read and were
-    /// skipped.
+    /// Number of records and chunks before the end that were skipped as unreadable.
     pub damaged: u64,
-    /// The first few of them, in words, each with its position.
+    /// Text and position of the first few of them.
     pub notes: Vec<String>,
 }
 
 impl Integrity {
-    /// What is wrong, in a sentence; `None` where nothing is.
+    /// A sentence about missing and damaged parts; `None` if there are none.
     pub fn summary(&self) -> Option<String> {
         let mut parts = Vec::new();
         if let Some(at) = self.truncated_at {
@@ -63,7 +62,7 @@ impl Integrity {
     }
 }
 
-/// Records of a file in its order, those of a chunk at the chunk's position.
+/// Records of a file in order; those of a chunk at the chunk's position.
 pub struct RecordStream<R> {
     source: R,
     len: u64,
@@ -74,7 +73,7 @@ pub struct RecordStream<R> {
 }
 
 impl<R: Read + Seek> RecordStream<R> {
-    /// Begins a file; `Ok(None)` where it does not begin as MCAP does.
+    /// Begins a file; `Ok(None)` if it does not begin with the MCAP magic bytes.
     pub fn new(mut source: R) -> io::Result<Option<Self>> {
         let len = source.seek(SeekFrom::End(0))?;
         source.seek(SeekFrom::Start(0))?;
@@ -89,9 +88,8 @@ impl<R: Read + Seek> RecordStream<R> {
         Ok(Some(Self { source, len, at, ended: false, ready, integrity }))
     }
 
-    /// The next record of the data section, `None` at its end. Fails only
-    /// when the file cannot be read; a damaged one shows in
-    /// [`Self::integrity`].
+    /// The next record of the data section, `None` at its end. Fails only if the file cannot be
+    /// read; damage is reported in [`Self::integrity`].
     pub fn next_record(&mut self) -> io::Result<Option<OwnedRecord>> {
         loop {
             if let Some(record) = self.ready.pop_front() {
@@ -104,12 +102,12 @@ impl<R: Read + Seek> RecordStream<R> {
         }
     }
 
-    /// What was wrong as far as the file has been read.
+    /// Missing or damaged parts, as far as the file has been read.
     pub fn integrity(&self) -> &Integrity {
         &self.integrity
     }
 
-    /// To note what a record's content shows.
+    /// For notes about damage in the content of records.
     pub fn integrity_mut(&mut self) -> &mut Integrity {
         &mut self.integrity
     }
@@ -169,8 +167,8 @@ impl<R: Read + Seek> RecordStream<R> {
         }
     }
 
-    /// The summary at a file's end repeats what has been read; only that it
-    /// ends is of interest.
+    /// Whether the file ends with the magic bytes. The summary before them repeats known data and
+    /// is not read.
     fn ends_with_magic(&mut self) -> io::Result<bool> {
         let magic_at = self.len.saturating_sub(MAGIC.len() as u64);
         if magic_at < self.at {
