@@ -1,5 +1,5 @@
-//! `report.html` of a calibration: where boards were seen, residuals of the corners, and the
-//! standard deviation of a width over the image.
+//! `report.html` of a calibration: positions of the boards in the image, residuals of the corners,
+//! and the standard deviation of a width over the image.
 
 pub mod cell;
 mod drawing;
@@ -17,7 +17,7 @@ use crate::calibration::width_map::{self, WidthMap};
 use crate::core::GridSize;
 use drawing::{Drawing, residuals, width_map};
 
-/// Everything that the page is made of.
+/// Data of the page.
 #[derive(Debug)]
 pub struct CalibrationPage<'a> {
     /// The board.
@@ -26,18 +26,18 @@ pub struct CalibrationPage<'a> {
     pub images: &'a Observations,
     /// The camera.
     pub solution: &'a Solution,
-    /// Standard deviation of a width, one map for each surface; empty where it cannot be
-    /// determined.
+    /// Standard deviation of a width, one map for each surface; empty if it cannot be determined.
     pub maps: &'a [WidthMap],
-    /// The largest standard deviation that is allowed \[mm\].
+    /// Largest permitted standard deviation of a width \[mm\]; `None` for no limit.
     pub limit_mm: Option<f64>,
-    /// The further image that would help most.
+    /// The additional image that would reduce the uncertainty most.
     pub next: Option<&'a NextView>,
-    /// The whole answer as text.
+    /// The result as text.
     pub text: &'a str,
     /// The calibration file.
     pub calibration_file: &'a str,
-    /// Seconds after which the page reloads itself, while images are still taken.
+    /// Period with which the page reloads itself while images are still taken \[s\]; `None`
+    /// afterwards.
     pub reload_s: Option<u32>,
 }
 

@@ -10,7 +10,7 @@ use super::html::titled_page;
 use crate::numeric::number::to_f64;
 use crate::trials::compare::{Figures, JUDGED_AFTER_MM, SIGMA_AFTER_MM, SeedStatistics};
 
-/// One number of one controller at one width, as `compare.json` has it.
+/// One number of one controller at one width, as in `compare.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparedNumber {
     /// The controller.
@@ -36,11 +36,11 @@ pub struct ControllerComparison {
     pub controllers: Vec<String>,
     /// Seeds of every controller and width.
     pub seeds: u64,
-    /// For each width \[mm\] the figures of all controllers.
+    /// Width \[mm\] and figures of all controllers, for each width.
     pub widths: Vec<(f64, Vec<Figures>)>,
 }
 
-/// A quantity of a controller: its name, its unit, how seeds are averaged, and its value.
+/// A compared quantity: its name, its unit, how seeds are averaged, and its value.
 struct Quantity(&'static str, &'static str, Average, fn(&Figures) -> SeedStatistics);
 
 /// The quantities that are compared.
@@ -54,26 +54,26 @@ const QUANTITIES: [Quantity; 6] = [
 ];
 
 impl Quantity {
-    /// Its name with its unit.
+    /// Its name and its unit.
     fn title(&self) -> String {
         if self.1 == "1" { self.0.to_owned() } else { format!("{} [{}]", self.0, self.1) }
     }
 
-    /// Its average over the seeds of a controller.
+    /// Its average over the seeds of a controller, as text.
     fn average(&self, figures: &Figures) -> String {
         average(&(self.3)(figures), self.2)
     }
 }
 
-/// Name of the number of seeds that failed.
+/// Name of the count of failed seeds.
 const FAILED: &str = "seeds never controlled, or stopped";
 
-/// How a number over seeds is averaged in a table.
+/// How a quantity is averaged over the seeds in a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Average {
-    /// Mean and confidence.
+    /// Mean with its confidence interval.
     Mean,
-    /// Median: some seeds may have none.
+    /// Median, for quantities that some seeds do not have.
     Median,
 }
 
@@ -87,7 +87,7 @@ fn average(estimate: &SeedStatistics, how: Average) -> String {
     }
 }
 
-/// Thousandths below 2, hundredths below 20, tenths from there on.
+/// A number with three decimals below 2, two below 20, otherwise one.
 fn short(value: f64) -> String {
     match value.abs() {
         size if size < 2.0 => format!("{value:.3}"),
@@ -97,7 +97,7 @@ fn short(value: f64) -> String {
 }
 
 impl ControllerComparison {
-    /// The numbers, one by one.
+    /// All numbers, for `compare.json`.
     pub fn numbers(&self) -> Vec<ComparedNumber> {
         let mut numbers = Vec::new();
         for (width_mm, all) in &self.widths {
@@ -120,8 +120,8 @@ impl ControllerComparison {
         numbers
     }
 
-    /// A table for a terminal: a block for each quantity, a line for each
-    /// controller, a column for each width.
+    /// A table for a terminal: a block for each quantity, a line for each controller, a column for
+    /// each width.
     pub fn plain(&self) -> String {
         let widest = self.controllers.iter().map(|name| name.chars().count()).max().unwrap_or(0);
         // Writing to a string cannot fail.
@@ -141,7 +141,7 @@ impl ControllerComparison {
         text
     }
 
-    /// A line for each controller with a word for each width.
+    /// A line for each controller, with a cell for each width.
     fn lines(&self, text: &mut String, widest: usize, word: impl Fn(&Figures) -> String) {
         for (who, name) in self.controllers.iter().enumerate() {
             let _ = write!(text, "{name:widest$}");
@@ -195,7 +195,7 @@ impl ControllerComparison {
         }
     }
 
-    /// A row for each controller with a word for each width.
+    /// A row for each controller, with a cell for each width.
     fn rows(&self, title: &str, word: impl Fn(&Figures) -> String) -> Markup {
         html! { @for (who, name) in self.controllers.iter().enumerate() { tr {
             td { @if who == 0 { (title) } }

@@ -1,21 +1,21 @@
-//! The frame of every page: head, style sheet, title, verdict and footer. A page refers to no
+//! The layout of every page: head, style sheet, title, verdict and footer. A page refers to no
 //! other file.
 
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
 use super::chart::palette;
 
-/// A page around its content, without title and footer.
+/// A page from its content, without title and footer.
 pub fn whole_page(title: &str, body: &Markup) -> Markup {
     reloading_page(title, None, body)
 }
 
-/// A page with its title above its content and a footer that ends with `note`.
+/// A page with a title, its content, and a footer that ends with `note`.
 pub fn titled_page(title: &str, body: &Markup, note: &str) -> String {
     whole_page(title, &titled(title, body, note)).into_string()
 }
 
-/// The content of a page between its title and its footer.
+/// Content with a title above it and a footer below it.
 pub fn titled(title: &str, body: &Markup, note: &str) -> Markup {
     html! {
         h1 { (title) }
@@ -24,7 +24,7 @@ pub fn titled(title: &str, body: &Markup, note: &str) -> Markup {
     }
 }
 
-/// A page that reloads itself after a number of seconds, where one is given.
+/// A page that reloads itself every `reload_s` seconds, or not at all for `None`.
 pub fn reloading_page(title: &str, reload_s: Option<u32>, body: &Markup) -> Markup {
     let style = include_str!("style.css");
     html! {
@@ -44,19 +44,19 @@ pub fn reloading_page(title: &str, reload_s: Option<u32>, body: &Markup) -> Mark
     }
 }
 
-/// How the subject of a page did.
+/// The verdict on the subject of a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum VerdictLevel {
-    /// Nothing to worry about.
+    /// Good.
     Good,
-    /// Something to look at.
+    /// Needs attention.
     Caution,
-    /// The task failed.
+    /// Failed.
     Bad,
 }
 
 impl VerdictLevel {
-    /// Good, or a reason for caution.
+    /// `Caution` if `is_cautious`, otherwise `Good`.
     pub const fn with_caution(is_cautious: bool) -> Self {
         if is_cautious { Self::Caution } else { Self::Good }
     }
@@ -83,7 +83,7 @@ pub fn about<N: Render, V: Render>(facts: impl IntoIterator<Item = (N, V)>) -> M
     html! { div.about { @for (name, value) in facts { span { (name) " " b { (value) } } } } }
 }
 
-/// A number with so many decimals; a dash where there is none.
+/// A number with `places` decimals; a dash for `None`.
 pub fn number(value: Option<f64>, places: usize) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.places$}"))
 }

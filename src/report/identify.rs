@@ -1,4 +1,4 @@
-//! A model from logged data: fit, validation, and the files with the result.
+//! Identification of a model from logged data: fit, validation, and the result files.
 
 mod curves;
 mod json;
@@ -23,18 +23,18 @@ pub use page::page;
 pub use refusal::NoModel;
 pub use table::text;
 
-/// A gain that changes by more standard errors and by a larger fraction than this once a linear
-/// drift is removed is that of the drift…
+/// A gain is attributed to a drift if it changes by more standard errors and by a larger fraction
+/// than this when a linear drift is removed.
 const CERTAIN_SIGMAS: f64 = 5.0;
 const CERTAIN_FRACTION: f64 = 0.2;
-/// …and one that changes by more than this may be.
+/// A change of the gain above which a drift is possible, in standard errors and as a fraction.
 const LIKELY_SIGMAS: f64 = 4.0;
 const LIKELY_FRACTION: f64 = 0.03;
 
 /// Largest number of lags of the residuals' autocorrelation.
 const LAGS: usize = 300;
 
-/// Fits all forms and chooses one. Fails with the reasons where none is accepted.
+/// Fits all forms and chooses the best model. Fails with the reasons if no form is accepted.
 pub fn study(logs: Logs, forms: &[FitSettings]) -> Result<ModelStudy, NoModel> {
     let estimation = samples(&logs.estimation)?;
     let validation = logs.validation.as_ref().map(|(data, _)| samples(data)).transpose()?;
@@ -90,7 +90,7 @@ pub fn study(logs: Logs, forms: &[FitSettings]) -> Result<ModelStudy, NoModel> {
     Ok(study)
 }
 
-/// Whether a model's gain is that of a drift.
+/// Whether a model's gain must be attributed to a drift.
 fn is_drift_gain(steady: &DetrendedGain, fit: &Fit) -> bool {
     let (sigmas, fraction) = steady.difference(fit.model.dc_gain());
     sigmas > CERTAIN_SIGMAS && fraction > CERTAIN_FRACTION
@@ -121,7 +121,7 @@ fn none(comparison: &ModelComparison, logs: &Logs) -> NoModel {
     NoModel::None { forms: comparison.rows.iter().map(refused).collect(), drift }
 }
 
-/// Warning of a gain that a drift may have changed.
+/// Warning about a gain that a drift may have changed; `None` without such a change.
 fn other_gain(study: &ModelStudy, steady: &DetrendedGain) -> Option<String> {
     let gain = study.fit.model.dc_gain();
     let (sigmas, fraction) = steady.difference(gain);

@@ -1,4 +1,4 @@
-//! A frame with the measured edges drawn in, to a fraction of a pixel.
+//! A frame with the measured edges drawn in, with subpixel accuracy.
 
 mod canvas;
 
@@ -10,17 +10,17 @@ use crate::numeric::number::to_f64;
 use crate::vision::{Edges, Gauge, WidthMeasurement};
 use canvas::Canvas;
 
-/// Longest side of a drawing \[px\], which trades detail against the size of a page.
+/// Longest side of a drawing \[px\]: a larger one shows more detail, but makes the page larger.
 const SIDE: usize = 720;
 /// Largest magnification of a small gauge.
 const MAX_SCALE: f64 = 6.0;
-/// An image whose brightest pixel is darker than this is brightened \[grey levels\].
+/// An image whose brightest pixel is below this is brightened \[grey levels\].
 const DARK: u8 = 110;
 const WHITE: Rgb = [255, 255, 255];
 const BLACK: Rgb = [0, 0, 0];
 
-/// The surroundings of the gauge, cut out of a frame, with the result of the measurement. Its
-/// size is bounded, whatever the camera.
+/// The part of a frame around the gauge, with the result of the measurement. Its size is bounded
+/// for any camera.
 #[derive(Debug, Clone)]
 pub struct GaugeCutout {
     /// Number of the frame.
@@ -28,8 +28,8 @@ pub struct GaugeCutout {
     /// The measurement, or the status of a rejected frame.
     pub outcome: Result<WidthMeasurement, &'static str>,
     cut: image::GrayImage,
-    /// Top left corner of the cut in the frame, and pixels of the cut for
-    /// each of the frame.
+    /// Top left corner of the cutout in the frame, and pixels of the cutout per pixel of the
+    /// frame.
     corner: (usize, usize),
     scale: f64,
     roi: Roi,
@@ -38,7 +38,7 @@ pub struct GaugeCutout {
 }
 
 impl GaugeCutout {
-    /// Cuts a snapshot out of a frame.
+    /// Cuts the surroundings of the gauge out of a frame.
     pub fn take(
         frame: &Frame,
         gauge: &Gauge,
@@ -77,14 +77,14 @@ impl GaugeCutout {
         canvas.into_image()
     }
 
-    /// The drawing as a PNG; none if it cannot be encoded.
+    /// The drawing as a PNG; `None` if it cannot be encoded.
     pub fn png(&self) -> Option<Vec<u8>> {
         let mut bytes = std::io::Cursor::new(Vec::new());
         self.draw().write_to(&mut bytes, image::ImageFormat::Png).ok()?;
         Some(bytes.into_inner())
     }
 
-    /// The drawing as a JPEG of this quality; none if it cannot be encoded.
+    /// The drawing as a JPEG of this quality; `None` if it cannot be encoded.
     pub fn jpeg(&self, quality: u8) -> Option<Vec<u8>> {
         let mut bytes = Vec::new();
         let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality);
@@ -92,7 +92,7 @@ impl GaugeCutout {
         Some(bytes)
     }
 
-    /// From raw image pixels to pixels of the drawing. The outlines of the pixels coincide, not
+    /// Position in the drawing of a raw image point. The outlines of the pixels coincide, not
     /// their centres.
     fn position(&self, point: ImagePoint, enlarge: f64) -> (f64, f64) {
         let scale = self.scale * enlarge;
@@ -130,8 +130,8 @@ impl GaugeCutout {
     }
 }
 
-/// The gauge and a margin around it, within the image: corner and size. The
-/// whole image where the gauge lies outside of it.
+/// The gauge and a margin around it, within the image: corner and size. The whole image if the
+/// gauge is outside.
 fn surroundings(roi: Roi, (width, height): (usize, usize)) -> ((usize, usize), (usize, usize)) {
     let margin = (roi.width.max(roi.height) / 12).max(8);
     let along = |start: usize, length: usize, limit: usize| {
@@ -144,7 +144,7 @@ fn surroundings(roi: Roi, (width, height): (usize, usize)) -> ((usize, usize), (
 
 type CutOut = ((usize, usize), (usize, usize));
 
-/// Cuts out a part and makes it smaller if it is too large; returns it with its scale.
+/// Cuts out a part and reduces its size if it is too large; returns it with its scale.
 fn cut_out(frame: &Frame, ((x, y), (width, height)): CutOut) -> (image::GrayImage, f64) {
     let grey = frame.to_grey8();
     let rows = grey.chunks_exact(frame.width()).skip(y).take(height);
@@ -161,7 +161,7 @@ fn cut_out(frame: &Frame, ((x, y), (width, height)): CutOut) -> (image::GrayImag
     (small, scale)
 }
 
-/// Stretches the grey levels of a dark image, in which a reader would see nothing.
+/// Stretches the grey levels of a dark image, in which nothing would be visible.
 fn brightened(mut grey: image::GrayImage) -> image::GrayImage {
     let brightest = grey.pixels().map(|pixel| pixel.0[0]).max().unwrap_or(255);
     if (1..DARK).contains(&brightest) {

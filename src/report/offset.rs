@@ -5,18 +5,18 @@ use crate::core::{RobotState, Stamp};
 use crate::identify::camera_offset::TimedWidth;
 use crate::io::recording::{RecordedEntry, RecordingError};
 
-/// A bead as it was recorded.
+/// Recorded data of a bead.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RecordedBead {
-    /// What the robot reported, when it arrived.
+    /// The robot's reports with their times of arrival.
     pub states: Vec<(Stamp, RobotState)>,
-    /// Widths that were measured.
+    /// Measured widths, by time of capture.
     pub widths: Vec<TimedWidth>,
-    /// Frames that gave none.
+    /// Number of rejected frames.
     pub rejected: u64,
 }
 
-/// Reads a recording to its end. Fails where it cannot be read on.
+/// Reads a recording to its end. Fails if the recording becomes unreadable.
 pub fn recorded_bead(
     entries: impl IntoIterator<Item = Result<RecordedEntry, RecordingError>>,
 ) -> Result<RecordedBead, RecordingError> {
@@ -32,7 +32,7 @@ pub fn recorded_bead(
             _ => {}
         }
     }
-    // Time goes by capture, whatever came in between.
+    // Sorted by capture time: widths may have arrived in another order.
     bead.widths.sort_by_key(|width| width.at);
     Ok(bead)
 }

@@ -11,8 +11,8 @@ use crate::vision::{Edges, Gauge, WidthMeasurement};
 /// Name of the folder within the output folder.
 pub const FOLDER: &str = "overlays";
 
-/// Writes one PNG a frame. Its name has the frame's number, the status and, where
-/// it was measured, width and standard deviation.
+/// Writes one PNG per frame. Its name has the frame's number, the status and, if it was measured,
+/// the width and its standard deviation.
 #[derive(Debug)]
 pub struct OverlayWriter {
     folder: PathBuf,
@@ -20,8 +20,7 @@ pub struct OverlayWriter {
 }
 
 impl OverlayWriter {
-    /// Makes the folder in an output folder that is there. Fails where it cannot
-    /// be made.
+    /// Creates the folder in an existing output folder; fails if that is not possible.
     pub fn create(output: &Path, gauge: Gauge) -> Result<Self, LogError> {
         let folder = output.join(FOLDER);
         fs::create_dir_all(&folder)
@@ -29,8 +28,7 @@ impl OverlayWriter {
         Ok(Self { folder, gauge })
     }
 
-    /// Adds a frame with the edges that were found in it. A frame that cannot be
-    /// drawn is left out.
+    /// Writes a frame with its edges. A frame that cannot be drawn is left out.
     pub fn frame(
         &self,
         frame: &Frame,
@@ -43,7 +41,7 @@ impl OverlayWriter {
     }
 }
 
-/// Such as `000012_ok_42.131+-0.024mm.png` or `000013_unsure.png`.
+/// File name, such as `000012_ok_42.131+-0.024mm.png` or `000013_unsure.png`.
 fn name(frame: u64, outcome: Result<WidthMeasurement, &'static str>) -> String {
     match outcome {
         Ok(WidthMeasurement { width, sigma, .. }) => {

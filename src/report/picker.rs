@@ -7,24 +7,24 @@ use crate::rows::frame_row::FrameRow;
 use crate::rows::names::in_words;
 use crate::vision::{Edges, Gauge};
 
-/// Largest number of frames in a report, which trades detail against the size of the page.
+/// Largest number of frames in a report: more show more, but make the page larger.
 const MAX_FRAMES: usize = 12;
-/// Largest number of rejected frames among them, each with another reason.
+/// Largest number of rejected frames among them, each with a different reason.
 const MAX_REJECTED_FRAMES: usize = 4;
-/// Frames of the even spread that are kept before every second one is dropped.
+/// Number of evenly spaced frames above which every second one is dropped.
 const MAX_SPREAD_FRAMES: usize = 16;
-/// Ratio of standard deviations from which a frame replaces the most uncertain one, so that a
+/// Ratio of standard deviations above which a frame replaces the most uncertain one, so that a
 /// slow drift does not copy every frame.
 const MIN_SIGMA_RATIO: f64 = 1.05;
-/// Quality of the images of a page (1 to 100), which trades detail against its size.
+/// JPEG quality of the images of a page (1 to 100): higher values make the page larger.
 const JPEG_QUALITY: u8 = 82;
 
 /// A frame of the report.
 #[derive(Debug, Clone)]
 pub struct ChosenFrame {
-    /// Its number.
+    /// Number of the frame.
     pub frame: u64,
-    /// What it shows.
+    /// Caption of the drawing.
     pub caption: String,
     /// The drawing.
     pub jpeg: Vec<u8>,
@@ -38,7 +38,7 @@ struct KeptCutout {
     why: &'static str,
 }
 
-/// Keeps a bounded number of frames.
+/// Selects a bounded number of frames.
 #[derive(Debug)]
 pub struct FramePicker {
     gauge: Gauge,
@@ -64,7 +64,7 @@ impl FramePicker {
         }
     }
 
-    /// Takes a frame; most are dropped at once.
+    /// Considers a frame; most are dropped immediately.
     pub fn offer(&mut self, row: &FrameRow, frame: &Frame, edges: Option<Edges<'_>>) {
         let gauge = self.gauge;
         let keep = |why| KeptCutout {
@@ -103,7 +103,7 @@ impl FramePicker {
         }
     }
 
-    /// The chosen frames in their order, drawn.
+    /// Drawings of the selected frames, sorted by frame number.
     pub fn finish(self) -> Vec<ChosenFrame> {
         let mut chosen: Vec<KeptCutout> = self.rejected;
         chosen.extend(self.first);
@@ -122,12 +122,12 @@ impl FramePicker {
     }
 }
 
-/// A frame is not shown twice.
+/// Whether a frame has not been selected yet.
 fn is_new(chosen: &[KeptCutout], kept: &KeptCutout) -> bool {
     chosen.iter().all(|other| other.snapshot.frame != kept.snapshot.frame)
 }
 
-/// `wanted` of `count` indices, evenly spaced, the last among them.
+/// `wanted` of `count` indices, evenly spaced; the last index is one of them.
 fn evenly(count: usize, wanted: usize) -> Vec<usize> {
     let wanted = wanted.min(count);
     (1..=wanted).map(|part| part * count / wanted - 1).collect()

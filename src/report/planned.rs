@@ -10,26 +10,26 @@ pub use table::to_csv;
 use crate::core::Unit;
 use crate::plan::{Plan, SpeedProfile, WidthPrediction};
 
-/// A bead of a job, planned.
+/// A planned bead of a job.
 #[derive(Debug)]
 pub struct PlannedBead {
-    /// Its name, such as `line 3`; its position in the job where the job does not name it.
+    /// Its name, such as `line 3`, or its position in the job if it has no name there.
     pub name: String,
     /// The speed without a plan, as fast as the robot's acceleration allows.
     pub nominal: SpeedProfile,
-    /// Path and position \[mm\], in order.
+    /// Path \[mm\] and position \[mm\] of the job's points, in order.
     pub position: Vec<(f64, [f64; 3])>,
     /// The plan, with commands relative to [`PlanFacts::idle`].
     pub plan: Plan,
-    /// Prediction for the plan.
+    /// Predicted width with the plan.
     pub planned: WidthPrediction,
-    /// Prediction for the nominal speed with a constant command.
+    /// Predicted width at nominal speed with a constant command.
     pub constant: WidthPrediction,
-    /// Prediction for the nominal speed with a command in proportion to it.
+    /// Predicted width at nominal speed with a command proportional to it.
     pub proportional: WidthPrediction,
 }
 
-/// Facts that hold for all beads.
+/// Facts that are common to all beads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlanFacts {
     /// Target width \[mm\].
@@ -49,7 +49,7 @@ impl PlannedBead {
     }
 }
 
-/// Root mean square of the relative width error over beads.
+/// Root mean square of the relative width error over all beads.
 pub fn rms<'a>(
     beads: impl IntoIterator<Item = &'a PlannedBead>,
     of: fn(&PlannedBead) -> &WidthPrediction,

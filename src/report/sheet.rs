@@ -1,4 +1,4 @@
-//! A board to print, at its true size, as PDF or SVG.
+//! A board for printing, at its true size, as PDF or SVG.
 
 use std::fmt::Write as _;
 
@@ -9,29 +9,29 @@ use crate::core::GridSize;
 
 /// Points of a PDF in a millimetre. By definition a point is 1/72 inch (ISO 32000-1, 8.3.2.3).
 const POINTS: f64 = 72.0 / 25.4;
-/// White between the squares and the paper's edge \[mm\]: printers need some, and the
-/// detection of boards needs a bright margin around the outer squares.
+/// White between the squares and the paper's edge \[mm\]: printers need some, and the detection of
+/// boards needs a bright margin around the outer squares.
 const MARGIN_MM: f64 = 8.0;
-/// Height below the squares for bar and text \[mm\].
+/// Height below the squares for scale bar and text \[mm\].
 const FOOT_MM: f64 = 24.0;
-/// Length of the bar, and of a short one on small paper \[mm\].
+/// Length of the scale bar, and of a shorter one for small paper \[mm\].
 const BAR_MM: [f64; 2] = [100.0, 50.0];
 /// Width of a line \[mm\].
 const LINE_MM: f64 = 0.3;
 /// Size of the letters \[mm\].
 const LETTERS_MM: f64 = 3.4;
 
-/// Paper, across.
+/// Paper in landscape format.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Paper {
-    /// Its long side \[mm\].
+    /// Long side \[mm\].
     pub width_mm: f64,
-    /// Its short side \[mm\].
+    /// Short side \[mm\].
     pub height_mm: f64,
 }
 
 impl Paper {
-    /// Known sizes.
+    /// Common paper sizes.
     pub const KNOWN: [(&'static str, Self); 6] = [
         ("a4", Self { width_mm: 297.0, height_mm: 210.0 }),
         ("a3", Self { width_mm: 420.0, height_mm: 297.0 }),
@@ -50,28 +50,27 @@ impl Paper {
     need_mm.ceil(), need_high_mm.ceil(), width_mm = paper.width_mm, height_mm = paper.height_mm
 )]
 pub struct TooLarge {
-    /// Width that is needed \[mm\].
+    /// Required width \[mm\].
     pub need_mm: f64,
-    /// Height that is needed \[mm\].
+    /// Required height \[mm\].
     pub need_high_mm: f64,
     /// The paper.
     pub paper: Paper,
 }
 
-/// What is printed: black rectangles and lines of words, from the paper's upper left
-/// corner \[mm\].
+/// The drawing: black rectangles and lines of text, from the paper's upper left corner \[mm\].
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardSheet {
     paper: Paper,
     title: String,
-    /// x, y, width, height.
+    /// x, y, width and height of each rectangle.
     black: Vec<[f64; 4]>,
-    /// Middle, base line, words.
+    /// Middle, baseline and text of each line.
     words: Vec<(f64, f64, String)>,
 }
 
 impl BoardSheet {
-    /// Lays a board out in the middle of the paper, with a bar to check its size with.
+    /// Places a board in the middle of the paper, with a scale bar to check its printed size.
     #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
     pub fn of(board: &Board, paper: Paper) -> Result<Self, TooLarge> {
         let GridSize { columns, rows } = board.corners();
@@ -134,7 +133,7 @@ impl BoardSheet {
         text
     }
 
-    /// As PDF of one page.
+    /// As a PDF with one page.
     pub fn pdf(&self) -> Vec<u8> {
         let [catalog, pages, page, font, content] = [1, 2, 3, 4, 5].map(Ref::new);
         let mut pdf = Pdf::new();
@@ -150,7 +149,7 @@ impl BoardSheet {
         pdf.finish()
     }
 
-    /// The page's drawing; PDF counts from the lower left corner.
+    /// The content of the PDF page; PDF coordinates start at the lower left corner.
     fn content(&self) -> Vec<u8> {
         let up = |y: f64| points(self.paper.height_mm - y);
         let mut content = Content::new();
@@ -169,8 +168,8 @@ impl BoardSheet {
     }
 }
 
-/// The black cells of all markers, those that are neighbours in a row as one, so that no
-/// hair line shows between them.
+/// The black cells of all markers. Neighbouring cells of a row are joined, so that no thin line
+/// shows between them.
 #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
 fn markers(board: &Board, (left, top): (f64, f64)) -> Vec<[f64; 4]> {
     let Some(marks) = board.markers() else { return Vec::new() };
@@ -201,7 +200,7 @@ fn options(board: &Board) -> String {
     })
 }
 
-/// A bar with a mark every centimetre, long ones at its ends and its middle.
+/// A scale bar with a mark every centimetre; the marks at its ends are longer.
 fn ruler(left: f64, base: f64, length: f64) -> Vec<[f64; 4]> {
     let marks = [BAR_MM[0], BAR_MM[1]]
         .iter()
@@ -211,7 +210,7 @@ fn ruler(left: f64, base: f64, length: f64) -> Vec<[f64; 4]> {
     for mark in 0..=marks {
         let at = left + length * f64::from(mark) / f64::from(marks);
         let tall = if mark == 0 || mark == marks { 6.0 } else { 3.0 };
-        // The outer sides of the outer marks are the bar's length apart.
+        // The distance between the outer sides of the outer marks is the length of the bar.
         let x = match mark {
             0 => at,
             _ if mark == marks => at - LINE_MM,
@@ -222,8 +221,8 @@ fn ruler(left: f64, base: f64, length: f64) -> Vec<[f64; 4]> {
     black
 }
 
-/// About how wide words are in Helvetica: its letters are half as wide as high, its
-/// spaces and thin letters half of that.
+/// Approximate width of a text in Helvetica \[mm\]: 0.56 of the letter size per letter, 0.30 for
+/// spaces and thin letters.
 fn helvetica_mm(words: &str) -> f64 {
     let wide = |letter: char| if " .,;:-ilI|tfrj".contains(letter) { 0.30 } else { 0.56 };
     LETTERS_MM * words.chars().map(wide).sum::<f64>()
@@ -277,7 +276,7 @@ mod tests {
         let pdf = sheet.pdf();
         assert!(pdf.starts_with(b"%PDF-1.7") && pdf.ends_with(b"%%EOF"));
         let text = String::from_utf8_lossy(&pdf);
-        // A4 across in points.
+        // Width of A4 paper in landscape format, in points.
         assert!(text.contains("841.8"), "{text}");
         assert!(text.contains("--square-mm 12.5"));
     }

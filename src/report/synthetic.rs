@@ -1,5 +1,5 @@
-//! A made-up run for the tests: a sine of a width, every state, a limit,
-//! rejected frames, images. The same every time.
+//! An invented run for the tests: a sinusoidal width, every state, a limit, rejected frames,
+//! images. It is always the same.
 
 #![expect(
     clippy::cast_precision_loss,
@@ -59,8 +59,7 @@ pub fn options(folder: &Path, title: &str, with_control: bool) -> LogOptions {
     }
 }
 
-/// A number between −1 and 1 that looks like chance (the finaliser of
-/// `SplitMix64`).
+/// A pseudo-random number between −1 and 1 (the finaliser of `SplitMix64`).
 fn chance(seed: u64) -> f64 {
     let mut z = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -163,7 +162,7 @@ fn setpoint(time: f64) -> Step {
     }
 }
 
-/// Twenty seconds with a controller, 50 frames a second.
+/// Twenty seconds with a controller, 50 frames per second.
 pub fn run(folder: &Path) -> Summary {
     let mut log = RunPage::log(options(folder, "Run of cell.toml <demo & more>", true)).unwrap();
     let mut edges = [Vec::new(), Vec::new()];
@@ -230,7 +229,7 @@ pub fn process(folder: &Path) -> Summary {
 
 pub const HOURS_OF_FRAMES: u64 = 100_000;
 
-/// Three hours at ten frames a second, without images.
+/// Three hours with ten frames per second, without images.
 pub fn hours(folder: &Path) -> Summary {
     let mut log = RunPage::log(options(folder, "A long run", true)).unwrap();
     for frame in 0..HOURS_OF_FRAMES {

@@ -1,4 +1,4 @@
-//! Results of tuning: a table, `tune.json` and a page.
+//! Results of the tuning: a table, `tune.json` and a page.
 
 mod json;
 mod page;
@@ -17,52 +17,52 @@ use crate::tune::{IdentifiedCell, Log};
 use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::pi::PiGains;
 
-/// Standard deviations from which a setting of the cell counts as wrong. Derived: P(|z| > 3) is
-/// 0.27 % for a normal deviate.
+/// Deviation of a setting from its estimate above which there is a warning \[standard
+/// deviations\]. Derived: P(|z| > 3) is 0.27 % for a normal deviate.
 const PLAUSIBLE_MISMATCH: f64 = 3.0;
-/// Residual of the robot's response (RMS) that is accepted, as a fraction of the speeds' range.
+/// Largest accepted RMS residual of the robot's response, as a fraction of the range of speeds.
 const MAX_GAIN_RATIO: f64 = 0.1;
-/// Fraction of rejected frames above which the noise is not representative.
+/// Fraction of rejected frames above which the noise estimate is not representative.
 const MANY_REJECTED: f64 = 0.2;
 
-/// An analysed recording with its proposals.
+/// An analysed recording with the proposed settings.
 #[derive(Debug, Clone)]
 pub struct Tuned {
     /// The recording.
     pub recording: String,
     /// The cell that is tuned.
     pub cell: String,
-    /// The recorded run.
+    /// Data of the recorded run.
     pub log: Log,
     /// The identified cell.
     pub plant: IdentifiedCell,
-    /// The proposal.
+    /// The proposed settings.
     pub proposal: Proposal,
     /// Target width \[mm\].
     pub target_mm: f64,
     /// The cell's limits.
     pub limits: SpeedLimits,
-    /// The cell's distance of the camera and its standard deviation now \[mm\].
+    /// Distance of the camera in the cell file and its standard deviation \[mm\].
     pub present_offset_mm: (f64, f64),
-    /// The cell's PI gains now, on the error in mm, with their margins at the worst
-    /// speed.
+    /// PI gains in the cell file for the error in mm, with their margins at the worst speed;
+    /// `None` if it has none.
     pub present_gains: Option<(PiGains, Option<LoopMargins>)>,
-    /// The loop at the speed at which the target is laid.
+    /// The loop at the speed at which the target width is laid.
     pub usual: LoopPlant,
-    /// Predictions for the controllers: the present one where it controls the width, the proposed
-    /// PI controller, the proposed distance controller.
+    /// Predictions for the controllers: the present one if it controls the width, the proposed PI
+    /// controller, the proposed distance controller.
     pub predictions: Vec<BeadPrediction>,
     /// Predictions for the proposed distance controller with a mismatched model.
     pub mismatched: Vec<BeadPrediction>,
     /// Band within which a bead counts as settled \[mm\].
     pub band_mm: f64,
-    /// Where the flow steps in the simulated beads \[mm\].
+    /// Path at which the flow steps in the simulated beads \[mm\].
     pub step_at_mm: f64,
 }
 
 impl Tuned {
-    /// Proposes settings for the identified cell, and simulates beads with them. Fails where the
-    /// cell cannot be simulated.
+    /// Proposes settings for the identified cell, and simulates beads with them. Fails if the cell
+    /// cannot be simulated.
     pub fn of(
         recording: String,
         cell_name: String,
@@ -101,7 +101,7 @@ impl Tuned {
         })
     }
 
-    /// Warnings before anything of this is used.
+    /// Warnings for the user of the proposed settings.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         warnings
@@ -187,8 +187,8 @@ impl Tuned {
             .then(|| format!("the cell has offset_mm = {now}, {off:.1} mm from what was found"))
     }
 
-    /// Lines of a cell file that were found: table, key and value. `unit_mm` is the
-    /// cell's `error_unit_mm`.
+    /// Proposed settings of the cell file: table, key and value. `unit_mm` is the cell's
+    /// `error_unit_mm`.
     pub fn settings(
         &self,
         by_distance: bool,
@@ -209,7 +209,7 @@ impl Tuned {
         settings
     }
 
-    /// The drift in words.
+    /// The estimated drift, or its upper limit, in words.
     fn drift_words(&self) -> String {
         match self.plant.width_noise.drift {
             Drift::Estimated { per_root_m, low, high } => format!(
@@ -225,13 +225,13 @@ impl Tuned {
     }
 }
 
-/// Speed at which the target is laid, within limits \[mm/s\].
+/// Speed at which the target width is laid, clamped to the limits \[mm/s\].
 fn speed_within(plant: &IdentifiedCell, target_mm: f64, limits: &SpeedLimits) -> f64 {
     let (min, max) = (limits.min_speed.get().max(1.0), limits.max_speed.get());
     plant.speed_for(target_mm).max(min).min(max)
 }
 
-/// Rounded to so many significant digits.
+/// Rounded to `digits` significant digits.
 fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
 }

@@ -1,4 +1,5 @@
-//! The page of a cell's calibration: its standard deviation over the image, with the gauge.
+//! The page of a cell's calibration: relative standard deviation of a width over the image, with
+//! the gauge.
 
 use maud::html;
 
@@ -7,20 +8,20 @@ use crate::calibration::relative_sigma_map::RelativeSigmaMap;
 use crate::core::Roi;
 use crate::report::html::titled_page;
 
-/// What the page is made of.
+/// Data of the page.
 #[derive(Debug)]
 pub struct CellCalibrationPage<'a> {
     /// The cell file.
     pub cell: &'a str,
-    /// Calibration and surface in words.
+    /// Description of calibration and surface.
     pub calibration: &'a str,
     /// Relative standard deviation of a width over the image.
     pub map: &'a RelativeSigmaMap,
     /// The gauge.
     pub gauge: Roi,
-    /// The same in the middle of the gauge, as a fraction of the width.
+    /// Relative standard deviation of a width in the middle of the gauge; `None` if it is unknown.
     pub in_gauge: Option<f64>,
-    /// First column and row, last column and row between which boards were seen \[px\].
+    /// Area in which boards were seen: first column and row, last column and row \[px\].
     pub covered_px: Option<[f64; 4]>,
 }
 
@@ -58,7 +59,7 @@ impl CellCalibrationPage<'_> {
     }
 }
 
-/// First column and row, last column and row of a gauge, with the pixels' own width
+/// First column and row, last column and row of a gauge, including the extent of its outer pixels
 /// \[px\].
 #[expect(clippy::cast_precision_loss, reason = "pixels of an image")]
 fn corners_px(gauge: Roi) -> [f64; 4] {

@@ -8,9 +8,9 @@ use crate::calibration::width_map::{Cells, MAP_CELLS, WidthMap};
 use crate::numeric::rank;
 use crate::report::chart::palette::{GAUGE, Ink, LEFT_EDGE, LIMIT, REJECTED, WIDTH};
 
-/// Width of a drawing on the page \[units of its own\].
+/// Width of a drawing \[px of the drawing\].
 const WIDE: f64 = 960.0;
-/// Margins at the left and at the bottom for the axes \[units of its own\].
+/// Margins at the left and at the bottom for the axes \[px of the drawing\].
 const MARGIN: (f64, f64) = (52.0, 44.0);
 /// Length at which the median residual is drawn, as a fraction of a square's side.
 const DRAWN: f64 = 0.15;
@@ -61,7 +61,7 @@ impl Drawing {
         }
     }
 
-    /// A bar for the typical and the largest error, each as a fraction of the longest bar.
+    /// A bar that shows the typical and the largest error as fractions of its full length.
     pub fn bar(typical: f64, largest: f64) -> Markup {
         let (long, high) = BAR;
         let part = |part: f64| round(long * part.clamp(0.0, 1.0));
@@ -74,7 +74,7 @@ impl Drawing {
     }
 }
 
-/// Round numbers of pixels along a side.
+/// Round pixel numbers along a side.
 fn ticks(side: f64) -> Vec<f64> {
     let steps = [20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0];
     let step = steps.into_iter().find(|step| side / step <= 9.0).unwrap_or(5000.0);
@@ -85,7 +85,7 @@ fn round(value: f64) -> f64 {
     (value * 10.0).round() / 10.0
 }
 
-/// Magnification at which residuals are drawn, so that they can be seen.
+/// Magnification with which the residuals are visible.
 pub fn magnification(solution: &Solution) -> f64 {
     let mut lengths_px: Vec<f64> = solution
         .views
@@ -94,12 +94,12 @@ pub fn magnification(solution: &Solution) -> f64 {
         .collect();
     let median = rank::median(&mut lengths_px).unwrap_or(1.0).max(1e-6);
     let times = DRAWN * typical_side(solution) / median;
-    // A round number is easier to divide by.
+    // Rounded down to one digit.
     let power = 10_f64.powf(times.log10().floor());
     (times / power).floor().max(1.0) * power
 }
 
-/// Distance of neighbouring corners of a row, in the median of all \[px\].
+/// Median distance of neighbouring corners in a row \[px\].
 fn typical_side(solution: &Solution) -> f64 {
     let neighbours = |view: &BoardView| -> Vec<f64> {
         let pairs = view.corners.windows(2).filter(|pair| pair[0].index + 1 == pair[1].index);
@@ -109,7 +109,7 @@ fn typical_side(solution: &Solution) -> f64 {
     rank::median(&mut sides).unwrap_or(10.0)
 }
 
-/// Every corner with its residual: from the expected to the observed position.
+/// The residual of every corner: from the expected to the observed position, magnified.
 pub fn residuals(solution: &Solution, times: f64) -> Markup {
     let drawing = Drawing::of(solution.image_size_px);
     let corners =
@@ -152,8 +152,8 @@ pub fn width_map(solution: &Solution, map: &WidthMap) -> Markup {
     )
 }
 
-/// Relative standard deviation of a width, cell by cell, with the gauge and the area where
-/// boards were seen.
+/// Relative standard deviation of a width, cell by cell, with the gauge and the area where boards
+/// were seen.
 pub fn sigma_map(map: &RelativeSigmaMap, gauge_px: [f64; 4], seen_px: Option<[f64; 4]>) -> Markup {
     let drawing = Drawing::of(map.image_size_px);
     drawing.svg(
@@ -167,7 +167,7 @@ pub fn sigma_map(map: &RelativeSigmaMap, gauge_px: [f64; 4], seen_px: Option<[f6
 }
 
 impl Drawing {
-    /// Cells, darker for larger values, each with its value in words.
+    /// Cells, darker for larger values, each with its value as text.
     fn cells(
         self,
         cells: &[Option<f64>],
@@ -192,7 +192,7 @@ impl Drawing {
         }
     }
 
-    /// A part of the image: first column and row, last column and row \[px\].
+    /// A rectangle in the image: first column and row, last column and row \[px\].
     fn frame(self, [left, top, right, bottom]: [f64; 4], ink: Ink, is_dashed: bool) -> Markup {
         let (x, y) = (self.x(left), self.y(top));
         let (width, height) = (round(self.x(right) - x), round(self.y(bottom) - y));
@@ -204,7 +204,7 @@ impl Drawing {
     }
 }
 
-/// Two significant digits.
+/// A number with two significant digits.
 fn short(mm: f64) -> String {
     let places = if mm < 0.001 {
         5

@@ -10,14 +10,14 @@ use super::range::ValueRange;
 pub struct XAxis {
     /// Its quantity, with its unit.
     pub title: String,
-    /// Smallest and largest value, before the division.
+    /// Smallest and largest value, before division by `divisor`.
     pub range: ValueRange,
-    /// Values are divided by this for the ticks.
+    /// Divisor of the values at the ticks.
     pub divisor: f64,
 }
 
 impl XAxis {
-    /// Time \[s\], in minutes or hours where it is long.
+    /// Time \[s\]; in minutes or hours for a long range.
     pub fn time(range: ValueRange) -> Self {
         let (unit, divisor) = match range.length() {
             long if long > 7200.0 => ("h", 3600.0),
@@ -27,12 +27,12 @@ impl XAxis {
         Self { title: format!("time [{unit}]"), range, divisor }
     }
 
-    /// Frames by their number.
+    /// Numbers of frames.
     pub fn frames(range: ValueRange) -> Self {
         Self { title: "frame".to_string(), range, divisor: 1.0 }
     }
 
-    /// Path length \[mm\], in metres where it is long.
+    /// Path length \[mm\]; in metres for a long range.
     pub fn path(range: ValueRange) -> Self {
         let (unit, divisor) = if range.length() > 10_000.0 { ("m", 1000.0) } else { ("mm", 1.0) };
         Self { title: format!("distance along the path [{unit}]"), range, divisor }
@@ -63,12 +63,12 @@ pub const LEFT: f64 = 62.0;
 const RIGHT: f64 = 14.0;
 
 impl Area {
-    /// A plot across the page.
+    /// A plot with the width of the page.
     pub const fn wide(height: f64) -> Self {
         Self { width: 1080.0, height, top: 26.0, bottom: 42.0 }
     }
 
-    /// A plot across half the page.
+    /// A plot with half the width of the page.
     pub const fn half(height: f64) -> Self {
         Self { width: 530.0, height, top: 26.0, bottom: 42.0 }
     }
@@ -83,7 +83,7 @@ impl Area {
         PageExtent { from: self.height - self.bottom, to: self.top }
     }
 
-    /// The x axis on this area.
+    /// Map from values to x positions on this area.
     pub fn x(&self, axis: &XAxis) -> impl Fn(f64) -> f64 + use<> {
         let scale = axis.scale(self.across());
         let divisor = axis.divisor;
@@ -100,7 +100,7 @@ impl Area {
         )
     }
 
-    /// The same for ticks of another scale.
+    /// Vertical grid lines and labels for other ticks and another scale.
     pub fn vertical_grid(&self, ticks: &[(f64, String)], scale: &AxisScale, title: &str) -> Markup {
         let PageExtent { from: bottom, to: top } = self.upwards();
         let PageExtent { from: left, to: right } = self.across();
@@ -130,7 +130,7 @@ impl Area {
         }
     }
 
-    /// The drawing around its content.
+    /// The complete drawing with this content.
     pub fn svg(&self, label: &str, inner: &Markup) -> Markup {
         html! {
             svg viewBox=(format!("0 0 {} {}", self.width, self.height)) role="img" aria-label=(label) {
@@ -139,7 +139,7 @@ impl Area {
         }
     }
 
-    /// Draws only what lies within the grid.
+    /// Clips the content to the grid.
     pub fn clipped(&self, inner: &Markup) -> Markup {
         let PageExtent { from: left, to: right } = self.across();
         let PageExtent { from: bottom, to: top } = self.upwards();
@@ -151,7 +151,7 @@ impl Area {
     }
 }
 
-/// A position on the page with one decimal, which is finer than can be seen.
+/// A position rounded to one decimal; smaller differences are not visible.
 pub fn round(position: f64) -> f64 {
     (position * 10.0).round() / 10.0 + 0.0
 }

@@ -2,13 +2,13 @@
 
 use super::range::ValueRange;
 
-/// Where an axis begins and ends on the page \[px of the drawing\]; upwards it begins at
-/// the larger number.
+/// Start and end of an axis on the page \[px of the drawing\]; on a y axis the start is the larger
+/// number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PageExtent {
-    /// Where its smallest value stands.
+    /// Position of the smallest value.
     pub from: f64,
-    /// Where its largest value stands.
+    /// Position of the largest value.
     pub to: f64,
 }
 
@@ -23,14 +23,14 @@ pub struct AxisScale {
 }
 
 impl AxisScale {
-    /// Values onto a part of the page. A range without extent is widened.
+    /// A linear map from values to a part of the page. A range of length 0 is widened.
     pub fn linear(values: ValueRange, page: PageExtent) -> Self {
         let (low, high) = widened(values.min, values.max);
         let PageExtent { from, to } = page;
         Self { low, high, from, to, log: false }
     }
 
-    /// The same for positive values on a logarithmic axis.
+    /// A logarithmic map from positive values to a part of the page.
     pub fn log(values: ValueRange, page: PageExtent) -> Self {
         let low = values.min.max(1e-9);
         let high = if values.max > low { values.max } else { low * 2.0 };
@@ -48,8 +48,7 @@ impl AxisScale {
         self.from + fraction * (self.to - self.from)
     }
 
-    /// Round values within the range, about `wanted` of them, with their
-    /// labels.
+    /// About `wanted` round values within the range, with their labels.
     pub fn ticks(&self, wanted: u32) -> Vec<(f64, String)> {
         if self.log { self.log_ticks() } else { self.linear_ticks(wanted) }
     }
@@ -101,7 +100,7 @@ fn widened(low: f64, high: f64) -> (f64, f64) {
     }
 }
 
-/// 1, 2 or 5 times a power of ten, not below `rough`.
+/// The smallest of 1, 2 or 5 times a power of ten that is not below `rough`.
 fn round_step(rough: f64) -> f64 {
     let power = 10_f64.powf(rough.max(1e-12).log10().floor());
     let factor = rough / power;
@@ -109,7 +108,7 @@ fn round_step(rough: f64) -> f64 {
     power * round.unwrap_or(10.0)
 }
 
-/// Decimals that a step of this size needs.
+/// Number of decimals for values in steps of this size.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=9")]
 fn decimals(step: f64) -> usize {
     (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize

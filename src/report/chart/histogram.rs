@@ -9,10 +9,10 @@ use super::range::ValueRange;
 use crate::numeric::number::to_f64;
 use crate::numeric::statistics::Distribution;
 
-/// Bars per factor of two, which trades resolution against noise of the counts.
+/// Bars per factor of two: more give a finer resolution, but noisier counts.
 const BARS_PER_OCTAVE: usize = 8;
 
-/// Bars of counts over milliseconds, with lines at the median and at 99 %.
+/// Counts over milliseconds as bars, with lines at the median and the 99 % quantile.
 pub fn draw(latencies: &Distribution) -> Markup {
     let bars = latencies.bars(BARS_PER_OCTAVE);
     let (Some(first), Some(last)) = (bars.first(), bars.last()) else { return html! {} };

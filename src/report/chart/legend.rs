@@ -6,10 +6,10 @@ use super::palette::{self, Ink};
 use super::series::PlotCurve;
 use super::strip::Strip;
 
-/// Name, colour and kind of line ("", "dash", "area", "block" or "dot").
+/// Name, colour and kind of mark ("", "dash", "area", "block" or "dot").
 pub type LegendEntry<'a> = (&'a str, Ink, &'a str);
 
-/// All of the entries.
+/// A legend of all entries.
 pub fn legend(entries: &[LegendEntry<'_>]) -> Markup {
     html! {
         div.legend { @for (name, ink, kind) in entries {
@@ -19,13 +19,13 @@ pub fn legend(entries: &[LegendEntry<'_>]) -> Markup {
     }
 }
 
-/// The entries whose series has something to draw.
+/// The entries whose series has points.
 pub fn drawn<'a>(entries: &[(&PlotCurve, LegendEntry<'a>)]) -> Vec<LegendEntry<'a>> {
     let drawn = entries.iter().filter(|(series, _)| !series.is_empty());
     drawn.map(|(_, entry)| *entry).collect()
 }
 
-/// The states that a strip shows, and whether a limit acted.
+/// A legend of the states in a strip, and of the limit if one acted.
 pub fn of_strips(names: &[&'static str], states: &Strip, limits: &Strip) -> Markup {
     let shown = |name: &str| states.segments().iter().any(|segment| segment.mark.name == name);
     let drawn = names.iter().filter(|name| shown(name));
@@ -37,7 +37,7 @@ pub fn of_strips(names: &[&'static str], states: &Strip, limits: &Strip) -> Mark
     legend(&entries)
 }
 
-/// Whether a strip shows anything worth drawing.
+/// Whether a strip has a mark with a severity above 0.
 pub fn has_marks(strip: &Strip) -> bool {
     strip.segments().iter().any(|segment| segment.mark.severity > 0)
 }

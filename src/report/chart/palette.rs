@@ -7,8 +7,7 @@ use std::fmt::Write as _;
 /// A colour as red, green and blue.
 pub type Rgb = [u8; 3];
 
-/// Something that is drawn, with its name in the style sheet and its colour on
-/// a light and on a dark page.
+/// The colour of a quantity, with its name in the style sheet, for light and dark pages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ink {
     /// Name of the style sheet's variable.
@@ -23,13 +22,13 @@ const fn ink(name: &'static str, light: Rgb, dark: Rgb) -> Ink {
     Ink { name, light, dark }
 }
 
-/// The measured width, and what is derived from it.
+/// The measured width, and quantities that follow from it.
 pub const WIDTH: Ink = ink("width", [0, 114, 178], [76, 172, 226]);
 /// Target values.
 pub const TARGET: Ink = ink("target", [40, 44, 52], [224, 228, 236]);
 /// Speed that the robot reports.
 pub const SPEED: Ink = ink("speed", [120, 28, 86], [226, 130, 190]);
-/// Setpoint that was sent.
+/// Last setpoint.
 pub const SETPOINT: Ink = ink("setpoint", [204, 121, 167], [156, 86, 134]);
 /// Demand of the controller before the limiter.
 pub const DEMAND: Ink = ink("demand", [150, 150, 158], [128, 132, 142]);
@@ -43,11 +42,11 @@ pub const FLOW: Ink = ink("flow", [0, 138, 140], [64, 196, 196]);
 pub const PRESSURE: Ink = ink("pressure", [92, 72, 168], [160, 146, 230]);
 /// Speed of a screw or of a wheel, and other commands of an extruder.
 pub const SCREW: Ink = ink("screw", [150, 94, 40], [206, 152, 98]);
-/// Length of a screw that is filled.
+/// Filled length of a screw.
 pub const FILLED: Ink = ink("filled", [82, 84, 116], [166, 168, 202]);
 /// Predictions of a model, in contrast to the data under them.
 pub const MODEL: Ink = ink("model", [176, 16, 48], [255, 128, 128]);
-/// The method of a paper, beside this program's.
+/// The method of a paper, next to this program's.
 pub const PAPER: Ink = ink("paper", [213, 94, 0], [236, 122, 38]);
 /// This program's best method.
 pub const OURS: Ink = ink("ours", [0, 114, 178], [76, 172, 226]);
@@ -59,7 +58,7 @@ pub const PRIMING: Ink = ink("priming", [86, 180, 233], [86, 180, 233]);
 pub const TRACKING: Ink = ink("tracking", [0, 158, 115], [0, 158, 115]);
 /// The pump was stopped before the end of the bead; the remaining flow fills it.
 pub const ENDING: Ink = ink("ending", [148, 190, 84], [148, 190, 84]);
-/// The speed is kept.
+/// The speed is held.
 pub const HOLDING: Ink = ink("holding", [230, 159, 0], [230, 159, 0]);
 /// The controller stopped with a fault.
 pub const FAULT: Ink = ink("fault", [213, 94, 0], [236, 94, 20]);
@@ -70,7 +69,7 @@ pub const RIGHT_EDGE: Ink = ink("right-edge", [240, 228, 66], [240, 228, 66]);
 /// The gauge in an image.
 pub const GAUGE: Ink = ink("gauge", [0, 158, 115], [0, 158, 115]);
 
-/// Controllers beside each other, in order.
+/// Colours of compared controllers, in order.
 pub const CONTROLLERS: [Ink; 6] = [PAPER, OURS, TRACKING, SETPOINT, LIMIT, FILLED];
 
 const ALL: [Ink; 23] = [
@@ -79,14 +78,14 @@ const ALL: [Ink; 23] = [
 ];
 
 impl Ink {
-    /// Its value in an inline style or an attribute.
+    /// Its value for an inline style or an attribute.
     pub fn css(self) -> String {
         format!("var(--{})", self.name)
     }
 }
 
-/// The colour of a state of the controller or of its extruder side, by its
-/// name; none of another name.
+/// The colour of a state of the controller or of the extruder side, by its name; `None` for other
+/// names.
 pub fn state(name: &str) -> Option<Ink> {
     let name = match name {
         "off" => "idle",

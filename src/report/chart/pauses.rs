@@ -13,14 +13,14 @@ use super::series::CurvePoint;
 /// Ticks of the axis \[s\].
 const TICKS_S: [f64; 9] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0];
 
-/// A layer over pauses \[s\], in the order of their length.
+/// A layer over pauses \[s\], sorted by length.
 #[derive(Debug)]
 pub enum PauseLayer<'a> {
     /// A curve from point to point.
     Curve(&'a [CurvePoint], Ink),
-    /// The same, and each point.
+    /// A curve from point to point, with its points.
     Marked(&'a [CurvePoint], Ink),
-    /// Points alone.
+    /// Points without a curve.
     Points(&'a [CurvePoint], Ink),
 }
 
@@ -32,7 +32,7 @@ impl PauseLayer<'_> {
     }
 }
 
-/// The drawing; values begin at zero.
+/// The drawing; the y axis begins at zero.
 pub fn over_pauses(area: Area, y_title: &str, layers: &[PauseLayer<'_>]) -> Markup {
     let all = || layers.iter().flat_map(PauseLayer::points);
     let longest_s = all().map(|(idle_s, _)| *idle_s).fold(1.0, f64::max);

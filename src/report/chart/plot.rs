@@ -15,11 +15,11 @@ use super::series::{CurvePoint, PlotCurve, unbroken};
 pub enum PlotLayer<'a> {
     /// A curve from sample to sample.
     Curve(&'a PlotCurve, Ink),
-    /// A pale curve of noisy data, for another to be seen over it.
+    /// A pale curve of noisy data, as background of another curve.
     Data(&'a PlotCurve, Ink),
-    /// A thin dashed curve, for a demand rather than an action.
+    /// A thin dashed curve for a demand.
     Demand(&'a PlotCurve, Ink),
-    /// A value that holds until the next one.
+    /// A curve of steps: each value holds until the next one.
     Stairs(&'a PlotCurve, Ink),
     /// The area between the envelopes of two series.
     Band(&'a PlotCurve, &'a PlotCurve, Ink),
@@ -27,23 +27,23 @@ pub enum PlotLayer<'a> {
     Level(f64, Ink, &'a str),
 }
 
-/// A plot that is ready to be drawn.
+/// A complete plot.
 #[derive(Debug)]
 pub struct Plot<'a> {
-    /// Its size on the page.
+    /// Its size on the page, with margins.
     pub area: Area,
     /// Its x axis.
     pub x: &'a XAxis,
     /// The quantity of the y axis, with its unit.
     pub y_title: &'a str,
-    /// Smallest and largest value; see [`y_range`].
+    /// Smallest and largest y value; see [`y_range`].
     pub y_range: ValueRange,
-    /// What is drawn, the lowest first.
+    /// The layers; the first is drawn first.
     pub layers: Vec<PlotLayer<'a>>,
 }
 
-/// A plot across the page, with its height \[px of the drawing\] and its layers, the lowest
-/// first.
+/// A plot with the width of the page, from its height \[px of the drawing\] and its layers; the
+/// first is drawn first.
 pub fn wide_plot(
     x: &XAxis,
     y_title: &str,
@@ -154,8 +154,8 @@ fn stairs(points: &[CurvePoint], position: impl Fn(&CurvePoint) -> CurvePoint) -
     path
 }
 
-/// The two series are fed together, so their envelopes have the same x; the
-/// outline breaks where the lower one does.
+/// Both series get the same samples, so their envelopes have the same x. The outline breaks where
+/// the lower one breaks.
 fn outline(
     low: &[CurvePoint],
     high: &[CurvePoint],

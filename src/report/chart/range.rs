@@ -1,4 +1,4 @@
-//! From the smallest to the largest of some values.
+//! The range of some values.
 
 /// A range of values.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,7 +15,7 @@ impl ValueRange {
         Self { min, max }
     }
 
-    /// The one that holds both.
+    /// The smallest range that contains both.
     #[must_use]
     pub fn joined(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
@@ -26,7 +26,7 @@ impl ValueRange {
         self.max - self.min
     }
 
-    /// With a margin of this fraction of its length on both sides.
+    /// The range with an additional margin on both sides, as a fraction of its length.
     #[must_use]
     pub fn with_margin(self, fraction: f64) -> Self {
         let margin = self.length() * fraction;

@@ -1,16 +1,16 @@
-//! A curve of any length in bounded memory: neighbouring samples share a
-//! bucket that keeps their smallest and their largest, so that no spike is
-//! lost.
+//! A curve of any length in bounded memory: neighbouring samples share a bucket, which keeps the
+//! smallest and the largest, so that no spike is lost.
 
 use super::range::ValueRange;
 
 /// A point of a curve, in the units of its axes.
 pub type CurvePoint = (f64, f64);
 
-/// Largest number of buckets; each gives up to two points, more than a page has pixels across.
+/// Largest number of buckets; each gives up to two points, together more than a page has pixels
+/// across.
 const MAX_BUCKETS: usize = 1000;
 
-/// The extremes of some neighbouring samples.
+/// The extremes of neighbouring samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Bucket {
     low: CurvePoint,
@@ -36,7 +36,7 @@ impl Bucket {
     }
 }
 
-/// Samples in their order, thinned by doubling the size of the buckets.
+/// Samples in order, thinned by doubling the size of the buckets.
 #[derive(Debug, Clone)]
 pub struct PlotCurve {
     buckets: Vec<Bucket>,
@@ -50,8 +50,8 @@ impl Default for PlotCurve {
 }
 
 impl PlotCurve {
-    /// Takes a sample; one that is not finite is left out. Where x falls, as a path does with a new
-    /// bead, a new bucket begins.
+    /// Adds a sample; values that are not finite are ignored. If x decreases, as a path does with
+    /// a new bead, a new bucket begins.
     pub fn push(&mut self, x: f64, y: f64) {
         if !(x.is_finite() && y.is_finite()) {
             return;
@@ -73,7 +73,7 @@ impl PlotCurve {
         }
     }
 
-    /// Whether there is nothing to draw.
+    /// Whether it has no point.
     pub fn is_empty(&self) -> bool {
         self.buckets.is_empty()
     }
@@ -93,17 +93,17 @@ impl PlotCurve {
         points
     }
 
-    /// The smallest of every bucket, at its middle.
+    /// The smallest value of every bucket, at its middle.
     pub fn lower_envelope(&self) -> Vec<CurvePoint> {
         self.buckets.iter().map(|b| (f64::midpoint(b.first_x, b.last_x), b.low.1)).collect()
     }
 
-    /// The largest of every bucket, at its middle.
+    /// The largest value of every bucket, at its middle.
     pub fn upper_envelope(&self) -> Vec<CurvePoint> {
         self.buckets.iter().map(|b| (f64::midpoint(b.first_x, b.last_x), b.high.1)).collect()
     }
 
-    /// Smallest and largest value.
+    /// Smallest and largest value; `None` without points.
     pub fn range(&self) -> Option<ValueRange> {
         self.buckets
             .iter()
@@ -111,7 +111,7 @@ impl PlotCurve {
             .reduce(ValueRange::joined)
     }
 
-    /// Smallest and largest x.
+    /// Smallest and largest x; `None` without points.
     pub fn extent(&self) -> Option<ValueRange> {
         self.buckets
             .iter()
@@ -120,14 +120,13 @@ impl PlotCurve {
     }
 }
 
-/// Where points that belong together end: the curve breaks where x falls or
-/// leaps over five times its usual step.
+/// Splits points where the curve breaks: x decreases, or increases by more than five times its
+/// usual step.
 pub fn unbroken(points: &[CurvePoint]) -> Vec<&[CurvePoint]> {
     let mut steps: Vec<f64> =
         points.windows(2).map(|pair| pair[1].0 - pair[0].0).filter(|step| *step > 0.0).collect();
     steps.sort_by(f64::total_cmp);
-    // The two extremes of a bucket may lie close together, so the usual step
-    // is looked for among the larger ones.
+    // The two extremes of a bucket may be close together, so the usual step is the upper quartile.
     let leap = steps.get(steps.len() * 3 / 4).map_or(f64::INFINITY, |step| step * 5.0);
     points
         .chunk_by(|a, b| (0.0..=leap).contains(&(b.0 - a.0)))
@@ -135,7 +134,7 @@ pub fn unbroken(points: &[CurvePoint]) -> Vec<&[CurvePoint]> {
         .collect()
 }
 
-/// Points as a curve that can be drawn.
+/// Collects points into a curve.
 impl FromIterator<CurvePoint> for PlotCurve {
     fn from_iter<I: IntoIterator<Item = CurvePoint>>(points: I) -> Self {
         let mut series = Self::default();

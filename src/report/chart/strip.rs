@@ -1,21 +1,22 @@
-//! States, limits or rejected frames over time, in bounded memory. Where the mark changes too fast
-//! to be drawn, the more severe one is kept.
+//! States, limits or rejected frames over time, in bounded memory. If marks change too fast to be
+//! drawn, the most severe one is kept.
 
-/// Segments that are kept before short ones are merged.
+/// Number of segments above which short ones are merged.
 const MAX_SEGMENTS: usize = 2000;
-/// Segments of equal length that short ones are merged into; at most about twice as many remain.
+/// Number of equal parts into which short segments are merged; at most about twice as many
+/// segments remain.
 const MERGED_SEGMENTS: f64 = 750.0;
 
-/// What holds; the higher severity wins where both cannot be drawn.
+/// A state, a limit or a rejection. Of several that cannot all be drawn, the most severe is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Mark {
-    /// 0 is nothing worth drawing.
+    /// Severity; 0 is not drawn.
     pub severity: u8,
     /// Its name.
     pub name: &'static str,
 }
 
-/// A segment over which a mark holds.
+/// A segment with one mark.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StripSegment {
     /// Start.
@@ -26,14 +27,14 @@ pub struct StripSegment {
     pub mark: Mark,
 }
 
-/// Consecutive segments.
+/// Consecutive segments of marks.
 #[derive(Debug, Clone, Default)]
 pub struct Strip {
     segments: Vec<StripSegment>,
 }
 
 impl Strip {
-    /// From `x` on this mark holds. An x that falls counts as the last one.
+    /// Sets the mark from `x` on. If `x` decreases, the last x is used.
     pub fn push(&mut self, x: f64, mark: Mark) {
         if !x.is_finite() {
             return;

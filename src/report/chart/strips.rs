@@ -12,18 +12,19 @@ use crate::rows::names::in_words;
 const ROW_HEIGHT: f64 = 20.0;
 /// Gap between strips \[px of the drawing\].
 const GAP: f64 = 8.0;
-/// Smallest width of a segment \[px of the drawing\], so that one frame among thousands is seen.
+/// Smallest width of a segment \[px of the drawing\], so that one frame among thousands is
+/// visible.
 const MIN_WIDTH: f64 = 1.6;
 /// Approximate width of a letter of the labels \[px of the drawing\].
 const LETTER_WIDTH: f64 = 6.6;
 
-/// One strip with its name and the colour of each segment; a segment without one is not drawn.
+/// A strip with its name and the colours of its marks; marks without a colour are not drawn.
 pub struct StripRow<'a> {
-    /// Name at the left.
+    /// Name at its left.
     pub name: &'a str,
-    /// What is drawn.
+    /// The segments.
     pub strip: &'a Strip,
-    /// Colour of a mark's name.
+    /// Colour of a mark, by its name.
     pub ink: fn(&str) -> Option<Ink>,
 }
 

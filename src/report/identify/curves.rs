@@ -13,11 +13,11 @@ use crate::report::chart::{
     Area, AxisScale, PlotCurve, PlotLayer, ValueRange, XAxis, legend, wide_plot, y_range,
 };
 
-/// Points of a curve of the model.
+/// Number of points of a model's curve.
 const POINTS: u32 = 400;
 /// Half width of a band \[standard deviations\]. Derived: P(|z| < 2) is 95 % for a normal deviate.
 const WIDE: f64 = 2.0;
-/// Colour of residuals, which belong neither to the model nor to the data.
+/// Colour of residuals.
 const LEFT: Ink = DEMAND;
 
 /// Colour of a quantity, by its unit.
@@ -66,8 +66,8 @@ pub fn residuals(study: &ModelStudy) -> Markup {
     wide_plot(&axis, &title, 170.0, y_range(&[&left], &[0.0]), layers)
 }
 
-/// Autocorrelation of the residuals from lag 1 on. At lag 0 it is always 1, and the other
-/// values would be drawn too small beside that.
+/// Autocorrelation of the residuals from lag 1 on. At lag 0 it is always 1, on a scale at which
+/// the other values would be too small.
 pub fn autocorrelation(study: &ModelStudy) -> Markup {
     let step_s = study.logs.estimation.step_s;
     let lags = &study.residuals.coefficients;
@@ -88,7 +88,7 @@ pub fn autocorrelation(study: &ModelStudy) -> Markup {
     wide_plot(&axis, "autocorrelation of the residuals", 210.0, y_range, layers)
 }
 
-/// The response to a step of one unit, with its band.
+/// The response to a unit step, with its uncertainty band.
 pub fn step(study: &ModelStudy) -> Markup {
     let fit = &study.fit;
     let end_s = fit.model.dead_time_s() + 7.0 * study.slowest_s();
@@ -128,8 +128,8 @@ pub fn bode(study: &ModelStudy) -> Markup {
     }
 }
 
-/// Frequencies \[Hz\] from one period in the whole record to well beyond the fastest pole, but
-/// not beyond the Nyquist frequency of the samples.
+/// Frequencies \[Hz\] from one period in the whole record to well above the fastest pole, at most
+/// the Nyquist frequency of the samples.
 fn frequencies(study: &ModelStudy) -> Vec<f64> {
     let data = &study.logs.estimation;
     let poles = study.fit.model.poles();

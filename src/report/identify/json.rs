@@ -6,7 +6,7 @@ use super::model::{ModelStudy, form};
 use crate::identify::experiment::Experiment;
 use crate::identify::fit::{ComparedModel, FitQuality};
 
-/// Everything but the curves.
+/// All results without the curves.
 pub fn to_json(study: &ModelStudy) -> Value {
     let logs = &study.logs;
     let fit = &study.fit;

@@ -15,9 +15,9 @@ pub struct Logs {
     pub output: Quantity,
     /// The data's source.
     pub source: String,
-    /// What the model is fitted to.
+    /// The data to which the model is fitted.
     pub estimation: Experiment,
-    /// Validation data and their source.
+    /// Validation data and their source; `None` without validation.
     pub validation: Option<(Experiment, String)>,
     /// Whether the logs begin at rest.
     pub from_rest: bool,
@@ -32,17 +32,17 @@ pub struct ModelStudy {
     pub comparison: ModelComparison,
     /// The chosen model.
     pub fit: Fit,
-    /// Its fit to the validation data.
+    /// Its fit to the validation data; `None` without validation.
     pub validation: Option<FitQuality>,
-    /// Its prediction of the validation data.
+    /// Its prediction of the validation data; `None` without validation.
     pub predicted: Option<Vec<f64>>,
     /// Autocorrelation of the residuals.
     pub residuals: Autocorrelation,
-    /// What the reader should know before the model is used.
+    /// Warnings for the user of the model.
     pub warnings: Vec<String>,
 }
 
-/// The word for a form, as the command line takes it.
+/// The name of a form, as on the command line.
 pub fn form(structure: Structure) -> String {
     let zero = |zero| if zero { "-zero" } else { "" };
     match structure {
@@ -61,7 +61,7 @@ impl ModelStudy {
         1.0 / slowest
     }
 
-    /// The model as it is saved in a file.
+    /// The model in the form for a file.
     pub fn model(&self, setting: Conditions) -> ModelFile {
         let fit = &self.fit;
         let input = &self.logs.estimation.input;
@@ -82,7 +82,7 @@ impl ModelStudy {
             transfer: fit.model.clone(),
             uncertainty: Some(ParameterUncertainty {
                 parameters: parameters.collect(),
-                // Symmetric, so that rows are columns.
+                // The matrix is symmetric: its columns are its rows.
                 covariance: fit.covariance.iter().copied().collect(),
             }),
             fit: Some(model_file::FitSummary {

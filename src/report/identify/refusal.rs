@@ -3,37 +3,37 @@
 use crate::identify::fit::SamplesError;
 use crate::identify::output_lead::OutputLead;
 
-/// No model is accepted.
+/// Why no model is accepted.
 #[derive(Debug, thiserror::Error)]
 pub enum NoModel {
-    /// The data.
+    /// The data are not suitable.
     #[error(transparent)]
     Data(#[from] SamplesError),
-    /// None of the forms.
+    /// No form is accepted.
     #[error("no model can be trusted:{}{}", lines(.forms), drift_line(.drift.as_ref()))]
     None {
-        /// Each form, and why it is none.
+        /// Each form, and why it is not accepted.
         forms: Vec<(String, String)>,
-        /// Sentence about a drifting output.
+        /// Sentence about a drift of the output, if there is one.
         drift: Option<String>,
     },
-    /// It does not predict other data.
+    /// The model does not predict the validation data.
     #[error(
         "the model ({form}, {estimation:.1} % on its own data) does not predict the data to \
          validate with: {validation:.1} %, no better than their mean. Are both of the same machine \
          and material, and is the input the one that moves the output?{}", drift_sentence(.drift.as_ref())
     )]
     PoorPrediction {
-        /// Its form.
+        /// Form of the model.
         form: String,
         /// Fit to its own data \[%\].
         estimation: f64,
-        /// Fit to the others \[%\].
+        /// Fit to the validation data \[%\].
         validation: f64,
-        /// Sentence about a drifting output.
+        /// Sentence about a drift of the output, if there is one.
         drift: Option<String>,
     },
-    /// It follows a drift of the output.
+    /// The model follows a drift of the output.
     #[error(
         "the output drifts: the gain of the model ({form}) is {gain:.4}, but {steady:.4} ± {sigma:.4} \
          once a straight line in time is taken off input and output; what moves the output besides \
@@ -41,16 +41,16 @@ pub enum NoModel {
          (--from-s, --to-s), or take the line out of the log"
     )]
     Drifts {
-        /// Its form.
+        /// Form of the model.
         form: String,
-        /// Its gain.
+        /// Gain of the model.
         gain: f64,
-        /// The gain without the line.
+        /// Gain after removal of a straight line in time.
         steady: f64,
-        /// Standard error of that.
+        /// Standard error of that gain.
         sigma: f64,
     },
-    /// The output moves before the input does.
+    /// The output responds before the input changes.
     #[error(
         "the output answers the input some {:.2} s before it comes: a model that may do so fits to \
          {:.1} %, the best that does not to {:.1} %. Are both on one clock, each sample with the \

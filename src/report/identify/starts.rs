@@ -15,20 +15,20 @@ use crate::identify::start_stop::file::{
 };
 use crate::identify::start_stop::{StartStopFit, StartStopFitError, fit};
 
-/// A standard error above this fraction of a parameter is reported.
+/// Relative standard error of a parameter above which it is reported.
 const LOOSE_FRACTION: f64 = 0.3;
-/// With fewer starts a standard deviation is hardly determined. Derived: its own relative error
-/// is 1/√(2(n − 1)) = 0.27 for n = 8.
+/// Number of starts below which a standard deviation is hardly determined. Derived: its own
+/// relative error is 1/√(2(n − 1)) = 0.27 for n = 8.
 const FEW_STARTS: usize = 8;
 
 /// Logged data with their names.
 #[derive(Debug, Clone)]
 pub struct StartLogs {
-    /// The data's source.
+    /// Where the data came from.
     pub source: String,
     /// The extruder's command.
     pub input: Quantity,
-    /// The flow, as it was logged.
+    /// The flow, in the quantity of the log.
     pub output: Quantity,
     /// The command, in its own unit.
     pub command: TimeSeries,
@@ -36,20 +36,20 @@ pub struct StartLogs {
     pub flow: TimeSeries,
 }
 
-/// Starts and stops with their warnings.
+/// A start-stop model with its warnings.
 #[derive(Debug)]
 pub struct StartStudy {
     /// The data.
     pub logs: StartLogs,
-    /// The parameters, and what they were found from.
+    /// The fitted parameters, and the starts and stops in the data.
     pub fit: StartStopFit,
-    /// The same as a file keeps it.
+    /// The model in the form for a file.
     pub file: StartStopFile,
-    /// Warnings before they are used.
+    /// Warnings for the user of the model.
     pub warnings: Vec<String>,
 }
 
-/// Fits starts and stops. Fails where the data do not determine them.
+/// Fits a start-stop model. Fails if the data do not determine it.
 pub fn study(logs: StartLogs, setting: Conditions) -> Result<StartStudy, StartStopFitError> {
     let fit = fit(&logs.command, &logs.flow)?;
     let file = StartStopFile::of(&fit, setting);
@@ -82,13 +82,13 @@ fn all_warnings(fit: &StartStopFit) -> Vec<String> {
 }
 
 impl StartStudy {
-    /// Starts without information: the first one, whose pause began before the record, and those
-    /// without an even flow after them.
+    /// Number of starts that were not used: the first one, whose pause began before the record,
+    /// and those without a steady flow after them.
     pub const fn left_out(&self) -> usize {
         self.fit.runs.saturating_sub(self.fit.starts.len())
     }
 
-    /// The flow for which delays are given \[mm³/s\].
+    /// The flow at which delays are given \[mm³/s\].
     pub fn flow_mm3_per_s(&self) -> f64 {
         let [low, high] = self.file.data.flow_range_mm3_per_s;
         f64::midpoint(low, high)

@@ -23,7 +23,7 @@ pub fn text(study: &ModelStudy) -> String {
     text
 }
 
-/// A line behind its head.
+/// Adds a line with a heading.
 pub fn put(text: &mut String, head: &str, line: &str) {
     // Writing to a string cannot fail.
     let _ = writeln!(text, "{}", format!("{head:<11}{line}").trim_end());
@@ -131,7 +131,7 @@ pub fn transfer(fit: &Fit) -> String {
         .replace("+ -", "- ")
 }
 
-/// Five significant digits.
+/// A number with five significant digits.
 pub fn significant(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {

@@ -5,10 +5,10 @@ use crate::identify::digits::three_digits;
 use crate::identify::experiment::Experiment;
 use crate::identify::fit::{DOMINANT_FRACTION, Fit, FitNote, Trend};
 
-/// Ratio of the RMS errors on validation data and on its own data above which a model is
-/// reported. Errors are compared and not fits, which grow with the excitation.
+/// Ratio of the RMS errors on validation data and on the model's own data above which there is a
+/// warning. Errors are compared, because fits grow with the excitation.
 const OVERFIT: f64 = 1.25;
-/// A fit below this is reported \[%\].
+/// Fit below which there is a warning \[%\].
 const POOR_PERCENT: f64 = 50.0;
 /// Minimum length of validation data \[slowest time constants\].
 const TIME_CONSTANTS: f64 = 5.0;
@@ -17,7 +17,7 @@ const TIME_CONSTANTS: f64 = 5.0;
 const RECORD_TIME_CONSTANTS: f64 = 3.0;
 
 impl ModelStudy {
-    /// Warnings before the model is used.
+    /// All warnings for the user of the model.
     pub(super) fn all_warnings(&self) -> Vec<String> {
         let mut warnings: Vec<String> =
             self.logs.estimation.notes.iter().map(|note| format!("data: {note}")).collect();
@@ -82,7 +82,7 @@ impl ModelStudy {
         })
     }
 
-    /// A time constant near the length of the record may be a drift.
+    /// Warning of a time constant near the length of the record, which may be a drift.
     fn short_record(&self) -> Option<String> {
         let (slowest_s, record_s) = (self.slowest_s(), self.logs.estimation.duration_s());
         (record_s < RECORD_TIME_CONSTANTS * slowest_s).then(|| {

@@ -4,13 +4,13 @@ use crate::report::chart::palette::Rgb;
 
 type CanvasPoint = (f64, f64);
 
-/// An image that is drawn on.
+/// An RGB image with drawing operations.
 pub struct Canvas {
     image: image::RgbImage,
 }
 
 impl Canvas {
-    /// Begins with a grey image.
+    /// A canvas with a grey image.
     pub fn new(grey: &image::GrayImage) -> Self {
         let image = image::RgbImage::from_fn(grey.width(), grey.height(), |x, y| {
             image::Rgb([grey.get_pixel(x, y).0[0]; 3])

@@ -12,13 +12,13 @@ use crate::report::html;
 
 /// Largest number of beads that are drawn: those with the largest errors.
 const DRAWN: usize = 12;
-/// Points of a curve over path.
+/// Number of points of a curve over path.
 const POINTS: u32 = 2000;
 
-/// A curve, its name, its colour and whether it is only demanded.
+/// A curve, its name, its colour, and whether it is a demand.
 type NamedCurve = (PlotCurve, &'static str, Ink, bool);
 
-/// The page, with names and values under its title, and with warnings.
+/// The page, with facts under its title, and with warnings.
 pub fn page(
     beads: &[PlannedBead],
     facts: &PlanFacts,
@@ -85,16 +85,16 @@ fn section(bead: &PlannedBead, facts: &PlanFacts) -> Markup {
     }
 }
 
-/// Predicted width error over path, about a value \[mm\].
+/// Predicted width over path, with its error about `middle_mm` \[mm\].
 fn widths_about(middle_mm: f64, of: &WidthPrediction, facts: &PlanFacts) -> PlotCurve {
     of.width.iter().map(|(at, error)| (*at, middle_mm + facts.width_mm * error)).collect()
 }
 
-/// A value along the path of a speed.
+/// A quantity along the path of a speed profile.
 fn along(speed: &SpeedProfile, of: impl Fn(f64) -> f64) -> PlotCurve {
     let (start, length) = (speed.start_mm(), speed.end_mm() - speed.start_mm());
     let even = (0..=POINTS).map(|k| start + length * f64::from(k) / f64::from(POINTS));
-    // The nodes as well, so that no apex lies between two points.
+    // The nodes of the profile are included, so that no extremum is between two points.
     let mut positions: Vec<f64> = even.chain(speed.path().iter().copied()).collect();
     positions.sort_by(f64::total_cmp);
     positions.into_iter().map(|position| (position, of(position))).collect()

@@ -1,13 +1,13 @@
-//! `plan.csv`: robot and extruder at each moment of a plan.
+//! `plan.csv`: robot and extruder at each time of a plan.
 
 use super::{PlanFacts, PlannedBead};
 
-/// Time between rows \[s\]; a point of the job has a row of its own.
+/// Time between rows \[s\]; each point of the job has an additional row.
 const STEP_S: f64 = 0.01;
-/// A row of the even grid is left out within this time of a row of a point \[s\].
+/// Distance to the row of a point below which a row of the even grid is left out \[s\].
 const CORNER_STEP_S: f64 = 1e-3;
 
-/// The table of all beads. Time begins anew with each.
+/// The table of all beads. The time of each bead begins at 0.
 pub fn to_csv(beads: &[PlannedBead], facts: &PlanFacts) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let command = format!("command_{}", facts.unit.word());
@@ -21,7 +21,7 @@ pub fn to_csv(beads: &[PlannedBead], facts: &PlanFacts) -> Result<Vec<u8>, csv::
     writer.into_inner().map_err(|error| error.into_error().into())
 }
 
-/// Moments with a row \[s\]: those of the job's points, and an even grid between them.
+/// Times of the rows \[s\]: those of the job's points, and an even grid between them.
 fn moments(bead: &PlannedBead) -> Vec<f64> {
     let end_s = bead.plan.speed.duration_s();
     let points = bead.position.iter().map(|(path_mm, _)| bead.plan.speed.time_at(*path_mm));
@@ -56,7 +56,7 @@ fn row(number: u32, bead: &PlannedBead, time_s: f64, facts: &PlanFacts) -> [Stri
     [number.to_string(), time, path, x, y, z, speed, nominal, command, flow, width]
 }
 
-/// Between two points the nozzle goes straight.
+/// Position at a path length \[mm\]: a straight line between two points of the job.
 fn position_at(position: &[(f64, [f64; 3])], path_mm: f64) -> [f64; 3] {
     let after = position.partition_point(|(at, _)| *at < path_mm);
     let last = position.last().map_or([0.0; 3], |(_, point)| *point);
@@ -68,7 +68,8 @@ fn position_at(position: &[(f64, [f64; 3])], path_mm: f64) -> [f64; 3] {
     std::array::from_fn(|axis| from[axis] + fraction * (to[axis] - from[axis]))
 }
 
-/// None within half a nozzle of the ends, where no full mean is.
+/// Width error at a path length; `None` within half a nozzle of the ends, where the mean is not
+/// complete.
 fn fraction_at(width: &[(f64, f64)], path_mm: f64) -> Option<f64> {
     let after = width.partition_point(|(at, _)| *at < path_mm);
     let (to_mm, to) = width.get(after)?;

@@ -8,7 +8,7 @@ use crate::report::html::{self, VerdictLevel};
 /// Relative error of the planned width (RMS) above which the verdict mentions it.
 const FAR_OFF_ERROR: f64 = 0.05;
 
-/// The verdict of a page, with the warnings of whoever made the plan.
+/// The verdict of the page, with the planner's warnings.
 pub fn verdict(beads: &[PlannedBead], facts: &PlanFacts, warnings: &[String]) -> Markup {
     let far_off = rms(beads, |bead| &bead.planned) > FAR_OFF_ERROR;
     let level = VerdictLevel::with_caution(far_off || !warnings.is_empty());

@@ -1,4 +1,4 @@
-//! The data of the plots, collected one fact at a time in bounded memory.
+//! The data of the plots, collected step by step in bounded memory.
 
 use super::distance::DistanceCharts;
 use super::extruder::ExtruderCharts;
@@ -13,7 +13,7 @@ use crate::rows::summary::StateFollower;
 /// A quantity over time (or frames) and over path.
 #[derive(Debug, Default)]
 pub struct TimeAndPath {
-    /// Over time, or over frames where no time is known.
+    /// Over time, or over frame numbers if the time is unknown.
     pub time: PlotCurve,
     /// Over the distance along the path.
     pub path: PlotCurve,
@@ -28,11 +28,10 @@ impl TimeAndPath {
     }
 }
 
-/// Everything that is plotted.
+/// Data of all plots.
 #[derive(Debug, Default)]
 pub struct Charts {
-    /// Whether x is time; else it is the frame's number. Decided by the first
-    /// frame.
+    /// Whether x is time or the number of the frame; the first frame decides.
     pub timed: Option<bool>,
     /// Measured width.
     pub width: TimeAndPath,
@@ -40,23 +39,23 @@ pub struct Charts {
     pub width_low: TimeAndPath,
     /// Width plus two standard deviations.
     pub width_high: TimeAndPath,
-    /// Target width there.
+    /// Target width at the measured bead.
     pub target: TimeAndPath,
-    /// Speed that the robot reports.
+    /// Last reported speed of the robot.
     pub speed: TimeAndPath,
     /// Setpoints.
     pub setpoint: TimeAndPath,
     /// Demand of the controller before the limiter.
     pub demand: TimeAndPath,
-    /// Contrast hint.
+    /// Contrast of the images \[grey levels\].
     pub contrast: PlotCurve,
-    /// Blur hint.
+    /// Blur of the edges \[px\].
     pub blur: PlotCurve,
-    /// Noise hint.
+    /// Noise of a pixel \[grey levels\].
     pub noise: PlotCurve,
     /// Saturated pixels \[%\].
     pub saturated: PlotCurve,
-    /// Rows that the width comes from \[%\].
+    /// Rows in use for the width \[%\].
     pub used: PlotCurve,
     /// Standard deviation of the width \[mm\].
     pub sigma: PlotCurve,
@@ -66,7 +65,7 @@ pub struct Charts {
     pub states: Strip,
     /// Limits that acted.
     pub limits: Strip,
-    /// The distance controller.
+    /// Estimates of the distance controller.
     pub distance: DistanceCharts,
     /// The extruder side.
     pub extruder: ExtruderCharts,
@@ -74,7 +73,7 @@ pub struct Charts {
 }
 
 impl Charts {
-    /// A frame that was measured or rejected.
+    /// Adds a measured or rejected frame.
     pub fn frame(&mut self, row: &FrameRow) {
         let timed = *self.timed.get_or_insert(row.time_s.is_some());
         let x = if timed { row.time_s } else { Some(to_f64(row.frame)) };
@@ -100,7 +99,7 @@ impl Charts {
         self.sigma.push(x, sigma);
     }
 
-    /// A step of the controller.
+    /// Adds a step of the controller.
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         self.timed.get_or_insert(true);
         self.extruder.step(now, event, step);

@@ -9,7 +9,7 @@ use crate::rows::log::FinishedRun;
 pub struct RunReport<'a> {
     /// Facts, summary and remarks.
     pub run: &'a FinishedRun<'a>,
-    /// The plots' data.
+    /// Data of the plots.
     pub charts: &'a Charts,
     /// Frames with their edges.
     pub images: &'a [ChosenFrame],

@@ -6,7 +6,7 @@ use crate::control::Step;
 use crate::report::chart::{PlotCurve, PlotLayer, XAxis, legend, palette, wide_plot, y_range};
 use crate::rows::summary::DistanceSummary;
 
-/// Estimates over the path on which the bead was laid.
+/// Estimates over the path at which the bead was laid.
 #[derive(Debug, Default)]
 pub struct DistanceCharts {
     level: PlotCurve,
@@ -17,13 +17,13 @@ pub struct DistanceCharts {
 }
 
 impl DistanceCharts {
-    /// A step of the controller.
+    /// Adds a step of the controller.
     pub fn step(&mut self, step: &Step) {
         let (Some(trace), Some(path)) = (step.trace.distance, step.trace.bead_path_mm) else {
             return;
         };
         let (path, level, sigma) = (path.get(), trace.level_mm.get(), trace.level_sigma_mm.get());
-        // Before the first width nothing is known.
+        // Before the first width there is no estimate.
         if sigma >= level {
             return;
         }
@@ -34,7 +34,7 @@ impl DistanceCharts {
         self.offset.push(path, trace.offset_mm.get());
     }
 
-    /// The section of the page; nothing without a distance controller.
+    /// The section of the page; empty without a distance controller.
     pub fn section(&self, summary: Option<&DistanceSummary>) -> Markup {
         let (Some(range), Some(summary)) = (self.level.extent(), summary) else {
             return html! {};

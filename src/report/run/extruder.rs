@@ -1,4 +1,4 @@
-//! The extruder side of a run: wanted flow, commands, and readings of its sensors.
+//! The extruder side of a run: demanded flow, commands, and sensor readings.
 
 use maud::{Markup, html};
 
@@ -12,10 +12,10 @@ use crate::report::chart::{
 use crate::rows::names;
 use crate::rows::summary::ExtruderSummary;
 
-/// The states of the extruder side.
+/// Names of the states of the extruder side.
 const STATES: [&str; 6] = ["off", "starting", "running", "ending", "holding", "fault"];
 
-/// The data of the plots of the extruder side.
+/// Data of the plots of the extruder side.
 #[derive(Debug, Default)]
 pub struct ExtruderCharts {
     demand: PlotCurve,
@@ -32,7 +32,7 @@ pub struct ExtruderCharts {
 }
 
 impl ExtruderCharts {
-    /// A step of the controller.
+    /// Adds a step of the controller.
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         let time = now.secs();
         if let Event::Extruder(report) = event {
@@ -59,7 +59,7 @@ impl ExtruderCharts {
         }
     }
 
-    /// The true flow of a simulation.
+    /// Adds the true flow of a simulation.
     pub fn flow(&mut self, now: Stamp, flow: Mm3PerS) {
         self.flow.push(now.secs(), flow.get());
     }
@@ -77,7 +77,7 @@ impl ExtruderCharts {
         }
     }
 
-    /// The section of the page, for an extruder whose drive takes this command.
+    /// The section of the page, for an extruder with this kind of command.
     pub fn section(&self, drive: CommandQuantity, summary: Option<&ExtruderSummary>) -> Markup {
         let Some(range) = self.command.extent() else { return html! {} };
         let axis = XAxis::time(range);
@@ -103,7 +103,7 @@ impl ExtruderCharts {
     }
 
     fn flow_plot(&self, axis: &XAxis) -> Markup {
-        // A live run knows the flow only from a sensor.
+        // Without a simulation the flow is known only from a sensor.
         let (flow, name) = if self.flow.is_empty() {
             (&self.sensed_flow, "measured")
         } else {
@@ -148,7 +148,7 @@ impl ExtruderCharts {
     }
 }
 
-/// The time in each state and at each limit.
+/// Times in each state and at each limit.
 fn times(summary: &ExtruderSummary) -> Markup {
     let total: f64 = summary.states_s.values().sum();
     let row = |what: &str, name: &str, seconds: f64| {

@@ -7,12 +7,12 @@ use crate::report::html::{VerdictLevel, number};
 use crate::rows::names::{extruder_fault, in_words};
 use crate::rows::summary::{ControlSummary, ExtruderSummary, ProfileSummary, Summary};
 
-/// Error, as a fraction of the target, above which the verdict mentions it.
+/// Width error above which the verdict mentions it, as a fraction of the target.
 const FAR_OFF_ERROR: f64 = 0.05;
 /// Fraction of the time above which the verdict mentions a limit.
 const LONG_LIMITED_FRACTION: f64 = 0.10;
 
-/// How a run went.
+/// The verdict on a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Verdict {
     /// Its level.
@@ -37,7 +37,7 @@ pub fn verdict(summary: &Summary, max_rejected_fraction: f64) -> Verdict {
         sentences.extend(more);
         if let Some(sentence) = far_off(control, summary) {
             level = level.max(VerdictLevel::Caution);
-            // Right behind the sentence about the width.
+            // Directly after the sentence about the width.
             sentences.insert(1, sentence);
         }
     }
@@ -78,7 +78,7 @@ fn width_sentence(summary: &Summary) -> String {
     }
 }
 
-/// Whether the extruder played a profile, which changes the width on purpose.
+/// Whether the extruder played a profile, which changes the width intentionally.
 fn is_excited(summary: &Summary) -> bool {
     summary.extruder.as_ref().is_some_and(|extruder| extruder.profile.is_some())
 }
@@ -122,8 +122,8 @@ fn rejected_sentence(summary: &Summary, max_rejected_fraction: f64) -> String {
     }
 }
 
-/// An error of more than a twentieth of the target once settled or in all, or a limit that
-/// acted for a tenth of the run.
+/// Sentence about an error above a twentieth of the target, after settling or over the whole bead;
+/// otherwise about a limit that acted for more than a tenth of the run. `None` without either.
 fn far_off(control: &ControlSummary, summary: &Summary) -> Option<String> {
     let (error, target) = (control.width_error_rms_settled_mm?, summary.target_width_mm?);
     let fraction = control.limited_s / summary.duration_s.unwrap_or(f64::INFINITY);
@@ -139,7 +139,7 @@ fn far_off(control: &ControlSummary, summary: &Summary) -> Option<String> {
     far_off.or_else(|| (fraction > LONG_LIMITED_FRACTION).then(limited))
 }
 
-/// An error over all bead laid under control, such as at a corner during settling.
+/// Sentence about the error over all bead laid under control, including the settling.
 fn far_off_before(control: &ControlSummary, target: f64) -> Option<String> {
     let (rms, worst) = (control.width_error_rms_mm?, control.width_error_worst?);
     (rms > FAR_OFF_ERROR * target).then(|| {
@@ -153,7 +153,7 @@ fn far_off_before(control: &ControlSummary, target: f64) -> Option<String> {
     })
 }
 
-/// Sentences about faults, holds and limits of the extruder side; none where it did well.
+/// Sentences about faults, holds and limits of the extruder side; empty if there were none.
 fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
     let total: f64 = extruder.states_s.values().sum();
     let mut sentences = Vec::new();
@@ -183,7 +183,7 @@ fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
     sentences
 }
 
-/// Whether a profile was played to its end, and whether the bead went on.
+/// Whether a profile was played to its end, and whether the bead was longer.
 fn profile_sentence(profile: &ProfileSummary) -> (VerdictLevel, String) {
     let ProfileSummary { duration_s, played_fraction, after_end_s } = *profile;
     let sentence = if played_fraction < 1.0 {
@@ -215,7 +215,7 @@ fn control_sentences(control: &ControlSummary) -> (VerdictLevel, Vec<String>) {
     if control.width_error_rms_mm.is_none() {
         level = level.max(VerdictLevel::Caution);
     }
-    // What holds while a run is being ended is no disturbance.
+    // A hold while the run ends is no disturbance.
     let held: f64 =
         control.held_for_s.iter().filter(|(why, _)| **why != "stopping").map(|(_, s)| s).sum();
     if held >= 0.05 {

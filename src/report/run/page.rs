@@ -14,7 +14,7 @@ use crate::rows::log::{FinishedRun, LogOptions, RunLog, RunObserver};
 use crate::rows::output::{LogError, write_whole};
 use crate::vision::{Edges, Gauge};
 
-/// Plots and chosen images of a run. Memory does not grow with its length.
+/// Plots and selected images of a run. Memory does not grow with its length.
 #[derive(Debug)]
 pub struct RunPage {
     charts: Charts,
@@ -27,7 +27,7 @@ impl RunPage {
         Self { charts: Charts::default(), images: FramePicker::new(gauge) }
     }
 
-    /// Begins the log of a run that writes such a page as `report.html`.
+    /// Begins the log of a run, with this page as `report.html`.
     pub fn log(options: LogOptions) -> Result<RunLog, LogError> {
         let page = Self::new(options.gauge);
         RunLog::create(options, Box::new(page))

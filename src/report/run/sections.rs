@@ -1,4 +1,4 @@
-//! The parts of the page, one below the other.
+//! The sections of the page.
 
 use base64::Engine as _;
 use maud::{Markup, html};
@@ -115,7 +115,7 @@ fn speed_plot(
         let levels = bounds.iter().zip(names);
         layers.extend(levels.map(|(bound, name)| PlotLayer::Level(*bound, palette::LIMIT, name)));
     }
-    // A demand far beyond the limits would press everything else flat.
+    // Without the demand: a value far beyond the limits would compress the other curves.
     let y_range = y_range(&[speed, setpoint], bounds.as_ref().map_or(&[], |bounds| bounds));
     let mut entries = legend::drawn(&[
         (speed, ("robot", palette::SPEED, "")),
@@ -157,7 +157,7 @@ pub fn rejections(summary: &Summary) -> Markup {
     }
 }
 
-/// Some frames with the edges drawn in.
+/// Selected frames with the edges drawn in.
 pub fn images(images: &[ChosenFrame]) -> Markup {
     html! {
         @if !images.is_empty() {
@@ -186,12 +186,12 @@ fn data_uri(jpeg: &[u8]) -> String {
 pub fn image_quality(report: &RunReport<'_>) -> Markup {
     let charts = report.charts;
     let Some(range) = charts.contrast.extent() else { return html! {} };
-    // Widths that were simulated without an image have no hints.
+    // Widths that are simulated without an image have no quality data.
     if charts.contrast.range().is_none_or(|range| range.max <= 0.0) {
         return html! {};
     }
     let axis = if charts.timed == Some(true) { XAxis::time(range) } else { XAxis::frames(range) };
-    // The range ends at least at `least_top`, so that a steady value looks steady.
+    // The axis ends at least at `least_top`, so that small variations do not fill the plot.
     let small = |series: &PlotCurve, least_top: f64, y_title: &str| {
         let range = y_range(&[series], &[0.0]);
         Plot {

@@ -6,7 +6,7 @@ use super::Tuned;
 use crate::tune::stability::LoopMargins;
 
 impl Tuned {
-    /// All numbers, as text.
+    /// All numbers as JSON text.
     pub fn json(&self) -> String {
         let plant = &self.plant;
         let robot = match &plant.robot {
@@ -59,7 +59,7 @@ impl Tuned {
     }
 }
 
-/// Infinite margins become null.
+/// Margins as JSON; infinite ones become null.
 fn of_loop(margins: LoopMargins) -> Value {
     json!({
         "is_stable": margins.is_stable,

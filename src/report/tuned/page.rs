@@ -10,7 +10,7 @@ use crate::report::chart::{Ink, PlotCurve, PlotLayer, XAxis, legend, wide_plot, 
 use crate::report::html::{VerdictLevel, about, titled_page, verdict};
 use crate::tune::predict::{BeadPrediction, FLOW_STEP, SEEDS};
 
-/// Time for which the robot's response to its steps is drawn \[s\].
+/// Duration of the drawn response of the robot \[s\].
 const SHOWN_S: f64 = 30.0;
 
 impl Tuned {

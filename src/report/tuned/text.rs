@@ -9,7 +9,7 @@ use crate::tune::stability::LoopMargins;
 use crate::width_control::pi::PiGains;
 
 impl Tuned {
-    /// All findings, predictions and proposals.
+    /// All results, predictions and proposed settings.
     pub fn plain(&self) -> String {
         let mut text = String::new();
         for (name, words) in self.findings() {
@@ -25,7 +25,7 @@ impl Tuned {
         text
     }
 
-    /// Findings, by name and in words.
+    /// Results, each with a name and a description.
     pub fn findings(&self) -> Vec<(&'static str, String)> {
         let plant = &self.plant;
         let (width, exponent, offset) = (plant.width_mm, plant.exponent, plant.offset_mm);
@@ -116,8 +116,8 @@ impl Tuned {
         )
     }
 
-    /// Rows of the table of margins: the present and the proposed PI gains, each at the worst speed
-    /// and at that of the target. No margins where both gains are 0.
+    /// Rows of the table of margins: the present and the proposed PI gains, each at the worst
+    /// speed and at that of the target. The margins are `None` if both gains are 0.
     pub fn loops(&self) -> Vec<(String, PiGains, Option<LoopMargins>)> {
         let now = self.present_gains.iter().map(|(gains, _)| ("now", *gains));
         let settings = now.chain([("proposed", self.proposal.pi.gains)]);
@@ -216,12 +216,12 @@ fn row(text: &mut String, one: &BeadPrediction) {
     );
 }
 
-/// A margin with its unit; it may be infinite.
+/// A margin with its unit, or words for infinity.
 fn with_unit(margin: f64, words: impl Fn(f64) -> String) -> String {
     if margin.is_finite() { words(margin) } else { "no end".to_owned() }
 }
 
-/// Margins as they are printed.
+/// Margins as text.
 pub fn margin_words(margins: Option<LoopMargins>) -> [String; 4] {
     let Some(margins) = margins else { return ["–", "–", "–", "–"].map(str::to_owned) };
     if !margins.is_stable {

@@ -1,4 +1,4 @@
-//! `report.html` of starts and stops.
+//! `report.html` of a start-stop model.
 
 use maud::{Markup, html};
 
@@ -13,7 +13,7 @@ use crate::report::chart::{
 use crate::report::html::{VerdictLevel, about, titled_page, verdict};
 use crate::report::identify::table::significant;
 
-/// Points of a curve of the model.
+/// Number of points of a model's curve.
 const POINTS: u32 = 300;
 /// Interval about the first flow in which a start is drawn \[s\].
 const ABOUT_FIRST_FLOW_S: ValueRange = ValueRange::new(-0.5, 3.0);
@@ -91,7 +91,7 @@ fn delays(study: &StartStudy) -> Markup {
         study.fit.starts.iter().map(|start| (start.idle_s, start.delay_s)).collect();
     let longest_s = study.file.data.idle_range_s[1];
     let (of, flow) = (&study.fit.parameters, study.flow_mm3_per_s());
-    // Even steps where the axis has them.
+    // Equal steps on the logarithmic axis.
     let step = longest_s.ln_1p() / f64::from(POINTS);
     let idle = (0..=POINTS).map(|k| (f64::from(k) * step).exp_m1());
     let model: Vec<(f64, f64)> = idle.map(|idle_s| (idle_s, of.delay_s(idle_s, flow))).collect();
@@ -129,7 +129,7 @@ fn starts(study: &StartStudy) -> Markup {
     laid_over("time since the first flow [s]", ABOUT_FIRST_FLOW_S, &all, &model)
 }
 
-/// The flow as a ratio to an even flow, over the time since a moment.
+/// The flow relative to a steady flow, over the time since `at_s`.
 fn relative_flow(flow: &Logged, at_s: f64, range: ValueRange, even: f64) -> PlotCurve {
     let part = flow.within(at_s + range.min, at_s + range.max);
     part.time_s.iter().zip(&part.values).map(|(at, value)| (at - at_s, value / even)).collect()

@@ -1,11 +1,11 @@
-//! Starts and stops as text.
+//! A start-stop model as text.
 
 use super::StartStudy;
 use crate::identify::digits::three_digits;
 use crate::identify::start_stop::file::{ParameterKey, START_PARAMETERS, STOP_PARAMETERS};
 use crate::report::identify::table::{put, significant};
 
-/// Pauses after which the delay is printed \[s\].
+/// Pauses for which the delay is printed \[s\].
 const SHOWN_PAUSES_S: [f64; 4] = [1.0, 10.0, 60.0, 200.0];
 
 /// A short table.
@@ -64,7 +64,7 @@ fn parameters(text: &mut String, study: &StartStudy, list: &[ParameterKey]) {
     }
 }
 
-/// The parameters' effect on a bead of the log.
+/// Explains the parameters by their effect on a bead of the log.
 fn meaning(text: &mut String, study: &StartStudy) {
     let (of, flow) = (&study.fit.parameters, study.flow_mm3_per_s());
     let [_, longest_s] = study.file.data.idle_range_s;
