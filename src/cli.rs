@@ -108,7 +108,7 @@ Example:
     Lab(lab::LabGroup),
 }
 
-/// Runs the program.
+/// Runs the program; returns its exit status.
 pub fn main() -> ExitCode {
     let matches = help::with_groups(Cli::command()).try_get_matches();
     let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {

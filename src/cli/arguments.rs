@@ -1,11 +1,11 @@
-//! Arguments that several commands have, and the error for wrong ones.
+//! Arguments that several commands have, and the error for wrong arguments.
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use crate::core::Mm;
 
-/// Largest length that is accepted \[mm\]: 100 m, beyond which a number is mistyped.
+/// Largest accepted length \[mm\]: 100 m; a larger number is probably mistyped.
 const LONGEST_MM: f64 = 1e5;
 /// Wrong arguments; the program ends with exit status 2.
 #[derive(Debug, thiserror::Error)]
@@ -13,14 +13,14 @@ const LONGEST_MM: f64 = 1e5;
 pub struct WrongArguments(String);
 
 impl WrongArguments {
-    /// With the value that was found and the values that are expected.
+    /// An error with a message; it should name the wrong and the expected values.
     #[expect(clippy::needless_pass_by_value, reason = "an error or a new text at every call")]
     pub fn new(what: impl ToString) -> Self {
         Self(what.to_string())
     }
 }
 
-/// A length \[mm\].
+/// Parses a length \[mm\].
 pub fn parse_length(text: &str) -> Result<Mm, String> {
     let value: f64 = text.trim().parse().map_err(|_| "expected a number of mm".to_owned())?;
     let within = |mm: &f64| mm.abs() <= LONGEST_MM;
@@ -30,18 +30,19 @@ pub fn parse_length(text: &str) -> Result<Mm, String> {
     Mm::new(value).map_err(|error| error.to_string())
 }
 
-/// A number within a range; `expected` is the message for another one.
+/// Parses a number within a range; `expected` is the message for other values.
 pub fn parse_within(text: &str, range: RangeInclusive<f64>, expected: &str) -> Result<f64, String> {
     let value = text.trim().parse().ok().filter(|value| range.contains(value));
     value.ok_or_else(|| expected.to_owned())
 }
 
-/// A duration of a run \[s\].
+/// Parses the duration of a run \[s\].
 pub fn parse_seconds(text: &str) -> Result<f64, String> {
     parse_within(text, 0.1..=1e7, "expected a number of seconds, 0.1 or more")
 }
 
-/// Refuses a file in a folder that does not exist, before the long work; `name` is the option's.
+/// Refuses an output file in a folder that does not exist, before the long work; `name` is the
+/// name of the option.
 pub fn check_writable(name: &str, path: &Path) -> Result<(), WrongArguments> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
@@ -53,8 +54,7 @@ pub fn check_writable(name: &str, path: &Path) -> Result<(), WrongArguments> {
     Ok(())
 }
 
-/// A folder name that is free: the name itself, or with the first number that
-/// is.
+/// A folder name that is not taken: the name itself, or the name with the first free number.
 pub fn free_folder(name: &str) -> PathBuf {
     let taken = |path: &Path| path.exists();
     let first = PathBuf::from(name);
@@ -67,8 +67,8 @@ pub fn free_folder(name: &str) -> PathBuf {
         .unwrap_or(first)
 }
 
-/// Refuses a folder that holds a recording: new results would replace it, or be mixed with those
-/// of another run.
+/// Refuses a folder that has a recording: new results would replace it, or be mixed with those of
+/// another run.
 pub fn refuse_a_recording_in(folder: &Path) -> Result<(), WrongArguments> {
     let names = ["recording.mcap", "recording.mcap.partial"];
     match names.map(|name| folder.join(name)).into_iter().find(|file| file.exists()) {
@@ -80,7 +80,7 @@ pub fn refuse_a_recording_in(folder: &Path) -> Result<(), WrongArguments> {
     }
 }
 
-/// Refuses the name of an output that exists: a file is never replaced.
+/// Refuses the name of an existing file: no file is ever replaced.
 pub fn refuse_replacing(path: &Path, what: &str) -> Result<(), WrongArguments> {
     if !path.exists() {
         return Ok(());

@@ -13,11 +13,11 @@ use crate::calibration::equations::{CameraModel, Correspondence};
 use crate::calibration::plane::OnBed;
 use crate::core::Mm;
 
-/// The bed plane and its source.
+/// The bed plane and the images from which it was fitted.
 pub struct BedPlane {
-    /// The images whose boards lay on the bed.
+    /// The images of boards on the bed.
     pub images: Vec<String>,
-    /// Whether they are assumed and not named.
+    /// Whether these images are assumed, because none were named.
     pub assumed: bool,
     /// Later images that show a board but were rejected.
     pub passed_over: Vec<String>,
@@ -25,7 +25,7 @@ pub struct BedPlane {
     pub on_bed: OnBed,
     /// Height of their printed faces above the bed.
     pub thickness: Mm,
-    /// The robot's z when they were taken.
+    /// The robot's z when the images were taken.
     pub robot_z: Mm,
 }
 
@@ -68,19 +68,19 @@ impl BedPlane {
     }
 }
 
-/// Boards of one kind on the bed, each with its image.
+/// Boards of one kind on the bed, with the names of their images.
 pub struct BoardsOnBed<'a> {
     board: &'a Board,
     corners: Vec<(String, Vec<CornerObservation>)>,
 }
 
 impl<'a> BoardsOnBed<'a> {
-    /// None yet.
+    /// A collection without boards.
     pub fn of(board: &'a Board) -> Self {
         Self { board, corners: Vec::new() }
     }
 
-    /// Adds a board. Fails for one at the position of another.
+    /// Adds a board. Fails if it has the position of an earlier board.
     pub fn add(&mut self, image: String, corners: Vec<CornerObservation>) -> anyhow::Result<()> {
         let is_twin = |(_, other): &&(String, Vec<CornerObservation>)| {
             is_same_position(self.board, other, &corners)
@@ -95,8 +95,8 @@ impl<'a> BoardsOnBed<'a> {
         Ok(())
     }
 
-    /// One plane through all boards, with the images' names. Fails where the corners' reprojection
-    /// error exceeds `max_px` (RMS); `other` names the limit in the message.
+    /// Fits one plane to all boards; returns it with the images' names. Fails if the corners'
+    /// reprojection error exceeds `max_px` (RMS); `other` names the limit in the message.
     pub fn fit(
         self,
         model: &CameraModel,
@@ -127,8 +127,8 @@ impl<'a> BoardsOnBed<'a> {
     }
 }
 
-/// The board's corners in an image that the camera was not calibrated from. Fails where its size
-/// \[px\] is not that of the calibration.
+/// The board's corners in an image that was not used for the camera's calibration. Fails if the
+/// size of the image \[px\] is not that of the calibration.
 pub fn find_corners(
     path: &Path,
     board: &Board,

@@ -7,7 +7,7 @@ use crate::calibration::board::{Board, Markers};
 use crate::calibration::dictionary::Dictionary;
 use crate::core::Mm;
 
-/// Sides of squares \[mm\].
+/// Accepted sides of squares \[mm\].
 const SQUARES_MM: (f64, f64) = (0.01, 1e4);
 
 /// Inner corners of a board, one fewer than its squares either way.
@@ -39,15 +39,14 @@ pub struct BoardArgs {
 }
 
 impl BoardArgs {
-    /// Fails for a board that cannot be used.
+    /// The board; fails if it cannot be used.
     pub fn board(&self) -> Result<Board, WrongArguments> {
         let marks = self.marker_mm.map(|side| Markers { side, dictionary: self.dictionary });
         board_of(self.board, self.square_mm, marks)
     }
 }
 
-/// A board of so many inner corners, with markers where it has some. Fails for one that
-/// cannot be used.
+/// A board with this number of inner corners, with or without markers. Fails if it cannot be used.
 pub fn board_of(
     corners: InnerCorners,
     square: Mm,
@@ -58,14 +57,14 @@ pub fn board_of(
     plain.with_marks(marks).map_err(WrongArguments::new)
 }
 
-/// A dictionary by its name.
+/// Parses the name of a dictionary.
 pub fn parse_dictionary(text: &str) -> Result<Dictionary, String> {
     Dictionary::named(text).ok_or_else(|| {
         "expected 4x4, 5x5, 6x6 or 7x7, or a name of OpenCV's such as DICT_5X5_100".to_owned()
     })
 }
 
-/// Columns x rows.
+/// Parses columns x rows.
 pub fn parse_board(text: &str) -> Result<InnerCorners, String> {
     let sides = text.split_once(['x', 'X', '×']);
     let number = |side: &str| side.trim().parse::<usize>().ok();
@@ -76,7 +75,7 @@ pub fn parse_board(text: &str) -> Result<InnerCorners, String> {
         .ok_or_else(|| "write columns x rows of inner corners, such as 9x6".to_owned())
 }
 
-/// The side of a square that can be printed and seen.
+/// Parses the side of a square, within the accepted range.
 pub fn parse_square(text: &str) -> Result<Mm, String> {
     let side = parse_length(text)?;
     let (smallest, largest) = SQUARES_MM;

@@ -1,4 +1,4 @@
-//! A board in an image file.
+//! Detection of a board in an image file.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use crate::calibration::rejection::BoardRejection;
 use crate::core::{Channel, Stamp};
 use crate::io::image_file;
 
-/// Looks for the board in an image file.
+/// Detects the board in an image file.
 pub fn find_board(
     board: &Board,
     name: &str,
@@ -19,7 +19,7 @@ pub fn find_board(
     board_observation::observe(board, name, &frame)
 }
 
-/// Fails for an image whose size is not that of the calibration.
+/// Fails if the size of an image is not that of the calibration.
 pub fn check_size(found: &BoardObservation, expected: [u32; 2]) -> anyhow::Result<()> {
     let ([width, height], [right, bottom]) = (found.image_size_px, expected);
     anyhow::ensure!(

@@ -21,8 +21,8 @@ use crate::core::Mm;
 use crate::drivers::camera::folder::list_images;
 use crate::io::atomic_file::write_atomic;
 
-/// Runs the command; the table and the figures go to standard output. Fails
-/// without writing anything where no calibration can be found.
+/// Runs the command; the table and the figures go to standard output. Fails without writing a file
+/// if no calibration can be computed.
 pub fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     let board = args.board.board()?;
     check_arguments(args)?;

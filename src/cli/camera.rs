@@ -20,7 +20,7 @@ pub enum CameraGroup {
     Offset(offset::OffsetArgs),
 }
 
-/// Runs one of them.
+/// Runs a command of the group.
 pub fn run(command: &CameraGroup, voice: Verbosity) -> anyhow::Result<ExitCode> {
     match command {
         CameraGroup::Board(args) => board::run(args).map(|()| ExitCode::SUCCESS),

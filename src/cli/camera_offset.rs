@@ -6,12 +6,12 @@ use crate::cell::Cell;
 use crate::core::{Mm, RobotState, Stamp};
 use crate::numeric::rank;
 
-/// Default of the largest offset that is tried.
+/// Default of the largest offset in the search.
 const MAX_OFFSET: Mm = Mm::constant(1000.0);
 /// Smallest range of a search \[mm\].
 const SHORTEST_SEARCH_MM: f64 = 20.0;
 
-/// Largest distance that is tried, from what was asked for.
+/// Largest offset in the search, from the option.
 pub fn max_offset(max: Option<Mm>) -> Result<Mm, WrongArguments> {
     let farthest = max.unwrap_or(MAX_OFFSET);
     if farthest.get() < SHORTEST_SEARCH_MM {
@@ -20,8 +20,8 @@ pub fn max_offset(max: Option<Mm>) -> Result<Mm, WrongArguments> {
     Ok(farthest)
 }
 
-/// Length of the gauge on the surface during the run, or that of the simulation where no frame
-/// was rendered.
+/// Length of the gauge on the surface during the run, or that of the simulation if no frames were
+/// rendered.
 pub fn gauge(
     cell: &Cell,
     calibration: &Calibration,
@@ -30,7 +30,7 @@ pub fn gauge(
     if cell.simulates_widths() {
         return Ok(cell.gauge_length(calibration));
     }
-    // After the bead the robot may lift the camera.
+    // After the bead the robot may lift the camera: only heights during the bead count.
     let laying = states.iter().filter(|(_, state)| state.mode.lays_bead());
     let mut heights: Vec<f64> = laying.map(|(_, state)| state.z_mm.get()).collect();
     let robot_z = rank::median(&mut heights).and_then(|z| Mm::new(z).ok());

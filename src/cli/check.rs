@@ -19,9 +19,9 @@ use crate::drivers::Devices;
 use crate::extruder::start_stop::Pause;
 use crate::width_control::strategy::distance::DistanceStrategy;
 
-/// Ratio of the speed limits above which one of them has a wrong unit.
+/// Ratio of the speed limits above which one of them probably has a wrong unit.
 const MAX_SPEED_RATIO: f64 = 200.0;
-/// Offset of the camera below which it has a wrong unit.
+/// Offset of the camera below which it probably has a wrong unit.
 const MIN_CAMERA_OFFSET: Mm = Mm::constant(0.5);
 
 /// Validates a cell file and all it refers to.
@@ -54,7 +54,7 @@ pub struct CheckArgs {
     schema: bool,
 }
 
-/// Runs the command; the findings go to standard output.
+/// Runs the command; the results go to standard output.
 pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     let Some(cell) = &args.cell else {
         say!("{:#}", schema::of_a_cell());
@@ -67,7 +67,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     check_height(&loaded)?;
     let run = read_cell(cell, &loaded.text, Purpose::Run);
     let run = run.map(|(cell, devices)| LoadedCell { cell, devices, ..loaded.clone() });
-    // All files of the extruder's strategy are checked before the cell is called sound.
+    // All files of the extruder's strategy are checked before the cell is called valid.
     let side = run.as_ref().map_or(Ok(None), LoadedCell::extruder)?;
     if let Some(side) = &side {
         warn(&side.warnings);
@@ -101,13 +101,13 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// How far the camera is above the measured surface \[mm\]; `None` for a single scale.
+/// Height of the camera above the measured surface \[mm\]; `None` for a single scale.
 fn above_surface_mm(loaded: &LoadedCell) -> Option<f64> {
     let Calibration::Full { bed, .. } = &loaded.calibration else { return None };
     Some(bed.apply_inverse(Point3::origin()).z - loaded.cell.surface_height.get())
 }
 
-/// Refuses a surface that the camera does not look down on.
+/// Refuses a surface on which the camera does not look down.
 fn check_height(loaded: &LoadedCell) -> Result<(), WrongArguments> {
     let height = loaded.cell.surface_height;
     match above_surface_mm(loaded) {
@@ -121,7 +121,7 @@ fn check_height(loaded: &LoadedCell) -> Result<(), WrongArguments> {
     }
 }
 
-/// Warns where a cell uses a calibration beyond the boards that it was made from.
+/// Warns if a cell uses a calibration outside the range of its boards.
 fn about_surface(loaded: &LoadedCell) {
     let (height, roi) = (loaded.cell.surface_height, loaded.cell.gauge.roi);
     let has_sigma = loaded.cell.surface_height_sigma > Mm::ZERO;
@@ -167,8 +167,8 @@ fn about_surface(loaded: &LoadedCell) {
     }
 }
 
-/// Prints the commands for which a cell with a complete robot side is ready, and what its extruder
-/// lacks for the others.
+/// Prints the commands for which a cell with a complete robot part is ready, and what its extruder
+/// part lacks for the others.
 fn about_purposes(run: &RunPart, devices: &Devices) {
     let part = run.extruder.as_ref();
     let has_link = part.is_none_or(|_| devices.extruder.is_some());
@@ -185,7 +185,7 @@ fn about_purposes(run: &RunPart, devices: &Devices) {
     }
 }
 
-/// Prints the extruder side, with the files that it refers to.
+/// Prints the extruder side and its files.
 fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::Result<()> {
     let part = loaded.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
     let Some(part) = part else { return Ok(()) };
@@ -219,7 +219,7 @@ fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::R
     Ok(())
 }
 
-/// Prints what is known ahead: starts, stops and the plan of a job.
+/// Prints the data that are known ahead: starts, stops and the plan of a job.
 fn about_starts_and_plan(side: &ExtruderSide) {
     if let Some(timing) = &side.setup.timing {
         let pause = Pause { idle: Span::from_secs(300.0), flow_before: timing.conditions().flow };
@@ -239,8 +239,7 @@ fn about_starts_and_plan(side: &ExtruderSide) {
     }
 }
 
-/// Refuses a gauge that reaches beyond the images that were calibrated: no frame could be
-/// measured.
+/// Refuses a gauge outside the calibrated images: no frame could be measured.
 fn check_gauge(loaded: &LoadedCell) -> Result<(), WrongArguments> {
     let Calibration::Full { image_size_px: [width, height], .. } = loaded.calibration else {
         return Ok(());
@@ -258,7 +257,7 @@ fn check_gauge(loaded: &LoadedCell) -> Result<(), WrongArguments> {
     ))
 }
 
-/// Prints the strategy, where it is not PI control.
+/// Prints the strategy, unless it is PI control.
 fn about_controller(loaded: &LoadedCell, run: &RunPart) {
     if let Some(steps) = loaded.cell.steps(run, &loaded.calibration) {
         let (slow, fast) = steps.speeds();
@@ -287,7 +286,7 @@ fn about_controller(loaded: &LoadedCell, run: &RunPart) {
     }
 }
 
-/// How the robot is reached, and what its driver can do.
+/// Prints the robot's address and the capabilities of its driver.
 fn about_robot(devices: &Devices) {
     let Some(robot) = &devices.robot else { return };
     let (name, can) = (robot.registration.name, robot.registration.capabilities);

@@ -1,4 +1,4 @@
-//! `truebead compare`: several controllers on the same seeded disturbances.
+//! `truebead compare`: several controllers with the same seeded disturbances.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -102,7 +102,7 @@ fn contenders(args: &CompareArgs) -> anyhow::Result<Vec<Contender>> {
     Ok(contenders)
 }
 
-/// What a run needs, of a cell without an extruder of its own.
+/// The run part of a cell, without an extruder.
 fn run_part(loaded: &LoadedCell) -> anyhow::Result<RunPart> {
     let path = loaded.path.display();
     let Some(run) = loaded.cell.run.clone() else {
@@ -117,7 +117,7 @@ fn run_part(loaded: &LoadedCell) -> anyhow::Result<RunPart> {
     Ok(run)
 }
 
-/// The file's name without its ending; the whole path where another has it.
+/// The file's name without its extension; the whole path if another has the same name.
 fn name(path: &std::path::Path, others: &[Contender]) -> String {
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let stem = stem.unwrap_or_default();

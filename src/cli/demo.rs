@@ -1,4 +1,4 @@
-//! `truebead demo`: the whole loop on this machine, with nothing attached.
+//! `truebead demo`: the whole loop on this machine, without hardware.
 
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
@@ -17,9 +17,9 @@ use crate::io::clock::RunClock;
 use crate::link::{PrintJob, RobotParams};
 use crate::simulators::robot::{RobotOptions, RobotSim};
 
-/// The cell, as it is shipped.
+/// The cell that ships with the program.
 const CELL: &str = include_str!("../../cells/demo.toml");
-/// Where the shipped cell looks for its robot.
+/// Address of the robot in that cell.
 const SHIPPED_ADDRESS: &str = "127.0.0.1:5653";
 
 /// Runs the whole loop on this machine with nothing attached.

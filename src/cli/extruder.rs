@@ -25,7 +25,7 @@ pub enum ExtruderGroup {
     Models(models::ModelsArgs),
 }
 
-/// Runs one of them.
+/// Runs a command of the group.
 pub fn run(command: &ExtruderGroup) -> anyhow::Result<ExitCode> {
     match command {
         ExtruderGroup::Excite(args) => excite::run(args).map(|()| ExitCode::SUCCESS),

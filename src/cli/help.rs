@@ -13,7 +13,7 @@ pub fn with_groups(command: Command) -> Command {
     ))
 }
 
-/// The commands, those of daily use first, then each group.
+/// The commands, the ones for daily use first, then each group.
 fn list(command: &Command) -> String {
     let styles = Styles::styled();
     let head = |name: &str| {
@@ -44,7 +44,7 @@ fn list(command: &Command) -> String {
     text
 }
 
-/// Names of all commands, with those of their groups.
+/// Names of all commands, including those of groups.
 fn names(command: &Command) -> Vec<String> {
     let mut names = Vec::new();
     for one in command.get_subcommands() {
@@ -69,10 +69,10 @@ mod tests {
     use super::*;
     use crate::cli::Cli;
 
-    /// Most lines of a help.
+    /// Largest number of lines of a help.
     const MAX_LINES: usize = 60;
 
-    /// What `--help` prints behind the words of a command.
+    /// The output of `--help` after a command.
     fn printed(path: &[String]) -> String {
         let words = path.iter().map(String::as_str).chain(["--help"]);
         let asked = with_groups(Cli::command()).try_get_matches_from(words);

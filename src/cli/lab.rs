@@ -18,7 +18,7 @@ pub enum LabGroup {
     Render(render::RenderArgs),
 }
 
-/// Runs one of them.
+/// Runs a command of the group.
 pub fn run(command: &LabGroup, voice: Verbosity) -> anyhow::Result<ExitCode> {
     match command {
         LabGroup::Reproduce(args) => reproduce::run(args, voice),

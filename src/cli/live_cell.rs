@@ -1,4 +1,4 @@
-//! A live run: from a loaded cell to the run's report.
+//! A live run, from a loaded cell to the report.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -22,7 +22,7 @@ use crate::rows::log::{ControlFacts, LogOptions, RunLog};
 use crate::rows::output::LogError;
 use crate::width_control::target::WidthTarget;
 
-/// Runs a loaded cell into a folder, and prints the outcome.
+/// Runs a loaded cell, writes to a folder, and prints the result.
 pub fn drive(
     loaded: LoadedCell,
     out: &Path,
@@ -37,26 +37,25 @@ pub fn drive(
     Ok(outcome::tell(&report, out, max_rejected))
 }
 
-/// What ends a run besides the operator.
+/// Conditions other than a signal that end a run.
 #[derive(Debug, Clone, Copy)]
 pub struct Until {
-    /// This time \[s\].
+    /// Longest duration \[s\]; `None` for no limit.
     pub duration_s: Option<f64>,
-    /// The end of the steps.
+    /// Whether the end of the speed steps ends the run.
     pub ends_with_steps: bool,
 }
 
-/// Where a run leaves its files.
+/// Output folders of a run.
 #[derive(Debug, Clone, Copy)]
 pub struct Folders<'a> {
-    /// Its recording.
+    /// Folder of the recording.
     pub recording: &'a Path,
-    /// Its tables and its report.
+    /// Folder of tables and report.
     pub log: &'a Path,
 }
 
-/// Runs a cell that has been loaded, with its recording in one folder and its log in
-/// another, or the same.
+/// Runs a loaded cell; recording and log may have the same folder.
 pub fn live(
     loaded: LoadedCell,
     folders: Folders<'_>,
@@ -105,8 +104,8 @@ pub fn live(
     })?)
 }
 
-/// Begins the log of a cell, with names and values under the report's title, to which the
-/// calibration is added.
+/// Begins the log of a cell. `header` are facts under the report's title; the calibration is added
+/// to them.
 pub fn log<'a>(
     loaded: &LoadedCell,
     folder: &Path,
@@ -126,7 +125,7 @@ pub fn log<'a>(
     })
 }
 
-/// Names and values under the title of a live run's report.
+/// Facts under the title of a live run's report.
 fn about(
     run: &RunPart,
     robot: &dyn RobotDriver,
@@ -142,8 +141,8 @@ fn about(
     about
 }
 
-/// The extruder side of a live run and the files behind it; none where the cell has none.
-/// Refuses an extruder without an address.
+/// The extruder side of a live run and its files; `None` if the cell has none. Refuses an extruder
+/// without an address.
 fn live_extruder(
     loaded: &LoadedCell,
     run: &RunPart,

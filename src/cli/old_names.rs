@@ -1,8 +1,8 @@
-//! Names of commands that have changed; the table goes before version 1.0.
+//! Changed names of commands; the table will be removed before version 1.0.
 
 use clap::error::{ContextKind, ContextValue};
 
-/// Former commands with their present names.
+/// Former commands with their current names.
 const COMMANDS: [(&str, &str); 12] = [
     ("board", "camera board"),
     ("verify", "camera verify"),
@@ -22,7 +22,7 @@ const COMMANDS: [(&str, &str); 12] = [
 const OPTIONS: [(&str, &str); 2] =
     [("--starts", "extruder starts"), ("--noise", "extruder noise --column")];
 
-/// The message for a name that has changed; none for another mistake.
+/// The message for a changed name; `None` for other errors.
 pub fn refusal(error: &clap::Error) -> Option<String> {
     let found = |kind| match error.get(kind) {
         Some(ContextValue::String(name)) => Some(name.as_str()),

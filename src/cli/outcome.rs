@@ -8,7 +8,7 @@ use crate::live::{Ending, LiveReport};
 use crate::rows::names;
 use crate::rows::summary::Summary;
 
-/// Prints the figures of a run to standard output, and gives its status.
+/// Prints the figures of a run to standard output, and returns its status.
 pub fn tell(report: &LiveReport, out: &Path, max_rejected: f64) -> ExitCode {
     print_figures(&report.summary);
     say!("report     {}", out.join("report.html").display());
@@ -19,7 +19,7 @@ pub fn tell(report: &LiveReport, out: &Path, max_rejected: f64) -> ExitCode {
     status(report, max_rejected)
 }
 
-/// The figures, to standard output.
+/// Prints the figures to standard output.
 pub fn print_figures(summary: &Summary) {
     say!("frames     {}, {} measured", summary.frames, summary.measured);
     for (reason, count) in &summary.rejected {
@@ -72,7 +72,7 @@ pub fn print_figures(summary: &Summary) {
     }
 }
 
-/// The status of a run; prints the reason where it is not 0.
+/// The exit status of a run; prints the reason if it is not 0.
 pub fn status(report: &LiveReport, max_rejected: f64) -> ExitCode {
     let faults = report.summary.control.as_ref().map_or(0, |control| control.faults);
     match &report.ending {
@@ -118,8 +118,8 @@ pub fn status(report: &LiveReport, max_rejected: f64) -> ExitCode {
         tell!("warning: {why}, and nothing was controlled");
         return ExitCode::from(WITH_LOSS);
     }
-    // A run that is ended early may show little more than the start of the bead; that is no
-    // loss.
+    // A run that is ended early may show little more than the start of the bead; rejected frames
+    // are no loss then.
     if report.ending != Ending::Asked
         && let Some(status) = status_of_rejections(&report.summary, max_rejected)
     {
@@ -128,7 +128,7 @@ pub fn status(report: &LiveReport, max_rejected: f64) -> ExitCode {
     if report.recording.is_err() { ExitCode::from(WITH_LOSS) } else { ExitCode::SUCCESS }
 }
 
-/// Warns of too many rejected frames, and gives the status for them.
+/// Warns of too many rejected frames, and returns the status for them; `None` if they are few.
 pub fn status_of_rejections(summary: &Summary, max_rejected: f64) -> Option<ExitCode> {
     let rejected = summary.rejected_fraction();
     (rejected > max_rejected).then(|| {

@@ -66,8 +66,8 @@ fn range(beads: &[PlannedBead], extruder: &PlannedExtruder) -> CommandRange {
     CommandRange { min: low + extruder.facts.idle, max: high + extruder.facts.idle }
 }
 
-/// Slowest planned speed further than a nozzle from a bead's ends \[mm/s\]; none where
-/// all beads are shorter.
+/// Slowest planned speed at more than a nozzle's length from a bead's ends \[mm/s\]; `None` if all
+/// beads are shorter.
 fn slowest(beads: &[PlannedBead], nozzle_mm: f64) -> Option<f64> {
     let inside = beads.iter().flat_map(|bead| {
         let speed = &bead.plan.speed;
@@ -88,7 +88,7 @@ fn summary(beads: &[PlannedBead], extruder: &PlannedExtruder) -> Vec<(&'static s
         format!("{:.3} mm ({:.1} %)", error * facts.width_mm, 100.0 * error)
     };
     let CommandRange { min: low, max: high } = range(beads, extruder);
-    // Rounding alone may make it less than nothing.
+    // Rounding may make it slightly negative.
     let added_s = sum(|bead| bead.plan.added_s).max(0.0);
     let following = error(|bead| &bead.proportional);
     let mut lines = vec![

@@ -1,8 +1,8 @@
-//! Output of commands: results on standard output, all else on standard error.
+//! Output of commands: results on standard output, all other messages on standard error.
 
 use std::io::Write as _;
 
-/// Writes a line to standard output. A closed pipe is no reason to stop: a run goes on.
+/// Writes a line to standard output. A closed pipe does not stop the program: a run continues.
 macro_rules! say {
     () => { say!("") };
     ($($text:tt)*) => {{
@@ -11,7 +11,7 @@ macro_rules! say {
     }};
 }
 
-/// Writes a line to standard error. A closed standard error is no reason to stop.
+/// Writes a line to standard error. A closed standard error does not stop the program.
 macro_rules! tell {
     ($($text:tt)*) => {{
         use std::io::Write;
@@ -19,12 +19,12 @@ macro_rules! tell {
     }};
 }
 
-/// The arguments are wrong, in words as for `format!`.
+/// An error for wrong arguments, with a message as for `format!`.
 macro_rules! wrong {
     ($($text:tt)*) => { $crate::cli::arguments::WrongArguments::new(format_args!($($text)*)) };
 }
 
-/// Returns that the arguments are wrong.
+/// Returns an error for wrong arguments.
 macro_rules! refuse {
     ($($text:tt)*) => { return Err(wrong!($($text)*).into()) };
 }
@@ -36,8 +36,7 @@ macro_rules! line {
     }};
 }
 
-/// Writes to standard output. A reader that has gone away, such as `head`, is no
-/// reason to stop.
+/// Writes to standard output. A reader that has ended, such as `head`, does not stop the program.
 pub fn print(text: &str) {
     let _ = std::io::stdout().write_all(text.as_bytes());
 }
@@ -45,7 +44,7 @@ pub fn print(text: &str) {
 /// How much a command prints on standard error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Verbosity {
-    /// Nothing but errors.
+    /// Whether only errors are printed.
     pub quiet: bool,
 }
 

@@ -27,9 +27,9 @@ use crate::rows::summary::{RunNote, Summary};
 use crate::run::ports::{FrameSource, Grab, SourceError};
 use crate::vision::{Measurer, Reject, RoughnessEstimator};
 
-/// Frames that may wait between reading and measuring, which trades memory against idle cores.
+/// Frames that may wait between reading and measuring: more need memory, fewer leave cores idle.
 const QUEUE_LENGTH: usize = 8;
-/// Unreadable frames that are named one by one, which keeps the terminal readable.
+/// Number of unreadable frames that are listed one by one, so that the terminal stays readable.
 const MAX_NAMED_UNREADABLE: u64 = 10;
 
 /// Measures the bead in recorded frames.
@@ -97,14 +97,14 @@ pub fn run(args: &ProcessArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     Ok(conclude(args, &summary, &first_rejections, &loaded))
 }
 
-/// The first frame that was rejected with each status, and why.
+/// The first frame that was rejected with each status, and its reason.
 type FirstRejections = BTreeMap<&'static str, (u64, Reject)>;
 
 fn wrong_input(SourceError { source_name, what }: SourceError) -> WrongArguments {
     wrong!("{source_name}: {what}")
 }
 
-/// Where frames are measured one after the other.
+/// State of the measuring loop.
 struct Measuring<'a> {
     loaded: &'a LoadedCell,
     robot_z: Option<&'a RobotZ>,
@@ -117,8 +117,8 @@ struct Measuring<'a> {
 }
 
 impl Measuring<'_> {
-    /// Reads in a separate thread, measures here. A source that fails in the middle ends the
-    /// work with a warning; the results so far are kept.
+    /// Reads in a separate thread, measures here. If the source fails in the middle, the work ends
+    /// with a warning; the results so far are kept.
     fn measure_all(
         mut self,
         mut source: Box<dyn FrameSource>,
@@ -205,7 +205,7 @@ impl Measuring<'_> {
     }
 }
 
-/// Gives every frame on until there are no more or nobody wants them.
+/// Passes on every frame, until there are no more or the receiver is gone.
 fn read(
     source: &mut dyn FrameSource,
     send: &Sender<Grab>,

@@ -10,7 +10,7 @@ use crate::cell::Cell;
 use crate::cell::file::{CalibrationSource, Purpose};
 use crate::io::recording::Recording;
 
-/// Opens a recording that is named on the command line.
+/// Opens a recording from the command line.
 pub fn open(path: &Path) -> Result<Recording, WrongArguments> {
     Recording::open(path).map_err(WrongArguments::new)
 }
@@ -26,21 +26,21 @@ pub fn refuse_foreign(recording: &Recording) -> Result<(), WrongArguments> {
     Ok(())
 }
 
-/// Warns of what is missing or damaged in a recording that has been read.
+/// Warns of missing or damaged parts of a recording that has been read.
 pub fn warn_of_damage(recording: &Recording) {
     if let Some(what) = recording.integrity().summary() {
         tell!("warning: {}: {what}", recording.file());
     }
 }
 
-/// Whether a file begins with these bytes, whatever its name.
+/// Whether a file begins with these bytes.
 pub fn begins_with(path: &Path, magic: &[u8]) -> std::io::Result<bool> {
     let mut begin = Vec::new();
     File::open(path)?.take(magic.len() as u64).read_to_end(&mut begin)?;
     Ok(begin == magic)
 }
 
-/// The cell of a recording and its calibration, as they were in the run.
+/// The attached cell of a recording and its calibration, as they were in the run.
 pub fn attached_cell(
     recording: &Recording,
     purpose: Purpose,

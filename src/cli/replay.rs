@@ -1,4 +1,4 @@
-//! `truebead replay`: whether today's controller gives the recorded steps.
+//! `truebead replay`: whether the current controller gives the recorded steps.
 
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -59,7 +59,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<ExitCode> {
     Ok(status)
 }
 
-/// The controller as it was at the start of the run.
+/// The controller in its state at the start of the run.
 fn recorded_controller(recording: &Recording) -> anyhow::Result<Controller> {
     let file = recording.file();
     refuse_foreign(recording)?;
@@ -77,7 +77,7 @@ fn recorded_controller(recording: &Recording) -> anyhow::Result<Controller> {
     Ok(controller.with_extruder(setup, part.demand))
 }
 
-/// The files that the extruder side is made from.
+/// The attached files of the extruder side.
 fn recorded_files(recording: &Recording, part: &ExtruderPart) -> anyhow::Result<Vec<ExtruderFile>> {
     let from = recording.file();
     let file = |name| {
@@ -113,7 +113,7 @@ fn with_progress<'a, E>(
     })
 }
 
-/// Prints how it went and gives the exit status.
+/// Prints the result and returns the exit status.
 fn tell(report: &ReplayReport) -> ExitCode {
     if let Some(difference) = &report.difference {
         print_difference(report.compared, difference);

@@ -1,4 +1,4 @@
-//! The JSON Schema of a cell file, for editors that complete and check TOML by one.
+//! The JSON Schema of a cell file, for editors that complete and check TOML with a schema.
 
 use serde_json::{Map, Value, json};
 
@@ -6,7 +6,7 @@ use crate::cell::Cell;
 use crate::document::describe::{KeyKind, KeySpec};
 use crate::drivers::Devices;
 
-/// Endings of keys and the units that they stand for, longer ones first.
+/// Suffixes of keys and their units, longer ones first.
 const UNITS: [(&str, &str); 31] = [
     ("_grey_per_px", "grey levels of 256 per px"),
     ("_mm_per_px_sigma", "mm/px"),
@@ -41,8 +41,8 @@ const UNITS: [(&str, &str); 31] = [
     ("_m", "m"),
 ];
 
-/// The schema of a cell file with every driver that there is. It is never stricter than the
-/// reader: a key that another choice needs passes.
+/// The schema of a cell file with all drivers. It is never stricter than the reader: it accepts
+/// keys that only other choices need.
 pub fn of_a_cell() -> Value {
     let mut tables = Map::new();
     for spec in Cell::keys(Devices::default) {
@@ -65,7 +65,7 @@ pub fn of_a_cell() -> Value {
     })
 }
 
-/// The object of a table such as `extruder.pressure`; it is made where there is none.
+/// The object of a table such as `extruder.pressure`; created if it does not exist.
 fn table_of<'a>(tables: &'a mut Map<String, Value>, path: &str) -> &'a mut Map<String, Value> {
     let (name, rest) = path.split_once('.').map_or((path, None), |(name, rest)| (name, Some(rest)));
     let table = tables.entry(name).or_insert_with(
@@ -82,7 +82,7 @@ fn properties_of(table: &mut Map<String, Value>) -> &mut Map<String, Value> {
     object(table.entry("properties").or_insert_with(|| json!({})))
 }
 
-/// The members of a value that is an object; it becomes one where it is none.
+/// The members of a value that is an object; any other value is replaced by an empty object.
 fn object(value: &mut Value) -> &mut Map<String, Value> {
     if !value.is_object() {
         *value = json!({});
@@ -127,7 +127,7 @@ fn property(spec: &KeySpec) -> Value {
     property
 }
 
-/// Unit, range and condition of a key in words; none where there is nothing to say.
+/// Unit, range and condition of a key in words; `None` without any of them.
 fn description(spec: &KeySpec) -> Option<String> {
     let unit =
         UNITS.iter().find(|(ending, _)| spec.key.ends_with(ending) || spec.key == &ending[1..]);

@@ -1,4 +1,4 @@
-//! `truebead sim`: machines that answer the links.
+//! `truebead sim`: simulated machines on the links.
 
 mod extruder;
 mod robot;
@@ -15,7 +15,7 @@ pub enum SimGroup {
     Extruder(extruder::ExtruderSimArgs),
 }
 
-/// Runs one of them.
+/// Runs a command of the group.
 pub fn run(command: &SimGroup) -> anyhow::Result<ExitCode> {
     match command {
         SimGroup::Robot(args) => robot::run(args),

@@ -1,5 +1,4 @@
-//! `truebead simulate`: the closed loop on a simulated cell, as fast as the
-//! machine allows.
+//! `truebead simulate`: the closed loop on a simulated cell, as fast as the computer allows.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -133,7 +132,7 @@ impl Observer for Logger {
     }
 
     fn is_done(&self) -> bool {
-        // A simulation that cannot be written ends.
+        // The simulation ends if its log cannot be written.
         self.failed.is_some() || self.stop.requested()
     }
 

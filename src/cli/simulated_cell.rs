@@ -20,7 +20,7 @@ pub fn simulated_extruder(loaded: &LoadedCell) -> anyhow::Result<Option<Commande
     Ok(side.map(|side| side.extruder))
 }
 
-/// Records the simulation, where a folder is given.
+/// Records the simulation if a folder is given.
 pub struct SimRecorder(Option<RecorderHandle>);
 
 impl SimRecorder {

@@ -1,4 +1,4 @@
-//! `truebead tune`: a short experiment, or a recording, and the settings that follow.
+//! `truebead tune`: settings from a short experiment or a recording.
 
 mod analyse;
 mod arguments;

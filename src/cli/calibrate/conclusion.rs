@@ -22,18 +22,18 @@ pub struct CalibrationResult<'a> {
     args: &'a CalibrateArgs,
     board: &'a Board,
     images: &'a CalibrationImages,
-    /// The camera.
+    /// The camera with its residuals.
     pub solution: Solution,
     plane: BedPlane,
     covariance: Option<CalibrationCovariance>,
     maps: Vec<WidthMap>,
-    /// The further image that would help most.
+    /// The additional image that would reduce the uncertainty most.
     pub next: Option<NextView>,
 }
 
 impl<'a> CalibrationResult<'a> {
-    /// Fails where no camera or no bed is found, and for a surface that the camera does
-    /// not look down on.
+    /// Fails if no camera or no bed plane can be computed, or if the camera does not look down on
+    /// the measured surface.
     pub fn of(
         args: &'a CalibrateArgs,
         board: &'a Board,
@@ -43,7 +43,7 @@ impl<'a> CalibrationResult<'a> {
         let seen: Vec<BoardObservation> = all.filter_map(|(_, board)| board.clone().ok()).collect();
         let solution = solve::solve(board, &seen)?;
         let plane = plane::find(args, board, &solution, images)?;
-        // Where the focal length is undetermined, the corners' noise is not the largest error.
+        // If the focal length is not determined, the corners' noise is not the largest error.
         let covariance = warnings::settles_camera(&solution)
             .then(|| CalibrationCovariance::of(board, &solution, &plane.on_bed, plane.thickness))
             .flatten();
@@ -53,7 +53,7 @@ impl<'a> CalibrationResult<'a> {
         Ok(result)
     }
 
-    /// Computes the standard deviation of the bead's width.
+    /// Computes the standard deviation of the bead's width at each height.
     fn find_width_sigma(&mut self) -> anyhow::Result<()> {
         let Some(known) = &self.covariance else { return Ok(()) };
         let camera_mm = known.camera_height_mm();
@@ -76,8 +76,8 @@ impl<'a> CalibrationResult<'a> {
         Ok(())
     }
 
-    /// The largest standard deviation of the bead's width where boards were seen \[mm\], at
-    /// any of the heights; `None` where it cannot be determined.
+    /// The largest standard deviation of the bead's width in the area where boards were seen, over
+    /// all heights \[mm\]; `None` if it cannot be determined.
     pub fn worst_mm(&self) -> Option<f64> {
         width_map::worst_mm(&self.maps)
     }
@@ -88,8 +88,8 @@ impl<'a> CalibrationResult<'a> {
         limit.is_some_and(|limit| self.worst_mm().is_none_or(|worst| worst > limit.get()))
     }
 
-    /// Relative standard deviation of a width where boards were seen: of the given bead or a
-    /// typical one, at the worst of the heights.
+    /// Relative standard deviation of a width in the area where boards were seen: of the given or
+    /// a typical bead, at the worst height.
     fn width_sigma_fraction(&self) -> Option<f64> {
         let bead = self.maps.first().map(|map| map.bead_mm);
         let given = self.worst_mm().zip(bead).map(|(worst, bead)| worst / bead);
@@ -112,7 +112,7 @@ impl<'a> CalibrationResult<'a> {
         .concat()
     }
 
-    /// The report, which reloads itself after a number of seconds where one is given.
+    /// The report; it reloads itself every `reload_s` seconds, or not at all for `None`.
     pub fn page(&self, text: &str, reload_s: Option<u32>) -> String {
         CalibrationPage {
             board: self.board,
@@ -128,7 +128,7 @@ impl<'a> CalibrationResult<'a> {
         .page()
     }
 
-    /// Writes the file, once it has been read back and found sound.
+    /// Writes the file after a check that it can be read back.
     pub fn write(&self) -> anyhow::Result<Calibration> {
         let text = self.file();
         let calibration = self.read_back(&text)?;
@@ -136,7 +136,7 @@ impl<'a> CalibrationResult<'a> {
         Ok(calibration)
     }
 
-    /// The calibration as it would be read from the file.
+    /// The calibration as it is read from the file.
     pub fn calibration(&self) -> anyhow::Result<Calibration> {
         self.read_back(&self.file())
     }

@@ -30,12 +30,11 @@ use crate::run::ports::{FrameSource, Grab};
 const FRAME_TIMEOUT_S: f64 = 5.0;
 /// Largest number of images: more of them hardly reduce the uncertainty.
 const MAX_VIEWS: usize = 60;
-/// Seconds after which the report reloads itself.
+/// Period with which the report reloads itself \[s\].
 const RELOAD_S: u32 = 3;
 
-/// Takes images until the width of the bead is known as well as was asked for, a
-/// further image brings nothing, there are [`MAX_VIEWS`], the camera ends, or the user
-/// ends it.
+/// Takes images until the uncertainty of the bead's width meets its limit, an additional image has
+/// no effect, there are [`MAX_VIEWS`] images, the camera ends, or the user ends it.
 pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<CalibrationImages> {
     let name = args.camera.as_deref().unwrap_or_default();
     let source = source(name)?;
@@ -74,7 +73,8 @@ fn source(name: &str) -> Result<ImageSource, WrongArguments> {
     }
 }
 
-/// A folder without other images, which would be mistaken for images of this camera.
+/// The folder for the images. Fails if it has other images, which could be mistaken for images of
+/// this camera.
 fn folder(args: &CalibrateArgs) -> Result<PathBuf, WrongArguments> {
     let beside = || {
         let stem = args.out.file_stem().unwrap_or(args.out.as_os_str()).to_string_lossy();
@@ -96,7 +96,7 @@ fn folder(args: &CalibrateArgs) -> Result<PathBuf, WrongArguments> {
     ))
 }
 
-/// The images taken so far, and the output about them.
+/// The images taken so far, and the messages about them.
 struct Taking<'a> {
     args: &'a CalibrateArgs,
     board: &'a Board,
@@ -136,7 +136,7 @@ impl Taking<'_> {
         Ok(())
     }
 
-    /// Takes a frame; returns whether the images are enough.
+    /// Examines a frame; returns whether there are enough images.
     fn examine(&mut self, frame: &Frame) -> anyhow::Result<bool> {
         match self.collector.add(board_observation::observe(self.board, "", frame)) {
             Decision::Kept(number) => self.keep(number, frame),
@@ -172,7 +172,7 @@ impl Taking<'_> {
         Ok(self.assess(number) || number >= MAX_VIEWS)
     }
 
-    /// Prints the progress and writes the report; returns whether the images are enough. A few
+    /// Prints the progress and writes the report; returns whether there are enough images. A few
     /// images may not determine a camera; then more are taken.
     fn assess(&mut self, number: usize) -> bool {
         let images = taken_so_far(&self.files, self.collector.kept());
@@ -191,13 +191,13 @@ impl Taking<'_> {
                 self.screen.say(&format!("  open {} to follow it", report.display()));
             }
             Ok(Ok(())) | Err(_) => {}
-            // It is written once more at the end; an error there is final.
+            // The report is written again at the end; an error there ends the command.
             Ok(Err(error)) => self.screen.state(&error.to_string()),
         }
         is_enough(self.args, &result)
     }
 
-    /// Removes the folder where it is new and empty.
+    /// Removes the folder if it is new and empty.
     fn clear(&self) {
         if self.is_folder_new {
             let _ = std::fs::remove_dir(&self.folder);
@@ -265,8 +265,8 @@ fn words(news: &Decision) -> String {
     }
 }
 
-/// Results on standard output; what is just going on on standard error: in one line on a
-/// terminal, otherwise whenever something else is going on.
+/// Output: results on standard output, the current activity on standard error, in one line on a
+/// terminal, otherwise a line for each change.
 struct Screen {
     bar: ProgressBar,
     is_plain: bool,
@@ -275,7 +275,7 @@ struct Screen {
 
 impl Screen {
     fn new() -> Self {
-        // Hidden by itself where standard error is not a terminal.
+        // The spinner hides itself if standard error is not a terminal.
         let bar = ProgressBar::new_spinner();
         let style = ProgressStyle::with_template("{spinner} {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
@@ -291,13 +291,13 @@ impl Screen {
         self.bar.set_message(text.to_owned());
         let kind: String = text.chars().filter(|letter| !letter.is_ascii_digit()).collect();
         if self.is_plain && kind != self.last {
-            // A closed standard error is no reason to stop.
+            // A closed standard error does not stop the work.
             let _ = writeln!(std::io::stderr(), "{text}");
         }
         self.last = kind;
     }
 
-    /// Whoever holds the board cannot read the screen.
+    /// Rings the bell: a user who holds the board cannot read the screen.
     fn ring(&self) {
         if !self.is_plain {
             let _ = write!(std::io::stderr(), "\x07");

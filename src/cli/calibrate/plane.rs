@@ -1,4 +1,4 @@
-//! The images that fix the bed plane, and what they say.
+//! The images for the bed plane, and the plane.
 
 use std::path::{Path, PathBuf};
 
@@ -14,14 +14,14 @@ use crate::calibration::solve::Solution;
 use crate::cli::arguments::WrongArguments;
 use crate::cli::bed_plane::{BedPlane, BoardsOnBed, find_corners};
 
-/// Reprojection error (RMS) of corners on the bed that is accepted, as a multiple of that of the
-/// other images. Beyond it the images are not of this camera, or the boards lay on no plane.
+/// Accepted reprojection error (RMS) of corners on the bed, as a multiple of that of the other
+/// images. Above it the images are of another camera, or the boards did not lie on a plane.
 const MAX_RMS_RATIO: f64 = 4.0;
-/// Reprojection error (RMS) that is accepted in any case \[px\]: a very good calibration must not
+/// Reprojection error (RMS) that is always accepted \[px\]: a very good calibration must not
 /// refuse a usual image.
 const MIN_ACCEPTED_RMS_PX: f64 = 0.3;
 
-/// Finds a mistyped image before the long work.
+/// Finds a mistyped image name before the long work.
 pub fn check(planes: &[PathBuf], files: &[PathBuf]) -> Result<(), WrongArguments> {
     match planes.iter().find(|path| !path.is_file() && index_of(path, files).is_none()) {
         Some(path) => {
@@ -31,8 +31,7 @@ pub fn check(planes: &[PathBuf], files: &[PathBuf]) -> Result<(), WrongArguments
     }
 }
 
-/// The image of the folder that is meant: by path, or by its name alone where there is
-/// no such file.
+/// Index of the image in the folder: by path, or by name alone if there is no such file.
 fn index_of(plane: &Path, files: &[PathBuf]) -> Option<usize> {
     let by_name = !plane.is_file() && plane.parent().is_none_or(|p| p.as_os_str().is_empty());
     let is_same = |file: &PathBuf| {
@@ -42,8 +41,8 @@ fn index_of(plane: &Path, files: &[PathBuf]) -> Option<usize> {
     files.iter().position(is_same)
 }
 
-/// Fits the bed plane to the boards of the images that were named, or to the last
-/// board that was found.
+/// Fits the bed plane to the boards in the named images, otherwise to the last board that was
+/// found.
 pub fn find(
     args: &CalibrateArgs,
     board: &Board,
@@ -104,8 +103,8 @@ fn corners_of(solution: &Solution, name: &str) -> Option<Vec<CornerObservation>>
     solution.views.iter().find(|view| view.name == name).map(|view| view.corners.clone())
 }
 
-/// The board's corners in the named image: those of the calibration where it took part, else
-/// found again.
+/// The board's corners in a named image: those of the calibration if it was used there, otherwise
+/// detected again.
 fn on_bed(
     path: &Path,
     board: &Board,
@@ -119,7 +118,7 @@ fn on_bed(
             Ok(_) => corners_of(solution, name)
                 .map(|corners| (name.clone(), corners))
                 .with_context(|| format!("--plane {name}: not used")),
-            // A board that is twice at one position still lies on the bed.
+            // A duplicate of another position is still a board on the bed.
             Err(BoardRejection::Duplicate { .. }) => {
                 find_corners(file, board, solution.image_size_px)
             }

@@ -12,7 +12,7 @@ use crate::calibration::width_map::{self, WidthMap};
 use crate::calibration::{Calibration, warnings};
 use crate::core::Mm;
 
-/// One line for each image: corners and errors, or why it is not used.
+/// One line for each image: corners and errors, or why it was rejected.
 pub fn images(observed: &Observations, solution: &Solution) -> String {
     let mut out = String::new();
     let column = name_column(observed);
@@ -41,7 +41,7 @@ pub fn images(observed: &Observations, solution: &Solution) -> String {
     out
 }
 
-/// One line for each image where no calibration is found.
+/// One line for each image, for a calibration that failed.
 pub fn refusals(observed: &Observations) -> String {
     let mut out = String::new();
     let column = name_column(observed);
@@ -58,7 +58,7 @@ fn name_column(observed: &Observations) -> usize {
     observed.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max("image".len())
 }
 
-/// The lens models with their reprojection errors, and the one that is used.
+/// The lens models with their reprojection errors, and the chosen one.
 pub fn lens(solution: &Solution) -> String {
     let mut out = String::new();
     line!(out, "\nlens: reprojection error of each model, and on images left out of its fit");
@@ -80,7 +80,7 @@ pub fn lens(solution: &Solution) -> String {
     out
 }
 
-/// Design effect from which it is reported. Derived: 1 + 3·0.16, three of its standard errors
+/// Design effect above which it is reported. Derived: 1 + 3·0.16, three of its standard errors
 /// above 1 with a dozen images.
 const REPORTED_EFFECT: f64 = 1.5;
 /// Length of the longest name of a parameter \[letters\].
@@ -196,7 +196,7 @@ pub fn maps(maps: &[WidthMap], limit: Option<Mm>) -> String {
     out
 }
 
-/// The further image that would help most.
+/// The additional image that would reduce the uncertainty most.
 pub fn next_view(covariance: Option<&CalibrationCovariance>, next: Option<&NextView>) -> String {
     let mut out = String::new();
     match (covariance, next) {

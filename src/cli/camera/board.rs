@@ -1,4 +1,4 @@
-//! `truebead camera board`: a checkerboard to print.
+//! `truebead camera board`: a checkerboard for printing.
 
 use std::path::PathBuf;
 

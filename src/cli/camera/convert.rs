@@ -1,4 +1,4 @@
-//! `truebead camera convert`: cameras from and for ROS and OpenCV.
+//! `truebead camera convert`: calibrations to and from ROS and OpenCV.
 
 mod arguments;
 mod import;
@@ -15,7 +15,7 @@ use crate::core::Mm;
 use crate::io::atomic_file::write_atomic;
 use crate::io::calibration_file;
 
-/// Runs the command. What the other format cannot hold goes to standard error.
+/// Runs the command. Data that the other format has no place for are listed on standard error.
 pub fn run(args: &ConvertArgs, voice: Verbosity) -> anyhow::Result<()> {
     let to = target(args)?;
     check(args, to)?;
@@ -54,8 +54,7 @@ fn ends_in(path: &Path, endings: &[&str]) -> bool {
 const YAML: &[&str] = &["yaml", "yml"];
 const TOML: &[&str] = &["toml"];
 
-/// The format of the output; its name must have the ending by which other programs recognise
-/// it.
+/// The format of the output; its name must have the extension that other programs expect.
 fn target(args: &ConvertArgs) -> Result<To, WrongArguments> {
     let is_toml = ends_in(&args.out, TOML);
     let out = args.out.display();
@@ -140,7 +139,7 @@ impl ConvertSource {
         }
     }
 
-    /// A note about the data that the format cannot hold; `None` where nothing is lost.
+    /// A note about data for which the format has no place; `None` if nothing is lost.
     fn left_out(&self, to: To) -> Option<String> {
         let is_given = |quality: &CalibrationQuality| {
             quality.width_relative_sigma.is_some()

@@ -15,7 +15,7 @@ use crate::cli::recorded::begins_with;
 /// First bytes of an MCAP file (MCAP specification, § Magic).
 const MCAP: &[u8] = b"\x89MCAP0\r\n";
 
-/// Runs the command; the answer goes to standard output.
+/// Runs the command; the result goes to standard output.
 pub fn run(args: &OffsetArgs) -> anyhow::Result<ExitCode> {
     if is_recording(&args.input)? {
         args.refuse("a recording", &args.of_image())?;
@@ -27,7 +27,7 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Decided by the first bytes of the file, whatever its name.
+/// Whether the file is a recording, by its first bytes.
 fn is_recording(path: &Path) -> Result<bool, WrongArguments> {
     let wrong = |what: String| wrong!("{}: {what}", path.display());
     if path.is_dir() {

@@ -1,4 +1,4 @@
-//! `truebead camera verify`: whether a calibration still holds.
+//! `truebead camera verify`: whether a calibration is still valid.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -14,17 +14,17 @@ use crate::cli::board_image::{check_size, find_board};
 use crate::core::Mm;
 use crate::io::calibration_file;
 
-/// Default of the largest error of a width that is accepted \[%\].
+/// Default of the largest accepted error of a width \[%\].
 const MAX_ERROR_PERCENT: f64 = 0.2;
-/// Standard deviations of the calibration's own uncertainty that are accepted besides. Derived:
-/// P(|z| > 3) is 0.27 % for a normal deviate.
+/// Additional accepted error, in standard deviations of the calibration's own uncertainty.
+/// Derived: P(|z| > 3) is 0.27 % for a normal deviate.
 const ACCEPTED_SIGMAS: f64 = 3.0;
-/// Ratio of the lens's reprojection error to that of its calibration above which it has changed.
+/// Ratio of the reprojection error to that of the calibration above which the lens has changed.
 const MAX_LENS_RATIO: f64 = 2.0;
-/// Reprojection error below which a lens is unchanged in any case \[px\].
+/// Reprojection error up to which a lens always counts as unchanged \[px\].
 const LENS_CHANGED_PX: f64 = 0.15;
-/// Height error above which the board is reported as higher or lower \[mm\]; below it, noise
-/// explains it.
+/// Height error above which the board is reported as higher or lower \[mm\]; smaller ones may be
+/// noise.
 const HIGHER_MM: f64 = 0.3;
 /// Tilt against the bed above which a board does not lie flat \[°\].
 const FLAT_DEG: f64 = 2.0;

@@ -13,11 +13,11 @@ use crate::io::atomic_file::write_atomic;
 use crate::report::calibration::cell::CellCalibrationPage;
 use crate::vision::gauge::BeadAxis;
 
-/// Cells of the map in text, along the image and across it.
+/// Cells of the map as text, in columns and rows.
 const TEXT_CELLS: Cells = Cells { columns: 8, rows: 6 };
 
-/// Prints the map, and writes the page where one is asked for. A calibration with one number for
-/// the whole image, or none, has no map.
+/// Prints the map, and writes the page if a path is given. A calibration with a single number for
+/// the whole image, or with none, has no map.
 pub fn tell(loaded: &LoadedCell, page: Option<&Path>) -> anyhow::Result<()> {
     let Calibration::Full { quality, .. } = &loaded.calibration else {
         anyhow::ensure!(page.is_none(), "--report: mm_per_px has no map of its uncertainty");
@@ -70,7 +70,7 @@ pub fn tell(loaded: &LoadedCell, page: Option<&Path>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// One of a plausible width that runs as the gauge says: the geometric mean of the
+/// A bead of plausible width in the direction of the gauge: its width is the geometric mean of the
 /// narrowest and the widest.
 fn bead(loaded: &LoadedCell) -> MapBead {
     let gauge = &loaded.cell.gauge;
@@ -88,7 +88,7 @@ fn middle(roi: Roi) -> ImagePoint {
     ImagePoint::new(half(roi.x, roi.width), half(roi.y, roi.height))
 }
 
-/// The map with the columns and rows of the cells' middles \[px\].
+/// The map as text, with the columns and rows of the cells' middles \[px\].
 fn lines(map: &RelativeSigmaMap, gauge: Roi) -> Vec<String> {
     let Cells { columns, rows } = map.counts;
     let middle = |cell: u32| {
@@ -116,7 +116,7 @@ fn lines(map: &RelativeSigmaMap, gauge: Roi) -> Vec<String> {
     lines
 }
 
-/// Three significant digits.
+/// A fraction in percent, with three significant digits.
 fn percent(fraction: f64) -> String {
     let percent = 100.0 * fraction;
     let places = if percent < 1.0 {

@@ -1,4 +1,4 @@
-//! `truebead extruder columns`: what a table or a recording holds.
+//! `truebead extruder columns`: lists the columns of a table or a recording.
 
 use std::path::PathBuf;
 

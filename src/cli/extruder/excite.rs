@@ -1,4 +1,4 @@
-//! `truebead extruder excite`: profiles that an extruder is excited with.
+//! `truebead extruder excite`: profiles that excite an extruder.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use crate::identify::digits::six_digits;
 use crate::identify::excitation::{Excitation, Waveform};
 use crate::io::atomic_file::write_atomic;
 
-/// Shortest hold time that is accepted \[s\]; a shorter one has a wrong unit.
+/// Shortest accepted hold time \[s\]; a shorter one probably has a wrong unit.
 const SHORTEST_S: f64 = 1e-3;
 /// Default period of a cell's commands \[s\]: `io_rate_hz` of 50 Hz.
 const DEFAULT_PERIOD_S: f64 = 0.02;
@@ -148,7 +148,7 @@ struct CommonArgs {
     out: PathBuf,
 }
 
-/// Runs the command; the answer goes to standard output.
+/// Runs the command; the result goes to standard output.
 pub fn run(args: &ExciteArgs) -> Result<()> {
     let (shape, level, all) = match &args.kind {
         Kind::Prbs(prbs) => {
@@ -206,7 +206,7 @@ impl CommonArgs {
         Ok(())
     }
 
-    /// Refuses a quantity of the bead, which cannot be commanded.
+    /// Refuses a quantity of the bead: it cannot be commanded.
     fn check_commanded(&self) -> Result<(), WrongArguments> {
         match Unit::of_column(&self.quantity) {
             Some(unit @ (Unit::Mm | Unit::Mm2)) => Err(wrong!(
@@ -220,7 +220,7 @@ impl CommonArgs {
     }
 }
 
-/// The shortest sequence that does not repeat itself, from 7 bits on.
+/// Number of bits of the shortest sequence that does not repeat itself; at least 7.
 fn bits_for(all: &CommonArgs) -> u32 {
     let bits = all.duration_s.unwrap_or(0.0) / all.hold_s;
     (7..16).find(|n| f64::from((1_u32 << n) - 1) >= bits).unwrap_or(16)
@@ -234,7 +234,7 @@ fn tell(profile: &CommandProfile, column: &str, out: &Path) {
     say!("values     {} to {} {unit}", six_digits(low), six_digits(high));
 }
 
-/// Prints the excited frequencies. Steps excite the slowest dynamics most, and a few levels have
+/// Prints the excited frequencies. Steps excite mainly the slowest dynamics, and a few levels have
 /// no band.
 fn print_band(excitation: &Excitation, (low_hz, high_hz): (f64, f64)) {
     let hold_s = six_digits(excitation.hold_s);

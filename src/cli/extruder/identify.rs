@@ -16,7 +16,7 @@ use crate::identify::model_file::{Conditions, to_toml};
 use crate::report::identify::{ModelStudy, page, study, text, to_json};
 use crate::rows::output::{make_folder, write_whole};
 
-/// Runs the command; the answer goes to standard output.
+/// Runs the command; the result goes to standard output.
 pub fn run(args: &IdentifyArgs) -> Result<()> {
     if let Some(folder) = &args.example {
         return example::write(folder);
@@ -51,7 +51,8 @@ fn write(found: &ModelStudy, setting: Conditions, folder: &Path) -> Result<Strin
     let json = serde_json::to_vec_pretty(&to_json(found)).context("identify.json")?;
     write_whole(folder, "identify.json", &json)?;
     write_whole(folder, "report.html", page(found).as_bytes())?;
-    // Last: an existing model is never replaced, so that a failed command can be repeated.
+    // The model is written last: an existing model is never replaced, so that a failed command can
+    // be repeated.
     write_whole(folder, keep::MODEL, model.as_bytes())?;
     Ok(model)
 }

@@ -1,4 +1,4 @@
-//! Where a model is saved: in a folder of its own, and in a library for cells.
+//! Storage of models: in a folder of their own, and in a library for cells.
 
 use std::path::{Path, PathBuf};
 
@@ -10,19 +10,19 @@ use crate::identify::model_file::parse;
 use crate::io::model_file::read_library;
 use crate::rows::output::{make_folder, write_whole};
 
-/// What a model is called in its own folder.
+/// Name of a model's file in its own folder.
 pub const MODEL: &str = "model.toml";
 
-/// What starts and stops are called in their own folder.
+/// Name of a start-stop model's file in its own folder.
 pub const STARTS: &str = "starts.toml";
 
-/// Refuses a folder that holds a file of this name already.
+/// Refuses a folder that already has a file of this name.
 pub fn refuse_taken(folder: &Path, name: &str) -> Result<(), WrongArguments> {
     refuse_replacing(&folder.join(name), "folder")
 }
 
-/// Adds the text of a model, which `kept` holds as well, to a library. Fails
-/// where the library has another model for the same conditions: a cell could not choose.
+/// Adds the text of a model, which is also in the file `kept`, to a library. Fails if the library
+/// has another model for the same conditions: a cell could not choose.
 pub fn add(library: &Path, text: &str, kept: &Path) -> Result<PathBuf> {
     let kept = kept.display().to_string();
     let model = parse(&kept, text)?;

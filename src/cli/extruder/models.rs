@@ -1,4 +1,4 @@
-//! `truebead extruder models`: what a folder of models holds.
+//! `truebead extruder models`: lists the models in a folder.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -54,12 +54,12 @@ pub struct ModelsArgs {
     output: Option<Unit>,
 }
 
-/// A unit by its word.
+/// Parses the name of a unit.
 fn parse_unit(word: &str) -> Result<Unit, String> {
     Unit::of_word(word).ok_or_else(|| format!("expected one of {}", units()))
 }
 
-/// Runs the command; the answer goes to standard output.
+/// Runs the command; the result goes to standard output.
 pub fn run(args: &ModelsArgs) -> Result<ExitCode> {
     let wanted = args.wanted()?;
     let ModelFolder { library, broken } = if args.path.is_dir() {

@@ -15,8 +15,8 @@ use crate::core::{MPa, Unit};
 use crate::extruder::pressure::kalman::PressureNoise;
 use crate::identify::grid::usual_step;
 
-/// Ratio of the variance of the drift between two readings to the variance of a reading, beyond
-/// which the pressure was not at rest.
+/// Largest ratio of the drift's variance between two readings to the variance of a reading; above
+/// it the pressure was not at rest.
 const MAX_DRIFT_RATIO: f64 = 1.0;
 
 /// Finds the noise of a pressure, as keys of [extruder.pressure].

@@ -1,4 +1,4 @@
-//! `truebead extruder starts`: how an extruder starts and stops, from a log of it.
+//! `truebead extruder starts`: identifies how an extruder starts and stops from a log.
 
 use std::path::{Path, PathBuf};
 
@@ -52,7 +52,7 @@ pub struct StartsArgs {
     out: Option<PathBuf>,
 }
 
-/// Runs the command; the answer goes to standard output.
+/// Runs the command; the result goes to standard output.
 pub fn run(args: &StartsArgs) -> Result<()> {
     let setting = args.setting.setting()?;
     let folder = args.out.clone().unwrap_or_else(|| free_folder("starts"));
@@ -72,7 +72,7 @@ fn write_all(found: &StartStudy, folder: &Path) -> Result<()> {
     let notes = [format!("Fitted by truebead {version} to {}.", found.logs.source), text(found)];
     make_folder(folder)?;
     write_whole(folder, "report.html", page(found).as_bytes())?;
-    // Last: an existing file is never replaced, so that a failed command can be repeated.
+    // Written last: an existing file is never replaced, so that a failed command can be repeated.
     write_whole(folder, keep::STARTS, to_toml(&found.file, &notes).as_bytes())?;
     Ok(())
 }
@@ -117,7 +117,7 @@ fn in_mm3_per_s(column: &str, quantity: &Quantity) -> Result<f64, WrongArguments
     ))
 }
 
-/// Two columns of a table at their moments.
+/// Two columns of a table with their sample times.
 fn series(args: &StartsArgs, rows: &TableColumns<'_>, names: [&str; 2]) -> Result<[TimeSeries; 2]> {
     let (columns, table): (_, &DataTable) = (&args.columns, rows.table);
     let (mut time_s, is_time_unit_known) = rows.time_s()?;

@@ -1,4 +1,4 @@
-//! `truebead lab accuracy`: errors of widths in images whose truth is known.
+//! `truebead lab accuracy`: errors of widths in images with known true widths.
 
 mod arguments;
 mod publish;
@@ -27,7 +27,8 @@ use crate::vision::Measurer;
 /// Default number of frames of a set. Derived: a standard deviation from n frames has a relative
 /// error of 1/√(2n), 1.3 % here (reference/accuracy.md).
 const FRAMES: u64 = 3_000;
-/// Consecutive frames of one measurer, which keeps a state from frame to frame as in a cell.
+/// Number of consecutive frames of one measurer, which keeps a state from frame to frame as in a
+/// cell.
 const FRAMES_PER_MEASURER: u64 = 250;
 
 /// Runs the command.
@@ -94,7 +95,7 @@ fn judge_case(
     CalibrationFigures::of(case, source, &outcomes)
 }
 
-/// Those that were named, or all.
+/// The named items, or all without names. Fails for an unknown name.
 fn chosen<T>(names: &[String], all: Vec<T>, name_of: impl Fn(&T) -> &str) -> Result<Vec<T>> {
     if let Some(unknown) = names.iter().find(|name| all.iter().all(|one| name_of(one) != **name)) {
         let known: Vec<&str> = all.iter().map(&name_of).collect();
@@ -104,8 +105,8 @@ fn chosen<T>(names: &[String], all: Vec<T>, name_of: impl Fn(&T) -> &str) -> Res
     Ok(all.into_iter().filter(wanted).collect())
 }
 
-/// Renders and measures the frames of a set. Which measurer measures which
-/// frames does not depend on the machine.
+/// Renders and measures the frames of a set. The assignment of frames to measurers does not depend
+/// on the machine.
 fn judge(set: &Set, frames: u64, progress: &SharedProgress) -> Result<SetFigures> {
     let studio = SetStudio::new(set)?;
     let runs: Result<Vec<Vec<Option<WidthError>>>> = (0..frames.div_ceil(FRAMES_PER_MEASURER))
@@ -124,7 +125,7 @@ fn judge(set: &Set, frames: u64, progress: &SharedProgress) -> Result<SetFigures
     Ok(SetFigures::of(set, studio.mm_per_px(), &runs?.concat()))
 }
 
-/// `None` for a frame that is refused.
+/// Error of a frame's width; `None` for a rejected frame.
 fn measure(studio: &SetStudio, measurer: &mut Measurer, frame: u64) -> Result<Option<WidthError>> {
     let rendered = studio.take(frame)?;
     let truth = rendered.truth.context("a bead that runs through its gauge has a truth")?;

@@ -1,4 +1,4 @@
-//! `truebead lab render`: frames of a simulated bead, with their truth.
+//! `truebead lab render`: frames of a simulated bead, with their true widths.
 
 use std::fs::{self, File};
 use std::io::ErrorKind;
@@ -39,7 +39,7 @@ pub struct RenderArgs {
     frames: Option<u64>,
 }
 
-/// Renders a scenario into a folder, which appears when it is whole.
+/// Renders a scenario into a folder, which appears when it is complete.
 pub fn run(args: &RenderArgs, voice: Verbosity) -> Result<()> {
     let LoadedCell { cell, calibration, text, .. } =
         LoadedCell::read(&args.scenario, Purpose::Measure)?;
@@ -61,7 +61,7 @@ pub fn run(args: &RenderArgs, voice: Verbosity) -> Result<()> {
     write_tables(&series, &truths, folder.path()).context("cannot write the tables")?;
     copy_scenario(&cell, &args.scenario, &text, folder.path())
         .context("cannot copy the scenario")?;
-    // An empty folder of this name gives way to the whole one.
+    // An empty folder of this name is replaced by the complete one.
     fs::rename(folder.path(), &args.out)
         .with_context(|| format!("cannot make {}", args.out.display()))?;
     let _renamed = folder.keep();
@@ -88,7 +88,7 @@ fn refuse_files_in(out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Renders and writes all frames, and returns what is true of each.
+/// Renders and writes all frames, and returns their true values.
 fn write_frames(
     series: &FrameSeries,
     frames: u64,
@@ -148,8 +148,8 @@ fn write_tables(series: &FrameSeries, truths: &[Option<Truth>], folder: &Path) -
     Ok(())
 }
 
-/// The scenario, and its calibration file where that lies beside it, so that
-/// the folder can be measured and rendered again.
+/// Copies the scenario, and its calibration file if it is in the same folder, so that the frames
+/// can be measured and rendered again.
 fn copy_scenario(cell: &Cell, scenario: &Path, text: &str, folder: &Path) -> Result<()> {
     fs::write(folder.join("scenario.toml"), text)?;
     let CalibrationSource::File(path) = &cell.calibration else { return Ok(()) };

@@ -80,7 +80,7 @@ impl From<BeadEndsArgument> for gcode::BeadEnds {
 }
 
 impl PlanArgs {
-    /// Refuses numbers that cannot be.
+    /// Refuses numbers outside their ranges.
     pub fn check(&self) -> Result<(), WrongArguments> {
         let above = |value: f64| value.is_finite() && value > 0.0;
         let least = |value: f64| value.is_finite() && value >= 0.0;

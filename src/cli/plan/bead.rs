@@ -8,15 +8,15 @@ use crate::plan::SpeedProfile;
 /// A bead before it is planned.
 #[derive(Debug)]
 pub struct JobBead {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// Its nominal speed.
     pub nominal: SpeedProfile,
-    /// Path and position \[mm\].
+    /// Path \[mm\] and position \[mm\] of its points.
     pub position: Vec<(f64, [f64; 3])>,
 }
 
-/// The error of a wrong job, with its file's name.
+/// The error for an invalid job, with its file name.
 pub fn wrong_job(job: &Path, what: &impl ToString) -> WrongArguments {
     wrong!("job {}: {}", job.display(), what.to_string())
 }

@@ -1,4 +1,4 @@
-//! The cell of a plan: model, limits and bead.
+//! The cell for a plan: model, limits and bead.
 
 use super::arguments::PlanArgs;
 use super::bead::{JobBead, wrong_job};
@@ -32,21 +32,22 @@ pub struct CommandRange {
 /// The part of a cell that a plan needs.
 #[derive(Debug)]
 pub struct PlannedExtruder {
-    /// What messages call the cell.
+    /// Name of the cell in messages.
     name: String,
-    /// From the command, relative to [`PlanFacts::idle`], to mm³/s.
+    /// Transfer function from the command, relative to [`PlanFacts::idle`], to the flow \[mm³/s\].
     transfer: TransferFunction,
-    /// Limits of such a command, of which none lets the flow run backwards.
+    /// Limits of the command relative to [`PlanFacts::idle`]; the flow is never negative within
+    /// them.
     drive: CommandLimits,
     /// Limits of the command itself.
     command_limits: CommandLimits,
-    /// Name of the model and range of its input, where it was identified.
+    /// Name of the model and range of its input, if it was identified.
     identified: Option<(String, CommandRange)>,
-    /// Largest speed \[mm/s\].
+    /// Largest speed of the robot \[mm/s\].
     pub fastest_mm_per_s: f64,
-    /// Acceleration \[mm/s²\].
+    /// Largest acceleration of the robot \[mm/s²\].
     pub accel_mm_per_s2: f64,
-    /// Length over which the nozzle averages what it lays \[mm\].
+    /// Length over which the nozzle averages the laid volume \[mm\].
     pub nozzle_mm: f64,
     /// The bead and the command's unit.
     pub facts: PlanFacts,
@@ -114,7 +115,7 @@ impl PlannedExtruder {
         })
     }
 
-    /// The task of the planner.
+    /// The task for the planner.
     pub fn task(&self, args: &PlanArgs) -> plan::PlanTask<'_> {
         let robot = plan::RobotMotionLimits {
             accel_mm_per_s2: self.accel_mm_per_s2,
@@ -135,7 +136,7 @@ impl PlannedExtruder {
         }
     }
 
-    /// Refuses speeds that robot or extruder cannot have.
+    /// Refuses speeds that robot or extruder cannot reach.
     pub fn check_speeds(
         &self,
         beads: &[JobBead],
@@ -169,7 +170,7 @@ impl PlannedExtruder {
         Ok(())
     }
 
-    /// Warning of commands beyond the range of the model's data, if there are any.
+    /// Warning of commands outside the range of the model's data; `None` if all are within it.
     pub fn beyond(&self, planned: CommandRange) -> Option<String> {
         let (source, CommandRange { min: least, max: most }) = self.identified.as_ref()?;
         let CommandRange { min: low, max: high } = planned;

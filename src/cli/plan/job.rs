@@ -8,10 +8,10 @@ use super::cell::PlannedExtruder;
 use crate::cli::arguments::WrongArguments;
 use crate::plan::{gcode, job};
 
-/// Endings of files with G-code.
+/// Extensions of files with G-code.
 const GCODE: [&str; 3] = ["gcode", "nc", "g"];
 
-/// Reads a job by its ending.
+/// Reads a job; the format follows from the file's extension.
 pub fn read(args: &PlanArgs, extruder: &PlannedExtruder) -> Result<Vec<JobBead>, WrongArguments> {
     let path = &args.job;
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();

@@ -1,5 +1,4 @@
-//! `truebead sim extruder`: an extruder controller that answers the extruder
-//! link.
+//! `truebead sim extruder`: a simulated extruder controller on the extruder link.
 
 use std::path::PathBuf;
 
@@ -47,8 +46,8 @@ pub struct ExtruderSimArgs {
     fail_after_s: Option<f64>,
 }
 
-/// Runs the extruder until SIGINT or SIGTERM. Fails where it cannot listen,
-/// and with [`WrongArguments`] where the cell describes no extruder.
+/// Runs the extruder until SIGINT or SIGTERM. Fails if it cannot listen, and with
+/// [`WrongArguments`] if the cell describes no extruder.
 pub fn run(args: &ExtruderSimArgs) -> anyhow::Result<()> {
     let loaded = LoadedCell::read(&args.cell, Purpose::Run)?;
     let options = options(args, &loaded)?;
@@ -60,7 +59,7 @@ pub fn run(args: &ExtruderSimArgs) -> anyhow::Result<()> {
     serve(&what, &args.listen, spawn, ExtruderSim::local_addr, ExtruderSim::stop)
 }
 
-/// Time until a rehearsed fault.
+/// Parses the time until a rehearsed fault \[s\].
 fn parse_until(text: &str) -> Result<f64, String> {
     parse_within(text, 0.0..=1e7, "expected seconds after the start of the pump, 0 to 1e7")
 }

@@ -1,4 +1,4 @@
-//! `truebead sim robot`: a robot controller that answers the robot link.
+//! `truebead sim robot`: a simulated robot controller on the robot link.
 
 use clap::Args;
 
@@ -72,8 +72,8 @@ pub struct RobotSimArgs {
     state_ms: u32,
 }
 
-/// Runs the robot until SIGINT or SIGTERM. Fails where it cannot listen, and
-/// with [`WrongArguments`] where the robot that was described cannot be.
+/// Runs the robot until SIGINT or SIGTERM. Fails if it cannot listen, and with [`WrongArguments`]
+/// if the robot's parameters are not valid.
 pub fn run(args: &RobotSimArgs) -> anyhow::Result<()> {
     let spawn = |listener| {
         RobotSim::spawn(listener, RunClock::start(), options(args), Box::new(print)).map_err(

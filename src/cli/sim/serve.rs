@@ -8,8 +8,8 @@ use signal_hook::iterator::Signals;
 
 use crate::core::Stamp;
 
-/// A machine that answers until SIGINT or SIGTERM: what it is called, where it listens, and how
-/// it is started and stopped.
+/// Runs a machine until SIGINT or SIGTERM, with its name, its address, and functions that start
+/// and stop it.
 pub fn serve<S>(
     what: &str,
     listen: &str,
@@ -19,7 +19,7 @@ pub fn serve<S>(
 ) -> anyhow::Result<()> {
     let listener = TcpListener::bind(listen)
         .with_context(|| format!("cannot listen on {listen}; name a free address with --listen"))?;
-    // Before the machine answers, so that no signal falls between.
+    // Before the machine starts, so that no signal is missed.
     let mut signals = Signals::new([SIGINT, SIGTERM]).context("cannot wait for signals")?;
     let sim = spawn(listener)?;
     tell!("{what} listens on {}; Ctrl-C ends it", address(&sim));

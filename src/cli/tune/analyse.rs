@@ -13,18 +13,18 @@ use crate::io::recording::{RecordedEntry, Recording};
 use crate::report::tuned::Tuned;
 use crate::tune::{IdentifiedCell, Log, TuneFacts};
 
-/// Factor by which the target's speed may lie beyond the limits: farther from the recorded
-/// speeds no bead is predicted.
+/// Factor by which the speed for the target may be outside the limits: predictions farther from
+/// the recorded speeds are not made.
 const MAX_SPEED_BEYOND_LIMITS: f64 = 3.0;
 
-/// Identifies a cell from a recording and proposes its settings. Fails where the recording does
-/// not determine the cell.
+/// Identifies a cell from a recording and proposes its settings. Fails if the recording does not
+/// determine the cell.
 pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<Tuned> {
     let name = path.display().to_string();
     let mut recording = open(path)?;
     let log = log(&mut recording).context("the recording cannot be read on")?;
     warn_of_damage(&recording);
-    // The gauge is that of the run, whatever the cell has become since.
+    // The gauge is that of the recorded run; the cell file may have changed since.
     let (cell, calibration) = attached_cell(&recording, Purpose::Run)
         .unwrap_or_else(|_| (loaded.cell.clone(), loaded.calibration.clone()));
     let gauge = gauge(&cell, &calibration, &log.states)?;

@@ -1,4 +1,4 @@
-//! The experiment: the cell with steps in place of its strategy, live or simulated.
+//! The experiment: the cell with speed steps as its strategy, live or simulated.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -24,10 +24,11 @@ use crate::width_control::steps::{StepSettings, StepsProgress};
 
 /// Keys of `[control]` that only the distance controller has.
 pub const DISTANCE_KEYS: [&str; 3] = ["exponent", "exponent_learns", "drift_per_root_m"];
-/// Bead beyond the last piece that the camera sees, for the robot's acceleration \[mm\].
+/// Additional bead after the last segment that the camera sees, for the robot's acceleration
+/// \[mm\].
 const EXTRA_LENGTH_MM: f64 = 50.0;
 
-/// Runs it into the folder; returns the recording and the status of the run.
+/// Runs the experiment into the folder; returns the recording and the status of the run.
 pub fn run(
     args: &TuneArgs,
     loaded: &LoadedCell,
@@ -59,8 +60,8 @@ pub fn run(
     Ok((recording, outcome::status(&report, max_rejected)))
 }
 
-/// The cell with steps in place of its controller. Its text is what is attached to the
-/// recording, so that a replay runs what ran.
+/// The cell with speed steps as its strategy. Its text is attached to the recording, so that a
+/// replay uses the same cell.
 fn derived(args: &TuneArgs, loaded: &LoadedCell) -> anyhow::Result<LoadedCell> {
     let mut document: DocumentMut = loaded.text.parse().context("the cell file")?;
     document["control"]["strategy"] = value("steps");
@@ -94,7 +95,7 @@ fn steps(loaded: &LoadedCell) -> anyhow::Result<StepSettings> {
     loaded.cell.steps(run, &loaded.calibration).context("the cell has no course of steps")
 }
 
-/// Length of bead of the experiment, from the robot's start on.
+/// Length of the experiment's bead, including its start.
 fn whole_length(loaded: &LoadedCell, steps: &StepSettings) -> anyhow::Result<Mm> {
     let run = loaded.cell.run.as_ref().context("the cell was not read for a run")?;
     let begins = run.robot.start_length.max(steps.camera_reach * 1.5);
@@ -132,7 +133,7 @@ fn announce(
     Ok(())
 }
 
-/// Lays the simulated bead until the camera has seen the last piece.
+/// Lays the simulated bead until the camera has seen the last segment.
 fn simulate(out: &Path, loaded: &LoadedCell) -> anyhow::Result<()> {
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
     let extruder = simulated_extruder(loaded)?;

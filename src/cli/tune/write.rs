@@ -13,7 +13,7 @@ use crate::cli::arguments::{WrongArguments, refuse_replacing};
 use crate::io::atomic_file::write_atomic;
 use crate::report::tuned::Tuned;
 
-/// Keys of the file that name another file.
+/// Keys of the cell file whose values are paths of other files.
 const PATHS: [(&str, &str); 7] = [
     ("calibration", "file"),
     ("camera", "source"),
@@ -24,8 +24,8 @@ const PATHS: [(&str, &str); 7] = [
     ("extruder", "plan"),
 ];
 
-/// Refuses a name that is taken, and another folder where paths of the cell would lead
-/// elsewhere from there.
+/// Refuses an existing file, and another folder if relative paths of the cell would be wrong
+/// there.
 pub fn refuse(path: &Path, cell: &Path, loaded: &LoadedCell) -> anyhow::Result<()> {
     refuse_replacing_written(path)?;
     let folder = |path: &Path| {
@@ -59,7 +59,7 @@ fn refuse_replacing_written(path: &Path) -> Result<(), WrongArguments> {
     })
 }
 
-/// Whether a key names a file by a relative path, and not a device or an address.
+/// Whether the value of a key is a relative path, not a device or an address.
 fn is_relative(document: &DocumentMut, table: &str, key: &str) -> bool {
     let named = document.get(table).and_then(|table| table.get(key)).and_then(Item::as_str);
     let is_other = |name: &str| {
@@ -69,7 +69,7 @@ fn is_relative(document: &DocumentMut, table: &str, key: &str) -> bool {
     named.is_some_and(|name| !is_other(name) && Path::new(name).is_relative())
 }
 
-/// Writes the copy. It is read back as any cell is before it gets its name.
+/// Writes the copy. Before it gets its name it is read back like any cell.
 pub fn write(
     path: &Path,
     loaded: &LoadedCell,
@@ -106,7 +106,7 @@ fn number(item: &Item) -> Option<f64> {
         .or_else(|| item.as_integer().and_then(|whole| i32::try_from(whole).ok()).map(f64::from))
 }
 
-/// Sets a key, with the comment behind it left where it is.
+/// Sets a key; the comment after it is kept.
 fn set(document: &mut DocumentMut, table: &str, key: &str, to: Item) {
     let decor = document[table].get(key).and_then(Item::as_value).map(|old| old.decor().clone());
     document[table][key] = to;

@@ -69,7 +69,7 @@ pub enum To {
     Opencv,
 }
 
-/// What ROS's `camera_info_manager` takes for a name.
+/// Parses a camera name with the characters that ROS's `camera_info_manager` accepts.
 fn parse_name(text: &str) -> Result<String, String> {
     let is_sound = |c: char| c.is_ascii_alphanumeric() || c == '_';
     if !text.is_empty() && text.chars().all(is_sound) {

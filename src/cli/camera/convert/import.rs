@@ -1,4 +1,4 @@
-//! From a camera of ROS or OpenCV to a calibration: the bed plane comes from images.
+//! Converts a camera of ROS or OpenCV to a calibration: the bed plane comes from images.
 
 use anyhow::Context;
 
@@ -12,14 +12,14 @@ use crate::cli::board_arguments::{InnerCorners, board_of};
 use crate::cli::print::print;
 use crate::core::Mm;
 
-/// Largest reprojection error (RMS) of corners on the bed \[px\]; beyond it the images are not of
-/// this camera, or the boards lay on no plane.
+/// Largest accepted reprojection error (RMS) of corners on the bed \[px\]; above it the images are
+/// of another camera, or the boards did not lie on a plane.
 const MAX_RMS_PX: f64 = 0.5;
-/// Reprojection error (RMS) from which a note is printed \[px\]; a sharp image of a flat board
+/// Reprojection error (RMS) above which a note is printed \[px\]; a sharp image of a flat board
 /// with a valid lens model has less.
 const SUSPECT_RMS_PX: f64 = 0.3;
 
-/// The text of a calibration: the camera of others, and a bed plane from images.
+/// The text of a calibration: the imported camera, and a bed plane from images.
 pub fn text(
     args: &ConvertArgs,
     import: &Import,

@@ -1,8 +1,8 @@
-//! The result beside the cell's present value.
+//! The result compared with the cell's current value.
 
 use crate::core::Mm;
 
-/// Prints the cell's present value beside the result, and the lines for its file.
+/// Prints the cell's current value, and the lines with the result for its file.
 pub fn tell(offset_mm: f64, sigma_mm: f64, now: Option<Mm>) {
     if let Some(now) = now.map(Mm::get) {
         let off = offset_mm - now;

@@ -64,13 +64,13 @@ pub struct OffsetArgs {
 pub struct OptionalBoard {
     /// A whole board.
     pub board: Option<BoardArgs>,
-    /// A part of one, without its counts.
+    /// Whether only a part of the board was given.
     pub is_part: bool,
 }
 
 impl Args for OptionalBoard {
     fn augment_args(command: Command) -> Command {
-        // As for an update, in which nothing is required.
+        // As for an update, in which no argument is required.
         BoardArgs::augment_args_for_update(command)
     }
 
@@ -101,7 +101,7 @@ fn parse_position(text: &str) -> Result<[f64; 2], String> {
 }
 
 impl OffsetArgs {
-    /// Options for an image alone, and whether they were given.
+    /// Options that are only for an image, and whether they were given.
     pub fn of_image(&self) -> [(&'static str, bool); 6] {
         [
             ("--board", self.board.board.is_some()),
@@ -113,7 +113,7 @@ impl OffsetArgs {
         ]
     }
 
-    /// Refuses options of the other kind of input.
+    /// Refuses options that are for the other kind of input.
     pub fn refuse(&self, kind: &str, options: &[(&str, bool)]) -> Result<(), WrongArguments> {
         match options.iter().find(|(_, given)| *given) {
             None => Ok(()),

@@ -1,4 +1,4 @@
-//! The offset from an image of a board that the nozzle touches.
+//! The offset from an image of a board and the position at which the nozzle touches it.
 
 use anyhow::{Context, bail};
 use nalgebra::Vector2;
@@ -18,17 +18,18 @@ use crate::vision::BeadAxis;
 
 /// Default standard deviation of the touched position, which is read by eye.
 const TOUCH_SIGMA: Mm = Mm::constant(0.5);
-/// Sideways distance that is more than an error of reading by eye \[mm\].
+/// Lateral distance above which the touched position is not plausible \[mm\].
 const SIDEWAYS_MM: f64 = 3.0;
-/// Scale error of a board from which a warning is printed.
+/// Scale error of a board above which a warning is printed.
 const MAX_SCALE_ERROR: f64 = 0.005;
-/// Scale error of a board beyond which no offset is given.
+/// Scale error of a board above which no offset is printed.
 const REFUSED_SCALE_ERROR: f64 = 0.03;
-/// Deviation of corners from a true board (RMS) beyond which they are not on the bed \[mm\].
+/// Deviation of corners from the true board (RMS) above which the board did not lie on the bed
+/// \[mm\].
 const NOT_FLAT_MM: f64 = 2.0;
-/// Distance beyond the outermost squares at which the nozzle may touch \[squares\].
+/// Largest distance of the touched position outside the squares \[squares\].
 const SQUARES_BEYOND: f64 = 2.0;
-/// Deviation of corners from a true board (RMS) from which a warning is printed \[mm\].
+/// Deviation of corners from the true board (RMS) above which a warning is printed \[mm\].
 const FLAT_MM: f64 = 0.5;
 
 /// Runs the command for an image.
@@ -99,8 +100,8 @@ fn touch(args: &OffsetArgs, at: [f64; 2]) -> Result<Touch, WrongArguments> {
     Ok(Touch { position: at, sigma, thickness, robot_z: args.robot_z_mm })
 }
 
-/// The nozzle lies beyond the top of a vertical gauge and beyond the right end of a
-/// horizontal one.
+/// The gauge's middle and directions. The nozzle is beyond the top of a vertical gauge and beyond
+/// the right end of a horizontal one.
 fn gauge(loaded: &LoadedCell) -> OffsetGauge {
     let cell = &loaded.cell;
     let (ahead, right) = match cell.gauge.axis {

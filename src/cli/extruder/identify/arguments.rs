@@ -20,11 +20,11 @@ use crate::numeric::hampel::Hampel;
 use crate::numeric::savgol::SavGol;
 use crate::report::identify::Logs;
 
-/// Default upper bound of the dead time, as a fraction of the record…
+/// Default upper bound of the dead time, as a fraction of the record.
 const DEAD_TIME_FRACTION: f64 = 0.125;
-/// …and in seconds; the smaller one holds.
+/// Default upper bound of the dead time \[s\]; the smaller of the two bounds applies.
 const DEAD_TIME_S: f64 = 10.0;
-/// Default fraction of the data that is kept for validation.
+/// Default fraction of the data for validation.
 const VALIDATE_FRACTION: f64 = 0.3;
 
 /// Finds a model of an extruder in logged data, for a cell to use.
@@ -115,7 +115,7 @@ fn validates_with_itself(other: &Path) -> anyhow::Error {
 }
 
 impl IdentifyArgs {
-    /// The output's name where it is made of other columns.
+    /// The output's name if it is computed from other columns.
     fn derived_output(&self) -> Option<&'static str> {
         self.bead.makes_flow().then_some(LAID_FLOW)
     }
@@ -172,7 +172,7 @@ impl IdentifyArgs {
         Ok((Logs { input, output, source, estimation, validation, from_rest }, warnings))
     }
 
-    /// The forms that are fitted.
+    /// The forms for the fit.
     pub fn forms(&self, data: &Experiment) -> Vec<FitSettings> {
         let most_s = (DEAD_TIME_FRACTION * data.duration_s()).min(DEAD_TIME_S);
         let dead_time =

@@ -1,4 +1,4 @@
-//! From a file to an experiment.
+//! Reads an experiment from a file.
 
 use std::path::Path;
 
@@ -15,17 +15,17 @@ use crate::io::bead_columns::BeadColumns;
 use crate::numeric::hampel::Hampel;
 use crate::numeric::savgol::SavGol;
 
-/// The columns and options of a reading.
+/// The columns and options for reading.
 pub struct Request<'a> {
     /// Column of the input.
     pub input: &'a str,
-    /// Column of the output, where it is not made of others.
+    /// Column of the output; `None` if it is computed from others.
     pub output: Option<&'a str>,
-    /// Time, units and part of the log.
+    /// Time, units and range of the log.
     pub columns: &'a ColumnArgs,
-    /// Longest gap that is bridged \[s\].
+    /// Longest gap that is interpolated \[s\].
     pub max_gap_s: Option<f64>,
-    /// Where the output was measured, or what it is made of.
+    /// Position of the measurement, and the columns of a computed output.
     pub bead: &'a BeadArgs,
     /// Filter of the output against outliers.
     pub hampel: Option<Hampel>,
@@ -33,7 +33,7 @@ pub struct Request<'a> {
     pub smooth: Option<SavGol>,
 }
 
-/// Reads a table or a recording, with warnings about it.
+/// Reads a table or a recording, with warnings about the data.
 pub fn read(path: &Path, request: &Request<'_>) -> Result<(Experiment, Vec<String>)> {
     let name = path.display().to_string();
     match LogSource::read(path, &request.bead.layer)? {

@@ -1,19 +1,19 @@
-//! How forms, dead times and filters are written.
+//! Syntax of forms, dead times and filters.
 
 use crate::cli::arguments::parse_within;
 use crate::identify::fit::{DeadTime, MAX_POLES, Structure};
 use crate::numeric::hampel::Hampel;
 use crate::numeric::savgol::SavGol;
 
-/// Forms that one word stands for.
+/// The forms for one word.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Forms(pub Vec<Structure>);
 
-/// A known dead time, or the range in which it is estimated; none for the default range.
+/// A known dead time, or the range in which it is estimated; `None` for the default range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeadTimeArg(pub Option<DeadTime>);
 
-/// One word for a form, or for those that are compared.
+/// Parses the name of a form, or of a group of forms.
 pub fn parse_forms(text: &str) -> Result<Forms, String> {
     let forms = match text {
         "compare" => vec![
@@ -50,7 +50,7 @@ fn pair<T: std::str::FromStr>(text: &str) -> Option<(T, T)> {
     Some((a.trim().parse().ok()?, b.trim().parse().ok()?))
 }
 
-/// A dead time, a range of them, or `estimate`.
+/// Parses a dead time, a range of dead times, or `estimate`.
 pub fn parse_dead_time(text: &str) -> Result<DeadTimeArg, String> {
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|s| (0.0..=1e4).contains(s));
     if text == "estimate" {
@@ -68,12 +68,12 @@ pub fn parse_dead_time(text: &str) -> Result<DeadTimeArg, String> {
     })
 }
 
-/// A gap that is bridged.
+/// Parses the longest gap that is interpolated \[s\].
 pub fn parse_gap(text: &str) -> Result<f64, String> {
     parse_within(text, 0.0..=1e4, "expected 0 to 10000 s")
 }
 
-/// K,T.
+/// Parses K,T: samples to either side and a limit in standard deviations.
 pub fn parse_hampel(text: &str) -> Result<Hampel, String> {
     let wrong = "expected samples to either side and standard deviations, such as 5,3";
     let (half_width, threshold) = text.split_once(',').ok_or(wrong)?;
@@ -82,7 +82,7 @@ pub fn parse_hampel(text: &str) -> Result<Hampel, String> {
     Hampel::new(half_width, threshold).map_err(|error| error.to_string())
 }
 
-/// W,P.
+/// Parses W,P: window length and polynomial degree.
 pub fn parse_smooth(text: &str) -> Result<SavGol, String> {
     let (window, degree) =
         pair(text).ok_or("expected samples and a degree of polynomials, such as 11,3")?;

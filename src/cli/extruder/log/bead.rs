@@ -12,7 +12,7 @@ use crate::extruder::demand::section;
 use crate::identify::align::{AlignError, to_extruded};
 use crate::identify::flow::at_moments;
 
-/// The column that a flow gets that is made of others, as in a recording.
+/// Name of the computed column of the flow, as in a recording.
 pub const LAID_FLOW: &str = "laid_flow_mm3_per_s";
 /// What was measured on the bead.
 #[derive(Debug, Args)]
@@ -40,12 +40,12 @@ pub struct BeadArgs {
 }
 
 impl BeadArgs {
-    /// Whether the output is a flow that is made of other columns.
+    /// Whether the output is a flow that is computed from other columns.
     pub const fn makes_flow(&self) -> bool {
         self.area.is_some() || self.width.is_some()
     }
 
-    /// Refuses options that a recording has no use for.
+    /// Refuses options that do not apply to a recording.
     pub fn refuse_columns(&self) -> Result<(), WrongArguments> {
         let given = [
             ("--position", &self.position),
@@ -62,8 +62,9 @@ impl BeadArgs {
         }
     }
 
-    /// The output of a table: the column of this name, where it is not made of others. One value for
-    /// each row from the first on; the last rows have none where their bead is not measured yet.
+    /// The output of a table: the column of this name, or a flow that is computed from others. One
+    /// value for each row from the first on; the last rows have none if their bead was not
+    /// measured yet.
     pub fn output(&self, rows: &TableColumns<'_>, output: Option<&str>) -> Result<Vec<f64>> {
         if self.position.is_none() && self.layer.measured_at_offset_mm.is_some_and(|mm| mm > 0.0) {
             refuse!("--measured-at-offset-mm needs --position, the way along the bead");
@@ -86,7 +87,7 @@ impl BeadArgs {
         }
     }
 
-    /// What was measured, at the moments of extrusion.
+    /// The measured values at the times of extrusion.
     fn aligned(
         &self,
         rows: &TableColumns<'_>,

@@ -1,4 +1,4 @@
-//! The part of a log that is used, its time, and the quantities of its columns.
+//! The range of a log that is used, its time, and the quantities of its columns.
 
 use clap::Args;
 
@@ -23,18 +23,18 @@ pub struct ColumnArgs {
     pub to_s: Option<f64>,
 }
 
-/// The given unit of a column.
+/// A unit that was given for a column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnitOverride {
     column: String,
     unit: String,
 }
 
-/// Seconds that a unit of time is long.
+/// Units of time, in seconds.
 const TIMES: [(&str, f64); 3] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
 
 impl ColumnArgs {
-    /// What a column of the input or the output holds.
+    /// The quantity of an input or output column.
     pub fn quantity(&self, column: &str) -> Result<Quantity, WrongArguments> {
         let given = match self.unit_override(column) {
             None => None,
@@ -52,7 +52,7 @@ impl ColumnArgs {
         })
     }
 
-    /// The column of time among these, and how many seconds its unit has.
+    /// The column of time among these, and its unit in seconds.
     pub fn time(&self, known: &[String]) -> Result<(String, f64), WrongArguments> {
         let list = known.join(", ");
         let mut candidates =
@@ -77,7 +77,7 @@ impl ColumnArgs {
         Ok((column.clone(), unit.1))
     }
 
-    /// The given unit of a column.
+    /// The unit that was given for a column.
     pub fn unit_override(&self, column: &str) -> Option<&str> {
         self.unit.iter().find(|given| given.column == column).map(|given| given.unit.as_str())
     }
@@ -86,8 +86,8 @@ impl ColumnArgs {
         (self.from_s.unwrap_or(f64::NEG_INFINITY), self.to_s.unwrap_or(f64::INFINITY))
     }
 
-    /// Keeps of columns of a table what was asked for; returns the first row
-    /// that is kept. Rows without a value of the output are left out.
+    /// Keeps the requested range of a table's columns; returns the index of its first row. Rows at
+    /// the end without a value of the output are left out.
     pub fn cut(&self, time_s: &mut Vec<f64>, input: &mut Vec<f64>, output: &mut Vec<f64>) -> usize {
         let (from_s, to_s) = self.span();
         time_s.truncate(output.len());
@@ -100,13 +100,13 @@ impl ColumnArgs {
         first
     }
 
-    /// Keeps of a column of a recording what was asked for.
+    /// Keeps the requested range of a recording's column.
     pub fn cut_series(&self, column: &TimeSeries) -> TimeSeries {
         let (from_s, to_s) = self.span();
         column.within(from_s, to_s)
     }
 
-    /// A column that has a given unit and does not exist.
+    /// A column for which a unit was given and that does not exist; `None` if there is none.
     pub fn unknown_column(&self, known: &[String]) -> Option<&str> {
         self.unit
             .iter()
@@ -115,7 +115,7 @@ impl ColumnArgs {
     }
 }
 
-/// The words of all units, for messages.
+/// The names of all units, for messages.
 pub fn units() -> String {
     Unit::all().map(Unit::word).collect::<Vec<_>>().join(", ")
 }
@@ -126,7 +126,7 @@ fn parse_unit_override(text: &str) -> Result<UnitOverride, String> {
     Ok(UnitOverride { column: column.trim().to_owned(), unit: unit.trim().to_owned() })
 }
 
-/// Refuses one column that is named twice.
+/// Refuses one column as both input and output.
 pub fn refuse_same(input: &str, output: &str) -> Result<(), WrongArguments> {
     if input != output {
         return Ok(());

@@ -5,7 +5,7 @@ use clap::Args;
 use crate::cli::arguments::WrongArguments;
 use crate::core::Mm;
 
-/// Lengths that are taken \[mm\].
+/// Accepted lengths \[mm\].
 const LENGTHS_MM: std::ops::RangeInclusive<f64> = 0.0..=1e5;
 
 /// What a recording's cell says of its bead, unless it is given.

@@ -12,9 +12,9 @@ use crate::identify::table::{DataTable, DataTableError};
 pub struct TableColumns<'a> {
     /// The table.
     pub table: &'a DataTable,
-    /// What messages call it.
+    /// Name of the table in messages.
     pub name: &'a str,
-    /// What its columns hold.
+    /// Time, units and range of its columns.
     pub columns: &'a ColumnArgs,
 }
 
@@ -29,14 +29,14 @@ impl TableColumns<'_> {
         }
     }
 
-    /// The time \[s\], and whether its unit is given.
+    /// The time \[s\], and whether its unit was given.
     pub fn time_s(&self) -> Result<(Vec<f64>, bool)> {
         let (time, unit_s) = self.columns.time(self.table.names())?;
         let time_s = self.column(&time)?.iter().map(|time| time * unit_s).collect();
         Ok((time_s, self.columns.unit_override(&time).is_some()))
     }
 
-    /// The numbers of a column in one unit.
+    /// The numbers of a column, converted to a unit.
     pub fn in_unit(&self, column: &str, unit: Unit) -> Result<Vec<f64>> {
         let values = self.column(column)?;
         let found = self.columns.quantity(column)?.unit;
@@ -66,7 +66,7 @@ pub fn check_unit_overrides(
     }
 }
 
-/// The line in the file beside the number of the sample.
+/// Adds the number of the line in the file to an error.
 pub fn at_line(
     table: &DataTable,
     first: usize,

@@ -19,16 +19,16 @@ use crate::io::recording::Recording;
 /// First bytes of an MCAP file (MCAP specification, § Magic).
 const MAGIC: &[u8] = b"\x89MCAP";
 
-/// Data as they were read.
+/// Data from a file.
 pub enum LogSource {
-    /// Columns on moments of their own.
+    /// Columns with their own sample times.
     Recording(BeadColumns),
-    /// Rows.
+    /// Rows with common sample times.
     Table(DataTable),
 }
 
 impl LogSource {
-    /// Reads either.
+    /// Reads a table or a recording.
     pub fn read(path: &Path, layer: &LayerArgs) -> Result<Self> {
         let name = path.display().to_string();
         let wrong = |what: &dyn std::fmt::Display| wrong!("{name}: {what}");
@@ -43,7 +43,7 @@ impl LogSource {
     }
 }
 
-/// A column of a recording, cut to the part that is used. Fails where there is none of this name.
+/// A column of a recording, cut to the requested range. Fails if there is no column of this name.
 pub fn recorded_column(
     found: &BeadColumns,
     file: &str,
@@ -66,7 +66,7 @@ fn recorded(path: &Path, layer: &LayerArgs) -> Result<BeadColumns> {
     Ok(found)
 }
 
-/// What the cell file says that is attached.
+/// Facts from the attached cell file.
 fn facts(recording: &Recording, layer: &LayerArgs) -> Result<BeadFacts> {
     let file = recording.file();
     refuse_foreign(recording)?;

@@ -76,7 +76,7 @@ pub struct AccuracyArgs {
     pub out: Option<PathBuf>,
 }
 
-/// A standard deviation takes at least two trials.
+/// Parses a number of trials: a standard deviation needs at least two.
 fn parse_trials(text: &str) -> Result<u64, String> {
     let count = text.trim().parse::<u64>().ok();
     count

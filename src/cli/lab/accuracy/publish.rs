@@ -1,4 +1,4 @@
-//! Where the figures of `truebead lab accuracy` go.
+//! Output of the figures of `truebead lab accuracy`.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -9,12 +9,12 @@ use serde::Serialize;
 use super::arguments::AccuracyArgs;
 use crate::rows::output;
 
-/// Makes the folder for the results, where one is asked for.
+/// Creates the folder for the results if one was given.
 pub fn make_folder(args: &AccuracyArgs) -> Result<()> {
     Ok(args.out.as_deref().map_or(Ok(()), |out: &Path| output::make_folder(out))?)
 }
 
-/// Figures for a terminal and for a file.
+/// Figures as text for a terminal and for a file.
 pub struct Texts {
     /// For a terminal.
     pub table: String,
@@ -23,8 +23,8 @@ pub struct Texts {
 }
 
 impl Texts {
-    /// Prints the table and writes `name.json` and `name.md` where a folder is asked for.
-    /// Status 1 where a limit is missed.
+    /// Prints the table and writes `name.json` and `name.md` if a folder was given. Status 1 if a
+    /// limit is missed.
     pub fn publish<T: Serialize>(
         &self,
         args: &AccuracyArgs,

@@ -1,4 +1,4 @@
-//! `truebead lab accuracy --random`: frames whose every parameter is drawn.
+//! `truebead lab accuracy --random`: frames with random parameters.
 
 use std::io::Cursor;
 use std::ops::Range;
@@ -26,12 +26,12 @@ use crate::vision::Measurer;
 /// Default number of frames of a set. Derived: a limit of 0.01 % of silently wrong widths is then
 /// three frames (reference/accuracy.md).
 const FRAMES: u64 = 30_000;
-/// Names all sets.
+/// Name that stands for all sets.
 const ALL: &str = "all";
 
-/// Renders frames with random parameters, measures each by itself, and compares the figures of
-/// each set with their limits: status 1 where one is missed. Writes tables, and the first frames
-/// where they are to be kept.
+/// Renders frames with random parameters, measures each independently, and compares the figures of
+/// each set with its limits: status 1 if one is missed. Writes tables, and the first frames if
+/// requested.
 pub fn judge(args: &AccuracyArgs, voice: Verbosity) -> Result<ExitCode> {
     let sets = named(&args.random)?;
     let frames = args.frames.unwrap_or(FRAMES);
@@ -64,7 +64,7 @@ pub fn judge(args: &AccuracyArgs, voice: Verbosity) -> Result<ExitCode> {
     texts.publish(args, "random", &all, missed)
 }
 
-/// The sets of some names, each once.
+/// The sets with these names, each once.
 fn named(names: &[String]) -> Result<Vec<DrawnSet>> {
     let mut chosen = Vec::new();
     for name in names {
@@ -81,7 +81,7 @@ fn named(names: &[String]) -> Result<Vec<DrawnSet>> {
     Ok(drawn::all().into_iter().filter(|set| chosen.contains(&set.name)).collect())
 }
 
-/// Measures a frame with a measurer of its own: its width comes from it alone.
+/// Measures a frame with a new measurer: its width does not depend on other frames.
 fn measure(drawn: &DrawnFrame, number: u64) -> DrawnOutcome {
     let surface = SurfaceMap::from_scale(1.0);
     let width = match Measurer::new(drawn.gauge, None).measure(&drawn.frame, &surface) {
@@ -97,7 +97,7 @@ fn measure(drawn: &DrawnFrame, number: u64) -> DrawnOutcome {
     DrawnOutcome { frame: number, parameters: drawn.parameters.clone(), width }
 }
 
-/// Keeps the first frames of a set, and a table of what was drawn and measured.
+/// Saves the first frames of a set, and a table of their parameters and results.
 fn keep(set: &DrawnSet, numbers: Range<u64>, folder: &Path) -> Result<()> {
     let mut table = csv::Writer::from_writer(Vec::new());
     let first = numbers.start;

@@ -18,9 +18,9 @@ use crate::studies::accuracy::roughness_table::{
 use crate::studies::accuracy::table::{markdown, table};
 use crate::vision::{Measurer, Roughness, RoughnessEstimator};
 
-/// Length of each bead in its correlation lengths.
+/// Length of each bead in correlation lengths.
 const CORRELATION_LENGTHS: f64 = 50.0;
-/// Advance of a bead from frame to frame \[px\]: the length of a gauge, and a tenth of it, so that
+/// Motion of a bead from frame to frame \[px\]: the length of a gauge, and a tenth of it, so that
 /// each part is seen in ten frames.
 const ADVANCES_PX: [usize; 2] = [100, 10];
 
@@ -49,7 +49,7 @@ pub fn judge(args: &AccuracyArgs, voice: Verbosity) -> Result<ExitCode> {
     Texts { table: table(&all), markdown: markdown(&all) }.publish(args, "roughness", &all, missed)
 }
 
-/// Lets a bead pass through its gauge.
+/// Measures a bead while it passes through its gauge.
 fn pass(bead: &LongBead, advance: usize) -> Result<BeadOutcome> {
     let surface = SurfaceMap::from_scale(1.0);
     let mut measurer = Measurer::new(bead.gauge(), None);
