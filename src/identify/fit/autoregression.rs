@@ -62,12 +62,13 @@ impl ArModel {
 
     /// Hᵀ·column, with H·Hᵀ the covariance of the residuals.
     pub fn weight(&self, column: &[f64]) -> Vec<f64> {
-        let mut weighed = vec![0.0; column.len()];
+        let mut weighted = vec![0.0; column.len()];
         for t in (0..column.len()).rev() {
-            let later = self.coefficients.iter().zip(weighed.get(t + 1..).unwrap_or_default());
-            weighed[t] = self.innovation_sigma * column[t] - later.map(|(a, w)| a * w).sum::<f64>();
+            let later = self.coefficients.iter().zip(weighted.get(t + 1..).unwrap_or_default());
+            weighted[t] =
+                self.innovation_sigma * column[t] - later.map(|(a, w)| a * w).sum::<f64>();
         }
-        weighed
+        weighted
     }
 }
 

@@ -39,8 +39,8 @@ pub(super) fn covariances(columns: &[Vec<f64>], noise: &ArModel, samples: usize)
         return Covariances { white: infinite.clone(), correlated: infinite, weak_direction };
     };
     let freedom = to_f64(samples) / to_f64(samples.saturating_sub(p).max(1));
-    let weighed: Vec<Vec<f64>> = columns.iter().map(|c| noise.weight(c)).collect();
-    let middle = normal_matrix(&weighed, &sizes);
+    let weighted: Vec<Vec<f64>> = columns.iter().map(|c| noise.weight(c)).collect();
+    let middle = normal_matrix(&weighted, &sizes);
     let scaled = |m: DMatrix<f64>| {
         DMatrix::from_fn(p, p, |i, j| m[(i, j)] * freedom / (sizes[i] * sizes[j]))
     };

@@ -150,14 +150,14 @@ impl StartStop {
     }
 
     /// When the flow has fallen to a fraction, from the stop command \[s\].
-    pub fn falls_to_s(&self, share: f64) -> f64 {
-        let share = share.clamp(f64::MIN_POSITIVE, 1.0);
+    pub fn falls_to_s(&self, fraction: f64) -> f64 {
+        let fraction = fraction.clamp(f64::MIN_POSITIVE, 1.0);
         // The flow falls no slower than its slowest part.
         let slowest_s = self.fall_s.max(self.drool_time_constant_s);
-        let (mut low, mut high) = (self.stop_s, self.stop_s - slowest_s * libm::log(share));
+        let (mut low, mut high) = (self.stop_s, self.stop_s - slowest_s * libm::log(fraction));
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);
-            if self.remaining_flow(middle) > share { low = middle } else { high = middle }
+            if self.remaining_flow(middle) > fraction { low = middle } else { high = middle }
         }
         high
     }

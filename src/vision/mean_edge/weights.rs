@@ -139,10 +139,10 @@ impl EdgeWeights {
                 weights.iter().zip(&self.bead).map(|(weight, bead)| weight * fraction(*bead));
             seen.take(self.pixels).collect()
         };
-        let (place, change) = (seen(self.position), seen(self.place_gradient()));
+        let (position, change) = (seen(self.position), seen(self.position_gradient()));
         let mut samples = ShiftSamples::default();
         for window in profile.windows(self.pixels) {
-            let found = product(&place, window);
+            let found = product(&position, window);
             samples.sum_of_squares += found * found;
             samples.drifts += found * product(&change, window);
             samples.count += 1.0;
@@ -151,7 +151,7 @@ impl EdgeWeights {
     }
 
     /// Derivative of the weights for the position by a move of the window inwards \[1/px\].
-    fn place_gradient(&self) -> [f64; WINDOW] {
+    fn position_gradient(&self) -> [f64; WINDOW] {
         std::array::from_fn(|k| {
             let at = |k: usize| if k < self.pixels { self.position[k] } else { 0.0 };
             let before = if k == 0 { 0.0 } else { at(k - 1) };

@@ -281,8 +281,8 @@ fn is_part(tracer: &EdgeTracer, step: f64) -> bool {
 }
 
 /// Whether few pixels about either edge show neither bead nor ground: a fraction below a limit.
-fn are_clean(fits: &[RoughFit; 2], max_odd_share: f64) -> bool {
-    fits.iter().all(|fit| fit.odd_fraction < max_odd_share)
+fn are_clean(fits: &[RoughFit; 2], max_odd_fraction: f64) -> bool {
+    fits.iter().all(|fit| fit.odd_fraction < max_odd_fraction)
 }
 
 /// Whether more shows about an edge than bead with its texture and ground.

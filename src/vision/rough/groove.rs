@@ -84,18 +84,19 @@ impl GrooveShape {
         self.model.width
     }
 
-    /// Average of two shapes and its variance (Bayesian model averaging); `share` is the
+    /// Average of two shapes and its variance (Bayesian model averaging); `probability` is the
     /// probability of the other one.
-    fn average_with(&self, other: &Self, share: f64) -> Self {
+    fn average_with(&self, other: &Self, probability: f64) -> Self {
         let apart = other.at - self.at;
-        let mean = |one: f64, other: f64| one + share * (other - one);
+        let mean = |one: f64, other: f64| one + probability * (other - one);
         Self {
             at: mean(self.at, other.at),
-            variance: mean(self.variance, other.variance) + share * (1.0 - share) * apart * apart,
+            variance: mean(self.variance, other.variance)
+                + probability * (1.0 - probability) * apart * apart,
             groove_probability: mean(self.groove_probability, other.groove_probability),
-            blur: if share > 0.5 { other.blur } else { self.blur },
+            blur: if probability > 0.5 { other.blur } else { self.blur },
             level_off: mean(self.level_off, other.level_off),
-            model: if share > 0.5 { other.model } else { self.model },
+            model: if probability > 0.5 { other.model } else { self.model },
         }
     }
 }
@@ -281,13 +282,13 @@ pub fn fit(mean: &MeanProfile, known: &GroovePrior<'_>) -> Option<GrooveShape> {
         let dip = dip.filter(|dip| dip.model.is_dip());
         let step_shape = groove.shape_of(&step, 0.0);
         let Some(dip) = dip else { return step_shape };
-        let share = match known.edge {
+        let probability = match known.edge {
             EdgeKind::Auto => 1.0 / (1.0 + libm::exp(0.5 * (DIP_COST + dip.cost - step.cost))),
             EdgeKind::Step => 0.0,
             EdgeKind::Groove => 1.0,
         };
         return match (step_shape, groove.shape_of(&dip, 1.0)) {
-            (Some(step), Some(dip)) => Some(step.average_with(&dip, share)),
+            (Some(step), Some(dip)) => Some(step.average_with(&dip, probability)),
             (step, dip) => dip.or(step),
         };
     }
@@ -358,18 +359,18 @@ impl GrooveProblem<'_> {
     /// falls.
     fn descend(&self, start: GrooveFit) -> Option<GrooveFit> {
         let mut best = start;
-        let mut share = 1.0;
+        let mut step_fraction = 1.0;
         for _ in 0..MAX_ITERATIONS {
-            let step = share * best.solved.unknowns;
+            let step = step_fraction * best.solved.unknowns;
             if step[0].abs() < CONVERGED_PX && step[1].abs() < CONVERGED_WIDTH_PX {
                 break;
             }
             let next = self.solve(&best.model.after(&step, self.prior.bead))?;
             if next.cost < best.cost {
                 best = next;
-                share = f64::min(2.0 * share, 1.0);
+                step_fraction = f64::min(2.0 * step_fraction, 1.0);
             } else {
-                share *= 0.5;
+                step_fraction *= 0.5;
             }
         }
         Some(best)

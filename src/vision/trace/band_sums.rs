@@ -45,9 +45,9 @@ impl BandSums {
         variance: f64,
         extra: [f64; 2],
         plain: [f64; 2],
-        least_share: f64,
+        min_fraction: f64,
     ) -> Option<(f64, CaliperEdge)> {
-        if self.rows < least_share * self.all_rows || self.rows < 1.0 {
+        if self.rows < min_fraction * self.all_rows || self.rows < 1.0 {
             return None;
         }
         let mut matrix = core * self.rows;
@@ -62,8 +62,8 @@ impl BandSums {
         let (found, variance_of_place) = solve(&matrix, &vector)?;
         let height = self.step + found[2] - found[1];
         let variance = variance * variance_of_place / (self.step * self.step);
-        let share = self.rows / self.all_rows;
-        Some((found[0] / self.step, CaliperEdge { at: 0.0, variance, height, row_fraction: share }))
+        let row_fraction = self.rows / self.all_rows;
+        Some((found[0] / self.step, CaliperEdge { at: 0.0, variance, height, row_fraction }))
     }
 }
 

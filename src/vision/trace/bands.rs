@@ -25,14 +25,14 @@ impl EdgeTracer {
         let core = self.row_fit.template.products.matrix();
         let extra = [0, 1].map(|side| self.extra_variance(core, variance, side));
         let plain = self.row_fit.template.plain_pixels();
-        let least_share =
+        let min_fraction =
             if self.occlusion.clear.is_empty() { MIN_ROW_FRACTION } else { MIN_CLEAR_ROW_FRACTION };
         self.edges.clear();
         let textured = self.textured.texture.is_some();
         let mut off: f64 = 0.0;
         for (band, sums) in self.row_fit.solved.iter().enumerate() {
             let located =
-                sums.solve(core, variance, extra, plain, least_share).map(|(moved, located)| {
+                sums.solve(core, variance, extra, plain, min_fraction).map(|(moved, located)| {
                     let bent = if textured { 0.0 } else { moved / blur };
                     let moved = moved * (1.0 + bent * bent / 12.0);
                     off = off.max(moved.abs());
