@@ -81,7 +81,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     }
     about_surface(&loaded);
     calibration_map::tell(&loaded, args.report.as_deref())?;
-    say!("  ready for process, render");
+    say!("  ready for process, lab render");
     match run {
         Ok(loaded) => {
             let Some(run) = &loaded.cell.run else { return Ok(ExitCode::SUCCESS) };

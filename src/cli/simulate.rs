@@ -36,8 +36,8 @@ simulated. One bead of [simulation] path_mm is laid. level = \"frames\" renders
 and measures every frame; level = \"widths\" takes the true width with noise and
 is thousands of times faster than the clock. Ctrl-C ends it with what there is by
 then. Leaves widths.csv, summary.json and report.html; with --record also
-recording.mcap, which identify and viewers of MCAP read. A folder that holds a
-recording of another run is refused.")]
+recording.mcap, which `extruder identify` and viewers of MCAP read. A folder that
+holds a recording of another run is refused.")]
 pub struct SimulateArgs {
     /// Cell file that describes cell, bead and world
     scenario: PathBuf,

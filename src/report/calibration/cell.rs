@@ -35,7 +35,7 @@ impl CellCalibrationPage<'_> {
                 h2 { "Uncertainty of a width by the calibration" }
                 p.hint {
                     (format!(
-                        "Standard deviation of the width of a bead of {} mm [% of it] whose \
+                        "Standard deviation of the width of a bead of {:.1} mm [% of it] whose \
                          middle is in a cell, at the cell's surface height. Every sigma_mm \
                          contains it for its own width and position; it is one error, the same in \
                          every frame. Solid: the gauge. Dashed: where boards were seen. Empty \

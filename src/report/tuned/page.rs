@@ -178,7 +178,7 @@ impl Tuned {
                 (plot(&axis, "robot's speed [mm/s]", 200.0, &bounds,
                     curves(&speeds, CONTROLLERS).chain(limits).collect(), &[]))
                 (table("controller", &self.predictions))
-                p.hint { "the distance controller has no gains that could swing. What stands for a \
+                p.hint { "The distance controller has no gains that could swing. What stands for a \
                     margin is how far what it is given may be wrong:" }
                 (table("the distance controller", &self.mismatched))
             }
