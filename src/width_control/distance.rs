@@ -7,12 +7,12 @@
 //!
 //! ```text
 //! reports ─▶ speed history ─┐ speed where the bead under the camera was laid
-//! width ± σ ────────────────┴▶ sample ─▶ pulsation ─▶ flow change ─▶ width model (ln A, b) ─▶ speed
-//!                                └─▶ offset estimate (the camera's true offset)
+//! width ± σ ────────────────┴▶ sample ─▶ pulsation ─▶ flow step ─▶ width model (ln A, b) ─▶ speed
 //! ```
 //!
-//! There are no gains: how much a width moves the estimate follows from its own standard
-//! deviation and from the drift of the flow that the cell states.
+//! There are no gains: how much a width moves the estimate follows from the roughness of the
+//! bead, from the width's own standard deviation, and from the drift of the flow that the cell
+//! states.
 
 mod flow_step;
 mod harmonic;
