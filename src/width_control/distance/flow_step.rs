@@ -11,6 +11,7 @@ use std::collections::VecDeque;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 
 use super::width_model::{WidthModel, WidthObservation};
+use crate::numeric::number::{to_count, to_f64};
 
 /// Largest number of widths that are kept.
 const MAX_WIDTHS: usize = 96;
@@ -37,6 +38,12 @@ const MIN_SIZE_LATER: f64 = 0.015;
 const OUTLIER_SIGMAS: f64 = 4.0;
 /// Largest distance between positions that are tried, in gauges.
 const MAX_SPACING_GAUGES: f64 = 0.1;
+/// Largest number of positions between two widths.
+const MAX_POSITIONS: usize = 10;
+/// Smallest prior of a position: widths of a robot that hardly moves.
+const MIN_PRIOR: f64 = 1e-6;
+/// Shortest gauge \[mm\]: a width at a point, as of a plant without a camera, counts as one.
+const MIN_GAUGE_MM: f64 = 1.0;
 /// Length after a step, beyond the gauge, after which it is part of the model, in gauges.
 const SETTLED_GAUGES: f64 = 0.25;
 
@@ -82,6 +89,7 @@ struct Candidate {
 impl StepDetector {
     /// Before the first width, for a gauge of this length \[mm\].
     pub fn new(gauge_mm: f64) -> Self {
+        let gauge_mm = gauge_mm.max(MIN_GAUGE_MM);
         Self { gauge_mm, records: VecDeque::new(), is_under_way: false }
     }
 
@@ -163,11 +171,12 @@ impl StepDetector {
         let mut found = Vec::new();
         for pair in residuals.windows(2) {
             let (before, after) = (pair[0].front_mm, pair[1].front_mm);
-            let pieces = ((after - before) / (MAX_SPACING_GAUGES * self.gauge_mm)).ceil().max(1.0);
-            let length = (after - before) / pieces;
-            let prior = libm::log((length / self.gauge_mm).max(1e-6));
-            let mut position_mm = before + 0.5 * length;
-            while position_mm < after {
+            let apart = (after - before) / (MAX_SPACING_GAUGES * self.gauge_mm);
+            let pieces = to_count(apart.ceil()).clamp(1, MAX_POSITIONS);
+            let length = (after - before) / to_f64(pieces);
+            let prior = libm::log((length / self.gauge_mm).max(MIN_PRIOR));
+            for piece in 0..pieces {
+                let position_mm = before + (to_f64(piece) + 0.5) * length;
                 let fraction =
                     |front_mm: f64| ((front_mm - position_mm) / self.gauge_mm).clamp(0.0, 1.0);
                 found.extend(fit.with_step(&residuals, fraction).map(|step| Candidate {
@@ -177,7 +186,6 @@ impl StepDetector {
                     state: base.estimate() + step.change,
                     covariance: step.covariance,
                 }));
-                position_mm += length;
             }
         }
         found
@@ -345,6 +353,21 @@ mod tests {
         for outlier in [20, 40, 60] {
             assert_eq!(found(0.0, 180.0, Some(outlier)), None, "{outlier}");
         }
+    }
+
+    #[test]
+    fn widths_at_a_point_and_at_one_place_have_steps_too() {
+        let model = known();
+        let mut detector = StepDetector::new(0.0);
+        let mut last = None;
+        for number in 0..20_u32 {
+            let step = if number >= 10 { 0.08 } else { 0.0 };
+            // Two widths at every place.
+            let front = 2.0 * f64::from(number / 2);
+            detector.push(front, width(model.predicted(-0.3) + step), model);
+            last = detector.find(1.0).or(last);
+        }
+        assert!((last.unwrap().size - 0.08).abs() < 0.01, "{last:?}");
     }
 
     #[test]
