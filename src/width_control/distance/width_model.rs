@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, RowVector2, Vector2};
 
 /// Initial standard deviation of b, as a fraction of it. Exponents of beads range from 0.2 to
 /// 1, so a stated one may be far off.
-const EXPONENT_SIGMA: f64 = 0.25;
+const EXPONENT_SIGMA: f64 = 0.4;
 /// Standard deviation of ln w by what no part of the model describes, as a wave of the flow. It
 /// does not move ln A less, but b, which would take a wave for an effect of the speed.
 const OTHER_SIGMA: f64 = 0.007;
