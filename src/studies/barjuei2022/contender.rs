@@ -64,12 +64,9 @@ impl ControlSetup {
         if let Self::Distance(rates, exponent) = self {
             (cell.simulation.latency, cell.simulation.step) = (LATENCY, STEP);
             (run.camera.rate_hz, run.robot.rate_hz) = (rates.vision_hz, rates.link_hz);
-            run.control.strategy = Arc::new(DistanceStrategy {
-                exponent,
-                learns_exponent: true,
-                drift_per_root_m: DRIFT,
-                cancels_pulsation: true,
-            });
+            let (learns_exponent, drift_per_root_m) = (true, DRIFT);
+            run.control.strategy =
+                Arc::new(DistanceStrategy { exponent, learns_exponent, drift_per_root_m });
         }
         (cell, run)
     }

@@ -7,7 +7,6 @@ use crate::cell::file::{Cell, Purpose, RunPart};
 use crate::core::Mm;
 use crate::trials::layer::LayerTrial;
 use crate::vision::MeasureMethod;
-use crate::width_control::strategy::BeadNoise;
 
 fn cell() -> (Cell, RunPart) {
     let text = include_str!("../../../cells/barjuei2022.toml");
@@ -143,8 +142,7 @@ fn by_distance_slow_waves_and_pulsations_are_attenuated() {
     let (cell, run) = cell();
     let ratio =
         |rates, what| error_ratio(&cell, &run, ControlSetup::by_distance(rates), what, 6).unwrap();
-    // The longest wave is followed; the shorter one, of 15 s, must at least not grow.
-    for (wavelength, most) in [(2400.0, [0.5, 0.3]), (1200.0, [1.05, 0.9])] {
+    for (wavelength, most) in [(2400.0, [0.43, 0.28]), (1200.0, [0.77, 0.55])] {
         for (rates, most) in RATES.into_iter().zip(most) {
             let found = ratio(rates, FlowDisturbance::Wave(wavelength));
             assert!(found <= most, "{wavelength} mm, {rates:?}: {found}");
@@ -180,27 +178,16 @@ fn by_distance_a_mismatch_and_outliers_raise_the_error_by_half_at_most() {
             let ratio = found.median_mm / nominal.median_mm;
             assert!(ratio <= 1.5, "{rates:?}, b {exponent}, {what:?}: {found:?} is {ratio}");
             let ratio = found.mean_mm / nominal.mean_mm;
-            // One width in ten is an outlier: a bead of twenty takes three of them for a step.
-            let most = if what.outliers > 0.0 { 2.0 } else { 1.5 };
-            assert!(ratio <= most, "{rates:?}, b {exponent}, {what:?}: {found:?} is {ratio}");
+            assert!(ratio <= 1.5, "{rates:?}, b {exponent}, {what:?}: {found:?} is {ratio}");
         }
-    }
-}
-
-#[test]
-fn by_distance_all_errors_at_once_are_survived() {
-    let (cell, run) = cell();
-    let mut errors = Vec::new();
-    for rates in RATES {
+        // All of it at once, in any direction.
         for (exponent, offset) in [(0.375, 1.2), (0.125, 1.2), (0.375, 0.8), (0.125, 0.8)] {
-            let who = ControlSetup::Distance(rates, exponent);
-            let what = Mismatch { offset, outliers: 0.1, missing: 0.2 };
-            let found = mismatched(&cell, &run, who, what, SEEDS).unwrap();
-            errors.push((rates, exponent, offset, found.median_mm));
+            let found =
+                found_with(rates, exponent, Mismatch { offset, outliers: 0.1, missing: 0.2 });
+            let ratio = found.median_mm / nominal.median_mm;
+            assert!(ratio <= 1.8, "{rates:?}, b {exponent}, {offset}: {found:?} is {ratio}");
         }
     }
-    let most = |exponent: f64| if exponent > 0.2 { 0.2 } else { 0.3 };
-    assert!(errors.iter().all(|(_, exponent, _, mm)| *mm < most(*exponent)), "{errors:#?}");
 }
 
 #[test]
@@ -222,7 +209,6 @@ fn by_distance_a_rough_bead_is_not_chased() {
     let (mut cell, run) = cell();
     cell.simulation.roughness.sigma_mm = 0.5;
     cell.simulation.roughness.length_mm = 8.0;
-    cell.bead_noise = BeadNoise { roughness: Some(Mm::constant(0.5)), length: Mm::constant(8.0) };
     let nobody = ControlSetup::Paper.enter(&cell, &run, 42.0);
     let (cell, mut run) = ControlSetup::by_distance(RATES[1]).enter(&nobody.0, &run, 42.0);
     let sigma = |run: &RunPart| {

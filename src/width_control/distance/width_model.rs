@@ -6,21 +6,15 @@ use nalgebra::{Matrix2, RowVector2, Vector2};
 /// Initial standard deviation of b, as a fraction of it. Exponents of beads range from 0.2 to
 /// 1, so a stated one may be far off.
 const EXPONENT_SIGMA: f64 = 0.4;
-/// Standard deviation of ln w by what no part of the model describes, as a wave of the flow. It
-/// does not move ln A less, but b, which would take a wave for an effect of the speed.
-const OTHER_SIGMA: f64 = 0.007;
 /// Range of b, as factors on its initial value. Too small an exponent makes control too
 /// aggressive, so the lower end is nearer.
 const EXPONENT_RANGE: (f64, f64) = (0.7, 2.2);
+/// Standard deviation of b above which it counts as poorly known, as a fraction of its initial
+/// value.
+const POORLY_KNOWN_SIGMA: f64 = 0.1;
 /// Smallest difference of ln v to the best known speed at which a width updates b: noise of
 /// reported speeds below it would bias b towards 0 (errors in variables).
 const MIN_LN_SPEED_DIFFERENCE: f64 = 0.015;
-/// Standard deviation of b after ln v has changed by 1, as a fraction of its initial value: a
-/// bead is a power of its speed only piece by piece. papers.md gives 0.221 and 0.267 on either
-/// side of 77 mm/s.
-const EXPONENT_SIGMA_PER_ROOT: f64 = 0.15;
-/// Smallest variance that can be inverted.
-const MIN_VARIANCE: f64 = 1e-14;
 /// Largest standard deviation of b at an end of its range, as a fraction of its initial value.
 const SIGMA_AT_RANGE_END: f64 = 0.3;
 /// Standard deviation of ln A after the first width, which may be an outlier.
@@ -45,8 +39,6 @@ pub struct WidthModel {
     learns_exponent: bool,
     known: bool,
     position_mm: Option<f64>,
-    /// Smallest and largest ln(v/v₀) of all widths.
-    ln_speeds: Option<(f64, f64)>,
 }
 
 /// A width with the speed at which it was laid.
@@ -56,6 +48,10 @@ pub struct WidthObservation {
     pub ln_width: f64,
     /// ln(v/v₀).
     pub ln_speed: f64,
+    /// Fraction of the gauge that lies after the last change of the flow.
+    pub covered_fraction: f64,
+    /// ln A before that change.
+    pub old_ln_width: f64,
     /// Variance of `ln_width`.
     pub variance: f64,
 }
@@ -93,7 +89,6 @@ impl WidthModel {
             learns_exponent: learns,
             known: false,
             position_mm: None,
-            ln_speeds: None,
         }
     }
 
@@ -116,6 +111,11 @@ impl WidthModel {
     /// b.
     pub fn exponent(&self) -> f64 {
         self.exponent
+    }
+
+    /// Whether b is still poorly known.
+    pub fn exponent_is_uncertain(&self) -> bool {
+        self.covariance[2] > (POORLY_KNOWN_SIGMA * self.prior_exponent).powi(2)
     }
 
     /// Whether a width of bead laid at ln(v/v₀) informs b: its speed differs clearly from the
@@ -156,9 +156,17 @@ impl WidthModel {
 
     /// The innovation of an observation.
     pub fn innovation(&self, observation: &WidthObservation) -> WidthInnovation {
+        let [level, both, exponent] = self.covariance;
+        let [by_level, by_exponent] = observation.slopes();
+        let predicted = self.ln_width * observation.covered_fraction
+            + observation.old_ln_width * (1.0 - observation.covered_fraction)
+            - self.exponent * observation.ln_speed;
+        let spread = by_level * by_level * level
+            + 2.0 * by_level * by_exponent * both
+            + by_exponent * by_exponent * exponent;
         WidthInnovation {
-            by: observation.ln_width - self.predicted(observation.ln_speed),
-            variance: self.predicted_variance(observation.ln_speed) + observation.variance,
+            by: observation.ln_width - predicted,
+            variance: spread.max(0.0) + observation.variance,
         }
     }
 
@@ -177,11 +185,8 @@ impl WidthModel {
         let [a, b] = observation.slopes();
         let [level, both, exponent] = self.covariance;
         let by_level = (level * a + both * b) / total;
-        let by_exponent = if learns && self.learns_exponent {
-            (both * a + exponent * b) / (total + OTHER_SIGMA * OTHER_SIGMA)
-        } else {
-            0.0
-        };
+        let by_exponent =
+            if learns && self.learns_exponent { (both * a + exponent * b) / total } else { 0.0 };
         self.ln_width += by_level * innovation.by;
         self.exponent += by_exponent * innovation.by;
         self.covariance =
@@ -212,56 +217,18 @@ impl WidthModel {
         self.covariance = [(level - slope * both).max(0.0), 0.0, kept];
     }
 
-    /// ln A and b.
-    pub fn estimate(&self) -> Vector2<f64> {
-        Vector2::new(self.ln_width, self.exponent)
-    }
-
-    /// Their covariance.
-    pub fn covariance(&self) -> Matrix2<f64> {
-        let [level, both, exponent] = self.covariance;
-        // A constant exponent has no variance: the smallest that can be inverted.
-        Matrix2::new(level, both, both, exponent.max(MIN_VARIANCE))
-    }
-
-    /// The model with another estimate of ln A and b.
-    pub fn with_estimate(mut self, estimate: Vector2<f64>, covariance: Matrix2<f64>) -> Self {
-        self.ln_width = estimate.x;
-        self.covariance[0] = covariance.m11;
-        if self.learns_exponent {
-            self.exponent = estimate.y;
-            self.covariance = [covariance.m11, covariance.m12, covariance.m22];
-            self.keep_exponent_in_range();
-        }
+    /// The model after ln A has changed by `size`, which has this variance.
+    pub fn after_change(mut self, size: f64, variance: f64) -> Self {
+        self.ln_width += size;
+        self.covariance[0] += variance;
         self
-    }
-
-    /// A width is laid at ln(v/v₀). Beyond the speeds of all widths before, b is less certain;
-    /// the width at the nearest of these speeds is as certain as it was.
-    pub fn move_to(&mut self, ln_speed: f64) {
-        let Some((slowest, fastest)) = self.ln_speeds else {
-            self.ln_speeds = Some((ln_speed, ln_speed));
-            return;
-        };
-        let nearest = ln_speed.clamp(slowest, fastest);
-        self.ln_speeds = Some((slowest.min(ln_speed), fastest.max(ln_speed)));
-        if self.learns_exponent && self.known {
-            let beyond = (ln_speed - nearest).abs();
-            let variance = beyond * (EXPONENT_SIGMA_PER_ROOT * self.prior_exponent).powi(2);
-            let [level, both, exponent] = self.covariance;
-            self.covariance = [
-                level + variance * nearest * nearest,
-                both + variance * nearest,
-                exponent + variance,
-            ];
-        }
     }
 }
 
 impl WidthObservation {
     /// Derivatives of the predicted ln w with respect to ln A and b.
     fn slopes(&self) -> [f64; 2] {
-        [1.0, -self.ln_speed]
+        [self.covered_fraction, -self.ln_speed]
     }
 }
 
@@ -280,7 +247,13 @@ mod tests {
     use super::*;
 
     fn observed(ln_width: f64, ln_speed: f64) -> WidthObservation {
-        WidthObservation { ln_width, ln_speed, variance: 1e-6 }
+        WidthObservation {
+            ln_width,
+            ln_speed,
+            covered_fraction: 1.0,
+            old_ln_width: 0.0,
+            variance: 1e-6,
+        }
     }
 
     #[test]
@@ -293,7 +266,7 @@ mod tests {
         }
         assert!((model.exponent() - 0.31).abs() < 1e-3, "{model:?}");
         assert!((model.ln_width() - 3.7).abs() < 1e-3);
-        assert!((model.predicted(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 5e-4);
+        assert!((model.predicted(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 1e-4);
     }
 
     #[test]
