@@ -169,13 +169,13 @@ impl Controller {
         let (max_gap, max_hold) = (self.setup.control.max_gap, self.setup.control.max_hold);
         let Some(Bead { mode, .. }) = self.phase.bead_mut() else { return };
         if *mode == Mode::Priming && is_due {
-            *mode = Mode::Holding { since: now, why: Hold::NoWidth };
+            *mode = Mode::holding(now, Hold::NoWidth);
         }
         match mode {
             Mode::Tracking { seen_at } if now - *seen_at > max_gap => {
-                *mode = Mode::Holding { since: now, why: Hold::NoWidth };
+                *mode = Mode::holding(now, Hold::NoWidth);
             }
-            Mode::Holding { since, why } if now - *since > max_hold => {
+            Mode::Holding { since, why, .. } if now - *since > max_hold => {
                 *mode = Mode::Fault { why: Fault::HeldTooLong(why.clone()) };
             }
             _ => {}

@@ -1,8 +1,13 @@
 //! The phase of a controller, with the data of each phase.
 
 use super::step::{Fault, Hold, State};
-use crate::core::{Mm, MmPerS, Stamp};
+use crate::core::{Mm, MmPerS, Span, Stamp};
 use crate::width_control::limiter::SpeedLimit;
+
+/// Widths in a row that end a hold for missing widths (`docs/src/how-to/run-a-cell.md`, § What
+/// the controller does). One or two may come by chance from a camera that still fails; each
+/// further one delays control by a frame.
+const WIDTHS_TO_RESUME: u32 = 3;
 
 /// The phase of a controller.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,12 +54,34 @@ pub enum Mode {
         since: Stamp,
         /// Why.
         why: Hold,
+        /// Widths that have come since.
+        timely: TimelyWidths,
     },
     /// The robot is commanded to stop.
     Fault {
         /// Why.
         why: Fault,
     },
+}
+
+/// Widths in a row that were no older than the longest gap when they arrived, and no farther
+/// apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct TimelyWidths {
+    count: u32,
+    /// Capture time of the last one.
+    last: Option<Stamp>,
+}
+
+/// A width of the bead that is being laid, as it arrives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Arrival {
+    /// When it arrived.
+    pub at: Stamp,
+    /// When its frame was captured.
+    pub captured_at: Stamp,
+    /// The longest time without a width.
+    pub max_gap: Span,
 }
 
 /// The stage of a bead.
@@ -102,9 +129,20 @@ impl Bead {
         if let Mode::Tracking { seen_at } = self.mode { Some(seen_at) } else { None }
     }
 
-    /// Whether tracking may begin with the next width.
-    pub fn waits_for_width(&self) -> bool {
-        matches!(self.mode, Mode::Priming | Mode::Holding { why: Hold::NoWidth, .. })
+    /// Whether tracking may begin with a width that arrives. A hold for missing widths ends
+    /// with the last of several timely ones; a late one names the camera as the reason.
+    pub fn may_track(&mut self, width: &Arrival) -> bool {
+        match &mut self.mode {
+            Mode::Priming => width.is_timely(),
+            Mode::Holding { why, timely, .. } if why.is_for_widths() => {
+                if !width.is_timely() && *why == Hold::NoWidth {
+                    *why = Hold::SlowCamera { age: width.age(), max_gap: width.max_gap };
+                }
+                timely.add(width);
+                timely.count >= WIDTHS_TO_RESUME
+            }
+            _ => false,
+        }
     }
 
     /// Whether it is held for a reason that lies with the robot.
@@ -116,6 +154,35 @@ impl Bead {
     /// Whether it is in fault.
     pub fn is_faulty(&self) -> bool {
         matches!(self.mode, Mode::Fault { .. })
+    }
+}
+
+impl Mode {
+    /// A hold that begins.
+    pub fn holding(since: Stamp, why: Hold) -> Self {
+        Self::Holding { since, why, timely: TimelyWidths::default() }
+    }
+}
+
+impl TimelyWidths {
+    /// Counts a timely width; a late one, and one after a gap, begins the count anew.
+    fn add(&mut self, width: &Arrival) {
+        let Arrival { captured_at, max_gap, .. } = *width;
+        let follows = self.last.is_some_and(|last| captured_at - last <= max_gap);
+        let before = if follows { self.count } else { 0 };
+        self.count = if width.is_timely() { before.saturating_add(1) } else { 0 };
+        self.last = Some(captured_at);
+    }
+}
+
+impl Arrival {
+    /// Age of the width when it arrived.
+    fn age(&self) -> Span {
+        self.at - self.captured_at
+    }
+
+    fn is_timely(&self) -> bool {
+        self.age() <= self.max_gap
     }
 }
 
@@ -143,8 +210,8 @@ impl Phase {
     pub fn hold(&mut self, now: Stamp, why: Hold) {
         let Some(bead) = self.bead_mut() else { return };
         match &mut bead.mode {
-            Mode::Priming | Mode::Tracking { .. } => bead.mode = Mode::Holding { since: now, why },
-            Mode::Holding { why: reason, .. } if *reason == Hold::NoWidth => *reason = why,
+            Mode::Priming | Mode::Tracking { .. } => bead.mode = Mode::holding(now, why),
+            Mode::Holding { why: reason, .. } if reason.is_for_widths() => *reason = why,
             _ => {}
         }
     }

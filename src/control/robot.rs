@@ -109,11 +109,11 @@ impl Controller {
     fn resume(&mut self, now: Stamp, state: &RobotState) {
         let Some(bead) = self.phase.bead_mut() else { return };
         bead.mode = if self.camera_lost {
-            Mode::Holding { since: now, why: Hold::CameraLost }
+            Mode::holding(now, Hold::CameraLost)
         } else if state.path_mm - self.bead.start < self.setup.cell.start_length {
             Mode::Priming
         } else {
-            Mode::Holding { since: now, why: Hold::NoWidth }
+            Mode::holding(now, Hold::NoWidth)
         };
     }
 

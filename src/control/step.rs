@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
-use crate::core::{Mm, MmPerS, Stamp};
+use crate::core::{Mm, MmPerS, Span, Stamp};
 use crate::extruder::{ExtruderCommand, ExtruderFault, ExtruderState, ExtruderTrace};
 use crate::width_control::SpeedLimit;
 use crate::width_control::distance::{DistanceTrace, FallbackReason};
@@ -26,6 +26,13 @@ pub enum Command {
 pub enum Hold {
     /// No width for longer than the cell allows.
     NoWidth,
+    /// Widths come, but too old to control with.
+    SlowCamera {
+        /// Age of the first such width when it arrived.
+        age: Span,
+        /// The longest time without a width.
+        max_gap: Span,
+    },
     /// The robot moves at its own hold speed.
     RobotHolds,
     /// The link to the robot is down.
@@ -40,6 +47,13 @@ pub enum Hold {
     CameraLost,
     /// The run is being ended. Left only by a new run.
     Stopping,
+}
+
+impl Hold {
+    /// Whether widths that come in time end it.
+    pub fn is_for_widths(&self) -> bool {
+        matches!(self, Self::NoWidth | Self::SlowCamera { .. })
+    }
 }
 
 /// Why the controller stopped the robot. Left when the robot is idle again.

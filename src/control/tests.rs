@@ -85,10 +85,15 @@ impl Line {
     }
 
     fn width(&mut self, width: f64) -> Step {
+        self.width_of_age(0.0, width)
+    }
+
+    /// A width that arrives some seconds after its frame was captured.
+    fn width_of_age(&mut self, age: f64, width: f64) -> Step {
         self.frame += 1;
         self.give(&Event::Measured {
             frame: self.frame,
-            captured_at: Stamp::from_secs(self.now),
+            captured_at: Stamp::from_secs(self.now - age),
             width_mm: Mm::constant(width),
             sigma_mm: Mm::constant(0.01),
         })
@@ -116,6 +121,11 @@ impl Line {
     fn advance(&mut self, secs: f64, path: f64, speed: f64) -> Step {
         self.now += secs;
         self.robot(RobotMode::Print, path, speed)
+    }
+
+    /// Lays bead at the start speed, which began at 1 s.
+    fn lay(&mut self, secs: f64) -> Step {
+        self.advance(secs, 112.5 * (self.now + secs - 1.0), 112.5)
     }
 }
 
@@ -161,10 +171,78 @@ fn a_gap_is_held_and_not_integrated_across() {
     let before = line.tick().unwrap();
     let _ = line.advance(0.6, 300.0, before);
     assert_eq!(line.tick(), Some(before));
-    assert_eq!(line.controller.state(), State::Holding(Hold::NoWidth));
+    let held = State::Holding(Hold::NoWidth);
+    assert_eq!(line.controller.state(), held);
+    for _ in 0..2 {
+        assert_eq!(line.width(44.0).state, held);
+        let _ = line.advance(0.02, 302.0, before);
+    }
     let step = line.width(44.0);
     assert_eq!(step.state, State::Tracking);
     assert!((step.trace.demand_mm_per_s.unwrap().get() - before).abs() < 1e-9);
+}
+
+/// Widths of an age, ten a second, until the hold must have ended in a fault.
+fn states_with_widths_of_age(mut line: Line, age: f64) -> Vec<State> {
+    let mut states = Vec::new();
+    for _ in 0..80 {
+        let _ = line.lay(0.1);
+        states.push(line.width_of_age(age, 42.0).state);
+        let _ = line.tick();
+        states.push(line.controller.state());
+    }
+    states
+}
+
+fn slow_camera(age: f64) -> Hold {
+    Hold::SlowCamera { age: Span::from_secs(age), max_gap: Span::from_secs(0.5) }
+}
+
+#[test]
+fn widths_that_are_too_old_do_not_end_a_hold_and_the_fault_names_the_camera() {
+    let states = states_with_widths_of_age(Line::tracking(), 0.8);
+    let held = states.iter().position(|state| matches!(state, State::Holding(_))).unwrap();
+    assert!(!states[held..].contains(&State::Tracking));
+    assert!(states.contains(&State::Holding(slow_camera(0.8))));
+    let fault = State::Fault(Fault::HeldTooLong(slow_camera(0.8)));
+    assert_eq!(states.last(), Some(&fault));
+    let lasted = states.iter().position(|state| *state == fault).unwrap() - held;
+    // Two states every 0.1 s, for the 3 s of the longest hold.
+    assert!((60..66).contains(&lasted), "{lasted}");
+}
+
+#[test]
+fn widths_that_are_young_enough_are_tracked_whatever_their_age() {
+    let states = states_with_widths_of_age(Line::tracking(), 0.25);
+    assert!(states.iter().all(|state| *state == State::Tracking));
+}
+
+#[test]
+fn control_does_not_begin_with_widths_that_are_too_old() {
+    let mut line = Line::new();
+    line.now = 1.0;
+    let _ = line.robot(RobotMode::Print, 0.0, 112.5);
+    let states = states_with_widths_of_age(line, 0.8);
+    assert!(!states.contains(&State::Tracking));
+    assert_eq!(states.last(), Some(&State::Fault(Fault::HeldTooLong(slow_camera(0.8)))));
+}
+
+#[test]
+fn only_timely_widths_in_a_row_end_a_hold() {
+    let mut line = Line::tracking();
+    let _ = line.lay(0.6);
+    let _ = line.tick();
+    for age in [0.0, 0.1, 0.6, 0.0, 0.0] {
+        let _ = line.lay(0.1);
+        assert_ne!(line.width_of_age(age, 42.0).state, State::Tracking, "{age}");
+    }
+    // A width after a gap is not in a row with those before it.
+    let _ = line.lay(0.6);
+    assert_ne!(line.width(42.0).state, State::Tracking);
+    let _ = line.lay(0.1);
+    assert_ne!(line.width(42.0).state, State::Tracking);
+    let _ = line.lay(0.1);
+    assert_eq!(line.width(42.0).state, State::Tracking);
 }
 
 #[test]
@@ -222,7 +300,11 @@ fn a_lost_link_is_a_hold_that_ends_with_the_link() {
     };
     line.now += 0.3;
     let _ = line.give(&Event::LinkUp { robot });
-    let _ = line.advance(0.1, 270.0, 80.0);
+    for path in [270.0, 278.0] {
+        let _ = line.advance(0.1, path, 80.0);
+        assert_eq!(line.width(42.0).state, State::Holding(Hold::NoWidth));
+    }
+    let _ = line.advance(0.1, 286.0, 80.0);
     let step = line.width(42.0);
     assert_eq!(step.state, State::Tracking);
     assert!((step.trace.demand_mm_per_s.unwrap().get() - 80.0).abs() < 1e-9);

@@ -3,7 +3,7 @@
 
 use super::controller::Controller;
 use super::extruder_control::NO_OVERRIDE;
-use super::phase::{Bead, Mode, Phase};
+use super::phase::{Arrival, Bead, Mode, Phase};
 use super::step::Trace;
 use crate::core::{Mm, ROBOT_LAG, SpeedMatch, Stamp};
 use crate::width_control::controller::{Outlook, SpeedRequest, WidthSample, WidthTrace};
@@ -37,15 +37,18 @@ impl Controller {
         if is_own_bead && self.robot.odometer.reports_no_path() {
             self.width.path_is_estimated();
         }
-        let bead = self.phase.bead();
+        let arrival = Arrival { at: now, captured_at, max_gap: self.setup.control.max_gap };
+        let may_begin = primed
+            && is_own_bead
+            && self.phase.bead_mut().is_some_and(|bead| bead.may_track(&arrival));
         let sample = WidthSample {
             captured_at,
             reading,
             error,
             nozzle_path: trace.nozzle_path_mm,
             is_own_bead,
-            tracked: bead.and_then(Bead::tracked),
-            may_begin: primed && is_own_bead && bead.is_some_and(Bead::waits_for_width),
+            tracked: self.phase.bead().and_then(Bead::tracked),
+            may_begin,
             driven: driven * (1.0 / factor.max(MIN_OVERRIDE)),
             saturation: self.saturation(),
         };

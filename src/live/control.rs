@@ -191,8 +191,8 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
             return;
         }
         let words = match &step.state {
-            State::Holding(why) => format!("holding: {}", names::in_words(names::of(why))),
-            State::Fault(why) => format!("fault: {}", names::in_words(&names::fault(why))),
+            State::Holding(why) => format!("holding: {}", names::hold_in_words(why)),
+            State::Fault(why) => format!("fault: {}", names::fault_in_words(why)),
             state => state.name().to_owned(),
         };
         (self.notice)(&format!("{:8.2} s  {}", now.secs(), words));

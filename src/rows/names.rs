@@ -1,6 +1,6 @@
 //! Names of reasons, in the form for files and in the form for people.
 
-use crate::control::Fault;
+use crate::control::{Fault, Hold};
 use crate::extruder::ExtruderFault;
 
 /// Name of a limit, or of a reason without details.
@@ -15,6 +15,28 @@ pub fn fault(fault: &Fault) -> String {
         Fault::HeldTooLong(why) => format!("{name}_{}", of(why)),
         Fault::Extruder(why) => format!("{name}_{}", extruder_fault(*why)),
         _ => name.to_owned(),
+    }
+}
+
+/// A hold for people: its name, the facts, and what to do.
+pub fn hold_in_words(hold: &Hold) -> String {
+    let name = in_words(of(hold));
+    match hold {
+        Hold::SlowCamera { age, max_gap } => format!(
+            "{name}: a width is {:.2} s old when it arrives, [control] max_gap_s is {} s; \
+             use smaller images, a lower rate or a faster camera",
+            age.secs(),
+            max_gap.secs()
+        ),
+        _ => name,
+    }
+}
+
+/// A fault for people, as [`hold_in_words`].
+pub fn fault_in_words(why: &Fault) -> String {
+    match why {
+        Fault::HeldTooLong(hold) => format!("held too long: {}", hold_in_words(hold)),
+        _ => in_words(&fault(why)),
     }
 }
 
@@ -41,7 +63,7 @@ pub fn in_words(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::Hold;
+    use crate::core::Span;
     use crate::extruder::{CommandLimit, ExtruderHold};
     use crate::width_control::limiter::SpeedLimit;
 
@@ -53,6 +75,13 @@ mod tests {
         }
         assert_eq!(name(serde_json::to_value(Hold::NoWidth)), of(&Hold::NoWidth));
         assert_eq!(name(serde_json::to_value(CommandLimit::Rise)), of(CommandLimit::Rise));
+    }
+
+    #[test]
+    fn a_slow_camera_is_named_with_its_age() {
+        let (age, max_gap) = (Span::from_millis(812), Span::from_millis(500));
+        let words = fault_in_words(&Fault::HeldTooLong(Hold::SlowCamera { age, max_gap }));
+        assert!(words.contains("0.81 s") && words.contains("0.5 s"), "{words}");
     }
 
     #[test]

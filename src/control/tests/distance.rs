@@ -130,3 +130,21 @@ fn control_waits_until_the_bead_fills_the_gauge() {
     let step = line.width(38.6);
     assert_eq!((step.state, step.trace.integral_mm_per_s), (State::Tracking, None));
 }
+
+#[test]
+fn a_hold_for_old_widths_is_not_ended_by_what_is_known_of_the_bead() {
+    let mut cell = Cell::new(by_distance());
+    let _ = cell.until(300.0);
+    assert_eq!(cell.line.controller.state(), State::Tracking);
+    let mut states = Vec::new();
+    for _ in 0..120 {
+        cell.path += cell.speed * STEP_S;
+        let _ = cell.line.advance(STEP_S, cell.path, cell.speed);
+        let _ = cell.line.width_of_age(0.8, 42.0);
+        cell.speed = cell.line.tick().unwrap_or(cell.speed);
+        states.push(cell.line.controller.state());
+    }
+    let held = states.iter().position(|state| matches!(state, State::Holding(_))).unwrap();
+    assert!(!states[held..].contains(&State::Tracking), "{states:?}");
+    assert_eq!(states.last(), Some(&State::Fault(Fault::HeldTooLong(slow_camera(0.8)))));
+}
