@@ -15,6 +15,7 @@ mod extrude;
 mod extruder_control;
 mod phase;
 mod planned;
+mod reports;
 mod robot;
 mod setup;
 pub mod step;

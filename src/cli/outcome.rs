@@ -66,6 +66,12 @@ pub fn print_figures(summary: &Summary) {
             profile.after_end_s
         );
     }
+    if control.robot_reports_ignored > 0 {
+        say!(
+            "robot      {} reports not used: its own time, on the robot link t_ms, did not rise",
+            control.robot_reports_ignored
+        );
+    }
     say!("faults     {}", control.faults);
     for (reason, count) in &control.fault_reasons {
         say!("           {count} {}", names::in_words(reason));

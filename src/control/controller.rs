@@ -3,9 +3,10 @@
 use super::event::Event;
 use super::extruder_control::{ExtruderControl, NO_OVERRIDE};
 use super::phase::{Bead, BeadOnPath, Mode, Phase, Setpoint};
+use super::reports::ReportMonitor;
 use super::setup::Setup;
 use super::step::{Command, Fault, Hold, State, Step, Trace};
-use crate::core::{Mm, RobotMode, RobotState, SpeedMatch, SpeedMonitor, Stamp};
+use crate::core::{Mm, RobotMode, RobotState, Span, SpeedMatch, SpeedMonitor, Stamp};
 use crate::extruder::{ExtruderSetup, FlowDemand};
 use crate::width_control::controller::{WidthController, WidthTrace};
 use crate::width_control::distance::WidthReading;
@@ -39,6 +40,7 @@ pub(super) struct RobotMonitor {
     pub(super) is_another_bead: bool,
     /// Since when no report has come.
     pub(super) silent_since: Option<Stamp>,
+    pub(super) reports: ReportMonitor,
     pub(super) path: PathHistory,
     pub(super) odometer: Odometer,
     pub(super) speed_monitor: SpeedMonitor,
@@ -87,7 +89,7 @@ impl Controller {
                 trace.frame = Some(*frame);
                 self.locate(*captured_at, &mut trace);
             }
-            Event::Robot(state) => self.reported(now, state),
+            Event::Robot(state) => self.reported(now, state, &mut trace),
             Event::LinkUp { robot } => self.link_came_up(robot),
             Event::LinkDown { .. } => self.link_went_down(now),
             Event::Tick => command = self.tick(now, &mut trace),
@@ -166,7 +168,9 @@ impl Controller {
     /// one, and changes to a fault when a hold lasts too long.
     fn time_out(&mut self, now: Stamp) {
         let is_due = self.laid_at(now).is_some_and(|laid| laid > self.widths_due());
-        let (max_gap, max_hold) = (self.setup.control.max_gap, self.setup.control.max_hold);
+        let max_gap = self.setup.control.max_gap;
+        let max_hold = self.setup.control.max_hold;
+        let max_jump_hold = max_hold + self.until_seen();
         let Some(Bead { mode, .. }) = self.phase.bead_mut() else { return };
         if *mode == Mode::Priming && is_due {
             *mode = Mode::holding(now, Hold::NoWidth);
@@ -175,8 +179,12 @@ impl Controller {
             Mode::Tracking { seen_at } if now - *seen_at > max_gap => {
                 *mode = Mode::holding(now, Hold::NoWidth);
             }
-            Mode::Holding { since, why, .. } if now - *since > max_hold => {
-                *mode = Mode::Fault { why: Fault::HeldTooLong(why.clone()) };
+            Mode::Holding { since, why, .. } => {
+                let is_jump = matches!(why, Hold::PathJump { .. });
+                let max_hold = if is_jump { max_jump_hold } else { max_hold };
+                if now - *since > max_hold {
+                    *mode = Mode::Fault { why: Fault::HeldTooLong(why.clone()) };
+                }
             }
             _ => {}
         }
@@ -188,6 +196,12 @@ impl Controller {
         let cell = &self.setup.cell;
         let max_gap = self.setup.control.max_gap;
         cell.start_length.max(cell.camera_offset) + cell.camera_offset + cell.start_speed * max_gap
+    }
+
+    /// Time until bead that is laid now is under the camera, at the start speed.
+    fn until_seen(&self) -> Span {
+        let cell = &self.setup.cell;
+        Span::from_secs(cell.camera_offset.get() / cell.start_speed.get())
     }
 
     /// Length of the bead that is laid at a time; none where the path is not known.

@@ -111,6 +111,9 @@ pub struct Setpoint {
 pub struct BeadOnPath {
     /// Path where it began.
     pub start: Mm,
+    /// Path from which the bead under the camera can be known: where it began, or where the
+    /// last jump of the reported path led.
+    pub known_from: Mm,
     /// Length that is laid.
     pub laid: Mm,
     /// Number of beads of the plan that were laid before it.
@@ -134,7 +137,7 @@ impl Bead {
     pub fn may_track(&mut self, width: &Arrival) -> bool {
         match &mut self.mode {
             Mode::Priming => width.is_timely(),
-            Mode::Holding { why, timely, .. } if why.is_for_widths() => {
+            Mode::Holding { why, timely, .. } if why.ends_with_widths() => {
                 if !width.is_timely() && *why == Hold::NoWidth {
                     *why = Hold::SlowCamera { age: width.age(), max_gap: width.max_gap };
                 }
@@ -148,7 +151,7 @@ impl Bead {
     /// Whether it is held for a reason that lies with the robot.
     pub fn waits_for_robot(&self) -> bool {
         let Mode::Holding { why, .. } = &self.mode else { return false };
-        matches!(why, Hold::RobotHolds | Hold::LinkDown | Hold::SpeedMismatch)
+        matches!(why, Hold::RobotHolds | Hold::LinkDown | Hold::SpeedMismatch | Hold::RobotClock)
     }
 
     /// Whether it is in fault.

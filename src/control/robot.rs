@@ -2,8 +2,8 @@
 
 use super::controller::Controller;
 use super::phase::{Bead, BeadStage, Mode, Phase};
-use super::step::{Fault, Hold};
-use crate::core::{Mm, RobotLimits, RobotMode, RobotState, SpeedMatch, Stamp};
+use super::step::{Fault, Hold, Trace};
+use crate::core::{Mm, RobotLimits, RobotMode, RobotState, Span, SpeedMatch, Stamp};
 use crate::width_control::controller::BeadReport;
 
 /// Fraction of the setpoint at which the run-up of a robot is over. A larger value is not
@@ -16,10 +16,26 @@ const MAX_LAID_BEFORE_FIRST_REPORT: Mm = Mm::constant(50.0);
 /// A path that falls by less belongs to the same bead: reports may jitter.
 const SAME_BEAD_TOLERANCE: Mm = Mm::constant(1.0);
 
+/// Longest time without a report that can be used. After this time a link counts as lost
+/// (`docs/src/reference/robot-link.md`, § Connections).
+const MAX_SILENCE: Span = Span::from_millis(500);
+
 impl Controller {
-    pub(super) fn reported(&mut self, now: Stamp, state: &RobotState) {
+    pub(super) fn reported(&mut self, now: Stamp, state: &RobotState, trace: &mut Trace) {
+        if let Some(silence) = self.robot.reports.clock_stands(now, state) {
+            trace.report_ignored = true;
+            if silence > MAX_SILENCE {
+                self.robot.speed_monitor.reset();
+                self.phase.hold(now, Hold::RobotClock);
+            }
+            return;
+        }
         let robot = &mut self.robot;
         let state = &robot.odometer.correct(now, state);
+        let jump = robot.reports.path_jump(now, state, self.setup.limits.max_speed);
+        if jump.is_some() {
+            robot.path.clear();
+        }
         robot.path.observe(now, state);
         robot.state = Some(*state);
         robot.silent_since = None;
@@ -32,7 +48,12 @@ impl Controller {
         }
         match state.mode {
             RobotMode::Idle => self.become_idle(),
-            RobotMode::Print => self.printing(now, state, before),
+            RobotMode::Print => {
+                if let Some(step) = jump {
+                    self.path_jumped(now, state.path_mm, step);
+                }
+                self.printing(now, state, before);
+            }
             RobotMode::Hold => {
                 self.robot.speed_monitor.reset();
                 self.phase.hold(now, Hold::RobotHolds);
@@ -56,6 +77,14 @@ impl Controller {
         {
             bead.mode = Mode::Fault { why };
         }
+    }
+
+    /// The path went on elsewhere: what the camera sees until bead from there on is under it
+    /// was laid at an unknown position.
+    fn path_jumped(&mut self, now: Stamp, to: Mm, step_mm: Mm) {
+        self.bead.known_from = to;
+        self.width.path_jumped();
+        self.phase.hold(now, Hold::PathJump { step_mm });
     }
 
     fn printing(&mut self, now: Stamp, state: &RobotState, before: Option<Mm>) {
@@ -100,6 +129,7 @@ impl Controller {
             state.path_mm - *path < MAX_LAID_BEFORE_FIRST_REPORT && state.path_mm >= *path
         });
         self.bead.start = stood.unwrap_or(state.path_mm);
+        self.bead.known_from = self.bead.start;
         self.phase = Phase::Bead(Bead::new());
         self.next_bead();
         self.width.begin_bead();
@@ -120,6 +150,7 @@ impl Controller {
     pub(super) fn link_came_up(&mut self, robot: &RobotLimits) {
         self.robot.link_up = true;
         self.robot.state = None;
+        self.robot.reports.reset();
         let limits = self.setup.limits;
         if limits.min_speed < robot.min_mm_per_s || limits.max_speed > robot.max_mm_per_s {
             self.phase.end(Hold::RobotLimits);

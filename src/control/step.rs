@@ -20,7 +20,7 @@ pub enum Command {
 }
 
 /// Why the controller does not track.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Hold {
@@ -39,6 +39,14 @@ pub enum Hold {
     LinkDown,
     /// The robot does not move at its setpoint.
     SpeedMismatch,
+    /// The robot's path grew by more than the robot can have moved. The bead under the camera
+    /// is known again once what was laid after it is seen.
+    PathJump {
+        /// Growth of the path from one report to the next.
+        step_mm: Mm,
+    },
+    /// The robot reports, and its clock does not rise: its path and speed are not known.
+    RobotClock,
     /// The robot's limits are narrower than the cell's.
     RobotLimits,
     /// An event or a step could not be recorded. Left only by a new run.
@@ -50,14 +58,19 @@ pub enum Hold {
 }
 
 impl Hold {
-    /// Whether widths that come in time end it.
+    /// Whether widths are missing.
     pub fn is_for_widths(&self) -> bool {
         matches!(self, Self::NoWidth | Self::SlowCamera { .. })
+    }
+
+    /// Whether widths that come in time end it.
+    pub fn ends_with_widths(&self) -> bool {
+        self.is_for_widths() || matches!(self, Self::PathJump { .. })
     }
 }
 
 /// Why the controller stopped the robot. Left when the robot is idle again.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Fault {
@@ -74,7 +87,7 @@ pub enum Fault {
 }
 
 /// The state that the controller is in after a step.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, IntoStaticStr)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum State {
@@ -117,6 +130,9 @@ pub struct Trace {
     /// the robot is idle.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub bead_expected: bool,
+    /// Whether the robot's report was not used, because the robot's clock had not risen.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub report_ignored: bool,
     /// Measured less target width.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error_mm: Option<Mm>,

@@ -2,6 +2,7 @@
 
 mod distance;
 mod extruder;
+mod robot_reports;
 
 use super::*;
 use crate::core::{
@@ -74,8 +75,13 @@ impl Line {
     }
 
     fn robot(&mut self, mode: RobotMode, path: f64, speed: f64) -> Step {
+        self.robot_at(None, mode, path, speed)
+    }
+
+    /// A report with the time of the robot's own clock.
+    fn robot_at(&mut self, ms: Option<u64>, mode: RobotMode, path: f64, speed: f64) -> Step {
         self.give(&Event::Robot(RobotState {
-            robot_time_ms: None,
+            robot_time_ms: ms,
             has_setpoint: true,
             mode,
             speed_mm_per_s: MmPerS::constant(speed),

@@ -84,7 +84,7 @@ impl Controller {
         trace.nozzle_path_mm = self.robot.path.path_at(captured_at);
         trace.bead_path_mm = trace.nozzle_path_mm.map(|path| path - self.setup.cell.camera_offset);
         trace.bead_expected = self.phase != Phase::Idle
-            && trace.bead_path_mm.is_some_and(|path| path >= self.bead.start);
+            && trace.bead_path_mm.is_some_and(|path| path >= self.bead.known_from);
     }
 
     /// The state of a bead before a setpoint; none unless it is priming or tracking.

@@ -28,6 +28,16 @@ pub fn hold_in_words(hold: &Hold) -> String {
             age.secs(),
             max_gap.secs()
         ),
+        Hold::PathJump { step_mm } => format!(
+            "{name}: the robot's path went on by {:.0} mm from one report to the next, farther \
+             than [limits] max_speed_mm_per_s allows; see that it counts the nozzle's way along \
+             the bead",
+            step_mm.get()
+        ),
+        Hold::RobotClock => format!(
+            "{name}: the robot reports and its own time stands still, on the robot link t_ms; \
+             its path and speed are not used. See that every report is made anew"
+        ),
         _ => name,
     }
 }

@@ -16,6 +16,10 @@ pub trait WidthController: Debug + Send {
     /// A new bead begins. The bead before it is no longer under the camera.
     fn begin_bead(&mut self) {}
 
+    /// The reported path goes on elsewhere on the same bead: the next report does not continue
+    /// those before it.
+    fn path_jumped(&mut self) {}
+
     /// The robot reports no path: the path of the next report or width is integrated from
     /// its speed.
     fn path_is_estimated(&mut self) {}

@@ -31,6 +31,11 @@ impl Default for PathHistory {
 }
 
 impl PathHistory {
+    /// Discards all reports.
+    pub fn clear(&mut self) {
+        self.reports.clear();
+    }
+
     /// Adds a report that arrived at a moment. A path that falls belongs to a new bead, and
     /// the reports of the old one are discarded.
     pub fn observe(&mut self, at: Stamp, state: &RobotState) {

@@ -8,7 +8,7 @@ use crate::width_control::target::Knot;
 const STEP_S: f64 = 0.05;
 
 /// The 2022 paper's cell, controlled by distance.
-fn by_distance() -> Setup {
+pub(super) fn by_distance() -> Setup {
     let strategy =
         DistanceStrategy { exponent: 0.25, learns_exponent: true, drift_per_root_m: 0.0055 };
     let mut setup = setup();

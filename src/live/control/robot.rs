@@ -4,7 +4,8 @@ use std::sync::atomic::Ordering;
 
 use super::ending::Ending;
 use super::{ControlThread, Inputs};
-use crate::core::RobotLimits;
+use crate::control::Event;
+use crate::core::{RobotLimits, RobotState, Stamp};
 use crate::run::ports::{Recorder, RobotEvent};
 use crate::width_control::limiter::SpeedLimits;
 
@@ -12,13 +13,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     /// Passes the robot's reports to the controller.
     pub(super) fn take_robot_event(&mut self, event: RobotEvent) {
         match &event {
-            RobotEvent::State { at, state } => {
-                self.robot_z.store(state.z_mm.get().to_bits(), Ordering::Relaxed);
-                self.speed = Some(state.speed_mm_per_s);
-                if let Some(view) = &self.robot_view {
-                    view.observe(*at, state);
-                }
-            }
+            RobotEvent::State { at, state } => return self.take_robot_state(*at, *state),
             RobotEvent::Up { limits: robot, .. } => {
                 (self.notice)(&format!("robot `{}` is connected", robot.name));
                 self.unfit = unfit(&self.limits, robot).map(Ending::RobotLimits);
@@ -27,6 +22,18 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
             RobotEvent::Refused { text, .. } => (self.notice)(&format!("robot refused {text}")),
         }
         self.give(event.into());
+    }
+
+    /// Passes on where the robot is, unless the controller does not use it.
+    fn take_robot_state(&mut self, at: Stamp, state: RobotState) {
+        if self.give(Event::Robot(state)).step.trace.report_ignored {
+            return;
+        }
+        self.robot_z.store(state.z_mm.get().to_bits(), Ordering::Relaxed);
+        self.speed = Some(state.speed_mm_per_s);
+        if let Some(view) = &self.robot_view {
+            view.observe(at, &state);
+        }
     }
 }
 

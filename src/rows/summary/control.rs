@@ -61,6 +61,8 @@ pub struct ControlSummary {
     pub was_connected: bool,
     /// Number of times the link came up again.
     pub link_reconnects: u64,
+    /// Reports of the robot that were not used, because the robot's clock had not risen.
+    pub robot_reports_ignored: u64,
 }
 
 /// The largest error of a width.
@@ -113,6 +115,7 @@ pub struct ControlTally {
     dropped: u64,
     records_lost: u64,
     links: u64,
+    reports_ignored: u64,
 }
 
 /// Path of the current bead at which control began.
@@ -150,6 +153,7 @@ impl ControlTally {
         if matches!(event, Event::LinkUp { .. }) {
             self.links += 1;
         }
+        self.reports_ignored += u64::from(step.trace.report_ignored);
         let before = self.follower.state().clone();
         if let Some(lapse) = self.follower.step(now, event, step) {
             self.add_time(&lapse);
@@ -210,6 +214,7 @@ impl ControlTally {
             records_lost: self.records_lost,
             was_connected: self.links > 0,
             link_reconnects: self.links.saturating_sub(1),
+            robot_reports_ignored: self.reports_ignored,
         }
     }
 

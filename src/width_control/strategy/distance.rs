@@ -108,6 +108,11 @@ impl WidthController for DistanceControl {
         self.by_distance.begin_bead();
     }
 
+    /// What was learned of the bead stays, with a larger variance; its speeds are recorded anew.
+    fn path_jumped(&mut self) {
+        self.by_distance.begin_bead();
+    }
+
     fn path_is_estimated(&mut self) {
         self.fallback = self.fallback.or(Some(FallbackReason::NoPath));
     }
