@@ -173,3 +173,29 @@ fn an_output_folder_with_a_recording_is_not_written_over() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("--out"));
     assert_eq!(fs::read(folder.path().join("recording.mcap")).unwrap(), b"precious");
 }
+
+/// A folder of equal frames.
+fn equal_frames(count: usize) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for number in 0..count {
+        let frame = folder.path().join(format!("frame_{number:05}.png"));
+        fs::copy("test_images/straight/frame_00000.png", frame).unwrap();
+    }
+    folder
+}
+
+#[test]
+fn equal_frames_that_were_recorded_keep_their_width_and_are_counted() {
+    let (frames, out) = (equal_frames(5), tempfile::tempdir().unwrap());
+    let status = truebead()
+        .arg("process")
+        .arg(frames.path())
+        .args(["--cell", "test_images/straight/scenario.toml", "--out"])
+        .arg(out.path())
+        .status()
+        .unwrap();
+    assert!(status.success());
+    let summary = summary(out.path());
+    assert_eq!((&summary["measured"], &summary["repeated"]), (&5.into(), &3.into()));
+    assert_eq!(summary["rejected"], serde_json::json!({}));
+}

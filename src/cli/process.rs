@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
@@ -25,7 +26,7 @@ use crate::rows::frame_row::FrameRow;
 use crate::rows::log::RunLog;
 use crate::rows::summary::{RunNote, Summary};
 use crate::run::ports::{FrameSource, Grab, SourceError};
-use crate::vision::{Measurer, Reject, RoughnessEstimator};
+use crate::vision::{Measurer, Reject, RepeatDetector, RoughnessEstimator};
 
 /// Frames that may wait between reading and measuring: more need memory, fewer leave cores idle.
 const QUEUE_LENGTH: usize = 8;
@@ -89,6 +90,7 @@ pub fn run(args: &ProcessArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
         progress,
         log,
         roughness: RoughnessEstimator::default(),
+        repeats: RepeatDetector::new(loaded.cell.gauge.roi),
         edges,
         overlays: overlays.transpose()?,
         first_rejections: BTreeMap::new(),
@@ -111,6 +113,7 @@ struct Measuring<'a> {
     progress: Progress,
     log: RunLog,
     roughness: RoughnessEstimator,
+    repeats: RepeatDetector,
     edges: Option<EdgesWriter>,
     overlays: Option<OverlayWriter>,
     first_rejections: FirstRejections,
@@ -169,6 +172,10 @@ impl Measuring<'_> {
     ) -> anyhow::Result<()> {
         match grab {
             Grab::Frame { frame, time_s } => {
+                let frame = Arc::new(frame);
+                if self.repeats.first_of_equal(&frame).is_some() {
+                    self.log.note(&RunNote::FrameRepeated);
+                }
                 let robot_z = self.robot_z.and_then(|z| z.z_at(frame.captured_at));
                 let surface = self.loaded.surface(robot_z);
                 let outcome = measurer
@@ -233,6 +240,9 @@ fn conclude(
         if let Some((frame, why)) = first_rejections.get(status) {
             say!("    frame {frame}: {why}");
         }
+    }
+    if summary.repeated > 0 {
+        say!("  {} equal to at least two before them", summary.repeated);
     }
     if let (Some(mean), Some(std)) = (summary.width_mean_mm, summary.width_std_mm) {
         say!("width {mean:.3} mm on average, standard deviation {std:.3} mm");

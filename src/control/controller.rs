@@ -26,6 +26,17 @@ pub struct Controller {
     pub(super) robot: RobotMonitor,
     /// The camera gives no more frames.
     pub(super) camera_lost: bool,
+    /// The first of the latest equal frames.
+    pub(super) first_equal: Option<FirstEqual>,
+}
+
+/// The first of several equal frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FirstEqual {
+    /// When it was captured.
+    pub(super) captured_at: Stamp,
+    /// Path of the nozzle then, or at the first one of them for which it was known.
+    pub(super) path: Mm,
 }
 
 /// What is known of the robot.
@@ -52,7 +63,16 @@ impl Controller {
     pub fn new(setup: Setup) -> Self {
         let width = setup.control.strategy.controller(&setup.cell, &setup.control);
         let (bead, robot) = (BeadOnPath::default(), RobotMonitor::default());
-        Self { setup, width, extruder: None, phase: Phase::Idle, bead, robot, camera_lost: false }
+        Self {
+            setup,
+            width,
+            extruder: None,
+            phase: Phase::Idle,
+            bead,
+            robot,
+            camera_lost: false,
+            first_equal: None,
+        }
     }
 
     /// Adds the side of an extruder that is commanded.
@@ -84,6 +104,15 @@ impl Controller {
                 trace.frame = Some(*frame);
                 let reading = WidthReading { width: *width_mm, sigma: *sigma_mm };
                 self.measured(now, *captured_at, reading, &mut trace);
+            }
+            Event::Repeated { frame, captured_at, first_at, width_mm, sigma_mm } => {
+                trace.frame = Some(*frame);
+                if self.has_moved(*first_at, *captured_at) {
+                    self.repeated(*first_at, *captured_at, &mut trace);
+                } else {
+                    let reading = WidthReading { width: *width_mm, sigma: *sigma_mm };
+                    self.measured(now, *captured_at, reading, &mut trace);
+                }
             }
             Event::Rejected { frame, captured_at, .. } => {
                 trace.frame = Some(*frame);

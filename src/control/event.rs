@@ -21,6 +21,20 @@ pub enum Event {
         /// Standard deviation of that width, as the measurement estimates it.
         sigma_mm: Mm,
     },
+    /// A frame was measured whose pixels are equal to those of the frames before it. It counts
+    /// as not captured if the robot has moved meanwhile, otherwise as measured.
+    Repeated {
+        /// Number of the frame.
+        frame: u64,
+        /// When the frame was captured.
+        captured_at: Stamp,
+        /// When the first of the equal frames was captured.
+        first_at: Stamp,
+        /// Width of the bead at the surface.
+        width_mm: Mm,
+        /// Standard deviation of that width, as the measurement estimates it.
+        sigma_mm: Mm,
+    },
     /// A frame was rejected by the measurement, or could not be read.
     Rejected {
         /// Number of the frame.

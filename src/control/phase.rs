@@ -148,6 +148,15 @@ impl Bead {
         }
     }
 
+    /// The width is known no later than at a time: a frame after it was not a new one.
+    pub fn known_until(&mut self, at: Stamp) {
+        match &mut self.mode {
+            Mode::Tracking { seen_at } => *seen_at = at.min(*seen_at),
+            Mode::Holding { why, .. } if *why == Hold::NoWidth => *why = Hold::CameraFrozen,
+            _ => {}
+        }
+    }
+
     /// Whether it is held for a reason that lies with the robot.
     pub fn waits_for_robot(&self) -> bool {
         let Mode::Holding { why, .. } = &self.mode else { return false };

@@ -33,6 +33,8 @@ pub enum Hold {
         /// The longest time without a width.
         max_gap: Span,
     },
+    /// Frames come, but with the pixels of those before them although the robot moves.
+    CameraFrozen,
     /// The robot moves at its own hold speed.
     RobotHolds,
     /// The link to the robot is down.
@@ -60,7 +62,7 @@ pub enum Hold {
 impl Hold {
     /// Whether widths are missing.
     pub fn is_for_widths(&self) -> bool {
-        matches!(self, Self::NoWidth | Self::SlowCamera { .. })
+        matches!(self, Self::NoWidth | Self::SlowCamera { .. } | Self::CameraFrozen)
     }
 
     /// Whether widths that come in time end it.
@@ -130,6 +132,10 @@ pub struct Trace {
     /// the robot is idle.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub bead_expected: bool,
+    /// Whether the frame was not used, because it is equal to those before it although the robot
+    /// has moved.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub frame_repeated: bool,
     /// Whether the robot's report was not used, because the robot's clock had not risen.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub report_ignored: bool,

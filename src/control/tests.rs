@@ -2,6 +2,7 @@
 
 mod distance;
 mod extruder;
+mod repeated;
 mod robot_reports;
 
 use super::*;

@@ -1,7 +1,7 @@
 //! Measured widths: where the bead in a frame was laid, and the sample for the width
 //! controller.
 
-use super::controller::Controller;
+use super::controller::{Controller, FirstEqual};
 use super::extruder_control::NO_OVERRIDE;
 use super::phase::{Arrival, Bead, Mode, Phase};
 use super::step::Trace;
@@ -17,7 +17,35 @@ use crate::width_control::target::BeadSegment;
 /// the width controller requested.
 const MIN_OVERRIDE: f64 = 0.5;
 
+/// Path over which equal frames cannot show a moving bead (`docs/src/reference/output-files.md`,
+/// § Statuses of a frame). A smaller value takes the jitter of a robot that stands for motion;
+/// bead moves as far within a frame or two.
+const MIN_MOVED: Mm = Mm::constant(1.0);
+
 impl Controller {
+    /// Whether the nozzle has moved since the first of several equal frames, or since the first
+    /// of them for which its path was known.
+    pub(super) fn has_moved(&mut self, first_at: Stamp, captured_at: Stamp) -> bool {
+        let Some(path) = self.robot.path.path_at(captured_at) else { return false };
+        let known = self.first_equal.filter(|first| first.captured_at == first_at);
+        let first = known.unwrap_or_else(|| FirstEqual {
+            captured_at: first_at,
+            path: self.robot.path.path_at(first_at).unwrap_or(path),
+        });
+        // Kept, because the history of the path may not reach back as far later.
+        self.first_equal = Some(first);
+        (path - first.path).abs() > MIN_MOVED
+    }
+
+    /// A frame that shows what the first of several equal ones has shown counts as not captured.
+    pub(super) fn repeated(&mut self, first_at: Stamp, captured_at: Stamp, trace: &mut Trace) {
+        trace.frame_repeated = true;
+        self.locate(captured_at, trace);
+        if let Some(bead) = self.phase.bead_mut() {
+            bead.known_until(first_at);
+        }
+    }
+
     pub(super) fn measured(
         &mut self,
         now: Stamp,

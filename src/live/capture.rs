@@ -13,7 +13,9 @@ use crate::core::{Frame, ImagePoint, Mm, Stamp};
 use crate::io::clock::RunClock;
 use crate::io::recorder::FrameTap;
 use crate::run::ports::{FrameSource, Grab};
-use crate::vision::{Measurer, Reject, Roughness, RoughnessEstimator, WidthMeasurement};
+use crate::vision::{
+    Measurer, Reject, RepeatDetector, Roughness, RoughnessEstimator, WidthMeasurement,
+};
 
 /// Data of the cell for the measurement.
 pub struct Optics {
@@ -50,6 +52,9 @@ pub struct MeasuredFrame {
     pub frame: Arc<Frame>,
     /// Time at which the program received it.
     pub had_at: Stamp,
+    /// Capture time of the first of several frames in a row that are equal to this one; `None`
+    /// if it is new.
+    pub first_equal_at: Option<Stamp>,
     /// The width, or why the frame was rejected.
     pub outcome: Result<WidthMeasurement, Reject>,
     /// Roughness of the bead from all frames up to this one; `None` while it is not determined.
@@ -137,6 +142,7 @@ fn measure_frames(
 ) {
     let mut measurer = Measurer::new(optics.cell.gauge, optics.cell.white);
     let mut estimator = RoughnessEstimator::default();
+    let mut repeats = RepeatDetector::new(optics.cell.gauge.roi);
     while let Some(taken) = mailbox.take() {
         let seen = match taken {
             Taken::Frame(frame, had_at) => {
@@ -148,9 +154,15 @@ fn measure_frames(
                 let edges = measurer.edges();
                 let frame = Arc::new(frame);
                 let edges = (edges.left.to_vec(), edges.right.to_vec());
-                let look =
-                    MeasuredFrame { frame: Arc::clone(&frame), had_at, outcome, roughness, edges };
-                if messages.send(CameraMessage::Frame(Box::new(look))).is_err() {
+                let measured = MeasuredFrame {
+                    frame: Arc::clone(&frame),
+                    had_at,
+                    first_equal_at: repeats.first_of_equal(&frame),
+                    outcome,
+                    roughness,
+                    edges,
+                };
+                if messages.send(CameraMessage::Frame(Box::new(measured))).is_err() {
                     return;
                 }
                 tap.frame(frame);

@@ -28,6 +28,10 @@ pub fn hold_in_words(hold: &Hold) -> String {
             age.secs(),
             max_gap.secs()
         ),
+        Hold::CameraFrozen => format!(
+            "{name}: its frames are equal within the gauge while the robot moves; see that the \
+             camera is triggered and that nothing keeps old images"
+        ),
         Hold::PathJump { step_mm } => format!(
             "{name}: the robot's path went on by {:.0} mm from one report to the next, farther \
              than [limits] max_speed_mm_per_s allows; see that it counts the nozzle's way along \

@@ -46,6 +46,8 @@ pub struct Summary {
     /// Rejected frames without bead of the run under the camera; these are not a loss.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected_without_bead: Option<u64>,
+    /// Frames that were equal to at least two before them: in a run rejected, offline measured.
+    pub repeated: u64,
     /// Mean of the measured widths.
     pub width_mean_mm: Option<f64>,
     /// Sample standard deviation of the measured widths.
@@ -141,6 +143,7 @@ pub struct SummaryBuilder {
     frames: u64,
     rejected: BTreeMap<&'static str, u64>,
     rejected_without_bead: u64,
+    repeated: u64,
     width: Moments,
     sigma: Moments,
     roughness: Option<Roughness>,
@@ -224,6 +227,7 @@ impl SummaryBuilder {
 
     /// Adds another note.
     pub fn note(&mut self, note: &RunNote) {
+        self.repeated += u64::from(*note == RunNote::FrameRepeated);
         if let Some(control) = &mut self.control {
             control.note(note);
         }
@@ -243,6 +247,7 @@ impl SummaryBuilder {
             measured,
             rejected: self.rejected.clone(),
             rejected_without_bead: self.control.is_some().then_some(self.rejected_without_bead),
+            repeated: self.repeated,
             width_mean_mm: self.width.mean(),
             width_std_mm: self.width.std(),
             sigma_mean_mm: self.sigma.mean(),

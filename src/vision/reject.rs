@@ -159,6 +159,11 @@ pub enum Reject {
         "an edge has no point on the surface: the gauge reaches beyond the bed's horizon, or the calibration is that of another view"
     )]
     OffSurface,
+    /// The frame has the pixels of those before it, although the robot has moved.
+    #[error(
+        "the frame is equal to those before it, and the robot has moved meanwhile; the camera, its driver or its network gives an old image again"
+    )]
+    Repeated,
     /// The frame could not be read at all.
     #[error("the frame could not be read")]
     Unreadable,
@@ -199,6 +204,7 @@ impl Reject {
             Self::Clipped { .. } => "clipped",
             Self::WrongSize { .. } | Self::OtherSize { .. } => "wrong_size",
             Self::OffSurface => "off_surface",
+            Self::Repeated => "repeated",
             Self::Unreadable => "unreadable",
         }
     }

@@ -135,8 +135,16 @@ fn every_kind_of_event_comes_back_and_is_described_by_the_schema() {
         width_mm: Mm::ZERO,
         sigma_mm: Mm::ZERO,
     };
+    let repeated = Event::Repeated {
+        frame: 2,
+        captured_at: Stamp::from_ns(2),
+        first_at: Stamp::START,
+        width_mm: Mm::ZERO,
+        sigma_mm: Mm::ZERO,
+    };
     let events = [
         measured,
+        repeated,
         event(3),
         Event::Robot(state),
         Event::LinkUp { robot },
@@ -173,6 +181,8 @@ fn the_step_schema_names_what_a_trace_holds() {
         captured_at: Some(Stamp::START),
         bead_path_mm: Some(Mm::ZERO),
         nozzle_path_mm: Some(Mm::ZERO),
+        frame_repeated: true,
+        report_ignored: true,
         error_mm: Some(Mm::ZERO),
         proportional_mm_per_s: Some(MmPerS::ZERO),
         integral_mm_per_s: Some(MmPerS::ZERO),

@@ -5,26 +5,21 @@ use crate::control::{Event, Step};
 use crate::core::{Mm, Stamp};
 use crate::live::capture::MeasuredFrame;
 use crate::rows::frame_row::{ControlColumns, FrameRow};
+use crate::rows::summary::RunNote;
 use crate::run::ports::Recorder;
 use crate::vision::Reject;
 
 impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     /// Passes a measured or rejected frame to the controller, and logs the result.
     pub(super) fn take_measured(&mut self, measured: MeasuredFrame) {
-        let MeasuredFrame { frame, had_at, outcome, roughness, edges } = measured;
+        let event = event_of(&measured);
+        let MeasuredFrame { frame, had_at, mut outcome, roughness, edges, .. } = measured;
         let (seq, captured_at) = (frame.seq, frame.captured_at);
-        let event = match &outcome {
-            Ok(measured) => Event::Measured {
-                frame: seq,
-                captured_at,
-                width_mm: measured.width,
-                sigma_mm: measured.sigma,
-            },
-            Err(reject) => {
-                Event::Rejected { frame: seq, captured_at, reason: reject.status().to_owned() }
-            }
-        };
         let step = self.give(event).step;
+        if step.trace.frame_repeated {
+            outcome = Err(Reject::Repeated);
+            self.journal.note(RunNote::FrameRepeated);
+        }
         if step.trace.demand_mm_per_s.is_some() || step.trace.distance.is_some() {
             self.latencies.used(had_at, self.inputs.now());
         }
@@ -57,5 +52,22 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
 
     fn columns(&self, step: &Step, width: Option<Mm>) -> ControlColumns {
         ControlColumns::of(step, width, self.speed, self.setpoint)
+    }
+}
+
+/// What the controller is told of a frame.
+fn event_of(measured: &MeasuredFrame) -> Event {
+    let (frame, captured_at) = (measured.frame.seq, measured.frame.captured_at);
+    match (&measured.outcome, measured.first_equal_at) {
+        (Ok(found), Some(first_at)) => {
+            let (width_mm, sigma_mm) = (found.width, found.sigma);
+            Event::Repeated { frame, captured_at, first_at, width_mm, sigma_mm }
+        }
+        (Ok(found), None) => {
+            Event::Measured { frame, captured_at, width_mm: found.width, sigma_mm: found.sigma }
+        }
+        (Err(reject), _) => {
+            Event::Rejected { frame, captured_at, reason: reject.status().to_owned() }
+        }
     }
 }

@@ -58,6 +58,11 @@ pub fn of(status: &str) -> (&'static str, &'static str) {
             "The bead bends sharply within the gauge.",
             "Corners have no width normal to the bead; make the gauge shorter if gentle bends are refused.",
         ),
+        "repeated" => (
+            "The frame was equal to those before it in the gauge, although the robot had moved.",
+            "See that the camera is triggered and runs on, and that nothing between camera and \
+             program keeps an old image; restart the camera.",
+        ),
         "unreadable" => (
             "The frame could not be decoded.",
             "Look at the file or the camera's cable; the log names each one.",
@@ -90,6 +95,7 @@ mod tests {
             Reject::WrongSize { image: (1, 1) },
             Reject::OtherSize { image: (1, 1), calibrated: [2, 2] },
             Reject::OffSurface,
+            Reject::Repeated,
             Reject::Unreadable,
         ] {
             assert_ne!(of(reject.status()), unknown, "{}", reject.status());

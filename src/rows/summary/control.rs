@@ -185,7 +185,7 @@ impl ControlTally {
             RunNote::FramesSuperseded(more) => self.superseded += more,
             RunNote::FramesDroppedByRecorder(more) => self.dropped += more,
             RunNote::RecordsLost(more) => self.records_lost += more,
-            RunNote::Remark(_) => {}
+            RunNote::Remark(_) | RunNote::FrameRepeated => {}
         }
     }
 

@@ -5,6 +5,8 @@
 pub enum RunNote {
     /// A setpoint was written to the robot.
     SetpointSent,
+    /// A frame was equal to the frames before it.
+    FrameRepeated,
     /// Frames that were not measured, because a newer one was there.
     FramesSuperseded(u64),
     /// Frames that were not recorded because the recorder was too slow.
