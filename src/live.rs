@@ -138,6 +138,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     let camera = open::CellCamera {
         cell: &live.cell,
         camera: &live.run.camera,
+        max_hold: live.run.control.max_hold,
         calibration: &live.calibration,
     };
     let (source, robot_view) = camera.open(live.clock, camera_end)?;

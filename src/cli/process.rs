@@ -197,6 +197,8 @@ impl Measuring<'_> {
                     edges.frame(frame.seq, measurer.calipers())?;
                 }
             }
+            // Recorded frames are there or not.
+            Grab::Waiting { .. } => return Ok(()),
             Grab::Unreadable { seq, time_s, reason } => {
                 if unreadable <= MAX_NAMED_UNREADABLE {
                     self.progress.note(&format!("unreadable: {reason}"));

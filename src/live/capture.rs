@@ -41,6 +41,8 @@ pub enum CameraMessage {
         /// Why it cannot be read.
         reason: String,
     },
+    /// The camera is not there yet, for this reason.
+    Waiting(String),
     /// No more frames: `None` is the regular end of the source, otherwise the reason.
     Ended(Option<String>),
 }
@@ -66,6 +68,7 @@ pub struct MeasuredFrame {
 enum Taken {
     Frame(Frame, Stamp),
     Unreadable { seq: u64, at: Stamp, reason: String },
+    Waiting { reason: String },
 }
 
 /// The running threads.
@@ -122,6 +125,7 @@ fn take_frames(
             Ok(Some(Grab::Unreadable { seq, reason, .. })) => {
                 Taken::Unreadable { seq, at: clock.now(), reason }
             }
+            Ok(Some(Grab::Waiting { reason })) => Taken::Waiting { reason },
             Ok(None) => break None,
             Err(error) => break Some(error.to_string()),
         };
@@ -169,6 +173,7 @@ fn measure_frames(
                 continue;
             }
             Taken::Unreadable { seq, at, reason } => CameraMessage::Unreadable { seq, at, reason },
+            Taken::Waiting { reason } => CameraMessage::Waiting(reason),
         };
         if messages.send(seen).is_err() {
             return;

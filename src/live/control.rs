@@ -91,7 +91,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
             match seen {
                 CameraMessage::Frame(measured) => self.take_measured(*measured),
                 CameraMessage::Unreadable { seq, at, reason } => self.unreadable(seq, at, &reason),
-                CameraMessage::Ended(_) => {}
+                CameraMessage::Waiting(_) | CameraMessage::Ended(_) => {}
             }
         }
     }
@@ -135,6 +135,9 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
                 }
                 Some(LiveInput::Camera(CameraMessage::Unreadable { seq, at, reason })) => {
                     self.unreadable(seq, at, &reason);
+                }
+                Some(LiveInput::Camera(CameraMessage::Waiting(reason))) => {
+                    (self.notice)(&format!("waiting for the camera {reason}"));
                 }
                 Some(LiveInput::Camera(CameraMessage::Ended(None)) | LiveInput::CameraGone) => {
                     return Ending::LastFrame;

@@ -29,6 +29,12 @@ pub enum Grab {
         /// where it has none.
         time_s: Option<f64>,
     },
+    /// There is no frame yet: the camera has never answered, and is waited for. Only a live camera
+    /// gives it.
+    Waiting {
+        /// Which camera, and why there is none.
+        reason: String,
+    },
     /// There is a frame, but it cannot be read.
     Unreadable {
         /// Its number.

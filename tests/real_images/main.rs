@@ -42,7 +42,7 @@ fn clip(path: &Path) -> Vec<Frame> {
     while let Some(grab) = video.next_frame().unwrap() {
         match grab {
             Grab::Frame { frame, .. } => frames.push(frame),
-            Grab::Unreadable { reason, .. } => panic!("{reason}"),
+            Grab::Unreadable { reason, .. } | Grab::Waiting { reason } => panic!("{reason}"),
         }
     }
     frames

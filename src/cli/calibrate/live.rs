@@ -45,6 +45,7 @@ pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<CalibrationIm
         name,
         rate_hz: args.rate_hz,
         deadline: Span::from_secs(FRAME_TIMEOUT_S),
+        max_outage: Span::from_secs(FRAME_TIMEOUT_S),
         channel: Channel::Grey,
     };
     let mut camera = open::live(options, RunClock::start(), stop.signals().clone())?;
@@ -116,6 +117,10 @@ impl Taking<'_> {
                 Ok(Some(Grab::Frame { frame, .. })) => self.examine(&frame)?,
                 Ok(Some(Grab::Unreadable { reason, .. })) => {
                     self.screen.state(&format!("unreadable: {reason}"));
+                    false
+                }
+                Ok(Some(Grab::Waiting { reason })) => {
+                    self.screen.state(&format!("waiting for the camera {reason}"));
                     false
                 }
                 Ok(None) => {

@@ -176,6 +176,7 @@ mod tests {
     fn times(grabs: &[Grab]) -> Vec<Option<f64>> {
         let time = |grab: &Grab| match grab {
             Grab::Frame { time_s, .. } | Grab::Unreadable { time_s, .. } => *time_s,
+            Grab::Waiting { .. } => None,
         };
         grabs.iter().map(time).collect()
     }

@@ -20,7 +20,7 @@ use crate::io::clock::RunClock;
 use crate::run::ports::{FrameSource, Grab, SourceError};
 use crate::sim::render::{RenderError, Renderer};
 
-/// Failures in a row after which a live source counts as lost.
+/// Failures in a row after which an attached camera counts as lost.
 const ATTEMPTS: u32 = 5;
 
 /// How recorded frames are read.
@@ -82,18 +82,21 @@ pub struct LiveOptions<'a> {
     pub rate_hz: f64,
     /// Longest wait for a frame before the camera counts as lost.
     pub deadline: Span,
+    /// How long a camera that is asked for each image may fail before it counts as lost.
+    pub max_outage: Span,
     /// Channel of a colour image that is used.
     pub channel: Channel,
 }
 
 impl<'a> LiveOptions<'a> {
-    /// Options for a cell's camera.
-    pub fn of(camera: &'a CameraSettings, channel: Channel) -> Self {
+    /// Options for a cell's camera, which may be away for as long as control may hold.
+    pub fn of(camera: &'a CameraSettings, channel: Channel, max_hold: Span) -> Self {
         Self {
             source: &camera.source,
             name: &camera.source_name,
             rate_hz: camera.rate_hz,
             deadline: camera.deadline,
+            max_outage: max_hold,
             channel,
         }
     }
@@ -118,9 +121,9 @@ pub fn live(
             let settings = SnapshotSettings {
                 rate_hz: camera.rate_hz,
                 timeout: camera.deadline,
-                attempts: ATTEMPTS,
+                max_outage: camera.max_outage,
             };
-            Ok(Box::new(Snapshot::open(url, channel, settings, clock)?))
+            Ok(Box::new(Snapshot::open(url, channel, settings, clock, stop)?))
         }
         ImageSource::Path(path) => {
             let options = OfflineOptions { channel, ..OfflineOptions::default() };
@@ -152,6 +155,8 @@ pub struct CellCamera<'a> {
     pub cell: &'a Cell,
     /// Its camera.
     pub camera: &'a CameraSettings,
+    /// The longest hold of its control.
+    pub max_hold: Span,
     /// The calibration of its images.
     pub calibration: &'a Calibration,
 }
@@ -164,9 +169,9 @@ impl CellCamera<'_> {
         clock: RunClock,
         stop: Receiver<()>,
     ) -> Result<(Box<dyn FrameSource>, Option<RobotView>), OpenError> {
-        let Self { cell, camera, calibration } = self;
+        let Self { cell, camera, max_hold, calibration } = self;
         if camera.source != ImageSource::Rendered {
-            return Ok((live(LiveOptions::of(camera, cell.channel), clock, stop)?, None));
+            return Ok((live(LiveOptions::of(camera, cell.channel, max_hold), clock, stop)?, None));
         }
         let simulation = &cell.simulation;
         let renderer = Renderer::of_cell(cell, calibration)?;

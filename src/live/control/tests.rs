@@ -397,3 +397,16 @@ fn equal_frames_of_a_robot_that_stands_keep_their_width() {
     assert!(outcome.notes.rows.borrow()[0].outcome.is_ok());
     assert_eq!(*outcome.notes.repeated.borrow(), 0);
 }
+
+#[test]
+fn a_camera_that_is_waited_for_is_reported_and_does_not_end_the_run() {
+    let mut inputs = printing(1.0);
+    let waiting = CameraMessage::Waiting("http://camera: connection refused".into());
+    inputs.push((0.1, LiveInput::Camera(waiting)));
+    inputs.push((0.4, LiveInput::StopRequested));
+    let outcome = Run::of(inputs).go();
+    assert_eq!(outcome.ending, Ending::Asked);
+    let reported = outcome.said.iter().filter(|line| line.contains("connection refused")).count();
+    assert_eq!(reported, 1);
+    assert!(outcome.notes.rows.borrow().is_empty());
+}

@@ -82,7 +82,7 @@ fn printing(path_mm: f64) -> RobotState {
 fn next(camera: &mut RenderedCamera) -> Frame {
     match camera.next_frame().unwrap().unwrap() {
         Grab::Frame { frame, .. } => frame,
-        Grab::Unreadable { reason, .. } => panic!("{reason}"),
+        Grab::Unreadable { reason, .. } | Grab::Waiting { reason } => panic!("{reason}"),
     }
 }
 
