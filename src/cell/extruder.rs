@@ -154,6 +154,13 @@ impl ExtruderSettings {
         }
     }
 
+    /// How long a command is valid: `valid_ms`, and never less than two commands are apart; that
+    /// is checked only where the extruder is reached over a link.
+    fn command_valid(&self) -> Span {
+        let valid = Span::from_millis(i64::try_from(self.valid_ms).unwrap_or(i64::MAX));
+        valid.max(Span::from_secs(1.5 / self.rates.io_hz))
+    }
+
     /// The setup of the extruder side with the controller of a strategy. Start and stop times and
     /// the plan are in other files, and `None` here.
     pub fn setup(&self, strategy: ExtruderStrategy) -> ExtruderSetup {
@@ -165,6 +172,7 @@ impl ExtruderSettings {
             feedforward_period: period(self.rates.feedforward_hz),
             control_period: period(self.rates.control_hz),
             io_period: period(self.rates.io_hz),
+            command_valid: self.command_valid(),
             max_gap: self.max_gap,
             max_hold: self.max_hold,
             max_pressure: self.max_pressure,

@@ -85,13 +85,14 @@ impl Controller {
     pub fn step(&mut self, now: Stamp, event: &Event) -> Step {
         let mut step = self.steer(now, event);
         step.extruder = self.extrude(now, event);
+        self.watch_extruder(now);
         if let Some(why) = self.extruder.as_ref().and_then(ExtruderControl::fault)
             && let Some(bead) = self.phase.bead_mut()
             && !bead.is_faulty()
         {
             bead.mode = Mode::Fault { why: Fault::Extruder(why) };
-            step.state = self.state();
         }
+        step.state = self.state();
         step
     }
 
@@ -198,8 +199,7 @@ impl Controller {
     fn time_out(&mut self, now: Stamp) {
         let is_due = self.laid_at(now).is_some_and(|laid| laid > self.widths_due());
         let max_gap = self.setup.control.max_gap;
-        let max_hold = self.setup.control.max_hold;
-        let max_jump_hold = max_hold + self.until_seen();
+        let max_hold = self.phase.held_for().and_then(|why| self.max_hold(why));
         let Some(Bead { mode, .. }) = self.phase.bead_mut() else { return };
         if *mode == Mode::Priming && is_due {
             *mode = Mode::holding(now, Hold::NoWidth);
@@ -208,12 +208,8 @@ impl Controller {
             Mode::Tracking { seen_at } if now - *seen_at > max_gap => {
                 *mode = Mode::holding(now, Hold::NoWidth);
             }
-            Mode::Holding { since, why, .. } => {
-                let is_jump = matches!(why, Hold::PathJump { .. });
-                let max_hold = if is_jump { max_jump_hold } else { max_hold };
-                if now - *since > max_hold {
-                    *mode = Mode::Fault { why: Fault::HeldTooLong(why.clone()) };
-                }
+            Mode::Holding { since, why, .. } if max_hold.is_some_and(|max| now - *since > max) => {
+                *mode = Mode::Fault { why: Fault::HeldTooLong(why.clone()) };
             }
             _ => {}
         }
@@ -225,6 +221,16 @@ impl Controller {
         let cell = &self.setup.cell;
         let max_gap = self.setup.control.max_gap;
         cell.start_length.max(cell.camera_offset) + cell.camera_offset + cell.start_speed * max_gap
+    }
+
+    /// Longest hold for a reason; none where the extruder side ends it.
+    fn max_hold(&self, why: &Hold) -> Option<Span> {
+        let max_hold = self.setup.control.max_hold;
+        match why {
+            Hold::ExtruderSilent => None,
+            Hold::PathJump { .. } => Some(max_hold + self.until_seen()),
+            _ => Some(max_hold),
+        }
     }
 
     /// Time until bead that is laid now is under the camera, at the start speed.

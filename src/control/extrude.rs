@@ -3,8 +3,8 @@
 use super::controller::Controller;
 use super::event::Event;
 use super::extruder_control::ExtruderControl;
-use super::phase::{BeadStage, Phase};
-use super::step::ExtruderStep;
+use super::phase::{Bead, BeadStage, Phase};
+use super::step::{ExtruderStep, Hold};
 use crate::core::Stamp;
 use crate::extruder::{Laying, RobotSpeed};
 
@@ -34,6 +34,21 @@ impl Controller {
             _ => return None,
         }
         Some(ExtruderStep { command, state: supervisor.state(), trace: supervisor.trace() })
+    }
+
+    /// Freezes width control while the extruder is silent: nothing flows, whatever the speed.
+    /// When it is back, control goes on with what is laid from then on.
+    pub(super) fn watch_extruder(&mut self, now: Stamp) {
+        let Some(side) = &self.extruder else { return };
+        if side.supervisor.is_silent(now) {
+            self.phase.hold(now, Hold::ExtruderSilent);
+            return;
+        }
+        let waits = self.phase.bead().is_some_and(Bead::waits_for_extruder);
+        if let Some(state) = self.robot.state.filter(|_| waits) {
+            self.begin_again(state.path_mm);
+            self.resume(now, &state);
+        }
     }
 
     /// Whether bead is laid, and the flow that it needs.

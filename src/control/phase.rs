@@ -163,6 +163,11 @@ impl Bead {
         matches!(why, Hold::RobotHolds | Hold::LinkDown | Hold::SpeedMismatch | Hold::RobotClock)
     }
 
+    /// Whether it is held because the extruder is silent.
+    pub fn waits_for_extruder(&self) -> bool {
+        matches!(self.mode, Mode::Holding { why: Hold::ExtruderSilent, .. })
+    }
+
     /// Whether it is in fault.
     pub fn is_faulty(&self) -> bool {
         matches!(self.mode, Mode::Fault { .. })
@@ -207,6 +212,14 @@ impl Phase {
     /// The bead, mutable, while one is controlled.
     pub fn bead_mut(&mut self) -> Option<&mut Bead> {
         if let Self::Bead(bead) = self { Some(bead) } else { None }
+    }
+
+    /// Why a bead is held, while one is.
+    pub fn held_for(&self) -> Option<&Hold> {
+        match &self.bead()?.mode {
+            Mode::Holding { why, .. } => Some(why),
+            _ => None,
+        }
     }
 
     /// The last limit that acted on a setpoint.

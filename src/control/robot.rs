@@ -82,9 +82,14 @@ impl Controller {
     /// The path went on elsewhere: what the camera sees until bead from there on is under it
     /// was laid at an unknown position.
     fn path_jumped(&mut self, now: Stamp, to: Mm, step_mm: Mm) {
-        self.bead.known_from = to;
-        self.width.path_jumped();
+        self.begin_again(to);
         self.phase.hold(now, Hold::PathJump { step_mm });
+    }
+
+    /// Only bead from a path on is used.
+    pub(super) fn begin_again(&mut self, from: Mm) {
+        self.bead.known_from = from;
+        self.width.bead_interrupted();
     }
 
     fn printing(&mut self, now: Stamp, state: &RobotState, before: Option<Mm>) {
@@ -136,7 +141,7 @@ impl Controller {
     }
 
     /// Continues when the reason for a hold has gone: primes again, or waits for a width.
-    fn resume(&mut self, now: Stamp, state: &RobotState) {
+    pub(super) fn resume(&mut self, now: Stamp, state: &RobotState) {
         let Some(bead) = self.phase.bead_mut() else { return };
         bead.mode = if self.camera_lost {
             Mode::holding(now, Hold::CameraLost)

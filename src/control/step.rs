@@ -49,6 +49,9 @@ pub enum Hold {
     },
     /// The robot reports, and its clock does not rise: its path and speed are not known.
     RobotClock,
+    /// The extruder has not reported for longer than a command is valid: its pump stands. The
+    /// extruder side ends it with a fault.
+    ExtruderSilent,
     /// The robot's limits are narrower than the cell's.
     RobotLimits,
     /// An event or a step could not be recorded. Left only by a new run.

@@ -49,6 +49,8 @@ pub struct ExtruderSetup {
     pub control_period: Span,
     /// Time between two commands.
     pub io_period: Span,
+    /// How long a command is valid at the extruder, after the report that it answers.
+    pub command_valid: Span,
     /// Longest time without a report over which the strategy goes on.
     pub max_gap: Span,
     /// Longest hold, and longest start, before the pump is stopped.

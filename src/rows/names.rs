@@ -28,6 +28,11 @@ pub fn hold_in_words(hold: &Hold) -> String {
             age.secs(),
             max_gap.secs()
         ),
+        Hold::ExtruderSilent => format!(
+            "{name}: it has not reported for [extruder] valid_ms, so that its last command has \
+             run out and its pump stands; see the extruder and its link. The robot is stopped \
+             after [extruder] max_hold_s"
+        ),
         Hold::CameraFrozen => format!(
             "{name}: its frames are equal within the gauge while the robot moves; see that the \
              camera is triggered and that nothing keeps old images"

@@ -16,9 +16,9 @@ pub trait WidthController: Debug + Send {
     /// A new bead begins. The bead before it is no longer under the camera.
     fn begin_bead(&mut self) {}
 
-    /// The reported path goes on elsewhere on the same bead: the next report does not continue
-    /// those before it.
-    fn path_jumped(&mut self) {}
+    /// The bead goes on from the next report, and what was laid before tells nothing of it: the
+    /// reported path goes on elsewhere, or the extruder had stopped.
+    fn bead_interrupted(&mut self) {}
 
     /// The robot reports no path: the path of the next report or width is integrated from
     /// its speed.

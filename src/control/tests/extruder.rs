@@ -21,6 +21,7 @@ fn test_bench(strategy: ExtruderStrategy) -> (ExtruderSetup, FlowDemand) {
         feedforward_period: Span::from_secs(TICK_S),
         control_period: Span::from_millis(50),
         io_period: Span::from_millis(20),
+        command_valid: Span::from_millis(300),
         max_gap: Span::from_millis(200),
         max_hold: Span::from_secs(1.0),
         max_pressure: None,
@@ -332,4 +333,57 @@ fn a_pump_stops_by_the_last_report_of_the_robot_whatever_was_held_before() {
         }
         assert!(!cell.last().pump_on, "{lost_before:?}");
     }
+}
+
+/// Lays bead until the width is tracked.
+fn tracking() -> Cell {
+    let mut cell = Cell::new(ExtruderStrategy::Constant(ConstantCommand(30.0)));
+    cell.mode = RobotMode::Print;
+    let _ = cell.go(3.0);
+    assert_eq!(cell.line.width(42.0).state, State::Tracking);
+    let _ = cell.line.tick();
+    cell
+}
+
+#[test]
+fn the_width_is_not_controlled_once_the_last_command_of_a_silent_extruder_has_run_out() {
+    let mut cell = tracking();
+    cell.link(false);
+    let _ = cell.go(0.25);
+    assert_eq!(cell.line.controller.state(), State::Tracking);
+    let _ = cell.go(0.1);
+    let silent = State::Holding(Hold::ExtruderSilent);
+    assert_eq!(cell.line.controller.state(), silent);
+    // Widths, here far too large, do not change the speed any more.
+    let speed = cell.line.tick().unwrap();
+    for _ in 0..5 {
+        assert_eq!(cell.line.width(50.0).state, silent);
+        assert_eq!(cell.line.tick(), Some(speed));
+        let _ = cell.go(0.05);
+    }
+    // The longest hold of the extruder, 1 s, counts from when its link was lost.
+    let _ = cell.go(0.5);
+    let fault = Fault::Extruder(ExtruderFault::HeldTooLong(ExtruderHold::LinkDown));
+    assert_eq!(cell.line.controller.state(), State::Fault(fault));
+    assert_eq!(cell.line.give(&Event::Tick).command, Some(Command::Stop));
+}
+
+#[test]
+fn control_goes_on_with_bead_that_was_laid_after_a_silent_extruder_came_back() {
+    let mut cell = tracking();
+    cell.link(false);
+    let _ = cell.go(0.6);
+    assert_eq!(cell.line.controller.state(), State::Holding(Hold::ExtruderSilent));
+    cell.link(true);
+    let _ = cell.go(0.1);
+    let back = cell.path;
+    let mut tracked = None;
+    while tracked.is_none() && cell.path < back + 300.0 {
+        let _ = cell.go(0.02);
+        let state = cell.line.width(42.0).state;
+        tracked = (state == State::Tracking).then_some(cell.path - back);
+    }
+    // The camera is 88.4 mm behind the nozzle.
+    let tracked = tracked.unwrap();
+    assert!((70.0..110.0).contains(&tracked), "{tracked}");
 }

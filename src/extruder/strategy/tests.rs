@@ -49,6 +49,7 @@ fn supervisor(
         feedforward_period: TICK,
         control_period: Span::from_millis(50),
         io_period: Span::from_millis(20),
+        command_valid: Span::from_millis(300),
         max_gap: Span::from_millis(200),
         max_hold: Span::from_secs(2.0),
         max_pressure: None,

@@ -159,6 +159,13 @@ impl Supervisor {
         }
     }
 
+    /// Whether the extruder has been silent for so long that its pump stands: every command
+    /// answers a report, and one that answers its last report has run out.
+    pub fn is_silent(&self, now: Stamp) -> bool {
+        matches!(self.phase, Phase::Running | Phase::Holding { .. })
+            && self.silent_for(now) > self.setup.command_valid
+    }
+
     /// Time without a report on this bead.
     fn silent_for(&self, now: Stamp) -> Span {
         now - self.last_report_at.map_or(self.bead_start, |at| at.max(self.bead_start))

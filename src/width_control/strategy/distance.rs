@@ -109,7 +109,7 @@ impl WidthController for DistanceControl {
     }
 
     /// What was learned of the bead stays, with a larger variance; its speeds are recorded anew.
-    fn path_jumped(&mut self) {
+    fn bead_interrupted(&mut self) {
         self.by_distance.begin_bead();
     }
 
