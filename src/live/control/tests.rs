@@ -410,3 +410,22 @@ fn a_camera_that_is_waited_for_is_reported_and_does_not_end_the_run() {
     assert_eq!(reported, 1);
     assert!(outcome.notes.rows.borrow().is_empty());
 }
+
+#[test]
+fn a_report_whose_clock_has_not_risen_is_not_passed_on() {
+    let with_clock = |s: f64, mm_per_s: f64| {
+        let mut input = report(s, RobotMode::Print);
+        if let LiveInput::Robot(RobotEvent::State { state, .. }) = &mut input {
+            (state.robot_time_ms, state.speed_mm_per_s) = (Some(7), speed(mm_per_s));
+        }
+        input
+    };
+    let mut inputs = vec![(0.0, up())];
+    inputs.extend([(0.1, with_clock(0.1, 90.0)), (0.2, with_clock(0.2, 95.0))]);
+    let reason = "cut short".to_owned();
+    let frame = CameraMessage::Unreadable { seq: 0, at: at(0.2), reason };
+    inputs.push((0.3, LiveInput::Camera(frame)));
+    let outcome = Run { duration: Some(Span::from_secs(0.5)), ..Run::of(inputs) }.go();
+    let rows = outcome.notes.rows.borrow();
+    assert_eq!(rows[0].control.unwrap().speed, Some(speed(90.0)));
+}

@@ -156,10 +156,13 @@ fn counts_reach_the_file_under_their_promised_keys() {
     };
     builder.step(seconds(0.0), &up, &step(State::Idle, SpeedLimit::None));
     builder.step(seconds(1.0), &up, &step(State::Idle, SpeedLimit::None));
+    let trace = Trace { report_ignored: true, ..Trace::default() };
+    builder.step(seconds(1.0), &robot(1.0), &Step { trace, ..Step::default() });
     builder.latency(2.0, 100.0);
     builder.latency(f64::NAN, f64::INFINITY);
     builder.note(&RunNote::SetpointSent);
     builder.note(&RunNote::FramesSuperseded(3));
+    builder.note(&RunNote::FrameRepeated);
     let folder = tempfile::tempdir().unwrap();
     let path = builder.finish().write(folder.path()).unwrap();
     let json: serde_json::Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
@@ -168,6 +171,8 @@ fn counts_reach_the_file_under_their_promised_keys() {
     assert_eq!(json["setpoints_sent"], 1);
     assert_eq!(json["frames_superseded"], 3);
     assert_eq!(json["link_reconnects"], 1);
+    assert_eq!(json["robot_reports_ignored"], 1);
+    assert_eq!(json["repeated"], 1);
     assert_eq!(json["target_width_mm"], 42.0);
     assert_eq!(json["faults"], 0);
     assert_eq!(json["limited_s"], 0.0);
