@@ -1,23 +1,23 @@
+//! One case of each kind; `tests/output_lead.rs` has many.
+
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use rayon::prelude::*;
-
 use super::*;
 use crate::identify::excitation::{Excitation, Waveform};
 use crate::identify::fit::InitialCondition;
-use crate::numeric::lti::{Between, TransferFunction, simulate};
+use crate::numeric::lti::{TransferFunction, simulate};
 
-const DT_S: f64 = 0.05;
+const DT_S: f64 = 0.2;
 
 /// An input of random levels and the answer to it, with a fifth of it as noise.
 fn logged(model: &TransferFunction, seed: u64) -> (Vec<f64>, Vec<f64>) {
     let shape = Waveform::Gaussian { mean: 0.0, sigma: 2.0, low: -6.0, high: 6.0, seed };
     let levels = Excitation { shape, hold_s: 0.8, duration_s: Some(60.0) };
-    let input = levels.profile().unwrap().sampled(DT_S, 1200);
+    let input = levels.profile().unwrap().sampled(DT_S, 300);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let clean = simulate(model, &input, DT_S).unwrap();
     let mut noisy = |y: &f64| {
@@ -47,7 +47,7 @@ fn ahead_by(input: &[f64], output: &[f64], steps: usize) -> Samples {
 #[test]
 fn a_clock_that_is_behind_is_reported_with_its_lead() {
     let machine = model(&[2.0], &[0.36, 0.72, 1.0], 0.3);
-    for (seed, steps) in [(1, 26), (2, 40), (3, 70), (4, 90)] {
+    for (seed, steps) in [(1, 7), (2, 10), (3, 17), (4, 22)] {
         let (input, output) = logged(&machine, seed);
         let samples = ahead_by(&input, &output, steps);
         let found = fit(&samples, &settings()).ok();
@@ -70,21 +70,17 @@ fn a_machine_that_only_answers_is_never_ahead() {
         model(&[2.0], &[0.1, 0.8, 1.7, 1.0], 0.0),
         model(&[2.0], &[0.36, 0.72, 1.0], 0.4),
     ];
-    (0..24_u64).into_par_iter().for_each(|seed| {
-        let machine = &machines[usize::try_from(seed).unwrap() % machines.len()];
+    for (seed, machine) in (0..).zip(&machines) {
         let (input, output) = logged(machine, seed);
         let samples = Samples::new(input, output, DT_S).unwrap();
-        // Also where no model was found, and where the input was measured.
-        for between in [Between::Held, Between::Linear] {
-            let settings = FitSettings { between, ..settings() };
-            assert_eq!(output_lead(&samples, &settings, None), None, "seed {seed}");
-        }
-    });
+        // Also where no model was found.
+        assert_eq!(output_lead(&samples, &settings(), None), None, "seed {seed}");
+    }
 }
 
 #[test]
 fn noise_is_not_ahead() {
-    for seed in 0..8 {
+    for seed in 0..3 {
         let (input, _) = logged(&model(&[2.0], &[0.8, 1.0], 0.0), seed);
         let (_, output) = logged(&model(&[2.0], &[0.8, 1.0], 0.0), seed + 100);
         let samples = Samples::new(input, output, DT_S).unwrap();

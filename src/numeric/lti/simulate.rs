@@ -143,12 +143,14 @@ impl Simulator {
         let [u0, u1, u2] = [delayed(0), delayed(1), delayed(2)];
         let [g0, g1, g2] = &self.taps;
         let mut output = self.through[0] * u0 + self.through[1] * u1;
-        let rows = self.state.chunks_exact(self.order.max(1));
-        let driven = g0.iter().zip(g1).zip(g2).map(|((a, b), c)| a * u0 + b * u1 + c * u2);
-        for (((next, row), driven), c) in self.next.iter_mut().zip(rows).zip(driven).zip(&self.c) {
-            let moved: f64 = row.iter().zip(&self.x).map(|(a, x)| a * x).sum();
-            *next = moved + driven;
-            output += c * *next;
+        // By index: iterators over several slices are slow where little is optimised (`make quick`).
+        for row in 0..self.order {
+            let mut moved = 0.0;
+            for column in 0..self.order {
+                moved += self.state[row * self.order + column] * self.x[column];
+            }
+            self.next[row] = moved + (g0[row] * u0 + g1[row] * u1 + g2[row] * u2);
+            output += self.c[row] * self.next[row];
         }
         std::mem::swap(&mut self.x, &mut self.next);
         output
