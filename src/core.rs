@@ -14,6 +14,6 @@ pub use geometry::{GridSize, ImagePoint, Pose, Roi, Size, SurfacePoint};
 pub use quantity::{Quantity, Unit};
 pub use readback::{ROBOT_LAG, SpeedMatch, SpeedMonitor};
 pub use refusal::RefusalReason;
-pub use robot::{RobotLimits, RobotMode, RobotState};
+pub use robot::{MAX_SILENCE, RobotLimits, RobotMode, RobotState};
 pub use time::{Span, Stamp};
 pub use units::{MPa, Mm, Mm2, Mm3PerS, MmPerS, MmPerS2, NotFinite, Px, Rpm, WidthRange};

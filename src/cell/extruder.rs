@@ -96,10 +96,10 @@ impl ExtruderSettings {
         }
         let max_gap = table.number("max_gap_s", 0.01..=60.0);
         if let Some((gap, rates)) = max_gap.zip(rates)
-            && gap * rates.io_hz < 1.5
+            && gap < shortest_s(rates.io_hz)
         {
-            let min_gap =
-                format!("at least {:.3}, one and a half periods of io_rate_hz", 1.5 / rates.io_hz);
+            let shortest = shortest_s(rates.io_hz);
+            let min_gap = format!("at least {shortest:.3}, one and a half periods of io_rate_hz");
             table.report("max_gap_s", gap.to_string(), min_gap);
         }
         let max_hold = table.number("max_hold_s", 0.1..=3600.0);
@@ -158,7 +158,7 @@ impl ExtruderSettings {
     /// is checked only where the extruder is reached over a link.
     fn command_valid(&self) -> Span {
         let valid = Span::from_millis(i64::try_from(self.valid_ms).unwrap_or(i64::MAX));
-        valid.max(Span::from_secs(1.5 / self.rates.io_hz))
+        valid.max(Span::from_secs(shortest_s(self.rates.io_hz)))
     }
 
     /// The setup of the extruder side with the controller of a strategy. Start and stop times and
@@ -184,16 +184,22 @@ impl ExtruderSettings {
     }
 }
 
+/// Shortest time that reports may stay away, and that a command holds, at an extruder that is
+/// commanded and reports `io_hz` times a second: one and a half periods \[s\].
+fn shortest_s(io_hz: f64) -> f64 {
+    1.5 / io_hz
+}
+
 /// How long a command holds at an extruder that is commanded and reports `io_hz` times a
 /// second \[ms\].
 fn read_valid_ms(table: &Table<'_>, io_hz: Option<f64>) -> Option<u64> {
     let valid_ms = table.integer_or("valid_ms", 100..=1000, VALID_MS)?;
     if let Some(io_hz) = io_hz
         && table.has("driver")
-        && u32::try_from(valid_ms).is_ok_and(|ms| f64::from(ms) < 1.5e3 / io_hz)
+        && u32::try_from(valid_ms).is_ok_and(|ms| f64::from(ms) < 1e3 * shortest_s(io_hz))
     {
-        let expected =
-            format!("at least {:.0}, one and a half periods of io_rate_hz", 1.5e3 / io_hz);
+        let shortest_ms = 1e3 * shortest_s(io_hz);
+        let expected = format!("at least {shortest_ms:.0}, one and a half periods of io_rate_hz");
         table.report("valid_ms", valid_ms.to_string(), expected);
     }
     Some(valid_ms)

@@ -3,7 +3,7 @@
 use super::controller::Controller;
 use super::phase::{Bead, BeadStage, Mode, Phase};
 use super::step::{Fault, Hold, Trace};
-use crate::core::{Mm, RobotLimits, RobotMode, RobotState, Span, SpeedMatch, Stamp};
+use crate::core::{MAX_SILENCE, Mm, RobotLimits, RobotMode, RobotState, SpeedMatch, Stamp};
 use crate::width_control::controller::BeadReport;
 
 /// Fraction of the setpoint at which the run-up of a robot is over. A larger value is not
@@ -15,10 +15,6 @@ const RUN_UP_FRACTION: f64 = 0.95;
 const MAX_LAID_BEFORE_FIRST_REPORT: Mm = Mm::constant(50.0);
 /// A path that falls by less belongs to the same bead: reports may jitter.
 const SAME_BEAD_TOLERANCE: Mm = Mm::constant(1.0);
-
-/// Longest time without a report that can be used. After this time a link counts as lost
-/// (`docs/src/reference/robot-link.md`, § Connections).
-const MAX_SILENCE: Span = Span::from_millis(500);
 
 impl Controller {
     pub(super) fn reported(&mut self, now: Stamp, state: &RobotState, trace: &mut Trace) {

@@ -4,6 +4,7 @@ mod distance;
 mod extruder;
 mod repeated;
 mod robot_reports;
+mod slow_camera;
 
 use super::*;
 use crate::core::{
@@ -61,14 +62,19 @@ impl Line {
     /// A cell with its link up.
     fn of(setup: Setup) -> Self {
         let mut line = Self { controller: Controller::new(setup), now: 0.0, frame: 0 };
+        let _ = line.link_up(200.0);
+        line
+    }
+
+    /// A robot connects that is as fast as this [mm/s].
+    fn link_up(&mut self, max_speed: f64) -> Step {
         let robot = RobotLimits {
             name: "sim".into(),
             min_mm_per_s: MmPerS::constant(10.0),
-            max_mm_per_s: MmPerS::constant(200.0),
+            max_mm_per_s: MmPerS::constant(max_speed),
             hold_mm_per_s: MmPerS::constant(80.0),
         };
-        let _ = line.give(&Event::LinkUp { robot });
-        line
+        self.give(&Event::LinkUp { robot })
     }
 
     fn give(&mut self, event: &Event) -> Step {
@@ -189,69 +195,6 @@ fn a_gap_is_held_and_not_integrated_across() {
     assert!((step.trace.demand_mm_per_s.unwrap().get() - before).abs() < 1e-9);
 }
 
-/// Widths of an age, ten a second, until the hold must have ended in a fault.
-fn states_with_widths_of_age(mut line: Line, age: f64) -> Vec<State> {
-    let mut states = Vec::new();
-    for _ in 0..80 {
-        let _ = line.lay(0.1);
-        states.push(line.width_of_age(age, 42.0).state);
-        let _ = line.tick();
-        states.push(line.controller.state());
-    }
-    states
-}
-
-fn slow_camera(age: f64) -> Hold {
-    Hold::SlowCamera { age: Span::from_secs(age), max_gap: Span::from_secs(0.5) }
-}
-
-#[test]
-fn widths_that_are_too_old_do_not_end_a_hold_and_the_fault_names_the_camera() {
-    let states = states_with_widths_of_age(Line::tracking(), 0.8);
-    let held = states.iter().position(|state| matches!(state, State::Holding(_))).unwrap();
-    assert!(!states[held..].contains(&State::Tracking));
-    assert!(states.contains(&State::Holding(slow_camera(0.8))));
-    let fault = State::Fault(Fault::HeldTooLong(slow_camera(0.8)));
-    assert_eq!(states.last(), Some(&fault));
-    let lasted = states.iter().position(|state| *state == fault).unwrap() - held;
-    // Two states every 0.1 s, for the 3 s of the longest hold.
-    assert!((60..66).contains(&lasted), "{lasted}");
-}
-
-#[test]
-fn widths_that_are_young_enough_are_tracked_whatever_their_age() {
-    let states = states_with_widths_of_age(Line::tracking(), 0.25);
-    assert!(states.iter().all(|state| *state == State::Tracking));
-}
-
-#[test]
-fn control_does_not_begin_with_widths_that_are_too_old() {
-    let mut line = Line::new();
-    line.now = 1.0;
-    let _ = line.robot(RobotMode::Print, 0.0, 112.5);
-    let states = states_with_widths_of_age(line, 0.8);
-    assert!(!states.contains(&State::Tracking));
-    assert_eq!(states.last(), Some(&State::Fault(Fault::HeldTooLong(slow_camera(0.8)))));
-}
-
-#[test]
-fn only_timely_widths_in_a_row_end_a_hold() {
-    let mut line = Line::tracking();
-    let _ = line.lay(0.6);
-    let _ = line.tick();
-    for age in [0.0, 0.1, 0.6, 0.0, 0.0] {
-        let _ = line.lay(0.1);
-        assert_ne!(line.width_of_age(age, 42.0).state, State::Tracking, "{age}");
-    }
-    // A width after a gap is not in a row with those before it.
-    let _ = line.lay(0.6);
-    assert_ne!(line.width(42.0).state, State::Tracking);
-    let _ = line.lay(0.1);
-    assert_ne!(line.width(42.0).state, State::Tracking);
-    let _ = line.lay(0.1);
-    assert_eq!(line.width(42.0).state, State::Tracking);
-}
-
 #[test]
 fn a_long_hold_becomes_a_fault_that_stops_the_robot() {
     let mut line = Line::tracking();
@@ -299,14 +242,8 @@ fn a_lost_link_is_a_hold_that_ends_with_the_link() {
     let step = line.give(&Event::LinkDown { reason: "no STATE for 500 ms".into() });
     assert_eq!(step.state, State::Holding(Hold::LinkDown));
     assert_eq!(line.tick(), None);
-    let robot = RobotLimits {
-        name: "sim".into(),
-        min_mm_per_s: MmPerS::constant(10.0),
-        max_mm_per_s: MmPerS::constant(200.0),
-        hold_mm_per_s: MmPerS::constant(80.0),
-    };
     line.now += 0.3;
-    let _ = line.give(&Event::LinkUp { robot });
+    let _ = line.link_up(200.0);
     for path in [270.0, 278.0] {
         let _ = line.advance(0.1, path, 80.0);
         assert_eq!(line.width(42.0).state, State::Holding(Hold::NoWidth));
@@ -320,13 +257,7 @@ fn a_lost_link_is_a_hold_that_ends_with_the_link() {
 #[test]
 fn a_robot_with_narrower_limits_is_never_driven() {
     let mut line = Line::new();
-    let robot = RobotLimits {
-        name: "slow".into(),
-        min_mm_per_s: MmPerS::constant(10.0),
-        max_mm_per_s: MmPerS::constant(100.0),
-        hold_mm_per_s: MmPerS::constant(80.0),
-    };
-    let step = line.give(&Event::LinkUp { robot });
+    let step = line.link_up(100.0);
     assert_eq!(step.state, State::Holding(Hold::RobotLimits));
     let _ = line.robot(RobotMode::Print, 0.0, 80.0);
     assert_eq!(line.tick(), None);

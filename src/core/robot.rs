@@ -2,7 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::core::time::Span;
 use crate::core::units::{Mm, MmPerS};
+
+/// Longest time without a report: after this time a link counts as lost
+/// (`docs/src/reference/robot-link.md`, § Connections).
+pub const MAX_SILENCE: Span = Span::from_millis(500);
 
 /// Mode of the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -2,6 +2,7 @@
 //! [`Span`] is signed so that delayed data shows. Nothing here reads a clock.
 
 use std::ops::{Add, Sub};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
@@ -81,6 +82,11 @@ impl Span {
     /// Signed nanoseconds.
     pub const fn ns(self) -> i64 {
         self.0
+    }
+
+    /// As the length of a wait; 0 if it is negative.
+    pub fn wait(self) -> Duration {
+        Duration::from_nanos(u64::try_from(self.0).unwrap_or(0))
     }
 
     /// Signed seconds.

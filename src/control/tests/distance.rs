@@ -146,5 +146,5 @@ fn a_hold_for_old_widths_is_not_ended_by_what_is_known_of_the_bead() {
     }
     let held = states.iter().position(|state| matches!(state, State::Holding(_))).unwrap();
     assert!(!states[held..].contains(&State::Tracking), "{states:?}");
-    assert_eq!(states.last(), Some(&State::Fault(Fault::HeldTooLong(slow_camera(0.8)))));
+    assert_eq!(states.last(), Some(&State::Fault(Fault::HeldTooLong(slow_camera::too_slow(0.8)))));
 }

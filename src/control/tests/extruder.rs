@@ -290,13 +290,7 @@ fn a_bead_that_begins_while_the_link_is_down_is_the_next_of_the_plan() {
     assert!((cell.line.tick().unwrap() - SPEED / 2.0).abs() < 1e-3);
     let _ = cell.line.give(&Event::LinkDown { reason: "no STATE for 500 ms".into() });
     cell.line.now += 1.0;
-    let robot = RobotLimits {
-        name: "sim".into(),
-        min_mm_per_s: MmPerS::constant(10.0),
-        max_mm_per_s: MmPerS::constant(200.0),
-        hold_mm_per_s: MmPerS::constant(80.0),
-    };
-    let _ = cell.line.give(&Event::LinkUp { robot });
+    let _ = cell.line.link_up(200.0);
     cell.path = 20.0;
     let _ = cell.go(0.02);
     cell.path = 600.0;

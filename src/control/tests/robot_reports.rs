@@ -129,13 +129,7 @@ fn the_path_of_another_connection_or_another_bead_is_no_jump() {
     assert_eq!(line.controller.state(), State::Priming);
     let mut line = Line::tracking();
     let _ = line.give(&Event::LinkDown { reason: "cut".into() });
-    let robot = RobotLimits {
-        name: "sim".into(),
-        min_mm_per_s: MmPerS::constant(10.0),
-        max_mm_per_s: MmPerS::constant(200.0),
-        hold_mm_per_s: MmPerS::constant(80.0),
-    };
-    let _ = line.give(&Event::LinkUp { robot });
+    let _ = line.link_up(200.0);
     let state = line.advance(0.1, 900.0, SPEED).state;
     assert_eq!(state, State::Holding(Hold::NoWidth));
 }

@@ -103,7 +103,7 @@ impl Live {
         if let Some(frame) = self.first.take() {
             return Ok(News::Frame(frame));
         }
-        let mut wait = duration(self.patience.deadline);
+        let mut wait = self.patience.deadline.wait();
         let worker = if let Some(worker) = self.worker.take() {
             worker
         } else {
@@ -181,10 +181,6 @@ impl Capture for Device {
             .map_err(|error| error.to_string())?
             .ok_or_else(|| "it gave an image that cannot be decoded".to_owned())
     }
-}
-
-fn duration(span: Span) -> Duration {
-    Duration::from_nanos(u64::try_from(span.ns()).unwrap_or(0))
 }
 
 fn delay_after(failures: u32) -> Duration {

@@ -194,8 +194,7 @@ impl FrameSource for Paced {
         let Some(mut grab) = self.inner.next_frame()? else { return Ok(None) };
         let due = self.due.unwrap_or_else(|| self.clock.now());
         self.due = Some(due + self.period);
-        let wait = (due - self.clock.now()).max(Span::ZERO);
-        let wait = std::time::Duration::from_nanos(u64::try_from(wait.ns()).unwrap_or(0));
+        let wait = (due - self.clock.now()).wait();
         // A message on the channel or its end means to stop.
         if self.stop.recv_timeout(wait) != Err(crossbeam_channel::RecvTimeoutError::Timeout) {
             return Ok(None);

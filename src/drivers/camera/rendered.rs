@@ -1,8 +1,6 @@
 //! The rendered camera: images of a simulated bead that follows the path and speed of the robot's
 //! reports.
 
-use std::time::Duration;
-
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
 use super::fault;
@@ -84,9 +82,7 @@ impl RenderedCamera {
         let due = self.due.map_or(now, |due| (due + self.period).max(now));
         self.due = Some(due);
         loop {
-            let left = (due - self.clock.now()).max(Span::ZERO);
-            let wait = Duration::from_nanos(u64::try_from(left.ns()).unwrap_or(0));
-            match self.stop.recv_timeout(wait) {
+            match self.stop.recv_timeout((due - self.clock.now()).wait()) {
                 Err(RecvTimeoutError::Timeout) if self.clock.now() >= due => return true,
                 Err(RecvTimeoutError::Timeout) => {}
                 Ok(()) | Err(RecvTimeoutError::Disconnected) => return false,

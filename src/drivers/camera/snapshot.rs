@@ -1,7 +1,5 @@
 //! A network camera that gives an image for each HTTP request.
 
-use std::time::Duration;
-
 use crossbeam_channel::{Receiver, RecvTimeoutError};
 use ureq::Agent;
 
@@ -66,7 +64,7 @@ impl Snapshot {
         if settings.timeout <= Span::ZERO {
             return Err(fault(url, "the longest wait for an answer must be above 0"));
         }
-        let timeout = Duration::from_nanos(settings.timeout.ns().unsigned_abs());
+        let timeout = settings.timeout.wait();
         // A camera is in the cell's own network, not behind a proxy.
         let config = Agent::config_builder().timeout_global(Some(timeout)).proxy(None).build();
         Ok(Self {
@@ -87,8 +85,7 @@ impl Snapshot {
     /// Waits until the next request is due; returns false when the source was stopped. Requests
     /// that were missed because of a slow camera are skipped.
     fn wait_until_due(&mut self) -> bool {
-        let wait = (self.due - self.clock.now()).max(Span::ZERO);
-        let wait = Duration::from_nanos(wait.ns().unsigned_abs());
+        let wait = (self.due - self.clock.now()).wait();
         if self.stop.recv_timeout(wait) != Err(RecvTimeoutError::Timeout) {
             return false;
         }
@@ -104,9 +101,7 @@ impl Snapshot {
         let bytes = answer.body_mut().with_config().limit(LONGEST_ANSWER).read_to_vec()?;
         Ok((bytes, captured_at))
     }
-}
 
-impl Snapshot {
     fn next_number(&mut self) -> u64 {
         let seq = self.next;
         self.next += 1;
@@ -171,6 +166,7 @@ mod tests {
     use std::io::{Read, Write};
     use std::net::TcpListener;
     use std::thread;
+    use std::time::Duration;
 
     const SETTINGS: SnapshotSettings = SnapshotSettings {
         rate_hz: 1000.0,

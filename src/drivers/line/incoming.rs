@@ -126,8 +126,7 @@ impl<D: Dialect> Incoming<D> {
     }
 
     fn read(&mut self, left: Span) -> Result<(), Why> {
-        let wait = Duration::from_nanos(u64::try_from(left.ns()).unwrap_or(0));
-        self.stream.set_read_timeout(Some(wait.max(Duration::from_millis(1))))?;
+        self.stream.set_read_timeout(Some(left.wait().max(Duration::from_millis(1))))?;
         let mut bytes = [0; 4096];
         match self.stream.read(&mut bytes) {
             Ok(0) => Err(Why::Closed),

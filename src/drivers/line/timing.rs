@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use crate::core::MAX_SILENCE;
+
 /// Timeouts and delays of a link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LinkTiming {
@@ -24,7 +26,7 @@ impl Default for LinkTiming {
         Self {
             connect: Duration::from_secs(1),
             hello: Duration::from_millis(500),
-            silence: Duration::from_millis(500),
+            silence: MAX_SILENCE.wait(),
             write: Duration::from_millis(5),
             first_delay: Duration::from_millis(100),
             longest_delay: Duration::from_secs(2),

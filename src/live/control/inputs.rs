@@ -1,11 +1,9 @@
 //! The inputs of the control thread, behind a trait: channels and a clock in a live run, a list in
 //! a test.
 
-use std::time::Duration;
-
 use crossbeam_channel::{Receiver, never, select};
 
-use crate::core::{Span, Stamp};
+use crate::core::Stamp;
 use crate::io::clock::RunClock;
 use crate::live::capture::CameraMessage;
 use crate::run::ports::{ExtruderEvent, RecordError, RobotEvent};
@@ -64,8 +62,7 @@ impl Inputs for LiveInputs {
 
     fn next(&mut self, until: Stamp) -> Option<LiveInput> {
         loop {
-            let wait = (until - self.clock.now()).max(Span::ZERO);
-            let wait = Duration::from_nanos(u64::try_from(wait.ns()).unwrap_or(0));
+            let wait = (until - self.clock.now()).wait();
             select! {
                 recv(self.camera) -> message => return Some(message.map_or_else(
                     |_| {
