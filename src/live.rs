@@ -46,7 +46,7 @@ use crate::run::runner::Runner;
 
 use capture::CapturePipeline;
 pub use control::Ending;
-use control::{ControlThread, ExtruderWatch, LiveInputs, StepsWatch};
+use control::{ControlThread, ExtruderWatch, LiveInputs, Notices, StepsWatch};
 use journal::Journal;
 use run_logger::RunLogger;
 
@@ -194,7 +194,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         limits: live.run.limits,
         unfit: None,
         steps: live.ends_with_steps.then(StepsWatch::default),
-        shown: None,
+        notices: Notices::default(),
         speed: None,
         setpoint: None,
     };

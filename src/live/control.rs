@@ -6,6 +6,7 @@ mod extruder;
 mod extruder_watch;
 mod frames;
 mod inputs;
+mod notices;
 mod robot;
 mod steps;
 
@@ -20,7 +21,6 @@ use super::latency::Latencies;
 use crate::control::{Command, Event, State, Step};
 use crate::core::{MmPerS, RobotMode, Span, Stamp};
 use crate::drivers::camera::rendered::RobotView;
-use crate::rows::names;
 use crate::rows::summary::RunNote;
 use crate::run::ports::{ExtruderPort, Recorder, RobotEvent, RobotPort};
 use crate::run::runner::{Handled, Runner};
@@ -29,6 +29,7 @@ use crate::width_control::limiter::SpeedLimits;
 pub use ending::Ending;
 pub use extruder_watch::ExtruderWatch;
 pub use inputs::{Inputs, LiveInput, LiveInputs};
+pub use notices::Notices;
 pub use steps::StepsWatch;
 
 /// Longest wait for the robot's report that it has stopped.
@@ -52,7 +53,7 @@ pub struct ControlThread<'a, I, K> {
     pub limits: SpeedLimits,
     pub unfit: Option<Ending>,
     pub steps: Option<StepsWatch>,
-    pub shown: Option<State>,
+    pub notices: Notices,
     pub speed: Option<MmPerS>,
     pub setpoint: Option<MmPerS>,
 }
@@ -114,7 +115,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
                 self.tick(due);
                 due = next_due(due, self.period, self.inputs.now());
                 if let Some(why) = &lost
-                    && matches!(self.shown, Some(State::Fault(_) | State::Idle))
+                    && matches!(self.notices.state(), Some(State::Fault(_) | State::Idle))
                 {
                     return Ending::CameraLost(why.clone());
                 }
@@ -188,18 +189,11 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
         handled
     }
 
-    /// Shows the operator a new state.
+    /// Tells the operator what a step brings.
     fn show(&mut self, now: Stamp, step: &Step) {
-        if self.shown.as_ref() == Some(&step.state) {
-            return;
+        for words in self.notices.of(now, step) {
+            (self.notice)(&words);
         }
-        let words = match &step.state {
-            State::Holding(why) => format!("holding: {}", names::hold_in_words(why)),
-            State::Fault(why) => format!("fault: {}", names::fault_in_words(why)),
-            state => state.name().to_owned(),
-        };
-        (self.notice)(&format!("{:8.2} s  {}", now.secs(), words));
-        self.shown = Some(step.state.clone());
     }
 
     fn tick(&mut self, due: Stamp) {

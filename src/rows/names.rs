@@ -2,6 +2,7 @@
 
 use crate::control::{Fault, Hold};
 use crate::extruder::ExtruderFault;
+use crate::width_control::distance::FallbackReason;
 
 /// Name of a limit, or of a reason without details.
 pub fn of(value: impl Into<&'static str>) -> &'static str {
@@ -48,6 +49,20 @@ pub fn hold_in_words(hold: &Hold) -> String {
              its path and speed are not used. See that every report is made anew"
         ),
         _ => name,
+    }
+}
+
+/// Why PI control took over from control by distance, for people.
+pub fn fallback(why: FallbackReason) -> &'static str {
+    match why {
+        FallbackReason::NoPath => "the robot reports no path",
+        FallbackReason::Unmatched => {
+            "the bead under the camera is none whose speed is known; is offset_mm right?"
+        }
+        FallbackReason::ModelContradicted => {
+            "the width does not follow the speed as the model predicts; is it this bead that the \
+             camera looks at, and are offset_mm and exponent right?"
+        }
     }
 }
 

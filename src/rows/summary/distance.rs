@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::control::Step;
+use crate::rows::names;
 use crate::width_control::distance::WidthUse;
 use crate::width_control::{DistanceTrace, FallbackReason};
 
@@ -38,15 +39,8 @@ impl DistanceSummary {
         let pulsation = self.pulsation_s.map_or(String::new(), |period| {
             format!(" The flow pulsates with a period of {period:.2} s.")
         });
-        let fallback = self.fallback_reason.map_or("", |why| match why {
-            FallbackReason::NoPath => " The PI controller took over: the robot reports no path.",
-            FallbackReason::Unmatched => {
-                " The PI controller took over: the bead under the camera is none whose speed is known; is \
-                 offset_mm right?"
-            }
-            FallbackReason::ModelContradicted => {
-                " The PI controller took over: the width did not respond to the speed as the model predicts."
-            }
+        let fallback = self.fallback_reason.map_or(String::new(), |why| {
+            format!(" The PI controller took over: {}.", names::fallback(why))
         });
         format!(
             "Widths used {samples_used}, outliers {outliers}, changes of the flow {changes}. Last estimates: \
