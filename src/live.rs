@@ -46,7 +46,7 @@ use crate::run::runner::Runner;
 
 use capture::CapturePipeline;
 pub use control::Ending;
-use control::{ControlThread, ExtruderWatch, LiveInputs, Notices, StepsWatch};
+use control::{ControlThread, ExtruderWatch, LiveInputs, Notices, StatusLine, StepsWatch};
 use journal::Journal;
 use run_logger::RunLogger;
 
@@ -78,6 +78,8 @@ pub struct LiveRun {
     pub stop: Receiver<()>,
     /// Called with messages for the operator.
     pub notice: Box<dyn FnMut(&str) + Send>,
+    /// Called with a line about the run, each of which replaces the one before.
+    pub status: Box<dyn FnMut(&str) + Send>,
 }
 
 /// The extruder of a live run.
@@ -173,6 +175,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     if let Some(side) = live.extruder {
         controller = controller.with_extruder(side.setup, side.demand);
     }
+    let status_line = StatusLine::new(watch.is_some());
     let mut control = ControlThread {
         inputs: LiveInputs {
             clock: live.clock,
@@ -191,6 +194,8 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         latencies: latency::Latencies::default(),
         journal: &logger,
         notice: live.notice,
+        status: live.status,
+        status_line,
         limits: live.run.limits,
         unfit: None,
         steps: live.ends_with_steps.then(StepsWatch::default),

@@ -14,6 +14,7 @@ use crate::cell::file::RunPart;
 use crate::core::Span;
 use crate::drivers::robot::RobotDriver;
 use crate::io::clock::RunClock;
+use crate::io::progress::StatusDisplay;
 use crate::io::recorder::{ExtruderFile, RecordConfig};
 use crate::io::stop::StopSignal;
 use crate::live::{self, LiveExtruder, LiveReport, LiveRun};
@@ -83,7 +84,9 @@ pub fn live(
         extruder_files,
     };
     let quiet = voice.quiet;
-    Ok(live::run(LiveRun {
+    let status = StatusDisplay::new(quiet);
+    let above = status.clone();
+    let report = live::run(LiveRun {
         run,
         robot,
         extruder,
@@ -97,11 +100,17 @@ pub fn live(
         stop: stop.signals().clone(),
         notice: Box::new(move |line| {
             if !quiet {
-                tell!("{line}");
+                above.note(line);
             }
         }),
+        status: Box::new({
+            let status = status.clone();
+            move |line| status.show(line)
+        }),
         cell: loaded.cell.clone(),
-    })?)
+    });
+    status.finish();
+    Ok(report?)
 }
 
 /// Begins the log of a cell. `header` are facts under the report's title; the calibration is added

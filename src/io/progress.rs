@@ -62,10 +62,7 @@ impl Progress {
 
     /// Writes a line above the bar.
     pub fn note(&self, line: &str) {
-        self.bar.suspend(|| {
-            // A closed standard error does not stop the work.
-            let _ = writeln!(std::io::stderr(), "{line}");
-        });
+        self.bar.suspend(|| write_note(line));
     }
 
     /// Ends; the bar disappears, plain lines get a last one.
@@ -82,6 +79,44 @@ impl Progress {
         let line = line(self.what, self.unit, done, self.bar.length(), self.bar.elapsed());
         let _ = writeln!(std::io::stderr(), "{line}{end}");
     }
+}
+
+/// A line on a terminal that is kept up to date; nothing elsewhere.
+#[derive(Debug, Clone)]
+pub struct StatusDisplay(ProgressBar);
+
+impl StatusDisplay {
+    /// An empty line; it stays empty if `quiet`.
+    pub fn new(quiet: bool) -> Self {
+        let target =
+            if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let bar = ProgressBar::with_draw_target(None, target);
+        // As long as the terminal is wide; the rest is cut off.
+        if let Ok(style) = ProgressStyle::with_template("{wide_msg}") {
+            bar.set_style(style);
+        }
+        Self(bar)
+    }
+
+    /// Replaces the line.
+    pub fn show(&self, line: &str) {
+        self.0.set_message(line.to_owned());
+    }
+
+    /// Writes a line above it.
+    pub fn note(&self, line: &str) {
+        self.0.suspend(|| write_note(line));
+    }
+
+    /// Takes the line away.
+    pub fn finish(&self) {
+        self.0.finish_and_clear();
+    }
+}
+
+fn write_note(line: &str) {
+    // A closed standard error does not stop the work.
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// Progress of work in several threads.

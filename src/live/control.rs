@@ -8,6 +8,7 @@ mod frames;
 mod inputs;
 mod notices;
 mod robot;
+mod status_line;
 mod steps;
 
 use std::sync::Arc;
@@ -30,6 +31,7 @@ pub use ending::Ending;
 pub use extruder_watch::ExtruderWatch;
 pub use inputs::{Inputs, LiveInput, LiveInputs};
 pub use notices::Notices;
+pub use status_line::StatusLine;
 pub use steps::StepsWatch;
 
 /// Longest wait for the robot's report that it has stopped.
@@ -50,6 +52,8 @@ pub struct ControlThread<'a, I, K> {
     pub latencies: Latencies,
     pub journal: &'a dyn Journal,
     pub notice: Box<dyn FnMut(&str) + Send>,
+    pub status: Box<dyn FnMut(&str) + Send>,
+    pub status_line: StatusLine,
     pub limits: SpeedLimits,
     pub unfit: Option<Ending>,
     pub steps: Option<StepsWatch>,
@@ -183,16 +187,19 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
         if let Some(steps) = &mut self.steps {
             steps.see(&handled.step);
         }
-        self.show(now, &handled.step);
+        self.show(now, &event, &handled.step);
         self.show_extruder(now, &handled.step);
         self.journal.step(now, event, handled.step.clone());
         handled
     }
 
     /// Tells the operator what a step brings.
-    fn show(&mut self, now: Stamp, step: &Step) {
+    fn show(&mut self, now: Stamp, event: &Event, step: &Step) {
         for words in self.notices.of(now, step) {
             (self.notice)(&words);
+        }
+        if let Some(line) = self.status_line.of(now, event, step) {
+            (self.status)(&line);
         }
     }
 

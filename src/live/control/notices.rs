@@ -1,4 +1,4 @@
-//! What an operator is told while a run goes on: a new state with its reason, a speed limit that
+//! What an operator hears while a run goes on: a new state with its reason, a speed limit that
 //! keeps the width from its target, and a width controller that falls back.
 
 use crate::control::{Command, State, Step};
@@ -7,11 +7,12 @@ use crate::rows::names;
 use crate::width_control::distance::FallbackReason;
 use crate::width_control::limiter::SpeedLimit;
 
-/// How long a speed limit must act, or not act, before it is told. A shorter time repeats itself
-/// where the speed only touches a limit.
+/// How long a speed limit must act, or not act, before it is reported
+/// (`docs/src/how-to/run-a-cell.md`, § What the controller does, and when it stops). A shorter time
+/// repeats itself where the speed only touches a limit.
 const LIMIT_DELAY: Span = Span::from_millis(500);
 
-/// What has been told.
+/// What has been reported.
 #[derive(Debug, Default)]
 pub struct Notices {
     state: Option<State>,
@@ -19,16 +20,16 @@ pub struct Notices {
     limit: LimitNotice,
 }
 
-/// A limit that acts, and whether it has been told.
+/// A limit that acts, and the one that was reported.
 #[derive(Debug, Default)]
 struct LimitNotice {
     acts: Option<SpeedLimit>,
     since: Stamp,
-    told: Option<SpeedLimit>,
+    reported: Option<SpeedLimit>,
 }
 
 impl Notices {
-    /// The state that was told last.
+    /// The state that was reported last.
     pub fn state(&self) -> Option<&State> {
         self.state.as_ref()
     }
@@ -69,11 +70,11 @@ impl LimitNotice {
                 (self.acts, self.since) = (acts, now);
             }
         }
-        if self.acts == self.told || now - self.since < LIMIT_DELAY {
+        if self.acts == self.reported || now - self.since < LIMIT_DELAY {
             return None;
         }
         let Some(limit) = self.acts else {
-            self.told = None;
+            self.reported = None;
             return Some("no longer at a speed limit".to_owned());
         };
         let (Some(Command::Speed(speed)), Some(demand)) =
@@ -81,7 +82,7 @@ impl LimitNotice {
         else {
             return None;
         };
-        self.told = Some(limit);
+        self.reported = Some(limit);
         Some(at_limit(limit, speed, demand))
     }
 }
@@ -116,44 +117,44 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_that_stays_is_told_once_with_the_flow_that_is_missing() {
+    fn a_limit_that_stays_is_reported_once_with_the_flow_that_is_missing() {
         let mut notices = Notices::default();
         assert_eq!(notices.of(at(0.0), &step(80.0, 80.0, SpeedLimit::None)).len(), 1);
-        let mut told = Vec::new();
+        let mut words = Vec::new();
         for tenth in 1..30 {
             let now = at(0.1 * f64::from(tenth));
-            told.extend(notices.of(now, &step(60.0, 56.0, SpeedLimit::MinSpeed)));
+            words.extend(notices.of(now, &step(60.0, 56.0, SpeedLimit::MinSpeed)));
         }
-        assert_eq!(told.len(), 1, "{told:?}");
-        assert!(told[0].contains("60.0 mm/s") && told[0].contains("7 % more flow"), "{told:?}");
+        assert_eq!(words.len(), 1, "{words:?}");
+        assert!(words[0].contains("60.0 mm/s") && words[0].contains("7 % more flow"), "{words:?}");
         for tenth in 30..60 {
             let now = at(0.1 * f64::from(tenth));
-            told.extend(notices.of(now, &step(70.0, 70.0, SpeedLimit::None)));
+            words.extend(notices.of(now, &step(70.0, 70.0, SpeedLimit::None)));
         }
-        assert_eq!(told.len(), 2, "{told:?}");
+        assert_eq!(words.len(), 2, "{words:?}");
     }
 
     #[test]
-    fn a_speed_that_touches_its_limit_now_and_then_is_not_told() {
+    fn a_speed_that_touches_its_limit_now_and_then_is_not_reported() {
         let mut notices = Notices::default();
-        let mut told = Vec::new();
+        let mut words = Vec::new();
         for tenth in 0..60 {
             let limit = if tenth % 4 == 0 { SpeedLimit::MaxSpeed } else { SpeedLimit::None };
             let now = at(0.1 * f64::from(tenth));
-            told.extend(notices.of(now, &step(150.0, 151.0, limit)));
+            words.extend(notices.of(now, &step(150.0, 151.0, limit)));
         }
-        assert_eq!(told.len(), 1, "{told:?}");
-        assert!(told[0].ends_with("tracking"));
+        assert_eq!(words.len(), 1, "{words:?}");
+        assert!(words[0].ends_with("tracking"));
     }
 
     #[test]
-    fn a_fallback_is_told_when_it_begins() {
+    fn a_fallback_is_reported_when_it_begins() {
         let mut notices = Notices::default();
         let mut fallen = step(80.0, 80.0, SpeedLimit::None);
         fallen.trace.fallback = Some(FallbackReason::ModelContradicted);
         assert_eq!(notices.of(at(0.0), &step(80.0, 80.0, SpeedLimit::None)).len(), 1);
-        let told = notices.of(at(0.1), &fallen);
-        assert!(told[0].contains("does not follow the speed"), "{told:?}");
+        let words = notices.of(at(0.1), &fallen);
+        assert!(words[0].contains("does not follow the speed"), "{words:?}");
         assert!(notices.of(at(0.2), &fallen).is_empty());
     }
 }

@@ -174,6 +174,8 @@ impl<K: Recorder> Run<K> {
             limits: self.limits,
             unfit: None,
             steps: None,
+            status: Box::new(|_| {}),
+            status_line: StatusLine::new(false),
             notices: Notices::default(),
             speed: None,
             setpoint: None,
