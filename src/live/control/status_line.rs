@@ -3,6 +3,7 @@
 use crate::control::{Event, State, Step};
 use crate::core::{Mm, MmPerS, Stamp};
 use crate::rows::names;
+use crate::rows::summary::StateFollower;
 use crate::width_control::limiter::SpeedLimit;
 
 /// What the line is made of.
@@ -10,9 +11,8 @@ use crate::width_control::limiter::SpeedLimit;
 pub struct StatusLine {
     width: Option<ShownWidth>,
     captured_at: Option<Stamp>,
-    state: State,
+    follower: StateFollower,
     speed: Option<MmPerS>,
-    limit: SpeedLimit,
     robot_up: bool,
     /// None without an extruder that is commanded.
     extruder_up: Option<bool>,
@@ -34,15 +34,12 @@ impl StatusLine {
 
     /// Takes an event with the controller's step, and returns the line when a setpoint is due.
     pub fn of(&mut self, now: Stamp, event: &Event, step: &Step) -> Option<String> {
+        let _ = self.follower.step(now, event, step);
         self.take(event, step);
         matches!(event, Event::Tick).then(|| self.words(now))
     }
 
     fn take(&mut self, event: &Event, step: &Step) {
-        self.state = step.state.clone();
-        if step.command.is_some() {
-            self.limit = step.trace.limit;
-        }
         match event {
             Event::Measured { captured_at, width_mm, sigma_mm, .. } => {
                 let target = step.trace.error_mm.map(|error| *width_mm - error);
@@ -75,7 +72,7 @@ impl StatusLine {
     }
 
     fn state_words(&self) -> String {
-        match &self.state {
+        match self.follower.state() {
             State::Holding(why) => format!("holding, {}", names::in_words(names::of(why))),
             State::Fault(why) => format!("fault, {}", names::in_words(&names::fault(why))),
             state => state.name().to_owned(),
@@ -83,7 +80,7 @@ impl StatusLine {
     }
 
     fn speed_words(&self, speed: MmPerS) -> String {
-        let limit = match self.limit {
+        let limit = match self.follower.limit() {
             SpeedLimit::None => String::new(),
             limit => format!(" ({})", names::in_words(names::of(limit))),
         };
