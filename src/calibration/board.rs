@@ -192,10 +192,9 @@ impl Board {
             .collect()
     }
 
-    /// The observed corners with their positions on a flat board \[mm\], and the height of each
-    /// corner over the plane of a bent board for a bend of 1 mm: a parabola along a row and one
-    /// along a column, each with zero mean over all corners, so that the plane of the board
-    /// stays the same.
+    /// The observed corners with their positions on a flat board \[mm\] and their heights over the
+    /// plane of a board that is bent by 1 mm from its middle to its end: a parabola along a row and
+    /// one along a column. Each has zero mean over all corners, so that the plane stays the same.
     pub fn correspondences(&self, seen: &[CornerObservation]) -> Vec<Correspondence> {
         let side = self.square.get();
         let rise = |at: usize, count: usize| {

@@ -180,7 +180,7 @@ impl Controller {
         let last = bead.setpoint.map_or(requested, |last| last.speed);
         let speed = speed_override.map_or(last, |factor| requested * factor);
         let (last_at, last) = bead.setpoint.map_or((now, speed), |last| (last.at, last.speed));
-        let limited = self.setup.limits.apply(speed, last, now - last_at);
+        let limited = self.setup.limits.limit_setpoint(speed, last, now - last_at);
         bead.limit = match (limited.limit, self.robot.speed_match) {
             (SpeedLimit::None, SpeedMatch::Slower) => SpeedLimit::RobotSlower,
             (SpeedLimit::None, SpeedMatch::Faster) => SpeedLimit::RobotFaster,

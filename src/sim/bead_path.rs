@@ -39,8 +39,9 @@ impl BeadPath {
         }
     }
 
-    /// Position ahead and to the right \[mm\] of a point along and across the bead. `across_mm` is
-    /// normal to the bead's own axis. `None` too far around a curve.
+    /// Position ahead and to the right \[mm\] of a point along and across the bead. Points of one
+    /// `across_mm` form a line parallel to the bead's axis, at that distance. `None` too far around
+    /// an arc.
     pub fn position(self, along_mm: f64, across_mm: f64) -> Option<Vector2<f64>> {
         match self {
             Self::Straight => Some(Vector2::new(along_mm, across_mm)),

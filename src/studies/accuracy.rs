@@ -45,7 +45,7 @@ impl SetFigures {
         }
         let (bias_mm, rmse_mm) = (errors.mean(), errors.rms());
         let rmse_px = rmse_mm.map(|rmse| rmse / mm_per_px);
-        let (bound_px, free_bound_px) = (set.bound_px(), set.free_bound_px());
+        let (bound_px, free_bound_px) = (set.cramer_rao_px(), set.free_cramer_rao_px());
         let measured = outcomes.iter().flatten().count();
         Self {
             set: set.name,

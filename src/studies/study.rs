@@ -50,7 +50,8 @@ impl Section {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TableRow {
     /// The paper, as [`Publication::name`].
-    pub seed: &'static str,
+    #[serde(rename = "seed")]
+    pub paper: &'static str,
     /// The experiment.
     pub case: String,
     /// The measured quantity.
@@ -69,7 +70,7 @@ pub struct TableRow {
 /// The rows of one paper, collected.
 #[derive(Debug)]
 pub struct TableRows {
-    seed: &'static str,
+    paper: &'static str,
     rows: Vec<TableRow>,
 }
 
@@ -79,7 +80,7 @@ type Quantity = (&'static str, &'static str);
 impl TableRows {
     /// An empty table.
     pub const fn of(paper: Publication) -> Self {
-        Self { seed: paper.name(), rows: Vec::new() }
+        Self { paper: paper.name(), rows: Vec::new() }
     }
 
     /// Adds a row: the published number, the result of the paper's method, and ours.
@@ -89,8 +90,8 @@ impl TableRows {
         (quantity, unit): Quantity,
         [published, simulated, ours]: [Option<f64>; 3],
     ) {
-        let (seed, case) = (self.seed, case.into());
-        self.rows.push(TableRow { seed, case, quantity, unit, published, simulated, ours });
+        let (paper, case) = (self.paper, case.into());
+        self.rows.push(TableRow { paper, case, quantity, unit, published, simulated, ours });
     }
 
     /// Adds a row without a published number.

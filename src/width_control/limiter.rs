@@ -51,7 +51,7 @@ impl SpeedLimits {
     /// The setpoint nearest to a demand within the limits, `dt` after the last one. The
     /// range has priority over the acceleration: a last setpoint outside the range is left
     /// at once.
-    pub fn apply(&self, demand: MmPerS, last: MmPerS, dt: Span) -> LimitedSpeed {
+    pub fn limit_setpoint(&self, demand: MmPerS, last: MmPerS, dt: Span) -> LimitedSpeed {
         let (ranged, range_limit) = if demand < self.min_speed {
             (self.min_speed, SpeedLimit::MinSpeed)
         } else if demand > self.max_speed {
@@ -83,8 +83,11 @@ mod tests {
     };
 
     fn apply(demand: f64, last: f64, dt_s: f64) -> (f64, SpeedLimit) {
-        let limited =
-            LIMITS.apply(MmPerS::constant(demand), MmPerS::constant(last), Span::from_secs(dt_s));
+        let limited = LIMITS.limit_setpoint(
+            MmPerS::constant(demand),
+            MmPerS::constant(last),
+            Span::from_secs(dt_s),
+        );
         (limited.speed.get(), limited.limit)
     }
 

@@ -78,10 +78,11 @@ pub trait ExtruderController {
         Ok(())
     }
 
-    /// Time passes while the last command is kept.
-    fn hold(&mut self, _dt: Span) {}
+    /// `dt` has passed in a supervisor's hold, with the command kept. Models advance, integrators do
+    /// not.
+    fn advance_held(&mut self, _dt: Span) {}
 
-    /// Resumes from a command that was kept for a while. That time is not integrated.
+    /// Resumes after a hold. Integrators leave out its time; models have advanced.
     fn resume(&mut self, _now: Stamp, _applied: f64) {}
 
     /// A start, during which one command was kept, is over: its flow is established.

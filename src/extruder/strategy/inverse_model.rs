@@ -129,12 +129,12 @@ impl ExtruderController for InverseFeedforward {
     }
 
     fn feedforward(&mut self, dt: Span, flow: Mm3PerS) {
-        self.hold(dt);
+        self.advance_held(dt);
         self.track(flow);
     }
 
     // Ticks that were missed are made up for, so that the model follows real time.
-    fn hold(&mut self, dt: Span) {
+    fn advance_held(&mut self, dt: Span) {
         let period_s = self.tracker.period().secs();
         self.backlog_s = (self.backlog_s + dt.secs()).min(MAX_BACKLOG_S);
         while self.backlog_s >= 0.5 * period_s {

@@ -38,10 +38,10 @@ impl ExtruderController for ScrewFill {
     }
 
     fn feedforward(&mut self, dt: Span, _flow: Mm3PerS) {
-        self.hold(dt);
+        self.advance_held(dt);
     }
 
-    fn hold(&mut self, dt: Span) {
+    fn advance_held(&mut self, dt: Span) {
         self.screw_time = self.screw_time + dt.max(Span::ZERO);
     }
 

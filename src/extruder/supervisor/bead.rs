@@ -37,7 +37,7 @@ impl Supervisor {
             Phase::Running if self.ratios.is_some() => {}
             Phase::Running => self.drive(now, dt, flow),
             Phase::Holding { why, .. } => {
-                self.setup.strategy.controller_mut().hold(dt);
+                self.setup.strategy.controller_mut().advance_held(dt);
                 if why == ExtruderHold::BadReading
                     && self.report_usable
                     && self.answer(now) == Some(true)

@@ -120,7 +120,7 @@ impl ExtruderEndpoint {
         command: ExtruderCommand,
         validity: Validity,
     ) -> Result<(), LineRefusal> {
-        self.sequence.check(seq)?;
+        self.sequence.count(seq)?;
         if let Some(code) = self.faults.refuse {
             return Err(LineRefusal::on_purpose(code));
         }

@@ -1,5 +1,5 @@
-//! Checks that a controller makes before it uses a line: that `HELLO` came before it, that no line
-//! was lost, and that the line has not expired.
+//! Checks that a robot or an extruder makes before it uses a line from the PC: that `HELLO` came
+//! before it, that no line was lost, and that the line has not expired.
 
 use super::limits::{MAX_VALID_MS, MIN_VALID_MS};
 use super::refusal::{ErrCode, LineRefusal};
@@ -52,9 +52,10 @@ impl Sequence {
         self.applied
     }
 
-    /// Checks a line's number. After a gap the count continues from the received number, so that
-    /// one lost line costs one refusal and not the connection.
-    pub fn check(&mut self, seq: u64) -> Result<(), LineRefusal> {
+    /// Counts a line. It is refused before `HELLO`, and if its number is not the expected one;
+    /// the count continues from it even then, so that after a lost line one more is refused and
+    /// not all that follow.
+    pub fn count(&mut self, seq: u64) -> Result<(), LineRefusal> {
         if !self.greeted {
             return Err(LineRefusal::new(ErrCode::Form, "HELLO must come first"));
         }

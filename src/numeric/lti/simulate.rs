@@ -59,7 +59,7 @@ impl Sampled {
     }
 }
 
-/// A dead time as whole steps and a remainder \[s\].
+/// A dead time as whole steps and a remainder \[s\]. Fails for a step that is not positive.
 pub(super) fn split(dead_time_s: f64, dt_s: f64) -> Result<(usize, f64), ModelError> {
     if !dt_s.is_finite() || dt_s <= 0.0 {
         return Err(ModelError::NotPositive { what: "the time step", value: dt_s });

@@ -73,7 +73,7 @@ impl Plot<'_> {
             (self.area.clipped(&html! {
                 @for layer in &self.layers { (self.layer(layer, &y)) }
             }))
-            @for layer in &self.layers { (self.label(layer, &y)) }
+            @for layer in &self.layers { (self.level_label(layer, &y)) }
         };
         let label = format!("{} over {}", self.y_title, self.x.title);
         self.area.svg(&label, &inner)
@@ -101,7 +101,8 @@ impl Plot<'_> {
         }
     }
 
-    fn label(&self, layer: &PlotLayer<'_>, y: &AxisScale) -> Markup {
+    /// The text of a level, at the right end above its line.
+    fn level_label(&self, layer: &PlotLayer<'_>, y: &AxisScale) -> Markup {
         let PlotLayer::Level(value, _, text) = layer else { return html! {} };
         let at = round(y.position(*value)) - 4.0;
         html! {

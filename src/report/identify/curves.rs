@@ -18,7 +18,7 @@ const POINTS: u32 = 400;
 /// Half width of a band \[standard deviations\]. Derived: P(|z| < 2) is 95 % for a normal deviate.
 const WIDE: f64 = 2.0;
 /// Colour of residuals.
-const LEFT: Ink = DEMAND;
+const RESIDUAL: Ink = DEMAND;
 
 /// Colour of a quantity, by its unit.
 fn ink(unit: Unit) -> Ink {
@@ -59,11 +59,11 @@ pub fn over_time(study: &ModelStudy, data: &Experiment, predicted: &[f64]) -> Ma
 /// Residuals of the model on its own data.
 pub fn residuals(study: &ModelStudy) -> Markup {
     let data = &study.logs.estimation;
-    let left = series(times(data), study.fit.residuals.iter().copied());
+    let residuals = series(times(data), study.fit.residuals.iter().copied());
     let title = format!("measured − model [{}]", study.logs.output.unit);
     let axis = XAxis::time(ValueRange::new(data.start_s, data.start_s + data.duration_s()));
-    let layers = vec![PlotLayer::Data(&left, LEFT), PlotLayer::Level(0.0, TARGET, "")];
-    wide_plot(&axis, &title, 170.0, y_range(&[&left], &[0.0]), layers)
+    let layers = vec![PlotLayer::Data(&residuals, RESIDUAL), PlotLayer::Level(0.0, TARGET, "")];
+    wide_plot(&axis, &title, 170.0, y_range(&[&residuals], &[0.0]), layers)
 }
 
 /// Autocorrelation of the residuals from lag 1 on. At lag 0 it is always 1, on a scale at which
@@ -82,7 +82,7 @@ pub fn autocorrelation(study: &ModelStudy) -> Markup {
     let layers = vec![
         PlotLayer::Level(bound, TARGET, "99 % of white noise"),
         PlotLayer::Level(-bound, TARGET, ""),
-        PlotLayer::Curve(&curve, LEFT),
+        PlotLayer::Curve(&curve, RESIDUAL),
     ];
     let y_range = y_range(&[&curve], &[-2.0 * bound, 2.0 * bound]);
     wide_plot(&axis, "autocorrelation of the residuals", 210.0, y_range, layers)
@@ -108,13 +108,15 @@ pub fn step(study: &ModelStudy) -> Markup {
 }
 
 fn edges(band: &Band) -> [PlotCurve; 3] {
-    [-WIDE, 0.0, WIDE].map(|times| {
-        let values = band.value.iter().zip(&band.sigma).map(|(value, sigma)| value + times * sigma);
+    [-WIDE, 0.0, WIDE].map(|factor| {
+        let values =
+            band.value.iter().zip(&band.sigma).map(|(value, sigma)| value + factor * sigma);
         series(band.at.iter().copied(), values)
     })
 }
 
-/// Gain and phase over frequency.
+/// Gain and phase over frequency, with their uncertainty bands; nothing where the response cannot
+/// be computed.
 pub fn bode(study: &ModelStudy) -> Markup {
     let Ok([gain, phase]) = band::frequency_response(&study.fit, &frequencies(study)) else {
         return html! {};
@@ -151,10 +153,10 @@ fn over_frequency(band: &Band, title: &str) -> Markup {
         range.unwrap_or(ValueRange::new(0.0, 1.0)).with_margin(0.06),
         area.upwards(),
     );
-    let path = |times: f64, back: bool| -> String {
+    let path = |factor: f64, back: bool| -> String {
         let points = band.at.iter().zip(&band.value).zip(&band.sigma);
         let points = points.map(|((f, value), sigma)| {
-            format!("{} {}", round(x.position(*f)), round(y.position(value + times * sigma)))
+            format!("{} {}", round(x.position(*f)), round(y.position(value + factor * sigma)))
         });
         let mut points: Vec<String> = points.collect();
         if back {

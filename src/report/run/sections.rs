@@ -223,7 +223,7 @@ pub fn image_quality(report: &RunReport<'_>) -> Markup {
 
 /// Advice about light and lens.
 fn advice(summary: &Summary) -> Markup {
-    let bound = advice::row_bound_px(&summary.image_quality);
+    let bound = advice::row_cramer_rao_px(&summary.image_quality);
     html! {
         @if !summary.advice.is_empty() {
             ul.advice { @for sentence in &summary.advice { li { (sentence) } } }

@@ -57,7 +57,7 @@ pub fn advice(hints: &ImageQuality) -> Vec<String> {
 }
 
 /// Cramér–Rao bound of an edge's position in one row \[px\]: standard deviation.
-pub fn row_bound_px(hints: &ImageQuality) -> Option<f64> {
+pub fn row_cramer_rao_px(hints: &ImageQuality) -> Option<f64> {
     let (contrast, noise) = (hints.contrast_median_grey?, hints.noise_median_grey?);
     let blur = hints.blur_median_px?;
     let root = (2.0 * std::f64::consts::PI.sqrt()).sqrt();
@@ -224,14 +224,14 @@ mod tests {
             skew_offset_sigma_px: None,
         };
         begins(&nothing, &[]);
-        assert_eq!(row_bound_px(&nothing), None);
+        assert_eq!(row_cramer_rao_px(&nothing), None);
         // The 2022 paper's method reports neither contrast nor noise.
         begins(&hints(0.0, 0.0, 0.0, 0.0, 1.0), &[]);
     }
 
     #[test]
     fn a_row_has_the_bound_of_the_documentation() {
-        let bound = row_bound_px(&hints(80.0, 4.0, 1.5, 0.0, 1.0)).unwrap();
+        let bound = row_cramer_rao_px(&hints(80.0, 4.0, 1.5, 0.0, 1.0)).unwrap();
         assert!((bound - 1.883 * 4.0 / 80.0 * 1.5f64.sqrt()).abs() < 1e-4, "{bound}");
     }
 

@@ -25,11 +25,11 @@ pub struct SetFigures {
     pub bias_px: Option<f64>,
     /// Root of the mean square of the error \[px\].
     pub rmse_px: Option<f64>,
-    /// Cramér–Rao bound of the standard deviation with a known direction \[px\], `Set::bound_px`.
+    /// Cramér–Rao bound of the standard deviation with a known direction \[px\], `Set::cramer_rao_px`.
     pub bound_px: f64,
     /// RMSE over [`Self::bound_px`].
     pub rmse_over_bound: Option<f64>,
-    /// Cramér–Rao bound with the direction from the same edges \[px\], `Set::free_bound_px`.
+    /// Cramér–Rao bound with the direction from the same edges \[px\], `Set::free_cramer_rao_px`.
     pub free_bound_px: f64,
     /// RMSE over [`Self::free_bound_px`].
     pub rmse_over_free_bound: Option<f64>,

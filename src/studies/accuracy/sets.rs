@@ -54,7 +54,7 @@ impl Set {
     /// ```text
     /// var = 2·cos² t·e²/N,   e² = 2√π·(σ/A)²·s/cos t
     /// ```
-    pub fn bound_px(&self) -> f64 {
+    pub fn cramer_rao_px(&self) -> f64 {
         let cos = libm::cos(self.image.slant_deg.to_radians());
         (2.0 * cos * cos * self.row_variance() / f64::from(self.rows)).sqrt()
     }
@@ -73,12 +73,12 @@ impl Set {
     ///
     /// That is 1 + 3·(w·sin t/N)² times the variance with a known direction, and
     /// the same for a bead along the gauge.
-    pub fn free_bound_px(&self) -> f64 {
+    pub fn free_cramer_rao_px(&self) -> f64 {
         let (sin, cos) = libm::sincos(self.image.slant_deg.to_radians());
         let rows = f64::from(self.rows);
         let lever = self.width_mm / MM_PER_PX * sin / cos;
         let direction = cos.powi(4) * 6.0 * self.row_variance() / rows.powi(3);
-        (self.bound_px().powi(2) + lever * lever * direction).sqrt()
+        (self.cramer_rao_px().powi(2) + lever * lever * direction).sqrt()
     }
 
     /// Smallest variance e² of an edge's position along a row \[px²\].
@@ -136,11 +136,11 @@ mod tests {
     #[test]
     fn the_bound_of_a_plain_set_is_that_of_two_edges() {
         for name in ["blur-1.5", "horizontal", "dark-bead"] {
-            let bound = set(name).bound_px();
+            let bound = set(name).cramer_rao_px();
             assert!(
                 (bound / (1.8827 * 0.05 * 1.5_f64.sqrt() * 0.02_f64.sqrt()) - 1.0).abs() < 1e-4
             );
-            assert_eq!(set(name).free_bound_px(), bound);
+            assert_eq!(set(name).free_cramer_rao_px(), bound);
         }
     }
 
@@ -162,7 +162,7 @@ mod tests {
         // Derivatives of (right − left)·cos(atan m) with respect to left, right and m.
         let by = nalgebra::Vector3::new(-cos, cos, -chord * sin * cos * cos);
         let bound = (by.transpose() * information.try_inverse().unwrap() * by)[0].sqrt();
-        assert!((set.free_bound_px() / bound - 1.0).abs() < 1e-3, "{bound}");
-        assert!(set.free_bound_px() > 1.05 * set.bound_px());
+        assert!((set.free_cramer_rao_px() / bound - 1.0).abs() < 1e-3, "{bound}");
+        assert!(set.free_cramer_rao_px() > 1.05 * set.cramer_rao_px());
     }
 }

@@ -132,9 +132,10 @@ impl Experiments {
         Ok(Section::new("Stand-off", hint, draw::stand_off(&curve)))
     }
 
+    /// Both measuring methods on two layers, of which no paper gives numbers.
     fn stack(&mut self) -> Result<(), ReproduceError> {
         let [theirs, ours] = self.by_method(|cell| paper::stack(cell, &self.run, ASIDE_MM))?;
-        let case = format!("two layers of 38 mm, truly {ASIDE_MM} mm apart");
+        let case = format!("two layers of 38 mm, the upper one {ASIDE_MM} mm aside");
         self.rows.compare(&case, ("lateral offset", "mm"), theirs.offset_mm, ours.offset_mm);
         let names = ["mean width error, layer 1", "mean width error, layer 2"];
         for (which, name) in names.into_iter().enumerate() {

@@ -112,8 +112,8 @@ mod tests {
     use super::*;
 
     fn row(published: Option<f64>, simulated: Option<f64>) -> TableRow {
-        let (seed, case, quantity) = ("ma2026", "step".to_owned(), "overshoot");
-        TableRow { seed, case, quantity, unit: "%", published, simulated, ours: None }
+        let (paper, case, quantity) = ("ma2026", "step".to_owned(), "overshoot");
+        TableRow { paper, case, quantity, unit: "%", published, simulated, ours: None }
     }
 
     #[test]

@@ -90,7 +90,7 @@ mod tests {
     fn columns_are_as_wide_as_what_stands_in_them() {
         let quantity = "a quantity with a name of some length";
         let row = |case: &str, quantity| TableRow {
-            seed: "ma2026",
+            paper: "ma2026",
             case: case.into(),
             quantity,
             unit: "mm",

@@ -27,7 +27,7 @@ impl VirtualRobot {
 
     /// A stop is obeyed even if its sequence number is wrong; the refusal is still sent to the PC.
     fn take_stop(&mut self, seq: u64) -> Result<(), LineRefusal> {
-        let counted = self.sequence.check(seq);
+        let counted = self.sequence.count(seq);
         if counted.is_ok() {
             self.sequence.apply(seq);
         }
@@ -44,7 +44,7 @@ impl VirtualRobot {
         speed: MmPerS,
         validity: Validity,
     ) -> Result<(), LineRefusal> {
-        self.sequence.check(seq)?;
+        self.sequence.count(seq)?;
         if let Some(code) = self.faults.refuse {
             return Err(LineRefusal::on_purpose(code));
         }

@@ -53,9 +53,9 @@ impl WidthProfile {
 }
 
 impl CornerRun {
-    /// Simulates a run with a speed profile and a voltage over time \[s\]. The voltage is held
-    /// from one command to the next and limited like the drive's. At the start the extruder is
-    /// settled at the first voltage.
+    /// Simulates the flow of a run with a speed profile and a voltage \[V\] over time \[s\]. The
+    /// voltage is held from one command to the next; its range and rate are the drive's. The first
+    /// voltage, at which the extruder is settled, is not limited.
     pub fn new(
         scenario: &Scenario,
         speed: &SpeedProfile,
