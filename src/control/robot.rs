@@ -136,7 +136,8 @@ impl Controller {
         self.width.begin_bead();
     }
 
-    /// Continues when the reason for a hold has gone: primes again, or waits for a width.
+    /// Leaves a hold whose reason with the robot or the extruder has gone: primes while the first
+    /// part of the bead is laid, then waits for a width. A lost camera keeps the hold.
     pub(super) fn resume(&mut self, now: Stamp, state: &RobotState) {
         let Some(bead) = self.phase.bead_mut() else { return };
         bead.mode = if self.camera_lost {

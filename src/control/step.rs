@@ -52,11 +52,11 @@ pub enum Hold {
     /// The extruder has not reported for longer than a command is valid: its pump stands. The
     /// extruder side ends it with a fault.
     ExtruderSilent,
-    /// The robot's limits are narrower than the cell's.
+    /// The robot's limits are narrower than the cell's. Left only by a new run.
     RobotLimits,
     /// An event or a step could not be recorded. Left only by a new run.
     RecordingLost,
-    /// The camera gives no more frames. Left only by a new run.
+    /// The camera gives no more frames: no width ends it. A live run ends after it.
     CameraLost,
     /// The run is being ended. Left only by a new run.
     Stopping,

@@ -90,7 +90,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     }
 
     /// Handles the remaining messages of the camera, so that every frame in the recording has its
-    /// event.
+    /// event and its row.
     pub fn take_rest(&mut self, seen: &Receiver<CameraMessage>) {
         for seen in seen.try_iter() {
             match seen {

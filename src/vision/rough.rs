@@ -99,7 +99,7 @@ pub struct RoughEdge {
     /// Positions in the last frame, one a caliper line.
     pub lines: Vec<Option<CaliperEdge>>,
     /// Variance of the mean profile \[grey levels²\].
-    variance: f64,
+    profile_variance: f64,
     /// Shape of the mean profile.
     shape: Option<GrooveShape>,
 }
@@ -148,7 +148,8 @@ impl RoughEdge {
         located::mean_position(&self.lines)
     }
 
-    /// Finds the edge near a line; `None` where no edge runs there.
+    /// Finds where the edge runs near a line, and the shape of its mean profile; [`Self::locate`]
+    /// gives its positions. `None` where no edge runs there.
     #[inline(always)]
     pub fn find<T: GreyPixel>(&mut self, scene: &RoughInput<'_, T>, line: &StepLine) -> Option<()> {
         self.windows.read(scene, line);
@@ -162,7 +163,7 @@ impl RoughEdge {
             }
             self.route.follow(&self.crossings.at)?;
         }
-        self.variance = position_noise::of_profile(&self.levels)?;
+        self.profile_variance = position_noise::profile_variance(&self.levels)?;
         self.shape = self.fit_shape(PRIOR_BLUR, scene, None);
         Some(())
     }
@@ -267,7 +268,7 @@ impl RoughEdge {
     ) -> Option<GrooveShape> {
         let known = groove::GroovePrior {
             table: scene.table,
-            variance: self.variance,
+            variance: self.profile_variance,
             blur,
             edge: scene.edge,
             roughness: position_noise::roughness(&self.crossings),

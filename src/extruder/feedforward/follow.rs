@@ -52,7 +52,8 @@ struct FlowHistory {
 
 impl SpeedFeedforward {
     /// From a forecast, an observer of the unmodelled flow, and the axis' inverse with a demand in
-    /// mm/s. All of them on a grid of `period`; measurements older than `memory` are ignored.
+    /// mm/s. All of them on a grid of `period`. The history spans `memory` back from the newest
+    /// forecast, which is [`FlowForecast::ahead_s`] from now; measurements before it are ignored.
     pub fn new(
         forecast: FlowForecast,
         observer: Option<FlowObserver>,
@@ -79,8 +80,8 @@ impl SpeedFeedforward {
         self.axis.start(flow.get() / area.get(), applied)
     }
 
-    /// Compares a measurement with the model at that time. Returns `false` for one that is older
-    /// than the history or in the future, which is ignored.
+    /// Compares a measurement with the model at that time. Returns `false`, and ignores it, without
+    /// an observer, before the first step, and for a time that the history does not span.
     pub fn measure(&mut self, seen: &FlowMeasurement) -> bool {
         let (Some(observer), Some(then)) = (&mut self.observer, self.history.at(seen.at)) else {
             return false;

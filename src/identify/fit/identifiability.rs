@@ -24,7 +24,7 @@ pub(super) fn undetermined(
     named: &NamedParameters,
     turn: &DMatrix<f64>,
 ) -> Option<Undetermined> {
-    let last = problem.layout().poles_from + problem.poles - 1;
+    let last = problem.layout().denominator_from + problem.poles - 1;
     let sigma = spread.correlated[(last, last)].max(0.0).sqrt();
     if sigma.is_nan() || MIN_SIGMAS * sigma >= theta[last].abs() {
         let (poles, coefficient) = (problem.poles, theta[last]);

@@ -35,7 +35,8 @@ pub(super) struct FitProblem {
 
 /// Indices of the parameters.
 pub(super) struct ParameterLayout {
-    pub poles_from: usize,
+    /// The first coefficient of the denominator; those of the numerator come before it.
+    pub denominator_from: usize,
     pub dead_time: Option<usize>,
     pub level: Option<usize>,
     pub free_from: usize,
@@ -74,9 +75,10 @@ impl FitProblem {
         Self { input, output, dt_s: n * self.dt_s, ..self.clone() }
     }
 
+    /// Where each parameter stands.
     pub fn layout(&self) -> ParameterLayout {
-        let poles_from = self.zeros + 1;
-        let mut total = poles_from + self.poles;
+        let denominator_from = self.zeros + 1;
+        let mut total = denominator_from + self.poles;
         let mut next = |is: bool| {
             total += usize::from(is);
             is.then(|| total - 1)
@@ -85,7 +87,7 @@ impl FitProblem {
         let level = next(self.level == OutputLevel::Estimated);
         let free_from = total;
         total += if self.has_free_response { self.poles } else { 0 };
-        ParameterLayout { poles_from, dead_time, level, free_from, total }
+        ParameterLayout { denominator_from, dead_time, level, free_from, total }
     }
 
     pub fn duration_s(&self) -> f64 {
@@ -173,7 +175,7 @@ impl FitProblem {
         let tiny = f64::MIN_POSITIVE;
         let mut time = 0.0_f64;
         for i in 1..=self.poles {
-            let alpha = theta[layout.poles_from + i - 1].abs();
+            let alpha = theta[layout.denominator_from + i - 1].abs();
             time = time.max(libm::pow(alpha, 1.0 / to_f64(i)));
         }
         let time = time.max(self.dt_s);
@@ -221,7 +223,7 @@ impl LeastSquares for FitProblem {
         {
             return [min_s, max_s];
         }
-        let last_pole = layout.poles_from + self.poles - 1;
+        let last_pole = layout.denominator_from + self.poles - 1;
         if number == last_pole {
             let before = if self.poles == 1 { 1.0 } else { theta[last_pole - 1].abs() };
             return [before * self.dt_s / MAX_POLE_RATE_PER_STEP, f64::MAX];

@@ -45,7 +45,7 @@ fn descend(problem: &FitProblem, start: &Minimum, max_steps: usize) -> Option<Mi
     minimise(problem, &start.theta, descent)
 }
 
-/// The few models that are followed further.
+/// The few models from which the last descent begins, after a short one of the best candidates.
 fn search(problem: &FitProblem) -> Vec<Minimum> {
     let mut starts = candidates(problem);
     starts.sort_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
@@ -82,7 +82,7 @@ fn with_linear_part(problem: &FitProblem, den: &[f64], dead_time_s: f64) -> Opti
     let mut theta = vec![0.0; layout.total];
     let last = den.last().copied()?;
     for (i, c) in den.iter().rev().skip(1).enumerate() {
-        theta[layout.poles_from + i] = c / last;
+        theta[layout.denominator_from + i] = c / last;
     }
     if let Some(position) = layout.dead_time {
         theta[position] = dead_time_s;

@@ -198,7 +198,9 @@ fn a_drift_beside_the_result_is_reported() {
     let found =
         study(logs(drifting, None), &[settings(Structure::SecondOrderOscillating { zero: false })]);
     let warnings = found.unwrap().warnings;
-    for words in ["the output drifts up by", "once a straight line in time is taken off"] {
+    for words in
+        ["the output less the model drifts up by", "once a straight line in time is taken off"]
+    {
         assert!(warnings.iter().any(|warning| warning.contains(words)), "{warnings:?}");
     }
 }

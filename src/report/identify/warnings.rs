@@ -98,7 +98,7 @@ impl ModelStudy {
 /// Warning of a linear drift in the residuals.
 fn of_drift(fit: &Fit, logs: &Logs) -> Option<String> {
     let line = Trend::significant_in(&fit.residuals)?;
-    Some(drifting(logs, &line, "the residuals"))
+    Some(drift_sentence(logs, &line, "the output less the model", "the residuals"))
 }
 
 /// Warning of an output that a linear drift dominates, while the input has none.
@@ -106,13 +106,15 @@ pub(super) fn output_drift(logs: &Logs) -> Option<String> {
     let Experiment { input, output, .. } = &logs.estimation;
     let line =
         Trend::significant_in(output).filter(|line| line.explained_fraction > DOMINANT_FRACTION)?;
-    (Trend::of(input).explained_fraction < DOMINANT_FRACTION).then(|| drifting(logs, &line, "it"))
+    (Trend::of(input).explained_fraction < DOMINANT_FRACTION)
+        .then(|| drift_sentence(logs, &line, "the output", "it"))
 }
 
-fn drifting(logs: &Logs, line: &Trend, whose: &str) -> String {
+/// Says how a series drifts and how much of it, or of what else, a straight line explains.
+fn drift_sentence(logs: &Logs, line: &Trend, series: &str, explained: &str) -> String {
     format!(
-        "the output drifts {} by {} {} over {:.1} s, whatever the input does: a straight line in time \
-         explains {:.0} % of {whose}. Hold temperature and feed steady, use a part without the drift \
+        "{series} drifts {} by {} {} over {:.1} s, whatever the input does: a straight line in time \
+         explains {:.0} % of {explained}. Hold temperature and feed steady, use a part without the drift \
          (--from-s, --to-s), or take the line out of the log",
         if line.rise > 0.0 { "up" } else { "down" },
         three_digits(line.rise.abs()),

@@ -73,7 +73,7 @@ impl DistanceTally {
         self.last = Some(trace);
     }
 
-    /// The summary; `None` without a distance controller.
+    /// The summary; `None` where no width has reached a distance controller.
     pub fn finish(&self) -> Option<DistanceSummary> {
         let last = self.last?;
         let [taken, outliers, changes, not_paired] = self.counts;

@@ -80,7 +80,7 @@ pub fn of_mean<T: GreyPixel>(
 
 /// Variance of the mean profile for each pixel across \[grey levels²\]: noise and
 /// texture of the bead, and of the ground where it is more, their correlation included.
-pub fn of_profile(levels: &EdgeLevels) -> Option<f64> {
+pub fn profile_variance(levels: &EdgeLevels) -> Option<f64> {
     let mean = levels.mean.as_ref()?;
     let summed = f64::from(SUMMED_INSIDE_PX);
     let inside = SideSegment { positions: mean.inside, summed };
