@@ -6,7 +6,9 @@
 
 use divan::Bencher;
 use truebead::core::{Mm, MmPerS, Span, Stamp};
-use truebead::width_control::distance::{DistanceController, DistanceSettings, WidthReading};
+use truebead::width_control::distance::{
+    BeadRoughness, DistanceController, DistanceSettings, WidthReading,
+};
 
 const FRAME_S: f64 = 0.02;
 
@@ -25,7 +27,9 @@ impl Under {
             reference_speed: MmPerS::constant(112.5),
             exponent: 0.25,
             learns_exponent: true,
-            drift_per_root_m: 0.0055,
+            drift_per_root_m: 0.002,
+            roughness: BeadRoughness { ratio: 0.0025, length_mm: 5.0 },
+            cancels_pulsation: true,
         });
         let mut under = Self { law, count: 0 };
         for _ in 0..1500 {

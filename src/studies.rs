@@ -3,6 +3,7 @@
 pub mod accuracy;
 pub mod barjuei2022;
 pub mod bcs_thesis;
+pub mod control;
 pub mod diagne2015;
 pub mod error;
 pub mod looey2026;

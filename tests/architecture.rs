@@ -18,7 +18,7 @@ const ROOMS: [(&str, &[&str]); 27] = [
     ("bridge", &["core"]),
     ("calibration", &["core", "numeric", "document", "bridge"]),
     ("vision", &["core", "numeric", "bridge", "calibration"]),
-    ("width_control", &["core", "document"]),
+    ("width_control", &["core", "numeric", "document"]),
     ("identify", &["core", "numeric", "document"]),
     ("extruder", &["core", "numeric", "document", "identify"]),
     ("plan", &["core", "numeric", "document", "extruder"]),

@@ -32,6 +32,7 @@ impl Cell {
             camera_offset_sigma: run.camera.offset_sigma,
             gauge_length: self.gauge_length(calibration),
             setpoint_period: Span::from_secs(1.0 / run.robot.rate_hz),
+            bead_noise: self.bead_noise,
         }
     }
 

@@ -19,7 +19,7 @@ use crate::document::{Document, Problems, Table};
 use crate::scenario::table::{self, Simulation, WidthSource};
 use crate::vision::Gauge;
 use crate::width_control::limiter::SpeedLimits;
-use crate::width_control::strategy::WidthControlSettings;
+use crate::width_control::strategy::{BeadNoise, WidthControlSettings};
 use crate::width_control::target::WidthTarget;
 
 pub use super::extruder::ExtruderPart;
@@ -64,6 +64,8 @@ pub struct Cell {
     pub frame_rate_hz: Option<f64>,
     /// How the camera is mounted, if the file says so.
     pub mount: Option<Mount>,
+    /// How rough the bead is.
+    pub bead_noise: BeadNoise,
     /// Which frames are kept, and how many rejected ones are acceptable.
     pub recording: RecordingSettings,
     /// What a run needs beyond measuring; complete when read for a run.
@@ -179,6 +181,7 @@ fn read_cell(root: &Table<'_>, folder: &Path, drivers: &mut dyn DriverTables) ->
     let channel = gauge_table.as_ref().and_then(read_channel);
     let bit_depth = gauge_table.as_ref().and_then(|t| t.optional_integer("bit_depth", 8..=16));
     let recording = read_recording(root.table("recording").as_ref());
+    let bead_noise = read_bead_noise(root);
     let control_table = root.run_table("control");
     let width = control_table.as_ref().and_then(control::read_target);
     let layers = root.table("layers");
@@ -226,8 +229,19 @@ fn read_cell(root: &Table<'_>, folder: &Path, drivers: &mut dyn DriverTables) ->
         frame_rate_hz,
         mount,
         recording: recording?,
+        bead_noise: bead_noise?,
         run,
         simulation: simulation?,
+    })
+}
+
+fn read_bead_noise(root: &Table<'_>) -> Option<BeadNoise> {
+    let table = root.table_or_empty("bead_noise")?;
+    let roughness = table.optional_number("roughness_mm", 0.0..=10.0);
+    let length = table.number_or("roughness_length_mm", 0.1..=1e3, 5.0);
+    Some(BeadNoise {
+        roughness: roughness.and_then(|mm| Mm::new(mm).ok()),
+        length: Mm::new(length?).ok()?,
     })
 }
 

@@ -1,6 +1,7 @@
 //! `truebead lab`: how well it measures and controls.
 
 mod accuracy;
+mod control;
 mod render;
 mod reproduce;
 
@@ -15,6 +16,7 @@ use super::print::Verbosity;
 pub enum LabGroup {
     Reproduce(reproduce::ReproduceArgs),
     Accuracy(accuracy::AccuracyArgs),
+    Control(control::ControlArgs),
     Render(render::RenderArgs),
 }
 
@@ -23,6 +25,7 @@ pub fn run(command: &LabGroup, voice: Verbosity) -> anyhow::Result<ExitCode> {
     match command {
         LabGroup::Reproduce(args) => reproduce::run(args, voice),
         LabGroup::Accuracy(args) => accuracy::run(args, voice),
+        LabGroup::Control(args) => control::run(args, voice),
         LabGroup::Render(args) => render::run(args, voice).map(|()| ExitCode::SUCCESS),
     }
 }

@@ -14,7 +14,7 @@ use crate::width_control::limiter::{SpeedLimit, SpeedLimits};
 use crate::width_control::pi::PiGains;
 use crate::width_control::strategy::constant::ConstantStrategy;
 use crate::width_control::strategy::pi::PiStrategy;
-use crate::width_control::strategy::{CellParameters, WidthControlSettings};
+use crate::width_control::strategy::{BeadNoise, CellParameters, WidthControlSettings};
 use crate::width_control::target::WidthTarget;
 use std::sync::Arc;
 
@@ -40,6 +40,7 @@ pub fn setup() -> Setup {
             camera_offset_sigma: Mm::constant(8.84),
             gauge_length: Mm::constant(12.7),
             setpoint_period: Span::from_millis(200),
+            bead_noise: BeadNoise { roughness: None, length: Mm::constant(5.0) },
             width_range: WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
         },
         bead_length: None,

@@ -7,7 +7,9 @@ use std::f64::consts::TAU;
 pub struct Flow {
     /// Path length at which the flow steps \[mm\].
     pub step_at_mm: f64,
-    /// Flow after the step, relative to the nominal flow.
+    /// Path length at which the flow is the nominal one again \[mm\].
+    pub step_until_mm: f64,
+    /// Flow between the two, relative to the nominal flow.
     pub step_ratio: f64,
     /// Amplitude of a sine along the path, relative to the nominal flow.
     pub wave_amplitude: f64,
@@ -25,6 +27,7 @@ impl Flow {
     /// A flow without disturbances.
     pub const STEADY: Self = Self {
         step_at_mm: 0.0,
+        step_until_mm: f64::INFINITY,
         step_ratio: 1.0,
         wave_amplitude: 0.0,
         wavelength_mm: 1000.0,
@@ -40,7 +43,8 @@ impl Flow {
 
     /// Flow at a path length without the pulsation, relative to the nominal flow.
     pub fn ratio_at(&self, path_mm: f64) -> f64 {
-        let step = if path_mm >= self.step_at_mm { self.step_ratio } else { 1.0 };
+        let is_stepped = (self.step_at_mm..self.step_until_mm).contains(&path_mm);
+        let step = if is_stepped { self.step_ratio } else { 1.0 };
         step * (1.0 + self.wave_amplitude * (TAU * path_mm / self.wavelength_mm).sin())
     }
 }
@@ -53,6 +57,7 @@ mod tests {
     fn a_step_and_a_wave_multiply() {
         let flow = Flow {
             step_at_mm: 100.0,
+            step_until_mm: 200.0,
             step_ratio: 0.92,
             wave_amplitude: 0.1,
             wavelength_mm: 400.0,
@@ -64,5 +69,6 @@ mod tests {
         assert!((flow.pulse_at(0.5, 0.5) - 0.8).abs() < 1e-12);
         assert_eq!(flow.ratio_at(0.0), 1.0);
         assert!((flow.ratio_at(100.0) - 0.92 * 1.1).abs() < 1e-12);
+        assert!((flow.ratio_at(500.0) - 1.1).abs() < 1e-12);
     }
 }

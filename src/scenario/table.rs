@@ -149,6 +149,7 @@ fn read_bead(keys: &Keys<'_>) -> BeadModel {
 fn read_flow(keys: &Keys<'_>) -> Flow {
     Flow {
         step_at_mm: keys.number("flow_step_at_mm", 0.0..=1e7, 0.0),
+        step_until_mm: keys.number("flow_step_until_mm", 0.0..=1e7, 1e7),
         step_ratio: keys.number("flow_step_ratio", 0.05..=10.0, 1.0),
         wave_amplitude: keys.number("flow_wave_amplitude", 0.0..=0.9, 0.0),
         wavelength_mm: keys.number("flow_wavelength_mm", 1.0..=1e6, 1000.0),

@@ -54,6 +54,8 @@ struct Strip {
 struct Node {
     left_mm: f64,
     right_mm: f64,
+    /// Width without roughness.
+    smooth_mm: f64,
     /// Integral of the width from the strip's first node \[mm²\].
     area_mm2: f64,
 }
@@ -100,9 +102,8 @@ impl LaidBead {
         while strip.next_number() <= last {
             #[expect(clippy::cast_precision_loss, reason = "node numbers stay below 2^53")]
             let path_mm = strip.next_number() as f64 * *step_mm;
-            let half = 0.5 * width * flow.ratio_at(path_mm) * drift.at(path_mm);
-            let [left, right] = waviness.at(path_mm);
-            strip.push(left - half, right + half, *step_mm);
+            let smooth_mm = width * flow.ratio_at(path_mm) * drift.at(path_mm);
+            strip.push(smooth_mm, waviness.at(path_mm), *step_mm);
         }
     }
 
@@ -133,6 +134,12 @@ impl LaidBead {
     /// Width at a path length \[mm\]; `None` where nothing has been laid.
     pub fn width_at(&self, path_mm: f64) -> Option<f64> {
         self.edges_at(path_mm).map(|(left, right)| right - left)
+    }
+
+    /// Width without roughness at a path length \[mm\]; `None` where nothing has been laid.
+    pub fn smooth_width_at(&self, path_mm: f64) -> Option<f64> {
+        let (node, next, fraction) = self.strip_at(path_mm)?.cell(path_mm, self.step_mm)?;
+        Some(node.smooth_mm + (next.smooth_mm - node.smooth_mm) * fraction)
     }
 
     /// Offsets of the left and the right edge from the path \[mm\], positive
@@ -181,13 +188,15 @@ impl Strip {
         }
     }
 
-    /// Adds a node; the width is never negative.
-    fn push(&mut self, left_mm: f64, right_mm: f64, step_mm: f64) {
-        let right_mm = right_mm.max(left_mm);
+    /// Adds a node with a width and the deviations of its left and right edge; the width is
+    /// never negative.
+    fn push(&mut self, smooth_mm: f64, [left, right]: [f64; 2], step_mm: f64) {
+        let left_mm = left - 0.5 * smooth_mm;
+        let right_mm = (right + 0.5 * smooth_mm).max(left_mm);
         let area_mm2 = self.nodes.last().map_or(0.0, |before| {
             before.area_mm2 + step_mm * 0.5 * (before.width_mm() + right_mm - left_mm)
         });
-        self.nodes.push(Node { left_mm, right_mm, area_mm2 });
+        self.nodes.push(Node { left_mm, right_mm, smooth_mm, area_mm2 });
     }
 
     /// The nodes before and after a position, and the fraction of the way between them.

@@ -8,6 +8,7 @@ use crate::run::runner::NoRecorder;
 
 use super::score::{BeadPoint, LayerScore};
 use crate::numeric::average::{mean, rms};
+use crate::numeric::number::to_count;
 use crate::sim::cell::{FrameObservation, Observer, SimCell, SimCellError};
 
 /// Distance between positions at which the bead is judged \[mm\]: that of the bead's own grid.
@@ -20,6 +21,8 @@ pub struct LayerTrial {
     pub score: LayerScore,
     /// True width of the bead, every half millimetre.
     pub bead: Vec<BeadPoint>,
+    /// Its width without roughness at the same positions.
+    pub smooth: Vec<BeadPoint>,
     /// Path of the nozzle when the first controlled setpoint was sent \[mm\]; infinite if none was
     /// sent.
     pub control_start_mm: f64,
@@ -54,27 +57,52 @@ impl LayerTrial {
         let score = LayerScore::new(target_mm);
         let mut watch = StartObserver { score, newest: None, control_start_mm: None };
         let end = sim.layer(Mm::ZERO, &mut watch);
-        let mut bead = Vec::new();
+        let (mut bead, mut smooth) = (Vec::new(), Vec::new());
         let mut at = 0.0;
         while at < cell.simulation.path.get() {
             bead.extend(sim.bead().width_at(at).map(|width| (at, width)));
+            smooth.extend(sim.bead().smooth_width_at(at).map(|width| (at, width)));
             at += BEAD_SPACING_MM;
         }
         let control_start_mm = watch.control_start_mm.unwrap_or(f64::INFINITY);
         let (score, complete) = (watch.score, end.complete);
-        Ok(Self { score, bead, control_start_mm, complete, target_mm })
+        Ok(Self { score, bead, smooth, control_start_mm, complete, target_mm })
     }
 
     /// Path from a position until the bead stays within a band about the target \[mm\]; infinite
     /// if it never does, or if there is no bead.
     pub fn settles_within(&self, from_mm: f64, band_mm: f64) -> f64 {
+        self.settles(&self.bead, from_mm, band_mm)
+    }
+
+    /// As [`Self::settles_within`], for the width without roughness of the bead up to a position.
+    pub fn smooth_settles_within(&self, from_mm: f64, to_mm: f64, band_mm: f64) -> f64 {
+        let end = self.smooth.partition_point(|(at, _)| *at < to_mm);
+        self.settles(&self.smooth[..end], from_mm, band_mm)
+    }
+
+    fn settles(&self, points: &[BeadPoint], from_mm: f64, band_mm: f64) -> f64 {
         let outside =
             |(at, width): &BeadPoint| *at >= from_mm && (width - self.target_mm).abs() > band_mm;
-        match self.bead.iter().rposition(outside) {
-            None if self.errors(from_mm).next().is_none() => f64::INFINITY,
+        match points.iter().rposition(outside) {
+            None if points.last().is_none_or(|(at, _)| *at < from_mm) => f64::INFINITY,
             None => 0.0,
-            Some(last) => self.bead.get(last + 1).map_or(f64::INFINITY, |(at, _)| at - from_mm),
+            Some(last) => points.get(last + 1).map_or(f64::INFINITY, |(at, _)| at - from_mm),
         }
+    }
+
+    /// Mean square error of the mean width over pieces of a length, from a position on \[mm²\].
+    pub fn mean_square_over(&self, length_mm: f64, from_mm: f64) -> f64 {
+        let errors: Vec<f64> = self.errors(from_mm).collect();
+        let points = to_count(length_mm / BEAD_SPACING_MM).max(1);
+        let mean_over = |piece: &[f64]| mean(piece.iter().copied());
+        mean(errors.windows(points).map(|piece| mean_over(piece).powi(2)))
+    }
+
+    /// Root mean square error of the width without roughness, from a position on \[mm\].
+    pub fn smooth_rms_error(&self, from_mm: f64) -> f64 {
+        let after = self.smooth.iter().filter(|(at, _)| *at >= from_mm);
+        rms(after.map(|(_, width)| width - self.target_mm))
     }
 
     /// Integral of the absolute error over the path from a position on \[mm²\]. This and the

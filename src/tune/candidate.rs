@@ -63,6 +63,7 @@ impl ControllerCandidate {
                 exponent: settings.exponent,
                 learns_exponent: settings.learns,
                 drift_per_root_m: settings.drift_per_root_m,
+                cancels_pulsation: true,
             }),
             gains: None,
             offset_mm: settings.offset_mm,

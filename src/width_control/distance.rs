@@ -7,17 +7,16 @@
 //!
 //! ```text
 //! reports ─▶ speed history ─┐ speed where the bead under the camera was laid
-//! width ± σ ────────────────┴▶ sample ─▶ pulsation ─▶ flow change ─▶ width model (ln A, b) ─▶ speed
-//!                                └─▶ offset estimate (the camera's true offset)
+//! width ± σ ────────────────┴▶ sample ─▶ pulsation ─▶ flow step ─▶ width model (ln A, b) ─▶ speed
 //! ```
 //!
-//! There are no gains: how much a width moves the estimate follows from its own standard
-//! deviation and from the drift of the flow that the cell states.
+//! There are no gains: how much a width moves the estimate follows from the roughness of the
+//! bead, from the width's own standard deviation, and from the drift of the flow that the cell
+//! states.
 
-mod autocorrelation;
-mod flow_change;
+mod flow_step;
 mod harmonic;
-mod offset_estimate;
+mod noise;
 mod pulsation;
 mod sample;
 mod speed_history;
@@ -31,15 +30,15 @@ use serde::{Deserialize, Serialize};
 
 use crate::core::{Mm, MmPerS, Span, Stamp};
 
-use autocorrelation::NoiseAutocorrelation;
-use flow_change::ChangeDetector;
-use offset_estimate::OffsetEstimator;
-use pulsation::FlowPulsation;
+use flow_step::StepDetector;
+pub use noise::BeadRoughness;
+use noise::WidthNoise;
+use pulsation::{FlowPulsation, PulsationSample};
 pub use sample::WidthReading;
-use sample::{ConsistencyMonitor, GaugeInterval, MatchedWidth};
+use sample::{GaugeInterval, MatchedWidth};
 use speed_history::SpeedHistory;
 use validation::ModelValidation;
-use width_model::{WidthInnovation, WidthModel};
+use width_model::{WidthModel, WidthObservation};
 
 /// Settings of control by distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,6 +58,10 @@ pub struct DistanceSettings {
     /// Drift of the flow, a random walk along the path: standard deviation over a metre, as
     /// a fraction.
     pub drift_per_root_m: f64,
+    /// Roughness of the bead.
+    pub roughness: BeadRoughness,
+    /// Whether a pulsation of the flow is cancelled.
+    pub cancels_pulsation: bool,
 }
 
 /// How a width was used.
@@ -87,8 +90,6 @@ pub struct DistanceTrace {
     pub level_sigma_mm: Mm,
     /// Exponent b.
     pub exponent: f64,
-    /// Estimated camera offset.
-    pub offset_mm: Mm,
     /// Period of a pulsation of the flow, where one is detected \[s\].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pulsation_s: Option<f64>,
@@ -112,11 +113,9 @@ pub struct DistanceController {
     settings: DistanceSettings,
     speed_history: SpeedHistory,
     model: WidthModel,
-    change_detector: ChangeDetector,
+    noise: WidthNoise,
+    steps: StepDetector,
     pulsation: FlowPulsation,
-    offset: OffsetEstimator,
-    consistency: ConsistencyMonitor,
-    autocorrelation: NoiseAutocorrelation,
     validation: ModelValidation,
     /// Path of the nozzle at the first of the latest widths without a known speed \[mm\].
     unmatched_since_mm: Option<f64>,
@@ -127,17 +126,15 @@ pub struct DistanceController {
 impl DistanceController {
     /// A controller before the first width.
     pub fn new(settings: DistanceSettings) -> Self {
-        let DistanceSettings { offset, offset_sigma, gauge, .. } = settings;
+        let DistanceSettings { offset, gauge, .. } = settings;
         let history_mm = HISTORY_FACTOR * (offset + gauge).get() + MAX_UNMATCHED_MM;
         Self {
             settings,
             speed_history: SpeedHistory::new(settings.reference_speed.get(), history_mm),
             model: WidthModel::new(settings.exponent, settings.learns_exponent),
-            change_detector: ChangeDetector::new(gauge.get()),
+            noise: WidthNoise::new(settings.roughness, gauge.get()),
+            steps: StepDetector::new(gauge.get()),
             pulsation: FlowPulsation::new(),
-            offset: OffsetEstimator::new(offset_sigma / offset.max(Mm::constant(1.0))),
-            consistency: ConsistencyMonitor::default(),
-            autocorrelation: NoiseAutocorrelation::new(gauge.get()),
             validation: ModelValidation::default(),
             unmatched_since_mm: None,
             is_unmatched: false,
@@ -147,10 +144,8 @@ impl DistanceController {
     /// A new bead: the speed history is cleared; the model is kept with a larger variance.
     pub fn begin_bead(&mut self) {
         self.speed_history.clear();
-        self.change_detector.clear();
+        self.steps.clear();
         self.model.begin_bead();
-        self.offset.begin_bead();
-        self.autocorrelation.reset();
         self.validation = ModelValidation::default();
         (self.unmatched_since_mm, self.is_unmatched) = (None, false);
     }
@@ -166,7 +161,7 @@ impl DistanceController {
     pub fn measured(&mut self, nozzle_path: Mm, width: WidthReading, target: Mm) -> DistanceTrace {
         self.check_history(nozzle_path.get());
         let taken = match self.match_speed(nozzle_path.get(), width) {
-            Some(sample) => self.take_sample(&sample, nozzle_path.get(), target.get()),
+            Some(sample) => self.take_sample(&sample, target.get()),
             None => WidthUse::NotMatched,
         };
         self.trace(taken)
@@ -196,7 +191,7 @@ impl DistanceController {
         if !self.is_ready() || width <= Mm::ZERO {
             return None;
         }
-        let pulsation = self.pulsation.mean(from.secs(), (from + lasts).secs());
+        let pulsation = self.pulsation_between(from.secs(), (from + lasts).secs());
         let ln_speed =
             (self.model.ln_width() + pulsation - width.get().ln()) / self.model.exponent();
         let speed = self.settings.reference_speed.get()
@@ -219,88 +214,88 @@ impl DistanceController {
 
     /// Middle of the gauge along the path \[mm\].
     fn gauge_centre(&self, nozzle_path: f64) -> f64 {
-        nozzle_path - self.settings.offset.get() * self.offset.factor()
+        nozzle_path - self.settings.offset.get()
     }
 
     fn match_speed(&self, nozzle_path: f64, reading: WidthReading) -> Option<MatchedWidth> {
         if reading.width <= Mm::ZERO || self.speed_history.is_empty() {
             return None;
         }
-        let offset = self.settings.offset.get();
         let gauge = GaugeInterval {
             centre_mm: self.gauge_centre(nozzle_path),
             length_mm: self.settings.gauge.get(),
-            centre_tolerance_mm: OFFSET_SIGMAS * self.offset.sigma() * offset,
+            centre_tolerance_mm: OFFSET_SIGMAS * self.settings.offset_sigma.get(),
         };
         MatchedWidth::new(&self.speed_history, gauge, reading, self.model.exponent())
     }
 
-    fn take_sample(&mut self, seen: &MatchedWidth, nozzle_path: f64, target: f64) -> WidthUse {
-        // Correlated widths count less than independent ones.
-        let sample =
-            &MatchedWidth { noise: seen.noise * self.autocorrelation.inflation(), ..*seen };
-        let drift = self.drift_per_mm() * self.model.distance_to(sample.position_mm);
-        let pulsation = self.pulsation.at(sample.laid_s);
-        let observation = offset_estimate::OffsetObservation {
-            nozzle_path,
-            offset: self.settings.offset.get(),
-            gauge: self.settings.gauge.get(),
-            ln_width: sample.ln_width - pulsation,
-            exponent: self.model.exponent(),
-            variance: sample.noise,
-            drift,
-        };
-        self.offset.update(&self.speed_history, &observation);
+    fn take_sample(&mut self, sample: &MatchedWidth, target: f64) -> WidthUse {
+        let spacing = self.model.distance_to(sample.position_mm);
+        let drift = self.drift_per_mm() * spacing;
+        let variance = sample.noise + self.noise.variance(spacing);
         self.model.advance_to(sample.position_mm, drift);
-        let spread = self.model.predicted_variance(sample.ln_speed);
-        let plain = sample.ln_width + self.model.exponent() * sample.ln_speed;
-        let correlated = seen.noise * self.autocorrelation.correlated_inflation()
-            + seen.offset_sigma * seen.offset_sigma;
-        let variance = correlated + LEVEL_VARIANCE_FACTOR * spread;
-        self.pulsation.update(sample.laid_s, plain, variance, drift);
-        self.update(sample, sample.ln_width - pulsation, libm::log(target.max(1e-3)), drift)
+        self.model.move_to(sample.ln_speed);
+        let half = 0.5 * sample.lasted_s;
+        let pulsation = self.pulsation_between(sample.laid_s - half, sample.laid_s + half);
+        let observation = WidthObservation {
+            ln_width: sample.ln_width - pulsation,
+            ln_speed: sample.ln_speed,
+            offset_slopes: sample.offset_slopes,
+            variance,
+        };
+        let innovation = self.model.innovation(&observation);
+        self.validation.update(sample, innovation, libm::log(target.max(1e-3)), drift);
+        if !self.steps.is_under_way() && self.model.is_known() {
+            self.noise.observe(innovation.normalised_squared(), spacing);
+        }
+        let taken = self.update(sample, &observation);
+        if taken != WidthUse::Change {
+            let value = sample.ln_width + self.model.exponent() * sample.ln_speed;
+            let MatchedWidth { laid_s, lasted_s, .. } = *sample;
+            let variance = variance + sample.offset_variance();
+            self.pulsation.update(&PulsationSample { laid_s, lasted_s, value, variance, drift });
+        }
+        taken
     }
 
     /// Updates the model with a width whose pulsation is subtracted, or rejects the width.
-    fn update(&mut self, sample: &MatchedWidth, ln_w: f64, ln_target: f64, drift: f64) -> WidthUse {
-        let before = self.model;
-        let observation = self.change_detector.observation(sample, ln_w);
-        let innovation = self.model.innovation(&observation);
-        let consistent = self.consistency.is_consistent();
-        if !(consistent && innovation.is_outlier()) {
-            let correlated_variance =
-                sample.variance() * (1.0 - 1.0 / self.autocorrelation.inflation());
-            let alone = WidthInnovation {
-                variance: innovation.variance - correlated_variance,
-                ..innovation
-            };
-            self.autocorrelation.update(sample.position_mm, alone);
-        }
-        self.change_detector.push(sample, ln_w, before, consistent);
-        let fraction = sample.variance() / innovation.variance;
-        self.consistency.update(sample.laid_s, innovation, fraction);
-        self.validation.update(sample, innovation, ln_target, drift);
-        if let Some(before) = self.change_detector.revert(sample, ln_w, innovation, drift) {
-            self.pulsation.shift(before.ln_width() - self.model.ln_width(), 0.0);
-            self.model = before;
+    fn update(&mut self, sample: &MatchedWidth, observation: &WidthObservation) -> WidthUse {
+        if !self.model.is_known() {
+            self.model.update(observation, false);
             return WidthUse::Taken;
         }
-        let outlier =
-            self.model.is_known() && innovation.is_outlier() && !self.consistency.is_inconsistent();
-        if !outlier {
-            let learns = self.consistency.is_consistent() || self.model.exponent_is_uncertain();
-            let informs =
-                self.model.informs_exponent(sample.ln_speed) && !sample.is_offset_sensitive();
-            self.model.update(&observation, learns && informs);
+        let excess = self.noise.excess();
+        let front = sample.position_mm + 0.5 * self.settings.gauge.get();
+        self.steps.push(front, *observation, self.model);
+        let was_under_way = self.steps.is_under_way();
+        if let Some(step) = self.steps.find(excess) {
+            if step.is_new {
+                self.validation.reset_steady();
+            }
+            if !self.steps.is_under_way() {
+                self.pulsation.loosen(step.size * step.size);
+            }
+            self.model = step.model;
+            self.model.advance_to(sample.position_mm, 0.0);
+            return WidthUse::Change;
         }
-        let Some(change) = self.change_detector.find() else {
-            return if outlier { WidthUse::Outlier } else { WidthUse::Taken };
-        };
-        self.validation.reset_steady();
-        self.autocorrelation.reset();
-        self.pulsation.shift(change.size, change.variance);
-        self.model = change.model_after(sample.position_mm, self.drift_per_mm());
-        WidthUse::Change
+        if was_under_way && let Some(before) = self.steps.without_step() {
+            self.model = before;
+            self.model.advance_to(sample.position_mm, 0.0);
+            return WidthUse::Taken;
+        }
+        let observation =
+            WidthObservation { variance: observation.variance * excess, ..*observation };
+        if self.model.innovation(&observation).is_outlier() {
+            return WidthUse::Outlier;
+        }
+        self.model.update(&observation, self.model.informs_exponent(sample.ln_speed));
+        WidthUse::Taken
+    }
+
+    /// Mean pulsation of ln w of bead laid between two times \[s\].
+    fn pulsation_between(&self, from_s: f64, to_s: f64) -> f64 {
+        if self.settings.cancels_pulsation { self.pulsation.mean(from_s, to_s) } else { 0.0 }
     }
 
     fn drift_per_mm(&self) -> f64 {
@@ -315,14 +310,12 @@ impl DistanceController {
             level_mm: mm(level),
             level_sigma_mm: mm(level * self.model.sigma()),
             exponent: self.model.exponent(),
-            offset_mm: self.settings.offset * self.offset.factor(),
             pulsation_s: self.pulsation.period_s(),
         }
     }
 }
 
 /// Length of the speed history over the distance from the nozzle to the far end of the gauge.
-/// The estimated offset may exceed the stated one by at most 24 % (`offset_estimate`).
 const HISTORY_FACTOR: f64 = 2.0;
 /// Path over which widths may have no known speed, beyond the start of a bead \[mm\]. A
 /// longer one delays the fallback; with a shorter one a short loss of reports causes it.
@@ -332,6 +325,3 @@ const MAX_UNMATCHED_MM: f64 = 50.0;
 const MAX_LN_SPEED_RATIO: f64 = 5.0;
 /// Error of the offset that a sample allows for, in standard deviations.
 const OFFSET_SIGMAS: f64 = 2.0;
-/// Weight of the variance of the predicted width in the observation of a pulsation. A larger
-/// value keeps an uncertain model from being taken for a pulsation, and detects one later.
-const LEVEL_VARIANCE_FACTOR: f64 = 4.0;

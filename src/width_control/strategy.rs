@@ -9,7 +9,7 @@ mod kind;
 pub mod pi;
 pub mod steps;
 
-pub use kind::{CellParameters, Registration, WidthControlSettings, WidthStrategy};
+pub use kind::{BeadNoise, CellParameters, Registration, WidthControlSettings, WidthStrategy};
 
 /// Every width controller that a cell may choose.
 pub const STRATEGIES: [&Registration; 4] =

@@ -9,8 +9,12 @@ const STEP_S: f64 = 0.05;
 
 /// The 2022 paper's cell, controlled by distance.
 pub(super) fn by_distance() -> Setup {
-    let strategy =
-        DistanceStrategy { exponent: 0.25, learns_exponent: true, drift_per_root_m: 0.0055 };
+    let strategy = DistanceStrategy {
+        exponent: 0.25,
+        learns_exponent: true,
+        drift_per_root_m: 0.0055,
+        cancels_pulsation: true,
+    };
     let mut setup = setup();
     setup.control.strategy = Arc::new(strategy);
     setup.cell.setpoint_period = Span::from_secs(STEP_S);

@@ -13,7 +13,6 @@ pub struct DistanceCharts {
     level_low: PlotCurve,
     level_high: PlotCurve,
     exponent: PlotCurve,
-    offset: PlotCurve,
 }
 
 impl DistanceCharts {
@@ -31,7 +30,6 @@ impl DistanceCharts {
         self.level_low.push(path, level - 2.0 * sigma);
         self.level_high.push(path, level + 2.0 * sigma);
         self.exponent.push(path, trace.exponent);
-        self.offset.push(path, trace.offset_mm.get());
     }
 
     /// The section of the page; empty without a distance controller.
@@ -46,7 +44,6 @@ impl DistanceCharts {
                 p.hint { (summary.words()) }
                 (self.level(&axis))
                 (curve(&axis, "exponent b", &self.exponent))
-                (curve(&axis, "camera behind the nozzle [mm]", &self.offset))
             }
         }
     }

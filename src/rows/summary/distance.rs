@@ -24,8 +24,6 @@ pub struct DistanceSummary {
     pub level_sigma_mm: f64,
     /// Exponent b.
     pub exponent: f64,
-    /// Estimated distance of the camera behind the nozzle \[mm\].
-    pub offset_mm: f64,
     /// Period of a detected pulsation \[s\]; `None` if there is none.
     pub pulsation_s: Option<f64>,
     /// Why the PI controller took over; `None` if it did not.
@@ -35,7 +33,7 @@ pub struct DistanceSummary {
 impl DistanceSummary {
     /// The figures in a sentence or two.
     pub fn words(&self) -> String {
-        let Self { samples_used, outliers, changes, level_mm, exponent, offset_mm, .. } = self;
+        let Self { samples_used, outliers, changes, level_mm, exponent, .. } = self;
         let pulsation = self.pulsation_s.map_or(String::new(), |period| {
             format!(" The flow pulsates with a period of {period:.2} s.")
         });
@@ -45,7 +43,7 @@ impl DistanceSummary {
         format!(
             "Widths used {samples_used}, outliers {outliers}, changes of the flow {changes}. Last estimates: \
              {level_mm:.2} mm wide at the start speed, b = \
-             {exponent:.3}, camera {offset_mm:.1} mm behind the nozzle.{pulsation}{fallback}"
+             {exponent:.3}.{pulsation}{fallback}"
         )
     }
 }
@@ -85,7 +83,6 @@ impl DistanceTally {
             level_mm: last.level_mm.get(),
             level_sigma_mm: last.level_sigma_mm.get(),
             exponent: last.exponent,
-            offset_mm: last.offset_mm.get(),
             pulsation_s: last.pulsation_s,
             fallback_reason: self.fallback,
         })

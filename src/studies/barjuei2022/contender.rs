@@ -64,9 +64,12 @@ impl ControlSetup {
         if let Self::Distance(rates, exponent) = self {
             (cell.simulation.latency, cell.simulation.step) = (LATENCY, STEP);
             (run.camera.rate_hz, run.robot.rate_hz) = (rates.vision_hz, rates.link_hz);
-            let (learns_exponent, drift_per_root_m) = (true, DRIFT);
-            run.control.strategy =
-                Arc::new(DistanceStrategy { exponent, learns_exponent, drift_per_root_m });
+            run.control.strategy = Arc::new(DistanceStrategy {
+                exponent,
+                learns_exponent: true,
+                drift_per_root_m: DRIFT,
+                cancels_pulsation: true,
+            });
         }
         (cell, run)
     }

@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use super::pulsation::PulsationSample;
 use super::width_model::MAX_SQUARED_INNOVATION;
 
 /// Initial standard deviation of either component, as a fraction of the width: pulsations of
@@ -37,9 +38,10 @@ impl Harmonic {
         TAU / self.rad_per_s
     }
 
-    /// Adds a value `dt_s` after the last one. Returns its log likelihood, without the
-    /// constant.
-    pub fn update(&mut self, dt_s: f64, value: f64, variance: f64, drift: f64) -> f64 {
+    /// Adds a value `dt_s` after the last one, that is the mean over `lasted_s`. Returns its log
+    /// likelihood, without the constant.
+    pub fn update(&mut self, dt_s: f64, one: &PulsationSample) -> f64 {
+        let PulsationSample { value, variance, drift, lasted_s, .. } = *one;
         if !self.known {
             self.known = true;
             self.parts[0] = value;
@@ -47,9 +49,10 @@ impl Harmonic {
         }
         self.rotate(dt_s, drift);
         let [p00, p01, p02, p11, p12, p22] = self.covariance;
-        let (h0, h1, h2) = (p00 + p01, p01 + p11, p02 + p12);
-        let total = (h0 + h1).max(0.0) + variance;
-        let by = value - self.parts[0] - self.parts[1];
+        let kept = kept_by_mean(self.rad_per_s * lasted_s);
+        let (h0, h1, h2) = (p00 + kept * p01, p01 + kept * p11, p02 + kept * p12);
+        let total = (h0 + kept * h1).max(0.0) + variance;
+        let by = value - self.parts[0] - kept * self.parts[1];
         let squared = (by * by / total).min(MAX_SQUARED_INNOVATION);
         let limit = (MAX_SQUARED_INNOVATION * total).sqrt();
         let by = by.clamp(-limit, limit) / total;
@@ -87,9 +90,8 @@ impl Harmonic {
         ];
     }
 
-    /// Shifts the level by `by`, which has this variance.
-    pub fn shift(&mut self, by: f64, variance: f64) {
-        self.parts[0] += by;
+    /// The level may have changed by a variance.
+    pub fn loosen(&mut self, variance: f64) {
         self.covariance[0] += variance;
     }
 
@@ -99,17 +101,30 @@ impl Harmonic {
         cos * self.parts[1] + sin * self.parts[2]
     }
 
+    /// What a mean over a time \[s\] keeps of the amplitude; negative where it inverts it.
+    pub fn kept_over(&self, lasted_s: f64) -> f64 {
+        kept_by_mean(self.rad_per_s * lasted_s)
+    }
+
     /// Mean of the pulsation between two times after the last value \[s\].
     pub fn mean(&self, from_s: f64, to_s: f64) -> f64 {
-        let half = 0.5 * self.rad_per_s * (to_s - from_s);
-        let kept = if half.abs() < 1e-9 { 1.0 } else { libm::sin(half) / half };
-        self.at(0.5 * (from_s + to_s)) * kept
+        self.at(0.5 * (from_s + to_s)) * kept_by_mean(self.rad_per_s * (to_s - from_s))
     }
+}
+
+/// What a mean over an angle keeps of the harmonic's amplitude.
+fn kept_by_mean(angle_rad: f64) -> f64 {
+    let half = 0.5 * angle_rad;
+    if half.abs() < 1e-9 { 1.0 } else { libm::sin(half) / half }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn sample(value: f64, variance: f64, drift: f64, lasted_s: f64) -> PulsationSample {
+        PulsationSample { laid_s: 0.0, lasted_s, value, variance, drift }
+    }
 
     #[test]
     fn a_pulsation_of_its_period_is_predicted() {
@@ -117,7 +132,7 @@ mod tests {
         let truth = |at: f64| 3.7 + 0.02 * (TAU * at / period + 0.4).sin();
         let mut harmonic = Harmonic::new(period);
         for k in 0..600 {
-            let _ = harmonic.update(0.02, truth(0.02 * f64::from(k)), 1e-6, 1e-9);
+            let _ = harmonic.update(0.02, &sample(truth(0.02 * f64::from(k)), 1e-6, 1e-9, 0.0));
         }
         let last = 0.02 * 599.0;
         for ahead in [0.0, 0.5, 1.3] {
@@ -132,8 +147,22 @@ mod tests {
     fn a_level_alone_has_no_pulsation() {
         let mut harmonic = Harmonic::new(f64::INFINITY);
         for k in 0..100 {
-            let _ = harmonic.update(0.1, 3.7 + 0.01 * f64::from(k % 2), 1e-4, 1e-8);
+            let _ = harmonic.update(0.1, &sample(3.7 + 0.01 * f64::from(k % 2), 1e-4, 1e-8, 0.0));
         }
         assert_eq!(harmonic.at(0.3), 0.0);
+    }
+
+    #[test]
+    fn a_mean_over_a_gauge_is_less_than_the_pulsation_at_the_nozzle() {
+        let (period, lasted) = (2.0, 0.8);
+        let half = 0.5 * TAU * lasted / period;
+        let truth = |at: f64| 0.02 * (TAU * at / period).sin();
+        let mut harmonic = Harmonic::new(period);
+        for k in 0..600 {
+            let seen = 3.7 + truth(0.02 * f64::from(k)) * half.sin() / half;
+            let _ = harmonic.update(0.02, &sample(seen, 1e-6, 1e-9, lasted));
+        }
+        let off = harmonic.at(0.5) - truth(0.02 * 599.0 + 0.5);
+        assert!(off.abs() < 1e-4, "{off}");
     }
 }

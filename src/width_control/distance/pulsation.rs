@@ -16,8 +16,28 @@ const PRIOR_LOG_ODDS: f64 = 14.0;
 const MEMORY_PERIODS: f64 = 10.0;
 /// Hypotheses of smaller weight are left out of sums, for speed.
 const MIN_WEIGHT: f64 = 1e-3;
+/// Periods that must have been seen before a pulsation is used: a part of one may be a drift.
+const MIN_PERIODS: f64 = 1.0;
+/// Part of a pulsation that the mean over a gauge must keep for its estimate to be used: less
+/// of it is lost in the noise.
+const MIN_KEPT: f64 = 0.3;
 /// Longest time between two widths over which phases are kept \[s\].
 const LONGEST_GAP_S: f64 = 3.0;
+
+/// What a width says of a pulsation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PulsationSample {
+    /// When the middle of its gauge was laid \[s\].
+    pub laid_s: f64,
+    /// How long the nozzle took for the gauge \[s\].
+    pub lasted_s: f64,
+    /// ln A of the width.
+    pub value: f64,
+    /// Its variance.
+    pub variance: f64,
+    /// Variance of the drift since the last width.
+    pub drift: f64,
+}
 
 /// Hypotheses of all periods.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +46,8 @@ pub struct FlowPulsation {
     level_only: Harmonic,
     harmonics: Vec<HarmonicHypothesis>,
     last_s: Option<f64>,
+    /// Time over which widths have come \[s\].
+    observed_s: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,12 +69,12 @@ impl FlowPulsation {
             weight: 0.0,
         };
         let harmonics = periods.take_while(|period| *period < longest).map(hypothesis).collect();
-        Self { level_only: Harmonic::new(f64::INFINITY), harmonics, last_s: None }
+        Self { level_only: Harmonic::new(f64::INFINITY), harmonics, last_s: None, observed_s: 0.0 }
     }
 
-    /// Adds ln A of one width, of bead laid at a time \[s\], with its variance, and the
-    /// variance of the drift since the last one.
-    pub fn update(&mut self, laid_s: f64, value: f64, variance: f64, drift: f64) {
+    /// Adds one width.
+    pub fn update(&mut self, one: &PulsationSample) {
+        let laid_s = one.laid_s;
         let passed = self.last_s.map_or(0.0, |last| laid_s - last);
         if passed < 0.0 {
             return;
@@ -61,10 +83,11 @@ impl FlowPulsation {
             *self = Self::new();
         }
         self.last_s = Some(laid_s);
-        let plain = self.level_only.update(passed, value, variance, drift);
+        self.observed_s += passed;
+        let plain = self.level_only.update(passed, one);
         let mut largest = PRIOR_LOG_ODDS;
         for hypothesis in &mut self.harmonics {
-            let likely = hypothesis.harmonic.update(passed, value, variance, drift);
+            let likely = hypothesis.harmonic.update(passed, one);
             let kept = 1.0 - (passed / (MEMORY_PERIODS * hypothesis.harmonic.period_s())).min(1.0);
             hypothesis.log_ratio =
                 (hypothesis.log_ratio * kept + likely - plain).max(-PRIOR_LOG_ODDS);
@@ -73,7 +96,10 @@ impl FlowPulsation {
         let mut total = libm::exp(PRIOR_LOG_ODDS - largest);
         for hypothesis in &mut self.harmonics {
             let less = hypothesis.log_ratio - largest;
-            hypothesis.weight = if less > -PRIOR_LOG_ODDS { libm::exp(less) } else { 0.0 };
+            let is_kept = hypothesis.harmonic.kept_over(one.lasted_s).abs() > MIN_KEPT;
+            let is_seen = self.observed_s > MIN_PERIODS * hypothesis.harmonic.period_s();
+            let is_likely = is_kept && is_seen && less > -PRIOR_LOG_ODDS;
+            hypothesis.weight = if is_likely { libm::exp(less) } else { 0.0 };
             total += hypothesis.weight;
         }
         for hypothesis in &mut self.harmonics {
@@ -81,20 +107,12 @@ impl FlowPulsation {
         }
     }
 
-    /// The flow has changed: shifts ln A of every hypothesis by `by`, which has this variance.
-    pub fn shift(&mut self, by: f64, variance: f64) {
-        self.level_only.shift(by, variance);
+    /// The flow has stepped: the level of every hypothesis may have changed by a variance.
+    pub fn loosen(&mut self, variance: f64) {
+        self.level_only.loosen(variance);
         for hypothesis in &mut self.harmonics {
-            hypothesis.harmonic.shift(by, variance);
+            hypothesis.harmonic.loosen(variance);
         }
-    }
-
-    /// The pulsation of ln w of bead laid at a time \[s\].
-    pub fn at(&self, at_s: f64) -> f64 {
-        let Some(last) = self.last_s else { return 0.0 };
-        self.likely()
-            .map(|hypothesis| hypothesis.weight * hypothesis.harmonic.at(at_s - last))
-            .sum()
     }
 
     /// Mean pulsation of ln w of bead laid between two times \[s\].
@@ -129,7 +147,10 @@ mod tests {
         for k in 0..seconds * rate_hz {
             at = f64::from(k) / f64::from(rate_hz);
             let [noise, _] = hash::normal_pair(hash::mix(&[7, u64::from(k)]));
-            pulsation.update(at, 3.7 + wave(at) + 0.0086 * noise, 0.0086 * 0.0086, 5e-8);
+            let value = 3.7 + wave(at) + 0.0086 * noise;
+            let (variance, drift) = (0.0086 * 0.0086, 5e-8);
+            let sample = PulsationSample { laid_s: at, lasted_s: 0.0, value, variance, drift };
+            pulsation.update(&sample);
         }
         (pulsation, at)
     }
@@ -141,7 +162,7 @@ mod tests {
             let (pulsation, last) = watch(seconds, 50, wave);
             let found = pulsation.period_s().unwrap();
             assert!((found / period - 1.0).abs() < 0.03, "{period}: {found}");
-            let off = pulsation.at(last + 0.8) - wave(last + 0.8);
+            let off = pulsation.mean(last + 0.8, last + 0.8) - wave(last + 0.8);
             assert!(off.abs() < 0.3 * 0.03, "{period}: {off}");
         }
     }
@@ -151,7 +172,7 @@ mod tests {
         for rate in [10, 50] {
             let (pulsation, last) = watch(40, rate, |_| 0.0);
             assert_eq!(pulsation.period_s(), None);
-            assert!(pulsation.at(last + 0.5).abs() < 1e-3);
+            assert!(pulsation.mean(last + 0.5, last + 0.5).abs() < 1e-3);
         }
     }
 }

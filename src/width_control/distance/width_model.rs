@@ -1,20 +1,29 @@
 //! The model of the bead: the width at the reference speed and the exponent,
 //! ln w = ln A − b·ln(v/v₀), by a Kalman filter.
 
-use nalgebra::{Matrix2, RowVector2, Vector2};
+use nalgebra::{Matrix2, Matrix4, Vector4};
 
 /// Initial standard deviation of b, as a fraction of it. Exponents of beads range from 0.2 to
 /// 1, so a stated one may be far off.
 const EXPONENT_SIGMA: f64 = 0.4;
+/// Standard deviation of ln w by what no part of the model describes, as a wave of the flow. It
+/// does not move ln A less, but b, which would take a wave for an effect of the speed.
+const OTHER_SIGMA: f64 = 0.007;
 /// Range of b, as factors on its initial value. Too small an exponent makes control too
 /// aggressive, so the lower end is nearer.
 const EXPONENT_RANGE: (f64, f64) = (0.7, 2.2);
-/// Standard deviation of b above which it counts as poorly known, as a fraction of its initial
-/// value.
-const POORLY_KNOWN_SIGMA: f64 = 0.1;
 /// Smallest difference of ln v to the best known speed at which a width updates b: noise of
 /// reported speeds below it would bias b towards 0 (errors in variables).
 const MIN_LN_SPEED_DIFFERENCE: f64 = 0.015;
+/// Standard deviation of b after ln v has changed by 1, as a fraction of its initial value: a
+/// bead is a power of its speed only piece by piece. papers.md gives 0.221 and 0.267 on either
+/// side of 77 mm/s.
+const EXPONENT_SIGMA_PER_ROOT: f64 = 0.15;
+/// Variance of either error of the offset, in units of its tolerance. Derived: the tolerance is
+/// two standard deviations.
+pub const OFFSET_ERROR_VARIANCE: f64 = 0.25;
+/// Smallest variance that can be inverted.
+const MIN_VARIANCE: f64 = 1e-14;
 /// Largest standard deviation of b at an end of its range, as a fraction of its initial value.
 const SIGMA_AT_RANGE_END: f64 = 0.3;
 /// Standard deviation of ln A after the first width, which may be an outlier.
@@ -28,17 +37,20 @@ const OUTLIER_SQUARED: f64 = 12.25;
 /// slow averages, so that one outlier decides nothing.
 pub const MAX_SQUARED_INNOVATION: f64 = 9.0;
 
-/// ln A and b with their covariance.
+/// ln A, b and two errors of the offset, with their covariance. The errors are by how much of its
+/// tolerance the camera looks further on, and further back, than the stated offset says: the same
+/// in every width, so that ten widths beside one change of the speed say little more of the bead
+/// than one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WidthModel {
-    ln_width: f64,
-    exponent: f64,
-    /// Variance of ln A, covariance of ln A and b, variance of b.
-    covariance: [f64; 3],
+    state: Vector4<f64>,
+    covariance: Matrix4<f64>,
     prior_exponent: f64,
     learns_exponent: bool,
     known: bool,
     position_mm: Option<f64>,
+    /// Smallest and largest ln(v/v₀) of all widths.
+    ln_speeds: Option<(f64, f64)>,
 }
 
 /// A width with the speed at which it was laid.
@@ -48,11 +60,10 @@ pub struct WidthObservation {
     pub ln_width: f64,
     /// ln(v/v₀).
     pub ln_speed: f64,
-    /// Fraction of the gauge that lies after the last change of the flow.
-    pub covered_fraction: f64,
-    /// ln A before that change.
-    pub old_ln_width: f64,
-    /// Variance of `ln_width`.
+    /// By how much ln w would differ if the gauge were the offset's tolerance further on, and
+    /// further back.
+    pub offset_slopes: [f64; 2],
+    /// Variance of `ln_width`, without that of the offset.
     pub variance: f64,
 }
 
@@ -82,20 +93,20 @@ impl WidthModel {
     pub fn new(exponent: f64, learns: bool) -> Self {
         let sigma = if learns { EXPONENT_SIGMA * exponent } else { 0.0 };
         Self {
-            ln_width: 0.0,
-            exponent,
-            covariance: [1.0, 0.0, sigma * sigma],
+            state: Vector4::new(0.0, exponent, 0.0, 0.0),
+            covariance: with_offset_errors(Matrix2::new(1.0, 0.0, 0.0, sigma * sigma)),
             prior_exponent: exponent,
             learns_exponent: learns,
             known: false,
             position_mm: None,
+            ln_speeds: None,
         }
     }
 
     /// A new bead, whose flow may differ.
     pub fn begin_bead(&mut self) {
         self.position_mm = None;
-        self.covariance[0] += BETWEEN_BEADS_SIGMA * BETWEEN_BEADS_SIGMA;
+        self.covariance.m11 += BETWEEN_BEADS_SIGMA * BETWEEN_BEADS_SIGMA;
     }
 
     /// Whether there was a first width.
@@ -105,42 +116,32 @@ impl WidthModel {
 
     /// ln A, A in mm.
     pub fn ln_width(&self) -> f64 {
-        self.ln_width
+        self.state.x
     }
 
     /// b.
     pub fn exponent(&self) -> f64 {
-        self.exponent
-    }
-
-    /// Whether b is still poorly known.
-    pub fn exponent_is_uncertain(&self) -> bool {
-        self.covariance[2] > (POORLY_KNOWN_SIGMA * self.prior_exponent).powi(2)
+        self.state.y
     }
 
     /// Whether a width of bead laid at ln(v/v₀) informs b: its speed differs clearly from the
     /// speed at which the width is known best.
     pub fn informs_exponent(&self, ln_speed: f64) -> bool {
-        let [_, both, exponent] = self.covariance;
+        let (both, exponent) = (self.covariance.m12, self.covariance.m22);
         exponent > 0.0 && (ln_speed - both / exponent).abs() > MIN_LN_SPEED_DIFFERENCE
     }
 
     /// Standard deviation of ln A, given b.
     pub fn sigma(&self) -> f64 {
-        let [level, both, exponent] = self.covariance;
+        let (level, both, exponent) =
+            (self.covariance.m11, self.covariance.m12, self.covariance.m22);
         let known = if exponent > 0.0 { both * both / exponent } else { 0.0 };
         (level - known).max(0.0).sqrt()
     }
 
-    /// Variance of the predicted ln w at ln(v/v₀).
-    pub fn predicted_variance(&self, ln_speed: f64) -> f64 {
-        let [level, both, exponent] = self.covariance;
-        (level - 2.0 * ln_speed * both + ln_speed * ln_speed * exponent).max(0.0)
-    }
-
     /// Predicted ln w at ln(v/v₀).
     pub fn predicted(&self, ln_speed: f64) -> f64 {
-        self.ln_width - self.exponent * ln_speed
+        self.ln_width() - self.exponent() * ln_speed
     }
 
     /// Path from the newest position to another \[mm\]; 0 backwards.
@@ -151,22 +152,15 @@ impl WidthModel {
     /// Advances to a position; ln A has drifted by a variance.
     pub fn advance_to(&mut self, position_mm: f64, drift: f64) {
         self.position_mm = Some(self.position_mm.map_or(position_mm, |last| last.max(position_mm)));
-        self.covariance[0] += drift;
+        self.covariance.m11 += drift;
     }
 
     /// The innovation of an observation.
     pub fn innovation(&self, observation: &WidthObservation) -> WidthInnovation {
-        let [level, both, exponent] = self.covariance;
-        let [by_level, by_exponent] = observation.slopes();
-        let predicted = self.ln_width * observation.covered_fraction
-            + observation.old_ln_width * (1.0 - observation.covered_fraction)
-            - self.exponent * observation.ln_speed;
-        let spread = by_level * by_level * level
-            + 2.0 * by_level * by_exponent * both
-            + by_exponent * by_exponent * exponent;
+        let slopes = observation.slopes();
         WidthInnovation {
-            by: observation.ln_width - predicted,
-            variance: spread.max(0.0) + observation.variance,
+            by: observation.ln_width - slopes.dot(&self.state),
+            variance: slopes.dot(&(self.covariance * slopes)).max(0.0) + observation.variance,
         }
     }
 
@@ -181,65 +175,112 @@ impl WidthModel {
         // The gain is at most one half: a single width may be an outlier.
         let spread = innovation.variance - observation.variance;
         let noise = observation.variance.max(spread);
-        let total = spread + noise;
-        let [a, b] = observation.slopes();
-        let [level, both, exponent] = self.covariance;
-        let by_level = (level * a + both * b) / total;
-        let by_exponent =
-            if learns && self.learns_exponent { (both * a + exponent * b) / total } else { 0.0 };
-        self.ln_width += by_level * innovation.by;
-        self.exponent += by_exponent * innovation.by;
-        self.covariance =
-            updated_covariance(self.covariance, [by_level, by_exponent], [a, b], noise);
+        let slopes = observation.slopes();
+        let informed = self.covariance * slopes;
+        let mut gain = informed / (spread + noise);
+        gain.y = if learns && self.learns_exponent {
+            informed.y / (spread + noise + OTHER_SIGMA * OTHER_SIGMA)
+        } else {
+            0.0
+        };
+        self.state += gain * innovation.by;
+        self.covariance = updated_covariance(&self.covariance, &gain, &slopes, noise);
         self.keep_exponent_in_range();
     }
 
     fn begin(&mut self, observation: &WidthObservation) {
         let u = observation.ln_speed;
-        self.ln_width = observation.ln_width + self.exponent * u;
-        let exponent = self.covariance[2];
-        self.covariance = [FIRST_SIGMA * FIRST_SIGMA + u * u * exponent, u * exponent, exponent];
+        self.state.x = observation.ln_width + self.exponent() * u;
+        let exponent = self.covariance.m22;
+        let level = FIRST_SIGMA * FIRST_SIGMA + u * u * exponent;
+        let both = u * exponent;
+        self.covariance = with_offset_errors(Matrix2::new(level, both, both, exponent));
         self.known = true;
     }
 
     /// Clamps b to its range, and moves ln A along the correlation.
     fn keep_exponent_in_range(&mut self) {
         let (min, max) = EXPONENT_RANGE;
-        let within = self.exponent.clamp(min * self.prior_exponent, max * self.prior_exponent);
-        let [level, both, exponent] = self.covariance;
-        if within == self.exponent || exponent <= 0.0 {
+        let within = self.exponent().clamp(min * self.prior_exponent, max * self.prior_exponent);
+        let exponent = self.covariance.m22;
+        if within == self.exponent() || exponent <= 0.0 {
             return;
         }
-        let slope = both / exponent;
-        self.ln_width += slope * (within - self.exponent);
-        self.exponent = within;
-        let kept = exponent.min((SIGMA_AT_RANGE_END * self.prior_exponent).powi(2));
-        self.covariance = [(level - slope * both).max(0.0), 0.0, kept];
+        let slopes = self.covariance.column(1) / exponent;
+        self.state += slopes * (within - self.exponent());
+        self.state.y = within;
+        self.covariance -= slopes * slopes.transpose() * exponent;
+        self.covariance.m22 = exponent.min((SIGMA_AT_RANGE_END * self.prior_exponent).powi(2));
     }
 
-    /// The model after ln A has changed by `size`, which has this variance.
-    pub fn after_change(mut self, size: f64, variance: f64) -> Self {
-        self.ln_width += size;
-        self.covariance[0] += variance;
+    /// ln A, b and the errors of the offset.
+    pub fn estimate(&self) -> Vector4<f64> {
+        self.state
+    }
+
+    /// Their covariance.
+    pub fn covariance(&self) -> Matrix4<f64> {
+        let mut covariance = self.covariance;
+        // A constant exponent has no variance: the smallest that can be inverted.
+        covariance.m22 = covariance.m22.max(MIN_VARIANCE);
+        covariance
+    }
+
+    /// The model with another estimate.
+    pub fn with_estimate(mut self, estimate: Vector4<f64>, covariance: Matrix4<f64>) -> Self {
+        let exponent = self.exponent();
+        (self.state, self.covariance) = (estimate, covariance);
+        if self.learns_exponent {
+            self.keep_exponent_in_range();
+        } else {
+            self.state.y = exponent;
+        }
         self
+    }
+
+    /// A width is laid at ln(v/v₀). Beyond the speeds of all widths before, b is less certain;
+    /// the width at the nearest of these speeds is as certain as it was.
+    pub fn move_to(&mut self, ln_speed: f64) {
+        let Some((slowest, fastest)) = self.ln_speeds else {
+            self.ln_speeds = Some((ln_speed, ln_speed));
+            return;
+        };
+        let nearest = ln_speed.clamp(slowest, fastest);
+        self.ln_speeds = Some((slowest.min(ln_speed), fastest.max(ln_speed)));
+        if self.learns_exponent && self.known {
+            let beyond = (ln_speed - nearest).abs();
+            let variance = beyond * (EXPONENT_SIGMA_PER_ROOT * self.prior_exponent).powi(2);
+            let slopes = Vector4::new(nearest, 1.0, 0.0, 0.0);
+            self.covariance += slopes * slopes.transpose() * variance;
+        }
     }
 }
 
 impl WidthObservation {
-    /// Derivatives of the predicted ln w with respect to ln A and b.
-    fn slopes(&self) -> [f64; 2] {
-        [self.covered_fraction, -self.ln_speed]
+    /// Derivatives of the predicted ln w with respect to ln A, b and the errors of the offset.
+    pub fn slopes(&self) -> Vector4<f64> {
+        let [ahead, behind] = self.offset_slopes;
+        Vector4::new(1.0, -self.ln_speed, ahead, behind)
     }
 }
 
+/// Covariance with errors of the offset that are independent of ln A and b.
+fn with_offset_errors(of_bead: Matrix2<f64>) -> Matrix4<f64> {
+    let mut all = Matrix4::from_diagonal_element(OFFSET_ERROR_VARIANCE);
+    all.fixed_view_mut::<2, 2>(0, 0).copy_from(&of_bead);
+    all
+}
+
 /// Covariance after an update with any gain (Joseph form).
-fn updated_covariance(spread: [f64; 3], gain: [f64; 2], slopes: [f64; 2], noise: f64) -> [f64; 3] {
-    let [level, both, exponent] = spread;
-    let before = Matrix2::new(level, both, both, exponent);
-    let gain = Vector2::from(gain);
-    let kept = Matrix2::identity() - gain * RowVector2::from(slopes);
+fn updated_covariance(
+    before: &Matrix4<f64>,
+    gain: &Vector4<f64>,
+    slopes: &Vector4<f64>,
+    noise: f64,
+) -> Matrix4<f64> {
+    let kept = Matrix4::identity() - gain * slopes.transpose();
     let after = kept * before * kept.transpose() + gain * gain.transpose() * noise;
-    [after.m11, 0.5 * (after.m12 + after.m21), after.m22]
+    0.5 * (after + after.transpose())
 }
 
 #[cfg(test)]
@@ -247,13 +288,7 @@ mod tests {
     use super::*;
 
     fn observed(ln_width: f64, ln_speed: f64) -> WidthObservation {
-        WidthObservation {
-            ln_width,
-            ln_speed,
-            covered_fraction: 1.0,
-            old_ln_width: 0.0,
-            variance: 1e-6,
-        }
+        WidthObservation { ln_width, ln_speed, offset_slopes: [0.0; 2], variance: 1e-6 }
     }
 
     #[test]
@@ -266,7 +301,7 @@ mod tests {
         }
         assert!((model.exponent() - 0.31).abs() < 1e-3, "{model:?}");
         assert!((model.ln_width() - 3.7).abs() < 1e-3);
-        assert!((model.predicted(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 1e-4);
+        assert!((model.predicted(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 5e-4);
     }
 
     #[test]
@@ -317,8 +352,7 @@ mod tests {
             let u = 0.3 * f64::from(k).sin();
             model.advance_to(f64::from(k), 1e-8);
             model.update(&observed(3.7 - 0.22 * u, u), k % 3 != 0);
-            let [p, q, r] = model.covariance;
-            assert!(p > 0.0 && r > 0.0 && q * q <= p * r * (1.0 + 1e-9), "{model:?}");
+            assert!(model.covariance.cholesky().is_some(), "{model:?}");
         }
     }
 }

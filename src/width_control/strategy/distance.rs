@@ -10,7 +10,9 @@ use crate::width_control::controller::{
     BeadReport, BoxedController, Outlook, SpeedRequest, Tracking, WidthController, WidthSample,
     WidthTrace,
 };
-use crate::width_control::distance::{DistanceController, DistanceSettings, FallbackReason};
+use crate::width_control::distance::{
+    BeadRoughness, DistanceController, DistanceSettings, FallbackReason,
+};
 
 /// Control by distance in a cell.
 pub const REGISTRATION: Registration = Registration { name: "distance", needs_gains: false, read };
@@ -18,7 +20,11 @@ pub const REGISTRATION: Registration = Registration { name: "distance", needs_ga
 /// Standard deviation of the flow's drift over a metre of path where the cell gives none, as
 /// a fraction. A larger value follows the flow faster and passes more noise of the width to
 /// the speed.
-const DRIFT_PER_ROOT_M: f64 = 0.0055;
+const DRIFT_PER_ROOT_M: f64 = 0.002;
+
+/// Standard deviation of a bead's width where the cell gives none, as a fraction of the target.
+/// A smaller one follows the bead's roughness, a larger one follows its flow more slowly.
+const ROUGHNESS_RATIO: f64 = 0.0025;
 
 /// Control by distance with its model of the bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,21 +35,31 @@ pub struct DistanceStrategy {
     pub learns_exponent: bool,
     /// Standard deviation of the flow's drift over a metre of path, as a fraction.
     pub drift_per_root_m: f64,
+    /// Whether a pulsation of the flow is cancelled.
+    pub cancels_pulsation: bool,
 }
 
 fn read(control: &Table<'_>) -> Option<Arc<dyn WidthStrategy>> {
     let exponent = control.number("exponent", 0.02..=2.0);
     let learns = control.choice("exponent_learns", &[("yes", true), ("no", false)]);
     let drift = control.number_or("drift_per_root_m", 1e-5..=1.0, DRIFT_PER_ROOT_M);
+    let pulsation = control.choice("pulsation", &[("cancel", true), ("ignore", false)]);
     Some(Arc::new(DistanceStrategy {
         exponent: exponent?,
         learns_exponent: learns?,
         drift_per_root_m: drift?,
+        cancels_pulsation: pulsation?,
     }))
+}
+
+fn roughness(cell: &CellParameters, target: Mm) -> BeadRoughness {
+    let ratio = cell.bead_noise.roughness.map_or(ROUGHNESS_RATIO, |rough| rough / target);
+    BeadRoughness { ratio, length_mm: cell.bead_noise.length.get() }
 }
 
 impl WidthStrategy for DistanceStrategy {
     fn controller(&self, cell: &CellParameters, control: &WidthControlSettings) -> BoxedController {
+        let target = control.target.nominal();
         let settings = DistanceSettings {
             offset: cell.camera_offset,
             offset_sigma: cell.camera_offset_sigma,
@@ -52,8 +68,9 @@ impl WidthStrategy for DistanceStrategy {
             exponent: self.exponent,
             learns_exponent: self.learns_exponent,
             drift_per_root_m: self.drift_per_root_m,
+            roughness: roughness(cell, target),
+            cancels_pulsation: self.cancels_pulsation,
         };
-        let target = control.target.nominal();
         let gains = control.gains.unwrap_or_else(|| cautious_gains(cell, target, self.exponent));
         Box::new(DistanceControl {
             by_distance: DistanceController::new(settings),

@@ -79,4 +79,15 @@ pub struct CellParameters {
     pub gauge_length: Mm,
     /// Time between two setpoints.
     pub setpoint_period: Span,
+    /// How rough the bead is.
+    pub bead_noise: BeadNoise,
+}
+
+/// Roughness of a bead's width along it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BeadNoise {
+    /// Standard deviation of the width at a point; none where the cell gives none.
+    pub roughness: Option<Mm>,
+    /// Its correlation length.
+    pub length: Mm,
 }

@@ -1,0 +1,73 @@
+//! A controller whose offset and exponent are wrong, with drift and waves of the flow.
+
+use rayon::prelude::*;
+
+use super::plant::{Control, LoopCell, Plan, TARGET_MM};
+use super::table::{CaseRow, Quantity, quantile};
+use crate::sim::hash;
+use crate::studies::error::ReproduceError;
+use crate::trials::layer::LayerTrial;
+
+/// Length of a bead \[mm\].
+const LENGTH_MM: f64 = 3000.0;
+/// Path from the first controlled setpoint from which the error counts \[mm\].
+const JUDGED_AFTER_MM: f64 = 100.0;
+/// Wavelengths of single waves \[mm\], from the shortest to the longest.
+const WAVELENGTHS_MM: [f64; 12] =
+    [60.0, 84.0, 117.0, 164.0, 229.0, 320.0, 448.0, 627.0, 877.0, 1226.0, 1715.0, 2400.0];
+/// Amplitude of single waves.
+const AMPLITUDE: f64 = 0.01;
+
+const RMS: Quantity = Quantity { name: "RMS, median", unit: "mm" };
+const RATIO: Quantity = Quantity { name: "RMS over the larger of PI's and uncontrolled", unit: "" };
+
+/// The rows of a cell.
+pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+    let drawn = |control| {
+        (0..seeds)
+            .into_par_iter()
+            .map(|seed| Ok(errors(&drawn_plan(cell, control, seed)?.lay(seed)?)))
+            .collect::<Result<Vec<f64>, ReproduceError>>()
+    };
+    let (ours, pi) = (drawn(Control::Distance)?, drawn(Control::Pi)?);
+    let (ours_mm, pi_mm) = (quantile(&ours, 0.5), quantile(&pi, 0.5));
+    let all = "offset, exponent, drift and wave drawn";
+    let mut rows = vec![CaseRow::new(cell, all, RMS, ours.len(), ours_mm, pi_mm)];
+    for wavelength_mm in WAVELENGTHS_MM {
+        let lay = |control| -> Result<f64, ReproduceError> {
+            let mut plan = Plan::new(cell, control)?.long(LENGTH_MM);
+            let flow = &mut plan.cell.simulation.flow;
+            (flow.wave_amplitude, flow.wavelength_mm) = (AMPLITUDE, wavelength_mm);
+            Ok(quantile(&plan.each(seeds, errors)?, 0.5))
+        };
+        let open = TARGET_MM * AMPLITUDE / std::f64::consts::SQRT_2;
+        let ratio = lay(Control::Distance)? / lay(Control::Pi)?.max(open);
+        let case = format!("wave of {wavelength_mm} mm");
+        rows.push(CaseRow::new(cell, &case, RATIO, ours.len(), ratio, 1.15));
+    }
+    Ok(rows)
+}
+
+fn errors(trial: &LayerTrial) -> f64 {
+    trial.smooth_rms_error(trial.control_start_mm + JUDGED_AFTER_MM)
+}
+
+/// A cell whose mismatch and disturbances are drawn by a seed.
+fn drawn_plan(cell: LoopCell, control: Control, seed: u64) -> Result<Plan, ReproduceError> {
+    let mut plan = Plan::new(cell, control)?.long(LENGTH_MM);
+    let unit = |number| hash::unit(hash::mix(&[MISMATCH_STREAM, seed, number]));
+    let between = |number, low: f64, high: f64| low + (high - low) * unit(number);
+    plan.assumed_offset = between(0, 0.8, 1.2);
+    let bead = &mut plan.cell.simulation.bead;
+    let factor = between(1, -std::f64::consts::LN_2, std::f64::consts::LN_2).exp();
+    // The cell's exponent stays; the bead's is the drawn fraction of it.
+    (bead.exponent, bead.slow_exponent) = (0.25 / factor, 0.25 / factor);
+    let flow = &mut plan.cell.simulation.flow;
+    flow.drift_per_root_m = between(2, 0.0, 0.02);
+    flow.wave_amplitude = between(3, 0.0, 0.02);
+    flow.wavelength_mm = between(4, 60.0_f64.ln(), 2400.0_f64.ln()).exp();
+    Ok(plan)
+}
+
+/// Random stream of what is drawn. Derived: the bytes of "mismatch".
+const MISMATCH_STREAM: u64 = 0x6d69_736d_6174_6368;

@@ -1,0 +1,144 @@
+//! The four cells of the study, and one bead in one of them.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::cell::file::{Cell, Purpose, RunPart};
+use crate::core::{Mm, MmPerS};
+use crate::numeric::root::{BISECTIONS, bisect};
+use crate::studies::barjuei2022::scale;
+use crate::studies::error::ReproduceError;
+use crate::trials::layer::LayerTrial;
+use crate::width_control::strategy::constant::ConstantStrategy;
+use crate::width_control::strategy::pi::PiStrategy;
+
+/// Target width \[mm\]: that of the nozzle, Shojaei Barjuei et al. 2022, section 3.2.
+pub const TARGET_MM: f64 = 42.0;
+/// Error within which a bead has its width \[mm\]: the paper's own band, section 5.
+pub const BAND_MM: f64 = 0.5;
+
+/// Gauge and rates of a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoopCell {
+    /// Length of the gauge \[mm\].
+    pub gauge_mm: f64,
+    /// Frames per second.
+    pub vision_hz: f64,
+    /// Setpoints per second.
+    pub link_hz: f64,
+}
+
+impl LoopCell {
+    /// The paper's rates and those of a current camera and link, each with a short gauge and with
+    /// the paper's.
+    pub const ALL: [Self; 4] = [
+        Self { gauge_mm: 12.7, vision_hz: 10.0, link_hz: 5.0 },
+        Self { gauge_mm: 12.7, vision_hz: 50.0, link_hz: 20.0 },
+        Self { gauge_mm: 63.0, vision_hz: 10.0, link_hz: 5.0 },
+        Self { gauge_mm: 63.0, vision_hz: 50.0, link_hz: 20.0 },
+    ];
+
+    /// Whether its gauge is longer than the bead's roughness by far.
+    pub fn is_gauge_long(self) -> bool {
+        self.gauge_mm > 30.0
+    }
+
+    /// Whether it has a current camera and link.
+    pub fn is_fast(self) -> bool {
+        self.vision_hz > 30.0
+    }
+
+    /// Its name in the table.
+    pub fn name(self) -> String {
+        format!("{} mm, {}/{} Hz", self.gauge_mm, self.vision_hz, self.link_hz)
+    }
+}
+
+/// What sets the speed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Control {
+    /// The controller of the study's cell.
+    Distance,
+    /// The paper's PI controller.
+    Pi,
+    /// A constant speed, from the start of the bead on.
+    None,
+}
+
+/// A bead to lay.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The cell.
+    pub cell: Cell,
+    /// Its run part.
+    pub run: RunPart,
+    /// The offset that the controller assumes, over the true one.
+    pub assumed_offset: f64,
+}
+
+impl Plan {
+    /// The study's cell with a gauge and rates, and a controller. Fails if the cell that comes
+    /// with the program cannot be read.
+    pub fn new(cell: LoopCell, control: Control) -> Result<Self, ReproduceError> {
+        let text = include_str!("cell.toml");
+        let mut file = Cell::parse(Path::new("cell.toml"), text, Purpose::Run)?;
+        let mut run = file.run.clone().ok_or(ReproduceError::NoRun)?;
+        file.simulation.gauge_length = Mm::constant(cell.gauge_mm);
+        (run.camera.rate_hz, run.robot.rate_hz) = (cell.vision_hz, cell.link_hz);
+        match control {
+            Control::Distance => {}
+            Control::Pi => run.control.strategy = Arc::new(PiStrategy),
+            Control::None => {
+                let speed = MmPerS::constant(speed_for_target(&file));
+                run.robot.start_speed = speed;
+                run.control.strategy = Arc::new(ConstantStrategy { speed });
+            }
+        }
+        Ok(Self { cell: file, run, assumed_offset: 1.0 })
+    }
+
+    /// Sets the length of the bead \[mm\].
+    pub fn long(mut self, mm: f64) -> Self {
+        self.cell.simulation.path = Mm::new(mm).unwrap_or(self.cell.simulation.path);
+        self
+    }
+
+    /// A bead without roughness.
+    pub fn smooth(mut self) -> Self {
+        self.cell.simulation.roughness.sigma_mm = 0.0;
+        self
+    }
+
+    /// Standard deviation of the mean width over the gauge by the roughness alone \[mm\]: that of
+    /// the mean of a process whose autocorrelation is exp(−(distance/length)²).
+    pub fn roughness_over_gauge_mm(&self) -> f64 {
+        let roughness = self.cell.simulation.roughness;
+        let ratio = self.cell.simulation.gauge_length.get() / roughness.length_mm;
+        let mean_correlation = std::f64::consts::PI.sqrt() / ratio * libm::erf(ratio)
+            + libm::expm1(-ratio * ratio) / (ratio * ratio);
+        roughness.sigma_mm * mean_correlation.sqrt()
+    }
+
+    /// Lays it with one seed.
+    pub fn lay(&self, seed: u64) -> Result<LayerTrial, ReproduceError> {
+        let Self { cell, run, assumed_offset } = self;
+        Ok(LayerTrial::lay_mismatched(cell, run, &scale(), *assumed_offset, seed)?)
+    }
+
+    /// A number for each seed from 0 on, in parallel.
+    pub fn each<T: Send>(
+        &self,
+        seeds: u64,
+        of: impl Fn(&LayerTrial) -> T + Send + Sync,
+    ) -> Result<Vec<T>, ReproduceError> {
+        (0..seeds).into_par_iter().map(|seed| Ok(of(&self.lay(seed)?))).collect()
+    }
+}
+
+/// Speed at which the bead has the target width \[mm/s\].
+fn speed_for_target(cell: &Cell) -> f64 {
+    let bead = cell.simulation.bead;
+    bisect(|speed| bead.width_at(speed) - TARGET_MM, 1.0, 1000.0, BISECTIONS)
+}

@@ -1,0 +1,81 @@
+//! The rows of the study.
+
+use serde::Serialize;
+
+use super::plant::LoopCell;
+use crate::numeric::rank;
+
+/// One figure of one case in one cell. The names of the fields are the keys of `control.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CaseRow {
+    /// The case.
+    pub case: String,
+    /// Gauge, and rates of camera and robot.
+    pub cell: String,
+    /// The figure.
+    pub quantity: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Number of beads.
+    pub beads: usize,
+    /// The value; `None` where it was not reached.
+    pub value: Option<f64>,
+    /// Largest value that is required.
+    pub required: f64,
+}
+
+/// What a figure is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quantity {
+    /// Its name.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+}
+
+impl CaseRow {
+    /// A figure of some beads of a case; one that is not finite was not reached.
+    pub fn new(
+        cell: LoopCell,
+        case: &str,
+        quantity: Quantity,
+        beads: usize,
+        value: f64,
+        required: f64,
+    ) -> Self {
+        Self {
+            case: case.to_owned(),
+            cell: cell.name(),
+            quantity: quantity.name,
+            unit: quantity.unit,
+            beads,
+            value: value.is_finite().then_some(value),
+            required,
+        }
+    }
+
+    /// Whether the value is within what is required.
+    pub fn is_met(&self) -> bool {
+        self.value.is_some_and(|value| value <= self.required)
+    }
+}
+
+/// The value at a fraction of the way from the smallest to the largest; infinite values count.
+pub fn quantile(values: &[f64], fraction: f64) -> f64 {
+    rank::quantile(&mut values.to_vec(), fraction).unwrap_or(f64::NAN)
+}
+
+/// The rows as plain text.
+pub fn plain(rows: &[CaseRow]) -> String {
+    let case_width = rows.iter().map(|row| row.case.chars().count()).max().unwrap_or(0);
+    let quantity_width = rows.iter().map(|row| row.quantity.chars().count()).max().unwrap_or(0);
+    let line = |row: &CaseRow| {
+        let value = row.value.map_or("never".to_owned(), |value| format!("{value:.4}"));
+        let met = if row.is_met() { "" } else { "  MISSED" };
+        format!(
+            "{:case_width$}  {:18}  {:quantity_width$}  {value:>10} {:2}  at most {:.4}{met}\n",
+            row.case, row.cell, row.quantity, row.unit, row.required
+        )
+    };
+    rows.iter().map(line).collect()
+}
