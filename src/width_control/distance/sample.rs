@@ -13,9 +13,6 @@ const UNMODELLED_RATIO: f64 = 0.17;
 /// Largest relative standard deviation by the flow that a model does not predict; a width with
 /// more says more about the flow's transient than about the bead.
 const MAX_UNMODELLED_SIGMA: f64 = 0.03;
-/// Exponent with which an error of the offset is considered, over the estimated one: that may be
-/// too small, and a wrong offset then looks like a step of the flow.
-const OFFSET_EXPONENT_RATIO: f64 = 1.5;
 /// Variance by the uncertain offset, over that of the width, from which a sample does not
 /// validate the model.
 const MAX_OFFSET_VARIANCE: f64 = 0.5;
@@ -77,8 +74,7 @@ impl MatchedWidth {
         let half = 0.5 * length_mm;
         let over = history.mean_over(position_mm - half, position_mm + half)?;
         let beside = |by: f64| history.mean_near(position_mm - half + by, position_mm + half + by);
-        let slope =
-            |by: f64| Some(-OFFSET_EXPONENT_RATIO * exponent * (beside(by)?.mean - over.mean));
+        let slope = |by: f64| Some(-exponent * (beside(by)?.mean - over.mean));
         let unmodelled =
             UNMODELLED_RATIO * history.flow_change_over(position_mm - half, position_mm + half)?;
         if unmodelled > MAX_UNMODELLED_SIGMA {
@@ -150,7 +146,7 @@ mod tests {
     #[test]
     fn at_a_change_of_speed_the_offset_decides_on_which_side_the_gauge_lies() {
         let at = sample_at(60.0);
-        let half = OFFSET_EXPONENT_RATIO * 0.5 * 0.25 * 0.6_f64.ln();
+        let half = 0.5 * 0.25 * 0.6_f64.ln();
         let [ahead, behind] = at.offset_slopes;
         assert!((ahead + half).abs() < 1e-9 && (behind - half).abs() < 1e-9, "{at:?}");
         assert!(at.is_offset_sensitive());
