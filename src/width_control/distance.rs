@@ -146,6 +146,7 @@ impl DistanceController {
         self.speed_history.clear();
         self.steps.clear();
         self.model.begin_bead();
+        self.noise.begin_bead();
         self.validation = ModelValidation::default();
         (self.unmatched_since_mm, self.is_unmatched) = (None, false);
     }
@@ -240,19 +241,19 @@ impl DistanceController {
         let observation = WidthObservation {
             ln_width: sample.ln_width - pulsation,
             ln_speed: sample.ln_speed,
-            offset_slopes: sample.offset_slopes,
+            ln_speed_beside: sample.ln_speed_beside,
             variance,
         };
         let innovation = self.model.innovation(&observation);
         self.validation.update(sample, innovation, libm::log(target.max(1e-3)), drift);
         if !self.steps.is_under_way() && self.model.is_known() {
-            self.noise.observe(innovation.normalised_squared(), spacing);
+            self.noise.observe(innovation.normalised(), sample.position_mm);
         }
         let taken = self.update(sample, &observation);
         if taken != WidthUse::Change {
             let value = sample.ln_width + self.model.exponent() * sample.ln_speed;
             let MatchedWidth { laid_s, lasted_s, .. } = *sample;
-            let variance = variance + sample.offset_variance();
+            let variance = variance + sample.offset_variance;
             self.pulsation.update(&PulsationSample { laid_s, lasted_s, value, variance, drift });
         }
         taken

@@ -46,6 +46,9 @@ const MAX_SPACING_GAUGES: f64 = 0.1;
 const MAX_POSITIONS: usize = 10;
 /// Smallest prior of a position: widths of a robot that hardly moves.
 const MIN_PRIOR: f64 = 1e-6;
+/// Iterations of the fit without a step (Gauss-Newton): an error of the offset has the more effect
+/// the larger b is.
+const ITERATIONS: usize = 3;
 /// Shortest gauge \[mm\]: a width at a point, as of a plant without a camera, counts as one.
 const MIN_GAUGE_MM: f64 = 1.0;
 /// Length after a step, beyond the gauge, after which it is part of the model, in gauges.
@@ -183,15 +186,13 @@ impl StepDetector {
         let Some(base) = self.records.front().map(|record| record.before) else {
             return Vec::new();
         };
-        let residuals = self.residuals(&base, scale);
+        let residuals = self.residuals(&base, scale, &base.estimate());
         let mut changed =
             (0..residuals.len()).rev().filter(|number| residuals[*number].is_changed());
         // After a later step too few widths would have changed.
         let Some(last) = changed.nth(MIN_WIDTHS - 1) else { return Vec::new() };
         let Some(mut before) = NormalEquations::new(&base) else { return Vec::new() };
-        let Some(without_step) = before.misfit_without_step(&residuals) else {
-            return Vec::new();
-        };
+        let Some(without_step) = self.misfit_without_step(&base, scale) else { return Vec::new() };
         let mut found = Vec::new();
         for number in 1..=last {
             let (widths_before, after) = residuals.split_at(number);
@@ -225,19 +226,45 @@ impl StepDetector {
         Changed { fraction: after.clamp(0.0, 1.0), residual: *residual }
     }
 
-    /// The widths less their prediction by the model before all of them.
-    fn residuals(&self, base: &WidthModel, scale: f64) -> Vec<Residual> {
+    /// The widths less their prediction by the model before all of them, linear about a state.
+    fn residuals(&self, base: &WidthModel, scale: f64, about: &Vector4<f64>) -> Vec<Residual> {
+        let change = about - base.estimate();
         let residual = |record: &WidthRecord| {
             let observation = &record.observation;
+            let slopes = observation.slopes(about);
             Residual {
                 front_mm: record.front_mm,
-                by: base.innovation(observation).by,
-                slopes: observation.slopes(),
+                by: observation.ln_width - observation.predicted(about) + slopes.dot(&change),
+                slopes,
                 variance: observation.variance * scale,
                 is_outlier: record.is_outlier,
             }
         };
         self.records.iter().map(residual).collect()
+    }
+
+    /// Misfit of all widths without a step: either all of them are as they should be, or those far
+    /// from the model before are outliers.
+    fn misfit_without_step(&self, base: &WidthModel, scale: f64) -> Option<f64> {
+        let equations = NormalEquations::new(base)?;
+        let far = |one: &Residual| one.misfit() > OUTLIER_MISFIT;
+        let outliers: Vec<bool> =
+            self.residuals(base, scale, &base.estimate()).iter().map(far).collect();
+        let least = |leaves_out: bool| {
+            let mut about = base.estimate();
+            let mut misfit = None;
+            for _ in 0..ITERATIONS {
+                let mut all = equations;
+                for (one, left) in self.residuals(base, scale, &about).iter().zip(&outliers) {
+                    all.add_unless_outlier(&Residual { is_outlier: leaves_out && *left, ..*one });
+                }
+                let found = all.solve()?;
+                about = base.estimate() + found.change;
+                misfit = Some(found.misfit);
+            }
+            misfit
+        };
+        Some(least(false)?.min(least(true)?))
     }
 }
 
@@ -272,6 +299,13 @@ struct NormalEquations {
     weighted: Vector4<f64>,
     /// Misfit of the model before all widths, of those that are in the equations and of the
     /// outliers.
+    misfit: f64,
+}
+
+/// Errors of the model before all widths, without a step.
+struct Errors {
+    change: Vector4<f64>,
+    /// What they leave, as a negative log likelihood.
     misfit: f64,
 }
 
@@ -319,21 +353,10 @@ impl NormalEquations {
         }
     }
 
-    /// Misfit of all widths without a step: either all of them are as they should be, or those far
-    /// from the model before are outliers.
-    fn misfit_without_step(&self, residuals: &[Residual]) -> Option<f64> {
-        let (mut all, mut without_outliers) = (*self, *self);
-        for one in residuals {
-            all.add(one);
-            let is_outlier = one.misfit() > OUTLIER_MISFIT;
-            without_outliers.add_unless_outlier(&Residual { is_outlier, ..*one });
-        }
-        Some(all.least_misfit()?.min(without_outliers.least_misfit()?))
-    }
-
-    fn least_misfit(&self) -> Option<f64> {
+    /// The errors that explain the widths, and what they leave.
+    fn solve(&self) -> Option<Errors> {
         let change = self.information.try_inverse()? * self.weighted;
-        Some(self.misfit - 0.5 * self.weighted.dot(&change))
+        Some(Errors { change, misfit: self.misfit - 0.5 * self.weighted.dot(&change) })
     }
 
     /// The step that explains the widths after it.
@@ -431,7 +454,7 @@ mod tests {
     }
 
     fn width(ln_width: f64) -> WidthObservation {
-        WidthObservation { ln_width, ln_speed: -0.3, offset_slopes: [0.0; 2], variance: 3e-5 }
+        WidthObservation { ln_width, ln_speed: -0.3, ln_speed_beside: [0.0; 2], variance: 3e-5 }
     }
 
     /// Widths every 1.5 mm over a flow that steps at 100 mm, until the gauge's end has come as far

@@ -1,14 +1,17 @@
 //! The noise of a width as an estimate of the bead: its roughness, and the measurement.
 
+use std::collections::VecDeque;
 use std::f64::consts::PI;
 
 /// Smallest part of the correlation length over which two widths differ at all.
 const MIN_SPACING_RATIO: f64 = 0.01;
 /// Path over which innovations are averaged \[mm\].
 const AVERAGED_MM: f64 = 300.0;
-/// Normalised innovations squared are clipped at seven standard deviations: an outlier in fifty
-/// widths makes the noise at most twice as large. The mean of a consistent filter stays 1.
-const MAX_NIS: f64 = 50.0;
+/// Innovations are clipped at this many standard deviations: an outlier in fifty widths makes the
+/// noise at most twice as large. The mean square of a consistent filter stays 1.
+const MAX_SIGMAS: f64 = 7.0;
+/// Largest number of innovations that are kept.
+const MAX_KEPT: usize = 256;
 
 /// Roughness of a bead: a stationary process along it whose autocorrelation is
 /// exp(−(distance/length)²).
@@ -21,14 +24,23 @@ pub struct BeadRoughness {
 }
 
 /// Noise of a series of widths along the bead.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct WidthNoise {
     /// Integral of the autocovariance over all distances \[mm\].
     density_mm: f64,
     /// Distance over which widths are independent \[mm\].
     reach_mm: f64,
-    /// Moving average of the normalised innovation squared.
+    /// Moving average of half the squared difference of two normalised innovations that are
+    /// independent.
     nis: f64,
+    /// The last normalised innovations, over the distance over which they depend on each other.
+    last: VecDeque<Innovation>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Innovation {
+    position_mm: f64,
+    normalised: f64,
 }
 
 impl WidthNoise {
@@ -39,6 +51,7 @@ impl WidthNoise {
             density_mm: roughness.ratio * roughness.ratio * reach,
             reach_mm: gauge_mm + reach,
             nis: 1.0,
+            last: VecDeque::new(),
         }
     }
 
@@ -50,10 +63,31 @@ impl WidthNoise {
         self.density_mm / spacing_mm.clamp(least, self.reach_mm)
     }
 
-    /// Adds a normalised innovation squared, of a width after this much path \[mm\].
-    pub fn observe(&mut self, squared: f64, spacing_mm: f64) {
-        let weight = -libm::expm1(-spacing_mm / AVERAGED_MM);
-        self.nis += weight * (squared.min(MAX_NIS) - self.nis);
+    /// Discards the last innovations.
+    pub fn begin_bead(&mut self) {
+        self.last.clear();
+    }
+
+    /// Adds a normalised innovation of a width at a position \[mm\]. Only its difference to an
+    /// independent one counts: innovations that agree along the bead are a drift of the flow.
+    pub fn observe(&mut self, normalised: f64, position_mm: f64) {
+        let normalised = normalised.clamp(-MAX_SIGMAS, MAX_SIGMAS);
+        let spacing = self.last.back().map_or(0.0, |last| position_mm - last.position_mm);
+        if spacing <= 0.0 && !self.last.is_empty() {
+            return;
+        }
+        self.last.push_back(Innovation { position_mm, normalised });
+        let mut independent = None;
+        while self.last.len() > MAX_KEPT
+            || self.last.front().is_some_and(|one| position_mm - one.position_mm >= self.reach_mm)
+        {
+            independent = self.last.pop_front();
+        }
+        let Some(before) = independent else { return };
+        self.last.push_front(before);
+        let squared = 0.5 * (normalised - before.normalised).powi(2);
+        let weight = -libm::expm1(-spacing / AVERAGED_MM);
+        self.nis += weight * (squared - self.nis);
     }
 
     /// How much larger than predicted innovations have been, as a variance; at least 1.
@@ -65,6 +99,7 @@ impl WidthNoise {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sim::hash;
 
     #[test]
     fn widths_close_together_count_as_one() {
@@ -76,16 +111,31 @@ mod tests {
         assert!((noise.variance(500.0).sqrt() * 42.0 - 0.071).abs() < 0.01);
     }
 
+    /// Innovations of a standard deviation every two millimetres from a position on.
+    fn observe(noise: &mut WidthNoise, from_mm: f64, innovation: impl Fn(f64) -> f64) {
+        for number in 0..400_u32 {
+            let position = from_mm + 2.0 * f64::from(number);
+            noise.observe(innovation(position), position);
+        }
+    }
+
+    fn normal(position: f64) -> f64 {
+        hash::normal_pair(hash::mix(&[11, position.to_bits()]))[0]
+    }
+
     #[test]
     fn innovations_that_are_too_large_make_the_noise_larger_and_small_ones_do_not_lower_it() {
         let mut noise = WidthNoise::new(BeadRoughness { ratio: 0.0025, length_mm: 5.0 }, 12.7);
-        for _ in 0..400 {
-            noise.observe(0.2, 2.0);
-        }
+        observe(&mut noise, 0.0, |position| 0.5 * normal(position));
         assert_eq!(noise.excess(), 1.0);
-        for _ in 0..400 {
-            noise.observe(4.0, 2.0);
-        }
-        assert!((noise.excess() - 4.0).abs() < 0.3, "{noise:?}");
+        observe(&mut noise, 800.0, |position| 2.0 * normal(position));
+        assert!((noise.excess() - 4.0).abs() < 1.0, "{noise:?}");
+    }
+
+    #[test]
+    fn innovations_that_agree_along_the_bead_are_no_noise() {
+        let mut noise = WidthNoise::new(BeadRoughness { ratio: 0.0025, length_mm: 5.0 }, 12.7);
+        observe(&mut noise, 0.0, |position| 3.0 * libm::sin(position / 150.0));
+        assert_eq!(noise.excess(), 1.0);
     }
 }

@@ -53,9 +53,11 @@ pub struct MatchedWidth {
     pub ln_speed: f64,
     /// Variance of `ln_width` by the measurement and the unmodelled flow.
     pub noise: f64,
-    /// By how much ln w would differ if the gauge were its tolerance further on, and further
-    /// back.
-    pub offset_slopes: [f64; 2],
+    /// By how much `ln_speed` would differ if the gauge were its tolerance further on, and
+    /// further back.
+    pub ln_speed_beside: [f64; 2],
+    /// Variance of `ln_width` by the uncertain offset.
+    pub offset_variance: f64,
 }
 
 impl MatchedWidth {
@@ -74,7 +76,9 @@ impl MatchedWidth {
         let half = 0.5 * length_mm;
         let over = history.mean_over(position_mm - half, position_mm + half)?;
         let beside = |by: f64| history.mean_near(position_mm - half + by, position_mm + half + by);
-        let slope = |by: f64| Some(-exponent * (beside(by)?.mean - over.mean));
+        let differs = |by: f64| Some(beside(by)?.mean - over.mean);
+        let ln_speed_beside = [differs(off_mm)?, differs(-off_mm)?];
+        let squares: f64 = ln_speed_beside.iter().map(|by| (exponent * by).powi(2)).sum();
         let unmodelled =
             UNMODELLED_RATIO * history.flow_change_over(position_mm - half, position_mm + half)?;
         if unmodelled > MAX_UNMODELLED_SIGMA {
@@ -91,24 +95,19 @@ impl MatchedWidth {
             noise: fraction * fraction
                 + MIN_RELATIVE_SIGMA * MIN_RELATIVE_SIGMA
                 + unmodelled * unmodelled,
-            offset_slopes: [slope(off_mm)?, slope(-off_mm)?],
+            ln_speed_beside,
+            offset_variance: OFFSET_ERROR_VARIANCE * squares,
         })
     }
 
     /// Variance of `ln_width`, with that by the uncertain offset.
     pub fn variance(&self) -> f64 {
-        self.noise + self.offset_variance()
+        self.noise + self.offset_variance
     }
 
     /// Whether an error of the offset hides what it says of the bead.
     pub fn is_offset_sensitive(&self) -> bool {
-        self.offset_variance() > MAX_OFFSET_VARIANCE * self.noise
-    }
-
-    /// Variance of `ln_width` by the uncertain offset.
-    pub fn offset_variance(&self) -> f64 {
-        let [ahead, behind] = self.offset_slopes;
-        OFFSET_ERROR_VARIANCE * (ahead * ahead + behind * behind)
+        self.offset_variance > MAX_OFFSET_VARIANCE * self.noise
     }
 }
 
@@ -137,7 +136,7 @@ mod tests {
     #[test]
     fn far_from_a_change_of_speed_the_offset_adds_no_uncertainty() {
         let before = sample_at(40.0);
-        assert!(before.offset_slopes == [0.0; 2] && before.ln_speed.abs() < 1e-9);
+        assert!(before.ln_speed_beside == [0.0; 2] && before.ln_speed.abs() < 1e-9);
         assert!((before.laid_s - 0.4).abs() < 1e-9);
         assert!((before.noise - (1e-4 + 2.5e-7)).abs() < 1e-12);
         assert!(!before.is_offset_sensitive());
@@ -146,9 +145,9 @@ mod tests {
     #[test]
     fn at_a_change_of_speed_the_offset_decides_on_which_side_the_gauge_lies() {
         let at = sample_at(60.0);
-        let half = 0.5 * 0.25 * 0.6_f64.ln();
-        let [ahead, behind] = at.offset_slopes;
-        assert!((ahead + half).abs() < 1e-9 && (behind - half).abs() < 1e-9, "{at:?}");
+        let half = 0.5 * 0.6_f64.ln();
+        let [ahead, behind] = at.ln_speed_beside;
+        assert!((ahead - half).abs() < 1e-9 && (behind + half).abs() < 1e-9, "{at:?}");
         assert!(at.is_offset_sensitive());
     }
 

@@ -60,9 +60,9 @@ pub struct WidthObservation {
     pub ln_width: f64,
     /// ln(v/v₀).
     pub ln_speed: f64,
-    /// By how much ln w would differ if the gauge were the offset's tolerance further on, and
-    /// further back.
-    pub offset_slopes: [f64; 2],
+    /// By how much `ln_speed` would differ if the gauge were the offset's tolerance further on,
+    /// and further back.
+    pub ln_speed_beside: [f64; 2],
     /// Variance of `ln_width`, without that of the offset.
     pub variance: f64,
 }
@@ -77,6 +77,11 @@ pub struct WidthInnovation {
 }
 
 impl WidthInnovation {
+    /// In standard deviations.
+    pub fn normalised(&self) -> f64 {
+        self.by / self.variance.sqrt()
+    }
+
     /// Normalised innovation squared.
     pub fn normalised_squared(&self) -> f64 {
         self.by * self.by / self.variance
@@ -157,9 +162,9 @@ impl WidthModel {
 
     /// The innovation of an observation.
     pub fn innovation(&self, observation: &WidthObservation) -> WidthInnovation {
-        let slopes = observation.slopes();
+        let slopes = observation.slopes(&self.state);
         WidthInnovation {
-            by: observation.ln_width - slopes.dot(&self.state),
+            by: observation.ln_width - observation.predicted(&self.state),
             variance: slopes.dot(&(self.covariance * slopes)).max(0.0) + observation.variance,
         }
     }
@@ -175,7 +180,7 @@ impl WidthModel {
         // The gain is at most one half: a single width may be an outlier.
         let spread = innovation.variance - observation.variance;
         let noise = observation.variance.max(spread);
-        let slopes = observation.slopes();
+        let slopes = observation.slopes(&self.state);
         let informed = self.covariance * slopes;
         let mut gain = informed / (spread + noise);
         gain.y = if learns && self.learns_exponent {
@@ -257,10 +262,21 @@ impl WidthModel {
 }
 
 impl WidthObservation {
-    /// Derivatives of the predicted ln w with respect to ln A, b and the errors of the offset.
-    pub fn slopes(&self) -> Vector4<f64> {
-        let [ahead, behind] = self.offset_slopes;
-        Vector4::new(1.0, -self.ln_speed, ahead, behind)
+    /// ln(v/v₀) with the errors of the offset in a state.
+    fn ln_speed_at(&self, state: &Vector4<f64>) -> f64 {
+        let [ahead, behind] = self.ln_speed_beside;
+        self.ln_speed + state.z * ahead + state.w * behind
+    }
+
+    /// ln w that a state predicts.
+    pub fn predicted(&self, state: &Vector4<f64>) -> f64 {
+        state.x - state.y * self.ln_speed_at(state)
+    }
+
+    /// Derivatives of the predicted ln w with respect to the state.
+    pub fn slopes(&self, state: &Vector4<f64>) -> Vector4<f64> {
+        let [ahead, behind] = self.ln_speed_beside;
+        Vector4::new(1.0, -self.ln_speed_at(state), -state.y * ahead, -state.y * behind)
     }
 }
 
@@ -288,7 +304,7 @@ mod tests {
     use super::*;
 
     fn observed(ln_width: f64, ln_speed: f64) -> WidthObservation {
-        WidthObservation { ln_width, ln_speed, offset_slopes: [0.0; 2], variance: 1e-6 }
+        WidthObservation { ln_width, ln_speed, ln_speed_beside: [0.0; 2], variance: 1e-6 }
     }
 
     #[test]
