@@ -38,7 +38,7 @@ pub use sample::WidthReading;
 use sample::{GaugeInterval, MatchedWidth};
 use speed_history::SpeedHistory;
 use validation::ModelValidation;
-use width_model::{WidthModel, WidthObservation};
+use width_model::{WidthInnovation, WidthModel, WidthObservation};
 
 /// Settings of control by distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,6 +115,7 @@ pub struct DistanceController {
     model: WidthModel,
     noise: WidthNoise,
     steps: StepDetector,
+    outliers: OutlierRun,
     pulsation: FlowPulsation,
     validation: ModelValidation,
     /// Path of the nozzle at the first of the latest widths without a known speed \[mm\].
@@ -134,6 +135,7 @@ impl DistanceController {
             model: WidthModel::new(settings.exponent, settings.learns_exponent),
             noise: WidthNoise::new(settings.roughness, gauge.get()),
             steps: StepDetector::new(gauge.get()),
+            outliers: OutlierRun::default(),
             pulsation: FlowPulsation::new(),
             validation: ModelValidation::default(),
             unmatched_since_mm: None,
@@ -145,6 +147,7 @@ impl DistanceController {
     pub fn begin_bead(&mut self) {
         self.speed_history.clear();
         self.steps.clear();
+        self.outliers = OutlierRun::default();
         self.model.begin_bead();
         self.noise.begin_bead();
         self.validation = ModelValidation::default();
@@ -233,11 +236,13 @@ impl DistanceController {
     fn take_sample(&mut self, sample: &MatchedWidth, target: f64) -> WidthUse {
         let spacing = self.model.distance_to(sample.position_mm);
         let drift = self.drift_per_mm() * spacing;
-        let variance = sample.noise + self.noise.variance(spacing);
+        let width_variance = sample.noise + self.noise.variance(spacing);
         self.model.advance_to(sample.position_mm, drift);
         self.model.move_to(sample.ln_speed);
         let half = 0.5 * sample.lasted_s;
         let pulsation = self.pulsation_between(sample.laid_s - half, sample.laid_s + half);
+        let variance =
+            width_variance + self.pulsation_variance(sample.laid_s - half, sample.laid_s + half);
         let observation = WidthObservation {
             ln_width: sample.ln_width - pulsation,
             ln_speed: sample.ln_speed,
@@ -253,7 +258,7 @@ impl DistanceController {
         if taken != WidthUse::Change {
             let value = sample.ln_width + self.model.exponent() * sample.ln_speed;
             let MatchedWidth { laid_s, lasted_s, .. } = *sample;
-            let variance = variance + sample.offset_variance;
+            let variance = width_variance + sample.offset_variance;
             self.pulsation.update(&PulsationSample { laid_s, lasted_s, value, variance, drift });
         }
         taken
@@ -287,9 +292,15 @@ impl DistanceController {
         }
         let observation =
             WidthObservation { variance: observation.variance * excess, ..*observation };
-        if self.model.innovation(&observation).is_outlier() {
-            return WidthUse::Outlier;
+        let innovation = self.model.innovation(&observation);
+        if innovation.is_outlier() {
+            if !self.outliers.agree(innovation, front, self.settings.gauge.get()) {
+                return WidthUse::Outlier;
+            }
+            self.model.update(&observation.weighted_as_no_outlier(&innovation), false);
+            return WidthUse::Taken;
         }
+        self.outliers = OutlierRun::default();
         self.model.update(&observation, self.model.informs_exponent(sample.ln_speed));
         WidthUse::Taken
     }
@@ -297,6 +308,10 @@ impl DistanceController {
     /// Mean pulsation of ln w of bead laid between two times \[s\].
     fn pulsation_between(&self, from_s: f64, to_s: f64) -> f64 {
         if self.settings.cancels_pulsation { self.pulsation.mean(from_s, to_s) } else { 0.0 }
+    }
+
+    fn pulsation_variance(&self, from_s: f64, to_s: f64) -> f64 {
+        if self.settings.cancels_pulsation { self.pulsation.variance(from_s, to_s) } else { 0.0 }
     }
 
     fn drift_per_mm(&self) -> f64 {
@@ -316,6 +331,29 @@ impl DistanceController {
     }
 }
 
+/// Outliers in a row on the same side of their predictions.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct OutlierRun {
+    count: usize,
+    is_above: bool,
+    from_mm: f64,
+}
+
+impl OutlierRun {
+    /// Adds an outlier; whether these outliers are many and span more than a gauge: then it is the
+    /// flow that is not as predicted.
+    fn agree(&mut self, innovation: WidthInnovation, front_mm: f64, gauge_mm: f64) -> bool {
+        let is_above = innovation.by > 0.0;
+        if self.count == 0 || is_above != self.is_above {
+            *self = Self { count: 0, is_above, from_mm: front_mm };
+        }
+        self.count += 1;
+        self.count > MAX_OUTLIERS && front_mm - self.from_mm > gauge_mm
+    }
+}
+
+/// Outliers in a row on the same side that are left out.
+const MAX_OUTLIERS: usize = 3;
 /// Length of the speed history over the distance from the nozzle to the far end of the gauge.
 const HISTORY_FACTOR: f64 = 2.0;
 /// Path over which widths may have no known speed, beyond the start of a bead \[mm\]. A

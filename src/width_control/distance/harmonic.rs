@@ -106,6 +106,15 @@ impl Harmonic {
         kept_by_mean(self.rad_per_s * lasted_s)
     }
 
+    /// Expected square of that mean.
+    pub fn mean_square(&self, from_s: f64, to_s: f64) -> f64 {
+        let (sin, cos) = libm::sincos(self.rad_per_s * 0.5 * (from_s + to_s));
+        let [_, _, _, p11, p12, p22] = self.covariance;
+        let variance = cos * cos * p11 + 2.0 * cos * sin * p12 + sin * sin * p22;
+        let kept = kept_by_mean(self.rad_per_s * (to_s - from_s));
+        self.mean(from_s, to_s).powi(2) + kept * kept * variance
+    }
+
     /// Mean of the pulsation between two times after the last value \[s\].
     pub fn mean(&self, from_s: f64, to_s: f64) -> f64 {
         self.at(0.5 * (from_s + to_s)) * kept_by_mean(self.rad_per_s * (to_s - from_s))

@@ -122,6 +122,17 @@ impl FlowPulsation {
         self.likely().map(|hypothesis| hypothesis.weight * mean(&hypothesis.harmonic)).sum()
     }
 
+    /// Variance of that mean: of every hypothesis, and between them.
+    pub fn variance(&self, from_s: f64, to_s: f64) -> f64 {
+        let Some(last) = self.last_s else { return 0.0 };
+        let mean = self.mean(from_s, to_s);
+        let squares: f64 = self
+            .likely()
+            .map(|one| one.weight * one.harmonic.mean_square(from_s - last, to_s - last))
+            .sum();
+        (squares - mean * mean).max(0.0)
+    }
+
     /// Period of the most probable pulsation \[s\]; none where no pulsation is more probable.
     pub fn period_s(&self) -> Option<f64> {
         let all: f64 = self.likely().map(|hypothesis| hypothesis.weight).sum();

@@ -268,6 +268,12 @@ impl WidthObservation {
         self.ln_speed + state.z * ahead + state.w * behind
     }
 
+    /// With so large a variance that it is just no outlier.
+    pub fn weighted_as_no_outlier(self, innovation: &WidthInnovation) -> Self {
+        let more = innovation.by * innovation.by / OUTLIER_SQUARED - innovation.variance;
+        Self { variance: self.variance + more.max(0.0), ..self }
+    }
+
     /// ln w that a state predicts.
     pub fn predicted(&self, state: &Vector4<f64>) -> f64 {
         state.x - state.y * self.ln_speed_at(state)
