@@ -12,7 +12,10 @@ pub mod table;
 mod tests;
 
 pub use contender::{ControlSetup, LoopRates};
-pub use disturbed::{BeadErrors, FlowDisturbance, Mismatch, error_ratio, mismatched, step_settles};
+pub use disturbed::{
+    BeadErrors, FlowDisturbance, Mismatch, NEAR_OFFSET, error_ratio, mismatched, realistic,
+    step_settles,
+};
 pub use layers::{LayerResult, lay, settles_unseen, with_frames};
 pub use stack::{Stack, TowerLayer, stack, tower};
 pub use stand_off::{StandOff, camera_above, stand_off};

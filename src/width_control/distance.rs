@@ -17,6 +17,7 @@
 mod flow_step;
 mod harmonic;
 mod noise;
+mod outlier_run;
 mod pulsation;
 mod sample;
 mod speed_history;
@@ -33,12 +34,13 @@ use crate::core::{Mm, MmPerS, Span, Stamp};
 use flow_step::StepDetector;
 pub use noise::BeadRoughness;
 use noise::WidthNoise;
+use outlier_run::OutlierRun;
 use pulsation::{FlowPulsation, PulsationSample};
 pub use sample::WidthReading;
 use sample::{GaugeInterval, MatchedWidth};
 use speed_history::SpeedHistory;
 use validation::ModelValidation;
-use width_model::{WidthInnovation, WidthModel, WidthObservation};
+use width_model::{WidthModel, WidthObservation};
 
 /// Settings of control by distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -331,29 +333,6 @@ impl DistanceController {
     }
 }
 
-/// Outliers in a row on the same side of their predictions.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct OutlierRun {
-    count: usize,
-    is_above: bool,
-    from_mm: f64,
-}
-
-impl OutlierRun {
-    /// Adds an outlier; whether these outliers are many and span more than a gauge: then it is the
-    /// flow that is not as predicted.
-    fn agree(&mut self, innovation: WidthInnovation, front_mm: f64, gauge_mm: f64) -> bool {
-        let is_above = innovation.by > 0.0;
-        if self.count == 0 || is_above != self.is_above {
-            *self = Self { count: 0, is_above, from_mm: front_mm };
-        }
-        self.count += 1;
-        self.count > MAX_OUTLIERS && front_mm - self.from_mm > gauge_mm
-    }
-}
-
-/// Outliers in a row on the same side that are left out.
-const MAX_OUTLIERS: usize = 3;
 /// Length of the speed history over the distance from the nozzle to the far end of the gauge.
 const HISTORY_FACTOR: f64 = 2.0;
 /// Path over which widths may have no known speed, beyond the start of a bead \[mm\]. A

@@ -6,6 +6,8 @@ use crate::width_control::strategy::distance::DistanceStrategy;
 use crate::width_control::target::Knot;
 
 const STEP_S: f64 = 0.05;
+/// Length of the gauge of `setup` [mm].
+const GAUGE_MM: f64 = 12.7;
 
 /// The 2022 paper's cell, controlled by distance.
 pub(super) fn by_distance() -> Setup {
@@ -26,7 +28,7 @@ struct Cell {
     line: Line,
     path: f64,
     speed: f64,
-    /// Position and width, as laid.
+    /// Piece by piece, where it begins and its width.
     laid: Vec<(f64, f64)>,
     /// Whether the robot reports its path.
     reports_path: bool,
@@ -51,13 +53,26 @@ impl Cell {
         self.line.now += STEP_S;
         let reported = if self.reports_path { self.path } else { 0.0 };
         let _ = self.line.robot(RobotMode::Print, reported, self.speed);
-        let under = self.path - 88.4;
-        let seen = self.laid.iter().rev().find(|(at, _)| *at <= under).map(|(_, width)| *width);
-        let step = seen.map(|width| self.line.width(width)).unwrap_or_default();
+        let step = self.seen().map(|width| self.line.width(width)).unwrap_or_default();
         if let Some(speed) = self.line.tick() {
             self.speed = speed;
         }
         step
+    }
+
+    /// Mean width over the gauge; `None` before there is bead under its middle.
+    fn seen(&self) -> Option<f64> {
+        let middle = self.path - 88.4;
+        let (from, to) = (middle - 0.5 * GAUGE_MM, middle + 0.5 * GAUGE_MM);
+        let ends = self.laid.iter().skip(1).map(|(at, _)| *at).chain([self.path]);
+        let pieces = self
+            .laid
+            .iter()
+            .zip(ends)
+            .map(|((at, width), end)| ((end.min(to) - at.max(from)).max(0.0), *width));
+        let (length, area) = pieces
+            .fold((0.0, 0.0), |(length, area), (seen, width)| (length + seen, area + seen * width));
+        (middle >= 0.0).then_some(area / length)
     }
 
     fn until(&mut self, path: f64) -> Step {

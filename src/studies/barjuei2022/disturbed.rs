@@ -4,9 +4,10 @@ use rayon::prelude::*;
 
 use super::{ControlSetup, scale};
 use crate::cell::file::{Cell, RunPart};
-use crate::core::Mm;
+use crate::core::{Mm, MmPerS2};
 use crate::numeric::average::mean;
 use crate::numeric::rank::mean_median;
+use crate::scenario::bead::EdgeRoughness;
 use crate::sim::cell::SimCellError;
 use crate::trials::layer::LayerTrial;
 
@@ -14,7 +15,7 @@ use crate::trials::layer::LayerTrial;
 const TARGET_MM: f64 = 42.0;
 /// Distance from camera to nozzle for disturbances along the path: less than the paper's 88.4 mm,
 /// because this distance limits the wavelengths that feedback can attenuate.
-const NEAR_OFFSET: Mm = Mm::constant(60.0);
+pub const NEAR_OFFSET: Mm = Mm::constant(60.0);
 /// Amplitude of waves and pulsations, as a fraction of the flow.
 const AMPLITUDE: f64 = 0.03;
 /// Speed from which lengths of path are derived \[mm/s\]: that of a width of 42 mm, Shojaei
@@ -23,6 +24,22 @@ const SPEED_MM_PER_S: f64 = 80.0;
 /// Path before errors count \[mm\]. Derived: 200 mm to where control begins (Shojaei Barjuei et
 /// al. 2022) and 20 mm for the first setpoints.
 const CONTROL_START_MM: f64 = 220.0;
+/// Standard deviation of a width. Derived: that of the cell of `lab control`, as are the next two.
+const WIDTH_SIGMA: Mm = Mm::constant(0.003);
+/// Roughness of a bead. Derived: as above.
+const ROUGHNESS: EdgeRoughness = EdgeRoughness { sigma_mm: 0.1, length_mm: 5.0 };
+/// Largest acceleration of a robot. Derived: as above.
+const ACCELERATION: MmPerS2 = MmPerS2::constant(2000.0);
+
+/// The cell with the noise of real measurements, a bead that is rough, and a robot with limited
+/// acceleration.
+pub fn realistic(cell: &Cell, run: &RunPart) -> (Cell, RunPart) {
+    let (mut cell, mut run) = (cell.clone(), run.clone());
+    cell.simulation.width_noise = WIDTH_SIGMA;
+    cell.simulation.roughness = ROUGHNESS;
+    run.limits.max_accel = ACCELERATION;
+    (cell, run)
+}
 
 /// A periodic disturbance of the flow.
 #[derive(Debug, Clone, Copy, PartialEq)]

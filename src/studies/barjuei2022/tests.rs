@@ -140,9 +140,10 @@ fn by_distance_a_step_of_the_flow_is_corrected_once_it_is_measured() {
 #[test]
 fn by_distance_slow_waves_and_pulsations_are_attenuated() {
     let (cell, run) = cell();
+    let (cell, run) = realistic(&cell, &run);
     let ratio =
         |rates, what| error_ratio(&cell, &run, ControlSetup::by_distance(rates), what, 6).unwrap();
-    for (wavelength, most) in [(2400.0, [0.43, 0.28]), (1200.0, [0.77, 0.55])] {
+    for (wavelength, most) in [(2400.0, [0.3, 0.28]), (1200.0, [0.77, 0.55]), (600.0, [0.3, 0.3])] {
         for (rates, most) in RATES.into_iter().zip(most) {
             let found = ratio(rates, FlowDisturbance::Wave(wavelength));
             assert!(found <= most, "{wavelength} mm, {rates:?}: {found}");
@@ -157,14 +158,12 @@ fn by_distance_slow_waves_and_pulsations_are_attenuated() {
 }
 
 #[test]
-fn by_distance_a_mismatch_and_outliers_raise_the_error_by_half_at_most() {
+fn by_distance_one_mismatch_costs_little_and_all_at_once_less_than_under_pi() {
     let (cell, run) = cell();
-    let found_with = |rates, exponent, what| {
-        let who = ControlSetup::Distance(rates, exponent);
-        mismatched(&cell, &run, who, what, SEEDS).unwrap()
-    };
+    let (cell, run) = realistic(&cell, &run);
+    let found_with = |who, what| mismatched(&cell, &run, who, what, SEEDS).unwrap();
     for rates in RATES {
-        let nominal = found_with(rates, 0.25, Mismatch::NONE);
+        let nominal = found_with(ControlSetup::by_distance(rates), Mismatch::NONE);
         let cases = [
             (0.25, Mismatch { offset: 1.2, ..Mismatch::NONE }),
             (0.25, Mismatch { offset: 0.8, ..Mismatch::NONE }),
@@ -174,18 +173,17 @@ fn by_distance_a_mismatch_and_outliers_raise_the_error_by_half_at_most() {
             (0.25, Mismatch { missing: 0.2, ..Mismatch::NONE }),
         ];
         for (exponent, what) in cases {
-            let found = found_with(rates, exponent, what);
-            let ratio = found.median_mm / nominal.median_mm;
-            assert!(ratio <= 1.5, "{rates:?}, b {exponent}, {what:?}: {found:?} is {ratio}");
-            let ratio = found.mean_mm / nominal.mean_mm;
-            assert!(ratio <= 1.5, "{rates:?}, b {exponent}, {what:?}: {found:?} is {ratio}");
+            let found = found_with(ControlSetup::Distance(rates, exponent), what);
+            let about = format!("{rates:?}, b {exponent}, {what:?}: {found:?}, {nominal:?}");
+            assert!(found.median_mm <= 1.1 * nominal.median_mm, "{about}");
+            assert!(found.mean_mm <= 1.1 * nominal.mean_mm, "{about}");
         }
-        // All of it at once, in any direction.
         for (exponent, offset) in [(0.375, 1.2), (0.125, 1.2), (0.375, 0.8), (0.125, 0.8)] {
-            let found =
-                found_with(rates, exponent, Mismatch { offset, outliers: 0.1, missing: 0.2 });
-            let ratio = found.median_mm / nominal.median_mm;
-            assert!(ratio <= 1.8, "{rates:?}, b {exponent}, {offset}: {found:?} is {ratio}");
+            let what = Mismatch { offset, outliers: 0.1, missing: 0.2 };
+            let pi = found_with(ControlSetup::Paper, what);
+            let found = found_with(ControlSetup::Distance(rates, exponent), what);
+            assert!(found.median_mm <= pi.median_mm, "{rates:?}, b {exponent}: {found:?}, {pi:?}");
+            assert!(found.mean_mm <= pi.mean_mm, "{rates:?}, b {exponent}: {found:?}, {pi:?}");
         }
     }
 }

@@ -461,7 +461,7 @@ mod tests {
     /// as `until`; one of them may be an outlier.
     fn found(size: f64, until: f64, outlier: Option<usize>) -> Option<FlowStep> {
         let model = known();
-        let ln_width = model.predicted(-0.3);
+        let ln_width = width(0.0).predicted(&model.estimate());
         let mut detector = StepDetector::new(GAUGE);
         let mut last = None;
         let mut front = 60.0;
@@ -504,7 +504,7 @@ mod tests {
             let step = if number >= 10 { 0.08 } else { 0.0 };
             // Two widths at every place.
             let front = 2.0 * f64::from(number / 2);
-            detector.push(front, width(model.predicted(-0.3) + step), model);
+            detector.push(front, width(width(0.0).predicted(&model.estimate()) + step), model);
             last = detector.find(1.0).or(last);
         }
         assert!((last.unwrap().size - 0.08).abs() < 0.01, "{last:?}");

@@ -144,11 +144,6 @@ impl WidthModel {
         (level - known).max(0.0).sqrt()
     }
 
-    /// Predicted ln w at ln(v/v₀).
-    pub fn predicted(&self, ln_speed: f64) -> f64 {
-        self.ln_width() - self.exponent() * ln_speed
-    }
-
     /// Path from the newest position to another \[mm\]; 0 backwards.
     pub fn distance_to(&self, position_mm: f64) -> f64 {
         self.position_mm.map_or(0.0, |last| (position_mm - last).max(0.0))
@@ -313,6 +308,10 @@ mod tests {
         WidthObservation { ln_width, ln_speed, ln_speed_beside: [0.0; 2], variance: 1e-6 }
     }
 
+    fn predicted(model: &WidthModel, ln_speed: f64) -> f64 {
+        observed(0.0, ln_speed).predicted(&model.estimate())
+    }
+
     #[test]
     fn two_speeds_identify_level_and_exponent() {
         let mut model = WidthModel::new(0.25, true);
@@ -323,7 +322,7 @@ mod tests {
         }
         assert!((model.exponent() - 0.31).abs() < 1e-3, "{model:?}");
         assert!((model.ln_width() - 3.7).abs() < 1e-3);
-        assert!((model.predicted(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 5e-4);
+        assert!((predicted(&model, -0.4) - (3.7 + 0.31 * 0.4)).abs() < 5e-4);
     }
 
     #[test]
@@ -335,7 +334,7 @@ mod tests {
             model.update(&observed(3.7 - 0.31 * u, u), true);
         }
         assert_eq!(model.exponent(), 0.25);
-        assert!((model.predicted(-0.4) - (3.7 + 0.31 * 0.4)).abs() < 1e-3);
+        assert!((predicted(&model, -0.4) - (3.7 + 0.31 * 0.4)).abs() < 1e-3);
     }
 
     #[test]
@@ -347,7 +346,7 @@ mod tests {
             model.update(&observed(3.7 - 0.05 * u, u), true);
         }
         assert!((model.exponent() - 0.7 * 0.25).abs() < 1e-12);
-        assert!((model.predicted(-0.4) - (3.7 + 0.05 * 0.4)).abs() < 2e-3, "{model:?}");
+        assert!((predicted(&model, -0.4) - (3.7 + 0.05 * 0.4)).abs() < 2e-3, "{model:?}");
     }
 
     #[test]
