@@ -18,9 +18,6 @@ const WAVELENGTHS_MM: [f64; 12] =
 /// Amplitude of single waves.
 const AMPLITUDE: f64 = 0.01;
 
-const RMS: Quantity = Quantity { name: "RMS, median", unit: "mm" };
-const RATIO: Quantity = Quantity { name: "RMS over the larger of PI's and uncontrolled", unit: "" };
-
 /// The rows of a cell.
 pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
     let drawn = |control| {
@@ -32,7 +29,8 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
     let (ours, pi) = (drawn(Control::Distance)?, drawn(Control::Pi)?);
     let (ours_mm, pi_mm) = (quantile(&ours, 0.5), quantile(&pi, 0.5));
     let all = "offset, exponent, drift and wave drawn";
-    let mut rows = vec![CaseRow::new(cell, all, RMS, ours.len(), ours_mm, pi_mm)];
+    let mut rows =
+        vec![CaseRow::new(cell, all, Quantity::mm("RMS, median"), ours.len(), ours_mm, pi_mm)];
     for wavelength_mm in WAVELENGTHS_MM {
         let lay = |control| -> Result<f64, ReproduceError> {
             let mut plan = Plan::new(cell, control)?.long(LENGTH_MM);
@@ -43,7 +41,14 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
         let open = TARGET_MM * AMPLITUDE / std::f64::consts::SQRT_2;
         let ratio = lay(Control::Distance)? / lay(Control::Pi)?.max(open);
         let case = format!("wave of {wavelength_mm} mm");
-        rows.push(CaseRow::new(cell, &case, RATIO, ours.len(), ratio, 1.15));
+        rows.push(CaseRow::new(
+            cell,
+            &case,
+            Quantity::ratio("RMS over the larger of PI's and uncontrolled"),
+            ours.len(),
+            ratio,
+            1.15,
+        ));
     }
     Ok(rows)
 }

@@ -22,10 +22,6 @@ const MIN_SETPOINTS: f64 = 5.0;
 /// Part of a pulsation that a mean over the gauge keeps, from which it is seen.
 const MIN_SEEN: f64 = 0.4;
 
-const MEDIAN: Quantity = Quantity { name: "RMS over uncontrolled, median", unit: "" };
-const MOST: Quantity = Quantity { name: "RMS over uncontrolled, 99 %", unit: "" };
-const LARGEST: Quantity = Quantity { name: "RMS over uncontrolled, largest", unit: "" };
-
 /// The rows of a cell.
 pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
     let row = |case: &str, quantity, ratios: &[f64], fraction, required| {
@@ -41,12 +37,24 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
             let seen = (wave.sin() / wave).abs();
             if seen >= MIN_SEEN && period_s * cell.link_hz >= MIN_SETPOINTS {
                 let case = format!("pulsation {:.0} %, {period_s} s, smooth", 100.0 * amplitude);
-                rows.push(row(&case, MEDIAN, &smooth, 0.5, 0.5));
+                rows.push(row(
+                    &case,
+                    Quantity::ratio("RMS over uncontrolled, median"),
+                    &smooth,
+                    0.5,
+                    0.5,
+                ));
             }
         }
         let case = format!("pulsation, {period_s} s");
-        rows.push(row(&case, MOST, &ratios, 0.99, 1.05));
-        rows.push(row(&case, LARGEST, &ratios, 1.0, 1.15));
+        rows.push(row(&case, Quantity::ratio("RMS over uncontrolled, 99 %"), &ratios, 0.99, 1.05));
+        rows.push(row(
+            &case,
+            Quantity::ratio("RMS over uncontrolled, largest"),
+            &ratios,
+            1.0,
+            1.15,
+        ));
     }
     Ok(rows)
 }

@@ -15,11 +15,6 @@ const AFTER_LOW_MM: f64 = 1400.0;
 /// Path from the first controlled setpoint from which the error counts \[mm\].
 const JUDGED_AFTER_MM: f64 = 500.0;
 
-const SETTLED_MEDIAN: Quantity = Quantity { name: "settled, median", unit: "mm" };
-const SETTLED_MOST: Quantity = Quantity { name: "settled, 95 %", unit: "mm" };
-const RMS_RATIO: Quantity = Quantity { name: "RMS over roughness alone", unit: "" };
-const RMS_SMOOTH: Quantity = Quantity { name: "RMS without roughness", unit: "mm" };
-
 /// The rows of a cell.
 pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
     let plan = Plan::new(cell, Control::Distance)?;
@@ -44,10 +39,10 @@ fn start_rows(cell: LoopCell, plan: &Plan, seeds: u64) -> Result<Vec<CaseRow>, R
     };
     let alone = plan.roughness_over_gauge_mm();
     Ok(vec![
-        row(SETTLED_MEDIAN, quantile(&settled, 0.5), 10.0),
-        row(SETTLED_MOST, quantile(&settled, 0.95), 20.0),
-        row(RMS_RATIO, pooled(&squares) / alone, 1.3),
-        row(RMS_SMOOTH, pooled(&smooth), 0.02),
+        row(Quantity::mm("settled, median"), quantile(&settled, 0.5), 10.0),
+        row(Quantity::mm("settled, 95 %"), quantile(&settled, 0.95), 20.0),
+        row(Quantity::ratio("RMS over roughness alone"), pooled(&squares) / alone, 1.3),
+        row(Quantity::mm("RMS without roughness"), pooled(&smooth), 0.02),
     ])
 }
 
@@ -66,8 +61,8 @@ fn more_flow_rows(cell: LoopCell, plan: &Plan, seeds: u64) -> Result<Vec<CaseRow
         CaseRow::new(cell, "flow +8 %", quantity, settled.len(), value, required)
     };
     Ok(vec![
-        row(SETTLED_MEDIAN, quantile(&settled, 0.5), median),
-        row(SETTLED_MOST, quantile(&settled, 0.95), most),
+        row(Quantity::mm("settled, median"), quantile(&settled, 0.5), median),
+        row(Quantity::mm("settled, 95 %"), quantile(&settled, 0.95), most),
     ])
 }
 
@@ -80,7 +75,7 @@ fn less_flow_row(cell: LoopCell, plan: Plan, seeds: u64) -> Result<CaseRow, Repr
     (flow.step_at_mm, flow.step_until_mm, flow.step_ratio) = (at, until, 0.92);
     let settled = plan.each(seeds, |trial| settled_after(trial, until))?;
     let value = quantile(&settled, 0.95);
-    Ok(CaseRow::new(cell, "flow −8 %", SETTLED_MOST, settled.len(), value, 150.0))
+    Ok(CaseRow::new(cell, "flow −8 %", Quantity::mm("settled, 95 %"), settled.len(), value, 150.0))
 }
 
 fn settled_after(trial: &LayerTrial, at_mm: f64) -> f64 {

@@ -27,10 +27,20 @@ pub struct CaseRow {
 /// What a figure is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantity {
-    /// Its name.
-    pub name: &'static str,
-    /// Its unit.
-    pub unit: &'static str,
+    name: &'static str,
+    unit: &'static str,
+}
+
+impl Quantity {
+    /// A length.
+    pub const fn mm(name: &'static str) -> Self {
+        Self { name, unit: "mm" }
+    }
+
+    /// A ratio.
+    pub const fn ratio(name: &'static str) -> Self {
+        Self { name, unit: "" }
+    }
 }
 
 impl CaseRow {
