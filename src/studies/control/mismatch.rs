@@ -12,7 +12,8 @@ use crate::trials::layer::LayerTrial;
 const LENGTH_MM: f64 = 3000.0;
 /// Path from the first controlled setpoint from which the error counts \[mm\].
 const JUDGED_AFTER_MM: f64 = 100.0;
-/// Wavelengths of single waves \[mm\], from the shortest to the longest.
+/// Wavelengths of single waves \[mm\]. Derived: twelve from 60 to 2400, equidistant in the
+/// logarithm.
 const WAVELENGTHS_MM: [f64; 12] =
     [60.0, 84.0, 117.0, 164.0, 229.0, 320.0, 448.0, 627.0, 877.0, 1226.0, 1715.0, 2400.0];
 /// Amplitude of single waves.

@@ -7,8 +7,8 @@ use std::f64::consts::PI;
 const MIN_SPACING_RATIO: f64 = 0.01;
 /// Path over which innovations are averaged \[mm\].
 const AVERAGED_MM: f64 = 300.0;
-/// Innovations are clipped at this many standard deviations: an outlier in fifty widths makes the
-/// noise at most twice as large. The mean square of a consistent filter stays 1.
+/// Innovations are clipped at this many standard deviations. Derived: 7² / 50 = 1, so that an
+/// outlier in fifty widths makes the noise at most twice as large. The mean square of a consistent filter stays 1.
 const MAX_SIGMAS: f64 = 7.0;
 /// Largest number of innovations that are kept.
 const MAX_KEPT: usize = 256;

@@ -6,8 +6,8 @@ use super::harmonic::Harmonic;
 /// Shortest and longest period \[s\]. Shorter ones are blurred by the gauge; longer ones are
 /// followed as drift.
 const PERIODS_S: (f64, f64) = (0.55, 10.0);
-/// Ratio of one period to the next. Over the memory of 10 periods a harmonic that is off by
-/// half a step, 1 %, loses a tenth of a period.
+/// Ratio of one period to the next. Derived: over the memory of 10 periods a harmonic that is
+/// off by half a step, 1 %, loses a tenth of a period.
 const PERIOD_RATIO: f64 = 1.02;
 /// Prior log odds against a pulsation. A flow change that is not yet detected looks like one
 /// for a while; a smaller value accepts it, a larger one finds a pulsation later.
