@@ -20,6 +20,29 @@ pub fn read_target(control: &Table<'_>) -> Option<Mm> {
     control.number("target_width_mm", 0.1..=1000.0).and_then(|v| Mm::new(v).ok())
 }
 
+/// How well the width must be kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToleranceSettings {
+    /// Largest error of a width.
+    pub tolerance: Mm,
+    /// Largest fraction of the bead's length that may be out of tolerance before a command ends
+    /// with status 3.
+    pub max_out_fraction: f64,
+}
+
+/// Tolerance where the cell gives none, as a fraction of the target, and the fraction of the length
+/// that may be out of it: both by the contract of `[control]`.
+const TOLERANCE_RATIO: f64 = 0.02;
+const MAX_OUT_FRACTION: f64 = 0.05;
+
+/// Reads `tolerance_mm` and `max_out_of_tolerance`.
+pub fn read_tolerance(control: &Table<'_>, target: &WidthTarget) -> Option<ToleranceSettings> {
+    let default = TOLERANCE_RATIO * target.nominal().get();
+    let tolerance = control.number_or("tolerance_mm", 1e-3..=100.0, default);
+    let max_out = control.number_or("max_out_of_tolerance", 0.0..=1.0, MAX_OUT_FRACTION);
+    Some(ToleranceSettings { tolerance: Mm::new(tolerance?).ok()?, max_out_fraction: max_out? })
+}
+
 /// Reads the rest of `[control]`. There are no defaults for gains, nor for the exponent.
 pub fn read_control(
     control: &Table<'_>,

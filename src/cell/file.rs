@@ -22,6 +22,7 @@ use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::strategy::{BeadNoise, WidthControlSettings};
 use crate::width_control::target::WidthTarget;
 
+pub use super::control::ToleranceSettings;
 pub use super::extruder::ExtruderPart;
 
 pub use calibration::CalibrationSource;
@@ -79,6 +80,8 @@ pub struct Cell {
 pub struct RunPart {
     /// The width controller.
     pub control: WidthControlSettings,
+    /// How well the width must be kept.
+    pub tolerance: ToleranceSettings,
     /// Range and acceleration of setpoints.
     pub limits: SpeedLimits,
     /// The camera.
@@ -192,6 +195,8 @@ fn read_cell(root: &Table<'_>, folder: &Path, drivers: &mut dyn DriverTables) ->
         control::check_target(table, layers.as_ref(), target, gauge);
     }
     let control = control_table.as_ref().and_then(|t| control::read_control(t, target.clone()));
+    let tolerance = control_table.as_ref().zip(target.as_ref());
+    let tolerance = tolerance.and_then(|(table, target)| control::read_tolerance(table, target));
     let camera_table = root.run_table("camera");
     let mount = camera_table.as_ref().and_then(read_mount);
     let frame_rate_hz = camera_table.as_ref().and_then(|t| t.number("rate_hz", 0.01..=10_000.0));
@@ -212,9 +217,9 @@ fn read_cell(root: &Table<'_>, folder: &Path, drivers: &mut dyn DriverTables) ->
     let bead = width.zip(speed).map(|(width, speed)| BeadStart { width, speed });
     let context = CellContext { bead, simulation: simulation.as_ref() };
     let extruder = ExtruderPart::read(root, folder, &context, drivers);
-    let run = match (control, limits, camera, robot) {
-        (Some(control), Some(limits), Some(camera), Some(robot)) => {
-            Some(RunPart { control, limits, camera, robot, extruder })
+    let run = match (control, tolerance, limits, camera, robot) {
+        (Some(control), Some(tolerance), Some(limits), Some(camera), Some(robot)) => {
+            Some(RunPart { control, tolerance, limits, camera, robot, extruder })
         }
         _ => None,
     };

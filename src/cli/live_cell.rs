@@ -72,7 +72,8 @@ pub fn live(
     let (extruder, extruder_files) = live_extruder(&loaded, &run)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
     let strategy = extruder.as_ref().map(|side| &side.setup.strategy);
-    let control = Some(ControlFacts::of(&run, strategy));
+    let gauge_length = loaded.cell.gauge_length(&loaded.calibration);
+    let control = Some(ControlFacts::of(&run, gauge_length, strategy));
     let header = about(&run, &*robot, &loaded.path, extruder.as_ref());
     let log = log(&loaded, folders.log, title, header, control)?;
     let record = RecordConfig {

@@ -7,6 +7,7 @@ use super::status::WITH_LOSS;
 use crate::live::{Ending, LiveReport};
 use crate::rows::names;
 use crate::rows::summary::Summary;
+use crate::rows::summary::tolerance::ToleranceSummary;
 
 /// Prints the figures of a run to standard output, and returns its status.
 pub fn tell(report: &LiveReport, out: &Path, max_rejected: f64) -> ExitCode {
@@ -43,6 +44,9 @@ pub fn print_figures(summary: &Summary) {
     }
     if let Some(settled) = control.width_error_rms_settled_mm {
         say!("settled    {settled:.3} mm RMS, from 500 mm after that");
+    }
+    if let Some(words) = control.tolerance.as_ref().and_then(ToleranceSummary::words) {
+        say!("tolerance  {words}");
     }
     if let (Some(p50), Some(p99)) = (control.latency_ms.p50, control.latency_ms.p99) {
         say!("latency    {p50:.2} ms median, {p99:.2} ms p99");
@@ -131,7 +135,22 @@ pub fn status(report: &LiveReport, max_rejected: f64) -> ExitCode {
     {
         return status;
     }
+    if report.ending != Ending::Asked
+        && let Some(status) = status_of_tolerance(&report.summary)
+    {
+        return status;
+    }
     if report.recording.is_err() { ExitCode::from(WITH_LOSS) } else { ExitCode::SUCCESS }
+}
+
+/// Warns of a width that was out of tolerance on too much of the length, and returns the status for
+/// it.
+pub fn status_of_tolerance(summary: &Summary) -> Option<ExitCode> {
+    let tolerance = summary.control.as_ref()?.tolerance.as_ref()?;
+    tolerance.is_exceeded().then(|| {
+        tell!("warning: the width was out of tolerance: {}", tolerance.words().unwrap_or_default());
+        ExitCode::from(WITH_LOSS)
+    })
 }
 
 /// Warns of too many rejected frames, and returns the status for them; `None` if they are few.

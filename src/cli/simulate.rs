@@ -61,7 +61,9 @@ pub fn run(args: &SimulateArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     }
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
     let extruder = simulated_extruder(&loaded)?;
-    let control = ControlFacts::of(&run, extruder.as_ref().map(|side| &side.setup.strategy));
+    let gauge_length = loaded.cell.gauge_length(&loaded.calibration);
+    let strategy = extruder.as_ref().map(|side| &side.setup.strategy);
+    let control = ControlFacts::of(&run, gauge_length, strategy);
     let calibration = loaded.calibration.clone();
     let recorder = SimRecorder::of(args.record.then_some(&args.out), &loaded)?;
     let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, recorder, extruder)?;
@@ -106,7 +108,7 @@ fn status(loaded: &LoadedCell, summary: &Summary, end: LayerEnd) -> ExitCode {
         tell!("warning: {:.1} % of the frames were refused", summary.rejected_fraction() * 100.0);
         return ExitCode::from(WITH_LOSS);
     }
-    ExitCode::SUCCESS
+    outcome::status_of_tolerance(summary).unwrap_or(ExitCode::SUCCESS)
 }
 
 /// Logs the simulation.

@@ -55,6 +55,7 @@ pub fn options(folder: &Path, title: &str, with_control: bool) -> LogOptions {
             },
             extruder: None,
             profile: None,
+            tolerance: None,
         }),
     }
 }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::frame_row::FrameRow;
 use super::output::{LogError, make_folder};
+use super::summary::tolerance::ToleranceRule;
 use super::summary::{RunNote, Summary, SummaryBuilder};
 use super::widths::WidthsWriter;
 use crate::cell::file::RunPart;
@@ -45,17 +46,22 @@ pub struct ControlFacts {
     pub extruder: Option<CommandQuantity>,
     /// Duration of the extruder's profile; `None` without a profile.
     pub profile: Option<Span>,
+    /// What the bead's width is judged by; `None` where it is not controlled.
+    pub tolerance: Option<ToleranceRule>,
 }
 
 impl ControlFacts {
-    /// The facts of a cell's run, with the strategy of its extruder.
-    pub fn of(run: &RunPart, controller: Option<&ExtruderStrategy>) -> Self {
+    /// The facts of a cell's run, whose widths are means over a length of bead, with the strategy of
+    /// its extruder.
+    pub fn of(run: &RunPart, gauge_length: Mm, controller: Option<&ExtruderStrategy>) -> Self {
         let extruder = run.extruder.as_ref().map(|part| part.extruder.drive);
         let profile = controller.and_then(|controller| match controller {
             ExtruderStrategy::Profile(played) => Some(played.lasts()),
             _ => None,
         });
-        Self { limits: run.limits, extruder, profile }
+        // A profile moves the width on purpose.
+        let tolerance = if profile.is_some() { None } else { ToleranceRule::of(run, gauge_length) };
+        Self { limits: run.limits, extruder, profile, tolerance }
     }
 }
 
@@ -107,7 +113,8 @@ impl RunLog {
         Ok(Self {
             widths: WidthsWriter::create(&options.folder, with_control)?,
             summary: SummaryBuilder::new(options.target, with_control)
-                .with_profile(options.control.and_then(|control| control.profile)),
+                .with_profile(options.control.and_then(|control| control.profile))
+                .with_tolerance(options.control.and_then(|control| control.tolerance)),
             page,
             remarks: Vec::new(),
             refused: Vec::new(),

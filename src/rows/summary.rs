@@ -9,6 +9,7 @@ mod image_quality;
 mod note;
 mod profile;
 mod times;
+pub mod tolerance;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -25,6 +26,7 @@ pub use follow::StateFollower;
 pub use image_quality::ImageQuality;
 pub use note::RunNote;
 pub use profile::ProfileSummary;
+use tolerance::ToleranceRule;
 
 use super::frame_row::FrameRow;
 use super::output::{LogError, write_whole};
@@ -164,6 +166,15 @@ impl SummaryBuilder {
     /// `with_control` is for runs with a controller.
     pub fn new(target: Option<Mm>, with_control: bool) -> Self {
         Self { target, control: with_control.then(ControlTally::default), ..Self::default() }
+    }
+
+    /// Sets what the bead's width is judged by.
+    #[must_use]
+    pub fn with_tolerance(mut self, rule: Option<ToleranceRule>) -> Self {
+        if let Some(control) = &mut self.control {
+            control.set_tolerance(rule);
+        }
+        self
     }
 
     /// Sets the duration of the profile that the extruder plays.

@@ -40,6 +40,14 @@ pub fn verdict(summary: &Summary, max_rejected_fraction: f64) -> Verdict {
             // Directly after the sentence about the width.
             sentences.insert(1, sentence);
         }
+        if let Some(tolerance) = &control.tolerance
+            && let Some(words) = tolerance.words()
+        {
+            if tolerance.is_exceeded() {
+                level = level.max(VerdictLevel::Caution);
+            }
+            sentences.push(format!("By length, {words}."));
+        }
     }
     if let Some(extruder) = &summary.extruder {
         let more = extruder_sentences(extruder);

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::follow::{Interval, StateFollower};
 use super::note::RunNote;
 use super::times::Times;
+use super::tolerance::{ToleranceRule, ToleranceSummary, ToleranceTally};
 use crate::control::{Event, State, Step};
 use crate::core::{Mm, Stamp};
 use crate::numeric::statistics::{Distribution, Moments};
@@ -30,6 +31,9 @@ pub struct ControlSummary {
     /// The largest error of the bead laid after control began, with its sign, and the robot's path
     /// at which that bead was laid.
     pub width_error_worst: Option<LargestError>,
+    /// How much of the bead was out of tolerance; absent where the width is not controlled.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<ToleranceSummary>,
     /// Setpoints that were written to the robot.
     pub setpoints_sent: u64,
     /// Time during which a limit acted on the speed.
@@ -104,6 +108,7 @@ pub struct ControlTally {
     error_size: Moments,
     error_settled: Moments,
     worst: Option<LargestError>,
+    tolerance: Option<ToleranceTally>,
     limited_by: Times,
     held_for: Times,
     states: Times,
@@ -129,7 +134,16 @@ enum ControlBegan {
 }
 
 impl ControlTally {
+    pub fn set_tolerance(&mut self, rule: Option<ToleranceRule>) {
+        self.tolerance = rule.map(ToleranceTally::new);
+    }
+
     pub fn frame(&mut self, row: &FrameRow) {
+        if *self.follower.state() != State::Idle
+            && let Some(tolerance) = &mut self.tolerance
+        {
+            tolerance.frame(row);
+        }
         let (Ok(measured), Some(control)) = (&row.outcome, row.control) else { return };
         let Some(target) = control.target else { return };
         let (ControlBegan::At(began) | ControlBegan::Over(began)) = self.began else { return };
@@ -163,6 +177,7 @@ impl ControlTally {
         {
             *self.fault_reasons.entry(names::fault(why)).or_default() += 1;
         }
+        self.follow_bead(now, &before);
         self.began = match (&step.state, self.began) {
             (State::Priming, _) => ControlBegan::NotYet,
             (State::Idle, ControlBegan::At(path)) => ControlBegan::Over(path),
@@ -172,6 +187,19 @@ impl ControlTally {
             }
             (_, began) => began,
         };
+    }
+
+    /// Follows the bead that is being laid.
+    fn follow_bead(&mut self, now: Stamp, before: &State) {
+        let Some(tolerance) = &mut self.tolerance else { return };
+        match (self.follower.state(), self.follower.path()) {
+            (State::Idle, _) => tolerance.end_bead(now),
+            (state, Some(path)) => {
+                let is_new = *state == State::Priming && *before != State::Priming;
+                tolerance.laid_to(now, path, is_new);
+            }
+            (_, None) => {}
+        }
     }
 
     pub fn latency(&mut self, latency_ms: f64, send_wait_ms: f64) {
@@ -199,6 +227,7 @@ impl ControlTally {
             width_error_rms_mm: self.error.rms(),
             width_error_rms_settled_mm: self.error_settled.rms(),
             width_error_worst: self.worst,
+            tolerance: self.tolerance.as_ref().map(ToleranceTally::finish),
             setpoints_sent: self.setpoints,
             limited_s: self.limited_by.total_s(),
             limited_by_s: self.limited_by.seconds(),

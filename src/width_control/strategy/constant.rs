@@ -27,6 +27,10 @@ fn read(control: &Table<'_>) -> Option<Arc<dyn WidthStrategy>> {
 }
 
 impl WidthStrategy for ConstantStrategy {
+    fn controls_width(&self) -> bool {
+        false
+    }
+
     fn controller(&self, _: &CellParameters, _: &WidthControlSettings) -> BoxedController {
         Box::new(*self)
     }

@@ -32,6 +32,11 @@ pub trait WidthStrategy: Any + Debug + Send + Sync {
     /// were read from.
     fn check(&self, _control: &Table<'_>, _start: MmPerS, _limits: SpeedLimits) {}
 
+    /// Whether it is there to keep the width at its target.
+    fn controls_width(&self) -> bool {
+        true
+    }
+
     /// Whether the whole gauge must lie on bead that is laid, not beside the nozzle.
     fn sees_only_laid_bead(&self) -> bool {
         false

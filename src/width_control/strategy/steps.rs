@@ -48,6 +48,10 @@ impl StepsStrategy {
 }
 
 impl WidthStrategy for StepsStrategy {
+    fn controls_width(&self) -> bool {
+        false
+    }
+
     fn controller(&self, cell: &CellParameters, _: &WidthControlSettings) -> BoxedController {
         Box::new(Steps::new(self.settings(cell)))
     }
