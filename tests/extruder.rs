@@ -256,7 +256,9 @@ fn foreseen(changes: &[(&str, &str)]) -> serde_json::Value {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("cell.toml"), text).unwrap();
     let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out"]);
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    // With some of the changes the bead is out of its tolerance.
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(matches!(output.status.code(), Some(0 | 3)), "{said}");
     let summary = fs::read_to_string(folder.path().join("out/summary.json")).unwrap();
     serde_json::from_str(&summary).unwrap()
 }

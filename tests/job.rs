@@ -51,7 +51,8 @@ fn widths<const N: usize>(folder: &Path, names: [&str; N]) -> Vec<[f64; N]> {
 fn a_planned_job_is_laid_with_the_robot_slow_at_the_corner_and_its_width_held() {
     let folder = tempfile::tempdir().unwrap();
     let quiet = [("flow_noise_mm3_per_s = 8.0", "flow_noise_mm3_per_s = 0.0")];
-    simulate(folder.path(), CORNER, &quiet, 0);
+    // The corner itself is out of tolerance.
+    simulate(folder.path(), CORNER, &quiet, 3);
     let names = ["bead_path_mm", "nozzle_path_mm", "width_mm", "speed_mm_per_s"];
     let rows = widths(folder.path(), names);
     let slowest = rows.iter().filter(|row| (280.0..320.0).contains(&row[1]));
@@ -68,9 +69,9 @@ fn a_planned_job_is_laid_with_the_robot_slow_at_the_corner_and_its_width_held() 
 
 #[test]
 fn recordings_hold_the_plan_and_the_starts_and_replay_the_same() {
-    for text in [CORNER, STARTS] {
+    for (text, code) in [(CORNER, 3), (STARTS, 0)] {
         let folder = tempfile::tempdir().unwrap();
-        simulate(folder.path(), text, &[], 0);
+        simulate(folder.path(), text, &[], code);
         let recording = folder.path().join("out/recording.mcap");
         let said = said(truebead(&["replay"]).arg(recording), 0);
         assert!(said.contains("all the same bit for bit"), "{said}");
@@ -129,7 +130,7 @@ fn gcode_is_planned_for_a_cell_that_starts_its_beads_itself() {
     let words = lay(&rest, 2);
     assert!(words.contains("--ends moving"), "{words}");
     plan(&moving, &["--ends", "moving"]);
-    lay(&moving, 0);
+    lay(&moving, 3);
     let rows =
         widths(folder.path(), ["bead_path_mm", "nozzle_path_mm", "width_mm", "speed_mm_per_s"]);
     let at_corner = rows.iter().filter(|row| (380.0..420.0).contains(&row[1]));

@@ -30,17 +30,18 @@ pub struct ToleranceSettings {
     pub max_out_fraction: f64,
 }
 
-/// Tolerance where the cell gives none, as a fraction of the target, and the fraction of the length
-/// that may be out of it: both by the contract of `[control]`.
+/// Tolerance where the cell gives none, as a fraction of the target, by the contract of `[control]`.
 const TOLERANCE_RATIO: f64 = 0.02;
+/// Fraction of the length that may be out of it where the cell gives none, by the contract of
+/// `[control]`.
 const MAX_OUT_FRACTION: f64 = 0.05;
 
 /// Reads `tolerance_mm` and `max_out_of_tolerance`.
 pub fn read_tolerance(control: &Table<'_>, target: &WidthTarget) -> Option<ToleranceSettings> {
-    let default = TOLERANCE_RATIO * target.nominal().get();
-    let tolerance = control.number_or("tolerance_mm", 1e-3..=100.0, default);
+    let tolerance = control.optional_number("tolerance_mm", 1e-3..=100.0);
     let max_out = control.number_or("max_out_of_tolerance", 0.0..=1.0, MAX_OUT_FRACTION);
-    Some(ToleranceSettings { tolerance: Mm::new(tolerance?).ok()?, max_out_fraction: max_out? })
+    let tolerance = tolerance.unwrap_or(TOLERANCE_RATIO * target.nominal().get());
+    Some(ToleranceSettings { tolerance: Mm::new(tolerance).ok()?, max_out_fraction: max_out? })
 }
 
 /// Reads the rest of `[control]`. There are no defaults for gains, nor for the exponent.

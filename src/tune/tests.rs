@@ -23,7 +23,8 @@ use crate::width_control::steps::StepsProgress;
 
 const SCALE: Calibration = Calibration::Scale { mm_per_px: 0.126_582, sigma: None };
 
-/// The cell of 50 Hz that ships with the program, with steps for its controller.
+/// The cell of 50 Hz that ships with the program, with steps for its controller, and with widths
+/// of which each has its own noise.
 fn cell(fraction: f64) -> Cell {
     let text = include_str!("../../cells/distance.toml");
     let text = text.replace(
@@ -33,6 +34,8 @@ fn cell(fraction: f64) -> Cell {
     let text = text.replace("\nexponent = 0.25", "\n# exponent = 0.25");
     let mut cell = Cell::parse(Path::new("steps.toml"), &text, Purpose::Run).unwrap();
     cell.simulation.bead.slow_below_mm_per_s = 0.0;
+    cell.simulation.width_noise = Mm::constant(0.36);
+    cell.simulation.roughness.sigma_mm = 0.0;
     cell
 }
 
