@@ -86,6 +86,9 @@ impl Controller {
     pub(super) fn begin_again(&mut self, from: Mm) {
         self.bead.known_from = from;
         self.width.bead_interrupted();
+        if let Some(response) = &mut self.response {
+            response.begin_bead();
+        }
     }
 
     fn printing(&mut self, now: Stamp, state: &RobotState, before: Option<Mm>) {
@@ -105,6 +108,9 @@ impl Controller {
             self.width.path_is_estimated();
         }
         self.width.robot_reported(&report);
+        if let Some(response) = &mut self.response {
+            response.reported(&report);
+        }
         let Some(bead) = self.phase.bead_mut() else { return };
         let requested = bead.setpoint.map_or(self.setup.cell.start_speed, |last| last.speed);
         if bead.stage == BeadStage::RunUp && state.speed_mm_per_s >= requested * RUN_UP_FRACTION {
@@ -134,6 +140,9 @@ impl Controller {
         self.phase = Phase::Bead(Bead::new());
         self.next_bead();
         self.width.begin_bead();
+        if let Some(response) = &mut self.response {
+            response.begin_bead();
+        }
     }
 
     /// Leaves a hold whose reason with the robot or the extruder has gone: primes while the first

@@ -2,6 +2,7 @@
 
 use crate::core::{Mm, Span};
 use crate::width_control::limiter::SpeedLimits;
+use crate::width_control::response::ResponseSettings;
 use crate::width_control::strategy::{CellParameters, WidthControlSettings};
 
 /// Everything that a controller has to know of its cell.
@@ -17,4 +18,17 @@ pub struct Setup {
     pub bead_length: Option<Mm>,
     /// How long a robot without a connection lays bead before it stops by itself.
     pub alone_for: Span,
+}
+
+impl Setup {
+    /// What the test is made for whether the width answers the speed.
+    pub(super) fn response_settings(&self) -> ResponseSettings {
+        let cell = &self.cell;
+        ResponseSettings {
+            offset: cell.camera_offset,
+            gauge: cell.gauge_length,
+            reference_speed: cell.start_speed,
+            roughness: cell.bead_noise.roughness_at(self.control.target.nominal()),
+        }
+    }
 }

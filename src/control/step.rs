@@ -7,6 +7,7 @@ use crate::core::{Mm, MmPerS, Span, Stamp};
 use crate::extruder::{ExtruderCommand, ExtruderFault, ExtruderState, ExtruderTrace};
 use crate::width_control::SpeedLimit;
 use crate::width_control::distance::{DistanceTrace, FallbackReason};
+use crate::width_control::response::NoResponse;
 use crate::width_control::steps::StepsTrace;
 
 /// What is to be sent to the robot.
@@ -47,6 +48,9 @@ pub enum Hold {
         /// Growth of the path from one report to the next.
         step_mm: Mm,
     },
+    /// The width does not answer the speed: the camera sees something else than the bead that is
+    /// laid, or the flow is not what lays it. Left with the bead.
+    NoResponse(NoResponse),
     /// The robot reports, and its clock does not rise: its path and speed are not known.
     RobotClock,
     /// The extruder has not reported for longer than a command is valid: its pump stands. The

@@ -4,7 +4,7 @@
 use super::controller::{Controller, FirstEqual};
 use super::extruder_control::NO_OVERRIDE;
 use super::phase::{Arrival, Bead, Mode, Phase};
-use super::step::Trace;
+use super::step::{Hold, Trace};
 use crate::core::{Mm, ROBOT_LAG, SpeedMatch, Stamp};
 use crate::width_control::controller::{Outlook, SpeedRequest, WidthSample, WidthTrace};
 use crate::width_control::distance::WidthReading;
@@ -94,6 +94,20 @@ impl Controller {
             {
                 last.speed = driven;
             }
+        }
+        self.check_response(now, &sample);
+    }
+
+    /// Holds if the width of the bead that is being laid does not answer the speed.
+    fn check_response(&mut self, now: Stamp, sample: &WidthSample) {
+        let Some(response) = &mut self.response else { return };
+        let Some(path) = sample.nozzle_path.filter(|_| sample.is_own_bead) else { return };
+        let target = sample.reading.width - sample.error;
+        let found = response.measured(path, sample.reading, target);
+        if let Some(found) = found
+            && self.phase.bead().is_some_and(|bead| bead.tracked().is_some())
+        {
+            self.phase.hold(now, Hold::NoResponse(found));
         }
     }
 

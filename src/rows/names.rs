@@ -3,6 +3,7 @@
 use crate::control::{Fault, Hold};
 use crate::extruder::ExtruderFault;
 use crate::width_control::distance::FallbackReason;
+use crate::width_control::response::NoResponse;
 
 /// Name of a limit, or of a reason without details.
 pub fn of(value: impl Into<&'static str>) -> &'static str {
@@ -44,6 +45,12 @@ pub fn hold_in_words(hold: &Hold) -> String {
              the bead",
             step_mm.get()
         ),
+        Hold::NoResponse(NoResponse { speed_change, width_change, .. }) => format!(
+            "{name}: {:+.0} % of speed have changed the width by {:+.1} %; see that the camera looks \
+             at the bead that is laid, and that the extruder lays it",
+            1e2 * speed_change,
+            1e2 * width_change
+        ),
         Hold::RobotClock => format!(
             "{name}: the robot reports and its own time stands still, on the robot link t_ms; \
              its path and speed are not used. See that every report is made anew"
@@ -58,10 +65,6 @@ pub fn fallback(why: FallbackReason) -> &'static str {
         FallbackReason::NoPath => "the robot reports no path",
         FallbackReason::Unmatched => {
             "the bead under the camera is none whose speed is known; is offset_mm right?"
-        }
-        FallbackReason::ModelContradicted => {
-            "the width does not follow the speed as the model predicts; is it this bead that the \
-             camera looks at, and are offset_mm and exponent right?"
         }
     }
 }

@@ -54,6 +54,8 @@ pub struct Simulation {
     pub outlier_size: f64,
     /// Fraction of the frames without a width, if no frame is rendered.
     pub missing_fraction: f64,
+    /// Another bead that comes into view.
+    pub other_bead: Option<OtherBead>,
     /// Width of the bead as a function of speed.
     pub bead: BeadModel,
     /// Roughness of the bead's edges.
@@ -62,6 +64,21 @@ pub struct Simulation {
     pub flow: Flow,
     /// The image of the bead and its disturbances.
     pub image: ImageModel,
+}
+
+/// A bead that the camera sees in place of the one that is laid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OtherBead {
+    /// Path of the nozzle from which on it is in view.
+    pub from: Mm,
+    /// Its width, whatever the speed.
+    pub width: Mm,
+}
+
+fn read_other_bead(world: &Table<'_>) -> Option<OtherBead> {
+    let from = world.optional_number("other_bead_from_mm", 0.0..=1e7)?;
+    let width = world.optional_number("other_bead_mm", 0.1..=1e3)?;
+    Some(OtherBead { from: Mm::new(from).ok()?, width: Mm::new(width).ok()? })
 }
 
 /// Reads the three tables; absent keys have their defaults. Reading goes on after an error, so
@@ -88,6 +105,7 @@ pub fn read(root: &Table<'_>) -> Option<Simulation> {
         outlier_fraction: world.number("outlier_fraction", 0.0..=1.0, 0.0),
         outlier_size: world.number("outlier_size", 0.0..=0.9, 0.2),
         missing_fraction: world.number("missing_fraction", 0.0..=1.0, 0.0),
+        other_bead: read_other_bead(&world.table),
         bead: read_bead(&bead),
         roughness: EdgeRoughness {
             sigma_mm: bead.number("roughness_mm", 0.0..=10.0, 0.1),

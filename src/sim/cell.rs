@@ -16,6 +16,8 @@ use crate::extruder::{ExtruderSetup, ExtruderState, FlowDemand};
 use crate::link::{ParamError, RobotParams, VirtualRobot};
 use crate::run::ports::Recorder;
 use crate::run::runner::{Handled, Runner};
+use crate::scenario::bead::BeadModel;
+use crate::scenario::disturbance::Flow;
 
 use super::extruder::SimExtruder;
 use super::hash;
@@ -75,6 +77,8 @@ pub struct SimCell<K> {
     nominal_flow: Option<Mm3PerS>,
     camera: SimCamera,
     bead: LaidBead,
+    /// The bead that the camera sees in place of it, from a path on \[mm\].
+    other_bead: Option<(f64, LaidBead)>,
     now: Stamp,
     layers: u64,
     /// Phase of the pump's pulsation, in periods.
@@ -159,6 +163,7 @@ impl<K: Recorder> SimCell<K> {
             run: run.clone(),
             cell: cell.clone(),
             bead: Self::fresh_bead(cell, 0),
+            other_bead: other_bead(cell, run),
             now: Stamp::START,
             layers: 0,
             pulse_phase: hash::unit(hash::mix(&[simulation.seed, PULSE_STREAM])),
@@ -324,8 +329,11 @@ impl<K: Recorder> SimCell<K> {
     /// Takes an image; its width arrives after the latency.
     fn take_frame(&mut self, observer: &mut impl Observer) {
         let state = self.runner.robot_mut().state(self.now);
-        let under = state.path_mm.get() - self.bead_start - self.run.camera.offset.get();
-        let taken = self.camera.take(self.now, under, state.z_mm, &self.bead);
+        let path = state.path_mm.get() - self.bead_start;
+        let under = path - self.run.camera.offset.get();
+        let other = self.other_bead.as_ref().filter(|(from, _)| path >= *from);
+        let bead = other.map_or(&self.bead, |(_, bead)| bead);
+        let taken = self.camera.take(self.now, under, state.z_mm, bead);
         let latency = self.cell.simulation.latency;
         let arrival =
             Arrival { at: self.now + latency, captured_at: self.now, position_mm: under, taken };
@@ -374,6 +382,23 @@ impl<K: Recorder> SimCell<K> {
     }
 }
 
+/// The other bead of a simulation, all along the path, and the path from which on it is seen \[mm\].
+fn other_bead(cell: &Cell, run: &RunPart) -> Option<(f64, LaidBead)> {
+    let simulation = &cell.simulation;
+    let other = simulation.other_bead?;
+    let model = BeadModel {
+        width_mm: other.width.get(),
+        exponent: 0.0,
+        slow_exponent: 0.0,
+        ..simulation.bead
+    };
+    let seed = hash::mix(&[simulation.seed, OTHER_STREAM]);
+    let mut bead = LaidBead::new(model, simulation.roughness, Flow::STEADY, seed);
+    let beyond = (run.camera.offset + simulation.gauge_length).get();
+    bead.lay(-beyond, simulation.path.get() + beyond, run.robot.start_speed.get());
+    Some((other.from.get(), bead))
+}
+
 /// A width that has not yet arrived at the controller.
 struct Arrival {
     at: Stamp,
@@ -383,6 +408,8 @@ struct Arrival {
     taken: CapturedFrame,
 }
 
+/// Random stream of another bead. Derived: the bytes of "other".
+const OTHER_STREAM: u64 = 0x006f_7468_6572;
 /// Random stream of the phase of the pulsation. Derived: the bytes of "pulse".
 const PULSE_STREAM: u64 = 0x0070_756c_7365;
 

@@ -5,6 +5,7 @@
 mod mismatch;
 mod plant;
 mod pulsation;
+mod response;
 mod steps;
 pub mod table;
 
@@ -24,6 +25,8 @@ pub enum Case {
     Pulsation,
     /// Wrong offset and exponent, drift and waves.
     Mismatch,
+    /// Another bead in view, and beads on which nothing is wrong.
+    Response,
 }
 
 impl Case {
@@ -35,6 +38,7 @@ impl Case {
                 Self::Steps => steps::rows(cell, seeds)?,
                 Self::Pulsation => pulsation::rows(cell, seeds)?,
                 Self::Mismatch => mismatch::rows(cell, seeds)?,
+                Self::Response => response::rows(cell, seeds)?,
             });
             progress.advance();
         }
@@ -56,6 +60,15 @@ mod tests {
         for cell in LoopCell::ALL {
             let rows = steps::rows(cell, 6).unwrap();
             assert_eq!(rows.len(), 7);
+            let missed: Vec<&CaseRow> = rows.iter().filter(|row| !row.is_met()).collect();
+            assert!(missed.is_empty(), "{missed:#?}");
+        }
+    }
+
+    #[test]
+    fn a_width_that_does_not_answer_is_noticed_and_no_other_bead_is_held() {
+        for cell in LoopCell::ALL.into_iter().filter(|cell| cell.is_fast()) {
+            let rows = response::rows(cell, 12).unwrap();
             let missed: Vec<&CaseRow> = rows.iter().filter(|row| !row.is_met()).collect();
             assert!(missed.is_empty(), "{missed:#?}");
         }

@@ -16,12 +16,9 @@
 
 mod flow_step;
 mod harmonic;
-mod noise;
 mod outlier_run;
 mod pulsation;
 mod sample;
-mod speed_history;
-mod validation;
 mod width_model;
 
 #[cfg(test)]
@@ -29,17 +26,15 @@ mod tests;
 
 use serde::{Deserialize, Serialize};
 
+use super::bead_noise::{BeadRoughness, WidthNoise};
+use super::speed_history::SpeedHistory;
 use crate::core::{Mm, MmPerS, Span, Stamp};
 
 use flow_step::StepDetector;
-pub use noise::BeadRoughness;
-use noise::WidthNoise;
 use outlier_run::OutlierRun;
 use pulsation::{FlowPulsation, PulsationSample};
 pub use sample::WidthReading;
 use sample::{GaugeInterval, MatchedWidth};
-use speed_history::SpeedHistory;
-use validation::ModelValidation;
 use width_model::{WidthModel, WidthObservation};
 
 /// Settings of control by distance.
@@ -103,8 +98,6 @@ pub struct DistanceTrace {
 pub enum FallbackReason {
     /// The robot moves and reports no path.
     NoPath,
-    /// The width does not follow the speed as the model predicts.
-    ModelContradicted,
     /// Widths could not be matched to speeds.
     Unmatched,
 }
@@ -119,7 +112,6 @@ pub struct DistanceController {
     steps: StepDetector,
     outliers: OutlierRun,
     pulsation: FlowPulsation,
-    validation: ModelValidation,
     /// Path of the nozzle at the first of the latest widths without a known speed \[mm\].
     unmatched_since_mm: Option<f64>,
     /// Whether widths had no known speed over too much path on this bead.
@@ -139,7 +131,6 @@ impl DistanceController {
             steps: StepDetector::new(gauge.get()),
             outliers: OutlierRun::default(),
             pulsation: FlowPulsation::new(),
-            validation: ModelValidation::default(),
             unmatched_since_mm: None,
             is_unmatched: false,
         }
@@ -152,7 +143,6 @@ impl DistanceController {
         self.outliers = OutlierRun::default();
         self.model.begin_bead();
         self.noise.begin_bead();
-        self.validation = ModelValidation::default();
         (self.unmatched_since_mm, self.is_unmatched) = (None, false);
     }
 
@@ -162,20 +152,14 @@ impl DistanceController {
         self.speed_history.report(at.secs(), path.get(), speed.get(), flow_ratio);
     }
 
-    /// A width of a frame that was captured with the nozzle at `nozzle_path`, and the target
-    /// width where that bead was laid.
-    pub fn measured(&mut self, nozzle_path: Mm, width: WidthReading, target: Mm) -> DistanceTrace {
+    /// A width of a frame that was captured with the nozzle at `nozzle_path`.
+    pub fn measured(&mut self, nozzle_path: Mm, width: WidthReading) -> DistanceTrace {
         self.check_history(nozzle_path.get());
         let taken = match self.match_speed(nozzle_path.get(), width) {
-            Some(sample) => self.take_sample(&sample, target.get()),
+            Some(sample) => self.take_sample(&sample),
             None => WidthUse::NotMatched,
         };
         self.trace(taken)
-    }
-
-    /// The robot is driven at this controller's speed from here on.
-    pub fn engaged(&mut self, nozzle_path: Mm) {
-        self.validation.engage(nozzle_path.get());
     }
 
     /// Whether the model is known, so that a speed can be set.
@@ -185,10 +169,7 @@ impl DistanceController {
 
     /// Why another controller must take over, if so.
     pub fn fallback_reason(&self) -> Option<FallbackReason> {
-        if self.is_unmatched {
-            return Some(FallbackReason::Unmatched);
-        }
-        self.validation.is_contradicted().then_some(FallbackReason::ModelContradicted)
+        self.is_unmatched.then_some(FallbackReason::Unmatched)
     }
 
     /// Speed at which the mean width over a time is `width`; `None` before the first width, or if
@@ -235,7 +216,7 @@ impl DistanceController {
         MatchedWidth::new(&self.speed_history, gauge, reading, self.model.exponent())
     }
 
-    fn take_sample(&mut self, sample: &MatchedWidth, target: f64) -> WidthUse {
+    fn take_sample(&mut self, sample: &MatchedWidth) -> WidthUse {
         let spacing = self.model.distance_to(sample.position_mm);
         let drift = self.drift_per_mm() * spacing;
         let width_variance = sample.noise + self.noise.variance(spacing);
@@ -252,7 +233,6 @@ impl DistanceController {
             variance,
         };
         let innovation = self.model.innovation(&observation);
-        self.validation.update(sample, innovation, libm::log(target.max(1e-3)), drift);
         if !self.steps.is_under_way() && self.model.is_known() {
             self.noise.observe(innovation.normalised(), sample.position_mm);
         }
@@ -277,9 +257,6 @@ impl DistanceController {
         self.steps.push(front, *observation, self.model);
         let was_under_way = self.steps.is_under_way();
         if let Some(step) = self.steps.find(excess) {
-            if step.is_new {
-                self.validation.reset_steady();
-            }
             if !self.steps.is_under_way() {
                 self.pulsation.loosen(step.size * step.size);
             }

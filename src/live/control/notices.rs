@@ -151,10 +151,10 @@ mod tests {
     fn a_fallback_is_reported_when_it_begins() {
         let mut notices = Notices::default();
         let mut fallen = step(80.0, 80.0, SpeedLimit::None);
-        fallen.trace.fallback = Some(FallbackReason::ModelContradicted);
+        fallen.trace.fallback = Some(FallbackReason::NoPath);
         assert_eq!(notices.of(at(0.0), &step(80.0, 80.0, SpeedLimit::None)).len(), 1);
         let words = notices.of(at(0.1), &fallen);
-        assert!(words[0].contains("does not follow the speed"), "{words:?}");
+        assert!(words[0].contains("the robot reports no path"), "{words:?}");
         assert!(notices.of(at(0.2), &fallen).is_empty());
     }
 }

@@ -83,8 +83,6 @@ pub struct FlowStep {
     pub size: f64,
     /// The model after it.
     pub model: WidthModel,
-    /// Whether it is new.
-    pub is_new: bool,
 }
 
 /// A step at one position.
@@ -137,11 +135,11 @@ impl StepDetector {
         let model = newest.before.with_estimate(found.state, found.covariance);
         let is_settled =
             newest.front_mm > found.position_mm + self.gauge_mm * (1.0 + SETTLED_GAUGES);
-        let is_new = !std::mem::replace(&mut self.is_under_way, true);
+        self.is_under_way = true;
         if is_settled {
             self.clear();
         }
-        Some(FlowStep { size: found.size, model, is_new })
+        Some(FlowStep { size: found.size, model })
     }
 
     /// The mean of all candidates, weighted by their evidence; `None` without any.

@@ -1,8 +1,8 @@
 //! A width with the speed at which that piece of bead was laid.
 
-use super::speed_history::SpeedHistory;
 use super::width_model::OFFSET_ERROR_VARIANCE;
 use crate::core::Mm;
+use crate::width_control::speed_history::SpeedHistory;
 
 /// Smallest relative standard deviation of a width: between two reports the speed is not
 /// known exactly.
@@ -13,9 +13,7 @@ const UNMODELLED_RATIO: f64 = 0.17;
 /// Largest relative standard deviation by the flow that a model does not predict; a width with
 /// more says more about the flow's transient than about the bead.
 const MAX_UNMODELLED_SIGMA: f64 = 0.03;
-/// Variance by the uncertain offset, over that of the width, from which a sample does not
-/// validate the model.
-const MAX_OFFSET_VARIANCE: f64 = 0.5;
+
 /// The piece of bead over which a width is the mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::struct_field_names, reason = "all in millimetres")]
@@ -99,16 +97,6 @@ impl MatchedWidth {
             offset_variance: OFFSET_ERROR_VARIANCE * squares,
         })
     }
-
-    /// Variance of `ln_width`, with that by the uncertain offset.
-    pub fn variance(&self) -> f64 {
-        self.noise + self.offset_variance
-    }
-
-    /// Whether an error of the offset hides what it says of the bead.
-    pub fn is_offset_sensitive(&self) -> bool {
-        self.offset_variance > MAX_OFFSET_VARIANCE * self.noise
-    }
 }
 
 #[cfg(test)]
@@ -139,7 +127,7 @@ mod tests {
         assert!(before.ln_speed_beside == [0.0; 2] && before.ln_speed.abs() < 1e-9);
         assert!((before.laid_s - 0.4).abs() < 1e-9);
         assert!((before.noise - (1e-4 + 2.5e-7)).abs() < 1e-12);
-        assert!(!before.is_offset_sensitive());
+        assert!(before.offset_variance < 1e-3 * before.noise);
     }
 
     #[test]
@@ -148,7 +136,7 @@ mod tests {
         let half = 0.5 * 0.6_f64.ln();
         let [ahead, behind] = at.ln_speed_beside;
         assert!((ahead - half).abs() < 1e-9 && (behind + half).abs() < 1e-9, "{at:?}");
-        assert!(at.is_offset_sensitive());
+        assert!(at.offset_variance > at.noise);
     }
 
     #[test]

@@ -10,9 +10,7 @@ use crate::width_control::controller::{
     BeadReport, BoxedController, Outlook, SpeedRequest, Tracking, WidthController, WidthSample,
     WidthTrace,
 };
-use crate::width_control::distance::{
-    BeadRoughness, DistanceController, DistanceSettings, FallbackReason,
-};
+use crate::width_control::distance::{DistanceController, DistanceSettings, FallbackReason};
 
 /// Control by distance in a cell.
 pub const REGISTRATION: Registration = Registration { name: "distance", needs_gains: false, read };
@@ -21,10 +19,6 @@ pub const REGISTRATION: Registration = Registration { name: "distance", needs_ga
 /// a fraction. A larger value follows the flow faster and passes more noise of the width to
 /// the speed.
 const DRIFT_PER_ROOT_M: f64 = 0.002;
-
-/// Standard deviation of a bead's width where the cell gives none, as a fraction of the target.
-/// A smaller one follows the bead's roughness, a larger one follows its flow more slowly.
-const ROUGHNESS_RATIO: f64 = 0.0025;
 
 /// Control by distance with its model of the bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,11 +46,6 @@ fn read(control: &Table<'_>) -> Option<Arc<dyn WidthStrategy>> {
     }))
 }
 
-fn roughness(cell: &CellParameters, target: Mm) -> BeadRoughness {
-    let ratio = cell.bead_noise.roughness.map_or(ROUGHNESS_RATIO, |rough| rough / target);
-    BeadRoughness { ratio, length_mm: cell.bead_noise.length.get() }
-}
-
 impl WidthStrategy for DistanceStrategy {
     fn controller(&self, cell: &CellParameters, control: &WidthControlSettings) -> BoxedController {
         let target = control.target.nominal();
@@ -68,7 +57,7 @@ impl WidthStrategy for DistanceStrategy {
             exponent: self.exponent,
             learns_exponent: self.learns_exponent,
             drift_per_root_m: self.drift_per_root_m,
-            roughness: roughness(cell, target),
+            roughness: cell.bead_noise.roughness_at(target),
             cancels_pulsation: self.cancels_pulsation,
         };
         let gains = control.gains.unwrap_or_else(|| cautious_gains(cell, target, self.exponent));
@@ -107,8 +96,7 @@ impl DistanceControl {
         if let Some(path) = sample.nozzle_path
             && sample.is_own_bead
         {
-            let target = sample.reading.width - sample.error;
-            trace.distance = Some(self.by_distance.measured(path, sample.reading, target));
+            trace.distance = Some(self.by_distance.measured(path, sample.reading));
             self.look_for_fallback();
         }
     }
@@ -174,8 +162,7 @@ impl WidthController for DistanceControl {
             }
             _ => return None,
         };
-        let Some((path, laid)) = outlook.path.zip(outlook.laid) else { return Some(seen_at) };
-        self.by_distance.engaged(path);
+        let Some(laid) = outlook.laid else { return Some(seen_at) };
         // Until the bead reaches the camera, no width is missing.
         Some(if laid < self.camera_offset { outlook.now } else { seen_at })
     }

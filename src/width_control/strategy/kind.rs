@@ -7,10 +7,15 @@ use std::sync::Arc;
 
 use crate::core::{Mm, MmPerS, Span, WidthRange};
 use crate::document::Table;
+use crate::width_control::bead_noise::BeadRoughness;
 use crate::width_control::controller::BoxedController;
 use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::pi::PiGains;
 use crate::width_control::target::WidthTarget;
+
+/// Standard deviation of a bead's width where the cell gives none, as a fraction of the target.
+/// A smaller one follows the bead's roughness, a larger one follows its flow more slowly.
+const ROUGHNESS_RATIO: f64 = 0.0025;
 
 /// A width controller that a cell may choose.
 #[derive(Debug)]
@@ -95,4 +100,12 @@ pub struct BeadNoise {
     pub roughness: Option<Mm>,
     /// Its correlation length.
     pub length: Mm,
+}
+
+impl BeadNoise {
+    /// Roughness of a bead of a width.
+    pub fn roughness_at(&self, width: Mm) -> BeadRoughness {
+        let ratio = self.roughness.map_or(ROUGHNESS_RATIO, |rough| rough / width);
+        BeadRoughness { ratio, length_mm: self.length.get() }
+    }
 }

@@ -22,6 +22,7 @@ const SMOOTH_STEADY: Simulation = Simulation {
     outlier_fraction: 0.0,
     outlier_size: 0.0,
     missing_fraction: 0.0,
+    other_bead: None,
     bead: BeadModel {
         width_mm: 10.0,
         at_speed_mm_per_s: 100.0,

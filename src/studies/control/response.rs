@@ -1,0 +1,188 @@
+//! Whether it is noticed that the width does not answer the speed, and whether that is said of beads
+//! on which it does.
+
+use rayon::prelude::*;
+
+use super::plant::{Control, LoopCell, Plan, TARGET_MM};
+use super::table::{CaseRow, Quantity, quantile};
+use crate::control::{Command, Event, Hold, State, Step};
+use crate::core::{Mm, Stamp};
+use crate::numeric::number::to_f64;
+use crate::run::runner::NoRecorder;
+use crate::scenario::disturbance::Flow;
+use crate::scenario::table::OtherBead;
+use crate::sim::cell::{FrameObservation, Observer, SimCell};
+use crate::sim::hash;
+use crate::studies::barjuei2022::scale;
+use crate::studies::error::ReproduceError;
+
+/// Length of a bead \[mm\].
+const LENGTH_MM: f64 = 3000.0;
+/// Change of the commanded ln v since the other bead came into view after which the width must have
+/// answered.
+const COMMANDED: f64 = 0.10;
+/// Gauges beyond the offset within which that must be noticed.
+const MAX_GAUGES: f64 = 2.0;
+/// Seconds in a thousand hours.
+const THOUSAND_HOURS_S: f64 = 3.6e6;
+
+/// The rows of a cell.
+pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+    let mut rows = Vec::new();
+    for (control, name) in [(Control::Distance, "by distance"), (Control::Pi, "by PI")] {
+        rows.extend(fault_rows(cell, &format!("another bead in view, {name}"), seeds, control)?);
+        let sound = observe(seeds, |seed| disturbed(cell, control, seed))?;
+        let held = sound.iter().filter(|one| one.held_mm.is_some()).count();
+        let lasted_s: f64 = sound.iter().map(|one| one.lasted_s).sum();
+        let value = THOUSAND_HOURS_S * to_f64(held) / lasted_s;
+        let quantity = Quantity::ratio("false alarms in 1,000 h");
+        let case = format!("no fault, {name}");
+        rows.push(CaseRow::new(cell, &case, quantity, sound.len(), value, 10.0));
+    }
+    Ok(rows)
+}
+
+fn fault_rows(
+    cell: LoopCell,
+    case: &str,
+    seeds: u64,
+    control: Control,
+) -> Result<[CaseRow; 2], ReproduceError> {
+    let most_mm = Plan::new(cell, control)?.run.camera.offset.get() + MAX_GAUGES * cell.gauge_mm;
+    let faulty = observe(seeds, |seed| with_other_bead(cell, control, seed))?;
+    // Where the speed hardly changes, there is nothing that the width could answer.
+    let after: Vec<f64> = faulty.iter().filter_map(Noticed::after_mm).collect();
+    let late = after.iter().filter(|after| **after > most_mm).count();
+    let fraction = to_f64(late) / to_f64(after.len());
+    let row = |quantity, value, required| {
+        CaseRow::new(cell, case, quantity, after.len(), value, required)
+    };
+    Ok([
+        row(Quantity::ratio("fraction not noticed in time"), fraction, 0.01),
+        row(Quantity::mm("noticed after, median"), quantile(&after, 0.5), most_mm),
+    ])
+}
+
+fn observe(
+    seeds: u64,
+    plan: impl Fn(u64) -> Result<Plan, ReproduceError> + Send + Sync,
+) -> Result<Vec<Noticed>, ReproduceError> {
+    (0..seeds).into_par_iter().map(|seed| Noticed::on(&plan(seed)?, seed)).collect()
+}
+
+/// Numbers that a seed draws.
+struct Draw(u64);
+
+impl Draw {
+    fn between(&self, number: u64, low: f64, high: f64) -> f64 {
+        low + (high - low) * hash::unit(hash::mix(&[RESPONSE_STREAM, self.0, number]))
+    }
+
+    /// As [`Self::between`], uniform in the logarithm.
+    fn ratio_between(&self, number: u64, low: f64, high: f64) -> f64 {
+        self.between(number, low.ln(), high.ln()).exp()
+    }
+
+    fn sign(&self, number: u64) -> f64 {
+        if self.between(number, -1.0, 1.0) < 0.0 { -1.0 } else { 1.0 }
+    }
+}
+
+/// From somewhere on the camera sees another bead, 1 to 10 mm off target.
+fn with_other_bead(cell: LoopCell, control: Control, seed: u64) -> Result<Plan, ReproduceError> {
+    let mut plan = Plan::new(cell, control)?.long(LENGTH_MM);
+    let draw = Draw(seed);
+    let width_mm = TARGET_MM + draw.sign(1) * draw.between(0, 1.0, 10.0);
+    let (from, width) = (Mm::new(draw.between(2, 600.0, 1600.0)), Mm::new(width_mm));
+    plan.cell.simulation.other_bead =
+        from.ok().zip(width.ok()).map(|(from, width)| OtherBead { from, width });
+    Ok(plan)
+}
+
+/// A bead on which nothing is wrong: its flow steps, drifts, waves and pulsates.
+fn disturbed(cell: LoopCell, control: Control, seed: u64) -> Result<Plan, ReproduceError> {
+    let mut plan = Plan::new(cell, control)?.long(LENGTH_MM);
+    let draw = Draw(seed);
+    plan.cell.simulation.flow = Flow {
+        step_at_mm: draw.between(0, 400.0, 2800.0),
+        step_ratio: 1.0 + 0.08 * draw.sign(1),
+        drift_per_root_m: draw.between(2, 0.0, 0.02),
+        wave_amplitude: draw.between(3, 0.0, 0.02),
+        wavelength_mm: draw.ratio_between(4, 60.0, 2400.0),
+        pulse_amplitude: draw.between(5, 0.0, 0.03),
+        pulse_period_s: draw.ratio_between(6, 0.6, 10.0),
+        ..Flow::STEADY
+    };
+    Ok(plan)
+}
+
+/// What was noticed on a bead. Paths count from its beginning.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Noticed {
+    start_mm: Option<f64>,
+    path_mm: f64,
+    /// From where on the camera sees another bead; infinite where it never does.
+    fault_from_mm: f64,
+    /// The last commanded ln v, and the one at the fault.
+    ln_speed: Option<f64>,
+    ln_speed_at_fault: Option<f64>,
+    /// Where it had changed by [`COMMANDED`] since.
+    commanded_mm: Option<f64>,
+    /// Where control held because the width does not answer.
+    held_mm: Option<f64>,
+    lasted_s: f64,
+}
+
+impl Noticed {
+    fn on(plan: &Plan, seed: u64) -> Result<Self, ReproduceError> {
+        let mut cell = plan.cell.clone();
+        cell.simulation.seed = seed + 1;
+        let other = cell.simulation.other_bead;
+        let fault_from_mm = other.map_or(f64::INFINITY, |other| other.from.get());
+        let mut noticed = Self { fault_from_mm, ..Self::default() };
+        let mut sim = SimCell::new(&cell, &plan.run, scale(), NoRecorder)?;
+        noticed.lasted_s = sim.layer(Mm::ZERO, &mut noticed).duration.secs();
+        Ok(noticed)
+    }
+
+    /// Path from the change of the commanded speed until it was noticed \[mm\]: infinite if it never
+    /// was, `None` if the speed hardly changed.
+    fn after_mm(&self) -> Option<f64> {
+        let commanded = self.commanded_mm?;
+        Some(self.held_mm.map_or(f64::INFINITY, |held| held - commanded))
+    }
+}
+
+impl Observer for Noticed {
+    fn step(&mut self, _: Stamp, event: &Event, step: &Step) {
+        if let Event::Robot(state) = event
+            && state.mode.lays_bead()
+        {
+            let start = *self.start_mm.get_or_insert(state.path_mm.get());
+            self.path_mm = state.path_mm.get() - start;
+        }
+        if let Some(Command::Speed(speed)) = step.command {
+            self.ln_speed = Some(speed.get().ln());
+        }
+        if self.path_mm >= self.fault_from_mm
+            && let Some(ln_speed) = self.ln_speed
+        {
+            let before = *self.ln_speed_at_fault.get_or_insert(ln_speed);
+            if (ln_speed - before).abs() >= COMMANDED {
+                self.commanded_mm.get_or_insert(self.path_mm);
+            }
+        }
+        if matches!(step.state, State::Holding(Hold::NoResponse(_))) {
+            self.held_mm.get_or_insert(self.path_mm);
+        }
+    }
+
+    fn frame(&mut self, _: &FrameObservation<'_>) {}
+
+    fn is_done(&self) -> bool {
+        self.held_mm.is_some()
+    }
+}
+
+/// Random stream of what is drawn. Derived: the bytes of "response".
+const RESPONSE_STREAM: u64 = 0x7265_7370_6f6e_7365;

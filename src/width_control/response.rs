@@ -1,0 +1,325 @@
+//! Whether the width answers the speed: actuator against effect.
+//!
+//! Where the speed changes and the width stays as it is, the flow has changed by just as much in the
+//! same place, or the width is not that of the bead that is laid: the camera looks at another one, or
+//! the extruder is elsewhere. The flow of this bead so far says which: where it would have to change
+//! many times as much as it has done before, the width does not answer.
+
+use std::collections::VecDeque;
+
+use serde::{Deserialize, Serialize};
+
+use crate::core::{Mm, MmPerS};
+use crate::numeric::rank;
+use crate::width_control::bead_noise::{BeadRoughness, WidthNoise};
+use crate::width_control::controller::BeadReport;
+use crate::width_control::distance::WidthReading;
+use crate::width_control::speed_history::SpeedHistory;
+
+/// The weakest answer that is expected: the width falls by this fraction of a small change of the
+/// speed. Derived: the lower end of what control by distance learns of an exponent of 0.25, that of
+/// Shojaei Barjuei et al. 2022.
+const WEAKEST_EXPONENT: f64 = 0.175;
+/// Exponents with which the flow is derived from width and speed; the one that leaves the steadiest
+/// flow counts.
+const EXPONENTS: [f64; 5] = [0.15, 0.25, 0.4, 0.65, 1.0];
+/// Error of the offset for which an answer may come sooner or later, as a fraction of it. Derived: two
+/// standard deviations where the cell states none.
+const OFFSET_ERROR: f64 = 0.2;
+/// By how many times more than usual the flow must have changed. A smaller value finds a missing
+/// answer sooner, and takes a flow that cancels the speed for one more often.
+const MIN_CHANGES: f64 = 6.0;
+/// Length of bead that says how much the flow usually changes \[mm\] ...
+const USUAL_OVER_MM: f64 = 1000.0;
+/// ... and the least \[mm\].
+const MIN_USUAL_OVER_MM: f64 = 300.0;
+/// Range of widths that are the same, in standard deviations. Derived: 3.5 to either side, once in
+/// 2150 widths by chance.
+const MAX_RANGE_SIGMAS: f64 = 7.0;
+/// Error from which the width is off target, as a fraction. A smaller one takes a disturbance that
+/// control has cancelled for a missing answer.
+const MIN_ERROR: f64 = 0.01;
+
+/// What the test is made for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ResponseSettings {
+    /// Path length from the nozzle back to the middle of the gauge.
+    pub offset: Mm,
+    /// Length of bead that one width is the mean of.
+    pub gauge: Mm,
+    /// Any speed: only ratios matter.
+    pub reference_speed: MmPerS,
+    /// Roughness of the bead.
+    pub roughness: BeadRoughness,
+}
+
+/// A change of the speed without effect.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct NoResponse {
+    /// Change of the speed, as a fraction.
+    pub speed_change: f64,
+    /// Change of the width of bead that was laid before and after it, as a fraction.
+    pub width_change: f64,
+    /// Path on which both changed \[mm\].
+    pub over_mm: f64,
+}
+
+/// The test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResponseTest {
+    settings: ResponseSettings,
+    speeds: SpeedHistory,
+    /// Variance of ln w of a width by the roughness.
+    roughness: f64,
+    /// The latest widths, oldest first, over the path on which an answer is looked for.
+    widths: VecDeque<MatchedWidth>,
+    /// Changes over that path, of all bead that says how much the flow usually changes.
+    changes: VecDeque<Change>,
+}
+
+/// A width with the speed at which that bead was laid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct MatchedWidth {
+    position_mm: f64,
+    ln_width: f64,
+    /// Mean of ln v over the gauge, where the cell says that it is and at either end of its error.
+    ln_speeds: [f64; 3],
+}
+
+/// Change of ln w and of ln v from one width to another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Change {
+    position_mm: f64,
+    width: f64,
+    speed: f64,
+}
+
+impl ResponseTest {
+    /// Before the first report.
+    pub fn new(settings: ResponseSettings) -> Self {
+        let ResponseSettings { offset, gauge, reference_speed, roughness } = settings;
+        let kept_mm = (1.0 + OFFSET_ERROR) * offset.get() + gauge.get();
+        Self {
+            settings,
+            speeds: SpeedHistory::new(reference_speed.get(), kept_mm),
+            roughness: WidthNoise::new(roughness, gauge.get()).variance(f64::INFINITY),
+            widths: VecDeque::new(),
+            changes: VecDeque::new(),
+        }
+    }
+
+    /// A new bead, or one that goes on elsewhere.
+    pub fn begin_bead(&mut self) {
+        self.speeds.clear();
+        self.widths.clear();
+        self.changes.clear();
+    }
+
+    /// The robot reported while it lays bead.
+    pub fn reported(&mut self, report: &BeadReport) {
+        let BeadReport { at, path, speed, flow_ratio } = *report;
+        self.speeds.report(at.secs(), path.get(), speed.get(), flow_ratio);
+    }
+
+    /// A width of a frame that was captured with the nozzle at `nozzle_path`, and the target width
+    /// of that bead. Returns the change of the speed that has had no effect, where there is one.
+    pub fn measured(
+        &mut self,
+        nozzle_path: Mm,
+        reading: WidthReading,
+        target: Mm,
+    ) -> Option<NoResponse> {
+        if reading.width <= Mm::ZERO || target <= Mm::ZERO {
+            return None;
+        }
+        let newest = self.matched((nozzle_path - self.settings.offset).get(), reading.width)?;
+        let before = self.widths.back().map(|last| last.position_mm);
+        if before.is_some_and(|before| before >= newest.position_mm) {
+            return None;
+        }
+        self.widths.push_back(newest);
+        let mut oldest = None;
+        while self
+            .widths
+            .front()
+            .is_some_and(|one| newest.position_mm - one.position_mm > self.span_mm())
+        {
+            oldest = self.widths.pop_front();
+        }
+        let oldest = oldest?;
+        self.widths.push_front(oldest);
+        let found = self.compare(&oldest, &newest, reading, target);
+        self.remember(&oldest, &newest);
+        found
+    }
+
+    /// Path within which a change of the speed is seen whole, wherever the camera looks within its
+    /// error \[mm\].
+    fn span_mm(&self) -> f64 {
+        2.0 * OFFSET_ERROR * self.settings.offset.get() + self.settings.gauge.get()
+    }
+
+    fn matched(&self, position_mm: f64, width: Mm) -> Option<MatchedWidth> {
+        let half = 0.5 * self.settings.gauge.get();
+        let shift = OFFSET_ERROR * self.settings.offset.get();
+        let at = |by: f64| self.speeds.mean_near(position_mm + by - half, position_mm + by + half);
+        let known = self.speeds.mean_over(position_mm - half, position_mm + half)?;
+        let ln_speeds = [known.mean, at(shift)?.mean, at(-shift)?.mean];
+        Some(MatchedWidth { position_mm, ln_width: libm::log(width.get()), ln_speeds })
+    }
+
+    fn remember(&mut self, oldest: &MatchedWidth, newest: &MatchedWidth) {
+        let position_mm = newest.position_mm;
+        let width = newest.ln_width - oldest.ln_width;
+        let speed = newest.ln_speeds[0] - oldest.ln_speeds[0];
+        self.changes.push_back(Change { position_mm, width, speed });
+        while self.changes.front().is_some_and(|one| position_mm - one.position_mm > USUAL_OVER_MM)
+        {
+            self.changes.pop_front();
+        }
+    }
+
+    /// By how much the flow usually changes: the median, with the exponent for which it is least;
+    /// `None` where too little bead is known.
+    fn usual_change(&self) -> Option<f64> {
+        let (first, last) = (self.changes.front()?, self.changes.back()?);
+        if last.position_mm - first.position_mm < MIN_USUAL_OVER_MM {
+            return None;
+        }
+        let median = |exponent: f64| {
+            let size = |change: &Change| (change.width + exponent * change.speed).abs();
+            rank::mean_median(&mut self.changes.iter().map(size).collect::<Vec<f64>>())
+        };
+        EXPONENTS.into_iter().filter_map(median).min_by(f64::total_cmp)
+    }
+
+    fn compare(
+        &self,
+        oldest: &MatchedWidth,
+        newest: &MatchedWidth,
+        reading: WidthReading,
+        target: Mm,
+    ) -> Option<NoResponse> {
+        let change = newest.speed_change(oldest);
+        let measurement = reading.sigma / reading.width;
+        let sigma = (self.roughness + measurement * measurement).sqrt();
+        let widths = self.widths.iter().map(|one| one.ln_width);
+        let (least, most) = widths
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), one| {
+                (least.min(one), most.max(one))
+            });
+        let same = MAX_RANGE_SIGMAS * sigma;
+        let is_off = (newest.ln_width - libm::log(target.get())).abs() > MIN_ERROR;
+        let answer = WEAKEST_EXPONENT * change;
+        if most - least > same || answer < same || !is_off {
+            return None;
+        }
+        (answer > MIN_CHANGES * self.usual_change()?).then(|| NoResponse {
+            speed_change: libm::expm1(newest.ln_speeds[0] - oldest.ln_speeds[0]),
+            width_change: libm::expm1(newest.ln_width - oldest.ln_width),
+            over_mm: newest.position_mm - oldest.position_mm,
+        })
+    }
+}
+
+impl MatchedWidth {
+    /// Size of the change of ln v since an earlier width: the smallest, wherever the camera looks
+    /// within its error.
+    fn speed_change(&self, earlier: &Self) -> f64 {
+        let changes = self.ln_speeds.iter().zip(&earlier.ln_speeds).map(|(now, then)| now - then);
+        changes.map(f64::abs).fold(f64::INFINITY, f64::min)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::core::Stamp;
+    use crate::sim::hash;
+
+    const OFFSET_MM: f64 = 88.4;
+    const GAUGE_MM: f64 = 12.7;
+    const FRAME_S: f64 = 0.02;
+
+    /// What the camera sees of a bead whose speed steps from 80 to 100 mm/s.
+    #[derive(Debug, Clone, Copy)]
+    struct Seen {
+        /// Exponent of the bead that is seen; 0 for one that does not answer.
+        exponent: f64,
+        /// By how much farther back the camera looks than is known \[mm\].
+        farther_mm: f64,
+        /// Amplitude of a wave of 100 mm of the flow.
+        wave: f64,
+        /// Its width over the target, before the step.
+        ratio: f64,
+    }
+
+    /// Path of the nozzle at the step \[mm\].
+    const STEP_MM: f64 = 900.0;
+
+    /// Path beyond the step until it is noticed that the width does not answer \[mm\].
+    fn noticed_after(seen: Seen) -> Option<f64> {
+        let mut test = ResponseTest::new(ResponseSettings {
+            offset: Mm::constant(OFFSET_MM),
+            gauge: Mm::constant(GAUGE_MM),
+            reference_speed: MmPerS::constant(100.0),
+            roughness: BeadRoughness { ratio: 0.0025, length_mm: 5.0 },
+        });
+        let (mut path, mut at) = (0.0, 0.0);
+        while path < STEP_MM + 600.0 {
+            let speed = if path < STEP_MM { 80.0 } else { 100.0 };
+            (path, at) = (path + speed * FRAME_S, at + FRAME_S);
+            test.reported(&BeadReport {
+                at: Stamp::from_secs(at),
+                path: Mm::constant(path),
+                speed: MmPerS::constant(speed),
+                flow_ratio: 1.0,
+            });
+            let middle = path - OFFSET_MM - seen.farther_mm;
+            let fraction = ((middle - STEP_MM) / GAUGE_MM + 0.5).clamp(0.0, 1.0);
+            let ln_speed = fraction * 1.25_f64.ln();
+            let flow = seen.wave * (std::f64::consts::TAU * middle / 100.0).sin();
+            let [rough, _] = hash::normal_pair(hash::mix(&[5, (middle / 8.0).floor().to_bits()]));
+            let ln_width = flow - seen.exponent * ln_speed + 0.0013 * rough;
+            let reading = WidthReading {
+                width: Mm::constant(42.0 * seen.ratio * ln_width.exp()),
+                sigma: Mm::constant(0.003),
+            };
+            let found = test.measured(Mm::constant(path), reading, Mm::constant(42.0));
+            if let Some(found) = found {
+                assert!((found.speed_change - 0.25).abs() < 0.05, "{found:?}");
+                assert!(found.width_change.abs() < 0.01, "{found:?}");
+                return Some(path - STEP_MM);
+            }
+        }
+        None
+    }
+
+    const ANSWERS: Seen = Seen { exponent: 0.25, farther_mm: 0.0, wave: 0.0, ratio: 1.05 };
+
+    #[test]
+    fn a_width_that_does_not_answer_is_noticed_within_the_offset_and_two_gauges() {
+        let after = noticed_after(Seen { exponent: 0.0, ..ANSWERS }).unwrap();
+        assert!(after <= OFFSET_MM + 2.0 * GAUGE_MM, "{after}");
+    }
+
+    #[test]
+    fn widths_that_answer_are_not_reported_whatever_the_exponent_and_the_error_of_the_offset() {
+        for exponent in [0.175, 0.25, 0.5, 1.0] {
+            for farther_mm in [0.0, 17.0, -17.0] {
+                let seen = Seen { exponent, farther_mm, ..ANSWERS };
+                assert_eq!(noticed_after(seen), None, "{seen:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_width_on_target_is_not_reported() {
+        assert_eq!(noticed_after(Seen { exponent: 0.0, ratio: 1.0, ..ANSWERS }), None);
+    }
+
+    #[test]
+    fn a_flow_that_varies_as_much_anyway_may_have_cancelled_the_speed() {
+        assert_eq!(noticed_after(Seen { exponent: 0.0, wave: 0.02, ..ANSWERS }), None);
+    }
+}
