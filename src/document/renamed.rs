@@ -1,7 +1,7 @@
 //! Keys that have another name now; the table goes before version 1.0.
 
 /// Former names of keys, each with its present one.
-const RENAMED: [(&str, &str); 27] = [
+const RENAMED: [(&str, &str); 26] = [
     ("law", "strategy"),
     ("law", "controller"),
     ("law", "feedback"),
@@ -9,7 +9,6 @@ const RENAMED: [(&str, &str); 27] = [
     ("foretold_from", "predicted_from"),
     ("late_s", "max_delay_s"),
     ("wander_mpa2", "drift_mpa2"),
-    ("model_doubt", "model_uncertainty"),
     ("weak_zone_share", "weak_zone_fraction"),
     ("pulsation_share", "pulsation_fraction"),
     ("most_filling", "max_filling"),

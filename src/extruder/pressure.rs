@@ -18,15 +18,15 @@ use crate::core::{MPa, Rpm, Span, Stamp};
 
 pub mod call_times;
 pub mod command_history;
-pub mod dead_zone;
-pub mod hypothesis;
 pub mod kalman;
+pub mod load;
 pub mod load_step;
-pub mod multiple_model;
 pub mod pi;
 pub mod predictive;
 pub mod reference;
+pub mod residual;
 pub mod smith;
+pub mod target_step;
 pub mod tuning;
 pub mod vsfc;
 
@@ -145,6 +145,12 @@ pub trait PressureController {
     /// The speed that was applied from `now` on in place of the last command, where other
     /// limits acted.
     fn settle(&mut self, now: Stamp, applied: Rpm);
+
+    /// Whether the pressure has not answered a step of its target, for longer than any plant takes
+    /// that is like the model.
+    fn is_unanswered(&self, _now: Stamp) -> bool {
+        false
+    }
 
     /// How far ahead the controller can use the target.
     fn preview(&self) -> Span {

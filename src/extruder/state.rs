@@ -42,6 +42,8 @@ pub enum ExtruderFault {
     Overpressure,
     /// The screw did not turn at its commanded speed.
     SpeedMismatch,
+    /// The pressure did not answer a step of its target.
+    NoPressureResponse,
 }
 
 /// What the extruder side is doing after a step.

@@ -301,6 +301,10 @@ impl Supervisor {
             return;
         }
         let controller = self.setup.strategy.controller_mut();
+        if controller.is_unanswered(now) {
+            self.phase = Phase::Fault(ExtruderFault::NoPressureResponse);
+            return;
+        }
         let demand = controller.demand();
         let (applied, limit) = self.setup.limits.apply(demand.value, self.applied, dt);
         let limit = if limit == CommandLimit::None { controller.limit() } else { limit };

@@ -1,16 +1,20 @@
 //! A simulated extruder from the speed of the screw to the pressure at the nozzle: lag and dead
-//! time, a drifting gain, a load at the input, a limited speed, and a sensor with noise.
+//! time, a drifting gain, a load at the input, a screw with a limited speed and stiction, and a
+//! sensor with noise, resolution, outliers and lost readings.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
-use super::hash::{mix, normal_pair};
+use super::hash::{mix, normal_pair, unit};
 use crate::core::{MPa, Rpm};
 use crate::extruder::pressure::{Fopdt, InitialState};
 use crate::numeric::number::to_count;
 
 /// Step of the plant \[s\]: papers.md, "002", 5 ms.
 pub const TICK_S: f64 = 0.005;
+
+/// Random stream of the sensor's faults. Derived: the bytes of "flts".
+const FAULT_STREAM: u64 = 0x666c_7473;
 
 /// A sinusoidal variation of the gain.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +34,19 @@ pub struct LoadChange {
     pub rpm: f64,
 }
 
+/// What a sensor does to the pressure, besides its noise. All zero: nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SensorFaults {
+    /// Distance of two neighbouring readings \[MPa\]; 0 for a continuous sensor.
+    pub resolution_mpa: f64,
+    /// Fraction of readings that are an outlier, anywhere between 0 and `outlier_up_to_mpa`.
+    pub outlier_fraction: f64,
+    /// Largest outlier \[MPa\].
+    pub outlier_up_to_mpa: f64,
+    /// Fraction of readings that are lost.
+    pub lost_fraction: f64,
+}
+
 /// Disturbances of the process.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Disturbances {
@@ -37,8 +54,12 @@ pub struct Disturbances {
     pub gain_waves: Vec<GainWave>,
     /// A step of the load.
     pub load: Option<LoadChange>,
+    /// The screw keeps its speed until the command is farther from it than this \[rpm\].
+    pub stiction_rpm: f64,
     /// Variance of the sensor's noise \[MPa²\].
     pub noise_mpa2: f64,
+    /// Other faults of the sensor.
+    pub sensor: SensorFaults,
     /// Seed of the noise.
     pub seed: u64,
 }
@@ -101,16 +122,37 @@ impl SimPressure {
         self.speed_rpm
     }
 
-    /// Reading of the sensor.
-    pub fn read(&self) -> MPa {
-        let [normal, _] = normal_pair(mix(&[0x7072_6573, self.disturbances.seed, self.tick]));
-        let noise = self.disturbances.noise_mpa2.sqrt() * normal;
-        MPa::new(self.pressure + noise).unwrap_or_default()
+    /// Reading of the sensor; none where it is lost.
+    pub fn read(&self) -> Option<MPa> {
+        let Disturbances { noise_mpa2, seed, sensor, .. } = &self.disturbances;
+        let [chance, place, lost] =
+            [1, 2, 3].map(|draw| unit(mix(&[FAULT_STREAM, *seed, self.tick, draw])));
+        if lost < sensor.lost_fraction {
+            return None;
+        }
+        let [normal, _] = normal_pair(mix(&[0x7072_6573, *seed, self.tick]));
+        let mut reading = self.pressure + noise_mpa2.sqrt() * normal;
+        if chance < sensor.outlier_fraction {
+            reading = place * sensor.outlier_up_to_mpa;
+        }
+        if sensor.resolution_mpa > 0.0 {
+            reading = (reading / sensor.resolution_mpa).round() * sensor.resolution_mpa;
+        }
+        MPa::new(reading).ok()
     }
 
     /// Commands a speed; the screw has it from the next tick on.
     pub fn command(&mut self, speed: Rpm) {
-        self.speed_rpm = speed.get().clamp(0.0, self.fastest_rpm);
+        let speed = speed.get().clamp(0.0, self.fastest_rpm);
+        if (speed - self.speed_rpm).abs() >= self.disturbances.stiction_rpm {
+            self.speed_rpm = speed;
+        }
+    }
+
+    /// Sets the largest speed of the screw; it slows down to it at once.
+    pub fn limit(&mut self, fastest: Rpm) {
+        self.fastest_rpm = fastest.get();
+        self.speed_rpm = self.speed_rpm.min(self.fastest_rpm);
     }
 
     /// Advances by one tick. The speed that is commanded now acts on the pressure one dead time

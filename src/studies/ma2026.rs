@@ -9,7 +9,9 @@ pub mod table;
 #[cfg(test)]
 mod tests;
 
-pub use experiment::{PressureExperiment, PressureTarget, STEP_EVERY, TestedController};
+pub use experiment::{
+    PressureExperiment, PressureTarget, READ_EVERY, STEP_EVERY, TestedController,
+};
 pub use margins::{MismatchMargins, margins};
 pub use plant::{
     DEAD_TIME_S, DRIFT_MPA2, Factors, LAG_S, LOAD_RPM, MODEL_ERROR, NOISE_MPA2, STEP_MPA, model,

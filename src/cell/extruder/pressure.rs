@@ -61,9 +61,7 @@ pub(super) fn read(table: &Table<'_>, context: &ReadContext<'_>) -> Option<Press
     let noise = or_report(table, "sensor_noise_mpa", PressureNoise::new(drift?, sigma?.powi(2)));
     let choice = match word? {
         ControllerWord::Predictive => {
-            let uncertainty = table.number_or("model_uncertainty", 0.01..=0.2, 0.1)?;
-            let tuning = Tuning::of(&model?, &noise?, uncertainty);
-            or_report(table, "model_uncertainty", tuning).map(PressureChoice::Predictive)
+            Some(PressureChoice::Predictive(Tuning::of(&model?, &noise?)))
         }
         ControllerWord::Vsfc => read_vsfc(table, noise?).map(PressureChoice::Vsfc),
         ControllerWord::Pi => read_pi(table).map(PressureChoice::Pi),

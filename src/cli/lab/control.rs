@@ -1,4 +1,4 @@
-//! `truebead lab control`: control of simulated beads whose reality is not the model.
+//! `truebead lab control`: control of simulated beads and pressures whose reality is not the model.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -14,13 +14,14 @@ use crate::rows::output;
 use crate::studies::control::Case;
 use crate::studies::control::table::{CaseRow, plain};
 
-/// Lays simulated beads whose flow, exponent or camera offset is not the model's.
+/// Controls simulated beads and pressures that are not the model's.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   truebead lab control steps --out control
 
-Prints a table and leaves control.json. Every figure is that of the bead's true width.
+Prints a table and leaves control.json. Every figure is that of the bead's true width, or of the
+true pressure at the nozzle.
 Status 1 if a figure is above what is required.")]
 pub struct ControlArgs {
     /// The cases; all of them where none is named
@@ -49,8 +50,9 @@ impl ValueEnum for Case {
 pub fn run(args: &ControlArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     output::make_folder(&args.out)?;
     let cases = if args.cases.is_empty() { Case::VARIANTS } else { &args.cases };
-    let total = Case::STEPS * u64::try_from(cases.len()).unwrap_or(0);
-    let mut progress = Progress::new("laying", "cells", Some(total), voice.quiet);
+    let total: usize = cases.iter().map(|case| case.steps()).sum();
+    let total = u64::try_from(total).ok();
+    let mut progress = Progress::new("simulating", "cases", total, voice.quiet);
     let mut rows = Vec::new();
     for case in cases {
         rows.extend(case.rows(args.seeds, &mut progress)?);

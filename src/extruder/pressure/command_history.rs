@@ -10,41 +10,14 @@ use super::Fopdt;
 /// feedforward.
 const MAX_COMMANDS_PER_S: f64 = 250.0;
 
-/// A command from a moment on, and the states at that moment.
+/// A command from a moment on, and the pressure at that moment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Entry {
     at_s: f64,
     /// Gain times command \[MPa\].
     drive: f64,
-    lags: LagStates,
-}
-
-/// States of a first lag of the commands and of a second lag of the first \[MPa\].
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct LagStates {
-    /// The pressure of a process with lag and gain and no dead time.
-    pub first: f64,
-    /// `first` through the lag once more, for the sensitivity to the lag.
-    pub second: f64,
-}
-
-impl LagStates {
-    /// After `dt_s` of a constant drive (zero-order hold, closed form).
-    fn after(self, drive: f64, dt_s: f64, lag_s: f64) -> Self {
-        let x = dt_s.max(0.0) / lag_s;
-        let kept = libm::exp(-x);
-        let (first, second) = (self.first - drive, self.second - drive);
-        Self { first: drive + first * kept, second: drive + (second + first * x) * kept }
-    }
-}
-
-/// The model at a moment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ModelMoment {
-    /// Gain times the command that was in force just before \[MPa\].
-    pub drive: f64,
-    /// The states.
-    pub lags: LagStates,
+    /// Pressure of a process with lag and gain and no dead time \[MPa\].
+    pressure: f64,
 }
 
 /// Past commands.
@@ -67,12 +40,18 @@ impl CommandHistory {
         reason = "at most 60 s at 250 a second, some times over"
     )]
     pub fn new(model: &Fopdt, back_s: f64, speed_rpm: f64) -> Self {
-        let drive = model.gain() * speed_rpm;
-        let lags = LagStates { first: drive, second: drive };
         let capacity = (back_s.clamp(0.0, 1e3) * MAX_COMMANDS_PER_S).ceil() as usize + 2;
-        let mut entries = VecDeque::with_capacity(capacity);
-        entries.push_back(Entry { at_s: f64::NEG_INFINITY, drive, lags });
-        Self { gain: model.gain(), lag_s: model.lag_s(), entries, capacity }
+        let entries = VecDeque::with_capacity(capacity);
+        let mut history = Self { gain: model.gain(), lag_s: model.lag_s(), entries, capacity };
+        history.restart(speed_rpm);
+        history
+    }
+
+    /// As if `speed_rpm` had always been commanded.
+    pub fn restart(&mut self, speed_rpm: f64) {
+        let drive = self.gain * speed_rpm;
+        self.entries.clear();
+        self.entries.push_back(Entry { at_s: f64::NEG_INFINITY, drive, pressure: drive });
     }
 
     /// A command from `at_s` on; not before the last one.
@@ -82,7 +61,7 @@ impl CommandHistory {
         if last.is_some_and(|last| drive == last.drive || at_s < last.at_s) {
             return;
         }
-        let entry = Entry { at_s, drive, lags: self.at(at_s).lags };
+        let entry = Entry { at_s, drive, pressure: self.pressure_at(at_s) };
         match self.entries.back_mut() {
             Some(last) if last.at_s == at_s => *last = entry,
             _ => {
@@ -94,16 +73,12 @@ impl CommandHistory {
         }
     }
 
-    /// The model at a moment \[s\]; for one before the oldest command, the model at that command.
-    pub fn at(&self, at_s: f64) -> ModelMoment {
+    /// Pressure of a process with this lag and gain and no dead time \[MPa\], at a moment \[s\];
+    /// for one before the oldest command, at that command. Exact (zero-order hold, closed form).
+    pub fn pressure_at(&self, at_s: f64) -> f64 {
         let entry = self.in_force(at_s);
-        let dt_s = if entry.at_s.is_finite() { at_s - entry.at_s } else { 0.0 };
-        ModelMoment { drive: entry.drive, lags: entry.lags.after(entry.drive, dt_s, self.lag_s) }
-    }
-
-    /// Gain times the command that was in force just before a moment \[MPa\].
-    pub fn drive_at(&self, at_s: f64) -> f64 {
-        self.in_force(at_s).drive
+        let dt_s = if entry.at_s.is_finite() { (at_s - entry.at_s).max(0.0) } else { 0.0 };
+        entry.drive + (entry.pressure - entry.drive) * libm::exp(-dt_s / self.lag_s)
     }
 
     /// The command in force just before: one that begins now does not count.
@@ -127,11 +102,10 @@ mod tests {
         history.push(1.0, 0.3);
         for dt in [0.0, 0.001, 0.41, 0.4137, 2.0] {
             let x = dt / 0.84;
-            let found = history.at(1.0 + dt).lags;
-            assert!((found.first - 0.6 * (1.0 - f64::exp(-x))).abs() < 1e-14, "{dt}");
-            assert!((found.second - 0.6 * (1.0 - (1.0 + x) * f64::exp(-x))).abs() < 1e-14);
+            let found = history.pressure_at(1.0 + dt);
+            assert!((found - 0.6 * (1.0 - f64::exp(-x))).abs() < 1e-14, "{dt}");
         }
-        assert_eq!(history.at(0.9).lags.first, 0.0);
+        assert_eq!(history.pressure_at(0.9), 0.0);
     }
 
     #[test]
@@ -149,7 +123,7 @@ mod tests {
                 expected += 2.0 * (speed - last) * (1.0 - f64::exp(-(t - at) / 0.84));
                 last = *speed;
             }
-            assert!((history.at(t).lags.first - expected).abs() < 1e-12, "{t}");
+            assert!((history.pressure_at(t) - expected).abs() < 1e-12, "{t}");
         }
     }
 
@@ -164,7 +138,7 @@ mod tests {
         }
         for back in [0.0, 0.1, 0.4999] {
             let t = 25.0 - back;
-            assert!((history.at(t).lags.first - all.at(t).lags.first).abs() < 1e-12);
+            assert!((history.pressure_at(t) - all.pressure_at(t)).abs() < 1e-12);
         }
     }
 
@@ -174,6 +148,6 @@ mod tests {
         history.push(1.0, 5.0);
         history.push(1.0, 0.3);
         history.push(0.5, 9.0);
-        assert!((history.at(1.84).lags.first - 0.6 * (1.0 - f64::exp(-1.0))).abs() < 1e-14);
+        assert!((history.pressure_at(1.84) - 0.6 * (1.0 - f64::exp(-1.0))).abs() < 1e-14);
     }
 }

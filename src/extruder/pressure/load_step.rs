@@ -2,7 +2,14 @@
 //! a step that began at any of them to none (Willsky and Jones 1976), with a prior for the size
 //! of the step.
 
-use super::hypothesis::Innovation;
+/// An innovation and its variance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Innovation {
+    /// Measured less predicted pressure \[MPa\].
+    pub difference: f64,
+    /// Its variance \[MPa²\].
+    pub variance: f64,
+}
 
 /// Innovations in the window. A longer one finds smaller steps later and costs more time.
 const WINDOW: usize = 16;
@@ -18,8 +25,6 @@ pub struct LoadStep {
     pub settled: f64,
     /// Fraction of it that shows by now.
     pub shown_fraction: f64,
-    /// Variance of its size \[MPa²\].
-    pub variance: f64,
 }
 
 /// The last innovations.
@@ -50,6 +55,11 @@ impl LoadStepDetector {
         Self { lag_s, step_sigma, threshold, innovations: [NO_INNOVATION; WINDOW], count: 0 }
     }
 
+    /// Discards the innovations.
+    pub fn reset(&mut self) {
+        self.count = 0;
+    }
+
     /// Adds an innovation, `dt_s` after the last. Returns a step that it detects; the window is
     /// empty after that.
     pub fn update(&mut self, innovation: Innovation, dt_s: f64) -> Option<LoadStep> {
@@ -59,7 +69,7 @@ impl LoadStepDetector {
         self.count = (self.count + 1).min(WINDOW);
         let jump = self.likeliest();
         if jump.is_some() {
-            self.count = 0;
+            self.reset();
         }
         jump
     }
@@ -88,14 +98,13 @@ impl LoadStepDetector {
         let with = sums.difference[0] - left * sums.difference[1];
         let power = sums.weight[0] - 2.0 * left * sums.weight[1] + left * left * sums.weight[2];
         if power <= 0.0 {
-            let settled = 0.0;
-            return (f64::NEG_INFINITY, LoadStep { settled, shown_fraction: 0.0, variance: 0.0 });
+            return (f64::NEG_INFINITY, LoadStep { settled: 0.0, shown_fraction: 0.0 });
         }
         let prior = self.step_sigma * self.step_sigma;
         let shrinkage = prior / (prior + 1.0 / power);
         let ratio = 0.5 * with * with / power * shrinkage - 0.5 * libm::log(1.0 + prior * power);
         let settled = shrinkage * with / power;
-        (ratio, LoadStep { settled, shown_fraction: 1.0 - left, variance: shrinkage / power })
+        (ratio, LoadStep { settled, shown_fraction: 1.0 - left })
     }
 }
 

@@ -1,120 +1,254 @@
-//! Predictive control with two degrees of freedom: a reference that lags behind the target,
-//! followed by the inverse of the model, and feedback on the pressure predicted a dead time
-//! ahead. Load and errors of the model are estimated together ([`super::multiple_model`]), so
-//! that neither is attributed to the other; corrections within the noise are applied in part
-//! ([`super::dead_zone`]); on the way to a target the upper bound of the pressure does not pass
-//! it. The controller has no integrator and cannot wind up: the observer uses the applied
-//! commands.
+//! Predictive control with two degrees of freedom. The feedforward inverts the model; the feedback is
+//! PI control of what the pressure lacks of the one that the feedforward should give, with part of
+//! what it has already corrected within the dead time. With a plant that is not the model it is
+//! therefore no worse than PI control: the model makes the feedforward, not the feedback.
+//!
+//! - A step of the target goes only part of the way until the pressure has answered
+//!   ([`super::target_step`]).
+//! - A step of the load is answered at once by the model ([`super::load`]); a second one not before
+//!   the feedback has had its time, so that a wrong gain does not make it swing.
+//! - While nothing has stepped, an error within the noise is corrected in part: the screw stays quiet.
+//!
+//! The feedback has no windup: what a limit keeps from the screw counts as feedforward, and the
+//! feedback is that of the pressure which the applied commands should have given.
 
-use super::call_times::{CallTimes, InitialState};
+use super::call_times::{CallTimes, InitialState, bounded};
 use super::command_history::CommandHistory;
-use super::multiple_model::{MultipleModelFilter, PressurePrediction};
-use super::reference::{Reference, ReferenceSegment};
+use super::load::Load;
+use super::reference::FIRST_PERIOD_S;
+use super::residual::Residual;
+use super::target_step::{Answer, FILTER_DELAY_S, TargetStep};
 use super::tuning::Tuning;
 use super::{Fopdt, PressureController, ReadingRefused, ScrewCommand};
 use crate::core::{MPa, Rpm, Span, Stamp};
 use crate::extruder::limits::CommandLimits;
 
-/// The controller with its state.
+/// Fraction of the corrections within the dead time that count as made. 0 is PI control, 1 Smith's
+/// predictor: this one swings less with twice the gain than the first, and is quicker with a dead
+/// time that is shorter than the model's than the second.
+const PENDING_FRACTION: f64 = 0.4;
+/// Fraction of the proportional gain within the quiet error.
+const QUIET_FRACTION: f64 = 0.3;
+/// Integral time within the quiet error \[s\]: a drift over minutes is followed.
+const QUIET_INTEGRAL_S: f64 = 60.0;
+/// Longest time for which a step of the target is bounded, in dead times and lags together.
+const BOUNDED_FOR: f64 = 1.0;
+/// Time in which a pressure answers a step of its target, in dead times and lags together.
+const ANSWER_WITHIN: f64 = 5.0;
+/// Dead times that are looked back: twice that of the model, and some.
+const LOOK_BACK: f64 = 2.5;
+
+/// The controller with its state. Pressures are in MPa, and what the screw is commanded is in MPa of
+/// the steady state that the model gives for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PredictiveController {
     model: Fopdt,
     tuning: Tuning,
     limits: CommandLimits,
-    history: CommandHistory,
-    filter: MultipleModelFilter,
-    reference: Reference,
     calls: CallTimes,
-    /// Weight of the speed at takeover, in place of the dead zone.
-    takeover_decay: f64,
+    /// All commands.
+    commanded: CommandHistory,
+    /// The part of the feedback in them.
+    fed_back: CommandHistory,
+    residual: Residual,
+    load: Load,
+    /// Whether a step of the load was found since the last command.
+    load_stepped: bool,
+    step: Option<TargetStep>,
+    target: f64,
+    /// Distance of the target from the pressure at takeover; it decays, so that the takeover is
+    /// bumpless.
+    takeover_offset: f64,
+    integral: f64,
+    /// Until when the feedback works in full \[s\].
+    awake_until_s: f64,
+    period_s: f64,
 }
 
 impl PredictiveController {
     /// Takes over bumplessly: the difference of the pressure from the model is attributed to a
     /// load.
     pub fn new(model: Fopdt, tuning: Tuning, limits: CommandLimits, running: InitialState) -> Self {
-        let speed = running.speed.get();
-        let load = running.pressure.get() - model.gain() * speed;
-        let lookback_s = MultipleModelFilter::lookback_s(&model, &tuning);
+        let (speed, pressure) = (running.speed.get(), running.pressure.get());
+        let look_back_s = LOOK_BACK * model.dead_time_s() + FILTER_DELAY_S;
         Self {
             model,
             tuning,
             limits,
-            history: CommandHistory::new(&model, lookback_s, speed),
-            filter: MultipleModelFilter::new(&model, tuning, load),
-            reference: Reference::new(tuning.reference_s, model.lag_s(), running),
             calls: CallTimes::new(running.speed),
-            takeover_decay: 1.0,
+            commanded: CommandHistory::new(&model, look_back_s, speed),
+            fed_back: CommandHistory::new(&model, look_back_s, 0.0),
+            residual: Residual::new(tuning.sigma),
+            load: Load::new(pressure - model.gain() * speed, model.lag_s(), tuning.sigma),
+            load_stepped: false,
+            step: None,
+            target: pressure,
+            takeover_offset: running.target.get() - pressure,
+            integral: 0.0,
+            awake_until_s: f64::NEG_INFINITY,
+            period_s: FIRST_PERIOD_S,
         }
     }
 
-    /// The prediction as of `now`.
-    pub fn prediction(&self, now: Stamp) -> PressurePrediction {
-        self.filter.predict(&self.history.at(now.secs()).lags)
+    fn span_s(&self) -> f64 {
+        self.model.dead_time_s() + self.model.lag_s()
     }
 
-    /// The estimated dead time \[s\].
-    pub fn dead_time_s(&self) -> f64 {
-        self.filter.dead_time_s()
+    /// The pressure that the feedforward alone gives a dead time after a moment \[s\].
+    fn by_feedforward(&self, at_s: f64, load: f64) -> f64 {
+        self.commanded.pressure_at(at_s) - self.fed_back.pressure_at(at_s) + load
     }
 
-    /// The drive \[MPa\] that takes the predicted pressure to another in the time until the next
-    /// command.
-    fn drive(&self, prediction: &PressurePrediction, target: f64, period_s: f64) -> f64 {
-        let kept = libm::exp(-period_s / (self.model.lag_s() * prediction.lag));
-        ((target - kept * prediction.pressure) / (1.0 - kept) - prediction.load) / prediction.gain
-    }
-
-    /// The part of load and gain error that the dead zone leaves uncorrected \[MPa\].
-    fn uncorrected(&self, prediction: &PressurePrediction, target: f64) -> f64 {
-        let needed = (target - prediction.load) / prediction.gain - target;
-        (self.tuning.zone.applied(needed) - needed) * prediction.gain * (1.0 - self.takeover_decay)
-    }
-
-    /// Direction and limit of the drive, so that the upper bound of the pressure does not pass
-    /// the target; none where the reference has arrived.
-    fn bound(&self, ahead: &PressurePrediction, segment: &ReferenceSegment) -> Option<(f64, f64)> {
-        let to_go = segment.target - segment.from;
-        if to_go.abs() <= self.tuning.sigma() {
-            return None;
+    /// Begins, goes on with or ends a step of the target.
+    fn follow_target(&mut self, now_s: f64, target: f64) {
+        let last = std::mem::replace(&mut self.target, target);
+        if (target - last).abs() > self.tuning.target_step {
+            let goes_on = |step: &TargetStep| !step.has_answered() && step.goes_on_to(target, last);
+            if !self.step.as_ref().is_some_and(goes_on) {
+                self.begin_step(now_s);
+            }
+            self.awake_until_s = now_s + self.tuning.awake_s;
         }
-        let sign = to_go.signum();
-        let bound = ahead.higher(sign * self.tuning.caution_sigmas);
-        let top = segment.target + sign * self.tuning.margin;
-        Some((sign, self.drive(&bound, top, segment.period_s)))
+        let bounded_s = BOUNDED_FOR * self.span_s();
+        if self.step.is_some_and(|step| step.has_answered() && now_s - step.began_s > bounded_s) {
+            self.step = None;
+        }
+    }
+
+    fn begin_step(&mut self, now_s: f64) {
+        // What the feedback has settled at belongs to the load from now on.
+        let fed_back = self.fed_back.pressure_at(now_s);
+        self.load.add(-fed_back);
+        self.residual.shift(-fed_back);
+        self.integral -= fed_back;
+        self.fed_back.restart(0.0);
+        let commanded = self.commanded.pressure_at(now_s);
+        let arrived = self.commanded.pressure_at(now_s - self.model.dead_time_s());
+        let measured = arrived + self.load.now() + self.residual.filtered();
+        let expected = commanded + self.load.ahead(self.model.dead_time_s());
+        self.step = Some(TargetStep::new(now_s, expected, commanded, measured));
+    }
+
+    /// What the feedback adds \[MPa\], `dt_s` after the last command.
+    fn feedback(&mut self, now_s: f64, dt_s: f64) -> f64 {
+        let now = self.fed_back.pressure_at(now_s);
+        let then = self.fed_back.pressure_at(now_s - self.model.dead_time_s());
+        let error = -self.residual.filtered() - then - PENDING_FRACTION * (now - then);
+        if error.abs() > self.tuning.quiet_error && now_s > self.awake_until_s {
+            self.awake_until_s = now_s + self.tuning.awake_s;
+        }
+        let Tuning { proportional, integral_s, .. } = self.tuning;
+        let (gain, rate) = if now_s < self.awake_until_s {
+            (proportional, proportional / integral_s)
+        } else {
+            (QUIET_FRACTION * proportional, 1.0 / QUIET_INTEGRAL_S)
+        };
+        // Without an answer an error in the direction of the step says nothing yet.
+        let waits = self
+            .step
+            .is_some_and(|step| !step.has_answered() && step.sign(self.target) * error > 0.0);
+        if !waits {
+            self.integral = bounded(self.integral + rate * error * dt_s);
+        }
+        gain * error + self.integral
+    }
+
+    /// The drive \[MPa\] that takes a pressure by the commands to another until the next command,
+    /// not farther beyond the other than the screw can slow down in time: until the next command
+    /// changes anything, after a time h, the pressure goes on by d·h/τ from a drive that is d beyond
+    /// it, and by d²/(2·r·τ) while the drive falls at a rate r.
+    fn drive(&self, from: f64, to: f64) -> f64 {
+        let kept = libm::exp(-self.period_s / self.model.lag_s());
+        let rate = self.model.gain() * self.limits.rate_per_s();
+        let (wait_s, falls_s2) =
+            (self.period_s, 2.0 * self.model.lag_s() * (to - from).abs() / rate);
+        let beyond = rate * ((wait_s * wait_s + falls_s2).sqrt() - wait_s);
+        let sign = (to - from).signum();
+        let at_once = (to - kept * from) / (1.0 - kept);
+        sign * (sign * at_once).min(sign * to + beyond)
+    }
+
+    /// What the feedforward commands \[MPa\]: it takes the pressure to the target at once after a step,
+    /// and along the reference else.
+    fn feedforward(&self, now_s: f64) -> f64 {
+        let dead_s = self.model.dead_time_s();
+        let load = self.load.ahead(dead_s);
+        let from = self.by_feedforward(now_s, load);
+        let at_once = self.step.is_some() || self.load_stepped;
+        let left = if at_once { 0.0 } else { libm::exp(-self.period_s / self.tuning.reference_s) };
+        let to = self.target + (from - self.target) * left;
+        let next_load = self.load.ahead(dead_s + self.period_s);
+        self.drive(from - load, to - next_load)
+    }
+
+    /// The drive \[MPa\] within what a step of the target allows.
+    fn within_step(&mut self, now_s: f64, drive: f64) -> f64 {
+        let Some(mut step) = self.step else { return drive };
+        let dead_s = self.model.dead_time_s();
+        let arrived = self.commanded.pressure_at(now_s - dead_s - FILTER_DELAY_S);
+        let answer = Answer {
+            arrived,
+            arrived_late: self.commanded.pressure_at(now_s - 2.0 * dead_s - FILTER_DELAY_S),
+            measured: arrived + self.load.now() + self.residual.filtered(),
+        };
+        let bound = step.bound(self.target, &answer);
+        self.step = Some(step);
+        let farthest = self.drive(self.commanded.pressure_at(now_s), bound);
+        let sign = step.sign(self.target);
+        sign * (sign * drive).min(sign * farthest)
     }
 }
 
 impl PressureController for PredictiveController {
     fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), ReadingRefused> {
         let dt_s = self.calls.read(now, pressure)?;
-        self.filter.update(&self.history, now.secs(), dt_s, pressure.get());
+        self.load.advance(dt_s);
+        let arrived = self.commanded.pressure_at(now.secs() - self.model.dead_time_s());
+        let residual = pressure.get() - arrived - self.load.now();
+        if !self.residual.update(residual) {
+            return Ok(());
+        }
+        if now.secs() < self.awake_until_s {
+            self.load.follow(residual);
+        } else if let Some(shown) = self.load.detect(residual, self.residual.sigma(), dt_s) {
+            self.residual.shift(shown);
+            self.load_stepped = true;
+            self.awake_until_s = now.secs() + self.tuning.awake_s;
+        }
         Ok(())
     }
 
     fn step(&mut self, now: Stamp, target: MPa) -> ScrewCommand {
         let Some(dt_s) = self.calls.begin(now) else { return self.calls.last_command() };
-        self.takeover_decay *= libm::exp(-dt_s / self.tuning.return_s);
-        let segment = self.reference.step(target.get(), dt_s);
-        let prediction = self.prediction(now);
-        let left = self.uncorrected(&prediction, segment.target);
-        let closing = libm::exp(-segment.period_s / self.tuning.feedback_s);
-        let next = segment.to + left + closing * (prediction.pressure - segment.from - left);
-        let mut drive = self.drive(&prediction, next, segment.period_s);
-        if let Some((sign, bound)) = self.bound(&prediction, &segment) {
-            drive = sign * (sign * drive).min(sign * bound);
+        if dt_s > 0.0 {
+            self.period_s = dt_s.clamp(1e-4, 1.0);
+            self.takeover_offset *= libm::exp(-dt_s / self.model.lag_s());
         }
+        let now_s = now.secs();
+        self.follow_target(now_s, target.get() - self.takeover_offset);
+        let feedback = self.feedback(now_s, dt_s);
+        let drive = self.feedforward(now_s) + feedback;
+        let drive = self.within_step(now_s, drive);
+        self.load_stepped = false;
         let command = self.calls.command(&self.limits, drive / self.model.gain(), dt_s);
-        self.history.push(now.secs(), command.speed.get());
+        self.commanded.push(now_s, command.speed.get());
+        self.fed_back.push(now_s, feedback / self.model.gain());
         command
     }
 
     fn settle(&mut self, now: Stamp, applied: Rpm) {
         self.calls.settle(applied);
-        self.history.push(now.secs(), applied.get());
+        self.commanded.push(now.secs(), applied.get());
+    }
+
+    fn is_unanswered(&self, now: Stamp) -> bool {
+        self.step.is_some_and(|step| {
+            !step.has_answered() && now.secs() - step.began_s > ANSWER_WITHIN * self.span_s()
+        })
     }
 
     fn preview(&self) -> Span {
-        Span::from_secs(self.filter.dead_time_s() + self.reference.lead_s())
+        let kept = libm::exp(-self.period_s / self.tuning.reference_s);
+        Span::from_secs(self.model.dead_time_s() + self.period_s / (1.0 - kept))
     }
 }

@@ -27,8 +27,7 @@ impl SmithPredictor {
     /// Predicted change of the pressure over the dead time from now \[MPa\].
     pub fn pending_change(&self, now: Stamp) -> f64 {
         let at_s = now.secs();
-        let then = self.history.at(at_s - self.dead_time_s).lags.first;
-        self.history.at(at_s).lags.first - then
+        self.history.pressure_at(at_s) - self.history.pressure_at(at_s - self.dead_time_s)
     }
 
     /// Records a command from now on.

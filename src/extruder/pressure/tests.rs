@@ -25,7 +25,7 @@ fn noise() -> PressureNoise {
 }
 
 fn predictive(limits: CommandLimits, running: InitialState) -> PredictiveController {
-    let tuning = Tuning::of(&model(), &noise(), 0.1).unwrap();
+    let tuning = Tuning::of(&model(), &noise());
     PredictiveController::new(model(), tuning, limits, running)
 }
 
@@ -65,7 +65,7 @@ fn drive(
     while plant.now_s() < until_s {
         let now = Stamp::from_secs(plant.now_s());
         if tick.is_multiple_of(4) {
-            controller.measured(now, plant.read()).unwrap();
+            controller.measured(now, plant.read().unwrap()).unwrap();
         }
         if tick.is_multiple_of(10) {
             plant.command(controller.step(now, MPa::constant(target(plant.now_s()))).speed);
@@ -134,7 +134,7 @@ fn another_limit_that_is_settled_causes_no_windup() {
         for tick in 0..12_000_u64 {
             let now = Stamp::from_secs(plant.now_s());
             if tick.is_multiple_of(4) {
-                controller.measured(now, plant.read()).unwrap();
+                controller.measured(now, plant.read().unwrap()).unwrap();
             }
             if tick.is_multiple_of(10) {
                 let target = if plant.now_s() < 30.0 { 1.5 } else { 0.6 };
@@ -204,37 +204,15 @@ fn a_model_out_of_range_is_refused_with_its_value() {
     assert!(Fopdt::new(1.0, f64::NAN, 0.41).is_err());
     let error = Fopdt::new(1.0, 0.84, -0.1).unwrap_err().to_string();
     assert_eq!(error, "the dead time [s] is -0.1: it must be between 0 and 60");
-    assert!(Tuning::of(&model(), &noise(), 0.5).is_err());
     assert!(VsfcGains::new(1.0, 1.0, 1.5, MPa::ZERO).is_err());
     assert!(PressurePiGains::new(1.0, 0.0, 1.0).is_err());
-}
-
-#[test]
-fn a_step_identifies_the_error_of_the_model() {
-    let cases = [(1.2, 0.84, 0.41), (0.8, 0.84, 0.41), (1.0, 0.84, 0.492), (1.0, 0.84, 0.328)];
-    for (gain, lag, dead) in cases {
-        let start = running(0.0, 0.0, 0.0);
-        let process = Fopdt::new(gain, lag, dead).unwrap();
-        let disturbed = Disturbances { noise_mpa2: 4.98e-5, seed: 3, ..Disturbances::default() };
-        let mut plant = SimPressure::new(process, disturbed, FASTEST, start);
-        let mut controller = predictive(free(), start);
-        drive(&mut controller, &mut plant, 4.0, |_| 0.6);
-        // The plant applies a command one tick later.
-        let dead_found = controller.dead_time_s();
-        assert!((dead_found - dead - 0.005).abs() < 0.025, "{gain} {dead}: {dead_found}");
-        let found = controller.prediction(Stamp::from_secs(4.0));
-        // Gain and load are not separable at a single level.
-        let settled = found.gain * plant.speed_rpm() + found.load;
-        assert!((settled - gain * plant.speed_rpm()).abs() < 0.01, "{gain} {dead}: {found:?}");
-        assert!((found.gain - gain).abs() < 0.07, "{gain} {dead}: {found:?}");
-    }
 }
 
 #[test]
 fn a_process_without_dead_time_is_held_as_well() {
     let process = Fopdt::new(0.02, 2.0, 0.0).unwrap();
     let noise = PressureNoise::new(1e-6, 1e-4).unwrap();
-    let tuning = Tuning::of(&process, &noise, 0.1).unwrap();
+    let tuning = Tuning::of(&process, &noise);
     let limits = CommandLimits::new(0.0, 300.0, 1e6).unwrap();
     let start = running(1.0, 1.0, 50.0);
     let mut controller = PredictiveController::new(process, tuning, limits, start);

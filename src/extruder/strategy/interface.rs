@@ -109,6 +109,11 @@ pub trait ExtruderController {
         CommandLimit::None
     }
 
+    /// Whether what is controlled has not answered, for longer than it can take.
+    fn is_unanswered(&self, _now: Stamp) -> bool {
+        false
+    }
+
     /// The demand now.
     fn demand(&self) -> CommandDemand;
 

@@ -73,7 +73,15 @@ impl ActiveController {
         }
     }
 
-    fn controller(&mut self) -> &mut dyn PressureController {
+    fn controller(&self) -> &dyn PressureController {
+        match self {
+            Self::Predictive(controller) => controller.as_ref(),
+            Self::Vsfc(controller) => controller,
+            Self::Pi(controller) => controller,
+        }
+    }
+
+    fn controller_mut(&mut self) -> &mut dyn PressureController {
         match self {
             Self::Predictive(controller) => controller.as_mut(),
             Self::Vsfc(controller) => controller,
@@ -119,7 +127,7 @@ impl ExtruderController for PressureLoop {
         let active = self.active.get_or_insert_with(|| {
             ActiveController::new(settings, InitialState { pressure, target: pressure, speed })
         });
-        active.controller().measured(now, pressure).map_err(|_| BadReading)
+        active.controller_mut().measured(now, pressure).map_err(|_| BadReading)
     }
 
     fn feedforward(&mut self, _dt: Span, flow: Mm3PerS) {
@@ -128,10 +136,14 @@ impl ExtruderController for PressureLoop {
 
     fn control(&mut self, now: Stamp, _: Span, _: &ExtruderReport) -> Result<(), BadReading> {
         if let Some(active) = &mut self.active {
-            let command = active.controller().step(now, self.target);
+            let command = active.controller_mut().step(now, self.target);
             (self.command_rpm, self.limit) = (command.speed.get(), command.limit);
         }
         Ok(())
+    }
+
+    fn is_unanswered(&self, now: Stamp) -> bool {
+        self.active.as_ref().is_some_and(|active| active.controller().is_unanswered(now))
     }
 
     fn demand(&self) -> CommandDemand {
@@ -151,7 +163,7 @@ impl ExtruderController for PressureLoop {
 
     fn settle(&mut self, now: Stamp, applied: f64) {
         if let (Some(active), Ok(applied)) = (&mut self.active, Rpm::new(applied)) {
-            active.controller().settle(now, applied);
+            active.controller_mut().settle(now, applied);
         }
     }
 }

@@ -18,7 +18,8 @@ use crate::extruder::screw::control::{Scheme, ScrewSettings};
 use crate::extruder::screw::feedback::PlugSetpoint;
 use crate::extruder::screw::{FillFeedback, PiecewiseExponential, ScrewDesign, SpeedPulsation};
 use crate::extruder::{
-    CommandQuantity, ExtruderHold, ExtruderSetup, ExtruderState, Laying, PumpMode, Supervisor,
+    CommandQuantity, ExtruderFault, ExtruderHold, ExtruderSetup, ExtruderState, Laying, PumpMode,
+    Supervisor,
 };
 use crate::numeric::lti::{Between, Simulator, TransferFunction};
 use crate::sim::pressure::{Disturbances, SimPressure};
@@ -130,7 +131,7 @@ impl Machine for Pressed {
     }
 
     fn report(&self) -> ExtruderReport {
-        ExtruderReport { pressure_mpa: Some(self.0.read()), ..report() }
+        ExtruderReport { pressure_mpa: self.0.read(), ..report() }
     }
 }
 
@@ -156,7 +157,7 @@ fn pressed(iterate: fn(&Fopdt, PressureNoise) -> PressureChoice) -> (Supervisor,
 }
 
 fn predictive(process: &Fopdt, noise: PressureNoise) -> PressureChoice {
-    PressureChoice::Predictive(Tuning::of(process, &noise, 0.1).unwrap())
+    PressureChoice::Predictive(Tuning::of(process, &noise))
 }
 
 #[test]
@@ -174,6 +175,38 @@ fn the_pressure_of_a_flow_is_reached_on_every_bead_from_a_standing_screw() {
             run(&mut side, &mut machine, (start + 1000, start + 1000 + pause), Laying::Idle);
         }
     }
+}
+
+/// A machine whose sensor gives the same pressure for good.
+struct Stuck(Pressed, MPa);
+
+impl Machine for Stuck {
+    fn advance(&mut self, command: Option<f64>) {
+        self.0.advance(command);
+    }
+
+    fn report(&self) -> ExtruderReport {
+        ExtruderReport { pressure_mpa: Some(self.1), ..report() }
+    }
+}
+
+#[test]
+fn a_pressure_that_does_not_answer_its_target_is_a_fault_before_the_screw_runs_away() {
+    let flow = |pressure| PowerLaw::PP_GF28.flow(MPa::constant(pressure)).unwrap();
+    let (mut side, mut machine) = pressed(predictive);
+    run(&mut side, &mut machine, (0, 2000), Laying::Bead(flow(0.6)));
+    let stuck = MPa::constant(machine.0.pressure());
+    let mut machine = Stuck(machine, stuck);
+    run(&mut side, &mut machine, (2000, 3000), Laying::Bead(flow(0.6)));
+    assert_eq!(side.state(), ExtruderState::Running);
+    // Five dead times and lags: 6.25 s, of 5 ms a tick.
+    let commands = commanded(&mut side, &mut machine, (3000, 4200), Laying::Bead(flow(0.8)), true);
+    assert_eq!(side.state(), ExtruderState::Running);
+    // 0.8 MPa need 40 rpm: no more, although the sensor says that 0.6 are there.
+    let last = commands.last().copied().unwrap();
+    assert!((last - 40.0).abs() < 2.0, "{last}");
+    run(&mut side, &mut machine, (4200, 4300), Laying::Bead(flow(0.8)));
+    assert_eq!(side.state(), ExtruderState::Fault(ExtruderFault::NoPressureResponse));
 }
 
 /// Reports are missing for half a second from several moments on: the command must resume from

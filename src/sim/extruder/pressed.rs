@@ -28,6 +28,7 @@ impl Pressed {
             load: Some(LoadChange { at_s, rpm }),
             noise_mpa2: plant.sensor_noise_mpa.powi(2),
             seed,
+            ..Disturbances::default()
         };
         let rest = InitialState { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
         let process = SimPressure::new(plant.process, disturbed, plant.max_speed, rest);
@@ -51,7 +52,7 @@ impl SimPlant for Pressed {
     }
 
     fn sense(&mut self, report: &mut ExtruderReport) {
-        report.pressure_mpa = Some(self.process.read());
+        report.pressure_mpa = self.process.read();
         report.screw_rpm = Rpm::new(self.process.speed_rpm()).ok();
     }
 }

@@ -49,10 +49,11 @@ impl LoopCell {
     pub fn is_fast(self) -> bool {
         self.vision_hz > 30.0
     }
+}
 
-    /// Its name in the table.
-    pub fn name(self) -> String {
-        format!("{} mm, {}/{} Hz", self.gauge_mm, self.vision_hz, self.link_hz)
+impl From<LoopCell> for String {
+    fn from(cell: LoopCell) -> Self {
+        format!("{} mm, {}/{} Hz", cell.gauge_mm, cell.vision_hz, cell.link_hz)
     }
 }
 

@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use super::plant::LoopCell;
 use crate::numeric::rank;
 
 /// One figure of one case in one cell. The names of the fields are the keys of `control.json`.
@@ -10,16 +9,19 @@ use crate::numeric::rank;
 pub struct CaseRow {
     /// The case.
     pub case: String,
-    /// Gauge, and rates of camera and robot.
+    /// Gauge, and rates of camera and robot; or the loop.
     pub cell: String,
     /// The figure.
     pub quantity: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// Number of beads.
+    /// Number of beads, or of runs.
     pub beads: usize,
     /// The value; `None` where it was not reached.
     pub value: Option<f64>,
+    /// Half of its confidence interval of 95 %, where it is a mean over the beads.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confidence: Option<f64>,
     /// Largest value that is required.
     pub required: f64,
 }
@@ -37,6 +39,16 @@ impl Quantity {
         Self { name, unit: "mm" }
     }
 
+    /// A quantity with its unit.
+    pub const fn new(name: &'static str, unit: &'static str) -> Self {
+        Self { name, unit }
+    }
+
+    /// A percentage.
+    pub const fn percent(name: &'static str) -> Self {
+        Self { name, unit: "%" }
+    }
+
     /// A ratio.
     pub const fn ratio(name: &'static str) -> Self {
         Self { name, unit: "" }
@@ -46,7 +58,7 @@ impl Quantity {
 impl CaseRow {
     /// A figure of some beads of a case; one that is not finite was not reached.
     pub fn new(
-        cell: LoopCell,
+        cell: impl Into<String>,
         case: &str,
         quantity: Quantity,
         beads: usize,
@@ -55,13 +67,19 @@ impl CaseRow {
     ) -> Self {
         Self {
             case: case.to_owned(),
-            cell: cell.name(),
+            cell: cell.into(),
             quantity: quantity.name,
             unit: quantity.unit,
             beads,
             value: value.is_finite().then_some(value),
+            confidence: None,
             required,
         }
+    }
+
+    /// With half of the confidence interval of its value.
+    pub fn with_confidence(self, confidence: f64) -> Self {
+        Self { confidence: Some(confidence), ..self }
     }
 
     /// Whether the value is within what is required.
@@ -81,9 +99,10 @@ pub fn plain(rows: &[CaseRow]) -> String {
     let quantity_width = rows.iter().map(|row| row.quantity.chars().count()).max().unwrap_or(0);
     let line = |row: &CaseRow| {
         let value = row.value.map_or("never".to_owned(), |value| format!("{value:.4}"));
+        let confidence = row.confidence.map_or(String::new(), |half| format!("±{half:.4}"));
         let met = if row.is_met() { "" } else { "  MISSED" };
         format!(
-            "{:case_width$}  {:18}  {:quantity_width$}  {value:>10} {:2}  at most {:.4}{met}\n",
+            "{:case_width$}  {:18}  {:quantity_width$}  {value:>10} {confidence:8} {:5}  at most {:.4}{met}\n",
             row.case, row.cell, row.quantity, row.unit, row.required
         )
     };

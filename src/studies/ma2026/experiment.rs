@@ -2,9 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::plant::{
-    DRIFT_MPA2, Factors, LAG_S, LOAD_RPM, MODEL_ERROR, NOISE_MPA2, STEP_MPA, model,
-};
+use super::plant::{DRIFT_MPA2, Factors, LAG_S, LOAD_RPM, NOISE_MPA2, STEP_MPA, model};
 use super::response::PressureResponse;
 use crate::core::{MPa, Rpm, Stamp};
 use crate::extruder::CommandLimits;
@@ -18,7 +16,7 @@ use crate::extruder::pressure::{InitialState, PressureController, PressureError}
 use crate::sim::pressure::{Disturbances, GainWave, LoadChange, SimPressure};
 
 /// Plant steps from reading to reading: 50 Hz, Ma et al. 2026.
-const READ_EVERY: u64 = 4;
+pub const READ_EVERY: u64 = 4;
 /// Plant steps from command to command: 20 Hz, Ma et al. 2026.
 pub const STEP_EVERY: u64 = 10;
 
@@ -113,7 +111,7 @@ impl TestedController {
                 Box::new(SmithPi::new(model, gains, 0.23, noise, limits, running))
             }
             Self::Predictive | Self::Previewed => {
-                let tuning = Tuning::of(&model, &noise, MODEL_ERROR / 2.0)?;
+                let tuning = Tuning::of(&model, &noise);
                 Box::new(PredictiveController::new(model, tuning, limits, running))
             }
         })
@@ -203,7 +201,7 @@ impl PressureExperiment {
         let now = Stamp::from_secs(plant.now_s());
         if tick.is_multiple_of(READ_EVERY) {
             // Simulated readings are always current and plausible.
-            let _ = controller.measured(now, plant.read());
+            let _ = plant.read().map(|reading| controller.measured(now, reading));
         }
         if tick.is_multiple_of(self.step_every.max(1)) {
             let ahead = if previewed { controller.preview().secs() } else { 0.0 };

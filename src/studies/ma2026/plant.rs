@@ -58,6 +58,11 @@ impl Factors {
         })
     }
 
+    /// Number of parameters that are not the model's.
+    pub fn wrong(self) -> usize {
+        [self.gain, self.lag, self.dead_time].into_iter().filter(|factor| *factor != 1.0).count()
+    }
+
     /// The plant.
     pub fn process(self) -> Result<Fopdt, PressureError> {
         Fopdt::new(self.gain, LAG_S * self.lag, DEAD_TIME_S * self.dead_time)

@@ -1,0 +1,365 @@
+//! The pressure loop where plant, screw and sensor are not what its model says, beside PI control
+//! of the same plant.
+
+use std::f64::consts::FRAC_PI_2;
+
+use rayon::prelude::*;
+
+use super::table::{CaseRow, Quantity};
+use crate::core::{MPa, Rpm, Stamp};
+use crate::extruder::pressure::{InitialState, PressureError};
+use crate::io::progress::Progress;
+use crate::numeric::average::{mean, standard_deviation};
+use crate::numeric::number::{to_count, to_f64};
+use crate::numeric::root::{BISECTIONS, bisect};
+use crate::sim::pressure::{Disturbances, LoadChange, SensorFaults, SimPressure, TICK_S};
+use crate::studies::error::ReproduceError;
+use crate::studies::ma2026::{
+    DEAD_TIME_S, Factors, LAG_S, LOAD_RPM, NOISE_MPA2, READ_EVERY, STEP_EVERY, STEP_MPA,
+    TestedController,
+};
+
+/// Length of a window after a step, in dead times and lags of the plant together.
+const WINDOW: f64 = 10.0;
+/// Time after a window over which the pressure must rest \[s\].
+const REST_S: f64 = 20.0;
+/// Time before the step \[s\].
+const BEFORE_S: f64 = 1.0;
+/// Largest error of the target that counts, whatever PI control does \[MPa·s\].
+const MOST_IAE: f64 = 0.8;
+/// Smallest phase margin of PI control from which a pair of errors is one to judge \[°\].
+const MIN_PHASE_MARGIN_DEG: f64 = 30.0;
+/// Largest speed of the screw \[rpm\], as in Ma et al. 2026.
+const FASTEST: Rpm = Rpm::constant(3.0);
+/// Fraction of the speed that is needed, while the screw is limited.
+const LIMITED_TO: f64 = 0.7;
+/// Levels of a sensor of ten bits. By definition.
+const LEVELS_10_BIT: f64 = 1024.0;
+/// Largest outlier \[MPa\]: three times the target and more.
+const OUTLIER_MPA: f64 = 2.0;
+/// Half of a confidence interval of 95 % of a normal distribution, in standard deviations.
+const NORMAL_95: f64 = 1.96;
+/// The loop's name in the table.
+const LOOP: &str = "pressure, 50/20 Hz";
+/// A speed below which a screw of 0.02 MPa/rpm does not follow is this part of one of 1 MPa/rpm.
+const STICTION_RPM: f64 = 0.5 * 0.02;
+
+/// A case.
+#[derive(Debug, Clone)]
+struct PressureCase {
+    name: String,
+    factors: Factors,
+    disturbed: Disturbances,
+    is_limited: bool,
+}
+
+/// What one run shows.
+#[derive(Debug, Clone, Copy, Default)]
+struct Figures {
+    /// Integral of the size of the error after the step \[MPa·s\].
+    step_iae: f64,
+    /// The same after the load.
+    load_iae: f64,
+    /// Overshoot of the step, as a fraction of it.
+    overshoot: f64,
+    /// Time to 90 % of the step \[s\].
+    rise_s: f64,
+    /// Size of the mean error after a window, the larger one \[MPa\].
+    rest_error: f64,
+    /// Largest less smallest pressure after a window, the larger one \[MPa\].
+    rest_range: f64,
+}
+
+/// Mean of a figure over the seeds, and half of its confidence interval of 95 %.
+#[derive(Debug, Clone, Copy)]
+struct Average {
+    mean: f64,
+    confidence: f64,
+}
+
+impl Average {
+    fn of(all: &[Figures], figure: impl Fn(&Figures) -> f64) -> Self {
+        let values: Vec<f64> = all.iter().map(figure).collect();
+        let sigma = if values.len() > 1 { standard_deviation(&values) } else { 0.0 };
+        let confidence = NORMAL_95 * sigma / to_f64(values.len()).sqrt();
+        Self { mean: mean(values.iter().copied()), confidence }
+    }
+
+    fn over(self, other: f64) -> Self {
+        Self { mean: self.mean / other, confidence: self.confidence / other }
+    }
+}
+
+fn noisy() -> Disturbances {
+    Disturbances { noise_mpa2: NOISE_MPA2, ..Disturbances::default() }
+}
+
+fn sensed(sensor: SensorFaults) -> Disturbances {
+    Disturbances { sensor, ..noisy() }
+}
+
+fn cases() -> Vec<PressureCase> {
+    let mut cases = vec![PressureCase::of("nothing wrong", noisy())];
+    for gain in [0.5, 0.7, 0.95, 1.4, 2.0] {
+        let factors = Factors { gain, ..Factors::NONE };
+        cases.push(PressureCase::with(format!("gain × {gain}"), factors));
+    }
+    for lag in [0.5, 0.7, 1.4, 2.0] {
+        cases.push(PressureCase::with(format!("lag × {lag}"), Factors { lag, ..Factors::NONE }));
+    }
+    for dead_time in [0.25, 0.35, 0.5, 0.7, 1.4, 2.0] {
+        let factors = Factors { dead_time, ..Factors::NONE };
+        cases.push(PressureCase::with(format!("dead time × {dead_time}"), factors));
+    }
+    for factor in [0.3, 1.5, 2.0, 3.0, 4.0] {
+        let disturbed = Disturbances { noise_mpa2: NOISE_MPA2 * factor * factor, ..noisy() };
+        cases.push(PressureCase::of(format!("noise × {factor}"), disturbed));
+    }
+    let none = SensorFaults::default();
+    for span_mpa in [10.0, 35.0] {
+        let faults = SensorFaults { resolution_mpa: span_mpa / LEVELS_10_BIT, ..none };
+        cases.push(PressureCase::of(format!("10 bit over {span_mpa} MPa"), sensed(faults)));
+    }
+    let outliers = SensorFaults { outlier_fraction: 0.02, outlier_up_to_mpa: OUTLIER_MPA, ..none };
+    cases.push(PressureCase::of("2 % outliers", sensed(outliers)));
+    let lost = SensorFaults { lost_fraction: 0.3, ..none };
+    cases.push(PressureCase::of("30 % of the readings lost", sensed(lost)));
+    let sticky = Disturbances { stiction_rpm: STICTION_RPM, ..noisy() };
+    cases.push(PressureCase::of("stiction", sticky));
+    let limited = PressureCase::of("screw limited to 70 %, then free", noisy());
+    cases.push(PressureCase { is_limited: true, ..limited });
+    cases.extend(pairs().into_iter().map(|factors| {
+        let Factors { gain, lag, dead_time } = factors;
+        PressureCase::with(format!("gain × {gain}, lag × {lag}, dead time × {dead_time}"), factors)
+    }));
+    cases
+}
+
+/// Two of the three parameters wrong, where PI control has its phase margin.
+fn pairs() -> Vec<Factors> {
+    let each = [0.5, 0.7, 1.0, 1.4, 2.0];
+    let dead = [0.25, 0.5, 1.0, 1.5, 2.0];
+    let mut found = Vec::new();
+    for gain in each {
+        for lag in each {
+            for dead_time in dead {
+                let factors = Factors { gain, lag, dead_time };
+                if factors.wrong() == 2 && phase_margin_deg(factors) >= MIN_PHASE_MARGIN_DEG {
+                    found.push(factors);
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Phase margin of the paper's PI control, 1.5·(1 + 1/s), of a plant \[°\].
+fn phase_margin_deg(factors: Factors) -> f64 {
+    let (lag_s, dead_s) = (factors.lag * LAG_S, factors.dead_time * DEAD_TIME_S);
+    let excess = |w: f64| {
+        1.5 * factors.gain * (1.0 + 1.0 / (w * w)).sqrt() / (1.0 + (w * lag_s).powi(2)).sqrt() - 1.0
+    };
+    let crossover = bisect(excess, 1e-3, 1e3, BISECTIONS);
+    let phase = -FRAC_PI_2 + crossover.atan() - (crossover * lag_s).atan() - crossover * dead_s;
+    180.0 + phase.to_degrees()
+}
+
+impl PressureCase {
+    fn window_s(&self) -> f64 {
+        WINDOW * (self.factors.lag * LAG_S + self.factors.dead_time * DEAD_TIME_S)
+    }
+
+    /// When the step begins that is judged \[s\]: the target steps, or a screw that was limited since
+    /// then is free.
+    fn step_at_s(&self) -> f64 {
+        if self.is_limited { BEFORE_S + self.window_s() } else { BEFORE_S }
+    }
+
+    /// When the load comes \[s\].
+    fn load_at_s(&self) -> f64 {
+        self.step_at_s() + self.window_s() + REST_S
+    }
+
+    /// One run: a step of the target, and one of the load.
+    fn run(&self, tried: TestedController, seed: u64) -> Result<Figures, PressureError> {
+        let running = InitialState { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
+        let mut controller = tried.controller(running)?;
+        let mut disturbed = self.disturbed.clone();
+        disturbed.seed = seed;
+        let rpm = LOAD_RPM / self.factors.gain;
+        disturbed.load = Some(LoadChange { at_s: self.load_at_s(), rpm });
+        let mut plant = SimPressure::new(self.factors.process()?, disturbed, FASTEST, running);
+        let limited = Rpm::new(LIMITED_TO * STEP_MPA / self.factors.gain).unwrap_or_default();
+        if self.is_limited {
+            plant.limit(limited);
+        }
+        let end_s = self.load_at_s() + self.window_s() + REST_S;
+        let mut pressures = Vec::with_capacity(to_count(end_s / TICK_S) + 1);
+        let mut tick = 0_u64;
+        while plant.now_s() < end_s {
+            let now_s = plant.now_s();
+            let now = Stamp::from_secs(now_s);
+            pressures.push(plant.pressure());
+            let is_free = now_s >= self.step_at_s();
+            if self.is_limited && is_free {
+                plant.limit(FASTEST);
+            }
+            if tick.is_multiple_of(READ_EVERY) {
+                // Simulated readings are current and plausible.
+                let _ = plant.read().map(|reading| controller.measured(now, reading));
+            }
+            if tick.is_multiple_of(STEP_EVERY) {
+                let target = if now_s >= BEFORE_S { STEP_MPA } else { 0.0 };
+                let command = controller.step(now, MPa::new(target).unwrap_or_default());
+                plant.command(command.speed);
+                if self.is_limited && !is_free && command.speed > limited {
+                    controller.settle(now, limited);
+                }
+            }
+            plant.advance();
+            tick += 1;
+        }
+        Ok(self.figures(&pressures))
+    }
+
+    fn figures(&self, pressures: &[f64]) -> Figures {
+        let part = |from_s: f64, takes_s: f64| {
+            let [from, until] = [from_s, from_s + takes_s]
+                .map(|at_s| to_count((at_s / TICK_S).round()).min(pressures.len()));
+            pressures.get(from..until).unwrap_or_default()
+        };
+        let window_s = self.window_s();
+        let step_at_s = self.step_at_s();
+        let (step, load) = (part(step_at_s, window_s), part(self.load_at_s(), window_s));
+        let rests = [step_at_s, self.load_at_s()].map(|at_s| part(at_s + window_s, REST_S));
+        let rise = step.iter().position(|pressure| *pressure >= 0.9 * STEP_MPA);
+        Figures {
+            step_iae: error_over(step),
+            load_iae: error_over(load),
+            overshoot: highest(step) / STEP_MPA - 1.0,
+            rise_s: rise.map_or(f64::INFINITY, |at| TICK_S * to_f64(at)),
+            rest_error: rests.map(mean_error).into_iter().fold(0.0, f64::max),
+            rest_range: rests.map(range).into_iter().fold(0.0, f64::max),
+        }
+    }
+}
+
+/// Integral of the size of the error \[MPa·s\].
+fn error_over(pressures: &[f64]) -> f64 {
+    pressures.iter().map(|pressure| (pressure - STEP_MPA).abs() * TICK_S).sum()
+}
+
+fn mean_error(pressures: &[f64]) -> f64 {
+    (mean(pressures.iter().copied()) - STEP_MPA).abs()
+}
+
+fn highest(pressures: &[f64]) -> f64 {
+    pressures.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+}
+
+fn range(pressures: &[f64]) -> f64 {
+    highest(pressures) - pressures.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+/// The rows of the study.
+pub fn rows(seeds: u64, progress: &mut Progress) -> Result<Vec<CaseRow>, ReproduceError> {
+    let mut rows = nominal_rows()?;
+    for case in cases() {
+        rows.extend(case.rows(seeds)?);
+        progress.advance();
+    }
+    Ok(rows)
+}
+
+/// Number of steps of progress.
+pub fn count() -> usize {
+    cases().len()
+}
+
+fn row(case: &str, quantity: Quantity, seeds: usize, found: Average, required: f64) -> CaseRow {
+    CaseRow::new(LOOP, case, quantity, seeds, found.mean, required)
+        .with_confidence(found.confidence)
+}
+
+/// Nothing wrong, without noise: one run says all.
+fn nominal_rows() -> Result<Vec<CaseRow>, ReproduceError> {
+    let case = PressureCase::of("nothing wrong, no noise", Disturbances::default());
+    let found = case.run(TestedController::Predictive, 0)?;
+    let row =
+        |quantity, value, required| CaseRow::new(LOOP, &case.name, quantity, 1, value, required);
+    Ok(vec![
+        row(Quantity::new("IAE of a step", "MPa·s"), found.step_iae, 0.39),
+        row(Quantity::percent("overshoot"), 100.0 * found.overshoot, 1.0),
+        row(Quantity::new("rise to 90 %", "s"), found.rise_s, 1.0),
+    ])
+}
+
+impl PressureCase {
+    fn of(name: impl Into<String>, disturbed: Disturbances) -> Self {
+        Self { name: name.into(), factors: Factors::NONE, disturbed, is_limited: false }
+    }
+
+    fn with(name: impl Into<String>, factors: Factors) -> Self {
+        Self { factors, ..Self::of(name, noisy()) }
+    }
+
+    /// All of its rows; of two wrong parameters the one that is nearest to what is required.
+    fn rows(&self, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+        let each = |tried| -> Result<Vec<Figures>, ReproduceError> {
+            (0..seeds).into_par_iter().map(|seed| Ok(self.run(tried, seed)?)).collect()
+        };
+        let ours = each(TestedController::Predictive)?;
+        let free = Self { is_limited: false, ..self.clone() };
+        let theirs: Result<Vec<Figures>, ReproduceError> = (0..seeds)
+            .into_par_iter()
+            .map(|seed| Ok(free.run(TestedController::Pi, seed)?))
+            .collect();
+        let rows = self.judged(&ours, &theirs?);
+        if self.factors.wrong() < 2 {
+            return Ok(rows);
+        }
+        let nearness =
+            |row: &CaseRow| row.value.map_or(f64::INFINITY, |found| found / row.required);
+        Ok(rows
+            .into_iter()
+            .max_by(|a, b| nearness(a).total_cmp(&nearness(b)))
+            .into_iter()
+            .collect())
+    }
+
+    fn judged(&self, ours: &[Figures], theirs: &[Figures]) -> Vec<CaseRow> {
+        let our = |figure: fn(&Figures) -> f64| Average::of(ours, figure);
+        let their = |figure: fn(&Figures) -> f64| mean(theirs.iter().map(figure));
+        let row =
+            |quantity, found, required| row(&self.name, quantity, ours.len(), found, required);
+        let step_iae = their(|run| run.step_iae).min(MOST_IAE);
+        let overshoot = if self.is_limited { 0.05 } else { 0.30 };
+        vec![
+            row(
+                Quantity::ratio("IAE of a step, over PI"),
+                our(|run| run.step_iae).over(step_iae),
+                1.1,
+            ),
+            row(
+                Quantity::ratio("IAE of a load, over PI"),
+                our(|run| run.load_iae).over(their(|run| run.load_iae)),
+                1.1,
+            ),
+            row(
+                Quantity::percent("overshoot"),
+                our(|run| run.overshoot).over(0.01),
+                100.0 * overshoot,
+            ),
+            row(
+                Quantity::new("mean error at rest", "kPa"),
+                our(|run| run.rest_error).over(1e-3),
+                7.0,
+            ),
+            row(
+                Quantity::ratio("range at rest, over PI"),
+                our(|run| run.rest_range).over(their(|run| run.rest_range)),
+                1.1,
+            ),
+        ]
+    }
+}
