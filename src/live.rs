@@ -22,7 +22,6 @@ pub mod run_logger;
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
 
 use crossbeam_channel::{Receiver, bounded, never, unbounded};
 
@@ -42,6 +41,7 @@ use crate::rows::log::RunLog;
 use crate::rows::output::LogError;
 use crate::rows::summary::{RunNote, Summary};
 use crate::run::ports::{ExtruderEvent, ExtruderPort, RecordError, RobotPort};
+use crate::run::robot_z::RobotZ;
 use crate::run::runner::Runner;
 
 use capture::CapturePipeline;
@@ -155,13 +155,13 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         events: robot_events,
     })?;
     let (extruder, from_extruder) = open_extruder(&live)?;
-    let robot_z = Arc::new(AtomicU64::new(f64::NAN.to_bits()));
+    let robot_z = RobotZ::default();
     let capture = CapturePipeline::start(
         source,
         capture::Optics {
             cell: live.cell.clone(),
             calibration: live.calibration.clone(),
-            robot_z: Arc::clone(&robot_z),
+            robot_z: robot_z.clone(),
         },
         recorder.frames(),
         live.clock,

@@ -16,7 +16,6 @@ use super::outcome::status_of_rejections;
 use super::print::Verbosity;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
-use crate::drivers::camera::mcap::RobotZ;
 use crate::drivers::camera::open::{self, OfflineOptions};
 use crate::io::progress::Progress;
 use crate::io::stop::StopSignal;
@@ -26,6 +25,7 @@ use crate::rows::frame_row::FrameRow;
 use crate::rows::log::RunLog;
 use crate::rows::summary::{RunNote, Summary};
 use crate::run::ports::{FrameSource, Grab, SourceError};
+use crate::run::robot_z::RobotZ;
 use crate::vision::{Measurer, Reject, RepeatDetector, RoughnessEstimator};
 
 /// Frames that may wait between reading and measuring: more need memory, fewer leave cores idle.

@@ -104,16 +104,23 @@ impl Controller {
         let Some(path) = sample.nozzle_path.filter(|_| sample.is_own_bead) else { return };
         let target = sample.reading.width - sample.error;
         let found = response.measured(path, sample.reading, target);
+        let factor = self.speed_override(now).unwrap_or(NO_OVERRIDE).max(MIN_OVERRIDE);
         if let Some(found) = found
-            && self.phase.bead().is_some_and(|bead| bead.tracked().is_some())
+            && let Some(bead) = self.phase.bead_mut()
+            && bead.tracked().is_some()
         {
+            // Control may have changed the speed once more since, for nothing.
+            if let Some(setpoint) = &mut bead.setpoint {
+                setpoint.requested = found.speed_before * (1.0 / factor);
+            }
             self.phase.hold(now, Hold::NoResponse(found));
         }
     }
 
     /// The target width where the bead in a frame was laid.
     fn target_of(&self, trace: &Trace) -> Mm {
-        let z = self.robot.state.map_or(Mm::ZERO, |robot| robot.z_mm);
+        let captured_at = trace.captured_at.unwrap_or_default();
+        let z = self.robot.path.z_at(captured_at).unwrap_or_default();
         let path = trace.bead_path_mm.map_or(Mm::ZERO, |path| path - self.bead.start);
         self.setup.control.target.at(z, path)
     }

@@ -1,18 +1,18 @@
 //! Camera and measurement: one thread takes frames, another measures the newest one.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{Builder, JoinHandle};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 
 use super::mailbox::Mailbox;
-use crate::calibration::Calibration;
+use crate::calibration::{Calibration, SurfaceMap};
 use crate::cell::Cell;
-use crate::core::{Frame, ImagePoint, Mm, Stamp};
+use crate::core::{Frame, ImagePoint, Stamp};
 use crate::io::clock::RunClock;
 use crate::io::recorder::FrameTap;
 use crate::run::ports::{FrameSource, Grab};
+use crate::run::robot_z::RobotZ;
 use crate::vision::{
     Measurer, Reject, RepeatDetector, Roughness, RoughnessEstimator, WidthMeasurement,
 };
@@ -23,8 +23,8 @@ pub struct Optics {
     pub cell: Cell,
     /// The calibration of its images.
     pub calibration: Calibration,
-    /// The robot's newest z \[mm\], as bits; NaN before its first report.
-    pub robot_z: Arc<AtomicU64>,
+    /// The robot's z over time.
+    pub robot_z: RobotZ,
 }
 
 /// A message from the capture pipeline to control.
@@ -150,7 +150,7 @@ fn measure_frames(
     while let Some(taken) = mailbox.take() {
         let seen = match taken {
             Taken::Frame(frame, had_at) => {
-                let surface = optics.surface();
+                let surface = optics.surface_at(frame.captured_at);
                 let outcome = measurer.measure(&frame, &surface);
                 let outcome = outcome.map(|found| measurer.with_skew(found));
                 estimator.frame(&measurer, outcome.as_ref().ok(), &surface);
@@ -182,8 +182,59 @@ fn measure_frames(
 }
 
 impl Optics {
-    fn surface(&self) -> crate::calibration::SurfaceMap {
-        let z = Mm::new(f64::from_bits(self.robot_z.load(Ordering::Relaxed))).ok();
-        self.cell.surface(&self.calibration, z)
+    /// The map of the surface that a frame shows which was captured at a time.
+    fn surface_at(&self, captured_at: Stamp) -> SurfaceMap {
+        self.cell.surface(&self.calibration, self.robot_z.z_at(captured_at))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use std::f64::consts::PI;
+    use std::path::Path;
+
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::calibration::Camera;
+    use crate::cell::file::Purpose;
+    use crate::control::Event;
+    use crate::core::{Mm, MmPerS, Pose, RobotMode, RobotState};
+
+    #[test]
+    fn a_frame_that_waits_over_a_layer_change_is_measured_at_the_height_of_its_capture() {
+        let text = include_str!("../../cells/extruder-pressure.toml");
+        let cell = Cell::parse(Path::new("cell.toml"), text, Purpose::Measure).unwrap();
+        let calibration = Calibration::Full {
+            image_size_px: [720, 540],
+            camera: Camera {
+                focal_px: [2500.0, 2500.0],
+                centre_px: [359.5, 269.5],
+                distortion: [0.0; 8],
+            },
+            bed: Pose::new(Vector3::new(PI, 0.0, 0.0), Vector3::new(0.0, 0.0, 400.0)),
+            robot_z: Mm::ZERO,
+            quality: None,
+        };
+        let optics = Optics { cell, calibration, robot_z: RobotZ::default() };
+        for (at, z) in [(1.0, 20.0), (1.5, 40.0)] {
+            let state = RobotState {
+                robot_time_ms: None,
+                has_setpoint: false,
+                mode: RobotMode::Print,
+                speed_mm_per_s: MmPerS::constant(40.0),
+                path_mm: Mm::constant(100.0),
+                z_mm: Mm::constant(z),
+            };
+            optics.robot_z.note(Stamp::from_secs(at), &Event::Robot(state));
+        }
+        let [lower, upper] =
+            [20.0, 40.0].map(|z| optics.cell.surface(&optics.calibration, Some(Mm::constant(z))));
+        assert_ne!(lower, upper);
+        // It is measured after 1.5 s, when the newest height is that of the next layer.
+        assert_eq!(optics.surface_at(Stamp::from_secs(1.4)), lower);
+        assert_eq!(optics.surface_at(Stamp::from_secs(1.5)), upper);
     }
 }

@@ -11,9 +11,6 @@ mod robot;
 mod status_line;
 mod steps;
 
-use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
-
 use crossbeam_channel::Receiver;
 
 use super::capture::CameraMessage;
@@ -24,6 +21,7 @@ use crate::core::{MmPerS, RobotMode, Span, Stamp};
 use crate::drivers::camera::rendered::RobotView;
 use crate::rows::summary::RunNote;
 use crate::run::ports::{ExtruderPort, Recorder, RobotEvent, RobotPort};
+use crate::run::robot_z::RobotZ;
 use crate::run::runner::{Handled, Runner};
 use crate::width_control::limiter::SpeedLimits;
 
@@ -47,7 +45,7 @@ pub struct ControlThread<'a, I, K> {
     pub extruder: Option<ExtruderWatch>,
     pub period: Span,
     pub duration: Option<Span>,
-    pub robot_z: Arc<AtomicU64>,
+    pub robot_z: RobotZ,
     pub robot_view: Option<RobotView>,
     pub latencies: Latencies,
     pub journal: &'a dyn Journal,
@@ -174,6 +172,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     /// Passes an event to the runner and its response to the log.
     fn give(&mut self, event: Event) -> Handled {
         let now = self.inputs.now();
+        self.robot_z.note(now, &event);
         let handled = self.runner.handle(now, &event);
         for failed in [&handled.robot, &handled.extruder] {
             if let Some(Err(reason)) = failed {

@@ -22,6 +22,7 @@ struct Report {
     at: Stamp,
     path: Mm,
     speed: MmPerS,
+    z: Mm,
 }
 
 impl Default for PathHistory {
@@ -45,7 +46,15 @@ impl PathHistory {
         if self.reports.len() == MAX_REPORTS {
             self.reports.pop_front();
         }
-        self.reports.push_back(Report { at, path: state.path_mm, speed: state.speed_mm_per_s });
+        let RobotState { path_mm: path, speed_mm_per_s: speed, z_mm: z, .. } = *state;
+        self.reports.push_back(Report { at, path, speed, z });
+    }
+
+    /// Height of the nozzle at a moment, in the robot's frame: that of the newest report then; of
+    /// the oldest one before it. `None` without reports.
+    pub fn z_at(&self, at: Stamp) -> Option<Mm> {
+        let after = self.reports.partition_point(|report| report.at <= at);
+        self.reports.get(after.saturating_sub(1)).map(|report| report.z)
     }
 
     /// Path of the nozzle at a moment: interpolated between two reports, extrapolated after
@@ -90,6 +99,18 @@ mod tests {
         assert!((path(1.05).unwrap() - 105.0).abs() < 1e-9);
         assert!((path(1.3).unwrap() - 126.0).abs() < 1e-9);
         assert_eq!(path(1.8), None);
+    }
+
+    #[test]
+    fn the_height_is_that_of_the_newest_report_at_the_moment() {
+        let mut history = PathHistory::default();
+        assert_eq!(history.z_at(Stamp::START), None);
+        for (secs, z) in [(1.0, 20.0), (1.2, 40.0)] {
+            let state = RobotState { z_mm: Mm::constant(z), ..report(100.0 * secs, 50.0) };
+            history.observe(Stamp::from_secs(secs), &state);
+        }
+        let z = |secs| history.z_at(Stamp::from_secs(secs)).map(Mm::get);
+        assert_eq!([z(0.5), z(1.1), z(1.2), z(9.0)], [20.0, 20.0, 40.0, 40.0].map(Some));
     }
 
     #[test]

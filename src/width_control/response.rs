@@ -62,6 +62,8 @@ pub struct NoResponse {
     pub width_change: f64,
     /// Path on which both changed \[mm\].
     pub over_mm: f64,
+    /// Speed before that, with the flow of now.
+    pub speed_before: MmPerS,
 }
 
 /// The test.
@@ -218,6 +220,7 @@ impl ResponseTest {
             speed_change: libm::expm1(newest.ln_speeds[0] - oldest.ln_speeds[0]),
             width_change: libm::expm1(newest.ln_width - oldest.ln_width),
             over_mm: newest.position_mm - oldest.position_mm,
+            speed_before: self.speeds.speed_of(oldest.ln_speeds[0]),
         })
     }
 }
@@ -289,6 +292,7 @@ mod tests {
             if let Some(found) = found {
                 assert!((found.speed_change - 0.25).abs() < 0.05, "{found:?}");
                 assert!(found.width_change.abs() < 0.01, "{found:?}");
+                assert!((found.speed_before.get() - 80.0).abs() < 0.1, "{found:?}");
                 return Some(path - STEP_MM);
             }
         }

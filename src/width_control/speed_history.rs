@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use crate::core::MmPerS;
+
 /// Largest number of nodes, whatever the length: more than ten minutes at 50 reports a second
 /// with two nodes each.
 const MAX_NODES: usize = 1 << 16;
@@ -166,6 +168,12 @@ impl SpeedHistory {
         let change = change + self.flow_change() * length;
         let sums = [sum + ln * length, square + ln * ln * length, change];
         self.nodes.push_back(Node { path_mm, at_s, sums });
+    }
+
+    /// The speed that a mean of ln(v/v₀) belongs to, with the flow of the newest report.
+    pub fn speed_of(&self, ln: f64) -> MmPerS {
+        let speed = self.reference_mm_per_s * self.flow_ratio * libm::exp(ln);
+        MmPerS::new(speed).unwrap_or_default()
     }
 
     /// When the nozzle was at a position \[s\]; `None` outside the history.

@@ -2,7 +2,6 @@
 //! or a topic given by name.
 
 mod raw;
-mod robot_z;
 
 #[cfg(test)]
 mod tests;
@@ -12,8 +11,6 @@ use std::sync::Arc;
 
 use prost::Message as _;
 
-pub use robot_z::RobotZ;
-
 use super::fault;
 use crate::core::{Channel, Frame, Stamp};
 use crate::io::foxglove::{COMPRESSED_IMAGE, CompressedImage, RAW_IMAGE, RawImage, timestamp_ns};
@@ -22,6 +19,7 @@ use crate::io::recorder::format::EVENT_TOPIC;
 use crate::io::recording::messages::{Message, Topic};
 use crate::io::recording::{RecordedEntry, Recording, RecordingError, index};
 use crate::run::ports::{FrameSource, Grab, SourceError};
+use crate::run::robot_z::RobotZ;
 
 /// Frames of one topic of an MCAP.
 ///

@@ -7,7 +7,7 @@ use crossbeam_channel::Receiver;
 use super::fault;
 use super::folder::Folder;
 use super::live::{Live, Patience};
-use super::mcap::{McapSource, RobotZ};
+use super::mcap::McapSource;
 use super::rendered::{RenderedCamera, RobotView};
 use super::snapshot::{Snapshot, SnapshotSettings};
 use super::video::VideoFile;
@@ -18,6 +18,7 @@ use crate::cell::file::{CameraSettings, ImageSource};
 use crate::core::{Channel, Span};
 use crate::io::clock::RunClock;
 use crate::run::ports::{FrameSource, Grab, SourceError};
+use crate::run::robot_z::RobotZ;
 use crate::sim::render::{RenderError, Renderer};
 
 /// Failures in a row after which an attached camera counts as lost.

@@ -1,7 +1,5 @@
 //! The robot's part of the control thread: reports of its link.
 
-use std::sync::atomic::Ordering;
-
 use super::ending::Ending;
 use super::{ControlThread, Inputs};
 use crate::control::Event;
@@ -29,7 +27,6 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
         if self.give(Event::Robot(state)).step.trace.report_ignored {
             return;
         }
-        self.robot_z.store(state.z_mm.get().to_bits(), Ordering::Relaxed);
         self.speed = Some(state.speed_mm_per_s);
         if let Some(view) = &self.robot_view {
             view.observe(at, &state);

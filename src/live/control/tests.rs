@@ -166,7 +166,7 @@ impl<K: Recorder> Run<K> {
             extruder: None,
             period: Span::from_secs(1.0 / RATE_HZ),
             duration: self.duration,
-            robot_z: Arc::default(),
+            robot_z: RobotZ::default(),
             robot_view: None,
             latencies: Latencies::default(),
             journal: &notes,

@@ -1,4 +1,5 @@
-//! Height of the nozzle over time, from the robot states in a recording.
+//! Height of the nozzle over time, from the robot's states: a frame is measured with the height at
+//! which it was captured, live as in a recording.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
