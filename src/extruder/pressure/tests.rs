@@ -249,3 +249,48 @@ proptest! {
         }
     }
 }
+
+/// From rest to 0.6 MPa in the paper's noise: the highest pressure, and the lowest and highest one in
+/// the last fifth.
+fn step_of(model: Fopdt, process: Fopdt) -> [f64; 3] {
+    let start = running(0.0, 0.0, 0.0);
+    let tuning = Tuning::of(&model, &noise());
+    let mut controller = PredictiveController::new(model, tuning, free(), start);
+    let disturbed = Disturbances { noise_mpa2: 4.98e-5, seed: 1, ..Disturbances::default() };
+    let mut plant = SimPressure::new(process, disturbed, FASTEST, start);
+    let until_s = 25.0 * (model.lag_s() + model.dead_time_s()) + 5.0;
+    let pressures: Vec<f64> = drive(&mut controller, &mut plant, until_s, |_| 0.6)
+        .into_iter()
+        .map(|(pressure, _)| pressure)
+        .collect();
+    let last = &pressures[pressures.len() * 4 / 5..];
+    let highest = |part: &[f64]| part.iter().copied().fold(f64::MIN, f64::max);
+    [highest(&pressures), last.iter().copied().fold(f64::MAX, f64::min), highest(last)]
+}
+
+#[test]
+fn any_plant_that_is_about_like_its_model_is_held() {
+    for lag in [0.1, 0.3, 0.84, 3.0] {
+        for dead in [0.0, 0.05, 0.2, 0.41, 1.0, 2.5] {
+            let model = Fopdt::new(1.0, lag, dead).unwrap();
+            for (gain, lag_ratio, dead_ratio) in [
+                (1.0, 1.0, 1.0),
+                (0.5, 1.0, 1.0),
+                (1.6, 1.0, 1.0),
+                (1.0, 0.6, 1.0),
+                (1.0, 1.8, 1.0),
+                (1.0, 1.0, 0.4),
+                (1.0, 1.0, 1.6),
+            ] {
+                let process = Fopdt::new(gain, lag * lag_ratio, dead * dead_ratio).unwrap();
+                let [highest, low, high] = step_of(model, process);
+                let plant = format!("{process:?} for {model:?}: {highest}, {low} to {high}");
+                assert!(highest < 1.25 * 0.6, "{plant}");
+                assert!(low > 0.6 - 0.015 && high < 0.6 + 0.015, "{plant}");
+                if process == model {
+                    assert!(highest < 1.02 * 0.6, "{plant}");
+                }
+            }
+        }
+    }
+}

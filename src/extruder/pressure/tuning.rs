@@ -3,15 +3,19 @@
 //!
 //! | setting | rule | reason |
 //! |---|---|---|
-//! | proportional gain | 0.78·τ/L for each unit of gain, L at least τ/4 | as quick as the paper's PI control, 1.5, and stable with half or twice any parameter of the model |
-//! | integral time | 0.95·τ | the same |
+//! | proportional gain | 0.93·τ/(L + 0.08 s) for each unit of gain, the denominator at least τ/4 | as quick as the paper's PI control, 1.5, and stable with half or twice any parameter of the model; hold and filter add 0.08 s to the dead time |
+//! | integral time | 0.95·τ, at least 0.16 s | the same |
 //! | reference lag | 0.56·L, at least τ/4 | the pressure follows a target that moves; a step of the target is not delayed by it |
 //! | step of the target | from 5·σ | a smaller one cannot be told from noise in time |
 //! | quiet error | 5·σ | a drift within the noise moves the screw little |
-//! | awake | 10·(L + τ) | after a step the feedback works in full until the error is gone |
+//! | awake | 10·(L + τ), at least 10 integral times over the proportional gain | after a step the feedback works in full until the error is gone |
 
 use super::Fopdt;
 use super::kalman::PressureNoise;
+
+/// Dead time by the hold of a command and the filter of the readings \[s\], at 20 commands and 50
+/// readings a second (Ma et al. 2026).
+const SAMPLING_S: f64 = 0.08;
 
 /// Settings of the predictive controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,14 +41,16 @@ impl Tuning {
     pub fn of(model: &Fopdt, noise: &PressureNoise) -> Self {
         let (lag, dead) = (model.lag_s(), model.dead_time_s());
         let sigma = noise.sigma().get();
+        let proportional = 0.93 * lag / (dead + SAMPLING_S).max(0.25 * lag);
+        let integral_s = (0.95 * lag).max(2.0 * SAMPLING_S);
         Self {
-            proportional: 0.78 * lag / dead.max(0.25 * lag),
-            integral_s: 0.95 * lag,
+            proportional,
+            integral_s,
             reference_s: (0.56 * dead).max(0.25 * lag),
             sigma,
             target_step: 5.0 * sigma,
             quiet_error: 5.0 * sigma,
-            awake_s: 10.0 * (dead + lag),
+            awake_s: 10.0 * (dead + lag).max(integral_s / proportional),
         }
     }
 }
