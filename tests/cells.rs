@@ -107,6 +107,21 @@ fn a_target_that_the_gauge_would_refuse_is_reported_with_its_key() {
 }
 
 #[test]
+fn another_bead_needs_its_width_and_where_it_begins() {
+    let text = fs::read_to_string(root().join("cells/distance.toml")).unwrap();
+    let with = |lines: &str| {
+        let text = text.replace("[simulation]", &format!("[simulation]\n{lines}"));
+        Cell::parse(Path::new("cell.toml"), &text, Purpose::Run)
+    };
+    let (width, from) = ("other_bead_mm = 45.0", "other_bead_from_mm = 900.0");
+    assert!(with(&format!("{width}\n{from}")).unwrap().simulation.other_bead.is_some());
+    for (line, missing) in [(width, "other_bead_from_mm"), (from, "other_bead_mm")] {
+        let said = with(line).unwrap_err().to_string();
+        assert!(said.contains(&format!("expected {missing} as well: both or none")), "{said}");
+    }
+}
+
+#[test]
 fn the_gauge_names_edge_sigma_and_gamma() {
     let text = fs::read_to_string(root().join("cells/process.toml")).unwrap();
     let with = |line: &str| {

@@ -76,9 +76,16 @@ pub struct OtherBead {
 }
 
 fn read_other_bead(world: &Table<'_>) -> Option<OtherBead> {
-    let from = world.optional_number("other_bead_from_mm", 0.0..=1e7)?;
-    let width = world.optional_number("other_bead_mm", 0.1..=1e3)?;
-    Some(OtherBead { from: Mm::new(from).ok()?, width: Mm::new(width).ok()? })
+    let from = world.optional_number("other_bead_from_mm", 0.0..=1e7);
+    let width = world.optional_number("other_bead_mm", 0.1..=1e3);
+    for (key, other) in
+        [("other_bead_mm", "other_bead_from_mm"), ("other_bead_from_mm", "other_bead_mm")]
+    {
+        if world.has(key) && !world.has(other) {
+            world.report(key, "it alone", format!("{other} as well: both or none"));
+        }
+    }
+    Some(OtherBead { from: Mm::new(from?).ok()?, width: Mm::new(width?).ok()? })
 }
 
 /// Reads the three tables; absent keys have their defaults. Reading goes on after an error, so

@@ -6,8 +6,8 @@ use std::collections::VecDeque;
 
 use super::Fopdt;
 
-/// Commands per second that are kept over the longest dead time: more than the 200 Hz of the
-/// feedforward.
+/// Commands per second that are kept over the longest dead time. Derived: more than the 200 Hz of
+/// the feedforward.
 const MAX_COMMANDS_PER_S: f64 = 250.0;
 
 /// A command from a moment on, and the pressure at that moment.

@@ -15,7 +15,7 @@ pub struct Innovation {
 const WINDOW: usize = 16;
 
 /// Smallest decay over one interval: a step with less of its transient left counts as settled.
-/// Products of it over the window do not underflow.
+/// Derived: products of it over the window, 1e-96, do not underflow.
 const MIN_DECAY: f64 = 1e-6;
 
 /// A step of the load.

@@ -1,15 +1,16 @@
 //! Measured less modelled pressure: filtered, without spikes, and with the noise of the readings.
 
-/// Weight of a reading in the filter. A larger one lets more noise through, a smaller one delays:
-/// this one by a reading.
+/// Weight of a reading in the filter. A larger one lets more noise through, a smaller one delays.
+/// Derived: this one delays by one reading.
 const WEIGHT: f64 = 0.5;
 /// Distance from the filter, in standard deviations of a reading, from which one reading alone is a
 /// spike. A smaller one delays the answer to a step that the model does not predict, a larger one
 /// lets spikes through.
 const SPIKE_SIGMAS: f64 = 15.0;
-/// Weight of a reading in the variance of the noise: over some fifty readings.
+/// Weight of a reading in the variance of the noise. Derived: a mean over fifty readings.
 const NOISE_WEIGHT: f64 = 0.02;
 /// Squares are clipped at this multiple of the variance, so that a step does not count as noise.
+/// Derived: three standard deviations.
 const MAX_SQUARE: f64 = 9.0;
 
 /// The residual with its noise.

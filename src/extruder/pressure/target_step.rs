@@ -8,7 +8,7 @@
 /// with twice the gain the overshoot stays below 30 %, and without an error of the model the
 /// integral of the error of a step in Ma et al. 2026 below 0.39 MPa·s.
 const OVERSHOOT_UNSEEN: f64 = 0.2905;
-/// The same once it has answered: below the noise.
+/// The same once it has answered: twice the noise in the step of Ma et al. 2026.
 const OVERSHOOT_SEEN: f64 = 0.02;
 /// Largest gain over the model's that is expected.
 const LARGEST_GAIN: f64 = 2.0;
@@ -16,7 +16,8 @@ const LARGEST_GAIN: f64 = 2.0;
 /// ratio is used. A smaller one takes noise for an answer.
 const ANSWERED: f64 = 0.15;
 /// Fraction of what the model has moved from which an answer counts at once; a smaller one counts from
-/// the next command on, because it may only be late.
+/// the next command on, because it may only be late. Derived: one parameter of the model is 20 % off,
+/// as in papers.md, "002".
 const NEARLY_WHOLE: f64 = 0.8;
 /// Delay of the filtered residual behind the model \[s\], at 50 readings and 20 commands a second
 /// (Ma et al. 2026): both must be compared at the same age, because they move fast.

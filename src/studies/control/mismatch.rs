@@ -2,9 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::plant::{Control, LoopCell, Plan, TARGET_MM};
+use super::plant::{Control, Draw, LoopCell, Plan, TARGET_MM};
 use super::table::{CaseRow, Quantity, quantile};
-use crate::sim::hash;
 use crate::studies::error::ReproduceError;
 use crate::trials::layer::LayerTrial;
 
@@ -61,17 +60,16 @@ fn errors(trial: &LayerTrial) -> f64 {
 /// A cell whose mismatch and disturbances are drawn by a seed.
 fn drawn_plan(cell: LoopCell, control: Control, seed: u64) -> Result<Plan, ReproduceError> {
     let mut plan = Plan::new(cell, control)?.long(LENGTH_MM);
-    let unit = |number| hash::unit(hash::mix(&[MISMATCH_STREAM, seed, number]));
-    let between = |number, low: f64, high: f64| low + (high - low) * unit(number);
-    plan.assumed_offset = between(0, 0.8, 1.2);
+    let draw = Draw { stream: MISMATCH_STREAM, seed };
+    plan.assumed_offset = draw.between(0, 0.8, 1.2);
     let bead = &mut plan.cell.simulation.bead;
-    let factor = between(1, -std::f64::consts::LN_2, std::f64::consts::LN_2).exp();
+    let factor = draw.ratio_between(1, 0.5, 2.0);
     // The cell's exponent stays; the bead's is the drawn fraction of it.
     (bead.exponent, bead.slow_exponent) = (0.25 / factor, 0.25 / factor);
     let flow = &mut plan.cell.simulation.flow;
-    flow.drift_per_root_m = between(2, 0.0, 0.02);
-    flow.wave_amplitude = between(3, 0.0, 0.02);
-    flow.wavelength_mm = between(4, 60.0_f64.ln(), 2400.0_f64.ln()).exp();
+    flow.drift_per_root_m = draw.between(2, 0.0, 0.02);
+    flow.wave_amplitude = draw.between(3, 0.0, 0.02);
+    flow.wavelength_mm = draw.ratio_between(4, 60.0, 2400.0);
     Ok(plan)
 }
 

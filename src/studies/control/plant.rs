@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::cell::file::{Cell, Purpose, RunPart};
 use crate::core::{Mm, MmPerS};
 use crate::numeric::root::{BISECTIONS, bisect};
+use crate::sim::hash;
 use crate::studies::barjuei2022::scale;
 use crate::studies::error::ReproduceError;
 use crate::trials::layer::LayerTrial;
@@ -142,4 +143,30 @@ impl Plan {
 fn speed_for_target(cell: &Cell) -> f64 {
     let bead = cell.simulation.bead;
     bisect(|speed| bead.width_at(speed) - TARGET_MM, 1.0, 1000.0, BISECTIONS)
+}
+
+/// Numbers that a seed draws, of a random stream.
+#[derive(Debug, Clone, Copy)]
+pub struct Draw {
+    /// The stream.
+    pub stream: u64,
+    /// The seed.
+    pub seed: u64,
+}
+
+impl Draw {
+    /// The number of an index, uniform between two.
+    pub fn between(self, index: u64, low: f64, high: f64) -> f64 {
+        low + (high - low) * hash::unit(hash::mix(&[self.stream, self.seed, index]))
+    }
+
+    /// As [`Self::between`], uniform in the logarithm.
+    pub fn ratio_between(self, index: u64, low: f64, high: f64) -> f64 {
+        self.between(index, low.ln(), high.ln()).exp()
+    }
+
+    /// 1 or −1.
+    pub fn sign(self, index: u64) -> f64 {
+        if self.between(index, -1.0, 1.0) < 0.0 { -1.0 } else { 1.0 }
+    }
 }

@@ -21,9 +21,9 @@ use crate::studies::ma2026::{
 
 /// Length of a window after a step, in dead times and lags of the plant together.
 const WINDOW: f64 = 10.0;
-/// Time after a window over which the pressure must rest \[s\].
+/// Time after a window over which the pressure must rest \[s\]: a period of the sine of Ma et al. 2026.
 const REST_S: f64 = 20.0;
-/// Time before the step \[s\].
+/// Time before the step \[s\]. Derived: the 50 readings from which the noise is known.
 const BEFORE_S: f64 = 1.0;
 /// Largest error of the target that counts, whatever PI control does \[MPa·s\].
 const MOST_IAE: f64 = 0.8;
@@ -35,13 +35,15 @@ const FASTEST: Rpm = Rpm::constant(3.0);
 const LIMITED_TO: f64 = 0.7;
 /// Levels of a sensor of ten bits. By definition.
 const LEVELS_10_BIT: f64 = 1024.0;
-/// Largest outlier \[MPa\]: three times the target and more.
+/// Largest outlier \[MPa\]. Derived: more than three times the target.
 const OUTLIER_MPA: f64 = 2.0;
-/// Half of a confidence interval of 95 % of a normal distribution, in standard deviations.
+/// Half of a confidence interval of 95 %, in standard deviations. Derived: the quantile of 97.5 % of
+/// a normal distribution.
 const NORMAL_95: f64 = 1.96;
 /// The loop's name in the table.
 const LOOP: &str = "pressure, 50/20 Hz";
-/// A speed below which a screw of 0.02 MPa/rpm does not follow is this part of one of 1 MPa/rpm.
+/// Change of speed that the screw does not follow \[rpm\]. Derived: 0.5 rpm of a screw with the 0.02
+/// MPa/rpm of a cell, for one with 1 MPa/rpm.
 const STICTION_RPM: f64 = 0.5 * 0.02;
 
 /// A case.

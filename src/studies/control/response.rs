@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::plant::{Control, LoopCell, Plan, TARGET_MM};
+use super::plant::{Control, Draw, LoopCell, Plan, TARGET_MM};
 use super::table::{CaseRow, Quantity, quantile};
 use crate::control::{Command, Event, Hold, State, Step};
 use crate::core::{Mm, Stamp};
@@ -12,7 +12,6 @@ use crate::run::runner::NoRecorder;
 use crate::scenario::disturbance::Flow;
 use crate::scenario::table::OtherBead;
 use crate::sim::cell::{FrameObservation, Observer, SimCell};
-use crate::sim::hash;
 use crate::studies::barjuei2022::scale;
 use crate::studies::error::ReproduceError;
 
@@ -70,28 +69,10 @@ fn observe(
     (0..seeds).into_par_iter().map(|seed| Noticed::on(&plan(seed)?, seed)).collect()
 }
 
-/// Numbers that a seed draws.
-struct Draw(u64);
-
-impl Draw {
-    fn between(&self, number: u64, low: f64, high: f64) -> f64 {
-        low + (high - low) * hash::unit(hash::mix(&[RESPONSE_STREAM, self.0, number]))
-    }
-
-    /// As [`Self::between`], uniform in the logarithm.
-    fn ratio_between(&self, number: u64, low: f64, high: f64) -> f64 {
-        self.between(number, low.ln(), high.ln()).exp()
-    }
-
-    fn sign(&self, number: u64) -> f64 {
-        if self.between(number, -1.0, 1.0) < 0.0 { -1.0 } else { 1.0 }
-    }
-}
-
 /// From somewhere on the camera sees another bead, 1 to 10 mm off target.
 fn with_other_bead(cell: LoopCell, control: Control, seed: u64) -> Result<Plan, ReproduceError> {
     let mut plan = Plan::new(cell, control)?.long(LENGTH_MM);
-    let draw = Draw(seed);
+    let draw = Draw { stream: RESPONSE_STREAM, seed };
     let width_mm = TARGET_MM + draw.sign(1) * draw.between(0, 1.0, 10.0);
     let (from, width) = (Mm::new(draw.between(2, 600.0, 1600.0)), Mm::new(width_mm));
     plan.cell.simulation.other_bead =
@@ -102,7 +83,7 @@ fn with_other_bead(cell: LoopCell, control: Control, seed: u64) -> Result<Plan, 
 /// A bead on which nothing is wrong: its flow steps, drifts, waves and pulsates.
 fn disturbed(cell: LoopCell, control: Control, seed: u64) -> Result<Plan, ReproduceError> {
     let mut plan = Plan::new(cell, control)?.long(LENGTH_MM);
-    let draw = Draw(seed);
+    let draw = Draw { stream: RESPONSE_STREAM, seed };
     plan.cell.simulation.flow = Flow {
         step_at_mm: draw.between(0, 400.0, 2800.0),
         step_ratio: 1.0 + 0.08 * draw.sign(1),
