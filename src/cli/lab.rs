@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod control;
+mod live;
 mod render;
 mod reproduce;
 
@@ -17,6 +18,7 @@ pub enum LabGroup {
     Reproduce(reproduce::ReproduceArgs),
     Accuracy(accuracy::AccuracyArgs),
     Control(control::ControlArgs),
+    Live(live::LiveArgs),
     Render(render::RenderArgs),
 }
 
@@ -26,6 +28,7 @@ pub fn run(command: &LabGroup, voice: Verbosity) -> anyhow::Result<ExitCode> {
         LabGroup::Reproduce(args) => reproduce::run(args, voice),
         LabGroup::Accuracy(args) => accuracy::run(args, voice),
         LabGroup::Control(args) => control::run(args, voice),
+        LabGroup::Live(args) => live::run(args, voice),
         LabGroup::Render(args) => render::run(args, voice).map(|()| ExitCode::SUCCESS),
     }
 }

@@ -2,8 +2,9 @@
 //! of the flow, pulsation, a wrong exponent, a wrong camera offset. Every case is laid with many
 //! seeds in four cells, and judged by the bead itself, not by what was measured.
 
+pub mod live;
 mod mismatch;
-mod plant;
+pub mod plant;
 mod pressure;
 mod pulsation;
 mod response;

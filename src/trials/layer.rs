@@ -10,6 +10,7 @@ use super::score::{BeadPoint, LayerScore};
 use crate::numeric::average::{mean, rms};
 use crate::numeric::number::to_count;
 use crate::sim::cell::{FrameObservation, Observer, SimCell, SimCellError};
+use crate::sim::laid::LaidBead;
 
 /// Distance between positions at which the bead is judged \[mm\]: that of the bead's own grid.
 const BEAD_SPACING_MM: f64 = 0.5;
@@ -57,16 +58,32 @@ impl LayerTrial {
         let score = LayerScore::new(target_mm);
         let mut watch = StartObserver { score, newest: None, control_start_mm: None };
         let end = sim.layer(Mm::ZERO, &mut watch);
+        let control_start_mm = watch.control_start_mm.unwrap_or(f64::INFINITY);
+        let path_mm = cell.simulation.path.get();
+        let trial = Self::of_bead(sim.bead(), path_mm, control_start_mm, target_mm);
+        Ok(Self { score: watch.score, complete: end.complete, ..trial })
+    }
+
+    /// A bead of a length that was laid elsewhere, without its measured widths: where control of it
+    /// began, and its target width \[mm\].
+    pub fn of_bead(laid: &LaidBead, length_mm: f64, control_start_mm: f64, target_mm: f64) -> Self {
         let (mut bead, mut smooth) = (Vec::new(), Vec::new());
         let mut at = 0.0;
-        while at < cell.simulation.path.get() {
-            bead.extend(sim.bead().width_at(at).map(|width| (at, width)));
-            smooth.extend(sim.bead().smooth_width_at(at).map(|width| (at, width)));
+        while at < length_mm {
+            bead.extend(laid.width_at(at).map(|width| (at, width)));
+            smooth.extend(laid.smooth_width_at(at).map(|width| (at, width)));
             at += BEAD_SPACING_MM;
         }
-        let control_start_mm = watch.control_start_mm.unwrap_or(f64::INFINITY);
-        let (score, complete) = (watch.score, end.complete);
-        Ok(Self { score, bead, smooth, control_start_mm, complete, target_mm })
+        let score = LayerScore::new(target_mm);
+        Self { score, bead, smooth, control_start_mm, complete: true, target_mm }
+    }
+
+    /// The same up to a position \[mm\].
+    pub fn until(&self, mm: f64) -> Self {
+        let part = |points: &[BeadPoint]| {
+            points.iter().copied().take_while(|(at, _)| *at < mm).collect::<Vec<BeadPoint>>()
+        };
+        Self { bead: part(&self.bead), smooth: part(&self.smooth), ..self.clone() }
     }
 
     /// Path from a position until the bead stays within a band about the target \[mm\]; infinite

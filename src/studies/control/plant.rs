@@ -42,12 +42,12 @@ impl LoopCell {
     ];
 
     /// Whether its gauge is longer than the bead's roughness by far.
-    pub fn is_gauge_long(self) -> bool {
+    pub const fn is_gauge_long(self) -> bool {
         self.gauge_mm > 30.0
     }
 
     /// Whether it has a current camera and link.
-    pub fn is_fast(self) -> bool {
+    pub const fn is_fast(self) -> bool {
         self.vision_hz > 30.0
     }
 }

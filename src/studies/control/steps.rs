@@ -7,7 +7,13 @@ use crate::studies::error::ReproduceError;
 use crate::trials::layer::LayerTrial;
 
 /// Path from the first controlled setpoint to a step of the flow \[mm\].
-const STEP_AFTER_MM: f64 = 600.0;
+pub const STEP_AFTER_MM: f64 = 600.0;
+/// Flow after a step over the one before it: the 8 % of papers.md, "004".
+pub const STEP_RATIO: f64 = 1.08;
+/// Path after which the width has settled after the start \[mm\]: in the median, and in 95 %.
+pub const START_LIMITS_MM: (f64, f64) = (10.0, 20.0);
+/// Path after the first controlled setpoint from which the error of a live bead counts \[mm\].
+pub const JUDGED_AFTER_START_MM: f64 = 200.0;
 /// Path over which the flow is too small \[mm\].
 const LOW_FOR_MM: f64 = 600.0;
 /// Length of bead after the flow is back \[mm\].
@@ -39,8 +45,8 @@ fn start_rows(cell: LoopCell, plan: &Plan, seeds: u64) -> Result<Vec<CaseRow>, R
     };
     let alone = plan.roughness_over_gauge_mm();
     Ok(vec![
-        row(Quantity::mm("settled, median"), quantile(&settled, 0.5), 10.0),
-        row(Quantity::mm("settled, 95 %"), quantile(&settled, 0.95), 20.0),
+        row(Quantity::mm("settled, median"), quantile(&settled, 0.5), START_LIMITS_MM.0),
+        row(Quantity::mm("settled, 95 %"), quantile(&settled, 0.95), START_LIMITS_MM.1),
         row(Quantity::ratio("RMS over roughness alone"), pooled(&squares) / alone, 1.3),
         row(Quantity::mm("RMS without roughness"), pooled(&smooth), 0.02),
     ])
@@ -50,13 +56,9 @@ fn more_flow_rows(cell: LoopCell, plan: &Plan, seeds: u64) -> Result<Vec<CaseRow
     let at = plan.run.robot.start_length.get() + STEP_AFTER_MM;
     let mut plan = plan.clone();
     let flow = &mut plan.cell.simulation.flow;
-    (flow.step_at_mm, flow.step_ratio) = (at, 1.08);
+    (flow.step_at_mm, flow.step_ratio) = (at, STEP_RATIO);
     let settled = plan.each(seeds, |trial| settled_after(trial, at))?;
-    let (median, most) = match (cell.is_gauge_long(), cell.is_fast()) {
-        (true, _) => (100.0, 140.0),
-        (false, false) => (120.0, 140.0),
-        (false, true) => (100.0, 115.0),
-    };
+    let (median, most) = step_limits_mm(cell);
     let row = |quantity, value, required| {
         CaseRow::new(cell, "flow +8 %", quantity, settled.len(), value, required)
     };
@@ -64,6 +66,16 @@ fn more_flow_rows(cell: LoopCell, plan: &Plan, seeds: u64) -> Result<Vec<CaseRow
         row(Quantity::mm("settled, median"), quantile(&settled, 0.5), median),
         row(Quantity::mm("settled, 95 %"), quantile(&settled, 0.95), most),
     ])
+}
+
+/// Path after which the width has settled after a step of the flow \[mm\]: in the median, and in
+/// 95 %.
+pub const fn step_limits_mm(cell: LoopCell) -> (f64, f64) {
+    match (cell.is_gauge_long(), cell.is_fast()) {
+        (true, _) => (100.0, 140.0),
+        (false, false) => (120.0, 140.0),
+        (false, true) => (100.0, 115.0),
+    }
 }
 
 /// With too little flow the speed is at its limit; the bead is judged once the flow is back.

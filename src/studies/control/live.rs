@@ -1,0 +1,197 @@
+//! Beads that are laid live, over sockets, judged by what the robot did.
+
+use super::plant::{BAND_MM, Control, LoopCell, Plan, TARGET_MM};
+use super::steps::{
+    JUDGED_AFTER_START_MM, START_LIMITS_MM, STEP_AFTER_MM, STEP_RATIO, step_limits_mm,
+};
+use super::table::{CaseRow, Quantity, quantile};
+use crate::cell::file::Cell;
+use crate::core::RobotMode;
+use crate::numeric::average::mean;
+use crate::numeric::number::to_f64;
+use crate::sim::bead_follower::{BeadFollower, BeadRecipe};
+use crate::simulators::robot::TrueState;
+use crate::studies::error::ReproduceError;
+use crate::trials::layer::LayerTrial;
+
+/// Length of the first part of the bead, at the start speed \[mm\]: papers.md, "004".
+const START_MM: f64 = 200.0;
+/// Length of a bead \[mm\]. Derived: the first part, the longest setpoint period after it, and
+/// 1200 mm under control.
+pub const BEAD_MM: f64 = START_MM + 25.0 + 1200.0;
+/// Length of a rendered image along the bead \[px\]. Derived: the default of `[render]`.
+const IMAGE_PX: f64 = 540.0;
+/// Scale of the study's cell \[mm/px\]: Shojaei Barjuei et al. 2022, section 4.3.
+const MM_PER_PX: f64 = 0.126_582;
+/// Change of the speed that is a controlled setpoint, as a fraction. Derived: the simulated robot
+/// keeps a speed to a thousandth.
+const CONTROLLED: f64 = 0.005;
+/// Speed at the start of a bead \[mm/s\]: Shojaei Barjuei et al. 2022, section 4.3.
+const START_MM_PER_S: f64 = 112.5;
+
+/// The study's cell for a live run against a robot at an address, with rendered frames.
+pub fn cell_text(cell: LoopCell, address: &str, seed: u64) -> String {
+    let gauge_px = (cell.gauge_mm / MM_PER_PX).round().min(IMAGE_PX - 40.0);
+    let from_px = (0.5 * (IMAGE_PX - gauge_px)).round();
+    let step_at_mm = START_MM + STEP_AFTER_MM;
+    let text = include_str!("cell.toml")
+        .replace("roi_px = [40, 20, 640, 500]", &format!("roi_px = [120, {from_px}, 480, {gauge_px}]"))
+        .replace("rate_hz = 50.0", &format!("rate_hz = {:?}", cell.vision_hz))
+        .replace("rate_hz = 20.0", &format!("rate_hz = {:?}", cell.link_hz))
+        .replace("127.0.0.1:5653", address)
+        .replace(
+            "[bead]",
+            &format!(
+                "[render]\nnoise_grey = 4.0\nblur_px = 1.5\n\n[bead]\nflow_step_at_mm = {step_at_mm:?}\n\
+                 flow_step_ratio = {STEP_RATIO:?}"
+            ),
+        )
+        .replace("[simulation]", &format!("[simulation]\nseed = {seed}"));
+    format!("{text}\n[recording]\nevery_nth_frame = 100\nmax_rejected_share = 0.30\n")
+}
+
+/// The bead that a robot has laid, from its own states; `None` where control never began.
+pub fn laid(cell: &Cell, states: &[TrueState]) -> Option<LayerTrial> {
+    let simulation = &cell.simulation;
+    let mut follower = BeadFollower::new(BeadRecipe {
+        model: simulation.bead,
+        roughness: simulation.roughness,
+        flow: simulation.flow,
+        seed: simulation.seed,
+    });
+    for TrueState { at, state } in states {
+        follower.observe(*at, &(*state).into());
+    }
+    let prints = states.iter().map(|one| one.state).filter(|one| one.mode == RobotMode::Print);
+    let at_start = |speed: f64| (speed / START_MM_PER_S - 1.0).abs() < CONTROLLED;
+    let mut before = prints.skip_while(|one| one.path_mm.get() < 0.9 * START_MM);
+    // The last state at the start speed: the first controlled setpoint came after it.
+    let mut control_start_mm = before.next()?.path_mm.get();
+    for state in before {
+        if !at_start(state.speed_mm_per_s.get()) {
+            return Some(LayerTrial::of_bead(
+                follower.bead(),
+                BEAD_MM,
+                control_start_mm,
+                TARGET_MM,
+            ));
+        }
+        control_start_mm = state.path_mm.get();
+    }
+    None
+}
+
+/// Figures of one bead.
+#[derive(Debug, Clone, Copy)]
+pub struct LiveFigures {
+    start_mm: f64,
+    step_mm: f64,
+    mean_square: f64,
+}
+
+impl LiveFigures {
+    /// Of a bead in a cell.
+    pub fn of(cell: LoopCell, trial: &LayerTrial) -> Self {
+        let step_at_mm = START_MM + STEP_AFTER_MM;
+        let before = trial.until(step_at_mm);
+        let from_mm = trial.control_start_mm;
+        Self {
+            start_mm: before.smooth_settles_within(from_mm, f64::INFINITY, BAND_MM),
+            step_mm: trial.smooth_settles_within(step_at_mm, f64::INFINITY, BAND_MM),
+            mean_square: before.mean_square_over(cell.gauge_mm, from_mm + JUDGED_AFTER_START_MM),
+        }
+    }
+}
+
+/// The rows of a cell, from its beads.
+pub fn rows(cell: LoopCell, beads: &[LiveFigures]) -> Result<Vec<CaseRow>, ReproduceError> {
+    let starts: Vec<f64> = beads.iter().map(|bead| bead.start_mm).collect();
+    let steps: Vec<f64> = beads.iter().map(|bead| bead.step_mm).collect();
+    let pooled = mean(beads.iter().map(|bead| bead.mean_square)).sqrt();
+    let alone = Plan::new(cell, Control::Distance)?.roughness_over_gauge_mm();
+    let row = |case, quantity, value, required| {
+        CaseRow::new(cell, case, quantity, beads.len(), value, required)
+    };
+    let (median, most) = step_limits_mm(cell);
+    let late = |settled: &[f64], limit: f64| {
+        to_f64(settled.iter().filter(|mm| **mm > limit).count()) / to_f64(beads.len())
+    };
+    let (start, step) = ("live: 42 mm from 38.6", "live: flow +8 %");
+    Ok(vec![
+        row(start, Quantity::mm("settled, median"), quantile(&starts, 0.5), START_LIMITS_MM.0),
+        row(
+            start,
+            Quantity::ratio("fraction settled later"),
+            late(&starts, START_LIMITS_MM.1),
+            0.05,
+        ),
+        row(start, Quantity::ratio("RMS over roughness alone"), pooled / alone, 1.3),
+        row(step, Quantity::mm("settled, median"), quantile(&steps, 0.5), median),
+        row(step, Quantity::ratio("fraction settled later"), late(&steps, most), 0.05),
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use std::path::Path;
+
+    use super::*;
+    use crate::cell::file::Purpose;
+    use crate::core::{Mm, MmPerS, Stamp};
+    use crate::link::RobotStatus;
+
+    fn parsed(cell: LoopCell) -> Cell {
+        let text = cell_text(cell, "127.0.0.1:9", 7);
+        Cell::parse(Path::new("live.toml"), &text, Purpose::Run).unwrap()
+    }
+
+    #[test]
+    fn a_live_cell_has_the_rates_and_the_gauge_of_the_study() {
+        for cell in LoopCell::ALL {
+            let found = parsed(cell);
+            let run = found.run.as_ref().unwrap();
+            assert_eq!((run.camera.rate_hz, run.robot.rate_hz), (cell.vision_hz, cell.link_hz));
+            let gauge_mm = to_f64(found.gauge.roi.height) * MM_PER_PX;
+            assert!((gauge_mm - cell.gauge_mm).abs() < 0.4, "{gauge_mm}");
+            assert_eq!(found.simulation.seed, 7);
+            let flow = found.simulation.flow;
+            assert_eq!((flow.step_at_mm, flow.step_ratio), (START_MM + STEP_AFTER_MM, STEP_RATIO));
+            assert_eq!(run.robot.start_length.get(), START_MM);
+            assert_eq!(run.robot.start_speed.get(), START_MM_PER_S);
+        }
+    }
+
+    #[test]
+    fn a_bead_is_judged_from_the_last_place_at_the_start_speed_on() {
+        let cell = parsed(LoopCell::ALL[0]);
+        let mut states = Vec::new();
+        let (mut path, mut number) = (0.0, 0_u64);
+        while path < BEAD_MM {
+            let speed = if path < 210.0 { START_MM_PER_S } else { 77.0 };
+            path += 0.02 * speed;
+            number += 1;
+            let state = RobotStatus {
+                t_ms: 20 * number,
+                seq: number,
+                mode: RobotMode::Print,
+                speed_mm_per_s: MmPerS::constant(speed),
+                path_mm: Mm::constant(path),
+                z_mm: Mm::ZERO,
+            };
+            let at = Stamp::from_secs(f64::from(u32::try_from(number).unwrap()) * 0.02);
+            states.push(TrueState { at, state });
+        }
+        let trial = laid(&cell, &states).unwrap();
+        assert!((trial.control_start_mm - 211.5).abs() < 1.2, "{}", trial.control_start_mm);
+        // 38.6 mm at the start speed, 42 mm after it, wider after the step of the flow.
+        let smooth = |at: f64| {
+            trial.smooth.iter().find(|(place, _)| *place >= at).map(|(_, width)| *width).unwrap()
+        };
+        assert!((smooth(100.0) - 38.6).abs() < 0.1 && (smooth(500.0) - 42.0).abs() < 0.1);
+        assert!((smooth(1000.0) / smooth(500.0) - STEP_RATIO).abs() < 1e-9);
+        let figures = LiveFigures::of(LoopCell::ALL[0], &trial);
+        assert!(figures.start_mm < 5.0 && figures.step_mm.is_infinite(), "{figures:?}");
+    }
+}
