@@ -11,7 +11,7 @@ use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::cli::live_cell::{Folders, Until, live};
 use crate::cli::print::Verbosity;
-use crate::core::{Mm, Span};
+use crate::core::{Mm, RobotState, Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::io::progress::Progress;
 use crate::link::{PrintJob, RobotParams};
@@ -78,7 +78,8 @@ fn lay(cell: LoopCell, seed: u64, folder: &Path) -> anyhow::Result<LiveFigures> 
     let folders = Folders { recording: folder, log: folder };
     let until = Until { duration_s: Some(DURATION_S), ends_with_steps: false };
     live(loaded, folders, "Live".into(), until, clock, Verbosity { quiet: true })?;
-    let states = robot.history();
+    let states: Vec<(Stamp, RobotState)> =
+        robot.history().into_iter().map(|one| (one.at, one.state.into())).collect();
     robot.stop();
     let trial = laid(&simulated, &states)
         .with_context(|| format!("control of the bead in {} never began", folder.display()))?;

@@ -6,11 +6,10 @@ use super::steps::{
 };
 use super::table::{CaseRow, Quantity, quantile};
 use crate::cell::file::Cell;
-use crate::core::RobotMode;
+use crate::core::{RobotMode, RobotState, Stamp};
 use crate::numeric::average::mean;
 use crate::numeric::number::to_f64;
 use crate::sim::bead_follower::{BeadFollower, BeadRecipe};
-use crate::simulators::robot::TrueState;
 use crate::studies::error::ReproduceError;
 use crate::trials::layer::LayerTrial;
 
@@ -50,8 +49,9 @@ pub fn cell_text(cell: LoopCell, address: &str, seed: u64) -> String {
     format!("{text}\n[recording]\nevery_nth_frame = 100\nmax_rejected_share = 0.30\n")
 }
 
-/// The bead that a robot has laid, from its own states; `None` where control never began.
-pub fn laid(cell: &Cell, states: &[TrueState]) -> Option<LayerTrial> {
+/// The bead that a robot has laid, from its own states and their times; `None` where control never
+/// began.
+pub fn laid(cell: &Cell, states: &[(Stamp, RobotState)]) -> Option<LayerTrial> {
     let simulation = &cell.simulation;
     let mut follower = BeadFollower::new(BeadRecipe {
         model: simulation.bead,
@@ -59,10 +59,10 @@ pub fn laid(cell: &Cell, states: &[TrueState]) -> Option<LayerTrial> {
         flow: simulation.flow,
         seed: simulation.seed,
     });
-    for TrueState { at, state } in states {
-        follower.observe(*at, &(*state).into());
+    for (at, state) in states {
+        follower.observe(*at, state);
     }
-    let prints = states.iter().map(|one| one.state).filter(|one| one.mode == RobotMode::Print);
+    let prints = states.iter().map(|one| one.1).filter(|one| one.mode == RobotMode::Print);
     let at_start = |speed: f64| (speed / START_MM_PER_S - 1.0).abs() < CONTROLLED;
     let mut before = prints.skip_while(|one| one.path_mm.get() < 0.9 * START_MM);
     // The last state at the start speed: the first controlled setpoint came after it.
@@ -139,8 +139,7 @@ mod tests {
 
     use super::*;
     use crate::cell::file::Purpose;
-    use crate::core::{Mm, MmPerS, Stamp};
-    use crate::link::RobotStatus;
+    use crate::core::{Mm, MmPerS};
 
     fn parsed(cell: LoopCell) -> Cell {
         let text = cell_text(cell, "127.0.0.1:9", 7);
@@ -167,21 +166,19 @@ mod tests {
     fn a_bead_is_judged_from_the_last_place_at_the_start_speed_on() {
         let cell = parsed(LoopCell::ALL[0]);
         let mut states = Vec::new();
-        let (mut path, mut number) = (0.0, 0_u64);
+        let (mut path, mut at_s) = (0.0, 0.0);
         while path < BEAD_MM {
             let speed = if path < 210.0 { START_MM_PER_S } else { 77.0 };
-            path += 0.02 * speed;
-            number += 1;
-            let state = RobotStatus {
-                t_ms: 20 * number,
-                seq: number,
+            (path, at_s) = (path + 0.02 * speed, at_s + 0.02);
+            let state = RobotState {
+                robot_time_ms: None,
+                has_setpoint: true,
                 mode: RobotMode::Print,
                 speed_mm_per_s: MmPerS::constant(speed),
                 path_mm: Mm::constant(path),
                 z_mm: Mm::ZERO,
             };
-            let at = Stamp::from_secs(f64::from(u32::try_from(number).unwrap()) * 0.02);
-            states.push(TrueState { at, state });
+            states.push((Stamp::from_secs(at_s), state));
         }
         let trial = laid(&cell, &states).unwrap();
         assert!((trial.control_start_mm - 211.5).abs() < 1.2, "{}", trial.control_start_mm);
