@@ -157,6 +157,13 @@ impl Cell {
         layers.zip(robot_z).map_or(Mm::ZERO, |(layers, z)| z - layers.first_z)
     }
 
+    /// As a live run takes it: frames are measured, whatever the level of the simulation.
+    #[must_use]
+    pub fn live(mut self) -> Self {
+        self.simulation.width_source = WidthSource::Frames;
+        self
+    }
+
     /// Whether widths are simulated without images.
     pub fn simulates_widths(&self) -> bool {
         self.run.as_ref().is_some_and(|run| run.camera.source == ImageSource::Rendered)

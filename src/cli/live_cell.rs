@@ -58,7 +58,7 @@ pub struct Folders<'a> {
 
 /// Runs a loaded cell; recording and log may have the same folder.
 pub fn live(
-    loaded: LoadedCell,
+    mut loaded: LoadedCell,
     folders: Folders<'_>,
     title: String,
     until: Until,
@@ -66,6 +66,8 @@ pub fn live(
     voice: Verbosity,
 ) -> anyhow::Result<LiveReport> {
     refuse_a_recording_in(folders.recording)?;
+    loaded.cell = loaded.cell.live();
+    loaded.check_camera_offset()?;
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
     let robot = loaded.devices.robot.as_ref().context("the cell names no robot")?;
     let robot = Arc::clone(&robot.driver);

@@ -50,7 +50,7 @@ pub fn attached_cell(
         refuse!("{file}: the attachment cell.toml is missing");
     };
     let name = format!("cell.toml in {file}");
-    let cell = Cell::parse(Path::new(&name), text, purpose)?;
+    let cell = Cell::parse(Path::new(&name), text, purpose)?.live();
     let calibration = match &cell.calibration {
         CalibrationSource::Scale { mm_per_px, sigma } => {
             Calibration::Scale { mm_per_px: *mm_per_px, sigma: *sigma }

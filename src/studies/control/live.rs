@@ -140,6 +140,7 @@ mod tests {
     use super::*;
     use crate::cell::file::Purpose;
     use crate::core::{Mm, MmPerS};
+    use crate::studies::barjuei2022::scale;
 
     fn parsed(cell: LoopCell) -> Cell {
         let text = cell_text(cell, "127.0.0.1:9", 7);
@@ -152,7 +153,7 @@ mod tests {
             let found = parsed(cell);
             let run = found.run.as_ref().unwrap();
             assert_eq!((run.camera.rate_hz, run.robot.rate_hz), (cell.vision_hz, cell.link_hz));
-            let gauge_mm = to_f64(found.gauge.roi.height) * MM_PER_PX;
+            let gauge_mm = found.clone().live().gauge_length(&scale()).get();
             assert!((gauge_mm - cell.gauge_mm).abs() < 0.4, "{gauge_mm}");
             assert_eq!(found.simulation.seed, 7);
             let flow = found.simulation.flow;
